@@ -1,0 +1,51 @@
+// What a bench file says: where the devices are and how they are mounted.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "compensation/units.hpp"
+
+namespace kphi::profiles {
+
+struct NetBoxPlace {
+  std::string host;              ///< name or address
+  std::uint16_t rdt_port = 49152;
+  std::uint16_t http_port = 80;
+  double rate_hz = 7000;         ///< RDT output rate expected of the box
+  int records_per_datagram = 40; ///< 1..40; 1 = real-time mode
+};
+
+struct MotorPlace {
+  std::string device;        ///< /dev/serial/by-id/... or a pty
+  unsigned baud = 115200;
+  int module_id = 0;         ///< 0..62
+  int spin = +1;             ///< +1 counter-clockwise seen from above, -1 clockwise: the sign of commanded speeds
+  double telemetry_hz = 50;  ///< speed readings per second of bench time; the others come in turn
+  RadPerSec speed_max;       ///< what this motor may be told at most
+};
+
+/// The simulated bench: how fast, from which seed, and where a person tells it what is mounted.
+struct Simulation {
+  bool in_process = false;   ///< true: the deterministic bench, virtual time, no transport
+  double time_scale = 1;     ///< bench seconds per wall second
+  std::uint64_t seed = 1;
+  std::string control;       ///< path of the control line (Unix socket); relative to the system's temporary folder
+};
+
+struct Bench {
+  std::string name;
+  NetBoxPlace netbox;
+  MotorPlace iq;
+  int thrust_axis = 2;       ///< 0..2 = Fx, Fy, Fz
+  int thrust_sign = +1;      ///< sign of the axis when the propeller pulls
+  std::optional<Simulation> simulation;
+  std::string text;          ///< the file, verbatim
+  std::string path;
+};
+
+[[nodiscard]] Bench load_bench(const std::string& path);
+[[nodiscard]] Bench parse_bench(const std::string& text, const std::string& path);
+
+}  // namespace kphi::profiles

@@ -1,0 +1,58 @@
+// What a campaign file says: propeller × occlusions × repetitions of one step profile.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "compensation/units.hpp"
+
+namespace kphi::profiles {
+
+/// One physical propeller. `id` is short and goes into file names ("5x3").
+struct Propeller {
+  std::string id;
+  std::string name;
+  double diameter_in = 0;
+  int blades = 0;
+};
+
+/// Commanded speeds of one run, held `dwell` each. The levels are evenly spaced and include both ends.
+struct StepProfile {
+  int steps = 0;
+  Seconds dwell;
+  RadPerSec first;
+  RadPerSec last;
+  /// All levels, ascending or descending, `steps` of them.
+  [[nodiscard]] std::vector<RadPerSec> levels() const;
+};
+
+/// Beyond these the run is refused (speed) or stopped (the rest).
+struct Limits {
+  RadPerSec speed_max;
+  Newtons thrust_max;
+  Amperes supply_current_max;
+  Celsius coil_temperature_max;
+};
+
+struct Campaign {
+  std::string name;
+  std::string operator_name;  ///< may be empty
+  Propeller propeller;
+  std::vector<double> occlusions_deg;  ///< degrees in [0, 360), each once, as listed
+  int repetitions = 3;
+  StepProfile profile;
+  Seconds zero;             ///< motor off, before and after each run
+  Seconds minimum_discard;  ///< at the start of every step, not averaged
+  Limits limits;
+  Volts supply;
+  std::string text;  ///< the file, verbatim
+  std::string path;
+};
+
+/// Strict: refuses duplicate and unknown keys, wrong units and types. Throws ConfigurationError with file:line:column.
+[[nodiscard]] Campaign load_campaign(const std::string& path);
+/// As load_campaign, from text; `path` only names it in messages.
+[[nodiscard]] Campaign parse_campaign(const std::string& text, const std::string& path);
+
+}  // namespace kphi::profiles

@@ -1,0 +1,48 @@
+// One row of steps.csv: what one step of one run (or the average of its repetitions) measured.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace kphi::results {
+
+/// Why a step is not to be trusted without a look. A set of bits; the names stand in steps.csv, joined by '+'.
+enum class Doubt : std::uint32_t {
+  none = 0,
+  speed_not_reached = 1u << 0,  ///< mean speed further than 1 % (and 2 rad/s) from the command
+  speed_unsteady = 1u << 1,     ///< speed spread over the window above 1 % of its mean (and 5 rad/s)
+  saturated = 1u << 2,          ///< a status word with the saturation bit, or a count at its limit
+  lost_samples = 1u << 3,       ///< fewer records in the window than ft_sequence says
+  derated = 1u << 4,            ///< the module derated
+  few_samples = 1u << 5,        ///< under a tenth of the expected load-cell samples, or under 3 speed readings
+  bad_status = 1u << 6,         ///< another error bit of the box
+};
+
+struct StepMean {
+  std::string propeller;
+  int blades = 0;
+  double diameter_in = 0;
+  double occlusion_deg = 0;
+  int repetition = 0;             ///< 1-based; 0 in an average over repetitions
+  int step = 0;                   ///< 0-based
+  double commanded_speed_rad_s = 0;
+  double speed_rad_s = 0;         ///< mean, unsigned
+  double speed_sd_rad_s = 0;
+  std::uint64_t speed_n = 0;
+  double thrust_n = 0;            ///< mean, zero subtracted, N
+  double thrust_sd_n = 0;
+  std::uint64_t thrust_samples = 0;
+  double torque_nm = 0;           ///< mean about the thrust axis, zero subtracted
+  double torque_sd_nm = 0;
+  double zero_n = 0;              ///< zero that was subtracted from the thrust at this step
+  double supply_voltage_v = 0;
+  double supply_current_a = 0;
+  double motor_current_a = 0;
+  double coil_temperature_degc = 0;
+  double window_begin_s = 0;      ///< since the run's epoch
+  double window_end_s = 0;
+  std::uint32_t doubts = 0;       ///< bits of Doubt
+};
+
+}  // namespace kphi::results
