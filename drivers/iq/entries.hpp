@@ -350,9 +350,9 @@ struct Path {
 template <Path path>
 concept Known = (find(path.view()) != nullptr);
 template <Path path>
-concept Readable = Known<path> &&(find(path.view())->allows(Access::get));
+concept Readable = (Known<path>)&&(find(path.view())->allows(Access::get));
 template <Path path>
-concept Writable = Known<path> &&(find(path.view())->allows(Access::set));
+concept Writable = (Known<path>)&&(find(path.view())->allows(Access::set));
 
 /// entry<"power_monitor.volts">: unknown names do not compile.
 template <Path path>

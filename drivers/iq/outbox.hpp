@@ -1,0 +1,49 @@
+// Frames on their way to the wire, in order, except that coast goes before everything that has not begun.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "drivers/iq/packet.hpp"
+
+namespace kphi::iq {
+
+class Outbox {
+ public:
+  enum class Kind : std::uint8_t { request, setting, motion, coast };
+
+  /// False when there is no room: nobody has taken bytes for long.
+  [[nodiscard]] bool push(Kind kind, const Packet& packet) noexcept;
+  /// Withdraws every motion command that has not begun to leave, and goes out before all other frames. Never refused;
+  /// up to three may wait.
+  void push_coast(const Packet& packet) noexcept;
+
+  /// All bytes that wait, contiguous; valid until the next call of another member.
+  [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return {wire_.data(), wire_size_}; }
+  /// The first `n` of them have left.
+  void sent(std::size_t n) noexcept;
+
+ private:
+  static constexpr std::size_t kFrames = 24;
+  static constexpr std::size_t kWaitingCoasts = 3;
+  struct Frame {
+    Kind kind = Kind::request;
+    std::size_t size = 0;
+    std::array<std::uint8_t, kMaxFrame> bytes{};
+  };
+
+  void insert(std::size_t at, Kind kind, const Packet& packet) noexcept;
+  void erase(std::size_t at) noexcept;
+  void lay_out() noexcept;
+  [[nodiscard]] std::size_t first_whole() const noexcept { return begun_ > 0 ? 1 : 0; }
+
+  std::array<Frame, kFrames> frames_;
+  std::size_t count_ = 0;
+  std::size_t begun_ = 0;  ///< bytes of the first frame that have left
+  std::array<std::uint8_t, kFrames * kMaxFrame> wire_{};
+  std::size_t wire_size_ = 0;
+};
+
+}  // namespace kphi::iq
