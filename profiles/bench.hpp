@@ -10,15 +10,15 @@
 namespace kphi::profiles {
 
 struct NetBoxPlace {
-  std::string host;              ///< name or address
+  std::string host;  ///< name or address
   std::uint16_t rdt_port = 49152;
   std::uint16_t http_port = 80;
-  double rate_hz = 7000;         ///< RDT output rate expected of the box
-  int records_per_datagram = 40; ///< 1..40; 1 = real-time mode
+  double rate_hz = 7000;          ///< RDT output rate expected of the box
+  int records_per_datagram = 40;  ///< 1..40; 1 = real-time mode
 };
 
 struct MotorPlace {
-  std::string device;        ///< /dev/serial/by-id/... or a pty
+  std::string device;  ///< /dev/serial/by-id/... or a pty
   unsigned baud = 115200;
   int module_id = 0;         ///< 0..62
   int spin = +1;             ///< +1 counter-clockwise seen from above, -1 clockwise: the sign of commanded speeds
@@ -28,20 +28,20 @@ struct MotorPlace {
 
 /// The simulated bench: how fast, from which seed, and where a person tells it what is mounted.
 struct Simulation {
-  bool in_process = false;   ///< true: the deterministic bench, virtual time, no transport
-  double time_scale = 1;     ///< bench seconds per wall second
+  bool in_process = false;  ///< true: the deterministic bench, virtual time, no transport
+  double time_scale = 1;    ///< bench seconds per wall second
   std::uint64_t seed = 1;
-  std::string control;       ///< path of the control line (Unix socket); relative to the system's temporary folder
+  std::string control;  ///< path of the control line (Unix socket); relative to the system's temporary folder
 };
 
 struct Bench {
   std::string name;
   NetBoxPlace netbox;
   MotorPlace iq;
-  int thrust_axis = 2;       ///< 0..2 = Fx, Fy, Fz
-  int thrust_sign = +1;      ///< sign of the axis when the propeller pulls
+  int thrust_axis = 2;   ///< 0..2 = Fx, Fy, Fz
+  int thrust_sign = +1;  ///< sign of the axis when the propeller pulls
   std::optional<Simulation> simulation;
-  std::string text;          ///< the file, verbatim
+  std::string text;  ///< the file, verbatim
   std::string path;
 };
 

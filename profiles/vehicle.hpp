@@ -15,7 +15,7 @@ struct Vehicle {
   Metres half_side;
   Metres arm_length;
   Metres propeller_radius;
-  std::array<double, 4> hinge_turn_deg{};            ///< 0, 90, 180, 270: corner of each arm
+  std::array<double, 4> hinge_turn_deg{};                ///< 0, 90, 180, 270: corner of each arm
   std::map<std::string, std::array<Radians, 4>> shapes;  ///< X, H, O, T: arm angles
   Radians arm_angle_min;
   Radians arm_angle_max;

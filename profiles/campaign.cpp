@@ -1,0 +1,80 @@
+#include "profiles/campaign.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "profiles/profile_reader.hpp"
+
+namespace kphi::profiles {
+namespace {
+
+void check_speeds(ProfileReader& file) {
+  const double most = file.number("/limits/speed_max_rpm");
+  for (const char* end : {"/profile/first_rpm", "/profile/last_rpm"}) {
+    if (file.number(end) <= most) continue;
+    file.refuse(end, fmt::format("{} is above {} RPM (limits.speed_max_rpm)", file.number(end), most),
+                "lower it, or raise the limit if propeller and motor bear it");
+  }
+}
+
+void check_window(ProfileReader& file) {
+  const double dwell = file.number("/profile/dwell_s");
+  const double discard = file.number("/minimum_discard_s");
+  if (dwell > discard) return;
+  file.refuse("/profile/dwell_s", fmt::format("{} is not above {} s (minimum_discard_s)", dwell, discard),
+              "dwell longer, or nothing is left to average");
+}
+
+void check_occlusions(ProfileReader& file, const std::vector<double>& occlusions_deg) {
+  for (std::size_t i = 1; i < occlusions_deg.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (occlusions_deg[i] != occlusions_deg[j]) continue;
+      file.refuse(fmt::format("/occlusions_deg/{}", i),
+                  fmt::format("{} degrees is listed before, at [{}]", occlusions_deg[i], j),
+                  "list each occlusion once; repetitions says how often it is run");
+      break;
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<RadPerSec> StepProfile::levels() const {
+  std::vector<RadPerSec> levels;
+  for (int i = 0; i < steps; ++i) {
+    const double share = steps > 1 ? static_cast<double>(i) / (steps - 1) : 0.0;
+    levels.emplace_back(std::lerp(first.value(), last.value(), share));  // exact at both ends
+  }
+  return levels;
+}
+
+Campaign parse_campaign(const std::string& text, const std::string& path) {
+  ProfileReader file(text, path, FileKind::campaign);
+  Campaign campaign;
+  campaign.name = file.text("/name");
+  campaign.operator_name = file.get_or<std::string>("/operator", "");
+  campaign.propeller = {file.text("/propeller/id"), file.text("/propeller/name"), file.number("/propeller/diameter_in"),
+                        file.get<int>("/propeller/blades")};
+  campaign.occlusions_deg = file.get<std::vector<double>>("/occlusions_deg");
+  campaign.repetitions = file.get_or<int>("/repetitions", campaign.repetitions);
+  campaign.profile = {file.get<int>("/profile/steps"), Seconds(file.number("/profile/dwell_s")),
+                      from_rpm(file.number("/profile/first_rpm")), from_rpm(file.number("/profile/last_rpm"))};
+  campaign.zero = Seconds(file.number("/zero_s"));
+  campaign.minimum_discard = Seconds(file.number("/minimum_discard_s"));
+  campaign.limits = {from_rpm(file.number("/limits/speed_max_rpm")), Newtons(file.number("/limits/thrust_max_n")),
+                     Amperes(file.number("/limits/supply_current_max_a")),
+                     Celsius(file.number("/limits/coil_temperature_max_degc"))};
+  campaign.supply = Volts(file.number("/supply_v"));
+  campaign.text = text;
+  campaign.path = path;
+  check_speeds(file);
+  check_window(file);
+  check_occlusions(file, campaign.occlusions_deg);
+  file.finish();
+  return campaign;
+}
+
+Campaign load_campaign(const std::string& path) { return parse_campaign(read_text(path), path); }
+
+}  // namespace kphi::profiles

@@ -1,0 +1,224 @@
+#include "profiles/check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "profiles/key_names.hpp"
+#include "profiles/plan.hpp"
+#include "profiles/schema.hpp"
+#include "profiles/vehicle.hpp"
+
+namespace kphi::profiles {
+namespace {
+
+constexpr const char* kCoefficients = "coefficients";
+constexpr const char* kCoefficientFormat = "kphi-coefficients/1";
+
+/// What the files of one call were, for the checks of one against another.
+struct Loaded {
+  std::vector<std::pair<std::size_t, Campaign>> campaigns;  ///< with the file's number
+  std::vector<Bench> benches;
+};
+
+std::string minutes(Seconds time) {
+  const auto seconds = std::llround(time.value());
+  return seconds < 120 ? fmt::format("{} s", seconds) : fmt::format("{} min {:02} s", seconds / 60, seconds % 60);
+}
+
+std::string summary_of(const Campaign& campaign, const Plan& plan, double rate_hz) {
+  const StepProfile& profile = campaign.profile;
+  const double increment = (to_rpm(profile.last) - to_rpm(profile.first)) / (profile.steps - 1);
+  return fmt::format(
+      "  propeller  {} ({}, {} in, {} blades)\n"
+      "  runs       {}: occlusions {:g} degrees, {} repetitions of each, {} mountings\n"
+      "  steps      {}: {} per run, {:.6g} to {:.6g} RPM by {:.6g} RPM, {:g} s each\n"
+      "  time       {} spinning, {} with the zeros, besides mounting\n"
+      "  disk       {:.3g} million samples at {:g} Hz, {:.3g} MB\n",
+      campaign.propeller.id, campaign.propeller.name, campaign.propeller.diameter_in, campaign.propeller.blades,
+      plan.runs.size(), fmt::join(campaign.occlusions_deg, ", "), campaign.repetitions, plan.mountings, plan.steps,
+      profile.steps, to_rpm(profile.first), to_rpm(profile.last), increment, profile.dwell.value(),
+      minutes(plan.spinning), minutes(plan.bench), static_cast<double>(plan.samples) / 1e6, rate_hz,
+      static_cast<double>(plan.bytes) / 1e6);
+}
+
+nlohmann::ordered_json report_of(const Plan& plan) {
+  return {{"runs", plan.runs.size()},      {"mountings", plan.mountings},
+          {"steps", plan.steps},           {"spinning_s", plan.spinning.value()},
+          {"bench_s", plan.bench.value()}, {"samples_in_steps", plan.samples_in_steps},
+          {"samples", plan.samples},       {"bytes", plan.bytes}};
+}
+
+std::string summary_of(const Bench& bench) {
+  const std::string simulated =
+      !bench.simulation ? "no"
+      : bench.simulation->in_process
+          ? fmt::format("in process, seed {}", bench.simulation->seed)
+          : fmt::format("{:g} times faster, seed {}", bench.simulation->time_scale, bench.simulation->seed);
+  return fmt::format(
+      "  net box    {}, RDT port {}, HTTP port {}, {:g} Hz, {} records per datagram\n"
+      "  motor      {} at {} baud, module {}, spin {:+}, at most {:.6g} RPM\n"
+      "  thrust     along {}F{}\n"
+      "  simulated  {}\n",
+      bench.netbox.host, bench.netbox.rdt_port, bench.netbox.http_port, bench.netbox.rate_hz,
+      bench.netbox.records_per_datagram, bench.iq.device, bench.iq.baud, bench.iq.module_id, bench.iq.spin,
+      to_rpm(bench.iq.speed_max), bench.thrust_sign > 0 ? '+' : '-', "xyz"[bench.thrust_axis], simulated);
+}
+
+std::string summary_of(const Vehicle& vehicle) {
+  std::string shapes;
+  for (const auto& [name, angles] : vehicle.shapes) {
+    shapes += fmt::format("  shape {:<4} arms at", name);
+    for (const Radians angle : angles) shapes += fmt::format(" {:.6g}", to_degrees(angle));
+    shapes += " degrees\n";
+  }
+  return fmt::format(
+      "  body       half side {:g} m, arms {:g} m, propeller radius {:g} m\n"
+      "  speeds     {:.6g} to {:.6g} RPM\n{}",
+      vehicle.half_side.value(), vehicle.arm_length.value(), vehicle.propeller_radius.value(),
+      to_rpm(vehicle.speed_min), to_rpm(vehicle.speed_max), shapes);
+}
+
+/// Value of the first line `format: …`: enough for a file that is no YAML, or YAML of another kind.
+std::string format_line(const std::string& text) {
+  constexpr std::string_view kKey = "format:";
+  std::size_t begin = text.compare(0, kKey.size(), kKey) == 0 ? 0 : text.find("\nformat:");
+  if (begin == std::string::npos) return "";
+  begin = text.find(':', begin) + 1;
+  begin = std::min(text.find_first_not_of(" \"'", begin), text.size());
+  return text.substr(begin, text.find_first_of(" \"'\r\n#", begin) - begin);
+}
+
+std::string format_of(const std::string& text, const std::string& path) {
+  try {
+    const SourceDocument document = parse_strict_yaml(text, path);
+    const auto* object = document.value.get_ptr<const nlohmann::json::object_t*>();
+    if (object == nullptr) return "";
+    const auto format = object->find("format");
+    return format != object->end() && format->second.is_string() ? format->second.get<std::string>() : "";
+  } catch (const RefusedFile&) {
+    return format_line(text);
+  }
+}
+
+std::optional<FileKind> kind_by_keys(const SourceDocument& document) {
+  static constexpr std::array<std::pair<const char*, FileKind>, 6> kTelltales{{{"occlusions_deg", FileKind::campaign},
+                                                                               {"profile", FileKind::campaign},
+                                                                               {"netbox", FileKind::bench},
+                                                                               {"iq", FileKind::bench},
+                                                                               {"shapes_deg", FileKind::vehicle},
+                                                                               {"half_side_m", FileKind::vehicle}}};
+  if (!document.value.is_object()) return std::nullopt;
+  for (const auto& [key, kind] : kTelltales) {
+    if (document.value.contains(key)) return kind;
+  }
+  return std::nullopt;
+}
+
+std::optional<FileKind> kind_of(const std::string& format) {
+  for (const FileKindInfo& candidate : kFileKinds) {
+    if (format == candidate.format) return candidate.kind;
+  }
+  return std::nullopt;
+}
+
+/// By its format; without a known one by its keys, so that it gets all its findings at once.
+FileKind recognise(const std::string& text, const std::string& path, const std::string& format) {
+  if (const auto kind = kind_of(format)) return *kind;
+  const SourceDocument document = parse_strict_yaml(text, path);
+  if (const auto kind = kind_by_keys(document)) return *kind;
+  std::vector<std::string> formats{kCoefficientFormat};
+  for (const FileKindInfo& candidate : kFileKinds) formats.emplace_back(candidate.format);
+  const auto near = nearest_name(format, formats);
+  throw RefusedFile(path, {{document.value_mark("/format"), "/format",
+                            format.empty() ? "the file does not say what it is" : format + " is not a known format",
+                            near ? fmt::format("did you mean format: {}?", *near)
+                                 : fmt::format("begin it with format: and one of {}", fmt::join(formats, ", "))}});
+}
+
+void judge(CheckedFile& file, std::size_t number, const CoefficientJudge& judge_coefficients, Loaded& loaded) {
+  const std::string text = read_text(file.path);
+  const std::string format = format_of(text, file.path);
+  if (format == kCoefficientFormat) {
+    file.kind = kCoefficients;
+    file.summary = judge_coefficients(file.path);
+    return;
+  }
+  const FileKind kind = recognise(text, file.path, format);
+  file.kind = info(kind).word;
+  if (kind == FileKind::campaign) {
+    const Campaign campaign = parse_campaign(text, file.path);
+    const Bench usual;
+    const Plan plan = make_plan(campaign, usual);
+    file.summary = summary_of(campaign, plan, usual.netbox.rate_hz);
+    file.report["plan"] = report_of(plan);
+    loaded.campaigns.emplace_back(number, campaign);
+  } else if (kind == FileKind::bench) {
+    loaded.benches.push_back(parse_bench(text, file.path));
+    file.summary = summary_of(loaded.benches.back());
+  } else {
+    file.summary = summary_of(parse_vehicle(text, file.path));
+  }
+}
+
+void refuse(CheckedFile& file, const std::string& error, nlohmann::ordered_json details = {}) {
+  file.errors.push_back(error);
+  details["message"] = error;
+  file.report["errors"].push_back(std::move(details));
+  file.summary.clear();
+}
+
+CheckedFile check_file(const std::string& path, std::size_t number, const CoefficientJudge& judge_coefficients,
+                       Loaded& loaded) {
+  CheckedFile file;
+  file.path = path;
+  file.report = {{"file", path}, {"kind", nullptr}, {"ok", true}, {"errors", nlohmann::ordered_json::array()}};
+  try {
+    judge(file, number, judge_coefficients, loaded);
+  } catch (const RefusedFile& refused) {
+    for (const Finding& finding : refused.findings()) {
+      refuse(file, describe(path, finding),
+             {{"line", finding.mark.line},
+              {"column", finding.mark.column},
+              {"what", finding.what},
+              {"next_move", finding.next_move}});
+    }
+  } catch (const std::runtime_error& refused) {
+    refuse(file, refused.what());
+  }
+  return file;
+}
+
+void check_against_benches(std::vector<CheckedFile>& files, const Loaded& loaded) {
+  for (const auto& [number, campaign] : loaded.campaigns) {
+    for (const Bench& bench : loaded.benches) {
+      try {
+        require_within(campaign, bench);
+      } catch (const ConfigurationError& refused) {
+        refuse(files[number], refused.what());
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<CheckedFile> check_files(const std::vector<std::string>& paths,
+                                     const CoefficientJudge& judge_coefficients) {
+  std::vector<CheckedFile> files;
+  Loaded loaded;
+  for (const std::string& path : paths) files.push_back(check_file(path, files.size(), judge_coefficients, loaded));
+  check_against_benches(files, loaded);
+  for (CheckedFile& file : files) {
+    if (!file.kind.empty()) file.report["kind"] = file.kind;
+    file.report["ok"] = file.ok();
+  }
+  return files;
+}
+
+}  // namespace kphi::profiles

@@ -1,0 +1,28 @@
+// What `kphi check` says about files: what each is, whether it is in order, what it means.
+#pragma once
+
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace kphi::profiles {
+
+struct CheckedFile {
+  std::string path;
+  std::string kind;                 ///< campaign, bench, vehicle or coefficients; empty if it cannot be told
+  std::string summary;              ///< a few lines; empty if refused
+  std::vector<std::string> errors;  ///< "path:line:column: what; next move", in the order of the file
+  nlohmann::ordered_json report;    ///< the same for programs: file, kind, ok, errors, plan of a campaign
+
+  [[nodiscard]] bool ok() const { return errors.empty(); }
+};
+
+/// Judges a coefficient file: gives its summary or throws std::runtime_error with "path:line: what; next move".
+using CoefficientJudge = std::function<std::string(const std::string& path)>;
+
+/// Checks every file by itself, then every campaign against every bench among them. Throws nothing about their content.
+[[nodiscard]] std::vector<CheckedFile> check_files(const std::vector<std::string>& paths,
+                                                   const CoefficientJudge& judge_coefficients);
+
+}  // namespace kphi::profiles

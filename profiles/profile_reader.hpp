@@ -1,0 +1,42 @@
+// From a file's text to typed values: strict YAML, then the schema, then the checks of the kind at hand.
+#pragma once
+
+#include <string>
+
+#include "profiles/schema.hpp"
+
+namespace kphi::profiles {
+
+/// Reads values by JSON pointer. What the schema requires is there and has its type; other values need a default.
+class ProfileReader {
+ public:
+  /// Throws RefusedFile with all that strict YAML and the schema find.
+  ProfileReader(const std::string& text, const std::string& path, FileKind kind);
+
+  [[nodiscard]] bool has(const std::string& pointer) const;
+  [[nodiscard]] double number(const std::string& pointer) const;
+  [[nodiscard]] std::string text(const std::string& pointer) const;
+
+  /// T: bool, an integer, double or std::string.
+  template <class T>
+  [[nodiscard]] T get(const std::string& pointer) const {
+    return value(pointer).get<T>();
+  }
+  template <class T>
+  [[nodiscard]] T get_or(const std::string& pointer, T otherwise) const {
+    return has(pointer) ? get<T>(pointer) : otherwise;
+  }
+  /// The keys of an object.
+  [[nodiscard]] std::vector<std::string> keys(const std::string& pointer) const;
+
+  /// Notes a finding at the value; `what` goes on after "name: ".
+  void refuse(const std::string& pointer, const std::string& what, const std::string& next_move);
+  /// Throws RefusedFile if anything was refused.
+  void finish() const;
+
+ private:
+  [[nodiscard]] const nlohmann::json& value(const std::string& pointer) const;
+  SourceDocument document_;
+};
+
+}  // namespace kphi::profiles

@@ -1,0 +1,34 @@
+// The JSON Schemas of the three kinds of files, and what they say about a document, in words for its author.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "profiles/strict_yaml.hpp"
+
+namespace kphi::profiles {
+
+enum class FileKind { campaign, bench, vehicle };
+
+struct FileKindInfo {
+  FileKind kind;
+  const char* word;    ///< "campaign"
+  const char* format;  ///< value of the key `format`
+};
+
+inline constexpr std::array<FileKindInfo, 3> kFileKinds{{
+    {FileKind::campaign, "campaign", "kphi-campaign/1"},
+    {FileKind::bench, "bench", "kphi-bench/1"},
+    {FileKind::vehicle, "vehicle", "kphi-vehicle/1"},
+}};
+
+[[nodiscard]] constexpr const FileKindInfo& info(FileKind kind) { return kFileKinds[static_cast<std::size_t>(kind)]; }
+
+/// The schema, verbatim from profiles/schema/, embedded in the program.
+[[nodiscard]] const char* schema_text(FileKind kind);
+
+/// One finding per fault (the innermost value or key, never the objects around it); empty if the document fits.
+/// Values that `document.findings` already names are not judged again.
+[[nodiscard]] std::vector<Finding> check_schema(const SourceDocument& document, FileKind kind);
+
+}  // namespace kphi::profiles
