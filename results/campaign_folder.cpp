@@ -1,0 +1,107 @@
+#include "results/campaign_folder.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <optional>
+#include <system_error>
+#include <tuple>
+
+#include "results/number.hpp"
+#include "results/record_error.hpp"
+
+namespace kphi::results {
+namespace {
+
+std::string file_name_safe(std::string text) {
+  for (char& c : text) {
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '_' && c != '-') c = '_';
+  }
+  return text;
+}
+
+struct RunName {
+  double occlusion_deg = 0;
+  int repetition = 0;
+  std::string propeller;
+};
+
+/// Inverse of run_file_name; nothing for other files.
+std::optional<RunName> parse_run_name(const std::string& name) {
+  const std::size_t phi = name.rfind("_phi");
+  const std::size_t rep = name.rfind("_rep");
+  if (!name.ends_with(".h5") || phi == std::string::npos || rep == std::string::npos || rep < phi) return std::nullopt;
+  const auto angle = parse_double(name.substr(phi + 4, rep - phi - 4));
+  const auto repetition = parse_double(name.substr(rep + 4, name.size() - 3 - rep - 4));
+  if (!angle || !repetition) return std::nullopt;
+  return RunName{*angle, static_cast<int>(*repetition), name.substr(0, phi)};
+}
+
+std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  if (!std::filesystem::is_directory(folder)) return files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+}  // namespace
+
+std::string run_file_name(const std::string& propeller_id, double occlusion_deg, int repetition) {
+  std::string angle = shortest(occlusion_deg);
+  const std::size_t whole = std::min(angle.find('.'), angle.size());
+  if (whole < 3) angle.insert(0, 3 - whole, '0');
+  return fmt::format("{}_phi{}_rep{}.h5", file_name_safe(propeller_id), angle, repetition);
+}
+
+CampaignFolder CampaignFolder::create(const std::filesystem::path& parent, const std::string& utc,
+                                      const std::string& name, FileLayer& files) {
+  const std::string base = (parent / file_name_safe(utc + "_" + name)).string();
+  try {
+    std::filesystem::create_directories(parent);
+    std::filesystem::path path = base;
+    for (int i = 2; !std::filesystem::create_directory(path); ++i) path = fmt::format("{}-{}", base, i);
+    CampaignFolder folder(path);
+    std::filesystem::create_directory(folder.runs());
+    std::filesystem::create_directory(folder.figures());
+    files.sync_folder(folder.path());
+    files.sync_folder(parent);
+    return folder;
+  } catch (const std::system_error& error) {
+    throw RecordError(failure_text(base, error.code().value()));
+  }
+}
+
+CampaignFolder CampaignFolder::open(const std::filesystem::path& path) {
+  CampaignFolder folder(path.has_filename() ? path : path.parent_path());
+  if (std::filesystem::exists(folder.journal()) || std::filesystem::is_directory(folder.runs())) return folder;
+  throw RecordError(
+      path.string() +
+      ": is no campaign folder: neither journal.jsonl nor runs/ is in it; name a folder that kphi run made");
+}
+
+std::vector<std::filesystem::path> CampaignFolder::complete_runs(std::span<const double> occlusions_deg) const {
+  using Key = std::tuple<std::ptrdiff_t, double, int, std::string>;
+  std::vector<std::pair<Key, std::filesystem::path>> found;
+  for (const auto& file : files_in(runs())) {
+    const auto name = parse_run_name(file.filename().string());
+    if (!name) continue;
+    const auto place =
+        std::find(occlusions_deg.begin(), occlusions_deg.end(), name->occlusion_deg) - occlusions_deg.begin();
+    found.push_back({Key{place, name->occlusion_deg, name->repetition, name->propeller}, file});
+  }
+  std::sort(found.begin(), found.end());
+  std::vector<std::filesystem::path> paths;
+  for (auto& [key, file] : found) paths.push_back(std::move(file));
+  return paths;
+}
+
+std::vector<std::filesystem::path> CampaignFolder::other_runs() const {
+  std::vector<std::filesystem::path> paths = files_in(runs());
+  std::erase_if(paths, [](const auto& file) { return parse_run_name(file.filename().string()).has_value(); });
+  return paths;
+}
+
+}  // namespace kphi::results

@@ -1,0 +1,50 @@
+// results/<UTC>_<campaign>/ and the names in it.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "results/file_layer.hpp"
+
+namespace kphi::results {
+
+/// "5x3_phi090_rep2.h5", "5x3_phi022.5_rep1.h5".
+[[nodiscard]] std::string run_file_name(const std::string& propeller_id, double occlusion_deg, int repetition);
+
+class CampaignFolder {
+ public:
+  /// Makes `<parent>/<utc>_<name>` with runs/ and figures/; when the name is taken, `…-2`, `…-3`. `utc` as the caller
+  /// writes it, such as 20210530T080000Z; of `name` and `utc`, characters outside [A-Za-z0-9._-] become '_'. Throws
+  /// RecordError.
+  [[nodiscard]] static CampaignFolder create(const std::filesystem::path& parent, const std::string& utc,
+                                             const std::string& name, FileLayer& files = disk());
+  /// A folder that is there. Throws RecordError when it holds neither a journal nor runs.
+  [[nodiscard]] static CampaignFolder open(const std::filesystem::path& folder);
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] std::filesystem::path campaign_file() const { return path_ / "campaign.yaml"; }
+  [[nodiscard]] std::filesystem::path bench_file() const { return path_ / "bench.yaml"; }
+  [[nodiscard]] std::filesystem::path journal() const { return path_ / "journal.jsonl"; }
+  [[nodiscard]] std::filesystem::path runs() const { return path_ / "runs"; }
+  [[nodiscard]] std::filesystem::path steps() const { return path_ / "steps.csv"; }
+  [[nodiscard]] std::filesystem::path coefficients() const { return path_ / "coefficients.yaml"; }
+  [[nodiscard]] std::filesystem::path report() const { return path_ / "report.html"; }
+  [[nodiscard]] std::filesystem::path figures() const { return path_ / "figures"; }
+  [[nodiscard]] std::filesystem::path run(const std::string& propeller_id, double occlusion_deg, int repetition) const {
+    return runs() / run_file_name(propeller_id, occlusion_deg, repetition);
+  }
+
+  /// Complete runs: by place of their occlusion in `occlusions_deg` (unlisted ones behind, ascending), then repetition.
+  /// Names alone are judged, no file is opened.
+  [[nodiscard]] std::vector<std::filesystem::path> complete_runs(std::span<const double> occlusions_deg = {}) const;
+  /// Aborted and interrupted ones, by name.
+  [[nodiscard]] std::vector<std::filesystem::path> other_runs() const;
+
+ private:
+  explicit CampaignFolder(std::filesystem::path path) : path_(std::move(path)) {}
+  std::filesystem::path path_;
+};
+
+}  // namespace kphi::results

@@ -1,0 +1,124 @@
+#include "results/file_layer.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+
+#include "results/record_error.hpp"
+
+namespace kphi::results {
+namespace {
+
+[[noreturn]] void fail(const char* operation) { throw std::system_error(errno, std::generic_category(), operation); }
+
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  [[nodiscard]] int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+void write_all(int fd, const std::string& text) {
+  for (std::size_t done = 0; done < text.size();) {
+    const ssize_t n = ::write(fd, text.data() + done, text.size() - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) fail("write");
+    done += static_cast<std::size_t>(n);
+  }
+}
+
+}  // namespace
+
+void FileLayer::before_write(std::uint64_t) {}
+
+void FileLayer::sync_data(int descriptor) {
+  if (::fdatasync(descriptor) != 0) fail("fdatasync");
+}
+
+void FileLayer::sync_folder(const std::filesystem::path& folder) {
+  const Descriptor fd(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (fd.get() < 0) fail("open folder");
+  if (::fsync(fd.get()) != 0) fail("fsync folder");
+}
+
+void FileLayer::rename(const std::filesystem::path& from, const std::filesystem::path& to) {
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return;
+  if (errno != EINVAL && errno != ENOSYS) fail("rename");
+  // File systems without RENAME_NOREPLACE: a hard link is as strict.
+  if (::link(from.c_str(), to.c_str()) != 0) fail("link");
+  if (::unlink(from.c_str()) != 0) fail("unlink");
+}
+
+void FileLayer::replace(const std::filesystem::path& from, const std::filesystem::path& to) {
+  if (::rename(from.c_str(), to.c_str()) != 0) fail("rename");
+}
+
+std::uint64_t FileLayer::free_bytes(const std::filesystem::path& folder) {
+  struct statvfs info {};
+  if (::statvfs(folder.empty() ? "." : folder.c_str(), &info) != 0) fail("statvfs");
+  return static_cast<std::uint64_t>(info.f_bavail) * info.f_frsize;
+}
+
+void MemoryOnlySync::sync_data(int) {}
+void MemoryOnlySync::sync_folder(const std::filesystem::path&) {}
+
+FileLayer& disk() {
+  static FileLayer layer;
+  return layer;
+}
+
+void require_room(const std::filesystem::path& folder, std::uint64_t bytes, FileLayer& files) {
+  std::uint64_t free = 0;
+  try {
+    free = files.free_bytes(folder);
+  } catch (const std::system_error& error) {
+    throw RecordError(failure_text(folder.string(), error.code().value()));
+  }
+  if (free >= bytes) return;
+  throw RecordError(fmt::format("disk full: {}: {:.1f} MB needed, {:.1f} MB free; make room or choose another folder",
+                                folder.string(), 1e-6 * static_cast<double>(bytes), 1e-6 * static_cast<double>(free)));
+}
+
+void write_text(const std::filesystem::path& path, const std::string& text, FileLayer& files) {
+  const std::filesystem::path part = path.string() + ".part";
+  try {
+    files.before_write(text.size());
+    const Descriptor fd(::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+    if (fd.get() < 0) fail("open");
+    write_all(fd.get(), text);
+    files.sync_data(fd.get());
+    files.replace(part, path);
+    files.sync_folder(path.parent_path());
+  } catch (const std::system_error& error) {
+    throw RecordError(failure_text(path.string(), error.code().value()));
+  }
+}
+
+std::string read_text(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  if (!in.is_open() || in.bad()) throw RecordError(failure_text(path.string(), errno));
+  return text;
+}
+
+std::string failure_text(const std::string& where, int error) {
+  const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
+  return fmt::format("{}{}: {}{}", full ? "disk full: " : "", where, std::generic_category().message(error),
+                     full ? "; make room or choose another folder" : "");
+}
+
+}  // namespace kphi::results

@@ -1,0 +1,338 @@
+#include "results/hdf5.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+#include "results/record_error.hpp"
+
+namespace kphi::results::hdf5 {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "chunks are written as they lie in memory");
+
+/// The print of errors is a property of each thread's error stack.
+void be_quiet() {
+  thread_local const herr_t quiet = H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  (void)quiet;
+}
+
+struct Cause {
+  std::string text;
+  int error = 0;
+};
+
+herr_t note(unsigned, const H5E_error2_t* entry, void* out) {
+  auto& cause = *static_cast<Cause*>(out);
+  const std::string text = entry->desc == nullptr ? "" : entry->desc;
+  if (cause.text.empty()) cause.text = text;
+  const auto at = text.find("errno = ");
+  if (at != std::string::npos && cause.error == 0) cause.error = std::atoi(text.c_str() + at + 8);
+  return 0;
+}
+
+/// The first entry of the error stack, the one nearest to the trouble; the stack is cleared.
+Cause take_cause() {
+  Cause cause;
+  H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, &note, &cause);
+  H5Eclear2(H5E_DEFAULT);
+  return cause;
+}
+
+[[noreturn]] void fail(const std::string& doing) {
+  const Cause cause = take_cause();
+  if (cause.error != 0) throw RecordError(failure_text(doing, cause.error));
+  throw RecordError(fmt::format("{}: HDF5: {}", doing, cause.text.empty() ? "refused" : cause.text));
+}
+
+Handle text_type() {
+  Handle type = own(H5Tcopy(H5T_C_S1), "text type");
+  check(H5Tset_size(type.get(), H5T_VARIABLE), "text type");
+  check(H5Tset_cset(type.get(), H5T_CSET_UTF8), "text type");
+  return type;
+}
+
+Handle scalar_space() { return own(H5Screate(H5S_SCALAR), "scalar"); }
+
+Handle row_space(hsize_t n) { return own(H5Screate_simple(1, &n, nullptr), "row"); }
+
+void put(const Handle& object, const char* name, hid_t file_type, hid_t memory_type, const Handle& space,
+         const void* value) {
+  const std::string doing = fmt::format("write attribute {}", name);
+  const Handle attribute =
+      has_attribute(object, name)
+          ? own(H5Aopen(object.get(), name, H5P_DEFAULT), doing)
+          : own(H5Acreate2(object.get(), name, file_type, space.get(), H5P_DEFAULT, H5P_DEFAULT), doing);
+  check(H5Awrite(attribute.get(), memory_type, value), doing);
+}
+
+void get(const Handle& object, const char* name, hid_t memory_type, hssize_t elements, void* value) {
+  const std::string doing = fmt::format("read attribute {}", name);
+  const Handle attribute = own(H5Aopen(object.get(), name, H5P_DEFAULT), doing);
+  const Handle space = own(H5Aget_space(attribute.get()), doing);
+  if (H5Sget_simple_extent_npoints(space.get()) != elements) throw RecordError(doing + ": has a strange size");
+  check(H5Aread(attribute.get(), memory_type, value), doing);
+}
+
+template <class CreationList>
+Handle creation_list(hid_t kind, CreationList&& more) {
+  Handle list = own(H5Pcreate(kind), "creation properties");
+  check(H5Pset_obj_track_times(list.get(), false), "creation properties");
+  check(H5Pset_attr_creation_order(list.get(), H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED), "creation properties");
+  // All attributes stay in the object's header: one place, one checksum.
+  check(H5Pset_attr_phase_change(list.get(), 256, 255), "creation properties");
+  more(list.get());
+  return list;
+}
+
+void track_links(hid_t list) {
+  check(H5Pset_link_creation_order(list, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED), "creation properties");
+}
+
+Handle fixed_text(std::size_t size) {
+  Handle type = own(H5Tcopy(H5T_C_S1), "text type");
+  check(H5Tset_size(type.get(), size), "text type");
+  return type;
+}
+
+void put_fixed_text(const Handle& object, const char* name, const std::string& value) {
+  const Handle type = fixed_text(value.size() + 1);
+  put(object, name, type.get(), type.get(), scalar_space(), value.c_str());
+}
+
+hobj_ref_t reference_to(const Handle& object) {
+  hobj_ref_t reference{};
+  check(H5Rcreate(&reference, object.get(), ".", H5R_OBJECT, -1), "reference");
+  return reference;
+}
+
+}  // namespace
+
+Handle::Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)) {}
+
+Handle& Handle::operator=(Handle&& other) noexcept {
+  if (this != &other) {
+    drop();
+    id_ = std::exchange(other.id_, H5I_INVALID_HID);
+  }
+  return *this;
+}
+
+void Handle::drop() noexcept {
+  if (id_ >= 0 && H5Idec_ref(id_) < 0) H5Eclear2(H5E_DEFAULT);
+  id_ = H5I_INVALID_HID;
+}
+
+void check(herr_t status, const std::string& doing) {
+  if (status < 0) fail(doing);
+}
+
+Handle own(hid_t id, const std::string& doing) {
+  if (id < 0) fail(doing);
+  return Handle(id);
+}
+
+Handle create_file(const std::filesystem::path& path) {
+  be_quiet();
+  const Handle list = creation_list(H5P_FILE_CREATE, track_links);
+  const Handle access = own(H5Pcreate(H5P_FILE_ACCESS), path.string());
+  // 1.8: readable by every HDF5 since 2008, with checksums over its metadata.
+  check(H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18), path.string());
+  return own(H5Fcreate(path.c_str(), H5F_ACC_EXCL, list.get(), access.get()), path.string() + ": create");
+}
+
+Handle open_file(const std::filesystem::path& path) {
+  be_quiet();
+  return own(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), path.string() + ": open");
+}
+
+Handle create_group(const Handle& parent, const char* name) {
+  const Handle list = creation_list(H5P_GROUP_CREATE, track_links);
+  return own(H5Gcreate2(parent.get(), name, H5P_DEFAULT, list.get(), H5P_DEFAULT),
+             fmt::format("create group {}", name));
+}
+
+Handle open_group(const Handle& parent, const char* name) {
+  return own(H5Gopen2(parent.get(), name, H5P_DEFAULT), fmt::format("open group {}", name));
+}
+
+int descriptor_of(const Handle& file) {
+  void* descriptor = nullptr;
+  check(H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &descriptor), "file descriptor");
+  return *static_cast<int*>(descriptor);
+}
+
+void write_attribute(const Handle& object, const char* name, const std::string& value) {
+  const Handle type = text_type();
+  const char* text = value.c_str();
+  put(object, name, type.get(), type.get(), scalar_space(), &text);
+}
+void write_attribute(const Handle& object, const char* name, double value) {
+  put(object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, scalar_space(), &value);
+}
+void write_attribute(const Handle& object, const char* name, std::int32_t value) {
+  put(object, name, H5T_STD_I32LE, H5T_NATIVE_INT32, scalar_space(), &value);
+}
+void write_attribute(const Handle& object, const char* name, std::uint32_t value) {
+  put(object, name, H5T_STD_U32LE, H5T_NATIVE_UINT32, scalar_space(), &value);
+}
+void write_attribute(const Handle& object, const char* name, std::uint64_t value) {
+  put(object, name, H5T_STD_U64LE, H5T_NATIVE_UINT64, scalar_space(), &value);
+}
+void write_attribute(const Handle& object, const char* name, const std::array<double, 6>& value) {
+  put(object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, row_space(value.size()), value.data());
+}
+
+bool has_attribute(const Handle& object, const char* name) {
+  const htri_t exists = H5Aexists(object.get(), name);
+  check(exists, fmt::format("look for attribute {}", name));
+  return exists > 0;
+}
+
+void read_attribute(const Handle& object, const char* name, std::string& value) {
+  const Handle type = text_type();
+  char* text = nullptr;
+  get(object, name, type.get(), 1, &text);
+  value = text == nullptr ? "" : text;
+  H5free_memory(text);
+}
+void read_attribute(const Handle& object, const char* name, double& value) {
+  get(object, name, H5T_NATIVE_DOUBLE, 1, &value);
+}
+void read_attribute(const Handle& object, const char* name, std::int32_t& value) {
+  get(object, name, H5T_NATIVE_INT32, 1, &value);
+}
+void read_attribute(const Handle& object, const char* name, std::uint32_t& value) {
+  get(object, name, H5T_NATIVE_UINT32, 1, &value);
+}
+void read_attribute(const Handle& object, const char* name, std::uint64_t& value) {
+  get(object, name, H5T_NATIVE_UINT64, 1, &value);
+}
+void read_attribute(const Handle& object, const char* name, std::array<double, 6>& value) {
+  get(object, name, H5T_NATIVE_DOUBLE, static_cast<hssize_t>(value.size()), value.data());
+}
+
+Column::Column(const Handle& group, const ColumnShape& shape, FileLayer& files, std::string file_name)
+    : shape_(shape), files_(&files), doing_(fmt::format("{}: write {}", file_name, shape.name)) {
+  const int rank = shape.width == 0 ? 1 : 2;
+  const std::array<hsize_t, 2> none{0, shape.width};
+  const std::array<hsize_t, 2> most{H5S_UNLIMITED, shape.width};
+  const std::array<hsize_t, 2> chunk{shape.chunk_rows, shape.width};
+  const Handle space = own(H5Screate_simple(rank, none.data(), most.data()), doing_);
+  const Handle list = creation_list(H5P_DATASET_CREATE, [&](hid_t id) {
+    check(H5Pset_chunk(id, rank, chunk.data()), doing_);
+    check(H5Pset_fill_time(id, H5D_FILL_TIME_NEVER), doing_);
+  });
+  dataset_ =
+      own(H5Dcreate2(group.get(), shape.name, shape.type, space.get(), H5P_DEFAULT, list.get(), H5P_DEFAULT), doing_);
+  write_attribute(dataset_, "units", std::string(shape.units));
+  write_attribute(dataset_, "long_name", std::string(shape.long_name));
+  write_attribute(dataset_, "crc32", std::uint32_t{0});
+  chunk_.resize(shape.chunk_rows * shape.row_bytes);
+}
+
+void Column::append(const void* rows, std::size_t count) {
+  const auto* from = static_cast<const std::byte*>(rows);
+  while (count > 0) {
+    const std::size_t filled = rows_ % shape_.chunk_rows;
+    const std::size_t n = std::min<std::size_t>(count, shape_.chunk_rows - filled);
+    std::memcpy(chunk_.data() + filled * shape_.row_bytes, from, n * shape_.row_bytes);
+    crc_.process_bytes(from, n * shape_.row_bytes);
+    rows_ += n;
+    from += n * shape_.row_bytes;
+    count -= n;
+    if (rows_ % shape_.chunk_rows == 0) write_chunk();
+  }
+}
+
+void Column::flush() {
+  if (rows_ != written_) write_chunk();
+}
+
+void Column::write_chunk() {
+  const std::array<hsize_t, 2> extent{rows_, shape_.width};
+  const std::array<hsize_t, 2> offset{(rows_ - 1) / shape_.chunk_rows * shape_.chunk_rows, 0};
+  try {
+    files_->before_write(chunk_.size());
+  } catch (const std::system_error& error) {
+    throw RecordError(failure_text(doing_, error.code().value()));
+  }
+  check(H5Dset_extent(dataset_.get(), extent.data()), doing_);
+  check(H5Dwrite_chunk(dataset_.get(), H5P_DEFAULT, 0, offset.data(), chunk_.size(), chunk_.data()), doing_);
+  written_ = rows_;
+  if (rows_ % shape_.chunk_rows == 0) std::fill(chunk_.begin(), chunk_.end(), std::byte{0});
+}
+
+void Column::write_crc() { write_attribute(dataset_, "crc32", crc()); }
+
+ColumnReader::ColumnReader(const Handle& group, const char* name, hid_t memory_type, std::size_t row_bytes,
+                           const std::string& file)
+    : doing_(fmt::format("{}: read {}", file, name)), memory_type_(memory_type), row_bytes_(row_bytes) {
+  const Handle access = own(H5Pcreate(H5P_DATASET_ACCESS), doing_);
+  // No chunk cache: rows go from the file to the caller's memory at once.
+  check(H5Pset_chunk_cache(access.get(), 1, 0, 1.0), doing_);
+  dataset_ = own(H5Dopen2(group.get(), name, access.get()), doing_);
+  space_ = own(H5Dget_space(dataset_.get()), doing_);
+  const int rank = H5Sget_simple_extent_ndims(space_.get());
+  if (rank < 1 || rank > 2) throw RecordError(doing_ + ": has a strange shape");
+  dims_.resize(static_cast<std::size_t>(rank));
+  check(H5Sget_simple_extent_dims(space_.get(), dims_.data(), nullptr), doing_);
+  const std::size_t width = rank == 2 ? dims_[1] : 1;
+  if (width * H5Tget_size(memory_type) != row_bytes) throw RecordError(doing_ + ": has a strange shape");
+  rows_ = dims_[0];
+}
+
+void ColumnReader::read(std::uint64_t first, std::uint64_t count, void* rows) {
+  if (count == 0) return;
+  if (first + count > rows_) throw RecordError(doing_ + ": holds fewer rows than asked for");
+  const int rank = static_cast<int>(dims_.size());
+  const std::array<hsize_t, 2> start{first, 0};
+  const std::array<hsize_t, 2> block{count, rank == 2 ? dims_[1] : 1};
+  check(H5Sselect_hyperslab(space_.get(), H5S_SELECT_SET, start.data(), nullptr, block.data(), nullptr), doing_);
+  const Handle memory = own(H5Screate_simple(rank, block.data(), nullptr), doing_);
+  check(H5Dread(dataset_.get(), memory_type_, memory.get(), space_.get(), H5P_DEFAULT, rows), doing_);
+}
+
+std::uint32_t ColumnReader::crc(std::uint64_t count) {
+  constexpr std::uint64_t kBlock = 65536;
+  std::vector<std::byte> rows(kBlock * row_bytes_);
+  boost::crc_32_type crc;
+  for (std::uint64_t at = 0; at < count; at += kBlock) {
+    const std::uint64_t n = std::min(kBlock, count - at);
+    read(at, n, rows.data());
+    crc.process_bytes(rows.data(), n * row_bytes_);
+  }
+  return crc.checksum();
+}
+
+void make_scale(const Handle& scale, const char* name, const std::vector<ScaleUse>& uses) {
+  put_fixed_text(scale, "CLASS", "DIMENSION_SCALE");
+  put_fixed_text(scale, "NAME", name);
+  constexpr std::size_t kSize = sizeof(hobj_ref_t) + sizeof(std::uint32_t);
+  const Handle type = own(H5Tcreate(H5T_COMPOUND, kSize), "reference list");
+  check(H5Tinsert(type.get(), "dataset", 0, H5T_STD_REF_OBJ), "reference list");
+  check(H5Tinsert(type.get(), "dimension", sizeof(hobj_ref_t), H5T_STD_U32LE), "reference list");
+  std::vector<std::byte> list(kSize * uses.size());
+  for (std::size_t i = 0; i < uses.size(); ++i) {
+    const hobj_ref_t reference = reference_to(*uses[i].dataset);
+    const std::uint32_t dimension = uses[i].dimension;
+    std::memcpy(list.data() + i * kSize, &reference, sizeof reference);
+    std::memcpy(list.data() + i * kSize + sizeof reference, &dimension, sizeof dimension);
+  }
+  put(scale, "REFERENCE_LIST", type.get(), type.get(), row_space(uses.size()), list.data());
+}
+
+void attach_scales(const Handle& dataset, const std::vector<const Handle*>& scales) {
+  const Handle type = own(H5Tvlen_create(H5T_STD_REF_OBJ), "dimension list");
+  std::vector<hobj_ref_t> references;
+  for (const Handle* scale : scales) references.push_back(reference_to(*scale));
+  std::vector<hvl_t> lists;
+  for (hobj_ref_t& reference : references) lists.push_back({1, &reference});
+  put(dataset, "DIMENSION_LIST", type.get(), type.get(), row_space(lists.size()), lists.data());
+}
+
+}  // namespace kphi::results::hdf5

@@ -1,0 +1,135 @@
+// HDF5's C API behind handles that close themselves and errors that throw. Its automatic error print is off. Files are
+// made without time stamps, with metadata checksums and tracked creation order: the same calls give the same bytes.
+// hid_t appears only here, in run_writer and in run_reader. Debian's library is thread-safe; one object, one thread.
+#pragma once
+
+#include <hdf5.h>
+
+#include <array>
+#include <boost/crc.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "results/file_layer.hpp"
+
+namespace kphi::results::hdf5 {
+
+/// Owns one HDF5 identifier of any kind.
+class Handle {
+ public:
+  Handle() = default;
+  explicit Handle(hid_t id) : id_(id) {}
+  Handle(Handle&& other) noexcept;
+  Handle& operator=(Handle&& other) noexcept;
+  ~Handle() { drop(); }
+  [[nodiscard]] hid_t get() const { return id_; }
+  [[nodiscard]] explicit operator bool() const { return id_ >= 0; }
+  /// Lets go without a word about failure.
+  void drop() noexcept;
+
+ private:
+  hid_t id_ = H5I_INVALID_HID;
+};
+
+/// Throws RecordError with HDF5's own cause when `status` (or `id`) is negative. `doing` reads "file: write counts".
+void check(herr_t status, const std::string& doing);
+[[nodiscard]] Handle own(hid_t id, const std::string& doing);
+
+[[nodiscard]] Handle create_file(const std::filesystem::path& path);
+[[nodiscard]] Handle open_file(const std::filesystem::path& path);
+[[nodiscard]] Handle create_group(const Handle& parent, const char* name);
+[[nodiscard]] Handle open_group(const Handle& parent, const char* name);
+/// The file's descriptor, for fdatasync.
+[[nodiscard]] int descriptor_of(const Handle& file);
+
+// Attributes. Writing an existing one of the same kind replaces its value in place. Strings are UTF-8.
+void write_attribute(const Handle& object, const char* name, const std::string& value);
+void write_attribute(const Handle& object, const char* name, double value);
+void write_attribute(const Handle& object, const char* name, std::int32_t value);
+void write_attribute(const Handle& object, const char* name, std::uint32_t value);
+void write_attribute(const Handle& object, const char* name, std::uint64_t value);
+void write_attribute(const Handle& object, const char* name, const std::array<double, 6>& value);
+
+[[nodiscard]] bool has_attribute(const Handle& object, const char* name);
+void read_attribute(const Handle& object, const char* name, std::string& value);
+void read_attribute(const Handle& object, const char* name, double& value);
+void read_attribute(const Handle& object, const char* name, std::int32_t& value);
+void read_attribute(const Handle& object, const char* name, std::uint32_t& value);
+void read_attribute(const Handle& object, const char* name, std::uint64_t& value);
+void read_attribute(const Handle& object, const char* name, std::array<double, 6>& value);
+
+/// What a column holds. Bytes on disk are little-endian.
+struct ColumnShape {
+  const char* name;
+  hid_t type;             ///< the little-endian file type
+  std::size_t row_bytes;  ///< of one row
+  hsize_t width;          ///< 0: one-dimensional, else the second dimension
+  hsize_t chunk_rows;
+  const char* units;  ///< UDUNITS spelling
+  const char* long_name;
+};
+
+/// A growing dataset, written chunk by chunk with H5Dwrite_chunk and never filled beforehand. A partly filled chunk is
+/// written as it stands and later written again in its place.
+class Column {
+ public:
+  Column(const Handle& group, const ColumnShape& shape, FileLayer& files, std::string file_name);
+  /// `rows` holds `count` rows in this machine's order (little-endian).
+  void append(const void* rows, std::size_t count);
+  /// Puts the partly filled chunk on disk.
+  void flush();
+  /// Rows appended so far.
+  [[nodiscard]] std::uint64_t rows() const { return rows_; }
+  /// CRC-32 of all rows appended so far.
+  [[nodiscard]] std::uint32_t crc() const { return crc_.checksum(); }
+  /// Notes the CRC of all rows in the attribute `crc32`.
+  void write_crc();
+  [[nodiscard]] const Handle& dataset() const { return dataset_; }
+
+ private:
+  void write_chunk();
+  ColumnShape shape_;
+  FileLayer* files_;
+  std::string doing_;
+  Handle dataset_;
+  std::vector<std::byte> chunk_;
+  std::uint64_t rows_ = 0;
+  std::uint64_t written_ = 0;
+  boost::crc_32_type crc_;
+};
+
+/// A dataset read in blocks of rows.
+class ColumnReader {
+ public:
+  ColumnReader(const Handle& group, const char* name, hid_t memory_type, std::size_t row_bytes,
+               const std::string& file);
+  [[nodiscard]] std::uint64_t rows() const { return rows_; }
+  void read(std::uint64_t first, std::uint64_t count, void* rows);
+  /// CRC-32 of the first `count` rows.
+  [[nodiscard]] std::uint32_t crc(std::uint64_t count);
+  [[nodiscard]] const Handle& dataset() const { return dataset_; }
+
+ private:
+  std::string doing_;
+  hid_t memory_type_;
+  std::size_t row_bytes_;
+  Handle dataset_;
+  Handle space_;
+  std::uint64_t rows_ = 0;
+  std::vector<hsize_t> dims_;
+};
+
+/// Makes `scale` the dimension scale of dimension `dimension` of each of `datasets` (HDF5 Dimension Scale
+/// specification), in a packed form without the padding that libhdf5_hl leaves to chance.
+struct ScaleUse {
+  const Handle* dataset;
+  unsigned dimension;
+};
+void make_scale(const Handle& scale, const char* name, const std::vector<ScaleUse>& uses);
+/// Writes DIMENSION_LIST: one scale per dimension of `dataset`; all scales are in the same file.
+void attach_scales(const Handle& dataset, const std::vector<const Handle*>& scales);
+
+}  // namespace kphi::results::hdf5

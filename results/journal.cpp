@@ -1,0 +1,134 @@
+#include "results/journal.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <optional>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "results/record_error.hpp"
+#include "results/sha256.hpp"
+
+namespace kphi::results {
+namespace {
+
+constexpr std::string_view kCheckKey = ",\"check\":\"";
+constexpr std::size_t kCheckDigits = 16;
+
+/// `body` is the line's object without its closing brace and without the checksum.
+std::string check_of(const std::string& previous, std::string_view body) {
+  return sha256(previous + std::string(body)).substr(0, kCheckDigits);
+}
+
+struct Lines {
+  std::vector<JournalEntry> entries;
+  std::string check;
+  std::size_t whole_bytes = 0;
+  bool torn = false;
+  std::optional<std::string> problem;
+};
+
+/// The entry, or why it is none.
+std::optional<std::string> parse_line(std::string_view line, std::uint64_t n, std::string& check, JournalEntry& entry) {
+  const std::size_t at = line.rfind(kCheckKey);
+  if (at == std::string_view::npos || line.size() != at + kCheckKey.size() + kCheckDigits + 2) return "has no checksum";
+  const std::string stored(line.substr(at + kCheckKey.size(), kCheckDigits));
+  if (stored != check_of(check, line.substr(0, at)))
+    return "does not match its checksum: it or the line before was changed";
+  try {
+    const nlohmann::json object = nlohmann::json::parse(line);
+    entry = {object.at("n"), object.at("t_ns"), object.at("utc"), object.at("event"), object.at("data")};
+  } catch (const nlohmann::json::exception& error) {
+    return error.what();
+  }
+  if (entry.n != n) return fmt::format("has number {} where {} was expected", entry.n, n);
+  check = stored;
+  return std::nullopt;
+}
+
+Lines parse(std::string_view text) {
+  Lines lines;
+  while (lines.whole_bytes < text.size()) {
+    const std::size_t end = text.find('\n', lines.whole_bytes);
+    if (end == std::string_view::npos) {
+      lines.torn = true;
+      break;
+    }
+    JournalEntry entry;
+    lines.problem = parse_line(text.substr(lines.whole_bytes, end - lines.whole_bytes), lines.entries.size() + 1,
+                               lines.check, entry);
+    if (lines.problem) break;
+    lines.entries.push_back(std::move(entry));
+    lines.whole_bytes = end + 1;
+  }
+  return lines;
+}
+
+JournalReading reading_of(Lines& lines, const std::filesystem::path& path) {
+  JournalReading reading;
+  if (lines.problem) {
+    reading.problems.push_back(fmt::format("{}:{}: {}", path.string(), lines.entries.size() + 1, *lines.problem));
+  }
+  reading.torn_last_line = lines.torn;
+  reading.entries = std::move(lines.entries);
+  return reading;
+}
+
+}  // namespace
+
+JournalReading read_journal(const std::filesystem::path& path) {
+  Lines lines = parse(read_text(path));
+  return reading_of(lines, path);
+}
+
+Journal::Journal(std::filesystem::path path, FileLayer& files) : path_(std::move(path)), files_(files) {
+  const bool is_new = !std::filesystem::exists(path_);
+  Lines lines = is_new ? Lines{} : parse(read_text(path_));
+  found_ = reading_of(lines, path_);
+  if (!found_.problems.empty()) throw RecordError(found_.problems.front() + "; begin a new campaign folder");
+  next_ = found_.entries.size() + 1;
+  check_ = lines.check;
+  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  if (descriptor_ < 0) throw RecordError(failure_text(path_.string(), errno));
+  try {
+    if (::ftruncate(descriptor_, static_cast<off_t>(lines.whole_bytes)) != 0) {
+      throw std::system_error(errno, std::generic_category());
+    }
+    if (is_new) files_.sync_folder(path_.parent_path());
+  } catch (const std::system_error& error) {
+    ::close(descriptor_);
+    throw RecordError(failure_text(path_.string(), error.code().value()));
+  }
+}
+
+Journal::~Journal() { ::close(descriptor_); }
+
+void Journal::append(const std::string& event, const nlohmann::json& data, Nanoseconds time_ns,
+                     const std::string& utc) {
+  nlohmann::ordered_json object{{"n", next_}, {"t_ns", time_ns}, {"utc", utc}, {"event", event}};
+  object["data"] = data.is_null() ? nlohmann::json::object() : data;
+  std::string line = object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  line.pop_back();
+  const std::string check = check_of(check_, line);
+  line += fmt::format("{}{}\"}}\n", kCheckKey, check);
+  try {
+    files_.before_write(line.size());
+    for (std::size_t done = 0; done < line.size();) {
+      const ssize_t n = ::write(descriptor_, line.data() + done, line.size() - done);
+      if (n < 0 && errno == EINTR) continue;
+      if (n < 0) throw std::system_error(errno, std::generic_category());
+      done += static_cast<std::size_t>(n);
+    }
+    files_.sync_data(descriptor_);
+  } catch (const std::system_error& error) {
+    throw RecordError(failure_text(path_.string(), error.code().value()));
+  }
+  ++next_;
+  check_ = check;
+}
+
+}  // namespace kphi::results

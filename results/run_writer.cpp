@@ -1,0 +1,267 @@
+#include "results/run_writer.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "results/hdf5.hpp"
+#include "results/run_layout.hpp"
+#include "results/run_reader.hpp"
+#include "results/sha256.hpp"
+
+namespace kphi::results {
+namespace {
+
+using hdf5::Column;
+using hdf5::Handle;
+
+constexpr hsize_t kSampleChunk = 8192;  // rows; a little over a second of the Net Box
+constexpr hsize_t kMotorChunk = 1024;
+constexpr hsize_t kMarkChunk = 64;
+
+/// A group of columns that grow together; `n_valid` says how many rows were whole at the last sync.
+struct Series {
+  Series(const Handle& parent, const char* name, const char* long_name) : group(hdf5::create_group(parent, name)) {
+    hdf5::write_attribute(group, "long_name", std::string(long_name));
+    hdf5::write_attribute(group, "n_valid", std::uint64_t{0});
+  }
+  Column& add(const hdf5::ColumnShape& shape, FileLayer& files, const std::string& file_name) {
+    columns.push_back(std::make_unique<Column>(group, shape, files, file_name));
+    return *columns.back();
+  }
+  void flush() {
+    for (const auto& column : columns) column->flush();
+    for (const auto& column : columns) column->write_crc();
+    hdf5::write_attribute(group, "n_valid", columns.front()->rows());
+  }
+  Handle group;
+  std::vector<std::unique_ptr<Column>> columns;
+};
+
+/// `from[i].*member` of all rows, side by side, appended to the column.
+template <class Row, class Value>
+void append_member(Column& column, std::span<const Row> rows, Value Row::*member) {
+  std::array<Value, 512> block;
+  for (std::size_t at = 0; at < rows.size(); at += block.size()) {
+    const std::size_t n = std::min(block.size(), rows.size() - at);
+    for (std::size_t i = 0; i < n; ++i) block[i] = rows[at + i].*member;
+    column.append(block.data(), n);
+  }
+}
+
+struct LoadCellSeries : Series {
+  LoadCellSeries(const Handle& root, FileLayer& files, const std::string& name)
+      : Series(root, "load_cell", "Net Box records as received"),
+        counts(add({"counts", H5T_STD_I32LE, 24, 6, kSampleChunk, "count", "force and torque, Fx Fy Fz Tx Ty Tz"},
+                   files, name)),
+        rdt(add({"rdt_sequence", H5T_STD_U32LE, 4, 0, kSampleChunk, "1", "RDT sequence number"}, files, name)),
+        ft(add({"ft_sequence", H5T_STD_U32LE, 4, 0, kSampleChunk, "1", "internal sample number of the box"}, files,
+               name)),
+        status(add({"status", H5T_STD_U32LE, 4, 0, kSampleChunk, "1", "status word of the box"}, files, name)),
+        arrival(
+            add({"t_arrival_ns", H5T_STD_I64LE, 8, 0, kSampleChunk, "ns", "receive stamp of the datagram, bench time"},
+                files, name)),
+        component(group, {"component", H5T_STD_I32LE, 4, 0, 6, "1", "0 to 5: Fx Fy Fz Tx Ty Tz"}, files, name) {
+    constexpr std::array<std::int32_t, 6> kComponents{0, 1, 2, 3, 4, 5};
+    component.append(kComponents.data(), kComponents.size());
+    component.write_crc();
+    const Handle& time = arrival.dataset();
+    hdf5::make_scale(time, "t_arrival_ns",
+                     {{&counts.dataset(), 0}, {&rdt.dataset(), 0}, {&ft.dataset(), 0}, {&status.dataset(), 0}});
+    hdf5::make_scale(component.dataset(), "component", {{&counts.dataset(), 1}});
+    hdf5::attach_scales(counts.dataset(), {&time, &component.dataset()});
+    for (const Column* column : {&rdt, &ft, &status}) hdf5::attach_scales(column->dataset(), {&time});
+  }
+  void append(std::span<const LoadCellRecord> rows) {
+    append_member(counts, rows, &LoadCellRecord::counts);
+    append_member(rdt, rows, &LoadCellRecord::rdt_sequence);
+    append_member(ft, rows, &LoadCellRecord::ft_sequence);
+    append_member(status, rows, &LoadCellRecord::status);
+    append_member(arrival, rows, &LoadCellRecord::arrival_ns);
+  }
+  Column &counts, &rdt, &ft, &status, &arrival;
+  Column component;
+};
+
+struct ChannelSeries : Series {
+  ChannelSeries(const Handle& motor, const MotorChannelInfo& info, FileLayer& files, const std::string& name)
+      : Series(motor, info.name, info.long_name),
+        value(add({"value", H5T_IEEE_F64LE, 8, 0, kMotorChunk, info.unit, info.long_name}, files, name)),
+        time(add({"t_ns", H5T_STD_I64LE, 8, 0, kMotorChunk, "ns", "midpoint of request and reply, bench time"}, files,
+                 name)),
+        uncertainty(
+            add({"t_uncertainty_ns", H5T_STD_I64LE, 8, 0, kMotorChunk, "ns", "half the round trip"}, files, name)) {
+    hdf5::make_scale(time.dataset(), "t_ns", {{&value.dataset(), 0}, {&uncertainty.dataset(), 0}});
+    for (const Column* column : {&value, &uncertainty}) hdf5::attach_scales(column->dataset(), {&time.dataset()});
+  }
+  void append(const MotorReading& reading) {
+    value.append(&reading.value, 1);
+    time.append(&reading.time_ns, 1);
+    uncertainty.append(&reading.uncertainty_ns, 1);
+  }
+  Column &value, &time, &uncertainty;
+};
+
+struct CommandSeries : Series {
+  CommandSeries(const Handle& root, FileLayer& files, const std::string& name)
+      : Series(root, "commands", "what the runner asked for"),
+        phase(add(
+            {"phase", H5T_STD_U8LE, 1, 0, kMarkChunk, "1", "0 zero before, 1 step, 2 spin down, 3 zero after, 4 end"},
+            files, name)),
+        step(add({"step", H5T_STD_I32LE, 4, 0, kMarkChunk, "1", "number of the step from 0, -1 outside steps"}, files,
+                 name)),
+        time(add({"t_ns", H5T_STD_I64LE, 8, 0, kMarkChunk, "ns", "begin of the phase, bench time"}, files, name)),
+        speed(add({"speed_rad_s", H5T_IEEE_F64LE, 8, 0, kMarkChunk, "rad s-1", "commanded speed, unsigned"}, files,
+                  name)) {
+    hdf5::make_scale(time.dataset(), "t_ns", {{&phase.dataset(), 0}, {&step.dataset(), 0}, {&speed.dataset(), 0}});
+    for (const Column* column : {&phase, &step, &speed}) hdf5::attach_scales(column->dataset(), {&time.dataset()});
+  }
+  void append(const PhaseMark& mark) {
+    const auto code = static_cast<std::uint8_t>(mark.phase);
+    phase.append(&code, 1);
+    step.append(&mark.step, 1);
+    time.append(&mark.time_ns, 1);
+    speed.append(&mark.speed_rad_s, 1);
+  }
+  Column &phase, &step, &time, &speed;
+};
+
+/// The first free of name, name-2, name-3 … before `ending`.
+std::filesystem::path free_name(const std::string& name, const std::string& ending) {
+  std::filesystem::path path = name + ending;
+  for (int i = 2; std::filesystem::exists(path); ++i) path = fmt::format("{}-{}{}", name, i, ending);
+  return path;
+}
+
+std::string without_ending(const std::filesystem::path& path) { return (path.parent_path() / path.stem()).string(); }
+
+/// Runs `action`; what the file layer refuses becomes a RecordError.
+template <class Action>
+void on_disk(const std::filesystem::path& path, Action&& action) {
+  try {
+    action();
+  } catch (const std::system_error& error) {
+    throw RecordError(failure_text(path.string(), error.code().value()));
+  }
+}
+
+std::filesystem::path prepared_part(const std::filesystem::path& final_path, FileLayer& files) {
+  if (std::filesystem::exists(final_path)) {
+    throw RecordError(final_path.string() + ": exists already and is not overwritten; choose another name");
+  }
+  const std::filesystem::path part = final_path.string() + ".part";
+  if (std::filesystem::exists(part)) {
+    on_disk(part, [&] { files.rename(part, free_name(without_ending(final_path) + ".interrupted", ".h5.part")); });
+  }
+  return part;
+}
+
+}  // namespace
+
+struct RunWriter::File {
+  File(const std::filesystem::path& path, const RunHeader& header, FileLayer& files)
+      : root(hdf5::create_file(path)),
+        load_cell(root, files, path.string()),
+        motor(hdf5::create_group(root, "motor")),
+        commands(root, files, path.string()) {
+    for (const MotorChannelInfo& info : kMotorChannels) {
+      channels.push_back(std::make_unique<ChannelSeries>(motor, info, files, path.string()));
+    }
+    hdf5::write_attribute(root, "format", std::string(kRunFormat));
+    hdf5::write_attribute(root, "complete", std::int32_t{0});
+    for_each_attribute(header, [&](const char* name, const auto& value) { hdf5::write_attribute(root, name, value); });
+  }
+  void flush() {
+    load_cell.flush();
+    load_cell.component.flush();
+    for (const auto& channel : channels) channel->flush();
+    commands.flush();
+  }
+
+  Handle root;
+  LoadCellSeries load_cell;
+  Handle motor;
+  std::vector<std::unique_ptr<ChannelSeries>> channels;
+  CommandSeries commands;
+};
+
+RunWriter::RunWriter(std::filesystem::path final_path, const RunHeader& header, FileLayer& files)
+    : final_path_(std::move(final_path)), path_(prepared_part(final_path_, files)), header_(header), files_(files) {
+  file_ = std::make_unique<File>(path_, header, files);
+  sync();
+  on_disk(path_, [&] { files_.sync_folder(path_.parent_path()); });
+}
+
+RunWriter::~RunWriter() = default;
+
+void RunWriter::append(std::span<const LoadCellRecord> records) { file_->load_cell.append(records); }
+
+void RunWriter::append(std::span<const MotorReading> readings) {
+  for (const MotorReading& reading : readings)
+    file_->channels.at(static_cast<std::size_t>(reading.channel))->append(reading);
+}
+
+void RunWriter::mark(const PhaseMark& mark) { file_->commands.append(mark); }
+
+void RunWriter::sync() {
+  on_disk(path_, [&] {
+    files_.before_write(0);
+    file_->flush();
+    hdf5::check(H5Fflush(file_->root.get(), H5F_SCOPE_GLOBAL), path_.string() + ": flush");
+    files_.sync_data(hdf5::descriptor_of(file_->root));
+  });
+}
+
+std::uint64_t RunWriter::samples() const { return file_ ? file_->load_cell.rdt.rows() : 0; }
+
+void RunWriter::close() {
+  hid_t root = H5I_INVALID_HID;
+  {
+    // The groups and columns go first, the file last: its close is the one that can tell of a failure.
+    const std::unique_ptr<File> file = std::move(file_);
+    root = file->root.get();
+    hdf5::check(H5Iinc_ref(root) < 0 ? -1 : 0, path_.string() + ": close");
+  }
+  hdf5::check(H5Fclose(root), path_.string() + ": close");
+}
+
+std::string RunWriter::finish(Outcome outcome, const std::string& reason, const SampleAccount& account) {
+  if (!file_) throw RecordError(path_.string() + ": is closed already");
+  const Handle& root = file_->root;
+  for_each_count(account, [&](const char* name, const auto& value) { hdf5::write_attribute(root, name, value); });
+  hdf5::write_attribute(root, "outcome", std::string(outcome_name(outcome)));
+  hdf5::write_attribute(root, "outcome_reason", reason);
+  hdf5::write_attribute(root, "attributes_sha256", attributes_digest(header_, account, outcome, reason));
+  hdf5::write_attribute(root, "complete", std::int32_t{outcome == Outcome::complete});
+  sync();
+  close();
+
+  const Verification verification = verify_run(path_);
+  if (outcome == Outcome::complete && !verification.whole()) {
+    throw RecordError(fmt::format("{}: the finished run is not whole: {}; repeat the run", path_.string(),
+                                  fmt::join(verification.problems, "; ")));
+  }
+  const std::string digest = sha256_of_file(path_);
+  const std::filesystem::path target =
+      outcome == Outcome::complete ? final_path_ : free_name(without_ending(final_path_) + ".aborted", ".h5");
+  on_disk(target, [&] {
+    std::filesystem::permissions(path_,
+                                 std::filesystem::perms::owner_write | std::filesystem::perms::group_write |
+                                     std::filesystem::perms::others_write,
+                                 std::filesystem::perm_options::remove);
+    files_.rename(path_, target);
+    path_ = target;
+    files_.sync_folder(target.parent_path());
+  });
+  return digest;
+}
+
+std::uint64_t RunWriter::bytes_needed(std::uint64_t samples, std::uint64_t readings) {
+  constexpr std::uint64_t kFixed = 4u << 20;  // chunks begun, header, attributes
+  return kFixed + (samples * 44 + readings * 24) * 21 / 20;
+}
+
+}  // namespace kphi::results

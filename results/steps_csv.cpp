@@ -1,0 +1,222 @@
+#include "results/steps_csv.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+#include <variant>
+
+#include "profiles/configuration_error.hpp"
+#include "results/number.hpp"
+
+namespace kphi::results {
+namespace {
+
+struct Doubts {
+  std::uint32_t StepMean::*member;
+};
+using Field =
+    std::variant<std::string StepMean::*, int StepMean::*, std::uint64_t StepMean::*, double StepMean::*, Doubts>;
+
+struct Column {
+  const char* name;
+  Field field;
+};
+
+const std::array kColumns{
+    Column{"propeller", &StepMean::propeller},
+    Column{"blades", &StepMean::blades},
+    Column{"diameter_in", &StepMean::diameter_in},
+    Column{"occlusion_deg", &StepMean::occlusion_deg},
+    Column{"repetition", &StepMean::repetition},
+    Column{"step", &StepMean::step},
+    Column{"commanded_speed_rad_s", &StepMean::commanded_speed_rad_s},
+    Column{"speed_rad_s", &StepMean::speed_rad_s},
+    Column{"speed_sd_rad_s", &StepMean::speed_sd_rad_s},
+    Column{"speed_n", &StepMean::speed_n},
+    Column{"thrust_n", &StepMean::thrust_n},
+    Column{"thrust_sd_n", &StepMean::thrust_sd_n},
+    Column{"thrust_samples", &StepMean::thrust_samples},
+    Column{"torque_nm", &StepMean::torque_nm},
+    Column{"torque_sd_nm", &StepMean::torque_sd_nm},
+    Column{"zero_n", &StepMean::zero_n},
+    Column{"supply_voltage_v", &StepMean::supply_voltage_v},
+    Column{"supply_current_a", &StepMean::supply_current_a},
+    Column{"motor_current_a", &StepMean::motor_current_a},
+    Column{"coil_temperature_degc", &StepMean::coil_temperature_degc},
+    Column{"window_begin_s", &StepMean::window_begin_s},
+    Column{"window_end_s", &StepMean::window_end_s},
+    Column{"doubts", Doubts{&StepMean::doubts}},
+};
+
+constexpr std::array kDoubtNames{
+    std::pair{Doubt::speed_not_reached, std::string_view("speed_not_reached")},
+    std::pair{Doubt::speed_unsteady, std::string_view("speed_unsteady")},
+    std::pair{Doubt::saturated, std::string_view("saturated")},
+    std::pair{Doubt::lost_samples, std::string_view("lost_samples")},
+    std::pair{Doubt::derated, std::string_view("derated")},
+    std::pair{Doubt::few_samples, std::string_view("few_samples")},
+    std::pair{Doubt::bad_status, std::string_view("bad_status")},
+};
+
+std::string quoted(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return out + '"';
+}
+
+struct Format {
+  const StepMean& step;
+  std::string operator()(std::string StepMean::*m) const { return quoted(step.*m); }
+  std::string operator()(int StepMean::*m) const { return std::to_string(step.*m); }
+  std::string operator()(std::uint64_t StepMean::*m) const { return std::to_string(step.*m); }
+  std::string operator()(double StepMean::*m) const { return std::isnan(step.*m) ? std::string() : shortest(step.*m); }
+  std::string operator()(Doubts d) const { return doubt_names(step.*d.member); }
+};
+
+template <class Integer>
+Integer parse_integer(const std::string& text) {
+  Integer value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) throw std::invalid_argument("is no whole number");
+  return value;
+}
+
+struct Parse {
+  StepMean& step;
+  const std::string& text;
+  void operator()(std::string StepMean::*m) const { step.*m = text; }
+  void operator()(int StepMean::*m) const { step.*m = parse_integer<int>(text); }
+  void operator()(std::uint64_t StepMean::*m) const { step.*m = parse_integer<std::uint64_t>(text); }
+  void operator()(double StepMean::*m) const {
+    const auto value = text.empty() ? std::numeric_limits<double>::quiet_NaN() : parse_double(text);
+    if (!value) throw std::invalid_argument("is no number");
+    step.*m = *value;
+  }
+  void operator()(Doubts d) const { step.*d.member = doubts_from_names(text); }
+};
+
+/// Fields of one record from `at` on; leaves `at` after its line end and counts the line feeds passed.
+std::vector<std::string> next_record(std::string_view text, std::size_t& at, std::size_t& lines) {
+  std::vector<std::string> fields(1);
+  bool inside = false;
+  for (; at < text.size(); ++at) {
+    const char c = text[at];
+    if (c == '\n') ++lines;
+    if (inside && c == '"' && at + 1 < text.size() && text[at + 1] == '"') {
+      fields.back() += text[++at];
+    } else if (c == '"') {
+      inside = !inside;
+    } else if (!inside && c == ',') {
+      fields.emplace_back();
+    } else if (!inside && c == '\n') {
+      ++at;
+      break;
+    } else {
+      fields.back() += c;
+    }
+  }
+  if (inside) throw std::invalid_argument("a quoted field has no end");
+  if (!fields.back().empty() && fields.back().back() == '\r') fields.back().pop_back();
+  return fields;
+}
+
+StepMean step_from(const std::vector<std::string>& fields) {
+  if (fields.size() != kColumns.size()) {
+    throw std::invalid_argument(fmt::format("{} fields where the header has {}", fields.size(), kColumns.size()));
+  }
+  StepMean step;
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    try {
+      std::visit(Parse{step, fields[i]}, kColumns[i].field);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(fmt::format("{}: \"{}\" {}", kColumns[i].name, fields[i], error.what()));
+    }
+  }
+  return step;
+}
+
+}  // namespace
+
+std::string doubt_names(std::uint32_t doubts) {
+  std::string names;
+  for (const auto& [bit, name] : kDoubtNames) {
+    if ((doubts & static_cast<std::uint32_t>(bit)) == 0) continue;
+    if (!names.empty()) names += '+';
+    names += name;
+  }
+  return names;
+}
+
+std::uint32_t doubts_from_names(std::string_view names) {
+  std::uint32_t doubts = 0;
+  while (!names.empty()) {
+    const std::size_t plus = std::min(names.find('+'), names.size());
+    const std::string_view word = names.substr(0, plus);
+    std::uint32_t bit = 0;
+    for (const auto& [value, name] : kDoubtNames) {
+      if (name == word) bit = static_cast<std::uint32_t>(value);
+    }
+    if (bit == 0) throw std::invalid_argument(fmt::format("names the unknown doubt \"{}\"", word));
+    doubts |= bit;
+    names.remove_prefix(std::min(plus + 1, names.size()));
+  }
+  return doubts;
+}
+
+std::string steps_header() {
+  std::string line;
+  for (const Column& column : kColumns) line += (line.empty() ? "" : ",") + std::string(column.name);
+  return line;
+}
+
+std::string format_step(const StepMean& step) {
+  std::string line;
+  for (std::size_t i = 0; i < kColumns.size(); ++i) {
+    if (i > 0) line += ',';
+    line += std::visit(Format{step}, kColumns[i].field);
+  }
+  return line;
+}
+
+std::string format_steps(std::span<const StepMean> steps) {
+  std::string text = steps_header() + '\n';
+  for (const StepMean& step : steps) text += format_step(step) + '\n';
+  return text;
+}
+
+std::vector<StepMean> parse_steps(std::string_view text, const std::string& name) {
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  std::size_t at = 0;
+  std::size_t lines = 0;
+  std::size_t line = 1;
+  std::vector<StepMean> steps;
+  try {
+    if (format_steps({}) != text.substr(0, std::min(text.size(), steps_header().size() + 1))) {
+      throw std::invalid_argument("is no header of a steps file; expected " + steps_header());
+    }
+    (void)next_record(text, at, lines);
+    while (at < text.size()) {
+      line = lines + 1;
+      steps.push_back(step_from(next_record(text, at, lines)));
+    }
+  } catch (const std::invalid_argument& error) {
+    throw ConfigurationError(fmt::format("{}:{}: {}", name, line, error.what()));
+  }
+  return steps;
+}
+
+void write_steps(const std::filesystem::path& path, std::span<const StepMean> steps, FileLayer& files) {
+  write_text(path, format_steps(steps), files);
+}
+
+std::vector<StepMean> read_steps(const std::filesystem::path& path) {
+  return parse_steps(read_text(path), path.string());
+}
+
+}  // namespace kphi::results

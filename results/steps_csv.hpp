@@ -1,0 +1,37 @@
+// steps.csv: one row per step of every run. UTF-8, LF, a header line with the units in the names, shortest round trip
+// numbers; a number that was not measured is an empty field (NaN in memory).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "results/file_layer.hpp"
+#include "results/step_mean.hpp"
+
+namespace kphi::results {
+
+/// Names of the set bits of Doubt joined by '+'; empty for none.
+[[nodiscard]] std::string doubt_names(std::uint32_t doubts);
+/// Inverse of doubt_names. Throws std::invalid_argument that names the unknown word.
+[[nodiscard]] std::uint32_t doubts_from_names(std::string_view names);
+
+/// The header line, without a line feed.
+[[nodiscard]] std::string steps_header();
+/// One row, without a line feed.
+[[nodiscard]] std::string format_step(const StepMean& step);
+/// The whole file: the same bytes live and in replay.
+[[nodiscard]] std::string format_steps(std::span<const StepMean> steps);
+
+/// Throws ConfigurationError "name:line: …" for a header or field it does not understand.
+[[nodiscard]] std::vector<StepMean> parse_steps(std::string_view text, const std::string& name);
+
+/// Replaces `path` in one step. Throws RecordError.
+void write_steps(const std::filesystem::path& path, std::span<const StepMean> steps, FileLayer& files = disk());
+/// Throws RecordError when it cannot be read, ConfigurationError when it cannot be understood.
+[[nodiscard]] std::vector<StepMean> read_steps(const std::filesystem::path& path);
+
+}  // namespace kphi::results
