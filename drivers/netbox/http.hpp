@@ -1,0 +1,15 @@
+// The one verb of the box's web server that a reader needs.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+namespace kphi::netbox {
+
+/// Body of `http://host:port<target>`; HTTP/1.0, one request per connection, at most 1 MiB. Blocks, for `wall_timeout`
+/// at most. Throws DeviceError when there is no connection, no whole answer in time, or another status than 200.
+[[nodiscard]] std::string http_get(const std::string& host, std::uint16_t port, const std::string& target,
+                                   std::chrono::nanoseconds wall_timeout);
+
+}  // namespace kphi::netbox

@@ -1,0 +1,240 @@
+#include "drivers/netbox/load_cell.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <system_error>
+
+#include "drivers/device_error.hpp"
+#include "drivers/netbox/http.hpp"
+
+namespace kphi::netbox {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::chrono::nanoseconds kHttpTimeout = 5s;
+// One sleep between two drains: at 7000 datagrams per second it spares most of the wake-ups, and the kernel's stamps
+// do not suffer.
+constexpr std::chrono::nanoseconds kNap = 1500us;
+constexpr std::chrono::nanoseconds kLongestLinger = 100ms;
+constexpr int kBatchesPerDrain = 256;
+constexpr double kQueueSeconds = 10;
+constexpr double kQueueLimit = 1 << 23;
+
+Configuration read_configuration(const Place& place) {
+  return parse_configuration(http_get(place.host, place.http_port, "/netftapi2.xml", kHttpTimeout),
+                             "Net Box " + place.host);
+}
+
+StreamSettings stream_settings(const Configuration& configuration, const Clock& clock, Command mode) {
+  StreamSettings settings;
+  settings.buffered = mode == Command::buffered;
+  settings.divisor = configuration.divisor;
+  settings.records_per_datagram = configuration.records_per_datagram;
+  settings.device_rate_hz = configuration.device_rate_hz;
+  settings.reply_timeout = clock.stretched(settings.reply_timeout);
+  settings.settle = clock.stretched(settings.settle);
+  settings.silence_timeout = clock.stretched(settings.silence_timeout);
+  return settings;
+}
+
+std::size_t queue_capacity(const Configuration& configuration, const Clock& clock) {
+  const double wall_rate_hz = configuration.rdt_rate_hz * to_seconds(clock.stretched(1s));
+  return static_cast<std::size_t>(std::clamp(std::ceil(kQueueSeconds * wall_rate_hz), 1024.0, kQueueLimit));
+}
+
+/// True when `descriptor` became readable within `wall`.
+bool poll_for(std::span<pollfd> descriptors, std::chrono::nanoseconds wall) noexcept {
+  const auto clamped = std::clamp<std::chrono::nanoseconds>(wall, 0ns, 1h);
+  const timespec timeout{clamped.count() / 1'000'000'000, clamped.count() % 1'000'000'000};
+  return ppoll(descriptors.data(), descriptors.size(), &timeout, nullptr) > 0;
+}
+
+}  // namespace
+
+LoadCell::Wakeup::Wakeup() : descriptor_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
+  if (descriptor_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+}
+LoadCell::Wakeup::~Wakeup() { close(descriptor_); }
+void LoadCell::Wakeup::raise() noexcept { eventfd_write(descriptor_, 1); }
+void LoadCell::Wakeup::clear() noexcept {
+  eventfd_t ignored;
+  eventfd_read(descriptor_, &ignored);
+}
+
+LoadCell::LoadCell(const Place& place, const Clock& clock, Command mode)
+    : place_(place),
+      clock_(clock),
+      configuration_(read_configuration(place)),
+      socket_(place.host, place.rdt_port),
+      queue_(queue_capacity(configuration_, clock)),
+      session_(stream_settings(configuration_, clock, mode)) {
+  accepted_.reserve(UdpSocket::kBatch * kMaxRecords);
+}
+
+LoadCell::~LoadCell() { stop(); }
+
+void LoadCell::start() {
+  stop();
+  if (!configuration_.rdt_enabled) {
+    throw DeviceError("Net Box " + place_.host, "start the stream", "RDT is disabled (comrdte)",
+                      "enable RDT on the box's Communications page");
+  }
+  stopping_ = false;
+  stop_wakeup_.clear();
+  state_ = State::starting;
+  thread_ = std::thread([this] { run(); });
+  // The session ends this by itself: it either streams or gives up.
+  state_.wait(State::starting);
+  if (state_ != State::failed) return;
+  stop();
+  throw_unanswered();
+}
+
+void LoadCell::stop() noexcept {
+  if (!thread_.joinable()) return;
+  stopping_ = true;
+  stop_wakeup_.raise();
+  thread_.join();
+}
+
+std::size_t LoadCell::take(std::span<StampedRecord> out) noexcept { return queue_.pop(out.data(), out.size()); }
+
+bool LoadCell::wait(std::chrono::nanoseconds wall) noexcept {
+  const auto deadline = std::chrono::steady_clock::now() + wall;
+  for (;;) {
+    consumer_waits_ = true;
+    std::atomic_thread_fence(std::memory_order_seq_cst);
+    if (queue_.read_available() > 0) return true;
+    const auto left = deadline - std::chrono::steady_clock::now();
+    if (left <= 0ns) return false;
+    pollfd raised{consumer_wakeup_.descriptor(), POLLIN, 0};
+    poll_for({&raised, 1}, left);
+    consumer_wakeup_.clear();
+  }
+}
+
+Counters LoadCell::counters() const noexcept {
+  CounterWords words;
+  for (;;) {
+    const std::uint32_t before = counters_version_.load(std::memory_order_acquire);
+    for (std::size_t i = 0; i < words.size(); ++i) words[i] = counter_words_[i].load(std::memory_order_relaxed);
+    std::atomic_thread_fence(std::memory_order_acquire);
+    if (before % 2 == 0 && counters_version_.load(std::memory_order_relaxed) == before) break;
+  }
+  return std::bit_cast<Counters>(words);
+}
+
+std::string LoadCell::receive_buffer_note() const {
+  const StreamSettings& settings = session_.settings();
+  const std::size_t payload = kRecordBytes * (settings.buffered ? settings.records_per_datagram : 1);
+  const double held = static_cast<double>(datagrams_held(socket_.receive_buffer_bytes(), payload));
+  const double tolerated_ms = 1e3 * held * to_seconds(clock_.shrunk(settings.datagram_period()));
+  return fmt::format("{:.1f} MiB, tolerates {:.0f} ms", static_cast<double>(socket_.receive_buffer_bytes()) / (1 << 20),
+                     tolerated_ms);
+}
+
+void LoadCell::run() noexcept {
+  // Signals are the main thread's business.
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_BLOCK, &all, nullptr);
+  session_.start(clock_.now());
+  while (!stopping_ && session_.state() != State::failed) pump();
+  const bool failed = session_.state() == State::failed;
+  if (!failed) session_.stop(clock_.now());
+  send_requests();
+  linger();
+  publish();
+}
+
+void LoadCell::pump() noexcept {
+  send_requests();
+  wait_for_datagrams();
+  drain();
+  session_.advance(clock_.now());
+  publish();
+}
+
+void LoadCell::wait_for_datagrams() noexcept {
+  std::array<pollfd, 2> both{{{stop_wakeup_.descriptor(), POLLIN, 0}, {socket_.native_handle(), POLLIN, 0}}};
+  const Instant due = session_.deadline();
+  poll_for(both, due == kNever ? 1h : clock_.shrunk(due - clock_.now()));
+  const bool stop_asked = both[0].revents != 0;
+  if (session_.state() == State::streaming && !stop_asked) poll_for({both.data(), 1}, kNap);
+}
+
+void LoadCell::drain() noexcept {
+  for (int batch = 0; batch < kBatchesPerDrain; ++batch) {
+    const std::span<const UdpSocket::Datagram> datagrams = socket_.receive();
+    for (const UdpSocket::Datagram& datagram : datagrams) {
+      const bool stamped = datagram.stamp.tv_sec != 0;
+      session_.note_host_drops(datagram.dropped);
+      session_.receive(datagram.bytes, stamped ? clock_.at_realtime(datagram.stamp) : clock_.now(), accepted_);
+    }
+    deliver();
+    if (datagrams.size() < UdpSocket::kBatch) return;
+  }
+}
+
+void LoadCell::deliver() noexcept {
+  if (accepted_.empty()) return;
+  const std::size_t taken = queue_.push(accepted_.data(), accepted_.size());
+  queue_overflows_ += accepted_.size() - taken;
+  newest_arrival_ns_ = accepted_.back().arrival.count();
+  accepted_.clear();
+  std::atomic_thread_fence(std::memory_order_seq_cst);
+  if (consumer_waits_.exchange(false)) consumer_wakeup_.raise();
+}
+
+void LoadCell::send_requests() noexcept {
+  std::array<std::uint8_t, 8> request;
+  while (session_.next_request(request)) socket_.send(request);
+}
+
+void LoadCell::linger() noexcept {
+  const Instant give_up = clock_.now() + clock_.stretched(kLongestLinger);
+  pollfd readable{socket_.native_handle(), POLLIN, 0};
+  while (clock_.now() < give_up && poll_for({&readable, 1}, 2 * clock_.shrunk(session_.settings().settle))) {
+    drain();
+    send_requests();
+  }
+}
+
+void LoadCell::publish() noexcept {
+  Counters counters = session_.counters();
+  counters.queue_overflows = queue_overflows_;
+  const auto words = std::bit_cast<CounterWords>(counters);
+  const std::uint32_t version = counters_version_.load(std::memory_order_relaxed);
+  counters_version_.store(version + 1, std::memory_order_relaxed);
+  std::atomic_thread_fence(std::memory_order_release);
+  for (std::size_t i = 0; i < words.size(); ++i) counter_words_[i].store(words[i], std::memory_order_relaxed);
+  counters_version_.store(version + 2, std::memory_order_release);
+  const State state = session_.state();
+  if (state_.exchange(state) != state) state_.notify_all();
+}
+
+void LoadCell::throw_unanswered() const {
+  const std::string device = fmt::format("Net Box {}:{}", place_.host, place_.rdt_port);
+  if (socket_.refusals() > 0) {
+    throw DeviceError(device, "start the stream", "the box is reachable, but refuses the RDT port",
+                      "check rdt_port, and that RDT is enabled on the box's Communications page");
+  }
+  if (socket_.last_error() != 0) {
+    throw DeviceError(device, "start the stream", std::strerror(socket_.last_error()),
+                      "check this host's network settings");
+  }
+  throw DeviceError(device, "start the stream",
+                    fmt::format("no record after {} requests", session_.settings().attempts),
+                    "check that no firewall holds back UDP and that no other program uses the box");
+}
+
+}  // namespace kphi::netbox

@@ -1,0 +1,107 @@
+// The load cell on its Net Box: reads the configuration, streams, and hands the records to one consumer. Writes none
+// of the box's settings.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <boost/lockfree/spsc_queue.hpp>
+#include <chrono>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "drivers/clock.hpp"
+#include "drivers/netbox/configuration.hpp"
+#include "drivers/netbox/session.hpp"
+#include "drivers/netbox/udp_socket.hpp"
+
+namespace kphi::netbox {
+
+struct Place {
+  std::string host;
+  std::uint16_t rdt_port = 49152;
+  std::uint16_t http_port = 80;
+};
+
+/// One receive thread while it streams. start, stop and the destructor belong to one thread, take and wait to one
+/// (other or same); the rest may be called from any. Counters and queue outlive a stop and the next start.
+class LoadCell {
+ public:
+  /// Reads the configuration over HTTP; sends nothing to the RDT port. `mode`: Command::buffered or real_time.
+  /// `clock` must outlive this. Throws DeviceError.
+  LoadCell(const Place& place, const Clock& clock, Command mode = Command::buffered);
+  /// Stops.
+  ~LoadCell();
+  LoadCell(const LoadCell&) = delete;
+  LoadCell& operator=(const LoadCell&) = delete;
+
+  [[nodiscard]] const Configuration& configuration() const noexcept { return configuration_; }
+  /// Returns once the first record has arrived. Throws DeviceError when none does, or when RDT is disabled.
+  void start();
+  /// Tells the box to stop, and waits a moment to see that it does.
+  void stop() noexcept;
+
+  /// Oldest first; 0 = none waits.
+  [[nodiscard]] std::size_t take(std::span<StampedRecord> out) noexcept;
+  /// True once records wait; false after `wall`.
+  [[nodiscard]] bool wait(std::chrono::nanoseconds wall) noexcept;
+
+  /// A consistent set, a few milliseconds old at most while records come.
+  [[nodiscard]] Counters counters() const noexcept;
+  /// Arrival of the newest accepted record; 0 before the first.
+  [[nodiscard]] Instant newest_arrival() const noexcept { return Instant(newest_arrival_ns_.load()); }
+  [[nodiscard]] State state() const noexcept { return state_.load(); }
+  /// "8.0 MiB, tolerates 1440 ms": how long this process may stand still before the kernel drops datagrams.
+  [[nodiscard]] std::string receive_buffer_note() const;
+
+ private:
+  class Wakeup {
+   public:
+    Wakeup();
+    ~Wakeup();
+    Wakeup(const Wakeup&) = delete;
+    Wakeup& operator=(const Wakeup&) = delete;
+    void raise() noexcept;
+    void clear() noexcept;
+    [[nodiscard]] int descriptor() const noexcept { return descriptor_; }
+
+   private:
+    int descriptor_;
+  };
+  using CounterWords = std::array<std::uint64_t, sizeof(Counters) / sizeof(std::uint64_t)>;
+
+  void run() noexcept;
+  void pump() noexcept;
+  void wait_for_datagrams() noexcept;
+  void drain() noexcept;
+  void deliver() noexcept;
+  void send_requests() noexcept;
+  void linger() noexcept;
+  void publish() noexcept;
+  [[noreturn]] void throw_unanswered() const;
+
+  const Place place_;
+  const Clock& clock_;
+  const Configuration configuration_;
+  UdpSocket socket_;
+  std::thread thread_;
+  std::atomic<bool> stopping_{false};
+  Wakeup stop_wakeup_, consumer_wakeup_;
+  std::atomic<bool> consumer_waits_{false};
+  boost::lockfree::spsc_queue<StampedRecord> queue_;
+
+  // The receive thread's own; others touch them only while it does not run.
+  Session session_;
+  std::vector<StampedRecord> accepted_;
+  std::uint64_t queue_overflows_ = 0;
+
+  // Published by the receive thread.
+  std::atomic<State> state_{State::idle};
+  std::atomic<std::int64_t> newest_arrival_ns_{0};
+  std::atomic<std::uint32_t> counters_version_{0};  // odd while they are being written
+  std::array<std::atomic<std::uint64_t>, std::tuple_size_v<CounterWords>> counter_words_{};
+};
+
+}  // namespace kphi::netbox

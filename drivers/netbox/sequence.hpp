@@ -1,0 +1,88 @@
+// Which records count, and what is missing between them. Both sequence numbers are compared as signed differences
+// modulo 2^32. No bytes, no I/O; one thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "drivers/clock.hpp"
+#include "drivers/netbox/rdt.hpp"
+
+namespace kphi::netbox {
+
+/// Records unless said otherwise. expected = received + lost_network + lost_host, always.
+struct Counters {
+  std::uint64_t received = 0;      ///< accepted
+  std::uint64_t expected = 0;      ///< that the box took from the first to the last accepted one (ft_sequence / stride)
+  std::uint64_t lost_network = 0;  ///< never reached this host; late ones stay counted here
+  std::uint64_t lost_host = 0;     ///< reached this host while the socket's buffer was full
+  std::uint64_t duplicates = 0;    ///< came a second time; discarded
+  std::uint64_t late = 0;          ///< came after a younger one; discarded
+  std::uint64_t stalled = 0;       ///< repeated an old measurement under a new rdt_sequence; discarded
+  std::uint64_t irregular = 0;     ///< accepted, but rdt and ft disagree about the gap before them (rate changed?)
+  std::uint64_t restarts = 0;      ///< times the stream began anew, ft_sequence going on
+  std::uint64_t reboots = 0;       ///< times ft_sequence began anew: bias and scale are to be doubted
+  std::uint64_t datagrams = 0;     ///< of any kind
+  std::uint64_t malformed = 0;     ///< datagrams of wrong size
+  std::uint64_t drained = 0;       ///< datagrams that came while none was asked for
+  std::uint64_t host_drops = 0;    ///< datagrams that the socket dropped (SO_RXQ_OVFL)
+  std::uint64_t queue_overflows = 0;  ///< accepted, then lost because the consumer did not take them in time
+};
+
+class SequenceAccount {
+ public:
+  /// `stride`: ft_sequence per record, 1..7000. `device_rate_hz`: ft_sequence per second.
+  SequenceAccount(unsigned stride, double device_rate_hz) noexcept : stride_(stride), device_rate_hz_(device_rate_hz) {}
+
+  /// The next record is the first of a stream that was asked for: nothing is missing before it.
+  void begin_segment() noexcept { has_last_ = false; }
+  /// True: deliver it. False: counted and to be discarded.
+  [[nodiscard]] bool accept(const Record& record, Instant arrival) noexcept {
+    if (has_last_ && record.rdt_sequence == last_rdt_ + 1 && record.ft_sequence == last_ft_ + stride_) [[likely]] {
+      remember(record, arrival);
+      ++counters_.received;
+      ++counters_.expected;
+      return true;
+    }
+    return accept_unusual(record, arrival);
+  }
+  /// As many records more were dropped by this host's socket: they explain the gaps seen from now on.
+  void add_host_drops(std::uint64_t datagrams, std::uint64_t records_per_datagram) noexcept;
+
+  [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+  [[nodiscard]] Counters& counters() noexcept { return counters_; }
+
+ private:
+  struct Gap {
+    std::uint32_t after_ft = 0, before_ft = 0;  // both were received
+  };
+
+  void remember(const Record& record, Instant arrival) noexcept {
+    last_rdt_ = record.rdt_sequence;
+    last_ft_ = record.ft_sequence;
+    last_arrival_ = arrival;
+    backward_run_ = 0;
+  }
+  bool accept_unusual(const Record& record, Instant arrival) noexcept;
+  bool accept_forward(const Record& record, Instant arrival, std::int32_t rdt_step, std::int32_t ft_step) noexcept;
+  bool refuse_backward(const Record& record, std::int32_t ft_step) noexcept;
+  bool accept_first(const Record& record, Instant arrival) noexcept;
+  bool plausible(std::int32_t ft_step, Instant arrival) const noexcept;
+  bool begins_after_reboot(const Record& record, bool far_back) noexcept;
+  void count_lost(std::uint64_t records, const Gap& gap) noexcept;
+  bool in_recent_gap(std::uint32_t ft) const noexcept;
+
+  const std::uint32_t stride_;
+  const double device_rate_hz_;
+  bool has_last_ = false;
+  std::uint32_t last_rdt_ = 0, last_ft_ = 0;
+  Instant last_arrival_{0};
+  std::uint64_t host_credit_ = 0;  // records dropped by the socket and not yet found missing
+  std::array<Gap, 16> gaps_{};
+  std::uint64_t gap_count_ = 0;
+  std::uint32_t backward_rdt_ = 0, backward_ft_ = 0;
+  std::uint64_t backward_run_ = 0;  // records in a row that continue each other, but not the stream
+  Counters counters_;
+};
+
+}  // namespace kphi::netbox

@@ -1,0 +1,90 @@
+// One client's dealings with the box over RDT: start it, take its records, notice silence, stop it. A state machine:
+// datagrams and the time go in; requests, records and the next deadline come out. One thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "drivers/clock.hpp"
+#include "drivers/netbox/rdt.hpp"
+#include "drivers/netbox/sequence.hpp"
+
+namespace kphi::netbox {
+
+struct StampedRecord {
+  Record record;
+  Instant arrival{0};  ///< bench time at which the datagram that brought it reached this host
+};
+
+/// Durations are bench time (a protocol's wall time goes through Clock::stretched first).
+struct StreamSettings {
+  bool buffered = true;                                       ///< false: real-time mode, one record per datagram
+  unsigned divisor = 1;                                       ///< ft_sequence per record
+  int records_per_datagram = 40;                              ///< in buffered mode
+  double device_rate_hz = 7000;                               ///< ft_sequence per second
+  Duration reply_timeout = std::chrono::milliseconds(100);    ///< of the first start; added to two datagram periods
+  Duration settle = std::chrono::milliseconds(5);             ///< silence after a stop before the start is sent
+  Duration silence_timeout = std::chrono::milliseconds(500);  ///< added to three datagram periods
+  int attempts = 6;  ///< starts sent before giving up; the timeout doubles up to four times the first
+
+  /// Bench time between two datagrams.
+  [[nodiscard]] Duration datagram_period() const noexcept;
+};
+
+enum class State : std::uint8_t {
+  idle,
+  starting,  ///< asked, no record yet
+  streaming,
+  silent,  ///< was streaming, nothing for long; streams again with the next record, or with start()
+  failed,  ///< no record after all attempts
+};
+
+class Session {
+ public:
+  explicit Session(StreamSettings settings);
+
+  /// Stop, wait for silence, start; repeated until the first record. From `silent` or `streaming` the account goes on,
+  /// so that what is missing in between is counted; from `idle` or `failed` it begins anew behind the old one.
+  void start(Instant now);
+  /// Tells the box to stop, and again if it keeps sending.
+  void stop(Instant now);
+  /// Appends the accepted records of one datagram to `out`.
+  void receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out);
+  /// To be called at `deadline()`, after everything that came before has been received.
+  void advance(Instant now);
+  /// Pops what must be sent to the box next. False: nothing.
+  [[nodiscard]] bool next_request(std::array<std::uint8_t, 8>& request) noexcept;
+  /// kNever when nothing is due.
+  [[nodiscard]] Instant deadline() const noexcept;
+  [[nodiscard]] State state() const noexcept;
+  /// Datagrams that the socket has dropped since it was opened (SO_RXQ_OVFL), as known at the datagram received next.
+  void note_host_drops(std::uint64_t total) noexcept;
+  [[nodiscard]] const Counters& counters() const noexcept { return account_.counters(); }
+  [[nodiscard]] const StreamSettings& settings() const noexcept { return settings_; }
+
+ private:
+  enum class Phase : std::uint8_t { idle, draining, awaiting, streaming, silent, failed };
+
+  void discard(Instant arrival);
+  bool belongs_to_new_stream(const Record& first) const noexcept;
+  void send(Command command) noexcept;
+  void send_stop(Instant now) noexcept;
+  void send_start(Instant now) noexcept;
+
+  const StreamSettings settings_;
+  const Duration silence_;
+  SequenceAccount account_;
+  Phase phase_ = Phase::idle;
+  Instant due_ = kNever;
+  Instant drain_limit_{0}, stop_sent_{0};
+  int attempt_ = 0;
+  std::size_t datagram_records_;  // of the last datagram
+  std::uint64_t host_drops_ = 0;
+  std::array<Record, kMaxRecords> decoded_{};
+  std::array<Command, 4> requests_{};
+  std::size_t request_count_ = 0;
+};
+
+}  // namespace kphi::netbox

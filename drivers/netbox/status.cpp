@@ -1,0 +1,64 @@
+#include "drivers/netbox/status.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+namespace kphi::netbox {
+namespace {
+
+struct Entry {
+  StatusBit bit;
+  const char* name;
+};
+
+constexpr Entry kTable[] = {
+    {StatusBit::cpu_or_ram, "CPU or RAM error"},
+    {StatusBit::digital_board, "digital board error"},
+    {StatusBit::analog_board, "analog board error"},
+    {StatusBit::serial_link, "serial link communication error"},
+    {StatusBit::program_memory, "program memory verification error"},
+    {StatusBit::halted, "halted: configuration errors"},
+    {StatusBit::settings_validation, "settings validation error"},
+    {StatusBit::calibration_mismatch, "configuration incompatible with calibration"},
+    {StatusBit::network, "network communication failure"},
+    {StatusBit::can, "CAN communication error"},
+    {StatusBit::rdt, "RDT communication error"},
+    {StatusBit::ethernet_ip, "EtherNet/IP failure"},
+    {StatusBit::device_net, "DeviceNet failure"},
+    {StatusBit::saturation, "transducer saturation or A/D error"},
+    {StatusBit::monitor_condition, "monitor condition latched"},
+    {StatusBit::watchdog, "watchdog timeout"},
+    {StatusBit::stack_check, "stack check error"},
+    {StatusBit::serial_eeprom, "serial EEPROM (I2C) failure"},
+    {StatusBit::serial_flash, "serial flash (SPI) failure"},
+    {StatusBit::analog_watchdog, "analog board watchdog timeout"},
+    {StatusBit::excitation_high, "excessive strain gage excitation current"},
+    {StatusBit::excitation_low, "insufficient strain gage excitation current"},
+    {StatusBit::analog_ground, "artificial analog ground out of range"},
+    {StatusBit::analog_supply_high, "analog supply too high"},
+    {StatusBit::analog_supply_low, "analog supply too low"},
+    {StatusBit::serial_link_unavailable, "serial link data unavailable"},
+    {StatusBit::reference_voltage, "reference voltage or power monitor error"},
+    {StatusBit::temperature, "internal temperature error"},
+    {StatusBit::http_failure, "HTTP protocol failure"},
+};
+
+std::string name_of(StatusBit bit) {
+  const auto entry = std::find_if(std::begin(kTable), std::end(kTable), [&](const Entry& e) { return e.bit == bit; });
+  return entry == std::end(kTable) ? "bit " + std::to_string(static_cast<unsigned>(bit)) : entry->name;
+}
+
+}  // namespace
+
+std::vector<std::string> names(std::uint32_t status) {
+  std::vector<std::string> set;
+  for (int bit = 30; bit >= 0; --bit) {
+    const auto candidate = static_cast<StatusBit>(bit);
+    if (has(status, candidate)) set.push_back(name_of(candidate));
+  }
+  // The summary alone says that something is wrong, not what.
+  if (status == 1u << 31) set.push_back("error summary");
+  return set;
+}
+
+}  // namespace kphi::netbox

@@ -1,0 +1,25 @@
+// The status word of each record (manual 9620-05-NET FT, Table 17.1). Not for the Ethernet Axia.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "drivers/netbox/codes.hpp"
+
+namespace kphi::netbox {
+
+[[nodiscard]] constexpr bool has(std::uint32_t status, StatusBit bit) noexcept {
+  return (status >> static_cast<unsigned>(bit) & 1u) != 0;
+}
+
+/// 0, or nothing but a latched monitor condition (0x80010000).
+[[nodiscard]] constexpr bool healthy(std::uint32_t status) noexcept { return status == 0 || status == 0x80010000u; }
+
+/// Transducer saturation or A/D error: the sample is worthless, the box is well.
+[[nodiscard]] constexpr bool saturated(std::uint32_t status) noexcept { return has(status, StatusBit::saturation); }
+
+/// What is set, most significant bit first, without the error summary; a bit the table does not know is "bit N".
+[[nodiscard]] std::vector<std::string> names(std::uint32_t status);
+
+}  // namespace kphi::netbox

@@ -1,0 +1,65 @@
+// The datagrams of one peer, with the kernel's receive stamps and its count of what it dropped. One thread.
+#pragma once
+
+#include <time.h>
+
+#include <array>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/udp.hpp>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace kphi::netbox {
+
+class UdpSocket {
+ public:
+  static constexpr std::size_t kBatch = 64;
+  struct Datagram {
+    std::span<const std::uint8_t> bytes;  ///< valid until the next receive()
+    timespec stamp{};                     ///< CLOCK_REALTIME; zero when the kernel gave none
+    std::uint64_t dropped = 0;            ///< datagrams dropped for want of buffer, since the socket was opened
+  };
+
+  /// Connects, so that only this peer's datagrams come in. Throws DeviceError.
+  UdpSocket(const std::string& host, std::uint16_t port);
+  ~UdpSocket();
+  UdpSocket(const UdpSocket&) = delete;
+  UdpSocket& operator=(const UdpSocket&) = delete;
+
+  /// What waits, without blocking, at most kBatch: fewer when no more waits. Allocates nothing.
+  [[nodiscard]] std::span<const Datagram> receive() noexcept;
+  /// False: the kernel did not take it.
+  bool send(std::span<const std::uint8_t> bytes) noexcept;
+  [[nodiscard]] int native_handle() { return socket_.native_handle(); }
+  /// The kernel's receive buffer, as read back.
+  [[nodiscard]] std::size_t receive_buffer_bytes() const noexcept { return receive_buffer_bytes_; }
+  /// Times the peer's host answered that nobody listens at the port.
+  [[nodiscard]] std::uint64_t refusals() const noexcept { return refusals_; }
+  /// errno of the last failure that is neither a refusal nor an interruption; 0 = none.
+  [[nodiscard]] int last_error() const noexcept { return last_error_; }
+
+ private:
+  static constexpr std::size_t kLongest = 1500;  // no multiple of 36: what is cut off is refused by its size
+  struct Slots;
+
+  void ask_for_buffer();
+  void read_control(std::size_t slot) noexcept;
+  bool retry(int error) noexcept;
+
+  boost::asio::io_context io_;
+  boost::asio::ip::udp::socket socket_;
+  std::size_t receive_buffer_bytes_ = 0;
+  std::uint64_t refusals_ = 0;
+  int last_error_ = 0;
+  std::uint64_t dropped_ = 0;
+  std::uint32_t dropped_reported_ = 0;
+  std::unique_ptr<Slots> slots_;
+  std::array<Datagram, kBatch> datagrams_{};
+};
+
+/// Datagrams of `payload_bytes` that a receive buffer holds: the kernel charges each with its bookkeeping.
+[[nodiscard]] std::size_t datagrams_held(std::size_t receive_buffer_bytes, std::size_t payload_bytes) noexcept;
+
+}  // namespace kphi::netbox
