@@ -1,0 +1,49 @@
+// When the Net Box took its samples, in bench time. The box has no clock but ft_sequence, which counts at its own rate;
+// the arrival stamps tell bench time, late by a delay of which only the smallest is steady. So: per 0.5 s of device
+// time the smallest (arrival - device time), and a least-squares line through these over the whole run.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "results/records.hpp"
+
+namespace kphi::daq {
+
+/// Records between two restarts of the box (ft_sequence jumps back): one clock each.
+struct ClockEpoch {
+  std::size_t begin = 0;  ///< index of the first record
+  std::size_t end = 0;    ///< one past the last
+  std::uint32_t ft_first = 0;
+  double offset_ns = 0;        ///< bench time of the first record
+  double skew = 0;             ///< bench ns gained per device ns
+  double residual_p99_ns = 0;  ///< 99 % of the fresh records came less than this after the line
+  std::size_t bins = 0;        ///< points under the line; with fewer than 4 the skew is taken as 0
+};
+
+class ClockMap {
+ public:
+  /// `device_rate_hz`: rate at which ft_sequence counts. The records must outlive the map and be in order of arrival.
+  /// Constant delays of box, filter and wire cannot be seen one-way: times are late by their smallest sum.
+  ClockMap(std::span<const results::LoadCellRecord> records, double device_rate_hz);
+
+  [[nodiscard]] const std::vector<ClockEpoch>& epochs() const { return epochs_; }
+  /// Bench time of the sample in record `index` of `epoch`. Increases with the index.
+  [[nodiscard]] results::Nanoseconds time_ns(const ClockEpoch& epoch, std::size_t index) const;
+  /// First record of `epoch` at or after `time`; epoch.end when there is none.
+  [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, results::Nanoseconds time) const;
+  /// Skew of an epoch in parts per million.
+  [[nodiscard]] static double skew_ppm(const ClockEpoch& epoch) { return 1e6 * epoch.skew; }
+  /// Below 500 ppm; more means that rate or stride are not what the box said.
+  [[nodiscard]] static bool plausible(const ClockEpoch& epoch) { return epoch.skew < 500e-6 && epoch.skew > -500e-6; }
+
+ private:
+  [[nodiscard]] double device_ns(const ClockEpoch& epoch, std::size_t index) const;
+  void fit(ClockEpoch& epoch) const;
+  std::span<const results::LoadCellRecord> records_;
+  double tick_ns_;
+  std::vector<ClockEpoch> epochs_;
+};
+
+}  // namespace kphi::daq

@@ -1,0 +1,10 @@
+# Raw run to step means: a library of its own, so that replay needs no device.
+add_library(kphi_reduction STATIC
+  clock_map.cpp
+  reduction.cpp
+  repetitions.cpp
+)
+target_link_libraries(kphi_reduction PUBLIC kphi_options kphi_results PRIVATE fmt::fmt)
+
+add_library(kphi_replay STATIC replay_commands.cpp)
+target_link_libraries(kphi_replay PUBLIC kphi_reduction CLI11::CLI11 PRIVATE kphi_profiles nlohmann_json::nlohmann_json)

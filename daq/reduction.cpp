@@ -1,0 +1,363 @@
+#include "daq/reduction.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "daq/clock_map.hpp"
+#include "results/record_error.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using results::Doubt;
+using results::LoadCellRecord;
+using results::MotorChannel;
+using results::MotorReading;
+using results::Nanoseconds;
+using results::Phase;
+using results::PhaseMark;
+using results::StepMean;
+
+__extension__ using Wide = __int128;
+
+constexpr std::uint32_t kSaturationBit = 1u << 17;  // Net Box Table 17.1
+constexpr std::uint32_t kMonitorBit = 1u << 16;     // a condition the user set; raises the summary bit, too
+constexpr std::uint32_t kSummaryBit = 1u << 31;
+constexpr double kStandstill = 5.0;    // rad/s
+constexpr double kSpeedShare = 0.01;   // of the command
+constexpr double kSpeedReached = 2.0;  // rad/s
+constexpr double kSpeedSteady = 5.0;   // rad/s
+constexpr double kFewSamples = 0.1;    // of those expected
+constexpr std::uint64_t kFewSpeeds = 3;
+
+double speed_tolerance(double commanded) { return std::max(kSpeedShare * commanded, kSpeedReached); }
+
+struct Window {
+  Nanoseconds begin = 0;
+  Nanoseconds end = 0;
+  [[nodiscard]] double centre() const { return 0.5 * (static_cast<double>(begin) + static_cast<double>(end)); }
+};
+
+/// Sums of one channel about its first sample: whole numbers, so the order of adding does not matter.
+class CountSums {
+ public:
+  void add(std::int32_t count) {
+    if (n_ == 0) first_ = count;
+    const std::int64_t d = static_cast<std::int64_t>(count) - first_;
+    sum_ += d;
+    squares_ += static_cast<Wide>(d) * d;
+    ++n_;
+  }
+  [[nodiscard]] std::uint64_t n() const { return n_; }
+  [[nodiscard]] double mean() const { return first_ + static_cast<double>(sum_) / static_cast<double>(n_); }
+  [[nodiscard]] double deviation() const {
+    if (n_ < 2) return 0;
+    const Wide spread = squares_ * static_cast<Wide>(n_) - static_cast<Wide>(sum_) * sum_;
+    const double n = static_cast<double>(n_);
+    return std::sqrt(static_cast<double>(spread) / n / (n - 1));
+  }
+
+ private:
+  std::int32_t first_ = 0;
+  std::uint64_t n_ = 0;
+  std::int64_t sum_ = 0;
+  Wide squares_ = 0;
+};
+
+struct CellWindow {
+  CountSums force;
+  CountSums torque;
+  std::uint64_t lost = 0;
+  std::uint32_t status = 0;  ///< all set bits, without healthy monitor words
+  bool at_limit = false;
+};
+
+/// The load cell of one run, with its samples placed in bench time.
+class CellStream {
+ public:
+  explicit CellStream(const results::RunRecording& run)
+      : header_(run.header), records_(run.load_cell), clock_(run.load_cell, run.header.load_cell.device_rate_hz) {
+    const auto& scale = header_.load_cell;
+    for (std::size_t i = 0; i < limits_.size(); ++i) {
+      const double counts = scale.range[i] * (i < 3 ? scale.counts_per_newton : scale.counts_per_newton_metre);
+      const double full = std::numeric_limits<std::int32_t>::max();
+      limits_[i] = static_cast<std::int64_t>(counts > 0 && counts < full ? counts : full);
+    }
+  }
+
+  [[nodiscard]] CellWindow over(const Window& window) const {
+    CellWindow found;
+    for (const ClockEpoch& epoch : clock_.epochs()) {
+      const std::size_t begin = clock_.first_at(epoch, window.begin);
+      const std::size_t end = clock_.first_at(epoch, window.end);
+      for (std::size_t i = begin; i < end; ++i) add(records_[i], found);
+      count_lost(epoch, begin, end, window, found);
+    }
+    return found;
+  }
+
+ private:
+  void add(const LoadCellRecord& record, CellWindow& found) const {
+    const auto axis = static_cast<std::size_t>(header_.thrust_axis);
+    found.force.add(record.counts[axis]);
+    found.torque.add(record.counts[axis + 3]);
+    if (record.status != (kSummaryBit | kMonitorBit)) found.status |= record.status;
+    for (std::size_t i = 0; i < 6; ++i) {
+      const std::int64_t count = record.counts[i];
+      found.at_limit |= count >= limits_[i] || count <= -limits_[i];
+    }
+  }
+
+  /// Gaps of ft_sequence inside the window, and those parts of gaps across its ends that lie inside.
+  void count_lost(const ClockEpoch& epoch, std::size_t begin, std::size_t end, const Window& window,
+                  CellWindow& found) const {
+    const std::uint32_t stride = std::max(header_.load_cell.ft_stride, 1u);
+    const std::size_t from = std::max(begin, epoch.begin + 1);
+    const std::size_t to = std::min(end + 1, epoch.end);
+    for (std::size_t i = from; i < to; ++i) {
+      const std::uint32_t missing = (records_[i].ft_sequence - records_[i - 1].ft_sequence) / stride - 1;
+      if (missing == 0 || missing == std::numeric_limits<std::uint32_t>::max()) continue;
+      if (i > begin && i < end) {
+        found.lost += missing;
+        continue;
+      }
+      const Nanoseconds before = clock_.time_ns(epoch, i - 1);
+      const double period = static_cast<double>(clock_.time_ns(epoch, i) - before) / (missing + 1.0);
+      for (std::uint32_t k = 1; k <= missing; ++k) {
+        const double t = static_cast<double>(before) + k * period;
+        found.lost += t >= static_cast<double>(window.begin) && t < static_cast<double>(window.end);
+      }
+    }
+  }
+
+  const results::RunHeader& header_;
+  const std::vector<LoadCellRecord>& records_;
+  ClockMap clock_;
+  std::array<std::int64_t, 6> limits_{};
+};
+
+struct Statistics {
+  std::uint64_t n = 0;
+  double mean = std::numeric_limits<double>::quiet_NaN();
+  double deviation = 0;
+  double least = std::numeric_limits<double>::infinity();
+};
+
+/// The motor's readings of one run, by channel and time.
+class MotorSeries {
+ public:
+  explicit MotorSeries(const std::vector<MotorReading>& readings) : readings_(readings) {}
+
+  [[nodiscard]] std::pair<const MotorReading*, const MotorReading*> over(MotorChannel channel,
+                                                                         const Window& window) const {
+    const auto at = [&](Nanoseconds time) {
+      return std::partition_point(readings_.data(), readings_.data() + readings_.size(), [&](const MotorReading& r) {
+        return r.channel < channel || (r.channel == channel && r.time_ns < time);
+      });
+    };
+    return {at(window.begin), at(window.end)};
+  }
+
+  [[nodiscard]] Statistics statistics(MotorChannel channel, const Window& window, double sign = 1) const {
+    const auto [begin, end] = over(channel, window);
+    Statistics s;
+    s.n = static_cast<std::uint64_t>(end - begin);
+    if (s.n == 0) return s;
+    double sum = 0;
+    for (const auto* r = begin; r != end; ++r) {
+      sum += sign * r->value;
+      s.least = std::min(s.least, sign * r->value);
+    }
+    s.mean = sum / static_cast<double>(s.n);
+    double squares = 0;
+    for (const auto* r = begin; r != end; ++r) squares += (sign * r->value - s.mean) * (sign * r->value - s.mean);
+    if (s.n > 1) s.deviation = std::sqrt(squares / static_cast<double>(s.n - 1));
+    return s;
+  }
+
+ private:
+  const std::vector<MotorReading>& readings_;
+};
+
+struct Zero {
+  double time = 0;   ///< ns, centre of its window
+  double force = 0;  ///< counts
+  double torque = 0;
+};
+
+class Zeros {
+ public:
+  void add(const Zero& zero) { (zeros_[0] ? zeros_[1] : zeros_[0]) = zero; }
+  [[nodiscard]] bool empty() const { return !zeros_[0]; }
+  [[nodiscard]] Zero at(double time) const {
+    const Zero& a = *zeros_[0];
+    if (!zeros_[1] || zeros_[1]->time == a.time) return a;
+    const Zero& b = *zeros_[1];
+    const double share = (time - a.time) / (b.time - a.time);
+    return {time, a.force + share * (b.force - a.force), a.torque + share * (b.torque - a.torque)};
+  }
+
+ private:
+  std::array<std::optional<Zero>, 2> zeros_;
+};
+
+class Reduction {
+ public:
+  explicit Reduction(const results::RunRecording& run) : run_(run), cell_(run), motor_(run.motor) {}
+
+  [[nodiscard]] std::vector<StepMean> steps() {
+    find_zeros();
+    std::vector<StepMean> means;
+    for (std::size_t i = 0; i < run_.phases.size(); ++i) {
+      if (run_.phases[i].phase == Phase::step && held_to_its_end(i)) means.push_back(mean_of(i));
+    }
+    return means;
+  }
+
+ private:
+  [[nodiscard]] Window phase_window(std::size_t i) const {
+    return {run_.phases[i].time_ns, run_.phases[i + 1].time_ns};
+  }
+  [[nodiscard]] Nanoseconds discard() const { return std::llround(1e9 * run_.header.minimum_discard_s); }
+
+  /// The step that an abort cut short is followed by whatever made the bench safe, never by another step.
+  [[nodiscard]] bool held_to_its_end(std::size_t i) const {
+    if (i + 1 >= run_.phases.size()) return false;
+    return run_.outcome == results::Outcome::complete || run_.phases[i + 1].phase == Phase::step;
+  }
+
+  void find_zeros() {
+    for (std::size_t i = 0; i + 1 < run_.phases.size(); ++i) {
+      const Phase phase = run_.phases[i].phase;
+      if (phase != Phase::zero_before && phase != Phase::zero_after) continue;
+      Window window = phase_window(i);
+      if (phase == Phase::zero_after) {
+        const Nanoseconds planned = window.end - window.begin;
+        window.begin += std::min(discard(), planned / 2);
+        window.begin = std::max(window.begin, standstill_in(phase_window(i)));
+        if (window.end - window.begin < planned / 10) continue;
+      }
+      const CellWindow zero = cell_.over(window);
+      if (zero.force.n() > 0) zeros_.add({window.centre(), zero.force.mean(), zero.torque.mean()});
+    }
+  }
+
+  /// The time after which no reading says that the motor turns.
+  [[nodiscard]] Nanoseconds standstill_in(const Window& window) const {
+    const auto [begin, end] = motor_.over(MotorChannel::speed, window);
+    Nanoseconds time = window.begin;
+    for (const auto* r = begin; r != end; ++r) {
+      if (std::abs(r->value) > kStandstill) time = r->time_ns + 1;
+    }
+    return time;
+  }
+
+  /// The step's window; when the speed never arrives, all that the discard leaves.
+  [[nodiscard]] Window settled(std::size_t i) const {
+    const PhaseMark& mark = run_.phases[i];
+    Window window = phase_window(i);
+    const auto near = [&](const MotorReading& r) {
+      return std::abs(run_.header.spin * r.value - mark.speed_rad_s) <= speed_tolerance(mark.speed_rad_s);
+    };
+    const auto [first, unused] = motor_.over(MotorChannel::speed, window);
+    window.begin = std::min(window.begin + discard(), window.end);
+    const auto [begin, end] = motor_.over(MotorChannel::speed, window);
+    if (begin != first && near(*(begin - 1))) return window;
+    const auto* arrived = std::find_if(begin, end, near);
+    if (arrived != end) window.begin = arrived->time_ns;
+    return window;
+  }
+
+  [[nodiscard]] StepMean mean_of(std::size_t i) const {
+    const results::RunHeader& header = run_.header;
+    const PhaseMark& mark = run_.phases[i];
+    const Window window = settled(i);
+    const CellWindow cell = cell_.over(window);
+    const Statistics speed = motor_.statistics(MotorChannel::speed, window, header.spin);
+    if (zeros_.empty()) {
+      throw results::RecordError(
+          fmt::format("run {}: no load-cell samples while the motor stood; repeat the run", header.uuid));
+    }
+    const Zero zero = zeros_.at(window.centre());
+    const double newtons = header.thrust_sign / header.load_cell.counts_per_newton;
+    const double newton_metres = header.thrust_sign / header.load_cell.counts_per_newton_metre;
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+
+    StepMean mean;
+    mean.propeller = header.propeller_id;
+    mean.blades = header.blades;
+    mean.diameter_in = header.diameter_in;
+    mean.occlusion_deg = header.occlusion_deg;
+    mean.repetition = header.repetition;
+    mean.step = mark.step;
+    mean.commanded_speed_rad_s = mark.speed_rad_s;
+    mean.speed_rad_s = speed.mean;
+    mean.speed_sd_rad_s = speed.deviation;
+    mean.speed_n = speed.n;
+    mean.thrust_n = cell.force.n() > 0 ? newtons * (cell.force.mean() - zero.force) : nan;
+    mean.thrust_sd_n = std::abs(newtons) * cell.force.deviation();
+    mean.thrust_samples = cell.force.n();
+    mean.torque_nm = cell.torque.n() > 0 ? newton_metres * (cell.torque.mean() - zero.torque) : nan;
+    mean.torque_sd_nm = std::abs(newton_metres) * cell.torque.deviation();
+    mean.zero_n = newtons * zero.force;
+    mean.supply_voltage_v = motor_.statistics(MotorChannel::supply_voltage, window).mean;
+    mean.supply_current_a = motor_.statistics(MotorChannel::supply_current, window).mean;
+    mean.motor_current_a = motor_.statistics(MotorChannel::motor_current, window).mean;
+    mean.coil_temperature_degc = motor_.statistics(MotorChannel::coil_temperature, window).mean;
+    mean.window_begin_s = 1e-9 * static_cast<double>(window.begin);
+    mean.window_end_s = 1e-9 * static_cast<double>(window.end);
+    mean.doubts = doubts(i, window, cell, speed);
+    return mean;
+  }
+
+  [[nodiscard]] std::uint32_t doubts(std::size_t i, const Window& window, const CellWindow& cell,
+                                     const Statistics& speed) const {
+    const double commanded = run_.phases[i].speed_rad_s;
+    const double planned_s =
+        1e-9 * static_cast<double>(run_.phases[i + 1].time_ns - run_.phases[i].time_ns - discard());
+    const double expected = std::max(planned_s, 0.0) * run_.header.load_cell.sample_rate_hz;
+    const double derate = motor_.statistics(MotorChannel::derate, window).least;
+    std::uint32_t bits = 0;
+    const auto note = [&](Doubt doubt, bool applies) { bits |= applies ? static_cast<std::uint32_t>(doubt) : 0u; };
+    // Without a single reading nobody knows: that is "not reached", too.
+    note(Doubt::speed_not_reached, !(std::abs(speed.mean - commanded) <= speed_tolerance(commanded)));
+    note(Doubt::speed_unsteady, speed.deviation > std::max(kSpeedShare * std::abs(speed.mean), kSpeedSteady));
+    note(Doubt::saturated, (cell.status & kSaturationBit) != 0 || cell.at_limit);
+    note(Doubt::lost_samples, cell.lost > 0);
+    note(Doubt::derated, derate < 1);
+    note(Doubt::few_samples,
+         static_cast<double>(cell.force.n()) < kFewSamples * expected || cell.force.n() == 0 || speed.n < kFewSpeeds);
+    const std::uint32_t told = kSaturationBit | kMonitorBit;
+    const bool only_saturation = (cell.status & ~(told | kSummaryBit)) == 0 && (cell.status & kSaturationBit) != 0;
+    note(Doubt::bad_status, (cell.status & ~told) != 0 && !only_saturation);
+    return bits;
+  }
+
+  const results::RunRecording& run_;
+  CellStream cell_;
+  MotorSeries motor_;
+  Zeros zeros_;
+};
+
+void require_usable(const results::RunHeader& header) {
+  const auto& scale = header.load_cell;
+  const bool usable = scale.counts_per_newton > 0 && scale.counts_per_newton_metre > 0 && scale.device_rate_hz > 0 &&
+                      header.thrust_axis >= 0 && header.thrust_axis <= 2;
+  if (usable) return;
+  throw results::RecordError(
+      fmt::format("run {}: scale, rate or thrust axis of the load cell cannot be used; see kphi verify", header.uuid));
+}
+
+}  // namespace
+
+std::vector<StepMean> reduce(const results::RunRecording& run) {
+  require_usable(run.header);
+  return Reduction(run).steps();
+}
+
+}  // namespace kphi::daq

@@ -1,0 +1,26 @@
+// From a raw run to its step means: a pure function of the run file, so that live and replay give the same bytes.
+#pragma once
+
+#include <vector>
+
+#include "results/records.hpp"
+#include "results/step_mean.hpp"
+
+namespace kphi::daq {
+
+/// One mean per step that was held to its end, in the order of the commands.
+///
+/// Window of a step: from its command plus the minimum discard, and from the first speed reading within 1 % (at least
+/// 2 rad/s) of the command, to the next command. Load cell and motor are averaged over the same window of bench time;
+/// load-cell samples are placed by ClockMap.
+/// Thrust: sign · (mean counts - zero) / counts per newton. Torque: about the direction of the thrust, likewise.
+/// Zero: mean of zero_before and of zero_after (without its beginning, and only once the motor stands), linear in time
+/// between the two; with one of them only, that one.
+/// Standard deviations are those of the samples (n - 1). Speed is unsigned: positive in the direction of the spin.
+/// A motor channel without a reading in the window gives NaN.
+///
+/// An aborted run gives the steps before the one that was cut short. Throws RecordError when a run with steps holds no
+/// load-cell samples in any zero window, or its scale cannot be used.
+[[nodiscard]] std::vector<results::StepMean> reduce(const results::RunRecording& run);
+
+}  // namespace kphi::daq

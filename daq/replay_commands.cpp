@@ -1,0 +1,152 @@
+#include "daq/replay_commands.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daq/reduction.hpp"
+#include "profiles/campaign.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/run_reader.hpp"
+#include "results/steps_csv.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using results::CampaignFolder;
+using results::StepMean;
+
+constexpr int kOk = 0;
+constexpr int kRejected = 5;
+
+struct Asked {
+  std::string path;
+  bool json = false;
+};
+
+struct Replay {
+  std::vector<StepMean> steps;
+  std::optional<std::filesystem::path> stored;  ///< steps.csv of the campaign folder, when there is one
+  bool whole_campaign = false;
+};
+
+std::vector<std::filesystem::path> runs_of(const CampaignFolder& folder) {
+  if (!std::filesystem::exists(folder.campaign_file())) return folder.complete_runs();
+  return folder.complete_runs(profiles::load_campaign(folder.campaign_file().string()).occlusions_deg);
+}
+
+Replay replay(const std::filesystem::path& path) {
+  Replay result;
+  result.whole_campaign = std::filesystem::is_directory(path);
+  std::filesystem::path steps;
+  if (result.whole_campaign) {
+    const CampaignFolder folder = CampaignFolder::open(path);
+    for (const auto& run : runs_of(folder)) {
+      const auto of_run = reduce(results::read_run(run));
+      result.steps.insert(result.steps.end(), of_run.begin(), of_run.end());
+    }
+    steps = folder.steps();
+  } else {
+    result.steps = reduce(results::read_run(path));
+    const auto runs = std::filesystem::absolute(path).parent_path();
+    if (runs.filename() == "runs") steps = runs.parent_path() / "steps.csv";
+  }
+  if (!steps.empty() && std::filesystem::exists(steps)) result.stored = steps;
+  return result;
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    lines.push_back(text.substr(at, end - at));
+    at = end + 1;
+  }
+  return lines;
+}
+
+/// Of the whole campaign every byte counts; of one run its block of lines must be in the file as it is.
+std::optional<std::string> difference(const Replay& replay, const std::string& stored) {
+  const std::string again = results::format_steps(replay.steps);
+  if (again == stored) return std::nullopt;
+  const std::vector<std::string> old_lines = lines_of(stored);
+  std::vector<std::string> new_lines = lines_of(again);
+  std::size_t at = 0;
+  if (!replay.whole_campaign) {
+    new_lines.erase(new_lines.begin());
+    if (new_lines.empty()) return std::nullopt;
+    // Propeller, blades, diameter, occlusion and repetition open each line of the run.
+    std::size_t comma = 0;
+    for (int i = 0; i < 5; ++i) comma = new_lines.front().find(',', comma) + 1;
+    const std::string opening = new_lines.front().substr(0, comma);
+    while (at < old_lines.size() && !old_lines[at].starts_with(opening)) ++at;
+  }
+  for (std::size_t i = 0; i < new_lines.size() || (replay.whole_campaign && at + i < old_lines.size()); ++i) {
+    const std::string was = at + i < old_lines.size() ? old_lines[at + i] : "(no line)";
+    const std::string is = i < new_lines.size() ? new_lines[i] : "(no line)";
+    if (was != is) return fmt::format("line {} differs\n  stored: {}\n  again:  {}", at + i + 1, was, is);
+  }
+  if (!replay.whole_campaign) return std::nullopt;
+  return std::string("the line ends differ");
+}
+
+nlohmann::ordered_json number(double value) {
+  return std::isnan(value) ? nlohmann::ordered_json() : nlohmann::ordered_json(value);
+}
+
+nlohmann::ordered_json to_json(const StepMean& step) {
+  return {{"propeller", step.propeller},
+          {"occlusion_deg", step.occlusion_deg},
+          {"repetition", step.repetition},
+          {"step", step.step},
+          {"commanded_speed_rad_s", step.commanded_speed_rad_s},
+          {"speed_rad_s", number(step.speed_rad_s)},
+          {"thrust_n", number(step.thrust_n)},
+          {"thrust_sd_n", step.thrust_sd_n},
+          {"torque_nm", number(step.torque_nm)},
+          {"zero_n", step.zero_n},
+          {"thrust_samples", step.thrust_samples},
+          {"doubts", results::doubt_names(step.doubts)}};
+}
+
+void print(const Replay& replay, const std::optional<std::string>& differs, bool json) {
+  if (!json) {
+    fmt::print("{}", results::format_steps(replay.steps));
+    return;
+  }
+  nlohmann::ordered_json out;
+  out["steps"] = nlohmann::ordered_json::array();
+  for (const StepMean& step : replay.steps) out["steps"].push_back(to_json(step));
+  out["compared_with"] = replay.stored ? nlohmann::ordered_json(replay.stored->string()) : nlohmann::ordered_json();
+  out["same"] = replay.stored ? nlohmann::ordered_json(!differs) : nlohmann::ordered_json();
+  out["difference"] = differs ? nlohmann::ordered_json(*differs) : nlohmann::ordered_json();
+  fmt::print("{}\n", out.dump(2));
+}
+
+int run_replay(const Asked& asked) {
+  const Replay result = replay(asked.path);
+  std::optional<std::string> differs;
+  if (result.stored) differs = difference(result, results::read_text(*result.stored));
+  print(result, differs, asked.json);
+  if (!differs) return kOk;
+  fmt::print(stderr, "{}: {}; the raw files are the truth, see kphi verify\n", result.stored->string(), *differs);
+  return kRejected;
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, int& exit_code) {
+  const auto asked = std::make_shared<Asked>();
+  CLI::App* command = app.add_subcommand("replay", "Turn raw samples into step means again and compare with steps.csv");
+  command->add_option("path", asked->path, "run file or campaign folder")->required()->check(CLI::ExistingPath);
+  command->add_flag("--json", asked->json, "one JSON object on stdout");
+  command->callback([asked, &exit_code] { exit_code = run_replay(*asked); });
+}
+
+}  // namespace kphi::daq
