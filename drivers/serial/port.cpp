@@ -48,6 +48,7 @@ std::string advice_for(int error, const std::string& device) {
 }
 
 std::string words_for(int error) {
+  if (error == ENOTTY) return "it is no serial port";
   if (error == EBUSY || error == EWOULDBLOCK) return "it is in use by another program";
   return std::strerror(error);
 }
