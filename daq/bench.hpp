@@ -1,0 +1,76 @@
+// The bench as runner and recorder see it. Two exist: the live one (real transports, threads, a steady clock) and the
+// deterministic one (sessions joined to simulated devices in virtual time, one thread). Neither runner nor recorder
+// can tell them apart.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "compensation/units.hpp"
+#include "drivers/clock.hpp"
+#include "profiles/bench.hpp"
+#include "results/records.hpp"
+#include "results/run_writer.hpp"
+
+namespace kphi::daq {
+
+/// Work that is called again and again until this goes.
+class Background {
+ public:
+  virtual ~Background() = default;
+};
+
+/// The motor. Whoever wants it to turn does so through Spin (spin.hpp), which cannot forget to let go.
+class MotorLink {
+ public:
+  virtual ~MotorLink() = default;
+  /// Positive = counter-clockwise. Also renews the lease without which the driver coasts the motor by itself.
+  virtual void spin_at(RadPerSec signed_speed) = 0;
+  virtual void renew() noexcept = 0;
+  virtual void coast() noexcept = 0;
+  /// Takes what the module reported since the last call. The recorder's thread.
+  virtual std::size_t take(std::span<results::MotorReading> out) = 0;
+  /// Why the link is dead; empty while it lives. Any thread.
+  [[nodiscard]] virtual std::string failure() const = 0;
+  /// One line: firmware, hardware, uid.
+  [[nodiscard]] virtual std::string identity() const = 0;
+};
+
+/// The load cell's stream. A fresh one for every run: counters start at zero with it.
+class LoadCellLink {
+ public:
+  virtual ~LoadCellLink() = default;
+  /// Reads the box's configuration and starts the stream. Throws DeviceError.
+  virtual results::LoadCellScale start() = 0;
+  virtual void stop() noexcept = 0;
+  /// Takes what came since the last call. The recorder's thread.
+  virtual std::size_t take(std::span<results::LoadCellRecord> out) = 0;
+  /// Why the stream is dead; empty while it lives. Any thread.
+  [[nodiscard]] virtual std::string failure() const = 0;
+  [[nodiscard]] virtual results::SampleAccount account() const = 0;
+};
+
+class Bench {
+ public:
+  virtual ~Bench() = default;
+  [[nodiscard]] virtual const Clock& clock() const = 0;
+  [[nodiscard]] virtual MotorLink& motor() = 0;
+  [[nodiscard]] virtual LoadCellLink& load_cell() = 0;
+  /// Returns at bench time `when`, or a little later on a live bench.
+  virtual void wait_until(Instant when) = 0;
+  /// Calls `work` until the handle goes: from a thread of its own, or from within wait_until.
+  [[nodiscard]] virtual std::unique_ptr<Background> keep_calling(std::function<void()> work) = 0;
+  /// Through which run files go to disk.
+  [[nodiscard]] virtual results::FileLayer& files() = 0;
+  /// How often the recorder secures the run file, bench time.
+  [[nodiscard]] virtual Duration sync_interval() const = 0;
+  /// Tells whoever must know what a person has mounted (a simulated bench). Throws DeviceError.
+  virtual void mounted(const std::string& propeller_id, double occlusion_deg) = 0;
+};
+
+/// Connects to the devices that the file names. Throws DeviceError.
+[[nodiscard]] std::unique_ptr<Bench> connect(const profiles::Bench& bench);
+
+}  // namespace kphi::daq

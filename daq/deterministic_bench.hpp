@@ -1,0 +1,62 @@
+// The bench in virtual time: driver sessions joined to simulated devices without transports, one thread, one seed.
+// The same campaign gives the same bytes, and takes seconds.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "daq/bench.hpp"
+#include "drivers/iq/session.hpp"
+#include "drivers/netbox/configuration.hpp"
+#include "drivers/netbox/session.hpp"
+#include "drivers/sim/bench.hpp"
+
+namespace kphi::daq {
+
+class DeterministicBench final : public Bench, private MotorLink, private LoadCellLink {
+ public:
+  explicit DeterministicBench(const profiles::Bench& place);
+  [[nodiscard]] const Clock& clock() const override { return clock_; }
+  [[nodiscard]] MotorLink& motor() override { return *this; }
+  [[nodiscard]] LoadCellLink& load_cell() override { return *this; }
+  void wait_until(Instant when) override;
+  [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override;
+  [[nodiscard]] results::FileLayer& files() override { return *files_; }
+  [[nodiscard]] Duration sync_interval() const override;
+  void mounted(const std::string& propeller_id, double occlusion_deg) override;
+
+  /// What a fault test looks at, and where it puts its finger.
+  [[nodiscard]] sim::SimulatedBench& simulation() noexcept { return sim_; }
+  void use_files(results::FileLayer& files) noexcept { files_ = &files; }
+
+ private:
+  void spin_at(RadPerSec signed_speed) override;
+  void renew() noexcept override;
+  void coast() noexcept override;
+  std::size_t take(std::span<results::MotorReading> out) override;
+  [[nodiscard]] std::string identity() const override;
+  results::LoadCellScale start() override;
+  void stop() noexcept override;
+  std::size_t take(std::span<results::LoadCellRecord> out) override;
+  [[nodiscard]] results::SampleAccount account() const override;
+  [[nodiscard]] std::string failure() const override;
+
+  void step_to(Instant when);
+  void exchange();
+  void exchange_motor();
+  void exchange_load_cell();
+
+  ManualClock clock_;
+  results::MemoryOnlySync own_files_;
+  results::FileLayer* files_ = &own_files_;
+  sim::SimulatedBench sim_;
+  iq::Session motor_;
+  netbox::Configuration configuration_;
+  std::optional<netbox::Session> stream_;
+  std::vector<netbox::StampedRecord> records_;
+  std::size_t taken_ = 0;
+  std::function<void()>* work_ = nullptr;
+  Instant next_work_{};
+};
+
+}  // namespace kphi::daq

@@ -1,0 +1,37 @@
+// When the bench must stop by itself. A trip is a value; the runner turns it into a stop.
+#pragma once
+
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "drivers/clock.hpp"
+#include "profiles/campaign.hpp"
+
+namespace kphi::daq {
+
+/// What the bench shows at one moment. A negative age: nothing came yet.
+struct Observation {
+  RadPerSec speed;          ///< unsigned
+  Newtons thrust;           ///< zero subtracted
+  Amperes supply_current;
+  Celsius coil_temperature;
+  Duration load_cell_age{};
+  Duration motor_age{};
+};
+
+/// A limit that was passed, in words: "thrust 21.3 N is above 20 N".
+struct Trip {
+  std::string reason;
+};
+
+/// Ages above `patience` (bench time) trip as well.
+[[nodiscard]] std::optional<Trip> check(const Observation& seen, const profiles::Limits& limits, Duration patience);
+
+/// A trip that stopped a run. The motor coasts already. Exit code 4.
+class SafetyStop : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace kphi::daq

@@ -1,0 +1,117 @@
+#include "daq/live_bench.hpp"
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <cmath>
+#include <thread>
+
+#include "daq/device_records.hpp"
+#include "drivers/device_error.hpp"
+#include "drivers/sim/control_line.hpp"
+
+namespace kphi::daq {
+namespace {
+
+constexpr Duration kDrainWall = std::chrono::milliseconds(5);
+constexpr Duration kSyncWall = std::chrono::milliseconds(500);
+
+iq::Settings motor_settings(const profiles::MotorPlace& place) {
+  iq::Settings settings;
+  settings.module_id = place.module_id;
+  settings.telemetry_hz = place.telemetry_hz;
+  return settings;
+}
+
+class Thread final : public Background {
+ public:
+  explicit Thread(std::function<void()> work)
+      : thread_([this, work = std::move(work)] {
+          while (!stop_) {
+            work();
+            std::this_thread::sleep_for(kDrainWall);
+          }
+        }) {}
+  ~Thread() override {
+    stop_ = true;
+    thread_.join();
+  }
+
+ private:
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace
+
+LiveMotor::LiveMotor(const profiles::MotorPlace& place, const Clock& clock)
+    : motor_(place.device, place.baud, motor_settings(place), clock) {}
+
+std::size_t LiveMotor::take(std::span<results::MotorReading> out) {
+  readings_.resize(out.size());
+  const std::size_t n = motor_.take(readings_);
+  for (std::size_t i = 0; i < n; ++i) out[i] = to_reading(readings_[i]);
+  return n;
+}
+
+LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock) : place_(std::move(place)), clock_(clock) {
+  // Whether the box answers at all is asked before anybody mounts anything.
+  cell_ = std::make_unique<netbox::LoadCell>(netbox::Place{place_.host, place_.rdt_port, place_.http_port}, clock_);
+}
+
+results::LoadCellScale LiveLoadCell::start() {
+  cell_.reset();
+  cell_ = std::make_unique<netbox::LoadCell>(netbox::Place{place_.host, place_.rdt_port, place_.http_port}, clock_);
+  const netbox::Configuration& found = cell_->configuration();
+  if (std::abs(found.rdt_rate_hz - place_.rate_hz) > 0.5) {
+    throw DeviceError("Net Box " + place_.host, "compare settings",
+                      fmt::format("it streams at {:g} Hz, the bench file says {:g} Hz", found.rdt_rate_hz, place_.rate_hz),
+                      "set the RDT output rate on the box's communication page or rate_hz in the bench file");
+  }
+  cell_->start();
+  return to_scale(found);
+}
+
+void LiveLoadCell::stop() noexcept { cell_->stop(); }
+
+std::size_t LiveLoadCell::take(std::span<results::LoadCellRecord> out) {
+  records_.resize(out.size());
+  const std::size_t n = cell_->take(records_);
+  for (std::size_t i = 0; i < n; ++i) out[i] = to_record(records_[i]);
+  return n;
+}
+
+std::string LiveLoadCell::failure() const {
+  switch (cell_->state()) {
+    case netbox::State::silent: return "load cell: the stream fell silent";
+    case netbox::State::failed: return "load cell: the stream could not be started again";
+    default: return "";
+  }
+}
+
+results::SampleAccount LiveLoadCell::account() const { return to_account(cell_->counters()); }
+
+LiveBench::LiveBench(const profiles::Bench& place)
+    : place_(place),
+      clock_(place.simulation ? place.simulation->time_scale : 1.0),
+      load_cell_(place.netbox, clock_),
+      motor_(place.iq, clock_) {}
+
+void LiveBench::wait_until(Instant when) {
+  const Duration left = clock_.shrunk(when - clock_.now());
+  if (left > Duration(0)) std::this_thread::sleep_for(left);
+}
+
+std::unique_ptr<Background> LiveBench::keep_calling(std::function<void()> work) {
+  return std::make_unique<Thread>(std::move(work));
+}
+
+Duration LiveBench::sync_interval() const { return clock_.stretched(kSyncWall); }
+
+void LiveBench::mounted(const std::string& propeller_id, double occlusion_deg) {
+  if (!place_.simulation || place_.simulation->control.empty()) return;
+  const std::string answer = sim::tell(place_.simulation->control, fmt::format("mount {} {:g}", propeller_id, occlusion_deg));
+  if (!answer.starts_with("ok")) throw DeviceError("simulated bench", "mount", answer);
+}
+
+}  // namespace kphi::daq

@@ -1,0 +1,64 @@
+// The bench over its real transports: Net Box over UDP and HTTP, motor module over a serial line, a steady clock.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "daq/bench.hpp"
+#include "drivers/iq/motor.hpp"
+#include "drivers/netbox/load_cell.hpp"
+
+namespace kphi::daq {
+
+class LiveMotor final : public MotorLink {
+ public:
+  LiveMotor(const profiles::MotorPlace& place, const Clock& clock);
+  void spin_at(RadPerSec signed_speed) override { motor_.spin_at(signed_speed); }
+  void renew() noexcept override { motor_.renew(); }
+  void coast() noexcept override { motor_.coast(); }
+  std::size_t take(std::span<results::MotorReading> out) override;
+  [[nodiscard]] std::string failure() const override { return motor_.failure(); }
+  [[nodiscard]] std::string identity() const override { return motor_.identity().summary(); }
+
+ private:
+  iq::Motor motor_;
+  std::vector<iq::Reading> readings_;
+};
+
+class LiveLoadCell final : public LoadCellLink {
+ public:
+  LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock);
+  results::LoadCellScale start() override;
+  void stop() noexcept override;
+  std::size_t take(std::span<results::LoadCellRecord> out) override;
+  [[nodiscard]] std::string failure() const override;
+  [[nodiscard]] results::SampleAccount account() const override;
+
+ private:
+  profiles::NetBoxPlace place_;
+  const Clock& clock_;
+  std::unique_ptr<netbox::LoadCell> cell_;  ///< of the present or last run
+  std::vector<netbox::StampedRecord> records_;
+};
+
+class LiveBench final : public Bench {
+ public:
+  /// Finds both devices; throws DeviceError.
+  explicit LiveBench(const profiles::Bench& place);
+  [[nodiscard]] const Clock& clock() const override { return clock_; }
+  [[nodiscard]] MotorLink& motor() override { return motor_; }
+  [[nodiscard]] LoadCellLink& load_cell() override { return load_cell_; }
+  void wait_until(Instant when) override;
+  [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override;
+  [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
+  [[nodiscard]] Duration sync_interval() const override;
+  void mounted(const std::string& propeller_id, double occlusion_deg) override;
+
+ private:
+  profiles::Bench place_;
+  SteadyClock clock_;
+  LiveLoadCell load_cell_;
+  LiveMotor motor_;
+};
+
+}  // namespace kphi::daq

@@ -1,0 +1,49 @@
+#include "daq/operator.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <charconv>
+
+
+namespace kphi::daq {
+namespace {
+
+bool is_angle(const std::string& text, double expected_deg) {
+  double value = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  return error == std::errc() && stop == end && value == expected_deg;
+}
+
+}  // namespace
+
+std::string TerminalOperator::read_line() {
+  std::string line;
+  for (;;) {
+    char c = 0;
+    const ssize_t n = read(input_, &c, 1);
+    if (stop_asked_()) throw Interrupted("stopped at the prompt");
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return "q";
+    if (c == '\n') return line;
+    if (c != '\r') line += c;
+  }
+}
+
+void TerminalOperator::mount(const profiles::Propeller& propeller, double occlusion_deg) {
+  const std::string what = occlusion_deg == 0 ? std::string("no occlusion") : fmt::format("the {:g}° occlusion", occlusion_deg);
+  fmt::print(words_, "\nMount {} under propeller {} ({}). The motor is locked. Step back, then\n", what, propeller.id,
+             propeller.name);
+  for (;;) {
+    fmt::print(words_, "type the mounted angle ({:g}) and Enter, or q to stop: ", occlusion_deg);
+    std::fflush(words_);
+    const std::string answer = read_line();
+    if (is_angle(answer, occlusion_deg)) return;
+    if (answer == "q") throw NotMounted(fmt::format("mounting of {:g}° was not confirmed", occlusion_deg));
+    fmt::print(words_, "\"{}\" is not {:g}.\n", answer, occlusion_deg);
+  }
+}
+
+}  // namespace kphi::daq

@@ -1,0 +1,80 @@
+#include "daq/progress.hpp"
+
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+
+namespace kphi::daq {
+namespace {
+
+std::string minutes_and_seconds(double seconds) {
+  const long whole = static_cast<long>(seconds + 0.5);
+  if (whole >= 3600) return fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
+  return fmt::format("{:02}:{:02}", whole / 60, whole % 60);
+}
+
+std::size_t width_of(std::FILE* stream) {
+  winsize size{};
+  if (ioctl(fileno(stream), TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return 120;
+  return size.ws_col;
+}
+
+/// At most `columns` characters, not bytes: φ and ° take two.
+std::string cut(const std::string& line, std::size_t columns) {
+  std::size_t seen = 0;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const bool starts_character = (static_cast<unsigned char>(line[i]) & 0xC0) != 0x80;
+    if (starts_character && seen++ == columns) return line.substr(0, i);
+  }
+  return line;
+}
+
+}  // namespace
+
+std::string describe(const Position& position, const Observation& seen) {
+  const std::string where =
+      fmt::format("{}  φ {:3g}°  rep {}/{}", position.propeller, position.occlusion_deg, position.repetition,
+                  position.repetitions);
+  const std::string what = position.step < 0
+                               ? fmt::format("{:<10}", position.phase)
+                               : fmt::format("step {:2}/{}", position.step + 1, position.steps);
+  return fmt::format("{}  {}  cmd {:5.0f}  is {:5.0f} RPM  thrust {:6.3f} N  left {}", where, what,
+                     to_rpm(position.commanded), to_rpm(seen.speed), seen.thrust.value(),
+                     minutes_and_seconds(position.remaining_s));
+}
+
+TerminalProgress::~TerminalProgress() { clear(); }
+
+void TerminalProgress::clear() {
+  if (!drawn_) return;
+  fmt::print(stream_, "\r\x1b[K");
+  std::fflush(stream_);
+  drawn_ = false;
+}
+
+void TerminalProgress::tick(const Position& position, const Observation& seen) {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_) return;
+  next_ = now + std::chrono::milliseconds(100);
+  fmt::print(stream_, "\r{}\x1b[K", cut(describe(position, seen), width_of(stream_) - 1));
+  std::fflush(stream_);
+  drawn_ = true;
+}
+
+void TerminalProgress::step_done(const Position&, const Observation&) {}
+
+void TerminalProgress::say(const std::string& line) {
+  clear();
+  fmt::print(stream_, "{}\n", line);
+}
+
+void PlainProgress::step_done(const Position& position, const Observation& seen) {
+  fmt::print(stream_, "{}\n", describe(position, seen));
+  std::fflush(stream_);
+}
+
+void PlainProgress::say(const std::string& line) {
+  fmt::print(stream_, "{}\n", line);
+  std::fflush(stream_);
+}
+
+}  // namespace kphi::daq

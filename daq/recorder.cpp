@@ -1,0 +1,99 @@
+#include "daq/recorder.hpp"
+
+#include <cmath>
+
+namespace kphi::daq {
+namespace {
+
+constexpr std::size_t kRecordsAtOnce = 7000;
+constexpr std::size_t kReadingsAtOnce = 512;
+
+}  // namespace
+
+Recorder::Recorder(Bench& bench, results::RunWriter& writer, ThrustAxis axis)
+    : bench_(bench),
+      writer_(writer),
+      axis_(axis),
+      next_sync_(bench.clock().now() + bench.sync_interval()),
+      records_(kRecordsAtOnce),
+      readings_(kReadingsAtOnce),
+      load_cell_ns_(bench.clock().now().count()),
+      motor_ns_(bench.clock().now().count()) {}
+
+void Recorder::drain() noexcept {
+  if (failed_.load(std::memory_order_relaxed)) return;
+  try {
+    drain_marks();
+    drain_load_cell();
+    drain_motor();
+    if (const Instant now = bench_.clock().now(); now >= next_sync_) {
+      writer_.sync();
+      next_sync_ = now + bench_.sync_interval();
+    }
+  } catch (...) {
+    failure_ = std::current_exception();
+    failed_.store(true, std::memory_order_release);
+  }
+}
+
+void Recorder::drain_marks() {
+  results::PhaseMark mark;
+  while (marks_.pop(mark)) {
+    writer_.mark(mark);
+    phase_sum_n_ = 0;
+    phase_count_ = 0;
+  }
+}
+
+void Recorder::drain_load_cell() {
+  while (const std::size_t n = bench_.load_cell().take(records_)) {
+    const std::span<const results::LoadCellRecord> batch(records_.data(), n);
+    writer_.append(batch);
+    std::int64_t sum = 0;
+    for (const auto& record : batch) sum += record.counts[static_cast<std::size_t>(axis_.axis)];
+    const double newtons = axis_.sign * static_cast<double>(sum) / axis_.counts_per_newton;
+    phase_sum_n_ += newtons;
+    phase_count_ += n;
+    thrust_n_ = newtons / static_cast<double>(n);
+    phase_mean_n_ = phase_sum_n_ / static_cast<double>(phase_count_);
+    load_cell_ns_ = batch.back().arrival_ns;
+  }
+}
+
+void Recorder::drain_motor() {
+  using results::MotorChannel;
+  while (const std::size_t n = bench_.motor().take(readings_)) {
+    const std::span<const results::MotorReading> batch(readings_.data(), n);
+    writer_.append(batch);
+    for (const auto& reading : batch) {
+      if (reading.channel == MotorChannel::speed) speed_rad_s_ = std::abs(reading.value);
+      if (reading.channel == MotorChannel::supply_current) supply_current_a_ = reading.value;
+      if (reading.channel == MotorChannel::coil_temperature) coil_temperature_degc_ = reading.value;
+    }
+    motor_ns_ = batch.back().time_ns;
+  }
+}
+
+void Recorder::mark(results::Phase phase, int step, RadPerSec commanded) {
+  // The queue holds more marks than a run has; it can only be full when nobody drains it.
+  if (!marks_.push({phase, step, bench_.clock().now().count(), commanded.value()})) {
+    throw std::runtime_error("recorder: nobody takes the marks of the run");
+  }
+}
+
+void Recorder::take_zero() noexcept { zero_n_ = phase_mean_n_.load(); }
+
+Observation Recorder::observe(Instant now) const noexcept {
+  return {RadPerSec(speed_rad_s_),
+          Newtons(thrust_n_ - zero_n_),
+          Amperes(supply_current_a_),
+          Celsius(coil_temperature_degc_),
+          now - Instant(load_cell_ns_),
+          now - Instant(motor_ns_)};
+}
+
+void Recorder::check_failure() {
+  if (failed_.load(std::memory_order_acquire)) std::rethrow_exception(failure_);
+}
+
+}  // namespace kphi::daq

@@ -1,0 +1,40 @@
+// One run: zero, steps, spin-down, zero, recorded into one file. Whatever happens, the motor coasts and what was
+// recorded is kept.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "daq/bench.hpp"
+#include "daq/progress.hpp"
+#include "profiles/bench.hpp"
+#include "profiles/campaign.hpp"
+#include "results/records.hpp"
+
+namespace kphi::daq {
+
+struct RunOrder {
+  const profiles::Campaign& campaign;
+  const profiles::Bench& place;
+  double occlusion_deg = 0;
+  int repetition = 1;                ///< 1-based
+  double remaining_bench_s = 0;      ///< of the campaign, this run included
+  std::filesystem::path file;        ///< final path
+};
+
+struct RunResult {
+  std::filesystem::path file;
+  std::string sha256;
+  results::SampleAccount account;
+};
+
+/// `stop_asked` is asked on every tick. Throws Interrupted, SafetyStop, DeviceError or RecordError after the motor was
+/// let go and the file was closed as aborted; the exception's message names the file that holds what was recorded.
+[[nodiscard]] RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress,
+                                   const std::function<bool()>& stop_asked);
+
+/// ISO 8601 with seconds, UTC: "2021-05-30T00:00:00Z".
+[[nodiscard]] std::string utc_text(const Clock& clock, Instant when);
+
+}  // namespace kphi::daq

@@ -1,0 +1,68 @@
+// A short campaign on the deterministic bench, in a folder of its own.
+#pragma once
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "profiles/bench.hpp"
+#include "profiles/campaign.hpp"
+
+namespace kphi::test {
+
+/// Removes itself.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "kphi-test-XXXXXX").string();
+    if (!mkdtemp(pattern.data())) throw std::runtime_error("mkdtemp");
+    path_ = pattern;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+inline std::string bytes_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+inline std::string short_campaign_text(const std::string& occlusions = "0, 90", int repetitions = 1, int steps = 4) {
+  return fmt::format(
+      "format: kphi-campaign/1\nname: short\n"
+      "propeller: {{id: 5x3, name: 5-inch three-blade, diameter_in: 5, blades: 3}}\n"
+      "occlusions_deg: [{}]\nrepetitions: {}\n"
+      "profile: {{steps: {}, dwell_s: 0.6, first_rpm: 6000, last_rpm: 18000}}\n"
+      "zero_s: 0.5\nminimum_discard_s: 0.3\nsupply_v: 12.0\n"
+      "limits: {{speed_max_rpm: 19100, thrust_max_n: 20, supply_current_max_a: 35, coil_temperature_max_degc: 110}}\n",
+      occlusions, repetitions, steps);
+}
+
+inline profiles::Campaign short_campaign(const std::string& occlusions = "0, 90", int repetitions = 1, int steps = 4) {
+  return profiles::parse_campaign(short_campaign_text(occlusions, repetitions, steps), "short.yaml");
+}
+
+inline profiles::Bench deterministic_place(int seed) {
+  return profiles::parse_bench(
+      fmt::format("format: kphi-bench/1\nname: test\n"
+                  "netbox: {{host: 127.0.0.1, rdt_port: 49152, http_port: 8049, rate_hz: 7000, records_per_datagram: 40}}\n"
+                  "iq: {{device: /dev/null, baud: 921600, module_id: 0, spin: +1, telemetry_hz: 50, speed_max_rpm: 19300}}\n"
+                  "thrust_axis: \"+Fz\"\nsimulation: {{in_process: true, seed: {}}}\n",
+                  seed),
+      "bench.yaml");
+}
+
+}  // namespace kphi::test

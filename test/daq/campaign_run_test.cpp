@@ -1,0 +1,105 @@
+#include "daq/campaign_run.hpp"
+
+#include <gmock/gmock.h>
+
+#include "daq/deterministic_bench.hpp"
+#include "daq/reduction.hpp"
+#include "drivers/device_error.hpp"
+#include "results/campaign_verification.hpp"
+#include "results/journal.hpp"
+#include "results/run_reader.hpp"
+#include "results/steps_csv.hpp"
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// Writes down what was asked; refuses at `refuse_at_deg`.
+class RememberingOperator final : public Operator {
+ public:
+  void mount(const profiles::Propeller& propeller, double occlusion_deg) override {
+    asked.push_back(fmt::format("{} {:g}", propeller.id, occlusion_deg));
+    if (occlusion_deg == refuse_at_deg) throw NotMounted("no");
+  }
+  std::vector<std::string> asked;
+  double refuse_at_deg = -1;
+};
+
+class ShortCampaign : public testing::Test {
+ protected:
+  CampaignResult run(const profiles::Campaign& campaign) {
+    return run_campaign(bench_, campaign, place_, results_, person_, progress_, [] { return false; });
+  }
+  std::vector<std::string> events() {
+    std::vector<std::string> names;
+    for (const auto& entry : results::read_journal(results_.journal()).entries) names.push_back(entry.event);
+    return names;
+  }
+
+  test::TemporaryFolder folder_;
+  profiles::Bench place_ = test::deterministic_place(2);
+  DeterministicBench bench_{place_};
+  results::CampaignFolder results_ = results::CampaignFolder::create(folder_.path(), "20210530T000000Z", "short");
+  RememberingOperator person_;
+  NoProgress progress_;
+};
+
+TEST_F(ShortCampaign, AsksForEachMountingOnceAndRunsAllItsRepetitions) {
+  const CampaignResult result = run(test::short_campaign("0, 90", 2, 3));
+  EXPECT_THAT(person_.asked, ElementsAre("5x3 0", "5x3 90"));
+  EXPECT_EQ(result.runs, 4);
+  EXPECT_EQ(result.steps, 12);
+  EXPECT_EQ(result.lost, 0u);
+  EXPECT_EQ(results_.complete_runs().size(), 4u);
+  EXPECT_THAT(events(), ElementsAre("campaign_started", "mounted", "run_accepted", "run_accepted", "mounted",
+                                    "run_accepted", "run_accepted", "campaign_finished"));
+}
+
+TEST_F(ShortCampaign, LeavesAWholeFolderWhoseStepsAreAPureFunctionOfTheRuns) {
+  const profiles::Campaign campaign = test::short_campaign("0, 90", 1, 3);
+  (void)run(campaign);
+  EXPECT_TRUE(results::verify_campaign(results_).whole());
+  EXPECT_EQ(test::bytes_of(results_.campaign_file()), campaign.text);
+  std::vector<results::StepMean> again;
+  for (const auto& file : results_.complete_runs(campaign.occlusions_deg)) {
+    for (const auto& step : reduce(results::read_run(file))) again.push_back(step);
+  }
+  EXPECT_EQ(test::bytes_of(results_.steps()), results::format_steps(again));
+}
+
+TEST_F(ShortCampaign, MeasuresLessThrustUnderAnOcclusion) {
+  (void)run(test::short_campaign("0, 270", 1, 3));
+  const auto steps = results::read_steps(results_.steps());
+  ASSERT_EQ(steps.size(), 6u);
+  EXPECT_NEAR(steps[5].thrust_n / steps[2].thrust_n, 0.25, 0.01) << "the paper's quarter";
+}
+
+TEST_F(ShortCampaign, KeepsFinishedRunsWhenAMountingIsRefused) {
+  person_.refuse_at_deg = 90;
+  EXPECT_THROW((void)run(test::short_campaign("0, 90", 1, 3)), NotMounted);
+  EXPECT_EQ(results_.complete_runs().size(), 1u);
+  EXPECT_EQ(results::read_steps(results_.steps()).size(), 3u);
+  EXPECT_THAT(events(), ElementsAre("campaign_started", "mounted", "run_accepted", "campaign_stopped"));
+}
+
+TEST_F(ShortCampaign, JournalsWhyARunWasStopped) {
+  profiles::Campaign campaign = test::short_campaign("0", 1, 3);
+  campaign.limits.supply_current_max = Amperes(1.0);
+  EXPECT_THROW((void)run(campaign), SafetyStop);
+  const auto journal = results::read_journal(results_.journal());
+  EXPECT_EQ(journal.entries[2].event, "run_aborted");
+  EXPECT_THAT(journal.entries[2].data.at("reason").get<std::string>(), HasSubstr("supply current"));
+  EXPECT_TRUE(results_.complete_runs().empty());
+}
+
+TEST_F(ShortCampaign, RefusesAPropellerThatTheBenchDoesNotHave) {
+  profiles::Campaign campaign = test::short_campaign("0", 1, 3);
+  campaign.propeller.id = "7x4";
+  EXPECT_THROW((void)run(campaign), DeviceError);
+}
+
+}  // namespace
+}  // namespace kphi::daq

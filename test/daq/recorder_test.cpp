@@ -1,0 +1,129 @@
+#include "daq/recorder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <deque>
+
+#include "results/run_reader.hpp"
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::daq {
+namespace {
+
+/// A bench of queues that a test fills.
+class QueueBench final : public Bench, private MotorLink, private LoadCellLink {
+ public:
+  [[nodiscard]] const Clock& clock() const override { return time; }
+  [[nodiscard]] MotorLink& motor() override { return *this; }
+  [[nodiscard]] LoadCellLink& load_cell() override { return *this; }
+  void wait_until(Instant when) override { time.set(when); }
+  [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()>) override { return nullptr; }
+  [[nodiscard]] results::FileLayer& files() override { return *layer; }
+  [[nodiscard]] Duration sync_interval() const override { return std::chrono::milliseconds(500); }
+  void mounted(const std::string&, double) override {}
+
+  ManualClock time;
+  results::FileLayer* layer = &results::disk();
+  std::deque<results::LoadCellRecord> records;
+  std::deque<results::MotorReading> readings;
+
+ private:
+  void spin_at(RadPerSec) override {}
+  void renew() noexcept override {}
+  void coast() noexcept override {}
+  std::size_t take(std::span<results::MotorReading> out) override { return move_out(readings, out); }
+  [[nodiscard]] std::string identity() const override { return "test"; }
+  results::LoadCellScale start() override { return {}; }
+  void stop() noexcept override {}
+  std::size_t take(std::span<results::LoadCellRecord> out) override { return move_out(records, out); }
+  [[nodiscard]] results::SampleAccount account() const override { return {}; }
+  [[nodiscard]] std::string failure() const override { return {}; }
+
+  template <class T>
+  static std::size_t move_out(std::deque<T>& from, std::span<T> out) {
+    const std::size_t n = std::min(from.size(), out.size());
+    for (std::size_t i = 0; i < n; ++i) {
+      out[i] = from.front();
+      from.pop_front();
+    }
+    return n;
+  }
+};
+
+class Recording : public testing::Test {
+ protected:
+  Recording() : writer_(folder_.path() / "run.h5", {}, bench_.files()), recorder_(bench_, writer_, {2, -1, 1e6}) {}
+
+  void sample(std::int32_t fz_counts, std::int64_t arrival_ns) {
+    ++sequence_;
+    bench_.records.push_back({{0, 0, fz_counts, 0, 0, 0}, sequence_, sequence_, 0, arrival_ns});
+  }
+
+  test::TemporaryFolder folder_;
+  QueueBench bench_;
+  results::RunWriter writer_;
+  Recorder recorder_;
+  std::uint32_t sequence_ = 0;
+};
+
+TEST_F(Recording, ShowsTheNewestOfEverythingWithItsAge) {
+  sample(-2'500'000, 4'000'000);
+  bench_.readings.push_back({results::MotorChannel::speed, 3'000'000, 0, -1234.5});
+  bench_.readings.push_back({results::MotorChannel::supply_current, 3'500'000, 0, 7.5});
+  bench_.readings.push_back({results::MotorChannel::coil_temperature, 3'600'000, 0, 61.0});
+  recorder_.drain();
+  const Observation seen = recorder_.observe(Instant(10'000'000));
+  EXPECT_DOUBLE_EQ(seen.thrust.value(), 2.5) << "the axis points the other way";
+  EXPECT_DOUBLE_EQ(seen.speed.value(), 1234.5) << "unsigned";
+  EXPECT_DOUBLE_EQ(seen.supply_current.value(), 7.5);
+  EXPECT_DOUBLE_EQ(seen.coil_temperature.value(), 61.0);
+  EXPECT_EQ(seen.load_cell_age, Duration(6'000'000));
+  EXPECT_EQ(seen.motor_age, Duration(6'400'000));
+}
+
+TEST_F(Recording, TakesTheMeanOfThePhaseAsZero) {
+  recorder_.mark(results::Phase::zero_before, -1, RadPerSec(0));
+  recorder_.drain();
+  sample(-100'000, 1);
+  sample(-300'000, 2);
+  recorder_.drain();
+  recorder_.take_zero();
+  sample(-1'200'000, 3);
+  recorder_.drain();
+  EXPECT_DOUBLE_EQ(recorder_.observe(Instant(4)).thrust.value(), 1.0);
+}
+
+TEST_F(Recording, KeepsTheAgeGrowingWhenNothingComes) {
+  recorder_.drain();
+  EXPECT_EQ(recorder_.observe(Instant(std::chrono::seconds(3))).load_cell_age, std::chrono::seconds(3));
+}
+
+TEST_F(Recording, WritesAllThatCameInTheOrderItCame) {
+  for (int i = 0; i < 20'000; ++i) sample(i, i);
+  recorder_.drain();
+  EXPECT_TRUE(bench_.records.empty());
+  EXPECT_EQ(writer_.samples(), 20'000u);
+}
+
+/// Breaks at the first sync.
+class BrokenDisk final : public results::FileLayer {
+ public:
+  void sync_data(int) override { throw std::system_error(EIO, std::generic_category()); }
+};
+
+TEST(RecordingOntoABrokenDisk, KeepsTheFirstErrorForTheRunnerAndThrowsNothingItself) {
+  BrokenDisk broken;
+  test::TemporaryFolder folder;
+  QueueBench bench;
+  results::RunWriter writer(folder.path() / "run.h5", {}, broken);
+  Recorder recorder(bench, writer, {});
+  EXPECT_NO_THROW(recorder.check_failure());
+  bench.time.set(std::chrono::seconds(1));
+  recorder.drain();
+  EXPECT_THROW(recorder.check_failure(), results::RecordError);
+  recorder.drain();
+  EXPECT_THROW(recorder.check_failure(), results::RecordError) << "it stays";
+}
+
+}  // namespace
+}  // namespace kphi::daq
