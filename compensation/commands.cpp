@@ -1,0 +1,98 @@
+#include "compensation/commands.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "compensation/compensate_rows.hpp"
+#include "compensation/compensator.hpp"
+#include "compensation/file/coefficient_file.hpp"
+#include "profiles/configuration_error.hpp"
+#include "profiles/vehicle.hpp"
+
+namespace kphi::compensation {
+namespace {
+
+struct Request {
+  std::string coefficients;
+  std::string vehicle;
+  ScalingLaw law = ScalingLaw::clamped;
+  bool json = false;
+};
+
+Airframe airframe_of(const profiles::Vehicle& vehicle) {
+  Airframe airframe{vehicle.half_side, vehicle.arm_length, vehicle.propeller_radius,
+                    vehicle.speed_min, vehicle.speed_max,  {}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double quarters = vehicle.hinge_turn_deg[i] / 90.0;
+    if (quarters != 0 && quarters != 1 && quarters != 2 && quarters != 3) {
+      throw ConfigurationError(vehicle.path +
+                               ": a hinge turn is not one of 0, 90, 180, 270 degrees; "
+                               "an arm hangs on a corner of the square body, give that corner");
+    }
+    airframe.hinge_turns[i] = static_cast<int>(quarters);
+  }
+  return airframe;
+}
+
+Compensator compensator_of(const Request& request) {
+  const ThrustLine line = thrust_line(load_coefficients(request.coefficients));
+  const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
+  const BuildOutcome outcome = Compensator::build({line, line, line, line}, airframe_of(vehicle), request.law);
+  if (!outcome.compensator) throw ConfigurationError(request.vehicle + ": " + describe(outcome.refusal));
+  if (outcome.doubts[0].gains_with_occlusion) {
+    std::cerr << request.coefficients << ": the line does not fall with occlusion; is this the right file?\n";
+  }
+  if (outcome.doubts[0].steps_at_contact) {
+    std::cerr << request.coefficients << ": the line misses K_T at 0 degrees, so speeds step at first contact; "
+              << "an anchored fit does not\n";
+  }
+  return *outcome.compensator;
+}
+
+int compensate(const Request& request) {
+  std::ios::sync_with_stdio(false);
+  std::cin.tie(nullptr);
+  try {
+    Compensator compensator = compensator_of(request);
+    const RowCounts counts = compensate_rows(std::cin, std::cout, std::cerr, compensator,
+                                             request.json ? RowFormat::json_lines : RowFormat::csv);
+    if (!std::cout) {
+      std::cerr << "standard output cannot be written; " << counts.written << " rows were on their way\n";
+      return 1;
+    }
+    if (counts.rejected == 0) return 0;
+    std::cerr << counts.rejected << " of " << counts.rejected + counts.written << " rows were left out\n";
+    return 5;
+  } catch (const CoefficientError& error) {
+    std::cerr << error.what() << '\n';
+  } catch (const ConfigurationError& error) {
+    std::cerr << error.what() << '\n';
+  } catch (const RowHeaderError& error) {
+    std::cerr << error.what() << '\n';
+  }
+  return 2;
+}
+
+}  // namespace
+
+void add_compensate(CLI::App& program, int& exit_code) {
+  auto request = std::make_shared<Request>();
+  CLI::App* command =
+      program.add_subcommand("compensate",
+                             "Arm angles and thrusts (CSV on stdin: theta1_deg..theta4_deg,thrust1_n..thrust4_n) to "
+                             "occlusions, scaling factors and speeds (CSV on stdout)");
+  command->add_option("--coefficients", request->coefficients, "coefficients.yaml of `kphi fit`")->required();
+  command->add_option("--vehicle", request->vehicle, "Vehicle file, e.g. profiles/foldable_drone.yaml")->required();
+  const std::map<std::string, ScalingLaw> laws = {{"clamped", ScalingLaw::clamped},
+                                                  {"published", ScalingLaw::published}};
+  command->add_option("--law", request->law, "clamped (default) or published (equation 4 to the letter)")
+      ->transform(CLI::CheckedTransformer(laws));
+  command->add_flag("--json", request->json, "One JSON object per row instead of CSV");
+  command->callback([request, &exit_code] { exit_code = compensate(*request); });
+}
+
+}  // namespace kphi::compensation

@@ -1,0 +1,33 @@
+// The work behind `kphi compensate`: rows of arm angles and thrusts in, rows of φ, k_i and speeds out.
+#pragma once
+
+#include <cstdint>
+#include <iosfwd>
+#include <stdexcept>
+
+#include "compensation/compensator.hpp"
+
+namespace kphi::compensation {
+
+enum class RowFormat { csv, json_lines };
+
+struct RowCounts {
+  std::uint64_t written = 0;
+  std::uint64_t rejected = 0;
+};
+
+/// The input has no header that names all eight columns.
+class RowHeaderError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Reads CSV with a header naming theta1_deg..theta4_deg and thrust1_n..thrust4_n, in any order; other columns are
+/// ignored. Writes phi1_deg.., k1.., speed1_rpm.., flags as CSV, or one JSON object per line, numbers in shortest round
+/// trip. A flag reads "rotor:what", several are separated by a blank. A row that cannot be used is left out, counted,
+/// and told on `words` with its line number. Output is handed on whenever no further input waits, so that it can stand
+/// in a pipe. Throws RowHeaderError.
+[[nodiscard]] RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& words,
+                                        Compensator& compensator, RowFormat format);
+
+}  // namespace kphi::compensation

@@ -1,0 +1,146 @@
+#include "compensation/compensator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace kphi::compensation {
+namespace {
+
+bool positive(double value) noexcept { return std::isfinite(value) && value > 0.0; }
+
+bool one_corner_each(const std::array<int, 4>& turns) noexcept {
+  unsigned seen = 0;
+  for (const int turn : turns) {
+    if (turn < 0 || turn > 3) return false;
+    seen |= 1u << turn;
+  }
+  return seen == 0b1111u;
+}
+
+Refusal refusal_of(const Airframe& airframe) noexcept {
+  if (!positive(airframe.half_side.value()) || !positive(airframe.arm_length.value()) ||
+      !positive(airframe.propeller_radius.value())) {
+    return Refusal::sizes;
+  }
+  if (airframe.arm_length <= airframe.propeller_radius) return Refusal::arm_length;
+  const double slowest = airframe.slowest_speed.value(), fastest = airframe.fastest_speed.value();
+  if (!(slowest >= 0.0) || !(fastest > slowest) || !std::isfinite(fastest)) return Refusal::speeds;
+  if (!one_corner_each(airframe.hinge_turns)) return Refusal::hinge_turns;
+  return Refusal::none;
+}
+
+LineDoubts doubts_about(const ThrustLine& line, ScalingLaw law) noexcept {
+  LineDoubts doubts;
+  doubts.gains_with_occlusion = line.slope_per_rad() >= 0.0;
+  // A line forced through K_T may miss it by the rounding of its file.
+  const double offset = line.intercept() / line.thrust_coefficient() - 1.0;
+  doubts.steps_at_contact = offset < -1e-9 || (law == ScalingLaw::published && offset > 1e-9);
+  return doubts;
+}
+
+}  // namespace
+
+const char* describe(Refusal refusal) noexcept {
+  switch (refusal) {
+    case Refusal::none:
+      return "nothing was refused";
+    case Refusal::sizes:
+      return "half side, arm length and propeller radius must be positive and finite; check the vehicle's sizes [m]";
+    case Refusal::arm_length:
+      return "the arm is not longer than the propeller radius, so its own corner is always covered; "
+             "check arm length and propeller radius [m]";
+    case Refusal::speeds:
+      return "speed limits must satisfy 0 <= slowest < fastest; check the vehicle's speed limits";
+    case Refusal::hinge_turns:
+      return "each arm needs a corner of its own; give the hinge turns 0, 1, 2, 3 (times 90 degrees) in some order";
+  }
+  return "unknown refusal";
+}
+
+BuildOutcome Compensator::build(const std::array<ThrustLine, 4>& lines, const Airframe& airframe,
+                                ScalingLaw law) noexcept {
+  BuildOutcome outcome;
+  outcome.refusal = refusal_of(airframe);
+  if (outcome.refusal != Refusal::none) return outcome;
+  for (std::size_t i = 0; i < lines.size(); ++i) outcome.doubts[i] = doubts_about(lines[i], law);
+  outcome.compensator = Compensator(lines, airframe, law);
+  return outcome;
+}
+
+Compensator::Compensator(const std::array<ThrustLine, 4>& lines, const Airframe& airframe, ScalingLaw law) noexcept
+    : slowest_(airframe.slowest_speed.value()),
+      fastest_(airframe.fastest_speed.value()),
+      law_(law),
+      lines_(lines),
+      airframe_(airframe),
+      contact_free_(contact_free_window(airframe.half_side, airframe.arm_length, airframe.propeller_radius)) {
+  arm_angles_.fill(Radians(std::numeric_limits<double>::quiet_NaN()));  // differs from every first angle
+  for (std::size_t i = 0; i < lines_.size(); ++i) apply_occlusion(i);
+}
+
+void Compensator::set_arms(const std::array<Radians, 4>& arm_angles) noexcept {
+  for (std::size_t i = 0; i < arm_angles.size(); ++i) {
+    const Radians angle = arm_angles[i];
+    if (angle == arm_angles_[i] && !arm_flags_[i].has(Flag::arm_angle_unknown)) continue;
+    if (!std::isfinite(angle.value())) {
+      arm_flags_[i] = arm_flags_[i].with(Flag::arm_angle_unknown, true);
+      continue;
+    }
+    arm_angles_[i] = angle;
+    arm_flags_[i] = Flags();
+    if (contact_free_.contains(angle)) {
+      if (occlusion_angles_[i].value() == 0.0) continue;
+      occlusion_angles_[i] = Radians(0.0);
+    } else {
+      const HubPosition hub = hub_seen_from_hinge(airframe_, angle);
+      occlusion_angles_[i] = rim_arc(airframe_.half_side, airframe_.propeller_radius, hub.x, hub.y);
+    }
+    apply_occlusion(i);
+  }
+}
+
+void Compensator::enable(bool on) noexcept {
+  enabled_ = on;
+  for (std::size_t i = 0; i < lines_.size(); ++i) apply_occlusion(i);
+}
+
+void Compensator::apply_occlusion(std::size_t rotor) noexcept {
+  const ThrustLine& line = lines_[rotor];
+  const Radians phi = occlusion_angles_[rotor];
+  const bool covered = enabled_ && phi.value() > 0.0;
+  const double scaling = covered ? line.scaling_factor(phi, law_) : 1.0;
+  // The published law reaches 0 and below: divide by next to nothing then, and the fastest speed holds.
+  const double effective = std::max(line.thrust_coefficient().value() * scaling, std::numeric_limits<double>::min());
+  scaling_factors_[rotor] = scaling;
+  effective_coefficients_[rotor] = effective;
+  thrust_max_[rotor] = Newtons(effective * fastest_ * fastest_);
+  drag_scale_[rotor] = 1.0 / std::max(scaling, kScalingFloor);
+  arm_flags_[rotor] = Flags()
+                          .with(Flag::arm_angle_unknown, arm_flags_[rotor].has(Flag::arm_angle_unknown))
+                          .with(Flag::beyond_fit, phi > line.largest_fitted())
+                          .with(Flag::at_floor, scaling <= kScalingFloor);
+}
+
+SpeedCommand Compensator::speeds_for(const std::array<Newtons, 4>& thrusts) const noexcept {
+  // One loop for the roots, one for the flags: the compiler makes vector instructions of the first.
+  double wanted[4];
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double asked = thrusts[i].value();
+    const double thrust = asked > 0.0 ? asked : 0.0;  // NaN compares false
+    wanted[i] = std::sqrt(thrust / effective_coefficients_[i]);
+  }
+  SpeedCommand command;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double asked = thrusts[i].value();
+    command.speeds[i] = RadPerSec(std::min(std::max(wanted[i], slowest_), fastest_));
+    command.flags[i] = arm_flags_[i]
+                           .with(Flag::thrust_nan, asked != asked)
+                           .with(Flag::thrust_negative, asked < 0.0)
+                           .with(Flag::speed_at_slowest, wanted[i] < slowest_)
+                           .with(Flag::speed_at_fastest, wanted[i] > fastest_);
+  }
+  return command;
+}
+
+}  // namespace kphi::compensation

@@ -1,0 +1,55 @@
+// The line k(φ) of one propeller, as fitted on the bench (paper, Fig. 5 and equation 4).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "compensation/units.hpp"
+
+namespace kphi::compensation {
+
+/// How k(φ) becomes the scaling factor k_i of ω = sqrt(T / (K_T k_i)).
+enum class ScalingLaw : std::uint8_t {
+  clamped,  ///< k(φ)/K_T held in [kScalingFloor, 1], exactly 1 at φ = 0: never slows a propeller down, never diverges
+  published,  ///< 1 − |K_T − k(φ)|/K_T, equation 4 to the letter: below 1 also where the line lies above K_T
+};
+
+/// The smallest k_i of ScalingLaw::clamped: the speed is raised by 1/sqrt(0.1) = 3.16 at most.
+inline constexpr double kScalingFloor = 0.1;
+
+/// T = k(φ) ω² with k(φ) = intercept + slope φ. A ThrustLine that exists is valid.
+class ThrustLine {
+ public:
+  /// `thrust_coefficient` is K_T, measured without occlusion; the line need not pass through it.
+  /// Nothing unless K_T and the intercept are positive, the slope [N/(rad/s)² per rad] finite, and `largest_fitted`,
+  /// the widest occlusion behind the line, in (0, 2π].
+  [[nodiscard]] static std::optional<ThrustLine> from(ThrustCoefficient thrust_coefficient, ThrustCoefficient intercept,
+                                                      double slope_per_rad, Radians largest_fitted) noexcept;
+
+  [[nodiscard]] ThrustCoefficient thrust_coefficient() const noexcept { return thrust_coefficient_; }
+  [[nodiscard]] ThrustCoefficient intercept() const noexcept { return intercept_; }
+  [[nodiscard]] double slope_per_rad() const noexcept { return slope_per_rad_; }
+  [[nodiscard]] Radians largest_fitted() const noexcept { return largest_fitted_; }
+
+  /// k(φ) on the line, also beyond the largest fitted angle, where it may be negative.
+  [[nodiscard]] ThrustCoefficient at(Radians occlusion_angle) const noexcept {
+    return intercept_ + ThrustCoefficient(slope_per_rad_ * occlusion_angle.value());
+  }
+  /// k_i. `clamped` is in [kScalingFloor, 1] whatever φ is, 1 if φ is NaN; `published` is what the formula gives.
+  [[nodiscard]] double scaling_factor(Radians occlusion_angle, ScalingLaw law = ScalingLaw::clamped) const noexcept;
+
+ private:
+  ThrustLine(ThrustCoefficient thrust_coefficient, ThrustCoefficient intercept, double slope_per_rad,
+             Radians largest_fitted) noexcept
+      : thrust_coefficient_(thrust_coefficient),
+        intercept_(intercept),
+        slope_per_rad_(slope_per_rad),
+        largest_fitted_(largest_fitted) {}
+
+  ThrustCoefficient thrust_coefficient_;
+  ThrustCoefficient intercept_;
+  double slope_per_rad_;
+  Radians largest_fitted_;
+};
+
+}  // namespace kphi::compensation

@@ -1,0 +1,52 @@
+#include "compensation/airframe.hpp"
+
+#include <gtest/gtest.h>
+
+#include "test/compensation/example_vehicle.hpp"
+#include "test/compensation/geometry_vectors.hpp"
+
+namespace kphi::compensation {
+namespace {
+
+void expect_hub_mm(std::size_t arm, Radians theta, double x, double y) {
+  const HubPosition hub = hub_in_body(example_airframe(), arm, theta);
+  EXPECT_NEAR(hub.x.value() * 1000, x, 0.5) << "arm " << arm;
+  EXPECT_NEAR(hub.y.value() * 1000, y, 0.5) << "arm " << arm;
+}
+
+TEST(Airframe, PutsTheHubsOfTheNamedShapesWhereTheyBelong) {
+  expect_hub_mm(0, shape_x()[0], 128, 128);
+  expect_hub_mm(1, shape_x()[1], -128, 128);
+  expect_hub_mm(2, shape_h()[2], -162, -45);
+  expect_hub_mm(3, shape_t()[3], 162, -45);
+  expect_hub_mm(0, shape_o()[0], -72, 45);
+  expect_hub_mm(1, shape_o()[1], -45, -72);
+  expect_hub_mm(2, shape_o()[2], 68.4, -73.9);
+  expect_hub_mm(3, shape_o()[3], 45, 72);
+}
+
+TEST(Airframe, AgreesWithTheKnownHubs) {
+  const auto vectors = geometry_vectors();
+  if (vectors.empty()) GTEST_SKIP() << kNoVectors;
+  for (const GeometryVector& v : vectors) {
+    if (!v.arm) continue;
+    Airframe airframe;
+    airframe.half_side = Metres(v.half_side);
+    airframe.arm_length = Metres(v.arm_length);
+    airframe.propeller_radius = Metres(v.radius);
+    const HubPosition hub = hub_in_body(airframe, *v.arm, Radians(v.theta));
+    EXPECT_NEAR(hub.x.value(), v.hub_x, 1e-15);
+    EXPECT_NEAR(hub.y.value(), v.hub_y, 1e-15);
+  }
+}
+
+TEST(Airframe, TakesTheCornerOfAnArmFromItsHingeTurn) {
+  Airframe airframe = example_airframe();
+  airframe.hinge_turns = {{2, 3, 0, 1}};
+  const HubPosition hub = hub_in_body(airframe, 0, from_degrees(45));
+  EXPECT_LT(hub.x, Metres(0));
+  EXPECT_LT(hub.y, Metres(0));
+}
+
+}  // namespace
+}  // namespace kphi::compensation

@@ -1,0 +1,52 @@
+// Counts what operator new is asked for while the flying calls run.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "test/compensation/example_vehicle.hpp"
+
+namespace {
+std::atomic<long> allocations{0};
+
+void* counted_allocation(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
+  throw std::bad_alloc();
+}
+}  // namespace
+
+void* operator new(std::size_t size) { return counted_allocation(size); }
+void* operator new[](std::size_t size) { return counted_allocation(size); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace kphi::compensation {
+namespace {
+
+TEST(FlyingCalls, AllocateNothing) {
+  const long before_control = allocations.load();
+  delete new int;
+  ASSERT_GT(allocations.load(), before_control) << "the count must see an allocation at all";
+
+  const long before = allocations.load();
+  const ThrustLine line = paper_line();
+  BuildOutcome built = Compensator::build({line, line, line, line}, example_airframe());
+  Compensator compensator = *built.compensator;
+  double sum = 0;
+  for (int degrees = -90; degrees <= 180; ++degrees) {
+    const Radians theta = from_degrees(degrees);
+    compensator.set_arms({theta, theta, theta, theta});
+    compensator.enable(degrees % 2 == 0);
+    sum += compensator.speeds_for(thrusts_of(0.0, 1.5, 1e9, -1.0)).speeds[1].value();
+  }
+  const long after = allocations.load();
+  EXPECT_EQ(after, before);
+  EXPECT_GT(sum, 0.0);
+}
+
+}  // namespace
+}  // namespace kphi::compensation

@@ -1,0 +1,140 @@
+#include "compensation/compensate_rows.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <sstream>
+#include <streambuf>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "test/compensation/example_vehicle.hpp"
+
+namespace kphi::compensation {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+const std::string kHeader = "theta1_deg,theta2_deg,theta3_deg,theta4_deg,thrust1_n,thrust2_n,thrust3_n,thrust4_n\n";
+const std::string kOutputHeader =
+    "phi1_deg,phi2_deg,phi3_deg,phi4_deg,k1,k2,k3,k4,speed1_rpm,speed2_rpm,speed3_rpm,speed4_rpm,flags\n";
+
+struct Result {
+  RowCounts counts;
+  std::string output;
+  std::string words;
+};
+
+Result compensated(const std::string& input, RowFormat format = RowFormat::csv) {
+  std::istringstream in(input);
+  std::ostringstream out, words;
+  Compensator compensator = example_compensator();
+  Result result;
+  result.counts = compensate_rows(in, out, words, compensator, format);
+  result.output = out.str();
+  result.words = words.str();
+  return result;
+}
+
+TEST(CompensateRows, WritesOcclusionsFactorsAndSpeeds) {
+  const Result result = compensated(kHeader + "45,45,45,180,1.7,0,1.7,1.7\n");
+  EXPECT_EQ(result.counts.written, 1u);
+  EXPECT_EQ(result.counts.rejected, 0u);
+  EXPECT_EQ(result.words, "");
+  EXPECT_THAT(result.output, StartsWith(kOutputHeader + "0,0,0,64.83"));
+  EXPECT_THAT(result.output, HasSubstr(",1,1,1,0.84269"));
+  EXPECT_THAT(result.output, HasSubstr(",10000,0,10000,10893."));
+  EXPECT_EQ(result.output.substr(result.output.size() - 2), ",\n") << "no flags";
+}
+
+TEST(CompensateRows, TellsFlagsByRotor) {
+  const Result result = compensated(kHeader + "45,45,45,45,-1,1,99,1\n");
+  EXPECT_THAT(result.output, HasSubstr(",1:thrust_negative 3:speed_at_fastest\n"));
+}
+
+TEST(CompensateRows, WritesOneJsonObjectPerLineIfAsked) {
+  const Result result = compensated(kHeader + "45,45,45,45,1.7,0,1.7,99\n45,45,45,45,0,0,0,0\n", RowFormat::json_lines);
+  EXPECT_THAT(result.output, StartsWith("{\"phi_deg\":[0,0,0,0],\"k\":[1,1,1,1],\"speed_rpm\":["));
+  EXPECT_THAT(result.output, HasSubstr("],\"flags\":[\"4:speed_at_fastest\"]}\n{\"phi_deg\""));
+  EXPECT_THAT(result.output, HasSubstr("\"speed_rpm\":[0,0,0,0],\"flags\":[]}\n"));
+}
+
+TEST(CompensateRows, FindsColumnsByNameAndIgnoresOthers) {
+  const Result plain = compensated(kHeader + "1,2,3,170,5,6,7,8\n");
+  const Result moved = compensated(
+      "time_s,thrust4_n,thrust3_n,thrust2_n,thrust1_n,theta4_deg,theta3_deg,theta2_deg,theta1_deg,note\n"
+      "0.1,8,7,6,5,170,3,2,1,words\n");
+  EXPECT_EQ(moved.output, plain.output);
+}
+
+TEST(CompensateRows, TakesWindowsLinesByteOrderMarksBlanksAndAMissingLastNewline) {
+  const Result plain = compensated(kHeader + "1,2,3,170,5,6,7,8\n");
+  std::string header = kHeader;
+  header.insert(header.size() - 1, "\r");
+  EXPECT_EQ(compensated("\xEF\xBB\xBF" + header + "\r\n 1, 2 ,3,170,5,6,7,8\r").output, plain.output);
+}
+
+TEST(CompensateRows, LeavesOutBadRowsAndNamesThemByLine) {
+  const Result result = compensated(kHeader +
+                                    "45,45,45,45,1,1,1,1\n"
+                                    "45,45,45,1,1,1,1\n"
+                                    "45,45,45,45,1,much,1,1\n"
+                                    "\n"
+                                    "45,nan,45,45,1,1,1,1\n"
+                                    "45,45,45,45,1,1,1,inf\n"
+                                    "45,45,45,45,1,1,1,\n"
+                                    "45,45,45,45,1,1,1,1 N\n"
+                                    "45,45,45,45,1,1,1,2\n");
+  EXPECT_EQ(result.counts.written, 2u);
+  EXPECT_EQ(result.counts.rejected, 6u);
+  EXPECT_THAT(result.words, StartsWith("stdin:3: has 7 fields where the header has 8; row left out\n"
+                                       "stdin:4: thrust2_n is `much`, not a finite number; row left out\n"
+                                       "stdin:6: theta2_deg is `nan`"));
+  EXPECT_THAT(result.words, HasSubstr("stdin:9: thrust4_n is `1 N`"));
+}
+
+TEST(CompensateRows, RefusesAHeaderWithoutAllColumns) {
+  for (const std::string& bad :
+       {std::string(), std::string("1,2,3,4,5,6,7,8\n"), kHeader.substr(11), "theta1_deg," + kHeader}) {
+    EXPECT_THROW(compensated(bad), RowHeaderError) << bad;
+  }
+}
+
+TEST(CompensateRows, OfAHeaderAloneIsAHeaderAlone) { EXPECT_EQ(compensated(kHeader).output, kOutputHeader); }
+
+/// A source that hands out one line at a time and looks, at each, at what has come out so far.
+class OneLineAtATime : public std::streambuf {
+ public:
+  OneLineAtATime(std::vector<std::string> lines, const std::ostringstream& out) : lines_(std::move(lines)), out_(out) {}
+  std::vector<std::size_t> output_sizes;
+
+ protected:
+  int_type underflow() override {
+    output_sizes.push_back(out_.str().size());
+    if (next_ == lines_.size()) return traits_type::eof();
+    std::string& line = lines_[next_++];
+    setg(line.data(), line.data(), line.data() + line.size());
+    return traits_type::to_int_type(line[0]);
+  }
+
+ private:
+  std::vector<std::string> lines_;
+  const std::ostringstream& out_;
+  std::size_t next_ = 0;
+};
+
+TEST(CompensateRows, HandsARowOnBeforeWaitingForTheNext) {
+  std::ostringstream out, words;
+  OneLineAtATime source({kHeader, "1,2,3,170,5,6,7,8\n", "1,2,3,170,5,6,7,9\n"}, out);
+  std::istream in(&source);
+  Compensator compensator = example_compensator();
+  (void)compensate_rows(in, out, words, compensator, RowFormat::csv);
+  ASSERT_EQ(source.output_sizes.size(), 4u);
+  EXPECT_GT(source.output_sizes[2], kOutputHeader.size());
+  EXPECT_GT(source.output_sizes[3], source.output_sizes[2]);
+}
+
+}  // namespace
+}  // namespace kphi::compensation

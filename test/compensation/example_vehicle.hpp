@@ -1,0 +1,49 @@
+// The default vehicle and the paper's line, as the tests use them.
+#pragma once
+
+#include <array>
+
+#include "compensation/compensator.hpp"
+
+namespace kphi::compensation {
+
+/// Five inches, three blades.
+inline const ThrustCoefficient kExampleCoefficient = from_newtons_per_rpm2(1.7e-8);
+
+/// A line given in units of K_T, slope per degree.
+inline ThrustLine example_line(double intercept, double slope_per_deg, double largest_fitted_deg = 270) {
+  const double slope_per_rad = slope_per_deg * 180 / kPi * kExampleCoefficient.value();
+  return *ThrustLine::from(kExampleCoefficient, kExampleCoefficient * intercept, slope_per_rad,
+                           from_degrees(largest_fitted_deg));
+}
+
+/// Through (45°, 0.90) and (270°, 0.25).
+inline ThrustLine paper_line() { return example_line(1.03, -0.0028889); }
+
+inline Airframe example_airframe() {
+  Airframe airframe;
+  airframe.half_side = Metres(0.045);
+  airframe.arm_length = Metres(0.117);
+  airframe.propeller_radius = Metres(0.0635);
+  airframe.fastest_speed = from_rpm(19100);
+  return airframe;
+}
+
+inline Compensator example_compensator(ScalingLaw law = ScalingLaw::clamped) {
+  const ThrustLine line = paper_line();
+  return *Compensator::build({line, line, line, line}, example_airframe(), law).compensator;
+}
+
+inline std::array<Radians, 4> arms_at(double a, double b, double c, double d) {
+  return {from_degrees(a), from_degrees(b), from_degrees(c), from_degrees(d)};
+}
+inline std::array<Radians, 4> shape_x() { return arms_at(45, 45, 45, 45); }
+inline std::array<Radians, 4> shape_h() { return arms_at(0, 90, 0, 90); }
+inline std::array<Radians, 4> shape_t() { return arms_at(90, 0, 0, 90); }
+inline std::array<Radians, 4> shape_o() { return arms_at(180, 180, 180 - 0.25 * 180 / kPi, 180); }
+
+inline std::array<Newtons, 4> thrusts_of(double a, double b, double c, double d) {
+  return {Newtons(a), Newtons(b), Newtons(c), Newtons(d)};
+}
+
+}  // namespace kphi::compensation

@@ -1,0 +1,220 @@
+#include "compensation/file/coefficient_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace kphi::compensation {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+const std::string kGood = R"(format: kphi-coefficients/1
+created_utc: "2021-05-30T00:00:00Z"
+tool_version: "0.1.0"
+propeller: {id: 5x3, name: "Dalprop 5040", diameter_in: 5.0, blades: 3}
+k_unit: N/(rad/s)^2
+overlap: rim_arc
+K_T: {value: 1.55e-06, standard_error: 1.0e-09, phi_deg: 0.0}
+line:
+  anchored: false
+  intercept: 1.6e-06
+  slope_per_deg: -4.5e-09
+  covariance: [[1.0e-18, -5.0e-21], [-5.0e-21, 4.0e-23]]
+  points_deg: [45.0, 90.0, 180.0, 270.0]
+valid: {phi_deg: [0.0, 270.0], speed_rpm: [3000.0, 19100.0]}
+table:
+  - {phi_deg: 0.0, k: 1.55e-06, standard_error: 1.0e-09, k_at_speed: 1.54e-06, at_speed_rpm: 19100.0, steps: 37, repetitions: 3}
+  - {phi_deg: 45.0, k: 1.4e-06, standard_error: 1.1e-09, k_at_speed: 1.39e-06, at_speed_rpm: 19100.0, steps: 37, repetitions: 3}
+air_density_kg_m3: 1.2
+supply_v: 12.0
+provenance:
+  campaign: icra2021_5in_3blade
+  fit: {model: "T = k w^2", estimator: huber}
+  runs: [{file: runs/5x3_phi000_rep1.h5, sha256: 00ff}]
+)";
+
+std::string with(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+std::string refusal_of(const std::string& text) {
+  try {
+    (void)parse_coefficients(text, "c.yaml");
+  } catch (const CoefficientError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("; ")) << "the next move is missing";
+    return error.what();
+  }
+  return "not refused";
+}
+
+TEST(CoefficientFile, GivesWhatTheFileSaysInSiUnits) {
+  const Coefficients c = parse_coefficients(kGood, "c.yaml");
+  EXPECT_EQ(c.path, "c.yaml");
+  EXPECT_EQ(c.created_utc, "2021-05-30T00:00:00Z");
+  EXPECT_EQ(c.propeller.id, "5x3");
+  EXPECT_EQ(c.propeller.diameter_in, 5.0);
+  EXPECT_EQ(c.propeller.blades, 3);
+  EXPECT_EQ(c.overlap, OverlapMeasure::rim_arc);
+  EXPECT_EQ(c.thrust_coefficient.value(), 1.55e-6);
+  EXPECT_EQ(c.thrust_coefficient_error->value(), 1e-9);
+  EXPECT_FALSE(c.line.anchored);
+  EXPECT_EQ(c.line.intercept.value(), 1.6e-6);
+  EXPECT_DOUBLE_EQ(c.line.slope_per_rad, -4.5e-9 * 180 / kPi);
+  ASSERT_TRUE(c.line.covariance);
+  EXPECT_EQ((*c.line.covariance)[0][0], 1e-18);
+  EXPECT_DOUBLE_EQ((*c.line.covariance)[0][1], -5e-21 * 180 / kPi);
+  EXPECT_DOUBLE_EQ((*c.line.covariance)[1][1], 4e-23 * (180 / kPi) * (180 / kPi));
+  ASSERT_EQ(c.line.points.size(), 4u);
+  EXPECT_EQ(c.line.points[3], from_degrees(270));
+  EXPECT_EQ(c.largest_occlusion, from_degrees(270));
+  EXPECT_EQ(c.fastest_speed, from_rpm(19100));
+  ASSERT_EQ(c.table.size(), 2u);
+  EXPECT_EQ(c.table[1].k.value(), 1.4e-6);
+  EXPECT_EQ(c.table[1].at_speed, from_rpm(19100));
+  EXPECT_EQ(c.table[1].steps, 37);
+  EXPECT_EQ(c.air_density_kg_m3, 1.2);
+  EXPECT_EQ(c.supply->value(), 12.0);
+  EXPECT_EQ(c.provenance.campaign, "icra2021_5in_3blade");
+  EXPECT_EQ(c.provenance.estimator, "huber");
+  ASSERT_EQ(c.provenance.runs.size(), 1u);
+  EXPECT_EQ(c.provenance.runs[0].sha256, "00ff");
+}
+
+TEST(CoefficientFile, ConvertsEveryCoefficientFromNewtonsPerRpmSquared) {
+  const Coefficients si = parse_coefficients(kGood, "si");
+  const Coefficients rpm = parse_coefficients(with(kGood, "N/(rad/s)^2", "N/RPM^2"), "rpm");
+  const double scale = from_newtons_per_rpm2(1.0).value();
+  EXPECT_DOUBLE_EQ(rpm.thrust_coefficient / si.thrust_coefficient, scale);
+  EXPECT_DOUBLE_EQ(*rpm.thrust_coefficient_error / *si.thrust_coefficient_error, scale);
+  EXPECT_DOUBLE_EQ(rpm.line.intercept / si.line.intercept, scale);
+  EXPECT_DOUBLE_EQ(rpm.line.slope_per_rad / si.line.slope_per_rad, scale);
+  EXPECT_DOUBLE_EQ((*rpm.line.covariance)[0][1] / (*si.line.covariance)[0][1], scale * scale);
+  EXPECT_DOUBLE_EQ(rpm.table[0].k / si.table[0].k, scale);
+  EXPECT_DOUBLE_EQ(*rpm.table[0].standard_error / *si.table[0].standard_error, scale);
+  EXPECT_DOUBLE_EQ(*rpm.table[0].k_at_speed / *si.table[0].k_at_speed, scale);
+}
+
+TEST(CoefficientFile, GivesTheLineThatFlies) {
+  const ThrustLine line = thrust_line(parse_coefficients(kGood, "c.yaml"));
+  EXPECT_EQ(line.thrust_coefficient().value(), 1.55e-6);
+  EXPECT_NEAR(line.at(from_degrees(100)).value(), 1.6e-6 - 4.5e-7, 1e-18);
+  EXPECT_EQ(line.largest_fitted(), from_degrees(270));
+}
+
+TEST(CoefficientFile, LetsKeysOfNewerWritersPass) {
+  EXPECT_NO_THROW((void)parse_coefficients(kGood + "humidity: {percent: 40}\n", "c.yaml"));
+  EXPECT_NO_THROW((void)parse_coefficients(with(kGood, "anchored: false", "anchored: false\n  f_test: 0.3"), "c.yaml"));
+}
+
+TEST(CoefficientFile, LeavesEmptyWhatIsUnknown) {
+  const Coefficients c = parse_coefficients(with(kGood, "air_density_kg_m3: 1.2", "air_density_kg_m3: unknown"), "c");
+  EXPECT_FALSE(c.air_density_kg_m3);
+  const Coefficients bare = parse_coefficients(kGood.substr(0, kGood.find("table:")), "c");
+  EXPECT_TRUE(bare.table.empty());
+  EXPECT_FALSE(bare.supply);
+  EXPECT_TRUE(bare.provenance.runs.empty());
+}
+
+TEST(CoefficientFile, IsRefusedWithoutUnitOrWithAnUnknownOne) {
+  EXPECT_THAT(refusal_of(with(kGood, "k_unit: N/(rad/s)^2\n", "")), HasSubstr("unit"));
+  const std::string message = refusal_of(with(kGood, "N/(rad/s)^2", "gf/RPM^2"));
+  EXPECT_THAT(message, StartsWith("c.yaml:5: "));
+  EXPECT_THAT(message, HasSubstr("gf/RPM^2"));
+}
+
+TEST(CoefficientFile, IsRefusedWithoutOverlapDefinitionOrWithAnUnknownOne) {
+  EXPECT_THAT(refusal_of(with(kGood, "overlap: rim_arc\n", "")), HasSubstr("overlap: rim_arc"));
+  EXPECT_THAT(refusal_of(with(kGood, "rim_arc", "area_share")), StartsWith("c.yaml:6: overlap `area_share`"));
+}
+
+TEST(CoefficientFile, IsRefusedInAnotherFormat) {
+  EXPECT_THAT(refusal_of(with(kGood, "format: kphi-coefficients/1\n", "")), HasSubstr("no `format`"));
+  EXPECT_THAT(refusal_of(with(kGood, "coefficients/1", "coefficients/2")), StartsWith("c.yaml:1: "));
+  for (const char* other : {"", "42", "[1, 2]", "format: [a", "\t", "format: {a: 1}", "just words"}) {
+    EXPECT_THAT(refusal_of(other), StartsWith("c.yaml:1: ")) << other;
+  }
+}
+
+TEST(CoefficientFile, IsRefusedWhenARequiredKeyIsMissing) {
+  for (const char* key : {"propeller", "K_T", "line", "valid", "value", "anchored", "intercept", "slope_per_deg"}) {
+    const std::string text = with(kGood, std::string(key) + ":", "other:");
+    EXPECT_THAT(refusal_of(text), HasSubstr("`" + std::string(key) + "`")) << key;
+  }
+  EXPECT_THAT(refusal_of(with(kGood, "valid: {phi_deg:", "valid: {other:")), HasSubstr("`phi_deg`"));
+}
+
+TEST(CoefficientFile, IsRefusedWhenANumberIsNotFinite) {
+  for (const char* bad :
+       {".nan", "nan", ".inf", "inf", "-inf", "1e999", "much", "1.55e-06x", "0x10", "[1]", "{}", "~"}) {
+    EXPECT_THAT(refusal_of(with(kGood, "value: 1.55e-06", "value: " + std::string(bad))), StartsWith("c.yaml:7: "))
+        << bad;
+    EXPECT_THAT(refusal_of(with(kGood, "-4.5e-09", bad)), HasSubstr("`slope_per_deg`")) << bad;
+  }
+  EXPECT_THAT(refusal_of(with(kGood, "4.0e-23", ".nan")), HasSubstr("covariance"));
+  EXPECT_THAT(refusal_of(with(kGood, "k: 1.4e-06", "k: .nan")), StartsWith("c.yaml:17: "));
+}
+
+TEST(CoefficientFile, IsRefusedWhenTheThrustCoefficientIsNotPositive) {
+  for (const char* bad : {"0", "-1.55e-06"}) {
+    EXPECT_THAT(refusal_of(with(kGood, "value: 1.55e-06", "value: " + std::string(bad))), HasSubstr("positive")) << bad;
+    EXPECT_THAT(refusal_of(with(kGood, "intercept: 1.6e-06", "intercept: " + std::string(bad))), HasSubstr("positive"));
+  }
+  EXPECT_THAT(refusal_of(with(kGood, "phi_deg: 0.0}", "phi_deg: 45.0}")), HasSubstr("phi_deg is not 0"));
+}
+
+TEST(CoefficientFile, IsRefusedWhenAKeyIsGivenTwice) {
+  EXPECT_THAT(refusal_of(kGood + "k_unit: N/RPM^2\n"), HasSubstr("second time"));
+  EXPECT_THAT(refusal_of(with(kGood, "  intercept:", "  intercept: 1.0\n  intercept:")), StartsWith("c.yaml:11: "));
+}
+
+TEST(CoefficientFile, IsRefusedWhenAnAnchoredLineMissesItsAnchor) {
+  EXPECT_THAT(refusal_of(with(kGood, "anchored: false", "anchored: true")), HasSubstr("anchored"));
+  EXPECT_NO_THROW((void)parse_coefficients(
+      with(with(kGood, "anchored: false", "anchored: true"), "intercept: 1.6e-06", "intercept: 1.55e-06"), "c"));
+}
+
+TEST(CoefficientFile, IsRefusedWhenARangeIsNoRange) {
+  for (const char* bad : {"[270.0, 0.0]", "[0.0]", "[0.0, 400.0]", "[-5.0, 270.0]", "270.0", "[]", "[0.0, .nan]"}) {
+    EXPECT_THAT(refusal_of(with(kGood, "[0.0, 270.0]", bad)), StartsWith("c.yaml:14: ")) << bad;
+  }
+}
+
+TEST(CoefficientFile, IsRefusedWhenTheCovarianceHasAnotherShape) {
+  for (const char* bad : {"[[1, 2, 3], [1, 2, 3]]", "[[1, 2]]", "[1, 2]", "[[1, 2], [3, 4], [5, 6]]"}) {
+    EXPECT_THAT(refusal_of(with(kGood, "[[1.0e-18, -5.0e-21], [-5.0e-21, 4.0e-23]]", bad)), StartsWith("c.yaml:12: "))
+        << bad;
+  }
+}
+
+TEST(CoefficientFile, SurvivesBeingCutAnywhere) {
+  for (std::size_t length = 0; length < kGood.size(); ++length) {
+    try {
+      (void)parse_coefficients(kGood.substr(0, length), "c.yaml");
+    } catch (const CoefficientError&) {
+    }
+  }
+}
+
+TEST(CoefficientFile, ThatCannotBeReadIsNamed) {
+  for (const char* path : {"/nonexistent/c.yaml", "/"}) {
+    try {
+      (void)load_coefficients(path);
+      FAIL() << path;
+    } catch (const CoefficientError& error) {
+      EXPECT_THAT(error.what(), StartsWith(path));
+    }
+  }
+}
+
+TEST(CoefficientFile, OfTheConsumerProjectIsRead) {
+  const Coefficients c = load_coefficients(std::string(KPHI_SOURCE_DIR) + "/test/consumer/coefficients.yaml");
+  EXPECT_NEAR(to_newtons_per_rpm2(c.thrust_coefficient), 1.7e-8, 1e-20);
+}
+
+}  // namespace
+}  // namespace kphi::compensation

@@ -1,0 +1,41 @@
+# Installs the library into a fresh prefix, either from an existing build (BUILT) or from the folder itself (SOURCE, as the
+# root of its own project), then configures, builds and runs the project CONSUMER against it below WORK.
+cmake_minimum_required(VERSION 3.25)
+
+function(run)
+  execute_process(COMMAND ${ARGV} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "${ARGV}\nended with ${result}:\n${output}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+file(REMOVE_RECURSE ${WORK})
+set(prefix ${WORK}/prefix)
+set(common -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_CXX_FLAGS=${CXX_FLAGS}
+           -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER})
+if(DEFINED BUILT)
+  set(with_file ON)
+  set(from ${BUILT})
+else()
+  set(with_file OFF)
+  set(from ${WORK}/library)
+  run(${CMAKE_COMMAND} -S ${SOURCE} -B ${from} ${common} -DKPHI_COMPENSATION_FILE=OFF)
+  run(${CMAKE_COMMAND} --build ${from} --parallel 1)
+endif()
+run(${CMAKE_COMMAND} --install ${from} --component compensation --prefix ${prefix})
+
+run(${CMAKE_COMMAND} -S ${CONSUMER} -B ${WORK}/stranger ${common} -DCMAKE_PREFIX_PATH=${prefix} -DWITH_FILE=${with_file})
+run(${CMAKE_COMMAND} --build ${WORK}/stranger --parallel 1)
+
+# sqrt(1.5 N / (1.7e-8 N/RPM² k_i)) with k_i = .84269, .84269, .91071, .84269.
+run(${WORK}/stranger/fly)
+if(NOT output STREQUAL "10232.6\n10232.6\n9843.1\n10232.6\n")
+  message(FATAL_ERROR "unexpected speeds:\n${output}")
+endif()
+if(with_file)
+  run(${WORK}/stranger/read_coefficients ${CONSUMER}/coefficients.yaml)
+  if(NOT output STREQUAL "1.7e-08\n")
+    message(FATAL_ERROR "unexpected K_T: ${output}")
+  endif()
+endif()
