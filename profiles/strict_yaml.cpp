@@ -50,6 +50,10 @@ class Builder final : public YAML::EventHandler {
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     refuse_as_key(mark);
     const std::string pointer = begin(mark);
+    // An empty value has the mark of whatever follows: its key is the place to look at.
+    if (const auto key = document_.key_marks.find(pointer); key != document_.key_marks.end()) {
+      document_.value_marks[pointer] = key->second;
+    }
     end(nullptr, pointer, anchor, 1);
   }
 

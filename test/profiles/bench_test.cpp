@@ -1,0 +1,134 @@
+#include "profiles/bench.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "test/profiles/refusals.hpp"
+
+namespace kphi::profiles {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+std::vector<std::string> refused(const std::string& from, const std::string& to) {
+  return refusals([&] { return parse_bench(changed(kBenchText, from, to), "b.yaml"); });
+}
+
+TEST(Bench, IsReadWhole) {
+  const Bench bench = parse_bench(kBenchText, "b.yaml");
+  EXPECT_EQ(bench.name, "bench");
+  EXPECT_EQ(bench.netbox.host, "192.168.1.1");
+  EXPECT_EQ(bench.netbox.rdt_port, 50000);
+  EXPECT_EQ(bench.netbox.http_port, 8080);
+  EXPECT_EQ(bench.netbox.rate_hz, 3500);
+  EXPECT_EQ(bench.netbox.records_per_datagram, 20);
+  EXPECT_EQ(bench.iq.device, "/dev/ttyUSB0");
+  EXPECT_EQ(bench.iq.baud, 921600u);
+  EXPECT_EQ(bench.iq.module_id, 7);
+  EXPECT_EQ(bench.iq.spin, -1);
+  EXPECT_EQ(bench.iq.telemetry_hz, 100);
+  EXPECT_EQ(bench.iq.speed_max, from_rpm(19300));
+  EXPECT_EQ(bench.thrust_axis, 0);
+  EXPECT_EQ(bench.thrust_sign, -1);
+  ASSERT_TRUE(bench.simulation);
+  EXPECT_FALSE(bench.simulation->in_process);
+  EXPECT_EQ(bench.simulation->time_scale, 20);
+  EXPECT_EQ(bench.simulation->seed, 5u);
+  EXPECT_EQ(bench.simulation->control, "/tmp/control");
+  EXPECT_EQ(bench.text, kBenchText);
+  EXPECT_EQ(bench.path, "b.yaml");
+}
+
+TEST(Bench, NeedsOnlyAddressesAxisAndSpeedLimit) {
+  const Bench bench = parse_bench(
+      "format: kphi-bench/1\nname: b\nnetbox: {host: netbox.lab}\niq: {device: /dev/ttyS1, speed_max_rpm: 9000}\n"
+      "thrust_axis: +Fz\n",
+      "b.yaml");
+  EXPECT_EQ(bench.netbox.rdt_port, 49152);
+  EXPECT_EQ(bench.netbox.http_port, 80);
+  EXPECT_EQ(bench.netbox.rate_hz, 7000);
+  EXPECT_EQ(bench.netbox.records_per_datagram, 40);
+  EXPECT_EQ(bench.iq.baud, 115200u);
+  EXPECT_EQ(bench.iq.module_id, 0);
+  EXPECT_EQ(bench.iq.spin, +1);
+  EXPECT_EQ(bench.iq.telemetry_hz, 50);
+  EXPECT_FALSE(bench.simulation);
+}
+
+TEST(Bench, KnowsSixThrustAxes) {
+  const std::vector<std::string> axes{"+Fx", "-Fx", "+Fy", "-Fy", "+Fz", "-Fz"};
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const Bench bench = parse_bench(changed(kBenchText, "-Fx", axes[i]), "b.yaml");
+    EXPECT_EQ(bench.thrust_axis, static_cast<int>(i / 2)) << axes[i];
+    EXPECT_EQ(bench.thrust_sign, i % 2 == 0 ? +1 : -1) << axes[i];
+  }
+  EXPECT_THAT(refused("-Fx", "Fz"),
+              ElementsAre("16:14: thrust_axis: text \"Fz\" is not known here; did you mean +Fz? write "
+                          "one of +Fx, -Fx, +Fy, -Fy, +Fz, -Fz"));
+}
+
+TEST(Bench, HoldsPortsAndIdentifiers) {
+  EXPECT_THAT(refused("50000", "0"), ElementsAre("5:13: netbox.rdt_port: 0 is below 1; write a value from 1 to 65535"));
+  EXPECT_THAT(refused("8080", "65536"),
+              ElementsAre("6:14: netbox.http_port: 65536 is above 65535; write a value from 1 to 65535"));
+  EXPECT_THAT(refused("module_id: 7", "module_id: 63"),
+              ElementsAre("12:14: iq.module_id: 63 is above 62; write a value from 0 to 62"));
+  EXPECT_THAT(refused("module_id: 7", "module_id: -1"), ElementsAre(StartsWith("12:14: iq.module_id: -1 is below 0")));
+  EXPECT_THAT(refused("datagram: 20", "datagram: 41"),
+              ElementsAre(StartsWith("8:25: netbox.records_per_datagram: 41 is above 40")));
+  EXPECT_THAT(refused("3500", "7001"),
+              ElementsAre("7:12: netbox.rate_hz: 7001 is above 7000 Hz; write a value from 1 to 7000 Hz"));
+}
+
+TEST(Bench, TakesOnlyStandardBaudRates) {
+  for (const char* baud :
+       {"9600", "19200", "38400", "57600", "115200", "230400", "460800", "921600", "1000000", "2000000"}) {
+    EXPECT_THAT(refused("921600", baud), IsEmpty()) << baud;
+  }
+  EXPECT_THAT(
+      refused("921600", "115201"),
+      ElementsAre("11:9: iq.baud: 115201 is not known here; write one of 9600, 19200, 38400, 57600, 115200, 230400, "
+                  "460800, 921600, 1000000, 2000000"));
+}
+
+TEST(Bench, SpinsOneWayOrTheOther) {
+  EXPECT_THAT(refused("spin: -1", "spin: +1"), IsEmpty());
+  for (const char* spin : {"0", "2", "-1.5", "\"+1\""})
+    EXPECT_EQ(refused("spin: -1", std::string("spin: ") + spin).size(), 1u) << spin;
+}
+
+TEST(Bench, WantsADeviceThatIsAPathAndAHostThatIsAName) {
+  EXPECT_THAT(refused("/dev/ttyUSB0", "ttyUSB0"),
+              ElementsAre("10:11: iq.device: text \"ttyUSB0\" does not fit; write a path that begins with /"));
+  EXPECT_THAT(refused("192.168.1.1", "\"http://192.168.1.1\""),
+              ElementsAre(StartsWith("4:9: netbox.host: text \"http://192.168.1.1\" does not fit")));
+  EXPECT_THAT(refused("192.168.1.1", "\"::1\""), IsEmpty());
+}
+
+TEST(Bench, SimulatesInProcessWithoutAControlLineOnly) {
+  EXPECT_THAT(
+      refused("  control: /tmp/control\n", ""),
+      ElementsAre("18:3: simulation: control is missing; add control: a path for the socket, or in_process: true"));
+  EXPECT_THAT(refused("  control: /tmp/control\n", "  in_process: true\n"), IsEmpty());
+  EXPECT_THAT(refused("seed: 5", "seed: -5"), ElementsAre(StartsWith("19:9: simulation.seed: -5 is below 0")));
+  EXPECT_THAT(refused("time_scale: 20", "time_scale: 0"),
+              ElementsAre(StartsWith("18:15: simulation.time_scale: 0 is below 0.1")));
+  EXPECT_THAT(refused("  seed: 5\n", "  in_process: yes\n"),
+              ElementsAre(StartsWith("19:15: yes is a boolean to some")));
+}
+
+TEST(Bench, NamesTheKeyThatWasMeant) {
+  EXPECT_THAT(refused("  baud:", "  baud_rate:"),
+              ElementsAre(StartsWith("11:3: baud_rate is not a key of iq; known here: baud,")));
+  EXPECT_THAT(refused("rdt_port", "rtd_port"),
+              ElementsAre("5:3: rtd_port is not a key of netbox; did you mean rdt_port?"));
+  EXPECT_THAT(
+      refused("speed_max_rpm", "speed_max_rad_s"),
+      ElementsAre("15:3: speed_max_rad_s is not a key of iq; the unit is part of the key: write speed_max_rpm and "
+                  "the value in RPM"));
+}
+
+}  // namespace
+}  // namespace kphi::profiles

@@ -1,0 +1,253 @@
+#include "profiles/campaign.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "test/profiles/refusals.hpp"
+
+namespace kphi::profiles {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+/// What the campaign says with `from` replaced by `to`.
+std::vector<std::string> refused(const std::string& from, const std::string& to) {
+  return refusals([&] { return parse_campaign(changed(kCampaignText, from, to), "c.yaml"); });
+}
+
+TEST(Campaign, IsReadIntoSiUnits) {
+  const Campaign campaign = parse_campaign(kCampaignText, "c.yaml");
+  EXPECT_EQ(campaign.name, "short");
+  EXPECT_EQ(campaign.operator_name, "Ada");
+  EXPECT_EQ(campaign.propeller.id, "5x3");
+  EXPECT_EQ(campaign.propeller.name, "five inches, three blades");
+  EXPECT_EQ(campaign.propeller.diameter_in, 5);
+  EXPECT_EQ(campaign.propeller.blades, 3);
+  EXPECT_THAT(campaign.occlusions_deg, ElementsAre(0, 45, 90));
+  EXPECT_EQ(campaign.repetitions, 2);
+  EXPECT_EQ(campaign.profile.steps, 4);
+  EXPECT_EQ(campaign.profile.dwell, Seconds(2));
+  EXPECT_EQ(campaign.profile.first, from_rpm(100));
+  EXPECT_EQ(campaign.profile.last, from_rpm(19100));
+  EXPECT_EQ(campaign.zero, Seconds(3));
+  EXPECT_EQ(campaign.minimum_discard, Seconds(0.5));
+  EXPECT_EQ(campaign.supply, Volts(12));
+  EXPECT_EQ(campaign.limits.speed_max, from_rpm(19100));
+  EXPECT_EQ(campaign.limits.thrust_max, Newtons(20));
+  EXPECT_EQ(campaign.limits.supply_current_max, Amperes(35));
+  EXPECT_EQ(campaign.limits.coil_temperature_max, Celsius(110));
+  EXPECT_EQ(campaign.text, kCampaignText);
+  EXPECT_EQ(campaign.path, "c.yaml");
+}
+
+TEST(Campaign, HasThreeRepetitionsAndNoOperatorUnlessItSaysSo) {
+  const std::string text = changed(changed(kCampaignText, "repetitions: 2\n", ""), "operator: Ada\n", "");
+  const Campaign campaign = parse_campaign(text, "c.yaml");
+  EXPECT_EQ(campaign.repetitions, 3);
+  EXPECT_EQ(campaign.operator_name, "");
+}
+
+TEST(Campaign, MayRunDownwards) {
+  const auto text =
+      changed(changed(kCampaignText, "first_rpm: 100", "first_rpm: 9000"), "last_rpm: 19100", "last_rpm: 50");
+  const auto levels = parse_campaign(text, "c.yaml").profile.levels();
+  EXPECT_EQ(levels.front(), from_rpm(9000));
+  EXPECT_EQ(levels.back(), from_rpm(50));
+}
+
+TEST(StepProfile, HasThePapersIncrementsAndBothEndsExactly) {
+  const StepProfile profile{40, Seconds(2), from_rpm(100), from_rpm(19100)};
+  const auto levels = profile.levels();
+  ASSERT_EQ(levels.size(), 40u);
+  EXPECT_EQ(levels.front(), from_rpm(100));
+  EXPECT_EQ(levels.back(), from_rpm(19100));
+  for (std::size_t i = 1; i < levels.size(); ++i) {
+    EXPECT_NEAR(to_rpm(levels[i] - levels[i - 1]), 487.179, 5e-4) << "step " << i;
+  }
+  const StepProfile six_inch{40, Seconds(2), from_rpm(100), from_rpm(17188)};
+  EXPECT_NEAR(to_rpm(six_inch.levels()[1] - six_inch.levels()[0]), 438.154, 5e-4);
+}
+
+TEST(StepProfile, EndsExactlyForEveryNumberOfSteps) {
+  for (int steps = 2; steps <= 1000; ++steps) {
+    const StepProfile profile{steps, Seconds(1), from_rpm(100), from_rpm(19100)};
+    const auto levels = profile.levels();
+    ASSERT_EQ(static_cast<int>(levels.size()), steps);
+    ASSERT_EQ(levels.front(), profile.first);
+    ASSERT_EQ(levels.back(), profile.last);
+  }
+}
+
+TEST(Campaign, RefusesSpeedsAboveItsOwnLimit) {
+  EXPECT_THAT(
+      refused("last_rpm: 19100", "last_rpm: 25000"),
+      ElementsAre("15:13: profile.last_rpm: 25000 is above 19100 RPM (limits.speed_max_rpm); lower it, or raise "
+                  "the limit if propeller and motor bear it"));
+  EXPECT_THAT(refused("first_rpm: 100", "first_rpm: 19101"),
+              ElementsAre(StartsWith("14:14: profile.first_rpm: 19101 is above")));
+}
+
+TEST(Campaign, RefusesDwellsThatLeaveNothingToAverage) {
+  EXPECT_THAT(
+      refused("dwell_s: 2.0", "dwell_s: 0.5"),
+      ElementsAre("13:12: profile.dwell_s: 0.5 is not above 0.5 s (minimum_discard_s); dwell longer, or nothing "
+                  "is left to average"));
+  EXPECT_THAT(refused("dwell_s: 2.0", "dwell_s: 0.51"), IsEmpty());
+}
+
+TEST(Campaign, RefusesAnOcclusionListedTwice) {
+  EXPECT_THAT(refused("[0, 45, 90]", "[0, 45, 45.0]"),
+              ElementsAre("9:25: occlusions_deg[2]: 45 degrees is listed before, at [1]; list each occlusion once; "
+                          "repetitions says how often it is run"));
+}
+
+TEST(Campaign, RefusesOcclusionsOutsideTheCircle) {
+  const std::string next = " degrees; write a value from 0 to below 360 degrees";
+  EXPECT_THAT(refused("[0, 45, 90]", "[0, 360]"), ElementsAre("9:21: occlusions_deg[1]: 360 is not below 360" + next));
+  EXPECT_THAT(refused("[0, 45, 90]", "[-1]"), ElementsAre("9:18: occlusions_deg[0]: -1 is below 0" + next));
+  EXPECT_THAT(refused("[0, 45, 90]", "[359.5]"), IsEmpty());
+  EXPECT_THAT(refused("[0, 45, 90]", "[]"), ElementsAre("9:17: occlusions_deg: 0 values; write at least 1"));
+  EXPECT_THAT(refused("[0, 45, 90]", "45"),
+              ElementsAre("9:17: occlusions_deg: expected a list, found 45; write a list: [45]"));
+}
+
+struct Range {
+  const char* from;
+  const char* key;
+  std::vector<std::string> refused;
+  std::vector<std::string> accepted;
+};
+
+TEST(Campaign, HoldsEveryRange) {
+  const std::vector<Range> ranges{
+      {"steps: 4", "steps: ", {"1", "0", "-4", "1001", "2.5", "4.0"}, {"2", "1000"}},
+      {"repetitions: 2", "repetitions: ", {"0", "21", "1.5"}, {"1", "20"}},
+      {"dwell_s: 2.0", "dwell_s: ", {"0", "-1", "601"}, {"600", "1"}},
+      {"first_rpm: 100", "first_rpm: ", {"0", "-100", "100001"}, {"1"}},
+      {"zero_s: 3.0", "zero_s: ", {"0", "601"}, {"0.1", "600"}},
+      {"minimum_discard_s: 0.5", "minimum_discard_s: ", {"-0.1", "601"}, {"0"}},
+      {"supply_v: 12.0", "supply_v: ", {"0", "61"}, {"60"}},
+      {"diameter_in: 5", "diameter_in: ", {"0.5", "41"}, {"1", "40"}},
+      {"blades: 3", "blades: ", {"1", "9", "2.5"}, {"2", "8"}},
+      {"speed_max_rpm: 19100", "speed_max_rpm: ", {"0", "100001", "19099"}, {"19100", "100000"}},
+      {"thrust_max_n: 20", "thrust_max_n: ", {"0", "1001"}, {"1000"}},
+      {"supply_current_max_a: 35", "supply_current_max_a: ", {"0", "501"}, {"500"}},
+      {"coil_temperature_max_degc: 110", "coil_temperature_max_degc: ", {"19", "201"}, {"20", "200"}},
+  };
+  for (const Range& range : ranges) {
+    for (const auto& value : range.refused)
+      EXPECT_EQ(refused(range.from, range.key + value).size(), 1u) << range.key << value;
+    for (const auto& value : range.accepted)
+      EXPECT_THAT(refused(range.from, range.key + value), IsEmpty()) << range.key << value;
+  }
+}
+
+TEST(Campaign, SaysWhichValuesAreAllowed) {
+  EXPECT_THAT(refused("steps: 4", "steps: 2000"),
+              ElementsAre("12:10: profile.steps: 2000 is above 1000; write a value from 2 to 1000"));
+  EXPECT_THAT(refused("dwell_s: 2.0", "dwell_s: 0"),
+              ElementsAre("13:12: profile.dwell_s: 0 is not above 0 s; write a value from above 0 to 600 s"));
+  EXPECT_THAT(refused("blades: 3", "blades: 1"),
+              ElementsAre("8:11: propeller.blades: 1 is below 2; write a value from 2 to 8"));
+}
+
+TEST(Campaign, NamesTheKeyThatWasMeant) {
+  EXPECT_THAT(refused("steps: 4", "stesp: 4"), ElementsAre("12:3: stesp is not a key of profile; did you mean steps?"));
+  EXPECT_THAT(refused("repetitions", "repetitons"),
+              ElementsAre("10:1: repetitons is not a key; did you mean repetitions?"));
+}
+
+TEST(Campaign, SaysThatTheUnitIsPartOfTheKey) {
+  EXPECT_THAT(refused("dwell_s: 2.0", "dwell_ms: 2000"),
+              ElementsAre("13:3: dwell_ms is not a key of profile; the unit is part of the key: write dwell_s and the "
+                          "value in s"));
+  EXPECT_THAT(
+      refused("last_rpm", "last"),
+      ElementsAre("15:3: last is not a key of profile; the unit is part of the key: write last_rpm and the value "
+                  "in RPM"));
+  EXPECT_THAT(
+      refused("dwell_s: 2.0", "dwell_s: 2 s"),
+      ElementsAre("13:12: profile.dwell_s: expected a number, found text \"2 s\"; write the number alone, in s"));
+}
+
+TEST(Campaign, SaysWhereAKeyBelongs) {
+  EXPECT_THAT(refused("zero_s: 3.0\n", "zero_s: 3.0\nthrust_max_n: 3\n"),
+              ElementsAre("17:1: thrust_max_n is not a key; it belongs to limits"));
+  EXPECT_THAT(refused("  steps: 4\n", "  steps: 4\n  zero_s: 3\n"),
+              ElementsAre("13:3: zero_s is not a key of profile; it belongs to the top of the file"));
+  EXPECT_THAT(refused("  steps: 4\n", "  steps: 4\n  colour: red\n"),
+              ElementsAre("13:3: colour is not a key of profile; known here: dwell_s, first_rpm, last_rpm, steps"));
+}
+
+TEST(Campaign, RefusesMissingKeysAtTheObjectThatLacksThem) {
+  EXPECT_THAT(
+      refused("  thrust_max_n: 20\n", ""),
+      ElementsAre("19:1: limits.thrust_max_n is missing; add the key thrust_max_n (above it the motor coasts)"));
+  EXPECT_THAT(refused("supply_v: 12.0\n", ""),
+              ElementsAre(StartsWith("1:1: supply_v is missing; add the key supply_v")));
+  EXPECT_THAT(refusals([] { return parse_campaign("format: kphi-campaign/1\nname: x\n", "c.yaml"); }),
+              testing::Contains("1:1: profile is missing; add the key profile (the speeds of a run)"));
+}
+
+TEST(Campaign, RefusesEmptyValuesAtTheirKey) {
+  EXPECT_THAT(refused("zero_s: 3.0", "zero_s:"),
+              ElementsAre("16:1: zero_s: expected a number, found nothing; write a number here (motor off, before and "
+                          "after each run)"));
+  EXPECT_THAT(
+      refused("limits:\n", "limits:\nlimitz:\n"),
+      ElementsAre(StartsWith("19:1: limits: expected keys, found nothing"), StartsWith("20:1: limitz is not a key")));
+}
+
+TEST(Campaign, RefusesWrongTypes) {
+  EXPECT_THAT(refused("id: 5x3", "id: 53"),
+              ElementsAre("5:7: propeller.id: expected text, found 53; quote it: \"53\""));
+  EXPECT_THAT(refused("steps: 4", "steps: \"4\""),
+              ElementsAre(StartsWith("12:10: profile.steps: expected a whole number, found text \"4\"")));
+  EXPECT_THAT(refused("supply_v: 12.0", "supply_v: {v: 12}"),
+              ElementsAre(StartsWith("18:11: supply_v: expected a number, found keys")));
+  EXPECT_THAT(refused("supply_v: 12.0", "supply_v: true"),
+              ElementsAre(StartsWith("18:11: supply_v: expected a number, found true")));
+  EXPECT_THAT(refusals([] { return parse_campaign("[1, 2]", "c.yaml"); }),
+              ElementsAre(StartsWith("1:1: the file: expected keys, found a list")));
+}
+
+TEST(Campaign, RefusesNamesThatCannotBeFileNames) {
+  for (const char* id : {"../x", "a/b", "\"\"", "\"a b\"", "-a", ".hidden", "φ", "a2345678901234567890123456789012x"}) {
+    EXPECT_THAT(refused("id: 5x3", std::string("id: ") + id), ElementsAre(StartsWith("5:7: propeller.id: text ")))
+        << id;
+  }
+  EXPECT_THAT(refused("name: short", "name: \"a\\nb\""), ElementsAre(StartsWith("2:7: ")));
+  EXPECT_THAT(refused("name: five inches, three blades", "name: \"\""),
+              ElementsAre("6:9: propeller.name: this text is empty; say maker and type, as on the hub"));
+}
+
+TEST(Campaign, RefusesFilesOfAnotherKindInOneSentence) {
+  EXPECT_THAT(refusals([] { return parse_campaign(kBenchText, "b.yaml"); }),
+              ElementsAre("1:9: this is a bench file, expected a campaign file; name a file that begins with format: "
+                          "kphi-campaign/1"));
+  EXPECT_THAT(refused("kphi-campaign/1", "kphi-campaign/2"),
+              ElementsAre("1:9: format: text \"kphi-campaign/2\" is not known here; write kphi-campaign/1"));
+}
+
+TEST(Campaign, SaysAllThatIsWrongAtOnceAndEachThingOnce) {
+  std::string text = changed(kCampaignText, "steps: 4", "stesp: 4");
+  text = changed(text, "repetitions: 2", "repetitions: 010");
+  text = changed(text, "supply_v: 12.0", "supply_v: 120");
+  text = changed(text, "  thrust_max_n: 20\n", "");
+  EXPECT_THAT(refusals([&] { return parse_campaign(text, "c.yaml"); }),
+              ElementsAre(StartsWith("10:14: 010 looks octal"), StartsWith("12:3: stesp is not a key"),
+                          StartsWith("18:11: supply_v: 120 is above 60 V"),
+                          StartsWith("19:1: limits.thrust_max_n is missing")));
+}
+
+TEST(Campaign, NamesItsFile) {
+  EXPECT_THAT([] { static_cast<void>(load_campaign("/no/such.yaml")); },
+              testing::ThrowsMessage<ConfigurationError>(StartsWith("/no/such.yaml: cannot be opened")));
+  EXPECT_THAT([] { static_cast<void>(parse_campaign("a: [", "dir/c.yaml")); },
+              testing::ThrowsMessage<ConfigurationError>(StartsWith("dir/c.yaml:")));
+}
+
+}  // namespace
+}  // namespace kphi::profiles

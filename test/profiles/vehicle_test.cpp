@@ -1,0 +1,83 @@
+#include "profiles/vehicle.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "test/profiles/refusals.hpp"
+
+namespace kphi::profiles {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+std::vector<std::string> refused(const std::string& from, const std::string& to) {
+  return refusals([&] { return parse_vehicle(changed(kVehicleText, from, to), "v.yaml"); });
+}
+
+TEST(Vehicle, IsReadIntoSiUnits) {
+  const Vehicle vehicle = parse_vehicle(kVehicleText, "v.yaml");
+  EXPECT_EQ(vehicle.name, "drone");
+  EXPECT_EQ(vehicle.half_side, Metres(0.045));
+  EXPECT_EQ(vehicle.arm_length, Metres(0.117));
+  EXPECT_EQ(vehicle.propeller_radius, Metres(0.0635));
+  EXPECT_THAT(vehicle.hinge_turn_deg, ElementsAre(0, 90, 180, 270));
+  ASSERT_EQ(vehicle.shapes.size(), 2u);
+  EXPECT_EQ(vehicle.shapes.at("X")[3], from_degrees(45));
+  EXPECT_EQ(vehicle.shapes.at("O")[2], from_degrees(165.676));
+  EXPECT_EQ(vehicle.arm_angle_min, from_degrees(-90));
+  EXPECT_EQ(vehicle.arm_angle_max, from_degrees(180));
+  EXPECT_EQ(vehicle.speed_min, from_rpm(0));
+  EXPECT_EQ(vehicle.speed_max, from_rpm(19100));
+  EXPECT_EQ(vehicle.text, kVehicleText);
+  EXPECT_EQ(vehicle.path, "v.yaml");
+}
+
+TEST(Vehicle, HasOneArmPerCornerInOrderUnlessItSaysOtherwise) {
+  const auto text = changed(kVehicleText, "hinge_turn_deg: [0, 90, 180, 270]\n", "");
+  EXPECT_THAT(parse_vehicle(text, "v.yaml").hinge_turn_deg, ElementsAre(0, 90, 180, 270));
+  EXPECT_THAT(refused("[0, 90, 180, 270]", "[90, 0.0, 270, 180]"), IsEmpty());
+  EXPECT_THAT(refused("[0, 90, 180, 270]", "[0, 90, 90, 270]"),
+              ElementsAre("6:25: hinge_turn_deg[2]: corner 90 has an arm already; give each corner one arm"));
+  EXPECT_THAT(refused("[0, 90, 180, 270]", "[0, 90, 180, 271]"),
+              ElementsAre("6:30: hinge_turn_deg[3]: 271 is not known here; write one of 0, 90, 180, 270"));
+}
+
+TEST(Vehicle, RefusesShapesThatTheServosCannotReach) {
+  EXPECT_THAT(refused("165.676, 180]", "180.5, 180]"),
+              ElementsAre("9:17: shapes_deg.O[2]: 180.5 is outside -90 to 180 degrees (arm_angle_min_deg, "
+                          "arm_angle_max_deg); the servo cannot go there; mend the angle or the range"));
+}
+
+TEST(Vehicle, RefusesShapesWithoutFourArms) {
+  EXPECT_THAT(refused("[45, 45, 45, 45]", "[45, 45, 45]"),
+              ElementsAre("8:6: shapes_deg.X: 3 values; write at least 4"));
+  EXPECT_THAT(refused("[45, 45, 45, 45]", "[45, 45, 45, 45, 45]"),
+              ElementsAre("8:6: shapes_deg.X: 5 values; write at most 4"));
+  EXPECT_THAT(refused("  X: [45, 45, 45, 45]\n  O: [180, 180, 165.676, 180]\n", "  {}\n"),
+              ElementsAre(StartsWith("8:3: shapes_deg: no keys; write at least 1")));
+}
+
+TEST(Vehicle, RefusesRangesThatAreEmpty) {
+  EXPECT_THAT(refused("speed_min_rpm: 0", "speed_min_rpm: 19100"),
+              ElementsAre("13:16: speed_max_rpm: 19100 is not above 19100 (speed_min_rpm); swap or mend the two"));
+  EXPECT_THAT(refused("arm_angle_max_deg: 180", "arm_angle_max_deg: -91"),
+              testing::Contains(StartsWith("11:20: arm_angle_max_deg: -91 is not above -90")));
+}
+
+TEST(Vehicle, RefusesArmsShorterThanThePropeller) {
+  EXPECT_THAT(refused("0.117", "0.0635"),
+              ElementsAre(StartsWith("4:15: arm_length_m: 0.0635 is not above 0.0635 m (propeller_radius_m)")));
+}
+
+TEST(Vehicle, WantsMetresInTheKey) {
+  EXPECT_THAT(
+      refused("half_side_m: 0.045", "half_side_mm: 45"),
+      ElementsAre("3:1: half_side_mm is not a key; the unit is part of the key: write half_side_m and the value in m"));
+  EXPECT_THAT(refused("half_side_m: 0.045", "half_side_m: 45"),
+              ElementsAre("3:14: half_side_m: 45 is above 10 m; write a value from above 0 to 10 m"));
+}
+
+}  // namespace
+}  // namespace kphi::profiles
