@@ -18,6 +18,7 @@ constexpr int kOptionalAttempts = 2;
 constexpr int kSilentTimeouts = 10;  ///< reply time-outs without any reply after which the module counts as gone
 constexpr std::size_t kGetFrame = 7;
 constexpr std::size_t kVelocityFrame = 11;
+constexpr std::size_t kSetAndGet = 18;
 
 constexpr const Entry& kVelocity = entry<"propeller_motor_control.ctrl_velocity">;
 constexpr const Entry& kDriveMode = entry<"brushless_drive.drive_mode">;
@@ -35,7 +36,7 @@ const Settings& checked(const Settings& settings) {
   if (!(settings.module_timeout_s > 0) || !std::isfinite(settings.module_timeout_s)) {
     throw std::invalid_argument(fmt::format("module timeout {} s is not above 0", settings.module_timeout_s));
   }
-  if (settings.credit_bytes < kVelocityFrame) throw std::invalid_argument("less credit than one frame needs");
+  if (settings.credit_bytes < kSetAndGet) throw std::invalid_argument("less credit than a set and its read-back need");
   return settings;
 }
 
@@ -330,7 +331,7 @@ void Session::continue_connecting(Instant now) {
     return;
   }
   const Step& step = kScript[step_];
-  if (requests_.busy(*step.entry)) return;
+  if (requests_.busy(*step.entry) || !fits(kSetAndGet)) return;
   if (step.sets()) {
     const double wanted = step.kind == Step::Kind::set_timeout ? settings_.module_timeout_s : 0;
     tell(Outbox::Kind::setting, make(*step.entry, Access::set, settings_.module_id, wanted), now);

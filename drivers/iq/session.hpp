@@ -29,7 +29,7 @@ struct Settings {
   Duration reply_timeout{0};      ///< bench time; 0: 100 ms, and Motor stretches these as wall time
   Duration wire_byte_time{0};     ///< 10 bits of one byte, bench time; 0: Motor takes 10/baud
   double module_timeout_s = 0.5;  ///< the module coasts by itself after this silence; Motor stretches it as wall time
-  std::size_t credit_bytes = 63;  ///< most bytes of unanswered frames: the module's receive buffer has 64
+  std::size_t credit_bytes = 63;  ///< most bytes of unanswered frames, 18 or more: the module's receive buffer has 64
 };
 
 class Session {

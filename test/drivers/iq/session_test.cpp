@@ -1,0 +1,700 @@
+#include "drivers/iq/session.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <random>
+#include <stdexcept>
+
+#include "test/drivers/iq/fake_module.hpp"
+
+namespace kphi::iq {
+namespace {
+
+using namespace std::chrono_literals;
+using fake::Bytes;
+using State = Session::State;
+
+constexpr Duration kTimeout = 100ms;
+
+/// A session and a module joined in virtual time, with a wire that can be told to misbehave.
+class Wire {
+ public:
+  explicit Wire(Settings settings = {}) : settings_(settings), session(settings) {}
+
+  fake::Module module;
+  Duration latency = 2ms;                                    ///< request to reply
+  std::function<void(Bytes& reply, Duration& delay)> spoil;  ///< may change or empty a reply
+  std::vector<std::pair<Instant, Bytes>> batches;            ///< all that the session sent
+  Instant now{0};
+
+ private:
+  Settings settings_;
+
+ public:
+  Session session;
+
+  /// The session has promised to be quiet until its deadline: that must lie ahead.
+  void run_until(Instant end) {
+    flush();
+    while (true) {
+      const Instant next = std::min(session.deadline(), arrivals_.empty() ? kNever : arrivals_.begin()->first);
+      if (next > end) break;
+      now = std::max(now, next);
+      if (!arrivals_.empty() && arrivals_.begin()->first <= now) {
+        const Bytes bytes = arrivals_.begin()->second;
+        arrivals_.erase(arrivals_.begin());
+        session.receive(bytes, now);
+      } else {
+        session.advance(now);
+        ASSERT_GT(session.deadline(), now) << "no progress";
+      }
+      flush();
+    }
+    now = end;
+  }
+  void run_for(Duration duration) { run_until(now + duration); }
+  bool run_to_state(State state, Duration limit) {
+    const Instant end = now + limit;
+    while (session.state() != state && now < end) run_for(1ms);
+    return session.state() == state;
+  }
+  void connect() {
+    session.connect(now);
+    ASSERT_TRUE(run_to_state(State::ready, 1s)) << session.failure();
+  }
+  void deliver(const Bytes& bytes, Duration delay = {}) { arrivals_.emplace(now + delay, bytes); }
+  [[nodiscard]] std::size_t replies_on_their_way() const { return arrivals_.size(); }
+  std::vector<Reading> readings() {
+    std::vector<Reading> all(10000);
+    all.resize(session.take(all));
+    return all;
+  }
+  std::vector<double> values(Quantity quantity) {
+    std::vector<double> found;
+    for (const Reading& reading : readings()) {
+      if (reading.quantity == quantity) found.push_back(reading.value);
+    }
+    return found;
+  }
+  void spin(double speed) {
+    session.spin_at(RadPerSec(speed), now);
+    flush();
+  }
+  void coast() {
+    session.coast(now);
+    flush();
+  }
+
+  void flush() {
+    const auto output = session.output();
+    if (output.empty()) return;
+    batches.emplace_back(now, Bytes(output.begin(), output.end()));
+    session.sent(output.size());
+    for (Bytes& reply : module.receive(batches.back().second)) {
+      Duration delay = latency;
+      if (spoil) spoil(reply, delay);
+      if (!reply.empty()) arrivals_.emplace(now + delay, reply);
+    }
+  }
+
+ private:
+  std::multimap<Instant, Bytes> arrivals_;
+};
+
+bool is_reply(const Bytes& reply, int type, int sub) { return reply.size() > 4 && reply[2] == type && reply[3] == sub; }
+
+TEST(Connecting, CoastsBeforeAnythingElse) {
+  Wire wire;
+  wire.connect();
+  ASSERT_FALSE(wire.module.heard.empty());
+  EXPECT_TRUE(wire.module.heard[0].is_coast());
+  EXPECT_EQ(fake::hex(std::span(wire.batches[0].second).first(7)), "55 02 34 02 01 8E 06");
+}
+
+TEST(Connecting, ReadsWhoTheModuleIs) {
+  Wire wire;
+  wire.connect();
+  const Identity& identity = wire.session.identity();
+  EXPECT_EQ(identity.firmware_text(), "speed 0.0.32");
+  EXPECT_EQ(identity.uid_text(), "111111112222222233333333");
+  EXPECT_EQ(identity.hardware, 0x10100u);
+  EXPECT_EQ(identity.electronics, 0x30000u);
+  EXPECT_EQ(identity.pole_pairs, 7);
+  EXPECT_EQ(identity.motor_kv_rpm_per_volt, 2200);
+  EXPECT_EQ(identity.timeout_s, 0.5);
+  EXPECT_EQ(identity.coil_temperature_client, 83);
+  EXPECT_NE(identity.summary().find("speed 0.0.32"), std::string::npos);
+}
+
+TEST(Connecting, MakesTheModuleCoastByItselfWithoutASong) {
+  Wire wire;
+  wire.connect();
+  EXPECT_EQ(fake::to_f32(wire.module.values.at({52, 15})), 0.5f);
+  EXPECT_EQ(wire.module.values.at({52, 18}), fake::u8(0));
+  EXPECT_EQ(wire.module.values.at({52, 19}), fake::u8(0));
+  EXPECT_EQ(wire.module.count([](const auto& m) { return m.access == 2; }), 0u) << "nothing is ever saved";
+}
+
+TEST(Connecting, FailsWhenTheTimeoutIsNotAccepted) {
+  for (const int sub : {15, 18, 19}) {
+    Wire wire;
+    wire.module.read_only = {{52, sub}};
+    wire.session.connect(wire.now);
+    ASSERT_TRUE(wire.run_to_state(State::failed, 3s)) << sub;
+    EXPECT_NE(wire.session.failure().find("it would keep spinning if this host died"), std::string::npos)
+        << wire.session.failure();
+    EXPECT_TRUE(wire.module.last_motion()->is_coast());
+  }
+}
+
+TEST(Connecting, ComparesTheTimeoutBitByBit) {
+  Wire wire;
+  wire.module.read_only = {{52, 15}};
+  wire.module.values[{52, 15}] = fake::f32(std::nextafter(0.5f, 1.0f));
+  wire.session.connect(wire.now);
+  EXPECT_TRUE(wire.run_to_state(State::failed, 3s));
+}
+
+TEST(Connecting, RepeatsASetThatWasLost) {
+  Wire wire;
+  wire.module.ignore_sets = true;
+  wire.session.connect(wire.now);
+  wire.run_for(5ms);
+  wire.module.ignore_sets = false;
+  EXPECT_TRUE(wire.run_to_state(State::ready, 1s)) << wire.session.failure();
+  EXPECT_GE(wire.module.count([](const auto& m) { return m.type == 52 && m.sub == 15 && m.access == 1; }), 2u);
+}
+
+TEST(Connecting, AcceptsOldFirmwareWithoutTimeoutBehaviour) {
+  Wire wire;
+  wire.module.silent = {{77, 0}, {52, 18}, {52, 19}};
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::ready, 10s)) << wire.session.failure();
+  EXPECT_FALSE(wire.session.identity().timeout_behavior_set);
+}
+
+TEST(Connecting, TakesTheCoilTemperatureOfOldFirmware) {
+  Wire wire;
+  wire.module.silent = {{83, 0}};
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::ready, 3s)) << wire.session.failure();
+  EXPECT_EQ(wire.session.identity().coil_temperature_client, 77);
+  wire.readings();
+  wire.run_for(1s);
+  const auto temperatures = wire.values(Quantity::coil_temperature);
+  ASSERT_FALSE(temperatures.empty());
+  EXPECT_EQ(temperatures[0], 44.5);
+}
+
+TEST(Connecting, GoesOnWithoutACoilTemperature) {
+  Wire wire;
+  wire.module.silent = {{83, 0}, {77, 0}};
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::ready, 3s)) << wire.session.failure();
+  wire.run_for(1s);
+  EXPECT_TRUE(wire.values(Quantity::coil_temperature).empty());
+  EXPECT_EQ(wire.session.state(), State::ready);
+}
+
+TEST(Connecting, FailsWithinASecondWhenNothingAnswers) {
+  Wire wire;
+  wire.module.mute = true;
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
+  EXPECT_EQ(wire.session.failure(), "nothing was received");
+}
+
+TEST(Connecting, SaysWhenOnlyGarbageComes) {
+  Wire wire;
+  wire.spoil = [](Bytes& reply, Duration&) { reply = {0x00, 0xE6, 0x55, 0x80}; };
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
+  EXPECT_EQ(wire.session.failure(), "bytes were received, but no valid packet");
+}
+
+TEST(Connecting, SaysWhenAnotherModuleAnswers) {
+  Wire wire;
+  wire.spoil = [](Bytes& reply, Duration&) { reply = fake::message(50, 0, 3, 5, fake::u8(5)); };
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
+  EXPECT_EQ(wire.session.failure(), "only modules with another id answer");
+  EXPECT_GT(wire.session.counters().wrong_module, 0u);
+}
+
+TEST(Connecting, FailsWhenTheModuleDoesNotCoast) {
+  Wire wire;
+  wire.module.ignore_sets = true;
+  wire.module.values[{50, 0}] = fake::u8(3);
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::failed, 2s));
+  EXPECT_NE(wire.session.failure().find("does not confirm that it coasts"), std::string::npos);
+}
+
+TEST(Settings, ThatMakeNoSenseAreRefused) {
+  for (const auto& spoil : std::vector<std::function<void(Settings&)>>{
+           [](Settings& s) { s.module_id = 63; }, [](Settings& s) { s.module_id = -1; },
+           [](Settings& s) { s.telemetry_hz = 0; }, [](Settings& s) { s.telemetry_hz = std::nan(""); },
+           [](Settings& s) { s.module_timeout_s = 0; }, [](Settings& s) { s.credit_bytes = 17; }}) {
+    Settings settings;
+    spoil(settings);
+    EXPECT_THROW(Session{settings}, std::invalid_argument);
+  }
+}
+
+TEST(Spinning, IsRefusedUnlessReady) {
+  Wire wire;
+  EXPECT_THROW(wire.spin(100), std::logic_error);
+  wire.session.connect(wire.now);
+  EXPECT_THROW(wire.spin(100), std::logic_error);
+  EXPECT_EQ(wire.module.count([](const auto& m) { return m.is_speed(); }), 0u);
+}
+
+TEST(Spinning, IsRefusedBeyondTheRangeAndForNonsense) {
+  Wire wire;
+  wire.connect();
+  for (const double speed : {3450.1, -3451.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    EXPECT_THROW(wire.spin(speed), std::invalid_argument);
+  }
+  EXPECT_FALSE(wire.session.spinning());
+}
+
+TEST(Spinning, SendsTheSpeedWithItsSign) {
+  Wire wire;
+  wire.connect();
+  wire.batches.clear();
+  wire.spin(-12.5);
+  ASSERT_EQ(wire.batches.size(), 1u);
+  EXPECT_EQ(fake::hex(wire.batches[0].second), "55 06 34 05 01 00 00 48 C1 E6 8D");
+  EXPECT_TRUE(wire.session.spinning());
+  EXPECT_FALSE(wire.session.coasting());
+}
+
+TEST(Spinning, AtZeroIsACoast) {
+  Wire wire;
+  wire.connect();
+  wire.spin(500);
+  wire.spin(0);
+  EXPECT_FALSE(wire.session.spinning());
+  EXPECT_TRUE(wire.module.last_motion()->is_coast());
+}
+
+TEST(Coasting, GoesBeforeAllThatHasNotBegunToLeave) {
+  Wire wire;
+  wire.connect();
+  wire.module.heard.clear();
+  Session& session = wire.session;
+  session.spin_at(RadPerSec(100), wire.now);
+  session.spin_at(RadPerSec(200), wire.now);
+  session.sent(5);  // the first speed is under way
+  session.coast(wire.now);
+  const Bytes first_half{0x55, 0x06, 0x34, 0x05, 0x01};
+  wire.module.receive(first_half);
+  wire.module.receive(session.output());
+  ASSERT_GE(wire.module.heard.size(), 2u);
+  EXPECT_TRUE(wire.module.heard[0].is_speed());
+  EXPECT_TRUE(wire.module.heard[1].is_coast());
+  EXPECT_EQ(wire.module.count([](const auto& m) { return m.is_speed(); }), 1u) << "the second speed is withdrawn";
+}
+
+TEST(Coasting, WithdrawsASpeedThatWaitsForCredit) {
+  Settings settings;
+  settings.credit_bytes = 18;
+  Wire wire(settings);
+  wire.connect();
+  wire.latency = 30ms;
+  wire.run_for(60ms);
+  const auto speeds = [&] { return wire.module.count([](const auto& m) { return m.is_speed(); }); };
+  for (int i = 0; i < 4; ++i) wire.spin(100 + i);
+  const auto sent = speeds();
+  EXPECT_LT(sent, 4u);
+  wire.coast();
+  wire.run_for(500ms);
+  EXPECT_EQ(speeds(), sent);
+  EXPECT_TRUE(wire.module.last_motion()->is_coast());
+  EXPECT_TRUE(wire.session.coasting());
+}
+
+TEST(Coasting, IsConfirmedOnlyByAQuestionPutAfterwards) {
+  Wire wire;
+  wire.connect();
+  wire.spin(300);
+  wire.latency = 10ms;
+  const auto asked_mode = [&] {
+    return wire.module.count([](const auto& m) { return m.type == 50 && m.sub == 0 && m.access == 0; });
+  };
+  wire.module.values[{50, 0}] = fake::u8(5);  // an answer that is already on its way, whatever it means
+  const auto before = asked_mode();
+  while (asked_mode() == before) wire.run_for(1ms);
+  wire.coast();
+  EXPECT_EQ(asked_mode(), before + 1) << "the older question is still open";
+  wire.run_for(11ms);
+  EXPECT_FALSE(wire.session.coasting());
+  EXPECT_EQ(asked_mode(), before + 2);
+  wire.run_for(10ms);
+  EXPECT_TRUE(wire.session.coasting());
+}
+
+TEST(Coasting, IsRepeatedUntilConfirmed) {
+  Wire wire;
+  wire.connect();
+  wire.spin(300);
+  wire.run_for(50ms);
+  wire.module.ignore_sets = true;
+  wire.coast();
+  wire.run_for(250ms);
+  EXPECT_FALSE(wire.session.coasting());
+  wire.module.ignore_sets = false;
+  wire.run_for(150ms);
+  EXPECT_TRUE(wire.session.coasting());
+  EXPECT_EQ(wire.session.state(), State::ready);
+}
+
+TEST(Coasting, FallsSilentWhenUnconfirmedSoThatTheModuleTimesOut) {
+  Wire wire;
+  wire.connect();
+  wire.spin(300);
+  wire.run_for(50ms);
+  wire.module.ignore_sets = true;
+  wire.coast();
+  wire.run_for(6s);
+  EXPECT_EQ(wire.session.state(), State::failed);
+  Duration longest{0};
+  for (std::size_t i = 1; i < wire.batches.size(); ++i) {
+    longest = std::max(longest, wire.batches[i].first - wire.batches[i - 1].first);
+  }
+  EXPECT_GT(longest, 500ms);
+  EXPECT_GT(wire.session.counters().unconfirmed_coasts, 1u) << "and it goes on trying";
+  wire.module.ignore_sets = false;
+  wire.run_for(3s);
+  EXPECT_TRUE(wire.session.coasting());
+  EXPECT_EQ(wire.session.state(), State::failed);
+}
+
+TEST(Coasting, IsWhatAModuleThatStoppedAnsweringHearsLast) {
+  Wire wire;
+  wire.connect();
+  wire.spin(300);
+  wire.run_for(100ms);
+  wire.module.mute = true;
+  ASSERT_TRUE(wire.run_to_state(State::failed, 3s));
+  EXPECT_NE(wire.session.failure().find("stopped answering"), std::string::npos);
+  EXPECT_TRUE(wire.module.last_motion()->is_coast());
+  EXPECT_THROW(wire.spin(300), std::logic_error);
+}
+
+TEST(Telemetry, ReadsSpeedEveryCycleAndTheOthersInTurn) {
+  Wire wire;
+  wire.connect();
+  wire.spin(1000);
+  wire.run_for(200ms);
+  wire.readings();
+  wire.run_for(3s);
+  std::map<Quantity, int> count;
+  std::map<Quantity, double> value;
+  for (const Reading& reading : wire.readings()) {
+    ++count[reading.quantity];
+    value[reading.quantity] = reading.value;
+  }
+  EXPECT_NEAR(count[Quantity::speed], 150, 1);
+  for (int i = 1; i < kQuantities; ++i) EXPECT_NEAR(count[static_cast<Quantity>(i)], 25, 1) << i;
+  EXPECT_EQ(value[Quantity::speed], 1000);
+  EXPECT_EQ(value[Quantity::supply_voltage], 12.5);
+  EXPECT_EQ(value[Quantity::supply_current], 3.25);
+  EXPECT_EQ(value[Quantity::motor_current], 10);
+  EXPECT_EQ(value[Quantity::coil_temperature], 55.25);
+  EXPECT_EQ(value[Quantity::derate], 1.0);
+  EXPECT_EQ(value[Quantity::drive_mode], 3);
+}
+
+TEST(Telemetry, AsksBothOfACycleInOneBatch) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(100ms);
+  wire.batches.clear();
+  wire.run_for(1s);
+  EXPECT_EQ(wire.batches.size(), 50u);
+  for (const auto& [time, bytes] : wire.batches) EXPECT_EQ(bytes.size(), 14u);
+}
+
+TEST(Telemetry, IsNotDoubledWhenTheModuleIsSlow) {
+  Wire wire;
+  wire.connect();
+  wire.latency = 55ms;
+  wire.run_for(100ms);
+  wire.module.heard.clear();
+  wire.run_for(1s);
+  const auto speeds = wire.module.count([](const auto& m) { return m.type == 50 && m.sub == 13; });
+  EXPECT_LE(speeds, 1000u / 55 + 1);
+  EXPECT_GE(speeds, 15u);
+  EXPECT_GT(wire.session.counters().skipped_polls, 0u);
+}
+
+TEST(Telemetry, StaysInsideTheCreditWindow) {
+  for (const std::size_t credit : {18u, 21u, 63u}) {
+    Settings settings;
+    settings.credit_bytes = credit;
+    settings.telemetry_hz = 1000;
+    Wire wire(settings);
+    wire.latency = 9ms;
+    std::size_t most = 0;
+    wire.spoil = [&](Bytes&, Duration&) { most = std::max(most, 7 * (wire.replies_on_their_way() + 1)); };
+    wire.session.connect(wire.now);
+    for (int i = 0; i < 3000; ++i) {
+      wire.run_for(100us);
+      if (wire.session.state() == State::ready && i % 50 == 0) wire.spin(100 + i);
+    }
+    EXPECT_LE(most, credit);
+    EXPECT_GE(most, std::min<std::size_t>(credit, 42) / 7 * 7) << "pipelined";
+  }
+}
+
+TEST(Telemetry, StampsTheMiddleLessTheTimeOnTheWire) {
+  Settings settings;
+  settings.wire_byte_time = 100us;
+  Wire wire(settings);
+  wire.latency = 7 * 100us + 11 * 100us + 2ms;
+  wire.connect();
+  wire.run_for(1s);
+  wire.readings();
+  wire.batches.clear();
+  wire.run_for(20ms);
+  ASSERT_EQ(wire.batches.size(), 1u);
+  wire.run_for(10ms);
+  const auto readings = wire.readings();
+  EXPECT_TRUE(std::any_of(readings.begin(), readings.end(), [&](const Reading& reading) {
+    return reading.quantity == Quantity::speed && reading.time == wire.batches[0].first + 700us + 1ms &&
+           reading.uncertainty == 1ms;
+  }));
+}
+
+TEST(Telemetry, UncertaintyCoversTheMomentOfMeasurement) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(30ms);
+  std::mt19937 random(5);
+  wire.spoil = [&](Bytes& reply, Duration& delay) {
+    delay = std::chrono::microseconds(20 + random() % 9000);
+    const Duration until_measured = delay * (random() % 11) / 10;
+    if (is_reply(reply, 50, 13)) {
+      reply = fake::message(50, 13, 3, 0, fake::f32(to_seconds(wire.now + until_measured)));
+    }
+  };
+  wire.run_for(30ms);
+  wire.readings();
+  wire.run_for(2s);
+  int checked = 0;
+  for (const Reading& reading : wire.readings()) {
+    if (reading.quantity != Quantity::speed) continue;
+    EXPECT_LE(std::abs(reading.value - to_seconds(reading.time)), to_seconds(reading.uncertainty) + 1e-6);
+    ++checked;
+  }
+  EXPECT_GT(checked, 90);
+}
+
+TEST(Telemetry, KeepsABoundedNumberOfReadings) {
+  Settings settings;
+  settings.telemetry_hz = 10000;
+  Wire wire(settings);
+  wire.latency = 10us;
+  wire.connect();
+  wire.run_for(1s);
+  EXPECT_EQ(wire.readings().size(), 4096u);
+  EXPECT_GT(wire.session.counters().dropped_readings, 0u);
+}
+
+TEST(Replies, ThatComeLateNeverAnswerTheNextRequest) {
+  for (const double factor : {1.01, 1.5, 1.99}) {
+    Wire wire;
+    wire.connect();
+    wire.run_for(500ms);
+    wire.readings();
+    bool delayed = false;
+    wire.spoil = [&](Bytes& reply, Duration& delay) {
+      if (delayed || !is_reply(reply, 50, 13)) return;
+      delayed = true;
+      reply = fake::message(50, 13, 3, 0, fake::f32(999));
+      delay = from_seconds(factor * to_seconds(kTimeout));
+    };
+    wire.run_for(2s);
+    EXPECT_EQ(wire.session.counters().late_replies, 1u) << factor;
+    EXPECT_EQ(wire.session.counters().timeouts, 1u);
+    const auto speeds = wire.values(Quantity::speed);
+    EXPECT_EQ(std::count(speeds.begin(), speeds.end(), 999.0), 0) << factor;
+    EXPECT_GT(speeds.size(), 80u) << "and polling goes on";
+  }
+}
+
+TEST(Replies, OfALineThatStallsInOrderAreNeverTakenForLaterOnes) {
+  // A true serial line keeps the order: while it stalls, nothing passes. Each value tells when it was asked.
+  std::mt19937 random(11);
+  Wire wire;
+  wire.connect();
+  wire.run_for(200ms);
+  wire.readings();
+  Instant line_free{0};
+  wire.spoil = [&](Bytes& reply, Duration& delay) {
+    if (is_reply(reply, 50, 13)) reply = fake::message(50, 13, 3, 0, fake::f32(to_seconds(wire.now)));
+    Instant at = wire.now + 2ms;
+    if (random() % 40 == 0) at += std::chrono::milliseconds(random() % 380);
+    line_free = std::max(line_free, at);
+    delay = line_free - wire.now;
+  };
+  wire.run_for(60s);
+  EXPECT_GT(wire.session.counters().late_replies, 5u);
+  int checked = 0;
+  for (const Reading& reading : wire.readings()) {
+    if (reading.quantity != Quantity::speed) continue;
+    ++checked;
+    const Instant asked = from_seconds(reading.value);
+    EXPECT_LT(std::abs(to_seconds(asked - (reading.time - reading.uncertainty))), 1e-4) << checked;
+  }
+  EXPECT_GT(checked, 100);
+}
+
+TEST(Replies, LeftUnreadByAHostThatSleptAreNotTakenForLaterOnes) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(500ms);
+  Session& session = wire.session;
+  while (session.output().empty()) {
+    wire.now = session.deadline();
+    session.advance(wire.now);
+  }
+  session.sent(session.output().size());
+  wire.now += 800ms;
+  session.advance(wire.now);  // the timers come first, then the bytes of before
+  wire.readings();
+  session.receive(fake::message(50, 13, 3, 0, fake::f32(111)), wire.now);
+  EXPECT_TRUE(wire.values(Quantity::speed).empty());
+  EXPECT_EQ(session.counters().late_replies, 1u);
+}
+
+TEST(Replies, OfAnotherModuleAreRejectedAndCounted) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(100ms);
+  wire.readings();
+  wire.spoil = [](Bytes& reply, Duration&) {
+    if (is_reply(reply, 50, 13)) reply = fake::message(50, 13, 3, 5, fake::f32(999));
+  };
+  wire.run_for(25ms);
+  wire.readings();
+  wire.run_for(500ms);
+  EXPECT_TRUE(wire.values(Quantity::speed).empty());
+  EXPECT_GT(wire.session.counters().wrong_module, 0u);
+}
+
+TEST(Replies, OfTheWrongLengthAreCountedAndNotStored) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(100ms);
+  wire.readings();
+  for (const Bytes& data : {Bytes{}, Bytes{1}, Bytes{1, 2, 3, 4, 5}, Bytes(57, 0)}) {
+    const auto before = wire.session.counters().wrong_length;
+    wire.module.values[{50, 13}] = data;
+    wire.run_for(25ms);
+    wire.readings();
+    wire.run_for(200ms);
+    EXPECT_TRUE(wire.values(Quantity::speed).empty()) << data.size();
+    EXPECT_GT(wire.session.counters().wrong_length, before);
+  }
+}
+
+TEST(Replies, ThatAreNoNumbersAreCountedAndNotStored) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(100ms);
+  wire.readings();
+  wire.module.values[{50, 13}] = fake::u32(0x7FC00000);
+  wire.run_for(100ms);
+  wire.module.values[{50, 13}] = fake::u32(0xFF800000);
+  wire.run_for(100ms);
+  for (const Reading& reading : wire.readings()) EXPECT_TRUE(std::isfinite(reading.value));
+  EXPECT_GE(wire.session.counters().bad_values, 8u);
+}
+
+TEST(Replies, ToNothingThatWasAskedAreCounted) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(100ms);
+  const auto before = wire.session.counters();
+  wire.deliver(fake::message(50, 37, 3, 0, fake::f32(1)));
+  wire.deliver(fake::message(50, 13, 0, 0));  // an echo of our own request
+  wire.deliver(fake::message(200, 1, 3, 0));
+  wire.deliver(fake::frame(7, {}));
+  wire.run_for(1ms);
+  EXPECT_EQ(wire.session.counters().unasked - before.unasked, 4u);
+}
+
+TEST(Resync, BringsTheNextReplyWithinOneTimeoutAfterAFalseHeader) {
+  for (const std::uint8_t length : {0x0A, 0x1E, 0x3B}) {
+    Wire wire;
+    wire.connect();
+    wire.run_for(100ms);
+    wire.readings();
+    const auto timeouts = wire.session.counters().timeouts;
+    wire.deliver({0x55, length, 0x32});
+    wire.run_for(kTimeout);
+    EXPECT_GE(wire.values(Quantity::speed).size(), 4u) << int{length};
+    EXPECT_EQ(wire.session.counters().timeouts, timeouts);
+  }
+}
+
+TEST(Resync, WaitsForTheSecondHalfOfAFrameFromASlowAdapter) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(100ms);
+  wire.readings();
+  wire.spoil = [&](Bytes& reply, Duration& delay) {
+    if (!is_reply(reply, 50, 13)) return;
+    wire.deliver(Bytes(reply.begin() + 5, reply.end()), 16ms);
+    reply.resize(5);
+    delay = 1us;
+  };
+  wire.module.silent = {{69, 0}, {69, 1}, {50, 36}, {83, 0}, {50, 41}, {50, 0}};
+  wire.run_for(200ms);
+  EXPECT_GE(wire.values(Quantity::speed).size(), 9u);
+  EXPECT_EQ(wire.session.counters().resyncs, 0u);
+}
+
+TEST(Soak, ARuinedLineNeverBringsAFalseValueAndNeverMotionAfterACoast) {
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    std::mt19937 random(seed);
+    const auto chance = [&](int in) { return static_cast<int>(random() % static_cast<unsigned>(in)) == 0; };
+    Wire wire;
+    wire.connect();
+    wire.spoil = [&](Bytes& reply, Duration& delay) {
+      if (chance(20)) reply[random() % reply.size()] ^= static_cast<std::uint8_t>(1u << random() % 8);
+      if (chance(30)) reply.resize(random() % reply.size());
+      if (chance(30)) reply.insert(reply.begin(), {0x55, static_cast<std::uint8_t>(random() % 64), 0x32});
+      if (chance(40)) delay += std::chrono::milliseconds(random() % 90);
+      if (chance(60)) reply.clear();
+    };
+    wire.module.values[{50, 13}] = fake::f32(0);
+    for (int i = 0; i < 60; ++i) {
+      if (wire.session.state() == State::ready && chance(3)) wire.spin(100);
+      if (chance(4)) wire.coast();
+      wire.run_for(std::chrono::milliseconds(random() % 40));
+      if (!wire.session.spinning() && wire.module.last_motion() != nullptr) {
+        ASSERT_TRUE(wire.module.last_motion()->is_coast()) << "seed " << seed;
+      }
+    }
+    wire.coast();
+    wire.spoil = nullptr;
+    wire.run_for(4s);
+    EXPECT_TRUE(wire.module.last_motion()->is_coast()) << "seed " << seed;
+    EXPECT_TRUE(wire.session.coasting()) << "seed " << seed;
+    for (const Reading& reading : wire.readings()) {
+      ASSERT_TRUE(reading.quantity != Quantity::speed || reading.value == 0 || reading.value == 100)
+          << "seed " << seed << ": " << reading.value;
+      ASSERT_TRUE(reading.quantity != Quantity::supply_voltage || reading.value == 12.5) << "seed " << seed;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace kphi::iq

@@ -1,0 +1,50 @@
+// Any bytes, in any chunks: the parser must account for each byte, and a session fed with them must never move the
+// motor.
+#include <cstdlib>
+
+#include "drivers/iq/session.hpp"
+
+namespace {
+
+void require(bool condition) {
+  if (!condition) std::abort();
+}
+
+void parse(std::span<const std::uint8_t> bytes, std::size_t chunk) {
+  kphi::iq::Parser parser;
+  std::uint64_t in_packets = 0;
+  const auto sink = [&](const kphi::iq::Packet& packet, std::size_t) {
+    require(packet.length <= kphi::iq::kMaxPayload);
+    in_packets += packet.length + kphi::iq::kFrameOverhead;
+  };
+  for (std::size_t at = 0; at < bytes.size(); at += chunk) {
+    parser.push(bytes.subspan(at, std::min(chunk, bytes.size() - at)), sink);
+  }
+  while (parser.partial()) parser.abandon(sink);
+  require(parser.counters().bytes == bytes.size());
+  require(parser.counters().discarded_bytes + in_packets == bytes.size());
+}
+
+void converse(std::span<const std::uint8_t> bytes, std::size_t chunk) {
+  kphi::iq::Session session{kphi::iq::Settings{}};
+  kphi::Instant now{0};
+  session.connect(now);
+  for (std::size_t at = 0; at < bytes.size(); at += chunk) {
+    session.receive(bytes.subspan(at, std::min(chunk, bytes.size() - at)), now);
+    session.sent(session.output().size());
+    now = std::max(now + std::chrono::milliseconds(1), std::min(session.deadline(), now + std::chrono::seconds(1)));
+    session.advance(now);
+    require(session.deadline() > now);
+    require(!session.spinning());
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size < 1) return 0;
+  const std::size_t chunk = data[0] % 70 + 1;
+  parse({data + 1, size - 1}, chunk);
+  converse({data + 1, size - 1}, chunk);
+  return 0;
+}
