@@ -45,6 +45,12 @@ void write_all(int fd, const std::string& text) {
 
 void FileLayer::before_write(std::uint64_t) {}
 
+void FileLayer::reserve(int descriptor, std::uint64_t offset, std::uint64_t bytes) {
+  const int status =
+      ::fallocate(descriptor, FALLOC_FL_KEEP_SIZE, static_cast<off_t>(offset), static_cast<off_t>(bytes));
+  if (status != 0 && (errno == ENOSPC || errno == EDQUOT)) fail("fallocate");
+}
+
 void FileLayer::sync_data(int descriptor) {
   if (::fdatasync(descriptor) != 0) fail("fdatasync");
 }

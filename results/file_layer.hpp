@@ -14,6 +14,8 @@ class FileLayer {
   virtual ~FileLayer() = default;
   /// Called before `bytes` go to a file; throws to refuse them.
   virtual void before_write(std::uint64_t bytes);
+  /// Gives `bytes` from `offset` on a place on the disk without making the file longer, where the file system can.
+  virtual void reserve(int descriptor, std::uint64_t offset, std::uint64_t bytes);
   /// fdatasync.
   virtual void sync_data(int descriptor);
   /// fsync of the folder: makes a creation or a renaming in it last.

@@ -1,6 +1,8 @@
 #include "results/hdf5.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <bit>
@@ -164,6 +166,22 @@ int descriptor_of(const Handle& file) {
   void* descriptor = nullptr;
   check(H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &descriptor), "file descriptor");
   return *static_cast<int*>(descriptor);
+}
+
+std::uint64_t size_of(const Handle& file) {
+  hsize_t size = 0;
+  check(H5Fget_filesize(file.get(), &size), "file size");
+  return size;
+}
+
+void sever(const Handle& file) noexcept {
+  void* descriptor = nullptr;
+  const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+  if (nowhere >= 0 && H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &descriptor) >= 0) {
+    ::dup2(nowhere, *static_cast<int*>(descriptor));
+  }
+  if (nowhere >= 0) ::close(nowhere);
+  H5Eclear2(H5E_DEFAULT);
 }
 
 void write_attribute(const Handle& object, const char* name, const std::string& value) {

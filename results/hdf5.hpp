@@ -44,6 +44,10 @@ void check(herr_t status, const std::string& doing);
 [[nodiscard]] Handle open_group(const Handle& parent, const char* name);
 /// The file's descriptor, for fdatasync.
 [[nodiscard]] int descriptor_of(const Handle& file);
+/// Bytes the file has or will have when HDF5 has written what it holds back.
+[[nodiscard]] std::uint64_t size_of(const Handle& file);
+/// From here on nothing HDF5 writes reaches the file; it can then be closed without changing a byte.
+void sever(const Handle& file) noexcept;
 
 // Attributes. Writing an existing one of the same kind replaces its value in place. Strings are UTF-8.
 void write_attribute(const Handle& object, const char* name, const std::string& value);

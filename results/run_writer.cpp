@@ -188,6 +188,20 @@ struct RunWriter::File {
   CommandSeries commands;
 };
 
+/// Everything that touches the open file goes through here. After the first failure nothing more may reach the disk:
+/// what HDF5 would write on closing, half of it refused, can spoil what the last sync left.
+template <class Action>
+void RunWriter::guarded(Action&& action) {
+  if (!file_) throw RecordError(path_.string() + ": is closed: the recording has ended, see the first error");
+  try {
+    on_disk(path_, action);
+  } catch (...) {
+    hdf5::sever(file_->root);
+    file_.reset();
+    throw;
+  }
+}
+
 RunWriter::RunWriter(std::filesystem::path final_path, const RunHeader& header, FileLayer& files)
     : final_path_(std::move(final_path)), path_(prepared_part(final_path_, files)), header_(header), files_(files) {
   file_ = std::make_unique<File>(path_, header, files);
@@ -197,22 +211,36 @@ RunWriter::RunWriter(std::filesystem::path final_path, const RunHeader& header, 
 
 RunWriter::~RunWriter() = default;
 
-void RunWriter::append(std::span<const LoadCellRecord> records) { file_->load_cell.append(records); }
-
-void RunWriter::append(std::span<const MotorReading> readings) {
-  for (const MotorReading& reading : readings)
-    file_->channels.at(static_cast<std::size_t>(reading.channel))->append(reading);
+void RunWriter::append(std::span<const LoadCellRecord> records) {
+  guarded([&] { file_->load_cell.append(records); });
 }
 
-void RunWriter::mark(const PhaseMark& mark) { file_->commands.append(mark); }
+void RunWriter::append(std::span<const MotorReading> readings) {
+  guarded([&] {
+    for (const MotorReading& reading : readings) {
+      file_->channels.at(static_cast<std::size_t>(reading.channel))->append(reading);
+    }
+  });
+}
+
+void RunWriter::mark(const PhaseMark& mark) {
+  guarded([&] { file_->commands.append(mark); });
+}
 
 void RunWriter::sync() {
-  on_disk(path_, [&] {
-    files_.before_write(0);
-    file_->flush();
-    hdf5::check(H5Fflush(file_->root.get(), H5F_SCOPE_GLOBAL), path_.string() + ": flush");
-    files_.sync_data(hdf5::descriptor_of(file_->root));
-  });
+  guarded([&] { secure(); });
+}
+
+void RunWriter::secure() {
+  constexpr std::uint64_t kMetadata = 256u << 10;  // more than one flush adds
+  file_->flush();
+  // With room reserved the flush of the metadata, which must not stop halfway, cannot meet a full disk.
+  const int descriptor = hdf5::descriptor_of(file_->root);
+  const std::uint64_t size = hdf5::size_of(file_->root);
+  files_.reserve(descriptor, reserved_, size + kMetadata - reserved_);
+  hdf5::check(H5Fflush(file_->root.get(), H5F_SCOPE_GLOBAL), path_.string() + ": flush");
+  files_.sync_data(descriptor);
+  reserved_ = size;
 }
 
 std::uint64_t RunWriter::samples() const { return file_ ? file_->load_cell.rdt.rows() : 0; }
@@ -229,14 +257,15 @@ void RunWriter::close() {
 }
 
 std::string RunWriter::finish(Outcome outcome, const std::string& reason, const SampleAccount& account) {
-  if (!file_) throw RecordError(path_.string() + ": is closed already");
-  const Handle& root = file_->root;
-  for_each_count(account, [&](const char* name, const auto& value) { hdf5::write_attribute(root, name, value); });
-  hdf5::write_attribute(root, "outcome", std::string(outcome_name(outcome)));
-  hdf5::write_attribute(root, "outcome_reason", reason);
-  hdf5::write_attribute(root, "attributes_sha256", attributes_digest(header_, account, outcome, reason));
-  hdf5::write_attribute(root, "complete", std::int32_t{outcome == Outcome::complete});
-  sync();
+  guarded([&] {
+    const Handle& root = file_->root;
+    for_each_count(account, [&](const char* name, const auto& value) { hdf5::write_attribute(root, name, value); });
+    hdf5::write_attribute(root, "outcome", std::string(outcome_name(outcome)));
+    hdf5::write_attribute(root, "outcome_reason", reason);
+    hdf5::write_attribute(root, "attributes_sha256", attributes_digest(header_, account, outcome, reason));
+    hdf5::write_attribute(root, "complete", std::int32_t{outcome == Outcome::complete});
+    secure();
+  });
   close();
 
   const Verification verification = verify_run(path_);
@@ -248,9 +277,8 @@ std::string RunWriter::finish(Outcome outcome, const std::string& reason, const 
   const std::filesystem::path target =
       outcome == Outcome::complete ? final_path_ : free_name(without_ending(final_path_) + ".aborted", ".h5");
   on_disk(target, [&] {
-    std::filesystem::permissions(path_,
-                                 std::filesystem::perms::owner_write | std::filesystem::perms::group_write |
-                                     std::filesystem::perms::others_write,
+    using std::filesystem::perms;
+    std::filesystem::permissions(path_, perms::owner_write | perms::group_write | perms::others_write,
                                  std::filesystem::perm_options::remove);
     files_.rename(path_, target);
     path_ = target;

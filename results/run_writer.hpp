@@ -4,6 +4,7 @@
 // One thread at a time.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <span>
@@ -46,12 +47,16 @@ class RunWriter {
 
  private:
   struct File;
+  template <class Action>
+  void guarded(Action&& action);
+  void secure();
   void close();
   std::filesystem::path final_path_;
   std::filesystem::path path_;
   RunHeader header_;
   FileLayer& files_;
   std::unique_ptr<File> file_;
+  std::uint64_t reserved_ = 0;  ///< bytes of the file that surely have their place on disk
 };
 
 }  // namespace kphi::results

@@ -1,0 +1,357 @@
+// Numbers, steps.csv, SHA-256, the journal and the campaign folder.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <bit>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+
+#include "profiles/configuration_error.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/campaign_verification.hpp"
+#include "results/journal.hpp"
+#include "results/number.hpp"
+#include "results/record_error.hpp"
+#include "results/sha256.hpp"
+#include "results/steps_csv.hpp"
+#include "test/results/synthetic_run.hpp"
+
+namespace kphi::results {
+namespace {
+
+using test::TemporaryFolder;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+template <class Action>
+std::string error_of(Action&& action) {
+  try {
+    action();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+/// Any bit pattern, so that all magnitudes occur.
+double double_of_bits(std::uint64_t bits) { return std::bit_cast<double>(bits); }
+
+// ---- numbers ----
+
+TEST(YamlNumber, LooksLikeAFloatToEveryReader) {
+  EXPECT_EQ(yaml_number(45), "45.0");
+  EXPECT_EQ(yaml_number(0), "0.0");
+  EXPECT_EQ(yaml_number(1e-6), "1.0e-06");
+  EXPECT_EQ(yaml_number(1.35e-6), "1.35e-06");
+  EXPECT_EQ(yaml_number(1e300), "1.0e+300");
+  EXPECT_EQ(yaml_number(-0.5), "-0.5");
+}
+
+TEST(YamlNumber, RefusesWhatIsNoNumber) {
+  EXPECT_THROW((void)yaml_number(std::nan("")), std::invalid_argument);
+  EXPECT_THROW((void)yaml_number(std::numeric_limits<double>::infinity()), std::invalid_argument);
+}
+
+TEST(Number, ReadsBackAsTheSameBits) {
+  EXPECT_TRUE(rc::check([](std::uint64_t bits) {
+    const double value = double_of_bits(bits);
+    RC_PRE(std::isfinite(value));
+    RC_ASSERT(std::bit_cast<std::uint64_t>(*parse_double(shortest(value))) == bits);
+    const std::string yaml = yaml_number(value);
+    RC_ASSERT(std::bit_cast<std::uint64_t>(*parse_double(yaml)) == bits);
+    RC_ASSERT(yaml.find('.') != std::string::npos && yaml.find('.') < yaml.find('e'));
+  }));
+}
+
+TEST(Number, ParsesNothingButANumber) {
+  EXPECT_EQ(parse_double("1.5"), 1.5);
+  for (const char* text : {"", " 1", "1 ", "1,5", "one", "0x10"}) EXPECT_FALSE(parse_double(text)) << text;
+}
+
+TEST(Sha256, KnowsTheStandardsExamples) {  // FIPS 180-2, appendix B.1
+  EXPECT_EQ(sha256("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(sha256(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  const TemporaryFolder folder;
+  std::ofstream(folder / "abc") << "abc";
+  EXPECT_EQ(sha256_of_file(folder / "abc"), sha256("abc"));
+  EXPECT_THROW((void)sha256_of_file(folder / "nothing"), RecordError);
+}
+
+// ---- steps.csv ----
+
+std::vector<StepMean> arbitrary_steps() {
+  return *rc::gen::container<std::vector<StepMean>>(rc::gen::exec([] {
+    const auto number = [] {
+      const double value = double_of_bits(*rc::gen::arbitrary<std::uint64_t>());
+      return std::isnan(value) ? std::numeric_limits<double>::quiet_NaN() : value;
+    };
+    StepMean s;
+    s.propeller = *rc::gen::string<std::string>();
+    std::erase(s.propeller, '\0');
+    std::erase(s.propeller, '\r');
+    s.blades = *rc::gen::arbitrary<int>();
+    s.step = *rc::gen::arbitrary<int>();
+    s.repetition = *rc::gen::arbitrary<int>();
+    s.thrust_samples = *rc::gen::arbitrary<std::uint64_t>();
+    s.speed_n = *rc::gen::arbitrary<std::uint64_t>();
+    s.thrust_n = number();
+    s.speed_rad_s = number();
+    s.supply_voltage_v = number();
+    s.window_end_s = number();
+    s.doubts = *rc::gen::inRange<std::uint32_t>(0, 128);
+    return s;
+  }));
+}
+
+TEST(StepsCsv, ReadsBackAsWritten) {
+  EXPECT_TRUE(rc::check([] {
+    const std::vector<StepMean> steps = arbitrary_steps();
+    const std::string text = format_steps(steps);
+    const std::vector<StepMean> again = parse_steps(text, "steps.csv");
+    RC_ASSERT(again.size() == steps.size());
+    RC_ASSERT(format_steps(again) == text);
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+      RC_ASSERT(again[i].propeller == steps[i].propeller);
+      RC_ASSERT(again[i].doubts == steps[i].doubts);
+      const bool both_missing = std::isnan(steps[i].thrust_n) && std::isnan(again[i].thrust_n);
+      RC_ASSERT(both_missing || again[i].thrust_n == steps[i].thrust_n);
+    }
+  }));
+}
+
+TEST(StepsCsv, IsPlainAndShort) {
+  StepMean step;
+  step.propeller = "5x3";
+  step.diameter_in = 5;
+  step.thrust_n = 0.1;
+  step.supply_voltage_v = std::nan("");
+  step.doubts = 5;
+  const std::string text = format_steps(std::span(&step, 1));
+  EXPECT_THAT(text, StartsWith("propeller,blades,diameter_in,occlusion_deg,repetition,step,commanded_speed_rad_s,"));
+  EXPECT_THAT(text, HasSubstr("\n5x3,0,5,0,0,0,0,0,0,0,0.1,0,0,0,0,0,,0,0,0,0,0,speed_not_reached+saturated\n"));
+  EXPECT_EQ(text.find('\r'), std::string::npos);
+}
+
+TEST(StepsCsv, SaysWhereItDoesNotUnderstand) {
+  StepMean step;
+  step.propeller = "5x3";
+  const std::string good = format_steps(std::vector<StepMean>(3, step));
+  const auto complaint = [](const std::string& text) {
+    return error_of([&] { (void)parse_steps(text, "steps.csv"); });
+  };
+  EXPECT_EQ(complaint(good), "no error");
+  EXPECT_THAT(complaint(""), StartsWith("steps.csv:1: "));
+  EXPECT_THAT(complaint("a,b\n"), StartsWith("steps.csv:1: "));
+  EXPECT_THAT(complaint(good + "5x3,1\n"), StartsWith("steps.csv:5: 2 fields where the header has 23"));
+  std::string bad = good;
+  bad.replace(bad.rfind("5x3,0,0"), 7, "5x3,0,x");
+  EXPECT_THAT(complaint(bad), StartsWith("steps.csv:4: diameter_in: \"x\" is no number"));
+  bad = good;
+  bad.insert(bad.size() - 1, "tired");
+  EXPECT_THAT(complaint(bad), AllOf(StartsWith("steps.csv:4: doubts"), HasSubstr("unknown doubt \"tired\"")));
+  EXPECT_THROW((void)parse_steps("", "steps.csv"), ConfigurationError);
+}
+
+TEST(StepsCsv, FilesAreReplacedWhole) {
+  const TemporaryFolder folder;
+  const StepMean step;
+  write_steps(folder / "steps.csv", std::span(&step, 1));
+  write_steps(folder / "steps.csv", {});
+  EXPECT_THAT(read_steps(folder / "steps.csv"), IsEmpty());
+  EXPECT_FALSE(std::filesystem::exists(folder / "steps.csv.part"));
+  EXPECT_THROW((void)read_steps(folder / "none.csv"), RecordError);
+}
+
+TEST(Doubts, HaveNamesBothWays) {
+  EXPECT_EQ(doubt_names(0), "");
+  EXPECT_EQ(doubt_names(127), "speed_not_reached+speed_unsteady+saturated+lost_samples+derated+few_samples+bad_status");
+  for (std::uint32_t doubts = 0; doubts < 128; ++doubts) EXPECT_EQ(doubts_from_names(doubt_names(doubts)), doubts);
+}
+
+// ---- journal ----
+
+class JournalFile : public ::testing::Test {
+ protected:
+  void write(int entries) {
+    Journal journal(path_);
+    for (int i = 0; i < entries; ++i) journal.append("step", {{"i", i}}, 1000 * i, "2021-05-30T00:00:00Z");
+  }
+  [[nodiscard]] std::string text() const { return read_text(path_); }
+  void put(const std::string& text) const { std::ofstream(path_, std::ios::binary) << text; }
+  TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "journal.jsonl";
+};
+
+TEST_F(JournalFile, TellsWhatWasToldInOrder) {
+  write(2);
+  {
+    Journal journal(path_);
+    EXPECT_EQ(journal.found().entries.size(), 2u);
+    journal.append(kRunAccepted, {{"file", "runs/a.h5"}, {"sha256", "00"}}, 5, "2021-05-30T00:00:05Z");
+    journal.append("end", nullptr, 6, "2021-05-30T00:00:06Z");
+  }
+  const JournalReading reading = read_journal(path_);
+  EXPECT_THAT(reading.problems, IsEmpty());
+  ASSERT_EQ(reading.entries.size(), 4u);
+  EXPECT_EQ(reading.entries[2].n, 3u);
+  EXPECT_EQ(reading.entries[2].event, "run_accepted");
+  EXPECT_EQ(reading.entries[2].data.at("file"), "runs/a.h5");
+  EXPECT_EQ(reading.entries[2].time_ns, 5);
+  for (std::size_t i = 0, at = 0; i < 4; ++i) {
+    const std::size_t end = text().find('\n', at);
+    EXPECT_TRUE(nlohmann::json::parse(text().substr(at, end - at)).is_object());
+    at = end + 1;
+  }
+}
+
+TEST_F(JournalFile, ATornLastLineIsToldAndCutOff) {
+  write(3);
+  const std::string whole = text();
+  const std::size_t last = whole.rfind('\n', whole.size() - 2) + 1;
+  for (std::size_t length = last + 1; length < whole.size(); ++length) {
+    put(whole.substr(0, length));
+    const JournalReading reading = read_journal(path_);
+    ASSERT_TRUE(reading.torn_last_line) << length;
+    ASSERT_EQ(reading.entries.size(), 2u);
+    ASSERT_THAT(reading.problems, IsEmpty());
+  }
+  {
+    Journal journal(path_);
+    EXPECT_TRUE(journal.found().torn_last_line);
+    journal.append("resumed", {}, 1, "2021-05-30T00:00:00Z");
+  }
+  const JournalReading reading = read_journal(path_);
+  EXPECT_FALSE(reading.torn_last_line);
+  ASSERT_EQ(reading.entries.size(), 3u);
+  EXPECT_EQ(reading.entries[2].event, "resumed");
+}
+
+TEST_F(JournalFile, EveryChangedByteShows) {
+  write(3);
+  const std::string whole = text();
+  for (std::size_t i = 0; i + 1 < whole.size(); ++i) {
+    std::string changed = whole;
+    changed[i] = static_cast<char>(changed[i] ^ 1);
+    put(changed);
+    ASSERT_FALSE(read_journal(path_).problems.empty()) << i;
+  }
+}
+
+TEST_F(JournalFile, ALostOrMovedLineShows) {
+  write(3);
+  const std::string whole = text();
+  const std::size_t a = whole.find('\n') + 1;
+  const std::size_t b = whole.find('\n', a) + 1;
+  put(whole.substr(0, a) + whole.substr(b));
+  EXPECT_THAT(read_journal(path_).problems, ElementsAre(HasSubstr("journal.jsonl:2: does not match its checksum")));
+  put(whole.substr(0, a) + whole.substr(b) + whole.substr(a, b - a));
+  EXPECT_FALSE(read_journal(path_).problems.empty());
+  EXPECT_THAT(error_of([&] { Journal journal(path_); }), HasSubstr("journal.jsonl:2"));
+}
+
+TEST_F(JournalFile, IsSyncedOncePerLineAndSaysWhenItCannotBe) {
+  class Counting : public FileLayer {
+   public:
+    void sync_data(int) override {
+      if (++syncs == 3) throw std::system_error(ENOSPC, std::generic_category());
+    }
+    int syncs = 0;
+  } files;
+  Journal journal(path_, files);
+  journal.append("a", {}, 0, "");
+  journal.append("b", {}, 0, "");
+  EXPECT_EQ(files.syncs, 2);
+  EXPECT_THAT(error_of([&] { journal.append("c", {}, 0, ""); }), StartsWith("disk full: "));
+}
+
+// ---- campaign folder ----
+
+TEST(CampaignFolder, NamesRunsSoThatTheySort) {
+  EXPECT_EQ(run_file_name("5x3", 90, 2), "5x3_phi090_rep2.h5");
+  EXPECT_EQ(run_file_name("5x3", 0, 1), "5x3_phi000_rep1.h5");
+  EXPECT_EQ(run_file_name("a/b", 22.5, 1), "a_b_phi022.5_rep1.h5");
+}
+
+TEST(CampaignFolder, IsNeverUsedTwice) {
+  const TemporaryFolder parent;
+  const auto a = CampaignFolder::create(parent.path(), "20210530T080000Z", "my campaign");
+  const auto b = CampaignFolder::create(parent.path(), "20210530T080000Z", "my campaign");
+  const auto c = CampaignFolder::create(parent.path(), "20210530T080000Z", "my campaign");
+  EXPECT_EQ(a.path().filename(), "20210530T080000Z_my_campaign");
+  EXPECT_EQ(b.path().filename(), "20210530T080000Z_my_campaign-2");
+  EXPECT_EQ(c.path().filename(), "20210530T080000Z_my_campaign-3");
+  EXPECT_TRUE(std::filesystem::is_directory(a.runs()));
+  EXPECT_TRUE(std::filesystem::is_directory(a.figures()));
+  EXPECT_THROW((void)CampaignFolder::open(parent.path()), RecordError);
+}
+
+TEST(CampaignFolder, ListsCompleteRunsInCampaignOrder) {
+  const TemporaryFolder parent;
+  const auto folder = CampaignFolder::create(parent.path(), "u", "c");
+  for (const double phi : {0.0, 90.0, 270.0}) {
+    for (const int rep : {1, 2, 10}) std::ofstream(folder.run("5x3", phi, rep)) << "x";
+  }
+  std::ofstream(folder.runs() / "5x3_phi045_rep1.aborted.h5") << "x";
+  std::ofstream(folder.runs() / "5x3_phi045_rep1.h5.part") << "x";
+  const std::vector<double> order{270, 0, 90};
+  std::vector<std::string> names;
+  for (const auto& path : folder.complete_runs(order)) names.push_back(path.filename().string());
+  EXPECT_THAT(names, ElementsAre("5x3_phi270_rep1.h5", "5x3_phi270_rep2.h5", "5x3_phi270_rep10.h5",
+                                 "5x3_phi000_rep1.h5", "5x3_phi000_rep2.h5", "5x3_phi000_rep10.h5",
+                                 "5x3_phi090_rep1.h5", "5x3_phi090_rep2.h5", "5x3_phi090_rep10.h5"));
+  EXPECT_EQ(folder.complete_runs().front().filename(), "5x3_phi000_rep1.h5");
+  EXPECT_EQ(folder.other_runs().size(), 2u);
+}
+
+class VerifiedCampaign : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string sha = test::write_run(run_, test::make_run({}));
+    Journal(folder_.journal())
+        .append(kRunAccepted, {{"file", "runs/" + run_.filename().string()}, {"sha256", sha}}, 0, "");
+  }
+  TemporaryFolder parent_;
+  CampaignFolder folder_ = CampaignFolder::create(parent_.path(), "u", "c");
+  std::filesystem::path run_ = folder_.run("5x3", 90, 2);
+};
+
+TEST_F(VerifiedCampaign, IsWholeAsItWasLeft) {
+  const CampaignVerification found = verify_campaign(folder_);
+  EXPECT_THAT(found.problems, IsEmpty());
+  EXPECT_EQ(found.runs, 1u);
+  EXPECT_EQ(found.entries, 1u);
+}
+
+TEST_F(VerifiedCampaign, EveryFlippedByteOfARunShows) {
+  std::filesystem::permissions(run_, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
+  const std::string whole = read_text(run_);
+  for (std::size_t at = 5; at < whole.size(); at += whole.size() / 12) {
+    std::string bytes = whole;
+    bytes[at] = static_cast<char>(bytes[at] ^ 0x10);
+    std::ofstream(run_, std::ios::binary) << bytes;
+    ASSERT_THAT(verify_campaign(folder_).problems,
+                Contains(HasSubstr("is not the file whose SHA-256 the journal holds")))
+        << at;
+  }
+}
+
+TEST_F(VerifiedCampaign, AMissingAndAnUnknownRunShow) {
+  std::filesystem::rename(run_, folder_.run("5x3", 90, 3));
+  const auto problems = verify_campaign(folder_).problems;
+  EXPECT_THAT(problems, Contains(HasSubstr("rep2.h5: is missing, the journal names it")));
+  EXPECT_THAT(problems, Contains(HasSubstr("rep3.h5: the journal holds no SHA-256 of it")));
+}
+
+TEST_F(VerifiedCampaign, WithoutItsJournalItIsNotWhole) {
+  std::filesystem::remove(folder_.journal());
+  EXPECT_THAT(verify_campaign(folder_).problems, Contains(HasSubstr("journal.jsonl: is missing")));
+}
+
+}  // namespace
+}  // namespace kphi::results
