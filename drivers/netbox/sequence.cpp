@@ -28,7 +28,7 @@ bool SequenceAccount::accept_unusual(const Record& record, Instant arrival) noex
   }
   const bool believable = plausible(ft_step, arrival);
   if (ft_step > 0 && believable) return accept_forward(record, arrival, rdt_step, ft_step);
-  if (begins_after_reboot(record, !believable)) {
+  if (!believable && confirms_reboot(record)) {
     ++counters_.reboots;
     return accept_first(record, arrival);
   }
@@ -76,15 +76,13 @@ bool SequenceAccount::plausible(std::int32_t ft_step, Instant arrival) const noe
   return device_seconds > -kLongestDelaySeconds && device_seconds < 2 * host_seconds + kLongestDelaySeconds;
 }
 
-bool SequenceAccount::begins_after_reboot(const Record& record, bool far_back) noexcept {
-  const bool continues =
-      backward_run_ > 0 && record.rdt_sequence == backward_rdt_ + 1 && record.ft_sequence == backward_ft_ + stride_;
-  backward_run_ = continues ? backward_run_ + 1 : 1;
-  backward_rdt_ = record.rdt_sequence;
-  backward_ft_ = record.ft_sequence;
-  // A box that booted anew within the longest delay looks like late records, until there are more than can be.
-  const double longest_late_run = kLongestDelaySeconds * device_rate_hz_ / stride_;
-  return backward_run_ >= 2 && (far_back || static_cast<double>(backward_run_) > longest_late_run);
+bool SequenceAccount::confirms_reboot(const Record& record) noexcept {
+  const bool confirms =
+      has_stray_ && record.rdt_sequence == stray_rdt_ + 1 && record.ft_sequence == stray_ft_ + stride_;
+  has_stray_ = true;
+  stray_rdt_ = record.rdt_sequence;
+  stray_ft_ = record.ft_sequence;
+  return confirms;
 }
 
 void SequenceAccount::add_host_drops(std::uint64_t datagrams, std::uint64_t records_per_datagram) noexcept {

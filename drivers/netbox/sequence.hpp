@@ -61,14 +61,14 @@ class SequenceAccount {
     last_rdt_ = record.rdt_sequence;
     last_ft_ = record.ft_sequence;
     last_arrival_ = arrival;
-    backward_run_ = 0;
+    has_stray_ = false;
   }
   bool accept_unusual(const Record& record, Instant arrival) noexcept;
   bool accept_forward(const Record& record, Instant arrival, std::int32_t rdt_step, std::int32_t ft_step) noexcept;
   bool refuse_backward(const Record& record, std::int32_t ft_step) noexcept;
   bool accept_first(const Record& record, Instant arrival) noexcept;
   bool plausible(std::int32_t ft_step, Instant arrival) const noexcept;
-  bool begins_after_reboot(const Record& record, bool far_back) noexcept;
+  bool confirms_reboot(const Record& record) noexcept;
   void count_lost(std::uint64_t records, const Gap& gap) noexcept;
   bool in_recent_gap(std::uint32_t ft) const noexcept;
 
@@ -80,8 +80,8 @@ class SequenceAccount {
   std::uint64_t host_credit_ = 0;  // records dropped by the socket and not yet found missing
   std::array<Gap, 16> gaps_{};
   std::uint64_t gap_count_ = 0;
-  std::uint32_t backward_rdt_ = 0, backward_ft_ = 0;
-  std::uint64_t backward_run_ = 0;  // records in a row that continue each other, but not the stream
+  bool has_stray_ = false;  // the last record was one that only a rebooted box can have sent
+  std::uint32_t stray_rdt_ = 0, stray_ft_ = 0;
   Counters counters_;
 };
 

@@ -1,0 +1,81 @@
+#include "drivers/netbox/status.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace kphi::netbox {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+TEST(Status, OnlyZeroAndALatchedMonitorConditionAreHealthy) {
+  EXPECT_TRUE(healthy(0));
+  EXPECT_TRUE(healthy(0x80010000));
+  EXPECT_FALSE(healthy(0x80000000));
+  EXPECT_FALSE(healthy(0x00010000));
+  for (unsigned bit = 0; bit < 31; ++bit) {
+    EXPECT_FALSE(healthy(1u << bit)) << bit;
+    EXPECT_FALSE(healthy(0x80000000u | 1u << bit) && bit != 16) << bit;
+    EXPECT_FALSE(healthy(0x80010000u | 1u << bit) && bit != 16) << bit;
+  }
+}
+
+TEST(Status, SaturationIsBit17) {
+  EXPECT_TRUE(saturated(0x80020000));
+  EXPECT_TRUE(saturated(0xffffffff));
+  EXPECT_FALSE(saturated(0x80010000));
+  EXPECT_FALSE(saturated(0x40000000));  // on an Ethernet Axia this is saturation
+  EXPECT_FALSE(saturated(0));
+}
+
+TEST(Status, NamesWhatIsSetMostSignificantFirst) {
+  EXPECT_THAT(names(0), IsEmpty());
+  EXPECT_THAT(names(0x80010000), ElementsAre("monitor condition latched"));
+  EXPECT_THAT(names(0x80020000), ElementsAre("transducer saturation or A/D error"));
+  EXPECT_THAT(names(0xC0000004), ElementsAre("CPU or RAM error", "internal temperature error"));
+}
+
+TEST(Status, AnErrorSummaryWithoutACauseIsNamedToo) { EXPECT_THAT(names(0x80000000), ElementsAre("error summary")); }
+
+TEST(Status, BitsWithoutAMeaningAreNamedByTheirNumber) {
+  EXPECT_THAT(names(0x00008001), ElementsAre("bit 15", "bit 0"));
+}
+
+TEST(Status, EveryBitOfTable17_1HasItsName) {
+  const char* const table[31] = {"bit 0",
+                                 "HTTP protocol failure",
+                                 "internal temperature error",
+                                 "reference voltage or power monitor error",
+                                 "serial link data unavailable",
+                                 "analog supply too low",
+                                 "analog supply too high",
+                                 "artificial analog ground out of range",
+                                 "insufficient strain gage excitation current",
+                                 "excessive strain gage excitation current",
+                                 "analog board watchdog timeout",
+                                 "serial flash (SPI) failure",
+                                 "serial EEPROM (I2C) failure",
+                                 "stack check error",
+                                 "watchdog timeout",
+                                 "bit 15",
+                                 "monitor condition latched",
+                                 "transducer saturation or A/D error",
+                                 "DeviceNet failure",
+                                 "EtherNet/IP failure",
+                                 "RDT communication error",
+                                 "CAN communication error",
+                                 "network communication failure",
+                                 "configuration incompatible with calibration",
+                                 "settings validation error",
+                                 "halted: configuration errors",
+                                 "program memory verification error",
+                                 "serial link communication error",
+                                 "analog board error",
+                                 "digital board error",
+                                 "CPU or RAM error"};
+  for (unsigned bit = 0; bit < 31; ++bit) EXPECT_THAT(names(1u << bit), ElementsAre(table[bit]));
+}
+
+}  // namespace
+}  // namespace kphi::netbox
