@@ -1,0 +1,140 @@
+#include "fit/coefficients.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "compensation/units.hpp"
+#include "results/number.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using results::yaml_number;
+
+/// A YAML double-quoted scalar: propeller "5e3" stays text, and no text can end the quotes.
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      result += '\\';
+      result += c;
+    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
+      result += fmt::format("\\x{:02X}", static_cast<unsigned>(static_cast<unsigned char>(c)));
+    } else {
+      result += c;
+    }
+  }
+  return result + "\"";
+}
+
+std::string number_or_unknown(std::optional<double> value) {
+  return value && std::isfinite(*value) ? yaml_number(*value) : "unknown";
+}
+
+std::string known_if_positive(double value) { return value > 0 ? yaml_number(value) : "unknown"; }
+
+std::string list(const std::vector<double>& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : ", ") + yaml_number(value);
+  return "[" + text + "]";
+}
+
+bool speeds_known(const Identification& identification) {
+  return identification.speed_max_rad_s > identification.speed_min_rad_s &&
+         std::isfinite(identification.speed_max_rad_s);
+}
+
+std::string speed_range(double min_rad_s, double max_rad_s) {
+  return list({printed_rpm(min_rad_s), printed_rpm(max_rad_s)});
+}
+
+std::string per_rpm2(double k) { return fmt::format("{:.6g} N/RPM^2", to_newtons_per_rpm2(ThrustCoefficient(k))); }
+
+std::string head(const Identification& identification, const Provenance& provenance) {
+  const std::string blades = identification.blades > 0 ? fmt::format("{}", identification.blades) : "unknown";
+  return fmt::format(
+      "format: kphi-coefficients/1\n"
+      "created_utc: {}\n"
+      "tool_version: {}\n"
+      "propeller: {{id: {}, name: {}, diameter_in: {}, blades: {}}}\n"
+      "k_unit: N/(rad/s)^2\n"
+      "overlap: rim_arc\n",
+      quoted(provenance.created_utc), quoted(provenance.tool_version), quoted(identification.propeller),
+      quoted(provenance.propeller_name.empty() ? identification.propeller : provenance.propeller_name),
+      known_if_positive(identification.diameter_in), blades);
+}
+
+std::string line_block(const LineFit& line) {
+  std::vector<double> points;
+  for (const LinePoint& point : line.points) points.push_back(point.phi_deg);
+  const auto& c = line.covariance;
+  return fmt::format(
+      "K_T: {{value: {}, standard_error: {}, phi_deg: 0.0}}  # {}\n"
+      "line:\n"
+      "  anchored: {}\n"
+      "  intercept: {}  # {}\n"
+      "  slope_per_deg: {}  # {}\n"
+      "  covariance: [{}, {}]  # of intercept, slope_per_deg\n"
+      "  points_deg: {}\n",
+      yaml_number(line.K_T), yaml_number(line.K_T_standard_error), per_rpm2(line.K_T), line.anchored,
+      yaml_number(line.intercept), per_rpm2(line.intercept), yaml_number(line.slope_per_deg),
+      per_rpm2(line.slope_per_deg) + " per degree", list({c[0][0], c[0][1]}), list({c[1][0], c[1][1]}), list(points));
+}
+
+std::string valid_block(const Identification& identification) {
+  std::string text = "valid: {phi_deg: " + list({0, identification.table.back().phi_deg});
+  if (speeds_known(identification))
+    text += ", speed_rpm: " + speed_range(identification.speed_min_rad_s, identification.speed_max_rad_s);
+  return text + "}\n";
+}
+
+std::string table_row(const OcclusionCoefficient& row, double at_speed_rad_s) {
+  std::string text = fmt::format("  - {{phi_deg: {}, k: {}, standard_error: {}", yaml_number(row.phi_deg),
+                                 yaml_number(row.k), known_if_positive(row.standard_error));
+  if (row.at_speed) {
+    text += fmt::format(", k_at_speed: {}, at_speed_rpm: {}", yaml_number(row.at_speed->k),
+                        yaml_number(printed_rpm(at_speed_rad_s)));
+  }
+  if (row.fit) text += fmt::format(", steps: {}, repetitions: {}", row.steps, row.repetitions);
+  return text + "}\n";
+}
+
+std::string provenance_block(const Identification& identification, const Provenance& provenance) {
+  std::string text = fmt::format(
+      "air_density_kg_m3: {}\n"
+      "supply_v: {}\n"
+      "provenance:\n"
+      "  campaign: {}\n"
+      "  fit: {{model: \"T = k w^2\", estimator: {}",
+      number_or_unknown(provenance.air_density_kg_m3), number_or_unknown(provenance.supply_v),
+      quoted(provenance.campaign), quoted(estimator_words(identification)));
+  if (speeds_known(identification))
+    text += ", speed_range_rpm: " + speed_range(identification.fitted.min_rad_s, identification.fitted.max_rad_s);
+  text += "}\n";
+  if (provenance.runs.empty()) return text + "  runs: []\n";
+  text += "  runs:\n";
+  for (const RunProvenance& run : provenance.runs)
+    text += fmt::format("    - {{file: {}, sha256: {}}}\n", quoted(run.file), quoted(run.sha256));
+  return text;
+}
+
+}  // namespace
+
+std::string estimator_words(const Identification& identification) {
+  const bool from_steps = !identification.table.empty() && identification.table.front().fit.has_value();
+  return from_steps ? "least squares of T on w^2 through the origin, then a weighted line through k(phi)"
+                    : "a weighted line through given k(phi)";
+}
+
+double printed_rpm(double speed_rad_s) { return std::round(to_rpm(RadPerSec(speed_rad_s)) * 1000) / 1000; }
+
+std::string format_coefficients(const Identification& identification, const Provenance& provenance) {
+  std::string text = head(identification, provenance) + line_block(identification.line) + valid_block(identification);
+  text += "table:\n";
+  for (const OcclusionCoefficient& row : identification.table) text += table_row(row, identification.at_speed_rad_s);
+  return text + provenance_block(identification, provenance);
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,42 @@
+// coefficients.yaml: what the bench hands to the library that flies. Format kphi-coefficients/1.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fit/identification.hpp"
+#include "results/records.hpp"
+
+namespace kphi::fit {
+
+/// A run behind the coefficients.
+struct RunProvenance {
+  std::string file;    ///< as seen from the campaign folder
+  std::string sha256;  ///< 64 hex digits
+  std::string outcome;
+  std::optional<results::SampleAccount> account;
+};
+
+/// Where the numbers come from. Nothing here is guessed: what is not known is empty and written as `unknown`.
+struct Provenance {
+  std::string created_utc;  ///< ISO 8601, Z
+  std::string tool_version;
+  std::string campaign;
+  std::string propeller_name;
+  std::string source;  ///< what was fitted: a campaign folder or a file
+  std::vector<RunProvenance> runs;
+  std::optional<double> air_density_kg_m3;
+  std::optional<double> supply_v;
+};
+
+/// What was minimised, in words; the same in file and report.
+[[nodiscard]] std::string estimator_words(const Identification& identification);
+
+/// A speed in RPM as files and reports print it: to a thousandth, which hides the rounding of π/30 and nothing else.
+[[nodiscard]] double printed_rpm(double speed_rad_s);
+
+/// The whole file. The same arguments give the same bytes.
+[[nodiscard]] std::string format_coefficients(const Identification& identification, const Provenance& provenance);
+
+}  // namespace kphi::fit

@@ -1,0 +1,355 @@
+#include "fit/commands.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "compensation/file/coefficient_file.hpp"
+#include "fit/coefficients.hpp"
+#include "fit/fit_error.hpp"
+#include "fit/import_table.hpp"
+#include "fit/k_table.hpp"
+#include "fit/raw_samples.hpp"
+#include "fit/report.hpp"
+#include "profiles/campaign.hpp"
+#include "profiles/configuration_error.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/journal.hpp"
+#include "results/sha256.hpp"
+#include "results/steps_csv.hpp"
+#include "results/version.hpp"
+
+namespace kphi::fit {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr int kDataRejected = 5;
+
+/// What is fitted, and what is known about where it comes from.
+struct Input {
+  std::vector<results::StepMean> steps;
+  std::vector<LinePoint> table;  ///< instead of steps
+  Provenance provenance;
+  fs::path folder;        ///< where the outputs go
+  bool campaign = false;  ///< `folder` is a campaign folder
+};
+
+struct FitRequest {
+  std::string path;
+  bool anchored = false;
+  std::vector<double> points_deg;
+  std::string speed_range_rpm;
+  std::optional<double> at_speed_rpm;
+  std::string out;
+  std::string propeller;
+  double diameter_in = 0;
+  int blades = 0;
+  bool no_report = false;
+  bool json = false;
+};
+
+/// Now, or SOURCE_DATE_EPOCH where somebody wants the same bytes again.
+std::string utc_now() {
+  const char* fixed = std::getenv("SOURCE_DATE_EPOCH");
+  const std::time_t now = fixed != nullptr ? static_cast<std::time_t>(std::atoll(fixed)) : std::time(nullptr);
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now));
+}
+
+/// Accepted runs with the checksums the journal holds; without a journal the files as they lie there.
+std::vector<RunProvenance> runs_of(const results::CampaignFolder& folder) {
+  std::vector<RunProvenance> runs;
+  if (fs::exists(folder.journal())) {
+    for (const results::JournalEntry& entry : results::read_journal(folder.journal()).entries) {
+      if (entry.event == results::kRunAccepted && entry.data.contains("file") && entry.data.contains("sha256"))
+        runs.push_back({entry.data["file"], entry.data["sha256"], "", std::nullopt});
+    }
+    return runs;
+  }
+  for (const fs::path& run : folder.complete_runs())
+    runs.push_back({fs::relative(run, folder.path()).string(), results::sha256_of_file(run), "", std::nullopt});
+  return runs;
+}
+
+Input campaign_input(const fs::path& path) {
+  const auto folder = results::CampaignFolder::open(path);
+  if (!fs::exists(folder.steps())) {
+    throw ConfigurationError(
+        fmt::format("{}: no steps.csv; `kphi replay {}` makes it from the runs", path.string(), path.string()));
+  }
+  Input input;
+  input.folder = path;
+  input.campaign = true;
+  input.steps = results::read_steps(folder.steps());
+  input.provenance.source = "steps.csv of the campaign folder";
+  input.provenance.runs = runs_of(folder);
+  if (fs::exists(folder.campaign_file())) {
+    const profiles::Campaign campaign = profiles::load_campaign(folder.campaign_file().string());
+    input.provenance.campaign = campaign.name;
+    input.provenance.propeller_name = campaign.propeller.name;
+    input.provenance.supply_v = campaign.supply.value();
+  }
+  return input;
+}
+
+Input file_input(const fs::path& path) {
+  Input input;
+  input.folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  input.provenance.campaign = path.stem().string();
+  input.provenance.source = path.filename().string();
+  const std::string text = results::read_text(path);
+  if (is_k_table(text)) {
+    input.table = read_k_table(text, path.string());
+  } else {
+    input.steps = results::parse_steps(text, path.string());
+  }
+  return input;
+}
+
+Input load(const std::string& path) {
+  Input input = fs::is_directory(path) ? campaign_input(path) : file_input(path);
+  input.provenance.created_utc = utc_now();
+  input.provenance.tool_version = kVersion;
+  return input;
+}
+
+/// "A:B" in RPM; either end may be left out.
+SpeedRange parse_speed_range(const std::string& text, SpeedRange range) {
+  if (text.empty()) return range;
+  const std::size_t colon = text.find(':');
+  const auto end = [&](const std::string& part, double& speed) {
+    if (part.empty()) return true;
+    const auto rpm = parse_number(part);
+    if (rpm) speed = from_rpm(*rpm).value();
+    return rpm.has_value();
+  };
+  if (colon == std::string::npos || !end(text.substr(0, colon), range.min_rad_s) ||
+      !end(text.substr(colon + 1), range.max_rad_s) || !(range.max_rad_s > range.min_rad_s)) {
+    throw ConfigurationError(
+        fmt::format("--speed-range-rpm {}: expected A:B with A below B, such as 3000:19100", text));
+  }
+  return range;
+}
+
+IdentificationOptions options_of(const FitRequest& request) {
+  IdentificationOptions options;
+  options.speed_range = parse_speed_range(request.speed_range_rpm, options.speed_range);
+  if (request.at_speed_rpm) options.at_speed_rad_s = from_rpm(*request.at_speed_rpm).value();
+  options.line.anchored = request.anchored;
+  options.line.points_deg = request.points_deg;
+  return options;
+}
+
+Identification identify_input(const Input& input, const FitRequest& request) {
+  const IdentificationOptions options = options_of(request);
+  Identification result =
+      input.table.empty() ? identify(input.steps, options)
+                          : identify_table(input.table, options.line, parse_speed_range(request.speed_range_rpm, {}));
+  if (!request.propeller.empty()) result.propeller = request.propeller;
+  if (result.propeller.empty()) result.propeller = input.provenance.campaign;
+  if (request.diameter_in > 0) result.diameter_in = request.diameter_in;
+  if (request.blades > 0) result.blades = request.blades;
+  return result;
+}
+
+void write_report(const Identification& identification, Input& input, const fs::path& folder) {
+  std::vector<ThrustShares> shares;
+  if (input.campaign) {
+    RawSamples raw = read_raw_samples(identification, std::move(input.provenance.runs), input.folder);
+    input.provenance.runs = std::move(raw.runs);
+    shares = std::move(raw.shares);
+  }
+  if (shares.empty()) shares = shares_of_steps(identification);
+  const Figures figures = draw_figures(identification, shares, folder / "figures");
+  if (!figures.skipped.empty()) fmt::print(stderr, "kphi: figures skipped: {}\n", figures.skipped);
+  results::MemoryOnlySync files;
+  results::write_text(folder / "report.html", format_report(identification, input.provenance, figures), files);
+  fmt::print(stderr, "report        {}\n", (folder / "report.html").string());
+}
+
+void print_number(const char* name, double value, double error, const char* per) {
+  const auto rpm = [](double k) { return to_newtons_per_rpm2(ThrustCoefficient(k)); };
+  fmt::print("{:<10} {} N/(rad/s)^2{}  =  {} N/RPM^2{}\n", name, with_error(value, error), per,
+             with_error(rpm(value), rpm(error)), per);
+}
+
+void print_headline(const LineFit& line) {
+  print_number("K_T", line.K_T, line.K_T_standard_error, "");
+  print_number("intercept", line.intercept, std::sqrt(line.covariance[0][0]), "");
+  print_number("slope", line.slope_per_deg, std::sqrt(line.covariance[1][1]), " per degree");
+}
+
+void print_json(const Identification& identification, const fs::path& coefficients) {
+  const LineFit& line = identification.line;
+  Json table = Json::array();
+  for (const OcclusionCoefficient& row : identification.table)
+    table.push_back({{"phi_deg", row.phi_deg}, {"k", row.k}, {"standard_error", row.standard_error}});
+  const Json json{{"coefficients", coefficients.string()},
+                  {"k_unit", "N/(rad/s)^2"},
+                  {"K_T", line.K_T},
+                  {"K_T_standard_error", line.K_T_standard_error},
+                  {"anchored", line.anchored},
+                  {"intercept", line.intercept},
+                  {"slope_per_deg", line.slope_per_deg},
+                  {"covariance", line.covariance},
+                  {"table", table},
+                  {"steps_used", identification.selection.used.size()},
+                  {"steps_doubtful", identification.selection.doubtful.size()}};
+  fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
+}
+
+void run_fit(const FitRequest& request) {
+  Input input = load(request.path);
+  const Identification identification = identify_input(input, request);
+  fs::path file = request.out.empty() ? input.folder / "coefficients.yaml" : fs::path(request.out);
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  fs::create_directories(folder);
+  results::MemoryOnlySync files;  // made again from steps.csv at any time
+  results::write_text(file, format_coefficients(identification, input.provenance), files);
+  for (const DoubtfulStep& doubtful : identification.selection.doubtful) {
+    fmt::print(stderr, "{:<13} phi {} deg, repetition {}, step {}: {}\n", doubtful.left_out ? "left out" : "kept",
+               doubtful.step.occlusion_deg, doubtful.step.repetition, doubtful.step.step + 1, doubtful.reason);
+  }
+  if (request.json) {
+    print_json(identification, file);
+  } else {
+    print_headline(identification.line);
+  }
+  fmt::print(stderr, "coefficients  {}\n", file.string());
+  if (!request.no_report) write_report(identification, input, folder);
+}
+
+/// The speeds that carried the fit. The file prints them to a thousandth RPM; that much more on either side takes the
+/// same steps again.
+SpeedRange fitted_range(const std::string& path, SpeedRange range) {
+  const YAML::Node ends = YAML::LoadFile(path)["provenance"]["fit"]["speed_range_rpm"];
+  if (!ends.IsDefined() || ends.size() != 2) return range;
+  const double slack = 1e-3;
+  return {from_rpm(ends[0].as<double>() - slack).value(), from_rpm(ends[1].as<double>() + slack).value()};
+}
+
+void run_report(const std::string& path) {
+  Input input = load(path);
+  const auto file = compensation::load_coefficients((fs::path(path) / "coefficients.yaml").string());
+  IdentificationOptions options;
+  options.line.anchored = file.line.anchored;
+  for (const Radians& point : file.line.points) options.line.points_deg.push_back(to_degrees(point));
+  options.speed_range = fitted_range(file.path, options.speed_range);
+  if (!file.table.empty() && file.table.front().at_speed) options.at_speed_rad_s = file.table.front().at_speed->value();
+  input.provenance.created_utc = file.created_utc;
+  write_report(identify(input.steps, options), input, path);
+}
+
+struct ImportRequest {
+  std::vector<std::string> files;
+  std::string out;
+  std::string speed;
+  std::optional<double> diameter_in;
+  ImportOptions options;
+};
+
+void run_import(const ImportRequest& request, int& exit_code) {
+  ImportOptions options = request.options;
+  options.diameter_in = request.diameter_in;
+  if (!request.speed.empty())
+    options.rows.speed = request.speed == "optical" ? SpeedSource::optical : SpeedSource::electrical;
+  for (const std::string& path : request.files) {
+    const ImportedTable imported = import_table(results::read_text(path), path, options);
+    const std::string name = fs::path(path).stem().string();
+    const fs::path folder = fs::path(request.out) / name;
+    fs::create_directories(folder);
+    results::MemoryOnlySync files;
+    results::write_steps(folder / "steps.csv", imported.steps, files);
+    for (const TableProblem& problem : imported.problems)
+      fmt::print(stderr, "{}:{}: {}\n", path, problem.line, problem.what);
+    try {
+      fmt::print("{}: {}\n", name, summary_of(imported));
+    } catch (const FitError& error) {
+      fmt::print(stderr, "kphi: {}: {}\n", path, error.what());
+      exit_code = kDataRejected;
+    }
+  }
+}
+
+/// Runs `work` as the command's callback; data that cannot be fitted become one line and exit code 5.
+void on_run(CLI::App& command, int& exit_code, std::function<void()> work) {
+  command.callback([&exit_code, work = std::move(work)] {
+    try {
+      work();
+    } catch (const FitError& error) {
+      fmt::print(stderr, "kphi: {}\n", error.what());
+      exit_code = kDataRejected;
+    } catch (const compensation::CoefficientError& error) {
+      throw ConfigurationError(error.what());
+    }
+  });
+}
+
+}  // namespace
+
+void add_fit(CLI::App& app, int& exit_code) {
+  auto request = std::make_shared<FitRequest>();
+  CLI::App* command = app.add_subcommand("fit", "steps → k of each occlusion → the line k(φ), with a report");
+  command->add_option("INPUT", request->path, "campaign folder, steps.csv, or K.csv with phi_deg,k[,u_k]")
+      ->required()
+      ->check(CLI::ExistingPath);
+  command->add_flag("--anchored", request->anchored, "the line starts at K_T (default: free, through the occlusions)");
+  command->add_option("--points", request->points_deg, "angles in degrees that carry the line (default: all above 0)")
+      ->delimiter(',');
+  command->add_option("--speed-range-rpm", request->speed_range_rpm,
+                      "A:B, speeds to fit (default 3000: and up; below, thrust is under the load cell's noise)");
+  command->add_option("--at-speed-rpm", request->at_speed_rpm,
+                      "speed of \"k at speed\" (default: the highest that every occlusion reached)");
+  command->add_option("--out", request->out, "coefficient file; report and figures go beside it");
+  command->add_option("--propeller", request->propeller, "id of the propeller (default: from the steps)");
+  command->add_option("--diameter-in", request->diameter_in, "diameter in inches (default: from the steps)");
+  command->add_option("--blades", request->blades, "number of blades (default: from the steps)");
+  command->add_flag("--no-report", request->no_report, "coefficients only");
+  command->add_flag("--json", request->json, "the result as JSON on stdout");
+  command->footer("kphi fit results/<folder>\nkphi fit K.csv --anchored --points 45,90 --out k.yaml");
+  on_run(*command, exit_code, [request] { run_fit(*request); });
+}
+
+void add_import(CLI::App& app, int& exit_code) {
+  auto request = std::make_shared<ImportRequest>();
+  RcbenchmarkSelection& rows = request->options.rows;
+  CLI::App* command = app.add_subcommand("import", "RCbenchmark CSV and UIUC static tables → step tables");
+  command->add_option("FILE", request->files, "tables; the unit of thrust is taken from their header")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command->add_option("--out", request->out, "folder; every table becomes <name>/steps.csv in it")->required();
+  command->add_option("--speed", request->speed, "which speed to take (default: electrical where it turns)")
+      ->check(CLI::IsMember({"electrical", "optical"}));
+  command->add_option("--speed-factor", rows.speed_factor, "on the speed; true over assumed pole count mends it")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--speed-above-rpm", rows.speed_above_rpm, "rows at or below are left out (default 0)");
+  command->add_option("--tare-rows", rows.tare_rows, "tare with so many first rows of a still motor (default 0)");
+  command->add_flag("--reverse-thrust", rows.reverse_thrust, "the stand measured thrust with the other sign");
+  command->add_option("--diameter-in", request->diameter_in, "diameter in inches (UIUC default: from the file's name)")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--propeller", request->options.propeller, "id of the propeller (default: the file's name)");
+  command->add_option("--blades", request->options.blades, "number of blades");
+  on_run(*command, exit_code, [request, &exit_code] { run_import(*request, exit_code); });
+}
+
+void add_report(CLI::App& app, int& exit_code) {
+  auto path = std::make_shared<std::string>();
+  CLI::App* command = app.add_subcommand("report", "draws report.html of a fitted campaign again");
+  command->add_option("DIR", *path, "campaign folder with steps.csv and coefficients.yaml")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  on_run(*command, exit_code, [path] { run_report(*path); });
+}
+
+}  // namespace kphi::fit

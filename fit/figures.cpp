@@ -1,0 +1,228 @@
+#include "fit/figures.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "compensation/units.hpp"
+#include "fit/coefficients.hpp"
+#include "fit/gnuplot.hpp"
+#include "results/file_layer.hpp"
+#include "results/number.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using results::shortest;
+
+/// Okabe and Ito's colours: apart for every kind of colour vision.
+constexpr std::array<const char*, 7> kColours{"#0072B2", "#009E73", "#CC79A7", "#D55E00",
+                                              "#56B4E9", "#B8A200", "#444444"};
+
+constexpr const char* kHead =
+    "set terminal svg size 800,470 noenhanced font 'Helvetica,Arial,sans-serif,14' linewidth 1.2 background '#ffffff'\n"
+    "set encoding utf8\n"
+    "set border lc rgb '#777777'\n"
+    "set tics nomirror textcolor rgb '#333333'\n"
+    "set grid ytics lc rgb '#e4e4e4' lt 1 lw 0.8\n";
+
+double mean(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value;
+  return values.empty() ? 0 : sum / static_cast<double>(values.size());
+}
+
+std::string block(const std::string& name, const std::string& rows) {
+  return fmt::format("${} << EOD\n{}EOD\n", name, rows);
+}
+
+/// Highest share in the figure, with room for its box.
+double share_top(const Identification& identification, const std::vector<ThrustShares>& shares) {
+  const LineFit& line = identification.line;
+  double top = 100 * std::max(1.0, line.at(0) / line.K_T);
+  for (const auto& entry : shares)
+    for (const double percent : entry.percent) top = std::max(top, percent);
+  return 10 * std::ceil((top + 3) / 10);
+}
+
+std::string line_rows(const LineFit& line, double from_deg, double to_deg) {
+  constexpr int kPieces = 60;
+  std::string rows;
+  for (int i = 0; i <= kPieces; ++i) {
+    const double phi = from_deg + (to_deg - from_deg) * i / kPieces;
+    const double k = line.at(phi), band = 2 * line.standard_error_at(phi);
+    rows += fmt::format("{:.6g} {:.8g} {:.8g} {:.8g}\n", phi, k * 1e6, (k - band) * 1e6, (k + band) * 1e6);
+  }
+  return rows;
+}
+
+std::string coefficient_rows(const Identification& identification) {
+  std::string rows;
+  for (const auto& row : identification.table)
+    rows += fmt::format("{:.6g} {:.8g} {:.8g}\n", row.phi_deg, row.k * 1e6, 2 * row.standard_error * 1e6);
+  return rows;
+}
+
+std::string angle_tics(const Identification& identification) {
+  std::string tics;
+  for (const auto& row : identification.table)
+    tics += fmt::format("{}'{}°' {}", tics.empty() ? "" : ", ", shortest(row.phi_deg), shortest(row.phi_deg));
+  return tics;
+}
+
+/// Boxes as wide as the angles allow without touching.
+double box_width(const Identification& identification) {
+  double gap = 60;
+  for (std::size_t i = 1; i < identification.table.size(); ++i)
+    gap = std::min(gap, identification.table[i].phi_deg - identification.table[i - 1].phi_deg);
+  return 0.4 * gap;
+}
+
+std::string axes(const Identification& identification, double top) {
+  const double width = box_width(identification);
+  return fmt::format(
+      "set xrange [{:.6g}:{:.6g}]\nset yrange [0:{:.6g}]\nset y2range [0:{:.8g}]\n"
+      "set xtics ({})\nset ytics 20\nset y2tics\nset boxwidth {:.6g} absolute\n"
+      "set xlabel 'angle of the occlusion φ'\nset ylabel 'thrust, % of the thrust at φ = 0'\n"
+      "set y2label 'k(φ), 10⁻⁶ N/(rad/s)²'\n"
+      "set key top right samplen 2 spacing 1.2\n"
+      "set style fill solid 0.45 border lc rgb '#3b6ea5'\n"
+      "set style boxplot range 1.5 outliers pointtype 7\nset pointsize 0.3\n",
+      identification.table.front().phi_deg - 1.2 * width, identification.table.back().phi_deg + 1.2 * width, top,
+      top / 100 * identification.line.K_T * 1e6, angle_tics(identification), width);
+}
+
+std::string box_plots(const std::vector<ThrustShares>& shares) {
+  std::string parts;
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    if (shares[i].percent.empty()) continue;
+    parts += fmt::format("  $share{} using ({}):1 with boxplot lc rgb '#3b6ea5' fillcolor rgb '#a9c6e6' {}, \\\n", i,
+                         shortest(shares[i].phi_deg), parts.empty() ? "title 'thrust'" : "notitle");
+  }
+  return parts;
+}
+
+bool has_points(const Identification& identification) {
+  return std::all_of(identification.table.begin(), identification.table.end(),
+                     [](const OcclusionCoefficient& row) { return row.fit.has_value(); });
+}
+
+bool write_and_draw(const Figure& figure, const std::filesystem::path& folder, const std::string& gnuplot,
+                    Figures& figures) {
+  results::MemoryOnlySync files;  // drawn again at any time from steps.csv
+  results::write_text(folder / (figure.name + ".gp"), figure.script, files);
+  results::write_text(folder / (figure.name + ".csv"), figure.csv, files);
+  const std::filesystem::path svg = folder / (figure.name + ".svg");
+  const GnuplotOutcome outcome = draw(folder / (figure.name + ".gp"), svg, gnuplot);
+  if (outcome.drawn) figures.drawn.push_back({figure.caption, svg});
+  if (!outcome.drawn) figures.skipped = outcome.reason;
+  return outcome.drawn;
+}
+
+}  // namespace
+
+std::vector<ThrustShares> shares_of_steps(const Identification& identification) {
+  std::vector<ThrustShares> shares;
+  for (const OcclusionCoefficient& row : identification.table) {
+    if (!row.at_speed) continue;
+    ThrustShares entry{row.phi_deg, {}};
+    for (const results::StepMean& step : identification.selection.used) {
+      const bool there = same_level(level(step), identification.at_speed_rad_s);
+      if (step.occlusion_deg == row.phi_deg && there) entry.percent.push_back(step.thrust_n);
+    }
+    shares.push_back(std::move(entry));
+  }
+  if (shares.empty() || shares.front().phi_deg != 0 || !(mean(shares.front().percent) > 0)) return {};
+  const double nominal = mean(shares.front().percent);
+  for (auto& entry : shares)
+    for (double& value : entry.percent) value *= 100 / nominal;
+  return shares;
+}
+
+Figure share_figure(const Identification& identification, const std::vector<ThrustShares>& shares) {
+  const LineFit& line = identification.line;
+  Figure figure;
+  figure.name = "thrust_share";
+  figure.caption = "Thrust in percent of the thrust without occlusion (boxes, left axis";
+  if (identification.at_speed_rad_s > 0)
+    figure.caption += fmt::format(", at {:.0f} RPM", to_rpm(RadPerSec(identification.at_speed_rad_s)));
+  figure.caption +=
+      ") and the angle-dependent coefficient k(φ) over all speeds (right axis, two standard errors). The line is solid "
+      "where it was measured.";
+  figure.csv = "kind,phi_deg,value,standard_error\n";
+  std::string data;
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    std::string rows;
+    for (const double percent : shares[i].percent) {
+      rows += fmt::format("{:.6g}\n", percent);
+      figure.csv += fmt::format("thrust_percent,{},{},\n", shortest(shares[i].phi_deg), shortest(percent));
+    }
+    if (!rows.empty()) data += block(fmt::format("share{}", i), rows);
+  }
+  for (const auto& row : identification.table) {
+    figure.csv +=
+        fmt::format("k_n_s2_per_rad2,{},{},{}\n", shortest(row.phi_deg), shortest(row.k), shortest(row.standard_error));
+  }
+  const double first = line.points.front().phi_deg, last = line.points.back().phi_deg;
+  data += block("line", line_rows(line, first, std::max(last, first + 1e-3)));
+  data += block("before", line_rows(line, 0, first));
+  data += block("k", coefficient_rows(identification));
+  figure.script =
+      kHead + data + axes(identification, share_top(identification, shares)) + "plot \\\n" +
+      "  $line using 1:3:4 axes x1y2 with filledcurves fs transparent solid 0.2 noborder lc rgb '#f28e2b' notitle, "
+      "\\\n" +
+      box_plots(shares) +
+      "  $before using 1:2 axes x1y2 with lines dt 2 lw 1.5 lc rgb '#f28e2b' notitle, \\\n"
+      "  $line using 1:2 axes x1y2 with lines lw 2.5 lc rgb '#f28e2b' title 'line k(φ)', \\\n"
+      "  $k using 1:2:3 axes x1y2 with yerrorbars pt 7 ps 0.6 lw 1.4 lc rgb '#222222' title 'k of each occlusion'\n";
+  return figure;
+}
+
+Figure thrust_figure(const Identification& identification) {
+  Figure figure;
+  figure.name = "thrust_over_speed";
+  figure.caption =
+      "Thrust over squared speed with the fits T = k ω², one colour per occlusion. Steps that were left out are "
+      "not shown.";
+  figure.csv = "phi_deg,speed_rad_s,thrust_n,fitted_n\n";
+  std::string data, parts;
+  for (std::size_t i = 0; i < identification.table.size(); ++i) {
+    const OcclusionCoefficient& row = identification.table[i];
+    const ThrustFit& fit = *row.fit;
+    std::string points;
+    for (const Point& point : fit.points) {
+      const double fitted = thrust(fit.parameters, point.speed_rad_s);
+      points += fmt::format("{:.8g} {:.8g}\n", point.speed_rad_s * point.speed_rad_s * 1e-6, point.thrust_n);
+      figure.csv += fmt::format("{},{},{},{}\n", shortest(row.phi_deg), shortest(point.speed_rad_s),
+                                shortest(point.thrust_n), shortest(fitted));
+    }
+    const double end = fit.speed_max_rad_s;
+    data += block(fmt::format("points{}", i), points);
+    data += block(fmt::format("fit{}", i), fmt::format("0 {:.8g}\n{:.8g} {:.8g}\n", fit.parameters.offset,
+                                                       end * end * 1e-6, thrust(fit.parameters, end)));
+    const char* colour = kColours[i % kColours.size()];
+    parts += fmt::format(
+        "{}  $fit{} using 1:2 with lines lw 1.6 lc rgb '{}' title 'φ = {}°', \\\n"
+        "  $points{} using 1:2 with points pt 6 ps 0.45 lc rgb '{}' notitle",
+        i == 0 ? "" : ", \\\n", i, colour, shortest(row.phi_deg), i, colour);
+  }
+  figure.script = kHead + data +
+                  "set xrange [0:*]\nset yrange [*<0:*]\nset xlabel 'ω², 10⁶ (rad/s)²'\nset ylabel 'thrust T, N'\n"
+                  "set key top left samplen 2 spacing 1.2\nplot \\\n" +
+                  parts + "\n";
+  return figure;
+}
+
+Figures draw_figures(const Identification& identification, const std::vector<ThrustShares>& shares,
+                     const std::filesystem::path& folder, const std::string& gnuplot) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);  // what failed shows at the first file
+  Figures figures;
+  bool able = write_and_draw(share_figure(identification, shares), folder, gnuplot, figures);
+  if (able && has_points(identification)) write_and_draw(thrust_figure(identification), folder, gnuplot, figures);
+  return figures;
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,94 @@
+#include "fit/html.hpp"
+
+#include <cstdint>
+#include <pugixml.hpp>
+#include <sstream>
+
+namespace kphi::fit {
+namespace {
+
+constexpr std::string_view kReplacement = "\xEF\xBF\xBD";
+
+/// Length of the UTF-8 character at the front, 0 if there is none (overlong forms, surrogates and above U+10FFFF
+/// included) or XML 1.0 does not allow it.
+std::size_t character_length(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<std::uint8_t>(text[i]) : 0u; };
+  const auto follows = [&](std::size_t i) { return (byte(i) & 0xC0u) == 0x80u; };
+  const std::uint32_t first = byte(0);
+  if (first < 0x80) return first >= 0x20 || first == '\t' || first == '\n' || first == '\r' ? 1 : 0;
+  if (first >= 0xC2 && first <= 0xDF) return follows(1) ? 2 : 0;
+  if (first >= 0xE0 && first <= 0xEF) {
+    if (!follows(1) || !follows(2)) return 0;
+    const std::uint32_t code = ((first & 0x0Fu) << 12) | ((byte(1) & 0x3Fu) << 6) | (byte(2) & 0x3Fu);
+    return code >= 0x800 && !(code >= 0xD800 && code <= 0xDFFF) && code < 0xFFFE ? 3 : 0;
+  }
+  if (first >= 0xF0 && first <= 0xF4) {
+    if (!follows(1) || !follows(2) || !follows(3)) return 0;
+    const std::uint32_t code = ((first & 0x07u) << 18) | ((byte(1) & 0x3Fu) << 12);
+    return code >= 0x10000 && code <= 0x10FFFF ? 4 : 0;
+  }
+  return 0;
+}
+
+std::string_view escape_of(char c) {
+  switch (c) {
+    case '&':
+      return "&amp;";
+    case '<':
+      return "&lt;";
+    case '>':
+      return "&gt;";
+    case '"':
+      return "&quot;";
+    case '\'':
+      return "&#39;";
+    default:
+      return {};
+  }
+}
+
+void prefix_references(pugi::xml_node node, const std::string& prefix) {
+  for (pugi::xml_attribute attribute : node.attributes()) {
+    const std::string_view name = attribute.name();
+    const std::string value = attribute.value();
+    if (name == "id") {
+      attribute.set_value((prefix + value).c_str());
+    } else if ((name == "href" || name == "xlink:href") && value.starts_with('#')) {
+      attribute.set_value(("#" + prefix + value.substr(1)).c_str());
+    } else if (const auto at = value.find("url(#"); at != std::string::npos) {
+      attribute.set_value((value.substr(0, at + 5) + prefix + value.substr(at + 5)).c_str());
+    }
+  }
+  for (pugi::xml_node child : node.children()) prefix_references(child, prefix);
+}
+
+}  // namespace
+
+std::string html_escaped(std::string_view text) {
+  std::string result;
+  while (!text.empty()) {
+    const std::size_t length = character_length(text);
+    if (length == 0) {
+      result += kReplacement;
+      text.remove_prefix(1);
+      continue;
+    }
+    const std::string_view escape = escape_of(text.front());
+    result += escape.empty() ? text.substr(0, length) : escape;
+    text.remove_prefix(length);
+  }
+  return result;
+}
+
+std::string inline_svg(std::string_view svg, const std::string& prefix) {
+  pugi::xml_document document;
+  if (!document.load_buffer(svg.data(), svg.size())) return {};
+  pugi::xml_node root = document.child("svg");
+  if (!root) return {};
+  prefix_references(root, prefix);
+  std::ostringstream text;
+  root.print(text, "", pugi::format_raw | pugi::format_no_declaration);
+  return std::move(text).str();
+}
+
+}  // namespace kphi::fit

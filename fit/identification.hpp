@@ -1,0 +1,57 @@
+// Steps of one propeller → one k per occlusion → the line k(φ).
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "fit/line_fit.hpp"
+#include "fit/step_selection.hpp"
+#include "fit/thrust_fit.hpp"
+
+namespace kphi::fit {
+
+struct IdentificationOptions {
+  SpeedRange speed_range{.min_rad_s = kSpeedMinRpm * 3.14159265358979323846 / 30};
+  std::optional<double> at_speed_rad_s;  ///< for "k at speed"; default: the highest level measured at every φ
+  LineFitOptions line;
+};
+
+/// One row of the table: what was measured at one φ.
+struct OcclusionCoefficient {
+  double phi_deg = 0;
+  double k = 0;               ///< N/(rad/s)², fitted over the speed range
+  double standard_error = 0;  ///< N/(rad/s)²
+  std::size_t steps = 0;      ///< distinct levels
+  std::size_t repetitions = 0;
+  std::optional<ThrustFit> fit;              ///< none in a table that came without steps
+  std::optional<SpeedCoefficient> at_speed;  ///< none when no good step lies at that speed
+};
+
+struct Identification {
+  std::string propeller;
+  double diameter_in = 0;                   ///< 0: not known
+  int blades = 0;                           ///< 0: not known
+  std::vector<OcclusionCoefficient> table;  ///< ascending φ, the first is φ = 0
+  LineFit line;
+  StepSelection selection;
+  double at_speed_rad_s = 0;   ///< commanded level of "k at speed"; 0: none
+  SpeedRange fitted{0, 0};     ///< lowest and highest level used at any φ
+  double speed_min_rad_s = 0;  ///< speeds that were measured at every φ: those the line vouches for
+  double speed_max_rad_s = 0;
+};
+
+/// Whether two speeds are the same level of a profile: they agree to 0.5 %.
+[[nodiscard]] bool same_level(double a_rad_s, double b_rad_s);
+
+/// Throws FitError when the steps are of several propellers, φ = 0 is missing, or a fit cannot be made (the message
+/// names φ).
+[[nodiscard]] Identification identify(std::span<const results::StepMean> steps,
+                                      const IdentificationOptions& options = {});
+
+/// The same from coefficients found elsewhere. `speed` is the range they hold for, as the caller says.
+[[nodiscard]] Identification identify_table(std::span<const LinePoint> points, const LineFitOptions& options,
+                                            const SpeedRange& speed);
+
+}  // namespace kphi::fit

@@ -1,0 +1,20 @@
+// The one way in which this folder asks Ceres to solve a small linear problem.
+#pragma once
+
+#include <ceres/ceres.h>
+
+#include <utility>
+#include <vector>
+
+namespace kphi::fit {
+
+/// Solves to rounding (the problems here are linear and scaled to about 1) and says nothing on stdout or stderr.
+/// Throws FitError, naming `what`, when Ceres does not converge.
+void solve_exactly(ceres::Problem& problem, const char* what);
+
+/// Covariance (JᵀJ)⁻¹ between the listed scalar blocks, row by row. Throws FitError, naming `what`, if J is rank
+/// deficient.
+[[nodiscard]] std::vector<double> unit_covariance(ceres::Problem& problem, const std::vector<const double*>& blocks,
+                                                  const char* what);
+
+}  // namespace kphi::fit

@@ -1,0 +1,19 @@
+// report.html: one self-contained page, read by browsers as HTML and by tests as XML. No script, nothing loaded from
+// elsewhere; figures are inline SVG.
+#pragma once
+
+#include <string>
+
+#include "fit/coefficients.hpp"
+#include "fit/figures.hpp"
+
+namespace kphi::fit {
+
+/// The same arguments (and SVG files) give the same bytes.
+[[nodiscard]] std::string format_report(const Identification& identification, const Provenance& provenance,
+                                        const Figures& figures);
+
+/// "1.5500e-06 ± 1.2e-09": the value to the second digit of its standard error; without one, six digits.
+[[nodiscard]] std::string with_error(double value, double standard_error);
+
+}  // namespace kphi::fit

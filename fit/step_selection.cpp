@@ -1,0 +1,76 @@
+#include "fit/step_selection.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace kphi::fit {
+namespace {
+
+using results::Doubt;
+
+struct DoubtPolicy {
+  Doubt doubt;
+  const char* words;
+  bool spoils;
+};
+
+constexpr std::array<DoubtPolicy, 7> kPolicy{{
+    {Doubt::speed_not_reached, "commanded speed not reached", true},
+    {Doubt::speed_unsteady, "speed never settled", true},
+    {Doubt::saturated, "load cell saturated", true},
+    {Doubt::lost_samples, "samples lost", false},
+    {Doubt::derated, "motor derated", true},
+    {Doubt::few_samples, "too few samples", true},
+    {Doubt::bad_status, "load cell reported an error", true},
+}};
+
+bool has(std::uint32_t doubts, Doubt doubt) { return (doubts & static_cast<std::uint32_t>(doubt)) != 0; }
+
+bool spoiled(std::uint32_t doubts) {
+  return std::any_of(kPolicy.begin(), kPolicy.end(),
+                     [&](const DoubtPolicy& policy) { return policy.spoils && has(doubts, policy.doubt); });
+}
+
+}  // namespace
+
+double level(const results::StepMean& step) {
+  return step.commanded_speed_rad_s > 0 ? step.commanded_speed_rad_s : step.speed_rad_s;
+}
+
+std::string doubts_in_words(std::uint32_t doubts) {
+  std::string words;
+  for (const DoubtPolicy& policy : kPolicy) {
+    if (!has(doubts, policy.doubt)) continue;
+    if (!words.empty()) words += ", ";
+    words += policy.words;
+  }
+  return words;
+}
+
+StepSelection select_steps(std::span<const results::StepMean> steps, const SpeedRange& range) {
+  // Limits are typed in RPM and levels come through files: a level that is the limit must not fall out by rounding.
+  constexpr double kSlack = 1e-9;
+  const bool single_repetitions =
+      std::any_of(steps.begin(), steps.end(), [](const results::StepMean& step) { return step.repetition > 0; });
+  StepSelection selection;
+  for (const results::StepMean& step : steps) {
+    if (single_repetitions && step.repetition == 0) continue;
+    const bool outside = level(step) < range.min_rad_s * (1 - kSlack) || level(step) > range.max_rad_s * (1 + kSlack);
+    if (outside) {
+      ++selection.outside_range;
+      continue;
+    }
+    const bool measured = std::isfinite(step.thrust_n) && std::isfinite(step.speed_rad_s);
+    const bool left_out = !measured || spoiled(step.doubts);
+    if (left_out || step.doubts != 0) {
+      const std::string words = doubts_in_words(step.doubts);
+      const char* missing = measured ? "" : (words.empty() ? "nothing measured" : ", nothing measured");
+      selection.doubtful.push_back({step, words + missing, left_out});
+    }
+    if (!left_out) selection.used.push_back(step);
+  }
+  return selection;
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,44 @@
+// Which steps enter a fit. A doubtful step is left out, listed and given its reason; it never vanishes silently.
+#pragma once
+
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "results/step_mean.hpp"
+
+namespace kphi::fit {
+
+/// Thrust below this speed is under the noise of the load cell: 100 RPM on a 5-inch propeller is 0.2 mN. Weighted in ω²
+/// such steps do no harm, but they widen the range for which the file vouches.
+inline constexpr double kSpeedMinRpm = 3000;
+
+struct SpeedRange {
+  double min_rad_s = 0;
+  double max_rad_s = std::numeric_limits<double>::infinity();
+};
+
+struct DoubtfulStep {
+  results::StepMean step;
+  std::string reason;    ///< "speed not reached, derated"
+  bool left_out = true;  ///< false: kept, but listed (lost samples alone)
+};
+
+struct StepSelection {
+  std::vector<results::StepMean> used;
+  std::vector<DoubtfulStep> doubtful;  ///< in the order given
+  std::size_t outside_range = 0;
+};
+
+/// The level of a step: what was commanded, or, in imported tables without a command, what was measured. rad/s.
+[[nodiscard]] double level(const results::StepMean& step);
+
+/// The doubts of a step in words, joined by ", "; empty when there is none.
+[[nodiscard]] std::string doubts_in_words(std::uint32_t doubts);
+
+/// Averages over repetitions (repetition 0) are dropped where single repetitions exist: they would count twice.
+/// Lost samples alone do not spoil a mean; every other doubt does.
+[[nodiscard]] StepSelection select_steps(std::span<const results::StepMean> steps, const SpeedRange& range);
+
+}  // namespace kphi::fit

@@ -1,0 +1,48 @@
+// Step means of a campaign as the bench would leave them, from a known truth and a seed.
+#pragma once
+
+#include <random>
+#include <vector>
+
+#include "compensation/units.hpp"
+#include "results/step_mean.hpp"
+
+namespace kphi::fit {
+
+struct CampaignTruth {
+  double K_T = 1.55e-6;          ///< N/(rad/s)²
+  double intercept = 1.5965e-6;  ///< of the occluded line
+  double slope_per_deg = -4.4778e-9;
+  double noise_n = 0.01;
+  [[nodiscard]] double k(double phi_deg) const { return phi_deg == 0 ? K_T : intercept + slope_per_deg * phi_deg; }
+};
+
+/// 40 steps from 100 to 19100 RPM, five angles, three repetitions: the paper's campaign.
+[[nodiscard]] inline std::vector<results::StepMean> campaign_steps(const CampaignTruth& truth = {}, unsigned seed = 1) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, 1);
+  std::vector<results::StepMean> steps;
+  for (const double phi : {0.0, 45.0, 90.0, 180.0, 270.0}) {
+    for (int repetition = 1; repetition <= 3; ++repetition) {
+      for (int i = 0; i < 40; ++i) {
+        results::StepMean step;
+        step.propeller = "5x3";
+        step.blades = 3;
+        step.diameter_in = 5;
+        step.occlusion_deg = phi;
+        step.repetition = repetition;
+        step.step = i;
+        step.commanded_speed_rad_s = from_rpm(100 + 19000.0 * i / 39).value();
+        step.speed_rad_s = step.commanded_speed_rad_s * (1 + 2e-4 * noise(random));
+        step.speed_n = 100;
+        step.thrust_n = truth.k(phi) * step.speed_rad_s * step.speed_rad_s + truth.noise_n * noise(random);
+        step.thrust_sd_n = 0.05;
+        step.thrust_samples = 7000;
+        steps.push_back(step);
+      }
+    }
+  }
+  return steps;
+}
+
+}  // namespace kphi::fit
