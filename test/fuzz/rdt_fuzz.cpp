@@ -1,0 +1,31 @@
+// Any sequence of datagrams into the decoder and the session: the account closes, nothing else gives way.
+// Input: pieces of two bytes length (modulo 1500) and as many bytes.
+#include <cstdlib>
+#include <span>
+#include <vector>
+
+#include "drivers/netbox/session.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace kphi;
+  using namespace kphi::netbox;
+  std::span<const std::uint8_t> input(data, size);
+  Session session{StreamSettings{}};
+  std::vector<StampedRecord> accepted;
+  Instant now{0};
+  session.start(now);
+  while (input.size() >= 2) {
+    const std::size_t wanted = (input[0] << 8 | input[1]) % 1500u;
+    now += Duration(1'000 * input[0]);
+    input = input.subspan(2);
+    const auto datagram = input.first(wanted < input.size() ? wanted : input.size());
+    input = input.subspan(datagram.size());
+    session.advance(now);
+    session.note_host_drops(datagram.size() % 7);
+    session.receive(datagram, now, accepted);
+  }
+  const Counters& counters = session.counters();
+  if (counters.expected != counters.received + counters.lost_network + counters.lost_host) std::abort();
+  if (counters.received != accepted.size()) std::abort();
+  return 0;
+}
