@@ -1,0 +1,51 @@
+#include "drivers/sim/bench.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+
+namespace kphi::sim {
+namespace {
+
+constexpr double kSafeToTouch = 5.0;  // rad/s
+
+/// Exact in integers: no drift of the ticks against the clock.
+constexpr Instant time_of_tick(std::uint64_t tick) noexcept {
+  return Instant(static_cast<std::int64_t>(tick * 1'000'000 / 7));
+}
+static_assert(kTicksPerSecond == 7000);
+
+}  // namespace
+
+SimulatedBench::SimulatedBench(const BenchSettings& settings)
+    : plant_(settings.plant, settings.seed),
+      netbox_(settings.netbox),
+      motor_({settings.module_id, settings.oscillator_gain, settings.time_scale}, plant_.motor()) {}
+
+void SimulatedBench::mount(const std::string& propeller_id, double occlusion_deg) {
+  const PropellerTruth* propeller = find_propeller(propeller_id);
+  if (propeller == nullptr) {
+    throw std::invalid_argument("no propeller '" + propeller_id + "' here; there are 5x2, 5x3, 6x2, 6x3");
+  }
+  if (!(occlusion_deg >= 0 && occlusion_deg < 360)) {
+    throw std::invalid_argument(fmt::format("occlusion {} deg is outside [0, 360)", occlusion_deg));
+  }
+  const double speed = plant_.motor().speed;
+  if (std::abs(speed) > kSafeToTouch) {
+    throw std::invalid_argument(fmt::format("the motor turns at {:.0f} rad/s; coast it and wait", speed));
+  }
+  plant_.mount(propeller, occlusion_deg);
+  mounted_ = fmt::format("{} {}", propeller_id, occlusion_deg);
+}
+
+void SimulatedBench::advance(Instant now) {
+  for (Instant at = time_of_tick(ticks_ + 1); at <= now; at = time_of_tick(ticks_ + 1)) {
+    ++ticks_;
+    motor_.advance(at);
+    plant_.step(motor_.drive());
+    netbox_.sample({at, plant_.reading()});
+  }
+}
+
+}  // namespace kphi::sim

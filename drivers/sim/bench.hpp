@@ -1,0 +1,54 @@
+// The simulated bench: physics, load cell box and motor module joined on one time. Single-threaded, no I/O, no clock:
+// the same inputs at the same bench times give the same bytes. The server puts transports around it; a deterministic
+// campaign joins it directly with the drivers' sessions.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "drivers/clock.hpp"
+#include "drivers/sim/iq_device.hpp"
+#include "drivers/sim/netbox_device.hpp"
+#include "drivers/sim/plant.hpp"
+
+namespace kphi::sim {
+
+struct BenchSettings {
+  std::uint64_t seed = 1;
+  double time_scale = 1;  ///< stretches the module's communication timeout, nothing else: it is a deadline of wall time
+  NetBoxSettings netbox;
+  int module_id = 0;
+  double oscillator_gain = 0;  ///< see IqSettings
+  PlantParameters plant;
+};
+
+class SimulatedBench {
+ public:
+  explicit SimulatedBench(const BenchSettings& settings);
+  SimulatedBench(const SimulatedBench&) = delete;
+  SimulatedBench& operator=(const SimulatedBench&) = delete;
+
+  /// Occlusion in degrees, [0, 360). Throws std::invalid_argument for an unknown propeller, an angle out of range, or
+  /// while the shaft turns faster than 5 rad/s: nobody reaches into a turning propeller.
+  void mount(const std::string& propeller_id, double occlusion_deg);
+  /// "5x3 90"; empty while only the bare motor stands there, as after power-up.
+  [[nodiscard]] std::string mounted() const { return mounted_; }
+
+  /// Physics up to and including `now`, 7000 internal ticks per second; the past is ignored. Bytes for the devices are
+  /// given to them after this was called with the time of their arrival.
+  void advance(Instant now);
+
+  [[nodiscard]] NetBoxDevice& netbox() noexcept { return netbox_; }
+  [[nodiscard]] IqDevice& motor() noexcept { return motor_; }
+  [[nodiscard]] const Plant& plant() const noexcept { return plant_; }
+  [[nodiscard]] std::uint64_t ticks() const noexcept { return ticks_; }
+
+ private:
+  Plant plant_;
+  NetBoxDevice netbox_;
+  IqDevice motor_;
+  std::string mounted_;
+  std::uint64_t ticks_ = 0;
+};
+
+}  // namespace kphi::sim

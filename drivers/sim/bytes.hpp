@@ -1,0 +1,34 @@
+// Numbers to bytes and back, for the simulated ends of the wires only: the Net Box is big-endian, the motor
+// little-endian.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+namespace kphi::sim {
+
+inline void put_big(std::uint8_t* to, std::uint32_t value) noexcept {
+  to[0] = static_cast<std::uint8_t>(value >> 24);
+  to[1] = static_cast<std::uint8_t>(value >> 16);
+  to[2] = static_cast<std::uint8_t>(value >> 8);
+  to[3] = static_cast<std::uint8_t>(value);
+}
+
+[[nodiscard]] inline std::uint32_t big(std::span<const std::uint8_t> bytes) noexcept {
+  std::uint32_t value = 0;
+  for (const std::uint8_t byte : bytes) value = value << 8 | byte;
+  return value;
+}
+
+inline void put_little(std::uint8_t* to, std::uint32_t value, std::size_t size) noexcept {
+  for (std::size_t i = 0; i < size; ++i) to[i] = static_cast<std::uint8_t>(value >> (8 * i));
+}
+
+[[nodiscard]] inline std::uint32_t little(std::span<const std::uint8_t> bytes) noexcept {
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < bytes.size() && i < 4; ++i) value |= static_cast<std::uint32_t>(bytes[i]) << (8 * i);
+  return value;
+}
+
+}  // namespace kphi::sim

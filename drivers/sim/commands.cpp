@@ -1,0 +1,158 @@
+#include "drivers/sim/commands.hpp"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "drivers/device_error.hpp"
+#include "drivers/sim/control_line.hpp"
+#include "drivers/sim/server.hpp"
+#include "drivers/sim/truth.hpp"
+#include "profiles/bench.hpp"
+#include "profiles/configuration_error.hpp"
+
+namespace kphi::sim {
+namespace {
+
+struct Options {
+  std::string bench;
+  std::string truth;
+  std::string resolved;
+  std::string mount;
+  bool status = false;
+  bool free_ports = false;
+  std::optional<double> time_scale;
+  std::optional<std::uint64_t> seed;
+};
+
+std::atomic<Server*> running{nullptr};
+
+void stop_running(int) {
+  if (Server* server = running.load()) server->request_stop();
+}
+
+[[noreturn]] void refuse(const profiles::Bench& bench, const std::string& what) {
+  throw ConfigurationError(bench.path + ": " + what);
+}
+
+profiles::Bench load_simulated(const Options& options) {
+  profiles::Bench bench = profiles::load_bench(options.bench);
+  if (!bench.simulation)
+    refuse(bench, "this is a real bench; only a file with a 'simulation:' section can be simulated");
+  if (bench.simulation->in_process) refuse(bench, "simulation.in_process needs no server; run the campaign directly");
+  if (bench.thrust_axis != 2 || bench.thrust_sign != 1 || bench.iq.spin != 1) {
+    refuse(bench,
+           "the simulated propellers pull along +Fz when they spin counter-clockwise; set thrust_axis \"+Fz\" and "
+           "iq.spin +1");
+  }
+  if (options.time_scale) bench.simulation->time_scale = *options.time_scale;
+  if (options.seed) bench.simulation->seed = *options.seed;
+  return bench;
+}
+
+ServerSettings settings_of(const profiles::Bench& bench, const Options& options) {
+  ServerSettings settings;
+  settings.bench.seed = bench.simulation->seed;
+  settings.bench.time_scale = bench.simulation->time_scale;
+  settings.bench.module_id = bench.iq.module_id;
+  settings.bench.netbox.rate_hz = bench.netbox.rate_hz;
+  settings.bench.netbox.records_per_datagram = bench.netbox.records_per_datagram;
+  settings.bench.netbox.address = bench.netbox.host;
+  settings.host = bench.netbox.host;
+  settings.rdt_port = options.free_ports ? 0 : bench.netbox.rdt_port;
+  settings.http_port = options.free_ports ? 0 : bench.netbox.http_port;
+  settings.device = bench.iq.device;
+  settings.control = bench.simulation->control;
+  return settings;
+}
+
+void write_file(const std::string& path, const std::string& text) {
+  std::ofstream file(path);
+  file << text << std::flush;
+  if (!file) throw DeviceError("file " + path, "write", "failed", "name a file that you may write");
+}
+
+std::string resolved_text(const profiles::Bench& bench, const Addresses& addresses) {
+  YAML::Node file = YAML::Load(bench.text);
+  file["netbox"]["rdt_port"] = addresses.rdt_port;
+  file["netbox"]["http_port"] = addresses.http_port;
+  file["iq"]["device"] = addresses.device;
+  file["simulation"]["control"] = addresses.control;
+  file["simulation"]["time_scale"] = fmt::format("{}", bench.simulation->time_scale);
+  file["simulation"]["seed"] = bench.simulation->seed;
+  return YAML::Dump(file) + "\n";
+}
+
+std::string ready_line(const profiles::Bench& bench, const Addresses& addresses) {
+  const nlohmann::ordered_json json{{"rdt", fmt::format("{}:{}", addresses.host, addresses.rdt_port)},
+                                    {"http", fmt::format("{}:{}", addresses.host, addresses.http_port)},
+                                    {"device", addresses.device},
+                                    {"control", addresses.control},
+                                    {"time_scale", bench.simulation->time_scale},
+                                    {"seed", bench.simulation->seed}};
+  return json.dump();
+}
+
+int talk(const profiles::Bench& bench, const std::string& line) {
+  const std::string answer = tell(control_path(bench.simulation->control), line);
+  fmt::print("{}\n", answer);
+  return answer.rfind("error", 0) == 0 ? 1 : 0;
+}
+
+void serve(const profiles::Bench& bench, const Options& options) {
+  Server server(settings_of(bench, options));
+  if (!options.truth.empty()) write_file(options.truth, truth_yaml(bench.simulation->seed));
+  if (!options.resolved.empty()) write_file(options.resolved, resolved_text(bench, server.addresses()));
+  running = &server;
+  std::signal(SIGINT, stop_running);
+  std::signal(SIGTERM, stop_running);
+  fmt::print("{}\n", ready_line(bench, server.addresses()));
+  std::fflush(stdout);
+  fmt::print(stderr, "kphi sim: the bench of {} runs {} times as fast as a clock; end it with Ctrl-C\n", bench.path,
+             bench.simulation->time_scale);
+  server.run();
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+  running = nullptr;
+  const auto& unsent = server.unsent();
+  if (unsent.datagrams + unsent.motor_bytes > 0) {
+    fmt::print(stderr, "kphi sim: not sent for want of room: {} datagrams, {} motor bytes\n", unsent.datagrams,
+               unsent.motor_bytes);
+  }
+}
+
+int run(const Options& options) {
+  const profiles::Bench bench = load_simulated(options);
+  if (!options.mount.empty()) return talk(bench, "mount " + options.mount);
+  if (options.status) return talk(bench, "status");
+  serve(bench, options);
+  return 0;
+}
+
+}  // namespace
+
+void add_sim(CLI::App& program, int& exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App* sim = program.add_subcommand("sim", "run the simulated bench of a bench file, or talk to a running one");
+  sim->add_option("BENCH", options->bench, "bench file with a 'simulation:' section")->required();
+  sim->add_option("--truth", options->truth, "write what is true of the simulated propellers to this file (YAML)");
+  sim->add_option("--time-scale", options->time_scale, "bench seconds per second, instead of the file's")
+      ->check(CLI::Range(0.1, 1000.0));
+  sim->add_option("--seed", options->seed, "of the noise, instead of the file's");
+  sim->add_option("--resolved", options->resolved, "write a copy of the bench file with the actual addresses");
+  sim->add_flag("--free-ports", options->free_ports, "listen on any free ports instead of the file's; see --resolved");
+  auto* mount = sim->add_option("--mount", options->mount, "tell the running simulator what is mounted: \"5x3 90\"");
+  sim->add_flag("--status", options->status, "ask the running simulator how it is: one line of JSON")->excludes(mount);
+  sim->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace kphi::sim

@@ -1,0 +1,114 @@
+#include "drivers/sim/control_line.hpp"
+
+#include <fmt/format.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <vector>
+
+#include "drivers/device_error.hpp"
+#include "drivers/sim/descriptor.hpp"
+
+namespace kphi::sim {
+namespace {
+
+std::vector<std::string> words_of(std::string_view line) {
+  std::vector<std::string> words;
+  constexpr std::string_view kBlanks = " \t\r";
+  while (true) {
+    const auto begin = line.find_first_not_of(kBlanks);
+    if (begin == std::string_view::npos) return words;
+    line.remove_prefix(begin);
+    const auto word = line.substr(0, line.find_first_of(kBlanks));
+    words.emplace_back(word);
+    line.remove_prefix(word.size());
+  }
+}
+
+std::string mount(SimulatedBench& bench, const std::string& propeller, const std::string& angle) {
+  double occlusion_deg = 0;
+  const auto [end, error] = std::from_chars(angle.data(), angle.data() + angle.size(), occlusion_deg);
+  if (error != std::errc{} || end != angle.data() + angle.size()) return "error '" + angle + "' is no angle in degrees";
+  try {
+    bench.mount(propeller, occlusion_deg);
+  } catch (const std::invalid_argument& refusal) {
+    return std::string("error ") + refusal.what();
+  }
+  return "ok " + bench.mounted();
+}
+
+std::string_view name_of(MotorDrive::Mode mode) noexcept {
+  constexpr std::array<std::string_view, 5> kNames{"brake", "coast", "volts", "pwm", "velocity"};
+  return kNames[static_cast<std::size_t>(mode)];
+}
+
+std::string status(SimulatedBench& bench) {
+  const auto& drive = bench.motor().drive();
+  nlohmann::ordered_json json{{"mounted", bench.mounted()},
+                              {"bench_time_s", static_cast<double>(bench.ticks()) * kTick},
+                              {"speed_rad_s", bench.plant().motor().speed},
+                              {"thrust_n", bench.plant().thrust()},
+                              {"coil_celsius", bench.plant().motor().coil_celsius},
+                              {"streaming", bench.netbox().streaming()},
+                              {"samples_sent", bench.netbox().records_sent()},
+                              {"motor_timeouts", bench.motor().timeouts()},
+                              {"drive", {{"mode", name_of(drive.mode)}, {"target", drive.target}}},
+                              {"last_motion_command_s", nullptr}};
+  const Instant last = bench.motor().last_motion_command();
+  if (last >= Instant{0}) json["last_motion_command_s"] = to_seconds(last);
+  return json.dump();
+}
+
+}  // namespace
+
+std::string control_answer(SimulatedBench& bench, std::string_view line) {
+  const auto words = words_of(line);
+  if (words.size() == 3 && words[0] == "mount") return mount(bench, words[1], words[2]);
+  if (words.size() == 1 && words[0] == "status") return status(bench);
+  return "error say 'mount PROPELLER DEGREES' or 'status'";
+}
+
+std::string control_path(const std::string& configured) {
+  const std::filesystem::path path(configured);
+  return path.is_absolute() ? path.string() : (std::filesystem::temp_directory_path() / path).string();
+}
+
+std::string tell(const std::string& path, const std::string& line) {
+  const auto refuse = [&](const char* operation, const std::string& cause) -> DeviceError {
+    return {"simulated bench " + path, operation, cause, "start it with: kphi sim BENCH"};
+  };
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.size() >= sizeof address.sun_path) throw refuse("connect", "the path is longer than a socket's may be");
+  std::memcpy(address.sun_path, path.data(), path.size());
+  const Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  const timeval patience{3, 0};
+  ::setsockopt(socket.number(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  if (::connect(socket.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    throw refuse("connect", std::strerror(errno));
+  }
+  const std::string question = line + "\n";
+  if (::send(socket.number(), question.data(), question.size(), MSG_NOSIGNAL) !=
+      static_cast<ssize_t>(question.size())) {
+    throw refuse("send", std::strerror(errno));
+  }
+  std::string answer;
+  std::array<char, 512> bytes{};
+  while (answer.find('\n') == std::string::npos) {
+    const ssize_t count = ::recv(socket.number(), bytes.data(), bytes.size(), 0);
+    if (count < 0 && errno == EINTR) continue;
+    if (count == 0) throw refuse("wait for an answer", "the connection was closed");
+    if (count < 0) throw refuse("wait for an answer", std::strerror(errno));
+    answer.append(bytes.data(), static_cast<std::size_t>(count));
+  }
+  return answer.substr(0, answer.find('\n'));
+}
+
+}  // namespace kphi::sim

@@ -1,0 +1,237 @@
+#include "drivers/sim/server.hpp"
+
+#include <arpa/inet.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "drivers/device_error.hpp"
+#include "drivers/sim/control_line.hpp"
+
+namespace kphi::sim {
+namespace {
+
+constexpr std::chrono::milliseconds kWakeUp{1};  // wall time
+constexpr int kCatchUp = 8;                      // bench time per wake-up, in wake-ups
+constexpr int kQuiet = 1000;                     // wake-ups without a byte: the client is gone
+constexpr std::size_t kBatch = 64;               // datagrams per system call
+
+[[noreturn]] void refuse(const std::string& where, const std::string& operation, const std::string& cause,
+                         const std::string& next_move) {
+  throw DeviceError("simulated bench " + where, operation, cause, next_move);
+}
+
+sockaddr_in address_of(const std::string& host, std::uint16_t port) {
+  addrinfo hints{};
+  hints.ai_family = AF_INET;
+  addrinfo* found = nullptr;
+  if (const int error = ::getaddrinfo(host.c_str(), nullptr, &hints, &found); error != 0) {
+    refuse(host, "resolve", ::gai_strerror(error), "name an address of this machine in netbox.host");
+  }
+  sockaddr_in address{};
+  std::memcpy(&address, found->ai_addr, sizeof address);
+  ::freeaddrinfo(found);
+  address.sin_port = htons(port);
+  return address;
+}
+
+Peer peer_of(const sockaddr_in& address) noexcept {
+  return static_cast<Peer>(address.sin_addr.s_addr) << 16 | address.sin_port;
+}
+
+sockaddr_in address_of(Peer peer) noexcept {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = static_cast<in_addr_t>(peer >> 16);
+  address.sin_port = static_cast<in_port_t>(peer & 0xffff);
+  return address;
+}
+
+sockaddr_un unix_address_of(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.empty() || path.size() >= sizeof address.sun_path) {
+    refuse("control '" + path + "'", "open control line", "no path, or longer than a socket's may be",
+           "set simulation.control in the bench file");
+  }
+  std::memcpy(address.sun_path, path.data(), path.size());
+  return address;
+}
+
+bool answers(const sockaddr_un& address) {
+  const Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  return ::connect(probe.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+}
+
+}  // namespace
+
+Server::Server(const ServerSettings& settings)
+    : time_scale_(settings.bench.time_scale),
+      addresses_{settings.host, 0, 0, {}, control_path(settings.control)},
+      bench_(settings.bench),
+      stop_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
+      rdt_(listen_at(SOCK_DGRAM, settings.rdt_port)),
+      web_(listen_at(SOCK_STREAM, settings.http_port)),
+      pty_(settings.device),
+      http_(std::move(web_.socket), {"\r\n\r\n", true, 1},
+            [this](std::string_view request) { return bench_.netbox().http(request); }),
+      control_(listen_for_control(), {"\n", false, 16},
+               [this](std::string_view line) { return control_answer(bench_, line) + "\n"; }),
+      batch_(kBatch) {
+  addresses_.rdt_port = rdt_.port;
+  addresses_.http_port = web_.port;
+  addresses_.device = pty_.path();
+}
+
+Server::~Server() { ::unlink(addresses_.control.c_str()); }
+
+Server::Listening Server::listen_at(int type, std::uint16_t port) const {
+  sockaddr_in address = address_of(addresses_.host, port);
+  Descriptor socket(::socket(AF_INET, type | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  const int yes = 1;
+  if (type == SOCK_STREAM) ::setsockopt(socket.number(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  const int buffer = 4 << 20;
+  if (type == SOCK_DGRAM) ::setsockopt(socket.number(), SOL_SOCKET, SO_SNDBUF, &buffer, sizeof buffer);
+  socklen_t size = sizeof address;
+  auto* generic = reinterpret_cast<sockaddr*>(&address);
+  const bool open = ::bind(socket.number(), generic, size) == 0 &&
+                    (type == SOCK_DGRAM || ::listen(socket.number(), 16) == 0) &&
+                    ::getsockname(socket.number(), generic, &size) == 0;
+  if (!open) {
+    refuse(addresses_.host + ":" + std::to_string(port), "listen", std::strerror(errno),
+           "is another simulator running? Else choose other ports in the bench file");
+  }
+  return {std::move(socket), ntohs(address.sin_port)};
+}
+
+Descriptor Server::listen_for_control() const {
+  const std::string& path = addresses_.control;
+  const sockaddr_un address = unix_address_of(path);
+  std::error_code error;
+  const auto folder = std::filesystem::path(path).parent_path();
+  std::filesystem::create_directories(folder, error);
+  if (std::filesystem::is_socket(path, error)) {
+    if (answers(address)) refuse(path, "open control line", "another simulator answers there", "end it first");
+    ::unlink(path.c_str());
+  }
+  Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  if (::bind(socket.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+      ::listen(socket.number(), 16) != 0) {
+    refuse(path, "open control line", std::strerror(errno), "set simulation.control in the bench file to a free path");
+  }
+  return socket;
+}
+
+void Server::request_stop() noexcept {
+  const std::uint64_t one = 1;
+  [[maybe_unused]] const ssize_t written = ::write(stop_.number(), &one, sizeof one);
+}
+
+std::vector<pollfd> Server::polls() const {
+  std::vector<pollfd> all{{stop_.number(), POLLIN, 0}, {rdt_.socket.number(), POLLIN, 0}, {pty_.number(), POLLIN, 0}};
+  http_.append_polls(all);
+  control_.append_polls(all);
+  return all;
+}
+
+void Server::run() {
+  const SteadyClock clock(time_scale_);
+  const Duration step_size = clock.stretched(kWakeUp);
+  Instant reached{0};
+  bool behind = false;
+  while (true) {
+    auto waiting = polls();
+    ::poll(waiting.data(), waiting.size(), behind ? 0 : static_cast<int>(kWakeUp.count()));
+    if (waiting.front().revents != 0) return;
+    const Instant now = clock.now();
+    const Instant goal = std::min(now, reached + kCatchUp * step_size);
+    behind = goal < now;
+    while (reached < goal) {
+      reached = std::min(goal, reached + step_size);
+      step(reached);
+    }
+    http_.serve();
+    control_.serve();
+  }
+}
+
+void Server::step(Instant now) {
+  bench_.advance(now);
+  hear_requests();
+  hear_motor(now);
+  send_datagrams();
+  send_motor();
+}
+
+void Server::hear_requests() {
+  std::array<std::uint8_t, 64> bytes{};
+  while (true) {
+    sockaddr_in from{};
+    socklen_t size = sizeof from;
+    const ssize_t count = ::recvfrom(rdt_.socket.number(), bytes.data(), bytes.size(), MSG_TRUNC,
+                                     reinterpret_cast<sockaddr*>(&from), &size);
+    if (count < 0) return;
+    const auto length = std::min(static_cast<std::size_t>(count), bytes.size());
+    bench_.netbox().receive(std::span(bytes).first(length), peer_of(from));
+  }
+}
+
+void Server::hear_motor(Instant now) {
+  std::array<std::uint8_t, 512> bytes{};
+  const std::size_t count = pty_.read(bytes);
+  if (count > 0) bench_.motor().receive(std::span(bytes).first(count), now);
+  quiet_steps_ = count > 0 ? 0 : quiet_steps_ + 1;
+  if (quiet_steps_ == kQuiet) pty_.unlock();
+}
+
+void Server::send_datagrams() {
+  std::size_t count = 0;
+  while (bench_.netbox().next_datagram(batch_[count])) {
+    if (++count < kBatch) continue;
+    send_batch(batch_, count);
+    count = 0;
+  }
+  send_batch(batch_, count);
+}
+
+void Server::send_batch(std::vector<Datagram>& batch, std::size_t count) {
+  std::array<sockaddr_in, kBatch> to{};
+  std::array<iovec, kBatch> parts{};
+  std::array<mmsghdr, kBatch> messages{};
+  for (std::size_t i = 0; i < count; ++i) {
+    to[i] = address_of(batch[i].peer);
+    parts[i] = {batch[i].bytes.data(), batch[i].size};
+    messages[i].msg_hdr.msg_name = &to[i];
+    messages[i].msg_hdr.msg_namelen = sizeof to[i];
+    messages[i].msg_hdr.msg_iov = &parts[i];
+    messages[i].msg_hdr.msg_iovlen = 1;
+  }
+  for (std::size_t sent = 0; sent < count;) {
+    const int accepted =
+        ::sendmmsg(rdt_.socket.number(), &messages[sent], static_cast<unsigned>(count - sent), MSG_NOSIGNAL);
+    if (accepted < 0 && errno == EINTR) continue;
+    if (accepted <= 0) {  // this one will not go; the next may
+      ++unsent_.datagrams;
+      ++sent;
+    } else {
+      sent += static_cast<std::size_t>(accepted);
+    }
+  }
+}
+
+void Server::send_motor() {
+  auto& bytes = bench_.motor().output();
+  if (bytes.empty()) return;
+  unsent_.motor_bytes += bytes.size() - pty_.write(bytes);
+  bytes.clear();
+}
+
+}  // namespace kphi::sim

@@ -1,0 +1,88 @@
+// The simulated bench on its true transports: UDP and HTTP for the load cell's box, a pseudo-terminal for the motor, a
+// Unix-domain socket for the person who mounts propellers. One thread, poll(), a wake-up per millisecond at least.
+#pragma once
+
+#include <poll.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "drivers/clock.hpp"
+#include "drivers/sim/bench.hpp"
+#include "drivers/sim/conversations.hpp"
+#include "drivers/sim/descriptor.hpp"
+#include "drivers/sim/pty.hpp"
+
+namespace kphi::sim {
+
+struct ServerSettings {
+  BenchSettings bench;             ///< time_scale there is also the scale of the clock
+  std::string host = "127.0.0.1";  ///< IPv4 name or address to listen on
+  std::uint16_t rdt_port = 0;      ///< 0: any free one
+  std::uint16_t http_port = 0;     ///< 0: any free one
+  std::string device;              ///< symlink to the motor's pseudo-terminal; empty: its own /dev/pts name only
+  std::string control;             ///< path of the control socket; see control_path
+};
+
+/// Where it can be reached, after ports and names were given out.
+struct Addresses {
+  std::string host;
+  std::uint16_t rdt_port = 0;
+  std::uint16_t http_port = 0;
+  std::string device;
+  std::string control;
+};
+
+/// What the transports would not take.
+struct Unsent {
+  std::uint64_t datagrams = 0;    ///< socket buffer full
+  std::uint64_t motor_bytes = 0;  ///< nobody reads the serial line
+};
+
+class Server {
+ public:
+  /// Opens everything. Throws DeviceError; another simulator on the same control socket is such an error.
+  explicit Server(const ServerSettings& settings);
+  ~Server();  ///< removes control socket and symlink
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  [[nodiscard]] const Addresses& addresses() const noexcept { return addresses_; }
+  /// Runs the bench until request_stop(). After a stall it catches up at most eight times as fast as time passes.
+  void run();
+  /// From any thread, and from a signal handler.
+  void request_stop() noexcept;
+  /// To be read when run() has returned.
+  [[nodiscard]] const Unsent& unsent() const noexcept { return unsent_; }
+
+ private:
+  struct Listening {
+    Descriptor socket;
+    std::uint16_t port;
+  };
+  [[nodiscard]] Listening listen_at(int type, std::uint16_t port) const;
+  [[nodiscard]] Descriptor listen_for_control() const;
+  [[nodiscard]] std::vector<pollfd> polls() const;
+  void step(Instant now);
+  void hear_requests();
+  void hear_motor(Instant now);
+  void send_datagrams();
+  void send_batch(std::vector<Datagram>& batch, std::size_t count);
+  void send_motor();
+
+  double time_scale_;
+  Addresses addresses_;
+  SimulatedBench bench_;
+  Descriptor stop_;
+  Listening rdt_;
+  Listening web_;
+  Pty pty_;
+  Conversations http_;
+  Conversations control_;
+  std::vector<Datagram> batch_;
+  Unsent unsent_;
+  int quiet_steps_ = 0;  ///< of the serial line
+};
+
+}  // namespace kphi::sim
