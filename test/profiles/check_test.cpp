@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -35,9 +36,9 @@ class Check : public testing::Test {
     });
   }
 
-  std::filesystem::path folder_ =
-      std::filesystem::temp_directory_path() /
-      ("kphi_check_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+  std::filesystem::path folder_ = std::filesystem::temp_directory_path() /
+                                  ("kphi_check_" + std::to_string(getpid()) + "_" +
+                                   std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
   std::vector<std::string> judged_;
   bool coefficients_are_wrong_ = false;
 };

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -227,7 +228,7 @@ TEST(Files, ThatCannotBeReadAreNamedWithTheReason) {
                                          "/no/such.yaml: cannot be opened: No such file or directory; check the name"));
   EXPECT_THAT(read("/"), testing::ThrowsMessage<ConfigurationError>("/: cannot be read: Is a directory; name a file"));
 
-  const auto path = std::filesystem::temp_directory_path() / "kphi_profiles_test_large.yaml";
+  const auto path = std::filesystem::temp_directory_path() / ("kphi_large_" + std::to_string(getpid()) + ".yaml");
   std::ofstream(path) << std::string(kMaxTextBytes + 1, '#');
   EXPECT_THAT(read(path.string()), testing::ThrowsMessage<ConfigurationError>(HasSubstr("larger than 1 MiB")));
   std::filesystem::remove(path);
