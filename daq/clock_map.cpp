@@ -40,24 +40,22 @@ double ClockMap::device_ns(const ClockEpoch& epoch, std::size_t index) const {
   return static_cast<double>(records_[index].ft_sequence - epoch.ft_first) * tick_ns_;
 }
 
+/// Of a datagram of many records only the last is fresh: the others waited for it.
+bool ClockMap::fresh(const ClockEpoch& epoch, std::size_t index) const {
+  return index + 1 == epoch.end || records_[index + 1].arrival_ns != records_[index].arrival_ns;
+}
+
 void ClockMap::fit(ClockEpoch& epoch) const {
   const results::Nanoseconds first_arrival = records_[epoch.begin].arrival_ns;
   const auto point = [&](std::size_t i) {
     const double device = device_ns(epoch, i);
     return Point{device, static_cast<double>(records_[i].arrival_ns - first_arrival) - device};
   };
-  // Of a datagram of many records only the last is fresh: the others waited for it.
-  const auto fresh = [&](std::size_t i) {
-    return i + 1 == epoch.end || records_[i + 1].arrival_ns != records_[i].arrival_ns;
-  };
-
   std::vector<Point> bins;
-  std::vector<Point> all;
   double bin_end = -1;
   for (std::size_t i = epoch.begin; i < epoch.end; ++i) {
-    if (!fresh(i)) continue;
+    if (!fresh(epoch, i)) continue;
     const Point p = point(i);
-    all.push_back(p);
     if (p.device_ns >= bin_end) {
       bins.push_back(p);
       bin_end = (std::floor(p.device_ns / kBinNs) + 1) * kBinNs;
@@ -85,13 +83,17 @@ void ClockMap::fit(ClockEpoch& epoch) const {
                       })->delay_ns;
   }
 
+  epoch.offset_ns += static_cast<double>(first_arrival);
+}
+
+double ClockMap::residual_p99_ns(const ClockEpoch& epoch) const {
   std::vector<double> residuals;
-  residuals.reserve(all.size());
-  for (const Point& p : all) residuals.push_back(p.delay_ns - epoch.offset_ns - epoch.skew * p.device_ns);
+  for (std::size_t i = epoch.begin; i < epoch.end; ++i) {
+    if (fresh(epoch, i)) residuals.push_back(static_cast<double>(records_[i].arrival_ns - time_ns(epoch, i)));
+  }
   const auto p99 = residuals.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(residuals.size() - 1));
   std::nth_element(residuals.begin(), p99, residuals.end());
-  epoch.residual_p99_ns = *p99;
-  epoch.offset_ns += static_cast<double>(first_arrival);
+  return *p99;
 }
 
 results::Nanoseconds ClockMap::time_ns(const ClockEpoch& epoch, std::size_t index) const {

@@ -16,10 +16,9 @@ struct ClockEpoch {
   std::size_t begin = 0;  ///< index of the first record
   std::size_t end = 0;    ///< one past the last
   std::uint32_t ft_first = 0;
-  double offset_ns = 0;        ///< bench time of the first record
-  double skew = 0;             ///< bench ns gained per device ns
-  double residual_p99_ns = 0;  ///< 99 % of the fresh records came less than this after the line
-  std::size_t bins = 0;        ///< points under the line; with fewer than 4 the skew is taken as 0
+  double offset_ns = 0;  ///< bench time of the first record
+  double skew = 0;       ///< bench ns gained per device ns
+  std::size_t bins = 0;  ///< points under the line; with fewer than 4 the skew is taken as 0
 };
 
 class ClockMap {
@@ -33,6 +32,8 @@ class ClockMap {
   [[nodiscard]] results::Nanoseconds time_ns(const ClockEpoch& epoch, std::size_t index) const;
   /// First record of `epoch` at or after `time`; epoch.end when there is none.
   [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, results::Nanoseconds time) const;
+  /// 99 % of the fresh records of an epoch came less than this after the line, ns. Looks at all of them again.
+  [[nodiscard]] double residual_p99_ns(const ClockEpoch& epoch) const;
   /// Skew of an epoch in parts per million.
   [[nodiscard]] static double skew_ppm(const ClockEpoch& epoch) { return 1e6 * epoch.skew; }
   /// Below 500 ppm; more means that rate or stride are not what the box said.
@@ -40,6 +41,7 @@ class ClockMap {
 
  private:
   [[nodiscard]] double device_ns(const ClockEpoch& epoch, std::size_t index) const;
+  [[nodiscard]] bool fresh(const ClockEpoch& epoch, std::size_t index) const;
   void fit(ClockEpoch& epoch) const;
   std::span<const results::LoadCellRecord> records_;
   double tick_ns_;

@@ -5,6 +5,3 @@ add_library(kphi_reduction STATIC
   repetitions.cpp
 )
 target_link_libraries(kphi_reduction PUBLIC kphi_options kphi_results PRIVATE fmt::fmt)
-
-add_library(kphi_replay STATIC replay_commands.cpp)
-target_link_libraries(kphi_replay PUBLIC kphi_reduction CLI11::CLI11 PRIVATE kphi_profiles nlohmann_json::nlohmann_json)

@@ -1,0 +1,286 @@
+#include "daq/reduction.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "daq/repetitions.hpp"
+#include "results/record_error.hpp"
+#include "results/run_reader.hpp"
+#include "results/steps_csv.hpp"
+#include "test/results/synthetic_run.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using results::Doubt;
+using results::RunRecording;
+using results::StepMean;
+using results::test::make_run;
+using results::test::Truth;
+
+bool has(const StepMean& step, Doubt doubt) { return (step.doubts & static_cast<std::uint32_t>(doubt)) != 0; }
+
+double k_of(const StepMean& step) { return step.thrust_n / (step.speed_rad_s * step.speed_rad_s); }
+
+TEST(Reduction, FindsTheKnownCoefficientWithoutDoubt) {
+  const Truth truth;
+  const auto steps = reduce(make_run(truth));
+  ASSERT_EQ(steps.size(), truth.speeds.size());
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const StepMean& step = steps[i];
+    EXPECT_EQ(step.step, static_cast<int>(i));
+    EXPECT_EQ(step.commanded_speed_rad_s, truth.speeds[i]);
+    EXPECT_NEAR(step.speed_rad_s, truth.speeds[i], 0.01);
+    EXPECT_NEAR(step.thrust_n, truth.k * truth.speeds[i] * truth.speeds[i], 5 * truth.noise_n / std::sqrt(1000.0));
+    EXPECT_NEAR(step.thrust_sd_n, truth.noise_n, 0.1 * truth.noise_n);
+    EXPECT_NEAR(step.torque_nm, truth.torque_share * step.thrust_n, 2e-4);
+    EXPECT_NEAR(static_cast<double>(step.thrust_samples), 1000, 2);
+    EXPECT_EQ(step.supply_voltage_v, 16.0);
+    EXPECT_TRUE(std::isnan(step.motor_current_a));
+    EXPECT_EQ(step.propeller, "5x3");
+    EXPECT_EQ(step.repetition, 2);
+    EXPECT_EQ(results::doubt_names(step.doubts), "");
+  }
+}
+
+TEST(Reduction, SignAndSpinOfTheMountingDoNotShow) {
+  for (const int sign : {-1, 1}) {
+    for (const int spin : {-1, 1}) {
+      Truth truth;
+      truth.sign = sign;
+      truth.spin = spin;
+      const auto steps = reduce(make_run(truth));
+      EXPECT_NEAR(steps[2].thrust_n, 1.2e-6 * 1200 * 1200, 0.005);
+      EXPECT_NEAR(steps[2].zero_n, sign * truth.zero_force_n, 0.005);
+      EXPECT_GT(steps[2].torque_nm, 0);
+      EXPECT_GT(steps[2].speed_rad_s, 0);
+    }
+  }
+}
+
+TEST(Reduction, ADriftingZeroIsInterpolatedInTime) {
+  Truth truth;
+  truth.noise_n = 0.001;
+  truth.drift_n_per_s = 0.02;
+  for (const StepMean& step : reduce(make_run(truth))) {
+    EXPECT_NEAR(k_of(step), truth.k, 1e-3 * truth.k) << step.step;
+    const double centre = 0.5 * (step.window_begin_s + step.window_end_s);
+    EXPECT_NEAR(step.zero_n, truth.sign * (truth.zero_force_n + truth.drift_n_per_s * centre), 1e-3);
+  }
+}
+
+TEST(Reduction, ASlowMotorShrinksTheWindowInsteadOfSpoilingTheMean) {
+  Truth truth;
+  truth.noise_n = 0.001;
+  truth.motor_tau_s = 0.3;
+  truth.dwell_s = 3;
+  const auto steps = reduce(make_run(truth));
+  // 0 → 400 rad/s with 0.3 s is within 4 rad/s after 1.38 s.
+  EXPECT_NEAR(steps[0].window_begin_s, truth.zero_s + 1.38, 0.03);
+  EXPECT_EQ(steps[0].window_end_s, truth.zero_s + truth.dwell_s);
+  for (const StepMean& step : steps) {
+    EXPECT_NEAR(k_of(step), truth.k, 2e-3 * truth.k);
+    EXPECT_EQ(results::doubt_names(step.doubts), "");
+  }
+}
+
+TEST(Reduction, ASpeedThatNeverArrivesIsDoubted) {
+  Truth truth;
+  truth.motor_tau_s = 20;
+  const auto steps = reduce(make_run(truth));
+  EXPECT_TRUE(has(steps[0], Doubt::speed_not_reached));
+  EXPECT_EQ(steps[0].window_begin_s, truth.zero_s + 1);
+}
+
+TEST(Reduction, AnUnsteadySpeedIsDoubted) {
+  RunRecording run = make_run({});
+  int n = 0;
+  for (auto& reading : run.motor) {
+    if (reading.channel == results::MotorChannel::speed) reading.value += (n++ % 2 == 0 ? 30 : -30);
+  }
+  EXPECT_TRUE(has(reduce(run)[2], Doubt::speed_unsteady));
+}
+
+TEST(Reduction, LostSamplesAreDoubtedWhereTheyWereLost) {
+  Truth truth;
+  truth.lose = [](std::uint64_t n) { return n >= 4500 && n < 4510; };  // second step: 4 s to 5 s
+  const auto steps = reduce(make_run(truth));
+  EXPECT_FALSE(has(steps[0], Doubt::lost_samples));
+  EXPECT_TRUE(has(steps[1], Doubt::lost_samples));
+  EXPECT_FALSE(has(steps[2], Doubt::lost_samples));
+  EXPECT_NEAR(k_of(steps[1]), truth.k, 5e-3 * truth.k);
+
+  truth.lose = [](std::uint64_t n) { return n >= 3100 && n < 3200; };  // in the discarded second of a step
+  for (const StepMean& step : reduce(make_run(truth))) EXPECT_FALSE(has(step, Doubt::lost_samples));
+
+  truth.lose = [](std::uint64_t n) { return n >= 3900 && n < 4100; };  // across the begin of a window
+  EXPECT_TRUE(has(reduce(make_run(truth))[1], Doubt::lost_samples));
+}
+
+TEST(Reduction, AlmostNoSamplesAreDoubted) {
+  Truth truth;
+  truth.lose = [](std::uint64_t n) { return n >= 4050 && n < 5000; };
+  EXPECT_TRUE(has(reduce(make_run(truth))[1], Doubt::few_samples));
+  truth.lose = [](std::uint64_t n) { return n >= 3500 && n < 5500; };
+  const StepMean step = reduce(make_run(truth))[1];
+  EXPECT_TRUE(has(step, Doubt::few_samples));
+  EXPECT_TRUE(has(step, Doubt::lost_samples));
+  EXPECT_TRUE(std::isnan(step.thrust_n));
+}
+
+TEST(Reduction, StatusWordsBecomeDoubts) {
+  const auto doubts_with = [](std::uint32_t word) {
+    Truth truth;
+    truth.status = [word](double t) { return t > 4.5 && t < 4.51 ? word : 0u; };
+    const auto steps = reduce(make_run(truth));
+    EXPECT_EQ(steps[0].doubts, 0u);
+    return results::doubt_names(steps[1].doubts);
+  };
+  EXPECT_EQ(doubts_with(0x80020000u), "saturated");
+  EXPECT_EQ(doubts_with(0x80010000u), "");  // a monitor condition is no error
+  EXPECT_EQ(doubts_with(0x80000010u), "bad_status");
+  EXPECT_EQ(doubts_with(0x80020010u), "saturated+bad_status");
+}
+
+TEST(Reduction, ACountAtTheEndOfItsRangeIsSaturation) {
+  RunRecording run = make_run({});
+  run.load_cell[4500].counts[2] = 120000000;
+  const auto steps = reduce(run);
+  EXPECT_TRUE(has(steps[1], Doubt::saturated));
+  EXPECT_FALSE(has(steps[0], Doubt::saturated));
+}
+
+TEST(Reduction, ADeratingModuleIsDoubted) {
+  RunRecording run = make_run({});
+  for (auto& r : run.motor) {
+    if (r.channel == results::MotorChannel::derate && r.time_ns > 4200000000 && r.time_ns < 4300000000) r.value = 0.9;
+  }
+  const auto steps = reduce(run);
+  EXPECT_TRUE(has(steps[1], Doubt::derated));
+  EXPECT_FALSE(has(steps[2], Doubt::derated));
+}
+
+TEST(Reduction, TheZeroAfterIsOnlyTakenWhenTheMotorStands) {
+  Truth truth;
+  truth.noise_n = 0.001;
+  RunRecording run = make_run(truth);
+  const double after = results::test::spin_down_at(truth) + results::test::kSpinDown;
+  for (auto& r : run.motor) {
+    if (r.channel == results::MotorChannel::speed && 1e-9 * static_cast<double>(r.time_ns) > after) r.value = 100;
+  }
+  for (auto& r : run.load_cell) {
+    if (1e-9 * static_cast<double>(r.arrival_ns) > after) r.counts[2] += 5000000;
+  }
+  for (const StepMean& step : reduce(run)) EXPECT_NEAR(k_of(step), truth.k, 5e-3 * truth.k);
+}
+
+TEST(Reduction, AnAbortedRunGivesTheStepsBeforeTheLast) {
+  const Truth truth;
+  RunRecording run = make_run(truth);
+  const auto whole = reduce(run);
+  run.outcome = results::Outcome::aborted;
+  run.phases.resize(4);  // zero, three steps
+  run.phases.push_back({results::Phase::spin_down, -1, 5500000000, 0});
+  const auto steps = reduce(run);
+  ASSERT_EQ(steps.size(), 2u);
+  EXPECT_EQ(steps[0].step, 0);
+  EXPECT_NEAR(steps[1].thrust_n, whole[1].thrust_n, 0.01);
+}
+
+TEST(Reduction, WithoutAZeroThereIsNoThrust) {
+  RunRecording run = make_run({});
+  std::erase_if(run.load_cell, [](const auto& r) { return r.arrival_ns < 1500000000 || r.arrival_ns > 7000000000; });
+  EXPECT_THROW((void)reduce(run), results::RecordError);
+  run = make_run({});
+  run.header.load_cell.counts_per_newton = 0;
+  EXPECT_THROW((void)reduce(run), results::RecordError);
+}
+
+TEST(Reduction, ARunWithoutStepsGivesNone) {
+  RunRecording run = make_run({});
+  run.phases.clear();
+  run.load_cell.clear();
+  EXPECT_TRUE(reduce(run).empty());
+}
+
+TEST(Reduction, GivesTheSameBytesFromMemoryAndFromTheFile) {
+  const results::test::TemporaryFolder folder;
+  Truth truth;
+  truth.records_per_datagram = 40;
+  const RunRecording run = make_run(truth);
+  results::test::write_run(folder / "a.h5", run);
+  EXPECT_EQ(results::format_steps(reduce(run)), results::format_steps(reduce(results::read_run(folder / "a.h5"))));
+}
+
+TEST(Reduction, TellsHowFastItIs) {
+  Truth truth;
+  truth.rate_hz = 7000;
+  truth.ft_stride = 1;
+  truth.speeds.assign(83, 500);
+  const RunRecording run = make_run(truth);
+  double best = 1e9;
+  std::size_t steps = 0;
+  for (int i = 0; i < 5; ++i) {
+    const auto begin = std::chrono::steady_clock::now();
+    steps = reduce(run).size();
+    best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+  }
+  std::printf("%zu samples reduced in %.1f ms\n", run.load_cell.size(), 1e3 * best);
+  EXPECT_EQ(steps, 83u);
+}
+
+// ---- repetitions ----
+
+TEST(Repetitions, AverageSoThatThrustOverSpeedSquaredStaysTheCoefficient) {
+  std::vector<StepMean> steps;
+  for (int rep = 1; rep <= 3; ++rep) {
+    StepMean s;
+    s.propeller = "5x3";
+    s.occlusion_deg = 90;
+    s.repetition = rep;
+    s.speed_rad_s = 900 + 50 * rep;
+    s.thrust_n = 1.3e-6 * s.speed_rad_s * s.speed_rad_s;
+    s.thrust_samples = 100;
+    s.doubts = rep == 2 ? static_cast<std::uint32_t>(Doubt::derated) : 0;
+    s.supply_current_a = rep == 1 ? std::nan("") : 2.0 * rep;
+    steps.push_back(s);
+  }
+  const auto mean = average_repetitions(steps);
+  ASSERT_EQ(mean.size(), 1u);
+  EXPECT_EQ(mean[0].repetition, 0);
+  EXPECT_NEAR(k_of(mean[0]), 1.3e-6, 1e-18);
+  EXPECT_EQ(mean[0].thrust_samples, 300u);
+  EXPECT_EQ(mean[0].supply_current_a, 5.0);
+  EXPECT_EQ(results::doubt_names(mean[0].doubts), "derated");
+}
+
+TEST(Repetitions, AreGroupedByPropellerOcclusionAndStep) {
+  std::vector<StepMean> steps;
+  for (const char* propeller : {"b", "a"}) {
+    for (const double phi : {90.0, 0.0}) {
+      for (int rep = 1; rep <= 2; ++rep) {
+        for (int step = 0; step < 3; ++step) {
+          StepMean s;
+          s.propeller = propeller;
+          s.occlusion_deg = phi;
+          s.repetition = rep;
+          s.step = step;
+          s.thrust_n = rep;
+          steps.push_back(s);
+        }
+      }
+    }
+  }
+  const auto means = average_repetitions(steps);
+  ASSERT_EQ(means.size(), 12u);
+  EXPECT_EQ(means[0].propeller, "b");
+  EXPECT_EQ(means[3].occlusion_deg, 0);
+  for (const StepMean& mean : means) EXPECT_EQ(mean.thrust_n, 1.5);
+}
+
+}  // namespace
+}  // namespace kphi::daq
