@@ -38,7 +38,6 @@ bool SequenceAccount::accept_unusual(const Record& record, Instant arrival) noex
 bool SequenceAccount::accept_first(const Record& record, Instant arrival) noexcept {
   has_last_ = true;
   host_credit_ = 0;
-  gap_count_ = 0;
   remember(record, arrival);
   ++counters_.received;
   ++counters_.expected;

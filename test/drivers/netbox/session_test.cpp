@@ -126,8 +126,10 @@ TEST_F(SessionTest, StartsAnywayWhenTheOldStreamDoesNotEnd) {
   }
   EXPECT_LE(now - begun, 20 * settings.settle + 1ms);
   ASSERT_FALSE(commands.empty());
+  now += 2 * settings.settle;
   receive(records(95'000, 5000));  // still the old one
   EXPECT_EQ(session.state(), State::starting);
+  EXPECT_THAT(told(), IsEmpty()) << "a stop now would end the stream that was just asked for";
   receive(records(1, 6000, 40));
   EXPECT_EQ(session.state(), State::streaming);
   EXPECT_EQ(session.counters().expected, 40u);
