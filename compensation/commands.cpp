@@ -1,9 +1,7 @@
 #include "compensation/commands.hpp"
 
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <string>
 
@@ -19,7 +17,7 @@ namespace {
 struct Request {
   std::string coefficients;
   std::string vehicle;
-  ScalingLaw law = ScalingLaw::clamped;
+  std::string law = "clamped";
   bool json = false;
 };
 
@@ -41,7 +39,8 @@ Airframe airframe_of(const profiles::Vehicle& vehicle) {
 Compensator compensator_of(const Request& request) {
   const ThrustLine line = thrust_line(load_coefficients(request.coefficients));
   const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
-  const BuildOutcome outcome = Compensator::build({line, line, line, line}, airframe_of(vehicle), request.law);
+  const ScalingLaw law = request.law == "published" ? ScalingLaw::published : ScalingLaw::clamped;
+  const BuildOutcome outcome = Compensator::build({line, line, line, line}, airframe_of(vehicle), law);
   if (!outcome.compensator) throw ConfigurationError(request.vehicle + ": " + describe(outcome.refusal));
   if (outcome.doubts[0].gains_with_occlusion) {
     std::cerr << request.coefficients << ": the line does not fall with occlusion; is this the right file?\n";
@@ -87,10 +86,9 @@ void add_compensate(CLI::App& program, int& exit_code) {
                              "occlusions, scaling factors and speeds (CSV on stdout)");
   command->add_option("--coefficients", request->coefficients, "coefficients.yaml of `kphi fit`")->required();
   command->add_option("--vehicle", request->vehicle, "Vehicle file, e.g. profiles/foldable_drone.yaml")->required();
-  const std::map<std::string, ScalingLaw> laws = {{"clamped", ScalingLaw::clamped},
-                                                  {"published", ScalingLaw::published}};
-  command->add_option("--law", request->law, "clamped (default) or published (equation 4 to the letter)")
-      ->transform(CLI::CheckedTransformer(laws));
+  command->add_option("--law", request->law, "clamped, or published (equation 4 to the letter)")
+      ->check(CLI::IsMember({"clamped", "published"}))
+      ->capture_default_str();
   command->add_flag("--json", request->json, "One JSON object per row instead of CSV");
   command->callback([request, &exit_code] { exit_code = compensate(*request); });
 }

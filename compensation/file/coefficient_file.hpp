@@ -26,8 +26,8 @@ struct Coefficients {
   struct Propeller {
     std::string id;
     std::string name;
-    double diameter_in = 0;
-    int blades = 0;
+    double diameter_in = 0;  ///< 0 if unknown
+    int blades = 0;          ///< 0 if unknown
   };
   struct Line {
     bool anchored = false;                                           ///< forced through K_T at φ = 0

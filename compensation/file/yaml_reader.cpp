@@ -10,8 +10,9 @@
 namespace kphi::compensation {
 namespace {
 
+/// In quotes "unknown" is a text like any other.
 bool says_nothing(const YAML::Node& node) {
-  return !node.IsDefined() || node.IsNull() || (node.IsScalar() && node.Scalar() == "unknown");
+  return !node.IsDefined() || node.IsNull() || (node.IsScalar() && node.Scalar() == "unknown" && node.Tag() != "!");
 }
 
 }  // namespace

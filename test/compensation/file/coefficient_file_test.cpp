@@ -114,6 +114,10 @@ TEST(CoefficientFile, LetsKeysOfNewerWritersPass) {
 TEST(CoefficientFile, LeavesEmptyWhatIsUnknown) {
   const Coefficients c = parse_coefficients(with(kGood, "air_density_kg_m3: 1.2", "air_density_kg_m3: unknown"), "c");
   EXPECT_FALSE(c.air_density_kg_m3);
+  const Coefficients imported =
+      parse_coefficients(with(with(kGood, "id: 5x3", "id: \"unknown\""), "blades: 3", "blades: unknown"), "c");
+  EXPECT_EQ(imported.propeller.id, "unknown") << "a text in quotes is a name";
+  EXPECT_EQ(imported.propeller.blades, 0);
   const Coefficients bare = parse_coefficients(kGood.substr(0, kGood.find("table:")), "c");
   EXPECT_TRUE(bare.table.empty());
   EXPECT_FALSE(bare.supply);
