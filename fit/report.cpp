@@ -17,7 +17,7 @@ constexpr const char* kStyle = R"(
 :root{--ink:#1c2430;--soft:#5c6675;--rule:#dfe3e8;--accent:#c2570c;--panel:#f7f8fa}
 *{box-sizing:border-box}
 body{font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,"Helvetica Neue",Arial,sans-serif;color:var(--ink);
- background:#fff;max-width:60rem;margin:2.5rem auto;padding:0 1.5rem}
+ background:#fff;max-width:68rem;margin:2.5rem auto;padding:0 1.5rem}
 h1{font-size:1.75rem;line-height:1.2;margin:0 0 .25rem}
 h2{font-size:1.15rem;margin:2.5rem 0 .75rem;padding-bottom:.3rem;border-bottom:1px solid var(--rule)}
 p.sub{color:var(--soft);margin:0 0 1.5rem}
@@ -26,17 +26,17 @@ p.note,figcaption{color:var(--soft);font-size:.9rem}
 .card{background:var(--panel);border:1px solid var(--rule);border-radius:8px;padding:1rem 1.2rem}
 .card h3{margin:0;font-size:.85rem;font-weight:600;color:var(--soft)}
 .card .value{font-size:1.3rem;font-weight:650;font-variant-numeric:tabular-nums;margin:.15rem 0;white-space:nowrap}
-.card .value .unit{font-size:.85rem;font-weight:400;color:var(--soft)}
+.card .value .unit{display:block;font-size:.85rem;font-weight:400;color:var(--soft)}
 .card p{margin:0;font-size:.88rem;color:var(--soft);font-variant-numeric:tabular-nums}
 .line{border-left:4px solid var(--accent)}
 figure{margin:1.25rem 0}
 figure svg{display:block;width:100%;height:auto;border:1px solid var(--rule);border-radius:8px}
 figcaption{margin-top:.5rem}
 .scroll{overflow-x:auto}
-table{border-collapse:collapse;width:100%;font-size:.9rem;font-variant-numeric:tabular-nums}
-th{text-align:right;font-weight:600;color:var(--soft);border-bottom:2px solid var(--rule);padding:.35rem .6rem;
+table{border-collapse:collapse;width:100%;font-size:.86rem;font-variant-numeric:tabular-nums}
+th{text-align:right;font-weight:600;color:var(--soft);border-bottom:2px solid var(--rule);padding:.35rem .5rem;
  vertical-align:bottom}
-td{text-align:right;border-bottom:1px solid var(--rule);padding:.35rem .6rem;white-space:nowrap}
+td{text-align:right;border-bottom:1px solid var(--rule);padding:.35rem .5rem;white-space:nowrap}
 th.text,td.text{text-align:left;white-space:normal}
 td.hash{text-align:left;font:.78rem ui-monospace,"DejaVu Sans Mono",Menlo,monospace;white-space:normal;
  word-break:break-all;color:var(--soft)}
@@ -133,7 +133,7 @@ std::string doubt_section(const StepSelection& selection) {
   const auto left_out = std::count_if(selection.doubtful.begin(), selection.doubtful.end(),
                                       [](const DoubtfulStep& doubtful) { return doubtful.left_out; });
   std::string html = fmt::format(
-      "<h2>Steps left out</h2>\n<p>{} steps were fitted; {} doubtful ones were left out, {} lie outside the speed "
+      "<h2>Steps left out</h2>\n<p>{} steps were fitted; {} left out for a doubt, {} lie outside the speed "
       "range.</p>\n",
       selection.used.size(), left_out, selection.outside_range);
   if (selection.doubtful.empty()) return html;
