@@ -329,14 +329,22 @@ inline constexpr Entry kEntries[] = {
   return nullptr;
 }
 
-/// `path`: "client.name", as in "propeller_motor_control.timeout". Null when there is no such entry.
-[[nodiscard]] constexpr const Entry* find(std::string_view path) noexcept {
-  const std::size_t dot = path.find('.');
-  if (dot == std::string_view::npos) return nullptr;
-  for (const Entry& entry : kEntries) {
-    if (name_of(entry.type) == path.substr(0, dot) && entry.name == path.substr(dot + 1)) return &entry;
+/// `path`: "client.name", as in "propeller_motor_control.timeout". std::size(kEntries) when there is no such entry.
+[[nodiscard]] constexpr std::size_t index_of(std::string_view path) noexcept {
+  for (std::size_t i = 0; i < std::size(kEntries); ++i) {
+    const std::string_view client = name_of(kEntries[i].type);
+    if (path.size() == client.size() + 1 + kEntries[i].name.size() && path[client.size()] == '.' &&
+        path.substr(0, client.size()) == client && path.substr(client.size() + 1) == kEntries[i].name) {
+      return i;
+    }
   }
-  return nullptr;
+  return std::size(kEntries);
+}
+
+/// Null when there is no such entry.
+[[nodiscard]] constexpr const Entry* find(std::string_view path) noexcept {
+  const std::size_t i = index_of(path);
+  return i < std::size(kEntries) ? &kEntries[i] : nullptr;
 }
 
 /// A path as a template argument.
@@ -348,16 +356,16 @@ struct Path {
 };
 
 template <Path path>
-concept Known = (find(path.view()) != nullptr);
+concept Known = (index_of(path.view()) < std::size(kEntries));
 template <Path path>
-concept Readable = (Known<path>)&&(find(path.view())->allows(Access::get));
+concept Readable = (Known<path>)&&(kEntries[index_of(path.view())].allows(Access::get));
 template <Path path>
-concept Writable = (Known<path>)&&(find(path.view())->allows(Access::set));
+concept Writable = (Known<path>)&&(kEntries[index_of(path.view())].allows(Access::set));
 
 /// entry<"power_monitor.volts">: unknown names do not compile.
 template <Path path>
 requires Known<path>
-inline constexpr const Entry& entry = *find(path.view());
+inline constexpr const Entry& entry = kEntries[index_of(path.view())];
 
 /// The packet of one access. Data goes with set and reply; a value is rounded to the format and held to its range.
 /// Formats none and bytes16 carry no number.
