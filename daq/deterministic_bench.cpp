@@ -12,7 +12,7 @@ namespace {
 
 constexpr Duration kHandshake = std::chrono::seconds(5);
 constexpr Duration kWorkEvery = std::chrono::milliseconds(50);
-constexpr Duration kSyncEvery = std::chrono::seconds(30);  // nothing is lost when a process cannot die half-way
+constexpr Duration kSyncEvery = std::chrono::seconds(1);
 constexpr sim::Peer kHost = 1;
 
 sim::BenchSettings settings_of(const profiles::Bench& place) {

@@ -53,7 +53,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"SilentMotor", [](Observation& o) { o.motor_age = milliseconds(700); }, "motor reading 0.7 s"},
         Case{"SpeedNotANumber", [](Observation& o) { o.speed = RadPerSec(std::numeric_limits<double>::quiet_NaN()); }, "speed"},
         Case{"ThrustNotANumber", [](Observation& o) { o.thrust = Newtons(std::numeric_limits<double>::quiet_NaN()); }, "thrust"}),
-    [](const testing::TestParamInfo<Case>& info) { return std::string(info.param.name); });
+    [](const testing::TestParamInfo<Case>& tested) { return std::string(tested.param.name); });
 
 }  // namespace
 }  // namespace kphi::daq

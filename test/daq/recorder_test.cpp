@@ -105,19 +105,24 @@ TEST_F(Recording, WritesAllThatCameInTheOrderItCame) {
   EXPECT_EQ(writer_.samples(), 20'000u);
 }
 
-/// Breaks at the first sync.
-class BrokenDisk final : public results::FileLayer {
+/// Breaks when told.
+class BreakableDisk final : public results::FileLayer {
  public:
-  void sync_data(int) override { throw std::system_error(EIO, std::generic_category()); }
+  void sync_data(int descriptor) override {
+    if (broken) throw std::system_error(EIO, std::generic_category());
+    FileLayer::sync_data(descriptor);
+  }
+  bool broken = false;
 };
 
 TEST(RecordingOntoABrokenDisk, KeepsTheFirstErrorForTheRunnerAndThrowsNothingItself) {
-  BrokenDisk broken;
+  BreakableDisk disk;
   test::TemporaryFolder folder;
   QueueBench bench;
-  results::RunWriter writer(folder.path() / "run.h5", {}, broken);
+  results::RunWriter writer(folder.path() / "run.h5", {}, disk);
   Recorder recorder(bench, writer, {});
   EXPECT_NO_THROW(recorder.check_failure());
+  disk.broken = true;
   bench.time.set(std::chrono::seconds(1));
   recorder.drain();
   EXPECT_THROW(recorder.check_failure(), results::RecordError);

@@ -32,9 +32,9 @@ class OneRun : public testing::Test {
 
   /// True when the simulated motor is neither driven nor driven up again within the next second.
   bool motor_is_let_go() {
-    const double before = std::abs(bench_.simulation().plant().speed());
+    const double before = std::abs(bench_.simulation().plant().motor().speed);
     bench_.wait_until(bench_.clock().now() + std::chrono::seconds(1));
-    const double after = std::abs(bench_.simulation().plant().speed());
+    const double after = std::abs(bench_.simulation().plant().motor().speed);
     return after < 1.0 || after < 0.7 * before;
   }
 

@@ -1,0 +1,97 @@
+// kphi: the table of contents. Each folder owns its commands; what goes wrong becomes one line and an exit code here.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <functional>
+#include <vector>
+
+#include "compensation/commands.hpp"
+#include "daq/commands.hpp"
+#include "daq/interlock.hpp"
+#include "daq/interrupt.hpp"
+#include "daq/replay_commands.hpp"
+#include "drivers/device_error.hpp"
+#include "drivers/sim/commands.hpp"
+#include "fit/commands.hpp"
+#include "profiles/commands.hpp"
+#include "profiles/configuration_error.hpp"
+#include "results/commands.hpp"
+#include "results/version.hpp"
+
+namespace {
+
+enum ExitCode { kOk = 0, kFailure = 1, kUsage = 2, kNoDevice = 3, kSafetyStop = 4, kDataRejected = 5, kInterrupted = 130 };
+
+constexpr const char* kFooter =
+    "Exit codes: 0 ok, 1 failure, 2 usage or configuration, 3 device not found, 4 safety stop,\n"
+    "            5 data rejected, 130 interrupted after a controlled spin-down.\n"
+    "Data goes to stdout, words to stderr. NO_COLOR is honoured.\n\n"
+    "Without hardware:  kphi sim profiles/bench_simulated.yaml &\n"
+    "                   kphi run profiles/icra2021_5in_3blade.yaml --bench profiles/bench_simulated.yaml --yes\n"
+    "                   kphi fit results/<the folder it named>";
+
+int complain(const std::exception& error, int exit_code) {
+  fmt::print(stderr, "kphi: {}\n", error.what());
+  return exit_code;
+}
+
+/// CLI11 says only "A subcommand is required" of a misspelt one.
+std::string nearest_command(const CLI::App& program, const std::string& word) {
+  for (const CLI::App* command : program.get_subcommands({})) {
+    const std::string& name = command->get_name();
+    if (name.starts_with(word.substr(0, 3)) || name.ends_with(word.substr(word.size() - std::min<std::size_t>(3, word.size())))) {
+      return name;
+    }
+  }
+  return {};
+}
+
+int usage_error(const CLI::App& program, const CLI::ParseError& error, int argc, char** argv) {
+  if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
+  fmt::print(stderr, "kphi: {}\n", error.what());
+  if (argc > 1 && argv[1][0] != '-' && program.get_subcommands().empty()) {
+    const std::string nearest = nearest_command(program, argv[1]);
+    fmt::print(stderr, "\"{}\" is no command{}\n", argv[1], nearest.empty() ? "" : "; did you mean \"" + nearest + "\"?");
+  }
+  fmt::print(stderr, "kphi --help lists the commands\n");
+  return kUsage;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App program("kphi: propeller test stand to k(φ) line to flight", "kphi");
+  program.footer(kFooter);
+  program.set_version_flag("--version", std::string("kphi ") + kphi::kVersion);
+  program.require_subcommand(1);
+  int exit_code = kOk;
+
+  kphi::profiles::add_check(program, exit_code);
+  kphi::sim::add_sim(program, exit_code);
+  kphi::daq::add_run(program, exit_code);
+  kphi::daq::add_replay(program, exit_code);
+  kphi::results::add_info(program, exit_code);
+  kphi::results::add_verify(program, exit_code);
+  kphi::fit::add_import(program, exit_code);
+  kphi::fit::add_fit(program, exit_code);
+  kphi::fit::add_report(program, exit_code);
+  kphi::compensation::add_compensate(program, exit_code);
+
+  try {
+    program.parse(argc, argv);
+    return exit_code;
+  } catch (const CLI::ParseError& error) {
+    return usage_error(program, error, argc, argv);
+  } catch (const kphi::ConfigurationError& error) {
+    return complain(error, kUsage);
+  } catch (const kphi::DeviceError& error) {
+    return complain(error, kNoDevice);
+  } catch (const kphi::daq::SafetyStop& error) {
+    return complain(error, kSafetyStop);
+  } catch (const kphi::daq::Interrupted& error) {
+    return complain(error, kInterrupted);
+  } catch (const std::exception& error) {
+    return complain(error, kFailure);
+  }
+}

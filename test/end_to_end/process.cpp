@@ -1,0 +1,118 @@
+#include "test/end_to_end/process.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <stdexcept>
+
+namespace kphi::test {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+std::string line_with(const std::string& printed, const std::string& text) {
+  const std::size_t found = printed.find(text);
+  if (found == std::string::npos) return {};
+  const std::size_t end = printed.find('\n', found);
+  if (end == std::string::npos) return {};
+  const std::size_t begin = printed.rfind('\n', found) + 1;
+  return printed.substr(begin, end - begin);
+}
+
+}  // namespace
+
+Process::Process(const std::vector<std::string>& arguments, const std::string& input) {
+  std::array<int, 2> in{}, out{}, err{};
+  if (pipe2(in.data(), O_CLOEXEC) || pipe2(out.data(), O_CLOEXEC) || pipe2(err.data(), O_CLOEXEC)) {
+    throw std::runtime_error("pipe");
+  }
+  pid_ = fork();
+  if (pid_ == 0) {
+    dup2(in[0], 0);
+    dup2(out[1], 1);
+    dup2(err[1], 2);
+    std::vector<char*> argv;
+    for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+    argv.push_back(nullptr);
+    execvp(argv[0], argv.data());
+    _exit(127);
+  }
+  close(in[0]);
+  close(out[1]);
+  close(err[1]);
+  out_descriptor_ = out[0];
+  err_descriptor_ = err[0];
+  if (!input.empty() && write(in[1], input.data(), input.size()) < 0) throw std::runtime_error("write to child");
+  close(in[1]);
+}
+
+Process::~Process() {
+  if (pid_ > 0) {
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+  }
+  close(out_descriptor_);
+  close(err_descriptor_);
+}
+
+void Process::signal(int number) const { kill(pid_, number); }
+
+bool Process::read_some(std::chrono::milliseconds limit) {
+  std::array<pollfd, 2> waiting{{{out_descriptor_, POLLIN, 0}, {err_descriptor_, POLLIN, 0}}};
+  if (poll(waiting.data(), waiting.size(), static_cast<int>(limit.count())) <= 0) return true;
+  bool open = false;
+  for (std::size_t i = 0; i < waiting.size(); ++i) {
+    if (!waiting[i].revents) {
+      open = true;
+      continue;
+    }
+    std::array<char, 4096> buffer;
+    const ssize_t n = read(waiting[i].fd, buffer.data(), buffer.size());
+    if (n > 0) {
+      (i == 0 ? out_ : err_).append(buffer.data(), static_cast<std::size_t>(n));
+      open = true;
+    }
+  }
+  return open;
+}
+
+std::string Process::everything() const { return "\n-- stdout\n" + out_ + "\n-- stderr\n" + err_; }
+
+std::string Process::wait_for(const std::string& text, std::chrono::seconds limit) {
+  const auto give_up = Clock::now() + limit;
+  for (bool open = true;;) {
+    for (const std::string* printed : {&out_, &err_}) {
+      if (std::string line = line_with(*printed, text); !line.empty()) return line;
+    }
+    if (!open) throw std::runtime_error("the process ended without \"" + text + "\"" + everything());
+    if (Clock::now() > give_up) throw std::runtime_error("\"" + text + "\" did not come" + everything());
+    open = read_some(std::chrono::milliseconds(100));
+  }
+}
+
+int Process::wait(std::chrono::seconds limit) {
+  const auto give_up = Clock::now() + limit;
+  while (read_some(std::chrono::milliseconds(50))) {
+    if (Clock::now() > give_up) throw std::runtime_error("the process does not end" + everything());
+    // A grandchild may hold the pipes open: the end of the process itself is what counts.
+    if (waitpid(pid_, &status_, WNOHANG) == pid_) {
+      while (read_some(std::chrono::milliseconds(0)) && Clock::now() < give_up) {
+        pollfd ready[2] = {{out_descriptor_, POLLIN, 0}, {err_descriptor_, POLLIN, 0}};
+        if (poll(ready, 2, 0) <= 0) break;
+      }
+      pid_ = -1;
+      break;
+    }
+  }
+  if (pid_ > 0) {
+    waitpid(pid_, &status_, 0);
+    pid_ = -1;
+  }
+  return WIFEXITED(status_) ? WEXITSTATUS(status_) : 128 + WTERMSIG(status_);
+}
+
+}  // namespace kphi::test

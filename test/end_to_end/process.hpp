@@ -1,0 +1,40 @@
+// A child process whose output is read as it comes.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+namespace kphi::test {
+
+class Process {
+ public:
+  /// Starts `arguments[0]`; standard input is `input`, then closed.
+  explicit Process(const std::vector<std::string>& arguments, const std::string& input = {});
+  /// Kills and waits.
+  ~Process();
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  /// Waits until a whole line that contains `text` came on stdout or stderr; returns it. Throws after `limit`, or when
+  /// the process ends without it, with all that was printed.
+  std::string wait_for(const std::string& text, std::chrono::seconds limit = std::chrono::seconds(60));
+  void signal(int number) const;
+  /// Waits for the end; returns the exit code, or 128 + signal. Throws after `limit`.
+  int wait(std::chrono::seconds limit = std::chrono::seconds(120));
+  [[nodiscard]] const std::string& out() const { return out_; }
+  [[nodiscard]] const std::string& err() const { return err_; }
+
+ private:
+  bool read_some(std::chrono::milliseconds limit);
+  [[nodiscard]] std::string everything() const;
+
+  int pid_ = -1;
+  int status_ = 0;
+  int out_descriptor_ = -1;
+  int err_descriptor_ = -1;
+  std::string out_;
+  std::string err_;
+};
+
+}  // namespace kphi::test

@@ -1,0 +1,233 @@
+// The program as a person types it, against the simulated bench over the real transports.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <yaml-cpp/yaml.h>
+
+#include <nlohmann/json.hpp>
+
+#include "results/run_reader.hpp"
+#include "test/daq/bench_fixture.hpp"
+#include "test/end_to_end/process.hpp"
+
+namespace kphi::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+std::string kphi() { return KPHI_PROGRAM; }
+
+void write(const std::filesystem::path& file, const std::string& text) { std::ofstream(file) << text; }
+
+std::string bench_text(const std::filesystem::path& folder, int rdt_port, int http_port, double time_scale) {
+  return fmt::format(
+      "format: kphi-bench/1\nname: test\n"
+      "netbox: {{host: 127.0.0.1, rdt_port: {}, http_port: {}, rate_hz: 7000, records_per_datagram: 40}}\n"
+      "iq: {{device: {}/motor, baud: 921600, module_id: 0, spin: +1, telemetry_hz: 50, speed_max_rpm: 19300}}\n"
+      "thrust_axis: \"+Fz\"\nsimulation: {{time_scale: {}, seed: 3, control: {}/control}}\n",
+      rdt_port, http_port, folder.string(), time_scale, folder.string());
+}
+
+/// `kphi sim` on free ports, in a folder of its own.
+class RunningBench {
+ public:
+  explicit RunningBench(double time_scale = 8)
+      : process_((write(folder_.path() / "wanted.yaml", bench_text(folder_.path(), 49152, 8049, time_scale)),
+                  std::vector<std::string>{kphi(), "sim", path("wanted.yaml"), "--free-ports", "--resolved",
+                                           path("bench.yaml"), "--truth", path("truth.yaml")})) {
+    process_.wait_for("\"rdt\"");
+    write(folder_.path() / "short.yaml", short_campaign_text("0, 45, 180"));
+  }
+  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
+  [[nodiscard]] std::string status() const {
+    Process asked({kphi(), "sim", path("bench.yaml"), "--status"});
+    EXPECT_EQ(asked.wait(), 0) << asked.err();
+    return asked.out();
+  }
+  /// Waits until the simulated motor turns slower than it would on any command of the campaign.
+  [[nodiscard]] bool motor_stops() const {
+    for (int asked = 0; asked < 400; ++asked) {
+      if (std::abs(json::parse(status()).at("speed_rad_s").get<double>()) < 5.0) return true;
+    }
+    return false;
+  }
+  [[nodiscard]] std::vector<std::string> run_command() const {
+    return {kphi(), "run", path("short.yaml"), "--bench", path("bench.yaml"), "--yes", "--out", path("results")};
+  }
+  Process& process() { return process_; }
+
+ private:
+  TemporaryFolder folder_;
+  Process process_;
+};
+
+std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
+TEST(Program, RunsACampaignOverTheRealTransportsAndFitsWhatTheBenchWasBuiltWith) {
+  RunningBench bench;
+  Process run(bench.run_command());
+  ASSERT_EQ(run.wait(), 0) << run.err();
+  const std::string folder = first_line(run.out());
+  EXPECT_THAT(run.err(), HasSubstr("0 lost"));
+  EXPECT_THAT(run.err(), HasSubstr("step  4/4"));
+  EXPECT_EQ(run.err().find('\r'), std::string::npos) << "no terminal, no control characters";
+
+  Process verify({kphi(), "verify", folder});
+  EXPECT_EQ(verify.wait(), 0) << verify.out() << verify.err();
+  Process replay({kphi(), "replay", folder});
+  EXPECT_EQ(replay.wait(), 0) << replay.err();
+  EXPECT_EQ(replay.out(), bytes_of(folder + "/steps.csv"));
+
+  Process fit({kphi(), "fit", folder});
+  ASSERT_EQ(fit.wait(), 0) << fit.err();
+  const YAML::Node found = YAML::LoadFile(folder + "/coefficients.yaml");
+  const YAML::Node truth = YAML::LoadFile(bench.path("truth.yaml"));
+  double true_k = 0;
+  for (const auto& propeller : truth["propellers"]) {
+    if (propeller["id"].as<std::string>() == "5x3") true_k = propeller["K_T"].as<double>();
+  }
+  EXPECT_NEAR(found["K_T"]["value"].as<double>(), true_k, 0.01 * true_k);
+  EXPECT_TRUE(std::filesystem::exists(folder + "/report.html"));
+
+  Process compensate({kphi(), "compensate", "--coefficients", folder + "/coefficients.yaml", "--vehicle",
+                      std::string(KPHI_SOURCE_DIR) + "/profiles/foldable_drone.yaml"},
+                     "theta1_deg,theta2_deg,theta3_deg,theta4_deg,thrust1_n,thrust2_n,thrust3_n,thrust4_n\n"
+                     "180,180,165.676,180,1.5,1.5,1.5,1.5\n");
+  EXPECT_EQ(compensate.wait(), 0) << compensate.err();
+  EXPECT_THAT(compensate.out(), HasSubstr("64.8"));
+}
+
+TEST(Program, StopsOnCtrlCWithTheMotorCoastingAndTheFileKept) {
+  for (const int signal_number : {SIGINT, SIGTERM, SIGHUP}) {
+    RunningBench bench;
+    Process run(bench.run_command());
+    run.wait_for("step  2/4");
+    run.signal(signal_number);
+    EXPECT_EQ(run.wait(), 130) << run.err();
+    EXPECT_THAT(run.err(), HasSubstr("recorded so far: "));
+    EXPECT_TRUE(bench.motor_stops());
+  }
+}
+
+TEST(Program, LeavesTheMotorStoppedWhenItIsKilled) {
+  RunningBench bench;
+  Process run(bench.run_command());
+  run.wait_for("step  3/4");
+  run.signal(SIGKILL);
+  EXPECT_EQ(run.wait(), 128 + SIGKILL);
+  EXPECT_TRUE(bench.motor_stops()) << "the module's own timeout should have coasted it";
+}
+
+TEST(Program, StopsWhenTheBenchVanishesMidRun) {
+  RunningBench bench;
+  Process run(bench.run_command());
+  run.wait_for("step  2/4");
+  bench.process().signal(SIGKILL);
+  EXPECT_EQ(run.wait(), 4) << run.err();
+  EXPECT_THAT(run.err(), HasSubstr("recorded so far: "));
+}
+
+class BadInput : public testing::Test {
+ protected:
+  BadInput() {
+    write(path("short.yaml"), short_campaign_text());
+    write(path("bench.yaml"), bench_text(folder_.path(), 49999, 49998, 8));
+  }
+  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
+  /// Runs and expects the exit code and one clear line that holds `words`.
+  void expect(const std::vector<std::string>& arguments, int exit_code, const std::string& words) {
+    std::vector<std::string> command{kphi()};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    Process process(command);
+    EXPECT_EQ(process.wait(), exit_code) << process.out() << process.err();
+    EXPECT_THAT(process.err(), HasSubstr(words));
+    EXPECT_EQ(process.err().find("terminate"), std::string::npos) << process.err();
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(BadInput, NoBox) {
+  expect({"run", path("short.yaml"), "--bench", path("bench.yaml"), "--yes", "--out", path("r")}, 3, "127.0.0.1");
+}
+
+TEST_F(BadInput, NoModule) {
+  RunningBench bench;
+  // A box that answers, and a serial line with nobody behind it.
+  std::string text = bytes_of(bench.path("bench.yaml"));
+  const std::size_t device = text.find("/motor");
+  text.replace(device, 6, "/no_motor");
+  write(path("no_module.yaml"), text);
+  expect({"run", path("short.yaml"), "--bench", path("no_module.yaml"), "--yes", "--out", path("r")}, 3, "no_motor");
+}
+
+TEST_F(BadInput, WrongUnit) {
+  std::string text = short_campaign_text();
+  text.replace(text.find("dwell_s"), 7, "dwell_ms");
+  write(path("unit.yaml"), text);
+  expect({"run", path("unit.yaml"), "--bench", path("bench.yaml"), "--yes"}, 2, "unit.yaml:5:");
+}
+
+TEST_F(BadInput, CampaignAboveTheMotorsLimit) {
+  std::string text = short_campaign_text();
+  text.replace(text.find("last_rpm: 18000"), 15, "last_rpm: 25000");
+  text.replace(text.find("speed_max_rpm: 19100"), 20, "speed_max_rpm: 25000");
+  write(path("fast.yaml"), text);
+  expect({"run", path("fast.yaml"), "--bench", path("bench.yaml"), "--yes"}, 2, "19300");
+}
+
+TEST_F(BadInput, UnreadableFile) {
+  expect({"run", path("nothing.yaml"), "--bench", path("bench.yaml"), "--yes"}, 2, "nothing.yaml");
+  expect({"fit", path("nothing")}, 2, "nothing");
+  expect({"check", path("nothing.yaml")}, 2, "nothing.yaml");
+}
+
+TEST_F(BadInput, NobodyToAskForMountings) {
+  expect({"run", path("short.yaml"), "--bench", path("bench.yaml")}, 2, "--yes");
+}
+
+TEST_F(BadInput, MisspeltCommand) { expect({"runn"}, 2, "did you mean \"run\""); }
+
+TEST_F(BadInput, UnknownOption) { expect({"run", "--fast"}, 2, "--help"); }
+
+TEST_F(BadInput, FullDiskMidRunKeepsWhatWasWritten) {
+  RunningBench bench;
+  // A file may not grow beyond 2.5 MB: the first run needs about 5.
+  std::vector<std::string> command{"bash", "-c", "trap '' XFSZ; ulimit -f 2500; exec \"$@\"", "bash"};
+  const auto run_command = bench.run_command();
+  command.insert(command.end(), run_command.begin(), run_command.end());
+  write(bench.path("short.yaml"), short_campaign_text("0", 1, 20));
+  Process run(command);
+  EXPECT_EQ(run.wait(), 1) << run.err();
+  EXPECT_TRUE(bench.motor_stops());
+  std::filesystem::path left;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(bench.path("results"))) {
+    if (entry.path().string().find(".h5") != std::string::npos) left = entry.path();
+  }
+  ASSERT_FALSE(left.empty()) << run.err();
+  EXPECT_GT(results::read_run(left).load_cell.size(), 20'000u) << left;
+}
+
+TEST(Check, TakesEveryShippedFile) {
+  for (const auto& entry : std::filesystem::directory_iterator(std::string(KPHI_SOURCE_DIR) + "/profiles")) {
+    if (entry.path().extension() != ".yaml") continue;
+    Process check({kphi(), "check", entry.path().string()});
+    EXPECT_EQ(check.wait(), 0) << check.err();
+  }
+}
+
+TEST(DryRun, PrintsThePlanAndTouchesNoDevice) {
+  const std::string profiles = std::string(KPHI_SOURCE_DIR) + "/profiles/";
+  Process run({kphi(), "run", profiles + "icra2021_5in_3blade.yaml", "--bench", profiles + "bench_lab.yaml", "--dry-run",
+               "--json"});
+  EXPECT_EQ(run.wait(), 0) << run.err();
+  const json plan = json::parse(run.out());
+  EXPECT_EQ(plan.at("runs"), 15);
+  EXPECT_EQ(plan.at("steps"), 600);
+  EXPECT_EQ(plan.at("mountings"), 5);
+  EXPECT_EQ(plan.at("spinning_s"), 1200.0);
+}
+
+}  // namespace
+}  // namespace kphi::test
