@@ -180,7 +180,7 @@ class Streaming {
 
 std::string utc_text(const Clock& clock, Instant when) {
   const auto seconds = std::chrono::time_point_cast<std::chrono::seconds>(
-      clock.epoch_utc() + std::chrono::duration_cast<std::chrono::system_clock::duration>(when));
+      clock.epoch_utc() + std::chrono::duration_cast<std::chrono::system_clock::duration>(clock.shrunk(when)));
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(seconds)));
 }
 

@@ -34,7 +34,7 @@ struct RunResult {
 [[nodiscard]] RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress,
                                    const std::function<bool()>& stop_asked);
 
-/// ISO 8601 with seconds, UTC: "2021-05-30T00:00:00Z".
+/// Calendar time of bench time `when`: ISO 8601 with seconds, UTC, "2021-05-30T00:00:00Z".
 [[nodiscard]] std::string utc_text(const Clock& clock, Instant when);
 
 }  // namespace kphi::daq

@@ -56,12 +56,12 @@ std::string head(const Identification& identification, const Provenance& provena
   const std::string blades = identification.blades > 0 ? fmt::format("{}", identification.blades) : "unknown";
   return fmt::format(
       "format: kphi-coefficients/1\n"
-      "created_utc: {}\n"
+      "measured_utc: {}\n"
       "tool_version: {}\n"
       "propeller: {{id: {}, name: {}, diameter_in: {}, blades: {}}}\n"
       "k_unit: N/(rad/s)^2\n"
       "overlap: rim_arc\n",
-      quoted(provenance.created_utc), quoted(provenance.tool_version), quoted(identification.propeller),
+      provenance.measured_utc.empty() ? "unknown" : quoted(provenance.measured_utc), quoted(provenance.tool_version), quoted(identification.propeller),
       quoted(provenance.propeller_name.empty() ? identification.propeller : provenance.propeller_name),
       known_if_positive(identification.diameter_in), blades);
 }

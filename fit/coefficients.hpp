@@ -20,7 +20,7 @@ struct RunProvenance {
 
 /// Where the numbers come from. Nothing here is guessed: what is not known is empty and written as `unknown`.
 struct Provenance {
-  std::string created_utc;  ///< ISO 8601, Z
+  std::string measured_utc;  ///< when the last run ended, ISO 8601, Z; empty: unknown
   std::string tool_version;
   std::string campaign;
   std::string propeller_name;

@@ -1,13 +1,10 @@
 #include "fit/commands.hpp"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -60,26 +57,19 @@ struct FitRequest {
   bool json = false;
 };
 
-/// Now, or SOURCE_DATE_EPOCH where somebody wants the same bytes again.
-std::string utc_now() {
-  const char* fixed = std::getenv("SOURCE_DATE_EPOCH");
-  const std::time_t now = fixed != nullptr ? static_cast<std::time_t>(std::atoll(fixed)) : std::time(nullptr);
-  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(now));
-}
-
-/// Accepted runs with the checksums the journal holds; without a journal the files as they lie there.
-std::vector<RunProvenance> runs_of(const results::CampaignFolder& folder) {
-  std::vector<RunProvenance> runs;
+/// Accepted runs with the checksums the journal holds, and when the last of them ended; without a journal the files
+/// as they lie there.
+void take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
   if (fs::exists(folder.journal())) {
     for (const results::JournalEntry& entry : results::read_journal(folder.journal()).entries) {
-      if (entry.event == results::kRunAccepted && entry.data.contains("file") && entry.data.contains("sha256"))
-        runs.push_back({entry.data["file"], entry.data["sha256"], "", std::nullopt});
+      if (entry.event != results::kRunAccepted || !entry.data.contains("file") || !entry.data.contains("sha256")) continue;
+      provenance.runs.push_back({entry.data["file"], entry.data["sha256"], "", std::nullopt});
+      provenance.measured_utc = entry.utc;
     }
-    return runs;
+    return;
   }
   for (const fs::path& run : folder.complete_runs())
-    runs.push_back({fs::relative(run, folder.path()).string(), results::sha256_of_file(run), "", std::nullopt});
-  return runs;
+    provenance.runs.push_back({fs::relative(run, folder.path()).string(), results::sha256_of_file(run), "", std::nullopt});
 }
 
 Input campaign_input(const fs::path& path) {
@@ -93,7 +83,7 @@ Input campaign_input(const fs::path& path) {
   input.campaign = true;
   input.steps = results::read_steps(folder.steps());
   input.provenance.source = "steps.csv of the campaign folder";
-  input.provenance.runs = runs_of(folder);
+  take_runs(folder, input.provenance);
   if (fs::exists(folder.campaign_file())) {
     const profiles::Campaign campaign = profiles::load_campaign(folder.campaign_file().string());
     input.provenance.campaign = campaign.name;
@@ -119,7 +109,6 @@ Input file_input(const fs::path& path) {
 
 Input load(const std::string& path) {
   Input input = fs::is_directory(path) ? campaign_input(path) : file_input(path);
-  input.provenance.created_utc = utc_now();
   input.provenance.tool_version = kVersion;
   return input;
 }
@@ -247,7 +236,6 @@ void run_report(const std::string& path) {
   for (const Radians& point : file.line.points) options.line.points_deg.push_back(to_degrees(point));
   options.speed_range = fitted_range(file.path, options.speed_range);
   if (!file.table.empty() && file.table.front().at_speed) options.at_speed_rad_s = file.table.front().at_speed->value();
-  input.provenance.created_utc = file.created_utc;
   write_report(identify(input.steps, options), input, path);
 }
 

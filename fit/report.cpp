@@ -38,7 +38,7 @@ th{text-align:right;font-weight:600;color:var(--soft);border-bottom:2px solid va
  vertical-align:bottom}
 td{text-align:right;border-bottom:1px solid var(--rule);padding:.35rem .5rem;white-space:nowrap}
 th.text,td.text{text-align:left;white-space:normal}
-td.hash{text-align:left;font:.78rem ui-monospace,"DejaVu Sans Mono",Menlo,monospace;white-space:normal;
+td.hash{text-align:left;font:.66rem ui-monospace,"DejaVu Sans Mono",Menlo,monospace;white-space:normal;
  word-break:break-all;color:var(--soft)}
 .warning{background:#fff6e5;border:1px solid #f0c36d;border-radius:8px;padding:.7rem 1rem}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:.3rem 1.2rem;margin:0;font-size:.92rem}
@@ -196,7 +196,8 @@ std::string provenance_section(const Identification& identification, const Prove
   html += entry("Overlap", "rim arc");
   html += entry("Air density", optional_number(provenance.air_density_kg_m3, "kg/m³"));
   html += entry("Supply", optional_number(provenance.supply_v, "V"));
-  html += entry("Made", provenance.created_utc + " by kphi " + provenance.tool_version);
+  html += entry("Measured", provenance.measured_utc.empty() ? "unknown" : provenance.measured_utc);
+  html += entry("Fitted by", "kphi " + provenance.tool_version);
   return html + "</dl>\n";
 }
 

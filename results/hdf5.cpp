@@ -1,7 +1,7 @@
 #include "results/hdf5.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,12 +16,6 @@ namespace kphi::results::hdf5 {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "chunks are written as they lie in memory");
-
-/// The print of errors is a property of each thread's error stack.
-void be_quiet() {
-  thread_local const herr_t quiet = H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  (void)quiet;
-}
 
 struct Cause {
   std::string text;
@@ -133,6 +127,14 @@ void check(herr_t status, const std::string& doing) {
   if (status < 0) fail(doing);
 }
 
+void be_quiet() noexcept {
+  // A file whose close was refused is half torn down; HDF5's own end-of-program cleaning would trip over it.
+  static const herr_t no_cleaning = H5dont_atexit();
+  thread_local const herr_t quiet = H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  (void)no_cleaning;
+  (void)quiet;
+}
+
 Handle own(hid_t id, const std::string& doing) {
   if (id < 0) fail(doing);
   return Handle(id);
@@ -176,7 +178,8 @@ std::uint64_t size_of(const Handle& file) {
 
 void sever(const Handle& file) noexcept {
   void* descriptor = nullptr;
-  const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+  // Memory, not /dev/null: closing truncates the file, and that must succeed.
+  const int nowhere = ::memfd_create("severed", MFD_CLOEXEC);
   if (nowhere >= 0 && H5Fget_vfd_handle(file.get(), H5P_DEFAULT, &descriptor) >= 0) {
     ::dup2(nowhere, *static_cast<int*>(descriptor));
   }

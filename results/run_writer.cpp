@@ -193,6 +193,7 @@ struct RunWriter::File {
 template <class Action>
 void RunWriter::guarded(Action&& action) {
   if (!file_) throw RecordError(path_.string() + ": is closed: the recording has ended, see the first error");
+  hdf5::be_quiet();
   try {
     on_disk(path_, action);
   } catch (...) {

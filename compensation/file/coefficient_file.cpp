@@ -187,7 +187,7 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   coefficients.path = path;
   const double scale = scale_of_unit(reader);
   coefficients.overlap = overlap_of(reader);
-  coefficients.created_utc = reader.optional_text_at(reader.top(), "created_utc");
+  coefficients.measured_utc = reader.optional_text_at(reader.top(), "measured_utc");
   coefficients.tool_version = reader.optional_text_at(reader.top(), "tool_version");
   read_propeller(reader, coefficients);
   read_thrust_coefficient(reader, scale, coefficients);

@@ -57,7 +57,7 @@ struct Coefficients {
   };
 
   std::string path;
-  std::string created_utc;
+  std::string measured_utc;
   std::string tool_version;
   Propeller propeller;
   OverlapMeasure overlap = OverlapMeasure::rim_arc;

@@ -26,7 +26,9 @@ constexpr auto kLongestNap = std::chrono::seconds(1);
 Settings stretched(Settings settings, unsigned baud, const Clock& clock) {
   if (settings.reply_timeout == Duration{0}) settings.reply_timeout = clock.stretched(std::chrono::milliseconds(100));
   if (settings.wire_byte_time == Duration{0} && baud > 0) settings.wire_byte_time = from_seconds(10.0 / baud);
-  settings.module_timeout_s = to_seconds(clock.stretched(from_seconds(settings.module_timeout_s)));
+  if (settings.longest_silence == Duration{0}) {
+    settings.longest_silence = clock.stretched(from_seconds(settings.module_timeout_s));
+  }
   return settings;
 }
 

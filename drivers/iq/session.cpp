@@ -42,6 +42,7 @@ const Settings& checked(const Settings& settings) {
 
 Settings completed(Settings settings) {
   if (settings.reply_timeout <= Duration{0}) settings.reply_timeout = std::chrono::milliseconds(100);
+  if (settings.longest_silence <= Duration{0}) settings.longest_silence = from_seconds(settings.module_timeout_s);
   return settings;
 }
 
@@ -299,7 +300,7 @@ void Session::continue_coasting(Instant now) {
       // Silence, so that the module's own timeout can end the motion.
       coast_attempts_ = 0;
       coast_ask_at_ = kNever;
-      coast_next_ = now + from_seconds(1.5 * settings_.module_timeout_s) + settings_.reply_timeout;
+      coast_next_ = now + settings_.longest_silence * 3 / 2 + settings_.reply_timeout;
       ++counters_.unconfirmed_coasts;
       if (state_ != State::failed) fail(why_no_answer(), now);
       return;

@@ -28,7 +28,8 @@ struct Settings {
   double telemetry_hz = 50;       ///< speed readings per second of bench time; the other quantities come in turn
   Duration reply_timeout{0};      ///< bench time; 0: 100 ms, and Motor stretches these as wall time
   Duration wire_byte_time{0};     ///< 10 bits of one byte, bench time; 0: Motor takes 10/baud
-  double module_timeout_s = 0.5;  ///< the module coasts by itself after this silence; Motor stretches it as wall time
+  double module_timeout_s = 0.5;  ///< the module coasts by itself after this silence; in its own seconds
+  Duration longest_silence{0};    ///< the same as bench time; 0: module_timeout_s, and Motor stretches it as wall time
   std::size_t credit_bytes = 63;  ///< most bytes of unanswered frames, 18 or more: the module's receive buffer has 64
 };
 

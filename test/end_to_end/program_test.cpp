@@ -84,10 +84,7 @@ TEST(Program, RunsACampaignOverTheRealTransportsAndFitsWhatTheBenchWasBuiltWith)
   ASSERT_EQ(fit.wait(), 0) << fit.err();
   const YAML::Node found = YAML::LoadFile(folder + "/coefficients.yaml");
   const YAML::Node truth = YAML::LoadFile(bench.path("truth.yaml"));
-  double true_k = 0;
-  for (const auto& propeller : truth["propellers"]) {
-    if (propeller["id"].as<std::string>() == "5x3") true_k = propeller["K_T"].as<double>();
-  }
+  const double true_k = truth["propellers"]["5x3"]["K_T"].as<double>();
   EXPECT_NEAR(found["K_T"]["value"].as<double>(), true_k, 0.01 * true_k);
   EXPECT_TRUE(std::filesystem::exists(folder + "/report.html"));
 
@@ -166,7 +163,7 @@ TEST_F(BadInput, WrongUnit) {
   std::string text = short_campaign_text();
   text.replace(text.find("dwell_s"), 7, "dwell_ms");
   write(path("unit.yaml"), text);
-  expect({"run", path("unit.yaml"), "--bench", path("bench.yaml"), "--yes"}, 2, "unit.yaml:5:");
+  expect({"run", path("unit.yaml"), "--bench", path("bench.yaml"), "--yes"}, 2, "unit.yaml:6:21: dwell_ms is not a key of profile");
 }
 
 TEST_F(BadInput, CampaignAboveTheMotorsLimit) {

@@ -17,7 +17,7 @@ using ::testing::Not;
 
 Provenance provenance() {
   Provenance result;
-  result.created_utc = "2021-05-30T00:00:00Z";
+  result.measured_utc = "2021-05-30T00:00:00Z";
   result.tool_version = "0.1.0";
   result.campaign = "icra2021";
   result.propeller_name = "HQProp \"5x4\" \\ three\nblades";

@@ -27,7 +27,7 @@ bool gnuplot_is_installed() { return std::system("command -v gnuplot >/dev/null 
 
 Provenance provenance() {
   Provenance result;
-  result.created_utc = "2021-05-30T00:00:00Z";
+  result.measured_utc = "2021-05-30T00:00:00Z";
   result.tool_version = "0.1.0";
   result.campaign = "icra <script>alert(1)</script> & \"co\"";
   result.propeller_name = "Tom's 5x4 & more";

@@ -12,7 +12,7 @@ using testing::HasSubstr;
 using testing::StartsWith;
 
 const std::string kGood = R"(format: kphi-coefficients/1
-created_utc: "2021-05-30T00:00:00Z"
+measured_utc: "2021-05-30T00:00:00Z"
 tool_version: "0.1.0"
 propeller: {id: 5x3, name: "Dalprop 5040", diameter_in: 5.0, blades: 3}
 k_unit: N/(rad/s)^2
@@ -55,7 +55,7 @@ std::string refusal_of(const std::string& text) {
 TEST(CoefficientFile, GivesWhatTheFileSaysInSiUnits) {
   const Coefficients c = parse_coefficients(kGood, "c.yaml");
   EXPECT_EQ(c.path, "c.yaml");
-  EXPECT_EQ(c.created_utc, "2021-05-30T00:00:00Z");
+  EXPECT_EQ(c.measured_utc, "2021-05-30T00:00:00Z");
   EXPECT_EQ(c.propeller.id, "5x3");
   EXPECT_EQ(c.propeller.diameter_in, 5.0);
   EXPECT_EQ(c.propeller.blades, 3);
