@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "daq/reduction.hpp"
+#include "daq/repetitions.hpp"
 #include "daq/run.hpp"
 #include "profiles/plan.hpp"
 #include "results/journal.hpp"
@@ -45,6 +46,8 @@ class CampaignRun {
       for (const profiles::PlannedRun& planned : plan_.runs) one(planned);
     } catch (const std::exception& e) {
       note("campaign_stopped", {{"reason", e.what()}});
+      progress_.say(fmt::format("{} of {} runs are finished and kept in {}", result_.runs, plan_.runs.size(),
+                                folder_.path().string()));
       throw;
     }
     note("campaign_finished", {{"runs", result_.runs}});
@@ -77,6 +80,7 @@ class CampaignRun {
     const auto means = reduce(results::read_run(run.file));
     steps_.insert(steps_.end(), means.begin(), means.end());
     results::write_steps(folder_.steps(), steps_, bench_.files());
+    results::write_steps(folder_.means(), average_repetitions(steps_), bench_.files());
     const std::uint64_t lost = run.account.lost_network + run.account.lost_host;
     note(results::kRunAccepted, {{"file", "runs/" + run.file.filename().string()},
                                  {"sha256", run.sha256},

@@ -54,6 +54,14 @@ std::size_t LiveMotor::take(std::span<results::MotorReading> out) {
   return n;
 }
 
+std::string LiveMotor::failure() const {
+  std::string failure = motor_.failure();
+  if (failure.empty() && motor_.counters().lease_expiries > 0) {
+    failure = "motor: nobody renewed the command in time and the driver let it coast; is this host overloaded?";
+  }
+  return failure;
+}
+
 LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock) : place_(std::move(place)), clock_(clock) {
   // Whether the box answers at all is asked before anybody mounts anything.
   cell_ = std::make_unique<netbox::LoadCell>(netbox::Place{place_.host, place_.rdt_port, place_.http_port}, clock_);

@@ -17,7 +17,7 @@ class LiveMotor final : public MotorLink {
   void renew() noexcept override { motor_.renew(); }
   void coast() noexcept override { motor_.coast(); }
   std::size_t take(std::span<results::MotorReading> out) override;
-  [[nodiscard]] std::string failure() const override { return motor_.failure(); }
+  [[nodiscard]] std::string failure() const override;
   [[nodiscard]] std::string identity() const override { return motor_.identity().summary(); }
 
  private:

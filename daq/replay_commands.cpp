@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daq/reduction.hpp"
+#include "daq/repetitions.hpp"
 #include "profiles/campaign.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/run_reader.hpp"
@@ -33,6 +34,7 @@ struct Asked {
 struct Replay {
   std::vector<StepMean> steps;
   std::optional<std::filesystem::path> stored;  ///< steps.csv of the campaign folder, when there is one
+  std::optional<std::filesystem::path> means;   ///< means.csv likewise; of a whole campaign only
   bool whole_campaign = false;
 };
 
@@ -52,6 +54,7 @@ Replay replay(const std::filesystem::path& path) {
       result.steps.insert(result.steps.end(), of_run.begin(), of_run.end());
     }
     steps = folder.steps();
+    if (std::filesystem::exists(folder.means())) result.means = folder.means();
   } else {
     result.steps = reduce(results::read_run(path));
     const auto runs = std::filesystem::absolute(path).parent_path();
@@ -133,6 +136,10 @@ int run_replay(const Asked& asked) {
   const Replay result = replay(asked.path);
   std::optional<std::string> differs;
   if (result.stored) differs = difference(result, results::read_text(*result.stored));
+  if (!differs && result.means &&
+      results::read_text(*result.means) != results::format_steps(average_repetitions(result.steps))) {
+    differs = "agrees, but means.csv beside it is not its average over the repetitions";
+  }
   print(result, differs, asked.json);
   if (!differs) return kOk;
   fmt::print(stderr, "{}: {}; the raw files are the truth, see kphi verify\n", result.stored->string(), *differs);
@@ -143,7 +150,7 @@ int run_replay(const Asked& asked) {
 
 void add_replay(CLI::App& app, int& exit_code) {
   const auto asked = std::make_shared<Asked>();
-  CLI::App* command = app.add_subcommand("replay", "Turn raw samples into step means again and compare with steps.csv");
+  CLI::App* command = app.add_subcommand("replay", "turn raw samples into step means again and compare with steps.csv");
   command->add_option("path", asked->path, "run file or campaign folder")->required()->check(CLI::ExistingPath);
   command->add_flag("--json", asked->json, "one JSON object on stdout");
   command->callback([asked, &exit_code] { exit_code = run_replay(*asked); });

@@ -107,8 +107,15 @@ Input file_input(const fs::path& path) {
   return input;
 }
 
+/// A campaign folder, a folder with a steps.csv, or a file.
 Input load(const std::string& path) {
-  Input input = fs::is_directory(path) ? campaign_input(path) : file_input(path);
+  const bool campaign = fs::exists(fs::path(path) / "journal.jsonl") || fs::exists(fs::path(path) / "runs");
+  if (fs::is_directory(path) && !campaign && !fs::exists(fs::path(path) / "steps.csv")) {
+    throw ConfigurationError(path + ": holds no campaign and no steps.csv; name a folder that kphi run or kphi import made");
+  }
+  Input input = campaign                 ? campaign_input(path)
+                : fs::is_directory(path) ? file_input(fs::path(path) / "steps.csv")
+                                         : file_input(path);
   input.provenance.tool_version = kVersion;
   return input;
 }
@@ -333,7 +340,7 @@ void add_import(CLI::App& app, int& exit_code) {
 
 void add_report(CLI::App& app, int& exit_code) {
   auto path = std::make_shared<std::string>();
-  CLI::App* command = app.add_subcommand("report", "draws report.html of a fitted campaign again");
+  CLI::App* command = app.add_subcommand("report", "draw report.html of a fitted campaign again");
   command->add_option("DIR", *path, "campaign folder with steps.csv and coefficients.yaml")
       ->required()
       ->check(CLI::ExistingDirectory);

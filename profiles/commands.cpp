@@ -43,7 +43,7 @@ void print(const CheckedFile& file, bool json) {
 }  // namespace
 
 void add_check(CLI::App& program, int& exit_code) {
-  auto* command = program.add_subcommand("check", "Check campaign, bench, vehicle and coefficient files");
+  auto* command = program.add_subcommand("check", "check campaign, bench, vehicle and coefficient files");
   auto options = std::make_shared<CheckOptions>();
   command->add_option("FILE", options->paths, "Files; campaigns are also held against the benches among them")
       ->required();

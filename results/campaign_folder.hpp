@@ -29,6 +29,8 @@ class CampaignFolder {
   [[nodiscard]] std::filesystem::path journal() const { return path_ / "journal.jsonl"; }
   [[nodiscard]] std::filesystem::path runs() const { return path_ / "runs"; }
   [[nodiscard]] std::filesystem::path steps() const { return path_ / "steps.csv"; }
+  /// Steps averaged over their repetitions.
+  [[nodiscard]] std::filesystem::path means() const { return path_ / "means.csv"; }
   [[nodiscard]] std::filesystem::path coefficients() const { return path_ / "coefficients.yaml"; }
   [[nodiscard]] std::filesystem::path report() const { return path_ / "report.html"; }
   [[nodiscard]] std::filesystem::path figures() const { return path_ / "figures"; }

@@ -140,7 +140,7 @@ CLI::App* add(CLI::App& app, const char* name, const char* description, const st
 
 void add_info(CLI::App& app, int& exit_code) {
   const auto asked = std::make_shared<Asked>();
-  add(app, "info", "Tell what is in a run or a campaign folder", asked)->callback([asked, &exit_code] {
+  add(app, "info", "tell what is in a run or a campaign folder", asked)->callback([asked, &exit_code] {
     info(*asked);
     exit_code = kOk;
   });
@@ -148,7 +148,7 @@ void add_info(CLI::App& app, int& exit_code) {
 
 void add_verify(CLI::App& app, int& exit_code) {
   const auto asked = std::make_shared<Asked>();
-  add(app, "verify", "Tell whether a run or a campaign folder is whole (exit code 5: it is not)", asked)
+  add(app, "verify", "tell whether a run or a campaign folder is whole (exit code 5: it is not)", asked)
       ->callback([asked, &exit_code] { exit_code = verify(*asked); });
 }
 

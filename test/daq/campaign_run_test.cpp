@@ -70,6 +70,16 @@ TEST_F(ShortCampaign, LeavesAWholeFolderWhoseStepsAreAPureFunctionOfTheRuns) {
   EXPECT_EQ(test::bytes_of(results_.steps()), results::format_steps(again));
 }
 
+TEST_F(ShortCampaign, AveragesTheRepetitions) {
+  (void)run(test::short_campaign("0", 3, 2));
+  const auto steps = results::read_steps(results_.steps());
+  const auto means = results::read_steps(results_.means());
+  ASSERT_EQ(steps.size(), 6u);
+  ASSERT_EQ(means.size(), 2u);
+  EXPECT_EQ(means[1].repetition, 0);
+  EXPECT_NEAR(means[1].thrust_n, (steps[1].thrust_n + steps[3].thrust_n + steps[5].thrust_n) / 3, 1e-12);
+}
+
 TEST_F(ShortCampaign, MeasuresLessThrustUnderAnOcclusion) {
   (void)run(test::short_campaign("0, 270", 1, 3));
   const auto steps = results::read_steps(results_.steps());

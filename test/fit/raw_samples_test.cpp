@@ -5,10 +5,12 @@
 #include <numeric>
 
 #include "test/fit/campaign_steps.hpp"
-#include "test/fit/temporary_folder.hpp"
+#include "test/temporary_folder.hpp"
 
 namespace kphi::fit {
 namespace {
+
+using test::TemporaryFolder;
 
 /// 1 kHz for 4 s; Fz reads −(second) N in counts, so every second has its own level.
 results::RunRecording recording() {

@@ -14,11 +14,12 @@
 #include "fit/html.hpp"
 #include "results/file_layer.hpp"
 #include "test/fit/campaign_steps.hpp"
-#include "test/fit/temporary_folder.hpp"
+#include "test/temporary_folder.hpp"
 
 namespace kphi::fit {
 namespace {
 
+using test::TemporaryFolder;
 using results::Doubt;
 using ::testing::HasSubstr;
 using ::testing::Not;

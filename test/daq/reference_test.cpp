@@ -1,0 +1,37 @@
+// results/reference was recorded once and must be understood for ever: a reader that changes its mind shows here.
+#include <gtest/gtest.h>
+
+#include "daq/reduction.hpp"
+#include "daq/repetitions.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/campaign_verification.hpp"
+#include "results/run_reader.hpp"
+#include "results/steps_csv.hpp"
+
+namespace kphi::daq {
+namespace {
+
+class Reference : public testing::Test {
+ protected:
+  results::CampaignFolder folder_ =
+      results::CampaignFolder::open(std::filesystem::path(KPHI_SOURCE_DIR) / "results/reference");
+};
+
+TEST_F(Reference, IsWhole) {
+  const auto verification = results::verify_campaign(folder_);
+  EXPECT_TRUE(verification.whole()) << verification.problems.front();
+  EXPECT_EQ(verification.runs, 3u);
+}
+
+TEST_F(Reference, GivesTheStoredStepMeansByteForByte) {
+  std::vector<results::StepMean> steps;
+  for (const auto& file : folder_.complete_runs(std::vector<double>{0, 90, 270})) {
+    for (const auto& step : reduce(results::read_run(file))) steps.push_back(step);
+  }
+  ASSERT_EQ(steps.size(), 12u);
+  EXPECT_EQ(results::format_steps(steps), results::read_text(folder_.steps()));
+  EXPECT_EQ(results::format_steps(average_repetitions(steps)), results::read_text(folder_.means()));
+}
+
+}  // namespace
+}  // namespace kphi::daq
