@@ -3,14 +3,11 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
-#include <sys/eventfd.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <system_error>
 
 #include "drivers/device_error.hpp"
 #include "drivers/netbox/http.hpp"
@@ -43,6 +40,7 @@ StreamSettings stream_settings(const Configuration& configuration, const Clock& 
   settings.reply_timeout = clock.stretched(settings.reply_timeout);
   settings.settle = clock.stretched(settings.settle);
   settings.silence_timeout = clock.stretched(settings.silence_timeout);
+  settings.reorder_patience = clock.stretched(settings.reorder_patience);
   return settings;
 }
 
@@ -60,22 +58,13 @@ bool poll_for(std::span<pollfd> descriptors, std::chrono::nanoseconds wall) noex
 
 }  // namespace
 
-LoadCell::Wakeup::Wakeup() : descriptor_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
-  if (descriptor_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
-}
-LoadCell::Wakeup::~Wakeup() { close(descriptor_); }
-void LoadCell::Wakeup::raise() noexcept { eventfd_write(descriptor_, 1); }
-void LoadCell::Wakeup::clear() noexcept {
-  eventfd_t ignored;
-  eventfd_read(descriptor_, &ignored);
-}
-
 LoadCell::LoadCell(const Place& place, const Clock& clock, Command mode)
     : place_(place),
       clock_(clock),
       configuration_(read_configuration(place)),
       socket_(place.host, place.rdt_port),
       queue_(queue_capacity(configuration_, clock)),
+      inquiry_(place.host, place.http_port, clock, inquiry_events_),
       session_(stream_settings(configuration_, clock, mode)) {
   accepted_.reserve(UdpSocket::kBatch * kMaxRecords);
 }
@@ -122,6 +111,14 @@ bool LoadCell::wait(std::chrono::nanoseconds wall) noexcept {
   }
 }
 
+std::vector<Event> LoadCell::take_events() {
+  std::vector<Event> events;
+  for (EventQueue* queue : {&stream_events_, &inquiry_events_})
+    queue->consume_all([&](const Event& event) { events.push_back(event); });
+  std::stable_sort(events.begin(), events.end(), [](const Event& a, const Event& b) { return a.at < b.at; });
+  return events;
+}
+
 Counters LoadCell::counters() const noexcept {
   CounterWords words;
   for (;;) {
@@ -152,21 +149,30 @@ void LoadCell::run() noexcept {
   const bool failed = session_.state() == State::failed;
   if (!failed) session_.stop(clock_.now());
   send_requests();
+  session_.flush(accepted_);
+  deliver();
   linger();
   publish();
+  hand_over_events();
 }
 
 void LoadCell::pump() noexcept {
   send_requests();
   wait_for_datagrams();
   drain();
-  session_.advance(clock_.now());
+  const Instant now = clock_.now();
+  if (session_.release_deadline() <= now) {
+    session_.release(now, accepted_);
+    deliver();
+  }
+  session_.advance(now);
   publish();
+  hand_over_events();
 }
 
 void LoadCell::wait_for_datagrams() noexcept {
   std::array<pollfd, 2> both{{{stop_wakeup_.descriptor(), POLLIN, 0}, {socket_.native_handle(), POLLIN, 0}}};
-  const Instant due = session_.deadline();
+  const Instant due = std::min(session_.deadline(), session_.release_deadline());
   poll_for(both, due == kNever ? 1h : clock_.shrunk(due - clock_.now()));
   const bool stop_asked = both[0].revents != 0;
   if (session_.state() == State::streaming && !stop_asked) poll_for({both.data(), 1}, kNap);
@@ -198,6 +204,13 @@ void LoadCell::deliver() noexcept {
 void LoadCell::send_requests() noexcept {
   std::array<std::uint8_t, 8> request;
   while (session_.next_request(request)) socket_.send(request);
+}
+
+void LoadCell::hand_over_events() noexcept {
+  session_.events().drain([this](const Event& event) {
+    stream_events_.push(event);
+    if (event.kind == EventKind::silent) inquiry_.ask();
+  });
 }
 
 void LoadCell::linger() noexcept {

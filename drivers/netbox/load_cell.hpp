@@ -14,8 +14,11 @@
 
 #include "drivers/clock.hpp"
 #include "drivers/netbox/configuration.hpp"
+#include "drivers/netbox/event_queue.hpp"
+#include "drivers/netbox/inquiry.hpp"
 #include "drivers/netbox/session.hpp"
 #include "drivers/netbox/udp_socket.hpp"
+#include "drivers/netbox/wakeup.hpp"
 
 namespace kphi::netbox {
 
@@ -48,6 +51,10 @@ class LoadCell {
   /// True once records wait; false after `wall`.
   [[nodiscard]] bool wait(std::chrono::nanoseconds wall) noexcept;
 
+  /// What has happened to the stream since the last call, oldest first; the thread of take and wait. After a silence
+  /// the box is asked over HTTP once, and the answer (stolen, rdt_disabled, unreachable) comes here up to 2 s later.
+  [[nodiscard]] std::vector<Event> take_events();
+
   /// A consistent set, a few milliseconds old at most while records come.
   [[nodiscard]] Counters counters() const noexcept;
   /// Arrival of the newest accepted record; 0 before the first.
@@ -57,19 +64,6 @@ class LoadCell {
   [[nodiscard]] std::string receive_buffer_note() const;
 
  private:
-  class Wakeup {
-   public:
-    Wakeup();
-    ~Wakeup();
-    Wakeup(const Wakeup&) = delete;
-    Wakeup& operator=(const Wakeup&) = delete;
-    void raise() noexcept;
-    void clear() noexcept;
-    [[nodiscard]] int descriptor() const noexcept { return descriptor_; }
-
-   private:
-    int descriptor_;
-  };
   using CounterWords = std::array<std::uint64_t, sizeof(Counters) / sizeof(std::uint64_t)>;
 
   void run() noexcept;
@@ -78,6 +72,7 @@ class LoadCell {
   void drain() noexcept;
   void deliver() noexcept;
   void send_requests() noexcept;
+  void hand_over_events() noexcept;
   void linger() noexcept;
   void publish() noexcept;
   [[noreturn]] void throw_unanswered() const;
@@ -91,6 +86,8 @@ class LoadCell {
   Wakeup stop_wakeup_, consumer_wakeup_;
   std::atomic<bool> consumer_waits_{false};
   boost::lockfree::spsc_queue<StampedRecord> queue_;
+  EventQueue stream_events_, inquiry_events_;
+  Inquiry inquiry_;
 
   // The receive thread's own; others touch them only while it does not run.
   Session session_;
