@@ -40,6 +40,7 @@ void Session::start(Instant now) {
   request_count_ = 0;
   send_stop(now);
   phase_ = Phase::draining;
+  bias_due_ = kNever;
   due_ = now + settings_.settle;
   drain_limit_ = now + kDrainLimit * settings_.settle;
 }
@@ -48,7 +49,7 @@ void Session::stop(Instant now) {
   request_count_ = 0;
   send_stop(now);
   phase_ = Phase::idle;
-  due_ = kNever;
+  due_ = bias_due_ = kNever;
 }
 
 void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out) {
@@ -67,6 +68,7 @@ void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, s
   if (!take_records(count, arrival, out)) return;
   if (phase_ == Phase::silent) note_event(EventKind::resumed, arrival);
   phase_ = Phase::streaming;
+  newest_arrival_ = arrival;
   due_ = arrival + silence_;
 }
 
@@ -96,7 +98,26 @@ void Session::note_event(EventKind kind, Instant at, std::uint32_t status) noexc
       {kind, at, shown_by.rdt_sequence, shown_by.ft_sequence, account_.last_rdt(), account_.last_ft(), 0, status});
 }
 
+void Session::set_bias(Instant now) {
+  if (phase_ != Phase::streaming) return;
+  send(Command::set_bias);
+  bias_starts_ = 0;
+  bias_due_ = now + 3 * settings_.datagram_period() + settings_.bias_patience;
+}
+
+void Session::check_bias(Instant now) noexcept {
+  const bool flows = newest_arrival_ + 2 * settings_.datagram_period() + settings_.bias_patience / 2 > now;
+  if (flows || bias_starts_ == settings_.attempts) {
+    bias_due_ = kNever;
+    return;
+  }
+  send(start_command());
+  ++bias_starts_;
+  bias_due_ = now + 3 * settings_.datagram_period() + settings_.reply_timeout;
+}
+
 void Session::advance(Instant now) {
+  if (now >= bias_due_) check_bias(now);
   if (now < due_) return;
   switch (phase_) {
     case Phase::draining:
@@ -126,7 +147,7 @@ bool Session::next_request(std::array<std::uint8_t, 8>& request) noexcept {
   return true;
 }
 
-Instant Session::deadline() const noexcept { return due_; }
+Instant Session::deadline() const noexcept { return std::min(due_, bias_due_); }
 
 State Session::state() const noexcept {
   switch (phase_) {
@@ -172,7 +193,7 @@ void Session::send_stop(Instant now) noexcept {
 }
 
 void Session::send_start(Instant now) noexcept {
-  send(settings_.buffered ? Command::buffered : Command::real_time);
+  send(start_command());
   const Duration patience = settings_.reply_timeout * (attempt_ == 0 ? 1 : attempt_ == 1 ? 2 : 4);
   ++attempt_;
   phase_ = Phase::awaiting;

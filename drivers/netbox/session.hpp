@@ -24,6 +24,7 @@ struct StreamSettings {
   Duration reply_timeout = std::chrono::milliseconds(100);    ///< of the first start; added to two datagram periods
   Duration settle = std::chrono::milliseconds(5);             ///< silence after a stop before the start is sent
   Duration silence_timeout = std::chrono::milliseconds(500);  ///< added to three datagram periods
+  Duration bias_patience = std::chrono::milliseconds(50);     ///< added to three datagram periods
   std::size_t reorder_records = 64;  ///< wait at most for overtaken ones; when buffered at least four datagrams
   Duration reorder_patience = std::chrono::milliseconds(20);  ///< and for so long
   int attempts = 6;  ///< starts sent before giving up; the timeout doubles up to four times the first
@@ -50,6 +51,9 @@ class Session {
   /// Tells the box to stop, and again if it keeps sending. What waits for overtaken records is to be flushed before;
   /// start() from `idle` forgets it.
   void stop(Instant now);
+  /// While streaming: the box takes its present load as zero. Some boxes stop their stream then: it is started again
+  /// when no record comes within three datagram periods and bias_patience. Another state: nothing is sent.
+  void set_bias(Instant now);
   /// Appends to `out` what can be delivered: ascending in ft_sequence. Records behind a gap wait for those that they
   /// may have overtaken (StreamSettings::reorder_records and reorder_patience) and come with a later call.
   void receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out);
@@ -78,9 +82,13 @@ class Session {
   enum class Phase : std::uint8_t { idle, draining, awaiting, streaming, silent, failed };
 
   void discard(Instant arrival);
+  void check_bias(Instant now) noexcept;
   bool take_records(std::size_t count, Instant arrival, std::vector<StampedRecord>& out);
   void note_event(EventKind kind, Instant at, std::uint32_t status = 0) noexcept;
   bool belongs_to_new_stream(const Record& first) const noexcept;
+  [[nodiscard]] Command start_command() const noexcept {
+    return settings_.buffered ? Command::buffered : Command::real_time;
+  }
   void send(Command command) noexcept;
   void send_stop(Instant now) noexcept;
   void send_start(Instant now) noexcept;
@@ -91,7 +99,9 @@ class Session {
   ReorderWindow window_;
   std::uint32_t trouble_ = 0;  // status bits that say so, of the last datagram
   Phase phase_ = Phase::idle;
-  Instant due_ = kNever;
+  Instant due_ = kNever, bias_due_ = kNever;
+  Instant newest_arrival_{0};
+  int bias_starts_ = 0;
   Instant drain_limit_{0}, stop_sent_{0};
   int attempt_ = 0;
   std::size_t datagram_records_;  // of the last datagram

@@ -311,6 +311,45 @@ TEST_F(SessionTest, WhatWaitsKeepsTheStreamAlive) {
   EXPECT_GT(session.deadline(), now + 500ms);
 }
 
+TEST_F(SessionTest, ABiasOnABoxThatKeepsStreamingIsOneRequest) {
+  start_streaming();
+  told();
+  session.set_bias(now);
+  EXPECT_THAT(told(), ElementsAre(0x42));
+  const Instant end = now + 300ms;
+  for (std::uint32_t i = 1; now < end; ++i) {
+    now += settings.datagram_period();
+    receive(records(1 + 40 * i, 1000 + 40 * i, 40));
+    session.advance(now);
+  }
+  EXPECT_THAT(told(), IsEmpty());
+  EXPECT_EQ(session.counters().lost_network, 0u);
+}
+
+TEST_F(SessionTest, ABiasOnABoxThatStopsIsFollowedByAStart) {
+  start_streaming();
+  told();
+  session.set_bias(now);
+  EXPECT_THAT(told(), ElementsAre(0x42));
+  EXPECT_EQ(session.deadline(), now + 3 * settings.datagram_period() + settings.bias_patience);
+  advance_to_deadline();
+  EXPECT_THAT(told(), ElementsAre(3));
+  advance_to_deadline();
+  EXPECT_THAT(told(), ElementsAre(3)) << "a start can be lost";
+  receive(records(1, 1040 + 1500, 40));
+  advance_to_deadline();
+  EXPECT_THAT(told(), IsEmpty());
+  EXPECT_EQ(session.state(), State::streaming);
+  EXPECT_EQ(session.counters().lost_network, 1500u) << "what the box measured meanwhile is accounted for";
+  EXPECT_EQ(session.counters().restarts, 1u);
+}
+
+TEST_F(SessionTest, ABiasWithoutAStreamIsNotSent) {
+  session.set_bias(now);
+  EXPECT_THAT(told(), IsEmpty());
+  EXPECT_EQ(session.deadline(), kNever);
+}
+
 TEST_F(SessionTest, StopsAndRepeatsTheStopWhileTheBoxGoesOn) {
   start_streaming();
   session.stop(now);
