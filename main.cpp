@@ -8,6 +8,7 @@
 
 #include "compensation/commands.hpp"
 #include "daq/commands.hpp"
+#include "daq/devices_commands.hpp"
 #include "daq/interlock.hpp"
 #include "daq/interrupt.hpp"
 #include "daq/replay_commands.hpp"
@@ -69,6 +70,7 @@ int main(int argc, char** argv) {
 
   kphi::profiles::add_check(program, exit_code);
   kphi::sim::add_sim(program, exit_code);
+  kphi::daq::add_devices(program, exit_code);
   kphi::daq::add_run(program, exit_code);
   kphi::daq::add_replay(program, exit_code);
   kphi::results::add_info(program, exit_code);

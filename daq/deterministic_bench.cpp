@@ -73,7 +73,7 @@ void DeterministicBench::wait_until(Instant when) {
   while (clock_.now() < when) {
     Instant next = std::min(when, clock_.now() + datagram);
     next = std::min(next, motor_.deadline());
-    if (stream_) next = std::min(next, stream_->deadline());
+    if (stream_) next = std::min({next, stream_->deadline(), stream_->release_deadline()});
     step_to(std::max(next, clock_.now() + Duration(1)));
     if (work_ && clock_.now() >= next_work_) {
       (*work_)();
@@ -87,7 +87,10 @@ void DeterministicBench::step_to(Instant when) {
   sim_.advance(when);
   exchange();  // what came is received before anything is found to be late
   motor_.advance(when);
-  if (stream_) stream_->advance(when);
+  if (stream_) {
+    stream_->release(when, records_);
+    stream_->advance(when);
+  }
   exchange();
 }
 
@@ -170,6 +173,7 @@ results::LoadCellScale DeterministicBench::start() {
 }
 
 void DeterministicBench::stop() noexcept {
+  stream_->flush(records_);
   stream_->stop(clock_.now());
   exchange_load_cell();
 }

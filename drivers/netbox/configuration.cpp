@@ -12,37 +12,10 @@
 #include <vector>
 
 #include "drivers/device_error.hpp"
-#include "drivers/netbox/codes.hpp"
+#include "drivers/netbox/units.hpp"
 
 namespace kphi::netbox {
 namespace {
-
-struct Unit {
-  const char* name;
-  int code;   // cfgfu, cfgtu
-  double si;  // newtons or newton-metres in one
-};
-
-constexpr double kLbf = 4.4482216152605, kKgf = 9.80665;
-
-constexpr Unit kForceUnits[] = {
-    {"N", static_cast<int>(ForceUnit::newton), 1.0}, {"kN", static_cast<int>(ForceUnit::kilonewton), 1000.0},
-    {"lbf", static_cast<int>(ForceUnit::lbf), kLbf}, {"klbf", static_cast<int>(ForceUnit::klbf), 1000.0 * kLbf},
-    {"kgf", static_cast<int>(ForceUnit::kgf), kKgf}, {"gf", static_cast<int>(ForceUnit::gf), 1e-3 * kKgf},
-};
-
-constexpr Unit kTorqueUnits[] = {
-    {"Nm", static_cast<int>(TorqueUnit::newton_metre), 1.0},
-    {"N-m", static_cast<int>(TorqueUnit::newton_metre), 1.0},
-    {"Nmm", static_cast<int>(TorqueUnit::newton_millimetre), 1e-3},
-    {"N-mm", static_cast<int>(TorqueUnit::newton_millimetre), 1e-3},
-    {"kg-cm", static_cast<int>(TorqueUnit::kgf_centimetre), 1e-2 * kKgf},
-    {"kgf-cm", static_cast<int>(TorqueUnit::kgf_centimetre), 1e-2 * kKgf},
-    {"kNm", static_cast<int>(TorqueUnit::kilonewton_metre), 1000.0},
-    {"kN-m", static_cast<int>(TorqueUnit::kilonewton_metre), 1000.0},
-    {"lbf-in", static_cast<int>(TorqueUnit::lbf_inch), 0.1129848290276167},
-    {"lbf-ft", static_cast<int>(TorqueUnit::lbf_foot), 1.3558179483314004},
-};
 
 constexpr double kFilterCutoffHz[] = {0, 838, 326, 152, 73, 35, 18, 8, 5, 1500, 2000, 2500, 3000};
 
@@ -155,8 +128,8 @@ void read_identity(const Elements& elements, Configuration& configuration) {
 }
 
 void read_scale(const Elements& elements, Configuration& configuration) {
-  const Unit force = elements.unit("scfgfu", "cfgfu", kForceUnits);
-  const Unit torque = elements.unit("scfgtu", "cfgtu", kTorqueUnits);
+  const Unit force = elements.unit("scfgfu", "cfgfu", force_units());
+  const Unit torque = elements.unit("scfgtu", "cfgtu", torque_units());
   const double counts_per_force = elements.number("cfgcpf");
   const double counts_per_torque = elements.number("cfgcpt");
   if (!(counts_per_force > 0) || !(counts_per_torque > 0)) {

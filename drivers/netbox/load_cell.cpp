@@ -3,14 +3,10 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
-#include <sys/eventfd.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
-#include <system_error>
 
 #include "drivers/device_error.hpp"
 #include "drivers/netbox/http.hpp"
@@ -43,6 +39,8 @@ StreamSettings stream_settings(const Configuration& configuration, const Clock& 
   settings.reply_timeout = clock.stretched(settings.reply_timeout);
   settings.settle = clock.stretched(settings.settle);
   settings.silence_timeout = clock.stretched(settings.silence_timeout);
+  settings.bias_patience = clock.stretched(settings.bias_patience);
+  settings.reorder_patience = clock.stretched(settings.reorder_patience);
   return settings;
 }
 
@@ -60,23 +58,16 @@ bool poll_for(std::span<pollfd> descriptors, std::chrono::nanoseconds wall) noex
 
 }  // namespace
 
-LoadCell::Wakeup::Wakeup() : descriptor_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
-  if (descriptor_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
-}
-LoadCell::Wakeup::~Wakeup() { close(descriptor_); }
-void LoadCell::Wakeup::raise() noexcept { eventfd_write(descriptor_, 1); }
-void LoadCell::Wakeup::clear() noexcept {
-  eventfd_t ignored;
-  eventfd_read(descriptor_, &ignored);
-}
-
 LoadCell::LoadCell(const Place& place, const Clock& clock, Command mode)
     : place_(place),
       clock_(clock),
       configuration_(read_configuration(place)),
       socket_(place.host, place.rdt_port),
-      queue_(queue_capacity(configuration_, clock)),
-      session_(stream_settings(configuration_, clock, mode)) {
+      queue_capacity_(queue_capacity(configuration_, clock)),
+      queue_(queue_capacity_),
+      inquiry_(place.host, place.http_port, clock, inquiry_events_),
+      session_(stream_settings(configuration_, clock, mode)),
+      meter_(configuration_.device_rate_hz) {
   accepted_.reserve(UdpSocket::kBatch * kMaxRecords);
 }
 
@@ -89,7 +80,7 @@ void LoadCell::start() {
                       "enable RDT on the box's Communications page");
   }
   stopping_ = false;
-  stop_wakeup_.clear();
+  order_wakeup_.clear();
   state_ = State::starting;
   thread_ = std::thread([this] { run(); });
   // The session ends this by itself: it either streams or gives up.
@@ -102,8 +93,13 @@ void LoadCell::start() {
 void LoadCell::stop() noexcept {
   if (!thread_.joinable()) return;
   stopping_ = true;
-  stop_wakeup_.raise();
+  order_wakeup_.raise();
   thread_.join();
+}
+
+void LoadCell::set_bias() noexcept {
+  bias_asked_ = true;
+  order_wakeup_.raise();
 }
 
 std::size_t LoadCell::take(std::span<StampedRecord> out) noexcept { return queue_.pop(out.data(), out.size()); }
@@ -122,15 +118,12 @@ bool LoadCell::wait(std::chrono::nanoseconds wall) noexcept {
   }
 }
 
-Counters LoadCell::counters() const noexcept {
-  CounterWords words;
-  for (;;) {
-    const std::uint32_t before = counters_version_.load(std::memory_order_acquire);
-    for (std::size_t i = 0; i < words.size(); ++i) words[i] = counter_words_[i].load(std::memory_order_relaxed);
-    std::atomic_thread_fence(std::memory_order_acquire);
-    if (before % 2 == 0 && counters_version_.load(std::memory_order_relaxed) == before) break;
-  }
-  return std::bit_cast<Counters>(words);
+std::vector<Event> LoadCell::take_events() {
+  std::vector<Event> events;
+  for (EventQueue* queue : {&stream_events_, &inquiry_events_})
+    queue->consume_all([&](const Event& event) { events.push_back(event); });
+  std::stable_sort(events.begin(), events.end(), [](const Event& a, const Event& b) { return a.at < b.at; });
+  return events;
 }
 
 std::string LoadCell::receive_buffer_note() const {
@@ -147,29 +140,45 @@ void LoadCell::run() noexcept {
   sigset_t all;
   sigfillset(&all);
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
+  meter_.begin();
+  bias_asked_ = false;
   session_.start(clock_.now());
   while (!stopping_ && session_.state() != State::failed) pump();
   const bool failed = session_.state() == State::failed;
   if (!failed) session_.stop(clock_.now());
   send_requests();
+  session_.flush(accepted_);
+  deliver();
   linger();
   publish();
+  hand_over_events();
 }
 
 void LoadCell::pump() noexcept {
+  if (bias_asked_.exchange(false)) {
+    order_wakeup_.clear();
+    session_.set_bias(clock_.now());
+  }
+  if (stopping_) return;
   send_requests();
   wait_for_datagrams();
   drain();
-  session_.advance(clock_.now());
+  const Instant now = clock_.now();
+  if (session_.release_deadline() <= now) {
+    session_.release(now, accepted_);
+    deliver();
+  }
+  session_.advance(now);
   publish();
+  hand_over_events();
 }
 
 void LoadCell::wait_for_datagrams() noexcept {
-  std::array<pollfd, 2> both{{{stop_wakeup_.descriptor(), POLLIN, 0}, {socket_.native_handle(), POLLIN, 0}}};
-  const Instant due = session_.deadline();
+  std::array<pollfd, 2> both{{{order_wakeup_.descriptor(), POLLIN, 0}, {socket_.native_handle(), POLLIN, 0}}};
+  const Instant due = std::min(session_.deadline(), session_.release_deadline());
   poll_for(both, due == kNever ? 1h : clock_.shrunk(due - clock_.now()));
-  const bool stop_asked = both[0].revents != 0;
-  if (session_.state() == State::streaming && !stop_asked) poll_for({both.data(), 1}, kNap);
+  const bool ordered = both[0].revents != 0;
+  if (session_.state() == State::streaming && !ordered) poll_for({both.data(), 1}, kNap);
 }
 
 void LoadCell::drain() noexcept {
@@ -177,8 +186,11 @@ void LoadCell::drain() noexcept {
     const std::span<const UdpSocket::Datagram> datagrams = socket_.receive();
     for (const UdpSocket::Datagram& datagram : datagrams) {
       const bool stamped = datagram.stamp.tv_sec != 0;
+      const std::size_t before = accepted_.size();
       session_.note_host_drops(datagram.dropped);
       session_.receive(datagram.bytes, stamped ? clock_.at_realtime(datagram.stamp) : clock_.now(), accepted_);
+      if (accepted_.size() > before)
+        meter_.note(accepted_.back(), accepted_.size() - before, session_.counters().reboots);
     }
     deliver();
     if (datagrams.size() < UdpSocket::kBatch) return;
@@ -189,6 +201,7 @@ void LoadCell::deliver() noexcept {
   if (accepted_.empty()) return;
   const std::size_t taken = queue_.push(accepted_.data(), accepted_.size());
   queue_overflows_ += accepted_.size() - taken;
+  meter_.note_queue(queue_capacity_ - queue_.write_available());
   newest_arrival_ns_ = accepted_.back().arrival.count();
   accepted_.clear();
   std::atomic_thread_fence(std::memory_order_seq_cst);
@@ -198,6 +211,13 @@ void LoadCell::deliver() noexcept {
 void LoadCell::send_requests() noexcept {
   std::array<std::uint8_t, 8> request;
   while (session_.next_request(request)) socket_.send(request);
+}
+
+void LoadCell::hand_over_events() noexcept {
+  session_.events().drain([this](const Event& event) {
+    stream_events_.push(event);
+    if (event.kind == EventKind::silent) inquiry_.ask();
+  });
 }
 
 void LoadCell::linger() noexcept {
@@ -212,12 +232,10 @@ void LoadCell::linger() noexcept {
 void LoadCell::publish() noexcept {
   Counters counters = session_.counters();
   counters.queue_overflows = queue_overflows_;
-  const auto words = std::bit_cast<CounterWords>(counters);
-  const std::uint32_t version = counters_version_.load(std::memory_order_relaxed);
-  counters_version_.store(version + 1, std::memory_order_relaxed);
-  std::atomic_thread_fence(std::memory_order_release);
-  for (std::size_t i = 0; i < words.size(); ++i) counter_words_[i].store(words[i], std::memory_order_relaxed);
-  counters_version_.store(version + 2, std::memory_order_release);
+  counters_.publish(counters);
+  Health health = meter_.health();
+  health.events_dropped = session_.events().dropped();
+  health_.publish(health);
   const State state = session_.state();
   if (state_.exchange(state) != state) state_.notify_all();
 }

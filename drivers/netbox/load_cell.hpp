@@ -2,7 +2,6 @@
 // of the box's settings.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <chrono>
@@ -14,8 +13,13 @@
 
 #include "drivers/clock.hpp"
 #include "drivers/netbox/configuration.hpp"
+#include "drivers/netbox/event_queue.hpp"
+#include "drivers/netbox/health.hpp"
+#include "drivers/netbox/inquiry.hpp"
+#include "drivers/netbox/published.hpp"
 #include "drivers/netbox/session.hpp"
 #include "drivers/netbox/udp_socket.hpp"
+#include "drivers/netbox/wakeup.hpp"
 
 namespace kphi::netbox {
 
@@ -43,13 +47,23 @@ class LoadCell {
   /// Tells the box to stop, and waits a moment to see that it does.
   void stop() noexcept;
 
+  /// Tells the box to take its present load as zero (0x42), and starts the stream again if the box stops it; returns
+  /// at once. Whether it worked is to be measured: see bias.hpp. Any thread.
+  void set_bias() noexcept;
+
   /// Oldest first; 0 = none waits.
   [[nodiscard]] std::size_t take(std::span<StampedRecord> out) noexcept;
   /// True once records wait; false after `wall`.
   [[nodiscard]] bool wait(std::chrono::nanoseconds wall) noexcept;
 
+  /// What has happened to the stream since the last call, oldest first; the thread of take and wait. After a silence
+  /// the box is asked over HTTP once, and the answer (stolen, rdt_disabled, unreachable) comes here up to 2 s later.
+  [[nodiscard]] std::vector<Event> take_events();
+
   /// A consistent set, a few milliseconds old at most while records come.
-  [[nodiscard]] Counters counters() const noexcept;
+  [[nodiscard]] Counters counters() const noexcept { return counters_.read(); }
+  /// As old as counters().
+  [[nodiscard]] Health health() const noexcept { return health_.read(); }
   /// Arrival of the newest accepted record; 0 before the first.
   [[nodiscard]] Instant newest_arrival() const noexcept { return Instant(newest_arrival_ns_.load()); }
   [[nodiscard]] State state() const noexcept { return state_.load(); }
@@ -57,27 +71,13 @@ class LoadCell {
   [[nodiscard]] std::string receive_buffer_note() const;
 
  private:
-  class Wakeup {
-   public:
-    Wakeup();
-    ~Wakeup();
-    Wakeup(const Wakeup&) = delete;
-    Wakeup& operator=(const Wakeup&) = delete;
-    void raise() noexcept;
-    void clear() noexcept;
-    [[nodiscard]] int descriptor() const noexcept { return descriptor_; }
-
-   private:
-    int descriptor_;
-  };
-  using CounterWords = std::array<std::uint64_t, sizeof(Counters) / sizeof(std::uint64_t)>;
-
   void run() noexcept;
   void pump() noexcept;
   void wait_for_datagrams() noexcept;
   void drain() noexcept;
   void deliver() noexcept;
   void send_requests() noexcept;
+  void hand_over_events() noexcept;
   void linger() noexcept;
   void publish() noexcept;
   [[noreturn]] void throw_unanswered() const;
@@ -87,21 +87,25 @@ class LoadCell {
   const Configuration configuration_;
   UdpSocket socket_;
   std::thread thread_;
-  std::atomic<bool> stopping_{false};
-  Wakeup stop_wakeup_, consumer_wakeup_;
+  std::atomic<bool> stopping_{false}, bias_asked_{false};
+  Wakeup order_wakeup_, consumer_wakeup_;
   std::atomic<bool> consumer_waits_{false};
+  const std::size_t queue_capacity_;
   boost::lockfree::spsc_queue<StampedRecord> queue_;
+  EventQueue stream_events_, inquiry_events_;
+  Inquiry inquiry_;
 
   // The receive thread's own; others touch them only while it does not run.
   Session session_;
   std::vector<StampedRecord> accepted_;
+  HealthMeter meter_;
   std::uint64_t queue_overflows_ = 0;
 
   // Published by the receive thread.
   std::atomic<State> state_{State::idle};
   std::atomic<std::int64_t> newest_arrival_ns_{0};
-  std::atomic<std::uint32_t> counters_version_{0};  // odd while they are being written
-  std::array<std::atomic<std::uint64_t>, std::tuple_size_v<CounterWords>> counter_words_{};
+  Published<Counters> counters_;
+  Published<Health> health_;
 };
 
 }  // namespace kphi::netbox

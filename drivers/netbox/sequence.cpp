@@ -1,6 +1,7 @@
 #include "drivers/netbox/sequence.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace kphi::netbox {
 namespace {
@@ -13,26 +14,79 @@ std::int32_t step(std::uint32_t from, std::uint32_t to) noexcept { return static
 
 }  // namespace
 
+void SequenceAccount::begin_segment() noexcept {
+  has_last_ = has_stray_ = false;
+  stall_run_ = 0;
+  former_count_ = 0;
+}
+
 bool SequenceAccount::accept_unusual(const Record& record, Instant arrival) noexcept {
   if (!has_last_) return accept_first(record, arrival);
-  const std::int32_t rdt_step = step(last_rdt_, record.rdt_sequence);
+  const std::int32_t rdt_step = step(last_rdt(), record.rdt_sequence);
   const std::int32_t ft_step = step(last_ft_, record.ft_sequence);
   if (ft_step == 0) {
-    if (rdt_step == 0) {
-      ++counters_.duplicates;
-    } else {
-      ++counters_.stalled;
-      last_rdt_ = record.rdt_sequence;
-    }
-    return false;
+    if (rdt_step == 0) return refuse(&Counters::duplicates);
+    note_stall(record, arrival);
+    return refuse(&Counters::stalled);
   }
-  const bool believable = plausible(ft_step, arrival);
-  if (ft_step > 0 && believable) return accept_forward(record, arrival, rdt_step, ft_step);
-  if (!believable && confirms_reboot(record)) {
-    ++counters_.reboots;
-    return accept_first(record, arrival);
+  if (looks_rebooted(record, arrival)) {
+    if (note_stray(record, arrival, ft_step)) return accept_reboot(record, arrival);
+    return refuse(stray_counted_);
   }
-  return refuse_backward(record, ft_step);
+  if (ft_step > 0 && !on_former_line(record)) return accept_forward(record, arrival, rdt_step, ft_step);
+  return refuse(ft_step < 0 && !in_recent_gap(record.ft_sequence) ? &Counters::duplicates : &Counters::late);
+}
+
+bool SequenceAccount::looks_rebooted(const Record& record, Instant arrival) const noexcept {
+  if (!has_last_) return false;
+  const std::int32_t ft_step = step(last_ft_, record.ft_sequence);
+  if (!plausible(ft_step, arrival)) return true;
+  // What is late or doubled lies on the line of this stream or of one before.
+  return ft_step < 0 && line(record.rdt_sequence, record.ft_sequence) != line(last_rdt_, last_ft_) &&
+         !on_former_line(record);
+}
+
+bool SequenceAccount::on_former_line(const Record& record) const noexcept {
+  const std::uint32_t its_line = line(record.rdt_sequence, record.ft_sequence);
+  if (its_line == line(last_rdt_, last_ft_)) return false;
+  const auto known = static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(former_count_, former_lines_.size()));
+  return std::find(former_lines_.begin(), former_lines_.begin() + known, its_line) != former_lines_.begin() + known;
+}
+
+bool SequenceAccount::note_stray(const Record& record, Instant arrival, std::int32_t ft_step) noexcept {
+  const bool confirms = has_stray_ && record.rdt_sequence == stray_.record.rdt_sequence + 1 &&
+                        record.ft_sequence == stray_.record.ft_sequence + stride_;
+  if (confirms) return true;
+  has_stray_ = true;
+  stray_ = {record, arrival};
+  stray_counted_ = ft_step < 0 && !in_recent_gap(record.ft_sequence) ? &Counters::duplicates : &Counters::late;
+  return false;
+}
+
+bool SequenceAccount::accept_reboot(const Record& record, Instant arrival) noexcept {
+  const StampedRecord first = stray_;
+  --(counters_.*stray_counted_);
+  ++counters_.reboots;
+  note_event(EventKind::rebooted, first.record, first.arrival, 0);
+  leave_line();
+  gap_count_ = 0;
+  stall_run_ = 0;
+  accept_first(first.record, first.arrival);
+  confirmed_ = first;
+  return accept(record, arrival);
+}
+
+std::optional<StampedRecord> SequenceAccount::take_confirmed() noexcept {
+  return std::exchange(confirmed_, std::nullopt);
+}
+
+void SequenceAccount::note_stall(const Record& record, Instant arrival) noexcept {
+  if (stall_run_++ == 0) note_event(EventKind::stalled, record, arrival, 0);
+  stall_rdt_ = record.rdt_sequence;
+}
+
+void SequenceAccount::note_event(EventKind kind, const Record& record, Instant at, std::uint64_t records) noexcept {
+  events_.note({kind, at, record.rdt_sequence, record.ft_sequence, last_rdt_, last_ft_, records, record.status});
 }
 
 bool SequenceAccount::accept_first(const Record& record, Instant arrival) noexcept {
@@ -50,9 +104,13 @@ bool SequenceAccount::accept_forward(const Record& record, Instant arrival, std:
   const std::uint64_t records = std::max<std::uint64_t>(1, (advance + stride_ / 2) / stride_);
   if (rdt_step <= 0) {
     ++counters_.restarts;
+    note_event(EventKind::restarted, record, arrival, records - 1);
   } else if (static_cast<std::uint64_t>(rdt_step) * stride_ != advance) {
     ++counters_.irregular;
   }
+  if (stall_run_ > 0) note_event(EventKind::stall_ended, record, arrival, stall_run_);
+  stall_run_ = 0;
+  if (line(record.rdt_sequence, record.ft_sequence) != line(last_rdt_, last_ft_)) leave_line();
   if (records > 1) count_lost(records - 1, {last_ft_, record.ft_sequence});
   counters_.expected += records;
   ++counters_.received;
@@ -60,28 +118,10 @@ bool SequenceAccount::accept_forward(const Record& record, Instant arrival, std:
   return true;
 }
 
-bool SequenceAccount::refuse_backward(const Record& record, std::int32_t ft_step) noexcept {
-  if (ft_step < 0 && !in_recent_gap(record.ft_sequence)) {
-    ++counters_.duplicates;
-  } else {
-    ++counters_.late;
-  }
-  return false;
-}
-
 bool SequenceAccount::plausible(std::int32_t ft_step, Instant arrival) const noexcept {
   const double device_seconds = ft_step / device_rate_hz_;
   const double host_seconds = std::max(0.0, to_seconds(arrival - last_arrival_));
   return device_seconds > -kLongestDelaySeconds && device_seconds < 2 * host_seconds + kLongestDelaySeconds;
-}
-
-bool SequenceAccount::confirms_reboot(const Record& record) noexcept {
-  const bool confirms =
-      has_stray_ && record.rdt_sequence == stray_rdt_ + 1 && record.ft_sequence == stray_ft_ + stride_;
-  has_stray_ = true;
-  stray_rdt_ = record.rdt_sequence;
-  stray_ft_ = record.ft_sequence;
-  return confirms;
 }
 
 void SequenceAccount::add_host_drops(std::uint64_t datagrams, std::uint64_t records_per_datagram) noexcept {

@@ -4,11 +4,18 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "drivers/clock.hpp"
+#include "drivers/netbox/events.hpp"
 #include "drivers/netbox/rdt.hpp"
 
 namespace kphi::netbox {
+
+struct StampedRecord {
+  Record record;
+  Instant arrival{0};  ///< bench time at which the datagram that brought it reached this host
+};
 
 /// Records unless said otherwise. expected = received + lost_network + lost_host, always.
 struct Counters {
@@ -17,7 +24,8 @@ struct Counters {
   std::uint64_t lost_network = 0;  ///< never reached this host; late ones stay counted here
   std::uint64_t lost_host = 0;     ///< reached this host while the socket's buffer was full
   std::uint64_t duplicates = 0;    ///< came a second time; discarded
-  std::uint64_t late = 0;          ///< came after a younger one; discarded
+  std::uint64_t late = 0;          ///< came after a younger one had been delivered; discarded
+  std::uint64_t reordered = 0;     ///< came after a younger one, but before its delivery; in their place again
   std::uint64_t stalled = 0;       ///< repeated an old measurement under a new rdt_sequence; discarded
   std::uint64_t irregular = 0;     ///< accepted, but rdt and ft disagree about the gap before them (rate changed?)
   std::uint64_t restarts = 0;      ///< times the stream began anew, ft_sequence going on
@@ -35,22 +43,39 @@ class SequenceAccount {
   SequenceAccount(unsigned stride, double device_rate_hz) noexcept : stride_(stride), device_rate_hz_(device_rate_hz) {}
 
   /// The next record is the first of a stream that was asked for: nothing is missing before it.
-  void begin_segment() noexcept { has_last_ = false; }
+  void begin_segment() noexcept;
   /// True: deliver it. False: counted and to be discarded.
   [[nodiscard]] bool accept(const Record& record, Instant arrival) noexcept {
-    if (has_last_ && record.rdt_sequence == last_rdt_ + 1 && record.ft_sequence == last_ft_ + stride_) [[likely]] {
-      remember(record, arrival);
-      ++counters_.received;
-      ++counters_.expected;
+    if (is_next(record)) [[likely]] {
+      accept_next(record, arrival);
       return true;
     }
     return accept_unusual(record, arrival);
   }
+  /// Follows the last accepted one in both numbers.
+  [[nodiscard]] bool is_next(const Record& record) const noexcept {
+    return has_last_ && record.rdt_sequence == last_rdt_ + 1 && record.ft_sequence == last_ft_ + stride_;
+  }
+  /// A record that is_next().
+  void accept_next(const Record& record, Instant arrival) noexcept {
+    remember(record, arrival);
+    ++counters_.received;
+    ++counters_.expected;
+  }
+  /// The first record of a rebooted box, once accept() has taken the second: it is to be delivered before that one.
+  [[nodiscard]] std::optional<StampedRecord> take_confirmed() noexcept;
+  /// Only a box that has booted anew can have sent it, as far as one record can tell.
+  [[nodiscard]] bool looks_rebooted(const Record& record, Instant arrival) const noexcept;
+  [[nodiscard]] bool has_last() const noexcept { return has_last_; }
+  [[nodiscard]] std::uint32_t last_ft() const noexcept { return last_ft_; }
+  [[nodiscard]] std::uint32_t last_rdt() const noexcept { return stall_run_ > 0 ? stall_rdt_ : last_rdt_; }
   /// As many records more were dropped by this host's socket: they explain the gaps seen from now on.
   void add_host_drops(std::uint64_t datagrams, std::uint64_t records_per_datagram) noexcept;
 
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
   [[nodiscard]] Counters& counters() noexcept { return counters_; }
+  /// Restarts, reboots and stalls; the owner takes them.
+  [[nodiscard]] EventLog& events() noexcept { return events_; }
 
  private:
   struct Gap {
@@ -65,10 +90,20 @@ class SequenceAccount {
   }
   bool accept_unusual(const Record& record, Instant arrival) noexcept;
   bool accept_forward(const Record& record, Instant arrival, std::int32_t rdt_step, std::int32_t ft_step) noexcept;
-  bool refuse_backward(const Record& record, std::int32_t ft_step) noexcept;
+  bool refuse(std::uint64_t Counters::*as) noexcept {
+    ++(counters_.*as);
+    return false;
+  }
   bool accept_first(const Record& record, Instant arrival) noexcept;
   bool plausible(std::int32_t ft_step, Instant arrival) const noexcept;
-  bool confirms_reboot(const Record& record) noexcept;
+  bool accept_reboot(const Record& record, Instant arrival) noexcept;
+  bool note_stray(const Record& record, Instant arrival, std::int32_t ft_step) noexcept;
+  void note_stall(const Record& record, Instant arrival) noexcept;
+  void note_event(EventKind kind, const Record& record, Instant at, std::uint64_t records) noexcept;
+  /// The same for all records of one stream: they lie on one line of rdt over ft.
+  std::uint32_t line(std::uint32_t rdt, std::uint32_t ft) const noexcept { return rdt * stride_ - ft; }
+  bool on_former_line(const Record& record) const noexcept;
+  void leave_line() noexcept { former_lines_[former_count_++ % former_lines_.size()] = line(last_rdt_, last_ft_); }
   void count_lost(std::uint64_t records, const Gap& gap) noexcept;
   bool in_recent_gap(std::uint32_t ft) const noexcept;
 
@@ -80,9 +115,16 @@ class SequenceAccount {
   std::uint64_t host_credit_ = 0;  // records dropped by the socket and not yet found missing
   std::array<Gap, 16> gaps_{};
   std::uint64_t gap_count_ = 0;
+  std::array<std::uint32_t, 4> former_lines_{};
+  std::uint64_t former_count_ = 0;
+  std::uint64_t stall_run_ = 0;  // records since the measurement stands still
+  std::uint32_t stall_rdt_ = 0;
   bool has_stray_ = false;  // the last record was one that only a rebooted box can have sent
-  std::uint32_t stray_rdt_ = 0, stray_ft_ = 0;
+  StampedRecord stray_;
+  std::uint64_t Counters::*stray_counted_ = nullptr;  // as what it was discarded
+  std::optional<StampedRecord> confirmed_;
   Counters counters_;
+  EventLog events_;
 };
 
 }  // namespace kphi::netbox

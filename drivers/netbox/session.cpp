@@ -10,6 +10,14 @@ constexpr int kDrainLimit = 20;
 // A new stream counts from 1. What is further on than this many datagrams belongs to the one before.
 constexpr std::uint32_t kFirstDatagrams = 64;
 
+constexpr std::uint32_t kTroubleBits =
+    1u << static_cast<unsigned>(StatusBit::rdt) | 1u << static_cast<unsigned>(StatusBit::network);
+
+std::size_t window_records(const StreamSettings& settings) {
+  const auto four_datagrams = static_cast<std::size_t>(settings.buffered ? 4 * settings.records_per_datagram : 4);
+  return std::max(settings.reorder_records, four_datagrams);
+}
+
 }  // namespace
 
 Duration StreamSettings::datagram_period() const noexcept {
@@ -20,14 +28,19 @@ Session::Session(StreamSettings settings)
     : settings_(settings),
       silence_(settings.silence_timeout + 3 * settings.datagram_period()),
       account_(settings.divisor, settings.device_rate_hz),
+      window_(window_records(settings), settings.reorder_patience, settings.divisor),
       datagram_records_(settings.buffered ? static_cast<std::size_t>(settings.records_per_datagram) : 1) {}
 
 void Session::start(Instant now) {
-  if (phase_ == Phase::idle || phase_ == Phase::failed) account_.begin_segment();
+  if (phase_ == Phase::idle || phase_ == Phase::failed) {
+    account_.begin_segment();
+    window_.forget();
+  }
   attempt_ = 0;
   request_count_ = 0;
   send_stop(now);
   phase_ = Phase::draining;
+  bias_due_ = kNever;
   due_ = now + settings_.settle;
   drain_limit_ = now + kDrainLimit * settings_.settle;
 }
@@ -36,7 +49,7 @@ void Session::stop(Instant now) {
   request_count_ = 0;
   send_stop(now);
   phase_ = Phase::idle;
-  due_ = kNever;
+  due_ = bias_due_ = kNever;
 }
 
 void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out) {
@@ -52,16 +65,59 @@ void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, s
     if (!expected) return discard(arrival);
   }
   datagram_records_ = count;
-  const std::size_t before = out.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    if (account_.accept(decoded_[i], arrival)) out.push_back({decoded_[i], arrival});
-  }
-  if (out.size() == before) return;
+  if (!take_records(count, arrival, out)) return;
+  if (phase_ == Phase::silent) note_event(EventKind::resumed, arrival);
   phase_ = Phase::streaming;
+  newest_arrival_ = arrival;
   due_ = arrival + silence_;
 }
 
+bool Session::take_records(std::size_t count, Instant arrival, std::vector<StampedRecord>& out) {
+  bool any_new = false;
+  std::uint32_t status = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Record& record = decoded_[i];
+    status |= record.status;
+    if (window_.empty() && account_.is_next(record)) [[likely]] {
+      account_.accept_next(record, arrival);
+      out.push_back({record, arrival});
+      any_new = true;
+    } else {
+      any_new |= window_.receive(record, arrival, account_, out);
+    }
+  }
+  const std::uint32_t trouble = status & kTroubleBits;
+  if ((trouble & ~trouble_) != 0) note_event(EventKind::box_trouble, arrival, trouble);
+  trouble_ = trouble;
+  return any_new;
+}
+
+void Session::note_event(EventKind kind, Instant at, std::uint32_t status) noexcept {
+  const Record& shown_by = decoded_[0];
+  account_.events().note(
+      {kind, at, shown_by.rdt_sequence, shown_by.ft_sequence, account_.last_rdt(), account_.last_ft(), 0, status});
+}
+
+void Session::set_bias(Instant now) {
+  if (phase_ != Phase::streaming) return;
+  send(Command::set_bias);
+  bias_starts_ = 0;
+  bias_due_ = now + 3 * settings_.datagram_period() + settings_.bias_patience;
+}
+
+void Session::check_bias(Instant now) noexcept {
+  const bool flows = newest_arrival_ + 2 * settings_.datagram_period() + settings_.bias_patience / 2 > now;
+  if (flows || bias_starts_ == settings_.attempts) {
+    bias_due_ = kNever;
+    return;
+  }
+  send(start_command());
+  ++bias_starts_;
+  bias_due_ = now + 3 * settings_.datagram_period() + settings_.reply_timeout;
+}
+
 void Session::advance(Instant now) {
+  if (now >= bias_due_) check_bias(now);
   if (now < due_) return;
   switch (phase_) {
     case Phase::draining:
@@ -74,6 +130,7 @@ void Session::advance(Instant now) {
     case Phase::streaming:
       phase_ = Phase::silent;
       due_ = kNever;
+      note_event(EventKind::silent, now);
       return;
     case Phase::idle:
     case Phase::silent:
@@ -90,7 +147,7 @@ bool Session::next_request(std::array<std::uint8_t, 8>& request) noexcept {
   return true;
 }
 
-Instant Session::deadline() const noexcept { return due_; }
+Instant Session::deadline() const noexcept { return std::min(due_, bias_due_); }
 
 State Session::state() const noexcept {
   switch (phase_) {
@@ -136,7 +193,7 @@ void Session::send_stop(Instant now) noexcept {
 }
 
 void Session::send_start(Instant now) noexcept {
-  send(settings_.buffered ? Command::buffered : Command::real_time);
+  send(start_command());
   const Duration patience = settings_.reply_timeout * (attempt_ == 0 ? 1 : attempt_ == 1 ? 2 : 4);
   ++attempt_;
   phase_ = Phase::awaiting;

@@ -8,15 +8,12 @@
 #include <vector>
 
 #include "drivers/clock.hpp"
+#include "drivers/netbox/events.hpp"
 #include "drivers/netbox/rdt.hpp"
+#include "drivers/netbox/reorder.hpp"
 #include "drivers/netbox/sequence.hpp"
 
 namespace kphi::netbox {
-
-struct StampedRecord {
-  Record record;
-  Instant arrival{0};  ///< bench time at which the datagram that brought it reached this host
-};
 
 /// Durations are bench time (a protocol's wall time goes through Clock::stretched first).
 struct StreamSettings {
@@ -27,6 +24,9 @@ struct StreamSettings {
   Duration reply_timeout = std::chrono::milliseconds(100);    ///< of the first start; added to two datagram periods
   Duration settle = std::chrono::milliseconds(5);             ///< silence after a stop before the start is sent
   Duration silence_timeout = std::chrono::milliseconds(500);  ///< added to three datagram periods
+  Duration bias_patience = std::chrono::milliseconds(50);     ///< added to three datagram periods
+  std::size_t reorder_records = 64;  ///< wait at most for overtaken ones; when buffered at least four datagrams
+  Duration reorder_patience = std::chrono::milliseconds(20);  ///< and for so long
   int attempts = 6;  ///< starts sent before giving up; the timeout doubles up to four times the first
 
   /// Bench time between two datagrams.
@@ -48,12 +48,23 @@ class Session {
   /// Stop, wait for silence, start; repeated until the first record. From `silent` or `streaming` the account goes on,
   /// so that what is missing in between is counted; from `idle` or `failed` it begins anew behind the old one.
   void start(Instant now);
-  /// Tells the box to stop, and again if it keeps sending.
+  /// Tells the box to stop, and again if it keeps sending. What waits for overtaken records is to be flushed before;
+  /// start() from `idle` forgets it.
   void stop(Instant now);
-  /// Appends the accepted records of one datagram to `out`.
+  /// While streaming: the box takes its present load as zero. Some boxes stop their stream then: it is started again
+  /// when no record comes within three datagram periods and bias_patience. Another state: nothing is sent.
+  void set_bias(Instant now);
+  /// Appends to `out` what can be delivered: ascending in ft_sequence. Records behind a gap wait for those that they
+  /// may have overtaken (StreamSettings::reorder_records and reorder_patience) and come with a later call.
   void receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out);
   /// To be called at `deadline()`, after everything that came before has been received.
   void advance(Instant now);
+  /// When release() will deliver; kNever when nothing waits. Not part of deadline().
+  [[nodiscard]] Instant release_deadline() const noexcept { return window_.deadline(); }
+  /// Appends what has waited in vain for overtaken records; receive() does so too.
+  void release(Instant now, std::vector<StampedRecord>& out) { window_.expire(now, account_, out); }
+  /// Appends all that waits: the account is complete then.
+  void flush(std::vector<StampedRecord>& out) { window_.flush(account_, out); }
   /// Pops what must be sent to the box next. False: nothing.
   [[nodiscard]] bool next_request(std::array<std::uint8_t, 8>& request) noexcept;
   /// kNever when nothing is due.
@@ -62,13 +73,22 @@ class Session {
   /// Datagrams that the socket has dropped since it was opened (SO_RXQ_OVFL), as known at the datagram received next.
   void note_host_drops(std::uint64_t total) noexcept;
   [[nodiscard]] const Counters& counters() const noexcept { return account_.counters(); }
+  /// Oldest first; bounded, see EventLog.
+  [[nodiscard]] std::vector<Event> take_events() { return account_.events().take(); }
+  [[nodiscard]] EventLog& events() noexcept { return account_.events(); }
   [[nodiscard]] const StreamSettings& settings() const noexcept { return settings_; }
 
  private:
   enum class Phase : std::uint8_t { idle, draining, awaiting, streaming, silent, failed };
 
   void discard(Instant arrival);
+  void check_bias(Instant now) noexcept;
+  bool take_records(std::size_t count, Instant arrival, std::vector<StampedRecord>& out);
+  void note_event(EventKind kind, Instant at, std::uint32_t status = 0) noexcept;
   bool belongs_to_new_stream(const Record& first) const noexcept;
+  [[nodiscard]] Command start_command() const noexcept {
+    return settings_.buffered ? Command::buffered : Command::real_time;
+  }
   void send(Command command) noexcept;
   void send_stop(Instant now) noexcept;
   void send_start(Instant now) noexcept;
@@ -76,8 +96,12 @@ class Session {
   const StreamSettings settings_;
   const Duration silence_;
   SequenceAccount account_;
+  ReorderWindow window_;
+  std::uint32_t trouble_ = 0;  // status bits that say so, of the last datagram
   Phase phase_ = Phase::idle;
-  Instant due_ = kNever;
+  Instant due_ = kNever, bias_due_ = kNever;
+  Instant newest_arrival_{0};
+  int bias_starts_ = 0;
   Instant drain_limit_{0}, stop_sent_{0};
   int attempt_ = 0;
   std::size_t datagram_records_;  // of the last datagram

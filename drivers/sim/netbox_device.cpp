@@ -11,11 +11,15 @@ namespace kphi::sim {
 namespace {
 
 constexpr std::uint32_t kHeader = 0x1234;
-constexpr std::uint32_t kSaturated = 1u << 17;
 constexpr std::uint32_t kErrorSummary = 1u << 31;
+constexpr std::uint32_t kSaturated = 1u << 17;
+constexpr std::uint32_t kSaturatedAxia = 1u << 30;
+constexpr std::uint32_t kConditionLatched = 1u << 16;
+constexpr int kPauseTicks = 350;  // of RateWrite::pauses
 
 enum Command : std::uint32_t {
   kStop = 0x0000,
+  kStartSingle = 0x0001,
   kStartRealTime = 0x0002,
   kStartBuffered = 0x0003,
   kStartMultiUnit = 0x0004,
@@ -27,47 +31,71 @@ int divisor_of(double rate_hz) noexcept {
   return std::clamp(static_cast<int>(std::floor(kTicksPerSecond / std::max(rate_hz, 1.0))), 1, kTicksPerSecond);
 }
 
+NetBoxSettings within_limits(NetBoxSettings settings) {
+  settings.records_per_datagram =
+      std::clamp(settings.records_per_datagram, 1, static_cast<int>(kRecordsPerDatagramMax));
+  settings.active_slot = std::clamp(settings.active_slot, 0, kSlots - 1);
+  settings.filter = std::clamp(settings.filter, 0, static_cast<int>(kFilterCutoffsHz.size()) - 1);
+  return settings;
+}
+
 }  // namespace
 
 NetBoxDevice::NetBoxDevice(const NetBoxSettings& settings)
-    : settings_(settings), divisor_(divisor_of(settings.rate_hz)), ft_sequence_(settings.first_ft_sequence - 1) {
-  settings_.records_per_datagram =
-      std::clamp(settings.records_per_datagram, 1, static_cast<int>(kRecordsPerDatagramMax));
-}
+    : settings_(within_limits(settings)),
+      signal_(settings_),
+      divisor_(divisor_of(settings.rate_hz)),
+      ft_sequence_(settings.first_ft_sequence - 1) {}
 
 void NetBoxDevice::receive(std::span<const std::uint8_t> datagram, Peer peer) {
-  if (datagram.size() != 8 || big(datagram.first(2)) != kHeader) {
+  if (datagram.size() != 8 || big(datagram.first(2)) != kHeader || !settings_.rdt_enabled) {
     ++requests_ignored_;
     return;
   }
-  const std::uint32_t sample_count = big(datagram.subspan(4, 4));
-  switch (big(datagram.subspan(2, 2))) {
+  obey(big(datagram.subspan(2, 2)), big(datagram.subspan(4, 4)), peer);
+}
+
+void NetBoxDevice::obey(std::uint32_t command, std::uint32_t sample_count, Peer peer) {
+  const bool axia = settings_.habits.axia;
+  const int block = settings_.records_per_datagram;
+  switch (command) {
     case kStop:
       return stop();
+    case kStartSingle:
+      if (axia || settings_.habits.command_one_streams) return start(peer, 1, sample_count);
+      break;
     case kStartRealTime:
-      return start(peer, 1, sample_count);
+      return start(peer, axia ? block : 1, sample_count);
     case kStartBuffered:
-      return start(peer, settings_.records_per_datagram, sample_count);
+      if (!axia) return start(peer, block, sample_count);
+      break;
     case kStartMultiUnit:
-      return start(peer, 1, sample_count);
+      if (!axia && settings_.habits.command_four_streams) return start(peer, 1, sample_count);
+      break;
     case kResetLatch:
-      return;       // no monitor condition is set, so nothing is latched
-    case kSetBias:  // the stream goes on
-      for (std::size_t axis = 0; axis < bias_.size(); ++axis) bias_[axis] += counts_[axis];
-      return;
+      if (!axia) return signal_.reset_latch();
+      break;
+    case kSetBias:
+      return bias();
     default:
-      ++requests_ignored_;
+      break;
   }
+  ++requests_ignored_;
 }
 
 void NetBoxDevice::start(Peer peer, int records_per_datagram, std::uint32_t sample_count) noexcept {
   streaming_ = true;
   finite_ = sample_count != 0;
   remaining_ = sample_count;
-  rdt_sequence_ = 0;
   records_per_datagram_ = static_cast<std::size_t>(records_per_datagram);
   ticks_to_record_ = 0;
   open_.peer = peer;
+  restart_stream();
+}
+
+void NetBoxDevice::restart_stream() noexcept {
+  ++streams_;
+  rdt_sequence_ = settings_.habits.first_rdt_sequence - 1;
   open_.size = 0;
 }
 
@@ -76,9 +104,51 @@ void NetBoxDevice::stop() noexcept {
   open_.size = 0;
 }
 
+void NetBoxDevice::bias() noexcept {
+  signal_.take_software_bias();
+  if (settings_.habits.bias_stops_stream) stop();
+}
+
+void NetBoxDevice::power_cycle(bool resume) {
+  ++boots_;
+  ft_sequence_ = 0xffffffffu;
+  forced_status_ = 0;
+  stalled_ = false;
+  peaks_high_ = peaks_low_ = {};
+  if (!settings_.habits.bias_vector_survives) settings_.bias_vector = {};
+  const auto kept = signal_.software_bias();
+  signal_ = NetBoxSignal(settings_);
+  if (settings_.habits.software_bias_survives) signal_.restore_software_bias(kept);
+  if (resume && streaming_) {
+    ticks_to_record_ = 0;
+    restart_stream();
+  } else {
+    stop();
+  }
+}
+
+void NetBoxDevice::configure(const NetBoxSettings& settings) {
+  const int before = divisor_;
+  settings_ = within_limits(settings);
+  divisor_ = divisor_of(settings_.rate_hz);
+  signal_.configure(settings_);
+  if (!settings_.rdt_enabled) stop();
+  if (divisor_ == before || !streaming_) return;
+  using RateWrite = NetBoxHabits::RateWrite;
+  if (settings_.habits.rate_write == RateWrite::stops) stop();
+  ticks_to_record_ = settings_.habits.rate_write == RateWrite::pauses ? kPauseTicks : 0;
+}
+
 void NetBoxDevice::sample(const LoadCellSample& sample) {
-  ++ft_sequence_;
-  measure(sample.wrench);
+  ++ticks_;
+  if (!stalled_) {
+    if (settings_.habits.ft_counts_samples || ticks_to_count_ == 0) {
+      ++ft_sequence_;
+      ticks_to_count_ = divisor_;
+    }
+    --ticks_to_count_;
+    measure(sample.wrench);
+  }
   if (!streaming_) return;
   if (ticks_to_record_ == 0) {
     append_record(sample.at);
@@ -88,18 +158,15 @@ void NetBoxDevice::sample(const LoadCellSample& sample) {
 }
 
 void NetBoxDevice::measure(const Wrench& wrench) noexcept {
-  status_ = 0;
-  for (std::size_t axis = 0; axis < wrench.size(); ++axis) {
-    const double range = settings_.range[axis];
-    double value = wrench[axis];
-    if (value > range || value < -range) {
-      value = value > 0 ? range : -range;
-      status_ = kSaturated | kErrorSummary;
-    }
-    const double counts = value * (axis < 3 ? settings_.counts_per_force : settings_.counts_per_torque);
-    counts_[axis] = static_cast<std::int32_t>(counts + (counts < 0 ? -0.5 : 0.5)) - bias_[axis];
-    peaks_high_[axis] = std::max(peaks_high_[axis], counts_[axis]);
-    peaks_low_[axis] = std::min(peaks_low_[axis], counts_[axis]);
+  signal_.measure(wrench);
+  status_ = forced_status_;
+  if (signal_.saturated()) status_ |= kErrorSummary | (settings_.habits.axia ? kSaturatedAxia : kSaturated);
+  if (signal_.latched()) status_ |= kErrorSummary | kConditionLatched;
+  if (!settings_.peaks) return;
+  const auto& counts = signal_.counts();
+  for (std::size_t axis = 0; axis < counts.size(); ++axis) {
+    peaks_high_[axis] = std::max(peaks_high_[axis], counts[axis]);
+    peaks_low_[axis] = std::min(peaks_low_[axis], counts[axis]);
   }
 }
 
@@ -108,21 +175,29 @@ void NetBoxDevice::append_record(Instant at) {
   put_big(to, ++rdt_sequence_);
   put_big(to + 4, ft_sequence_);
   put_big(to + 8, status_);
-  for (std::size_t axis = 0; axis < counts_.size(); ++axis) {
-    put_big(to + 12 + 4 * axis, static_cast<std::uint32_t>(counts_[axis]));
+  const auto& counts = signal_.counts();
+  for (std::size_t axis = 0; axis < counts.size(); ++axis) {
+    put_big(to + 12 + 4 * axis, static_cast<std::uint32_t>(counts[axis]));
   }
+  open_.sampled[open_.size / kRecordBytes] = at;
   open_.size += kRecordBytes;
   open_.at = at;
   ++records_sent_;
-  const bool last = finite_ && --remaining_ == 0;
-  if (last || open_.size == records_per_datagram_ * kRecordBytes) close_datagram();
-  if (last) stop();
+  using LastBlock = NetBoxHabits::LastBlock;
+  const bool full = open_.size == records_per_datagram_ * kRecordBytes;
+  if (finite_ && remaining_ > 0) --remaining_;
+  const bool last = finite_ && remaining_ == 0;
+  if (full || (last && settings_.habits.last_block == LastBlock::partial)) close_datagram();
+  if (last && (full || settings_.habits.last_block != LastBlock::padded)) stop();
 }
 
 void NetBoxDevice::close_datagram() {
   const auto payload = open_.payload();
-  waiting_.push_back({open_.peer, open_.at, waiting_bytes_.size(), payload.size()});
+  waiting_.push_back(
+      {open_.peer, open_.at, boots_, streams_, waiting_bytes_.size(), payload.size(), waiting_instants_.size()});
   waiting_bytes_.insert(waiting_bytes_.end(), payload.begin(), payload.end());
+  waiting_instants_.insert(waiting_instants_.end(), open_.sampled.begin(),
+                           open_.sampled.begin() + static_cast<std::ptrdiff_t>(payload.size() / kRecordBytes));
   open_.size = 0;
 }
 
@@ -131,16 +206,19 @@ bool NetBoxDevice::next_datagram(Datagram& out) {
   const Waiting& waiting = waiting_[next_++];
   out.peer = waiting.peer;
   out.at = waiting.at;
+  out.boot = waiting.boot;
+  out.stream = waiting.stream;
+  out.foreign = false;
   out.size = waiting.size;
-  std::copy_n(waiting_bytes_.begin() + static_cast<std::ptrdiff_t>(waiting.offset), waiting.size, out.bytes.begin());
+  std::copy_n(waiting_bytes_.data() + waiting.offset, waiting.size, out.bytes.data());
+  std::copy_n(waiting_instants_.data() + waiting.first_instant, waiting.size / kRecordBytes, out.sampled.data());
   if (next_ == waiting_.size()) {
     waiting_.clear();
     waiting_bytes_.clear();
+    waiting_instants_.clear();
     next_ = 0;
   }
   return true;
 }
-
-std::string NetBoxDevice::http(std::string_view request) const { return netbox_answer(*this, request); }
 
 }  // namespace kphi::sim

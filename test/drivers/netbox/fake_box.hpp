@@ -120,6 +120,9 @@ class FakeBox {
     std::uint32_t first_ft = 1000;
     unsigned skip_every = 0;       ///< every so many datagrams one is not sent
     bool mute_after_1000 = false;  ///< sends 1000 records and no more
+    std::int32_t load = 0;         ///< Fz in counts, until a bias
+    bool bias_works = true;
+    bool bias_stops = false;  ///< and then the stream
   };
 
   explicit FakeBox(Manner manner) : manner_(manner), socket_(SOCK_DGRAM), ft_(manner.first_ft) {
@@ -135,7 +138,8 @@ class FakeBox {
   bool streaming() const { return streaming_; }
   std::uint64_t sent() const { return sent_; }        ///< records
   std::uint64_t skipped() const { return skipped_; }  ///< records
-  int settings_written() const { return strange_; }   ///< datagrams that are neither start nor stop
+  int biases() const { return biases_; }
+  int settings_written() const { return strange_; }  ///< datagrams that are neither start nor stop nor bias
 
  private:
   using SteadyTime = std::chrono::steady_clock::time_point;
@@ -172,6 +176,10 @@ class FakeBox {
       datagrams_ = 0;
       begun_ = std::chrono::steady_clock::now();
       streaming_ = true;
+    } else if (command == 0x42) {
+      ++biases_;
+      if (manner_.bias_works) manner_.load = 0;
+      if (manner_.bias_stops) streaming_ = false;
     } else {
       ++strange_;
     }
@@ -181,7 +189,8 @@ class FakeBox {
     const auto due = static_cast<std::uint64_t>(seconds * manner_.speed * 7000.0 / manner_.divisor / records_);
     for (; datagrams_ < due; ++datagrams_) {
       if (manner_.mute_after_1000 && rdt_ > 1000) return;
-      const Bytes bytes = records(rdt_, ft_, records_, manner_.divisor);
+      Bytes bytes;
+      for (unsigned i = 0; i < records_; ++i) put_record(bytes, rdt_ + i, ft_ + i * manner_.divisor, 0, manner_.load);
       rdt_ += records_;
       ft_ += records_ * manner_.divisor;
       if (manner_.skip_every && datagrams_ % manner_.skip_every == manner_.skip_every - 1) {
@@ -201,7 +210,7 @@ class FakeBox {
   std::uint64_t datagrams_ = 0;
   SteadyTime begun_;
   std::atomic<bool> ending_{false}, streaming_{false};
-  std::atomic<int> starts_{0}, stops_{0}, strange_{0};
+  std::atomic<int> starts_{0}, stops_{0}, strange_{0}, biases_{0};
   std::atomic<std::uint64_t> sent_{0}, skipped_{0};
   std::thread thread_;
 };

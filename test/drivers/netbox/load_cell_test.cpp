@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "drivers/device_error.hpp"
 #include "test/drivers/netbox/fake_box.hpp"
 
@@ -193,6 +195,34 @@ TEST(LoadCell, SaysThatAStreamHasFallenSilent) {
   EXPECT_TRUE(eventually([&] { return cell.state() == State::silent; }));
   EXPECT_EQ(cell.counters().received, 1000u);
   EXPECT_EQ(box.starts(), 1) << "it must not fight for a stream that another client has taken";
+}
+
+std::vector<EventKind> kinds_until(LoadCell& cell, std::size_t wanted) {
+  std::vector<EventKind> kinds;
+  EXPECT_TRUE(eventually([&] {
+    for (const Event& event : cell.take_events()) kinds.push_back(event.kind);
+    return kinds.size() >= wanted;
+  }));
+  return kinds;
+}
+
+TEST(LoadCell, ASilentStreamOfABoxThatAnswersIsCalledStolen) {
+  FakeWeb web(FakeWeb::page(xml()));
+  FakeBox box({.mute_after_1000 = true});
+  const SteadyClock clock;
+  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
+  cell.start();
+  EXPECT_THAT(kinds_until(cell, 2), testing::ElementsAre(EventKind::silent, EventKind::stolen));
+}
+
+TEST(LoadCell, ASilentStreamOfABoxThatIsGoneIsCalledUnreachable) {
+  std::optional<FakeWeb> web(std::in_place, FakeWeb::page(xml()));
+  FakeBox box({.mute_after_1000 = true});
+  const SteadyClock clock;
+  LoadCell cell({"127.0.0.1", box.port(), web->port()}, clock);
+  web.reset();
+  cell.start();
+  EXPECT_THAT(kinds_until(cell, 2), testing::ElementsAre(EventKind::silent, EventKind::unreachable));
 }
 
 TEST(LoadCell, AClosedRdtPortIsAClearErrorWithinSeconds) {

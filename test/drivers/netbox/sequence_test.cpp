@@ -146,7 +146,16 @@ TEST(Sequence, AFarDropOfFtIsARebootOnceASecondRecordConfirmsIt) {
   EXPECT_TRUE(stream.accept(2, 20'001));
   EXPECT_TRUE(stream.accept(3, 20'002));
   EXPECT_EQ(stream.counters().reboots, 1u);
-  EXPECT_EQ(stream.counters().received, 102u);
+  const auto first = stream.account().take_confirmed();
+  ASSERT_TRUE(first) << "the first of the two is a true measurement as well";
+  EXPECT_EQ(first->record.ft_sequence, 20'000u);
+  EXPECT_EQ(stream.counters().received, 103u);
+  EXPECT_EQ(stream.counters().late + stream.counters().duplicates, 0u);
+  const std::vector<Event> events = stream.account().events().take();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].kind, EventKind::rebooted);
+  EXPECT_EQ(events[0].ft, 20'000u);
+  EXPECT_EQ(events[0].previous_ft, 10'000'100u);
   EXPECT_EQ(stream.counters().lost_network, 0u);
   stream.expect_closed();
 }
@@ -175,12 +184,62 @@ TEST(Sequence, ASingleStrayRecordIsNoReboot) {
   stream.expect_closed();
 }
 
-TEST(Sequence, ABoxThatBootsWithinSecondsOfItsFirstBootIsHeardAgainOnceItHasCaughtUp) {
+TEST(Sequence, ABoxThatBootsWithinSecondsOfItsFirstBootIsRecognisedToo) {
   Stream stream;
   for (std::uint32_t i = 1; i <= 1000; ++i) stream.accept(i, 10'000 + i);
-  for (std::uint32_t i = 1; i <= 11'000; ++i) EXPECT_FALSE(stream.accept(i, i));
-  EXPECT_TRUE(stream.accept(11'001, 11'001));
+  EXPECT_FALSE(stream.accept(1, 1));
+  for (std::uint32_t i = 2; i <= 11'000; ++i) EXPECT_TRUE(stream.accept(i, i));
+  EXPECT_EQ(stream.counters().reboots, 1u);
+  EXPECT_EQ(stream.counters().received, 12'000u);
   stream.expect_closed();
+}
+
+TEST(Sequence, ABurstOfLateRecordsFromBeforeARestartIsNoReboot) {
+  Stream stream;
+  for (std::uint32_t i = 1; i <= 100; ++i) {
+    if (i < 50 || i >= 60) stream.accept(i, 5000 + i);
+  }
+  for (std::uint32_t i = 1; i <= 10; ++i) stream.accept(i, 5100 + i);
+  for (std::uint32_t i = 50; i < 60; ++i) EXPECT_FALSE(stream.accept(i, 5000 + i));
+  EXPECT_EQ(stream.counters().reboots, 0u);
+  EXPECT_EQ(stream.counters().late, 10u);
+  stream.expect_closed();
+}
+
+TEST(Sequence, NamesARestartWithItsNumbers) {
+  Stream stream;
+  stream.accept(2000, 70'000);
+  stream.accept(1, 70'050);
+  const std::vector<Event> events = stream.account().events().take();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].kind, EventKind::restarted);
+  EXPECT_EQ(events[0].previous_rdt, 2000u);
+  EXPECT_EQ(events[0].rdt, 1u);
+  EXPECT_EQ(events[0].records, 49u);
+  EXPECT_NE(to_string(events[0]).find("rdt 1 after 2000"), std::string::npos);
+}
+
+TEST(Sequence, NamesAStallOnceAndItsEnd) {
+  Stream stream;
+  stream.accept(1, 100);
+  for (std::uint32_t i = 2; i <= 30; ++i) EXPECT_FALSE(stream.accept(i, 100));
+  EXPECT_TRUE(stream.accept(31, 101));
+  EXPECT_TRUE(stream.accept(32, 102));
+  const std::vector<Event> events = stream.account().events().take();
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events[0].kind, EventKind::stalled);
+  EXPECT_EQ(events[1].kind, EventKind::stall_ended);
+  EXPECT_EQ(events[1].records, 29u);
+  EXPECT_EQ(stream.counters().irregular, 0u);
+  stream.expect_closed();
+}
+
+TEST(Sequence, KeepsTheOldestEventsAndCountsTheOthers) {
+  Stream stream;
+  for (std::uint32_t i = 0; i < 100; ++i) stream.accept(1, 100 + i);
+  EXPECT_EQ(stream.counters().restarts, 99u);
+  EXPECT_EQ(stream.account().events().dropped(), 99 - EventLog::kCapacity);
+  EXPECT_EQ(stream.account().events().take().size(), EventLog::kCapacity);
 }
 
 TEST(Sequence, AStreamOfWholeDuplicatesIsNeverTakenForAReboot) {

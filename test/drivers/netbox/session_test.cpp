@@ -244,6 +244,113 @@ TEST_F(SessionTest, ARepeatedMeasurementDoesNotKeepTheStreamAlive) {
   EXPECT_EQ(out.size(), 40u);
 }
 
+TEST_F(SessionTest, NamesTheSilenceAndItsEnd) {
+  start_streaming();
+  advance_to_deadline();
+  receive(records(41 + 4000, 1040 + 4000, 40));
+  const std::vector<Event> events = session.take_events();
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events[0].kind, EventKind::silent);
+  EXPECT_EQ(events[0].at, now);
+  EXPECT_EQ(events[1].kind, EventKind::resumed);
+  EXPECT_EQ(events[1].ft, 5040u);
+  EXPECT_THAT(session.take_events(), IsEmpty());
+}
+
+TEST_F(SessionTest, NamesTroubleOfTheBoxOnceForEachTimeItRises) {
+  start_streaming();
+  std::uint32_t sent = 40;
+  const auto receive_with = [&](std::uint32_t status) {
+    Bytes datagram;
+    test::put_record(datagram, 1 + sent, 1000 + sent, status);
+    ++sent;
+    receive(datagram);
+  };
+  for (const std::uint32_t status : {0x80100000u, 0x80100000u, 0u, 0x80400000u, 0x80500000u, 0x80020000u})
+    receive_with(status);
+  const std::vector<Event> events = session.take_events();
+  ASSERT_EQ(events.size(), 3u);
+  EXPECT_EQ(events[0].status, 1u << 20);
+  EXPECT_EQ(events[1].status, 1u << 22);
+  EXPECT_EQ(events[2].status, 1u << 20 | 1u << 22);
+  EXPECT_THAT(to_string(events[1]), testing::HasSubstr("network communication failure"));
+  EXPECT_EQ(session.counters().received, 46u) << "its records are delivered all the same";
+}
+
+TEST_F(SessionTest, PutsSwappedDatagramsInOrder) {
+  start_streaming();
+  now += 5ms;
+  receive(records(81, 1080, 40));
+  EXPECT_EQ(out.size(), 40u);
+  EXPECT_EQ(session.release_deadline(), now + settings.reorder_patience);
+  EXPECT_EQ(session.counters().lost_network, 0u);
+  now += 1ms;
+  receive(records(41, 1040, 40));
+  ASSERT_EQ(out.size(), 120u);
+  for (std::uint32_t i = 0; i < 120; ++i) EXPECT_EQ(out[i].record.ft_sequence, 1000 + i);
+  EXPECT_EQ(session.release_deadline(), kNever);
+  EXPECT_EQ(session.counters().lost_network + session.counters().late, 0u);
+}
+
+TEST_F(SessionTest, GivesUpAGapWhenItsTimeIsOverWithoutAFurtherDatagram) {
+  start_streaming();
+  receive(records(81, 1080, 40));
+  now = session.release_deadline();
+  session.release(now, out);
+  EXPECT_EQ(out.size(), 80u);
+  EXPECT_EQ(session.counters().lost_network, 40u);
+  receive(records(41, 1040, 40));
+  EXPECT_EQ(session.counters().late, 40u);
+  EXPECT_EQ(out.size(), 80u);
+}
+
+TEST_F(SessionTest, WhatWaitsKeepsTheStreamAlive) {
+  start_streaming();
+  now += 400ms;
+  receive(records(81, 1080, 40));
+  EXPECT_GT(session.deadline(), now + 500ms);
+}
+
+TEST_F(SessionTest, ABiasOnABoxThatKeepsStreamingIsOneRequest) {
+  start_streaming();
+  told();
+  session.set_bias(now);
+  EXPECT_THAT(told(), ElementsAre(0x42));
+  const Instant end = now + 300ms;
+  for (std::uint32_t i = 1; now < end; ++i) {
+    now += settings.datagram_period();
+    receive(records(1 + 40 * i, 1000 + 40 * i, 40));
+    session.advance(now);
+  }
+  EXPECT_THAT(told(), IsEmpty());
+  EXPECT_EQ(session.counters().lost_network, 0u);
+}
+
+TEST_F(SessionTest, ABiasOnABoxThatStopsIsFollowedByAStart) {
+  start_streaming();
+  told();
+  session.set_bias(now);
+  EXPECT_THAT(told(), ElementsAre(0x42));
+  EXPECT_EQ(session.deadline(), now + 3 * settings.datagram_period() + settings.bias_patience);
+  advance_to_deadline();
+  EXPECT_THAT(told(), ElementsAre(3));
+  advance_to_deadline();
+  EXPECT_THAT(told(), ElementsAre(3)) << "a start can be lost";
+  now = session.deadline() - 1ms;
+  receive(records(1, 1040 + 1500, 40));
+  advance_to_deadline();
+  EXPECT_THAT(told(), IsEmpty());
+  EXPECT_EQ(session.state(), State::streaming);
+  EXPECT_EQ(session.counters().lost_network, 1500u) << "what the box measured meanwhile is accounted for";
+  EXPECT_EQ(session.counters().restarts, 1u);
+}
+
+TEST_F(SessionTest, ABiasWithoutAStreamIsNotSent) {
+  session.set_bias(now);
+  EXPECT_THAT(told(), IsEmpty());
+  EXPECT_EQ(session.deadline(), kNever);
+}
+
 TEST_F(SessionTest, StopsAndRepeatsTheStopWhileTheBoxGoesOn) {
   start_streaming();
   session.stop(now);
@@ -286,6 +393,8 @@ TEST_F(SessionTest, ChargesTheHostWithWholeDatagrams) {
   EXPECT_EQ(session.counters().lost_network, 40u);
   session.note_host_drops(3);
   receive(records(241 + 40, 1240 + 40, 40));
+  EXPECT_EQ(session.counters().lost_network, 40u) << "one datagram may have been overtaken";
+  session.flush(out);
   EXPECT_EQ(session.counters().lost_host, 120u);
   EXPECT_EQ(session.counters().lost_network, 80u);
 }
@@ -359,6 +468,7 @@ TEST(SessionProperty, TheAccountClosesForEveryChannel) {
       session.receive(datagram, now, out);
       if (chance(25)) session.receive(datagram, now, out);
     }
+    session.flush(out);
     const Counters& c = session.counters();
     EXPECT_EQ(c.expected, c.received + c.lost_network + c.lost_host) << seed;
     EXPECT_EQ(c.received, out.size()) << seed;

@@ -17,7 +17,7 @@ struct Answer {
   pugi::xml_document xml;
 };
 
-Answer get(const NetBoxDevice& box, const std::string& target) {
+Answer get(NetBoxDevice& box, const std::string& target) {
   Answer answer;
   const std::string text = box.http("GET " + target + " HTTP/1.0\r\nHost: box");
   answer.status = text.substr(0, text.find("\r\n"));
@@ -34,7 +34,8 @@ TEST(NetBoxPages, ConfigurationHasTheCapturedElementsInOrder) {
       "cfgcpt",    "cfgmr",      "cfgusra", "cfgusrb",    "setcfgsel",  "setpke",        "setmce",    "setbias",
       "mce",       "mcx",        "mcc",     "mcv",        "mco",        "setuserfilter", "nethwaddr", "netip",
       "comnetip",  "comnetdhcp", "comrdte", "comrdtrate", "comrdtbsiz", "mfgdigsn",      "mfgdigver"};
-  const Answer answer = get(NetBoxDevice(NetBoxSettings{}), "/netftapi2.xml");
+  NetBoxDevice box{NetBoxSettings{}};
+  const Answer answer = get(box, "/netftapi2.xml");
   EXPECT_EQ(answer.status, "HTTP/1.0 200 OK");
   std::vector<std::string> found;
   for (const auto& element : answer.xml.child("netft")) found.emplace_back(element.name());
@@ -44,7 +45,8 @@ TEST(NetBoxPages, ConfigurationHasTheCapturedElementsInOrder) {
 }
 
 TEST(NetBoxPages, DefaultsAreAMini40InNewtons) {
-  const Answer answer = get(NetBoxDevice(NetBoxSettings{}), "/netftapi2.xml?index=0");
+  NetBoxDevice box{NetBoxSettings{}};
+  const Answer answer = get(box, "/netftapi2.xml?index=0");
   const auto text = [&](const char* name) { return std::string(answer.xml.child("netft").child_value(name)); };
   EXPECT_EQ(text("cfgmr"), "20;20;60;1;1;1");
   EXPECT_EQ(text("cfgcpf"), "1000000");
@@ -71,7 +73,7 @@ TEST(NetBoxPages, ShowTheQuantisedRateAndThePeaks) {
 }
 
 TEST(NetBoxPages, EmptyCalibrationSlotsShowIt) {
-  const NetBoxDevice box{NetBoxSettings{}};
+  NetBoxDevice box{NetBoxSettings{}};
   const Answer slot = get(box, "/netftapi2.xml?index=15");
   EXPECT_STREQ(slot.xml.child("netft").child_value("cfgcalsn"), "FT0000");
   EXPECT_STREQ(slot.xml.child("netft").child_value("cfgmr"), "0;0;0;0;0;0");
@@ -79,7 +81,7 @@ TEST(NetBoxPages, EmptyCalibrationSlotsShowIt) {
 }
 
 TEST(NetBoxPages, CalibrationAgreesWithTheConfiguration) {
-  const NetBoxDevice box{NetBoxSettings{}};
+  NetBoxDevice box{NetBoxSettings{}};
   const Answer calibration = get(box, "/netftcalapi.xml");
   const Answer configuration = get(box, "/netftapi2.xml");
   EXPECT_STREQ(calibration.xml.child("netftCalibration").child_value("calsn"),
@@ -88,10 +90,11 @@ TEST(NetBoxPages, CalibrationAgreesWithTheConfiguration) {
 }
 
 TEST(NetBoxPages, EverythingElseIsNotFound) {
-  const NetBoxDevice box{NetBoxSettings{}};
-  for (const char* request : {"GET /comm.cgi?comrdtrate=100 HTTP/1.0", "GET / HTTP/1.0", "POST /netftapi2.xml HTTP/1.0",
-                              "GET", "", "GET /netftapi2.xml?index=16 HTTP/1.0", "GET /netftapi2.xml?index=x HTTP/1.0",
-                              "GET /netftapi2.xml?index= HTTP/1.0", "GET /netftapi2.xml?slot=1 HTTP/1.0"}) {
+  NetBoxDevice box{NetBoxSettings{}};
+  for (const char* request :
+       {"GET /other.cgi?comrdtrate=100 HTTP/1.0", "GET / HTTP/1.0", "POST /netftapi2.xml HTTP/1.0", "GET", "",
+        "GET /netftapi2.xml?index=16 HTTP/1.0", "GET /netftapi2.xml?index=x HTTP/1.0",
+        "GET /netftapi2.xml?index= HTTP/1.0", "GET /netftapi2.xml?slot=1 HTTP/1.0"}) {
     EXPECT_EQ(box.http(request).substr(0, 22), "HTTP/1.0 404 Not Found") << request;
   }
 }

@@ -1,0 +1,123 @@
+// The process stands still, or its consumer does: nothing is lost.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+
+#include <functional>
+#include <vector>
+
+#include "drivers/netbox/load_cell.hpp"
+#include "test/drivers/netbox/fake_box.hpp"
+
+namespace kphi::netbox {
+namespace {
+
+using namespace std::chrono_literals;
+using test::captured_xml;
+using test::FakeBox;
+using test::FakeWeb;
+using test::with;
+
+std::string xml(const char* records_per_datagram) {
+  return with(with(captured_xml(), "comrdtrate", "7000"), "comrdtbsiz", records_per_datagram);
+}
+
+template <class Condition>
+bool eventually(Condition condition) {
+  const auto deadline = std::chrono::steady_clock::now() + 20s;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    usleep(1000);
+  }
+  return true;
+}
+
+/// Bytes of plain structs between this process and its child.
+class Pipe {
+ public:
+  Pipe() {
+    if (pipe(ends_) != 0) throw std::runtime_error("pipe");
+  }
+  template <class T>
+  bool put(const T& value) const {
+    return write(ends_[1], &value, sizeof value) == sizeof value;
+  }
+  template <class T>
+  bool get(T& value) const {
+    pollfd readable{ends_[0], POLLIN, 0};
+    return poll(&readable, 1, 20'000) == 1 && read(ends_[0], &value, sizeof value) == sizeof value;
+  }
+
+ private:
+  int ends_[2]{};
+};
+
+struct Ports {
+  std::uint16_t rdt, http;
+};
+
+/// The child's life: streams 15 000 records and tells its account.
+void be_the_reader(const Pipe& orders, const Pipe& reports) {
+  Ports ports{};
+  if (!orders.get(ports)) return;
+  const SteadyClock clock;
+  LoadCell cell({"127.0.0.1", ports.rdt, ports.http}, clock, Command::real_time);
+  cell.start();
+  if (!eventually([&] { return cell.counters().received >= 1000; })) return;
+  const std::string note = cell.receive_buffer_note();
+  const int tolerated_ms = std::stoi(note.substr(note.find("tolerates ") + 10));
+  reports.put(tolerated_ms);
+  if (!eventually([&] { return cell.counters().received + cell.counters().lost_host >= 15'000; })) return;
+  cell.stop();
+  reports.put(cell.counters());
+}
+
+TEST(Standstill, AProcessStoppedForASecondLosesNothingOneRecordPerDatagram) {
+  const Pipe orders, reports;
+  const pid_t child = fork();  // before any thread of this test lives
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    be_the_reader(orders, reports);
+    _exit(0);
+  }
+  FakeWeb web(FakeWeb::page(xml("1")));
+  FakeBox box({.records_per_datagram = 1});
+  int tolerated_ms = 0;
+  Counters counters;
+  const bool started = orders.put(Ports{box.port(), web.port()}) && reports.get(tolerated_ms);
+  const std::uint64_t before = box.sent();
+  kill(child, SIGSTOP);
+  const bool a_second_has_passed = eventually([&] { return box.sent() >= before + 7000; });
+  kill(child, SIGCONT);
+  const bool reported = reports.get(counters);
+  if (!reported) kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  ASSERT_TRUE(started && a_second_has_passed && reported);
+  EXPECT_EQ(counters.expected, counters.received + counters.lost_network + counters.lost_host);
+  if (tolerated_ms < 1100)
+    GTEST_SKIP() << "the kernel grants a buffer for " << tolerated_ms << " ms only: raise net.core.rmem_max to 4194304";
+  EXPECT_EQ(counters.lost_network + counters.lost_host + counters.queue_overflows, 0u);
+  EXPECT_GE(counters.received, 15'000u);
+  EXPECT_EQ(box.starts(), 1) << "it carries on, it does not begin anew";
+}
+
+TEST(Standstill, AConsumerThatStandsStillForFiveSecondsLosesNothing) {
+  FakeWeb web(FakeWeb::page(xml("1")));
+  FakeBox box({.records_per_datagram = 1});
+  const SteadyClock clock;
+  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock, Command::real_time);
+  cell.start();
+  ASSERT_TRUE(eventually([&] { return cell.counters().received >= 35'000; }));
+  cell.stop();
+  const Counters counters = cell.counters();
+  EXPECT_EQ(counters.queue_overflows + counters.lost_network + counters.lost_host, 0u);
+  EXPECT_GE(cell.health().queue_high_water, 35'000u);
+  EXPECT_NEAR(cell.health().records_per_second, 7000, 200);
+  std::vector<StampedRecord> taken(counters.received + 1);
+  EXPECT_EQ(cell.take(taken), counters.received);
+  for (std::size_t i = 1; i < counters.received; ++i)
+    ASSERT_EQ(taken[i].record.ft_sequence, taken[i - 1].record.ft_sequence + 1);
+}
+
+}  // namespace
+}  // namespace kphi::netbox
