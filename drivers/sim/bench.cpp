@@ -9,6 +9,8 @@ namespace kphi::sim {
 namespace {
 
 constexpr double kSafeToTouch = 5.0;  // rad/s
+// Faults draw from another sequence than the physics, which therefore stays the same with and without them.
+constexpr std::uint64_t kWireStream = 0x5bd1e995'6c62272eull;
 
 /// Exact in integers: no drift of the ticks against the clock.
 constexpr Instant time_of_tick(std::uint64_t tick) noexcept {
@@ -21,6 +23,7 @@ static_assert(kTicksPerSecond == 7000);
 SimulatedBench::SimulatedBench(const BenchSettings& settings)
     : plant_(settings.plant, settings.seed),
       netbox_(settings.netbox),
+      wire_(netbox_, settings.faults, settings.seed ^ kWireStream, settings.keep),
       motor_({settings.module_id, settings.oscillator_gain, settings.time_scale}, plant_.motor()) {}
 
 void SimulatedBench::mount(const std::string& propeller_id, double occlusion_deg) {
@@ -44,7 +47,7 @@ void SimulatedBench::advance(Instant now) {
     ++ticks_;
     motor_.advance(at);
     plant_.step(motor_.drive());
-    netbox_.sample({at, plant_.reading()});
+    wire_.sample({at, plant_.reading()});
   }
 }
 

@@ -10,6 +10,7 @@
 #include "drivers/sim/iq_device.hpp"
 #include "drivers/sim/netbox_device.hpp"
 #include "drivers/sim/plant.hpp"
+#include "drivers/sim/wire.hpp"
 
 namespace kphi::sim {
 
@@ -20,6 +21,8 @@ struct BenchSettings {
   int module_id = 0;
   double oscillator_gain = 0;  ///< see IqSettings
   PlantParameters plant;
+  FaultScript faults;  ///< of the load cell's wire and box; drawn from `seed`
+  FaultyWire::Keep keep = FaultyWire::Keep::totals;
 };
 
 class SimulatedBench {
@@ -38,7 +41,9 @@ class SimulatedBench {
   /// given to them after this was called with the time of their arrival.
   void advance(Instant now);
 
+  /// Datagrams and pages taken from here know only the faults of the box itself; see wire().
   [[nodiscard]] NetBoxDevice& netbox() noexcept { return netbox_; }
+  [[nodiscard]] FaultyWire& wire() noexcept { return wire_; }
   [[nodiscard]] IqDevice& motor() noexcept { return motor_; }
   [[nodiscard]] const Plant& plant() const noexcept { return plant_; }
   [[nodiscard]] std::uint64_t ticks() const noexcept { return ticks_; }
@@ -46,6 +51,7 @@ class SimulatedBench {
  private:
   Plant plant_;
   NetBoxDevice netbox_;
+  FaultyWire wire_;
   IqDevice motor_;
   std::string mounted_;
   std::uint64_t ticks_ = 0;

@@ -8,6 +8,7 @@
 #include <csignal>
 #include <cstdio>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -15,6 +16,7 @@
 
 #include "drivers/device_error.hpp"
 #include "drivers/sim/control_line.hpp"
+#include "drivers/sim/fault_file.hpp"
 #include "drivers/sim/server.hpp"
 #include "drivers/sim/truth.hpp"
 #include "profiles/bench.hpp"
@@ -27,6 +29,8 @@ struct Options {
   std::string bench;
   std::string truth;
   std::string resolved;
+  std::string faults;
+  std::string truth_log;
   std::string mount;
   bool status = false;
   bool free_ports = false;
@@ -59,6 +63,17 @@ profiles::Bench load_simulated(const Options& options) {
   return bench;
 }
 
+FaultScript load_faults(const std::string& path) {
+  std::ifstream file(path);
+  const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  if (!file) throw ConfigurationError(path + ": cannot be read; name a fault script");
+  try {
+    return parse_faults(text, path);
+  } catch (const FaultFileError& error) {
+    throw ConfigurationError(error.what());
+  }
+}
+
 ServerSettings settings_of(const profiles::Bench& bench, const Options& options) {
   ServerSettings settings;
   settings.bench.seed = bench.simulation->seed;
@@ -70,6 +85,9 @@ ServerSettings settings_of(const profiles::Bench& bench, const Options& options)
   settings.host = bench.netbox.host;
   settings.rdt_port = options.free_ports ? 0 : bench.netbox.rdt_port;
   settings.http_port = options.free_ports ? 0 : bench.netbox.http_port;
+  settings.tcp_port = settings.rdt_port == 0 ? 0 : static_cast<std::uint16_t>(settings.rdt_port - 1);
+  if (!options.faults.empty()) settings.bench.faults = load_faults(options.faults);
+  if (!options.truth_log.empty()) settings.bench.keep = FaultyWire::Keep::datagrams;
   settings.device = bench.iq.device;
   settings.control = bench.simulation->control;
   return settings;
@@ -95,6 +113,7 @@ std::string resolved_text(const profiles::Bench& bench, const Addresses& address
 std::string ready_line(const profiles::Bench& bench, const Addresses& addresses) {
   const nlohmann::ordered_json json{{"rdt", fmt::format("{}:{}", addresses.host, addresses.rdt_port)},
                                     {"http", fmt::format("{}:{}", addresses.host, addresses.http_port)},
+                                    {"tcp", fmt::format("{}:{}", addresses.host, addresses.tcp_port)},
                                     {"device", addresses.device},
                                     {"control", addresses.control},
                                     {"time_scale", bench.simulation->time_scale},
@@ -123,6 +142,7 @@ void serve(const profiles::Bench& bench, const Options& options) {
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
   running = nullptr;
+  if (!options.truth_log.empty()) write_file(options.truth_log, json_lines(server.truth()));
   const auto& unsent = server.unsent();
   if (unsent.datagrams + unsent.motor_bytes > 0) {
     fmt::print(stderr, "kphi sim: not sent for want of room: {} datagrams, {} motor bytes\n", unsent.datagrams,
@@ -145,6 +165,8 @@ void add_sim(CLI::App& program, int& exit_code) {
   CLI::App* sim = program.add_subcommand("sim", "run the simulated bench of a bench file, or talk to a running one");
   sim->add_option("BENCH", options->bench, "bench file with a 'simulation:' section")->required();
   sim->add_option("--truth", options->truth, "write what is true of the simulated propellers to this file (YAML)");
+  sim->add_option("--faults", options->faults, "script of what goes wrong on the load cell's wire (YAML)");
+  sim->add_option("--truth-log", options->truth_log, "write at exit what happened to every datagram (JSON lines)");
   sim->add_option("--time-scale", options->time_scale, "bench seconds per second, instead of the file's")
       ->check(CLI::Range(0.1, 1000.0));
   sim->add_option("--seed", options->seed, "of the noise, instead of the file's");

@@ -13,13 +13,34 @@ constexpr std::chrono::seconds kPatience{3};
 
 }  // namespace
 
-Conversations::Conversations(Descriptor listener, Manners manners, std::function<std::string(std::string_view)> answer)
-    : listener_(std::move(listener)), manners_(std::move(manners)), answer_(std::move(answer)) {}
+Conversations::Conversations(Descriptor listener, const Manners& manners,
+                             std::function<Answer(std::string_view)> answer)
+    : Conversations(std::move(listener), manners.at_once, [manners, answer = std::move(answer)](std::string& heard) {
+        Answer all;
+        for (auto end = heard.find(manners.terminator); end != std::string::npos && !all.close;
+             end = heard.find(manners.terminator)) {
+          Answer one = answer(std::string_view(heard).substr(0, end));
+          heard.erase(0, end + manners.terminator.size());
+          all.bytes += one.bytes;
+          all.wait = one.wait;
+          all.close = one.close || manners.one_answer;
+        }
+        return all;
+      }) {}
+
+Conversations::Conversations(Descriptor listener, std::size_t at_once, Answerer answerer)
+    : listener_(std::move(listener)), at_once_(at_once), answerer_(std::move(answerer)) {}
+
+void Conversations::listen_at(Descriptor listener) {
+  listener_ = std::move(listener);
+  if (!listening()) connections_.clear();
+}
 
 void Conversations::append_polls(std::vector<pollfd>& polls) const {
-  if (connections_.size() < manners_.at_once) polls.push_back({listener_.number(), POLLIN, 0});
+  if (listening() && connections_.size() < at_once_) polls.push_back({listener_.number(), POLLIN, 0});
   for (const auto& connection : connections_) {
-    const short writing = connection.to_say.empty() ? 0 : POLLOUT;
+    const bool waiting = connection.speak_at > std::chrono::steady_clock::now();
+    const short writing = connection.to_say.empty() || waiting ? 0 : POLLOUT;
     polls.push_back({connection.socket.number(), static_cast<short>(POLLIN | writing), 0});
   }
 }
@@ -36,10 +57,11 @@ void Conversations::serve() {
 }
 
 void Conversations::welcome() {
-  while (connections_.size() < manners_.at_once) {
+  while (listening() && connections_.size() < at_once_) {
     const int number = ::accept4(listener_.number(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (number < 0) return;
-    connections_.push_back({Descriptor(number), {}, {}});
+    connections_.emplace_back();
+    connections_.back().socket = Descriptor(number);
   }
 }
 
@@ -54,16 +76,15 @@ void Conversations::hear(Connection& connection) {
     }
     connection.heard_at = std::chrono::steady_clock::now();
     connection.heard.append(bytes.data(), static_cast<std::size_t>(count));
-    for (auto end = connection.heard.find(manners_.terminator); end != std::string::npos && !connection.closing;
-         end = connection.heard.find(manners_.terminator)) {
-      connection.to_say += answer_(std::string_view(connection.heard).substr(0, end));
-      connection.heard.erase(0, end + manners_.terminator.size());
-      connection.closing = manners_.one_answer;
-    }
+    Answer answer = answerer_(connection.heard);
+    connection.to_say += answer.bytes;
+    if (answer.wait.count() > 0) connection.speak_at = connection.heard_at + answer.wait;
+    connection.closing = answer.close;
   }
 }
 
 void Conversations::say(Connection& connection) {
+  if (connection.speak_at > std::chrono::steady_clock::now()) return;
   while (!connection.to_say.empty()) {
     const auto& text = connection.to_say;
     const ssize_t count = ::send(connection.socket.number(), text.data(), text.size(), MSG_NOSIGNAL);

@@ -17,15 +17,27 @@ namespace kphi::sim {
 
 class Conversations {
  public:
+  struct Answer {
+    std::string bytes;
+    std::chrono::nanoseconds wait{0};  ///< wall time before the first byte
+    bool close = false;                ///< after the last one
+  };
+  /// Takes whole questions off the front of what was heard and says what to send.
+  using Answerer = std::function<Answer(std::string& heard)>;
   struct Manners {
     std::string terminator;   ///< ends a question
     bool one_answer = false;  ///< close after the first
     std::size_t at_once = 1;  ///< connections served at the same time; others wait in the queue
   };
-  /// `listener`: non-blocking and listening. `answer`: question without its terminator -> bytes to send.
-  Conversations(Descriptor listener, Manners manners, std::function<std::string(std::string_view)> answer);
+  /// `listener`: non-blocking and listening. `answer`: question without its terminator -> what to send.
+  Conversations(Descriptor listener, const Manners& manners, std::function<Answer(std::string_view)> answer);
+  /// For questions without a terminator.
+  Conversations(Descriptor listener, std::size_t at_once, Answerer answerer);
 
   void append_polls(std::vector<pollfd>& polls) const;
+  /// Another listener, or none: connections are refused then, and those that there are end.
+  void listen_at(Descriptor listener);
+  [[nodiscard]] bool listening() const noexcept { return listener_.number() >= 0; }
   /// Does what can be done now; also drops who has been silent for 3 s of wall time.
   void serve();
 
@@ -35,6 +47,7 @@ class Conversations {
     std::string heard;
     std::string to_say;
     bool closing = false;
+    std::chrono::steady_clock::time_point speak_at{};
     std::chrono::steady_clock::time_point heard_at = std::chrono::steady_clock::now();
   };
   void welcome();
@@ -42,8 +55,8 @@ class Conversations {
   void say(Connection& connection);
 
   Descriptor listener_;
-  Manners manners_;
-  std::function<std::string(std::string_view)> answer_;
+  std::size_t at_once_;
+  Answerer answerer_;
   std::list<Connection> connections_;
 };
 

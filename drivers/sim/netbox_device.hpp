@@ -58,6 +58,7 @@ class NetBoxDevice {
   /// The acquisition stands still: records repeat sample and ft_sequence.
   void stall(bool stalled) noexcept { stalled_ = stalled; }
   void set_ft_sequence(std::uint32_t next) noexcept { ft_sequence_ = next - 1; }
+  [[nodiscard]] std::uint32_t ft_sequence() const noexcept { return ft_sequence_; }  ///< of the last sample
   /// Ends the stream's numbering: the next record is the first of a stream that nobody asked for.
   void restart_stream() noexcept;
   /// ORed into every status word until cleared.

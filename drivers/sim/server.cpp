@@ -1,7 +1,6 @@
 #include "drivers/sim/server.hpp"
 
 #include <arpa/inet.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
@@ -22,25 +21,12 @@ namespace {
 constexpr std::chrono::milliseconds kWakeUp{1};  // wall time
 constexpr int kCatchUp = 8;                      // bench time per wake-up, in wake-ups
 constexpr int kQuiet = 1000;                     // wake-ups without a byte: the client is gone
+constexpr std::size_t kHttpConnections = 4;      // of a box that serves more than one at a time
 constexpr std::size_t kBatch = 64;               // datagrams per system call
 
 [[noreturn]] void refuse(const std::string& where, const std::string& operation, const std::string& cause,
                          const std::string& next_move) {
   throw DeviceError("simulated bench " + where, operation, cause, next_move);
-}
-
-sockaddr_in address_of(const std::string& host, std::uint16_t port) {
-  addrinfo hints{};
-  hints.ai_family = AF_INET;
-  addrinfo* found = nullptr;
-  if (const int error = ::getaddrinfo(host.c_str(), nullptr, &hints, &found); error != 0) {
-    refuse(host, "resolve", ::gai_strerror(error), "name an address of this machine in netbox.host");
-  }
-  sockaddr_in address{};
-  std::memcpy(&address, found->ai_addr, sizeof address);
-  ::freeaddrinfo(found);
-  address.sin_port = htons(port);
-  return address;
 }
 
 Peer peer_of(const sockaddr_in& address) noexcept {
@@ -75,42 +61,34 @@ bool answers(const sockaddr_un& address) {
 
 Server::Server(const ServerSettings& settings)
     : time_scale_(settings.bench.time_scale),
-      addresses_{settings.host, 0, 0, {}, control_path(settings.control)},
+      addresses_{settings.host, 0, 0, 0, {}, control_path(settings.control)},
       bench_(settings.bench),
       stop_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
-      rdt_(listen_at(SOCK_DGRAM, settings.rdt_port)),
-      web_(listen_at(SOCK_STREAM, settings.http_port)),
+      rdt_(listen_at(settings.host, SOCK_DGRAM, settings.rdt_port)),
+      foreign_(listen_at(settings.host, SOCK_DGRAM, 0)),
+      web_(listen_at(settings.host, SOCK_STREAM, settings.http_port)),
+      coarse_(listen_at(settings.host, SOCK_STREAM, settings.tcp_port)),
       pty_(settings.device),
-      http_(std::move(web_.socket), {"\r\n\r\n", true, 1},
-            [this](std::string_view request) { return bench_.netbox().http(request); }),
+      http_(std::move(web_.socket),
+            {"\r\n\r\n", true, settings.bench.netbox.habits.one_http_connection ? 1 : kHttpConnections},
+            [this](std::string_view request) { return web_answer(request); }),
+      tcp_(std::move(coarse_.socket), 4,
+           [this](std::string& heard) {
+             Conversations::Answer answer;
+             answer.bytes = bench_.netbox().tcp(heard, answer.close);
+             return answer;
+           }),
       control_(listen_for_control(), {"\n", false, 16},
-               [this](std::string_view line) { return control_answer(bench_, line) + "\n"; }),
+               [this](std::string_view line) { return Conversations::Answer{control_answer(bench_, line) + "\n"}; }),
       batch_(kBatch) {
   addresses_.rdt_port = rdt_.port;
   addresses_.http_port = web_.port;
+  addresses_.tcp_port = coarse_.port;
   addresses_.device = pty_.path();
+  open_or_close_web();
 }
 
 Server::~Server() { ::unlink(addresses_.control.c_str()); }
-
-Server::Listening Server::listen_at(int type, std::uint16_t port) const {
-  sockaddr_in address = address_of(addresses_.host, port);
-  Descriptor socket(::socket(AF_INET, type | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-  const int yes = 1;
-  if (type == SOCK_STREAM) ::setsockopt(socket.number(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  const int buffer = 4 << 20;
-  if (type == SOCK_DGRAM) ::setsockopt(socket.number(), SOL_SOCKET, SO_SNDBUF, &buffer, sizeof buffer);
-  socklen_t size = sizeof address;
-  auto* generic = reinterpret_cast<sockaddr*>(&address);
-  const bool open = ::bind(socket.number(), generic, size) == 0 &&
-                    (type == SOCK_DGRAM || ::listen(socket.number(), 16) == 0) &&
-                    ::getsockname(socket.number(), generic, &size) == 0;
-  if (!open) {
-    refuse(addresses_.host + ":" + std::to_string(port), "listen", std::strerror(errno),
-           "is another simulator running? Else choose other ports in the bench file");
-  }
-  return {std::move(socket), ntohs(address.sin_port)};
-}
 
 Descriptor Server::listen_for_control() const {
   const std::string& path = addresses_.control;
@@ -138,6 +116,7 @@ void Server::request_stop() noexcept {
 std::vector<pollfd> Server::polls() const {
   std::vector<pollfd> all{{stop_.number(), POLLIN, 0}, {rdt_.socket.number(), POLLIN, 0}, {pty_.number(), POLLIN, 0}};
   http_.append_polls(all);
+  tcp_.append_polls(all);
   control_.append_polls(all);
   return all;
 }
@@ -145,22 +124,35 @@ std::vector<pollfd> Server::polls() const {
 void Server::run() {
   const SteadyClock clock(time_scale_);
   const Duration step_size = clock.stretched(kWakeUp);
-  Instant reached{0};
   bool behind = false;
   while (true) {
     auto waiting = polls();
     ::poll(waiting.data(), waiting.size(), behind ? 0 : static_cast<int>(kWakeUp.count()));
     if (waiting.front().revents != 0) return;
     const Instant now = clock.now();
-    const Instant goal = std::min(now, reached + kCatchUp * step_size);
+    const Instant goal = std::min(now, reached_ + kCatchUp * step_size);
     behind = goal < now;
-    while (reached < goal) {
-      reached = std::min(goal, reached + step_size);
-      step(reached);
+    while (reached_ < goal) {
+      reached_ = std::min(goal, reached_ + step_size);
+      step(reached_);
     }
+    open_or_close_web();
     http_.serve();
+    tcp_.serve();
     control_.serve();
   }
+}
+
+void Server::open_or_close_web() {
+  const bool open = !bench_.wire().http_refused(reached_);
+  if (open != http_.listening())
+    http_.listen_at(open ? listen_at(addresses_.host, SOCK_STREAM, web_.port).socket : Descriptor());
+}
+
+Conversations::Answer Server::web_answer(std::string_view request) {
+  HttpReply reply = bench_.wire().http(request, reached_);
+  return {std::move(reply.bytes),
+          std::chrono::nanoseconds(static_cast<std::int64_t>(static_cast<double>(reply.wait.count()) / time_scale_))};
 }
 
 void Server::step(Instant now) {
@@ -180,7 +172,7 @@ void Server::hear_requests() {
                                      reinterpret_cast<sockaddr*>(&from), &size);
     if (count < 0) return;
     const auto length = std::min(static_cast<std::size_t>(count), bytes.size());
-    bench_.netbox().receive(std::span(bytes).first(length), peer_of(from));
+    bench_.wire().request(std::span(bytes).first(length), peer_of(from), reached_);
   }
 }
 
@@ -194,15 +186,24 @@ void Server::hear_motor(Instant now) {
 
 void Server::send_datagrams() {
   std::size_t count = 0;
-  while (bench_.netbox().next_datagram(batch_[count])) {
-    if (++count < kBatch) continue;
-    send_batch(batch_, count);
+  const auto flush = [&] {
+    const bool foreign = count > 0 && batch_[0].foreign;
+    send_batch(batch_, count, foreign);
     count = 0;
+  };
+  while (bench_.wire().next_datagram(batch_[count], reached_)) {
+    if (count > 0 && batch_[count].foreign != batch_[0].foreign) {
+      const Datagram other = batch_[count];
+      flush();
+      batch_[0] = other;
+    }
+    if (++count == kBatch) flush();
   }
-  send_batch(batch_, count);
+  flush();
 }
 
-void Server::send_batch(std::vector<Datagram>& batch, std::size_t count) {
+void Server::send_batch(std::vector<Datagram>& batch, std::size_t count, bool foreign) {
+  const int socket = foreign ? foreign_.socket.number() : rdt_.socket.number();
   std::array<sockaddr_in, kBatch> to{};
   std::array<iovec, kBatch> parts{};
   std::array<mmsghdr, kBatch> messages{};
@@ -215,8 +216,7 @@ void Server::send_batch(std::vector<Datagram>& batch, std::size_t count) {
     messages[i].msg_hdr.msg_iovlen = 1;
   }
   for (std::size_t sent = 0; sent < count;) {
-    const int accepted =
-        ::sendmmsg(rdt_.socket.number(), &messages[sent], static_cast<unsigned>(count - sent), MSG_NOSIGNAL);
+    const int accepted = ::sendmmsg(socket, &messages[sent], static_cast<unsigned>(count - sent), MSG_NOSIGNAL);
     if (accepted < 0 && errno == EINTR) continue;
     if (accepted <= 0) {  // this one will not go; the next may
       ++unsent_.datagrams;

@@ -1,5 +1,6 @@
-// The simulated bench on its true transports: UDP and HTTP for the load cell's box, a pseudo-terminal for the motor, a
-// Unix-domain socket for the person who mounts propellers. One thread, poll(), a wake-up per millisecond at least.
+// The simulated bench on its true transports: UDP, HTTP and TCP for the load cell's box, a pseudo-terminal for the
+// motor, a Unix-domain socket for the person who mounts propellers. One thread, poll(), a wake-up per millisecond at
+// least.
 #pragma once
 
 #include <poll.h>
@@ -12,6 +13,7 @@
 #include "drivers/sim/bench.hpp"
 #include "drivers/sim/conversations.hpp"
 #include "drivers/sim/descriptor.hpp"
+#include "drivers/sim/listening.hpp"
 #include "drivers/sim/pty.hpp"
 
 namespace kphi::sim {
@@ -21,6 +23,7 @@ struct ServerSettings {
   std::string host = "127.0.0.1";  ///< IPv4 name or address to listen on
   std::uint16_t rdt_port = 0;      ///< 0: any free one
   std::uint16_t http_port = 0;     ///< 0: any free one
+  std::uint16_t tcp_port = 0;      ///< 0: any free one; 49151 on a real box
   std::string device;              ///< symlink to the motor's pseudo-terminal; empty: its own /dev/pts name only
   std::string control;             ///< path of the control socket; see control_path
 };
@@ -30,6 +33,7 @@ struct Addresses {
   std::string host;
   std::uint16_t rdt_port = 0;
   std::uint16_t http_port = 0;
+  std::uint16_t tcp_port = 0;
   std::string device;
   std::string control;
 };
@@ -53,22 +57,21 @@ class Server {
   void run();
   /// From any thread, and from a signal handler.
   void request_stop() noexcept;
+  /// To be read when run() has returned: what the script of faults did.
+  [[nodiscard]] const WireTruth& truth() noexcept { return bench_.wire().truth(); }
   /// To be read when run() has returned.
   [[nodiscard]] const Unsent& unsent() const noexcept { return unsent_; }
 
  private:
-  struct Listening {
-    Descriptor socket;
-    std::uint16_t port;
-  };
-  [[nodiscard]] Listening listen_at(int type, std::uint16_t port) const;
   [[nodiscard]] Descriptor listen_for_control() const;
   [[nodiscard]] std::vector<pollfd> polls() const;
   void step(Instant now);
   void hear_requests();
   void hear_motor(Instant now);
   void send_datagrams();
-  void send_batch(std::vector<Datagram>& batch, std::size_t count);
+  void open_or_close_web();
+  [[nodiscard]] Conversations::Answer web_answer(std::string_view request);
+  void send_batch(std::vector<Datagram>& batch, std::size_t count, bool foreign);
   void send_motor();
 
   double time_scale_;
@@ -76,13 +79,17 @@ class Server {
   SimulatedBench bench_;
   Descriptor stop_;
   Listening rdt_;
+  Listening foreign_;  ///< sends what a script lets come from elsewhere
   Listening web_;
+  Listening coarse_;
   Pty pty_;
   Conversations http_;
+  Conversations tcp_;
   Conversations control_;
   std::vector<Datagram> batch_;
   Unsent unsent_;
   int quiet_steps_ = 0;  ///< of the serial line
+  Instant reached_{0};   ///< bench time
 };
 
 }  // namespace kphi::sim

@@ -130,6 +130,21 @@ TEST_F(RunningServer, ServesItsConfigurationOverHttp) {
   }
 }
 
+TEST_F(RunningServer, AnswersOverTcpInOneOrManySegments) {
+  const Descriptor socket = connected(SOCK_STREAM, server->addresses().tcp_port);
+  std::string question(20, '\0');
+  question[0] = 1;  // READCALINFO
+  ASSERT_EQ(::send(socket.number(), question.data(), 7, 0), 7);
+  ASSERT_EQ(::send(socket.number(), question.data() + 7, 13, 0), 13);
+  std::string answer;
+  while (answer.size() < 24) {
+    const std::string part = receive(socket.number());
+    ASSERT_FALSE(part.empty());
+    answer += part;
+  }
+  EXPECT_EQ(hex_of(answer.substr(0, 12)), hex("12 34 02 03 00 0f 42 40 00 0f 42 40"));
+}
+
 TEST_F(RunningServer, MotorAnswersOnThePtyAlsoAfterAReopen) {
   for (int i = 0; i < 2; ++i) {
     const Descriptor port = motor_port();
@@ -188,6 +203,89 @@ TEST_F(RunningServer, LeavesNothingBehind) {
   EXPECT_FALSE(fs::exists(fs::symlink_status(addresses.device)));
   EXPECT_FALSE(fs::exists(addresses.control));
   EXPECT_THROW((void)tell(addresses.control, "status"), DeviceError);
+}
+
+TEST_F(RunningServer, TakesWritesOverHttp) {
+  const auto ask = [&](const std::string& target) {
+    const Descriptor socket = connected(SOCK_STREAM, server->addresses().http_port);
+    const std::string request = "GET /" + target + " HTTP/1.0\r\n\r\n";
+    EXPECT_EQ(::send(socket.number(), request.data(), request.size(), 0), static_cast<ssize_t>(request.size()));
+    std::string answer;
+    for (std::string part = receive(socket.number()); !part.empty(); part = receive(socket.number())) answer += part;
+    return answer;
+  };
+  EXPECT_EQ(ask("setting.cgi?setuserfilter=4").substr(0, 18), "HTTP/1.0 302 Found");
+  EXPECT_NE(ask("netftapi2.xml").find("<setuserfilter>4</setuserfilter>"), std::string::npos);
+}
+
+/// A server with a script of faults from its first moment on.
+struct FaultyServer : RunningServer {
+  void begin_again(const std::vector<FaultEntry>& entries) {
+    stop();
+    ServerSettings settings;
+    settings.control = (folder / "control").string();
+    for (const auto& entry : entries) settings.bench.faults.push_back(fault_of(entry));
+    server.emplace(settings);
+    thread = std::thread([this] { server->run(); });
+  }
+};
+
+TEST_F(FaultyServer, LosesWhatTheScriptSaysAndCountsIt) {
+  begin_again({{{"kind", "loss"}, {"at_s", "0"}, {"count", "3"}}});
+  const Descriptor socket = connected(SOCK_DGRAM, server->addresses().rdt_port);
+  const auto start = bytes("12 34 00 03 00 00 01 90");  // 400 samples: ten datagrams
+  ASSERT_EQ(::send(socket.number(), start.data(), start.size(), 0), 8);
+  EXPECT_EQ(hex_of(receive(socket.number()).substr(0, 4)), hex("00 00 00 79")) << "121 comes first";
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(receive(socket.number()).size(), 1440u);
+  server->request_stop();
+  thread.join();
+  EXPECT_EQ(server->truth().dropped, 3u);
+  EXPECT_EQ(server->truth().arrived, 7u);
+}
+
+TEST_F(FaultyServer, ForeignDatagramsComeFromAnotherAddress) {
+  begin_again({{{"kind", "foreign_source"}, {"at_s", "0"}, {"for_s", "100"}}});
+  const Descriptor socket(::socket(AF_INET, SOCK_DGRAM, 0));  // not connected: it hears everybody
+  sockaddr_in box{};
+  box.sin_family = AF_INET;
+  box.sin_port = htons(server->addresses().rdt_port);
+  box.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const auto start = bytes("12 34 00 02 00 00 00 05");
+  ASSERT_EQ(::sendto(socket.number(), start.data(), start.size(), 0, reinterpret_cast<sockaddr*>(&box), sizeof box), 8);
+  int true_ones = 0, foreign = 0;
+  for (int i = 0; i < 10; ++i) {
+    pollfd waiting{socket.number(), POLLIN, 0};
+    ASSERT_GT(::poll(&waiting, 1, 5000), 0);
+    std::array<char, 2048> buffer{};
+    sockaddr_in from{};
+    socklen_t size = sizeof from;
+    ASSERT_EQ(::recvfrom(socket.number(), buffer.data(), buffer.size(), 0, reinterpret_cast<sockaddr*>(&from), &size),
+              36);
+    ++(from.sin_port == box.sin_port ? true_ones : foreign);
+  }
+  EXPECT_EQ(true_ones, 5);
+  EXPECT_EQ(foreign, 5);
+}
+
+TEST_F(FaultyServer, RefusesConnectionsForAWhileAndListensAgain) {
+  begin_again({{{"kind", "http_refused"}, {"at_s", "0"}, {"for_s", "0.5"}}});
+  const auto connects = [&] {
+    const Descriptor socket(::socket(AF_INET, SOCK_STREAM, 0));
+    sockaddr_in web{};
+    web.sin_family = AF_INET;
+    web.sin_port = htons(server->addresses().http_port);
+    web.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    return ::connect(socket.number(), reinterpret_cast<const sockaddr*>(&web), sizeof web) == 0;
+  };
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  bool refused = false, served = false;
+  while (!(refused && served) && std::chrono::steady_clock::now() < deadline) {
+    const bool now = connects();
+    refused = refused || !now;
+    served = served || (refused && now);
+  }
+  EXPECT_TRUE(refused);
+  EXPECT_TRUE(served);
 }
 
 TEST(Server, RefusesToReplaceAFileByItsLink) {

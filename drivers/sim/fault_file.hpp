@@ -1,0 +1,25 @@
+// A fault script as a file:
+//
+//     format: kphi-faults/1
+//     faults:
+//       - {at_s: 2, for_s: 1, kind: loss, p: 0.01, burst: 3}
+//       - {at_s: 5, kind: reboot, down_s: 0.8, resume: true}
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+#include "drivers/sim/faults.hpp"
+
+namespace kphi::sim {
+
+/// The message reads "path:line:column: what; the next move".
+class FaultFileError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Strict; throws FaultFileError. `path` only names the text in messages.
+[[nodiscard]] FaultScript parse_faults(const std::string& text, const std::string& path);
+
+}  // namespace kphi::sim

@@ -1,0 +1,201 @@
+#include "drivers/sim/faults.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+namespace kphi::sim {
+namespace {
+
+struct Parameter {
+  std::string_view name;
+  void (*set)(Fault& fault, double value);
+  double low, high;
+  bool whole = false;
+  bool required = false;
+};
+
+constexpr Duration kOvertaken = std::chrono::milliseconds(10);
+constexpr double kHour = 3600;
+constexpr double kMany = 4294967295.0;
+
+template <auto Member>
+void as_number(Fault& fault, double value) {
+  using T = std::remove_reference_t<decltype(fault.*Member)>;
+  if constexpr (std::is_same_v<T, Duration>) {
+    fault.*Member = from_seconds(value);
+  } else {
+    fault.*Member = static_cast<T>(value);
+  }
+}
+
+template <auto Member>
+constexpr Parameter probability(std::string_view name, bool required = false) {
+  return {name, as_number<Member>, 0, 1, false, required};
+}
+template <auto Member>
+constexpr Parameter seconds(std::string_view name, bool required = false) {
+  return {name, as_number<Member>, 0, kHour, false, required};
+}
+template <auto Member>
+constexpr Parameter whole(std::string_view name, double low, double high, bool required = false) {
+  return {name, as_number<Member>, low, high, true, required};
+}
+
+constexpr Parameter kP = probability<&Fault::p>("p");
+constexpr Parameter kDelay = seconds<&Fault::delay>("delay_s");
+constexpr Parameter kAnyDelay = seconds<&Fault::delay>("delay_s", true);
+
+/// How long a fault of this kind goes on.
+enum class Extent : std::uint8_t { instant, window, window_or_count, window_or_forever };
+
+struct Kind {
+  FaultKind kind;
+  std::string_view name;
+  Extent extent;
+  std::vector<Parameter> parameters;
+};
+
+const std::vector<Kind>& kinds() {
+  using F = Fault;
+  using K = FaultKind;
+  using E = Extent;
+  static const std::vector<Kind> table{
+      {K::loss, "loss", E::window_or_count, {kP, whole<&F::burst>("burst", 1, 1e6)}},
+      {K::gilbert,
+       "gilbert",
+       E::window_or_count,
+       {probability<&F::p_good_bad>("p_good_bad", true), probability<&F::p_bad_good>("p_bad_good", true),
+        probability<&F::loss>("loss")}},
+      {K::duplicate, "duplicate", E::window_or_count, {kP, kDelay}},
+      {K::reorder, "reorder", E::window_or_count, {kP, whole<&F::depth>("depth", 1, 1000), kDelay}},
+      {K::delay, "delay", E::window_or_count, {kAnyDelay, seconds<&F::jitter>("jitter_s")}},
+      {K::hold, "hold", E::window, {}},
+      {K::wrong_size,
+       "wrong_size",
+       E::window_or_count,
+       {kP, whole<&F::size>("size", 0, 1476, true), whole<&F::replaces>("replaces", 0, 1)}},
+      {K::foreign_source, "foreign_source", E::window_or_count, {kP}},
+      {K::lost_start, "lost_start", E::window_or_count, {}},
+      {K::doubled_start, "doubled_start", E::window_or_count, {kDelay}},
+      {K::delayed_start, "delayed_start", E::window_or_count, {kAnyDelay}},
+      {K::stolen, "stolen", E::instant, {whole<&F::buffered>("buffered", 0, 1)}},
+      {K::restart, "restart", E::instant, {}},
+      {K::reboot, "reboot", E::instant, {seconds<&F::down>("down_s"), whole<&F::resume>("resume", 0, 1)}},
+      {K::stall, "stall", E::window, {}},
+      {K::ft_jump_back, "ft_jump_back", E::instant, {whole<&F::samples>("samples", 1, kMany, true)}},
+      {K::wrap, "wrap", E::instant, {whole<&F::samples>("samples", 1, kMany, true)}},
+      {K::clock_skew,
+       "clock_skew",
+       E::window_or_forever,
+       {{"ppm", as_number<&F::ppm>, -1000, 1000, false, true},
+        {"wander_ppm", as_number<&F::wander_ppm>, 0, 1000},
+        {"period_s", as_number<&F::period>, 1, 1e6}}},
+      {K::status,
+       "status",
+       E::window_or_forever,
+       {whole<&F::bits>("bits", 1, kMany, true), whole<&F::latched>("latched", 0, 1)}},
+      {K::saturation, "saturation", E::window_or_forever, {whole<&F::axes>("axes", 1, 63, true)}},
+      {K::units,
+       "units",
+       E::instant,
+       {whole<&F::force_unit>("force_unit", 1, 6, true), whole<&F::torque_unit>("torque_unit", 1, 6)}},
+      {K::http_slow, "http_slow", E::window_or_count, {kAnyDelay}},
+      {K::http_truncated, "http_truncated", E::window_or_count, {whole<&F::size>("size", 0, 1e6, true)}},
+      {K::http_status, "http_status", E::window_or_count, {whole<&F::code>("code", 400, 599, true)}},
+      {K::http_oversized, "http_oversized", E::window_or_count, {whole<&F::size>("size", 1, 1e8, true)}},
+      {K::http_refused, "http_refused", E::window, {}},
+  };
+  return table;
+}
+
+const Kind& kind_named(const std::string& name) {
+  for (const Kind& kind : kinds()) {
+    if (kind.name == name) return kind;
+  }
+  std::string known;
+  for (const Kind& kind : kinds()) known += fmt::format("{}{}", known.empty() ? "" : ", ", kind.name);
+  throw FaultEntryError("kind", fmt::format("no fault is called '{}'; there are {}", name, known));
+}
+
+double number(const std::string& key, const std::string& text) {
+  if (text == "true") return 1;
+  if (text == "false") return 0;
+  double value = 0;
+  if (text.substr(0, 2) == "0x") {
+    std::uint32_t bits = 0;
+    const auto [end, error] = std::from_chars(text.data() + 2, text.data() + text.size(), bits, 16);
+    if (error == std::errc{} && end == text.data() + text.size()) return bits;
+  }
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) {
+    throw FaultEntryError(key, fmt::format("'{}' is no number", text));
+  }
+  return value;
+}
+
+double number_within(const Parameter& parameter, const FaultEntry& entry) {
+  const std::string key(parameter.name);
+  const double value = number(key, entry.at(key));
+  if (!(value >= parameter.low && value <= parameter.high)) {
+    throw FaultEntryError(key, fmt::format("{} is outside {} to {}", value, parameter.low, parameter.high));
+  }
+  if (parameter.whole && value != std::floor(value)) throw FaultEntryError(key, fmt::format("{} is not whole", value));
+  return value;
+}
+
+void check_extent(const Kind& kind, const FaultEntry& entry) {
+  const bool has_end = entry.contains("for_s"), has_count = entry.contains("count");
+  if (kind.extent == Extent::window && !has_end) throw FaultEntryError("", fmt::format("{} needs for_s", kind.name));
+  if (kind.extent == Extent::window_or_count && !has_end && !has_count) {
+    throw FaultEntryError("", fmt::format("{} needs for_s or count", kind.name));
+  }
+}
+
+std::vector<Parameter> parameters_of(const Kind& kind) {
+  std::vector<Parameter> all = kind.parameters;
+  all.push_back(seconds<&Fault::at>("at_s", true));
+  all.back().high = 1e6;
+  if (kind.extent != Extent::instant) all.push_back({"for_s", as_number<&Fault::lasts>, 1e-6, 1e6});
+  if (kind.extent == Extent::window_or_count) all.push_back(whole<&Fault::count>("count", 1, 1e9));
+  return all;
+}
+
+}  // namespace
+
+std::string_view name_of(FaultKind kind) noexcept {
+  const auto& table = kinds();
+  const auto found = std::find_if(table.begin(), table.end(), [&](const Kind& k) { return k.kind == kind; });
+  return found == table.end() ? "?" : found->name;
+}
+
+Fault fault_of(const FaultEntry& entry) {
+  const auto named = entry.find("kind");
+  if (named == entry.end()) throw FaultEntryError("", "the kind is missing");
+  const Kind& kind = kind_named(named->second);
+  const auto parameters = parameters_of(kind);
+  for (const auto& [key, value] : entry) {
+    const bool known = key == "kind" || std::any_of(parameters.begin(), parameters.end(),
+                                                    [&name = key](const Parameter& p) { return p.name == name; });
+    if (!known) throw FaultEntryError(key, fmt::format("{} has no '{}'", kind.name, key));
+  }
+  check_extent(kind, entry);
+  Fault fault;
+  fault.kind = kind.kind;
+  if (kind.kind == FaultKind::reorder) fault.delay = kOvertaken;
+  for (const Parameter& parameter : parameters) {
+    if (entry.contains(std::string(parameter.name))) {
+      parameter.set(fault, number_within(parameter, entry));
+    } else if (parameter.required) {
+      throw FaultEntryError("", fmt::format("{} needs {}", kind.name, parameter.name));
+    }
+  }
+  if (fault.kind == FaultKind::wrong_size && fault.size > 0 && fault.size % 36 == 0 && fault.size <= 1440) {
+    throw FaultEntryError("size", "whole records are the right size: 36 to 1440 in steps of 36");
+  }
+  return fault;
+}
+
+}  // namespace kphi::sim

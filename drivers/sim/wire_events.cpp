@@ -1,0 +1,197 @@
+// What a script does to the requests, to the box itself and to its web server.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "drivers/sim/bytes.hpp"
+#include "drivers/sim/motor.hpp"
+#include "drivers/sim/wire.hpp"
+
+namespace kphi::sim {
+namespace {
+
+constexpr double kTurn = 6.28318530717958647692;
+
+bool is_start(std::span<const std::uint8_t> datagram) noexcept {
+  if (datagram.size() != 8 || big(datagram.first(2)) != 0x1234) return false;
+  const std::uint32_t command = big(datagram.subspan(2, 2));
+  return command >= 1 && command <= 4;
+}
+
+std::string page(std::string_view status, std::string_view body) {
+  return fmt::format("HTTP/1.0 {}\r\nContent-Type: text/html\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{}",
+                     status, body.size(), body);
+}
+
+std::string oversized(std::size_t size) {
+  return page("200 OK", "<?xml version=\"1.0\"?><netft>" + std::string(size, ' '));
+}
+
+}  // namespace
+
+void FaultyWire::schedule() noexcept {
+  next_event_ = events_.empty() ? kNever : events_.back().at;
+  for (const LateRequest& request : late_requests_) next_event_ = std::min(next_event_, request.due);
+}
+
+void FaultyWire::meet_events(Instant now) {
+  while (next_event_ <= now) {
+    if (!events_.empty() && events_.back().at == next_event_) {
+      const Event event = events_.back();
+      events_.pop_back();
+      const Fault& fault = script_[event.fault];
+      event.begins ? begin(fault, event.at) : end(fault);
+      note(event.at, fmt::format("{} {}", name_of(fault.kind), event.begins ? "begins" : "ends"));
+    } else {
+      const auto due = std::find_if(late_requests_.begin(), late_requests_.end(),
+                                    [&](const LateRequest& r) { return r.due == next_event_; });
+      const LateRequest request = std::move(*due);
+      late_requests_.erase(due);
+      hand_over(request.bytes, request.peer);
+    }
+    schedule();
+  }
+}
+
+void FaultyWire::note(Instant at, std::string what) { truth_.events.push_back({at, std::move(what)}); }
+
+void FaultyWire::begin(const Fault& fault, Instant) {
+  switch (fault.kind) {
+    case FaultKind::stolen: {
+      const std::array<std::uint8_t, 8> start{0x12, 0x34, 0, static_cast<std::uint8_t>(fault.buffered ? 3 : 2),
+                                              0,    0,    0, 0};
+      ++truth_.thefts;
+      return hand_over(start, kThief);
+    }
+    case FaultKind::restart:
+      if (!box_.streaming()) return;
+      ++truth_.restarts;
+      return box_.restart_stream();
+    case FaultKind::reboot:
+      ++truth_.reboots;
+      dead_ = true;
+      return;
+    case FaultKind::stall:
+      ++truth_.stalls;
+      return box_.stall(true);
+    case FaultKind::ft_jump_back:
+      ++truth_.jumps;
+      return box_.set_ft_sequence(box_.ft_sequence() + 1 - static_cast<std::uint32_t>(fault.samples));
+    case FaultKind::wrap:
+      return box_.set_ft_sequence(0u - static_cast<std::uint32_t>(fault.samples));
+    case FaultKind::clock_skew:
+      skew_ = &fault;
+      skewed_ = true;
+      return;
+    case FaultKind::status:
+      return box_.set_status(fault.bits);
+    case FaultKind::saturation:
+      return box_.force_saturation(fault.axes);
+    case FaultKind::units: {
+      NetBoxSettings settings = box_.settings();
+      Slot& slot = settings.slots[static_cast<std::size_t>(settings.active_slot)];
+      slot.force_unit = fault.force_unit;
+      slot.torque_unit = fault.torque_unit;
+      return box_.configure(settings);
+    }
+    default:
+      return;
+  }
+}
+
+void FaultyWire::end(const Fault& fault) {
+  switch (fault.kind) {
+    case FaultKind::reboot:
+      dead_ = false;
+      return box_.power_cycle(fault.resume);
+    case FaultKind::stall:
+      return box_.stall(false);
+    case FaultKind::clock_skew:
+      skewed_ = false;
+      return;
+    case FaultKind::status:
+      if (!fault.latched) box_.clear_status(fault.bits);
+      return;
+    case FaultKind::saturation:
+      return box_.force_saturation(0);
+    default:
+      return;
+  }
+}
+
+void FaultyWire::sample_skewed(const LoadCellSample& sample) {
+  const double turn = kTurn * to_seconds(sample.at - skew_->at) / to_seconds(skew_->period);
+  const double rate = 1 + 1e-6 * (skew_->ppm + (skew_->wander_ppm == 0 ? 0 : skew_->wander_ppm * std::sin(turn)));
+  phase_ += rate;
+  const int crossed = static_cast<int>(phase_);
+  phase_ -= crossed;
+  // Forces change little within a tick; the time of the sample is exact.
+  for (int left = crossed - 1; left >= 0; --left) {
+    box_.sample({sample.at - from_seconds((phase_ + left) / rate * kTick), sample.wrench});
+  }
+}
+
+void FaultyWire::hand_over(std::span<const std::uint8_t> datagram, Peer peer) {
+  if (dead_) {
+    ++truth_.unheard;
+    return;
+  }
+  box_.receive(datagram, peer);
+}
+
+void FaultyWire::request(std::span<const std::uint8_t> datagram, Peer peer, Instant now) {
+  if (now >= next_event_) meet_events(now);
+  if (!is_start(datagram)) return hand_over(datagram, peer);
+  ++truth_.starts;
+  Duration later{-1};
+  bool at_once = true;
+  for (std::size_t i = 0; i < script_.size(); ++i) {
+    const Fault& fault = script_[i];
+    if (fault.kind < FaultKind::lost_start || fault.kind > FaultKind::delayed_start || !active(i, now)) continue;
+    ++progress_[i].used;
+    note(now, std::string(name_of(fault.kind)));
+    if (fault.kind == FaultKind::lost_start) {
+      ++truth_.starts_lost;
+      return;
+    }
+    later = std::max(later, fault.delay);
+    at_once = at_once && fault.kind == FaultKind::doubled_start;
+    ++(fault.kind == FaultKind::doubled_start ? truth_.starts_doubled : truth_.starts_delayed);
+  }
+  if (at_once) hand_over(datagram, peer);
+  if (later < Duration{0}) return;
+  late_requests_.push_back({now + later, {datagram.begin(), datagram.end()}, peer});
+  schedule();
+}
+
+HttpReply FaultyWire::http(std::string_view request, Instant now) {
+  HttpReply reply{box_.http(request), Duration{0}};
+  for (std::size_t i = 0; i < script_.size(); ++i) {
+    const Fault& fault = script_[i];
+    if (fault.kind < FaultKind::http_slow || fault.kind == FaultKind::http_refused || !active(i, now)) continue;
+    ++progress_[i].used;
+    ++truth_.http_spoilt;
+    note(now, std::string(name_of(fault.kind)));
+    if (fault.kind == FaultKind::http_slow) reply.wait = std::max(reply.wait, fault.delay);
+    if (fault.kind == FaultKind::http_truncated)
+      reply.bytes.resize(std::min(reply.bytes.size(), static_cast<std::size_t>(fault.size)));
+    if (fault.kind == FaultKind::http_oversized) reply.bytes = oversized(static_cast<std::size_t>(fault.size));
+    if (fault.kind == FaultKind::http_status) {
+      const std::string status =
+          fmt::format("{} {}", fault.code, fault.code < 500 ? "Not Found" : "Internal Server Error");
+      reply.bytes = page(status, "<html><body>" + status + "</body></html>");
+    }
+  }
+  return reply;
+}
+
+bool FaultyWire::http_refused(Instant now) const noexcept {
+  if (dead_) return true;
+  for (std::size_t i = 0; i < script_.size(); ++i) {
+    if (script_[i].kind == FaultKind::http_refused && active(i, now)) return true;
+  }
+  return false;
+}
+
+}  // namespace kphi::sim

@@ -1,0 +1,235 @@
+// Each fault alone: the driver's account equals the simulator's truth, and what it delivers is what was sent, in order,
+// once, each record with the time of its first arrival.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "drivers/sim/faults.hpp"
+#include "test/drivers/netbox_faults/joined.hpp"
+
+namespace kphi::netbox::test {
+namespace {
+
+using namespace std::chrono_literals;
+using sim::FaultEntry;
+
+sim::FaultScript script(std::initializer_list<FaultEntry> entries) {
+  sim::FaultScript faults;
+  for (const FaultEntry& entry : entries) faults.push_back(sim::fault_of(entry));
+  return faults;
+}
+
+struct Mode {
+  const char* name;
+  Manner manner;
+};
+
+class EachFault : public testing::TestWithParam<Mode> {
+ protected:
+  /// Runs three seconds and expects agreement.
+  Joined& run(sim::FaultScript faults, Instant end = 3s) {
+    joined.emplace(GetParam().manner, std::move(faults), 42);
+    joined->run_until(end);
+    joined->finish();
+    EXPECT_EQ(joined->disagreement(), "");
+    EXPECT_GT(joined->counters().received, 0u);
+    return *joined;
+  }
+  [[nodiscard]] bool slow() const { return GetParam().manner.divisor > 10; }
+  std::optional<Joined> joined;
+};
+
+TEST_P(EachFault, NoneAtAll) {
+  Joined& j = run({});
+  EXPECT_EQ(j.counters().lost_network, 0u);
+  EXPECT_EQ(j.counters().duplicates, 0u);
+}
+
+TEST_P(EachFault, UniformLoss) {
+  const Counters& c = run(script({{{"kind", "loss"}, {"at_s", "0.5"}, {"for_s", "2"}, {"p", "0.1"}}})).counters();
+  EXPECT_GT(c.lost_network, 0u);
+}
+
+TEST_P(EachFault, BurstLoss) {
+  const Counters& c =
+      run(script({{{"kind", "loss"}, {"at_s", "0.5"}, {"for_s", "2"}, {"p", "0.05"}, {"burst", "7"}}})).counters();
+  EXPECT_GT(c.lost_network, 0u);
+}
+
+TEST_P(EachFault, GilbertElliottLoss) {
+  run(script({{{"kind", "gilbert"},
+               {"at_s", "0.5"},
+               {"for_s", "2"},
+               {"p_good_bad", "0.05"},
+               {"p_bad_good", "0.3"},
+               {"loss", "0.8"}}}));
+  EXPECT_GT(joined->counters().lost_network, 0u);
+}
+
+TEST_P(EachFault, Duplicates) {
+  run(script({{{"kind", "duplicate"}, {"at_s", "0.5"}, {"for_s", "2"}, {"p", "0.2"}}}));
+  EXPECT_GT(joined->counters().duplicates, 0u);
+}
+
+TEST_P(EachFault, DuplicatesMuchLater) {
+  run(script({{{"kind", "duplicate"}, {"at_s", "0.5"}, {"for_s", "1"}, {"p", "0.2"}, {"delay_s", "0.3"}}}));
+  EXPECT_GT(joined->counters().duplicates, 0u);
+}
+
+TEST_P(EachFault, AdjacentSwaps) {
+  const Counters& c =
+      run(script({{{"kind", "reorder"}, {"at_s", "0.5"}, {"for_s", "2"}, {"p", "0.1"}, {"depth", "1"}}})).counters();
+  EXPECT_EQ(c.lost_network, 0u);
+  if (!slow()) {
+    EXPECT_GT(c.reordered, 0u);
+  }
+}
+
+TEST_P(EachFault, ReorderingThreeDeep) {
+  const Counters& c = run(script({{{"kind", "reorder"},
+                                   {"at_s", "0.5"},
+                                   {"for_s", "2"},
+                                   {"p", "0.1"},
+                                   {"depth", "3"},
+                                   {"delay_s", "0.018"}}}))
+                          .counters();
+  EXPECT_EQ(c.lost_network, 0u);
+}
+
+TEST_P(EachFault, DelayWithJitter) {
+  run(script({{{"kind", "delay"}, {"at_s", "0.5"}, {"for_s", "2"}, {"delay_s", "0.05"}, {"jitter_s", "0.05"}}}), 4s);
+  EXPECT_EQ(joined->counters().lost_network, 0u);
+}
+
+TEST_P(EachFault, PauseThenBurst) {
+  run(script({{{"kind", "hold"}, {"at_s", "1"}, {"for_s", "0.3"}}}));
+  EXPECT_EQ(joined->counters().lost_network, 0u);
+}
+
+TEST_P(EachFault, WrongSizes) {
+  for (const char* size : {"0", "1", "35", "37", "71", "1441", "1476"}) {
+    run(script({{{"kind", "wrong_size"}, {"at_s", "0.5"}, {"for_s", "1"}, {"p", "0.1"}, {"size", size}}}));
+    EXPECT_GT(joined->counters().malformed, 0u) << size;
+    EXPECT_EQ(joined->counters().lost_network, 0u) << size;
+  }
+}
+
+TEST_P(EachFault, WrongSizesInsteadOfDatagrams) {
+  run(script(
+      {{{"kind", "wrong_size"}, {"at_s", "0.5"}, {"for_s", "1"}, {"p", "0.1"}, {"size", "71"}, {"replaces", "1"}}}));
+  EXPECT_GT(joined->counters().malformed, 0u);
+  EXPECT_GT(joined->counters().lost_network, 0u);
+}
+
+TEST_P(EachFault, ForeignSourcesAreNotHeard) {
+  run(script({{{"kind", "foreign_source"}, {"at_s", "0"}, {"for_s", "2"}, {"p", "0.5"}}}));
+  EXPECT_GT(joined->wire().truth().foreign, 0u);
+}
+
+TEST_P(EachFault, LostStarts) {
+  run(script({{{"kind", "lost_start"}, {"at_s", "0"}, {"count", "3"}}}), 6s);
+  EXPECT_EQ(joined->wire().truth().starts, 4u);
+}
+
+TEST_P(EachFault, DoubledStart) {
+  run(script({{{"kind", "doubled_start"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "0.9"}}}));
+  EXPECT_EQ(joined->counters().restarts, 1u);
+}
+
+TEST_P(EachFault, DelayedStart) {
+  run(script({{{"kind", "delayed_start"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "0.05"}}}));
+}
+
+TEST_P(EachFault, RestartUnasked) {
+  run(script({{{"kind", "restart"}, {"at_s", "1.5"}}}));
+  EXPECT_EQ(joined->counters().restarts, 1u);
+}
+
+TEST_P(EachFault, StolenStreamIsTakenBackWhenAsked) {
+  run(script({{{"kind", "stolen"}, {"at_s", "1.5"}}}), 5s);
+  EXPECT_EQ(joined->silences(), 1);
+  EXPECT_EQ(joined->counters().restarts, 1u);
+  EXPECT_GT(joined->counters().lost_network, 0u);
+}
+
+TEST_P(EachFault, StolenStreamStaysSilent) {
+  Manner manner = GetParam().manner;
+  manner.start_again_when_silent = false;
+  Joined j(manner, script({{{"kind", "stolen"}, {"at_s", "1.5"}}}), 42);
+  j.run_until(5s);
+  j.finish();
+  EXPECT_EQ(j.session().state(), State::silent);
+  EXPECT_EQ(j.disagreement(), "");
+  EXPECT_EQ(j.wire().truth().starts, 1u);
+}
+
+TEST_P(EachFault, RebootWithResume) {
+  run(script({{{"kind", "reboot"}, {"at_s", "1.5"}, {"down_s", "0.2"}, {"resume", "1"}}}));
+  EXPECT_EQ(joined->counters().reboots, 1u);
+}
+
+TEST_P(EachFault, RebootWithoutResume) {
+  run(script({{{"kind", "reboot"}, {"at_s", "1.5"}, {"down_s", "0.2"}}}), 6s);
+  EXPECT_EQ(joined->counters().reboots, 1u);
+  EXPECT_EQ(joined->silences(), 1);
+}
+
+TEST_P(EachFault, Stall) {
+  run(script({{{"kind", "stall"}, {"at_s", "1.5"}, {"for_s", "0.4"}}}));
+  EXPECT_GT(joined->counters().stalled, 0u);
+}
+
+TEST_P(EachFault, JumpBackFarReadsAsReboot) {
+  Joined j(GetParam().manner, script({{{"kind", "ft_jump_back"}, {"at_s", "1.5"}, {"samples", "70000"}}}), 42);
+  j.run_until(3s);
+  j.finish();
+  EXPECT_EQ(j.counters().reboots, 1u);
+  // A datagram that jumps within itself is not one line of the log.
+  if (GetParam().manner.records_per_datagram == 1) {
+    EXPECT_EQ(j.disagreement(), "");
+  }
+}
+
+TEST_P(EachFault, WrapOfTheInternalSequence) {
+  run(script({{{"kind", "wrap"}, {"at_s", "0"}, {"samples", "9000"}}}));
+  EXPECT_EQ(joined->counters().lost_network, 0u);
+  EXPECT_EQ(joined->counters().reboots, 0u);
+}
+
+TEST_P(EachFault, WrapWithLoss) {
+  run(script({{{"kind", "wrap"}, {"at_s", "0"}, {"samples", "9000"}},
+              {{"kind", "loss"}, {"at_s", "0.5"}, {"for_s", "1.5"}, {"p", "0.2"}}}));
+}
+
+TEST_P(EachFault, ClockSkewIsNoLoss) {
+  run(script({{{"kind", "clock_skew"}, {"at_s", "0"}, {"ppm", "100"}, {"wander_ppm", "5"}, {"period_s", "10"}}}));
+  EXPECT_EQ(joined->counters().lost_network, 0u);
+}
+
+TEST_P(EachFault, StatusBitsDoNotTouchTheAccount) {
+  run(script({{{"kind", "status"}, {"at_s", "1"}, {"for_s", "0.5"}, {"bits", "0x80400000"}}}));
+  const auto bad = std::count_if(joined->out().begin(), joined->out().end(),
+                                 [](const StampedRecord& r) { return r.record.status == 0x80400000u; });
+  EXPECT_NEAR(static_cast<double>(bad), 3500.0 / GetParam().manner.divisor, 1);
+}
+
+TEST_P(EachFault, SaturationIsInTheRecords) {
+  run(script({{{"kind", "saturation"}, {"at_s", "1"}, {"for_s", "0.5"}, {"axes", "4"}}}));
+  for (const StampedRecord& r : joined->out())
+    ASSERT_EQ(r.record.status == 0x80020000u, r.record.counts[2] == 60'000'000);
+}
+
+constexpr Manner real_time(int divisor) { return {false, 1, divisor, 0, true, {}}; }
+constexpr Manner buffered(int records, int divisor, std::uint32_t first_ft = 0) {
+  return {true, records, divisor, first_ft, true, {}};
+}
+
+INSTANTIATE_TEST_SUITE_P(, EachFault,
+                         testing::Values(Mode{"Buffered40At7000", buffered(40, 1)},
+                                         Mode{"Buffered7At7000", buffered(7, 1, 4294960000u)},
+                                         Mode{"RealTimeAt7000", real_time(1)}, Mode{"RealTimeAt1000", real_time(7)}),
+                         [](const auto& mode) { return std::string(mode.param.name); });
+
+}  // namespace
+}  // namespace kphi::netbox::test

@@ -1,0 +1,69 @@
+// The driver's session joined with the simulator's wire, one thread, virtual time: and what a perfect driver would say.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "drivers/netbox/session.hpp"
+#include "drivers/sim/wire.hpp"
+
+namespace kphi::netbox::test {
+
+struct Manner {
+  bool buffered = true;
+  int records_per_datagram = 40;
+  int divisor = 1;
+  std::uint32_t first_ft = 0;
+  bool start_again_when_silent = true;
+  sim::NetBoxHabits habits;
+};
+
+/// What the truth says the account must be.
+struct Ideal {
+  struct Delivered {
+    std::uint32_t rdt = 0, ft = 0;
+    Instant arrival{0};
+    friend bool operator==(const Delivered&, const Delivered&) = default;
+  };
+  std::uint64_t received = 0, lost = 0, duplicates = 0, stalled = 0, restarts = 0, reboots = 0, malformed = 0;
+  std::vector<Delivered> delivered;  ///< in this order
+};
+
+class Joined {
+ public:
+  Joined(const Manner& manner, sim::FaultScript script, std::uint64_t seed);
+  /// Starts the session at 0; from then on 7000 ticks a second.
+  void run_until(Instant end);
+  /// Delivers what waits, so that the account is complete.
+  void finish();
+  [[nodiscard]] Ideal ideal() const;
+  /// Everything that differs between driver and truth; empty when they agree.
+  [[nodiscard]] std::string disagreement() const;
+
+  [[nodiscard]] Session& session() noexcept { return session_; }
+  [[nodiscard]] const Counters& counters() const noexcept { return session_.counters(); }
+  [[nodiscard]] sim::FaultyWire& wire() noexcept { return wire_; }
+  [[nodiscard]] sim::NetBoxDevice& box() noexcept { return box_; }
+  [[nodiscard]] const std::vector<StampedRecord>& out() const noexcept { return out_; }
+  [[nodiscard]] int silences() const noexcept { return silences_; }
+
+ private:
+  struct Arrival {
+    std::uint32_t boot, stream, first_rdt;
+    Instant at;
+  };
+  void pump(Instant now);
+
+  Manner manner_;
+  sim::NetBoxDevice box_;
+  sim::FaultyWire wire_;
+  Session session_;
+  std::vector<StampedRecord> out_;
+  std::vector<Arrival> arrivals_;  // of whole datagrams that the session did not drain
+  std::uint64_t drained_ = 0;
+  int silences_ = 0;
+  std::uint64_t tick_ = 0;
+};
+
+}  // namespace kphi::netbox::test

@@ -1,0 +1,298 @@
+// The faulty wire by itself: what arrives, when, and what it says about it.
+#include "drivers/sim/wire.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "drivers/sim/motor.hpp"
+#include "test/drivers/sim/hex.hpp"
+
+namespace kphi::sim {
+namespace {
+
+using namespace std::chrono_literals;
+using test::bytes;
+using Keep = FaultyWire::Keep;
+
+const auto kRealTime = bytes("12 34 00 02 00 00 00 00");
+constexpr Peer kHost = 7;
+using Entries = std::vector<FaultEntry>;
+
+struct Bench {
+  explicit Bench(const Entries& entries, std::uint64_t seed = 1, Keep keep = Keep::samples)
+      : wire(box, script(entries), seed, keep) {
+    wire.request(kRealTime, kHost, Instant{0});
+  }
+  static FaultScript script(const Entries& entries) {
+    FaultScript faults;
+    for (const auto& entry : entries) faults.push_back(fault_of(entry));
+    return faults;
+  }
+  /// Ticks on, taking what has arrived after each `step` ticks.
+  std::vector<Datagram> run(int ticks, int step = 1) {
+    std::vector<Datagram> all;
+    Datagram next;
+    for (int i = 0; i < ticks; ++i) {
+      ++tick;
+      now = Instant(tick * 1'000'000 / 7);
+      wire.sample({now, {0, 0, 1, 0, 0, 0}});
+      if (tick % step == 0)
+        while (wire.next_datagram(next, now)) all.push_back(next);
+    }
+    return all;
+  }
+  NetBoxDevice box{[] {
+    NetBoxSettings settings;
+    settings.rate_hz = 1000;
+    return settings;
+  }()};
+  FaultyWire wire;
+  std::int64_t tick = 0;
+  Instant now{0};
+};
+
+std::uint32_t rdt(const Datagram& d) { return static_cast<std::uint32_t>(d.bytes[2] << 8 | d.bytes[3]); }
+std::uint32_t ft(const Datagram& d) {
+  return static_cast<std::uint32_t>(d.bytes[4]) << 24 |
+         static_cast<std::uint32_t>(d.bytes[5] << 16 | d.bytes[6] << 8 | d.bytes[7]);
+}
+
+TEST(FaultyWire, WithoutFaultsPassesAllAtOnce) {
+  Bench bench(Entries{});
+  const auto arrived = bench.run(7000);
+  ASSERT_EQ(arrived.size(), 1000u);
+  for (const Datagram& d : arrived) EXPECT_EQ(d.at, d.sampled[0]);
+  EXPECT_EQ(bench.wire.truth().arrived, 1000u);
+  EXPECT_EQ(bench.wire.truth().log.size(), 1000u);
+  EXPECT_EQ(bench.wire.truth().sampled.size(), 1000u);
+}
+
+TEST(FaultyWire, LosesAtMostAsManyAsTold) {
+  Bench bench(Entries{{{"kind", "loss"}, {"at_s", "0.1"}, {"count", "5"}}});
+  EXPECT_EQ(bench.run(7000).size(), 995u);
+  EXPECT_EQ(bench.wire.truth().dropped, 5u);
+  EXPECT_EQ(bench.wire.truth().records_dropped, 5u);
+}
+
+TEST(FaultyWire, LosesInBursts) {
+  Bench bench(Entries{{{"kind", "loss"}, {"at_s", "0"}, {"for_s", "10"}, {"p", "0.02"}, {"burst", "6"}}});
+  const auto arrived = bench.run(70000);
+  for (std::size_t i = 1; i < arrived.size(); ++i) {
+    const std::uint32_t lost = rdt(arrived[i]) - rdt(arrived[i - 1]) - 1;
+    ASSERT_EQ(lost % 6, 0u);
+  }
+  EXPECT_NEAR(static_cast<double>(bench.wire.truth().dropped), 10000 * 0.12 / 1.1, 250);
+}
+
+TEST(FaultyWire, GilbertElliottLosesItsShare) {
+  Bench bench(
+      Entries{{{"kind", "gilbert"}, {"at_s", "0"}, {"for_s", "60"}, {"p_good_bad", "0.01"}, {"p_bad_good", "0.09"}}});
+  bench.run(420000, 70);
+  EXPECT_NEAR(static_cast<double>(bench.wire.truth().dropped), 6000, 1000) << "a tenth of the time is bad";
+}
+
+TEST(FaultyWire, DuplicatesLater) {
+  Bench bench(Entries{{{"kind", "duplicate"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "0.0105"}}});
+  const auto arrived = bench.run(700);
+  ASSERT_EQ(arrived.size(), 101u);
+  EXPECT_EQ(rdt(arrived[11]), 1u);
+  EXPECT_EQ(arrived[11].at, arrived[0].at + 10500us);
+  EXPECT_EQ(bench.wire.truth().duplicated, 1u);
+  EXPECT_EQ(bench.wire.truth().log[0].arrivals, 2u);
+}
+
+TEST(FaultyWire, LetsTheNextOnesOvertake) {
+  Bench bench(Entries{{{"kind", "reorder"}, {"at_s", "0"}, {"count", "1"}, {"depth", "3"}}});
+  const auto arrived = bench.run(70);
+  EXPECT_EQ(rdt(arrived[2]), 4u);
+  EXPECT_EQ(rdt(arrived[3]), 1u);
+  EXPECT_EQ(rdt(arrived[4]), 5u);
+  EXPECT_EQ(bench.wire.truth().overtaken, 1u);
+}
+
+TEST(FaultyWire, HoldsNothingBackLongerThanTold) {
+  Bench bench(Entries{{{"kind", "reorder"}, {"at_s", "0"}, {"count", "1"}, {"depth", "900"}, {"delay_s", "0.02"}}});
+  const auto arrived = bench.run(700);
+  const auto first = std::find_if(arrived.begin(), arrived.end(), [](const Datagram& d) { return rdt(d) == 1; });
+  ASSERT_NE(first, arrived.end());
+  EXPECT_EQ(first->at, first->sampled[0] + 20ms);
+}
+
+TEST(FaultyWire, DelaysInOrder) {
+  Bench bench(
+      Entries{{{"kind", "delay"}, {"at_s", "0"}, {"for_s", "0.05"}, {"delay_s", "0.02"}, {"jitter_s", "0.01"}}});
+  const auto arrived = bench.run(1400);
+  ASSERT_EQ(arrived.size(), 200u);
+  for (std::size_t i = 1; i < arrived.size(); ++i) {
+    EXPECT_EQ(rdt(arrived[i]), rdt(arrived[i - 1]) + 1);
+    EXPECT_GE(arrived[i].at, arrived[i - 1].at);
+  }
+  EXPECT_GE(arrived[0].at - arrived[0].sampled[0], 20ms);
+  EXPECT_LE(arrived[0].at - arrived[0].sampled[0], 30ms);
+}
+
+TEST(FaultyWire, HoldsThenBursts) {
+  Bench bench(Entries{{{"kind", "hold"}, {"at_s", "0.1"}, {"for_s", "0.2"}}});
+  EXPECT_EQ(bench.run(2099).size(), 100u);
+  EXPECT_EQ(bench.wire.next_arrival(), 300ms);
+  const auto burst = bench.run(1);
+  EXPECT_EQ(burst.size(), 200u);
+  for (const Datagram& d : burst) EXPECT_EQ(d.at, 300ms);
+}
+
+TEST(FaultyWire, MakesUpWrongSizesAndForeigners) {
+  Bench bench(Entries{{{"kind", "wrong_size"}, {"at_s", "0"}, {"count", "2"}, {"size", "1476"}},
+                      {{"kind", "foreign_source"}, {"at_s", "0.05"}, {"count", "3"}}});
+  const auto arrived = bench.run(700);
+  EXPECT_EQ(std::count_if(arrived.begin(), arrived.end(), [](const Datagram& d) { return d.size == 1476; }), 2);
+  EXPECT_EQ(std::count_if(arrived.begin(), arrived.end(), [](const Datagram& d) { return d.foreign; }), 3);
+  EXPECT_EQ(arrived.size(), 105u);
+  EXPECT_EQ(bench.wire.truth().malformed, 2u);
+  EXPECT_EQ(bench.wire.truth().foreign, 3u);
+  EXPECT_EQ(bench.wire.truth().arrived, 100u);
+}
+
+TEST(FaultyWire, LosesDoublesAndDelaysStarts) {
+  Bench lost(Entries{{{"kind", "lost_start"}, {"at_s", "0"}, {"count", "1"}}});
+  EXPECT_TRUE(lost.run(70).empty());
+  lost.wire.request(kRealTime, kHost, lost.now);
+  EXPECT_EQ(lost.run(70).size(), 10u);
+  Bench doubled(Entries{{{"kind", "doubled_start"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "0.005"}}});
+  const auto arrived = doubled.run(70);
+  EXPECT_EQ(rdt(arrived[4]), 5u);
+  EXPECT_EQ(rdt(arrived[5]), 1u);
+  Bench delayed(Entries{{{"kind", "delayed_start"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "0.005"}}});
+  EXPECT_EQ(delayed.run(70).size(), 5u + 1u);
+  EXPECT_EQ(delayed.wire.truth().starts_delayed, 1u);
+}
+
+TEST(FaultyWire, AThiefLeavesOnlySilence) {
+  Bench bench(Entries{{{"kind", "stolen"}, {"at_s", "0.1"}}});
+  EXPECT_EQ(bench.run(7000).size(), 100u);
+  EXPECT_EQ(bench.wire.truth().to_others, 901u) << "from 0.1 s to 1 s, both included";
+  bench.wire.request(kRealTime, kHost, bench.now);
+  EXPECT_EQ(rdt(bench.run(7).at(0)), 1u);
+}
+
+TEST(FaultyWire, RebootsWithAndWithoutTheStream) {
+  Bench with(Entries{{{"kind", "reboot"}, {"at_s", "0.1"}, {"down_s", "0.1"}, {"resume", "true"}}});
+  const auto arrived = with.run(7000);
+  EXPECT_EQ(arrived.size(), 100u + 801u);
+  EXPECT_EQ(rdt(arrived[100]), 1u);
+  EXPECT_EQ(ft(arrived[100]), 0u);
+  EXPECT_EQ(arrived[100].boot, 1u);
+  Bench without(Entries{{{"kind", "reboot"}, {"at_s", "0.1"}, {"down_s", "0.1"}}});
+  EXPECT_EQ(without.run(1000).size(), 100u);
+  without.wire.request(kRealTime, kHost, without.now);
+  EXPECT_EQ(without.wire.truth().unheard, 1u) << "it is still down";
+  EXPECT_TRUE(without.wire.http_refused(without.now));
+  without.run(1000);
+  without.wire.request(kRealTime, kHost, without.now);
+  EXPECT_EQ(without.run(70).size(), 10u);
+}
+
+TEST(FaultyWire, StallsJumpsAndWraps) {
+  Bench stall(Entries{{{"kind", "stall"}, {"at_s", "0.05"}, {"for_s", "0.05"}}});
+  const auto stalled = stall.run(700);
+  EXPECT_EQ(ft(stalled[60]), ft(stalled[90]));
+  EXPECT_EQ(rdt(stalled[99]), 100u);
+  Bench jump(Entries{{{"kind", "ft_jump_back"}, {"at_s", "0.05"}, {"samples", "100"}}});
+  const auto jumped = jump.run(700);
+  EXPECT_EQ(ft(jumped[50]), ft(jumped[49]) + 7 - 100);
+  Bench wrap(Entries{{{"kind", "wrap"}, {"at_s", "0"}, {"samples", "70"}}});
+  const auto wrapped = wrap.run(700);
+  EXPECT_EQ(ft(wrapped[0]), 0u - 70u);
+  EXPECT_EQ(ft(wrapped[10]), 0u);
+}
+
+TEST(FaultyWire, ASkewedBoxTakesMoreSamplesAtItsOwnTimes) {
+  Bench bench(Entries{{{"kind", "clock_skew"}, {"at_s", "0"}, {"ppm", "500"}}});
+  const auto arrived = bench.run(70000, 70);
+  EXPECT_EQ(arrived.size(), 10005u);
+  const double period_us = 1e6 * to_seconds(arrived[10000].sampled[0] - arrived[0].sampled[0]) / 10000;
+  EXPECT_NEAR(period_us, 1000 / 1.0005, 1e-4);
+  for (std::size_t i = 1; i < arrived.size(); ++i) {
+    ASSERT_NEAR(1e6 * to_seconds(arrived[i].sampled[0] - arrived[i - 1].sampled[0]), 1000 / 1.0005, 0.004) << i;
+  }
+}
+
+TEST(FaultyWire, StatusSaturationAndUnits) {
+  Bench bench(Entries{{{"kind", "status"}, {"at_s", "0.02"}, {"for_s", "0.01"}, {"bits", "0x80400000"}},
+                      {{"kind", "status"}, {"at_s", "0.04"}, {"for_s", "0.01"}, {"bits", "0x10"}, {"latched", "1"}},
+                      {{"kind", "saturation"}, {"at_s", "0.06"}, {"for_s", "0.01"}, {"axes", "4"}},
+                      {{"kind", "units"}, {"at_s", "0.08"}, {"force_unit", "6"}}});
+  const auto arrived = bench.run(700);
+  const auto status = [&](std::size_t i) {
+    return arrived[i].bytes[8] << 24 | arrived[i].bytes[9] << 16 | arrived[i].bytes[11];
+  };
+  EXPECT_EQ(status(10), 0);
+  EXPECT_EQ(static_cast<std::uint32_t>(status(25)), 0x80400000u);
+  EXPECT_EQ(status(35), 0);
+  EXPECT_EQ(status(45), 0x10);
+  EXPECT_EQ(status(55), 0x10);
+  EXPECT_EQ(static_cast<std::uint32_t>(status(65)), 0x80020010u);
+  EXPECT_EQ(bench.box.signal().counts()[2], 102) << "1 N in gf";
+}
+
+TEST(FaultyWire, SpoilsThePages) {
+  Bench bench(Entries{{{"kind", "http_status"}, {"at_s", "0"}, {"count", "1"}, {"code", "500"}},
+                      {{"kind", "http_truncated"}, {"at_s", "0.01"}, {"for_s", "0.01"}, {"size", "20"}},
+                      {{"kind", "http_oversized"}, {"at_s", "0.03"}, {"for_s", "0.01"}, {"size", "65536"}},
+                      {{"kind", "http_slow"}, {"at_s", "0.05"}, {"for_s", "0.01"}, {"delay_s", "2"}},
+                      {{"kind", "http_refused"}, {"at_s", "0.07"}, {"for_s", "0.01"}}});
+  const auto get = [&](Instant at) { return bench.wire.http("GET /netftapi2.xml HTTP/1.0", at); };
+  EXPECT_EQ(get(0ms).bytes.substr(0, 12), "HTTP/1.0 500");
+  EXPECT_EQ(get(1ms).bytes.substr(0, 12), "HTTP/1.0 200");
+  EXPECT_EQ(get(15ms).bytes.size(), 20u);
+  EXPECT_GT(get(35ms).bytes.size(), 65536u);
+  EXPECT_EQ(get(55ms).wait, 2s);
+  EXPECT_TRUE(bench.wire.http_refused(75ms));
+  EXPECT_FALSE(bench.wire.http_refused(85ms));
+  EXPECT_EQ(bench.wire.truth().http_spoilt, 4u);
+}
+
+std::vector<std::uint8_t> everything(std::uint64_t seed, int step) {
+  Bench bench(Entries{{{"kind", "loss"}, {"at_s", "0.1"}, {"for_s", "1"}, {"p", "0.1"}, {"burst", "2"}},
+                      {{"kind", "reorder"}, {"at_s", "0.1"}, {"for_s", "1"}, {"p", "0.1"}, {"depth", "3"}},
+                      {{"kind", "duplicate"}, {"at_s", "0.3"}, {"for_s", "1"}, {"p", "0.1"}, {"delay_s", "0.0123"}},
+                      {{"kind", "delay"}, {"at_s", "0.5"}, {"for_s", "1"}, {"delay_s", "0.01"}, {"jitter_s", "0.01"}},
+                      {{"kind", "wrong_size"}, {"at_s", "0.5"}, {"for_s", "1"}, {"p", "0.1"}, {"size", "37"}},
+                      {{"kind", "clock_skew"}, {"at_s", "0"}, {"ppm", "60"}, {"wander_ppm", "1"}},
+                      {{"kind", "reboot"}, {"at_s", "1.6"}, {"down_s", "0.1"}, {"resume", "1"}}},
+              seed);
+  std::vector<std::uint8_t> out;
+  for (const Datagram& d : bench.run(14000, step)) {
+    out.insert(out.end(), d.payload().begin(), d.payload().end());
+    for (int shift = 0; shift < 64; shift += 8) out.push_back(static_cast<std::uint8_t>(d.at.count() >> shift));
+  }
+  return out;
+}
+
+TEST(FaultyWire, SameSeedSameBytesAtTheSameTimes) {
+  EXPECT_EQ(everything(1, 1), everything(1, 1));
+  EXPECT_NE(everything(1, 1), everything(2, 1));
+}
+
+TEST(FaultyWire, DoesNotDependOnHowOftenItIsAsked) { EXPECT_EQ(everything(3, 1), everything(3, 500)); }
+
+TEST(FaultyWire, TellsTheTruthLineByLine) {
+  Bench bench(
+      {{{"kind", "loss"}, {"at_s", "0.1"}, {"count", "2"}}, {{"kind", "stall"}, {"at_s", "0.2"}, {"for_s", "0.1"}}}, 1,
+      Keep::datagrams);
+  bench.run(7000);
+  std::istringstream lines(json_lines(bench.wire.truth()));
+  std::vector<nlohmann::json> all;
+  for (std::string line; std::getline(lines, line);) all.push_back(nlohmann::json::parse(line));
+  ASSERT_EQ(all.size(), 2u + 1000u + 1u);
+  EXPECT_EQ(all[0]["event"], "stall begins");
+  EXPECT_EQ(all[1]["at_ns"], 300'000'000);
+  EXPECT_EQ(all[2]["first_rdt"], 1);
+  EXPECT_EQ(all.back()["totals"]["dropped"], 2);
+  EXPECT_EQ(std::count_if(all.begin() + 2, all.end() - 1, [](const auto& d) { return d["arrivals"] == 0; }), 2);
+}
+
+}  // namespace
+}  // namespace kphi::sim
