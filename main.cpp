@@ -22,7 +22,15 @@
 
 namespace {
 
-enum ExitCode { kOk = 0, kFailure = 1, kUsage = 2, kNoDevice = 3, kSafetyStop = 4, kDataRejected = 5, kInterrupted = 130 };
+enum ExitCode {
+  kOk = 0,
+  kFailure = 1,
+  kUsage = 2,
+  kNoDevice = 3,
+  kSafetyStop = 4,
+  kDataRejected = 5,
+  kInterrupted = 130
+};
 
 constexpr const char* kFooter =
     "Exit codes: 0 ok, 1 failure, 2 usage or configuration, 3 device not found, 4 safety stop,\n"
@@ -41,7 +49,8 @@ int complain(const std::exception& error, int exit_code) {
 std::string nearest_command(const CLI::App& program, const std::string& word) {
   for (const CLI::App* command : program.get_subcommands({})) {
     const std::string& name = command->get_name();
-    if (name.starts_with(word.substr(0, 3)) || name.ends_with(word.substr(word.size() - std::min<std::size_t>(3, word.size())))) {
+    if (name.starts_with(word.substr(0, 3)) ||
+        name.ends_with(word.substr(word.size() - std::min<std::size_t>(3, word.size())))) {
       return name;
     }
   }
@@ -53,7 +62,8 @@ int usage_error(const CLI::App& program, const CLI::ParseError& error, int argc,
   fmt::print(stderr, "kphi: {}\n", error.what());
   if (argc > 1 && argv[1][0] != '-' && program.get_subcommands().empty()) {
     const std::string nearest = nearest_command(program, argv[1]);
-    fmt::print(stderr, "\"{}\" is no command{}\n", argv[1], nearest.empty() ? "" : "; did you mean \"" + nearest + "\"?");
+    fmt::print(stderr, "\"{}\" is no command{}\n", argv[1],
+               nearest.empty() ? "" : "; did you mean \"" + nearest + "\"?");
   }
   fmt::print(stderr, "kphi --help lists the commands\n");
   return kUsage;

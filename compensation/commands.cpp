@@ -80,9 +80,8 @@ int compensate(const Request& request) {
 
 void add_compensate(CLI::App& program, int& exit_code) {
   auto request = std::make_shared<Request>();
-  CLI::App* command =
-      program.add_subcommand("compensate",
-                             "CSV of arm angles and thrusts on stdin → occlusions, k_i and rotor speeds on stdout");
+  CLI::App* command = program.add_subcommand(
+      "compensate", "CSV of arm angles and thrusts on stdin → occlusions, k_i and rotor speeds on stdout");
   command->footer("Columns: theta1_deg … theta4_deg, thrust1_n … thrust4_n; others are ignored.");
   command->add_option("--coefficients", request->coefficients, "coefficients.yaml of `kphi fit`")->required();
   command->add_option("--vehicle", request->vehicle, "Vehicle file, e.g. profiles/foldable_drone.yaml")->required();

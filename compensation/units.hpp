@@ -34,16 +34,16 @@ class Quantity {
   double value_ = 0.0;
 };
 
-using Newtons = Quantity<struct NewtonUnit>;                      ///< N
-using NewtonMetres = Quantity<struct NewtonMetreUnit>;            ///< N m
-using RadPerSec = Quantity<struct RadPerSecUnit>;                 ///< rad/s
-using Radians = Quantity<struct RadianUnit>;                      ///< rad
-using ThrustCoefficient = Quantity<struct ThrustCoefficientUnit>; ///< N/(rad/s)²
-using Seconds = Quantity<struct SecondUnit>;                      ///< s
-using Metres = Quantity<struct MetreUnit>;                        ///< m
-using Volts = Quantity<struct VoltUnit>;                          ///< V
-using Amperes = Quantity<struct AmpereUnit>;                      ///< A
-using Celsius = Quantity<struct CelsiusUnit>;                     ///< °C
+using Newtons = Quantity<struct NewtonUnit>;                       ///< N
+using NewtonMetres = Quantity<struct NewtonMetreUnit>;             ///< N m
+using RadPerSec = Quantity<struct RadPerSecUnit>;                  ///< rad/s
+using Radians = Quantity<struct RadianUnit>;                       ///< rad
+using ThrustCoefficient = Quantity<struct ThrustCoefficientUnit>;  ///< N/(rad/s)²
+using Seconds = Quantity<struct SecondUnit>;                       ///< s
+using Metres = Quantity<struct MetreUnit>;                         ///< m
+using Volts = Quantity<struct VoltUnit>;                           ///< V
+using Amperes = Quantity<struct AmpereUnit>;                       ///< A
+using Celsius = Quantity<struct CelsiusUnit>;                      ///< °C
 
 /// 1 RPM in rad/s.
 inline constexpr double kRadPerSecPerRpm = kPi / 30.0;

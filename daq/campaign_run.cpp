@@ -59,7 +59,8 @@ class CampaignRun {
     if (planned.occlusion_deg != mounted_deg_) mount(planned.occlusion_deg);
     const auto file = folder_.run(campaign_.propeller.id, planned.occlusion_deg, planned.repetition);
     const double per_run_s = plan_.bench.value() / static_cast<double>(plan_.runs.size());
-    const double remaining_s = per_run_s * static_cast<double>(plan_.runs.size() - static_cast<std::size_t>(result_.runs));
+    const double remaining_s =
+        per_run_s * static_cast<double>(plan_.runs.size() - static_cast<std::size_t>(result_.runs));
     try {
       const RunOrder order{campaign_, place_, planned.occlusion_deg, planned.repetition, remaining_s, file};
       accept(record_run(bench_, order, progress_, stop_asked_));

@@ -22,8 +22,9 @@ struct CampaignResult {
 
 /// Runs everything in order into `folder`. Each finished run is hashed in the journal and its step means are in
 /// steps.csv before the next begins. Throws what record_run and Operator::mount throw; the journal then holds why.
-[[nodiscard]] CampaignResult run_campaign(Bench& bench, const profiles::Campaign& campaign, const profiles::Bench& place,
-                                          const results::CampaignFolder& folder, Operator& person, Progress& progress,
+[[nodiscard]] CampaignResult run_campaign(Bench& bench, const profiles::Campaign& campaign,
+                                          const profiles::Bench& place, const results::CampaignFolder& folder,
+                                          Operator& person, Progress& progress,
                                           const std::function<bool()>& stop_asked);
 
 }  // namespace kphi::daq

@@ -35,11 +35,11 @@ std::uint64_t bytes_needed(const profiles::Plan& plan, const profiles::Bench& pl
 }
 
 nlohmann::json plan_json(const profiles::Campaign& campaign, const profiles::Bench& place, const profiles::Plan& plan) {
-  return {{"campaign", campaign.name},          {"propeller", campaign.propeller.id},
-          {"runs", plan.runs.size()},           {"mountings", plan.mountings},
-          {"steps", plan.steps},                {"spinning_s", plan.spinning.value()},
-          {"bench_s", plan.bench.value()},      {"time_scale", time_scale(place)},
-          {"samples", plan.samples},            {"bytes", bytes_needed(plan, place)}};
+  return {{"campaign", campaign.name},     {"propeller", campaign.propeller.id},
+          {"runs", plan.runs.size()},      {"mountings", plan.mountings},
+          {"steps", plan.steps},           {"spinning_s", plan.spinning.value()},
+          {"bench_s", plan.bench.value()}, {"time_scale", time_scale(place)},
+          {"samples", plan.samples},       {"bytes", bytes_needed(plan, place)}};
 }
 
 std::string plan_text(const profiles::Campaign& campaign, const profiles::Bench& place, const profiles::Plan& plan) {
@@ -62,8 +62,9 @@ bool stop_asked() { return SignalWatch::count() > 0; }
 std::unique_ptr<Operator> person(const RunOptions& options) {
   if (options.yes) return std::make_unique<AgreeingOperator>();
   if (!isatty(STDIN_FILENO)) {
-    throw ConfigurationError("kphi run: nobody to ask for the mountings: standard input is no terminal; use --yes if "
-                             "the bench mounts by itself");
+    throw ConfigurationError(
+        "kphi run: nobody to ask for the mountings: standard input is no terminal; use --yes if "
+        "the bench mounts by itself");
   }
   return std::make_unique<TerminalOperator>(STDIN_FILENO, stderr, stop_asked);
 }
@@ -97,8 +98,10 @@ int run(const RunOptions& options) {
   profiles::require_within(campaign, place);
   const profiles::Plan plan = profiles::make_plan(campaign, place);
   if (options.dry_run) {
-    if (options.json) fmt::print("{}\n", plan_json(campaign, place, plan).dump());
-    else fmt::print("{}\n", plan_text(campaign, place, plan));
+    if (options.json)
+      fmt::print("{}\n", plan_json(campaign, place, plan).dump());
+    else
+      fmt::print("{}\n", plan_text(campaign, place, plan));
     return 0;
   }
   fmt::print(stderr, "{}\nCtrl-C lets the motor coast, closes the file and stops.\n", plan_text(campaign, place, plan));

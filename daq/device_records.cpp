@@ -6,13 +6,20 @@ namespace {
 results::MotorChannel channel_of(iq::Quantity quantity) noexcept {
   using results::MotorChannel;
   switch (quantity) {
-    case iq::Quantity::speed: return MotorChannel::speed;
-    case iq::Quantity::supply_voltage: return MotorChannel::supply_voltage;
-    case iq::Quantity::supply_current: return MotorChannel::supply_current;
-    case iq::Quantity::motor_current: return MotorChannel::motor_current;
-    case iq::Quantity::coil_temperature: return MotorChannel::coil_temperature;
-    case iq::Quantity::derate: return MotorChannel::derate;
-    case iq::Quantity::drive_mode: return MotorChannel::drive_mode;
+    case iq::Quantity::speed:
+      return MotorChannel::speed;
+    case iq::Quantity::supply_voltage:
+      return MotorChannel::supply_voltage;
+    case iq::Quantity::supply_current:
+      return MotorChannel::supply_current;
+    case iq::Quantity::motor_current:
+      return MotorChannel::motor_current;
+    case iq::Quantity::coil_temperature:
+      return MotorChannel::coil_temperature;
+    case iq::Quantity::derate:
+      return MotorChannel::derate;
+    case iq::Quantity::drive_mode:
+      return MotorChannel::drive_mode;
   }
   return MotorChannel::speed;
 }

@@ -26,7 +26,8 @@ std::optional<Trip> check(const Observation& seen, const profiles::Limits& limit
   if (auto trip = above("coil temperature", seen.coil_temperature.value(), limits.coil_temperature_max.value(), "°C")) {
     return trip;
   }
-  if (auto trip = above("age of the newest load-cell sample", to_seconds(seen.load_cell_age), to_seconds(patience), "s")) {
+  if (auto trip =
+          above("age of the newest load-cell sample", to_seconds(seen.load_cell_age), to_seconds(patience), "s")) {
     return trip;
   }
   return above("age of the newest motor reading", to_seconds(seen.motor_age), to_seconds(patience), "s");

@@ -12,8 +12,8 @@ namespace kphi::daq {
 
 /// What the bench shows at one moment. A negative age: nothing came yet.
 struct Observation {
-  RadPerSec speed;          ///< unsigned
-  Newtons thrust;           ///< zero subtracted
+  RadPerSec speed;  ///< unsigned
+  Newtons thrust;   ///< zero subtracted
   Amperes supply_current;
   Celsius coil_temperature;
   Duration load_cell_age{};

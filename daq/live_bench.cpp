@@ -72,9 +72,10 @@ results::LoadCellScale LiveLoadCell::start() {
   cell_ = std::make_unique<netbox::LoadCell>(netbox::Place{place_.host, place_.rdt_port, place_.http_port}, clock_);
   const netbox::Configuration& found = cell_->configuration();
   if (std::abs(found.rdt_rate_hz - place_.rate_hz) > 0.5) {
-    throw DeviceError("Net Box " + place_.host, "compare settings",
-                      fmt::format("it streams at {:g} Hz, the bench file says {:g} Hz", found.rdt_rate_hz, place_.rate_hz),
-                      "set the RDT output rate on the box's communication page or rate_hz in the bench file");
+    throw DeviceError(
+        "Net Box " + place_.host, "compare settings",
+        fmt::format("it streams at {:g} Hz, the bench file says {:g} Hz", found.rdt_rate_hz, place_.rate_hz),
+        "set the RDT output rate on the box's communication page or rate_hz in the bench file");
   }
   cell_->start();
   return to_scale(found);
@@ -91,9 +92,12 @@ std::size_t LiveLoadCell::take(std::span<results::LoadCellRecord> out) {
 
 std::string LiveLoadCell::failure() const {
   switch (cell_->state()) {
-    case netbox::State::silent: return "load cell: the stream fell silent";
-    case netbox::State::failed: return "load cell: the stream could not be started again";
-    default: return "";
+    case netbox::State::silent:
+      return "load cell: the stream fell silent";
+    case netbox::State::failed:
+      return "load cell: the stream could not be started again";
+    default:
+      return "";
   }
 }
 
@@ -118,7 +122,8 @@ Duration LiveBench::sync_interval() const { return clock_.stretched(kSyncWall); 
 
 void LiveBench::mounted(const std::string& propeller_id, double occlusion_deg) {
   if (!place_.simulation || place_.simulation->control.empty()) return;
-  const std::string answer = sim::tell(place_.simulation->control, fmt::format("mount {} {:g}", propeller_id, occlusion_deg));
+  const std::string answer =
+      sim::tell(place_.simulation->control, fmt::format("mount {} {:g}", propeller_id, occlusion_deg));
   if (!answer.starts_with("ok")) throw DeviceError("simulated bench", "mount", answer);
 }
 

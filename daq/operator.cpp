@@ -6,7 +6,6 @@
 #include <cerrno>
 #include <charconv>
 
-
 namespace kphi::daq {
 namespace {
 
@@ -33,7 +32,8 @@ std::string TerminalOperator::read_line() {
 }
 
 void TerminalOperator::mount(const profiles::Propeller& propeller, double occlusion_deg) {
-  const std::string what = occlusion_deg == 0 ? std::string("no occlusion") : fmt::format("the {:g}° occlusion", occlusion_deg);
+  const std::string what =
+      occlusion_deg == 0 ? std::string("no occlusion") : fmt::format("the {:g}° occlusion", occlusion_deg);
   fmt::print(words_, "\nMount {} under propeller {} ({}). The motor is locked. Step back, then\n", what, propeller.id,
              propeller.name);
   for (;;) {

@@ -31,12 +31,10 @@ std::string cut(const std::string& line, std::size_t columns) {
 }  // namespace
 
 std::string describe(const Position& position, const Observation& seen) {
-  const std::string where =
-      fmt::format("{}  φ {:3g}°  rep {}/{}", position.propeller, position.occlusion_deg, position.repetition,
-                  position.repetitions);
-  const std::string what = position.step < 0
-                               ? fmt::format("{:<10}", position.phase)
-                               : fmt::format("step {:2}/{}", position.step + 1, position.steps);
+  const std::string where = fmt::format("{}  φ {:3g}°  rep {}/{}", position.propeller, position.occlusion_deg,
+                                        position.repetition, position.repetitions);
+  const std::string what = position.step < 0 ? fmt::format("{:<10}", position.phase)
+                                             : fmt::format("step {:2}/{}", position.step + 1, position.steps);
   return fmt::format("{}  {}  cmd {:5.0f}  is {:5.0f} RPM  thrust {:6.3f} N  left {}", where, what,
                      to_rpm(position.commanded), to_rpm(seen.speed), seen.thrust.value(),
                      minutes_and_seconds(position.remaining_s));

@@ -14,12 +14,12 @@ namespace kphi::daq {
 struct Position {
   std::string propeller;
   double occlusion_deg = 0;
-  int repetition = 0;   ///< 1-based
+  int repetition = 0;  ///< 1-based
   int repetitions = 0;
-  int step = -1;        ///< 0-based; -1 outside steps
+  int step = -1;  ///< 0-based; -1 outside steps
   int steps = 0;
-  std::string phase;    ///< "zero", "spin down"; empty in a step
-  RadPerSec commanded;  ///< unsigned
+  std::string phase;       ///< "zero", "spin down"; empty in a step
+  RadPerSec commanded;     ///< unsigned
   double remaining_s = 0;  ///< of the campaign, as a person's clock runs
 };
 

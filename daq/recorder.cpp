@@ -84,12 +84,8 @@ void Recorder::mark(results::Phase phase, int step, RadPerSec commanded) {
 void Recorder::take_zero() noexcept { zero_n_ = phase_mean_n_.load(); }
 
 Observation Recorder::observe(Instant now) const noexcept {
-  return {RadPerSec(speed_rad_s_),
-          Newtons(thrust_n_ - zero_n_),
-          Amperes(supply_current_a_),
-          Celsius(coil_temperature_degc_),
-          now - Instant(load_cell_ns_),
-          now - Instant(motor_ns_)};
+  return {RadPerSec(speed_rad_s_),         Newtons(thrust_n_ - zero_n_), Amperes(supply_current_a_),
+          Celsius(coil_temperature_degc_), now - Instant(load_cell_ns_), now - Instant(motor_ns_)};
 }
 
 void Recorder::check_failure() {

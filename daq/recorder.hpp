@@ -13,7 +13,7 @@ namespace kphi::daq {
 
 /// How thrust is read off the six axes.
 struct ThrustAxis {
-  int axis = 2;      ///< 0..2 = Fx, Fy, Fz
+  int axis = 2;  ///< 0..2 = Fx, Fy, Fz
   int sign = +1;
   double counts_per_newton = 1e6;
 };

@@ -184,8 +184,7 @@ std::string utc_text(const Clock& clock, Instant when) {
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(seconds)));
 }
 
-RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress,
-                     const std::function<bool()>& stop_asked) {
+RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, const std::function<bool()>& stop_asked) {
   std::optional<Streaming> streaming(std::in_place, bench.load_cell());
   results::RunWriter writer(order.file, header_of(order, bench, streaming->scale()), bench.files());
   Recorder recorder(bench, writer,

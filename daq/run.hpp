@@ -18,9 +18,9 @@ struct RunOrder {
   const profiles::Campaign& campaign;
   const profiles::Bench& place;
   double occlusion_deg = 0;
-  int repetition = 1;                ///< 1-based
-  double remaining_bench_s = 0;      ///< of the campaign, this run included
-  std::filesystem::path file;        ///< final path
+  int repetition = 1;            ///< 1-based
+  double remaining_bench_s = 0;  ///< of the campaign, this run included
+  std::filesystem::path file;    ///< final path
 };
 
 struct RunResult {

@@ -3,7 +3,9 @@
 namespace kphi {
 namespace {
 
-std::int64_t nanoseconds(const timespec& t) noexcept { return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec; }
+std::int64_t nanoseconds(const timespec& t) noexcept {
+  return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
+}
 
 std::int64_t read(clockid_t id) noexcept {
   timespec t{};

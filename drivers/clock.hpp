@@ -16,7 +16,9 @@ using Instant = std::chrono::nanoseconds;
 /// Later than anything: the deadline of who waits for nothing.
 inline constexpr Instant kNever = Instant::max();
 
-[[nodiscard]] constexpr double to_seconds(Duration duration) noexcept { return 1e-9 * static_cast<double>(duration.count()); }
+[[nodiscard]] constexpr double to_seconds(Duration duration) noexcept {
+  return 1e-9 * static_cast<double>(duration.count());
+}
 [[nodiscard]] constexpr Duration from_seconds(double seconds) noexcept {
   return Duration(static_cast<std::int64_t>(seconds * 1e9 + (seconds < 0 ? -0.5 : 0.5)));
 }

@@ -61,7 +61,8 @@ std::string head(const Identification& identification, const Provenance& provena
       "propeller: {{id: {}, name: {}, diameter_in: {}, blades: {}}}\n"
       "k_unit: N/(rad/s)^2\n"
       "overlap: rim_arc\n",
-      provenance.measured_utc.empty() ? "unknown" : quoted(provenance.measured_utc), quoted(provenance.tool_version), quoted(identification.propeller),
+      provenance.measured_utc.empty() ? "unknown" : quoted(provenance.measured_utc), quoted(provenance.tool_version),
+      quoted(identification.propeller),
       quoted(provenance.propeller_name.empty() ? identification.propeller : provenance.propeller_name),
       known_if_positive(identification.diameter_in), blades);
 }

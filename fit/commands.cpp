@@ -62,14 +62,16 @@ struct FitRequest {
 void take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
   if (fs::exists(folder.journal())) {
     for (const results::JournalEntry& entry : results::read_journal(folder.journal()).entries) {
-      if (entry.event != results::kRunAccepted || !entry.data.contains("file") || !entry.data.contains("sha256")) continue;
+      if (entry.event != results::kRunAccepted || !entry.data.contains("file") || !entry.data.contains("sha256"))
+        continue;
       provenance.runs.push_back({entry.data["file"], entry.data["sha256"], "", std::nullopt});
       provenance.measured_utc = entry.utc;
     }
     return;
   }
   for (const fs::path& run : folder.complete_runs())
-    provenance.runs.push_back({fs::relative(run, folder.path()).string(), results::sha256_of_file(run), "", std::nullopt});
+    provenance.runs.push_back(
+        {fs::relative(run, folder.path()).string(), results::sha256_of_file(run), "", std::nullopt});
 }
 
 Input campaign_input(const fs::path& path) {
@@ -111,7 +113,8 @@ Input file_input(const fs::path& path) {
 Input load(const std::string& path) {
   const bool campaign = fs::exists(fs::path(path) / "journal.jsonl") || fs::exists(fs::path(path) / "runs");
   if (fs::is_directory(path) && !campaign && !fs::exists(fs::path(path) / "steps.csv")) {
-    throw ConfigurationError(path + ": holds no campaign and no steps.csv; name a folder that kphi run or kphi import made");
+    throw ConfigurationError(path +
+                             ": holds no campaign and no steps.csv; name a folder that kphi run or kphi import made");
   }
   Input input = campaign                 ? campaign_input(path)
                 : fs::is_directory(path) ? file_input(fs::path(path) / "steps.csv")

@@ -46,7 +46,8 @@ void check(herr_t status, const std::string& doing);
 [[nodiscard]] int descriptor_of(const Handle& file);
 /// Bytes the file has or will have when HDF5 has written what it holds back.
 [[nodiscard]] std::uint64_t size_of(const Handle& file);
-/// HDF5 prints its errors on stderr unless told not to, by every thread that calls it. Creating and opening files does so.
+/// HDF5 prints its errors on stderr unless told not to, by every thread that calls it. Creating and opening files does
+/// so.
 void be_quiet() noexcept;
 /// From here on nothing HDF5 writes reaches the file; it can then be closed without changing a byte.
 void sever(const Handle& file) noexcept;

@@ -34,8 +34,8 @@ enum class MotorChannel : std::uint8_t {
 
 struct MotorChannelInfo {
   MotorChannel channel;
-  const char* name;       ///< the group's name in the file
-  const char* unit;       ///< UDUNITS spelling
+  const char* name;  ///< the group's name in the file
+  const char* unit;  ///< UDUNITS spelling
   const char* long_name;
 };
 
@@ -61,27 +61,27 @@ enum class Phase : std::uint8_t { zero_before, step, spin_down, zero_after, end 
 
 struct PhaseMark {
   Phase phase{};
-  int step = -1;              ///< 0-based, -1 outside steps
-  Nanoseconds time_ns = 0;    ///< begin of the phase
-  double speed_rad_s = 0;     ///< commanded, unsigned
+  int step = -1;            ///< 0-based, -1 outside steps
+  Nanoseconds time_ns = 0;  ///< begin of the phase
+  double speed_rad_s = 0;   ///< commanded, unsigned
 };
 
 /// How counts become newtons: read from the box at the start of the run.
 struct LoadCellScale {
   double counts_per_newton = 1e6;
   double counts_per_newton_metre = 1e6;
-  double sample_rate_hz = 7000;       ///< nominal rate of records
-  std::uint32_t ft_stride = 1;        ///< ft_sequence counts per record
-  double device_rate_hz = 7000;       ///< rate at which ft_sequence counts
-  std::array<double, 6> range{};      ///< N and N m
-  std::string serial;                 ///< of the calibration
-  std::string configuration_xml;      ///< verbatim
+  double sample_rate_hz = 7000;   ///< nominal rate of records
+  std::uint32_t ft_stride = 1;    ///< ft_sequence counts per record
+  double device_rate_hz = 7000;   ///< rate at which ft_sequence counts
+  std::array<double, 6> range{};  ///< N and N m
+  std::string serial;             ///< of the calibration
+  std::string configuration_xml;  ///< verbatim
 };
 
 /// Everything about a run that is known before the motor turns.
 struct RunHeader {
   std::string uuid;
-  std::string started_utc;            ///< ISO 8601, Z
+  std::string started_utc;  ///< ISO 8601, Z
   std::string tool_version;
   std::string campaign_name;
   std::string campaign_text;
@@ -92,25 +92,25 @@ struct RunHeader {
   double diameter_in = 0;
   int blades = 0;
   double occlusion_deg = 0;
-  int repetition = 0;                 ///< 1-based
-  int thrust_axis = 2;                ///< 0..2
+  int repetition = 0;   ///< 1-based
+  int thrust_axis = 2;  ///< 0..2
   int thrust_sign = +1;
   int spin = +1;
   double minimum_discard_s = 0;
   LoadCellScale load_cell;
-  std::string motor_identity;         ///< one line: firmware, hardware, uid
+  std::string motor_identity;  ///< one line: firmware, hardware, uid
 };
 
 /// How many samples there should be and are. received + lost_network + lost_host = expected, exactly.
 struct SampleAccount {
-  std::uint64_t expected = 0;      ///< by ft_sequence, first to last
-  std::uint64_t received = 0;      ///< in the file
+  std::uint64_t expected = 0;  ///< by ft_sequence, first to last
+  std::uint64_t received = 0;  ///< in the file
   std::uint64_t lost_network = 0;
-  std::uint64_t lost_host = 0;     ///< dropped by the socket (SO_RXQ_OVFL) or a full queue
-  std::uint64_t duplicates = 0;    ///< discarded
-  std::uint64_t late = 0;          ///< discarded
-  std::uint64_t malformed = 0;     ///< datagrams of a wrong size
-  std::uint64_t restarts = 0;      ///< of the stream
+  std::uint64_t lost_host = 0;   ///< dropped by the socket (SO_RXQ_OVFL) or a full queue
+  std::uint64_t duplicates = 0;  ///< discarded
+  std::uint64_t late = 0;        ///< discarded
+  std::uint64_t malformed = 0;   ///< datagrams of a wrong size
+  std::uint64_t restarts = 0;    ///< of the stream
 };
 
 enum class Outcome : std::uint8_t { complete, aborted };

@@ -24,25 +24,25 @@ struct StepMean {
   int blades = 0;
   double diameter_in = 0;
   double occlusion_deg = 0;
-  int repetition = 0;             ///< 1-based; 0 in an average over repetitions
-  int step = 0;                   ///< 0-based
+  int repetition = 0;  ///< 1-based; 0 in an average over repetitions
+  int step = 0;        ///< 0-based
   double commanded_speed_rad_s = 0;
-  double speed_rad_s = 0;         ///< mean, unsigned
+  double speed_rad_s = 0;  ///< mean, unsigned
   double speed_sd_rad_s = 0;
   std::uint64_t speed_n = 0;
-  double thrust_n = 0;            ///< mean, zero subtracted, N
+  double thrust_n = 0;  ///< mean, zero subtracted, N
   double thrust_sd_n = 0;
   std::uint64_t thrust_samples = 0;
-  double torque_nm = 0;           ///< mean about the thrust axis, zero subtracted
+  double torque_nm = 0;  ///< mean about the thrust axis, zero subtracted
   double torque_sd_nm = 0;
-  double zero_n = 0;              ///< zero that was subtracted from the thrust at this step
+  double zero_n = 0;  ///< zero that was subtracted from the thrust at this step
   double supply_voltage_v = 0;
   double supply_current_a = 0;
   double motor_current_a = 0;
   double coil_temperature_degc = 0;
-  double window_begin_s = 0;      ///< since the run's epoch
+  double window_begin_s = 0;  ///< since the run's epoch
   double window_end_s = 0;
-  std::uint32_t doubts = 0;       ///< bits of Doubt
+  std::uint32_t doubts = 0;  ///< bits of Doubt
 };
 
 }  // namespace kphi::results

@@ -21,9 +21,10 @@ class Motor {
   static constexpr Duration kLease = std::chrono::milliseconds(500);
 
   /// Opens the port exclusively and connects (coasting first); blocks for at most 10 s, usually some 50 ms. Deadlines
-  /// of the protocol are wall time: `settings.reply_timeout` 0 becomes clock.stretched(100 ms), wire_byte_time 0 becomes
-  /// 10/baud. module_timeout_s goes to the module as it is: its seconds are its own. Throws DeviceError: port missing, forbidden or in use, no
-  /// module answers, the module refused its communication timeout. `clock` must outlive the motor.
+  /// of the protocol are wall time: `settings.reply_timeout` 0 becomes clock.stretched(100 ms), wire_byte_time 0
+  /// becomes 10/baud. module_timeout_s goes to the module as it is: its seconds are its own. Throws DeviceError: port
+  /// missing, forbidden or in use, no module answers, the module refused its communication timeout. `clock` must
+  /// outlive the motor.
   Motor(std::string device, unsigned baud, Settings settings, const Clock& clock);
   /// Coasts three times, waits at most 0.6 s for drive mode coast, closes.
   ~Motor();

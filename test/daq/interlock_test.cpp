@@ -51,8 +51,10 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"Temperature", [](Observation& o) { o.coil_temperature = Celsius(111); }, "coil temperature 111 °C"},
         Case{"SilentLoadCell", [](Observation& o) { o.load_cell_age = milliseconds(501); }, "load-cell sample 0.501 s"},
         Case{"SilentMotor", [](Observation& o) { o.motor_age = milliseconds(700); }, "motor reading 0.7 s"},
-        Case{"SpeedNotANumber", [](Observation& o) { o.speed = RadPerSec(std::numeric_limits<double>::quiet_NaN()); }, "speed"},
-        Case{"ThrustNotANumber", [](Observation& o) { o.thrust = Newtons(std::numeric_limits<double>::quiet_NaN()); }, "thrust"}),
+        Case{"SpeedNotANumber", [](Observation& o) { o.speed = RadPerSec(std::numeric_limits<double>::quiet_NaN()); },
+             "speed"},
+        Case{"ThrustNotANumber", [](Observation& o) { o.thrust = Newtons(std::numeric_limits<double>::quiet_NaN()); },
+             "thrust"}),
     [](const testing::TestParamInfo<Case>& tested) { return std::string(tested.param.name); });
 
 }  // namespace

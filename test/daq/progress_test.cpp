@@ -33,8 +33,10 @@ std::string printed(void (*talk)(Progress&), bool terminal) {
   std::size_t size = 0;
   std::FILE* stream = open_memstream(&text, &size);
   std::unique_ptr<Progress> progress;
-  if (terminal) progress = std::make_unique<TerminalProgress>(stream);
-  else progress = std::make_unique<PlainProgress>(stream);
+  if (terminal)
+    progress = std::make_unique<TerminalProgress>(stream);
+  else
+    progress = std::make_unique<PlainProgress>(stream);
   talk(*progress);
   progress.reset();
   std::fclose(stream);

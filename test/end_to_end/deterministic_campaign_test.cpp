@@ -23,7 +23,8 @@ std::map<std::string, std::string> campaign_from(int seed) {
   const auto path = [&](const char* name) { return (folder.path() / name).string(); };
   std::ofstream(path("campaign.yaml")) << short_campaign_text("0, 90, 180", 2);
   std::ofstream(path("bench.yaml")) << deterministic_place(seed).text;
-  Process run({KPHI_PROGRAM, "run", path("campaign.yaml"), "--bench", path("bench.yaml"), "--yes", "--out", path("out")});
+  Process run(
+      {KPHI_PROGRAM, "run", path("campaign.yaml"), "--bench", path("bench.yaml"), "--yes", "--out", path("out")});
   EXPECT_EQ(run.wait(), 0) << run.err();
   Process fit({KPHI_PROGRAM, "fit", run.out().substr(0, run.out().find('\n'))});
   EXPECT_EQ(fit.wait(), 0) << fit.err();
@@ -41,7 +42,8 @@ TEST(DeterministicCampaign, GivesTheSameFilesByteForByteFromOneSeedAndOthersFrom
   EXPECT_EQ(once.size(), again.size());
   const auto other = campaign_from(6);
   for (const auto& [name, bytes] : once) {
-    if (name.ends_with(".h5") || name.ends_with("steps.csv") || name.ends_with("means.csv") || name.ends_with("coefficients.yaml")) {
+    if (name.ends_with(".h5") || name.ends_with("steps.csv") || name.ends_with("means.csv") ||
+        name.ends_with("coefficients.yaml")) {
       EXPECT_FALSE(other.at(name) == bytes) << name << " does not depend on the seed";
     }
   }

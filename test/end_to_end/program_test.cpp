@@ -163,7 +163,8 @@ TEST_F(BadInput, WrongUnit) {
   std::string text = short_campaign_text();
   text.replace(text.find("dwell_s"), 7, "dwell_ms");
   write(path("unit.yaml"), text);
-  expect({"run", path("unit.yaml"), "--bench", path("bench.yaml"), "--yes"}, 2, "unit.yaml:6:21: dwell_ms is not a key of profile");
+  expect({"run", path("unit.yaml"), "--bench", path("bench.yaml"), "--yes"}, 2,
+         "unit.yaml:6:21: dwell_ms is not a key of profile");
 }
 
 TEST_F(BadInput, CampaignAboveTheMotorsLimit) {
@@ -216,8 +217,8 @@ TEST(Check, TakesEveryShippedFile) {
 
 TEST(DryRun, PrintsThePlanAndTouchesNoDevice) {
   const std::string profiles = std::string(KPHI_SOURCE_DIR) + "/profiles/";
-  Process run({kphi(), "run", profiles + "icra2021_5in_3blade.yaml", "--bench", profiles + "bench_lab.yaml", "--dry-run",
-               "--json"});
+  Process run({kphi(), "run", profiles + "icra2021_5in_3blade.yaml", "--bench", profiles + "bench_lab.yaml",
+               "--dry-run", "--json"});
   EXPECT_EQ(run.wait(), 0) << run.err();
   const json plan = json::parse(run.out());
   EXPECT_EQ(plan.at("runs"), 15);

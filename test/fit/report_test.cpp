@@ -19,8 +19,8 @@
 namespace kphi::fit {
 namespace {
 
-using test::TemporaryFolder;
 using results::Doubt;
+using test::TemporaryFolder;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
