@@ -61,6 +61,9 @@ void look_at_stream(Probe& probe, LoadCell& cell, const Clock& clock, std::chron
   probe.streamed = true;
   probe.counters = cell.counters();
   probe.health = cell.health();
+  // Jitter is this host's and the network's: told as a person's clock runs.
+  probe.health.jitter_p50_ns = clock.shrunk(Duration(probe.health.jitter_p50_ns)).count();
+  probe.health.jitter_p99_ns = clock.shrunk(Duration(probe.health.jitter_p99_ns)).count();
   probe.receive_buffer = cell.receive_buffer_note();
   probe.events = cell.take_events();
   judge_stream(probe, status, clock.shrunk(std::chrono::seconds(1)) == std::chrono::seconds(1));
@@ -90,7 +93,7 @@ std::vector<std::string> Probe::lines() const {
   if (configuration) {
     const Configuration& box = *configuration;
     text.push_back(fmt::format("{}, firmware {}", box.product.empty() ? "Net Box" : box.product, box.firmware));
-    text.push_back(fmt::format("calibration {} in slot {} \"{}\", {:g} counts per N, {:g} per Nm",
+    text.push_back(fmt::format("calibration {} in slot {} \"{}\", {:.0f} counts per N, {:.0f} per Nm",
                                box.calibration_serial, box.slot, box.slot_name, box.counts_per_newton,
                                box.counts_per_newton_metre));
     text.push_back(fmt::format("ranges {:g} {:g} {:g} N, {:g} {:g} {:g} Nm", box.range[0], box.range[1], box.range[2],
