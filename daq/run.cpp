@@ -208,7 +208,7 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
       cause = std::current_exception();
     }
   }
-  if (!cause) return {order.file, writer.finish(results::Outcome::complete, "", account), account};
+  if (!cause) return {order.file, writer.finish({results::Outcome::complete, "", account, {}, {}}), account};
 
   std::string reason = "unknown";
   try {
@@ -217,7 +217,7 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
     reason = e.what();
   }
   try {
-    (void)writer.finish(results::Outcome::aborted, reason, account);
+    (void)writer.finish({results::Outcome::aborted, reason, account, {}, {}});
   } catch (const results::RecordError&) {
     // The first cause matters more; the .part file stays as it was secured last.
   }

@@ -10,6 +10,7 @@
 #include "results/campaign_folder.hpp"
 #include "results/campaign_verification.hpp"
 #include "results/run_reader.hpp"
+#include "results/sha256.hpp"
 
 namespace kphi::results {
 namespace {
@@ -25,6 +26,34 @@ struct Asked {
 };
 
 std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
+
+Json describe(const StreamHealth& health) {
+  return {{"records_per_second", health.records_per_second},
+          {"datagrams_per_second", health.datagrams_per_second},
+          {"jitter_p50_s", health.jitter_p50_s},
+          {"jitter_p99_s", health.jitter_p99_s},
+          {"skew_ppm", health.skew_ppm},
+          {"clock_uncertainty_s", health.clock_uncertainty_s},
+          {"queue_high_water", health.queue_high_water},
+          {"events_dropped", health.events_dropped}};
+}
+
+Json describe(const BoxBias& bias) {
+  if (bias.records == 0) return nullptr;
+  return {{"records", bias.records},
+          {"before", bias.before},
+          {"before_sd", bias.before_sd},
+          {"after", bias.after},
+          {"after_sd", bias.after_sd}};
+}
+
+Json describe(const std::vector<StreamEvent>& events) {
+  Json list = Json::array();
+  for (const StreamEvent& event : events) {
+    list.push_back({{"kind", name_of(event.kind)}, {"t_ns", event.time_ns}, {"text", event.text}});
+  }
+  return list;
+}
 
 Json describe(const std::filesystem::path& path) {
   const RunRecording run = read_run(path);
@@ -46,8 +75,19 @@ Json describe(const std::filesystem::path& path) {
           {"samples", run.load_cell.size()},
           {"lost_network", run.account.lost_network},
           {"lost_host", run.account.lost_host},
+          {"duplicates", run.account.duplicates},
+          {"late", run.account.late},
+          {"reordered", run.account.reordered},
+          {"stalled", run.account.stalled},
+          {"malformed", run.account.malformed},
+          {"restarts", run.account.restarts},
+          {"reboots", run.account.reboots},
+          {"events", describe(run.events)},
+          {"health", run.header.format < 2 ? Json() : describe(run.health)},
+          {"box_bias", describe(run.box_bias)},
           {"motor_readings", run.motor.size()},
           {"calibration_serial", header.load_cell.serial},
+          {"configuration_sha256", sha256(header.load_cell.configuration_xml)},
           {"sample_rate_hz", header.load_cell.sample_rate_hz},
           {"motor", header.motor_identity},
           {"tool_version", header.tool_version},
@@ -63,8 +103,18 @@ Json describe_folder(const CampaignFolder& folder) {
 }
 
 void print_run(const Json& run) {
+  const auto line = [](const std::string& name, const Json& value) {
+    fmt::print("{:28} {}\n", name, value.is_string() ? value.get<std::string>() : value.dump());
+  };
   for (const auto& [key, value] : run.items()) {
-    fmt::print("{:20} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+    if (value.is_null()) continue;
+    if (key == "events") {
+      for (const Json& event : value) line("event", event["text"]);
+    } else if (value.is_object()) {
+      for (const auto& [inner, figure] : value.items()) line(key + " " + inner, figure);
+    } else {
+      line(key, value);
+    }
   }
 }
 

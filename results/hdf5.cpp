@@ -237,6 +237,14 @@ void read_attribute(const Handle& object, const char* name, std::array<double, 6
   get(object, name, H5T_NATIVE_DOUBLE, static_cast<hssize_t>(value.size()), value.data());
 }
 
+Handle fixed_text_type(std::size_t bytes) {
+  Handle type = own(H5Tcopy(H5T_C_S1), "text type");
+  check(H5Tset_size(type.get(), bytes), "text type");
+  check(H5Tset_cset(type.get(), H5T_CSET_UTF8), "text type");
+  check(H5Tset_strpad(type.get(), H5T_STR_NULLPAD), "text type");
+  return type;
+}
+
 Column::Column(const Handle& group, const ColumnShape& shape, FileLayer& files, std::string file_name)
     : shape_(shape), files_(&files), doing_(fmt::format("{}: write {}", file_name, shape.name)) {
   const int rank = shape.width == 0 ? 1 : 2;

@@ -68,6 +68,9 @@ void read_attribute(const Handle& object, const char* name, std::uint32_t& value
 void read_attribute(const Handle& object, const char* name, std::uint64_t& value);
 void read_attribute(const Handle& object, const char* name, std::array<double, 6>& value);
 
+/// Of `bytes` bytes, UTF-8, filled up with zeros.
+[[nodiscard]] Handle fixed_text_type(std::size_t bytes);
+
 /// What a column holds. Bytes on disk are little-endian.
 struct ColumnShape {
   const char* name;

@@ -56,8 +56,18 @@ struct MotorReading {
   double value = 0;                ///< unit of the channel
 };
 
-/// What the runner asked for, and when the motor was told.
-enum class Phase : std::uint8_t { zero_before, step, spin_down, zero_after, end };
+/// What the runner asked for, and when the motor was told. The last three: the box's own bias, before zero_before.
+enum class Phase : std::uint8_t {
+  zero_before,
+  step,
+  spin_down,
+  zero_after,
+  end,
+  bias_before,    ///< measured without load
+  bias_settling,  ///< the box was told to take the load as zero
+  bias_after,     ///< measured again
+};
+inline constexpr Phase kLastPhase = Phase::bias_after;
 
 struct PhaseMark {
   Phase phase{};
@@ -76,10 +86,12 @@ struct LoadCellScale {
   std::array<double, 6> range{};  ///< N and N m
   std::string serial;             ///< of the calibration
   std::string configuration_xml;  ///< verbatim
+  std::string slots_json;         ///< pages of all slots, verbatim: {"netftapi2.xml?index=0": "<?xml …", …}
 };
 
 /// Everything about a run that is known before the motor turns.
 struct RunHeader {
+  int format = 2;  ///< of the run file: kphi-run/1 or kphi-run/2
   std::string uuid;
   std::string started_utc;  ///< ISO 8601, Z
   std::string tool_version;
@@ -111,19 +123,79 @@ struct SampleAccount {
   std::uint64_t late = 0;        ///< discarded
   std::uint64_t malformed = 0;   ///< datagrams of a wrong size
   std::uint64_t restarts = 0;    ///< of the stream
+  std::uint64_t reboots = 0;     ///< of the box: ft_sequence began anew
+  std::uint64_t reordered = 0;   ///< overtaken on the way; in their place again
+  std::uint64_t stalled = 0;     ///< repeated an old measurement; discarded
+  std::uint64_t irregular = 0;   ///< accepted, but the two sequences disagree about the gap before them
+};
+
+/// What happened to the load cell's stream, or to the cell. Codes and names as in the run file.
+enum class EventKind : std::uint8_t {
+  restarted,
+  rebooted,
+  stalled,
+  stall_ended,
+  silent,
+  resumed,
+  box_trouble,
+  stolen,
+  rdt_disabled,
+  unreachable,
+  near_range,    ///< an axis above 80 % of its range; the first time in a run
+  beyond_range,  ///< at 100 % or more; the first time in a run
+  range_trip,    ///< above 110 %: the motor was let go
+};
+inline constexpr std::array<const char*, 13> kEventNames{
+    "restarted", "rebooted",     "stalled",     "stall_ended", "silent",       "resumed",   "box_trouble",
+    "stolen",    "rdt_disabled", "unreachable", "near_range",  "beyond_range", "range_trip"};
+[[nodiscard]] constexpr const char* name_of(EventKind kind) { return kEventNames[static_cast<std::size_t>(kind)]; }
+
+struct StreamEvent {
+  EventKind kind{};
+  Nanoseconds time_ns = 0;
+  std::uint64_t records = 0;  ///< missing before it; of a stall: repeated
+  std::string text;           ///< one line; the file holds kEventTextBytes of it
+};
+inline constexpr std::size_t kEventTextBytes = 240;
+
+/// How well the stream did, first to last record. Rates in bench time, jitter as a person's clock runs.
+struct StreamHealth {
+  double records_per_second = 0;
+  double datagrams_per_second = 0;
+  double jitter_p50_s = 0;  ///< arrival after that of the least delayed datagram
+  double jitter_p99_s = 0;
+  double skew_ppm = 0;                 ///< box's clock slow: positive; 0 before it is known
+  double clock_uncertainty_s = 0;      ///< without the constant part of the delay
+  std::uint64_t queue_high_water = 0;  ///< records that waited for the recorder at most
+  std::uint64_t events_dropped = 0;    ///< beyond what the lists hold
+};
+
+/// The box's own bias (0x42), measured without load before and after it was taken. Apart from the zeros of the run,
+/// which are subtracted by software. Fx Fy Fz in N, Tx Ty Tz in N m.
+struct BoxBias {
+  std::uint64_t records = 0;  ///< of each mean; 0: no bias was taken
+  std::array<double, 6> before{}, before_sd{};
+  std::array<double, 6> after{}, after_sd{};
 };
 
 enum class Outcome : std::uint8_t { complete, aborted };
 
-/// A run read back, whole.
-struct RunRecording {
-  RunHeader header;
-  SampleAccount account;
+/// What is known at the end of a run.
+struct RunEnding {
   Outcome outcome = Outcome::aborted;
   std::string outcome_reason;
+  SampleAccount account;
+  StreamHealth health;
+  BoxBias box_bias;
+};
+
+/// A run read back, whole.
+struct RunRecording : RunEnding {
+  RunHeader header;
   std::vector<LoadCellRecord> load_cell;
   std::vector<MotorReading> motor;  ///< sorted by channel, then time
   std::vector<PhaseMark> phases;
+  std::vector<StreamEvent> events;  ///< in the order in which they were noticed
 };
 
 }  // namespace kphi::results

@@ -6,14 +6,15 @@
 
 namespace kphi::results {
 
-std::string attributes_digest(const RunHeader& header, const SampleAccount& account, Outcome outcome,
-                              const std::string& reason) {
+std::string format_name(int format) { return "kphi-run/" + std::to_string(format); }
+
+std::string attributes_digest(const RunHeader& header, const RunEnding& ending) {
   nlohmann::json all;
   const auto add = [&](const char* name, const auto& value) { all[name] = value; };
   for_each_attribute(header, add);
-  for_each_count(account, add);
-  add("outcome", outcome_name(outcome));
-  add("outcome_reason", reason);
+  for_each_figure(ending, header.format, add);
+  add("outcome", outcome_name(ending.outcome));
+  add("outcome_reason", ending.outcome_reason);
   return sha256(all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 

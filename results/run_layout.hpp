@@ -1,5 +1,5 @@
-// Names in a run file (format kphi-run/1), told once: the writer, the reader and the digest of the header use this
-// table.
+// Names in a run file (format kphi-run/2; kphi-run/1 lacks some), told once: the writer, the reader and the digest of
+// the attributes use this table.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,9 @@
 
 namespace kphi::results {
 
-inline constexpr const char* kRunFormat = "kphi-run/1";
+inline constexpr int kRunFormat = 2;
+/// "kphi-run/2".
+[[nodiscard]] std::string format_name(int format);
 
 /// Calls visit(name, member) for every root attribute that describes the run. `Header` is RunHeader or const RunHeader.
 template <class Header, class Visit>
@@ -40,11 +42,14 @@ void for_each_attribute(Header& header, Visit&& visit) {
   visit("calibration_serial", header.load_cell.serial);
   visit("configuration_xml", header.load_cell.configuration_xml);
   visit("motor_identity", header.motor_identity);
+  if (header.format >= 2) visit("slots_json", header.load_cell.slots_json);
 }
 
-/// Calls visit(name, member) for every root attribute that counts samples.
-template <class Account, class Visit>
-void for_each_count(Account& account, Visit&& visit) {
+/// Calls visit(name, member) for every root attribute that is written at the end, but for the outcome. `Ending` is
+/// RunEnding or const RunEnding; `format` that of the header.
+template <class Ending, class Visit>
+void for_each_figure(Ending& ending, int format, Visit&& visit) {
+  auto& account = ending.account;
   visit("n_expected", account.expected);
   visit("n_received", account.received);
   visit("n_lost_network", account.lost_network);
@@ -53,11 +58,30 @@ void for_each_count(Account& account, Visit&& visit) {
   visit("n_late", account.late);
   visit("n_malformed", account.malformed);
   visit("n_restarts", account.restarts);
+  if (format < 2) return;
+  visit("n_reboots", account.reboots);
+  visit("n_reordered", account.reordered);
+  visit("n_stalled", account.stalled);
+  visit("n_irregular", account.irregular);
+  auto& health = ending.health;
+  visit("health_records_per_second", health.records_per_second);
+  visit("health_datagrams_per_second", health.datagrams_per_second);
+  visit("health_jitter_p50_s", health.jitter_p50_s);
+  visit("health_jitter_p99_s", health.jitter_p99_s);
+  visit("health_skew_ppm", health.skew_ppm);
+  visit("health_clock_uncertainty_s", health.clock_uncertainty_s);
+  visit("health_queue_high_water", health.queue_high_water);
+  visit("health_events_dropped", health.events_dropped);
+  auto& bias = ending.box_bias;
+  visit("box_bias_records", bias.records);
+  visit("box_bias_before", bias.before);
+  visit("box_bias_before_sd", bias.before_sd);
+  visit("box_bias_after", bias.after);
+  visit("box_bias_after_sd", bias.after_sd);
 }
 
 /// SHA-256 over names and values of all of these, with the outcome: what the attribute `attributes_sha256` holds.
-[[nodiscard]] std::string attributes_digest(const RunHeader& header, const SampleAccount& account, Outcome outcome,
-                                            const std::string& reason);
+[[nodiscard]] std::string attributes_digest(const RunHeader& header, const RunEnding& ending);
 
 [[nodiscard]] const char* outcome_name(Outcome outcome);
 

@@ -17,17 +17,19 @@ using hdf5::Handle;
 
 constexpr std::uint64_t kBlock = 8192;  // rows: the blocks of five columns stay in the second-level cache
 
-Handle open_run(const std::filesystem::path& path) {
-  Handle root = hdf5::open_file(path);
+int format_of(const Handle& root, const std::filesystem::path& path) {
   std::string format = "none";
   if (hdf5::has_attribute(root, "format")) hdf5::read_attribute(root, "format", format);
-  if (format == kRunFormat) return root;
-  throw RecordError(
-      fmt::format("{}: is no run file: format \"{}\" where \"{}\" was expected", path.string(), format, kRunFormat));
+  for (int known = 1; known <= kRunFormat; ++known) {
+    if (format == format_name(known)) return known;
+  }
+  throw RecordError(fmt::format("{}: is no run file: format \"{}\" where \"{}\" was expected", path.string(), format,
+                                format_name(kRunFormat)));
 }
 
-RunHeader header_of(const Handle& root) {
+RunHeader header_of(const Handle& root, const std::filesystem::path& path) {
   RunHeader header;
+  header.format = format_of(root, path);
   for_each_attribute(header, [&](const char* name, auto& value) { hdf5::read_attribute(root, name, value); });
   return header;
 }
@@ -105,12 +107,39 @@ std::vector<PhaseMark> phases_of(const Handle& root, const std::string& file) {
   speed.read(0, rows, speeds.data());
   std::vector<PhaseMark> marks;
   for (std::uint64_t i = 0; i < rows; ++i) {
-    if (codes[i] > static_cast<std::uint8_t>(Phase::end)) {
+    if (codes[i] > static_cast<std::uint8_t>(kLastPhase)) {
       throw RecordError(fmt::format("{}: commands row {} has the unknown phase {}", file, i, codes[i]));
     }
     marks.push_back({static_cast<Phase>(codes[i]), steps[i], times[i], speeds[i]});
   }
   return marks;
+}
+
+std::vector<StreamEvent> events_of(const Handle& root, const std::string& file) {
+  const Handle group = hdf5::open_group(root, "events");
+  const Handle type = hdf5::fixed_text_type(kEventTextBytes);
+  ColumnReader kind(group, "kind", H5T_NATIVE_UINT8, 1, file);
+  ColumnReader time(group, "t_ns", H5T_NATIVE_INT64, 8, file);
+  ColumnReader records(group, "records", H5T_NATIVE_UINT64, 8, file);
+  ColumnReader text(group, "text", type.get(), kEventTextBytes, file);
+  const std::uint64_t rows = valid_rows(group, {&kind, &time, &records, &text});
+  std::vector<StreamEvent> events;
+  for (std::uint64_t i = 0; i < rows; ++i) {
+    std::uint8_t code = 0;
+    std::array<char, kEventTextBytes + 1> line{};
+    StreamEvent event;
+    kind.read(i, 1, &code);
+    time.read(i, 1, &event.time_ns);
+    records.read(i, 1, &event.records);
+    text.read(i, 1, line.data());
+    if (code >= kEventNames.size()) {
+      throw RecordError(fmt::format("{}: events row {} has the unknown kind {}", file, i, code));
+    }
+    event.kind = static_cast<EventKind>(code);
+    event.text = line.data();
+    events.push_back(std::move(event));
+  }
+  return events;
 }
 
 void read_outcome(const Handle& root, RunRecording& run) {
@@ -123,7 +152,8 @@ void read_outcome(const Handle& root, RunRecording& run) {
     run.account.expected = run.account.received + run.account.lost_network;
     return;
   }
-  for_each_count(run.account, [&](const char* name, auto& value) { hdf5::read_attribute(root, name, value); });
+  for_each_figure(run, run.header.format,
+                  [&](const char* name, auto& value) { hdf5::read_attribute(root, name, value); });
   hdf5::read_attribute(root, "outcome_reason", run.outcome_reason);
   run.outcome = complete == 1 ? Outcome::complete : Outcome::aborted;
 }
@@ -143,20 +173,21 @@ auto naming(const std::filesystem::path& path, Read&& read) {
 
 RunRecording read_run(const std::filesystem::path& path) {
   return naming(path, [&] {
-    const Handle root = open_run(path);
+    const Handle root = hdf5::open_file(path);
     RunRecording run;
-    run.header = header_of(root);
+    run.header = header_of(root, path);
     run.load_cell = load_cell_of(root, path.string());
     const Handle motor = hdf5::open_group(root, "motor");
     for (const MotorChannelInfo& info : kMotorChannels) append_channel(motor, info, path.string(), run.motor);
     run.phases = phases_of(root, path.string());
+    if (run.header.format >= 2) run.events = events_of(root, path.string());
     read_outcome(root, run);
     return run;
   });
 }
 
 RunHeader read_header(const std::filesystem::path& path) {
-  return naming(path, [&] { return header_of(open_run(path)); });
+  return naming(path, [&] { return header_of(hdf5::open_file(path), path); });
 }
 
 SequenceCheck check_sequence(const std::vector<LoadCellRecord>& records, std::uint32_t ft_stride) {

@@ -38,7 +38,7 @@ void check_columns(const Handle& parent, const char* name, std::initializer_list
   }
 }
 
-void check_all_columns(const std::filesystem::path& path, Problems& problems) {
+void check_all_columns(const std::filesystem::path& path, int format, Problems& problems) {
   const Handle root = hdf5::open_file(path);
   check_columns(root, "load_cell",
                 {{"counts", H5T_NATIVE_INT32, 24},
@@ -60,6 +60,14 @@ void check_all_columns(const std::filesystem::path& path, Problems& problems) {
                  {"t_ns", H5T_NATIVE_INT64, 8},
                  {"speed_rad_s", H5T_NATIVE_DOUBLE, 8}},
                 problems);
+  if (format < 2) return;
+  const Handle text = hdf5::fixed_text_type(kEventTextBytes);
+  check_columns(root, "events",
+                {{"kind", H5T_NATIVE_UINT8, 1},
+                 {"t_ns", H5T_NATIVE_INT64, 8},
+                 {"records", H5T_NATIVE_UINT64, 8},
+                 {"text", text.get(), kEventTextBytes}},
+                problems);
 }
 
 void check_end(const std::filesystem::path& path, const RunRecording& run, Problems& problems) {
@@ -72,9 +80,7 @@ void check_end(const std::filesystem::path& path, const RunRecording& run, Probl
   std::string outcome;
   hdf5::read_attribute(root, "attributes_sha256", digest);
   hdf5::read_attribute(root, "outcome", outcome);
-  if (digest != attributes_digest(run.header, run.account, run.outcome, run.outcome_reason)) {
-    problems.push_back("the attributes do not match their checksum");
-  }
+  if (digest != attributes_digest(run.header, run)) problems.push_back("the attributes do not match their checksum");
   if (outcome != outcome_name(run.outcome))
     problems.push_back(fmt::format("outcome \"{}\" contradicts the flag complete", outcome));
 }
@@ -97,12 +103,14 @@ void check_account(const RunRecording& run, const SequenceCheck& sequence, Probl
 
 void check_order(const RunRecording& run, const SequenceCheck& sequence, Problems& problems) {
   if (sequence.repeated > 0) problems.push_back(fmt::format("{} samples are there twice", sequence.repeated));
-  if (sequence.off_stride > 0) {
+  if (sequence.off_stride > run.account.irregular) {
     problems.push_back(fmt::format("ft_sequence left its stride of {} at {} places", run.header.load_cell.ft_stride,
                                    sequence.off_stride));
   }
-  if (sequence.reboots > 0)
-    problems.push_back(fmt::format("ft_sequence jumped back {} times: the box restarted", sequence.reboots));
+  if (sequence.reboots > run.account.reboots) {
+    problems.push_back(fmt::format("ft_sequence jumped back {} times: the box restarted, {} restarts were counted",
+                                   sequence.reboots, run.account.reboots));
+  }
   if (sequence.restarts > run.account.restarts) {
     problems.push_back(fmt::format("rdt_sequence began again {} times where {} restarts were counted",
                                    sequence.restarts, run.account.restarts));
@@ -145,7 +153,7 @@ Verification verify_run(const std::filesystem::path& path) {
     found.outcome = run.outcome;
     found.samples = run.load_cell.size();
     check_end(path, run, found.problems);
-    check_all_columns(path, found.problems);
+    check_all_columns(path, run.header.format, found.problems);
     const SequenceCheck sequence = check_sequence(run.load_cell, run.header.load_cell.ft_stride);
     found.lost = sequence.lost;
     check_account(run, sequence, found.problems);

@@ -21,6 +21,7 @@ using hdf5::Handle;
 constexpr hsize_t kSampleChunk = 8192;  // rows; a little over a second of the Net Box
 constexpr hsize_t kMotorChunk = 1024;
 constexpr hsize_t kMarkChunk = 64;
+constexpr hsize_t kEventChunk = 16;
 
 /// A group of columns that grow together; `n_valid` says how many rows were whole at the last sync.
 struct Series {
@@ -109,7 +110,8 @@ struct CommandSeries : Series {
   CommandSeries(const Handle& root, FileLayer& files, const std::string& name)
       : Series(root, "commands", "what the runner asked for"),
         phase(add(
-            {"phase", H5T_STD_U8LE, 1, 0, kMarkChunk, "1", "0 zero before, 1 step, 2 spin down, 3 zero after, 4 end"},
+            {"phase", H5T_STD_U8LE, 1, 0, kMarkChunk, "1",
+             "0 zero before, 1 step, 2 spin down, 3 zero after, 4 end, 5 bias before, 6 bias settling, 7 bias after"},
             files, name)),
         step(add({"step", H5T_STD_I32LE, 4, 0, kMarkChunk, "1", "number of the step from 0, -1 outside steps"}, files,
                  name)),
@@ -127,6 +129,33 @@ struct CommandSeries : Series {
     speed.append(&mark.speed_rad_s, 1);
   }
   Column &phase, &step, &time, &speed;
+};
+
+struct EventSeries : Series {
+  EventSeries(const Handle& root, FileLayer& files, const std::string& name)
+      : Series(root, "events", "what happened to the load cell and its stream"),
+        text_type(hdf5::fixed_text_type(kEventTextBytes)),
+        kind(add({"kind", H5T_STD_U8LE, 1, 0, kEventChunk, "1",
+                  "0 restarted, 1 rebooted, 2 stalled, 3 stall ended, 4 silent, 5 resumed, 6 box trouble, 7 stolen, "
+                  "8 RDT disabled, 9 unreachable, 10 near range, 11 beyond range, 12 range trip"},
+                 files, name)),
+        time(add({"t_ns", H5T_STD_I64LE, 8, 0, kEventChunk, "ns", "when it was noticed, bench time"}, files, name)),
+        records(add({"records", H5T_STD_U64LE, 8, 0, kEventChunk, "1", "missing before it, or repeated"}, files, name)),
+        text(add({"text", text_type.get(), kEventTextBytes, 0, kEventChunk, "1", "for a person"}, files, name)) {
+    hdf5::make_scale(time.dataset(), "t_ns", {{&kind.dataset(), 0}, {&records.dataset(), 0}, {&text.dataset(), 0}});
+    for (const Column* column : {&kind, &records, &text}) hdf5::attach_scales(column->dataset(), {&time.dataset()});
+  }
+  void append(const StreamEvent& event) {
+    const auto code = static_cast<std::uint8_t>(event.kind);
+    std::array<char, kEventTextBytes> line{};
+    event.text.copy(line.data(), line.size());
+    kind.append(&code, 1);
+    time.append(&event.time_ns, 1);
+    records.append(&event.records, 1);
+    text.append(line.data(), 1);
+  }
+  Handle text_type;
+  Column &kind, &time, &records, &text;
 };
 
 /// The first free of name, name-2, name-3 … before `ending`.
@@ -166,19 +195,22 @@ struct RunWriter::File {
       : root(hdf5::create_file(path)),
         load_cell(root, files, path.string()),
         motor(hdf5::create_group(root, "motor")),
-        commands(root, files, path.string()) {
+        commands(root, files, path.string()),
+        events(root, files, path.string()) {
     for (const MotorChannelInfo& info : kMotorChannels) {
       channels.push_back(std::make_unique<ChannelSeries>(motor, info, files, path.string()));
     }
-    hdf5::write_attribute(root, "format", std::string(kRunFormat));
+    hdf5::write_attribute(root, "format", format_name(header.format));
     hdf5::write_attribute(root, "complete", std::int32_t{0});
     for_each_attribute(header, [&](const char* name, const auto& value) { hdf5::write_attribute(root, name, value); });
+    hdf5::write_attribute(root, "configuration_sha256", sha256(header.load_cell.configuration_xml));
   }
   void flush() {
     load_cell.flush();
     load_cell.component.flush();
     for (const auto& channel : channels) channel->flush();
     commands.flush();
+    events.flush();
   }
 
   Handle root;
@@ -186,6 +218,7 @@ struct RunWriter::File {
   Handle motor;
   std::vector<std::unique_ptr<ChannelSeries>> channels;
   CommandSeries commands;
+  EventSeries events;
 };
 
 /// Everything that touches the open file goes through here. After the first failure nothing more may reach the disk:
@@ -205,7 +238,8 @@ void RunWriter::guarded(Action&& action) {
 
 RunWriter::RunWriter(std::filesystem::path final_path, const RunHeader& header, FileLayer& files)
     : final_path_(std::move(final_path)), path_(prepared_part(final_path_, files)), header_(header), files_(files) {
-  file_ = std::make_unique<File>(path_, header, files);
+  header_.format = kRunFormat;
+  file_ = std::make_unique<File>(path_, header_, files);
   sync();
   on_disk(path_, [&] { files_.sync_folder(path_.parent_path()); });
 }
@@ -226,6 +260,10 @@ void RunWriter::append(std::span<const MotorReading> readings) {
 
 void RunWriter::mark(const PhaseMark& mark) {
   guarded([&] { file_->commands.append(mark); });
+}
+
+void RunWriter::note(const StreamEvent& event) {
+  guarded([&] { file_->events.append(event); });
 }
 
 void RunWriter::sync() {
@@ -257,13 +295,15 @@ void RunWriter::close() {
   hdf5::check(H5Fclose(root), path_.string() + ": close");
 }
 
-std::string RunWriter::finish(Outcome outcome, const std::string& reason, const SampleAccount& account) {
+std::string RunWriter::finish(const RunEnding& ending) {
+  const Outcome outcome = ending.outcome;
   guarded([&] {
     const Handle& root = file_->root;
-    for_each_count(account, [&](const char* name, const auto& value) { hdf5::write_attribute(root, name, value); });
+    for_each_figure(ending, header_.format,
+                    [&](const char* name, const auto& value) { hdf5::write_attribute(root, name, value); });
     hdf5::write_attribute(root, "outcome", std::string(outcome_name(outcome)));
-    hdf5::write_attribute(root, "outcome_reason", reason);
-    hdf5::write_attribute(root, "attributes_sha256", attributes_digest(header_, account, outcome, reason));
+    hdf5::write_attribute(root, "outcome_reason", ending.outcome_reason);
+    hdf5::write_attribute(root, "attributes_sha256", attributes_digest(header_, ending));
     hdf5::write_attribute(root, "complete", std::int32_t{outcome == Outcome::complete});
     secure();
   });

@@ -29,13 +29,14 @@ class RunWriter {
   void append(std::span<const LoadCellRecord> records);
   void append(std::span<const MotorReading> readings);
   void mark(const PhaseMark& mark);
+  void note(const StreamEvent& event);
 
   /// Everything appended so far is on disk when this returns (H5Fflush and fdatasync). Twice a second of wall time.
   void sync();
 
   /// Closes, reopens and verifies, renames `.part` to `.h5` (aborted: `.aborted.h5`, or `.aborted-2.h5` …), makes it
   /// read-only. Returns the file's SHA-256. Throws when a complete run does not pass: the .part stays for a look.
-  [[nodiscard]] std::string finish(Outcome outcome, const std::string& reason, const SampleAccount& account);
+  [[nodiscard]] std::string finish(const RunEnding& ending);
 
   /// Where the record lies now: the .part, after finish() its final name.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }

@@ -17,6 +17,12 @@ enum class Doubt : std::uint32_t {
   derated = 1u << 4,            ///< the module derated
   few_samples = 1u << 5,        ///< under a tenth of the expected load-cell samples, or under 3 speed readings
   bad_status = 1u << 6,         ///< another error bit of the box
+  stream_restarted = 1u << 7,   ///< the stream began anew within the step
+  rebooted = 1u << 8,           ///< the box started anew since the zero: its bias is another
+  stalled = 1u << 9,            ///< the box repeated its measurement within the step
+  silent = 1u << 10,            ///< no record for long within the step
+  box_trouble = 1u << 11,       ///< the box saw its own communication fail within the step
+  stolen = 1u << 12,            ///< another client took the stream within the step
 };
 
 struct StepMean {

@@ -61,6 +61,12 @@ constexpr std::array kDoubtNames{
     std::pair{Doubt::derated, std::string_view("derated")},
     std::pair{Doubt::few_samples, std::string_view("few_samples")},
     std::pair{Doubt::bad_status, std::string_view("bad_status")},
+    std::pair{Doubt::stream_restarted, std::string_view("stream_restarted")},
+    std::pair{Doubt::rebooted, std::string_view("rebooted")},
+    std::pair{Doubt::stalled, std::string_view("stalled")},
+    std::pair{Doubt::silent, std::string_view("silent")},
+    std::pair{Doubt::box_trouble, std::string_view("box_trouble")},
+    std::pair{Doubt::stolen, std::string_view("stolen")},
 };
 
 std::string quoted(const std::string& text) {

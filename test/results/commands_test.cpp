@@ -54,6 +54,21 @@ TEST_F(Commands, InfoTellsWhatIsInARun) {
   EXPECT_EQ(json.at("steps"), 3);
 }
 
+TEST_F(Commands, InfoTellsWhatHappenedToTheStreamAndHowItDid) {
+  RunRecording run = test::make_run({});
+  run.events.push_back({EventKind::restarted, 3'000'000'000, 12, "3.000 s: the stream began anew"});
+  run.health.skew_ppm = 17.25;
+  const auto file = folder_.run("5x3", 180, 1);
+  (void)test::write_run(file, run);
+  const Said said = say("info " + file.string());
+  EXPECT_THAT(said.out, HasSubstr("3.000 s: the stream began anew"));
+  EXPECT_THAT(said.out, HasSubstr("17.25"));
+  const auto json = nlohmann::json::parse(say("info --json " + file.string()).out);
+  EXPECT_EQ(json.at("events").at(0).at("kind"), "restarted");
+  EXPECT_EQ(json.at("health").at("skew_ppm"), 17.25);
+  EXPECT_TRUE(json.at("box_bias").is_null()) << "none was taken";
+}
+
 TEST_F(Commands, InfoTellsWhatIsInAFolder) {
   std::ofstream(folder_.runs() / "5x3_phi180_rep1.h5.part") << "x";
   EXPECT_THAT(say("info " + folder_.path().string()).out, HasSubstr("1 complete runs"));

@@ -51,9 +51,7 @@ bool same_rows(const std::vector<Row>& a, const std::vector<Row>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Row& x, const Row& y) { return same(x, y); });
 }
 
-std::string digest(const RunRecording& run) {
-  return attributes_digest(run.header, run.account, run.outcome, run.outcome_reason);
-}
+std::string digest(const RunRecording& run) { return attributes_digest(run.header, run); }
 
 void make_writable(const std::filesystem::path& path) {
   std::filesystem::permissions(path, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
@@ -71,6 +69,34 @@ TEST(RunFile, ReadsBackAsWritten) {
   EXPECT_EQ(again.header.operator_name, "Zoë");
   EXPECT_EQ(again.header.load_cell.configuration_xml.size(), 70000u);
   EXPECT_EQ(read_header(folder / "a.h5").uuid, run.header.uuid);
+}
+
+TEST(RunFile, KeepsWhatHappenedToTheStreamItsHealthAndTheBoxesBias) {
+  const TemporaryFolder folder;
+  RunRecording run = make_run({});
+  run.header.load_cell.slots_json = "{\"netftapi2.xml?index=0\": \"<netft/>\"}";
+  for (std::size_t kind = 0; kind < kEventNames.size(); ++kind) {
+    run.events.push_back({static_cast<EventKind>(kind), 1000 + static_cast<Nanoseconds>(kind), kind,
+                          std::string(kind == 3 ? 2 * kEventTextBytes : kind, 'e')});
+  }
+  run.account.reordered = 5;
+  run.health.skew_ppm = -31.5;
+  run.health.queue_high_water = 412;
+  run.box_bias = {7000, {1, 2, 3, 4, 5, 6}, {}, {}, {0, 0, 0, 0, 0, 0.25}};
+  write_run(folder / "a.h5", run);
+  EXPECT_TRUE(verify_run(folder / "a.h5").whole());
+  const RunRecording again = read_run(folder / "a.h5");
+  EXPECT_EQ(digest(run), digest(again));
+  EXPECT_EQ(again.header.load_cell.slots_json, run.header.load_cell.slots_json);
+  EXPECT_EQ(again.health.skew_ppm, -31.5);
+  EXPECT_EQ(again.box_bias.after_sd[5], 0.25);
+  ASSERT_EQ(again.events.size(), run.events.size());
+  for (std::size_t i = 0; i < run.events.size(); ++i) {
+    EXPECT_EQ(again.events[i].kind, run.events[i].kind);
+    EXPECT_EQ(again.events[i].time_ns, run.events[i].time_ns);
+    EXPECT_EQ(again.events[i].records, run.events[i].records);
+    EXPECT_EQ(again.events[i].text, run.events[i].text.substr(0, kEventTextBytes));
+  }
 }
 
 TEST(RunFile, IsReadOnlyUnderItsFinalNameWithTheDigestThatFinishGave) {
@@ -121,7 +147,7 @@ TEST(RunFile, DoesNotReplaceAFileThatAppearedMeanwhile) {
   RunWriter writer(folder / "a.h5", run.header);
   write_pieces(writer, run);
   std::ofstream(folder / "a.h5") << "mine";
-  EXPECT_THROW((void)writer.finish(Outcome::complete, "", run.account), RecordError);
+  EXPECT_THROW((void)writer.finish(run), RecordError);
   EXPECT_EQ(std::filesystem::file_size(folder / "a.h5"), 4u);
   EXPECT_TRUE(std::filesystem::exists(folder / "a.h5.part"));
 }
@@ -481,6 +507,15 @@ TEST_F(VerifiedRun, ADoubledSampleARebootAndALeftStrideShow) {
   run = make_run({});
   run.load_cell[100].ft_sequence += 1;
   EXPECT_THAT(problems_of(run), Contains(HasSubstr("left its stride")));
+}
+
+TEST_F(VerifiedRun, WithARestartOfTheBoxThatWasCountedIsWhole) {
+  RunRecording run = make_run({});
+  for (std::size_t i = 0; i < run.load_cell.size(); ++i)
+    run.load_cell[i].ft_sequence = static_cast<std::uint32_t>(7 * (i < 5000 ? i : i - 5000));
+  run.account.reboots = 1;
+  write_run(path_, run);
+  EXPECT_TRUE(verify_run(path_).whole()) << ::testing::PrintToString(verify_run(path_).problems);
 }
 
 TEST_F(VerifiedRun, ATruncatedFileShows) {

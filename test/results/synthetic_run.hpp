@@ -152,6 +152,7 @@ inline RunRecording make_run(const Truth& truth) {
 /// Writes as a runner does: in small pieces, with a sync every `samples_per_sync`.
 inline void write_pieces(RunWriter& writer, const RunRecording& run, std::size_t samples_per_sync = 3500) {
   for (const PhaseMark& mark : run.phases) writer.mark(mark);
+  for (const StreamEvent& event : run.events) writer.note(event);
   writer.append(std::span<const MotorReading>(run.motor));
   for (std::size_t at = 0; at < run.load_cell.size(); at += samples_per_sync) {
     const std::size_t n = std::min(samples_per_sync, run.load_cell.size() - at);
@@ -163,7 +164,7 @@ inline void write_pieces(RunWriter& writer, const RunRecording& run, std::size_t
 inline std::string write_run(const std::filesystem::path& path, const RunRecording& run, FileLayer& files = disk()) {
   RunWriter writer(path, run.header, files);
   write_pieces(writer, run);
-  return writer.finish(run.outcome, run.outcome_reason, run.account);
+  return writer.finish(run);
 }
 
 }  // namespace kphi::results::test
