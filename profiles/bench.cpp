@@ -1,17 +1,43 @@
 #include "profiles/bench.hpp"
 
+#include <fmt/format.h>
+
+#include <filesystem>
+
 #include "profiles/profile_reader.hpp"
 
 namespace kphi::profiles {
 namespace {
 
-NetBoxPlace read_netbox(const ProfileReader& file) {
+template <class T>
+std::optional<T> optional(const ProfileReader& file, const std::string& pointer) {
+  return file.has(pointer) ? std::optional<T>(file.get<T>(pointer)) : std::nullopt;
+}
+
+/// A value to be set is also the one expected; another one beside it is a contradiction.
+template <class T>
+void agree(ProfileReader& file, const std::string& key, const std::optional<T>& set, T& expected) {
+  if (!set) return;
+  if (file.has("/netbox/" + key) && expected != *set) {
+    file.refuse("/netbox/settings/" + key, fmt::format("{} is not the {} of netbox.{}", *set, expected, key),
+                "write the same, or leave netbox." + key + " out");
+  }
+  expected = *set;
+}
+
+NetBoxPlace read_netbox(ProfileReader& file) {
   NetBoxPlace place;
   place.host = file.text("/netbox/host");
   place.rdt_port = file.get_or("/netbox/rdt_port", place.rdt_port);
   place.http_port = file.get_or("/netbox/http_port", place.http_port);
+  place.tcp_port = file.get_or("/netbox/tcp_port", static_cast<std::uint16_t>(place.rdt_port - 1));
   place.rate_hz = file.get_or("/netbox/rate_hz", place.rate_hz);
   place.records_per_datagram = file.get_or("/netbox/records_per_datagram", place.records_per_datagram);
+  place.settings = {
+      optional<double>(file, "/netbox/settings/rate_hz"), optional<int>(file, "/netbox/settings/records_per_datagram"),
+      optional<int>(file, "/netbox/settings/filter_hz"), optional<int>(file, "/netbox/settings/configuration")};
+  agree(file, "rate_hz", place.settings.rate_hz, place.rate_hz);
+  agree(file, "records_per_datagram", place.settings.records_per_datagram, place.records_per_datagram);
   return place;
 }
 
@@ -26,12 +52,13 @@ MotorPlace read_motor(const ProfileReader& file) {
   return place;
 }
 
-Simulation read_simulation(ProfileReader& file) {
+Simulation read_simulation(ProfileReader& file, const std::filesystem::path& folder) {
   Simulation simulation;
   simulation.in_process = file.get_or("/simulation/in_process", simulation.in_process);
   simulation.time_scale = file.get_or("/simulation/time_scale", simulation.time_scale);
   simulation.seed = file.get_or("/simulation/seed", simulation.seed);
   simulation.control = file.get_or("/simulation/control", simulation.control);
+  if (file.has("/simulation/faults")) simulation.faults = (folder / file.text("/simulation/faults")).string();
   if (!simulation.in_process && simulation.control.empty()) {
     file.refuse("/simulation", "control is missing", "add control: a path for the socket, or in_process: true");
   }
@@ -49,7 +76,7 @@ Bench parse_bench(const std::string& text, const std::string& path) {
   const std::string axis = file.text("/thrust_axis");  // "+Fz"
   bench.thrust_sign = axis[0] == '-' ? -1 : +1;
   bench.thrust_axis = axis[2] - 'x';
-  if (file.has("/simulation")) bench.simulation = read_simulation(file);
+  if (file.has("/simulation")) bench.simulation = read_simulation(file, std::filesystem::path(path).parent_path());
   bench.text = text;
   bench.path = path;
   file.finish();

@@ -9,12 +9,22 @@
 
 namespace kphi::profiles {
 
+/// What the box is to be set to; what is absent stays as it is.
+struct NetBoxSettings {
+  std::optional<double> rate_hz;
+  std::optional<int> records_per_datagram;
+  std::optional<int> filter_hz;      ///< cutoff of one of the box's filters; 0: none
+  std::optional<int> configuration;  ///< slot 0..15; the box's web pages count from 1
+};
+
 struct NetBoxPlace {
   std::string host;  ///< name or address
   std::uint16_t rdt_port = 49152;
   std::uint16_t http_port = 80;
-  double rate_hz = 7000;          ///< RDT output rate expected of the box
-  int records_per_datagram = 40;  ///< 1..40; 1 = real-time mode
+  std::uint16_t tcp_port = 49151;  ///< one below rdt_port unless the file says otherwise
+  double rate_hz = 7000;           ///< RDT output rate expected of the box
+  int records_per_datagram = 40;   ///< 1..40; 1 = real-time mode
+  NetBoxSettings settings;         ///< rate and records agree with those above
 };
 
 struct MotorPlace {
@@ -32,6 +42,7 @@ struct Simulation {
   double time_scale = 1;    ///< bench seconds per wall second
   std::uint64_t seed = 1;
   std::string control;  ///< path of the control line (Unix socket); relative to the system's temporary folder
+  std::string faults;   ///< path of a fault script; in the file relative to the file's folder; empty: none
 };
 
 struct Bench {

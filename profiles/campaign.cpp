@@ -61,6 +61,7 @@ Campaign parse_campaign(const std::string& text, const std::string& path) {
   campaign.profile = {file.get<int>("/profile/steps"), Seconds(file.number("/profile/dwell_s")),
                       from_rpm(file.number("/profile/first_rpm")), from_rpm(file.number("/profile/last_rpm"))};
   campaign.zero = Seconds(file.number("/zero_s"));
+  campaign.box_bias = file.get_or("/box_bias", campaign.box_bias);
   campaign.minimum_discard = Seconds(file.number("/minimum_discard_s"));
   campaign.limits = {from_rpm(file.number("/limits/speed_max_rpm")), Newtons(file.number("/limits/thrust_max_n")),
                      Amperes(file.number("/limits/supply_current_max_a")),

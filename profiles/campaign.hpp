@@ -43,6 +43,7 @@ struct Campaign {
   int repetitions = 3;
   StepProfile profile;
   Seconds zero;             ///< motor off, before and after each run
+  bool box_bias = false;    ///< before each run the box takes its load as zero, measured for `zero` before and after
   Seconds minimum_discard;  ///< at the start of every step, not averaged
   Limits limits;
   Volts supply;

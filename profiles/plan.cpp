@@ -33,7 +33,7 @@ Plan make_plan(const Campaign& campaign, const Bench& bench) {
   plan.mountings = static_cast<int>(campaign.occlusions_deg.size());
   plan.steps = runs * campaign.profile.steps;
   plan.spinning = campaign.profile.dwell * plan.steps;
-  plan.bench = plan.spinning + campaign.zero * (2.0 * runs);
+  plan.bench = plan.spinning + campaign.zero * ((campaign.box_bias ? 4.0 : 2.0) * runs);
   plan.samples_in_steps = samples_in(plan.spinning, bench.netbox.rate_hz);
   plan.samples = samples_in(plan.bench, bench.netbox.rate_hz);
   plan.bytes = plan.samples * kBytesPerSample;

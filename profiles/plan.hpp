@@ -22,7 +22,7 @@ struct Plan {
   int mountings = 0;                   ///< times that a person changes the occlusion, the first one included
   int steps = 0;                       ///< in all runs
   Seconds spinning;                    ///< motor on
-  Seconds bench;                       ///< spinning and zeros; not: mounting, spinning down
+  Seconds bench;                       ///< spinning and zeros; zeros and biases; not: mounting, spinning down
   std::uint64_t samples_in_steps = 0;  ///< Net Box samples at the bench's rate
   std::uint64_t samples = 0;           ///< zeros included
   std::uint64_t bytes = 0;             ///< of the samples

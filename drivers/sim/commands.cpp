@@ -85,8 +85,9 @@ ServerSettings settings_of(const profiles::Bench& bench, const Options& options)
   settings.host = bench.netbox.host;
   settings.rdt_port = options.free_ports ? 0 : bench.netbox.rdt_port;
   settings.http_port = options.free_ports ? 0 : bench.netbox.http_port;
-  settings.tcp_port = settings.rdt_port == 0 ? 0 : static_cast<std::uint16_t>(settings.rdt_port - 1);
-  if (!options.faults.empty()) settings.bench.faults = load_faults(options.faults);
+  settings.tcp_port = options.free_ports ? 0 : bench.netbox.tcp_port;
+  const std::string& faults = options.faults.empty() ? bench.simulation->faults : options.faults;
+  if (!faults.empty()) settings.bench.faults = load_faults(faults);
   if (!options.truth_log.empty()) settings.bench.keep = FaultyWire::Keep::datagrams;
   settings.device = bench.iq.device;
   settings.control = bench.simulation->control;
@@ -103,6 +104,7 @@ std::string resolved_text(const profiles::Bench& bench, const Addresses& address
   YAML::Node file = YAML::Load(bench.text);
   file["netbox"]["rdt_port"] = addresses.rdt_port;
   file["netbox"]["http_port"] = addresses.http_port;
+  file["netbox"]["tcp_port"] = addresses.tcp_port;
   file["iq"]["device"] = addresses.device;
   file["simulation"]["control"] = addresses.control;
   file["simulation"]["time_scale"] = fmt::format("{}", bench.simulation->time_scale);
@@ -165,7 +167,8 @@ void add_sim(CLI::App& program, int& exit_code) {
   CLI::App* sim = program.add_subcommand("sim", "run the simulated bench of a bench file, or talk to a running one");
   sim->add_option("BENCH", options->bench, "bench file with a 'simulation:' section")->required();
   sim->add_option("--truth", options->truth, "write what is true of the simulated propellers to this file (YAML)");
-  sim->add_option("--faults", options->faults, "script of what goes wrong on the load cell's wire (YAML)");
+  sim->add_option("--faults", options->faults,
+                  "script of what goes wrong on the load cell's wire (YAML), instead of the file's");
   sim->add_option("--truth-log", options->truth_log, "write at exit what happened to every datagram (JSON lines)");
   sim->add_option("--time-scale", options->time_scale, "bench seconds per second, instead of the file's")
       ->check(CLI::Range(0.1, 1000.0));

@@ -50,6 +50,8 @@ TEST(Bench, NeedsOnlyAddressesAxisAndSpeedLimit) {
   EXPECT_EQ(bench.netbox.http_port, 80);
   EXPECT_EQ(bench.netbox.rate_hz, 7000);
   EXPECT_EQ(bench.netbox.records_per_datagram, 40);
+  EXPECT_EQ(bench.netbox.tcp_port, 49151);
+  EXPECT_FALSE(bench.netbox.settings.rate_hz || bench.netbox.settings.filter_hz);
   EXPECT_EQ(bench.iq.baud, 115200u);
   EXPECT_EQ(bench.iq.module_id, 0);
   EXPECT_EQ(bench.iq.spin, +1);
@@ -80,6 +82,44 @@ TEST(Bench, HoldsPortsAndIdentifiers) {
               ElementsAre(StartsWith("8:25: netbox.records_per_datagram: 41 is above 40")));
   EXPECT_THAT(refused("3500", "7001"),
               ElementsAre("7:12: netbox.rate_hz: 7001 is above 7000 Hz; write a value from 1 to 7000 Hz"));
+}
+
+TEST(Bench, KnowsWhereTheBoxSpeaksTcp) {
+  EXPECT_EQ(parse_bench(kBenchText, "b.yaml").netbox.tcp_port, 49999) << "one below the port of RDT";
+  EXPECT_EQ(parse_bench(changed(kBenchText, "  rate_hz", "  tcp_port: 50017\n  rate_hz"), "b.yaml").netbox.tcp_port,
+            50017);
+}
+
+TEST(Bench, SaysWhatTheBoxIsToBeSetTo) {
+  const Bench bench = parse_bench(
+      changed(kBenchText, "iq:\n", "  settings: {rate_hz: 3500, filter_hz: 838, configuration: 2}\niq:\n"), "b.yaml");
+  EXPECT_EQ(bench.netbox.settings.rate_hz, 3500);
+  EXPECT_EQ(bench.netbox.settings.records_per_datagram, std::nullopt);
+  EXPECT_EQ(bench.netbox.settings.filter_hz, 838);
+  EXPECT_EQ(bench.netbox.settings.configuration, 2);
+  const Bench alone = parse_bench(changed(kBenchText, "  rate_hz: 3500\n", "  settings: {rate_hz: 1000}\n"), "b.yaml");
+  EXPECT_EQ(alone.netbox.rate_hz, 1000) << "what is set is expected";
+}
+
+TEST(Bench, RefusesSettingsThatContradictOrDoNotExist) {
+  const auto with = [](const std::string& settings) {
+    return refused("iq:\n", "  settings: {" + settings + "}\niq:\n");
+  };
+  EXPECT_THAT(with("rate_hz: 7000"),
+              ElementsAre("9:23: netbox.settings.rate_hz: 7000 is not the 3500 of netbox.rate_hz; write the same, or "
+                          "leave netbox.rate_hz out"));
+  EXPECT_THAT(with("filter_hz: 100"), ElementsAre(StartsWith("9:25: netbox.settings.filter_hz: 100 is not known")));
+  EXPECT_THAT(with("configuration: 16"),
+              ElementsAre(StartsWith("9:29: netbox.settings.configuration: 16 is above 15")));
+  EXPECT_THAT(with("comnetip: 1"), ElementsAre(StartsWith("9:14: comnetip is not a key of netbox.settings")));
+}
+
+TEST(Bench, FindsItsFaultScriptBesideItself) {
+  const auto text = changed(kBenchText, "  seed: 5\n", "  seed: 5\n  faults: bad_day.yaml\n");
+  EXPECT_EQ(parse_bench(text, "/lab/benches/b.yaml").simulation->faults, "/lab/benches/bad_day.yaml");
+  EXPECT_EQ(parse_bench(changed(text, "bad_day", "/tmp/bad_day"), "/lab/b.yaml").simulation->faults,
+            "/tmp/bad_day.yaml");
+  EXPECT_EQ(parse_bench(kBenchText, "b.yaml").simulation->faults, "");
 }
 
 TEST(Bench, TakesOnlyStandardBaudRates) {

@@ -33,6 +33,7 @@ TEST(Campaign, IsReadIntoSiUnits) {
   EXPECT_EQ(campaign.profile.last, from_rpm(19100));
   EXPECT_EQ(campaign.zero, Seconds(3));
   EXPECT_EQ(campaign.minimum_discard, Seconds(0.5));
+  EXPECT_FALSE(campaign.box_bias) << "never unasked";
   EXPECT_EQ(campaign.supply, Volts(12));
   EXPECT_EQ(campaign.limits.speed_max, from_rpm(19100));
   EXPECT_EQ(campaign.limits.thrust_max, Newtons(20));

@@ -22,6 +22,13 @@ TEST(Plan, OfThePapersCampaignHasFifteenRunsAndTwentyMinutesOfSpinning) {
   EXPECT_EQ(plan.bytes, 388'080'000u);
 }
 
+TEST(Plan, CountsTheTimeThatTheBoxesBiasTakes) {
+  Campaign campaign = parse_campaign(kCampaignText, "c.yaml");
+  const Seconds without = make_plan(campaign, Bench{}).bench;
+  campaign.box_bias = true;  // before each run measured twice for as long as a zero
+  EXPECT_EQ(make_plan(campaign, Bench{}).bench, without + campaign.zero * 12.0);
+}
+
 TEST(Plan, OfThePapersFourPropellersSpinsEightyMinutes) {
   Seconds spinning;
   for (const char* name : {"5in_2blade", "5in_3blade", "6in_2blade", "6in_3blade"}) {
