@@ -7,9 +7,12 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "compensation/units.hpp"
 #include "drivers/clock.hpp"
+#include "drivers/netbox/configuration.hpp"
+#include "drivers/netbox/finding.hpp"
 #include "profiles/bench.hpp"
 #include "results/records.hpp"
 #include "results/run_writer.hpp"
@@ -42,14 +45,23 @@ class MotorLink {
 class LoadCellLink {
  public:
   virtual ~LoadCellLink() = default;
+  /// As read last: when the link was made, or at start().
+  [[nodiscard]] virtual const netbox::Configuration& configuration() const = 0;
+  /// What making the link found besides, worst first; no faults: these throw.
+  [[nodiscard]] virtual std::vector<netbox::Finding> findings() const = 0;
   /// Reads the box's configuration and starts the stream. Throws DeviceError.
   virtual results::LoadCellScale start() = 0;
   virtual void stop() noexcept = 0;
   /// Takes what came since the last call. The recorder's thread.
   virtual std::size_t take(std::span<results::LoadCellRecord> out) = 0;
+  /// What happened to the stream since the last call, oldest first. The recorder's thread.
+  [[nodiscard]] virtual std::vector<results::StreamEvent> take_events() = 0;
+  /// Tells the box to take its present load as zero; the stream goes on. The runner's thread.
+  virtual void set_bias() noexcept = 0;
   /// Why the stream is dead; empty while it lives. Any thread.
   [[nodiscard]] virtual std::string failure() const = 0;
   [[nodiscard]] virtual results::SampleAccount account() const = 0;
+  [[nodiscard]] virtual results::StreamHealth health() const = 0;
 };
 
 class Bench {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "daq/load_cell_audit.hpp"
 #include "daq/reduction.hpp"
 #include "daq/repetitions.hpp"
 #include "daq/run.hpp"
@@ -43,6 +44,7 @@ class CampaignRun {
                               {"bench_sha256", results::sha256(place_.text)},
                               {"motor", bench_.motor().identity()}});
     try {
+      audit();
       for (const profiles::PlannedRun& planned : plan_.runs) one(planned);
     } catch (const std::exception& e) {
       note("campaign_stopped", {{"reason", e.what()}});
@@ -70,6 +72,15 @@ class CampaignRun {
     }
   }
 
+  void audit() {
+    for (const netbox::Finding& finding : audit_load_cell(bench_.load_cell(), campaign_, place_)) {
+      const bool is_note = finding.severity == netbox::Severity::note;
+      if (!is_note) progress_.say(describe(finding));
+      note("load_cell_finding",
+           {{"severity", is_note ? "note" : "warning"}, {"what", finding.what}, {"next_move", finding.next_move}});
+    }
+  }
+
   void mount(double occlusion_deg) {
     person_.mount(campaign_.propeller, occlusion_deg);
     bench_.mounted(campaign_.propeller.id, occlusion_deg);
@@ -78,15 +89,18 @@ class CampaignRun {
   }
 
   void accept(const RunResult& run) {
-    const auto means = reduce(results::read_run(run.file));
+    const results::RunRecording recording = results::read_run(run.file);
+    const auto means = reduce(recording);
     steps_.insert(steps_.end(), means.begin(), means.end());
     results::write_steps(folder_.steps(), steps_, bench_.files());
     results::write_steps(folder_.means(), average_repetitions(steps_), bench_.files());
     const std::uint64_t lost = run.account.lost_network + run.account.lost_host;
-    note(results::kRunAccepted, {{"file", "runs/" + run.file.filename().string()},
-                                 {"sha256", run.sha256},
-                                 {"samples", run.account.received},
-                                 {"lost", lost}});
+    json accepted = {{"file", "runs/" + run.file.filename().string()},
+                     {"sha256", run.sha256},
+                     {"samples", run.account.received},
+                     {"lost", lost}};
+    for (const results::StreamEvent& event : recording.events) accepted["events"].push_back(event.text);
+    note(results::kRunAccepted, accepted);
     int doubtful = 0;
     for (const auto& step : means) doubtful += step.doubts != 0;
     ++result_.runs;

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace kphi::daq {
 namespace {
 
 constexpr double kBinNs = 0.5e9;
 constexpr std::size_t kLeastBins = 4;
+constexpr results::Nanoseconds kNoBreak = std::numeric_limits<results::Nanoseconds>::max();
 
 /// One fresh record: device time, and how much later it arrived than the device's clock says.
 struct Point {
@@ -17,16 +19,20 @@ struct Point {
 
 }  // namespace
 
-ClockMap::ClockMap(std::span<const results::LoadCellRecord> records, double device_rate_hz)
+ClockMap::ClockMap(std::span<const results::LoadCellRecord> records, double device_rate_hz,
+                   std::span<const results::Nanoseconds> breaks)
     : records_(records), tick_ns_(1e9 / device_rate_hz) {
+  // Signed difference: the wrap of the 32-bit counter goes forward, a restart of the box back.
+  const auto counts_on = [&](std::size_t i) {
+    return static_cast<std::int32_t>(records[i].ft_sequence - records[i - 1].ft_sequence) > 0;
+  };
   for (std::size_t begin = 0; begin < records.size();) {
+    while (!breaks.empty() && breaks.front() <= records[begin].arrival_ns) breaks = breaks.subspan(1);
+    const results::Nanoseconds next_break = breaks.empty() ? kNoBreak : breaks.front();
     std::size_t end = begin + 1;
-    // Signed difference: the wrap of the 32-bit counter goes forward, a restart of the box back.
-    while (end < records.size() &&
-           static_cast<std::int32_t>(records[end].ft_sequence - records[end - 1].ft_sequence) > 0) {
-      ++end;
-    }
+    while (end < records.size() && counts_on(end) && records[end].arrival_ns < next_break) ++end;
     ClockEpoch epoch;
+    epoch.rebooted = begin > 0 && !counts_on(begin);
     epoch.begin = begin;
     epoch.end = end;
     epoch.ft_first = records[begin].ft_sequence;

@@ -11,21 +11,24 @@
 
 namespace kphi::daq {
 
-/// Records between two restarts of the box (ft_sequence jumps back): one clock each.
+/// Records during which ft_sequence counts without a break: one clock each.
 struct ClockEpoch {
   std::size_t begin = 0;  ///< index of the first record
   std::size_t end = 0;    ///< one past the last
   std::uint32_t ft_first = 0;
-  double offset_ns = 0;  ///< bench time of the first record
-  double skew = 0;       ///< bench ns gained per device ns
-  std::size_t bins = 0;  ///< points under the line; with fewer than 4 the skew is taken as 0
+  double offset_ns = 0;   ///< bench time of the first record
+  double skew = 0;        ///< bench ns gained per device ns
+  bool rebooted = false;  ///< ft_sequence jumped back at its begin: the box started anew
+  std::size_t bins = 0;   ///< points under the line; with fewer than 4 the skew is taken as 0
 };
 
 class ClockMap {
  public:
   /// `device_rate_hz`: rate at which ft_sequence counts. The records must outlive the map and be in order of arrival.
   /// Constant delays of box, filter and wire cannot be seen one-way: times are late by their smallest sum.
-  ClockMap(std::span<const results::LoadCellRecord> records, double device_rate_hz);
+  /// `breaks`: when the box took up counting after it had stood still; ascending.
+  ClockMap(std::span<const results::LoadCellRecord> records, double device_rate_hz,
+           std::span<const results::Nanoseconds> breaks = {});
 
   [[nodiscard]] const std::vector<ClockEpoch>& epochs() const { return epochs_; }
   /// Bench time of the sample in record `index` of `epoch`. Increases with the index.

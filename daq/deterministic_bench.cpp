@@ -5,7 +5,12 @@
 #include <stdexcept>
 
 #include "daq/device_records.hpp"
+#include "daq/slot_pages.hpp"
 #include "drivers/device_error.hpp"
+#include "drivers/netbox/calinfo.hpp"
+#include "drivers/sim/fault_file.hpp"
+#include "profiles/configuration_error.hpp"
+#include "profiles/strict_yaml.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -13,7 +18,16 @@ namespace {
 constexpr Duration kHandshake = std::chrono::seconds(5);
 constexpr Duration kWorkEvery = std::chrono::milliseconds(50);
 constexpr Duration kSyncEvery = std::chrono::seconds(1);
+constexpr Duration kHttpTimeout = std::chrono::seconds(5);
 constexpr sim::Peer kHost = 1;
+
+sim::FaultScript faults_of(const std::string& path) {
+  try {
+    return path.empty() ? sim::FaultScript() : sim::parse_faults(profiles::read_text(path), path);
+  } catch (const sim::FaultFileError& error) {
+    throw ConfigurationError(error.what());
+  }
+}
 
 sim::BenchSettings settings_of(const profiles::Bench& place) {
   sim::BenchSettings settings;
@@ -21,6 +35,7 @@ sim::BenchSettings settings_of(const profiles::Bench& place) {
   settings.netbox.rate_hz = place.netbox.rate_hz;
   settings.netbox.records_per_datagram = place.netbox.records_per_datagram;
   settings.module_id = place.iq.module_id;
+  if (place.simulation) settings.faults = faults_of(place.simulation->faults);
   return settings;
 }
 
@@ -42,9 +57,13 @@ netbox::StreamSettings stream_settings(const netbox::Configuration& box) {
   return settings;
 }
 
-std::string body_of(const std::string& response) {
+/// Throws DeviceError, as the true transport would.
+std::string body_of(const std::string& response, const std::string& operation) {
   const std::size_t blank = response.find("\r\n\r\n");
-  return blank == std::string::npos ? std::string() : response.substr(blank + 4);
+  const std::string status = response.substr(0, response.find("\r\n"));
+  if (blank == std::string::npos) throw DeviceError("Net Box", operation, "the answer is cut short");
+  if (status.find(" 200 ") == std::string::npos) throw DeviceError("Net Box", operation, "the box says: " + status);
+  return response.substr(blank + 4);
 }
 
 class WithinWaits final : public Background {
@@ -66,6 +85,33 @@ DeterministicBench::DeterministicBench(const profiles::Bench& place)
   motor_.connect(clock_.now());
   while (motor_.state() == iq::Session::State::connecting) step_to(clock_.now() + std::chrono::milliseconds(1));
   if (motor_.state() != iq::Session::State::ready) throw DeviceError("IQ module", "connect", motor_.failure());
+  read_box();
+  cross_check();
+  SlotPages slots = read_slot_pages([this](const std::string& target) { return page(target); });
+  slots_json_ = std::move(slots.json);
+  findings_.insert(findings_.end(), slots.findings.begin(), slots.findings.end());
+}
+
+std::string DeterministicBench::page(const std::string& target) {
+  const std::string operation = "GET " + target;
+  if (sim_.wire().http_refused(clock_.now())) throw DeviceError("Net Box", operation, "connection refused");
+  const sim::HttpReply reply = sim_.wire().http(operation + " HTTP/1.0\r\n\r\n", clock_.now());
+  if (reply.wait > kHttpTimeout) throw DeviceError("Net Box", operation, "no answer in time");
+  wait_until(clock_.now() + reply.wait);
+  return body_of(reply.bytes, operation);
+}
+
+void DeterministicBench::read_box() { configuration_ = netbox::parse_configuration(page("/netftapi2.xml")); }
+
+void DeterministicBench::cross_check() {
+  const auto request = netbox::encode_read_calinfo();
+  std::string received(request.begin(), request.end());
+  bool close = false;
+  const std::string answer = sim_.netbox().tcp(received, close);
+  const auto calinfo = netbox::decode_calinfo({reinterpret_cast<const std::uint8_t*>(answer.data()), answer.size()});
+  if (!calinfo) throw DeviceError("Net Box", "read the calibration over TCP", "the answer is none of a Net Box");
+  if (const auto finding = netbox::compare(*calinfo, configuration_))
+    throw DeviceError("Net Box", "compare its scale", finding->what, finding->next_move);
 }
 
 void DeterministicBench::wait_until(Instant when) {
@@ -73,7 +119,7 @@ void DeterministicBench::wait_until(Instant when) {
   while (clock_.now() < when) {
     Instant next = std::min(when, clock_.now() + datagram);
     next = std::min(next, motor_.deadline());
-    if (stream_) next = std::min({next, stream_->deadline(), stream_->release_deadline()});
+    if (stream_) next = std::min({next, stream_->deadline(), stream_->release_deadline(), sim_.wire().next_arrival()});
     step_to(std::max(next, clock_.now() + Duration(1)));
     if (work_ && clock_.now() >= next_work_) {
       (*work_)();
@@ -114,11 +160,14 @@ void DeterministicBench::exchange_motor() {
 void DeterministicBench::exchange_load_cell() {
   if (stream_) {
     std::array<std::uint8_t, 8> request{};
-    while (stream_->next_request(request)) sim_.netbox().receive(request, kHost);
+    while (stream_->next_request(request)) sim_.wire().request(request, kHost, clock_.now());
   }
   sim::Datagram datagram;
-  while (sim_.netbox().next_datagram(datagram)) {
-    if (stream_) stream_->receive(datagram.payload(), clock_.now(), records_);
+  while (sim_.wire().next_datagram(datagram, clock_.now())) {
+    if (!stream_ || datagram.foreign) continue;  // a connected socket does not see what others send
+    const std::size_t before = records_.size();
+    stream_->receive(datagram.payload(), datagram.at, records_);
+    if (records_.size() > before) meter_->note(records_.back(), records_.size() - before, stream_->counters().reboots);
   }
 }
 
@@ -159,8 +208,11 @@ std::size_t DeterministicBench::take(std::span<results::MotorReading> out) {
 std::string DeterministicBench::identity() const { return motor_.identity().summary(); }
 
 results::LoadCellScale DeterministicBench::start() {
-  configuration_ = netbox::parse_configuration(body_of(sim_.netbox().http("GET /netftapi2.xml HTTP/1.0\r\n\r\n")));
+  stream_.reset();
+  read_box();
   stream_.emplace(stream_settings(configuration_));
+  meter_.emplace(configuration_.device_rate_hz);
+  meter_->begin();
   records_.clear();
   taken_ = 0;
   stream_->start(clock_.now());
@@ -169,7 +221,9 @@ results::LoadCellScale DeterministicBench::start() {
     step_to(clock_.now() + std::chrono::milliseconds(1));
   }
   if (stream_->state() != netbox::State::streaming) throw DeviceError("Net Box", "start the stream", "no record came");
-  return to_scale(configuration_);
+  results::LoadCellScale scale = to_scale(configuration_);
+  scale.slots_json = slots_json_;
+  return scale;
 }
 
 void DeterministicBench::stop() noexcept {
@@ -187,6 +241,43 @@ std::size_t DeterministicBench::take(std::span<results::LoadCellRecord> out) {
     taken_ = 0;
   }
   return n;
+}
+
+std::vector<results::StreamEvent> DeterministicBench::take_events() {
+  std::vector<results::StreamEvent> events;
+  for (netbox::Event event : stream_->take_events()) {
+    events.push_back(to_event(event));
+    if (event.kind != netbox::EventKind::silent) continue;
+    event = {};
+    event.kind = why_silent();
+    event.at = clock_.now();
+    events.push_back(to_event(event));
+  }
+  events_dropped_ = stream_->events().dropped();
+  return events;
+}
+
+/// What netbox::Inquiry asks over HTTP.
+netbox::EventKind DeterministicBench::why_silent() {
+  if (sim_.wire().http_refused(clock_.now())) return netbox::EventKind::unreachable;
+  try {
+    const std::string operation = "GET /netftapi2.xml";
+    const std::string xml = body_of(sim_.wire().http(operation + " HTTP/1.0\r\n\r\n", clock_.now()).bytes, operation);
+    return netbox::parse_configuration(xml).rdt_enabled ? netbox::EventKind::stolen : netbox::EventKind::rdt_disabled;
+  } catch (const DeviceError&) {
+    return netbox::EventKind::unreachable;
+  }
+}
+
+void DeterministicBench::set_bias() noexcept {
+  stream_->set_bias(clock_.now());
+  exchange_load_cell();
+}
+
+results::StreamHealth DeterministicBench::health() const {
+  netbox::Health health = meter_->health();
+  health.events_dropped = events_dropped_;
+  return to_health(health, clock_);
 }
 
 results::SampleAccount DeterministicBench::account() const { return to_account(stream_->counters()); }

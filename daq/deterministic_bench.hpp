@@ -1,5 +1,5 @@
 // The bench in virtual time: driver sessions joined to simulated devices without transports, one thread, one seed.
-// The same campaign gives the same bytes, and takes seconds.
+// The same campaign gives the same bytes, and takes seconds; also when a script spoils the load cell's wire.
 #pragma once
 
 #include <optional>
@@ -8,6 +8,7 @@
 #include "daq/bench.hpp"
 #include "drivers/iq/session.hpp"
 #include "drivers/netbox/configuration.hpp"
+#include "drivers/netbox/health.hpp"
 #include "drivers/netbox/session.hpp"
 #include "drivers/sim/bench.hpp"
 
@@ -15,6 +16,7 @@ namespace kphi::daq {
 
 class DeterministicBench final : public Bench, private MotorLink, private LoadCellLink {
  public:
+  /// Throws DeviceError; ConfigurationError when the fault script that the file names cannot be used.
   explicit DeterministicBench(const profiles::Bench& place);
   [[nodiscard]] const Clock& clock() const override { return clock_; }
   [[nodiscard]] MotorLink& motor() override { return *this; }
@@ -35,12 +37,21 @@ class DeterministicBench final : public Bench, private MotorLink, private LoadCe
   void coast() noexcept override;
   std::size_t take(std::span<results::MotorReading> out) override;
   [[nodiscard]] std::string identity() const override;
+  [[nodiscard]] const netbox::Configuration& configuration() const override { return configuration_; }
+  [[nodiscard]] std::vector<netbox::Finding> findings() const override { return findings_; }
   results::LoadCellScale start() override;
   void stop() noexcept override;
   std::size_t take(std::span<results::LoadCellRecord> out) override;
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+  void set_bias() noexcept override;
   [[nodiscard]] results::SampleAccount account() const override;
+  [[nodiscard]] results::StreamHealth health() const override;
   [[nodiscard]] std::string failure() const override;
 
+  [[nodiscard]] std::string page(const std::string& target);
+  void read_box();
+  void cross_check();
+  [[nodiscard]] netbox::EventKind why_silent();
   void step_to(Instant when);
   void exchange();
   void exchange_motor();
@@ -52,7 +63,11 @@ class DeterministicBench final : public Bench, private MotorLink, private LoadCe
   sim::SimulatedBench sim_;
   iq::Session motor_;
   netbox::Configuration configuration_;
+  std::vector<netbox::Finding> findings_;
+  std::string slots_json_;
   std::optional<netbox::Session> stream_;
+  std::optional<netbox::HealthMeter> meter_;
+  std::uint64_t events_dropped_ = 0;
   std::vector<netbox::StampedRecord> records_;
   std::size_t taken_ = 0;
   std::function<void()>* work_ = nullptr;

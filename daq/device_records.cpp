@@ -24,6 +24,34 @@ results::MotorChannel channel_of(iq::Quantity quantity) noexcept {
   return MotorChannel::speed;
 }
 
+results::EventKind event_kind_of(netbox::EventKind kind) noexcept {
+  using From = netbox::EventKind;
+  using To = results::EventKind;
+  switch (kind) {
+    case From::restarted:
+      return To::restarted;
+    case From::rebooted:
+      return To::rebooted;
+    case From::stalled:
+      return To::stalled;
+    case From::stall_ended:
+      return To::stall_ended;
+    case From::silent:
+      return To::silent;
+    case From::resumed:
+      return To::resumed;
+    case From::box_trouble:
+      return To::box_trouble;
+    case From::stolen:
+      return To::stolen;
+    case From::rdt_disabled:
+      return To::rdt_disabled;
+    case From::unreachable:
+      return To::unreachable;
+  }
+  return To::box_trouble;
+}
+
 }  // namespace
 
 results::LoadCellRecord to_record(const netbox::StampedRecord& stamped) noexcept {
@@ -33,6 +61,37 @@ results::LoadCellRecord to_record(const netbox::StampedRecord& stamped) noexcept
 
 results::MotorReading to_reading(const iq::Reading& reading) noexcept {
   return {channel_of(reading.quantity), reading.time.count(), reading.uncertainty.count(), reading.value};
+}
+
+netbox::StampedRecord to_stamped(const results::LoadCellRecord& record) noexcept {
+  return {{record.rdt_sequence, record.ft_sequence, record.status, record.counts}, Instant(record.arrival_ns)};
+}
+
+results::StreamEvent to_event(const netbox::Event& event) {
+  std::string text = netbox::to_string(event);
+  if (event.kind == netbox::EventKind::rebooted) text += "; the steps that follow in this run are in doubt";
+  return {event_kind_of(event.kind), event.at.count(), event.records, std::move(text)};
+}
+
+results::StreamHealth to_health(const netbox::Health& health, const Clock& clock) noexcept {
+  results::StreamHealth out;
+  out.records_per_second = health.records_per_second;
+  out.datagrams_per_second = health.datagrams_per_second;
+  out.jitter_p50_s = to_seconds(clock.shrunk(Duration(health.jitter_p50_ns)));
+  out.jitter_p99_s = to_seconds(clock.shrunk(Duration(health.jitter_p99_ns)));
+  out.skew_ppm = health.skew_ppm;
+  out.clock_uncertainty_s = to_seconds(Duration(health.clock_uncertainty_ns));
+  out.queue_high_water = health.queue_high_water;
+  out.events_dropped = health.events_dropped;
+  return out;
+}
+
+netbox::Configuration to_configuration(const results::LoadCellScale& scale) {
+  netbox::Configuration configuration;
+  configuration.counts_per_newton = scale.counts_per_newton;
+  configuration.counts_per_newton_metre = scale.counts_per_newton_metre;
+  configuration.range = scale.range;
+  return configuration;
 }
 
 results::LoadCellScale to_scale(const netbox::Configuration& configuration) {
@@ -51,13 +110,17 @@ results::LoadCellScale to_scale(const netbox::Configuration& configuration) {
 results::SampleAccount to_account(const netbox::Counters& counters) noexcept {
   results::SampleAccount account;
   account.expected = counters.expected;
-  account.received = counters.received;
+  account.received = counters.received - counters.queue_overflows;
   account.lost_network = counters.lost_network;
-  account.lost_host = counters.lost_host;
+  account.lost_host = counters.lost_host + counters.queue_overflows;
   account.duplicates = counters.duplicates;
   account.late = counters.late;
   account.malformed = counters.malformed;
   account.restarts = counters.restarts;
+  account.reboots = counters.reboots;
+  account.reordered = counters.reordered;
+  account.stalled = counters.stalled;
+  account.irregular = counters.irregular;
   return account;
 }
 

@@ -8,10 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "daq/load_cell_audit.hpp"
 #include "drivers/device_error.hpp"
 #include "drivers/iq/motor.hpp"
 #include "drivers/netbox/probe.hpp"
 #include "profiles/bench.hpp"
+#include "profiles/campaign.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -22,6 +24,7 @@ constexpr const char* kFactoryAddress = "192.168.1.1";
 
 struct Asked {
   std::string bench;
+  std::string campaign;
   bool json = false;
 };
 
@@ -67,12 +70,17 @@ const char* word(netbox::Severity severity) {
   return severity == netbox::Severity::fault ? "fault" : severity == netbox::Severity::warning ? "warning" : "note";
 }
 
-Answer ask_load_cell(const profiles::NetBoxPlace& place, const Clock& clock, bool from_bench) {
+netbox::ProbeSettings probe_settings(const Asked& asked, const std::optional<profiles::Bench>& bench) {
   netbox::ProbeSettings settings;
-  if (from_bench) {
-    settings.intention.rate_hz = place.rate_hz;
-    settings.intention.records_per_datagram = place.records_per_datagram;
-  }
+  if (!bench) return settings;
+  settings.tcp_port = bench->netbox.tcp_port;
+  settings.intention.rate_hz = bench->netbox.rate_hz;
+  settings.intention.records_per_datagram = bench->netbox.records_per_datagram;
+  if (!asked.campaign.empty()) settings.intention = intention_of(profiles::load_campaign(asked.campaign), *bench);
+  return settings;
+}
+
+Answer ask_load_cell(const profiles::NetBoxPlace& place, const Clock& clock, const netbox::ProbeSettings& settings) {
   const netbox::Probe probe = netbox::probe({place.host, place.rdt_port, place.http_port}, clock, settings);
   Answer answer{"Net Box " + place.host, probe.answers(), probe.lines(), {}};
   if (probe.configuration) answer.details["configuration"] = to_json(*probe.configuration);
@@ -133,7 +141,7 @@ int devices(const Asked& asked) {
   profiles::NetBoxPlace factory;
   factory.host = kFactoryAddress;
   std::vector<Answer> answers;
-  answers.push_back(ask_load_cell(bench ? bench->netbox : factory, clock, bench.has_value()));
+  answers.push_back(ask_load_cell(bench ? bench->netbox : factory, clock, probe_settings(asked, bench)));
   if (bench) answers.push_back(ask_motor(bench->iq, clock));
   print(answers, asked.json);
   if (!bench) fmt::print(stderr, "kphi: no bench file: only the Net Box's factory address was asked; use --bench\n");
@@ -149,6 +157,9 @@ void add_devices(CLI::App& program, int& exit_code) {
   auto asked = std::make_shared<Asked>();
   CLI::App* command = program.add_subcommand("devices", "what answers, who it is, what is wrong with it");
   command->add_option("--bench", asked->bench, "bench file; without it the Net Box's factory address is asked")
+      ->check(CLI::ExistingFile);
+  command->add_option("--campaign", asked->campaign, "campaign file: are rate and ranges good for its speeds?")
+      ->needs("--bench")
       ->check(CLI::ExistingFile);
   command->add_flag("--json", asked->json, "for a script");
   command->callback([asked, &exit_code] { exit_code = devices(*asked); });

@@ -6,14 +6,18 @@
 #include <cmath>
 #include <thread>
 
-#include "daq/device_records.hpp"
+#include "daq/slot_pages.hpp"
 #include "drivers/device_error.hpp"
+#include "drivers/netbox/calinfo.hpp"
+#include "drivers/netbox/http.hpp"
 #include "drivers/sim/control_line.hpp"
 
 namespace kphi::daq {
 namespace {
 
 constexpr Duration kDrainWall = std::chrono::milliseconds(5);
+constexpr std::chrono::seconds kCalinfoTimeout{1};
+constexpr std::chrono::seconds kPageTimeout{5};
 constexpr Duration kSyncWall = std::chrono::milliseconds(500);
 
 iq::Settings motor_settings(const profiles::MotorPlace& place) {
@@ -65,6 +69,15 @@ std::string LiveMotor::failure() const {
 LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock) : place_(std::move(place)), clock_(clock) {
   // Whether the box answers at all is asked before anybody mounts anything.
   cell_ = std::make_unique<netbox::LoadCell>(netbox::Place{place_.host, place_.rdt_port, place_.http_port}, clock_);
+  if (auto finding = netbox::cross_check(place_.host, place_.tcp_port, configuration(), kCalinfoTimeout)) {
+    if (finding->severity == netbox::Severity::fault)
+      throw DeviceError("Net Box " + place_.host, "compare its scale", finding->what, finding->next_move);
+    findings_.push_back(std::move(*finding));
+  }
+  SlotPages slots = read_slot_pages(
+      [&](const std::string& target) { return netbox::http_get(place_.host, place_.http_port, target, kPageTimeout); });
+  slots_json_ = std::move(slots.json);
+  findings_.insert(findings_.end(), slots.findings.begin(), slots.findings.end());
 }
 
 results::LoadCellScale LiveLoadCell::start() {
@@ -78,7 +91,15 @@ results::LoadCellScale LiveLoadCell::start() {
         "set the RDT output rate on the box's communication page or rate_hz in the bench file");
   }
   cell_->start();
-  return to_scale(found);
+  results::LoadCellScale scale = to_scale(found);
+  scale.slots_json = slots_json_;
+  return scale;
+}
+
+std::vector<results::StreamEvent> LiveLoadCell::take_events() {
+  std::vector<results::StreamEvent> events;
+  for (const netbox::Event& event : cell_->take_events()) events.push_back(to_event(event));
+  return events;
 }
 
 void LiveLoadCell::stop() noexcept { cell_->stop(); }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "daq/bench.hpp"
+#include "daq/device_records.hpp"
 #include "drivers/iq/motor.hpp"
 #include "drivers/netbox/load_cell.hpp"
 
@@ -27,18 +28,26 @@ class LiveMotor final : public MotorLink {
 
 class LiveLoadCell final : public LoadCellLink {
  public:
+  /// Reads the configuration, holds it against what TCP says, reads the pages of all slots. Throws DeviceError.
   LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock);
+  [[nodiscard]] const netbox::Configuration& configuration() const override { return cell_->configuration(); }
+  [[nodiscard]] std::vector<netbox::Finding> findings() const override { return findings_; }
   results::LoadCellScale start() override;
   void stop() noexcept override;
   std::size_t take(std::span<results::LoadCellRecord> out) override;
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+  void set_bias() noexcept override { cell_->set_bias(); }
   [[nodiscard]] std::string failure() const override;
   [[nodiscard]] results::SampleAccount account() const override;
+  [[nodiscard]] results::StreamHealth health() const override { return to_health(cell_->health(), clock_); }
 
  private:
   profiles::NetBoxPlace place_;
   const Clock& clock_;
   std::unique_ptr<netbox::LoadCell> cell_;  ///< of the present or last run
   std::vector<netbox::StampedRecord> records_;
+  std::vector<netbox::Finding> findings_;
+  std::string slots_json_;
 };
 
 class LiveBench final : public Bench {

@@ -1,19 +1,31 @@
 #include "daq/recorder.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
+
+#include "daq/device_records.hpp"
 
 namespace kphi::daq {
 namespace {
 
 constexpr std::size_t kRecordsAtOnce = 7000;
 constexpr std::size_t kReadingsAtOnce = 512;
+constexpr std::array kAxes{"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
+
+results::EventKind kind_of(netbox::RangeVerdict verdict) {
+  if (verdict == netbox::RangeVerdict::trip) return results::EventKind::range_trip;
+  return verdict == netbox::RangeVerdict::beyond ? results::EventKind::beyond_range : results::EventKind::near_range;
+}
 
 }  // namespace
 
-Recorder::Recorder(Bench& bench, results::RunWriter& writer, ThrustAxis axis)
+Recorder::Recorder(Bench& bench, results::RunWriter& writer, ThrustAxis axis, const results::LoadCellScale& scale)
     : bench_(bench),
       writer_(writer),
       axis_(axis),
+      scale_(to_configuration(scale)),
+      watch_(scale_),
       next_sync_(bench.clock().now() + bench.sync_interval()),
       records_(kRecordsAtOnce),
       readings_(kReadingsAtOnce),
@@ -25,6 +37,7 @@ void Recorder::drain() noexcept {
   try {
     drain_marks();
     drain_load_cell();
+    drain_events();
     drain_motor();
     if (const Instant now = bench_.clock().now(); now >= next_sync_) {
       writer_.sync();
@@ -42,16 +55,49 @@ void Recorder::drain_marks() {
     writer_.mark(mark);
     phase_sum_n_ = 0;
     phase_count_ = 0;
+    measuring_ = mark.phase == results::Phase::bias_before || mark.phase == results::Phase::bias_after;
+    estimate_ = {};
   }
+}
+
+void Recorder::drain_events() {
+  for (results::StreamEvent& event : bench_.load_cell().take_events()) note(std::move(event));
+}
+
+void Recorder::note(results::StreamEvent event) {
+  writer_.note(event);
+  events_.push(event);  // a full queue: nobody listens, and the file has it
+}
+
+void Recorder::look_at(std::span<const results::LoadCellRecord> batch) {
+  for (const results::LoadCellRecord& record : batch) {
+    const netbox::StampedRecord stamped = to_stamped(record);
+    const netbox::RangeVerdict verdict = watch_.look(stamped.record);
+    if (verdict > worst_) note_range(verdict, record.arrival_ns);
+    if (measuring_) estimate_.add(stamped);
+  }
+  if (measuring_) measured_.publish(estimate_.result(scale_));
+}
+
+void Recorder::note_range(netbox::RangeVerdict verdict, results::Nanoseconds at) {
+  worst_ = verdict;
+  const auto axis = static_cast<std::size_t>(watch_.worst_axis());
+  const std::string load = fmt::format("{} carries {:.0f} % of its range of {:g} {}", kAxes[axis],
+                                       100 * watch_.largest_load(), scale_.range[axis], axis < 3 ? "N" : "N m");
+  note({kind_of(verdict), at, 0, fmt::format("{:.3f} s: {}", 1e-9 * static_cast<double>(at), load)});
+  if (verdict != netbox::RangeVerdict::trip) return;
+  trip_ = load;
+  tripped_.store(true, std::memory_order_release);
 }
 
 void Recorder::drain_load_cell() {
   while (const std::size_t n = bench_.load_cell().take(records_)) {
     const std::span<const results::LoadCellRecord> batch(records_.data(), n);
     writer_.append(batch);
+    look_at(batch);
     std::int64_t sum = 0;
     for (const auto& record : batch) sum += record.counts[static_cast<std::size_t>(axis_.axis)];
-    const double newtons = axis_.sign * static_cast<double>(sum) / axis_.counts_per_newton;
+    const double newtons = axis_.sign * static_cast<double>(sum) / scale_.counts_per_newton;
     phase_sum_n_ += newtons;
     phase_count_ += n;
     thrust_n_ = newtons / static_cast<double>(n);
@@ -79,6 +125,17 @@ void Recorder::mark(results::Phase phase, int step, RadPerSec commanded) {
   if (!marks_.push({phase, step, bench_.clock().now().count(), commanded.value()})) {
     throw std::runtime_error("recorder: nobody takes the marks of the run");
   }
+}
+
+std::vector<results::StreamEvent> Recorder::take_events() {
+  std::vector<results::StreamEvent> taken;
+  events_.consume_all([&](const results::StreamEvent& event) { taken.push_back(event); });
+  return taken;
+}
+
+std::optional<std::string> Recorder::range_trip() const {
+  if (!tripped_.load(std::memory_order_acquire)) return std::nullopt;
+  return trip_;
 }
 
 void Recorder::take_zero() noexcept { zero_n_ = phase_mean_n_.load(); }

@@ -1,13 +1,18 @@
-// Empties the devices' queues into the run file and remembers the newest of everything.
+// Empties the devices' queues into the run file, looks at every sample and remembers the newest of everything.
 #pragma once
 
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <exception>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "daq/bench.hpp"
 #include "daq/interlock.hpp"
+#include "drivers/netbox/bias.hpp"
+#include "drivers/netbox/published.hpp"
+#include "drivers/netbox/range_watch.hpp"
 
 namespace kphi::daq {
 
@@ -15,19 +20,24 @@ namespace kphi::daq {
 struct ThrustAxis {
   int axis = 2;  ///< 0..2 = Fx, Fy, Fz
   int sign = +1;
-  double counts_per_newton = 1e6;
 };
 
 /// Two threads: drain() belongs to one, all else to the runner. Neither waits for the other.
 class Recorder {
  public:
-  Recorder(Bench& bench, results::RunWriter& writer, ThrustAxis axis);
+  Recorder(Bench& bench, results::RunWriter& writer, ThrustAxis axis, const results::LoadCellScale& scale);
 
   /// Takes all that waits, appends it, secures the file when it is time. Keeps the first error for check_failure and
   /// does nothing after it.
   void drain() noexcept;
   /// Begins a phase now.
   void mark(results::Phase phase, int step, RadPerSec commanded);
+  /// What happened to the load cell since the last call; all of it is in the file already.
+  [[nodiscard]] std::vector<results::StreamEvent> take_events();
+  /// The load cell is in danger: an axis above 110 % of its range. Says which, and how much.
+  [[nodiscard]] std::optional<std::string> range_trip() const;
+  /// Mean and standard deviation of all axes over the present phase, which measures a bias.
+  [[nodiscard]] netbox::ZeroMeasurement measured() const noexcept { return measured_.read(); }
   /// The mean thrust of the current phase becomes the zero of observe().
   void take_zero() noexcept;
   /// The newest of everything at bench time `now`.
@@ -39,20 +49,33 @@ class Recorder {
   void drain_load_cell();
   void drain_motor();
   void drain_marks();
+  void drain_events();
+  void look_at(std::span<const results::LoadCellRecord> batch);
+  void note(results::StreamEvent event);
+  void note_range(netbox::RangeVerdict verdict, results::Nanoseconds at);
 
   Bench& bench_;
   results::RunWriter& writer_;
   ThrustAxis axis_;
+  const netbox::Configuration scale_;
+  netbox::RangeWatch watch_;
+  netbox::RangeVerdict worst_ = netbox::RangeVerdict::inside;
+  bool measuring_ = false;
+  netbox::ZeroEstimate estimate_;
   Instant next_sync_;
   std::vector<results::LoadCellRecord> records_;
   std::vector<results::MotorReading> readings_;
   boost::lockfree::spsc_queue<results::PhaseMark, boost::lockfree::capacity<1024>> marks_;
+  boost::lockfree::spsc_queue<results::StreamEvent, boost::lockfree::capacity<256>> events_;  // to the runner
   double phase_sum_n_ = 0;
   std::uint64_t phase_count_ = 0;
 
   std::atomic<double> thrust_n_{0}, phase_mean_n_{0}, zero_n_{0};
   std::atomic<double> speed_rad_s_{0}, supply_current_a_{0}, coil_temperature_degc_{0};
   std::atomic<std::int64_t> load_cell_ns_, motor_ns_;
+  netbox::Published<netbox::ZeroMeasurement> measured_;
+  std::atomic<bool> tripped_{false};
+  std::string trip_;  // written before tripped_, read after it
   std::atomic<bool> failed_{false};
   std::exception_ptr failure_;  // written before failed_, read after it
 };

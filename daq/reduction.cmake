@@ -1,6 +1,7 @@
 # Raw run to step means: a library of its own, so that replay needs no device.
 add_library(kphi_reduction STATIC
   clock_map.cpp
+  event_doubts.cpp
   reduction.cpp
   repetitions.cpp
 )

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "daq/clock_map.hpp"
+#include "daq/event_doubts.hpp"
 #include "results/record_error.hpp"
 
 namespace kphi::daq {
@@ -81,13 +82,30 @@ struct CellWindow {
 class CellStream {
  public:
   explicit CellStream(const results::RunRecording& run)
-      : header_(run.header), records_(run.load_cell), clock_(run.load_cell, run.header.load_cell.device_rate_hz) {
+      : header_(run.header),
+        records_(run.load_cell),
+        clock_(run.load_cell, run.header.load_cell.device_rate_hz, stall_ends(run.events)) {
+    for (const ClockEpoch& epoch : clock_.epochs()) {
+      if (epoch.rebooted) reboots_.push_back(clock_.time_ns(epoch, epoch.begin));
+    }
     const auto& scale = header_.load_cell;
     for (std::size_t i = 0; i < limits_.size(); ++i) {
       const double counts = scale.range[i] * (i < 3 ? scale.counts_per_newton : scale.counts_per_newton_metre);
       const double full = std::numeric_limits<std::int32_t>::max();
       limits_[i] = static_cast<std::int64_t>(counts > 0 && counts < full ? counts : full);
     }
+  }
+
+  /// How often the box had started anew before `time`.
+  [[nodiscard]] std::size_t boot_at(Nanoseconds time) const {
+    return static_cast<std::size_t>(std::count_if(reboots_.begin(), reboots_.end(), [&](auto t) { return t < time; }));
+  }
+  /// The part of a window after the last restart of the box in it.
+  [[nodiscard]] Window since_reboot(Window window) const {
+    for (const Nanoseconds time : reboots_) {
+      if (time < window.end) window.begin = std::max(window.begin, time);
+    }
+    return window;
   }
 
   [[nodiscard]] CellWindow over(const Window& window) const {
@@ -138,6 +156,7 @@ class CellStream {
   const results::RunHeader& header_;
   const std::vector<LoadCellRecord>& records_;
   ClockMap clock_;
+  std::vector<Nanoseconds> reboots_;
   std::array<std::int64_t, 6> limits_{};
 };
 
@@ -188,18 +207,22 @@ struct Zero {
   double time = 0;   ///< ns, centre of its window
   double force = 0;  ///< counts
   double torque = 0;
+  std::size_t boot = 0;  ///< a zero holds for one power-up of the box
 };
 
 class Zeros {
  public:
   void add(const Zero& zero) { (zeros_[0] ? zeros_[1] : zeros_[0]) = zero; }
   [[nodiscard]] bool empty() const { return !zeros_[0]; }
-  [[nodiscard]] Zero at(double time) const {
+  /// Power-up of the first zero: the only one without doubt.
+  [[nodiscard]] std::size_t boot() const { return zeros_[0]->boot; }
+  [[nodiscard]] Zero at(double time, std::size_t boot) const {
     const Zero& a = *zeros_[0];
     if (!zeros_[1] || zeros_[1]->time == a.time) return a;
     const Zero& b = *zeros_[1];
+    if (a.boot != b.boot) return b.boot == boot ? b : a;
     const double share = (time - a.time) / (b.time - a.time);
-    return {time, a.force + share * (b.force - a.force), a.torque + share * (b.torque - a.torque)};
+    return {time, a.force + share * (b.force - a.force), a.torque + share * (b.torque - a.torque), boot};
   }
 
  private:
@@ -208,7 +231,8 @@ class Zeros {
 
 class Reduction {
  public:
-  explicit Reduction(const results::RunRecording& run) : run_(run), cell_(run), motor_(run.motor) {}
+  explicit Reduction(const results::RunRecording& run)
+      : run_(run), cell_(run), motor_(run.motor), spans_(doubt_spans(run.events)) {}
 
   [[nodiscard]] std::vector<StepMean> steps() {
     find_zeros();
@@ -242,8 +266,10 @@ class Reduction {
         window.begin = std::max(window.begin, standstill_in(phase_window(i)));
         if (window.end - window.begin < planned / 10) continue;
       }
+      window = cell_.since_reboot(window);
       const CellWindow zero = cell_.over(window);
-      if (zero.force.n() > 0) zeros_.add({window.centre(), zero.force.mean(), zero.torque.mean()});
+      if (zero.force.n() == 0) continue;
+      zeros_.add({window.centre(), zero.force.mean(), zero.torque.mean(), cell_.boot_at(window.end)});
     }
   }
 
@@ -283,7 +309,7 @@ class Reduction {
       throw results::RecordError(
           fmt::format("run {}: no load-cell samples while the motor stood; repeat the run", header.uuid));
     }
-    const Zero zero = zeros_.at(window.centre());
+    const Zero zero = zeros_.at(window.centre(), cell_.boot_at(window.end));
     const double newtons = header.thrust_sign / header.load_cell.counts_per_newton;
     const double newton_metres = header.thrust_sign / header.load_cell.counts_per_newton_metre;
     const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -322,7 +348,8 @@ class Reduction {
         1e-9 * static_cast<double>(run_.phases[i + 1].time_ns - run_.phases[i].time_ns - discard());
     const double expected = std::max(planned_s, 0.0) * run_.header.load_cell.sample_rate_hz;
     const double derate = motor_.statistics(MotorChannel::derate, window).least;
-    std::uint32_t bits = 0;
+    const Window whole = phase_window(i);
+    std::uint32_t bits = doubts_within(spans_, whole.begin, whole.end);
     const auto note = [&](Doubt doubt, bool applies) { bits |= applies ? static_cast<std::uint32_t>(doubt) : 0u; };
     // Without a single reading nobody knows: that is "not reached", too.
     note(Doubt::speed_not_reached, !(std::abs(speed.mean - commanded) <= speed_tolerance(commanded)));
@@ -330,6 +357,7 @@ class Reduction {
     note(Doubt::saturated, (cell.status & kSaturationBit) != 0 || cell.at_limit);
     note(Doubt::lost_samples, cell.lost > 0);
     note(Doubt::derated, derate < 1);
+    note(Doubt::rebooted, cell_.boot_at(whole.end) != zeros_.boot());
     note(Doubt::few_samples,
          static_cast<double>(cell.force.n()) < kFewSamples * expected || cell.force.n() == 0 || speed.n < kFewSpeeds);
     const std::uint32_t told = kSaturationBit | kMonitorBit;
@@ -341,6 +369,7 @@ class Reduction {
   const results::RunRecording& run_;
   CellStream cell_;
   MotorSeries motor_;
+  std::vector<DoubtSpan> spans_;
   Zeros zeros_;
 };
 

@@ -15,7 +15,8 @@ namespace kphi::daq {
 /// load-cell samples are placed by ClockMap.
 /// Thrust: sign · (mean counts - zero) / counts per newton. Torque: about the direction of the thrust, likewise.
 /// Zero: mean of zero_before and of zero_after (without its beginning, and only once the motor stands), linear in time
-/// between the two; with one of them only, that one.
+/// between the two; with one of them only, that one. A zero holds for one power-up of the box: when the box started
+/// anew in the run, each step takes that of its own power-up if there is one, and all after the first are in doubt.
 /// Standard deviations are those of the samples (n - 1). Speed is unsigned: positive in the direction of the spin.
 /// A motor channel without a reading in the window gives NaN.
 ///

@@ -7,9 +7,11 @@
 #include <boost/uuid/uuid_io.hpp>
 #include <optional>
 
+#include "daq/box_bias.hpp"
 #include "daq/interrupt.hpp"
 #include "daq/recorder.hpp"
 #include "daq/spin.hpp"
+#include "drivers/device_error.hpp"
 #include "results/run_writer.hpp"
 #include "results/version.hpp"
 
@@ -22,6 +24,17 @@ constexpr Duration kTickWall = std::chrono::milliseconds(10);
 constexpr Duration kPatienceWall = std::chrono::milliseconds(500);
 constexpr double kStandstillRadPerSec = 5.0;
 constexpr double kSpinDownLimitSeconds = 30.0;
+constexpr Duration kBiasWorksWall = std::chrono::milliseconds(100);  // what was on its way still has the old zero
+constexpr Duration kExplanationWall = std::chrono::seconds(3);       // the box is asked over HTTP for 2 s
+constexpr int kBiasAttempts = 3;
+constexpr int kLinesOfEvents = 10;
+
+/// The box has been asked why it is silent, or is so no more.
+bool explains_silence(results::EventKind kind) {
+  using results::EventKind;
+  return kind == EventKind::stolen || kind == EventKind::rdt_disabled || kind == EventKind::unreachable ||
+         kind == EventKind::resumed;
+}
 
 results::RunHeader header_of(const RunOrder& order, Bench& bench, const results::LoadCellScale& scale) {
   const auto& [campaign, place, occlusion_deg, repetition, remaining, file] = order;
@@ -67,6 +80,7 @@ class Sequence {
 
   void run() {
     wait_for_standstill();
+    if (order_.campaign.box_bias) take_box_bias();
     hold_zero(Phase::zero_before);
     recorder_.take_zero();
     spin_through_the_steps();
@@ -75,7 +89,53 @@ class Sequence {
     recorder_.mark(Phase::end, -1, RadPerSec(0));
   }
 
+  [[nodiscard]] const results::BoxBias& box_bias() const { return box_bias_; }
+
+  /// After a stop: when the load cell has fallen silent, why, as far as the box tells; else empty.
+  std::string explanation() {
+    const Instant since = bench_.clock().now();
+    const auto stretched = [&](Duration wall) { return bench_.clock().stretched(wall); };
+    if (recorder_.observe(since).load_cell_age < stretched(kPatienceWall) / 2) return {};
+    while (bench_.clock().now() < since + stretched(kExplanationWall) && !stop_asked_()) {
+      for (const results::StreamEvent& event : recorder_.take_events()) {
+        if (explains_silence(event.kind)) return "; " + event.text;
+      }
+      bench_.wait_until(bench_.clock().now() + stretched(kTickWall));
+    }
+    return {};
+  }
+
  private:
+  void take_box_bias() {
+    const netbox::ZeroMeasurement before = measure(Phase::bias_before);
+    if (const auto why = unrest(before)) throw DeviceError("Net Box", "take the bias", *why, kBiasNextMove);
+    // The box takes one noisy sample as its zero: a bad draw is drawn again.
+    for (int attempt = 1;; ++attempt) {
+      set_box_bias();
+      const netbox::ZeroMeasurement after = measure(Phase::bias_after);
+      box_bias_ = to_bias(before, after);
+      const auto remains = beyond_zero(after);
+      if (!remains) return;
+      if (attempt == kBiasAttempts) throw DeviceError("Net Box", "take the bias", *remains, kBiasNextMove);
+    }
+  }
+
+  void set_box_bias() {
+    recorder_.mark(Phase::bias_settling, -1, RadPerSec(0));
+    bench_.load_cell().set_bias();
+    const netbox::Configuration& box = bench_.load_cell().configuration();
+    hold(bench_.clock().stretched(kBiasWorksWall) + from_seconds(3 * box.records_per_datagram / box.rdt_rate_hz),
+         nullptr);
+  }
+
+  netbox::ZeroMeasurement measure(Phase phase) {
+    position_.phase = "bias";
+    recorder_.mark(phase, -1, RadPerSec(0));
+    hold(from_seconds(order_.campaign.zero.value()), nullptr);
+    progress_.step_done(position_, seen_);
+    return recorder_.measured();
+  }
+
   void spin_through_the_steps() {
     Spin spin(bench_.motor(), order_.place.iq.spin);
     int step = 0;
@@ -125,6 +185,8 @@ class Sequence {
   void tick(Spin* spin) {
     if (stop_asked_()) throw Interrupted("stopped by request");
     recorder_.check_failure();
+    tell_events();
+    if (const auto trip = recorder_.range_trip()) throw SafetyStop("load cell: " + *trip);
     for (const std::string& failure : {bench_.motor().failure(), bench_.load_cell().failure()}) {
       if (!failure.empty()) throw SafetyStop(failure);
     }
@@ -138,6 +200,14 @@ class Sequence {
     progress_.tick(position_, seen_);
   }
 
+  void tell_events() {
+    for (const results::StreamEvent& event : recorder_.take_events()) {
+      if (told_ < kLinesOfEvents) progress_.say("load cell: " + event.text);
+      if (++told_ == kLinesOfEvents)
+        progress_.say("load cell: what else happens in this run is in its file: kphi info");
+    }
+  }
+
   Bench& bench_;
   Recorder& recorder_;
   const RunOrder& order_;
@@ -146,6 +216,8 @@ class Sequence {
   Position position_;
   Observation seen_;
   Instant end_{};
+  int told_ = 0;
+  results::BoxBias box_bias_;
 };
 
 /// Streams while it lives.
@@ -162,17 +234,26 @@ class Streaming {
   results::LoadCellScale scale_;
 };
 
-/// What went wrong, with the name of the file that holds the rest. Keeps the type of the exception.
-[[noreturn]] void rethrow_naming(const std::exception_ptr& cause, const std::filesystem::path& file) {
-  const std::string where = fmt::format("; recorded so far: {}", file.string());
+std::string what(const std::exception_ptr& cause) {
+  try {
+    std::rethrow_exception(cause);
+  } catch (const std::exception& e) {
+    return e.what();
+  } catch (...) {
+    return "unknown";
+  }
+}
+
+/// What went wrong, with what is known besides. Keeps the type of the exception.
+[[noreturn]] void rethrow_with(const std::exception_ptr& cause, const std::string& more) {
   try {
     std::rethrow_exception(cause);
   } catch (const Interrupted& e) {
-    throw Interrupted(e.what() + where);
+    throw Interrupted(e.what() + more);
   } catch (const SafetyStop& e) {
-    throw SafetyStop(e.what() + where);
+    throw SafetyStop(e.what() + more);
   } catch (const results::RecordError& e) {
-    throw results::RecordError(e.what() + where);
+    throw results::RecordError(e.what() + more);
   }
 }
 
@@ -187,20 +268,21 @@ std::string utc_text(const Clock& clock, Instant when) {
 RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, const std::function<bool()>& stop_asked) {
   std::optional<Streaming> streaming(std::in_place, bench.load_cell());
   results::RunWriter writer(order.file, header_of(order, bench, streaming->scale()), bench.files());
-  Recorder recorder(bench, writer,
-                    {order.place.thrust_axis, order.place.thrust_sign, streaming->scale().counts_per_newton});
+  Recorder recorder(bench, writer, {order.place.thrust_axis, order.place.thrust_sign}, streaming->scale());
+  Sequence sequence(bench, recorder, order, progress, stop_asked);
   std::exception_ptr cause;
+  std::string explanation;
   {
     const auto draining = bench.keep_calling([&] { recorder.drain(); });
     try {
-      Sequence(bench, recorder, order, progress, stop_asked).run();
+      sequence.run();
     } catch (...) {
       cause = std::current_exception();
+      explanation = sequence.explanation();
     }
   }
   streaming.reset();
   recorder.drain();
-  const results::SampleAccount account = bench.load_cell().account();
   if (!cause) {
     try {
       recorder.check_failure();
@@ -208,20 +290,18 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
       cause = std::current_exception();
     }
   }
-  if (!cause) return {order.file, writer.finish({results::Outcome::complete, "", account, {}, {}}), account};
+  const results::SampleAccount account = bench.load_cell().account();
+  results::RunEnding ending{results::Outcome::complete, "", account, bench.load_cell().health(), sequence.box_bias()};
+  if (!cause) return {order.file, writer.finish(ending), account};
 
-  std::string reason = "unknown";
+  ending.outcome = results::Outcome::aborted;
+  ending.outcome_reason = what(cause) + explanation;
   try {
-    std::rethrow_exception(cause);
-  } catch (const std::exception& e) {
-    reason = e.what();
-  }
-  try {
-    (void)writer.finish({results::Outcome::aborted, reason, account, {}, {}});
+    (void)writer.finish(ending);
   } catch (const results::RecordError&) {
     // The first cause matters more; the .part file stays as it was secured last.
   }
-  rethrow_naming(cause, writer.path());
+  rethrow_with(cause, fmt::format("{}; recorded so far: {}", explanation, writer.path().string()));
 }
 
 }  // namespace kphi::daq

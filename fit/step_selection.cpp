@@ -15,7 +15,7 @@ struct DoubtPolicy {
   bool spoils;
 };
 
-constexpr std::array<DoubtPolicy, 7> kPolicy{{
+constexpr std::array<DoubtPolicy, 13> kPolicy{{
     {Doubt::speed_not_reached, "commanded speed not reached", true},
     {Doubt::speed_unsteady, "speed never settled", true},
     {Doubt::saturated, "load cell saturated", true},
@@ -23,6 +23,12 @@ constexpr std::array<DoubtPolicy, 7> kPolicy{{
     {Doubt::derated, "motor derated", true},
     {Doubt::few_samples, "too few samples", true},
     {Doubt::bad_status, "load cell reported an error", true},
+    {Doubt::stream_restarted, "stream began anew", false},
+    {Doubt::rebooted, "load cell's box started anew since the zero", true},
+    {Doubt::stalled, "load cell repeated its measurement", true},
+    {Doubt::silent, "load cell fell silent", true},
+    {Doubt::box_trouble, "load cell's box saw its communication fail", false},
+    {Doubt::stolen, "another client took the stream", true},
 }};
 
 bool has(std::uint32_t doubts, Doubt doubt) { return (doubts & static_cast<std::uint32_t>(doubt)) != 0; }

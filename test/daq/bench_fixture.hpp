@@ -35,14 +35,15 @@ inline profiles::Campaign short_campaign(const std::string& occlusions = "0, 90"
   return profiles::parse_campaign(short_campaign_text(occlusions, repetitions, steps), "short.yaml");
 }
 
-inline profiles::Bench deterministic_place(int seed) {
+/// `faults`: path of a fault script; empty: none.
+inline profiles::Bench deterministic_place(int seed, const std::string& faults = {}) {
   return profiles::parse_bench(
       fmt::format(
           "format: kphi-bench/1\nname: test\n"
           "netbox: {{host: 127.0.0.1, rdt_port: 49152, http_port: 8049, rate_hz: 7000, records_per_datagram: 40}}\n"
           "iq: {{device: /dev/null, baud: 921600, module_id: 0, spin: +1, telemetry_hz: 50, speed_max_rpm: 19300}}\n"
-          "thrust_axis: \"+Fz\"\nsimulation: {{in_process: true, seed: {}}}\n",
-          seed),
+          "thrust_axis: \"+Fz\"\nsimulation: {{in_process: true, seed: {}{}}}\n",
+          seed, faults.empty() ? "" : ", faults: " + faults),
       "bench.yaml");
 }
 

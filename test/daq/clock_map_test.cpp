@@ -129,5 +129,24 @@ TEST(ClockMap, LivesWithAlmostNothing) {
   EXPECT_EQ(map.time_ns(map.epochs()[0], 0), 0);
 }
 
+/// One record each millisecond; the box stands still for a second after the 2000th.
+TEST(ClockMap, BeginsAnewWhereTheBoxTookUpCountingAgain) {
+  std::vector<results::LoadCellRecord> records(6000);
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    records[i].ft_sequence = static_cast<std::uint32_t>(7 * i);
+    records[i].arrival_ns = static_cast<results::Nanoseconds>(1'000'000 * i + (i < 2000 ? 0 : 1'000'000'000));
+  }
+  const std::vector<results::Nanoseconds> breaks{3'000'000'000};
+  const ClockMap map(records, 7000, breaks);
+  ASSERT_EQ(map.epochs().size(), 2u);
+  EXPECT_FALSE(map.epochs()[1].rebooted);
+  EXPECT_EQ(map.epochs()[1].begin, 2000u);
+  EXPECT_NEAR(static_cast<double>(map.time_ns(map.epochs()[1], 4000)), 5e9, 1e3);
+  EXPECT_NEAR(ClockMap::skew_ppm(map.epochs()[0]), 0, 1);
+
+  const ClockMap unaware(records, 7000);
+  EXPECT_FALSE(ClockMap::plausible(unaware.epochs()[0])) << "without the break the clock seems far off";
+}
+
 }  // namespace
 }  // namespace kphi::daq

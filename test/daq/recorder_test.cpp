@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <deque>
+#include <utility>
 
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
@@ -26,6 +28,7 @@ class QueueBench final : public Bench, private MotorLink, private LoadCellLink {
   results::FileLayer* layer = &results::disk();
   std::deque<results::LoadCellRecord> records;
   std::deque<results::MotorReading> readings;
+  std::vector<results::StreamEvent> events;
 
  private:
   void spin_at(RadPerSec) override {}
@@ -33,10 +36,15 @@ class QueueBench final : public Bench, private MotorLink, private LoadCellLink {
   void coast() noexcept override {}
   std::size_t take(std::span<results::MotorReading> out) override { return move_out(readings, out); }
   [[nodiscard]] std::string identity() const override { return "test"; }
+  [[nodiscard]] const netbox::Configuration& configuration() const override { return configuration_; }
+  [[nodiscard]] std::vector<netbox::Finding> findings() const override { return {}; }
   results::LoadCellScale start() override { return {}; }
   void stop() noexcept override {}
   std::size_t take(std::span<results::LoadCellRecord> out) override { return move_out(records, out); }
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return std::exchange(events, {}); }
+  void set_bias() noexcept override {}
   [[nodiscard]] results::SampleAccount account() const override { return {}; }
+  [[nodiscard]] results::StreamHealth health() const override { return {}; }
   [[nodiscard]] std::string failure() const override { return {}; }
 
   template <class T>
@@ -48,11 +56,19 @@ class QueueBench final : public Bench, private MotorLink, private LoadCellLink {
     }
     return n;
   }
+  netbox::Configuration configuration_;
 };
+
+/// 20 N, 60 N along Fz, 1 N m.
+results::LoadCellScale mini40() {
+  results::LoadCellScale scale;
+  scale.range = {20, 20, 60, 1, 1, 1};
+  return scale;
+}
 
 class Recording : public testing::Test {
  protected:
-  Recording() : writer_(folder_.path() / "run.h5", {}, bench_.files()), recorder_(bench_, writer_, {2, -1, 1e6}) {}
+  Recording() : writer_(folder_.path() / "run.h5", {}, bench_.files()), recorder_(bench_, writer_, {2, -1}, mini40()) {}
 
   void sample(std::int32_t fz_counts, std::int64_t arrival_ns) {
     ++sequence_;
@@ -105,6 +121,51 @@ TEST_F(Recording, WritesAllThatCameInTheOrderItCame) {
   EXPECT_EQ(writer_.samples(), 20'000u);
 }
 
+TEST_F(Recording, WarnsOnceNearARangeAndOnceBeyondIt) {
+  for (const std::int32_t counts : {47'000'000, 49'000'000, -50'000'000, 60'000'000, -61'000'000, 65'999'999}) {
+    sample(counts, 1'500'000'000);
+  }
+  recorder_.drain();
+  const auto events = recorder_.take_events();
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events[0].kind, results::EventKind::near_range);
+  EXPECT_EQ(events[0].text, "1.500 s: Fz carries 82 % of its range of 60 N");
+  EXPECT_EQ(events[1].kind, results::EventKind::beyond_range);
+  EXPECT_EQ(recorder_.range_trip(), std::nullopt);
+  EXPECT_TRUE(recorder_.take_events().empty()) << "told once";
+}
+
+TEST_F(Recording, TripsAboveATenthBeyondARangeAndNamesTheAxis) {
+  bench_.records.push_back({{0, 0, 0, 0, -1'150'000, 0}, 1, 1, 0, 2'000'000'000});
+  recorder_.drain();
+  EXPECT_EQ(recorder_.range_trip(), "Ty carries 115 % of its range of 1 N m");
+  EXPECT_EQ(recorder_.take_events().at(0).kind, results::EventKind::range_trip);
+}
+
+TEST_F(Recording, WritesWhatHappenedToTheStreamAndTellsTheRunner) {
+  bench_.events.push_back({results::EventKind::restarted, 5, 0, "the stream began anew"});
+  recorder_.drain();
+  EXPECT_EQ(recorder_.take_events().at(0).text, "the stream began anew");
+  writer_.sync();
+  EXPECT_EQ(results::read_run(writer_.path()).events.at(0).kind, results::EventKind::restarted);
+}
+
+TEST_F(Recording, MeasuresAPhaseThatBelongsToABias) {
+  recorder_.mark(results::Phase::bias_before, -1, RadPerSec(0));
+  recorder_.drain();
+  sample(1'000'000, 1);
+  sample(3'000'000, 2);
+  recorder_.drain();
+  EXPECT_EQ(recorder_.measured().records, 2u);
+  EXPECT_DOUBLE_EQ(recorder_.measured().mean[2], 2.0);
+  EXPECT_NEAR(recorder_.measured().standard_deviation[2], std::sqrt(2.0), 1e-12);
+  recorder_.mark(results::Phase::bias_after, -1, RadPerSec(0));
+  recorder_.drain();
+  sample(500'000, 3);
+  recorder_.drain();
+  EXPECT_DOUBLE_EQ(recorder_.measured().mean[2], 0.5) << "each phase by itself";
+}
+
 /// Breaks when told.
 class BreakableDisk final : public results::FileLayer {
  public:
@@ -120,7 +181,7 @@ TEST(RecordingOntoABrokenDisk, KeepsTheFirstErrorForTheRunnerAndThrowsNothingIts
   test::TemporaryFolder folder;
   QueueBench bench;
   results::RunWriter writer(folder.path() / "run.h5", {}, disk);
-  Recorder recorder(bench, writer, {});
+  Recorder recorder(bench, writer, {}, mini40());
   EXPECT_NO_THROW(recorder.check_failure());
   disk.broken = true;
   bench.time.set(std::chrono::seconds(1));

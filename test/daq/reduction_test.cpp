@@ -146,6 +146,49 @@ TEST(Reduction, StatusWordsBecomeDoubts) {
   EXPECT_EQ(doubts_with(0x80020010u), "saturated+bad_status");
 }
 
+/// The box starts anew at 4 s, in the second step, with another bias.
+RunRecording rebooted_run(double shift_n) {
+  Truth truth;
+  truth.drift_n_per_s = 0;
+  RunRecording run = make_run(truth);
+  for (std::size_t i = 4000; i < run.load_cell.size(); ++i) {
+    run.load_cell[i].ft_sequence = static_cast<std::uint32_t>(7 * (i - 4000));
+    run.load_cell[i].counts[2] += static_cast<std::int32_t>(1e6 * shift_n);
+  }
+  return run;
+}
+
+TEST(Reduction, AZeroHoldsForOnePowerUpOfTheBox) {
+  const Truth truth;
+  const auto steps = reduce(rebooted_run(0.5));
+  EXPECT_EQ(results::doubt_names(steps[0].doubts), "");
+  EXPECT_NEAR(k_of(steps[0]), truth.k, 0.02 * truth.k) << "the zero after the run is that of another bias";
+  EXPECT_TRUE(has(steps[1], Doubt::rebooted));
+  EXPECT_EQ(results::doubt_names(steps[2].doubts), "rebooted");
+  EXPECT_NEAR(k_of(steps[2]), truth.k, 0.005 * truth.k) << "the zero after the run is of the same power-up";
+}
+
+TEST(Reduction, AZeroAfterARestartOfTheBoxIsAGoodZero) {
+  RunRecording run = make_run({});
+  for (std::size_t i = 0; i < run.load_cell.size(); ++i) {
+    run.load_cell[i].ft_sequence = static_cast<std::uint32_t>(7 * (i < 300 ? i : i - 300));
+    if (i < 300) run.load_cell[i].counts[2] += 900'000;
+  }
+  for (const StepMean& step : reduce(run)) {
+    EXPECT_EQ(results::doubt_names(step.doubts), "");
+    EXPECT_NEAR(step.thrust_n, 1.2e-6 * step.speed_rad_s * step.speed_rad_s, 0.01);
+  }
+}
+
+TEST(Reduction, EventsOfTheStreamAreDoubtedWhereTheyHappened) {
+  RunRecording run = make_run({});
+  run.events.push_back({results::EventKind::restarted, 4'000'000'000, 0, ""});
+  const auto steps = reduce(run);
+  EXPECT_EQ(results::doubt_names(steps[0].doubts), "");
+  EXPECT_EQ(results::doubt_names(steps[1].doubts), "stream_restarted");
+  EXPECT_EQ(results::doubt_names(steps[2].doubts), "");
+}
+
 TEST(Reduction, ACountAtTheEndOfItsRangeIsSaturation) {
   RunRecording run = make_run({});
   run.load_cell[4500].counts[2] = 120000000;

@@ -1,0 +1,72 @@
+#include "daq/load_cell_audit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "profiles/configuration_error.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using netbox::Finding;
+using netbox::Severity;
+
+std::string remedied(const Finding& finding) {
+  return finding.next_move.empty() ? finding.what : finding.what + "; " + finding.next_move;
+}
+
+}  // namespace
+
+netbox::Intention intention_of(const profiles::Campaign& campaign, const profiles::Bench& place) {
+  netbox::Intention intention;
+  for (const RadPerSec level : campaign.profile.levels()) intention.speeds_rpm.push_back(to_rpm(level));
+  intention.blades = campaign.propeller.blades;
+  intention.largest_thrust_n = campaign.limits.thrust_max.value();
+  intention.thrust_axis = place.thrust_axis;
+  intention.rate_hz = place.netbox.rate_hz;
+  intention.records_per_datagram = place.netbox.records_per_datagram;
+  return intention;
+}
+
+std::vector<Finding> unset(const netbox::Configuration& box, const profiles::NetBoxSettings& wanted) {
+  std::vector<Finding> findings;
+  const int cutoff = static_cast<int>(netbox::filter_cutoff_hz(box.filter_code).value_or(-1));
+  if (wanted.filter_hz && *wanted.filter_hz != cutoff) {
+    findings.push_back(
+        {Severity::fault,
+         fmt::format("the box filters at {} Hz, netbox.settings.filter_hz is {}", cutoff, *wanted.filter_hz),
+         "set the filter on the box's Settings page, or leave filter_hz out"});
+  }
+  if (wanted.configuration && *wanted.configuration != box.slot) {
+    findings.push_back({Severity::fault,
+                        fmt::format("configuration {} is active in the box, netbox.settings.configuration is {}",
+                                    box.slot, *wanted.configuration),
+                        fmt::format("choose it on the box's Settings page, where it is number {}, or leave "
+                                    "configuration out",
+                                    *wanted.configuration + 1)});
+  }
+  return findings;
+}
+
+std::vector<Finding> audit_load_cell(const LoadCellLink& cell, const profiles::Campaign& campaign,
+                                     const profiles::Bench& place) {
+  const netbox::Configuration& box = cell.configuration();
+  std::vector<Finding> findings = netbox::audit(box, intention_of(campaign, place));
+  for (auto& more : {unset(box, place.netbox.settings), cell.findings()})
+    findings.insert(findings.end(), more.begin(), more.end());
+  std::stable_sort(findings.begin(), findings.end(),
+                   [](const Finding& a, const Finding& b) { return a.severity > b.severity; });
+  std::string faults;
+  for (const Finding& finding : findings) {
+    if (finding.severity == Severity::fault) faults += (faults.empty() ? "" : "\n  ") + remedied(finding);
+  }
+  if (!faults.empty()) throw ConfigurationError("Net Box " + place.netbox.host + ": " + faults);
+  return findings;
+}
+
+std::string describe(const Finding& finding) {
+  return fmt::format("load cell: {}: {}", finding.severity == Severity::note ? "note" : "warning", remedied(finding));
+}
+
+}  // namespace kphi::daq

@@ -1,0 +1,47 @@
+#include "daq/event_doubts.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "results/steps_csv.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using results::EventKind;
+using results::StreamEvent;
+
+std::string doubts(const std::vector<StreamEvent>& events, results::Nanoseconds begin, results::Nanoseconds end) {
+  return results::doubt_names(doubts_within(doubt_spans(events), begin, end));
+}
+
+TEST(EventDoubts, AnInstantConcernsTheStepInWhichItLies) {
+  const std::vector<StreamEvent> events{{EventKind::restarted, 150, 0, ""}};
+  EXPECT_EQ(doubts(events, 0, 150), "");
+  EXPECT_EQ(doubts(events, 150, 300), "stream_restarted");
+  EXPECT_EQ(doubts(events, 300, 450), "");
+}
+
+TEST(EventDoubts, AStallConcernsAllStepsUntilItEnds) {
+  const std::vector<StreamEvent> events{{EventKind::stalled, 150, 0, ""}, {EventKind::stall_ended, 350, 0, ""}};
+  EXPECT_EQ(doubts(events, 0, 100), "");
+  EXPECT_EQ(doubts(events, 100, 200), "stalled");
+  EXPECT_EQ(doubts(events, 200, 300), "stalled");
+  EXPECT_EQ(doubts(events, 300, 400), "stalled");
+  EXPECT_EQ(doubts(events, 400, 500), "");
+  EXPECT_THAT(stall_ends(events), testing::ElementsAre(350));
+}
+
+TEST(EventDoubts, ASilenceThatDoesNotEndConcernsAllThatFollows) {
+  const std::vector<StreamEvent> events{{EventKind::silent, 150, 0, ""}, {EventKind::stolen, 160, 0, ""}};
+  EXPECT_EQ(doubts(events, 1000, 2000), "silent+stolen");
+}
+
+TEST(EventDoubts, RangesAndRestartsOfTheBoxShowInTheSamplesThemselves) {
+  for (const EventKind kind : {EventKind::near_range, EventKind::beyond_range, EventKind::rebooted}) {
+    EXPECT_TRUE(doubt_spans(std::vector<StreamEvent>{{kind, 5, 0, ""}}).empty());
+  }
+}
+
+}  // namespace
+}  // namespace kphi::daq

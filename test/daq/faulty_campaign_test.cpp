@@ -1,0 +1,297 @@
+// Campaigns on the deterministic bench whose load cell's wire and box go wrong by a script.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daq/campaign_run.hpp"
+#include "daq/deterministic_bench.hpp"
+#include "daq/interlock.hpp"
+#include "daq/reduction.hpp"
+#include "drivers/device_error.hpp"
+#include "profiles/configuration_error.hpp"
+#include "results/campaign_verification.hpp"
+#include "results/journal.hpp"
+#include "results/run_reader.hpp"
+#include "results/sha256.hpp"
+#include "results/steps_csv.hpp"
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using results::EventKind;
+using testing::Contains;
+using testing::HasSubstr;
+
+class SaidLines final : public Progress {
+ public:
+  void tick(const Position&, const Observation&) override {}
+  void step_done(const Position&, const Observation&) override {}
+  void say(const std::string& line) override { lines.push_back(line); }
+  std::vector<std::string> lines;
+};
+
+/// Zero at 0.2 s to 0.7 s, then four steps of 0.6 s to 3.1 s; two runs.
+class FaultyCampaign : public testing::Test {
+ protected:
+  CampaignResult run(const std::string& faults, int seed = 4) {
+    const auto script = folder_.path() / "faults.yaml";
+    std::ofstream(script) << "format: kphi-faults/1\nfaults:\n" << faults;
+    place_ = test::deterministic_place(seed, script.string());
+    bench_.emplace(place_);
+    prepare(*bench_);
+    results_.emplace(results::CampaignFolder::create(folder_.path(), "u", "c"));
+    AgreeingOperator person;
+    return run_campaign(*bench_, campaign_, place_, *results_, person, said_, [] { return false; });
+  }
+  virtual void prepare(DeterministicBench&) {}
+
+  [[nodiscard]] results::RunRecording recording(std::size_t i) const {
+    return results::read_run(results_->complete_runs(campaign_.occlusions_deg).at(i));
+  }
+  [[nodiscard]] std::vector<std::string> doubts(std::size_t run) const {
+    std::vector<std::string> names;
+    for (const auto& step : reduce(recording(run))) names.push_back(results::doubt_names(step.doubts));
+    return names;
+  }
+  [[nodiscard]] std::vector<EventKind> events(std::size_t run) const {
+    std::vector<EventKind> kinds;
+    for (const auto& event : recording(run).events) kinds.push_back(event.kind);
+    return kinds;
+  }
+  [[nodiscard]] const sim::WireTruth& truth() { return bench_->simulation().wire().truth(); }
+  [[nodiscard]] bool motor_is_let_go() {
+    const double before = std::abs(bench_->simulation().plant().motor().speed);
+    bench_->wait_until(bench_->clock().now() + std::chrono::seconds(1));
+    const double after = std::abs(bench_->simulation().plant().motor().speed);
+    return after < 1.0 || after < 0.7 * before;
+  }
+  /// Step means of the whole campaign from the files alone are those that were stored.
+  void expect_replay_agrees() const {
+    std::vector<results::StepMean> again;
+    for (const auto& file : results_->complete_runs(campaign_.occlusions_deg)) {
+      for (const auto& step : reduce(results::read_run(file))) again.push_back(step);
+    }
+    EXPECT_EQ(results::format_steps(again), test::bytes_of(results_->steps()));
+    EXPECT_TRUE(results::verify_campaign(*results_).whole())
+        << testing::PrintToString(results::verify_campaign(*results_).problems);
+  }
+
+  test::TemporaryFolder folder_;
+  profiles::Campaign campaign_ = test::short_campaign();
+  profiles::Bench place_;
+  std::optional<DeterministicBench> bench_;
+  std::optional<results::CampaignFolder> results_;
+  SaidLines said_;
+};
+
+constexpr const char* kManyFaults =
+    "  - {at_s: 1.0, for_s: 0.5, kind: loss, p: 0.05, burst: 2}\n"
+    "  - {at_s: 1.6, for_s: 0.4, kind: duplicate, p: 0.2}\n"
+    "  - {at_s: 2.0, for_s: 0.3, kind: reorder, p: 0.2, depth: 1}\n"
+    "  - {at_s: 2.4, kind: restart}\n"
+    "  - {at_s: 2.5, for_s: 0.3, kind: wrong_size, p: 0.1, size: 71}\n"
+    "  - {at_s: 2.5, for_s: 0.3, kind: foreign_source, p: 0.1}\n"
+    "  - {at_s: 5.5, for_s: 1.0, kind: loss, p: 0.02}\n"
+    "  - {at_s: 0, kind: clock_skew, ppm: 80}\n";
+
+TEST_F(FaultyCampaign, AccountsForEverySampleAsTheTruthSays) {
+  const CampaignResult result = run(kManyFaults);
+  EXPECT_EQ(result.runs, 2);
+  results::SampleAccount sum;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const results::SampleAccount account = recording(i).account;
+    EXPECT_EQ(account.received + account.lost_network + account.lost_host, account.expected);
+    sum.lost_network += account.lost_network;
+    sum.duplicates += account.duplicates;
+    sum.malformed += account.malformed;
+    sum.restarts += account.restarts;
+    sum.reordered += account.reordered;
+    sum.late += account.late;
+  }
+  EXPECT_GT(truth().records_dropped, 0u);
+  std::uint64_t never_sent = 0;  // by a box that begins anew with a datagram half filled
+  for (const auto& event : recording(0).events) never_sent += event.kind == EventKind::restarted ? event.records : 0;
+  EXPECT_LT(never_sent, 40u);
+  EXPECT_EQ(sum.lost_network, truth().records_dropped + never_sent);
+  EXPECT_GT(truth().records_duplicated, 0u);
+  EXPECT_EQ(sum.duplicates, truth().records_duplicated);
+  EXPECT_GT(truth().malformed, 0u);
+  EXPECT_EQ(sum.malformed, truth().malformed);
+  EXPECT_GT(truth().foreign, 0u);
+  EXPECT_EQ(sum.restarts, truth().restarts);
+  EXPECT_EQ(sum.reordered, 40 * truth().overtaken);
+  EXPECT_EQ(sum.late, 0u);
+  EXPECT_THAT(events(0), Contains(EventKind::restarted));
+  EXPECT_NEAR(recording(0).health.skew_ppm, -80, 5);
+  expect_replay_agrees();
+}
+
+TEST_F(FaultyCampaign, GivesTheSameBytesFromTheSameSeed) {
+  const auto digests = [&](int seed) {
+    (void)run(kManyFaults, seed);
+    std::vector<std::string> all{test::bytes_of(results_->steps())};
+    for (const auto& file : results_->complete_runs()) all.push_back(results::sha256_of_file(file));
+    return all;
+  };
+  // The path of the script is in the bench file, which is in the runs: one folder for all three.
+  const auto once = digests(9);
+  EXPECT_EQ(once, digests(9));
+  EXPECT_NE(once[1], digests(10)[1]);
+}
+
+TEST_F(FaultyCampaign, DoubtsTheStepInWhichTheStreamBeganAnew) {
+  (void)run("  - {at_s: 2.4, kind: restart}\n");
+  EXPECT_EQ(doubts(0), (std::vector<std::string>{"", "", "lost_samples+stream_restarted", ""}));
+  EXPECT_EQ(doubts(1), (std::vector<std::string>{"", "", "", ""}));
+  EXPECT_THAT(said_.lines, Contains(HasSubstr("the stream began anew")));
+  EXPECT_THAT(results::read_journal(results_->journal()).entries.at(2).data.at("events").at(0).get<std::string>(),
+              HasSubstr("the stream began anew"));
+  expect_replay_agrees();
+}
+
+TEST_F(FaultyCampaign, DoubtsAllStepsAfterARestartOfTheBoxUntilTheNextRun) {
+  const CampaignResult result = run("  - {at_s: 1.6, kind: reboot, down_s: 0.1, resume: true}\n");
+  EXPECT_EQ(result.runs, 2);
+  const auto found = doubts(0);
+  EXPECT_EQ(found[0], "");
+  EXPECT_THAT(found[1], HasSubstr("rebooted"));
+  EXPECT_EQ(found[2], "rebooted");
+  EXPECT_EQ(found[3], "rebooted");
+  EXPECT_EQ(doubts(1), (std::vector<std::string>{"", "", "", ""}));
+  EXPECT_EQ(recording(0).account.reboots, 1u);
+  const auto& lines = said_.lines;
+  EXPECT_EQ(std::count_if(lines.begin(), lines.end(),
+                          [](const auto& line) { return line.find("the box has started anew") != std::string::npos; }),
+            1);
+  expect_replay_agrees();
+}
+
+TEST_F(FaultyCampaign, DoubtsStallsAndKeepsTheClockAfterThem) {
+  (void)run("  - {at_s: 1.5, for_s: 0.3, kind: stall}\n");
+  const auto found = doubts(0);
+  EXPECT_EQ(found[0], "");
+  EXPECT_THAT(found[1], HasSubstr("stalled"));
+  EXPECT_EQ(found[2], "");
+  EXPECT_EQ(found[3], "") << "a clock that stood still must not misplace what follows";
+  EXPECT_GT(recording(0).account.stalled, 1000u);
+  expect_replay_agrees();
+}
+
+TEST_F(FaultyCampaign, DoubtsTheStepInWhichTheBoxSawItsCommunicationFail) {
+  (void)run("  - {at_s: 1.6, for_s: 0.05, kind: status, bits: 0x80100000}\n");
+  EXPECT_THAT(doubts(0)[1], HasSubstr("box_trouble"));
+  EXPECT_EQ(doubts(0)[2], "");
+}
+
+TEST_F(FaultyCampaign, StopsWhenTheStreamIsStolenAndSaysSo) {
+  try {
+    (void)run("  - {at_s: 2.0, kind: stolen}\n");
+    FAIL() << "a stolen stream went unnoticed";
+  } catch (const SafetyStop& stop) {
+    EXPECT_THAT(stop.what(), HasSubstr("another client has taken the stream"));
+  }
+  EXPECT_TRUE(motor_is_let_go());
+}
+
+TEST_F(FaultyCampaign, StopsWhenTheBoxGoesAndSaysThatItDoesNotAnswer) {
+  try {
+    (void)run("  - {at_s: 2.0, kind: reboot, down_s: 100}\n");
+    FAIL() << "a dead box went unnoticed";
+  } catch (const SafetyStop& stop) {
+    EXPECT_THAT(stop.what(), HasSubstr("does not answer over HTTP"));
+  }
+  EXPECT_TRUE(motor_is_let_go());
+}
+
+TEST_F(FaultyCampaign, RefusesABoxWhosePagesCannotBeRead) {
+  EXPECT_THROW((void)run("  - {at_s: 0, for_s: 10, kind: http_status, code: 500}\n"), DeviceError);
+  EXPECT_THROW((void)run("  - {at_s: 0, for_s: 10, kind: http_refused}\n"), DeviceError);
+  EXPECT_THROW((void)run("  - {at_s: 0, for_s: 10, kind: http_slow, delay_s: 6}\n"), DeviceError);
+  EXPECT_NO_THROW((void)run("  - {at_s: 0, count: 1, kind: http_slow, delay_s: 2}\n"));
+}
+
+TEST_F(FaultyCampaign, RefusesAScriptThatIsNone) {
+  EXPECT_THROW((void)run("  - {at_s: 2.0, kind: earthquake}\n"), ConfigurationError);
+  EXPECT_THROW(DeterministicBench(test::deterministic_place(1, "/nowhere/faults.yaml")), ConfigurationError);
+}
+
+TEST_F(FaultyCampaign, GoesOnBeyondARangeInDoubtWithOneWarning) {
+  (void)run("  - {at_s: 1.5, for_s: 0.2, kind: saturation, axes: 1}\n");
+  EXPECT_THAT(doubts(0)[1], HasSubstr("saturated"));
+  EXPECT_EQ(doubts(0)[3], "");
+  EXPECT_THAT(events(0), testing::ElementsAre(EventKind::beyond_range));
+  EXPECT_THAT(said_.lines, Contains(HasSubstr("Fx carries 100 % of its range of 20 N")));
+}
+
+/// A gage bias shifts what the box shows: at the end of the range of the gages it then shows more than the range.
+class ShiftedCell : public FaultyCampaign {
+  void prepare(DeterministicBench& bench) override {
+    sim::NetBoxSettings settings;
+    settings.bias_vector[0] = -6554;  // a fifth of the range
+    bench.simulation().netbox().configure(settings);
+  }
+};
+
+TEST_F(ShiftedCell, LetsTheMotorGoAboveATenthBeyondARange) {
+  try {
+    (void)run("  - {at_s: 2.0, for_s: 1, kind: saturation, axes: 1}\n");
+    FAIL() << "the cell was loaded with 120 % of its range";
+  } catch (const SafetyStop& stop) {
+    EXPECT_THAT(stop.what(), HasSubstr("load cell: Fx carries 120 % of its range of 20 N"));
+  }
+  EXPECT_TRUE(motor_is_let_go());
+  const auto aborted = results_->other_runs();
+  ASSERT_EQ(aborted.size(), 1u);
+  const results::RunRecording run = results::read_run(aborted[0]);
+  EXPECT_EQ(run.outcome, results::Outcome::aborted);
+  EXPECT_EQ(run.events.back().kind, EventKind::range_trip);
+  EXPECT_GT(run.load_cell.back().arrival_ns, 2'000'000'000) << "the last samples are kept";
+}
+
+TEST_F(FaultyCampaign, TakesTheBoxesBiasAsAMeasuredStepWhenTheCampaignSaysSo) {
+  campaign_ = profiles::parse_campaign(test::short_campaign_text() + "box_bias: true\n", "short.yaml");
+  (void)run("  []\n");
+  for (std::size_t i = 0; i < 2; ++i) {
+    const results::RunRecording run = recording(i);
+    EXPECT_EQ(run.phases.at(0).phase, results::Phase::bias_before);
+    EXPECT_EQ(run.phases.at(1).phase, results::Phase::bias_settling);
+    EXPECT_EQ(run.phases.at(2).phase, results::Phase::bias_after);
+    EXPECT_EQ(run.phases.at(3).phase, results::Phase::zero_before);
+    EXPECT_GT(run.box_bias.records, 3000u);
+    EXPECT_NEAR(run.box_bias.before_sd[2], 0.025, 0.002);
+    EXPECT_LT(std::abs(run.box_bias.after[2]), 0.05) << "the box takes one noisy sample as its zero";
+    for (const auto& step : reduce(run))
+      EXPECT_NEAR(step.zero_n, run.box_bias.after[2], 0.002) << "and the rest is ours";
+  }
+  EXPECT_GT(std::abs(recording(0).box_bias.before[2]), 0.06) << "there was something to take away";
+  EXPECT_EQ(doubts(0), (std::vector<std::string>{"", "", "", ""}));
+  expect_replay_agrees();
+}
+
+TEST_F(FaultyCampaign, TakesNoBiasFromSamplesThatAreNotSound) {
+  campaign_ = profiles::parse_campaign(test::short_campaign_text() + "box_bias: true\n", "short.yaml");
+  try {
+    (void)run("  - {at_s: 0, for_s: 20, kind: saturation, axes: 1}\n");
+    FAIL() << "a saturated cell was biased";
+  } catch (const DeviceError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("take the bias"), HasSubstr("no sound record came")));
+  }
+  EXPECT_EQ(results::read_run(results_->other_runs().at(0)).outcome, results::Outcome::aborted);
+}
+
+TEST_F(FaultyCampaign, TakesNoBiasUnasked) {
+  (void)run("  []\n");
+  EXPECT_EQ(recording(0).box_bias.records, 0u);
+  EXPECT_EQ(recording(0).phases.at(0).phase, results::Phase::zero_before);
+}
+
+TEST_F(FaultyCampaign, KeepsThePagesOfAllSlotsAndTheHealthOfTheStream) {
+  (void)run("  []\n");
+  const results::RunRecording run = recording(1);
+  EXPECT_THAT(run.header.load_cell.slots_json, AllOf(HasSubstr("netftapi2.xml?index=15"), HasSubstr("FT21001")));
+  EXPECT_NEAR(run.health.records_per_second, 7000, 1);
+  EXPECT_NEAR(run.health.datagrams_per_second, 175, 1);
+}
+
+}  // namespace
+}  // namespace kphi::daq

@@ -1,0 +1,75 @@
+#include "daq/load_cell_audit.hpp"
+
+#include <gmock/gmock.h>
+
+#include "daq/deterministic_bench.hpp"
+#include "profiles/configuration_error.hpp"
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using testing::HasSubstr;
+
+class Audit : public testing::Test {
+ protected:
+  /// Words of the refusal; empty when there is none.
+  std::string refusal() {
+    DeterministicBench bench(place_);
+    bench.simulation().netbox().configure(settings_);
+    (void)bench.load_cell().start();  // reads the configuration
+    bench.load_cell().stop();
+    try {
+      found_ = audit_load_cell(bench.load_cell(), campaign_, place_);
+      return "";
+    } catch (const ConfigurationError& error) {
+      return error.what();
+    }
+  }
+  profiles::Campaign campaign_ = test::short_campaign();
+  profiles::Bench place_ = test::deterministic_place(1);
+  sim::NetBoxSettings settings_;
+  std::vector<netbox::Finding> found_;
+};
+
+TEST_F(Audit, LetsAWellSetBoxPass) {
+  EXPECT_EQ(refusal(), "");
+  EXPECT_TRUE(found_.empty());
+}
+
+TEST_F(Audit, RefusesARateThatFoldsAStepIntoAConstantForce) {
+  settings_.rate_hz = place_.netbox.rate_hz = 100;
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("6000.0 RPM"), HasSubstr("set the RDT output rate to 7000 Hz")));
+}
+
+TEST_F(Audit, RefusesALimitOfThrustThatTheCellCannotBear) {
+  campaign_.limits.thrust_max = Newtons(60);
+  EXPECT_THAT(refusal(), HasSubstr("60 N are expected on Fz, whose range is 60 N"));
+  campaign_.limits.thrust_max = Newtons(50);
+  EXPECT_EQ(refusal(), "");
+  ASSERT_EQ(found_.size(), 1u);
+  EXPECT_EQ(
+      describe(found_[0]),
+      "load cell: warning: 50 N are expected on Fz, whose range is 60 N; choose a calibration with a larger range "
+      "on the box's Configurations page, or lower the speeds");
+}
+
+TEST_F(Audit, RefusesSettingsThatAreNotTheBoxs) {
+  settings_.filter = 5;
+  place_.netbox.settings.filter_hz = 35;
+  EXPECT_EQ(refusal(), "");
+  place_.netbox.settings.filter_hz = 0;
+  EXPECT_THAT(refusal(), HasSubstr("the box filters at 35 Hz, netbox.settings.filter_hz is 0"));
+  place_.netbox.settings = {};
+  place_.netbox.settings.configuration = 3;
+  EXPECT_THAT(refusal(), HasSubstr("where it is number 4"));
+}
+
+TEST_F(Audit, WarnsOfAnotherBufferSize) {
+  settings_.records_per_datagram = 10;
+  EXPECT_EQ(refusal(), "");
+  EXPECT_THAT(found_.at(0).what, HasSubstr("10 records per datagram"));
+}
+
+}  // namespace
+}  // namespace kphi::daq
