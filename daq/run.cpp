@@ -244,7 +244,7 @@ std::string what(const std::exception_ptr& cause) {
   }
 }
 
-/// What went wrong, with what is known besides. Keeps the type of the exception.
+/// What went wrong, with what is known besides. Keeps the type of the exception, but for a DeviceError.
 [[noreturn]] void rethrow_with(const std::exception_ptr& cause, const std::string& more) {
   try {
     std::rethrow_exception(cause);
@@ -254,6 +254,8 @@ std::string what(const std::exception_ptr& cause) {
     throw SafetyStop(e.what() + more);
   } catch (const results::RecordError& e) {
     throw results::RecordError(e.what() + more);
+  } catch (const DeviceError& e) {
+    throw SafetyStop(e.what() + more);  // the device was there; what it refuses in the middle of a run stops the run
   }
 }
 

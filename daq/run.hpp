@@ -29,8 +29,9 @@ struct RunResult {
   results::SampleAccount account;
 };
 
-/// `stop_asked` is asked on every tick. Throws Interrupted, SafetyStop, DeviceError or RecordError after the motor was
-/// let go and the file was closed as aborted; the exception's message names the file that holds what was recorded.
+/// `stop_asked` is asked on every tick. Throws Interrupted, SafetyStop or RecordError after the motor was let go and
+/// the file was closed as aborted; the exception's message names the file that holds what was recorded, and why the
+/// load cell fell silent when that was it. Throws DeviceError when the stream does not start.
 [[nodiscard]] RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress,
                                    const std::function<bool()>& stop_asked);
 

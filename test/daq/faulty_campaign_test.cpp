@@ -273,7 +273,7 @@ TEST_F(FaultyCampaign, TakesNoBiasFromSamplesThatAreNotSound) {
   try {
     (void)run("  - {at_s: 0, for_s: 20, kind: saturation, axes: 1}\n");
     FAIL() << "a saturated cell was biased";
-  } catch (const DeviceError& error) {
+  } catch (const SafetyStop& error) {
     EXPECT_THAT(error.what(), AllOf(HasSubstr("take the bias"), HasSubstr("no sound record came")));
   }
   EXPECT_EQ(results::read_run(results_->other_runs().at(0)).outcome, results::Outcome::aborted);

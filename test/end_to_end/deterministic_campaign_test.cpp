@@ -49,5 +49,18 @@ TEST(DeterministicCampaign, GivesTheSameFilesByteForByteFromOneSeedAndOthersFrom
   }
 }
 
+TEST(DeterministicCampaign, StopsWithExitCodeFourWhenItsFaultScriptTakesTheStreamAway) {
+  const TemporaryFolder folder;
+  const auto path = [&](const char* name) { return (folder.path() / name).string(); };
+  std::ofstream(path("faults.yaml")) << "format: kphi-faults/1\nfaults:\n  - {at_s: 8, kind: stolen}\n";
+  std::ofstream(path("campaign.yaml")) << short_campaign_text("0, 90, 180", 2);
+  std::ofstream(path("bench.yaml")) << deterministic_place(5, "faults.yaml").text;  // beside the bench file
+  Process run(
+      {KPHI_PROGRAM, "run", path("campaign.yaml"), "--bench", path("bench.yaml"), "--yes", "--out", path("out")});
+  EXPECT_EQ(run.wait(), 4) << run.err();
+  EXPECT_NE(run.err().find("another client has taken the stream"), std::string::npos) << run.err();
+  EXPECT_NE(run.err().find("1 of 6 runs are finished"), std::string::npos) << run.err();
+}
+
 }  // namespace
 }  // namespace kphi::test

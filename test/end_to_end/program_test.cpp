@@ -1,11 +1,18 @@
 // The program as a person types it, against the simulated bench over the real transports.
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
+#include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
+#include <array>
+#include <boost/asio.hpp>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
@@ -21,22 +28,32 @@ std::string kphi() { return KPHI_PROGRAM; }
 
 void write(const std::filesystem::path& file, const std::string& text) { std::ofstream(file) << text; }
 
-std::string bench_text(const std::filesystem::path& folder, int rdt_port, int http_port, double time_scale) {
+std::string bench_text(const std::filesystem::path& folder, int rdt_port, int http_port, double time_scale,
+                       double rate_hz = 7000) {
   return fmt::format(
       "format: kphi-bench/1\nname: test\n"
-      "netbox: {{host: 127.0.0.1, rdt_port: {}, http_port: {}, rate_hz: 7000, records_per_datagram: 40}}\n"
+      "netbox: {{host: 127.0.0.1, rdt_port: {}, http_port: {}, rate_hz: {}, records_per_datagram: 40}}\n"
       "iq: {{device: {}/motor, baud: 921600, module_id: 0, spin: +1, telemetry_hz: 50, speed_max_rpm: 19300}}\n"
       "thrust_axis: \"+Fz\"\nsimulation: {{time_scale: {}, seed: 3, control: {}/control}}\n",
-      rdt_port, http_port, folder.string(), time_scale, folder.string());
+      rdt_port, http_port, rate_hz, folder.string(), time_scale, folder.string());
 }
+
+struct Manner {
+  double time_scale = 8;
+  double rate_hz = 7000;
+  std::string faults = "  []\n";  ///< entries of a fault script
+};
 
 /// `kphi sim` on free ports, in a folder of its own.
 class RunningBench {
  public:
-  explicit RunningBench(double time_scale = 8)
-      : process_((write(folder_.path() / "wanted.yaml", bench_text(folder_.path(), 49152, 8049, time_scale)),
+  explicit RunningBench(const Manner& manner = {})
+      : process_((write(folder_.path() / "wanted.yaml",
+                        bench_text(folder_.path(), 49152, 8049, manner.time_scale, manner.rate_hz)),
+                  write(folder_.path() / "faults.yaml", "format: kphi-faults/1\nfaults:\n" + manner.faults),
                   std::vector<std::string>{kphi(), "sim", path("wanted.yaml"), "--free-ports", "--resolved",
-                                           path("bench.yaml"), "--truth", path("truth.yaml")})) {
+                                           path("bench.yaml"), "--truth", path("truth.yaml"), "--faults",
+                                           path("faults.yaml"), "--truth-log", path("wire.jsonl")})) {
     process_.wait_for("\"rdt\"");
     write(folder_.path() / "short.yaml", short_campaign_text("0, 45, 180"));
   }
@@ -124,6 +141,131 @@ TEST(Program, StopsWhenTheBenchVanishesMidRun) {
   bench.process().signal(SIGKILL);
   EXPECT_EQ(run.wait(), 4) << run.err();
   EXPECT_THAT(run.err(), HasSubstr("recorded so far: "));
+}
+
+json info_of(const std::string& path) {
+  Process info({kphi(), "info", "--json", path});
+  EXPECT_EQ(info.wait(), 0) << info.err();
+  return json::parse(info.out());
+}
+
+TEST(Program, AccountsForWhatTheWireLoses) {
+  RunningBench bench({8, 7000,
+                      "  - {at_s: 0, for_s: 100000, kind: loss, p: 0.002}\n"
+                      "  - {at_s: 0, for_s: 100000, kind: duplicate, p: 0.01}\n"
+                      "  - {at_s: 0, for_s: 100000, kind: wrong_size, p: 0.01, size: 37}\n"});
+  write(bench.path("short.yaml"), short_campaign_text("0, 90", 1, 8));
+  Process run(bench.run_command());
+  ASSERT_EQ(run.wait(), 0) << run.err();
+  const std::string folder = first_line(run.out());
+  for (const char* verb : {"verify", "replay"}) {
+    Process again({kphi(), verb, folder});
+    EXPECT_EQ(again.wait(), 0) << again.out() << again.err();
+  }
+  bench.process().signal(SIGTERM);
+  ASSERT_EQ(bench.process().wait(), 0) << bench.process().err();
+  const std::string log = bytes_of(bench.path("wire.jsonl"));
+  const json truth = json::parse(log.substr(log.rfind('\n', log.size() - 2) + 1)).at("totals");
+  std::uint64_t lost = 0, duplicates = 0, malformed = 0;
+  const json info = info_of(folder);
+  for (const json& one : info.at("runs")) {
+    lost += one.at("lost_network").get<std::uint64_t>() + one.at("lost_host").get<std::uint64_t>();
+    duplicates += one.at("duplicates").get<std::uint64_t>();
+    malformed += one.at("malformed").get<std::uint64_t>();
+  }
+  EXPECT_GT(lost, 0u);
+  EXPECT_GT(duplicates, 0u);
+  EXPECT_GT(malformed, 0u);
+  // What went wrong before a run's first record and after its last is no part of it.
+  EXPECT_LE(lost, truth.at("records_dropped").get<std::uint64_t>());
+  EXPECT_LE(duplicates, truth.at("records_duplicated").get<std::uint64_t>());
+  EXPECT_LE(malformed, truth.at("malformed").get<std::uint64_t>());
+}
+
+/// Sends what a second client would send to the box.
+void steal_stream(int rdt_port) {
+  const int socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in box{};
+  box.sin_family = AF_INET;
+  box.sin_port = htons(static_cast<std::uint16_t>(rdt_port));
+  box.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  constexpr std::array<std::uint8_t, 8> kStart{0x12, 0x34, 0, 2, 0, 0, 0, 0};
+  EXPECT_EQ(::sendto(socket_, kStart.data(), kStart.size(), 0, reinterpret_cast<const sockaddr*>(&box), sizeof box), 8);
+  ::close(socket_);
+}
+
+TEST(Program, StopsWhenAnotherClientTakesTheStreamAndSaysSo) {
+  RunningBench bench;
+  Process run(bench.run_command());
+  run.wait_for("step  2/4");
+  steal_stream(YAML::LoadFile(bench.path("bench.yaml"))["netbox"]["rdt_port"].as<int>());
+  EXPECT_EQ(run.wait(), 4) << run.err();
+  EXPECT_THAT(run.err(), HasSubstr("another client has taken the stream"));
+  EXPECT_TRUE(bench.motor_stops());
+}
+
+TEST(Program, TakesTheBoxesBiasWhenTheCampaignSaysSo) {
+  RunningBench bench;
+  write(bench.path("short.yaml"), short_campaign_text("0") + "box_bias: true\n");
+  Process run(bench.run_command());
+  ASSERT_EQ(run.wait(), 0) << run.err();
+  const std::string folder = first_line(run.out());
+  const json bias = info_of(folder).at("runs").at(0).at("box_bias");
+  EXPECT_GT(bias.at("records"), 1000);
+  EXPECT_LT(std::abs(bias.at("after").at(2).get<double>()), 0.05);
+  Process replay({kphi(), "replay", folder});
+  EXPECT_EQ(replay.wait(), 0) << replay.err();
+}
+
+TEST(Program, RefusesARateThatFoldsStepsOfTheCampaignAndNamesThem) {
+  RunningBench bench({8, 100, "  []\n"});
+  Process devices({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--campaign", bench.path("short.yaml")});
+  EXPECT_EQ(devices.wait(), 0) << devices.err();
+  EXPECT_THAT(devices.out(), HasSubstr("6000.0 RPM (1/rev at 100.00 Hz appears at 0.00 Hz)"));
+  Process run(bench.run_command());
+  EXPECT_EQ(run.wait(), 2) << run.err();
+  EXPECT_THAT(run.err(), HasSubstr("set the RDT output rate to 7000 Hz"));
+  EXPECT_TRUE(!std::filesystem::exists(bench.path("results")) || std::filesystem::is_empty(bench.path("results")));
+}
+
+/// Speaks the box's TCP once: units N and N m, and a scale that is another.
+class OtherScale {
+ public:
+  OtherScale() : listener_(io_, {boost::asio::ip::address_v4::loopback(), 0}) {
+    port_ = listener_.local_endpoint().port();
+    thread_ = std::thread([this] {
+      boost::asio::ip::tcp::socket peer(io_);
+      boost::system::error_code error;
+      listener_.accept(peer, error);
+      std::array<std::uint8_t, 20> request{};
+      boost::asio::read(peer, boost::asio::buffer(request), error);
+      const std::array<std::uint8_t, 24> answer{0x12, 0x34, 2, 3, 0, 0, 0x27, 0x10, 0, 0x0f, 0x42, 0x40};
+      boost::asio::write(peer, boost::asio::buffer(answer), error);
+    });
+  }
+  ~OtherScale() {
+    boost::system::error_code error;
+    boost::asio::ip::tcp::socket(io_).connect(listener_.local_endpoint(), error);  // in case nobody came
+    thread_.join();
+  }
+  [[nodiscard]] int port() const { return port_; }
+
+ private:
+  boost::asio::io_context io_;
+  boost::asio::ip::tcp::acceptor listener_;
+  int port_ = 0;
+  std::thread thread_;
+};
+
+TEST(Program, RefusesABoxThatNamesTwoScales) {
+  RunningBench bench;
+  OtherScale other;
+  YAML::Node file = YAML::LoadFile(bench.path("bench.yaml"));
+  file["netbox"]["tcp_port"] = other.port();
+  write(bench.path("bench.yaml"), YAML::Dump(file) + "\n");
+  Process run(bench.run_command());
+  EXPECT_EQ(run.wait(), 3) << run.err();
+  EXPECT_THAT(run.err(), HasSubstr("10000 counts per N"));
 }
 
 class BadInput : public testing::Test {
