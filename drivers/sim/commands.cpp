@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "drivers/device_error.hpp"
 #include "drivers/sim/control_line.hpp"
@@ -63,7 +64,7 @@ profiles::Bench load_simulated(const Options& options) {
   return bench;
 }
 
-FaultScript load_faults(const std::string& path) {
+FaultFile load_faults(const std::string& path) {
   std::ifstream file(path);
   const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   if (!file) throw ConfigurationError(path + ": cannot be read; name a fault script");
@@ -86,7 +87,11 @@ ServerSettings settings_of(const profiles::Bench& bench, const Options& options)
   settings.rdt_port = options.free_ports ? 0 : bench.netbox.rdt_port;
   settings.http_port = options.free_ports ? 0 : bench.netbox.http_port;
   settings.tcp_port = settings.rdt_port == 0 ? 0 : static_cast<std::uint16_t>(settings.rdt_port - 1);
-  if (!options.faults.empty()) settings.bench.faults = load_faults(options.faults);
+  if (!options.faults.empty()) {
+    FaultFile file = load_faults(options.faults);
+    settings.bench.faults = std::move(file.load_cell);
+    settings.bench.netbox.habits = file.habits;
+  }
   if (!options.truth_log.empty()) settings.bench.keep = FaultyWire::Keep::datagrams;
   settings.device = bench.iq.device;
   settings.control = bench.simulation->control;

@@ -1,15 +1,19 @@
 // A fault script as a file:
 //
 //     format: kphi-faults/1
+//     habits: {bias_stops_stream: true}     # of the box, see NetBoxHabits; may be absent
 //     faults:
 //       - {at_s: 2, for_s: 1, kind: loss, p: 0.01, burst: 3}
 //       - {at_s: 5, kind: reboot, down_s: 0.8, resume: true}
+//
+// `kind` says which device an entry concerns.
 #pragma once
 
 #include <stdexcept>
 #include <string>
 
 #include "drivers/sim/faults.hpp"
+#include "drivers/sim/netbox_settings.hpp"
 
 namespace kphi::sim {
 
@@ -19,7 +23,12 @@ class FaultFileError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+struct FaultFile {
+  FaultScript load_cell;
+  NetBoxHabits habits;
+};
+
 /// Strict; throws FaultFileError. `path` only names the text in messages.
-[[nodiscard]] FaultScript parse_faults(const std::string& text, const std::string& path);
+[[nodiscard]] FaultFile parse_faults(const std::string& text, const std::string& path);
 
 }  // namespace kphi::sim

@@ -2,13 +2,12 @@
 #include "drivers/sim/wire.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "drivers/sim/bytes.hpp"
 
 namespace kphi::sim {
 namespace {
-
-bool concerns_datagrams(FaultKind kind) noexcept { return kind <= FaultKind::foreign_source; }
 
 std::uint32_t word(const Datagram& datagram, std::size_t offset) noexcept {
   return big(datagram.payload().subspan(offset, 4));
@@ -17,15 +16,16 @@ std::uint32_t word(const Datagram& datagram, std::size_t offset) noexcept {
 }  // namespace
 
 FaultyWire::FaultyWire(NetBoxDevice& box, FaultScript script, std::uint64_t seed, Keep keep)
-    : box_(box), script_(std::move(script)), random_(seed), keep_(keep), progress_(script_.size()) {
+    : box_(box),
+      script_(std::move(script)),
+      random_(seed),
+      keep_(keep),
+      progress_(script_.size()),
+      first_address_(box.settings().address) {
   for (std::size_t i = 0; i < script_.size(); ++i) {
     const Fault& fault = script_[i];
-    if (concerns_datagrams(fault.kind)) {
-      direct_ = false;
-      continue;
-    }
-    if (fault.kind >= FaultKind::lost_start && fault.kind <= FaultKind::delayed_start) continue;
-    if (fault.kind >= FaultKind::http_slow) continue;
+    direct_ = direct_ && !on_datagrams(fault.kind);
+    if (!on_box(fault.kind)) continue;
     events_.push_back({fault.at, i, true});
     if (fault.kind == FaultKind::reboot) events_.push_back({fault.at + fault.down, i, false});
     if (fault.end() != kNever) events_.push_back({fault.end(), i, false});
@@ -76,10 +76,23 @@ Instant FaultyWire::next_arrival() const noexcept {
 
 void FaultyWire::carry_all(Instant now) {
   while (box_.next_datagram(passing_.datagram)) {
+    if (passing_.datagram.peer != kThief) shorten(passing_.datagram);
     passing_.entry = enter(passing_.datagram);
     if (passing_.datagram.peer != kThief) carry(passing_);
   }
   give_up_holding(now);
+}
+
+void FaultyWire::shorten(Datagram& datagram) {
+  for (std::size_t i = 0; i < script_.size(); ++i) {
+    const Fault& fault = script_[i];
+    if (fault.kind != FaultKind::short_block || !active(i, datagram.at) || !chance(fault.p)) continue;
+    const std::size_t records = datagram.size / kRecordBytes;
+    const std::size_t left_out = std::min(static_cast<std::size_t>(fault.records), records - 1);
+    datagram.size -= left_out * kRecordBytes;
+    truth_.records_left_out += left_out;
+    ++progress_[i].used;
+  }
 }
 
 void FaultyWire::carry(Parcel parcel) {
@@ -118,7 +131,7 @@ FaultyWire::Fate FaultyWire::decide(Instant at) {
   Fate fate;
   fate.due = at;
   for (std::size_t i = 0; i < script_.size(); ++i) {
-    if (concerns_datagrams(script_[i].kind) && active(i, at)) act(script_[i], progress_[i], at, fate);
+    if (on_datagrams(script_[i].kind) && active(i, at)) act(script_[i], progress_[i], at, fate);
   }
   if (fate.due > at) ++truth_.delayed;
   fate.due = std::max(fate.due, last_due_);
@@ -142,6 +155,15 @@ void FaultyWire::act(const Fault& fault, Progress& progress, Instant at, Fate& f
       fate.due = std::max(fate.due,
                           at + fault.delay + from_seconds(to_seconds(fault.jitter) * 0.5 * (random_.symmetric() + 1)));
       break;
+    case FaultKind::jitter: {
+      const double mean_times = -std::log(0.5 * (random_.symmetric() + 1) + 0x1p-54);
+      const double spike = chance(fault.p) ? 0.5 * (random_.symmetric() + 1) : 0;
+      fate.due = std::max(fate.due,
+                          at + from_seconds(mean_times * to_seconds(fault.jitter) + spike * to_seconds(fault.spike)));
+      break;
+    }
+    case FaultKind::short_block:
+      return;
     case FaultKind::hold:
       fate.due = std::max(fate.due, fault.end());
       break;
@@ -210,6 +232,7 @@ std::size_t FaultyWire::enter(const Datagram& datagram) {
   if (keep_ == Keep::samples) {
     truth_.sampled.insert(truth_.sampled.end(), datagram.sampled.begin(),
                           datagram.sampled.begin() + static_cast<std::ptrdiff_t>(records));
+    for (std::size_t at = 4; at < datagram.size; at += kRecordBytes) truth_.ft.push_back(word(datagram, at));
   }
   truth_.log.push_back(entry);
   return truth_.log.size() - 1;

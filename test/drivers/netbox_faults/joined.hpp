@@ -26,7 +26,8 @@ struct Ideal {
     Instant arrival{0};
     friend bool operator==(const Delivered&, const Delivered&) = default;
   };
-  std::uint64_t received = 0, lost = 0, duplicates = 0, stalled = 0, restarts = 0, reboots = 0, malformed = 0;
+  std::uint64_t received = 0, lost = 0, duplicates = 0, stalled = 0, restarts = 0, reboots = 0, irregular = 0,
+                malformed = 0;
   std::vector<Delivered> delivered;  ///< in this order
 };
 
@@ -53,7 +54,12 @@ class Joined {
     std::uint32_t boot, stream, first_rdt;
     Instant at;
   };
+  struct Last {
+    bool any = false;
+    std::uint32_t boot = 0, stream = 0, rdt = 0, ft = 0;
+  };
   void pump(Instant now);
+  void take_into(Ideal& ideal, Last& last, const Ideal::Delivered& record, const sim::SentDatagram& sent) const;
 
   Manner manner_;
   sim::NetBoxDevice box_;
