@@ -59,17 +59,18 @@ bool FaultyWire::next_datagram(Datagram& out, Instant now) {
     return false;
   }
   carry_all(now);
-  const auto first = under_way_.begin();
-  if (first == under_way_.end() || first->first.first > now) return false;
-  out = first->second.datagram;
-  out.at = first->first.first;
-  count_arrival(first->second, out.at);
-  under_way_.erase(first);
+  const Instant due = under_way_.next();
+  if (due > now || due == kNever) return false;
+  const Parcel& first = under_way_.first();
+  out = first.datagram;
+  out.at = due;
+  count_arrival(first, due);
+  under_way_.drop_first();
   return true;
 }
 
 Instant FaultyWire::next_arrival() const noexcept {
-  Instant next = under_way_.empty() ? kNever : under_way_.begin()->first.first;
+  Instant next = under_way_.next();
   for (const Held& held : held_) next = std::min(next, held.give_up);
   return next;
 }
@@ -95,20 +96,24 @@ void FaultyWire::shorten(Datagram& datagram) {
   }
 }
 
-void FaultyWire::carry(Parcel parcel) {
+void FaultyWire::make_up(const Parcel& after, std::size_t size, bool foreign, Instant due) {
+  Parcel made = after;
+  Datagram& datagram = made.datagram;
+  made.whole = false;
+  if (size > datagram.size) std::fill_n(datagram.bytes.data() + datagram.size, size - datagram.size, std::uint8_t{0});
+  datagram.size = size;
+  datagram.foreign = foreign;
+  if (foreign) put_big(datagram.bytes.data(), word(datagram, 0) + 1000);
+  under_way_.add(made, due);
+}
+
+void FaultyWire::carry(const Parcel& parcel) {
   const Instant sent = parcel.datagram.at;
   give_up_holding(sent);
   const Fate fate = decide(sent);
   last_due_ = fate.due;
-  const auto make_up = [&](Parcel made, std::size_t size, bool foreign) {
-    made.whole = false;
-    made.datagram.size = size;
-    made.datagram.foreign = foreign;
-    if (foreign) put_big(made.datagram.bytes.data(), word(made.datagram, 0) + 1000);
-    deliver(std::move(made), fate.due);
-  };
-  for (std::uint64_t i = 0; i < fate.foreign; ++i) make_up(parcel, parcel.datagram.size, true);
-  for (const std::uint64_t size : fate.sizes) make_up(parcel, static_cast<std::size_t>(size), false);
+  for (std::uint64_t i = 0; i < fate.foreign; ++i) make_up(parcel, parcel.datagram.size, true, fate.due);
+  for (const std::uint64_t size : fate.sizes) make_up(parcel, static_cast<std::size_t>(size), false, fate.due);
   if (fate.dropped || fate.replaced) {
     ++truth_.dropped;
     truth_.records_dropped += parcel.datagram.size / kRecordBytes;
@@ -117,13 +122,13 @@ void FaultyWire::carry(Parcel parcel) {
   for (const Duration after : fate.copies) {
     Parcel copy = parcel;
     copy.copy = true;
-    deliver(std::move(copy), fate.due + after);
+    under_way_.add(copy, fate.due + after);
   }
   if (fate.depth > 0) {
-    held_.push_back({std::move(parcel), fate.depth, std::max(fate.due, sent + fate.overtaken_for)});
+    held_.push_back({parcel, fate.depth, std::max(fate.due, sent + fate.overtaken_for)});
     return;
   }
-  deliver(std::move(parcel), fate.due);
+  under_way_.add(parcel, fate.due);
   let_pass(fate.due);
 }
 
@@ -190,7 +195,7 @@ void FaultyWire::let_pass(Instant due) {
       continue;
     }
     ++truth_.overtaken;
-    deliver(std::move(held_[i].parcel), due);
+    under_way_.add(held_[i].parcel, due);
     held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(i));
   }
 }
@@ -201,7 +206,7 @@ void FaultyWire::give_up_holding(Instant now) {
       ++i;
       continue;
     }
-    deliver(std::move(held_[i].parcel), held_[i].give_up);
+    under_way_.add(held_[i].parcel, held_[i].give_up);
     held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(i));
   }
 }

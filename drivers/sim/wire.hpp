@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,6 +12,7 @@
 #include "drivers/sim/faults.hpp"
 #include "drivers/sim/netbox_device.hpp"
 #include "drivers/sim/random.hpp"
+#include "drivers/sim/under_way.hpp"
 #include "drivers/sim/wire_truth.hpp"
 
 namespace kphi::sim {
@@ -102,8 +102,6 @@ class FaultyWire {
     std::vector<std::uint64_t> sizes;
     std::uint64_t foreign = 0;
   };
-  using Place = std::pair<Instant, std::uint64_t>;  ///< arrival, then order
-
   void meet_events(Instant now);
   void schedule() noexcept;
   void begin(const Fault& fault, Instant now);
@@ -116,10 +114,10 @@ class FaultyWire {
   void hand_over(std::span<const std::uint8_t> datagram, Peer peer);
 
   void carry_all(Instant now);
-  void carry(Parcel parcel);
+  void carry(const Parcel& parcel);
+  void make_up(const Parcel& after, std::size_t size, bool foreign, Instant due);
   [[nodiscard]] Fate decide(Instant at);
   void act(const Fault& fault, Progress& progress, Instant at, Fate& fate);
-  void deliver(Parcel parcel, Instant due) { under_way_.emplace(Place{due, order_++}, std::move(parcel)); }
   void let_pass(Instant due);
   void give_up_holding(Instant now);
   void shorten(Datagram& datagram);
@@ -144,10 +142,9 @@ class FaultyWire {
   std::string moved_to_, first_address_;
   const Fault* skew_ = nullptr;
   double phase_ = 0;  ///< of the box's clock, in its samples
-  std::map<Place, Parcel> under_way_;
+  UnderWay<Parcel> under_way_;
   std::vector<Held> held_;
   Instant last_due_{0};
-  std::uint64_t order_ = 0;
   Parcel passing_;
   WireTruth truth_;
 };
