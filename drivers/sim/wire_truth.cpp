@@ -1,5 +1,7 @@
 #include "drivers/sim/wire_truth.hpp"
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
 namespace kphi::sim {
@@ -63,6 +65,15 @@ std::string json_lines(const WireTruth& truth) {
   for (const Total& total : kTotals) totals[total.name] = truth.*total.member;
   add({{"totals", totals}});
   return out;
+}
+
+std::string summary(const WireTruth& truth) {
+  std::string out;
+  for (const Total& total : kTotals) {
+    if (truth.*total.member > 0)
+      out += fmt::format("{}{} {}", out.empty() ? "" : ", ", total.name, truth.*total.member);
+  }
+  return out.empty() ? "nothing was sent" : out;
 }
 
 }  // namespace kphi::sim

@@ -59,4 +59,7 @@ struct WireTruth {
 /// One JSON object per line: the events, the datagrams of the log, then {"totals": …}.
 [[nodiscard]] std::string json_lines(const WireTruth& truth);
 
+/// The totals that are not zero, in one line: "sent 700, records_sent 28000, …".
+[[nodiscard]] std::string summary(const WireTruth& truth);
+
 }  // namespace kphi::sim
