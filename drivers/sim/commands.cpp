@@ -13,7 +13,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include "drivers/device_error.hpp"
 #include "drivers/sim/control_line.hpp"
@@ -74,9 +73,11 @@ std::string text_of(const std::string& path) {
   throw ConfigurationError(path + ": cannot be read; name a fault script");
 }
 
-FaultFile load_faults(const std::string& path) {
+void load_faults(const std::string& path, BenchSettings& bench) {
+  const std::string text = text_of(path);
   try {
-    return parse_faults(text_of(path), path);
+    bench.faults = parse_faults(text, path);
+    bench.netbox.habits = parse_habits(text, path);
   } catch (const FaultFileError& error) {
     throw ConfigurationError(error.what());
   }
@@ -94,11 +95,7 @@ ServerSettings settings_of(const profiles::Bench& bench, const Options& options)
   settings.rdt_port = options.free_ports ? 0 : bench.netbox.rdt_port;
   settings.http_port = options.free_ports ? 0 : bench.netbox.http_port;
   settings.tcp_port = settings.rdt_port == 0 ? 0 : static_cast<std::uint16_t>(settings.rdt_port - 1);
-  if (!options.faults.empty()) {
-    FaultFile file = load_faults(options.faults);
-    settings.bench.faults = std::move(file.load_cell);
-    settings.bench.netbox.habits = file.habits;
-  }
+  if (!options.faults.empty()) load_faults(options.faults, settings.bench);
   if (!options.truth_log.empty()) settings.bench.keep = FaultyWire::Keep::datagrams;
   settings.device = bench.iq.device;
   settings.control = bench.simulation->control;

@@ -64,11 +64,10 @@ YAML::Node parse(const std::string& text, const std::string& path) {
   }
 }
 
-}  // namespace
-
-FaultFile parse_faults(const std::string& text, const std::string& path) {
+/// Its members, known by name; there is a list of faults.
+std::map<std::string, YAML::Node> file_of(const std::string& text, const std::string& path) {
   const YAML::Node root = parse(text, path);
-  const auto all = members(root, path);
+  auto all = members(root, path);
   for (const auto& [key, value] : all) {
     if (key != "format" && key != "faults" && key != "habits")
       refuse(path, value.Mark(), fmt::format("unknown key '{}'", key), "remove it");
@@ -79,10 +78,21 @@ FaultFile parse_faults(const std::string& text, const std::string& path) {
   if (!all.contains("faults") || !all.at("faults").IsSequence()) {
     refuse(path, root.Mark(), "there is no list of faults", "write faults: and a list of entries, or []");
   }
-  FaultFile file;
-  if (all.contains("habits")) file.habits = read_habits(all.at("habits"), path);
-  for (const auto& entry : all.at("faults")) file.load_cell.push_back(read_entry(entry, path));
-  return file;
+  return all;
+}
+
+}  // namespace
+
+FaultScript parse_faults(const std::string& text, const std::string& path) {
+  const auto file = file_of(text, path);
+  FaultScript script;
+  for (const auto& entry : file.at("faults")) script.push_back(read_entry(entry, path));
+  return script;
+}
+
+NetBoxHabits parse_habits(const std::string& text, const std::string& path) {
+  const auto file = file_of(text, path);
+  return file.contains("habits") ? read_habits(file.at("habits"), path) : NetBoxHabits{};
 }
 
 }  // namespace kphi::sim

@@ -23,12 +23,9 @@ class FaultFileError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-struct FaultFile {
-  FaultScript load_cell;
-  NetBoxHabits habits;
-};
-
 /// Strict; throws FaultFileError. `path` only names the text in messages.
-[[nodiscard]] FaultFile parse_faults(const std::string& text, const std::string& path);
+[[nodiscard]] FaultScript parse_faults(const std::string& text, const std::string& path);
+/// Of the same file; defaults where it names none.
+[[nodiscard]] NetBoxHabits parse_habits(const std::string& text, const std::string& path);
 
 }  // namespace kphi::sim

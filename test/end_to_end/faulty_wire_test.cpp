@@ -35,13 +35,12 @@ std::uint64_t truly_lost(const std::vector<json>& log, std::uint32_t first_ft, s
 }
 
 TEST(FaultyWire, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
-  RunningBench bench(
-      "faults:\n"
-      "  - {at_s: 0, for_s: 100000, kind: loss, p: 0.01, burst: 3}\n"
-      "  - {at_s: 0, for_s: 100000, kind: duplicate, p: 0.02}\n"
-      "  - {at_s: 0, for_s: 100000, kind: foreign_source, p: 0.02}\n"
-      "  - {at_s: 0, for_s: 100000, kind: wrong_size, p: 0.02, size: 71}\n"
-      "  - {at_s: 0, for_s: 100000, kind: http_charset}");
+  RunningBench bench(Manner{8, 7000,
+                            "  - {at_s: 0, for_s: 100000, kind: loss, p: 0.01, burst: 3}\n"
+                            "  - {at_s: 0, for_s: 100000, kind: duplicate, p: 0.02}\n"
+                            "  - {at_s: 0, for_s: 100000, kind: foreign_source, p: 0.02}\n"
+                            "  - {at_s: 0, for_s: 100000, kind: wrong_size, p: 0.02, size: 71}\n"
+                            "  - {at_s: 0, for_s: 100000, kind: http_charset}\n"});
   Process devices({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--json"});
   EXPECT_EQ(devices.wait(), 0) << devices.err();
   EXPECT_GT(json::parse(devices.out())[0]["stream"]["lost_network"], 0);
@@ -50,7 +49,7 @@ TEST(FaultyWire, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
   bench.process().signal(SIGTERM);
   EXPECT_EQ(bench.process().wait(), 0);
   EXPECT_THAT(bench.process().err(), AllOf(HasSubstr("records_dropped"), HasSubstr("foreign")));
-  const std::vector<json> log = lines_of(bench.path("truth.jsonl"));
+  const std::vector<json> log = lines_of(bench.path("wire.jsonl"));
   EXPECT_EQ(log.front()["event"], "http_charset");
   int runs = 0;
   std::uint64_t lost = 0;
@@ -69,10 +68,10 @@ TEST(FaultyWire, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
 }
 
 TEST(FaultyWire, AStolenStreamEndsTheCampaignWithTheMotorStopped) {
-  RunningBench bench("faults: [{at_s: 4, kind: stolen}]");
+  RunningBench bench(Manner{8, 7000, "  - {at_s: 4, kind: stolen}\n"});
   Process run(bench.run_command());
   EXPECT_EQ(run.wait(), 4) << run.err();
-  EXPECT_THAT(run.err(), AllOf(HasSubstr("the stream fell silent"), HasSubstr("recorded so far: ")));
+  EXPECT_THAT(run.err(), HasSubstr("recorded so far: "));
   EXPECT_TRUE(bench.motor_stops());
 }
 

@@ -21,26 +21,32 @@ inline std::string kphi() { return KPHI_PROGRAM; }
 
 inline void write(const std::filesystem::path& file, const std::string& text) { std::ofstream(file) << text; }
 
-inline std::string bench_text(const std::filesystem::path& folder, int rdt_port, int http_port, double time_scale) {
+inline std::string bench_text(const std::filesystem::path& folder, int rdt_port, int http_port, double time_scale,
+                              double rate_hz = 7000) {
   return fmt::format(
       "format: kphi-bench/1\nname: test\n"
-      "netbox: {{host: 127.0.0.1, rdt_port: {}, http_port: {}, rate_hz: 7000, records_per_datagram: 40}}\n"
+      "netbox: {{host: 127.0.0.1, rdt_port: {}, http_port: {}, rate_hz: {}, records_per_datagram: 40}}\n"
       "iq: {{device: {}/motor, baud: 921600, module_id: 0, spin: +1, telemetry_hz: 50, speed_max_rpm: 19300}}\n"
       "thrust_axis: \"+Fz\"\nsimulation: {{time_scale: {}, seed: 3, control: {}/control}}\n",
-      rdt_port, http_port, folder.string(), time_scale, folder.string());
+      rdt_port, http_port, rate_hz, folder.string(), time_scale, folder.string());
 }
+
+struct Manner {
+  double time_scale = 8;
+  double rate_hz = 7000;
+  std::string faults = "  []\n";  ///< entries of a fault script
+};
 
 /// `kphi sim` on free ports, in a folder of its own.
 class RunningBench {
  public:
-  explicit RunningBench(double time_scale = 8) : RunningBench("faults: []", time_scale) {}
-  /// `faults`: a script without its first line.
-  explicit RunningBench(const std::string& faults, double time_scale = 8)
-      : process_((write(folder_.path() / "wanted.yaml", bench_text(folder_.path(), 49152, 8049, time_scale)),
-                  write(folder_.path() / "faults.yaml", "format: kphi-faults/1\n" + faults + "\n"),
+  explicit RunningBench(const Manner& manner = {})
+      : process_((write(folder_.path() / "wanted.yaml",
+                        bench_text(folder_.path(), 49152, 8049, manner.time_scale, manner.rate_hz)),
+                  write(folder_.path() / "faults.yaml", "format: kphi-faults/1\nfaults:\n" + manner.faults),
                   std::vector<std::string>{kphi(), "sim", path("wanted.yaml"), "--free-ports", "--resolved",
                                            path("bench.yaml"), "--truth", path("truth.yaml"), "--faults",
-                                           path("faults.yaml"), "--truth-log", path("truth.jsonl")})) {
+                                           path("faults.yaml"), "--truth-log", path("wire.jsonl")})) {
     process_.wait_for("\"rdt\"");
     write(folder_.path() / "short.yaml", short_campaign_text("0, 45, 180"));
   }

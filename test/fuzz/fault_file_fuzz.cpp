@@ -39,12 +39,12 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-void stream_through(const sim::FaultFile& file) {
+void stream_through(const std::string& text) {
   sim::NetBoxSettings settings;
   settings.records_per_datagram = 7;
-  settings.habits = file.habits;
+  settings.habits = sim::parse_habits(text, "faults.yaml");
   sim::NetBoxDevice box(settings);
-  sim::FaultyWire wire(box, file.load_cell, 1);
+  sim::FaultyWire wire(box, sim::parse_faults(text, "faults.yaml"), 1);
   wire.request(std::array<std::uint8_t, 8>{0x12, 0x34, 0, 3, 0, 0, 0, 0}, 7, Instant{0});
   sim::Datagram datagram;
   std::uint64_t taken = 0;
@@ -69,7 +69,7 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
-    stream_through(sim::parse_faults(std::string(reinterpret_cast<const char*>(data), size), "faults.yaml"));
+    stream_through({reinterpret_cast<const char*>(data), size});
   } catch (const sim::FaultFileError&) {
   }
   return 0;

@@ -14,6 +14,7 @@ using namespace std::chrono_literals;
 std::string refusal(const std::string& text) {
   try {
     (void)parse_faults(text, "f.yaml");
+    (void)parse_habits(text, "f.yaml");
   } catch (const FaultFileError& error) {
     return error.what();
   }
@@ -64,8 +65,7 @@ TEST(FaultFile, ReadsEveryKind) {
   - {at_s: 0, kind: zero_drift, axis: 2, amount: 0.5, tau_s: 30}
   - {at_s: 3, for_s: 9, kind: address, address: 127.0.0.2}
 )",
-                                          "f.yaml")
-                                 .load_cell;
+                                          "f.yaml");
   std::set<FaultKind> kinds;
   for (const Fault& fault : script) kinds.insert(fault.kind);
   EXPECT_EQ(kinds.size(), all_fault_kinds().size());
@@ -84,15 +84,13 @@ TEST(FaultFile, ReadsEveryKind) {
   for (std::size_t i = 1; i < script.size(); ++i) EXPECT_NE(name_of(script[i].kind), "?");
 }
 
-TEST(FaultFile, MayBeEmpty) { EXPECT_TRUE(parse_faults("format: kphi-faults/1\nfaults: []\n", "f").load_cell.empty()); }
+TEST(FaultFile, MayBeEmpty) { EXPECT_TRUE(parse_faults("format: kphi-faults/1\nfaults: []\n", "f").empty()); }
 
 TEST(FaultFile, ChoosesTheHabitsOfTheBox) {
-  const auto habits =
-      parse_faults(
-          "format: kphi-faults/1\nfaults: []\nhabits: {bias_stops_stream: true, last_block: padded, "
-          "rate_write: pauses, first_rdt_sequence: 0, array_separator: blank, ft_counts_samples: false}",
-          "f")
-          .habits;
+  const auto habits = parse_habits(
+      "format: kphi-faults/1\nfaults: []\nhabits: {bias_stops_stream: true, last_block: padded, "
+      "rate_write: pauses, first_rdt_sequence: 0, array_separator: blank, ft_counts_samples: false}",
+      "f");
   EXPECT_TRUE(habits.bias_stops_stream);
   EXPECT_EQ(habits.last_block, NetBoxHabits::LastBlock::padded);
   EXPECT_EQ(habits.rate_write, NetBoxHabits::RateWrite::pauses);
