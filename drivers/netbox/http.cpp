@@ -48,10 +48,17 @@ class Exchange {
   void write() {
     http::async_write(stream_, request_, [this](error_code error, std::size_t) {
       if (!proceed(error, "read the answer")) return;
-      http::async_read(stream_, buffer_, parser_, [this](error_code failure, std::size_t) {
-        error_ = failure;
-        done_ = true;
+      // The headers by themselves: with the body behind them, Beast 1.74 forgets that they announce too long a one.
+      http::async_read_header(stream_, buffer_, parser_, [this](error_code failure, std::size_t) {
+        if (proceed(failure, "read the answer")) read_body();
       });
+    });
+  }
+
+  void read_body() {
+    http::async_read(stream_, buffer_, parser_, [this](error_code error, std::size_t) {
+      error_ = error;
+      done_ = true;
     });
   }
 

@@ -63,12 +63,21 @@ profiles::Bench load_simulated(const Options& options) {
   return bench;
 }
 
-FaultScript load_faults(const std::string& path) {
-  std::ifstream file(path);
-  const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-  if (!file) throw ConfigurationError(path + ": cannot be read; name a fault script");
+std::string text_of(const std::string& path) {
   try {
-    return parse_faults(text, path);
+    std::ifstream file(path);
+    const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    if (file) return text;
+  } catch (const std::ios_base::failure&) {  // a folder
+  }
+  throw ConfigurationError(path + ": cannot be read; name a fault script");
+}
+
+void load_faults(const std::string& path, BenchSettings& bench) {
+  const std::string text = text_of(path);
+  try {
+    bench.faults = parse_faults(text, path);
+    bench.netbox.habits = parse_habits(text, path);
   } catch (const FaultFileError& error) {
     throw ConfigurationError(error.what());
   }
@@ -87,7 +96,7 @@ ServerSettings settings_of(const profiles::Bench& bench, const Options& options)
   settings.http_port = options.free_ports ? 0 : bench.netbox.http_port;
   settings.tcp_port = options.free_ports ? 0 : bench.netbox.tcp_port;
   const std::string& faults = options.faults.empty() ? bench.simulation->faults : options.faults;
-  if (!faults.empty()) settings.bench.faults = load_faults(faults);
+  if (!faults.empty()) load_faults(faults, settings.bench);
   if (!options.truth_log.empty()) settings.bench.keep = FaultyWire::Keep::datagrams;
   settings.device = bench.iq.device;
   settings.control = bench.simulation->control;
@@ -131,6 +140,8 @@ int talk(const profiles::Bench& bench, const std::string& line) {
 
 void serve(const profiles::Bench& bench, const Options& options) {
   Server server(settings_of(bench, options));
+  if (!options.truth_log.empty())
+    write_file(options.truth_log, "");  // refused now rather than when it is full of truth
   if (!options.truth.empty()) write_file(options.truth, truth_yaml(bench.simulation->seed));
   if (!options.resolved.empty()) write_file(options.resolved, resolved_text(bench, server.addresses()));
   running = &server;
@@ -145,6 +156,7 @@ void serve(const profiles::Bench& bench, const Options& options) {
   std::signal(SIGTERM, SIG_DFL);
   running = nullptr;
   if (!options.truth_log.empty()) write_file(options.truth_log, json_lines(server.truth()));
+  if (!options.faults.empty()) fmt::print(stderr, "kphi sim: {}\n", summary(server.truth()));
   const auto& unsent = server.unsent();
   if (unsent.datagrams + unsent.motor_bytes > 0) {
     fmt::print(stderr, "kphi sim: not sent for want of room: {} datagrams, {} motor bytes\n", unsent.datagrams,

@@ -1,7 +1,10 @@
 #include "drivers/sim/conversations.hpp"
 
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 
@@ -62,6 +65,9 @@ void Conversations::welcome() {
     if (number < 0) return;
     connections_.emplace_back();
     connections_.back().socket = Descriptor(number);
+    // Segments leave as they are written. Not known to sockets of other families, which need it not.
+    const int yes = 1;
+    ::setsockopt(number, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
   }
 }
 
@@ -78,19 +84,23 @@ void Conversations::hear(Connection& connection) {
     connection.heard.append(bytes.data(), static_cast<std::size_t>(count));
     Answer answer = answerer_(connection.heard);
     connection.to_say += answer.bytes;
+    if (!answer.bytes.empty()) {
+      connection.segment = answer.segment;
+      connection.pause = answer.pause;
+    }
     if (answer.wait.count() > 0) connection.speak_at = connection.heard_at + answer.wait;
     connection.closing = answer.close;
   }
 }
 
 void Conversations::say(Connection& connection) {
-  if (connection.speak_at > std::chrono::steady_clock::now()) return;
-  while (!connection.to_say.empty()) {
-    const auto& text = connection.to_say;
-    const ssize_t count = ::send(connection.socket.number(), text.data(), text.size(), MSG_NOSIGNAL);
+  auto& text = connection.to_say;
+  while (!text.empty() && connection.speak_at <= std::chrono::steady_clock::now()) {
+    const std::size_t size = connection.segment == 0 ? text.size() : std::min(connection.segment, text.size());
+    const ssize_t count = ::send(connection.socket.number(), text.data(), size, MSG_NOSIGNAL);
     if (count < 0 && (errno == EAGAIN || errno == EINTR)) return;
-    if (count <= 0) connection.to_say.clear();
-    if (count > 0) connection.to_say.erase(0, static_cast<std::size_t>(count));
+    text.erase(0, count > 0 ? static_cast<std::size_t>(count) : text.size());
+    if (connection.segment != 0) connection.speak_at = std::chrono::steady_clock::now() + connection.pause;
   }
 }
 

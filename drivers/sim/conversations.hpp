@@ -19,8 +19,10 @@ class Conversations {
  public:
   struct Answer {
     std::string bytes;
-    std::chrono::nanoseconds wait{0};  ///< wall time before the first byte
-    bool close = false;                ///< after the last one
+    std::chrono::nanoseconds wait{0};   ///< wall time before the first byte
+    bool close = false;                 ///< after the last one
+    std::size_t segment = 0;            ///< at most so many bytes at once; 0: all
+    std::chrono::nanoseconds pause{0};  ///< wall time between two segments
   };
   /// Takes whole questions off the front of what was heard and says what to send.
   using Answerer = std::function<Answer(std::string& heard)>;
@@ -47,6 +49,8 @@ class Conversations {
     std::string heard;
     std::string to_say;
     bool closing = false;
+    std::size_t segment = 0;
+    std::chrono::nanoseconds pause{0};
     std::chrono::steady_clock::time_point speak_at{};
     std::chrono::steady_clock::time_point heard_at = std::chrono::steady_clock::now();
   };

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include "drivers/sim/habits.hpp"
+
 namespace kphi::sim {
 namespace {
 
@@ -25,13 +27,27 @@ std::map<std::string, YAML::Node> members(const YAML::Node& map, const std::stri
   return all;
 }
 
+const std::string& scalar(const std::string& key, const YAML::Node& value, const std::string& path) {
+  if (!value.IsScalar()) refuse(path, value.Mark(), fmt::format("{} is no single value", key), "write one");
+  return value.Scalar();
+}
+
+NetBoxHabits read_habits(const YAML::Node& node, const std::string& path) {
+  NetBoxHabits habits;
+  for (const auto& [key, value] : members(node, path)) {
+    try {
+      set_habit(habits, key, scalar(key, value, path));
+    } catch (const FaultEntryError& error) {
+      refuse(path, value.Mark(), error.what(), "mend it");
+    }
+  }
+  return habits;
+}
+
 Fault read_entry(const YAML::Node& node, const std::string& path) {
   FaultEntry entry;
   const auto all = members(node, path);
-  for (const auto& [key, value] : all) {
-    if (!value.IsScalar()) refuse(path, value.Mark(), fmt::format("{} is no single value", key), "write a number");
-    entry[key] = value.Scalar();
-  }
+  for (const auto& [key, value] : all) entry[key] = scalar(key, value, path);
   try {
     return fault_of(entry);
   } catch (const FaultEntryError& error) {
@@ -48,13 +64,12 @@ YAML::Node parse(const std::string& text, const std::string& path) {
   }
 }
 
-}  // namespace
-
-FaultScript parse_faults(const std::string& text, const std::string& path) {
+/// Its members, known by name; there is a list of faults.
+std::map<std::string, YAML::Node> file_of(const std::string& text, const std::string& path) {
   const YAML::Node root = parse(text, path);
-  const auto all = members(root, path);
+  auto all = members(root, path);
   for (const auto& [key, value] : all) {
-    if (key != "format" && key != "faults")
+    if (key != "format" && key != "faults" && key != "habits")
       refuse(path, value.Mark(), fmt::format("unknown key '{}'", key), "remove it");
   }
   if (!all.contains("format") || !all.at("format").IsScalar() || all.at("format").Scalar() != kFormat) {
@@ -63,9 +78,21 @@ FaultScript parse_faults(const std::string& text, const std::string& path) {
   if (!all.contains("faults") || !all.at("faults").IsSequence()) {
     refuse(path, root.Mark(), "there is no list of faults", "write faults: and a list of entries, or []");
   }
+  return all;
+}
+
+}  // namespace
+
+FaultScript parse_faults(const std::string& text, const std::string& path) {
+  const auto file = file_of(text, path);
   FaultScript script;
-  for (const auto& entry : all.at("faults")) script.push_back(read_entry(entry, path));
+  for (const auto& entry : file.at("faults")) script.push_back(read_entry(entry, path));
   return script;
+}
+
+NetBoxHabits parse_habits(const std::string& text, const std::string& path) {
+  const auto file = file_of(text, path);
+  return file.contains("habits") ? read_habits(file.at("habits"), path) : NetBoxHabits{};
 }
 
 }  // namespace kphi::sim

@@ -1,15 +1,19 @@
 // A fault script as a file:
 //
 //     format: kphi-faults/1
+//     habits: {bias_stops_stream: true}     # of the box, see NetBoxHabits; may be absent
 //     faults:
 //       - {at_s: 2, for_s: 1, kind: loss, p: 0.01, burst: 3}
 //       - {at_s: 5, kind: reboot, down_s: 0.8, resume: true}
+//
+// `kind` says which device an entry concerns.
 #pragma once
 
 #include <stdexcept>
 #include <string>
 
 #include "drivers/sim/faults.hpp"
+#include "drivers/sim/netbox_settings.hpp"
 
 namespace kphi::sim {
 
@@ -21,5 +25,7 @@ class FaultFileError : public std::runtime_error {
 
 /// Strict; throws FaultFileError. `path` only names the text in messages.
 [[nodiscard]] FaultScript parse_faults(const std::string& text, const std::string& path);
+/// Of the same file; defaults where it names none.
+[[nodiscard]] NetBoxHabits parse_habits(const std::string& text, const std::string& path);
 
 }  // namespace kphi::sim

@@ -41,6 +41,18 @@ NetBoxSettings within_limits(NetBoxSettings settings) {
 
 }  // namespace
 
+Datagram& Datagram::operator=(const Datagram& other) noexcept {
+  peer = other.peer;
+  at = other.at;
+  boot = other.boot;
+  stream = other.stream;
+  foreign = other.foreign;
+  size = other.size;
+  std::copy_n(other.bytes.begin(), size, bytes.begin());
+  std::copy_n(other.sampled.begin(), std::min(size / kRecordBytes, sampled.size()), sampled.begin());
+  return *this;
+}
+
 NetBoxDevice::NetBoxDevice(const NetBoxSettings& settings)
     : settings_(within_limits(settings)),
       signal_(settings_),

@@ -25,6 +25,11 @@ inline constexpr std::size_t kRecordsPerDatagramMax = 40;
 inline constexpr std::size_t kDatagramBytesMax = kRecordBytes * (kRecordsPerDatagramMax + 1);
 
 struct Datagram {
+  Datagram() = default;
+  Datagram(const Datagram& other) noexcept { *this = other; }
+  /// Only what is in use.
+  Datagram& operator=(const Datagram& other) noexcept;
+
   Peer peer = 0;
   Instant at{0};             ///< bench time of its last record; out of a FaultyWire: of its arrival
   std::uint32_t boot = 0;    ///< power-ups of the box before it was written

@@ -21,17 +21,12 @@ std::string response(std::string_view status, std::string_view type, std::string
 
 std::string not_found() { return response("404 Not Found", "text/html", "<html><body>404 Not Found</body></html>"); }
 
-template <class Values>
-std::string joined(const Values& values) {
-  return fmt::format("{}", fmt::join(values, ";"));
-}
-
 /// One word per monitor condition.
 template <class Word>
 std::string conditions(const NetBoxSettings& settings, Word word) {
   std::string out;
   for (const MonitorCondition& condition : settings.conditions) {
-    if (!out.empty()) out += ';';
+    if (!out.empty()) out += settings.habits.array_separator;
     out += word(condition);
   }
   return out;
@@ -66,7 +61,10 @@ std::array<std::int64_t, 6> shown_bias(const NetBoxDevice& box) {
 }
 
 /// The box's ENABL.
-const char* enabled(bool yes) { return yes ? "Enabled" : "Disabled"; }
+const char* enabled(const NetBoxSettings& settings, bool yes) {
+  if (settings.habits.flags_as_digits) return yes ? "1" : "0";
+  return yes ? "Enabled" : "Disabled";
+}
 
 std::string escaped(const std::string& text) {
   std::string out;
@@ -90,6 +88,8 @@ std::string configuration_page(const NetBoxDevice& box, int number) {
   const Slot& slot = settings.slots[static_cast<std::size_t>(number)];
   const bool calibrated = slot.calibration == 0;
   std::string page = "<?xml version=\"1.0\"?><netft>\n";
+  const std::string separator(1, settings.habits.array_separator);
+  const auto joined = [&](const auto& values) { return fmt::format("{}", fmt::join(values, separator)); };
   const auto add = [&](std::string_view tag, const auto& value) {
     fmt::format_to(std::back_inserter(page), "<{}>{}</{}>\n", tag, value, tag);
   };
@@ -127,7 +127,7 @@ std::string configuration_page(const NetBoxDevice& box, int number) {
   add("netip", settings.address);
   add("comnetip", settings.address);
   add("comnetdhcp", "Disabled");
-  add("comrdte", enabled(settings.rdt_enabled));
+  add("comrdte", enabled(settings, settings.rdt_enabled));
   add("comrdtrate", kTicksPerSecond / box.divisor());
   add("comrdtbsiz", settings.records_per_datagram);
   add("mfgdigsn", "LOT0001");
@@ -137,7 +137,7 @@ std::string configuration_page(const NetBoxDevice& box, int number) {
   add("cfgtu", slot.torque_unit);
   add("cfgtdu", slot.distance_unit);
   add("cfgtau", slot.angle_unit);
-  add("comeipe", enabled(settings.ethernet_ip));
+  add("comeipe", enabled(settings, settings.ethernet_ip));
   return page + "</netft>\n";
 }
 

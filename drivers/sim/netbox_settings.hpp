@@ -48,6 +48,8 @@ struct NetBoxHabits {
   std::uint32_t first_rdt_sequence = 1;       ///< 0 in one public simulator
   bool ft_counts_samples = true;              ///< false: it counts records
   bool torque_text_with_hyphen = false;       ///< N-m instead of Nm
+  bool flags_as_digits = false;               ///< 1 and 0 instead of Enabled and Disabled
+  char array_separator = ';';                 ///< ';', ',' or ' ', of arrays in the XML
   bool product_name = true;                   ///< prodname is in the XML
   bool axia = false;                          ///< Ethernet Axia: other commands, other status bits
   bool close_on_unknown_tcp = false;          ///< WRITETRANSFORM, WRITETHRESHOLD; false: no answer

@@ -71,16 +71,14 @@ Server::Server(const ServerSettings& settings)
       pty_(settings.device),
       http_(std::move(web_.socket),
             {"\r\n\r\n", true, settings.bench.netbox.habits.one_http_connection ? 1 : kHttpConnections},
-            [this](std::string_view request) { return web_answer(request); }),
+            [this](std::string_view request) { return in_wall_time(bench_.wire().http(request, reached_)); }),
       tcp_(std::move(coarse_.socket), 4,
-           [this](std::string& heard) {
-             Conversations::Answer answer;
-             answer.bytes = bench_.netbox().tcp(heard, answer.close);
-             return answer;
-           }),
+           [this](std::string& heard) { return in_wall_time(bench_.wire().tcp(heard, reached_)); }),
       control_(listen_for_control(), {"\n", false, 16},
                [this](std::string_view line) { return Conversations::Answer{control_answer(bench_, line) + "\n"}; }),
-      batch_(kBatch) {
+      batch_(kBatch),
+      present_host_(settings.host),
+      last_wanted_(settings.host) {
   addresses_.rdt_port = rdt_.port;
   addresses_.http_port = web_.port;
   addresses_.tcp_port = coarse_.port;
@@ -136,6 +134,7 @@ void Server::run() {
       reached_ = std::min(goal, reached_ + step_size);
       step(reached_);
     }
+    follow_the_address();
     open_or_close_web();
     http_.serve();
     tcp_.serve();
@@ -144,15 +143,33 @@ void Server::run() {
 }
 
 void Server::open_or_close_web() {
-  const bool open = !bench_.wire().http_refused(reached_);
+  const bool open = !bench_.wire().http_refused(reached_) && !present_host_.empty();
   if (open != http_.listening())
-    http_.listen_at(open ? listen_at(addresses_.host, SOCK_STREAM, web_.port).socket : Descriptor());
+    http_.listen_at(open ? listen_at(present_host_, SOCK_STREAM, web_.port).socket : Descriptor());
 }
 
-Conversations::Answer Server::web_answer(std::string_view request) {
-  HttpReply reply = bench_.wire().http(request, reached_);
-  return {std::move(reply.bytes),
-          std::chrono::nanoseconds(static_cast<std::int64_t>(static_cast<double>(reply.wait.count()) / time_scale_))};
+void Server::follow_the_address() {
+  const std::string& moved = bench_.wire().moved_to();
+  const std::string& wanted = moved.empty() ? addresses_.host : moved;
+  if (wanted == last_wanted_) return;
+  last_wanted_ = wanted;
+  http_.listen_at(Descriptor());
+  tcp_.listen_at(Descriptor());
+  rdt_.socket = Descriptor();
+  present_host_.clear();
+  try {
+    rdt_ = listen_at(wanted, SOCK_DGRAM, rdt_.port);
+    tcp_.listen_at(listen_at(wanted, SOCK_STREAM, coarse_.port).socket);
+    present_host_ = wanted;
+  } catch (const DeviceError&) {  // no address of this machine: the box is where nobody reaches it
+  }
+}
+
+Conversations::Answer Server::in_wall_time(StreamReply&& reply) const {
+  const auto wall = [this](Duration bench) {
+    return std::chrono::nanoseconds(static_cast<std::int64_t>(static_cast<double>(bench.count()) / time_scale_));
+  };
+  return {std::move(reply.bytes), wall(reply.wait), reply.close, reply.segment, wall(reply.pause)};
 }
 
 void Server::step(Instant now) {

@@ -70,7 +70,8 @@ class Server {
   void hear_motor(Instant now);
   void send_datagrams();
   void open_or_close_web();
-  [[nodiscard]] Conversations::Answer web_answer(std::string_view request);
+  void follow_the_address();
+  [[nodiscard]] Conversations::Answer in_wall_time(StreamReply&& reply) const;
   void send_batch(std::vector<Datagram>& batch, std::size_t count, bool foreign);
   void send_motor();
 
@@ -88,6 +89,8 @@ class Server {
   Conversations control_;
   std::vector<Datagram> batch_;
   Unsent unsent_;
+  std::string present_host_;  ///< empty: the box has an address that this machine has not
+  std::string last_wanted_;
   int quiet_steps_ = 0;  ///< of the serial line
   Instant reached_{0};   ///< bench time
 };

@@ -2,13 +2,12 @@
 #include "drivers/sim/wire.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "drivers/sim/bytes.hpp"
 
 namespace kphi::sim {
 namespace {
-
-bool concerns_datagrams(FaultKind kind) noexcept { return kind <= FaultKind::foreign_source; }
 
 std::uint32_t word(const Datagram& datagram, std::size_t offset) noexcept {
   return big(datagram.payload().subspan(offset, 4));
@@ -17,15 +16,16 @@ std::uint32_t word(const Datagram& datagram, std::size_t offset) noexcept {
 }  // namespace
 
 FaultyWire::FaultyWire(NetBoxDevice& box, FaultScript script, std::uint64_t seed, Keep keep)
-    : box_(box), script_(std::move(script)), random_(seed), keep_(keep), progress_(script_.size()) {
+    : box_(box),
+      script_(std::move(script)),
+      random_(seed),
+      keep_(keep),
+      progress_(script_.size()),
+      first_address_(box.settings().address) {
   for (std::size_t i = 0; i < script_.size(); ++i) {
     const Fault& fault = script_[i];
-    if (concerns_datagrams(fault.kind)) {
-      direct_ = false;
-      continue;
-    }
-    if (fault.kind >= FaultKind::lost_start && fault.kind <= FaultKind::delayed_start) continue;
-    if (fault.kind >= FaultKind::http_slow) continue;
+    direct_ = direct_ && !on_datagrams(fault.kind);
+    if (!on_box(fault.kind)) continue;
     events_.push_back({fault.at, i, true});
     if (fault.kind == FaultKind::reboot) events_.push_back({fault.at + fault.down, i, false});
     if (fault.end() != kNever) events_.push_back({fault.end(), i, false});
@@ -59,43 +59,61 @@ bool FaultyWire::next_datagram(Datagram& out, Instant now) {
     return false;
   }
   carry_all(now);
-  const auto first = under_way_.begin();
-  if (first == under_way_.end() || first->first.first > now) return false;
-  out = first->second.datagram;
-  out.at = first->first.first;
-  count_arrival(first->second, out.at);
-  under_way_.erase(first);
+  const Instant due = under_way_.next();
+  if (due > now || due == kNever) return false;
+  const Parcel& first = under_way_.first();
+  out = first.datagram;
+  out.at = due;
+  count_arrival(first, due);
+  under_way_.drop_first();
   return true;
 }
 
 Instant FaultyWire::next_arrival() const noexcept {
-  Instant next = under_way_.empty() ? kNever : under_way_.begin()->first.first;
+  Instant next = under_way_.next();
   for (const Held& held : held_) next = std::min(next, held.give_up);
   return next;
 }
 
 void FaultyWire::carry_all(Instant now) {
   while (box_.next_datagram(passing_.datagram)) {
+    if (passing_.datagram.peer != kThief) shorten(passing_.datagram);
     passing_.entry = enter(passing_.datagram);
     if (passing_.datagram.peer != kThief) carry(passing_);
   }
   give_up_holding(now);
 }
 
-void FaultyWire::carry(Parcel parcel) {
+void FaultyWire::shorten(Datagram& datagram) {
+  for (std::size_t i = 0; i < script_.size(); ++i) {
+    const Fault& fault = script_[i];
+    if (fault.kind != FaultKind::short_block || !active(i, datagram.at) || !chance(fault.p)) continue;
+    const std::size_t records = datagram.size / kRecordBytes;
+    const std::size_t left_out = std::min(static_cast<std::size_t>(fault.records), records - 1);
+    datagram.size -= left_out * kRecordBytes;
+    truth_.records_left_out += left_out;
+    ++progress_[i].used;
+  }
+}
+
+void FaultyWire::make_up(const Parcel& after, std::size_t size, bool foreign, Instant due) {
+  Parcel made = after;
+  Datagram& datagram = made.datagram;
+  made.whole = false;
+  if (size > datagram.size) std::fill_n(datagram.bytes.data() + datagram.size, size - datagram.size, std::uint8_t{0});
+  datagram.size = size;
+  datagram.foreign = foreign;
+  if (foreign) put_big(datagram.bytes.data(), word(datagram, 0) + 1000);
+  under_way_.add(made, due);
+}
+
+void FaultyWire::carry(const Parcel& parcel) {
   const Instant sent = parcel.datagram.at;
   give_up_holding(sent);
   const Fate fate = decide(sent);
   last_due_ = fate.due;
-  const auto make_up = [&](Parcel made, std::size_t size, bool foreign) {
-    made.whole = false;
-    made.datagram.size = size;
-    made.datagram.foreign = foreign;
-    if (foreign) put_big(made.datagram.bytes.data(), word(made.datagram, 0) + 1000);
-    deliver(std::move(made), fate.due);
-  };
-  for (std::uint64_t i = 0; i < fate.foreign; ++i) make_up(parcel, parcel.datagram.size, true);
-  for (const std::uint64_t size : fate.sizes) make_up(parcel, static_cast<std::size_t>(size), false);
+  for (std::uint64_t i = 0; i < fate.foreign; ++i) make_up(parcel, parcel.datagram.size, true, fate.due);
+  for (const std::uint64_t size : fate.sizes) make_up(parcel, static_cast<std::size_t>(size), false, fate.due);
   if (fate.dropped || fate.replaced) {
     ++truth_.dropped;
     truth_.records_dropped += parcel.datagram.size / kRecordBytes;
@@ -104,13 +122,13 @@ void FaultyWire::carry(Parcel parcel) {
   for (const Duration after : fate.copies) {
     Parcel copy = parcel;
     copy.copy = true;
-    deliver(std::move(copy), fate.due + after);
+    under_way_.add(copy, fate.due + after);
   }
   if (fate.depth > 0) {
-    held_.push_back({std::move(parcel), fate.depth, std::max(fate.due, sent + fate.overtaken_for)});
+    held_.push_back({parcel, fate.depth, std::max(fate.due, sent + fate.overtaken_for)});
     return;
   }
-  deliver(std::move(parcel), fate.due);
+  under_way_.add(parcel, fate.due);
   let_pass(fate.due);
 }
 
@@ -118,7 +136,7 @@ FaultyWire::Fate FaultyWire::decide(Instant at) {
   Fate fate;
   fate.due = at;
   for (std::size_t i = 0; i < script_.size(); ++i) {
-    if (concerns_datagrams(script_[i].kind) && active(i, at)) act(script_[i], progress_[i], at, fate);
+    if (on_datagrams(script_[i].kind) && active(i, at)) act(script_[i], progress_[i], at, fate);
   }
   if (fate.due > at) ++truth_.delayed;
   fate.due = std::max(fate.due, last_due_);
@@ -142,6 +160,15 @@ void FaultyWire::act(const Fault& fault, Progress& progress, Instant at, Fate& f
       fate.due = std::max(fate.due,
                           at + fault.delay + from_seconds(to_seconds(fault.jitter) * 0.5 * (random_.symmetric() + 1)));
       break;
+    case FaultKind::jitter: {
+      const double mean_times = -std::log(0.5 * (random_.symmetric() + 1) + 0x1p-54);
+      const double spike = chance(fault.p) ? 0.5 * (random_.symmetric() + 1) : 0;
+      fate.due = std::max(fate.due,
+                          at + from_seconds(mean_times * to_seconds(fault.jitter) + spike * to_seconds(fault.spike)));
+      break;
+    }
+    case FaultKind::short_block:
+      return;
     case FaultKind::hold:
       fate.due = std::max(fate.due, fault.end());
       break;
@@ -168,7 +195,7 @@ void FaultyWire::let_pass(Instant due) {
       continue;
     }
     ++truth_.overtaken;
-    deliver(std::move(held_[i].parcel), due);
+    under_way_.add(held_[i].parcel, due);
     held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(i));
   }
 }
@@ -179,7 +206,7 @@ void FaultyWire::give_up_holding(Instant now) {
       ++i;
       continue;
     }
-    deliver(std::move(held_[i].parcel), held_[i].give_up);
+    under_way_.add(held_[i].parcel, held_[i].give_up);
     held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(i));
   }
 }
@@ -210,6 +237,7 @@ std::size_t FaultyWire::enter(const Datagram& datagram) {
   if (keep_ == Keep::samples) {
     truth_.sampled.insert(truth_.sampled.end(), datagram.sampled.begin(),
                           datagram.sampled.begin() + static_cast<std::ptrdiff_t>(records));
+    for (std::size_t at = 4; at < datagram.size; at += kRecordBytes) truth_.ft.push_back(word(datagram, at));
   }
   truth_.log.push_back(entry);
   return truth_.log.size() - 1;

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,6 +12,7 @@
 #include "drivers/sim/faults.hpp"
 #include "drivers/sim/netbox_device.hpp"
 #include "drivers/sim/random.hpp"
+#include "drivers/sim/under_way.hpp"
 #include "drivers/sim/wire_truth.hpp"
 
 namespace kphi::sim {
@@ -20,9 +20,13 @@ namespace kphi::sim {
 /// The client that steals streams; what the box sends to it leaves the wire unseen.
 inline constexpr Peer kThief = ~Peer{0};
 
-struct HttpReply {
+/// What the box says over a stream socket. Bench times.
+struct StreamReply {
   std::string bytes;
-  Duration wait{0};  ///< before the first byte
+  Duration wait{0};         ///< before the first byte
+  std::size_t segment = 0;  ///< at most so many bytes at once; 0: all
+  Duration pause{0};        ///< between two segments
+  bool close = false;       ///< after the last byte
 };
 
 class FaultyWire {
@@ -38,11 +42,11 @@ class FaultyWire {
   void sample(const LoadCellSample& sample) {
     if (sample.at >= next_event_) [[unlikely]]
       meet_events(sample.at);
-    if (dead_) return;
-    if (skewed_) return sample_skewed(sample);
+    if (disturbed_) [[unlikely]]
+      return sample_disturbed(sample);
     box_.sample(sample);
   }
-  /// A datagram to the box's RDT port, sent at `now`.
+  /// A datagram to the box's RDT port, sent at `now` to the address that the box has then.
   void request(std::span<const std::uint8_t> datagram, Peer peer, Instant now);
   /// Next datagram that has arrived until `now`; `out.at` is the time of its arrival.
   bool next_datagram(Datagram& out, Instant now);
@@ -50,10 +54,14 @@ class FaultyWire {
   [[nodiscard]] Instant next_arrival() const noexcept;
 
   /// Answer to one complete request.
-  [[nodiscard]] HttpReply http(std::string_view request, Instant now);
+  [[nodiscard]] StreamReply http(std::string_view request, Instant now);
   /// Nobody listens on the web server's port now.
   [[nodiscard]] bool http_refused(Instant now) const noexcept;
+  /// As NetBoxDevice::tcp; an empty reply when `received` holds no whole command.
+  [[nodiscard]] StreamReply tcp(std::string& received, Instant now);
   [[nodiscard]] bool dead() const noexcept { return dead_; }
+  /// Where the box is since a fault gave it another address: what it sends comes from there. Empty: where it was.
+  [[nodiscard]] const std::string& moved_to() const noexcept { return moved_to_; }
   [[nodiscard]] const WireTruth& truth() const noexcept { return truth_; }
 
  private:
@@ -94,23 +102,25 @@ class FaultyWire {
     std::vector<std::uint64_t> sizes;
     std::uint64_t foreign = 0;
   };
-  using Place = std::pair<Instant, std::uint64_t>;  ///< arrival, then order
-
   void meet_events(Instant now);
   void schedule() noexcept;
   void begin(const Fault& fault, Instant now);
   void end(const Fault& fault);
   void note(Instant at, std::string what);
+  void sample_disturbed(LoadCellSample sample);
   void sample_skewed(const LoadCellSample& sample);
+  void move_to(const std::string& address);
+  void count_use(std::size_t fault, Instant now, std::uint64_t WireTruth::*counter);
   void hand_over(std::span<const std::uint8_t> datagram, Peer peer);
 
   void carry_all(Instant now);
-  void carry(Parcel parcel);
+  void carry(const Parcel& parcel);
+  void make_up(const Parcel& after, std::size_t size, bool foreign, Instant due);
   [[nodiscard]] Fate decide(Instant at);
   void act(const Fault& fault, Progress& progress, Instant at, Fate& fate);
-  void deliver(Parcel parcel, Instant due) { under_way_.emplace(Place{due, order_++}, std::move(parcel)); }
   void let_pass(Instant due);
   void give_up_holding(Instant now);
+  void shorten(Datagram& datagram);
   std::size_t enter(const Datagram& datagram);
   void count_arrival(const Parcel& parcel, Instant at);
   [[nodiscard]] bool active(std::size_t fault, Instant at) const noexcept;
@@ -125,14 +135,16 @@ class FaultyWire {
   std::vector<Event> events_;  ///< latest first
   std::vector<LateRequest> late_requests_;
   Instant next_event_ = kNever;
+  bool disturbed_ = false;  ///< dead, skewed or drifting
   bool dead_ = false;
   bool skewed_ = false;
+  std::vector<std::size_t> drifting_;
+  std::string moved_to_, first_address_;
   const Fault* skew_ = nullptr;
   double phase_ = 0;  ///< of the box's clock, in its samples
-  std::map<Place, Parcel> under_way_;
+  UnderWay<Parcel> under_way_;
   std::vector<Held> held_;
   Instant last_due_{0};
-  std::uint64_t order_ = 0;
   Parcel passing_;
   WireTruth truth_;
 };

@@ -1,4 +1,4 @@
-// What a script does to the requests, to the box itself and to its web server.
+// What a script does to the requests and to the box itself.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,15 +17,6 @@ bool is_start(std::span<const std::uint8_t> datagram) noexcept {
   if (datagram.size() != 8 || big(datagram.first(2)) != 0x1234) return false;
   const std::uint32_t command = big(datagram.subspan(2, 2));
   return command >= 1 && command <= 4;
-}
-
-std::string page(std::string_view status, std::string_view body) {
-  return fmt::format("HTTP/1.0 {}\r\nContent-Type: text/html\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{}",
-                     status, body.size(), body);
-}
-
-std::string oversized(std::size_t size) {
-  return page("200 OK", "<?xml version=\"1.0\"?><netft>" + std::string(size, ' '));
 }
 
 }  // namespace
@@ -56,6 +47,19 @@ void FaultyWire::meet_events(Instant now) {
 
 void FaultyWire::note(Instant at, std::string what) { truth_.events.push_back({at, std::move(what)}); }
 
+void FaultyWire::count_use(std::size_t fault, Instant now, std::uint64_t WireTruth::*counter) {
+  ++progress_[fault].used;
+  ++(truth_.*counter);
+  note(now, std::string(name_of(script_[fault].kind)));
+}
+
+void FaultyWire::move_to(const std::string& address) {
+  moved_to_ = address;
+  NetBoxSettings settings = box_.settings();
+  settings.address = address.empty() ? first_address_ : address;
+  box_.configure(settings);
+}
+
 void FaultyWire::begin(const Fault& fault, Instant) {
   switch (fault.kind) {
     case FaultKind::stolen: {
@@ -70,7 +74,7 @@ void FaultyWire::begin(const Fault& fault, Instant) {
       return box_.restart_stream();
     case FaultKind::reboot:
       ++truth_.reboots;
-      dead_ = true;
+      dead_ = disturbed_ = true;
       return;
     case FaultKind::stall:
       ++truth_.stalls;
@@ -78,12 +82,28 @@ void FaultyWire::begin(const Fault& fault, Instant) {
     case FaultKind::ft_jump_back:
       ++truth_.jumps;
       return box_.set_ft_sequence(box_.ft_sequence() + 1 - static_cast<std::uint32_t>(fault.samples));
+    case FaultKind::overrun:
+      ++truth_.overruns;
+      return box_.set_ft_sequence(box_.ft_sequence() + 1 + static_cast<std::uint32_t>(fault.samples));
     case FaultKind::wrap:
       return box_.set_ft_sequence(0u - static_cast<std::uint32_t>(fault.samples));
     case FaultKind::clock_skew:
       skew_ = &fault;
-      skewed_ = true;
+      skewed_ = disturbed_ = true;
       return;
+    case FaultKind::zero_drift:
+      drifting_.push_back(static_cast<std::size_t>(&fault - script_.data()));
+      disturbed_ = true;
+      return;
+    case FaultKind::rate: {
+      ++truth_.rate_changes;
+      NetBoxSettings settings = box_.settings();
+      settings.rate_hz = fault.rate_hz;
+      return box_.configure(settings);
+    }
+    case FaultKind::address:
+      ++truth_.moves;
+      return move_to(fault.address);
     case FaultKind::status:
       return box_.set_status(fault.bits);
     case FaultKind::saturation:
@@ -104,11 +124,15 @@ void FaultyWire::end(const Fault& fault) {
   switch (fault.kind) {
     case FaultKind::reboot:
       dead_ = false;
+      disturbed_ = skewed_ || !drifting_.empty();
       return box_.power_cycle(fault.resume);
+    case FaultKind::address:
+      return move_to({});
     case FaultKind::stall:
       return box_.stall(false);
     case FaultKind::clock_skew:
       skewed_ = false;
+      disturbed_ = dead_ || !drifting_.empty();
       return;
     case FaultKind::status:
       if (!fault.latched) box_.clear_status(fault.bits);
@@ -118,6 +142,16 @@ void FaultyWire::end(const Fault& fault) {
     default:
       return;
   }
+}
+
+void FaultyWire::sample_disturbed(LoadCellSample sample) {
+  if (dead_) return;
+  for (const std::size_t i : drifting_) {
+    const Fault& fault = script_[i];
+    const double since = to_seconds(sample.at - fault.at);
+    sample.wrench[fault.axis] += fault.amount * -std::expm1(-since / to_seconds(fault.tau));
+  }
+  skewed_ ? sample_skewed(sample) : box_.sample(sample);
 }
 
 void FaultyWire::sample_skewed(const LoadCellSample& sample) {
@@ -148,50 +182,17 @@ void FaultyWire::request(std::span<const std::uint8_t> datagram, Peer peer, Inst
   bool at_once = true;
   for (std::size_t i = 0; i < script_.size(); ++i) {
     const Fault& fault = script_[i];
-    if (fault.kind < FaultKind::lost_start || fault.kind > FaultKind::delayed_start || !active(i, now)) continue;
-    ++progress_[i].used;
-    note(now, std::string(name_of(fault.kind)));
-    if (fault.kind == FaultKind::lost_start) {
-      ++truth_.starts_lost;
-      return;
-    }
+    if (!on_starts(fault.kind) || !active(i, now)) continue;
+    if (fault.kind == FaultKind::lost_start) return count_use(i, now, &WireTruth::starts_lost);
+    const bool doubled = fault.kind == FaultKind::doubled_start;
+    count_use(i, now, doubled ? &WireTruth::starts_doubled : &WireTruth::starts_delayed);
     later = std::max(later, fault.delay);
-    at_once = at_once && fault.kind == FaultKind::doubled_start;
-    ++(fault.kind == FaultKind::doubled_start ? truth_.starts_doubled : truth_.starts_delayed);
+    at_once = at_once && doubled;
   }
   if (at_once) hand_over(datagram, peer);
   if (later < Duration{0}) return;
   late_requests_.push_back({now + later, {datagram.begin(), datagram.end()}, peer});
   schedule();
-}
-
-HttpReply FaultyWire::http(std::string_view request, Instant now) {
-  HttpReply reply{box_.http(request), Duration{0}};
-  for (std::size_t i = 0; i < script_.size(); ++i) {
-    const Fault& fault = script_[i];
-    if (fault.kind < FaultKind::http_slow || fault.kind == FaultKind::http_refused || !active(i, now)) continue;
-    ++progress_[i].used;
-    ++truth_.http_spoilt;
-    note(now, std::string(name_of(fault.kind)));
-    if (fault.kind == FaultKind::http_slow) reply.wait = std::max(reply.wait, fault.delay);
-    if (fault.kind == FaultKind::http_truncated)
-      reply.bytes.resize(std::min(reply.bytes.size(), static_cast<std::size_t>(fault.size)));
-    if (fault.kind == FaultKind::http_oversized) reply.bytes = oversized(static_cast<std::size_t>(fault.size));
-    if (fault.kind == FaultKind::http_status) {
-      const std::string status =
-          fmt::format("{} {}", fault.code, fault.code < 500 ? "Not Found" : "Internal Server Error");
-      reply.bytes = page(status, "<html><body>" + status + "</body></html>");
-    }
-  }
-  return reply;
-}
-
-bool FaultyWire::http_refused(Instant now) const noexcept {
-  if (dead_) return true;
-  for (std::size_t i = 0; i < script_.size(); ++i) {
-    if (script_[i].kind == FaultKind::http_refused && active(i, now)) return true;
-  }
-  return false;
 }
 
 }  // namespace kphi::sim

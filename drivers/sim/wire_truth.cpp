@@ -1,8 +1,52 @@
 #include "drivers/sim/wire_truth.hpp"
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
 namespace kphi::sim {
+namespace {
+
+struct Total {
+  const char* name;
+  std::uint64_t WireTruth::*member;
+};
+
+using T = WireTruth;
+constexpr Total kTotals[] = {
+    {"sent", &T::sent},
+    {"records_sent", &T::records_sent},
+    {"arrived", &T::arrived},
+    {"records_arrived", &T::records_arrived},
+    {"dropped", &T::dropped},
+    {"records_dropped", &T::records_dropped},
+    {"duplicated", &T::duplicated},
+    {"records_duplicated", &T::records_duplicated},
+    {"overtaken", &T::overtaken},
+    {"delayed", &T::delayed},
+    {"malformed", &T::malformed},
+    {"foreign", &T::foreign},
+    {"records_left_out", &T::records_left_out},
+    {"to_others", &T::to_others},
+    {"records_to_others", &T::records_to_others},
+    {"starts", &T::starts},
+    {"starts_lost", &T::starts_lost},
+    {"starts_doubled", &T::starts_doubled},
+    {"starts_delayed", &T::starts_delayed},
+    {"unheard", &T::unheard},
+    {"thefts", &T::thefts},
+    {"restarts", &T::restarts},
+    {"reboots", &T::reboots},
+    {"stalls", &T::stalls},
+    {"jumps", &T::jumps},
+    {"overruns", &T::overruns},
+    {"rate_changes", &T::rate_changes},
+    {"moves", &T::moves},
+    {"http_spoilt", &T::http_spoilt},
+    {"tcp_spoilt", &T::tcp_spoilt},
+};
+
+}  // namespace
 
 std::string json_lines(const WireTruth& truth) {
   using nlohmann::ordered_json;
@@ -17,33 +61,19 @@ std::string json_lines(const WireTruth& truth) {
     if (d.first_sample < truth.sampled.size()) line["first_sampled_ns"] = truth.sampled[d.first_sample].count();
     add(line);
   }
-  add({{"totals",
-        {{"sent", truth.sent},
-         {"records_sent", truth.records_sent},
-         {"arrived", truth.arrived},
-         {"records_arrived", truth.records_arrived},
-         {"dropped", truth.dropped},
-         {"records_dropped", truth.records_dropped},
-         {"duplicated", truth.duplicated},
-         {"records_duplicated", truth.records_duplicated},
-         {"overtaken", truth.overtaken},
-         {"delayed", truth.delayed},
-         {"malformed", truth.malformed},
-         {"foreign", truth.foreign},
-         {"to_others", truth.to_others},
-         {"records_to_others", truth.records_to_others},
-         {"starts", truth.starts},
-         {"starts_lost", truth.starts_lost},
-         {"starts_doubled", truth.starts_doubled},
-         {"starts_delayed", truth.starts_delayed},
-         {"unheard", truth.unheard},
-         {"thefts", truth.thefts},
-         {"restarts", truth.restarts},
-         {"reboots", truth.reboots},
-         {"stalls", truth.stalls},
-         {"jumps", truth.jumps},
-         {"http_spoilt", truth.http_spoilt}}}});
+  ordered_json totals;
+  for (const Total& total : kTotals) totals[total.name] = truth.*total.member;
+  add({{"totals", totals}});
   return out;
+}
+
+std::string summary(const WireTruth& truth) {
+  std::string out;
+  for (const Total& total : kTotals) {
+    if (truth.*total.member > 0)
+      out += fmt::format("{}{} {}", out.empty() ? "" : ", ", total.name, truth.*total.member);
+  }
+  return out.empty() ? "nothing was sent" : out;
 }
 
 }  // namespace kphi::sim

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "drivers/sim/fault_file.hpp"
 
 namespace kphi::sim {
@@ -12,6 +14,7 @@ using namespace std::chrono_literals;
 std::string refusal(const std::string& text) {
   try {
     (void)parse_faults(text, "f.yaml");
+    (void)parse_habits(text, "f.yaml");
   } catch (const FaultFileError& error) {
     return error.what();
   }
@@ -49,9 +52,23 @@ TEST(FaultFile, ReadsEveryKind) {
   - {at_s: 0, count: 1, kind: http_status, code: 500}
   - {at_s: 0, count: 1, kind: http_oversized, size: 65536}
   - {at_s: 0, for_s: 1, kind: http_refused}
+  - {at_s: 0, count: 1, kind: http_charset, utf16: true}
+  - {at_s: 0, count: 1, kind: http_missing_tag, tag: cfgcpf}
+  - {at_s: 0, count: 1, kind: http_duplicate_tag, tag: cfgcpf}
+  - {at_s: 0, count: 1, kind: tcp_split, size: 3}
+  - {at_s: 0, for_s: 1, kind: tcp_merged, delay_s: 0.1}
+  - {at_s: 0, count: 1, kind: tcp_short, size: 5}
+  - {at_s: 0, for_s: 1, kind: jitter, mean_s: 0.0001, p: 0.01, spike_s: 0.005}
+  - {at_s: 0, for_s: 1, kind: short_block, p: 0.5, records: 3}
+  - {at_s: 0, kind: overrun, samples: 3}
+  - {at_s: 0, kind: rate, rate_hz: 1000}
+  - {at_s: 0, kind: zero_drift, axis: 2, amount: 0.5, tau_s: 30}
+  - {at_s: 3, for_s: 9, kind: address, address: 127.0.0.2}
 )",
                                           "f.yaml");
-  ASSERT_EQ(script.size(), 27u);
+  std::set<FaultKind> kinds;
+  for (const Fault& fault : script) kinds.insert(fault.kind);
+  EXPECT_EQ(kinds.size(), all_fault_kinds().size());
   EXPECT_EQ(script[0].at, 1s);
   EXPECT_EQ(script[0].lasts, 2s);
   EXPECT_EQ(script[0].p, 0.1);
@@ -68,6 +85,31 @@ TEST(FaultFile, ReadsEveryKind) {
 }
 
 TEST(FaultFile, MayBeEmpty) { EXPECT_TRUE(parse_faults("format: kphi-faults/1\nfaults: []\n", "f").empty()); }
+
+TEST(FaultFile, ChoosesTheHabitsOfTheBox) {
+  const auto habits = parse_habits(
+      "format: kphi-faults/1\nfaults: []\nhabits: {bias_stops_stream: true, last_block: padded, "
+      "rate_write: pauses, first_rdt_sequence: 0, array_separator: blank, ft_counts_samples: false}",
+      "f");
+  EXPECT_TRUE(habits.bias_stops_stream);
+  EXPECT_EQ(habits.last_block, NetBoxHabits::LastBlock::padded);
+  EXPECT_EQ(habits.rate_write, NetBoxHabits::RateWrite::pauses);
+  EXPECT_EQ(habits.first_rdt_sequence, 0u);
+  EXPECT_EQ(habits.array_separator, ' ');
+  EXPECT_FALSE(habits.ft_counts_samples);
+  EXPECT_TRUE(habits.bias_vector_survives) << "as it was";
+}
+
+TEST(FaultFile, RefusesHabitsThatABoxCannotHave) {
+  const std::string head = "format: kphi-faults/1\nfaults: []\nhabits:\n  ";
+  EXPECT_EQ(refusal(head + "last_block: lost\n"),
+            "f.yaml:4:15: 'lost' is neither partial, padded nor dropped; mend it");
+  EXPECT_EQ(refusal(head + "axia: maybe\n"), "f.yaml:4:9: 'maybe' is neither false nor true; mend it");
+  EXPECT_EQ(refusal(head + "first_rdt_sequence: -1\n"), "f.yaml:4:23: '-1' is no number from 0 to 4294967295; mend it");
+  EXPECT_EQ(refusal(head + "smokes: true\n").substr(0, 42), "f.yaml:4:11: no habit is called 'smokes'; ");
+  EXPECT_NE(refusal(head + "axia: ''\n"), "accepted");
+  EXPECT_NE(refusal(head + "axia: [true]\n"), "accepted");
+}
 
 TEST(FaultFile, SaysWhereAndWhat) {
   EXPECT_EQ(refusal(kHead + "  - {at_s: 1, for_s: 2, kind: loss, p: 1.5}\n"),
@@ -93,6 +135,10 @@ TEST(FaultFile, IsStrict) {
            "{at_s: 1, for_s: 1, kind: gilbert, p_good_bad: 0.1}",
            "{at_s: 1, for_s: 1, kind: wrong_size, size: 72}",
            "{at_s: 1, for_s: 1, kind: status, bits: 0xg}",
+           "{at_s: 1, count: 1, kind: http_missing_tag}",
+           "{at_s: 1, count: 1, kind: http_missing_tag, tag: <a>}",
+           "{at_s: 1, kind: address, address: 300.0.0.1}",
+           "{at_s: 1, kind: overrun}",
            "loss",
        }) {
     EXPECT_EQ(refusal(kHead + "  - " + entry + "\n").substr(0, 9), "f.yaml:3:") << entry;

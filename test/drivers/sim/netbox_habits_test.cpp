@@ -109,6 +109,18 @@ TEST(NetBoxHabits, XmlMaySpellAndOmit) {
   EXPECT_NE(xml.find("<setbias>0;0;1000;0;0;0</setbias>"), std::string::npos);
 }
 
+TEST(NetBoxHabits, XmlMaySeparateAndFlagOtherwise) {
+  NetBoxDevice box = box_that([](NetBoxSettings& s) {
+    s.habits.array_separator = ',';
+    s.habits.flags_as_digits = true;
+  });
+  const std::string xml = box.http("GET /netftapi2.xml HTTP/1.0");
+  EXPECT_NE(xml.find("<cfgmr>20,20,60,1,1,1</cfgmr>"), std::string::npos);
+  EXPECT_NE(xml.find("<mcc>1,1,1"), std::string::npos);
+  EXPECT_NE(xml.find("<comrdte>1</comrdte>"), std::string::npos);
+  EXPECT_NE(xml.find("<comeipe>0</comeipe>"), std::string::npos);
+}
+
 TEST(NetBoxPowerCycle, CountsAnewAndForgetsTheSoftwareBias) {
   NetBoxSettings settings;
   settings.bias_vector[2] = 100;

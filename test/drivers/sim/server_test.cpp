@@ -288,6 +288,54 @@ TEST_F(FaultyServer, RefusesConnectionsForAWhileAndListensAgain) {
   EXPECT_TRUE(served);
 }
 
+TEST_F(FaultyServer, AnswersOverTcpInSegmentsOrTogether) {
+  begin_again({{{"kind", "tcp_split"}, {"at_s", "0"}, {"count", "1"}, {"size", "7"}, {"delay_s", "0.1"}},
+               {{"kind", "tcp_merged"}, {"at_s", "0"}, {"for_s", "1000"}, {"delay_s", "0.3"}}});
+  const Descriptor socket = connected(SOCK_STREAM, server->addresses().tcp_port);
+  std::string question(20, '\0');
+  question[0] = 1;
+  ASSERT_EQ(::send(socket.number(), question.data(), 20, 0), 20);
+  std::vector<std::size_t> segments;
+  for (std::size_t received = 0; received < 24; received += segments.back()) {
+    segments.push_back(receive(socket.number()).size());
+    ASSERT_GT(segments.back(), 0u);
+  }
+  EXPECT_EQ(segments, (std::vector<std::size_t>{7, 7, 7, 3}));
+  ASSERT_EQ(::send(socket.number(), question.data(), 20, 0), 20);
+  ASSERT_EQ(::send(socket.number(), question.data(), 20, 0), 20);
+  EXPECT_EQ(receive(socket.number()).size(), 48u);
+}
+
+TEST_F(FaultyServer, MovesToAnotherAddressOfThisMachine) {
+  begin_again({{{"kind", "address"}, {"at_s", "0.2"}, {"address", "127.0.0.3"}}});
+  const auto answers_at = [&](const char* address) {
+    const Descriptor socket(::socket(AF_INET, SOCK_STREAM, 0));
+    sockaddr_in web{};
+    web.sin_family = AF_INET;
+    web.sin_port = htons(server->addresses().http_port);
+    ::inet_pton(AF_INET, address, &web.sin_addr);
+    return ::connect(socket.number(), reinterpret_cast<const sockaddr*>(&web), sizeof web) == 0;
+  };
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  while (!answers_at("127.0.0.3") && std::chrono::steady_clock::now() < deadline) {
+  }
+  EXPECT_TRUE(answers_at("127.0.0.3"));
+  EXPECT_FALSE(answers_at("127.0.0.1"));
+}
+
+TEST_F(FaultyServer, AnAddressOfNobodyIsSilenceNotAnEnd) {
+  begin_again({{{"kind", "address"}, {"at_s", "0.1"}, {"for_s", "0.2"}, {"address", "203.0.113.9"}}});
+  const std::string control = server->addresses().control;
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  while (nlohmann::json::parse(tell(control, "status"))["bench_time_s"].get<double>() < 0.4 &&
+         std::chrono::steady_clock::now() < deadline) {
+  }
+  const Descriptor socket = connected(SOCK_DGRAM, server->addresses().rdt_port);
+  const auto start = bytes("12 34 00 02 00 00 00 01");
+  ASSERT_EQ(::send(socket.number(), start.data(), start.size(), 0), 8);
+  EXPECT_EQ(receive(socket.number()).size(), 36u) << "back where it was";
+}
+
 TEST(Server, RefusesToReplaceAFileByItsLink) {
   const fs::path folder = fresh_folder();
   ServerSettings settings;

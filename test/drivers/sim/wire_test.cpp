@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -132,6 +133,116 @@ TEST(FaultyWire, DelaysInOrder) {
   }
   EXPECT_GE(arrived[0].at - arrived[0].sampled[0], 20ms);
   EXPECT_LE(arrived[0].at - arrived[0].sampled[0], 30ms);
+}
+
+TEST(FaultyWire, JittersByAnExponentialAndSomeSpikes) {
+  Bench bench(Entries{{{"kind", "jitter"},
+                       {"at_s", "0"},
+                       {"for_s", "100"},
+                       {"mean_s", "0.00002"},
+                       {"p", "0.01"},
+                       {"spike_s", "0.0009"}}});
+  const auto arrived = bench.run(70000);
+  double sum = 0;
+  int late = 0;
+  for (const Datagram& d : arrived) {
+    const double delay = to_seconds(d.at - d.sampled[0]);
+    ASSERT_GE(delay, 0);
+    sum += delay;
+    if (delay > 0.0002) ++late;
+  }
+  EXPECT_NEAR(sum / static_cast<double>(arrived.size()), 20e-6 + 0.01 * 450e-6, 1e-6);
+  EXPECT_NEAR(late, 0.01 * 7 / 9 * 10000, 30) << "those whose spike is longer than 0.2 ms";
+}
+
+TEST(FaultyWire, ShortBlocksLackTheirEnd) {
+  NetBoxSettings settings;
+  settings.records_per_datagram = 10;
+  NetBoxDevice box(settings);
+  FaultyWire wire(box, Bench::script({{{"kind", "short_block"}, {"at_s", "0"}, {"count", "2"}, {"records", "15"}}}), 1);
+  wire.request(bytes("12 34 00 03 00 00 00 00"), kHost, Instant{0});
+  for (int i = 1; i <= 30; ++i) wire.sample({Instant(i), {}});
+  std::vector<std::size_t> sizes;
+  for (Datagram d; wire.next_datagram(d, Instant(99));) sizes.push_back(d.size / 36);
+  EXPECT_EQ(sizes, (std::vector<std::size_t>{1, 1, 10}));
+  EXPECT_EQ(wire.truth().records_left_out, 18u);
+  EXPECT_EQ(wire.truth().records_sent, 12u);
+}
+
+TEST(FaultyWire, OverrunsAndChangesItsRate) {
+  Bench overrun(Entries{{{"kind", "overrun"}, {"at_s", "0.05"}, {"samples", "3"}}});
+  const auto arrived = overrun.run(700);
+  EXPECT_EQ(ft(arrived[50]), ft(arrived[49]) + 7 + 3);
+  EXPECT_EQ(rdt(arrived[50]), rdt(arrived[49]) + 1);
+  EXPECT_EQ(overrun.wire.truth().overruns, 1u);
+  Bench rate(Entries{{{"kind", "rate"}, {"at_s", "0.05"}, {"rate_hz", "500"}}});
+  EXPECT_EQ(rate.run(700).size(), 50u) << "a box whose stream stops with the write";
+  EXPECT_EQ(rate.box.divisor(), 14);
+}
+
+TEST(FaultyWire, DriftsToItsAmount) {
+  Bench bench(Entries{{{"kind", "zero_drift"}, {"at_s", "1"}, {"axis", "2"}, {"amount", "0.5"}, {"tau_s", "2"}}});
+  bench.run(7000);
+  EXPECT_EQ(bench.box.signal().counts()[2], 1'000'000);
+  bench.run(14000, 70);
+  EXPECT_NEAR(bench.box.signal().counts()[2], 1e6 + 0.5e6 * (1 - std::exp(-1.0)), 2);
+  bench.run(140000, 70);
+  EXPECT_NEAR(bench.box.signal().counts()[2], 1.5e6, 50);
+}
+
+TEST(FaultyWire, MovesToAnotherAddressAndBack) {
+  Bench bench(Entries{{{"kind", "address"}, {"at_s", "0.05"}, {"for_s", "0.05"}, {"address", "10.1.2.3"}}});
+  EXPECT_EQ(bench.wire.moved_to(), "");
+  bench.run(400);
+  EXPECT_EQ(bench.wire.moved_to(), "10.1.2.3");
+  EXPECT_EQ(bench.box.settings().address, "10.1.2.3");
+  bench.run(400);
+  EXPECT_EQ(bench.wire.moved_to(), "");
+  EXPECT_EQ(bench.box.settings().address, "127.0.0.1");
+}
+
+TEST(FaultyWire, SpoilsTagsAndLetters) {
+  Bench bench(Entries{{{"kind", "http_missing_tag"}, {"at_s", "0"}, {"for_s", "0.01"}, {"tag", "cfgcpf"}},
+                      {{"kind", "http_duplicate_tag"}, {"at_s", "0.02"}, {"for_s", "0.01"}, {"tag", "cfgcpf"}},
+                      {{"kind", "http_charset"}, {"at_s", "0.04"}, {"for_s", "0.01"}},
+                      {{"kind", "http_charset"}, {"at_s", "0.06"}, {"for_s", "0.01"}, {"utf16", "1"}},
+                      {{"kind", "http_missing_tag"}, {"at_s", "0.08"}, {"for_s", "0.01"}, {"tag", "nosuch"}}});
+  const auto get = [&](Instant at) { return bench.wire.http("GET /netftapi2.xml HTTP/1.0", at).bytes; };
+  const auto count = [](const std::string& text, const std::string& what) {
+    int n = 0;
+    for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++n;
+    return n;
+  };
+  EXPECT_EQ(count(get(1ms), "<cfgcpf>"), 0);
+  EXPECT_EQ(count(get(25ms), "<cfgcpf>1000000</cfgcpf>\n"), 2);
+  EXPECT_EQ(count(get(45ms), "<cfgnam>Pr\xfc"), 1);
+  EXPECT_EQ(count(get(65ms), std::string("<\0n\0e\0t\0f\0t\0>\0", 14)), 1);
+  EXPECT_EQ(count(get(85ms), "</netft>"), 1);
+  for (const Instant at : {1ms, 25ms, 45ms, 65ms, 85ms}) {
+    const std::string answer = get(at);
+    const std::size_t body = answer.size() - answer.find("\r\n\r\n") - 4;
+    EXPECT_EQ(count(answer, "Content-Length: " + std::to_string(body) + "\r\n"), 1);
+  }
+}
+
+TEST(FaultyWire, SplitsMergesAndShortensAnswersOverTcp) {
+  Bench bench(Entries{{{"kind", "tcp_split"}, {"at_s", "0"}, {"count", "1"}, {"size", "5"}},
+                      {{"kind", "tcp_merged"}, {"at_s", "0.02"}, {"count", "1"}, {"delay_s", "0.3"}},
+                      {{"kind", "tcp_short"}, {"at_s", "0.04"}, {"count", "1"}, {"size", "9"}}});
+  const auto ask = [&](Instant at) {
+    std::string command(20, '\0');
+    command[0] = 1;
+    return bench.wire.tcp(command, at);
+  };
+  EXPECT_EQ(ask(1ms).segment, 5u);
+  EXPECT_EQ(ask(2ms).segment, 0u) << "once";
+  EXPECT_EQ(ask(21ms).wait, 300ms);
+  const StreamReply cut = ask(41ms);
+  EXPECT_EQ(cut.bytes.size(), 9u);
+  EXPECT_TRUE(cut.close);
+  std::string half(10, '\0');
+  EXPECT_EQ(bench.wire.tcp(half, 50ms).bytes, "");
+  EXPECT_EQ(bench.wire.truth().tcp_spoilt, 3u);
 }
 
 TEST(FaultyWire, HoldsThenBursts) {

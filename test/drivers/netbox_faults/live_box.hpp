@@ -1,0 +1,137 @@
+// The simulated box on real sockets of loopback, and a consumer of the driver's records that remembers what it saw.
+#pragma once
+
+#include <chrono>
+#include <initializer_list>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "drivers/netbox/load_cell.hpp"
+#include "drivers/sim/server.hpp"
+#include "test/temporary_folder.hpp"
+
+namespace kphi::netbox::test {
+
+inline constexpr std::chrono::seconds kPatience{20};
+
+/// True as soon as `condition` is; false after kPatience.
+template <class Condition>
+bool eventually(Condition condition) {
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    std::this_thread::sleep_for(std::chrono::microseconds(200));
+  }
+  return true;
+}
+
+/// Free ports, a folder of its own, a thread of its own.
+class LiveBox {
+ public:
+  struct Manner {
+    double rate_hz = 7000;
+    int records_per_datagram = 40;
+    double time_scale = 1;
+    std::vector<sim::FaultEntry> faults = {};
+    sim::NetBoxHabits habits = {};
+  };
+
+  explicit LiveBox(const Manner& manner) : server_(settings(manner)), thread_([this] { server_.run(); }) {}
+  ~LiveBox() { stop(); }
+  LiveBox(const LiveBox&) = delete;
+  LiveBox& operator=(const LiveBox&) = delete;
+
+  [[nodiscard]] const sim::Addresses& addresses() const { return server_.addresses(); }
+  [[nodiscard]] Place place() const { return {addresses().host, addresses().rdt_port, addresses().http_port}; }
+  /// What truly happened; the box is gone then.
+  const sim::WireTruth& stop() {
+    if (thread_.joinable()) {
+      server_.request_stop();
+      thread_.join();
+    }
+    return server_.truth();
+  }
+
+ private:
+  [[nodiscard]] sim::ServerSettings settings(const Manner& manner) const {
+    sim::ServerSettings settings;
+    settings.bench.time_scale = manner.time_scale;
+    settings.bench.netbox.rate_hz = manner.rate_hz;
+    settings.bench.netbox.records_per_datagram = manner.records_per_datagram;
+    settings.bench.netbox.habits = manner.habits;
+    for (const sim::FaultEntry& entry : manner.faults) settings.bench.faults.push_back(sim::fault_of(entry));
+    settings.bench.keep = sim::FaultyWire::Keep::samples;
+    settings.control = (folder_.path() / "control").string();
+    return settings;
+  }
+
+  kphi::test::TemporaryFolder folder_;
+  sim::Server server_;
+  std::thread thread_;
+};
+
+/// Takes whatever comes and checks that it is in order. Has a state and can be neither copied nor moved.
+class Consumer {
+ public:
+  explicit Consumer(LoadCell& cell) : cell_(cell), batch_(4096) {}
+  Consumer(const Consumer&) = delete;
+  Consumer& operator=(const Consumer&) = delete;
+
+  /// Until `enough` records were taken in all; false when they do not come in time.
+  bool take_until(std::uint64_t enough) {
+    return take_while([&] { return taken_ < enough; });
+  }
+  template <class Condition>
+  bool take_while(Condition condition) {
+    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    while (condition()) {
+      if (std::chrono::steady_clock::now() > deadline) return false;
+      if (cell_.wait(std::chrono::milliseconds(20))) take_what_waits();
+    }
+    return true;
+  }
+  void take_what_waits() {
+    while (const std::size_t count = cell_.take(batch_)) {
+      for (std::size_t i = 0; i < count; ++i) see(batch_[i].record);
+    }
+  }
+
+  [[nodiscard]] std::uint64_t taken() const { return taken_; }
+  [[nodiscard]] std::uint64_t out_of_order() const { return out_of_order_; }
+  /// Of ft_sequence, beyond one stride from record to record.
+  [[nodiscard]] std::uint64_t samples_missing() const { return samples_missing_; }
+  [[nodiscard]] std::uint32_t first_rdt() const { return first_rdt_; }
+  [[nodiscard]] std::uint32_t last_rdt() const { return last_.rdt_sequence; }
+
+ private:
+  void see(const Record& record) {
+    if (taken_++ == 0) {
+      first_rdt_ = record.rdt_sequence;
+    } else {
+      const auto advance = static_cast<std::int32_t>(record.ft_sequence - last_.ft_sequence);
+      const auto stride = static_cast<std::int32_t>(cell_.configuration().divisor);
+      if (advance <= 0) ++out_of_order_;
+      if (advance > stride) samples_missing_ += static_cast<std::uint64_t>(advance - stride);
+    }
+    last_ = record;
+  }
+
+  LoadCell& cell_;
+  std::vector<StampedRecord> batch_;
+  std::uint64_t taken_ = 0, out_of_order_ = 0, samples_missing_ = 0;
+  std::uint32_t first_rdt_ = 0;
+  Record last_;
+};
+
+/// Kinds of the events until one of `last` comes, that one included; all so far when it does not come in time.
+inline std::vector<EventKind> events_until(LoadCell& cell, EventKind last) {
+  std::vector<EventKind> kinds;
+  (void)eventually([&] {
+    for (const Event& event : cell.take_events()) kinds.push_back(event.kind);
+    return !kinds.empty() && kinds.back() == last;
+  });
+  return kinds;
+}
+
+}  // namespace kphi::netbox::test

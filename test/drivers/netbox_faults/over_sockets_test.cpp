@@ -1,0 +1,245 @@
+// Faults that exist on real sockets only: what the driver says and counts, and what it tells a person to do.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "drivers/device_error.hpp"
+#include "drivers/netbox/calinfo.hpp"
+#include "drivers/netbox/http.hpp"
+#include "test/drivers/netbox_faults/live_box.hpp"
+
+namespace kphi::netbox::test {
+namespace {
+
+using namespace std::chrono_literals;
+using sim::FaultEntry;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+template <class Act>
+std::string error_of(Act act) {
+  try {
+    act();
+  } catch (const DeviceError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+/// What a fault of the pages makes of reading the configuration.
+std::string reading_with(const FaultEntry& fault) {
+  LiveBox box({.faults = {fault}});
+  const SteadyClock clock;
+  return error_of([&] { LoadCell cell(box.place(), clock); });
+}
+
+FaultEntry on_pages(const std::string& kind, const std::string& key, const std::string& value) {
+  return {{"kind", kind}, {"at_s", "0"}, {"for_s", "1000"}, {key, value}};
+}
+
+TEST(PagesOverSockets, ASlowAnswerIsWaitedForAndATooSlowOneIsNamed) {
+  LiveBox box({.faults = {on_pages("http_slow", "delay_s", "0.2")}});
+  const auto get = [&](std::chrono::nanoseconds timeout) {
+    return http_get("127.0.0.1", box.addresses().http_port, "/netftapi2.xml", timeout);
+  };
+  EXPECT_THAT(
+      error_of([&] { static_cast<void>(get(50ms)); }),
+      AllOf(HasSubstr("no answer within 0.1 s (could not read the answer)"), HasSubstr("one connection at a time")));
+  EXPECT_THAT(get(5s), HasSubstr("</netft>"));
+  EXPECT_GE(box.stop().http_spoilt, 2u);
+}
+
+TEST(PagesOverSockets, ATruncatedPageIsNamed) {
+  for (const char* size : {"0", "20", "100", "1000"}) {
+    EXPECT_THAT(reading_with(on_pages("http_truncated", "size", size)), HasSubstr("the box broke off; try again"))
+        << size;
+  }
+}
+
+TEST(PagesOverSockets, AnotherStatusIsNamed) {
+  EXPECT_THAT(reading_with(on_pages("http_status", "code", "404")),
+              AllOf(HasSubstr("HTTP status 404"), HasSubstr("Open the address in a browser")));
+  EXPECT_THAT(reading_with(on_pages("http_status", "code", "500")), HasSubstr("HTTP status 500"));
+}
+
+TEST(PagesOverSockets, AnOversizedPageIsRefused) {
+  EXPECT_THAT(reading_with(on_pages("http_oversized", "size", "65536")), HasSubstr("the XML is broken at byte"));
+  EXPECT_THAT(reading_with(on_pages("http_oversized", "size", "2000000")), HasSubstr("this is no Net Box"));
+}
+
+TEST(PagesOverSockets, ARefusedConnectionIsNamed) {
+  EXPECT_THAT(reading_with({{"kind", "http_refused"}, {"at_s", "0"}, {"for_s", "1000"}}),
+              AllOf(HasSubstr("Connection refused"), HasSubstr("check the address and http_port")));
+}
+
+TEST(PagesOverSockets, AWrongCharsetSpoilsNoNumber) {
+  for (const char* utf16 : {"0", "1"}) {
+    LiveBox box({.faults = {on_pages("http_charset", "utf16", utf16)}});
+    const SteadyClock clock;
+    LoadCell cell(box.place(), clock);
+    EXPECT_EQ(cell.configuration().counts_per_newton, 1e6) << utf16;
+    EXPECT_EQ(cell.configuration().records_per_datagram, 40) << utf16;
+    EXPECT_EQ(box.stop().http_spoilt, 1u);
+  }
+}
+
+TEST(PagesOverSockets, AMissingOrDoubledElementIsNamed) {
+  for (const char* tag : {"cfgcpf", "cfgcpt", "cfgmr", "cfgcalsn", "comrdtrate", "comrdtbsiz", "comrdte", "runrate",
+                          "setuserfilter", "setbias", "cfgtfx", "setcfgsel", "mfgdigver"}) {
+    const std::string element = std::string("element <") + tag + ">";
+    EXPECT_THAT(reading_with(on_pages("http_missing_tag", "tag", tag)), HasSubstr(element + " is missing"));
+    EXPECT_THAT(reading_with(on_pages("http_duplicate_tag", "tag", tag)),
+                HasSubstr(element + " appears more than once"));
+  }
+  EXPECT_EQ(reading_with(on_pages("http_missing_tag", "tag", "prodname")), "no error") << "some boxes do not say it";
+  EXPECT_EQ(reading_with(on_pages("http_missing_tag", "tag", "scfgfu")), "no error") << "the code says it too";
+  EXPECT_EQ(reading_with(on_pages("http_duplicate_tag", "tag", "runpkmx")), "no error") << "nobody needs it";
+}
+
+TEST(PagesOverSockets, OtherSpellingsReadTheSame) {
+  for (const char separator : {',', ' '}) {
+    LiveBox::Manner manner;
+    manner.habits.array_separator = separator;
+    manner.habits.flags_as_digits = true;
+    manner.habits.torque_text_with_hyphen = true;
+    LiveBox box(manner);
+    const SteadyClock clock;
+    const LoadCell cell(box.place(), clock);
+    EXPECT_TRUE(cell.configuration().rdt_enabled);
+    EXPECT_EQ(cell.configuration().range[2], 60);
+    EXPECT_EQ(cell.configuration().counts_per_newton_metre, 1e6);
+  }
+}
+
+TEST(PagesOverSockets, AnAxiaIsRefusedByName) {
+  LiveBox::Manner manner;
+  manner.habits.axia = true;
+  LiveBox box(manner);
+  const SteadyClock clock;
+  EXPECT_THAT(error_of([&] { LoadCell cell(box.place(), clock); }), HasSubstr("is an Ethernet Axia"));
+}
+
+Calinfo calinfo_with(const FaultEntry& fault) {
+  LiveBox box({.faults = {fault}});
+  return read_calinfo("127.0.0.1", box.addresses().tcp_port, 5s);
+}
+
+TEST(TcpOverSockets, SplitAndLateAnswersAreWhole) {
+  const Calinfo whole = calinfo_with({{"kind", "tcp_merged"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "0"}});
+  EXPECT_EQ(whole.counts_per_force, 1'000'000u);
+  for (const char* size : {"1", "5", "23"})
+    EXPECT_EQ(calinfo_with({{"kind", "tcp_split"}, {"at_s", "0"}, {"count", "1"}, {"size", size}}), whole) << size;
+  EXPECT_EQ(calinfo_with({{"kind", "tcp_merged"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "0.1"}}), whole);
+}
+
+TEST(TcpOverSockets, AShortReplyIsAnErrorAndInACrossCheckANote) {
+  for (const char* size : {"0", "1", "23"}) {
+    LiveBox box({.faults = {{{"kind", "tcp_short"}, {"at_s", "0"}, {"for_s", "1000"}, {"size", size}}}});
+    EXPECT_THAT(error_of([&] { static_cast<void>(read_calinfo("127.0.0.1", box.addresses().tcp_port, 5s)); }),
+                AllOf(HasSubstr("read the calibration over TCP"), HasSubstr("check that this is a Net Box")))
+        << size;
+    const SteadyClock clock;
+    const LoadCell cell(box.place(), clock);
+    const auto finding = cross_check("127.0.0.1", box.addresses().tcp_port, cell.configuration(), 5s);
+    ASSERT_TRUE(finding);
+    EXPECT_EQ(finding->severity, Severity::note);
+    EXPECT_EQ(box.stop().tcp_spoilt, 2u);
+  }
+}
+
+/// A stream at four times the speed, with one fault.
+struct Stream {
+  explicit Stream(const FaultEntry& fault, Command mode = Command::buffered)
+      : box({.time_scale = 4, .faults = {fault}}), cell(box.place(), clock, mode), consumer(cell) {}
+  LiveBox box;
+  const SteadyClock clock{4};
+  LoadCell cell;
+  Consumer consumer;
+};
+
+TEST(StreamOverSockets, ForeignDatagramsAreNotHeard) {
+  Stream s({{"kind", "foreign_source"}, {"at_s", "0"}, {"for_s", "1000"}, {"p", "0.5"}});
+  s.cell.start();
+  ASSERT_TRUE(s.consumer.take_until(7000));
+  s.cell.stop();
+  s.consumer.take_what_waits();
+  EXPECT_EQ(s.consumer.samples_missing() + s.consumer.out_of_order(), 0u);
+  EXPECT_EQ(s.cell.counters().duplicates + s.cell.counters().malformed + s.cell.counters().reboots, 0u);
+  EXPECT_GT(s.box.stop().foreign, 50u);
+}
+
+TEST(StreamOverSockets, ADoubledStartIsOneRestart) {
+  Stream s({{"kind", "doubled_start"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "0.9"}});
+  s.cell.start();
+  ASSERT_TRUE(s.consumer.take_until(14'000));
+  EXPECT_EQ(s.cell.counters().restarts, 1u);
+  // A buffered box forgets the block that it was filling.
+  EXPECT_LT(s.cell.counters().lost_network, 40u);
+  EXPECT_EQ(s.cell.counters().lost_network, s.consumer.samples_missing());
+}
+
+TEST(StreamOverSockets, ADelayedStartIsWaitedFor) {
+  Stream s({{"kind", "delayed_start"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "0.3"}});
+  s.cell.start();
+  ASSERT_TRUE(s.consumer.take_until(1000));
+  EXPECT_EQ(s.cell.counters().lost_network, 0u);
+  EXPECT_EQ(s.box.stop().starts, 1u);
+}
+
+TEST(StreamOverSockets, LostStartsAreRepeated) {
+  Stream s({{"kind", "lost_start"}, {"at_s", "0"}, {"count", "2"}});
+  s.cell.start();
+  ASSERT_TRUE(s.consumer.take_until(1000));
+  EXPECT_EQ(s.box.stop().starts, 3u);
+}
+
+TEST(StreamOverSockets, AStolenStreamIsNamedAndNotFoughtFor) {
+  Stream s({{"kind", "stolen"}, {"at_s", "4"}});
+  s.cell.start();
+  EXPECT_THAT(events_until(s.cell, EventKind::stolen), ElementsAre(EventKind::silent, EventKind::stolen));
+  EXPECT_EQ(s.cell.state(), State::silent);
+  EXPECT_EQ(s.box.stop().starts, 1u);
+}
+
+TEST(StreamOverSockets, AJitteringWireLosesNothing) {
+  Stream s(
+      {{"kind", "jitter"}, {"at_s", "0"}, {"for_s", "1000"}, {"mean_s", "0.0005"}, {"p", "0.02"}, {"spike_s", "0.02"}},
+      Command::real_time);
+  s.cell.start();
+  ASSERT_TRUE(s.consumer.take_until(14'000));
+  s.cell.stop();
+  EXPECT_EQ(s.cell.counters().expected, s.cell.counters().received);
+}
+
+/// The box has another address from second 4 on; nobody listens where it was.
+TEST(StreamOverSockets, AnAddressGivenAnewIsUnreachableAndThenFoundThere) {
+  Stream s({{"kind", "address"}, {"at_s", "4"}, {"address", "127.0.0.2"}});
+  s.cell.start();
+  EXPECT_THAT(events_until(s.cell, EventKind::unreachable), ElementsAre(EventKind::silent, EventKind::unreachable));
+  s.cell.stop();
+  EXPECT_THAT(error_of([&] { s.cell.start(); }), AllOf(HasSubstr("refuses the RDT port"), HasSubstr("check rdt_port")));
+  Place there = s.box.place();
+  there.host = "127.0.0.2";
+  LoadCell found(there, s.clock);
+  EXPECT_THAT(found.configuration().xml, HasSubstr("<netip>127.0.0.2</netip>"));
+  Consumer consumer(found);
+  found.start();
+  EXPECT_TRUE(consumer.take_until(1000));
+  EXPECT_EQ(consumer.samples_missing(), 0u);
+}
+
+TEST(StreamOverSockets, EveryLostRecordIsCounted) {
+  Stream s({{"kind", "gilbert"}, {"at_s", "0"}, {"for_s", "1000"}, {"p_good_bad", "0.05"}, {"p_bad_good", "0.3"}});
+  s.cell.start();
+  ASSERT_TRUE(s.consumer.take_until(14'000));
+  s.cell.stop();
+  s.consumer.take_what_waits();
+  const Counters counters = s.cell.counters();
+  EXPECT_GT(counters.lost_network, 0u);
+  EXPECT_EQ(counters.lost_network + counters.lost_host, s.consumer.samples_missing());
+  EXPECT_EQ(counters.expected, counters.received + counters.lost_network + counters.lost_host);
+  EXPECT_LE(counters.lost_network, s.box.stop().records_dropped);
+}
+
+}  // namespace
+}  // namespace kphi::netbox::test
