@@ -16,18 +16,13 @@
 #include "drivers/netbox/event_queue.hpp"
 #include "drivers/netbox/health.hpp"
 #include "drivers/netbox/inquiry.hpp"
+#include "drivers/netbox/place.hpp"
 #include "drivers/netbox/published.hpp"
 #include "drivers/netbox/session.hpp"
 #include "drivers/netbox/udp_socket.hpp"
 #include "drivers/netbox/wakeup.hpp"
 
 namespace kphi::netbox {
-
-struct Place {
-  std::string host;
-  std::uint16_t rdt_port = 49152;
-  std::uint16_t http_port = 80;
-};
 
 /// One receive thread while it streams. start, stop and the destructor belong to one thread, take and wait to one
 /// (other or same); the rest may be called from any. Counters and queue outlive a stop and the next start.
