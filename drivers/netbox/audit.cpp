@@ -49,7 +49,7 @@ std::optional<Finding> slow_datagrams(const Configuration& box, const Intention&
 }
 
 std::optional<Finding> filter_above_half_the_rate(const Configuration& box, const Intention&) {
-  const double cutoff = filter_cutoff_hz(box.filter_code).value_or(0);
+  const double cutoff = filter_cutoff_hz(box).value_or(0);
   if (cutoff <= box.rdt_rate_hz / 2) return std::nullopt;
   return Finding{Severity::warning,
                  fmt::format("the filter's cutoff, {:g} Hz, is above half the rate, {:.4g} Hz: what lies between is "
@@ -67,7 +67,7 @@ std::optional<Finding> unfiltered_low_rate(const Configuration& box, const Inten
 }
 
 std::optional<Finding> aliased_rotor(const Configuration& box, const Intention& intention) {
-  const double cutoff = filter_cutoff_hz(box.filter_code).value_or(0);
+  const double cutoff = filter_cutoff_hz(box).value_or(0);
   std::vector<AliasedLine> lines =
       aliased_lines(box.rdt_rate_hz, intention.speeds_rpm, intention.blades, intention.alias_limit_hz);
   std::erase_if(lines, [&](const AliasedLine& line) { return cutoff > 0 && line.true_hz > cutoff; });
