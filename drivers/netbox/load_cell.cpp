@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "drivers/device_error.hpp"
+#include "drivers/netbox/audit.hpp"
 #include "drivers/netbox/http.hpp"
 
 namespace kphi::netbox {
@@ -53,8 +54,14 @@ StreamSettings stream_settings(const Configuration& configuration, const Clock& 
   return settings;
 }
 
+int records_of(const StreamSettings& settings) noexcept {
+  return settings.buffered ? settings.records_per_datagram : 1;
+}
+
+double bench_seconds_per_second(const Clock& clock) noexcept { return to_seconds(clock.stretched(1s)); }
+
 std::size_t queue_capacity(const Configuration& configuration, const Clock& clock) {
-  const double wall_rate_hz = configuration.rdt_rate_hz * to_seconds(clock.stretched(1s));
+  const double wall_rate_hz = configuration.rdt_rate_hz * bench_seconds_per_second(clock);
   return static_cast<std::size_t>(std::clamp(std::ceil(kQueueSeconds * wall_rate_hz), 1024.0, kQueueLimit));
 }
 
@@ -140,11 +147,17 @@ std::vector<Event> LoadCell::take_events() {
 
 std::string LoadCell::receive_buffer_note() const {
   const StreamSettings& settings = session_.settings();
-  const std::size_t payload = kRecordBytes * (settings.buffered ? settings.records_per_datagram : 1);
-  const double held = static_cast<double>(datagrams_held(socket_.receive_buffer_bytes(), payload));
-  const double tolerated_ms = 1e3 * held * to_seconds(clock_.shrunk(settings.datagram_period()));
+  const double tolerated_ms = 1e3 / bench_seconds_per_second(clock_) *
+                              tolerated_standstill_s(socket_.receive_buffer_bytes(), records_of(settings),
+                                                     settings.device_rate_hz / settings.divisor);
   return fmt::format("{:.1f} MiB, tolerates {:.0f} ms", static_cast<double>(socket_.receive_buffer_bytes()) / (1 << 20),
                      tolerated_ms);
+}
+
+std::optional<Finding> LoadCell::receive_buffer_finding() const {
+  const StreamSettings& settings = session_.settings();
+  return small_receive_buffer(socket_.receive_buffer_bytes(), records_of(settings),
+                              settings.device_rate_hz / settings.divisor, bench_seconds_per_second(clock_));
 }
 
 void LoadCell::run() noexcept {

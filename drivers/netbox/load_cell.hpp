@@ -6,6 +6,7 @@
 #include <boost/lockfree/spsc_queue.hpp>
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
@@ -14,6 +15,7 @@
 #include "drivers/clock.hpp"
 #include "drivers/netbox/configuration.hpp"
 #include "drivers/netbox/event_queue.hpp"
+#include "drivers/netbox/finding.hpp"
 #include "drivers/netbox/health.hpp"
 #include "drivers/netbox/inquiry.hpp"
 #include "drivers/netbox/place.hpp"
@@ -70,6 +72,10 @@ class LoadCell {
   [[nodiscard]] State state() const noexcept { return state_.load(); }
   /// "8.0 MiB, tolerates 1440 ms": how long this process may stand still before the kernel drops datagrams.
   [[nodiscard]] std::string receive_buffer_note() const;
+  /// The kernel has granted less buffer than asked for: how long may the process stand still, and what to do.
+  [[nodiscard]] std::optional<Finding> receive_buffer_finding() const;
+  /// As the kernel tells it.
+  [[nodiscard]] std::size_t receive_buffer_bytes() const noexcept { return socket_.receive_buffer_bytes(); }
 
  private:
   void run() noexcept;

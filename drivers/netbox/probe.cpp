@@ -127,6 +127,7 @@ Probe probe(const Place& place, const Clock& clock, const ProbeSettings& setting
     LoadCell cell(place, clock, Command::buffered, {.reconnect = false});
     found.configuration = cell.configuration();
     found.findings = audit(*found.configuration, settings.intention);
+    if (auto finding = cell.receive_buffer_finding()) found.findings.push_back(std::move(*finding));
     if (auto finding = cross_check(place.host, settings.tcp_port, *found.configuration, settings.tcp_timeout))
       found.findings.push_back(std::move(*finding));
     look_at_stream(found, cell, clock, settings.stream);

@@ -15,8 +15,9 @@ constexpr std::uint32_t kFirstDatagrams = 64;
 constexpr std::uint32_t kTroubleBits =
     1u << static_cast<unsigned>(StatusBit::rdt) | 1u << static_cast<unsigned>(StatusBit::network);
 
-// A lease of fewer datagrams could end before its renewal.
-constexpr std::uint64_t kLeastLease = 8;
+// A lease of fewer silences could end before a silence is noticed: whether somebody has taken the stream or it has run
+// out could not be told then.
+constexpr int kLeastLease = 4;
 
 bool same_count(const StreamSettings& a, const StreamSettings& b) noexcept {
   return a.divisor == b.divisor && a.device_rate_hz == b.device_rate_hz;
@@ -36,8 +37,8 @@ Duration StreamSettings::datagram_period() const noexcept {
 std::uint32_t StreamSettings::sample_count() const noexcept {
   if (lease <= Duration{0}) return 0;
   const Duration period = datagram_period();
-  const auto datagrams = std::max<std::uint64_t>(kLeastLease, static_cast<std::uint64_t>(lease / period));
-  return static_cast<std::uint32_t>(datagrams * static_cast<std::uint64_t>(buffered ? records_per_datagram : 1));
+  const std::int64_t datagrams = (std::max(lease, kLeastLease * silence()) + period - Duration{1}) / period;
+  return static_cast<std::uint32_t>(datagrams * (buffered ? records_per_datagram : 1));
 }
 
 Session::Session(StreamSettings settings)
@@ -55,7 +56,7 @@ Session::Session(StreamSettings settings, const Session& before)
 
 Session::Session(StreamSettings settings, SequenceAccount account)
     : settings_(settings),
-      silence_(settings.silence_timeout + 3 * settings.datagram_period()),
+      silence_(settings.silence()),
       lease_(from_seconds(settings.sample_count() * (settings.divisor / settings.device_rate_hz))),
       account_(std::move(account)),
       window_(window_records(settings), settings.reorder_patience, settings.divisor),
@@ -115,6 +116,7 @@ void Session::begin_streaming(Instant arrival) noexcept {
   lease_end_ = arrival + lease_;
 }
 
+/// Only ever behind a datagram of ours: a renewal of a stream that another client has taken would be a fight for it.
 void Session::tend_lease(Instant now) noexcept {
   const std::uint64_t renewals = account_.counters().renewals;
   if (renewals != renewals_seen_) {
@@ -132,11 +134,6 @@ void Session::renew_lease(Instant now) noexcept {
   account_.expect_renewals(++renewals_sent_);
   send(start_command());
   renewal_due_ = now + 3 * settings_.datagram_period() + settings_.reply_timeout;
-}
-
-/// No datagram has come to be followed by the renewal.
-Instant Session::overdue_renewal() const noexcept {
-  return renewal_due_ == kNever ? kNever : renewal_due_ + 2 * settings_.datagram_period();
 }
 
 Command Session::start_command() const noexcept {
@@ -191,7 +188,6 @@ void Session::check_bias(Instant now) noexcept {
 
 void Session::advance(Instant now) {
   if (now >= bias_due_) check_bias(now);
-  if (now >= overdue_renewal()) renew_lease(now);
   if (now < due_) return;
   switch (phase_) {
     case Phase::draining:
@@ -228,7 +224,7 @@ bool Session::next_request(std::array<std::uint8_t, 8>& request) noexcept {
   return true;
 }
 
-Instant Session::deadline() const noexcept { return std::min({due_, bias_due_, overdue_renewal()}); }
+Instant Session::deadline() const noexcept { return std::min(due_, bias_due_); }
 
 State Session::state() const noexcept {
   switch (phase_) {

@@ -29,11 +29,13 @@ struct StreamSettings {
   std::size_t reorder_records = 64;  ///< wait at most for overtaken ones; when buffered at least four datagrams
   Duration reorder_patience = std::chrono::milliseconds(20);  ///< and for so long
   Product product = Product::net_box;                         ///< of whose commands
-  Duration lease{0};  ///< see StreamPolicy; 0: until stopped. At least eight datagrams
+  Duration lease{0};  ///< see StreamPolicy; 0: until stopped. At least four times silence()
   int attempts = 6;   ///< starts sent before giving up; the timeout doubles up to four times the first
 
   /// Bench time between two datagrams.
   [[nodiscard]] Duration datagram_period() const noexcept;
+  /// A stream that brings nothing for so long is called silent.
+  [[nodiscard]] Duration silence() const noexcept { return silence_timeout + 3 * datagram_period(); }
   /// Whole datagrams, so that nobody needs to know what a box does with a last one that is not full. 0: no end.
   [[nodiscard]] std::uint32_t sample_count() const noexcept;
 };
@@ -107,7 +109,6 @@ class Session {
   void begin_streaming(Instant arrival) noexcept;
   void tend_lease(Instant now) noexcept;
   void renew_lease(Instant now) noexcept;
-  [[nodiscard]] Instant overdue_renewal() const noexcept;
   void send(Command command) noexcept;
   void send_stop(Instant now) noexcept;
   void send_start(Instant now) noexcept;

@@ -114,6 +114,14 @@ void check_ranges(const Place& place, const WantedSettings& wanted) {
   }
 }
 
+/// Its rate is that of its converter, and its filters depend on that: neither is known well enough to write it.
+void check_product(const Place& place, const Configuration& box, const WantedSettings& wanted) {
+  if (box.kind == Product::net_box || (!wanted.rate_hz && !wanted.filter)) return;
+  throw DeviceError(device(place), "write its settings",
+                    "rate_hz and filter of an Ethernet Axia cannot be written from here",
+                    "set them on the sensor's web pages and leave them out of the bench file; nothing was written");
+}
+
 std::vector<Assignment> differences(const Shown& shown, const Configuration& box, const WantedSettings& wanted) {
   std::vector<Assignment> found;
   for (const Setting& s : kSettings) {
@@ -192,6 +200,7 @@ SettingsKeeper::~SettingsKeeper() {
 void SettingsKeeper::apply(const WantedSettings& wanted) {
   const Shown shown(place_);
   before_ = after_ = parse_configuration(shown.xml(), device(place_));
+  check_product(place_, before_, wanted);
   const std::vector<Assignment> assignments = differences(shown, before_, wanted);
   if (assignments.empty()) return;
   SettingsJournal journal{shown.text("mfgdigsn"), {}, read_slots(place_)};

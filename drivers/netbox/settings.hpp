@@ -37,7 +37,8 @@ class SettingsKeeper {
   /// Recovers what an earlier program has left in `journal`; reads the configuration; when something is to change,
   /// keeps before() and the XML of all 16 slots in `journal` (synced to the disk), then writes, one URL per page, and
   /// reads back. Writes nothing, and no journal, when `wanted` is empty or the box is so already. Throws DeviceError,
-  /// with what was changed set back: out of range, a slot that measures nothing, the box does not answer 302 or does
+  /// with what was changed set back: out of range, a slot that measures nothing, rate or
+  /// filter of an Ethernet Axia, the box does not answer 302 or does
   /// not take a setting.
   SettingsKeeper(Place place, const WantedSettings& wanted, std::filesystem::path journal);
   /// As restore(). What fails stays in the journal.

@@ -247,5 +247,12 @@ TEST_F(SettingsTest, AnUnreachableJournalPreventsTheWrite) {
   EXPECT_THAT(web.writes(), IsEmpty());
 }
 
+TEST_F(SettingsTest, RateAndFilterOfAnAxiaAreRefused) {
+  web.set("prodname", "Ethernet Axia");
+  EXPECT_THAT(failure({.rate_hz = 976}), HasSubstr("Ethernet Axia cannot be written"));
+  EXPECT_THAT(failure({.filter = 1}), HasSubstr("nothing was written"));
+  EXPECT_THAT(web.writes(), IsEmpty());
+}
+
 }  // namespace
 }  // namespace kphi::netbox

@@ -17,6 +17,7 @@ struct Manner {
   std::uint32_t first_ft = 0;
   bool start_again_when_silent = true;
   sim::NetBoxHabits habits;
+  Duration lease{0};
 };
 
 /// What the truth says the account must be.
@@ -35,6 +36,8 @@ class Joined {
   Joined(const Manner& manner, sim::FaultScript script, std::uint64_t seed);
   /// Starts the session at 0; from then on 7000 ticks a second.
   void run_until(Instant end);
+  /// The host stands still, or is dead: nobody reads, nobody asks.
+  void run_box_alone_until(Instant end);
   /// Delivers what waits, so that the account is complete.
   void finish();
   [[nodiscard]] Ideal ideal() const;
@@ -53,6 +56,7 @@ class Joined {
     std::uint32_t boot, stream, first_rdt;
     Instant at;
   };
+  Instant sample();
   void pump(Instant now);
 
   Manner manner_;
