@@ -64,8 +64,10 @@ class SettableWeb {
     while (!query.empty()) {
       const std::string pair = query.substr(0, query.find('&'));
       query.erase(0, pair.size() + 1);
-      const std::string key = pair.substr(0, pair.find('='));
-      int value = std::stoi(pair.substr(pair.find('=') + 1));
+      const std::size_t equals = pair.find('=');
+      if (equals == std::string::npos) continue;
+      const std::string key = pair.substr(0, equals);
+      int value = std::stoi(pair.substr(equals + 1));
       if (manner_.at_most.contains(key)) value = std::min(value, manner_.at_most[key]);
       if (key == "comrdtrate") value = 7000 / (7000 / value);
       values_[key] = std::to_string(value);
