@@ -20,7 +20,8 @@ Manner axia(bool buffered) {
 }
 
 std::size_t records_per_datagram(Joined& joined) {
-  return static_cast<std::size_t>(joined.counters().received / joined.counters().datagrams);
+  const Counters& c = joined.counters();
+  return c.datagrams == 0 ? 0 : static_cast<std::size_t>(c.received / c.datagrams);
 }
 
 TEST(Axia, MultiBlockBringsTheWholeBufferInEachDatagram) {
