@@ -54,8 +54,8 @@ StreamSettings stream_settings(const Configuration& configuration, const Clock& 
   return settings;
 }
 
-int records_of(const StreamSettings& settings) noexcept {
-  return settings.buffered ? settings.records_per_datagram : 1;
+int records_of(const Configuration& configuration, Command mode) noexcept {
+  return mode == Command::buffered ? configuration.records_per_datagram : 1;
 }
 
 double bench_seconds_per_second(const Clock& clock) noexcept { return to_seconds(clock.stretched(1s)); }
@@ -146,18 +146,16 @@ std::vector<Event> LoadCell::take_events() {
 }
 
 std::string LoadCell::receive_buffer_note() const {
-  const StreamSettings& settings = session_.settings();
   const double tolerated_ms = 1e3 / bench_seconds_per_second(clock_) *
-                              tolerated_standstill_s(socket_.receive_buffer_bytes(), records_of(settings),
-                                                     settings.device_rate_hz / settings.divisor);
+                              tolerated_standstill_s(socket_.receive_buffer_bytes(), records_of(configuration_, mode_),
+                                                     configuration_.rdt_rate_hz);
   return fmt::format("{:.1f} MiB, tolerates {:.0f} ms", static_cast<double>(socket_.receive_buffer_bytes()) / (1 << 20),
                      tolerated_ms);
 }
 
 std::optional<Finding> LoadCell::receive_buffer_finding() const {
-  const StreamSettings& settings = session_.settings();
-  return small_receive_buffer(socket_.receive_buffer_bytes(), records_of(settings),
-                              settings.device_rate_hz / settings.divisor, bench_seconds_per_second(clock_));
+  return small_receive_buffer(socket_.receive_buffer_bytes(), records_of(configuration_, mode_),
+                              configuration_.rdt_rate_hz, bench_seconds_per_second(clock_));
 }
 
 void LoadCell::run() noexcept {

@@ -34,6 +34,7 @@ struct Counters {
   std::uint64_t malformed = 0;     ///< datagrams of wrong size
   std::uint64_t drained = 0;       ///< datagrams that came while none was asked for
   std::uint64_t host_drops = 0;    ///< datagrams that the socket dropped (SO_RXQ_OVFL)
+  std::uint64_t reconnects = 0;    ///< times the stream was started again after it had ended
   std::uint64_t renewals = 0;      ///< times the stream began anew because its lease was renewed: no restarts
   std::uint64_t lost_at_renewals = 0;  ///< of lost_network and lost_host: missing where that happened
   std::uint64_t queue_overflows = 0;   ///< accepted, then lost because the consumer did not take them in time

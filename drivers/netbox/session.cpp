@@ -69,6 +69,7 @@ void Session::start(Instant now) {
     resuming_ = false;
   } else if (phase_ == Phase::streaming || phase_ == Phase::silent) {
     resuming_ = true;
+    silence_told_ = phase_ == Phase::silent;
   }
   attempt_ = 0;
   request_count_ = 0;
@@ -108,7 +109,10 @@ void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, s
 
 void Session::begin_streaming(Instant arrival) noexcept {
   if (phase_ == Phase::silent) note_event(EventKind::resumed, arrival);
-  if (resuming_ && phase_ == Phase::awaiting) note_event(EventKind::reconnected, arrival);
+  if (resuming_ && phase_ == Phase::awaiting) {
+    ++account_.counters().reconnects;
+    note_event(EventKind::reconnected, arrival);
+  }
   phase_ = Phase::streaming;
   resuming_ = false;
   if (lease_ == Duration{0}) return;
@@ -196,6 +200,7 @@ void Session::advance(Instant now) {
       if (attempt_ < settings_.attempts) return send_start(now);
       stop(now);
       phase_ = resuming_ ? Phase::silent : Phase::failed;
+      if (resuming_ && !silence_told_) note_event(EventKind::silent, now);
       return;
     case Phase::streaming:
       renewal_due_ = kNever;

@@ -122,7 +122,7 @@ class Session {
   Instant due_ = kNever, bias_due_ = kNever;
   Instant newest_arrival_{0};
   int bias_starts_ = 0;
-  bool resuming_ = false;
+  bool resuming_ = false, silence_told_ = false;
   Instant renewal_due_ = kNever, lease_end_ = kNever;
   std::uint64_t renewals_seen_ = 0;
   int renewals_sent_ = 0;  // since the last one that showed

@@ -85,7 +85,8 @@ void write_journal(const std::filesystem::path& path, const SettingsJournal& jou
 }
 
 std::optional<SettingsJournal> read_journal(const std::filesystem::path& path) {
-  if (!std::filesystem::exists(path)) return std::nullopt;
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return std::nullopt;
   pugi::xml_document document;
   const pugi::xml_parse_result result = document.load_file(path.c_str(), kParse);
   const pugi::xml_node root = document.child(kRoot);

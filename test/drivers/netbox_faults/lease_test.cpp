@@ -86,6 +86,17 @@ TEST_P(Lease, RenewalsThatAreAllLostEndTheStreamAndItIsTakenAnew) {
   EXPECT_EQ(j.disagreement(), "");
   EXPECT_EQ(j.session().state(), State::streaming);
   EXPECT_GT(j.counters().lost_network, 0u);
+  EXPECT_EQ(j.counters().reconnects, 1u);
+}
+
+TEST_P(Lease, ThatNobodyGrantsAnyMoreIsASilence) {
+  const sim::FaultEntry lost{{"kind", "lost_start"}, {"at_s", "1"}, {"for_s", "60"}};
+  Joined& j = join({sim::fault_of(lost)});
+  j.run_until(10s);
+  EXPECT_EQ(j.session().state(), State::silent);
+  const std::vector<Event> events = j.session().take_events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].kind, EventKind::silent);
 }
 
 TEST_P(Lease, AccountsForLossAroundItsRenewals) {

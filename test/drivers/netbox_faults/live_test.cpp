@@ -91,6 +91,7 @@ TEST_F(Live, ABoxThatBootsAndDoesNotStreamIsStartedAgainAndItsConfigurationReadA
   EXPECT_TRUE(follow(cell, [&] { return taken > before + 700; }));
   cell.stop();
   EXPECT_EQ(cell.counters().reboots, 1u);
+  EXPECT_EQ(cell.counters().reconnects, 1u);
   expect_closed(cell.counters());
 }
 
