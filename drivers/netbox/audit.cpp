@@ -6,6 +6,9 @@
 #include <cmath>
 #include <optional>
 
+#include "drivers/netbox/rdt.hpp"
+#include "drivers/netbox/udp_socket.hpp"
+
 namespace kphi::netbox {
 namespace {
 
@@ -49,7 +52,7 @@ std::optional<Finding> slow_datagrams(const Configuration& box, const Intention&
 }
 
 std::optional<Finding> filter_above_half_the_rate(const Configuration& box, const Intention&) {
-  const double cutoff = filter_cutoff_hz(box.filter_code).value_or(0);
+  const double cutoff = filter_cutoff_hz(box).value_or(0);
   if (cutoff <= box.rdt_rate_hz / 2) return std::nullopt;
   return Finding{Severity::warning,
                  fmt::format("the filter's cutoff, {:g} Hz, is above half the rate, {:.4g} Hz: what lies between is "
@@ -67,7 +70,7 @@ std::optional<Finding> unfiltered_low_rate(const Configuration& box, const Inten
 }
 
 std::optional<Finding> aliased_rotor(const Configuration& box, const Intention& intention) {
-  const double cutoff = filter_cutoff_hz(box.filter_code).value_or(0);
+  const double cutoff = filter_cutoff_hz(box).value_or(0);
   std::vector<AliasedLine> lines =
       aliased_lines(box.rdt_rate_hz, intention.speeds_rpm, intention.blades, intention.alias_limit_hz);
   std::erase_if(lines, [&](const AliasedLine& line) { return cutoff > 0 && line.true_hz > cutoff; });
@@ -120,9 +123,26 @@ std::optional<Finding> gage_bias(const Configuration& box, const Intention&) {
                  "tare before each run"};
 }
 
-constexpr Check kChecks[] = {rdt_disabled,        empty_calibration,   other_rate,     aliased_rotor,
-                             narrow_force_range,  narrow_torque_range, other_buffer,   filter_above_half_the_rate,
-                             unfiltered_low_rate, slow_datagrams,      tool_transform, gage_bias};
+std::optional<Finding> unknown_filter(const Configuration& box, const Intention&) {
+  if (filter_cutoff_hz(box)) return std::nullopt;
+  return Finding{
+      Severity::warning,
+      fmt::format("the cutoff of filter {} of this product is not known: aliasing cannot be judged", box.filter_code),
+      "switch the filter off on the sensor's Settings page"};
+}
+
+std::optional<Finding> receive_buffer(const Configuration& box, const Intention& intention) {
+  if (intention.receive_buffer_bytes == 0) return std::nullopt;
+  return small_receive_buffer(intention.receive_buffer_bytes, box.records_per_datagram, box.rdt_rate_hz);
+}
+
+constexpr Check kChecks[] = {rdt_disabled,        empty_calibration,
+                             other_rate,          aliased_rotor,
+                             narrow_force_range,  narrow_torque_range,
+                             other_buffer,        filter_above_half_the_rate,
+                             unfiltered_low_rate, unknown_filter,
+                             slow_datagrams,      receive_buffer,
+                             tool_transform,      gage_bias};
 
 }  // namespace
 
@@ -139,6 +159,24 @@ std::vector<AliasedLine> aliased_lines(double rate_hz, std::span<const double> s
     }
   }
   return lines;
+}
+
+double tolerated_standstill_s(std::size_t receive_buffer_bytes, int records_per_datagram, double rate_hz) {
+  const auto records = static_cast<std::size_t>(records_per_datagram);
+  const std::size_t held = datagrams_held(receive_buffer_bytes, kRecordBytes * records) * records;
+  return static_cast<double>(held) / rate_hz;
+}
+
+std::optional<Finding> small_receive_buffer(std::size_t receive_buffer_bytes, int records_per_datagram, double rate_hz,
+                                            double time_scale) {
+  if (receive_buffer_bytes >= kWantedReceiveBytes) return std::nullopt;
+  const double tolerated_s = tolerated_standstill_s(receive_buffer_bytes, records_per_datagram, rate_hz) / time_scale;
+  return Finding{tolerated_s < 0.5 ? Severity::warning : Severity::note,
+                 fmt::format("the kernel grants {:.2f} MiB of receive buffer instead of {:.0f}: records are lost when "
+                             "this host stands still for more than {:.0f} ms",
+                             static_cast<double>(receive_buffer_bytes) / (1 << 20),
+                             static_cast<double>(kWantedReceiveBytes) / (1 << 20), 1e3 * tolerated_s),
+                 "as root: sysctl -w net.core.rmem_max=4194304"};
 }
 
 std::vector<Finding> audit(const Configuration& box, const Intention& intention) {

@@ -9,14 +9,16 @@ namespace kphi::netbox {
 /// RDT commands (Table 10.1). None is acknowledged; the newest wins, whoever sent it.
 enum class Command : std::uint16_t {
   stop = 0,
-  real_time = 2,  ///< one record per datagram
-  buffered = 3,   ///< "RDT Buffer Size" records per datagram
+  axia_single_block = 1,  ///< Ethernet Axia: one record per datagram
+  real_time = 2,          ///< one record per datagram
+  axia_multi_block = 2,   ///< Ethernet Axia: "RDT Buffer Size" records per datagram
+  buffered = 3,           ///< "RDT Buffer Size" records per datagram
   multi_unit = 4,
   reset_latch = 0x41,
   set_bias = 0x42,
 };
 
-/// Bits of the status word (Table 17.1, Net Box; the Ethernet Axia has another map).
+/// Bits of the status word (Table 17.1, Net Box).
 enum class StatusBit : std::uint8_t {
   http_failure = 1,
   temperature = 2,
@@ -48,6 +50,22 @@ enum class StatusBit : std::uint8_t {
   digital_board = 29,
   cpu_or_ram = 30,
   error_summary = 31,  ///< also set together with monitor_condition
+};
+
+/// Bits of the status word of an Ethernet Axia.
+enum class AxiaStatusBit : std::uint8_t {
+  temperature = 0,
+  supply_voltage = 1,
+  broken_gage = 2,
+  busy = 3,  ///< commits to its memory, or changes filter or calibration
+  common_error = 5,
+  calibration_not_accessible = 7,
+  monitor_condition = 16,  ///< latched; no error
+  gage_out_of_range = 27,  ///< stays for 32 samples
+  simulated_error = 28,
+  calibration_checksum = 29,
+  out_of_range = 30,  ///< force or torque; saturated; stays for 32 samples
+  error_summary = 31,
 };
 
 /// `cfgfu`, and forceUnits of the TCP interface.

@@ -110,17 +110,47 @@ class Elements {
   pugi::xml_node root_;
 };
 
+/// Rates of the Axia's converter: what it shows, and what all five are rounded down from.
+struct AxiaRate {
+  int shown;
+  double true_hz;
+};
+constexpr AxiaRate kAxiaRates[] = {
+    {488, 7812.5 / 16}, {976, 7812.5 / 8}, {1953, 7812.5 / 4}, {3906, 7812.5 / 2}, {7812, 7812.5}};
+
+/// What a product's name contains, letters only, small.
+struct ProductName {
+  const char* part;
+  Product kind;
+};
+constexpr ProductName kProductNames[] = {
+    {"axia", Product::axia}, {"netft", Product::net_box}, {"netbox", Product::net_box}};
+
+Product kind_of(const Elements& elements, const Configuration& configuration) {
+  std::string name = boost::algorithm::to_lower_copy(configuration.product);
+  std::erase_if(name, [](char c) { return c < 'a' || c > 'z'; });
+  for (const ProductName& known : kProductNames) {
+    if (boost::algorithm::contains(name, known.part)) return known.kind;
+  }
+  // Only the Axia has the rate of its converter in its XML; the Net Box's firmware is 1.x or 2.x.
+  if (!elements.optional_text("setrate").empty()) return Product::axia;
+  const std::string& firmware = configuration.firmware;
+  const bool of_net_box =
+      boost::algorithm::starts_with(firmware, "1.") || boost::algorithm::starts_with(firmware, "2.");
+  if (name.empty() && of_net_box) return Product::net_box;
+  elements.refuse(fmt::format("\"{}\" with firmware {} is neither a Net Box nor an Ethernet Axia: its commands and "
+                              "status word are not known",
+                              configuration.product, firmware),
+                  "use one of these");
+}
+
 void read_identity(const Elements& elements, Configuration& configuration) {
   configuration.product = elements.optional_text("prodname");
   configuration.firmware = elements.text("mfgdigver");
   configuration.slot = elements.whole_number("setcfgsel", 0, 15);
   configuration.slot_name = elements.optional_text("cfgnam");
   configuration.calibration_serial = elements.text("cfgcalsn");
-  if (boost::algorithm::icontains(configuration.product, "axia")) {
-    elements.refuse(fmt::format("\"{}\" is an Ethernet Axia: commands and status word differ from the Net Box's",
-                                configuration.product),
-                    "use a Net Box");
-  }
+  configuration.kind = kind_of(elements, configuration);
   if (configuration.calibration_serial == "FT0000") {
     elements.refuse(fmt::format("slot {} uses an empty calibration (FT0000)", configuration.slot),
                     "choose a calibration on the box's Configurations page");
@@ -151,13 +181,25 @@ void read_scale(const Elements& elements, Configuration& configuration) {
   }
 }
 
+double device_rate_hz(const Elements& elements, Product kind) {
+  if (kind == Product::axia && !elements.optional_text("setrate").empty()) {
+    const int shown = elements.whole_number("setrate", 1, 1'000'000);
+    for (const AxiaRate& rate : kAxiaRates) {
+      if (rate.shown == shown) return rate.true_hz;
+    }
+    elements.refuse(fmt::format("<setrate> is {}: an Ethernet Axia has 488, 976, 1953, 3906 and 7812 Hz", shown),
+                    "choose one of these on the sensor's Settings page");
+  }
+  return elements.whole_number("runrate", 1, 1'000'000);
+}
+
 void read_stream(const Elements& elements, Configuration& configuration) {
-  const int device_rate = elements.whole_number("runrate", 1, 1'000'000);
-  const int shown_rate = elements.whole_number("comrdtrate", 1, device_rate);
+  const double device_rate = device_rate_hz(elements, configuration.kind);
+  const int shown_rate = elements.whole_number("comrdtrate", 1, static_cast<int>(device_rate));
   configuration.device_rate_hz = device_rate;
   // The box runs whole fractions only and shows them rounded down; this finds the fraction again.
   configuration.divisor = static_cast<unsigned>(device_rate / shown_rate);
-  configuration.rdt_rate_hz = static_cast<double>(device_rate) / configuration.divisor;
+  configuration.rdt_rate_hz = device_rate / configuration.divisor;
   configuration.records_per_datagram = elements.whole_number("comrdtbsiz", 1, 40);
   configuration.rdt_enabled = elements.flag("comrdte");
   configuration.filter_code = elements.whole_number("setuserfilter", 0, std::size(kFilterCutoffHz) - 1);
@@ -170,6 +212,11 @@ std::optional<double> filter_cutoff_hz(int filter_code) noexcept {
   return kFilterCutoffHz[filter_code];
 }
 
+std::optional<double> filter_cutoff_hz(const Configuration& box) noexcept {
+  if (box.kind == Product::axia && box.filter_code != 0) return std::nullopt;
+  return filter_cutoff_hz(box.filter_code);
+}
+
 Configuration parse_configuration(std::string_view xml, const std::string& device) {
   const Elements elements(xml, device);
   Configuration configuration;
@@ -180,6 +227,8 @@ Configuration parse_configuration(std::string_view xml, const std::string& devic
   configuration.tool_distance_unit = elements.text("scfgtdu");
   configuration.tool_angle_unit = elements.text("scfgtau");
   configuration.gage_bias = elements.six("setbias");
+  if (elements.optional_text("setpke") == "1" && !elements.optional_text("runpkmx").empty())
+    configuration.peaks = Peaks{elements.six("runpkmx"), elements.six("runpkmn")};
   configuration.xml = xml;
   return configuration;
 }

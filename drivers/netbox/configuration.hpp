@@ -6,10 +6,18 @@
 #include <string>
 #include <string_view>
 
+#include "drivers/netbox/product.hpp"
+
 namespace kphi::netbox {
 
+/// Largest and smallest counts since the box was switched on, or since they were reset.
+struct Peaks {
+  std::array<double, 6> high{}, low{};
+};
+
 struct Configuration {
-  std::string product;             ///< empty when the box does not say
+  std::string product;  ///< prodname; empty when the box does not say
+  Product kind = Product::net_box;
   std::string firmware;            ///< mfgdigver
   std::string calibration_serial;  ///< cfgcalsn
   int slot = 0;                    ///< setcfgsel: zero-based, the box's web pages count from one
@@ -29,16 +37,19 @@ struct Configuration {
   std::array<double, 6> tool_transform{};
   std::string tool_distance_unit, tool_angle_unit;
   std::array<double, 6> gage_bias{};  ///< setbias, already applied too
+  std::optional<Peaks> peaks;         ///< runpkmx, runpkmn; nothing when the box does not keep them (setpke)
 
   std::string xml;  ///< what was read, verbatim
 };
 
-/// Cutoff of a filter code in Hz, 0 = no filter; nothing for a code that no manual names.
+/// Cutoff of a Net Box's filter code in Hz, 0 = no filter; nothing for a code that no manual names.
 [[nodiscard]] std::optional<double> filter_cutoff_hz(int filter_code) noexcept;
+/// That of the box; nothing for an Axia's filter, whose table depends on its rate and is not known.
+[[nodiscard]] std::optional<double> filter_cutoff_hz(const Configuration& box) noexcept;
 
 /// Throws DeviceError, naming `device`, for whatever leaves the scale or the rate in doubt: missing, repeated or
-/// unreadable elements, an unknown unit, counts per unit or ranges not above zero, an empty calibration (FT0000), an
-/// Ethernet Axia. Independent of the locale.
+/// unreadable elements, an unknown unit, counts per unit or ranges not above zero, an empty calibration (FT0000), a
+/// product that is neither a Net Box nor an Ethernet Axia, a rate that its product has not. Independent of the locale.
 [[nodiscard]] Configuration parse_configuration(std::string_view xml, const std::string& device = "Net Box");
 
 }  // namespace kphi::netbox

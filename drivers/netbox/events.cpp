@@ -37,6 +37,14 @@ std::string words(const Event& event) {
       return "the box answers, but RDT is disabled: enable it on the box's Communications page";
     case EventKind::unreachable:
       return "the box does not answer over HTTP: check its power and the cable";
+    case EventKind::unusable:
+      return "the box answers, but its configuration cannot be measured with: open its web pages";
+    case EventKind::reconnected:
+      return fmt::format("the stream was started again {}", numbers(event));
+    case EventKind::configuration_changed:
+      return "the box is configured otherwise than before: " + to_words(event.changes);
+    case EventKind::given_up:
+      return "the stream could not be started again: check the box, its cable and its power, then start again";
   }
   return "unknown event";
 }

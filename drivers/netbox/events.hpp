@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "drivers/clock.hpp"
+#include "drivers/netbox/changes.hpp"
 
 namespace kphi::netbox {
 
@@ -21,6 +22,11 @@ enum class EventKind : std::uint8_t {
   stolen,        ///< silence, but the box answers and RDT is enabled: another client has the stream, or the box booted
   rdt_disabled,  ///< silence, and the box says that RDT is disabled
   unreachable,   ///< silence, and the box does not answer over HTTP either
+  unusable,      ///< silence or a boot, and the box's configuration cannot be measured with
+  reconnected,   ///< the stream was started again after a silence
+  configuration_changed,  ///< `changes`: what arrives from now on, and since the silence or boot before, is another
+                          ///< segment with another meaning
+  given_up,               ///< no reconnection in the time set for it
 };
 
 struct Event {
@@ -30,6 +36,7 @@ struct Event {
   std::uint32_t previous_rdt = 0, previous_ft = 0;  ///< of the accepted record before
   std::uint64_t records = 0;                        ///< missing before it; of a stall: repeated
   std::uint32_t status = 0;                         ///< of box_trouble
+  Changes changes = 0;                              ///< of configuration_changed
   friend bool operator==(const Event&, const Event&) = default;
 };
 

@@ -94,10 +94,9 @@ std::string advice(const error_code& error, std::uint16_t port) {
   return "check the address, the cable and the box's power";
 }
 
-}  // namespace
-
-std::string http_get(const std::string& host, std::uint16_t port, const std::string& target,
-                     std::chrono::nanoseconds wall_timeout) {
+/// Blocks until the whole answer is there. Throws DeviceError when it does not come or has another status.
+http::response<http::string_body> exchanged(const std::string& host, std::uint16_t port, const std::string& target,
+                                            std::chrono::nanoseconds wall_timeout, http::status demanded) {
   const std::string device = fmt::format("Net Box {}:{}", host, port);
   const std::string operation = "GET " + target;
   asio::io_context io;
@@ -116,11 +115,23 @@ std::string http_get(const std::string& host, std::uint16_t port, const std::str
     throw DeviceError(device, operation, fmt::format("could not {}: {}", exchange.step(), exchange.error().message()),
                       advice(exchange.error(), port));
   }
-  if (exchange.response().result() != http::status::ok) {
+  if (exchange.response().result() != demanded) {
     throw DeviceError(device, operation, fmt::format("HTTP status {}", exchange.response().result_int()),
                       "is this a Net Box? Open the address in a browser");
   }
-  return std::move(exchange.response().body());
+  return std::move(exchange.response());
+}
+
+}  // namespace
+
+std::string http_get(const std::string& host, std::uint16_t port, const std::string& target,
+                     std::chrono::nanoseconds wall_timeout) {
+  return std::move(exchanged(host, port, target, wall_timeout, http::status::ok).body());
+}
+
+void http_write(const std::string& host, std::uint16_t port, const std::string& target,
+                std::chrono::nanoseconds wall_timeout) {
+  (void)exchanged(host, port, target, wall_timeout, http::status::found);
 }
 
 }  // namespace kphi::netbox

@@ -1,4 +1,4 @@
-// The one verb of the box's web server that a reader needs.
+// The two verbs of the box's web server: read a page, write settings. Both are a GET.
 #pragma once
 
 #include <chrono>
@@ -11,5 +11,10 @@ namespace kphi::netbox {
 /// at most. Throws DeviceError when there is no connection, no whole answer in time, or another status than 200.
 [[nodiscard]] std::string http_get(const std::string& host, std::uint16_t port, const std::string& target,
                                    std::chrono::nanoseconds wall_timeout);
+
+/// Writes settings: `target` is one of the box's CGI pages with all its variables, "/comm.cgi?comrdtrate=1000". The box
+/// answers HTTP/1.0 302 Found, whatever it has done: read back. As http_get; throws for any other answer.
+void http_write(const std::string& host, std::uint16_t port, const std::string& target,
+                std::chrono::nanoseconds wall_timeout);
 
 }  // namespace kphi::netbox

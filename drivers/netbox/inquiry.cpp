@@ -15,8 +15,8 @@ constexpr std::chrono::seconds kTimeout{2};
 
 }  // namespace
 
-Inquiry::Inquiry(std::string host, std::uint16_t http_port, const Clock& clock, EventQueue& answers)
-    : host_(std::move(host)), http_port_(http_port), clock_(clock), answers_(answers), thread_([this] { run(); }) {}
+Inquiry::Inquiry(Place place, const Clock& clock, Configuration known, Wakeup& bell)
+    : place_(std::move(place)), clock_(clock), bell_(bell), known_(std::move(known)), thread_([this] { run(); }) {}
 
 Inquiry::~Inquiry() {
   order_ = kEnd;
@@ -37,20 +37,33 @@ void Inquiry::run() noexcept {
     order_.wait(kRest);
     int ask = kAsk;
     if (!order_.compare_exchange_strong(ask, kRest)) return;
-    Event answer;
-    answer.kind = find_out();
+    Answer answer = find_out();
     answer.at = clock_.now();
     answers_.push(answer);
+    bell_.raise();
   }
 }
 
-EventKind Inquiry::find_out() const noexcept {
+Inquiry::Answer Inquiry::find_out() noexcept {
+  Answer answer;
   try {
-    const std::string xml = http_get(host_, http_port_, "/netftapi2.xml", kTimeout);
-    return parse_configuration(xml).rdt_enabled ? EventKind::stolen : EventKind::rdt_disabled;
+    const std::string xml = http_get(place_.host, place_.http_port, "/netftapi2.xml", kTimeout);
+    answer.box = BoxAnswer::unusable;
+    Configuration fresh = parse_configuration(xml);
+    const std::lock_guard lock(mutex_);
+    answer.changes = compare(known_, fresh);
+    answer.booted = forgot_peaks(known_, fresh);
+    answer.box = fresh.rdt_enabled ? BoxAnswer::ready : BoxAnswer::rdt_disabled;
+    known_ = std::move(fresh);
   } catch (const std::exception&) {
-    return EventKind::unreachable;
+    // `answer` says how far it came.
   }
+  return answer;
+}
+
+Configuration Inquiry::latest() const {
+  const std::lock_guard lock(mutex_);
+  return known_;
 }
 
 }  // namespace kphi::netbox

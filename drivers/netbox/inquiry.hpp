@@ -1,37 +1,54 @@
-// Asks the box over HTTP why its stream is silent: once for each silence, on a thread of its own, far from the
-// receive path.
+// Asks the box over HTTP how it is set now, on a thread of its own, far from the receive path: when its stream has
+// fallen silent, and when it has booted.
 #pragma once
 
 #include <atomic>
-#include <cstdint>
-#include <string>
+#include <boost/lockfree/spsc_queue.hpp>
+#include <mutex>
 #include <thread>
 
 #include "drivers/clock.hpp"
-#include "drivers/netbox/event_queue.hpp"
+#include "drivers/netbox/changes.hpp"
+#include "drivers/netbox/configuration.hpp"
+#include "drivers/netbox/place.hpp"
+#include "drivers/netbox/reconnect.hpp"
+#include "drivers/netbox/wakeup.hpp"
 
 namespace kphi::netbox {
 
 class Inquiry {
  public:
-  /// `clock` and `answers` must outlive this; the thread is the only producer of `answers`.
-  Inquiry(std::string host, std::uint16_t http_port, const Clock& clock, EventQueue& answers);
+  struct Answer {
+    BoxAnswer box = BoxAnswer::unreachable;
+    Changes changes = 0;  ///< against what was known before
+    bool booted = false;  ///< it has forgotten its peaks
+    Instant at{0};        ///< bench time
+  };
+
+  /// `clock` and `bell` must outlive this; `bell` is raised with each answer.
+  Inquiry(Place place, const Clock& clock, Configuration known, Wakeup& bell);
   /// Waits for a running request, 2 s at most.
   ~Inquiry();
   Inquiry(const Inquiry&) = delete;
   Inquiry& operator=(const Inquiry&) = delete;
   /// Any thread; returns at once. Asked again while it works, it asks once more.
   void ask() noexcept;
+  /// One thread. False: no answer waits.
+  [[nodiscard]] bool take(Answer& answer) noexcept { return answers_.pop(answer); }
+  /// What the box said last. Any thread.
+  [[nodiscard]] Configuration latest() const;
 
  private:
   enum Order : int { kRest, kAsk, kEnd };
   void run() noexcept;
-  [[nodiscard]] EventKind find_out() const noexcept;
+  [[nodiscard]] Answer find_out() noexcept;
 
-  const std::string host_;
-  const std::uint16_t http_port_;
+  const Place place_;
   const Clock& clock_;
-  EventQueue& answers_;
+  Wakeup& bell_;
+  mutable std::mutex mutex_;
+  Configuration known_;  // under mutex_
+  boost::lockfree::spsc_queue<Answer, boost::lockfree::capacity<16>> answers_;
   std::atomic<int> order_{kRest};
   std::thread thread_;
 };

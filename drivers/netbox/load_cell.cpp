@@ -7,8 +7,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <memory>
+#include <utility>
 
 #include "drivers/device_error.hpp"
+#include "drivers/netbox/audit.hpp"
 #include "drivers/netbox/http.hpp"
 
 namespace kphi::netbox {
@@ -30,8 +33,15 @@ Configuration read_configuration(const Place& place) {
                              "Net Box " + place.host);
 }
 
-StreamSettings stream_settings(const Configuration& configuration, const Clock& clock, Command mode) {
+StreamPolicy on_the_bench(const StreamPolicy& policy, const Clock& clock) {
+  return {policy.reconnect, clock.stretched(policy.first_pause), clock.stretched(policy.longest_pause),
+          clock.stretched(policy.give_up_after), clock.stretched(policy.lease)};
+}
+
+StreamSettings stream_settings(const Configuration& configuration, const Clock& clock, Command mode, Duration lease) {
   StreamSettings settings;
+  settings.product = configuration.kind;
+  settings.lease = lease;
   settings.buffered = mode == Command::buffered;
   settings.divisor = configuration.divisor;
   settings.records_per_datagram = configuration.records_per_datagram;
@@ -44,8 +54,14 @@ StreamSettings stream_settings(const Configuration& configuration, const Clock& 
   return settings;
 }
 
+int records_of(const Configuration& configuration, Command mode) noexcept {
+  return mode == Command::buffered ? configuration.records_per_datagram : 1;
+}
+
+double bench_seconds_per_second(const Clock& clock) noexcept { return to_seconds(clock.stretched(1s)); }
+
 std::size_t queue_capacity(const Configuration& configuration, const Clock& clock) {
-  const double wall_rate_hz = configuration.rdt_rate_hz * to_seconds(clock.stretched(1s));
+  const double wall_rate_hz = configuration.rdt_rate_hz * bench_seconds_per_second(clock);
   return static_cast<std::size_t>(std::clamp(std::ceil(kQueueSeconds * wall_rate_hz), 1024.0, kQueueLimit));
 }
 
@@ -58,16 +74,20 @@ bool poll_for(std::span<pollfd> descriptors, std::chrono::nanoseconds wall) noex
 
 }  // namespace
 
-LoadCell::LoadCell(const Place& place, const Clock& clock, Command mode)
+LoadCell::LoadCell(const Place& place, const Clock& clock, Command mode, const StreamPolicy& policy)
     : place_(place),
       clock_(clock),
       configuration_(read_configuration(place)),
+      mode_(mode),
+      policy_(on_the_bench(policy, clock)),
       socket_(place.host, place.rdt_port),
       queue_capacity_(queue_capacity(configuration_, clock)),
       queue_(queue_capacity_),
-      inquiry_(place.host, place.http_port, clock, inquiry_events_),
-      session_(stream_settings(configuration_, clock, mode)),
-      meter_(configuration_.device_rate_hz) {
+      inquiry_(place, clock, configuration_, order_wakeup_),
+      session_(stream_settings(configuration_, clock, mode, policy_.lease)),
+      meter_(configuration_.device_rate_hz),
+      reconnect_(policy_),
+      streamed_(configuration_) {
   accepted_.reserve(UdpSocket::kBatch * kMaxRecords);
 }
 
@@ -120,19 +140,22 @@ bool LoadCell::wait(std::chrono::nanoseconds wall) noexcept {
 
 std::vector<Event> LoadCell::take_events() {
   std::vector<Event> events;
-  for (EventQueue* queue : {&stream_events_, &inquiry_events_})
-    queue->consume_all([&](const Event& event) { events.push_back(event); });
+  events_.consume_all([&](const Event& event) { events.push_back(event); });
   std::stable_sort(events.begin(), events.end(), [](const Event& a, const Event& b) { return a.at < b.at; });
   return events;
 }
 
 std::string LoadCell::receive_buffer_note() const {
-  const StreamSettings& settings = session_.settings();
-  const std::size_t payload = kRecordBytes * (settings.buffered ? settings.records_per_datagram : 1);
-  const double held = static_cast<double>(datagrams_held(socket_.receive_buffer_bytes(), payload));
-  const double tolerated_ms = 1e3 * held * to_seconds(clock_.shrunk(settings.datagram_period()));
+  const double tolerated_ms = 1e3 / bench_seconds_per_second(clock_) *
+                              tolerated_standstill_s(socket_.receive_buffer_bytes(), records_of(configuration_, mode_),
+                                                     configuration_.rdt_rate_hz);
   return fmt::format("{:.1f} MiB, tolerates {:.0f} ms", static_cast<double>(socket_.receive_buffer_bytes()) / (1 << 20),
                      tolerated_ms);
+}
+
+std::optional<Finding> LoadCell::receive_buffer_finding() const {
+  return small_receive_buffer(socket_.receive_buffer_bytes(), records_of(configuration_, mode_),
+                              configuration_.rdt_rate_hz, bench_seconds_per_second(clock_));
 }
 
 void LoadCell::run() noexcept {
@@ -140,7 +163,9 @@ void LoadCell::run() noexcept {
   sigset_t all;
   sigfillset(&all);
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
+  adopt_latest_stream();
   meter_.begin();
+  reconnect_.streaming();
   bias_asked_ = false;
   session_.start(clock_.now());
   while (!stopping_ && session_.state() != State::failed) pump();
@@ -171,14 +196,15 @@ void LoadCell::pump() noexcept {
   session_.advance(now);
   publish();
   hand_over_events();
+  tend_connection(now);
 }
 
 void LoadCell::wait_for_datagrams() noexcept {
   std::array<pollfd, 2> both{{{order_wakeup_.descriptor(), POLLIN, 0}, {socket_.native_handle(), POLLIN, 0}}};
-  const Instant due = std::min(session_.deadline(), session_.release_deadline());
+  const Instant due = std::min({session_.deadline(), session_.release_deadline(), reconnect_.deadline()});
   poll_for(both, due == kNever ? 1h : clock_.shrunk(due - clock_.now()));
   const bool ordered = both[0].revents != 0;
-  if (session_.state() == State::streaming && !ordered) poll_for({both.data(), 1}, kNap);
+  if (session_.state() == State::streaming && !ordered && !session_.renews_next()) poll_for({both.data(), 1}, kNap);
 }
 
 void LoadCell::drain() noexcept {
@@ -215,10 +241,71 @@ void LoadCell::send_requests() noexcept {
 
 void LoadCell::hand_over_events() noexcept {
   session_.events().drain([this](const Event& event) {
-    stream_events_.push(event);
-    if (event.kind == EventKind::silent) inquiry_.ask();
+    events_.push(event);
+    if (event.kind == EventKind::silent) reconnect_.silent(event.at);
+    if (event.kind == EventKind::rebooted) inquiry_.ask();
   });
 }
+
+void LoadCell::tend_connection(Instant now) noexcept {
+  Inquiry::Answer answer;
+  while (inquiry_.take(answer)) {
+    order_wakeup_.clear();
+    note_answer(answer);
+  }
+  if (session_.state() == State::streaming) {
+    reconnect_.streaming();
+  } else if (reconnect_.starting() && session_.state() == State::silent) {
+    reconnect_.start_failed(now);
+  }
+  switch (reconnect_.next(now)) {
+    case Reconnect::Move::ask:
+      return inquiry_.ask();
+    case Reconnect::Move::start:
+      adopt_latest_stream();
+      return session_.start(now);
+    case Reconnect::Move::give_up:
+      events_.push(Event{.kind = EventKind::given_up, .at = now});
+      return;
+    case Reconnect::Move::none:
+      return;
+  }
+}
+
+void LoadCell::note_answer(const Inquiry::Answer& answer) noexcept {
+  constexpr EventKind kKinds[] = {EventKind::unreachable, EventKind::unusable, EventKind::rdt_disabled,
+                                  EventKind::stolen};
+  if (answer.changes != 0)
+    events_.push(Event{.kind = EventKind::configuration_changed, .at = answer.at, .changes = answer.changes});
+  const bool streams = session_.state() == State::streaming;
+  if (streams) {
+    if (answer.box == BoxAnswer::unusable) events_.push(Event{.kind = EventKind::unusable, .at = answer.at});
+    if (!changes_stream(answer.changes)) return;
+    adopt_latest_stream();
+    session_.start(answer.at);
+    return;
+  }
+  if (!reconnect_.answered(answer.box, answer.booted, answer.at)) return;
+  const bool starts = answer.box == BoxAnswer::ready && reconnect_.will_start();
+  if (!starts) events_.push(Event{.kind = kKinds[static_cast<std::size_t>(answer.box)], .at = answer.at});
+}
+
+/// The box may be set to another rate than when session_ was made. Where the count of its samples goes on, the account
+/// does.
+void LoadCell::adopt_latest_stream() {
+  Configuration latest = inquiry_.latest();
+  if (!changes_stream(compare(streamed_, latest))) return;
+  session_.flush(accepted_);
+  deliver();
+  Session fresh(stream_settings(latest, clock_, mode_, policy_.lease), session_);
+  std::destroy_at(&session_);
+  std::construct_at(&session_, std::move(fresh));
+  std::destroy_at(&meter_);
+  std::construct_at(&meter_, latest.device_rate_hz);
+  streamed_ = std::move(latest);
+}
+
+State LoadCell::shown_state() const noexcept { return session_.resuming() ? State::silent : session_.state(); }
 
 void LoadCell::linger() noexcept {
   const Instant give_up = clock_.now() + clock_.stretched(kLongestLinger);
@@ -236,7 +323,7 @@ void LoadCell::publish() noexcept {
   Health health = meter_.health();
   health.events_dropped = session_.events().dropped();
   health_.publish(health);
-  const State state = session_.state();
+  const State state = shown_state();
   if (state_.exchange(state) != state) state_.notify_all();
 }
 

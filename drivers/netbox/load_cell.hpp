@@ -1,11 +1,12 @@
-// The load cell on its Net Box: reads the configuration, streams, and hands the records to one consumer. Writes none
-// of the box's settings.
+// The load cell on its Net Box: reads the configuration, streams, starts again after a failure, and hands the records
+// to one consumer. Writes none of the box's settings.
 #pragma once
 
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <thread>
@@ -14,20 +15,17 @@
 #include "drivers/clock.hpp"
 #include "drivers/netbox/configuration.hpp"
 #include "drivers/netbox/event_queue.hpp"
+#include "drivers/netbox/finding.hpp"
 #include "drivers/netbox/health.hpp"
 #include "drivers/netbox/inquiry.hpp"
+#include "drivers/netbox/place.hpp"
 #include "drivers/netbox/published.hpp"
+#include "drivers/netbox/reconnect.hpp"
 #include "drivers/netbox/session.hpp"
 #include "drivers/netbox/udp_socket.hpp"
 #include "drivers/netbox/wakeup.hpp"
 
 namespace kphi::netbox {
-
-struct Place {
-  std::string host;
-  std::uint16_t rdt_port = 49152;
-  std::uint16_t http_port = 80;
-};
 
 /// One receive thread while it streams. start, stop and the destructor belong to one thread, take and wait to one
 /// (other or same); the rest may be called from any. Counters and queue outlive a stop and the next start.
@@ -35,13 +33,16 @@ class LoadCell {
  public:
   /// Reads the configuration over HTTP; sends nothing to the RDT port. `mode`: Command::buffered or real_time.
   /// `clock` must outlive this. Throws DeviceError.
-  LoadCell(const Place& place, const Clock& clock, Command mode = Command::buffered);
+  LoadCell(const Place& place, const Clock& clock, Command mode = Command::buffered, const StreamPolicy& policy = {});
   /// Stops.
   ~LoadCell();
   LoadCell(const LoadCell&) = delete;
   LoadCell& operator=(const LoadCell&) = delete;
 
+  /// As read at construction: the scale of the records until an event says configuration_changed.
   [[nodiscard]] const Configuration& configuration() const noexcept { return configuration_; }
+  /// As read last: anew after each silence and each boot of the box.
+  [[nodiscard]] Configuration latest_configuration() const { return inquiry_.latest(); }
   /// Returns once the first record has arrived. Throws DeviceError when none does, or when RDT is disabled.
   void start();
   /// Tells the box to stop, and waits a moment to see that it does.
@@ -57,7 +58,9 @@ class LoadCell {
   [[nodiscard]] bool wait(std::chrono::nanoseconds wall) noexcept;
 
   /// What has happened to the stream since the last call, oldest first; the thread of take and wait. After a silence
-  /// the box is asked over HTTP once, and the answer (stolen, rdt_disabled, unreachable) comes here up to 2 s later.
+  /// the box is asked over HTTP, and the answer (stolen, rdt_disabled, unusable, unreachable) comes here up to 2 s
+  /// later, each once for as long as it stays the same; then what StreamPolicy allows is done about it. state() stays
+  /// `silent` until records come again.
   [[nodiscard]] std::vector<Event> take_events();
 
   /// A consistent set, a few milliseconds old at most while records come.
@@ -69,6 +72,10 @@ class LoadCell {
   [[nodiscard]] State state() const noexcept { return state_.load(); }
   /// "8.0 MiB, tolerates 1440 ms": how long this process may stand still before the kernel drops datagrams.
   [[nodiscard]] std::string receive_buffer_note() const;
+  /// The kernel has granted less buffer than asked for: how long may the process stand still, and what to do.
+  [[nodiscard]] std::optional<Finding> receive_buffer_finding() const;
+  /// As the kernel tells it.
+  [[nodiscard]] std::size_t receive_buffer_bytes() const noexcept { return socket_.receive_buffer_bytes(); }
 
  private:
   void run() noexcept;
@@ -79,12 +86,18 @@ class LoadCell {
   void send_requests() noexcept;
   void hand_over_events() noexcept;
   void linger() noexcept;
+  void tend_connection(Instant now) noexcept;
+  void note_answer(const Inquiry::Answer& answer) noexcept;
+  void adopt_latest_stream();
+  [[nodiscard]] State shown_state() const noexcept;
   void publish() noexcept;
   [[noreturn]] void throw_unanswered() const;
 
   const Place place_;
   const Clock& clock_;
   const Configuration configuration_;
+  const Command mode_;
+  const StreamPolicy policy_;  // bench time
   UdpSocket socket_;
   std::thread thread_;
   std::atomic<bool> stopping_{false}, bias_asked_{false};
@@ -92,13 +105,15 @@ class LoadCell {
   std::atomic<bool> consumer_waits_{false};
   const std::size_t queue_capacity_;
   boost::lockfree::spsc_queue<StampedRecord> queue_;
-  EventQueue stream_events_, inquiry_events_;
+  EventQueue events_;
   Inquiry inquiry_;
 
   // The receive thread's own; others touch them only while it does not run.
   Session session_;
   std::vector<StampedRecord> accepted_;
   HealthMeter meter_;
+  Reconnect reconnect_;
+  Configuration streamed_;  // what session_ is made for
   std::uint64_t queue_overflows_ = 0;
 
   // Published by the receive thread.

@@ -12,9 +12,9 @@
 namespace kphi::netbox {
 namespace {
 
-std::string status_words(std::uint32_t status) {
+std::string status_words(std::uint32_t status, Product product) {
   std::string words;
-  for (const std::string& name : names(status)) words += (words.empty() ? "" : ", ") + name;
+  for (const std::string& name : names(status, product)) words += (words.empty() ? "" : ", ") + name;
   return words;
 }
 
@@ -35,7 +35,7 @@ void judge_stream(Probe& probe, std::uint32_t status, bool known_skew) {
     find(Severity::warning, fmt::format("{} datagrams have a wrong size", counters.malformed),
          "is another device at this address?");
   if (!healthy(status))
-    find(Severity::fault, "the box reports: " + status_words(status),
+    find(Severity::fault, "the box reports: " + status_words(status, probe.configuration->kind),
          "power-cycle the box; unload the cell if saturated");
   if (known_skew && std::abs(probe.health.skew_ppm) > ClockEstimate::kBelievableSkewPpm)
     find(Severity::fault,
@@ -69,8 +69,9 @@ void look_at_stream(Probe& probe, LoadCell& cell, const Clock& clock, std::chron
   judge_stream(probe, status, clock.shrunk(std::chrono::seconds(1)) == std::chrono::seconds(1));
 }
 
-std::string filter_words(int code) {
-  const double cutoff = filter_cutoff_hz(code).value_or(0);
+std::string filter_words(const Configuration& box) {
+  if (!filter_cutoff_hz(box)) return fmt::format("filter code {}", box.filter_code);
+  const double cutoff = *filter_cutoff_hz(box);
   return cutoff > 0 ? fmt::format("filter {:g} Hz", cutoff) : "no filter";
 }
 
@@ -100,7 +101,7 @@ std::vector<std::string> Probe::lines() const {
                                box.range[3], box.range[4], box.range[5]));
     text.push_back(fmt::format("RDT {}, {:.4g} Hz, {} records per datagram, {}",
                                box.rdt_enabled ? "enabled" : "disabled", box.rdt_rate_hz, box.records_per_datagram,
-                               filter_words(box.filter_code)));
+                               filter_words(box)));
     text.push_back(fmt::format("gage bias {:g} {:g} {:g} {:g} {:g} {:g}", box.gage_bias[0], box.gage_bias[1],
                                box.gage_bias[2], box.gage_bias[3], box.gage_bias[4], box.gage_bias[5]));
   }
@@ -123,9 +124,10 @@ std::vector<std::string> Probe::lines() const {
 Probe probe(const Place& place, const Clock& clock, const ProbeSettings& settings) {
   Probe found;
   try {
-    LoadCell cell(place, clock);
+    LoadCell cell(place, clock, Command::buffered, {.reconnect = false});
     found.configuration = cell.configuration();
     found.findings = audit(*found.configuration, settings.intention);
+    if (auto finding = cell.receive_buffer_finding()) found.findings.push_back(std::move(*finding));
     if (auto finding = cross_check(place.host, settings.tcp_port, *found.configuration, settings.tcp_timeout))
       found.findings.push_back(std::move(*finding));
     look_at_stream(found, cell, clock, settings.stream);

@@ -103,8 +103,7 @@ bool SequenceAccount::accept_forward(const Record& record, Instant arrival, std:
   const auto advance = static_cast<std::uint64_t>(ft_step);
   const std::uint64_t records = std::max<std::uint64_t>(1, (advance + stride_ / 2) / stride_);
   if (rdt_step <= 0) {
-    ++counters_.restarts;
-    note_event(EventKind::restarted, record, arrival, records - 1);
+    note_restart(record, arrival, records - 1);
   } else if (static_cast<std::uint64_t>(rdt_step) * stride_ != advance) {
     ++counters_.irregular;
   }
@@ -116,6 +115,17 @@ bool SequenceAccount::accept_forward(const Record& record, Instant arrival, std:
   ++counters_.received;
   remember(record, arrival);
   return true;
+}
+
+void SequenceAccount::note_restart(const Record& record, Instant arrival, std::uint64_t missing) noexcept {
+  if (renewals_expected_ > 0) {
+    --renewals_expected_;
+    ++counters_.renewals;
+    counters_.lost_at_renewals += missing;
+    return;
+  }
+  ++counters_.restarts;
+  note_event(EventKind::restarted, record, arrival, missing);
 }
 
 bool SequenceAccount::plausible(std::int32_t ft_step, Instant arrival) const noexcept {

@@ -34,7 +34,10 @@ struct Counters {
   std::uint64_t malformed = 0;     ///< datagrams of wrong size
   std::uint64_t drained = 0;       ///< datagrams that came while none was asked for
   std::uint64_t host_drops = 0;    ///< datagrams that the socket dropped (SO_RXQ_OVFL)
-  std::uint64_t queue_overflows = 0;  ///< accepted, then lost because the consumer did not take them in time
+  std::uint64_t reconnects = 0;    ///< times the stream was started again after it had ended
+  std::uint64_t renewals = 0;      ///< times the stream began anew because its lease was renewed: no restarts
+  std::uint64_t lost_at_renewals = 0;  ///< of lost_network and lost_host: missing where that happened
+  std::uint64_t queue_overflows = 0;   ///< accepted, then lost because the consumer did not take them in time
 };
 
 class SequenceAccount {
@@ -44,6 +47,8 @@ class SequenceAccount {
 
   /// The next record is the first of a stream that was asked for: nothing is missing before it.
   void begin_segment() noexcept;
+  /// So many of the next restarts are asked for: no doubt, and no event.
+  void expect_renewals(int count) noexcept { renewals_expected_ = count; }
   /// True: deliver it. False: counted and to be discarded.
   [[nodiscard]] bool accept(const Record& record, Instant arrival) noexcept {
     if (is_next(record)) [[likely]] {
@@ -95,6 +100,7 @@ class SequenceAccount {
     return false;
   }
   bool accept_first(const Record& record, Instant arrival) noexcept;
+  void note_restart(const Record& record, Instant arrival, std::uint64_t missing) noexcept;
   bool plausible(std::int32_t ft_step, Instant arrival) const noexcept;
   bool accept_reboot(const Record& record, Instant arrival) noexcept;
   bool note_stray(const Record& record, Instant arrival, std::int32_t ft_step) noexcept;
@@ -112,6 +118,7 @@ class SequenceAccount {
   bool has_last_ = false;
   std::uint32_t last_rdt_ = 0, last_ft_ = 0;
   Instant last_arrival_{0};
+  int renewals_expected_ = 0;
   std::uint64_t host_credit_ = 0;  // records dropped by the socket and not yet found missing
   std::array<Gap, 16> gaps_{};
   std::uint64_t gap_count_ = 0;

@@ -1,6 +1,7 @@
 #include "drivers/netbox/session.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace kphi::netbox {
 namespace {
@@ -10,8 +11,17 @@ constexpr int kDrainLimit = 20;
 // A new stream counts from 1. What is further on than this many datagrams belongs to the one before.
 constexpr std::uint32_t kFirstDatagrams = 64;
 
+// Of the Net Box; the Axia has no such bits.
 constexpr std::uint32_t kTroubleBits =
     1u << static_cast<unsigned>(StatusBit::rdt) | 1u << static_cast<unsigned>(StatusBit::network);
+
+// A lease of fewer silences could end before a silence is noticed: whether somebody has taken the stream or it has run
+// out could not be told then.
+constexpr int kLeastLease = 4;
+
+bool same_count(const StreamSettings& a, const StreamSettings& b) noexcept {
+  return a.divisor == b.divisor && a.device_rate_hz == b.device_rate_hz;
+}
 
 std::size_t window_records(const StreamSettings& settings) {
   const auto four_datagrams = static_cast<std::size_t>(settings.buffered ? 4 * settings.records_per_datagram : 4);
@@ -24,10 +34,31 @@ Duration StreamSettings::datagram_period() const noexcept {
   return from_seconds((buffered ? records_per_datagram : 1) * (divisor / device_rate_hz));
 }
 
+std::uint32_t StreamSettings::sample_count() const noexcept {
+  if (lease <= Duration{0}) return 0;
+  const Duration period = datagram_period();
+  const std::int64_t datagrams = (std::max(lease, kLeastLease * silence()) + period - Duration{1}) / period;
+  return static_cast<std::uint32_t>(datagrams * (buffered ? records_per_datagram : 1));
+}
+
 Session::Session(StreamSettings settings)
+    : Session(settings, SequenceAccount(settings.divisor, settings.device_rate_hz)) {}
+
+Session::Session(StreamSettings settings, const Session& before)
+    : Session(settings, same_count(settings, before.settings_)
+                            ? before.account_
+                            : SequenceAccount(settings.divisor, settings.device_rate_hz)) {
+  account_.counters() = before.account_.counters();
+  host_drops_ = before.host_drops_;
+  renewals_seen_ = before.renewals_seen_;
+  phase_ = before.phase_;
+}
+
+Session::Session(StreamSettings settings, SequenceAccount account)
     : settings_(settings),
-      silence_(settings.silence_timeout + 3 * settings.datagram_period()),
-      account_(settings.divisor, settings.device_rate_hz),
+      silence_(settings.silence()),
+      lease_(from_seconds(settings.sample_count() * (settings.divisor / settings.device_rate_hz))),
+      account_(std::move(account)),
       window_(window_records(settings), settings.reorder_patience, settings.divisor),
       datagram_records_(settings.buffered ? static_cast<std::size_t>(settings.records_per_datagram) : 1) {}
 
@@ -35,12 +66,16 @@ void Session::start(Instant now) {
   if (phase_ == Phase::idle || phase_ == Phase::failed) {
     account_.begin_segment();
     window_.forget();
+    resuming_ = false;
+  } else if (phase_ == Phase::streaming || phase_ == Phase::silent) {
+    resuming_ = true;
+    silence_told_ = phase_ == Phase::silent;
   }
   attempt_ = 0;
   request_count_ = 0;
   send_stop(now);
   phase_ = Phase::draining;
-  bias_due_ = kNever;
+  bias_due_ = renewal_due_ = kNever;
   due_ = now + settings_.settle;
   drain_limit_ = now + kDrainLimit * settings_.settle;
 }
@@ -49,7 +84,7 @@ void Session::stop(Instant now) {
   request_count_ = 0;
   send_stop(now);
   phase_ = Phase::idle;
-  due_ = bias_due_ = kNever;
+  due_ = bias_due_ = renewal_due_ = kNever;
 }
 
 void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out) {
@@ -66,10 +101,49 @@ void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, s
   }
   datagram_records_ = count;
   if (!take_records(count, arrival, out)) return;
-  if (phase_ == Phase::silent) note_event(EventKind::resumed, arrival);
-  phase_ = Phase::streaming;
+  if (phase_ != Phase::streaming) begin_streaming(arrival);
   newest_arrival_ = arrival;
   due_ = arrival + silence_;
+  if (lease_ > Duration{0}) tend_lease(arrival);
+}
+
+void Session::begin_streaming(Instant arrival) noexcept {
+  if (phase_ == Phase::silent) note_event(EventKind::resumed, arrival);
+  if (resuming_ && phase_ == Phase::awaiting) {
+    ++account_.counters().reconnects;
+    note_event(EventKind::reconnected, arrival);
+  }
+  phase_ = Phase::streaming;
+  resuming_ = false;
+  if (lease_ == Duration{0}) return;
+  renewal_due_ = arrival + lease_ / 2;
+  lease_end_ = arrival + lease_;
+}
+
+/// Only ever behind a datagram of ours: a renewal of a stream that another client has taken would be a fight for it.
+void Session::tend_lease(Instant now) noexcept {
+  const std::uint64_t renewals = account_.counters().renewals;
+  if (renewals != renewals_seen_) {
+    renewals_seen_ = renewals;
+    renewals_sent_ = 0;
+    account_.expect_renewals(0);
+    renewal_due_ = now + lease_ / 2;
+    lease_end_ = now + lease_;
+  } else if (now >= renewal_due_) {
+    renew_lease(now);
+  }
+}
+
+void Session::renew_lease(Instant now) noexcept {
+  account_.expect_renewals(++renewals_sent_);
+  send(start_command());
+  renewal_due_ = now + 3 * settings_.datagram_period() + settings_.reply_timeout;
+}
+
+Command Session::start_command() const noexcept {
+  if (settings_.product == Product::axia)
+    return settings_.buffered ? Command::axia_multi_block : Command::axia_single_block;
+  return settings_.buffered ? Command::buffered : Command::real_time;
 }
 
 bool Session::take_records(std::size_t count, Instant arrival, std::vector<StampedRecord>& out) {
@@ -86,7 +160,7 @@ bool Session::take_records(std::size_t count, Instant arrival, std::vector<Stamp
       any_new |= window_.receive(record, arrival, account_, out);
     }
   }
-  const std::uint32_t trouble = status & kTroubleBits;
+  const std::uint32_t trouble = settings_.product == Product::net_box ? status & kTroubleBits : 0;
   if ((trouble & ~trouble_) != 0) note_event(EventKind::box_trouble, arrival, trouble);
   trouble_ = trouble;
   return any_new;
@@ -125,9 +199,17 @@ void Session::advance(Instant now) {
     case Phase::awaiting:
       if (attempt_ < settings_.attempts) return send_start(now);
       stop(now);
-      phase_ = Phase::failed;
+      phase_ = resuming_ ? Phase::silent : Phase::failed;
+      if (resuming_ && !silence_told_) note_event(EventKind::silent, now);
       return;
     case Phase::streaming:
+      renewal_due_ = kNever;
+      if (now >= lease_end_) {
+        // This host stood still for too long, and the box has stopped by itself: nobody has taken the stream.
+        start(now);
+        account_.expect_renewals(1);
+        return;
+      }
       phase_ = Phase::silent;
       due_ = kNever;
       note_event(EventKind::silent, now);
@@ -141,7 +223,7 @@ void Session::advance(Instant now) {
 
 bool Session::next_request(std::array<std::uint8_t, 8>& request) noexcept {
   if (request_count_ == 0) return false;
-  request = encode_request(requests_[0]);
+  request = encode_request(requests_[0], requests_[0] == start_command() ? settings_.sample_count() : 0);
   std::copy(requests_.begin() + 1, requests_.end(), requests_.begin());
   --request_count_;
   return true;

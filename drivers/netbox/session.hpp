@@ -9,6 +9,7 @@
 
 #include "drivers/clock.hpp"
 #include "drivers/netbox/events.hpp"
+#include "drivers/netbox/product.hpp"
 #include "drivers/netbox/rdt.hpp"
 #include "drivers/netbox/reorder.hpp"
 #include "drivers/netbox/sequence.hpp"
@@ -27,10 +28,16 @@ struct StreamSettings {
   Duration bias_patience = std::chrono::milliseconds(50);     ///< added to three datagram periods
   std::size_t reorder_records = 64;  ///< wait at most for overtaken ones; when buffered at least four datagrams
   Duration reorder_patience = std::chrono::milliseconds(20);  ///< and for so long
-  int attempts = 6;  ///< starts sent before giving up; the timeout doubles up to four times the first
+  Product product = Product::net_box;                         ///< of whose commands
+  Duration lease{0};  ///< see StreamPolicy; 0: until stopped. At least four times silence()
+  int attempts = 6;   ///< starts sent before giving up; the timeout doubles up to four times the first
 
   /// Bench time between two datagrams.
   [[nodiscard]] Duration datagram_period() const noexcept;
+  /// A stream that brings nothing for so long is called silent.
+  [[nodiscard]] Duration silence() const noexcept { return silence_timeout + 3 * datagram_period(); }
+  /// Whole datagrams, so that nobody needs to know what a box does with a last one that is not full. 0: no end.
+  [[nodiscard]] std::uint32_t sample_count() const noexcept;
 };
 
 enum class State : std::uint8_t {
@@ -38,12 +45,15 @@ enum class State : std::uint8_t {
   starting,  ///< asked, no record yet
   streaming,
   silent,  ///< was streaming, nothing for long; streams again with the next record, or with start()
-  failed,  ///< no record after all attempts
+  failed,  ///< no record after all attempts of the first start
 };
 
 class Session {
  public:
   explicit Session(StreamSettings settings);
+  /// Goes on where `before` is, with other settings: start() it then. With another stride a new account, its counters
+  /// going on; what is missing in between is not known then.
+  Session(StreamSettings settings, const Session& before);
 
   /// Stop, wait for silence, start; repeated until the first record. From `silent` or `streaming` the account goes on,
   /// so that what is missing in between is counted; from `idle` or `failed` it begins anew behind the old one.
@@ -70,6 +80,14 @@ class Session {
   /// kNever when nothing is due.
   [[nodiscard]] Instant deadline() const noexcept;
   [[nodiscard]] State state() const noexcept;
+  /// Starting again after a silence; `silent` again when no record comes.
+  [[nodiscard]] bool resuming() const noexcept {
+    return resuming_ && (phase_ == Phase::draining || phase_ == Phase::awaiting);
+  }
+  /// The lease is renewed with the next datagram: each moment until then costs records.
+  [[nodiscard]] bool renews_next() const noexcept {
+    return renewal_due_ != kNever && newest_arrival_ + settings_.datagram_period() >= renewal_due_;
+  }
   /// Datagrams that the socket has dropped since it was opened (SO_RXQ_OVFL), as known at the datagram received next.
   void note_host_drops(std::uint64_t total) noexcept;
   [[nodiscard]] const Counters& counters() const noexcept { return account_.counters(); }
@@ -81,20 +99,22 @@ class Session {
  private:
   enum class Phase : std::uint8_t { idle, draining, awaiting, streaming, silent, failed };
 
+  Session(StreamSettings settings, SequenceAccount account);
   void discard(Instant arrival);
   void check_bias(Instant now) noexcept;
   bool take_records(std::size_t count, Instant arrival, std::vector<StampedRecord>& out);
   void note_event(EventKind kind, Instant at, std::uint32_t status = 0) noexcept;
   bool belongs_to_new_stream(const Record& first) const noexcept;
-  [[nodiscard]] Command start_command() const noexcept {
-    return settings_.buffered ? Command::buffered : Command::real_time;
-  }
+  [[nodiscard]] Command start_command() const noexcept;
+  void begin_streaming(Instant arrival) noexcept;
+  void tend_lease(Instant now) noexcept;
+  void renew_lease(Instant now) noexcept;
   void send(Command command) noexcept;
   void send_stop(Instant now) noexcept;
   void send_start(Instant now) noexcept;
 
   const StreamSettings settings_;
-  const Duration silence_;
+  const Duration silence_, lease_;
   SequenceAccount account_;
   ReorderWindow window_;
   std::uint32_t trouble_ = 0;  // status bits that say so, of the last datagram
@@ -102,6 +122,10 @@ class Session {
   Instant due_ = kNever, bias_due_ = kNever;
   Instant newest_arrival_{0};
   int bias_starts_ = 0;
+  bool resuming_ = false, silence_told_ = false;
+  Instant renewal_due_ = kNever, lease_end_ = kNever;
+  std::uint64_t renewals_seen_ = 0;
+  int renewals_sent_ = 0;  // since the last one that showed
   Instant drain_limit_{0}, stop_sent_{0};
   int attempt_ = 0;
   std::size_t datagram_records_;  // of the last datagram

@@ -1,17 +1,19 @@
 #include "drivers/netbox/status.hpp"
 
 #include <algorithm>
-#include <iterator>
+#include <span>
 
 namespace kphi::netbox {
 namespace {
 
 struct Entry {
-  StatusBit bit;
+  constexpr Entry(StatusBit b, const char* n) : bit(static_cast<int>(b)), name(n) {}
+  constexpr Entry(AxiaStatusBit b, const char* n) : bit(static_cast<int>(b)), name(n) {}
+  int bit;
   const char* name;
 };
 
-constexpr Entry kTable[] = {
+constexpr Entry kNetBox[] = {
     {StatusBit::cpu_or_ram, "CPU or RAM error"},
     {StatusBit::digital_board, "digital board error"},
     {StatusBit::analog_board, "analog board error"},
@@ -43,18 +45,36 @@ constexpr Entry kTable[] = {
     {StatusBit::http_failure, "HTTP protocol failure"},
 };
 
-std::string name_of(StatusBit bit) {
-  const auto entry = std::find_if(std::begin(kTable), std::end(kTable), [&](const Entry& e) { return e.bit == bit; });
-  return entry == std::end(kTable) ? "bit " + std::to_string(static_cast<unsigned>(bit)) : entry->name;
+constexpr Entry kAxia[] = {
+    {AxiaStatusBit::out_of_range, "force or torque out of range"},
+    {AxiaStatusBit::calibration_checksum, "calibration checksum error"},
+    {AxiaStatusBit::simulated_error, "simulated error"},
+    {AxiaStatusBit::gage_out_of_range, "gage out of range"},
+    {AxiaStatusBit::monitor_condition, "monitor condition latched"},
+    {AxiaStatusBit::calibration_not_accessible, "calibration not accessible"},
+    {AxiaStatusBit::common_error, "common error"},
+    {AxiaStatusBit::busy, "busy with its memory, filter or calibration"},
+    {AxiaStatusBit::broken_gage, "broken gage"},
+    {AxiaStatusBit::supply_voltage, "supply voltage error"},
+    {AxiaStatusBit::temperature, "temperature error"},
+};
+
+std::span<const Entry> table_of(Product product) noexcept {
+  return product == Product::axia ? std::span<const Entry>(kAxia) : std::span<const Entry>(kNetBox);
+}
+
+std::string name_of(int bit, Product product) {
+  const auto table = table_of(product);
+  const auto entry = std::find_if(table.begin(), table.end(), [&](const Entry& e) { return e.bit == bit; });
+  return entry == table.end() ? "bit " + std::to_string(bit) : entry->name;
 }
 
 }  // namespace
 
-std::vector<std::string> names(std::uint32_t status) {
+std::vector<std::string> names(std::uint32_t status, Product product) {
   std::vector<std::string> set;
   for (int bit = 30; bit >= 0; --bit) {
-    const auto candidate = static_cast<StatusBit>(bit);
-    if (has(status, candidate)) set.push_back(name_of(candidate));
+    if ((status >> bit & 1u) != 0) set.push_back(name_of(bit, product));
   }
   // The summary alone says that something is wrong, not what.
   if (status == 1u << 31) set.push_back("error summary");

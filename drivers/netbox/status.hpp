@@ -1,4 +1,4 @@
-// The status word of each record (manual 9620-05-NET FT, Table 17.1). Not for the Ethernet Axia.
+// The status word of each record: Net Box (manual 9620-05-NET FT, Table 17.1) and Ethernet Axia, which differ.
 #pragma once
 
 #include <cstdint>
@@ -6,10 +6,14 @@
 #include <vector>
 
 #include "drivers/netbox/codes.hpp"
+#include "drivers/netbox/product.hpp"
 
 namespace kphi::netbox {
 
 [[nodiscard]] constexpr bool has(std::uint32_t status, StatusBit bit) noexcept {
+  return (status >> static_cast<unsigned>(bit) & 1u) != 0;
+}
+[[nodiscard]] constexpr bool has(std::uint32_t status, AxiaStatusBit bit) noexcept {
   return (status >> static_cast<unsigned>(bit) & 1u) != 0;
 }
 
@@ -17,9 +21,13 @@ namespace kphi::netbox {
 [[nodiscard]] constexpr bool healthy(std::uint32_t status) noexcept { return status == 0 || status == 0x80010000u; }
 
 /// Transducer saturation or A/D error: the sample is worthless, the box is well.
-[[nodiscard]] constexpr bool saturated(std::uint32_t status) noexcept { return has(status, StatusBit::saturation); }
+[[nodiscard]] constexpr bool saturated(std::uint32_t status, Product product = Product::net_box) noexcept {
+  if (product == Product::axia)
+    return has(status, AxiaStatusBit::out_of_range) || has(status, AxiaStatusBit::gage_out_of_range);
+  return has(status, StatusBit::saturation);
+}
 
 /// What is set, most significant bit first, without the error summary; a bit the table does not know is "bit N".
-[[nodiscard]] std::vector<std::string> names(std::uint32_t status);
+[[nodiscard]] std::vector<std::string> names(std::uint32_t status, Product product = Product::net_box);
 
 }  // namespace kphi::netbox

@@ -43,6 +43,7 @@ TEST(Audit, FindsNothingInAGoodBox) {
   intention.largest_torque_nm = 0.2;
   intention.rate_hz = 7000;
   intention.records_per_datagram = 40;
+  intention.receive_buffer_bytes = kWantedReceiveBytes;
   EXPECT_THAT(audit(good_box(), intention), IsEmpty());
 }
 
@@ -106,6 +107,24 @@ INSTANTIATE_TEST_SUITE_P(
                box.rdt_rate_hz = 20;
              },
              Severity::warning, "a datagram takes 2.0 s", "lower the RDT buffer size"},
+        Case{"UnknownFilter",
+             [](Configuration& box, Intention&) {
+               box.kind = Product::axia;
+               box.filter_code = 3;
+             },
+             Severity::warning, "filter 3", "switch the filter off"},
+        Case{
+            "ReceiveBufferTooSmall",
+            [](Configuration& box, Intention& intention) {
+              box.records_per_datagram = 1;
+              intention.receive_buffer_bytes = 212'992;
+            },
+            Severity::warning,
+            "0.20 MiB of receive buffer instead of 8: records are lost when this host stands still for more than 37 ms",
+            "sysctl -w net.core.rmem_max=4194304"},
+        Case{"ReceiveBufferSmallButBuffered",
+             [](Configuration&, Intention& intention) { intention.receive_buffer_bytes = 212'992; }, Severity::note,
+             "more than 526 ms", "sysctl"},
         Case{"ToolTransform", [](Configuration& box, Intention&) { box.tool_transform[2] = 5; }, Severity::note,
              "tool transform is applied", "second time"},
         Case{"GageBias", [](Configuration& box, Intention&) { box.gage_bias[0] = 745; }, Severity::note, "setbias",

@@ -126,8 +126,54 @@ TEST(Configuration, RefusesASlotThatMeasuresNothing) {
   EXPECT_THAT(refusal(with(captured_xml(), "cfgcalsn", "FT0000")), HasSubstr("empty calibration"));
 }
 
-TEST(Configuration, RefusesAnEthernetAxia) {
-  EXPECT_THAT(refusal(with(captured_xml(), "prodname", "Ethernet Axia")), HasSubstr("is an Ethernet Axia"));
+TEST(Configuration, TellsTheProductByItsName) {
+  const std::pair<const char*, Product> known[] = {{"Net F/T", Product::net_box},
+                                                   {"NetFT", Product::net_box},
+                                                   {"Net Box", Product::net_box},
+                                                   {"Ethernet Axia", Product::axia},
+                                                   {"ETHERNET AXIA80-M20", Product::axia}};
+  for (const auto& [name, kind] : known)
+    EXPECT_EQ(parse_configuration(with(captured_xml(), "prodname", name)).kind, kind) << name;
+}
+
+TEST(Configuration, TellsTheProductByItsFirmwareWhereItHasNoName) {
+  EXPECT_EQ(parse_configuration(captured_xml()).kind, Product::net_box);
+  EXPECT_EQ(parse_configuration(with(captured_xml(), "mfgdigver", "1.0.3")).kind, Product::net_box);
+  EXPECT_EQ(parse_configuration(with(captured_xml(), "setrate", "7812")).kind, Product::axia);
+  EXPECT_THAT(refusal(with(captured_xml(), "mfgdigver", "7.1")), HasSubstr("neither a Net Box nor an Ethernet Axia"));
+}
+
+TEST(Configuration, RefusesAProductItDoesNotKnow) {
+  EXPECT_THAT(refusal(with(captured_xml(), "prodname", "Wireless F/T")),
+              HasSubstr("\"Wireless F/T\" with firmware 2.2.59 is neither"));
+}
+
+TEST(Configuration, TheFiveRatesOfAnAxiaAreRoundedDownFrom7812AndAHalf) {
+  const std::string axia = with(with(captured_xml(), "prodname", "Ethernet Axia"), "comrdtrate", "488");
+  const std::pair<const char*, double> rates[] = {
+      {"488", 488.28125}, {"976", 976.5625}, {"1953", 1953.125}, {"3906", 3906.25}, {"7812", 7812.5}};
+  for (const auto& [shown, true_hz] : rates) {
+    const Configuration box = parse_configuration(with(axia, "setrate", shown));
+    EXPECT_EQ(box.device_rate_hz, true_hz);
+    EXPECT_EQ(parse_configuration(with(with(axia, "setrate", shown), "comrdtrate", shown)).divisor, 1u);
+  }
+  EXPECT_EQ(parse_configuration(with(axia, "setrate", "7812")).divisor, 16u);
+  EXPECT_THAT(refusal(with(axia, "setrate", "7000")), HasSubstr("488, 976, 1953, 3906 and 7812"));
+}
+
+TEST(Configuration, DoesNotPretendToKnowAnAxiasFilters) {
+  const std::string axia = with(captured_xml(), "prodname", "Ethernet Axia");
+  EXPECT_EQ(filter_cutoff_hz(parse_configuration(axia)), 0.0);
+  EXPECT_EQ(filter_cutoff_hz(parse_configuration(with(axia, "setuserfilter", "3"))), std::nullopt);
+  EXPECT_EQ(filter_cutoff_hz(parse_configuration(with(captured_xml(), "setuserfilter", "3"))), 152.0);
+}
+
+TEST(Configuration, KnowsThePeaksWhereTheBoxKeepsThem) {
+  const Configuration box = parse_configuration(captured_xml());
+  ASSERT_TRUE(box.peaks.has_value());
+  EXPECT_EQ(box.peaks->high[2], 20557075);
+  EXPECT_EQ(box.peaks->low[5], -729991);
+  EXPECT_FALSE(parse_configuration(with(captured_xml(), "setpke", "0")).peaks.has_value());
 }
 
 TEST(Configuration, RefusesWhenAnElementItNeedsIsMissingOrTwice) {

@@ -10,6 +10,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstring>
+#include <functional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -50,6 +51,7 @@ class FakeWeb {
     std::vector<std::string> pieces;
     std::chrono::milliseconds before_each{0};
     bool keep_open = false;  ///< after the last piece, until the end of this object
+    std::function<std::string(const std::string& request)> answer = nullptr;  ///< instead of the pieces
   };
 
   explicit FakeWeb(Manner manner) : manner_(std::move(manner)), socket_(SOCK_STREAM) {
@@ -88,6 +90,7 @@ class FakeWeb {
       request.append(bytes, static_cast<std::size_t>(count));
     }
     last_request_ = request;
+    if (manner_.answer) manner_.pieces = {manner_.answer(request)};
     for (const std::string& piece : manner_.pieces) {
       pause(manner_.before_each);
       if (send(client, piece.data(), piece.size(), MSG_NOSIGNAL) < 0) return;

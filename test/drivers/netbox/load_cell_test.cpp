@@ -225,6 +225,39 @@ TEST(LoadCell, ASilentStreamOfABoxThatIsGoneIsCalledUnreachable) {
   EXPECT_THAT(kinds_until(cell, 2), testing::ElementsAre(EventKind::silent, EventKind::unreachable));
 }
 
+TEST(LoadCell, GivesUpABoxThatDoesNotComeBack) {
+  std::optional<FakeWeb> web(std::in_place, FakeWeb::page(xml()));
+  FakeBox box({.mute_after_1000 = true});
+  const SteadyClock clock;
+  LoadCell cell({"127.0.0.1", box.port(), web->port()}, clock, Command::buffered,
+                {.first_pause = 20ms, .give_up_after = 200ms});
+  web.reset();
+  cell.start();
+  EXPECT_THAT(kinds_until(cell, 3),
+              testing::ElementsAre(EventKind::silent, EventKind::unreachable, EventKind::given_up));
+  EXPECT_EQ(cell.state(), State::silent);
+  EXPECT_EQ(box.starts(), 1);
+}
+
+TEST(LoadCell, StartsABoxAgainThatHasForgottenItsPeaks) {
+  std::atomic<bool> booted{false};
+  FakeWeb web({{}, {}, false, [&](const std::string&) {
+                 return FakeWeb::page(booted ? with(xml(), "runpkmx", "0;0;0;0;0;0") : xml()).pieces[0];
+               }});
+  FakeBox box({.mute_after_1000 = true});
+  const SteadyClock clock;
+  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
+  cell.start();
+  booted = true;
+  EXPECT_THAT(kinds_until(cell, 3),
+              testing::ElementsAre(EventKind::silent, EventKind::restarted, EventKind::reconnected));
+  EXPECT_EQ(box.starts(), 2);
+  // Silent again, and nothing tells of another boot: this time it is left alone.
+  EXPECT_THAT(kinds_until(cell, 2), testing::ElementsAre(EventKind::silent, EventKind::stolen));
+  EXPECT_EQ(box.starts(), 2);
+  EXPECT_EQ(cell.counters().received, 2000u);
+}
+
 TEST(LoadCell, AClosedRdtPortIsAClearErrorWithinSeconds) {
   FakeWeb web(FakeWeb::page(xml()));
   std::uint16_t closed = 0;
@@ -275,6 +308,17 @@ TEST(LoadCell, TellsHowLongTheProcessMayStandStill) {
   const SteadyClock clock;
   LoadCell cell({"127.0.0.1", 1, web.port()}, clock);
   EXPECT_THAT(cell.receive_buffer_note(), testing::MatchesRegex("[0-9.]+ MiB, tolerates [0-9]+ ms"));
+}
+
+TEST(LoadCell, SaysWhatToDoAboutABufferSmallerThanAskedFor) {
+  FakeWeb web(FakeWeb::page(xml()));
+  const SteadyClock clock;
+  const LoadCell cell({"127.0.0.1", 1, web.port()}, clock);
+  const std::optional<Finding> finding = cell.receive_buffer_finding();
+  EXPECT_EQ(finding.has_value(), cell.receive_buffer_bytes() < std::size_t{8} << 20);
+  if (finding) {
+    EXPECT_THAT(finding->next_move, HasSubstr("net.core.rmem_max"));
+  }
 }
 
 TEST(ReceiveBuffer, HoldsWhatWasMeasured) {

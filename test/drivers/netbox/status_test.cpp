@@ -77,5 +77,29 @@ TEST(Status, EveryBitOfTable17_1HasItsName) {
   for (unsigned bit = 0; bit < 31; ++bit) EXPECT_THAT(names(1u << bit), ElementsAre(table[bit]));
 }
 
+TEST(Status, AnAxiasSaturationIsBit30AndItsGagesBit27) {
+  EXPECT_TRUE(saturated(0xC0000000, Product::axia));
+  EXPECT_TRUE(saturated(0x88000000, Product::axia));
+  EXPECT_FALSE(saturated(0x80020000, Product::axia));
+  EXPECT_FALSE(saturated(0x80010000, Product::axia));
+}
+
+TEST(Status, EveryBitOfTheAxiasMapHasItsName) {
+  const std::pair<int, const char*> map[] = {{0, "temperature error"},
+                                             {1, "supply voltage error"},
+                                             {2, "broken gage"},
+                                             {3, "busy with its memory, filter or calibration"},
+                                             {5, "common error"},
+                                             {7, "calibration not accessible"},
+                                             {16, "monitor condition latched"},
+                                             {27, "gage out of range"},
+                                             {28, "simulated error"},
+                                             {29, "calibration checksum error"},
+                                             {30, "force or torque out of range"}};
+  for (const auto& [bit, name] : map) EXPECT_THAT(names(1u << bit, Product::axia), ElementsAre(name));
+  EXPECT_THAT(names(1u << 17, Product::axia), ElementsAre("bit 17"));
+  EXPECT_THAT(names(1u << 31, Product::axia), ElementsAre("error summary"));
+}
+
 }  // namespace
 }  // namespace kphi::netbox

@@ -17,6 +17,7 @@ struct Manner {
   std::uint32_t first_ft = 0;
   bool start_again_when_silent = true;
   sim::NetBoxHabits habits;
+  Duration lease{0};
 };
 
 /// What the truth says the account must be. Late is what came when the driver had known of its absence for longer than
@@ -37,6 +38,8 @@ class Joined {
   Joined(const Manner& manner, sim::FaultScript script, std::uint64_t seed);
   /// Starts the session at 0; from then on 7000 ticks a second.
   void run_until(Instant end);
+  /// The host stands still, or is dead: nobody reads, nobody asks.
+  void run_box_alone_until(Instant end);
   /// Delivers what waits, so that the account is complete.
   void finish();
   [[nodiscard]] Ideal ideal() const;
@@ -59,6 +62,7 @@ class Joined {
     bool any = false;
     std::uint32_t boot = 0, stream = 0, rdt = 0, ft = 0;
   };
+  Instant sample();
   void pump(Instant now);
   void take_into(Ideal& ideal, Last& last, const Ideal::Delivered& record, const sim::SentDatagram& sent) const;
 

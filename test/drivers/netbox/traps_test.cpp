@@ -1,0 +1,264 @@
+// What other clients of this box got wrong, one test each.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/time.h>
+
+#include "drivers/device_error.hpp"
+#include "drivers/netbox/calinfo.hpp"
+#include "drivers/netbox/http.hpp"
+#include "drivers/netbox/load_cell.hpp"
+#include "drivers/netbox/session.hpp"
+#include "drivers/netbox/settings.hpp"
+#include "drivers/netbox/status.hpp"
+#include "drivers/netbox/udp_socket.hpp"
+#include "test/drivers/netbox/fake_box.hpp"
+#include "test/drivers/netbox/settable_web.hpp"
+
+namespace kphi::netbox {
+namespace {
+
+using namespace std::chrono_literals;
+using test::Bytes;
+using test::captured_xml;
+using test::FakeBox;
+using test::FakeWeb;
+using test::records;
+using test::with;
+using SteadyTime = std::chrono::steady_clock;
+
+std::string xml() { return with(with(captured_xml(), "comrdtrate", "7000"), "comrdtbsiz", "40"); }
+
+template <class Condition>
+bool eventually(Condition condition) {
+  const auto deadline = SteadyTime::now() + 20s;
+  while (!condition()) {
+    if (SteadyTime::now() > deadline) return false;
+    std::this_thread::yield();
+  }
+  return true;
+}
+
+/// A peer of the driver's socket, told where that is by its first datagram.
+class Peer {
+ public:
+  Peer() : socket_(SOCK_DGRAM), driver("127.0.0.1", socket_.port()) {
+    driver.send(encode_request(Command::stop));
+    received_ = recvfrom(socket_.descriptor(), bytes_, sizeof bytes_, 0, reinterpret_cast<sockaddr*>(&from_), &length_);
+  }
+  void send(const Bytes& bytes) {
+    EXPECT_EQ(sendto(socket_.descriptor(), bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&from_), length_),
+              static_cast<ssize_t>(bytes.size()));
+  }
+  [[nodiscard]] ssize_t received() const { return received_; }
+
+ private:
+  test::LoopbackSocket socket_;
+  sockaddr_in from_{};
+  socklen_t length_ = sizeof from_;
+  std::uint8_t bytes_[64]{};
+  ssize_t received_ = 0;
+
+ public:
+  UdpSocket driver;
+};
+
+TEST(Traps, ASampleCountOfOneIsOneAndNot65537) {
+  const std::array<std::uint8_t, 8> one{0x12, 0x34, 0, 2, 0, 0, 0, 1};
+  EXPECT_EQ(encode_request(Command::real_time, 1), one);
+  const std::array<std::uint8_t, 8> all_bytes_differ{0x12, 0x34, 0, 3, 1, 2, 3, 4};
+  EXPECT_EQ(encode_request(Command::buffered, 0x01020304), all_bytes_differ);
+}
+
+TEST(Traps, AZeroByteEndsNeitherARequestNorADatagram) {
+  Peer peer;
+  EXPECT_EQ(peer.received(), 8);
+  peer.send(Bytes(36, 0));
+  std::span<const UdpSocket::Datagram> datagrams;
+  ASSERT_TRUE(eventually([&] { return !(datagrams = peer.driver.receive()).empty(); }));
+  EXPECT_EQ(datagrams[0].bytes.size(), 36u);
+  std::array<Record, kMaxRecords> out;
+  EXPECT_EQ(decode(datagrams[0].bytes, out), 1u);
+}
+
+class TrapsOfTheSequence : public testing::Test {
+ protected:
+  TrapsOfTheSequence() {
+    session.start(0s);
+    session.advance(1s);
+    receive(1, 1s);
+  }
+  void receive(std::uint32_t rdt, Instant at) { session.receive(records(rdt, 1000 + rdt), at, out); }
+  Session session{StreamSettings{}};
+  std::vector<StampedRecord> out;
+};
+
+TEST_F(TrapsOfTheSequence, ALateRecordDoesNotOverwriteTheNewestNumber) {
+  for (const std::uint32_t rdt : {2u, 4u, 3u, 5u}) receive(rdt, 1s);
+  EXPECT_EQ(session.counters().lost_network, 0u);
+  EXPECT_EQ(out.size(), 5u);
+}
+
+TEST_F(TrapsOfTheSequence, NumbersAreNotComparedUnsigned) {
+  receive(2, 1s);
+  receive(4, 1s);
+  session.release(2s, out);  // 3 is given up
+  receive(3, 2s);
+  receive(5, 2s);
+  EXPECT_EQ(session.counters().lost_network, 1u) << "and not 4294967295";
+  EXPECT_EQ(session.counters().late, 1u);
+}
+
+TEST(Traps, TheBoxDoesNotStreamToADeadPortAfterTheEnd) {
+  FakeWeb web(FakeWeb::page(xml()));
+  FakeBox box({});
+  const SteadyClock clock;
+  {
+    LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
+    cell.start();
+    ASSERT_TRUE(cell.wait(20s));
+  }
+  EXPECT_TRUE(eventually([&] { return !box.streaming(); }));
+}
+
+TEST_F(TrapsOfTheSequence, NoFilterTouchesTheCounts) {
+  Bytes bytes;
+  for (std::uint32_t i = 0; i < 40; ++i) test::put_record(bytes, 2 + i, 1002 + i, 0, i % 2 == 0 ? 1'000'000 : -7);
+  session.receive(bytes, 1s, out);
+  ASSERT_EQ(out.size(), 41u);
+  for (std::size_t i = 0; i < 40; ++i) EXPECT_EQ(out[i + 1].record.counts[2], i % 2 == 0 ? 1'000'000 : -7);
+}
+
+TEST(Traps, ASettingIsWrittenByItsNameAndWithAnEqualsSign) {
+  test::SettableWeb web;
+  const auto journal = std::filesystem::temp_directory_path() / ("kphi_traps_" + std::to_string(getpid()));
+  const SettingsKeeper keeper(web.place(), {.rate_hz = 1000, .records_per_datagram = 10}, journal);
+  EXPECT_THAT(web.writes(), testing::ElementsAre("/comm.cgi?comrdtrate=1000&comrdtbsiz=10"));
+}
+
+TEST(Traps, ABacklogIsTakenAtOnceAndNotOneDatagramPerCycle) {
+  Peer peer;
+  for (std::uint32_t i = 0; i < 60; ++i) peer.send(records(1 + i, 1 + i));
+  std::size_t taken = 0, calls = 0;
+  ASSERT_TRUE(eventually([&] {
+    const std::size_t count = peer.driver.receive().size();
+    if (count > 0) ++calls;
+    return (taken += count) == 60;
+  }));
+  EXPECT_LE(calls, 3u);
+}
+
+TEST(Traps, ATimeoutOfAQuarterSecondIsAQuarterSecond) {
+  FakeWeb web({{"HTTP/1.0 200 OK\r\n"}, 60s});
+  const auto begun = SteadyTime::now();
+  EXPECT_THROW((void)http_get("127.0.0.1", web.port(), "/", 250ms), DeviceError);
+  const auto http = SteadyTime::now() - begun;
+  EXPECT_GE(http, 249ms);
+  EXPECT_LT(http, 10s);
+  FakeWeb page(FakeWeb::page(xml()));
+  const SteadyClock clock;
+  LoadCell cell({"127.0.0.1", 1, page.port()}, clock);
+  const auto waiting = SteadyTime::now();
+  EXPECT_FALSE(cell.wait(250ms));
+  EXPECT_GE(SteadyTime::now() - waiting, 249ms);
+}
+
+TEST(Traps, NoOldRecordIsGivenAgainWhenNothingComes) {
+  FakeWeb web(FakeWeb::page(xml()));
+  FakeBox box({.mute_after_1000 = true});
+  const SteadyClock clock;
+  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
+  cell.start();
+  std::vector<StampedRecord> out(4096);
+  std::size_t taken = 0;
+  ASSERT_TRUE(eventually([&] {
+    taken += cell.take(out);
+    return cell.state() == State::silent;
+  }));
+  taken += cell.take(out);
+  EXPECT_EQ(taken, 1000u);
+  EXPECT_EQ(cell.take(out), 0u);
+  EXPECT_FALSE(cell.wait(0ns));
+  EXPECT_GT(clock.now() - cell.newest_arrival(), 500ms) << "its age tells that it is stale";
+}
+
+TEST_F(TrapsOfTheSequence, ALatchedMonitorConditionIsHealthyAndAnErrorIsNoException) {
+  Bytes bytes;
+  test::put_record(bytes, 2, 1002, 0x80010000);
+  test::put_record(bytes, 3, 1003, 0xC0000000);
+  session.receive(bytes, 1s, out);
+  ASSERT_EQ(out.size(), 3u);
+  EXPECT_TRUE(healthy(out[1].record.status));
+  EXPECT_FALSE(healthy(out[2].record.status));
+}
+
+TEST(Traps, ALostDatagramNeverHangsTheClient) {
+  FakeWeb web(FakeWeb::page(xml()));
+  FakeBox box({.starts_ignored = 1000});
+  const SteadyClock clock;
+  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
+  EXPECT_THROW(cell.start(), DeviceError);
+  EXPECT_FALSE(cell.wait(1ms));
+}
+
+TEST(Traps, OneReadIsNotOneMessage) {
+  std::vector<std::string> byte_by_byte;
+  for (const char byte : xml()) byte_by_byte.push_back(std::string(1, byte));
+  byte_by_byte.insert(byte_by_byte.begin(), "HTTP/1.0 200 OK\r\n\r\n");
+  FakeWeb web({byte_by_byte});
+  EXPECT_EQ(http_get("127.0.0.1", web.port(), "/netftapi2.xml", 20s), xml());
+  // Of the 16-bit interface: Calinfo.ReadsAnAnswerInPieces. What is cut short is no message:
+  const Bytes cut(18, 0x12);
+  EXPECT_EQ(decode_calinfo(cut), std::nullopt);
+}
+
+TEST(Traps, ARecordIsStampedWhenItArrivesAndNotWhenItIsRead) {
+  Peer peer;
+  peer.send(records(1, 1));
+  timespec sent{};
+  clock_gettime(CLOCK_REALTIME, &sent);
+  const auto read_at = SteadyTime::now() + 50ms;
+  ASSERT_TRUE(eventually([&] { return SteadyTime::now() > read_at; }));
+  const auto datagrams = peer.driver.receive();
+  ASSERT_EQ(datagrams.size(), 1u);
+  const double late_s = static_cast<double>(datagrams[0].stamp.tv_sec - sent.tv_sec) +
+                        1e-9 * static_cast<double>(datagrams[0].stamp.tv_nsec - sent.tv_nsec);
+  EXPECT_LT(late_s, 0.04);
+}
+
+TEST(Traps, ASignalExtendsNoTimeout) {
+  FakeWeb web(FakeWeb::page(xml()));
+  const SteadyClock clock;
+  LoadCell cell({"127.0.0.1", 1, web.port()}, clock);
+  struct sigaction action {
+  }, before{};
+  action.sa_handler = [](int) {};
+  sigaction(SIGALRM, &action, &before);
+  const itimerval every_5_ms{{0, 5000}, {0, 5000}}, never{};
+  setitimer(ITIMER_REAL, &every_5_ms, nullptr);
+  const auto begun = SteadyTime::now();
+  EXPECT_FALSE(cell.wait(200ms));
+  const auto took = SteadyTime::now() - begun;
+  setitimer(ITIMER_REAL, &never, nullptr);
+  sigaction(SIGALRM, &before, nullptr);
+  EXPECT_GE(took, 199ms);
+  EXPECT_LT(took, 5s);
+}
+
+TEST_F(TrapsOfTheSequence, AStandingMeasurementIsNotDeliveredAsNew) {
+  for (std::uint32_t rdt = 2; rdt < 12; ++rdt) session.receive(records(rdt, 1001), 1s, out);
+  EXPECT_EQ(out.size(), 1u);
+  EXPECT_EQ(session.counters().stalled, 10u);
+}
+
+TEST(Traps, NothingIsWrittenAndNoStreamIsTakenAtStartUp) {
+  test::SettableWeb web;
+  FakeBox box({});
+  const SteadyClock clock;
+  const LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
+  EXPECT_THAT(web.writes(), testing::IsEmpty());
+  EXPECT_EQ(box.starts() + box.stops() + box.biases() + box.settings_written(), 0);
+}
+
+}  // namespace
+}  // namespace kphi::netbox

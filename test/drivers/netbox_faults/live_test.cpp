@@ -1,0 +1,215 @@
+// The load cell against the simulator's server, both on their true transports: what a virtual wire cannot show, because
+// HTTP has a part in it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <thread>
+
+#include "drivers/netbox/http.hpp"
+#include "drivers/netbox/load_cell.hpp"
+#include "drivers/netbox/probe.hpp"
+#include "drivers/netbox/settings.hpp"
+#include "drivers/sim/server.hpp"
+
+namespace kphi::netbox::test {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr auto kPatience = 30s;
+
+sim::Fault fault(const sim::FaultEntry& entry) { return sim::fault_of(entry); }
+
+class Live : public testing::Test {
+ protected:
+  ~Live() override { stop(); }
+
+  void start(sim::FaultScript faults, const sim::NetBoxSettings& box = {}) {
+    sim::ServerSettings settings;
+    settings.bench.netbox = box;
+    settings.bench.faults = std::move(faults);
+    settings.control =
+        (std::filesystem::temp_directory_path() / ("kphi_live_" + std::to_string(getpid()) + ".control")).string();
+    server.emplace(settings);
+    thread = std::thread([this] { server->run(); });
+  }
+  void stop() {
+    if (!thread.joinable()) return;
+    server->request_stop();
+    thread.join();
+  }
+  [[nodiscard]] Place place() const {
+    const sim::Addresses& at = server->addresses();
+    return {at.host, at.rdt_port, at.http_port};
+  }
+  /// Takes records and events until `enough` or the patience is over.
+  template <class Enough>
+  bool follow(LoadCell& cell, Enough enough) {
+    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    std::vector<StampedRecord> batch(4096);
+    while (std::chrono::steady_clock::now() < deadline) {
+      (void)cell.wait(20ms);
+      taken += cell.take(batch);
+      for (const Event& event : cell.take_events()) events.push_back(event);
+      if (enough()) return true;
+    }
+    return false;
+  }
+  [[nodiscard]] bool seen(EventKind kind) const {
+    return std::any_of(events.begin(), events.end(), [&](const Event& event) { return event.kind == kind; });
+  }
+  [[nodiscard]] std::vector<EventKind> kinds() const {
+    std::vector<EventKind> kinds;
+    for (const Event& event : events) kinds.push_back(event.kind);
+    return kinds;
+  }
+  static void expect_closed(const Counters& c) { EXPECT_EQ(c.expected, c.received + c.lost_network + c.lost_host); }
+
+  const SteadyClock clock;
+  std::optional<sim::Server> server;
+  std::thread thread;
+  std::uint64_t taken = 0;
+  std::vector<Event> events;
+};
+
+TEST_F(Live, ABoxThatBootsAndDoesNotStreamIsStartedAgainAndItsConfigurationReadAgain) {
+  start({fault({{"kind", "reboot"}, {"at_s", "1.5"}, {"down_s", "1.2"}}),
+         fault({{"kind", "http_refused"}, {"at_s", "1.5"}, {"for_s", "1.2"}})});
+  LoadCell cell(place(), clock);
+  cell.start();
+  ASSERT_TRUE(follow(cell, [&] { return seen(EventKind::reconnected) && cell.state() == State::streaming; }))
+      << testing::PrintToString(kinds());
+  EXPECT_THAT(kinds(), testing::ElementsAre(EventKind::silent, EventKind::unreachable, EventKind::rebooted,
+                                            EventKind::reconnected));
+  const std::uint64_t before = taken;
+  EXPECT_TRUE(follow(cell, [&] { return taken > before + 700; }));
+  cell.stop();
+  EXPECT_EQ(cell.counters().reboots, 1u);
+  EXPECT_EQ(cell.counters().reconnects, 1u);
+  expect_closed(cell.counters());
+}
+
+TEST_F(Live, AStolenStreamIsReportedAndNotFoughtFor) {
+  start({fault({{"kind", "stolen"}, {"at_s", "1"}})});
+  LoadCell cell(place(), clock);
+  cell.start();
+  ASSERT_TRUE(follow(cell, [&] { return seen(EventKind::stolen); }));
+  // Longer than all that a reconnection would wait for at first.
+  const auto until = std::chrono::steady_clock::now() + 1s;
+  EXPECT_TRUE(follow(cell, [&] { return std::chrono::steady_clock::now() > until; }));
+  EXPECT_EQ(cell.state(), State::silent);
+  EXPECT_THAT(kinds(), testing::ElementsAre(EventKind::silent, EventKind::stolen));
+  stop();
+  EXPECT_EQ(server->truth().starts, 1u);
+}
+
+TEST_F(Live, UnitsThatChangeWithABootAreNamedAlthoughTheStreamGoesOn) {
+  start({fault({{"kind", "units"}, {"at_s", "1"}, {"force_unit", "1"}, {"torque_unit", "3"}}),
+         fault({{"kind", "reboot"}, {"at_s", "1"}, {"down_s", "0.1"}, {"resume", "1"}})});
+  LoadCell cell(place(), clock);
+  cell.start();
+  ASSERT_TRUE(follow(cell, [&] { return seen(EventKind::configuration_changed); })) << testing::PrintToString(kinds());
+  EXPECT_TRUE(seen(EventKind::rebooted));
+  const Event& changed = events.back();
+  EXPECT_TRUE(has(changed.changes, Change::units));
+  EXPECT_THAT(to_string(changed), HasSubstr("configured otherwise than before: units, counts per unit"));
+  EXPECT_EQ(cell.configuration().force_unit, "N");
+  EXPECT_EQ(cell.latest_configuration().force_unit, "lbf");
+  EXPECT_EQ(cell.state(), State::streaming);
+}
+
+TEST_F(Live, AnotherRateAfterABootIsStreamedByItsOwnCount) {
+  sim::NetBoxSettings box;
+  box.habits.rate_write = sim::NetBoxHabits::RateWrite::continues;
+  start({fault({{"kind", "reboot"}, {"at_s", "2"}, {"down_s", "1"}}),
+         fault({{"kind", "http_refused"}, {"at_s", "2"}, {"for_s", "1.2"}})},
+        box);
+  LoadCell cell(place(), clock);
+  cell.start();
+  ASSERT_TRUE(follow(cell, [&] { return taken > 350; }));
+  http_write(place().host, place().http_port, "/comm.cgi?comrdtrate=1000", 2s);
+  ASSERT_TRUE(follow(cell, [&] { return seen(EventKind::reconnected); })) << testing::PrintToString(kinds());
+  EXPECT_TRUE(seen(EventKind::configuration_changed));
+  const Counters before = cell.counters();
+  EXPECT_GT(before.irregular, 0u) << "rdt and ft disagree while the rate is not what was read";
+  ASSERT_TRUE(follow(cell, [&] { return cell.counters().received > before.received + 200; }));
+  cell.stop();
+  EXPECT_EQ(cell.counters().irregular, before.irregular);
+  EXPECT_EQ(cell.counters().lost_network, before.lost_network);
+  EXPECT_EQ(cell.latest_configuration().divisor, 7u);
+  expect_closed(cell.counters());
+}
+
+TEST_F(Live, ALeaseIsRenewedOverTheWire) {
+  start({});
+  LoadCell cell(place(), clock, Command::buffered, {.lease = 2s});
+  cell.start();
+  ASSERT_TRUE(follow(cell, [&] { return cell.counters().renewals >= 3; }));
+  cell.stop();
+  expect_closed(cell.counters());
+  EXPECT_EQ(cell.counters().restarts, 0u);
+  EXPECT_EQ(cell.counters().lost_network, cell.counters().lost_at_renewals);
+  EXPECT_EQ(seen(EventKind::restarted), false);
+  std::printf("%d renewals, %d records lost at them\n", static_cast<int>(cell.counters().renewals),
+              static_cast<int>(cell.counters().lost_at_renewals));
+}
+
+TEST_F(Live, AnAxiaStreamsInBothModes) {
+  sim::NetBoxSettings axia;
+  axia.habits.axia = true;
+  start({}, axia);
+  for (const Command mode : {Command::buffered, Command::real_time}) {
+    LoadCell cell(place(), clock, mode);
+    EXPECT_EQ(cell.configuration().kind, Product::axia);
+    cell.start();
+    ASSERT_TRUE(follow(cell, [&] { return cell.counters().received >= 2000; }));
+    cell.stop();
+    const Counters c = cell.counters();
+    const double records = mode == Command::buffered ? 40 : 1;
+    EXPECT_NEAR(static_cast<double>(c.received) / static_cast<double>(c.datagrams), records, 0.2 * records);
+    expect_closed(c);
+  }
+}
+
+TEST_F(Live, TheProbeNamesAnAxiasFaultByItsOwnMap) {
+  sim::NetBoxSettings axia;
+  axia.habits.axia = true;
+  start({fault({{"kind", "status"}, {"at_s", "0"}, {"for_s", "60"}, {"bits", "0xC0000000"}})}, axia);
+  ProbeSettings settings;
+  settings.tcp_port = server->addresses().tcp_port;
+  settings.stream = 300ms;
+  const Probe found = probe(place(), clock, settings);
+  std::string all;
+  for (const std::string& line : found.lines()) all += line + "\n";
+  EXPECT_THAT(all, HasSubstr("the box reports: force or torque out of range"));
+  EXPECT_THAT(all, Not(HasSubstr("CPU or RAM")));
+}
+
+TEST_F(Live, SettingsAreWrittenAndSetBackOnABoxThatServesThreeWritesASecond) {
+  sim::NetBoxSettings box;
+  box.habits.only_three_writes = true;
+  start({}, box);
+  const std::filesystem::path journal =
+      std::filesystem::temp_directory_path() / ("kphi_live_" + std::to_string(getpid()) + ".journal");
+  for (int round = 0; round < 3; ++round) {
+    SettingsKeeper keeper(place(), {.rate_hz = 150, .records_per_datagram = 4, .filter = 5}, journal);
+    EXPECT_EQ(keeper.after().divisor, 46u);
+    EXPECT_EQ(keeper.after().records_per_datagram, 4);
+    EXPECT_EQ(keeper.after().filter_code, 5);
+    keeper.restore();
+  }
+  const LoadCell cell(place(), clock);
+  EXPECT_EQ(cell.configuration().divisor, 1u);
+  EXPECT_EQ(cell.configuration().records_per_datagram, 40);
+  EXPECT_EQ(cell.configuration().filter_code, 0);
+  EXPECT_FALSE(std::filesystem::exists(journal));
+}
+
+}  // namespace
+}  // namespace kphi::netbox::test
