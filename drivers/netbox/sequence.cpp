@@ -71,6 +71,7 @@ bool SequenceAccount::accept_reboot(const Record& record, Instant arrival) noexc
   leave_line();
   gap_count_ = 0;
   stall_run_ = 0;
+  forget_host_drops();
   accept_first(first.record, first.arrival);
   confirmed_ = first;
   return accept(record, arrival);
@@ -91,7 +92,6 @@ void SequenceAccount::note_event(EventKind kind, const Record& record, Instant a
 
 bool SequenceAccount::accept_first(const Record& record, Instant arrival) noexcept {
   has_last_ = true;
-  host_credit_ = 0;
   remember(record, arrival);
   ++counters_.received;
   ++counters_.expected;

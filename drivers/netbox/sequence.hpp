@@ -62,6 +62,8 @@ class SequenceAccount {
     ++counters_.received;
     ++counters_.expected;
   }
+  /// The first record of a stream has come, though it may wait: what was dropped before it explains no gap.
+  void forget_host_drops() noexcept { host_credit_ = 0; }
   /// The first record of a rebooted box, once accept() has taken the second: it is to be delivered before that one.
   [[nodiscard]] std::optional<StampedRecord> take_confirmed() noexcept;
   /// Only a box that has booted anew can have sent it, as far as one record can tell.

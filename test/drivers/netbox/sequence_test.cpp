@@ -74,15 +74,6 @@ TEST(Sequence, AGapIsTheHostsAsFarAsTheSocketExplainsIt) {
   stream.expect_closed();
 }
 
-TEST(Sequence, DropsBeforeTheFirstRecordExplainNothing) {
-  Stream stream;
-  stream.account().add_host_drops(100, 1);
-  stream.accept(50, 100);
-  stream.accept(52, 102);
-  EXPECT_EQ(stream.counters().lost_host, 0u);
-  EXPECT_EQ(stream.counters().lost_network, 1u);
-}
-
 TEST(Sequence, ADuplicateIsDiscarded) {
   Stream stream;
   stream.accept(1, 100);

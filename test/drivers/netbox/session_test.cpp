@@ -205,6 +205,7 @@ TEST_F(SessionTest, CallsAStreamSilentAfterItsTimeoutAndTakesItUpAgain) {
   EXPECT_THAT(told(), IsEmpty()) << "another client may have the box: it is not fought over";
   receive(records(41 + 4000, 1040 + 4000, 40));
   EXPECT_EQ(session.state(), State::streaming);
+  session.flush(out);
   EXPECT_EQ(session.counters().lost_network, 4000u);
 }
 
@@ -214,6 +215,7 @@ TEST_F(SessionTest, CountsWhatIsMissingAcrossItsOwnRestartFromSilence) {
   session.start(now);
   advance_to_deadline();
   receive(records(1, 1040 + 5000, 40));
+  session.flush(out);
   EXPECT_EQ(session.counters().restarts, 1u);
   EXPECT_EQ(session.counters().lost_network, 5000u);
   EXPECT_EQ(session.counters().expected, 5080u);
@@ -341,6 +343,7 @@ TEST_F(SessionTest, ABiasOnABoxThatStopsIsFollowedByAStart) {
   advance_to_deadline();
   EXPECT_THAT(told(), IsEmpty());
   EXPECT_EQ(session.state(), State::streaming);
+  session.flush(out);
   EXPECT_EQ(session.counters().lost_network, 1500u) << "what the box measured meanwhile is accounted for";
   EXPECT_EQ(session.counters().restarts, 1u);
 }
@@ -389,6 +392,7 @@ TEST_F(SessionTest, ChargesTheHostWithWholeDatagrams) {
   start_streaming();
   session.note_host_drops(3);
   receive(records(41 + 160, 1040 + 160, 40));  // four datagrams missing, three of them dropped here
+  session.flush(out);
   EXPECT_EQ(session.counters().lost_host, 120u);
   EXPECT_EQ(session.counters().lost_network, 40u);
   session.note_host_drops(3);

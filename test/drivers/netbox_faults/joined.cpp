@@ -83,11 +83,17 @@ Ideal Joined::ideal() const {
   struct Seen {
     std::uint64_t times = 0;
     Instant first{0};
+    bool late = false;
   };
   std::map<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>, Seen> seen;
   for (const Arrival& arrival : arrivals_) {
     Seen& s = seen[{arrival.boot, arrival.stream, arrival.first_rdt}];
     if (s.times++ == 0) s.first = arrival.at;
+  }
+  Instant younger = kNever;
+  for (auto s = seen.rbegin(); s != seen.rend(); ++s) {
+    s->second.late = younger != kNever && s->second.first >= younger + session_.settings().reorder_patience;
+    younger = std::min(younger, s->second.first);
   }
   const auto stride = static_cast<std::uint32_t>(manner_.divisor);
   Ideal ideal;
@@ -97,6 +103,10 @@ Ideal Joined::ideal() const {
     const auto found = seen.find({sent.boot, sent.stream, sent.first_rdt});
     if (found == seen.end()) continue;
     const Seen& s = found->second;
+    if (s.late) {
+      ideal.late += s.times * sent.records;
+      continue;
+    }
     const bool anew =
         last == nullptr || sent.boot != last->boot || static_cast<std::int32_t>(sent.first_ft - last->last_ft) < 0;
     const bool repeats = !anew && sent.first_ft == last->last_ft;
@@ -127,7 +137,7 @@ std::string Joined::disagreement() const {
   compare("lost", account.lost_network, truth.lost);
   compare("lost in host", account.lost_host, 0);
   compare("duplicates", account.duplicates, truth.duplicates);
-  compare("late", account.late, 0);
+  compare("late", account.late, truth.late);
   compare("stalled", account.stalled, truth.stalled);
   compare("restarts", account.restarts, truth.restarts);
   compare("reboots", account.reboots, truth.reboots);

@@ -19,14 +19,15 @@ struct Manner {
   sim::NetBoxHabits habits;
 };
 
-/// What the truth says the account must be.
+/// What the truth says the account must be. Late is what came when the driver had known of its absence for longer than
+/// it promises to wait.
 struct Ideal {
   struct Delivered {
     std::uint32_t rdt = 0, ft = 0;
     Instant arrival{0};
     friend bool operator==(const Delivered&, const Delivered&) = default;
   };
-  std::uint64_t received = 0, lost = 0, duplicates = 0, stalled = 0, restarts = 0, reboots = 0, malformed = 0;
+  std::uint64_t received = 0, lost = 0, duplicates = 0, late = 0, stalled = 0, restarts = 0, reboots = 0, malformed = 0;
   std::vector<Delivered> delivered;  ///< in this order
 };
 
