@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "drivers/device_error.hpp"
 
@@ -26,10 +28,11 @@ struct UdpSocket::Slots {
       headers[i].msg_hdr.msg_iovlen = 1;
       headers[i].msg_hdr.msg_control = controls[i].data();
     }
+    rearm(kBatch);
   }
-  /// The kernel overwrites the lengths.
-  void rearm() noexcept {
-    for (std::size_t i = 0; i < kBatch; ++i) headers[i].msg_hdr.msg_controllen = controls[i].size();
+  /// The kernel overwrites the lengths of what it fills.
+  void rearm(std::size_t used) noexcept {
+    for (std::size_t i = 0; i < used; ++i) headers[i].msg_hdr.msg_controllen = controls[i].size();
   }
 
   using Control = std::array<char, CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t))>;
@@ -66,13 +69,14 @@ void UdpSocket::ask_for_buffer() {
 }
 
 std::span<const UdpSocket::Datagram> UdpSocket::receive() noexcept {
+  slots_->rearm(std::exchange(used_, 0));
   int count = 0;
   do {
-    slots_->rearm();
     count = recvmmsg(native_handle(), slots_->headers.data(), kBatch, MSG_DONTWAIT, nullptr);
   } while (count < 0 && retry(errno));
-  for (int i = 0; i < count; ++i) read_control(static_cast<std::size_t>(i));
-  return {datagrams_.data(), static_cast<std::size_t>(count < 0 ? 0 : count)};
+  used_ = static_cast<std::size_t>(std::max(count, 0));
+  for (std::size_t i = 0; i < used_; ++i) read_control(i);
+  return {datagrams_.data(), used_};
 }
 
 bool UdpSocket::send(std::span<const std::uint8_t> bytes) noexcept {

@@ -56,6 +56,7 @@ class UdpSocket {
   std::uint64_t dropped_ = 0;
   std::uint32_t dropped_reported_ = 0;
   std::unique_ptr<Slots> slots_;
+  std::size_t used_ = 0;  // of the slots, by the last receive()
   std::array<Datagram, kBatch> datagrams_{};
 };
 

@@ -84,7 +84,6 @@ TEST(ClockEstimate, StaysWithinFiveMicrosecondsOnALoadedHost) {
     EXPECT_NEAR(estimate.skew_ppm(), 60, 2) << seed;
     EXPECT_TRUE(estimate.believable());
     EXPECT_LT(to_seconds(estimate.uncertainty()), 10e-6) << seed;
-    EXPECT_GT(to_seconds(estimate.residual_p99()), 1e-3) << "the delays are no error of the clock, but are seen";
   }
 }
 

@@ -44,7 +44,7 @@ Fault random_fault(Dice& dice, const Manner& manner) {
   // Within the time and the number of records for which a driver waits for overtaken ones.
   const double period = manner.records_per_datagram * manner.divisor / 7000.0;
   Fault fault;
-  fault.at = from_seconds(dice.real(0.6, 3));
+  fault.at = from_seconds(dice.real(0, 3));
   fault.lasts = from_seconds(dice.real(0.05, 1));
   fault.p = dice.real(0.005, 0.2);
   switch (dice.whole(0, 8)) {
