@@ -18,8 +18,8 @@ using namespace std::chrono_literals;
 
 constexpr std::chrono::nanoseconds kHttpTimeout = 5s;
 constexpr std::chrono::nanoseconds kNap = 1500us;
-// A box sends 7000 datagrams per second at most: where they come faster it is a simulated one in haste.
-constexpr std::chrono::nanoseconds kHaste = 100us;
+// A box sends 7000 records per second at most: where more come it is a simulated one in haste.
+constexpr double kHasteHz = 20'000;
 constexpr std::chrono::nanoseconds kHealthPeriod = 20ms;
 constexpr std::chrono::nanoseconds kLongestLinger = 100ms;
 constexpr int kBatchesPerDrain = 64;
@@ -45,9 +45,13 @@ StreamSettings stream_settings(const Configuration& configuration, const Clock& 
   return settings;
 }
 
+double wall_rate_hz(const Configuration& configuration, const Clock& clock) {
+  return configuration.rdt_rate_hz * to_seconds(clock.stretched(1s));
+}
+
 std::size_t queue_capacity(const Configuration& configuration, const Clock& clock) {
-  const double wall_rate_hz = configuration.rdt_rate_hz * to_seconds(clock.stretched(1s));
-  return static_cast<std::size_t>(std::clamp(std::ceil(kQueueSeconds * wall_rate_hz), 1024.0, kQueueLimit));
+  const double records = std::ceil(kQueueSeconds * wall_rate_hz(configuration, clock));
+  return static_cast<std::size_t>(std::clamp(records, 1024.0, kQueueLimit));
 }
 
 Duration between(const timespec& from, const timespec& to) noexcept {
@@ -71,7 +75,7 @@ LoadCell::LoadCell(const Place& place, const Clock& clock, Command mode)
       ring_(queue_capacity(configuration_, clock)),
       inquiry_(place.host, place.http_port, clock, inquiry_events_),
       session_(stream_settings(configuration_, clock, mode)),
-      always_naps_(clock.shrunk(session_.settings().datagram_period()) < kHaste),
+      always_naps_(wall_rate_hz(configuration_, clock) > kHasteHz),
       meter_(configuration_.device_rate_hz) {
   accepted_.reserve(UdpSocket::kBatch * kMaxRecords);
 }
@@ -135,10 +139,7 @@ std::vector<Event> LoadCell::take_events() {
 std::string LoadCell::receive_buffer_note() const {
   const StreamSettings& settings = session_.settings();
   const std::size_t payload = kRecordBytes * (settings.buffered ? settings.records_per_datagram : 1);
-  const double held = static_cast<double>(datagrams_held(socket_.receive_buffer_bytes(), payload));
-  const double tolerated_ms = 1e3 * held * to_seconds(clock_.shrunk(settings.datagram_period()));
-  return fmt::format("{:.1f} MiB, tolerates {:.0f} ms", static_cast<double>(socket_.receive_buffer_bytes()) / (1 << 20),
-                     tolerated_ms);
+  return tolerated_stall(socket_.receive_buffer_bytes(), payload, clock_.shrunk(settings.datagram_period()));
 }
 
 void LoadCell::run() noexcept {

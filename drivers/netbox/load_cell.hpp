@@ -30,7 +30,7 @@ struct Place {
 };
 
 /// One receive thread while it streams. While somebody is in wait() it hands each datagram over at once; otherwise, and
-/// whenever the datagrams come faster than any box sends them, it lets them gather for 1.5 ms: a consumer that only
+/// whenever the records come faster than any box sends them, it lets them gather for 1.5 ms: a consumer that only
 /// takes now and then costs a third of the wake-ups. The records' own times are the kernel's and do not suffer.
 /// start, stop and the destructor belong to one thread, take and wait to one
 /// (other or same); the rest may be called from any. Counters and queue outlive a stop and the next start.

@@ -15,8 +15,6 @@ namespace {
 
 using boost::asio::ip::udp;
 
-constexpr int kWantedBuffer = 4 << 20;
-
 }  // namespace
 
 /// What recvmmsg fills.
@@ -42,7 +40,8 @@ struct UdpSocket::Slots {
   std::array<mmsghdr, kBatch> headers{};
 };
 
-UdpSocket::UdpSocket(const std::string& host, std::uint16_t port) : socket_(io_), slots_(std::make_unique<Slots>()) {
+UdpSocket::UdpSocket(const std::string& host, std::uint16_t port, std::size_t buffer_bytes)
+    : socket_(io_), slots_(std::make_unique<Slots>()) {
   const std::string device = fmt::format("Net Box {}:{}", host, port);
   boost::system::error_code error;
   // The box speaks IPv4 only.
@@ -51,7 +50,7 @@ UdpSocket::UdpSocket(const std::string& host, std::uint16_t port) : socket_(io_)
   socket_.open(udp::v4(), error);
   if (!error) socket_.connect(*endpoints.begin(), error);
   if (error) throw DeviceError(device, "open a UDP socket", error.message(), "check this host's network settings");
-  ask_for_buffer();
+  ask_for_buffer(buffer_bytes);
   const int on = 1;
   setsockopt(native_handle(), SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
   setsockopt(native_handle(), SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
@@ -59,9 +58,10 @@ UdpSocket::UdpSocket(const std::string& host, std::uint16_t port) : socket_(io_)
 
 UdpSocket::~UdpSocket() = default;
 
-void UdpSocket::ask_for_buffer() {
-  if (setsockopt(native_handle(), SOL_SOCKET, SO_RCVBUFFORCE, &kWantedBuffer, sizeof kWantedBuffer) != 0)
-    setsockopt(native_handle(), SOL_SOCKET, SO_RCVBUF, &kWantedBuffer, sizeof kWantedBuffer);
+void UdpSocket::ask_for_buffer(std::size_t bytes) {
+  const int wanted = static_cast<int>(bytes);
+  if (setsockopt(native_handle(), SOL_SOCKET, SO_RCVBUFFORCE, &wanted, sizeof wanted) != 0)
+    setsockopt(native_handle(), SOL_SOCKET, SO_RCVBUF, &wanted, sizeof wanted);
   int granted = 0;
   socklen_t length = sizeof granted;
   getsockopt(native_handle(), SOL_SOCKET, SO_RCVBUF, &granted, &length);
@@ -121,6 +121,18 @@ std::size_t datagrams_held(std::size_t receive_buffer_bytes, std::size_t payload
   // Measured on Linux 5 and 6 for 36 and 1440 bytes; in between the allocator's next size.
   const std::size_t charged = payload_bytes <= 100 ? 832 : payload_bytes <= 600 ? 1344 : 2315;
   return receive_buffer_bytes / charged;
+}
+
+std::string tolerated_stall(std::size_t receive_buffer_bytes, std::size_t payload_bytes,
+                            std::chrono::nanoseconds period) {
+  const double held = static_cast<double>(datagrams_held(receive_buffer_bytes, payload_bytes));
+  std::string note =
+      fmt::format("{:.1f} MiB, tolerates {:.0f} ms", static_cast<double>(receive_buffer_bytes) / (1 << 20),
+                  held * 1e-6 * static_cast<double>(period.count()));
+  // The kernel doubles what is asked for.
+  if (receive_buffer_bytes < 2 * UdpSocket::kWantedBuffer)
+    note += fmt::format("; for longer set net.core.rmem_max to {}", UdpSocket::kWantedBuffer);
+  return note;
 }
 
 }  // namespace kphi::netbox
