@@ -75,6 +75,7 @@ LoadCell::LoadCell(const Place& place, const Clock& clock, Command mode)
       ring_(queue_capacity(configuration_, clock)),
       inquiry_(place.host, place.http_port, clock, inquiry_events_),
       session_(stream_settings(configuration_, clock, mode)),
+      gathers_(clock.shrunk(session_.settings().datagram_period()) < kNap),
       always_naps_(wall_rate_hz(configuration_, clock) > kHasteHz),
       meter_(configuration_.device_rate_hz) {
   accepted_.reserve(UdpSocket::kBatch * kMaxRecords);
@@ -190,7 +191,7 @@ void LoadCell::wait_for_datagrams() noexcept {
   poll_for(both, due == kNever ? 1h : clock_.shrunk(due - clock_.now()));
   if (both[0].revents != 0) {
     order_wakeup_.clear();
-  } else if (session_.state() == State::streaming) {
+  } else if (gathers_ && session_.state() == State::streaming) {
     nap();
   }
 }

@@ -29,9 +29,10 @@ struct Place {
   std::uint16_t http_port = 80;
 };
 
-/// One receive thread while it streams. While somebody is in wait() it hands each datagram over at once; otherwise, and
-/// whenever the records come faster than any box sends them, it lets them gather for 1.5 ms: a consumer that only
-/// takes now and then costs a third of the wake-ups. The records' own times are the kernel's and do not suffer.
+/// One receive thread while it streams. Buffered, each datagram is handed over at once (measured: 0.2 % of a core, 99
+/// of 100 within 0.1 ms). Single records at 7 kHz cannot be both quick and cheap: while somebody is in wait() each is
+/// handed over at once (3 % of a core, 99 of 100 within 0.1 ms); for who only takes now and then, and on clocks in
+/// haste, they gather for 1.5 ms (1.2 %). The records' own times are the kernel's and do not suffer.
 /// start, stop and the destructor belong to one thread, take and wait to one
 /// (other or same); the rest may be called from any. Counters and queue outlive a stop and the next start.
 class LoadCell {
@@ -103,6 +104,7 @@ class LoadCell {
 
   // The receive thread's own; others touch them only while it does not run.
   Session session_;
+  const bool gathers_;      // more than one datagram comes during a nap
   const bool always_naps_;  // read by the consumer too
   std::vector<StampedRecord> accepted_;
   Instant newest_arrival_{0}, health_due_{0};

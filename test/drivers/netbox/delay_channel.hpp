@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <numbers>
 #include <random>
+#include <vector>
 
 #include "drivers/netbox/clock_estimate.hpp"
 
@@ -56,23 +57,36 @@ class Channel {
 
 struct Quality {
   double rms_us = 0, mean_us = 0, largest_us = 0;
+  /// What is left when the constant, which nobody can see from one end, is taken away.
+  double spread_us() const { return std::sqrt(std::max(0.0, rms_us * rms_us - mean_us * mean_us)); }
+};
+
+/// Collects errors in us.
+class Errors {
+ public:
+  void add(double error_us) {
+    squares_ += error_us * error_us;
+    sum_ += error_us;
+    largest_ = std::max(largest_, std::abs(error_us));
+    ++n_;
+  }
+  Quality quality() const { return {std::sqrt(squares_ / n_), sum_ / n_, largest_}; }
+
+ private:
+  double squares_ = 0, sum_ = 0, largest_ = 0;
+  int n_ = 0;
 };
 
 /// Error against the true sample time plus the least delay, from 30 s to `seconds`.
 inline Quality quality_of(Channel& channel, ClockEstimate& estimate, double seconds) {
-  double squares = 0, sum = 0, largest = 0;
-  int n = 0;
+  Errors errors;
   for (Channel::Sample sample = channel.next(); sample.true_s < seconds; sample = channel.next()) {
     estimate.add(sample.ft, sample.arrival);
     if (sample.true_s < 30) continue;
     const double told = to_seconds(estimate.host_time(sample.ft) - std::chrono::seconds(100));
-    const double error_us = 1e6 * (told - sample.true_s - Channel::kLeastDelay);
-    squares += error_us * error_us;
-    sum += error_us;
-    largest = std::max(largest, std::abs(error_us));
-    ++n;
+    errors.add(1e6 * (told - sample.true_s - Channel::kLeastDelay));
   }
-  return {std::sqrt(squares / n), sum / n, largest};
+  return errors.quality();
 }
 
 struct ChannelCase {
