@@ -21,9 +21,12 @@ constexpr Duration kSyncEvery = std::chrono::seconds(1);
 constexpr Duration kHttpTimeout = std::chrono::seconds(5);
 constexpr sim::Peer kHost = 1;
 
-sim::FaultScript faults_of(const std::string& path) {
+void load_faults(const std::string& path, sim::BenchSettings& settings) {
+  if (path.empty()) return;
+  const std::string text = profiles::read_text(path);
   try {
-    return path.empty() ? sim::FaultScript() : sim::parse_faults(profiles::read_text(path), path);
+    settings.faults = sim::parse_faults(text, path);
+    settings.netbox.habits = sim::parse_habits(text, path);
   } catch (const sim::FaultFileError& error) {
     throw ConfigurationError(error.what());
   }
@@ -35,7 +38,7 @@ sim::BenchSettings settings_of(const profiles::Bench& place) {
   settings.netbox.rate_hz = place.netbox.rate_hz;
   settings.netbox.records_per_datagram = place.netbox.records_per_datagram;
   settings.module_id = place.iq.module_id;
-  if (place.simulation) settings.faults = faults_of(place.simulation->faults);
+  if (place.simulation) load_faults(place.simulation->faults, settings);
   return settings;
 }
 

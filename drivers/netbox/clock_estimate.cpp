@@ -8,37 +8,35 @@ namespace kphi::netbox {
 void ClockEstimate::restart() noexcept {
   begun_ = has_line_ = false;
   point_count_ = 0;
-  residuals_.clear();
 }
 
-void ClockEstimate::add(std::uint32_t ft_sequence, Instant arrival) noexcept {
+Duration ClockEstimate::add(std::uint32_t ft_sequence, Instant arrival) noexcept {
   if (!begun_) {
     begun_ = true;
     ++epochs_;
     newest_ft_ = ft_sequence;
     newest_count_ = 0;
     first_arrival_ = arrival;
-    bin_ = 0;
+    bin_end_s_ = kBinSeconds;
     best_ = {};
     smallest_delay_ = largest_delay_ = 0;
-    return;
+    return Duration{0};
   }
   newest_count_ += static_cast<std::int32_t>(ft_sequence - newest_ft_);
   newest_ft_ = ft_sequence;
   Point point;
-  point.device_s = static_cast<double>(newest_count_) / device_rate_hz_;
+  point.device_s = static_cast<double>(newest_count_) * device_period_s_;
   point.delay_s = to_seconds(arrival - first_arrival_) - point.device_s;
   smallest_delay_ = std::min(smallest_delay_, point.delay_s);
   largest_delay_ = std::max(largest_delay_, point.delay_s);
-  const auto bin = static_cast<std::int64_t>(std::floor(point.device_s / kBinSeconds));
-  if (bin > bin_) {
+  if (point.device_s >= bin_end_s_) {
     close_bin();
-    bin_ = bin;
+    bin_end_s_ = kBinSeconds * (std::floor(point.device_s / kBinSeconds) + 1);
     best_ = point;
   } else if (point.delay_s < best_.delay_s) {
     best_ = point;
   }
-  if (has_line_) residuals_.add(from_seconds(point.delay_s - offset_ - slope_ * (point.device_s - centre_)));
+  return from_seconds(point.delay_s - least_delay(point.device_s));
 }
 
 void ClockEstimate::close_bin() noexcept {
@@ -79,14 +77,17 @@ void ClockEstimate::fit() noexcept {
 }
 
 double ClockEstimate::device_seconds(std::uint32_t ft_sequence) const noexcept {
-  return static_cast<double>(newest_count_ + static_cast<std::int32_t>(ft_sequence - newest_ft_)) / device_rate_hz_;
+  return static_cast<double>(newest_count_ + static_cast<std::int32_t>(ft_sequence - newest_ft_)) * device_period_s_;
+}
+
+double ClockEstimate::least_delay(double device_s) const noexcept {
+  return has_line_ ? offset_ + slope_ * (device_s - centre_) : smallest_delay_;
 }
 
 Instant ClockEstimate::host_time(std::uint32_t ft_sequence) const noexcept {
   if (!begun_) return Instant{0};
   const double device = device_seconds(ft_sequence);
-  const double delay = has_line_ ? offset_ + slope_ * (device - centre_) : smallest_delay_;
-  return first_arrival_ + from_seconds(device + delay);
+  return first_arrival_ + from_seconds(device + least_delay(device));
 }
 
 Duration ClockEstimate::uncertainty() const noexcept {

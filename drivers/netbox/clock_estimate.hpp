@@ -7,7 +7,6 @@
 #include <cstdint>
 
 #include "drivers/clock.hpp"
-#include "drivers/netbox/delay_histogram.hpp"
 
 namespace kphi::netbox {
 
@@ -19,10 +18,11 @@ class ClockEstimate {
   /// Beyond this the rate or the divisor is another than configured.
   static constexpr double kBelievableSkewPpm = 500;
 
-  explicit ClockEstimate(double device_rate_hz) noexcept : device_rate_hz_(device_rate_hz) {}
+  explicit ClockEstimate(double device_rate_hz) noexcept : device_period_s_(1 / device_rate_hz) {}
 
-  /// Each record that was the last of its datagram (only that one is fresh), in the order of delivery.
-  void add(std::uint32_t ft_sequence, Instant arrival) noexcept;
+  /// Each record that was the last of its datagram (only that one is fresh), in the order of delivery. By how much it
+  /// came later than with the smallest delay: as host_time() tells it now.
+  Duration add(std::uint32_t ft_sequence, Instant arrival) noexcept;
   /// A new epoch: the box has booted. Everything is forgotten.
   void restart() noexcept;
 
@@ -39,8 +39,6 @@ class ClockEstimate {
   [[nodiscard]] bool believable() const noexcept {
     return skew_ppm() < kBelievableSkewPpm && skew_ppm() > -kBelievableSkewPpm;
   }
-  /// 99 of 100 records of this epoch came no later than so much after their host_time; counted once ready().
-  [[nodiscard]] Duration residual_p99() const noexcept { return residuals_.quantile(0.99); }
   [[nodiscard]] std::uint64_t epochs() const noexcept { return epochs_; }
 
  private:
@@ -51,21 +49,21 @@ class ClockEstimate {
 
   void close_bin() noexcept;
   void fit() noexcept;
+  [[nodiscard]] double least_delay(double device_s) const noexcept;
   [[nodiscard]] double device_seconds(std::uint32_t ft_sequence) const noexcept;
 
-  const double device_rate_hz_;
+  const double device_period_s_;
   std::uint64_t epochs_ = 0;
   bool begun_ = false, has_line_ = false;
   std::uint32_t newest_ft_ = 0;
   std::int64_t newest_count_ = 0;  // samples since the first record
   Instant first_arrival_{0};
-  std::int64_t bin_ = 0;
-  Point best_;  // of the open bin
+  double bin_end_s_ = 0;  // of the open bin, device time since the first record
+  Point best_;            // of that bin
   double smallest_delay_ = 0, largest_delay_ = 0;
   std::array<Point, kBins> points_{};
   std::size_t point_count_ = 0;
   double offset_ = 0, slope_ = 0, centre_ = 0, line_error_ = 0;
-  DelayHistogram residuals_;
 };
 
 }  // namespace kphi::netbox

@@ -11,8 +11,7 @@ void HealthMeter::begin() noexcept {
 void HealthMeter::note(const StampedRecord& newest, std::uint64_t records, std::uint64_t reboots) noexcept {
   if (reboots != reboots_) clock_.restart();
   reboots_ = reboots;
-  clock_.add(newest.record.ft_sequence, newest.arrival);
-  jitter_.add(newest.arrival - clock_.host_time(newest.record.ft_sequence));
+  jitter_.add(clock_.add(newest.record.ft_sequence, newest.arrival));
   if (datagrams_++ == 0) {
     first_ = newest.arrival;
   } else {

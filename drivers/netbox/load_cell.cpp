@@ -20,11 +20,12 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::chrono::nanoseconds kHttpTimeout = 5s;
-// One sleep between two drains: at 7000 datagrams per second it spares most of the wake-ups, and the kernel's stamps
-// do not suffer.
 constexpr std::chrono::nanoseconds kNap = 1500us;
+// A box sends 7000 records per second at most: where more come it is a simulated one in haste.
+constexpr double kHasteHz = 20'000;
+constexpr std::chrono::nanoseconds kHealthPeriod = 20ms;
 constexpr std::chrono::nanoseconds kLongestLinger = 100ms;
-constexpr int kBatchesPerDrain = 256;
+constexpr int kBatchesPerDrain = 64;
 constexpr double kQueueSeconds = 10;
 constexpr double kQueueLimit = 1 << 23;
 
@@ -60,9 +61,17 @@ int records_of(const Configuration& configuration, Command mode) noexcept {
 
 double bench_seconds_per_second(const Clock& clock) noexcept { return to_seconds(clock.stretched(1s)); }
 
+double wall_rate_hz(const Configuration& configuration, const Clock& clock) noexcept {
+  return configuration.rdt_rate_hz * bench_seconds_per_second(clock);
+}
+
 std::size_t queue_capacity(const Configuration& configuration, const Clock& clock) {
-  const double wall_rate_hz = configuration.rdt_rate_hz * bench_seconds_per_second(clock);
-  return static_cast<std::size_t>(std::clamp(std::ceil(kQueueSeconds * wall_rate_hz), 1024.0, kQueueLimit));
+  const double records = std::ceil(kQueueSeconds * wall_rate_hz(configuration, clock));
+  return static_cast<std::size_t>(std::clamp(records, 1024.0, kQueueLimit));
+}
+
+Duration between(const timespec& from, const timespec& to) noexcept {
+  return Duration((to.tv_sec - from.tv_sec) * 1'000'000'000 + to.tv_nsec - from.tv_nsec);
 }
 
 /// True when `descriptor` became readable within `wall`.
@@ -81,10 +90,11 @@ LoadCell::LoadCell(const Place& place, const Clock& clock, Command mode, const S
       mode_(mode),
       policy_(on_the_bench(policy, clock)),
       socket_(place.host, place.rdt_port),
-      queue_capacity_(queue_capacity(configuration_, clock)),
-      queue_(queue_capacity_),
+      ring_(queue_capacity(configuration_, clock)),
       inquiry_(place, clock, configuration_, order_wakeup_),
       session_(stream_settings(configuration_, clock, mode, policy_.lease)),
+      gathers_(clock.shrunk(session_.settings().datagram_period()) < kNap),
+      always_naps_(wall_rate_hz(configuration_, clock) > kHasteHz),
       meter_(configuration_.device_rate_hz),
       reconnect_(policy_),
       streamed_(configuration_) {
@@ -122,14 +132,15 @@ void LoadCell::set_bias() noexcept {
   order_wakeup_.raise();
 }
 
-std::size_t LoadCell::take(std::span<StampedRecord> out) noexcept { return queue_.pop(out.data(), out.size()); }
+std::size_t LoadCell::take(std::span<StampedRecord> out) noexcept { return ring_.take(out); }
 
 bool LoadCell::wait(std::chrono::nanoseconds wall) noexcept {
   const auto deadline = std::chrono::steady_clock::now() + wall;
   for (;;) {
     consumer_waits_ = true;
     std::atomic_thread_fence(std::memory_order_seq_cst);
-    if (queue_.read_available() > 0) return true;
+    if (!ring_.empty()) return true;
+    if (napping_ && !always_naps_) order_wakeup_.raise();
     const auto left = deadline - std::chrono::steady_clock::now();
     if (left <= 0ns) return false;
     pollfd raised{consumer_wakeup_.descriptor(), POLLIN, 0};
@@ -146,11 +157,9 @@ std::vector<Event> LoadCell::take_events() {
 }
 
 std::string LoadCell::receive_buffer_note() const {
-  const double tolerated_ms = 1e3 / bench_seconds_per_second(clock_) *
-                              tolerated_standstill_s(socket_.receive_buffer_bytes(), records_of(configuration_, mode_),
-                                                     configuration_.rdt_rate_hz);
-  return fmt::format("{:.1f} MiB, tolerates {:.0f} ms", static_cast<double>(socket_.receive_buffer_bytes()) / (1 << 20),
-                     tolerated_ms);
+  const StreamSettings& settings = session_.settings();
+  const std::size_t payload = kRecordBytes * (settings.buffered ? settings.records_per_datagram : 1);
+  return tolerated_stall(socket_.receive_buffer_bytes(), payload, clock_.shrunk(settings.datagram_period()));
 }
 
 std::optional<Finding> LoadCell::receive_buffer_finding() const {
@@ -173,17 +182,16 @@ void LoadCell::run() noexcept {
   if (!failed) session_.stop(clock_.now());
   send_requests();
   session_.flush(accepted_);
-  deliver();
+  store_accepted();
+  hand_over();
   linger();
   publish();
+  publish_health();
   hand_over_events();
 }
 
 void LoadCell::pump() noexcept {
-  if (bias_asked_.exchange(false)) {
-    order_wakeup_.clear();
-    session_.set_bias(clock_.now());
-  }
+  if (bias_asked_.exchange(false)) session_.set_bias(clock_.now());
   if (stopping_) return;
   send_requests();
   wait_for_datagrams();
@@ -191,10 +199,15 @@ void LoadCell::pump() noexcept {
   const Instant now = clock_.now();
   if (session_.release_deadline() <= now) {
     session_.release(now, accepted_);
-    deliver();
+    store_accepted();
+    hand_over();
   }
   session_.advance(now);
   publish();
+  if (now >= health_due_) {
+    publish_health();
+    health_due_ = now + clock_.stretched(kHealthPeriod);
+  }
   hand_over_events();
   tend_connection(now);
 }
@@ -203,35 +216,66 @@ void LoadCell::wait_for_datagrams() noexcept {
   std::array<pollfd, 2> both{{{order_wakeup_.descriptor(), POLLIN, 0}, {socket_.native_handle(), POLLIN, 0}}};
   const Instant due = std::min({session_.deadline(), session_.release_deadline(), reconnect_.deadline()});
   poll_for(both, due == kNever ? 1h : clock_.shrunk(due - clock_.now()));
-  const bool ordered = both[0].revents != 0;
-  if (session_.state() == State::streaming && !ordered && !session_.renews_next()) poll_for({both.data(), 1}, kNap);
+  if (both[0].revents != 0) {
+    order_wakeup_.clear();
+  } else if (gathers_ && session_.state() == State::streaming && !session_.renews_next()) {
+    nap();
+  }
+}
+
+void LoadCell::nap() noexcept {
+  napping_ = true;
+  std::atomic_thread_fence(std::memory_order_seq_cst);
+  if (always_naps_ || !consumer_waits_) {
+    pollfd ordered{order_wakeup_.descriptor(), POLLIN, 0};
+    if (poll_for({&ordered, 1}, kNap)) order_wakeup_.clear();
+  }
+  napping_ = false;
 }
 
 void LoadCell::drain() noexcept {
   for (int batch = 0; batch < kBatchesPerDrain; ++batch) {
     const std::span<const UdpSocket::Datagram> datagrams = socket_.receive();
-    for (const UdpSocket::Datagram& datagram : datagrams) {
-      const bool stamped = datagram.stamp.tv_sec != 0;
-      const std::size_t before = accepted_.size();
-      session_.note_host_drops(datagram.dropped);
-      session_.receive(datagram.bytes, stamped ? clock_.at_realtime(datagram.stamp) : clock_.now(), accepted_);
-      if (accepted_.size() > before)
-        meter_.note(accepted_.back(), accepted_.size() - before, session_.counters().reboots);
-    }
-    deliver();
-    if (datagrams.size() < UdpSocket::kBatch) return;
+    if (datagrams.empty()) break;
+    // The clock is read once for all.
+    const timespec& first = datagrams.front().stamp;
+    const bool stamped = first.tv_sec != 0;
+    const Instant at_first = stamped ? clock_.at_realtime(first) : clock_.now();
+    for (const UdpSocket::Datagram& datagram : datagrams)
+      take_in(datagram, stamped ? at_first + clock_.stretched(between(first, datagram.stamp)) : at_first);
+    if (datagrams.size() < UdpSocket::kBatch) break;
   }
+  hand_over();
 }
 
-void LoadCell::deliver() noexcept {
+void LoadCell::take_in(const UdpSocket::Datagram& datagram, Instant arrival) noexcept {
+  session_.note_host_drops(datagram.dropped);
+  const std::span<StampedRecord> room = ring_.room(records_in(datagram.bytes.size()));
+  const std::size_t count = session_.receive_in_order(datagram.bytes, arrival, room);
+  if (count > 0) {
+    meter_.note(room[count - 1], count, session_.counters().reboots);
+    ring_.fill(count);
+    newest_arrival_ = arrival;
+    return;
+  }
+  session_.receive(datagram.bytes, arrival, accepted_);
+  if (!accepted_.empty()) meter_.note(accepted_.back(), accepted_.size(), session_.counters().reboots);
+  store_accepted();
+}
+
+void LoadCell::store_accepted() noexcept {
   if (accepted_.empty()) return;
-  const std::size_t taken = queue_.push(accepted_.data(), accepted_.size());
-  queue_overflows_ += accepted_.size() - taken;
-  meter_.note_queue(queue_capacity_ - queue_.write_available());
-  newest_arrival_ns_ = accepted_.back().arrival.count();
+  queue_overflows_ += accepted_.size() - ring_.push(accepted_);
+  newest_arrival_ = accepted_.back().arrival;
   accepted_.clear();
+}
+
+void LoadCell::hand_over() noexcept {
+  newest_arrival_ns_.store(newest_arrival_.count(), std::memory_order_release);
+  if (!ring_.publish()) return;
+  meter_.note_queue(ring_.waiting());
   std::atomic_thread_fence(std::memory_order_seq_cst);
-  if (consumer_waits_.exchange(false)) consumer_wakeup_.raise();
+  if (consumer_waits_ && consumer_waits_.exchange(false)) consumer_wakeup_.raise();
 }
 
 void LoadCell::send_requests() noexcept {
@@ -296,7 +340,8 @@ void LoadCell::adopt_latest_stream() {
   Configuration latest = inquiry_.latest();
   if (!changes_stream(compare(streamed_, latest))) return;
   session_.flush(accepted_);
-  deliver();
+  store_accepted();
+  hand_over();
   Session fresh(stream_settings(latest, clock_, mode_, policy_.lease), session_);
   std::destroy_at(&session_);
   std::construct_at(&session_, std::move(fresh));
@@ -320,11 +365,16 @@ void LoadCell::publish() noexcept {
   Counters counters = session_.counters();
   counters.queue_overflows = queue_overflows_;
   counters_.publish(counters);
+  const State state = shown_state();
+  if (state_ == state) return;
+  state_ = state;
+  state_.notify_all();
+}
+
+void LoadCell::publish_health() noexcept {
   Health health = meter_.health();
   health.events_dropped = session_.events().dropped();
   health_.publish(health);
-  const State state = shown_state();
-  if (state_.exchange(state) != state) state_.notify_all();
 }
 
 void LoadCell::throw_unanswered() const {

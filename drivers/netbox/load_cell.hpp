@@ -3,7 +3,6 @@
 #pragma once
 
 #include <atomic>
-#include <boost/lockfree/spsc_queue.hpp>
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -21,13 +20,18 @@
 #include "drivers/netbox/place.hpp"
 #include "drivers/netbox/published.hpp"
 #include "drivers/netbox/reconnect.hpp"
+#include "drivers/netbox/record_ring.hpp"
 #include "drivers/netbox/session.hpp"
 #include "drivers/netbox/udp_socket.hpp"
 #include "drivers/netbox/wakeup.hpp"
 
 namespace kphi::netbox {
 
-/// One receive thread while it streams. start, stop and the destructor belong to one thread, take and wait to one
+/// One receive thread while it streams. Buffered, each datagram is handed over at once (measured: 0.2 % of a core, 99
+/// of 100 within 0.1 ms). Single records at 7 kHz cannot be both quick and cheap: while somebody is in wait() each is
+/// handed over at once (3 % of a core, 99 of 100 within 0.1 ms); for who only takes now and then, and on clocks in
+/// haste, they gather for 1.5 ms (1.2 %). The records' own times are the kernel's and do not suffer.
+/// start, stop and the destructor belong to one thread, take and wait to one
 /// (other or same); the rest may be called from any. Counters and queue outlive a stop and the next start.
 class LoadCell {
  public:
@@ -65,7 +69,7 @@ class LoadCell {
 
   /// A consistent set, a few milliseconds old at most while records come.
   [[nodiscard]] Counters counters() const noexcept { return counters_.read(); }
-  /// As old as counters().
+  /// 20 ms older at most than counters().
   [[nodiscard]] Health health() const noexcept { return health_.read(); }
   /// Arrival of the newest accepted record; 0 before the first.
   [[nodiscard]] Instant newest_arrival() const noexcept { return Instant(newest_arrival_ns_.load()); }
@@ -81,8 +85,11 @@ class LoadCell {
   void run() noexcept;
   void pump() noexcept;
   void wait_for_datagrams() noexcept;
+  void nap() noexcept;
   void drain() noexcept;
-  void deliver() noexcept;
+  void take_in(const UdpSocket::Datagram& datagram, Instant arrival) noexcept;
+  void store_accepted() noexcept;
+  void hand_over() noexcept;
   void send_requests() noexcept;
   void hand_over_events() noexcept;
   void linger() noexcept;
@@ -91,6 +98,7 @@ class LoadCell {
   void adopt_latest_stream();
   [[nodiscard]] State shown_state() const noexcept;
   void publish() noexcept;
+  void publish_health() noexcept;
   [[noreturn]] void throw_unanswered() const;
 
   const Place place_;
@@ -102,15 +110,17 @@ class LoadCell {
   std::thread thread_;
   std::atomic<bool> stopping_{false}, bias_asked_{false};
   Wakeup order_wakeup_, consumer_wakeup_;
-  std::atomic<bool> consumer_waits_{false};
-  const std::size_t queue_capacity_;
-  boost::lockfree::spsc_queue<StampedRecord> queue_;
+  std::atomic<bool> consumer_waits_{false}, napping_{false};
+  RecordRing ring_;
   EventQueue events_;
   Inquiry inquiry_;
 
   // The receive thread's own; others touch them only while it does not run.
   Session session_;
+  const bool gathers_;      // more than one datagram comes during a nap
+  const bool always_naps_;  // read by the consumer too
   std::vector<StampedRecord> accepted_;
+  Instant newest_arrival_{0}, health_due_{0};
   HealthMeter meter_;
   Reconnect reconnect_;
   Configuration streamed_;  // what session_ is made for

@@ -4,8 +4,6 @@
 
 namespace kphi::netbox {
 
-using boost::endian::load_big_s32;
-using boost::endian::load_big_u32;
 using boost::endian::store_big_u16;
 using boost::endian::store_big_u32;
 
@@ -18,16 +16,8 @@ std::array<std::uint8_t, 8> encode_request(Command command, std::uint32_t sample
 }
 
 std::size_t decode(std::span<const std::uint8_t> datagram, std::span<Record, kMaxRecords> out) noexcept {
-  const std::size_t count = datagram.size() / kRecordBytes;
-  if (datagram.size() % kRecordBytes != 0 || count > kMaxRecords) return 0;
-  const std::uint8_t* bytes = datagram.data();
-  for (std::size_t i = 0; i < count; ++i, bytes += kRecordBytes) {
-    Record& record = out[i];
-    record.rdt_sequence = load_big_u32(bytes);
-    record.ft_sequence = load_big_u32(bytes + 4);
-    record.status = load_big_u32(bytes + 8);
-    for (std::size_t axis = 0; axis < 6; ++axis) record.counts[axis] = load_big_s32(bytes + 12 + 4 * axis);
-  }
+  const std::size_t count = records_in(datagram.size());
+  for (std::size_t i = 0; i < count; ++i) decode(datagram.data() + i * kRecordBytes, out[i]);
   return count;
 }
 

@@ -1,14 +1,20 @@
 #include "drivers/netbox/reorder.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 namespace kphi::netbox {
 namespace {
 
+// A stream begins with it; one box is said to begin with 0.
+constexpr std::uint32_t kFirstRdt = 1;
+
 std::int32_t step(std::uint32_t from, std::uint32_t to) noexcept { return static_cast<std::int32_t>(to - from); }
 
-std::int32_t ahead(const Record& record, const SequenceAccount& account) noexcept {
-  return account.has_last() ? step(account.last_ft(), record.ft_sequence) : 0;
+/// Order in which the box took and sent them.
+bool before(const Record& a, const Record& b) noexcept {
+  const std::int32_t advance = step(a.ft_sequence, b.ft_sequence);
+  return advance != 0 ? advance > 0 : step(a.rdt_sequence, b.rdt_sequence) > 0;
 }
 
 bool deliver(const StampedRecord& stamped, SequenceAccount& account, std::vector<StampedRecord>& out) {
@@ -21,7 +27,7 @@ bool deliver(const StampedRecord& stamped, SequenceAccount& account, std::vector
 }  // namespace
 
 ReorderWindow::ReorderWindow(std::size_t records, Duration patience, unsigned stride)
-    : records_(records), patience_(patience), stride_(stride), reach_(static_cast<std::int32_t>(records * stride)) {
+    : records_(records), patience_(patience), stride_(stride) {
   held_.reserve(records_ + 1);
 }
 
@@ -29,22 +35,33 @@ bool ReorderWindow::receive(const Record& record, Instant arrival, SequenceAccou
                             std::vector<StampedRecord>& out) {
   const StampedRecord stamped{record, arrival};
   if (held_.empty() && account.is_next(record)) return deliver(stamped, account, out);
+  if (held_.empty() && !account.has_last()) account.forget_host_drops();
   expire(arrival, account, out);
-  while (!held_.empty() && ahead(record, account) > reach_) release(run_length(0), account, out);
-  const std::int32_t distance = ahead(record, account);
-  // rdt one further: nothing is on its way, the box itself has left samples out.
-  const bool follows = record.rdt_sequence == account.last_rdt() + 1;
-  if (distance > 0 && distance <= reach_ && !follows && static_cast<std::uint32_t>(distance) != stride_) {
+  const bool rebooted = account.looks_rebooted(record, arrival);
+  if (!rebooted && may_have_overtaken(record, account)) {
     if (!hold(stamped, account)) return false;
-    if (held_.size() >= records_) release(run_length(0), account, out);
+    const bool begins = !account.has_last() && held_.front().record.rdt_sequence <= kFirstRdt;
+    if (begins || held_.size() >= records_) release(run_length(0), account, out);
     return true;
   }
-  if (account.looks_rebooted(record, arrival)) flush(account, out);
+  if (rebooted) flush(account, out);
   const bool delivered = deliver(stamped, account, out);
   if (!delivered || held_.empty()) return delivered;
   ++account.counters().reordered;
-  if (account.is_next(held_.front().record)) release(run_length(0), account, out);
+  if (follows(account.last_rdt(), account.last_ft(), held_.front().record)) release(run_length(0), account, out);
   return true;
+}
+
+bool ReorderWindow::may_have_overtaken(const Record& record, const SequenceAccount& account) const noexcept {
+  const bool behind_held = !held_.empty() && before(held_.front().record, record);
+  if (!account.has_last()) return record.rdt_sequence > kFirstRdt || behind_held;
+  if (step(account.last_ft(), record.ft_sequence) <= 0) return false;
+  return behind_held || !follows(account.last_rdt(), account.last_ft(), record);
+}
+
+bool ReorderWindow::follows(std::uint32_t rdt, std::uint32_t ft, const Record& record) const noexcept {
+  // rdt one further alone: the box itself has left samples out. ft alone: it has begun a stream anew in between.
+  return record.rdt_sequence == rdt + 1 || record.ft_sequence == ft + stride_;
 }
 
 void ReorderWindow::expire(Instant now, SequenceAccount& account, std::vector<StampedRecord>& out) {
@@ -61,15 +78,15 @@ void ReorderWindow::flush(SequenceAccount& account, std::vector<StampedRecord>& 
 }
 
 bool ReorderWindow::hold(const StampedRecord& stamped, SequenceAccount& account) {
-  const auto place = std::find_if(held_.rbegin(), held_.rend(), [&](const StampedRecord& held) {
-    return step(held.record.ft_sequence, stamped.record.ft_sequence) >= 0;
-  });
-  if (place != held_.rend() && place->record.ft_sequence == stamped.record.ft_sequence) {
+  const auto behind = std::find_if(held_.rbegin(), held_.rend(), [&](const StampedRecord& held) {
+                        return !before(stamped.record, held.record);
+                      }).base();
+  if (behind != held_.begin() && !before(std::prev(behind)->record, stamped.record)) {
     ++account.counters().duplicates;
     return false;
   }
-  if (place != held_.rbegin()) ++account.counters().reordered;
-  held_.insert(place.base(), stamped);
+  if (behind != held_.end()) ++account.counters().reordered;
+  held_.insert(behind, stamped);
   oldest_arrival_ = held_.size() == 1 ? stamped.arrival : std::min(oldest_arrival_, stamped.arrival);
   return true;
 }
@@ -84,7 +101,8 @@ void ReorderWindow::release(std::size_t count, SequenceAccount& account, std::ve
 
 std::size_t ReorderWindow::run_length(std::size_t from) const noexcept {
   std::size_t end = from + 1;
-  while (end < held_.size() && held_[end].record.ft_sequence == held_[end - 1].record.ft_sequence + stride_) ++end;
+  const auto last = [&]() -> const Record& { return held_[end - 1].record; };
+  while (end < held_.size() && follows(last().rdt_sequence, last().ft_sequence, held_[end].record)) ++end;
   return end - from;
 }
 

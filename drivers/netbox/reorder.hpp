@@ -1,5 +1,5 @@
-// Records that overtook others wait here until those have come, or are given up. What follows its predecessor passes
-// straight through. One thread; allocates at construction only.
+// Records that overtook others, also the first of a stream, wait here until those have come, or are given up. What
+// follows its predecessor passes straight through. One thread; allocates at construction only.
 #pragma once
 
 #include <vector>
@@ -11,8 +11,8 @@ namespace kphi::netbox {
 
 class ReorderWindow {
  public:
-  /// At most `records` wait, none longer than `patience` (bench time) once time has been told. `stride`: ft_sequence
-  /// per record.
+  /// At most `records` wait, however long the gap before them; none longer than `patience` (bench time) once time has
+  /// been told. `stride`: ft_sequence per record.
   ReorderWindow(std::size_t records, Duration patience, unsigned stride);
 
   [[nodiscard]] bool empty() const noexcept { return held_.empty(); }
@@ -28,6 +28,9 @@ class ReorderWindow {
   [[nodiscard]] Instant deadline() const noexcept { return held_.empty() ? kNever : oldest_arrival_ + patience_; }
 
  private:
+  [[nodiscard]] bool may_have_overtaken(const Record& record, const SequenceAccount& account) const noexcept;
+  /// Nothing can be on its way between (rdt, ft) and `record`.
+  [[nodiscard]] bool follows(std::uint32_t rdt, std::uint32_t ft, const Record& record) const noexcept;
   bool hold(const StampedRecord& stamped, SequenceAccount& account);
   void release(std::size_t count, SequenceAccount& account, std::vector<StampedRecord>& out);
   [[nodiscard]] std::size_t run_length(std::size_t from) const noexcept;
@@ -35,8 +38,7 @@ class ReorderWindow {
   const std::size_t records_;
   const Duration patience_;
   const std::uint32_t stride_;
-  const std::int32_t reach_;         // of ft_sequence, from the last delivered one
-  std::vector<StampedRecord> held_;  // ascending in ft_sequence
+  std::vector<StampedRecord> held_;  // ascending in ft_sequence, then rdt_sequence
   Instant oldest_arrival_ = kNever;
 };
 

@@ -1,6 +1,7 @@
 #include "drivers/netbox/sequence.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace kphi::netbox {
@@ -9,6 +10,7 @@ namespace {
 // No datagram is on its way for longer: ft_sequence further back than this, or ahead of the time that has passed, was
 // counted by a box that has booted anew.
 constexpr double kLongestDelaySeconds = 5.0;
+constexpr double kUsualDelaySeconds = 0.05, kLargestSkew = 0.01;
 
 std::int32_t step(std::uint32_t from, std::uint32_t to) noexcept { return static_cast<std::int32_t>(to - from); }
 
@@ -41,6 +43,9 @@ bool SequenceAccount::looks_rebooted(const Record& record, Instant arrival) cons
   if (!has_last_) return false;
   const std::int32_t ft_step = step(last_ft_, record.ft_sequence);
   if (!plausible(ft_step, arrival)) return true;
+  // From shortly before the wrap a boot looks like a step forward; the time that has passed tells them apart.
+  const bool wraps = ft_step > 0 && record.ft_sequence < last_ft_;
+  if (wraps && step(last_rdt(), record.rdt_sequence) <= 0 && !in_time(ft_step, arrival)) return true;
   // What is late or doubled lies on the line of this stream or of one before.
   return ft_step < 0 && line(record.rdt_sequence, record.ft_sequence) != line(last_rdt_, last_ft_) &&
          !on_former_line(record);
@@ -71,6 +76,7 @@ bool SequenceAccount::accept_reboot(const Record& record, Instant arrival) noexc
   leave_line();
   gap_count_ = 0;
   stall_run_ = 0;
+  forget_host_drops();
   accept_first(first.record, first.arrival);
   confirmed_ = first;
   return accept(record, arrival);
@@ -91,7 +97,6 @@ void SequenceAccount::note_event(EventKind kind, const Record& record, Instant a
 
 bool SequenceAccount::accept_first(const Record& record, Instant arrival) noexcept {
   has_last_ = true;
-  host_credit_ = 0;
   remember(record, arrival);
   ++counters_.received;
   ++counters_.expected;
@@ -132,6 +137,11 @@ bool SequenceAccount::plausible(std::int32_t ft_step, Instant arrival) const noe
   const double device_seconds = ft_step / device_rate_hz_;
   const double host_seconds = std::max(0.0, to_seconds(arrival - last_arrival_));
   return device_seconds > -kLongestDelaySeconds && device_seconds < 2 * host_seconds + kLongestDelaySeconds;
+}
+
+bool SequenceAccount::in_time(std::int32_t ft_step, Instant arrival) const noexcept {
+  const double host_seconds = to_seconds(arrival - last_arrival_);
+  return std::abs(ft_step / device_rate_hz_ - host_seconds) < kUsualDelaySeconds + kLargestSkew * host_seconds;
 }
 
 void SequenceAccount::add_host_drops(std::uint64_t datagrams, std::uint64_t records_per_datagram) noexcept {

@@ -52,7 +52,7 @@ class SequenceAccount {
   /// True: deliver it. False: counted and to be discarded.
   [[nodiscard]] bool accept(const Record& record, Instant arrival) noexcept {
     if (is_next(record)) [[likely]] {
-      accept_next(record, arrival);
+      accept_run(record, 1, arrival);
       return true;
     }
     return accept_unusual(record, arrival);
@@ -61,12 +61,14 @@ class SequenceAccount {
   [[nodiscard]] bool is_next(const Record& record) const noexcept {
     return has_last_ && record.rdt_sequence == last_rdt_ + 1 && record.ft_sequence == last_ft_ + stride_;
   }
-  /// A record that is_next().
-  void accept_next(const Record& record, Instant arrival) noexcept {
-    remember(record, arrival);
-    ++counters_.received;
-    ++counters_.expected;
+  /// `count` records that follow each other, the first is_next(); `last` is the last of them.
+  void accept_run(const Record& last, std::size_t count, Instant arrival) noexcept {
+    remember(last, arrival);
+    counters_.received += count;
+    counters_.expected += count;
   }
+  /// The first record of a stream has come, though it may wait: what was dropped before it explains no gap.
+  void forget_host_drops() noexcept { host_credit_ = 0; }
   /// The first record of a rebooted box, once accept() has taken the second: it is to be delivered before that one.
   [[nodiscard]] std::optional<StampedRecord> take_confirmed() noexcept;
   /// Only a box that has booted anew can have sent it, as far as one record can tell.
@@ -102,6 +104,7 @@ class SequenceAccount {
   bool accept_first(const Record& record, Instant arrival) noexcept;
   void note_restart(const Record& record, Instant arrival, std::uint64_t missing) noexcept;
   bool plausible(std::int32_t ft_step, Instant arrival) const noexcept;
+  bool in_time(std::int32_t ft_step, Instant arrival) const noexcept;
   bool accept_reboot(const Record& record, Instant arrival) noexcept;
   bool note_stray(const Record& record, Instant arrival, std::int32_t ft_step) noexcept;
   void note_stall(const Record& record, Instant arrival) noexcept;

@@ -87,7 +87,36 @@ void Session::stop(Instant now) {
   due_ = bias_due_ = renewal_due_ = kNever;
 }
 
+std::size_t Session::receive_in_order(std::span<const std::uint8_t> datagram, Instant arrival,
+                                      std::span<StampedRecord> out) noexcept {
+  const std::size_t count = records_in(datagram.size());
+  if (phase_ != Phase::streaming || !window_.empty() || count == 0 || count > out.size()) return 0;
+  decode(datagram.data(), out[0].record);
+  if (!account_.is_next(out[0].record)) return 0;
+  std::uint32_t rdt = out[0].record.rdt_sequence, ft = out[0].record.ft_sequence;
+  std::uint32_t deviation = 0, status = out[0].record.status;
+  out[0].arrival = arrival;
+  for (std::size_t i = 1; i < count; ++i) {
+    Record& record = out[i].record;
+    decode(datagram.data() + i * kRecordBytes, record);
+    out[i].arrival = arrival;
+    deviation |= (record.rdt_sequence ^ ++rdt) | (record.ft_sequence ^ (ft += settings_.divisor));
+    status |= record.status;
+  }
+  if (deviation != 0) return 0;
+  ++account_.counters().datagrams;
+  account_.accept_run(out[count - 1].record, count, arrival);
+  if (status != trouble_) note_status(status, out[0].record, arrival);
+  note_arrival(count, arrival);
+  return count;
+}
+
 void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out) {
+  const std::size_t before = out.size();
+  out.resize(before + records_in(datagram.size()));
+  const std::size_t in_order = receive_in_order(datagram, arrival, std::span(out).subspan(before));
+  out.resize(before + in_order);
+  if (in_order > 0) return;
   Counters& counters = account_.counters();
   ++counters.datagrams;
   const std::size_t count = decode(datagram, decoded_);
@@ -102,16 +131,14 @@ void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, s
   datagram_records_ = count;
   if (!take_records(count, arrival, out)) return;
   if (phase_ != Phase::streaming) begin_streaming(arrival);
-  newest_arrival_ = arrival;
-  due_ = arrival + silence_;
-  if (lease_ > Duration{0}) tend_lease(arrival);
+  note_arrival(count, arrival);
 }
 
 void Session::begin_streaming(Instant arrival) noexcept {
-  if (phase_ == Phase::silent) note_event(EventKind::resumed, arrival);
+  if (phase_ == Phase::silent) note_event(EventKind::resumed, arrival, decoded_[0]);
   if (resuming_ && phase_ == Phase::awaiting) {
     ++account_.counters().reconnects;
-    note_event(EventKind::reconnected, arrival);
+    note_event(EventKind::reconnected, arrival, decoded_[0]);
   }
   phase_ = Phase::streaming;
   resuming_ = false;
@@ -150,24 +177,34 @@ bool Session::take_records(std::size_t count, Instant arrival, std::vector<Stamp
   bool any_new = false;
   std::uint32_t status = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const Record& record = decoded_[i];
-    status |= record.status;
-    if (window_.empty() && account_.is_next(record)) [[likely]] {
-      account_.accept_next(record, arrival);
-      out.push_back({record, arrival});
-      any_new = true;
-    } else {
-      any_new |= window_.receive(record, arrival, account_, out);
-    }
+    status |= decoded_[i].status;
+    any_new |= window_.receive(decoded_[i], arrival, account_, out);
   }
-  const std::uint32_t trouble = settings_.product == Product::net_box ? status & kTroubleBits : 0;
-  if ((trouble & ~trouble_) != 0) note_event(EventKind::box_trouble, arrival, trouble);
-  trouble_ = trouble;
+  note_status(status, decoded_[0], arrival);
   return any_new;
 }
 
-void Session::note_event(EventKind kind, Instant at, std::uint32_t status) noexcept {
-  const Record& shown_by = decoded_[0];
+void Session::note_arrival(std::size_t count, Instant arrival) noexcept {
+  datagram_records_ = count;
+  newest_arrival_ = arrival;
+  due_ = arrival + silence_;
+  if (lease_ > Duration{0}) tend_lease(arrival);
+}
+
+void Session::note_status(std::uint32_t status, const Record& shown_by, Instant arrival) noexcept {
+  const std::uint32_t trouble = settings_.product == Product::net_box ? status & kTroubleBits : 0;
+  if ((trouble & ~trouble_) != 0) note_event(EventKind::box_trouble, arrival, shown_by, trouble);
+  trouble_ = trouble;
+}
+
+void Session::note_silence(Instant now) noexcept {
+  Record last;
+  last.rdt_sequence = account_.last_rdt();
+  last.ft_sequence = account_.last_ft();
+  note_event(EventKind::silent, now, last);
+}
+
+void Session::note_event(EventKind kind, Instant at, const Record& shown_by, std::uint32_t status) noexcept {
   account_.events().note(
       {kind, at, shown_by.rdt_sequence, shown_by.ft_sequence, account_.last_rdt(), account_.last_ft(), 0, status});
 }
@@ -200,7 +237,7 @@ void Session::advance(Instant now) {
       if (attempt_ < settings_.attempts) return send_start(now);
       stop(now);
       phase_ = resuming_ ? Phase::silent : Phase::failed;
-      if (resuming_ && !silence_told_) note_event(EventKind::silent, now);
+      if (resuming_ && !silence_told_) note_silence(now);
       return;
     case Phase::streaming:
       renewal_due_ = kNever;
@@ -212,7 +249,7 @@ void Session::advance(Instant now) {
       }
       phase_ = Phase::silent;
       due_ = kNever;
-      note_event(EventKind::silent, now);
+      note_silence(now);
       return;
     case Phase::idle:
     case Phase::silent:

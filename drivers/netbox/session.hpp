@@ -67,6 +67,11 @@ class Session {
   /// Appends to `out` what can be delivered: ascending in ft_sequence. Records behind a gap wait for those that they
   /// may have overtaken (StreamSettings::reorder_records and reorder_patience) and come with a later call.
   void receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out);
+  /// The short way for the commonest datagram alone, while streaming and nothing waits: all its records follow each
+  /// other and those before. Decodes them into `out`, which has room for them, and returns their number. 0: nothing has
+  /// been counted, it is one for receive().
+  [[nodiscard]] std::size_t receive_in_order(std::span<const std::uint8_t> datagram, Instant arrival,
+                                             std::span<StampedRecord> out) noexcept;
   /// To be called at `deadline()`, after everything that came before has been received.
   void advance(Instant now);
   /// When release() will deliver; kNever when nothing waits. Not part of deadline().
@@ -103,7 +108,10 @@ class Session {
   void discard(Instant arrival);
   void check_bias(Instant now) noexcept;
   bool take_records(std::size_t count, Instant arrival, std::vector<StampedRecord>& out);
-  void note_event(EventKind kind, Instant at, std::uint32_t status = 0) noexcept;
+  void note_arrival(std::size_t count, Instant arrival) noexcept;
+  void note_status(std::uint32_t status, const Record& shown_by, Instant arrival) noexcept;
+  void note_silence(Instant now) noexcept;
+  void note_event(EventKind kind, Instant at, const Record& shown_by, std::uint32_t status = 0) noexcept;
   bool belongs_to_new_stream(const Record& first) const noexcept;
   [[nodiscard]] Command start_command() const noexcept;
   void begin_streaming(Instant arrival) noexcept;

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "drivers/device_error.hpp"
 
@@ -12,8 +14,6 @@ namespace kphi::netbox {
 namespace {
 
 using boost::asio::ip::udp;
-
-constexpr int kWantedBuffer = 4 << 20;
 
 }  // namespace
 
@@ -26,10 +26,11 @@ struct UdpSocket::Slots {
       headers[i].msg_hdr.msg_iovlen = 1;
       headers[i].msg_hdr.msg_control = controls[i].data();
     }
+    rearm(kBatch);
   }
-  /// The kernel overwrites the lengths.
-  void rearm() noexcept {
-    for (std::size_t i = 0; i < kBatch; ++i) headers[i].msg_hdr.msg_controllen = controls[i].size();
+  /// The kernel overwrites the lengths of what it fills.
+  void rearm(std::size_t used) noexcept {
+    for (std::size_t i = 0; i < used; ++i) headers[i].msg_hdr.msg_controllen = controls[i].size();
   }
 
   using Control = std::array<char, CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t))>;
@@ -39,7 +40,8 @@ struct UdpSocket::Slots {
   std::array<mmsghdr, kBatch> headers{};
 };
 
-UdpSocket::UdpSocket(const std::string& host, std::uint16_t port) : socket_(io_), slots_(std::make_unique<Slots>()) {
+UdpSocket::UdpSocket(const std::string& host, std::uint16_t port, std::size_t buffer_bytes)
+    : socket_(io_), slots_(std::make_unique<Slots>()) {
   const std::string device = fmt::format("Net Box {}:{}", host, port);
   boost::system::error_code error;
   // The box speaks IPv4 only.
@@ -48,7 +50,7 @@ UdpSocket::UdpSocket(const std::string& host, std::uint16_t port) : socket_(io_)
   socket_.open(udp::v4(), error);
   if (!error) socket_.connect(*endpoints.begin(), error);
   if (error) throw DeviceError(device, "open a UDP socket", error.message(), "check this host's network settings");
-  ask_for_buffer();
+  ask_for_buffer(buffer_bytes);
   const int on = 1;
   setsockopt(native_handle(), SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
   setsockopt(native_handle(), SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
@@ -56,9 +58,10 @@ UdpSocket::UdpSocket(const std::string& host, std::uint16_t port) : socket_(io_)
 
 UdpSocket::~UdpSocket() = default;
 
-void UdpSocket::ask_for_buffer() {
-  if (setsockopt(native_handle(), SOL_SOCKET, SO_RCVBUFFORCE, &kWantedBuffer, sizeof kWantedBuffer) != 0)
-    setsockopt(native_handle(), SOL_SOCKET, SO_RCVBUF, &kWantedBuffer, sizeof kWantedBuffer);
+void UdpSocket::ask_for_buffer(std::size_t bytes) {
+  const int wanted = static_cast<int>(bytes);
+  if (setsockopt(native_handle(), SOL_SOCKET, SO_RCVBUFFORCE, &wanted, sizeof wanted) != 0)
+    setsockopt(native_handle(), SOL_SOCKET, SO_RCVBUF, &wanted, sizeof wanted);
   int granted = 0;
   socklen_t length = sizeof granted;
   getsockopt(native_handle(), SOL_SOCKET, SO_RCVBUF, &granted, &length);
@@ -66,13 +69,14 @@ void UdpSocket::ask_for_buffer() {
 }
 
 std::span<const UdpSocket::Datagram> UdpSocket::receive() noexcept {
+  slots_->rearm(std::exchange(used_, 0));
   int count = 0;
   do {
-    slots_->rearm();
     count = recvmmsg(native_handle(), slots_->headers.data(), kBatch, MSG_DONTWAIT, nullptr);
   } while (count < 0 && retry(errno));
-  for (int i = 0; i < count; ++i) read_control(static_cast<std::size_t>(i));
-  return {datagrams_.data(), static_cast<std::size_t>(count < 0 ? 0 : count)};
+  used_ = static_cast<std::size_t>(std::max(count, 0));
+  for (std::size_t i = 0; i < used_; ++i) read_control(i);
+  return {datagrams_.data(), used_};
 }
 
 bool UdpSocket::send(std::span<const std::uint8_t> bytes) noexcept {
@@ -117,6 +121,18 @@ std::size_t datagrams_held(std::size_t receive_buffer_bytes, std::size_t payload
   // Measured on Linux 5 and 6 for 36 and 1440 bytes; in between the allocator's next size.
   const std::size_t charged = payload_bytes <= 100 ? 832 : payload_bytes <= 600 ? 1344 : 2315;
   return receive_buffer_bytes / charged;
+}
+
+std::string tolerated_stall(std::size_t receive_buffer_bytes, std::size_t payload_bytes,
+                            std::chrono::nanoseconds period) {
+  const double held = static_cast<double>(datagrams_held(receive_buffer_bytes, payload_bytes));
+  std::string note =
+      fmt::format("{:.1f} MiB, tolerates {:.0f} ms", static_cast<double>(receive_buffer_bytes) / (1 << 20),
+                  held * 1e-6 * static_cast<double>(period.count()));
+  // The kernel doubles what is asked for.
+  if (receive_buffer_bytes < 2 * UdpSocket::kWantedBuffer)
+    note += fmt::format("; for longer set net.core.rmem_max to {}", UdpSocket::kWantedBuffer);
+  return note;
 }
 
 }  // namespace kphi::netbox

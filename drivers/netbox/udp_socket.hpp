@@ -6,6 +6,7 @@
 #include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/udp.hpp>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -22,8 +23,11 @@ class UdpSocket {
     std::uint64_t dropped = 0;            ///< datagrams dropped for want of buffer, since the socket was opened
   };
 
-  /// Connects, so that only this peer's datagrams come in. Throws DeviceError.
-  UdpSocket(const std::string& host, std::uint16_t port);
+  static constexpr std::size_t kWantedBuffer = std::size_t{4} << 20;
+
+  /// Connects, so that only this peer's datagrams come in. Asks for `buffer_bytes` of receive buffer, and takes what
+  /// the kernel grants. Throws DeviceError.
+  UdpSocket(const std::string& host, std::uint16_t port, std::size_t buffer_bytes = kWantedBuffer);
   ~UdpSocket();
   UdpSocket(const UdpSocket&) = delete;
   UdpSocket& operator=(const UdpSocket&) = delete;
@@ -44,7 +48,7 @@ class UdpSocket {
   static constexpr std::size_t kLongest = 1500;  // no multiple of 36: what is cut off is refused by its size
   struct Slots;
 
-  void ask_for_buffer();
+  void ask_for_buffer(std::size_t bytes);
   void read_control(std::size_t slot) noexcept;
   bool retry(int error) noexcept;
 
@@ -56,10 +60,16 @@ class UdpSocket {
   std::uint64_t dropped_ = 0;
   std::uint32_t dropped_reported_ = 0;
   std::unique_ptr<Slots> slots_;
+  std::size_t used_ = 0;  // of the slots, by the last receive()
   std::array<Datagram, kBatch> datagrams_{};
 };
 
 /// Datagrams of `payload_bytes` that a receive buffer holds: the kernel charges each with its bookkeeping.
 [[nodiscard]] std::size_t datagrams_held(std::size_t receive_buffer_bytes, std::size_t payload_bytes) noexcept;
+
+/// "8.0 MiB, tolerates 1440 ms": how long the receiver may stand still before the kernel drops datagrams of
+/// `payload_bytes` that come every `period` (wall time); and the next move where less was granted than is wanted.
+[[nodiscard]] std::string tolerated_stall(std::size_t receive_buffer_bytes, std::size_t payload_bytes,
+                                          std::chrono::nanoseconds period);
 
 }  // namespace kphi::netbox

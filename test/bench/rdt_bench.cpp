@@ -1,50 +1,78 @@
-// Decode, and decode + account + session, per record. Goal: the deterministic bench pushes a campaign's 8.4 million
-// records through in well under two seconds.
-#include <benchmark/benchmark.h>
+// What the judgement about a record costs, without any socket: decoding alone, and the whole session, against swapping
+// the bytes of its nine words one by one. Interleaved; each line the median of many pairs.
+#include <fmt/format.h>
 
-#include <vector>
+#include <boost/endian/conversion.hpp>
 
 #include "drivers/netbox/session.hpp"
-#include "test/drivers/netbox/record_bytes.hpp"
+#include "test/drivers/netbox/receivers.hpp"
 
 namespace {
 
 using namespace kphi;
 using namespace kphi::netbox;
+using test::Bytes;
 
-void decode_datagram(benchmark::State& state) {
-  const auto count = static_cast<unsigned>(state.range(0));
-  const test::Bytes datagram = test::records(1, 1, count);
-  std::array<Record, kMaxRecords> out;
-  for (auto _ : state) {
-    benchmark::DoNotOptimize(decode(datagram, out));
-    benchmark::ClobberMemory();
-  }
-  state.SetItemsProcessed(state.iterations() * count);
-}
-BENCHMARK(decode_datagram)->Arg(1)->Arg(40);
+constexpr unsigned kRecords = 40'000, kPairs = 31;
 
-void session_receive(benchmark::State& state) {
-  const auto count = static_cast<unsigned>(state.range(0));
-  constexpr unsigned kDatagrams = 1000;
-  std::vector<test::Bytes> datagrams;
-  for (unsigned i = 0; i < kDatagrams; ++i) datagrams.push_back(test::records(1 + i * count, 1 + i * count, count));
-  std::vector<StampedRecord> accepted;
-  accepted.reserve(kMaxRecords);
-  for (auto _ : state) {
-    Session session{StreamSettings{}};
-    Instant now{0};
-    session.start(now);
-    session.advance(now = session.deadline());
-    for (const test::Bytes& datagram : datagrams) {
-      accepted.clear();
-      session.receive(datagram, now, accepted);
-      benchmark::DoNotOptimize(accepted.data());
-    }
-    if (session.counters().received != kDatagrams * count) state.SkipWithError("records were lost");
-  }
-  state.SetItemsProcessed(state.iterations() * kDatagrams * count);
+/// Keeps the compiler from leaving out what fills `place`.
+void use(const void* place) { asm volatile("" : : "r"(place) : "memory"); }
+
+template <class Work>
+double seconds_of(Work&& work) {
+  const double begun = test::cpu_seconds();
+  work();
+  return test::cpu_seconds() - begun;
 }
-BENCHMARK(session_receive)->Arg(1)->Arg(40);
+
+void swap_words(const std::vector<Bytes>& datagrams) {
+  static std::array<std::uint32_t, 9 * kMaxRecords> words;
+  for (const Bytes& datagram : datagrams) {
+    for (std::size_t w = 0; w < datagram.size() / 4; ++w) words[w] = boost::endian::load_big_u32(&datagram[4 * w]);
+    use(words.data());
+  }
+}
+
+void decode_all(const std::vector<Bytes>& datagrams) {
+  static std::array<Record, kMaxRecords> out;
+  for (const Bytes& datagram : datagrams) {
+    if (decode(datagram, out) == 0) return;
+    use(out.data());
+  }
+}
+
+void receive_all(const std::vector<Bytes>& datagrams) {
+  static std::array<StampedRecord, kMaxRecords> out;
+  Session session{StreamSettings{}};
+  session.start(Instant{0});
+  session.advance(session.deadline());
+  std::vector<StampedRecord> first;
+  session.receive(datagrams.front(), Instant{1}, first);
+  for (std::size_t i = 1; i < datagrams.size(); ++i) {
+    if (session.receive_in_order(datagrams[i], Instant{1}, out) == 0) std::abort();
+    use(out.data());
+  }
+}
+
+void compare(const char* what, unsigned per_datagram, void (*work)(const std::vector<Bytes>&)) {
+  std::vector<Bytes> datagrams;
+  for (std::uint32_t i = 1; i <= kRecords; i += per_datagram) datagrams.push_back(test::records(i, i, per_datagram));
+  std::vector<double> ratios, ns;
+  for (unsigned pair = 0; pair < kPairs; ++pair) {
+    const double bare = seconds_of([&] { swap_words(datagrams); }), driver = seconds_of([&] { work(datagrams); });
+    ratios.push_back(driver / bare);
+    ns.push_back(1e9 * driver / kRecords);
+  }
+  fmt::print("{:<8} {:>2} records per datagram / swapping words: median {:.2f} worst {:.2f} ({:.1f} ns per record)\n",
+             what, per_datagram, test::median(ratios), *std::max_element(ratios.begin(), ratios.end()),
+             test::median(ns));
+}
 
 }  // namespace
+
+int main() {
+  for (const unsigned per_datagram : {1u, 40u}) {
+    compare("decode", per_datagram, decode_all);
+    compare("session", per_datagram, receive_all);
+  }
+}

@@ -307,7 +307,23 @@ TEST(LoadCell, TellsHowLongTheProcessMayStandStill) {
   FakeWeb web(FakeWeb::page(xml()));
   const SteadyClock clock;
   LoadCell cell({"127.0.0.1", 1, web.port()}, clock);
-  EXPECT_THAT(cell.receive_buffer_note(), testing::MatchesRegex("[0-9.]+ MiB, tolerates [0-9]+ ms"));
+  EXPECT_THAT(cell.receive_buffer_note(), testing::ContainsRegex("^[0-9.]+ MiB, tolerates [0-9]+ ms"));
+}
+
+TEST(LoadCell, HandsOverAtOnceToWhoWaits) {
+  FakeWeb web(FakeWeb::page(xml(1, 1)));
+  FakeBox box({.records_per_datagram = 1});
+  const SteadyClock clock;
+  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock, Command::real_time);
+  cell.start();
+  std::vector<StampedRecord> batch(512);
+  std::uint64_t waits = 0, taken = 0;
+  while (taken < 7000 && cell.wait(1s)) {
+    ++waits;
+    taken += cell.take(batch);
+  }
+  EXPECT_GE(taken, 7000u);
+  EXPECT_LT(static_cast<double>(taken) / static_cast<double>(waits), 8) << "records per wake-up";
 }
 
 TEST(LoadCell, SaysWhatToDoAboutABufferSmallerThanAskedFor) {

@@ -124,12 +124,91 @@ TEST_F(ReorderTest, AFullWindowGivesUpItsFirstGap) {
   expect_closed();
 }
 
-TEST_F(ReorderTest, AGapWiderThanTheWindowIsLostAtOnce) {
+TEST_F(ReorderTest, AGapWiderThanTheWindowWaitsLikeAnyOther) {
   receive(1);
-  receive(100);
-  EXPECT_EQ(out.size(), 2u);
-  EXPECT_EQ(counters().lost_network, 98u);
+  receive(1000);
+  EXPECT_EQ(out.size(), 1u);
+  now += 20ms;
+  window.expire(now, account, out);
+  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{1, 1000}));
+  EXPECT_EQ(counters().lost_network, 998u);
   expect_closed();
+}
+
+TEST_F(ReorderTest, WhatIsOvertakenRightBehindAWideGapIsDelivered) {
+  receive(1);
+  for (const std::uint32_t i : {1002u, 1000u, 1001u, 1003u}) receive(i);
+  now += 20ms;
+  window.expire(now, account, out);
+  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{1, 1000, 1001, 1002, 1003}));
+  EXPECT_EQ(counters().lost_network, 998u);
+  EXPECT_EQ(counters().late, 0u);
+  expect_closed();
+}
+
+TEST_F(ReorderTest, BehindAWideGapTheWindowFillsLikeBehindAnyOther) {
+  receive(1);
+  for (std::uint32_t i = 1000; i < 1063; ++i) receive(i);
+  EXPECT_EQ(out.size(), 1u);
+  receive(1063);
+  EXPECT_EQ(out.size(), 65u);
+  EXPECT_TRUE(window.empty());
+  EXPECT_EQ(counters().lost_network, 998u);
+}
+
+TEST_F(ReorderTest, TheFirstRecordsOfAStreamMayBeOvertakenToo) {
+  for (const std::uint32_t i : {3u, 2u, 1u, 4u}) EXPECT_TRUE(receive(i));
+  expect_delivered_from_one_to(4);
+  EXPECT_EQ(counters().duplicates + counters().late, 0u);
+  expect_closed();
+}
+
+TEST_F(ReorderTest, AStreamWhoseFirstRecordsAreLostBeginsAfterThePatience) {
+  for (const std::uint32_t i : {41u, 42u}) receive(i);
+  EXPECT_TRUE(out.empty());
+  now += 20ms;
+  window.expire(now, account, out);
+  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{41, 42}));
+  EXPECT_EQ(counters().expected, 2u) << "nothing is missing before the first";
+}
+
+TEST_F(ReorderTest, DropsBeforeTheFirstRecordExplainNothing) {
+  account.add_host_drops(100, 1);
+  for (const std::uint32_t i : {1u, 3u}) receive(i);
+  window.flush(account, out);
+  EXPECT_EQ(counters().lost_host, 0u);
+  EXPECT_EQ(counters().lost_network, 1u);
+}
+
+TEST_F(ReorderTest, DropsBehindAWaitingFirstRecordExplainWhatIsMissingThere) {
+  receive(3);
+  account.add_host_drops(1, 1);
+  receive(5);
+  window.flush(account, out);
+  EXPECT_EQ(counters().lost_host, 1u);
+  EXPECT_EQ(counters().lost_network, 0u);
+}
+
+TEST_F(ReorderTest, WhatIsLeftOfAFormerStreamIsDeliveredBeforeTheNewOne) {
+  for (const std::uint32_t i : {500u, 501u}) receive(i, 1000 + i);
+  for (const std::uint32_t i : {1u, 2u}) receive(i, 1501 + i);
+  now += 20ms;
+  window.expire(now, account, out);
+  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{500, 501, 502, 503}));
+  EXPECT_EQ(counters().restarts, 1u);
+  EXPECT_EQ(counters().reboots, 0u);
+  expect_closed();
+}
+
+TEST_F(ReorderTest, RepetitionsOfAWaitingMeasurementAreAStallAndNoDuplicates) {
+  receive(1);
+  receive(5);
+  for (const std::uint32_t rdt : {6u, 7u, 7u, 8u}) receive(rdt, 1005);
+  receive(9, 1009);
+  window.flush(account, out);
+  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{1, 5, 9}));
+  EXPECT_EQ(counters().stalled, 3u);
+  EXPECT_EQ(counters().duplicates, 1u);
 }
 
 TEST_F(ReorderTest, ADuplicateOfAWaitingRecordIsCounted) {
@@ -157,6 +236,7 @@ TEST_F(ReorderTest, ARestartWithoutAGapDropsNothing) {
 
 TEST_F(ReorderTest, AReorderAcrossARestartIsSortedToo) {
   receive(98, 1098);
+  window.flush(account, out);
   receive(100, 1100);
   receive(1, 1101);
   receive(99, 1099);

@@ -74,13 +74,32 @@ TEST(Sequence, AGapIsTheHostsAsFarAsTheSocketExplainsIt) {
   stream.expect_closed();
 }
 
-TEST(Sequence, DropsBeforeTheFirstRecordExplainNothing) {
-  Stream stream;
-  stream.account().add_host_drops(100, 1);
-  stream.accept(50, 100);
-  stream.accept(52, 102);
-  EXPECT_EQ(stream.counters().lost_host, 0u);
-  EXPECT_EQ(stream.counters().lost_network, 1u);
+TEST(Sequence, ABootShortlyBeforeTheWrapIsNoStepForward) {
+  SequenceAccount account(1, 7000);
+  Record record;
+  const auto accept = [&](std::uint32_t rdt, std::uint32_t ft, Instant arrival) {
+    record.rdt_sequence = rdt;
+    record.ft_sequence = ft;
+    return account.accept(record, arrival);
+  };
+  EXPECT_TRUE(accept(500, 0xffffffff - 999, 10s));
+  EXPECT_FALSE(accept(1, 6, 10s + 20ms)) << "1006 samples take longer";
+  EXPECT_TRUE(accept(2, 7, 10s + 20ms));
+  EXPECT_EQ(account.counters().reboots, 1u);
+  EXPECT_EQ(account.counters().lost_network, 0u);
+}
+
+TEST(Sequence, ARestartAcrossTheWrapIsNoBoot) {
+  SequenceAccount account(1, 7000);
+  Record record;
+  record.rdt_sequence = 500;
+  record.ft_sequence = 0xffffffff - 999;
+  EXPECT_TRUE(account.accept(record, 10s));
+  record.rdt_sequence = 1;
+  record.ft_sequence = 6;
+  EXPECT_TRUE(account.accept(record, 10s + 150ms));
+  EXPECT_EQ(account.counters().restarts, 1u);
+  EXPECT_EQ(account.counters().lost_network, 1005u);
 }
 
 TEST(Sequence, ADuplicateIsDiscarded) {

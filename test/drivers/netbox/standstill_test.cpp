@@ -7,20 +7,17 @@
 #include <vector>
 
 #include "drivers/netbox/load_cell.hpp"
-#include "test/drivers/netbox/fake_box.hpp"
+#include "test/drivers/netbox/box_process.hpp"
 
 namespace kphi::netbox {
 namespace {
 
 using namespace std::chrono_literals;
-using test::captured_xml;
 using test::FakeBox;
 using test::FakeWeb;
-using test::with;
-
-std::string xml(const char* records_per_datagram) {
-  return with(with(captured_xml(), "comrdtrate", "7000"), "comrdtbsiz", records_per_datagram);
-}
+using test::Pipe;
+using test::Ports;
+using test::streaming_xml;
 
 template <class Condition>
 bool eventually(Condition condition) {
@@ -31,30 +28,6 @@ bool eventually(Condition condition) {
   }
   return true;
 }
-
-/// Bytes of plain structs between this process and its child.
-class Pipe {
- public:
-  Pipe() {
-    if (pipe(ends_) != 0) throw std::runtime_error("pipe");
-  }
-  template <class T>
-  bool put(const T& value) const {
-    return write(ends_[1], &value, sizeof value) == sizeof value;
-  }
-  template <class T>
-  bool get(T& value) const {
-    pollfd readable{ends_[0], POLLIN, 0};
-    return poll(&readable, 1, 20'000) == 1 && read(ends_[0], &value, sizeof value) == sizeof value;
-  }
-
- private:
-  int ends_[2]{};
-};
-
-struct Ports {
-  std::uint16_t rdt, http;
-};
 
 /// The child's life: streams 15 000 records and tells its account.
 void be_the_reader(const Pipe& orders, const Pipe& reports) {
@@ -80,7 +53,7 @@ TEST(Standstill, AProcessStoppedForASecondLosesNothingOneRecordPerDatagram) {
     be_the_reader(orders, reports);
     _exit(0);
   }
-  FakeWeb web(FakeWeb::page(xml("1")));
+  FakeWeb web(FakeWeb::page(streaming_xml(1)));
   FakeBox box({.records_per_datagram = 1});
   int tolerated_ms = 0;
   Counters counters;
@@ -102,7 +75,7 @@ TEST(Standstill, AProcessStoppedForASecondLosesNothingOneRecordPerDatagram) {
 }
 
 TEST(Standstill, AConsumerThatStandsStillForFiveSecondsLosesNothing) {
-  FakeWeb web(FakeWeb::page(xml("1")));
+  FakeWeb web(FakeWeb::page(streaming_xml(1)));
   FakeBox box({.records_per_datagram = 1});
   const SteadyClock clock;
   LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock, Command::real_time);

@@ -77,6 +77,24 @@ TEST_F(UdpSocketTest, CountsWhatItsBufferCouldNotHold) {
   EXPECT_EQ(last[0].dropped, sent - received) << "the datagram behind the drops tells how many there were";
 }
 
+TEST_F(UdpSocketTest, ASmallBufferToleratesTheStallThatItTellsAndNoMore) {
+  UdpSocket small("127.0.0.1", box.port(), 64 << 10);
+  const std::string note =
+      tolerated_stall(small.receive_buffer_bytes(), 36, std::chrono::nanoseconds(1'000'000'000 / 7000));
+  EXPECT_EQ(note, "0.1 MiB, tolerates 22 ms; for longer set net.core.rmem_max to 4194304");
+  socklen_t length = sizeof own;
+  getsockname(small.native_handle(), reinterpret_cast<sockaddr*>(&own), &length);
+  const auto received_of = [&](std::size_t sent) {
+    for (std::size_t i = 0; i < sent; ++i) send_from(box, 36);
+    std::size_t received = 0;
+    while (const std::size_t count = small.receive().size()) received += count;
+    return received;
+  };
+  const std::size_t held = 22 * 7;
+  EXPECT_EQ(received_of(held), held);
+  EXPECT_LT(received_of(2 * held), 2 * held);
+}
+
 TEST_F(UdpSocketTest, SendsToItsPeer) {
   const std::array<std::uint8_t, 8> request{1, 2, 3, 4, 5, 6, 7, 8};
   EXPECT_TRUE(socket.send(request));

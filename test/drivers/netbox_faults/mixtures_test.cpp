@@ -44,7 +44,7 @@ Fault random_fault(Dice& dice, const Manner& manner) {
   // Within the time and the number of records for which a driver waits for overtaken ones.
   const double period = manner.records_per_datagram * manner.divisor / 7000.0;
   Fault fault;
-  fault.at = from_seconds(dice.real(0.6, 3));
+  fault.at = from_seconds(dice.real(0, 3));
   fault.lasts = from_seconds(dice.real(0.05, 1));
   fault.p = dice.real(0.005, 0.2);
   switch (dice.whole(0, 8)) {
@@ -122,10 +122,6 @@ void add_upheaval(Dice& dice, sim::FaultScript& script) {
   script.push_back(fault);
 }
 
-/// Here one datagram is overtaken right behind a loss that is longer than the driver's window: the driver gives the gap
-/// up at once and calls that datagram late. Its sums close all the same.
-constexpr std::uint64_t kBehindALongGap = 137;
-
 class Mixtures : public testing::TestWithParam<int> {};
 
 TEST_P(Mixtures, AccountEqualsTruth) {
@@ -142,13 +138,6 @@ TEST_P(Mixtures, AccountEqualsTruth) {
     Joined joined(manner, script, seed);
     joined.run_until(8s);
     joined.finish();
-    if (seed == kBehindALongGap) {
-      const Ideal truth = joined.ideal();
-      EXPECT_GT(joined.counters().late, 0u);
-      EXPECT_EQ(joined.counters().received + joined.counters().late, truth.received);
-      EXPECT_EQ(joined.counters().lost_network - joined.counters().late, truth.lost);
-      continue;
-    }
     EXPECT_EQ(joined.disagreement(), "") << "seed " << seed << ", " << (manner.buffered ? "buffered " : "real time ")
                                          << manner.records_per_datagram << ", divisor " << manner.divisor
                                          << ", first ft " << manner.first_ft << "\n"

@@ -1,0 +1,47 @@
+// More records than any box sends, and a host that has other things to do: shorter than the benchmarks of the same
+// name.
+#include <gtest/gtest.h>
+
+#include "test/drivers/netbox/busy_loops.hpp"
+#include "test/drivers/netbox/receivers.hpp"
+
+namespace kphi::netbox {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace test;
+
+/// The cheapest of several runs of each, so that what else the machine does counts for little.
+void expect_cheap(bool buffered) {
+  const BoxProcess box({.records_per_datagram = buffered ? 40u : 1u, .speed = kHasteHz / 7000});
+  double bare_ns = 1e9, driver_ns = 1e9;
+  for (int i = 0; i < 5; ++i) {
+    const std::optional<Pair> pair = measure_pair(box, buffered, 0.3);
+    if (!pair) continue;
+    EXPECT_EQ(pair->driver.lost, 0u);
+    bare_ns = std::min(bare_ns, pair->bare.receiver_ns());
+    driver_ns = std::min(driver_ns, pair->driver.receiver_ns());
+  }
+  if (bare_ns == 1e9) GTEST_SKIP() << "this machine was too busy to send 200 000 records per second";
+  EXPECT_LE(driver_ns / bare_ns, 1.5) << driver_ns << " ns per record against " << bare_ns;
+}
+
+TEST(Load, ABufferedRecordCostsAtMostHalfAsMuchAgainAsInABareLoop) { expect_cheap(true); }
+TEST(Load, ASingleRecordCostsAtMostHalfAsMuchAgainAsInABareLoop) { expect_cheap(false); }
+
+TEST(Load, BesideTwoBusyLoopsNothingIsLostAndNothingIsOld) {
+  const BoxProcess box({});
+  const BusyLoops busy(2);
+  const SteadyClock clock;
+  Driver driver(box.ports(), clock, true);
+  driver.keep_ages = true;
+  const Cost cost = driver.run(3, Driver::Consumer::waits);
+  EXPECT_EQ(cost.lost, 0u);
+  EXPECT_TRUE(driver.in_order);
+  EXPECT_GT(cost.records, 15'000u);
+  const std::vector<Duration>& ages = driver.ages();
+  EXPECT_LT(ages[ages.size() * 99 / 100], 20ms);
+}
+
+}  // namespace
+}  // namespace kphi::netbox
