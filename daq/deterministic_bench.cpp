@@ -98,7 +98,7 @@ DeterministicBench::DeterministicBench(const profiles::Bench& place)
 std::string DeterministicBench::page(const std::string& target) {
   const std::string operation = "GET " + target;
   if (sim_.wire().http_refused(clock_.now())) throw DeviceError("Net Box", operation, "connection refused");
-  const sim::HttpReply reply = sim_.wire().http(operation + " HTTP/1.0\r\n\r\n", clock_.now());
+  const sim::StreamReply reply = sim_.wire().http(operation + " HTTP/1.0\r\n\r\n", clock_.now());
   if (reply.wait > kHttpTimeout) throw DeviceError("Net Box", operation, "no answer in time");
   wait_until(clock_.now() + reply.wait);
   return body_of(reply.bytes, operation);
@@ -109,8 +109,7 @@ void DeterministicBench::read_box() { configuration_ = netbox::parse_configurati
 void DeterministicBench::cross_check() {
   const auto request = netbox::encode_read_calinfo();
   std::string received(request.begin(), request.end());
-  bool close = false;
-  const std::string answer = sim_.netbox().tcp(received, close);
+  const std::string answer = sim_.wire().tcp(received, clock_.now()).bytes;
   const auto calinfo = netbox::decode_calinfo({reinterpret_cast<const std::uint8_t*>(answer.data()), answer.size()});
   if (!calinfo) throw DeviceError("Net Box", "read the calibration over TCP", "the answer is none of a Net Box");
   if (const auto finding = netbox::compare(*calinfo, configuration_))

@@ -48,6 +48,14 @@ results::EventKind event_kind_of(netbox::EventKind kind) noexcept {
       return To::rdt_disabled;
     case From::unreachable:
       return To::unreachable;
+    case From::unusable:
+      return To::unusable;
+    case From::reconnected:
+      return To::reconnected;
+    case From::configuration_changed:
+      return To::configuration_changed;
+    case From::given_up:
+      return To::given_up;
   }
   return To::box_trouble;
 }

@@ -25,6 +25,8 @@ constexpr Meaning kMeanings[] = {
     {EventKind::silent, Doubt::silent, EventKind::resumed},
     {EventKind::box_trouble, Doubt::box_trouble, std::nullopt},
     {EventKind::stolen, Doubt::stolen, EventKind::resumed},
+    {EventKind::unusable, Doubt::configuration_changed, EventKind::configuration_changed},
+    {EventKind::configuration_changed, Doubt::configuration_changed, EventKind::configuration_changed},
 };
 
 Nanoseconds end_of(const Meaning& meaning, std::span<const StreamEvent> later, Nanoseconds begin) {

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <atomic>
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <thread>
 
 #include "daq/slot_pages.hpp"
@@ -25,6 +28,33 @@ iq::Settings motor_settings(const profiles::MotorPlace& place) {
   settings.module_id = place.module_id;
   settings.telemetry_hz = place.telemetry_hz;
   return settings;
+}
+
+netbox::Place rdt_place(const profiles::NetBoxPlace& place) { return {place.host, place.rdt_port, place.http_port}; }
+
+netbox::WantedSettings wanted_settings(const profiles::NetBoxPlace& place) {
+  netbox::WantedSettings wanted;
+  if (place.settings.rate_hz) wanted.rate_hz = static_cast<int>(std::lround(*place.settings.rate_hz));
+  wanted.records_per_datagram = place.settings.records_per_datagram;
+  wanted.configuration = place.settings.configuration;
+  if (!place.settings.filter_hz) return wanted;
+  for (int code = 0; const auto cutoff_hz = netbox::filter_cutoff_hz(code); ++code) {
+    if (*cutoff_hz == *place.settings.filter_hz) wanted.filter = code;
+  }
+  return wanted;
+}
+
+/// Where the next program finds what a killed one has left changed in this box.
+std::filesystem::path settings_journal(const profiles::NetBoxPlace& place) {
+  const auto variable = [](const char* name) { return std::string(std::getenv(name) ? std::getenv(name) : ""); };
+  std::filesystem::path folder = variable("XDG_STATE_HOME");
+  if (folder.empty()) {
+    folder = variable("HOME").empty() ? std::filesystem::temp_directory_path()
+                                      : std::filesystem::path(variable("HOME")) / ".local" / "state";
+  }
+  std::string name = fmt::format("netbox_{}_{}.journal", place.host, place.http_port);
+  std::replace(name.begin(), name.end(), '/', '_');
+  return folder / "kphi" / name;
 }
 
 class Thread final : public Background {
@@ -66,9 +96,13 @@ std::string LiveMotor::failure() const {
   return failure;
 }
 
-LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock) : place_(std::move(place)), clock_(clock) {
-  // Whether the box answers at all is asked before anybody mounts anything.
-  cell_ = std::make_unique<netbox::LoadCell>(netbox::Place{place_.host, place_.rdt_port, place_.http_port}, clock_);
+LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock)
+    : place_(std::move(place)),
+      clock_(clock),
+      settings_(rdt_place(place_), wanted_settings(place_), settings_journal(place_)),
+      // Whether the box answers at all is asked before anybody mounts anything.
+      cell_(std::make_unique<netbox::LoadCell>(rdt_place(place_), clock_)),
+      findings_(settings_.notes()) {
   if (auto finding = netbox::cross_check(place_.host, place_.tcp_port, configuration(), kCalinfoTimeout)) {
     if (finding->severity == netbox::Severity::fault)
       throw DeviceError("Net Box " + place_.host, "compare its scale", finding->what, finding->next_move);
@@ -82,7 +116,7 @@ LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock) : pl
 
 results::LoadCellScale LiveLoadCell::start() {
   cell_.reset();
-  cell_ = std::make_unique<netbox::LoadCell>(netbox::Place{place_.host, place_.rdt_port, place_.http_port}, clock_);
+  cell_ = std::make_unique<netbox::LoadCell>(rdt_place(place_), clock_);
   const netbox::Configuration& found = cell_->configuration();
   if (std::abs(found.rdt_rate_hz - place_.rate_hz) > 0.5) {
     throw DeviceError(

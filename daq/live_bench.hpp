@@ -8,6 +8,7 @@
 #include "daq/device_records.hpp"
 #include "drivers/iq/motor.hpp"
 #include "drivers/netbox/load_cell.hpp"
+#include "drivers/netbox/settings.hpp"
 
 namespace kphi::daq {
 
@@ -28,7 +29,8 @@ class LiveMotor final : public MotorLink {
 
 class LiveLoadCell final : public LoadCellLink {
  public:
-  /// Reads the configuration, holds it against what TCP says, reads the pages of all slots. Throws DeviceError.
+  /// Sets the box as the bench file wants it, reads the configuration, holds it against what TCP says, reads the pages
+  /// of all slots. The box's settings come back when this dies, or when the next program starts. Throws DeviceError.
   LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock);
   [[nodiscard]] const netbox::Configuration& configuration() const override { return cell_->configuration(); }
   [[nodiscard]] std::vector<netbox::Finding> findings() const override { return findings_; }
@@ -44,6 +46,7 @@ class LiveLoadCell final : public LoadCellLink {
  private:
   profiles::NetBoxPlace place_;
   const Clock& clock_;
+  netbox::SettingsKeeper settings_;
   std::unique_ptr<netbox::LoadCell> cell_;  ///< of the present or last run
   std::vector<netbox::StampedRecord> records_;
   std::vector<netbox::Finding> findings_;

@@ -33,7 +33,7 @@ constexpr int kLinesOfEvents = 10;
 bool explains_silence(results::EventKind kind) {
   using results::EventKind;
   return kind == EventKind::stolen || kind == EventKind::rdt_disabled || kind == EventKind::unreachable ||
-         kind == EventKind::resumed;
+         kind == EventKind::unusable ||         kind == EventKind::resumed;
 }
 
 results::RunHeader header_of(const RunOrder& order, Bench& bench, const results::LoadCellScale& scale) {

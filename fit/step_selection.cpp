@@ -15,7 +15,7 @@ struct DoubtPolicy {
   bool spoils;
 };
 
-constexpr std::array<DoubtPolicy, 13> kPolicy{{
+constexpr std::array<DoubtPolicy, 14> kPolicy{{
     {Doubt::speed_not_reached, "commanded speed not reached", true},
     {Doubt::speed_unsteady, "speed never settled", true},
     {Doubt::saturated, "load cell saturated", true},
@@ -29,6 +29,7 @@ constexpr std::array<DoubtPolicy, 13> kPolicy{{
     {Doubt::silent, "load cell fell silent", true},
     {Doubt::box_trouble, "load cell's box saw its communication fail", false},
     {Doubt::stolen, "another client took the stream", true},
+    {Doubt::configuration_changed, "load cell's box was set otherwise", true},
 }};
 
 bool has(std::uint32_t doubts, Doubt doubt) { return (doubts & static_cast<std::uint32_t>(doubt)) != 0; }

@@ -144,10 +144,15 @@ enum class EventKind : std::uint8_t {
   near_range,    ///< an axis above 80 % of its range; the first time in a run
   beyond_range,  ///< at 100 % or more; the first time in a run
   range_trip,    ///< above 110 %: the motor was let go
+  unusable,      ///< silent or booted, and now set so that nothing can be measured with it
+  reconnected,   ///< started again after a silence
+  configuration_changed,  ///< its counts mean something else since then
+  given_up,               ///< no reconnection in time
 };
-inline constexpr std::array<const char*, 13> kEventNames{
-    "restarted", "rebooted",     "stalled",     "stall_ended", "silent",       "resumed",   "box_trouble",
-    "stolen",    "rdt_disabled", "unreachable", "near_range",  "beyond_range", "range_trip"};
+inline constexpr std::array<const char*, 17> kEventNames{
+    "restarted", "rebooted",     "stalled",     "stall_ended", "silent",       "resumed",
+    "box_trouble", "stolen",    "rdt_disabled", "unreachable", "near_range",  "beyond_range", "range_trip",
+    "unusable", "reconnected", "configuration_changed", "given_up"};
 [[nodiscard]] constexpr const char* name_of(EventKind kind) { return kEventNames[static_cast<std::size_t>(kind)]; }
 
 struct StreamEvent {

@@ -23,6 +23,7 @@ enum class Doubt : std::uint32_t {
   silent = 1u << 10,            ///< no record for long within the step
   box_trouble = 1u << 11,       ///< the box saw its own communication fail within the step
   stolen = 1u << 12,            ///< another client took the stream within the step
+  configuration_changed = 1u << 13,  ///< the box was set otherwise within the step or before it in the run
 };
 
 struct StepMean {

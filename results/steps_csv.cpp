@@ -67,6 +67,7 @@ constexpr std::array kDoubtNames{
     std::pair{Doubt::silent, std::string_view("silent")},
     std::pair{Doubt::box_trouble, std::string_view("box_trouble")},
     std::pair{Doubt::stolen, std::string_view("stolen")},
+    std::pair{Doubt::configuration_changed, std::string_view("configuration_changed")},
 };
 
 std::string quoted(const std::string& text) {
