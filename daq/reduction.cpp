@@ -10,6 +10,7 @@
 
 #include "daq/clock_map.hpp"
 #include "daq/event_doubts.hpp"
+#include "daq/zero_limits.hpp"
 #include "results/record_error.hpp"
 
 namespace kphi::daq {
@@ -34,6 +35,8 @@ constexpr double kSpeedShare = 0.01;   // of the command
 constexpr double kSpeedReached = 2.0;  // rad/s
 constexpr double kSpeedSteady = 5.0;   // rad/s
 constexpr double kFewSamples = 0.1;    // of those expected
+constexpr double kMostSamples =
+    0.9;  // of the window's: a restart of the box leaves a gap that ft_sequence does not show
 constexpr std::uint64_t kFewSpeeds = 3;
 
 double speed_tolerance(double commanded) { return std::max(kSpeedShare * commanded, kSpeedReached); }
@@ -207,6 +210,7 @@ struct Zero {
   double time = 0;   ///< ns, centre of its window
   double force = 0;  ///< counts
   double torque = 0;
+  double force_deviation = 0;
   std::size_t boot = 0;  ///< a zero holds for one power-up of the box
 };
 
@@ -222,7 +226,15 @@ class Zeros {
     const Zero& b = *zeros_[1];
     if (a.boot != b.boot) return b.boot == boot ? b : a;
     const double share = (time - a.time) / (b.time - a.time);
-    return {time, a.force + share * (b.force - a.force), a.torque + share * (b.torque - a.torque), boot};
+    return {time, a.force + share * (b.force - a.force), a.torque + share * (b.torque - a.torque), 0, boot};
+  }
+  /// Counts from before to after; NaN when nobody can tell.
+  [[nodiscard]] double movement() const {
+    if (!zeros_[1] || zeros_[0]->boot != zeros_[1]->boot) return std::numeric_limits<double>::quiet_NaN();
+    return zeros_[1]->force - zeros_[0]->force;
+  }
+  [[nodiscard]] double largest_deviation() const {
+    return std::max(zeros_[0]->force_deviation, zeros_[1] ? zeros_[1]->force_deviation : 0.0);
   }
 
  private:
@@ -234,13 +246,18 @@ class Reduction {
   explicit Reduction(const results::RunRecording& run)
       : run_(run), cell_(run), motor_(run.motor), spans_(doubt_spans(run.events)) {}
 
-  [[nodiscard]] std::vector<StepMean> steps() {
+  [[nodiscard]] Reduced reduced() {
     find_zeros();
-    std::vector<StepMean> means;
+    Reduced found;
     for (std::size_t i = 0; i < run_.phases.size(); ++i) {
-      if (run_.phases[i].phase == Phase::step && held_to_its_end(i)) means.push_back(mean_of(i));
+      if (run_.phases[i].phase == Phase::step && held_to_its_end(i)) found.steps.push_back(mean_of(i));
     }
-    return means;
+    if (zeros_.empty()) return found;
+    found.zero = check_zeros(found.steps);
+    const std::uint32_t doubts = (found.zero.drifted() ? static_cast<std::uint32_t>(Doubt::zero_drifted) : 0u) |
+                                 (found.zero.noisy() ? static_cast<std::uint32_t>(Doubt::zero_noisy) : 0u);
+    for (StepMean& step : found.steps) step.doubts |= doubts;
+    return found;
   }
 
  private:
@@ -248,6 +265,15 @@ class Reduction {
     return {run_.phases[i].time_ns, run_.phases[i + 1].time_ns};
   }
   [[nodiscard]] Nanoseconds discard() const { return std::llround(1e9 * run_.header.minimum_discard_s); }
+
+  [[nodiscard]] ZeroCheck check_zeros(const std::vector<StepMean>& steps) const {
+    const results::RunHeader& header = run_.header;
+    double largest_thrust_n = 0;  // NaN of a step without samples is none
+    for (const StepMean& step : steps) largest_thrust_n = std::fmax(largest_thrust_n, std::abs(step.thrust_n));
+    const double newtons = header.thrust_sign / header.load_cell.counts_per_newton;
+    return {newtons * zeros_.movement(), tolerated_drift(largest_thrust_n),
+            std::abs(newtons) * zeros_.largest_deviation()};
+  }
 
   /// The step that an abort cut short is followed by whatever made the bench safe, never by another step.
   [[nodiscard]] bool held_to_its_end(std::size_t i) const {
@@ -269,7 +295,8 @@ class Reduction {
       window = cell_.since_reboot(window);
       const CellWindow zero = cell_.over(window);
       if (zero.force.n() == 0) continue;
-      zeros_.add({window.centre(), zero.force.mean(), zero.torque.mean(), cell_.boot_at(window.end)});
+      zeros_.add(
+          {window.centre(), zero.force.mean(), zero.torque.mean(), zero.force.deviation(), cell_.boot_at(window.end)});
     }
   }
 
@@ -355,7 +382,9 @@ class Reduction {
     note(Doubt::speed_not_reached, !(std::abs(speed.mean - commanded) <= speed_tolerance(commanded)));
     note(Doubt::speed_unsteady, speed.deviation > std::max(kSpeedShare * std::abs(speed.mean), kSpeedSteady));
     note(Doubt::saturated, (cell.status & kSaturationBit) != 0 || cell.at_limit);
-    note(Doubt::lost_samples, cell.lost > 0);
+    const double whole_window =
+        1e-9 * static_cast<double>(window.end - window.begin) * run_.header.load_cell.sample_rate_hz;
+    note(Doubt::lost_samples, cell.lost > 0 || static_cast<double>(cell.force.n()) < kMostSamples * whole_window);
     note(Doubt::derated, derate < 1);
     note(Doubt::rebooted, cell_.boot_at(whole.end) != zeros_.boot());
     note(Doubt::few_samples,
@@ -384,9 +413,15 @@ void require_usable(const results::RunHeader& header) {
 
 }  // namespace
 
-std::vector<StepMean> reduce(const results::RunRecording& run) {
+bool ZeroCheck::drifted() const { return std::abs(moved_n) > tolerated_n; }
+
+bool ZeroCheck::noisy() const { return deviation_n > kNoisyZero; }
+
+Reduced reduce_with_zeros(const results::RunRecording& run) {
   require_usable(run.header);
-  return Reduction(run).steps();
+  return Reduction(run).reduced();
 }
+
+std::vector<StepMean> reduce(const results::RunRecording& run) { return reduce_with_zeros(run).steps; }
 
 }  // namespace kphi::daq

@@ -15,7 +15,7 @@ struct DoubtPolicy {
   bool spoils;
 };
 
-constexpr std::array<DoubtPolicy, 14> kPolicy{{
+constexpr std::array<DoubtPolicy, 16> kPolicy{{
     {Doubt::speed_not_reached, "commanded speed not reached", true},
     {Doubt::speed_unsteady, "speed never settled", true},
     {Doubt::saturated, "load cell saturated", true},
@@ -30,6 +30,8 @@ constexpr std::array<DoubtPolicy, 14> kPolicy{{
     {Doubt::box_trouble, "load cell's box saw its communication fail", false},
     {Doubt::stolen, "another client took the stream", true},
     {Doubt::configuration_changed, "load cell's box was set otherwise", true},
+    {Doubt::zero_drifted, "load cell's zero drifted during the run", true},
+    {Doubt::zero_noisy, "load cell was not at rest at a zero", true},
 }};
 
 bool has(std::uint32_t doubts, Doubt doubt) { return (doubts & static_cast<std::uint32_t>(doubt)) != 0; }

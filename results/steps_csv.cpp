@@ -68,6 +68,8 @@ constexpr std::array kDoubtNames{
     std::pair{Doubt::box_trouble, std::string_view("box_trouble")},
     std::pair{Doubt::stolen, std::string_view("stolen")},
     std::pair{Doubt::configuration_changed, std::string_view("configuration_changed")},
+    std::pair{Doubt::zero_drifted, std::string_view("zero_drifted")},
+    std::pair{Doubt::zero_noisy, std::string_view("zero_noisy")},
 };
 
 std::string quoted(const std::string& text) {

@@ -73,6 +73,39 @@ TEST(Reduction, ADriftingZeroIsInterpolatedInTime) {
   }
 }
 
+TEST(Reduction, AZeroThatMovesFurtherThanToleratedPutsAllStepsInDoubt) {
+  Truth truth;  // 1.7 N at most: 0.02 N are tolerated; 10 s from zero to zero
+  truth.noise_n = 0.001;
+  truth.drift_n_per_s = 0.0018;
+  for (const StepMean& step : reduce(make_run(truth))) EXPECT_EQ(results::doubt_names(step.doubts), "");
+  truth.drift_n_per_s = 0.0024;
+  const Reduced reduced = reduce_with_zeros(make_run(truth));
+  EXPECT_NEAR(reduced.zero.moved_n, truth.sign * 0.0024 * 9.5, 0.002);
+  EXPECT_EQ(reduced.zero.tolerated_n, 0.02);
+  ASSERT_EQ(reduced.steps.size(), 3u);
+  for (const StepMean& step : reduced.steps) EXPECT_EQ(results::doubt_names(step.doubts), "zero_drifted");
+}
+
+TEST(Reduction, ALargeThrustToleratesHalfAPercentOfDrift) {
+  Truth truth;
+  truth.noise_n = 0.001;
+  truth.k = 1.2e-5;  // 17.3 N
+  truth.drift_n_per_s = 0.0072;
+  const Reduced tolerated = reduce_with_zeros(make_run(truth));
+  EXPECT_NEAR(tolerated.zero.tolerated_n, 0.0864, 0.0002);
+  EXPECT_EQ(results::doubt_names(tolerated.steps[0].doubts), "");
+  truth.drift_n_per_s = 0.0105;
+  EXPECT_EQ(results::doubt_names(reduce(make_run(truth))[0].doubts), "zero_drifted");
+}
+
+TEST(Reduction, ANoisyZeroPutsAllStepsInDoubt) {
+  Truth truth;
+  truth.noise_n = 0.14;
+  for (const StepMean& step : reduce(make_run(truth))) EXPECT_FALSE(has(step, Doubt::zero_noisy));
+  truth.noise_n = 0.16;
+  for (const StepMean& step : reduce(make_run(truth))) EXPECT_TRUE(has(step, Doubt::zero_noisy));
+}
+
 TEST(Reduction, ASlowMotorShrinksTheWindowInsteadOfSpoilingTheMean) {
   Truth truth;
   truth.noise_n = 0.001;
@@ -166,6 +199,17 @@ TEST(Reduction, AZeroHoldsForOnePowerUpOfTheBox) {
   EXPECT_TRUE(has(steps[1], Doubt::rebooted));
   EXPECT_EQ(results::doubt_names(steps[2].doubts), "rebooted");
   EXPECT_NEAR(k_of(steps[2]), truth.k, 0.005 * truth.k) << "the zero after the run is of the same power-up";
+}
+
+TEST(Reduction, AGapThatARestartOfTheBoxHidesIsLostAllTheSame) {
+  RunRecording run = rebooted_run(0);
+  const auto cut = [&](std::ptrdiff_t from, std::ptrdiff_t to) {
+    run.load_cell.erase(run.load_cell.begin() + from, run.load_cell.begin() + to);
+  };
+  cut(4000, 4050);
+  EXPECT_FALSE(has(reduce(run)[1], Doubt::lost_samples)) << "a twentieth of the window";
+  cut(4000, 4250);
+  EXPECT_TRUE(has(reduce(run)[1], Doubt::lost_samples)) << "nearly a third";
 }
 
 TEST(Reduction, AZeroAfterARestartOfTheBoxIsAGoodZero) {
