@@ -56,6 +56,8 @@ class LoadCellLink {
   virtual std::size_t take(std::span<results::LoadCellRecord> out) = 0;
   /// What happened to the stream since the last call, oldest first. The recorder's thread.
   [[nodiscard]] virtual std::vector<results::StreamEvent> take_events() = 0;
+  /// netftapi2.xml of the box as it is now. The runner's thread. Throws DeviceError.
+  [[nodiscard]] virtual std::string page() = 0;
   /// Tells the box to take its present load as zero; the stream goes on. The runner's thread.
   virtual void set_bias() noexcept = 0;
   /// Why the stream is dead; empty while it lives. Any thread.

@@ -9,7 +9,9 @@
 #include "daq/reduction.hpp"
 #include "daq/repetitions.hpp"
 #include "daq/run.hpp"
+#include "daq/zero_limits.hpp"
 #include "profiles/plan.hpp"
+#include "profiles/strict_yaml.hpp"
 #include "results/journal.hpp"
 #include "results/run_reader.hpp"
 #include "results/sha256.hpp"
@@ -39,10 +41,16 @@ class CampaignRun {
   CampaignResult run() {
     results::write_text(folder_.campaign_file(), campaign_.text, bench_.files());
     results::write_text(folder_.bench_file(), place_.text, bench_.files());
-    note("campaign_started", {{"tool_version", kVersion},
-                              {"campaign_sha256", results::sha256(campaign_.text)},
-                              {"bench_sha256", results::sha256(place_.text)},
-                              {"motor", bench_.motor().identity()}});
+    json started{{"tool_version", kVersion},
+                 {"campaign_sha256", results::sha256(campaign_.text)},
+                 {"bench_sha256", results::sha256(place_.text)},
+                 {"motor", bench_.motor().identity()}};
+    if (place_.simulation && !place_.simulation->faults.empty()) {
+      const std::string faults = profiles::read_text(place_.simulation->faults);
+      results::write_text(folder_.faults_file(), faults, bench_.files());
+      started["faults_sha256"] = results::sha256(faults);
+    }
+    note("campaign_started", started);
     try {
       audit();
       for (const profiles::PlannedRun& planned : plan_.runs) one(planned);
@@ -90,7 +98,7 @@ class CampaignRun {
 
   void accept(const RunResult& run) {
     const results::RunRecording recording = results::read_run(run.file);
-    const auto means = reduce(recording);
+    const auto [means, zero] = reduce_with_zeros(recording);
     steps_.insert(steps_.end(), means.begin(), means.end());
     results::write_steps(folder_.steps(), steps_, bench_.files());
     results::write_steps(folder_.means(), average_repetitions(steps_), bench_.files());
@@ -101,6 +109,7 @@ class CampaignRun {
                      {"lost", lost}};
     for (const results::StreamEvent& event : recording.events) accepted["events"].push_back(event.text);
     note(results::kRunAccepted, accepted);
+    tell(zero);
     int doubtful = 0;
     for (const auto& step : means) doubtful += step.doubts != 0;
     ++result_.runs;
@@ -111,6 +120,21 @@ class CampaignRun {
     progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps in doubt", result_.runs,
                               plan_.runs.size(), run.file.filename().string(), run.account.received, lost, doubtful,
                               means.size()));
+  }
+
+  void tell(const ZeroCheck& zero) {
+    if (zero.drifted()) {
+      progress_.say(fmt::format(
+          "load cell: its zero moved by {:.3g} N during this run, {:.2g} N are tolerated: all its steps are "
+          "in doubt; let the cell warm up, keep draughts off it, see that nothing touches it",
+          zero.moved_n, zero.tolerated_n));
+    }
+    if (zero.noisy()) {
+      progress_.say(
+          fmt::format("load cell: at a zero of this run the samples scatter by {:.3g} N, {:g} N are tolerated: "
+                      "all its steps are in doubt; {}",
+                      zero.deviation_n, kNoisyZero, kZeroNextMove));
+    }
   }
 
   void note(const std::string& event, const json& data) {

@@ -104,7 +104,7 @@ std::string DeterministicBench::page(const std::string& target) {
   return body_of(reply.bytes, operation);
 }
 
-void DeterministicBench::read_box() { configuration_ = netbox::parse_configuration(page("/netftapi2.xml")); }
+void DeterministicBench::read_box() { configuration_ = netbox::parse_configuration(page()); }
 
 void DeterministicBench::cross_check() {
   const auto request = netbox::encode_read_calinfo();

@@ -43,6 +43,7 @@ class DeterministicBench final : public Bench, private MotorLink, private LoadCe
   void stop() noexcept override;
   std::size_t take(std::span<results::LoadCellRecord> out) override;
   [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+  [[nodiscard]] std::string page() override { return page("/netftapi2.xml"); }
   void set_bias() noexcept override;
   [[nodiscard]] results::SampleAccount account() const override;
   [[nodiscard]] results::StreamHealth health() const override;

@@ -18,6 +18,8 @@ struct Observation {
   Celsius coil_temperature;
   Duration load_cell_age{};
   Duration motor_age{};
+  bool load_cell_is_fresh = true;  ///< no older than the stream's and this host's delay: thrust is what is now
+  bool motor_is_fresh = true;      ///< likewise, of speed, current and temperature
 };
 
 /// A limit that was passed, in words: "thrust 21.3 N is above 20 N".

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <atomic>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -57,6 +57,10 @@ std::filesystem::path settings_journal(const profiles::NetBoxPlace& place) {
   return folder / "kphi" / name;
 }
 
+std::string page_of(const profiles::NetBoxPlace& place, const std::string& target) {
+  return netbox::http_get(place.host, place.http_port, target, kPageTimeout);
+}
+
 class Thread final : public Background {
  public:
   explicit Thread(std::function<void()> work)
@@ -108,8 +112,7 @@ LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock)
       throw DeviceError("Net Box " + place_.host, "compare its scale", finding->what, finding->next_move);
     findings_.push_back(std::move(*finding));
   }
-  SlotPages slots = read_slot_pages(
-      [&](const std::string& target) { return netbox::http_get(place_.host, place_.http_port, target, kPageTimeout); });
+  SlotPages slots = read_slot_pages([&](const std::string& target) { return page_of(place_, target); });
   slots_json_ = std::move(slots.json);
   findings_.insert(findings_.end(), slots.findings.begin(), slots.findings.end());
 }
@@ -135,6 +138,8 @@ std::vector<results::StreamEvent> LiveLoadCell::take_events() {
   for (const netbox::Event& event : cell_->take_events()) events.push_back(to_event(event));
   return events;
 }
+
+std::string LiveLoadCell::page() { return page_of(place_, "/netftapi2.xml"); }
 
 void LiveLoadCell::stop() noexcept { cell_->stop(); }
 

@@ -38,6 +38,7 @@ class LiveLoadCell final : public LoadCellLink {
   void stop() noexcept override;
   std::size_t take(std::span<results::LoadCellRecord> out) override;
   [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+  [[nodiscard]] std::string page() override;
   void set_bias() noexcept override { cell_->set_bias(); }
   [[nodiscard]] std::string failure() const override;
   [[nodiscard]] results::SampleAccount account() const override;

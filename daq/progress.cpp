@@ -28,6 +28,14 @@ std::string cut(const std::string& line, std::size_t columns) {
   return line;
 }
 
+/// What no longer comes, and for how long.
+std::string silence(const Observation& seen) {
+  std::string words;
+  if (!seen.motor_is_fresh) words += fmt::format("  no speed for {:.1f} s", to_seconds(seen.motor_age));
+  if (!seen.load_cell_is_fresh) words += fmt::format("  no thrust for {:.1f} s", to_seconds(seen.load_cell_age));
+  return words;
+}
+
 }  // namespace
 
 std::string describe(const Position& position, const Observation& seen) {
@@ -35,9 +43,11 @@ std::string describe(const Position& position, const Observation& seen) {
                                         position.repetition, position.repetitions);
   const std::string what = position.step < 0 ? fmt::format("{:<10}", position.phase)
                                              : fmt::format("step {:2}/{}", position.step + 1, position.steps);
-  return fmt::format("{}  {}  cmd {:5.0f}  is {:5.0f} RPM  thrust {:6.3f} N  left {}", where, what,
-                     to_rpm(position.commanded), to_rpm(seen.speed), seen.thrust.value(),
-                     minutes_and_seconds(position.remaining_s));
+  return fmt::format("{}  {}  cmd {:5.0f}  is {} RPM  thrust {} N  left {}", where, what, to_rpm(position.commanded),
+                     seen.motor_is_fresh ? fmt::format("{:5.0f}", to_rpm(seen.speed)) : "    ?",
+                     seen.load_cell_is_fresh ? fmt::format("{:6.3f}", seen.thrust.value()) : "     ?",
+                     minutes_and_seconds(position.remaining_s)) +
+         silence(seen);
 }
 
 TerminalProgress::~TerminalProgress() { clear(); }

@@ -36,7 +36,9 @@ class Recorder {
   [[nodiscard]] std::vector<results::StreamEvent> take_events();
   /// The load cell is in danger: an axis above 110 % of its range. Says which, and how much.
   [[nodiscard]] std::optional<std::string> range_trip() const;
-  /// Mean and standard deviation of all axes over the present phase, which measures a bias.
+  /// For what the runner found out by itself, once nobody drains any more.
+  void note(const results::StreamEvent& event);
+  /// Mean and standard deviation of all axes over the present phase, which measures a bias or the zero before.
   [[nodiscard]] netbox::ZeroMeasurement measured() const noexcept { return measured_.read(); }
   /// The mean thrust of the current phase becomes the zero of observe().
   void take_zero() noexcept;
@@ -51,7 +53,6 @@ class Recorder {
   void drain_marks();
   void drain_events();
   void look_at(std::span<const results::LoadCellRecord> batch);
-  void note(results::StreamEvent event);
   void note_range(netbox::RangeVerdict verdict, results::Nanoseconds at);
 
   Bench& bench_;
@@ -62,6 +63,7 @@ class Recorder {
   netbox::RangeVerdict worst_ = netbox::RangeVerdict::inside;
   bool measuring_ = false;
   netbox::ZeroEstimate estimate_;
+  const Duration fresh_load_cell_, fresh_motor_;
   Instant next_sync_;
   std::vector<results::LoadCellRecord> records_;
   std::vector<results::MotorReading> readings_;

@@ -8,7 +8,9 @@
 #include <optional>
 
 #include "daq/box_bias.hpp"
+#include "daq/box_configuration.hpp"
 #include "daq/interrupt.hpp"
+#include "daq/load_cell_audit.hpp"
 #include "daq/recorder.hpp"
 #include "daq/spin.hpp"
 #include "drivers/device_error.hpp"
@@ -27,13 +29,14 @@ constexpr double kSpinDownLimitSeconds = 30.0;
 constexpr Duration kBiasWorksWall = std::chrono::milliseconds(100);  // what was on its way still has the old zero
 constexpr Duration kExplanationWall = std::chrono::seconds(3);       // the box is asked over HTTP for 2 s
 constexpr int kBiasAttempts = 3;
+constexpr int kReadings = 2;  // of the box's configuration at the end; a page may be lost
 constexpr int kLinesOfEvents = 10;
 
 /// The box has been asked why it is silent, or is so no more.
 bool explains_silence(results::EventKind kind) {
   using results::EventKind;
   return kind == EventKind::stolen || kind == EventKind::rdt_disabled || kind == EventKind::unreachable ||
-         kind == EventKind::unusable ||         kind == EventKind::resumed;
+         kind == EventKind::unusable || kind == EventKind::resumed;
 }
 
 results::RunHeader header_of(const RunOrder& order, Bench& bench, const results::LoadCellScale& scale) {
@@ -82,6 +85,7 @@ class Sequence {
     wait_for_standstill();
     if (order_.campaign.box_bias) take_box_bias();
     hold_zero(Phase::zero_before);
+    require_rest();
     recorder_.take_zero();
     spin_through_the_steps();
     wait_for_standstill();
@@ -91,11 +95,22 @@ class Sequence {
 
   [[nodiscard]] const results::BoxBias& box_bias() const { return box_bias_; }
 
+  /// After the stream has ended, and nobody drains any more.
+  void compare_configuration(int attempts) {
+    const auto event = configuration_event(
+        bench_.load_cell().configuration(), box_bias_.records > 0, [&] { return bench_.load_cell().page(); },
+        [&] { return bench_.clock().now(); }, attempts);
+    if (!event) return;
+    recorder_.note(*event);
+    progress_.say("load cell: " + event->text);
+  }
+
   /// After a stop: when the load cell has fallen silent, why, as far as the box tells; else empty.
   std::string explanation() {
     const Instant since = bench_.clock().now();
     const auto stretched = [&](Duration wall) { return bench_.clock().stretched(wall); };
     if (recorder_.observe(since).load_cell_age < stretched(kPatienceWall) / 2) return {};
+    if (!standstill_.empty()) return "; " + standstill_;
     while (bench_.clock().now() < since + stretched(kExplanationWall) && !stop_asked_()) {
       for (const results::StreamEvent& event : recorder_.take_events()) {
         if (explains_silence(event.kind)) return "; " + event.text;
@@ -108,7 +123,7 @@ class Sequence {
  private:
   void take_box_bias() {
     const netbox::ZeroMeasurement before = measure(Phase::bias_before);
-    if (const auto why = unrest(before)) throw DeviceError("Net Box", "take the bias", *why, kBiasNextMove);
+    if (const auto why = unrest(before)) throw DeviceError("Net Box", "take the bias", *why, kZeroNextMove);
     // The box takes one noisy sample as its zero: a bad draw is drawn again.
     for (int attempt = 1;; ++attempt) {
       set_box_bias();
@@ -116,7 +131,7 @@ class Sequence {
       box_bias_ = to_bias(before, after);
       const auto remains = beyond_zero(after);
       if (!remains) return;
-      if (attempt == kBiasAttempts) throw DeviceError("Net Box", "take the bias", *remains, kBiasNextMove);
+      if (attempt == kBiasAttempts) throw DeviceError("Net Box", "take the bias", *remains, kZeroNextMove);
     }
   }
 
@@ -158,6 +173,18 @@ class Sequence {
     recorder_.mark(phase, -1, RadPerSec(0));
     hold(from_seconds(order_.campaign.zero.value()), nullptr);
     progress_.step_done(position_, seen_);
+  }
+
+  /// Nothing turns while the cell is not at rest: the zero would be worth nothing, and all that is measured against it.
+  void require_rest() {
+    while (!seen_.load_cell_is_fresh) hold(bench_.clock().stretched(kTickWall), nullptr);  // check() ends this
+    const auto axis = static_cast<std::size_t>(order_.place.thrust_axis);
+    const double deviation = recorder_.measured().standard_deviation[axis];
+    if (deviation <= kNoisyZero) return;
+    throw DeviceError(
+        "Net Box", "take the zero",
+        fmt::format("F{} is noisy: deviation {:.3g} N where {:g} N are tolerated", "xyz"[axis], deviation, kNoisyZero),
+        kZeroNextMove);
   }
 
   void wait_for_standstill() {
@@ -202,6 +229,8 @@ class Sequence {
 
   void tell_events() {
     for (const results::StreamEvent& event : recorder_.take_events()) {
+      if (event.kind == results::EventKind::stalled) standstill_ = event.text;
+      if (event.kind == results::EventKind::stall_ended) standstill_.clear();
       if (told_ < kLinesOfEvents) progress_.say("load cell: " + event.text);
       if (++told_ == kLinesOfEvents)
         progress_.say("load cell: what else happens in this run is in its file: kphi info");
@@ -217,6 +246,7 @@ class Sequence {
   Observation seen_;
   Instant end_{};
   int told_ = 0;
+  std::string standstill_;  ///< of the box's measurement, as told; empty while it measures
   results::BoxBias box_bias_;
 };
 
@@ -234,6 +264,16 @@ class Streaming {
   results::LoadCellScale scale_;
 };
 
+/// A box that was set otherwise since it was read last must still suit the campaign. Throws ConfigurationError.
+void judge_changes(const netbox::Configuration& before, const LoadCellLink& cell, const RunOrder& order,
+                   Progress& progress) {
+  const netbox::Changes changes = changes_since(before, cell.configuration(), order.campaign.box_bias);
+  if (changes == 0) return;
+  progress.say("load cell: the box is configured otherwise than when it was read last: " + netbox::to_words(changes) +
+               "; this run is recorded with its present scale");
+  (void)audit_load_cell(cell, order.campaign, order.place);
+}
+
 std::string what(const std::exception_ptr& cause) {
   try {
     std::rethrow_exception(cause);
@@ -241,6 +281,16 @@ std::string what(const std::exception_ptr& cause) {
     return e.what();
   } catch (...) {
     return "unknown";
+  }
+}
+
+bool is_interrupted(const std::exception_ptr& cause) {
+  try {
+    std::rethrow_exception(cause);
+  } catch (const Interrupted&) {
+    return true;
+  } catch (...) {
+    return false;
   }
 }
 
@@ -268,7 +318,9 @@ std::string utc_text(const Clock& clock, Instant when) {
 }
 
 RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, const std::function<bool()>& stop_asked) {
+  const netbox::Configuration before = bench.load_cell().configuration();
   std::optional<Streaming> streaming(std::in_place, bench.load_cell());
+  judge_changes(before, bench.load_cell(), order, progress);
   results::RunWriter writer(order.file, header_of(order, bench, streaming->scale()), bench.files());
   Recorder recorder(bench, writer, {order.place.thrust_axis, order.place.thrust_sign}, streaming->scale());
   Sequence sequence(bench, recorder, order, progress, stop_asked);
@@ -288,8 +340,15 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   if (!cause) {
     try {
       recorder.check_failure();
+      sequence.compare_configuration(kReadings);
     } catch (...) {
       cause = std::current_exception();
+    }
+  }
+  if (cause && explanation.empty() && !is_interrupted(cause)) {
+    try {
+      sequence.compare_configuration(1);  // units that changed can look like a limit that was passed
+    } catch (const results::RecordError&) {
     }
   }
   const results::SampleAccount account = bench.load_cell().account();

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>
@@ -60,6 +61,7 @@ profiles::Bench load_simulated(const Options& options) {
   }
   if (options.time_scale) bench.simulation->time_scale = *options.time_scale;
   if (options.seed) bench.simulation->seed = *options.seed;
+  if (!options.faults.empty()) bench.simulation->faults = options.faults;
   return bench;
 }
 
@@ -95,8 +97,7 @@ ServerSettings settings_of(const profiles::Bench& bench, const Options& options)
   settings.rdt_port = options.free_ports ? 0 : bench.netbox.rdt_port;
   settings.http_port = options.free_ports ? 0 : bench.netbox.http_port;
   settings.tcp_port = options.free_ports ? 0 : bench.netbox.tcp_port;
-  const std::string& faults = options.faults.empty() ? bench.simulation->faults : options.faults;
-  if (!faults.empty()) load_faults(faults, settings.bench);
+  if (!bench.simulation->faults.empty()) load_faults(bench.simulation->faults, settings.bench);
   if (!options.truth_log.empty()) settings.bench.keep = FaultyWire::Keep::datagrams;
   settings.device = bench.iq.device;
   settings.control = bench.simulation->control;
@@ -118,6 +119,9 @@ std::string resolved_text(const profiles::Bench& bench, const Addresses& address
   file["simulation"]["control"] = addresses.control;
   file["simulation"]["time_scale"] = fmt::format("{}", bench.simulation->time_scale);
   file["simulation"]["seed"] = bench.simulation->seed;
+  // The copy may lie in another folder.
+  const std::string& faults = bench.simulation->faults;
+  if (!faults.empty()) file["simulation"]["faults"] = std::filesystem::absolute(faults).string();
   return YAML::Dump(file) + "\n";
 }
 
@@ -156,7 +160,7 @@ void serve(const profiles::Bench& bench, const Options& options) {
   std::signal(SIGTERM, SIG_DFL);
   running = nullptr;
   if (!options.truth_log.empty()) write_file(options.truth_log, json_lines(server.truth()));
-  if (!options.faults.empty()) fmt::print(stderr, "kphi sim: {}\n", summary(server.truth()));
+  if (!bench.simulation->faults.empty()) fmt::print(stderr, "kphi sim: {}\n", summary(server.truth()));
   const auto& unsent = server.unsent();
   if (unsent.datagrams + unsent.motor_bytes > 0) {
     fmt::print(stderr, "kphi sim: not sent for want of room: {} datagrams, {} motor bytes\n", unsent.datagrams,

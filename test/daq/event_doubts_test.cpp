@@ -37,6 +37,14 @@ TEST(EventDoubts, ASilenceThatDoesNotEndConcernsAllThatFollows) {
   EXPECT_EQ(doubts(events, 1000, 2000), "silent+stolen");
 }
 
+TEST(EventDoubts, AnotherConfigurationConcernsTheWholeRunBecauseNobodyKnowsSinceWhen) {
+  for (const EventKind kind : {EventKind::configuration_changed, EventKind::unusable}) {
+    const std::vector<StreamEvent> events{{kind, 150, 0, ""}};
+    EXPECT_EQ(doubts(events, 0, 100), "configuration_changed");
+    EXPECT_EQ(doubts(events, 200, 300), "configuration_changed");
+  }
+}
+
 TEST(EventDoubts, RangesAndRestartsOfTheBoxShowInTheSamplesThemselves) {
   for (const EventKind kind : {EventKind::near_range, EventKind::beyond_range, EventKind::rebooted}) {
     EXPECT_TRUE(doubt_spans(std::vector<StreamEvent>{{kind, 5, 0, ""}}).empty());

@@ -42,6 +42,7 @@ class QueueBench final : public Bench, private MotorLink, private LoadCellLink {
   void stop() noexcept override {}
   std::size_t take(std::span<results::LoadCellRecord> out) override { return move_out(records, out); }
   [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return std::exchange(events, {}); }
+  std::string page() override { return {}; }
   void set_bias() noexcept override {}
   [[nodiscard]] results::SampleAccount account() const override { return {}; }
   [[nodiscard]] results::StreamHealth health() const override { return {}; }
