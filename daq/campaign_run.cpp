@@ -123,7 +123,9 @@ class CampaignRun {
   }
 
   void tell(const ZeroCheck& zero) {
-    if (zero.drifted()) {
+    if (zero.only_one) {
+      progress_.say("load cell: only one of the two zeros of this run could be taken: all its steps are in doubt");
+    } else if (zero.drifted()) {
       progress_.say(fmt::format(
           "load cell: its zero moved by {:.3g} N during this run, {:.2g} N are tolerated: all its steps are "
           "in doubt; let the cell warm up, keep draughts off it, see that nothing touches it",

@@ -218,6 +218,7 @@ class Zeros {
  public:
   void add(const Zero& zero) { (zeros_[0] ? zeros_[1] : zeros_[0]) = zero; }
   [[nodiscard]] bool empty() const { return !zeros_[0]; }
+  [[nodiscard]] bool both() const { return zeros_[1].has_value(); }
   /// Power-up of the first zero: the only one without doubt.
   [[nodiscard]] std::size_t boot() const { return zeros_[0]->boot; }
   [[nodiscard]] Zero at(double time, std::size_t boot) const {
@@ -272,7 +273,8 @@ class Reduction {
     for (const StepMean& step : steps) largest_thrust_n = std::fmax(largest_thrust_n, std::abs(step.thrust_n));
     const double newtons = header.thrust_sign / header.load_cell.counts_per_newton;
     return {newtons * zeros_.movement(), tolerated_drift(largest_thrust_n),
-            std::abs(newtons) * zeros_.largest_deviation()};
+            std::abs(newtons) * zeros_.largest_deviation(),
+            run_.outcome == results::Outcome::complete && !zeros_.both()};
   }
 
   /// The step that an abort cut short is followed by whatever made the bench safe, never by another step.
@@ -413,7 +415,7 @@ void require_usable(const results::RunHeader& header) {
 
 }  // namespace
 
-bool ZeroCheck::drifted() const { return std::abs(moved_n) > tolerated_n; }
+bool ZeroCheck::drifted() const { return only_one || std::abs(moved_n) > tolerated_n; }
 
 bool ZeroCheck::noisy() const { return deviation_n > kNoisyZero; }
 

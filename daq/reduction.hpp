@@ -13,6 +13,7 @@ struct ZeroCheck {
   double moved_n = 0;      ///< from before to after; NaN with one of them only, or when the box started anew between
   double tolerated_n = 0;  ///< of moved_n
   double deviation_n = 0;  ///< of the samples, the larger one
+  bool only_one = false;   ///< in a run that was finished: nobody knows how far it moved
   [[nodiscard]] bool drifted() const;
   [[nodiscard]] bool noisy() const;
 };

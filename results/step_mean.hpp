@@ -24,8 +24,8 @@ enum class Doubt : std::uint32_t {
   box_trouble = 1u << 11,            ///< the box saw its own communication fail within the step
   stolen = 1u << 12,                 ///< another client took the stream within the step
   configuration_changed = 1u << 13,  ///< the box was set otherwise at some time of the run
-  zero_drifted = 1u << 14,           ///< the zeros before and after the run differ by more than is tolerated
-  zero_noisy = 1u << 15,             ///< the samples of a zero of the run scatter by more than is tolerated
+  zero_drifted = 1u << 14,  ///< the zeros before and after the run differ by more than is tolerated, or one is missing
+  zero_noisy = 1u << 15,    ///< the samples of a zero of the run scatter by more than is tolerated
 };
 
 struct StepMean {

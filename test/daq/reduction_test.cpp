@@ -20,6 +20,7 @@ using results::Doubt;
 using results::RunRecording;
 using results::StepMean;
 using results::test::make_run;
+using results::test::spin_down_at;
 using results::test::Truth;
 
 bool has(const StepMean& step, Doubt doubt) { return (step.doubts & static_cast<std::uint32_t>(doubt)) != 0; }
@@ -84,6 +85,19 @@ TEST(Reduction, AZeroThatMovesFurtherThanToleratedPutsAllStepsInDoubt) {
   EXPECT_EQ(reduced.zero.tolerated_n, 0.02);
   ASSERT_EQ(reduced.steps.size(), 3u);
   for (const StepMean& step : reduced.steps) EXPECT_EQ(results::doubt_names(step.doubts), "zero_drifted");
+}
+
+TEST(Reduction, ARunWithoutOneOfItsZerosIsInDoubtBecauseNobodyKnowsHowFarItMoved) {
+  const Truth truth;
+  RunRecording run = make_run(truth);
+  const auto last = static_cast<results::Nanoseconds>(1e9 * spin_down_at(truth));
+  std::erase_if(run.load_cell, [&](const auto& record) { return record.arrival_ns > last; });
+  for (const StepMean& step : reduce(run)) {
+    EXPECT_EQ(results::doubt_names(step.doubts), "zero_drifted");
+    EXPECT_NEAR(k_of(step), truth.k, 0.02 * truth.k);
+  }
+  run.outcome = results::Outcome::aborted;
+  EXPECT_EQ(results::doubt_names(reduce(run)[0].doubts), "") << "that it lacks the second zero is known";
 }
 
 TEST(Reduction, ALargeThrustToleratesHalfAPercentOfDrift) {
