@@ -131,6 +131,7 @@ nlohmann::ordered_json to_json(const iq::ClockGain& gain) {
 iq::ProbeSettings probe_settings(const profiles::MotorPlace& place, std::optional<double> clock_gain_s) {
   iq::ProbeSettings settings;
   settings.intention.speed_max_rad_s = place.speed_max.value();
+  settings.intention.clock_unchecked = !place.clock_gain && !clock_gain_s;
   if (place.clock_gain && !clock_gain_s) settings.intention.uid = place.clock_gain->uid;
   if (clock_gain_s) {
     settings.clock_gain.emplace();

@@ -273,6 +273,12 @@ std::optional<Finding> no_feed_forward(const AuditRecord& module, const Intentio
                  "identify it for this propeller: V = ff1 w + ff2 w^2, ff2 is near 3e-7 for 5 inches");
 }
 
+std::optional<Finding> unchecked_clock(const AuditRecord&, const Intention& intention) {
+  if (!intention.clock_unchecked) return std::nullopt;
+  return Finding{Severity::note, "the module's clock is unchecked: its speeds may be off by some tenths of a percent",
+                 "kphi devices --bench FILE --clock-gain measures it"};
+}
+
 constexpr Check kChecks[] = {untold,
                              other_module,
                              wrong_style,
@@ -300,7 +306,8 @@ constexpr Check kChecks[] = {untold,
                              high_current,
                              no_control,
                              no_feed_forward,
-                             slewing};
+                             slewing,
+                             unchecked_clock};
 
 std::string value_text(const Entry& entry, double value) {
   return entry.format == Format::f32 ? fmt::format("{}", static_cast<float>(value)) : fmt::format("{:.0f}", value);

@@ -127,6 +127,7 @@ struct Intention {
   double speed_max_rad_s = 0;       ///< fastest step
   double coil_temperature_max_degc = 0;
   bool hobby_input_allowed = false;  ///< false: refuse a module whose hobby input may also command it
+  bool clock_unchecked = false;      ///< no gain of the module's clock is known: note it
   std::string uid;                   ///< of the module expected: one seen before, or the clock gain's
 };
 

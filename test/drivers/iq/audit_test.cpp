@@ -218,6 +218,8 @@ INSTANTIATE_TEST_SUITE_P(
              Severity::warning, "limited to 50 V/s", "100 or more"},
         Case{"Slew", [](Values& v, Intention&) { set<"brushless_drive.slew_enable">(v, 1); }, Severity::note,
              "limited to 500 V/s", ""},
+        Case{"UncheckedClock", [](Values&, Intention& i) { i.clock_unchecked = true; }, Severity::note,
+             "clock is unchecked", "--clock-gain"},
         Case{"NoControl",
              [](Values& v, Intention&) {
                set<"propeller_motor_control.velocity_Kp">(v, 0);
