@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <fstream>
-#include <regex>
+#include <iterator>
 
 #include "drivers/device_error.hpp"
 
@@ -30,6 +30,21 @@ std::optional<Number> number(const std::string& text, int base) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return value;
+}
+
+/// Four hexadecimal digits, or '*' for any.
+bool read_id(const std::string& text, std::optional<std::uint16_t>& id) {
+  if (text == "*") return true;
+  if (text.size() == 4) id = number<std::uint16_t>(text, 16);
+  return id.has_value();
+}
+
+/// "1-1.2", or with an interface "1-1.2:1.0".
+bool is_socket(const std::string& text) {
+  if (text.empty() || text.find_first_not_of("0123456789-.:") != std::string::npos) return false;
+  const auto dash = text.find('-');
+  return dash != 0 && dash != std::string::npos && dash == text.rfind('-') && dash + 1 < text.size() &&
+         text.find(':') == text.rfind(':');
 }
 
 bool has(const fs::path& folder, const char* attribute) {
@@ -102,11 +117,24 @@ std::string Adapter::line() const {
 }
 
 std::optional<Wanted> Wanted::parse(const std::string& specification) {
-  static const std::regex kForm(
-      R"(usb:([0-9a-fA-F]{4}|\*):([0-9a-fA-F]{4}|\*)(?::([^:@].*?))??(?:@(\d+-\d+(?:\.\d+)*(?::\d+\.\d+)?))?)");
-  std::smatch part;
-  if (!std::regex_match(specification, part, kForm)) return std::nullopt;
-  return Wanted{number<std::uint16_t>(part[1], 16), number<std::uint16_t>(part[2], 16), part[3], part[4]};
+  if (!specification.starts_with("usb:")) return std::nullopt;
+  std::string rest = specification.substr(4);
+  Wanted wanted;
+  if (const auto at = rest.rfind('@'); at != std::string::npos && is_socket(rest.substr(at + 1))) {
+    wanted.port = rest.substr(at + 1);
+    rest.resize(at);
+  }
+  const auto colon = rest.find(':');
+  if (colon == std::string::npos) return std::nullopt;
+  const auto second = rest.find(':', colon + 1);
+  if (second != std::string::npos) {
+    wanted.serial = rest.substr(second + 1);
+    if (wanted.serial.empty() || wanted.serial[0] == ':' || wanted.serial[0] == '@') return std::nullopt;
+    rest.resize(second);
+  }
+  if (!read_id(rest.substr(0, colon), wanted.vendor)) return std::nullopt;
+  if (!read_id(rest.substr(colon + 1), wanted.product)) return std::nullopt;
+  return wanted;
 }
 
 bool Wanted::fits(const Adapter& adapter) const {
