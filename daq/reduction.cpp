@@ -10,6 +10,8 @@
 
 #include "daq/clock_map.hpp"
 #include "daq/event_doubts.hpp"
+#include "profiles/bench.hpp"
+#include "profiles/configuration_error.hpp"
 #include "results/record_error.hpp"
 
 namespace kphi::daq {
@@ -35,6 +37,18 @@ constexpr double kSpeedReached = 2.0;  // rad/s
 constexpr double kSpeedSteady = 5.0;   // rad/s
 constexpr double kFewSamples = 0.1;    // of those expected
 constexpr std::uint64_t kFewSpeeds = 3;
+
+/// True speed per reported speed: the gain of the motor module's clock, where the run's bench file knows it.
+double clock_factor(const results::RunHeader& header) {
+  if (header.bench_text.find("clock_gain") == std::string::npos) return 1;
+  try {
+    const auto gain = profiles::parse_bench(header.bench_text, "bench.yaml").iq.clock_gain;
+    return gain ? gain->factor : 1;
+  } catch (const ConfigurationError& error) {
+    throw results::RecordError(fmt::format("run {}: the clock gain in its bench file cannot be read: {}; see kphi info",
+                                           header.uuid, error.what()));
+  }
+}
 
 double speed_tolerance(double commanded) { return std::max(kSpeedShare * commanded, kSpeedReached); }
 
@@ -232,7 +246,7 @@ class Zeros {
 class Reduction {
  public:
   explicit Reduction(const results::RunRecording& run)
-      : run_(run), cell_(run), motor_(run.motor), spans_(doubt_spans(run.events)) {}
+      : run_(run), clock_factor_(clock_factor(run.header)), cell_(run), motor_(run.motor), spans_(doubt_spans(run.events)) {}
 
   [[nodiscard]] std::vector<StepMean> steps() {
     find_zeros();
@@ -322,8 +336,8 @@ class Reduction {
     mean.repetition = header.repetition;
     mean.step = mark.step;
     mean.commanded_speed_rad_s = mark.speed_rad_s;
-    mean.speed_rad_s = speed.mean;
-    mean.speed_sd_rad_s = speed.deviation;
+    mean.speed_rad_s = clock_factor_ * speed.mean;
+    mean.speed_sd_rad_s = clock_factor_ * speed.deviation;
     mean.speed_n = speed.n;
     mean.thrust_n = cell.force.n() > 0 ? newtons * (cell.force.mean() - zero.force) : nan;
     mean.thrust_sd_n = std::abs(newtons) * cell.force.deviation();
@@ -367,6 +381,7 @@ class Reduction {
   }
 
   const results::RunRecording& run_;
+  const double clock_factor_;
   CellStream cell_;
   MotorSeries motor_;
   std::vector<DoubtSpan> spans_;

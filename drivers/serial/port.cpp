@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "drivers/device_error.hpp"
+#include "drivers/serial/discovery.hpp"
 
 namespace kphi::serial {
 namespace {
@@ -116,14 +117,17 @@ std::vector<std::string> stable_names() {
   return names;
 }
 
-Port::Port(boost::asio::io_context& io, const std::string& device, unsigned baud) : device_(device), stream_(io) {
+Port::Port(boost::asio::io_context& io, const std::string& specification, unsigned baud)
+    : device_(specification), stream_(io) {
   if (!known_baud(baud)) {
-    throw DeviceError("serial port " + device, "open", fmt::format("{} baud is not a rate this system knows", baud),
+    throw DeviceError("serial port " + specification, "open",
+                      fmt::format("{} baud is not a rate this system knows", baud),
                       fmt::format("use one of {}", fmt::join(kBauds, ", ")));
   }
-  stream_.assign(open_exclusively(device));
+  device_ = path_of(specification);
+  stream_.assign(open_exclusively(device_));
   try {
-    make_raw(native_handle(), device);
+    make_raw(native_handle(), device_);
     using boost::asio::serial_port_base;
     stream_.set_option(serial_port_base::baud_rate(baud));
     stream_.set_option(serial_port_base::character_size(8));
@@ -132,7 +136,7 @@ Port::Port(boost::asio::io_context& io, const std::string& device, unsigned baud
     stream_.set_option(serial_port_base::flow_control(serial_port_base::flow_control::none));
   } catch (const boost::system::system_error& error) {
     ioctl(native_handle(), TIOCNXCL);
-    throw DeviceError("serial port " + device, fmt::format("set {} baud 8N1", baud), error.code().message(),
+    throw DeviceError("serial port " + device_, fmt::format("set {} baud 8N1", baud), error.code().message(),
                       "check that the adapter supports this rate");
   } catch (...) {
     ioctl(native_handle(), TIOCNXCL);

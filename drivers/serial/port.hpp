@@ -16,15 +16,17 @@ namespace kphi::serial {
 
 class Port {
  public:
-  /// Throws DeviceError: unknown baud, no such device, no permission, not a terminal, or in use. A second program is
-  /// refused by TIOCEXCL, root too by flock(2) when it asks the same way.
-  Port(boost::asio::io_context& io, const std::string& device, unsigned baud);
+  /// `specification`: a path, or a USB adapter as discovery.hpp names it. Throws DeviceError: unknown baud, no such
+  /// device, no permission, not a terminal, or in use. A second program is refused by TIOCEXCL, root too by flock(2)
+  /// when it asks the same way.
+  Port(boost::asio::io_context& io, const std::string& specification, unsigned baud);
   ~Port();
   Port(const Port&) = delete;
   Port& operator=(const Port&) = delete;
 
   [[nodiscard]] boost::asio::serial_port& stream() noexcept { return stream_; }
   [[nodiscard]] int native_handle() noexcept { return stream_.native_handle(); }
+  /// The path that was opened.
   [[nodiscard]] const std::string& device() const noexcept { return device_; }
   /// The driver agreed to hand bytes over at once. False on most USB adapters' drivers and on pseudo-terminals.
   [[nodiscard]] bool low_latency() const noexcept { return low_latency_; }
