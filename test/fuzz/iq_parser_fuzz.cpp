@@ -13,7 +13,7 @@ void require(bool condition) {
 void parse(std::span<const std::uint8_t> bytes, std::size_t chunk) {
   kphi::iq::Parser parser;
   std::uint64_t in_packets = 0;
-  const auto sink = [&](const kphi::iq::Packet& packet, std::size_t) {
+  const auto sink = [&](const kphi::iq::Packet& packet, std::uint64_t) {
     require(packet.length <= kphi::iq::kMaxPayload);
     in_packets += packet.length + kphi::iq::kFrameOverhead;
   };

@@ -22,10 +22,10 @@ struct Reception {
   Parser parser;
   std::vector<Bytes> frames;
   void push(std::span<const std::uint8_t> bytes) {
-    parser.push(bytes, [&](const Packet& packet, std::size_t) { frames.push_back(encoded(packet)); });
+    parser.push(bytes, [&](const Packet& packet, std::uint64_t) { frames.push_back(encoded(packet)); });
   }
   void abandon() {
-    parser.abandon([&](const Packet& packet, std::size_t) { frames.push_back(encoded(packet)); });
+    parser.abandon([&](const Packet& packet, std::uint64_t) { frames.push_back(encoded(packet)); });
   }
 };
 
@@ -104,7 +104,7 @@ TEST(Packet, RoundTripsForEveryTypeAndLength) {
       for (std::size_t i = 0; i < length; ++i) packet.payload[i] = static_cast<std::uint8_t>(random());
       std::vector<Packet> received;
       Parser parser;
-      parser.push(encoded(packet), [&](const Packet& p, std::size_t) { received.push_back(p); });
+      parser.push(encoded(packet), [&](const Packet& p, std::uint64_t) { received.push_back(p); });
       ASSERT_EQ(received.size(), 1u);
       ASSERT_TRUE(received[0] == packet);
     }
@@ -140,14 +140,19 @@ TEST(Parser, AccountsForEveryByte) {
   EXPECT_EQ(counters.discarded_bytes, stream.size() - in_packets);
 }
 
-TEST(Parser, TellsHowManyBytesFollowAPacket) {
-  Bytes stream = speed_reply(1);
+TEST(Parser, TellsWhereAPacketEnds) {
+  Bytes stream{0x55, 0x1E, 0x32};
+  append(stream, speed_reply(1));
   append(stream, speed_reply(2));
   append(stream, {0x55, 0x06});
-  std::vector<std::size_t> behind;
+  std::vector<std::uint64_t> ends;
   Parser parser;
-  parser.push(stream, [&](const Packet&, std::size_t n) { behind.push_back(n); });
-  EXPECT_EQ(behind, (std::vector<std::size_t>{13, 2}));
+  const auto note = [&](const Packet&, std::uint64_t end) { ends.push_back(end); };
+  parser.push(std::span(stream).first(5), note);
+  parser.push(std::span(stream).subspan(5), note);
+  EXPECT_TRUE(ends.empty());
+  parser.abandon(note);
+  EXPECT_EQ(ends, (std::vector<std::uint64_t>{14, 25}));
 }
 
 TEST(Parser, TakesBurstsOfTwentyRepliesInOneRead) {

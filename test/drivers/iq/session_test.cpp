@@ -163,10 +163,13 @@ TEST(Connecting, RepeatsASetThatWasLost) {
   Wire wire;
   wire.module.ignore_sets = true;
   wire.session.connect(wire.now);
-  wire.run_for(5ms);
+  const auto sets = [&] {
+    return wire.module.count([](const auto& m) { return m.type == 52 && m.sub == 15 && m.access == 1; });
+  };
+  while (sets() == 0) wire.run_for(1ms);
   wire.module.ignore_sets = false;
   EXPECT_TRUE(wire.run_to_state(State::ready, 1s)) << wire.session.failure();
-  EXPECT_GE(wire.module.count([](const auto& m) { return m.type == 52 && m.sub == 15 && m.access == 1; }), 2u);
+  EXPECT_GE(sets(), 2u);
 }
 
 TEST(Connecting, AcceptsOldFirmwareWithoutTimeoutBehaviour) {
@@ -416,8 +419,10 @@ TEST(Telemetry, AsksBothOfACycleInOneBatch) {
   wire.run_for(100ms);
   wire.batches.clear();
   wire.run_for(1s);
-  EXPECT_EQ(wire.batches.size(), 50u);
-  for (const auto& [time, bytes] : wire.batches) EXPECT_EQ(bytes.size(), 14u);
+  const auto both = [](const auto& batch) { return batch.second.size() >= 14; };
+  EXPECT_EQ(std::count_if(wire.batches.begin(), wire.batches.end(), both), 50 + 2)
+      << "twice it looks for a restart alone";
+  EXPECT_EQ(wire.batches.size(), 50u + 2u);
 }
 
 TEST(Telemetry, IsNotDoubledWhenTheModuleIsSlow) {
@@ -438,6 +443,7 @@ TEST(Telemetry, StaysInsideTheCreditWindow) {
     Settings settings;
     settings.credit_bytes = credit;
     settings.telemetry_hz = 1000;
+    settings.slow_hz = 1000;
     Wire wire(settings);
     wire.latency = 9ms;
     std::size_t most = 0;
@@ -627,7 +633,8 @@ TEST(Replies, ToNothingThatWasAskedAreCounted) {
   wire.deliver(fake::message(200, 1, 3, 0));
   wire.deliver(fake::frame(7, {}));
   wire.run_for(1ms);
-  EXPECT_EQ(wire.session.counters().unasked - before.unasked, 4u);
+  EXPECT_EQ(wire.session.counters().unasked - before.unasked, 3u);
+  EXPECT_EQ(wire.session.counters().unknown_entries - before.unknown_entries, 1u);
 }
 
 TEST(Resync, BringsTheNextReplyWithinOneTimeoutAfterAFalseHeader) {
@@ -655,7 +662,7 @@ TEST(Resync, WaitsForTheSecondHalfOfAFrameFromASlowAdapter) {
     reply.resize(5);
     delay = 1us;
   };
-  wire.module.silent = {{69, 0}, {69, 1}, {50, 36}, {83, 0}, {50, 41}, {50, 0}};
+  wire.module.silent = {{69, 0}, {69, 1}, {50, 36}, {83, 0}, {50, 41}, {50, 0}, {5, 15}, {84, 1}};
   wire.run_for(200ms);
   EXPECT_GE(wire.values(Quantity::speed).size(), 9u);
   EXPECT_EQ(wire.session.counters().resyncs, 0u);
