@@ -64,6 +64,7 @@ void Bus::advance(Instant now) {
 void Bus::settle(Instant now) {
   if (size() == 1) return;
   stop_for_the_silent(now);
+  collect();
   pass_the_line(now);
 }
 

@@ -18,7 +18,7 @@ bool is_volatile_setting(const Entry& wanted) noexcept {
   return wanted.allows(Access::get) && wanted.allows(Access::set) && wanted.allows(Access::save) && !calibrated;
 }
 
-void Inquiries::begin(std::vector<Inquiry> inquiries) {
+void Inquiries::check(const std::vector<Inquiry>& inquiries) {
   for (const Inquiry& inquiry : inquiries) {
     const Entry& wanted = *inquiry.entry;
     if (!wanted.allows(Access::get) || size_of(wanted.format) > 4) {
@@ -29,6 +29,9 @@ void Inquiries::begin(std::vector<Inquiry> inquiries) {
           fmt::format("{}.{} is no setting for passing use", name_of(wanted.type), wanted.name));
     }
   }
+}
+
+void Inquiries::begin(std::vector<Inquiry> inquiries) {
   inquiries_ = std::move(inquiries);
   left_ = inquiries_.size();
   states_.assign(left_, State::waiting);
@@ -63,6 +66,13 @@ void Inquiries::take(const Heard& heard) {
     if (!set_to || replies_[i].accepted || last) finish(i);
     return;
   }
+}
+
+bool Inquiries::sets(const Entry& wanted) const noexcept {
+  for (std::size_t i = 0; i < inquiries_.size(); ++i) {
+    if (states_[i] != State::done && inquiries_[i].entry == &wanted && inquiries_[i].set_to) return true;
+  }
+  return false;
 }
 
 void Inquiries::abandon() noexcept {

@@ -28,13 +28,17 @@ class Inquiries {
  public:
   explicit Inquiries(int module_id) noexcept : module_id_(module_id) {}
 
-  /// Begins anew with these. Throws std::invalid_argument for what may not be read, or not be set in passing.
+  /// Throws std::invalid_argument for what may not be read, or not be set in passing.
+  static void check(const std::vector<Inquiry>& inquiries);
+  /// Begins anew with these, which are checked.
   void begin(std::vector<Inquiry> inquiries);
   void take(const Heard& heard);
   void advance(Exchange& exchange, int system_control_id, Instant now);
   /// Gives the open ones up: the link is gone.
   void abandon() noexcept;
   [[nodiscard]] bool done() const noexcept { return left_ == 0; }
+  /// This one is being set.
+  [[nodiscard]] bool sets(const Entry& entry) const noexcept;
   /// One for each, in order.
   [[nodiscard]] const std::vector<Reply>& replies() const noexcept { return replies_; }
 

@@ -263,6 +263,7 @@ void Link::publish() {
 void Link::lose(const std::string& why) {
   port_.reset();
   congested_ = false;
+  was_ready_.assign(was_ready_.size(), false);
   bus_.lose(why, clock_.now());
   next_attempt_ = steady_clock::now() + reopening_.next();
 }

@@ -13,7 +13,7 @@ namespace kphi::iq {
 class ResetWatch {
  public:
   void begin(const Identity& identity) noexcept;
-  /// The next uptime may be anything: it is being set.
+  /// The next uptime may be anything, and so may fault_ever: one of them is being set.
   void expect_new_time() noexcept { uptime_.reset(); }
   /// What gave the restart away; nothing if there was none.
   [[nodiscard]] std::optional<std::string> take(const Heard& heard);

@@ -70,6 +70,8 @@ StopReport Seat::stop(const StopSettings& settings, Duration lease) {
 }
 
 std::vector<Reply> Seat::inquire(std::vector<Inquiry> inquiries) {
+  Inquiries::check(inquiries);
+  const std::lock_guard turn(inquiring_);
   std::unique_lock lock(mutex_);
   if (state_ != Session::State::ready || ended_) refuse("ask", "wait until it is connected");
   orders_.inquiry = std::move(inquiries);

@@ -73,6 +73,7 @@ class Seat {
   const std::string name_;
   const std::function<void()> ring_;
 
+  std::mutex inquiring_;      ///< owners: one inquiry after the other
   mutable std::mutex mutex_;  ///< owners and the link's thread: everything down to the atomics
   std::condition_variable changed_;
   Orders orders_;

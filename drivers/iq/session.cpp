@@ -105,9 +105,7 @@ void Session::expire_lease(Instant now) {
 void Session::inquire(std::vector<Inquiry> inquiries, Instant now) {
   if (state_ != State::ready) throw std::logic_error("only a module that is connected can be asked");
   if (!inquiries_.done()) throw std::logic_error("one inquiry after the other");
-  for (const Inquiry& inquiry : inquiries) {
-    if (inquiry.set_to && inquiry.entry == &entry<"system_control.time">) reset_watch_.expect_new_time();
-  }
+  Inquiries::check(inquiries);
   inquiries_.begin(std::move(inquiries));
   service(now);
 }
@@ -135,16 +133,17 @@ void Session::take_heard(std::span<const Heard> all, Instant now) {
     if (heard.kind == Heard::Kind::timeout && !silent()) exchange_.ask_fence(settings_.module_id, now);
     if (coasting_.confirmed()) stopping_.confirmed(heard.end);
     if (state_ == State::connecting) connecting_.take(heard);
+    take_restart(heard, now);
     inquiries_.take(heard);
     polling_.take(heard, exchange_.counters());
     if (heard.answers(entry<"brushless_drive.obs_velocity">))
       stopping_.measured(polling_.speed(), polling_.speed_time());
-    take_restart(heard, now);
   }
 }
 
 void Session::take_restart(const Heard& heard, Instant now) {
   if (state_ != State::ready) return;
+  if (inquiries_.sets(heard.entry())) return reset_watch_.expect_new_time();
   const auto sign = reset_watch_.take(heard);
   if (!sign) return;
   ++exchange_.counters().module_resets;

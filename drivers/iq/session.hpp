@@ -80,7 +80,7 @@ class Session {
   /// Of the last stop or coast of a spinning motor that has come to its end; nothing before.
   [[nodiscard]] const std::optional<StopReport>& stop_report() const noexcept { return stopping_.report(); }
 
-  /// Puts questions between the polls. Throws std::invalid_argument as Inquiries::begin does, std::logic_error unless
+  /// Puts questions between the polls. Throws std::invalid_argument as Inquiries::check does, std::logic_error unless
   /// ready or while others are open.
   void inquire(std::vector<Inquiry> inquiries, Instant now);
   [[nodiscard]] const Inquiries& inquiries() const noexcept { return inquiries_; }
