@@ -115,10 +115,10 @@ void Link::turn() {
   try {
     speak();
     publish();
-    sleep();
-    hear();
+    const Woken woken = sleep();
+    if (woken.by_port) hear();
     bus_.advance(clock_.now());
-    obey();
+    if (woken.by_bell) obey();
     keep_leases();
   } catch (const serial::PortGone& gone) {
     lose(gone.what());
@@ -126,17 +126,18 @@ void Link::turn() {
   recover();
 }
 
-void Link::sleep() {
+Link::Woken Link::sleep() {
   const auto left = std::max(due() - steady_clock::now(), steady_clock::duration{0});
   const auto ns = std::chrono::nanoseconds(left).count();
   const timespec limit{static_cast<time_t>(ns / 1'000'000'000), ns % 1'000'000'000};
   pollfd fds[2] = {{bell_, POLLIN, 0}, {-1, 0, 0}};
   if (port_) fds[1] = {port_->fd(), static_cast<short>(congested_ ? POLLIN | POLLOUT : POLLIN), 0};
-  if (ppoll(fds, 2, &limit, nullptr) <= 0) return;
+  if (ppoll(fds, 2, &limit, nullptr) <= 0) return {};
   std::uint64_t rings = 0;
   if (fds[0].revents != 0 && ::read(bell_, &rings, sizeof rings) < 0 && errno != EAGAIN) {
     throw std::system_error(errno, std::generic_category(), "eventfd");
   }
+  return {fds[0].revents != 0, fds[1].revents != 0};
 }
 
 Link::WallTime Link::due() const {
@@ -152,10 +153,9 @@ Link::WallTime Link::due() const {
   return due;
 }
 
+// Reading also finds out that the port is gone.
 void Link::hear() {
-  if (!port_) return;
   std::array<std::uint8_t, 4096> buffer;
-  // Reading an empty port also finds out whether it is still there.
   while (const std::size_t n = port_->read(buffer)) {
     const auto bytes = std::span(buffer).first(n);
     const Instant now = clock_.now();

@@ -45,7 +45,10 @@ class Link {
   // The thread.
   void run() noexcept;
   void turn();
-  void sleep();
+  struct Woken {
+    bool by_bell = false, by_port = false;
+  };
+  Woken sleep();
   [[nodiscard]] WallTime due() const;
   void hear();
   void obey();
