@@ -4,9 +4,14 @@
 
 namespace kphi::iq {
 
-bool Requests::busy(const Entry& entry) const noexcept {
+bool Requests::busy(const Entry& entry, int module_id) const noexcept {
   return std::any_of(requests_.begin(), requests_.begin() + count_,
-                     [&](const Request& request) { return request.entry == &entry; });
+                     [&](const Request& request) { return request.entry == &entry && request.module_id == module_id; });
+}
+
+bool Requests::none_open() const noexcept {
+  return std::none_of(requests_.begin(), requests_.begin() + count_,
+                      [](const Request& request) { return request.entry != nullptr && !request.expired; });
 }
 
 std::size_t Requests::outstanding_bytes() const noexcept {
@@ -19,11 +24,13 @@ void Requests::add(const Request& request) noexcept {
   if (count_ < kRequests) requests_[count_++] = request;
 }
 
-std::optional<Requests::Answer> Requests::answer(std::uint8_t type, std::uint8_t sub) noexcept {
+std::optional<Requests::Answer> Requests::answer(std::uint8_t type, std::uint8_t sub, int module_id) noexcept {
   for (std::size_t i = 0; i < count_; ++i) {
     const Request request = requests_[i];
-    if (request.entry == nullptr || static_cast<std::uint8_t>(request.entry->type) != type || request.entry->sub != sub)
+    if (request.entry == nullptr || request.module_id != module_id || request.entry->sub != sub ||
+        static_cast<std::uint8_t>(request.entry->type) != type) {
       continue;
+    }
     erase(i);
     if (!request.expired) release_before(request.order);
     return Answer{request, request.expired};
@@ -38,8 +45,8 @@ Instant Requests::deadline() const noexcept {
 }
 
 Instant Requests::due(const Request& request) const noexcept {
-  if (!request.expired) return request.started + reply_timeout_;
-  return request.expired_at + reply_timeout_ * (request.overtaken ? 1 : 3);
+  if (!request.expired) return request.started + request.patience;
+  return std::max(request.started + quarantine_ * (request.overtaken ? 2 : 10), request.expired_at + quarantine_);
 }
 
 void Requests::erase(std::size_t at) noexcept {

@@ -29,7 +29,7 @@ constexpr const Entry& kCoast = entry<"propeller_motor_control.ctrl_coast">;
 }  // namespace
 
 SerialDialogue::SerialDialogue(const DialoguePlace& place, const Clock& clock)
-    : place_(place), clock_(clock), port_(io_, place.device, place.baud) {
+    : place_(place), clock_(clock), port_(place.device, place.baud) {
   coast();
   try {
     prove_coast();
@@ -188,12 +188,12 @@ bool SerialDialogue::listen(WallTime until, Sink&& sink) {
 std::size_t SerialDialogue::read(std::span<std::uint8_t> buffer, WallTime until) {
   for (;;) {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - SteadyTime::now());
-    pollfd line{port_.native_handle(), POLLIN, 0};
+    pollfd line{port_.fd(), POLLIN, 0};
     const int ready = ::poll(&line, 1, static_cast<int>(std::max<std::int64_t>(0, left.count())));
     if (ready < 0 && errno == EINTR) continue;
     if (ready < 0) lose("read", std::strerror(errno));
     if (ready == 0) return 0;
-    const auto n = ::read(port_.native_handle(), buffer.data(), buffer.size());
+    const auto n = ::read(port_.fd(), buffer.data(), buffer.size());
     if (n > 0) return static_cast<std::size_t>(n);
     if (n < 0 && (errno == EAGAIN || errno == EINTR)) continue;
     lose("read", n == 0 ? "the line was closed" : std::strerror(errno));
@@ -205,14 +205,14 @@ void SerialDialogue::write(const Packet& packet) {
   const std::size_t size = encode(packet, frame);
   const WallTime until = SteadyTime::now() + kLongestPatience;
   for (std::size_t done = 0; done < size;) {
-    const auto n = ::write(port_.native_handle(), frame.data() + done, size - done);
+    const auto n = ::write(port_.fd(), frame.data() + done, size - done);
     if (n > 0) {
       done += static_cast<std::size_t>(n);
       continue;
     }
     if (n < 0 && errno != EAGAIN && errno != EINTR) lose("write", std::strerror(errno));
     if (SteadyTime::now() > until) lose("write", "the line takes no bytes");
-    pollfd line{port_.native_handle(), POLLOUT, 0};
+    pollfd line{port_.fd(), POLLOUT, 0};
     ::poll(&line, 1, 10);
   }
   counters_.bytes_out += size;

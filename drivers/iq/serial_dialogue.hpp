@@ -2,7 +2,6 @@
 // for measuring with it. The motor coasts from the beginning to the end, and is proven to.
 #pragma once
 
-#include <boost/asio/io_context.hpp>
 #include <chrono>
 #include <span>
 #include <string>
@@ -66,7 +65,6 @@ class SerialDialogue final : public Dialogue {
 
   const DialoguePlace place_;
   const Clock& clock_;
-  boost::asio::io_context io_{1};
   serial::Port port_;
   Parser parser_;
   Counters counters_;

@@ -4,8 +4,8 @@
 #include <sys/ioctl.h>
 #include <umockdev.h>
 
-#include <boost/asio/read.hpp>
-#include <boost/asio/write.hpp>
+#include <array>
+#include <chrono>
 #include <memory>
 
 #include "drivers/device_error.hpp"
@@ -72,18 +72,22 @@ TEST_F(UsbAdapterOnAFakeBus, IsFoundByItsSerialNumberAndCarriesBytes) {
   add(adapter("1-1", "0403:6001", "A10K0000", "ttyUSB0"));
   add(adapter("1-2", "0403:6001", "B20L1111", "ttyUSB1"));
   let_open_exclusively("/dev/ttyUSB1");
-  boost::asio::io_context io;
-  Port port(io, "usb:*:*:B20L1111", 115200);
+  Port port("usb:*:*:B20L1111", 115200);
   EXPECT_EQ(port.device(), "/dev/ttyUSB1");
   const int far_end = umockdev_testbed_get_dev_fd(bed_.get(), "/dev/ttyUSB1");
   ASSERT_GE(far_end, 0);
-  boost::asio::write(port.stream(), boost::asio::buffer("ask", 3));
+  const std::array<std::uint8_t, 3> asked{'a', 's', 'k'};
+  ASSERT_EQ(port.write(asked), asked.size());
   std::string heard(3, ' ');
   ASSERT_EQ(::read(far_end, heard.data(), 3), 3);
   EXPECT_EQ(heard, "ask");
   ASSERT_EQ(::write(far_end, "tell", 4), 4);
-  std::string got(4, ' ');
-  boost::asio::read(port.stream(), boost::asio::buffer(got));
+  std::string got;
+  while (got.size() < 4 && port.wait(std::chrono::seconds(10))) {
+    std::array<std::uint8_t, 16> bytes;
+    const std::size_t n = port.read(bytes);
+    got.append(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(n));
+  }
   EXPECT_EQ(got, "tell");
 }
 
