@@ -11,6 +11,16 @@ namespace {
 constexpr double kSafeToTouch = 5.0;  // rad/s
 // Faults draw from another sequence than the physics, which therefore stays the same with and without them.
 constexpr std::uint64_t kWireStream = 0x5bd1e995'6c62272eull;
+constexpr std::uint64_t kModuleStream = 0x2545f491'4f6cdd1dull;
+
+IqSettings module_of(const BenchSettings& settings) {
+  IqSettings module = settings.module;
+  module.module_id = settings.module_id;
+  module.oscillator_gain = settings.oscillator_gain;
+  module.time_scale = settings.time_scale;
+  module.seed = settings.seed ^ kModuleStream;
+  return module;
+}
 
 /// Exact in integers: no drift of the ticks against the clock.
 constexpr Instant time_of_tick(std::uint64_t tick) noexcept {
@@ -24,7 +34,7 @@ SimulatedBench::SimulatedBench(const BenchSettings& settings)
     : plant_(settings.plant, settings.seed),
       netbox_(settings.netbox),
       wire_(netbox_, settings.faults, settings.seed ^ kWireStream, settings.keep),
-      motor_({settings.module_id, settings.oscillator_gain, settings.time_scale}, plant_.motor()) {}
+      motor_(module_of(settings), plant_.motor()) {}
 
 void SimulatedBench::mount(const std::string& propeller_id, double occlusion_deg) {
   const PropellerTruth* propeller = find_propeller(propeller_id);
@@ -46,7 +56,7 @@ void SimulatedBench::advance(Instant now) {
   for (Instant at = time_of_tick(ticks_ + 1); at <= now; at = time_of_tick(ticks_ + 1)) {
     ++ticks_;
     motor_.advance(at);
-    plant_.step(motor_.drive());
+    plant_.step(motor_.stage());
     wire_.sample({at, plant_.reading()});
   }
 }

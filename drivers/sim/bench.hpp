@@ -19,7 +19,8 @@ struct BenchSettings {
   double time_scale = 1;  ///< stretches the module's communication timeout, nothing else: it is a deadline of wall time
   NetBoxSettings netbox;
   int module_id = 0;
-  double oscillator_gain = 0;  ///< see IqSettings
+  double oscillator_gain = 0;  ///< see IqSettings; none, until those who read the speed correct for it
+  IqSettings module;           ///< the rest of the module: module_id, oscillator_gain, time_scale and seed are of above
   PlantParameters plant;
   FaultScript faults;  ///< of the load cell's wire and box; drawn from `seed`
   FaultyWire::Keep keep = FaultyWire::Keep::totals;
