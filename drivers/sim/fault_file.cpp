@@ -25,7 +25,10 @@ std::map<std::string, YAML::Node> members(const YAML::Node& map, const std::stri
   return all;
 }
 
-Fault read_entry(const YAML::Node& node, const std::string& path) {
+/// Adds the entry to the script if it is of its kind.
+template <class FaultType>
+void read_entry(const YAML::Node& node, const std::string& path, FaultType (*make)(const FaultEntry&), bool of_motor,
+                std::vector<FaultType>& script) {
   FaultEntry entry;
   const auto all = members(node, path);
   for (const auto& [key, value] : all) {
@@ -33,7 +36,7 @@ Fault read_entry(const YAML::Node& node, const std::string& path) {
     entry[key] = value.Scalar();
   }
   try {
-    return fault_of(entry);
+    if (is_motor_fault(entry) == of_motor) script.push_back(make(entry));
   } catch (const FaultEntryError& error) {
     const auto at = all.find(error.key);
     refuse(path, at == all.end() ? node.Mark() : at->second.Mark(), error.what(), "mend this entry");
@@ -48,9 +51,7 @@ YAML::Node parse(const std::string& text, const std::string& path) {
   }
 }
 
-}  // namespace
-
-FaultScript parse_faults(const std::string& text, const std::string& path) {
+YAML::Node entries_of(const std::string& text, const std::string& path) {
   const YAML::Node root = parse(text, path);
   const auto all = members(root, path);
   for (const auto& [key, value] : all) {
@@ -63,8 +64,20 @@ FaultScript parse_faults(const std::string& text, const std::string& path) {
   if (!all.contains("faults") || !all.at("faults").IsSequence()) {
     refuse(path, root.Mark(), "there is no list of faults", "write faults: and a list of entries, or []");
   }
+  return all.at("faults");
+}
+
+}  // namespace
+
+FaultScript parse_faults(const std::string& text, const std::string& path) {
   FaultScript script;
-  for (const auto& entry : all.at("faults")) script.push_back(read_entry(entry, path));
+  for (const auto& entry : entries_of(text, path)) read_entry(entry, path, fault_of, false, script);
+  return script;
+}
+
+MotorFaultScript parse_motor_faults(const std::string& text, const std::string& path) {
+  MotorFaultScript script;
+  for (const auto& entry : entries_of(text, path)) read_entry(entry, path, motor_fault_of, true, script);
   return script;
 }
 
