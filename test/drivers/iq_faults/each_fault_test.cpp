@@ -250,6 +250,22 @@ TEST_P(EachFault, ADumbModuleThatIgnoresTheCoastIsLeftToItsTimeout) {
   EXPECT_EQ(joined->module().timeouts(), 1u);
 }
 
+TEST_P(EachFault, ASpeedTakenBackNeverReachesThePort) {
+  Manner manner = GetParam().manner;
+  manner.port_takes = 2;  // frames wait in the driver
+  joined.emplace(manner, sim::MotorFaultScript{}, 42);
+  joined->run_until(4s);
+  joined->finish();
+  const Instant before = joined->module().last_motion().at;
+  for (int i = 0; i < 50; ++i) {
+    joined->waver();
+    joined->run_until(8s + i * 20ms);
+  }
+  EXPECT_EQ(joined->danger(), "");
+  EXPECT_GT(joined->module().last_motion().at, before) << "the coasts arrive";
+  EXPECT_LT(joined->motor().speed, 1);
+}
+
 TEST_P(EachFault, PhysicsMayGoWrongWithoutTheAccount) {
   for (const FaultEntry& entry : std::vector<FaultEntry>{{{"kind", "motor_hot"}, {"coil_celsius", "150"}},
                                                          {{"kind", "motor_hot"}, {"controller_celsius", "75"}},

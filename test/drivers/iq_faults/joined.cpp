@@ -113,11 +113,16 @@ void Joined::run_until(Instant end) {
 }
 
 void Joined::finish() {
-  const Instant now(static_cast<std::int64_t>(tick_ * 1'000'000 / 7));
   may_spin_ = false;
-  session_.coast(now);
-  coasted_at_ = now;
-  run_until(now + 2s);
+  session_.coast(now());
+  coasted_at_ = now();
+  run_until(now() + 2s);
+}
+
+void Joined::waver() {
+  session_.spin_at(RadPerSec(500), now());
+  session_.coast(now());
+  coasted_ = true;
 }
 
 void Joined::pump(Instant now) {
@@ -131,7 +136,8 @@ void Joined::pump(Instant now) {
   if (session_.deadline() <= now) session_.advance(now);
   connect_again(now);
   command(now);
-  const auto output = session_.output();
+  auto output = session_.output();
+  if (manner_.port_takes > 0) output = output.first(std::min(output.size(), manner_.port_takes));
   if (!output.empty()) {
     watch(output, now);
     line_.send(output, now);

@@ -20,6 +20,7 @@ struct Manner {
   Duration reply_latency = std::chrono::microseconds(100);
   Duration reply_jitter = std::chrono::microseconds(50);
   Duration usb_tick{0};
+  std::size_t port_takes = 0;  ///< bytes that the host's port takes per tick; 0: all
   sim::IqHabits habits;
 };
 
@@ -32,6 +33,9 @@ class Joined {
   void run_until(Instant end);
   /// Coasts and gives the module two seconds to come to rest.
   void finish();
+
+  /// Commands a speed and takes it back at once.
+  void waver();
 
   /// Everything in which the driver's account and what it delivered differ from the truth; empty when nothing does.
   [[nodiscard]] std::string disagreement() const;
@@ -54,6 +58,7 @@ class Joined {
 
  private:
   void pump(Instant now);
+  [[nodiscard]] Instant now() const noexcept { return Instant(static_cast<std::int64_t>(tick_ * 1'000'000 / 7)); }
   void command(Instant now);
   void watch(std::span<const std::uint8_t> bytes, Instant now);
   void connect_again(Instant now);
