@@ -115,7 +115,6 @@ void Joined::run_until(Instant end) {
 void Joined::finish() {
   may_spin_ = false;
   session_.coast(now());
-  coasted_at_ = now();
   run_until(now() + 2s);
 }
 

@@ -53,8 +53,6 @@ class Joined {
   [[nodiscard]] int failures() const noexcept { return failures_; }
   [[nodiscard]] const std::string& first_failure() const noexcept { return first_failure_; }
   [[nodiscard]] Instant ready_at() const noexcept { return ready_at_; }
-  /// Longest time that the module needed from the driver's coast to standing without drive.
-  [[nodiscard]] Instant coasted_at() const noexcept { return coasted_at_; }
 
  private:
   void pump(Instant now);
@@ -75,7 +73,7 @@ class Joined {
   std::uint64_t tick_ = 0;
   bool may_spin_ = true, was_plugged_ = true;
   bool coasted_ = true;  ///< no spin_at() since the last coast on the wire
-  Instant next_command_{0}, reconnect_at_ = kNever, ready_at_{-1}, coasted_at_{-1};
+  Instant next_command_{0}, reconnect_at_ = kNever, ready_at_{-1};
   int commands_ = 0, failures_ = 0, connects_ = 1;
   std::uint64_t forbidden_motions_ = 0;
   Instant forbidden_at_{-1};
