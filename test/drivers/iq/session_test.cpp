@@ -428,24 +428,29 @@ TEST(Telemetry, KeepsABoundedNumberOfReadings) {
 }
 
 TEST(Replies, ThatComeLateNeverAnswerTheNextRequest) {
-  for (const double factor : {1.01, 1.5, 1.99}) {
+  // Alone: what a module answers later leaves after them.
+  for (const double factor : {1.01, 1.5, 1.99, 5.0}) {
     Wire wire;
     wire.connect();
     wire.run_for(500ms);
     wire.readings();
     bool delayed = false;
+    Instant line_free{0};
     wire.spoil = [&](Bytes& reply, Duration& delay) {
-      if (delayed || !is_reply(reply, 50, 13)) return;
-      delayed = true;
-      reply = fake::message(50, 13, 3, 0, fake::f32(999));
-      delay = from_seconds(factor * to_seconds(kTimeout));
+      if (!delayed && is_reply(reply, 50, 13)) {
+        delayed = true;
+        reply = fake::message(50, 13, 3, 0, fake::f32(999));
+        delay = from_seconds(factor * to_seconds(kTimeout));
+      }
+      line_free = std::max(line_free, wire.now + delay);
+      delay = line_free - wire.now;
     };
     wire.run_for(2s);
-    EXPECT_EQ(wire.session.counters().late_replies, 1u) << factor;
-    EXPECT_EQ(wire.session.counters().timeouts, 1u);
+    EXPECT_GE(wire.session.counters().late_replies, 1u) << factor;
+    EXPECT_EQ(wire.session.counters().late_replies, wire.session.counters().timeouts);
     const auto speeds = wire.values(Quantity::speed);
     EXPECT_EQ(std::count(speeds.begin(), speeds.end(), 999.0), 0) << factor;
-    EXPECT_GT(speeds.size(), 80u) << "and polling goes on";
+    EXPECT_GT(static_cast<double>(speeds.size()), 90 - 5 * factor) << "and polling goes on behind it";
   }
 }
 
@@ -613,7 +618,7 @@ TEST(Timeouts, OfALostReplyCostOneGapOfThatEntryAndNoOther) {
   const auto readings = wire.readings();
   const auto speeds =
       std::count_if(readings.begin(), readings.end(), [](const Reading& r) { return r.quantity == Quantity::speed; });
-  EXPECT_GE(speeds, 50 - 11) << "200 ms of quarantine at 50 Hz";
+  EXPECT_GE(speeds, 50 - 4) << "a time-out of 40 ms at 50 Hz: others have overtaken it by then";
   EXPECT_GE(readings.size() - static_cast<std::size_t>(speeds), 49u);
 }
 
