@@ -123,7 +123,12 @@ TEST_P(Mixtures, NothingWrongIsDeliveredAndNothingSpinsOn) {
       EXPECT_GT(joined.silence_after(over), 1h) << "nothing of another module is delivered";
       continue;
     }
-    EXPECT_LT(joined.silence_after(over), joined.failures() == 0 ? recovery(manner) : 3s) << "it recovers";
+    if (joined.module().singing()) {  // old firmware after its time-out, until its supply is switched off and on
+      EXPECT_NE(joined.session().state(), Session::State::ready) << "it does not confirm its coast";
+      continue;
+    }
+    const bool went_on = joined.failures() == 0 && joined.ready_at() < over;
+    EXPECT_LT(joined.silence_after(over), went_on ? recovery(manner) : 3s) << "it recovers";
     EXPECT_EQ(joined.session().state(), Session::State::ready) << joined.session().failure();
   }
 }
