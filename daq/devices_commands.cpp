@@ -9,8 +9,9 @@
 #include <vector>
 
 #include "daq/load_cell_audit.hpp"
-#include "drivers/device_error.hpp"
-#include "drivers/iq/motor.hpp"
+#include "daq/run.hpp"
+#include "drivers/finding.hpp"
+#include "drivers/iq/probe.hpp"
 #include "drivers/netbox/probe.hpp"
 #include "profiles/bench.hpp"
 #include "profiles/campaign.hpp"
@@ -26,6 +27,7 @@ struct Asked {
   std::string bench;
   std::string campaign;
   bool json = false;
+  std::optional<double> clock_gain_s;
 };
 
 struct Answer {
@@ -66,8 +68,12 @@ nlohmann::ordered_json to_json(const netbox::Counters& counters, const netbox::H
           {"queue_high_water", health.queue_high_water}};
 }
 
-const char* word(netbox::Severity severity) {
-  return severity == netbox::Severity::fault ? "fault" : severity == netbox::Severity::warning ? "warning" : "note";
+nlohmann::ordered_json to_json(const std::vector<Finding>& findings) {
+  auto all = nlohmann::ordered_json::array();
+  for (const Finding& finding : findings) {
+    all.push_back({{"severity", name_of(finding.severity)}, {"what", finding.what}, {"next_move", finding.next_move}});
+  }
+  return all;
 }
 
 netbox::ProbeSettings probe_settings(const Asked& asked, const std::optional<profiles::Bench>& bench) {
@@ -85,31 +91,75 @@ Answer ask_load_cell(const profiles::NetBoxPlace& place, const Clock& clock, con
   Answer answer{"Net Box " + place.host, probe.answers(), probe.lines(), {}};
   if (probe.configuration) answer.details["configuration"] = to_json(*probe.configuration);
   if (probe.streamed) answer.details["stream"] = to_json(probe.counters, probe.health);
-  for (const netbox::Finding& finding : probe.findings) {
-    answer.details["findings"].push_back(
-        {{"severity", word(finding.severity)}, {"what", finding.what}, {"next_move", finding.next_move}});
-  }
+  answer.details["findings"] = to_json(probe.findings);
   return answer;
 }
 
-Answer ask_motor(const profiles::MotorPlace& place, const Clock& clock) {
-  Answer answer{"IQ module " + place.device, false, {}, {}};
-  try {
-    iq::Settings settings;
-    settings.module_id = place.module_id;
-    settings.telemetry_hz = place.telemetry_hz;
-    const iq::Motor motor(place.device, place.baud, settings, clock);
-    const iq::Identity identity = motor.identity();
-    answer.answers = true;
-    answer.lines.push_back(identity.summary());
-    answer.details = {{"firmware", identity.firmware_text()},
-                      {"uid", identity.uid_text()},
-                      {"pole_pairs", identity.pole_pairs},
-                      {"fault", identity.fault_now}};
-  } catch (const DeviceError& error) {
-    answer.lines.push_back(std::string("fault: ") + error.what());
-    answer.details = {{"error", error.what()}};
+nlohmann::ordered_json to_json(const iq::AuditRecord& module) {
+  nlohmann::ordered_json all = {{"uid", module.uid()},
+                                {"firmware", module.firmware() ? module.firmware()->text() : ""},
+                                {"hardware", module.hardware() ? module.hardware()->text() : ""},
+                                {"electronics", module.electronics() ? module.electronics()->text() : ""}};
+  auto& parameters = all["parameters"] = nlohmann::ordered_json::object();
+  for (std::size_t i = 0; i < iq::kAuditedCount; ++i) {
+    const iq::Entry& told = *iq::kAudited[i];
+    if (module.values[i]) parameters[fmt::format("{}.{}", name_of(told.type), told.name)] = *module.values[i];
   }
+  return all;
+}
+
+nlohmann::ordered_json to_json(const serial::Adapter& adapter) {
+  nlohmann::ordered_json one = {{"device", adapter.device.string()},
+                                {"specification", adapter.specification()},
+                                {"words", adapter.words},
+                                {"socket", adapter.port}};
+  if (adapter.latency_timer_ms) one["latency_timer_ms"] = *adapter.latency_timer_ms;
+  return one;
+}
+
+nlohmann::ordered_json to_json(const iq::Counters& counters) {
+  return {{"requests", counters.requests},
+          {"replies", counters.replies},
+          {"timeouts", counters.timeouts},
+          {"late_replies", counters.late_replies},
+          {"unasked", counters.unasked},
+          {"wrong_module", counters.wrong_module},
+          {"crc_errors", counters.crc_errors},
+          {"wrong_length", counters.wrong_length},
+          {"discarded_bytes", counters.discarded_bytes}};
+}
+
+nlohmann::ordered_json to_json(const iq::ClockGain& gain) {
+  return {{"factor", gain.factor},         {"u", gain.u_factor},       {"lowest", gain.lowest},
+          {"highest", gain.highest},       {"uid", gain.uid},          {"measured_utc", gain.measured_utc},
+          {"duration_s", gain.duration_s}, {"readings", gain.readings}};
+}
+
+/// What the bench file knows of the module and wants of it.
+iq::ProbeSettings probe_settings(const profiles::MotorPlace& place, std::optional<double> clock_gain_s) {
+  iq::ProbeSettings settings;
+  settings.intention.speed_max_rad_s = place.speed_max.value();
+  settings.intention.clock_unchecked = !place.clock_gain && !clock_gain_s;
+  if (place.clock_gain && !clock_gain_s) settings.intention.uid = place.clock_gain->uid;
+  if (clock_gain_s) {
+    settings.clock_gain.emplace();
+    settings.clock_gain->duration_s = *clock_gain_s;
+  }
+  return settings;
+}
+
+Answer ask_motor(const profiles::MotorPlace& place, const Clock& clock, std::optional<double> clock_gain_s) {
+  iq::Probe probe = iq::probe({place.device, place.baud, place.module_id}, clock, probe_settings(place, clock_gain_s));
+  if (probe.clock_gain) probe.clock_gain->measured_utc = utc_text(clock, clock.now());
+  Answer answer{"IQ module " + place.device, probe.answers(), probe.lines(), {}};
+  if (probe.record) {
+    answer.details = to_json(*probe.record);
+    answer.details["round_trip_ns"] = probe.round_trip.count();
+    answer.details["counters"] = to_json(probe.counters);
+  }
+  if (probe.adapter) answer.details["adapter"] = to_json(*probe.adapter);
+  if (probe.clock_gain) answer.details["clock_gain"] = to_json(*probe.clock_gain);
+  answer.details["findings"] = to_json(probe.findings);
   return answer;
 }
 
@@ -142,7 +192,7 @@ int devices(const Asked& asked) {
   factory.host = kFactoryAddress;
   std::vector<Answer> answers;
   answers.push_back(ask_load_cell(bench ? bench->netbox : factory, clock, probe_settings(asked, bench)));
-  if (bench) answers.push_back(ask_motor(bench->iq, clock));
+  if (bench) answers.push_back(ask_motor(bench->iq, clock, asked.clock_gain_s));
   print(answers, asked.json);
   if (!bench) fmt::print(stderr, "kphi: no bench file: only the Net Box's factory address was asked; use --bench\n");
   for (const Answer& answer : answers) {
@@ -156,10 +206,18 @@ int devices(const Asked& asked) {
 void add_devices(CLI::App& program, int& exit_code) {
   auto asked = std::make_shared<Asked>();
   CLI::App* command = program.add_subcommand("devices", "what answers, who it is, what is wrong with it");
-  command->add_option("--bench", asked->bench, "bench file; without it the Net Box's factory address is asked")
-      ->check(CLI::ExistingFile);
+  CLI::Option* bench =
+      command->add_option("--bench", asked->bench, "bench file; without it the Net Box's factory address is asked")
+          ->check(CLI::ExistingFile);
+  command
+      ->add_option("--clock-gain", asked->clock_gain_s,
+                   "measure the motor module's clock against this host's, for so many seconds of bench time")
+      ->expected(0, 1)
+      ->default_str("60")
+      ->check(CLI::Range(1.0, 1e5))
+      ->needs(bench);
   command->add_option("--campaign", asked->campaign, "campaign file: are rate and ranges good for its speeds?")
-      ->needs("--bench")
+      ->needs(bench)
       ->check(CLI::ExistingFile);
   command->add_flag("--json", asked->json, "for a script");
   command->callback([asked, &exit_code] { exit_code = devices(*asked); });

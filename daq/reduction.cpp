@@ -11,6 +11,8 @@
 #include "daq/clock_map.hpp"
 #include "daq/event_doubts.hpp"
 #include "daq/zero_limits.hpp"
+#include "profiles/bench.hpp"
+#include "profiles/configuration_error.hpp"
 #include "results/record_error.hpp"
 
 namespace kphi::daq {
@@ -38,6 +40,18 @@ constexpr double kFewSamples = 0.1;    // of those expected
 constexpr double kMostSamples =
     0.9;  // of the window's: a restart of the box leaves a gap that ft_sequence does not show
 constexpr std::uint64_t kFewSpeeds = 3;
+
+/// True speed per reported speed: the gain of the motor module's clock, where the run's bench file knows it.
+double clock_factor(const results::RunHeader& header) {
+  if (header.bench_text.find("clock_gain") == std::string::npos) return 1;
+  try {
+    const auto gain = profiles::parse_bench(header.bench_text, "bench.yaml").iq.clock_gain;
+    return gain ? gain->factor : 1;
+  } catch (const ConfigurationError& error) {
+    throw results::RecordError(fmt::format("run {}: the clock gain in its bench file cannot be read: {}; see kphi info",
+                                           header.uuid, error.what()));
+  }
+}
 
 double speed_tolerance(double commanded) { return std::max(kSpeedShare * commanded, kSpeedReached); }
 
@@ -245,7 +259,7 @@ class Zeros {
 class Reduction {
  public:
   explicit Reduction(const results::RunRecording& run)
-      : run_(run), cell_(run), motor_(run.motor), spans_(doubt_spans(run.events)) {}
+      : run_(run), clock_factor_(clock_factor(run.header)), cell_(run), motor_(run.motor), spans_(doubt_spans(run.events)) {}
 
   [[nodiscard]] Reduced reduced() {
     find_zeros();
@@ -351,8 +365,8 @@ class Reduction {
     mean.repetition = header.repetition;
     mean.step = mark.step;
     mean.commanded_speed_rad_s = mark.speed_rad_s;
-    mean.speed_rad_s = speed.mean;
-    mean.speed_sd_rad_s = speed.deviation;
+    mean.speed_rad_s = clock_factor_ * speed.mean;
+    mean.speed_sd_rad_s = clock_factor_ * speed.deviation;
     mean.speed_n = speed.n;
     mean.thrust_n = cell.force.n() > 0 ? newtons * (cell.force.mean() - zero.force) : nan;
     mean.thrust_sd_n = std::abs(newtons) * cell.force.deviation();
@@ -398,6 +412,7 @@ class Reduction {
   }
 
   const results::RunRecording& run_;
+  const double clock_factor_;
   CellStream cell_;
   MotorSeries motor_;
   std::vector<DoubtSpan> spans_;

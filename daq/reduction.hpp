@@ -34,7 +34,9 @@ struct Reduced {
 /// anew in the run, each step takes that of its own power-up if there is one, and all after the first are in doubt.
 /// Standard deviations are those of the samples (n - 1). Speed is unsigned: positive in the direction of the spin.
 /// Zeros that drifted or scatter (zero_limits.hpp) put all steps of the run in doubt.
-/// A motor channel without a reading in the window gives NaN.
+/// Where the bench file of the run knows the gain of the module's clock, the mean speed and its deviation are true
+/// ones: reported speed times gain. Doubts judge the reported speed, which is what the module holds to the command. A
+/// motor channel without a reading in the window gives NaN.
 ///
 /// An aborted run gives the steps before the one that was cut short. Throws RecordError when a run with steps holds no
 /// load-cell samples in any zero window, or its scale cannot be used.

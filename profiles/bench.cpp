@@ -41,6 +41,15 @@ NetBoxPlace read_netbox(ProfileReader& file) {
   return place;
 }
 
+ClockGain read_clock_gain(const ProfileReader& file) {
+  ClockGain gain;
+  gain.factor = file.number("/iq/clock_gain/factor");
+  gain.u_factor = file.number("/iq/clock_gain/u");
+  gain.uid = file.get_or("/iq/clock_gain/uid", gain.uid);
+  gain.measured_utc = file.get_or("/iq/clock_gain/measured_utc", gain.measured_utc);
+  return gain;
+}
+
 MotorPlace read_motor(const ProfileReader& file) {
   MotorPlace place;
   place.device = file.text("/iq/device");
@@ -49,6 +58,7 @@ MotorPlace read_motor(const ProfileReader& file) {
   place.spin = file.get_or("/iq/spin", place.spin);
   place.telemetry_hz = file.get_or("/iq/telemetry_hz", place.telemetry_hz);
   place.speed_max = from_rpm(file.number("/iq/speed_max_rpm"));
+  if (file.has("/iq/clock_gain")) place.clock_gain = read_clock_gain(file);
   return place;
 }
 

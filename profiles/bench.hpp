@@ -27,13 +27,22 @@ struct NetBoxPlace {
   NetBoxSettings settings;         ///< rate and records agree with those above
 };
 
+/// The module's clock against a host's, as `kphi devices --clock-gain` measured it: true speed = reported · factor.
+struct ClockGain {
+  double factor = 1;         ///< module seconds per host second
+  double u_factor = 0;       ///< standard uncertainty
+  std::string uid;           ///< of the module; empty: not said
+  std::string measured_utc;  ///< ISO 8601; empty: not said
+};
+
 struct MotorPlace {
-  std::string device;  ///< /dev/serial/by-id/... or a pty
+  std::string device;  ///< /dev/serial/by-id/..., a pty, or a USB adapter: usb:VID:PID[:SERIAL][@PORT]
   unsigned baud = 115200;
   int module_id = 0;         ///< 0..62
   int spin = +1;             ///< +1 counter-clockwise seen from above, -1 clockwise: the sign of commanded speeds
   double telemetry_hz = 50;  ///< speed readings per second of bench time; the others come in turn
   RadPerSec speed_max;       ///< what this motor may be told at most
+  std::optional<ClockGain> clock_gain;
 };
 
 /// The simulated bench: how fast, from which seed, and where a person tells it what is mounted.

@@ -2,42 +2,18 @@
 
 #include <fmt/format.h>
 
+#include "drivers/iq/version.hpp"
+
 namespace kphi::iq {
-namespace {
 
-std::string style_text(std::uint32_t style) {
-  switch (style) {
-    case 1:
-      return "speed";
-    case 2:
-      return "servo";
-    case 3:
-      return "pulsing";
-    case 4:
-      return "step/dir";
-    case 6:
-      return "pulsing velocity";
-    default:
-      return fmt::format("style {}", style);
-  }
-}
-
-std::string board_text(std::uint32_t word) {
-  return fmt::format("type {}.{} batch {}", word >> 16, word >> 8 & 0xFF, word & 0xFF);
-}
-
-}  // namespace
-
-std::string Identity::firmware_text() const {
-  return fmt::format("{} {}.{}.{}", style_text(firmware >> 20), firmware >> 14 & 0x3F, firmware >> 7 & 0x7F,
-                     firmware & 0x7F);
-}
+std::string Identity::firmware_text() const { return FirmwareVersion(firmware).text(); }
 
 std::string Identity::uid_text() const { return fmt::format("{:08x}{:08x}{:08x}", uid1, uid2, uid3); }
 
 std::string Identity::summary() const {
-  std::string text = fmt::format("firmware {}, hardware {}, electronics {}, uid {}, timeout {} s, ", firmware_text(),
-                                 board_text(hardware), board_text(electronics), uid_text(), timeout_s);
+  std::string text =
+      fmt::format("firmware {}, hardware {}, electronics {}, uid {}, timeout {} s, ", firmware_text(),
+                  BoardVersion(hardware).text(), BoardVersion(electronics).text(), uid_text(), timeout_s);
   text += coil_temperature_client == 0 ? std::string("no coil temperature")
                                        : fmt::format("coil temperature from client {}", coil_temperature_client);
   if (!timeout_behavior_set) text += ", old firmware: plays its song after a timeout";

@@ -19,6 +19,13 @@ struct Identity {
   double timeout_s = 0;               ///< communication timeout, read back; seconds of the module
   bool timeout_behavior_set = false;  ///< false: old firmware, which always coasts and then plays its song
   int coil_temperature_client = 0;    ///< 83, 77 (old firmware), 0: none answers
+  int system_control_id = 0;          ///< where system_control answers: the module's id; on old firmware always 0
+  double uptime_s = -1;               ///< seconds of the module at connection; below 0: not told
+  int fault_ever = -1;                ///< bits of FaultBit at connection; -1: not told
+
+  [[nodiscard]] bool same_module(const Identity& other) const noexcept {
+    return uid1 == other.uid1 && uid2 == other.uid2 && uid3 == other.uid3;
+  }
 
   /// One line for a person.
   [[nodiscard]] std::string summary() const;

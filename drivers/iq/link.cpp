@@ -4,36 +4,37 @@
 #include <poll.h>
 #include <signal.h>
 #include <sys/eventfd.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
-#include <boost/asio/write.hpp>
 #include <cerrno>
-#include <cmath>
+#include <system_error>
 
-#include "drivers/device_error.hpp"
 #include "drivers/iq/motor.hpp"
+#include "drivers/serial/discovery.hpp"
 
 namespace kphi::iq {
 namespace {
 
 using std::chrono::steady_clock;
 constexpr auto kConnectLimit = std::chrono::seconds(10);
-constexpr auto kStopLimit = std::chrono::milliseconds(600);
 constexpr auto kLastWordsLimit = std::chrono::milliseconds(200);
 constexpr auto kLongestNap = std::chrono::seconds(1);
+constexpr auto kPublishEvery = std::chrono::milliseconds(5);
+constexpr auto kFirstPause = std::chrono::milliseconds(50);
+constexpr auto kLongestPause = std::chrono::seconds(1);
 
-Settings stretched(Settings settings, unsigned baud, const Clock& clock) {
-  if (settings.reply_timeout == Duration{0}) settings.reply_timeout = clock.stretched(std::chrono::milliseconds(100));
-  if (settings.wire_byte_time == Duration{0} && baud > 0) settings.wire_byte_time = from_seconds(10.0 / baud);
-  if (settings.longest_silence == Duration{0}) {
-    settings.longest_silence = clock.stretched(from_seconds(settings.module_timeout_s));
+std::vector<Settings> stretched(std::vector<Settings> modules, const std::string& device, unsigned baud,
+                                const Clock& clock) {
+  const bool adapter = serial::adapter_of(device).has_value();
+  for (Settings& settings : modules) {
+    settings.wire_paces |= adapter;
+    if (settings.reply_timeout == Duration{0}) settings.reply_timeout = clock.stretched(std::chrono::milliseconds(100));
+    if (settings.wire_byte_time == Duration{0} && baud > 0) settings.wire_byte_time = from_seconds(10.0 / baud);
+    if (settings.longest_silence == Duration{0}) {
+      settings.longest_silence = clock.stretched(from_seconds(settings.module_timeout_s));
+    }
   }
-  return settings;
-}
-
-std::int64_t nanoseconds(steady_clock::time_point time) noexcept {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count();
+  return modules;
 }
 
 int make_bell() {
@@ -51,288 +52,251 @@ void refuse_signals() noexcept {
 
 }  // namespace
 
-Link::Link(const std::string& device, unsigned baud, Settings settings, const Clock& clock)
+Link::Link(const std::string& device, unsigned baud, const std::vector<Settings>& modules, const Clock& clock,
+           const std::string& capture)
     : device_(device),
+      baud_(baud),
       clock_(clock),
-      port_(io_, device, baud),
-      bell_(io_, make_bell()),
-      timer_(io_),
-      session_(stretched(settings, baud, clock)) {
-  thread_ = std::thread([this] { run(); });
+      bell_(make_bell()),
+      bus_(stretched(modules, device, baud, clock)),
+      reopening_(kFirstPause, kLongestPause),
+      reconnecting_(kFirstPause, kLongestPause),
+      was_ready_(modules.size(), false) {
+  for (const Settings& settings : modules) {
+    const std::string name = modules.size() == 1 ? "motor module on " + device
+                                                 : fmt::format("motor module {} on {}", settings.module_id, device);
+    seats_.push_back(std::make_unique<Seat>(name, [this] { ring(); }));
+  }
   try {
-    wait_until_ready(baud);
+    port_ = std::make_unique<serial::Port>(device, baud);
+    if (!capture.empty()) capture_ = std::make_unique<Capture>(capture);
+    thread_ = std::thread([this] { run(); });
+    wait_until_ready();
   } catch (...) {
-    shut_down();
+    end_thread();
     throw;
   }
 }
 
-Link::~Link() { shut_down(); }
+Link::~Link() { end_thread(); }
 
-void Link::wait_until_ready(unsigned baud) {
-  std::unique_lock lock(mutex_);
-  const bool decided = changed_.wait_for(lock, kConnectLimit, [&] {
-    return ended_ || state_ == Session::State::ready || state_ == Session::State::failed;
-  });
-  if (decided && !ended_ && state_ == Session::State::ready) return;
-  throw DeviceError("motor module on " + device_, fmt::format("connect at {} baud", baud),
-                    decided ? failure_ : std::string("it did not come to an end in time"),
-                    "check its supply, RX and TX, the baud rate and the module id");
+void Link::wait_until_ready() {
+  for (std::size_t i = 0; i < seats_.size(); ++i) {
+    const auto connected = seats_[i]->await_connection(kConnectLimit);
+    if (connected.value_or(false)) continue;
+    throw DeviceError("motor module on " + device_, fmt::format("connect at {} baud", baud_),
+                      connected ? seats_[i]->failure() : std::string("it did not come to an end in time"),
+                      "check its supply, RX and TX, the baud rate and the module id");
+  }
 }
 
-void Link::shut_down() noexcept {
-  if (!thread_.joinable()) return;
-  {
-    const std::lock_guard lock(mutex_);
-    stop_asked_ = true;
-    wanted_speed_.reset();
-  }
+void Link::end_thread() noexcept {
+  quit_ = true;
   ring();
-  thread_.join();
-}
-
-void Link::spin_at(RadPerSec signed_speed) {
-  if (!(std::abs(signed_speed.value()) <= entry<"propeller_motor_control.ctrl_velocity">.max)) {
-    throw std::invalid_argument(fmt::format("speed {} rad/s is beyond what the module takes", signed_speed.value()));
-  }
-  {
-    const std::lock_guard lock(mutex_);
-    if (!alive_ || stop_asked_) {
-      throw DeviceError("motor module on " + device_, "spin", failure_.empty() ? "it is being stopped" : failure_,
-                        "connect again");
-    }
-    renew();
-    wanted_speed_ = signed_speed;
-  }
-  ring();
-}
-
-void Link::renew() noexcept { lease_end_ns_ = nanoseconds(steady_clock::now()) + Motor::kLease.count(); }
-
-std::uint64_t Link::ask_coast() noexcept {
-  std::uint64_t mine = 0;
-  {
-    const std::lock_guard lock(mutex_);
-    wanted_speed_.reset();
-    mine = ++coasts_asked_;
-  }
-  ring();
-  return mine;
-}
-
-bool Link::coast_and_confirm(Duration wall) noexcept {
-  const std::uint64_t mine = ask_coast();
-  std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, wall, [&] { return ended_ || coasts_confirmed_ >= mine; });
-  return coasts_confirmed_ >= mine;
-}
-
-std::string Link::failure() const {
-  const std::lock_guard lock(mutex_);
-  return failure_;
-}
-
-Identity Link::identity() const {
-  const std::lock_guard lock(mutex_);
-  return identity_;
-}
-
-Counters Link::counters() const {
-  const std::lock_guard lock(mutex_);
-  return counters_;
+  if (thread_.joinable()) thread_.join();
+  ::close(bell_);
 }
 
 void Link::ring() noexcept {
   const std::uint64_t one = 1;
-  [[maybe_unused]] const auto written = ::write(bell_.native_handle(), &one, sizeof one);
+  [[maybe_unused]] const auto written = ::write(bell_, &one, sizeof one);
 }
-
-bool Link::lease_over(WallTime wall) const noexcept { return nanoseconds(wall) >= lease_end_ns_; }
 
 void Link::run() noexcept {
   refuse_signals();
+  std::string why = "it is being stopped";
   try {
-    read();
-    listen();
-    session_.connect(clock_.now());
-    pump();
-    io_.run();
+    bus_.connect_anew(clock_.now());
+    while (!quit_) turn();
   } catch (const std::exception& error) {
-    lose(error.what());
+    why = error.what();
   }
   last_words();
-  {
-    const std::lock_guard lock(mutex_);
-    ended_ = true;
-    alive_ = false;
+  for (auto& seat : seats_) seat->end(why);
+}
+
+void Link::turn() {
+  try {
+    speak();
+    publish();
+    const Woken woken = sleep();
+    if (woken.by_port) hear();
+    bus_.advance(clock_.now());
+    if (woken.by_bell) obey();
+    keep_leases();
+  } catch (const serial::PortGone& gone) {
+    lose(gone.what());
   }
-  changed_.notify_all();
+  recover();
 }
 
-void Link::read() {
-  port_.stream().async_read_some(boost::asio::buffer(read_buffer_), [this](const auto& error, std::size_t n) {
-    if (error) return lose(fmt::format("the port is gone ({}): adapter unplugged?", error.message()));
-    session_.receive(std::span(read_buffer_).first(n), clock_.now());
-    pump();
-    read();
-  });
+Link::Woken Link::sleep() {
+  const auto left = std::max(due() - steady_clock::now(), steady_clock::duration{0});
+  const auto ns = std::chrono::nanoseconds(left).count();
+  const timespec limit{static_cast<time_t>(ns / 1'000'000'000), ns % 1'000'000'000};
+  pollfd fds[2] = {{bell_, POLLIN, 0}, {-1, 0, 0}};
+  if (port_) fds[1] = {port_->fd(), static_cast<short>(congested_ ? POLLIN | POLLOUT : POLLIN), 0};
+  if (ppoll(fds, 2, &limit, nullptr) <= 0) return {};
+  std::uint64_t rings = 0;
+  if (fds[0].revents != 0 && ::read(bell_, &rings, sizeof rings) < 0 && errno != EAGAIN) {
+    throw std::system_error(errno, std::generic_category(), "eventfd");
+  }
+  return {fds[0].revents != 0, fds[1].revents != 0};
 }
 
-void Link::listen() {
-  bell_.async_wait(boost::asio::posix::stream_descriptor::wait_read, [this](const auto& error) {
-    if (error) return;
-    std::uint64_t rings = 0;
-    [[maybe_unused]] const auto got = ::read(bell_.native_handle(), &rings, sizeof rings);
-    obey();
-    pump();
-    listen();
-  });
+Link::WallTime Link::due() const {
+  const WallTime now = steady_clock::now();
+  WallTime due = now + kLongestNap;
+  if (!port_) return std::min(due, next_attempt_);
+  const Instant deadline = bus_.deadline();
+  if (deadline != kNever) due = std::min(due, now + clock_.shrunk(std::max(deadline - clock_.now(), Duration{0})));
+  for (std::size_t i = 0; i < seats_.size(); ++i) {
+    if (bus_.module(i).spinning()) due = std::min(due, seats_[i]->lease_end());
+    if (bus_.module(i).state() == Session::State::failed && next_attempt_ > now) due = std::min(due, next_attempt_);
+  }
+  return due;
+}
+
+// Reading also finds out that the port is gone.
+void Link::hear() {
+  std::array<std::uint8_t, 4096> buffer;
+  while (const std::size_t n = port_->read(buffer)) {
+    const auto bytes = std::span(buffer).first(n);
+    const Instant now = clock_.now();
+    if (capture_) capture_->add(Capture::Direction::came, bytes, now);
+    bus_.receive(bytes, now);
+    if (n < buffer.size()) return;
+  }
 }
 
 void Link::obey() {
-  std::optional<RadPerSec> speed;
-  std::uint64_t coasts = 0;
-  bool stop = false;
-  {
-    const std::lock_guard lock(mutex_);
-    speed = std::exchange(wanted_speed_, std::nullopt);
-    coasts = coasts_asked_;
-    stop = stop_asked_;
-  }
+  for (std::size_t i = 0; i < seats_.size(); ++i) obey(seats_[i]->take_orders(), *seats_[i], bus_.module(i));
+}
+
+void Link::obey(const Orders& orders, Seat& seat, Session& session) {
   const Instant now = clock_.now();
-  if (coasts != coasts_obeyed_) {
-    coasts_obeyed_ = coasts;
-    session_.coast(now);
-  }
-  if (stop && !stopping_) {
-    stopping_ = true;
-    stop_deadline_ = steady_clock::now() + kStopLimit;
-    for (int i = 0; i < 3; ++i) session_.coast(now);
-  }
-  if (!speed || stopping_ || session_.state() != Session::State::ready) return;
-  if (lease_over(steady_clock::now())) {
-    ++lease_expiries_;
+  if (orders.emergency) session.emergency_stop(now);
+  if (orders.coast && !orders.emergency) session.coast(now);
+  if (orders.stop) session.stop(*orders.stop, now);
+  if (orders.rearm && session.state() == Session::State::ready) session.rearm();
+  if (orders.inquiry && session.state() == Session::State::ready) session.inquire(*orders.inquiry, now);
+  if (!orders.speed || !session.armed()) return;
+  if (steady_clock::now() < seat.lease_end()) {
+    session.spin_at(*orders.speed, now);
   } else {
-    session_.spin_at(*speed, now);
+    seat.count_lease_expiry();
   }
 }
 
-void Link::pump() {
-  const WallTime wall = steady_clock::now();
-  keep_lease(wall);
-  write();
-  move_readings();
-  publish();
-  end_if_stopped(wall);
-  arm(wall);
+void Link::keep_leases() {
+  const WallTime now = steady_clock::now();
+  for (std::size_t i = 0; i < seats_.size(); ++i) {
+    if (!bus_.module(i).spinning() || now < seats_[i]->lease_end()) continue;
+    seats_[i]->count_lease_expiry();
+    bus_.module(i).expire_lease(clock_.now());
+  }
 }
 
-void Link::write() {
-  const auto bytes = session_.output();
-  if (writing_ || bytes.empty()) return;
-  writing_ = true;
-  std::copy(bytes.begin(), bytes.end(), write_buffer_.begin());
-  boost::asio::async_write(port_.stream(), boost::asio::buffer(write_buffer_, bytes.size()),
-                           [this](const auto& error, std::size_t) {
-                             writing_ = false;
-                             if (error) return lose(fmt::format("the port is gone ({})", error.message()));
-                             pump();
-                           });
-  session_.sent(bytes.size());
+void Link::recover() {
+  if (steady_clock::now() < next_attempt_) return;
+  if (!port_) {
+    reopen();
+  } else {
+    reconnect_modules();
+  }
 }
 
-void Link::move_readings() {
-  std::array<Reading, 64> batch;
-  while (const std::size_t n = session_.take(batch)) dropped_readings_ += n - queue_.push(batch.data(), n);
-  newest_reading_ns_ = session_.newest_reading().count();
+void Link::reopen() {
+  try {
+    port_ = std::make_unique<serial::Port>(device_, baud_);
+    bus_.connect_anew(clock_.now());
+  } catch (const DeviceError&) {
+    next_attempt_ = steady_clock::now() + reopening_.next();
+  }
 }
 
-void Link::keep_lease(WallTime wall) {
-  if (!session_.spinning() || !lease_over(wall)) return;
-  ++lease_expiries_;
-  session_.coast(clock_.now());
+// A module that failed goes on coasting until it confirms; then its settings are looked at again.
+void Link::reconnect_modules() {
+  bool all_rest = true, any_failed = false, all_ready = true, all_known = true;
+  for (std::size_t i = 0; i < bus_.size(); ++i) {
+    const Session& session = bus_.module(i);
+    all_known &= session.was_connected();
+    any_failed |= session.state() == Session::State::failed;
+    all_rest &= session.state() != Session::State::failed || session.coasting();
+    all_ready &= session.state() == Session::State::ready;
+    if (session.state() == Session::State::ready && !was_ready_[i]) {
+      if (!session.armed()) seats_[i]->count_reconnection();
+      was_ready_[i] = true;
+    }
+    if (session.state() == Session::State::failed) was_ready_[i] = false;
+  }
+  if (all_ready) {
+    reopening_.reset();
+    reconnecting_.reset();
+  }
+  if (!any_failed || !all_rest || !all_known) return;
+  next_attempt_ = steady_clock::now() + reconnecting_.next();
+  for (std::size_t i = 0; i < bus_.size(); ++i) {
+    if (bus_.module(i).state() == Session::State::failed) bus_.module(i).connect(clock_.now());
+  }
 }
 
-void Link::end_if_stopped(WallTime wall) {
-  if (!stopping_) return;
-  if ((session_.coasting() && !writing_ && session_.output().empty()) || wall >= stop_deadline_) io_.stop();
-}
-
-void Link::arm(WallTime wall) {
-  WallTime due = wall + kLongestNap;
-  const Instant deadline = session_.deadline();
-  if (deadline != kNever) due = std::min(due, wall + clock_.shrunk(std::max(deadline - clock_.now(), Duration{0})));
-  if (session_.spinning()) due = std::min(due, WallTime(std::chrono::nanoseconds(lease_end_ns_)));
-  if (stopping_) due = std::min(due, stop_deadline_);
-  if (due >= armed_) return;
-  armed_ = due;
-  timer_.expires_at(due);
-  timer_.async_wait([this](const auto& error) {
-    if (error) return;
-    armed_ = WallTime::max();
-    session_.advance(clock_.now());
-    pump();
-  });
+void Link::speak() {
+  congested_ = false;
+  if (!port_) return;
+  for (auto bytes = bus_.output(); !bytes.empty(); bytes = bus_.output()) {
+    const std::size_t n = port_->write(bytes);
+    if (capture_ && n > 0) capture_->add(Capture::Direction::sent, bytes.first(n), clock_.now());
+    bus_.sent(n);
+    if (n > 0) continue;
+    congested_ = true;
+    return;
+  }
 }
 
 void Link::publish() {
-  const Session::State state = session_.state();
-  bool news = false;
-  {
-    const std::lock_guard lock(mutex_);
-    counters_ = session_.counters();
-    counters_.dropped_readings += dropped_readings_;
-    counters_.lease_expiries = lease_expiries_;
-    if (state != state_) {
-      state_ = state;
-      identity_ = session_.identity();
-      failure_ = session_.failure();
-      alive_ = state != Session::State::failed;
-      news = true;
-    }
-    if (session_.coasting() && coasts_confirmed_ != coasts_obeyed_) {
-      coasts_confirmed_ = coasts_obeyed_;
-      news = true;
-    }
+  const WallTime now = steady_clock::now();
+  const bool all = now - published_ >= kPublishEvery;
+  if (all) published_ = now;
+  for (std::size_t i = 0; i < seats_.size(); ++i) {
+    seats_[i]->move_readings(bus_.module(i));
+    seats_[i]->publish(bus_.module(i), port_ != nullptr, all);
   }
-  if (news) changed_.notify_all();
 }
 
 void Link::lose(const std::string& why) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (failure_.empty()) failure_ = why;
-    alive_ = false;
-  }
-  changed_.notify_all();
-  io_.stop();
+  port_.reset();
+  congested_ = false;
+  was_ready_.assign(was_ready_.size(), false);
+  bus_.lose(why, clock_.now());
+  next_attempt_ = steady_clock::now() + reopening_.next();
 }
 
-// Past the session, so that an error inside it cannot prevent it. A batch cut short is no harm: the module rescans
+// Past the sessions, so that an error inside them cannot prevent it. A batch cut short is no harm: the module rescans
 // behind a bad CRC, and there are three.
 void Link::last_words() noexcept {
+  if (!port_) return;
   const auto end = steady_clock::now() + kLastWordsLimit;
-  std::array<std::uint8_t, kMaxFrame> frame;
-  const std::size_t size = encode(set<"propeller_motor_control.ctrl_coast">(session_.settings().module_id), frame);
-  std::array<std::uint8_t, 3 * kMaxFrame> thrice;
-  for (std::size_t i = 0; i < 3; ++i) std::copy_n(frame.begin(), size, thrice.begin() + i * size);
-  std::span<const std::uint8_t> rest(thrice.data(), 3 * size);
-  while (!rest.empty() && steady_clock::now() < end) {
-    const auto n = ::write(port_.native_handle(), rest.data(), rest.size());
-    if (n > 0) {
-      rest = rest.subspan(static_cast<std::size_t>(n));
-    } else if (n < 0 && errno == EAGAIN) {
-      pollfd room{port_.native_handle(), POLLOUT, 0};
-      ::poll(&room, 1, 10);
-    } else if (n == 0 || errno != EINTR) {
-      return;
+  try {
+    for (std::size_t i = 0; i < 3 * bus_.size(); ++i) {
+      std::array<std::uint8_t, kMaxFrame> frame;
+      const int id = bus_.module(i % bus_.size()).settings().module_id;
+      std::span<const std::uint8_t> rest =
+          std::span(frame).first(encode(set<"propeller_motor_control.ctrl_coast">(id), frame));
+      while (!rest.empty() && steady_clock::now() < end) {
+        const std::size_t n = port_->write(rest);
+        if (capture_ && n > 0) capture_->add(Capture::Direction::sent, rest.first(n), clock_.now());
+        rest = rest.subspan(n);
+        if (n > 0) continue;
+        pollfd room{port_->fd(), POLLOUT, 0};
+        ::poll(&room, 1, 10);
+      }
     }
+  } catch (const std::exception&) {
+    return;  // the port is gone
   }
   // Closing may throw away what has not left yet.
-  int waiting = 0;
-  while (ioctl(port_.native_handle(), TIOCOUTQ, &waiting) == 0 && waiting > 0 && steady_clock::now() < end) {
-    ::poll(nullptr, 0, 2);
-  }
+  port_->drain(end - steady_clock::now());
 }
 
 }  // namespace kphi::iq

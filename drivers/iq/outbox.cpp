@@ -14,7 +14,7 @@ bool Outbox::push(Kind kind, const Packet& packet) noexcept {
   return true;
 }
 
-void Outbox::push_coast(const Packet& packet) noexcept {
+void Outbox::push_coast(const Packet& packet, bool padded) noexcept {
   std::size_t waiting = 0;
   for (std::size_t i = first_whole(); i < count_;) {
     if (frames_[i].kind == Kind::motion) {
@@ -26,10 +26,19 @@ void Outbox::push_coast(const Packet& packet) noexcept {
   }
   if (waiting < kWaitingCoasts) {
     if (count_ == kFrames) erase(count_ - 1);
-    insert(first_whole(), Kind::coast, packet);
+    insert(first_whole(), Kind::coast, packet, padded ? kPadding : 0);
   }
   lay_out();
 }
+
+void Outbox::withdraw() noexcept {
+  for (std::size_t i = count_; i > first_whole(); --i) {
+    if (frames_[i - 1].kind != Kind::coast) erase(i - 1);
+  }
+  lay_out();
+}
+
+void Outbox::clear() noexcept { count_ = begun_ = wire_size_ = 0; }
 
 void Outbox::sent(std::size_t n) noexcept {
   n += begun_;
@@ -41,10 +50,12 @@ void Outbox::sent(std::size_t n) noexcept {
   lay_out();
 }
 
-void Outbox::insert(std::size_t at, Kind kind, const Packet& packet) noexcept {
+void Outbox::insert(std::size_t at, Kind kind, const Packet& packet, std::size_t padding) noexcept {
   std::move_backward(frames_.begin() + at, frames_.begin() + count_, frames_.begin() + count_ + 1);
-  frames_[at].kind = kind;
-  frames_[at].size = encode(packet, frames_[at].bytes);
+  Frame& frame = frames_[at];
+  frame.kind = kind;
+  std::fill_n(frame.bytes.begin(), padding, std::uint8_t{0});
+  frame.size = padding + encode(packet, std::span(frame.bytes).subspan(padding).first<kMaxFrame>());
   ++count_;
 }
 

@@ -13,12 +13,19 @@ namespace kphi::iq {
 class Outbox {
  public:
   enum class Kind : std::uint8_t { request, setting, motion, coast };
+  /// Zeros ahead of a padded coast. With the coast and one question behind it they make 62 bytes: as many as the
+  /// longest false header can still wait for, and one less than the module's receive buffer holds.
+  static constexpr std::size_t kPadding = 48;
 
   /// False when there is no room: nobody has taken bytes for long.
   [[nodiscard]] bool push(Kind kind, const Packet& packet) noexcept;
   /// Withdraws every motion command that has not begun to leave, and goes out before all other frames. Never refused;
   /// up to three may wait.
-  void push_coast(const Packet& packet) noexcept;
+  void push_coast(const Packet& packet, bool padded = false) noexcept;
+  /// Drops all that has not begun to leave, coasts excepted.
+  void withdraw() noexcept;
+  /// Drops everything.
+  void clear() noexcept;
 
   /// All bytes that wait, contiguous; valid until the next call of another member.
   [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return {wire_.data(), wire_size_}; }
@@ -28,13 +35,14 @@ class Outbox {
  private:
   static constexpr std::size_t kFrames = 24;
   static constexpr std::size_t kWaitingCoasts = 3;
+  static constexpr std::size_t kRoom = kPadding + kMaxFrame;
   struct Frame {
     Kind kind = Kind::request;
     std::size_t size = 0;
-    std::array<std::uint8_t, kMaxFrame> bytes{};
+    std::array<std::uint8_t, kRoom> bytes{};
   };
 
-  void insert(std::size_t at, Kind kind, const Packet& packet) noexcept;
+  void insert(std::size_t at, Kind kind, const Packet& packet, std::size_t padding = 0) noexcept;
   void erase(std::size_t at) noexcept;
   void lay_out() noexcept;
   [[nodiscard]] std::size_t first_whole() const noexcept { return begun_ > 0 ? 1 : 0; }
@@ -42,7 +50,7 @@ class Outbox {
   std::array<Frame, kFrames> frames_;
   std::size_t count_ = 0;
   std::size_t begun_ = 0;  ///< bytes of the first frame that have left
-  std::array<std::uint8_t, kFrames * kMaxFrame> wire_{};
+  std::array<std::uint8_t, kFrames * kRoom> wire_{};
   std::size_t wire_size_ = 0;
 };
 

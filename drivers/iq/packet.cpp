@@ -28,40 +28,55 @@ std::size_t encode(const Packet& packet, std::span<std::uint8_t, kMaxFrame> fram
   return packet.length + kFrameOverhead;
 }
 
+std::size_t Parser::scan(std::span<const std::uint8_t> bytes) noexcept {
+  if (bytes.empty()) return 0;
+  const void* start = std::memchr(bytes.data(), kStart, bytes.size());
+  if (start == nullptr) return discard(bytes.size());
+  const auto noise = static_cast<std::size_t>(static_cast<const std::uint8_t*>(start) - bytes.data());
+  if (noise > 0) return discard(noise);
+  if (bytes.size() < 2) return 0;
+  const std::size_t length = bytes[1];
+  if (length > kMaxPayload) {
+    ++counters_.refused_lengths;
+    return discard(1);
+  }
+  if (bytes.size() < length + kFrameOverhead) return 0;
+  if ((bytes[length + 3] | bytes[length + 4] << 8) != checksum(bytes.subspan(1, length + 2))) {
+    ++counters_.crc_errors;
+    return discard(1);
+  }
+  packet_.type = bytes[2];
+  packet_.length = static_cast<std::uint8_t>(length);
+  std::copy_n(bytes.begin() + 3, length, packet_.payload.begin());
+  found_ = true;
+  ++counters_.packets;
+  position_ += length + kFrameOverhead;
+  return length + kFrameOverhead;
+}
+
+// No further than the end of the frame that is waited for: what follows is read where it lies.
+std::size_t Parser::top_up(std::span<const std::uint8_t> bytes) noexcept {
+  const std::size_t wanted = size_ < 2 ? 2 : held_[1] + kFrameOverhead;
+  return hold(bytes.first(std::min(bytes.size(), wanted - size_)));
+}
+
+std::size_t Parser::hold(std::span<const std::uint8_t> rest) noexcept {
+  std::copy(rest.begin(), rest.end(), held_.begin() + size_);
+  size_ += rest.size();
+  return rest.size();
+}
+
+std::size_t Parser::discard(std::size_t n) noexcept {
+  counters_.discarded_bytes += n;
+  position_ += n;
+  return n;
+}
+
 void Parser::drop(std::size_t n) noexcept {
   size_ -= n;
   std::memmove(held_.data(), held_.data() + n, size_);
 }
 
-Parser::Step Parser::scan() noexcept {
-  const auto* begin = held_.data();
-  const auto noise = static_cast<std::size_t>(std::find(begin, begin + size_, kStart) - begin);
-  if (noise > 0) {
-    counters_.discarded_bytes += noise;
-    drop(noise);
-  }
-  if (size_ < 2) return Step::wait;
-  const std::size_t length = held_[1];
-  if (length > kMaxPayload) {
-    ++counters_.refused_lengths;
-    ++counters_.discarded_bytes;
-    drop(1);
-    return Step::again;
-  }
-  if (size_ < length + kFrameOverhead) return Step::wait;
-  const std::uint16_t crc = checksum(std::span(held_).subspan(1, length + 2));
-  if ((held_[length + 3] | held_[length + 4] << 8) != crc) {
-    ++counters_.crc_errors;
-    ++counters_.discarded_bytes;
-    drop(1);
-    return Step::again;
-  }
-  packet_.type = held_[2];
-  packet_.length = static_cast<std::uint8_t>(length);
-  std::copy_n(held_.begin() + 3, length, packet_.payload.begin());
-  ++counters_.packets;
-  drop(length + kFrameOverhead);
-  return Step::found;
-}
+void Parser::reset() noexcept { drop(discard(size_)); }
 
 }  // namespace kphi::iq

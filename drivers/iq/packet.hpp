@@ -42,7 +42,8 @@ struct Packet {
 std::size_t encode(const Packet& packet, std::span<std::uint8_t, kMaxFrame> frame) noexcept;
 
 /// Finds frames in a stream of bytes, in whatever chunks it comes. Nothing intact is lost: after a bad CRC or a LEN
-/// over 59 the search goes on at the byte behind the false 0x55. Allocates nothing.
+/// over 59 the search goes on at the byte behind the false 0x55. Whole frames are read where they lie; only what a
+/// chunk cuts off is held. Allocates nothing.
 class Parser {
  public:
   struct Counters {
@@ -53,14 +54,18 @@ class Parser {
     std::uint64_t discarded_bytes = 0;  ///< bytes that belong to no packet
   };
 
-  /// Calls `sink(const Packet&, std::size_t behind)` for each packet; `behind` = bytes of this chunk after its last
-  /// one.
+  /// Calls `sink(const Packet&, std::uint64_t end)` for each packet; `end` = bytes of the stream up to its last one.
   template <class Sink>
   void push(std::span<const std::uint8_t> bytes, Sink&& sink) {
     counters_.bytes += bytes.size();
-    for (std::size_t i = 0; i < bytes.size(); ++i) {
-      held_[size_++] = bytes[i];
-      deliver(sink, bytes.size() - i - 1);
+    while (!bytes.empty()) {
+      if (size_ > 0) {
+        bytes = bytes.subspan(top_up(bytes));
+        read_held(sink);
+      } else {
+        bytes = bytes.subspan(read(bytes, sink));
+        bytes = bytes.subspan(hold(bytes));
+      }
     }
   }
 
@@ -69,12 +74,13 @@ class Parser {
   template <class Sink>
   void abandon(Sink&& sink) {
     if (size_ == 0) return;
-    ++counters_.discarded_bytes;
+    discard(1);
     drop(1);
-    deliver(sink, 0);
+    read_held(sink);
   }
 
-  void reset() noexcept { size_ = 0; }
+  /// Forgets the frame being waited for.
+  void reset() noexcept;
 
   /// A frame has begun and is not complete.
   [[nodiscard]] bool partial() const noexcept { return size_ > 0; }
@@ -83,22 +89,32 @@ class Parser {
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 
  private:
-  enum class Step { wait, again, found };
-
+  /// Reads all that is complete, returns how many bytes are done with.
   template <class Sink>
-  void deliver(Sink&& sink, std::size_t behind) {
-    for (;;) {
-      const Step step = scan();
-      if (step == Step::wait) return;
-      if (step == Step::found) sink(std::as_const(packet_), behind);
+  std::size_t read(std::span<const std::uint8_t> bytes, Sink& sink) {
+    std::size_t done = 0;
+    while (const std::size_t n = scan(bytes.subspan(done))) {
+      done += n;
+      if (std::exchange(found_, false)) sink(std::as_const(packet_), position_);
     }
+    return done;
+  }
+  template <class Sink>
+  void read_held(Sink& sink) {
+    drop(read(std::span<const std::uint8_t>(held_.data(), size_), sink));
   }
 
-  Step scan() noexcept;
+  /// Looks at the beginning: noise, a false header, or a packet. Returns its size; 0: it is incomplete.
+  std::size_t scan(std::span<const std::uint8_t> bytes) noexcept;
+  std::size_t top_up(std::span<const std::uint8_t> bytes) noexcept;
+  std::size_t hold(std::span<const std::uint8_t> rest) noexcept;
+  std::size_t discard(std::size_t n) noexcept;
   void drop(std::size_t n) noexcept;
 
   std::array<std::uint8_t, kMaxFrame> held_{};
   std::size_t size_ = 0;
+  std::uint64_t position_ = 0;  ///< bytes of the stream done with
+  bool found_ = false;
   Packet packet_;
   Counters counters_;
 };

@@ -25,11 +25,19 @@ inline constexpr int kQuantities = 7;
   return names[static_cast<int>(quantity)];
 }
 
+/// When a question and its reply passed this host, bench time.
+struct Stamps {
+  Instant sent{0};        ///< the question was handed to the wire
+  Instant first_byte{0};  ///< of the reply came
+  Instant parsed{0};      ///< the reply was whole
+};
+
 struct Reading {
   Quantity quantity = Quantity::speed;
   double value = 0;         ///< in the unit named above; always finite
   Instant time{0};          ///< bench time: midpoint of request and reply, less the time of their bytes on the wire
   Duration uncertainty{0};  ///< half of what is left between the two: the true moment is time ± uncertainty
+  Stamps stamps;
 };
 
 /// What happened on the wire. Malformed input is counted, never an error.
@@ -42,6 +50,7 @@ struct Counters {
   std::uint64_t resyncs = 0;          ///< frames given up because the rest did not come in time
   std::uint64_t requests = 0, replies = 0;
   std::uint64_t timeouts = 0;
+  std::uint64_t unknown_entries = 0;     ///< replies of a type or sub that no table knows
   std::uint64_t late_replies = 0;        ///< came after their request had timed out; never used
   std::uint64_t unasked = 0;             ///< replies to nothing that was asked, and packets that are no replies
   std::uint64_t wrong_module = 0;        ///< replies of another module id
@@ -51,7 +60,9 @@ struct Counters {
   std::uint64_t dropped_readings = 0;    ///< nobody took them in time
   std::uint64_t coasts = 0;              ///< coast commands given to the wire
   std::uint64_t unconfirmed_coasts = 0;  ///< times the module did not report coast after several commands
+  std::uint64_t module_resets = 0;       ///< times it was seen to have restarted by itself
   std::uint64_t lease_expiries = 0;      ///< times the host's watchdog coasted the motor (Motor)
+  std::uint64_t reconnections = 0;       ///< times the link was lost and found again (Motor)
 };
 
 }  // namespace kphi::iq

@@ -4,34 +4,30 @@
 // Safety. The session never commands motion by itself and coasts before anything else. A coast withdraws motion
 // commands that wait, goes before all other frames, and is repeated until the module reports drive mode coast. The
 // module is told to coast by itself when it hears nothing for `module_timeout_s`; polling keeps it from doing so,
-// hence the session falls silent when the module does not confirm a coast or stops answering.
+// hence the session falls silent when the module does not confirm a coast or stops answering. After any failure it is
+// disarmed: it spins again only after a new connection and an explicit rearm().
 #pragma once
 
-#include <boost/circular_buffer.hpp>
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "compensation/units.hpp"
 #include "drivers/clock.hpp"
-#include "drivers/iq/entries.hpp"
+#include "drivers/iq/coasting.hpp"
+#include "drivers/iq/connecting.hpp"
+#include "drivers/iq/event.hpp"
+#include "drivers/iq/exchange.hpp"
 #include "drivers/iq/identity.hpp"
-#include "drivers/iq/outbox.hpp"
-#include "drivers/iq/packet.hpp"
+#include "drivers/iq/inquiries.hpp"
+#include "drivers/iq/polling.hpp"
 #include "drivers/iq/reading.hpp"
-#include "drivers/iq/requests.hpp"
+#include "drivers/iq/reset_watch.hpp"
+#include "drivers/iq/settings.hpp"
+#include "drivers/iq/stopping.hpp"
 
 namespace kphi::iq {
-
-struct Settings {
-  int module_id = 0;              ///< 0..62
-  double telemetry_hz = 50;       ///< speed readings per second of bench time; the other quantities come in turn
-  Duration reply_timeout{0};      ///< bench time; 0: 100 ms, and Motor stretches these as wall time
-  Duration wire_byte_time{0};     ///< 10 bits of one byte, bench time; 0: Motor takes 10/baud
-  double module_timeout_s = 0.5;  ///< the module coasts by itself after this silence; in its own seconds
-  Duration longest_silence{0};    ///< the same as bench time; 0: module_timeout_s, and Motor stretches it as wall time
-  std::size_t credit_bytes = 63;  ///< most bytes of unanswered frames, 18 or more: the module's receive buffer has 64
-};
 
 class Session {
  public:
@@ -41,102 +37,115 @@ class Session {
   explicit Session(Settings settings);
 
   /// Starts over: coast and its confirmation first; identity; sets the communication timeout, its behaviour to coast
-  /// and its song to never, and reads all three back bit by bit. Then `ready` or `failed`.
+  /// and its song to never, and reads all three back bit by bit. Then `ready` or `failed`. A module that was connected
+  /// before must be the same again. The first connection arms it.
   void connect(Instant now);
+  /// As connect, over a line that is another one now: nothing of before may be sent or believed.
+  void connect_anew(Instant now);
   [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
   [[nodiscard]] State state() const noexcept { return state_; }
   /// Why it failed; empty else.
   [[nodiscard]] const std::string& failure() const noexcept { return failure_; }
   /// Whole once `ready`.
-  [[nodiscard]] const Identity& identity() const noexcept { return identity_; }
+  [[nodiscard]] const Identity& identity() const noexcept { return connecting_.identity(); }
+  /// Oldest first; they are gone afterwards.
+  [[nodiscard]] std::vector<Event> take_events() { return std::exchange(events_, {}); }
+
+  /// It has been ready at least once.
+  [[nodiscard]] bool was_connected() const noexcept { return known_.has_value(); }
+  /// It may spin: ready, and no failure since the first connection or the last rearm().
+  [[nodiscard]] bool armed() const noexcept { return armed_ && state_ == State::ready; }
+  /// The owner has seen the failure. Throws std::logic_error unless ready.
+  void rearm();
+  /// The line is lost, or whatever else the owner of the line knows. Disarmed; it coasts as soon as it can.
+  void fail(EventKind kind, const std::string& why, Instant now);
 
   /// Closed-loop speed, + = counter-clockwise. Zero is a coast: commanding 0 rad/s would brake actively and feed a
-  /// supply that cannot sink. Throws std::logic_error unless ready, std::invalid_argument beyond ±3450 rad/s.
+  /// supply that cannot sink. Throws std::logic_error unless armed, std::invalid_argument beyond ±3450 rad/s.
   void spin_at(RadPerSec signed_speed, Instant now);
   /// In any state. Goes before everything that has not begun to leave.
-  void coast(Instant now) noexcept;
+  void coast(Instant now) noexcept { coast(1, now); }
+  /// The coast three times at once.
+  void emergency_stop(Instant now) noexcept { coast(3, now); }
+  /// Ramps down and coasts; see stopping.hpp. stop_report() tells the end. A coast or a new speed overrules the ramp.
+  void stop(const StopSettings& settings, Instant now);
+  /// The owner of the motor has not given a sign of life in time.
+  void expire_lease(Instant now);
   /// Motion was commanded and no coast since.
   [[nodiscard]] bool spinning() const noexcept { return spinning_; }
   /// The module has reported drive mode coast to a question put after the last coast.
-  [[nodiscard]] bool coasting() const noexcept { return coast_confirmed_; }
+  [[nodiscard]] bool coasting() const noexcept { return coasting_.confirmed(); }
+  /// A stop or a coast of a spinning motor is under way.
+  [[nodiscard]] bool stopping() const noexcept { return stopping_.active(); }
+  /// Of the last stop or coast of a spinning motor that has come to its end; nothing before.
+  [[nodiscard]] const std::optional<StopReport>& stop_report() const noexcept { return stopping_.report(); }
+
+  /// Puts questions between the polls. Throws std::invalid_argument as Inquiries::check does, std::logic_error unless
+  /// ready or while others are open.
+  void inquire(std::vector<Inquiry> inquiries, Instant now);
+  [[nodiscard]] const Inquiries& inquiries() const noexcept { return inquiries_; }
 
   void receive(std::span<const std::uint8_t> bytes, Instant now);
   /// Does what is due: polls, time-outs, retries. Afterwards deadline() is later than `now`.
   void advance(Instant now);
   /// Bytes to send, oldest first; valid until the next non-const call.
-  [[nodiscard]] std::span<const std::uint8_t> output() const noexcept { return outbox_.bytes(); }
+  [[nodiscard]] std::span<const std::uint8_t> output() const noexcept { return exchange_.output(); }
   /// The first `n` of them have left.
-  void sent(std::size_t n) noexcept;
+  void sent(std::size_t n) noexcept { exchange_.sent(n); }
   /// When advance() is next needed; kNever: not before something else happens.
   [[nodiscard]] Instant deadline() const noexcept;
 
   /// Moves the oldest readings out, returns how many. 4096 are kept; older ones are dropped and counted.
-  std::size_t take(std::span<Reading> out);
-  [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+  std::size_t take(std::span<Reading> out) { return polling_.take_readings(out); }
+  [[nodiscard]] const Counters& counters() const noexcept { return exchange_.counters(); }
+  [[nodiscard]] const RoundTripHistogram& round_trips() const noexcept { return exchange_.round_trips(); }
+  /// The deadline that a question would get now, from the measured round trips.
+  [[nodiscard]] Duration reply_timeout() const noexcept { return exchange_.timeout(); }
   /// Time of the newest reading; zero before the first.
-  [[nodiscard]] Instant newest_reading() const noexcept { return newest_reading_; }
+  [[nodiscard]] Instant newest_reading() const noexcept { return polling_.newest_reading(); }
+
+  // For several modules on one line (bus.hpp).
+  /// While held, only coast goes out.
+  void hold(bool held) noexcept { exchange_.hold(held); }
+  void set_neighbours(std::uint64_t ids) noexcept { exchange_.set_neighbours(ids); }
+  /// Nothing waits to be sent or answered.
+  [[nodiscard]] bool quiet() const noexcept { return exchange_.quiet(); }
+  /// It leaves the line to the module's own communication timeout.
+  [[nodiscard]] bool silent() const noexcept { return coasting_.silent(); }
 
  private:
-  void take_packet(const Packet& packet, Instant end);
-  void take_answer(const Request& request, const Packet& packet, Instant end);
-  void take_reading(const Request& request, double value, std::size_t reply_bytes, Instant end);
-  void take_step_answer(const Request& request, const Packet& packet);
-  void take_drive_mode(const Request& request, double mode, Instant now);
-  void take_timeout(const Request& request, Instant now);
-  [[nodiscard]] Duration patience() const noexcept;
-  void watch_partial(Instant now);
-  void count_parser() noexcept;
-
+  void restart(Instant now);
+  void coast(int times, Instant now) noexcept;
+  void take_heard(std::span<const Heard> heard, Instant now);
+  void take_restart(const Heard& heard, Instant now);
   void service(Instant now);
   void continue_coasting(Instant now);
   void continue_connecting(Instant now);
-  void fail_step(const char* why);
+  void continue_stopping(Instant now);
   void flush_speed(Instant now);
-  void poll(Instant now);
   void check_silence(Instant now);
-  void fail(const std::string& why, Instant now);
+  void judge_round_trip(Instant now);
+  void note(EventKind kind, const std::string& words, Instant now);
   [[nodiscard]] std::string why_no_answer() const;
-
-  bool ask(const Entry& entry, Instant now) noexcept;
-  bool tell(Outbox::Kind kind, const Packet& packet, Instant now) noexcept;
-  void send_coast(Instant now) noexcept;
-  Request on_wire(const Entry* entry, std::size_t bytes, Instant now) noexcept;
-  [[nodiscard]] bool fits(std::size_t bytes) const noexcept;
-  [[nodiscard]] const Entry* entry_of(Quantity quantity) const noexcept;
 
   Settings settings_;
   State state_ = State::idle;
   std::string failure_;
-  Identity identity_;
-  Parser parser_;
-  std::uint64_t partial_offset_ = 0;
-  Instant partial_since_{kNever};
-  Outbox outbox_;
-  Requests requests_;
-  std::uint64_t order_ = 0;
-  Instant wire_free_{0};  ///< when the last byte handed over will have left
+  std::vector<Event> events_;
+  bool armed_ = false;
+  std::optional<Identity> known_;  ///< of the first connection
+  Exchange exchange_;
+  Coasting coasting_;
+  Connecting connecting_;
+  Polling polling_;
+  ResetWatch reset_watch_;
+  Stopping stopping_;
+  Inquiries inquiries_;
   Instant last_reply_{0};
-
-  std::size_t step_ = 0;  ///< of the connection script
-  bool step_asked_ = false;
-  int step_attempts_ = 0;
-  std::string step_failure_;
-
   bool spinning_ = false;
+  double commanded_speed_ = 0;         ///< rad/s, the last one
   std::optional<float> wanted_speed_;  ///< waits for credit
-  bool coast_pending_ = false;
-  bool coast_confirmed_ = false;
-  std::uint64_t coast_order_ = 0;
-  int coast_attempts_ = 0;
-  Instant coast_next_{0};
-  Instant coast_ask_at_{kNever};
-  int last_drive_mode_ = -1;
-
-  Instant next_poll_{0};
-  int turn_ = 0;
-  boost::circular_buffer<Reading> readings_;
-  Instant newest_reading_{0};
-  Counters counters_;
+  bool round_trip_judged_ = false;
 };
 
 }  // namespace kphi::iq

@@ -184,8 +184,7 @@ std::vector<Finding> audit(const Configuration& box, const Intention& intention)
   for (const Check check : kChecks) {
     if (auto finding = check(box, intention)) findings.push_back(std::move(*finding));
   }
-  std::stable_sort(findings.begin(), findings.end(),
-                   [](const Finding& a, const Finding& b) { return a.severity > b.severity; });
+  put_worst_first(findings);
   return findings;
 }
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "drivers/device_error.hpp"
@@ -75,18 +74,6 @@ std::string filter_words(const Configuration& box) {
   return cutoff > 0 ? fmt::format("filter {:g} Hz", cutoff) : "no filter";
 }
 
-const char* word(Severity severity) {
-  switch (severity) {
-    case Severity::fault:
-      return "fault";
-    case Severity::warning:
-      return "warning";
-    case Severity::note:
-      break;
-  }
-  return "note";
-}
-
 }  // namespace
 
 std::vector<std::string> Probe::lines() const {
@@ -114,10 +101,7 @@ std::vector<std::string> Probe::lines() const {
                                1e-3 * static_cast<double>(health.jitter_p99_ns)));
     text.push_back("receive buffer " + receive_buffer);
   }
-  for (const Finding& finding : findings) {
-    text.push_back(fmt::format("{}: {}{}{}", word(finding.severity), finding.what,
-                               finding.next_move.empty() ? "" : "; ", finding.next_move));
-  }
+  for (const Finding& finding : findings) text.push_back(finding.line());
   return text;
 }
 
@@ -134,8 +118,7 @@ Probe probe(const Place& place, const Clock& clock, const ProbeSettings& setting
   } catch (const DeviceError& error) {
     found.findings.push_back({Severity::fault, error.what(), ""});
   }
-  std::stable_sort(found.findings.begin(), found.findings.end(),
-                   [](const Finding& a, const Finding& b) { return a.severity > b.severity; });
+  put_worst_first(found.findings);
   return found;
 }
 

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <linux/serial.h>
+#include <poll.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <termios.h>
@@ -13,16 +14,38 @@
 #include <cstring>
 #include <filesystem>
 #include <iterator>
+#include <thread>
 #include <utility>
 
-#include "drivers/device_error.hpp"
+#include "drivers/serial/discovery.hpp"
 
 namespace kphi::serial {
 namespace {
 
-constexpr unsigned kBauds[] = {1200,    2400,    4800,    9600,    19200,   38400,   57600,
-                               115200,  230400,  460800,  500000,  576000,  921600,  1000000,
-                               1152000, 1500000, 2000000, 2500000, 3000000, 3500000, 4000000};
+struct Rate {
+  unsigned baud;
+  speed_t code;
+};
+constexpr Rate kRates[] = {{1200, B1200},       {2400, B2400},       {4800, B4800},       {9600, B9600},
+                           {19200, B19200},     {38400, B38400},     {57600, B57600},     {115200, B115200},
+                           {230400, B230400},   {460800, B460800},   {500000, B500000},   {576000, B576000},
+                           {921600, B921600},   {1000000, B1000000}, {1152000, B1152000}, {1500000, B1500000},
+                           {2000000, B2000000}, {2500000, B2500000}, {3000000, B3000000}, {3500000, B3500000},
+                           {4000000, B4000000}};
+
+const Rate* rate_of(unsigned baud) noexcept {
+  const auto found =
+      std::find_if(std::begin(kRates), std::end(kRates), [&](const Rate& rate) { return rate.baud == baud; });
+  return found == std::end(kRates) ? nullptr : found;
+}
+
+const Rate& known_rate(const std::string& device, unsigned baud) {
+  if (const Rate* rate = rate_of(baud)) return *rate;
+  std::vector<unsigned> known;
+  for (const Rate& rate : kRates) known.push_back(rate.baud);
+  throw DeviceError("serial port " + device, "open", fmt::format("{} baud is not a rate this system knows", baud),
+                    fmt::format("use one of {}", fmt::join(known, ", ")));
+}
 
 std::string advice_for_missing() {
   const std::vector<std::string> names = stable_names();
@@ -73,7 +96,7 @@ class Descriptor {
   int fd_;
 };
 
-void make_raw(int fd, const std::string& device) {
+void make_raw(int fd, const std::string& device, const Rate& rate) {
   termios line{};
   if (tcgetattr(fd, &line) != 0) refuse(device, "read line settings", errno);
   cfmakeraw(&line);
@@ -81,7 +104,15 @@ void make_raw(int fd, const std::string& device) {
   line.c_cflag &= ~static_cast<tcflag_t>(CRTSCTS | CSTOPB | PARENB);
   line.c_cc[VMIN] = 1;
   line.c_cc[VTIME] = 0;
+  cfsetispeed(&line, rate.code);
+  cfsetospeed(&line, rate.code);
   if (tcsetattr(fd, TCSANOW, &line) != 0) refuse(device, "set line raw", errno);
+  // It may obey in part: that is no error to tcsetattr.
+  termios now{};
+  if (tcgetattr(fd, &now) != 0 || cfgetospeed(&now) != rate.code) {
+    throw DeviceError("serial port " + device, fmt::format("set {} baud 8N1", rate.baud), "it keeps another rate",
+                      "check that the adapter supports this rate");
+  }
 }
 
 bool ask_low_latency(int fd) noexcept {
@@ -102,9 +133,7 @@ int open_exclusively(const std::string& device) {
 
 }  // namespace
 
-bool known_baud(unsigned baud) noexcept {
-  return std::find(std::begin(kBauds), std::end(kBauds), baud) != std::end(kBauds);
-}
+bool known_baud(unsigned baud) noexcept { return rate_of(baud) != nullptr; }
 
 std::vector<std::string> stable_names() {
   std::vector<std::string> names;
@@ -116,34 +145,67 @@ std::vector<std::string> stable_names() {
   return names;
 }
 
-Port::Port(boost::asio::io_context& io, const std::string& device, unsigned baud) : device_(device), stream_(io) {
-  if (!known_baud(baud)) {
-    throw DeviceError("serial port " + device, "open", fmt::format("{} baud is not a rate this system knows", baud),
-                      fmt::format("use one of {}", fmt::join(kBauds, ", ")));
-  }
-  stream_.assign(open_exclusively(device));
-  try {
-    make_raw(native_handle(), device);
-    using boost::asio::serial_port_base;
-    stream_.set_option(serial_port_base::baud_rate(baud));
-    stream_.set_option(serial_port_base::character_size(8));
-    stream_.set_option(serial_port_base::parity(serial_port_base::parity::none));
-    stream_.set_option(serial_port_base::stop_bits(serial_port_base::stop_bits::one));
-    stream_.set_option(serial_port_base::flow_control(serial_port_base::flow_control::none));
-  } catch (const boost::system::system_error& error) {
-    ioctl(native_handle(), TIOCNXCL);
-    throw DeviceError("serial port " + device, fmt::format("set {} baud 8N1", baud), error.code().message(),
-                      "check that the adapter supports this rate");
-  } catch (...) {
-    ioctl(native_handle(), TIOCNXCL);
-    throw;
-  }
-  tcflush(native_handle(), TCIOFLUSH);
-  low_latency_ = ask_low_latency(native_handle());
+Port::Port(const std::string& specification, unsigned baud) : device_(specification) {
+  (void)known_rate(specification, baud);
+  device_ = path_of(specification);
+  Descriptor opened(open_exclusively(device_));
+  fd_ = opened.get();
+  apply(baud);
+  tcflush(fd_, TCIOFLUSH);
+  low_latency_ = ask_low_latency(fd_);
+  fd_ = opened.release();
 }
 
 Port::~Port() {
-  if (stream_.is_open()) ioctl(native_handle(), TIOCNXCL);
+  ioctl(fd_, TIOCNXCL);
+  ::close(fd_);
+}
+
+std::size_t Port::read(std::span<std::uint8_t> into) {
+  const auto n = ::read(fd_, into.data(), into.size());
+  if (n > 0) return static_cast<std::size_t>(n);
+  if (n < 0 && (errno == EAGAIN || errno == EINTR)) return 0;
+  gone("read", n == 0 ? ENODEV : errno);
+}
+
+std::size_t Port::write(std::span<const std::uint8_t> bytes) {
+  const auto n = ::write(fd_, bytes.data(), bytes.size());
+  if (n >= 0) return static_cast<std::size_t>(n);
+  if (errno == EAGAIN || errno == EINTR) return 0;
+  gone("write", errno);
+}
+
+bool Port::wait(Duration wall) const noexcept {
+  pollfd line{fd_, POLLIN, 0};
+  const timespec limit{static_cast<time_t>(wall.count() / 1'000'000'000), wall.count() % 1'000'000'000};
+  return wall >= Duration{0} && ppoll(&line, 1, &limit, nullptr) > 0;
+}
+
+std::size_t Port::unsent() const noexcept {
+  int waiting = 0;
+  return ioctl(fd_, TIOCOUTQ, &waiting) == 0 && waiting > 0 ? static_cast<std::size_t>(waiting) : 0;
+}
+
+void Port::drain(Duration wall) const noexcept {
+  const auto end = std::chrono::steady_clock::now() + wall;
+  while (unsent() > 0 && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+void Port::set_baud(unsigned baud) {
+  apply(baud);
+  tcflush(fd_, TCIOFLUSH);
+}
+
+void Port::apply(unsigned baud) {
+  make_raw(fd_, device_, known_rate(device_, baud));
+  baud_ = baud;
+}
+
+void Port::gone(const char* operation, int error) const {
+  throw PortGone("serial port " + device_, operation, fmt::format("it is gone ({}): unplugged?", std::strerror(error)),
+                 "plug it in again");
 }
 
 }  // namespace kphi::serial

@@ -11,6 +11,17 @@ namespace {
 constexpr double kSafeToTouch = 5.0;  // rad/s
 // Faults draw from another sequence than the physics, which therefore stays the same with and without them.
 constexpr std::uint64_t kWireStream = 0x5bd1e995'6c62272eull;
+constexpr std::uint64_t kLineStream = 0x9e3779b9'7f4a7c15ull;
+constexpr std::uint64_t kModuleStream = 0x2545f491'4f6cdd1dull;
+
+IqSettings module_of(const BenchSettings& settings) {
+  IqSettings module = settings.module;
+  module.module_id = settings.module_id;
+  module.oscillator_gain = settings.oscillator_gain;
+  module.time_scale = settings.time_scale;
+  module.seed = settings.seed ^ kModuleStream;
+  return module;
+}
 
 /// Exact in integers: no drift of the ticks against the clock.
 constexpr Instant time_of_tick(std::uint64_t tick) noexcept {
@@ -24,7 +35,9 @@ SimulatedBench::SimulatedBench(const BenchSettings& settings)
     : plant_(settings.plant, settings.seed),
       netbox_(settings.netbox),
       wire_(netbox_, settings.faults, settings.seed ^ kWireStream, settings.keep),
-      motor_({settings.module_id, settings.oscillator_gain, settings.time_scale}, plant_.motor()) {}
+      motor_(module_of(settings), plant_.motor()),
+      motor_line_(motor_, {settings.motor_line_paced, settings.time_scale, settings.motor_usb_tick},
+                  settings.motor_faults, settings.seed ^ kLineStream, settings.motor_keep) {}
 
 void SimulatedBench::mount(const std::string& propeller_id, double occlusion_deg) {
   const PropellerTruth* propeller = find_propeller(propeller_id);
@@ -45,10 +58,13 @@ void SimulatedBench::mount(const std::string& propeller_id, double occlusion_deg
 void SimulatedBench::advance(Instant now) {
   for (Instant at = time_of_tick(ticks_ + 1); at <= now; at = time_of_tick(ticks_ + 1)) {
     ++ticks_;
+    if (at >= motor_line_.next_event()) motor_line_.advance(at);
+    plant_.upset(motor_line_.upset());
     motor_.advance(at);
-    plant_.step(motor_.drive());
+    plant_.step(motor_.stage());
     wire_.sample({at, plant_.reading()});
   }
+  motor_line_.advance(now);
 }
 
 }  // namespace kphi::sim

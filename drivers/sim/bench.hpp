@@ -8,6 +8,7 @@
 
 #include "drivers/clock.hpp"
 #include "drivers/sim/iq_device.hpp"
+#include "drivers/sim/iq_line.hpp"
 #include "drivers/sim/netbox_device.hpp"
 #include "drivers/sim/plant.hpp"
 #include "drivers/sim/wire.hpp"
@@ -19,10 +20,15 @@ struct BenchSettings {
   double time_scale = 1;  ///< stretches the module's communication timeout, nothing else: it is a deadline of wall time
   NetBoxSettings netbox;
   int module_id = 0;
-  double oscillator_gain = 0;  ///< see IqSettings
+  double oscillator_gain = 0;  ///< see IqSettings; none, until those who read the speed correct for it
+  IqSettings module;           ///< the rest of the module: module_id, oscillator_gain, time_scale and seed are of above
   PlantParameters plant;
   FaultScript faults;  ///< of the load cell's wire and box; drawn from `seed`
   FaultyWire::Keep keep = FaultyWire::Keep::totals;
+  bool motor_line_paced = false;  ///< see IqLineSettings
+  Duration motor_usb_tick{0};     ///< see IqLineSettings
+  MotorFaultScript motor_faults;  ///< of the motor's line, module and supply; drawn from `seed`
+  IqLine::Keep motor_keep = IqLine::Keep::totals;
 };
 
 class SimulatedBench {
@@ -44,7 +50,10 @@ class SimulatedBench {
   /// Datagrams and pages taken from here know only the faults of the box itself; see wire().
   [[nodiscard]] NetBoxDevice& netbox() noexcept { return netbox_; }
   [[nodiscard]] FaultyWire& wire() noexcept { return wire_; }
+  /// The module itself, for who joins a driver without a line between.
   [[nodiscard]] IqDevice& motor() noexcept { return motor_; }
+  /// Bytes given to it and taken from it know rate, adapter and faults. It is carried along by advance().
+  [[nodiscard]] IqLine& motor_line() noexcept { return motor_line_; }
   [[nodiscard]] const Plant& plant() const noexcept { return plant_; }
   [[nodiscard]] std::uint64_t ticks() const noexcept { return ticks_; }
 
@@ -53,6 +62,7 @@ class SimulatedBench {
   NetBoxDevice netbox_;
   FaultyWire wire_;
   IqDevice motor_;
+  IqLine motor_line_;
   std::string mounted_;
   std::uint64_t ticks_ = 0;
 };

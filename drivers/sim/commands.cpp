@@ -35,6 +35,11 @@ struct Options {
   std::string mount;
   bool status = false;
   bool free_ports = false;
+  double clock_gain = 0;
+  double reply_latency_us = 0;
+  double usb_tick_ms = 0;
+  bool legacy = false;
+  bool paced = false;
   std::optional<double> time_scale;
   std::optional<std::uint64_t> seed;
 };
@@ -80,6 +85,7 @@ void load_faults(const std::string& path, BenchSettings& bench) {
   try {
     bench.faults = parse_faults(text, path);
     bench.netbox.habits = parse_habits(text, path);
+    bench.motor_faults = parse_motor_faults(text, path);
   } catch (const FaultFileError& error) {
     throw ConfigurationError(error.what());
   }
@@ -90,6 +96,12 @@ ServerSettings settings_of(const profiles::Bench& bench, const Options& options)
   settings.bench.seed = bench.simulation->seed;
   settings.bench.time_scale = bench.simulation->time_scale;
   settings.bench.module_id = bench.iq.module_id;
+  settings.bench.module.baud = bench.iq.baud;
+  settings.bench.oscillator_gain = options.clock_gain;
+  settings.bench.module.habits = options.legacy ? legacy_habits() : IqHabits{};
+  settings.bench.module.reply_latency = from_seconds(1e-6 * options.reply_latency_us);
+  settings.bench.motor_line_paced = options.paced;
+  settings.bench.motor_usb_tick = from_seconds(1e-3 * options.usb_tick_ms);
   settings.bench.netbox.rate_hz = bench.netbox.rate_hz;
   settings.bench.netbox.records_per_datagram = bench.netbox.records_per_datagram;
   settings.bench.netbox.address = bench.netbox.host;
@@ -98,7 +110,10 @@ ServerSettings settings_of(const profiles::Bench& bench, const Options& options)
   settings.http_port = options.free_ports ? 0 : bench.netbox.http_port;
   settings.tcp_port = options.free_ports ? 0 : bench.netbox.tcp_port;
   if (!bench.simulation->faults.empty()) load_faults(bench.simulation->faults, settings.bench);
-  if (!options.truth_log.empty()) settings.bench.keep = FaultyWire::Keep::datagrams;
+  if (!options.truth_log.empty()) {
+    settings.bench.keep = FaultyWire::Keep::datagrams;
+    settings.bench.motor_keep = IqLine::Keep::replies;
+  }
   settings.device = bench.iq.device;
   settings.control = bench.simulation->control;
   return settings;
@@ -159,7 +174,8 @@ void serve(const profiles::Bench& bench, const Options& options) {
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
   running = nullptr;
-  if (!options.truth_log.empty()) write_file(options.truth_log, json_lines(server.truth()));
+  if (!options.truth_log.empty())
+    write_file(options.truth_log, json_lines(server.truth()) + json_lines(server.motor_truth()));
   if (!bench.simulation->faults.empty()) fmt::print(stderr, "kphi sim: {}\n", summary(server.truth()));
   const auto& unsent = server.unsent();
   if (unsent.datagrams + unsent.motor_bytes > 0) {
@@ -184,13 +200,22 @@ void add_sim(CLI::App& program, int& exit_code) {
   sim->add_option("BENCH", options->bench, "bench file with a 'simulation:' section")->required();
   sim->add_option("--truth", options->truth, "write what is true of the simulated propellers to this file (YAML)");
   sim->add_option("--faults", options->faults,
-                  "script of what goes wrong on the load cell's wire (YAML), instead of the file's");
-  sim->add_option("--truth-log", options->truth_log, "write at exit what happened to every datagram (JSON lines)");
+                  "script of what goes wrong on the wires and in the devices (YAML), instead of the file's");
+  sim->add_option("--truth-log", options->truth_log,
+                  "write at exit what happened to every datagram and reply (JSON lines)");
   sim->add_option("--time-scale", options->time_scale, "bench seconds per second, instead of the file's")
       ->check(CLI::Range(0.1, 1000.0));
   sim->add_option("--seed", options->seed, "of the noise, instead of the file's");
   sim->add_option("--resolved", options->resolved, "write a copy of the bench file with the actual addresses");
   sim->add_flag("--free-ports", options->free_ports, "listen on any free ports instead of the file's; see --resolved");
+  sim->add_option("--clock-gain", options->clock_gain,
+                  "relative error of the motor module's clock; a real one may have 0.005")
+      ->check(CLI::Range(-0.05, 0.05));
+  sim->add_option("--reply-latency-us", options->reply_latency_us, "of the motor module")->check(CLI::Range(0.0, 1e6));
+  sim->add_option("--usb-tick-ms", options->usb_tick_ms, "latency timer of the motor's serial adapter, 1 or 16")
+      ->check(CLI::Range(0.0, 255.0));
+  sim->add_flag("--paced", options->paced, "bytes on the motor's line take the time that its baud gives them");
+  sim->add_flag("--legacy", options->legacy, "a motor module with old firmware");
   auto* mount = sim->add_option("--mount", options->mount, "tell the running simulator what is mounted: \"5x3 90\"");
   sim->add_flag("--status", options->status, "ask the running simulator how it is: one line of JSON")->excludes(mount);
   sim->callback([options, &exit_code] { exit_code = run(*options); });

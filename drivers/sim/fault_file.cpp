@@ -44,12 +44,15 @@ NetBoxHabits read_habits(const YAML::Node& node, const std::string& path) {
   return habits;
 }
 
-Fault read_entry(const YAML::Node& node, const std::string& path) {
+/// Adds the entry to the script if it is of its kind.
+template <class FaultType>
+void read_entry(const YAML::Node& node, const std::string& path, FaultType (*make)(const FaultEntry&), bool of_motor,
+                std::vector<FaultType>& script) {
   FaultEntry entry;
   const auto all = members(node, path);
   for (const auto& [key, value] : all) entry[key] = scalar(key, value, path);
   try {
-    return fault_of(entry);
+    if (is_motor_fault(entry) == of_motor) script.push_back(make(entry));
   } catch (const FaultEntryError& error) {
     const auto at = all.find(error.key);
     refuse(path, at == all.end() ? node.Mark() : at->second.Mark(), error.what(), "mend this entry");
@@ -84,9 +87,16 @@ std::map<std::string, YAML::Node> file_of(const std::string& text, const std::st
 }  // namespace
 
 FaultScript parse_faults(const std::string& text, const std::string& path) {
-  const auto file = file_of(text, path);
   FaultScript script;
-  for (const auto& entry : file.at("faults")) script.push_back(read_entry(entry, path));
+  const auto file = file_of(text, path);
+  for (const auto& entry : file.at("faults")) read_entry(entry, path, fault_of, false, script);
+  return script;
+}
+
+MotorFaultScript parse_motor_faults(const std::string& text, const std::string& path) {
+  MotorFaultScript script;
+  const auto file = file_of(text, path);
+  for (const auto& entry : file.at("faults")) read_entry(entry, path, motor_fault_of, true, script);
   return script;
 }
 

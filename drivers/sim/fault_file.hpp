@@ -13,6 +13,7 @@
 #include <string>
 
 #include "drivers/sim/faults.hpp"
+#include "drivers/sim/iq_faults.hpp"
 #include "drivers/sim/netbox_settings.hpp"
 
 namespace kphi::sim {
@@ -23,9 +24,11 @@ class FaultFileError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Strict; throws FaultFileError. `path` only names the text in messages.
+/// Strict; throws FaultFileError. `path` only names the text in messages. Entries of the motor, whose kinds begin with
+/// motor_, are for parse_motor_faults(), and its others for parse_faults().
 [[nodiscard]] FaultScript parse_faults(const std::string& text, const std::string& path);
 /// Of the same file; defaults where it names none.
 [[nodiscard]] NetBoxHabits parse_habits(const std::string& text, const std::string& path);
+[[nodiscard]] MotorFaultScript parse_motor_faults(const std::string& text, const std::string& path);
 
 }  // namespace kphi::sim

@@ -1,237 +1,297 @@
 #include "drivers/sim/iq_device.hpp"
 
-#include <array>
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
+#include "drivers/iq/codes.hpp"
 #include "drivers/sim/bytes.hpp"
 
 namespace kphi::sim {
 namespace {
 
-enum Code : std::uint8_t { kGet = 0, kSet = 1, kReply = 3 };
-constexpr int kBroadcast = 63;
-constexpr double kTorqueConstant = 0.0043;  // of the module's own model, N m/A
+enum Code : std::uint8_t { kGet = 0, kSet = 1, kSave = 2, kReply = 3 };
+constexpr int kBroadcast = static_cast<int>(iq::ModuleId::broadcast);
+constexpr std::uint8_t kSystemControl = static_cast<std::uint8_t>(iq::Client::system_control);
+constexpr std::uint16_t kPacked = iq_key(88, 0);
+constexpr int kTicksPerSafety = 7;  // every millisecond
+constexpr double kFix16 = 65536;
+constexpr double kBrownOutVolts = 3.2;  // of the input: the controller holds no longer
+constexpr Duration kBrownOut = std::chrono::milliseconds(50);
+
+std::uint32_t bits_of(IqFormat format, double value) noexcept {
+  if (format == IqFormat::f32) return std::bit_cast<std::uint32_t>(static_cast<float>(value));
+  return static_cast<std::uint32_t>(static_cast<std::int64_t>(value));
+}
 
 }  // namespace
 
-IqDevice::IqDevice(const IqSettings& settings, const MotorState& state) : settings_(settings), state_(state) {
-  memory_.store(5, 14, settings.module_id);
-  tune();
+IqDevice::IqDevice(const IqSettings& settings, const MotorState& state)
+    : settings_(settings),
+      state_(&state),
+      memory_(settings.habits),
+      scanner_(settings.habits.receive_buffer),
+      sensors_(settings.sensors,
+               settings.habits.oscillator == IqHabits::Oscillator::none ? 0 : settings.oscillator_gain, settings.seed),
+      random_(~settings.seed),
+      baud_(settings.baud) {
+  memory_.provide(5, 14, settings.module_id);
+  memory_.provide(16, 0, settings.baud);
+  memory_.provide(52, 15, settings.timeout_s);
+  replace(settings.uid);
+  boot(Instant{0});
 }
 
 void IqDevice::receive(std::span<const std::uint8_t> bytes, Instant now) {
-  scanner_.feed(bytes);
-  while (const auto frame = scanner_.next()) obey(*frame, now);
+  heard_ = std::max(heard_, now);
+  if (now < off_until_ || in_boot_loader_) return;
+  attend(now);
+  while (!bytes.empty()) {
+    const std::size_t taken = scanner_.feed(bytes);
+    bytes = bytes.subspan(taken);
+    const std::uint64_t before = frames_ + scanner_.crc_errors();
+    attend(now);
+    if (now < off_until_ || in_boot_loader_) return;
+    if (taken == 0 && before == frames_ + scanner_.crc_errors()) break;
+  }
+  overflowed_ += bytes.size();
+}
+
+void IqDevice::advance(Instant now) noexcept {
+  heard_ = std::max(heard_, now);
+  if (now < off_until_ || in_boot_loader_) {
+    stage_ = {};
+    return;
+  }
+  if (state_->supply_volts < kBrownOutVolts) return brown_out(now, kBrownOut);
+  attend(now);
+  sensors_.step(*state_);
+  if (now >= timeout_at_) expire(now);
+  if (ending_.going_on()) {
+    ending_.step(state_->speed, now, drive_);
+    if (!ending_.going_on()) memory_.store(52, 0, drive_.mode == MotorDrive::Mode::brake ? 0 : 1);
+  }
+  if (++ticks_to_safety_ >= kTicksPerSafety) {
+    ticks_to_safety_ = 0;
+    const IqReadings readings = sensors_.readings(*state_);
+    if (safety_.check(memory_, readings) && memory_.value(84, 2) != 0) rest(MotorDrive::Mode::coast, now);
+    const bool modern = settings_.habits.coil_estimator;
+    const double coil = derate_between(memory_.value(modern ? 83 : 77, modern ? 8 : 1),
+                                       memory_.value(modern ? 83 : 77, modern ? 9 : 2), readings.coil_celsius);
+    limits_.thermal = coil * derate_between(memory_.value(73, 3), memory_.value(73, 4), readings.controller_celsius);
+  }
+  const IqSensed sensed{state_->speed / (1 + clock_gain()), state_->supply_volts};
+  stage_ = control_.step(safety_.safe_mode() ? MotorDrive{} : drive_, limits_, sensed);
+}
+
+bool IqDevice::next_reply(IqReply& out, Instant now) {
+  if (now >= off_until_ && !in_boot_loader_) attend(now);
+  if (replies_.empty() || replies_.front().at > now) return false;
+  out = replies_.front();
+  replies_.pop_front();
+  return true;
+}
+
+std::vector<std::uint8_t>& IqDevice::output() {
+  IqReply reply;
+  while (next_reply(reply, heard_))
+    append_iq_frame(output_, reply.type, reply.sub, static_cast<std::uint8_t>(reply.id << 2 | kReply), reply.data());
+  return output_;
+}
+
+/// One question at a time; what has not been read yet stays in the buffer.
+void IqDevice::attend(Instant now) {
+  while (busy_until_ <= now) {
+    const auto frame = scanner_.next();
+    if (!frame) return;
+    obey(*frame, std::max(busy_until_, std::min(now, heard_)));
+    if (now < off_until_ || in_boot_loader_) return;
+  }
+}
+
+bool IqDevice::is_mine(int id, std::uint8_t type) const noexcept {
+  if (id == kBroadcast) return true;
+  if (settings_.habits.system_control_on_id_zero && type == kSystemControl) return id == 0;
+  return id == static_cast<int>(memory_.value(5, 14));
 }
 
 void IqDevice::obey(const IqFrame& frame, Instant now) {
   if (frame.payload.size() < 2) return;
+  const IqHabits& habits = settings_.habits;
   const int id = frame.payload[1] >> 2;
   const int code = frame.payload[1] & 3;
-  if (code == kReply || (id != kBroadcast && id != static_cast<int>(memory_.value(5, 14)))) return;
+  const bool mine = is_mine(id, frame.type);
+  const bool deaf = upset_.deaf_to_sets && code != kGet;
+  if (code == kReply || deaf || (id == kBroadcast && code != kGet && !habits.broadcast_set_obeyed)) return;
+  if ((mine || habits.other_ids_restart_timeout) && (code != kGet || habits.get_restarts_timeout)) restart_timeout(now);
+  if (!mine) return;
   ++frames_;
-  restart_timeout(now);
-  if (code == kGet && frame.payload.size() == 2 && id != kBroadcast) answer(frame.type, frame.payload[0], now);
-  if (code == kSet) set(frame.type, frame.payload[0], frame.payload.subspan(2), now);
+  const std::uint8_t sub = frame.payload[0];
+  const auto data = frame.payload.subspan(2);
+  if (code == kGet && data.empty() && (id != kBroadcast || habits.broadcast_get_answered)) answer(frame.type, sub, now);
+  if (code == kSet && iq_key(frame.type, sub) == kPacked) return take_packed(data, now);
+  if (code == kSet) set(frame.type, sub, data, now);
+  if (code == kSave && data.empty()) save(frame.type, sub);
 }
 
 void IqDevice::answer(std::uint8_t type, std::uint8_t sub, Instant now) {
-  if (iq_key(type, sub) == iq_key(88, 1)) return answer_telemetry(now);
   const IqMemory::Cell* cell = memory_.find(type, sub);
-  if (cell == nullptr || !cell->entry.get) return;
+  if (cell == nullptr || !cell->entry.get()) return;
+  if (cell->entry.format == IqFormat::bytes16) return answer_telemetry(now);
   std::uint32_t bits = cell->bits;
-  double value = 0;
-  if (live_value(iq_key(type, sub), now, value)) {
-    bits = cell->entry.format == IqFormat::f32 ? std::bit_cast<std::uint32_t>(static_cast<float>(value))
-                                               : static_cast<std::uint32_t>(value);
+  double truth = std::numeric_limits<double>::quiet_NaN();
+  if (const auto value = live_value(iq_key(type, sub), sensors_.readings(*state_), now)) {
+    bits = bits_of(cell->entry.format, *value);
+    truth = live_value(iq_key(type, sub), true_readings(), now).value_or(truth);
   }
   std::array<std::uint8_t, 4> data{};
   put_little(data.data(), bits, 4);
-  const auto access = static_cast<std::uint8_t>(static_cast<int>(memory_.value(5, 14)) << 2 | kReply);
-  append_iq_frame(output_, type, sub, access, std::span(data).first(iq_size(cell->entry.format)));
+  reply(type, sub, std::span(data).first(iq_size(cell->entry.format)), truth, now);
 }
 
-bool IqDevice::live_value(std::uint16_t key, Instant now, double& value) const noexcept {
-  const auto& s = state_;
+void IqDevice::reply(std::uint8_t type, std::uint8_t sub, std::span<const std::uint8_t> data, double truth,
+                     Instant now) {
+  const bool on_zero = settings_.habits.system_control_on_id_zero && type == kSystemControl;
+  IqReply reply;
+  reply.asked = now;
+  const double jitter = 0.5 * (random_.symmetric() + 1) * to_seconds(settings_.reply_jitter);
+  reply.at = now + from_seconds((to_seconds(settings_.reply_latency) + jitter) * settings_.time_scale);
+  reply.type = type;
+  reply.sub = sub;
+  reply.id = on_zero ? 0 : static_cast<std::uint8_t>(memory_.value(5, 14));
+  reply.size = static_cast<std::uint8_t>(data.size());
+  std::copy(data.begin(), data.end(), reply.bytes.begin());
+  reply.truth = truth;
+  busy_until_ = reply.at;
+  replies_.push_back(reply);
+}
+
+IqReadings IqDevice::true_readings() const noexcept {
+  IqReadings r = sensors_.readings(*state_);
+  r.speed = state_->speed;
+  r.volts = r.volts_cascaded = state_->supply_volts;
+  r.amps = state_->supply_amps;
+  r.controller_celsius = state_->controller_celsius;
+  r.coil_celsius = state_->coil_celsius;
+  r.stator_celsius = state_->stator_celsius;
+  r.motor_amps = state_->motor_amps;
+  return r;
+}
+
+int IqDevice::drive_mode() const noexcept {
+  using Mode = MotorDrive::Mode;
+  using iq::DriveMode;
+  if (safety_.safe_mode() && settings_.habits.coast_in_safe_mode) return static_cast<int>(DriveMode::coast);
+  if (ending_.singing()) return static_cast<int>(DriveMode::phase_volts);
+  if (drive_.mode == Mode::coast) return static_cast<int>(DriveMode::coast);
+  if (drive_.mode == Mode::brake) return static_cast<int>(DriveMode::brake);
+  return static_cast<int>(drive_.mode == Mode::pwm ? DriveMode::spin_pwm : DriveMode::spin_volts);
+}
+
+std::optional<double> IqDevice::live_value(std::uint16_t key, const IqReadings& r, Instant now) const noexcept {
+  const bool modern = settings_.habits.coil_estimator;
   switch (key) {
     case iq_key(5, 15):
-      value = uptime(now);
-      return true;
-    case iq_key(50, 0): {
-      using Mode = MotorDrive::Mode;
-      const bool stage_off = drive_.mode == Mode::coast;
-      value = stage_off ? 5 : drive_.mode == Mode::brake ? 4 : drive_.mode == Mode::pwm ? 2 : 3;
-      return true;
-    }
+      return uptime(now);
+    case iq_key(50, 0):
+      return drive_mode();
     case iq_key(50, 8):
-      value = s.drive_volts / s.supply_volts;
-      return true;
+      return stage_.mode == PowerStage::Mode::drive ? stage_.duty : 0;
     case iq_key(50, 9):
-      value = s.drive_volts;
-      return true;
+      return control_.volts();
     case iq_key(50, 11):
     case iq_key(69, 0):
-      value = s.supply_volts;
-      return true;
+      return r.volts;
     case iq_key(50, 12):
-      value = s.angle;
-      return true;
+      return r.angle;
     case iq_key(50, 13):
-      value = s.speed * (1 + settings_.oscillator_gain);
-      return true;
-    case iq_key(50, 36):
-      value = s.motor_amps;
-      return true;
-    case iq_key(50, 37):
-      value = s.motor_amps * kTorqueConstant;
-      return true;
+      return r.speed;
+    case iq_key(50, 10):
+      return r.speed * memory_.finite(50, 18);
+    case iq_key(50, 23):
     case iq_key(50, 44):
-      value = s.speed * kTorqueConstant;
-      return true;
+      return r.emf;
+    case iq_key(50, 36):
+      return r.motor_amps;
+    case iq_key(50, 37):
+      return r.motor_torque;
+    case iq_key(50, 41):
+      return std::lround(control_.derate() * kFix16);
+    case iq_key(50, 45):
+      return r.emf + limits_.amps_max * limits_.resistance;
     case iq_key(69, 1):
-      value = s.supply_amps;
-      return true;
+      return r.amps;
     case iq_key(69, 2):
-      value = s.supply_amps * s.supply_volts;
-      return true;
+      return r.amps * r.volts;
     case iq_key(69, 3):
-      value = s.supply_joules - joules_at_reset_;
-      return true;
+      return r.joules;
+    case iq_key(69, 7):
+      return r.volts_raw;
+    case iq_key(69, 8):
+      return r.amps_raw;
+    case iq_key(69, 13):
+      return r.volts_cascaded;
     case iq_key(73, 0):
-      value = s.controller_celsius;
-      return true;
+      return r.controller_celsius;
+    case iq_key(73, 5):
+      return derate_between(memory_.value(73, 3), memory_.value(73, 4), r.controller_celsius);
+    case iq_key(77, 0):
     case iq_key(83, 0):
-      value = s.coil_celsius;
-      return true;
+      return r.coil_celsius;
+    case iq_key(77, 5):
+      return std::lround(kFix16 * derate_between(memory_.value(77, 1), memory_.value(77, 2), r.coil_celsius));
+    case iq_key(83, 1):
+      return r.stator_celsius;
+    case iq_key(83, 5):
+      return r.forced_convection;
+    case iq_key(83, 10):
+      return modern ? derate_between(memory_.value(83, 8), memory_.value(83, 9), r.coil_celsius) : 1;
+    case iq_key(83, 11):
+      return r.joule_watts;
+    case iq_key(83, 12):
+      return r.convection_watts;
+    case iq_key(83, 13):
+      return r.conduction_watts;
+    case iq_key(83, 19):
+      return r.lamination_celsius;
+    case iq_key(84, 0):
+      return safety_.now();
+    case iq_key(84, 1):
+      return safety_.ever();
+    case iq_key(86, 12):
+      return throttle_.armed() ? 1 : 0;
     default:
-      return false;
+      return std::nullopt;
   }
 }
 
 void IqDevice::answer_telemetry(Instant now) {
   const auto rounded = [](double value) {
-    return static_cast<std::uint32_t>(static_cast<std::int32_t>(std::lround(value)));
+    return static_cast<std::uint32_t>(static_cast<std::int32_t>(std::lround(std::clamp(value, -32768.0, 32767.0))));
   };
+  const IqReadings r = sensors_.readings(*state_);
   std::array<std::uint8_t, 16> data{};
-  put_little(data.data(), rounded(state_.controller_celsius * 100), 2);
-  put_little(data.data() + 2, rounded(state_.coil_celsius * 100), 2);
-  put_little(data.data() + 4, rounded(state_.supply_volts * 100), 2);
-  put_little(data.data() + 6, rounded(state_.supply_amps * 100), 2);
-  put_little(data.data() + 8, rounded((state_.supply_joules - joules_at_reset_) / state_.supply_volts / 3.6), 2);
-  put_little(data.data() + 10, rounded(state_.speed * (1 + settings_.oscillator_gain)), 2);
-  put_little(data.data() + 12, static_cast<std::uint32_t>(uptime(now)), 4);
-  const auto access = static_cast<std::uint8_t>(static_cast<int>(memory_.value(5, 14)) << 2 | kReply);
-  append_iq_frame(output_, 88, 1, access, data);
+  put_little(data.data(), rounded(r.controller_celsius * 100), 2);
+  put_little(data.data() + 2, rounded(r.coil_celsius * 100), 2);
+  put_little(data.data() + 4, rounded(r.volts * 100), 2);
+  put_little(data.data() + 6, rounded(r.amps * 100), 2);
+  put_little(data.data() + 8, rounded(r.joules / std::max(r.volts, 1.0) / 3.6), 2);
+  put_little(data.data() + 10, rounded(r.speed), 2);
+  put_little(data.data() + 12, static_cast<std::uint32_t>(std::max(0.0, uptime(now))), 4);
+  reply(88, 1, data, std::numeric_limits<double>::quiet_NaN(), now);
 }
 
-void IqDevice::set(std::uint8_t type, std::uint8_t sub, std::span<const std::uint8_t> data, Instant now) {
-  IqMemory::Cell* cell = memory_.find(type, sub);
-  if (cell == nullptr || !cell->entry.set || data.size() != iq_size(cell->entry.format)) return;
-  cell->bits = little(data);
-  act(type, sub, now);
+double IqDevice::line_rate() const noexcept {
+  const bool shared = settings_.habits.oscillator == IqHabits::Oscillator::all;
+  return baud_ * (1 + (shared ? settings_.oscillator_gain : 0));
 }
 
-void IqDevice::act(std::uint8_t type, std::uint8_t sub, Instant now) {
-  using Mode = MotorDrive::Mode;
-  const auto spin_as = [&](Mode mode) { spin(mode, memory_.value(type, sub)); };
-  switch (iq_key(type, sub)) {
-    case iq_key(5, 15):
-      time_offset_ = memory_.value(5, 15) - to_seconds(now) * (1 + settings_.oscillator_gain);
-      return;
-    case iq_key(69, 4):
-      joules_at_reset_ = state_.supply_joules;
-      return;
-    case iq_key(84, 1):
-      memory_.store(84, 1, 0);
-      return;  // nothing has ever tripped
-    case iq_key(52, 1):
-      rest(Mode::brake);
-      break;
-    case iq_key(52, 2):
-      rest(Mode::coast);
-      break;
-    case iq_key(50, 5):
-      rest(Mode::brake);
-      break;
-    case iq_key(50, 6):
-      rest(Mode::coast);
-      break;
-    case iq_key(52, 3):
-    case iq_key(50, 3):
-      spin_as(Mode::pwm);
-      break;
-    case iq_key(52, 4):
-    case iq_key(50, 4):
-      spin_as(Mode::volts);
-      break;
-    case iq_key(52, 5):
-      spin_as(Mode::velocity);
-      break;
-    default:
-      if (type == 52) tune();
-      return;
-  }
-  last_motion_command_ = now;
-  if (drive_.mode != Mode::coast && drive_.mode != Mode::brake) {
-    timeout_at_ = Instant{0};
-    restart_timeout(now);
-  }
-}
-
-void IqDevice::spin(MotorDrive::Mode mode, double target) noexcept {
-  if (!std::isfinite(target)) return rest(MotorDrive::Mode::coast);
-  stopping_ = false;
-  drive_.mode = mode;
-  drive_.target = target;
-  memory_.store(52, 0, mode == MotorDrive::Mode::pwm ? 2 : mode == MotorDrive::Mode::volts ? 3 : 4);
-}
-
-void IqDevice::rest(MotorDrive::Mode mode) noexcept {
-  stopping_ = false;
-  drive_.mode = mode;
-  drive_.target = 0;
-  timeout_at_ = kNever;
-  memory_.store(52, 0, mode == MotorDrive::Mode::brake ? 0 : 1);
-}
-
-void IqDevice::tune() noexcept {
-  const auto finite = [this](std::uint8_t sub) {
-    const double value = memory_.value(52, sub);
-    return std::isfinite(value) ? value : 0.0;
-  };
-  drive_.kp = finite(7);
-  drive_.ki = finite(8);
-  drive_.kd = finite(9);
-  drive_.ff0 = finite(10);
-  drive_.ff1 = finite(11);
-  drive_.ff2 = finite(12);
-  drive_.input_filter_hz = finite(16);
-}
-
-void IqDevice::restart_timeout(Instant now) noexcept {
-  if (timeout_at_ == kNever) return;
-  const double seconds = memory_.value(52, 15) * settings_.time_scale;
-  constexpr double kYear = 3e7;
-  timeout_at_ = now + from_seconds(seconds > 0 ? std::fmin(seconds, kYear) : 0.0);
-}
-
-void IqDevice::expire() noexcept {
-  ++timeouts_;
-  const bool through_zero_volts = memory_.value(52, 18) != 0;
-  rest(MotorDrive::Mode::coast);
-  if (!through_zero_volts) return;
-  spin(MotorDrive::Mode::volts, 0);
-  stopping_ = true;
-}
-
-void IqDevice::finish_stop() noexcept {
-  if (std::abs(state_.speed) >= memory_.value(87, 0)) return;
-  rest(memory_.value(52, 18) == 2 ? MotorDrive::Mode::brake : MotorDrive::Mode::coast);
+double IqDevice::clock_gain() const noexcept {
+  return settings_.habits.oscillator == IqHabits::Oscillator::none ? 0 : settings_.oscillator_gain;
 }
 
 double IqDevice::uptime(Instant now) const noexcept {
-  return to_seconds(now) * (1 + settings_.oscillator_gain) + time_offset_;
+  return to_seconds(now - booted_) * (1 + clock_gain()) + time_offset_;
 }
 
 }  // namespace kphi::sim

@@ -1,27 +1,70 @@
-// The other end of the motor's wire: an IQ2306 speed module as bytes in and bytes out. No port, clock or thread.
+// The other end of the motor's wire: an IQ2306 speed module as bytes in and replies out. No port, clock or thread.
 // SETs are never answered, GETs in the order they came; unknown entries, wrong lengths and other ids are met with
-// silence. Open questions of the protocol are answered as the facts suggest: a GET resets the communication timeout, a
-// broadcast SET acts, a broadcast GET is not answered. Not in this version: save and reboot, throttle commands,
-// derating, the song.
+// silence. What the documents leave open is answered by IqHabits.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "drivers/clock.hpp"
+#include "drivers/sim/iq_control.hpp"
+#include "drivers/sim/iq_ending.hpp"
 #include "drivers/sim/iq_entries.hpp"
 #include "drivers/sim/iq_frame.hpp"
+#include "drivers/sim/iq_habits.hpp"
+#include "drivers/sim/iq_safety.hpp"
+#include "drivers/sim/iq_sensors.hpp"
+#include "drivers/sim/iq_throttle.hpp"
 #include "drivers/sim/motor.hpp"
 
 namespace kphi::sim {
 
 struct IqSettings {
-  int module_id = 0;           ///< 0..62
-  double oscillator_gain = 0;  ///< relative error of the module's clock: reported speed reads speed * (1 + gain).
-                               ///< Default none in this version; a real module has no crystal.
-  double time_scale = 1;  ///< bench seconds per wall second: the communication timeout lasts this many times longer
+  int module_id = 0;               ///< 0..62
+  double oscillator_gain = 0.005;  ///< relative error of the module's clock: time and baud run as 1 + gain, a speed
+                                   ///< reads speed / (1 + gain) and is held at what was commanded times 1 + gain
+  double time_scale = 1;   ///< bench seconds per wall second: the communication timeout and the replies' latency last
+                           ///< this many times longer
+  unsigned baud = 115200;  ///< saved
+  IqHabits habits;
+  IqSensorErrors sensors;
+  Duration reply_latency{0};  ///< from the end of a question to the reply, wall time; the module does one at a time
+  Duration reply_jitter{0};   ///< up to this much more
+  double timeout_s = 0.5;     ///< saved
+  std::array<std::uint32_t, 3> uid{0x00230006, 0x4d4b5011, 0x20343353};
+  std::uint64_t seed = 1;
+};
+
+/// One reply as the firmware meant it.
+struct IqReply {
+  Instant asked{0};  ///< when the question was read: the moment that the value is of
+  Instant at{0};     ///< earliest time of its first byte
+  std::uint8_t type = 0, sub = 0, id = 0;
+  std::uint8_t size = 0;
+  std::array<std::uint8_t, 16> bytes{};
+  double truth = std::numeric_limits<double>::quiet_NaN();  ///< what a perfect sensor would say; NaN: no such thing
+
+  [[nodiscard]] std::span<const std::uint8_t> data() const noexcept { return std::span(bytes).first(size); }
+};
+
+/// A command that spins, brakes or coasts, as the module understood it.
+struct IqMotion {
+  Instant at{0};
+  MotorDrive::Mode mode = MotorDrive::Mode::coast;
+  double target = 0;
+};
+
+/// What a script of faults does to the module itself.
+struct IqUpset {
+  IqHeat heat;
+  bool deaf_to_sets = false;
+  std::optional<double> redline;  ///< rad/s: where the derate begins; it ends 3 % later
 };
 
 class IqDevice {
@@ -29,51 +72,110 @@ class IqDevice {
   /// `state` must outlive the device.
   IqDevice(const IqSettings& settings, const MotorState& state);
 
+  /// Bytes that arrive at `now`, which is not before that of an earlier call.
   void receive(std::span<const std::uint8_t> bytes, Instant now);
-  /// Lets the communication timeout expire; call it every tick.
-  void advance(Instant now) noexcept {
-    if (now >= timeout_at_) expire();
-    if (stopping_) finish_stop();
-  }
-  /// Bytes to send, oldest first. The caller empties it.
-  [[nodiscard]] std::vector<std::uint8_t>& output() noexcept { return output_; }
+  /// One tick of the firmware: timeout, safety, sensors, control.
+  void advance(Instant now) noexcept;
+  /// Next reply that is ready at `now`.
+  bool next_reply(IqReply& out, Instant now);
+  /// When next_reply() will have one; kNever when no question waits.
+  [[nodiscard]] Instant next_reply_at() const noexcept { return replies_.empty() ? kNever : replies_.front().at; }
+  /// The replies as bytes, oldest first, for who joins a driver without a line between. The caller empties it.
+  [[nodiscard]] std::vector<std::uint8_t>& output();
 
+  /// Off for `down`, then as after power-up; what was not saved is lost.
+  void brown_out(Instant now, Duration down);
+  /// Another module of the same kind is plugged in.
+  void replace(const std::array<std::uint32_t, 3>& uid) noexcept;
+  /// The line's rate as if somebody had set and saved it, at once.
+  void set_baud(unsigned baud) noexcept;
+  void upset(const IqUpset& upset) noexcept;
+
+  /// Bits per second on the wire, as a perfect clock would count them; 0 while it is off.
+  [[nodiscard]] double line_rate() const noexcept;
   [[nodiscard]] const MotorDrive& drive() const noexcept { return drive_; }
+  [[nodiscard]] const PowerStage& stage() const noexcept { return stage_; }
+  [[nodiscard]] const IqMemory& memory() const noexcept { return memory_; }
+  [[nodiscard]] const IqSafety& safety() const noexcept { return safety_; }
+  [[nodiscard]] bool armed() const noexcept { return throttle_.armed(); }
+  [[nodiscard]] bool singing() const noexcept { return ending_.singing(); }
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
   [[nodiscard]] std::uint64_t crc_errors() const noexcept { return scanner_.crc_errors(); }
+  [[nodiscard]] std::uint64_t overflowed_bytes() const noexcept { return overflowed_; }
   [[nodiscard]] std::uint64_t timeouts() const noexcept { return timeouts_; }
+  [[nodiscard]] std::uint64_t boots() const noexcept { return boots_; }
   /// Bench time of the last command that spins, brakes or coasts; -1 ns before the first.
-  [[nodiscard]] Instant last_motion_command() const noexcept { return last_motion_command_; }
+  [[nodiscard]] Instant last_motion_command() const noexcept { return last_motion_.at; }
+  [[nodiscard]] const IqMotion& last_motion() const noexcept { return last_motion_; }
 
  private:
+  // Frames.
+  void attend(Instant now);
   void obey(const IqFrame& frame, Instant now);
+  [[nodiscard]] bool is_mine(int id, std::uint8_t type) const noexcept;
   void answer(std::uint8_t type, std::uint8_t sub, Instant now);
   void set(std::uint8_t type, std::uint8_t sub, std::span<const std::uint8_t> data, Instant now);
+  void save(std::uint8_t type, std::uint8_t sub) noexcept;
+  void reply(std::uint8_t type, std::uint8_t sub, std::span<const std::uint8_t> data, double truth, Instant now);
+  /// The value of an entry that follows the physics, by these readings.
+  [[nodiscard]] std::optional<double> live_value(std::uint16_t key, const IqReadings& readings,
+                                                 Instant now) const noexcept;
+  [[nodiscard]] int drive_mode() const noexcept;
+  void answer_telemetry(Instant now);
+  [[nodiscard]] IqReadings true_readings() const noexcept;
+
+  // Actions.
   void act(std::uint8_t type, std::uint8_t sub, Instant now);
-  void spin(MotorDrive::Mode mode, double target) noexcept;
-  void rest(MotorDrive::Mode mode) noexcept;
+  bool command_motion(std::uint8_t type, std::uint8_t sub, Instant now);
+  void spin(MotorDrive::Mode mode, double target, Instant now) noexcept;
+  void rest(MotorDrive::Mode mode, Instant now) noexcept;
+  void take_packed(std::span<const std::uint8_t> data, Instant now);
+  void take_throttle(double throttle, Instant now) noexcept;
+  void met(IqThrottle::Event event, Instant now) noexcept;
   void tune() noexcept;
-  void expire() noexcept;
-  void finish_stop() noexcept;
+  void system_action(std::uint8_t sub, Instant now);
+  void flash_action(std::uint8_t sub) noexcept;
+  void boot(Instant now);
+
+  // Time.
+  void expire(Instant now) noexcept;
+  void end_motion(int behavior, int song, Instant now) noexcept;
   void restart_timeout(Instant now) noexcept;
   [[nodiscard]] double uptime(Instant now) const noexcept;
-  /// The value of an entry that follows the physics.
-  [[nodiscard]] bool live_value(std::uint16_t key, Instant now, double& value) const noexcept;
-  void answer_telemetry(Instant now);
+  [[nodiscard]] double clock_gain() const noexcept;
 
   IqSettings settings_;
-  const MotorState& state_;
+  const MotorState* state_;
   IqMemory memory_;
   IqScanner scanner_;
-  std::vector<std::uint8_t> output_;
+  IqSensors sensors_;
+  IqSafety safety_;
+  IqThrottle throttle_;
+  IqControl control_;
+  IqEnding ending_;
+  IqLimits limits_;
+  IqUpset upset_;
+  Random random_;
   MotorDrive drive_;
-  bool stopping_ = false;  ///< at 0 V until slow, then the final state of the timeout
-  double joules_at_reset_ = 0;
+  PowerStage stage_;
+
+  std::deque<IqReply> replies_;
+  std::vector<std::uint8_t> output_;
+  Instant heard_{0};       ///< latest time that it was told
+  Instant busy_until_{0};  ///< with a question
+  Instant off_until_{0};
+  bool in_boot_loader_ = false;
+  unsigned baud_;
+  double joules_offset_ = 0;
   double time_offset_ = 0;
+  Instant booted_{0};
   Instant timeout_at_ = kNever;
-  Instant last_motion_command_{-1};
+  IqMotion last_motion_{Instant{-1}, MotorDrive::Mode::coast, 0};
   std::uint64_t frames_ = 0;
   std::uint64_t timeouts_ = 0;
+  std::uint64_t overflowed_ = 0;
+  std::uint64_t boots_ = 0;
+  int ticks_to_safety_ = 0;
 };
 
 }  // namespace kphi::sim

@@ -1,5 +1,7 @@
 #include "drivers/sim/iq_frame.hpp"
 
+#include <algorithm>
+
 #include "drivers/sim/bytes.hpp"
 
 namespace kphi::sim {
@@ -31,10 +33,18 @@ void append_iq_frame(std::vector<std::uint8_t>& out, std::uint8_t type, std::uin
   out.push_back(static_cast<std::uint8_t>(crc >> 8));
 }
 
-void IqScanner::feed(std::span<const std::uint8_t> bytes) {
+std::size_t IqScanner::feed(std::span<const std::uint8_t> bytes) {
   bytes_.erase(bytes_.begin(), bytes_.begin() + static_cast<std::ptrdiff_t>(position_));
   position_ = 0;
-  bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+  const std::size_t room = capacity_ == 0 ? bytes.size() : capacity_ - bytes_.size();
+  const auto taken = bytes.first(std::min(room, bytes.size()));
+  bytes_.insert(bytes_.end(), taken.begin(), taken.end());
+  return taken.size();
+}
+
+void IqScanner::clear() noexcept {
+  bytes_.clear();
+  position_ = 0;
 }
 
 std::optional<IqFrame> IqScanner::next() noexcept {

@@ -25,12 +25,17 @@ struct IqFrame {
 /// byte behind the failed 0x55. A partial frame waits for ever.
 class IqScanner {
  public:
-  void feed(std::span<const std::uint8_t> bytes);
+  /// `capacity`: bytes that it holds, 64 or more; 0: without limit.
+  explicit IqScanner(std::size_t capacity = 0) noexcept : capacity_(capacity) {}
+  /// Takes as many bytes as there is room for, and says how many that was.
+  std::size_t feed(std::span<const std::uint8_t> bytes);
   /// Next whole frame, or none until more bytes come.
   [[nodiscard]] std::optional<IqFrame> next() noexcept;
+  void clear() noexcept;
   [[nodiscard]] std::uint64_t crc_errors() const noexcept { return crc_errors_; }
 
  private:
+  std::size_t capacity_;
   std::vector<std::uint8_t> bytes_;
   std::size_t position_ = 0;
   std::uint64_t crc_errors_ = 0;

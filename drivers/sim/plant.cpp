@@ -22,8 +22,8 @@ void Plant::mount(const PropellerTruth* propeller, double occlusion_deg) noexcep
   motor_.load(shaft_);
 }
 
-void Plant::step(const MotorDrive& drive) noexcept {
-  motor_.step(drive, random_);
+void Plant::step(const PowerStage& stage) noexcept {
+  motor_.step(stage, random_);
   load_cell_.step(motor_.state().speed, motor_.reaction_torque(), random_);
 }
 

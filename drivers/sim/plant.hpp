@@ -22,9 +22,11 @@ class Plant {
   /// nullptr: the bare motor. Occlusion in degrees, [0, 360).
   void mount(const PropellerTruth* propeller, double occlusion_deg) noexcept;
   /// Advances by 1/7000 s.
-  void step(const MotorDrive& drive) noexcept;
+  void step(const PowerStage& stage) noexcept;
+  void upset(const MotorUpset& upset) noexcept { motor_.upset(upset); }
 
   [[nodiscard]] const MotorState& motor() const noexcept { return motor_.state(); }
+  [[nodiscard]] const MotorEnergy& energy() const noexcept { return motor_.energy(); }
   [[nodiscard]] const MotorParameters& motor_parameters() const noexcept { return motor_.parameters(); }
   [[nodiscard]] const Wrench& reading() const noexcept { return load_cell_.reading(); }
   [[nodiscard]] double thrust() const noexcept { return load_cell_.thrust(); }      ///< N, without noise and zero

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "drivers/device_error.hpp"
 
@@ -22,10 +23,23 @@ namespace fs = std::filesystem;
   throw DeviceError("simulated motor " + path, operation, cause, next_move);
 }
 
-void make_raw(int descriptor) noexcept {
+struct Rate {
+  unsigned baud;
+  speed_t code;
+};
+constexpr Rate kRates[] = {{9600, B9600},       {19200, B19200},     {38400, B38400},     {57600, B57600},
+                           {115200, B115200},   {230400, B230400},   {460800, B460800},   {500000, B500000},
+                           {576000, B576000},   {921600, B921600},   {1000000, B1000000}, {1152000, B1152000},
+                           {1500000, B1500000}, {2000000, B2000000}, {2500000, B2500000}, {3000000, B3000000},
+                           {3500000, B3500000}, {4000000, B4000000}};
+
+void make_raw(int descriptor, unsigned baud) noexcept {
   termios line{};
   if (tcgetattr(descriptor, &line) != 0) return;
   cfmakeraw(&line);
+  for (const Rate& rate : kRates) {
+    if (rate.baud == baud) cfsetspeed(&line, rate.code);
+  }
   tcsetattr(descriptor, TCSANOW, &line);
 }
 
@@ -44,27 +58,42 @@ void link(const std::string& device, const std::string& slave) {
 
 }  // namespace
 
-Pty::Pty(const std::string& device)
-    : path_(device), master_(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
+Pty::Pty(const std::string& device, unsigned baud) : device_(device), baud_(baud) { plug(); }
+
+Pty::~Pty() { unplug(); }
+
+void Pty::plug() {
+  Descriptor master(::posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   std::array<char, 128> name{};
-  if (master_.number() < 0 || ::grantpt(master_.number()) != 0 || ::unlockpt(master_.number()) != 0 ||
-      ::ptsname_r(master_.number(), name.data(), name.size()) != 0) {
-    refuse(device, "open pseudo-terminal", std::strerror(errno));
+  if (master.number() < 0 || ::grantpt(master.number()) != 0 || ::unlockpt(master.number()) != 0 ||
+      ::ptsname_r(master.number(), name.data(), name.size()) != 0) {
+    refuse(device_, "open pseudo-terminal", std::strerror(errno));
   }
+  Descriptor slave(::open(name.data(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+  if (slave.number() < 0) refuse(name.data(), "open", std::strerror(errno));
+  make_raw(slave.number(), baud_);
   slave_path_ = name.data();
-  slave_ = Descriptor(::open(name.data(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-  if (slave_.number() < 0) refuse(slave_path_, "open", std::strerror(errno));
-  make_raw(slave_.number());
-  if (device.empty()) {
-    path_ = slave_path_;
-  } else {
-    link(device, slave_path_);
-  }
+  path_ = device_.empty() ? slave_path_ : device_;
+  if (!device_.empty()) link(device_, slave_path_);
+  master_ = std::move(master);
+  slave_ = std::move(slave);
 }
 
-Pty::~Pty() {
+void Pty::unplug() noexcept {
   std::error_code error;
   if (path_ != slave_path_ && fs::read_symlink(path_, error) == fs::path(slave_path_)) fs::remove(path_, error);
+  slave_ = Descriptor();
+  master_ = Descriptor();
+}
+
+unsigned Pty::baud() const noexcept {
+  termios line{};
+  if (tcgetattr(slave_.number(), &line) != 0) return 0;
+  const speed_t code = cfgetospeed(&line);
+  for (const Rate& rate : kRates) {
+    if (rate.code == code) return rate.baud;
+  }
+  return 0;
 }
 
 std::size_t Pty::read(std::span<std::uint8_t> into) noexcept {

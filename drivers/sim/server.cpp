@@ -68,7 +68,7 @@ Server::Server(const ServerSettings& settings)
       foreign_(listen_at(settings.host, SOCK_DGRAM, 0)),
       web_(listen_at(settings.host, SOCK_STREAM, settings.http_port)),
       coarse_(listen_at(settings.host, SOCK_STREAM, settings.tcp_port)),
-      pty_(settings.device),
+      pty_(settings.device, settings.bench.module.baud),
       http_(std::move(web_.socket),
             {"\r\n\r\n", true, settings.bench.netbox.habits.one_http_connection ? 1 : kHttpConnections},
             [this](std::string_view request) { return in_wall_time(bench_.wire().http(request, reached_)); }),
@@ -196,7 +196,12 @@ void Server::hear_requests() {
 void Server::hear_motor(Instant now) {
   std::array<std::uint8_t, 512> bytes{};
   const std::size_t count = pty_.read(bytes);
-  if (count > 0) bench_.motor().receive(std::span(bytes).first(count), now);
+  IqLine& line = bench_.motor_line();
+  if (count > 0) {
+    line.host_rate(pty_.baud());
+    line.send(std::span(bytes).first(count), now);
+    line.advance(now);
+  }
   quiet_steps_ = count > 0 ? 0 : quiet_steps_ + 1;
   if (quiet_steps_ == kQuiet) pty_.unlock();
 }
@@ -245,10 +250,10 @@ void Server::send_batch(std::vector<Datagram>& batch, std::size_t count, bool fo
 }
 
 void Server::send_motor() {
-  auto& bytes = bench_.motor().output();
-  if (bytes.empty()) return;
-  unsent_.motor_bytes += bytes.size() - pty_.write(bytes);
-  bytes.clear();
+  IqLine& line = bench_.motor_line();
+  if (line.plugged() != pty_.plugged()) line.plugged() ? pty_.plug() : pty_.unplug();
+  IqChunk chunk;
+  while (line.next_chunk(chunk, reached_)) unsent_.motor_bytes += chunk.bytes.size() - pty_.write(chunk.bytes);
 }
 
 }  // namespace kphi::sim

@@ -59,6 +59,7 @@ class Server {
   void request_stop() noexcept;
   /// To be read when run() has returned: what the script of faults did.
   [[nodiscard]] const WireTruth& truth() noexcept { return bench_.wire().truth(); }
+  [[nodiscard]] const IqTruth& motor_truth() noexcept { return bench_.motor_line().truth(); }
   /// To be read when run() has returned.
   [[nodiscard]] const Unsent& unsent() const noexcept { return unsent_; }
 

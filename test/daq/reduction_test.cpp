@@ -48,6 +48,34 @@ TEST(Reduction, FindsTheKnownCoefficientWithoutDoubt) {
   }
 }
 
+std::string bench_with(const std::string& motor) {
+  return "format: kphi-bench/1\nname: b\nnetbox: {host: b}\niq: {device: /dev/null, speed_max_rpm: 19300" + motor +
+         "}\nthrust_axis: +Fz\n";
+}
+
+TEST(Reduction, CorrectsSpeedsByTheClockGainOfTheBenchFile) {
+  auto run = make_run(Truth{});
+  run.header.bench_text = bench_with("");
+  const auto reported = reduce(run);
+  run.header.bench_text = bench_with(", clock_gain: {factor: 1.005, u: 1e-5}");
+  const auto corrected = reduce(run);
+  for (std::size_t i = 0; i < reported.size(); ++i) {
+    EXPECT_DOUBLE_EQ(corrected[i].speed_rad_s, 1.005 * reported[i].speed_rad_s);
+    EXPECT_DOUBLE_EQ(corrected[i].speed_sd_rad_s, 1.005 * reported[i].speed_sd_rad_s);
+    EXPECT_EQ(corrected[i].thrust_n, reported[i].thrust_n);
+    EXPECT_EQ(corrected[i].window_begin_s, reported[i].window_begin_s);
+    EXPECT_EQ(corrected[i].doubts, reported[i].doubts);
+  }
+  run.header.bench_text = bench_with(", clock_gain: {factor: 1.02, u: 1e-5}");
+  EXPECT_EQ(reduce(run)[2].doubts, reported[2].doubts) << "the module holds what it reports, not what is true";
+}
+
+TEST(Reduction, RefusesAClockGainThatCannotBeRead) {
+  auto run = make_run(Truth{});
+  run.header.bench_text = bench_with(", clock_gain: {factor: fast}");
+  EXPECT_THROW((void)reduce(run), results::RecordError);
+}
+
 TEST(Reduction, SignAndSpinOfTheMountingDoNotShow) {
   for (const int sign : {-1, 1}) {
     for (const int spin : {-1, 1}) {

@@ -56,6 +56,21 @@ TEST(Program, RunsACampaignOverTheRealTransportsAndFitsWhatTheBenchWasBuiltWith)
   EXPECT_THAT(compensate.out(), HasSubstr("64.8"));
 }
 
+TEST(Program, TellsWhoItsDevicesAreAndHowTheirClocksRun) {
+  RunningBench bench;
+  Process devices({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--json", "--clock-gain", "10"});
+  ASSERT_EQ(devices.wait(), 0) << devices.err();
+  const json motor = json::parse(devices.out()).at(1);
+  EXPECT_EQ(motor.at("uid"), "002300064d4b501120343353");
+  EXPECT_EQ(motor.at("firmware"), "speed 0.0.32");
+  EXPECT_EQ(motor.at("parameters").at("brushless_drive.volts_limit"), 27.0);
+  EXPECT_EQ(motor.at("parameters").at("propeller_motor_control.timeout"), 0.5);
+  EXPECT_LE(motor.at("clock_gain").at("lowest"), 1.0);
+  EXPECT_GE(motor.at("clock_gain").at("highest"), 1.0);
+  EXPECT_EQ(motor.at("clock_gain").at("uid"), motor.at("uid"));
+  for (const json& finding : motor.at("findings")) EXPECT_NE(finding.at("severity"), "fault") << finding;
+}
+
 TEST(Program, StopsOnCtrlCWithTheMotorCoastingAndTheFileKept) {
   for (const int signal_number : {SIGINT, SIGTERM, SIGHUP}) {
     RunningBench bench;

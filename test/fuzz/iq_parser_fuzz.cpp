@@ -1,8 +1,9 @@
-// Any bytes, in any chunks: the parser must account for each byte, and a session fed with them must never move the
-// motor.
+// Any bytes, in any chunks: the parser must account for each byte, and neither a session nor a line of several fed with
+// them may ever move a motor.
 #include <cstdlib>
 
-#include "drivers/iq/session.hpp"
+#include "drivers/iq/bus.hpp"
+#include "test/drivers/iq/fake_module.hpp"
 
 namespace {
 
@@ -13,7 +14,7 @@ void require(bool condition) {
 void parse(std::span<const std::uint8_t> bytes, std::size_t chunk) {
   kphi::iq::Parser parser;
   std::uint64_t in_packets = 0;
-  const auto sink = [&](const kphi::iq::Packet& packet, std::size_t) {
+  const auto sink = [&](const kphi::iq::Packet& packet, std::uint64_t) {
     require(packet.length <= kphi::iq::kMaxPayload);
     in_packets += packet.length + kphi::iq::kFrameOverhead;
   };
@@ -39,6 +40,39 @@ void converse(std::span<const std::uint8_t> bytes, std::size_t chunk) {
   }
 }
 
+/// A line of two, where the bytes come between the true answers: once connected it must stay still as well, and
+/// nothing may ever be saved.
+void share(std::span<const std::uint8_t> bytes, std::size_t chunk) {
+  kphi::iq::Settings second;
+  second.module_id = 5;
+  kphi::iq::Bus bus({kphi::iq::Settings{}, second});
+  kphi::iq::fake::Module modules[2];
+  modules[1].id = 5;
+  modules[1].values[{5, 14}] = {5};
+  kphi::Instant now{0};
+  bus.connect_anew(now);
+  std::size_t at = 0;
+  for (int turn = 0; turn < 400; ++turn) {
+    const auto sent = bus.output();
+    const std::vector<std::uint8_t> heard(sent.begin(), sent.end());
+    bus.sent(heard.size());
+    for (auto& module : modules) {
+      for (const auto& reply : module.receive(heard)) bus.receive(reply, now);
+    }
+    if (turn > 100 && at < bytes.size()) {
+      bus.receive(bytes.subspan(at, std::min(chunk, bytes.size() - at)), now);
+      at += chunk;
+    }
+    now = std::max(now + std::chrono::microseconds(100), std::min(bus.deadline(), now + std::chrono::seconds(1)));
+    bus.advance(now);
+    require(bus.deadline() > now);
+  }
+  for (const auto& module : modules) {
+    require(module.count([](const auto& h) { return h.is_motion() && !h.is_coast(); }) == 0);
+    require(module.count([](const auto& h) { return h.access == 2; }) == 0);
+  }
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -46,5 +80,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::size_t chunk = data[0] % 70 + 1;
   parse({data + 1, size - 1}, chunk);
   converse({data + 1, size - 1}, chunk);
+  share({data + 1, size - 1}, chunk);
   return 0;
 }

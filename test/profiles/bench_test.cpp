@@ -141,10 +141,38 @@ TEST(Bench, SpinsOneWayOrTheOther) {
 
 TEST(Bench, WantsADeviceThatIsAPathAndAHostThatIsAName) {
   EXPECT_THAT(refused("/dev/ttyUSB0", "ttyUSB0"),
-              ElementsAre("10:11: iq.device: text \"ttyUSB0\" does not fit; write a path that begins with /"));
+              ElementsAre("10:11: iq.device: text \"ttyUSB0\" does not fit; write a path that begins with /, or "
+                          "usb:VID:PID[:SERIAL][@PORT] with four hexadecimal digits or * each"));
+  EXPECT_THAT(refused("/dev/ttyUSB0", "usb:403:6001"), ElementsAre(StartsWith("10:11: iq.device: text")));
+  EXPECT_THAT(refused("/dev/ttyUSB0", "usb:0403:6001@here"), ElementsAre(StartsWith("10:11: iq.device: text")));
+  for (const char* fine : {"usb:0403:6001", "usb:0403:6001:A10K0000", "usb:*:*:A10K0000", "usb:1a86:7523@1-4.2",
+                           "usb:1a86:7523@1-4.2:1.0"}) {
+    EXPECT_THAT(refused("/dev/ttyUSB0", fine), IsEmpty()) << fine;
+  }
   EXPECT_THAT(refused("192.168.1.1", "\"http://192.168.1.1\""),
               ElementsAre(StartsWith("4:9: netbox.host: text \"http://192.168.1.1\" does not fit")));
   EXPECT_THAT(refused("192.168.1.1", "\"::1\""), IsEmpty());
+}
+
+TEST(Bench, MayKnowTheGainOfTheModulesClock) {
+  EXPECT_FALSE(parse_bench(kBenchText, "b.yaml").iq.clock_gain);
+  const auto with = [](const std::string& gain) { return "  clock_gain: {" + gain + "}\n  baud:"; };
+  const Bench bench =
+      parse_bench(changed(kBenchText, "  baud:",
+                          with("factor: 1.0050312, u: 3.0e-05, uid: \"002300064d4b501120343353\", measured_utc: "
+                               "\"2026-05-01T12:00:00Z\", duration_s: 60.0")),
+                  "b.yaml");
+  ASSERT_TRUE(bench.iq.clock_gain);
+  EXPECT_EQ(bench.iq.clock_gain->factor, 1.0050312);
+  EXPECT_EQ(bench.iq.clock_gain->u_factor, 3.0e-5);
+  EXPECT_EQ(bench.iq.clock_gain->uid, "002300064d4b501120343353");
+  EXPECT_EQ(bench.iq.clock_gain->measured_utc, "2026-05-01T12:00:00Z");
+  EXPECT_THAT(refused("  baud:", with("factor: 1.005, u: 1e-5")), IsEmpty());
+  EXPECT_THAT(refused("  baud:", with("factor: 5031, u: 1e-5")),
+              ElementsAre(StartsWith("11:24: iq.clock_gain.factor: 5031 is above 1.03")));
+  EXPECT_THAT(refused("  baud:", with("factor: 1.005")), ElementsAre(testing::HasSubstr("u is missing")));
+  EXPECT_THAT(refused("  baud:", with("factor: 1.005, u: 1e-5, uid: \"12\"")),
+              ElementsAre(testing::HasSubstr("24 hexadecimal digits")));
 }
 
 TEST(Bench, SimulatesInProcessWithoutAControlLineOnly) {

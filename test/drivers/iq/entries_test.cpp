@@ -94,7 +94,7 @@ Packet decoded(const Bytes& frame) {
   Packet result;
   int packets = 0;
   Parser parser;
-  parser.push(frame, [&](const Packet& packet, std::size_t) {
+  parser.push(frame, [&](const Packet& packet, std::uint64_t) {
     result = packet;
     ++packets;
   });

@@ -85,14 +85,32 @@ class Module {
   std::set<Key> read_only;      ///< entries that a set does not change
   std::map<Key, Bytes> values;  ///< what a get brings
   std::vector<Heard> heard;
+  bool old_system_control = false;    ///< system_control answers on id 0 only
+  unsigned baud = 0;                  ///< 0: any
+  bool baud_needs_reboot = false;     ///< a new rate takes effect after a reboot
+  bool baud_of_others_fails = false;  ///< at another rate than the first, three of four replies are lost
+  int restarts = 0;
+  bool turns_at_once = true;  ///< it has the commanded speed at once; else the test says how fast it turns
 
   Module() {
     values = {{{50, 0}, u8(5)},          {{50, 13}, f32(0)},      {{69, 0}, f32(12.5)},      {{69, 1}, f32(3.25)},
               {{50, 36}, f32(10)},       {{83, 0}, f32(55.25)},   {{77, 0}, f32(44.5)},      {{50, 41}, u32(65536)},
               {{52, 15}, f32(1)},        {{52, 18}, u8(2)},       {{52, 19}, u8(2)},         {{5, 16}, u32(0x00100020)},
               {{5, 17}, u32(0x10100)},   {{5, 18}, u32(0x30000)}, {{5, 4}, u32(0x11111111)}, {{5, 5}, u32(0x22222222)},
-              {{5, 6}, u32(0x33333333)}, {{50, 14}, u16(7)},      {{50, 32}, f32(2200)},     {{84, 0}, u8(0)}};
+              {{5, 6}, u32(0x33333333)}, {{5, 14}, u8(0)},        {{5, 15}, f32(100)},       {{84, 1}, u8(0)},
+              {{50, 14}, u16(7)},        {{50, 32}, f32(2200)},   {{84, 0}, u8(0)},          {{52, 0}, u8(1)},
+              {{52, 7}, f32(0.001)},     {{52, 8}, f32(0)},       {{52, 9}, f32(0)},         {{50, 33}, f32(0.045)}};
     silent = {{77, 0}};
+  }
+
+  /// As after a brown-out: what was set is lost, the uptime begins again.
+  void restart() {
+    const auto id_value = values[{5, 14}];
+    values = Module().values;
+    values[{5, 14}] = id_value;
+    values[{5, 15}] = f32(0.25);
+    if (next_baud_ != 0) baud = next_baud_;
+    ++restarts;
   }
 
   /// Bytes from the host in, replies out, in order, one element each.
@@ -140,7 +158,9 @@ class Module {
   void act(const std::uint8_t* bytes, std::size_t length, std::vector<Bytes>& replies) {
     Heard message{bytes[2], bytes[3], bytes[4] & 3, bytes[4] >> 2, Bytes(bytes + 5, bytes + 3 + length)};
     heard.push_back(message);
-    if (message.id != id) return;
+    const bool for_system = message.type == 5 && old_system_control;
+    const bool broadcast = message.id == 63 && message.access == 1;
+    if (!broadcast && message.id != (for_system ? 0 : id)) return;
     const Key key{message.type, message.sub};
     if (message.access == 0 && !mute && silent.count(key) == 0 && values.count(key) != 0) {
       replies.push_back(frame_of_reply(message));
@@ -149,22 +169,28 @@ class Module {
   }
 
   [[nodiscard]] Bytes frame_of_reply(const Heard& message) const {
-    return kphi::iq::fake::message(message.type, message.sub, 3, id, values.at({message.type, message.sub}));
+    return kphi::iq::fake::message(message.type, message.sub, 3, message.id, values.at({message.type, message.sub}));
   }
 
   void obey(const Heard& message, const Key& key) {
-    if (message.is_coast()) {
+    if (key == Key{5, 0}) {
+      restart();
+    } else if (key == Key{16, 0}) {
+      next_baud_ = static_cast<unsigned>(message.data[0] | message.data[1] << 8 | message.data[2] << 16);
+      if (!baud_needs_reboot) baud = next_baud_;
+    } else if (message.is_coast()) {
       values[{50, 0}] = u8(5);
-      values[{50, 13}] = f32(0);
+      if (turns_at_once) values[{50, 13}] = f32(0);
     } else if (message.is_speed()) {
       values[{50, 0}] = u8(3);
-      values[{50, 13}] = message.data;
+      if (turns_at_once) values[{50, 13}] = message.data;
     } else if (values.count(key) != 0) {
       values[key] = message.data;
     }
   }
 
   Bytes buffer_;
+  unsigned next_baud_ = 0;
 };
 
 }  // namespace kphi::iq::fake

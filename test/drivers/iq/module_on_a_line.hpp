@@ -28,6 +28,12 @@ class ModuleOnALine {
     const std::lock_guard lock(mutex_);
     return work(module_);
   }
+  /// Further modules that hear the same line.
+  template <class Work>
+  void with_others(Work&& work) {
+    const std::lock_guard lock(mutex_);
+    work(others_);
+  }
   /// Waits until `what(module)` holds after something was heard.
   template <class What>
   bool wait_for(What&& what, std::chrono::milliseconds limit = std::chrono::milliseconds(3000)) {
@@ -63,17 +69,37 @@ class ModuleOnALine {
       const std::lock_guard lock(mutex_);  // held from the read on: left_coasting must not look in between
       const auto n = ::read(terminal_.master(), buffer, sizeof buffer);
       if (n <= 0) continue;
-      for (const Bytes& reply : module_.receive(std::span(buffer, static_cast<std::size_t>(n)))) {
-        [[maybe_unused]] const auto written = ::write(terminal_.master(), reply.data(), reply.size());
-      }
+      answer(std::span(buffer, static_cast<std::size_t>(n)));
       heard_.notify_all();
     }
   }
 
+  /// At the wrong rate both sides hear garbage.
+  void answer(std::span<std::uint8_t> bytes) {
+    const bool understood = module_.baud == 0 || module_.baud == terminal_.baud();
+    const bool unreliable = module_.baud_of_others_fails && module_.baud != first_baud_;
+    if (first_baud_ == 0) first_baud_ = module_.baud;
+    if (!understood) {
+      for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(byte * 37 + 0x55);
+    }
+    for (Module& other : others_) {
+      for (const Bytes& reply : other.receive(bytes)) send(reply, false);
+    }
+    for (const Bytes& reply : module_.receive(bytes)) send(reply, unreliable && ++replies_ % 4 != 0);
+    if (!understood) send({0x55, 0x3B, 0x80, 0x00}, false);
+  }
+  void send(const Bytes& bytes, bool lost) {
+    if (lost) return;
+    [[maybe_unused]] const auto written = ::write(terminal_.master(), bytes.data(), bytes.size());
+  }
+
+  unsigned first_baud_ = 0;
+  int replies_ = 0;
   serial::fake::PseudoTerminal terminal_;
   std::mutex mutex_;
   std::condition_variable heard_;
   Module module_;
+  std::vector<Module> others_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

@@ -166,6 +166,45 @@ TEST(Motor, StretchesProtocolDeadlinesOnAFastBench) {
       2000ms));
 }
 
+TEST(Motor, AnswersQuestionsInPassing) {
+  Stand stand;
+  stand.spin(700);
+  const auto replies = stand.motor->inquire({{find("brushless_drive.motor_Kv"), {}},
+                                             {find("propeller_motor_control.ctrl_thrust"), {}},
+                                             {find("propeller_motor_control.timeout"), 0.25}});
+  ASSERT_EQ(replies.size(), 3u);
+  EXPECT_EQ(replies[0].value, 2200.0);
+  EXPECT_EQ(replies[1].value, std::nullopt);
+  EXPECT_TRUE(replies[2].accepted);
+  EXPECT_THROW((void)stand.motor->inquire({{find("propeller_motor_control.ctrl_pwm"), 0.1}}), std::invalid_argument);
+  EXPECT_TRUE(stand.motor->alive());
+}
+
+TEST(Motor, SharesItsLineWithOthers) {
+  const SteadyClock clock;
+  ModuleOnALine line;
+  line.with_others([](std::vector<Module>& others) {
+    others.resize(1);
+    others[0].id = 9;
+    others[0].values[{5, 14}] = fake::u8(9);
+  });
+  Settings second;
+  second.module_id = 9;
+  auto motors = Motor::on_one_line(line.device(), 115200, {Settings{}, second}, clock);
+  ASSERT_EQ(motors.size(), 2u);
+  motors[1]->spin_at(RadPerSec(800));
+  const auto other_spins = [&] {
+    bool spins = false;
+    line.with_others([&](std::vector<Module>& others) { spins = others[0].values.at({50, 0}) == fake::u8(3); });
+    return spins;
+  };
+  EXPECT_TRUE(soon([&] { return other_spins(); }, 2000ms));
+  EXPECT_EQ(line.with([](Module& m) { return m.values.at({50, 0}); }), fake::u8(5)) << "the first one rests";
+  motors[1].reset();
+  EXPECT_FALSE(other_spins());
+  EXPECT_TRUE(motors[0]->alive()) << "it lives on";
+}
+
 TEST(Lease, CoastsAMotorWhoseCallerFellSilentWhilePollingGoesOn) {
   Stand stand;
   const auto start = steady_clock::now();
@@ -226,6 +265,24 @@ INSTANTIATE_TEST_SUITE_P(
                            }},
                     WayOut{"Coast", [](Stand& s) { s.motor->coast(); }},
                     WayOut{"ConfirmedCoast", [](Stand& s) { (void)s.motor->coast_and_confirm(1s); }},
+                    WayOut{"EmergencyStop", [](Stand& s) { s.motor->emergency_stop(); }},
+                    WayOut{"SlowStop", [](Stand& s) { EXPECT_TRUE(s.motor->stop().safe()); }},
+                    WayOut{"SlowStopThatIsAbandoned",
+                           [](Stand& s) {
+                             auto stop = std::async(std::launch::async, [&] { (void)s.motor->stop(); });
+                             s.motor->coast();
+                             stop.get();
+                           }},
+                    WayOut{"ModuleThatRestarts",
+                           [](Stand& s) {
+                             s.line.with([](Module& m) { m.restart(); });
+                             EXPECT_TRUE(soon(
+                                 [&] {
+                                   s.motor->renew();
+                                   return !s.motor->alive();
+                                 },
+                                 3000ms));
+                           }},
                     WayOut{"SpeedZero", [](Stand& s) { s.motor->spin_at(RadPerSec(0)); }},
                     WayOut{"SilentCaller", [](Stand&) {}},
                     WayOut{"DestructionWithACommandOnItsWay",

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
+#include <numeric>
 #include <random>
 
 #include "test/drivers/iq/fake_module.hpp"
@@ -22,16 +22,16 @@ struct Reception {
   Parser parser;
   std::vector<Bytes> frames;
   void push(std::span<const std::uint8_t> bytes) {
-    parser.push(bytes, [&](const Packet& packet, std::size_t) { frames.push_back(encoded(packet)); });
+    parser.push(bytes, [&](const Packet& packet, std::uint64_t) { frames.push_back(encoded(packet)); });
   }
   void abandon() {
-    parser.abandon([&](const Packet& packet, std::size_t) { frames.push_back(encoded(packet)); });
+    parser.abandon([&](const Packet& packet, std::uint64_t) { frames.push_back(encoded(packet)); });
   }
 };
 
 /// Brute force over a whole recording: what a receiver that rewinds after each failure must find, and where it stands.
-std::vector<Bytes> all_frames(const Bytes& bytes) {
-  std::vector<Bytes> found;
+std::vector<std::pair<std::size_t, std::span<const std::uint8_t>>> all_frames(std::span<const std::uint8_t> bytes) {
+  std::vector<std::pair<std::size_t, std::span<const std::uint8_t>>> found;
   for (std::size_t at = 0; at + 1 < bytes.size();) {
     const std::size_t size = bytes[at + 1] + 5u;
     if (bytes[at] != 0x55 || size > 64) {
@@ -41,8 +41,7 @@ std::vector<Bytes> all_frames(const Bytes& bytes) {
     if (at + size > bytes.size()) break;
     const std::uint16_t crc = fake::crc16(&bytes[at + 1], size - 3);
     if (bytes[at + size - 2] == (crc & 0xFF) && bytes[at + size - 1] == crc >> 8) {
-      found.emplace_back(bytes.begin() + static_cast<std::ptrdiff_t>(at),
-                         bytes.begin() + static_cast<std::ptrdiff_t>(at + size));
+      found.emplace_back(at, bytes.subspan(at, size));
       at += size;
     } else {
       ++at;
@@ -104,25 +103,97 @@ TEST(Packet, RoundTripsForEveryTypeAndLength) {
       for (std::size_t i = 0; i < length; ++i) packet.payload[i] = static_cast<std::uint8_t>(random());
       std::vector<Packet> received;
       Parser parser;
-      parser.push(encoded(packet), [&](const Packet& p, std::size_t) { received.push_back(p); });
+      parser.push(encoded(packet), [&](const Packet& p, std::uint64_t) { received.push_back(p); });
       ASSERT_EQ(received.size(), 1u);
       ASSERT_TRUE(received[0] == packet);
     }
   }
 }
 
-TEST(Parser, FindsWhatABruteForceScannerFindsForEveryChunkSize) {
+/// Frames of a stream, and where they end, in one number.
+class Digest {
+ public:
+  void add(std::span<const std::uint8_t> frame, std::uint64_t end) {
+    for (const std::uint8_t byte : frame) fold(byte);
+    fold(end);
+    ++count_;
+  }
+  friend bool operator==(const Digest&, const Digest&) = default;
+  [[nodiscard]] std::size_t count() const { return count_; }
+
+ private:
+  void fold(std::uint64_t value) { hash_ = (hash_ ^ value) * 0x100000001B3; }
+  std::uint64_t hash_ = 0xCBF29CE484222325;
+  std::size_t count_ = 0;
+};
+
+Digest brute_force(std::span<const std::uint8_t> bytes) {
+  Digest digest;
+  for (const auto& [begin, frame] : all_frames(bytes)) digest.add(frame, begin + frame.size());
+  return digest;
+}
+
+Digest parsed(std::span<const std::uint8_t> bytes, std::size_t chunk) {
+  Digest digest;
+  Parser parser;
+  for (std::size_t at = 0; at < bytes.size(); at += chunk) {
+    parser.push(bytes.subspan(at, std::min(chunk, bytes.size() - at)), [&](const Packet& packet, std::uint64_t end) {
+      std::array<std::uint8_t, kMaxFrame> frame;
+      digest.add(std::span(frame).first(encode(packet, frame)), end);
+    });
+  }
+  return digest;
+}
+
+std::vector<std::size_t> chunk_sizes(std::mt19937& random) {
+  std::vector<std::size_t> sizes(64);
+  std::iota(sizes.begin(), sizes.end(), std::size_t{1});
+  for (int i = 0; i < 32; ++i) sizes.push_back(65 + random() % 4031);
+  sizes.push_back(4096);
+  return sizes;
+}
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr std::size_t kManyBytes = 500'000;
+#else
+constexpr std::size_t kManyBytes = 10'000'000;
+#endif
+
+// Each chunk size reads one quarter of the bytes; the brute force reads each quarter once.
+TEST(Parser, FindsWhatABruteForceScannerFindsInTenMillionBytesForEveryChunkSize) {
   std::mt19937 random(20210530);
-  const Bytes stream = random_stream(random, 1'100'000);
-  const std::vector<Bytes> expected = all_frames(stream);
-  ASSERT_GT(expected.size(), 20'000u);
-  for (std::size_t chunk = 1; chunk <= 64; ++chunk) {
-    Reception reception;
-    for (std::size_t at = 0; at < stream.size(); at += chunk) {
-      reception.push(std::span(stream).subspan(at, std::min(chunk, stream.size() - at)));
+  const Bytes stream = random_stream(random, kManyBytes);
+  const std::size_t quarter = stream.size() / 4;
+  std::array<std::span<const std::uint8_t>, 4> parts;
+  std::array<Digest, 4> expected;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    parts[i] = std::span(stream).subspan(i * quarter, quarter);
+    expected[i] = brute_force(parts[i]);
+    ASSERT_GT(expected[i].count(), kManyBytes / 250);
+  }
+  std::size_t turn = 0;
+  for (const std::size_t chunk : chunk_sizes(random)) {
+    const std::size_t part = turn++ % parts.size();
+    ASSERT_EQ(parsed(parts[part], chunk), expected[part]) << "chunks of " << chunk << ", quarter " << part;
+  }
+}
+
+TEST(Parser, FindsWhatABruteForceScannerFindsInPureNoise) {
+  std::mt19937 random(1);
+  Bytes noise(kManyBytes / 5);
+  for (auto& byte : noise) byte = static_cast<std::uint8_t>(random());
+  EXPECT_EQ(parsed(noise, 4096), brute_force(noise));
+  EXPECT_EQ(parsed(noise, 1), brute_force(noise));
+}
+
+TEST(Parser, FindsWhatABruteForceScannerFindsBehindEveryTruncation) {
+  const Bytes cut = fake::message(50, 13, 3, 0, {0x55, 0x3B, 0x55, 0x06});
+  for (std::size_t size = 0; size <= cut.size(); ++size) {
+    for (std::size_t good = 0; good < 8; ++good) {
+      Bytes stream(cut.begin(), cut.begin() + static_cast<std::ptrdiff_t>(size));
+      for (std::size_t i = 0; i < good; ++i) append(stream, speed_reply(static_cast<double>(i)));
+      for (const std::size_t chunk : {1u, 5u, 64u}) ASSERT_EQ(parsed(stream, chunk), brute_force(stream)) << size;
     }
-    ASSERT_TRUE(reception.frames == expected)
-        << "chunks of " << chunk << ": " << reception.frames.size() << " of " << expected.size();
   }
 }
 
@@ -140,14 +211,19 @@ TEST(Parser, AccountsForEveryByte) {
   EXPECT_EQ(counters.discarded_bytes, stream.size() - in_packets);
 }
 
-TEST(Parser, TellsHowManyBytesFollowAPacket) {
-  Bytes stream = speed_reply(1);
+TEST(Parser, TellsWhereAPacketEnds) {
+  Bytes stream{0x55, 0x1E, 0x32};
+  append(stream, speed_reply(1));
   append(stream, speed_reply(2));
   append(stream, {0x55, 0x06});
-  std::vector<std::size_t> behind;
+  std::vector<std::uint64_t> ends;
   Parser parser;
-  parser.push(stream, [&](const Packet&, std::size_t n) { behind.push_back(n); });
-  EXPECT_EQ(behind, (std::vector<std::size_t>{13, 2}));
+  const auto note = [&](const Packet&, std::uint64_t end) { ends.push_back(end); };
+  parser.push(std::span(stream).first(5), note);
+  parser.push(std::span(stream).subspan(5), note);
+  EXPECT_TRUE(ends.empty());
+  parser.abandon(note);
+  EXPECT_EQ(ends, (std::vector<std::uint64_t>{14, 25}));
 }
 
 TEST(Parser, TakesBurstsOfTwentyRepliesInOneRead) {

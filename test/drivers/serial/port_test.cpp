@@ -3,11 +3,11 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <boost/asio/read.hpp>
-#include <boost/asio/write.hpp>
+#include <array>
 #include <memory>
+#include <numeric>
+#include <vector>
 
-#include "drivers/device_error.hpp"
 #include "test/drivers/serial/pseudo_terminal.hpp"
 
 namespace kphi::serial {
@@ -16,9 +16,8 @@ namespace {
 using fake::PseudoTerminal;
 
 std::string refusal(const std::string& device, unsigned baud) {
-  boost::asio::io_context io;
   try {
-    Port port(io, device, baud);
+    Port port(device, baud);
   } catch (const DeviceError& error) {
     return error.what();
   }
@@ -27,8 +26,7 @@ std::string refusal(const std::string& device, unsigned baud) {
 
 TEST(Port, IsRawEightBitsWithoutParityAtTheBaudAskedFor) {
   PseudoTerminal terminal;
-  boost::asio::io_context io;
-  const Port port(io, terminal.name(), 921600);
+  const Port port(terminal.name(), 921600);
   const termios line = terminal.line();
   EXPECT_EQ(cfgetospeed(&line), static_cast<speed_t>(B921600));
   EXPECT_EQ(line.c_cflag & static_cast<tcflag_t>(CSIZE), static_cast<tcflag_t>(CS8));
@@ -40,16 +38,17 @@ TEST(Port, IsRawEightBitsWithoutParityAtTheBaudAskedFor) {
 
 TEST(Port, CarriesEveryByteUnchangedBothWays) {
   PseudoTerminal terminal;
-  boost::asio::io_context io;
-  Port port(io, terminal.name(), 115200);
-  std::string all;
-  for (int i = 0; i < 256; ++i) all.push_back(static_cast<char>(i));
-  const auto size = static_cast<ssize_t>(all.size());
-  ASSERT_EQ(::write(terminal.master(), all.data(), all.size()), size);
-  std::string got(all.size(), '\0');
-  boost::asio::read(port.stream(), boost::asio::buffer(got));
+  Port port(terminal.name(), 115200);
+  std::vector<std::uint8_t> all(256);
+  std::iota(all.begin(), all.end(), std::uint8_t{0});
+  ASSERT_EQ(::write(terminal.master(), all.data(), all.size()), static_cast<ssize_t>(all.size()));
+  std::vector<std::uint8_t> got(all.size());
+  for (std::size_t n = 0; n < all.size();) {
+    ASSERT_TRUE(port.wait(std::chrono::seconds(2)));
+    n += port.read(std::span(got).subspan(n));
+  }
   EXPECT_EQ(got, all);
-  boost::asio::write(port.stream(), boost::asio::buffer(all));
+  ASSERT_EQ(port.write(all), all.size());
   for (std::size_t n = 0; n < all.size();) {
     const auto more = ::read(terminal.master(), got.data() + n, got.size() - n);
     ASSERT_GT(more, 0);
@@ -58,10 +57,44 @@ TEST(Port, CarriesEveryByteUnchangedBothWays) {
   EXPECT_EQ(got, all);
 }
 
+TEST(Port, NeverBlocks) {
+  PseudoTerminal terminal;
+  Port port(terminal.name(), 115200);
+  std::array<std::uint8_t, 16> some;
+  EXPECT_EQ(port.read(some), 0u);
+  EXPECT_FALSE(port.wait(std::chrono::milliseconds(1)));
+  const std::vector<std::uint8_t> much(4096);
+  for (int i = 0; i < 1000 && port.write(much) > 0; ++i) {
+  }
+  EXPECT_EQ(port.write(much), 0u) << "nobody reads at the other end";
+}
+
+TEST(Port, ThrowsWhenItIsUnplugged) {
+  PseudoTerminal terminal;
+  Port port(terminal.name(), 115200);
+  terminal.unplug();
+  std::array<std::uint8_t, 16> some;
+  EXPECT_THROW((void)port.read(some), PortGone);
+  EXPECT_TRUE(port.wait(std::chrono::seconds(1))) << "there is something to tell";
+}
+
+TEST(Port, ChangesItsBaudAndForgetsWhatWasOnItsWay) {
+  PseudoTerminal terminal;
+  Port port(terminal.name(), 115200);
+  ASSERT_EQ(::write(terminal.master(), "old", 3), 3);
+  ASSERT_TRUE(port.wait(std::chrono::seconds(2)));
+  port.set_baud(921600);
+  EXPECT_EQ(port.baud(), 921600u);
+  const termios line = terminal.line();
+  EXPECT_EQ(cfgetospeed(&line), static_cast<speed_t>(B921600));
+  std::array<std::uint8_t, 16> some;
+  EXPECT_EQ(port.read(some), 0u);
+  EXPECT_THROW(port.set_baud(250000), DeviceError);
+}
+
 TEST(Port, IsRefusedToASecondOpener) {
   PseudoTerminal terminal;
-  boost::asio::io_context io;
-  auto first = std::make_unique<Port>(io, terminal.name(), 115200);
+  auto first = std::make_unique<Port>(terminal.name(), 115200);
   EXPECT_NE(refusal(terminal.name(), 115200).find("in use by another program"), std::string::npos);
   first.reset();
   EXPECT_EQ(refusal(terminal.name(), 115200), "") << "and free again afterwards";

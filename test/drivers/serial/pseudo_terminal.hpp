@@ -8,6 +8,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace kphi::serial::fake {
 
@@ -38,6 +39,17 @@ class PseudoTerminal {
     termios line{};
     tcgetattr(slave_, &line);
     return line;
+  }
+  /// As the host has set it.
+  [[nodiscard]] unsigned baud() const {
+    constexpr std::pair<speed_t, unsigned> rates[] = {
+        {B9600, 9600},     {B19200, 19200},   {B38400, 38400},   {B57600, 57600},     {B115200, 115200},
+        {B230400, 230400}, {B460800, 460800}, {B921600, 921600}, {B1000000, 1000000}, {B2000000, 2000000}};
+    const termios now = line();
+    for (const auto& [code, rate] : rates) {
+      if (cfgetospeed(&now) == code) return rate;
+    }
+    return 0;
   }
   void unplug() {
     if (master_ >= 0) ::close(master_);

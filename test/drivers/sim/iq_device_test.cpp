@@ -5,7 +5,7 @@
 #include <bit>
 #include <limits>
 
-#include "test/drivers/sim/hex.hpp"
+#include "test/drivers/sim/iq_module.hpp"
 
 namespace kphi::sim {
 namespace {
@@ -15,25 +15,7 @@ using test::bytes;
 using test::hex;
 using Mode = MotorDrive::Mode;
 
-class Module : public ::testing::Test {
- protected:
-  /// What the module answers to these bytes, as hex.
-  std::string tell(std::string_view spelt, Instant now = Instant{0}) {
-    device.output().clear();
-    device.receive(bytes(spelt), now);
-    return hex(device.output());
-  }
-  void set_float(std::uint8_t type, std::uint8_t sub, float value, Instant now = Instant{0}) {
-    const auto bits = std::bit_cast<std::uint32_t>(value);
-    std::vector<std::uint8_t> data, frame;
-    for (int shift = 0; shift < 32; shift += 8) data.push_back(static_cast<std::uint8_t>(bits >> shift));
-    append_iq_frame(frame, type, sub, 1, data);
-    device.receive(frame, now);
-  }
-
-  MotorState state;
-  IqDevice device{IqSettings{}, state};
-};
+using Module = test::ExactModule;
 
 TEST_F(Module, AnswersWhoItIsByteForByte) {
   EXPECT_EQ(tell("55 02 05 10 00 2B 81"), hex("55 06 05 10 03 20 00 10 00 39 08"));  // speed 0.0.32
@@ -167,14 +149,9 @@ TEST_F(Module, DoesNotTimeOutInCoastOrBrake) {
 }
 
 TEST_F(Module, TimeoutThroughZeroVoltsEndsInCoastOrBrake) {
-  for (const auto& [spelt, last] : {std::pair{"55 03 34 12 01 01 D5 17", Mode::coast}, {"", Mode::brake}}) {
-    if (*spelt != '\0') {
-      tell(spelt);
-    } else {
-      std::vector<std::uint8_t> frame;
-      append_iq_frame(frame, 52, 18, 1, bytes("02"));
-      device.receive(frame, Instant{0});
-    }
+  send(52, 19, 1, "00");
+  for (const auto& [behavior, last] : {std::pair{"01", Mode::coast}, {"02", Mode::brake}}) {
+    send(52, 18, 1, behavior);
     state.speed = 100;
     set_float(52, 5, 100);
     device.advance(500ms);
@@ -182,12 +159,16 @@ TEST_F(Module, TimeoutThroughZeroVoltsEndsInCoastOrBrake) {
     EXPECT_EQ(device.drive().target, 0);
     state.speed = 4;
     device.advance(501ms);
+    EXPECT_EQ(device.drive().mode, Mode::volts) << "not slow for long enough";
+    device.advance(1501ms);
     EXPECT_EQ(device.drive().mode, last);
   }
 }
 
 TEST_F(Module, TimeoutIsWallTime) {
-  IqDevice fast({0, 0, 20}, state);
+  settings = exact();
+  settings.time_scale = 20;
+  IqDevice fast(settings, state);
   fast.receive(bytes("55 06 34 0F 01 00 00 80 3E E9 8A"), Instant{0});  // 0.25 s
   fast.receive(bytes("55 06 34 05 01 00 00 C8 42 95 37"), Instant{0});
   fast.advance(4999ms);
@@ -197,12 +178,14 @@ TEST_F(Module, TimeoutIsWallTime) {
 }
 
 TEST_F(Module, ReportsItsClocksErrorInSpeedAndTime) {
-  IqDevice off({0, 0.005, 1}, state);
-  state.speed = 1000;
+  settings = exact();
+  settings.oscillator_gain = 0.005;
+  IqDevice off(settings, state);
+  state.speed = 1005;
   off.receive(bytes("55 02 32 0D 00 31 B4 55 02 05 0F 00 66 92"), 1000s);
   std::vector<std::uint8_t> expected;
-  append_iq_frame(expected, 50, 13, 3, bytes("00 40 7b 44"));  // 1005
-  append_iq_frame(expected, 5, 15, 3, bytes("00 40 7b 44"));
+  append_iq_frame(expected, 50, 13, 3, bytes("00 00 7a 44"));  // 1000: it takes a turn to last longer
+  append_iq_frame(expected, 5, 15, 3, bytes("00 40 7b 44"));   // 1005
   EXPECT_EQ(hex(off.output()), hex(std::span<const std::uint8_t>(expected)));
 }
 
@@ -218,17 +201,27 @@ TEST_F(Module, JoulesCanBeReset) {
   EXPECT_EQ(tell("55 02 45 03 00 A6 CA").substr(15, 12), "00 00 40 40 ");
 }
 
-TEST(IqEntries, AreSortedAndAnswerWithTheirLength) {
-  MotorState state;
-  for (const auto& entry : iq_entries()) {
-    IqDevice device({}, state);
-    std::vector<std::uint8_t> request;
-    append_iq_frame(request, entry.type, entry.sub, 0, {});
-    device.receive(request, Instant{0});
-    if (!entry.get) {
-      EXPECT_TRUE(device.output().empty()) << int{entry.type} << "/" << int{entry.sub};
-    } else {
-      EXPECT_EQ(device.output().size(), 7 + iq_size(entry.format)) << int{entry.type} << "/" << int{entry.sub};
+TEST(IqEntries, AnswerByTheirAccessAndLengthInEveryPersonality) {
+  IqHabits all = IqHabits{};
+  all.legacy_estimator = all.lamination = all.thrust_entries = all.supply_limits = all.undocumented = true;
+  for (const IqHabits& habits : {IqHabits{}, legacy_habits(), all}) {
+    MotorState state;
+    IqSettings settings;
+    settings.habits = habits;
+    std::size_t rows = 0;
+    for (const auto& entry : iq_entries()) {
+      IqDevice device(settings, state);
+      std::vector<std::uint8_t> request;
+      append_iq_frame(request, entry.type, entry.sub, 0, {});
+      device.receive(request, Instant{0});
+      const bool there = entry.get() && iq_present(entry, habits);
+      rows += iq_present(entry, habits) ? 1 : 0;
+      EXPECT_EQ(device.output().size(), there ? 7 + iq_size(entry.format) : 0)
+          << int{entry.type} << "/" << int{entry.sub};
+    }
+    EXPECT_GT(rows, 130u);
+    if (habits.undocumented) {
+      EXPECT_EQ(rows, iq_entries().size());
     }
   }
 }

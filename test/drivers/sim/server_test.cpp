@@ -336,6 +336,65 @@ TEST_F(FaultyServer, AnAddressOfNobodyIsSilenceNotAnEnd) {
   EXPECT_EQ(receive(socket.number()).size(), 36u) << "back where it was";
 }
 
+/// Writes to the port until the answer has come, 5 s at most.
+std::string ask_port(int number, std::string_view spelt, std::size_t size) {
+  const auto request = bytes(spelt);
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  std::string answer;
+  EXPECT_EQ(::write(number, request.data(), request.size()), static_cast<ssize_t>(request.size()));
+  while (answer.size() < size && std::chrono::steady_clock::now() < deadline) {
+    pollfd waiting{number, POLLIN, 0};
+    if (::poll(&waiting, 1, 200) <= 0 || (waiting.revents & POLLIN) == 0) break;
+    answer += receive(number);
+  }
+  return hex_of(answer);
+}
+
+void set_rate(int number, speed_t rate) {
+  termios line{};
+  ASSERT_EQ(::tcgetattr(number, &line), 0);
+  cfmakeraw(&line);
+  cfsetspeed(&line, rate);
+  ASSERT_EQ(::tcsetattr(number, TCSANOW, &line), 0);
+}
+
+TEST_F(RunningServer, AtTheWrongRateTheMotorIsNotUnderstood) {
+  const Descriptor port = motor_port();
+  set_rate(port.number(), B921600);
+  EXPECT_EQ(ask_port(port.number(), "55 02 05 10 00 2B 81", 11), "");
+  set_rate(port.number(), B115200);
+  std::string answer;
+  for (int i = 0; i < 20 && answer.size() < 33; ++i) answer = ask_port(port.number(), "55 02 05 10 00 2B 81", 11);
+  EXPECT_NE(answer.find(hex("55 06 05 10 03 20 00 10 00 39 08")), std::string::npos);
+}
+
+TEST_F(FaultyServer, UnpluggedTheLinkIsGoneAndComesBackAsAnotherTerminal) {
+  stop();
+  ServerSettings settings;
+  settings.control = (folder / "control").string();
+  settings.device = (folder / "dev" / "motor").string();
+  settings.bench.motor_faults.push_back(
+      motor_fault_of({{"kind", "motor_unplug"}, {"at_s", "0.3"}, {"for_s", "0.3"}, {"other", "true"}}));
+  server.emplace(settings);
+  const std::string link = server->addresses().device;
+  const fs::path first = fs::read_symlink(link);
+  const Descriptor port = motor_port();
+  thread = std::thread([this] { server->run(); });
+  pollfd waiting{port.number(), POLLIN, 0};
+  ASSERT_GT(::poll(&waiting, 1, 5000), 0);
+  EXPECT_NE(waiting.revents & (POLLHUP | POLLERR), 0) << "the client sees the hang-up";
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  std::error_code error;
+  while (fs::exists(fs::symlink_status(link, error)) && std::chrono::steady_clock::now() < deadline) {
+  }
+  EXPECT_FALSE(fs::exists(fs::symlink_status(link, error)));
+  while (!fs::exists(fs::symlink_status(link, error)) && std::chrono::steady_clock::now() < deadline) {
+  }
+  const Descriptor again(::open(link.c_str(), O_RDWR | O_NOCTTY));
+  ASSERT_GE(again.number(), 0);
+  EXPECT_EQ(ask_port(again.number(), "55 02 05 04 00 9C 4E", 11).substr(15, 12), "18 00 41 00 ") << "another uid";
+}
+
 TEST(Server, RefusesToReplaceAFileByItsLink) {
   const fs::path folder = fresh_folder();
   ServerSettings settings;

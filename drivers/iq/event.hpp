@@ -1,0 +1,42 @@
+// What happened to a module and its link, by name: what a run must know to be believed or thrown away.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "drivers/clock.hpp"
+
+namespace kphi::iq {
+
+enum class EventKind : std::uint8_t {
+  connected,        ///< identity read, communication timeout set; coasting
+  no_answer,        ///< it could not be connected to
+  module_reset,     ///< it restarted by itself: its volatile settings are lost
+  module_silent,    ///< it stopped answering
+  coast_denied,     ///< it did not confirm a coast
+  lease_expired,    ///< nobody renewed the command in time
+  port_lost,        ///< unplugged
+  another_module,   ///< what answers now is not the module of before
+  slow_round_trip,  ///< the median is so long that readings are blurred in time
+};
+
+[[nodiscard]] constexpr std::string_view name_of(EventKind kind) noexcept {
+  constexpr std::string_view names[] = {"connected",     "no_answer",      "module_reset",
+                                        "module_silent", "coast_denied",   "lease_expired",
+                                        "port_lost",     "another_module", "slow_round_trip"};
+  return names[static_cast<int>(kind)];
+}
+
+/// What was measured across it cannot be believed.
+[[nodiscard]] constexpr bool spoils_a_run(EventKind kind) noexcept {
+  return kind != EventKind::connected && kind != EventKind::slow_round_trip;
+}
+
+struct Event {
+  EventKind kind = EventKind::connected;
+  Instant time{0};    ///< bench time at which it was noticed
+  std::string words;  ///< for a person
+};
+
+}  // namespace kphi::iq

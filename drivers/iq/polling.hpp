@@ -1,0 +1,64 @@
+// Telemetry: who is asked when, and the readings that come of it. Three beats: the quantities of every cycle, one of
+// the others at a time, and the two entries that tell whether the module has restarted. What a beat asks for waits for
+// credit; what still waits at the next beat is skipped and counted.
+#pragma once
+
+#include <array>
+#include <boost/circular_buffer.hpp>
+
+#include "drivers/iq/exchange.hpp"
+#include "drivers/iq/identity.hpp"
+
+namespace kphi::iq {
+
+class Polling {
+ public:
+  /// `settings` are completed.
+  explicit Polling(const Settings& settings);
+
+  void begin(const Identity& identity, Instant now);
+  void end() noexcept { on_ = false; }
+  void take(const Heard& heard, Counters& counters);
+  void advance(Exchange& exchange, Instant now);
+  [[nodiscard]] Instant deadline() const noexcept;
+
+  /// Moves the oldest readings out, returns how many. 4096 are kept; older ones are dropped and counted.
+  std::size_t take_readings(std::span<Reading> out);
+  /// Zero before the first.
+  [[nodiscard]] Instant newest_reading() const noexcept { return newest_; }
+  /// The newest speed, rad/s; NaN before the first.
+  [[nodiscard]] double speed() const noexcept { return speed_; }
+  [[nodiscard]] Instant speed_time() const noexcept { return speed_time_; }
+
+ private:
+  static constexpr std::size_t kQuestions = kQuantities + 2;
+  struct Question {
+    const Entry* entry = nullptr;  ///< null: the module has no such entry
+    int module_id = 0;
+  };
+  struct Beat {
+    Duration period{0};
+    Instant next{0};
+    /// Whether it is due; then the next one is set.
+    bool strike(Instant now) noexcept;
+  };
+
+  void want(std::size_t question, Counters& counters) noexcept;
+  void want_slow(Counters& counters) noexcept;
+  [[nodiscard]] Reading reading_of(const Heard& heard, Quantity quantity) const noexcept;
+
+  int module_id_;
+  Duration byte_time_;
+  std::array<bool, kQuantities> every_cycle_{};
+  bool on_ = false;
+  std::array<Question, kQuestions> questions_{};
+  std::array<bool, kQuestions> wanted_{};
+  Beat cycle_, slow_, watch_;
+  std::size_t turn_ = 0;
+  boost::circular_buffer<Reading> readings_;
+  Instant newest_{0};
+  double speed_;
+  Instant speed_time_{0};
+};
+
+}  // namespace kphi::iq

@@ -1,0 +1,205 @@
+#include "drivers/iq/seat.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "drivers/device_error.hpp"
+
+namespace kphi::iq {
+namespace {
+
+using std::chrono::steady_clock;
+constexpr std::size_t kEvents = 256;
+constexpr auto kAnswerLimit = std::chrono::seconds(20);
+constexpr double kFastest = entry<"propeller_motor_control.ctrl_velocity">.max;
+
+}  // namespace
+
+void Seat::spin_at(RadPerSec signed_speed, Duration lease) {
+  if (!(std::abs(signed_speed.value()) <= kFastest)) {
+    throw std::invalid_argument(fmt::format("speed {} rad/s is beyond what the module takes", signed_speed.value()));
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    if (!alive_) refuse("spin", ended_ ? "connect again" : "see to what happened, then rearm it");
+    renew(lease);
+    orders_.speed = signed_speed;
+    orders_.stop.reset();
+  }
+  ring_();
+}
+
+void Seat::renew(Duration lease) noexcept {
+  lease_end_ns_ = std::chrono::nanoseconds((steady_clock::now() + lease).time_since_epoch()).count();
+}
+
+std::uint64_t Seat::coast(bool emergency) noexcept {
+  std::uint64_t ticket = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    orders_.speed.reset();
+    orders_.stop.reset();
+    (emergency ? orders_.emergency : orders_.coast) = true;
+    ticket = ++coasts_.asked;
+  }
+  ring_();
+  return ticket;
+}
+
+bool Seat::await_coast(std::uint64_t ticket, Duration wall) noexcept {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, wall, [&] { return ended_ || !line_ || coasts_.done >= ticket; });
+  return coasts_.done >= ticket;
+}
+
+StopReport Seat::stop(const StopSettings& settings, Duration lease) {
+  Stopping::check(settings);
+  std::unique_lock lock(mutex_);
+  orders_.speed.reset();
+  orders_.stop = settings;
+  const std::uint64_t ticket = ++stops_.asked;
+  ring_();
+  // Whoever waits here is alive.
+  do {
+    renew(lease);
+  } while (!changed_.wait_for(lock, lease / 4, [&] { return ended_ || stops_.done >= ticket; }));
+  return stops_.done >= ticket ? stop_report_ : StopReport{};
+}
+
+std::vector<Reply> Seat::inquire(std::vector<Inquiry> inquiries) {
+  Inquiries::check(inquiries);
+  const std::lock_guard turn(inquiring_);
+  std::unique_lock lock(mutex_);
+  if (state_ != Session::State::ready || ended_) refuse("ask", "wait until it is connected");
+  orders_.inquiry = std::move(inquiries);
+  const std::uint64_t ticket = ++inquiries_.asked;
+  ring_();
+  changed_.wait_for(lock, kAnswerLimit, [&] { return ended_ || inquiries_.done >= ticket; });
+  if (inquiries_.done < ticket) refuse("ask", "connect again");
+  return replies_;
+}
+
+void Seat::rearm() {
+  std::unique_lock lock(mutex_);
+  if (alive_) return;
+  if (state_ != Session::State::ready || ended_) refuse("rearm", "wait until it is connected again");
+  orders_.rearm = true;
+  const std::uint64_t ticket = ++rearms_.asked;
+  ring_();
+  changed_.wait_for(lock, kAnswerLimit, [&] { return ended_ || rearms_.done >= ticket; });
+  if (!alive_) refuse("rearm", "wait until it is connected again");
+}
+
+std::optional<bool> Seat::await_connection(Duration wall) {
+  std::unique_lock lock(mutex_);
+  const bool decided = changed_.wait_for(lock, wall, [&] { return lost() || state_ == Session::State::ready; });
+  if (!decided) return std::nullopt;
+  return !lost();
+}
+
+std::vector<Event> Seat::take_events() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(events_, {});
+}
+
+bool Seat::connected() const {
+  const std::lock_guard lock(mutex_);
+  return !ended_ && state_ == Session::State::ready;
+}
+
+std::string Seat::failure() const {
+  const std::lock_guard lock(mutex_);
+  return failure_;
+}
+
+Identity Seat::identity() const {
+  const std::lock_guard lock(mutex_);
+  return identity_;
+}
+
+Counters Seat::counters() const {
+  const std::lock_guard lock(mutex_);
+  return counters_;
+}
+
+RoundTripHistogram Seat::round_trips() const {
+  const std::lock_guard lock(mutex_);
+  return round_trips_;
+}
+
+void Seat::refuse(const char* operation, const char* next_move) const {
+  throw DeviceError(name_, operation, failure_.empty() ? "it is not connected" : failure_, next_move);
+}
+
+Orders Seat::take_orders() {
+  const std::lock_guard lock(mutex_);
+  for (Ticket* ticket : {&coasts_, &stops_, &rearms_, &inquiries_}) ticket->obeyed = ticket->asked;
+  return std::exchange(orders_, {});
+}
+
+void Seat::move_readings(Session& session) {
+  std::array<Reading, 64> batch;
+  while (const std::size_t n = session.take(batch)) dropped_readings_ += n - readings_.push(batch.data(), n);
+  newest_reading_ns_ = session.newest_reading().count();
+}
+
+void Seat::publish(Session& session, bool line, bool all) {
+  bool news = false;
+  {
+    const std::lock_guard lock(mutex_);
+    news = note_state(session) || line != std::exchange(line_, line) || all;
+    if (close_tickets(session)) news = true;
+    for (Event& event : session.take_events()) {
+      if (events_.size() == kEvents) events_.erase(events_.begin());
+      events_.push_back(std::move(event));
+    }
+    if (news) {
+      counters_ = session.counters();
+      counters_.dropped_readings += dropped_readings_;
+      counters_.lease_expiries = lease_expiries_;
+      counters_.reconnections = reconnections_;
+      round_trips_ = session.round_trips();
+    }
+  }
+  if (news) changed_.notify_all();
+}
+
+bool Seat::note_state(const Session& session) {
+  if (!session.failure().empty()) failure_ = session.failure();
+  if (session.armed()) failure_.clear();
+  const bool alive = session.armed() || (alive_ && session.state() == Session::State::connecting);
+  const bool news = state_ != session.state() || alive_ != alive;
+  state_ = session.state();
+  alive_ = alive;
+  if (news && state_ == Session::State::ready) identity_ = session.identity();
+  return news;
+}
+
+bool Seat::close_tickets(const Session& session) {
+  bool news = false;
+  const auto close = [&](Ticket& ticket, bool done) {
+    if (!ticket.open() || !done) return false;
+    ticket.done = ticket.obeyed;
+    return news = true;
+  };
+  close(coasts_, session.coasting());
+  if (close(stops_, !session.stopping() && session.stop_report().has_value())) stop_report_ = *session.stop_report();
+  if (close(inquiries_, session.inquiries().done())) replies_ = session.inquiries().replies();
+  close(rearms_, true);
+  return news;
+}
+
+void Seat::end(const std::string& why) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (failure_.empty()) failure_ = why;
+    ended_ = true;
+    alive_ = false;
+  }
+  changed_.notify_all();
+}
+
+}  // namespace kphi::iq

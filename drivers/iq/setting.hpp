@@ -1,0 +1,28 @@
+// Parameters of the firmware that are set for this connection only, and proven to have arrived.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "drivers/finding.hpp"
+#include "drivers/iq/dialogue.hpp"
+
+namespace kphi::iq {
+
+struct Setting {
+  const Entry* entry = nullptr;
+  double value = 0;
+  bool required = true;  ///< false: firmware that does not know the entry is accepted
+};
+
+/// Whether `read` is what a set of `wanted` leaves: the same bits on the wire, or within 1e-6 of `wanted`, relative.
+/// Never an absolute tolerance: velocity_ff2 is near 5e-7.
+[[nodiscard]] bool is_as_set(const Entry& entry, double wanted, double read) noexcept;
+
+/// Sets each and reads it back; saves nothing. A finding for each that is not as set: a fault.
+[[nodiscard]] std::vector<Finding> set_and_read_back(Dialogue& module, std::span<const Setting> settings);
+
+/// What every connection sets: the communication timeout, coast at its end, and no song.
+[[nodiscard]] std::vector<Setting> connection_settings(double module_timeout_s);
+
+}  // namespace kphi::iq

@@ -1,0 +1,75 @@
+// The way from a spinning motor to a standing one, and the account of it. The voltage is taken back slowly, so that the
+// motor does not feed a supply that cannot sink; below a speed it coasts; it is over when the module reports drive mode
+// coast and the propeller stands. Speeds in rad/s, times in bench time.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "drivers/clock.hpp"
+
+namespace kphi::iq {
+
+struct StopSettings {
+  double deceleration = 1000;  ///< rad/s², 100..100000; a voltage falls about 4.3 mV per rad/s on the 2200Kv
+  double coast_below = 500;    ///< rad/s: from here on the motor coasts
+  double standing_below = 10;  ///< rad/s
+  Duration limit = std::chrono::seconds(10);  ///< from the coast to standing
+};
+
+struct StopReport {
+  enum class Outcome {
+    standing,     ///< drive mode coast is confirmed and the speed fell below the threshold
+    slowing,      ///< confirmed, and the speed was falling when the limit came
+    turning,      ///< confirmed, but the speed does not fall: what drives it?
+    unseen,       ///< confirmed, but no speed was read afterwards
+    unconfirmed,  ///< the module did not confirm; it falls back on its own communication timeout
+    overruled,    ///< motion was commanded meanwhile
+  };
+  Outcome outcome = Outcome::unconfirmed;
+  double speed_at_start = 0;  ///< rad/s
+  double speed_at_end = 0;
+  std::optional<Duration> time_to_coast;     ///< from the request to the module's report of drive mode coast
+  std::optional<Duration> time_to_standing;  ///< from the request to the first speed below the threshold
+
+  /// The module has confirmed that it does not drive the motor.
+  [[nodiscard]] bool safe() const noexcept { return outcome != Outcome::unconfirmed && outcome != Outcome::overruled; }
+  /// One line for a person.
+  [[nodiscard]] std::string summary() const;
+};
+
+class Stopping {
+ public:
+  /// Throws std::invalid_argument for settings that make no sense.
+  static void check(const StopSettings& settings);
+
+  /// From `speed`, signed; `ramped` else coasting at once.
+  void begin(const StopSettings& settings, double speed, bool ramped, Instant now) noexcept;
+  /// The speed to command now; nothing: not ramping, or no new one is due. Zero: coast.
+  [[nodiscard]] std::optional<double> ramp(Instant now) noexcept;
+  void coasted(Instant now) noexcept;
+  void confirmed(Instant now) noexcept;
+  void measured(double speed, Instant time) noexcept;
+  /// Decides what time decides.
+  void advance(Instant now) noexcept;
+  void end(StopReport::Outcome outcome) noexcept;
+
+  [[nodiscard]] bool active() const noexcept { return phase_ != Phase::none; }
+  [[nodiscard]] bool ramping() const noexcept { return phase_ == Phase::ramping; }
+  [[nodiscard]] Instant deadline() const noexcept;
+  /// Of the last stop that ended.
+  [[nodiscard]] const std::optional<StopReport>& report() const noexcept { return report_; }
+
+ private:
+  enum class Phase { none, ramping, coasting };
+
+  Phase phase_ = Phase::none;
+  StopSettings settings_;
+  Instant asked_{0}, next_{0}, coasted_{0}, speed_time_{0};
+  double speed_at_coast_ = 0, speed_ = 0;
+  bool measured_after_coast_ = false;
+  StopReport open_;
+  std::optional<StopReport> report_;
+};
+
+}  // namespace kphi::iq

@@ -1,0 +1,48 @@
+// The version words of a module, taken apart.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace kphi::iq {
+
+/// system_control.firmware_version: style (bits 31..20), major (19..14), minor (13..7), patch (6..0).
+struct FirmwareVersion {
+  static constexpr int kSpeed = 1;  ///< the only style that a stand can use
+
+  int style = 0, major = 0, minor = 0, patch = 0;
+
+  FirmwareVersion() = default;
+  constexpr explicit FirmwareVersion(std::uint32_t word) noexcept
+      : style(static_cast<int>(word >> 20)),
+        major(static_cast<int>(word >> 14 & 0x3F)),
+        minor(static_cast<int>(word >> 7 & 0x7F)),
+        patch(static_cast<int>(word & 0x7F)) {}
+
+  /// Of two of the same style.
+  [[nodiscard]] constexpr bool older_than(int other_major, int other_minor, int other_patch) const noexcept {
+    if (major != other_major) return major < other_major;
+    return minor != other_minor ? minor < other_minor : patch < other_patch;
+  }
+  /// "speed 0.0.32"
+  [[nodiscard]] std::string text() const;
+};
+
+/// system_control.hardware_version and electronics_version: type (bits 31..16), major (15..8), batch (7..0).
+struct BoardVersion {
+  static constexpr int kHardware2306 = 1;     ///< hardware type of the 2306-2200Kv; its majors are 0 and 1
+  static constexpr int kElectronics2306 = 3;  ///< its electronics type
+
+  int type = 0, major = 0, batch = 0;
+
+  BoardVersion() = default;
+  constexpr explicit BoardVersion(std::uint32_t word) noexcept
+      : type(static_cast<int>(word >> 16)),
+        major(static_cast<int>(word >> 8 & 0xFF)),
+        batch(static_cast<int>(word & 0xFF)) {}
+
+  /// "type 1.1 batch 0"
+  [[nodiscard]] std::string text() const;
+};
+
+}  // namespace kphi::iq

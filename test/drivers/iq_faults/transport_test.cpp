@@ -1,0 +1,130 @@
+// The driver on a pseudo-terminal against the simulated bench: what only a real port can do. Wall time; waits have
+// deadlines.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <thread>
+
+#include "drivers/device_error.hpp"
+#include "drivers/iq/motor.hpp"
+#include "drivers/sim/server.hpp"
+#include "test/temporary_folder.hpp"
+
+namespace kphi::iq::test {
+namespace {
+
+using namespace std::chrono_literals;
+using Wall = std::chrono::steady_clock;
+
+template <class What>
+bool wait_for(What&& what, Wall::duration limit = 5s) {
+  const auto deadline = Wall::now() + limit;
+  while (!what()) {
+    if (Wall::now() > deadline) return false;
+    std::this_thread::yield();
+  }
+  return true;
+}
+
+class OverAPort : public testing::Test {
+ protected:
+  ~OverAPort() override { stop(); }
+  void serve(std::vector<sim::FaultEntry> entries, unsigned baud = 115200) {
+    sim::ServerSettings settings;
+    settings.device = (folder.path() / "motor").string();
+    settings.control = (folder.path() / "control").string();
+    settings.bench.module.baud = baud;
+    settings.bench.motor_line_paced = true;
+    settings.bench.motor_keep = sim::IqLine::Keep::replies;
+    for (const auto& entry : entries) settings.bench.motor_faults.push_back(sim::motor_fault_of(entry));
+    server.emplace(settings);
+    device = server->addresses().device;
+    thread = std::thread([this] { server->run(); });
+  }
+  void stop() {
+    if (!thread.joinable()) return;
+    server->request_stop();
+    thread.join();
+  }
+
+  kphi::test::TemporaryFolder folder;
+  std::string device;
+  std::optional<sim::Server> server;
+  std::thread thread;
+  SteadyClock clock;
+};
+
+TEST_F(OverAPort, EveryReadingWasSent) {
+  serve({});
+  std::vector<Reading> readings(4096);
+  {
+    Motor motor(device, 115200, {}, clock);
+    motor.spin_at(RadPerSec(300));
+    const auto begin = Wall::now();
+    ASSERT_TRUE(wait_for([&] {
+      motor.renew();
+      return motor.counters().replies > 100 || Wall::now() - begin > 4s;
+    }));
+    readings.resize(motor.take(readings));
+    EXPECT_EQ(motor.counters().crc_errors, 0u);
+  }
+  stop();
+  EXPECT_GT(readings.size(), 50u);
+  for (const Reading& reading : readings) {
+    if (reading.quantity != Quantity::speed) continue;
+    const auto& log = server->motor_truth().log;
+    EXPECT_TRUE(std::any_of(log.begin(), log.end(), [&](const sim::SentIqReply& sent) {
+      float said = 0;
+      if (sent.type == 50 && sent.sub == 13) std::memcpy(&said, sent.bytes.data(), 4);
+      return sent.arrivals == 1 && static_cast<double>(said) == reading.value;
+    })) << reading.value;
+  }
+}
+
+TEST_F(OverAPort, AtAnotherRateTheDriverSaysThatNothingSensibleComes) {
+  serve({}, 921600);
+  try {
+    Motor motor(device, 115200, {}, clock);
+    FAIL() << "it must not connect";
+  } catch (const DeviceError& error) {
+    EXPECT_NE(std::string(error.what()), "");
+  }
+}
+
+TEST_F(OverAPort, UnpluggedItIsDeadSoonAndCanBeOpenedAgainByItsName) {
+  serve({{{"kind", "motor_unplug"}, {"at_s", "1"}, {"for_s", "0.3"}, {"other", "true"}}});
+  {
+    Motor motor(device, 115200, {}, clock);
+    motor.spin_at(RadPerSec(300));
+    ASSERT_TRUE(wait_for([&] {
+      motor.renew();
+      return !motor.alive();
+    }));
+    EXPECT_NE(motor.failure(), "");
+    EXPECT_THROW(motor.spin_at(RadPerSec(300)), DeviceError);
+  }
+  ASSERT_TRUE(wait_for([&] { return std::filesystem::exists(device); }));
+  Motor again(device, 115200, {}, clock);
+  EXPECT_EQ(again.identity().uid1, 0x00410018u) << "another module hangs there now";
+}
+
+TEST_F(OverAPort, WhenTheModuleFallsBackToItsFirstRateTheDriverGivesUpAndTheModuleCoasts) {
+  serve({{{"kind", "motor_baud"}, {"at_s", "1"}}}, 921600);
+  {
+    Motor motor(device, 921600, {}, clock);
+    motor.spin_at(RadPerSec(300));
+    ASSERT_TRUE(wait_for([&] {
+      motor.renew();
+      return !motor.alive();
+    }));
+  }
+  stop();
+  EXPECT_GT(server->motor_truth().done[static_cast<std::size_t>(sim::MotorFaultKind::baud)], 0u);
+}
+
+}  // namespace
+}  // namespace kphi::iq::test
