@@ -25,6 +25,7 @@ constexpr double kPatience = 600;              // ms: what the interlock grants,
 constexpr double kWholeRun = 10'000;           // ms
 constexpr int kSteps = 8;
 constexpr int kKilledBy = 128;
+constexpr int kInterrupted = 130;
 
 /// The program under test and the bench it runs on.
 struct Scene {
@@ -63,6 +64,13 @@ enum class Cause {
   end_of_dwell,  ///< the last commanded speed has had its time
 };
 
+/// What is not as wanted yet: why, and how it is instead. The day it is as wanted, this test says so.
+struct Excuse {
+  const char* why = nullptr;
+  double limit_ms = 0;
+  int exit_code = 0;
+};
+
 struct Way {
   const char* name;
   Cause cause;
@@ -71,51 +79,49 @@ struct Way {
   int exit_code;
   const char* words = "";  ///< of the program
   double limit_ms = kPrompt;
-  bool last_word = true;  ///< the last command that the module hears is a coast
-  // What is not so yet. The day it is, this test says so.
-  const char* missed = nullptr;  ///< why
-  double stays_within_ms = 0;    ///< instead
+  Excuse excuse{};
+  bool heard = true;  ///< what the program says still reaches the module
 };
 
 std::ostream& operator<<(std::ostream& out, const Way& way) { return out << way.name; }
 
-const char* const kPatient = "the newest sample or reading may be 500 ms old";
-const char* const kUnasked = "nothing stops a run for what the module says of itself";
+constexpr Excuse kPatient{"the newest sample or reading may be 500 ms old", kPatience, 4};
+constexpr Excuse kUnasked{"nothing stops a run for what the module says of itself", kWholeRun, 0};
+constexpr Excuse killed_by(int number) {
+  return {"this signal kills it; the module's own timeout coasts", kModuleAlone, kKilledBy + number};
+}
+
+constexpr auto kDeed = Cause::deed;
+constexpr auto kScript = Cause::script;
+constexpr auto kEnd = Cause::end_of_dwell;
 const Way kWays[] = {
-    {"NormalEnd", Cause::end_of_dwell, nullptr, "", 0, "next: kphi fit"},
-    {"Interrupt", Cause::deed, send<SIGINT>, "", 130, "stopped by request"},
-    {"InterruptTwice", Cause::deed, send<SIGINT, SIGINT>, "", 130, "stopped by request"},
-    {"Terminate", Cause::deed, send<SIGTERM>, "", 130, "stopped by request"},
-    {"HangUp", Cause::deed, send<SIGHUP>, "", 130, "stopped by request"},
-    {"QuitKey", Cause::deed, send<SIGQUIT>, "", 130, "stopped by request", kPrompt, true,
-     "SIGQUIT kills it; the module's own timeout coasts", kModuleAlone},
-    {"NobodyReads", Cause::end_of_dwell, close_the_pipes, "", 0, "", kPrompt, true,
-     "SIGPIPE kills it; the module's own timeout coasts", kModuleAlone},
-    {"DiskFull", Cause::deed, fill_the_disk, "", 1, "File too large"},
-    {"Killed", Cause::deed, send<SIGKILL>, "", kKilledBy + SIGKILL, "", kModuleAlone, false},
-    {"Crashed", Cause::deed, send<SIGSEGV>, "", kKilledBy + SIGSEGV, "", kModuleAlone, false},
-    {"Frozen", Cause::deed, stop_until_the_module_coasts, "", 4, "", kModuleAlone},
-    {"BoxSilent", Cause::script, nullptr, "kind: hold, for_s: 1000", 4, "load-cell", kPrompt, true, kPatient,
-     kPatience},
-    {"BoxDead", Cause::script, nullptr, "kind: reboot, down_s: 1000", 4, "load-cell", kPrompt, true, kPatient,
-     kPatience},
-    {"BoxUnreachable", Cause::script, nullptr, "kind: address, address: 10.255.255.1, for_s: 1000", 4, "load-cell",
-     kPrompt, true, kPatient, kPatience},
-    {"StreamStolen", Cause::script, nullptr, "kind: stolen", 4, "another client", kPrompt, true, kPatient, kPatience},
-    {"RangeTrip", Cause::script, nullptr, "kind: saturation, axes: 4, for_s: 1000", 4, "range"},
-    {"CoilHot", Cause::script, nullptr, "kind: motor_hot, coil_celsius: 130, for_s: 1000", 4, "coil temperature"},
-    {"Derate", Cause::script, nullptr, "kind: motor_redline, speed_rad_s: 500, for_s: 1000", 4, "derate", kPrompt, true,
-     kUnasked, kWholeRun},
-    {"PowerSafety", Cause::script, nullptr, "kind: motor_over_voltage, volts: 20, for_s: 1000", 4, "fault", kPrompt,
-     true, kUnasked, kWholeRun},
-    {"RotorLocked", Cause::script, nullptr, "kind: motor_locked, for_s: 1000", 4, "", kPrompt, true, kUnasked,
-     kWholeRun},
-    {"SupplySag", Cause::script, nullptr, "kind: motor_sag, volts: 8.5, for_s: 1000", 4},
-    {"BrownOut", Cause::script, nullptr, "kind: motor_brown_out, down_s: 0.05", 4, "restarted"},
-    {"Unplugged", Cause::script, nullptr, "kind: motor_unplug, for_s: 1000", 4, "", kModuleAlone, false},
-    {"ModuleUnheard", Cause::script, nullptr, "kind: motor_mute, for_s: 1000", 4, "motor reading", kPrompt, true,
-     kPatient, kPatience},
-    {"ModuleDeaf", Cause::script, nullptr, "kind: motor_deaf, for_s: 1000", 4, "", kModuleAlone, false},
+    {"NormalEnd", kEnd, nullptr, "", 0, "next: kphi fit"},
+    {"Interrupt", kDeed, send<SIGINT>, "", 130, "stopped by request"},
+    {"InterruptTwice", kDeed, send<SIGINT, SIGINT>, "", 130, "stopped by request"},
+    {"Terminate", kDeed, send<SIGTERM>, "", 130, "stopped by request"},
+    {"HangUp", kDeed, send<SIGHUP>, "", 130, "stopped by request"},
+    {"QuitKey", kDeed, send<SIGQUIT>, "", 130, "stopped by request", kPrompt, killed_by(SIGQUIT)},
+    {"NobodyReads", kEnd, close_the_pipes, "", 0, "", kPrompt, killed_by(SIGPIPE)},
+    {"DiskFull", kDeed, fill_the_disk, "", 1, "File too large"},
+    {"Killed", kDeed, send<SIGKILL>, "", kKilledBy + SIGKILL, "", kModuleAlone},
+    {"Crashed", kDeed, send<SIGSEGV>, "", kKilledBy + SIGSEGV, "", kModuleAlone},
+    {"Frozen", kDeed, stop_until_the_module_coasts, "", 4, "", kModuleAlone},
+    {"BoxSilent", kScript, nullptr, "kind: hold, for_s: 1000", 4, "load-cell", kPrompt, kPatient},
+    {"BoxDead", kScript, nullptr, "kind: reboot, down_s: 1000", 4, "load-cell", kPrompt, kPatient},
+    {"BoxUnreachable", kScript, nullptr, "kind: address, address: 10.255.255.1, for_s: 1000", 4, "load-cell", kPrompt,
+     kPatient},
+    {"StreamStolen", kScript, nullptr, "kind: stolen", 4, "another client", kPrompt, kPatient},
+    {"RangeTrip", kScript, nullptr, "kind: saturation, axes: 4, for_s: 1000", 4, "range"},
+    {"CoilHot", kScript, nullptr, "kind: motor_hot, coil_celsius: 130, for_s: 1000", 4, "coil temperature"},
+    {"Derate", kScript, nullptr, "kind: motor_redline, speed_rad_s: 500, for_s: 1000", 4, "derate", kPrompt, kUnasked},
+    {"PowerSafety", kScript, nullptr, "kind: motor_over_voltage, volts: 20, for_s: 1000", 4, "fault", kPrompt,
+     kUnasked},
+    {"RotorLocked", kScript, nullptr, "kind: motor_locked, for_s: 1000", 4, "", kPrompt, kUnasked},
+    {"SupplySag", kScript, nullptr, "kind: motor_sag, volts: 8.5, for_s: 1000", 4, "restarted"},
+    {"BrownOut", kScript, nullptr, "kind: motor_brown_out, down_s: 0.05", 4, "restarted"},
+    {"Unplugged", kScript, nullptr, "kind: motor_unplug, for_s: 1000", 4, "", kModuleAlone, {}, false},
+    {"ModuleUnheard", kScript, nullptr, "kind: motor_mute, for_s: 1000", 4, "motor reading", kPrompt, kPatient},
+    {"ModuleDeaf", kScript, nullptr, "kind: motor_deaf, for_s: 1000", 4, "", kModuleAlone, {}, false},
 };
 
 /// What the simulated motor says of itself after the end; times in ms of the bench.
@@ -224,25 +230,28 @@ TEST_P(WaysOut, EndWithTheMotorCoasting) {
   ASSERT_TRUE(outcome.spun_before()) << outcome.words;
   ASSERT_EQ(account.stages.back().second, "coast") << outcome.words;
 
+  const Excuse& excuse = way.excuse;
+  const bool excused = excuse.why != nullptr;
+  const double limit_ms = excused ? excuse.limit_ms : way.limit_ms;
   const double coasts_ms = account.stages.back().first - outcome.cause_ms;
   const double told_ms = account.last_speed_at() - outcome.cause_ms;
   fmt::print("{:<16} coasts {:6.1f} ms after the cause; wanted {:.0f} ms\n", way.name, coasts_ms, way.limit_ms);
-  const bool kept = coasts_ms <= way.limit_ms && told_ms <= way.limit_ms && outcome.exit_code == way.exit_code;
-  if (way.missed != nullptr) {
-    EXPECT_LE(coasts_ms, way.stays_within_ms) << outcome.words;
-    EXPECT_FALSE(kept) << "it keeps the limit now: strike the excuse from the table";
-    GTEST_SKIP() << fmt::format(
-        "MISSED: coasts {:.0f} ms after the cause, exit code {}, last told to turn {:.0f} ms "
-        "after it; wanted {:.0f} ms and {}: {}",
-        coasts_ms, outcome.exit_code, told_ms, way.limit_ms, way.exit_code, way.missed);
-  }
-  if (way.last_word) {
+  EXPECT_LE(coasts_ms, limit_ms) << outcome.words;
+  EXPECT_LE(told_ms, limit_ms) << "it was told to turn again\n" << outcome.words;
+  EXPECT_EQ(outcome.exit_code, excused ? excuse.exit_code : way.exit_code) << outcome.words;
+  if (outcome.exit_code <= kInterrupted && way.heard) {
     EXPECT_EQ(account.commands.back().mode, "coast") << outcome.words;
   }
-  EXPECT_LE(coasts_ms, way.limit_ms) << outcome.words;
-  EXPECT_LE(told_ms, way.limit_ms) << "it was told to turn again\n" << outcome.words;
-  EXPECT_EQ(outcome.exit_code, way.exit_code) << outcome.words;
-  EXPECT_THAT(outcome.words, HasSubstr(way.words));
+  if (outcome.exit_code == way.exit_code) {
+    EXPECT_THAT(outcome.words, HasSubstr(way.words));
+  }
+  if (!excused) return;
+  EXPECT_FALSE(coasts_ms <= way.limit_ms && told_ms <= way.limit_ms && outcome.exit_code == way.exit_code)
+      << "it is as wanted now: strike the excuse from the table";
+  GTEST_SKIP() << fmt::format(
+      "MISSED: coasts {:.0f} ms after the cause, told to turn until {:.0f} ms, exit code {}; "
+      "wanted {:.0f} ms and exit code {}: {}",
+      coasts_ms, told_ms, outcome.exit_code, way.limit_ms, way.exit_code, excuse.why);
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, WaysOut, testing::ValuesIn(kWays),
