@@ -175,7 +175,8 @@ void serve(const profiles::Bench& bench, const Options& options) {
   std::signal(SIGTERM, SIG_DFL);
   running = nullptr;
   if (!options.truth_log.empty())
-    write_file(options.truth_log, json_lines(server.truth()) + json_lines(server.motor_truth()));
+    write_file(options.truth_log,
+               json_lines(server.truth()) + server.motion().json_lines() + json_lines(server.motor_truth()));
   if (!bench.simulation->faults.empty()) fmt::print(stderr, "kphi sim: {}\n", summary(server.truth()));
   const auto& unsent = server.unsent();
   if (unsent.datagrams + unsent.motor_bytes > 0) {
@@ -202,7 +203,7 @@ void add_sim(CLI::App& program, int& exit_code) {
   sim->add_option("--faults", options->faults,
                   "script of what goes wrong on the wires and in the devices (YAML), instead of the file's");
   sim->add_option("--truth-log", options->truth_log,
-                  "write at exit what happened to every datagram and reply (JSON lines)");
+                  "write at exit what happened to every datagram, reply and command of the motor (JSON lines)");
   sim->add_option("--time-scale", options->time_scale, "bench seconds per second, instead of the file's")
       ->check(CLI::Range(0.1, 1000.0));
   sim->add_option("--seed", options->seed, "of the noise, instead of the file's");

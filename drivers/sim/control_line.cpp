@@ -15,6 +15,7 @@
 
 #include "drivers/device_error.hpp"
 #include "drivers/sim/descriptor.hpp"
+#include "drivers/sim/motion_log.hpp"
 
 namespace kphi::sim {
 namespace {
@@ -42,11 +43,6 @@ std::string mount(SimulatedBench& bench, const std::string& propeller, const std
     return std::string("error ") + refusal.what();
   }
   return "ok " + bench.mounted();
-}
-
-std::string_view name_of(MotorDrive::Mode mode) noexcept {
-  constexpr std::array<std::string_view, 5> kNames{"brake", "coast", "volts", "pwm", "velocity"};
-  return kNames[static_cast<std::size_t>(mode)];
 }
 
 std::string status(SimulatedBench& bench) {
