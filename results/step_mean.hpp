@@ -10,20 +10,27 @@ namespace kphi::results {
 /// Why a step is not to be trusted without a look. A set of bits; the names stand in steps.csv, joined by '+'.
 enum class Doubt : std::uint32_t {
   none = 0,
-  speed_not_reached = 1u << 0,  ///< mean speed further than 1 % (and 2 rad/s) from the command
-  speed_unsteady = 1u << 1,     ///< speed spread over the window above 1 % of its mean (and 5 rad/s)
-  saturated = 1u << 2,          ///< a status word with the saturation bit, or a count at its limit
-  lost_samples = 1u << 3,       ///< fewer records in the window than ft_sequence says
-  derated = 1u << 4,            ///< the module derated
-  few_samples = 1u << 5,        ///< under a tenth of the expected load-cell samples, or under 3 speed readings
-  bad_status = 1u << 6,         ///< another error bit of the box
-  stream_restarted = 1u << 7,   ///< the stream began anew within the step
-  rebooted = 1u << 8,           ///< the box started anew since the zero: its bias is another
-  stalled = 1u << 9,            ///< the box repeated its measurement within the step
-  silent = 1u << 10,            ///< no record for long within the step
-  box_trouble = 1u << 11,       ///< the box saw its own communication fail within the step
-  stolen = 1u << 12,            ///< another client took the stream within the step
+  speed_not_reached = 1u << 0,       ///< mean speed further than 1 % (and 2 rad/s) from the command
+  speed_unsteady = 1u << 1,          ///< speed spread over the window above 1 % of its mean (and 5 rad/s)
+  saturated = 1u << 2,               ///< a status word with the saturation bit, or a count at its limit
+  lost_samples = 1u << 3,            ///< fewer records in the window than ft_sequence says
+  derated = 1u << 4,                 ///< the module derated
+  few_samples = 1u << 5,             ///< under a tenth of the expected load-cell samples, or under 3 speed readings
+  bad_status = 1u << 6,              ///< another error bit of the box
+  stream_restarted = 1u << 7,        ///< the stream began anew within the step
+  rebooted = 1u << 8,                ///< the box started anew since the zero: its bias is another
+  stalled = 1u << 9,                 ///< the box repeated its measurement within the step
+  silent = 1u << 10,                 ///< no record for long within the step
+  box_trouble = 1u << 11,            ///< the box saw its own communication fail within the step
+  stolen = 1u << 12,                 ///< another client took the stream within the step
   configuration_changed = 1u << 13,  ///< the box was set otherwise within the step or before it in the run
+  drive_saturated = 1u << 14,        ///< the module drove with 98 % of the supply voltage or more: none was left
+  motor_fault = 1u << 15,            ///< the module reported a fault within the step
+  supply_out_of_band = 1u << 16,     ///< the supply voltage was not within 10 % of the campaign's
+  coil_hot = 1u << 17,               ///< the coil was at the campaign's limit of its temperature, or above
+  motor_reset = 1u << 18,            ///< the module restarted by itself within the step
+  motor_lost = 1u << 19,             ///< the module was lost, or did not do as it was told, within the step
+  slow_round_trip = 1u << 20,        ///< the module's readings are blurred in time since then in this run
 };
 
 struct StepMean {
