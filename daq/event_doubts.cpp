@@ -16,7 +16,7 @@ constexpr Nanoseconds kForEver = std::numeric_limits<Nanoseconds>::max();
 struct Meaning {
   EventKind kind;
   Doubt doubt;
-  std::optional<EventKind> until;  ///< nothing: an instant
+  std::optional<EventKind> until;  ///< nothing: an instant; itself: to the end of the run
 };
 
 constexpr Meaning kMeanings[] = {
@@ -27,6 +27,15 @@ constexpr Meaning kMeanings[] = {
     {EventKind::stolen, Doubt::stolen, EventKind::resumed},
     {EventKind::unusable, Doubt::configuration_changed, EventKind::configuration_changed},
     {EventKind::configuration_changed, Doubt::configuration_changed, EventKind::configuration_changed},
+    {EventKind::motor_reset, Doubt::motor_reset, std::nullopt},
+    {EventKind::motor_connected, Doubt::motor_lost, std::nullopt},
+    {EventKind::motor_no_answer, Doubt::motor_lost, EventKind::motor_connected},
+    {EventKind::motor_silent, Doubt::motor_lost, EventKind::motor_connected},
+    {EventKind::motor_coast_denied, Doubt::motor_lost, EventKind::motor_connected},
+    {EventKind::motor_lease_expired, Doubt::motor_lost, std::nullopt},
+    {EventKind::motor_port_lost, Doubt::motor_lost, EventKind::motor_connected},
+    {EventKind::motor_another_module, Doubt::motor_lost, EventKind::motor_connected},
+    {EventKind::motor_slow_round_trip, Doubt::slow_round_trip, EventKind::motor_slow_round_trip},
 };
 
 Nanoseconds end_of(const Meaning& meaning, std::span<const StreamEvent> later, Nanoseconds begin) {

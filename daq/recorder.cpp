@@ -62,6 +62,7 @@ void Recorder::drain_marks() {
 
 void Recorder::drain_events() {
   for (results::StreamEvent& event : bench_.load_cell().take_events()) note(std::move(event));
+  for (results::StreamEvent& event : bench_.motor().take_events()) note(std::move(event));
 }
 
 void Recorder::note(results::StreamEvent event) {

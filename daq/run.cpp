@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "daq/box_bias.hpp"
+#include "daq/device_records.hpp"
 #include "daq/interrupt.hpp"
 #include "daq/recorder.hpp"
 #include "daq/spin.hpp"
@@ -26,6 +27,7 @@ constexpr double kStandstillRadPerSec = 5.0;
 constexpr double kSpinDownLimitSeconds = 30.0;
 constexpr Duration kBiasWorksWall = std::chrono::milliseconds(100);  // what was on its way still has the old zero
 constexpr Duration kExplanationWall = std::chrono::seconds(3);       // the box is asked over HTTP for 2 s
+constexpr Duration kAftermath = std::chrono::seconds(3);
 constexpr int kBiasAttempts = 3;
 constexpr int kLinesOfEvents = 10;
 
@@ -33,7 +35,7 @@ constexpr int kLinesOfEvents = 10;
 bool explains_silence(results::EventKind kind) {
   using results::EventKind;
   return kind == EventKind::stolen || kind == EventKind::rdt_disabled || kind == EventKind::unreachable ||
-         kind == EventKind::unusable ||         kind == EventKind::resumed;
+         kind == EventKind::unusable || kind == EventKind::resumed;
 }
 
 results::RunHeader header_of(const RunOrder& order, Bench& bench, const results::LoadCellScale& scale) {
@@ -61,6 +63,7 @@ results::RunHeader header_of(const RunOrder& order, Bench& bench, const results:
   header.minimum_discard_s = campaign.minimum_discard.value();
   header.load_cell = scale;
   header.motor_identity = bench.motor().identity();
+  header.motor_parameters = bench.motor().parameters().text();
   return header;
 }
 
@@ -90,6 +93,21 @@ class Sequence {
   }
 
   [[nodiscard]] const results::BoxBias& box_bias() const { return box_bias_; }
+  [[nodiscard]] const std::optional<iq::StopReport>& stop() const { return stop_; }
+
+  /// After the motor was let go: what became of it; empty when it never turned, or that is told already.
+  std::string aftermath() {
+    if (!has_spun_ || stop_) return {};
+    iq::StopSettings settings;
+    settings.limit = kAftermath;
+    bench_.motor().begin_stop(settings);
+    const Instant give_up = bench_.clock().now() + 4 * kAftermath;
+    while (bench_.clock().now() < give_up) {
+      if ((stop_ = bench_.motor().stop_report())) return "; " + stop_->summary();
+      bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
+    }
+    return "; nobody knows whether the motor coasts";
+  }
 
   /// After a stop: when the load cell has fallen silent, why, as far as the box tells; else empty.
   std::string explanation() {
@@ -138,6 +156,7 @@ class Sequence {
 
   void spin_through_the_steps() {
     Spin spin(bench_.motor(), order_.place.iq.spin);
+    has_spun_ = true;
     int step = 0;
     for (const RadPerSec level : order_.campaign.profile.levels()) {
       position_.step = step;
@@ -150,7 +169,11 @@ class Sequence {
     }
     position_.step = -1;
     position_.commanded = RadPerSec(0);
+    position_.phase = "spin down";
     recorder_.mark(Phase::spin_down, -1, RadPerSec(0));
+    spin.begin_stop();
+    while (!(stop_ = spin.stopped())) hold(bench_.clock().stretched(kTickWall), &spin);
+    if (!stop_->safe()) throw SafetyStop(stop_->summary());
   }
 
   void hold_zero(Phase phase) {
@@ -202,9 +225,10 @@ class Sequence {
 
   void tell_events() {
     for (const results::StreamEvent& event : recorder_.take_events()) {
-      if (told_ < kLinesOfEvents) progress_.say("load cell: " + event.text);
-      if (++told_ == kLinesOfEvents)
-        progress_.say("load cell: what else happens in this run is in its file: kphi info");
+      const std::string line = (is_of_motor(event.kind) ? "motor: " : "load cell: ") + event.text;
+      if (told_ < kLinesOfEvents) progress_.say(line);
+      if (++told_ == kLinesOfEvents) progress_.say("what else happens in this run is in its file: kphi info");
+      if (ends_a_run(event.kind)) throw SafetyStop(line);
     }
   }
 
@@ -218,6 +242,8 @@ class Sequence {
   Instant end_{};
   int told_ = 0;
   results::BoxBias box_bias_;
+  bool has_spun_ = false;
+  std::optional<iq::StopReport> stop_;
 };
 
 /// Streams while it lives.
@@ -280,7 +306,7 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
       sequence.run();
     } catch (...) {
       cause = std::current_exception();
-      explanation = sequence.explanation();
+      explanation = sequence.explanation() + sequence.aftermath();
     }
   }
   streaming.reset();
@@ -294,7 +320,7 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   }
   const results::SampleAccount account = bench.load_cell().account();
   results::RunEnding ending{results::Outcome::complete, "", account, bench.load_cell().health(), sequence.box_bias()};
-  if (!cause) return {order.file, writer.finish(ending), account};
+  if (!cause) return {order.file, writer.finish(ending), account, sequence.stop()};
 
   ending.outcome = results::Outcome::aborted;
   ending.outcome_reason = what(cause) + explanation;
