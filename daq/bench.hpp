@@ -5,12 +5,15 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "compensation/units.hpp"
 #include "drivers/clock.hpp"
+#include "drivers/iq/audit.hpp"
+#include "drivers/iq/stopping.hpp"
 #include "drivers/netbox/configuration.hpp"
 #include "drivers/netbox/finding.hpp"
 #include "profiles/bench.hpp"
@@ -32,9 +35,20 @@ class MotorLink {
   /// Positive = counter-clockwise. Also renews the lease without which the driver coasts the motor by itself.
   virtual void spin_at(RadPerSec signed_speed) = 0;
   virtual void renew() noexcept = 0;
-  virtual void coast() noexcept = 0;
+  /// Coasts, three times at once; also when the link is gone, as far as can be.
+  virtual void emergency_stop() noexcept = 0;
+  /// Begins to ramp down and to coast, and to watch it to the end; returns at once. Ignored while another is under way.
+  virtual void begin_stop(const iq::StopSettings& settings) = 0;
+  /// How the last of them ended; nothing while it is under way, or before the first.
+  [[nodiscard]] virtual std::optional<iq::StopReport> stop_report() = 0;
+  /// What the module told of itself when the link was made.
+  [[nodiscard]] virtual const iq::AuditRecord& parameters() const = 0;
+  /// Asks for it now; nothing when the module tells none. Throws DeviceError. The runner's thread.
+  [[nodiscard]] virtual std::optional<Celsius> coil_temperature() = 0;
   /// Takes what the module reported since the last call. The recorder's thread.
   virtual std::size_t take(std::span<results::MotorReading> out) = 0;
+  /// What happened to the module and its line since the last call, oldest first. The recorder's thread.
+  [[nodiscard]] virtual std::vector<results::StreamEvent> take_events() = 0;
   /// Why the link is dead; empty while it lives. Any thread.
   [[nodiscard]] virtual std::string failure() const = 0;
   /// One line: firmware, hardware, uid.

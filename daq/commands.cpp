@@ -8,9 +8,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "daq/bench_audit.hpp"
 #include "daq/campaign_run.hpp"
 #include "daq/interrupt.hpp"
-#include "daq/load_cell_audit.hpp"
 #include "profiles/configuration_error.hpp"
 #include "profiles/plan.hpp"
 #include "results/file_layer.hpp"
@@ -110,7 +110,7 @@ int run(const RunOptions& options) {
   const SignalWatch signals;
   std::filesystem::create_directories(options.out);
   const auto bench = connect(place);
-  (void)audit_load_cell(bench->load_cell(), campaign, place);  // before a folder is made; its words come with the run
+  (void)audit_bench(*bench, campaign, place);  // before a folder is made; its words come with the run
   results::require_room(options.out, bytes_needed(plan, place), bench->files());
   const auto started = std::chrono::time_point_cast<std::chrono::seconds>(bench->clock().epoch_utc());
   const auto folder = results::CampaignFolder::create(

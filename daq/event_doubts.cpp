@@ -31,6 +31,15 @@ constexpr Meaning kMeanings[] = {
     // The box is read at times; nobody knows when between two readings it was set otherwise.
     {EventKind::unusable, Doubt::configuration_changed, Concerns::whole_run},
     {EventKind::configuration_changed, Doubt::configuration_changed, Concerns::whole_run},
+    {EventKind::motor_reset, Doubt::motor_reset, Concerns::instant},
+    {EventKind::motor_connected, Doubt::motor_lost, Concerns::instant},
+    {EventKind::motor_no_answer, Doubt::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_silent, Doubt::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_coast_denied, Doubt::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_lease_expired, Doubt::motor_lost, Concerns::instant},
+    {EventKind::motor_port_lost, Doubt::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_another_module, Doubt::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_slow_round_trip, Doubt::slow_round_trip, Concerns::until_it_ends, EventKind::motor_slow_round_trip},
 };
 
 Nanoseconds end_of(const Meaning& meaning, std::span<const StreamEvent> later, Nanoseconds begin) {

@@ -1,4 +1,4 @@
-// Which steps an event of the load cell's stream puts in doubt.
+// Which steps an event of the load cell's stream or of the motor module puts in doubt.
 #pragma once
 
 #include <cstdint>

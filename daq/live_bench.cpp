@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "daq/motor_audit.hpp"
 #include "daq/slot_pages.hpp"
 #include "drivers/device_error.hpp"
 #include "drivers/netbox/calinfo.hpp"
@@ -83,7 +84,31 @@ class Thread final : public Background {
 }  // namespace
 
 LiveMotor::LiveMotor(const profiles::MotorPlace& place, const Clock& clock)
-    : motor_(place.device, place.baud, motor_settings(place), clock) {}
+    : motor_(place.device, place.baud, motor_settings(place), clock, place.capture),
+      parameters_(read_parameters(motor_.identity(), [this](auto asked) { return motor_.inquire(std::move(asked)); })) {
+  (void)motor_.take_events();  // that it is connected
+}
+
+void LiveMotor::begin_stop(const iq::StopSettings& settings) {
+  if (stop_.valid() && !stop_report()) return;
+  stop_report_.reset();
+  stop_ = std::async(std::launch::async, [this, settings] { return motor_.stop(settings); });
+}
+
+std::optional<iq::StopReport> LiveMotor::stop_report() {
+  if (stop_.valid() && stop_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) stop_report_ = stop_.get();
+  return stop_report_;
+}
+
+std::optional<Celsius> LiveMotor::coil_temperature() {
+  return ask_coil_temperature(parameters_, [this](auto asked) { return motor_.inquire(std::move(asked)); });
+}
+
+std::vector<results::StreamEvent> LiveMotor::take_events() {
+  std::vector<results::StreamEvent> events;
+  for (const iq::Event& event : motor_.take_events()) events.push_back(to_event(event));
+  return events;
+}
 
 std::size_t LiveMotor::take(std::span<results::MotorReading> out) {
   readings_.resize(out.size());
@@ -93,11 +118,9 @@ std::size_t LiveMotor::take(std::span<results::MotorReading> out) {
 }
 
 std::string LiveMotor::failure() const {
-  std::string failure = motor_.failure();
-  if (failure.empty() && motor_.counters().lease_expiries > 0) {
-    failure = "motor: nobody renewed the command in time and the driver let it coast; is this host overloaded?";
-  }
-  return failure;
+  if (const std::string failure = motor_.failure(); !failure.empty()) return "motor: " + failure;
+  if (motor_.counters().lease_expiries == 0) return "";
+  return "motor: nobody renewed the command in time and the driver let it coast; is this host overloaded?";
 }
 
 LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock)

@@ -1,6 +1,7 @@
 // The bench over its real transports: Net Box over UDP and HTTP, motor module over a serial line, a steady clock.
 #pragma once
 
+#include <future>
 #include <memory>
 #include <vector>
 
@@ -14,17 +15,26 @@ namespace kphi::daq {
 
 class LiveMotor final : public MotorLink {
  public:
+  /// Connects and reads the module's parameters. Throws DeviceError.
   LiveMotor(const profiles::MotorPlace& place, const Clock& clock);
   void spin_at(RadPerSec signed_speed) override { motor_.spin_at(signed_speed); }
   void renew() noexcept override { motor_.renew(); }
-  void coast() noexcept override { motor_.coast(); }
+  void emergency_stop() noexcept override { motor_.emergency_stop(); }
+  void begin_stop(const iq::StopSettings& settings) override;
+  [[nodiscard]] std::optional<iq::StopReport> stop_report() override;
+  [[nodiscard]] const iq::AuditRecord& parameters() const override { return parameters_; }
+  [[nodiscard]] std::optional<Celsius> coil_temperature() override;
   std::size_t take(std::span<results::MotorReading> out) override;
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
   [[nodiscard]] std::string failure() const override;
   [[nodiscard]] std::string identity() const override { return motor_.identity().summary(); }
 
  private:
   iq::Motor motor_;
+  iq::AuditRecord parameters_;
   std::vector<iq::Reading> readings_;
+  std::optional<iq::StopReport> stop_report_;
+  std::future<iq::StopReport> stop_;  ///< goes first: it waits for the stop that it is
 };
 
 class LiveLoadCell final : public LoadCellLink {

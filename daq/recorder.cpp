@@ -69,6 +69,7 @@ void Recorder::drain_marks() {
 
 void Recorder::drain_events() {
   for (const results::StreamEvent& event : bench_.load_cell().take_events()) note(event);
+  for (const results::StreamEvent& event : bench_.motor().take_events()) note(event);
 }
 
 void Recorder::note(const results::StreamEvent& event) {

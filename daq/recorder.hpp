@@ -32,7 +32,7 @@ class Recorder {
   void drain() noexcept;
   /// Begins a phase now.
   void mark(results::Phase phase, int step, RadPerSec commanded);
-  /// What happened to the load cell since the last call; all of it is in the file already.
+  /// What happened to load cell and motor since the last call; all of it is in the file already.
   [[nodiscard]] std::vector<results::StreamEvent> take_events();
   /// The load cell is in danger: an axis above 110 % of its range. Says which, and how much.
   [[nodiscard]] std::optional<std::string> range_trip() const;

@@ -11,7 +11,9 @@
 #include "daq/clock_map.hpp"
 #include "daq/event_doubts.hpp"
 #include "daq/zero_limits.hpp"
+#include "drivers/iq/quality.hpp"
 #include "profiles/bench.hpp"
+#include "profiles/campaign.hpp"
 #include "profiles/configuration_error.hpp"
 #include "results/record_error.hpp"
 
@@ -51,6 +53,23 @@ double clock_factor(const results::RunHeader& header) {
     throw results::RecordError(fmt::format("run {}: the clock gain in its bench file cannot be read: {}; see kphi info",
                                            header.uuid, error.what()));
   }
+}
+
+constexpr int kGatesSince = 3;  // format of the run file; steps of older ones keep the doubts that they have
+constexpr double kSupplyBand = 0.1;
+
+/// What the campaign in the run's header says that motor and supply may do.
+iq::QualityLimits quality_limits(const results::RunHeader& header) {
+  iq::QualityLimits limits;
+  try {
+    const profiles::Campaign campaign = profiles::parse_campaign(header.campaign_text, "campaign.yaml");
+    limits.supply_lowest_v = (1 - kSupplyBand) * campaign.supply.value();
+    limits.supply_highest_v = (1 + kSupplyBand) * campaign.supply.value();
+    limits.coil_temperature_max_degc = campaign.limits.coil_temperature_max.value();
+  } catch (const ConfigurationError&) {
+    // A run without a readable campaign has no limits.
+  }
+  return limits;
 }
 
 double speed_tolerance(double commanded) { return std::max(kSpeedShare * commanded, kSpeedReached); }
@@ -259,7 +278,12 @@ class Zeros {
 class Reduction {
  public:
   explicit Reduction(const results::RunRecording& run)
-      : run_(run), clock_factor_(clock_factor(run.header)), cell_(run), motor_(run.motor), spans_(doubt_spans(run.events)) {}
+      : run_(run),
+        clock_factor_(clock_factor(run.header)),
+        limits_(quality_limits(run.header)),
+        cell_(run),
+        motor_(run.motor),
+        spans_(doubt_spans(run.events)) {}
 
   [[nodiscard]] Reduced reduced() {
     find_zeros();
@@ -408,11 +432,32 @@ class Reduction {
     const std::uint32_t told = kSaturationBit | kMonitorBit;
     const bool only_saturation = (cell.status & ~(told | kSummaryBit)) == 0 && (cell.status & kSaturationBit) != 0;
     note(Doubt::bad_status, (cell.status & ~told) != 0 && !only_saturation);
+    if (run_.header.format < kGatesSince) return bits;
+    const iq::Verdict verdict = iq::judge(module_readings(window), limits_);
+    note(Doubt::drive_saturated, verdict.is_shut(iq::Gate::saturation));
+    note(Doubt::motor_fault, verdict.is_shut(iq::Gate::fault));
+    note(Doubt::supply_out_of_band, verdict.is_shut(iq::Gate::supply_voltage));
+    note(Doubt::coil_hot, verdict.is_shut(iq::Gate::coil_temperature));
     return bits;
+  }
+
+  /// Of the gates that nothing else here decides.
+  [[nodiscard]] iq::StepReadings module_readings(const Window& window) const {
+    iq::StepReadings readings;
+    const auto add = [&](MotorChannel channel, const iq::Entry& entry) {
+      const auto [begin, end] = motor_.over(channel, window);
+      for (const auto* r = begin; r != end; ++r) readings.add(entry, r->value);
+    };
+    add(MotorChannel::drive_pwm, iq::entry<"brushless_drive.drive_pwm">);
+    add(MotorChannel::fault_now, iq::entry<"power_safety.fault_now">);
+    add(MotorChannel::supply_voltage, iq::entry<"power_monitor.volts">);
+    add(MotorChannel::coil_temperature, iq::entry<"coil_temperature_estimator.t_coil">);
+    return readings;
   }
 
   const results::RunRecording& run_;
   const double clock_factor_;
+  const iq::QualityLimits limits_;
   CellStream cell_;
   MotorSeries motor_;
   std::vector<DoubtSpan> spans_;

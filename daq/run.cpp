@@ -9,6 +9,7 @@
 
 #include "daq/box_bias.hpp"
 #include "daq/box_configuration.hpp"
+#include "daq/device_records.hpp"
 #include "daq/interrupt.hpp"
 #include "daq/load_cell_audit.hpp"
 #include "daq/recorder.hpp"
@@ -28,6 +29,7 @@ constexpr double kStandstillRadPerSec = 5.0;
 constexpr double kSpinDownLimitSeconds = 30.0;
 constexpr Duration kBiasWorksWall = std::chrono::milliseconds(100);  // what was on its way still has the old zero
 constexpr Duration kExplanationWall = std::chrono::seconds(3);       // the box is asked over HTTP for 2 s
+constexpr Duration kAftermath = std::chrono::seconds(3);
 constexpr int kBiasAttempts = 3;
 constexpr int kReadings = 2;  // of the box's configuration at the end; a page may be lost
 constexpr int kLinesOfEvents = 10;
@@ -64,6 +66,7 @@ results::RunHeader header_of(const RunOrder& order, Bench& bench, const results:
   header.minimum_discard_s = campaign.minimum_discard.value();
   header.load_cell = scale;
   header.motor_identity = bench.motor().identity();
+  header.motor_parameters = bench.motor().parameters().text();
   return header;
 }
 
@@ -94,6 +97,21 @@ class Sequence {
   }
 
   [[nodiscard]] const results::BoxBias& box_bias() const { return box_bias_; }
+  [[nodiscard]] const std::optional<iq::StopReport>& stop() const { return stop_; }
+
+  /// After the motor was let go: what became of it; empty when it never turned, or that is told already.
+  std::string aftermath() {
+    if (!has_spun_ || stop_) return {};
+    iq::StopSettings settings;
+    settings.limit = kAftermath;
+    bench_.motor().begin_stop(settings);
+    const Instant give_up = bench_.clock().now() + 4 * kAftermath;
+    while (bench_.clock().now() < give_up) {
+      if ((stop_ = bench_.motor().stop_report())) return "; " + stop_->summary();
+      bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
+    }
+    return "; nobody knows whether the motor coasts";
+  }
 
   /// After the stream has ended, and nobody drains any more.
   void compare_configuration(int attempts) {
@@ -153,6 +171,7 @@ class Sequence {
 
   void spin_through_the_steps() {
     Spin spin(bench_.motor(), order_.place.iq.spin);
+    has_spun_ = true;
     int step = 0;
     for (const RadPerSec level : order_.campaign.profile.levels()) {
       position_.step = step;
@@ -165,7 +184,11 @@ class Sequence {
     }
     position_.step = -1;
     position_.commanded = RadPerSec(0);
+    position_.phase = "spin down";
     recorder_.mark(Phase::spin_down, -1, RadPerSec(0));
+    spin.begin_stop();
+    while (!(stop_ = spin.stopped())) hold(bench_.clock().stretched(kTickWall), &spin);
+    if (!stop_->safe()) throw SafetyStop(stop_->summary());
   }
 
   void hold_zero(Phase phase) {
@@ -231,9 +254,10 @@ class Sequence {
     for (const results::StreamEvent& event : recorder_.take_events()) {
       if (event.kind == results::EventKind::stalled) standstill_ = event.text;
       if (event.kind == results::EventKind::stall_ended) standstill_.clear();
-      if (told_ < kLinesOfEvents) progress_.say("load cell: " + event.text);
-      if (++told_ == kLinesOfEvents)
-        progress_.say("load cell: what else happens in this run is in its file: kphi info");
+      const std::string line = (is_of_motor(event.kind) ? "motor: " : "load cell: ") + event.text;
+      if (told_ < kLinesOfEvents) progress_.say(line);
+      if (++told_ == kLinesOfEvents) progress_.say("what else happens in this run is in its file: kphi info");
+      if (ends_a_run(event.kind)) throw SafetyStop(line);
     }
   }
 
@@ -248,6 +272,8 @@ class Sequence {
   int told_ = 0;
   std::string standstill_;  ///< of the box's measurement, as told; empty while it measures
   results::BoxBias box_bias_;
+  bool has_spun_ = false;
+  std::optional<iq::StopReport> stop_;
 };
 
 /// Streams while it lives.
@@ -332,7 +358,7 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
       sequence.run();
     } catch (...) {
       cause = std::current_exception();
-      explanation = sequence.explanation();
+      explanation = sequence.explanation() + sequence.aftermath();
     }
   }
   streaming.reset();
@@ -353,7 +379,7 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   }
   const results::SampleAccount account = bench.load_cell().account();
   results::RunEnding ending{results::Outcome::complete, "", account, bench.load_cell().health(), sequence.box_bias()};
-  if (!cause) return {order.file, writer.finish(ending), account};
+  if (!cause) return {order.file, writer.finish(ending), account, sequence.stop()};
 
   ending.outcome = results::Outcome::aborted;
   ending.outcome_reason = what(cause) + explanation;

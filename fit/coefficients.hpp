@@ -19,6 +19,12 @@ struct RunProvenance {
 };
 
 /// Where the numbers come from. Nothing here is guessed: what is not known is empty and written as `unknown`.
+/// The clock of the motor module, by which it tells the speed, against a host's.
+struct MotorClock {
+  double gain = 1;
+  std::optional<double> u_gain;  ///< standard uncertainty; nothing: unchecked, the gain is taken as 1
+};
+
 struct Provenance {
   std::string measured_utc;  ///< when the last run ended, ISO 8601, Z; empty: unknown
   std::string tool_version;
@@ -28,6 +34,7 @@ struct Provenance {
   std::vector<RunProvenance> runs;
   std::optional<double> air_density_kg_m3;
   std::optional<double> supply_v;
+  std::optional<MotorClock> clock;  ///< of a campaign
 };
 
 /// What was minimised, in words; the same in file and report.

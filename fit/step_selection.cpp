@@ -15,7 +15,7 @@ struct DoubtPolicy {
   bool spoils;
 };
 
-constexpr std::array<DoubtPolicy, 16> kPolicy{{
+constexpr std::array<DoubtPolicy, 23> kPolicy{{
     {Doubt::speed_not_reached, "commanded speed not reached", true},
     {Doubt::speed_unsteady, "speed never settled", true},
     {Doubt::saturated, "load cell saturated", true},
@@ -32,6 +32,13 @@ constexpr std::array<DoubtPolicy, 16> kPolicy{{
     {Doubt::configuration_changed, "load cell's box was set otherwise", true},
     {Doubt::zero_drifted, "load cell's zero drifted during the run", true},
     {Doubt::zero_noisy, "load cell was not at rest at a zero", true},
+    {Doubt::drive_saturated, "motor drive saturated", true},
+    {Doubt::motor_fault, "motor module reported a fault", true},
+    {Doubt::supply_out_of_band, "supply voltage off", false},
+    {Doubt::coil_hot, "motor coil hot", false},
+    {Doubt::motor_reset, "motor module restarted", true},
+    {Doubt::motor_lost, "motor module lost", true},
+    {Doubt::slow_round_trip, "motor readings blurred in time", false},
 }};
 
 bool has(std::uint32_t doubts, Doubt doubt) { return (doubts & static_cast<std::uint32_t>(doubt)) != 0; }

@@ -50,7 +50,7 @@ ClockGain read_clock_gain(const ProfileReader& file) {
   return gain;
 }
 
-MotorPlace read_motor(const ProfileReader& file) {
+MotorPlace read_motor(const ProfileReader& file, const std::filesystem::path& folder) {
   MotorPlace place;
   place.device = file.text("/iq/device");
   place.baud = file.get_or("/iq/baud", place.baud);
@@ -59,6 +59,7 @@ MotorPlace read_motor(const ProfileReader& file) {
   place.telemetry_hz = file.get_or("/iq/telemetry_hz", place.telemetry_hz);
   place.speed_max = from_rpm(file.number("/iq/speed_max_rpm"));
   if (file.has("/iq/clock_gain")) place.clock_gain = read_clock_gain(file);
+  if (file.has("/iq/capture")) place.capture = (folder / file.text("/iq/capture")).string();
   return place;
 }
 
@@ -82,7 +83,7 @@ Bench parse_bench(const std::string& text, const std::string& path) {
   Bench bench;
   bench.name = file.text("/name");
   bench.netbox = read_netbox(file);
-  bench.iq = read_motor(file);
+  bench.iq = read_motor(file, std::filesystem::path(path).parent_path());
   const std::string axis = file.text("/thrust_axis");  // "+Fz"
   bench.thrust_sign = axis[0] == '-' ? -1 : +1;
   bench.thrust_axis = axis[2] - 'x';

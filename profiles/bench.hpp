@@ -43,6 +43,7 @@ struct MotorPlace {
   double telemetry_hz = 50;  ///< speed readings per second of bench time; the others come in turn
   RadPerSec speed_max;       ///< what this motor may be told at most
   std::optional<ClockGain> clock_gain;
+  std::string capture;  ///< path of a file for all bytes of the line, beside the bench file; empty: none
 };
 
 /// The simulated bench: how fast, from which seed, and where a person tells it what is mounted.

@@ -70,6 +70,13 @@ constexpr std::array kDoubtNames{
     std::pair{Doubt::configuration_changed, std::string_view("configuration_changed")},
     std::pair{Doubt::zero_drifted, std::string_view("zero_drifted")},
     std::pair{Doubt::zero_noisy, std::string_view("zero_noisy")},
+    std::pair{Doubt::drive_saturated, std::string_view("drive_saturated")},
+    std::pair{Doubt::motor_fault, std::string_view("motor_fault")},
+    std::pair{Doubt::supply_out_of_band, std::string_view("supply_out_of_band")},
+    std::pair{Doubt::coil_hot, std::string_view("coil_hot")},
+    std::pair{Doubt::motor_reset, std::string_view("motor_reset")},
+    std::pair{Doubt::motor_lost, std::string_view("motor_lost")},
+    std::pair{Doubt::slow_round_trip, std::string_view("slow_round_trip")},
 };
 
 std::string quoted(const std::string& text) {

@@ -48,6 +48,50 @@ TEST(Reduction, FindsTheKnownCoefficientWithoutDoubt) {
   }
 }
 
+/// A run whose module says `value` of `channel` once in the middle of each step.
+RunRecording with_readings(results::MotorChannel channel, double value) {
+  auto run = make_run(Truth{});
+  run.header.format = 3;
+  run.header.campaign_text =
+      "format: kphi-campaign/1\nname: short\n"
+      "propeller: {id: 5x3, name: 5-inch three-blade, diameter_in: 5, blades: 3}\n"
+      "occlusions_deg: [0]\nprofile: {steps: 4, dwell_s: 0.6, first_rpm: 6000, last_rpm: 18000}\n"
+      "zero_s: 0.5\nminimum_discard_s: 0.3\nsupply_v: 16.0\n"
+      "limits: {speed_max_rpm: 19100, thrust_max_n: 20, supply_current_max_a: 35, coil_temperature_max_degc: 110}\n";
+  for (std::size_t i = 0; i + 1 < run.phases.size(); ++i) {
+    if (run.phases[i].phase != results::Phase::step) continue;
+    const auto end = run.phases[i + 1].time_ns;
+    run.motor.push_back({channel, end - 1'000'000, 0, value});
+  }
+  std::stable_sort(run.motor.begin(), run.motor.end(), [](const auto& a, const auto& b) {
+    return a.channel != b.channel ? a.channel < b.channel : a.time_ns < b.time_ns;
+  });
+  return run;
+}
+
+TEST(Reduction, ShutsTheGatesOfMotorAndSupply) {
+  using results::MotorChannel;
+  const auto doubts = [](MotorChannel channel, double value) {
+    return results::doubt_names(reduce(with_readings(channel, value)).at(1).doubts);
+  };
+  EXPECT_EQ(doubts(MotorChannel::drive_pwm, 0.97), "");
+  EXPECT_EQ(doubts(MotorChannel::drive_pwm, 0.98), "drive_saturated");
+  EXPECT_EQ(doubts(MotorChannel::drive_pwm, -0.99), "drive_saturated");
+  EXPECT_EQ(doubts(MotorChannel::fault_now, 0), "");
+  EXPECT_EQ(doubts(MotorChannel::fault_now, 2), "motor_fault");
+  EXPECT_EQ(doubts(MotorChannel::supply_voltage, 14.5), "");
+  EXPECT_EQ(doubts(MotorChannel::supply_voltage, 14.3), "supply_out_of_band");
+  EXPECT_EQ(doubts(MotorChannel::supply_voltage, 17.7), "supply_out_of_band");
+  EXPECT_EQ(doubts(MotorChannel::coil_temperature, 109), "");
+  EXPECT_EQ(doubts(MotorChannel::coil_temperature, 110), "coil_hot");
+}
+
+TEST(Reduction, LeavesTheDoubtsOfOlderRunsAsTheyAre) {
+  auto run = with_readings(results::MotorChannel::supply_voltage, 5);
+  run.header.format = 2;
+  EXPECT_EQ(reduce(run).at(1).doubts, 0u);
+}
+
 std::string bench_with(const std::string& motor) {
   return "format: kphi-bench/1\nname: b\nnetbox: {host: b}\niq: {device: /dev/null, speed_max_rpm: 19300" + motor +
          "}\nthrust_axis: +Fz\n";

@@ -123,7 +123,9 @@ TEST(Program, AccountsForWhatTheWireLoses) {
   bench.process().signal(SIGTERM);
   ASSERT_EQ(bench.process().wait(), 0) << bench.process().err();
   const std::string log = bytes_of(bench.path("wire.jsonl"));
-  const json truth = json::parse(log.substr(log.rfind('\n', log.size() - 2) + 1)).at("totals");
+  const std::size_t totals = log.find("{\"totals\"");
+  ASSERT_NE(totals, std::string::npos) << log.substr(log.size() - std::min<std::size_t>(log.size(), 400));
+  const json truth = json::parse(log.substr(totals, log.find('\n', totals) - totals)).at("totals");
   std::uint64_t lost = 0, duplicates = 0, malformed = 0;
   const json info = info_of(folder);
   for (const json& one : info.at("runs")) {

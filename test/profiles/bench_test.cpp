@@ -175,6 +175,12 @@ TEST(Bench, MayKnowTheGainOfTheModulesClock) {
               ElementsAre(testing::HasSubstr("24 hexadecimal digits")));
 }
 
+TEST(Bench, PutsTheCaptureOfTheMotorsLineBesideItself) {
+  EXPECT_EQ(parse_bench(kBenchText, "folder/b.yaml").iq.capture, "");
+  EXPECT_EQ(parse_bench(changed(kBenchText, "  baud:", "  capture: line.iq\n  baud:"), "folder/b.yaml").iq.capture,
+            "folder/line.iq");
+}
+
 TEST(Bench, SimulatesInProcessWithoutAControlLineOnly) {
   EXPECT_THAT(
       refused("  control: /tmp/control\n", ""),

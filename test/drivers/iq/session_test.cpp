@@ -318,7 +318,7 @@ TEST(Telemetry, ReadsSpeedEveryCycleAndTheOthersInTurn) {
     value[reading.quantity] = reading.value;
   }
   EXPECT_NEAR(count[Quantity::speed], 150, 1);
-  for (int i = 1; i < kQuantities; ++i) EXPECT_NEAR(count[static_cast<Quantity>(i)], 25, 1) << i;
+  for (int i = 1; i < kQuantities; ++i) EXPECT_NEAR(count[static_cast<Quantity>(i)], 150.0 / (kQuantities - 1), 1) << i;
   EXPECT_EQ(value[Quantity::speed], 1000);
   EXPECT_EQ(value[Quantity::supply_voltage], 12.5);
   EXPECT_EQ(value[Quantity::supply_current], 3.25);

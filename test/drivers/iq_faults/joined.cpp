@@ -61,6 +61,10 @@ Key key_of(Quantity quantity, bool legacy) {
       return {50, 41};
     case Quantity::drive_mode:
       return {50, 0};
+    case Quantity::drive_pwm:
+      return {50, 8};
+    case Quantity::fault_now:
+      return {84, 0};
   }
   return {0, 0};
 }
@@ -72,7 +76,8 @@ std::uint32_t bits_of(std::span<const std::uint8_t> data) {
 }
 
 std::uint32_t bits_of(const Reading& reading) {
-  if (reading.quantity == Quantity::drive_mode) return static_cast<std::uint32_t>(reading.value);
+  if (reading.quantity == Quantity::drive_mode || reading.quantity == Quantity::fault_now)
+    return static_cast<std::uint32_t>(reading.value);
   if (reading.quantity == Quantity::derate) return static_cast<std::uint32_t>(std::lround(reading.value * 65536));
   return std::bit_cast<std::uint32_t>(static_cast<float>(reading.value));
 }
