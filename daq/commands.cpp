@@ -79,18 +79,19 @@ std::unique_ptr<Progress> display() {
 
 void summarise(const CampaignResult& result, const results::CampaignFolder& folder, bool json) {
   if (json) {
-    fmt::print("{}\n", nlohmann::json{{"folder", folder.path().string()},
-                                      {"runs", result.runs},
-                                      {"samples", result.samples},
-                                      {"lost", result.lost},
-                                      {"steps", result.steps},
-                                      {"doubtful_steps", result.doubtful_steps}}
-                           .dump());
+    put(stdout, nlohmann::json{{"folder", folder.path().string()},
+                               {"runs", result.runs},
+                               {"samples", result.samples},
+                               {"lost", result.lost},
+                               {"steps", result.steps},
+                               {"doubtful_steps", result.doubtful_steps}}
+                        .dump() +
+                    "\n");
   } else {
-    fmt::print("{}\n", folder.path().string());
+    put(stdout, folder.path().string() + "\n");
   }
-  fmt::print(stderr, "{} runs, {} samples, {} lost, {} of {} steps in doubt\nnext: kphi fit {}\n", result.runs,
-             result.samples, result.lost, result.doubtful_steps, result.steps, folder.path().string());
+  put(stderr, fmt::format("{} runs, {} samples, {} lost, {} of {} steps in doubt\nnext: kphi fit {}\n", result.runs,
+                          result.samples, result.lost, result.doubtful_steps, result.steps, folder.path().string()));
 }
 
 int run(const RunOptions& options) {
@@ -105,7 +106,8 @@ int run(const RunOptions& options) {
       fmt::print("{}\n", plan_text(campaign, place, plan));
     return 0;
   }
-  fmt::print(stderr, "{}\nCtrl-C lets the motor coast, closes the file and stops.\n", plan_text(campaign, place, plan));
+  put(stderr,
+      fmt::format("{}\nCtrl-C lets the motor coast, closes the file and stops.\n", plan_text(campaign, place, plan)));
   const auto operator_ = person(options);
   const SignalWatch signals;
   std::filesystem::create_directories(options.out);

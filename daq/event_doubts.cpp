@@ -39,7 +39,8 @@ constexpr Meaning kMeanings[] = {
     {EventKind::motor_lease_expired, Doubt::motor_lost, Concerns::instant},
     {EventKind::motor_port_lost, Doubt::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
     {EventKind::motor_another_module, Doubt::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
-    {EventKind::motor_slow_round_trip, Doubt::slow_round_trip, Concerns::until_it_ends, EventKind::motor_slow_round_trip},
+    {EventKind::motor_slow_round_trip, Doubt::slow_round_trip, Concerns::until_it_ends,
+     EventKind::motor_slow_round_trip},
 };
 
 Nanoseconds end_of(const Meaning& meaning, std::span<const StreamEvent> later, Nanoseconds begin) {

@@ -38,6 +38,11 @@ std::string silence(const Observation& seen) {
 
 }  // namespace
 
+void put(std::FILE* stream, const std::string& text) noexcept {
+  (void)std::fputs(text.c_str(), stream);
+  (void)std::fflush(stream);
+}
+
 std::string describe(const Position& position, const Observation& seen) {
   const std::string where = fmt::format("{}  φ {:3g}°  rep {}/{}", position.propeller, position.occlusion_deg,
                                         position.repetition, position.repetitions);
@@ -54,8 +59,7 @@ TerminalProgress::~TerminalProgress() { clear(); }
 
 void TerminalProgress::clear() {
   if (!drawn_) return;
-  fmt::print(stream_, "\r\x1b[K");
-  std::fflush(stream_);
+  put(stream_, "\r\x1b[K");
   drawn_ = false;
 }
 
@@ -63,8 +67,7 @@ void TerminalProgress::tick(const Position& position, const Observation& seen) {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_) return;
   next_ = now + std::chrono::milliseconds(100);
-  fmt::print(stream_, "\r{}\x1b[K", cut(describe(position, seen), width_of(stream_) - 1));
-  std::fflush(stream_);
+  put(stream_, fmt::format("\r{}\x1b[K", cut(describe(position, seen), width_of(stream_) - 1)));
   drawn_ = true;
 }
 
@@ -72,17 +75,13 @@ void TerminalProgress::step_done(const Position&, const Observation&) {}
 
 void TerminalProgress::say(const std::string& line) {
   clear();
-  fmt::print(stream_, "{}\n", line);
+  put(stream_, fmt::format("{}\n", line));
 }
 
 void PlainProgress::step_done(const Position& position, const Observation& seen) {
-  fmt::print(stream_, "{}\n", describe(position, seen));
-  std::fflush(stream_);
+  put(stream_, fmt::format("{}\n", describe(position, seen)));
 }
 
-void PlainProgress::say(const std::string& line) {
-  fmt::print(stream_, "{}\n", line);
-  std::fflush(stream_);
-}
+void PlainProgress::say(const std::string& line) { put(stream_, fmt::format("{}\n", line)); }
 
 }  // namespace kphi::daq

@@ -23,6 +23,9 @@ struct Position {
   double remaining_s = 0;  ///< of the campaign, as a person's clock runs
 };
 
+/// A reader that is gone is no reason to stop a run: what cannot be written is lost in silence.
+void put(std::FILE* stream, const std::string& text) noexcept;
+
 /// Implementations are called from the runner's thread only.
 class Progress {
  public:

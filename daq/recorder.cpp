@@ -123,6 +123,8 @@ void Recorder::drain_motor() {
       if (reading.channel == MotorChannel::speed) speed_rad_s_ = std::abs(reading.value);
       if (reading.channel == MotorChannel::supply_current) supply_current_a_ = reading.value;
       if (reading.channel == MotorChannel::coil_temperature) coil_temperature_degc_ = reading.value;
+      if (reading.channel == MotorChannel::derate) derate_ = reading.value;
+      if (reading.channel == MotorChannel::fault_now) fault_bits_ = static_cast<unsigned>(reading.value);
     }
     motor_ns_ = batch.back().time_ns;
   }
@@ -151,6 +153,8 @@ void Recorder::take_zero() noexcept { zero_n_ = phase_mean_n_.load(); }
 Observation Recorder::observe(Instant now) const noexcept {
   Observation seen{RadPerSec(speed_rad_s_),         Newtons(thrust_n_ - zero_n_), Amperes(supply_current_a_),
                    Celsius(coil_temperature_degc_), now - Instant(load_cell_ns_), now - Instant(motor_ns_)};
+  seen.derate = derate_;
+  seen.fault_bits = fault_bits_;
   seen.load_cell_is_fresh = seen.load_cell_age <= fresh_load_cell_;
   seen.motor_is_fresh = seen.motor_age <= fresh_motor_;
   return seen;

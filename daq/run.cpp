@@ -25,6 +25,11 @@ using results::Phase;
 
 constexpr Duration kTickWall = std::chrono::milliseconds(10);
 constexpr Duration kPatienceWall = std::chrono::milliseconds(500);
+// While the motor turns. Seen twice: after this host has stood still, what waits in the sockets is taken in between.
+constexpr Duration kSpinPatienceWall = std::chrono::milliseconds(145);
+constexpr Duration kSecondLookWall = std::chrono::milliseconds(20);
+// A program that was stopped for this long must not go on: the module may have let its motor coast meanwhile.
+constexpr Duration kLongestPauseWall = std::chrono::milliseconds(400);
 constexpr double kStandstillRadPerSec = 5.0;
 constexpr double kSpinDownLimitSeconds = 30.0;
 constexpr Duration kBiasWorksWall = std::chrono::milliseconds(100);  // what was on its way still has the old zero
@@ -127,7 +132,7 @@ class Sequence {
   std::string explanation() {
     const Instant since = bench_.clock().now();
     const auto stretched = [&](Duration wall) { return bench_.clock().stretched(wall); };
-    if (recorder_.observe(since).load_cell_age < stretched(kPatienceWall) / 2) return {};
+    if (recorder_.observe(since).load_cell_age < stretched(kSpinPatienceWall) / 2) return {};
     if (!standstill_.empty()) return "; " + standstill_;
     while (bench_.clock().now() < since + stretched(kExplanationWall) && !stop_asked_()) {
       for (const results::StreamEvent& event : recorder_.take_events()) {
@@ -241,13 +246,28 @@ class Sequence {
       if (!failure.empty()) throw SafetyStop(failure);
     }
     const Instant now = bench_.clock().now();
-    seen_ = recorder_.observe(now);
-    if (auto trip = check(seen_, order_.campaign.limits, bench_.clock().stretched(kPatienceWall))) {
-      throw SafetyStop(trip->reason);
+    if (spin && spun_at_ != kNever && now - spun_at_ > bench_.clock().stretched(kLongestPauseWall)) {
+      throw SafetyStop(fmt::format("this program stood still for {:.2g} s while the motor turned",
+                                   to_seconds(bench_.clock().shrunk(now - spun_at_))));
     }
+    spun_at_ = spin ? now : kNever;
+    seen_ = recorder_.observe(now);
+    if (const auto trip = check(seen_, order_.campaign.limits)) throw SafetyStop(trip->reason);
+    check_ages_at(now, spin != nullptr);
     if (spin) spin->renew();
     position_.remaining_s = to_seconds(bench_.clock().shrunk(std::max(Duration(0), end_ - now)));
     progress_.tick(position_, seen_);
+  }
+
+  void check_ages_at(Instant now, bool spinning) {
+    const auto stretched = [&](Duration wall) { return bench_.clock().stretched(wall); };
+    const auto trip = check_ages(seen_, stretched(spinning ? kSpinPatienceWall : kPatienceWall));
+    if (!trip) {
+      stale_since_ = kNever;
+      return;
+    }
+    stale_since_ = std::min(stale_since_, now);
+    if (now - stale_since_ >= stretched(kSecondLookWall)) throw SafetyStop(trip->reason);
   }
 
   void tell_events() {
@@ -268,6 +288,8 @@ class Sequence {
   const std::function<bool()>& stop_asked_;
   Position position_;
   Observation seen_;
+  Instant stale_since_ = kNever;
+  Instant spun_at_ = kNever;  ///< the last tick, if the motor turned
   Instant end_{};
   int told_ = 0;
   std::string standstill_;  ///< of the box's measurement, as told; empty while it measures
@@ -351,14 +373,15 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   Recorder recorder(bench, writer, {order.place.thrust_axis, order.place.thrust_sign}, streaming->scale());
   Sequence sequence(bench, recorder, order, progress, stop_asked);
   std::exception_ptr cause;
-  std::string explanation;
+  std::string explanation, aftermath;
   {
     const auto draining = bench.keep_calling([&] { recorder.drain(); });
     try {
       sequence.run();
     } catch (...) {
       cause = std::current_exception();
-      explanation = sequence.explanation() + sequence.aftermath();
+      explanation = sequence.explanation();
+      aftermath = sequence.aftermath();
     }
   }
   streaming.reset();
@@ -382,13 +405,13 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   if (!cause) return {order.file, writer.finish(ending), account, sequence.stop()};
 
   ending.outcome = results::Outcome::aborted;
-  ending.outcome_reason = what(cause) + explanation;
+  ending.outcome_reason = what(cause) + explanation + aftermath;
   try {
     (void)writer.finish(ending);
   } catch (const results::RecordError&) {
     // The first cause matters more; the .part file stays as it was secured last.
   }
-  rethrow_with(cause, fmt::format("{}; recorded so far: {}", explanation, writer.path().string()));
+  rethrow_with(cause, fmt::format("{}{}; recorded so far: {}", explanation, aftermath, writer.path().string()));
 }
 
 }  // namespace kphi::daq
