@@ -499,6 +499,34 @@ TEST(Replies, LeftUnreadByAHostThatSleptAreNotTakenForLaterOnes) {
   EXPECT_EQ(session.counters().late_replies, 1u);
 }
 
+TEST(Replies, ThatBeganToComeBeforeTheirQuestionAreSecondCopies) {
+  for (const bool paced : {false, true}) {
+    Settings settings;
+    settings.slow_hz = 0.001;
+    settings.wire_byte_time = paced ? 100us : 0us;
+    settings.wire_paces = paced;
+    Wire wire(settings);
+    wire.latency = paced ? 6ms : 2ms;
+    wire.connect();
+    wire.run_for(500ms);
+    wire.readings();
+    wire.spoil = [&](Bytes& reply, Duration&) {
+      if (!is_reply(reply, 50, 13)) return;
+      const Bytes copy = fake::message(50, 13, 3, 0, fake::f32(999));
+      // The next question follows 18 ms after this reply. On a line whose bytes take their time the copy may begin
+      // together with it.
+      wire.deliver(Bytes(copy.begin(), copy.begin() + 1), paced ? 20ms + 200us : 19ms);
+      wire.deliver(Bytes(copy.begin() + 1, copy.end()), paced ? 20ms + 1200us : 21ms);
+    };
+    const auto before = wire.session.counters().unasked;
+    wire.run_for(1s);
+    const auto speeds = wire.values(Quantity::speed);
+    EXPECT_GT(speeds.size(), 45u);
+    EXPECT_EQ(std::count(speeds.begin(), speeds.end(), 999.0), 0) << paced;
+    EXPECT_GT(wire.session.counters().unasked, before + 45);
+  }
+}
+
 TEST(Replies, OfAnotherModuleAreRejectedAndCounted) {
   Wire wire;
   wire.connect();
@@ -582,7 +610,7 @@ TEST(Resync, WaitsForTheSecondHalfOfAFrameFromASlowAdapter) {
     reply.resize(5);
     delay = 1us;
   };
-  wire.module.silent = {{69, 0}, {69, 1}, {50, 36}, {83, 0}, {50, 41}, {50, 0}, {5, 15}, {84, 1}};
+  wire.module.silent = {{69, 0}, {69, 1}, {50, 36}, {83, 0}, {50, 41}, {50, 0}, {5, 15}, {84, 1}, {50, 8}, {84, 0}};
   wire.run_for(200ms);
   EXPECT_GE(wire.values(Quantity::speed).size(), 9u);
   EXPECT_EQ(wire.session.counters().resyncs, 0u);
@@ -670,7 +698,9 @@ TEST(Telemetry, AsksForAllThatIsWantedInEveryCycle) {
   std::map<Quantity, int> count;
   for (const Reading& reading : wire.readings()) ++count[reading.quantity];
   for (const Quantity quantity : settings.every_cycle) EXPECT_NEAR(count[quantity], 100, 1) << name_of(quantity);
-  EXPECT_NEAR(count[Quantity::coil_temperature] + count[Quantity::derate] + count[Quantity::drive_mode], 10, 1);
+  EXPECT_NEAR(count[Quantity::coil_temperature] + count[Quantity::derate] + count[Quantity::drive_mode] +
+                  count[Quantity::drive_pwm] + count[Quantity::fault_now],
+              10, 1);
 }
 
 struct Restart {
