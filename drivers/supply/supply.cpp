@@ -24,6 +24,8 @@ std::string PoweredOutput::off() noexcept {
     return {};
   } catch (const std::exception& error) {
     return error.what();
+  } catch (...) {
+    return "an unknown failure";
   }
 }
 
