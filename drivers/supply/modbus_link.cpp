@@ -17,7 +17,6 @@ namespace kphi::supply {
 namespace {
 
 using std::chrono::steady_clock;
-constexpr int kRounds = 20;  // of silence that was broken, together at most kLongestQuiet
 constexpr auto kLongestQuiet = std::chrono::seconds(2);
 constexpr double kBitsPerByte = 10, kSilentBytes = 3.5;
 
@@ -152,12 +151,13 @@ Outcome ModbusLink::outcome(int result, int expected) {
 
 void ModbusLink::fall_silent() {
   if (!open_) return;
-  const auto end = steady_clock::now() + kLongestQuiet;
-  for (int round = 0; round < kRounds && steady_clock::now() < end; ++round) {
+  const bool tcp = address_.wire == Address::Wire::tcp;
+  for (const auto end = steady_clock::now() + kLongestQuiet; steady_clock::now() < end;) {
     pollfd line{modbus_get_socket(context_.get()), POLLIN, 0};
     const int arrived = ::poll(&line, 1, static_cast<int>(timing_.quiet.count()));
-    if (arrived <= 0 || (line.revents & POLLIN) == 0) break;
-    if (modbus_flush(context_.get()) <= 0) break;  // its end has been reached: the next request will tell
+    if (arrived <= 0 || (line.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) break;
+    const int flushed = modbus_flush(context_.get());  // bytes of TCP, 0 on a serial line
+    if (flushed < 0 || (tcp && flushed == 0)) break;   // its end: the next request will tell
   }
   modbus_flush(context_.get());
 }

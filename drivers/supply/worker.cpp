@@ -69,6 +69,7 @@ void Worker::switch_on() {
       const std::lock_guard lock(mutex_);
       if (offs_asked_ != offs) throw DeviceError(identity_.device, "switch on", "it was switched off meanwhile");
     }
+    if (output_ && !supply_->read().output) output_.reset();  // it has tripped
     if (!output_) output_.emplace(*supply_);
   });
 }

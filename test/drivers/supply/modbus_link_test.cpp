@@ -143,6 +143,24 @@ TEST(ModbusLink, WouldTakeALateAnswerForTheAnswerToTheNextRequest) {
   EXPECT_EQ(image[9], 5000);
 }
 
+/// An answer that begins late and takes its time: silence is waited for until its end.
+TEST(ModbusLink, WaitsForTheEndOfALateAnswer) {
+  test::SimulatedSupply supply;
+  ModbusLink link(supply.address(), kShort);
+  ASSERT_TRUE(link.open().ok());
+  auto late = once(SupplyFaultKind::late);
+  late.delay = kShort.answer + 30ms;
+  supply.spoil(late);
+  auto dribble = once(SupplyFaultKind::dribble);
+  dribble.delay = 5ms;
+  supply.spoil(dribble);
+  RegisterImage image{};
+  EXPECT_EQ(link.read({8, 13}, image).failure, Failure::timeout);
+  link.fall_silent();
+  const Outcome settled = link.read({8, 13}, image);
+  EXPECT_TRUE(settled.ok()) << settled.words;
+}
+
 struct Row {
   const char* name;
   sim::SupplyFault fault;

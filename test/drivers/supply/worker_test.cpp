@@ -388,6 +388,8 @@ TEST(SupplyWorkerOnAWire, ReportsATripAsAReading) {
     return newest && newest->protection == Protection::over_voltage && !newest->output;
   }));
   EXPECT_TRUE(worker.alive());
+  worker.switch_on();
+  EXPECT_TRUE(simulated.output()) << "a new wish after the trip";
 }
 
 /// The motor is braked and feeds back: the supply cannot take it, the voltage rises, and the threshold ends it.
