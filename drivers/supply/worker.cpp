@@ -75,7 +75,7 @@ void Worker::switch_on() {
 }
 
 void Worker::ask(std::function<void()> act) {
-  std::future<void> done;
+  std::future<Answer> coming;
   {
     const std::lock_guard lock(mutex_);
     if (ended_ || stop_asked_) {
@@ -83,10 +83,12 @@ void Worker::ask(std::function<void()> act) {
                         "open it again");
     }
     orders_.push_back({std::move(act), {}});
-    done = orders_.back().done.get_future();
+    coming = orders_.back().answer.get_future();
   }
   changed_.notify_all();
-  done.get();
+  const Answer answer = coming.get();
+  if (answer.kind == Answer::Kind::unfit) throw std::invalid_argument(answer.words);
+  if (answer.kind == Answer::Kind::failed) throw DeviceError(answer.words);
 }
 
 std::uint64_t Worker::ask_off() noexcept {
@@ -166,15 +168,21 @@ bool Worker::obey() {
     Order order = std::move(orders_.front());
     orders_.pop_front();
     lock.unlock();
-    try {
-      order.act();
-      order.done.set_value();
-    } catch (...) {
-      order.done.set_exception(std::current_exception());
-    }
+    order.answer.set_value(answer_to(order.act));
     lock.lock();
   }
   return !stop_asked_;
+}
+
+Worker::Answer Worker::answer_to(const std::function<void()>& act) {
+  try {
+    act();
+    return {};
+  } catch (const std::invalid_argument& unfit) {
+    return {Answer::Kind::unfit, unfit.what()};
+  } catch (...) {
+    return {Answer::Kind::failed, words_of(std::current_exception())};
+  }
 }
 
 /// Throws what kept the output from being reported off.
@@ -226,10 +234,9 @@ void Worker::finish(std::string why) noexcept {
   }
   counters_ = supply_->counters();
   ended_ = true;
-  for (Order& order : orders_) {
-    order.done.set_exception(std::make_exception_ptr(
-        DeviceError(identity_.device, "command", failure_.empty() ? "it is being closed" : failure_, "open it again")));
-  }
+  const DeviceError gone(identity_.device, "command", failure_.empty() ? "it is being closed" : failure_,
+                         "open it again");
+  for (Order& order : orders_) order.answer.set_value({Answer::Kind::failed, gone.what()});
   orders_.clear();
   changed_.notify_all();
 }

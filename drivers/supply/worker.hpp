@@ -59,9 +59,15 @@ class Worker {
   [[nodiscard]] std::string failure() const;
 
  private:
+  /// Words instead of an exception: those stay on the thread that has thrown them.
+  struct Answer {
+    enum class Kind : std::uint8_t { done, unfit, failed };
+    Kind kind = Kind::done;
+    std::string words;
+  };
   struct Order {
     std::function<void()> act;
-    std::promise<void> done;
+    std::promise<Answer> answer;
   };
 
   void ask(std::function<void()> act);
@@ -69,6 +75,7 @@ class Worker {
 
   // The thread.
   void run() noexcept;
+  [[nodiscard]] static Answer answer_to(const std::function<void()>& act);
   [[nodiscard]] bool obey();
   void obey_off();
   [[nodiscard]] std::string turn_off() noexcept;

@@ -251,6 +251,14 @@ TEST(SupplyWorker, HandsFailuresToWhoHasAsked) {
   EXPECT_FALSE(script.output);
 }
 
+TEST(SupplyWorker, TellsUnfitLimitsFromAFailure) {
+  SteadyClock clock;
+  test::SimulatedSupply simulated;
+  Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock, kShort), clock);
+  EXPECT_THROW(worker.apply({Volts(61), Amperes(1), Volts(13), Amperes(3)}), std::invalid_argument);
+  EXPECT_TRUE(worker.alive());
+}
+
 TEST(SupplyWorker, RefusesOrdersWhenItHasFailed) {
   Script script;
   script.read_fails = true;
