@@ -1,5 +1,6 @@
 #include "drivers/sim/virtual_usb.hpp"
 
+#include <dlfcn.h>
 #include <errno.h>
 #include <fmt/format.h>
 #include <linux/usbdevice_fs.h>
@@ -288,8 +289,9 @@ VirtualUsb::VirtualUsb() : bed_(std::make_unique<Bed>()) {
 VirtualUsb::~VirtualUsb() = default;
 
 bool VirtualUsb::available() noexcept {
-  const char* preloaded = g_getenv("LD_PRELOAD");
-  return preloaded != nullptr && std::string_view(preloaded).find("libumockdev-preload") != std::string_view::npos;
+  void* const preloaded = dlopen("libumockdev-preload.so.0", RTLD_LAZY | RTLD_NOLOAD);
+  if (preloaded != nullptr) dlclose(preloaded);
+  return preloaded != nullptr;
 }
 
 void VirtualUsb::plug(int port, UsbFunction& function) {
