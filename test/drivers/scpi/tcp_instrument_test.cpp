@@ -59,7 +59,7 @@ TEST_F(TcpInstrumentTest, SpeaksTheDialectOfRigol) {
 }
 
 TEST_F(TcpInstrumentTest, GivesALateAnswerToNobody) {
-  faults.set({{UsbFaultKind::late, {}, {}, 1, 250ms}});
+  faults.set({{UsbFaultKind::late, {}, {}, 1, 400ms}});
   EXPECT_THAT(refusal([&] { (void)line.query("VOLT? MAX"); }), HasSubstr("no answer in time"));
   EXPECT_EQ(line.query("CURR? MAX"), "10.000");
 }

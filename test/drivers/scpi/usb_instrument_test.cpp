@@ -134,14 +134,14 @@ TEST_F(UsbInstrumentTest, AbortsAfterSilence) {
 
 TEST_F(UsbInstrumentTest, GivesALateAnswerToNobody) {
   Usbtmc line(*device, 100ms);
-  break_with(UsbFaultKind::late, 1, 150ms);
+  break_with(UsbFaultKind::late, 1, 400ms);
   EXPECT_THAT(refusal([&] { (void)line.query("VOLT? MAX"); }), HasSubstr("no answer in time"));
   EXPECT_EQ(line.query("CURR? MAX"), "10.000");
 }
 
 TEST_F(UsbInstrumentTest, GivesALateAnswerToNobodyEvenIfTheInstrumentIgnoresAborts) {
   Usbtmc line(*device, 100ms);
-  faults.set({{UsbFaultKind::late, {}, {}, 1, 150ms}, {UsbFaultKind::deaf_to_abort, {}, {}, 4}});
+  faults.set({{UsbFaultKind::late, {}, {}, 1, 400ms}, {UsbFaultKind::deaf_to_abort, {}, {}, 4}});
   EXPECT_NE(refusal([&] { (void)line.query("VOLT? MAX"); }), "");
   std::string answer;
   ASSERT_TRUE(eventually([&] { return refusal([&] { answer = line.query("CURR? MAX"); }).empty(); }));
