@@ -63,6 +63,16 @@ MotorPlace read_motor(const ProfileReader& file, const std::filesystem::path& fo
   return place;
 }
 
+AmbientPlace read_ambient(const ProfileReader& file) {
+  if (!file.has("/ambient/manual")) {
+    const std::string sensor = file.text("/ambient");
+    return {sensor == "unknown" ? "" : sensor, std::nullopt};
+  }
+  const auto value = [&](const char* key) { return file.number(std::string("/ambient/manual/") + key); };
+  return {"", ManualAir{value("temperature_c"), value("pressure_pa"), value("relative_humidity"),
+                        value("u_temperature_c"), value("u_pressure_pa"), value("u_relative_humidity")}};
+}
+
 Simulation read_simulation(ProfileReader& file, const std::filesystem::path& folder) {
   Simulation simulation;
   simulation.in_process = file.get_or("/simulation/in_process", simulation.in_process);
@@ -87,6 +97,7 @@ Bench parse_bench(const std::string& text, const std::string& path) {
   const std::string axis = file.text("/thrust_axis");  // "+Fz"
   bench.thrust_sign = axis[0] == '-' ? -1 : +1;
   bench.thrust_axis = axis[2] - 'x';
+  if (file.has("/ambient")) bench.ambient = read_ambient(file);
   if (file.has("/simulation")) bench.simulation = read_simulation(file, std::filesystem::path(path).parent_path());
   bench.text = text;
   bench.path = path;

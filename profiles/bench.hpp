@@ -55,12 +55,28 @@ struct Simulation {
   std::string faults;   ///< path of a fault script; in the file relative to the file's folder; empty: none
 };
 
+/// What a person has read off, with standard uncertainties.
+struct ManualAir {
+  double temperature_c = 0;
+  double pressure_pa = 0;        ///< absolute, at the stand
+  double relative_humidity = 0;  ///< 0..1
+  double u_temperature_c = 0, u_pressure_pa = 0, u_relative_humidity = 0;
+};
+
+/// Where the state of the air comes from. Neither: nobody knows it.
+struct AmbientPlace {
+  std::string sensor;  ///< "usb:04d8:00dd", with :SERIAL or @PORT; empty: none
+  std::optional<ManualAir> manual;
+  [[nodiscard]] bool known() const noexcept { return !sensor.empty() || manual.has_value(); }
+};
+
 struct Bench {
   std::string name;
   NetBoxPlace netbox;
   MotorPlace iq;
   int thrust_axis = 2;   ///< 0..2 = Fx, Fy, Fz
   int thrust_sign = +1;  ///< sign of the axis when the propeller pulls
+  AmbientPlace ambient;
   std::optional<Simulation> simulation;
   std::string text;  ///< the file, verbatim
   std::string path;

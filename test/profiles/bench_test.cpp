@@ -193,6 +193,73 @@ TEST(Bench, SimulatesInProcessWithoutAControlLineOnly) {
               ElementsAre(StartsWith("19:15: yes is a boolean to some")));
 }
 
+std::vector<std::string> refused_air(const std::string& ambient) {
+  return refusals([&] { return parse_bench(kBenchText + ambient, "b.yaml"); });
+}
+
+constexpr const char* kManualAir =
+    "ambient:\n"                        // 21
+    "  manual:\n"                       // 22
+    "    temperature_c: 21.5\n"         // 23
+    "    pressure_pa: 98700\n"          // 24
+    "    relative_humidity: 0.45\n"     // 25
+    "    u_temperature_c: 0.5\n"        // 26
+    "    u_pressure_pa: 100\n"          // 27
+    "    u_relative_humidity: 0.05\n";  // 28
+
+TEST(Bench, KnowsWhereTheStateOfTheAirComesFrom) {
+  EXPECT_FALSE(parse_bench(kBenchText, "b.yaml").ambient.known()) << "absent";
+  const auto place = [](const std::string& text) { return parse_bench(kBenchText + text, "b.yaml").ambient; };
+  EXPECT_FALSE(place("ambient: unknown\n").known());
+  for (const char* sensor : {"usb:04d8:00dd", "usb:04D8:00DD:0001AB", "usb:04d8:00dd@1-1.4", "usb:04d8:00dd:A1@2-3"})
+    EXPECT_EQ(place(std::string("ambient: ") + sensor + "\n").sensor, sensor);
+  const AmbientPlace by_hand = place(kManualAir);
+  EXPECT_TRUE(by_hand.known());
+  EXPECT_EQ(by_hand.sensor, "");
+  ASSERT_TRUE(by_hand.manual);
+  EXPECT_EQ(by_hand.manual->temperature_c, 21.5);
+  EXPECT_EQ(by_hand.manual->pressure_pa, 98700);
+  EXPECT_EQ(by_hand.manual->relative_humidity, 0.45);
+  EXPECT_EQ(by_hand.manual->u_temperature_c, 0.5);
+  EXPECT_EQ(by_hand.manual->u_pressure_pa, 100);
+  EXPECT_EQ(by_hand.manual->u_relative_humidity, 0.05);
+}
+
+TEST(Bench, RefusesAirFromNowhere) {
+  const std::string advice =
+      "write unknown, or usb:04d8:00dd (a BME280 behind an MCP2221A; :SERIAL or @PORT behind it if there are several), "
+      "or manual: and the values";
+  EXPECT_THAT(refused_air("ambient: usb:0403:6001\n"),
+              ElementsAre("21:10: ambient: text \"usb:0403:6001\" does not fit; " + advice));
+  EXPECT_THAT(refused_air("ambient: 21\n"), ElementsAre("21:10: ambient: 21 does not fit; " + advice));
+  for (const char* text : {"Unknown", "usb:04d8:00dd:", "usb:04d8:00dd@", "[]", "\"\""})
+    EXPECT_EQ(refused_air(std::string("ambient: ") + text + "\n").size(), 1u) << text;
+}
+
+TEST(Bench, WantsAirByHandWholeWithUncertaintiesAndInItsUnits) {
+  const auto changed_air = [](const std::string& from, const std::string& to) {
+    return refused_air(changed(kManualAir, from, to));
+  };
+  EXPECT_THAT(
+      changed_air("    u_pressure_pa: 100\n", ""),
+      ElementsAre("22:3: ambient.manual.u_pressure_pa is missing; add the key u_pressure_pa (standard uncertainty "
+                  "of pressure_pa)"));
+  EXPECT_THAT(changed_air("pressure_pa: 98700", "pressure_hpa: 987"),
+              ElementsAre("24:5: pressure_hpa is not a key of ambient.manual; the unit is part of the key: write "
+                          "pressure_pa and the value in Pa"));
+  EXPECT_THAT(
+      changed_air("98700", "987"),
+      ElementsAre("24:18: ambient.manual.pressure_pa: 987 is below 50000 Pa; write a value from 50000 to 110000 "
+                  "Pa"));
+  EXPECT_THAT(changed_air("0.45", "45"),
+              ElementsAre(StartsWith("25:24: ambient.manual.relative_humidity: 45 is above 1")));
+  EXPECT_THAT(changed_air("temperature_c: 21.5", "temperature_c: 294.6"),
+              ElementsAre(StartsWith("23:20: ambient.manual.temperature_c: 294.6 is above 60 °C")));
+  EXPECT_THAT(changed_air("u_temperature_c: 0.5", "u_temperature_c: 0"),
+              ElementsAre(StartsWith("26:22: ambient.manual.u_temperature_c: 0 is not above 0")));
+  EXPECT_EQ(refused_air("ambient: {}\n").size(), 1u);
+}
+
 TEST(Bench, NamesTheKeyThatWasMeant) {
   EXPECT_THAT(refused("  baud:", "  baud_rate:"),
               ElementsAre(StartsWith("11:3: baud_rate is not a key of iq; known here: baud,")));
