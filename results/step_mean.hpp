@@ -26,13 +26,13 @@ enum class Doubt : std::uint32_t {
   configuration_changed = 1u << 13,  ///< the box was set otherwise at some time of the run
   zero_drifted = 1u << 14,  ///< the zeros before and after the run differ by more than is tolerated, or one is missing
   zero_noisy = 1u << 15,    ///< the samples of a zero of the run scatter by more than is tolerated
-  drive_saturated = 1u << 16,        ///< the module drove with 98 % of the supply voltage or more: none was left
-  motor_fault = 1u << 17,            ///< the module reported a fault within the step
-  supply_out_of_band = 1u << 18,     ///< the supply voltage was not within 10 % of the campaign's
-  coil_hot = 1u << 19,               ///< the coil was at the campaign's limit of its temperature, or above
-  motor_reset = 1u << 20,            ///< the module restarted by itself within the step
-  motor_lost = 1u << 21,             ///< the module was lost, or did not do as it was told, within the step
-  slow_round_trip = 1u << 22,        ///< the module's readings are blurred in time since then in this run
+  drive_saturated = 1u << 16,     ///< the module drove with 98 % of the supply voltage or more: none was left
+  motor_fault = 1u << 17,         ///< the module reported a fault within the step
+  supply_out_of_band = 1u << 18,  ///< the supply voltage was not within 10 % of the campaign's
+  coil_hot = 1u << 19,            ///< the coil was at the campaign's limit of its temperature, or above
+  motor_reset = 1u << 20,         ///< the module restarted by itself within the step
+  motor_lost = 1u << 21,          ///< the module was lost, or did not do as it was told, within the step
+  slow_round_trip = 1u << 22,     ///< the module's readings are blurred in time since then in this run
 };
 
 struct StepMean {
