@@ -68,7 +68,8 @@ class Recorder {
   std::vector<results::LoadCellRecord> records_;
   std::vector<results::MotorReading> readings_;
   boost::lockfree::spsc_queue<results::PhaseMark, boost::lockfree::capacity<1024>> marks_;
-  boost::lockfree::spsc_queue<results::StreamEvent, boost::lockfree::capacity<256>> events_;  // to the runner
+  // To the runner. Sized at run time: Boost 1.74's queue of fixed capacity never destroys what is left in it.
+  boost::lockfree::spsc_queue<results::StreamEvent> events_{256};
   double phase_sum_n_ = 0;
   std::uint64_t phase_count_ = 0;
 
