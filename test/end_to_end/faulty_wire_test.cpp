@@ -94,7 +94,8 @@ TEST(FaultyWire, OtherUnitsDuringARunAreNoticedAtItsEnd) {
 }
 
 TEST(FaultyWire, AStolenStreamEndsTheCampaignWithTheMotorStopped) {
-  RunningBench bench(Manner{8, 7000, "  - {at_s: 4, kind: stolen}\n"});
+  RunningBench bench(Manner{8, 7000, "  - {at_s: 24, kind: stolen}\n"});
+  write(bench.path("short.yaml"), short_campaign_text("0", 1, 60));  // one run of 36 s and more
   Process run(bench.run_command());
   EXPECT_EQ(run.wait(), 4) << run.err();
   EXPECT_THAT(run.err(), HasSubstr("recorded so far: "));
