@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "compensation/commands.hpp"
+#include "compensation/flight/commands.hpp"
 #include "daq/commands.hpp"
 #include "daq/devices_commands.hpp"
 #include "daq/interlock.hpp"
@@ -89,6 +90,7 @@ int main(int argc, char** argv) {
   kphi::fit::add_fit(program, exit_code);
   kphi::fit::add_report(program, exit_code);
   kphi::compensation::add_compensate(program, exit_code);
+  kphi::flight::add_fly(program, exit_code);
 
   try {
     program.parse(argc, argv);

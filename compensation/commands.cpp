@@ -21,21 +21,6 @@ struct Request {
   bool json = false;
 };
 
-Airframe airframe_of(const profiles::Vehicle& vehicle) {
-  Airframe airframe{vehicle.half_side, vehicle.arm_length, vehicle.propeller_radius,
-                    vehicle.speed_min, vehicle.speed_max,  {}};
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double quarters = vehicle.hinge_turn_deg[i] / 90.0;
-    if (quarters != 0 && quarters != 1 && quarters != 2 && quarters != 3) {
-      throw ConfigurationError(vehicle.path +
-                               ": a hinge turn is not one of 0, 90, 180, 270 degrees; "
-                               "an arm hangs on a corner of the square body, give that corner");
-    }
-    airframe.hinge_turns[i] = static_cast<int>(quarters);
-  }
-  return airframe;
-}
-
 Compensator compensator_of(const Request& request) {
   const ThrustLine line = thrust_line(load_coefficients(request.coefficients));
   const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
@@ -77,6 +62,21 @@ int compensate(const Request& request) {
 }
 
 }  // namespace
+
+Airframe airframe_of(const profiles::Vehicle& vehicle) {
+  Airframe airframe{vehicle.half_side, vehicle.arm_length, vehicle.propeller_radius,
+                    vehicle.speed_min, vehicle.speed_max,  {}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double quarters = vehicle.hinge_turn_deg[i] / 90.0;
+    if (quarters != 0 && quarters != 1 && quarters != 2 && quarters != 3) {
+      throw ConfigurationError(vehicle.path +
+                               ": a hinge turn is not one of 0, 90, 180, 270 degrees; "
+                               "an arm hangs on a corner of the square body, give that corner");
+    }
+    airframe.hinge_turns[i] = static_cast<int>(quarters);
+  }
+  return airframe;
+}
 
 void add_compensate(CLI::App& program, int& exit_code) {
   auto request = std::make_shared<Request>();
