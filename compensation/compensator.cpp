@@ -18,16 +18,33 @@ bool one_corner_each(const std::array<int, 4>& turns) noexcept {
   return seen == 0b1111u;
 }
 
+bool finite(const Hinge& hinge) noexcept {
+  return std::isfinite(hinge.at.x.value()) && std::isfinite(hinge.at.y.value()) && std::isfinite(hinge.turn.value());
+}
+
+Refusal refusal_of_body(const Airframe& airframe) noexcept {
+  if (!airframe.polygon) return one_corner_each(airframe.hinge_turns) ? Refusal::none : Refusal::hinge_turns;
+  for (const Hinge& hinge : airframe.polygon->hinges) {
+    if (!finite(hinge)) return Refusal::hinges;
+  }
+  return Refusal::none;
+}
+
 Refusal refusal_of(const Airframe& airframe) noexcept {
-  if (!positive(airframe.half_side.value()) || !positive(airframe.arm_length.value()) ||
+  if ((!airframe.polygon && !positive(airframe.half_side.value())) || !positive(airframe.arm_length.value()) ||
       !positive(airframe.propeller_radius.value())) {
     return Refusal::sizes;
   }
   if (airframe.arm_length <= airframe.propeller_radius) return Refusal::arm_length;
   const double slowest = airframe.slowest_speed.value(), fastest = airframe.fastest_speed.value();
   if (!(slowest >= 0.0) || !(fastest > slowest) || !std::isfinite(fastest)) return Refusal::speeds;
-  if (!one_corner_each(airframe.hinge_turns)) return Refusal::hinge_turns;
-  return Refusal::none;
+  return refusal_of_body(airframe);
+}
+
+/// The window is known in closed form for the square alone.
+ContactFreeWindow window_of(const Airframe& airframe) noexcept {
+  if (airframe.polygon) return {Radians(1.0), Radians(-1.0)};
+  return contact_free_window(airframe.half_side, airframe.arm_length, airframe.propeller_radius);
 }
 
 LineDoubts doubts_about(const ThrustLine& line, ScalingLaw law) noexcept {
@@ -54,6 +71,12 @@ const char* describe(Refusal refusal) noexcept {
       return "speed limits must satisfy 0 <= slowest < fastest; check the vehicle's speed limits";
     case Refusal::hinge_turns:
       return "each arm needs a corner of its own; give the hinge turns 0, 1, 2, 3 (times 90 degrees) in some order";
+    case Refusal::hinges:
+      return "a hinge of the polygon body is not finite; check its place [m] and turn [rad]";
+    case Refusal::overlap:
+      return "a line was fitted with another overlap measure than the airframe flies with; fly the measure of the fit, "
+             "or "
+             "fit again";
   }
   return "unknown refusal";
 }
@@ -62,6 +85,9 @@ BuildOutcome Compensator::build(const std::array<ThrustLine, 4>& lines, const Ai
                                 ScalingLaw law) noexcept {
   BuildOutcome outcome;
   outcome.refusal = refusal_of(airframe);
+  for (const ThrustLine& line : lines) {
+    if (outcome.refusal == Refusal::none && line.overlap() != airframe.overlap) outcome.refusal = Refusal::overlap;
+  }
   if (outcome.refusal != Refusal::none) return outcome;
   for (std::size_t i = 0; i < lines.size(); ++i) outcome.doubts[i] = doubts_about(lines[i], law);
   outcome.compensator = Compensator(lines, airframe, law);
@@ -74,7 +100,8 @@ Compensator::Compensator(const std::array<ThrustLine, 4>& lines, const Airframe&
       law_(law),
       lines_(lines),
       airframe_(airframe),
-      contact_free_(contact_free_window(airframe.half_side, airframe.arm_length, airframe.propeller_radius)) {
+      outline_(airframe.polygon ? airframe.polygon->outline : ConvexPolygon::square(airframe.half_side)),
+      contact_free_(window_of(airframe)) {
   arm_angles_.fill(Radians(std::numeric_limits<double>::quiet_NaN()));  // differs from every first angle
   for (std::size_t i = 0; i < lines_.size(); ++i) apply_occlusion(i);
 }
@@ -93,11 +120,22 @@ void Compensator::set_arms(const std::array<Radians, 4>& arm_angles) noexcept {
       if (occlusion_angles_[i].value() == 0.0) continue;
       occlusion_angles_[i] = Radians(0.0);
     } else {
-      const HubPosition hub = hub_seen_from_hinge(airframe_, angle);
-      occlusion_angles_[i] = rim_arc(airframe_.half_side, airframe_.propeller_radius, hub.x, hub.y);
+      occlusion_angles_[i] = occlusion_at(i, angle);
     }
     apply_occlusion(i);
   }
+}
+
+Radians Compensator::occlusion_at(std::size_t arm, Radians arm_angle) const noexcept {
+  if (airframe_.polygon) {
+    const HubPosition hub = hub_at_hinge(airframe_.polygon->hinges[arm], airframe_.arm_length, arm_angle);
+    return occlusion_angle(outline_, airframe_.propeller_radius, hub, airframe_.overlap);
+  }
+  const HubPosition hub = hub_seen_from_hinge(airframe_, arm_angle);
+  if (airframe_.overlap == OverlapMeasure::rim_arc) {
+    return rim_arc(airframe_.half_side, airframe_.propeller_radius, hub.x, hub.y);
+  }
+  return occlusion_angle(outline_, airframe_.propeller_radius, hub, airframe_.overlap);
 }
 
 void Compensator::enable(bool on) noexcept {
@@ -116,10 +154,12 @@ void Compensator::apply_occlusion(std::size_t rotor) noexcept {
   effective_coefficients_[rotor] = effective;
   thrust_max_[rotor] = Newtons(effective * fastest_ * fastest_);
   drag_scale_[rotor] = 1.0 / std::max(scaling, kScalingFloor);
-  arm_flags_[rotor] = Flags()
-                          .with(Flag::arm_angle_unknown, arm_flags_[rotor].has(Flag::arm_angle_unknown))
-                          .with(Flag::beyond_fit, phi > line.largest_fitted())
-                          .with(Flag::at_floor, scaling <= kScalingFloor);
+  arm_flags_[rotor] =
+      Flags()
+          .with(Flag::arm_angle_unknown, arm_flags_[rotor].has(Flag::arm_angle_unknown))
+          .with(Flag::beyond_fit, phi > line.largest_fitted())
+          .with(Flag::at_floor, scaling <= kScalingFloor)
+          .with(Flag::at_ceiling, covered && law_ == ScalingLaw::clamped && line.at(phi) > line.thrust_coefficient());
 }
 
 SpeedCommand Compensator::speeds_for(const std::array<Newtons, 4>& thrusts) const noexcept {
@@ -141,6 +181,28 @@ SpeedCommand Compensator::speeds_for(const std::array<Newtons, 4>& thrusts) cons
                            .with(Flag::speed_at_fastest, wanted[i] > fastest_);
   }
   return command;
+}
+
+std::array<RadPerSec, 4> Compensator::speed_uncertainties(const std::array<Newtons, 4>& thrusts,
+                                                          Radians arm_angle_uncertainty) const noexcept {
+  const SpeedCommand command = speeds_for(thrusts);
+  std::array<RadPerSec, 4> uncertainties;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Radians angle = arm_angles_[i], phi = enabled_ ? occlusion_angles_[i] : Radians(0.0);
+    const bool known = !arm_flags_[i].has(Flag::arm_angle_unknown) && std::isfinite(arm_angle_uncertainty.value());
+    Radians spread(0.0);
+    if (enabled_ && known && std::isfinite(angle.value()) && arm_angle_uncertainty.value() != 0.0) {
+      const Radians above = occlusion_at(i, angle + arm_angle_uncertainty);
+      const Radians below = occlusion_at(i, angle - arm_angle_uncertainty);
+      spread = Radians(0.5 * std::fabs((above - below).value()));
+    }
+    const double relative = lines_[i].relative_uncertainty(phi, spread, phi.value() > 0.0 ? law_ : ScalingLaw::clamped);
+    const double unknown = std::numeric_limits<double>::infinity();
+    const double speed = command.speeds[i].value();
+    // Zero times infinity would be NaN.
+    uncertainties[i] = RadPerSec(known && relative < unknown ? 0.5 * relative * speed : unknown);
+  }
+  return uncertainties;
 }
 
 }  // namespace kphi::compensation

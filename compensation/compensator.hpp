@@ -28,6 +28,7 @@ enum class Flag : std::uint8_t {
   arm_angle_unknown = 16,  ///< the last arm angle was not finite: the occlusion before it is kept
   beyond_fit = 32,         ///< φ is larger than the largest fitted occlusion: the line is extrapolated
   at_floor = 64,           ///< k_i is at kScalingFloor or (published law) below
+  at_ceiling = 128,        ///< covered, yet the line lies above K_T there: k_i is held at 1 (clamped law)
 };
 
 class Flags {
@@ -59,6 +60,8 @@ enum class Refusal : std::uint8_t {
   arm_length,   ///< the arm must be longer than the propeller radius
   speeds,       ///< 0 <= slowest < fastest, both finite
   hinge_turns,  ///< each arm has a corner of its own: 0, 1, 2, 3 in any order
+  hinges,       ///< hinges of a polygon body must be finite
+  overlap,      ///< every line must be fitted with the overlap measure that the airframe flies with
 };
 
 /// One sentence, with the next move.
@@ -80,6 +83,12 @@ class Compensator {
   /// Where nothing is covered this is sqrt(T / K_T) bit for bit.
   [[nodiscard]] SpeedCommand speeds_for(const std::array<Newtons, 4>& thrusts) const noexcept;
 
+  /// Standard uncertainty [rad/s] of the speeds that speeds_for gives for these thrusts, from the lines' own (K_T,
+  /// intercept, slope) and that of the arm angles [rad], which moves φ. +∞ where none can be given: the line carries
+  /// none, k_i is at its floor, the arm angle is not known. Costs up to eight times a set_arms: for logs and planning.
+  [[nodiscard]] std::array<RadPerSec, 4> speed_uncertainties(
+      const std::array<Newtons, 4>& thrusts, Radians arm_angle_uncertainty = Radians(0.0)) const noexcept;
+
   /// Compensated or not. When off every k_i is 1 and speeds_for is the plain map bit for bit; φ is followed all the
   /// same.
   void enable(bool on) noexcept;
@@ -99,6 +108,7 @@ class Compensator {
  private:
   Compensator(const std::array<ThrustLine, 4>& lines, const Airframe& airframe, ScalingLaw law) noexcept;
   void apply_occlusion(std::size_t rotor) noexcept;
+  [[nodiscard]] Radians occlusion_at(std::size_t arm, Radians arm_angle) const noexcept;
 
   std::array<double, 4> effective_coefficients_{};  // K_T k_i, positive: what speeds_for divides by
   double slowest_;
@@ -113,6 +123,7 @@ class Compensator {
   std::array<double, 4> drag_scale_{};
   std::array<ThrustLine, 4> lines_;
   Airframe airframe_;
+  ConvexPolygon outline_;
   ContactFreeWindow contact_free_;
 };
 

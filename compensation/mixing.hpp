@@ -29,7 +29,8 @@ struct RotorLayout {
 
 /// How much a rotor turns the body. Torque follows the speed, and the uncovered thrust f⁰ = K_T ω² tells the speed:
 /// torque = f⁰ (per_newton + per_square_newton f⁰), with f⁰ = drag_scale f, drag_scale = 1/k_i.
-/// Torque per thrust, κ(f) = drag_scale (per_newton + per_square_newton drag_scale f).
+/// Torque per thrust, κ(f) = drag_scale (per_newton + per_square_newton drag_scale f), the bracket held within half and
+/// twice per_newton.
 struct DragTorque {
   Metres per_newton{0.0};          ///< N m per N, positive, e.g. 0.0133
   double per_square_newton = 0.0;  ///< N m per N²; how κ changes with the load; 0: κ is constant
@@ -54,7 +55,7 @@ enum class Concession : std::uint8_t {
   yaw = 1,         ///< the yaw torque is smaller than demanded (never larger, never of the other sign)
   thrust = 2,      ///< the collective thrust was shifted along A⁻¹e_thrust, which leaves all three torques alone
   roll_pitch = 4,  ///< no thrust and yaw let roll and pitch be met: rotors were cut at their limits
-  demand_nan = 8,  ///< a demand was not finite and counted as 0, or a limit was NaN or crossed and counted as closed
+  demand_nan = 8,  ///< a demand was NaN and counted as 0, or a rotor's limits were NaN or crossed and counted as closed
 };
 
 class Concessions {
@@ -96,6 +97,9 @@ class Mixer {
   /// 1. yaw goes down, no further than to `assured_yaw` [N m, absolute] (a demand below it is not touched);
   /// 2. the collective thrust moves, along A⁻¹e_thrust, by as little as yaw's freedom allows;
   /// 3. where roll and pitch cannot be met at all, each rotor is cut at its limits.
+  /// Where one move of each kind is enough this is the scheme of the paper: "the worst rotor at its limit". Two rotors
+  /// that break their limits on opposite sides of yaw cost it collective thrust that yaw could have given; here they do
+  /// not.
   [[nodiscard]] MixedThrusts mix(const Wrench& demand, const ThrustLimits& limits,
                                  NewtonMetres assured_yaw = NewtonMetres(0.0)) const noexcept;
 

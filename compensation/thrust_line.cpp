@@ -2,20 +2,30 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace kphi::compensation {
 namespace {
 
 bool positive(double value) noexcept { return std::isfinite(value) && value > 0.0; }
 
+bool not_negative(double value) noexcept { return std::isfinite(value) && value >= 0.0; }
+
+bool sound(const LineUncertainty& u) noexcept {
+  return not_negative(u.thrust_coefficient) && not_negative(u.intercept_variance) && std::isfinite(u.covariance) &&
+         not_negative(u.slope_variance);
+}
+
 }  // namespace
 
 std::optional<ThrustLine> ThrustLine::from(ThrustCoefficient thrust_coefficient, ThrustCoefficient intercept,
-                                           double slope_per_rad, Radians largest_fitted) noexcept {
+                                           double slope_per_rad, Radians largest_fitted, OverlapMeasure overlap,
+                                           const std::optional<LineUncertainty>& uncertainty) noexcept {
   if (!positive(thrust_coefficient.value()) || !positive(intercept.value())) return std::nullopt;
   if (!std::isfinite(slope_per_rad)) return std::nullopt;
   if (!positive(largest_fitted.value()) || largest_fitted.value() > 2 * kPi) return std::nullopt;
-  return ThrustLine(thrust_coefficient, intercept, slope_per_rad, largest_fitted);
+  if (name_of(overlap) == "unknown" || (uncertainty && !sound(*uncertainty))) return std::nullopt;
+  return ThrustLine(thrust_coefficient, intercept, slope_per_rad, largest_fitted, overlap, uncertainty);
 }
 
 double ThrustLine::scaling_factor(Radians occlusion_angle, ScalingLaw law) const noexcept {
@@ -24,6 +34,22 @@ double ThrustLine::scaling_factor(Radians occlusion_angle, ScalingLaw law) const
   if (law == ScalingLaw::published) return 1.0 - std::fabs(reference - k) / reference;
   if (!(occlusion_angle.value() > 0.0)) return 1.0;
   return std::min(1.0, std::max(kScalingFloor, k / reference));
+}
+
+double ThrustLine::relative_uncertainty(Radians occlusion_angle, Radians angle_uncertainty,
+                                        ScalingLaw law) const noexcept {
+  constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  const double phi = occlusion_angle.value(), reference = thrust_coefficient_.value(), k = at(occlusion_angle).value();
+  const double factor = scaling_factor(occlusion_angle, law);
+  if (!uncertainty_ || phi != phi || !(factor > kScalingFloor)) return kUnknown;
+  const LineUncertainty& u = *uncertainty_;
+  if (law == ScalingLaw::clamped && factor == 1.0) return u.thrust_coefficient / reference;
+  const double from_angle = slope_per_rad_ * angle_uncertainty.value();
+  double variance = u.intercept_variance + phi * (2 * u.covariance + phi * u.slope_variance) + from_angle * from_angle;
+  // The published law reflects the line at K_T: K_T k_i = 2 K_T − k there.
+  if (k > reference) variance += 4 * u.thrust_coefficient * u.thrust_coefficient;
+  const double relative = std::sqrt(std::max(variance, 0.0)) / (reference * factor);
+  return relative == relative ? relative : kUnknown;
 }
 
 }  // namespace kphi::compensation

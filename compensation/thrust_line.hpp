@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "compensation/overlap_measure.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::compensation {
@@ -17,19 +18,32 @@ enum class ScalingLaw : std::uint8_t {
 /// The smallest k_i of ScalingLaw::clamped: the speed is raised by 1/sqrt(0.1) = 3.16 at most.
 inline constexpr double kScalingFloor = 0.1;
 
+/// How well the line is known, one standard deviation, SI.
+struct LineUncertainty {
+  double thrust_coefficient = 0.0;  ///< of K_T [N/(rad/s)²]
+  double intercept_variance = 0.0;  ///< of the line, [N/(rad/s)²]²
+  double covariance = 0.0;          ///< of intercept and slope, per rad
+  double slope_variance = 0.0;      ///< per rad²
+};
+
 /// T = k(φ) ω² with k(φ) = intercept + slope φ. A ThrustLine that exists is valid.
 class ThrustLine {
  public:
-  /// `thrust_coefficient` is K_T, measured without occlusion; the line need not pass through it.
-  /// Nothing unless K_T and the intercept are positive, the slope [N/(rad/s)² per rad] finite, and `largest_fitted`,
-  /// the widest occlusion behind the line, in (0, 2π].
-  [[nodiscard]] static std::optional<ThrustLine> from(ThrustCoefficient thrust_coefficient, ThrustCoefficient intercept,
-                                                      double slope_per_rad, Radians largest_fitted) noexcept;
+  /// `thrust_coefficient` is K_T, measured without occlusion; the line need not pass through it. `overlap` is how the φ
+  /// of the fit is measured. Nothing unless K_T and the intercept are positive, the slope [N/(rad/s)² per rad] finite,
+  /// `largest_fitted`, the widest occlusion behind the line, in (0, 2π], and the uncertainty, if given, finite with
+  /// variances not negative.
+  [[nodiscard]] static std::optional<ThrustLine> from(
+      ThrustCoefficient thrust_coefficient, ThrustCoefficient intercept, double slope_per_rad, Radians largest_fitted,
+      OverlapMeasure overlap = OverlapMeasure::rim_arc,
+      const std::optional<LineUncertainty>& uncertainty = std::nullopt) noexcept;
 
   [[nodiscard]] ThrustCoefficient thrust_coefficient() const noexcept { return thrust_coefficient_; }
   [[nodiscard]] ThrustCoefficient intercept() const noexcept { return intercept_; }
   [[nodiscard]] double slope_per_rad() const noexcept { return slope_per_rad_; }
   [[nodiscard]] Radians largest_fitted() const noexcept { return largest_fitted_; }
+  [[nodiscard]] OverlapMeasure overlap() const noexcept { return overlap_; }
+  [[nodiscard]] const std::optional<LineUncertainty>& uncertainty() const noexcept { return uncertainty_; }
 
   /// k(φ) on the line, also beyond the largest fitted angle, where it may be negative.
   [[nodiscard]] ThrustCoefficient at(Radians occlusion_angle) const noexcept {
@@ -37,19 +51,28 @@ class ThrustLine {
   }
   /// k_i. `clamped` is in [kScalingFloor, 1] whatever φ is, 1 if φ is NaN; `published` is what the formula gives.
   [[nodiscard]] double scaling_factor(Radians occlusion_angle, ScalingLaw law = ScalingLaw::clamped) const noexcept;
+  /// Standard uncertainty of K_T k_i relative to itself, from K_T, the line and the angle's own `angle_uncertainty`;
+  /// the speed ω = sqrt(T/(K_T k_i)) has half of it. Where the law leaves the line it is K_T's alone (k_i = 1). K_T and
+  /// the line count as independent. +∞ where none can be given: no uncertainty known, k_i at its floor or below, φ NaN.
+  [[nodiscard]] double relative_uncertainty(Radians occlusion_angle, Radians angle_uncertainty,
+                                            ScalingLaw law = ScalingLaw::clamped) const noexcept;
 
  private:
   ThrustLine(ThrustCoefficient thrust_coefficient, ThrustCoefficient intercept, double slope_per_rad,
-             Radians largest_fitted) noexcept
+             Radians largest_fitted, OverlapMeasure overlap, const std::optional<LineUncertainty>& uncertainty) noexcept
       : thrust_coefficient_(thrust_coefficient),
         intercept_(intercept),
         slope_per_rad_(slope_per_rad),
-        largest_fitted_(largest_fitted) {}
+        largest_fitted_(largest_fitted),
+        overlap_(overlap),
+        uncertainty_(uncertainty) {}
 
   ThrustCoefficient thrust_coefficient_;
   ThrustCoefficient intercept_;
   double slope_per_rad_;
   Radians largest_fitted_;
+  OverlapMeasure overlap_;
+  std::optional<LineUncertainty> uncertainty_;
 };
 
 }  // namespace kphi::compensation

@@ -38,8 +38,8 @@ OverlapMeasure overlap_of(const YamlReader& reader) {
                   "add `overlap: rim_arc` if they are rim arcs");
   }
   const std::string overlap = reader.text_at(reader.top(), "overlap");
-  if (overlap == "rim_arc") return OverlapMeasure::rim_arc;
-  reader.refuse(node, "overlap `" + overlap + "` is not known", "fit again with `rim_arc`, the definition that flies");
+  if (const auto measure = overlap_measure_named(overlap)) return *measure;
+  reader.refuse(node, "overlap `" + overlap + "` is not known", "use rim_arc, area_share or load_share");
 }
 
 std::optional<ThrustCoefficient> optional_coefficient(const YamlReader& reader, const YAML::Node& map,
@@ -61,6 +61,10 @@ void read_thrust_coefficient(const YamlReader& reader, double scale, Coefficient
                   "fit again from a campaign with a run at 0 degrees");
   }
   into.thrust_coefficient_error = optional_coefficient(reader, map, "standard_error", scale);
+  if (into.thrust_coefficient_error && into.thrust_coefficient_error->value() < 0.0) {
+    reader.refuse(reader.required(map, "standard_error"), "a standard error is below 0",
+                  "write the file again with `kphi fit`");
+  }
 }
 
 void read_covariance(const YamlReader& reader, const YAML::Node& map, double scale, Coefficients::Line& line) {
@@ -75,6 +79,7 @@ void read_covariance(const YamlReader& reader, const YAML::Node& map, double sca
     for (std::size_t j = 0; j < 2; ++j) {
       covariance[i][j] = reader.number(rows[i][j], "covariance") * units[i] * units[j];
     }
+    if (covariance[i][i] < 0.0) reader.refuse(rows[i], "a variance is below 0", "write the file again with `kphi fit`");
   }
   line.covariance = covariance;
 }
@@ -212,8 +217,14 @@ Coefficients load_coefficients(const std::string& path) {
 }
 
 ThrustLine thrust_line(const Coefficients& coefficients) {
-  const auto line = ThrustLine::from(coefficients.thrust_coefficient, coefficients.line.intercept,
-                                     coefficients.line.slope_per_rad, coefficients.largest_occlusion);
+  std::optional<LineUncertainty> uncertainty;
+  if (const auto& covariance = coefficients.line.covariance; covariance && coefficients.thrust_coefficient_error) {
+    uncertainty = LineUncertainty{coefficients.thrust_coefficient_error->value(), (*covariance)[0][0],
+                                  (*covariance)[0][1], (*covariance)[1][1]};
+  }
+  const auto line =
+      ThrustLine::from(coefficients.thrust_coefficient, coefficients.line.intercept, coefficients.line.slope_per_rad,
+                       coefficients.largest_occlusion, coefficients.overlap, uncertainty);
   if (!line) throw CoefficientError(coefficients.path + ": not a line that can fly; read the file again");
   return *line;
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "compensation/overlap_measure.hpp"
 #include "compensation/thrust_line.hpp"
 #include "compensation/units.hpp"
 
@@ -17,9 +18,6 @@ class CoefficientError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
-
-/// How the occlusion angles of the file are defined. A line must be flown with the definition it was fitted with.
-enum class OverlapMeasure { rim_arc };
 
 /// One coefficient file in SI units, whatever its k_unit. What the file leaves out or calls `unknown` is empty.
 struct Coefficients {
@@ -60,8 +58,8 @@ struct Coefficients {
   std::string measured_utc;
   std::string tool_version;
   Propeller propeller;
-  OverlapMeasure overlap = OverlapMeasure::rim_arc;
-  ThrustCoefficient thrust_coefficient;                       ///< K_T, measured at φ = 0
+  OverlapMeasure overlap = OverlapMeasure::rim_arc;  ///< a line must be flown with the measure it was fitted with
+  ThrustCoefficient thrust_coefficient;              ///< K_T, measured at φ = 0
   std::optional<ThrustCoefficient> thrust_coefficient_error;  ///< standard error of K_T
   Line line;
   Radians smallest_occlusion;  ///< valid range of φ
@@ -81,7 +79,9 @@ struct Coefficients {
 /// As load_coefficients, from text; `path` only names it in messages.
 [[nodiscard]] Coefficients parse_coefficients(const std::string& text, const std::string& path);
 
-/// What flies: the line of the file. Throws CoefficientError if `coefficients` was altered into something invalid.
+/// What flies: the line of the file, with its overlap measure, and with its uncertainty if the file tells both the
+/// covariance and the standard error of K_T. Throws CoefficientError if `coefficients` was altered into something
+/// invalid.
 [[nodiscard]] ThrustLine thrust_line(const Coefficients& coefficients);
 
 }  // namespace kphi::compensation

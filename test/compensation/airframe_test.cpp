@@ -48,5 +48,18 @@ TEST(Airframe, TakesTheCornerOfAnArmFromItsHingeTurn) {
   EXPECT_LT(hub.y, Metres(0));
 }
 
+TEST(Airframe, MirrorsAnArmAboutTheDiagonalOfItsCorner) {
+  Airframe airframe = example_airframe();
+  airframe.mirrored = {true, false, true, false};
+  const HubPosition x = hub_in_body(airframe, 0, from_degrees(45));
+  EXPECT_NEAR(x.x.value(), x.y.value(), 1e-15) << "45° points away from the body either way";
+  const HubPosition folded = hub_in_body(airframe, 0, from_degrees(180));
+  EXPECT_NEAR(folded.x.value(), 0.045, 1e-15) << "180° lies along the edge before instead of the next";
+  EXPECT_NEAR(folded.y.value(), -0.072, 1e-15);
+  const HubPosition opposite = hub_in_body(airframe, 2, from_degrees(180));
+  EXPECT_NEAR(opposite.x.value(), -folded.x.value(), 1e-15);
+  EXPECT_NEAR(opposite.y.value(), -folded.y.value(), 1e-15);
+}
+
 }  // namespace
 }  // namespace kphi::compensation

@@ -22,6 +22,8 @@ struct GeometryVector {
   double hub_x = 0;
   double hub_y = 0;
   double phi_arc = 0;
+  double phi_area = 0;
+  double phi_load = 0;
 };
 
 inline double exact_number(const std::string& text) {
@@ -54,6 +56,8 @@ inline std::vector<GeometryVector> geometry_vectors() {
     vector.hub_x = exact_number(cells.at(6));
     vector.hub_y = exact_number(cells.at(7));
     vector.phi_arc = exact_number(cells.at(8));
+    vector.phi_area = exact_number(cells.at(10));
+    vector.phi_load = exact_number(cells.at(11));
     vectors.push_back(vector);
   }
   return vectors;

@@ -105,6 +105,79 @@ TEST(ThrustLine, CannotExistInvalid) {
   EXPECT_FALSE(ThrustLine::from(k, k, -1e-7, Radians(6.3)));
 }
 
+ThrustLine line_with(const LineUncertainty& uncertainty) {
+  const ThrustLine line = paper_line();
+  return *ThrustLine::from(line.thrust_coefficient(), line.intercept(), line.slope_per_rad(), line.largest_fitted(),
+                           OverlapMeasure::rim_arc, uncertainty);
+}
+
+/// 1 % of K_T, 1.5 % of the intercept, 4 % of the slope, correlated as lines through distant points are.
+LineUncertainty example_uncertainty() {
+  const double k = kExampleCoefficient.value();
+  const double intercept = 0.015 * k, slope = 0.04 * paper_line().slope_per_rad();
+  return {0.01 * k, intercept * intercept, 0.8 * intercept * slope, slope * slope};
+}
+
+TEST(ThrustLine, PropagatesItsUncertaintyAsDrawingManyLinesDoes) {
+  const LineUncertainty u = example_uncertainty();
+  const ThrustLine line = line_with(u);
+  std::mt19937_64 random(17);
+  std::normal_distribution<double> normal;
+  constexpr int kDraws = 40000;
+  for (const double phi_deg : {2.0, 65.0, 150.0}) {
+    for (const ScalingLaw law : {ScalingLaw::clamped, ScalingLaw::published}) {
+      const double phi = phi_deg * kPi / 180, angle_error = 0.02;
+      if (law == ScalingLaw::clamped && phi_deg == 2.0) continue;  // held at 1 there
+      double sum = 0, squares = 0;
+      for (int i = 0; i < kDraws; ++i) {
+        const double a = normal(random), b = normal(random);
+        const double k_t = kExampleCoefficient.value() + u.thrust_coefficient * normal(random);
+        const double intercept = line.intercept().value() + std::sqrt(u.intercept_variance) * a;
+        const double slope = line.slope_per_rad() - std::sqrt(u.slope_variance) * (0.8 * a + 0.6 * b);
+        const double k = intercept + slope * (phi + angle_error * normal(random));
+        const double effective = law == ScalingLaw::published ? k_t - std::fabs(k_t - k) : k;
+        sum += effective;
+        squares += effective * effective;
+      }
+      const double mean = sum / kDraws, drawn = std::sqrt(squares / kDraws - mean * mean) / mean;
+      // Near K_T the fold of the published law narrows the draws.
+      const double tolerance = phi_deg == 2.0 ? 0.25 : 0.03;
+      EXPECT_NEAR(line.relative_uncertainty(Radians(phi), Radians(angle_error), law) / drawn, 1.0, tolerance)
+          << phi_deg << " degrees";
+    }
+  }
+}
+
+TEST(ThrustLine, HasTheUncertaintyOfKtWhereTheLawLeavesTheLine) {
+  const ThrustLine line = line_with(example_uncertainty());
+  EXPECT_DOUBLE_EQ(line.relative_uncertainty(Radians(0), Radians(0)), 0.01);
+  EXPECT_DOUBLE_EQ(line.relative_uncertainty(from_degrees(5), Radians(0.1)), 0.01) << "held at 1";
+}
+
+TEST(ThrustLine, SaysInfiniteWhereNoUncertaintyCanBeGiven) {
+  EXPECT_EQ(paper_line().relative_uncertainty(from_degrees(65), Radians(0)), kInfinity) << "none is known";
+  const ThrustLine line = line_with(example_uncertainty());
+  EXPECT_EQ(line.relative_uncertainty(from_degrees(350), Radians(0)), kInfinity) << "at the floor";
+  EXPECT_EQ(line.relative_uncertainty(Radians(kNaN), Radians(0)), kInfinity);
+  EXPECT_EQ(line.relative_uncertainty(from_degrees(65), Radians(kNaN)), kInfinity);
+}
+
+TEST(ThrustLine, RefusesAnUncertaintyOrAMeasureThatCannotBe) {
+  const ThrustLine line = paper_line();
+  const auto made = [&](const LineUncertainty& u, OverlapMeasure overlap = OverlapMeasure::area_share) {
+    return ThrustLine::from(line.thrust_coefficient(), line.intercept(), line.slope_per_rad(), line.largest_fitted(),
+                            overlap, u);
+  };
+  ASSERT_TRUE(made(example_uncertainty()));
+  EXPECT_EQ(made(example_uncertainty())->overlap(), OverlapMeasure::area_share);
+  EXPECT_EQ(line.overlap(), OverlapMeasure::rim_arc);
+  EXPECT_FALSE(made({-1e-9, 0, 0, 0}));
+  EXPECT_FALSE(made({0, -1e-20, 0, 0}));
+  EXPECT_FALSE(made({0, 0, kNaN, 0}));
+  EXPECT_FALSE(made({0, 0, 0, kInfinity}));
+  EXPECT_FALSE(made({}, static_cast<OverlapMeasure>(3)));
+}
+
 TEST(ThrustLine, IsMadeWithoutExceptions) {
   static_assert(noexcept(ThrustLine::from(ThrustCoefficient(), ThrustCoefficient(), 0.0, Radians())));
   static_assert(noexcept(std::declval<const ThrustLine&>().scaling_factor(Radians())));

@@ -133,7 +133,29 @@ TEST(CoefficientFile, IsRefusedWithoutUnitOrWithAnUnknownOne) {
 
 TEST(CoefficientFile, IsRefusedWithoutOverlapDefinitionOrWithAnUnknownOne) {
   EXPECT_THAT(refusal_of(with(kGood, "overlap: rim_arc\n", "")), HasSubstr("overlap: rim_arc"));
-  EXPECT_THAT(refusal_of(with(kGood, "rim_arc", "area_share")), StartsWith("c.yaml:6: overlap `area_share`"));
+  EXPECT_THAT(refusal_of(with(kGood, "rim_arc", "rim_share")), StartsWith("c.yaml:6: overlap `rim_share`"));
+}
+
+TEST(CoefficientFile, HandsItsOverlapMeasureAndItsUncertaintyToTheLine) {
+  EXPECT_EQ(thrust_line(parse_coefficients(kGood, "c")).overlap(), OverlapMeasure::rim_arc);
+  for (const OverlapMeasure measure : {OverlapMeasure::area_share, OverlapMeasure::load_share}) {
+    const std::string text = with(kGood, "rim_arc", std::string(name_of(measure)));
+    EXPECT_EQ(thrust_line(parse_coefficients(text, "c")).overlap(), measure);
+  }
+  const auto uncertainty = thrust_line(parse_coefficients(kGood, "c")).uncertainty();
+  ASSERT_TRUE(uncertainty);
+  EXPECT_EQ(uncertainty->thrust_coefficient, 1e-9);
+  EXPECT_EQ(uncertainty->intercept_variance, 1e-18);
+  EXPECT_DOUBLE_EQ(uncertainty->covariance, -5e-21 * 180 / kPi);
+  EXPECT_DOUBLE_EQ(uncertainty->slope_variance, 4e-23 * (180 / kPi) * (180 / kPi));
+  EXPECT_FALSE(thrust_line(parse_coefficients(with(kGood, "standard_error: 1.0e-09", "standard_error: unknown"), "c"))
+                   .uncertainty());
+}
+
+TEST(CoefficientFile, IsRefusedWithAVarianceBelowZeroOrAnErrorBelowZero) {
+  EXPECT_THAT(refusal_of(with(kGood, "[[1.0e-18,", "[[-1.0e-18,")), StartsWith("c.yaml:12: "));
+  EXPECT_THAT(refusal_of(with(kGood, "4.0e-23]]", "-4.0e-23]]")), StartsWith("c.yaml:12: "));
+  EXPECT_THAT(refusal_of(with(kGood, "standard_error: 1.0e-09", "standard_error: -1.0e-09")), StartsWith("c.yaml:7: "));
 }
 
 TEST(CoefficientFile, IsRefusedInAnotherFormat) {

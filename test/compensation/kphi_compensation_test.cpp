@@ -1,0 +1,167 @@
+// The C interface gives the numbers of the classes, bit for bit.
+#include "compensation/kphi_compensation.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+#include <random>
+#include <string>
+
+#include "compensation/mixing.hpp"
+#include "test/compensation/example_vehicle.hpp"
+
+namespace kphi::compensation {
+namespace {
+
+kphi_line plain_line() {
+  const ThrustLine line = paper_line();
+  kphi_line plain{};
+  plain.thrust_coefficient = line.thrust_coefficient().value();
+  plain.intercept = line.intercept().value();
+  plain.slope_per_rad = line.slope_per_rad();
+  plain.largest_fitted_rad = line.largest_fitted().value();
+  return plain;
+}
+
+kphi_airframe plain_airframe() {
+  const Airframe airframe = example_airframe();
+  kphi_airframe plain{};
+  plain.half_side = airframe.half_side.value();
+  plain.arm_length = airframe.arm_length.value();
+  plain.propeller_radius = airframe.propeller_radius.value();
+  plain.fastest_speed = airframe.fastest_speed.value();
+  for (int i = 0; i < 4; ++i) plain.hinge_turns[i] = i;
+  return plain;
+}
+
+kphi_compensator built(const kphi_airframe& airframe, int law = KPHI_LAW_CLAMPED) {
+  const kphi_line lines[4] = {plain_line(), plain_line(), plain_line(), plain_line()};
+  kphi_compensator compensator;
+  EXPECT_EQ(kphi_compensator_build(&compensator, lines, &airframe, law), 0);
+  return compensator;
+}
+
+template <class Unit>
+void expect_same(const double (&plain)[4], const std::array<Quantity<Unit>, 4>& typed) {
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(std::memcmp(&plain[i], &typed[i], sizeof(double)), 0);
+}
+
+TEST(PlainInterface, GivesTheNumbersOfTheClassBitForBit) {
+  for (const int law : {KPHI_LAW_CLAMPED, KPHI_LAW_PUBLISHED}) {
+    kphi_compensator plain = built(plain_airframe(), law);
+    Compensator typed = example_compensator(static_cast<ScalingLaw>(law));
+    std::mt19937_64 random(11);
+    std::uniform_real_distribution<double> theta(-2, 3.5), thrust(-1, 9);
+    for (int i = 0; i < 1000; ++i) {
+      const double arms[4] = {theta(random), theta(random), theta(random), theta(random)};
+      const double thrusts[4] = {thrust(random), thrust(random), thrust(random), thrust(random)};
+      kphi_set_arms(&plain, arms);
+      typed.set_arms({Radians(arms[0]), Radians(arms[1]), Radians(arms[2]), Radians(arms[3])});
+      kphi_enable(&plain, i % 3);
+      typed.enable(i % 3 != 0);
+      double got[4];
+      unsigned char flags[4];
+      kphi_speeds_for(&plain, thrusts, got, flags);
+      const SpeedCommand command = typed.speeds_for(thrusts_of(thrusts[0], thrusts[1], thrusts[2], thrusts[3]));
+      expect_same(got, command.speeds);
+      for (std::size_t j = 0; j < 4; ++j) EXPECT_EQ(flags[j], command.flags[j].bits());
+      kphi_occlusion_angles(&plain, got);
+      expect_same(got, typed.occlusion_angles());
+      kphi_thrust_max(&plain, got);
+      expect_same(got, typed.thrust_max());
+      kphi_scaling_factors(&plain, got);
+      for (std::size_t j = 0; j < 4; ++j) EXPECT_EQ(got[j], typed.scaling_factors()[j]);
+      kphi_drag_scale(&plain, got);
+      for (std::size_t j = 0; j < 4; ++j) EXPECT_EQ(got[j], typed.drag_scale()[j]);
+    }
+  }
+}
+
+TEST(PlainInterface, TellsTheUncertaintyWhereTheLineHasOne) {
+  kphi_line line = plain_line();
+  line.has_uncertainty = 1;
+  line.thrust_coefficient_error = 0.01 * line.thrust_coefficient;
+  const kphi_line lines[4] = {line, line, line, plain_line()};
+  const kphi_airframe airframe = plain_airframe();
+  kphi_compensator compensator;
+  ASSERT_EQ(kphi_compensator_build(&compensator, lines, &airframe, KPHI_LAW_CLAMPED), 0);
+  const double x[4] = {0.8, 0.8, 0.8, 0.8}, thrusts[4] = {1, 1, 1, 1};
+  kphi_set_arms(&compensator, x);
+  double speeds[4], uncertainties[4];
+  kphi_speeds_for(&compensator, thrusts, speeds, nullptr);
+  kphi_speed_uncertainties(&compensator, thrusts, 0.01, uncertainties);
+  EXPECT_NEAR(uncertainties[0] / speeds[0], 0.005, 1e-12);
+  EXPECT_EQ(uncertainties[3], std::numeric_limits<double>::infinity());
+}
+
+TEST(PlainInterface, TakesAPolygonBody) {
+  kphi_airframe airframe = plain_airframe();
+  airframe.corner_count = 4;
+  const double square[4][2] = {{.045, .045}, {-.045, .045}, {-.045, -.045}, {.045, -.045}};
+  std::memcpy(airframe.corners, square, sizeof square);
+  std::memcpy(airframe.hinges, square, sizeof square);
+  for (int i = 0; i < 4; ++i) airframe.hinge_turn_rad[i] = i * kPi / 2;
+  kphi_compensator general = built(airframe), closed = built(plain_airframe());
+  const double o[4] = {kPi, kPi, kPi - 0.25, kPi};
+  kphi_set_arms(&general, o);
+  kphi_set_arms(&closed, o);
+  double a[4], b[4];
+  kphi_occlusion_angles(&general, a);
+  kphi_occlusion_angles(&closed, b);
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(a[i], b[i], 1e-12);
+}
+
+TEST(PlainInterface, RefusesInWordsAndBuildsNothing) {
+  const auto refusal = [](void (*spoil)(kphi_line&, kphi_airframe&), int law = KPHI_LAW_CLAMPED) {
+    kphi_line lines[4] = {plain_line(), plain_line(), plain_line(), plain_line()};
+    kphi_airframe airframe = plain_airframe();
+    spoil(lines[2], airframe);
+    kphi_compensator compensator;
+    std::memset(&compensator, 0x5a, sizeof compensator);
+    const kphi_compensator before = compensator;
+    const int code = kphi_compensator_build(&compensator, lines, &airframe, law);
+    EXPECT_EQ(std::memcmp(&compensator, &before, sizeof before), 0);
+    EXPECT_NE(std::string(kphi_refusal_text(code)), "unknown refusal");
+    EXPECT_NE(code, 0);
+    return std::string(kphi_refusal_text(code));
+  };
+  EXPECT_NE(refusal([](kphi_line& line, kphi_airframe&) { line.thrust_coefficient = 0; }).find("K_T"),
+            std::string::npos);
+  EXPECT_NE(refusal([](kphi_line& line, kphi_airframe&) { line.overlap = KPHI_AREA_SHARE; }).find("overlap measure"),
+            std::string::npos);
+  EXPECT_NE(refusal([](kphi_line& line, kphi_airframe&) { line.overlap = 3; }).find("line"), std::string::npos);
+  EXPECT_NE(refusal([](kphi_line&, kphi_airframe& a) { a.overlap = -1; }).find("overlap"), std::string::npos);
+  EXPECT_NE(refusal([](kphi_line&, kphi_airframe& a) { a.corner_count = 13; }).find("corners"), std::string::npos);
+  EXPECT_NE(refusal([](kphi_line&, kphi_airframe& a) { a.corner_count = -1; }).find("corners"), std::string::npos);
+  EXPECT_NE(refusal([](kphi_line&, kphi_airframe& a) { a.arm_length = 0.05; }).find("arm"), std::string::npos);
+  EXPECT_NE(refusal([](kphi_line&, kphi_airframe&) {}, 2).find("law"), std::string::npos);
+  EXPECT_STREQ(kphi_refusal_text(-1), "unknown refusal");
+}
+
+TEST(PlainInterface, MixesAsTheClassDoes) {
+  const double hubs[4][2] = {{.128, .128}, {-.128, .128}, {-.128, -.128}, {.128, -.12}};
+  const int spins[4] = {1, -1, 1, -1};
+  RotorLayout layout;
+  for (std::size_t i = 0; i < 4; ++i) layout.hubs[i] = {Metres(hubs[i][0]), Metres(hubs[i][1])};
+  kphi_mixer plain;
+  ASSERT_EQ(kphi_mixer_build(&plain, hubs, spins, 0.0133, 1e-4), 1);
+  Mixer typed = Mixer::build(layout, {Metres(0.0133), 1e-4}).value();
+  const double scale[4] = {1.2, 1, 1.1, 1}, demand[4] = {8, .3, -.2, .05}, low[4] = {}, high[4] = {3, 3, 2.5, 3};
+  ASSERT_EQ(kphi_mixer_set_layout(&plain, hubs, spins, scale), 1);
+  ASSERT_TRUE(typed.set_layout(layout, {scale[0], scale[1], scale[2], scale[3]}));
+  double thrusts[4], achieved[4];
+  const int gave = kphi_mix(&plain, demand, low, high, 0.01, thrusts, achieved);
+  const MixedThrusts mixed = typed.mix({Newtons(8), NewtonMetres(.3), NewtonMetres(-.2), NewtonMetres(.05)},
+                                       {{}, thrusts_of(3, 3, 2.5, 3)}, NewtonMetres(0.01));
+  EXPECT_EQ(gave, mixed.concessions.bits());
+  EXPECT_NE(gave, 0);
+  expect_same(thrusts, mixed.thrusts);
+  EXPECT_EQ(achieved[3], mixed.achieved.yaw.value());
+  const int no_spins[4] = {1, 0, 1, -1};
+  EXPECT_EQ(kphi_mixer_set_layout(&plain, hubs, no_spins, scale), 0);
+  EXPECT_EQ(kphi_mixer_build(&plain, hubs, no_spins, 0.0133, 0), 0);
+}
+
+}  // namespace
+}  // namespace kphi::compensation

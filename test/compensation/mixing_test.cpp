@@ -1,0 +1,355 @@
+#include "compensation/mixing.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "test/compensation/example_vehicle.hpp"
+
+namespace kphi::compensation {
+namespace {
+
+constexpr double kKappa = 0.0133;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Hubs of the default vehicle about its centre of gravity: .045 of .60 kg sit at each hub.
+RotorLayout layout_of(const std::array<Radians, 4>& arms) {
+  RotorLayout layout;
+  Metres x, y;
+  for (std::size_t i = 0; i < 4; ++i) {
+    layout.hubs[i] = hub_in_body(example_airframe(), i, arms[i]);
+    x = x + layout.hubs[i].x * (.045 / .60);
+    y = y + layout.hubs[i].y * (.045 / .60);
+  }
+  for (HubPosition& hub : layout.hubs) hub = {hub.x - x, hub.y - y};
+  return layout;
+}
+
+Mixer mixer_of(const std::array<Radians, 4>& arms, double per_square_newton = 0.0) {
+  return Mixer::build(layout_of(arms), {Metres(kKappa), per_square_newton}).value();
+}
+
+std::array<double, 4> drag_scale_in_o() {
+  Compensator compensator = example_compensator();
+  compensator.set_arms(shape_o());
+  return compensator.drag_scale();
+}
+
+Wrench wrench(double thrust, double roll, double pitch, double yaw) {
+  return {Newtons(thrust), NewtonMetres(roll), NewtonMetres(pitch), NewtonMetres(yaw)};
+}
+
+ThrustLimits limits(double smallest, double largest) {
+  return {thrusts_of(smallest, smallest, smallest, smallest), thrusts_of(largest, largest, largest, largest)};
+}
+
+Eigen::Vector4d vector(const Wrench& w) { return {w.thrust.value(), w.roll.value(), w.pitch.value(), w.yaw.value()}; }
+Eigen::Vector4d vector(const std::array<Newtons, 4>& f) {
+  return {f[0].value(), f[1].value(), f[2].value(), f[3].value()};
+}
+
+/// The allocation as the header states it, for constant κ.
+Eigen::Matrix4d allocation(const RotorLayout& layout, const std::array<double, 4>& drag_scale = {{1, 1, 1, 1}}) {
+  Eigen::Matrix4d a;
+  for (int i = 0; i < 4; ++i) {
+    const auto u = static_cast<std::size_t>(i);
+    a.col(i) << 1, layout.hubs[u].y.value(), -layout.hubs[u].x.value(), layout.spins[u] * kKappa * drag_scale[u];
+  }
+  return a;
+}
+
+void expect_four(const std::array<double, 4>& actual, const std::array<double, 4>& expected, double tolerance) {
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(actual[i], expected[i], tolerance) << "rotor " << i;
+}
+
+TEST(Mixer, InvertsTheAllocationInEveryShape) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> thrust(4, 8), torque(-0.05, 0.05), yaw(-0.005, 0.005);
+  for (const auto& shape : {shape_x(), shape_h(), shape_t(), shape_o()}) {
+    const Mixer mixer = mixer_of(shape);
+    const Eigen::Matrix4d inverse = allocation(layout_of(shape)).inverse();
+    for (int i = 0; i < 1000; ++i) {
+      const Wrench demand = wrench(thrust(random), torque(random), torque(random), yaw(random));
+      const MixedThrusts mixed = mixer.mix(demand, limits(0, 100));
+      const Eigen::Vector4d exact = inverse * vector(demand);
+      if (exact.minCoeff() < 0) continue;
+      EXPECT_FALSE(mixed.concessions.any());
+      EXPECT_LT((vector(mixed.thrusts) - exact).norm(), 1e-12);
+      EXPECT_LT((vector(mixed.achieved) - vector(demand)).norm(), 1e-12);
+    }
+  }
+}
+
+TEST(Mixer, KnowsThatEqualThrustsAreFreeOfTorqueOnlyInSymmetricShapes) {
+  expect_four(mixer_of(shape_x()).thrust_direction(), {.25, .25, .25, .25}, 1e-12);
+  expect_four(mixer_of(shape_h()).thrust_direction(), {.25, .25, .25, .25}, 1e-12);
+  expect_four(mixer_of(shape_t()).thrust_direction(), {.1511, .1511, .3489, .3489}, 5e-5);
+  expect_four(mixer_of(shape_o()).thrust_direction(), {.2618, .2246, .2382, .2754}, 5e-5);
+  Mixer occluded = mixer_of(shape_o());
+  ASSERT_TRUE(occluded.set_layout(layout_of(shape_o()), drag_scale_in_o()));
+  expect_four(occluded.thrust_direction(), {.2666, .2194, .2424, .2716}, 5e-5);
+}
+
+TEST(Mixer, CountsTheTorqueOfARotorByItsSpeedNotByItsNetThrust) {
+  Mixer mixer = mixer_of(shape_o());
+  ASSERT_TRUE(mixer.set_layout(layout_of(shape_o()), drag_scale_in_o()));
+  const Wrench made = mixer.wrench_of(thrusts_of(1, 2, 3, 4));
+  const Eigen::Vector4d exact = allocation(layout_of(shape_o()), drag_scale_in_o()) * Eigen::Vector4d(1, 2, 3, 4);
+  EXPECT_LT((vector(made) - exact).norm(), 1e-13);
+}
+
+TEST(Mixer, IteratesUntilTheTorquePerThrustBelongsToTheThrust) {
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<double> thrust(4, 10), torque(-0.02, 0.02), yaw(-0.02, 0.02);
+  const Mixer mixer = mixer_of(shape_x(), 0.1 * kKappa / 6), constant = mixer_of(shape_x());
+  double differs = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const Wrench demand = wrench(thrust(random), torque(random), torque(random), yaw(random));
+    const MixedThrusts mixed = mixer.mix(demand, limits(0, 100));
+    if (mixed.concessions.any()) continue;
+    EXPECT_NEAR(mixed.achieved.yaw.value(), demand.yaw.value(), 1e-12);
+    // κ(f) as the header states it.
+    double torque_made = 0;
+    for (std::size_t j = 0; j < 4; ++j) {
+      const double f = mixed.thrusts[j].value();
+      torque_made += (j % 2 == 0 ? 1 : -1) * f * (kKappa + 0.1 * kKappa / 6 * f);
+    }
+    EXPECT_NEAR(torque_made, demand.yaw.value(), 1e-12);
+    differs = std::max(
+        differs, std::fabs(vector(constant.mix(demand, limits(0, 100)).achieved)[3] - mixed.achieved.yaw.value()));
+    differs = std::max(differs, (vector(constant.mix(demand, limits(0, 100)).thrusts) - vector(mixed.thrusts)).norm());
+  }
+  EXPECT_GT(differs, 1e-3) << "κ(f) must matter at all";
+}
+
+TEST(Mixer, TakesYawDownFirst) {
+  const Mixer mixer = mixer_of(shape_x());
+  const Wrench demand = wrench(6, 0.01, -0.02, 0.06);  // rotors 0 and 2 up by more than a newton
+  const MixedThrusts mixed = mixer.mix(demand, limits(0, 2.2));
+  EXPECT_TRUE(mixed.concessions.has(Concession::yaw));
+  EXPECT_FALSE(mixed.concessions.has(Concession::thrust));
+  EXPECT_FALSE(mixed.concessions.has(Concession::roll_pitch));
+  EXPECT_NEAR(mixed.achieved.thrust.value(), 6, 1e-12);
+  EXPECT_NEAR(mixed.achieved.roll.value(), 0.01, 1e-12);
+  EXPECT_NEAR(mixed.achieved.pitch.value(), -0.02, 1e-12);
+  EXPECT_LT(mixed.achieved.yaw.value(), 0.06);
+  const Eigen::Vector4d f = vector(mixed.thrusts);
+  EXPECT_NEAR(f.maxCoeff(), 2.2, 1e-12) << "no further than needed";
+}
+
+TEST(Mixer, KeepsTheAssuredYawAndShiftsTheThrustForIt) {
+  const Mixer mixer = mixer_of(shape_x());
+  const Wrench demand = wrench(8, 0, 0, 0.04);
+  const MixedThrusts free = mixer.mix(demand, limits(0, 2.1)),
+                     assured = mixer.mix(demand, limits(0, 2.1), NewtonMetres(0.02));
+  EXPECT_NEAR(free.achieved.thrust.value(), 8, 1e-12);
+  EXPECT_LT(free.achieved.yaw.value(), 0.02);
+  EXPECT_NEAR(assured.achieved.yaw.value(), 0.02, 1e-12);
+  EXPECT_TRUE(assured.concessions.has(Concession::thrust));
+  EXPECT_LT(assured.achieved.thrust.value(), 8);
+}
+
+TEST(Mixer, LeavesAYawBelowTheAssuredAlone) {
+  const MixedThrusts mixed = mixer_of(shape_x()).mix(wrench(8, 0, 0, -0.02), limits(0, 2.1), NewtonMetres(0.03));
+  EXPECT_FALSE(mixed.concessions.has(Concession::yaw));
+  EXPECT_NEAR(mixed.achieved.yaw.value(), -0.02, 1e-12);
+}
+
+TEST(Mixer, NeverAnswersWithMoreYawThanDemandedNorOfTheOtherSign) {
+  // Roll asks most of rotor 1, whose spin opposes the yaw: bringing it down by yaw would enlarge the yaw.
+  const Mixer mixer = mixer_of(shape_x());
+  const MixedThrusts mixed = mixer.mix(wrench(7, 0.2, 0.2, 0.005), limits(0, 2.4));
+  EXPECT_NEAR(mixed.achieved.roll.value(), 0.2, 1e-12);
+  EXPECT_NEAR(mixed.achieved.pitch.value(), 0.2, 1e-12);
+  EXPECT_TRUE(mixed.concessions.has(Concession::thrust));
+  EXPECT_LE(mixed.achieved.yaw.value(), 0.005 + 1e-15);
+  EXPECT_GE(mixed.achieved.yaw.value(), -1e-15);
+}
+
+TEST(Mixer, ShiftsAlongTheTorqueFreeDirectionWhereTheShapeIsNotSymmetric) {
+  for (const auto& shape : {shape_t(), shape_o()}) {
+    const Mixer mixer = mixer_of(shape);
+    const MixedThrusts mixed = mixer.mix(wrench(12, 0.03, -0.03, 0), limits(0, 3));
+    EXPECT_TRUE(mixed.concessions.has(Concession::thrust));
+    EXPECT_LT(mixed.achieved.thrust.value(), 12);
+    EXPECT_NEAR(mixed.achieved.roll.value(), 0.03, 1e-12);
+    EXPECT_NEAR(mixed.achieved.pitch.value(), -0.03, 1e-12);
+    EXPECT_NEAR(mixed.achieved.yaw.value(), 0, 1e-12);
+  }
+}
+
+TEST(Mixer, RaisesTheThrustWhereRollNeedsARotorAboveItsLowerLimit) {
+  const MixedThrusts mixed = mixer_of(shape_x()).mix(wrench(1, 0.3, 0, 0), limits(0, 10));
+  EXPECT_GT(mixed.achieved.thrust.value(), 1);
+  EXPECT_NEAR(mixed.achieved.roll.value(), 0.3, 1e-12);
+  EXPECT_NEAR(vector(mixed.thrusts).minCoeff(), 0, 1e-12);
+}
+
+TEST(Mixer, HoldsEachRotorsOwnLimit) {
+  Compensator compensator = example_compensator();
+  compensator.set_arms(shape_o());
+  Mixer mixer = mixer_of(shape_o());
+  ASSERT_TRUE(mixer.set_layout(layout_of(shape_o()), compensator.drag_scale()));
+  const ThrustLimits held{{}, compensator.thrust_max()};
+  const MixedThrusts mixed = mixer.mix(wrench(21.9, 0, 0, 0), held);
+  EXPECT_TRUE(mixed.concessions.has(Concession::thrust));
+  int at_limit = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_LE(mixed.thrusts[i], held.largest[i]);
+    at_limit += held.largest[i] - mixed.thrusts[i] < Newtons(1e-9);
+  }
+  EXPECT_EQ(at_limit, 1);
+  const SpeedCommand command = compensator.speeds_for(mixed.thrusts);
+  for (const RadPerSec speed : command.speeds) EXPECT_LE(speed, example_airframe().fastest_speed);
+  EXPECT_NEAR(mixed.achieved.roll.value(), 0, 1e-12);
+  EXPECT_NEAR(mixed.achieved.pitch.value(), 0, 1e-12);
+}
+
+TEST(Mixer, CutsAtTheLimitsWhereRollCannotBeMetAtAll) {
+  const MixedThrusts mixed = mixer_of(shape_x()).mix(wrench(6, 5, 0, 0), limits(0.1, 3));
+  EXPECT_TRUE(mixed.concessions.has(Concession::roll_pitch));
+  for (const Newtons f : mixed.thrusts) {
+    EXPECT_GE(f, Newtons(0.1));
+    EXPECT_LE(f, Newtons(3));
+  }
+  EXPECT_NEAR(mixed.achieved.roll.value(), 2 * 0.128 * 2 * 2.9 / 2, 2e-3) << "all that two rotors on each side can do";
+}
+
+/// Whether some yaw between `low` and `high` keeps all rotors within limits at this collective thrust.
+bool feasible(const Eigen::Matrix4d& inverse, const Wrench& demand, double thrust, double low, double high,
+              const ThrustLimits& held, double margin) {
+  const Eigen::Vector4d base = inverse * Eigen::Vector4d(thrust, demand.roll.value(), demand.pitch.value(), 0);
+  const Eigen::Vector4d per_yaw = inverse.col(3);
+  for (int i = 0; i < 4; ++i) {
+    const auto u = static_cast<std::size_t>(i);
+    double a = (held.smallest[u].value() - margin - base[i]) / per_yaw[i];
+    double b = (held.largest[u].value() + margin - base[i]) / per_yaw[i];
+    if (a > b) std::swap(a, b);
+    low = std::max(low, a);
+    high = std::min(high, b);
+  }
+  return low <= high;
+}
+
+TEST(Mixer, GivesUpNoMoreThrustThanYawsFreedomLeavesNecessaryAndNoMoreYawThanThat) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> theta(-90, 180), thrust(1, 20), torque(-0.25, 0.25), yaw(-0.1, 0.1), top(2, 6),
+      floor(0, 0.3), assured(0, 0.03), scale(1, 1.5), share(0, 1);
+  int yawed = 0, shifted = 0, lost = 0, unsaturated = 0;
+  for (int i = 0; i < 30000; ++i) {
+    const RotorLayout layout = layout_of(arms_at(theta(random), theta(random), theta(random), theta(random)));
+    auto mixer = Mixer::build(layout, {Metres(kKappa), 0.0});
+    const std::array<double, 4> scales = {scale(random), scale(random), scale(random), scale(random)};
+    if (!mixer || !mixer->set_layout(layout, scales)) continue;
+    const Eigen::Matrix4d a = allocation(layout, scales);
+    const Eigen::Matrix4d inverse = a.inverse();
+    if (inverse.norm() > 1e4) continue;
+    const Wrench demand = wrench(thrust(random), torque(random), torque(random), yaw(random));
+    const ThrustLimits held{thrusts_of(floor(random), floor(random), floor(random), floor(random)),
+                            thrusts_of(top(random), top(random), top(random), top(random))};
+    const double kept = std::min(assured(random), std::fabs(demand.yaw.value()));
+    const MixedThrusts mixed = mixer->mix(demand, held, NewtonMetres(kept));
+    const double sign = demand.yaw.value() < 0 ? -1 : 1;
+    const double from = std::min(sign * kept, demand.yaw.value()), to = std::max(sign * kept, demand.yaw.value());
+    for (std::size_t j = 0; j < 4; ++j) {
+      ASSERT_GE(mixed.thrusts[j], held.smallest[j]);
+      ASSERT_LE(mixed.thrusts[j], held.largest[j]);
+    }
+    const double asked = demand.thrust.value(), given = mixed.achieved.thrust.value();
+    if (mixed.concessions.has(Concession::roll_pitch)) {
+      ++lost;
+      for (double any = 0; any < 24; any += 0.05) {
+        ASSERT_FALSE(feasible(inverse, demand, any, from, to, held, -1e-6)) << "vehicle " << i << " at " << any << " N";
+      }
+      continue;
+    }
+    ASSERT_NEAR(mixed.achieved.roll.value(), demand.roll.value(), 1e-8);
+    ASSERT_NEAR(mixed.achieved.pitch.value(), demand.pitch.value(), 1e-8);
+    ASSERT_GE(mixed.achieved.yaw.value(), from - 1e-8);
+    ASSERT_LE(mixed.achieved.yaw.value(), to + 1e-8);
+    ASSERT_TRUE(feasible(inverse, demand, given, from, to, held, 1e-7));
+    if (mixed.concessions.has(Concession::thrust)) {
+      ++shifted;
+      const double nearer = asked + (given - asked) * share(random) * 0.999;
+      ASSERT_FALSE(feasible(inverse, demand, nearer, from, to, held, -1e-7)) << "vehicle " << i;
+    } else {
+      ASSERT_NEAR(given, asked, 1e-9);
+    }
+    const double turned = mixed.achieved.yaw.value() - demand.yaw.value();
+    if (mixed.concessions.has(Concession::yaw) && std::fabs(turned) > 1e-6) {
+      ++yawed;
+      const double nearer = demand.yaw.value() + turned * share(random) * 0.999;
+      ASSERT_FALSE(feasible(inverse, demand, given, nearer, nearer, held, -1e-9)) << "vehicle " << i;
+    }
+    unsaturated += !mixed.concessions.any();
+  }
+  EXPECT_GT(yawed, 500);
+  EXPECT_GT(shifted, 500);
+  EXPECT_GT(lost, 500);
+  EXPECT_GT(unsaturated, 500);
+}
+
+TEST(Mixer, LetsNoNaNOutWhateverGoesIn) {
+  std::mt19937_64 random(5);
+  const double odd[] = {kNaN, kInfinity, -kInfinity, 1e308, -1e308, 5e-324, 0.0, 0.05, 6.0, -1.0};
+  std::uniform_int_distribution<std::size_t> pick(0, std::size(odd) - 1);
+  const auto any = [&] { return odd[pick(random)]; };
+  for (int i = 0; i < 100000; ++i) {
+    Mixer mixer = mixer_of(shape_o(), 1e-3);
+    RotorLayout layout = layout_of(shape_t());
+    layout.hubs[i % 4] = {Metres(any()), Metres(any())};
+    (void)mixer.set_layout(layout, {any(), 1, any(), 1.2});
+    const ThrustLimits held{thrusts_of(any(), any(), 0, any()), thrusts_of(any(), any(), 5, any())};
+    const MixedThrusts mixed = mixer.mix(wrench(any(), any(), any(), any()), held, NewtonMetres(any()));
+    for (const Newtons f : mixed.thrusts) {
+      ASSERT_GE(f.value(), 0.0);
+      ASSERT_LE(f.value(), 1e9);
+    }
+    ASSERT_TRUE(vector(mixed.achieved).allFinite());
+  }
+}
+
+TEST(Mixer, SaysThatADemandOrALimitWasNaN) {
+  const Mixer mixer = mixer_of(shape_x());
+  EXPECT_TRUE(mixer.mix(wrench(6, kNaN, 0, 0), limits(0, 6)).concessions.has(Concession::demand_nan));
+  EXPECT_TRUE(mixer.mix(wrench(6, 0, 0, 0), limits(0, kNaN)).concessions.has(Concession::demand_nan));
+  EXPECT_TRUE(mixer.mix(wrench(6, 0, 0, 0), limits(3, 2)).concessions.has(Concession::demand_nan));
+  EXPECT_FALSE(mixer.mix(wrench(6, 0, 0, 0), limits(0, kInfinity)).concessions.any());
+}
+
+TEST(Mixer, KeepsTheLayoutBeforeWhereTheNewOneCannotBeFlown) {
+  Mixer mixer = mixer_of(shape_x());
+  const auto before = mixer.thrust_direction();
+  const RotorLayout good = layout_of(shape_t());
+  RotorLayout bad = good;
+  bad.hubs[2].x = Metres(kNaN);
+  EXPECT_FALSE(mixer.set_layout(bad));
+  bad = good;
+  bad.spins[1] = 0;
+  EXPECT_FALSE(mixer.set_layout(bad));
+  for (const double scale : {0.0, -1.0, kNaN, kInfinity}) EXPECT_FALSE(mixer.set_layout(good, {1, 1, scale, 1}));
+  for (std::size_t i = 0; i < 4; ++i) bad.hubs[i] = {Metres(0.1 * static_cast<double>(i)), Metres(0.02)};
+  bad.spins = good.spins;
+  EXPECT_FALSE(mixer.set_layout(bad)) << "hubs on one line cannot roll";
+  bad = layout_of(shape_x());
+  bad.spins = {1, 1, -1, -1};
+  EXPECT_FALSE(mixer.set_layout(bad)) << "differences that roll and pitch leave free give no yaw";
+  EXPECT_EQ(mixer.thrust_direction(), before);
+  EXPECT_TRUE(mixer.set_layout(good));
+  EXPECT_FALSE(Mixer::build(layout_of(shape_x()), {Metres(0.0), 0.0}));
+  EXPECT_FALSE(Mixer::build(layout_of(shape_x()), {Metres(kKappa), kNaN}));
+}
+
+TEST(Mixer, PromisesNotToThrow) {
+  static_assert(noexcept(std::declval<const Mixer&>().mix(Wrench{}, ThrustLimits{})));
+  static_assert(noexcept(std::declval<Mixer&>().set_layout(RotorLayout{})));
+  static_assert(std::is_trivially_copyable_v<Mixer>);
+}
+
+}  // namespace
+}  // namespace kphi::compensation

@@ -1,0 +1,168 @@
+// What holds for every vehicle, line, arm angle and thrust: a million of each from fixed seeds.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <random>
+
+#include "test/compensation/example_vehicle.hpp"
+
+namespace kphi::compensation {
+namespace {
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr int kDraws = 50000;
+#else
+constexpr int kDraws = 1000000;
+#endif
+
+class Draw {
+ public:
+  explicit Draw(std::uint64_t seed) : random_(seed) {}
+  double between(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
+
+  Airframe airframe() {
+    Airframe airframe = example_airframe();
+    airframe.half_side = Metres(between(0.01, 0.15));
+    airframe.propeller_radius = Metres(between(0.03, 0.12));
+    airframe.arm_length = airframe.propeller_radius * between(1.001, 2.5);
+    return airframe;
+  }
+  /// Falls with occlusion; the intercept on either side of K_T.
+  ThrustLine line() { return example_line(between(0.8, 1.2), -between(0.0, 0.01)); }
+  std::array<Radians, 4> arms() {
+    return {Radians(between(-kPi / 2, kPi)), Radians(between(-kPi / 2, kPi)), Radians(between(-kPi / 2, kPi)),
+            Radians(between(-kPi / 2, kPi))};
+  }
+  std::array<Newtons, 4> thrusts(double largest) {
+    return thrusts_of(between(0, largest), between(0, largest), between(0, largest), between(0, largest));
+  }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+bool same_bits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+
+TEST(Properties, PhiLiesBetweenNothingAndAWholeTurnInEveryMeasure) {
+  Draw draw(101);
+  int touching = 0;
+  for (int i = 0; i < kDraws; ++i) {
+    const double a = draw.between(0.001, 0.2), r = draw.between(0.01, 0.2);
+    const Metres x(draw.between(-0.4, 0.4)), y(draw.between(-0.4, 0.4));
+    const double arc = rim_arc(Metres(a), Metres(r), x, y).value();
+    ASSERT_GE(arc, 0.0);
+    ASSERT_LE(arc, 2 * kPi);
+    touching += arc > 0;
+    if (i % 8 != 0) continue;
+    for (const OverlapMeasure measure : {OverlapMeasure::area_share, OverlapMeasure::load_share}) {
+      const double phi = occlusion_angle(ConvexPolygon::square(Metres(a)), Metres(r), {x, y}, measure).value();
+      ASSERT_GE(phi, 0.0);
+      ASSERT_LE(phi, 2 * kPi);
+      ASSERT_TRUE(arc == 0.0 || phi > 0.0) << "a rim over the body means area over the body";
+    }
+  }
+  EXPECT_GT(touching, kDraws / 10);
+}
+
+TEST(Properties, PhiIsContinuousInTheArmAngle) {
+  Draw draw(102);
+  constexpr double kStep = 1e-9;
+  for (int i = 0; i < kDraws; ++i) {
+    const Airframe airframe = draw.airframe();
+    const double theta = draw.between(-kPi / 2, kPi), r = airframe.propeller_radius.value();
+    const auto arc = [&](double angle) {
+      const HubPosition hub = hub_seen_from_hinge(airframe, Radians(angle));
+      return rim_arc(airframe.half_side, airframe.propeller_radius, hub.x, hub.y).value();
+    };
+    // A strip as wide as the hub moves holds at most so much rim, on each of four edges: the root at tangency.
+    const double moved = airframe.arm_length.value() * kStep + 1e-16;
+    ASSERT_NEAR(arc(theta), arc(theta + kStep), 8 * std::sqrt(2 * moved / r) + 1e-12);
+    if (i % 8 == 0) {
+      const auto share = [&](double angle) {
+        return occlusion_angle(ConvexPolygon::square(airframe.half_side), airframe.propeller_radius,
+                               hub_seen_from_hinge(airframe, Radians(angle)), OverlapMeasure::area_share)
+            .value();
+      };
+      ASSERT_NEAR(share(theta), share(theta + kStep), 8 * moved / r + 1e-12);
+    }
+  }
+}
+
+TEST(Properties, EveryArmSeesTheSamePhiAtTheSameAngle) {
+  Draw draw(103);
+  for (int i = 0; i < kDraws / 4; ++i) {
+    Airframe airframe = draw.airframe();
+    airframe.mirrored = {i % 2 == 0, i % 3 == 0, i % 5 == 0, i % 7 == 0};
+    const ThrustLine line = paper_line();
+    Compensator compensator = *Compensator::build({line, line, line, line}, airframe).compensator;
+    const Radians theta(draw.between(-kPi / 2, kPi));
+    compensator.set_arms({theta, theta, theta, theta});
+    for (std::size_t arm = 0; arm < 4; ++arm) {
+      ASSERT_EQ(compensator.occlusion_angles()[arm], compensator.occlusion_angles()[0]);
+      // The same by way of the body's own frame, turned by quarters and mirrored.
+      const HubPosition hub = hub_in_body(airframe, arm, theta);
+      const double in_body = rim_arc(airframe.half_side, airframe.propeller_radius, hub.x, hub.y).value();
+      ASSERT_NEAR(in_body, compensator.occlusion_angles()[arm].value(), 1e-7);
+    }
+  }
+}
+
+TEST(Properties, TheScalingFactorLiesBetweenItsFloorAndOne) {
+  Draw draw(104);
+  for (int i = 0; i < kDraws; ++i) {
+    const double k = example_line(draw.between(0.01, 3), draw.between(-0.1, 0.1))
+                         .scaling_factor(Radians(draw.between(-0.1, 2 * kPi)));
+    ASSERT_GE(k, kScalingFloor);
+    ASSERT_LE(k, 1.0);
+  }
+}
+
+TEST(Properties, TheSpeedGrowsWithThrustAndWithOverlapAndReturnsTheThrust) {
+  Draw draw(105);
+  int occluded = 0;
+  for (int i = 0; i < kDraws / 4; ++i) {  // four rotors each
+    const ThrustLine line = draw.line();
+    const auto built = Compensator::build({line, line, line, line}, draw.airframe());
+    Compensator compensator = *built.compensator;
+    compensator.set_arms(draw.arms());
+    const auto thrusts = draw.thrusts(0.6);  // within reach even at the floor
+    auto more = thrusts;
+    for (Newtons& thrust : more) thrust = thrust + Newtons(draw.between(0, 0.01));
+    const auto speeds = compensator.speeds_for(thrusts).speeds, faster = compensator.speeds_for(more).speeds;
+    for (std::size_t j = 0; j < 4; ++j) {
+      ASSERT_GE(faster[j], speeds[j]);
+      const ThrustCoefficient k = kExampleCoefficient * compensator.scaling_factors()[j];
+      ASSERT_NEAR(thrust_at(k, speeds[j]).value(), thrusts[j].value(), 1e-12 * thrusts[j].value());
+      occluded += compensator.occlusion_angles()[j].value() > 0;
+    }
+    const auto same = compensator.speeds_for(thrusts_of(0.5, 0.5, 0.5, 0.5)).speeds;
+    const auto& phi = compensator.occlusion_angles();
+    for (std::size_t j = 1; j < 4; ++j) {
+      const std::size_t wider = phi[j] >= phi[j - 1] ? j : j - 1, narrower = 2 * j - 1 - wider;
+      ASSERT_GE(same[wider], same[narrower]);
+    }
+  }
+  EXPECT_GT(occluded, kDraws / 20);
+}
+
+TEST(Properties, XAndHAndTAndOffAreThePlainMapBitForBit) {
+  Draw draw(106);
+  const std::array<std::array<Radians, 4>, 4> shapes = {shape_x(), shape_h(), shape_t(), shape_o()};
+  for (int i = 0; i < kDraws / 4; ++i) {
+    const ThrustLine line = draw.line();
+    const auto law = i % 2 == 0 ? ScalingLaw::clamped : ScalingLaw::published;
+    Compensator compensator = *Compensator::build({line, line, line, line}, example_airframe(), law).compensator;
+    const std::size_t shape = static_cast<std::size_t>(i) % 4;
+    compensator.enable(shape != 3);  // O: off
+    compensator.set_arms(shapes[shape]);
+    const auto thrusts = draw.thrusts(6);
+    const auto speeds = compensator.speeds_for(thrusts).speeds;
+    for (std::size_t j = 0; j < 4; ++j) {
+      ASSERT_TRUE(same_bits(speeds[j].value(), std::sqrt(thrusts[j].value() / kExampleCoefficient.value())));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace kphi::compensation
