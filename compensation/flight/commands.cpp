@@ -62,7 +62,8 @@ Vehicle vehicle_of(const std::string& path) {
 
 Scene nominal_of(const Request& request) {
   const auto line = compensation::thrust_line(compensation::load_coefficients(request.coefficients));
-  const Vehicle vehicle = vehicle_of(request.vehicle);
+  Vehicle vehicle = vehicle_of(request.vehicle);
+  vehicle.airframe.overlap = line.overlap();
   const auto built = compensation::Compensator::build({line, line, line, line}, vehicle.airframe);
   if (!built.compensator) throw ConfigurationError(request.vehicle + ": " + describe(built.refusal));
   const double hover = kGravity * vehicle.build.mass_kg / 4;
@@ -113,7 +114,7 @@ Flown fly_requested(const Request& request) {
   if (!request.out.empty()) fs::create_directories(request.out);
   for (std::size_t i = 0; i < kExperiments.size(); ++i) {
     if (!request.experiment.empty() && request.experiment != kExperiments[i].name) continue;
-    flown.flights[i] = fly(kExperiments[i], flown.nominal, shadow, request.out.empty() ? nullptr : &traces[i]);
+    flown.flights[i] = fly_one(i, flown.nominal, shadow, request.out.empty() ? nullptr : &traces[i]);
   }
   flown.draws =
       fly_draws(flown.nominal.vehicle, flown.nominal.line, shadow, request.seed, request.draws, threads_of(request));

@@ -9,8 +9,9 @@
 
 namespace kphi::flight {
 
-/// The lab's position gains; kpz and kdz are the ones that satisfy Table II. Attitude at half the lab's default
-/// stiffness (krp 12, rate 18), which puts the x and y of hovering in O near the paper's; nothing else was tuned.
+/// kpz and kdz are the only ones that satisfy Table II. The foldable drone's others are not public: these are of the
+/// lab's order, with the attitude at half the stiffness of the lab's default (krp 12, rate 18), because roll and pitch
+/// have a third of the inertia in O. Height errors do not depend on them; x and y do, so draws spread them.
 struct Gains {
   Eigen::Vector3d position{6, 6, 15};                  ///< 1/s²
   Eigen::Vector3d velocity{4, 4, 6};                   ///< 1/s

@@ -12,7 +12,8 @@ namespace {
 using compensation::ThrustLine;
 
 ThrustLine line_with(const ThrustLine& line, ThrustCoefficient intercept, double slope_per_rad) {
-  const auto made = ThrustLine::from(line.thrust_coefficient(), intercept, slope_per_rad, line.largest_fitted());
+  const auto made = ThrustLine::from(line.thrust_coefficient(), intercept, slope_per_rad, line.largest_fitted(),
+                                     line.overlap(), line.uncertainty());
   if (!made) throw std::invalid_argument("the line k(φ) has no positive intercept left; check the coefficient file");
   return *made;
 }

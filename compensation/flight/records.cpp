@@ -58,7 +58,7 @@ std::string leg_marks(const Experiment& experiment) {
     const std::string at = shortest(begins);
     if (i > 0) marks += "set arrow from " + at + ", graph 0 to " + at + ", graph 1 nohead lc rgb '#999999' dt 2\n";
     marks +=
-        "set label '" + leg_name(experiment.legs[i]) + "' at " + at + ", graph 0.93 offset 0.7,0 tc rgb '#555555'\n";
+        "set label '" + leg_name(experiment.legs[i]) + "' at " + at + ", graph 1.07 offset 0.7,0 tc rgb '#555555'\n";
   }
   return marks;
 }
@@ -133,19 +133,18 @@ std::string draws_figure(const std::vector<Draw>& draws) {
     hover += shortest(merits.hover_z_plain) + " " + shortest(std::fabs(merits.hover_z_compensated)) + "\n";
     forward += shortest(merits.forward_plain) + " " + shortest(merits.forward_compensated) + "\n";
   }
-  const std::string axes = "set xlabel 'without compensation [m]'\nset ylabel 'with compensation [m]'\n";
-  return terminal(900, 470) + kFigureHead + "$hover << EOD\n" + hover + "EOD\n$forward << EOD\n" + forward +
+  const auto plot = [](const std::string& title, const std::string& block, const std::string& colour) {
+    return "set title '" + title + "'\nplot [0:*] [0:*] x lc rgb '#bbbbbb' title 'no difference', $" + block +
+           " with points pt 7 ps 0.35 lc rgb '" + colour + "' title 'draws', $paper_" + block +
+           " with points pt 2 ps 1.2 lc rgb '#D55E00' title 'paper'\n";
+  };
+  return terminal(900, 520) + kFigureHead + "$hover << EOD\n" + hover + "EOD\n$forward << EOD\n" + forward +
          "EOD\n$paper_hover << EOD\n0.17 0.043\n0.1594 0.0106\nEOD\n"
          "$paper_forward << EOD\n0.2339 0.1210\n0.2134 0.1318\nEOD\n"
-         "set multiplot layout 1,2\nset key top left samplen 1\n" +
-         axes +
-         "plot [0:*] [0:*] x lc rgb '#bbbbbb' title 'no difference', $hover with points pt 7 ps 0.35 lc rgb '#0072B2' "
-         "title '|z| of hover in O', $paper_hover with points pt 2 ps 1.2 lc rgb '#D55E00' title 'paper'\n"
-         "plot [0:*] [0:*] x lc rgb '#bbbbbb' title 'no difference', $forward with points pt 7 ps 0.35 lc rgb "
-         "'#009E73' "
-         "title 'distance in forward flight in O', $paper_forward with points pt 2 ps 1.2 lc rgb '#D55E00' title "
-         "'paper'\n"
-         "unset multiplot\n";
+         "set multiplot layout 1,2\nset key outside bottom center horizontal samplen 1\n"
+         "set xlabel 'without compensation [m]'\nset ylabel 'with compensation [m]'\n" +
+         plot("height error of hover in O", "hover", "#0072B2") +
+         plot("distance in forward flight in O", "forward", "#009E73") + "unset multiplot\n";
 }
 
 }  // namespace kphi::flight

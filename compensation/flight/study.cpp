@@ -20,9 +20,14 @@ void count_lost(Merits& merits, const Experiment& experiment, const FlightResult
 
 }  // namespace
 
+FlightResult fly_one(std::size_t index, Scene scene, const Shadow& shadow, std::vector<TraceRow>* trace) {
+  scene.seed = Random(scene.seed, index).bits();
+  return fly(kExperiments[index], scene, shadow, trace);
+}
+
 NineFlights fly_all(const Scene& scene, const Shadow& shadow) {
   NineFlights flights;
-  for (std::size_t i = 0; i < kExperiments.size(); ++i) flights[i] = fly(kExperiments[i], scene, shadow);
+  for (std::size_t i = 0; i < kExperiments.size(); ++i) flights[i] = fly_one(i, scene, shadow);
   return flights;
 }
 

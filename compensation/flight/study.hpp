@@ -12,6 +12,9 @@ namespace kphi::flight {
 
 using NineFlights = std::array<FlightResult, kExperiments.size()>;
 
+/// Experiment `index` with a noise of its own: of the stream `index` of the scene's seed.
+[[nodiscard]] FlightResult fly_one(std::size_t index, Scene scene, const Shadow& shadow,
+                                   std::vector<TraceRow>* trace = nullptr);
 [[nodiscard]] NineFlights fly_all(const Scene& scene, const Shadow& shadow);
 
 /// The numbers that one set of nine flights is judged by. Errors in m. Valid unless a flight was lost.

@@ -14,7 +14,7 @@ NineFlights one_hover() {
   FlightResult& flight = flights[kHoverPlain];
   flight.leg_count = 3;
   flight.legs[1].mean_error = {0.0726, -0.0762, 0.1535};
-  flight.legs[1].mean_error_rate = {0, 0, 0.001};
+  flight.legs[1].mean_error_rate = {0, 0, 0.0036};
   flight.legs[2].mean_error = {0, 0, -0.01};
   return flights;
 }
@@ -37,8 +37,8 @@ TEST(HoverTable, SaysLostInsteadOfANumber) {
 
 TEST(HeightTable, ShowsTheIdentityForOursAndThePapers) {
   const std::string table = height_table(one_hover(), Gains());
-  EXPECT_THAT(table, HasSubstr("0.1535  0.0010"));
-  EXPECT_THAT(table, HasSubstr("2.309")) << "15 * 0.1535 + 6 * 0.001";
+  EXPECT_THAT(table, HasSubstr("0.1535  0.0036"));
+  EXPECT_THAT(table, HasSubstr("  2.324 ")) << "15 * 0.1535 + 6 * 0.0036";
   EXPECT_THAT(table, HasSubstr("-0.5005")) << "the paper's, from its own e and e'";
 }
 

@@ -20,7 +20,7 @@ TEST(MassProperties, OfTheFourShapesAreThoseComputedByHand) {
   for (const Known& known : std::vector<Known>{
            {"X", compensation::shape_x(), {0, 0}, {3.276, 3.276, 6.441}},
            {"H", compensation::shape_h(), {0, 0}, {0.704, 5.063, 5.655}},
-           {"T", compensation::shape_t(), {0, 17.55}, {2.570, 2.884, 5.341}},
+           {"T", compensation::shape_t(), {0, 17.55}, {2.699, 2.884, 5.471}},
            {"O", compensation::arms_at(180, 180, 165.676, 180), {-0.27, -2.17}, {1.138, 0.965, 1.992}},
        }) {
     const MassProperties found = mass_properties(example_vehicle(), known.arms, {});
