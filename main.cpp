@@ -39,7 +39,9 @@ constexpr const char* kFooter =
     "Data goes to stdout, words to stderr. NO_COLOR is honoured.\n\n"
     "Without hardware:  kphi sim profiles/bench_simulated.yaml &\n"
     "                   kphi run profiles/icra2021_5in_3blade.yaml --bench profiles/bench_simulated.yaml --yes\n"
-    "                   kphi fit results/<the folder it named>";
+    "                   kphi fit results/<the folder it named>\n"
+    "                   kphi fly --coefficients results/<the folder>/coefficients.yaml \\\n"
+    "                            --vehicle profiles/foldable_drone.yaml";
 
 int complain(const std::exception& error, int exit_code) {
   fmt::print(stderr, "kphi: {}\n", error.what());

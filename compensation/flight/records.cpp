@@ -58,7 +58,7 @@ std::string leg_marks(const Experiment& experiment) {
     const std::string at = shortest(begins);
     if (i > 0) marks += "set arrow from " + at + ", graph 0 to " + at + ", graph 1 nohead lc rgb '#999999' dt 2\n";
     marks +=
-        "set label '" + leg_name(experiment.legs[i]) + "' at " + at + ", graph 1.07 offset 0.7,0 tc rgb '#555555'\n";
+        "set label '" + leg_name(experiment.legs[i]) + "' at " + at + ", graph 0.91 offset 0.7,0 tc rgb '#555555'\n";
   }
   return marks;
 }
@@ -105,6 +105,7 @@ std::string draws_csv(const std::vector<Draw>& draws) {
 }
 
 std::string error_figure(const Experiment& experiment, const std::vector<TraceRow>& trace) {
+  const double total = static_cast<double>(experiment.leg_count) * leg_seconds(experiment.path);
   std::string script = terminal(800, 560) + kFigureHead + "$error << EOD\n";
   for (std::size_t i = 0; i < trace.size(); i += kFigureStride) {
     const Eigen::Vector3d error = trace[i].reference - trace[i].estimate;
@@ -112,8 +113,9 @@ std::string error_figure(const Experiment& experiment, const std::vector<TraceRo
     for (const double axis : error) script += " " + aligned(axis, 5, 0);
     script += "\n";
   }
-  script += "EOD\n" + leg_marks(experiment) + "unset key\nset lmargin 9\nset multiplot layout 3,1 title '" +
-            std::string(experiment.title) + "'\n";
+  script += "EOD\n" + leg_marks(experiment) +
+            "unset key\nset lmargin 9\nset offsets 0, 0, graph 0.2, 0\nset xrange [0:" + shortest(total) +
+            "]\nset multiplot layout 3,1 title '" + std::string(experiment.title) + "'\n";
   const char* colours[] = {"#0072B2", "#009E73", "#D55E00"};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::string name(1, static_cast<char>('x' + axis));
@@ -141,7 +143,7 @@ std::string draws_figure(const std::vector<Draw>& draws) {
   return terminal(900, 520) + kFigureHead + "$hover << EOD\n" + hover + "EOD\n$forward << EOD\n" + forward +
          "EOD\n$paper_hover << EOD\n0.17 0.043\n0.1594 0.0106\nEOD\n"
          "$paper_forward << EOD\n0.2339 0.1210\n0.2134 0.1318\nEOD\n"
-         "set multiplot layout 1,2\nset key outside bottom center horizontal samplen 1\n"
+         "set multiplot layout 1,2\nset key outside bottom center horizontal samplen 1\nset bmargin 6.5\n"
          "set xlabel 'without compensation [m]'\nset ylabel 'with compensation [m]'\n" +
          plot("height error of hover in O", "hover", "#0072B2") +
          plot("distance in forward flight in O", "forward", "#009E73") + "unset multiplot\n";
