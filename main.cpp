@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "compensation/commands.hpp"
+#include "compensation/flight/commands.hpp"
 #include "daq/commands.hpp"
 #include "daq/devices_commands.hpp"
 #include "daq/interlock.hpp"
@@ -38,7 +39,9 @@ constexpr const char* kFooter =
     "Data goes to stdout, words to stderr. NO_COLOR is honoured.\n\n"
     "Without hardware:  kphi sim profiles/bench_simulated.yaml &\n"
     "                   kphi run profiles/icra2021_5in_3blade.yaml --bench profiles/bench_simulated.yaml --yes\n"
-    "                   kphi fit results/<the folder it named>";
+    "                   kphi fit results/<the folder it named>\n"
+    "                   kphi fly --coefficients results/<the folder>/coefficients.yaml \\\n"
+    "                            --vehicle profiles/foldable_drone.yaml";
 
 int complain(const std::exception& error, int exit_code) {
   fmt::print(stderr, "kphi: {}\n", error.what());
@@ -89,6 +92,7 @@ int main(int argc, char** argv) {
   kphi::fit::add_fit(program, exit_code);
   kphi::fit::add_report(program, exit_code);
   kphi::compensation::add_compensate(program, exit_code);
+  kphi::flight::add_fly(program, exit_code);
 
   try {
     program.parse(argc, argv);

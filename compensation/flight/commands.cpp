@@ -1,0 +1,239 @@
+#include "compensation/flight/commands.hpp"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+
+#include "compensation/commands.hpp"
+#include "compensation/compensator.hpp"
+#include "compensation/file/coefficient_file.hpp"
+#include "compensation/flight/paper.hpp"
+#include "compensation/flight/records.hpp"
+#include "compensation/flight/tables.hpp"
+#include "fit/gnuplot.hpp"
+#include "profiles/configuration_error.hpp"
+#include "profiles/vehicle.hpp"
+#include "results/file_layer.hpp"
+
+namespace kphi::flight {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+struct Request {
+  std::string coefficients;
+  std::string vehicle;
+  std::string experiment;
+  std::size_t draws = 0;
+  std::uint64_t seed = 1;
+  std::size_t threads = 0;
+  std::string out;
+  bool json = false;
+};
+
+/// What one call flew.
+struct Flown {
+  Scene nominal;
+  NineFlights flights;
+  std::vector<Draw> draws;
+};
+
+Vehicle vehicle_of(const std::string& path) {
+  const profiles::Vehicle file = profiles::load_vehicle(path);
+  Vehicle vehicle;
+  vehicle.airframe = profiles::airframe_of(file);
+  for (const auto& [name, angles] : {std::pair{"X", &vehicle.x}, std::pair{"O", &vehicle.o}}) {
+    const auto shape = file.shapes.find(name);
+    if (shape == file.shapes.end()) {
+      throw ConfigurationError(path + ": the experiments need the shape " + name + "; give its angles in shapes_deg");
+    }
+    *angles = shape->second;
+  }
+  return vehicle;
+}
+
+Scene nominal_of(const Request& request) {
+  const auto line = compensation::thrust_line(compensation::load_coefficients(request.coefficients));
+  const Vehicle vehicle = vehicle_of(request.vehicle);
+  const auto built = compensation::Compensator::build({line, line, line, line}, vehicle.airframe);
+  if (!built.compensator) throw ConfigurationError(request.vehicle + ": " + describe(built.refusal));
+  const double hover = kGravity * vehicle.build.mass_kg / 4;
+  if (built.compensator->thrust_max()[0].value() < 1.5 * hover) {
+    throw ConfigurationError(
+        fmt::format("{}: a rotor gives {:.2f} N at its fastest, and hovering with {} kg takes {:.2f} N; check K_T and "
+                    "speed_max_rpm",
+                    request.coefficients, built.compensator->thrust_max()[0].value(), vehicle.build.mass_kg, hover));
+  }
+  return nominal_scene(vehicle, line, request.seed);
+}
+
+std::size_t threads_of(const Request& request) {
+  return request.threads > 0 ? request.threads : std::max(1u, std::thread::hardware_concurrency());
+}
+
+void write(const fs::path& path, const std::string& text) {
+  results::MemoryOnlySync files;  // flown again at any time from the same files and seed
+  results::write_text(path, text, files);
+}
+
+/// Why it could not be drawn, or nothing.
+std::string write_figure(const fs::path& folder, const std::string& name, const std::string& script) {
+  write(folder / (name + ".gp"), script);
+  return fit::draw(folder / (name + ".gp"), folder / (name + ".svg")).reason;
+}
+
+void write_out(const Request& request, const Flown& flown, const std::array<std::vector<TraceRow>, 9>& traces) {
+  const fs::path folder(request.out);
+  std::string skipped;
+  for (std::size_t i = 0; i < traces.size(); ++i) {
+    if (traces[i].empty()) continue;
+    const std::string name(kExperiments[i].name);
+    write(folder / (name + ".csv"), trace_csv(traces[i]));
+    skipped = write_figure(folder, name, error_figure(kExperiments[i], traces[i]));
+  }
+  if (!flown.draws.empty()) {
+    write(folder / "draws.csv", draws_csv(flown.draws));
+    skipped = write_figure(folder, "draws", draws_figure(flown.draws));
+  }
+  if (!skipped.empty()) fmt::print(stderr, "no figures: {}\n", skipped);
+}
+
+Flown fly_requested(const Request& request) {
+  Flown flown{nominal_of(request), {}, {}};
+  const Shadow shadow(flown.nominal.vehicle.airframe);
+  std::array<std::vector<TraceRow>, 9> traces;
+  if (!request.out.empty()) fs::create_directories(request.out);
+  for (std::size_t i = 0; i < kExperiments.size(); ++i) {
+    if (!request.experiment.empty() && request.experiment != kExperiments[i].name) continue;
+    flown.flights[i] = fly_one(i, flown.nominal, shadow, request.out.empty() ? nullptr : &traces[i]);
+  }
+  flown.draws =
+      fly_draws(flown.nominal.vehicle, flown.nominal.line, shadow, request.seed, request.draws, threads_of(request));
+  if (!request.out.empty()) write_out(request, flown, traces);
+  return flown;
+}
+
+std::string told(const Request& request, const Scene& scene) {
+  const Truth& truth = scene.truth;
+  const compensation::ThrustLine& line = scene.line;
+  const double k_t = line.thrust_coefficient().value();
+  std::string errors;
+  for (const double factor : truth.thrust) errors += fmt::format(" {:+.0f}", 100 * (factor - 1));
+  return fmt::format(
+      "The controller flies with K_T {:.4e} N/(rad/s)^2 and k/K_T = {:.4f} {:+.6f} phi[deg] ({}).\n"
+      "It is not told: the loss goes by the law \"{}\", gamma = {:g} times as on the bench (gamma is fitted to the "
+      "paper's\n"
+      "hover height and to nothing else); mass {:+.1f} %, K_T of the rotors{} %, centre of gravity {:+.1f} {:+.1f} mm "
+      "off; "
+      "seed {}.\n\n",
+      k_t, line.intercept().value() / k_t, line.slope_per_rad() / k_t * kPi / 180, request.coefficients,
+      name_of(truth.law), truth.gamma, 100 * (truth.mass - 1), errors, 1e3 * truth.cog_error.x(),
+      1e3 * truth.cog_error.y(), request.seed);
+}
+
+void print_text(const Request& request, const Flown& flown) {
+  fmt::print("{}{}{}{}", told(request, flown.nominal), hover_table(flown.flights),
+             height_table(flown.flights, flown.nominal.pilot.gains), forward_table(flown.flights));
+  for (std::size_t i = 0; i < flown.flights.size(); ++i) {
+    if (flown.flights[i].lost) fmt::print("{}: left the 1 m around its reference\n", kExperiments[i].name);
+  }
+  if (!flown.draws.empty()) fmt::print("{}", findings_table(findings_of(flown.draws)));
+  fmt::print("{}", not_reproduced());
+}
+
+Json json_of(const Percentiles& p) { return {{"p10", p.p10}, {"p50", p.p50}, {"p90", p.p90}}; }
+
+Json json_of(const Findings& found) {
+  return {{"draws", found.draws},
+          {"lost_plain", found.lost_plain},
+          {"lost_compensated", found.lost_compensated},
+          {"hover_z_better", found.hover_z_better},
+          {"forward_better", found.forward_better},
+          {"hover_z_plain_m", json_of(found.hover_z_plain)},
+          {"hover_z_compensated_m", json_of(found.hover_z_compensated)},
+          {"hover_z_ratio", json_of(found.hover_z_ratio)},
+          {"hover_xy_plain_m", json_of(found.hover_xy_plain)},
+          {"hover_xy_compensated_m", json_of(found.hover_xy_compensated)},
+          {"hover_xy_ratio", json_of(found.hover_xy_ratio)},
+          {"forward_x_m", json_of(found.forward_x)},
+          {"forward_plain_m", json_of(found.forward_plain)},
+          {"forward_compensated_m", json_of(found.forward_compensated)},
+          {"forward_ratio", json_of(found.forward_ratio)},
+          {"square_speed_ratio", json_of(found.square_speed_ratio)}};
+}
+
+Json json_of(const Experiment& experiment, const FlightResult& flight) {
+  Json legs = Json::array();
+  const std::size_t valid = flight.lost ? flight.lost_leg : flight.leg_count;
+  for (std::size_t i = 0; i < valid; ++i) {
+    const LegResult& leg = flight.legs[i];
+    legs.push_back({{"shape", experiment.legs[i].shape == Shape::x ? "X" : "O"},
+                    {"compensated", experiment.legs[i].compensated},
+                    {"mean_error_m", {leg.mean_error.x(), leg.mean_error.y(), leg.mean_error.z()}},
+                    {"mean_distance_m", leg.mean_distance},
+                    {"deviation_m", leg.deviation},
+                    {"mean_square_speed_rad2_s2", leg.mean_square_speed},
+                    {"fastest_rad_s", leg.fastest}});
+  }
+  return {{"name", experiment.name}, {"lost", flight.lost}, {"conceded_steps", flight.concessions}, {"legs", legs}};
+}
+
+void print_json(const Request& request, const Flown& flown) {
+  const Truth& truth = flown.nominal.truth;
+  Json flights = Json::array();
+  for (std::size_t i = 0; i < flown.flights.size(); ++i) {
+    if (flown.flights[i].leg_count > 0) flights.push_back(json_of(kExperiments[i], flown.flights[i]));
+  }
+  Json told{{"coefficients", request.coefficients}, {"vehicle", request.vehicle}, {"seed", request.seed},
+            {"loss_law", name_of(truth.law)},       {"gamma", truth.gamma},       {"flights", flights}};
+  if (!flown.draws.empty()) told["study"] = json_of(findings_of(flown.draws));
+  told["not_reproduced"] = kNotReproduced;
+  fmt::print("{}\n", told.dump(2, ' ', false, Json::error_handler_t::replace));
+}
+
+int fly_command(const Request& request) {
+  try {
+    const Flown flown = fly_requested(request);
+    request.json ? print_json(request, flown) : print_text(request, flown);
+    return 0;
+  } catch (const compensation::CoefficientError& error) {
+    throw ConfigurationError(error.what());
+  }
+}
+
+std::vector<std::string> experiment_names() {
+  std::vector<std::string> names;
+  for (const Experiment& experiment : kExperiments) names.emplace_back(experiment.name);
+  return names;
+}
+
+}  // namespace
+
+void add_fly(CLI::App& program, int& exit_code) {
+  const auto request = std::make_shared<Request>();
+  CLI::App* command = program.add_subcommand(
+      "fly", "fly the paper's nine experiments in simulation with these coefficients, before propellers turn");
+  command->footer(
+      "Without --draws: one set of circumstances. With it: as many more, drawn from the seed, as percentiles.");
+  command->add_option("--coefficients", request->coefficients, "coefficients.yaml of `kphi fit`")->required();
+  command->add_option("--vehicle", request->vehicle, "Vehicle file, e.g. profiles/foldable_drone.yaml")->required();
+  command->add_option("--experiment", request->experiment, "One of the nine")->check(CLI::IsMember(experiment_names()));
+  command->add_option("--draws", request->draws, "Sets of circumstances to draw, e.g. 400")
+      ->check(CLI::Range(0, 10000));
+  command->add_option("--seed", request->seed, "Of noise and draws")->capture_default_str();
+  command->add_option("--threads", request->threads, "0: one per core; the result does not depend on it")
+      ->check(CLI::Range(0, 256));
+  command->add_option("--out", request->out, "Folder for traces and draws (CSV) and figures (SVG)");
+  command->add_flag("--json", request->json, "The result as JSON on stdout");
+  command->callback([request, &exit_code] { exit_code = fly_command(*request); });
+}
+
+}  // namespace kphi::flight

@@ -1,0 +1,69 @@
+#include "compensation/flight/draw.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "compensation/flight/random.hpp"
+
+namespace kphi::flight {
+namespace {
+
+using compensation::ThrustLine;
+
+ThrustLine line_with(const ThrustLine& line, ThrustCoefficient intercept, double slope_per_rad) {
+  const auto made = ThrustLine::from(line.thrust_coefficient(), intercept, slope_per_rad, line.largest_fitted(),
+                                     line.overlap(), line.uncertainty());
+  if (!made) throw std::invalid_argument("the line k(φ) has no positive intercept left; check the coefficient file");
+  return *made;
+}
+
+/// The arms that stop short of the farthest one do so `factor` times as far.
+Angles with_margin(const Angles& arms, double factor) {
+  const Radians farthest = *std::max_element(arms.begin(), arms.end());
+  Angles moved = arms;
+  for (Radians& arm : moved) arm = farthest - factor * (farthest - arm);
+  return moved;
+}
+
+void draw_truth(Truth& truth, Random& random) {
+  truth.gamma = random.uniform(1.0, 1.5);
+  truth.mass = random.normal(1.0, 0.015);
+  for (double& factor : truth.thrust) factor = random.normal(1.0, 0.01);
+  for (double& error : truth.arm_error) error = random.normal(0.0, 0.02);
+  for (Eigen::Index i = 0; i < 2; ++i) truth.cog_error[i] = random.normal(0.0, 1.5e-3);
+  truth.drag = random.uniform(0.1, 0.5);
+  for (Eigen::Index i = 0; i < 2; ++i) truth.wind[i] = random.normal(0.0, 0.1);
+}
+
+void draw_gains(Gains& gains, Random& random) {
+  const double root = std::sqrt(random.uniform(0.4, 1.0));
+  gains.attitude.head<2>().setConstant(12 * root);
+  gains.rate.head<2>().setConstant(18 * root);
+  gains.position.head<2>().setConstant(random.uniform(5, 10));
+}
+
+}  // namespace
+
+Scene nominal_scene(const Vehicle& vehicle, const ThrustLine& line, std::uint64_t seed) {
+  return {vehicle, line, {}, {}, {}, seed};
+}
+
+Scene drawn_scene(const Vehicle& vehicle, const ThrustLine& line, std::uint64_t seed, std::size_t index) {
+  Random random(seed, index);
+  Scene scene = nominal_scene(vehicle, line, random.bits());
+  scene.truth.law = static_cast<LossLaw>(index % kLossLaws);
+  draw_truth(scene.truth, random);
+  draw_gains(scene.pilot.gains, random);
+  scene.vehicle.o = with_margin(vehicle.o, random.uniform(0.4, 2.0));
+  const double slope = line.slope_per_rad() * random.normal(1.0, 0.03);
+  scene.line = line_with(line, line.intercept() + random.normal(0.0, 0.01) * line.thrust_coefficient(), slope);
+  return scene;
+}
+
+ThrustLine scaled_loss(const ThrustLine& line, double factor) {
+  const ThrustCoefficient above = line.intercept() - line.thrust_coefficient();
+  return line_with(line, line.thrust_coefficient() + factor * above, factor * line.slope_per_rad());
+}
+
+}  // namespace kphi::flight

@@ -1,0 +1,80 @@
+#include "compensation/flight/pilot.hpp"
+
+namespace kphi::flight {
+namespace {
+
+using compensation::Compensator;
+using compensation::Mixer;
+using compensation::RotorLayout;
+
+RotorLayout layout_of(const Vehicle& vehicle, const MassProperties& mass) noexcept {
+  RotorLayout layout;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector2d lever = mass.hubs[i] - mass.cog;
+    layout.hubs[i] = {Metres(lever.x()), Metres(lever.y())};
+    layout.spins[i] = vehicle.build.spin[i] > 0 ? 1 : -1;
+  }
+  return layout;
+}
+
+}  // namespace
+
+std::optional<Pilot> Pilot::build(const Vehicle& vehicle, const compensation::ThrustLine& line,
+                                  const PilotSettings& settings) {
+  const auto built = Compensator::build({line, line, line, line}, vehicle.airframe);
+  const auto mixer =
+      Mixer::build(layout_of(vehicle, mass_properties(vehicle, vehicle.x, {})), {Metres(vehicle.build.yaw_arm_m), 0.0});
+  if (!built.compensator || !mixer) return std::nullopt;
+  return Pilot(vehicle, settings, *built.compensator, *mixer);
+}
+
+Pilot::Pilot(const Vehicle& vehicle, const PilotSettings& settings, const Compensator& compensator,
+             const Mixer& mixer) noexcept
+    : vehicle_(vehicle),
+      settings_(settings),
+      compensator_(compensator),
+      mixer_(mixer),
+      rate_control_(settings.gains, vehicle.build.rotor_lag_s),
+      mass_(mass_properties(vehicle, vehicle.x, {})),
+      arms_(vehicle.x) {}
+
+void Pilot::compensate(bool on) noexcept {
+  compensator_.enable(on);
+  allocate();
+}
+
+void Pilot::set_arms(const Angles& arms) noexcept {
+  if (arms == arms_) return;
+  arms_ = arms;
+  mass_ = mass_properties(vehicle_, arms, {});
+  Angles as_wired = arms;
+  for (std::size_t i = 0; i < 4; ++i) as_wired[i] = arms[static_cast<std::size_t>(settings_.arm_order[i])];
+  compensator_.set_arms(as_wired);
+  allocate();
+}
+
+void Pilot::allocate() noexcept { mixer_.set_layout(layout_of(vehicle_, mass_), compensator_.drag_scale()); }
+
+void Pilot::look(const Reference& reference, const BodyMotion& estimate, const Eigen::Quaterniond& attitude) noexcept {
+  const AccelerationDemand demand = position_control(settings_.gains, reference, estimate, attitude);
+  collective_ = demand.collective;
+  const Eigen::Quaterniond wanted = attitude_along(demand.acceleration, 0.0);
+  feedback_rates_ = attitude_control(settings_.gains, attitude, wanted);
+  wanted_rates_ = rates_along(reference.jerk, collective_, wanted);
+}
+
+Eigen::Vector4d Pilot::act(const Eigen::Vector3d& body_rates) noexcept {
+  const Eigen::Vector3d torque = rate_control_.torque(wanted_rates_, feedback_rates_, body_rates, mass_.inertia);
+  compensation::ThrustLimits limits;
+  limits.largest = compensator_.thrust_max();
+  const auto mixed = mixer_.mix({Newtons(mass_.mass_kg * collective_), NewtonMetres(torque.x()),
+                                 NewtonMetres(torque.y()), NewtonMetres(torque.z())},
+                                limits, NewtonMetres(settings_.assured_yaw));
+  rate_control_.applied({mixed.achieved.roll.value(), mixed.achieved.pitch.value(), mixed.achieved.yaw.value()}, kStep);
+  concessions_ += mixed.concessions.any() ? 1 : 0;
+  thrusts_ = mixed.thrusts;
+  const auto command = compensator_.speeds_for(mixed.thrusts);
+  return {command.speeds[0].value(), command.speeds[1].value(), command.speeds[2].value(), command.speeds[3].value()};
+}
+
+}  // namespace kphi::flight

@@ -1,0 +1,96 @@
+#include "compensation/flight/study.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "test/compensation/flight/flight_fixture.hpp"
+
+namespace kphi::flight {
+namespace {
+
+std::vector<Draw> draws(std::size_t count, std::size_t threads) {
+  return fly_draws(example_vehicle(), bench_line(), example_shadow(), 1, count, threads);
+}
+
+bool same(const NineFlights& a, const NineFlights& b) {
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (a[i].lost != b[i].lost) return false;
+    for (std::size_t leg = 0; leg < 3; ++leg) {
+      if (a[i].legs[leg].mean_error != b[i].legs[leg].mean_error) return false;
+      if (a[i].legs[leg].deviation != b[i].legs[leg].deviation) return false;
+    }
+  }
+  return true;
+}
+
+TEST(Study, IsTheSameForAnyNumberOfThreads) {
+  const std::vector<Draw> one = draws(5, 1), three = draws(5, 3);
+  for (std::size_t i = 0; i < one.size(); ++i) EXPECT_TRUE(same(one[i].flights, three[i].flights)) << i;
+  EXPECT_FALSE(same(one[0].flights, one[1].flights));
+  EXPECT_TRUE(same(draws(2, 2)[1].flights, one[1].flights)) << "a draw does not depend on how many there are";
+}
+
+// The gates of 400 draws are in fly_study_test.cpp; these are those of a glance.
+TEST(Study, FindsCompensationBetterInAFewDraws) {
+  const Findings found = findings_of(draws(12, 2));
+  EXPECT_LE(found.hover_z_ratio.p50, 0.45);
+  EXPECT_LE(found.forward_ratio.p50, 0.7);
+  EXPECT_GE(found.forward_better, 0.8);
+  EXPECT_NEAR(found.square_speed_ratio.p50, 1, 0.02);
+}
+
+TEST(Percentiles, LieBetweenTheOrderStatistics) {
+  const Percentiles found = percentiles({5, 1, 4, 2, 3, 0});
+  EXPECT_NEAR(found.p10, 0.5, 1e-12);
+  EXPECT_NEAR(found.p50, 2.5, 1e-12);
+  EXPECT_NEAR(found.p90, 4.5, 1e-12);
+  EXPECT_EQ(percentiles({7}).p10, 7);
+  EXPECT_EQ(percentiles({}).p50, 0);
+}
+
+/// A draw in which every flight went well: 0.2 m without, `ratio` of it with compensation.
+Draw made_up(double ratio) {
+  Draw draw{example_scene(), {}};
+  for (std::size_t i = 0; i < kExperiments.size(); ++i) {
+    draw.flights[i].leg_count = kExperiments[i].leg_count;
+    for (std::size_t leg = 0; leg < kExperiments[i].leg_count; ++leg) {
+      const bool helped = kExperiments[i].legs[leg].compensated;
+      draw.flights[i].legs[leg].mean_error = Eigen::Vector3d(0.1, 0, 0.2) * (helped ? ratio : 1);
+      draw.flights[i].legs[leg].mean_distance = 0.2 * (helped ? ratio : 1);
+      draw.flights[i].legs[leg].mean_square_speed = 1e6;
+    }
+  }
+  return draw;
+}
+
+TEST(Findings, TakeTheSizeOfTheHeightErrorWhicheverSideItIsOn) {
+  const Findings found = findings_of({made_up(-0.5)});
+  EXPECT_NEAR(found.hover_z_ratio.p50, 0.5, 1e-12);
+  EXPECT_NEAR(found.hover_z_compensated.p50, -0.1, 1e-12) << "but tell the side";
+  EXPECT_EQ(found.hover_z_better, 1);
+}
+
+TEST(Findings, CountALostFlightAgainstTheSideThatLostIt) {
+  Draw lost_plain = made_up(0.5), lost_compensated = made_up(0.5), lost_in_x = made_up(0.5);
+  lost_plain.flights[kHoverPlain].lost = true;
+  lost_plain.flights[kHoverPlain].lost_leg = 1;
+  lost_compensated.flights[kLevelSwitched].lost = true;
+  lost_compensated.flights[kLevelSwitched].lost_leg = 1;
+  lost_in_x.flights[kLevelPlain].lost = true;
+  lost_in_x.flights[kLevelPlain].lost_leg = 0;
+  const Findings found = findings_of({made_up(0.5), lost_plain, lost_compensated, lost_in_x});
+  EXPECT_EQ(found.draws, 4u);
+  EXPECT_EQ(found.lost_plain, 1u);
+  EXPECT_EQ(found.lost_compensated, 2u);
+  EXPECT_EQ(found.forward_better, 0.5) << "the whole one, and the one that only compensation saved";
+  EXPECT_EQ(found.forward_ratio.p50, 0.5);
+}
+
+TEST(Findings, CountACompensationThatHarmsAsWorse) {
+  const Findings found = findings_of({made_up(0.5), made_up(1.5)});
+  EXPECT_EQ(found.hover_z_better, 0.5);
+  EXPECT_EQ(found.forward_better, 0.5);
+}
+
+}  // namespace
+}  // namespace kphi::flight

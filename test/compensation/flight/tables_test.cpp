@@ -1,0 +1,64 @@
+#include "compensation/flight/tables.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace kphi::flight {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+NineFlights one_hover() {
+  NineFlights flights;
+  FlightResult& flight = flights[kHoverPlain];
+  flight.leg_count = 3;
+  flight.legs[1].mean_error = {0.0726, -0.0762, 0.1535};
+  flight.legs[1].mean_error_rate = {0, 0, 0.0036};
+  flight.legs[2].mean_error = {0, 0, -0.01};
+  return flights;
+}
+
+TEST(HoverTable, PutsOursBesideThePapers) {
+  const std::string table = hover_table(one_hover());
+  EXPECT_THAT(table, HasSubstr("X       O n.c.    0.0726  0.0762  0.1535  below     0.2200  0.1100  0.1700\n"));
+  EXPECT_THAT(table, HasSubstr("O n.c.  X         0.0000  0.0000  0.0100  above "));
+  EXPECT_THAT(table, Not(HasSubstr("X       O c."))) << "that flight was not flown";
+}
+
+TEST(HoverTable, SaysLostInsteadOfANumber) {
+  NineFlights flights = one_hover();
+  flights[kHoverPlain].lost = true;
+  flights[kHoverPlain].lost_leg = 1;
+  EXPECT_THAT(hover_table(flights), HasSubstr("X       O n.c.      lost "));
+  EXPECT_THAT(hover_table(flights), Not(HasSubstr("0.1535")));
+  EXPECT_THAT(height_table(flights, Gains()), testing::IsEmpty());
+}
+
+TEST(HeightTable, ShowsTheIdentityForOursAndThePapers) {
+  const std::string table = height_table(one_hover(), Gains());
+  EXPECT_THAT(table, HasSubstr("0.1535  0.0036"));
+  EXPECT_THAT(table, HasSubstr("  2.324 ")) << "15 * 0.1535 + 6 * 0.0036";
+  EXPECT_THAT(table, HasSubstr("-0.5005")) << "the paper's, from its own e and e'";
+}
+
+TEST(ForwardTable, ShowsMeanAndDeviationBesideThePapers) {
+  NineFlights flights;
+  flights[kRisingSwitched].leg_count = 2;
+  flights[kRisingSwitched].legs[0].mean_distance = 0.1939;
+  flights[kRisingSwitched].legs[0].deviation = 0.0177;
+  const std::string table = forward_table(flights);
+  EXPECT_THAT(table, HasSubstr("rising O n.c. - O c."));
+  EXPECT_THAT(table, HasSubstr("0.194 ±0.018  ( 0.213 ±0.045)"));
+  EXPECT_THAT(table, Not(HasSubstr("level")));
+}
+
+TEST(Tables, OfNothingFlownAreEmpty) { EXPECT_EQ(hover_table({}) + height_table({}, Gains()) + forward_table({}), ""); }
+
+TEST(NotReproduced, NamesTheXBaselineAndTheVelocityTerm) {
+  EXPECT_THAT(not_reproduced(), HasSubstr("the errors in X of Tables I and III"));
+  EXPECT_THAT(not_reproduced(), HasSubstr("the velocity term of Table II"));
+}
+
+}  // namespace
+}  // namespace kphi::flight
