@@ -67,10 +67,9 @@ class CampaignRun {
                  {"campaign_sha256", results::sha256(campaign_.text)},
                  {"bench_sha256", results::sha256(place_.text)},
                  {"motor", bench_.motor().identity()}};
-    if (place_.simulation && !place_.simulation->faults.empty()) {
-      const std::string faults = profiles::read_text(place_.simulation->faults);
-      results::write_text(folder_.faults_file(), faults, bench_.files());
-      started["faults_sha256"] = results::sha256(faults);
+    if (place_.simulation) {
+      keep(place_.simulation->faults, folder_.faults_file(), "faults_sha256", started);
+      keep(place_.simulation->motor, folder_.motor_file(), "motor_sha256", started);
     }
     note("campaign_started", started);
     try {
@@ -87,6 +86,14 @@ class CampaignRun {
   }
 
  private:
+  /// A file that the bench file names, if it names one, beside the copy of the bench file.
+  void keep(const std::string& file, const std::filesystem::path& copy, const char* hash, json& noted) {
+    if (file.empty()) return;
+    const std::string text = profiles::read_text(file);
+    results::write_text(copy, text, bench_.files());
+    noted[hash] = results::sha256(text);
+  }
+
   void one(const profiles::PlannedRun& planned) {
     if (planned.occlusion_deg != mounted_deg_) mount(planned.occlusion_deg);
     const auto file = folder_.run(campaign_.propeller.id, planned.occlusion_deg, planned.repetition);

@@ -9,6 +9,7 @@
 #include "drivers/device_error.hpp"
 #include "drivers/netbox/calinfo.hpp"
 #include "drivers/sim/fault_file.hpp"
+#include "drivers/sim/motor_file.hpp"
 #include "profiles/configuration_error.hpp"
 #include "profiles/strict_yaml.hpp"
 
@@ -29,7 +30,18 @@ void load_faults(const std::string& path, sim::BenchSettings& settings) {
     settings.faults = sim::parse_faults(text, path);
     settings.netbox.habits = sim::parse_habits(text, path);
     settings.motor_faults = sim::parse_motor_faults(text, path);
-  } catch (const sim::FaultFileError& error) {
+  } catch (const sim::FileError& error) {
+    throw ConfigurationError(error.what());
+  }
+}
+
+void load_motor(const std::string& path, sim::BenchSettings& settings) {
+  if (path.empty()) return;
+  try {
+    const sim::MotorProfile profile = sim::parse_motor_profile(profiles::read_text(path), path);
+    settings.plant.motor = profile.motor;
+    settings.module.sensors = profile.sensors;
+  } catch (const sim::FileError& error) {
     throw ConfigurationError(error.what());
   }
 }
@@ -40,7 +52,10 @@ sim::BenchSettings settings_of(const profiles::Bench& place, sim::BenchSettings 
   settings.netbox.records_per_datagram = place.netbox.records_per_datagram;
   settings.module_id = place.iq.module_id;
   settings.module.baud = place.iq.baud;
-  if (place.simulation) load_faults(place.simulation->faults, settings);
+  if (place.simulation) {
+    load_faults(place.simulation->faults, settings);
+    load_motor(place.simulation->motor, settings);
+  }
   return settings;
 }
 

@@ -17,7 +17,7 @@ namespace kphi::daq {
 
 class DeterministicBench final : public Bench, private LoadCellLink {
  public:
-  /// Throws DeviceError; ConfigurationError when the fault script that the file names cannot be used.
+  /// Throws DeviceError; ConfigurationError when a script or motor that the file names cannot be used.
   /// `other`: what no bench file says of the simulated devices.
   explicit DeterministicBench(const profiles::Bench& place, const sim::BenchSettings& other = {});
   [[nodiscard]] const Clock& clock() const override { return clock_; }

@@ -32,6 +32,8 @@ std::optional<Trip> check(const Observation& seen, const profiles::Limits& limit
     return Trip{fmt::format("motor: the module reports a fault (bits 0x{:02X})", seen.fault_bits)};
   if (!(seen.derate >= kNoDerate))
     return Trip{fmt::format("motor: the module derates to {:.0f} % of its drive", 100 * seen.derate)};
+  // Last: fault and derating say why the rotor does not follow.
+  if (seen.speed_error.kind != SpeedError::Kind::none) return Trip{to_words(seen.speed_error)};
   return std::nullopt;
 }
 

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "daq/speed_error.hpp"
 #include "drivers/clock.hpp"
 #include "profiles/campaign.hpp"
 
@@ -20,6 +21,7 @@ struct Observation {
   Duration motor_age{};
   double derate = 1;               ///< share of its drive that the module allows itself; 1: all
   unsigned fault_bits = 0;         ///< of power_safety.fault_now
+  SpeedError speed_error{};        ///< of speed against command
   bool load_cell_is_fresh = true;  ///< no older than the stream's and this host's delay: thrust is what is now
   bool motor_is_fresh = true;      ///< likewise, of speed, current and temperature
 };
@@ -29,7 +31,7 @@ struct Trip {
   std::string reason;
 };
 
-/// Of what was measured, and of what the module says of itself.
+/// Of what was measured, of what the module says of itself, and whether its rotor does what it is told.
 [[nodiscard]] std::optional<Trip> check(const Observation& seen, const profiles::Limits& limits);
 /// Ages above `patience`, bench time.
 [[nodiscard]] std::optional<Trip> check_ages(const Observation& seen, Duration patience);

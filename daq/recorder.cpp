@@ -14,6 +14,12 @@ constexpr std::size_t kReadingsAtOnce = 512;
 /// What is younger is shown as what is: this host's own delay, and three times that of the device.
 constexpr Duration kFreshWall = std::chrono::milliseconds(60);
 constexpr Duration kFreshMotor = std::chrono::milliseconds(100);
+/// How late this host may tell a speed and take the reading that answers it.
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+constexpr Duration kHostWall = std::chrono::milliseconds(300);
+#else
+constexpr Duration kHostWall = std::chrono::milliseconds(60);
+#endif
 constexpr std::array kAxes{"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
 
 results::EventKind kind_of(netbox::RangeVerdict verdict) {
@@ -23,12 +29,14 @@ results::EventKind kind_of(netbox::RangeVerdict verdict) {
 
 }  // namespace
 
-Recorder::Recorder(Bench& bench, results::RunWriter& writer, ThrustAxis axis, const results::LoadCellScale& scale)
+Recorder::Recorder(Bench& bench, results::RunWriter& writer, const Mounting& mounting,
+                   const results::LoadCellScale& scale)
     : bench_(bench),
       writer_(writer),
-      axis_(axis),
+      mounting_(mounting),
       scale_(to_configuration(scale)),
       watch_(scale_),
+      speed_watch_(mounting.spin, bench.clock().stretched(kHostWall)),
       fresh_load_cell_(bench.clock().stretched(kFreshWall) +
                        from_seconds(3 * bench.load_cell().configuration().records_per_datagram / scale.sample_rate_hz)),
       fresh_motor_(bench.clock().stretched(kFreshWall) + kFreshMotor),
@@ -64,6 +72,11 @@ void Recorder::drain_marks() {
     measuring_ = mark.phase == results::Phase::bias_before || mark.phase == results::Phase::bias_after ||
                  mark.phase == results::Phase::zero_before;
     estimate_ = {};
+    if (mark.phase == results::Phase::step) {
+      speed_watch_.command(Instant(mark.time_ns), RadPerSec(mark.speed_rad_s));
+    } else {
+      speed_watch_.release();
+    }
   }
 }
 
@@ -104,8 +117,8 @@ void Recorder::drain_load_cell() {
     writer_.append(batch);
     look_at(batch);
     std::int64_t sum = 0;
-    for (const auto& record : batch) sum += record.counts[static_cast<std::size_t>(axis_.axis)];
-    const double newtons = axis_.sign * static_cast<double>(sum) / scale_.counts_per_newton;
+    for (const auto& record : batch) sum += record.counts[static_cast<std::size_t>(mounting_.axis)];
+    const double newtons = mounting_.sign * static_cast<double>(sum) / scale_.counts_per_newton;
     phase_sum_n_ += newtons;
     phase_count_ += n;
     thrust_n_ = newtons / static_cast<double>(n);
@@ -120,6 +133,7 @@ void Recorder::drain_motor() {
     const std::span<const results::MotorReading> batch(readings_.data(), n);
     writer_.append(batch);
     for (const auto& reading : batch) {
+      speed_watch_.take(reading);
       if (reading.channel == MotorChannel::speed) speed_rad_s_ = std::abs(reading.value);
       if (reading.channel == MotorChannel::supply_current) supply_current_a_ = reading.value;
       if (reading.channel == MotorChannel::coil_temperature) coil_temperature_degc_ = reading.value;
@@ -128,6 +142,7 @@ void Recorder::drain_motor() {
     }
     motor_ns_ = batch.back().time_ns;
   }
+  speed_error_.publish(speed_watch_.error());
 }
 
 void Recorder::mark(results::Phase phase, int step, RadPerSec commanded) {
@@ -155,6 +170,7 @@ Observation Recorder::observe(Instant now) const noexcept {
                    Celsius(coil_temperature_degc_), now - Instant(load_cell_ns_), now - Instant(motor_ns_)};
   seen.derate = derate_;
   seen.fault_bits = fault_bits_;
+  seen.speed_error = speed_error_.read();
   seen.load_cell_is_fresh = seen.load_cell_age <= fresh_load_cell_;
   seen.motor_is_fresh = seen.motor_age <= fresh_motor_;
   return seen;

@@ -16,16 +16,17 @@
 
 namespace kphi::daq {
 
-/// How thrust is read off the six axes.
-struct ThrustAxis {
-  int axis = 2;  ///< 0..2 = Fx, Fy, Fz
-  int sign = +1;
+/// How thrust is read off the six axes, and which way the motor is told to turn.
+struct Mounting {
+  int axis = 2;   ///< 0..2 = Fx, Fy, Fz
+  int sign = +1;  ///< of the axis when the propeller pulls
+  int spin = +1;  ///< +1 counter-clockwise
 };
 
 /// Two threads: drain() belongs to one, all else to the runner. Neither waits for the other.
 class Recorder {
  public:
-  Recorder(Bench& bench, results::RunWriter& writer, ThrustAxis axis, const results::LoadCellScale& scale);
+  Recorder(Bench& bench, results::RunWriter& writer, const Mounting& mounting, const results::LoadCellScale& scale);
 
   /// Takes all that waits, appends it, secures the file when it is time. Keeps the first error for check_failure and
   /// does nothing after it.
@@ -57,9 +58,10 @@ class Recorder {
 
   Bench& bench_;
   results::RunWriter& writer_;
-  ThrustAxis axis_;
+  Mounting mounting_;
   const netbox::Configuration scale_;
   netbox::RangeWatch watch_;
+  SpeedWatch speed_watch_;
   netbox::RangeVerdict worst_ = netbox::RangeVerdict::inside;
   bool measuring_ = false;
   netbox::ZeroEstimate estimate_;
@@ -79,6 +81,7 @@ class Recorder {
   std::atomic<unsigned> fault_bits_{0};
   std::atomic<std::int64_t> load_cell_ns_, motor_ns_;
   netbox::Published<netbox::ZeroMeasurement> measured_;
+  netbox::Published<SpeedError> speed_error_;
   std::atomic<bool> tripped_{false};
   std::string trip_;  // written before tripped_, read after it
   std::atomic<bool> failed_{false};

@@ -108,18 +108,23 @@ class Sequence {
   [[nodiscard]] const results::BoxBias& box_bias() const { return box_bias_; }
   [[nodiscard]] const std::optional<iq::StopReport>& stop() const { return stop_; }
 
-  /// After the motor was let go: what became of it; empty when it never turned, or that is told already.
+  /// After the motor was let go: what became of it, and what its module says of the cause; empty when it never turned,
+  /// or that is told already.
   std::string aftermath() {
     if (!has_spun_ || stop_) return {};
     iq::StopSettings settings;
     settings.limit = kAftermath;
     bench_.motor().begin_stop(settings);
     const Instant give_up = bench_.clock().now() + 4 * kAftermath;
+    std::string cause;
     while (bench_.clock().now() < give_up) {
-      if ((stop_ = bench_.motor().stop_report())) return "; " + stop_->summary();
+      for (const results::StreamEvent& event : recorder_.take_events()) {
+        if (cause.empty() && is_of_motor(event.kind) && ends_a_run(event.kind)) cause = "; " + event.text;
+      }
+      if ((stop_ = bench_.motor().stop_report())) return cause + "; " + stop_->summary();
       bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
     }
-    return "; nobody knows whether the motor coasts";
+    return cause + "; nobody knows whether the motor coasts";
   }
 
   /// After the stream has ended, and nobody drains any more.
@@ -374,7 +379,8 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   std::optional<Streaming> streaming(std::in_place, bench.load_cell());
   judge_changes(before, bench.load_cell(), order, progress);
   results::RunWriter writer(order.file, header_of(order, bench, streaming->scale()), bench.files());
-  Recorder recorder(bench, writer, {order.place.thrust_axis, order.place.thrust_sign}, streaming->scale());
+  Recorder recorder(bench, writer, {order.place.thrust_axis, order.place.thrust_sign, order.place.iq.spin},
+                    streaming->scale());
   Sequence sequence(bench, recorder, order, progress, stop_asked);
   std::exception_ptr cause;
   std::string explanation, aftermath;

@@ -80,6 +80,7 @@ Simulation read_simulation(ProfileReader& file, const std::filesystem::path& fol
   simulation.seed = file.get_or("/simulation/seed", simulation.seed);
   simulation.control = file.get_or("/simulation/control", simulation.control);
   if (file.has("/simulation/faults")) simulation.faults = (folder / file.text("/simulation/faults")).string();
+  if (file.has("/simulation/motor")) simulation.motor = (folder / file.text("/simulation/motor")).string();
   if (!simulation.in_process && simulation.control.empty()) {
     file.refuse("/simulation", "control is missing", "add control: a path for the socket, or in_process: true");
   }

@@ -53,6 +53,7 @@ struct Simulation {
   std::uint64_t seed = 1;
   std::string control;  ///< path of the control line (Unix socket); relative to the system's temporary folder
   std::string faults;   ///< path of a fault script; in the file relative to the file's folder; empty: none
+  std::string motor;    ///< path of a simulated motor, likewise; empty: the 2306 that is built in
 };
 
 /// What a person has read off, with standard uncertainties.

@@ -10,6 +10,7 @@
 
 #include "compensation/file/coefficient_file.hpp"
 #include "drivers/sim/fault_file.hpp"
+#include "drivers/sim/motor_file.hpp"
 #include "profiles/check.hpp"
 #include "profiles/strict_yaml.hpp"
 
@@ -44,7 +45,8 @@ std::string judge_coefficients(const std::string& path) {
       to_degrees(c.smallest_occlusion), to_degrees(c.largest_occlusion), name_of(c.overlap), uncertainty_of(c));
 }
 
-std::string in_words(const sim::Fault& fault) {
+template <class Fault>
+std::string in_words(const Fault& fault) {
   std::string words = fmt::format("  at {:g} s  {}", to_seconds(fault.at), sim::name_of(fault.kind));
   if (fault.lasts > Duration{0}) words += fmt::format(" for {:g} s", to_seconds(fault.lasts));
   if (fault.count > 0) words += fmt::format(", {} times at most", fault.count);
@@ -56,12 +58,23 @@ std::string judge_faults(const std::string& path) {
   (void)sim::parse_habits(text, path);
   std::string summary;
   for (const sim::Fault& fault : sim::parse_faults(text, path)) summary += in_words(fault);
+  for (const sim::MotorFault& fault : sim::parse_motor_faults(text, path)) summary += in_words(fault);
   return summary;
+}
+
+std::string judge_motor(const std::string& path) {
+  const sim::MotorParameters motor = sim::parse_motor_profile(read_text(path), path).motor;
+  return fmt::format(
+      "  motor      {:.4g} RPM/V, {:g} ohm, {:g} kg m^2 without propeller\n"
+      "  supply     {:g} V behind {:g} ohm, at most {:g} A\n",
+      to_rpm(RadPerSec(1 / motor.torque_constant)), motor.resistance, motor.rotor_inertia, motor.supply_volts,
+      motor.source_resistance, motor.supply_current_max);
 }
 
 const std::vector<ForeignKind>& foreign_kinds() {
   static const std::vector<ForeignKind> kinds{{"kphi-coefficients/1", "coefficients", judge_coefficients},
-                                              {"kphi-faults/1", "fault script", judge_faults}};
+                                              {"kphi-faults/1", "fault script", judge_faults},
+                                              {"kphi-sim-motor/1", "simulated motor", judge_motor}};
   return kinds;
 }
 
@@ -77,8 +90,8 @@ void print(const CheckedFile& file, bool json) {
 }  // namespace
 
 void add_check(CLI::App& program, int& exit_code) {
-  auto* command =
-      program.add_subcommand("check", "check campaign, bench, vehicle and coefficient files and fault scripts");
+  auto* command = program.add_subcommand(
+      "check", "check campaign, bench, vehicle and coefficient files, fault scripts and simulated motors");
   auto options = std::make_shared<CheckOptions>();
   command->add_option("FILE", options->paths, "Files; campaigns are also held against the benches among them")
       ->required();

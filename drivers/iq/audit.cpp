@@ -5,12 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compensation/units.hpp"
+
 namespace kphi::iq {
 namespace {
 
 constexpr int kHobbyDisabled = 254;
 constexpr double kNoDerate = 65536;
 constexpr double kPolePairs = 7, kMotorKv = 2200, kMotorAmps = 30;  // 2306-2200Kv
+constexpr double kSlowFilter = 8;                                   // Hz: a time constant as long as the loop's, 0.02 s
 constexpr double kSlowSlew = 100;                                   // V/s; the manual advises not to go below
 
 using Check = std::optional<Finding> (*)(const AuditRecord&, const Intention&);
@@ -254,6 +257,14 @@ std::optional<Finding> slewing(const AuditRecord& module, const Intention&) {
                  slow ? "raise brushless_drive.slew_volts_per_second to 100 or more" : ""};
 }
 
+std::optional<Finding> late_commands(const AuditRecord& module, const Intention&) {
+  const auto& hertz = module.value<"propeller_motor_control.input_filter_fc">();
+  if (!hertz || *hertz >= kSlowFilter) return std::nullopt;
+  return warning(fmt::format("input_filter_fc is {:g} Hz: a new speed reaches the controller only after {:.2g} s",
+                             *hertz, 1 / (2 * kPi * *hertz)),
+                 "raise propeller_motor_control.input_filter_fc to 10 Hz or more");
+}
+
 std::optional<Finding> no_control(const AuditRecord& module, const Intention&) {
   const auto& kp = module.value<"propeller_motor_control.velocity_Kp">();
   const auto& ki = module.value<"propeller_motor_control.velocity_Ki">();
@@ -307,6 +318,7 @@ constexpr Check kChecks[] = {untold,
                              no_control,
                              no_feed_forward,
                              slewing,
+                             late_commands,
                              unchecked_clock};
 
 std::string value_text(const Entry& entry, double value) {

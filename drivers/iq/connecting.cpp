@@ -5,7 +5,6 @@
 namespace kphi::iq {
 namespace {
 
-constexpr int kRequiredAttempts = 3;
 constexpr int kOptionalAttempts = 2;
 
 }  // namespace
@@ -18,8 +17,8 @@ void Connecting::begin(const std::optional<Identity>& known) {
   identity_ = {};
   identity_.system_control_id = module_id_;
   step_ = 0;
+  open_.reset();
   asked_ = false;
-  attempts_ = 0;
   failure_.clear();
   another_module_ = false;
 }
@@ -28,48 +27,43 @@ void Connecting::advance(Exchange& exchange, Instant now) {
   if (asked_ || !failure_.empty()) return;
   while (!done() && kScript[step_].kind == Step::Kind::legacy_coil && identity_.coil_temperature_client != 0) next();
   if (done()) return;
-  const Step& step = kScript[step_];
-  const int id = id_of(*step.entry);
-  asked_ = step.sets() ? exchange.tell_and_ask(*step.entry, wanted(), id, now) : exchange.ask(*step.entry, id, now);
+  if (!open_) open_ = inquiry();
+  const auto& [wanted, set_to] = open_->inquiry();
+  const int id = id_of(*wanted);
+  asked_ = set_to ? exchange.tell_and_ask(*wanted, *set_to, id, now) : exchange.ask(*wanted, id, now);
 }
 
 void Connecting::take(const Heard& heard) {
   if (!asked_ || done() || &heard.entry() != kScript[step_].entry) return;
   asked_ = false;
-  switch (heard.kind) {
-    case Heard::Kind::answer:
-      return take_answer(heard);
-    case Heard::Kind::wrong_length:
-      return fail_attempt("a reply of the wrong length");
-    case Heard::Kind::timeout:
-      return fail_attempt("no reply");
-  }
+  open_->take(heard.kind == Heard::Kind::answer ? std::optional(heard.value()) : std::nullopt);
+  if (open_->done()) conclude(heard.kind == Heard::Kind::wrong_length ? "a reply of the wrong length" : "no reply");
 }
 
-void Connecting::take_answer(const Heard& heard) {
+void Connecting::conclude(const char* why_silent) {
   const Step& step = kScript[step_];
-  if (step.sets() && !is_as_set(*step.entry, wanted(), heard.value())) {
-    if (++attempts_ < kRequiredAttempts) return;
+  const Reply reply = open_->reply();
+  if (!reply.value) return take_silence(why_silent);
+  if (step.sets() && !reply.accepted) {
     failure_ = fmt::format(
         "the module did not accept its communication timeout ({} reads {} instead of {}): it would keep spinning if "
         "this host died",
-        step.entry->name, heard.value(), wanted());
+        step.entry->name, *reply.value, *wanted());
     return;
   }
-  step.store(identity_, heard.value());
-  if (step.kind == Step::Kind::own_id) take_own_id(heard.value());
+  step.store(identity_, *reply.value);
+  if (step.kind == Step::Kind::own_id) take_own_id(*reply.value);
   if (step.kind == Step::Kind::last_of_uid) compare_uid();
   next();
 }
 
-void Connecting::fail_attempt(const char* why) {
+void Connecting::take_silence(const char* why) {
   const Step& step = kScript[step_];
-  if (++attempts_ < (step.must_answer() || step.sets() ? kRequiredAttempts : kOptionalAttempts)) return;
   if (step.must_answer()) {
     failure_ = fmt::format("{} to get {}.{}", why, name_of(step.entry->type), step.entry->name);
   } else if (step.kind == Step::Kind::own_id && identity_.system_control_id != 0) {
     identity_.system_control_id = 0;
-    attempts_ = 0;
+    open_.reset();
   } else {
     next();
   }
@@ -89,15 +83,23 @@ void Connecting::compare_uid() {
 
 void Connecting::next() noexcept {
   ++step_;
-  attempts_ = 0;
+  open_.reset();
 }
 
 int Connecting::id_of(const Entry& asked) const noexcept {
   return asked.type == Client::system_control ? identity_.system_control_id : module_id_;
 }
 
-double Connecting::wanted() const noexcept {
-  return kScript[step_].kind == Step::Kind::set_timeout ? module_timeout_s_ : 0;
+std::optional<double> Connecting::wanted() const noexcept {
+  const Step& step = kScript[step_];
+  if (!step.sets()) return std::nullopt;
+  return step.kind == Step::Kind::set_timeout ? module_timeout_s_ : 0;
+}
+
+OpenInquiry Connecting::inquiry() const noexcept {
+  const Step& step = kScript[step_];
+  const bool vital = step.must_answer() || step.sets();
+  return OpenInquiry({step.entry, wanted()}, vital ? OpenInquiry::kAttempts : kOptionalAttempts);
 }
 
 }  // namespace kphi::iq

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "drivers/iq/exchange.hpp"
+#include "drivers/iq/inquiry.hpp"
 #include "drivers/iq/script.hpp"
 
 namespace kphi::iq {
@@ -30,9 +31,10 @@ class Connecting {
 
  private:
   [[nodiscard]] int id_of(const Entry& entry) const noexcept;
-  [[nodiscard]] double wanted() const noexcept;
-  void take_answer(const Heard& heard);
-  void fail_attempt(const char* why);
+  [[nodiscard]] std::optional<double> wanted() const noexcept;
+  [[nodiscard]] OpenInquiry inquiry() const noexcept;
+  void conclude(const char* why_silent);
+  void take_silence(const char* why);
   void take_own_id(double id);
   void compare_uid();
   void next() noexcept;
@@ -42,8 +44,8 @@ class Connecting {
   std::optional<Identity> known_;
   Identity identity_;
   std::size_t step_ = 0;
-  bool asked_ = false;
-  int attempts_ = 0;
+  std::optional<OpenInquiry> open_;  ///< of this step
+  bool asked_ = false;               ///< an answer is awaited
   std::string failure_;
   bool another_module_ = false;
 };

@@ -2,14 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace kphi::iq {
-namespace {
-
-constexpr int kAttempts = 3;
-
-}  // namespace
 
 void Inquiries::check(const std::vector<Inquiry>& inquiries) {
   for (const Inquiry& inquiry : inquiries) {
@@ -24,58 +20,50 @@ void Inquiries::check(const std::vector<Inquiry>& inquiries) {
   }
 }
 
-void Inquiries::begin(std::vector<Inquiry> inquiries) {
-  inquiries_ = std::move(inquiries);
-  left_ = inquiries_.size();
-  states_.assign(left_, State::waiting);
-  attempts_.assign(left_, 0);
-  replies_.assign(left_, {});
+void Inquiries::begin(const std::vector<Inquiry>& inquiries) {
+  items_.clear();
+  for (const Inquiry& inquiry : inquiries) items_.push_back({OpenInquiry(inquiry)});
 }
 
 void Inquiries::advance(Exchange& exchange, int system_control_id, Instant now) {
-  if (done()) return;
-  for (std::size_t i = 0; i < inquiries_.size(); ++i) {
-    if (states_[i] != State::waiting) continue;
-    const auto& [wanted, set_to] = inquiries_[i];
+  for (Item& item : items_) {
+    if (item.asked || item.open.done()) continue;
+    const auto& [wanted, set_to] = item.open.inquiry();
     const int id = wanted->type == Client::system_control ? system_control_id : module_id_;
-    const bool sent = set_to ? exchange.tell_and_ask(*wanted, *set_to, id, now) : exchange.ask(*wanted, id, now);
-    if (sent) states_[i] = State::asked;
+    item.asked = set_to ? exchange.tell_and_ask(*wanted, *set_to, id, now) : exchange.ask(*wanted, id, now);
   }
 }
 
 void Inquiries::take(const Heard& heard) {
-  for (std::size_t i = 0; i < inquiries_.size(); ++i) {
-    if (states_[i] != State::asked || inquiries_[i].entry != &heard.entry()) continue;
-    const bool last = ++attempts_[i] >= kAttempts;
-    states_[i] = State::waiting;
-    if (heard.kind != Heard::Kind::answer) {
-      if (last) finish(i);
-      return;
-    }
-    const auto& set_to = inquiries_[i].set_to;
-    replies_[i].value = heard.value();
-    replies_[i].accepted = set_to && is_as_set(heard.entry(), *set_to, heard.value());
-    if (!set_to || replies_[i].accepted || last) finish(i);
-    return;
+  for (Item& item : items_) {
+    if (!item.asked || item.open.inquiry().entry != &heard.entry()) continue;
+    item.asked = false;
+    return item.open.take(heard.kind == Heard::Kind::answer ? std::optional(heard.value()) : std::nullopt);
   }
+}
+
+bool Inquiries::done() const noexcept {
+  return std::all_of(items_.begin(), items_.end(), [](const Item& item) { return item.open.done(); });
 }
 
 bool Inquiries::sets(const Entry& wanted) const noexcept {
-  for (std::size_t i = 0; i < inquiries_.size(); ++i) {
-    if (states_[i] != State::done && inquiries_[i].entry == &wanted && inquiries_[i].set_to) return true;
-  }
-  return false;
+  return std::any_of(items_.begin(), items_.end(), [&](const Item& item) {
+    const Inquiry& inquiry = item.open.inquiry();
+    return !item.open.done() && inquiry.entry == &wanted && inquiry.set_to;
+  });
 }
 
 void Inquiries::abandon() noexcept {
-  for (std::size_t i = 0; i < inquiries_.size(); ++i) {
-    if (states_[i] != State::done) finish(i);
+  for (Item& item : items_) {
+    item.open.give_up();
+    item.asked = false;
   }
 }
 
-void Inquiries::finish(std::size_t i) noexcept {
-  states_[i] = State::done;
-  --left_;
+std::vector<Reply> Inquiries::replies() const {
+  std::vector<Reply> all;
+  for (const Item& item : items_) all.push_back(item.open.reply());
+  return all;
 }
 
 }  // namespace kphi::iq

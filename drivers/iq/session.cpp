@@ -102,11 +102,11 @@ void Session::expire_lease(Instant now) {
   emergency_stop(now);
 }
 
-void Session::inquire(std::vector<Inquiry> inquiries, Instant now) {
+void Session::inquire(const std::vector<Inquiry>& inquiries, Instant now) {
   if (state_ != State::ready) throw std::logic_error("only a module that is connected can be asked");
   if (!inquiries_.done()) throw std::logic_error("one inquiry after the other");
   Inquiries::check(inquiries);
-  inquiries_.begin(std::move(inquiries));
+  inquiries_.begin(inquiries);
   service(now);
 }
 

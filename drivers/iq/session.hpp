@@ -82,7 +82,7 @@ class Session {
 
   /// Puts questions between the polls. Throws std::invalid_argument as Inquiries::check does, std::logic_error unless
   /// ready or while others are open.
-  void inquire(std::vector<Inquiry> inquiries, Instant now);
+  void inquire(const std::vector<Inquiry>& inquiries, Instant now);
   [[nodiscard]] const Inquiries& inquiries() const noexcept { return inquiries_; }
 
   void receive(std::span<const std::uint8_t> bytes, Instant now);

@@ -2,24 +2,35 @@
 
 #include <fmt/format.h>
 
+#include "drivers/iq/inquiry.hpp"
+
 namespace kphi::iq {
 namespace {
 
 std::string path(const Entry& entry) { return fmt::format("{}.{}", name_of(entry.type), entry.name); }
+
+Reply prove(Dialogue& module, const Setting& setting) {
+  OpenInquiry open({setting.entry, setting.value});
+  while (!open.done()) {
+    module.tell(*setting.entry, setting.value);
+    const auto answer = module.ask(*setting.entry);
+    if (!answer) break;  // it has asked again by itself
+    open.take(answer->value);
+  }
+  return open.reply();
+}
 
 }  // namespace
 
 std::vector<Finding> set_and_read_back(Dialogue& module, std::span<const Setting> settings) {
   std::vector<Finding> findings;
   for (const Setting& setting : settings) {
-    module.tell(*setting.entry, setting.value);
-    const auto answer = module.ask(*setting.entry);
-    if (!answer && !setting.required) continue;
-    if (answer && is_as_set(*setting.entry, setting.value, answer->value)) continue;
+    const Reply reply = prove(module, setting);
+    if (reply.accepted || (!reply.value && !setting.required)) continue;
     findings.push_back(
         {Severity::fault,
          fmt::format("{} was set to {:.9g} {} and {}", path(*setting.entry), setting.value, setting.entry->unit,
-                     answer ? fmt::format("reads back {:.9g}", answer->value) : "does not answer"),
+                     reply.value ? fmt::format("reads back {:.9g}", *reply.value) : "does not answer"),
          "check the firmware version and the line to the module, then connect again"});
   }
   return findings;

@@ -18,6 +18,7 @@
 #include "drivers/device_error.hpp"
 #include "drivers/sim/control_line.hpp"
 #include "drivers/sim/fault_file.hpp"
+#include "drivers/sim/motor_file.hpp"
 #include "drivers/sim/server.hpp"
 #include "drivers/sim/truth.hpp"
 #include "profiles/bench.hpp"
@@ -77,7 +78,7 @@ std::string text_of(const std::string& path) {
     if (file) return text;
   } catch (const std::ios_base::failure&) {  // a folder
   }
-  throw ConfigurationError(path + ": cannot be read; name a fault script");
+  throw ConfigurationError(path + ": cannot be read; name a file that is there");
 }
 
 void load_faults(const std::string& path, BenchSettings& bench) {
@@ -86,7 +87,17 @@ void load_faults(const std::string& path, BenchSettings& bench) {
     bench.faults = parse_faults(text, path);
     bench.netbox.habits = parse_habits(text, path);
     bench.motor_faults = parse_motor_faults(text, path);
-  } catch (const FaultFileError& error) {
+  } catch (const FileError& error) {
+    throw ConfigurationError(error.what());
+  }
+}
+
+void load_motor(const std::string& path, BenchSettings& bench) {
+  try {
+    const MotorProfile profile = parse_motor_profile(text_of(path), path);
+    bench.plant.motor = profile.motor;
+    bench.module.sensors = profile.sensors;
+  } catch (const FileError& error) {
     throw ConfigurationError(error.what());
   }
 }
@@ -110,6 +121,7 @@ ServerSettings settings_of(const profiles::Bench& bench, const Options& options)
   settings.http_port = options.free_ports ? 0 : bench.netbox.http_port;
   settings.tcp_port = options.free_ports ? 0 : bench.netbox.tcp_port;
   if (!bench.simulation->faults.empty()) load_faults(bench.simulation->faults, settings.bench);
+  if (!bench.simulation->motor.empty()) load_motor(bench.simulation->motor, settings.bench);
   if (!options.truth_log.empty()) {
     settings.bench.keep = FaultyWire::Keep::datagrams;
     settings.bench.motor_keep = IqLine::Keep::replies;
@@ -135,8 +147,9 @@ std::string resolved_text(const profiles::Bench& bench, const Addresses& address
   file["simulation"]["time_scale"] = fmt::format("{}", bench.simulation->time_scale);
   file["simulation"]["seed"] = bench.simulation->seed;
   // The copy may lie in another folder.
-  const std::string& faults = bench.simulation->faults;
+  const std::string &faults = bench.simulation->faults, &motor = bench.simulation->motor;
   if (!faults.empty()) file["simulation"]["faults"] = std::filesystem::absolute(faults).string();
+  if (!motor.empty()) file["simulation"]["motor"] = std::filesystem::absolute(motor).string();
   return YAML::Dump(file) + "\n";
 }
 

@@ -1,36 +1,14 @@
 #include "drivers/sim/fault_file.hpp"
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
 #include "drivers/sim/habits.hpp"
+#include "drivers/sim/strict_map.hpp"
 
 namespace kphi::sim {
 namespace {
 
 constexpr const char* kFormat = "kphi-faults/1";
-
-[[noreturn]] void refuse(const std::string& path, const YAML::Mark& mark, const std::string& what,
-                         const std::string& next_move) {
-  throw FaultFileError(fmt::format("{}:{}:{}: {}; {}", path, mark.line + 1, mark.column + 1, what, next_move));
-}
-
-/// A map of scalars, each key once.
-std::map<std::string, YAML::Node> members(const YAML::Node& map, const std::string& path) {
-  if (!map.IsMap()) refuse(path, map.Mark(), "this is no map of keys and values", "write key: value");
-  std::map<std::string, YAML::Node> all;
-  for (const auto& member : map) {
-    if (!member.first.IsScalar()) refuse(path, member.first.Mark(), "this key is no word", "write key: value");
-    const bool fresh = all.emplace(member.first.Scalar(), member.second).second;
-    if (!fresh) refuse(path, member.first.Mark(), fmt::format("'{}' stands twice", member.first.Scalar()), "keep one");
-  }
-  return all;
-}
-
-const std::string& scalar(const std::string& key, const YAML::Node& value, const std::string& path) {
-  if (!value.IsScalar()) refuse(path, value.Mark(), fmt::format("{} is no single value", key), "write one");
-  return value.Scalar();
-}
 
 NetBoxHabits read_habits(const YAML::Node& node, const std::string& path) {
   NetBoxHabits habits;
@@ -59,17 +37,9 @@ void read_entry(const YAML::Node& node, const std::string& path, FaultType (*mak
   }
 }
 
-YAML::Node parse(const std::string& text, const std::string& path) {
-  try {
-    return YAML::Load(text);
-  } catch (const YAML::Exception& error) {
-    refuse(path, error.mark, error.msg, "mend the YAML");
-  }
-}
-
 /// Its members, known by name; there is a list of faults.
 std::map<std::string, YAML::Node> file_of(const std::string& text, const std::string& path) {
-  const YAML::Node root = parse(text, path);
+  const YAML::Node root = parse_yaml(text, path);
   auto all = members(root, path);
   for (const auto& [key, value] : all) {
     if (key != "format" && key != "faults" && key != "habits")

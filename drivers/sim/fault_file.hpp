@@ -9,22 +9,16 @@
 // `kind` says which device an entry concerns.
 #pragma once
 
-#include <stdexcept>
 #include <string>
 
 #include "drivers/sim/faults.hpp"
+#include "drivers/sim/file_error.hpp"
 #include "drivers/sim/iq_faults.hpp"
 #include "drivers/sim/netbox_settings.hpp"
 
 namespace kphi::sim {
 
-/// The message reads "path:line:column: what; the next move".
-class FaultFileError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
-/// Strict; throws FaultFileError. `path` only names the text in messages. Entries of the motor, whose kinds begin with
+/// Strict; throws FileError. `path` only names the text in messages. Entries of the motor, whose kinds begin with
 /// motor_, are for parse_motor_faults(), and its others for parse_faults().
 [[nodiscard]] FaultScript parse_faults(const std::string& text, const std::string& path);
 /// Of the same file; defaults where it names none.

@@ -4,32 +4,35 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <vector>
 
 #include "drivers/clock.hpp"
-#include "drivers/sim/faults.hpp"
+#include "drivers/sim/fault_entry.hpp"
 
 namespace kphi::sim {
 
-/// How long a fault of a kind goes on: no time at all; a window (for_s); a window or so many times (count).
-enum class FaultExtent : std::uint8_t { instant, window, window_or_count };
+/// How long a fault of a kind goes on: no time at all; a window (for_s); a window or so many times (count); a window,
+/// or from then on.
+enum class FaultExtent : std::uint8_t { instant, window, window_or_count, window_or_forever };
 
+/// A key of a kind: how its text becomes a member.
 template <class Fault>
 struct FaultParameter {
   std::string_view name;
-  void (*set)(Fault& fault, double value);
-  double low, high;
+  /// Throws FaultEntryError for a text that will not do.
+  void (*set)(Fault& fault, const FaultParameter& parameter, const std::string& text);
+  double low = 0, high = 0;
   bool whole = false, required = false;
 
   /// For a member that is a number or a Duration (then the script's value is in seconds).
   template <auto Member>
-  static void into(Fault& fault, double value) {
+  static void into(Fault& fault, const FaultParameter& parameter, const std::string& text) {
     using T = std::remove_reference_t<decltype(fault.*Member)>;
+    const double value = fault_number(parameter.name, text, {parameter.low, parameter.high, parameter.whole});
     if constexpr (std::is_same_v<T, Duration>) {
       fault.*Member = from_seconds(value);
     } else {
@@ -49,6 +52,7 @@ class FaultTable {
     std::string_view name;
     FaultExtent extent;
     std::vector<Parameter> parameters;
+    Fault usual{};  ///< where the script is silent
   };
 
   FaultTable(std::string device, std::vector<Row> rows) : device_(std::move(device)), rows_(std::move(rows)) {}
@@ -59,21 +63,24 @@ class FaultTable {
     return "?";
   }
 
+  [[nodiscard]] std::vector<Kind> kinds() const {
+    std::vector<Kind> all;
+    for (const Row& row : rows_) all.push_back(row.kind);
+    return all;
+  }
+
   /// Strict: unknown kinds and keys, values out of range and missing keys throw FaultEntryError.
   [[nodiscard]] Fault read(const FaultEntry& entry) const {
-    const Row& row = row_of(entry);
+    const Row& row = row_named(kind_of(entry));
     const std::vector<Parameter> parameters = parameters_of(row);
     refuse_unknown_keys(row, parameters, entry);
-    const bool ends = entry.contains("for_s"), counts = entry.contains("count");
-    if (row.extent == FaultExtent::window && !ends) refuse("", fmt::format("{} needs for_s", row.name));
-    if (row.extent == FaultExtent::window_or_count && !ends && !counts)
-      refuse("", fmt::format("{} needs for_s or count", row.name));
-    Fault fault;
+    refuse_endlessness(row, entry);
+    Fault fault = row.usual;
     fault.kind = row.kind;
     for (const Parameter& parameter : parameters) {
       const auto found = entry.find(std::string(parameter.name));
       if (found != entry.end()) {
-        parameter.set(fault, within(parameter, found->second));
+        parameter.set(fault, parameter, found->second);
       } else if (parameter.required) {
         refuse("", fmt::format("{} needs {}", row.name, parameter.name));
       }
@@ -84,19 +91,15 @@ class FaultTable {
  private:
   static constexpr double kLatest = 1e6;  // s
 
-  [[noreturn]] static void refuse(std::string_view key, const std::string& what) {
-    throw FaultEntryError(std::string(key), what);
-  }
+  [[noreturn]] static void refuse(const std::string& key, const std::string& what) { throw FaultEntryError(key, what); }
 
-  const Row& row_of(const FaultEntry& entry) const {
-    const auto named = entry.find("kind");
-    if (named == entry.end()) refuse("", "the kind is missing");
+  const Row& row_named(const std::string& name) const {
     std::string known;
     for (const Row& row : rows_) {
-      if (row.name == named->second) return row;
+      if (row.name == name) return row;
       known += fmt::format("{}{}", known.empty() ? "" : ", ", row.name);
     }
-    refuse("kind", fmt::format("no fault of {} is called '{}'; there are {}", device_, named->second, known));
+    refuse("kind", fmt::format("no fault of {} is called '{}'; there are {}", device_, name, known));
   }
 
   static std::vector<Parameter> parameters_of(const Row& row) {
@@ -117,15 +120,11 @@ class FaultTable {
     }
   }
 
-  static double within(const Parameter& parameter, const std::string& text) {
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc{} || end != text.data() + text.size())
-      refuse(parameter.name, fmt::format("'{}' is no number", text));
-    if (!(value >= parameter.low && value <= parameter.high))
-      refuse(parameter.name, fmt::format("{} is outside {} to {}", value, parameter.low, parameter.high));
-    if (parameter.whole && value != std::floor(value)) refuse(parameter.name, fmt::format("{} is not whole", value));
-    return value;
+  static void refuse_endlessness(const Row& row, const FaultEntry& entry) {
+    const bool ends = entry.contains("for_s"), counts = entry.contains("count");
+    if (row.extent == FaultExtent::window && !ends) refuse("", fmt::format("{} needs for_s", row.name));
+    if (row.extent == FaultExtent::window_or_count && !ends && !counts)
+      refuse("", fmt::format("{} needs for_s or count", row.name));
   }
 
   std::string device_;

@@ -4,10 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <string_view>
 
-#include "drivers/sim/faults.hpp"
+#include "drivers/sim/fault_entry.hpp"
 
 namespace kphi::sim {
 namespace {
@@ -48,12 +47,6 @@ constexpr std::array<Habit, 18> kHabits{{
     {"one_http_connection", &H::one_http_connection},
 }};
 
-void set_first_rdt(NetBoxHabits& habits, const std::string& value) {
-  const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), habits.first_rdt_sequence);
-  if (error != std::errc{} || end != value.data() + value.size())
-    throw FaultEntryError(std::string(kFirstRdt), fmt::format("'{}' is no number from 0 to 4294967295", value));
-}
-
 std::string known_names() {
   std::string names(kFirstRdt);
   for (const Habit& habit : kHabits) names += fmt::format(", {}", habit.name);
@@ -63,7 +56,10 @@ std::string known_names() {
 }  // namespace
 
 void set_habit(NetBoxHabits& habits, const std::string& name, const std::string& value) {
-  if (name == kFirstRdt) return set_first_rdt(habits, value);
+  if (name == kFirstRdt) {
+    habits.first_rdt_sequence = static_cast<std::uint32_t>(fault_number(name, value, {0, 4294967295.0, true}));
+    return;
+  }
   const auto habit = std::find_if(kHabits.begin(), kHabits.end(), [&](const Habit& h) { return h.name == name; });
   if (habit == kHabits.end())
     throw FaultEntryError(name, fmt::format("no habit is called '{}'; there are {}", name, known_names()));

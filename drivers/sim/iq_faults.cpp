@@ -2,37 +2,19 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <cctype>
 #include <cmath>
+
+#include "drivers/sim/fault_table.hpp"
 
 namespace kphi::sim {
 namespace {
 
-constexpr double kHour = 3600, kMany = 1e9;
+constexpr double kHour = 3600;
 constexpr Duration kOvertaken = std::chrono::milliseconds(10);
 constexpr std::string_view kPrefix = "motor_";
 
-/// A key of a kind: how its text becomes a member.
-struct Parameter {
-  std::string_view name;
-  void (*set)(MotorFault& fault, const Parameter& parameter, const std::string& text);
-  double low = 0, high = 0;
-  bool required = false;
-  bool whole = false;
-
-  [[nodiscard]] double within(const std::string& text) const { return fault_number(name, text, {low, high, whole}); }
-};
-
-template <auto Member>
-void as_number(MotorFault& fault, const Parameter& parameter, const std::string& text) {
-  using T = std::remove_reference_t<decltype(fault.*Member)>;
-  const double value = parameter.within(text);
-  if constexpr (std::is_same_v<T, Duration>) {
-    fault.*Member = from_seconds(value);
-  } else {
-    fault.*Member = static_cast<T>(value);
-  }
-}
+using Parameter = FaultParameter<MotorFault>;
 
 void as_value(MotorFault& fault, const Parameter&, const std::string& text) {
   if (text == "nan" || text == ".nan") {
@@ -61,121 +43,82 @@ void as_bytes(MotorFault& fault, const Parameter&, const std::string& text) {
 }
 
 using F = MotorFault;
-constexpr Parameter kP{"p", as_number<&F::p>, 0, 1};
-constexpr Parameter kType{"type", as_number<&F::type>, 0, 255, false, true};
-constexpr Parameter kSub{"sub", as_number<&F::sub>, 0, 255, false, true};
-constexpr Parameter kDelay{"delay_s", as_number<&F::delay>, 0, kHour};
-constexpr Parameter kAnyDelay{"delay_s", as_number<&F::delay>, 0, kHour, true};
+constexpr Parameter kP{"p", Parameter::into<&F::p>, 0, 1};
+constexpr Parameter kType{"type", Parameter::into<&F::type>, 0, 255, true};
+constexpr Parameter kSub{"sub", Parameter::into<&F::sub>, 0, 255, true};
+constexpr Parameter kDelay{"delay_s", Parameter::into<&F::delay>, 0, kHour};
+constexpr Parameter kAnyDelay{"delay_s", Parameter::into<&F::delay>, 0, kHour, false, true};
+constexpr Parameter kShort{"size", Parameter::into<&F::size>, 0, 22, true, true};
+constexpr Parameter kVolts{"volts", Parameter::into<&F::volts>, 0, 100, false, true};
 
-/// How long a fault of this kind goes on, and whether it may be of one entry only.
-enum class Extent : std::uint8_t { instant, window, replies, bytes };
+/// A fault of replies may be of one entry's, or of some of them.
+std::vector<Parameter> of_replies(std::vector<Parameter> parameters = {}) {
+  parameters.insert(parameters.end(), {kP, kType, kSub});
+  return parameters;
+}
 
-struct Kind {
-  MotorFaultKind kind;
-  std::string_view name;
-  Extent extent;
-  std::vector<Parameter> parameters;
-};
+MotorFault with(Duration delay, std::uint64_t size) {
+  MotorFault fault;
+  fault.delay = delay;
+  fault.size = size;
+  return fault;
+}
 
-const std::vector<Kind>& kinds() {
+const FaultTable<MotorFault>& table() {
   using K = MotorFaultKind;
-  using E = Extent;
-  static const std::vector<Kind> table{
-      {K::flip, "motor_flip", E::replies, {{"bits", as_number<&F::bits>, 1, 64, false, true}}},
-      {K::bad_crc, "motor_bad_crc", E::replies, {}},
-      {K::drop, "motor_drop", E::replies, {}},
-      {K::duplicate, "motor_duplicate", E::replies, {}},
-      {K::reorder, "motor_reorder", E::replies, {kDelay}},
-      {K::truncate, "motor_truncate", E::replies, {{"size", as_number<&F::size>, 0, 22, true, true}}},
-      {K::garbage,
-       "motor_garbage",
-       E::replies,
-       {{"bytes", as_bytes}, {"size", as_number<&F::size>, 1, 200, false, true}}},
-      {K::merge, "motor_merge", E::replies, {kAnyDelay}},
-      {K::split, "motor_split", E::replies, {kAnyDelay}},
-      {K::stall, "motor_stall", E::replies, {{"size", as_number<&F::size>, 1, 22, true, true}, kAnyDelay}},
-      {K::delay, "motor_delay", E::replies, {kAnyDelay, {"jitter_s", as_number<&F::jitter>, 0, kHour}}},
-      {K::value, "motor_value", E::replies, {{"value", as_value, 0, 0, true}}},
-      {K::wrong_length, "motor_wrong_length", E::replies, {{"size", as_number<&F::size>, 0, 16, true, true}}},
-      {K::wrong_id, "motor_wrong_id", E::replies, {{"id", as_number<&F::id>, 0, 63, true, true}}},
-      {K::stuck, "motor_stuck", E::replies, {}},
-      {K::mute, "motor_mute", E::window, {}},
-      {K::deaf, "motor_deaf", E::window, {}},
-      {K::command_flip, "motor_command_flip", E::bytes, {kP}},
-      {K::unplug, "motor_unplug", E::window, {{"other", as_number<&F::other>, 0, 1, false, true}}},
-      {K::brown_out, "motor_brown_out", E::instant, {{"down_s", as_number<&F::down>, 0, kHour}}},
-      {K::ignore_sets, "motor_ignore_sets", E::window, {}},
-      {K::baud, "motor_baud", E::instant, {{"baud", as_number<&F::baud>, 300, 2e6, false, true}}},
-      {K::redline, "motor_redline", E::window, {{"speed_rad_s", as_number<&F::speed>, 1, 4200, true}}},
-      {K::hot,
-       "motor_hot",
-       E::window,
-       {{"coil_celsius", as_number<&F::coil>, -300, 300},
-        {"controller_celsius", as_number<&F::controller>, -300, 300}}},
-      {K::over_voltage, "motor_over_voltage", E::window, {{"volts", as_number<&F::volts>, 0, 100, true}}},
-      {K::sag, "motor_sag", E::window, {{"volts", as_number<&F::volts>, 0, 100, true}}},
-      {K::locked, "motor_locked", E::window, {}},
-  };
-  return table;
-}
-
-const Kind& kind_named(const std::string& name) {
-  std::string known;
-  for (const Kind& kind : kinds()) {
-    if (kind.name == name) return kind;
-    known += fmt::format("{}{}", known.empty() ? "" : ", ", kind.name);
-  }
-  throw FaultEntryError("kind", fmt::format("no fault is called '{}'; there are {}", name, known));
-}
-
-std::vector<Parameter> parameters_of(const Kind& kind) {
-  std::vector<Parameter> all = kind.parameters;
-  all.push_back({"at_s", as_number<&F::at>, 0, 1e6, true});
-  if (kind.extent != Extent::instant)
-    all.push_back({"for_s", as_number<&F::lasts>, 1e-6, 1e6, kind.extent == Extent::window});
-  if (kind.extent == Extent::replies || kind.extent == Extent::bytes)
-    all.push_back({"count", as_number<&F::count>, 1, kMany, false, true});
-  if (kind.extent == Extent::replies) all.insert(all.end(), {kP, kType, kSub});
+  using E = FaultExtent;
+  static const FaultTable<MotorFault> all(
+      "the motor",
+      {
+          {K::flip, "motor_flip", E::window_or_count, of_replies({{"bits", Parameter::into<&F::bits>, 1, 64, true}})},
+          {K::bad_crc, "motor_bad_crc", E::window_or_count, of_replies()},
+          {K::drop, "motor_drop", E::window_or_count, of_replies()},
+          {K::duplicate, "motor_duplicate", E::window_or_count, of_replies()},
+          {K::reorder, "motor_reorder", E::window_or_count, of_replies({kDelay}), with(kOvertaken, 0)},
+          {K::truncate, "motor_truncate", E::window_or_count, of_replies({kShort})},
+          {K::garbage, "motor_garbage", E::window_or_count,
+           of_replies({{"bytes", as_bytes}, {"size", Parameter::into<&F::size>, 1, 200, true}}), with(Duration{0}, 8)},
+          {K::merge, "motor_merge", E::window_or_count, of_replies({kAnyDelay})},
+          {K::split, "motor_split", E::window_or_count, of_replies({kAnyDelay})},
+          {K::stall, "motor_stall", E::window_or_count,
+           of_replies({{"size", Parameter::into<&F::size>, 1, 22, true, true}, kAnyDelay})},
+          {K::delay, "motor_delay", E::window_or_count,
+           of_replies({kAnyDelay, {"jitter_s", Parameter::into<&F::jitter>, 0, kHour}})},
+          {K::value, "motor_value", E::window_or_count, of_replies({{"value", as_value, 0, 0, false, true}})},
+          {K::wrong_length, "motor_wrong_length", E::window_or_count,
+           of_replies({{"size", Parameter::into<&F::size>, 0, 16, true, true}})},
+          {K::wrong_id, "motor_wrong_id", E::window_or_count,
+           of_replies({{"id", Parameter::into<&F::id>, 0, 63, true, true}})},
+          {K::stuck, "motor_stuck", E::window_or_count, of_replies()},
+          {K::mute, "motor_mute", E::window, {}},
+          {K::deaf, "motor_deaf", E::window, {}},
+          {K::command_flip, "motor_command_flip", E::window_or_count, {kP}},
+          {K::unplug, "motor_unplug", E::window, {{"other", Parameter::into<&F::other>, 0, 1, true}}},
+          {K::brown_out, "motor_brown_out", E::instant, {{"down_s", Parameter::into<&F::down>, 0, kHour}}},
+          {K::ignore_sets, "motor_ignore_sets", E::window, {}},
+          {K::baud, "motor_baud", E::instant, {{"baud", Parameter::into<&F::baud>, 300, 2e6, true}}},
+          {K::redline, "motor_redline", E::window, {{"speed_rad_s", Parameter::into<&F::speed>, 1, 4200, false, true}}},
+          {K::hot,
+           "motor_hot",
+           E::window,
+           {{"coil_celsius", Parameter::into<&F::coil>, -300, 300},
+            {"controller_celsius", Parameter::into<&F::controller>, -300, 300}}},
+          {K::over_voltage, "motor_over_voltage", E::window, {kVolts}},
+          {K::sag, "motor_sag", E::window, {kVolts}},
+          {K::locked, "motor_locked", E::window, {}},
+      });
   return all;
 }
 
 }  // namespace
 
-std::string_view name_of(MotorFaultKind kind) noexcept {
-  const auto& table = kinds();
-  const auto found = std::find_if(table.begin(), table.end(), [&](const Kind& k) { return k.kind == kind; });
-  return found == table.end() ? "?" : found->name;
-}
+std::string_view name_of(MotorFaultKind kind) noexcept { return table().name_of(kind); }
 
 bool is_motor_fault(const FaultEntry& entry) noexcept {
   const auto kind = entry.find("kind");
   return kind != entry.end() && kind->second.rfind(kPrefix, 0) == 0;
 }
 
-MotorFault motor_fault_of(const FaultEntry& entry) {
-  const Kind& kind = kind_named(kind_of(entry));
-  const auto parameters = parameters_of(kind);
-  for (const auto& [key, value] : entry) {
-    const bool known = key == "kind" || std::any_of(parameters.begin(), parameters.end(),
-                                                    [&name = key](const Parameter& p) { return p.name == name; });
-    if (!known) throw FaultEntryError(key, fmt::format("{} has no '{}'", kind.name, key));
-  }
-  const bool endless = !entry.contains("for_s") && !entry.contains("count");
-  if (endless && (kind.extent == Extent::replies || kind.extent == Extent::bytes))
-    throw FaultEntryError("", fmt::format("{} needs for_s or count", kind.name));
-  MotorFault fault;
-  fault.kind = kind.kind;
-  if (fault.kind == MotorFaultKind::reorder) fault.delay = kOvertaken;
-  if (fault.kind == MotorFaultKind::garbage) fault.size = 8;
-  for (const Parameter& parameter : parameters) {
-    const auto found = entry.find(std::string(parameter.name));
-    if (found != entry.end()) {
-      parameter.set(fault, parameter, found->second);
-    } else if (parameter.required) {
-      throw FaultEntryError("", fmt::format("{} needs {}", kind.name, parameter.name));
-    }
-  }
-  return fault;
-}
+MotorFault motor_fault_of(const FaultEntry& entry) { return table().read(entry); }
 
 }  // namespace kphi::sim

@@ -9,8 +9,6 @@ namespace kphi::sim {
 namespace {
 
 constexpr int kTicksPerWarming = 70;  // heat is slow: every 10 ms
-constexpr double kControllerOhm = 0.007;
-constexpr double kOwnWarmth = 5;  // °C of the idling electronics
 
 double sign_of(double x) noexcept { return x > 0 ? 1.0 : (x < 0 ? -1.0 : 0.0); }
 
@@ -45,7 +43,7 @@ Motor::Motor(const MotorParameters& parameters) noexcept
   state_.supply_volts = parameters.supply_volts - parameters.idle_current * parameters.source_resistance;
   state_.supply_amps = state_.source_amps = parameters.idle_current;
   state_.coil_celsius = state_.stator_celsius = parameters.ambient_celsius;
-  state_.controller_celsius = parameters.ambient_celsius + kOwnWarmth;
+  state_.controller_celsius = parameters.ambient_celsius + parameters.controller_own_warmth;
 }
 
 void Motor::step(const PowerStage& stage, Random& random) noexcept {
@@ -151,7 +149,8 @@ void Motor::warm() noexcept {
   const double stator_lost = p.stator_convection * (state_.stator_celsius - p.ambient_celsius);
   state_.coil_celsius += (square * winding_resistance_ - lost - conducted) / p.coil_capacity * kInterval;
   state_.stator_celsius += (conducted - stator_lost) / p.stator_capacity * kInterval;
-  const double controller_target = p.ambient_celsius + kOwnWarmth + p.controller_to_ambient * kControllerOhm * square;
+  const double controller_target =
+      p.ambient_celsius + p.controller_own_warmth + p.controller_to_ambient * p.controller_resistance * square;
   state_.controller_celsius += (controller_target - state_.controller_celsius) * kInterval / p.controller_seconds;
   const double warmth = p.copper_coefficient * (state_.coil_celsius - 25);
   winding_resistance_ = p.winding_resistance * (1 + warmth);

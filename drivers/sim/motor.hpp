@@ -74,8 +74,10 @@ struct MotorParameters {
   double coil_to_stator = 0.25;           ///< W/°C
   double stator_capacity = 10;            ///< J/°C
   double stator_convection = 0.08;        ///< W/°C
-  double controller_to_ambient = 8;       ///< °C/W of its own 7 mohm and electronics
+  double controller_resistance = 0.007;   ///< ohm; what its own heat comes from
+  double controller_to_ambient = 8;       ///< °C/W
   double controller_seconds = 60;         ///< time constant
+  double controller_own_warmth = 5;       ///< °C of the idling electronics
   double ambient_celsius = 25;
   double turbulence = 0.02;  ///< deviation of the drag torque per tick, relative
 };

@@ -6,7 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "drivers/sim/faults.hpp"
+#include "drivers/clock.hpp"
+#include "drivers/sim/fault_entry.hpp"
 
 namespace kphi::sim {
 

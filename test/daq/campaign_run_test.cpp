@@ -5,6 +5,7 @@
 #include "daq/deterministic_bench.hpp"
 #include "daq/reduction.hpp"
 #include "drivers/device_error.hpp"
+#include "profiles/configuration_error.hpp"
 #include "results/campaign_verification.hpp"
 #include "results/journal.hpp"
 #include "results/run_reader.hpp"
@@ -126,6 +127,40 @@ TEST_F(ShortCampaign, KeepsWhatTheModuleToldOfItselfInEveryRun) {
   for (const auto& file : results_.complete_runs()) {
     EXPECT_THAT(results::read_header(file).motor_parameters,
                 AllOf(HasSubstr("brushless_drive.volts_limit: "), HasSubstr("uid: \"002300064d4b501120343353\"\n")));
+  }
+}
+
+TEST(SimulatedMotor, OfAFileTakesTheBuiltInsPlaceAndIsKeptBesideTheBenchFile) {
+  const test::TemporaryFolder folder;
+  const std::string motor =
+      "format: kphi-sim-motor/1\nsupply: {voltage_v: 13.5}\nsensors: {voltage_gain_error_relative: 0}\n";
+  std::ofstream(folder.path() / "motor.yaml") << motor;
+  std::string text = test::deterministic_place(1).text;
+  text.replace(text.find("in_process: true"), 16, "in_process: true, motor: motor.yaml");
+  const auto place = profiles::parse_bench(text, (folder.path() / "bench.yaml").string());
+  DeterministicBench bench(place);
+  EXPECT_NEAR(bench.simulation().plant().motor().supply_volts, 13.5, 0.01);
+  const auto results = results::CampaignFolder::create(folder.path(), "u", "c");
+  AgreeingOperator person;
+  NoProgress progress;
+  const auto campaign = test::short_campaign("0", 1, 2);
+  (void)run_campaign(bench, campaign, place, results, person, progress, [] { return false; });
+  EXPECT_EQ(test::bytes_of(results.motor_file()), motor);
+  EXPECT_NE(test::bytes_of(results.journal()).find("motor_sha256"), std::string::npos);
+}
+
+TEST(SimulatedMotor, OfABadFileIsRefusedAtItsPlace) {
+  const test::TemporaryFolder folder;
+  std::ofstream(folder.path() / "motor.yaml") << "format: kphi-sim-motor/1\nmotor: {resistance_ohm: low}\n";
+  std::string text = test::deterministic_place(1).text;
+  text.replace(text.find("in_process: true"), 16, "in_process: true, motor: motor.yaml");
+  const auto place = profiles::parse_bench(text, (folder.path() / "bench.yaml").string());
+  try {
+    const DeterministicBench bench(place);
+    FAIL();
+  } catch (const ConfigurationError& error) {
+    EXPECT_NE(std::string(error.what()).find("motor.yaml:2:25: resistance_ohm: 'low' is no number"), std::string::npos)
+        << error.what();
   }
 }
 

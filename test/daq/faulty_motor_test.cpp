@@ -49,6 +49,41 @@ TEST_F(FaultyMotor, StopsWhenTheModuleFallsSilentOrDeaf) {
   EXPECT_TRUE(motor_is_let_go());
 }
 
+TEST_F(FaultyMotor, StopsWhenTheRotorIsHeldAndTellsSo) {
+  for (const int seed : {4, 5, 6, 7, 8}) {
+    EXPECT_THAT(stop(fmt::format("  - {{at_s: {}, for_s: 10, kind: motor_locked}}\n", 0.8 + 0.4 * (seed - 4))),
+                HasSubstr("the rotor does not do what it is told"));
+    EXPECT_TRUE(motor_is_let_go());
+  }
+}
+
+TEST_F(FaultyMotor, StopsWhenARotorIsHeldAtASpeedThatTellsNothing) {
+  campaign_.profile.first = from_rpm(100);
+  campaign_.profile.last = from_rpm(160);
+  EXPECT_THAT(stop("  - {at_s: 0.3, for_s: 10, kind: motor_locked}\n"), HasSubstr("the rotor is stalled"));
+  EXPECT_LT(bench_->simulation().plant().motor().coil_celsius, 32);
+  EXPECT_TRUE(motor_is_let_go());
+}
+
+TEST_F(FaultyMotor, StopsWhenItsSpeedCannotBeReadOrIsNotBelieved) {
+  EXPECT_THAT(stop("  - {at_s: 1.5, for_s: 10, kind: motor_drop, type: 50, sub: 13}\n"), HasSubstr("was not read"));
+  EXPECT_TRUE(motor_is_let_go());
+  EXPECT_THAT(stop("  - {at_s: 1.2, for_s: 10, kind: motor_stuck, type: 50, sub: 13}\n"),
+              HasSubstr("instead of 10000 RPM"));
+  EXPECT_TRUE(motor_is_let_go());
+}
+
+TEST_F(FaultyMotor, FindsNothingWrongWithTheRotorInALongCleanRun) {
+  campaign_ = test::short_campaign("0", 1, 40);
+  campaign_.profile.first = from_rpm(100);
+  campaign_.profile.last = from_rpm(19100);
+  campaign_.profile.dwell = Seconds(2);
+  campaign_.limits.speed_max = from_rpm(19100);
+  EXPECT_NO_THROW((void)run("  []\n"));
+  std::swap(campaign_.profile.first, campaign_.profile.last);
+  EXPECT_NO_THROW((void)run("  []\n", 5));
+}
+
 TEST_F(FaultyMotor, DoubtsStepsWithoutEnoughSupply) {
   (void)run("  - {at_s: 1.4, for_s: 0.5, kind: motor_sag, volts: 1.5}\n");
   EXPECT_EQ(doubts(0)[0], "");

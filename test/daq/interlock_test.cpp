@@ -57,6 +57,11 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"Temperature", [](Observation& o) { o.coil_temperature = Celsius(111); }, "coil temperature 111 °C"},
         Case{"Derate", [](Observation& o) { o.derate = 0.8; }, "derates to 80 %"},
         Case{"Fault", [](Observation& o) { o.fault_bits = 0x42; }, "reports a fault (bits 0x42)"},
+        Case{"HeldRotor",
+             [](Observation& o) {
+               o.speed_error = {SpeedError::Kind::strays, from_rpm(6000), RadPerSec(0), Amperes(30), milliseconds(120)};
+             },
+             "the rotor does not do what it is told: 0 RPM instead of 6000 RPM"},
         Case{"DerateNotANumber", [](Observation& o) { o.derate = std::numeric_limits<double>::quiet_NaN(); },
              "derates"},
         Case{"SilentLoadCell", [](Observation& o) { o.load_cell_age = milliseconds(501); }, "load-cell sample 0.501 s"},

@@ -117,6 +117,22 @@ TEST_F(Recording, ShowsTheNewestOfEverythingWithItsAge) {
   EXPECT_EQ(seen.motor_age, Duration(6'400'000));
 }
 
+TEST_F(Recording, ShowsThatTheRotorDoesNotDoWhatItIsToldUntilTheStepsEnd) {
+  bench_.time.set(std::chrono::seconds(1));
+  recorder_.mark(results::Phase::step, 0, RadPerSec(500));
+  recorder_.drain();
+  EXPECT_EQ(recorder_.observe(bench_.time.now()).speed_error.kind, SpeedError::Kind::none);
+  for (int i = 1; i < 50; ++i)
+    bench_.readings.push_back({results::MotorChannel::speed, 1'000'000'000 + i * 20'000'000, 0, 0});
+  recorder_.drain();
+  const SpeedError error = recorder_.observe(bench_.time.now()).speed_error;
+  EXPECT_EQ(error.kind, SpeedError::Kind::strays);
+  EXPECT_DOUBLE_EQ(error.commanded.value(), 500);
+  recorder_.mark(results::Phase::spin_down, -1, RadPerSec(0));
+  recorder_.drain();
+  EXPECT_EQ(recorder_.observe(bench_.time.now()).speed_error.kind, SpeedError::Kind::none);
+}
+
 TEST_F(Recording, TakesTheMeanOfThePhaseAsZero) {
   recorder_.mark(results::Phase::zero_before, -1, RadPerSec(0));
   recorder_.drain();

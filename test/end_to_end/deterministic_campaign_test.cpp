@@ -1,5 +1,7 @@
 // A campaign on the deterministic bench, through the program, twice: the ground on which fault tests stand.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
 
 #include <map>
 
@@ -8,6 +10,8 @@
 
 namespace kphi::test {
 namespace {
+
+using testing::HasSubstr;
 
 /// Every file below a folder: relative name → bytes.
 std::map<std::string, std::string> contents(const std::filesystem::path& folder) {
@@ -18,17 +22,29 @@ std::map<std::string, std::string> contents(const std::filesystem::path& folder)
   return files;
 }
 
-std::map<std::string, std::string> campaign_from(int seed) {
+std::map<std::string, std::string> campaign_on(const std::string& bench, const std::string& campaign) {
   const TemporaryFolder folder;
   const auto path = [&](const char* name) { return (folder.path() / name).string(); };
-  std::ofstream(path("campaign.yaml")) << short_campaign_text("0, 90, 180", 2);
-  std::ofstream(path("bench.yaml")) << deterministic_place(seed).text;
+  std::ofstream(path("campaign.yaml")) << campaign;
+  std::ofstream(path("bench.yaml")) << bench;
   Process run(
       {KPHI_PROGRAM, "run", path("campaign.yaml"), "--bench", path("bench.yaml"), "--yes", "--out", path("out")});
   EXPECT_EQ(run.wait(), 0) << run.err();
   Process fit({KPHI_PROGRAM, "fit", run.out().substr(0, run.out().find('\n'))});
   EXPECT_EQ(fit.wait(), 0) << fit.err();
   return contents(path("out"));
+}
+
+std::map<std::string, std::string> campaign_from(int seed) {
+  return campaign_on(deterministic_place(seed).text, short_campaign_text("0, 90, 180", 2));
+}
+
+const std::string& file_named(const std::map<std::string, std::string>& files, const std::string& ending) {
+  for (const auto& [name, bytes] : files) {
+    if (name.ends_with(ending)) return bytes;
+  }
+  static const std::string none;
+  return none;
 }
 
 TEST(DeterministicCampaign, GivesTheSameFilesByteForByteFromOneSeedAndOthersFromAnother) {
@@ -47,6 +63,26 @@ TEST(DeterministicCampaign, GivesTheSameFilesByteForByteFromOneSeedAndOthersFrom
       EXPECT_FALSE(other.at(name) == bytes) << name << " does not depend on the seed";
     }
   }
+}
+
+TEST(DeterministicCampaign, TellsInTheReportWhetherTheMotorsClockWasCheckedAndCorrectsByIt) {
+  const std::string campaign = short_campaign_text("0, 90, 180", 1);
+  const std::string unchecked_bench = deterministic_place(7).text;
+  std::string checked_bench = unchecked_bench;
+  const std::string last_key = "speed_max_rpm: 19300";
+  checked_bench.replace(checked_bench.find(last_key), last_key.size(),
+                        last_key + ", clock_gain: {factor: 1.004, u: 2e-5}");
+  const auto unchecked = campaign_on(unchecked_bench, campaign);
+  const auto checked = campaign_on(checked_bench, campaign);
+
+  EXPECT_THAT(file_named(unchecked, "report.html"), HasSubstr("<dt>Motor's clock</dt><dd>unchecked: all speeds"));
+  EXPECT_THAT(file_named(unchecked, "coefficients.yaml"), HasSubstr("motor_clock: unchecked"));
+  EXPECT_THAT(file_named(checked, "report.html"), HasSubstr("gain 1.004 ± 2.0e-05, speeds are corrected"));
+  EXPECT_THAT(file_named(checked, "coefficients.yaml"), HasSubstr("motor_clock: {gain: 1.004, u: 2e-05}"));
+
+  const auto K_T = [](const std::string& text) { return YAML::Load(text)["K_T"]["value"].as<double>(); };
+  EXPECT_NEAR(K_T(file_named(checked, "coefficients.yaml")),
+              K_T(file_named(unchecked, "coefficients.yaml")) / (1.004 * 1.004), 1e-4 * 1.5e-6);
 }
 
 TEST(DeterministicCampaign, StopsWithExitCodeFourWhenItsFaultScriptTakesTheStreamAway) {

@@ -70,7 +70,7 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
     stream_through({reinterpret_cast<const char*>(data), size});
-  } catch (const sim::FaultFileError&) {
+  } catch (const sim::FileError&) {
   }
   return 0;
 }

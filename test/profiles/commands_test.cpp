@@ -69,6 +69,12 @@ TEST(CheckCommand, ReadsTheShippedFaultScriptAndTellsWhatWillGoWrong) {
   EXPECT_THAT(outcome.out, testing::HasSubstr("\n  at 500 s  http_slow, 1 times at most\n"));
 }
 
+TEST(CheckCommand, ReadsTheShippedMotor) {
+  const Outcome outcome = run("check " + shipped("motor_iq2306.yaml"));
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, testing::HasSubstr("simulated motor in order\n  motor      2221 RPM/V, 0.045 ohm"));
+}
+
 TEST(CheckCommand, RefusesAFaultScriptAtItsLineAndColumn) {
   const kphi::test::TemporaryFolder folder;
   const auto refused = [&](const std::string& text, const std::string& words) {
@@ -79,7 +85,10 @@ TEST(CheckCommand, RefusesAFaultScriptAtItsLineAndColumn) {
     EXPECT_EQ(outcome.out, "");
     EXPECT_THAT(outcome.err, testing::StartsWith(path + words));
   };
-  refused("format: kphi-faults/1\nfaults:\n  - {at_s: 0, for_s: 1, kind: los}\n", ":3:31: no fault is called 'los'");
+  refused("format: kphi-faults/1\nfaults:\n  - {at_s: 0, for_s: 1, kind: los}\n",
+          ":3:31: no fault of the load cell is called 'los'");
+  refused("format: kphi-faults/1\nfaults:\n  - {at_s: 0, kind: motor_sag}\n", ":3:5: motor_sag needs for_s");
+  refused("format: kphi-sim-motor/1\nmotor: {resistance_ohm: 0}\n", ":2:25: resistance_ohm: 0 is outside 0.001 to 10");
   refused("format: kphi-faults/1\nhabits: {axia: 1}\nfaults: []\n", ":2:16: '1' is neither false nor true");
   refused("format: kphi-fault/1\nfaults: []\n",
           ":1:9: kphi-fault/1 is not a known format; did you mean format: "

@@ -66,6 +66,7 @@ class FakeDialogue final : public Dialogue {
   std::map<const Entry*, double> values = good_values();
   std::vector<const Entry*> asked;
   bool ignores_sets = false;
+  int loses_sets = 0;  ///< so many of the next
 
   ManualClock clock{std::chrono::hours(5)};
   double gain = 1;         ///< of the module's clock
@@ -103,7 +104,7 @@ class FakeDialogue final : public Dialogue {
     return static_cast<float>(tick_s > 0 ? tick_s * std::floor(exact / tick_s) : exact);
   }
   void send(const Entry& entry, double value) override {
-    if (ignores_sets) return;
+    if (ignores_sets || loses_sets-- > 0) return;
     if (&entry == &kTime) {
       offset_s = value - gain * to_seconds(clock.now());
     } else if (values.count(&entry) != 0) {

@@ -9,6 +9,7 @@
 
 #include "drivers/device_error.hpp"
 #include "test/drivers/iq/module_on_a_line.hpp"
+#include "test/soon.hpp"
 
 namespace kphi::iq {
 namespace {
@@ -17,6 +18,7 @@ using namespace std::chrono_literals;
 using fake::Module;
 using fake::ModuleOnALine;
 using std::chrono::steady_clock;
+using test::soon;
 
 struct Stand {
   SteadyClock clock;
@@ -28,16 +30,6 @@ struct Stand {
     ASSERT_TRUE(line.heard_a_speed(speed));
   }
 };
-
-/// Polls with a deadline, for what announces itself nowhere.
-template <class What>
-bool soon(What&& what, std::chrono::milliseconds limit) {
-  for (const auto end = steady_clock::now() + limit; steady_clock::now() < end;) {
-    if (what()) return true;
-    std::this_thread::sleep_for(500us);
-  }
-  return what();
-}
 
 std::string refusal(const std::string& device, unsigned baud = 115200) {
   const SteadyClock clock;

@@ -11,6 +11,7 @@
 #include "drivers/device_error.hpp"
 #include "drivers/iq/motor.hpp"
 #include "test/drivers/iq/module_on_a_line.hpp"
+#include "test/soon.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::iq {
@@ -20,17 +21,8 @@ using namespace std::chrono_literals;
 using fake::Module;
 using fake::ModuleOnALine;
 using std::chrono::steady_clock;
+using test::soon;
 using test::TemporaryFolder;
-
-/// Polls with a deadline, for what announces itself nowhere.
-template <class What>
-bool soon(What&& what, std::chrono::milliseconds limit = 5000ms) {
-  for (const auto end = steady_clock::now() + limit; steady_clock::now() < end;) {
-    if (what()) return true;
-    std::this_thread::sleep_for(500us);
-  }
-  return what();
-}
 
 /// A module behind a name that stays while the terminal behind it changes.
 struct Bench {

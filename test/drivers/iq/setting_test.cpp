@@ -33,6 +33,16 @@ TEST(SettingReadBack, FindsWhatDidNotArrive) {
   EXPECT_THAT(findings[0].what, HasSubstr("timeout was set to 0.25 s and reads back 10"));
 }
 
+TEST(SettingReadBack, SetsAgainWhatWasLost) {
+  FakeDialogue module;
+  module.values[&kTimeout] = 10;
+  module.loses_sets = 2;
+  EXPECT_THAT(set_and_read_back(module, connection_settings(0.25)), IsEmpty());
+  module.values[&kTimeout] = 10;
+  module.loses_sets = 3;
+  EXPECT_EQ(set_and_read_back(module, connection_settings(0.25)).size(), 1u);
+}
+
 TEST(SettingReadBack, AcceptsOldFirmwareWhereTheEntryIsNotRequired) {
   FakeDialogue module;
   module.values.erase(&entry<"propeller_motor_control.timeout_behavior">);

@@ -12,23 +12,15 @@
 #include "drivers/device_error.hpp"
 #include "drivers/iq/motor.hpp"
 #include "drivers/sim/server.hpp"
+#include "test/soon.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::iq::test {
 namespace {
 
 using namespace std::chrono_literals;
+using kphi::test::soon;
 using Wall = std::chrono::steady_clock;
-
-template <class What>
-bool wait_for(What&& what, Wall::duration limit = 5s) {
-  const auto deadline = Wall::now() + limit;
-  while (!what()) {
-    if (Wall::now() > deadline) return false;
-    std::this_thread::yield();
-  }
-  return true;
-}
 
 class OverAPort : public testing::Test {
  protected:
@@ -65,7 +57,7 @@ TEST_F(OverAPort, EveryReadingWasSent) {
     Motor motor(device, 115200, {}, clock);
     motor.spin_at(RadPerSec(300));
     const auto begin = Wall::now();
-    ASSERT_TRUE(wait_for([&] {
+    ASSERT_TRUE(soon([&] {
       motor.renew();
       return motor.counters().replies > 100 || Wall::now() - begin > 4s;
     }));
@@ -100,14 +92,14 @@ TEST_F(OverAPort, UnpluggedItIsDeadSoonAndCanBeOpenedAgainByItsName) {
   {
     Motor motor(device, 115200, {}, clock);
     motor.spin_at(RadPerSec(300));
-    ASSERT_TRUE(wait_for([&] {
+    ASSERT_TRUE(soon([&] {
       motor.renew();
       return !motor.alive();
     }));
     EXPECT_NE(motor.failure(), "");
     EXPECT_THROW(motor.spin_at(RadPerSec(300)), DeviceError);
   }
-  ASSERT_TRUE(wait_for([&] { return std::filesystem::exists(device); }));
+  ASSERT_TRUE(soon([&] { return std::filesystem::exists(device); }));
   Motor again(device, 115200, {}, clock);
   EXPECT_EQ(again.identity().uid1, 0x00410018u) << "another module hangs there now";
 }
@@ -117,7 +109,7 @@ TEST_F(OverAPort, WhenTheModuleFallsBackToItsFirstRateTheDriverGivesUpAndTheModu
   {
     Motor motor(device, 921600, {}, clock);
     motor.spin_at(RadPerSec(300));
-    ASSERT_TRUE(wait_for([&] {
+    ASSERT_TRUE(soon([&] {
       motor.renew();
       return !motor.alive();
     }));

@@ -15,7 +15,7 @@ std::string refusal(const std::string& text) {
   try {
     (void)parse_faults(text, "f.yaml");
     (void)parse_habits(text, "f.yaml");
-  } catch (const FaultFileError& error) {
+  } catch (const FileError& error) {
     return error.what();
   }
   return "accepted";
@@ -105,7 +105,7 @@ TEST(FaultFile, RefusesHabitsThatABoxCannotHave) {
   EXPECT_EQ(refusal(head + "last_block: lost\n"),
             "f.yaml:4:15: 'lost' is neither partial, padded nor dropped; mend it");
   EXPECT_EQ(refusal(head + "axia: maybe\n"), "f.yaml:4:9: 'maybe' is neither false nor true; mend it");
-  EXPECT_EQ(refusal(head + "first_rdt_sequence: -1\n"), "f.yaml:4:23: '-1' is no number from 0 to 4294967295; mend it");
+  EXPECT_EQ(refusal(head + "first_rdt_sequence: -1\n"), "f.yaml:4:23: -1 is outside 0 to 4294967295; mend it");
   EXPECT_EQ(refusal(head + "smokes: true\n").substr(0, 42), "f.yaml:4:11: no habit is called 'smokes'; ");
   EXPECT_NE(refusal(head + "axia: ''\n"), "accepted");
   EXPECT_NE(refusal(head + "axia: [true]\n"), "accepted");

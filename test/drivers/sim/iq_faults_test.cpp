@@ -17,7 +17,7 @@ const std::string kHead = "format: kphi-faults/1\nfaults:\n";
 std::string refusal(const std::string& text) {
   try {
     (void)parse_motor_faults(text, "f.yaml");
-  } catch (const FaultFileError& error) {
+  } catch (const FileError& error) {
     return error.what();
   }
   return "accepted";

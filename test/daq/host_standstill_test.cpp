@@ -1,0 +1,100 @@
+// The host stands still in the middle of a run: short enough, and what it finds afterwards is older than anything may
+// be, yet all of it waits to be taken; too long, and nobody knows what the motor did meanwhile.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daq/deterministic_bench.hpp"
+#include "daq/interlock.hpp"
+#include "daq/run.hpp"
+#include "results/run_reader.hpp"
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using std::chrono::milliseconds;
+using testing::HasSubstr;
+
+/// The deterministic bench under a host whose threads all stand still once.
+class SleepyBench final : public Bench {
+ public:
+  explicit SleepyBench(const profiles::Bench& place) : bench(place) { bench.mounted("5x3", 0); }
+
+  [[nodiscard]] const Clock& clock() const override { return bench.clock(); }
+  [[nodiscard]] MotorLink& motor() override { return bench.motor(); }
+  [[nodiscard]] LoadCellLink& load_cell() override { return bench.load_cell(); }
+  [[nodiscard]] results::FileLayer& files() override { return bench.files(); }
+  [[nodiscard]] Duration sync_interval() const override { return bench.sync_interval(); }
+  void mounted(const std::string& propeller, double occlusion) override { bench.mounted(propeller, occlusion); }
+
+  void wait_until(Instant when) override {
+    if (clock().now() >= sleeps_at && !slept_) {
+      slept_ = asleep_ = true;
+      bench.wait_until(clock().now() + sleeps_for);
+      asleep_ = false;
+      return;
+    }
+    if (slept_ && !woken_) {  // the recorder's thread wakes as soon as the runner's
+      woken_ = true;
+      (*work_)();
+    }
+    bench.wait_until(when);
+  }
+  [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override {
+    work_ = std::make_shared<std::function<void()>>(std::move(work));
+    return bench.keep_calling([this, work = work_] {
+      if (!asleep_) (*work)();
+    });
+  }
+
+  DeterministicBench bench;
+  Instant sleeps_at = std::chrono::seconds(2);
+  Duration sleeps_for{0};
+
+ private:
+  std::shared_ptr<std::function<void()>> work_;
+  bool slept_ = false, asleep_ = false, woken_ = false;
+};
+
+class HostStandstill : public testing::Test {
+ protected:
+  RunResult record(Duration sleeps_for) {
+    bench_.sleeps_for = sleeps_for;
+    return record_run(bench_, {campaign_, place_, 0.0, 1, 10.0, folder_.path() / "run.h5"}, progress_,
+                      [] { return false; });
+  }
+  std::string stop(Duration sleeps_for) {
+    try {
+      (void)record(sleeps_for);
+    } catch (const SafetyStop& stop) {
+      return stop.what();
+    }
+    return "went on";
+  }
+
+  test::TemporaryFolder folder_;
+  profiles::Campaign campaign_ = test::short_campaign();
+  profiles::Bench place_ = test::deterministic_place(1);
+  SleepyBench bench_{place_};
+  NoProgress progress_;
+};
+
+TEST_F(HostStandstill, OfAQuarterOfASecondIsSeenTwiceAndBorneSinceAllOfItWaits) {
+  const RunResult result = record(milliseconds(250));
+  EXPECT_EQ(result.account.lost_network + result.account.lost_host, 0u);
+  EXPECT_EQ(results::read_run(result.file).outcome, results::Outcome::complete);
+}
+
+TEST_F(HostStandstill, OfHalfASecondEndsTheRunWithTheMotorCoasting) {
+  EXPECT_THAT(stop(milliseconds(500)), HasSubstr("stood still for 0.5"));
+  bench_.bench.wait_until(bench_.clock().now() + std::chrono::seconds(1));
+  EXPECT_EQ(bench_.bench.simulation().motor().stage().mode, sim::PowerStage::Mode::coast);
+}
+
+TEST_F(HostStandstill, BeforeTheMotorTurnsHarmsNothing) {
+  bench_.sleeps_at = milliseconds(400);
+  EXPECT_EQ(results::read_run(record(milliseconds(450)).file).outcome, results::Outcome::complete);
+}
+
+}  // namespace
+}  // namespace kphi::daq
