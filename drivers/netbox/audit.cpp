@@ -123,6 +123,18 @@ std::optional<Finding> gage_bias(const Configuration& box, const Intention&) {
                  "tare before each run"};
 }
 
+std::optional<Finding> monitor_conditions(const Configuration& box, const Intention&) {
+  constexpr const char* kAxes[] = {"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
+  if (!box.monitoring || !box.monitor_conditions || box.monitor_conditions->empty()) return std::nullopt;
+  std::string list;
+  for (const MonitorCondition& c : *box.monitor_conditions) {
+    list += fmt::format("{}{} {} {:g} {}", list.empty() ? "" : ", ", kAxes[c.axis], c.above ? '>' : '<', c.threshold,
+                        c.axis < 3 ? "N" : "Nm");
+  }
+  return Finding{Severity::note, fmt::format("the box judges these monitor conditions at 7 kHz: {}", list),
+                 "once one was true, the status says \"monitor condition\" until it is reset"};
+}
+
 std::optional<Finding> unknown_filter(const Configuration& box, const Intention&) {
   if (filter_cutoff_hz(box)) return std::nullopt;
   return Finding{
@@ -136,13 +148,10 @@ std::optional<Finding> receive_buffer(const Configuration& box, const Intention&
   return small_receive_buffer(intention.receive_buffer_bytes, box.records_per_datagram, box.rdt_rate_hz);
 }
 
-constexpr Check kChecks[] = {rdt_disabled,        empty_calibration,
-                             other_rate,          aliased_rotor,
-                             narrow_force_range,  narrow_torque_range,
-                             other_buffer,        filter_above_half_the_rate,
-                             unfiltered_low_rate, unknown_filter,
-                             slow_datagrams,      receive_buffer,
-                             tool_transform,      gage_bias};
+constexpr Check kChecks[] = {rdt_disabled,        empty_calibration,   other_rate,        aliased_rotor,
+                             narrow_force_range,  narrow_torque_range, other_buffer,      filter_above_half_the_rate,
+                             unfiltered_low_rate, unknown_filter,      slow_datagrams,    receive_buffer,
+                             tool_transform,      gage_bias,           monitor_conditions};
 
 }  // namespace
 

@@ -16,7 +16,8 @@ constexpr bool differ(const Configuration& a, const Configuration& b) {
 
 using C = Configuration;
 constexpr Row kTable[] = {
-    {Change::product, "product", [](const C& a, const C& b) { return a.product != b.product || a.kind != b.kind; }},
+    {Change::product, "product",
+     [](const C& a, const C& b) { return a.product != b.product || a.kind != b.kind || a.serial != b.serial; }},
     {Change::firmware, "firmware", differ<&C::firmware>},
     {Change::calibration, "calibration", differ<&C::calibration_serial>},
     {Change::slot, "configuration slot", differ<&C::slot>},

@@ -73,13 +73,24 @@ class Elements {
   /// Six numbers, separated by ; or , or blanks.
   [[nodiscard]] std::array<double, 6> six(const char* name) const {
     const std::string value = text(name);
-    std::vector<std::string> parts;
-    boost::algorithm::split(parts, value, boost::algorithm::is_any_of(";, \t\r\n"),
-                            boost::algorithm::token_compress_on);
+    const std::vector<std::string> parts = parts_of(value);
     std::array<double, 6> numbers{};
     if (parts.size() != numbers.size()) refuse(fmt::format("<{}> is \"{}\", not six numbers", name, value), kAskForXml);
     std::transform(parts.begin(), parts.end(), numbers.begin(),
                    [&](const std::string& part) { return parse_number(name, part); });
+    return numbers;
+  }
+
+  /// One whole number for each monitor condition; nothing when the box shows it otherwise, or not at all.
+  [[nodiscard]] std::optional<std::array<int, 16>> sixteen(const char* name) const {
+    const std::vector<std::string> parts = parts_of(optional_text(name));
+    std::array<int, 16> numbers{};
+    if (parts.size() != numbers.size()) return std::nullopt;
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const char* end = parts[i].data() + parts[i].size();
+      const auto [stopped, error] = std::from_chars(parts[i].data(), end, numbers[i]);
+      if (error != std::errc{} || stopped != end) return std::nullopt;
+    }
     return numbers;
   }
 
@@ -101,6 +112,13 @@ class Elements {
   static constexpr const char* kAskForXml = "open netftapi2.xml in a browser and compare";
 
  private:
+  [[nodiscard]] static std::vector<std::string> parts_of(const std::string& value) {
+    std::vector<std::string> parts;
+    boost::algorithm::split(parts, value, boost::algorithm::is_any_of(";, \t\r\n"),
+                            boost::algorithm::token_compress_on);
+    return parts;
+  }
+
   [[nodiscard]] double parse_number(const char* name, const std::string& text) const {
     double value = 0;
     const char* end = text.data() + text.size();
@@ -152,6 +170,7 @@ Product kind_of(const Elements& elements, const Configuration& configuration) {
 void read_identity(const Elements& elements, Configuration& configuration) {
   configuration.product = elements.optional_text("prodname");
   configuration.firmware = elements.text("mfgdigver");
+  configuration.serial = elements.optional_text("mfgdigsn");
   configuration.slot = elements.whole_number("setcfgsel", 0, 15);
   configuration.slot_name = elements.optional_text("cfgnam");
   configuration.calibration_serial = elements.text("cfgcalsn");
@@ -210,6 +229,20 @@ void read_stream(const Elements& elements, Configuration& configuration) {
   configuration.filter_code = elements.whole_number("setuserfilter", 0, std::size(kFilterCutoffHz) - 1);
 }
 
+void read_monitor(const Elements& elements, Configuration& configuration) {
+  configuration.monitoring = elements.optional_text("setmce") == "1";
+  const auto on = elements.sixteen("mce"), axis = elements.sixteen("mcx"), sign = elements.sixteen("mcc"),
+             counts = elements.sixteen("mcv");
+  if (!on || !axis || !sign || !counts) return;
+  std::vector<MonitorCondition> conditions;
+  for (std::size_t i = 0; i < on->size(); ++i) {
+    if ((*on)[i] != 1 || (*axis)[i] < 0 || (*axis)[i] > 5) continue;
+    const double per_unit = (*axis)[i] < 3 ? configuration.counts_per_newton : configuration.counts_per_newton_metre;
+    conditions.push_back({static_cast<int>(i), (*axis)[i], (*sign)[i] > 0, (*counts)[i] / per_unit});
+  }
+  configuration.monitor_conditions = std::move(conditions);
+}
+
 }  // namespace
 
 std::optional<double> filter_cutoff_hz(int filter_code) noexcept {
@@ -234,6 +267,7 @@ Configuration parse_configuration(std::string_view xml, const std::string& devic
   configuration.gage_bias = elements.six("setbias");
   if (elements.optional_text("setpke") == "1" && !elements.optional_text("runpkmx").empty())
     configuration.peaks = Peaks{elements.six("runpkmx"), elements.six("runpkmn")};
+  read_monitor(elements, configuration);
   configuration.xml = xml;
   return configuration;
 }

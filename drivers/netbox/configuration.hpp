@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "drivers/netbox/product.hpp"
 
@@ -15,10 +16,20 @@ struct Peaks {
   std::array<double, 6> high{}, low{};
 };
 
+/// A statement that the box judges with each internal sample, whatever rate it sends: once it has been true, bit 16 of
+/// the status stays set until LoadCell::reset_latch().
+struct MonitorCondition {
+  int number = 0;        ///< 0..15
+  int axis = 0;          ///< 0..5 = Fx..Tz
+  bool above = true;     ///< true of a load above the threshold; else below
+  double threshold = 0;  ///< N or Nm
+};
+
 struct Configuration {
   std::string product;  ///< prodname; empty when the box does not say
   Product kind = Product::net_box;
   std::string firmware;            ///< mfgdigver
+  std::string serial;              ///< mfgdigsn, of the box; empty when it does not say
   std::string calibration_serial;  ///< cfgcalsn
   int slot = 0;                    ///< setcfgsel: zero-based, the box's web pages count from one
   std::string slot_name;
@@ -38,6 +49,10 @@ struct Configuration {
   std::string tool_distance_unit, tool_angle_unit;
   std::array<double, 6> gage_bias{};  ///< setbias, already applied too
   std::optional<Peaks> peaks;         ///< runpkmx, runpkmn; nothing when the box does not keep them (setpke)
+
+  bool monitoring = false;  ///< setmce: the box judges its monitor conditions
+  /// Those switched on; nothing when the box does not tell them in a way that is understood.
+  std::optional<std::vector<MonitorCondition>> monitor_conditions;
 
   std::string xml;  ///< what was read, verbatim
 };

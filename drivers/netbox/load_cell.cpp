@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/prctl.h>
 
 #include <algorithm>
 #include <cmath>
@@ -20,9 +21,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::chrono::nanoseconds kHttpTimeout = 5s;
-constexpr std::chrono::nanoseconds kNap = 1500us;
-// A box sends 7000 records per second at most: where more come it is a simulated one in haste.
-constexpr double kHasteHz = 20'000;
 constexpr std::chrono::nanoseconds kHealthPeriod = 20ms;
 constexpr std::chrono::nanoseconds kLongestLinger = 100ms;
 constexpr int kBatchesPerDrain = 64;
@@ -35,8 +33,12 @@ Configuration read_configuration(const Place& place) {
 }
 
 StreamPolicy on_the_bench(const StreamPolicy& policy, const Clock& clock) {
-  return {policy.reconnect, clock.stretched(policy.first_pause), clock.stretched(policy.longest_pause),
-          clock.stretched(policy.give_up_after), clock.stretched(policy.lease)};
+  return {policy.reconnect,
+          clock.stretched(policy.first_pause),
+          clock.stretched(policy.longest_pause),
+          clock.stretched(policy.give_up_after),
+          clock.stretched(policy.lease),
+          policy.hand_over};
 }
 
 StreamSettings stream_settings(const Configuration& configuration, const Clock& clock, Command mode, Duration lease) {
@@ -44,6 +46,7 @@ StreamSettings stream_settings(const Configuration& configuration, const Clock& 
   settings.product = configuration.kind;
   settings.lease = lease;
   settings.buffered = mode == Command::buffered;
+  settings.multi_unit = mode == Command::multi_unit;
   settings.divisor = configuration.divisor;
   settings.records_per_datagram = configuration.records_per_datagram;
   settings.device_rate_hz = configuration.device_rate_hz;
@@ -93,11 +96,14 @@ LoadCell::LoadCell(const Place& place, const Clock& clock, Command mode, const S
       ring_(queue_capacity(configuration_, clock)),
       inquiry_(place, clock, configuration_, order_wakeup_),
       session_(stream_settings(configuration_, clock, mode, policy_.lease)),
-      gathers_(clock.shrunk(session_.settings().datagram_period()) < kNap),
-      always_naps_(wall_rate_hz(configuration_, clock) > kHasteHz),
+      gathering_(policy.hand_over, session_.settings().datagram_period(), bench_seconds_per_second(clock)),
       meter_(configuration_.device_rate_hz),
       reconnect_(policy_),
       streamed_(configuration_) {
+  if (mode == Command::multi_unit && configuration_.kind == Product::axia) {
+    throw DeviceError("Net Box " + place.host, "prepare the stream", "an Ethernet Axia knows no multi-unit mode",
+                      "use real-time or buffered mode");
+  }
   accepted_.reserve(UdpSocket::kBatch * kMaxRecords);
 }
 
@@ -132,21 +138,26 @@ void LoadCell::set_bias() noexcept {
   order_wakeup_.raise();
 }
 
+void LoadCell::reset_latch() noexcept {
+  latch_reset_asked_ = true;
+  order_wakeup_.raise();
+}
+
 std::size_t LoadCell::take(std::span<StampedRecord> out) noexcept { return ring_.take(out); }
 
 bool LoadCell::wait(std::chrono::nanoseconds wall) noexcept {
+  records_wanted_.store(true, std::memory_order_relaxed);
+  if (!ring_.empty()) return true;
   const auto deadline = std::chrono::steady_clock::now() + wall;
-  for (;;) {
-    consumer_waits_ = true;
-    std::atomic_thread_fence(std::memory_order_seq_cst);
-    if (!ring_.empty()) return true;
-    if (napping_ && !always_naps_) order_wakeup_.raise();
-    const auto left = deadline - std::chrono::steady_clock::now();
-    if (left <= 0ns) return false;
-    pollfd raised{consumer_wakeup_.descriptor(), POLLIN, 0};
-    poll_for({&raised, 1}, left);
-    consumer_wakeup_.clear();
+  for (auto left = wall; left > 0ns; left = deadline - std::chrono::steady_clock::now()) {
+    consumer_bell_.listen();
+    if (ring_.empty()) consumer_bell_.sleep(left);
+    if (ring_.empty()) continue;
+    consumer_bell_.leave();
+    return true;
   }
+  consumer_bell_.leave();
+  return false;
 }
 
 std::vector<Event> LoadCell::take_events() {
@@ -172,10 +183,12 @@ void LoadCell::run() noexcept {
   sigset_t all;
   sigfillset(&all);
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
+  // Else the kernel may make each nap longer by 50 us.
+  prctl(PR_SET_TIMERSLACK, 1);
   adopt_latest_stream();
   meter_.begin();
   reconnect_.streaming();
-  bias_asked_ = false;
+  bias_asked_ = latch_reset_asked_ = false;
   session_.start(clock_.now());
   while (!stopping_ && session_.state() != State::failed) pump();
   const bool failed = session_.state() == State::failed;
@@ -192,6 +205,7 @@ void LoadCell::run() noexcept {
 
 void LoadCell::pump() noexcept {
   if (bias_asked_.exchange(false)) session_.set_bias(clock_.now());
+  if (latch_reset_asked_.exchange(false)) session_.reset_latch();
   if (stopping_) return;
   send_requests();
   wait_for_datagrams();
@@ -213,27 +227,22 @@ void LoadCell::pump() noexcept {
 }
 
 void LoadCell::wait_for_datagrams() noexcept {
+  if (const auto wall = clock_.shrunk(nap()); wall > 0ns) return std::this_thread::sleep_for(wall);
   std::array<pollfd, 2> both{{{order_wakeup_.descriptor(), POLLIN, 0}, {socket_.native_handle(), POLLIN, 0}}};
   const Instant due = std::min({session_.deadline(), session_.release_deadline(), reconnect_.deadline()});
   poll_for(both, due == kNever ? 1h : clock_.shrunk(due - clock_.now()));
-  if (both[0].revents != 0) {
-    order_wakeup_.clear();
-  } else if (gathers_ && session_.state() == State::streaming && !session_.renews_next()) {
-    nap();
-  }
+  if (both[0].revents != 0) order_wakeup_.clear();
 }
 
-void LoadCell::nap() noexcept {
-  napping_ = true;
-  std::atomic_thread_fence(std::memory_order_seq_cst);
-  if (always_naps_ || !consumer_waits_) {
-    pollfd ordered{order_wakeup_.descriptor(), POLLIN, 0};
-    if (poll_for({&ordered, 1}, kNap)) order_wakeup_.clear();
-  }
-  napping_ = false;
+/// None without datagrams, so that silence and orders are noticed by poll, nor where a datagram is to be answered.
+Duration LoadCell::nap() const noexcept {
+  if (drained_ == 0 || session_.state() != State::streaming) return Duration{0};
+  const Duration nap = gathering_.nap(clock_.now(), awaited_);
+  return session_.renews_within(nap) ? Duration{0} : nap;
 }
 
 void LoadCell::drain() noexcept {
+  drained_ = 0;
   for (int batch = 0; batch < kBatchesPerDrain; ++batch) {
     const std::span<const UdpSocket::Datagram> datagrams = socket_.receive();
     if (datagrams.empty()) break;
@@ -243,12 +252,14 @@ void LoadCell::drain() noexcept {
     const Instant at_first = stamped ? clock_.at_realtime(first) : clock_.now();
     for (const UdpSocket::Datagram& datagram : datagrams)
       take_in(datagram, stamped ? at_first + clock_.stretched(between(first, datagram.stamp)) : at_first);
+    drained_ += datagrams.size();
     if (datagrams.size() < UdpSocket::kBatch) break;
   }
   hand_over();
 }
 
 void LoadCell::take_in(const UdpSocket::Datagram& datagram, Instant arrival) noexcept {
+  gathering_.note(arrival);
   session_.note_host_drops(datagram.dropped);
   const std::span<StampedRecord> room = ring_.room(records_in(datagram.bytes.size()));
   const std::size_t count = session_.receive_in_order(datagram.bytes, arrival, room);
@@ -274,8 +285,9 @@ void LoadCell::hand_over() noexcept {
   newest_arrival_ns_.store(newest_arrival_.count(), std::memory_order_release);
   if (!ring_.publish()) return;
   meter_.note_queue(ring_.waiting());
-  std::atomic_thread_fence(std::memory_order_seq_cst);
-  if (consumer_waits_ && consumer_waits_.exchange(false)) consumer_wakeup_.raise();
+  awaited_ = consumer_bell_.listening() || records_wanted_.load(std::memory_order_relaxed);
+  records_wanted_.store(false, std::memory_order_relaxed);
+  consumer_bell_.ring();
 }
 
 void LoadCell::send_requests() noexcept {
@@ -345,6 +357,7 @@ void LoadCell::adopt_latest_stream() {
   Session fresh(stream_settings(latest, clock_, mode_, policy_.lease), session_);
   std::destroy_at(&session_);
   std::construct_at(&session_, std::move(fresh));
+  gathering_ = Gathering(policy_.hand_over, session_.settings().datagram_period(), bench_seconds_per_second(clock_));
   std::destroy_at(&meter_);
   std::construct_at(&meter_, latest.device_rate_hz);
   streamed_ = std::move(latest);

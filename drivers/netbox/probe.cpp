@@ -80,7 +80,8 @@ std::vector<std::string> Probe::lines() const {
   std::vector<std::string> text;
   if (configuration) {
     const Configuration& box = *configuration;
-    text.push_back(fmt::format("{}, firmware {}", box.product.empty() ? "Net Box" : box.product, box.firmware));
+    text.push_back(fmt::format("{}, serial {}, firmware {}", box.product.empty() ? "Net Box" : box.product,
+                               box.serial.empty() ? "not told" : box.serial, box.firmware));
     text.push_back(fmt::format("calibration {} in slot {} \"{}\", {:.0f} counts per N, {:.0f} per Nm",
                                box.calibration_serial, box.slot, box.slot_name, box.counts_per_newton,
                                box.counts_per_newton_metre));

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "drivers/clock.hpp"
+#include "drivers/netbox/hand_over.hpp"
 
 namespace kphi::netbox {
 
@@ -18,6 +19,7 @@ struct StreamPolicy {
   /// it has passed: when this host dies, the box stops by itself. Each renewal costs what the box has gathered for the
   /// datagram under way (Counters::lost_at_renewals); nothing in real-time mode.
   Duration lease{0};
+  HandOver hand_over = HandOver::as_asked;
 };
 
 /// What a box said when it was asked.

@@ -1,5 +1,5 @@
-// Records on their way from the receive thread to the consumer: decoded where they are stored, copied once, by the
-// consumer. No lock; touches all its memory at construction and allocates nothing afterwards.
+// Records on their way from the receive thread to the consumer: decoded where they are stored, copied once at most, by
+// the consumer. No lock; touches all its memory at construction and allocates nothing afterwards.
 #pragma once
 
 #include <algorithm>
@@ -58,15 +58,23 @@ class RecordRing {
   /// Writer: records that the reader has not taken yet.
   [[nodiscard]] std::size_t waiting() const noexcept { return written_ - taken_.load(std::memory_order_relaxed); }
 
-  /// Reader: oldest first; how many.
-  std::size_t take(std::span<StampedRecord> out) noexcept {
+  /// Reader: `sink` is called with spans of the oldest, in place; `most` in all. They are gone when it returns, and not
+  /// when it throws. How many.
+  template <class Sink>
+  std::size_t consume(Sink&& sink, std::size_t most = SIZE_MAX) {
     const std::uint64_t taken = taken_.load(std::memory_order_relaxed);
-    const std::size_t count = std::min<std::size_t>(out.size(), published_.load(std::memory_order_acquire) - taken);
-    const std::size_t from = taken & (capacity_ - 1), before_wrap = std::min(count, capacity_ - from);
-    std::copy_n(&slots_[from], before_wrap, out.data());
-    std::copy_n(slots_.data(), count - before_wrap, out.data() + before_wrap);
+    const std::size_t count = std::min<std::size_t>(most, published_.load(std::memory_order_acquire) - taken);
+    const std::size_t from = taken & (capacity_ - 1), before_end = std::min(count, capacity_ - from);
+    if (before_end > 0) sink(std::span<const StampedRecord>(&slots_[from], before_end));
+    if (count > before_end) sink(std::span<const StampedRecord>(slots_.data(), count - before_end));
     taken_.store(taken + count, std::memory_order_release);
     return count;
+  }
+  /// Reader: oldest first; how many.
+  std::size_t take(std::span<StampedRecord> out) noexcept {
+    auto to = out.begin();
+    return consume([&](std::span<const StampedRecord> some) { to = std::copy(some.begin(), some.end(), to); },
+                   out.size());
   }
   /// Reader.
   [[nodiscard]] bool empty() const noexcept {

@@ -43,9 +43,10 @@ bool SequenceAccount::looks_rebooted(const Record& record, Instant arrival) cons
   if (!has_last_) return false;
   const std::int32_t ft_step = step(last_ft_, record.ft_sequence);
   if (!plausible(ft_step, arrival)) return true;
-  // From shortly before the wrap a boot looks like a step forward; the time that has passed tells them apart.
-  const bool wraps = ft_step > 0 && record.ft_sequence < last_ft_;
-  if (wraps && step(last_rdt(), record.rdt_sequence) <= 0 && !in_time(ft_step, arrival)) return true;
+  // From shortly before the wrap, or behind it, a boot looks like a step forward; the time that has passed tells them
+  // apart.
+  const bool begins_anew = ft_step > 0 && step(last_rdt(), record.rdt_sequence) <= 0;
+  if (begins_anew && counted_since_last(record.ft_sequence, arrival) && !in_time(ft_step, arrival)) return true;
   // What is late or doubled lies on the line of this stream or of one before.
   return ft_step < 0 && line(record.rdt_sequence, record.ft_sequence) != line(last_rdt_, last_ft_) &&
          !on_former_line(record);
@@ -137,6 +138,11 @@ bool SequenceAccount::plausible(std::int32_t ft_step, Instant arrival) const noe
   const double device_seconds = ft_step / device_rate_hz_;
   const double host_seconds = std::max(0.0, to_seconds(arrival - last_arrival_));
   return device_seconds > -kLongestDelaySeconds && device_seconds < 2 * host_seconds + kLongestDelaySeconds;
+}
+
+bool SequenceAccount::counted_since_last(std::uint32_t ft, Instant arrival) const noexcept {
+  const double host_seconds = to_seconds(arrival - last_arrival_);
+  return ft / device_rate_hz_ < kUsualDelaySeconds + (1 + kLargestSkew) * host_seconds;
 }
 
 bool SequenceAccount::in_time(std::int32_t ft_step, Instant arrival) const noexcept {

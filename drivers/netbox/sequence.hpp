@@ -104,6 +104,8 @@ class SequenceAccount {
   bool accept_first(const Record& record, Instant arrival) noexcept;
   void note_restart(const Record& record, Instant arrival, std::uint64_t missing) noexcept;
   bool plausible(std::int32_t ft_step, Instant arrival) const noexcept;
+  /// A box that has booted after the last accepted record can have counted so far.
+  bool counted_since_last(std::uint32_t ft, Instant arrival) const noexcept;
   bool in_time(std::int32_t ft_step, Instant arrival) const noexcept;
   bool accept_reboot(const Record& record, Instant arrival) noexcept;
   bool note_stray(const Record& record, Instant arrival, std::int32_t ft_step) noexcept;

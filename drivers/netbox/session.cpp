@@ -170,7 +170,8 @@ void Session::renew_lease(Instant now) noexcept {
 Command Session::start_command() const noexcept {
   if (settings_.product == Product::axia)
     return settings_.buffered ? Command::axia_multi_block : Command::axia_single_block;
-  return settings_.buffered ? Command::buffered : Command::real_time;
+  if (settings_.buffered) return Command::buffered;
+  return settings_.multi_unit ? Command::multi_unit : Command::real_time;
 }
 
 bool Session::take_records(std::size_t count, Instant arrival, std::vector<StampedRecord>& out) {

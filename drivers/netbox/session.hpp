@@ -18,10 +18,11 @@ namespace kphi::netbox {
 
 /// Durations are bench time (a protocol's wall time goes through Clock::stretched first).
 struct StreamSettings {
-  bool buffered = true;                                       ///< false: real-time mode, one record per datagram
-  unsigned divisor = 1;                                       ///< ft_sequence per record
-  int records_per_datagram = 40;                              ///< in buffered mode
-  double device_rate_hz = 7000;                               ///< ft_sequence per second
+  bool buffered = true;           ///< false: real-time mode, one record per datagram
+  bool multi_unit = false;        ///< real-time mode by the command that keeps several boxes in step; not on an Axia
+  unsigned divisor = 1;           ///< ft_sequence per record
+  int records_per_datagram = 40;  ///< in buffered mode
+  double device_rate_hz = 7000;   ///< ft_sequence per second
   Duration reply_timeout = std::chrono::milliseconds(100);    ///< of the first start; added to two datagram periods
   Duration settle = std::chrono::milliseconds(5);             ///< silence after a stop before the start is sent
   Duration silence_timeout = std::chrono::milliseconds(500);  ///< added to three datagram periods
@@ -64,6 +65,8 @@ class Session {
   /// While streaming: the box takes its present load as zero. Some boxes stop their stream then: it is started again
   /// when no record comes within three datagram periods and bias_patience. Another state: nothing is sent.
   void set_bias(Instant now);
+  /// The box forgets that one of its monitor conditions has been true. Not acknowledged: the status shows it.
+  void reset_latch() noexcept { send(Command::reset_latch); }
   /// Appends to `out` what can be delivered: ascending in ft_sequence. Records behind a gap wait for those that they
   /// may have overtaken (StreamSettings::reorder_records and reorder_patience) and come with a later call.
   void receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out);
@@ -89,9 +92,10 @@ class Session {
   [[nodiscard]] bool resuming() const noexcept {
     return resuming_ && (phase_ == Phase::draining || phase_ == Phase::awaiting);
   }
-  /// The lease is renewed with the next datagram: each moment until then costs records.
-  [[nodiscard]] bool renews_next() const noexcept {
-    return renewal_due_ != kNever && newest_arrival_ + settings_.datagram_period() >= renewal_due_;
+  /// The lease is renewed with a datagram that comes within `span`, or with the next: each moment that this one waits
+  /// costs records then.
+  [[nodiscard]] bool renews_within(Duration span) const noexcept {
+    return renewal_due_ != kNever && newest_arrival_ + span + settings_.datagram_period() >= renewal_due_;
   }
   /// Datagrams that the socket has dropped since it was opened (SO_RXQ_OVFL), as known at the datagram received next.
   void note_host_drops(std::uint64_t total) noexcept;

@@ -127,6 +127,12 @@ INSTANTIATE_TEST_SUITE_P(
              "more than 526 ms", "sysctl"},
         Case{"ToolTransform", [](Configuration& box, Intention&) { box.tool_transform[2] = 5; }, Severity::note,
              "tool transform is applied", "second time"},
+        Case{"MonitorConditions",
+             [](Configuration& box, Intention&) {
+               box.monitoring = true;
+               box.monitor_conditions = {{0, 2, true, 55}, {1, 5, false, -0.5}};
+             },
+             Severity::note, "monitor conditions at 7 kHz: Fz > 55 N, Tz < -0.5 Nm", "until it is reset"},
         Case{"GageBias", [](Configuration& box, Intention&) { box.gage_bias[0] = 745; }, Severity::note, "setbias",
              "tare"}),
     [](const testing::TestParamInfo<Case>& one) { return one.param.name; });

@@ -19,13 +19,14 @@ struct Edit {
 TEST(Changes, NameWhatGivesTheCountsAnotherMeaning) {
   const Configuration before = parse_configuration(captured_xml());
   EXPECT_EQ(to_words(compare(before, before)), "");
-  for (const Edit& edit : {Edit{"cfgcalsn", "FT12345", "calibration"}, Edit{"mfgdigver", "2.3.0", "firmware"},
-                           Edit{"prodname", "Ethernet Axia", "product"}, Edit{"setcfgsel", "1", "configuration slot"},
-                           Edit{"scfgfu", "kN", "units, counts per unit, ranges"},
-                           Edit{"cfgcpt", "500000", "counts per unit"}, Edit{"cfgmr", "330;330;990;30;30;60", "ranges"},
-                           Edit{"comrdtrate", "1000", "rate"}, Edit{"comrdtbsiz", "40", "records per datagram"},
-                           Edit{"setuserfilter", "4", "filter"}, Edit{"cfgtfx", "0;0;0;0;0;0", "tool transform"},
-                           Edit{"scfgtdu", "in", "tool transform"}, Edit{"setbias", "0;0;0;0;0;0", "gage bias"}}) {
+  for (const Edit& edit :
+       {Edit{"cfgcalsn", "FT12345", "calibration"}, Edit{"mfgdigver", "2.3.0", "firmware"},
+        Edit{"prodname", "Ethernet Axia", "product"}, Edit{"mfgdigsn", "LOT2", "product"},
+        Edit{"setcfgsel", "1", "configuration slot"}, Edit{"scfgfu", "kN", "units, counts per unit, ranges"},
+        Edit{"cfgcpt", "500000", "counts per unit"}, Edit{"cfgmr", "330;330;990;30;30;60", "ranges"},
+        Edit{"comrdtrate", "1000", "rate"}, Edit{"comrdtbsiz", "40", "records per datagram"},
+        Edit{"setuserfilter", "4", "filter"}, Edit{"cfgtfx", "0;0;0;0;0;0", "tool transform"},
+        Edit{"scfgtdu", "in", "tool transform"}, Edit{"setbias", "0;0;0;0;0;0", "gage bias"}}) {
     const Configuration after = parse_configuration(with(captured_xml(), edit.element, edit.content));
     EXPECT_EQ(to_words(compare(before, after)), edit.words) << edit.element;
   }

@@ -31,6 +31,7 @@ TEST(Configuration, ReadsACapturedBox) {
   const Configuration configuration = parse_configuration(captured_xml());
   EXPECT_EQ(configuration.product, "");
   EXPECT_EQ(configuration.firmware, "2.2.59");
+  EXPECT_EQ(configuration.serial, "LOTxxxx");
   EXPECT_EQ(configuration.calibration_serial, "FTxxxxx");
   EXPECT_EQ(configuration.slot, 0);
   EXPECT_EQ(configuration.slot_name, "empty");
@@ -50,6 +51,27 @@ TEST(Configuration, ReadsACapturedBox) {
   EXPECT_EQ(configuration.tool_angle_unit, "degrees");
   EXPECT_THAT(configuration.gage_bias, ElementsAre(745, 17, 447, 184, -596, -253));
   EXPECT_EQ(configuration.xml, captured_xml());
+}
+
+TEST(Configuration, TellsTheMonitorConditionsThatAreOn) {
+  const Configuration captured = parse_configuration(captured_xml());
+  EXPECT_FALSE(captured.monitoring);
+  ASSERT_TRUE(captured.monitor_conditions);
+  ASSERT_EQ(captured.monitor_conditions->size(), 2u);
+  const MonitorCondition& first = captured.monitor_conditions->front();
+  EXPECT_EQ(first.number, 0);
+  EXPECT_EQ(first.axis, 3);
+  EXPECT_FALSE(first.above);
+  EXPECT_EQ(first.threshold, 0.1);
+  EXPECT_EQ(captured.monitor_conditions->back().threshold, -0.01);
+  EXPECT_TRUE(parse_configuration(with(captured_xml(), "setmce", "1")).monitoring);
+}
+
+TEST(Configuration, MonitorConditionsThatItDoesNotUnderstandAreUnknownAndNoReasonToRefuse) {
+  for (const char* content :
+       {"", "1;1", "1;1;0;0;0;0;0;0;0;0;0;0;0;0;0;x", "99999999999;1;0;0;0;0;0;0;0;0;0;0;0;0;0;0"})
+    EXPECT_FALSE(parse_configuration(with(captured_xml(), "mcv", content)).monitor_conditions) << content;
+  EXPECT_FALSE(parse_configuration(with(captured_xml(), "mce", nullptr)).monitor_conditions);
 }
 
 TEST(Configuration, TellsTheProductWhereTheBoxDoes) {

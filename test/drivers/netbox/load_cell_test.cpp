@@ -250,7 +250,7 @@ TEST(LoadCell, StartsABoxAgainThatHasForgottenItsPeaks) {
   cell.start();
   booted = true;
   EXPECT_THAT(kinds_until(cell, 3),
-              testing::ElementsAre(EventKind::silent, EventKind::restarted, EventKind::reconnected));
+              testing::ElementsAre(EventKind::silent, EventKind::rebooted, EventKind::reconnected));
   EXPECT_EQ(box.starts(), 2);
   // Silent again, and nothing tells of another boot: this time it is left alone.
   EXPECT_THAT(kinds_until(cell, 2), testing::ElementsAre(EventKind::silent, EventKind::stolen));

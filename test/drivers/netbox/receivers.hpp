@@ -2,6 +2,7 @@
 // per record, in CPU time of its receiving thread.
 #pragma once
 
+#include <fmt/format.h>
 #include <sys/socket.h>
 #include <time.h>
 
@@ -9,6 +10,7 @@
 #include <array>
 #include <boost/endian/conversion.hpp>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <set>
 #include <vector>
@@ -42,10 +44,22 @@ struct Cost {
   double wall_s = 0;
   double receiver_cpu_s = 0;  ///< of the receiving thread
   double consumer_cpu_s = 0;  ///< of the thread that takes
+  std::uint64_t wakeups = 0;  ///< of the receiving thread: how often it has slept
   double receiver_ns() const { return 1e9 * receiver_cpu_s / static_cast<double>(records); }
   double both_ns() const { return 1e9 * (receiver_cpu_s + consumer_cpu_s) / static_cast<double>(records); }
   double rate_hz() const { return static_cast<double>(records) / wall_s; }
+  double wakeups_per_record() const { return static_cast<double>(wakeups) / static_cast<double>(records); }
 };
+
+/// How often a thread of this process has gone to sleep by itself.
+inline std::uint64_t sleeps_of(int thread_id) {
+  std::ifstream status(fmt::format("/proc/self/task/{}/status", thread_id));
+  for (std::string word; status >> word;) {
+    std::uint64_t count = 0;
+    if (word == "voluntary_ctxt_switches:" && status >> count) return count;
+  }
+  return 0;
+}
 
 /// Receives a stream and swaps its bytes, nothing else: no stamps, no account, no queue. Sleeps `nap` after each
 /// wake-up, so that datagrams gather.
@@ -119,9 +133,10 @@ class Driver {
  public:
   enum class Consumer { waits, polls };  ///< polls: takes every 5 ms, as a recorder does
 
-  Driver(const Ports& ports, const Clock& clock, bool buffered)
+  Driver(const Ports& ports, const Clock& clock, bool buffered, HandOver hand_over = HandOver::as_asked)
       : clock_(clock),
-        cell_({"127.0.0.1", ports.rdt, ports.http}, clock, buffered ? Command::buffered : Command::real_time) {
+        cell_({"127.0.0.1", ports.rdt, ports.http}, clock, buffered ? Command::buffered : Command::real_time,
+              {.hand_over = hand_over}) {
     const std::set<int> before = threads_of_this_process();
     cell_.start();
     for (const int id : threads_of_this_process())
@@ -132,22 +147,28 @@ class Driver {
   Cost run(double seconds, Consumer consumer) {
     take(consumer);
     Cost cost;
+    ages_.clear();
+    const std::uint64_t sleeps = sleeps_of(receiver_);
     const Counters begun = cell_.counters();
     const double cpu = cpu_seconds(cpu_clock_of(receiver_)), own = cpu_seconds(), wall = cpu_seconds(CLOCK_MONOTONIC);
     while (cpu_seconds(CLOCK_MONOTONIC) - wall < seconds) take(consumer);
     cost.wall_s = cpu_seconds(CLOCK_MONOTONIC) - wall;
     cost.receiver_cpu_s = cpu_seconds(cpu_clock_of(receiver_)) - cpu;
     cost.consumer_cpu_s = cpu_seconds() - own;
+    cost.wakeups = sleeps_of(receiver_) - sleeps;
     const Counters ended = cell_.counters();
     cost.records = ended.received - begun.received;
     cost.lost = ended.lost_network + ended.lost_host + ended.queue_overflows + ended.late;
     return cost;
   }
   LoadCell& cell() { return cell_; }
-  /// Bench time from the kernel's stamp to the consumer's hand of each record taken, of the last run, ascending.
-  std::vector<Duration>& ages() {
-    std::sort(ages_.begin(), ages_.end());
-    return ages_;
+  /// Bench time from the kernel's stamp to the consumer's hand that so many of 100 records of the last run did not
+  /// exceed.
+  Duration age(std::size_t percentile) {
+    if (ages_.empty()) return Duration{0};
+    const auto at = ages_.begin() + static_cast<std::ptrdiff_t>((ages_.size() - 1) * percentile / 100);
+    std::nth_element(ages_.begin(), at, ages_.end());
+    return *at;
   }
   bool keep_ages = false;
   bool in_order = true;  ///< each record taken followed the one before
@@ -181,7 +202,7 @@ class Driver {
 };
 
 inline constexpr double kHasteHz = 200'000;
-inline constexpr std::chrono::nanoseconds kBareNap = std::chrono::microseconds(1500);
+inline constexpr std::chrono::nanoseconds kBareNap = std::chrono::milliseconds(2);  // HandOver::gathered
 
 struct Pair {
   Cost bare, driver;
@@ -197,7 +218,7 @@ inline std::optional<Pair> measure_pair(const BoxProcess& box, bool buffered, do
     pair.bare = bare.run(seconds, kBareNap);
   }
   const SteadyClock clock(kHasteHz / 7000);
-  Driver driver(box.ports(), clock, buffered);
+  Driver driver(box.ports(), clock, buffered, HandOver::gathered);
   pair.driver = driver.run(seconds, Driver::Consumer::waits);
   const auto kept = [](const Cost& cost) { return std::abs(cost.rate_hz() / kHasteHz - 1) < 0.03; };
   if (!kept(pair.bare) || !kept(pair.driver)) return std::nullopt;

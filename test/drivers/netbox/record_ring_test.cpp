@@ -75,6 +75,33 @@ TEST(RecordRing, KeepsTheOrderAcrossItsEnd) {
   EXPECT_GT(expected, 100'000u);
 }
 
+TEST(RecordRing, ConsumesInPlaceInTwoPartsOverItsEnd) {
+  RecordRing ring(128);
+  std::uint32_t next = 0;
+  std::vector<StampedRecord> out(100);
+  for (const std::size_t count : {40, 40, 20}) write(ring, next, count);
+  ring.publish();
+  ring.take(out);
+  for (int i = 0; i < 2; ++i) write(ring, next, 30);
+  ring.publish();
+  struct Sink {
+    Sink() = default;
+    Sink(const Sink&) = delete;
+    std::vector<std::size_t> sizes;
+    std::vector<std::uint32_t> numbers;
+    void operator()(std::span<const StampedRecord> some) {
+      sizes.push_back(some.size());
+      for (const StampedRecord& one : some) numbers.push_back(one.record.ft_sequence);
+    }
+  } sink;
+  EXPECT_EQ(ring.consume(sink), 60u);
+  EXPECT_EQ(sink.sizes, (std::vector<std::size_t>{28, 32}));
+  for (std::uint32_t i = 0; i < 60; ++i) EXPECT_EQ(sink.numbers[i], 100 + i);
+  EXPECT_TRUE(ring.empty());
+  EXPECT_EQ(ring.consume(sink), 0u);
+  EXPECT_EQ(sink.sizes.size(), 2u) << "not called for nothing";
+}
+
 TEST(RecordRing, BetweenTwoThreadsNothingIsLostOrTorn) {
   RecordRing ring(1024);
   constexpr std::uint32_t kRecords = 400'000;

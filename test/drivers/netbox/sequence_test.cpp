@@ -89,6 +89,34 @@ TEST(Sequence, ABootShortlyBeforeTheWrapIsNoStepForward) {
   EXPECT_EQ(account.counters().lost_network, 0u);
 }
 
+TEST(Sequence, ABootShortlyBehindTheWrapIsNoStepForward) {
+  SequenceAccount account(1, 7000);
+  Record record;
+  const auto accept = [&](std::uint32_t rdt, std::uint32_t ft, Instant arrival) {
+    record.rdt_sequence = rdt;
+    record.ft_sequence = ft;
+    return account.accept(record, arrival);
+  };
+  EXPECT_TRUE(accept(30'000, 2600, 10s));
+  EXPECT_FALSE(accept(1, 3600, 10s + 520ms)) << "1000 samples take less";
+  EXPECT_TRUE(accept(2, 3601, 10s + 520ms));
+  EXPECT_EQ(account.counters().reboots, 1u);
+  EXPECT_EQ(account.counters().lost_network, 0u);
+}
+
+TEST(Sequence, ARestartThatComesLateIsNoBootWhereTheBoxHasCountedFurtherThanThat) {
+  SequenceAccount account(1, 7000);
+  Record record;
+  record.rdt_sequence = 30'000;
+  record.ft_sequence = 26'000;
+  EXPECT_TRUE(account.accept(record, 10s));
+  record.rdt_sequence = 1;
+  record.ft_sequence = 27'000;
+  EXPECT_TRUE(account.accept(record, 10s + 520ms)) << "held up for 0.38 s on its way";
+  EXPECT_EQ(account.counters().restarts, 1u);
+  EXPECT_EQ(account.counters().lost_network, 999u);
+}
+
 TEST(Sequence, ARestartAcrossTheWrapIsNoBoot) {
   SequenceAccount account(1, 7000);
   Record record;

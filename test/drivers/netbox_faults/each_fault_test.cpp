@@ -346,26 +346,6 @@ TEST(LastBlock, PartialPaddedOrDroppedIsAccountedFor) {
   }
 }
 
-TEST(MultiUnit, ItsRecordsAreThoseOfRealTimeMode) {
-  sim::NetBoxDevice box{sim::NetBoxSettings{}};
-  sim::FaultyWire wire(box, {}, 1);
-  StreamSettings settings;
-  settings.buffered = false;
-  Session session{settings};
-  session.start(Instant{0});
-  session.advance(session.deadline());
-  wire.request(std::array<std::uint8_t, 8>{0x12, 0x34, 0, 4, 0, 0, 0, 0}, 7, Instant{0});
-  std::vector<StampedRecord> out;
-  sim::Datagram datagram;
-  for (std::int64_t tick = 1; tick <= 700; ++tick) {
-    const Instant now(10'000'000 + tick * 1'000'000 / 7);
-    wire.sample({now, {}});
-    while (wire.next_datagram(datagram, now)) session.receive(datagram.payload(), now, out);
-  }
-  EXPECT_EQ(session.counters().received, 700u);
-  EXPECT_EQ(session.counters().datagrams, 700u);
-}
-
 constexpr Manner real_time(int divisor) { return {false, 1, divisor, 0, true, {}}; }
 constexpr Manner buffered(int records, int divisor, std::uint32_t first_ft = 0) {
   return {true, records, divisor, first_ft, true, {}};

@@ -1,9 +1,10 @@
 // Two hundred random mixtures of faults, each from its seed: account and truth agree in every number, and in every
-// record that is delivered.
+// record that is delivered. KPHI_MIXTURES=3000 in the environment runs more of them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <random>
 #include <string>
 
@@ -122,31 +123,43 @@ void add_upheaval(Dice& dice, sim::FaultScript& script) {
   script.push_back(fault);
 }
 
+void expect_agreement(std::uint64_t seed) {
+  Dice dice(seed);
+  const Manner manner = random_manner(dice);
+  sim::FaultScript script;
+  for (int n = dice.whole(1, 5); n > 0; --n) script.push_back(random_fault(dice, manner));
+  add_upheaval(dice, script);
+  std::string description;
+  for (const Fault& fault : script)
+    description += std::string(name_of(fault.kind)) + " at " + std::to_string(to_seconds(fault.at)) + "\n";
+  Joined joined(manner, script, seed);
+  joined.run_until(8s);
+  joined.finish();
+  EXPECT_EQ(joined.disagreement(), "") << "seed " << seed << ", " << (manner.buffered ? "buffered " : "real time ")
+                                       << manner.records_per_datagram << ", divisor " << manner.divisor << ", first ft "
+                                       << manner.first_ft << "\n"
+                                       << description;
+  EXPECT_EQ(joined.session().state(), State::streaming) << "seed " << seed;
+}
+
+constexpr int kSeedsInOne = 10;
+
+int mixtures() {
+  const char* asked = std::getenv("KPHI_MIXTURES");
+  return asked ? std::atoi(asked) : 200;
+}
+
 class Mixtures : public testing::TestWithParam<int> {};
 
 TEST_P(Mixtures, AccountEqualsTruth) {
-  for (int i = 0; i < 10; ++i) {
-    const auto seed = static_cast<std::uint64_t>(GetParam() * 10 + i);
-    Dice dice(seed);
-    const Manner manner = random_manner(dice);
-    sim::FaultScript script;
-    for (int n = dice.whole(1, 5); n > 0; --n) script.push_back(random_fault(dice, manner));
-    add_upheaval(dice, script);
-    std::string description;
-    for (const Fault& fault : script)
-      description += std::string(name_of(fault.kind)) + " at " + std::to_string(to_seconds(fault.at)) + "\n";
-    Joined joined(manner, script, seed);
-    joined.run_until(8s);
-    joined.finish();
-    EXPECT_EQ(joined.disagreement(), "") << "seed " << seed << ", " << (manner.buffered ? "buffered " : "real time ")
-                                         << manner.records_per_datagram << ", divisor " << manner.divisor
-                                         << ", first ft " << manner.first_ft << "\n"
-                                         << description;
-    EXPECT_EQ(joined.session().state(), State::streaming) << "seed " << seed;
-  }
+  for (int i = 0; i < kSeedsInOne; ++i) expect_agreement(static_cast<std::uint64_t>(GetParam() * kSeedsInOne + i));
 }
 
-INSTANTIATE_TEST_SUITE_P(TenSeedsEach, Mixtures, testing::Range(0, 20));
+INSTANTIATE_TEST_SUITE_P(TenSeedsEach, Mixtures, testing::Range(0, mixtures() / kSeedsInOne));
+
+/// A boot 0.37 s behind the wrap of ft_sequence, the stream not coming on: what the box has counted until it is asked
+/// again looks like a step forward.
+TEST(Mixture, ABootRightBehindTheWrap) { expect_agreement(4537); }
 
 }  // namespace
 }  // namespace kphi::netbox::test
