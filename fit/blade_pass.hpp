@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "fit/statistical_test.hpp"
@@ -17,7 +18,7 @@ struct BladePassLine {
   double reported_speed_rad_s = 0;  ///< mean over the same samples, as the module said
   double gain = 1;                  ///< true speed over reported speed
   double u_gain = 0;                ///< by the noise about the line and the speed's wander
-  double signal_to_noise = 0;       ///< amplitude over the mean amplitude of its surroundings
+  double signal_to_noise = 0;       ///< amplitude over the rms of the bins around it
 };
 
 struct BladePassCheck {
@@ -29,13 +30,13 @@ struct BladePassCheck {
 };
 
 struct BladePassOptions {
-  double u_box = 30e-6;  ///< relative standard uncertainty of the box's sample clock, a quartz
-  double search = 0.02;  ///< how far from the reported speed to look, relative
-  double least_signal_to_noise = 8;
+  double u_box = 30e-6;              ///< relative standard uncertainty of the box's sample clock, a quartz
+  double search = 0.02;              ///< how far from the reported speed to look, relative
+  double least_signal_to_noise = 8;  ///< of the line over the noise of one bin
 };
 
-/// Speeds in `run` are as the module reported them. Nothing when no step shows a line.
-[[nodiscard]] std::optional<BladePassCheck> check_by_blade_pass(const results::RunRecording& run,
+/// Speeds in `runs` are as the module reported them. Nothing when no step shows a line.
+[[nodiscard]] std::optional<BladePassCheck> check_by_blade_pass(std::span<const results::RunRecording> runs,
                                                                 const BladePassOptions& options = {});
 
 }  // namespace kphi::fit

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/line_fit.hpp"
 #include "fit/run_sums.hpp"
 
 namespace kphi::fit {
@@ -25,12 +26,7 @@ struct BootstrapInterval {
   double lower = 0, upper = 0;  ///< percentiles
 };
 
-/// Of every k, and of the line through those φ that `line_weights` names: coefficients of intercept and slope as linear
-/// functions of the k, in the order of φ (LineFit's own weights, held fixed).
-struct LineWeights {
-  std::vector<double> intercept, slope;  ///< one per φ
-};
-
+/// Of every k, and of the line through them with the weights that it was fitted with, held fixed.
 /// `runs` sorted by φ. The same arguments give the same numbers.
 [[nodiscard]] std::vector<BootstrapInterval> bootstrap(std::span<const RunSums> runs, const LineWeights& line,
                                                        const BootstrapOptions& options = {});

@@ -1,12 +1,13 @@
 // The paper's statements across propellers as a table: claim, value found, interval, verdict.
 #pragma once
 
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "fit/analysis.hpp"
+#include "fit/family.hpp"
 
 namespace kphi::fit {
 
@@ -19,8 +20,8 @@ enum class Verdict : std::uint8_t {
 [[nodiscard]] const char* name_of(Verdict verdict);
 
 struct Claim {
-  std::string id;         ///< short and stable: "slope_5in"
-  std::string statement;  ///< in words, with the tolerance
+  std::string id;         ///< short and stable: "slopes_5in"
+  std::string statement;  ///< in words
   std::string unit;
   double value = std::numeric_limits<double>::quiet_NaN();
   double lower = value, upper = value;  ///< 95 % interval
@@ -29,13 +30,9 @@ struct Claim {
   Verdict verdict = Verdict::not_tested;
 };
 
-/// One fitted propeller.
-struct FamilyMember {
-  Identification identification;
-  Analysis analysis;
-};
-
-/// Every claim stands in the table, also those that these propellers cannot test.
+/// Every claim stands in the table, also those that these propellers cannot test. The paper gives no tolerances: those
+/// allowed here stand in the table, chosen so that its claims do not contradict each other (doubling per inch and both
+/// offsets cannot hold exactly together).
 [[nodiscard]] std::vector<Claim> test_claims(std::span<const FamilyMember> family);
 
 }  // namespace kphi::fit

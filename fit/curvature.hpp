@@ -17,8 +17,8 @@ struct Curvature {
   [[nodiscard]] bool bends() const { return lack_of_fit.rejected() || quadratic.rejected(); }
 };
 
-/// `points` that carry the line, with standard errors; `freedom` of the variance behind those errors. With 2 points
-/// nothing can be tested, with 3 the two tests are the same.
-[[nodiscard]] Curvature curvature(std::span<const LinePoint> points, double freedom, const LineFit& line);
+/// `points` that carry the line (of an anchored one with φ = 0), with standard errors; `freedom` of the variance behind
+/// those errors. With 2 points nothing can be tested, with 3 the two tests are the same.
+[[nodiscard]] Curvature curvature(std::span<const LinePoint> points, double freedom);
 
 }  // namespace kphi::fit
