@@ -49,6 +49,23 @@ BudgetRow line_row(const LineFit& line, const Curvature& curvature) {
   return row;
 }
 
+/// Of K_T, intercept and slope; the line's own row is in the last two.
+std::vector<std::vector<double>> covariance_of(const ErrorSources& sources, const LineWeights& weights,
+                                               const BudgetRow& row) {
+  const std::vector<std::vector<double>> functions{unit_vector(weights.slope.size(), 0), weights.intercept,
+                                                   weights.slope};
+  std::vector<std::vector<double>> result(3, std::vector<double>(3));
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      result[i][j] = sources.covariance(functions[i], functions[j]);
+      if (i == 0 || j == 0) continue;
+      for (std::size_t m = 0; m < functions[i].size(); ++m)
+        result[i][j] += functions[i][m] * functions[j][m] * row.u * row.u;
+    }
+  }
+  return result;
+}
+
 BudgetRow scaled(BudgetRow row, double by) {
   row.sensitivity *= by;
   return row;
@@ -213,11 +230,7 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   const BudgetRow row = line_row(line, analysis.curvature);
   analysis.intercept = line_budget(sources, "intercept", kUnitOfK, line.intercept, weights.intercept, row);
   analysis.slope = line_budget(sources, "slope", "N/(rad/s)^2/deg", line.slope_per_deg, weights.slope, row);
-  const std::vector<std::vector<double>> functions{unit_vector(phis.size(), 0), weights.intercept, weights.slope};
-  for (const auto& a : functions) {
-    analysis.covariance.emplace_back();
-    for (const auto& b : functions) analysis.covariance.back().push_back(sources.covariance(a, b));
-  }
+  analysis.covariance = covariance_of(sources, weights, row);
   for (const double phi : options.prediction_deg)
     analysis.predictions.push_back(predict(identification, sources, weights, phi, row));
   analysis.standard = standard_air(analysis.coefficients, options);

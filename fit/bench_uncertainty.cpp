@@ -29,10 +29,10 @@ constexpr std::array<Entry, 5> kEntries{{
 
 void set_uncertainty(BenchUncertainty& bench, const std::string& text) {
   const std::size_t equals = text.find('=');
-  const auto value = equals == std::string::npos ? std::nullopt : parse_number(text.substr(equals + 1));
+  const double value = equals == std::string::npos ? -1 : parse_number(text.substr(equals + 1)).value_or(-1);
   for (const Entry& entry : kEntries) {
-    if (text.substr(0, equals) != entry.name || !value || !(*value >= 0)) continue;
-    bench.*entry.member = *value * entry.unit;
+    if (text.substr(0, equals) != entry.name || !(value >= 0)) continue;
+    bench.*entry.member = value * entry.unit;
     return;
   }
   throw ConfigurationError(fmt::format(

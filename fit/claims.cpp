@@ -55,14 +55,19 @@ std::optional<Estimate> minus(const std::optional<Estimate>& a, const std::optio
   return difference(*a, *b);
 }
 
-Claim judged(std::string id, std::string statement, std::string unit, const std::optional<Estimate>& found,
-             double allowed_lower, double allowed_upper) {
+Claim claim_of(std::string id, std::string statement, std::string unit, double allowed_lower, double allowed_upper) {
   Claim claim;
   claim.id = std::move(id);
   claim.statement = std::move(statement);
   claim.unit = std::move(unit);
   claim.allowed_lower = allowed_lower;
   claim.allowed_upper = allowed_upper;
+  return claim;
+}
+
+Claim judged(std::string id, std::string statement, std::string unit, const std::optional<Estimate>& found,
+             double allowed_lower, double allowed_upper) {
+  Claim claim = claim_of(std::move(id), std::move(statement), std::move(unit), allowed_lower, allowed_upper);
   if (!found) return claim;
   const double half = coverage_factor(found->freedom) * found->u;
   claim.value = found->value;
@@ -78,13 +83,11 @@ Claim judged(std::string id, std::string statement, std::string unit, const std:
 /// A test that does not reject only says that nothing was found: the claim then holds as far as these data see.
 Claim linear(const FamilyMember& member) {
   const StatisticalTest& test = member.analysis.curvature.lack_of_fit;
-  Claim claim;
-  claim.id = "linear_" + member.identification.propeller;
-  claim.statement = fmt::format("thrust falls linearly with the occlusion ({}); p of the lack of fit, {} or above",
-                                member.identification.propeller, kTestLevel);
-  claim.unit = "1";
-  claim.allowed_lower = kTestLevel;
-  claim.allowed_upper = 1;
+  const std::string& propeller = member.identification.propeller;
+  Claim claim = claim_of(fmt::format("linear_{}", propeller),
+                         fmt::format("thrust falls linearly with the occlusion ({}); p of the lack of fit, {} or above",
+                                     propeller, kTestLevel),
+                         "1", kTestLevel, 1);
   if (!test.tested()) return claim;
   claim.value = claim.lower = claim.upper = test.p;
   claim.verdict = test.rejected() ? Verdict::fails : Verdict::holds;

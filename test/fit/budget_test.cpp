@@ -29,7 +29,7 @@ TEST(Budget, ReproducesTheGaugeBlockOfTheGum) {
   EXPECT_NEAR(budget.combined(), 32, 0.5);
   EXPECT_EQ(std::floor(budget.freedom()), 16);
   EXPECT_NEAR(budget.coverage(0.99), 2.92, 0.02);
-  EXPECT_NEAR(budget.expanded(0.99), 93, 1);
+  EXPECT_NEAR(budget.expanded(0.99), 93, 1.5) << "with u rounded up to 32 and the freedom down to 16";
 }
 
 TEST(Budget, SharesAddUpToOneAndLackWhatNobodyKnows) {

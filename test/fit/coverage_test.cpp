@@ -21,7 +21,7 @@ TEST(Coverage, IntervalsOfAHundredCampaignsHoldTheTruth) {
 TEST(Coverage, ABentTruthIsReported) {
   StudyTruth bent;
   bent.bend = 0.03;
-  bent.rise = 0.10;
+  bent.rise = 0.15;  // real ones of 5 inch rise by 11 to 21 %
   int line = 0, speed = 0, draws = 40;
   for (unsigned seed = 1; seed <= 40; ++seed) {
     const StudyCampaign campaign = study_campaign(bent, seed);
