@@ -11,7 +11,6 @@
 #include <string>
 #include <thread>
 
-#include "compensation/commands.hpp"
 #include "compensation/compensator.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "compensation/flight/paper.hpp"
