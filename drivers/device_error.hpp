@@ -12,6 +12,8 @@ class DeviceError : public std::runtime_error {
   DeviceError(const std::string& device, const std::string& operation, const std::string& cause,
               const std::string& next_move = {})
       : std::runtime_error(device + ": " + operation + ": " + cause + (next_move.empty() ? "" : "; " + next_move)) {}
+  /// One that was told before, on another thread.
+  explicit DeviceError(const std::string& message) : std::runtime_error(message) {}
 };
 
 }  // namespace kphi

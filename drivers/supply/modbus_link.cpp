@@ -1,0 +1,172 @@
+#include "drivers/supply/modbus_link.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/file.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <map>
+#include <stdexcept>
+#include <thread>
+
+namespace kphi::supply {
+namespace {
+
+using std::chrono::steady_clock;
+constexpr auto kLongestQuiet = std::chrono::seconds(2);
+constexpr double kBitsPerByte = 10, kSilentBytes = 3.5;
+
+speed_t speed_of(unsigned baud) {
+  static const std::map<unsigned, speed_t> kSpeeds{
+      {1200, B1200},   {2400, B2400},     {4800, B4800},     {9600, B9600},     {19200, B19200},  {38400, B38400},
+      {57600, B57600}, {115200, B115200}, {230400, B230400}, {460800, B460800}, {921600, B921600}};
+  const auto found = kSpeeds.find(baud);
+  return found == kSpeeds.end() ? B0 : found->second;
+}
+
+Failure failure_of(int error) noexcept {
+  switch (error) {
+    case ETIMEDOUT:
+      return Failure::timeout;
+    case EMBBADCRC:
+    case EMBBADDATA:
+    case EMBBADSLAVE:
+    case EMBBADEXC:
+    case EMBUNKEXC:
+      return Failure::damaged;
+    case EMBXSBUSY:
+    case EMBXACK:
+      return Failure::busy;
+    default:
+      return error > MODBUS_ENOBASE ? Failure::refused : Failure::lost;
+  }
+}
+
+std::string words_for(int error) {
+  switch (failure_of(error)) {
+    case Failure::timeout:
+      return "no answer";
+    case Failure::damaged:
+      return fmt::format("a damaged answer ({})", modbus_strerror(error));
+    case Failure::refused:
+    case Failure::busy:
+      return fmt::format("it answers \"{}\"", modbus_strerror(error));
+    default:
+      return fmt::format("the line is lost ({})", std::strerror(error));
+  }
+}
+
+modbus_t* make_context(const Address& address) {
+  if (address.slave < 1 || (address.slave > 247 && address.slave != 255)) {
+    throw std::invalid_argument(fmt::format("{} is no Modbus address; use 1 to 247", address.slave));
+  }
+  if (address.wire == Address::Wire::tcp) {
+    return modbus_new_tcp_pi(address.host.c_str(), std::to_string(address.port).c_str());
+  }
+  if (!known_baud(address.baud)) {
+    throw std::invalid_argument(fmt::format("{} baud is not a rate that can be set; use 9600 or 115200", address.baud));
+  }
+  return modbus_new_rtu(address.device.c_str(), static_cast<int>(address.baud), 'N', 8, 1);
+}
+
+std::uint32_t microseconds(std::chrono::milliseconds time) { return static_cast<std::uint32_t>(time.count() * 1000); }
+
+}  // namespace
+
+ModbusLink::ModbusLink(const Address& address, const Timing& timing)
+    : address_(address), timing_(timing), context_(make_context(address), &modbus_free), last_(steady_clock::now()) {
+  if (!context_) throw std::invalid_argument(fmt::format("supply \"{}\": {}", address.uri, modbus_strerror(errno)));
+  modbus_set_slave(context_.get(), address.slave);
+  modbus_set_error_recovery(context_.get(), MODBUS_ERROR_RECOVERY_NONE);
+  modbus_set_response_timeout(context_.get(), microseconds(timing.answer) / 1'000'000,
+                              microseconds(timing.answer) % 1'000'000);
+  modbus_set_byte_timeout(context_.get(), microseconds(timing.byte) / 1'000'000, microseconds(timing.byte) % 1'000'000);
+}
+
+ModbusLink::~ModbusLink() { close(); }
+
+void ModbusLink::close() noexcept {
+  if (!open_) return;
+  if (address_.wire == Address::Wire::rtu) ioctl(modbus_get_socket(context_.get()), TIOCNXCL);
+  modbus_close(context_.get());
+  open_ = false;
+}
+
+Outcome ModbusLink::open() {
+  close();
+  if (modbus_connect(context_.get()) != 0) {
+    const int error = errno;
+    return {Failure::lost, error > MODBUS_ENOBASE ? modbus_strerror(error) : std::strerror(error)};
+  }
+  open_ = true;
+  last_ = steady_clock::now();
+  if (address_.wire == Address::Wire::tcp) return {};
+  Outcome taken = take_port();
+  if (!taken.ok()) close();
+  return taken;
+}
+
+Outcome ModbusLink::take_port() {
+  const int port = modbus_get_socket(context_.get());
+  termios line{};
+  if (tcgetattr(port, &line) != 0) return {Failure::lost, "it is no serial port"};
+  if (cfgetospeed(&line) != speed_of(address_.baud)) {
+    return {Failure::lost, fmt::format("the port does not take {} baud", address_.baud)};
+  }
+  if (flock(port, LOCK_EX | LOCK_NB) != 0) return {Failure::lost, "it is in use by another program"};
+  ioctl(port, TIOCEXCL);
+  return {};
+}
+
+Outcome ModbusLink::read(const Block& block, RegisterImage& into) {
+  if (block.first + block.count > into.size()) throw std::logic_error("a block of registers beyond the image");
+  if (!open_) return {Failure::lost, "the line is not open"};
+  keep_gap();
+  RegisterImage fresh{};
+  const int result = modbus_read_registers(context_.get(), block.first, block.count, fresh.data());
+  Outcome all = outcome(result, block.count);
+  if (all.ok()) std::copy_n(fresh.begin(), block.count, into.begin() + block.first);
+  return all;
+}
+
+Outcome ModbusLink::write(Writable at, std::uint16_t value, bool multiple) {
+  if (!open_) return {Failure::lost, "the line is not open"};
+  keep_gap();
+  const int result = multiple ? modbus_write_registers(context_.get(), at, 1, &value)
+                              : modbus_write_register(context_.get(), at, value);
+  return outcome(result, 1);
+}
+
+Outcome ModbusLink::outcome(int result, int expected) {
+  const int error = errno;
+  last_ = steady_clock::now();
+  if (result == expected) return {};
+  if (result >= 0) return {Failure::damaged, "an answer of another length"};
+  return {failure_of(error), words_for(error)};
+}
+
+void ModbusLink::fall_silent() {
+  if (!open_) return;
+  const bool tcp = address_.wire == Address::Wire::tcp;
+  for (const auto end = steady_clock::now() + kLongestQuiet; steady_clock::now() < end;) {
+    pollfd line{modbus_get_socket(context_.get()), POLLIN, 0};
+    const int arrived = ::poll(&line, 1, static_cast<int>(timing_.quiet.count()));
+    if (arrived <= 0 || (line.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) break;
+    const int flushed = modbus_flush(context_.get());  // bytes of TCP, 0 on a serial line
+    if (flushed < 0 || (tcp && flushed == 0)) break;   // its end: the next request will tell
+  }
+  modbus_flush(context_.get());
+}
+
+/// Frames are told apart by 3.5 bytes of silence (Modbus over serial line 1.02, 2.5.1.1).
+void ModbusLink::keep_gap() const {
+  if (address_.wire == Address::Wire::tcp) return;
+  const std::chrono::duration<double> gap(std::max(kSilentBytes * kBitsPerByte / address_.baud, 0.00175));
+  std::this_thread::sleep_until(last_ + std::chrono::duration_cast<steady_clock::duration>(gap));
+}
+
+}  // namespace kphi::supply

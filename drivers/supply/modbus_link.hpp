@@ -1,0 +1,75 @@
+// One Modbus line: libmodbus opened, asked once per call, and closed, with its traps held shut. One thread.
+//
+// libmodbus 3.1.6 takes a late answer for the answer to the next request when their lengths agree (RTU has no
+// transaction number), does not recover from bytes before a frame until it is flushed, and runs at 9600 baud when it
+// does not know the rate. Hence fall_silent(), and a rate that is checked before and after.
+#pragma once
+
+#include <modbus/modbus.h>
+
+#include <array>
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "drivers/supply/address.hpp"
+#include "drivers/supply/models.hpp"
+
+namespace kphi::supply {
+
+/// Deadlines, wall time.
+struct Timing {
+  std::chrono::milliseconds answer{500};  ///< stock Riden firmware answers fewer than 10 requests per second
+  std::chrono::milliseconds byte{100};    ///< within an answer
+  std::chrono::milliseconds quiet{150};   ///< silence after which a late answer is no longer expected
+};
+
+/// Registers by address, as far as they have been read.
+using RegisterImage = std::array<std::uint16_t, 128>;
+
+enum class Failure : std::uint8_t {
+  none,
+  timeout,  ///< no answer, or only its beginning
+  damaged,  ///< bad CRC, foreign sender, wrong shape
+  busy,     ///< the device asks for patience
+  refused,  ///< the device will not: another try is of no use
+  lost,     ///< the port or connection is gone
+};
+
+struct Outcome {
+  Failure failure = Failure::none;
+  std::string words;
+  [[nodiscard]] bool ok() const noexcept { return failure == Failure::none; }
+};
+
+class ModbusLink {
+ public:
+  /// Opens nothing yet. Throws std::invalid_argument for what must never reach libmodbus: baud, slave.
+  ModbusLink(const Address& address, const Timing& timing);
+  ~ModbusLink();
+  ModbusLink(const ModbusLink&) = delete;
+  ModbusLink& operator=(const ModbusLink&) = delete;
+
+  /// Anew when it was open. A serial port is taken exclusively.
+  [[nodiscard]] Outcome open();
+  /// One request, one answer. `block` lies within the image.
+  [[nodiscard]] Outcome read(const Block& block, RegisterImage& into);
+  /// One register, by function 0x10 if `multiple`, else 0x06.
+  [[nodiscard]] Outcome write(Writable at, std::uint16_t value, bool multiple);
+  /// Waits until nothing has arrived for Timing::quiet (2 s at most) and forgets what had.
+  void fall_silent();
+
+ private:
+  [[nodiscard]] Outcome outcome(int result, int expected);
+  [[nodiscard]] Outcome take_port();
+  void close() noexcept;
+  void keep_gap() const;
+
+  Address address_;
+  Timing timing_;
+  std::unique_ptr<modbus_t, decltype(&modbus_free)> context_;
+  std::chrono::steady_clock::time_point last_;  ///< of the wire's traffic
+  bool open_ = false;
+};
+
+}  // namespace kphi::supply

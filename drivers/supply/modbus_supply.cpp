@@ -1,0 +1,329 @@
+#include "drivers/supply/modbus_supply.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "drivers/device_error.hpp"
+#include "drivers/serial/port.hpp"
+
+namespace kphi::supply {
+namespace {
+
+constexpr int kAttempts = 3;
+constexpr double kMargin = 1.1;              // measured values may exceed the largest setting by this
+constexpr std::uint16_t kDecimals = 0x0233;  // Hanmatek: voltage 2, current 3, power 3
+
+std::string name_of(Protection protection) {
+  constexpr const char* kNames[] = {"none",        "over-voltage",  "over-current",    "over-power",
+                                    "over-heated", "short circuit", "an unknown cause"};
+  return kNames[static_cast<int>(protection)];
+}
+
+}  // namespace
+
+ModbusSupply::ModbusSupply(const Address& address, const Clock& clock, const Timing& timing)
+    : address_(address), clock_(clock), link_(address, timing) {
+  identity_.device = "supply on " + address.where();
+  identify();
+  describe();
+}
+
+void ModbusSupply::identify() {
+  const Model* const wanted = address_.model.empty() ? nullptr : find_model(address_.model);
+  std::string answers;
+  for (const RegisterMap* map : families()) {
+    if (wanted != nullptr && wanted->map != map) continue;
+    model_ = ask_model(*map, answers);
+    if (model_ != nullptr) break;
+  }
+  if (model_ == nullptr) {
+    throw DeviceError(identity_.device, "identify", "no known model: " + answers,
+                      fmt::format("known are {}", fmt::join(model_names(), ", ")));
+  }
+  if (wanted != nullptr && wanted != model_) {
+    throw DeviceError(identity_.device, "identify", fmt::format("it is a {}, not a {}", model_->name, wanted->name),
+                      "correct model= in its address, or the port");
+  }
+  if (const int at = model_->map->decimals; at != kAbsent && registers_[static_cast<std::size_t>(at)] != kDecimals) {
+    throw DeviceError(identity_.device, "identify",
+                      fmt::format("its values have decimals {:#06x}", registers_[static_cast<std::size_t>(at)]),
+                      fmt::format("only {:#06x} is known", kDecimals));
+  }
+  known_ = registers_;
+}
+
+/// nullptr when it is none of this family; `answers` gathers what it said.
+const Model* ModbusSupply::ask_model(const RegisterMap& map, std::string& answers) {
+  const char* const join = answers.empty() ? "" : ", ";
+  bool refused = false;
+  persist("identify", [&] {
+    Outcome outcome = read_block(map.identity);
+    refused = outcome.failure == Failure::refused;
+    return refused ? Outcome{} : outcome;
+  });
+  if (refused) {
+    answers += fmt::format("{}{} refused", join, map.family);
+    return nullptr;
+  }
+  answers += fmt::format("{}{} register {} is {}", join, map.family, map.model, registers_[map.model]);
+  return find_model(map, registers_[map.model]);
+}
+
+void ModbusSupply::describe() {
+  const RegisterMap& map = *model_->map;
+  identity_.model = model_->name;
+  identity_.device = fmt::format("supply {} on {}", model_->name, address_.where());
+  if (map.serial != kAbsent) {
+    const auto at = static_cast<std::size_t>(map.serial);
+    identity_.serial = fmt::format("{:08}", static_cast<std::uint32_t>(registers_[at]) << 16 | registers_[at + 1]);
+  }
+  if (map.firmware != kAbsent) {
+    const unsigned version = registers_[static_cast<std::size_t>(map.firmware)];
+    identity_.firmware = fmt::format("{}.{:02}", version / 100, version % 100);
+  }
+  (void)read();
+  identity_.voltage_max_v = model_->max_v;
+  identity_.voltage_step_v = 1 / model_->counts_per_v;
+  identity_.current_max_a = range().max_a;
+  identity_.current_step_a = 1 / range().counts_per_a;
+}
+
+Reading ModbusSupply::read() {
+  Reading reading;
+  persist("read", [&] { return look(reading); });
+  return reading;
+}
+
+Outcome ModbusSupply::look(Reading& reading) {
+  const Instant before = clock_.now();
+  for (const Block& block : model_->map->look) {
+    if (block.count == 0) continue;
+    if (Outcome outcome = read_block(block); !outcome.ok()) return outcome;
+  }
+  const Instant after = clock_.now();
+  reading.at = before + (after - before) / 2;
+  reading.uncertainty = (after - before + Duration(1)) / 2;
+  const std::string doubt = implausible(reading);
+  if (doubt.empty()) return {};
+  ++counters_.implausible;
+  return {Failure::damaged, doubt};
+}
+
+const CurrentRange& ModbusSupply::range() const noexcept {
+  const int at = model_->map->current_range;
+  const bool second = at != kAbsent && model_->ranges[1].max_a > 0 && registers_[static_cast<std::size_t>(at)] == 1;
+  return model_->ranges[second ? 1 : 0];
+}
+
+double ModbusSupply::over_current_counts_per_a() const noexcept {
+  return model_->over_current_counts_per_a > 0 ? model_->over_current_counts_per_a : range().counts_per_a;
+}
+
+/// Fills the reading from the registers. What cannot be; empty when all can.
+std::string ModbusSupply::implausible(Reading& reading) const {
+  const RegisterMap& map = *model_->map;
+  const auto at = [&](int address) { return registers_[static_cast<std::size_t>(address)]; };
+  const CurrentRange& amps = range();
+  reading.set_voltage_v = at(map.set_voltage) / model_->counts_per_v;
+  reading.current_limit_a = at(map.current_limit) / amps.counts_per_a;
+  reading.voltage_v = at(map.voltage) / model_->counts_per_v;
+  reading.current_a = at(map.current) / amps.counts_per_a;
+  reading.protection = protection_of(map, at(map.protection));
+  reading.output = at(map.output) != 0;
+  if (map.regulation != kAbsent) {
+    reading.regulation = at(map.regulation) != 0 ? Regulation::constant_current : Regulation::constant_voltage;
+  } else {
+    // No register tells: at the limit, and the voltage has given way.
+    const bool limited = reading.output && at(map.current) + 1 >= at(map.current_limit);
+    const bool gave_way = at(map.voltage) + 5 < at(map.set_voltage);
+    reading.regulation = limited && gave_way ? Regulation::constant_current : Regulation::constant_voltage;
+  }
+  const auto beyond = [](const char* what, double value, double max) {
+    return value > kMargin * max ? fmt::format("{} of {}", what, value) : std::string();
+  };
+  for (const std::string& doubt :
+       {beyond("a set voltage", reading.set_voltage_v, model_->max_v),
+        beyond("a current limit", reading.current_limit_a, amps.max_a),
+        beyond("a voltage", reading.voltage_v, model_->max_v), beyond("a current", reading.current_a, amps.max_a),
+        beyond("an output state", at(map.output), 1),
+        beyond("a regulation", map.regulation == kAbsent ? 0 : at(map.regulation), 1),
+        beyond("a current range", model_->ranges[1].max_a > 0 ? at(map.current_range) : 0, 1)}) {
+    if (!doubt.empty()) return "it reports " + doubt + ", which cannot be";
+  }
+  return {};
+}
+
+void ModbusSupply::check(const Limits& limits) const {
+  const CurrentRange& amps = range();
+  const auto refuse = [&](const char* what, double value, double max, const char* unit) {
+    throw std::invalid_argument(
+        fmt::format("{}: {} of {} {} is outside 0 to {} {}", identity_.device, what, value, unit, max, unit));
+  };
+  for (const auto& [what, value] : {std::pair("a voltage", limits.voltage), {"an over-voltage", limits.over_voltage}}) {
+    if (!fits(value.value(), model_->counts_per_v, model_->max_v)) refuse(what, value.value(), model_->max_v, "V");
+  }
+  if (!fits(limits.current.value(), amps.counts_per_a, amps.max_a))
+    refuse("a current limit", limits.current.value(), amps.max_a, "A");
+  if (!fits(limits.over_current.value(), over_current_counts_per_a(), amps.max_a))
+    refuse("an over-current", limits.over_current.value(), amps.max_a, "A");
+}
+
+Limits ModbusSupply::apply(const Limits& limits) {
+  (void)read();  // the current range may have been changed by hand
+  check(limits);
+  const RegisterMap& map = *model_->map;
+  const double per_v = model_->counts_per_v, per_a = range().counts_per_a, per_over_a = over_current_counts_per_a();
+  const std::uint16_t over_voltage = to_counts(limits.over_voltage.value(), per_v);
+  const std::uint16_t over_current = to_counts(limits.over_current.value(), per_over_a);
+  const std::uint16_t current = to_counts(limits.current.value(), per_a);
+  const std::uint16_t voltage = to_counts(limits.voltage.value(), per_v);
+  put("set over-voltage", map.over_voltage, over_voltage);
+  put("set over-current", map.over_current, over_current);
+  put("set current limit", map.current_limit, current);
+  put("set voltage", map.set_voltage, voltage);
+  persist("read thresholds", [&] { return read_block(map.thresholds); });
+  (void)read();
+  confirm("over-voltage threshold", map.over_voltage, over_voltage, per_v);
+  confirm("over-current threshold", map.over_current, over_current, per_over_a);
+  confirm("current limit", map.current_limit, current, per_a);
+  confirm("voltage", map.set_voltage, voltage, per_v);
+  limits_applied_ = true;
+  return {Volts(voltage / per_v), Amperes(current / per_a), Volts(over_voltage / per_v),
+          Amperes(over_current / per_over_a)};
+}
+
+void ModbusSupply::put(const char* operation, Writable at, std::uint16_t value) {
+  persist(operation, [&] { return write_once(at, value, model_->map->write_multiple); });
+}
+
+void ModbusSupply::confirm(const char* what, std::uint16_t at, std::uint16_t value, double counts_per_unit) {
+  if (registers_[at] == value) return;
+  throw DeviceError(
+      identity_.device, fmt::format("set {}", what),
+      fmt::format("it was told {} and reports {}", value / counts_per_unit, registers_[at] / counts_per_unit),
+      "unlock its panel, recall preset M0, and let nobody turn its knobs");
+}
+
+void ModbusSupply::switch_on() {
+  if (!limits_applied_) {
+    throw DeviceError(identity_.device, "switch on", "its limits have not been set by this program",
+                      "apply limits first");
+  }
+  persist("switch on", [&] { return write_once(model_->map->output, 1, false); });
+  const Reading reading = read();
+  if (reading.output && reading.protection == Protection::none) return;
+  throw DeviceError(identity_.device, "switch on",
+                    reading.protection == Protection::none
+                        ? std::string("it has acknowledged and stays off")
+                        : fmt::format("it has switched off by itself: {}", name_of(reading.protection)),
+                    "check the load, the thresholds and the panel");
+}
+
+void ModbusSupply::switch_off() {
+  const Writable output = model_->map->output;
+  bool sent = false;
+  if (!lost_) sent = write_once(output, 0, false).ok();
+  if (!sent) unsettled_ = true;
+  if (!sent) persist("switch off", [&] { return write_once(output, 0, false); });
+  if (!read().output) return;
+  persist("switch off", [&] { return write_once(output, 0, false); });
+  if (!read().output) return;
+  throw DeviceError(identity_.device, "switch off", "it has acknowledged and reports that its output is on",
+                    "switch it off by hand");
+}
+
+Outcome ModbusSupply::read_block(const Block& block) {
+  ++counters_.requests;
+  return count(link_.read(block, registers_));
+}
+
+Outcome ModbusSupply::write_once(Writable at, std::uint16_t value, bool multiple) {
+  ++counters_.requests;
+  return count(link_.write(at, value, multiple));
+}
+
+Outcome ModbusSupply::count(Outcome outcome) {
+  switch (outcome.failure) {
+    case Failure::none:
+      ++counters_.replies;
+      break;
+    case Failure::timeout:
+      ++counters_.timeouts;
+      break;
+    case Failure::damaged:
+      ++counters_.damaged;
+      break;
+    case Failure::busy:
+    case Failure::refused:
+      ++counters_.refused;
+      break;
+    case Failure::lost:
+      lost_ = true;
+      break;
+  }
+  return outcome;
+}
+
+void ModbusSupply::persist(const char* operation, const std::function<Outcome()>& attempt) {
+  Outcome outcome;
+  for (int i = 0; i < kAttempts; ++i) {
+    if (i > 0) ++counters_.retries;
+    if (unsettled_ || lost_) outcome = settle();
+    if (unsettled_ || lost_) continue;
+    outcome = attempt();
+    if (outcome.ok()) return;
+    unsettled_ = outcome.failure != Failure::busy && outcome.failure != Failure::refused;
+    if (outcome.failure == Failure::refused) break;
+  }
+  throw DeviceError(identity_.device, operation, outcome.words, remedy(outcome.failure));
+}
+
+/// Afterwards, if it succeeded, nothing that was sent before is under way.
+Outcome ModbusSupply::settle() {
+  if (lost_) {
+    if (Outcome opened = link_.open(); !opened.ok()) return opened;
+    lost_ = false;
+  }
+  ++counters_.flushes;
+  link_.fall_silent();
+  if (model_ != nullptr) {
+    const RegisterMap& map = *model_->map;
+    if (Outcome asked = read_block(map.identity); !asked.ok()) return asked;
+    const auto same = [&](int at) {
+      return at == kAbsent || registers_[static_cast<std::size_t>(at)] == known_[static_cast<std::size_t>(at)];
+    };
+    if (!same(map.model) || !same(map.serial) || (map.serial != kAbsent && !same(map.serial + 1))) {
+      ++counters_.implausible;
+      return {Failure::damaged, "another device answers in its place"};
+    }
+  }
+  unsettled_ = false;
+  return {};
+}
+
+std::string ModbusSupply::remedy(Failure failure) const {
+  const bool rtu = address_.wire == Address::Wire::rtu;
+  switch (failure) {
+    case Failure::timeout:
+      return rtu ? fmt::format(
+                       "is it on and its interface enabled, is {} its baud rate (Riden 115200, DPS and HM 9600), "
+                       "{} its address?",
+                       address_.baud, address_.slave)
+                 : std::string("is it on, and does it speak Modbus TCP?");
+    case Failure::damaged:
+      return "check cable and ground, and that nobody else speaks on this line";
+    case Failure::busy:
+    case Failure::refused:
+      return "check its model, firmware and panel lock";
+    default:
+      break;
+  }
+  if (!rtu) return "check host, port and network";
+  const auto names = serial::stable_names();
+  if (names.empty()) return "no serial adapter is plugged in; plug it in and try again";
+  return fmt::format("plug it in, close other programs; these are there: {}", fmt::join(names, ", "));
+}
+
+}  // namespace kphi::supply

@@ -1,0 +1,68 @@
+// A supply behind Modbus, RTU or TCP. Blocking, one thread.
+//
+// No stale value. After any failure the line is left to fall silent and flushed, and then the device is asked who it
+// is: answers come in the order of requests, and no other answer has the shape of this one, so when it has come nothing
+// older can follow. The same question notices that another device has been plugged in.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "drivers/supply/address.hpp"
+#include "drivers/supply/modbus_link.hpp"
+#include "drivers/supply/models.hpp"
+#include "drivers/supply/supply.hpp"
+
+namespace kphi::supply {
+
+class ModbusSupply final : public Supply {
+ public:
+  /// Opens, asks who it is, and looks once; writes nothing. Throws DeviceError: no such port or host, in use, no
+  /// answer, a model that is unknown or not the one that the address names. `clock` outlives the supply and stamps
+  /// readings only; deadlines are wall time.
+  ModbusSupply(const Address& address, const Clock& clock, const Timing& timing = {});
+
+  [[nodiscard]] const Identity& identity() const noexcept override { return identity_; }
+  Limits apply(const Limits& limits) override;
+  [[nodiscard]] Reading read() override;
+  /// The order goes out at least once even when nothing is heard from the device.
+  void switch_off() override;
+  [[nodiscard]] Counters counters() const noexcept override { return counters_; }
+
+ private:
+  /// Throws DeviceError unless limits have been applied before.
+  void switch_on() override;
+
+  void identify();
+  [[nodiscard]] const Model* ask_model(const RegisterMap& map, std::string& answers);
+  void describe();
+  [[nodiscard]] Outcome look(Reading& reading);
+  [[nodiscard]] std::string implausible(Reading& reading) const;
+  [[nodiscard]] const CurrentRange& range() const noexcept;
+  [[nodiscard]] double over_current_counts_per_a() const noexcept;
+  void check(const Limits& limits) const;
+  void put(const char* operation, Writable at, std::uint16_t value);
+  void confirm(const char* what, std::uint16_t at, std::uint16_t value, double counts_per_unit);
+
+  // Bounded retries around single requests.
+  void persist(const char* operation, const std::function<Outcome()>& attempt);
+  [[nodiscard]] Outcome settle();
+  [[nodiscard]] Outcome count(Outcome outcome);
+  [[nodiscard]] Outcome read_block(const Block& block);
+  [[nodiscard]] Outcome write_once(Writable at, std::uint16_t value, bool multiple);
+  [[nodiscard]] std::string remedy(Failure failure) const;
+
+  const Address address_;
+  const Clock& clock_;
+  ModbusLink link_;
+  const Model* model_ = nullptr;
+  RegisterImage registers_{};
+  RegisterImage known_{};  ///< as they were when the device was identified
+  Identity identity_;
+  Counters counters_;
+  bool lost_ = true;       ///< to be opened
+  bool unsettled_ = true;  ///< old answers may be under way
+  bool limits_applied_ = false;
+};
+
+}  // namespace kphi::supply

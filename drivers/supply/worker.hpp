@@ -1,0 +1,110 @@
+// A supply with a thread of its own: looks at it a few times per second and hands the readings out. However slow the
+// wire, nobody waits for it who has not asked it for something.
+//
+// Safety. The output is switched off, whoever had switched it on: when asked, from any thread; when the supply fails;
+// when the thread ends for whatever reason; and when the object dies. If that could not be confirmed, failure() says
+// so.
+#pragma once
+
+#include <boost/lockfree/spsc_queue.hpp>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+
+#include "drivers/supply/supply.hpp"
+
+namespace kphi::supply {
+
+class Worker {
+ public:
+  /// Looks per second of bench time; 2 to 5 is what real supplies bear.
+  static constexpr double kUsualRate = 4;
+
+  /// `clock` outlives the worker. Throws std::invalid_argument for a rate outside 0.1 to 100.
+  Worker(std::unique_ptr<Supply> supply, const Clock& clock, double looks_per_second = kUsualRate);
+  /// Switches off and closes; takes as long as the supply, a few seconds when it does not answer.
+  ~Worker();
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  /// Any thread; wait for the device. Throw what Supply throws, and DeviceError when the worker is not alive.
+  Limits apply(const Limits& limits);
+  /// Returns with the output on. Overruled by any switch_off() after its call, with DeviceError.
+  void switch_on();
+  /// Any thread; waits for nothing.
+  void switch_off() noexcept;
+  /// Any thread: the same, and waits for the device to report it. False after `wall` or when the supply has failed: the
+  /// output may be on.
+  [[nodiscard]] bool switch_off_and_confirm(Duration wall) noexcept;
+
+  /// Oldest readings first; one consumer thread. Holds 4096, 17 minutes at 4 Hz; further ones are dropped and counted.
+  std::size_t take(std::span<Reading> out);
+  /// Any thread.
+  [[nodiscard]] std::optional<Reading> newest() const;
+  [[nodiscard]] Counters counters() const;
+  [[nodiscard]] std::uint64_t dropped_readings() const;
+  /// Known since the construction.
+  [[nodiscard]] const Identity& identity() const noexcept { return identity_; }
+  /// False once the supply has failed; it stays false.
+  [[nodiscard]] bool alive() const;
+  /// Why it is not alive, and whether the output may still be on.
+  [[nodiscard]] std::string failure() const;
+
+ private:
+  /// Words instead of an exception: those stay on the thread that has thrown them.
+  struct Answer {
+    enum class Kind : std::uint8_t { done, unfit, failed };
+    Kind kind = Kind::done;
+    std::string words;
+  };
+  struct Order {
+    std::function<void()> act;
+    std::promise<Answer> answer;
+  };
+
+  void ask(std::function<void()> act);
+  std::uint64_t ask_off() noexcept;
+
+  // The thread.
+  void run() noexcept;
+  [[nodiscard]] static Answer answer_to(const std::function<void()>& act);
+  [[nodiscard]] bool obey();
+  void obey_off();
+  [[nodiscard]] std::string turn_off() noexcept;
+  void look();
+  void finish(std::string why) noexcept;
+
+  const std::unique_ptr<Supply> supply_;
+  const Clock& clock_;
+  const Duration period_;  ///< bench time
+  const Identity identity_;
+
+  // Only the thread touches these.
+  std::optional<PoweredOutput> output_;
+  Instant next_look_{0};
+
+  // Callers of any thread and the worker's own meet here; held for some copies only, never during traffic.
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Order> orders_;
+  std::uint64_t offs_asked_ = 0, offs_done_ = 0;
+  bool stop_asked_ = false;
+  bool ended_ = false;
+  std::string failure_;
+  std::optional<Reading> newest_;
+  Counters counters_;
+  std::uint64_t dropped_readings_ = 0;
+
+  boost::lockfree::spsc_queue<Reading, boost::lockfree::capacity<4096>> queue_;
+  std::thread thread_;
+};
+
+}  // namespace kphi::supply

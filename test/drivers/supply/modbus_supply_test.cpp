@@ -1,0 +1,399 @@
+#include "drivers/supply/modbus_supply.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <stdexcept>
+
+#include "drivers/device_error.hpp"
+#include "test/drivers/serial/pseudo_terminal.hpp"
+#include "test/drivers/supply/simulated_supply.hpp"
+
+namespace kphi::supply {
+namespace {
+
+using namespace std::chrono_literals;
+using sim::SupplyFaultKind;
+using test::eventually;
+using test::kShort;
+using test::Over;
+using test::SimulatedSupply;
+using testing::AllOf;
+using testing::HasSubstr;
+
+const Limits kTwelveVolts{Volts(12), Amperes(2.5), Volts(13), Amperes(3)};
+
+std::string what_of(const std::function<void()>& act) {
+  try {
+    act();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+/// Every model, on both wires.
+class EverySupply : public testing::TestWithParam<std::string> {
+ protected:
+  SteadyClock clock;
+  SimulatedSupply simulated{GetParam()};
+};
+
+TEST_P(EverySupply, TellsWhoItIs) {
+  for (const Over wire : {Over::rtu, Over::tcp}) {
+    const ModbusSupply supply(simulated.address(wire), clock, kShort);
+    EXPECT_EQ(supply.identity().model, GetParam());
+    EXPECT_THAT(supply.identity().device, HasSubstr("supply " + GetParam() + " on "));
+    const Model& model = *find_model(GetParam());
+    EXPECT_EQ(supply.identity().voltage_max_v, model.max_v);
+    EXPECT_EQ(supply.identity().current_step_a, 1 / model.ranges[0].counts_per_a);
+  }
+  EXPECT_TRUE(simulated.truth().writes.empty()) << "to ask who it is writes nothing";
+}
+
+TEST_P(EverySupply, IsSetInItsOwnScale) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  const Limits applied = supply.apply(kTwelveVolts);
+  EXPECT_DOUBLE_EQ(applied.voltage.value(), 12);
+  EXPECT_DOUBLE_EQ(applied.over_current.value(), 3);
+  simulated.inspect([](sim::SupplySlave& slave) {
+    const sim::SupplyControls& controls = slave.circuit().controls();
+    EXPECT_NEAR(controls.volts, 12, 1e-9);
+    EXPECT_NEAR(controls.amps, 2.5, 1e-9);
+    EXPECT_NEAR(controls.over_volts, 13, 1e-9);
+    EXPECT_NEAR(controls.over_amps, 3, 1e-9);
+  });
+}
+
+TEST_P(EverySupply, ReadsWhatIsAtItsTerminals) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  supply.apply(kTwelveVolts);
+  EXPECT_FALSE(supply.read().output);
+  {
+    PoweredOutput on(supply);
+    ASSERT_TRUE(eventually([&] { return supply.read().voltage_v > 11.969; }));
+    const Instant before = clock.now();
+    const Reading reading = supply.read();
+    EXPECT_TRUE(reading.output);
+    EXPECT_EQ(reading.regulation, Regulation::constant_voltage);
+    EXPECT_EQ(reading.protection, Protection::none);
+    EXPECT_NEAR(reading.voltage_v, 12 - 0.020 * 1.2, 0.02);
+    EXPECT_NEAR(reading.current_a, 0.1 * reading.voltage_v, 0.02);
+    EXPECT_NEAR(reading.power_w(), reading.voltage_v * reading.current_a, 1e-12);
+    EXPECT_DOUBLE_EQ(reading.set_voltage_v, 12);
+    EXPECT_DOUBLE_EQ(reading.current_limit_a, 2.5);
+    EXPECT_GE(reading.at - reading.uncertainty, before - 1ns);
+    EXPECT_LE(reading.at + reading.uncertainty, clock.now() + 1ns);
+    EXPECT_GT(reading.uncertainty, Duration{0});
+  }
+  EXPECT_FALSE(simulated.output());
+  EXPECT_EQ(simulated.harm(), 0u);
+}
+
+TEST_P(EverySupply, TellsConstantCurrent) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  supply.apply({Volts(12), Amperes(1), Volts(13), Amperes(3)});
+  simulated.hang({0, 0.5});
+  PoweredOutput on(supply);
+  EXPECT_TRUE(eventually([&] { return supply.read().regulation == Regulation::constant_current; }));
+  EXPECT_TRUE(eventually([&] { return std::abs(supply.read().current_a - 1) < 0.015; }));
+  EXPECT_NEAR(supply.read().voltage_v, 2, 0.2);
+}
+
+TEST_P(EverySupply, TellsWhyItHasTripped) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  supply.apply({Volts(12), Amperes(3), Volts(13), Amperes(1)});
+  simulated.hang({0, 0.2});
+  const std::string refusal = what_of([&] {
+    PoweredOutput on(supply);
+    eventually([&] { return supply.read().protection != Protection::none; });
+    EXPECT_EQ(supply.read().protection, Protection::over_current);
+    EXPECT_FALSE(supply.read().output);
+    throw std::runtime_error("seen");
+  });
+  // A fast trip is reported by the switch itself.
+  EXPECT_THAT(refusal, testing::AnyOf(HasSubstr("seen"), HasSubstr("over-current")));
+}
+
+INSTANTIATE_TEST_SUITE_P(Models, EverySupply,
+                         testing::Values("RD6006", "RD6006P", "RD6012", "RD6012P", "RD6018", "RD6024", "DPS3005",
+                                         "DPS5005", "DPH5005", "DPS5015", "DPS5020", "DPS8005", "HM305P", "HM310P"),
+                         [](const auto& model) { return model.param; });
+
+class Riden : public testing::Test {
+ protected:
+  SteadyClock clock;
+  SimulatedSupply simulated;
+};
+
+TEST_F(Riden, WritesThresholdsFirstAndSwitchesWithFunctionSix) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  supply.apply(kTwelveVolts);
+  { PoweredOutput on(supply); }
+  using Write = std::pair<std::uint16_t, std::uint16_t>;
+  EXPECT_THAT(simulated.truth().writes, testing::ElementsAre(Write{82, 1300}, Write{83, 3000}, Write{9, 2500},
+                                                             Write{8, 1200}, Write{18, 1}, Write{18, 0}));
+}
+
+TEST_F(Riden, AsksWhoItIsBeforeAnythingElse) {
+  const ModbusSupply supply(simulated.address(), clock, kShort);
+  const auto truth = simulated.truth();
+  ASSERT_GE(truth.frames.size(), 2u);
+  EXPECT_EQ(truth.frames[0], (std::vector<std::uint8_t>{1, 3, 0, 0, 0, 4, 0x44, 0x09}));
+  EXPECT_EQ(truth.frames[1], (std::vector<std::uint8_t>{1, 3, 0, 8, 0, 13, 0x05, 0xCD}));
+  EXPECT_EQ(supply.identity().serial, "00004711");
+  EXPECT_EQ(supply.identity().firmware, "1.28");
+}
+
+TEST_F(Riden, RefusesToBeSwitchedOnWithoutLimits) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  EXPECT_THAT(what_of([&] { PoweredOutput on(supply); }), HasSubstr("limits have not been set"));
+  for (const auto& [at, value] : simulated.truth().writes) EXPECT_EQ(value, 0) << at;
+}
+
+TEST_F(Riden, RefusesSettingsBeyondItsRange) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  for (const Limits& limits :
+       {Limits{Volts(60.1), Amperes(1), Volts(60), Amperes(1)}, Limits{Volts(12), Amperes(6.1), Volts(13), Amperes(1)},
+        Limits{Volts(12), Amperes(1), Volts(-1), Amperes(1)}, Limits{Volts(12), Amperes(1), Volts(13), Amperes(NAN)}}) {
+    EXPECT_THROW(supply.apply(limits), std::invalid_argument);
+  }
+  EXPECT_THAT(what_of([&] {
+                supply.apply({Volts(61), Amperes(1), Volts(13), Amperes(1)});
+              }),
+              HasSubstr("a voltage of 61 V is outside 0 to 60 V"));
+  EXPECT_TRUE(simulated.truth().writes.empty());
+}
+
+TEST_F(Riden, SetsZeroAsAnyOtherValue) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  const Limits applied = supply.apply({Volts(0), Amperes(0), Volts(13), Amperes(3)});
+  EXPECT_EQ(applied.voltage.value(), 0);
+  EXPECT_EQ(supply.read().set_voltage_v, 0);
+}
+
+TEST_F(Riden, NoticesWhenItDoesNotDoWhatItAcknowledges) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  supply.apply(kTwelveVolts);
+  sim::SupplyFault ignored;
+  ignored.kind = SupplyFaultKind::ignored_writes;
+  ignored.lasts = 1h;
+  simulated.spoil(ignored);
+  EXPECT_THAT(what_of([&] {
+                supply.apply({Volts(11), Amperes(2.5), Volts(13), Amperes(3)});
+              }),
+              HasSubstr("it was told 11 and reports 12"));
+  EXPECT_THAT(what_of([&] { PoweredOutput on(supply); }), HasSubstr("it has acknowledged and stays off"));
+}
+
+TEST_F(Riden, SaysWhenItCannotBeSwitchedOff) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  supply.apply(kTwelveVolts);
+  PoweredOutput on(supply);
+  sim::SupplyFault ignored;
+  ignored.kind = SupplyFaultKind::ignored_writes;
+  ignored.lasts = 1h;
+  simulated.spoil(ignored);
+  EXPECT_THAT(on.off(), HasSubstr("reports that its output is on; switch it off by hand"));
+}
+
+/// The order leaves even when nothing comes back: the device may hear though it is not heard.
+TEST_F(Riden, IsSwitchedOffThoughItIsNotHeard) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  supply.apply(kTwelveVolts);
+  PoweredOutput on(supply);
+  sim::SupplyFault silent;
+  silent.kind = SupplyFaultKind::no_reply;
+  silent.lasts = 1h;
+  simulated.spoil(silent);
+  EXPECT_THROW((void)supply.read(), DeviceError);
+  EXPECT_TRUE(simulated.output());
+  EXPECT_THAT(on.off(), HasSubstr("no answer"));
+  EXPECT_FALSE(simulated.output());
+}
+
+TEST_F(Riden, IsTriedAtMostThreeTimes) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  sim::SupplyFault deaf;
+  deaf.kind = SupplyFaultKind::deaf;
+  deaf.lasts = 1h;
+  simulated.spoil(deaf);
+  const std::uint64_t before = simulated.truth().requests;
+  EXPECT_THAT(what_of([&] { (void)supply.read(); }),
+              AllOf(HasSubstr("read: no answer"), HasSubstr("is 115200 its baud rate")));
+  EXPECT_EQ(simulated.truth().requests - before, 3u);
+  EXPECT_EQ(supply.counters().timeouts, 3u);
+  EXPECT_EQ(supply.counters().retries, 2u);
+}
+
+TEST_F(Riden, SilentFromTheBeginningIsNamed) {
+  serial::fake::PseudoTerminal line;
+  EXPECT_THAT(what_of([&] { ModbusSupply(parse_address("modbus-rtu:" + line.name()), clock, kShort); }),
+              AllOf(HasSubstr("supply on " + line.name()), HasSubstr("no answer"), HasSubstr("its baud rate")));
+}
+
+TEST_F(Riden, AbsentIsNamed) {
+  EXPECT_THAT(what_of([&] { ModbusSupply(parse_address("modbus-rtu:/dev/no-such-port"), clock, kShort); }),
+              AllOf(HasSubstr("No such file or directory"), HasSubstr("plug")));
+  EXPECT_THAT(what_of([&] { ModbusSupply(parse_address("modbus-tcp:127.0.0.1:1"), clock, kShort); }),
+              AllOf(HasSubstr("127.0.0.1:1"), HasSubstr("check host, port and network")));
+}
+
+TEST_F(Riden, OfAnotherModelThanNamedIsRefused) {
+  EXPECT_THAT(what_of([&] { ModbusSupply(simulated.address(Over::rtu, "?model=RD6012"), clock, kShort); }),
+              HasSubstr("it is a RD6006, not a RD6012"));
+}
+
+TEST_F(Riden, OfUnknownModelIsRefusedAndLeftAlone) {
+  sim::SupplyFault unknown;
+  unknown.kind = SupplyFaultKind::reads_as;
+  unknown.lasts = 1h;
+  unknown.address = 0;
+  unknown.value = 60301;
+  simulated.spoil(unknown);
+  EXPECT_THAT(what_of([&] { ModbusSupply(simulated.address(), clock, kShort); }),
+              AllOf(HasSubstr("no known model: RD60xx register 0 is 60301"), HasSubstr("known are RD6006")));
+  EXPECT_TRUE(simulated.truth().writes.empty());
+}
+
+TEST_F(Riden, ReplacedByAnotherIsNoticed) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  sim::SupplyFault other;
+  other.kind = SupplyFaultKind::reads_as;
+  other.lasts = 1h;
+  other.address = 2;
+  other.value = 4712;
+  simulated.spoil(other);
+  EXPECT_TRUE(supply.read().at > Instant{0}) << "nothing has given rise to the question";
+  sim::SupplyFault lost;
+  lost.kind = SupplyFaultKind::no_reply;
+  lost.count = 1;
+  simulated.spoil(lost);
+  EXPECT_THAT(what_of([&] { (void)supply.read(); }), HasSubstr("another device answers in its place"));
+}
+
+TEST_F(Riden, ReportingWhatCannotBeIsNotBelieved) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  const std::map<std::uint16_t, std::uint16_t> impossible{{8, 6700},  {9, 6700}, {10, 6601},
+                                                          {11, 6601}, {17, 2},   {18, 7}};
+  for (const auto& [at, value] : impossible) {
+    sim::SupplyFault fault;
+    fault.kind = SupplyFaultKind::reads_as;
+    fault.lasts = 1h;
+    fault.address = at;
+    fault.value = value;
+    SimulatedSupply another;
+    ModbusSupply doubted(another.address(), clock, kShort);
+    another.spoil(fault);
+    EXPECT_THAT(what_of([&] { (void)doubted.read(); }), HasSubstr("which cannot be")) << at;
+    EXPECT_EQ(doubted.counters().implausible, 3u);
+  }
+}
+
+TEST_F(Riden, WithAnUnknownProtectionCodeHasTripped) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  sim::SupplyFault fault;
+  fault.kind = SupplyFaultKind::reads_as;
+  fault.lasts = 1h;
+  fault.address = 16;
+  fault.value = 9;
+  simulated.spoil(fault);
+  EXPECT_EQ(supply.read().protection, Protection::unknown);
+}
+
+/// After a preset was recalled on the panel the thresholds are not the ones that are read: they are always written.
+TEST_F(Riden, HasItsOwnThresholdsAfterAPresetWasRecalled) {
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  supply.apply(kTwelveVolts);
+  simulated.inspect([](sim::SupplySlave& slave) { slave.registers().write(19, 3); });
+  supply.apply(kTwelveVolts);
+  simulated.inspect([](sim::SupplySlave& slave) {
+    EXPECT_NEAR(slave.circuit().controls().over_volts, 13, 1e-9);
+    EXPECT_NEAR(slave.circuit().controls().over_amps, 3, 1e-9);
+  });
+}
+
+TEST_F(Riden, ComesBackAfterItWasUnpluggedAndPluggedInAgain) {
+  for (const Over wire : {Over::rtu, Over::tcp}) {
+    ModbusSupply supply(simulated.address(wire), clock, kShort);
+    sim::SupplyFault closed;
+    closed.kind = SupplyFaultKind::closed;
+    closed.lasts = 100ms;
+    simulated.spoil(closed);
+    EXPECT_TRUE(eventually([&] { return what_of([&] { (void)supply.read(); }) != "nothing was thrown"; }));
+    EXPECT_TRUE(eventually([&] { return what_of([&] { (void)supply.read(); }) == "nothing was thrown"; }));
+  }
+}
+
+TEST(RidenWithTwoRanges, CountsByItsRangeRegister) {
+  SteadyClock clock;
+  SimulatedSupply simulated("RD6012P");
+  ModbusSupply narrow(simulated.address(), clock, kShort);
+  EXPECT_EQ(narrow.identity().current_max_a, 6);
+  EXPECT_EQ(narrow.identity().current_step_a, 1e-4);
+  EXPECT_THROW(narrow.apply({Volts(12), Amperes(9), Volts(13), Amperes(10)}), std::invalid_argument);
+  simulated.inspect([](sim::SupplySlave& slave) { slave.registers().write(20, 1); });
+  const Limits applied = narrow.apply({Volts(12), Amperes(9), Volts(13), Amperes(10)});
+  EXPECT_DOUBLE_EQ(applied.current.value(), 9);
+  EXPECT_DOUBLE_EQ(narrow.read().current_limit_a, 9);
+  simulated.inspect([](sim::SupplySlave& slave) { EXPECT_NEAR(slave.circuit().controls().amps, 9, 1e-9); });
+}
+
+TEST(HanmatekThresholds, InThreeDecimalsTripTooEarlyNeverTooLate) {
+  SteadyClock clock;
+  sim::SupplySettings settings;
+  settings.model = "HM310P";
+  settings.replies_per_s = 0;
+  settings.disputes.over_current_in_milliamps = true;
+  SimulatedSupply simulated(settings);
+  ModbusSupply supply(simulated.address(), clock, kShort);
+  supply.apply(kTwelveVolts);
+  simulated.inspect([](sim::SupplySlave& slave) { EXPECT_LE(slave.circuit().controls().over_amps, 3); });
+}
+
+TEST(RidenDisputes, DoNotTouchAReading) {
+  SteadyClock clock;
+  for (const bool other : {false, true}) {
+    sim::SupplySettings settings;
+    settings.model = "RD6006P";
+    settings.replies_per_s = 0;
+    settings.disputes.power_in_milliwatts = other;
+    settings.disputes.register_12 =
+        other ? sim::SupplyDisputes::Twelve::power_high_word : sim::SupplyDisputes::Twelve::milliampere_hours;
+    settings.disputes.preset_reads_zero = !other;
+    SimulatedSupply simulated(settings);
+    ModbusSupply supply(simulated.address(), clock, kShort);
+    supply.apply(kTwelveVolts);
+    PoweredOutput on(supply);
+    EXPECT_TRUE(eventually([&] { return std::abs(supply.read().power_w() - 14.3) < 0.2; }));
+  }
+}
+
+/// Random settings of every model: what is applied is the nearest step, and what the device holds.
+TEST(RandomSettings, ArriveAsTheNearestStep) {
+  SteadyClock clock;
+  std::mt19937_64 random(20210530);
+  for (const Model& model : models()) {
+    SimulatedSupply simulated{std::string(model.name)};
+    ModbusSupply supply(simulated.address(), clock, kShort);
+    const auto any = [&](double max) { return std::uniform_real_distribution<double>(0, max)(random); };
+    for (int i = 0; i < 5; ++i) {
+      const double max_a = model.ranges[0].max_a;
+      const Limits wanted{Volts(any(model.max_v)), Amperes(any(max_a)), Volts(any(model.max_v)), Amperes(any(max_a))};
+      const Limits applied = supply.apply(wanted);
+      EXPECT_NEAR(applied.voltage.value(), wanted.voltage.value(), 0.5001 / model.counts_per_v);
+      EXPECT_NEAR(applied.current.value(), wanted.current.value(), 0.5001 / model.ranges[0].counts_per_a);
+      simulated.inspect([&](sim::SupplySlave& slave) {
+        EXPECT_NEAR(slave.circuit().controls().volts, applied.voltage.value(), 1e-9);
+        EXPECT_NEAR(slave.circuit().controls().amps, applied.current.value(), 1e-9);
+        EXPECT_NEAR(slave.circuit().controls().over_volts, applied.over_voltage.value(), 1e-9);
+        EXPECT_NEAR(slave.circuit().controls().over_amps, applied.over_current.value(), 1e-9);
+      });
+    }
+  }
+}
+
+}  // namespace
+}  // namespace kphi::supply

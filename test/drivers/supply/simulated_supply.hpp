@@ -1,0 +1,91 @@
+// A running simulated supply, and the driver's view of where it is.
+#pragma once
+
+#include <unistd.h>
+
+#include <chrono>
+#include <functional>
+#include <string>
+#include <thread>
+
+#include "drivers/sim/supply_server.hpp"
+#include "drivers/supply/address.hpp"
+#include "drivers/supply/modbus_link.hpp"
+#include "test/temporary_folder.hpp"
+
+namespace kphi::supply::test {
+
+/// Short, so that tests are; long beside the pauses of a busy host.
+inline constexpr Timing kShort{std::chrono::milliseconds(150), std::chrono::milliseconds(50),
+                               std::chrono::milliseconds(60)};
+
+/// Polls until it holds; false after ten seconds.
+inline bool eventually(const std::function<bool()>& holds) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (!holds()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
+}
+
+enum class Over { rtu, tcp };
+
+class SimulatedSupply {
+ public:
+  explicit SimulatedSupply(const std::string& model = "RD6006", double replies_per_s = 0)
+      : SimulatedSupply([&] {
+          sim::SupplySettings settings;
+          settings.model = model;
+          settings.replies_per_s = replies_per_s;
+          return settings;
+        }()) {}
+  explicit SimulatedSupply(const sim::SupplySettings& supply)
+      : server_({supply, sim::SupplyLoad{0, 0.1}, (folder_.path() / "supply").string(), "127.0.0.1", 0}),
+        thread_([this] { server_.run(); }) {}
+  ~SimulatedSupply() {
+    server_.request_stop();
+    thread_.join();
+  }
+
+  [[nodiscard]] Address address(Over wire = Over::rtu, const std::string& options = {}) const {
+    return parse_address(wire == Over::rtu ? "modbus-rtu:" + server_.device() + options
+                                           : "modbus-tcp:127.0.0.1:" + std::to_string(server_.port()) + options);
+  }
+  void inspect(const std::function<void(sim::SupplySlave&)>& look) {
+    server_.inspect([&](sim::SupplySlave& slave, sim::SupplyLoad&, Instant) { look(slave); });
+  }
+  void hang(const sim::SupplyLoad& load) {
+    server_.inspect([&](sim::SupplySlave&, sim::SupplyLoad& now, Instant) { now = load; });
+  }
+  /// `fault.at` counts from now.
+  void spoil(sim::SupplyFault fault) {
+    server_.inspect([&](sim::SupplySlave& slave, sim::SupplyLoad&, Instant now) {
+      fault.at += now;
+      slave.add_fault(fault);
+    });
+  }
+  [[nodiscard]] bool output() {
+    bool on = false;
+    inspect([&](sim::SupplySlave& slave) { on = slave.circuit().output(); });
+    return on;
+  }
+  [[nodiscard]] sim::SupplyTruth truth() {
+    sim::SupplyTruth all;
+    inspect([&](sim::SupplySlave& slave) { all = slave.truth(); });
+    return all;
+  }
+  /// Writes to calibration or bootloader.
+  [[nodiscard]] std::uint64_t harm() {
+    std::uint64_t count = 0;
+    inspect([&](sim::SupplySlave& slave) { count = slave.registers().harmful_writes(); });
+    return count;
+  }
+
+ private:
+  kphi::test::TemporaryFolder folder_;
+  sim::SupplyServer server_;
+  std::thread thread_;
+};
+
+}  // namespace kphi::supply::test

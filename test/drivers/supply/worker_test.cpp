@@ -1,0 +1,418 @@
+#include "drivers/supply/worker.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <latch>
+#include <stdexcept>
+#include <vector>
+
+#include "drivers/device_error.hpp"
+#include "drivers/supply/modbus_supply.hpp"
+#include "test/drivers/supply/simulated_supply.hpp"
+
+namespace kphi::supply {
+namespace {
+
+using namespace std::chrono_literals;
+using test::eventually;
+using test::kShort;
+using testing::AllOf;
+using testing::HasSubstr;
+
+const Limits kTwelveVolts{Volts(12), Amperes(2.5), Volts(13), Amperes(3)};
+
+/// What a fake supply was told and what it shall do; outlives it.
+struct Script {
+  std::atomic<bool> output{true};  ///< somebody has left it on
+  std::atomic<int> looks{0}, offs{0};
+  std::atomic<bool> read_fails{false}, off_fails{false}, on_fails{false}, throws_oddly{false};
+  std::latch* inside = nullptr;   ///< counted down in the first look
+  std::latch* release = nullptr;  ///< waited for there
+};
+
+class FakeSupply final : public Supply {
+ public:
+  explicit FakeSupply(Script& script) : script_(script) { identity_.device = "fake supply"; }
+  [[nodiscard]] const Identity& identity() const noexcept override { return identity_; }
+  Limits apply(const Limits& limits) override { return limits; }
+  [[nodiscard]] Reading read() override {
+    const int look = ++script_.looks;
+    if (look == 1 && script_.inside != nullptr) {
+      script_.inside->count_down();
+      script_.release->wait();
+    }
+    if (script_.throws_oddly) throw 42;
+    if (script_.read_fails) throw DeviceError("fake supply", "read", "the line is lost", "plug it in");
+    Reading reading;
+    reading.at = Instant(look);
+    reading.output = script_.output;
+    return reading;
+  }
+  void switch_off() override {
+    ++script_.offs;
+    if (script_.off_fails) throw DeviceError("fake supply", "switch off", "no answer");
+    script_.output = false;
+  }
+  [[nodiscard]] Counters counters() const noexcept override { return {}; }
+
+ private:
+  void switch_on() override {
+    script_.output = true;
+    if (script_.on_fails) throw DeviceError("fake supply", "switch on", "no answer");
+  }
+  Script& script_;
+  Identity identity_;
+};
+
+std::unique_ptr<Supply> fake(Script& script) { return std::make_unique<FakeSupply>(script); }
+
+std::string what_of(const std::function<void()>& act) {
+  try {
+    act();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
+}
+
+TEST(PoweredOutput, IsOnWhileItLives) {
+  Script script;
+  script.output = false;
+  FakeSupply supply(script);
+  {
+    PoweredOutput on(supply);
+    EXPECT_TRUE(script.output);
+  }
+  EXPECT_FALSE(script.output);
+}
+
+TEST(PoweredOutput, EndsWithAnException) {
+  Script script;
+  FakeSupply supply(script);
+  EXPECT_THROW(
+      {
+        PoweredOutput on(supply);
+        throw std::runtime_error("anything");
+      },
+      std::runtime_error);
+  EXPECT_FALSE(script.output);
+}
+
+TEST(PoweredOutput, SwitchesOffWhenSwitchingOnWasNotConfirmed) {
+  Script script;
+  script.on_fails = true;
+  FakeSupply supply(script);
+  EXPECT_THROW(PoweredOutput on(supply), DeviceError);
+  EXPECT_FALSE(script.output);
+  EXPECT_EQ(script.offs, 1);
+}
+
+TEST(PoweredOutput, SwitchesOffOnceAndTellsOfAFailure) {
+  Script script;
+  script.off_fails = true;
+  FakeSupply supply(script);
+  {
+    PoweredOutput on(supply);
+    EXPECT_THAT(on.off(), HasSubstr("no answer"));
+  }
+  EXPECT_EQ(script.offs, 1);
+}
+
+TEST(SupplyWorker, HandsOutReadingsInOrder) {
+  Script script;
+  SteadyClock clock(100);
+  Worker worker(fake(script), clock, 5);
+  std::vector<Reading> all;
+  EXPECT_TRUE(eventually([&] {
+    std::array<Reading, 8> some;
+    const std::size_t count = worker.take(some);
+    all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(count));
+    return all.size() >= 20;
+  }));
+  for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(all[i].at, Instant(static_cast<std::int64_t>(i) + 1));
+  ASSERT_TRUE(worker.newest());
+  EXPECT_GE(worker.newest()->at, all.back().at);
+  EXPECT_TRUE(worker.alive());
+  EXPECT_EQ(worker.failure(), "");
+}
+
+TEST(SupplyWorker, DropsAndCountsWhatNobodyTakes) {
+  Script script;
+  SteadyClock clock(1000);
+  Worker worker(fake(script), clock, 100);
+  EXPECT_TRUE(eventually([&] { return worker.dropped_readings() > 0; }));
+  EXPECT_GE(script.looks, 4096);
+}
+
+TEST(SupplyWorker, SwitchesOffWhenItDies) {
+  Script script;
+  SteadyClock clock;
+  {
+    Worker worker(fake(script), clock);
+    worker.apply(kTwelveVolts);
+    worker.switch_on();
+    EXPECT_TRUE(script.output);
+  }
+  EXPECT_FALSE(script.output);
+}
+
+TEST(SupplyWorker, SwitchesOffWhatSomebodyElseHadSwitchedOn) {
+  Script script;
+  SteadyClock clock;
+  { Worker worker(fake(script), clock); }
+  EXPECT_FALSE(script.output);
+}
+
+TEST(SupplyWorker, SwitchesOffWhenItsOwnerThrows) {
+  Script script;
+  SteadyClock clock;
+  EXPECT_THROW(
+      {
+        Worker worker(fake(script), clock);
+        worker.switch_on();
+        throw std::runtime_error("anything");
+      },
+      std::runtime_error);
+  EXPECT_FALSE(script.output);
+}
+
+TEST(SupplyWorker, SwitchesOffWhenTheSupplyFails) {
+  Script script;
+  SteadyClock clock(100);
+  Worker worker(fake(script), clock);
+  worker.switch_on();
+  script.read_fails = true;
+  EXPECT_TRUE(eventually([&] { return !worker.alive(); }));
+  EXPECT_FALSE(script.output);
+  EXPECT_EQ(worker.failure(), "fake supply: read: the line is lost; plug it in");
+}
+
+TEST(SupplyWorker, SwitchesOffWhateverIsThrownOnItsThread) {
+  Script script;
+  SteadyClock clock(100);
+  Worker worker(fake(script), clock);
+  worker.switch_on();
+  script.throws_oddly = true;
+  EXPECT_TRUE(eventually([&] { return !worker.alive(); }));
+  EXPECT_FALSE(script.output);
+  EXPECT_EQ(worker.failure(), "an unknown failure");
+}
+
+TEST(SupplyWorker, SaysThatItCouldNotSwitchOff) {
+  Script script;
+  SteadyClock clock(100);
+  Worker worker(fake(script), clock);
+  worker.switch_on();
+  script.off_fails = true;
+  script.read_fails = true;
+  EXPECT_TRUE(eventually([&] { return !worker.alive(); }));
+  EXPECT_GE(script.offs, 1);
+  EXPECT_EQ(
+      worker.failure(),
+      "fake supply: read: the line is lost; plug it in; fake supply: switch off: no answer; its output may be on: "
+      "switch it off by hand");
+  EXPECT_FALSE(worker.switch_off_and_confirm(10s)) << "at once, since nobody can";
+}
+
+TEST(SupplyWorker, FailsWhenTheOrderToSwitchOffFails) {
+  Script script;
+  SteadyClock clock;
+  Worker worker(fake(script), clock);
+  script.off_fails = true;
+  EXPECT_FALSE(worker.switch_off_and_confirm(10s));
+  EXPECT_FALSE(worker.alive());
+  EXPECT_EQ(worker.failure(), "fake supply: switch off: no answer; its output may be on: switch it off by hand");
+  EXPECT_GE(script.offs, 2);
+}
+
+TEST(SupplyWorker, SwitchesOffWhenAskedAndGoesOn) {
+  Script script;
+  SteadyClock clock(100);
+  Worker worker(fake(script), clock);
+  worker.switch_on();
+  EXPECT_TRUE(worker.switch_off_and_confirm(10s));
+  EXPECT_FALSE(script.output);
+  EXPECT_TRUE(worker.alive());
+  worker.switch_on();
+  EXPECT_TRUE(script.output);
+}
+
+TEST(SupplyWorker, HandsFailuresToWhoHasAsked) {
+  Script script;
+  script.on_fails = true;
+  SteadyClock clock;
+  Worker worker(fake(script), clock);
+  EXPECT_THAT(what_of([&] { worker.switch_on(); }), HasSubstr("switch on: no answer"));
+  EXPECT_TRUE(worker.alive());
+  EXPECT_FALSE(script.output);
+}
+
+TEST(SupplyWorker, TellsUnfitLimitsFromAFailure) {
+  SteadyClock clock;
+  test::SimulatedSupply simulated;
+  Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock, kShort), clock);
+  EXPECT_THROW(worker.apply({Volts(61), Amperes(1), Volts(13), Amperes(3)}), std::invalid_argument);
+  EXPECT_TRUE(worker.alive());
+}
+
+TEST(SupplyWorker, RefusesOrdersWhenItHasFailed) {
+  Script script;
+  script.read_fails = true;
+  SteadyClock clock;
+  Worker worker(fake(script), clock);
+  EXPECT_TRUE(eventually([&] { return !worker.alive(); }));
+  EXPECT_THAT(what_of([&] { worker.switch_on(); }), HasSubstr("the line is lost"));
+  EXPECT_THAT(what_of([&] { worker.apply(kTwelveVolts); }), HasSubstr("the line is lost"));
+}
+
+TEST(SupplyWorker, IsLookedAtASensibleNumberOfTimes) {
+  Script script;
+  SteadyClock clock;
+  EXPECT_THROW(Worker(fake(script), clock, 0), std::invalid_argument);
+  EXPECT_THROW(Worker(fake(script), clock, 1000), std::invalid_argument);
+}
+
+/// The supply is in the midst of a look and stays there: everybody else gets through. Who waited for it would wait for
+/// ever.
+TEST(SupplyWorker, LetsNobodyWaitForASlowSupply) {
+  std::latch inside(1), release(1);
+  Script script;
+  script.inside = &inside;
+  script.release = &release;
+  SteadyClock clock;
+  Worker worker(fake(script), clock);
+  inside.wait();
+  std::array<Reading, 4> some;
+  EXPECT_EQ(worker.take(some), 0u);
+  EXPECT_FALSE(worker.newest());
+  EXPECT_TRUE(worker.alive());
+  EXPECT_EQ(worker.failure(), "");
+  EXPECT_EQ(worker.counters().requests, 0u);
+  EXPECT_EQ(worker.dropped_readings(), 0u);
+  worker.switch_off();
+  EXPECT_FALSE(worker.switch_off_and_confirm(1ms));
+  EXPECT_TRUE(script.output);
+  release.count_down();
+  EXPECT_TRUE(eventually([&] { return !script.output; }));
+}
+
+/// While a look goes on, on and off are asked for, in this order: it never goes on.
+TEST(SupplyWorker, LetsOffOverruleAnEarlierOn) {
+  std::latch inside(1), release(1);
+  Script script;
+  script.inside = &inside;
+  script.release = &release;
+  script.output = false;
+  SteadyClock clock;
+  Worker worker(fake(script), clock);
+  inside.wait();
+  std::string answer;
+  std::latch asking(1);
+  std::thread asks([&] {
+    asking.count_down();
+    answer = what_of([&] { worker.switch_on(); });
+  });
+  asking.wait();
+  worker.switch_off();  // before or after the other thread's call: off either way, or on by a later wish
+  release.count_down();
+  asks.join();
+  if (answer == "nothing was thrown") {
+    EXPECT_TRUE(script.output) << "asked after the off";
+  } else {
+    EXPECT_THAT(answer, HasSubstr("it was switched off meanwhile"));
+    EXPECT_FALSE(script.output);
+  }
+}
+
+TEST(SupplyWorkerOnAWire, FeedsFromAStockSupplyOfTenAnswersPerSecond) {
+  SteadyClock clock;
+  test::SimulatedSupply simulated("RD6006", 10);
+  Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock), clock, 5);
+  worker.apply(kTwelveVolts);
+  worker.switch_on();
+  std::vector<Reading> all;
+  EXPECT_TRUE(eventually([&] {
+    std::array<Reading, 8> some;
+    const std::size_t count = worker.take(some);
+    all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(count));
+    return all.size() >= 6;
+  }));
+  EXPECT_TRUE(std::is_sorted(all.begin(), all.end(), [](const Reading& a, const Reading& b) { return a.at < b.at; }));
+  EXPECT_EQ(worker.counters().retries, 0u);
+  EXPECT_TRUE(worker.switch_off_and_confirm(10s));
+  EXPECT_FALSE(simulated.output());
+}
+
+TEST(SupplyWorkerOnAWire, NamesTheUnpluggedSupplyAndThatItCouldNotSwitchOff) {
+  SteadyClock clock;
+  test::SimulatedSupply simulated;
+  Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock, kShort), clock, 20);
+  worker.apply(kTwelveVolts);
+  worker.switch_on();
+  sim::SupplyFault closed;
+  closed.kind = sim::SupplyFaultKind::closed;
+  closed.lasts = 1h;
+  simulated.spoil(closed);
+  EXPECT_TRUE(eventually([&] { return !worker.alive(); }));
+  EXPECT_THAT(worker.failure(),
+              AllOf(HasSubstr("supply RD6006 on "), HasSubstr("No such file"), HasSubstr("plug"),
+                    HasSubstr("switch off"), HasSubstr("its output may be on: switch it off by hand")));
+  EXPECT_TRUE(simulated.output()) << "a cable that is out takes no orders";
+}
+
+TEST(SupplyWorkerOnAWire, SwitchesOffASupplyThatIsNotHeardAnyMore) {
+  SteadyClock clock;
+  test::SimulatedSupply simulated;
+  {
+    Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock, kShort), clock, 20);
+    worker.apply(kTwelveVolts);
+    worker.switch_on();
+    sim::SupplyFault silent;
+    silent.kind = sim::SupplyFaultKind::no_reply;
+    silent.lasts = 1h;
+    simulated.spoil(silent);
+    EXPECT_TRUE(eventually([&] { return !worker.alive(); }));
+    EXPECT_THAT(worker.failure(), HasSubstr("its output may be on"));
+  }
+  EXPECT_FALSE(simulated.output()) << "it has heard, though it was not heard";
+}
+
+TEST(SupplyWorkerOnAWire, ReportsATripAsAReading) {
+  SteadyClock clock;
+  test::SimulatedSupply simulated;
+  Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock, kShort), clock, 20);
+  worker.apply(kTwelveVolts);
+  worker.switch_on();
+  sim::SupplyFault trip;
+  trip.kind = sim::SupplyFaultKind::trip;
+  trip.code = 1;
+  simulated.spoil(trip);
+  EXPECT_TRUE(eventually([&] {
+    const auto newest = worker.newest();
+    return newest && newest->protection == Protection::over_voltage && !newest->output;
+  }));
+  EXPECT_TRUE(worker.alive());
+  worker.switch_on();
+  EXPECT_TRUE(simulated.output()) << "a new wish after the trip";
+}
+
+/// The motor is braked and feeds back: the supply cannot take it, the voltage rises, and the threshold ends it.
+TEST(SupplyWorkerOnAWire, SeesTheVoltageRiseWhenTheLoadFeedsBack) {
+  SteadyClock clock;
+  test::SimulatedSupply simulated;
+  Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock, kShort), clock, 50);
+  worker.apply(kTwelveVolts);
+  simulated.hang({0.5, 0});
+  worker.switch_on();
+  ASSERT_TRUE(eventually([&] { return worker.newest() && worker.newest()->voltage_v > 11.9; }));
+  simulated.hang({-0.2, 0});
+  EXPECT_TRUE(eventually([&] { return worker.newest()->protection == Protection::over_voltage; }));
+  EXPECT_TRUE(eventually([&] { return worker.newest()->current_a < 0.01; }));
+}
+
+}  // namespace
+}  // namespace kphi::supply
