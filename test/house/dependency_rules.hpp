@@ -24,6 +24,9 @@ inline const std::vector<Rule>& rules() {
       {"drivers/supply/", {"drivers/*", "drivers/supply/", "drivers/serial/", "compensation/units.hpp"}},
       {"drivers/ambient/", {"drivers/*", "drivers/ambient/", "drivers/usb/", "compensation/units.hpp"}},
       {"drivers/usb/", {"drivers/*", "drivers/usb/", "compensation/units.hpp"}},
+      // An instrument that speaks SCPI is one kind of supply: it sees what a supply is, not how another one is driven.
+      {"drivers/scpi/",
+       {"drivers/*", "drivers/scpi/", "drivers/usb/", "drivers/supply/supply.hpp", "compensation/units.hpp"}},
       // The other end of each wire: of the drivers only the enums of codes.
       {"drivers/sim/",
        {"drivers/*", "drivers/sim/", "drivers/netbox/codes.hpp", "drivers/iq/codes.hpp", "compensation/units.hpp"}},

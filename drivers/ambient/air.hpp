@@ -1,0 +1,38 @@
+// The air that the propeller works on: thrust is proportional to its density.
+#pragma once
+
+namespace kphi::ambient {
+
+/// Moist air with the standard uncertainties (k = 1) of what was measured.
+struct Air {
+  double temperature_c = 0;      ///< °C
+  double pressure_pa = 0;        ///< absolute, at the stand: not reduced to sea level
+  double relative_humidity = 0;  ///< 0..1
+  double u_temperature_c = 0;
+  double u_pressure_pa = 0;
+  double u_relative_humidity = 0;
+};
+
+struct Density {
+  double kg_m3 = 0;
+  double u_kg_m3 = 0;  ///< standard uncertainty: that of the measured quantities and of the formula
+};
+
+/// To which k is normalised (ISA at sea level, 15 °C, dry).
+inline constexpr double kStandardDensity = 1.225;  // kg/m³
+
+/// What the formula is good for; also the limits beyond which a reading is a broken sensor.
+inline constexpr double kColdest = -40, kHottest = 60;                    // °C
+inline constexpr double kLowestPressure = 5e4, kHighestPressure = 1.1e5;  // Pa
+
+[[nodiscard]] bool plausible(const Air& air) noexcept;
+
+/// CIPM-2007 (Picard et al., Metrologia 45, 2008, eq. 1, A1.1 to A1.4; x_CO2 = 400e-6), its relative uncertainty 22e-6
+/// within 15..27 °C and 600..1100 hPa. Outside, the terms of the enhancement factor are extrapolated: 1e-4 is taken.
+/// First-order propagation (JCGM 100, eq. 10). Throws std::invalid_argument unless plausible.
+[[nodiscard]] Density density_of(const Air& air);
+
+/// k · 1.225/ρ: what the propeller would give in standard air at the same speed.
+[[nodiscard]] double at_standard_density(double k, double density_kg_m3) noexcept;
+
+}  // namespace kphi::ambient

@@ -1,0 +1,189 @@
+#include "drivers/ambient/mcp2221.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "drivers/device_error.hpp"
+
+namespace kphi::ambient {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kBetweenCommands = 1ms;
+constexpr usb::Transport::Timeout kReply = 500ms;
+constexpr int kAttempts = 20;     // of what the bridge calls busy, a pause apart
+constexpr int kStaleReplies = 4;  // answers to commands of a killed predecessor
+constexpr std::size_t kPayload = 60;
+constexpr std::uint8_t kHid = 0x03;
+
+enum Command : std::uint8_t {
+  status = 0x10,
+  get_data = 0x40,
+  write_stop = 0x90,
+  read_restart = 0x93,
+  write_no_stop = 0x94
+};
+constexpr std::uint8_t kCancelTransfer = 0x10, kSetSpeed = 0x20, kSpeedBusy = 0x21;
+constexpr std::uint8_t kDivider100kHz = 12'000'000 / 100'000 - 3;
+
+constexpr std::uint8_t kIdle = 0x00, kBusy = 0x01, kAddressNack = 0x25, kPartialData = 0x41, kWritingNoStop = 0x45,
+                       kReadPartial = 0x54, kReadComplete = 0x55, kReadError = 127;
+
+const char* meaning(std::uint8_t engine_state) noexcept {
+  switch (engine_state) {
+    case 0x12:
+    case 0x17:
+      return "no start condition: the bus is held low";
+    case 0x21:
+    case kAddressNack:
+      return "nobody answers at this address";
+    case 0x23:
+      return "the address took too long";
+    case 0x44:
+      return "the write took too long";
+    case 0x52:
+      return "the read took too long";
+    case 0x62:
+      return "no stop condition: the bus is held low";
+    case kBusy:
+      return "the bridge stays busy";
+    default:
+      return "the bridge reports an error";
+  }
+}
+
+}  // namespace
+
+Mcp2221::Mcp2221(usb::Transport& transport, Pause pause) : transport_(transport), pause_(std::move(pause)) {
+  const auto& all = transport.interfaces();
+  const auto hid = std::find_if(all.begin(), all.end(), [](const usb::Interface& i) { return i.class_code == kHid; });
+  const auto endpoint = [&](bool in) {
+    const auto found = std::find_if(hid->endpoints.begin(), hid->endpoints.end(), [in](const usb::Endpoint& e) {
+      return e.kind == usb::EndpointKind::interrupt && e.in() == in;
+    });
+    return found == hid->endpoints.end() ? usb::Endpoint{} : *found;
+  };
+  if (hid != all.end()) {
+    in_ = endpoint(true);
+    out_ = endpoint(false);
+  }
+  if (in_.address == 0 || out_.address == 0)
+    fail("open", "it has no HID interface with two interrupt endpoints", "is this an MCP2221A?");
+  transport_.claim(hid->number);
+  cancel();
+  set_speed();
+}
+
+void Mcp2221::sleep(std::chrono::microseconds wall) { std::this_thread::sleep_for(wall); }
+
+void Mcp2221::write(std::uint8_t address, std::span<const std::uint8_t> bytes) {
+  send(write_stop, address, bytes.size(), bytes, "write");
+  wait_until_idle("write");
+}
+
+void Mcp2221::read(std::uint8_t address, std::uint8_t register_number, std::span<std::uint8_t> into) {
+  send(write_no_stop, address, 1, {&register_number, 1}, "address a register");
+  wait_until_idle("address a register");
+  send(read_restart, address, into.size(), {}, "read");
+  std::size_t have = 0;
+  for (int attempt = 0; attempt < kAttempts && have < into.size(); ++attempt) {
+    Report command{};
+    command[0] = get_data;
+    const Report reply = exchange(command, "read");
+    const std::uint8_t state = reply[2], count = reply[3];
+    if (state == kAddressNack) fail("read", state);
+    const bool data =
+        reply[1] == 0 && (state == kIdle || state == kPartialData || state == kReadPartial || state == kReadComplete);
+    if (!data || count == kReadError || count == 0) continue;  // not there yet
+    if (count > kPayload || count > into.size() - have)
+      fail("read", "more bytes than were asked for", "reset the bridge");
+    std::copy_n(reply.begin() + 4, count, into.begin() + static_cast<std::ptrdiff_t>(have));
+    have += count;
+    attempt = 0;
+  }
+  if (have < into.size()) fail("read", kBusy);
+}
+
+Mcp2221::Report Mcp2221::exchange(const Report& command, const char* operation) {
+  pause_(kBetweenCommands);
+  const usb::Transfer sent = transport_.write(out_, command, kReply);
+  if (sent.outcome != usb::Outcome::done) fail(operation, usb::name_of(sent.outcome), "is the bridge plugged in?");
+  Report reply{};
+  // Nothing but the echoed command tells whose answer it is.
+  for (int i = 0; i < kStaleReplies; ++i) {
+    const usb::Transfer got = transport_.read(in_, reply, kReply);
+    if (got.outcome != usb::Outcome::done) fail(operation, usb::name_of(got.outcome), "is the bridge plugged in?");
+    if (got.bytes == reply.size() && reply[0] == command[0]) return reply;
+  }
+  fail(operation, "answers to other commands", "does another program use the bridge?");
+}
+
+void Mcp2221::set_speed() {
+  Report command{};
+  command[0] = status;
+  command[3] = kSetSpeed;
+  command[4] = kDivider100kHz;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    const Report reply = exchange(command, "set the bus speed");
+    if (reply[3] == kSetSpeed) return;
+    if (reply[3] != kSpeedBusy) break;
+    cancel();
+  }
+  fail("set the bus speed", kBusy);
+}
+
+void Mcp2221::cancel() {
+  Report command{};
+  command[0] = status;
+  command[2] = kCancelTransfer;
+  exchange(command, "free the bus");
+}
+
+void Mcp2221::send(std::uint8_t command_code, std::uint8_t address, std::size_t total,
+                   std::span<const std::uint8_t> data, const char* operation) {
+  Report command{};
+  command[0] = command_code;
+  command[1] = static_cast<std::uint8_t>(total);
+  command[2] = static_cast<std::uint8_t>(total >> 8);
+  command[3] = static_cast<std::uint8_t>(address << 1);
+  if (data.size() > kPayload) fail(operation, "more than 60 bytes at once", "");
+  std::copy(data.begin(), data.end(), command.begin() + 4);
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    const Report reply = exchange(command, operation);
+    if (reply[1] == 0) return;
+    if (reply[2] != kBusy && reply[2] != kIdle) fail(operation, reply[2]);
+  }
+  fail(operation, kBusy);
+}
+
+void Mcp2221::wait_until_idle(const char* operation) {
+  Report command{};
+  command[0] = status;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    const Report reply = exchange(command, operation);
+    const std::uint8_t state = reply[8];
+    if (state == kAddressNack || (reply[20] & 0x40) != 0) fail(operation, kAddressNack);
+    if (state == kIdle || state == kWritingNoStop) return;
+    if (state == 0x12 || state == 0x17 || state == 0x23 || state == 0x44 || state == 0x62) fail(operation, state);
+  }
+  fail(operation, kBusy);
+}
+
+void Mcp2221::fail(const char* operation, const std::string& cause, const char* next_move) const {
+  throw DeviceError("MCP2221A (" + transport_.name() + ")", operation, cause, next_move);
+}
+
+void Mcp2221::fail(const char* operation, std::uint8_t engine_state) {
+  // Leave the bus free for the next call; what failed is told either way.
+  try {
+    cancel();
+  } catch (const DeviceError&) {
+  }
+  fail(operation, fmt::format("{} (engine state 0x{:02X})", meaning(engine_state), engine_state),
+       "check the sensor's wiring and address, then plug the bridge in again");
+}
+
+}  // namespace kphi::ambient

@@ -1,0 +1,47 @@
+// Microchip's MCP2221A, a bridge from USB to I²C: 64-byte reports by interrupt transfers, one command outstanding.
+// Codes as the Linux kernel's driver and NetBSD's have them.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+
+#include "drivers/ambient/i2c.hpp"
+#include "drivers/usb/transport.hpp"
+
+namespace kphi::ambient {
+
+class Mcp2221 final : public I2c {
+ public:
+  static constexpr std::uint16_t kVendor = 0x04d8, kProduct = 0x00dd;
+  using Report = std::array<std::uint8_t, 64>;
+  /// Waits for that long; the bridge wants a millisecond between two commands.
+  using Pause = std::function<void(std::chrono::microseconds)>;
+
+  /// Claims the HID interface, frees a bus that a killed predecessor has left in the middle of a transfer, and sets
+  /// 100 kHz. `transport` must outlive this. Throws DeviceError: not such a bridge, does not answer, bus stuck.
+  explicit Mcp2221(usb::Transport& transport, Pause pause = sleep);
+
+  void write(std::uint8_t address, std::span<const std::uint8_t> bytes) override;
+  void read(std::uint8_t address, std::uint8_t register_number, std::span<std::uint8_t> into) override;
+
+  /// Sleeps.
+  static void sleep(std::chrono::microseconds wall);
+
+ private:
+  Report exchange(const Report& command, const char* operation);
+  void set_speed();
+  void cancel();
+  void send(std::uint8_t command, std::uint8_t address, std::size_t total, std::span<const std::uint8_t> data,
+            const char* operation);
+  void wait_until_idle(const char* operation);
+  [[noreturn]] void fail(const char* operation, const std::string& cause, const char* next_move) const;
+  [[noreturn]] void fail(const char* operation, std::uint8_t engine_state);
+
+  usb::Transport& transport_;
+  const Pause pause_;
+  usb::Endpoint in_, out_;
+};
+
+}  // namespace kphi::ambient

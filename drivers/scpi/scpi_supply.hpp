@@ -1,0 +1,44 @@
+// A supply that speaks SCPI, over USB or TCP.
+#pragma once
+
+#include <memory>
+
+#include "drivers/clock.hpp"
+#include "drivers/scpi/dialect.hpp"
+#include "drivers/scpi/line.hpp"
+#include "drivers/supply/supply.hpp"
+
+namespace kphi::scpi {
+
+class ScpiSupply final : public supply::Supply {
+ public:
+  /// Asks who it is and what it can do (*IDN?, VOLT? MAX, CURR? MAX); writes nothing. `line` and `clock` must outlive
+  /// this. Throws DeviceError.
+  ScpiSupply(Line& line, const Clock& clock);
+
+  [[nodiscard]] const supply::Identity& identity() const noexcept override { return identity_; }
+  /// After each command the instrument's error queue is asked (SYST:ERR?).
+  supply::Limits apply(const supply::Limits& limits) override;
+  [[nodiscard]] supply::Reading read() override;
+  void switch_off() override;
+  [[nodiscard]] supply::Counters counters() const noexcept override;
+
+ private:
+  void switch_on() override;
+  void switch_output(bool on);
+  void tell(const std::string& command);
+  void set(std::string_view command, double value, double step);
+  [[nodiscard]] double ask(std::string_view query);
+  [[nodiscard]] double ask_within(std::string_view query, double most);
+  [[nodiscard]] bool tripped(std::string_view query);
+  [[nodiscard]] supply::Regulation regulation();
+  [[noreturn]] void fail(std::string_view operation, const std::string& cause, const char* next_move = "");
+
+  Line& line_;
+  const Clock& clock_;
+  supply::Identity identity_;
+  const Dialect* dialect_ = nullptr;
+  supply::Counters counters_;
+};
+
+}  // namespace kphi::scpi

@@ -1,0 +1,217 @@
+#include "drivers/scpi/usbtmc.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "drivers/device_error.hpp"
+#include "drivers/scpi/usbtmc_header.hpp"
+
+namespace kphi::scpi {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::uint8_t kClass = 0xFE, kSubclass = 0x03;
+constexpr std::uint8_t kFromInterface = 0xA1, kFromEndpoint = 0xA2;
+enum Request : std::uint8_t {
+  initiate_abort_out = 1,
+  check_abort_out = 2,
+  initiate_abort_in = 3,
+  check_abort_in = 4,
+  initiate_clear = 5,
+  check_clear = 6,
+  get_capabilities = 7,
+  ren_control = 160,
+};
+constexpr std::uint8_t kSuccess = 0x01, kPending = 0x02;
+constexpr int kChecks = 100;  // of a clear or abort that is pending
+constexpr usb::Transport::Timeout kControlTimeout = 500ms, kDrainTimeout = 20ms;
+constexpr std::uint32_t kPart = 4096;          // bytes asked for at once
+constexpr std::size_t kLongestAnswer = 65536;  // nothing asked here is longer
+
+/// They claim remote/local and must not be sent REN.
+struct Choker {
+  std::uint16_t vendor, product;  // product 0: all of the vendor's
+};
+constexpr Choker kChokeOnRemoteControl[] = {{0x1ab1, 0x0588}, {0x1ab1, 0x04b0}, {0x1ab1, 0x04b1},
+                                            {0x1ab1, 0x0515}, {0xf4ec, 0},      {0x0b21, 0}};
+
+bool chokes(const usb::Transport& device) noexcept {
+  return std::any_of(std::begin(kChokeOnRemoteControl), std::end(kChokeOnRemoteControl), [&](const Choker& c) {
+    return c.vendor == device.vendor() && (c.product == 0 || c.product == device.product());
+  });
+}
+
+}  // namespace
+
+Usbtmc::Usbtmc(usb::Transport& transport, Timeout timeout) : transport_(transport), timeout_(timeout) {
+  find_endpoints();
+  transport_.claim(interface_);
+  read_capabilities();
+  clear();
+  take_remote_control();
+}
+
+void Usbtmc::find_endpoints() {
+  for (const usb::Interface& candidate : transport_.interfaces()) {
+    if (candidate.class_code != kClass || candidate.subclass != kSubclass) continue;
+    for (const usb::Endpoint& endpoint : candidate.endpoints) {
+      if (endpoint.kind == usb::EndpointKind::bulk) (endpoint.in() ? in_ : out_) = endpoint;
+    }
+    interface_ = candidate.number;
+    if (in_.address != 0 && out_.address != 0) return;
+  }
+  fail("open", "it has no USBTMC interface", "is this a measuring instrument?");
+}
+
+void Usbtmc::read_capabilities() {
+  std::array<std::uint8_t, 24> answer{};
+  const usb::Transfer got =
+      transport_.control_in({kFromInterface, get_capabilities, 0, interface_}, answer, kControlTimeout);
+  if (got.outcome != usb::Outcome::done || got.bytes != answer.size() || answer[0] != kSuccess) return;
+  capabilities_ = {(answer[4] & 4) != 0,  (answer[5] & 1) != 0,  (answer[15] & 2) != 0,
+                   (answer[15] & 4) != 0, (answer[15] & 1) != 0, (answer[15] & 8) != 0};
+}
+
+void Usbtmc::take_remote_control() {
+  if (!capabilities_.remote_local || chokes(transport_)) return;
+  std::array<std::uint8_t, 1> answer{};
+  // Without it instruments obey all the same; their front panel stays unlocked.
+  (void)transport_.control_in({kFromInterface, ren_control, 1, interface_}, answer, kControlTimeout);
+}
+
+void Usbtmc::clear() {
+  std::array<std::uint8_t, 2> answer{};
+  const auto request = [&](Request what, std::size_t bytes) {
+    const usb::Transfer got =
+        transport_.control_in({kFromInterface, what, 0, interface_}, std::span(answer).first(bytes), kControlTimeout);
+    if (got.outcome != usb::Outcome::done) fail("clear", usb::name_of(got.outcome), "plug the instrument in again");
+    return answer[0];
+  };
+  std::uint8_t status = request(initiate_clear, 1);
+  if (status == kSuccess) status = request(check_clear, 2);
+  for (int i = 0; status == kPending && i < kChecks; ++i) {
+    if ((answer[1] & 1) != 0) drain();
+    status = request(check_clear, 2);
+  }
+  if (status != kSuccess) fail("clear", fmt::format("status 0x{:02X}", status), "switch the instrument off and on");
+  (void)transport_.clear_halt(out_);
+  out_of_order_ = false;
+}
+
+void Usbtmc::write(std::string_view command) {
+  if (out_of_order_) {
+    ++counters_.recoveries;
+    clear();
+  }
+  tag_ = usbtmc::next_tag(tag_);
+  const auto message = usbtmc::message_out(tag_, std::string(command) + "\n");
+  const usb::Transfer sent = transport_.write(out_, message, timeout_);
+  if (sent.outcome == usb::Outcome::done && sent.bytes == message.size()) return;
+  recover_out(sent.outcome);
+  fail(command, usb::name_of(sent.outcome));
+}
+
+std::string Usbtmc::query(std::string_view command) {
+  ++counters_.queries;
+  write(command);
+  return receive(command);
+}
+
+std::string Usbtmc::receive(std::string_view command) {
+  std::string answer;
+  bool first = true;
+  while (!receive_part(answer, first)) {
+    first = false;
+    if (answer.size() <= kLongestAnswer) continue;
+    ++counters_.damaged;
+    out_of_order_ = true;
+    fail(command, "the answer does not end");
+  }
+  while (!answer.empty() && (answer.back() == '\n' || answer.back() == '\r')) answer.pop_back();
+  return answer;
+}
+
+/// True once the message has ended. Some instruments send one empty packet before the first answer.
+bool Usbtmc::receive_part(std::string& answer, bool may_be_empty) {
+  tag_ = usbtmc::next_tag(tag_);
+  const auto request = usbtmc::request_in(tag_, kPart);
+  const usb::Transfer asked = transport_.write(out_, request, timeout_);
+  if (asked.outcome != usb::Outcome::done) {
+    recover_out(asked.outcome);
+    fail("ask for the answer", usb::name_of(asked.outcome));
+  }
+  std::array<std::uint8_t, kPart + usbtmc::kHeaderBytes + 4> buffer;
+  usb::Transfer got = transport_.read(in_, buffer, timeout_);
+  if (got.outcome == usb::Outcome::done && got.bytes == 0 && may_be_empty) got = transport_.read(in_, buffer, timeout_);
+  if (got.outcome != usb::Outcome::done) {
+    recover_in(got.outcome);
+    fail("read the answer", usb::name_of(got.outcome), "does the instrument know this command?");
+  }
+  const auto header = usbtmc::answer_header(std::span(buffer).first(got.bytes), tag_);
+  if (!header || header->bytes > kPart) {
+    ++counters_.damaged;
+    recover_in(got.outcome);
+    fail("read the answer", "it answers another request");
+  }
+  std::size_t have = std::min<std::size_t>(got.bytes - usbtmc::kHeaderBytes, header->bytes);
+  answer.append(reinterpret_cast<const char*>(buffer.data()) + usbtmc::kHeaderBytes, have);
+  while (have < header->bytes) {
+    got = transport_.read(in_, buffer, timeout_);
+    if (got.outcome != usb::Outcome::done || got.bytes == 0) {
+      recover_in(got.outcome);
+      fail("read the answer", got.bytes == 0 ? "it breaks off" : usb::name_of(got.outcome));
+    }
+    const std::size_t more = std::min<std::size_t>(got.bytes, header->bytes - have);
+    answer.append(reinterpret_cast<const char*>(buffer.data()), more);
+    have += more;
+  }
+  return header->end_of_message;
+}
+
+void Usbtmc::recover_out(usb::Outcome outcome) noexcept {
+  out_of_order_ = true;
+  if (outcome == usb::Outcome::timed_out) {
+    ++counters_.timeouts;
+    (void)abort(initiate_abort_out, check_abort_out, out_);
+  }
+  if (outcome != usb::Outcome::gone && outcome != usb::Outcome::cancelled) (void)transport_.clear_halt(out_);
+}
+
+void Usbtmc::recover_in(usb::Outcome outcome) noexcept {
+  out_of_order_ = true;
+  if (outcome == usb::Outcome::gone || outcome == usb::Outcome::cancelled) return;
+  if (outcome == usb::Outcome::timed_out) ++counters_.timeouts;
+  (void)abort(initiate_abort_in, check_abort_in, in_);
+  (void)transport_.clear_halt(in_);
+}
+
+bool Usbtmc::abort(std::uint8_t initiate, std::uint8_t check, const usb::Endpoint& endpoint) noexcept {
+  std::array<std::uint8_t, 8> answer{};
+  usb::Transfer got = transport_.control_in({kFromEndpoint, initiate, tag_, endpoint.address},
+                                            std::span(answer).first(2), kControlTimeout);
+  if (got.outcome != usb::Outcome::done || answer[0] != kSuccess) return false;
+  for (int i = 0; i < kChecks; ++i) {
+    if (endpoint.in()) drain();
+    got = transport_.control_in({kFromEndpoint, check, 0, endpoint.address}, answer, kControlTimeout);
+    if (got.outcome != usb::Outcome::done) return false;
+    if (answer[0] != kPending) return answer[0] == kSuccess;
+  }
+  return false;
+}
+
+void Usbtmc::drain() noexcept {
+  std::array<std::uint8_t, 512> discarded;
+  for (int i = 0; i < kChecks; ++i) {
+    const usb::Transfer got = transport_.read(in_, discarded, kDrainTimeout);
+    if (got.outcome != usb::Outcome::done || got.bytes < discarded.size()) return;
+  }
+}
+
+void Usbtmc::fail(std::string_view operation, const std::string& cause, const char* next_move) {
+  throw DeviceError(transport_.name(), std::string(operation), cause, next_move);
+}
+
+}  // namespace kphi::scpi

@@ -1,0 +1,83 @@
+// What a USB device's driver needs of the bus, whoever carries it: libusb, or a test. Calls block until done or until
+// their time is up, and belong to one thread at a time; cancel() may come from any.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace kphi::usb {
+
+/// How a transfer ended.
+enum class Outcome : std::uint8_t {
+  done,
+  timed_out,
+  stalled,    ///< the endpoint halts until clear_halt()
+  gone,       ///< unplugged
+  cancelled,  ///< by cancel()
+  failed,     ///< anything else the bus reports
+};
+
+[[nodiscard]] const char* name_of(Outcome outcome) noexcept;
+
+struct Transfer {
+  Outcome outcome = Outcome::done;
+  std::size_t bytes = 0;  ///< moved, also when it ended early
+};
+
+enum class EndpointKind : std::uint8_t { bulk, interrupt, other };
+
+struct Endpoint {
+  std::uint8_t address = 0;  ///< bit 7: IN
+  EndpointKind kind = EndpointKind::other;
+  std::uint16_t packet_bytes = 0;  ///< largest packet
+  [[nodiscard]] bool in() const noexcept { return (address & 0x80) != 0; }
+};
+
+struct Interface {
+  std::uint8_t number = 0;
+  std::uint8_t class_code = 0, subclass = 0, protocol = 0;
+  std::vector<Endpoint> endpoints;
+};
+
+/// The eight bytes of a control request (USB 2.0, 9.3); the length is that of the data.
+struct Setup {
+  std::uint8_t request_type = 0;  ///< bmRequestType
+  std::uint8_t request = 0;       ///< bRequest
+  std::uint16_t value = 0;        ///< wValue
+  std::uint16_t index = 0;        ///< wIndex
+};
+
+class Transport {
+ public:
+  using Timeout = std::chrono::milliseconds;
+
+  Transport() = default;
+  virtual ~Transport() = default;
+  Transport(const Transport&) = delete;
+  Transport& operator=(const Transport&) = delete;
+
+  /// For messages: "USB device 04d8:00dd, serial 0001, port 1-2".
+  [[nodiscard]] virtual const std::string& name() const noexcept = 0;
+  [[nodiscard]] virtual std::uint16_t vendor() const noexcept = 0;
+  [[nodiscard]] virtual std::uint16_t product() const noexcept = 0;
+  [[nodiscard]] virtual const std::vector<Interface>& interfaces() const noexcept = 0;
+  /// Takes the interface for this process alone, from the kernel's driver too, until the transport dies. Throws
+  /// DeviceError.
+  virtual void claim(std::uint8_t interface_number) = 0;
+
+  virtual Transfer control_in(const Setup& setup, std::span<std::uint8_t> data, Timeout timeout) noexcept = 0;
+  virtual Transfer control_out(const Setup& setup, std::span<const std::uint8_t> data, Timeout timeout) noexcept = 0;
+  /// Bulk or interrupt, as the endpoint is.
+  virtual Transfer read(const Endpoint& endpoint, std::span<std::uint8_t> data, Timeout timeout) noexcept = 0;
+  virtual Transfer write(const Endpoint& endpoint, std::span<const std::uint8_t> data, Timeout timeout) noexcept = 0;
+  virtual Outcome clear_halt(const Endpoint& endpoint) noexcept = 0;
+
+  /// Any thread: the transfer under way and all later ones end at once as cancelled.
+  virtual void cancel() noexcept = 0;
+};
+
+}  // namespace kphi::usb

@@ -1,0 +1,107 @@
+#include "drivers/ambient/bme280_sensor.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "drivers/device_error.hpp"
+#include "test/drivers/ambient/fake_bridge.hpp"
+
+namespace kphi::ambient {
+namespace {
+
+using testing::HasSubstr;
+
+class Bme280SensorTest : public testing::Test {
+ protected:
+  FakeBridge usb;
+  Mcp2221 bridge{usb, no_pause};
+
+  Bme280Sensor sensor() { return Bme280Sensor(bridge, usb.name(), no_pause); }
+  std::string refusal() {
+    try {
+      (void)sensor().read();
+    } catch (const DeviceError& error) {
+      return error.what();
+    }
+    return "";
+  }
+};
+
+TEST_F(Bme280SensorTest, MeasuresTheAirWithItsTolerances) {
+  Bme280Sensor measured = sensor();
+  const Air air = measured.read();
+  EXPECT_DOUBLE_EQ(air.temperature_c, 25.08);
+  EXPECT_NEAR(air.pressure_pa, 100653.25, 0.01);
+  EXPECT_NEAR(air.relative_humidity, 0.51, 0.05);
+  EXPECT_NEAR(air.u_temperature_c, 0.577, 1e-3);
+  EXPECT_NEAR(air.u_pressure_pa, 57.7, 0.1);
+  EXPECT_NEAR(air.u_relative_humidity, 0.0173, 1e-4);
+  EXPECT_EQ(measured.identity(), "BME280 at 0x76 behind USB device 04d8:00dd, serial 0001");
+}
+
+TEST_F(Bme280SensorTest, WritesHumidityControlBeforeMeasureControl) {
+  (void)sensor().read();
+  using Write = std::pair<int, int>;
+  EXPECT_THAT(usb.writes, testing::ElementsAre(Write{0xE0, 0xB6}, Write{0xF5, 0}, Write{0xF2, 5}, Write{0xF4, 0xB5}));
+}
+
+TEST_F(Bme280SensorTest, IsFoundAtItsSecondAddress) {
+  usb.sensor_address = 0x77;
+  EXPECT_THAT(sensor().identity(), HasSubstr("0x77"));
+}
+
+TEST_F(Bme280SensorTest, RefusesAnotherChip) {
+  usb.registers[0xD0] = 0x58;
+  EXPECT_THAT(refusal(), HasSubstr("chip id 0x58"));
+}
+
+TEST_F(Bme280SensorTest, SaysWhenNobodyIsThere) {
+  usb.sensor_address = 0x10;
+  EXPECT_THAT(refusal(), HasSubstr("nobody answers"));
+}
+
+TEST_F(Bme280SensorTest, RefusesACalibrationThatChangesBetweenTwoReadings) {
+  int read = 0;
+  usb.spoil = [&](std::vector<std::uint8_t>& answer) {
+    if (answer[0] == 0x40 && answer[3] == 24 && ++read == 2) answer[10] ^= 1;
+    return false;
+  };
+  EXPECT_THAT(refusal(), HasSubstr("two readings differ"));
+}
+
+TEST_F(Bme280SensorTest, RefusesAQuantityThatWasNotMeasured) {
+  Bme280Sensor measured = sensor();
+  usb.spoil = [](std::vector<std::uint8_t>& answer) {
+    if (answer[0] == 0x40 && answer[3] == 8) answer[10] = 0x80, answer[11] = 0;
+    return false;
+  };
+  EXPECT_THROW((void)measured.read(), DeviceError);
+}
+
+TEST_F(Bme280SensorTest, RefusesAirThatCannotBe) {
+  Bme280Sensor measured = sensor();
+  usb.spoil = [](std::vector<std::uint8_t>& answer) {
+    if (answer[0] == 0x40 && answer[3] == 8) answer[7] = 0xFF;
+    return false;
+  };
+  try {
+    (void)measured.read();
+    FAIL();
+  } catch (const DeviceError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("no air is like this"));
+  }
+}
+
+TEST_F(Bme280SensorTest, GivesUpAMeasurementThatDoesNotEnd) {
+  Bme280Sensor measured = sensor();
+  usb.registers[0xF3] = 0x08;
+  try {
+    (void)measured.read();
+    FAIL();
+  } catch (const DeviceError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("does not end"));
+  }
+}
+
+}  // namespace
+}  // namespace kphi::ambient

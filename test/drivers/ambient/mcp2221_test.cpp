@@ -1,0 +1,136 @@
+#include "drivers/ambient/mcp2221.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "drivers/device_error.hpp"
+#include "test/drivers/ambient/fake_bridge.hpp"
+
+namespace kphi::ambient {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+template <class Call>
+std::string refusal(Call&& call) {
+  try {
+    call();
+  } catch (const DeviceError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Mcp2221, FreesTheBusAndSetsTheSpeedWhenItOpens) {
+  FakeBridge usb;
+  Mcp2221 bridge(usb, no_pause);
+  EXPECT_TRUE(usb.claimed);
+  EXPECT_THAT(usb.commands, ElementsAre(Bytes{0x10, 0, 0x10}, Bytes{0x10, 0, 0, 0x20, 0x75}));
+}
+
+TEST(Mcp2221, ReadsARegisterInTheFramesOfTheManual) {
+  FakeBridge usb;
+  Mcp2221 bridge(usb, no_pause);
+  usb.commands.clear();
+  std::array<std::uint8_t, 8> data{};
+  bridge.read(0x76, 0xF7, data);
+  EXPECT_THAT(data, ElementsAre(0x80, 0, 0, 0x80, 0, 0, 0x80, 0));
+  EXPECT_THAT(usb.commands,
+              ElementsAre(Bytes{0x94, 1, 0, 0xEC, 0xF7}, Bytes{0x10}, Bytes{0x93, 8, 0, 0xEC}, Bytes{0x40}));
+}
+
+TEST(Mcp2221, GathersAReadingLongerThanOneReport) {
+  FakeBridge usb;
+  for (int i = 0; i < 100; ++i) usb.registers[i] = static_cast<std::uint8_t>(i);
+  Mcp2221 bridge(usb, no_pause);
+  std::array<std::uint8_t, 100> data{};
+  bridge.read(0x76, 0, data);
+  for (int i = 0; i < 100; ++i) ASSERT_EQ(data[static_cast<std::size_t>(i)], i);
+}
+
+TEST(Mcp2221, SeesAMissingAcknowledgement) {
+  FakeBridge usb;
+  Mcp2221 bridge(usb, no_pause);
+  std::array<std::uint8_t, 1> data{};
+  EXPECT_THAT(refusal([&] { bridge.read(0x40, 0xD0, data); }), HasSubstr("nobody answers at this address"));
+  EXPECT_THAT(refusal([&] { bridge.write(0x40, data); }), HasSubstr("0x25"));
+  bridge.read(0x76, 0xD0, data);
+  EXPECT_EQ(data[0], 0x60) << "the bus is free again";
+}
+
+TEST(Mcp2221, AsksAgainWhileTheBridgeIsBusy) {
+  FakeBridge usb;
+  Mcp2221 bridge(usb, no_pause);
+  usb.busy = 3;
+  std::array<std::uint8_t, 1> data{};
+  bridge.read(0x76, 0xD0, data);
+  EXPECT_EQ(data[0], 0x60);
+}
+
+TEST(Mcp2221, GivesUpABridgeThatStaysBusy) {
+  FakeBridge usb;
+  Mcp2221 bridge(usb, no_pause);
+  usb.spoil = [](Bytes& answer) {
+    if (answer[0] == 0x94) answer[1] = 1, answer[2] = 0x01;
+    return false;
+  };
+  std::array<std::uint8_t, 1> data{};
+  EXPECT_THAT(refusal([&] { bridge.read(0x76, 0xD0, data); }), HasSubstr("busy"));
+}
+
+TEST(Mcp2221, PassesOverAnswersToAnotherCommand) {
+  FakeBridge usb;
+  usb.waiting.push_back(Bytes(64, 0x40));
+  Mcp2221 bridge(usb, no_pause);
+  usb.waiting.push_back(Bytes(64, 0x93));
+  std::array<std::uint8_t, 1> data{};
+  bridge.read(0x76, 0xD0, data);
+  EXPECT_EQ(data[0], 0x60);
+}
+
+TEST(Mcp2221, NamesTheBusThatIsHeldLow) {
+  FakeBridge usb;
+  Mcp2221 bridge(usb, no_pause);
+  usb.spoil = [](Bytes& answer) {
+    if (answer[0] == 0x10) answer[8] = 0x12;
+    return false;
+  };
+  std::array<std::uint8_t, 1> data{};
+  EXPECT_THAT(refusal([&] { bridge.read(0x76, 0xD0, data); }), HasSubstr("held low"));
+}
+
+TEST(Mcp2221, CancelsATransferThatKeepsTheSpeedFromBeingSet) {
+  FakeBridge usb;
+  int busy = 1;
+  usb.spoil = [&](Bytes& answer) {
+    if (answer[3] == 0x20 && busy-- > 0) answer[3] = 0x21;
+    return false;
+  };
+  Mcp2221 bridge(usb, no_pause);
+  EXPECT_THAT(usb.commands, ElementsAre(Bytes{0x10, 0, 0x10}, Bytes{0x10, 0, 0, 0x20, 0x75}, Bytes{0x10, 0, 0x10},
+                                        Bytes{0x10, 0, 0, 0x20, 0x75}));
+}
+
+TEST(Mcp2221, SaysWhenItIsUnplugged) {
+  FakeBridge usb;
+  Mcp2221 bridge(usb, no_pause);
+  usb.next_write = usb::Outcome::gone;
+  std::array<std::uint8_t, 1> data{};
+  EXPECT_THAT(refusal([&] { bridge.read(0x76, 0xD0, data); }), HasSubstr("unplugged"));
+}
+
+TEST(Mcp2221, NeverTakesMoreThanItAskedFor) {
+  FakeBridge usb;
+  Mcp2221 bridge(usb, no_pause);
+  usb.spoil = [](Bytes& answer) {
+    if (answer[0] == 0x40) answer[3] = 60;
+    return false;
+  };
+  std::array<std::uint8_t, 2> data{};
+  EXPECT_THAT(refusal([&] { bridge.read(0x76, 0xD0, data); }), HasSubstr("more bytes"));
+}
+
+}  // namespace
+}  // namespace kphi::ambient

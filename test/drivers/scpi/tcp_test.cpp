@@ -1,0 +1,129 @@
+#include "drivers/scpi/tcp.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include <atomic>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/read_until.hpp>
+#include <boost/asio/write.hpp>
+#include <functional>
+#include <thread>
+
+#include "drivers/device_error.hpp"
+
+namespace kphi::scpi {
+namespace {
+
+namespace asio = boost::asio;
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+/// Answers each line by what `answer` gives; nothing for an empty string. One connection at a time.
+class Server {
+ public:
+  explicit Server(std::function<std::string(const std::string&)> answer)
+      : answer_(std::move(answer)),
+        acceptor_(io_, {asio::ip::address_v4::loopback(), 0}),
+        thread_([this] { serve(); }) {}
+  ~Server() {
+    stop_ = true;
+    ::shutdown(connection_, SHUT_RDWR);
+    boost::system::error_code ignored;
+    asio::ip::tcp::socket knock(io_);
+    knock.connect(acceptor_.local_endpoint(), ignored);
+    knock.close(ignored);
+    thread_.join();
+  }
+  [[nodiscard]] std::uint16_t port() const { return acceptor_.local_endpoint().port(); }
+
+ private:
+  void serve() {
+    while (!stop_) {
+      boost::system::error_code error;
+      asio::ip::tcp::socket socket(io_);
+      acceptor_.accept(socket, error);
+      connection_ = socket.native_handle();
+      std::string text;
+      while (!error && !stop_) {
+        const std::size_t n = asio::read_until(socket, asio::dynamic_buffer(text), '\n', error);
+        if (error) break;
+        const std::string reply = answer_(text.substr(0, n - 1));
+        text.erase(0, n);
+        asio::write(socket, asio::buffer(reply), error);
+      }
+    }
+  }
+  std::function<std::string(const std::string&)> answer_;
+  asio::io_context io_;
+  asio::ip::tcp::acceptor acceptor_;
+  std::atomic<bool> stop_{false};
+  std::atomic<int> connection_{-1};
+  std::thread thread_;
+};
+
+std::string refusal(Tcp& line, const char* query) {
+  try {
+    return "answered " + line.query(query);
+  } catch (const DeviceError& error) {
+    return error.what();
+  }
+}
+
+TEST(ScpiOverTcp, AsksAndAnswers) {
+  Server server([](const std::string& line) { return line == "*IDN?" ? "KPHI,FAKE,1,0\r\n" : ""; });
+  Tcp line("127.0.0.1", server.port());
+  EXPECT_EQ(line.query("*IDN?"), "KPHI,FAKE,1,0");
+  line.write("OUTP ON");
+  EXPECT_EQ(line.query("*IDN?"), "KPHI,FAKE,1,0");
+}
+
+TEST(ScpiOverTcp, LetsALateAnswerDieWithItsConnection) {
+  std::atomic<bool> held{true};
+  Server server([&](const std::string& line) {
+    if (line == "VOLT?") held.wait(true);
+    return line == "VOLT?" ? "12.0\n" : "5.0\n";
+  });
+  Tcp line("127.0.0.1", server.port(), 100ms);
+  EXPECT_THAT(refusal(line, "VOLT?"), HasSubstr("no answer in time"));
+  held = false;
+  held.notify_all();
+  EXPECT_EQ(line.query("CURR?"), "5.0");
+  EXPECT_EQ(line.counters().timeouts, 1u);
+  EXPECT_EQ(line.counters().recoveries, 1u);
+}
+
+TEST(ScpiOverTcp, ThrowsAwayALineThatNobodyAskedFor) {
+  Server server([](const std::string& line) { return line == "VOLT?" ? "12.0\n99.9\n" : "5.0\n"; });
+  Tcp line("127.0.0.1", server.port());
+  EXPECT_EQ(line.query("VOLT?"), "12.0");
+  EXPECT_EQ(line.query("CURR?"), "5.0");
+}
+
+TEST(ScpiOverTcp, GivesUpAnAnswerThatDoesNotEnd) {
+  Server server([](const std::string&) { return std::string(100000, '7'); });
+  Tcp line("127.0.0.1", server.port());
+  EXPECT_THAT(refusal(line, "CURV?"), HasSubstr("does not end"));
+}
+
+TEST(ScpiOverTcp, SaysWhenNobodyListens) {
+  std::uint16_t port = 0;
+  {
+    Server server([](const std::string&) { return ""; });
+    port = server.port();
+  }
+  EXPECT_THROW(Tcp("127.0.0.1", port), DeviceError);
+}
+
+TEST(ScpiOverTcp, ConnectsAgainAfterTheInstrumentHasClosed) {
+  auto server = std::make_unique<Server>([](const std::string&) { return "1\n"; });
+  const std::uint16_t port = server->port();
+  Tcp line("127.0.0.1", port, 500ms);
+  EXPECT_EQ(line.query("A?"), "1");
+  server.reset();
+  EXPECT_THAT(refusal(line, "A?"), testing::Not(HasSubstr("answered")));
+}
+
+}  // namespace
+}  // namespace kphi::scpi
