@@ -6,6 +6,8 @@
 #include <string>
 
 #include "compensation/units.hpp"
+#include "profiles/ambient_place.hpp"
+#include "profiles/supply_place.hpp"
 
 namespace kphi::profiles {
 
@@ -52,14 +54,17 @@ struct Simulation {
   std::uint64_t seed = 1;
   std::string control;  ///< path of the control line (Unix socket); relative to the system's temporary folder
   std::string faults;   ///< path of a fault script; in the file relative to the file's folder; empty: none
+  double air_density_kg_m3 = 1.225;  ///< of the simulated air
 };
 
 struct Bench {
   std::string name;
   NetBoxPlace netbox;
   MotorPlace iq;
-  int thrust_axis = 2;   ///< 0..2 = Fx, Fy, Fz
-  int thrust_sign = +1;  ///< sign of the axis when the propeller pulls
+  int thrust_axis = 2;                  ///< 0..2 = Fx, Fy, Fz
+  int thrust_sign = +1;                 ///< sign of the axis when the propeller pulls
+  std::optional<SupplyPlace> supply;    ///< none: what powers the motor is not ours to switch
+  std::optional<AmbientPlace> ambient;  ///< none: unknown
   std::optional<Simulation> simulation;
   std::string text;  ///< the file, verbatim
   std::string path;
