@@ -61,7 +61,7 @@ bool answers(const sockaddr_un& address) {
 
 Server::Server(const ServerSettings& settings)
     : time_scale_(settings.bench.time_scale),
-      addresses_{settings.host, 0, 0, 0, {}, control_path(settings.control)},
+      addresses_{settings.host, 0, 0, 0, {}, control_path(settings.control), {}, 0},
       bench_(settings.bench),
       stop_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
       rdt_(listen_at(settings.host, SOCK_DGRAM, settings.rdt_port)),
@@ -83,6 +83,11 @@ Server::Server(const ServerSettings& settings)
   addresses_.http_port = web_.port;
   addresses_.tcp_port = coarse_.port;
   addresses_.device = pty_.path();
+  if (bench_.supply() != nullptr && settings.supply) {
+    supply_.emplace(*settings.supply);
+    addresses_.supply_device = supply_->device();
+    addresses_.supply_port = supply_->port();
+  }
   open_or_close_web();
 }
 
@@ -116,6 +121,7 @@ std::vector<pollfd> Server::polls() const {
   http_.append_polls(all);
   tcp_.append_polls(all);
   control_.append_polls(all);
+  if (supply_) supply_->append_polls(all);
   return all;
 }
 
@@ -178,6 +184,9 @@ void Server::step(Instant now) {
   hear_motor(now);
   send_datagrams();
   send_motor();
+  if (!supply_) return;
+  supply_->hear(*bench_.supply(), now);
+  supply_->send(*bench_.supply(), now);
 }
 
 void Server::hear_requests() {
