@@ -15,7 +15,7 @@ struct DoubtPolicy {
   bool spoils;
 };
 
-constexpr std::array<DoubtPolicy, 14> kPolicy{{
+constexpr std::array<DoubtPolicy, 18> kPolicy{{
     {Doubt::speed_not_reached, "commanded speed not reached", true},
     {Doubt::speed_unsteady, "speed never settled", true},
     {Doubt::saturated, "load cell saturated", true},
@@ -30,6 +30,10 @@ constexpr std::array<DoubtPolicy, 14> kPolicy{{
     {Doubt::box_trouble, "load cell's box saw its communication fail", false},
     {Doubt::stolen, "another client took the stream", true},
     {Doubt::configuration_changed, "load cell's box was set otherwise", true},
+    {Doubt::supply_limited, "supply limited the current", true},
+    {Doubt::supply_off, "supply was off", true},
+    {Doubt::supply_sag, "supply sagged", false},
+    {Doubt::supply_rise, "motor fed back into the supply", false},
 }};
 
 bool has(std::uint32_t doubts, Doubt doubt) { return (doubts & static_cast<std::uint32_t>(doubt)) != 0; }

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "results/supply_reading.hpp"
+
 namespace kphi::results {
 
 /// Nanoseconds of bench time since the run's epoch.
@@ -91,7 +93,7 @@ struct LoadCellScale {
 
 /// Everything about a run that is known before the motor turns.
 struct RunHeader {
-  int format = 2;  ///< of the run file: kphi-run/1 or kphi-run/2
+  int format = 3;  ///< of the run file: kphi-run/1 to kphi-run/3
   std::string uuid;
   std::string started_utc;  ///< ISO 8601, Z
   std::string tool_version;
@@ -110,7 +112,10 @@ struct RunHeader {
   int spin = +1;
   double minimum_discard_s = 0;
   LoadCellScale load_cell;
-  std::string motor_identity;  ///< one line: firmware, hardware, uid
+  std::string motor_identity;      ///< one line: firmware, hardware, uid
+  std::string supply_identity;     ///< one line: model, serial, firmware; empty: none
+  double air_density_kg_m3 = 0;    ///< 0: unknown
+  double air_density_u_kg_m3 = 0;  ///< its standard uncertainty
 };
 
 /// How many samples there should be and are. received + lost_network + lost_host = expected, exactly.
@@ -141,18 +146,18 @@ enum class EventKind : std::uint8_t {
   stolen,
   rdt_disabled,
   unreachable,
-  near_range,    ///< an axis above 80 % of its range; the first time in a run
-  beyond_range,  ///< at 100 % or more; the first time in a run
-  range_trip,    ///< above 110 %: the motor was let go
-  unusable,      ///< silent or booted, and now set so that nothing can be measured with it
-  reconnected,   ///< started again after a silence
+  near_range,             ///< an axis above 80 % of its range; the first time in a run
+  beyond_range,           ///< at 100 % or more; the first time in a run
+  range_trip,             ///< above 110 %: the motor was let go
+  unusable,               ///< silent or booted, and now set so that nothing can be measured with it
+  reconnected,            ///< started again after a silence
   configuration_changed,  ///< its counts mean something else since then
   given_up,               ///< no reconnection in time
 };
 inline constexpr std::array<const char*, 17> kEventNames{
-    "restarted", "rebooted",     "stalled",     "stall_ended", "silent",       "resumed",
-    "box_trouble", "stolen",    "rdt_disabled", "unreachable", "near_range",  "beyond_range", "range_trip",
-    "unusable", "reconnected", "configuration_changed", "given_up"};
+    "restarted",   "rebooted", "stalled",      "stall_ended",           "silent",     "resumed",
+    "box_trouble", "stolen",   "rdt_disabled", "unreachable",           "near_range", "beyond_range",
+    "range_trip",  "unusable", "reconnected",  "configuration_changed", "given_up"};
 [[nodiscard]] constexpr const char* name_of(EventKind kind) { return kEventNames[static_cast<std::size_t>(kind)]; }
 
 struct StreamEvent {
@@ -198,7 +203,8 @@ struct RunEnding {
 struct RunRecording : RunEnding {
   RunHeader header;
   std::vector<LoadCellRecord> load_cell;
-  std::vector<MotorReading> motor;  ///< sorted by channel, then time
+  std::vector<MotorReading> motor;    ///< sorted by channel, then time
+  std::vector<SupplyReading> supply;  ///< by time
   std::vector<PhaseMark> phases;
   std::vector<StreamEvent> events;  ///< in the order in which they were noticed
 };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -10,21 +11,27 @@ namespace kphi::results {
 /// Why a step is not to be trusted without a look. A set of bits; the names stand in steps.csv, joined by '+'.
 enum class Doubt : std::uint32_t {
   none = 0,
-  speed_not_reached = 1u << 0,  ///< mean speed further than 1 % (and 2 rad/s) from the command
-  speed_unsteady = 1u << 1,     ///< speed spread over the window above 1 % of its mean (and 5 rad/s)
-  saturated = 1u << 2,          ///< a status word with the saturation bit, or a count at its limit
-  lost_samples = 1u << 3,       ///< fewer records in the window than ft_sequence says
-  derated = 1u << 4,            ///< the module derated
-  few_samples = 1u << 5,        ///< under a tenth of the expected load-cell samples, or under 3 speed readings
-  bad_status = 1u << 6,         ///< another error bit of the box
-  stream_restarted = 1u << 7,   ///< the stream began anew within the step
-  rebooted = 1u << 8,           ///< the box started anew since the zero: its bias is another
-  stalled = 1u << 9,            ///< the box repeated its measurement within the step
-  silent = 1u << 10,            ///< no record for long within the step
-  box_trouble = 1u << 11,       ///< the box saw its own communication fail within the step
-  stolen = 1u << 12,            ///< another client took the stream within the step
+  speed_not_reached = 1u << 0,       ///< mean speed further than 1 % (and 2 rad/s) from the command
+  speed_unsteady = 1u << 1,          ///< speed spread over the window above 1 % of its mean (and 5 rad/s)
+  saturated = 1u << 2,               ///< a status word with the saturation bit, or a count at its limit
+  lost_samples = 1u << 3,            ///< fewer records in the window than ft_sequence says
+  derated = 1u << 4,                 ///< the module derated
+  few_samples = 1u << 5,             ///< under a tenth of the expected load-cell samples, or under 3 speed readings
+  bad_status = 1u << 6,              ///< another error bit of the box
+  stream_restarted = 1u << 7,        ///< the stream began anew within the step
+  rebooted = 1u << 8,                ///< the box started anew since the zero: its bias is another
+  stalled = 1u << 9,                 ///< the box repeated its measurement within the step
+  silent = 1u << 10,                 ///< no record for long within the step
+  box_trouble = 1u << 11,            ///< the box saw its own communication fail within the step
+  stolen = 1u << 12,                 ///< another client took the stream within the step
   configuration_changed = 1u << 13,  ///< the box was set otherwise within the step or before it in the run
+  supply_limited = 1u << 24,         ///< the bench supply limited the current within the step
+  supply_off = 1u << 25,             ///< its output was off within the step, or its protection had switched it off
+  supply_sag = 1u << 26,             ///< more than 5 % of its set voltage was missing at its terminals
+  supply_rise = 1u << 27,            ///< its terminals were more than 3 % above the set voltage: the motor fed back
 };
+
+inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 
 struct StepMean {
   std::string propeller;
@@ -50,6 +57,12 @@ struct StepMean {
   double window_begin_s = 0;  ///< since the run's epoch
   double window_end_s = 0;
   std::uint32_t doubts = 0;  ///< bits of Doubt
+  // Beyond the doubts: columns of their own groups, which a file has when one of its steps has them.
+  double supply_v = kNotMeasured;  ///< at the terminals of the bench supply
+  double supply_a = kNotMeasured;  ///< out of it
+  double supply_w = kNotMeasured;  ///< mean of the products
+  double air_density_kg_m3 = kNotMeasured;
+  double air_density_u_kg_m3 = kNotMeasured;  ///< standard uncertainty
 };
 
 }  // namespace kphi::results
