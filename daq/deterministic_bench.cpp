@@ -16,6 +16,7 @@ namespace kphi::daq {
 namespace {
 
 constexpr Duration kHandshake = std::chrono::seconds(5);
+constexpr Duration kSupplyRises = std::chrono::milliseconds(500);
 constexpr Duration kWorkEvery = std::chrono::milliseconds(50);
 constexpr Duration kSyncEvery = std::chrono::seconds(1);
 constexpr Duration kHttpTimeout = std::chrono::seconds(5);
@@ -38,6 +39,8 @@ sim::BenchSettings settings_of(const profiles::Bench& place) {
   settings.netbox.rate_hz = place.netbox.rate_hz;
   settings.netbox.records_per_datagram = place.netbox.records_per_datagram;
   settings.module_id = place.iq.module_id;
+  if (place.supply) settings.supply.emplace();
+  if (place.simulation) settings.plant.air_density_kg_m3 = place.simulation->air_density_kg_m3;
   if (place.simulation) load_faults(place.simulation->faults, settings);
   return settings;
 }
@@ -84,7 +87,14 @@ class WithinWaits final : public Background {
 }  // namespace
 
 DeterministicBench::DeterministicBench(const profiles::Bench& place)
-    : sim_(settings_of(place)), motor_(motor_settings(place.iq)) {
+    : sim_(settings_of(place)),
+      supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, sim_.supply()->circuit(), clock_)
+                           : nullptr),
+      motor_(motor_settings(place.iq)) {
+  if (supply_) {
+    clock_.set(clock_.now() + kSupplyRises);
+    sim_.advance(clock_.now());
+  }
   motor_.connect(clock_.now());
   while (motor_.state() == iq::Session::State::connecting) step_to(clock_.now() + std::chrono::milliseconds(1));
   if (motor_.state() != iq::Session::State::ready) throw DeviceError("IQ module", "connect", motor_.failure());
@@ -133,6 +143,7 @@ void DeterministicBench::wait_until(Instant when) {
 void DeterministicBench::step_to(Instant when) {
   clock_.set(when);
   sim_.advance(when);
+  if (supply_) supply_->link.look();
   exchange();  // what came is received before anything is found to be late
   motor_.advance(when);
   if (stream_) {

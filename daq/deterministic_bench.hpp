@@ -2,10 +2,12 @@
 // The same campaign gives the same bytes, and takes seconds; also when a script spoils the load cell's wire.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "daq/bench.hpp"
+#include "daq/deterministic_supply.hpp"
 #include "drivers/iq/session.hpp"
 #include "drivers/netbox/configuration.hpp"
 #include "drivers/netbox/health.hpp"
@@ -21,6 +23,7 @@ class DeterministicBench final : public Bench, private MotorLink, private LoadCe
   [[nodiscard]] const Clock& clock() const override { return clock_; }
   [[nodiscard]] MotorLink& motor() override { return *this; }
   [[nodiscard]] LoadCellLink& load_cell() override { return *this; }
+  [[nodiscard]] SupplyLink* supply() override { return supply_ ? &supply_->link : nullptr; }
   void wait_until(Instant when) override;
   [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override;
   [[nodiscard]] results::FileLayer& files() override { return *files_; }
@@ -61,6 +64,13 @@ class DeterministicBench final : public Bench, private MotorLink, private LoadCe
   results::MemoryOnlySync own_files_;
   results::FileLayer* files_ = &own_files_;
   sim::SimulatedBench sim_;
+  struct PoweredSupply {
+    PoweredSupply(const profiles::SupplyPlace& place, sim::SupplyCircuit& circuit, const Clock& clock)
+        : link(place, circuit, clock), powered(link) {}
+    DeterministicSupply link;
+    Powered powered;
+  };
+  std::unique_ptr<PoweredSupply> supply_;
   iq::Session motor_;
   netbox::Configuration configuration_;
   std::vector<netbox::Finding> findings_;

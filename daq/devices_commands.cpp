@@ -10,6 +10,7 @@
 
 #include "daq/load_cell_audit.hpp"
 #include "daq/run.hpp"
+#include "daq/supply_probe.hpp"
 #include "drivers/finding.hpp"
 #include "drivers/iq/probe.hpp"
 #include "drivers/netbox/probe.hpp"
@@ -163,6 +164,25 @@ Answer ask_motor(const profiles::MotorPlace& place, const Clock& clock, std::opt
   return answer;
 }
 
+Answer ask_supply(const profiles::SupplyPlace& place, const Clock& clock) {
+  const SupplyProbe probe = probe_supply(place, clock);
+  Answer answer{"supply " + place.uri, probe.answers(), probe.lines(), {}};
+  if (probe.identity) {
+    answer.details["model"] = probe.identity->model;
+    answer.details["serial"] = probe.identity->serial;
+    answer.details["firmware"] = probe.identity->firmware;
+  }
+  if (probe.reading) {
+    answer.details["voltage_v"] = probe.reading->voltage_v;
+    answer.details["current_a"] = probe.reading->current_a;
+    answer.details["set_voltage_v"] = probe.reading->set_voltage_v;
+    answer.details["current_limit_a"] = probe.reading->current_limit_a;
+    answer.details["output"] = probe.reading->output;
+  }
+  answer.details["findings"] = to_json(probe.findings);
+  return answer;
+}
+
 void print(const std::vector<Answer>& answers, bool json) {
   if (json) {
     auto all = nlohmann::ordered_json::array();
@@ -192,6 +212,7 @@ int devices(const Asked& asked) {
   factory.host = kFactoryAddress;
   std::vector<Answer> answers;
   answers.push_back(ask_load_cell(bench ? bench->netbox : factory, clock, probe_settings(asked, bench)));
+  if (bench && bench->supply) answers.push_back(ask_supply(*bench->supply, clock));
   if (bench) answers.push_back(ask_motor(bench->iq, clock, asked.clock_gain_s));
   print(answers, asked.json);
   if (!bench) fmt::print(stderr, "kphi: no bench file: only the Net Box's factory address was asked; use --bench\n");

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <atomic>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -161,6 +161,7 @@ results::SampleAccount LiveLoadCell::account() const { return to_account(cell_->
 LiveBench::LiveBench(const profiles::Bench& place)
     : place_(place),
       clock_(place.simulation ? place.simulation->time_scale : 1.0),
+      supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, clock_) : nullptr),
       load_cell_(place.netbox, clock_),
       motor_(place.iq, clock_) {}
 

@@ -1,6 +1,7 @@
 // Empties the devices' queues into the run file, looks at every sample and remembers the newest of everything.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <exception>
@@ -42,12 +43,15 @@ class Recorder {
   void take_zero() noexcept;
   /// The newest of everything at bench time `now`.
   [[nodiscard]] Observation observe(Instant now) const noexcept;
+  /// What the bench supply showed last; time 0: nothing yet.
+  [[nodiscard]] results::SupplyReading supply() const noexcept { return supply_.read(); }
   /// Rethrows what drain() ran into.
   void check_failure();
 
  private:
   void drain_load_cell();
   void drain_motor();
+  void drain_supply();
   void drain_marks();
   void drain_events();
   void look_at(std::span<const results::LoadCellRecord> batch);
@@ -65,6 +69,7 @@ class Recorder {
   Instant next_sync_;
   std::vector<results::LoadCellRecord> records_;
   std::vector<results::MotorReading> readings_;
+  std::array<results::SupplyReading, 16> supply_readings_;
   boost::lockfree::spsc_queue<results::PhaseMark, boost::lockfree::capacity<1024>> marks_;
   boost::lockfree::spsc_queue<results::StreamEvent, boost::lockfree::capacity<256>> events_;  // to the runner
   double phase_sum_n_ = 0;
@@ -74,6 +79,7 @@ class Recorder {
   std::atomic<double> speed_rad_s_{0}, supply_current_a_{0}, coil_temperature_degc_{0};
   std::atomic<std::int64_t> load_cell_ns_, motor_ns_;
   netbox::Published<netbox::ZeroMeasurement> measured_;
+  netbox::Published<results::SupplyReading> supply_;
   std::atomic<bool> tripped_{false};
   std::string trip_;  // written before tripped_, read after it
   std::atomic<bool> failed_{false};

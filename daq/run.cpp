@@ -7,10 +7,12 @@
 #include <boost/uuid/uuid_io.hpp>
 #include <optional>
 
+#include "daq/air.hpp"
 #include "daq/box_bias.hpp"
 #include "daq/interrupt.hpp"
 #include "daq/recorder.hpp"
 #include "daq/spin.hpp"
+#include "daq/supply_interlock.hpp"
 #include "drivers/device_error.hpp"
 #include "results/run_writer.hpp"
 #include "results/version.hpp"
@@ -22,6 +24,7 @@ using results::Phase;
 
 constexpr Duration kTickWall = std::chrono::milliseconds(10);
 constexpr Duration kPatienceWall = std::chrono::milliseconds(500);
+constexpr Duration kSupplyPatienceWall = std::chrono::seconds(2);  // it is asked four times per second
 constexpr double kStandstillRadPerSec = 5.0;
 constexpr double kSpinDownLimitSeconds = 30.0;
 constexpr Duration kBiasWorksWall = std::chrono::milliseconds(100);  // what was on its way still has the old zero
@@ -33,7 +36,7 @@ constexpr int kLinesOfEvents = 10;
 bool explains_silence(results::EventKind kind) {
   using results::EventKind;
   return kind == EventKind::stolen || kind == EventKind::rdt_disabled || kind == EventKind::unreachable ||
-         kind == EventKind::unusable ||         kind == EventKind::resumed;
+         kind == EventKind::unusable || kind == EventKind::resumed;
 }
 
 results::RunHeader header_of(const RunOrder& order, Bench& bench, const results::LoadCellScale& scale) {
@@ -61,6 +64,12 @@ results::RunHeader header_of(const RunOrder& order, Bench& bench, const results:
   header.minimum_discard_s = campaign.minimum_discard.value();
   header.load_cell = scale;
   header.motor_identity = bench.motor().identity();
+  if (bench.supply() != nullptr) header.supply_identity = bench.supply()->identity();
+  if (place.ambient) {
+    const ambient::Density air = density_of(*place.ambient);
+    header.air_density_kg_m3 = air.kg_m3;
+    header.air_density_u_kg_m3 = air.u_kg_m3;
+  }
   return header;
 }
 
@@ -75,7 +84,8 @@ class Sequence {
     position_.repetition = order.repetition;
     position_.repetitions = order.campaign.repetitions;
     position_.steps = order.campaign.profile.steps;
-    end_ = bench.clock().now() + from_seconds(order.remaining_bench_s);
+    begin_ = bench.clock().now();
+    end_ = begin_ + from_seconds(order.remaining_bench_s);
   }
 
   void run() {
@@ -195,9 +205,22 @@ class Sequence {
     if (auto trip = check(seen_, order_.campaign.limits, bench_.clock().stretched(kPatienceWall))) {
       throw SafetyStop(trip->reason);
     }
+    watch_supply(now);
     if (spin) spin->renew();
     position_.remaining_s = to_seconds(bench_.clock().shrunk(std::max(Duration(0), end_ - now)));
     progress_.tick(position_, seen_);
+  }
+
+  void watch_supply(Instant now) {
+    if (bench_.supply() == nullptr) return;
+    if (const std::string failure = bench_.supply()->failure(); !failure.empty()) throw SafetyStop(failure);
+    const results::SupplyReading seen = recorder_.supply();
+    const bool any = seen.time_ns != 0;
+    const Instant last = any ? Instant(seen.time_ns) : begin_;
+    if (now - last > bench_.clock().stretched(kSupplyPatienceWall))
+      throw SafetyStop(fmt::format("supply: no reading for {:.3g} s", to_seconds(now - last)));
+    if (!any || !order_.place.supply) return;
+    if (const auto trip = check(seen, *order_.place.supply)) throw SafetyStop(trip->reason);
   }
 
   void tell_events() {
@@ -215,6 +238,7 @@ class Sequence {
   const std::function<bool()>& stop_asked_;
   Position position_;
   Observation seen_;
+  Instant begin_{};
   Instant end_{};
   int told_ = 0;
   results::BoxBias box_bias_;
@@ -279,7 +303,8 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
     try {
       sequence.run();
     } catch (...) {
-      cause = std::current_exception();
+      cause = std::current_exception();  // the motor coasts since the Spin has gone
+      if (bench.supply() != nullptr) bench.supply()->cut();
       explanation = sequence.explanation();
     }
   }
