@@ -51,6 +51,7 @@ OcclusionCoefficient coefficient(double phi_deg, const std::vector<StepMean>& st
   row.standard_error = row.fit->standard_error.k;
   row.steps = levels.size();
   row.repetitions = repetitions.size();
+  if (const auto air = air_of(steps)) row.standard = at_standard(row.k, row.standard_error, *air);
   if (!at_level.empty()) row.at_speed = k_at_speed(at_level);
   return row;
 }
@@ -97,6 +98,7 @@ Identification identify(std::span<const StepMean> steps, const IdentificationOpt
   result.diameter_in = steps.front().diameter_in;
   result.blades = steps.front().blades;
   result.selection = select_steps(steps, options.speed_range);
+  result.air = air_of(result.selection.used);
   const StepsByAngle angles = by_angle(result.selection);
   result.at_speed_rad_s = options.at_speed_rad_s.value_or(highest_common_level(angles));
 

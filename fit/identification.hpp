@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/air.hpp"
 #include "fit/line_fit.hpp"
 #include "fit/step_selection.hpp"
 #include "fit/thrust_fit.hpp"
@@ -21,9 +22,10 @@ struct IdentificationOptions {
 /// One row of the table: what was measured at one φ.
 struct OcclusionCoefficient {
   double phi_deg = 0;
-  double k = 0;               ///< N/(rad/s)², fitted over the speed range
-  double standard_error = 0;  ///< N/(rad/s)²
-  std::size_t steps = 0;      ///< distinct levels
+  double k = 0;                                 ///< N/(rad/s)², fitted over the speed range
+  double standard_error = 0;                    ///< N/(rad/s)²
+  std::optional<StandardCoefficient> standard;  ///< none where the air is unknown
+  std::size_t steps = 0;                        ///< distinct levels
   std::size_t repetitions = 0;
   std::optional<ThrustFit> fit;              ///< none in a table that came without steps
   std::optional<SpeedCoefficient> at_speed;  ///< none when no good step lies at that speed
@@ -36,9 +38,10 @@ struct Identification {
   std::vector<OcclusionCoefficient> table;  ///< ascending φ, the first is φ = 0
   LineFit line;
   StepSelection selection;
-  double at_speed_rad_s = 0;   ///< commanded level of "k at speed"; 0: none
-  SpeedRange fitted{0, 0};     ///< lowest and highest level used at any φ
-  double speed_min_rad_s = 0;  ///< speeds that were measured at every φ: those the line vouches for
+  std::optional<AirDensity> air;  ///< of the steps used; none: unknown, and so is every k at standard density
+  double at_speed_rad_s = 0;      ///< commanded level of "k at speed"; 0: none
+  SpeedRange fitted{0, 0};        ///< lowest and highest level used at any φ
+  double speed_min_rad_s = 0;     ///< speeds that were measured at every φ: those the line vouches for
   double speed_max_rad_s = 0;
 };
 
