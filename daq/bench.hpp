@@ -5,13 +5,17 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "compensation/units.hpp"
 #include "daq/supply_link.hpp"
+#include "drivers/ambient/air.hpp"
 #include "drivers/clock.hpp"
+#include "drivers/iq/audit.hpp"
+#include "drivers/iq/stopping.hpp"
 #include "drivers/netbox/configuration.hpp"
 #include "drivers/netbox/finding.hpp"
 #include "profiles/bench.hpp"
@@ -33,9 +37,20 @@ class MotorLink {
   /// Positive = counter-clockwise. Also renews the lease without which the driver coasts the motor by itself.
   virtual void spin_at(RadPerSec signed_speed) = 0;
   virtual void renew() noexcept = 0;
-  virtual void coast() noexcept = 0;
+  /// Coasts, three times at once; also when the link is gone, as far as can be.
+  virtual void emergency_stop() noexcept = 0;
+  /// Begins to ramp down and to coast, and to watch it to the end; returns at once. Ignored while another is under way.
+  virtual void begin_stop(const iq::StopSettings& settings) = 0;
+  /// How the last of them ended; nothing while it is under way, or before the first.
+  [[nodiscard]] virtual std::optional<iq::StopReport> stop_report() = 0;
+  /// What the module told of itself when the link was made.
+  [[nodiscard]] virtual const iq::AuditRecord& parameters() const = 0;
+  /// Asks for it now; nothing when the module tells none. Throws DeviceError. The runner's thread.
+  [[nodiscard]] virtual std::optional<Celsius> coil_temperature() = 0;
   /// Takes what the module reported since the last call. The recorder's thread.
   virtual std::size_t take(std::span<results::MotorReading> out) = 0;
+  /// What happened to the module and its line since the last call, oldest first. The recorder's thread.
+  [[nodiscard]] virtual std::vector<results::StreamEvent> take_events() = 0;
   /// Why the link is dead; empty while it lives. Any thread.
   [[nodiscard]] virtual std::string failure() const = 0;
   /// One line: firmware, hardware, uid.
@@ -57,6 +72,8 @@ class LoadCellLink {
   virtual std::size_t take(std::span<results::LoadCellRecord> out) = 0;
   /// What happened to the stream since the last call, oldest first. The recorder's thread.
   [[nodiscard]] virtual std::vector<results::StreamEvent> take_events() = 0;
+  /// netftapi2.xml of the box as it is now. The runner's thread. Throws DeviceError.
+  [[nodiscard]] virtual std::string page() = 0;
   /// Tells the box to take its present load as zero; the stream goes on. The runner's thread.
   virtual void set_bias() noexcept = 0;
   /// Why the stream is dead; empty while it lives. Any thread.
@@ -73,6 +90,8 @@ class Bench {
   [[nodiscard]] virtual LoadCellLink& load_cell() = 0;
   /// nullptr: what powers the motor is not ours to switch. Else the motor is powered while the bench lives.
   [[nodiscard]] virtual SupplyLink* supply() { return nullptr; }
+  /// Of the air, now; nothing: nobody knows it.
+  [[nodiscard]] virtual std::optional<ambient::Density> air() const { return std::nullopt; }
   /// Returns at bench time `when`, or a little later on a live bench.
   virtual void wait_until(Instant when) = 0;
   /// Calls `work` until the handle goes: from a thread of its own, or from within wait_until.

@@ -4,17 +4,15 @@
 #include <optional>
 #include <string>
 
+#include "daq/zero_limits.hpp"
 #include "drivers/netbox/bias.hpp"
 #include "results/records.hpp"
 
 namespace kphi::daq {
 
-/// Deviation of one record above which nobody stands still: a bias taken there is worthless. Ten times the white noise
-/// of the cell.
-inline constexpr double kNoisyForce = 0.3;     ///< N
-inline constexpr double kNoisyTorque = 0.009;  ///< N m
-
-inline constexpr const char* kBiasNextMove = "let the stand come to rest, keep hands and wind off, and try again";
+/// Deviation of one record above which nobody stands still: a bias taken there is worthless.
+inline constexpr double kNoisyForce = 10 * kRestForce;    ///< N
+inline constexpr double kNoisyTorque = 10 * kRestTorque;  ///< N m
 
 /// Why no bias may be taken, in words: an axis is noisier than that, or no sound record came. Empty: it may.
 [[nodiscard]] std::optional<std::string> unrest(const netbox::ZeroMeasurement& before);

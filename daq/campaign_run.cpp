@@ -2,14 +2,21 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "daq/load_cell_audit.hpp"
+#include "daq/bench_audit.hpp"
+#include "daq/interrupt.hpp"
 #include "daq/reduction.hpp"
 #include "daq/repetitions.hpp"
 #include "daq/run.hpp"
+#include "daq/zero_limits.hpp"
+#include "drivers/device_error.hpp"
+#include "drivers/iq/quality.hpp"
 #include "profiles/plan.hpp"
+#include "profiles/strict_yaml.hpp"
 #include "results/journal.hpp"
 #include "results/run_reader.hpp"
 #include "results/sha256.hpp"
@@ -20,6 +27,23 @@ namespace kphi::daq {
 namespace {
 
 using nlohmann::json;
+
+constexpr Duration kCoolingLook = std::chrono::seconds(1);
+constexpr Duration kCoolingTickWall = std::chrono::milliseconds(100);
+
+json to_json(const iq::StopReport& stop) {
+  const auto seconds = [](const std::optional<Duration>& time) { return time ? json(to_seconds(*time)) : json(); };
+  return {{"confirmed", stop.safe()},
+          {"time_to_coast_s", seconds(stop.time_to_coast)},
+          {"time_to_standing_s", seconds(stop.time_to_standing)},
+          {"words", stop.summary()}};
+}
+
+std::string standing_words(const std::optional<iq::StopReport>& stop) {
+  if (!stop) return "";
+  if (!stop->time_to_standing) return ", " + stop->summary();
+  return fmt::format(", stood after {:.1f} s", to_seconds(*stop->time_to_standing));
+}
 
 class CampaignRun {
  public:
@@ -39,10 +63,16 @@ class CampaignRun {
   CampaignResult run() {
     results::write_text(folder_.campaign_file(), campaign_.text, bench_.files());
     results::write_text(folder_.bench_file(), place_.text, bench_.files());
-    note("campaign_started", {{"tool_version", kVersion},
-                              {"campaign_sha256", results::sha256(campaign_.text)},
-                              {"bench_sha256", results::sha256(place_.text)},
-                              {"motor", bench_.motor().identity()}});
+    json started{{"tool_version", kVersion},
+                 {"campaign_sha256", results::sha256(campaign_.text)},
+                 {"bench_sha256", results::sha256(place_.text)},
+                 {"motor", bench_.motor().identity()}};
+    if (place_.simulation && !place_.simulation->faults.empty()) {
+      const std::string faults = profiles::read_text(place_.simulation->faults);
+      results::write_text(folder_.faults_file(), faults, bench_.files());
+      started["faults_sha256"] = results::sha256(faults);
+    }
+    note("campaign_started", started);
     try {
       audit();
       for (const profiles::PlannedRun& planned : plan_.runs) one(planned);
@@ -64,6 +94,9 @@ class CampaignRun {
     const double remaining_s =
         per_run_s * static_cast<double>(plan_.runs.size() - static_cast<std::size_t>(result_.runs));
     try {
+      cool_down();
+      if (place_.ambient.known() && !bench_.air())
+        progress_.say("air: its sensor measures no more: the density of this run is unknown");
       const RunOrder order{campaign_, place_, planned.occlusion_deg, planned.repetition, remaining_s, file};
       accept(record_run(bench_, order, progress_, stop_asked_));
     } catch (const std::exception& e) {
@@ -73,11 +106,38 @@ class CampaignRun {
   }
 
   void audit() {
-    for (const netbox::Finding& finding : audit_load_cell(bench_.load_cell(), campaign_, place_)) {
-      const bool is_note = finding.severity == netbox::Severity::note;
-      if (!is_note) progress_.say(describe(finding));
-      note("load_cell_finding",
-           {{"severity", is_note ? "note" : "warning"}, {"what", finding.what}, {"next_move", finding.next_move}});
+    for (const BenchFinding& found : audit_bench(bench_, campaign_, place_)) {
+      const Finding& finding = found.finding;
+      if (finding.severity != Severity::note) progress_.say(found.line());
+      note(found.device == "motor" ? "motor_finding" : "load_cell_finding",
+           {{"severity", name_of(finding.severity)}, {"what", finding.what}, {"next_move", finding.next_move}});
+    }
+    if (!place_.iq.clock_gain) note("clock_unchecked", {{"uid", bench_.motor().parameters().uid()}});
+  }
+
+  /// The motor stands meanwhile.
+  void cool_down() {
+    const auto& limits = campaign_.limits;
+    if (!limits.cooling) return;
+    const iq::CoolingRule rule{limits.cooling->pause_above.value(), limits.cooling->resume_below.value()};
+    const Instant begun = bench_.clock().now();
+    for (bool pausing = false;; pausing = true) {
+      const auto coil = bench_.motor().coil_temperature();
+      if (!rule.pauses(pausing, coil ? coil->value() : std::nan(""))) {
+        if (pausing) note("cooled_down", {{"seconds", to_seconds(bench_.clock().now() - begun)}});
+        return;
+      }
+      if (!coil) throw DeviceError("IQ module", "ask its coil temperature", "it tells none; remove limits.cooling");
+      if (!pausing) {
+        progress_.say(
+            fmt::format("the coil has {:.0f} °C: waiting for {:g} °C", coil->value(), rule.resume_below_degc));
+        note("cooling", {{"coil_degc", coil->value()}, {"resume_below_degc", rule.resume_below_degc}});
+      }
+      const Instant next = bench_.clock().now() + kCoolingLook;
+      while (bench_.clock().now() < next) {
+        if (stop_asked_()) throw Interrupted("stopped by request");
+        bench_.wait_until(std::min(next, bench_.clock().now() + bench_.clock().stretched(kCoolingTickWall)));
+      }
     }
   }
 
@@ -90,7 +150,7 @@ class CampaignRun {
 
   void accept(const RunResult& run) {
     const results::RunRecording recording = results::read_run(run.file);
-    const auto means = reduce(recording);
+    const auto [means, zero] = reduce_with_zeros(recording);
     steps_.insert(steps_.end(), means.begin(), means.end());
     results::write_steps(folder_.steps(), steps_, bench_.files());
     results::write_steps(folder_.means(), average_repetitions(steps_), bench_.files());
@@ -99,8 +159,10 @@ class CampaignRun {
                      {"sha256", run.sha256},
                      {"samples", run.account.received},
                      {"lost", lost}};
+    if (run.stop) accepted["stop"] = to_json(*run.stop);
     for (const results::StreamEvent& event : recording.events) accepted["events"].push_back(event.text);
     note(results::kRunAccepted, accepted);
+    tell(zero);
     int doubtful = 0;
     for (const auto& step : means) doubtful += step.doubts != 0;
     ++result_.runs;
@@ -108,9 +170,26 @@ class CampaignRun {
     result_.lost += lost;
     result_.steps += static_cast<int>(means.size());
     result_.doubtful_steps += doubtful;
-    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps in doubt", result_.runs,
+    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps in doubt{}", result_.runs,
                               plan_.runs.size(), run.file.filename().string(), run.account.received, lost, doubtful,
-                              means.size()));
+                              means.size(), standing_words(run.stop)));
+  }
+
+  void tell(const ZeroCheck& zero) {
+    if (zero.only_one) {
+      progress_.say("load cell: only one of the two zeros of this run could be taken: all its steps are in doubt");
+    } else if (zero.drifted()) {
+      progress_.say(fmt::format(
+          "load cell: its zero moved by {:.3g} N during this run, {:.2g} N are tolerated: all its steps are "
+          "in doubt; let the cell warm up, keep draughts off it, see that nothing touches it",
+          zero.moved_n, zero.tolerated_n));
+    }
+    if (zero.noisy()) {
+      progress_.say(
+          fmt::format("load cell: at a zero of this run the samples scatter by {:.3g} N, {:g} N are tolerated: "
+                      "all its steps are in doubt; {}",
+                      zero.deviation_n, kNoisyZero, kZeroNextMove));
+    }
   }
 
   void note(const std::string& event, const json& data) {

@@ -8,9 +8,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "daq/bench_audit.hpp"
 #include "daq/campaign_run.hpp"
 #include "daq/interrupt.hpp"
-#include "daq/load_cell_audit.hpp"
 #include "profiles/configuration_error.hpp"
 #include "profiles/plan.hpp"
 #include "results/file_layer.hpp"
@@ -79,18 +79,19 @@ std::unique_ptr<Progress> display() {
 
 void summarise(const CampaignResult& result, const results::CampaignFolder& folder, bool json) {
   if (json) {
-    fmt::print("{}\n", nlohmann::json{{"folder", folder.path().string()},
-                                      {"runs", result.runs},
-                                      {"samples", result.samples},
-                                      {"lost", result.lost},
-                                      {"steps", result.steps},
-                                      {"doubtful_steps", result.doubtful_steps}}
-                           .dump());
+    put(stdout, nlohmann::json{{"folder", folder.path().string()},
+                               {"runs", result.runs},
+                               {"samples", result.samples},
+                               {"lost", result.lost},
+                               {"steps", result.steps},
+                               {"doubtful_steps", result.doubtful_steps}}
+                        .dump() +
+                    "\n");
   } else {
-    fmt::print("{}\n", folder.path().string());
+    put(stdout, folder.path().string() + "\n");
   }
-  fmt::print(stderr, "{} runs, {} samples, {} lost, {} of {} steps in doubt\nnext: kphi fit {}\n", result.runs,
-             result.samples, result.lost, result.doubtful_steps, result.steps, folder.path().string());
+  put(stderr, fmt::format("{} runs, {} samples, {} lost, {} of {} steps in doubt\nnext: kphi fit {}\n", result.runs,
+                          result.samples, result.lost, result.doubtful_steps, result.steps, folder.path().string()));
 }
 
 int run(const RunOptions& options) {
@@ -105,12 +106,13 @@ int run(const RunOptions& options) {
       fmt::print("{}\n", plan_text(campaign, place, plan));
     return 0;
   }
-  fmt::print(stderr, "{}\nCtrl-C lets the motor coast, closes the file and stops.\n", plan_text(campaign, place, plan));
+  put(stderr,
+      fmt::format("{}\nCtrl-C lets the motor coast, closes the file and stops.\n", plan_text(campaign, place, plan)));
   const auto operator_ = person(options);
   const SignalWatch signals;
   std::filesystem::create_directories(options.out);
   const auto bench = connect(place);
-  (void)audit_load_cell(bench->load_cell(), campaign, place);  // before a folder is made; its words come with the run
+  (void)audit_bench(*bench, campaign, place);  // before a folder is made; its words come with the run
   results::require_room(options.out, bytes_needed(plan, place), bench->files());
   const auto started = std::chrono::time_point_cast<std::chrono::seconds>(bench->clock().epoch_utc());
   const auto folder = results::CampaignFolder::create(

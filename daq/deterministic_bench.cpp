@@ -20,6 +20,7 @@ constexpr Duration kSupplyRises = std::chrono::milliseconds(500);
 constexpr Duration kWorkEvery = std::chrono::milliseconds(50);
 constexpr Duration kSyncEvery = std::chrono::seconds(1);
 constexpr Duration kHttpTimeout = std::chrono::seconds(5);
+constexpr Duration kMotorWait = std::chrono::milliseconds(1);
 constexpr sim::Peer kHost = 1;
 
 void load_faults(const std::string& path, sim::BenchSettings& settings) {
@@ -28,29 +29,22 @@ void load_faults(const std::string& path, sim::BenchSettings& settings) {
   try {
     settings.faults = sim::parse_faults(text, path);
     settings.netbox.habits = sim::parse_habits(text, path);
+    settings.motor_faults = sim::parse_motor_faults(text, path);
+    if (settings.supply) settings.supply->faults = sim::parse_supply_faults(text, path);
   } catch (const sim::FaultFileError& error) {
     throw ConfigurationError(error.what());
   }
 }
 
-sim::BenchSettings settings_of(const profiles::Bench& place) {
-  sim::BenchSettings settings;
+sim::BenchSettings settings_of(const profiles::Bench& place, sim::BenchSettings settings) {
   settings.seed = place.simulation ? place.simulation->seed : 1;
   settings.netbox.rate_hz = place.netbox.rate_hz;
   settings.netbox.records_per_datagram = place.netbox.records_per_datagram;
   settings.module_id = place.iq.module_id;
   if (place.supply) settings.supply.emplace();
   if (place.simulation) settings.plant.air_density_kg_m3 = place.simulation->air_density_kg_m3;
+  settings.module.baud = place.iq.baud;
   if (place.simulation) load_faults(place.simulation->faults, settings);
-  return settings;
-}
-
-iq::Settings motor_settings(const profiles::MotorPlace& place) {
-  iq::Settings settings;
-  settings.module_id = place.module_id;
-  settings.telemetry_hz = place.telemetry_hz;
-  settings.reply_timeout = std::chrono::milliseconds(100);
-  settings.wire_byte_time = from_seconds(10.0 / place.baud);
   return settings;
 }
 
@@ -86,18 +80,17 @@ class WithinWaits final : public Background {
 
 }  // namespace
 
-DeterministicBench::DeterministicBench(const profiles::Bench& place)
-    : sim_(settings_of(place)),
+DeterministicBench::DeterministicBench(const profiles::Bench& place, const sim::BenchSettings& other)
+    : air_(place.ambient, clock_),
+      sim_(settings_of(place, other)),
       supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, sim_.supply()->circuit(), clock_)
                            : nullptr),
-      motor_(motor_settings(place.iq)) {
+      motor_(place.iq, sim_.motor_line(), clock_, [this] { step_to(clock_.now() + kMotorWait); }) {
   if (supply_) {
     clock_.set(clock_.now() + kSupplyRises);
     sim_.advance(clock_.now());
   }
-  motor_.connect(clock_.now());
-  while (motor_.state() == iq::Session::State::connecting) step_to(clock_.now() + std::chrono::milliseconds(1));
-  if (motor_.state() != iq::Session::State::ready) throw DeviceError("IQ module", "connect", motor_.failure());
+  motor_.connect();
   read_box();
   cross_check();
   SlotPages slots = read_slot_pages([this](const std::string& target) { return page(target); });
@@ -114,7 +107,7 @@ std::string DeterministicBench::page(const std::string& target) {
   return body_of(reply.bytes, operation);
 }
 
-void DeterministicBench::read_box() { configuration_ = netbox::parse_configuration(page("/netftapi2.xml")); }
+void DeterministicBench::read_box() { configuration_ = netbox::parse_configuration(page()); }
 
 void DeterministicBench::cross_check() {
   const auto request = netbox::encode_read_calinfo();
@@ -154,20 +147,8 @@ void DeterministicBench::step_to(Instant when) {
 }
 
 void DeterministicBench::exchange() {
-  exchange_motor();
+  motor_.exchange();
   exchange_load_cell();
-}
-
-void DeterministicBench::exchange_motor() {
-  for (;;) {
-    const std::size_t asked = motor_.output().size();
-    sim_.motor().receive(motor_.output(), clock_.now());
-    motor_.sent(asked);
-    auto& reply = sim_.motor().output();
-    if (asked == 0 && reply.empty()) return;
-    motor_.receive(reply, clock_.now());
-    reply.clear();
-  }
 }
 
 void DeterministicBench::exchange_load_cell() {
@@ -197,28 +178,6 @@ void DeterministicBench::mounted(const std::string& propeller_id, double occlusi
     throw DeviceError("simulated bench", "mount", e.what());
   }
 }
-
-void DeterministicBench::spin_at(RadPerSec signed_speed) {
-  motor_.spin_at(signed_speed, clock_.now());
-  exchange_motor();
-}
-
-// One thread: who asks for a speed cannot die apart from who watches it.
-void DeterministicBench::renew() noexcept {}
-
-void DeterministicBench::coast() noexcept {
-  motor_.coast(clock_.now());
-  exchange_motor();
-}
-
-std::size_t DeterministicBench::take(std::span<results::MotorReading> out) {
-  std::array<iq::Reading, 64> readings;
-  const std::size_t n = motor_.take(std::span(readings).first(std::min(out.size(), readings.size())));
-  for (std::size_t i = 0; i < n; ++i) out[i] = to_reading(readings[i]);
-  return n;
-}
-
-std::string DeterministicBench::identity() const { return motor_.identity().summary(); }
 
 results::LoadCellScale DeterministicBench::start() {
   stream_.reset();
@@ -296,7 +255,6 @@ results::StreamHealth DeterministicBench::health() const {
 results::SampleAccount DeterministicBench::account() const { return to_account(stream_->counters()); }
 
 std::string DeterministicBench::failure() const {
-  if (motor_.state() == iq::Session::State::failed) return "motor: " + motor_.failure();
   if (stream_ && stream_->state() == netbox::State::silent) return "load cell: the stream fell silent";
   return "";
 }

@@ -1,14 +1,16 @@
 // The bench in virtual time: driver sessions joined to simulated devices without transports, one thread, one seed.
-// The same campaign gives the same bytes, and takes seconds; also when a script spoils the load cell's wire.
+// The same campaign gives the same bytes, and takes seconds; also when a script spoils the load cell's wire or the
+// motor's line.
 #pragma once
 
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "daq/air.hpp"
 #include "daq/bench.hpp"
+#include "daq/deterministic_motor.hpp"
 #include "daq/deterministic_supply.hpp"
-#include "drivers/iq/session.hpp"
 #include "drivers/netbox/configuration.hpp"
 #include "drivers/netbox/health.hpp"
 #include "drivers/netbox/session.hpp"
@@ -16,14 +18,16 @@
 
 namespace kphi::daq {
 
-class DeterministicBench final : public Bench, private MotorLink, private LoadCellLink {
+class DeterministicBench final : public Bench, private LoadCellLink {
  public:
   /// Throws DeviceError; ConfigurationError when the fault script that the file names cannot be used.
-  explicit DeterministicBench(const profiles::Bench& place);
+  /// `other`: what no bench file says of the simulated devices.
+  explicit DeterministicBench(const profiles::Bench& place, const sim::BenchSettings& other = {});
   [[nodiscard]] const Clock& clock() const override { return clock_; }
-  [[nodiscard]] MotorLink& motor() override { return *this; }
+  [[nodiscard]] MotorLink& motor() override { return motor_; }
   [[nodiscard]] LoadCellLink& load_cell() override { return *this; }
   [[nodiscard]] SupplyLink* supply() override { return supply_ ? &supply_->link : nullptr; }
+  [[nodiscard]] std::optional<ambient::Density> air() const override { return air_.density(); }
   void wait_until(Instant when) override;
   [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override;
   [[nodiscard]] results::FileLayer& files() override { return *files_; }
@@ -35,17 +39,13 @@ class DeterministicBench final : public Bench, private MotorLink, private LoadCe
   void use_files(results::FileLayer& files) noexcept { files_ = &files; }
 
  private:
-  void spin_at(RadPerSec signed_speed) override;
-  void renew() noexcept override;
-  void coast() noexcept override;
-  std::size_t take(std::span<results::MotorReading> out) override;
-  [[nodiscard]] std::string identity() const override;
   [[nodiscard]] const netbox::Configuration& configuration() const override { return configuration_; }
   [[nodiscard]] std::vector<netbox::Finding> findings() const override { return findings_; }
   results::LoadCellScale start() override;
   void stop() noexcept override;
   std::size_t take(std::span<results::LoadCellRecord> out) override;
   [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+  [[nodiscard]] std::string page() override { return page("/netftapi2.xml"); }
   void set_bias() noexcept override;
   [[nodiscard]] results::SampleAccount account() const override;
   [[nodiscard]] results::StreamHealth health() const override;
@@ -57,10 +57,10 @@ class DeterministicBench final : public Bench, private MotorLink, private LoadCe
   [[nodiscard]] netbox::EventKind why_silent();
   void step_to(Instant when);
   void exchange();
-  void exchange_motor();
   void exchange_load_cell();
 
   ManualClock clock_;
+  AirSource air_;
   results::MemoryOnlySync own_files_;
   results::FileLayer* files_ = &own_files_;
   sim::SimulatedBench sim_;
@@ -71,7 +71,7 @@ class DeterministicBench final : public Bench, private MotorLink, private LoadCe
     Powered powered;
   };
   std::unique_ptr<PoweredSupply> supply_;
-  iq::Session motor_;
+  DeterministicMotor motor_;
   netbox::Configuration configuration_;
   std::vector<netbox::Finding> findings_;
   std::string slots_json_;

@@ -5,7 +5,7 @@
 namespace kphi::daq {
 namespace {
 
-constexpr Duration kLookEvery = std::chrono::milliseconds(250);
+constexpr Duration kLookEvery = std::chrono::milliseconds(125);
 
 /// The simulator has its own enum; the file's code is told here.
 results::SupplyProtection to_protection(sim::SupplyTrip trip) {

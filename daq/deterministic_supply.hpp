@@ -1,4 +1,4 @@
-// The simulated supply's circuit without a transport: looked at four times per second of virtual time.
+// The simulated supply's circuit without a transport: looked at eight times per second of virtual time.
 #pragma once
 
 #include <vector>

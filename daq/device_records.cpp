@@ -1,5 +1,10 @@
 #include "daq/device_records.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
 namespace kphi::daq {
 namespace {
 
@@ -20,6 +25,10 @@ results::MotorChannel channel_of(iq::Quantity quantity) noexcept {
       return MotorChannel::derate;
     case iq::Quantity::drive_mode:
       return MotorChannel::drive_mode;
+    case iq::Quantity::drive_pwm:
+      return MotorChannel::drive_pwm;
+    case iq::Quantity::fault_now:
+      return MotorChannel::fault_now;
   }
   return MotorChannel::speed;
 }
@@ -60,6 +69,23 @@ results::EventKind event_kind_of(netbox::EventKind kind) noexcept {
   return To::box_trouble;
 }
 
+struct MotorEvent {
+  iq::EventKind from;
+  results::EventKind to;
+};
+
+constexpr std::array kMotorEvents{
+    MotorEvent{iq::EventKind::connected, results::EventKind::motor_connected},
+    MotorEvent{iq::EventKind::no_answer, results::EventKind::motor_no_answer},
+    MotorEvent{iq::EventKind::module_reset, results::EventKind::motor_reset},
+    MotorEvent{iq::EventKind::module_silent, results::EventKind::motor_silent},
+    MotorEvent{iq::EventKind::coast_denied, results::EventKind::motor_coast_denied},
+    MotorEvent{iq::EventKind::lease_expired, results::EventKind::motor_lease_expired},
+    MotorEvent{iq::EventKind::port_lost, results::EventKind::motor_port_lost},
+    MotorEvent{iq::EventKind::another_module, results::EventKind::motor_another_module},
+    MotorEvent{iq::EventKind::slow_round_trip, results::EventKind::motor_slow_round_trip},
+};
+
 }  // namespace
 
 results::LoadCellRecord to_record(const netbox::StampedRecord& stamped) noexcept {
@@ -79,6 +105,19 @@ results::StreamEvent to_event(const netbox::Event& event) {
   std::string text = netbox::to_string(event);
   if (event.kind == netbox::EventKind::rebooted) text += "; the steps that follow in this run are in doubt";
   return {event_kind_of(event.kind), event.at.count(), event.records, std::move(text)};
+}
+
+results::StreamEvent to_event(const iq::Event& event) {
+  const auto* known = std::find_if(kMotorEvents.begin(), kMotorEvents.end(),
+                                   [&](const MotorEvent& each) { return each.from == event.kind; });
+  // A kind that nobody knows yet is as bad as the worst.
+  const auto kind = known != kMotorEvents.end() ? known->to : results::EventKind::motor_silent;
+  return {kind, event.time.count(), 0, fmt::format("{:.3f} s: {}", to_seconds(event.time), event.words)};
+}
+
+bool ends_a_run(results::EventKind kind) noexcept {
+  return std::any_of(kMotorEvents.begin(), kMotorEvents.end(),
+                     [&](const MotorEvent& each) { return each.to == kind && iq::spoils_a_run(each.from); });
 }
 
 results::StreamHealth to_health(const netbox::Health& health, const Clock& clock) noexcept {

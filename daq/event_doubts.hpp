@@ -1,4 +1,4 @@
-// Which steps an event of the load cell's stream puts in doubt.
+// Which steps an event of the load cell's stream or of the motor module puts in doubt.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,8 @@ struct DoubtSpan {
   results::Doubt doubt{};
 };
 
-/// One span per event that spoils or may spoil a measurement; a stall or a silence lasts until it ends, or for ever.
+/// One span per event that spoils or may spoil a measurement; a stall or a silence lasts until it ends, or for ever;
+/// a change of the configuration concerns the whole run.
 /// Not of reboots and ranges: the samples themselves show these.
 [[nodiscard]] std::vector<DoubtSpan> doubt_spans(std::span<const results::StreamEvent> events);
 

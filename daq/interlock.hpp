@@ -18,6 +18,10 @@ struct Observation {
   Celsius coil_temperature;
   Duration load_cell_age{};
   Duration motor_age{};
+  double derate = 1;               ///< share of its drive that the module allows itself; 1: all
+  unsigned fault_bits = 0;         ///< of power_safety.fault_now
+  bool load_cell_is_fresh = true;  ///< no older than the stream's and this host's delay: thrust is what is now
+  bool motor_is_fresh = true;      ///< likewise, of speed, current and temperature
 };
 
 /// A limit that was passed, in words: "thrust 21.3 N is above 20 N".
@@ -25,8 +29,10 @@ struct Trip {
   std::string reason;
 };
 
-/// Ages above `patience` (bench time) trip as well.
-[[nodiscard]] std::optional<Trip> check(const Observation& seen, const profiles::Limits& limits, Duration patience);
+/// Of what was measured, and of what the module says of itself.
+[[nodiscard]] std::optional<Trip> check(const Observation& seen, const profiles::Limits& limits);
+/// Ages above `patience`, bench time.
+[[nodiscard]] std::optional<Trip> check_ages(const Observation& seen, Duration patience);
 
 /// A trip that stopped a run. The motor coasts already. Exit code 4.
 class SafetyStop : public std::runtime_error {

@@ -1,4 +1,4 @@
-// Ctrl-C, SIGTERM and SIGHUP as a question that the runner asks on every tick.
+// Ctrl-C, Ctrl-\\, SIGTERM and SIGHUP as a question that the runner asks on every tick.
 #pragma once
 
 #include <stdexcept>
@@ -11,7 +11,8 @@ class Interrupted : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// While it lives the signals SIGINT, SIGTERM and SIGHUP only count; afterwards they do what they did before.
+/// While it lives the signals SIGINT, SIGTERM, SIGHUP and SIGQUIT only count, and those of a reader that is gone and of
+/// a file that is too large do nothing; afterwards all do what they did before.
 class SignalWatch {
  public:
   SignalWatch();

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "daq/motor_audit.hpp"
 #include "daq/slot_pages.hpp"
 #include "drivers/device_error.hpp"
 #include "drivers/netbox/calinfo.hpp"
@@ -57,6 +58,10 @@ std::filesystem::path settings_journal(const profiles::NetBoxPlace& place) {
   return folder / "kphi" / name;
 }
 
+std::string page_of(const profiles::NetBoxPlace& place, const std::string& target) {
+  return netbox::http_get(place.host, place.http_port, target, kPageTimeout);
+}
+
 class Thread final : public Background {
  public:
   explicit Thread(std::function<void()> work)
@@ -79,7 +84,31 @@ class Thread final : public Background {
 }  // namespace
 
 LiveMotor::LiveMotor(const profiles::MotorPlace& place, const Clock& clock)
-    : motor_(place.device, place.baud, motor_settings(place), clock) {}
+    : motor_(place.device, place.baud, motor_settings(place), clock, place.capture),
+      parameters_(read_parameters(motor_.identity(), [this](auto asked) { return motor_.inquire(std::move(asked)); })) {
+  (void)motor_.take_events();  // that it is connected
+}
+
+void LiveMotor::begin_stop(const iq::StopSettings& settings) {
+  if (stop_.valid() && !stop_report()) return;
+  stop_report_.reset();
+  stop_ = std::async(std::launch::async, [this, settings] { return motor_.stop(settings); });
+}
+
+std::optional<iq::StopReport> LiveMotor::stop_report() {
+  if (stop_.valid() && stop_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) stop_report_ = stop_.get();
+  return stop_report_;
+}
+
+std::optional<Celsius> LiveMotor::coil_temperature() {
+  return ask_coil_temperature(parameters_, [this](auto asked) { return motor_.inquire(std::move(asked)); });
+}
+
+std::vector<results::StreamEvent> LiveMotor::take_events() {
+  std::vector<results::StreamEvent> events;
+  for (const iq::Event& event : motor_.take_events()) events.push_back(to_event(event));
+  return events;
+}
 
 std::size_t LiveMotor::take(std::span<results::MotorReading> out) {
   readings_.resize(out.size());
@@ -89,11 +118,9 @@ std::size_t LiveMotor::take(std::span<results::MotorReading> out) {
 }
 
 std::string LiveMotor::failure() const {
-  std::string failure = motor_.failure();
-  if (failure.empty() && motor_.counters().lease_expiries > 0) {
-    failure = "motor: nobody renewed the command in time and the driver let it coast; is this host overloaded?";
-  }
-  return failure;
+  if (const std::string failure = motor_.failure(); !failure.empty()) return "motor: " + failure;
+  if (motor_.counters().lease_expiries == 0) return "";
+  return "motor: nobody renewed the command in time and the driver let it coast; is this host overloaded?";
 }
 
 LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock)
@@ -108,8 +135,7 @@ LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock)
       throw DeviceError("Net Box " + place_.host, "compare its scale", finding->what, finding->next_move);
     findings_.push_back(std::move(*finding));
   }
-  SlotPages slots = read_slot_pages(
-      [&](const std::string& target) { return netbox::http_get(place_.host, place_.http_port, target, kPageTimeout); });
+  SlotPages slots = read_slot_pages([&](const std::string& target) { return page_of(place_, target); });
   slots_json_ = std::move(slots.json);
   findings_.insert(findings_.end(), slots.findings.begin(), slots.findings.end());
 }
@@ -136,6 +162,8 @@ std::vector<results::StreamEvent> LiveLoadCell::take_events() {
   return events;
 }
 
+std::string LiveLoadCell::page() { return page_of(place_, "/netftapi2.xml"); }
+
 void LiveLoadCell::stop() noexcept { cell_->stop(); }
 
 std::size_t LiveLoadCell::take(std::span<results::LoadCellRecord> out) {
@@ -161,6 +189,7 @@ results::SampleAccount LiveLoadCell::account() const { return to_account(cell_->
 LiveBench::LiveBench(const profiles::Bench& place)
     : place_(place),
       clock_(place.simulation ? place.simulation->time_scale : 1.0),
+      air_(place.ambient, clock_),
       supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, clock_) : nullptr),
       load_cell_(place.netbox, clock_),
       motor_(place.iq, clock_) {}

@@ -1,9 +1,11 @@
 // The bench over its real transports: Net Box over UDP and HTTP, motor module over a serial line, a steady clock.
 #pragma once
 
+#include <future>
 #include <memory>
 #include <vector>
 
+#include "daq/air.hpp"
 #include "daq/bench.hpp"
 #include "daq/device_records.hpp"
 #include "daq/live_supply.hpp"
@@ -15,17 +17,26 @@ namespace kphi::daq {
 
 class LiveMotor final : public MotorLink {
  public:
+  /// Connects and reads the module's parameters. Throws DeviceError.
   LiveMotor(const profiles::MotorPlace& place, const Clock& clock);
   void spin_at(RadPerSec signed_speed) override { motor_.spin_at(signed_speed); }
   void renew() noexcept override { motor_.renew(); }
-  void coast() noexcept override { motor_.coast(); }
+  void emergency_stop() noexcept override { motor_.emergency_stop(); }
+  void begin_stop(const iq::StopSettings& settings) override;
+  [[nodiscard]] std::optional<iq::StopReport> stop_report() override;
+  [[nodiscard]] const iq::AuditRecord& parameters() const override { return parameters_; }
+  [[nodiscard]] std::optional<Celsius> coil_temperature() override;
   std::size_t take(std::span<results::MotorReading> out) override;
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
   [[nodiscard]] std::string failure() const override;
   [[nodiscard]] std::string identity() const override { return motor_.identity().summary(); }
 
  private:
   iq::Motor motor_;
+  iq::AuditRecord parameters_;
   std::vector<iq::Reading> readings_;
+  std::optional<iq::StopReport> stop_report_;
+  std::future<iq::StopReport> stop_;  ///< goes first: it waits for the stop that it is
 };
 
 class LiveLoadCell final : public LoadCellLink {
@@ -39,6 +50,7 @@ class LiveLoadCell final : public LoadCellLink {
   void stop() noexcept override;
   std::size_t take(std::span<results::LoadCellRecord> out) override;
   [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+  [[nodiscard]] std::string page() override;
   void set_bias() noexcept override { cell_->set_bias(); }
   [[nodiscard]] std::string failure() const override;
   [[nodiscard]] results::SampleAccount account() const override;
@@ -68,6 +80,7 @@ class LiveBench final : public Bench {
   [[nodiscard]] MotorLink& motor() override { return motor_; }
   [[nodiscard]] LoadCellLink& load_cell() override { return load_cell_; }
   [[nodiscard]] SupplyLink* supply() override { return supply_ ? &supply_->link : nullptr; }
+  [[nodiscard]] std::optional<ambient::Density> air() const override { return air_.density(); }
   void wait_until(Instant when) override;
   [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override;
   [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
@@ -77,6 +90,7 @@ class LiveBench final : public Bench {
  private:
   profiles::Bench place_;
   SteadyClock clock_;
+  AirSource air_;
   std::unique_ptr<PoweredSupply> supply_;  ///< before the motor, which needs it to answer; goes after it
   LiveLoadCell load_cell_;
   LiveMotor motor_;

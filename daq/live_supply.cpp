@@ -7,21 +7,25 @@
 
 #include "daq/supply_interlock.hpp"
 #include "drivers/device_error.hpp"
+#include "drivers/scpi/place.hpp"
+#include "drivers/supply/address.hpp"
 #include "drivers/supply/modbus_supply.hpp"
 #include "profiles/configuration_error.hpp"
 
 namespace kphi::daq {
 namespace {
 
+constexpr double kLooksPerSecond = 8;         // the motor must coast 0.2 s after a trip; stock Riden bear up to 10
 constexpr std::chrono::seconds kRise{3};      // wall time until the voltage must stand
 constexpr std::chrono::seconds kConfirm{3};   // wall time for the order to switch off
 constexpr std::chrono::milliseconds kAsk{2};  // between two glances at the newest reading
 
 }  // namespace
 
-supply::Address address_of(const profiles::SupplyPlace& place) {
+std::unique_ptr<supply::Supply> open_supply(const profiles::SupplyPlace& place, const Clock& clock) {
   try {
-    return supply::parse_address(place.uri);
+    if (scpi::is_scpi(place.uri)) return scpi::open_supply(place.uri, clock);
+    return std::make_unique<supply::ModbusSupply>(supply::parse_address(place.uri), clock);
   } catch (const std::invalid_argument& error) {
     throw ConfigurationError(std::string("supply.uri: ") + error.what());
   }
@@ -54,7 +58,7 @@ std::string summary(const supply::Identity& identity) {
 }
 
 LiveSupply::LiveSupply(const profiles::SupplyPlace& place, const Clock& clock)
-    : place_(place), worker_(std::make_unique<supply::ModbusSupply>(address_of(place), clock), clock) {}
+    : place_(place), worker_(open_supply(place, clock), clock, kLooksPerSecond) {}
 
 std::string LiveSupply::identity() const { return summary(worker_.identity()); }
 
@@ -86,17 +90,19 @@ std::size_t LiveSupply::take(std::span<results::SupplyReading> out) {
   return n;
 }
 
-std::string LiveSupply::failure() const {
-  if (worker_.alive()) return "";
+std::string LiveSupply::failure() const { return worker_.alive() ? "" : words(); }
+
+/// Why it has failed, beginning with whose failure it is.
+std::string LiveSupply::words() const {
   const std::string why = worker_.failure();
-  return why.empty() ? "supply: its thread has ended" : why;
+  if (why.empty()) return "supply: its thread has ended";
+  return why.starts_with("supply") ? why : "supply: " + why;
 }
 
 std::string LiveSupply::switch_off() noexcept {
   if (worker_.switch_off_and_confirm(kConfirm)) return "";
   try {
-    const std::string why = worker_.failure();
-    return why.empty() ? "the supply has not confirmed that its output is off: it may be ON" : why;
+    return worker_.alive() ? "supply: it has not confirmed that its output is off: it may be ON" : words();
   } catch (...) {
     return "supply: output may be ON";
   }

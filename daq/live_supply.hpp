@@ -1,10 +1,10 @@
-// The bench supply over Modbus, in a thread of its own.
+// The bench supply over Modbus or SCPI, in a thread of its own.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "daq/supply_link.hpp"
-#include "drivers/supply/address.hpp"
 #include "drivers/supply/worker.hpp"
 #include "profiles/supply_place.hpp"
 
@@ -22,14 +22,15 @@ class LiveSupply final : public SupplyLink {
 
  private:
   void switch_on() override;
+  [[nodiscard]] std::string words() const;
 
   const profiles::SupplyPlace place_;
   supply::Worker worker_;
   std::vector<supply::Reading> readings_;
 };
 
-/// Throws ConfigurationError.
-[[nodiscard]] supply::Address address_of(const profiles::SupplyPlace& place);
+/// Over Modbus or SCPI, as its URI says. Throws ConfigurationError, DeviceError.
+[[nodiscard]] std::unique_ptr<supply::Supply> open_supply(const profiles::SupplyPlace& place, const Clock& clock);
 [[nodiscard]] supply::Limits limits_of(const profiles::SupplyPlace& place);
 [[nodiscard]] results::SupplyReading to_reading(const supply::Reading& reading);
 /// "RD6018, serial 4711, firmware 1.28".

@@ -2,19 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
-#include "profiles/configuration_error.hpp"
-
 namespace kphi::daq {
 namespace {
 
 using netbox::Finding;
 using netbox::Severity;
-
-std::string remedied(const Finding& finding) {
-  return finding.next_move.empty() ? finding.what : finding.what + "; " + finding.next_move;
-}
 
 }  // namespace
 
@@ -55,18 +47,8 @@ std::vector<Finding> audit_load_cell(const LoadCellLink& cell, const profiles::C
   std::vector<Finding> findings = netbox::audit(box, intention_of(campaign, place));
   for (auto& more : {unset(box, place.netbox.settings), cell.findings()})
     findings.insert(findings.end(), more.begin(), more.end());
-  std::stable_sort(findings.begin(), findings.end(),
-                   [](const Finding& a, const Finding& b) { return a.severity > b.severity; });
-  std::string faults;
-  for (const Finding& finding : findings) {
-    if (finding.severity == Severity::fault) faults += (faults.empty() ? "" : "\n  ") + remedied(finding);
-  }
-  if (!faults.empty()) throw ConfigurationError("Net Box " + place.netbox.host + ": " + faults);
+  put_worst_first(findings);
   return findings;
-}
-
-std::string describe(const Finding& finding) {
-  return fmt::format("load cell: {}: {}", finding.severity == Severity::note ? "note" : "warning", remedied(finding));
 }
 
 }  // namespace kphi::daq

@@ -12,15 +12,12 @@ namespace kphi::daq {
 /// Speeds and blades of the campaign, the largest thrust that its limits let pass, rate and buffer of the bench file.
 [[nodiscard]] netbox::Intention intention_of(const profiles::Campaign& campaign, const profiles::Bench& place);
 
-/// What is worth a word: worst first, no faults. A fault throws ConfigurationError with its remedy.
+/// Worst first, faults included; see bench_audit.hpp.
 [[nodiscard]] std::vector<netbox::Finding> audit_load_cell(const LoadCellLink& cell, const profiles::Campaign& campaign,
                                                            const profiles::Bench& place);
 
 /// What of the settings the bench file asks for is not so in the box; rate and buffer are the audit's.
 [[nodiscard]] std::vector<netbox::Finding> unset(const netbox::Configuration& box,
                                                  const profiles::NetBoxSettings& wanted);
-
-/// "warning: … ; the next move".
-[[nodiscard]] std::string describe(const netbox::Finding& finding);
 
 }  // namespace kphi::daq

@@ -28,24 +28,38 @@ std::string cut(const std::string& line, std::size_t columns) {
   return line;
 }
 
+/// What no longer comes, and for how long.
+std::string silence(const Observation& seen) {
+  std::string words;
+  if (!seen.motor_is_fresh) words += fmt::format("  no speed for {:.1f} s", to_seconds(seen.motor_age));
+  if (!seen.load_cell_is_fresh) words += fmt::format("  no thrust for {:.1f} s", to_seconds(seen.load_cell_age));
+  return words;
+}
+
 }  // namespace
+
+void put(std::FILE* stream, const std::string& text) noexcept {
+  (void)std::fputs(text.c_str(), stream);
+  (void)std::fflush(stream);
+}
 
 std::string describe(const Position& position, const Observation& seen) {
   const std::string where = fmt::format("{}  φ {:3g}°  rep {}/{}", position.propeller, position.occlusion_deg,
                                         position.repetition, position.repetitions);
   const std::string what = position.step < 0 ? fmt::format("{:<10}", position.phase)
                                              : fmt::format("step {:2}/{}", position.step + 1, position.steps);
-  return fmt::format("{}  {}  cmd {:5.0f}  is {:5.0f} RPM  thrust {:6.3f} N  left {}", where, what,
-                     to_rpm(position.commanded), to_rpm(seen.speed), seen.thrust.value(),
-                     minutes_and_seconds(position.remaining_s));
+  return fmt::format("{}  {}  cmd {:5.0f}  is {} RPM  thrust {} N  left {}", where, what, to_rpm(position.commanded),
+                     seen.motor_is_fresh ? fmt::format("{:5.0f}", to_rpm(seen.speed)) : "    ?",
+                     seen.load_cell_is_fresh ? fmt::format("{:6.3f}", seen.thrust.value()) : "     ?",
+                     minutes_and_seconds(position.remaining_s)) +
+         silence(seen);
 }
 
 TerminalProgress::~TerminalProgress() { clear(); }
 
 void TerminalProgress::clear() {
   if (!drawn_) return;
-  fmt::print(stream_, "\r\x1b[K");
-  std::fflush(stream_);
+  put(stream_, "\r\x1b[K");
   drawn_ = false;
 }
 
@@ -53,8 +67,7 @@ void TerminalProgress::tick(const Position& position, const Observation& seen) {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_) return;
   next_ = now + std::chrono::milliseconds(100);
-  fmt::print(stream_, "\r{}\x1b[K", cut(describe(position, seen), width_of(stream_) - 1));
-  std::fflush(stream_);
+  put(stream_, fmt::format("\r{}\x1b[K", cut(describe(position, seen), width_of(stream_) - 1)));
   drawn_ = true;
 }
 
@@ -62,17 +75,13 @@ void TerminalProgress::step_done(const Position&, const Observation&) {}
 
 void TerminalProgress::say(const std::string& line) {
   clear();
-  fmt::print(stream_, "{}\n", line);
+  put(stream_, fmt::format("{}\n", line));
 }
 
 void PlainProgress::step_done(const Position& position, const Observation& seen) {
-  fmt::print(stream_, "{}\n", describe(position, seen));
-  std::fflush(stream_);
+  put(stream_, fmt::format("{}\n", describe(position, seen)));
 }
 
-void PlainProgress::say(const std::string& line) {
-  fmt::print(stream_, "{}\n", line);
-  std::fflush(stream_);
-}
+void PlainProgress::say(const std::string& line) { put(stream_, fmt::format("{}\n", line)); }
 
 }  // namespace kphi::daq

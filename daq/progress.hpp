@@ -23,6 +23,9 @@ struct Position {
   double remaining_s = 0;  ///< of the campaign, as a person's clock runs
 };
 
+/// A reader that is gone is no reason to stop a run: what cannot be written is lost in silence.
+void put(std::FILE* stream, const std::string& text) noexcept;
+
 /// Implementations are called from the runner's thread only.
 class Progress {
  public:
@@ -71,7 +74,8 @@ class PlainProgress final : public Progress {
   std::FILE* stream_;
 };
 
-/// "5x3  φ  90°  rep 2/3  step 17/40  cmd  7895 RPM  is  7894 RPM  thrust  1.162 N  left 06:12"
+/// "5x3  φ  90°  rep 2/3  step 17/40  cmd  7895 RPM  is  7894 RPM  thrust  1.162 N  left 06:12"; what is not fresh is
+/// no number: "…  thrust      ? N  left 06:12  no thrust for 0.8 s".
 [[nodiscard]] std::string describe(const Position& position, const Observation& seen);
 
 }  // namespace kphi::daq

@@ -11,6 +11,9 @@ namespace {
 
 constexpr std::size_t kRecordsAtOnce = 7000;
 constexpr std::size_t kReadingsAtOnce = 512;
+/// What is younger is shown as what is: this host's own delay, and three times that of the device.
+constexpr Duration kFreshWall = std::chrono::milliseconds(60);
+constexpr Duration kFreshMotor = std::chrono::milliseconds(100);
 constexpr std::array kAxes{"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
 
 results::EventKind kind_of(netbox::RangeVerdict verdict) {
@@ -26,6 +29,9 @@ Recorder::Recorder(Bench& bench, results::RunWriter& writer, ThrustAxis axis, co
       axis_(axis),
       scale_(to_configuration(scale)),
       watch_(scale_),
+      fresh_load_cell_(bench.clock().stretched(kFreshWall) +
+                       from_seconds(3 * bench.load_cell().configuration().records_per_datagram / scale.sample_rate_hz)),
+      fresh_motor_(bench.clock().stretched(kFreshWall) + kFreshMotor),
       next_sync_(bench.clock().now() + bench.sync_interval()),
       records_(kRecordsAtOnce),
       readings_(kReadingsAtOnce),
@@ -59,16 +65,18 @@ void Recorder::drain_marks() {
     writer_.mark(mark);
     phase_sum_n_ = 0;
     phase_count_ = 0;
-    measuring_ = mark.phase == results::Phase::bias_before || mark.phase == results::Phase::bias_after;
+    measuring_ = mark.phase == results::Phase::bias_before || mark.phase == results::Phase::bias_after ||
+                 mark.phase == results::Phase::zero_before;
     estimate_ = {};
   }
 }
 
 void Recorder::drain_events() {
-  for (results::StreamEvent& event : bench_.load_cell().take_events()) note(std::move(event));
+  for (const results::StreamEvent& event : bench_.load_cell().take_events()) note(event);
+  for (const results::StreamEvent& event : bench_.motor().take_events()) note(event);
 }
 
-void Recorder::note(results::StreamEvent event) {
+void Recorder::note(const results::StreamEvent& event) {
   writer_.note(event);
   events_.push(event);  // a full queue: nobody listens, and the file has it
 }
@@ -119,6 +127,8 @@ void Recorder::drain_motor() {
       if (reading.channel == MotorChannel::speed) speed_rad_s_ = std::abs(reading.value);
       if (reading.channel == MotorChannel::supply_current) supply_current_a_ = reading.value;
       if (reading.channel == MotorChannel::coil_temperature) coil_temperature_degc_ = reading.value;
+      if (reading.channel == MotorChannel::derate) derate_ = reading.value;
+      if (reading.channel == MotorChannel::fault_now) fault_bits_ = static_cast<unsigned>(reading.value);
     }
     motor_ns_ = batch.back().time_ns;
   }
@@ -153,8 +163,13 @@ std::optional<std::string> Recorder::range_trip() const {
 void Recorder::take_zero() noexcept { zero_n_ = phase_mean_n_.load(); }
 
 Observation Recorder::observe(Instant now) const noexcept {
-  return {RadPerSec(speed_rad_s_),         Newtons(thrust_n_ - zero_n_), Amperes(supply_current_a_),
-          Celsius(coil_temperature_degc_), now - Instant(load_cell_ns_), now - Instant(motor_ns_)};
+  Observation seen{RadPerSec(speed_rad_s_),         Newtons(thrust_n_ - zero_n_), Amperes(supply_current_a_),
+                   Celsius(coil_temperature_degc_), now - Instant(load_cell_ns_), now - Instant(motor_ns_)};
+  seen.derate = derate_;
+  seen.fault_bits = fault_bits_;
+  seen.load_cell_is_fresh = seen.load_cell_age <= fresh_load_cell_;
+  seen.motor_is_fresh = seen.motor_age <= fresh_motor_;
+  return seen;
 }
 
 void Recorder::check_failure() {

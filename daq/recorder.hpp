@@ -33,11 +33,13 @@ class Recorder {
   void drain() noexcept;
   /// Begins a phase now.
   void mark(results::Phase phase, int step, RadPerSec commanded);
-  /// What happened to the load cell since the last call; all of it is in the file already.
+  /// What happened to load cell and motor since the last call; all of it is in the file already.
   [[nodiscard]] std::vector<results::StreamEvent> take_events();
   /// The load cell is in danger: an axis above 110 % of its range. Says which, and how much.
   [[nodiscard]] std::optional<std::string> range_trip() const;
-  /// Mean and standard deviation of all axes over the present phase, which measures a bias.
+  /// For what the runner found out by itself, once nobody drains any more.
+  void note(const results::StreamEvent& event);
+  /// Mean and standard deviation of all axes over the present phase, which measures a bias or the zero before.
   [[nodiscard]] netbox::ZeroMeasurement measured() const noexcept { return measured_.read(); }
   /// The mean thrust of the current phase becomes the zero of observe().
   void take_zero() noexcept;
@@ -55,7 +57,6 @@ class Recorder {
   void drain_marks();
   void drain_events();
   void look_at(std::span<const results::LoadCellRecord> batch);
-  void note(results::StreamEvent event);
   void note_range(netbox::RangeVerdict verdict, results::Nanoseconds at);
 
   Bench& bench_;
@@ -66,17 +67,21 @@ class Recorder {
   netbox::RangeVerdict worst_ = netbox::RangeVerdict::inside;
   bool measuring_ = false;
   netbox::ZeroEstimate estimate_;
+  const Duration fresh_load_cell_, fresh_motor_;
   Instant next_sync_;
   std::vector<results::LoadCellRecord> records_;
   std::vector<results::MotorReading> readings_;
   std::array<results::SupplyReading, 16> supply_readings_;
   boost::lockfree::spsc_queue<results::PhaseMark, boost::lockfree::capacity<1024>> marks_;
-  boost::lockfree::spsc_queue<results::StreamEvent, boost::lockfree::capacity<256>> events_;  // to the runner
+  // To the runner. Sized at run time: Boost 1.74's queue of fixed capacity never destroys what is left in it.
+  boost::lockfree::spsc_queue<results::StreamEvent> events_{256};
   double phase_sum_n_ = 0;
   std::uint64_t phase_count_ = 0;
 
   std::atomic<double> thrust_n_{0}, phase_mean_n_{0}, zero_n_{0};
   std::atomic<double> speed_rad_s_{0}, supply_current_a_{0}, coil_temperature_degc_{0};
+  std::atomic<double> derate_{1};
+  std::atomic<unsigned> fault_bits_{0};
   std::atomic<std::int64_t> load_cell_ns_, motor_ns_;
   netbox::Published<netbox::ZeroMeasurement> measured_;
   netbox::Published<results::SupplyReading> supply_;

@@ -6,4 +6,4 @@ add_library(kphi_reduction STATIC
   repetitions.cpp
   supply_means.cpp
 )
-target_link_libraries(kphi_reduction PUBLIC kphi_options kphi_results PRIVATE kphi_profiles fmt::fmt)
+target_link_libraries(kphi_reduction PUBLIC kphi_options kphi_results PRIVATE kphi_profiles kphi_iq fmt::fmt)

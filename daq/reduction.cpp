@@ -11,7 +11,10 @@
 #include "daq/clock_map.hpp"
 #include "daq/event_doubts.hpp"
 #include "daq/supply_means.hpp"
+#include "daq/zero_limits.hpp"
+#include "drivers/iq/quality.hpp"
 #include "profiles/bench.hpp"
+#include "profiles/campaign.hpp"
 #include "profiles/configuration_error.hpp"
 #include "results/record_error.hpp"
 
@@ -37,6 +40,8 @@ constexpr double kSpeedShare = 0.01;   // of the command
 constexpr double kSpeedReached = 2.0;  // rad/s
 constexpr double kSpeedSteady = 5.0;   // rad/s
 constexpr double kFewSamples = 0.1;    // of those expected
+constexpr double kMostSamples =
+    0.9;  // of the window's: a restart of the box leaves a gap that ft_sequence does not show
 constexpr std::uint64_t kFewSpeeds = 3;
 
 /// True speed per reported speed: the gain of the motor module's clock, where the run's bench file knows it.
@@ -49,6 +54,23 @@ double clock_factor(const results::RunHeader& header) {
     throw results::RecordError(fmt::format("run {}: the clock gain in its bench file cannot be read: {}; see kphi info",
                                            header.uuid, error.what()));
   }
+}
+
+constexpr int kGatesSince = 3;  // format of the run file; steps of older ones keep the doubts that they have
+constexpr double kSupplyBand = 0.1;
+
+/// What the campaign in the run's header says that motor and supply may do.
+iq::QualityLimits quality_limits(const results::RunHeader& header) {
+  iq::QualityLimits limits;
+  try {
+    const profiles::Campaign campaign = profiles::parse_campaign(header.campaign_text, "campaign.yaml");
+    limits.supply_lowest_v = (1 - kSupplyBand) * campaign.supply.value();
+    limits.supply_highest_v = (1 + kSupplyBand) * campaign.supply.value();
+    limits.coil_temperature_max_degc = campaign.limits.coil_temperature_max.value();
+  } catch (const ConfigurationError&) {
+    // A run without a readable campaign has no limits.
+  }
+  return limits;
 }
 
 double speed_tolerance(double commanded) { return std::max(kSpeedShare * commanded, kSpeedReached); }
@@ -222,6 +244,7 @@ struct Zero {
   double time = 0;   ///< ns, centre of its window
   double force = 0;  ///< counts
   double torque = 0;
+  double force_deviation = 0;
   std::size_t boot = 0;  ///< a zero holds for one power-up of the box
 };
 
@@ -229,6 +252,7 @@ class Zeros {
  public:
   void add(const Zero& zero) { (zeros_[0] ? zeros_[1] : zeros_[0]) = zero; }
   [[nodiscard]] bool empty() const { return !zeros_[0]; }
+  [[nodiscard]] bool both() const { return zeros_[1].has_value(); }
   /// Power-up of the first zero: the only one without doubt.
   [[nodiscard]] std::size_t boot() const { return zeros_[0]->boot; }
   [[nodiscard]] Zero at(double time, std::size_t boot) const {
@@ -237,7 +261,15 @@ class Zeros {
     const Zero& b = *zeros_[1];
     if (a.boot != b.boot) return b.boot == boot ? b : a;
     const double share = (time - a.time) / (b.time - a.time);
-    return {time, a.force + share * (b.force - a.force), a.torque + share * (b.torque - a.torque), boot};
+    return {time, a.force + share * (b.force - a.force), a.torque + share * (b.torque - a.torque), 0, boot};
+  }
+  /// Counts from before to after; NaN when nobody can tell.
+  [[nodiscard]] double movement() const {
+    if (!zeros_[1] || zeros_[0]->boot != zeros_[1]->boot) return std::numeric_limits<double>::quiet_NaN();
+    return zeros_[1]->force - zeros_[0]->force;
+  }
+  [[nodiscard]] double largest_deviation() const {
+    return std::max(zeros_[0]->force_deviation, zeros_[1] ? zeros_[1]->force_deviation : 0.0);
   }
 
  private:
@@ -249,17 +281,23 @@ class Reduction {
   explicit Reduction(const results::RunRecording& run)
       : run_(run),
         clock_factor_(clock_factor(run.header)),
+        limits_(quality_limits(run.header)),
         cell_(run),
         motor_(run.motor),
         spans_(doubt_spans(run.events)) {}
 
-  [[nodiscard]] std::vector<StepMean> steps() {
+  [[nodiscard]] Reduced reduced() {
     find_zeros();
-    std::vector<StepMean> means;
+    Reduced found;
     for (std::size_t i = 0; i < run_.phases.size(); ++i) {
-      if (run_.phases[i].phase == Phase::step && held_to_its_end(i)) means.push_back(mean_of(i));
+      if (run_.phases[i].phase == Phase::step && held_to_its_end(i)) found.steps.push_back(mean_of(i));
     }
-    return means;
+    if (zeros_.empty()) return found;
+    found.zero = check_zeros(found.steps);
+    const std::uint32_t doubts = (found.zero.drifted() ? static_cast<std::uint32_t>(Doubt::zero_drifted) : 0u) |
+                                 (found.zero.noisy() ? static_cast<std::uint32_t>(Doubt::zero_noisy) : 0u);
+    for (StepMean& step : found.steps) step.doubts |= doubts;
+    return found;
   }
 
  private:
@@ -267,6 +305,16 @@ class Reduction {
     return {run_.phases[i].time_ns, run_.phases[i + 1].time_ns};
   }
   [[nodiscard]] Nanoseconds discard() const { return std::llround(1e9 * run_.header.minimum_discard_s); }
+
+  [[nodiscard]] ZeroCheck check_zeros(const std::vector<StepMean>& steps) const {
+    const results::RunHeader& header = run_.header;
+    double largest_thrust_n = 0;  // NaN of a step without samples is none
+    for (const StepMean& step : steps) largest_thrust_n = std::fmax(largest_thrust_n, std::abs(step.thrust_n));
+    const double newtons = header.thrust_sign / header.load_cell.counts_per_newton;
+    return {newtons * zeros_.movement(), tolerated_drift(largest_thrust_n),
+            std::abs(newtons) * zeros_.largest_deviation(),
+            run_.outcome == results::Outcome::complete && !zeros_.both()};
+  }
 
   /// The step that an abort cut short is followed by whatever made the bench safe, never by another step.
   [[nodiscard]] bool held_to_its_end(std::size_t i) const {
@@ -288,7 +336,8 @@ class Reduction {
       window = cell_.since_reboot(window);
       const CellWindow zero = cell_.over(window);
       if (zero.force.n() == 0) continue;
-      zeros_.add({window.centre(), zero.force.mean(), zero.torque.mean(), cell_.boot_at(window.end)});
+      zeros_.add(
+          {window.centre(), zero.force.mean(), zero.torque.mean(), zero.force.deviation(), cell_.boot_at(window.end)});
     }
   }
 
@@ -373,14 +422,17 @@ class Reduction {
     const double expected = std::max(planned_s, 0.0) * run_.header.load_cell.sample_rate_hz;
     const double derate = motor_.statistics(MotorChannel::derate, window).least;
     const Window whole = phase_window(i);
-    std::uint32_t bits =
-        doubts_within(spans_, whole.begin, whole.end) | supply_doubts(run_.supply, whole.begin, whole.end);
+    std::uint32_t bits = doubts_within(spans_, whole.begin, whole.end) |
+                         supply_doubts(run_.supply, whole.begin, window.begin, false) |
+                         supply_doubts(run_.supply, window.begin, window.end, true);
     const auto note = [&](Doubt doubt, bool applies) { bits |= applies ? static_cast<std::uint32_t>(doubt) : 0u; };
     // Without a single reading nobody knows: that is "not reached", too.
     note(Doubt::speed_not_reached, !(std::abs(speed.mean - commanded) <= speed_tolerance(commanded)));
     note(Doubt::speed_unsteady, speed.deviation > std::max(kSpeedShare * std::abs(speed.mean), kSpeedSteady));
     note(Doubt::saturated, (cell.status & kSaturationBit) != 0 || cell.at_limit);
-    note(Doubt::lost_samples, cell.lost > 0);
+    const double whole_window =
+        1e-9 * static_cast<double>(window.end - window.begin) * run_.header.load_cell.sample_rate_hz;
+    note(Doubt::lost_samples, cell.lost > 0 || static_cast<double>(cell.force.n()) < kMostSamples * whole_window);
     note(Doubt::derated, derate < 1);
     note(Doubt::rebooted, cell_.boot_at(whole.end) != zeros_.boot());
     note(Doubt::few_samples,
@@ -388,11 +440,32 @@ class Reduction {
     const std::uint32_t told = kSaturationBit | kMonitorBit;
     const bool only_saturation = (cell.status & ~(told | kSummaryBit)) == 0 && (cell.status & kSaturationBit) != 0;
     note(Doubt::bad_status, (cell.status & ~told) != 0 && !only_saturation);
+    if (run_.header.format < kGatesSince) return bits;
+    const iq::Verdict verdict = iq::judge(module_readings(window), limits_);
+    note(Doubt::drive_saturated, verdict.is_shut(iq::Gate::saturation));
+    note(Doubt::motor_fault, verdict.is_shut(iq::Gate::fault));
+    note(Doubt::supply_out_of_band, verdict.is_shut(iq::Gate::supply_voltage));
+    note(Doubt::coil_hot, verdict.is_shut(iq::Gate::coil_temperature));
     return bits;
+  }
+
+  /// Of the gates that nothing else here decides.
+  [[nodiscard]] iq::StepReadings module_readings(const Window& window) const {
+    iq::StepReadings readings;
+    const auto add = [&](MotorChannel channel, const iq::Entry& entry) {
+      const auto [begin, end] = motor_.over(channel, window);
+      for (const auto* r = begin; r != end; ++r) readings.add(entry, r->value);
+    };
+    add(MotorChannel::drive_pwm, iq::entry<"brushless_drive.drive_pwm">);
+    add(MotorChannel::fault_now, iq::entry<"power_safety.fault_now">);
+    add(MotorChannel::supply_voltage, iq::entry<"power_monitor.volts">);
+    add(MotorChannel::coil_temperature, iq::entry<"coil_temperature_estimator.t_coil">);
+    return readings;
   }
 
   const results::RunRecording& run_;
   const double clock_factor_;
+  const iq::QualityLimits limits_;
   CellStream cell_;
   MotorSeries motor_;
   std::vector<DoubtSpan> spans_;
@@ -410,9 +483,15 @@ void require_usable(const results::RunHeader& header) {
 
 }  // namespace
 
-std::vector<StepMean> reduce(const results::RunRecording& run) {
+bool ZeroCheck::drifted() const { return only_one || std::abs(moved_n) > tolerated_n; }
+
+bool ZeroCheck::noisy() const { return deviation_n > kNoisyZero; }
+
+Reduced reduce_with_zeros(const results::RunRecording& run) {
   require_usable(run.header);
-  return Reduction(run).steps();
+  return Reduction(run).reduced();
 }
+
+std::vector<StepMean> reduce(const results::RunRecording& run) { return reduce_with_zeros(run).steps; }
 
 }  // namespace kphi::daq

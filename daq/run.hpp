@@ -4,10 +4,12 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "daq/bench.hpp"
 #include "daq/progress.hpp"
+#include "drivers/iq/stopping.hpp"
 #include "profiles/bench.hpp"
 #include "profiles/campaign.hpp"
 #include "results/records.hpp"
@@ -27,6 +29,7 @@ struct RunResult {
   std::filesystem::path file;
   std::string sha256;
   results::SampleAccount account;
+  std::optional<iq::StopReport> stop;  ///< how the motor came to stand
 };
 
 /// `stop_asked` is asked on every tick. Throws Interrupted, SafetyStop or RecordError after the motor was let go and

@@ -1,27 +1,48 @@
 // The only way to turn the motor.
 #pragma once
 
+#include <optional>
+
 #include "daq/bench.hpp"
 
 namespace kphi::daq {
 
-/// While a Spin lives the motor may turn; when it goes, by whatever way, the motor coasts.
+/// While a Spin lives the motor may turn; when it goes before a stop of its own has come to a good end, by whatever
+/// way, the motor is let go at once.
 class Spin {
  public:
   /// `direction` +1 counter-clockwise, -1 clockwise.
   Spin(MotorLink& motor, int direction) noexcept : motor_(motor), direction_(direction) {}
-  ~Spin() { motor_.coast(); }
+  ~Spin() {
+    if (!let_go_) motor_.emergency_stop();
+  }
   Spin(const Spin&) = delete;
   Spin& operator=(const Spin&) = delete;
 
   /// Unsigned speed.
-  void at(RadPerSec speed) { motor_.spin_at(RadPerSec(direction_ * speed.value())); }
+  void at(RadPerSec speed) {
+    let_go_ = stopping_ = false;
+    motor_.spin_at(RadPerSec(direction_ * speed.value()));
+  }
   /// Tells the driver's watchdog that someone still watches.
   void renew() noexcept { motor_.renew(); }
+  /// Ramps down and coasts; returns at once.
+  void begin_stop(const iq::StopSettings& settings = {}) {
+    motor_.begin_stop(settings);
+    stopping_ = true;
+  }
+  /// How the stop ended; nothing while it is under way.
+  [[nodiscard]] std::optional<iq::StopReport> stopped() {
+    auto report = stopping_ ? motor_.stop_report() : std::nullopt;
+    let_go_ = report && report->safe();
+    return report;
+  }
 
  private:
   MotorLink& motor_;
   int direction_;
+  bool stopping_ = false;
+  bool let_go_ = false;  ///< the module has confirmed that it coasts
 };
 
 }  // namespace kphi::daq

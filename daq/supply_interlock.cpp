@@ -17,16 +17,20 @@ std::optional<Trip> moved(const char* what, double now, double wanted, const cha
 
 }  // namespace
 
-std::optional<Trip> check(const results::SupplyReading& seen, const profiles::SupplyPlace& wanted) {
-  using results::SupplyProtection;
-  if (seen.protection != SupplyProtection::none)
-    return Trip{fmt::format("supply: its {} protection has switched it off", name_of(seen.protection))};
+std::string tripped_words(const results::SupplyReading& seen) {
+  return fmt::format("supply: its {} protection has switched it off", name_of(seen.protection));
+}
+
+std::optional<Trip> check(const results::SupplyReading& seen, const profiles::SupplyPlace& wanted, bool settled) {
+  const double volts = wanted.voltage.value();
+  const bool limits = seen.regulation == results::SupplyRegulation::constant_current;
+  if (seen.protection != results::SupplyProtection::none) return Trip{tripped_words(seen)};
   if (seen.output == 0) return Trip{"supply: its output is off"};
-  const double volts = wanted.voltage.value(), amps = wanted.current_limit.value();
-  if (seen.regulation == results::SupplyRegulation::constant_current)
+  if (limits && settled)
     return Trip{fmt::format("supply: it limits the current: {:.3g} A at {:.4g} V", seen.current_a, seen.voltage_v)};
   if (auto trip = moved("set voltage", seen.set_voltage_v, volts, "V")) return trip;
-  if (auto trip = moved("current limit", seen.current_limit_a, amps, "A")) return trip;
+  if (auto trip = moved("current limit", seen.current_limit_a, wanted.current_limit.value(), "A")) return trip;
+  if (!settled) return std::nullopt;
   // Written so that NaN trips.
   if (!(seen.voltage_v >= (1 - kSupplySag) * volts))
     return Trip{fmt::format("supply: {:.4g} V at its terminals, more than {:g} % below the {:g} V set", seen.voltage_v,

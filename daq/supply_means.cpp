@@ -33,12 +33,14 @@ void take_supply(std::span<const SupplyReading> readings, std::int64_t begin, st
   }
 }
 
-std::uint32_t supply_doubts(std::span<const SupplyReading> readings, std::int64_t begin, std::int64_t end) {
+std::uint32_t supply_doubts(std::span<const SupplyReading> readings, std::int64_t begin, std::int64_t end,
+                            bool settled) {
   std::uint32_t bits = 0;
   const auto note = [&](Doubt doubt, bool applies) { bits |= applies ? static_cast<std::uint32_t>(doubt) : 0u; };
   for (const SupplyReading& seen : within(readings, begin, end)) {
     const bool off = seen.output == 0 || seen.protection != results::SupplyProtection::none;
     note(Doubt::supply_off, off);
+    if (!settled) continue;
     note(Doubt::supply_limited, seen.regulation == results::SupplyRegulation::constant_current);
     note(Doubt::supply_sag, !(seen.voltage_v >= (1 - kSupplySag) * seen.set_voltage_v));
     note(Doubt::supply_rise, seen.voltage_v > (1 + kSupplyRise) * seen.set_voltage_v);

@@ -14,8 +14,9 @@ namespace kphi::daq {
 void take_supply(std::span<const results::SupplyReading> readings, std::int64_t begin, std::int64_t end,
                  results::StepMean& mean);
 
-/// Bits of results::Doubt that the readings in [begin, end) raise.
+/// Bits of results::Doubt that the readings in [begin, end) raise, of which the speed has `settled`, as in the
+/// interlock.
 [[nodiscard]] std::uint32_t supply_doubts(std::span<const results::SupplyReading> readings, std::int64_t begin,
-                                          std::int64_t end);
+                                          std::int64_t end, bool settled);
 
 }  // namespace kphi::daq

@@ -4,7 +4,6 @@
 
 #include "daq/live_supply.hpp"
 #include "drivers/device_error.hpp"
-#include "drivers/supply/modbus_supply.hpp"
 
 namespace kphi::daq {
 
@@ -33,11 +32,10 @@ std::vector<Finding> findings_of(const supply::Identity& identity, const supply:
 
 SupplyProbe probe_supply(const profiles::SupplyPlace& place, const Clock& clock) {
   SupplyProbe probe;
-  const supply::Address address = address_of(place);
   try {
-    supply::ModbusSupply supply(address, clock);
-    probe.identity = supply.identity();
-    probe.reading = supply.read();
+    const auto supply = open_supply(place, clock);
+    probe.identity = supply->identity();
+    probe.reading = supply->read();
     probe.findings = findings_of(*probe.identity, *probe.reading, place);
   } catch (const DeviceError& error) {
     probe.findings.push_back({Severity::fault, error.what(), ""});

@@ -128,6 +128,10 @@ std::string provenance_block(const Identification& identification, const Provena
   if (speeds_known(identification))
     text += ", speed_range_rpm: " + speed_range(identification.fitted.min_rad_s, identification.fitted.max_rad_s);
   text += "}\n";
+  if (const auto& clock = provenance.clock) {
+    text += clock->u_gain ? fmt::format("  motor_clock: {{gain: {}, u: {}}}\n", clock->gain, *clock->u_gain)
+                          : "  motor_clock: unchecked\n";
+  }
   if (provenance.runs.empty()) return text + "  runs: []\n";
   text += "  runs:\n";
   for (const RunProvenance& run : provenance.runs)

@@ -19,6 +19,12 @@ struct RunProvenance {
 };
 
 /// Where the numbers come from. Nothing here is guessed: what is not known is empty and written as `unknown`.
+/// The clock of the motor module, by which it tells the speed, against a host's.
+struct MotorClock {
+  double gain = 1;
+  std::optional<double> u_gain;  ///< standard uncertainty; nothing: unchecked, the gain is taken as 1
+};
+
 struct Provenance {
   std::string measured_utc;  ///< when the last run ended, ISO 8601, Z; empty: unknown
   std::string tool_version;
@@ -27,6 +33,7 @@ struct Provenance {
   std::string source;  ///< what was fitted: a campaign folder or a file
   std::vector<RunProvenance> runs;
   std::optional<double> supply_v;
+  std::optional<MotorClock> clock;  ///< of a campaign
 };
 
 /// What was minimised, in words; the same in file and report.

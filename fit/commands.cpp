@@ -18,6 +18,7 @@
 #include "fit/k_table.hpp"
 #include "fit/raw_samples.hpp"
 #include "fit/report.hpp"
+#include "profiles/bench.hpp"
 #include "profiles/campaign.hpp"
 #include "profiles/configuration_error.hpp"
 #include "results/campaign_folder.hpp"
@@ -74,6 +75,11 @@ void take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
         {fs::relative(run, folder.path()).string(), results::sha256_of_file(run), "", std::nullopt});
 }
 
+MotorClock clock_of(const fs::path& bench_file) {
+  const auto gain = profiles::load_bench(bench_file.string()).iq.clock_gain;
+  return gain ? MotorClock{gain->factor, gain->u_factor} : MotorClock{};
+}
+
 Input campaign_input(const fs::path& path) {
   const auto folder = results::CampaignFolder::open(path);
   if (!fs::exists(folder.steps())) {
@@ -86,6 +92,7 @@ Input campaign_input(const fs::path& path) {
   input.steps = results::read_steps(folder.steps());
   input.provenance.source = "steps.csv of the campaign folder";
   take_runs(folder, input.provenance);
+  if (fs::exists(folder.bench_file())) input.provenance.clock = clock_of(folder.bench_file());
   if (fs::exists(folder.campaign_file())) {
     const profiles::Campaign campaign = profiles::load_campaign(folder.campaign_file().string());
     input.provenance.campaign = campaign.name;

@@ -221,6 +221,14 @@ std::string optional_number(std::optional<double> value, const char* unit) {
   return value && std::isfinite(*value) ? fmt::format("{:g} {}", *value, unit) : "unknown";
 }
 
+std::string clock_words(const MotorClock& clock) {
+  if (!clock.u_gain)
+    return "unchecked: all speeds may be off by some tenths of a percent together, and k by twice that; kphi devices "
+           "--bench FILE --clock-gain measures it";
+  return fmt::format("gain {:.7g} ± {:.1e}, speeds are corrected; shared by all steps: {:.1e} of k", clock.gain,
+                     *clock.u_gain, 2 * *clock.u_gain / clock.gain);
+}
+
 std::string provenance_section(const Identification& identification, const Provenance& provenance) {
   std::string points;
   for (const LinePoint& point : identification.line.points)
@@ -237,6 +245,7 @@ std::string provenance_section(const Identification& identification, const Prove
   const auto& air = identification.air;
   html += entry("Air density", air ? fmt::format("{:.4f} ± {:.4f} kg/m³", air->kg_m3, air->u_kg_m3) : "unknown");
   html += entry("Supply", optional_number(provenance.supply_v, "V"));
+  if (provenance.clock) html += entry("Motor's clock", clock_words(*provenance.clock));
   html += entry("Measured", provenance.measured_utc.empty() ? "unknown" : provenance.measured_utc);
   html += entry("Fitted by", "kphi " + provenance.tool_version);
   return html + "</dl>\n";

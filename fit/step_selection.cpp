@@ -15,7 +15,7 @@ struct DoubtPolicy {
   bool spoils;
 };
 
-constexpr std::array<DoubtPolicy, 18> kPolicy{{
+constexpr std::array<DoubtPolicy, 27> kPolicy{{
     {Doubt::speed_not_reached, "commanded speed not reached", true},
     {Doubt::speed_unsteady, "speed never settled", true},
     {Doubt::saturated, "load cell saturated", true},
@@ -30,6 +30,15 @@ constexpr std::array<DoubtPolicy, 18> kPolicy{{
     {Doubt::box_trouble, "load cell's box saw its communication fail", false},
     {Doubt::stolen, "another client took the stream", true},
     {Doubt::configuration_changed, "load cell's box was set otherwise", true},
+    {Doubt::zero_drifted, "load cell's zero drifted during the run", true},
+    {Doubt::zero_noisy, "load cell was not at rest at a zero", true},
+    {Doubt::drive_saturated, "motor drive saturated", true},
+    {Doubt::motor_fault, "motor module reported a fault", true},
+    {Doubt::supply_out_of_band, "supply voltage off", false},
+    {Doubt::coil_hot, "motor coil hot", false},
+    {Doubt::motor_reset, "motor module restarted", true},
+    {Doubt::motor_lost, "motor module lost", true},
+    {Doubt::slow_round_trip, "motor readings blurred in time", false},
     {Doubt::supply_limited, "supply limited the current", true},
     {Doubt::supply_off, "supply was off", true},
     {Doubt::supply_sag, "supply sagged", false},

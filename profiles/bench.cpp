@@ -50,7 +50,7 @@ ClockGain read_clock_gain(const ProfileReader& file) {
   return gain;
 }
 
-MotorPlace read_motor(const ProfileReader& file) {
+MotorPlace read_motor(const ProfileReader& file, const std::filesystem::path& folder) {
   MotorPlace place;
   place.device = file.text("/iq/device");
   place.baud = file.get_or("/iq/baud", place.baud);
@@ -59,6 +59,7 @@ MotorPlace read_motor(const ProfileReader& file) {
   place.telemetry_hz = file.get_or("/iq/telemetry_hz", place.telemetry_hz);
   place.speed_max = from_rpm(file.number("/iq/speed_max_rpm"));
   if (file.has("/iq/clock_gain")) place.clock_gain = read_clock_gain(file);
+  if (file.has("/iq/capture")) place.capture = (folder / file.text("/iq/capture")).string();
   return place;
 }
 
@@ -82,14 +83,13 @@ SupplyPlace read_supply(ProfileReader& file) {
 }
 
 AmbientPlace read_ambient(const ProfileReader& file) {
-  AmbientPlace place;
-  place.temperature_c = file.number("/ambient/temperature_c");
-  place.pressure_pa = file.number("/ambient/pressure_pa");
-  place.relative_humidity = file.number("/ambient/relative_humidity");
-  place.u_temperature_c = file.get_or("/ambient/u_temperature_c", place.u_temperature_c);
-  place.u_pressure_pa = file.get_or("/ambient/u_pressure_pa", place.u_pressure_pa);
-  place.u_relative_humidity = file.get_or("/ambient/u_relative_humidity", place.u_relative_humidity);
-  return place;
+  if (!file.has("/ambient/manual")) {
+    const std::string sensor = file.text("/ambient");
+    return {sensor == "unknown" ? "" : sensor, std::nullopt};
+  }
+  const auto value = [&](const char* key) { return file.number(std::string("/ambient/manual/") + key); };
+  return {"", ManualAir{value("temperature_c"), value("pressure_pa"), value("relative_humidity"),
+                        value("u_temperature_c"), value("u_pressure_pa"), value("u_relative_humidity")}};
 }
 
 Simulation read_simulation(ProfileReader& file, const std::filesystem::path& folder) {
@@ -113,7 +113,7 @@ Bench parse_bench(const std::string& text, const std::string& path) {
   Bench bench;
   bench.name = file.text("/name");
   bench.netbox = read_netbox(file);
-  bench.iq = read_motor(file);
+  bench.iq = read_motor(file, std::filesystem::path(path).parent_path());
   const std::string axis = file.text("/thrust_axis");  // "+Fz"
   bench.thrust_sign = axis[0] == '-' ? -1 : +1;
   bench.thrust_axis = axis[2] - 'x';

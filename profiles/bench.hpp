@@ -6,7 +6,6 @@
 #include <string>
 
 #include "compensation/units.hpp"
-#include "profiles/ambient_place.hpp"
 #include "profiles/supply_place.hpp"
 
 namespace kphi::profiles {
@@ -45,6 +44,7 @@ struct MotorPlace {
   double telemetry_hz = 50;  ///< speed readings per second of bench time; the others come in turn
   RadPerSec speed_max;       ///< what this motor may be told at most
   std::optional<ClockGain> clock_gain;
+  std::string capture;  ///< path of a file for all bytes of the line, beside the bench file; empty: none
 };
 
 /// The simulated bench: how fast, from which seed, and where a person tells it what is mounted.
@@ -57,14 +57,29 @@ struct Simulation {
   double air_density_kg_m3 = 1.225;  ///< of the simulated air
 };
 
+/// What a person has read off, with standard uncertainties.
+struct ManualAir {
+  double temperature_c = 0;
+  double pressure_pa = 0;        ///< absolute, at the stand
+  double relative_humidity = 0;  ///< 0..1
+  double u_temperature_c = 0, u_pressure_pa = 0, u_relative_humidity = 0;
+};
+
+/// Where the state of the air comes from. Neither: nobody knows it.
+struct AmbientPlace {
+  std::string sensor;  ///< "usb:04d8:00dd", with :SERIAL or @PORT; empty: none
+  std::optional<ManualAir> manual;
+  [[nodiscard]] bool known() const noexcept { return !sensor.empty() || manual.has_value(); }
+};
+
 struct Bench {
   std::string name;
   NetBoxPlace netbox;
   MotorPlace iq;
-  int thrust_axis = 2;                  ///< 0..2 = Fx, Fy, Fz
-  int thrust_sign = +1;                 ///< sign of the axis when the propeller pulls
-  std::optional<SupplyPlace> supply;    ///< none: what powers the motor is not ours to switch
-  std::optional<AmbientPlace> ambient;  ///< none: unknown
+  int thrust_axis = 2;                ///< 0..2 = Fx, Fy, Fz
+  int thrust_sign = +1;               ///< sign of the axis when the propeller pulls
+  std::optional<SupplyPlace> supply;  ///< none: what powers the motor is not ours to switch
+  AmbientPlace ambient;
   std::optional<Simulation> simulation;
   std::string text;  ///< the file, verbatim
   std::string path;

@@ -38,6 +38,16 @@ void check_occlusions(ProfileReader& file, const std::vector<double>& occlusions
   }
 }
 
+std::optional<Cooling> read_cooling(ProfileReader& file) {
+  if (!file.has("/limits/cooling")) return std::nullopt;
+  const Cooling cooling{Celsius(file.number("/limits/cooling/pause_above_degc")),
+                        Celsius(file.number("/limits/cooling/resume_below_degc"))};
+  if (cooling.resume_below.value() > cooling.pause_above.value()) {
+    file.refuse("/limits/cooling/resume_below_degc", "is above pause_above_degc", "lower it: a pause would never end");
+  }
+  return cooling;
+}
+
 }  // namespace
 
 std::vector<RadPerSec> StepProfile::levels() const {
@@ -65,7 +75,7 @@ Campaign parse_campaign(const std::string& text, const std::string& path) {
   campaign.minimum_discard = Seconds(file.number("/minimum_discard_s"));
   campaign.limits = {from_rpm(file.number("/limits/speed_max_rpm")), Newtons(file.number("/limits/thrust_max_n")),
                      Amperes(file.number("/limits/supply_current_max_a")),
-                     Celsius(file.number("/limits/coil_temperature_max_degc"))};
+                     Celsius(file.number("/limits/coil_temperature_max_degc")), read_cooling(file)};
   campaign.supply = Volts(file.number("/supply_v"));
   campaign.text = text;
   campaign.path = path;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,12 +28,19 @@ struct StepProfile {
   [[nodiscard]] std::vector<RadPerSec> levels() const;
 };
 
+/// Between runs the motor stands until its coil has cooled down.
+struct Cooling {
+  Celsius pause_above;
+  Celsius resume_below;
+};
+
 /// Beyond these the run is refused (speed) or stopped (the rest).
 struct Limits {
   RadPerSec speed_max;
   Newtons thrust_max;
   Amperes supply_current_max;
   Celsius coil_temperature_max;
+  std::optional<Cooling> cooling{};
 };
 
 struct Campaign {

@@ -17,9 +17,6 @@
 namespace kphi::profiles {
 namespace {
 
-constexpr const char* kCoefficients = "coefficients";
-constexpr const char* kCoefficientFormat = "kphi-coefficients/1";
-
 /// What the files of one call were, for the checks of one against another.
 struct Loaded {
   std::vector<std::pair<std::size_t, Campaign>> campaigns;  ///< with the file's number
@@ -128,11 +125,13 @@ std::optional<FileKind> kind_of(const std::string& format) {
 }
 
 /// By its format; without a known one by its keys, so that it gets all its findings at once.
-FileKind recognise(const std::string& text, const std::string& path, const std::string& format) {
+FileKind recognise(const std::string& text, const std::string& path, const std::string& format,
+                   const std::vector<ForeignKind>& foreign) {
   if (const auto kind = kind_of(format)) return *kind;
   const SourceDocument document = parse_strict_yaml(text, path);
   if (const auto kind = kind_by_keys(document)) return *kind;
-  std::vector<std::string> formats{kCoefficientFormat};
+  std::vector<std::string> formats;
+  for (const ForeignKind& candidate : foreign) formats.push_back(candidate.format);
   for (const FileKindInfo& candidate : kFileKinds) formats.emplace_back(candidate.format);
   const auto near = nearest_name(format, formats);
   throw RefusedFile(path, {{document.value_mark("/format"), "/format",
@@ -141,15 +140,16 @@ FileKind recognise(const std::string& text, const std::string& path, const std::
                                  : fmt::format("begin it with format: and one of {}", fmt::join(formats, ", "))}});
 }
 
-void judge(CheckedFile& file, std::size_t number, const CoefficientJudge& judge_coefficients, Loaded& loaded) {
+void judge(CheckedFile& file, std::size_t number, const std::vector<ForeignKind>& foreign, Loaded& loaded) {
   const std::string text = read_text(file.path);
   const std::string format = format_of(text, file.path);
-  if (format == kCoefficientFormat) {
-    file.kind = kCoefficients;
-    file.summary = judge_coefficients(file.path);
+  for (const ForeignKind& candidate : foreign) {
+    if (format != candidate.format) continue;
+    file.kind = candidate.word;
+    file.summary = candidate.judge(file.path);
     return;
   }
-  const FileKind kind = recognise(text, file.path, format);
+  const FileKind kind = recognise(text, file.path, format, foreign);
   file.kind = info(kind).word;
   if (kind == FileKind::campaign) {
     const Campaign campaign = parse_campaign(text, file.path);
@@ -173,13 +173,13 @@ void refuse(CheckedFile& file, const std::string& error, nlohmann::ordered_json 
   file.summary.clear();
 }
 
-CheckedFile check_file(const std::string& path, std::size_t number, const CoefficientJudge& judge_coefficients,
+CheckedFile check_file(const std::string& path, std::size_t number, const std::vector<ForeignKind>& foreign,
                        Loaded& loaded) {
   CheckedFile file;
   file.path = path;
   file.report = {{"file", path}, {"kind", nullptr}, {"ok", true}, {"errors", nlohmann::ordered_json::array()}};
   try {
-    judge(file, number, judge_coefficients, loaded);
+    judge(file, number, foreign, loaded);
   } catch (const RefusedFile& refused) {
     for (const Finding& finding : refused.findings()) {
       refuse(file, describe(path, finding),
@@ -208,11 +208,10 @@ void check_against_benches(std::vector<CheckedFile>& files, const Loaded& loaded
 
 }  // namespace
 
-std::vector<CheckedFile> check_files(const std::vector<std::string>& paths,
-                                     const CoefficientJudge& judge_coefficients) {
+std::vector<CheckedFile> check_files(const std::vector<std::string>& paths, const std::vector<ForeignKind>& foreign) {
   std::vector<CheckedFile> files;
   Loaded loaded;
-  for (const std::string& path : paths) files.push_back(check_file(path, files.size(), judge_coefficients, loaded));
+  for (const std::string& path : paths) files.push_back(check_file(path, files.size(), foreign, loaded));
   check_against_benches(files, loaded);
   for (CheckedFile& file : files) {
     if (!file.kind.empty()) file.report["kind"] = file.kind;

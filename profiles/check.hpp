@@ -10,7 +10,7 @@ namespace kphi::profiles {
 
 struct CheckedFile {
   std::string path;
-  std::string kind;                 ///< campaign, bench, vehicle or coefficients; empty if it cannot be told
+  std::string kind;                 ///< campaign, bench, vehicle or a foreign one; empty if it cannot be told
   std::string summary;              ///< a few lines; empty if refused
   std::vector<std::string> errors;  ///< "path:line:column: what; next move", in the order of the file
   nlohmann::ordered_json report;    ///< the same for programs: file, kind, ok, errors, plan of a campaign
@@ -18,11 +18,16 @@ struct CheckedFile {
   [[nodiscard]] bool ok() const { return errors.empty(); }
 };
 
-/// Judges a coefficient file: gives its summary or throws std::runtime_error with "path:line: what; next move".
-using CoefficientJudge = std::function<std::string(const std::string& path)>;
+/// A kind of file that another folder reads.
+struct ForeignKind {
+  std::string format;  ///< as in its line `format: …`
+  std::string word;
+  /// Gives the summary or throws std::runtime_error with "path:line: what; next move".
+  std::function<std::string(const std::string& path)> judge;
+};
 
 /// Checks every file by itself, then every campaign against every bench among them. Throws nothing about their content.
 [[nodiscard]] std::vector<CheckedFile> check_files(const std::vector<std::string>& paths,
-                                                   const CoefficientJudge& judge_coefficients);
+                                                   const std::vector<ForeignKind>& foreign);
 
 }  // namespace kphi::profiles

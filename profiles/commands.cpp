@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "compensation/file/coefficient_file.hpp"
+#include "drivers/sim/fault_file.hpp"
 #include "profiles/check.hpp"
+#include "profiles/strict_yaml.hpp"
 
 namespace kphi::profiles {
 namespace {
@@ -31,6 +33,33 @@ std::string judge_coefficients(const std::string& path) {
       to_degrees(c.smallest_occlusion), to_degrees(c.largest_occlusion));
 }
 
+template <class Fault>
+std::string in_words(const Fault& fault) {
+  std::string words = fmt::format("  at {:g} s  {}", to_seconds(fault.at), name_of(fault.kind));
+  if (fault.lasts > Duration{0}) words += fmt::format(" for {:g} s", to_seconds(fault.lasts));
+  if (fault.count > 0) words += fmt::format(", {} times at most", fault.count);
+  return words + "\n";
+}
+
+std::string judge_faults(const std::string& path) {
+  const std::string text = read_text(path);
+  (void)sim::parse_habits(text, path);
+  std::string summary;
+  const auto tell = [&](const auto& script) {
+    for (const auto& fault : script) summary += in_words(fault);
+  };
+  tell(sim::parse_faults(text, path));
+  tell(sim::parse_motor_faults(text, path));
+  tell(sim::parse_supply_faults(text, path));
+  return summary;
+}
+
+const std::vector<ForeignKind>& foreign_kinds() {
+  static const std::vector<ForeignKind> kinds{{"kphi-coefficients/1", "coefficients", judge_coefficients},
+                                              {"kphi-faults/1", "fault script", judge_faults}};
+  return kinds;
+}
+
 void print(const CheckedFile& file, bool json) {
   if (json) {
     fmt::print("{}\n", file.report.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
@@ -43,14 +72,15 @@ void print(const CheckedFile& file, bool json) {
 }  // namespace
 
 void add_check(CLI::App& program, int& exit_code) {
-  auto* command = program.add_subcommand("check", "check campaign, bench, vehicle and coefficient files");
+  auto* command =
+      program.add_subcommand("check", "check campaign, bench, vehicle and coefficient files and fault scripts");
   auto options = std::make_shared<CheckOptions>();
   command->add_option("FILE", options->paths, "Files; campaigns are also held against the benches among them")
       ->required();
   command->add_flag("--json", options->json, "One JSON object per file, one per line");
   command->callback([options, &exit_code] {
     exit_code = 0;
-    for (const CheckedFile& file : check_files(options->paths, judge_coefficients)) {
+    for (const CheckedFile& file : check_files(options->paths, foreign_kinds())) {
       print(file, options->json);
       if (!file.ok()) exit_code = 2;
     }

@@ -12,8 +12,8 @@ struct UnitSuffix {
   std::string_view unit;
 };
 
-/// The second half are units that we do not use and others do.
-constexpr std::array<UnitSuffix, 34> kUnits{{
+/// Also units that we do not use and others do.
+constexpr std::array<UnitSuffix, 36> kUnits{{
     {"_rad_s", "rad/s"}, {"_rpm", "RPM"},
     {"_rad", "rad"},     {"_degc", "°C"},
     {"_deg", "degrees"}, {"_hz", "Hz"},
@@ -31,6 +31,7 @@ constexpr std::array<UnitSuffix, 34> kUnits{{
     {"_kgf", "kgf"},     {"_g", "g"},
     {"_mv", "mV"},       {"_ma", "mA"},
     {"_mm", "mm"},       {"_cm", "cm"},
+    {"_pa", "Pa"},       {"_hpa", "hPa"},
 }};
 
 /// Edit distance with swapped neighbours (optimal string alignment).

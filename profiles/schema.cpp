@@ -97,6 +97,9 @@ std::vector<Finding> wrong_type(const Complaint& c) {
                                                                                     {"boolean", "true or false"},
                                                                                     {"array", "a list"},
                                                                                     {"object", "keys"}}};
+  if (c.schema["type"].is_array()) {
+    return {c.at_value(fmt::format("{} does not fit", shown(c.value)), "write " + c.schema.value("x_expected", ""))};
+  }
   const std::string type = c.schema.value("type", "");
   const auto* word = std::find_if(kWords.begin(), kWords.end(), [&](const auto& w) { return w.first == type; });
   const std::string expected(word->second);

@@ -8,8 +8,9 @@
 namespace kphi::profiles {
 
 struct SupplyPlace {
-  std::string uri;        ///< modbus-rtu:/dev/..., modbus-tcp:host:port, each with ?baud=, slave=, model=
-  Volts voltage;          ///< to be set
+  std::string uri;  ///< modbus-rtu:/dev/..., modbus-tcp:host:port, each with ?baud=, slave=, model=; scpi-tcp:host,
+                    ///< scpi-usb:VID:PID
+  Volts voltage;    ///< to be set
   Amperes current_limit;  ///< at which it goes over to constant current
   Volts over_voltage;     ///< at which it switches off
   Amperes over_current;   ///< at which it switches off

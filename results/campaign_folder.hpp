@@ -26,6 +26,7 @@ class CampaignFolder {
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] std::filesystem::path campaign_file() const { return path_ / "campaign.yaml"; }
   [[nodiscard]] std::filesystem::path bench_file() const { return path_ / "bench.yaml"; }
+  [[nodiscard]] std::filesystem::path faults_file() const { return path_ / "faults.yaml"; }
   [[nodiscard]] std::filesystem::path journal() const { return path_ / "journal.jsonl"; }
   [[nodiscard]] std::filesystem::path runs() const { return path_ / "runs"; }
   [[nodiscard]] std::filesystem::path steps() const { return path_ / "steps.csv"; }

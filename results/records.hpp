@@ -32,6 +32,8 @@ enum class MotorChannel : std::uint8_t {
   coil_temperature,  ///< °C
   derate,            ///< 1 = none
   drive_mode,        ///< code; 5 = coast
+  drive_pwm,         ///< share of the supply voltage that drives the motor, after all limits; -1..1
+  fault_now,         ///< bits of what is wrong; 0 = nothing
 };
 
 struct MotorChannelInfo {
@@ -39,9 +41,10 @@ struct MotorChannelInfo {
   const char* name;  ///< the group's name in the file
   const char* unit;  ///< UDUNITS spelling
   const char* long_name;
+  int since = 1;  ///< format of the run file that has it first
 };
 
-inline constexpr std::array<MotorChannelInfo, 7> kMotorChannels{{
+inline constexpr std::array<MotorChannelInfo, 9> kMotorChannels{{
     {MotorChannel::speed, "speed", "rad s-1", "rotor speed, positive counter-clockwise"},
     {MotorChannel::supply_voltage, "supply_voltage", "V", "voltage at the module's input"},
     {MotorChannel::supply_current, "supply_current", "A", "current into the module"},
@@ -49,6 +52,8 @@ inline constexpr std::array<MotorChannelInfo, 7> kMotorChannels{{
     {MotorChannel::coil_temperature, "coil_temperature", "degC", "coil temperature, estimated by the module"},
     {MotorChannel::derate, "derate", "1", "drive derating factor, 1 = none"},
     {MotorChannel::drive_mode, "drive_mode", "1", "drive mode code, 5 = coast"},
+    {MotorChannel::drive_pwm, "drive_pwm", "1", "share of the supply voltage that drives the motor", 3},
+    {MotorChannel::fault_now, "fault_now", "1", "bits of power_safety.fault_now, 0 = no fault", 3},
 }};
 
 struct MotorReading {
@@ -93,7 +98,7 @@ struct LoadCellScale {
 
 /// Everything about a run that is known before the motor turns.
 struct RunHeader {
-  int format = 3;  ///< of the run file: kphi-run/1 to kphi-run/3
+  int format = 4;  ///< of the run file: kphi-run/1 to kphi-run/4
   std::string uuid;
   std::string started_utc;  ///< ISO 8601, Z
   std::string tool_version;
@@ -113,6 +118,7 @@ struct RunHeader {
   double minimum_discard_s = 0;
   LoadCellScale load_cell;
   std::string motor_identity;      ///< one line: firmware, hardware, uid
+  std::string motor_parameters;    ///< YAML: what the module told of itself, one line each
   std::string supply_identity;     ///< one line: model, serial, firmware; empty: none
   double air_density_kg_m3 = 0;    ///< 0: unknown
   double air_density_u_kg_m3 = 0;  ///< its standard uncertainty
@@ -134,7 +140,7 @@ struct SampleAccount {
   std::uint64_t irregular = 0;   ///< accepted, but the two sequences disagree about the gap before them
 };
 
-/// What happened to the load cell's stream, or to the cell. Codes and names as in the run file.
+/// What happened to the load cell's stream, to the cell, or to the motor module. Codes and names as in the run file.
 enum class EventKind : std::uint8_t {
   restarted,
   rebooted,
@@ -153,12 +159,50 @@ enum class EventKind : std::uint8_t {
   reconnected,            ///< started again after a silence
   configuration_changed,  ///< its counts mean something else since then
   given_up,               ///< no reconnection in time
+  motor_connected,        ///< found again; it coasts, and turns no more in this run
+  motor_no_answer,        ///< could not be connected to
+  motor_reset,            ///< it restarted by itself
+  motor_silent,           ///< it stopped answering
+  motor_coast_denied,     ///< it did not confirm that it coasts
+  motor_lease_expired,    ///< the command was not renewed in time, and the driver let the motor coast
+  motor_port_lost,        ///< unplugged
+  motor_another_module,   ///< another one answers
+  motor_slow_round_trip,  ///< its readings are blurred in time
+  supply_stop,            ///< what the bench supply showed stopped the run
 };
-inline constexpr std::array<const char*, 17> kEventNames{
-    "restarted",   "rebooted", "stalled",      "stall_ended",           "silent",     "resumed",
-    "box_trouble", "stolen",   "rdt_disabled", "unreachable",           "near_range", "beyond_range",
-    "range_trip",  "unusable", "reconnected",  "configuration_changed", "given_up"};
+inline constexpr std::array<const char*, 27> kEventNames{"restarted",
+                                                         "rebooted",
+                                                         "stalled",
+                                                         "stall_ended",
+                                                         "silent",
+                                                         "resumed",
+                                                         "box_trouble",
+                                                         "stolen",
+                                                         "rdt_disabled",
+                                                         "unreachable",
+                                                         "near_range",
+                                                         "beyond_range",
+                                                         "range_trip",
+                                                         "unusable",
+                                                         "reconnected",
+                                                         "configuration_changed",
+                                                         "given_up",
+                                                         "motor_connected",
+                                                         "motor_no_answer",
+                                                         "motor_reset",
+                                                         "motor_silent",
+                                                         "motor_coast_denied",
+                                                         "motor_lease_expired",
+                                                         "motor_port_lost",
+                                                         "motor_another_module",
+                                                         "motor_slow_round_trip",
+                                                         "supply_stop"};
 [[nodiscard]] constexpr const char* name_of(EventKind kind) { return kEventNames[static_cast<std::size_t>(kind)]; }
+
+/// Of the motor module; else of the load cell, or of the supply.
+[[nodiscard]] constexpr bool is_of_motor(EventKind kind) {
+  return kind >= EventKind::motor_connected && kind <= EventKind::motor_slow_round_trip;
+}
 
 struct StreamEvent {
   EventKind kind{};

@@ -215,10 +215,12 @@ RunRecording read_run(const std::filesystem::path& path) {
     run.header = header_of(root, path);
     run.load_cell = load_cell_of(root, path.string());
     const Handle motor = hdf5::open_group(root, "motor");
-    for (const MotorChannelInfo& info : kMotorChannels) append_channel(motor, info, path.string(), run.motor);
+    for (const MotorChannelInfo& info : kMotorChannels) {
+      if (info.since <= run.header.format) append_channel(motor, info, path.string(), run.motor);
+    }
     run.phases = phases_of(root, path.string());
     if (run.header.format >= 2) run.events = events_of(root, path.string());
-    if (run.header.format >= 3) run.supply = supply_of(root, path.string());
+    if (run.header.format >= 4) run.supply = supply_of(root, path.string());
     read_outcome(root, run);
     return run;
   });

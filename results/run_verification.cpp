@@ -49,6 +49,7 @@ void check_all_columns(const std::filesystem::path& path, int format, Problems& 
                 problems);
   const Handle motor = hdf5::open_group(root, "motor");
   for (const MotorChannelInfo& info : kMotorChannels) {
+    if (info.since > format) continue;
     check_columns(
         motor, info.name,
         {{"value", H5T_NATIVE_DOUBLE, 8}, {"t_ns", H5T_NATIVE_INT64, 8}, {"t_uncertainty_ns", H5T_NATIVE_INT64, 8}},
@@ -68,7 +69,7 @@ void check_all_columns(const std::filesystem::path& path, int format, Problems& 
                  {"records", H5T_NATIVE_UINT64, 8},
                  {"text", text.get(), kEventTextBytes}},
                 problems);
-  if (format < 3) return;
+  if (format < 4) return;
   check_columns(root, "supply",
                 {{"t_ns", H5T_NATIVE_INT64, 8},
                  {"t_uncertainty_ns", H5T_NATIVE_INT64, 8},

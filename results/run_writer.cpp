@@ -184,14 +184,20 @@ struct CommandSeries : Series {
   Column &phase, &step, &time, &speed;
 };
 
+/// "0 restarted, 1 rebooted, …"
+std::string listed_kinds() {
+  std::string list;
+  for (std::size_t i = 0; i < kEventNames.size(); ++i)
+    list += fmt::format("{}{} {}", i == 0 ? "" : ", ", i, kEventNames[i]);
+  return list;
+}
+
 struct EventSeries : Series {
   EventSeries(const Handle& root, FileLayer& files, const std::string& name)
-      : Series(root, "events", "what happened to the load cell and its stream"),
+      : Series(root, "events", "what happened to the load cell, its stream and the motor module"),
+        kinds(listed_kinds()),
         text_type(hdf5::fixed_text_type(kEventTextBytes)),
-        kind(add({"kind", H5T_STD_U8LE, 1, 0, kEventChunk, "1",
-                  "0 restarted, 1 rebooted, 2 stalled, 3 stall ended, 4 silent, 5 resumed, 6 box trouble, 7 stolen, "
-                  "8 RDT disabled, 9 unreachable, 10 near range, 11 beyond range, 12 range trip"},
-                 files, name)),
+        kind(add({"kind", H5T_STD_U8LE, 1, 0, kEventChunk, "1", kinds.c_str()}, files, name)),
         time(add({"t_ns", H5T_STD_I64LE, 8, 0, kEventChunk, "ns", "when it was noticed, bench time"}, files, name)),
         records(add({"records", H5T_STD_U64LE, 8, 0, kEventChunk, "1", "missing before it, or repeated"}, files, name)),
         text(add({"text", text_type.get(), kEventTextBytes, 0, kEventChunk, "1", "for a person"}, files, name)) {
@@ -207,6 +213,7 @@ struct EventSeries : Series {
     records.append(&event.records, 1);
     text.append(line.data(), 1);
   }
+  const std::string kinds;
   Handle text_type;
   Column &kind, &time, &records, &text;
 };

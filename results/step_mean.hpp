@@ -14,7 +14,7 @@ enum class Doubt : std::uint32_t {
   speed_not_reached = 1u << 0,       ///< mean speed further than 1 % (and 2 rad/s) from the command
   speed_unsteady = 1u << 1,          ///< speed spread over the window above 1 % of its mean (and 5 rad/s)
   saturated = 1u << 2,               ///< a status word with the saturation bit, or a count at its limit
-  lost_samples = 1u << 3,            ///< fewer records in the window than ft_sequence says
+  lost_samples = 1u << 3,            ///< fewer records in the window than ft_sequence says, or than 90 % by rate
   derated = 1u << 4,                 ///< the module derated
   few_samples = 1u << 5,             ///< under a tenth of the expected load-cell samples, or under 3 speed readings
   bad_status = 1u << 6,              ///< another error bit of the box
@@ -24,11 +24,20 @@ enum class Doubt : std::uint32_t {
   silent = 1u << 10,                 ///< no record for long within the step
   box_trouble = 1u << 11,            ///< the box saw its own communication fail within the step
   stolen = 1u << 12,                 ///< another client took the stream within the step
-  configuration_changed = 1u << 13,  ///< the box was set otherwise within the step or before it in the run
-  supply_limited = 1u << 24,         ///< the bench supply limited the current within the step
-  supply_off = 1u << 25,             ///< its output was off within the step, or its protection had switched it off
-  supply_sag = 1u << 26,             ///< more than 5 % of its set voltage was missing at its terminals
-  supply_rise = 1u << 27,            ///< its terminals were more than 3 % above the set voltage: the motor fed back
+  configuration_changed = 1u << 13,  ///< the box was set otherwise at some time of the run
+  zero_drifted = 1u << 14,  ///< the zeros before and after the run differ by more than is tolerated, or one is missing
+  zero_noisy = 1u << 15,    ///< the samples of a zero of the run scatter by more than is tolerated
+  drive_saturated = 1u << 16,     ///< the module drove with 98 % of the supply voltage or more: none was left
+  motor_fault = 1u << 17,         ///< the module reported a fault within the step
+  supply_out_of_band = 1u << 18,  ///< the supply voltage was not within 10 % of the campaign's
+  coil_hot = 1u << 19,            ///< the coil was at the campaign's limit of its temperature, or above
+  motor_reset = 1u << 20,         ///< the module restarted by itself within the step
+  motor_lost = 1u << 21,          ///< the module was lost, or did not do as it was told, within the step
+  slow_round_trip = 1u << 22,     ///< the module's readings are blurred in time since then in this run
+  supply_limited = 1u << 24,      ///< the bench supply limited the current within the step
+  supply_off = 1u << 25,          ///< its output was off within the step, or its protection had switched it off
+  supply_sag = 1u << 26,          ///< more than 5 % of its set voltage was missing at its terminals
+  supply_rise = 1u << 27,         ///< its terminals were more than 3 % above the set voltage: the motor fed back
 };
 
 inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();

@@ -22,10 +22,9 @@ Bme280Sensor::Bme280Sensor(I2c& bus, const std::string& where, Mcp2221::Pause pa
     : bus_(bus), pause_(std::move(pause)), identity_("BME280 behind " + where) {
   find();
   identity_ = fmt::format("BME280 at 0x{:02X} behind {}", address_, where);
-  set(bme280::kResetRegister, bme280::kReset);
-  pause_(kPoll);
-  wait_while(bme280::kCopying, "load its calibration");
+  reset();
   calibration_ = read_calibration();
+  reset();
   if (calibration_ != read_calibration())
     fail("read its calibration", "two readings differ", "check the wiring of the bus");
   if (const auto refusal = bme280::refusal_of(calibration_); !refusal.empty())
@@ -74,6 +73,12 @@ void Bme280Sensor::find() {
     why += fmt::format("{}0x{:02X}: chip id 0x{:02X} instead of 0x60", why.empty() ? "" : "; ", address, id);
   }
   fail("find it", why, "a BMP280 (0x58) has no humidity and is not supported");
+}
+
+void Bme280Sensor::reset() {
+  set(bme280::kResetRegister, bme280::kReset);
+  pause_(kPoll);
+  wait_while(bme280::kCopying, "load its calibration");
 }
 
 void Bme280Sensor::wait_while(std::uint8_t status_bits, const char* operation) {

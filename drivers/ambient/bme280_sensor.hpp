@@ -10,9 +10,9 @@ namespace kphi::ambient {
 
 class Bme280Sensor final : public Ambient {
  public:
-  /// Looks for it at 0x76, then at 0x77; resets it, waits until it has loaded its calibration, and reads that twice.
-  /// `bus` must outlive this; `where` names it in messages. Throws DeviceError: nobody there, another chip,
-  /// calibration damaged.
+  /// Looks for it at 0x76, then at 0x77; resets it, waits until it has loaded its calibration, and reads that;
+  /// twice, for a damaged copy is not damaged in the same way again. `bus` must outlive this; `where` names it in
+  /// messages. Throws DeviceError: nobody there, another chip, calibration damaged.
   Bme280Sensor(I2c& bus, const std::string& where, Mcp2221::Pause pause = Mcp2221::sleep);
 
   /// 16 samples of each quantity, about 110 ms. Throws DeviceError also for values that no air has.
@@ -22,6 +22,7 @@ class Bme280Sensor final : public Ambient {
 
  private:
   void find();
+  void reset();
   void wait_while(std::uint8_t status_bits, const char* operation);
   [[nodiscard]] bme280::Calibration read_calibration();
   [[nodiscard]] std::uint8_t get(std::uint8_t register_number);

@@ -22,6 +22,7 @@ constexpr std::uint8_t kHid = 0x03;
 enum Command : std::uint8_t {
   status = 0x10,
   get_data = 0x40,
+  get_settings = 0x61,
   write_stop = 0x90,
   read_restart = 0x93,
   write_no_stop = 0x94
@@ -108,15 +109,39 @@ void Mcp2221::read(std::uint8_t address, std::uint8_t register_number, std::span
 }
 
 Mcp2221::Report Mcp2221::exchange(const Report& command, const char* operation) {
+  if (!in_step_) synchronise();
   pause_(kBetweenCommands);
+  in_step_ = false;
   const usb::Transfer sent = transport_.write(out_, command, kReply);
   if (sent.outcome != usb::Outcome::done) fail(operation, usb::name_of(sent.outcome), "is the bridge plugged in?");
+  const Report reply = fetch(command[0], operation);
+  in_step_ = true;
+  return reply;
+}
+
+/// Answers come in the order of the commands: all that come before the one to a command used for nothing else are old.
+void Mcp2221::synchronise() {
+  Report command{};
+  command[0] = get_settings;
+  pause_(kBetweenCommands);
+  const usb::Transfer sent = transport_.write(out_, command, kReply);
+  if (sent.outcome != usb::Outcome::done)
+    fail("find its step", usb::name_of(sent.outcome), "is the bridge plugged in?");
+  fetch(get_settings, "find its step");
+  in_step_ = true;
+}
+
+/// Nothing but the echoed command tells whose answer it is.
+Mcp2221::Report Mcp2221::fetch(std::uint8_t command_code, const char* operation) {
   Report reply{};
-  // Nothing but the echoed command tells whose answer it is.
   for (int i = 0; i < kStaleReplies; ++i) {
     const usb::Transfer got = transport_.read(in_, reply, kReply);
+    if (got.outcome == usb::Outcome::stalled) {
+      (void)transport_.clear_halt(in_);
+      continue;
+    }
     if (got.outcome != usb::Outcome::done) fail(operation, usb::name_of(got.outcome), "is the bridge plugged in?");
-    if (got.bytes == reply.size() && reply[0] == command[0]) return reply;
+    if (got.bytes == reply.size() && reply[0] == command_code) return reply;
   }
   fail(operation, "answers to other commands", "does another program use the bridge?");
 }

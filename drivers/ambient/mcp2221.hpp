@@ -19,8 +19,9 @@ class Mcp2221 final : public I2c {
   /// Waits for that long; the bridge wants a millisecond between two commands.
   using Pause = std::function<void(std::chrono::microseconds)>;
 
-  /// Claims the HID interface, frees a bus that a killed predecessor has left in the middle of a transfer, and sets
-  /// 100 kHz. `transport` must outlive this. Throws DeviceError: not such a bridge, does not answer, bus stuck.
+  /// Claims the HID interface, throws away the answers that a killed predecessor did not fetch, frees a bus that it
+  /// left in the middle of a transfer, and sets 100 kHz. `transport` must outlive this. Throws DeviceError: not such a
+  /// bridge, does not answer, bus stuck.
   explicit Mcp2221(usb::Transport& transport, Pause pause = sleep);
 
   void write(std::uint8_t address, std::span<const std::uint8_t> bytes) override;
@@ -31,6 +32,8 @@ class Mcp2221 final : public I2c {
 
  private:
   Report exchange(const Report& command, const char* operation);
+  void synchronise();
+  Report fetch(std::uint8_t command_code, const char* operation);
   void set_speed();
   void cancel();
   void send(std::uint8_t command, std::uint8_t address, std::size_t total, std::span<const std::uint8_t> data,
@@ -42,6 +45,7 @@ class Mcp2221 final : public I2c {
   usb::Transport& transport_;
   const Pause pause_;
   usb::Endpoint in_, out_;
+  bool in_step_ = false;  ///< false: answers to earlier commands may still come
 };
 
 }  // namespace kphi::ambient

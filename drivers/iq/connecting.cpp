@@ -48,7 +48,7 @@ void Connecting::take(const Heard& heard) {
 
 void Connecting::take_answer(const Heard& heard) {
   const Step& step = kScript[step_];
-  if (step.sets() && !(heard.packet == make(*step.entry, Access::reply, module_id_, wanted()))) {
+  if (step.sets() && !is_as_set(*step.entry, wanted(), heard.value())) {
     if (++attempts_ < kRequiredAttempts) return;
     failure_ = fmt::format(
         "the module did not accept its communication timeout ({} reads {} instead of {}): it would keep spinning if "

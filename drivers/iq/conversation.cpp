@@ -15,6 +15,11 @@ Duration on_wire(std::size_t bytes, unsigned baud) { return from_seconds(10.0 * 
 
 }  // namespace
 
+bool is_reply_of(const Packet& packet, const Entry& asked, int module_id) noexcept {
+  return packet.standard() && packet.access() == Access::reply && packet.module_id() == module_id &&
+         packet.type == static_cast<std::uint8_t>(asked.type) && packet.sub() == asked.sub;
+}
+
 void Conversation::set_baud(unsigned baud) {
   port_.drain(kWriteLimit);
   std::this_thread::sleep_for(kAdapter);
@@ -24,31 +29,35 @@ void Conversation::set_baud(unsigned baud) {
   send(zeros);
 }
 
-void Conversation::tell(const Packet& packet) {
-  std::array<std::uint8_t, kMaxFrame> frame;
-  const std::size_t size = encode(packet, frame);
-  send(std::span(frame).first(size));
+bool Conversation::resynchronise() noexcept {
+  const bool partial = parser_.partial();
+  parser_.reset();
+  return partial;
 }
 
-void Conversation::send(std::span<const std::uint8_t> bytes) {
+bool Conversation::tell(const Packet& packet) {
+  std::array<std::uint8_t, kMaxFrame> frame;
+  const std::size_t size = encode(packet, frame);
+  return send(std::span(frame).first(size));
+}
+
+bool Conversation::send(std::span<const std::uint8_t> bytes) {
   for (const auto end = steady_clock::now() + kWriteLimit; !bytes.empty() && steady_clock::now() < end;) {
     bytes = bytes.subspan(port_.write(bytes));
     if (!bytes.empty()) port_.drain(std::chrono::milliseconds(2));
   }
+  return bytes.empty();
 }
 
 std::optional<double> Conversation::ask(const Entry& asked, int module_id, Duration wall) {
-  listen(Duration{0}, [](const Packet&) {});  // what came too late for the question before
+  listen(Duration{0}, [](const Packet&) { return false; });  // what came too late for the question before
   tell(make(asked, Access::get, module_id));
-  const auto end = steady_clock::now() + wall + on_wire(port_.unsent() + kMaxFrame, baud());
   std::optional<double> answer;
-  while (!answer && port_.wait(end - steady_clock::now())) {
-    read([&](const Packet& packet) {
-      const bool ours = packet.type == static_cast<std::uint8_t>(asked.type) && packet.sub() == asked.sub &&
-                        packet.module_id() == module_id && packet.data().size() == size_of(asked.format);
-      if (ours) answer = number(asked.format, packet.data());
-    });
-  }
+  listen(wall + on_wire(port_.unsent() + kMaxFrame, baud()), [&](const Packet& packet) {
+    if (!is_reply_of(packet, asked, module_id) || packet.data().size() != size_of(asked.format)) return false;
+    answer = number(asked.format, packet.data());
+    return true;
+  });
   return answer;
 }
 

@@ -7,7 +7,7 @@
 namespace kphi::iq {
 
 void Dialogue::tell(const Entry& entry, double value) {
-  if (!is_setting(entry)) {
+  if (!is_volatile_setting(entry)) {
     throw std::logic_error(fmt::format("{}.{} is no setting", name_of(entry.type), entry.name));
   }
   send(entry, value);

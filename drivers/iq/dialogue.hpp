@@ -14,20 +14,13 @@ struct Answer {
   Duration uncertainty{0};  ///< half of that span: from the end of the question to the beginning of the reply
 };
 
-/// Parameters of the firmware, which it can also save, and what an operator resets: the clock, the memory of faults.
-/// Never what makes the motor move, reboots, erases or changes the line.
-[[nodiscard]] constexpr bool is_setting(const Entry& asked) noexcept {
-  if (asked.permitted == kGetSetSave) return &asked != &entry<"system_control.module_id">;
-  return &asked == &entry<"system_control.time"> || &asked == &entry<"power_safety.fault_ever">;
-}
-
 class Dialogue {
  public:
   virtual ~Dialogue() = default;
   /// Nothing when no answer came in time, after such retries as the dialogue thinks fit: this firmware does not know
   /// the entry. Throws DeviceError when the line is gone.
   virtual std::optional<Answer> ask(const Entry& entry) = 0;
-  /// Sets until the next reboot; never answered. Throws std::logic_error for what is no setting.
+  /// Sets until the next reboot; never answered. Throws std::logic_error unless is_volatile_setting.
   void tell(const Entry& entry, double value);
   /// Returns after this much bench time.
   virtual void pause(Duration bench) = 0;

@@ -78,4 +78,15 @@ Packet make(const Entry& entry, Access access, int module_id, double value) {
   return packet;
 }
 
+bool is_volatile_setting(const Entry& wanted) noexcept {
+  if (&wanted == &entry<"system_control.time"> || &wanted == &entry<"power_safety.fault_ever">) return true;
+  if (wanted.type == Client::system_control) return false;
+  const bool calibrated = wanted.type == Client::brushless_drive && wanted.sub >= 14 && wanted.sub <= 18;
+  return wanted.permitted == kGetSetSave && !calibrated;
+}
+
+bool is_as_set(const Entry& asked, double wanted, double read) noexcept {
+  return wanted == read || make(asked, Access::set, 0, wanted) == make(asked, Access::set, 0, read);
+}
+
 }  // namespace kphi::iq

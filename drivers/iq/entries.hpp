@@ -382,4 +382,13 @@ template <Path path>
 requires Writable<path>
 [[nodiscard]] Packet set(int module_id, double value = 0) { return make(entry<path>, Access::set, module_id, value); }
 
+/// Whether a program may set it in passing: a parameter that a restart brings back, or what an operator resets, the
+/// clock and the memory of faults. Not so: what moves the motor, what the factory calibrated, the id, the baud rate, a
+/// reboot, the memory.
+[[nodiscard]] bool is_volatile_setting(const Entry& entry) noexcept;
+
+/// Whether `read` is what a set of `wanted` leaves: the same bits on the wire. Nothing near it will do: velocity_ff2 is
+/// near 5e-7.
+[[nodiscard]] bool is_as_set(const Entry& entry, double wanted, double read) noexcept;
+
 }  // namespace kphi::iq

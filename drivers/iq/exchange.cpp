@@ -8,6 +8,27 @@ namespace {
 
 constexpr std::size_t kGetFrame = 7;
 
+// Every firmware has them, telemetry asks for none of them, and they are as many as a break of the line that is just
+// not a failure can swallow.
+constexpr const Entry* kFences[] = {
+    &entry<"propeller_motor_control.ctrl_mode">,
+    &entry<"brushless_drive.motor_pole_pairs">,
+    &entry<"propeller_motor_control.velocity_Kp">,
+    &entry<"brushless_drive.motor_Kv">,
+    &entry<"propeller_motor_control.velocity_Ki">,
+    &entry<"brushless_drive.motor_R_ohm">,
+    &entry<"propeller_motor_control.velocity_Kd">,
+    &entry<"brushless_drive.obs_supply_volts">,
+    &entry<"propeller_motor_control.velocity_ff0">,
+    &entry<"brushless_drive.drive_volts">,
+    &entry<"propeller_motor_control.velocity_ff1">,
+    &entry<"brushless_drive.drive_pwm">,
+    &entry<"propeller_motor_control.velocity_ff2">,
+    &entry<"brushless_drive.obs_angle">,
+    &entry<"power_monitor.watts">,
+    &entry<"power_monitor.joules">,
+};
+
 }  // namespace
 
 double Heard::value() const noexcept {
@@ -17,6 +38,7 @@ double Heard::value() const noexcept {
 Exchange::Exchange(const Settings& settings)
     : longest_timeout_(settings.reply_timeout),
       byte_time_(settings.wire_byte_time),
+      wire_paces_(settings.wire_paces),
       credit_bytes_(settings.credit_bytes),
       requests_(settings.reply_timeout),
       timeout_(settings.shortest_timeout, settings.reply_timeout) {
@@ -25,7 +47,6 @@ Exchange::Exchange(const Settings& settings)
 
 void Exchange::change_line() noexcept {
   parser_.reset();
-  partial_since_ = kNever;
   outbox_.clear();
   requests_.clear();
   wire_free_ = Instant{0};
@@ -56,11 +77,11 @@ bool Exchange::tell_and_ask(const Entry& told, double value, int module_id, Inst
 }
 
 void Exchange::ask_fence(int module_id, Instant now) noexcept {
-  constexpr const Entry* fences[] = {&entry<"brushless_drive.drive_mode">, &entry<"propeller_motor_control.ctrl_mode">,
-                                     &entry<"brushless_drive.obs_velocity">};
-  if (!requests_.none_open()) return;
-  for (const Entry* fence : fences) {
-    if (ask(*fence, module_id, now)) return;
+  if (!requests_.haunted() || !requests_.none_open()) return;
+  for (std::size_t tries = 0; tries < std::size(kFences); ++tries) {
+    const Entry& fence = *kFences[fence_];
+    fence_ = (fence_ + 1) % std::size(kFences);
+    if (ask(fence, module_id, now)) return;
   }
 }
 
@@ -81,25 +102,24 @@ std::span<const Heard> Exchange::receive(std::span<const std::uint8_t> bytes, In
   while (!bytes.empty()) {
     const std::size_t n = std::min(bytes.size(), kMaxFrame);
     const Instant end = now - byte_time_ * static_cast<std::int64_t>(bytes.size() - n);
-    stamp_arrivals(n, end);
+    stamp_arrivals(n, end, now);
     parser_.push(bytes.first(n),
                  [&](const Packet& packet, std::uint64_t position) { take_packet(packet, position, now); });
     bytes = bytes.subspan(n);
   }
   last_chunk_ = now;
-  watch_partial(now);
+  count_parser();
   return heard_;
 }
 
 std::span<const Heard> Exchange::advance(Instant now) {
   heard_.clear();
-  while (parser_.partial() && now - partial_since_ >= patience()) {
+  while (parser_.partial() && now - reading_of(parser_.partial_offset()) >= patience()) {
     ++counters_.resyncs;
     parser_.abandon([&](const Packet& packet, std::uint64_t position) { take_packet(packet, position, now); });
-    partial_since_ = now;
   }
-  watch_partial(now);
-  requests_.expire(now, [&](const Request& request) {
+  count_parser();
+  requests_.expire(understood_until(now), [&](const Request& request) {
     ++counters_.timeouts;
     timeout_.timed_out(request.started, now);
     heard_.push_back({Heard::Kind::timeout, request, {}, {}, now});
@@ -109,7 +129,9 @@ std::span<const Heard> Exchange::advance(Instant now) {
 
 Instant Exchange::deadline() const noexcept {
   const Instant earliest = requests_.deadline();
-  return parser_.partial() ? std::min(earliest, partial_since_ + patience()) : earliest;
+  if (!parser_.partial()) return earliest;
+  const Instant since = reading_of(parser_.partial_offset());
+  return earliest <= since ? earliest : since + patience();
 }
 
 void Exchange::sent(std::size_t n) noexcept {
@@ -127,7 +149,8 @@ void Exchange::take_packet(const Packet& packet, std::uint64_t end, Instant now)
     if ((id & neighbours_) == 0) ++counters_.wrong_module;
     return;
   }
-  const auto answer = requests_.answer(packet.type, packet.sub(), packet.module_id());
+  const std::size_t size = packet.length + kFrameOverhead;
+  const auto answer = requests_.answer(packet.type, packet.sub(), packet.module_id(), begun(end - size));
   if (!answer) {
     ++(find(packet.type, packet.sub()) == nullptr ? counters_.unknown_entries : counters_.unasked);
     return;
@@ -137,7 +160,6 @@ void Exchange::take_packet(const Packet& packet, std::uint64_t end, Instant now)
     return;
   }
   ++counters_.replies;
-  const std::size_t size = packet.length + kFrameOverhead;
   const Instant last_byte = arrival_of(end - 1);
   learn(answer->request, size, last_byte);
   const bool whole = packet.data().size() == size_of(answer->request.entry->format);
@@ -150,10 +172,11 @@ void Exchange::take_packet(const Packet& packet, std::uint64_t end, Instant now)
 }
 
 // The bytes of a chunk came one after the other before it was read, and after the chunk before was.
-void Exchange::stamp_arrivals(std::size_t n, Instant now) noexcept {
+void Exchange::stamp_arrivals(std::size_t n, Instant end, Instant now) noexcept {
   const std::uint64_t first = parser_.counters().bytes;
   for (std::size_t i = 0; i < n; ++i) {
-    arrivals_[(first + i) % kArrivals] = std::max(now - byte_time_ * static_cast<std::int64_t>(n - 1 - i), last_chunk_);
+    const Instant on_wire = end - byte_time_ * static_cast<std::int64_t>(n - 1 - i);
+    arrivals_[(first + i) % kArrivals] = {std::max(on_wire, last_chunk_), now};
   }
 }
 
@@ -162,14 +185,10 @@ Duration Exchange::patience() const noexcept {
   return std::max(longest_timeout_ / 4, byte_time_ * static_cast<std::int64_t>(kMaxFrame));
 }
 
-void Exchange::watch_partial(Instant now) noexcept {
-  if (!parser_.partial()) {
-    partial_since_ = kNever;
-  } else if (partial_since_ == kNever || parser_.partial_offset() != partial_offset_) {
-    partial_since_ = now;
-  }
-  partial_offset_ = parser_.partial_offset();
-  count_parser();
+// What came behind a header that may be a false one may hold the answer: until that is known no question is late that
+// was not late when the header came.
+Instant Exchange::understood_until(Instant now) const noexcept {
+  return parser_.partial() ? std::min(now, reading_of(parser_.partial_offset())) : now;
 }
 
 void Exchange::count_parser() noexcept {
@@ -196,6 +215,8 @@ Request Exchange::on_wire(const Entry* asked, int module_id, std::size_t bytes, 
   request.order = ++order_;
   request.queued = now;
   request.started = std::max(now, wire_free_);
+  // Half of it: the rate of the module's clock is not quite that of this host's.
+  request.earliest = wire_paces_ ? request.started + byte_time_ * static_cast<std::int64_t>(bytes) / 2 : now;
   request.patience = timeout_.timeout();
   wire_free_ = request.started + byte_time_ * static_cast<std::int64_t>(bytes);
   return request;

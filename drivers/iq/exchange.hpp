@@ -52,7 +52,8 @@ class Exchange {
   /// False: it is open already, or there is no credit. Nothing has been sent then.
   bool ask(const Entry& entry, int module_id, Instant now) noexcept;
   bool tell(Outbox::Kind kind, const Packet& packet, Instant now) noexcept;
-  /// Asks something harmless when nothing is open: its answer shows that what timed out before will not be answered.
+  /// Asks something harmless while something that timed out may still be answered and nothing else is open: answers to
+  /// later questions show that it will not.
   void ask_fence(int module_id, Instant now) noexcept;
   /// Sets it and asks for it in one go.
   bool tell_and_ask(const Entry& entry, double value, int module_id, Instant now) noexcept;
@@ -85,27 +86,39 @@ class Exchange {
 
  private:
   void take_packet(const Packet& packet, std::uint64_t end, Instant now);
-  void stamp_arrivals(std::size_t n, Instant now) noexcept;
-  [[nodiscard]] Instant arrival_of(std::uint64_t position) const noexcept { return arrivals_[position % kArrivals]; }
-  void watch_partial(Instant now) noexcept;
+  void stamp_arrivals(std::size_t n, Instant end, Instant now) noexcept;
+  [[nodiscard]] Instant arrival_of(std::uint64_t position) const noexcept {
+    return arrivals_[position % kArrivals].on_wire;
+  }
+  /// When it was handed to this host: never too early, where the other is reckoned.
+  [[nodiscard]] Instant reading_of(std::uint64_t position) const noexcept {
+    return arrivals_[position % kArrivals].read;
+  }
+  [[nodiscard]] Instant begun(std::uint64_t position) const noexcept {
+    return wire_paces_ ? arrival_of(position) : reading_of(position);
+  }
+  [[nodiscard]] Instant understood_until(Instant now) const noexcept;
   void count_parser() noexcept;
   [[nodiscard]] Duration patience() const noexcept;
   void learn(const Request& request, std::size_t reply_bytes, Instant end) noexcept;
   Request on_wire(const Entry* entry, int module_id, std::size_t bytes, Instant now) noexcept;
 
   Duration longest_timeout_, byte_time_;
+  bool wire_paces_;
   std::size_t credit_bytes_;
   std::uint64_t own_ids_ = 0;  ///< that were ever asked
   std::uint64_t neighbours_ = 0;
   bool held_ = false;
   Parser parser_;
   static constexpr std::size_t kArrivals = 2 * kMaxFrame;
-  std::array<Instant, kArrivals> arrivals_{};  ///< of the last bytes, by position
+  struct Arrival {
+    Instant on_wire{0}, read{0};
+  };
+  std::array<Arrival, kArrivals> arrivals_{};  ///< of the last bytes, by position
   Instant last_chunk_{0};
-  std::uint64_t partial_offset_ = 0;
-  Instant partial_since_{kNever};
   Outbox outbox_;
   Requests requests_;
+  std::size_t fence_ = 0;  ///< the next one
   std::uint64_t order_ = 0;
   Instant wire_free_{0};  ///< when the last byte handed over will have left
   AdaptiveTimeout timeout_;

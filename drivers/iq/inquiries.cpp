@@ -11,13 +11,6 @@ constexpr int kAttempts = 3;
 
 }  // namespace
 
-bool is_volatile_setting(const Entry& wanted) noexcept {
-  if (&wanted == &entry<"system_control.time"> || &wanted == &entry<"power_safety.fault_ever">) return true;
-  if (wanted.type == Client::system_control) return false;
-  const bool calibrated = wanted.type == Client::brushless_drive && wanted.sub >= 14 && wanted.sub <= 18;
-  return wanted.allows(Access::get) && wanted.allows(Access::set) && wanted.allows(Access::save) && !calibrated;
-}
-
 void Inquiries::check(const std::vector<Inquiry>& inquiries) {
   for (const Inquiry& inquiry : inquiries) {
     const Entry& wanted = *inquiry.entry;
@@ -61,8 +54,7 @@ void Inquiries::take(const Heard& heard) {
     }
     const auto& set_to = inquiries_[i].set_to;
     replies_[i].value = heard.value();
-    replies_[i].accepted =
-        set_to && heard.packet == make(heard.entry(), Access::reply, heard.packet.module_id(), *set_to);
+    replies_[i].accepted = set_to && is_as_set(heard.entry(), *set_to, heard.value());
     if (!set_to || replies_[i].accepted || last) finish(i);
     return;
   }

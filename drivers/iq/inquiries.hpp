@@ -10,10 +10,6 @@
 
 namespace kphi::iq {
 
-/// Whether a program may set it in passing: a parameter that a restart brings back. Not so: what moves the motor, what
-/// the factory calibrated, the id, the baud rate, a reboot, the memory.
-[[nodiscard]] bool is_volatile_setting(const Entry& entry) noexcept;
-
 struct Inquiry {
   const Entry* entry = nullptr;
   std::optional<double> set_to;  ///< set first, then read back

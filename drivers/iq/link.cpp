@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "drivers/iq/motor.hpp"
+#include "drivers/serial/discovery.hpp"
 
 namespace kphi::iq {
 namespace {
@@ -22,8 +23,11 @@ constexpr auto kPublishEvery = std::chrono::milliseconds(5);
 constexpr auto kFirstPause = std::chrono::milliseconds(50);
 constexpr auto kLongestPause = std::chrono::seconds(1);
 
-std::vector<Settings> stretched(std::vector<Settings> modules, unsigned baud, const Clock& clock) {
+std::vector<Settings> stretched(std::vector<Settings> modules, const std::string& device, unsigned baud,
+                                const Clock& clock) {
+  const bool adapter = serial::adapter_of(device).has_value();
   for (Settings& settings : modules) {
+    settings.wire_paces |= adapter;
     if (settings.reply_timeout == Duration{0}) settings.reply_timeout = clock.stretched(std::chrono::milliseconds(100));
     if (settings.wire_byte_time == Duration{0} && baud > 0) settings.wire_byte_time = from_seconds(10.0 / baud);
     if (settings.longest_silence == Duration{0}) {
@@ -54,7 +58,7 @@ Link::Link(const std::string& device, unsigned baud, const std::vector<Settings>
       baud_(baud),
       clock_(clock),
       bell_(make_bell()),
-      bus_(stretched(modules, baud, clock)),
+      bus_(stretched(modules, device, baud, clock)),
       reopening_(kFirstPause, kLongestPause),
       reconnecting_(kFirstPause, kLongestPause),
       was_ready_(modules.size(), false) {

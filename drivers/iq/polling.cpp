@@ -28,6 +28,10 @@ const Entry* entry_of(Quantity quantity, const Identity& identity) noexcept {
       return &entry<"brushless_drive.derate">;
     case Quantity::drive_mode:
       return &entry<"brushless_drive.drive_mode">;
+    case Quantity::drive_pwm:
+      return &entry<"brushless_drive.drive_pwm">;
+    case Quantity::fault_now:
+      return identity.fault_ever >= 0 ? &entry<"power_safety.fault_now"> : nullptr;
   }
   return nullptr;
 }

@@ -16,12 +16,15 @@ enum class Quantity : std::uint8_t {
   coil_temperature,  ///< °C, estimated by the module
   derate,            ///< 1 = none; below 1 the module holds its voltage back and a speed is not to be trusted
   drive_mode,        ///< a DriveMode; 5 = coast
+  drive_pwm,         ///< share of the supply voltage after all limits, -1..1
+  fault_now,         ///< bits, see fault_words(); 0 = nothing
 };
-inline constexpr int kQuantities = 7;
+inline constexpr int kQuantities = 9;
 
 [[nodiscard]] constexpr std::string_view name_of(Quantity quantity) noexcept {
-  constexpr std::string_view names[kQuantities] = {
-      "speed", "supply_voltage", "supply_current", "motor_current", "coil_temperature", "derate", "drive_mode"};
+  constexpr std::string_view names[kQuantities] = {"speed",         "supply_voltage",   "supply_current",
+                                                   "motor_current", "coil_temperature", "derate",
+                                                   "drive_mode",    "drive_pwm",        "fault_now"};
   return names[static_cast<int>(quantity)];
 }
 

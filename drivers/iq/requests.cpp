@@ -14,6 +14,11 @@ bool Requests::none_open() const noexcept {
                       [](const Request& request) { return request.entry != nullptr && !request.expired; });
 }
 
+bool Requests::haunted() const noexcept {
+  return std::any_of(requests_.begin(), requests_.begin() + count_,
+                     [](const Request& request) { return request.expired; });
+}
+
 std::size_t Requests::outstanding_bytes() const noexcept {
   std::size_t bytes = 0;
   for (std::size_t i = 0; i < count_; ++i) bytes += requests_[i].expired ? 0 : requests_[i].bytes;
@@ -24,15 +29,16 @@ void Requests::add(const Request& request) noexcept {
   if (count_ < kRequests) requests_[count_++] = request;
 }
 
-std::optional<Requests::Answer> Requests::answer(std::uint8_t type, std::uint8_t sub, int module_id) noexcept {
+std::optional<Requests::Answer> Requests::answer(std::uint8_t type, std::uint8_t sub, int module_id,
+                                                 Instant begun) noexcept {
   for (std::size_t i = 0; i < count_; ++i) {
     const Request request = requests_[i];
     if (request.entry == nullptr || request.module_id != module_id || request.entry->sub != sub ||
-        static_cast<std::uint8_t>(request.entry->type) != type) {
+        static_cast<std::uint8_t>(request.entry->type) != type || begun < request.earliest) {
       continue;
     }
-    erase(i);
-    if (!request.expired) release_before(request.order);
+    if (!request.expired) erase(i);
+    overtake(request.order);
     return Answer{request, request.expired};
   }
   return std::nullopt;
@@ -46,7 +52,7 @@ Instant Requests::deadline() const noexcept {
 
 Instant Requests::due(const Request& request) const noexcept {
   if (!request.expired) return request.started + request.patience;
-  return std::max(request.started + quarantine_ * (request.overtaken ? 2 : 10), request.expired_at + quarantine_);
+  return std::max(request.started + 10 * quarantine_, request.expired_at + quarantine_);
 }
 
 void Requests::erase(std::size_t at) noexcept {
@@ -55,14 +61,17 @@ void Requests::erase(std::size_t at) noexcept {
 }
 
 // The module answers in order: whoever answers a later frame has read the sets before it.
-void Requests::release_before(std::uint64_t order) noexcept {
+void Requests::overtake(std::uint64_t order) noexcept {
   for (std::size_t i = 0; i < count_;) {
-    if (requests_[i].order < order && requests_[i].entry == nullptr) {
+    Request& request = requests_[i];
+    if (request.order < order) ++request.overtaken;
+    const bool gone =
+        request.entry == nullptr ? request.overtaken > 0 : request.expired && request.overtaken >= kOvertaken;
+    if (gone) {
       erase(i);
-      continue;
+    } else {
+      ++i;
     }
-    requests_[i].overtaken |= requests_[i].order < order;
-    ++i;
   }
 }
 

@@ -22,11 +22,12 @@ std::vector<Found> scan(const std::string& device, unsigned baud) {
   int legacy_id = -1;
   const auto note = [&](const Packet& packet) {
     const int id = packet.module_id();
-    if (id >= kIds) return;
+    if (!packet.standard() || packet.access() != Access::reply || id >= kIds) return false;
     if (packet.type == static_cast<std::uint8_t>(Client::brushless_drive)) here[static_cast<std::size_t>(id)] = true;
-    if (packet.type != static_cast<std::uint8_t>(Client::system_control) || packet.data().size() != 1) return;
+    if (packet.type != static_cast<std::uint8_t>(Client::system_control) || packet.data().size() != 1) return false;
     if (packet.data()[0] == id) modern[static_cast<std::size_t>(id)] = true;
     if (packet.data()[0] != id && id == 0) legacy_id = packet.data()[0];
+    return false;
   };
   for (int id = 0; id < kIds; ++id) {
     line.tell(get<"brushless_drive.drive_mode">(id));

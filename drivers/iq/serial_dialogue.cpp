@@ -1,13 +1,9 @@
 #include "drivers/iq/serial_dialogue.hpp"
 
 #include <fmt/format.h>
-#include <poll.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <thread>
 
 #include "drivers/device_error.hpp"
@@ -29,7 +25,7 @@ constexpr const Entry& kCoast = entry<"propeller_motor_control.ctrl_coast">;
 }  // namespace
 
 SerialDialogue::SerialDialogue(const DialoguePlace& place, const Clock& clock)
-    : place_(place), clock_(clock), port_(place.device, place.baud) {
+    : place_(place), clock_(clock), line_(place.device, place.baud) {
   coast();
   try {
     prove_coast();
@@ -47,10 +43,11 @@ std::optional<Answer> SerialDialogue::ask(const Entry& entry) {
   for (int i = 0; i < kAttempts; ++i) {
     if (const auto answer = ask_once(entry)) return answer;
     // A late reply must not answer the next question: it passes while nothing is asked.
-    listen(SteadyTime::now() + patience(), [this](const Packet&) {
+    line_.listen(patience(), [this](const Packet&) {
       ++counters_.late_replies;
       return false;
     });
+    count_parser();
   }
   return std::nullopt;
 }
@@ -112,11 +109,11 @@ std::optional<Answer> SerialDialogue::ask_once(const Entry& entry) {
   const Packet question = make(entry, Access::get, place_.module_id);
   const Duration byte_time = clock_.stretched(from_seconds(10.0 / place_.baud));
   const Instant sent = clock_.now();
-  const WallTime wall = SteadyTime::now();
+  const auto wall = SteadyTime::now();
   write(question);
   ++counters_.requests;
   std::optional<Answer> answer;
-  listen(wall + patience(), [&](const Packet& packet) {
+  line_.listen(patience(), [&](const Packet& packet) {
     if (!answers(packet, entry)) return false;
     const Instant received = clock_.now();
     learn(SteadyTime::now() - wall);
@@ -131,16 +128,14 @@ std::optional<Answer> SerialDialogue::ask_once(const Entry& entry) {
     answer = Answer{number(entry.format, packet.data()), from + (to - from) / 2, (to - from + Duration(1)) / 2};
     return true;
   });
+  count_parser();
   if (answer) {
     ++counters_.replies;
     if (!std::isfinite(answer->value)) ++counters_.bad_values;
     return answer;
   }
   ++counters_.timeouts;
-  if (parser_.partial()) {
-    ++counters_.resyncs;
-    parser_.reset();
-  }
+  if (line_.resynchronise()) ++counters_.resyncs;
   return answer;
 }
 
@@ -157,13 +152,9 @@ Duration SerialDialogue::patience() const noexcept {
 }
 
 bool SerialDialogue::answers(const Packet& packet, const Entry& asked) noexcept {
-  const bool reply = packet.standard() && packet.access() == Access::reply;
-  if (reply && packet.module_id() != place_.module_id) {
-    ++counters_.wrong_module;
-    return false;
-  }
-  if (!reply || packet.type != static_cast<std::uint8_t>(asked.type) || packet.sub() != asked.sub) {
-    ++counters_.unasked;
+  if (!is_reply_of(packet, asked, place_.module_id)) {
+    const bool reply = packet.standard() && packet.access() == Access::reply;
+    ++(reply && packet.module_id() != place_.module_id ? counters_.wrong_module : counters_.unasked);
     return false;
   }
   if (packet.data().size() == size_of(asked.format)) return true;
@@ -171,55 +162,13 @@ bool SerialDialogue::answers(const Packet& packet, const Entry& asked) noexcept 
   return false;
 }
 
-template <class Sink>
-bool SerialDialogue::listen(WallTime until, Sink&& sink) {
-  std::uint8_t buffer[512];
-  bool stop = false;
-  while (!stop) {
-    const std::size_t n = read(buffer, until);
-    if (n == 0) break;
-    parser_.push(std::span<const std::uint8_t>(buffer, n),
-                 [&](const Packet& packet, auto) { stop = sink(packet) || stop; });
-    count_parser();
-  }
-  return stop;
-}
-
-std::size_t SerialDialogue::read(std::span<std::uint8_t> buffer, WallTime until) {
-  for (;;) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - SteadyTime::now());
-    pollfd line{port_.fd(), POLLIN, 0};
-    const int ready = ::poll(&line, 1, static_cast<int>(std::max<std::int64_t>(0, left.count())));
-    if (ready < 0 && errno == EINTR) continue;
-    if (ready < 0) lose("read", std::strerror(errno));
-    if (ready == 0) return 0;
-    const auto n = ::read(port_.fd(), buffer.data(), buffer.size());
-    if (n > 0) return static_cast<std::size_t>(n);
-    if (n < 0 && (errno == EAGAIN || errno == EINTR)) continue;
-    lose("read", n == 0 ? "the line was closed" : std::strerror(errno));
-  }
-}
-
 void SerialDialogue::write(const Packet& packet) {
-  std::array<std::uint8_t, kMaxFrame> frame;
-  const std::size_t size = encode(packet, frame);
-  const WallTime until = SteadyTime::now() + kLongestPatience;
-  for (std::size_t done = 0; done < size;) {
-    const auto n = ::write(port_.fd(), frame.data() + done, size - done);
-    if (n > 0) {
-      done += static_cast<std::size_t>(n);
-      continue;
-    }
-    if (n < 0 && errno != EAGAIN && errno != EINTR) lose("write", std::strerror(errno));
-    if (SteadyTime::now() > until) lose("write", "the line takes no bytes");
-    pollfd line{port_.fd(), POLLOUT, 0};
-    ::poll(&line, 1, 10);
-  }
-  counters_.bytes_out += size;
+  if (!line_.tell(packet)) lose("write", "the line takes no bytes");
+  counters_.bytes_out += packet.length + kFrameOverhead;
 }
 
 void SerialDialogue::count_parser() noexcept {
-  const Parser::Counters& parsed = parser_.counters();
+  const Parser::Counters& parsed = line_.heard();
   counters_.bytes_in = parsed.bytes;
   counters_.packets = parsed.packets;
   counters_.crc_errors = parsed.crc_errors;
@@ -228,7 +177,7 @@ void SerialDialogue::count_parser() noexcept {
 }
 
 void SerialDialogue::lose(const char* operation, const std::string& cause) const {
-  throw DeviceError("IQ module on " + port_.device(), operation, cause,
+  throw DeviceError("IQ module on " + line_.device(), operation, cause,
                     "check its supply, the cable, the module id and the baud rate");
 }
 

@@ -2,16 +2,13 @@
 // for measuring with it. The motor coasts from the beginning to the end, and is proven to.
 #pragma once
 
-#include <chrono>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "drivers/finding.hpp"
+#include "drivers/iq/conversation.hpp"
 #include "drivers/iq/dialogue.hpp"
-#include "drivers/iq/packet.hpp"
 #include "drivers/iq/reading.hpp"
-#include "drivers/serial/port.hpp"
 
 namespace kphi::iq {
 
@@ -37,7 +34,7 @@ class SerialDialogue final : public Dialogue {
   void pause(Duration bench) override;
 
   /// The path that was opened.
-  [[nodiscard]] const std::string& device() const noexcept { return port_.device(); }
+  [[nodiscard]] const std::string& device() const noexcept { return line_.device(); }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
   /// Median of question to reply, with their time on the wire; wall time. Zero before the first.
   [[nodiscard]] Duration median_round_trip() const;
@@ -45,18 +42,11 @@ class SerialDialogue final : public Dialogue {
   [[nodiscard]] std::vector<Finding> findings() const;
 
  private:
-  using WallTime = std::chrono::steady_clock::time_point;
-
   void send(const Entry& entry, double value) override;
   void coast() noexcept;
   void prove_coast();
   void write(const Packet& packet);
   std::optional<Answer> ask_once(const Entry& entry);
-  /// Reads what comes until `until`; calls sink for each packet, which returns true to stop. Returns whether it
-  /// stopped.
-  template <class Sink>
-  bool listen(WallTime until, Sink&& sink);
-  std::size_t read(std::span<std::uint8_t> buffer, WallTime until);
   void learn(Duration round_trip);
   [[nodiscard]] Duration patience() const noexcept;
   [[nodiscard]] bool answers(const Packet& packet, const Entry& asked) noexcept;
@@ -65,8 +55,7 @@ class SerialDialogue final : public Dialogue {
 
   const DialoguePlace place_;
   const Clock& clock_;
-  serial::Port port_;
-  Parser parser_;
+  Conversation line_;
   Counters counters_;
   std::vector<Duration> round_trips_;  ///< the last 5000 or more
   Duration typical_round_trip_{0};

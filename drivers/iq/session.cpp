@@ -130,7 +130,6 @@ void Session::take_heard(std::span<const Heard> all, Instant now) {
   for (const Heard& heard : all) {
     if (heard.kind != Heard::Kind::timeout) last_reply_ = std::max(last_reply_, heard.end);
     coasting_.take(heard, exchange_);
-    if (heard.kind == Heard::Kind::timeout && !silent()) exchange_.ask_fence(settings_.module_id, now);
     if (coasting_.confirmed()) stopping_.confirmed(heard.end);
     if (state_ == State::connecting) connecting_.take(heard);
     take_restart(heard, now);
@@ -157,6 +156,7 @@ void Session::service(Instant now) {
   flush_speed(now);
   polling_.advance(exchange_, now);
   if (state_ == State::ready) inquiries_.advance(exchange_, identity().system_control_id, now);
+  if (!silent()) exchange_.ask_fence(settings_.module_id, now);
   check_silence(now);
   judge_round_trip(now);
 }
@@ -230,7 +230,10 @@ std::string Session::why_no_answer() const {
   if (counted.packets == 0) return "bytes were received, but no valid packet";
   if (counted.replies == 0 && counted.wrong_module > 0) return "only modules with another id answer";
   if (coasting_.last_mode() < 0) return "no reply to get brushless_drive.drive_mode";
-  return fmt::format("the module does not confirm that it coasts (its drive mode last read {})", coasting_.last_mode());
+  const bool sings = coasting_.last_mode() == static_cast<int>(DriveMode::phase_volts);
+  return fmt::format(
+      "the module does not confirm that it coasts (its drive mode last read {}{})", coasting_.last_mode(),
+      sings ? ": old firmware sings so after its time-out, until its supply is switched off and on" : "");
 }
 
 }  // namespace kphi::iq

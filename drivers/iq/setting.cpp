@@ -2,21 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 namespace kphi::iq {
 namespace {
-
-constexpr double kRelative = 1e-6;
 
 std::string path(const Entry& entry) { return fmt::format("{}.{}", name_of(entry.type), entry.name); }
 
 }  // namespace
-
-bool is_as_set(const Entry& entry, double wanted, double read) noexcept {
-  return make(entry, Access::set, 0, wanted) == make(entry, Access::set, 0, read) ||
-         std::abs(read - wanted) <= kRelative * std::abs(wanted);
-}
 
 std::vector<Finding> set_and_read_back(Dialogue& module, std::span<const Setting> settings) {
   std::vector<Finding> findings;

@@ -15,10 +15,6 @@ struct Setting {
   bool required = true;  ///< false: firmware that does not know the entry is accepted
 };
 
-/// Whether `read` is what a set of `wanted` leaves: the same bits on the wire, or within 1e-6 of `wanted`, relative.
-/// Never an absolute tolerance: velocity_ff2 is near 5e-7.
-[[nodiscard]] bool is_as_set(const Entry& entry, double wanted, double read) noexcept;
-
 /// Sets each and reads it back; saves nothing. A finding for each that is not as set: a fault.
 [[nodiscard]] std::vector<Finding> set_and_read_back(Dialogue& module, std::span<const Setting> settings);
 

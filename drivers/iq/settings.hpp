@@ -19,6 +19,8 @@ struct Settings {
   Duration shortest_timeout{0};   ///< what the measured round trip may shorten it to; 0: 2/5 of reply_timeout
   Duration slow_round_trip{0};    ///< a median above this is told as an event; 0: 1/25 of reply_timeout (4 ms)
   Duration wire_byte_time{0};     ///< 10 bits of one byte; 0: Motor takes 10/baud
+  bool wire_paces = false;        ///< bytes really take that long, so that what comes sooner answers nothing; Motor: on
+                                  ///< an adapter, not on a pseudo-terminal
   double module_timeout_s = 0.5;  ///< the module coasts by itself after this silence; in its own seconds
   Duration longest_silence{0};    ///< the same as bench time; 0: module_timeout_s, and Motor stretches it as wall time
   std::size_t credit_bytes = 63;  ///< most bytes of unanswered frames, 18 or more: the module's receive buffer has 64

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "drivers/device_error.hpp"
+#include "drivers/netbox/printable.hpp"
 #include "drivers/netbox/units.hpp"
 
 namespace kphi::netbox {
@@ -23,6 +24,10 @@ constexpr double kFilterCutoffHz[] = {0, 838, 326, 152, 73, 35, 18, 8, 5, 1500, 
 class Elements {
  public:
   Elements(std::string_view xml, std::string device) : device_(std::move(device)) {
+    if (xml.find('\0') != std::string_view::npos) {
+      refuse(fmt::format("the page holds a NUL byte at {}: it is not in UTF-8", xml.find('\0')),
+             "see that no proxy is between this host and the box, then power-cycle the box");
+    }
     const pugi::xml_parse_result result = document_.load_buffer(xml.data(), xml.size());
     if (!result) {
       refuse(fmt::format("the XML is broken at byte {}: {}", result.offset, result.description()),
@@ -40,7 +45,7 @@ class Elements {
     const auto found = root_.children(name);
     if (std::distance(found.begin(), found.end()) > 1)
       refuse(fmt::format("element <{}> appears more than once", name), kAskForXml);
-    return boost::algorithm::trim_copy(std::string(root_.child_value(name)));
+    return printable(boost::algorithm::trim_copy(std::string(root_.child_value(name))));
   }
 
   [[nodiscard]] std::string text(const char* name) const {

@@ -4,28 +4,15 @@
 
 #include <cmath>
 #include <stdexcept>
-#include <vector>
 
 #include "drivers/device_error.hpp"
+#include "drivers/scpi/common_commands.hpp"
 #include "drivers/scpi/numbers.hpp"
 
 namespace kphi::scpi {
 namespace {
 
 constexpr double kMarginOfReading = 1.1;  // a supply shows a little more than it can be set to
-
-/// Maker, model, serial number, firmware (IEEE 488.2, 10.14).
-std::vector<std::string> fields_of(const std::string& identity) {
-  std::vector<std::string> fields;
-  for (std::size_t from = 0; fields.size() < 4;) {
-    const std::size_t comma = identity.find(',', from);
-    fields.push_back(identity.substr(from, comma - from));
-    if (comma == std::string::npos) break;
-    from = comma + 1;
-  }
-  fields.resize(4);
-  return fields;
-}
 
 void demand_range(const char* what, double value, double most) {
   if (std::isfinite(value) && value >= 0 && value <= most * kMarginOfReading) return;
@@ -37,10 +24,11 @@ void demand_range(const char* what, double value, double most) {
 ScpiSupply::ScpiSupply(Line& line, const Clock& clock) : line_(line), clock_(clock) {
   identity_.device = line.name();
   const std::string who = line_.query("*IDN?");
-  const auto fields = fields_of(who);
+  const auto fields = identity_fields(who);
   if (fields[1].empty()) fail("*IDN?", "\"" + who + "\" names no model", "is this an instrument that speaks SCPI?");
   dialect_ = &dialect_of(who);
   identity_ = {fmt::format("supply {} on {}", fields[1], line.name()), fields[1], fields[2], fields[3]};
+  forget_errors(line_);
   identity_.voltage_step_v = dialect_->voltage_step_v;
   identity_.current_step_a = dialect_->current_step_a;
   identity_.voltage_max_v = ask("VOLT? MAX");
@@ -103,10 +91,10 @@ void ScpiSupply::tell(const std::string& command) {
   if (command.empty()) return;
   ++counters_.requests;
   line_.write(command);
-  const std::string error = line_.query("SYST:ERR?");
-  const auto code = number_of(std::string_view(error).substr(0, error.find(',')));
-  if (code && *code == 0) return;
+  const std::string error = next_error(line_);
+  if (error.empty()) return;
   ++counters_.refused;
+  forget_errors(line_);
   fail(command, "the instrument answers " + error, "is this within what it can do?");
 }
 

@@ -28,8 +28,10 @@ enum Request : std::uint8_t {
 constexpr std::uint8_t kSuccess = 0x01, kPending = 0x02;
 constexpr int kChecks = 100;  // of a clear or abort that is pending
 constexpr usb::Transport::Timeout kControlTimeout = 500ms, kDrainTimeout = 20ms;
-constexpr std::uint32_t kPart = 4096;          // bytes asked for at once
-constexpr std::size_t kLongestAnswer = 65536;  // nothing asked here is longer
+// A host must have room for whole packets, of 64, 512 or 1024 bytes: header and data fill four of the largest.
+constexpr std::size_t kRoom = 4096;
+constexpr std::uint32_t kPart = kRoom - usbtmc::kHeaderBytes;  // bytes asked for at once
+constexpr std::size_t kLongestAnswer = 65536;                  // nothing asked here is longer
 
 /// They claim remote/local and must not be sent REN.
 struct Choker {
@@ -143,7 +145,7 @@ bool Usbtmc::receive_part(std::string& answer, bool may_be_empty) {
     recover_out(asked.outcome);
     fail("ask for the answer", usb::name_of(asked.outcome));
   }
-  std::array<std::uint8_t, kPart + usbtmc::kHeaderBytes + 4> buffer;
+  std::array<std::uint8_t, kRoom> buffer;
   usb::Transfer got = transport_.read(in_, buffer, timeout_);
   if (got.outcome == usb::Outcome::done && got.bytes == 0 && may_be_empty) got = transport_.read(in_, buffer, timeout_);
   if (got.outcome != usb::Outcome::done) {
@@ -151,10 +153,11 @@ bool Usbtmc::receive_part(std::string& answer, bool may_be_empty) {
     fail("read the answer", usb::name_of(got.outcome), "does the instrument know this command?");
   }
   const auto header = usbtmc::answer_header(std::span(buffer).first(got.bytes), tag_);
-  if (!header || header->bytes > kPart) {
+  const bool goes_nowhere = header && header->bytes == 0 && !header->end_of_message;
+  if (!header || header->bytes > kPart || goes_nowhere) {
     ++counters_.damaged;
     recover_in(got.outcome);
-    fail("read the answer", "it answers another request");
+    fail("read the answer", goes_nowhere ? "it is empty and does not end" : "it answers another request");
   }
   std::size_t have = std::min<std::size_t>(got.bytes - usbtmc::kHeaderBytes, header->bytes);
   answer.append(reinterpret_cast<const char*>(buffer.data()) + usbtmc::kHeaderBytes, have);
@@ -203,7 +206,7 @@ bool Usbtmc::abort(std::uint8_t initiate, std::uint8_t check, const usb::Endpoin
 }
 
 void Usbtmc::drain() noexcept {
-  std::array<std::uint8_t, 512> discarded;
+  std::array<std::uint8_t, kRoom> discarded;
   for (int i = 0; i < kChecks; ++i) {
     const usb::Transfer got = transport_.read(in_, discarded, kDrainTimeout);
     if (got.outcome != usb::Outcome::done || got.bytes < discarded.size()) return;

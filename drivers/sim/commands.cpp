@@ -7,6 +7,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>
@@ -65,6 +66,7 @@ profiles::Bench load_simulated(const Options& options) {
   }
   if (options.time_scale) bench.simulation->time_scale = *options.time_scale;
   if (options.seed) bench.simulation->seed = *options.seed;
+  if (!options.faults.empty()) bench.simulation->faults = options.faults;
   return bench;
 }
 
@@ -84,6 +86,10 @@ void load_faults(const std::string& path, BenchSettings& bench) {
     bench.faults = parse_faults(text, path);
     bench.netbox.habits = parse_habits(text, path);
     bench.motor_faults = parse_motor_faults(text, path);
+    const SupplyFaultScript supply = parse_supply_faults(text, path);
+    if (bench.supply) bench.supply->faults = supply;
+    if (!bench.supply && !supply.empty())
+      throw ConfigurationError(path + ": there are faults of the supply, and the bench file has no supply:");
   } catch (const FaultFileError& error) {
     throw ConfigurationError(error.what());
   }
@@ -122,14 +128,13 @@ ServerSettings settings_of(const profiles::Bench& bench, const Options& options)
   settings.rdt_port = options.free_ports ? 0 : bench.netbox.rdt_port;
   settings.http_port = options.free_ports ? 0 : bench.netbox.http_port;
   settings.tcp_port = options.free_ports ? 0 : bench.netbox.tcp_port;
-  const std::string& faults = options.faults.empty() ? bench.simulation->faults : options.faults;
-  if (!faults.empty()) load_faults(faults, settings.bench);
+  if (bench.supply) load_supply(bench, options, settings);
+  if (!bench.simulation->faults.empty()) load_faults(bench.simulation->faults, settings.bench);
   if (!options.truth_log.empty()) {
     settings.bench.keep = FaultyWire::Keep::datagrams;
     settings.bench.motor_keep = IqLine::Keep::replies;
   }
   settings.bench.plant.air_density_kg_m3 = bench.simulation->air_density_kg_m3;
-  if (bench.supply) load_supply(bench, options, settings);
   settings.device = bench.iq.device;
   settings.control = bench.simulation->control;
   return settings;
@@ -156,6 +161,9 @@ std::string resolved_text(const profiles::Bench& bench, const Addresses& address
   file["simulation"]["control"] = addresses.control;
   file["simulation"]["time_scale"] = fmt::format("{}", bench.simulation->time_scale);
   file["simulation"]["seed"] = bench.simulation->seed;
+  // The copy may lie in another folder.
+  const std::string& faults = bench.simulation->faults;
+  if (!faults.empty()) file["simulation"]["faults"] = std::filesystem::absolute(faults).string();
   return YAML::Dump(file) + "\n";
 }
 
@@ -196,8 +204,9 @@ void serve(const profiles::Bench& bench, const Options& options) {
   std::signal(SIGTERM, SIG_DFL);
   running = nullptr;
   if (!options.truth_log.empty())
-    write_file(options.truth_log, json_lines(server.truth()) + json_lines(server.motor_truth()));
-  if (!options.faults.empty()) fmt::print(stderr, "kphi sim: {}\n", summary(server.truth()));
+    write_file(options.truth_log,
+               json_lines(server.truth()) + server.motion().json_lines() + json_lines(server.motor_truth()));
+  if (!bench.simulation->faults.empty()) fmt::print(stderr, "kphi sim: {}\n", summary(server.truth()));
   const auto& unsent = server.unsent();
   if (unsent.datagrams + unsent.motor_bytes > 0) {
     fmt::print(stderr, "kphi sim: not sent for want of room: {} datagrams, {} motor bytes\n", unsent.datagrams,
@@ -223,7 +232,7 @@ void add_sim(CLI::App& program, int& exit_code) {
   sim->add_option("--faults", options->faults,
                   "script of what goes wrong on the wires and in the devices (YAML), instead of the file's");
   sim->add_option("--truth-log", options->truth_log,
-                  "write at exit what happened to every datagram and reply (JSON lines)");
+                  "write at exit what happened to every datagram, reply and command of the motor (JSON lines)");
   sim->add_option("--time-scale", options->time_scale, "bench seconds per second, instead of the file's")
       ->check(CLI::Range(0.1, 1000.0));
   sim->add_option("--seed", options->seed, "of the noise, instead of the file's");

@@ -4,8 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 
 namespace kphi::sim {
 namespace {
@@ -158,30 +156,9 @@ const Kind& kind_named(const std::string& name) {
   throw FaultEntryError("kind", fmt::format("no fault is called '{}'; there are {}", name, known));
 }
 
-double number(const std::string& key, const std::string& text) {
-  if (text == "true") return 1;
-  if (text == "false") return 0;
-  double value = 0;
-  if (text.substr(0, 2) == "0x") {
-    std::uint32_t bits = 0;
-    const auto [end, error] = std::from_chars(text.data() + 2, text.data() + text.size(), bits, 16);
-    if (error == std::errc{} && end == text.data() + text.size()) return bits;
-  }
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) {
-    throw FaultEntryError(key, fmt::format("'{}' is no number", text));
-  }
-  return value;
-}
-
 double number_within(const Parameter& parameter, const FaultEntry& entry) {
-  const std::string key(parameter.name);
-  const double value = number(key, entry.at(key));
-  if (!(value >= parameter.low && value <= parameter.high)) {
-    throw FaultEntryError(key, fmt::format("{} is outside {} to {}", value, parameter.low, parameter.high));
-  }
-  if (parameter.whole && value != std::floor(value)) throw FaultEntryError(key, fmt::format("{} is not whole", value));
-  return value;
+  return fault_number(parameter.name, entry.at(std::string(parameter.name)),
+                      {parameter.low, parameter.high, parameter.whole});
 }
 
 void set(Fault& fault, const Parameter& parameter, const FaultEntry& entry) {
@@ -226,9 +203,7 @@ const std::vector<FaultKind>& all_fault_kinds() {
 }
 
 Fault fault_of(const FaultEntry& entry) {
-  const auto named = entry.find("kind");
-  if (named == entry.end()) throw FaultEntryError("", "the kind is missing");
-  const Kind& kind = kind_named(named->second);
+  const Kind& kind = kind_named(kind_of(entry));
   const auto parameters = parameters_of(kind);
   for (const auto& [key, value] : entry) {
     const bool known = key == "kind" || std::any_of(parameters.begin(), parameters.end(),

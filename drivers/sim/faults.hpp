@@ -3,13 +3,12 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "drivers/clock.hpp"
+#include "drivers/sim/fault_entry.hpp"
 
 namespace kphi::sim {
 
@@ -96,16 +95,6 @@ using FaultScript = std::vector<Fault>;
   return kind >= FaultKind::http_slow && kind <= FaultKind::http_duplicate_tag;
 }
 [[nodiscard]] constexpr bool on_tcp(FaultKind kind) noexcept { return kind >= FaultKind::tcp_split; }
-
-/// One entry of a script as a person writes it: names and values as text.
-using FaultEntry = std::map<std::string, std::string>;
-
-/// What is wrong in an entry, and at which of its keys; an empty key: the whole entry.
-class FaultEntryError : public std::runtime_error {
- public:
-  FaultEntryError(std::string at_key, const std::string& what) : std::runtime_error(what), key(std::move(at_key)) {}
-  const std::string key;
-};
 
 /// Strict: unknown keys, keys of another kind, values out of range and missing keys throw FaultEntryError.
 [[nodiscard]] Fault fault_of(const FaultEntry& entry);

@@ -80,7 +80,7 @@ void IqDevice::advance(Instant now) noexcept {
                                        memory_.value(modern ? 83 : 77, modern ? 9 : 2), readings.coil_celsius);
     limits_.thermal = coil * derate_between(memory_.value(73, 3), memory_.value(73, 4), readings.controller_celsius);
   }
-  const IqSensed sensed{state_->speed * (1 + clock_gain()), state_->supply_volts};
+  const IqSensed sensed{state_->speed / (1 + clock_gain()), state_->supply_volts};
   stage_ = control_.step(safety_.safe_mode() ? MotorDrive{} : drive_, limits_, sensed);
 }
 

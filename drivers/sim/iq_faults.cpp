@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 namespace kphi::sim {
@@ -13,15 +12,6 @@ constexpr double kHour = 3600, kMany = 1e9;
 constexpr Duration kOvertaken = std::chrono::milliseconds(10);
 constexpr std::string_view kPrefix = "motor_";
 
-double number(const std::string& key, const std::string& text) {
-  if (text == "true" || text == "false") return text == "true" ? 1 : 0;
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value))
-    throw FaultEntryError(key, fmt::format("'{}' is no number", text));
-  return value;
-}
-
 /// A key of a kind: how its text becomes a member.
 struct Parameter {
   std::string_view name;
@@ -30,14 +20,7 @@ struct Parameter {
   bool required = false;
   bool whole = false;
 
-  [[nodiscard]] double within(const std::string& text) const {
-    const std::string key(name);
-    const double value = number(key, text);
-    if (!(value >= low && value <= high))
-      throw FaultEntryError(key, fmt::format("{} is outside {} to {}", value, low, high));
-    if (whole && value != std::floor(value)) throw FaultEntryError(key, fmt::format("{} is not whole", value));
-    return value;
-  }
+  [[nodiscard]] double within(const std::string& text) const { return fault_number(name, text, {low, high, whole}); }
 };
 
 template <auto Member>
@@ -59,7 +42,7 @@ void as_value(MotorFault& fault, const Parameter&, const std::string& text) {
   } else if (text == "denormal") {
     fault.value = std::numeric_limits<float>::denorm_min();
   } else {
-    fault.value = number("value", text);
+    fault.value = fault_number("value", text);
   }
 }
 
@@ -170,9 +153,7 @@ bool is_motor_fault(const FaultEntry& entry) noexcept {
 }
 
 MotorFault motor_fault_of(const FaultEntry& entry) {
-  const auto named = entry.find("kind");
-  if (named == entry.end()) throw FaultEntryError("", "the kind is missing");
-  const Kind& kind = kind_named(named->second);
+  const Kind& kind = kind_named(kind_of(entry));
   const auto parameters = parameters_of(kind);
   for (const auto& [key, value] : entry) {
     const bool known = key == "kind" || std::any_of(parameters.begin(), parameters.end(),

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "drivers/clock.hpp"
-#include "drivers/sim/faults.hpp"
+#include "drivers/sim/fault_entry.hpp"
 
 namespace kphi::sim {
 

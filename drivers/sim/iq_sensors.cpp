@@ -28,7 +28,7 @@ void IqSensors::restart(const IqMemory& memory, const MotorState& truth) noexcep
   readings_.controller_celsius = truth.controller_celsius;
   readings_.volts = readings_.volts_cascaded = truth.supply_volts * (1 + errors_.volts_gain);
   readings_.amps = truth.supply_amps * (1 + errors_.amps_gain);
-  readings_.speed = truth.speed * (1 + speed_gain_);
+  readings_.speed = truth.speed / clock_rate_;
   joules_at_reset_ = truth.supply_joules;
   heat_square_ = 0;
 }
@@ -71,7 +71,7 @@ void IqSensors::reset_joules(const MotorState& truth) noexcept {
 IqReadings IqSensors::readings(const MotorState& truth) const noexcept {
   IqReadings out = readings_;
   if (errors_.perfect) {
-    out.speed = truth.speed * (1 + speed_gain_);
+    out.speed = truth.speed / clock_rate_;
     out.volts = out.volts_cascaded = truth.supply_volts;
     out.amps = truth.supply_amps;
     out.joules = truth.supply_joules - joules_at_reset_;
@@ -103,7 +103,7 @@ void IqSensors::convert(const MotorState& truth) noexcept {
   r.joules += r.volts * r.amps * kTick;
   const double warm = truth.controller_celsius + errors_.controller_noise * random_.normal();
   r.controller_celsius += model_.controller_filter * (warm - r.controller_celsius);
-  const double speed = truth.speed * (1 + speed_gain_) + errors_.speed_noise * random_.normal();
+  const double speed = truth.speed / clock_rate_ + errors_.speed_noise * random_.normal();
   r.speed += model_.speed_filter * (speed - r.speed);
 }
 

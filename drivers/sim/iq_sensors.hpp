@@ -29,7 +29,7 @@ struct IqHeat {
 };
 
 struct IqReadings {
-  double speed = 0;  ///< rad/s, by the module's clock
+  double speed = 0;  ///< rad/s, by the module's clock: a fast one counts more of its seconds per turn
   double volts = 0, amps = 0, joules = 0;
   double volts_cascaded = 0;
   std::uint16_t volts_raw = 0, amps_raw = 0;
@@ -43,8 +43,9 @@ struct IqReadings {
 
 class IqSensors {
  public:
-  IqSensors(const IqSensorErrors& errors, double speed_gain, std::uint64_t seed) noexcept
-      : errors_(errors), speed_gain_(speed_gain), random_(seed) {}
+  /// `clock_gain`: relative error of the module's clock, above 0 when it is fast.
+  IqSensors(const IqSensorErrors& errors, double clock_gain, std::uint64_t seed) noexcept
+      : errors_(errors), clock_rate_(1 + clock_gain), random_(seed) {}
 
   /// At power-up: the estimators begin at the ambient temperature that they are told.
   void restart(const IqMemory& memory, const MotorState& truth) noexcept;
@@ -68,7 +69,7 @@ class IqSensors {
     double ambient = 25, free = 0.05, forced = 0.006, to_stator = 0.25, coil_capacity = 6;
   };
   IqSensorErrors errors_;
-  double speed_gain_;
+  double clock_rate_;  ///< seconds of the module per second
   Random random_;
   Model model_;
   IqHeat heat_;

@@ -63,6 +63,7 @@ Server::Server(const ServerSettings& settings)
     : time_scale_(settings.bench.time_scale),
       addresses_{settings.host, 0, 0, 0, {}, control_path(settings.control), {}, 0},
       bench_(settings.bench),
+      keep_motion_(settings.bench.motor_keep == IqLine::Keep::replies),
       stop_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
       rdt_(listen_at(settings.host, SOCK_DGRAM, settings.rdt_port)),
       foreign_(listen_at(settings.host, SOCK_DGRAM, 0)),
@@ -180,8 +181,10 @@ Conversations::Answer Server::in_wall_time(StreamReply&& reply) const {
 
 void Server::step(Instant now) {
   bench_.advance(now);
+  log_motion(now);
   hear_requests();
   hear_motor(now);
+  log_motion(now);
   send_datagrams();
   send_motor();
   if (!supply_) return;
@@ -213,6 +216,12 @@ void Server::hear_motor(Instant now) {
   }
   quiet_steps_ = count > 0 ? 0 : quiet_steps_ + 1;
   if (quiet_steps_ == kQuiet) pty_.unlock();
+}
+
+void Server::log_motion(Instant now) {
+  if (!keep_motion_) return;
+  motion_.look(bench_.motor(), bench_.plant().motor().speed, now);
+  if (SupplySlave* supply = bench_.supply()) motion_.look(supply->circuit(), now);
 }
 
 void Server::send_datagrams() {

@@ -15,6 +15,7 @@
 #include "drivers/sim/conversations.hpp"
 #include "drivers/sim/descriptor.hpp"
 #include "drivers/sim/listening.hpp"
+#include "drivers/sim/motion_log.hpp"
 #include "drivers/sim/pty.hpp"
 #include "drivers/sim/supply_port.hpp"
 
@@ -65,6 +66,8 @@ class Server {
   /// To be read when run() has returned: what the script of faults did.
   [[nodiscard]] const WireTruth& truth() noexcept { return bench_.wire().truth(); }
   [[nodiscard]] const IqTruth& motor_truth() noexcept { return bench_.motor_line().truth(); }
+  /// Kept when the motor's replies are, too.
+  [[nodiscard]] const MotionLog& motion() const noexcept { return motion_; }
   /// To be read when run() has returned.
   [[nodiscard]] const Unsent& unsent() const noexcept { return unsent_; }
 
@@ -74,6 +77,7 @@ class Server {
   void step(Instant now);
   void hear_requests();
   void hear_motor(Instant now);
+  void log_motion(Instant now);
   void send_datagrams();
   void open_or_close_web();
   void follow_the_address();
@@ -84,6 +88,8 @@ class Server {
   double time_scale_;
   Addresses addresses_;
   SimulatedBench bench_;
+  const bool keep_motion_;
+  MotionLog motion_;
   Descriptor stop_;
   Listening rdt_;
   Listening foreign_;  ///< sends what a script lets come from elsewhere

@@ -1,5 +1,6 @@
 #include "drivers/sim/virtual_usb.hpp"
 
+#include <dlfcn.h>
 #include <errno.h>
 #include <fmt/format.h>
 #include <linux/usbdevice_fs.h>
@@ -11,6 +12,7 @@
 #include <map>
 #include <mutex>
 #include <stdexcept>
+#include <utility>
 
 namespace kphi::sim {
 namespace {
@@ -62,7 +64,9 @@ std::vector<std::uint8_t> string_descriptor(const std::string& text) {
 /// One device in its socket; answers the kernel's calls on umockdev's thread.
 class VirtualUsb::Socket {
  public:
-  Socket(UMockdevTestbed* bed, int port, UsbFunction& function) : bed_(bed), function_(function), number_(port + 1) {
+  /// `number`: of the device on its bus, another one for each stay, as the kernel does it.
+  Socket(UMockdevTestbed* bed, int port, int number, UsbFunction& function)
+      : bed_(bed), function_(function), number_(number) {
     node_ = fmt::format("/dev/bus/usb/001/{:03}", number_);
     path_ = fmt::format("/sys/devices/usb1/1-{}", port);
     GError* error = nullptr;
@@ -75,12 +79,17 @@ class VirtualUsb::Socket {
     umockdev_testbed_uevent(bed_, path_.c_str(), "add");
   }
   ~Socket() {
+    pull();
+    umockdev_testbed_detach_ioctl(bed_, node_.c_str(), nullptr);
+  }
+  /// From now on its calls are answered as those of a device that is gone, after the transfers under way have ended as
+  /// such. Who detached it right away would leave a call that is under way without any answer, for ever.
+  void pull() {
     {
       const std::lock_guard lock(mutex_);
-      gone_ = true;
+      if (std::exchange(gone_, true)) return;
     }
     umockdev_testbed_uevent(bed_, path_.c_str(), "remove");
-    umockdev_testbed_detach_ioctl(bed_, node_.c_str(), nullptr);
     umockdev_testbed_remove_device(bed_, path_.c_str());
   }
   Socket(const Socket&) = delete;
@@ -113,11 +122,13 @@ class VirtualUsb::Socket {
       umockdev_ioctl_client_complete(client, result, error);
       return TRUE;
     };
-    if (gone_) return complete(-1, ENODEV);
+    const bool reaps = request == USBDEVFS_REAPURB || request == USBDEVFS_REAPURBNDELAY;
+    if (gone_ && !(reaps && !urbs_.empty())) return complete(-1, ENODEV);
     switch (request) {
       case USBDEVFS_GET_CAPABILITIES: {
         const Data flags = resolve(argument, 0, sizeof(std::uint32_t));
-        const std::uint32_t capabilities = USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM;
+        const std::uint32_t capabilities =
+            USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM | USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
         umockdev_ioctl_data_update(flags.get(), 0,
                                    const_cast<std::uint8_t*>(reinterpret_cast<const std::uint8_t*>(&capabilities)),
                                    sizeof capabilities);
@@ -173,8 +184,10 @@ class VirtualUsb::Socket {
   }
 
   std::list<Urb>::iterator next_ended() {
-    for (Urb& urb : urbs_)
-      if (!urb.ended) carry_on(urb);
+    for (Urb& urb : urbs_) {
+      if (urb.ended) continue;
+      gone_ ? end(urb, -ESHUTDOWN, 0) : carry_on(urb);
+    }
     return std::find_if(urbs_.begin(), urbs_.end(), [](const Urb& urb) { return urb.ended; });
   }
 
@@ -254,7 +267,18 @@ class VirtualUsb::Socket {
 
 struct VirtualUsb::Bed {
   Owned<UMockdevTestbed> testbed{umockdev_testbed_new()};
+  std::mutex mutex;  // of all below: whoever plugs
   std::map<int, std::unique_ptr<Socket>> sockets;
+  std::vector<std::unique_ptr<Socket>> pulled;
+  int devices = 1;  // so far, with the root hub
+
+  void pull(int port) {
+    const auto found = sockets.find(port);
+    if (found == sockets.end()) return;
+    found->second->pull();
+    pulled.push_back(std::move(found->second));
+    sockets.erase(found);
+  }
 };
 
 VirtualUsb::VirtualUsb() : bed_(std::make_unique<Bed>()) {
@@ -265,16 +289,21 @@ VirtualUsb::VirtualUsb() : bed_(std::make_unique<Bed>()) {
 VirtualUsb::~VirtualUsb() = default;
 
 bool VirtualUsb::available() noexcept {
-  const char* preloaded = g_getenv("LD_PRELOAD");
-  return preloaded != nullptr && std::string_view(preloaded).find("libumockdev-preload") != std::string_view::npos;
+  void* const preloaded = dlopen("libumockdev-preload.so.0", RTLD_LAZY | RTLD_NOLOAD);
+  if (preloaded != nullptr) dlclose(preloaded);
+  return preloaded != nullptr;
 }
 
 void VirtualUsb::plug(int port, UsbFunction& function) {
-  unplug(port);
-  bed_->sockets[port] = std::make_unique<Socket>(bed_->testbed.get(), port, function);
+  const std::lock_guard lock(bed_->mutex);
+  bed_->pull(port);
+  bed_->sockets[port] = std::make_unique<Socket>(bed_->testbed.get(), port, ++bed_->devices, function);
 }
 
-void VirtualUsb::unplug(int port) { bed_->sockets.erase(port); }
+void VirtualUsb::unplug(int port) {
+  const std::lock_guard lock(bed_->mutex);
+  bed_->pull(port);
+}
 
 std::string VirtualUsb::directory() const {
   gchar* root = umockdev_testbed_get_root_dir(bed_->testbed.get());

@@ -21,7 +21,8 @@ class VirtualUsb {
   /// True in a process that was started with the preloaded library.
   [[nodiscard]] static bool available() noexcept;
 
-  /// At socket `port` (1..) of bus 1. The function must outlive its stay; it is called on the bus's thread.
+  /// At socket `port` (1..) of bus 1. The function must outlive its stay; it is called on the bus's thread. Both may be
+  /// called by any thread.
   void plug(int port, UsbFunction& function);
   void unplug(int port);
   /// What another program needs in its environment, besides the preloaded library: UMOCKDEV_DIR.

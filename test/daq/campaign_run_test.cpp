@@ -54,8 +54,8 @@ TEST_F(ShortCampaign, AsksForEachMountingOnceAndRunsAllItsRepetitions) {
   EXPECT_EQ(result.steps, 12);
   EXPECT_EQ(result.lost, 0u);
   EXPECT_EQ(results_.complete_runs().size(), 4u);
-  EXPECT_THAT(events(), ElementsAre("campaign_started", "mounted", "run_accepted", "run_accepted", "mounted",
-                                    "run_accepted", "run_accepted", "campaign_finished"));
+  EXPECT_THAT(events(), ElementsAre("campaign_started", "clock_unchecked", "mounted", "run_accepted", "run_accepted",
+                                    "mounted", "run_accepted", "run_accepted", "campaign_finished"));
 }
 
 TEST_F(ShortCampaign, LeavesAWholeFolderWhoseStepsAreAPureFunctionOfTheRuns) {
@@ -92,7 +92,8 @@ TEST_F(ShortCampaign, KeepsFinishedRunsWhenAMountingIsRefused) {
   EXPECT_THROW((void)run(test::short_campaign("0, 90", 1, 3)), NotMounted);
   EXPECT_EQ(results_.complete_runs().size(), 1u);
   EXPECT_EQ(results::read_steps(results_.steps()).size(), 3u);
-  EXPECT_THAT(events(), ElementsAre("campaign_started", "mounted", "run_accepted", "campaign_stopped"));
+  EXPECT_THAT(events(),
+              ElementsAre("campaign_started", "clock_unchecked", "mounted", "run_accepted", "campaign_stopped"));
 }
 
 TEST_F(ShortCampaign, JournalsWhyARunWasStopped) {
@@ -100,9 +101,32 @@ TEST_F(ShortCampaign, JournalsWhyARunWasStopped) {
   campaign.limits.supply_current_max = Amperes(1.0);
   EXPECT_THROW((void)run(campaign), SafetyStop);
   const auto journal = results::read_journal(results_.journal());
-  EXPECT_EQ(journal.entries[2].event, "run_aborted");
-  EXPECT_THAT(journal.entries[2].data.at("reason").get<std::string>(), HasSubstr("supply current"));
+  EXPECT_EQ(journal.entries[3].event, "run_aborted");
+  EXPECT_THAT(journal.entries[3].data.at("reason").get<std::string>(),
+              AllOf(HasSubstr("supply current"), HasSubstr("coast confirmed after 0.")));
   EXPECT_TRUE(results_.complete_runs().empty());
+}
+
+TEST_F(ShortCampaign, JournalsHowLongTheMotorTookToStand) {
+  (void)run(test::short_campaign("0", 1, 3));
+  const auto stop = results::read_journal(results_.journal()).entries.at(3).data.at("stop");
+  EXPECT_EQ(stop.at("confirmed"), true);
+  EXPECT_GT(stop.at("time_to_standing_s").get<double>(), stop.at("time_to_coast_s").get<double>());
+  EXPECT_GT(stop.at("time_to_coast_s").get<double>(), 1.0) << "18000 RPM are not thrown away at once";
+}
+
+TEST_F(ShortCampaign, DoesNotSayThatTheClockIsUncheckedWhenItsGainIsKnown) {
+  place_.iq.clock_gain = profiles::ClockGain{1.0, 1e-5, "", ""};
+  (void)run(test::short_campaign("0", 1, 3));
+  EXPECT_THAT(events(), testing::Not(testing::Contains("clock_unchecked")));
+}
+
+TEST_F(ShortCampaign, KeepsWhatTheModuleToldOfItselfInEveryRun) {
+  (void)run(test::short_campaign("0, 90", 1, 3));
+  for (const auto& file : results_.complete_runs()) {
+    EXPECT_THAT(results::read_header(file).motor_parameters,
+                AllOf(HasSubstr("brushless_drive.volts_limit: "), HasSubstr("uid: \"002300064d4b501120343353\"\n")));
+  }
 }
 
 TEST_F(ShortCampaign, RefusesAPropellerThatTheBenchDoesNotHave) {

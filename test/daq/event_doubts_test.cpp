@@ -22,6 +22,24 @@ TEST(EventDoubts, AnInstantConcernsTheStepInWhichItLies) {
   EXPECT_EQ(doubts(events, 300, 450), "");
 }
 
+TEST(EventDoubts, ARestartOfTheMotorModuleConcernsItsStepAndALossAllUntilItIsBack) {
+  const std::vector<StreamEvent> events{{EventKind::motor_reset, 150, 0, ""},
+                                        {EventKind::motor_port_lost, 250, 0, ""},
+                                        {EventKind::motor_connected, 450, 0, ""}};
+  EXPECT_EQ(doubts(events, 0, 150), "");
+  EXPECT_EQ(doubts(events, 100, 200), "motor_reset");
+  EXPECT_EQ(doubts(events, 200, 300), "motor_lost");
+  EXPECT_EQ(doubts(events, 300, 400), "motor_lost");
+  EXPECT_EQ(doubts(events, 451, 500), "");
+}
+
+TEST(EventDoubts, ASlowLineBlursAllThatFollows) {
+  const std::vector<StreamEvent> events{{EventKind::motor_slow_round_trip, 150, 0, ""}};
+  EXPECT_EQ(doubts(events, 0, 150), "");
+  EXPECT_EQ(doubts(events, 100, 200), "slow_round_trip");
+  EXPECT_EQ(doubts(events, 900, 1000), "slow_round_trip");
+}
+
 TEST(EventDoubts, AStallConcernsAllStepsUntilItEnds) {
   const std::vector<StreamEvent> events{{EventKind::stalled, 150, 0, ""}, {EventKind::stall_ended, 350, 0, ""}};
   EXPECT_EQ(doubts(events, 0, 100), "");
@@ -35,6 +53,14 @@ TEST(EventDoubts, AStallConcernsAllStepsUntilItEnds) {
 TEST(EventDoubts, ASilenceThatDoesNotEndConcernsAllThatFollows) {
   const std::vector<StreamEvent> events{{EventKind::silent, 150, 0, ""}, {EventKind::stolen, 160, 0, ""}};
   EXPECT_EQ(doubts(events, 1000, 2000), "silent+stolen");
+}
+
+TEST(EventDoubts, AnotherConfigurationConcernsTheWholeRunBecauseNobodyKnowsSinceWhen) {
+  for (const EventKind kind : {EventKind::configuration_changed, EventKind::unusable}) {
+    const std::vector<StreamEvent> events{{kind, 150, 0, ""}};
+    EXPECT_EQ(doubts(events, 0, 100), "configuration_changed");
+    EXPECT_EQ(doubts(events, 200, 300), "configuration_changed");
+  }
 }
 
 TEST(EventDoubts, RangesAndRestartsOfTheBoxShowInTheSamplesThemselves) {

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "daq/bench_audit.hpp"
 #include "daq/deterministic_bench.hpp"
 #include "profiles/configuration_error.hpp"
 #include "test/daq/bench_fixture.hpp"
@@ -19,8 +20,10 @@ class Audit : public testing::Test {
     bench.simulation().netbox().configure(settings_);
     (void)bench.load_cell().start();  // reads the configuration
     bench.load_cell().stop();
+    found_.clear();
     try {
-      found_ = audit_load_cell(bench.load_cell(), campaign_, place_);
+      for (const BenchFinding& found : audit_bench(bench, campaign_, place_))
+        if (found.device == "load cell") found_.push_back(found);
       return "";
     } catch (const ConfigurationError& error) {
       return error.what();
@@ -29,7 +32,7 @@ class Audit : public testing::Test {
   profiles::Campaign campaign_ = test::short_campaign();
   profiles::Bench place_ = test::deterministic_place(1);
   sim::NetBoxSettings settings_;
-  std::vector<netbox::Finding> found_;
+  std::vector<BenchFinding> found_;
 };
 
 TEST_F(Audit, LetsAWellSetBoxPass) {
@@ -49,7 +52,7 @@ TEST_F(Audit, RefusesALimitOfThrustThatTheCellCannotBear) {
   EXPECT_EQ(refusal(), "");
   ASSERT_EQ(found_.size(), 1u);
   EXPECT_EQ(
-      describe(found_[0]),
+      found_[0].line(),
       "load cell: warning: 50 N are expected on Fz, whose range is 60 N; choose a calibration with a larger range "
       "on the box's Configurations page, or lower the speeds");
 }
@@ -68,7 +71,7 @@ TEST_F(Audit, RefusesSettingsThatAreNotTheBoxs) {
 TEST_F(Audit, WarnsOfAnotherBufferSize) {
   settings_.records_per_datagram = 10;
   EXPECT_EQ(refusal(), "");
-  EXPECT_THAT(found_.at(0).what, HasSubstr("10 records per datagram"));
+  EXPECT_THAT(found_.at(0).finding.what, HasSubstr("10 records per datagram"));
 }
 
 }  // namespace

@@ -50,6 +50,20 @@ TEST(Progress, NamesPropellerOcclusionRepetitionStepSpeedsThrustAndTimeLeft) {
             "5x3  φ  90°  rep 2/3  step 17/40  cmd  7895  is  7894 RPM  thrust  1.162 N  left 06:12");
 }
 
+TEST(Progress, ShowsNoNumberForWhatNoLongerComes) {
+  Observation observation = seen();
+  observation.load_cell_is_fresh = false;
+  observation.load_cell_age = std::chrono::milliseconds(840);
+  EXPECT_EQ(
+      describe(in_a_step(), observation),
+      "5x3  φ  90°  rep 2/3  step 17/40  cmd  7895  is  7894 RPM  thrust      ? N  left 06:12  no thrust for 0.8 s");
+  observation.motor_is_fresh = false;
+  observation.motor_age = std::chrono::seconds(2);
+  EXPECT_EQ(describe(in_a_step(), observation),
+            "5x3  φ  90°  rep 2/3  step 17/40  cmd  7895  is     ? RPM  thrust      ? N  left 06:12  no speed for 2.0 s"
+            "  no thrust for 0.8 s");
+}
+
 TEST(Progress, NamesThePhaseOutsideSteps) {
   Position position = in_a_step();
   position.step = -1;

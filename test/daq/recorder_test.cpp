@@ -12,11 +12,43 @@
 namespace kphi::daq {
 namespace {
 
+template <class T>
+std::size_t move_out(std::deque<T>& from, std::span<T> out) {
+  const std::size_t n = std::min(from.size(), out.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    out[i] = from.front();
+    from.pop_front();
+  }
+  return n;
+}
+
+/// A motor that says what a test puts in.
+class QueueMotor final : public MotorLink {
+ public:
+  void spin_at(RadPerSec) override {}
+  void renew() noexcept override {}
+  void emergency_stop() noexcept override {}
+  void begin_stop(const iq::StopSettings&) override {}
+  [[nodiscard]] std::optional<iq::StopReport> stop_report() override { return std::nullopt; }
+  [[nodiscard]] const iq::AuditRecord& parameters() const override { return parameters_; }
+  [[nodiscard]] std::optional<Celsius> coil_temperature() override { return std::nullopt; }
+  std::size_t take(std::span<results::MotorReading> out) override { return move_out(readings, out); }
+  [[nodiscard]] std::string identity() const override { return "test"; }
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return std::exchange(events, {}); }
+  [[nodiscard]] std::string failure() const override { return {}; }
+
+  std::deque<results::MotorReading> readings;
+  std::vector<results::StreamEvent> events;
+
+ private:
+  iq::AuditRecord parameters_;
+};
+
 /// A bench of queues that a test fills.
-class QueueBench final : public Bench, private MotorLink, private LoadCellLink {
+class QueueBench final : public Bench, private LoadCellLink {
  public:
   [[nodiscard]] const Clock& clock() const override { return time; }
-  [[nodiscard]] MotorLink& motor() override { return *this; }
+  [[nodiscard]] MotorLink& motor() override { return queue_motor; }
   [[nodiscard]] LoadCellLink& load_cell() override { return *this; }
   void wait_until(Instant when) override { time.set(when); }
   [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()>) override { return nullptr; }
@@ -27,35 +59,23 @@ class QueueBench final : public Bench, private MotorLink, private LoadCellLink {
   ManualClock time;
   results::FileLayer* layer = &results::disk();
   std::deque<results::LoadCellRecord> records;
-  std::deque<results::MotorReading> readings;
+  QueueMotor queue_motor;
+  std::deque<results::MotorReading>& readings = queue_motor.readings;
   std::vector<results::StreamEvent> events;
 
  private:
-  void spin_at(RadPerSec) override {}
-  void renew() noexcept override {}
-  void coast() noexcept override {}
-  std::size_t take(std::span<results::MotorReading> out) override { return move_out(readings, out); }
-  [[nodiscard]] std::string identity() const override { return "test"; }
   [[nodiscard]] const netbox::Configuration& configuration() const override { return configuration_; }
   [[nodiscard]] std::vector<netbox::Finding> findings() const override { return {}; }
   results::LoadCellScale start() override { return {}; }
   void stop() noexcept override {}
   std::size_t take(std::span<results::LoadCellRecord> out) override { return move_out(records, out); }
   [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return std::exchange(events, {}); }
+  std::string page() override { return {}; }
   void set_bias() noexcept override {}
   [[nodiscard]] results::SampleAccount account() const override { return {}; }
   [[nodiscard]] results::StreamHealth health() const override { return {}; }
   [[nodiscard]] std::string failure() const override { return {}; }
 
-  template <class T>
-  static std::size_t move_out(std::deque<T>& from, std::span<T> out) {
-    const std::size_t n = std::min(from.size(), out.size());
-    for (std::size_t i = 0; i < n; ++i) {
-      out[i] = from.front();
-      from.pop_front();
-    }
-    return n;
-  }
   netbox::Configuration configuration_;
 };
 

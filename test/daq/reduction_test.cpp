@@ -20,6 +20,7 @@ using results::Doubt;
 using results::RunRecording;
 using results::StepMean;
 using results::test::make_run;
+using results::test::spin_down_at;
 using results::test::Truth;
 
 bool has(const StepMean& step, Doubt doubt) { return (step.doubts & static_cast<std::uint32_t>(doubt)) != 0; }
@@ -45,6 +46,50 @@ TEST(Reduction, FindsTheKnownCoefficientWithoutDoubt) {
     EXPECT_EQ(step.repetition, 2);
     EXPECT_EQ(results::doubt_names(step.doubts), "");
   }
+}
+
+/// A run whose module says `value` of `channel` once in the middle of each step.
+RunRecording with_readings(results::MotorChannel channel, double value) {
+  auto run = make_run(Truth{});
+  run.header.format = 3;
+  run.header.campaign_text =
+      "format: kphi-campaign/1\nname: short\n"
+      "propeller: {id: 5x3, name: 5-inch three-blade, diameter_in: 5, blades: 3}\n"
+      "occlusions_deg: [0]\nprofile: {steps: 4, dwell_s: 0.6, first_rpm: 6000, last_rpm: 18000}\n"
+      "zero_s: 0.5\nminimum_discard_s: 0.3\nsupply_v: 16.0\n"
+      "limits: {speed_max_rpm: 19100, thrust_max_n: 20, supply_current_max_a: 35, coil_temperature_max_degc: 110}\n";
+  for (std::size_t i = 0; i + 1 < run.phases.size(); ++i) {
+    if (run.phases[i].phase != results::Phase::step) continue;
+    const auto end = run.phases[i + 1].time_ns;
+    run.motor.push_back({channel, end - 1'000'000, 0, value});
+  }
+  std::stable_sort(run.motor.begin(), run.motor.end(), [](const auto& a, const auto& b) {
+    return a.channel != b.channel ? a.channel < b.channel : a.time_ns < b.time_ns;
+  });
+  return run;
+}
+
+TEST(Reduction, ShutsTheGatesOfMotorAndSupply) {
+  using results::MotorChannel;
+  const auto doubts = [](MotorChannel channel, double value) {
+    return results::doubt_names(reduce(with_readings(channel, value)).at(1).doubts);
+  };
+  EXPECT_EQ(doubts(MotorChannel::drive_pwm, 0.97), "");
+  EXPECT_EQ(doubts(MotorChannel::drive_pwm, 0.98), "drive_saturated");
+  EXPECT_EQ(doubts(MotorChannel::drive_pwm, -0.99), "drive_saturated");
+  EXPECT_EQ(doubts(MotorChannel::fault_now, 0), "");
+  EXPECT_EQ(doubts(MotorChannel::fault_now, 2), "motor_fault");
+  EXPECT_EQ(doubts(MotorChannel::supply_voltage, 14.5), "");
+  EXPECT_EQ(doubts(MotorChannel::supply_voltage, 14.3), "supply_out_of_band");
+  EXPECT_EQ(doubts(MotorChannel::supply_voltage, 17.7), "supply_out_of_band");
+  EXPECT_EQ(doubts(MotorChannel::coil_temperature, 109), "");
+  EXPECT_EQ(doubts(MotorChannel::coil_temperature, 110), "coil_hot");
+}
+
+TEST(Reduction, LeavesTheDoubtsOfOlderRunsAsTheyAre) {
+  auto run = with_readings(results::MotorChannel::supply_voltage, 5);
+  run.header.format = 2;
+  EXPECT_EQ(reduce(run).at(1).doubts, 0u);
 }
 
 std::string bench_with(const std::string& motor) {
@@ -99,6 +144,52 @@ TEST(Reduction, ADriftingZeroIsInterpolatedInTime) {
     const double centre = 0.5 * (step.window_begin_s + step.window_end_s);
     EXPECT_NEAR(step.zero_n, truth.sign * (truth.zero_force_n + truth.drift_n_per_s * centre), 1e-3);
   }
+}
+
+TEST(Reduction, AZeroThatMovesFurtherThanToleratedPutsAllStepsInDoubt) {
+  Truth truth;  // 1.7 N at most: 0.02 N are tolerated; 10 s from zero to zero
+  truth.noise_n = 0.001;
+  truth.drift_n_per_s = 0.0018;
+  for (const StepMean& step : reduce(make_run(truth))) EXPECT_EQ(results::doubt_names(step.doubts), "");
+  truth.drift_n_per_s = 0.0024;
+  const Reduced reduced = reduce_with_zeros(make_run(truth));
+  EXPECT_NEAR(reduced.zero.moved_n, truth.sign * 0.0024 * 9.5, 0.002);
+  EXPECT_EQ(reduced.zero.tolerated_n, 0.02);
+  ASSERT_EQ(reduced.steps.size(), 3u);
+  for (const StepMean& step : reduced.steps) EXPECT_EQ(results::doubt_names(step.doubts), "zero_drifted");
+}
+
+TEST(Reduction, ARunWithoutOneOfItsZerosIsInDoubtBecauseNobodyKnowsHowFarItMoved) {
+  const Truth truth;
+  RunRecording run = make_run(truth);
+  const auto last = static_cast<results::Nanoseconds>(1e9 * spin_down_at(truth));
+  std::erase_if(run.load_cell, [&](const auto& record) { return record.arrival_ns > last; });
+  for (const StepMean& step : reduce(run)) {
+    EXPECT_EQ(results::doubt_names(step.doubts), "zero_drifted");
+    EXPECT_NEAR(k_of(step), truth.k, 0.02 * truth.k);
+  }
+  run.outcome = results::Outcome::aborted;
+  EXPECT_EQ(results::doubt_names(reduce(run)[0].doubts), "") << "that it lacks the second zero is known";
+}
+
+TEST(Reduction, ALargeThrustToleratesHalfAPercentOfDrift) {
+  Truth truth;
+  truth.noise_n = 0.001;
+  truth.k = 1.2e-5;  // 17.3 N
+  truth.drift_n_per_s = 0.0072;
+  const Reduced tolerated = reduce_with_zeros(make_run(truth));
+  EXPECT_NEAR(tolerated.zero.tolerated_n, 0.0864, 0.0002);
+  EXPECT_EQ(results::doubt_names(tolerated.steps[0].doubts), "");
+  truth.drift_n_per_s = 0.0105;
+  EXPECT_EQ(results::doubt_names(reduce(make_run(truth))[0].doubts), "zero_drifted");
+}
+
+TEST(Reduction, ANoisyZeroPutsAllStepsInDoubt) {
+  Truth truth;
+  truth.noise_n = 0.14;
+  for (const StepMean& step : reduce(make_run(truth))) EXPECT_FALSE(has(step, Doubt::zero_noisy));
+  truth.noise_n = 0.16;
+  for (const StepMean& step : reduce(make_run(truth))) EXPECT_TRUE(has(step, Doubt::zero_noisy));
 }
 
 TEST(Reduction, ASlowMotorShrinksTheWindowInsteadOfSpoilingTheMean) {
@@ -194,6 +285,17 @@ TEST(Reduction, AZeroHoldsForOnePowerUpOfTheBox) {
   EXPECT_TRUE(has(steps[1], Doubt::rebooted));
   EXPECT_EQ(results::doubt_names(steps[2].doubts), "rebooted");
   EXPECT_NEAR(k_of(steps[2]), truth.k, 0.005 * truth.k) << "the zero after the run is of the same power-up";
+}
+
+TEST(Reduction, AGapThatARestartOfTheBoxHidesIsLostAllTheSame) {
+  RunRecording run = rebooted_run(0);
+  const auto cut = [&](std::ptrdiff_t from, std::ptrdiff_t to) {
+    run.load_cell.erase(run.load_cell.begin() + from, run.load_cell.begin() + to);
+  };
+  cut(4000, 4050);
+  EXPECT_FALSE(has(reduce(run)[1], Doubt::lost_samples)) << "a twentieth of the window";
+  cut(4000, 4250);
+  EXPECT_TRUE(has(reduce(run)[1], Doubt::lost_samples)) << "nearly a third";
 }
 
 TEST(Reduction, AZeroAfterARestartOfTheBoxIsAGoodZero) {

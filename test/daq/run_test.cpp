@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "daq/deterministic_bench.hpp"
@@ -17,6 +18,8 @@ namespace {
 using results::Outcome;
 using results::Phase;
 using testing::HasSubstr;
+
+double to_rad_per_sec(double rpm) { return from_rpm(rpm).value(); }
 
 constexpr double kTrueK5x3 = 1.7e-8 / (kRadPerSecPerRpm * kRadPerSecPerRpm);
 
@@ -76,6 +79,33 @@ TEST_F(OneRun, MeasuresTheThrustThatTheBenchWasBuiltWith) {
 TEST_F(OneRun, LeavesTheMotorCoasting) {
   (void)record();
   EXPECT_TRUE(motor_is_let_go());
+}
+
+TEST_F(OneRun, StopsTheMotorGentlyAndWatchesItUntilItStands) {
+  const RunResult result = record();
+  ASSERT_TRUE(result.stop);
+  EXPECT_EQ(result.stop->outcome, iq::StopReport::Outcome::standing);
+  EXPECT_NEAR(result.stop->speed_at_start, to_rad_per_sec(18000), 20);
+  // 1000 rad/s² down to 500 rad/s, then it coasts.
+  EXPECT_NEAR(to_seconds(result.stop->time_to_coast.value()), 1.39, 0.05);
+  const results::RunRecording run = results::read_run(result.file);
+  const auto spin_down = std::find_if(run.phases.begin(), run.phases.end(),
+                                      [](const auto& mark) { return mark.phase == Phase::spin_down; });
+  for (const auto& reading : run.motor) {
+    const double since = 1e-9 * static_cast<double>(reading.time_ns - spin_down->time_ns);
+    if (reading.channel != results::MotorChannel::speed || since < 0.1 || since > 1.3) continue;
+    EXPECT_NEAR(reading.value, to_rad_per_sec(18000) - 1000 * since, 60) << since;
+  }
+}
+
+TEST_F(OneRun, LetsGoAtOnceAtATripAndSaysWhatBecameOfTheMotor) {
+  campaign_.limits.thrust_max = Newtons(2.0);
+  try {
+    (void)record();
+    FAIL();
+  } catch (const SafetyStop& stop) {
+    EXPECT_THAT(stop.what(), testing::ContainsRegex("the motor (stands|is slowing down).*coast confirmed after 0[.]0"));
+  }
 }
 
 TEST_F(OneRun, NeverOverwritesAnEarlierRun) {

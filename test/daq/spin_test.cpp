@@ -15,28 +15,71 @@ class ToldMotor final : public MotorLink {
     told.push_back(fmt(speed.value()));
   }
   void renew() noexcept override { told.push_back("renew"); }
-  void coast() noexcept override { told.push_back("coast"); }
+  void emergency_stop() noexcept override { told.push_back("emergency stop"); }
+  void begin_stop(const iq::StopSettings&) override { told.push_back("stop"); }
+  [[nodiscard]] std::optional<iq::StopReport> stop_report() override { return report; }
+  [[nodiscard]] const iq::AuditRecord& parameters() const override { return record; }
+  [[nodiscard]] std::optional<Celsius> coil_temperature() override { return std::nullopt; }
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return {}; }
   std::size_t take(std::span<results::MotorReading>) override { return 0; }
   [[nodiscard]] std::string failure() const override { return {}; }
   [[nodiscard]] std::string identity() const override { return {}; }
 
   std::vector<std::string> told;
+  std::optional<iq::StopReport> report;
+  iq::AuditRecord record;
   bool refuse = false;
 
  private:
   static std::string fmt(double v) { return "spin " + std::to_string(static_cast<int>(v)); }
 };
 
-TEST(Spin, CoastsWhenItGoes) {
+TEST(Spin, LetsTheMotorGoWhenItGoes) {
   ToldMotor motor;
   { Spin(motor, +1).at(RadPerSec(100)); }
-  EXPECT_EQ(motor.told, (std::vector<std::string>{"spin 100", "coast"}));
+  EXPECT_EQ(motor.told, (std::vector<std::string>{"spin 100", "emergency stop"}));
+}
+
+TEST(Spin, LeavesAMotorAloneThatHasConfirmedItsStop) {
+  ToldMotor motor;
+  {
+    Spin spin(motor, +1);
+    spin.at(RadPerSec(100));
+    EXPECT_FALSE(spin.stopped()) << "nobody has asked for a stop";
+    spin.begin_stop();
+    EXPECT_FALSE(spin.stopped());
+    motor.report = iq::StopReport{iq::StopReport::Outcome::standing, 100, 0, {}, {}};
+    EXPECT_TRUE(spin.stopped());
+  }
+  EXPECT_EQ(motor.told, (std::vector<std::string>{"spin 100", "stop"}));
+}
+
+TEST(Spin, DoesNotBelieveAStopThatIsUnderWayUnconfirmedOrOverruled) {
+  for (const bool reported : {false, true}) {
+    ToldMotor motor;
+    {
+      Spin spin(motor, +1);
+      spin.begin_stop();
+      if (reported) motor.report = iq::StopReport{};
+      (void)spin.stopped();
+    }
+    EXPECT_EQ(motor.told.back(), "emergency stop");
+  }
+  ToldMotor motor;
+  {
+    Spin spin(motor, +1);
+    spin.begin_stop();
+    motor.report = iq::StopReport{iq::StopReport::Outcome::standing, 100, 0, {}, {}};
+    (void)spin.stopped();
+    spin.at(RadPerSec(100));
+  }
+  EXPECT_EQ(motor.told.back(), "emergency stop");
 }
 
 TEST(Spin, CoastsEvenWhenItNeverSpun) {
   ToldMotor motor;
   { const Spin spin(motor, +1); }
-  EXPECT_EQ(motor.told, (std::vector<std::string>{"coast"}));
+  EXPECT_EQ(motor.told, (std::vector<std::string>{"emergency stop"}));
 }
 
 TEST(Spin, CoastsWhenAnExceptionPasses) {
@@ -47,14 +90,14 @@ TEST(Spin, CoastsWhenAnExceptionPasses) {
     throw std::runtime_error("anything");
   };
   EXPECT_THROW(fail(), std::runtime_error);
-  EXPECT_EQ(motor.told.back(), "coast");
+  EXPECT_EQ(motor.told.back(), "emergency stop");
 }
 
 TEST(Spin, CoastsWhenTheCommandItselfFails) {
   ToldMotor motor;
   motor.refuse = true;
   EXPECT_THROW(Spin(motor, +1).at(RadPerSec(2000)), std::runtime_error);
-  EXPECT_EQ(motor.told.back(), "coast");
+  EXPECT_EQ(motor.told.back(), "emergency stop");
 }
 
 TEST(Spin, TurnsTheOtherWayForAClockwisePropeller) {

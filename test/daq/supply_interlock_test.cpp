@@ -17,14 +17,28 @@ SupplyReading healthy() {
   return {1, 0, 11.9, 18, 12, 20, SupplyRegulation::constant_voltage, SupplyProtection::none, 1};
 }
 
-TEST(SupplyInterlock, LetsAHealthySupplyBe) { EXPECT_FALSE(check(healthy(), kWanted)); }
+TEST(SupplyInterlock, LetsAHealthySupplyBe) { EXPECT_FALSE(check(healthy(), kWanted, true)); }
 
 TEST(SupplyInterlock, AllowsASagOfFivePercentAndARiseOfThree) {
   SupplyReading seen = healthy();
   seen.voltage_v = 11.41;
-  EXPECT_FALSE(check(seen, kWanted));
+  EXPECT_FALSE(check(seen, kWanted, true));
   seen.voltage_v = 12.35;
-  EXPECT_FALSE(check(seen, kWanted));
+  EXPECT_FALSE(check(seen, kWanted, true));
+}
+
+TEST(SupplyInterlock, ExcusesWhatAChangeOfSpeedBringsAndNothingElse) {
+  SupplyReading seen = healthy();
+  seen.regulation = SupplyRegulation::constant_current;
+  seen.voltage_v = 10;
+  EXPECT_FALSE(check(seen, kWanted, false));
+  seen.voltage_v = 13;
+  EXPECT_FALSE(check(seen, kWanted, false));
+  seen.current_limit_a = 10;
+  EXPECT_TRUE(check(seen, kWanted, false));
+  seen = healthy();
+  seen.output = 0;
+  EXPECT_TRUE(check(seen, kWanted, false));
 }
 
 struct Case {
@@ -38,7 +52,7 @@ class EachSupplyTrip : public testing::TestWithParam<Case> {};
 TEST_P(EachSupplyTrip, SaysWhatIsWrong) {
   SupplyReading seen = healthy();
   GetParam().spoil(seen);
-  const auto trip = check(seen, kWanted);
+  const auto trip = check(seen, kWanted, true);
   ASSERT_TRUE(trip);
   EXPECT_NE(trip->reason.find(GetParam().words), std::string::npos) << trip->reason;
 }

@@ -67,6 +67,32 @@ TEST(FaultyWire, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
   EXPECT_GT(lost, 0u);
 }
 
+TEST(FaultyWire, NamesInLatin1ReachNoTerminalAsRawBytes) {
+  RunningBench bench(Manner{8, 7000, "  - {at_s: 0, for_s: 100000, kind: http_charset}\n"});
+  Process devices({kphi(), "devices", "--bench", bench.path("bench.yaml")});
+  EXPECT_EQ(devices.wait(), 0) << devices.err();
+  EXPECT_THAT(devices.out(), HasSubstr("Pr\uFFFDfstand"));
+  EXPECT_THAT(devices.out() + devices.err(), testing::Not(HasSubstr("\xFC")));
+}
+
+TEST(FaultyWire, APageInUtf16IsRefusedInOneLine) {
+  RunningBench bench(Manner{8, 7000, "  - {at_s: 0, for_s: 100000, kind: http_charset, utf16: true}\n"});
+  Process run(bench.run_command());
+  EXPECT_EQ(run.wait(), 3) << run.err();
+  EXPECT_THAT(run.err(), AllOf(HasSubstr("NUL byte"), HasSubstr("power-cycle the box")));
+}
+
+TEST(FaultyWire, OtherUnitsDuringARunAreNoticedAtItsEnd) {
+  RunningBench bench(Manner{8, 7000, "  - {at_s: 20, kind: units, force_unit: 4}\n"});
+  write(bench.path("short.yaml"), short_campaign_text("0", 1, 60));  // one run of 36 s and more
+  Process run(bench.run_command());
+  EXPECT_EQ(run.wait(), 0) << run.err();
+  EXPECT_THAT(run.err(), AllOf(HasSubstr("configured otherwise than when the run began: units, counts per unit"),
+                               HasSubstr("60 of 60 steps in doubt")));
+  const std::string folder = run.out().substr(0, run.out().find('\n'));
+  EXPECT_EQ(bytes_of(folder + "/faults.yaml"), bytes_of(bench.path("faults.yaml")));
+}
+
 TEST(FaultyWire, AStolenStreamEndsTheCampaignWithTheMotorStopped) {
   RunningBench bench(Manner{8, 7000, "  - {at_s: 4, kind: stolen}\n"});
   Process run(bench.run_command());

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <stdexcept>
+#include <utility>
 
 namespace kphi::test {
 namespace {
@@ -60,6 +61,10 @@ Process::~Process() {
 }
 
 void Process::signal(int number) const { kill(pid_, number); }
+
+void Process::close_pipes() {
+  for (int* descriptor : {&out_descriptor_, &err_descriptor_}) close(std::exchange(*descriptor, -1));
+}
 
 bool Process::read_some(std::chrono::milliseconds limit) {
   std::array<pollfd, 2> waiting{{{out_descriptor_, POLLIN, 0}, {err_descriptor_, POLLIN, 0}}};

@@ -20,6 +20,9 @@ class Process {
   /// the process ends without it, with all that was printed.
   std::string wait_for(const std::string& text, std::chrono::seconds limit = std::chrono::seconds(60));
   void signal(int number) const;
+  [[nodiscard]] int pid() const { return pid_; }
+  /// Nobody listens any more: what it prints from now on meets a closed pipe.
+  void close_pipes();
   /// Waits for the end; returns the exit code, or 128 + signal. Throws after `limit`.
   int wait(std::chrono::seconds limit = std::chrono::seconds(120));
   [[nodiscard]] const std::string& out() const { return out_; }

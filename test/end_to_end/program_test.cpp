@@ -15,70 +15,13 @@
 #include <thread>
 
 #include "results/run_reader.hpp"
-#include "test/daq/bench_fixture.hpp"
-#include "test/end_to_end/process.hpp"
+#include "test/end_to_end/running_bench.hpp"
 
 namespace kphi::test {
 namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
-
-std::string kphi() { return KPHI_PROGRAM; }
-
-void write(const std::filesystem::path& file, const std::string& text) { std::ofstream(file) << text; }
-
-std::string bench_text(const std::filesystem::path& folder, int rdt_port, int http_port, double time_scale,
-                       double rate_hz = 7000) {
-  return fmt::format(
-      "format: kphi-bench/1\nname: test\n"
-      "netbox: {{host: 127.0.0.1, rdt_port: {}, http_port: {}, rate_hz: {}, records_per_datagram: 40}}\n"
-      "iq: {{device: {}/motor, baud: 921600, module_id: 0, spin: +1, telemetry_hz: 50, speed_max_rpm: 19300}}\n"
-      "thrust_axis: \"+Fz\"\nsimulation: {{time_scale: {}, seed: 3, control: {}/control}}\n",
-      rdt_port, http_port, rate_hz, folder.string(), time_scale, folder.string());
-}
-
-struct Manner {
-  double time_scale = 8;
-  double rate_hz = 7000;
-  std::string faults = "  []\n";  ///< entries of a fault script
-};
-
-/// `kphi sim` on free ports, in a folder of its own.
-class RunningBench {
- public:
-  explicit RunningBench(const Manner& manner = {})
-      : process_((write(folder_.path() / "wanted.yaml",
-                        bench_text(folder_.path(), 49152, 8049, manner.time_scale, manner.rate_hz)),
-                  write(folder_.path() / "faults.yaml", "format: kphi-faults/1\nfaults:\n" + manner.faults),
-                  std::vector<std::string>{kphi(), "sim", path("wanted.yaml"), "--free-ports", "--resolved",
-                                           path("bench.yaml"), "--truth", path("truth.yaml"), "--faults",
-                                           path("faults.yaml"), "--truth-log", path("wire.jsonl")})) {
-    process_.wait_for("\"rdt\"");
-    write(folder_.path() / "short.yaml", short_campaign_text("0, 45, 180"));
-  }
-  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
-  [[nodiscard]] std::string status() const {
-    Process asked({kphi(), "sim", path("bench.yaml"), "--status"});
-    EXPECT_EQ(asked.wait(), 0) << asked.err();
-    return asked.out();
-  }
-  /// Waits until the simulated motor turns slower than it would on any command of the campaign.
-  [[nodiscard]] bool motor_stops() const {
-    for (int asked = 0; asked < 400; ++asked) {
-      if (std::abs(json::parse(status()).at("speed_rad_s").get<double>()) < 5.0) return true;
-    }
-    return false;
-  }
-  [[nodiscard]] std::vector<std::string> run_command() const {
-    return {kphi(), "run", path("short.yaml"), "--bench", path("bench.yaml"), "--yes", "--out", path("results")};
-  }
-  Process& process() { return process_; }
-
- private:
-  TemporaryFolder folder_;
-  Process process_;
-};
 
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
@@ -180,7 +123,9 @@ TEST(Program, AccountsForWhatTheWireLoses) {
   bench.process().signal(SIGTERM);
   ASSERT_EQ(bench.process().wait(), 0) << bench.process().err();
   const std::string log = bytes_of(bench.path("wire.jsonl"));
-  const json truth = json::parse(log.substr(log.rfind('\n', log.size() - 2) + 1)).at("totals");
+  const std::size_t totals = log.find("{\"totals\"");
+  ASSERT_NE(totals, std::string::npos) << log.substr(log.size() - std::min<std::size_t>(log.size(), 400));
+  const json truth = json::parse(log.substr(totals, log.find('\n', totals) - totals)).at("totals");
   std::uint64_t lost = 0, duplicates = 0, malformed = 0;
   const json info = info_of(folder);
   for (const json& one : info.at("runs")) {

@@ -175,6 +175,12 @@ TEST(Bench, MayKnowTheGainOfTheModulesClock) {
               ElementsAre(testing::HasSubstr("24 hexadecimal digits")));
 }
 
+TEST(Bench, PutsTheCaptureOfTheMotorsLineBesideItself) {
+  EXPECT_EQ(parse_bench(kBenchText, "folder/b.yaml").iq.capture, "");
+  EXPECT_EQ(parse_bench(changed(kBenchText, "  baud:", "  capture: line.iq\n  baud:"), "folder/b.yaml").iq.capture,
+            "folder/line.iq");
+}
+
 TEST(Bench, SimulatesInProcessWithoutAControlLineOnly) {
   EXPECT_THAT(
       refused("  control: /tmp/control\n", ""),
@@ -185,6 +191,73 @@ TEST(Bench, SimulatesInProcessWithoutAControlLineOnly) {
               ElementsAre(StartsWith("18:15: simulation.time_scale: 0 is below 0.1")));
   EXPECT_THAT(refused("  seed: 5\n", "  in_process: yes\n"),
               ElementsAre(StartsWith("19:15: yes is a boolean to some")));
+}
+
+std::vector<std::string> refused_air(const std::string& ambient) {
+  return refusals([&] { return parse_bench(kBenchText + ambient, "b.yaml"); });
+}
+
+constexpr const char* kManualAir =
+    "ambient:\n"                        // 21
+    "  manual:\n"                       // 22
+    "    temperature_c: 21.5\n"         // 23
+    "    pressure_pa: 98700\n"          // 24
+    "    relative_humidity: 0.45\n"     // 25
+    "    u_temperature_c: 0.5\n"        // 26
+    "    u_pressure_pa: 100\n"          // 27
+    "    u_relative_humidity: 0.05\n";  // 28
+
+TEST(Bench, KnowsWhereTheStateOfTheAirComesFrom) {
+  EXPECT_FALSE(parse_bench(kBenchText, "b.yaml").ambient.known()) << "absent";
+  const auto place = [](const std::string& text) { return parse_bench(kBenchText + text, "b.yaml").ambient; };
+  EXPECT_FALSE(place("ambient: unknown\n").known());
+  for (const char* sensor : {"usb:04d8:00dd", "usb:04D8:00DD:0001AB", "usb:04d8:00dd@1-1.4", "usb:04d8:00dd:A1@2-3"})
+    EXPECT_EQ(place(std::string("ambient: ") + sensor + "\n").sensor, sensor);
+  const AmbientPlace by_hand = place(kManualAir);
+  EXPECT_TRUE(by_hand.known());
+  EXPECT_EQ(by_hand.sensor, "");
+  ASSERT_TRUE(by_hand.manual);
+  EXPECT_EQ(by_hand.manual->temperature_c, 21.5);
+  EXPECT_EQ(by_hand.manual->pressure_pa, 98700);
+  EXPECT_EQ(by_hand.manual->relative_humidity, 0.45);
+  EXPECT_EQ(by_hand.manual->u_temperature_c, 0.5);
+  EXPECT_EQ(by_hand.manual->u_pressure_pa, 100);
+  EXPECT_EQ(by_hand.manual->u_relative_humidity, 0.05);
+}
+
+TEST(Bench, RefusesAirFromNowhere) {
+  const std::string advice =
+      "write unknown, or usb:04d8:00dd (a BME280 behind an MCP2221A; :SERIAL or @PORT behind it if there are several), "
+      "or manual: and the values";
+  EXPECT_THAT(refused_air("ambient: usb:0403:6001\n"),
+              ElementsAre("21:10: ambient: text \"usb:0403:6001\" does not fit; " + advice));
+  EXPECT_THAT(refused_air("ambient: 21\n"), ElementsAre("21:10: ambient: 21 does not fit; " + advice));
+  for (const char* text : {"Unknown", "usb:04d8:00dd:", "usb:04d8:00dd@", "[]", "\"\""})
+    EXPECT_EQ(refused_air(std::string("ambient: ") + text + "\n").size(), 1u) << text;
+}
+
+TEST(Bench, WantsAirByHandWholeWithUncertaintiesAndInItsUnits) {
+  const auto changed_air = [](const std::string& from, const std::string& to) {
+    return refused_air(changed(kManualAir, from, to));
+  };
+  EXPECT_THAT(
+      changed_air("    u_pressure_pa: 100\n", ""),
+      ElementsAre("22:3: ambient.manual.u_pressure_pa is missing; add the key u_pressure_pa (standard uncertainty "
+                  "of pressure_pa)"));
+  EXPECT_THAT(changed_air("pressure_pa: 98700", "pressure_hpa: 987"),
+              ElementsAre("24:5: pressure_hpa is not a key of ambient.manual; the unit is part of the key: write "
+                          "pressure_pa and the value in Pa"));
+  EXPECT_THAT(
+      changed_air("98700", "987"),
+      ElementsAre("24:18: ambient.manual.pressure_pa: 987 is below 50000 Pa; write a value from 50000 to 110000 "
+                  "Pa"));
+  EXPECT_THAT(changed_air("0.45", "45"),
+              ElementsAre(StartsWith("25:24: ambient.manual.relative_humidity: 45 is above 1")));
+  EXPECT_THAT(changed_air("temperature_c: 21.5", "temperature_c: 294.6"),
+              ElementsAre(StartsWith("23:20: ambient.manual.temperature_c: 294.6 is above 60 °C")));
+  EXPECT_THAT(changed_air("u_temperature_c: 0.5", "u_temperature_c: 0"),
+              ElementsAre(StartsWith("26:22: ambient.manual.u_temperature_c: 0 is not above 0")));
+  EXPECT_EQ(refused_air("ambient: {}\n").size(), 1u);
 }
 
 TEST(Bench, NamesTheKeyThatWasMeant) {
@@ -221,7 +294,7 @@ TEST(Bench, KnowsTheSupply) {
 TEST(Bench, HasNoSupplyAndKnowsNoAirUnlessTheFileSaysSo) {
   const Bench bench = parse_bench(with_power(""), "b.yaml");
   EXPECT_FALSE(bench.supply);
-  EXPECT_FALSE(bench.ambient);
+  EXPECT_FALSE(bench.ambient.known());
 }
 
 TEST(Bench, RefusesASupplyThatWouldTripAtOnce) {
@@ -236,28 +309,6 @@ TEST(Bench, RefusesASupplyThatWouldTripAtOnce) {
               ElementsAre(testing::HasSubstr("write modbus-rtu:/dev/ttyUSB1")));
   EXPECT_THAT(refused_supply("current_limit_a: 17, ", ""),
               ElementsAre(testing::HasSubstr("supply.current_limit_a is missing")));
-}
-
-TEST(Bench, KnowsTheAirWithItsUncertainty) {
-  const Bench bench = parse_bench(
-      with_power("ambient: {temperature_c: 21.5, pressure_pa: 98400, relative_humidity: 0.4, u_pressure_pa: 50}\n"),
-      "b.yaml");
-  ASSERT_TRUE(bench.ambient);
-  EXPECT_EQ(bench.ambient->temperature_c, 21.5);
-  EXPECT_EQ(bench.ambient->pressure_pa, 98400);
-  EXPECT_EQ(bench.ambient->relative_humidity, 0.4);
-  EXPECT_EQ(bench.ambient->u_temperature_c, 1);
-  EXPECT_EQ(bench.ambient->u_pressure_pa, 50);
-  EXPECT_EQ(bench.ambient->u_relative_humidity, 0.05);
-}
-
-TEST(Bench, RefusesAirThatIsNone) {
-  EXPECT_THAT(refusals([] {
-                return parse_bench(
-                    with_power("ambient: {temperature_c: 21, pressure_pa: 984, relative_humidity: 40}\n"), "b.yaml");
-              }),
-              ElementsAre(testing::HasSubstr("ambient.pressure_pa: 984 is below 50000"),
-                          testing::HasSubstr("ambient.relative_humidity: 40 is above 1")));
 }
 
 }  // namespace

@@ -145,6 +145,20 @@ TEST(Campaign, HoldsEveryRange) {
   }
 }
 
+TEST(Campaign, MayLetTheCoilCoolDownBetweenRuns) {
+  EXPECT_FALSE(parse_campaign(kCampaignText, "c.yaml").limits.cooling);
+  const auto with = [](const std::string& cooling) {
+    return changed(kCampaignText,
+                   "coil_temperature_max_degc:", "cooling: {" + cooling + "}\n  coil_temperature_max_degc:");
+  };
+  const auto cooling = parse_campaign(with("pause_above_degc: 70, resume_below_degc: 45"), "c.yaml").limits.cooling;
+  ASSERT_TRUE(cooling);
+  EXPECT_EQ(cooling->pause_above.value(), 70);
+  EXPECT_EQ(cooling->resume_below.value(), 45);
+  EXPECT_THROW((void)parse_campaign(with("pause_above_degc: 45, resume_below_degc: 70"), "c.yaml"), ConfigurationError);
+  EXPECT_THROW((void)parse_campaign(with("pause_above_degc: 45"), "c.yaml"), ConfigurationError);
+}
+
 TEST(Campaign, SaysWhichValuesAreAllowed) {
   EXPECT_THAT(refused("steps: 4", "steps: 2000"),
               ElementsAre("12:10: profile.steps: 2000 is above 1000; write a value from 2 to 1000"));

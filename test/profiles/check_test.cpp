@@ -29,11 +29,11 @@ class Check : public testing::Test {
   }
 
   std::vector<CheckedFile> check(const std::vector<std::string>& paths) {
-    return check_files(paths, [this](const std::string& path) -> std::string {
-      judged_.push_back(path);
-      if (coefficients_are_wrong_) throw std::runtime_error(path + ":3: no k_unit; add it");
-      return "  K_T fine\n";
-    });
+    return check_files(paths, {{"kphi-coefficients/1", "coefficients", [this](const std::string& path) -> std::string {
+                                  judged_.push_back(path);
+                                  if (coefficients_are_wrong_) throw std::runtime_error(path + ":3: no k_unit; add it");
+                                  return "  K_T fine\n";
+                                }}});
   }
 
   std::filesystem::path folder_ = std::filesystem::temp_directory_path() /

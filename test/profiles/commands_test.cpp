@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "test/profiles/refusals.hpp"
+#include "test/temporary_folder.hpp"
 
 namespace kphi::profiles {
 namespace {
@@ -55,6 +57,33 @@ TEST(CheckCommand, PrintsOneJsonObjectPerFile) {
   EXPECT_FALSE(std::getline(lines, rest));
   EXPECT_EQ(nlohmann::json::parse(first)["ok"], false);
   EXPECT_EQ(nlohmann::json::parse(second)["kind"], "bench");
+}
+
+TEST(CheckCommand, ReadsTheShippedFaultScriptAndTellsWhatWillGoWrong) {
+  const Outcome outcome = run("check " + shipped("faults_example.yaml"));
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_THAT(outcome.out,
+              testing::HasSubstr("faults_example.yaml: fault script in order\n  at 0 s  loss for 3600 s\n"));
+  EXPECT_THAT(outcome.out, testing::HasSubstr("\n  at 60 s  reboot\n"));
+  EXPECT_THAT(outcome.out, testing::HasSubstr("\n  at 500 s  http_slow, 1 times at most\n"));
+}
+
+TEST(CheckCommand, RefusesAFaultScriptAtItsLineAndColumn) {
+  const kphi::test::TemporaryFolder folder;
+  const auto refused = [&](const std::string& text, const std::string& words) {
+    const std::string path = (folder.path() / "bad.yaml").string();
+    std::ofstream(path) << text;
+    const Outcome outcome = run("check " + path);
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_THAT(outcome.err, testing::StartsWith(path + words));
+  };
+  refused("format: kphi-faults/1\nfaults:\n  - {at_s: 0, for_s: 1, kind: los}\n", ":3:31: no fault is called 'los'");
+  refused("format: kphi-faults/1\nhabits: {axia: 1}\nfaults: []\n", ":2:16: '1' is neither false nor true");
+  refused("format: kphi-fault/1\nfaults: []\n",
+          ":1:9: kphi-fault/1 is not a known format; did you mean format: "
+          "kphi-faults/1?");
 }
 
 }  // namespace

@@ -22,6 +22,7 @@ namespace {
 std::vector<std::string> shipped_files() {
   std::vector<std::string> paths;
   for (const auto& entry : std::filesystem::directory_iterator(shipped(""))) {
+    if (entry.path().filename() == "faults_example.yaml") continue;  // not read by this folder: see commands_test
     if (entry.path().extension() == ".yaml") paths.push_back(entry.path().string());
   }
   std::sort(paths.begin(), paths.end());

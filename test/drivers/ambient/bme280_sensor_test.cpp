@@ -42,7 +42,8 @@ TEST_F(Bme280SensorTest, MeasuresTheAirWithItsTolerances) {
 TEST_F(Bme280SensorTest, WritesHumidityControlBeforeMeasureControl) {
   (void)sensor().read();
   using Write = std::pair<int, int>;
-  EXPECT_THAT(usb.writes, testing::ElementsAre(Write{0xE0, 0xB6}, Write{0xF5, 0}, Write{0xF2, 5}, Write{0xF4, 0xB5}));
+  EXPECT_THAT(usb.writes, testing::ElementsAre(Write{0xE0, 0xB6}, Write{0xE0, 0xB6}, Write{0xF5, 0}, Write{0xF2, 5},
+                                               Write{0xF4, 0xB5}));
 }
 
 TEST_F(Bme280SensorTest, IsFoundAtItsSecondAddress) {

@@ -27,7 +27,7 @@ TEST(Mcp2221, FreesTheBusAndSetsTheSpeedWhenItOpens) {
   FakeBridge usb;
   Mcp2221 bridge(usb, no_pause);
   EXPECT_TRUE(usb.claimed);
-  EXPECT_THAT(usb.commands, ElementsAre(Bytes{0x10, 0, 0x10}, Bytes{0x10, 0, 0, 0x20, 0x75}));
+  EXPECT_THAT(usb.commands, ElementsAre(Bytes{0x61}, Bytes{0x10, 0, 0x10}, Bytes{0x10, 0, 0, 0x20, 0x75}));
 }
 
 TEST(Mcp2221, ReadsARegisterInTheFramesOfTheManual) {
@@ -109,8 +109,8 @@ TEST(Mcp2221, CancelsATransferThatKeepsTheSpeedFromBeingSet) {
     return false;
   };
   Mcp2221 bridge(usb, no_pause);
-  EXPECT_THAT(usb.commands, ElementsAre(Bytes{0x10, 0, 0x10}, Bytes{0x10, 0, 0, 0x20, 0x75}, Bytes{0x10, 0, 0x10},
-                                        Bytes{0x10, 0, 0, 0x20, 0x75}));
+  EXPECT_THAT(usb.commands, ElementsAre(Bytes{0x61}, Bytes{0x10, 0, 0x10}, Bytes{0x10, 0, 0, 0x20, 0x75},
+                                        Bytes{0x10, 0, 0x10}, Bytes{0x10, 0, 0, 0x20, 0x75}));
 }
 
 TEST(Mcp2221, SaysWhenItIsUnplugged) {

@@ -219,5 +219,19 @@ TEST(Numbers, OfTheWrongLengthAreNone) {
   EXPECT_EQ(number(Format::u16, two), 0x0201);
 }
 
+TEST(ReadBack, IsComparedBitByBit) {
+  constexpr const Entry& kFf2 = entry<"propeller_motor_control.velocity_ff2">;
+  constexpr const Entry& kTimeout = entry<"propeller_motor_control.timeout">;
+  EXPECT_TRUE(is_as_set(kFf2, 5e-7, static_cast<float>(5e-7)));
+  EXPECT_FALSE(is_as_set(kFf2, 5e-7, 5e-7 * (1 + 0.9e-6)));
+  EXPECT_FALSE(is_as_set(kFf2, 5e-7, 5.1e-7)) << "2 % off, and only 1e-8 away";
+  EXPECT_FALSE(is_as_set(kFf2, 5e-7, 0));
+  EXPECT_FALSE(is_as_set(kFf2, 0, 1e-30));
+  EXPECT_TRUE(is_as_set(kFf2, 0, -0.0));
+  EXPECT_FALSE(is_as_set(kFf2, 5e-7, std::nan("")));
+  EXPECT_TRUE(is_as_set(kTimeout, 0.5, 0.5));
+  EXPECT_FALSE(is_as_set(entry<"hobby_input.allowed_protocols">, 254, 255));
+}
+
 }  // namespace
 }  // namespace kphi::iq

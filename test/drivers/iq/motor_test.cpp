@@ -170,7 +170,7 @@ TEST(Motor, AnswersQuestionsInPassing) {
   Stand stand;
   stand.spin(700);
   const auto replies = stand.motor->inquire({{find("brushless_drive.motor_Kv"), {}},
-                                             {find("propeller_motor_control.velocity_Kp"), {}},
+                                             {find("propeller_motor_control.ctrl_thrust"), {}},
                                              {find("propeller_motor_control.timeout"), 0.25}});
   ASSERT_EQ(replies.size(), 3u);
   EXPECT_EQ(replies[0].value, 2200.0);

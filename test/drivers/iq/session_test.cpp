@@ -318,7 +318,7 @@ TEST(Telemetry, ReadsSpeedEveryCycleAndTheOthersInTurn) {
     value[reading.quantity] = reading.value;
   }
   EXPECT_NEAR(count[Quantity::speed], 150, 1);
-  for (int i = 1; i < kQuantities; ++i) EXPECT_NEAR(count[static_cast<Quantity>(i)], 25, 1) << i;
+  for (int i = 1; i < kQuantities; ++i) EXPECT_NEAR(count[static_cast<Quantity>(i)], 150.0 / (kQuantities - 1), 1) << i;
   EXPECT_EQ(value[Quantity::speed], 1000);
   EXPECT_EQ(value[Quantity::supply_voltage], 12.5);
   EXPECT_EQ(value[Quantity::supply_current], 3.25);
@@ -428,24 +428,29 @@ TEST(Telemetry, KeepsABoundedNumberOfReadings) {
 }
 
 TEST(Replies, ThatComeLateNeverAnswerTheNextRequest) {
-  for (const double factor : {1.01, 1.5, 1.99}) {
+  // Alone: what a module answers later leaves after them.
+  for (const double factor : {1.01, 1.5, 1.99, 5.0}) {
     Wire wire;
     wire.connect();
     wire.run_for(500ms);
     wire.readings();
     bool delayed = false;
+    Instant line_free{0};
     wire.spoil = [&](Bytes& reply, Duration& delay) {
-      if (delayed || !is_reply(reply, 50, 13)) return;
-      delayed = true;
-      reply = fake::message(50, 13, 3, 0, fake::f32(999));
-      delay = from_seconds(factor * to_seconds(kTimeout));
+      if (!delayed && is_reply(reply, 50, 13)) {
+        delayed = true;
+        reply = fake::message(50, 13, 3, 0, fake::f32(999));
+        delay = from_seconds(factor * to_seconds(kTimeout));
+      }
+      line_free = std::max(line_free, wire.now + delay);
+      delay = line_free - wire.now;
     };
     wire.run_for(2s);
-    EXPECT_EQ(wire.session.counters().late_replies, 1u) << factor;
-    EXPECT_EQ(wire.session.counters().timeouts, 1u);
+    EXPECT_GE(wire.session.counters().late_replies, 1u) << factor;
+    EXPECT_EQ(wire.session.counters().late_replies, wire.session.counters().timeouts);
     const auto speeds = wire.values(Quantity::speed);
     EXPECT_EQ(std::count(speeds.begin(), speeds.end(), 999.0), 0) << factor;
-    EXPECT_GT(speeds.size(), 80u) << "and polling goes on";
+    EXPECT_GT(static_cast<double>(speeds.size()), 90 - 5 * factor) << "and polling goes on behind it";
   }
 }
 
@@ -492,6 +497,34 @@ TEST(Replies, LeftUnreadByAHostThatSleptAreNotTakenForLaterOnes) {
   session.receive(fake::message(50, 13, 3, 0, fake::f32(111)), wire.now);
   EXPECT_TRUE(wire.values(Quantity::speed).empty());
   EXPECT_EQ(session.counters().late_replies, 1u);
+}
+
+TEST(Replies, ThatBeganToComeBeforeTheirQuestionAreSecondCopies) {
+  for (const bool paced : {false, true}) {
+    Settings settings;
+    settings.slow_hz = 0.001;
+    settings.wire_byte_time = paced ? 100us : 0us;
+    settings.wire_paces = paced;
+    Wire wire(settings);
+    wire.latency = paced ? 6ms : 2ms;
+    wire.connect();
+    wire.run_for(500ms);
+    wire.readings();
+    wire.spoil = [&](Bytes& reply, Duration&) {
+      if (!is_reply(reply, 50, 13)) return;
+      const Bytes copy = fake::message(50, 13, 3, 0, fake::f32(999));
+      // The next question follows 18 ms after this reply. On a line whose bytes take their time the copy may begin
+      // together with it.
+      wire.deliver(Bytes(copy.begin(), copy.begin() + 1), paced ? 20ms + 200us : 19ms);
+      wire.deliver(Bytes(copy.begin() + 1, copy.end()), paced ? 20ms + 1200us : 21ms);
+    };
+    const auto before = wire.session.counters().unasked;
+    wire.run_for(1s);
+    const auto speeds = wire.values(Quantity::speed);
+    EXPECT_GT(speeds.size(), 45u);
+    EXPECT_EQ(std::count(speeds.begin(), speeds.end(), 999.0), 0) << paced;
+    EXPECT_GT(wire.session.counters().unasked, before + 45);
+  }
 }
 
 TEST(Replies, OfAnotherModuleAreRejectedAndCounted) {
@@ -577,7 +610,7 @@ TEST(Resync, WaitsForTheSecondHalfOfAFrameFromASlowAdapter) {
     reply.resize(5);
     delay = 1us;
   };
-  wire.module.silent = {{69, 0}, {69, 1}, {50, 36}, {83, 0}, {50, 41}, {50, 0}, {5, 15}, {84, 1}};
+  wire.module.silent = {{69, 0}, {69, 1}, {50, 36}, {83, 0}, {50, 41}, {50, 0}, {5, 15}, {84, 1}, {50, 8}, {84, 0}};
   wire.run_for(200ms);
   EXPECT_GE(wire.values(Quantity::speed).size(), 9u);
   EXPECT_EQ(wire.session.counters().resyncs, 0u);
@@ -613,7 +646,7 @@ TEST(Timeouts, OfALostReplyCostOneGapOfThatEntryAndNoOther) {
   const auto readings = wire.readings();
   const auto speeds =
       std::count_if(readings.begin(), readings.end(), [](const Reading& r) { return r.quantity == Quantity::speed; });
-  EXPECT_GE(speeds, 50 - 11) << "200 ms of quarantine at 50 Hz";
+  EXPECT_GE(speeds, 50 - 4) << "a time-out of 40 ms at 50 Hz: others have overtaken it by then";
   EXPECT_GE(readings.size() - static_cast<std::size_t>(speeds), 49u);
 }
 
@@ -665,7 +698,9 @@ TEST(Telemetry, AsksForAllThatIsWantedInEveryCycle) {
   std::map<Quantity, int> count;
   for (const Reading& reading : wire.readings()) ++count[reading.quantity];
   for (const Quantity quantity : settings.every_cycle) EXPECT_NEAR(count[quantity], 100, 1) << name_of(quantity);
-  EXPECT_NEAR(count[Quantity::coil_temperature] + count[Quantity::derate] + count[Quantity::drive_mode], 10, 1);
+  EXPECT_NEAR(count[Quantity::coil_temperature] + count[Quantity::derate] + count[Quantity::drive_mode] +
+                  count[Quantity::drive_pwm] + count[Quantity::fault_now],
+              10, 1);
 }
 
 struct Restart {

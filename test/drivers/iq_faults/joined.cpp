@@ -16,8 +16,7 @@ using namespace std::chrono_literals;
 
 constexpr Duration kTick = 142858ns;
 constexpr Duration kCommandEvery = 400ms;
-// Longer than the module's timeout: who asks again at once keeps a module alive that does not hear the coast.
-constexpr Duration kReconnectAfter = 1s;
+constexpr Duration kReconnectAfter = 200ms;
 constexpr std::array<double, 5> kSpeeds{300, 600, 900, 450, 700};
 
 sim::IqSettings module_settings(const Manner& manner, std::uint64_t seed) {
@@ -36,6 +35,8 @@ Settings session_settings(const Manner& manner) {
   settings.module_id = manner.module_id;
   settings.telemetry_hz = manner.telemetry_hz;
   settings.wire_byte_time = manner.paced ? from_seconds(10.0 / manner.baud) : Duration{0};
+  settings.wire_paces = manner.paced;
+  settings.module_timeout_s = manner.module_timeout_s;
   return settings;
 }
 
@@ -60,6 +61,10 @@ Key key_of(Quantity quantity, bool legacy) {
       return {50, 41};
     case Quantity::drive_mode:
       return {50, 0};
+    case Quantity::drive_pwm:
+      return {50, 8};
+    case Quantity::fault_now:
+      return {84, 0};
   }
   return {0, 0};
 }
@@ -71,7 +76,8 @@ std::uint32_t bits_of(std::span<const std::uint8_t> data) {
 }
 
 std::uint32_t bits_of(const Reading& reading) {
-  if (reading.quantity == Quantity::drive_mode) return static_cast<std::uint32_t>(reading.value);
+  if (reading.quantity == Quantity::drive_mode || reading.quantity == Quantity::fault_now)
+    return static_cast<std::uint32_t>(reading.value);
   if (reading.quantity == Quantity::derate) return static_cast<std::uint32_t>(std::lround(reading.value * 65536));
   return std::bit_cast<std::uint32_t>(static_cast<float>(reading.value));
 }
@@ -125,17 +131,14 @@ void Joined::waver() {
 }
 
 void Joined::pump(Instant now) {
-  if (line_.plugged() != was_plugged_) {
-    was_plugged_ = line_.plugged();
-    reconnect_at_ = was_plugged_ ? now : kNever;
-    if (!was_plugged_) may_spin_ = false;
-  }
+  follow_the_plug(now);
   sim::IqChunk chunk;
   while (line_.next_chunk(chunk, now)) session_.receive(chunk.bytes, chunk.at);
   if (session_.deadline() <= now) session_.advance(now);
   connect_again(now);
   command(now);
-  auto output = session_.output();
+  for (Event& event : session_.take_events()) events_.push_back(std::move(event));
+  auto output = was_plugged_ ? session_.output() : std::span<const std::uint8_t>{};
   if (manner_.port_takes > 0) output = output.first(std::min(output.size(), manner_.port_takes));
   if (!output.empty()) {
     watch(output, now);
@@ -149,14 +152,25 @@ void Joined::pump(Instant now) {
   }
 }
 
+// As the owner of a port does.
+void Joined::follow_the_plug(Instant now) {
+  if (line_.plugged() == was_plugged_) return;
+  was_plugged_ = line_.plugged();
+  if (!was_plugged_) return session_.fail(EventKind::port_lost, "the port is gone", now);
+  ++connects_;
+  session_.connect_anew(now);
+}
+
+// As the owner of a port does: who asks a module that does not hear the coast keeps it alive.
 void Joined::connect_again(Instant now) {
-  if (session_.state() == Session::State::failed && reconnect_at_ == kNever) {
+  const bool failed = session_.state() == Session::State::failed;
+  if (failed && !was_failed_) {
     if (failures_++ == 0) first_failure_ = session_.failure();
     may_spin_ = false;
-    reconnect_at_ = line_.plugged() ? now + kReconnectAfter : kNever;
+    reconnect_at_ = now + kReconnectAfter;
   }
-  if (now < reconnect_at_) return;
-  reconnect_at_ = kNever;
+  was_failed_ = failed;
+  if (!failed || !was_plugged_ || !session_.coasting() || now < reconnect_at_) return;
   ++connects_;
   session_.connect(now);
 }
@@ -186,6 +200,10 @@ Duration Joined::silence_after(Instant after) const {
     if (readings_[i].quantity == Quantity::speed && received_[i] > after) return received_[i] - after;
   }
   return 10h;
+}
+
+bool Joined::saw(EventKind kind) const {
+  return std::any_of(events_.begin(), events_.end(), [&](const Event& event) { return event.kind == kind; });
 }
 
 std::string Joined::danger() const {

@@ -17,6 +17,7 @@ struct Manner {
   unsigned baud = 115200;
   bool paced = true;
   int module_id = 0;
+  double module_timeout_s = 0.5;
   Duration reply_latency = std::chrono::microseconds(100);
   Duration reply_jitter = std::chrono::microseconds(50);
   Duration usb_tick{0};
@@ -29,7 +30,7 @@ class Joined {
   Joined(const Manner& manner, sim::MotorFaultScript script, std::uint64_t seed);
 
   /// Seven thousand ticks a second. Speeds are commanded from the first `ready` on, another one every 0.4 s; after a
-  /// failure the session is connected again, and nobody spins any more.
+  /// failure the session is connected again as soon as it coasts, and nobody rearms it.
   void run_until(Instant end);
   /// Coasts and gives the module two seconds to come to rest.
   void finish();
@@ -44,6 +45,7 @@ class Joined {
   /// From `after` to the next reading of the speed; longer than an hour when none came.
   [[nodiscard]] Duration silence_after(Instant after) const;
 
+  [[nodiscard]] bool saw(EventKind kind) const;
   [[nodiscard]] const Session& session() const noexcept { return session_; }
   [[nodiscard]] const Counters& counters() const noexcept { return session_.counters(); }
   [[nodiscard]] const sim::IqTruth& truth() const noexcept { return line_.truth(); }
@@ -58,6 +60,7 @@ class Joined {
   void pump(Instant now);
   [[nodiscard]] Instant now() const noexcept { return Instant(static_cast<std::int64_t>(tick_ * 1'000'000 / 7)); }
   void command(Instant now);
+  void follow_the_plug(Instant now);
   void watch(std::span<const std::uint8_t> bytes, Instant now);
   void connect_again(Instant now);
   [[nodiscard]] std::string wrong_readings() const;
@@ -71,9 +74,10 @@ class Joined {
   std::vector<Reading> readings_;
   std::vector<Instant> received_;  ///< when each of them was delivered
   std::uint64_t tick_ = 0;
-  bool may_spin_ = true, was_plugged_ = true;
+  std::vector<Event> events_;
+  bool may_spin_ = true, was_plugged_ = true, was_failed_ = false;
   bool coasted_ = true;  ///< no spin_at() since the last coast on the wire
-  Instant next_command_{0}, reconnect_at_ = kNever, ready_at_{-1};
+  Instant next_command_{0}, reconnect_at_{0}, ready_at_{-1};
   int commands_ = 0, failures_ = 0, connects_ = 1;
   std::uint64_t forbidden_motions_ = 0;
   Instant forbidden_at_{-1};

@@ -203,6 +203,23 @@ TEST(Configuration, RefusesWhatIsNoNetBox) {
   EXPECT_THAT(refusal(captured_xml().substr(0, 900)), HasSubstr("broken"));
 }
 
+TEST(Configuration, RefusesAPageWithNulBytesWhichNoFileCouldKeepVerbatim) {
+  std::string utf16 = "\xff\xfe";
+  for (const char c : captured_xml()) (utf16 += c) += '\0';
+  EXPECT_THAT(refusal(utf16), HasSubstr("NUL byte at 3: it is not in UTF-8"));
+  EXPECT_THAT(refusal(captured_xml() + '\0'), HasSubstr("NUL byte"));
+}
+
+TEST(Configuration, ShowsNamesThatAreNoUtf8WithoutTheirRawBytes) {
+  const Configuration box = parse_configuration(with(captured_xml(), "cfgnam",
+                                                     "Pr\xFC"
+                                                     "fstand \x1B[2J"));
+  EXPECT_EQ(box.slot_name, "Pr\uFFFDfstand \uFFFD[2J");
+  EXPECT_THAT(box.xml, HasSubstr("Pr\xFC"
+                                 "fstand"))
+      << "verbatim";
+}
+
 TEST(Configuration, AnyCutOfTheXmlIsRefusedNeverMisread) {
   const std::string xml = captured_xml();
   for (std::size_t length = 0; length < xml.size(); ++length)

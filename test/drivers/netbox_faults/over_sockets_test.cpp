@@ -72,15 +72,18 @@ TEST(PagesOverSockets, ARefusedConnectionIsNamed) {
               AllOf(HasSubstr("Connection refused"), HasSubstr("check the address and http_port")));
 }
 
-TEST(PagesOverSockets, AWrongCharsetSpoilsNoNumber) {
-  for (const char* utf16 : {"0", "1"}) {
-    LiveBox box({.faults = {on_pages("http_charset", "utf16", utf16)}});
-    const SteadyClock clock;
-    LoadCell cell(box.place(), clock);
-    EXPECT_EQ(cell.configuration().counts_per_newton, 1e6) << utf16;
-    EXPECT_EQ(cell.configuration().records_per_datagram, 40) << utf16;
-    EXPECT_EQ(box.stop().http_spoilt, 1u);
-  }
+TEST(PagesOverSockets, ALatin1LetterSpoilsNoNumber) {
+  LiveBox box({.faults = {on_pages("http_charset", "utf16", "0")}});
+  const SteadyClock clock;
+  LoadCell cell(box.place(), clock);
+  EXPECT_EQ(cell.configuration().counts_per_newton, 1e6);
+  EXPECT_EQ(cell.configuration().records_per_datagram, 40);
+  EXPECT_EQ(cell.configuration().slot_name, "Pr\uFFFDfstand");
+  EXPECT_EQ(box.stop().http_spoilt, 1u);
+}
+
+TEST(PagesOverSockets, APageInUtf16IsRefusedBecauseNoRunFileCouldKeepItVerbatim) {
+  EXPECT_THAT(reading_with(on_pages("http_charset", "utf16", "1")), HasSubstr("NUL byte"));
 }
 
 TEST(PagesOverSockets, AMissingOrDoubledElementIsNamed) {

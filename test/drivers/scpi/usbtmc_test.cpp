@@ -128,6 +128,8 @@ TEST_F(UsbtmcTest, GivesUpAnAnswerThatNeverEnds) {
   usb.part = 4000;
   usb.obey = [](const std::string&) { return std::string(200000, '7'); };
   EXPECT_THAT(refusal(line, "CURV?"), HasSubstr("does not end"));
+  usb.part = 0;
+  EXPECT_THAT(refusal(line, "CURV?"), HasSubstr("does not end")) << "one empty part after the other";
 }
 
 }  // namespace

@@ -16,13 +16,15 @@ namespace {
 using namespace std::chrono_literals;
 using test::bytes;
 
-std::vector<std::uint8_t> velocity(float speed) {
+std::vector<std::uint8_t> set_of_the_controller(std::uint8_t sub, float value) {
   std::vector<std::uint8_t> data, frame;
   for (int shift = 0; shift < 32; shift += 8)
-    data.push_back(static_cast<std::uint8_t>(std::bit_cast<std::uint32_t>(speed) >> shift));
-  append_iq_frame(frame, 52, 5, 1, data);
+    data.push_back(static_cast<std::uint8_t>(std::bit_cast<std::uint32_t>(value) >> shift));
+  append_iq_frame(frame, 52, sub, 1, data);
   return frame;
 }
+
+std::vector<std::uint8_t> velocity(float speed) { return set_of_the_controller(5, speed); }
 
 /// Everything the bench says in three seconds of a small campaign.
 std::vector<std::uint8_t> campaign(std::uint64_t seed, Duration step) {
@@ -62,6 +64,21 @@ TEST(SimulatedBench, TicksSevenThousandTimesASecondWithoutDrift) {
   for (Instant now = 1s; now <= 10s; now += 333333ns) bench.advance(now);
   bench.advance(10s);
   EXPECT_EQ(bench.ticks(), 70000u);
+}
+
+TEST(SimulatedBench, AFastClockOfTheModuleMakesTheMotorTurnFaster) {
+  for (const double gain : {-0.02, 0.0, 0.02}) {
+    BenchSettings settings;
+    settings.oscillator_gain = gain;
+    SimulatedBench bench(settings);
+    bench.mount("5x2", 0);
+    bench.motor().receive(set_of_the_controller(8, 0.05f), Instant{0});  // an integral, which leaves no error
+    for (Instant now{0}; now <= 4s; now += 100ms) {
+      bench.advance(now);
+      bench.motor().receive(velocity(1000), now);
+    }
+    EXPECT_NEAR(bench.plant().motor().speed, 1000 * (1 + gain), 0.5) << gain;
+  }
 }
 
 TEST(SimulatedBench, MotorCoastsWhenItsMasterFallsSilent) {

@@ -181,11 +181,11 @@ TEST_F(Module, ReportsItsClocksErrorInSpeedAndTime) {
   settings = exact();
   settings.oscillator_gain = 0.005;
   IqDevice off(settings, state);
-  state.speed = 1000;
+  state.speed = 1005;
   off.receive(bytes("55 02 32 0D 00 31 B4 55 02 05 0F 00 66 92"), 1000s);
   std::vector<std::uint8_t> expected;
-  append_iq_frame(expected, 50, 13, 3, bytes("00 40 7b 44"));  // 1005
-  append_iq_frame(expected, 5, 15, 3, bytes("00 40 7b 44"));
+  append_iq_frame(expected, 50, 13, 3, bytes("00 00 7a 44"));  // 1000: it takes a turn to last longer
+  append_iq_frame(expected, 5, 15, 3, bytes("00 40 7b 44"));   // 1005
   EXPECT_EQ(hex(off.output()), hex(std::span<const std::uint8_t>(expected)));
 }
 

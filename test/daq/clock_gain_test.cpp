@@ -1,0 +1,66 @@
+// A module whose clock is off by half a percent, and a bench file that knows it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "daq/deterministic_bench.hpp"
+#include "daq/reduction.hpp"
+#include "daq/run.hpp"
+#include "results/run_reader.hpp"
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::daq {
+namespace {
+
+/// The simulator's own speed at every tick of the runner.
+class TrueSpeed final : public Progress {
+ public:
+  explicit TrueSpeed(DeterministicBench& bench) : bench_(bench) {}
+  void tick(const Position&, const Observation&) override {
+    seen_.push_back({to_seconds(bench_.clock().now()), bench_.simulation().plant().motor().speed});
+  }
+  void step_done(const Position&, const Observation&) override {}
+  void say(const std::string&) override {}
+  [[nodiscard]] double mean(double begin_s, double end_s) const {
+    double sum = 0;
+    int n = 0;
+    for (const auto& [time, speed] : seen_) {
+      if (time < begin_s || time >= end_s) continue;
+      sum += speed;
+      ++n;
+    }
+    return sum / n;
+  }
+
+ private:
+  DeterministicBench& bench_;
+  std::vector<std::pair<double, double>> seen_;
+};
+
+TEST(ClockGain, GivesTrueSpeedsFromAModuleWhoseClockIsFast) {
+  std::string text = test::deterministic_place(3).text;
+  text.replace(text.find("speed_max_rpm: 19300"), 20, "speed_max_rpm: 19300, clock_gain: {factor: 1.005, u: 1e-5}");
+  const profiles::Bench place = profiles::parse_bench(text, "bench.yaml");
+  std::string profile = test::short_campaign_text("0", 1, 3);
+  profile.replace(profile.find("dwell_s: 0.6"), 12, "dwell_s: 3.0");
+  const profiles::Campaign campaign = profiles::parse_campaign(profile, "slow.yaml");
+  sim::BenchSettings fast;
+  fast.oscillator_gain = 0.005;
+  DeterministicBench bench(place, fast);
+  bench.mounted("5x3", 0);
+  TrueSpeed truth(bench);
+  const test::TemporaryFolder folder;
+  const auto file = folder.path() / "run.h5";
+  (void)record_run(bench, {campaign, place, 0.0, 1, 10.0, file}, truth, [] { return false; });
+  const auto steps = reduce(results::read_run(file));
+  ASSERT_EQ(steps.size(), 3u);
+  for (const auto& step : steps) {
+    const double true_mean = truth.mean(step.window_begin_s, step.window_end_s);
+    EXPECT_NEAR(step.speed_rad_s, true_mean, 2e-4 * true_mean);
+    EXPECT_NEAR(true_mean, 1.005 * step.commanded_speed_rad_s, 1e-3 * true_mean) << "it holds what it reports";
+    EXPECT_EQ(step.doubts, 0u);
+  }
+}
+
+}  // namespace
+}  // namespace kphi::daq

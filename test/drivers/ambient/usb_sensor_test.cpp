@@ -1,0 +1,232 @@
+// The true libusb, the driver of the bridge and that of the sensor, against a simulated bridge and sensor that share no
+// line with them; each fault alone.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <future>
+
+#include "drivers/ambient/ambient_worker.hpp"
+#include "drivers/ambient/bme280_sensor.hpp"
+#include "drivers/ambient/place.hpp"
+#include "drivers/sim/mcp2221.hpp"
+#include "drivers/sim/random.hpp"
+#include "drivers/sim/usb_socket.hpp"
+#include "drivers/usb/bus.hpp"
+#include "test/drivers/usb/virtual_bus.hpp"
+
+namespace kphi::ambient {
+namespace {
+
+using namespace std::chrono_literals;
+using sim::UsbFaultKind;
+using testing::HasSubstr;
+
+constexpr const char* kAddress = "usb:04d8:00dd:0001";
+
+/// The integer formulas drop the lowest bits of the counts (aT >> 3): 0.0025 °C beside the steps of 0.01 °C, and
+/// through the temperature 0.2 Pa beside the counts of 0.18 Pa.
+void expect_equal(const Air& air, const sim::TrueAir& truth) {
+  EXPECT_NEAR(air.temperature_c, truth.temperature_c, 0.0078);
+  EXPECT_NEAR(air.pressure_pa, truth.pressure_pa, 0.5);
+  EXPECT_NEAR(air.relative_humidity, truth.relative_humidity, 1e-4) << "counts of 0.008 %";
+}
+
+class UsbSensorTest : public OnVirtualBus {
+ protected:
+  std::unique_ptr<Ambient> sensor() { return open(place_of(kAddress)); }
+  void expect_true_air(Ambient& from) { expect_equal(from.read(), truth); }
+  /// The bridge's manual is kept.
+  void TearDown() override {
+    const sim::BridgeTruth seen = bridge.truth();
+    EXPECT_EQ(seen.hasty, 0u);
+    EXPECT_EQ(seen.malformed, 0u);
+  }
+
+  sim::TrueAir truth{21.37, 98'765, 0.43};
+  sim::Mcp2221 bridge{faults, "0001", sim::Bme280(truth)};
+};
+
+TEST_F(UsbSensorTest, ReadsTheTrueAirWithinItsResolution) {
+  wire->plug(1, bridge);
+  const auto air = sensor();
+  EXPECT_THAT(air->identity(), HasSubstr("BME280 at 0x76 behind USB device 04d8:00dd, serial 0001, port 1-1"));
+  sim::Random random(1);
+  for (int i = 0; i < 8; ++i) {
+    truth = {25 + 30 * random.symmetric(), 85'000 + 25'000 * random.symmetric(), 0.5 + 0.4 * random.symmetric()};
+    bridge.set_air(truth);
+    expect_true_air(*air);
+  }
+  EXPECT_EQ(bridge.truth().overlapped, 0u) << "one command outstanding";
+  EXPECT_EQ(bridge.truth().nacks, 0u);
+}
+
+TEST_F(UsbSensorTest, ReadsTheExampleOfTheDataSheet) {
+  bridge.set_air({128422 / 5120.0, 25767233 / 256.0, 0.2241});
+  wire->plug(1, bridge);
+  const Air air = sensor()->read();
+  EXPECT_DOUBLE_EQ(air.temperature_c, 25.08);
+  EXPECT_NEAR(air.pressure_pa, 100653.25, 0.2);
+}
+
+TEST_F(UsbSensorTest, MovesAReportThereAndBackByInterruptTransfers) {
+  wire->plug(1, bridge);
+  const usb::Bus bus;
+  const auto device = bus.open(usb::Address::parse(kAddress));
+  device->claim(2);
+  const usb::Interface& hid = device->interfaces().at(2);
+  ASSERT_EQ(hid.class_code, 3);
+  ASSERT_EQ(hid.endpoints.at(1).kind, usb::EndpointKind::interrupt);
+  std::array<std::uint8_t, 64> report{0x10, 0, 0, 0x20, 0x75};
+  EXPECT_EQ(device->write(hid.endpoints.at(1), report, 1000ms).bytes, 64u);
+  report.fill(0);
+  EXPECT_EQ(device->read(hid.endpoints.at(0), report, 1000ms).bytes, 64u);
+  EXPECT_EQ(report[0], 0x10);
+  EXPECT_EQ(report[3], 0x20);
+  EXPECT_EQ(report[4], 0x75);
+}
+
+TEST_F(UsbSensorTest, IsFoundAtItsOtherAddress) {
+  sim::Mcp2221 other(faults, "0001", sim::Bme280(truth, 0x77));
+  wire->plug(1, other);
+  const auto air = sensor();
+  EXPECT_THAT(air->identity(), HasSubstr("0x77"));
+  expect_true_air(*air);
+  EXPECT_EQ(other.truth().nacks, 1u);
+}
+
+TEST_F(UsbSensorTest, SaysWhenNobodyIsBehindTheBridge) {
+  break_with(UsbFaultKind::nack, 1000);
+  wire->plug(1, bridge);
+  EXPECT_THAT(refusal([&] { (void)sensor(); }), HasSubstr("nobody answers at this address"));
+  EXPECT_THAT(refusal([&] { (void)open(place_of("usb:04d8:00dd:0002")); }), HasSubstr("not plugged in"));
+}
+
+TEST_F(UsbSensorTest, SaysWhenAnAcknowledgementIsMissingAndGoesOn) {
+  wire->plug(1, bridge);
+  const auto air = sensor();
+  break_with(UsbFaultKind::nack);
+  EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("nobody answers at this address"));
+  expect_true_air(*air);
+}
+
+TEST_F(UsbSensorTest, WaitsForABusyBridge) {
+  break_with(UsbFaultKind::busy, 3);
+  wire->plug(1, bridge);
+  const auto air = sensor();
+  expect_true_air(*air);
+  break_with(UsbFaultKind::busy, 10);
+  expect_true_air(*air);
+}
+
+TEST_F(UsbSensorTest, GivesUpABridgeThatStaysBusy) {
+  wire->plug(1, bridge);
+  const auto air = sensor();
+  break_with(UsbFaultKind::busy, 100'000);
+  EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("stays busy"));
+  faults.set({});
+  expect_true_air(*air);
+}
+
+TEST_F(UsbSensorTest, NamesABusThatIsHeldLow) {
+  wire->plug(1, bridge);
+  const auto air = sensor();
+  break_with(UsbFaultKind::stuck_bus);
+  EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("held low"));
+  expect_true_air(*air);
+}
+
+TEST_F(UsbSensorTest, GivesUpASilentBridgeAndGoesOn) {
+  wire->plug(1, bridge);
+  const auto air = sensor();
+  break_with(UsbFaultKind::no_reply);
+  EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("no answer in time"));
+  expect_true_air(*air);
+}
+
+TEST_F(UsbSensorTest, NeverTakesALateAnswerForThatToTheSameCommand) {
+  wire->plug(1, bridge);
+  const auto air = sensor();
+  break_with(UsbFaultKind::late, 1, 700ms);
+  EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("no answer in time"));
+  expect_true_air(*air);
+  const std::uint64_t overlapped = bridge.truth().overlapped;
+  EXPECT_LE(overlapped, 1u);
+  expect_true_air(*air);
+  EXPECT_EQ(bridge.truth().overlapped, overlapped) << "in step again";
+}
+
+TEST_F(UsbSensorTest, TakesUpABridgeThatAPredecessorLeftInTheMiddle) {
+  std::vector<std::uint8_t> report(64, 0);
+  report[0] = 0x10;  // its answer was not fetched, and is one to the first command of whoever comes next
+  (void)bridge.out(0x03, report);
+  wire->plug(1, bridge);
+  expect_true_air(*sensor());
+}
+
+TEST_F(UsbSensorTest, ClearsAHaltedEndpoint) {
+  wire->plug(1, bridge);
+  const auto air = sensor();
+  break_with(UsbFaultKind::stall, 2);
+  expect_true_air(*air);
+}
+
+TEST_F(UsbSensorTest, RefusesACalibrationOfWhichOneByteWasDamaged) {
+  wire->plug(1, bridge);
+  for (const auto& [at, value] : {std::pair{0x89, 0x6A}, std::pair{0x8E, 0x00}, std::pair{0xE5, 0xFF}}) {
+    sim::UsbFault fault{UsbFaultKind::reads_as, {}, {}, 1};
+    fault.address = static_cast<std::uint8_t>(at);
+    fault.value = static_cast<std::uint8_t>(value);
+    faults.set({fault});
+    EXPECT_THAT(refusal([&] { (void)sensor(); }), HasSubstr("two readings differ"));
+  }
+  expect_true_air(*sensor());
+}
+
+TEST_F(UsbSensorTest, RefusesAnotherChip) {
+  sim::UsbFault bmp280{UsbFaultKind::reads_as};
+  bmp280.address = 0xD0, bmp280.value = 0x58;
+  faults.set({bmp280});
+  wire->plug(1, bridge);
+  EXPECT_THAT(refusal([&] { (void)sensor(); }), HasSubstr("chip id 0x58 instead of 0x60"));
+}
+
+TEST_F(UsbSensorTest, EndsAtOnceWhenItIsUnpluggedInTheMiddle) {
+  wire->plug(1, bridge);
+  auto air = sensor();
+  break_with(UsbFaultKind::no_reply);
+  const std::uint64_t before = bridge.truth().commands;
+  auto failure = std::async(std::launch::async, [&] { return refusal([&] { (void)air->read(); }); });
+  ASSERT_TRUE(eventually([&] { return bridge.truth().commands > before; })) << "it waits for the answer";
+  wire->unplug(1);
+  EXPECT_THAT(failure.get(), HasSubstr("unplugged"));
+  EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("unplugged"));
+  wire->plug(1, bridge);
+  expect_true_air(*sensor());
+}
+
+TEST_F(UsbSensorTest, ComesBackByItselfAfterAReplug) {
+  wire->plug(1, bridge);
+  const AmbientWorker worker([] { return open(place_of(kAddress)); }, clock, {10ms, 20ms, 80ms});
+  ASSERT_TRUE(worker.wait_for_first(10s)) << worker.failure();
+  wire->unplug(1);
+  ASSERT_TRUE(eventually([&] { return worker.failure().find("not plugged in") != std::string::npos; }));
+  EXPECT_TRUE(worker.newest()) << "what was measured stays, and grows old";
+  const std::uint64_t readings = worker.counters().readings;
+  wire->plug(1, bridge);
+  ASSERT_TRUE(eventually([&] { return worker.counters().readings > readings; })) << worker.failure();
+  EXPECT_EQ(worker.counters().openings, 2u);
+  EXPECT_GE(worker.counters().failures, 1u);
+  expect_equal(worker.newest()->air, truth);
+}
+
+TEST_F(UsbSensorTest, IsPulledOutAndPluggedInAsAScriptSays) {
+  faults.set({sim::UsbFault{UsbFaultKind::unplug, clock.now() + 100ms, 50ms}});
+  const usb::Bus bus;
+  const sim::UsbSocket socket(*wire, 1, bridge, faults);
+  ASSERT_TRUE(eventually([&] { return bus.list().size() == 1; }));
+  ASSERT_TRUE(eventually([&] { return bus.list().empty(); }));
+  ASSERT_TRUE(eventually([&] { return bus.list().size() == 1; }));
+}
+
+}  // namespace
+}  // namespace kphi::ambient

@@ -1,0 +1,231 @@
+// The true libusb and the drivers of USBTMC, supply and meter, against a simulated instrument that shares no line with
+// them; each fault alone, then all together.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <future>
+
+#include "drivers/scpi/scpi_meter.hpp"
+#include "drivers/scpi/scpi_supply.hpp"
+#include "drivers/scpi/usbtmc.hpp"
+#include "drivers/sim/random.hpp"
+#include "drivers/sim/usbtmc.hpp"
+#include "drivers/usb/bus.hpp"
+#include "test/drivers/usb/virtual_bus.hpp"
+
+namespace kphi::scpi {
+namespace {
+
+using namespace std::chrono_literals;
+using sim::UsbFaultKind;
+using testing::HasSubstr;
+
+class UsbInstrumentTest : public OnVirtualBus {
+ protected:
+  void SetUp() override {
+    OnVirtualBus::SetUp();
+    if (IsSkipped()) return;
+    wire->plug(1, function);
+    bus = std::make_unique<usb::Bus>();
+    device = bus->open(usb::Address::parse("usb:1209:5c91"));
+  }
+  void TearDown() override { EXPECT_EQ(function.truth().malformed, 0u) << "the class's rules are kept"; }
+  std::string idn(Line& line) { return line.query("*IDN?"); }
+
+  sim::ScpiInstrument instrument;
+  sim::Usbtmc function{instrument, faults};
+  std::unique_ptr<usb::Bus> bus;
+  std::unique_ptr<usb::Transport> device;
+  static constexpr const char* kIdentity = "KPHI,SIM3010,SN0001,1.00";
+};
+
+TEST_F(UsbInstrumentTest, IsClearedPutUnderRemoteControlAndAsked) {
+  Usbtmc line(*device, 500ms);
+  EXPECT_EQ(idn(line), kIdentity);
+  EXPECT_TRUE(line.capabilities().scpi);
+  EXPECT_TRUE(line.capabilities().remote_local);
+  EXPECT_EQ(function.truth().clears, 1u);
+  EXPECT_EQ(function.truth().remote, 1u);
+}
+
+TEST_F(UsbInstrumentTest, IsASupplyWithItsLimitsAndProtections) {
+  Usbtmc line(*device, 500ms);
+  ScpiSupply supply(line, clock);
+  EXPECT_EQ(supply.identity().model, "SIM3010");
+  EXPECT_EQ(supply.identity().voltage_max_v, 30);
+  instrument.connect_load(6);
+  const supply::Limits limits{Volts(12), Amperes(5), Volts(13.2), Amperes(6)};
+  EXPECT_EQ(supply.apply(limits), limits);
+  {
+    supply::PoweredOutput output(supply);
+    supply::Reading reading = supply.read();
+    EXPECT_TRUE(reading.output);
+    EXPECT_DOUBLE_EQ(reading.voltage_v, 12);
+    EXPECT_DOUBLE_EQ(reading.current_a, 2);
+    EXPECT_EQ(reading.regulation, supply::Regulation::constant_voltage);
+    instrument.connect_load(1);
+    reading = supply.read();
+    EXPECT_DOUBLE_EQ(reading.voltage_v, 5);
+    EXPECT_EQ(reading.regulation, supply::Regulation::constant_current);
+    (void)instrument.obey("VOLT:PROT 3");
+    reading = supply.read();
+    EXPECT_EQ(reading.protection, supply::Protection::over_voltage);
+    EXPECT_FALSE(reading.output);
+  }
+  EXPECT_FALSE(instrument.state().output);
+}
+
+TEST_F(UsbInstrumentTest, BlamesACommandOnlyForItsOwnErrors) {
+  (void)instrument.obey("FOO;BAR;VOLT 99");
+  Usbtmc line(*device, 500ms);
+  ScpiSupply supply(line, clock);
+  EXPECT_NO_THROW(supply.apply({Volts(12), Amperes(5), Volts(13.2), Amperes(6)}));
+  instrument.note_error(-410, "Query INTERRUPTED");
+  EXPECT_NO_THROW(supply.switch_off());
+  EXPECT_THAT(refusal([&] {
+                (void)supply.apply({Volts(32), Amperes(5), Volts(33), Amperes(6)});
+              }),
+              testing::AllOf(HasSubstr("VOLT 32"), HasSubstr("-222")));
+}
+
+TEST_F(UsbInstrumentTest, SurvivesAnEmptyFirstPacket) {
+  Usbtmc line(*device, 500ms);
+  break_with(UsbFaultKind::empty_first);
+  EXPECT_EQ(idn(line), kIdentity);
+  EXPECT_EQ(line.counters().timeouts, 0u);
+}
+
+TEST_F(UsbInstrumentTest, GathersPacketsAndParts) {
+  Usbtmc line(*device, 500ms);
+  for (const std::uint64_t size : {std::uint64_t{16}, std::uint64_t{64}}) {
+    break_with(UsbFaultKind::packets, 1, {}, size);
+    EXPECT_EQ(idn(line), kIdentity) << size;
+  }
+  for (const std::uint64_t size : {std::uint64_t{1}, std::uint64_t{7}, std::uint64_t{24}, std::uint64_t{25}}) {
+    break_with(UsbFaultKind::parts, 1000, {}, size);
+    EXPECT_EQ(idn(line), kIdentity) << size;
+  }
+}
+
+TEST_F(UsbInstrumentTest, NeverTakesTheAnswerToAnotherRequest) {
+  Usbtmc line(*device, 500ms);
+  break_with(UsbFaultKind::wrong_tag);
+  EXPECT_THAT(refusal([&] { (void)idn(line); }), HasSubstr("another request"));
+  EXPECT_EQ(idn(line), kIdentity);
+  EXPECT_EQ(line.counters().damaged, 1u);
+}
+
+TEST_F(UsbInstrumentTest, RecoversFromAStall) {
+  Usbtmc line(*device, 500ms);
+  break_with(UsbFaultKind::stall);
+  EXPECT_THAT(refusal([&] { (void)idn(line); }), HasSubstr("stalled"));
+  EXPECT_EQ(idn(line), kIdentity);
+}
+
+TEST_F(UsbInstrumentTest, AbortsAfterSilence) {
+  Usbtmc line(*device, 100ms);
+  break_with(UsbFaultKind::no_reply);
+  EXPECT_THAT(refusal([&] { (void)idn(line); }), HasSubstr("no answer in time"));
+  EXPECT_EQ(function.truth().aborts, 1u);
+  EXPECT_EQ(idn(line), kIdentity);
+  EXPECT_EQ(line.counters().timeouts, 1u);
+  EXPECT_EQ(line.counters().recoveries, 1u);
+}
+
+TEST_F(UsbInstrumentTest, GivesALateAnswerToNobody) {
+  Usbtmc line(*device, 100ms);
+  break_with(UsbFaultKind::late, 1, 400ms);
+  EXPECT_THAT(refusal([&] { (void)line.query("VOLT? MAX"); }), HasSubstr("no answer in time"));
+  EXPECT_EQ(line.query("CURR? MAX"), "10.000");
+}
+
+TEST_F(UsbInstrumentTest, GivesALateAnswerToNobodyEvenIfTheInstrumentIgnoresAborts) {
+  Usbtmc line(*device, 100ms);
+  faults.set({{UsbFaultKind::late, {}, {}, 1, 400ms}, {UsbFaultKind::deaf_to_abort, {}, {}, 4}});
+  EXPECT_NE(refusal([&] { (void)line.query("VOLT? MAX"); }), "");
+  std::string answer;
+  ASSERT_TRUE(eventually([&] { return refusal([&] { answer = line.query("CURR? MAX"); }).empty(); }));
+  EXPECT_EQ(answer, "10.000");
+}
+
+TEST_F(UsbInstrumentTest, SaysWhatItDoesNotKnow) {
+  Usbtmc line(*device, 50ms);
+  EXPECT_THAT(refusal([&] { (void)line.query("FOO?"); }), HasSubstr("does the instrument know this command?"));
+  EXPECT_EQ(idn(line), kIdentity);
+}
+
+TEST_F(UsbInstrumentTest, SendsNoRemoteControlToWhomItChokes) {
+  sim::Usbtmc choker(instrument, faults, {0x1ab1, 0x0588, "DS1", true});
+  wire->plug(2, choker);
+  const auto other = bus->open(usb::Address::parse("usb:1ab1:0588"));
+  Usbtmc line(*other, 500ms);
+  EXPECT_EQ(idn(line), kIdentity);
+  EXPECT_EQ(choker.truth().remote, 0u);
+}
+
+TEST_F(UsbInstrumentTest, EndsAtOnceWhenItIsUnpluggedInTheMiddleAndComesBack) {
+  {
+    Usbtmc line(*device, 60'000ms);
+    break_with(UsbFaultKind::no_reply);
+    auto failure = std::async(std::launch::async, [&] { return refusal([&] { (void)idn(line); }); });
+    ASSERT_TRUE(eventually([&] { return function.truth().requests > 0; }));
+    wire->unplug(1);
+    EXPECT_THAT(failure.get(), HasSubstr("unplugged"));
+    EXPECT_THAT(refusal([&] { (void)idn(line); }), HasSubstr("unplugged"));
+  }
+  wire->plug(1, function);
+  ASSERT_TRUE(
+      eventually([&] { return refusal([&] { device = bus->open(usb::Address::parse("usb:1209:5c91")); }).empty(); }));
+  Usbtmc line(*device, 500ms);
+  EXPECT_EQ(idn(line), kIdentity);
+}
+
+TEST_F(UsbInstrumentTest, IsAMeterOfTheQuantitiesThatAreAskedFor) {
+  sim::ScpiInstrument analyser({"KPHI,ANALYSER,1,1", sim::ScpiKind::meter});
+  sim::Usbtmc other(analyser, faults, {0x0b21, 0x0039, "A1"});
+  analyser.present(12.3456, 4.5678);
+  wire->plug(2, other);
+  const auto opened = bus->open(usb::Address::parse("usb:0b21:0039"));
+  Usbtmc line(*opened, 500ms);
+  ScpiMeter meter(line, clock, {true, true, true});
+  EXPECT_THAT(meter.identity(), HasSubstr("meter ANALYSER on USB device 0b21:0039"));
+  const MeterReading reading = meter.read();
+  EXPECT_DOUBLE_EQ(*reading.voltage_v, 12.3456);
+  EXPECT_DOUBLE_EQ(*reading.current_a, 4.5678);
+  EXPECT_NEAR(*reading.power_w, 12.3456 * 4.5678, 1e-6);
+  EXPECT_GT(reading.uncertainty, Duration{0});
+  EXPECT_LE(reading.at + reading.uncertainty, clock.now());
+}
+
+TEST_F(UsbInstrumentTest, AnswersTrulyOrNotAtAllUnderAnyMixtureOfFaults) {
+  Usbtmc line(*device, 25ms);
+  constexpr UsbFaultKind kKinds[] = {UsbFaultKind::no_reply,    UsbFaultKind::late,         UsbFaultKind::stall,
+                                     UsbFaultKind::wrong_tag,   UsbFaultKind::packets,      UsbFaultKind::parts,
+                                     UsbFaultKind::empty_first, UsbFaultKind::deaf_to_abort};
+  sim::Random random(1);
+  int answered = 0, failed = 0;
+  for (int i = 0; i < 150; ++i) {
+    if (i % 3 == 0) {
+      sim::UsbFaultScript script;
+      for (std::uint64_t n = random.bits() % 3; n > 0; --n) {
+        sim::UsbFault fault{kKinds[random.bits() % std::size(kKinds)], {}, {}, 1 + random.bits() % 2};
+        fault.delay = Duration(static_cast<std::int64_t>(random.bits() % 60'000'000));
+        fault.size = 4 * (1 + random.bits() % 8);
+        script.push_back(fault);
+      }
+      faults.set(script);
+    }
+    const bool volts = random.bits() % 2 == 0;
+    try {
+      ASSERT_EQ(line.query(volts ? "VOLT? MAX" : "CURR? MAX"), volts ? "30.000" : "10.000") << i;
+      ++answered;
+    } catch (const DeviceError&) {
+      ++failed;
+    }
+  }
+  EXPECT_GT(answered, 60);
+  EXPECT_GT(failed, 10);
+}
+
+}  // namespace
+}  // namespace kphi::scpi

@@ -1,0 +1,60 @@
+// A test on the virtual USB, skipped visibly where there is none.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <memory>
+#include <thread>
+
+#include "drivers/device_error.hpp"
+#include "drivers/sim/usb_faults.hpp"
+#include "drivers/sim/virtual_usb.hpp"
+
+namespace kphi {
+
+class OnVirtualBus : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!sim::VirtualUsb::available()) GTEST_SKIP() << "needs LD_PRELOAD=libumockdev-preload.so.0 (package umockdev)";
+    wire = std::make_unique<sim::VirtualUsb>();
+  }
+
+  /// From now on, so many times.
+  void break_with(sim::UsbFaultKind kind, std::uint64_t count = 1, Duration delay = {}, std::uint64_t size = 16) {
+    sim::UsbFault fault;
+    fault.kind = kind;
+    fault.count = count;
+    fault.delay = delay;
+    fault.size = size;
+    faults.set({fault});
+  }
+
+  SteadyClock clock;
+  sim::UsbFaults faults{clock};
+  std::unique_ptr<sim::VirtualUsb> wire;
+};
+
+/// The words of the DeviceError that the call throws; empty: none.
+template <class Call>
+std::string refusal(Call&& call) {
+  try {
+    call();
+  } catch (const DeviceError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// Polls; false after ten seconds.
+template <class Condition>
+[[nodiscard]] bool eventually(Condition&& holds) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (!holds()) {
+    if (std::chrono::steady_clock::now() > deadline) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
+}
+
+}  // namespace kphi
