@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "compensation/units.hpp"
+#include "daq/supply_link.hpp"
+#include "drivers/ambient/air.hpp"
 #include "drivers/clock.hpp"
 #include "drivers/iq/audit.hpp"
 #include "drivers/iq/stopping.hpp"
@@ -86,6 +88,10 @@ class Bench {
   [[nodiscard]] virtual const Clock& clock() const = 0;
   [[nodiscard]] virtual MotorLink& motor() = 0;
   [[nodiscard]] virtual LoadCellLink& load_cell() = 0;
+  /// nullptr: what powers the motor is not ours to switch. Else the motor is powered while the bench lives.
+  [[nodiscard]] virtual SupplyLink* supply() { return nullptr; }
+  /// Of the air, now; nothing: nobody knows it.
+  [[nodiscard]] virtual std::optional<ambient::Density> air() const { return std::nullopt; }
   /// Returns at bench time `when`, or a little later on a live bench.
   virtual void wait_until(Instant when) = 0;
   /// Calls `work` until the handle goes: from a thread of its own, or from within wait_until.

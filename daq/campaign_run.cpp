@@ -102,6 +102,8 @@ class CampaignRun {
         per_run_s * static_cast<double>(plan_.runs.size() - static_cast<std::size_t>(result_.runs));
     try {
       cool_down();
+      if (place_.ambient.known() && !bench_.air())
+        progress_.say("air: its sensor measures no more: the density of this run is unknown");
       const RunOrder order{campaign_, place_, planned.occlusion_deg, planned.repetition, remaining_s, file};
       accept(record_run(bench_, order, progress_, stop_asked_));
     } catch (const std::exception& e) {

@@ -17,6 +17,7 @@ namespace kphi::daq {
 namespace {
 
 constexpr Duration kHandshake = std::chrono::seconds(5);
+constexpr Duration kSupplyRises = std::chrono::milliseconds(500);
 constexpr Duration kWorkEvery = std::chrono::milliseconds(50);
 constexpr Duration kSyncEvery = std::chrono::seconds(1);
 constexpr Duration kHttpTimeout = std::chrono::seconds(5);
@@ -30,6 +31,7 @@ void load_faults(const std::string& path, sim::BenchSettings& settings) {
     settings.faults = sim::parse_faults(text, path);
     settings.netbox.habits = sim::parse_habits(text, path);
     settings.motor_faults = sim::parse_motor_faults(text, path);
+    if (settings.supply) settings.supply->faults = sim::parse_supply_faults(text, path);
   } catch (const sim::FileError& error) {
     throw ConfigurationError(error.what());
   }
@@ -51,6 +53,8 @@ sim::BenchSettings settings_of(const profiles::Bench& place, sim::BenchSettings 
   settings.netbox.rate_hz = place.netbox.rate_hz;
   settings.netbox.records_per_datagram = place.netbox.records_per_datagram;
   settings.module_id = place.iq.module_id;
+  if (place.supply) settings.supply.emplace();
+  if (place.simulation) settings.plant.air_density_kg_m3 = place.simulation->air_density_kg_m3;
   settings.module.baud = place.iq.baud;
   if (place.simulation) {
     load_faults(place.simulation->faults, settings);
@@ -92,8 +96,15 @@ class WithinWaits final : public Background {
 }  // namespace
 
 DeterministicBench::DeterministicBench(const profiles::Bench& place, const sim::BenchSettings& other)
-    : sim_(settings_of(place, other)),
+    : air_(place.ambient, clock_),
+      sim_(settings_of(place, other)),
+      supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, sim_.supply()->circuit(), clock_)
+                           : nullptr),
       motor_(place.iq, sim_.motor_line(), clock_, [this] { step_to(clock_.now() + kMotorWait); }) {
+  if (supply_) {
+    clock_.set(clock_.now() + kSupplyRises);
+    sim_.advance(clock_.now());
+  }
   motor_.connect();
   read_box();
   cross_check();
@@ -140,6 +151,7 @@ void DeterministicBench::wait_until(Instant when) {
 void DeterministicBench::step_to(Instant when) {
   clock_.set(when);
   sim_.advance(when);
+  if (supply_) supply_->link.look();
   exchange();  // what came is received before anything is found to be late
   motor_.advance(when);
   if (stream_) {

@@ -3,11 +3,14 @@
 // motor's line.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
+#include "daq/air.hpp"
 #include "daq/bench.hpp"
 #include "daq/deterministic_motor.hpp"
+#include "daq/deterministic_supply.hpp"
 #include "drivers/netbox/configuration.hpp"
 #include "drivers/netbox/health.hpp"
 #include "drivers/netbox/session.hpp"
@@ -23,6 +26,8 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   [[nodiscard]] const Clock& clock() const override { return clock_; }
   [[nodiscard]] MotorLink& motor() override { return motor_; }
   [[nodiscard]] LoadCellLink& load_cell() override { return *this; }
+  [[nodiscard]] SupplyLink* supply() override { return supply_ ? &supply_->link : nullptr; }
+  [[nodiscard]] std::optional<ambient::Density> air() const override { return air_.density(); }
   void wait_until(Instant when) override;
   [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override;
   [[nodiscard]] results::FileLayer& files() override { return *files_; }
@@ -55,9 +60,17 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   void exchange_load_cell();
 
   ManualClock clock_;
+  AirSource air_;
   results::MemoryOnlySync own_files_;
   results::FileLayer* files_ = &own_files_;
   sim::SimulatedBench sim_;
+  struct PoweredSupply {
+    PoweredSupply(const profiles::SupplyPlace& place, sim::SupplyCircuit& circuit, const Clock& clock)
+        : link(place, circuit, clock), powered(link) {}
+    DeterministicSupply link;
+    Powered powered;
+  };
+  std::unique_ptr<PoweredSupply> supply_;
   DeterministicMotor motor_;
   netbox::Configuration configuration_;
   std::vector<netbox::Finding> findings_;

@@ -8,8 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "daq/air.hpp"
 #include "daq/load_cell_audit.hpp"
 #include "daq/run.hpp"
+#include "daq/supply_probe.hpp"
+#include "daq/usb_probe.hpp"
 #include "drivers/finding.hpp"
 #include "drivers/iq/probe.hpp"
 #include "drivers/netbox/probe.hpp"
@@ -35,6 +38,7 @@ struct Answer {
   bool answers = false;
   std::vector<std::string> lines;
   nlohmann::ordered_json details;
+  bool wanted = true;  ///< by the bench file
 };
 
 nlohmann::ordered_json to_json(const netbox::Configuration& box) {
@@ -163,6 +167,47 @@ Answer ask_motor(const profiles::MotorPlace& place, const Clock& clock, std::opt
   return answer;
 }
 
+Answer ask_supply(const profiles::SupplyPlace& place, const Clock& clock) {
+  const SupplyProbe probe = probe_supply(place, clock);
+  Answer answer{"supply " + place.uri, probe.answers(), probe.lines(), {}};
+  if (probe.identity) {
+    answer.details["model"] = probe.identity->model;
+    answer.details["serial"] = probe.identity->serial;
+    answer.details["firmware"] = probe.identity->firmware;
+  }
+  if (probe.reading) {
+    answer.details["voltage_v"] = probe.reading->voltage_v;
+    answer.details["current_a"] = probe.reading->current_a;
+    answer.details["set_voltage_v"] = probe.reading->set_voltage_v;
+    answer.details["current_limit_a"] = probe.reading->current_limit_a;
+    answer.details["output"] = probe.reading->output;
+  }
+  answer.details["findings"] = to_json(probe.findings);
+  return answer;
+}
+
+Answer answer_of(const UsbProbe& probe, bool wanted) {
+  Answer answer{probe.device, probe.answers, probe.lines(), {}, wanted};
+  answer.details["words"] = probe.words;
+  answer.details["findings"] = to_json(probe.findings);
+  return answer;
+}
+
+void ask_usb(const std::optional<profiles::Bench>& bench, std::vector<Answer>& answers) {
+  if (bench && !bench->ambient.sensor.empty()) answers.push_back(answer_of(probe_sensor(bench->ambient.sensor), true));
+  if (bench && bench->ambient.manual) {
+    const auto air = AirSource(bench->ambient, SteadyClock()).density();
+    answers.push_back(
+        {"air, written by hand", true, {words_of(*air)}, {{"kg_m3", air->kg_m3}, {"u_kg_m3", air->u_kg_m3}}});
+  }
+  if (bench && !bench->ambient.known())
+    fmt::print(stderr, "kphi: {}: the air is unknown: k will not compare with that of another day; add ambient:\n",
+               bench->path);
+  std::vector<std::string> known;
+  for (const Answer& answer : answers) known.push_back(answer.device);
+  for (const UsbProbe& probe : probe_usb(known)) answers.push_back(answer_of(probe, false));
+}
+
 void print(const std::vector<Answer>& answers, bool json) {
   if (json) {
     auto all = nlohmann::ordered_json::array();
@@ -192,11 +237,13 @@ int devices(const Asked& asked) {
   factory.host = kFactoryAddress;
   std::vector<Answer> answers;
   answers.push_back(ask_load_cell(bench ? bench->netbox : factory, clock, probe_settings(asked, bench)));
+  if (bench && bench->supply) answers.push_back(ask_supply(*bench->supply, clock));
   if (bench) answers.push_back(ask_motor(bench->iq, clock, asked.clock_gain_s));
+  ask_usb(bench, answers);
   print(answers, asked.json);
   if (!bench) fmt::print(stderr, "kphi: no bench file: only the Net Box's factory address was asked; use --bench\n");
   for (const Answer& answer : answers) {
-    if (!answer.answers) return kNoDevice;
+    if (answer.wanted && !answer.answers) return kNoDevice;
   }
   return kOk;
 }

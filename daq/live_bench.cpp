@@ -189,6 +189,8 @@ results::SampleAccount LiveLoadCell::account() const { return to_account(cell_->
 LiveBench::LiveBench(const profiles::Bench& place)
     : place_(place),
       clock_(place.simulation ? place.simulation->time_scale : 1.0),
+      air_(place.ambient, clock_),
+      supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, clock_) : nullptr),
       load_cell_(place.netbox, clock_),
       motor_(place.iq, clock_) {}
 

@@ -5,8 +5,10 @@
 #include <memory>
 #include <vector>
 
+#include "daq/air.hpp"
 #include "daq/bench.hpp"
 #include "daq/device_records.hpp"
+#include "daq/live_supply.hpp"
 #include "drivers/iq/motor.hpp"
 #include "drivers/netbox/load_cell.hpp"
 #include "drivers/netbox/settings.hpp"
@@ -64,13 +66,21 @@ class LiveLoadCell final : public LoadCellLink {
   std::string slots_json_;
 };
 
+struct PoweredSupply {
+  PoweredSupply(const profiles::SupplyPlace& place, const Clock& clock) : link(place, clock), powered(link) {}
+  LiveSupply link;
+  Powered powered;
+};
+
 class LiveBench final : public Bench {
  public:
-  /// Finds both devices; throws DeviceError.
+  /// Finds all devices, and switches the supply on; throws DeviceError.
   explicit LiveBench(const profiles::Bench& place);
   [[nodiscard]] const Clock& clock() const override { return clock_; }
   [[nodiscard]] MotorLink& motor() override { return motor_; }
   [[nodiscard]] LoadCellLink& load_cell() override { return load_cell_; }
+  [[nodiscard]] SupplyLink* supply() override { return supply_ ? &supply_->link : nullptr; }
+  [[nodiscard]] std::optional<ambient::Density> air() const override { return air_.density(); }
   void wait_until(Instant when) override;
   [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override;
   [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
@@ -80,6 +90,8 @@ class LiveBench final : public Bench {
  private:
   profiles::Bench place_;
   SteadyClock clock_;
+  AirSource air_;
+  std::unique_ptr<PoweredSupply> supply_;  ///< before the motor, which needs it to answer; goes after it
   LiveLoadCell load_cell_;
   LiveMotor motor_;
 };

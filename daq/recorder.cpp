@@ -44,7 +44,10 @@ Recorder::Recorder(Bench& bench, results::RunWriter& writer, const Mounting& mou
       records_(kRecordsAtOnce),
       readings_(kReadingsAtOnce),
       load_cell_ns_(bench.clock().now().count()),
-      motor_ns_(bench.clock().now().count()) {}
+      motor_ns_(bench.clock().now().count()) {
+  while (bench.supply() != nullptr && bench.supply()->take(supply_readings_) > 0) {  // of the time before this run
+  }
+}
 
 void Recorder::drain() noexcept {
   if (failed_.load(std::memory_order_relaxed)) return;
@@ -53,6 +56,7 @@ void Recorder::drain() noexcept {
     drain_load_cell();
     drain_events();
     drain_motor();
+    drain_supply();
     if (const Instant now = bench_.clock().now(); now >= next_sync_) {
       writer_.sync();
       next_sync_ = now + bench_.sync_interval();
@@ -143,6 +147,14 @@ void Recorder::drain_motor() {
     motor_ns_ = batch.back().time_ns;
   }
   speed_error_.publish(speed_watch_.error());
+}
+
+void Recorder::drain_supply() {
+  if (bench_.supply() == nullptr) return;
+  while (const std::size_t n = bench_.supply()->take(supply_readings_)) {
+    writer_.append(std::span<const results::SupplyReading>(supply_readings_.data(), n));
+    supply_.publish(supply_readings_[n - 1]);
+  }
 }
 
 void Recorder::mark(results::Phase phase, int step, RadPerSec commanded) {

@@ -1,6 +1,7 @@
 // Empties the devices' queues into the run file, looks at every sample and remembers the newest of everything.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <exception>
@@ -45,12 +46,15 @@ class Recorder {
   void take_zero() noexcept;
   /// The newest of everything at bench time `now`.
   [[nodiscard]] Observation observe(Instant now) const noexcept;
+  /// What the bench supply showed last; time 0: nothing yet.
+  [[nodiscard]] results::SupplyReading supply() const noexcept { return supply_.read(); }
   /// Rethrows what drain() ran into.
   void check_failure();
 
  private:
   void drain_load_cell();
   void drain_motor();
+  void drain_supply();
   void drain_marks();
   void drain_events();
   void look_at(std::span<const results::LoadCellRecord> batch);
@@ -69,6 +73,7 @@ class Recorder {
   Instant next_sync_;
   std::vector<results::LoadCellRecord> records_;
   std::vector<results::MotorReading> readings_;
+  std::array<results::SupplyReading, 16> supply_readings_;
   boost::lockfree::spsc_queue<results::PhaseMark, boost::lockfree::capacity<1024>> marks_;
   // To the runner. Sized at run time: Boost 1.74's queue of fixed capacity never destroys what is left in it.
   boost::lockfree::spsc_queue<results::StreamEvent> events_{256};
@@ -82,6 +87,7 @@ class Recorder {
   std::atomic<std::int64_t> load_cell_ns_, motor_ns_;
   netbox::Published<netbox::ZeroMeasurement> measured_;
   netbox::Published<SpeedError> speed_error_;
+  netbox::Published<results::SupplyReading> supply_;
   std::atomic<bool> tripped_{false};
   std::string trip_;  // written before tripped_, read after it
   std::atomic<bool> failed_{false};

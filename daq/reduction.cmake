@@ -4,5 +4,6 @@ add_library(kphi_reduction STATIC
   event_doubts.cpp
   reduction.cpp
   repetitions.cpp
+  supply_means.cpp
 )
 target_link_libraries(kphi_reduction PUBLIC kphi_options kphi_results PRIVATE kphi_profiles kphi_iq fmt::fmt)

@@ -10,6 +10,7 @@
 
 #include "daq/clock_map.hpp"
 #include "daq/event_doubts.hpp"
+#include "daq/supply_means.hpp"
 #include "daq/zero_limits.hpp"
 #include "drivers/iq/quality.hpp"
 #include "profiles/bench.hpp"
@@ -405,6 +406,11 @@ class Reduction {
     mean.window_begin_s = 1e-9 * static_cast<double>(window.begin);
     mean.window_end_s = 1e-9 * static_cast<double>(window.end);
     mean.doubts = doubts(i, window, cell, speed);
+    take_supply(run_.supply, window.begin, window.end, mean);
+    if (header.air_density_kg_m3 > 0) {
+      mean.air_density_kg_m3 = header.air_density_kg_m3;
+      mean.air_density_u_kg_m3 = header.air_density_u_kg_m3;
+    }
     return mean;
   }
 
@@ -416,7 +422,9 @@ class Reduction {
     const double expected = std::max(planned_s, 0.0) * run_.header.load_cell.sample_rate_hz;
     const double derate = motor_.statistics(MotorChannel::derate, window).least;
     const Window whole = phase_window(i);
-    std::uint32_t bits = doubts_within(spans_, whole.begin, whole.end);
+    std::uint32_t bits = doubts_within(spans_, whole.begin, whole.end) |
+                         supply_doubts(run_.supply, whole.begin, window.begin, false) |
+                         supply_doubts(run_.supply, window.begin, window.end, true);
     const auto note = [&](Doubt doubt, bool applies) { bits |= applies ? static_cast<std::uint32_t>(doubt) : 0u; };
     // Without a single reading nobody knows: that is "not reached", too.
     note(Doubt::speed_not_reached, !(std::abs(speed.mean - commanded) <= speed_tolerance(commanded)));

@@ -23,6 +23,11 @@ constexpr double StepMean::*kMeans[] = {
     &StepMean::window_begin_s,
     &StepMean::coil_temperature_degc,
     &StepMean::window_end_s,
+    &StepMean::supply_v,
+    &StepMean::supply_a,
+    &StepMean::supply_w,
+    &StepMean::air_density_kg_m3,
+    &StepMean::air_density_u_kg_m3,
 };
 constexpr double StepMean::*kRootMeanSquares[] = {&StepMean::speed_rad_s, &StepMean::speed_sd_rad_s,
                                                   &StepMean::thrust_sd_n, &StepMean::torque_sd_nm};

@@ -14,6 +14,7 @@
 #include "daq/load_cell_audit.hpp"
 #include "daq/recorder.hpp"
 #include "daq/spin.hpp"
+#include "daq/supply_interlock.hpp"
 #include "drivers/device_error.hpp"
 #include "results/run_writer.hpp"
 #include "results/version.hpp"
@@ -25,6 +26,7 @@ using results::Phase;
 
 constexpr Duration kTickWall = std::chrono::milliseconds(10);
 constexpr Duration kPatienceWall = std::chrono::milliseconds(500);
+constexpr Duration kSupplyPatienceWall = std::chrono::seconds(2);  // it is asked eight times per second
 // While the motor turns. Seen twice: after this host has stood still, what waits in the sockets is taken in between.
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
 constexpr Duration kSpinPatienceWall = kPatienceWall;  // an instrumented bench is many times slower
@@ -35,10 +37,12 @@ constexpr Duration kSecondLookWall = std::chrono::milliseconds(20);
 // A program that was stopped for this long must not go on: the module may have let its motor coast meanwhile.
 constexpr Duration kLongestPauseWall = std::chrono::milliseconds(400);
 constexpr double kStandstillRadPerSec = 5.0;
+constexpr double kAnySpeed = 1e4;  // rad/s
 constexpr double kSpinDownLimitSeconds = 30.0;
 constexpr Duration kBiasWorksWall = std::chrono::milliseconds(100);  // what was on its way still has the old zero
 constexpr Duration kExplanationWall = std::chrono::seconds(3);       // the box is asked over HTTP for 2 s
 constexpr Duration kAftermath = std::chrono::seconds(3);
+constexpr Duration kLastLookWall = std::chrono::milliseconds(500);  // at a supply whose output is off
 constexpr int kBiasAttempts = 3;
 constexpr int kReadings = 2;  // of the box's configuration at the end; a page may be lost
 constexpr int kLinesOfEvents = 10;
@@ -75,6 +79,11 @@ results::RunHeader header_of(const RunOrder& order, Bench& bench, const results:
   header.minimum_discard_s = campaign.minimum_discard.value();
   header.load_cell = scale;
   header.motor_identity = bench.motor().identity();
+  if (bench.supply() != nullptr) header.supply_identity = bench.supply()->identity();
+  if (const auto air = bench.air()) {
+    header.air_density_kg_m3 = air->kg_m3;
+    header.air_density_u_kg_m3 = air->u_kg_m3;
+  }
   header.motor_parameters = bench.motor().parameters().text();
   return header;
 }
@@ -90,7 +99,8 @@ class Sequence {
     position_.repetition = order.repetition;
     position_.repetitions = order.campaign.repetitions;
     position_.steps = order.campaign.profile.steps;
-    end_ = bench.clock().now() + from_seconds(order.remaining_bench_s);
+    begin_ = bench.clock().now();
+    end_ = begin_ + from_seconds(order.remaining_bench_s);
   }
 
   void run() {
@@ -107,10 +117,13 @@ class Sequence {
 
   [[nodiscard]] const results::BoxBias& box_bias() const { return box_bias_; }
   [[nodiscard]] const std::optional<iq::StopReport>& stop() const { return stop_; }
+  /// What the supply did that stopped the run.
+  [[nodiscard]] const std::optional<results::StreamEvent>& supply_event() const { return supply_event_; }
 
   /// After the motor was let go: what became of it, and what its module says of the cause; empty when it never turned,
   /// or that is told already.
   std::string aftermath() {
+    if (bench_.supply() != nullptr) return power_off();
     if (!has_spun_ || stop_) return {};
     iq::StopSettings settings;
     settings.limit = kAftermath;
@@ -125,6 +138,22 @@ class Sequence {
       bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
     }
     return cause + "; nobody knows whether the motor coasts";
+  }
+
+  /// Without power nothing turns, and the module can tell nothing more. A supply that has tripped says so even when the
+  /// module, which starved, was heard first.
+  std::string power_off() {
+    const Instant since = bench_.clock().now();
+    const std::string why = bench_.supply()->switch_off();
+    if (!why.empty()) return supply_event_ && supply_event_->text.ends_with(why) ? "" : "; " + why;
+    const Instant give_up = bench_.clock().now() + bench_.clock().stretched(kLastLookWall);
+    while (recorder_.supply().time_ns < since.count() && bench_.clock().now() < give_up)
+      bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
+    const results::SupplyReading seen = recorder_.supply();
+    const bool tripped = seen.protection != results::SupplyProtection::none;
+    if (!tripped || supply_event_) return "; the supply's output is off";
+    note_supply(tripped_words(seen));
+    return "; " + supply_event_->text;
   }
 
   /// After the stream has ended, and nobody drains any more.
@@ -190,6 +219,7 @@ class Sequence {
     for (const RadPerSec level : order_.campaign.profile.levels()) {
       position_.step = step;
       position_.commanded = level;
+      change_speed();
       spin.at(level);
       recorder_.mark(Phase::step, step, level);
       hold(from_seconds(order_.campaign.profile.dwell.value()), &spin);
@@ -200,10 +230,16 @@ class Sequence {
     position_.commanded = RadPerSec(0);
     position_.phase = "spin down";
     recorder_.mark(Phase::spin_down, -1, RadPerSec(0));
-    spin.begin_stop();
+    change_speed();
+    iq::StopSettings stop;
+    // What a ramp feeds back raises the voltage of a bench supply, which cannot sink it, until its protection trips.
+    if (bench_.supply() != nullptr) stop.coast_below = kAnySpeed;
+    spin.begin_stop(stop);
     while (!(stop_ = spin.stopped())) hold(bench_.clock().stretched(kTickWall), &spin);
     if (!stop_->safe()) throw SafetyStop(stop_->summary());
   }
+
+  void change_speed() { settled_from_ = bench_.clock().now() + from_seconds(order_.campaign.minimum_discard.value()); }
 
   void hold_zero(Phase phase) {
     position_.phase = "zero";
@@ -263,9 +299,38 @@ class Sequence {
     seen_ = recorder_.observe(now);
     if (const auto trip = check(seen_, order_.campaign.limits)) throw SafetyStop(trip->reason);
     check_ages_at(now, spin != nullptr);
+    watch_supply(now);
     if (spin) spin->renew();
     position_.remaining_s = to_seconds(bench_.clock().shrunk(std::max(Duration(0), end_ - now)));
     progress_.tick(position_, seen_);
+  }
+
+  void watch_supply(Instant now) {
+    if (bench_.supply() == nullptr) return;
+    const std::string why = supply_trouble(now);
+    if (why.empty()) return;
+    note_supply(why);
+    throw SafetyStop(why);
+  }
+
+  /// Why the supply must stop the bench; empty: it need not.
+  [[nodiscard]] std::string supply_trouble(Instant now) const {
+    if (std::string failure = bench_.supply()->failure(); !failure.empty()) return failure;
+    const results::SupplyReading seen = recorder_.supply();
+    const bool any = seen.time_ns != 0;
+    const Instant last = any ? Instant(seen.time_ns) : begin_;
+    if (now - last > bench_.clock().stretched(kSupplyPatienceWall))
+      return fmt::format("supply: no reading for {:.3g} s", to_seconds(bench_.clock().shrunk(now - last)));
+    if (!any || !order_.place.supply) return {};
+    const auto trip = check(seen, *order_.place.supply, seen.time_ns >= settled_from_.count());
+    return trip ? trip->reason : std::string();
+  }
+
+  void note_supply(const std::string& what) {
+    const std::int64_t at = bench_.clock().now().count();
+    const std::string where = position_.step < 0 ? "" : fmt::format("step {}: ", position_.step + 1);
+    supply_event_ = {results::EventKind::supply_stop, at, 0,
+                     fmt::format("{:.3f} s: {}{}", 1e-9 * static_cast<double>(at), where, what)};
   }
 
   void check_ages_at(Instant now, bool spinning) {
@@ -297,6 +362,8 @@ class Sequence {
   const std::function<bool()>& stop_asked_;
   Position position_;
   Observation seen_;
+  Instant begin_{};
+  Instant settled_from_{};  ///< until then a change of speed may load the supply as it likes
   Instant stale_since_ = kNever;
   Instant spun_at_ = kNever;  ///< the last tick, if the motor turned
   Instant end_{};
@@ -305,6 +372,7 @@ class Sequence {
   results::BoxBias box_bias_;
   bool has_spun_ = false;
   std::optional<iq::StopReport> stop_;
+  std::optional<results::StreamEvent> supply_event_;
 };
 
 /// Streams while it lives.
@@ -389,13 +457,15 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
     try {
       sequence.run();
     } catch (...) {
-      cause = std::current_exception();
+      cause = std::current_exception();  // the motor coasts since the Spin has gone
+      if (bench.supply() != nullptr) bench.supply()->cut();
       explanation = sequence.explanation();
       aftermath = sequence.aftermath();
     }
   }
   streaming.reset();
   recorder.drain();
+  if (const auto& event = sequence.supply_event()) recorder.note(*event);
   if (!cause) {
     try {
       recorder.check_failure();

@@ -27,8 +27,8 @@ class Spin {
   /// Tells the driver's watchdog that someone still watches.
   void renew() noexcept { motor_.renew(); }
   /// Ramps down and coasts; returns at once.
-  void begin_stop() {
-    motor_.begin_stop({});
+  void begin_stop(const iq::StopSettings& settings = {}) {
+    motor_.begin_stop(settings);
     stopping_ = true;
   }
   /// How the stop ended; nothing while it is under way.

@@ -99,19 +99,33 @@ std::string table_row(const OcclusionCoefficient& row, double at_speed_rad_s) {
     text += fmt::format(", k_at_speed: {}, at_speed_rpm: {}", yaml_number(row.at_speed->k),
                         yaml_number(printed_rpm(at_speed_rad_s)));
   }
+  if (row.standard)
+    text += fmt::format(", k_standard: {}, k_standard_error: {}", yaml_number(row.standard->k),
+                        yaml_number(row.standard->standard_error));
   if (row.fit) text += fmt::format(", steps: {}, repetitions: {}", row.steps, row.repetitions);
   return text + "}\n";
 }
 
+std::string standard_block(const Identification& identification) {
+  const auto& standard = identification.table.front().standard;
+  if (!identification.air || !standard) return "unknown";
+  return fmt::format("{{value: {}, standard_error: {}, air_density_kg_m3: {}}}", yaml_number(standard->k),
+                     yaml_number(standard->standard_error), yaml_number(kStandardDensity));
+}
+
 std::string provenance_block(const Identification& identification, const Provenance& provenance) {
+  const auto& air = identification.air;
   std::string text = fmt::format(
       "air_density_kg_m3: {}\n"
+      "air_density_u_kg_m3: {}\n"
+      "k_standard: {}  # K_T in standard air\n"
       "supply_v: {}\n"
       "provenance:\n"
       "  campaign: {}\n"
       "  fit: {{model: \"T = k w^2\", estimator: {}",
-      number_or_unknown(provenance.air_density_kg_m3), number_or_unknown(provenance.supply_v),
-      quoted(provenance.campaign), quoted(estimator_words(identification)));
+      air ? yaml_number(air->kg_m3) : "unknown", air ? yaml_number(air->u_kg_m3) : "unknown",
+      standard_block(identification), number_or_unknown(provenance.supply_v), quoted(provenance.campaign),
+      quoted(estimator_words(identification)));
   if (speeds_known(identification))
     text += ", speed_range_rpm: " + speed_range(identification.fitted.min_rad_s, identification.fitted.max_rad_s);
   text += "}\n";

@@ -32,7 +32,6 @@ struct Provenance {
   std::string propeller_name;
   std::string source;  ///< what was fitted: a campaign folder or a file
   std::vector<RunProvenance> runs;
-  std::optional<double> air_density_kg_m3;
   std::optional<double> supply_v;
   std::optional<MotorClock> clock;  ///< of a campaign
 };

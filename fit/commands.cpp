@@ -237,6 +237,9 @@ void print_json(const Identification& identification, const Analysis& analysis, 
             {"k_unit", "N/(rad/s)^2"},
             {"K_T", line.K_T},
             {"K_T_standard_error", line.K_T_standard_error},
+            {"k_standard",
+             identification.table.front().standard ? Json(identification.table.front().standard->k) : Json(nullptr)},
+            {"air_density_kg_m3", identification.air ? Json(identification.air->kg_m3) : Json(nullptr)},
             {"anchored", line.anchored},
             {"intercept", line.intercept},
             {"slope_per_deg", line.slope_per_deg},
@@ -275,9 +278,13 @@ void run_fit(const FitRequest& request) {
     print_json(identification, analysis, raw, file);
   } else {
     print_headline(identification.line);
+    if (const auto& standard = identification.table.front().standard)
+      print_number("k_standard", standard->k, standard->standard_error, "");
     if (!raw.is_null()) fmt::print("{}\n", raw.dump(2));
   }
   for (const std::string& remark : analysis.remarks) fmt::print(stderr, "line          {}\n", remark);
+  if (!identification.air)
+    fmt::print(stderr, "air density   unknown: k holds for the air of that day; write ambient: into the bench file\n");
   fmt::print(stderr, "coefficients  {}\n", file.string());
   if (!request.no_report) write_report(identification, input, folder);
 }

@@ -69,6 +69,7 @@ OcclusionCoefficient coefficient(double phi_deg, std::vector<StepMean> steps, co
   row.standard_error = row.fit->standard_error.k;
   row.steps = levels.size();
   row.repetitions = repetitions.size();
+  if (const auto air = air_of(steps)) row.standard = at_standard(row.k, row.standard_error, *air);
   if (!at_level.empty()) row.at_speed = k_at_speed(at_level);
   if (options.estimator == Estimator::polynomial || options.estimator == Estimator::at_speed) {
     if (!row.at_speed) throw FitError("no good step at the reference speed; name a speed of the profile");
@@ -181,6 +182,7 @@ Identification identify(std::span<const StepMean> steps, const IdentificationOpt
   result.diameter_in = steps.front().diameter_in;
   result.blades = steps.front().blades;
   result.selection = select_steps(steps, options.speed_range);
+  result.air = air_of(result.selection.used);
   const StepsByAngle angles = by_angle_or_refuse(result.selection);
   result.at_speed_rad_s = options.at_speed_rad_s.value_or(highest_common_level(angles));
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/air.hpp"
 #include "fit/line_fit.hpp"
 #include "fit/repeatability.hpp"
 #include "fit/step_selection.hpp"
@@ -37,6 +38,7 @@ struct OcclusionCoefficient {
   /// N/(rad/s)². Of several repetitions: noise, zero and scatter between runs (Repeatability), without what all k have
   /// in common; of a single one: of the fit.
   double standard_error = 0;
+  std::optional<StandardCoefficient> standard;  ///< none where the air is unknown
   std::size_t steps = 0;  ///< distinct levels
   std::size_t repetitions = 0;
   std::optional<ThrustFit> fit;              ///< none in a table that came without steps
@@ -52,6 +54,7 @@ struct Identification {
   LineFit line;
   Repeatability repeatability;  ///< one angle per row of the table; empty in a table that came without steps
   StepSelection selection;
+  std::optional<AirDensity> air;  ///< of the steps used; none: unknown, and so is every k at standard density
   Estimator estimator = Estimator::through_origin;
   Weighting weighting = Weighting::equal;
   Loss loss = Loss::none;

@@ -9,6 +9,7 @@
 
 #include "compensation/units.hpp"
 #include "fit/html.hpp"
+#include "fit/power.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -78,6 +79,45 @@ std::string headline(const Identification& identification) {
          card("Line k(φ): slope", line.slope_per_deg, std::sqrt(line.covariance[1][1]), "N/(rad/s)² per degree",
               "N/RPM² per degree", crossings) +
          "</div>\n";
+}
+
+std::string standard_section(const Identification& identification) {
+  const std::string title = "<h2>In standard air, 1.225 kg/m³</h2>\n";
+  if (!identification.air) {
+    return title +
+           "<p class=\"warning\">Air density unknown: k holds for the air of that day only, and no k at standard "
+           "density "
+           "is given. Days differ by 3 % for 10 K or 30 hPa. Next time write ambient: into the bench file.</p>\n";
+  }
+  std::string html =
+      title +
+      fmt::format(
+          "<p>Measured in air of {:.4f} ± {:.4f} kg/m³.</p>\n<div class=\"scroll\"><table><thead><tr><th>φ</th><th>k · "
+          "1.225/ρ, N/(rad/s)²</th><th>N/RPM²</th></tr></thead><tbody>\n",
+          identification.air->kg_m3, identification.air->u_kg_m3);
+  for (const OcclusionCoefficient& row : identification.table) {
+    if (!row.standard) continue;
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td></tr>\n", angle(row.phi_deg),
+                        with_error(row.standard->k, row.standard->standard_error),
+                        with_error(per_rpm2(row.standard->k), per_rpm2(row.standard->standard_error)));
+  }
+  return html + "</tbody></table></div>\n<p class=\"note\">± includes the standard uncertainty of the density.</p>\n";
+}
+
+std::string power_section(const Identification& identification) {
+  const std::vector<StepPower> rows = power_of(identification.selection.used);
+  if (rows.empty()) return {};
+  std::string html =
+      "<h2>Power</h2>\n<div class=\"scroll\"><table><thead><tr><th>φ</th><th>step</th><th>speed, RPM</th><th>thrust, "
+      "N</th><th>power, W</th><th>g/W</th><th>N/W</th><th class=\"text\">measured by</th></tr></thead><tbody>\n";
+  for (const StepPower& row : rows) {
+    html += fmt::format(
+        "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.4f}</td><td>{:.2f}</td><td>{:.3f}</td><td>{:.5f}</td><td "
+        "class=\"text\">{}</td></tr>\n",
+        angle(row.phi_deg), row.step + 1, rpm(row.speed_rad_s), row.thrust_n, row.power_w, row.gram_per_watt(),
+        row.newton_per_watt(), row.by_supply ? "supply" : "module");
+  }
+  return html + "</tbody></table></div>\n";
 }
 
 std::string at_speed_cell(const OcclusionCoefficient& row) {
@@ -202,7 +242,8 @@ std::string provenance_section(const Identification& identification, const Prove
     html +=
         entry("Speeds", rpm(identification.speed_min_rad_s) + " to " + rpm(identification.speed_max_rad_s) + " RPM");
   html += entry("Overlap", "rim arc");
-  html += entry("Air density", optional_number(provenance.air_density_kg_m3, "kg/m³"));
+  const auto& air = identification.air;
+  html += entry("Air density", air ? fmt::format("{:.4f} ± {:.4f} kg/m³", air->kg_m3, air->u_kg_m3) : "unknown");
   html += entry("Supply", optional_number(provenance.supply_v, "V"));
   if (provenance.clock) html += entry("Motor's clock", clock_words(*provenance.clock));
   html += entry("Measured", provenance.measured_utc.empty() ? "unknown" : provenance.measured_utc);
@@ -237,8 +278,8 @@ std::string format_report(const Identification& identification, const Provenance
              "class=\"sub\">{}</p>\n",
              html_escaped(identification.propeller), kStyle, propeller_line(identification, provenance)) +
          headline(identification) + figure_section(figures) + coefficient_table(identification) +
-         doubt_section(identification.selection) + run_section(provenance.runs) +
-         provenance_section(identification, provenance) + "</body>\n</html>\n";
+         standard_section(identification) + power_section(identification) + doubt_section(identification.selection) +
+         run_section(provenance.runs) + provenance_section(identification, provenance) + "</body>\n</html>\n";
 }
 
 }  // namespace kphi::fit

@@ -15,7 +15,7 @@ struct DoubtPolicy {
   bool spoils;
 };
 
-constexpr std::array<DoubtPolicy, 23> kPolicy{{
+constexpr std::array<DoubtPolicy, 27> kPolicy{{
     {Doubt::speed_not_reached, "commanded speed not reached", true},
     {Doubt::speed_unsteady, "speed never settled", true},
     {Doubt::saturated, "load cell saturated", true},
@@ -39,6 +39,10 @@ constexpr std::array<DoubtPolicy, 23> kPolicy{{
     {Doubt::motor_reset, "motor module restarted", true},
     {Doubt::motor_lost, "motor module lost", true},
     {Doubt::slow_round_trip, "motor readings blurred in time", false},
+    {Doubt::supply_limited, "supply limited the current", true},
+    {Doubt::supply_off, "supply was off", true},
+    {Doubt::supply_sag, "supply sagged", false},
+    {Doubt::supply_rise, "motor fed back into the supply", false},
 }};
 
 bool has(std::uint32_t doubts, Doubt doubt) { return (doubts & static_cast<std::uint32_t>(doubt)) != 0; }

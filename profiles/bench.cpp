@@ -63,6 +63,25 @@ MotorPlace read_motor(const ProfileReader& file, const std::filesystem::path& fo
   return place;
 }
 
+SupplyPlace read_supply(ProfileReader& file) {
+  const SupplyPlace place{file.text("/supply/uri"), Volts(file.number("/supply/voltage_v")),
+                          Amperes(file.number("/supply/current_limit_a")), Volts(file.number("/supply/over_voltage_v")),
+                          Amperes(file.number("/supply/over_current_a"))};
+  if (!(place.over_voltage.value() > place.voltage.value())) {
+    file.refuse(
+        "/supply/over_voltage_v",
+        fmt::format("{:g} V is not above the {:g} V of voltage_v", place.over_voltage.value(), place.voltage.value()),
+        "write more: it would switch off at once");
+  }
+  if (place.over_current.value() < place.current_limit.value()) {
+    file.refuse("/supply/over_current_a",
+                fmt::format("{:g} A is below the {:g} A of current_limit_a", place.over_current.value(),
+                            place.current_limit.value()),
+                "write that or more");
+  }
+  return place;
+}
+
 AmbientPlace read_ambient(const ProfileReader& file) {
   if (!file.has("/ambient/manual")) {
     const std::string sensor = file.text("/ambient");
@@ -81,6 +100,7 @@ Simulation read_simulation(ProfileReader& file, const std::filesystem::path& fol
   simulation.control = file.get_or("/simulation/control", simulation.control);
   if (file.has("/simulation/faults")) simulation.faults = (folder / file.text("/simulation/faults")).string();
   if (file.has("/simulation/motor")) simulation.motor = (folder / file.text("/simulation/motor")).string();
+  simulation.air_density_kg_m3 = file.get_or("/simulation/air_density_kg_m3", simulation.air_density_kg_m3);
   if (!simulation.in_process && simulation.control.empty()) {
     file.refuse("/simulation", "control is missing", "add control: a path for the socket, or in_process: true");
   }
@@ -98,6 +118,7 @@ Bench parse_bench(const std::string& text, const std::string& path) {
   const std::string axis = file.text("/thrust_axis");  // "+Fz"
   bench.thrust_sign = axis[0] == '-' ? -1 : +1;
   bench.thrust_axis = axis[2] - 'x';
+  if (file.has("/supply")) bench.supply = read_supply(file);
   if (file.has("/ambient")) bench.ambient = read_ambient(file);
   if (file.has("/simulation")) bench.simulation = read_simulation(file, std::filesystem::path(path).parent_path());
   bench.text = text;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "compensation/units.hpp"
+#include "profiles/supply_place.hpp"
 
 namespace kphi::profiles {
 
@@ -54,6 +55,7 @@ struct Simulation {
   std::string control;  ///< path of the control line (Unix socket); relative to the system's temporary folder
   std::string faults;   ///< path of a fault script; in the file relative to the file's folder; empty: none
   std::string motor;    ///< path of a simulated motor, likewise; empty: the 2306 that is built in
+  double air_density_kg_m3 = 1.225;  ///< of the simulated air
 };
 
 /// What a person has read off, with standard uncertainties.
@@ -75,8 +77,9 @@ struct Bench {
   std::string name;
   NetBoxPlace netbox;
   MotorPlace iq;
-  int thrust_axis = 2;   ///< 0..2 = Fx, Fy, Fz
-  int thrust_sign = +1;  ///< sign of the axis when the propeller pulls
+  int thrust_axis = 2;                ///< 0..2 = Fx, Fy, Fz
+  int thrust_sign = +1;               ///< sign of the axis when the propeller pulls
+  std::optional<SupplyPlace> supply;  ///< none: what powers the motor is not ours to switch
   AmbientPlace ambient;
   std::optional<Simulation> simulation;
   std::string text;  ///< the file, verbatim

@@ -47,7 +47,7 @@ std::string judge_coefficients(const std::string& path) {
 
 template <class Fault>
 std::string in_words(const Fault& fault) {
-  std::string words = fmt::format("  at {:g} s  {}", to_seconds(fault.at), sim::name_of(fault.kind));
+  std::string words = fmt::format("  at {:g} s  {}", to_seconds(fault.at), name_of(fault.kind));
   if (fault.lasts > Duration{0}) words += fmt::format(" for {:g} s", to_seconds(fault.lasts));
   if (fault.count > 0) words += fmt::format(", {} times at most", fault.count);
   return words + "\n";
@@ -57,8 +57,12 @@ std::string judge_faults(const std::string& path) {
   const std::string text = read_text(path);
   (void)sim::parse_habits(text, path);
   std::string summary;
-  for (const sim::Fault& fault : sim::parse_faults(text, path)) summary += in_words(fault);
-  for (const sim::MotorFault& fault : sim::parse_motor_faults(text, path)) summary += in_words(fault);
+  const auto tell = [&](const auto& script) {
+    for (const auto& fault : script) summary += in_words(fault);
+  };
+  tell(sim::parse_faults(text, path));
+  tell(sim::parse_motor_faults(text, path));
+  tell(sim::parse_supply_faults(text, path));
   return summary;
 }
 

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "results/supply_reading.hpp"
+
 namespace kphi::results {
 
 /// Nanoseconds of bench time since the run's epoch.
@@ -96,7 +98,7 @@ struct LoadCellScale {
 
 /// Everything about a run that is known before the motor turns.
 struct RunHeader {
-  int format = 3;  ///< of the run file: kphi-run/1 to kphi-run/3
+  int format = 4;  ///< of the run file: kphi-run/1 to kphi-run/4
   std::string uuid;
   std::string started_utc;  ///< ISO 8601, Z
   std::string tool_version;
@@ -115,8 +117,11 @@ struct RunHeader {
   int spin = +1;
   double minimum_discard_s = 0;
   LoadCellScale load_cell;
-  std::string motor_identity;    ///< one line: firmware, hardware, uid
-  std::string motor_parameters;  ///< YAML: what the module told of itself, one line each
+  std::string motor_identity;      ///< one line: firmware, hardware, uid
+  std::string motor_parameters;    ///< YAML: what the module told of itself, one line each
+  std::string supply_identity;     ///< one line: model, serial, firmware; empty: none
+  double air_density_kg_m3 = 0;    ///< 0: unknown
+  double air_density_u_kg_m3 = 0;  ///< its standard uncertainty
 };
 
 /// How many samples there should be and are. received + lost_network + lost_host = expected, exactly.
@@ -163,8 +168,9 @@ enum class EventKind : std::uint8_t {
   motor_port_lost,        ///< unplugged
   motor_another_module,   ///< another one answers
   motor_slow_round_trip,  ///< its readings are blurred in time
+  supply_stop,            ///< what the bench supply showed stopped the run
 };
-inline constexpr std::array<const char*, 26> kEventNames{"restarted",
+inline constexpr std::array<const char*, 27> kEventNames{"restarted",
                                                          "rebooted",
                                                          "stalled",
                                                          "stall_ended",
@@ -189,11 +195,14 @@ inline constexpr std::array<const char*, 26> kEventNames{"restarted",
                                                          "motor_lease_expired",
                                                          "motor_port_lost",
                                                          "motor_another_module",
-                                                         "motor_slow_round_trip"};
+                                                         "motor_slow_round_trip",
+                                                         "supply_stop"};
 [[nodiscard]] constexpr const char* name_of(EventKind kind) { return kEventNames[static_cast<std::size_t>(kind)]; }
 
-/// Of the motor module; else of the load cell.
-[[nodiscard]] constexpr bool is_of_motor(EventKind kind) { return kind >= EventKind::motor_connected; }
+/// Of the motor module; else of the load cell, or of the supply.
+[[nodiscard]] constexpr bool is_of_motor(EventKind kind) {
+  return kind >= EventKind::motor_connected && kind <= EventKind::motor_slow_round_trip;
+}
 
 struct StreamEvent {
   EventKind kind{};
@@ -238,7 +247,8 @@ struct RunEnding {
 struct RunRecording : RunEnding {
   RunHeader header;
   std::vector<LoadCellRecord> load_cell;
-  std::vector<MotorReading> motor;  ///< sorted by channel, then time
+  std::vector<MotorReading> motor;    ///< sorted by channel, then time
+  std::vector<SupplyReading> supply;  ///< by time
   std::vector<PhaseMark> phases;
   std::vector<StreamEvent> events;  ///< in the order in which they were noticed
 };

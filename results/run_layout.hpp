@@ -1,4 +1,4 @@
-// Names in a run file (format kphi-run/3; older ones lack some), told once: the writer, the reader and the digest of
+// Names in a run file (format kphi-run/4; older ones lack some), told once: the writer, the reader and the digest of
 // the attributes use this table.
 #pragma once
 
@@ -9,8 +9,8 @@
 
 namespace kphi::results {
 
-inline constexpr int kRunFormat = 3;
-/// "kphi-run/3".
+inline constexpr int kRunFormat = 4;
+/// "kphi-run/4".
 [[nodiscard]] std::string format_name(int format);
 
 /// Calls visit(name, member) for every root attribute that describes the run. `Header` is RunHeader or const RunHeader.
@@ -44,6 +44,10 @@ void for_each_attribute(Header& header, Visit&& visit) {
   visit("motor_identity", header.motor_identity);
   if (header.format >= 2) visit("slots_json", header.load_cell.slots_json);
   if (header.format >= 3) visit("motor_parameters", header.motor_parameters);
+  if (header.format < 4) return;
+  visit("supply_identity", header.supply_identity);
+  visit("air_density_kg_m3", header.air_density_kg_m3);
+  visit("air_density_u_kg_m3", header.air_density_u_kg_m3);
 }
 
 /// Calls visit(name, member) for every root attribute that is written at the end, but for the outcome. `Ending` is

@@ -142,6 +142,43 @@ std::vector<StreamEvent> events_of(const Handle& root, const std::string& file) 
   return events;
 }
 
+std::vector<SupplyReading> supply_of(const Handle& root, const std::string& file) {
+  const Handle group = hdf5::open_group(root, "supply");
+  ColumnReader time(group, "t_ns", H5T_NATIVE_INT64, 8, file);
+  ColumnReader uncertainty(group, "t_uncertainty_ns", H5T_NATIVE_INT64, 8, file);
+  ColumnReader voltage(group, "voltage", H5T_NATIVE_DOUBLE, 8, file);
+  ColumnReader current(group, "current", H5T_NATIVE_DOUBLE, 8, file);
+  ColumnReader set_voltage(group, "set_voltage", H5T_NATIVE_DOUBLE, 8, file);
+  ColumnReader current_limit(group, "current_limit", H5T_NATIVE_DOUBLE, 8, file);
+  ColumnReader regulation(group, "regulation", H5T_NATIVE_UINT8, 1, file);
+  ColumnReader protection(group, "protection", H5T_NATIVE_UINT8, 1, file);
+  ColumnReader output(group, "output", H5T_NATIVE_UINT8, 1, file);
+  const std::uint64_t rows = valid_rows(group, {&time, &uncertainty, &voltage, &current, &set_voltage, &current_limit,
+                                                &regulation, &protection, &output});
+  std::vector<SupplyReading> readings(rows);
+  for (std::uint64_t i = 0; i < rows; ++i) {
+    SupplyReading& reading = readings[i];
+    std::uint8_t codes[3] = {};
+    time.read(i, 1, &reading.time_ns);
+    uncertainty.read(i, 1, &reading.uncertainty_ns);
+    voltage.read(i, 1, &reading.voltage_v);
+    current.read(i, 1, &reading.current_a);
+    set_voltage.read(i, 1, &reading.set_voltage_v);
+    current_limit.read(i, 1, &reading.current_limit_a);
+    regulation.read(i, 1, &codes[0]);
+    protection.read(i, 1, &codes[1]);
+    output.read(i, 1, &codes[2]);
+    if (codes[0] > static_cast<std::uint8_t>(SupplyRegulation::unknown) ||
+        codes[1] > static_cast<std::uint8_t>(SupplyProtection::unknown)) {
+      throw RecordError(fmt::format("{}: supply row {} has an unknown code", file, i));
+    }
+    reading.regulation = static_cast<SupplyRegulation>(codes[0]);
+    reading.protection = static_cast<SupplyProtection>(codes[1]);
+    reading.output = codes[2];
+  }
+  return readings;
+}
+
 void read_outcome(const Handle& root, RunRecording& run) {
   std::int32_t complete = 0;
   hdf5::read_attribute(root, "complete", complete);
@@ -183,6 +220,7 @@ RunRecording read_run(const std::filesystem::path& path) {
     }
     run.phases = phases_of(root, path.string());
     if (run.header.format >= 2) run.events = events_of(root, path.string());
+    if (run.header.format >= 4) run.supply = supply_of(root, path.string());
     read_outcome(root, run);
     return run;
   });

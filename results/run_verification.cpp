@@ -69,6 +69,18 @@ void check_all_columns(const std::filesystem::path& path, int format, Problems& 
                  {"records", H5T_NATIVE_UINT64, 8},
                  {"text", text.get(), kEventTextBytes}},
                 problems);
+  if (format < 4) return;
+  check_columns(root, "supply",
+                {{"t_ns", H5T_NATIVE_INT64, 8},
+                 {"t_uncertainty_ns", H5T_NATIVE_INT64, 8},
+                 {"voltage", H5T_NATIVE_DOUBLE, 8},
+                 {"current", H5T_NATIVE_DOUBLE, 8},
+                 {"set_voltage", H5T_NATIVE_DOUBLE, 8},
+                 {"current_limit", H5T_NATIVE_DOUBLE, 8},
+                 {"regulation", H5T_NATIVE_UINT8, 1},
+                 {"protection", H5T_NATIVE_UINT8, 1},
+                 {"output", H5T_NATIVE_UINT8, 1}},
+                problems);
 }
 
 void check_end(const std::filesystem::path& path, const RunRecording& run, Problems& problems) {

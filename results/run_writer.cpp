@@ -106,6 +106,59 @@ struct ChannelSeries : Series {
   Column &value, &time, &uncertainty;
 };
 
+struct SupplySeries : Series {
+  SupplySeries(const Handle& root, FileLayer& files, const std::string& name)
+      : Series(root, "supply", "what the bench supply showed; no rows without one"),
+        time(add({"t_ns", H5T_STD_I64LE, 8, 0, kMotorChunk, "ns", "midpoint of request and answer, bench time"}, files,
+                 name)),
+        uncertainty(
+            add({"t_uncertainty_ns", H5T_STD_I64LE, 8, 0, kMotorChunk, "ns", "half the round trip"}, files, name)),
+        voltage(number("voltage", "V", "voltage at the supply's terminals", files, name)),
+        current(number("current", "A", "current out of the supply", files, name)),
+        set_voltage(number("set_voltage", "V", "set voltage, as read back", files, name)),
+        current_limit(number("current_limit", "A", "limit of the current, as read back", files, name)),
+        regulation(code("regulation", "0 constant voltage, 1 constant current, 2 unknown", files, name)),
+        protection(code("protection",
+                        "0 none, 1 over-voltage, 2 over-current, 3 over-power, 4 over-temperature, 5 short circuit, "
+                        "6 unknown",
+                        files, name)),
+        output(code("output", "1: on", files, name)) {
+    const std::array all{&uncertainty,   &voltage,    &current,    &set_voltage,
+                         &current_limit, &regulation, &protection, &output};
+    hdf5::make_scale(time.dataset(), "t_ns",
+                     {{&uncertainty.dataset(), 0},
+                      {&voltage.dataset(), 0},
+                      {&current.dataset(), 0},
+                      {&set_voltage.dataset(), 0},
+                      {&current_limit.dataset(), 0},
+                      {&regulation.dataset(), 0},
+                      {&protection.dataset(), 0},
+                      {&output.dataset(), 0}});
+    for (const Column* column : all) hdf5::attach_scales(column->dataset(), {&time.dataset()});
+  }
+  void append(const SupplyReading& reading) {
+    const std::array<std::uint8_t, 3> codes{static_cast<std::uint8_t>(reading.regulation),
+                                            static_cast<std::uint8_t>(reading.protection),
+                                            static_cast<std::uint8_t>(reading.output)};
+    time.append(&reading.time_ns, 1);
+    uncertainty.append(&reading.uncertainty_ns, 1);
+    voltage.append(&reading.voltage_v, 1);
+    current.append(&reading.current_a, 1);
+    set_voltage.append(&reading.set_voltage_v, 1);
+    current_limit.append(&reading.current_limit_a, 1);
+    regulation.append(&codes[0], 1);
+    protection.append(&codes[1], 1);
+    output.append(&codes[2], 1);
+  }
+  Column& number(const char* column, const char* unit, const char* words, FileLayer& files, const std::string& name) {
+    return add({column, H5T_IEEE_F64LE, 8, 0, kMotorChunk, unit, words}, files, name);
+  }
+  Column& code(const char* column, const char* words, FileLayer& files, const std::string& name) {
+    return add({column, H5T_STD_U8LE, 1, 0, kMotorChunk, "1", words}, files, name);
+  }
+  Column &time, &uncertainty, &voltage, &current, &set_voltage, &current_limit, &regulation, &protection, &output;
+};
+
 struct CommandSeries : Series {
   CommandSeries(const Handle& root, FileLayer& files, const std::string& name)
       : Series(root, "commands", "what the runner asked for"),
@@ -203,7 +256,8 @@ struct RunWriter::File {
         load_cell(root, files, path.string()),
         motor(hdf5::create_group(root, "motor")),
         commands(root, files, path.string()),
-        events(root, files, path.string()) {
+        events(root, files, path.string()),
+        supply(root, files, path.string()) {
     for (const MotorChannelInfo& info : kMotorChannels) {
       channels.push_back(std::make_unique<ChannelSeries>(motor, info, files, path.string()));
     }
@@ -218,6 +272,7 @@ struct RunWriter::File {
     for (const auto& channel : channels) channel->flush();
     commands.flush();
     events.flush();
+    supply.flush();
   }
 
   Handle root;
@@ -226,6 +281,7 @@ struct RunWriter::File {
   std::vector<std::unique_ptr<ChannelSeries>> channels;
   CommandSeries commands;
   EventSeries events;
+  SupplySeries supply;
 };
 
 /// Everything that touches the open file goes through here. After the first failure nothing more may reach the disk:
@@ -262,6 +318,12 @@ void RunWriter::append(std::span<const MotorReading> readings) {
     for (const MotorReading& reading : readings) {
       file_->channels.at(static_cast<std::size_t>(reading.channel))->append(reading);
     }
+  });
+}
+
+void RunWriter::append(std::span<const SupplyReading> readings) {
+  guarded([&] {
+    for (const SupplyReading& reading : readings) file_->supply.append(reading);
   });
 }
 

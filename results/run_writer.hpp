@@ -28,6 +28,7 @@ class RunWriter {
 
   void append(std::span<const LoadCellRecord> records);
   void append(std::span<const MotorReading> readings);
+  void append(std::span<const SupplyReading> readings);
   void mark(const PhaseMark& mark);
   void note(const StreamEvent& event);
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -33,7 +34,13 @@ enum class Doubt : std::uint32_t {
   motor_reset = 1u << 20,         ///< the module restarted by itself within the step
   motor_lost = 1u << 21,          ///< the module was lost, or did not do as it was told, within the step
   slow_round_trip = 1u << 22,     ///< the module's readings are blurred in time since then in this run
+  supply_limited = 1u << 24,      ///< the bench supply limited the current within the step
+  supply_off = 1u << 25,          ///< its output was off within the step, or its protection had switched it off
+  supply_sag = 1u << 26,          ///< more than 5 % of its set voltage was missing at its terminals
+  supply_rise = 1u << 27,         ///< its terminals were more than 3 % above the set voltage: the motor fed back
 };
+
+inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 
 struct StepMean {
   std::string propeller;
@@ -59,6 +66,12 @@ struct StepMean {
   double window_begin_s = 0;  ///< since the run's epoch
   double window_end_s = 0;
   std::uint32_t doubts = 0;  ///< bits of Doubt
+  // Beyond the doubts: columns of their own groups, which a file has when one of its steps has them.
+  double supply_v = kNotMeasured;  ///< at the terminals of the bench supply
+  double supply_a = kNotMeasured;  ///< out of it
+  double supply_w = kNotMeasured;  ///< mean of the products
+  double air_density_kg_m3 = kNotMeasured;
+  double air_density_u_kg_m3 = kNotMeasured;  ///< standard uncertainty
 };
 
 }  // namespace kphi::results

@@ -10,7 +10,7 @@
 
 namespace kphi::scpi {
 
-class ScpiSupply final : public supply::Supply {
+class ScpiSupply : public supply::Supply {
  public:
   /// Asks who it is and what it can do (*IDN?, VOLT? MAX, CURR? MAX); writes nothing. `line` and `clock` must outlive
   /// this. Throws DeviceError.

@@ -37,7 +37,11 @@ SimulatedBench::SimulatedBench(const BenchSettings& settings)
       wire_(netbox_, settings.faults, settings.seed ^ kWireStream, settings.keep),
       motor_(module_of(settings), plant_.motor()),
       motor_line_(motor_, {settings.motor_line_paced, settings.time_scale, settings.motor_usb_tick},
-                  settings.motor_faults, settings.seed ^ kLineStream, settings.motor_keep) {}
+                  settings.motor_faults, settings.seed ^ kLineStream, settings.motor_keep) {
+  if (!settings.supply) return;
+  supply_.emplace(*settings.supply);
+  plant_.power([this](double amps, double siemens) { return supply_->advance({amps, siemens}, tick_at_); });
+}
 
 void SimulatedBench::mount(const std::string& propeller_id, double occlusion_deg) {
   const PropellerTruth* propeller = find_propeller(propeller_id);
@@ -58,6 +62,7 @@ void SimulatedBench::mount(const std::string& propeller_id, double occlusion_deg
 void SimulatedBench::advance(Instant now) {
   for (Instant at = time_of_tick(ticks_ + 1); at <= now; at = time_of_tick(ticks_ + 1)) {
     ++ticks_;
+    tick_at_ = at;
     if (at >= motor_line_.next_event()) motor_line_.advance(at);
     plant_.upset(motor_line_.upset());
     motor_.advance(at);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "drivers/clock.hpp"
@@ -11,6 +12,7 @@
 #include "drivers/sim/iq_line.hpp"
 #include "drivers/sim/netbox_device.hpp"
 #include "drivers/sim/plant.hpp"
+#include "drivers/sim/supply_slave.hpp"
 #include "drivers/sim/wire.hpp"
 
 namespace kphi::sim {
@@ -23,7 +25,8 @@ struct BenchSettings {
   double oscillator_gain = 0;  ///< see IqSettings; none, until those who read the speed correct for it
   IqSettings module;           ///< the rest of the module: module_id, oscillator_gain, time_scale and seed are of above
   PlantParameters plant;
-  FaultScript faults;  ///< of the load cell's wire and box; drawn from `seed`
+  std::optional<SupplySettings> supply;  ///< powers the motor, off at first; none: the supply of plant.motor does
+  FaultScript faults;                    ///< of the load cell's wire and box; drawn from `seed`
   FaultyWire::Keep keep = FaultyWire::Keep::totals;
   bool motor_line_paced = false;  ///< see IqLineSettings
   Duration motor_usb_tick{0};     ///< see IqLineSettings
@@ -54,10 +57,13 @@ class SimulatedBench {
   [[nodiscard]] IqDevice& motor() noexcept { return motor_; }
   /// Bytes given to it and taken from it know rate, adapter and faults. It is carried along by advance().
   [[nodiscard]] IqLine& motor_line() noexcept { return motor_line_; }
+  /// nullptr: none was asked for.
+  [[nodiscard]] SupplySlave* supply() noexcept { return supply_ ? &*supply_ : nullptr; }
   [[nodiscard]] const Plant& plant() const noexcept { return plant_; }
   [[nodiscard]] std::uint64_t ticks() const noexcept { return ticks_; }
 
  private:
+  std::optional<SupplySlave> supply_;
   Plant plant_;
   NetBoxDevice netbox_;
   FaultyWire wire_;
@@ -65,6 +71,7 @@ class SimulatedBench {
   IqLine motor_line_;
   std::string mounted_;
   std::uint64_t ticks_ = 0;
+  Instant tick_at_{0};
 };
 
 }  // namespace kphi::sim

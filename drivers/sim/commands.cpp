@@ -87,6 +87,10 @@ void load_faults(const std::string& path, BenchSettings& bench) {
     bench.faults = parse_faults(text, path);
     bench.netbox.habits = parse_habits(text, path);
     bench.motor_faults = parse_motor_faults(text, path);
+    const SupplyFaultScript supply = parse_supply_faults(text, path);
+    if (bench.supply) bench.supply->faults = supply;
+    if (!bench.supply && !supply.empty())
+      throw ConfigurationError(path + ": there are faults of the supply, and the bench file has no supply:");
   } catch (const FileError& error) {
     throw ConfigurationError(error.what());
   }
@@ -99,6 +103,21 @@ void load_motor(const std::string& path, BenchSettings& bench) {
     bench.module.sensors = profile.sensors;
   } catch (const FileError& error) {
     throw ConfigurationError(error.what());
+  }
+}
+
+void load_supply(const profiles::Bench& bench, const Options& options, ServerSettings& settings) {
+  try {
+    const SupplyUri uri = parse_supply_uri(bench.supply->uri);
+    auto& supply = settings.bench.supply.emplace();
+    supply.model = uri.model;
+    supply.slave = uri.slave;
+    supply.seed = bench.simulation->seed;
+    (void)SupplySlave(supply);  // refuses an unknown model
+    settings.supply = uri.places;
+    if (options.free_ports) settings.supply->port = 0;
+  } catch (const std::invalid_argument& error) {
+    refuse(bench, error.what());
   }
 }
 
@@ -120,12 +139,14 @@ ServerSettings settings_of(const profiles::Bench& bench, const Options& options)
   settings.rdt_port = options.free_ports ? 0 : bench.netbox.rdt_port;
   settings.http_port = options.free_ports ? 0 : bench.netbox.http_port;
   settings.tcp_port = options.free_ports ? 0 : bench.netbox.tcp_port;
+  if (bench.supply) load_supply(bench, options, settings);
   if (!bench.simulation->faults.empty()) load_faults(bench.simulation->faults, settings.bench);
   if (!bench.simulation->motor.empty()) load_motor(bench.simulation->motor, settings.bench);
   if (!options.truth_log.empty()) {
     settings.bench.keep = FaultyWire::Keep::datagrams;
     settings.bench.motor_keep = IqLine::Keep::replies;
   }
+  settings.bench.plant.air_density_kg_m3 = bench.simulation->air_density_kg_m3;
   settings.device = bench.iq.device;
   settings.control = bench.simulation->control;
   return settings;
@@ -143,6 +164,12 @@ std::string resolved_text(const profiles::Bench& bench, const Addresses& address
   file["netbox"]["http_port"] = addresses.http_port;
   file["netbox"]["tcp_port"] = addresses.tcp_port;
   file["iq"]["device"] = addresses.device;
+  if (bench.supply && addresses.supply_port != 0) {
+    const std::size_t query = bench.supply->uri.find('?');
+    file["supply"]["uri"] =
+        fmt::format("modbus-tcp:{}:{}{}", parse_supply_uri(bench.supply->uri).places.host.value_or(""),
+                    addresses.supply_port, query == std::string::npos ? "" : bench.supply->uri.substr(query));
+  }
   file["simulation"]["control"] = addresses.control;
   file["simulation"]["time_scale"] = fmt::format("{}", bench.simulation->time_scale);
   file["simulation"]["seed"] = bench.simulation->seed;
@@ -154,13 +181,15 @@ std::string resolved_text(const profiles::Bench& bench, const Addresses& address
 }
 
 std::string ready_line(const profiles::Bench& bench, const Addresses& addresses) {
-  const nlohmann::ordered_json json{{"rdt", fmt::format("{}:{}", addresses.host, addresses.rdt_port)},
-                                    {"http", fmt::format("{}:{}", addresses.host, addresses.http_port)},
-                                    {"tcp", fmt::format("{}:{}", addresses.host, addresses.tcp_port)},
-                                    {"device", addresses.device},
-                                    {"control", addresses.control},
-                                    {"time_scale", bench.simulation->time_scale},
-                                    {"seed", bench.simulation->seed}};
+  nlohmann::ordered_json json{{"rdt", fmt::format("{}:{}", addresses.host, addresses.rdt_port)},
+                              {"http", fmt::format("{}:{}", addresses.host, addresses.http_port)},
+                              {"tcp", fmt::format("{}:{}", addresses.host, addresses.tcp_port)},
+                              {"device", addresses.device},
+                              {"control", addresses.control},
+                              {"time_scale", bench.simulation->time_scale},
+                              {"seed", bench.simulation->seed}};
+  if (!addresses.supply_device.empty()) json["supply"] = addresses.supply_device;
+  if (addresses.supply_port != 0) json["supply"] = fmt::format("{}:{}", addresses.host, addresses.supply_port);
   return json.dump();
 }
 

@@ -59,7 +59,28 @@ std::string status(SimulatedBench& bench) {
                               {"last_motion_command_s", nullptr}};
   const Instant last = bench.motor().last_motion_command();
   if (last >= Instant{0}) json["last_motion_command_s"] = to_seconds(last);
+  if (SupplySlave* supply = bench.supply()) {
+    const SupplyCircuit& circuit = supply->circuit();
+    json["supply"] = {{"output", circuit.output()}, {"volts", circuit.volts()}, {"amps", circuit.amps()}};
+  }
   return json.dump();
+}
+
+/// "kind=supply_trip code=1": of the supply, from now on.
+std::string fail(SimulatedBench& bench, std::vector<std::string> words) {
+  if (bench.supply() == nullptr) return "error this bench has no supply";
+  FaultEntry entry{{"at_s", fmt::format("{}", static_cast<double>(bench.ticks()) * kTick)}};
+  for (std::size_t i = 1; i < words.size(); ++i) {
+    const std::size_t equals = words[i].find('=');
+    if (equals == std::string::npos) return "error '" + words[i] + "' is no key=value";
+    entry[words[i].substr(0, equals)] = words[i].substr(equals + 1);
+  }
+  try {
+    bench.supply()->add_fault(supply_fault_of(entry));
+  } catch (const FaultEntryError& error) {
+    return std::string("error ") + error.what();
+  }
+  return fmt::format("ok {}", entry["at_s"]);
 }
 
 }  // namespace
@@ -68,7 +89,8 @@ std::string control_answer(SimulatedBench& bench, std::string_view line) {
   const auto words = words_of(line);
   if (words.size() == 3 && words[0] == "mount") return mount(bench, words[1], words[2]);
   if (words.size() == 1 && words[0] == "status") return status(bench);
-  return "error say 'mount PROPELLER DEGREES' or 'status'";
+  if (words.size() > 1 && words[0] == "fault") return fail(bench, words);
+  return "error say 'mount PROPELLER DEGREES', 'status' or 'fault kind=supply_...'";
 }
 
 std::string control_path(const std::string& configured) {

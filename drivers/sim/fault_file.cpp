@@ -24,18 +24,22 @@ NetBoxHabits read_habits(const YAML::Node& node, const std::string& path) {
 
 /// Adds the entry to the script if it is of its kind.
 template <class FaultType>
-void read_entry(const YAML::Node& node, const std::string& path, FaultType (*make)(const FaultEntry&), bool of_motor,
-                std::vector<FaultType>& script) {
+void read_entry(const YAML::Node& node, const std::string& path, FaultType (*make)(const FaultEntry&),
+                bool (*belongs)(const FaultEntry&), std::vector<FaultType>& script) {
   FaultEntry entry;
   const auto all = members(node, path);
   for (const auto& [key, value] : all) entry[key] = scalar(key, value, path);
   try {
-    if (is_motor_fault(entry) == of_motor) script.push_back(make(entry));
+    if (belongs(entry)) script.push_back(make(entry));
   } catch (const FaultEntryError& error) {
     const auto at = all.find(error.key);
     refuse(path, at == all.end() ? node.Mark() : at->second.Mark(), error.what(), "mend this entry");
   }
 }
+
+bool is_load_cell_fault(const FaultEntry& entry) { return !is_motor_fault(entry) && !is_supply_fault(entry); }
+bool of_motor(const FaultEntry& entry) { return is_motor_fault(entry); }
+bool of_supply(const FaultEntry& entry) { return is_supply_fault(entry); }
 
 /// Its members, known by name; there is a list of faults.
 std::map<std::string, YAML::Node> file_of(const std::string& text, const std::string& path) {
@@ -54,20 +58,27 @@ std::map<std::string, YAML::Node> file_of(const std::string& text, const std::st
   return all;
 }
 
-}  // namespace
-
-FaultScript parse_faults(const std::string& text, const std::string& path) {
-  FaultScript script;
+template <class FaultType>
+std::vector<FaultType> entries(const std::string& text, const std::string& path, FaultType (*make)(const FaultEntry&),
+                               bool (*belongs)(const FaultEntry&)) {
+  std::vector<FaultType> script;
   const auto file = file_of(text, path);
-  for (const auto& entry : file.at("faults")) read_entry(entry, path, fault_of, false, script);
+  for (const auto& entry : file.at("faults")) read_entry(entry, path, make, belongs, script);
   return script;
 }
 
+}  // namespace
+
+FaultScript parse_faults(const std::string& text, const std::string& path) {
+  return entries(text, path, fault_of, is_load_cell_fault);
+}
+
 MotorFaultScript parse_motor_faults(const std::string& text, const std::string& path) {
-  MotorFaultScript script;
-  const auto file = file_of(text, path);
-  for (const auto& entry : file.at("faults")) read_entry(entry, path, motor_fault_of, true, script);
-  return script;
+  return entries(text, path, motor_fault_of, of_motor);
+}
+
+SupplyFaultScript parse_supply_faults(const std::string& text, const std::string& path) {
+  return entries(text, path, supply_fault_of, of_supply);
 }
 
 NetBoxHabits parse_habits(const std::string& text, const std::string& path) {

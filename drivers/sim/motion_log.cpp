@@ -28,6 +28,10 @@ void MotionLog::look(const IqDevice& motor, double speed, Instant now) {
   if (stages_.empty() || stages_.back().mode != mode) stages_.push_back({now, mode, speed});
 }
 
+void MotionLog::look(const SupplyCircuit& supply, Instant now) {
+  if (outputs_.empty() || outputs_.back().second != supply.output()) outputs_.emplace_back(now, supply.output());
+}
+
 std::string MotionLog::json_lines() const {
   using nlohmann::ordered_json;
   std::string out;
@@ -38,6 +42,7 @@ std::string MotionLog::json_lines() const {
   }
   for (const Stage& stage : stages_)
     add({{"at_ns", stage.at.count()}, {"stage", name_of(stage.mode)}, {"speed_rad_s", stage.speed}});
+  for (const auto& [at, on] : outputs_) add({{"at_ns", at.count()}, {"supply_output", on}});
   return out;
 }
 

@@ -92,6 +92,7 @@ Motor::Circuit Motor::solve(const PowerStage& stage, const Shaft& shaft) const n
 /// Voltage of the bus when the motor draws `conductance` times it plus `amps`: while the supply conducts, or cannot
 /// give more, or is overrun and blocks.
 double Motor::bus_volts(double conductance, double amps) const noexcept {
+  if (source_) return source_(amps + parameters_.idle_current, conductance);
   const double capacitance = parameters_.bus_capacitance * kTicksPerSecond;
   const double source = parameters_.supply_volts + upset_.supply_volts;
   const double resistance = parameters_.source_resistance + upset_.source_resistance;
@@ -115,12 +116,16 @@ void Motor::account(const Circuit& circuit, const Shaft& shaft, double next) noe
   const double bus = std::max(circuit.volts, 1e-3);
   const double module_amps = motor_watts / bus + parameters_.idle_current;
   const double rise = circuit.volts - state_.supply_volts;
-  const double source_amps = module_amps + parameters_.bus_capacitance * rise * kTicksPerSecond;
+  const double source_amps = source_ ? module_amps : module_amps + parameters_.bus_capacitance * rise * kTicksPerSecond;
 
-  energy_.source += (parameters_.supply_volts + upset_.supply_volts) * source_amps * kTick;
-  energy_.source_loss += (parameters_.supply_volts + upset_.supply_volts - circuit.volts) * source_amps * kTick;
-  energy_.bus += 0.5 * parameters_.bus_capacitance * rise * (circuit.volts + state_.supply_volts);
-  energy_.bus_loss += 0.5 * parameters_.bus_capacitance * rise * rise;
+  if (source_) {
+    energy_.source += circuit.volts * source_amps * kTick;
+  } else {
+    energy_.source += (parameters_.supply_volts + upset_.supply_volts) * source_amps * kTick;
+    energy_.source_loss += (parameters_.supply_volts + upset_.supply_volts - circuit.volts) * source_amps * kTick;
+    energy_.bus += 0.5 * parameters_.bus_capacitance * rise * (circuit.volts + state_.supply_volts);
+    energy_.bus_loss += 0.5 * parameters_.bus_capacitance * rise * rise;
+  }
   energy_.electronics += circuit.volts * parameters_.idle_current * kTick;
   energy_.copper += circuit.amps * circuit.amps * circuit.resistance * kTick;
   energy_.drag += shaft.locked ? 0 : shaft.drag * mean * kTick;

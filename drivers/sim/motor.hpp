@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <utility>
 
 #include "drivers/sim/random.hpp"
 
@@ -95,10 +97,17 @@ struct MotorUpset {
   bool locked = false;           ///< the rotor is held
 };
 
+/// Another source on the bus: its voltage at the end of a tick in which the module draws `amps` + `siemens` times that
+/// voltage.
+using BusSource = std::function<double(double amps, double siemens)>;
+
 class Motor {
  public:
   explicit Motor(const MotorParameters& parameters) noexcept;
   void load(const ShaftLoad& load) noexcept { load_ = load; }
+  /// From now on the bus hangs on `source`, which has the capacitance as well; what an upset does to the supply is
+  /// void.
+  void power(BusSource source) { source_ = std::move(source); }
   void upset(const MotorUpset& upset) noexcept { upset_ = upset; }
   void step(const PowerStage& stage, Random& random) noexcept;
   [[nodiscard]] const MotorState& state() const noexcept { return state_; }
@@ -123,6 +132,7 @@ class Motor {
   MotorParameters parameters_;
   ShaftLoad load_;
   MotorUpset upset_;
+  BusSource source_;  ///< empty: the supply of the parameters
   MotorState state_;
   MotorEnergy energy_;
   double resistance_;          ///< whole loop, now

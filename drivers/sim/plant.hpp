@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 
 #include "drivers/sim/load_cell.hpp"
 #include "drivers/sim/motor.hpp"
@@ -13,6 +14,7 @@ namespace kphi::sim {
 struct PlantParameters {
   MotorParameters motor;
   LoadCellParameters load_cell;
+  double air_density_kg_m3 = 1.225;  ///< thrust and drag are those of truth.hpp at 1.225 and proportional to it
 };
 
 class Plant {
@@ -23,6 +25,8 @@ class Plant {
   void mount(const PropellerTruth* propeller, double occlusion_deg) noexcept;
   /// Advances by 1/7000 s.
   void step(const PowerStage& stage) noexcept;
+  /// See Motor::power.
+  void power(BusSource source) { motor_.power(std::move(source)); }
   void upset(const MotorUpset& upset) noexcept { motor_.upset(upset); }
 
   [[nodiscard]] const MotorState& motor() const noexcept { return motor_.state(); }
@@ -35,6 +39,7 @@ class Plant {
   [[nodiscard]] double torque_coefficient() const noexcept { return shaft_.drag; }  ///< N m/(rad/s)², as mounted
 
  private:
+  double density_share_;  ///< of 1.225 kg/m³
   Random random_;
   Motor motor_;
   LoadCell load_cell_;

@@ -61,7 +61,7 @@ bool answers(const sockaddr_un& address) {
 
 Server::Server(const ServerSettings& settings)
     : time_scale_(settings.bench.time_scale),
-      addresses_{settings.host, 0, 0, 0, {}, control_path(settings.control)},
+      addresses_{settings.host, 0, 0, 0, {}, control_path(settings.control), {}, 0},
       bench_(settings.bench),
       keep_motion_(settings.bench.motor_keep == IqLine::Keep::replies),
       stop_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
@@ -84,6 +84,11 @@ Server::Server(const ServerSettings& settings)
   addresses_.http_port = web_.port;
   addresses_.tcp_port = coarse_.port;
   addresses_.device = pty_.path();
+  if (bench_.supply() != nullptr && settings.supply) {
+    supply_.emplace(*settings.supply);
+    addresses_.supply_device = supply_->device();
+    addresses_.supply_port = supply_->port();
+  }
   open_or_close_web();
 }
 
@@ -117,6 +122,7 @@ std::vector<pollfd> Server::polls() const {
   http_.append_polls(all);
   tcp_.append_polls(all);
   control_.append_polls(all);
+  if (supply_) supply_->append_polls(all);
   return all;
 }
 
@@ -181,6 +187,9 @@ void Server::step(Instant now) {
   log_motion(now);
   send_datagrams();
   send_motor();
+  if (!supply_) return;
+  supply_->hear(*bench_.supply(), now);
+  supply_->send(*bench_.supply(), now);
 }
 
 void Server::hear_requests() {
@@ -210,7 +219,9 @@ void Server::hear_motor(Instant now) {
 }
 
 void Server::log_motion(Instant now) {
-  if (keep_motion_) motion_.look(bench_.motor(), bench_.plant().motor().speed, now);
+  if (!keep_motion_) return;
+  motion_.look(bench_.motor(), bench_.plant().motor().speed, now);
+  if (SupplySlave* supply = bench_.supply()) motion_.look(supply->circuit(), now);
 }
 
 void Server::send_datagrams() {

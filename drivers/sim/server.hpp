@@ -6,6 +6,7 @@
 #include <poll.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,17 +17,19 @@
 #include "drivers/sim/listening.hpp"
 #include "drivers/sim/motion_log.hpp"
 #include "drivers/sim/pty.hpp"
+#include "drivers/sim/supply_port.hpp"
 
 namespace kphi::sim {
 
 struct ServerSettings {
-  BenchSettings bench;             ///< time_scale there is also the scale of the clock
-  std::string host = "127.0.0.1";  ///< IPv4 name or address to listen on
-  std::uint16_t rdt_port = 0;      ///< 0: any free one
-  std::uint16_t http_port = 0;     ///< 0: any free one
-  std::uint16_t tcp_port = 0;      ///< 0: any free one; 49151 on a real box
-  std::string device;              ///< symlink to the motor's pseudo-terminal; empty: its own /dev/pts name only
-  std::string control;             ///< path of the control socket; see control_path
+  BenchSettings bench;                 ///< time_scale there is also the scale of the clock
+  std::string host = "127.0.0.1";      ///< IPv4 name or address to listen on
+  std::uint16_t rdt_port = 0;          ///< 0: any free one
+  std::uint16_t http_port = 0;         ///< 0: any free one
+  std::uint16_t tcp_port = 0;          ///< 0: any free one; 49151 on a real box
+  std::string device;                  ///< symlink to the motor's pseudo-terminal; empty: its own /dev/pts name only
+  std::optional<SupplyPlaces> supply;  ///< where bench.supply can be reached
+  std::string control;                 ///< path of the control socket; see control_path
 };
 
 /// Where it can be reached, after ports and names were given out.
@@ -37,6 +40,8 @@ struct Addresses {
   std::uint16_t tcp_port = 0;
   std::string device;
   std::string control;
+  std::string supply_device;      ///< empty: none
+  std::uint16_t supply_port = 0;  ///< 0: none
 };
 
 /// What the transports would not take.
@@ -91,6 +96,7 @@ class Server {
   Listening web_;
   Listening coarse_;
   Pty pty_;
+  std::optional<SupplyPort> supply_;
   Conversations http_;
   Conversations tcp_;
   Conversations control_;

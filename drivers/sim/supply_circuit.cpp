@@ -24,10 +24,11 @@ double SupplyCircuit::step(const SupplyLoad& load, double seconds) noexcept {
   double next = voltage_with(0);
   amps_ = 0;
   limiting_ = false;
-  if (output_ && next < controls_.volts) {
+  const double volts = std::max(0.0, controls_.volts - sag_volts_);
+  if (output_ && next < volts) {
     const double source = 1 / parameters_.source_ohm;
-    next = (c * volts_ + source * controls_.volts - load.amps) / (c + g + source);
-    amps_ = source * (controls_.volts - next);
+    next = (c * volts_ + source * volts - load.amps) / (c + g + source);
+    amps_ = source * (volts - next);
     if (amps_ > controls_.amps) {
       limiting_ = true;
       amps_ = controls_.amps;

@@ -38,6 +38,8 @@ class SupplyCircuit {
   /// Switching on forgets the trip.
   void switch_output(bool on) noexcept;
   void trip(SupplyTrip why) noexcept;
+  /// From now on the source stays below its set voltage by so much.
+  void sag(double volts) noexcept { sag_volts_ = volts; }
 
   /// Returns the voltage at the terminals after `seconds` with this load, V; never negative.
   double step(const SupplyLoad& load, double seconds) noexcept;
@@ -60,6 +62,7 @@ class SupplyCircuit {
   bool output_ = false, limiting_ = false;
   SupplyTrip tripped_ = SupplyTrip::none;
   double volts_ = 0, amps_ = 0, shown_volts_ = 0, shown_amps_ = 0;
+  double sag_volts_ = 0;
   double over_current_s_ = 0, coulombs_ = 0, joules_ = 0;
 };
 

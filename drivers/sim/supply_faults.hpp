@@ -1,5 +1,6 @@
 // The script of what goes wrong on the supply's wire and in the supply, as plain data; entries are written as those of
-// faults.hpp: {at_s: 5, for_s: 1, kind: late, delay_s: 0.55}. Times are bench time.
+// faults.hpp: {at_s: 5, for_s: 1, kind: supply_late, delay_s: 0.55}; `late` there is supply_late here. Times are bench
+// time.
 #pragma once
 
 #include <cstdint>
@@ -30,6 +31,7 @@ enum class SupplyFaultKind : std::uint8_t {
   closed,          ///< port and connection are gone
   trip,            ///< switches itself off: `code` 1 OVP, 2 OCP, 3 OPP, 4 over-heated, 5 short circuit
   panel,           ///< somebody sets `register` to `value` by hand
+  sag,             ///< its source gives way by `volts`
 };
 
 struct SupplyFault {
@@ -42,6 +44,7 @@ struct SupplyFault {
   Duration delay{0};
   int slave = 2, code = 2;
   std::uint16_t address = 0, value = 0;  ///< of a register
+  double volts = 0;
 
   [[nodiscard]] Instant end() const noexcept { return lasts > Duration{0} ? at + lasts : kNever; }
 };
@@ -49,6 +52,9 @@ struct SupplyFault {
 using SupplyFaultScript = std::vector<SupplyFault>;
 
 [[nodiscard]] std::string_view name_of(SupplyFaultKind kind) noexcept;
+
+/// Does this entry of a script belong here, by its kind's name?
+[[nodiscard]] bool is_supply_fault(const FaultEntry& entry) noexcept;
 
 /// Strict: unknown kinds and keys, values out of range and missing keys throw FaultEntryError.
 [[nodiscard]] SupplyFault supply_fault_of(const FaultEntry& entry);

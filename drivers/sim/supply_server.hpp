@@ -5,16 +5,13 @@
 
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "drivers/clock.hpp"
 #include "drivers/sim/descriptor.hpp"
-#include "drivers/sim/listening.hpp"
-#include "drivers/sim/pty.hpp"
+#include "drivers/sim/supply_port.hpp"
 #include "drivers/sim/supply_slave.hpp"
 
 namespace kphi::sim {
@@ -35,8 +32,8 @@ class SupplyServer {
   SupplyServer& operator=(const SupplyServer&) = delete;
 
   /// Where a client opens the serial line.
-  [[nodiscard]] const std::string& device() const noexcept { return device_; }
-  [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
+  [[nodiscard]] const std::string& device() const noexcept { return port_.device(); }
+  [[nodiscard]] std::uint16_t port() const noexcept { return port_.port(); }
   /// Runs until request_stop().
   void run();
   /// From any thread, and from a signal handler.
@@ -48,22 +45,11 @@ class SupplyServer {
   [[nodiscard]] std::vector<pollfd> polls() const;
   [[nodiscard]] int patience();
   void step();
-  void open_or_close(Instant now);
-  void hear_line(Instant now);
-  void welcome();
-  void hear_clients(Instant now);
-  void send(Instant now);
 
   SupplyServerSettings settings_;
   SteadyClock clock_;
   Descriptor stop_;
-  std::optional<Pty> pty_;
-  std::optional<Listening> listening_;
-  std::string device_;
-  std::uint16_t port_ = 0;
-  std::map<int, Descriptor> clients_;  ///< by number; 0 is the serial line's
-  int last_client_ = 0;
-  int quiet_steps_ = 0;  ///< of the serial line
+  SupplyPort port_;
 
   std::mutex mutex_;  ///< run()'s thread and those who inspect
   SupplySlave slave_;

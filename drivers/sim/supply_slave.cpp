@@ -33,13 +33,16 @@ void SupplySlave::add_fault(const SupplyFault& fault) {
 }
 
 double SupplySlave::advance(const SupplyLoad& load, Instant now) {
+  double sag = 0;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     const SupplyFault& fault = settings_.faults[i];
+    if (fault.kind == SupplyFaultKind::sag && now >= fault.at && now < fault.end()) sag += fault.volts;
     if (used_[i] > 0 || now < fault.at) continue;
     if (fault.kind == SupplyFaultKind::trip) circuit_.trip(static_cast<SupplyTrip>(fault.code));
     if (fault.kind == SupplyFaultKind::panel) registers_.write(fault.address, fault.value);
     if (fault.kind == SupplyFaultKind::trip || fault.kind == SupplyFaultKind::panel) ++used_[i];
   }
+  circuit_.sag(sag);
   if (now > reached_) circuit_.step(load, std::min(kLongestStep, to_seconds(now - reached_)));
   reached_ = std::max(reached_, now);
   return circuit_.volts();

@@ -1,6 +1,7 @@
 #include "drivers/supply/modbus_supply.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <stdexcept>
@@ -321,6 +322,9 @@ std::string ModbusSupply::remedy(Failure failure) const {
       break;
   }
   if (!rtu) return "check host, port and network";
+  const char* const device = address_.device.c_str();
+  if (::access(device, F_OK) == 0 && ::access(device, R_OK | W_OK) != 0)
+    return "this user may not open it: install drivers/udev/60-kphi.rules, or join the group dialout";
   const auto names = serial::stable_names();
   if (names.empty()) return "no serial adapter is plugged in; plug it in and try again";
   return fmt::format("plug it in, close other programs; these are there: {}", fmt::join(names, ", "));

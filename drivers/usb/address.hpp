@@ -22,9 +22,10 @@ struct Address {
 /// One device as it is on the bus.
 struct Listing {
   std::uint16_t vendor = 0, product = 0;
-  std::string serial;     ///< empty: it has none, or this user may not ask
-  std::string port_path;  ///< "1-1.4"
-  bool readable = true;   ///< false: this user may not open it
+  std::string serial;       ///< empty: it has none, or this user may not ask
+  std::string port_path;    ///< "1-1.4"
+  bool readable = true;     ///< false: this user may not open it
+  bool instrument = false;  ///< has an interface of the Test and Measurement Class
   friend bool operator==(const Listing&, const Listing&) = default;
 };
 

@@ -23,10 +23,25 @@ std::string port_path(libusb_device* device) {
   return path;
 }
 
+bool is_instrument(libusb_device* device) {
+  constexpr std::uint8_t kApplication = 0xFE, kTestAndMeasurement = 0x03;
+  libusb_config_descriptor* found = nullptr;
+  if (libusb_get_active_config_descriptor(device, &found) != 0) return false;
+  const std::unique_ptr<libusb_config_descriptor, decltype(&libusb_free_config_descriptor)> all(
+      found, &libusb_free_config_descriptor);
+  for (int i = 0; i < all->bNumInterfaces; ++i) {
+    const libusb_interface& one = all->interface[i];
+    if (one.num_altsetting > 0 && one.altsetting[0].bInterfaceClass == kApplication &&
+        one.altsetting[0].bInterfaceSubClass == kTestAndMeasurement)
+      return true;
+  }
+  return false;
+}
+
 Listing listing_without_serial(libusb_device* device) {
   libusb_device_descriptor descriptor{};
   libusb_get_device_descriptor(device, &descriptor);
-  return {descriptor.idVendor, descriptor.idProduct, "", port_path(device), true};
+  return {descriptor.idVendor, descriptor.idProduct, "", port_path(device), true, is_instrument(device)};
 }
 
 std::string serial_of(libusb_device* device, libusb_device_handle* handle) {

@@ -21,20 +21,30 @@ inline std::string kphi() { return KPHI_PROGRAM; }
 
 inline void write(const std::filesystem::path& file, const std::string& text) { std::ofstream(file) << text; }
 
+/// `more`: further lines of the file.
 inline std::string bench_text(const std::filesystem::path& folder, int rdt_port, int http_port, double time_scale,
-                              double rate_hz = 7000) {
+                              double rate_hz = 7000, const std::string& more = "") {
   return fmt::format(
       "format: kphi-bench/1\nname: test\n"
       "netbox: {{host: 127.0.0.1, rdt_port: {}, http_port: {}, rate_hz: {}, records_per_datagram: 40}}\n"
       "iq: {{device: {}/motor, baud: 921600, module_id: 0, spin: +1, telemetry_hz: 50, speed_max_rpm: 19300}}\n"
-      "thrust_axis: \"+Fz\"\nsimulation: {{time_scale: {}, seed: 3, control: {}/control}}\n",
-      rdt_port, http_port, rate_hz, folder.string(), time_scale, folder.string());
+      "thrust_axis: \"+Fz\"\nsimulation: {{time_scale: {}, seed: 3, control: {}/control}}\n{}",
+      rdt_port, http_port, rate_hz, folder.string(), time_scale, folder.string(), more);
+}
+
+/// A supply on a pseudo-terminal that gives what the simulated motor takes at 19,100 RPM.
+inline std::string supply_text(const std::filesystem::path& folder) {
+  return fmt::format(
+      "supply: {{uri: \"modbus-rtu:{}/supply?model=RD6024\", voltage_v: 12, current_limit_a: 24, over_voltage_v: 14, "
+      "over_current_a: 24}}\n",
+      folder.string());
 }
 
 struct Manner {
   double time_scale = 8;
   double rate_hz = 7000;
   std::string faults = "  []\n";  ///< entries of a fault script
+  bool supply = false;            ///< the bench has one of its own
 };
 
 /// `kphi sim` on free ports, in a folder of its own.
@@ -42,7 +52,8 @@ class RunningBench {
  public:
   explicit RunningBench(const Manner& manner = {})
       : process_((write(folder_.path() / "wanted.yaml",
-                        bench_text(folder_.path(), 49152, 8049, manner.time_scale, manner.rate_hz)),
+                        bench_text(folder_.path(), 49152, 8049, manner.time_scale, manner.rate_hz,
+                                   manner.supply ? supply_text(folder_.path()) : "")),
                   write(folder_.path() / "faults.yaml", "format: kphi-faults/1\nfaults:\n" + manner.faults),
                   std::vector<std::string>{kphi(), "sim", path("wanted.yaml"), "--free-ports", "--resolved",
                                            path("bench.yaml"), "--truth", path("truth.yaml"), "--faults",

@@ -1,14 +1,14 @@
 // Every way out of a run ends with the motor coasting, by the simulated motor's own account: within 200 ms of the
-// cause; where nothing that the program says reaches the module, within the module's own timeout and 100 ms.
+// cause; where nothing that the program says reaches the module, within the module's own timeout and 100 ms. Where the
+// bench has a supply, its output is off in the end, unless the program was killed.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <signal.h>
 #include <sys/resource.h>
 
-#include <sstream>
-
 #include "drivers/sim/control_line.hpp"
+#include "test/end_to_end/account.hpp"
 #include "test/end_to_end/running_bench.hpp"
 
 namespace kphi::test {
@@ -21,6 +21,7 @@ constexpr double kPrompt = 200;                // ms
 constexpr double kModuleAlone = 600;           // ms: it is told 0.5 s
 constexpr double kStrikesAt[]{1.8, 3.6, 6.0};  // s, bench time of a scripted fault; the later ones for a busy host
 constexpr int kSteps = 8;
+constexpr double kFullSpeed = 0.99 * 19100 * 2 * 3.14159265358979 / 60;  // rad/s
 constexpr int kKilledBy = 128;
 constexpr int kInterrupted = 130;
 
@@ -28,6 +29,8 @@ constexpr int kInterrupted = 130;
 struct Scene {
   RunningBench& bench;
   Process& run;
+  const char* supply_fault;
+  double& cause_ms;
   [[nodiscard]] json status() const { return json::parse(sim::tell(bench.path("control"), "status")); }
   void await_coast() const {
     const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(10);
@@ -52,6 +55,20 @@ void fill_the_disk(const Scene& scene) {
   ASSERT_EQ(::prlimit(scene.run.pid(), RLIMIT_FSIZE, &nothing, nullptr), 0);
 }
 
+/// In the middle of the step of 19,100 RPM, when the speed has settled.
+void let_the_supply_fail(const Scene& scene) {
+  const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  const auto await = [&](auto&& holds) {
+    while (!holds(scene.status()) && std::chrono::steady_clock::now() < give_up) ::poll(nullptr, 0, 5);
+  };
+  await([](const json& now) { return now["speed_rad_s"] > kFullSpeed; });
+  const double reached_s = scene.status()["bench_time_s"];
+  await([&](const json& now) { return now["bench_time_s"] > reached_s + 0.4; });
+  const std::string answer = sim::tell(scene.bench.path("control"), std::string("fault ") + scene.supply_fault);
+  ASSERT_THAT(answer, testing::StartsWith("ok "));
+  scene.cause_ms = 1e3 * std::stod(answer.substr(3));
+}
+
 void close_the_pipes(const Scene& scene) { scene.run.close_pipes(); }
 
 /// The moment from which the milliseconds count.
@@ -70,15 +87,32 @@ struct Way {
   const char* words = "";  ///< of the program
   double limit_ms = kPrompt;
   bool heard = true;  ///< what the program says still reaches the module
+  const char* supply_fault = nullptr;  ///< of the bench's own supply, at full speed
+  bool switchable = true;              ///< what the program says still reaches the supply
+  /// Those of the motor spoil the supply inside its simulator instead.
+  [[nodiscard]] bool has_supply() const { return std::string_view(fault).find("volt") == std::string_view::npos; }
 };
 
 std::ostream& operator<<(std::ostream& out, const Way& way) { return out << way.name; }
+
+constexpr Way of_supply(const char* name, const char* fault, const char* words, bool switchable = true) {
+  Way way{name, Cause::deed, let_the_supply_fail, "", 4, words};
+  way.supply_fault = fault;
+  way.switchable = switchable;
+  return way;
+}
 
 constexpr auto kDeed = Cause::deed;
 constexpr auto kScript = Cause::script;
 constexpr auto kEnd = Cause::end_of_ramp;
 const Way kWays[] = {
     {"NormalEnd", kEnd, nullptr, "", 0, "next: kphi fit"},
+    of_supply("SupplyOverVoltage", "kind=supply_trip code=1", "over-voltage protection has switched it off"),
+    of_supply("SupplyOverCurrent", "kind=supply_trip code=2", "over-current protection has switched it off"),
+    of_supply("SupplyLimitsTheCurrent", "kind=supply_panel register=9 value=500", "limit"),
+    of_supply("SupplySagsALittle", "kind=supply_sag volts=0.8 for_s=1000", "below the 12 V set"),
+    of_supply("MainsFail", "kind=supply_sag volts=12 for_s=1000", ""),
+    of_supply("SupplyUnplugged", "kind=supply_closed for_s=1000", "supply", false),
     {"Interrupt", kDeed, send<SIGINT>, "", 130, "stopped by request"},
     {"InterruptTwice", kDeed, send<SIGINT, SIGINT>, "", 130, "stopped by request"},
     {"Terminate", kDeed, send<SIGTERM>, "", 130, "stopped by request"},
@@ -105,55 +139,16 @@ const Way kWays[] = {
     {"ModuleDeaf", kScript, nullptr, "kind: motor_deaf, for_s: 1000", 4, "", kModuleAlone, false},
 };
 
-/// What the simulated motor says of itself after the end; times in ms of the bench.
-struct Account {
-  struct Command {
-    double at;
-    std::string mode;
-    double target;
-  };
-  std::vector<Command> commands;
-  std::vector<std::pair<double, std::string>> stages;
-
-  [[nodiscard]] std::string stage_at(double time) const {
-    std::string stage = "coast";
-    for (const auto& [at, name] : stages) {
-      if (at <= time) stage = name;
-    }
-    return stage;
-  }
-  [[nodiscard]] double last_speed_at() const {
-    double last = -1;
-    for (const Command& command : commands) {
-      if (command.mode == "velocity") last = command.at;
-    }
-    return last;
-  }
-};
-
-Account account_of(const std::string& log) {
-  Account account;
-  std::istringstream text(log);
-  for (std::string line; std::getline(text, line);) {
-    if (line.rfind("{\"at_ns\"", 0) != 0) continue;
-    const json item = json::parse(line);
-    const double at = 1e-6 * item["at_ns"].get<double>();
-    if (item.contains("motion_command")) {
-      const std::string mode = item["motion_command"];
-      account.commands.push_back({at, mode, item[mode == "velocity" ? "target_rad_s" : "target"].get<double>()});
-    }
-    if (item.contains("stage")) account.stages.emplace_back(at, item["stage"]);
-  }
-  return account;
-}
-
-std::string campaign_text() {
-  std::string text = short_campaign_text("0", 1, kSteps);
+std::string campaign_text(const Way& way) {
+  const bool full_speed = way.supply_fault != nullptr;
+  std::string text = short_campaign_text("0", 1, full_speed ? 5 : kSteps);
   const auto replace = [&](const std::string& from, const std::string& to) {
     text.replace(text.find(from), from.size(), to);
   };
   replace("zero_s: 0.5", "zero_s: 0.2");
-  replace("last_rpm: 18000", "last_rpm: 9000");
+  replace("last_rpm: 18000", full_speed ? "last_rpm: 19100" : "last_rpm: 9000");
+  if (full_speed) replace("first_rpm: 6000", "first_rpm: 9100");
+  if (full_speed) replace("dwell_s: 0.6", "dwell_s: 1.2");
   return text;
 }
 
@@ -168,14 +163,15 @@ struct Outcome {
 
 Outcome take(const Way& way, double fault_at_s) {
   const std::string fault = way.fault;
-  RunningBench bench({1, 7000, fault.empty() ? "  []\n" : fmt::format("  - {{at_s: {}, {}}}\n", fault_at_s, fault)});
-  write(bench.path("short.yaml"), campaign_text());
+  RunningBench bench(
+      {1, 7000, fault.empty() ? "  []\n" : fmt::format("  - {{at_s: {}, {}}}\n", fault_at_s, fault), way.has_supply()});
+  write(bench.path("short.yaml"), campaign_text(way));
   // The signal that comes with a limit on files is ignored: a full disk sends none.
   std::vector<std::string> command{"bash", "-c", "ulimit -c 0; trap '' XFSZ; exec \"$@\"", "bash"};
   for (const std::string& word : bench.run_command()) command.push_back(word);
   Process run(command);
-  const Scene scene{bench, run};
   Outcome outcome;
+  const Scene scene{bench, run, way.supply_fault, outcome.cause_ms};
   if (way.deed != nullptr) {
     run.wait_for("step  1/");
     outcome.cause_ms = 1e3 * scene.status()["bench_time_s"].get<double>();
@@ -221,6 +217,10 @@ TEST_P(WaysOut, EndWithTheMotorCoasting) {
     EXPECT_EQ(account.commands.back().mode, "coast") << outcome.words;
   }
   EXPECT_THAT(outcome.words, HasSubstr(way.words));
+  if (way.has_supply() && way.switchable && outcome.exit_code < kKilledBy) {
+    ASSERT_FALSE(account.outputs.empty());
+    EXPECT_FALSE(account.outputs.back()) << "the supply's output is on\n" << outcome.words;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, WaysOut, testing::ValuesIn(kWays),

@@ -271,5 +271,45 @@ TEST(Bench, NamesTheKeyThatWasMeant) {
                   "the value in RPM"));
 }
 
+std::string with_power(const std::string& more) {
+  return "format: kphi-bench/1\nname: b\nnetbox: {host: netbox.lab}\niq: {device: /dev/ttyS1, speed_max_rpm: 9000}\n"
+         "thrust_axis: +Fz\n" +
+         more;
+}
+
+constexpr const char* kSupply =
+    "supply: {uri: \"modbus-rtu:/dev/ttyUSB1?model=RD6018\", voltage_v: 12, current_limit_a: 17, over_voltage_v: 14, "
+    "over_current_a: 18}\n";
+
+TEST(Bench, KnowsTheSupply) {
+  const Bench bench = parse_bench(with_power(kSupply), "b.yaml");
+  ASSERT_TRUE(bench.supply);
+  EXPECT_EQ(bench.supply->uri, "modbus-rtu:/dev/ttyUSB1?model=RD6018");
+  EXPECT_EQ(bench.supply->voltage, Volts(12));
+  EXPECT_EQ(bench.supply->current_limit, Amperes(17));
+  EXPECT_EQ(bench.supply->over_voltage, Volts(14));
+  EXPECT_EQ(bench.supply->over_current, Amperes(18));
+}
+
+TEST(Bench, HasNoSupplyAndKnowsNoAirUnlessTheFileSaysSo) {
+  const Bench bench = parse_bench(with_power(""), "b.yaml");
+  EXPECT_FALSE(bench.supply);
+  EXPECT_FALSE(bench.ambient.known());
+}
+
+TEST(Bench, RefusesASupplyThatWouldTripAtOnce) {
+  const auto refused_supply = [](const std::string& from, const std::string& to) {
+    return refusals([&] { return parse_bench(with_power(changed(kSupply, from, to)), "b.yaml"); });
+  };
+  EXPECT_THAT(refused_supply("over_voltage_v: 14", "over_voltage_v: 12"),
+              ElementsAre(testing::HasSubstr("supply.over_voltage_v: 12 V is not above the 12 V of voltage_v")));
+  EXPECT_THAT(refused_supply("over_current_a: 18", "over_current_a: 16.9"),
+              ElementsAre(testing::HasSubstr("supply.over_current_a: 16.9 A is below the 17 A of current_limit_a")));
+  EXPECT_THAT(refused_supply("modbus-rtu:", "riden:"),
+              ElementsAre(testing::HasSubstr("write modbus-rtu:/dev/ttyUSB1")));
+  EXPECT_THAT(refused_supply("current_limit_a: 17, ", ""),
+              ElementsAre(testing::HasSubstr("supply.current_limit_a is missing")));
+}
+
 }  // namespace
 }  // namespace kphi::profiles

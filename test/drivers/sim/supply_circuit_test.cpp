@@ -41,6 +41,17 @@ TEST(SupplyCircuit, HoldsTheCurrentWhenTheLoadWantsMore) {
   EXPECT_FALSE(circuit.limiting());
 }
 
+TEST(SupplyCircuit, StaysBelowItsSetVoltageWhileItSags) {
+  SupplyCircuit circuit = at_twelve_volts();
+  circuit.sag(3);
+  run(circuit, {1, 0}, 0.2);
+  EXPECT_NEAR(circuit.volts(), 9 - 0.020, 1e-3);
+  EXPECT_EQ(circuit.controls().volts, 12);
+  circuit.sag(0);
+  run(circuit, {1, 0}, 0.2);
+  EXPECT_NEAR(circuit.volts(), 12 - 0.020, 1e-3);
+}
+
 TEST(SupplyCircuit, TakesNoCurrentBack) {
   SupplyCircuit circuit = at_twelve_volts();
   circuit.controls().over_volts = 100;

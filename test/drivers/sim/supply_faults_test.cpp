@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "drivers/sim/fault_file.hpp"
+
 namespace kphi::sim {
 namespace {
 
@@ -17,23 +19,33 @@ std::string refusal(const FaultEntry& entry) {
 }
 
 TEST(SupplyFaults, AreReadFromAnEntry) {
-  const SupplyFault late = supply_fault_of({{"kind", "late"}, {"at_s", "1.5"}, {"for_s", "2"}, {"delay_s", "0.55"}});
+  const SupplyFault late =
+      supply_fault_of({{"kind", "supply_late"}, {"at_s", "1.5"}, {"for_s", "2"}, {"delay_s", "0.55"}});
   EXPECT_EQ(late.kind, SupplyFaultKind::late);
   EXPECT_EQ(late.at, 1500ms);
   EXPECT_EQ(late.end(), 3500ms);
   EXPECT_EQ(late.delay, 550ms);
-  const SupplyFault panel = supply_fault_of({{"kind", "panel"}, {"at_s", "1"}, {"register", "8"}, {"value", "1100"}});
+  const SupplyFault panel =
+      supply_fault_of({{"kind", "supply_panel"}, {"at_s", "1"}, {"register", "8"}, {"value", "1100"}});
   EXPECT_EQ(panel.address, 8);
   EXPECT_EQ(panel.value, 1100);
-  const SupplyFault crc = supply_fault_of({{"kind", "bad_crc"}, {"at_s", "0"}, {"count", "3"}, {"p", "0.5"}});
+  const SupplyFault crc = supply_fault_of({{"kind", "supply_bad_crc"}, {"at_s", "0"}, {"count", "3"}, {"p", "0.5"}});
   EXPECT_EQ(crc.count, 3u);
   EXPECT_EQ(crc.p, 0.5);
   EXPECT_EQ(crc.end(), kNever);
+  EXPECT_EQ(supply_fault_of({{"kind", "supply_sag"}, {"at_s", "1"}, {"for_s", "1"}, {"volts", "4.5"}}).volts, 4.5);
+}
+
+TEST(SupplyFaults, AreKnownByTheirPrefix) {
+  EXPECT_TRUE(is_supply_fault({{"kind", "supply_trip"}}));
+  EXPECT_FALSE(is_supply_fault({{"kind", "motor_sag"}}));
+  EXPECT_FALSE(is_supply_fault({}));
 }
 
 TEST(SupplyFaults, OfEveryKindHaveAName) {
-  for (const char* name : {"bad_crc", "no_reply", "deaf", "truncated", "garbage", "wrong_slave", "wrong_transaction",
-                           "echo", "exception", "ignored_writes"}) {
+  for (const char* name :
+       {"supply_bad_crc", "supply_no_reply", "supply_deaf", "supply_truncated", "supply_garbage", "supply_wrong_slave",
+        "supply_wrong_transaction", "supply_echo", "supply_exception", "supply_ignored_writes"}) {
     const SupplyFault fault = supply_fault_of({{"kind", name}, {"at_s", "0"}, {"count", "1"}});
     EXPECT_EQ(name_of(fault.kind), name);
   }
@@ -41,16 +53,30 @@ TEST(SupplyFaults, OfEveryKindHaveAName) {
 
 TEST(SupplyFaults, AreStrict) {
   EXPECT_EQ(refusal({{"at_s", "0"}}), ": the kind is missing");
-  EXPECT_EQ(refusal({{"kind", "bad_crc"}, {"at_s", "0"}}), ": bad_crc needs for_s or count");
-  EXPECT_EQ(refusal({{"kind", "bad_crc"}, {"count", "1"}}), ": bad_crc needs at_s");
-  EXPECT_EQ(refusal({{"kind", "closed"}, {"at_s", "0"}, {"count", "1"}}), "count: closed has no 'count'");
-  EXPECT_EQ(refusal({{"kind", "late"}, {"at_s", "0"}, {"count", "1"}}), ": late needs delay_s");
-  EXPECT_EQ(refusal({{"kind", "trip"}, {"at_s", "0"}, {"code", "6"}}), "code: 6 is outside 1 to 5");
-  EXPECT_EQ(refusal({{"kind", "trip"}, {"at_s", "0"}, {"code", "1.5"}}), "code: 1.5 is not whole");
-  EXPECT_EQ(refusal({{"kind", "trip"}, {"at_s", "x"}, {"code", "1"}}), "at_s: 'x' is no number");
-  EXPECT_EQ(refusal({{"kind", "trip"}, {"at_s", "nan"}, {"code", "1"}}), "at_s: 'nan' is no number");
+  EXPECT_EQ(refusal({{"kind", "supply_bad_crc"}, {"at_s", "0"}}), ": supply_bad_crc needs for_s or count");
+  EXPECT_EQ(refusal({{"kind", "supply_bad_crc"}, {"count", "1"}}), ": supply_bad_crc needs at_s");
+  EXPECT_EQ(refusal({{"kind", "supply_closed"}, {"at_s", "0"}, {"count", "1"}}), "count: supply_closed has no 'count'");
+  EXPECT_EQ(refusal({{"kind", "supply_late"}, {"at_s", "0"}, {"count", "1"}}), ": supply_late needs delay_s");
+  EXPECT_EQ(refusal({{"kind", "supply_trip"}, {"at_s", "0"}, {"code", "6"}}), "code: 6 is outside 1 to 5");
+  EXPECT_EQ(refusal({{"kind", "supply_trip"}, {"at_s", "0"}, {"code", "1.5"}}), "code: 1.5 is not whole");
+  EXPECT_EQ(refusal({{"kind", "supply_trip"}, {"at_s", "x"}, {"code", "1"}}), "at_s: 'x' is no number");
+  EXPECT_EQ(refusal({{"kind", "supply_trip"}, {"at_s", "nan"}, {"code", "1"}}), "at_s: 'nan' is no number");
   EXPECT_NE(refusal({{"kind", "loss"}, {"at_s", "0"}, {"count", "1"}}).find("no fault of the supply is called 'loss'"),
             std::string::npos);
+}
+
+TEST(SupplyFaults, StandInOneScriptWithThoseOfTheOtherDevices) {
+  const std::string text =
+      "format: kphi-faults/1\nfaults:\n"
+      "  - {at_s: 1, kind: reboot, down_s: 1}\n"
+      "  - {at_s: 2, kind: supply_trip, code: 2}\n"
+      "  - {at_s: 3, kind: motor_locked, for_s: 1}\n";
+  EXPECT_EQ(parse_faults(text, "f.yaml").size(), 1u);
+  EXPECT_EQ(parse_motor_faults(text, "f.yaml").size(), 1u);
+  const SupplyFaultScript script = parse_supply_faults(text, "f.yaml");
+  ASSERT_EQ(script.size(), 1u);
+  EXPECT_EQ(script[0].kind, SupplyFaultKind::trip);
+  EXPECT_EQ(script[0].code, 2);
 }
 
 }  // namespace

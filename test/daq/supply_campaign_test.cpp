@@ -1,0 +1,151 @@
+// Campaigns on the deterministic bench whose motor hangs on the simulated supply.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daq/campaign_run.hpp"
+#include "daq/deterministic_bench.hpp"
+#include "daq/reduction.hpp"
+#include "results/campaign_verification.hpp"
+#include "results/run_reader.hpp"
+#include "results/steps_csv.hpp"
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using testing::HasSubstr;
+
+profiles::Bench powered_place(double current_limit_a) {
+  profiles::Bench place = test::deterministic_place(4);
+  place.supply =
+      profiles::SupplyPlace{"modbus-rtu:/dev/null", Volts(12), Amperes(current_limit_a), Volts(13.5), Amperes(60)};
+  return place;
+}
+
+class NoteMotor final : public Progress {
+ public:
+  void tick(const Position& position, const Observation&) override {
+    if (act) act(position);
+  }
+  void step_done(const Position&, const Observation&) override {}
+  void say(const std::string&) override {}
+  std::function<void(const Position&)> act;
+};
+
+class SupplyCampaign : public testing::Test {
+ protected:
+  CampaignResult run(double current_limit_a = 50) {
+    place_ = powered_place(current_limit_a);
+    bench_.emplace(place_);
+    results_.emplace(results::CampaignFolder::create(folder_.path(), "u", "c"));
+    AgreeingOperator person;
+    return run_campaign(*bench_, campaign_, place_, *results_, person, progress_, [] { return false; });
+  }
+  sim::SupplyCircuit& circuit() { return bench_->simulation().supply()->circuit(); }
+  [[nodiscard]] results::RunRecording aborted() const {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path())) {
+      if (entry.path().string().ends_with(".aborted.h5")) return results::read_run(entry.path());
+    }
+    ADD_FAILURE() << "no aborted run";
+    return {};
+  }
+  /// Runs into `reason`, after `act` was done in the middle of the third step; then what every safety stop must leave
+  /// is held.
+  void expect_stop(double limit_a, std::function<void()> act, const std::string& reason) {
+    int ticks = 0;
+    progress_.act = [&](const Position& position) {
+      if (position.step == 2 && ++ticks == 30) act();
+    };
+    try {
+      (void)run(limit_a);
+      FAIL() << "nothing stopped the run";
+    } catch (const SafetyStop& stop) {
+      EXPECT_THAT(stop.what(), HasSubstr(reason));
+    }
+    EXPECT_FALSE(circuit().output());
+    bench_->wait_until(bench_->clock().now() + std::chrono::milliseconds(200));
+    EXPECT_EQ(bench_->simulation().motor().stage().mode, sim::PowerStage::Mode::coast);
+    const results::RunRecording kept = aborted();
+    EXPECT_THAT(kept.outcome_reason, HasSubstr(reason));
+    EXPECT_GT(kept.load_cell.size(), 5000u);
+    EXPECT_GT(kept.supply.size(), 3u);
+  }
+
+  test::TemporaryFolder folder_;
+  profiles::Campaign campaign_ = test::short_campaign("0, 90");
+  profiles::Bench place_;
+  std::optional<DeterministicBench> bench_;
+  std::optional<results::CampaignFolder> results_;
+  NoteMotor progress_;
+};
+
+TEST_F(SupplyCampaign, RecordsWhatTheSupplyShows) {
+  const CampaignResult result = run();
+  EXPECT_EQ(result.runs, 2);
+  EXPECT_EQ(result.doubtful_steps, 0);
+  const auto recording = results::read_run(results_->complete_runs(campaign_.occlusions_deg).at(0));
+  EXPECT_EQ(recording.header.supply_identity, "simulated supply");
+  ASSERT_GT(recording.supply.size(), 8u);
+  for (const auto& reading : recording.supply) {
+    EXPECT_EQ(reading.output, 1u);
+    EXPECT_EQ(reading.set_voltage_v, 12);
+    EXPECT_EQ(reading.current_limit_a, 50);
+  }
+  EXPECT_TRUE(results::verify_run(results_->complete_runs(campaign_.occlusions_deg).at(0)).whole());
+}
+
+TEST_F(SupplyCampaign, GivesPowerPerStepAsTheModuleSawIt) {
+  (void)run();
+  const auto steps = results::read_steps(results_->steps());
+  ASSERT_EQ(steps.size(), 8u);
+  for (const auto& step : steps) {
+    EXPECT_NEAR(step.supply_a, step.supply_current_a, 0.1 * step.supply_current_a + 0.1) << step.step;
+    EXPECT_NEAR(step.supply_v, 12 - 0.020 * step.supply_a, 0.02) << step.step;
+    EXPECT_NEAR(step.supply_w, step.supply_v * step.supply_a, 0.02 * step.supply_w) << step.step;
+    EXPECT_NEAR(step.supply_voltage_v, step.supply_v, 0.1) << "one circuit";
+  }
+  EXPECT_GT(steps[3].supply_w, 3 * steps[0].supply_w);
+}
+
+TEST_F(SupplyCampaign, StepsWithoutASupplyHaveNoSuchColumns) {
+  results::StepMean step;
+  EXPECT_THAT(results::format_steps({&step, 1}), testing::Not(HasSubstr("supply_w")));
+  step.supply_v = step.supply_a = step.supply_w = 2;
+  EXPECT_THAT(results::format_steps({&step, 1}), HasSubstr(",doubts,supply_v,supply_a,supply_w\n"));
+}
+
+TEST_F(SupplyCampaign, StopsWhenTheSupplyLimitsTheCurrent) {
+  expect_stop(
+      50, [&] { circuit().controls().amps = 0.9 * circuit().amps(); }, "it limits the current");
+}
+
+TEST_F(SupplyCampaign, StopsWhenItsProtectionTrips) {
+  expect_stop(
+      50, [&] { circuit().trip(sim::SupplyTrip::over_voltage); }, "over-voltage protection has switched it off");
+}
+
+TEST_F(SupplyCampaign, StopsWhenSomebodyTurnsTheKnob) {
+  expect_stop(
+      50, [&] { circuit().controls().volts = 11.8; }, "somebody has turned a knob");
+}
+
+TEST_F(SupplyCampaign, IsTheSameForTheSameSeed) {
+  (void)run();
+  const std::string first = results::read_text(results_->steps());
+  std::filesystem::remove_all(results_->path());
+  (void)run();
+  EXPECT_EQ(results::read_text(results_->steps()), first);
+}
+
+TEST_F(SupplyCampaign, CoastsWithinAFifthOfASecondOfTheReading) {
+  expect_stop(
+      50, [&] { circuit().trip(sim::SupplyTrip::over_current); }, "over-current");
+  const results::RunRecording kept = aborted();
+  const auto first = std::find_if(kept.supply.begin(), kept.supply.end(), [](const auto& r) { return r.output == 0; });
+  ASSERT_NE(first, kept.supply.end());
+  // The motor was let go before the stream ended, and the bridge is open soon after (expect_stop).
+  EXPECT_LT(kept.load_cell.back().arrival_ns - first->time_ns, 200'000'000);
+}
+
+}  // namespace
+}  // namespace kphi::daq

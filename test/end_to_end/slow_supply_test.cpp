@@ -1,0 +1,58 @@
+// A supply as slow as stock firmware, 10 answers a second over a true pseudo-terminal, some of them so late that nobody
+// waits for them any more, beside 7000 load-cell samples a second over true UDP.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "results/run_reader.hpp"
+#include "results/steps_csv.hpp"
+#include "test/end_to_end/running_bench.hpp"
+
+namespace kphi::test {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr double kTimeout = 0.5;  // s: what the driver waits for an answer
+
+/// An answer that leaves 50 ms after the driver has given up, with 11 V in it, which no other answer has.
+std::string late_answer(double at_s) {
+  return fmt::format(
+      "  - {{at_s: {0}, count: 1, kind: supply_late, delay_s: {1}}}\n"
+      "  - {{at_s: {0}, for_s: 0.3, kind: supply_reads_as, register: 10, value: 1100}}\n",
+      at_s, kTimeout + 0.05);
+}
+
+std::filesystem::path the_run_in(const std::filesystem::path& results) {
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(results)) {
+    if (entry.path().string().ends_with("rep1.h5")) return entry.path();
+  }
+  return {};
+}
+
+TEST(SlowSupply, DisturbsNothingAndNoneOfItsLateAnswersBecomesAValue) {
+  RunningBench bench({1, 7000, late_answer(2.2) + late_answer(3.6) + late_answer(5.0) + late_answer(6.4), true});
+  write(bench.path("short.yaml"), short_campaign_text("0", 1, 6));
+  Process run(bench.run_command());
+  ASSERT_EQ(run.wait(), 0) << run.err();
+  const results::RunRecording kept = results::read_run(the_run_in(bench.path("results")));
+
+  EXPECT_EQ(kept.account.lost_network + kept.account.lost_host, 0u);
+  for (std::size_t i = 0; i + 1 < kept.phases.size(); ++i) {
+    if (kept.phases[i].phase != results::Phase::step) continue;
+    const double lasted = 1e-9 * static_cast<double>(kept.phases[i + 1].time_ns - kept.phases[i].time_ns);
+    EXPECT_NEAR(lasted, 0.6, 0.1) << "step " << kept.phases[i].step;
+  }
+
+  ASSERT_GT(kept.supply.size(), 8u);
+  std::int64_t longest = 0;
+  for (std::size_t i = 0; i < kept.supply.size(); ++i) {
+    EXPECT_GT(kept.supply[i].voltage_v, 11.3) << "a late answer";
+    EXPECT_EQ(kept.supply[i].set_voltage_v, 12);
+    if (i > 0) longest = std::max(longest, kept.supply[i].time_ns - kept.supply[i - 1].time_ns);
+  }
+  EXPECT_GT(longest, static_cast<std::int64_t>(kTimeout * kSecond)) << "no answer was late: this test showed nothing";
+}
+
+}  // namespace
+}  // namespace kphi::test

@@ -1,0 +1,91 @@
+// One simulated propeller in thin and in dense air, each through campaign, recording, reduction and identification: the
+// coefficients differ as the air does, those in standard air not at all.
+#include <gtest/gtest.h>
+
+#include "daq/campaign_run.hpp"
+#include "daq/deterministic_bench.hpp"
+#include "drivers/ambient/air.hpp"
+#include "fit/identification.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/steps_csv.hpp"
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::test {
+namespace {
+
+class Silence final : public daq::Progress {
+ public:
+  void tick(const daq::Position&, const daq::Observation&) override {}
+  void step_done(const daq::Position&, const daq::Observation&) override {}
+  void say(const std::string&) override {}
+};
+
+/// Pa, at 20 °C and half the humidity that the air can hold.
+double pressure_of(double kg_m3) {
+  double low = ambient::kLowestPressure, high = ambient::kHighestPressure;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (ambient::density_of({20, middle, 0.5, 0.1, 10, 0.01}).kg_m3 < kg_m3 ? low : high) = middle;
+  }
+  return low;
+}
+
+/// Nothing but the air disturbs this bench.
+sim::BenchSettings quiet() {
+  sim::BenchSettings settings;
+  settings.module.sensors.perfect = true;
+  settings.plant.motor.turbulence = 0;
+  auto& cell = settings.plant.load_cell;
+  cell.noise = cell.zero_spread = cell.drift_per_minute = cell.walk_per_root_minute = {};
+  cell.once_per_turn = cell.blade_pass = cell.blade_pass_occluded = 0;
+  return settings;
+}
+
+profiles::Bench place_in(double kg_m3) {
+  std::string text = deterministic_place(5).text;
+  const std::string seed = "seed: 5";
+  text.replace(text.find(seed), seed.size(), fmt::format("{}, air_density_kg_m3: {}", seed, kg_m3));
+  text += fmt::format(
+      "ambient: {{manual: {{temperature_c: 20, pressure_pa: {}, relative_humidity: 0.5, u_temperature_c: 0.1, "
+      "u_pressure_pa: 10, u_relative_humidity: 0.01}}}}\n",
+      pressure_of(kg_m3));
+  return profiles::parse_bench(text, "bench.yaml");
+}
+
+profiles::Campaign patient_campaign() {
+  std::string text = short_campaign_text("0, 90, 180", 1, 3);
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    text.replace(text.find(from), from.size(), to);
+  };
+  replace("dwell_s: 0.6", "dwell_s: 2.5");
+  replace("minimum_discard_s: 0.3", "minimum_discard_s: 2");
+  return profiles::parse_campaign(text, "patient.yaml");
+}
+
+fit::Identification identified_in(double kg_m3) {
+  const TemporaryFolder folder;
+  const profiles::Bench place = place_in(kg_m3);
+  const profiles::Campaign campaign = patient_campaign();
+  daq::DeterministicBench bench(place, quiet());
+  const auto results = results::CampaignFolder::create(folder.path(), "u", "c");
+  daq::AgreeingOperator person;
+  Silence silence;
+  (void)daq::run_campaign(bench, campaign, place, results, person, silence, [] { return false; });
+  return fit::identify(results::read_steps(results.steps()));
+}
+
+TEST(StandardAir, GivesTheSamePropellerTheSameCoefficientsInAnyAir) {
+  const fit::Identification thin = identified_in(1.10), dense = identified_in(1.25);
+  ASSERT_TRUE(thin.air && dense.air);
+  EXPECT_NEAR(thin.air->kg_m3, 1.10, 1e-9);
+  EXPECT_NEAR(dense.air->kg_m3, 1.25, 1e-9);
+  ASSERT_EQ(thin.table.size(), 3u);
+  for (std::size_t i = 0; i < thin.table.size(); ++i) {
+    EXPECT_NEAR(dense.table[i].k / thin.table[i].k, 1.25 / 1.10, 1e-6);
+    ASSERT_TRUE(thin.table[i].standard && dense.table[i].standard);
+    EXPECT_NEAR(dense.table[i].standard->k / thin.table[i].standard->k, 1, 1e-6) << thin.table[i].phi_deg << "°";
+  }
+}
+
+}  // namespace
+}  // namespace kphi::test
