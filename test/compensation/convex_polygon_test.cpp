@@ -48,7 +48,7 @@ bool contains(const ConvexPolygon& body, double x, double y) {
 
 /// Counts rings and directions of the disk, weighing rings by r (area) or r² (load): a coarse second opinion.
 double counted(const ConvexPolygon& body, double radius, double x, double y, OverlapMeasure measure) {
-  constexpr int kRings = 200, kDirections = 400;
+  constexpr int kRings = 40, kDirections = 600;
   double covered = 0, all = 0;
   for (int ring = 0; ring < kRings; ++ring) {
     const double r = measure == OverlapMeasure::rim_arc ? radius : radius * (ring + 0.5) / kRings;
