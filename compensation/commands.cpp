@@ -21,11 +21,21 @@ struct Request {
   bool json = false;
 };
 
+/// By name and file; Compensator::build would refuse it, too.
+void require_one_measure(const ThrustLine& line, const profiles::Vehicle& vehicle, const Request& request) {
+  if (line.overlap() == vehicle.overlap) return;
+  const std::string fitted(name_of(line.overlap())), flown(name_of(vehicle.overlap));
+  throw ConfigurationError(request.coefficients + ": fitted with overlap " + fitted + ", but " + request.vehicle +
+                           " flies with " + flown + "; write `overlap: " + fitted +
+                           "` in the vehicle file, or fit again with " + flown);
+}
+
 Compensator compensator_of(const Request& request) {
   const ThrustLine line = thrust_line(load_coefficients(request.coefficients));
   const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
+  require_one_measure(line, vehicle, request);
   const ScalingLaw law = request.law == "published" ? ScalingLaw::published : ScalingLaw::clamped;
-  const BuildOutcome outcome = Compensator::build({line, line, line, line}, airframe_of(vehicle), law);
+  const BuildOutcome outcome = Compensator::build({line, line, line, line}, profiles::airframe_of(vehicle), law);
   if (!outcome.compensator) throw ConfigurationError(request.vehicle + ": " + describe(outcome.refusal));
   if (outcome.doubts[0].gains_with_occlusion) {
     std::cerr << request.coefficients << ": the line does not fall with occlusion; is this the right file?\n";
@@ -62,21 +72,6 @@ int compensate(const Request& request) {
 }
 
 }  // namespace
-
-Airframe airframe_of(const profiles::Vehicle& vehicle) {
-  Airframe airframe{vehicle.half_side, vehicle.arm_length, vehicle.propeller_radius,
-                    vehicle.speed_min, vehicle.speed_max,  {}};
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double quarters = vehicle.hinge_turn_deg[i] / 90.0;
-    if (quarters != 0 && quarters != 1 && quarters != 2 && quarters != 3) {
-      throw ConfigurationError(vehicle.path +
-                               ": a hinge turn is not one of 0, 90, 180, 270 degrees; "
-                               "an arm hangs on a corner of the square body, give that corner");
-    }
-    airframe.hinge_turns[i] = static_cast<int>(quarters);
-  }
-  return airframe;
-}
 
 void add_compensate(CLI::App& program, int& exit_code) {
   auto request = std::make_shared<Request>();

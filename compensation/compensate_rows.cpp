@@ -29,7 +29,8 @@ constexpr FlagName kFlagNames[] = {{Flag::thrust_nan, "thrust_nan"},
                                    {Flag::speed_at_fastest, "speed_at_fastest"},
                                    {Flag::arm_angle_unknown, "arm_angle_unknown"},
                                    {Flag::beyond_fit, "beyond_fit"},
-                                   {Flag::at_floor, "at_floor"}};
+                                   {Flag::at_floor, "at_floor"},
+                                   {Flag::at_ceiling, "at_ceiling"}};
 
 std::string_view trimmed(std::string_view text) {
   const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };

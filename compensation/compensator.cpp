@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "compensation/occlusion.hpp"
+
 namespace kphi::compensation {
 namespace {
 
@@ -100,42 +102,43 @@ Compensator::Compensator(const std::array<ThrustLine, 4>& lines, const Airframe&
       law_(law),
       lines_(lines),
       airframe_(airframe),
-      outline_(airframe.polygon ? airframe.polygon->outline : ConvexPolygon::square(airframe.half_side)),
       contact_free_(window_of(airframe)) {
   arm_angles_.fill(Radians(std::numeric_limits<double>::quiet_NaN()));  // differs from every first angle
   for (std::size_t i = 0; i < lines_.size(); ++i) apply_occlusion(i);
 }
 
-void Compensator::set_arms(const std::array<Radians, 4>& arm_angles) noexcept {
-  for (std::size_t i = 0; i < arm_angles.size(); ++i) {
-    const Radians angle = arm_angles[i];
-    if (angle == arm_angles_[i] && !arm_flags_[i].has(Flag::arm_angle_unknown)) continue;
-    if (!std::isfinite(angle.value())) {
-      arm_flags_[i] = arm_flags_[i].with(Flag::arm_angle_unknown, true);
-      continue;
-    }
-    arm_angles_[i] = angle;
-    arm_flags_[i] = Flags();
-    if (contact_free_.contains(angle)) {
-      if (occlusion_angles_[i].value() == 0.0) continue;
-      occlusion_angles_[i] = Radians(0.0);
-    } else {
-      occlusion_angles_[i] = occlusion_at(i, angle);
-    }
-    apply_occlusion(i);
+Compensator::Arm Compensator::take(std::size_t i, Radians angle) noexcept {
+  if (angle == arm_angles_[i] && !arm_flags_[i].has(Flag::arm_angle_unknown)) return Arm::at_rest;
+  if (!std::isfinite(angle.value())) {
+    arm_flags_[i] = arm_flags_[i].with(Flag::arm_angle_unknown, true);
+    return Arm::at_rest;
   }
+  arm_angles_[i] = angle;
+  arm_flags_[i] = Flags();
+  if (!contact_free_.contains(angle)) return Arm::near_body;
+  return occlusion_angles_[i].value() == 0.0 ? Arm::at_rest : Arm::left_body;
 }
 
-Radians Compensator::occlusion_at(std::size_t arm, Radians arm_angle) const noexcept {
-  if (airframe_.polygon) {
-    const HubPosition hub = hub_at_hinge(airframe_.polygon->hinges[arm], airframe_.arm_length, arm_angle);
-    return occlusion_angle(outline_, airframe_.propeller_radius, hub, airframe_.overlap);
+void Compensator::set_arms(const std::array<Radians, 4>& arm_angles) noexcept {
+  // In passes over all arms: the long calls of one pass do not wait for each other.
+  std::array<Arm, 4> arms{};
+  bool all_at_rest = true;
+  for (std::size_t i = 0; i < 4; ++i) {
+    arms[i] = take(i, arm_angles[i]);
+    all_at_rest = all_at_rest && arms[i] == Arm::at_rest;
   }
-  const HubPosition hub = hub_seen_from_hinge(airframe_, arm_angle);
-  if (airframe_.overlap == OverlapMeasure::rim_arc) {
-    return rim_arc(airframe_.half_side, airframe_.propeller_radius, hub.x, hub.y);
+  if (all_at_rest) return;
+  std::array<HubPosition, 4> hubs{};
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (arms[i] == Arm::near_body) hubs[i] = hub_beside_body(airframe_, i, arm_angles[i]);
   }
-  return occlusion_angle(outline_, airframe_.propeller_radius, hub, airframe_.overlap);
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (arms[i] == Arm::near_body) occlusion_angles_[i] = occlusion_beside_body(airframe_, hubs[i]);
+    if (arms[i] == Arm::left_body) occlusion_angles_[i] = Radians(0.0);
+  }
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (arms[i] != Arm::at_rest) apply_occlusion(i);
+  }
 }
 
 void Compensator::enable(bool on) noexcept {
@@ -152,7 +155,7 @@ void Compensator::apply_occlusion(std::size_t rotor) noexcept {
   const double effective = std::max(line.thrust_coefficient().value() * scaling, std::numeric_limits<double>::min());
   scaling_factors_[rotor] = scaling;
   effective_coefficients_[rotor] = effective;
-  thrust_max_[rotor] = Newtons(effective * fastest_ * fastest_);
+  thrust_max_[rotor] = Newtons(effective * (fastest_ * fastest_));
   drag_scale_[rotor] = 1.0 / std::max(scaling, kScalingFloor);
   arm_flags_[rotor] =
       Flags()
@@ -192,8 +195,8 @@ std::array<RadPerSec, 4> Compensator::speed_uncertainties(const std::array<Newto
     const bool known = !arm_flags_[i].has(Flag::arm_angle_unknown) && std::isfinite(arm_angle_uncertainty.value());
     Radians spread(0.0);
     if (enabled_ && known && std::isfinite(angle.value()) && arm_angle_uncertainty.value() != 0.0) {
-      const Radians above = occlusion_at(i, angle + arm_angle_uncertainty);
-      const Radians below = occlusion_at(i, angle - arm_angle_uncertainty);
+      const Radians above = occlusion_of_arm(airframe_, i, angle + arm_angle_uncertainty);
+      const Radians below = occlusion_of_arm(airframe_, i, angle - arm_angle_uncertainty);
       spread = Radians(0.5 * std::fabs((above - below).value()));
     }
     const double relative = lines_[i].relative_uncertainty(phi, spread, phi.value() > 0.0 ? law_ : ScalingLaw::clamped);

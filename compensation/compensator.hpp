@@ -107,8 +107,10 @@ class Compensator {
 
  private:
   Compensator(const std::array<ThrustLine, 4>& lines, const Airframe& airframe, ScalingLaw law) noexcept;
+  /// What a new angle means for φ: nothing, that it is 0 again, or that it must be computed.
+  enum class Arm : std::uint8_t { at_rest, left_body, near_body };
+  [[nodiscard]] Arm take(std::size_t i, Radians angle) noexcept;
   void apply_occlusion(std::size_t rotor) noexcept;
-  [[nodiscard]] Radians occlusion_at(std::size_t arm, Radians arm_angle) const noexcept;
 
   std::array<double, 4> effective_coefficients_{};  // K_T k_i, positive: what speeds_for divides by
   double slowest_;
@@ -123,7 +125,6 @@ class Compensator {
   std::array<double, 4> drag_scale_{};
   std::array<ThrustLine, 4> lines_;
   Airframe airframe_;
-  ConvexPolygon outline_;
   ContactFreeWindow contact_free_;
 };
 

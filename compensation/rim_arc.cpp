@@ -23,16 +23,21 @@ Radians rim_arc(Metres half_side, Metres radius, Metres hub_x, Metres hub_y) noe
   if (!(away_x * away_x + away_y * away_y < r * r)) return Radians(0.0);
 
   // The square, seen from the hub in units of the radius.
-  const double left = (-a - x) / r, right = (a - x) / r, bottom = (-a - y) / r, top = (a - y) / r;
+  const double per_radius = 1.0 / r;
+  const double left = (-a - x) * per_radius, right = (a - x) * per_radius;
+  const double bottom = (-a - y) * per_radius, top = (a - y) * per_radius;
   if (left >= 1.0 || right <= -1.0 || bottom >= 1.0 || top <= -1.0) return Radians(0.0);
 
   // cos t in [left, right] and sin t in [bottom, top], each as two intervals of t.
   const double a1 = clamped_acos(right), a2 = clamped_acos(left);
   const double b1 = clamped_asin(bottom), b2 = clamped_asin(top);
-  const double right_half = overlap(a1, a2, b1, b2) + overlap(-a2, -a1, b1, b2);
-  const double left_half =
-      overlap(a1, a2, kPi - b2, kPi - b1) + overlap(2 * kPi - a2, 2 * kPi - a1, kPi - b2, kPi - b1);
-  return Radians(std::min(right_half + left_half, 2 * kPi));
+  // Seen from a hub beside the body one half of the rim stays empty.
+  double arc = 0.0;
+  if (right > 0.0) arc += overlap(a1, a2, b1, b2) + overlap(-a2, -a1, b1, b2);
+  if (left < 0.0) {
+    arc += overlap(a1, a2, kPi - b2, kPi - b1) + overlap(2 * kPi - a2, 2 * kPi - a1, kPi - b2, kPi - b1);
+  }
+  return Radians(std::min(arc, 2 * kPi));
 }
 
 ContactFreeWindow contact_free_window(Metres half_side, Metres arm_length, Metres radius) noexcept {

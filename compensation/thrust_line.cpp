@@ -28,14 +28,6 @@ std::optional<ThrustLine> ThrustLine::from(ThrustCoefficient thrust_coefficient,
   return ThrustLine(thrust_coefficient, intercept, slope_per_rad, largest_fitted, overlap, uncertainty);
 }
 
-double ThrustLine::scaling_factor(Radians occlusion_angle, ScalingLaw law) const noexcept {
-  const double reference = thrust_coefficient_.value();
-  const double k = at(occlusion_angle).value();
-  if (law == ScalingLaw::published) return 1.0 - std::fabs(reference - k) / reference;
-  if (!(occlusion_angle.value() > 0.0)) return 1.0;
-  return std::min(1.0, std::max(kScalingFloor, k / reference));
-}
-
 double ThrustLine::relative_uncertainty(Radians occlusion_angle, Radians angle_uncertainty,
                                         ScalingLaw law) const noexcept {
   constexpr double kUnknown = std::numeric_limits<double>::infinity();

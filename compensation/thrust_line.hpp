@@ -1,6 +1,8 @@
 // The line k(φ) of one propeller, as fitted on the bench (paper, Fig. 5 and equation 4).
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 
@@ -50,7 +52,13 @@ class ThrustLine {
     return intercept_ + ThrustCoefficient(slope_per_rad_ * occlusion_angle.value());
   }
   /// k_i. `clamped` is in [kScalingFloor, 1] whatever φ is, 1 if φ is NaN; `published` is what the formula gives.
-  [[nodiscard]] double scaling_factor(Radians occlusion_angle, ScalingLaw law = ScalingLaw::clamped) const noexcept;
+  [[nodiscard]] double scaling_factor(Radians occlusion_angle, ScalingLaw law = ScalingLaw::clamped) const noexcept {
+    const double reference = thrust_coefficient_.value();
+    const double k = at(occlusion_angle).value();
+    if (law == ScalingLaw::published) return 1.0 - std::fabs(reference - k) / reference;
+    if (!(occlusion_angle.value() > 0.0)) return 1.0;
+    return std::min(1.0, std::max(kScalingFloor, k / reference));
+  }
   /// Standard uncertainty of K_T k_i relative to itself, from K_T, the line and the angle's own `angle_uncertainty`;
   /// the speed ω = sqrt(T/(K_T k_i)) has half of it. Where the law leaves the line it is K_T's alone (k_i = 1). K_T and
   /// the line count as independent. +∞ where none can be given: no uncertainty known, k_i at its floor or below, φ NaN.

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "compensation/occlusion.hpp"
 #include "profiles/key_names.hpp"
 #include "profiles/plan.hpp"
 #include "profiles/schema.hpp"
@@ -67,18 +68,32 @@ std::string summary_of(const Bench& bench) {
       to_rpm(bench.iq.speed_max), bench.thrust_sign > 0 ? '+' : '-', "xyz"[bench.thrust_axis], simulated);
 }
 
+std::string in_words(const Vehicle& vehicle) {
+  if (!vehicle.body) return fmt::format("half side {:g} m", vehicle.half_side.value());
+  return fmt::format("{} corners", vehicle.body->outline.size());
+}
+
+/// Each shape with the φ that its arms give.
+std::string summary_of_shape(const std::string& name, const std::array<Radians, 4>& angles,
+                             const compensation::Airframe& airframe) {
+  std::string arms, occlusions;
+  for (std::size_t i = 0; i < angles.size(); ++i) {
+    arms += fmt::format(" {:.6g}", to_degrees(angles[i]));
+    occlusions += fmt::format(" {:.4g}", to_degrees(compensation::occlusion_of_arm(airframe, i, angles[i])));
+  }
+  return fmt::format("  shape {:<4} arms at{} degrees, occluded by{} degrees\n", name, arms, occlusions);
+}
+
 std::string summary_of(const Vehicle& vehicle) {
   std::string shapes;
-  for (const auto& [name, angles] : vehicle.shapes) {
-    shapes += fmt::format("  shape {:<4} arms at", name);
-    for (const Radians angle : angles) shapes += fmt::format(" {:.6g}", to_degrees(angle));
-    shapes += " degrees\n";
-  }
+  const compensation::Airframe airframe = airframe_of(vehicle);
+  for (const auto& [name, angles] : vehicle.shapes) shapes += summary_of_shape(name, angles, airframe);
   return fmt::format(
-      "  body       half side {:g} m, arms {:g} m, propeller radius {:g} m\n"
-      "  speeds     {:.6g} to {:.6g} RPM\n{}",
-      vehicle.half_side.value(), vehicle.arm_length.value(), vehicle.propeller_radius.value(),
-      to_rpm(vehicle.speed_min), to_rpm(vehicle.speed_max), shapes);
+      "  body       {}, arms {:g} m, propeller radius {:g} m\n"
+      "  speeds     {:.6g} to {:.6g} RPM\n"
+      "  overlap    {}\n{}",
+      in_words(vehicle), vehicle.arm_length.value(), vehicle.propeller_radius.value(), to_rpm(vehicle.speed_min),
+      to_rpm(vehicle.speed_max), compensation::name_of(vehicle.overlap), shapes);
 }
 
 /// Value of the first line `format: …`: enough for a file that is no YAML, or YAML of another kind.

@@ -21,16 +21,27 @@ struct CheckOptions {
   bool json = false;
 };
 
+/// What the line's uncertainty does to the speed of a rotor, at the ends of the valid range.
+std::string uncertainty_of(const compensation::Coefficients& c) {
+  const compensation::ThrustLine line = thrust_line(c);
+  if (!line.uncertainty())
+    return "  speeds     of unknown uncertainty: the file tells no covariance or no error of K_T\n";
+  const auto percent = [&](Radians phi) { return 50 * line.relative_uncertainty(phi, Radians(0)); };
+  return fmt::format("  speeds     to {:.2g} % without occlusion, {:.2g} % at {:g} degrees\n", percent(Radians(0)),
+                     percent(c.largest_occlusion), to_degrees(c.largest_occlusion));
+}
+
 std::string judge_coefficients(const std::string& path) {
   const compensation::Coefficients c = compensation::load_coefficients(path);
   return fmt::format(
       "  propeller  {} ({})\n"
       "  K_T        {:.6g} N/(rad/s)^2 = {:.6g} N/RPM^2\n"
       "  line       k = {:.6g} {:+.6g} * phi/rad N/(rad/s)^2{}\n"
-      "  valid      {:g} to {:g} degrees\n",
+      "  valid      {:g} to {:g} degrees, overlap measured as {}\n"
+      "{}",
       c.propeller.id, c.propeller.name, c.thrust_coefficient.value(), to_newtons_per_rpm2(c.thrust_coefficient),
       c.line.intercept.value(), c.line.slope_per_rad, c.line.anchored ? ", anchored at K_T" : "",
-      to_degrees(c.smallest_occlusion), to_degrees(c.largest_occlusion));
+      to_degrees(c.smallest_occlusion), to_degrees(c.largest_occlusion), name_of(c.overlap), uncertainty_of(c));
 }
 
 std::string in_words(const sim::Fault& fault) {

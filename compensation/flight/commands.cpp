@@ -11,7 +11,6 @@
 #include <string>
 #include <thread>
 
-#include "compensation/commands.hpp"
 #include "compensation/compensator.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "compensation/flight/paper.hpp"
@@ -49,7 +48,10 @@ struct Flown {
 Vehicle vehicle_of(const std::string& path) {
   const profiles::Vehicle file = profiles::load_vehicle(path);
   Vehicle vehicle;
-  vehicle.airframe = compensation::airframe_of(file);
+  vehicle.airframe = profiles::airframe_of(file);
+  if (vehicle.airframe.polygon) {
+    throw ConfigurationError(path + ": the simulated air knows square bodies only; give half_side_m instead of body");
+  }
   for (const auto& [name, angles] : {std::pair{"X", &vehicle.x}, std::pair{"O", &vehicle.o}}) {
     const auto shape = file.shapes.find(name);
     if (shape == file.shapes.end()) {
@@ -62,8 +64,7 @@ Vehicle vehicle_of(const std::string& path) {
 
 Scene nominal_of(const Request& request) {
   const auto line = compensation::thrust_line(compensation::load_coefficients(request.coefficients));
-  Vehicle vehicle = vehicle_of(request.vehicle);
-  vehicle.airframe.overlap = line.overlap();
+  const Vehicle vehicle = vehicle_of(request.vehicle);
   const auto built = compensation::Compensator::build({line, line, line, line}, vehicle.airframe);
   if (!built.compensator) throw ConfigurationError(request.vehicle + ": " + describe(built.refusal));
   const double hover = kGravity * vehicle.build.mass_kg / 4;

@@ -14,6 +14,7 @@ file(REMOVE_RECURSE ${WORK})
 set(prefix ${WORK}/prefix)
 set(common -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_CXX_FLAGS=${CXX_FLAGS}
            -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER})
+set(speeds "10232.6\n10232.6\n9843.1\n10232.6\n")
 if(DEFINED BUILT)
   set(with_file ON)
   set(from ${BUILT})
@@ -25,13 +26,34 @@ else()
 endif()
 run(${CMAKE_COMMAND} --install ${from} --component compensation --prefix ${prefix})
 
-run(${CMAKE_COMMAND} -S ${CONSUMER} -B ${WORK}/stranger ${common} -DCMAKE_PREFIX_PATH=${prefix} -DWITH_FILE=${with_file})
+# The example of the library's README, as it stands there.
+file(READ ${README} readme)
+if(NOT readme MATCHES "```cpp\n")
+  message(FATAL_ERROR "${README} has no example")
+endif()
+string(FIND "${readme}" "```cpp\n" begin)
+math(EXPR begin "${begin} + 7")
+string(SUBSTRING "${readme}" ${begin} -1 example)
+string(FIND "${example}" "```" end)
+string(SUBSTRING "${example}" 0 ${end} example)
+file(WRITE ${WORK}/readme_example.cpp "${example}")
+
+run(${CMAKE_COMMAND} -S ${CONSUMER} -B ${WORK}/stranger ${common} -DREADME_EXAMPLE=${WORK}/readme_example.cpp -DCMAKE_PREFIX_PATH=${prefix} -DWITH_FILE=${with_file})
 run(${CMAKE_COMMAND} --build ${WORK}/stranger --parallel 1)
 
 # sqrt(1.5 N / (1.7e-8 N/RPM² k_i)) with k_i = .84269, .84269, .91071, .84269.
 run(${WORK}/stranger/fly)
-if(NOT output STREQUAL "10232.6\n10232.6\n9843.1\n10232.6\n")
+if(NOT output STREQUAL speeds)
   message(FATAL_ERROR "unexpected speeds:\n${output}")
+endif()
+
+# The same in C, linked by a C compiler.
+run(${CMAKE_COMMAND} -S ${CONSUMER}/plain_c -B ${WORK}/plain_c -G ${GENERATOR} -DCMAKE_C_COMPILER=${CC}
+    -DCMAKE_C_FLAGS=${C_FLAGS} -DCMAKE_PREFIX_PATH=${prefix})
+run(${CMAKE_COMMAND} --build ${WORK}/plain_c --parallel 1)
+run(${WORK}/plain_c/fly_c)
+if(NOT output STREQUAL "${speeds}6.0000\n")
+  message(FATAL_ERROR "unexpected speeds or thrusts in C:\n${output}")
 endif()
 if(with_file)
   run(${WORK}/stranger/read_coefficients ${CONSUMER}/coefficients.yaml)

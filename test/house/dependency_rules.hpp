@@ -16,7 +16,8 @@ struct Rule {
 /// The most specific folder counts. Commands (`commands.cpp`, `…_commands.cpp`) belong to the program and are free.
 inline const std::vector<Rule>& rules() {
   static const std::vector<Rule> kRules{
-      {"profiles/", {"profiles/", "compensation/units.hpp"}},
+      // A vehicle file describes an airframe and is checked as one.
+      {"profiles/", {"profiles/", "compensation/units.hpp", "compensation/airframe.hpp", "compensation/occlusion.hpp"}},
       {"drivers/", {"drivers/*", "compensation/units.hpp"}},
       {"drivers/serial/", {"drivers/*", "drivers/serial/", "compensation/units.hpp"}},
       {"drivers/netbox/", {"drivers/*", "drivers/netbox/", "compensation/units.hpp"}},

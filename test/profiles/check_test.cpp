@@ -71,6 +71,17 @@ TEST_F(Check, SumsUpACampaign) {
   EXPECT_EQ(file.report["plan"]["bytes"], 388080000);
 }
 
+TEST_F(Check, SumsUpAVehicleWithTheOcclusionsOfItsShapes) {
+  EXPECT_EQ(check({shipped("foldable_drone.yaml")}).front().summary,
+            "  body       half side 0.045 m, arms 0.117 m, propeller radius 0.0635 m\n"
+            "  speeds     0 to 19100 RPM\n"
+            "  overlap    rim_arc\n"
+            "  shape H    arms at 0 90 0 90 degrees, occluded by 0 0 0 0 degrees\n"
+            "  shape O    arms at 180 180 165.676 180 degrees, occluded by 64.84 64.84 41.29 64.84 degrees\n"
+            "  shape T    arms at 90 0 0 90 degrees, occluded by 0 0 0 0 degrees\n"
+            "  shape X    arms at 45 45 45 45 degrees, occluded by 0 0 0 0 degrees\n");
+}
+
 TEST_F(Check, GivesCoefficientFilesToTheirJudge) {
   const std::string path = write("c.yaml", "format: kphi-coefficients/1\nk_unit: N/RPM^2\n");
   EXPECT_TRUE(check({path}).front().ok());

@@ -79,5 +79,73 @@ TEST(Vehicle, WantsMetresInTheKey) {
               ElementsAre("3:14: half_side_m: 45 is above 10 m; write a value from above 0 to 10 m"));
 }
 
+const std::string kBodyText =
+    "body:\n"
+    "  corners_m: [[0.1, 0.03], [-0.1, 0.03], [-0.1, -0.03], [0.1, -0.03]]\n"
+    "  hinges:\n"
+    "    - {x_m: 0.1, y_m: 0.03, turn_deg: 0}\n"
+    "    - {x_m: -0.1, y_m: 0.03, turn_deg: 180, mirrored: true}\n"
+    "    - {x_m: -0.1, y_m: -0.03, turn_deg: 180}\n"
+    "    - {x_m: 0.1, y_m: -0.03, turn_deg: 0, mirrored: true}\n";
+
+std::string vehicle_with_body() {
+  const std::string text = changed(kVehicleText, "hinge_turn_deg: [0, 90, 180, 270]\n", "");
+  return changed(text, "half_side_m: 0.045\n", kBodyText);
+}
+
+TEST(Vehicle, IsTheAirframeThatFlies) {
+  const auto text =
+      changed(kVehicleText, "[0, 90, 180, 270]", "[0, 90, 270, 180]\narm_mirrored: [false, true, false, true]");
+  const compensation::Airframe airframe = airframe_of(parse_vehicle(text, "v.yaml"));
+  EXPECT_EQ(airframe.half_side, Metres(0.045));
+  EXPECT_EQ(airframe.arm_length, Metres(0.117));
+  EXPECT_EQ(airframe.propeller_radius, Metres(0.0635));
+  EXPECT_EQ(airframe.fastest_speed, from_rpm(19100));
+  EXPECT_THAT(airframe.hinge_turns, ElementsAre(0, 1, 3, 2));
+  EXPECT_THAT(airframe.mirrored, ElementsAre(false, true, false, true));
+  EXPECT_EQ(airframe.overlap, compensation::OverlapMeasure::rim_arc);
+  EXPECT_FALSE(airframe.polygon);
+}
+
+TEST(Vehicle, SaysHowItsOverlapIsMeasured) {
+  EXPECT_EQ(parse_vehicle(std::string(kVehicleText) + "overlap: load_share\n", "v").overlap,
+            compensation::OverlapMeasure::load_share);
+  EXPECT_THAT(refused("half_side_m: 0.045\n", "half_side_m: 0.045\noverlap: rim\n"),
+              ElementsAre(StartsWith("4:10: overlap: ")));
+}
+
+TEST(Vehicle, MayHaveAnyConvexBody) {
+  const Vehicle vehicle = parse_vehicle(vehicle_with_body(), "v.yaml");
+  ASSERT_TRUE(vehicle.body);
+  EXPECT_EQ(vehicle.body->outline.size(), 4u);
+  EXPECT_EQ(vehicle.body->outline.corner(1).x, Metres(-0.1));
+  EXPECT_EQ(vehicle.body->hinges[1].turn, from_degrees(180));
+  EXPECT_TRUE(vehicle.body->hinges[1].mirrored);
+  EXPECT_FALSE(vehicle.body->hinges[2].mirrored);
+  EXPECT_TRUE(airframe_of(vehicle).polygon);
+}
+
+TEST(Vehicle, RefusesABodyThatIsNotConvexOrGoesClockwise) {
+  const auto refusals_of = [](const std::string& from, const std::string& to) {
+    return refusals([&] { return parse_vehicle(changed(vehicle_with_body(), from, to), "v"); });
+  };
+  EXPECT_THAT(refusals_of("[-0.1, 0.03], [-0.1, -0.03]", "[-0.1, -0.03], [-0.1, 0.03]"),
+              ElementsAre(StartsWith("4:14: body.corners_m: not the corners of a convex body")));
+  EXPECT_THAT(refusals_of(", [-0.1, 0.03], [-0.1, -0.03], [0.1, -0.03]", ", [-0.1, 0.03]"),
+              ElementsAre(StartsWith("4:14: body.corners_m: 2 values; write at least 3")));
+  EXPECT_THAT(refusals_of("    - {x_m: -0.1, y_m: -0.03, turn_deg: 180}\n", ""),
+              ElementsAre(StartsWith("6:5: body.hinges: 3 values; write at least 4")));
+}
+
+TEST(Vehicle, HasOneBody) {
+  EXPECT_THAT(refused("half_side_m: 0.045\n", ""),
+              ElementsAre(StartsWith("1:1: half_side_m: missing, and there is no body either")));
+  const auto both = refusals([] {
+    return parse_vehicle(vehicle_with_body() + "half_side_m: 0.045\narm_mirrored: [true, true, true, true]\n", "v");
+  });
+  EXPECT_THAT(both, ElementsAre(StartsWith("19:14: half_side_m: belongs to a square body"),
+                                StartsWith("20:15: arm_mirrored: belongs to a square body")));
+}
+
 }  // namespace
 }  // namespace kphi::profiles

@@ -1,0 +1,143 @@
+// Any bytes as lines, airframe, arm angles, thrusts, layout and demands: whatever is built must fly without NaN, within
+// its limits; φ in [0, 2π], k_i in its range, the plain map when off.
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+
+#include "compensation/compensator.hpp"
+#include "compensation/mixing.hpp"
+
+namespace {
+
+using namespace kphi;
+using namespace kphi::compensation;
+
+void require(bool holds) {
+  if (!holds) std::abort();
+}
+
+/// Reads numbers, plain ones and any bits, until there are no more; zeros then.
+class Bytes {
+ public:
+  Bytes(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}
+  std::uint8_t byte() { return at_ < size_ ? data_[at_++] : 0; }
+  bool more() const { return at_ < size_; }
+  /// One byte says how: any bits of a double, or a number of the given size.
+  double number(double usual) {
+    const std::uint8_t how = byte();
+    if (how % 8 == 7) {
+      std::uint64_t bits = 0;
+      for (int i = 0; i < 8; ++i) bits = bits << 8 | byte();
+      double value;
+      std::memcpy(&value, &bits, sizeof value);
+      return value;
+    }
+    return usual * (static_cast<double>(byte() << 8 | byte()) / 32768.0 - (how % 8 < 4 ? 0.0 : 1.0));
+  }
+
+ private:
+  const std::uint8_t* data_;
+  std::size_t size_;
+  std::size_t at_ = 0;
+};
+
+OverlapMeasure measure(Bytes& bytes) { return static_cast<OverlapMeasure>(bytes.byte() % 3); }
+
+std::optional<ThrustLine> line(Bytes& bytes, OverlapMeasure overlap) {
+  std::optional<LineUncertainty> uncertainty;
+  if (bytes.byte() % 2 == 0) {
+    uncertainty = LineUncertainty{bytes.number(1e-8), bytes.number(1e-16), bytes.number(1e-16), bytes.number(1e-16)};
+  }
+  return ThrustLine::from(ThrustCoefficient(bytes.number(1e-6)), ThrustCoefficient(bytes.number(1e-6)),
+                          bytes.number(1e-6), Radians(bytes.number(5)), overlap, uncertainty);
+}
+
+Airframe airframe(Bytes& bytes, OverlapMeasure overlap) {
+  Airframe frame{Metres(bytes.number(0.1)), Metres(bytes.number(0.2)), Metres(bytes.number(0.1)),
+                 RadPerSec(bytes.number(100)), RadPerSec(bytes.number(2000))};
+  frame.overlap = overlap;
+  const std::uint8_t kind = bytes.byte();
+  for (std::size_t i = 0; i < 4; ++i) frame.mirrored[i] = (kind >> i & 1) != 0;
+  if (kind % 2 == 0) return frame;
+  Position corners[ConvexPolygon::kMaxCorners];
+  const std::size_t count = bytes.byte() % (ConvexPolygon::kMaxCorners + 1);
+  double direction = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (kind % 4 == 1) {
+      corners[i] = {Metres(bytes.number(0.2)), Metres(bytes.number(0.2))};
+      continue;
+    }
+    direction += 0.01 + bytes.byte() / 128.0;  // on a circle: convex unless it goes round twice
+    corners[i] = {Metres(0.1 * std::cos(direction)), Metres(0.1 * std::sin(direction))};
+  }
+  if (const auto outline = ConvexPolygon::from(corners, count)) {
+    frame.polygon = PolygonBody{*outline, {}};
+    for (Hinge& hinge : frame.polygon->hinges) {
+      hinge = {{Metres(bytes.number(0.2)), Metres(bytes.number(0.2))}, Radians(bytes.number(7)), kind % 3 == 0};
+    }
+  }
+  return frame;
+}
+
+void fly(Compensator& compensator, const Airframe& frame, Bytes& bytes) {
+  std::array<Radians, 4> arms;
+  std::array<Newtons, 4> thrusts;
+  for (Radians& arm : arms) arm = Radians(bytes.number(4));
+  for (Newtons& thrust : thrusts) thrust = Newtons(bytes.number(8));
+  compensator.enable(bytes.byte() % 4 != 0);
+  compensator.set_arms(arms);
+  const SpeedCommand command = compensator.speeds_for(thrusts);
+  const auto uncertainties = compensator.speed_uncertainties(thrusts, Radians(bytes.number(0.1)));
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double phi = compensator.occlusion_angles()[i].value(), k = compensator.scaling_factors()[i];
+    require(phi >= 0.0 && phi <= 2 * kPi);
+    require(k <= 1.0);
+    require(command.speeds[i] >= frame.slowest_speed && command.speeds[i] <= frame.fastest_speed);
+    require(compensator.thrust_max()[i].value() >= 0.0);
+    require(compensator.drag_scale()[i] >= 1.0 && compensator.drag_scale()[i] <= 1.0 / kScalingFloor);
+    require(uncertainties[i].value() >= 0.0);
+    require(compensator.enabled() || k == 1.0);
+  }
+}
+
+void mix(const Compensator* compensator, Bytes& bytes) {
+  RotorLayout layout;
+  for (HubPosition& hub : layout.hubs) hub = {Metres(bytes.number(0.2)), Metres(bytes.number(0.2))};
+  auto mixer = Mixer::build(layout, {Metres(bytes.number(0.02)), bytes.number(0.001)});
+  if (!mixer) return;
+  ThrustLimits limits;
+  for (std::size_t i = 0; i < 4; ++i) {
+    limits.smallest[i] = Newtons(bytes.number(1));
+    limits.largest[i] = Newtons(bytes.number(8));
+  }
+  if (compensator != nullptr) {
+    limits.largest = compensator->thrust_max();
+    (void)mixer->set_layout(layout, compensator->drag_scale());
+  }
+  const Wrench demand{Newtons(bytes.number(20)), NewtonMetres(bytes.number(1)), NewtonMetres(bytes.number(1)),
+                      NewtonMetres(bytes.number(0.2))};
+  const MixedThrusts mixed = mixer->mix(demand, limits, NewtonMetres(bytes.number(0.05)));
+  for (const Newtons thrust : mixed.thrusts) require(thrust.value() >= 0.0 && thrust.value() <= 1e9);
+  require(std::isfinite(mixed.achieved.thrust.value()) && std::isfinite(mixed.achieved.roll.value()));
+  require(std::isfinite(mixed.achieved.pitch.value()) && std::isfinite(mixed.achieved.yaw.value()));
+  for (const double share : mixer->thrust_direction()) require(std::isfinite(share));
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  Bytes bytes(data, size);
+  const OverlapMeasure overlap = measure(bytes);
+  const auto law = static_cast<ScalingLaw>(bytes.byte() % 2);
+  const auto some = line(bytes, overlap), other = line(bytes, overlap);
+  const Airframe frame = airframe(bytes, overlap);
+  std::optional<Compensator> compensator;
+  if (some && other) compensator = Compensator::build({*some, *other, *some, *other}, frame, law).compensator;
+  for (int i = 0; i < 50 && bytes.more(); ++i) {
+    if (compensator) fly(*compensator, frame, bytes);
+    mix(compensator ? &*compensator : nullptr, bytes);
+  }
+  return 0;
+}
