@@ -49,6 +49,9 @@ Vehicle vehicle_of(const std::string& path) {
   const profiles::Vehicle file = profiles::load_vehicle(path);
   Vehicle vehicle;
   vehicle.airframe = profiles::airframe_of(file);
+  if (vehicle.airframe.polygon) {
+    throw ConfigurationError(path + ": the simulated air knows square bodies only; give half_side_m instead of body");
+  }
   for (const auto& [name, angles] : {std::pair{"X", &vehicle.x}, std::pair{"O", &vehicle.o}}) {
     const auto shape = file.shapes.find(name);
     if (shape == file.shapes.end()) {

@@ -115,6 +115,17 @@ TEST_F(Fly, RefusesWhatItCannotFlyWithOneLine) {
   EXPECT_EQ(no_o.code, 2);
   EXPECT_THAT(no_o.err, HasSubstr("shape O"));
 
+  const std::string oblong = *folder_ / "oblong.yaml";
+  std::ofstream(oblong) << "format: kphi-vehicle/1\nname: oblong\narm_length_m: 0.117\npropeller_radius_m: 0.0635\n"
+                           "body: {corners_m: [[0.1, 0.05], [-0.1, 0.05], [-0.1, -0.05], [0.1, -0.05]], hinges: [\n"
+                           "  {x_m: 0.1, y_m: 0.05, turn_deg: 0}, {x_m: -0.1, y_m: 0.05, turn_deg: 90},\n"
+                           "  {x_m: -0.1, y_m: -0.05, turn_deg: 180}, {x_m: 0.1, y_m: -0.05, turn_deg: 270}]}\n"
+                           "shapes_deg: {X: [45, 45, 45, 45], O: [180, 180, 180, 180]}\narm_angle_min_deg: -90\n"
+                           "arm_angle_max_deg: 180\nspeed_min_rpm: 0\nspeed_max_rpm: 19100\n";
+  const Outcome no_square = fly({}, coefficients_, oblong);
+  EXPECT_EQ(no_square.code, 2);
+  EXPECT_THAT(no_square.err, HasSubstr("square bodies only"));
+
   std::ostringstream text;
   text << std::ifstream(kVehicle).rdbuf();
   std::string slow = text.str();

@@ -60,9 +60,15 @@ TEST(PaperTables, PointAtLegsOfTheirOwnShape) {
   for (const ForwardRow& row : kForwardRows) {
     const Experiment& experiment = kExperiments[row.flight];
     EXPECT_EQ(row.title.substr(0, 6) == "rising", experiment.path == Path::rising_circle);
-    if (row.x) EXPECT_TRUE(matches("X", experiment.legs[row.x->leg])) << experiment.name;
-    if (row.o_plain) EXPECT_TRUE(matches("O n.c.", experiment.legs[row.o_plain->leg])) << experiment.name;
-    if (row.o_compensated) EXPECT_TRUE(matches("O c.", experiment.legs[row.o_compensated->leg])) << experiment.name;
+    if (row.x) {
+      EXPECT_TRUE(matches("X", experiment.legs[row.x->leg])) << experiment.name;
+    }
+    if (row.o_plain) {
+      EXPECT_TRUE(matches("O n.c.", experiment.legs[row.o_plain->leg])) << experiment.name;
+    }
+    if (row.o_compensated) {
+      EXPECT_TRUE(matches("O c.", experiment.legs[row.o_compensated->leg])) << experiment.name;
+    }
   }
 }
 

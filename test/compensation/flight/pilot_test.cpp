@@ -42,6 +42,24 @@ TEST(Pilot, TurnsCoveredRotorsFasterOnlyWhenItCompensates) {
   EXPECT_GT(speeds_in(compensation::shape_o(), true).sum(), 1.05 * speeds_in(compensation::shape_o(), false).sum());
 }
 
+/// A rotor's torque follows its squared speed, not the thrust that is left of it: covered rotors turn the body more.
+TEST(Pilot, HoldsYawStillInOBecauseItAllocatesWithTheTorqueOfCoveredRotors) {
+  Pilot pilot = example_pilot();
+  pilot.set_arms(compensation::shape_o());
+  const double k_t = bench_line().thrust_coefficient().value();
+  for (const bool on : {true, false}) {
+    pilot.compensate(on);
+    pilot.look(Reference(), kOnReference, Eigen::Quaterniond::Identity());
+    const Eigen::Vector4d squares = pilot.act({0, 0, 0}).cwiseAbs2();
+    const Build build;
+    double yaw = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      yaw += build.spin[i] * build.yaw_arm_m * k_t * squares[static_cast<Eigen::Index>(i)];
+    }
+    EXPECT_NEAR(yaw, 0, 1e-9) << "N m, compensated: " << on;
+  }
+}
+
 TEST(Pilot, KeepsEveryRotorWithinWhatItCanGiveWhateverIsDemanded) {
   Pilot pilot = example_pilot();
   Random random(12);

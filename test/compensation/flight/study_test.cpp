@@ -48,6 +48,28 @@ TEST(Percentiles, LieBetweenTheOrderStatistics) {
   EXPECT_EQ(percentiles({}).p50, 0);
 }
 
+TEST(Merits, AreOfTheRightLegsOfTheRightFlights) {
+  NineFlights flights;
+  for (std::size_t i = 0; i < flights.size(); ++i) {
+    for (std::size_t leg = 0; leg < 3; ++leg) {
+      const double flight = static_cast<double>(i), part = static_cast<double>(leg);
+      flights[i].legs[leg].mean_error = {flight, part, 10 * flight + part};
+      flights[i].legs[leg].mean_distance = 100 * flight + part;
+      flights[i].legs[leg].mean_square_speed = 1 + part * part;
+    }
+  }
+  const Merits merits = merits_of(flights);
+  EXPECT_EQ(merits.hover_z_plain, 1);
+  EXPECT_EQ(merits.hover_z_compensated, 11);
+  EXPECT_EQ(merits.hover_xy_plain, 1);
+  EXPECT_NEAR(merits.hover_xy_compensated, std::sqrt(2.0), 1e-15);
+  EXPECT_EQ(merits.forward_x, (300 + 500 + 600 + 800) / 4.0);
+  EXPECT_EQ(merits.forward_plain, (301 + 400 + 601 + 700) / 4.0);
+  EXPECT_EQ(merits.forward_compensated, (501 + 401 + 801 + 701) / 4.0);
+  EXPECT_EQ(merits.square_speed_ratio, 1.5) << "(1 + 5) / (2 * 2)";
+  EXPECT_FALSE(merits.lost());
+}
+
 /// A draw in which every flight went well: 0.2 m without, `ratio` of it with compensation.
 Draw made_up(double ratio) {
   Draw draw{example_scene(), {}};
