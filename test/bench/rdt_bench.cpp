@@ -1,10 +1,9 @@
 // What the judgement about a record costs, without any socket: decoding alone, and the whole session, against swapping
 // the bytes of its nine words one by one. Interleaved; each line the median of many pairs.
-#include <fmt/format.h>
-
 #include <boost/endian/conversion.hpp>
 
 #include "drivers/netbox/session.hpp"
+#include "test/bench/figures.hpp"
 #include "test/drivers/netbox/receivers.hpp"
 
 namespace {
@@ -63,9 +62,9 @@ void compare(const char* what, unsigned per_datagram, void (*work)(const std::ve
     ratios.push_back(driver / bare);
     ns.push_back(1e9 * driver / kRecords);
   }
-  fmt::print("{:<8} {:>2} records per datagram / swapping words: median {:.2f} worst {:.2f} ({:.1f} ns per record)\n",
-             what, per_datagram, test::median(ratios), *std::max_element(ratios.begin(), ratios.end()),
-             test::median(ns));
+  fmt::print("{}, {} per datagram: {:.1f} ns per record; worst pair {:.2f}\n", what, per_datagram, test::median(ns),
+             *std::max_element(ratios.begin(), ratios.end()));
+  bench::compared(test::median(ratios), fmt::format("{}, {} per datagram / swapping words", what, per_datagram));
 }
 
 }  // namespace

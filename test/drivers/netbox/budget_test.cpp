@@ -44,9 +44,9 @@ void expect_within(const Way& way, const Budget& limit) {
            budget.median_age <= limit.median_age;
   };
   for (int i = 0; i < 20 && (i == 0 || !within()); ++i) budget = measure(box, way);
-  RecordProperty("of_bare", std::to_string(budget.of_bare));
-  RecordProperty("wakeups_per_record", std::to_string(budget.wakeups_per_record));
-  RecordProperty("median_age_us", std::to_string(1e6 * to_seconds(budget.median_age)));
+  testing::Test::RecordProperty("of_bare", std::to_string(budget.of_bare));
+  testing::Test::RecordProperty("wakeups_per_record", std::to_string(budget.wakeups_per_record));
+  testing::Test::RecordProperty("median_age_us", std::to_string(1e6 * to_seconds(budget.median_age)));
   EXPECT_LE(budget.of_bare, limit.of_bare);
   EXPECT_LE(budget.wakeups_per_record, limit.wakeups_per_record);
   EXPECT_LE(budget.median_age, limit.median_age);
