@@ -15,7 +15,7 @@ struct DoubtPolicy {
   bool spoils;
 };
 
-constexpr std::array<DoubtPolicy, 23> kPolicy{{
+constexpr std::array<DoubtPolicy, 28> kPolicy{{
     {Doubt::speed_not_reached, "commanded speed not reached", true},
     {Doubt::speed_unsteady, "speed never settled", true},
     {Doubt::saturated, "load cell saturated", true},
@@ -39,6 +39,11 @@ constexpr std::array<DoubtPolicy, 23> kPolicy{{
     {Doubt::motor_reset, "motor module restarted", true},
     {Doubt::motor_lost, "motor module lost", true},
     {Doubt::slow_round_trip, "motor readings blurred in time", false},
+    {Doubt::unsettled, "thrust never settled", true},
+    {Doubt::drifted, "thrust drifted within the step", true},
+    {Doubt::lag_unknown, "lag of the thrust unknown", false},
+    {Doubt::frozen, "load cell repeated one value", true},
+    {Doubt::speed_glitch, "impossible speeds left out", false},
 }};
 
 bool has(std::uint32_t doubts, Doubt doubt) { return (doubts & static_cast<std::uint32_t>(doubt)) != 0; }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -9,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "profiles/configuration_error.hpp"
 #include "results/number.hpp"
@@ -53,6 +55,45 @@ const std::array kColumns{
     Column{"doubts", Doubts{&StepMean::doubts}},
 };
 
+/// Columns that a file has when one of its steps has a value for the first of them.
+struct Group {
+  std::vector<Column> columns;
+  [[nodiscard]] bool in(const StepMean& step) const {
+    return !std::isnan(step.*std::get<double StepMean::*>(columns.front().field));
+  }
+};
+
+const std::array kGroups{
+    Group{{Column{"discarded_s", &StepMean::discarded_s}, Column{"thrust_n_eff", &StepMean::thrust_n_eff},
+           Column{"thrust_u_n", &StepMean::thrust_u_n}, Column{"thrust_freedom", &StepMean::thrust_freedom},
+           Column{"speed_u_rad_s", &StepMean::speed_u_rad_s}, Column{"zero_u_n", &StepMean::zero_u_n},
+           Column{"zero_moved_n", &StepMean::zero_moved_n}, Column{"lag_s", &StepMean::lag_s},
+           Column{"lag_u_s", &StepMean::lag_u_s}, Column{"speed_glitches", &StepMean::speed_glitches}}},
+};
+
+using Columns = std::vector<Column>;
+
+Columns with_groups(const std::array<bool, kGroups.size()>& present) {
+  Columns columns(kColumns.begin(), kColumns.end());
+  for (std::size_t i = 0; i < kGroups.size(); ++i) {
+    if (present[i]) columns.insert(columns.end(), kGroups[i].columns.begin(), kGroups[i].columns.end());
+  }
+  return columns;
+}
+
+Columns columns_of(std::span<const StepMean> steps) {
+  std::array<bool, kGroups.size()> present{};
+  for (std::size_t i = 0; i < kGroups.size(); ++i)
+    present[i] = std::any_of(steps.begin(), steps.end(), [&](const StepMean& step) { return kGroups[i].in(step); });
+  return with_groups(present);
+}
+
+std::string header_of(const Columns& columns) {
+  std::string line;
+  for (const Column& column : columns) line += (line.empty() ? "" : ",") + std::string(column.name);
+  return line;
+}
+
 constexpr std::array kDoubtNames{
     std::pair{Doubt::speed_not_reached, std::string_view("speed_not_reached")},
     std::pair{Doubt::speed_unsteady, std::string_view("speed_unsteady")},
@@ -77,6 +118,11 @@ constexpr std::array kDoubtNames{
     std::pair{Doubt::motor_reset, std::string_view("motor_reset")},
     std::pair{Doubt::motor_lost, std::string_view("motor_lost")},
     std::pair{Doubt::slow_round_trip, std::string_view("slow_round_trip")},
+    std::pair{Doubt::unsettled, std::string_view("unsettled")},
+    std::pair{Doubt::drifted, std::string_view("drifted")},
+    std::pair{Doubt::lag_unknown, std::string_view("lag_unknown")},
+    std::pair{Doubt::frozen, std::string_view("frozen")},
+    std::pair{Doubt::speed_glitch, std::string_view("speed_glitch")},
 };
 
 std::string quoted(const std::string& text) {
@@ -142,16 +188,36 @@ std::vector<std::string> next_record(std::string_view text, std::size_t& at, std
   return fields;
 }
 
-StepMean step_from(const std::vector<std::string>& fields) {
-  if (fields.size() != kColumns.size()) {
-    throw std::invalid_argument(fmt::format("{} fields where the header has {}", fields.size(), kColumns.size()));
+std::string row_of(const StepMean& step, const Columns& columns) {
+  std::string line;
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (i > 0) line += ',';
+    line += std::visit(Format{step}, columns[i].field);
+  }
+  return line;
+}
+
+/// The columns that a header names; the base, then any groups in order.
+Columns columns_named(std::string_view header) {
+  for (unsigned set = 0; set < 1u << kGroups.size(); ++set) {
+    std::array<bool, kGroups.size()> present{};
+    for (std::size_t i = 0; i < present.size(); ++i) present[i] = (set >> i & 1u) != 0;
+    Columns columns = with_groups(present);
+    if (header_of(columns) == header) return columns;
+  }
+  throw std::invalid_argument("is no header of a steps file; expected " + steps_header());
+}
+
+StepMean step_from(const std::vector<std::string>& fields, const Columns& columns) {
+  if (fields.size() != columns.size()) {
+    throw std::invalid_argument(fmt::format("{} fields where the header has {}", fields.size(), columns.size()));
   }
   StepMean step;
   for (std::size_t i = 0; i < fields.size(); ++i) {
     try {
-      std::visit(Parse{step, fields[i]}, kColumns[i].field);
+      std::visit(Parse{step, fields[i]}, columns[i].field);
     } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(fmt::format("{}: \"{}\" {}", kColumns[i].name, fields[i], error.what()));
+      throw std::invalid_argument(fmt::format("{}: \"{}\" {}", columns[i].name, fields[i], error.what()));
     }
   }
   return step;
@@ -185,26 +251,16 @@ std::uint32_t doubts_from_names(std::string_view names) {
   return doubts;
 }
 
-std::string steps_header() {
-  std::string line;
-  for (const Column& column : kColumns) line += (line.empty() ? "" : ",") + std::string(column.name);
-  return line;
-}
-
-std::string format_step(const StepMean& step) {
-  std::string line;
-  for (std::size_t i = 0; i < kColumns.size(); ++i) {
-    if (i > 0) line += ',';
-    line += std::visit(Format{step}, kColumns[i].field);
-  }
-  return line;
-}
+std::string steps_header() { return header_of(with_groups({})); }
 
 std::string format_steps(std::span<const StepMean> steps) {
-  std::string text = steps_header() + '\n';
-  for (const StepMean& step : steps) text += format_step(step) + '\n';
+  const Columns columns = columns_of(steps);
+  std::string text = header_of(columns) + '\n';
+  for (const StepMean& step : steps) text += row_of(step, columns) + '\n';
   return text;
 }
+
+std::string format_step(const StepMean& step) { return row_of(step, columns_of({&step, 1})); }
 
 std::vector<StepMean> parse_steps(std::string_view text, const std::string& name) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
@@ -213,13 +269,13 @@ std::vector<StepMean> parse_steps(std::string_view text, const std::string& name
   std::size_t line = 1;
   std::vector<StepMean> steps;
   try {
-    if (format_steps({}) != text.substr(0, std::min(text.size(), steps_header().size() + 1))) {
-      throw std::invalid_argument("is no header of a steps file; expected " + steps_header());
-    }
+    const std::size_t end = text.find('\n');
+    if (end == std::string_view::npos) (void)columns_named("");
+    const Columns columns = columns_named(text.substr(0, end));
     (void)next_record(text, at, lines);
     while (at < text.size()) {
       line = lines + 1;
-      steps.push_back(step_from(next_record(text, at, lines)));
+      steps.push_back(step_from(next_record(text, at, lines), columns));
     }
   } catch (const std::invalid_argument& error) {
     throw ConfigurationError(fmt::format("{}:{}: {}", name, line, error.what()));

@@ -1,5 +1,6 @@
 // steps.csv: one row per step of every run. UTF-8, LF, a header line with the units in the names, shortest round trip
-// numbers; a number that was not measured is an empty field (NaN in memory).
+// numbers; a number that was not measured is an empty field (NaN in memory). Further
+// columns stand in groups at the end, each where one of the steps has it.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,7 @@ namespace kphi::results {
 /// Inverse of doubt_names. Throws std::invalid_argument that names the unknown word.
 [[nodiscard]] std::uint32_t doubts_from_names(std::string_view names);
 
-/// The header line, without a line feed.
+/// The header line without further columns, without a line feed.
 [[nodiscard]] std::string steps_header();
 /// One row, without a line feed.
 [[nodiscard]] std::string format_step(const StepMean& step);
