@@ -108,8 +108,18 @@ results::Nanoseconds ClockMap::time_ns(const ClockEpoch& epoch, std::size_t inde
 }
 
 std::size_t ClockMap::first_at(const ClockEpoch& epoch, results::Nanoseconds time) const {
-  std::size_t low = epoch.begin;
-  std::size_t high = epoch.end;
+  return first_at(epoch, time, epoch.begin, epoch.end);
+}
+
+std::size_t ClockMap::first_at(const ClockEpoch& epoch, results::Nanoseconds time, std::size_t begin,
+                               std::size_t end) const {
+  std::size_t low = begin;
+  std::size_t stride = 1;
+  while (low + stride < end && time_ns(epoch, low + stride) < time) {
+    low += stride;
+    stride *= 2;
+  }
+  std::size_t high = std::min(low + stride, end);
   while (low < high) {
     const std::size_t middle = low + (high - low) / 2;
     if (time_ns(epoch, middle) < time) {

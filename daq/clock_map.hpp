@@ -35,6 +35,9 @@ class ClockMap {
   [[nodiscard]] results::Nanoseconds time_ns(const ClockEpoch& epoch, std::size_t index) const;
   /// First record of `epoch` at or after `time`; epoch.end when there is none.
   [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, results::Nanoseconds time) const;
+  /// The same among records [begin, end) of the epoch, of which all before begin are earlier.
+  [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, results::Nanoseconds time, std::size_t begin,
+                                     std::size_t end) const;
   /// 99 % of the fresh records of an epoch came less than this after the line, ns. Looks at all of them again.
   [[nodiscard]] double residual_p99_ns(const ClockEpoch& epoch) const;
   /// Skew of an epoch in parts per million.

@@ -1,9 +1,16 @@
 # Raw run to step means: a library of its own, so that replay needs no device.
 add_library(kphi_reduction STATIC
+  cell_stream.cpp
   clock_map.cpp
   event_doubts.cpp
+  lag.cpp
+  mean_error.cpp
+  motor_series.cpp
   reduction.cpp
   repetitions.cpp
+  settling.cpp
+  step_doubts.cpp
   supply_means.cpp
+  zeros.cpp
 )
-target_link_libraries(kphi_reduction PUBLIC kphi_options kphi_results PRIVATE kphi_profiles kphi_iq fmt::fmt)
+target_link_libraries(kphi_reduction PUBLIC kphi_options kphi_results kphi_iq PRIVATE kphi_profiles Boost::headers fmt::fmt)

@@ -3,20 +3,11 @@
 
 #include <vector>
 
+#include "daq/zeros.hpp"
 #include "results/records.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::daq {
-
-/// What the zeros of a run say of its thrust, N.
-struct ZeroCheck {
-  double moved_n = 0;      ///< from before to after; NaN with one of them only, or when the box started anew between
-  double tolerated_n = 0;  ///< of moved_n
-  double deviation_n = 0;  ///< of the samples, the larger one
-  bool only_one = false;   ///< in a run that was finished: nobody knows how far it moved
-  [[nodiscard]] bool drifted() const;
-  [[nodiscard]] bool noisy() const;
-};
 
 struct Reduced {
   std::vector<results::StepMean> steps;
@@ -25,18 +16,24 @@ struct Reduced {
 
 /// One mean per step that was held to its end, in the order of the commands.
 ///
-/// Window of a step: from its command plus the minimum discard, and from the first speed reading within 1 % (at least
-/// 2 rad/s) of the command, to the next command. Load cell and motor are averaged over the same window of bench time;
-/// load-cell samples are placed by ClockMap.
+/// Lag: how much later the thrust shows than the speed, from all steps of the run (lag.hpp). Thrust and torque are
+/// averaged over one window, and whatever the module reports over the window that was so much earlier. Where the lag is
+/// unknown the two are the same, and the steps say so.
+/// Window of a step: to the next command, from the minimum discard and the lag after its own, not before the first
+/// speed within 1 % (at least 2 rad/s) of the command, and not before the thrust is settled (settling.hpp). A step
+/// that does not settle is averaged over the least window at its end, and is in doubt.
+/// Load-cell samples are placed by ClockMap and summed in bins that begin at the command (cell_stream.hpp).
 /// Thrust: sign · (mean counts - zero) / counts per newton. Torque: about the direction of the thrust, likewise.
-/// Zero: mean of zero_before and of zero_after (without its beginning, and only once the motor stands), linear in time
-/// between the two; with one of them only, that one. A zero holds for one power-up of the box: when the box started
-/// anew in the run, each step takes that of its own power-up if there is one, and all after the first are in doubt.
-/// Standard deviations are those of the samples (n - 1). Speed is unsigned: positive in the direction of the spin.
-/// Zeros that drifted or scatter (zero_limits.hpp) put all steps of the run in doubt.
-/// Where the bench file of the run knows the gain of the module's clock, the mean speed and its deviation are true
-/// ones: reported speed times gain. Doubts judge the reported speed, which is what the module holds to the command. A
-/// motor channel without a reading in the window gives NaN.
+/// Its standard uncertainty: that of the mean of correlated samples (mean_error.hpp) and that of the zero. Effective
+/// number of samples: variance of the samples over that of their mean; more than there are when the noise is periodic.
+/// Zero: see zeros.hpp. A zero holds for one power-up of the box: when the box started anew in the run, each step takes
+/// that of its own power-up if there is one, and all after the first are in doubt. Zeros that drifted or are not known
+/// well (zero_limits.hpp) put all steps of the run in doubt.
+/// Standard deviations are those of the samples (n - 1). Speed is unsigned: positive in the direction of the spin;
+/// glitches (motor_series.hpp) are left out and counted.
+/// Where the bench file of the run knows the gain of the module's clock, the mean speed, its deviation and its
+/// uncertainty are true ones: reported speed times gain. Doubts judge the reported speed, which is what the module
+/// holds to the command. A motor channel without a reading in the window gives NaN.
 ///
 /// An aborted run gives the steps before the one that was cut short. Throws RecordError when a run with steps holds no
 /// load-cell samples in any zero window, or its scale cannot be used.

@@ -1,16 +1,25 @@
 #include "daq/repetitions.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
-#include <limits>
 #include <map>
-#include <string>
+#include <optional>
+#include <set>
 #include <tuple>
 
 namespace kphi::daq {
 namespace {
 
+using results::Doubt;
 using results::StepMean;
 using Group = std::vector<const StepMean*>;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// ---- averages ----
 
 constexpr double StepMean::*kMeans[] = {
     &StepMean::commanded_speed_rad_s,
@@ -28,9 +37,14 @@ constexpr double StepMean::*kMeans[] = {
     &StepMean::supply_w,
     &StepMean::air_density_kg_m3,
     &StepMean::air_density_u_kg_m3,
+    &StepMean::discarded_s,
+    &StepMean::zero_moved_n,
+    &StepMean::lag_s,
 };
 constexpr double StepMean::*kRootMeanSquares[] = {&StepMean::speed_rad_s, &StepMean::speed_sd_rad_s,
                                                   &StepMean::thrust_sd_n, &StepMean::torque_sd_nm};
+constexpr double StepMean::*kUncertainties[] = {&StepMean::thrust_u_n, &StepMean::speed_u_rad_s, &StepMean::zero_u_n,
+                                                &StepMean::lag_u_s};
 
 /// Mean of f(value) over the rows that have the value; NaN without any.
 template <class Function>
@@ -42,24 +56,202 @@ double mean_over(const Group& group, double StepMean::*member, Function f) {
     sum += f(step->*member);
     ++n;
   }
-  return n == 0 ? std::numeric_limits<double>::quiet_NaN() : sum / n;
+  return n == 0 ? kNan : sum / n;
+}
+
+double sum_over(const Group& group, double StepMean::*member) {
+  double sum = 0;
+  for (const StepMean* step : group) sum += step->*member;
+  return sum;
+}
+
+/// Welch-Satterthwaite, of the mean of the repetitions.
+double freedom_of(const Group& group) {
+  double squares = 0, share = 0;
+  for (const StepMean* step : group) {
+    const double square = step->thrust_u_n * step->thrust_u_n;
+    squares += square;
+    share += square * square / step->thrust_freedom;
+  }
+  return squares * squares / share;
 }
 
 StepMean average(const Group& group) {
+  const double n = static_cast<double>(group.size());
   StepMean mean = *group.front();
   mean.repetition = 0;
   for (const auto member : kMeans) mean.*member = mean_over(group, member, [](double x) { return x; });
   for (const auto member : kRootMeanSquares) {
     mean.*member = std::sqrt(mean_over(group, member, [](double x) { return x * x; }));
   }
+  for (const auto member : kUncertainties) {
+    mean.*member = std::sqrt(mean_over(group, member, [](double x) { return x * x; }) / n);
+  }
+  mean.thrust_n_eff = sum_over(group, &StepMean::thrust_n_eff);
+  mean.thrust_freedom = freedom_of(group);
   mean.speed_n = 0;
   mean.thrust_samples = 0;
+  mean.speed_glitches = 0;
   for (const StepMean* step : group) {
     mean.speed_n += step->speed_n;
     mean.thrust_samples += step->thrust_samples;
+    mean.speed_glitches += step->speed_glitches;
     mean.doubts |= step->doubts;
   }
   return mean;
+}
+
+// ---- judgement ----
+
+/// Doubts that leave thrust over speed² as good as it is.
+constexpr std::uint32_t kHarmless = [] {
+  std::uint32_t bits = 0xFu << 24;  // of the bench supply
+  for (const Doubt doubt : {Doubt::lost_samples, Doubt::stream_restarted, Doubt::box_trouble, Doubt::supply_out_of_band,
+                            Doubt::coil_hot, Doubt::slow_round_trip, Doubt::lag_unknown, Doubt::speed_glitch}) {
+    bits |= static_cast<std::uint32_t>(doubt);
+  }
+  return bits;
+}();
+
+bool good(const StepMean& step) {
+  return (step.doubts & ~kHarmless) == 0 && std::isfinite(step.thrust_n) && step.speed_rad_s > 0;
+}
+
+double square(double x) { return x * x; }
+
+/// Of the thrust from within the step alone; older files do not tell it.
+double within(const StepMean& step) {
+  const double n = static_cast<double>(std::max<std::uint64_t>(step.thrust_samples, 1));
+  if (std::isnan(step.thrust_u_n)) return step.thrust_sd_n / std::sqrt(n);
+  return std::sqrt(std::max(square(step.thrust_u_n) - square(step.zero_u_n), 0.0));
+}
+
+using Runs = std::map<int, Group>;  // by repetition
+
+std::set<int> good_levels(const Group& run) {
+  std::set<int> levels;
+  for (const StepMean* step : run) {
+    if (good(*step)) levels.insert(step->step);
+  }
+  return levels;
+}
+
+RepetitionFigure figure_of(const Group& run, const std::set<int>& levels) {
+  double tx = 0, xx = 0, x_sum = 0, variance = 0, zero = 0;
+  for (const StepMean* step : run) {
+    if (!levels.contains(step->step)) continue;
+    const double x = square(step->speed_rad_s);
+    const double of_speed =
+        std::isnan(step->speed_u_rad_s) ? 0 : 2 * step->thrust_n * step->speed_u_rad_s / step->speed_rad_s;
+    tx += step->thrust_n * x;
+    xx += x * x;
+    x_sum += x;
+    variance += x * x * (square(within(*step)) + square(of_speed));
+    zero = std::isnan(step->zero_u_n) ? 0 : std::max(zero, step->zero_u_n);
+  }
+  RepetitionFigure figure;
+  figure.k = tx / xx;
+  figure.u = std::sqrt(variance + square(zero * x_sum)) / xx;
+  return figure;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+}
+
+std::vector<RepetitionFigure> figures_of(const Runs& runs) {
+  std::vector<RepetitionFigure> figures;
+  std::optional<std::set<int>> common;
+  for (const auto& [repetition, run] : runs) {
+    const std::set<int> levels = good_levels(run);
+    figures.push_back({repetition, kNan, kNan, !levels.empty() && 2 * levels.size() >= run.size(), false});
+    if (!figures.back().usable) continue;
+    if (!common) common = levels;
+    std::erase_if(*common, [&](int level) { return !levels.contains(level); });
+  }
+  for (RepetitionFigure& figure : figures) {
+    if (!figure.usable || common->empty()) continue;
+    const RepetitionFigure found = figure_of(runs.at(figure.repetition), *common);
+    figure.k = found.k;
+    figure.u = found.u;
+  }
+  return figures;
+}
+
+/// Marks the outlying ones; the median of all usable ones.
+double identify_outliers(std::vector<RepetitionFigure>& figures, const RepetitionRule& rule) {
+  std::vector<double> k, u, away;
+  for (const RepetitionFigure& figure : figures) {
+    if (std::isnan(figure.k)) continue;
+    k.push_back(figure.k);
+    u.push_back(figure.u);
+  }
+  if (k.empty()) return kNan;
+  const double middle = median(k);
+  if (k.size() < 3) return middle;
+  for (const double value : k) away.push_back(std::abs(value - middle));
+  const double scale = std::max({1.4826 * median(away), median(u), rule.least_share * std::abs(middle)});
+  for (RepetitionFigure& figure : figures) figure.outlying = std::abs(figure.k - middle) > rule.threshold * scale;
+  return middle;
+}
+
+/// One-way analysis of variance: the repetitions are the groups, and how certain each is comes from within it.
+void analyse(RepetitionVerdict& verdict, double freedom_within) {
+  double n = 0, mean = 0, squares = 0, u_squares = 0;
+  for (const RepetitionFigure& figure : verdict.repetitions) {
+    if (std::isnan(figure.k)) continue;
+    n += 1;
+    mean += figure.k;
+    u_squares += square(figure.u);
+  }
+  if (n < 2) return;
+  mean /= n;
+  for (const RepetitionFigure& figure : verdict.repetitions) {
+    if (!std::isnan(figure.k)) squares += square(figure.k - mean);
+  }
+  verdict.between_sd = std::sqrt(squares / (n - 1));
+  verdict.within_u = std::sqrt(u_squares / n);
+  if (!(verdict.within_u > 0)) return;
+  verdict.f = square(verdict.between_sd / verdict.within_u);
+  const boost::math::fisher_f distribution(n - 1, std::max(freedom_within, 1.0));
+  verdict.p = boost::math::cdf(boost::math::complement(distribution, verdict.f));
+}
+
+double freedom_within(const Runs& runs) {
+  double freedom = 0;
+  for (const auto& [repetition, run] : runs) {
+    for (const StepMean* step : run) {
+      if (good(*step)) freedom += std::isnan(step->thrust_freedom) ? 1 : std::min(step->thrust_freedom, 1e3);
+    }
+  }
+  return freedom;
+}
+
+void decide(RepetitionVerdict& verdict, const RepetitionRule& rule) {
+  int standing = 0;
+  std::vector<double> k;
+  for (const RepetitionFigure& figure : verdict.repetitions) {
+    if (!figure.usable) {
+      verdict.reason = fmt::format("repetition {} has too few steps without doubt", figure.repetition);
+    } else if (figure.outlying) {
+      verdict.reason = fmt::format("repetition {} gives a k that is {:+.2f} % off the median of all (Hampel)",
+                                   figure.repetition, 100 * (figure.k / verdict.k - 1));
+    } else {
+      ++standing;
+      k.push_back(figure.k);
+    }
+  }
+  const auto runs = static_cast<int>(verdict.repetitions.size());
+  const auto [low, high] = std::minmax_element(k.begin(), k.end());
+  const bool spread = k.size() > 1 && verdict.p < 0.05 && *high - *low > rule.spread_share * std::abs(verdict.k);
+  if (spread && verdict.reason.empty()) {
+    verdict.reason = fmt::format("the repetitions spread over {:.2f} % of k, and none stands out",
+                                 100 * (*high - *low) / std::abs(verdict.k));
+  }
+  const bool too_few = standing < rule.wanted || spread;
+  verdict.asks_for_another = runs >= rule.wanted && runs < rule.at_most && too_few;
 }
 
 }  // namespace
@@ -75,6 +267,30 @@ std::vector<StepMean> average_repetitions(std::span<const StepMean> steps) {
   std::vector<StepMean> means;
   for (const Group& group : groups) means.push_back(average(group));
   return means;
+}
+
+std::vector<RepetitionVerdict> judge_repetitions(std::span<const StepMean> steps, const RepetitionRule& rule) {
+  std::vector<RepetitionVerdict> verdicts;
+  std::vector<Runs> runs;
+  std::map<std::pair<std::string, double>, std::size_t> places;
+  for (const StepMean& step : steps) {
+    if (step.repetition == 0) continue;
+    const auto [place, is_new] = places.try_emplace({step.propeller, step.occlusion_deg}, runs.size());
+    if (is_new) {
+      runs.emplace_back();
+      verdicts.emplace_back();
+      verdicts.back().propeller = step.propeller;
+      verdicts.back().occlusion_deg = step.occlusion_deg;
+    }
+    runs[place->second][step.repetition].push_back(&step);
+  }
+  for (std::size_t i = 0; i < verdicts.size(); ++i) {
+    verdicts[i].repetitions = figures_of(runs[i]);
+    verdicts[i].k = identify_outliers(verdicts[i].repetitions, rule);
+    analyse(verdicts[i], freedom_within(runs[i]));
+    decide(verdicts[i], rule);
+  }
+  return verdicts;
 }
 
 }  // namespace kphi::daq

@@ -1,7 +1,9 @@
-// Three times the same, averaged.
+// The same run several times: averaged, and judged.
 #pragma once
 
+#include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "results/step_mean.hpp"
@@ -11,9 +13,50 @@ namespace kphi::daq {
 /// One row per propeller, occlusion and step, in the order of first appearance, with repetition = 0.
 /// T = k ω² is linear in ω², so the averaged speed is the root of the mean of the squares, and thrust over speed² of
 /// the row is the k that the repetitions have together. Thrust, torque, zero, electrical and thermal readings, the
-/// commanded speed and the window's ends: arithmetic means over the repetitions that have them. Standard deviations:
-/// root mean square (the spread within a step, not between repetitions). Numbers of samples: sums. Doubts: those of any
-/// repetition.
+/// commanded speed, the lag and the window's ends: arithmetic means over the repetitions that have them. Standard
+/// deviations: root mean square (the spread within a step, not between repetitions). Standard uncertainties: of the
+/// mean, as if nothing but what is within the steps made the repetitions differ; judge_repetitions tells whether that
+/// is so. Numbers of samples: sums. Doubts: those of any repetition.
 [[nodiscard]] std::vector<results::StepMean> average_repetitions(std::span<const results::StepMean> steps);
+
+/// k of one repetition, N/(rad/s)²: least squares of T = k ω² over the levels that all repetitions have.
+struct RepetitionFigure {
+  int repetition = 0;
+  double k = std::numeric_limits<double>::quiet_NaN();
+  double u = std::numeric_limits<double>::quiet_NaN();  ///< standard, from within the steps and the zeros
+  bool usable = false;                                  ///< at least half of its steps are without a doubt about k
+  bool outlying = false;                                ///< by Hampel's identifier
+};
+
+/// What repetitions of one propeller and occlusion say of each other.
+struct RepetitionVerdict {
+  std::string propeller;
+  double occlusion_deg = 0;
+  std::vector<RepetitionFigure> repetitions;                     ///< every one stays here, whatever becomes of it
+  double k = std::numeric_limits<double>::quiet_NaN();           ///< median
+  double between_sd = std::numeric_limits<double>::quiet_NaN();  ///< of k from repetition to repetition
+  double within_u = std::numeric_limits<double>::quiet_NaN();    ///< root mean square of u
+  double f = std::numeric_limits<double>::quiet_NaN();  ///< between² over within² (one-way analysis of variance)
+  double p = std::numeric_limits<double>::quiet_NaN();  ///< how probable so large an f is when nothing is between
+  bool asks_for_another = false;
+  std::string reason;  ///< one line; empty when nothing is to be said
+};
+
+struct RepetitionRule {
+  int wanted = 3;   ///< repetitions of the campaign
+  int at_most = 5;  ///< runs: after these it is no longer chance
+  /// Hampel's identifier: further from the median than so many times the largest of 1.4826 · median absolute
+  /// deviation, the uncertainty within, and least_share · k.
+  double threshold = 3;
+  double least_share = 0.001;
+  /// From the lowest to the highest more than this share of k is too much, even when none of them stands out.
+  double spread_share = 0.02;
+};
+
+/// One verdict per propeller and occlusion, in the order of first appearance; rows with repetition 0 do not count. Once
+/// the wanted repetitions are there, another is asked for while fewer of them are good (usable and not outlying), or
+/// while their spread is too large, up to at_most.
+[[nodiscard]] std::vector<RepetitionVerdict> judge_repetitions(std::span<const results::StepMean> steps,
+                                                               const RepetitionRule& rule = {});
 
 }  // namespace kphi::daq

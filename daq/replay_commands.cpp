@@ -2,12 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <deque>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include "daq/reduction.hpp"
@@ -43,16 +48,33 @@ std::vector<std::filesystem::path> runs_of(const CampaignFolder& folder) {
   return folder.complete_runs(profiles::load_campaign(folder.campaign_file().string()).occlusions_deg);
 }
 
+/// Reduces runs while the next one is read; HDF5 is only ever asked from here. Their order is that of the files.
+std::vector<StepMean> reduced(const std::vector<std::filesystem::path>& runs) {
+  const std::size_t at_once = std::max(1u, std::thread::hardware_concurrency());
+  std::deque<std::future<std::vector<StepMean>>> under_way;
+  std::vector<StepMean> steps;
+  const auto take_first = [&] {
+    const std::vector<StepMean> of_run = under_way.front().get();
+    under_way.pop_front();
+    steps.insert(steps.end(), of_run.begin(), of_run.end());
+  };
+  for (const auto& run : runs) {
+    while (under_way.size() >= at_once) take_first();
+    auto recording = std::make_shared<const results::RunRecording>(results::read_run(run));
+    under_way.push_back(
+        std::async(std::launch::async, [recording = std::move(recording)] { return reduce(*recording); }));
+  }
+  while (!under_way.empty()) take_first();
+  return steps;
+}
+
 Replay replay(const std::filesystem::path& path) {
   Replay result;
   result.whole_campaign = std::filesystem::is_directory(path);
   std::filesystem::path steps;
   if (result.whole_campaign) {
     const CampaignFolder folder = CampaignFolder::open(path);
-    for (const auto& run : runs_of(folder)) {
-      const auto of_run = reduce(results::read_run(run));
-      result.steps.insert(result.steps.end(), of_run.begin(), of_run.end());
-    }
+    result.steps = reduced(runs_of(folder));
     steps = folder.steps();
     if (std::filesystem::exists(folder.means())) result.means = folder.means();
   } else {
@@ -79,6 +101,11 @@ std::optional<std::string> difference(const Replay& replay, const std::string& s
   const std::string again = results::format_steps(replay.steps);
   if (again == stored) return std::nullopt;
   const std::vector<std::string> old_lines = lines_of(stored);
+  if (stored.starts_with(results::steps_header() + '\n') && !again.starts_with(results::steps_header() + '\n')) {
+    return std::string(
+        "was written by an older reduction, without lag and uncertainties; `kphi replay DIR >steps.csv` "
+        "writes it anew");
+  }
   std::vector<std::string> new_lines = lines_of(again);
   std::size_t at = 0;
   if (!replay.whole_campaign) {
@@ -115,6 +142,9 @@ nlohmann::ordered_json to_json(const StepMean& step) {
           {"torque_nm", number(step.torque_nm)},
           {"zero_n", step.zero_n},
           {"thrust_samples", step.thrust_samples},
+          {"thrust_u_n", number(step.thrust_u_n)},
+          {"thrust_n_eff", number(step.thrust_n_eff)},
+          {"lag_s", number(step.lag_s)},
           {"doubts", results::doubt_names(step.doubts)}};
 }
 

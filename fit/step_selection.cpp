@@ -15,7 +15,7 @@ struct DoubtPolicy {
   bool spoils;
 };
 
-constexpr std::array<DoubtPolicy, 27> kPolicy{{
+constexpr std::array<DoubtPolicy, 32> kPolicy{{
     {Doubt::speed_not_reached, "commanded speed not reached", true},
     {Doubt::speed_unsteady, "speed never settled", true},
     {Doubt::saturated, "load cell saturated", true},
@@ -43,6 +43,11 @@ constexpr std::array<DoubtPolicy, 27> kPolicy{{
     {Doubt::supply_off, "supply was off", true},
     {Doubt::supply_sag, "supply sagged", false},
     {Doubt::supply_rise, "motor fed back into the supply", false},
+    {Doubt::unsettled, "thrust never settled", true},
+    {Doubt::drifted, "thrust drifted within the step", true},
+    {Doubt::lag_unknown, "lag of the thrust unknown", false},
+    {Doubt::frozen, "load cell repeated one value", true},
+    {Doubt::speed_glitch, "impossible speeds left out", false},
 }};
 
 bool has(std::uint32_t doubts, Doubt doubt) { return (doubts & static_cast<std::uint32_t>(doubt)) != 0; }

@@ -34,10 +34,15 @@ enum class Doubt : std::uint32_t {
   motor_reset = 1u << 20,         ///< the module restarted by itself within the step
   motor_lost = 1u << 21,          ///< the module was lost, or did not do as it was told, within the step
   slow_round_trip = 1u << 22,     ///< the module's readings are blurred in time since then in this run
-  supply_limited = 1u << 24,      ///< the bench supply limited the current within the step
-  supply_off = 1u << 25,          ///< its output was off within the step, or its protection had switched it off
-  supply_sag = 1u << 26,          ///< more than 5 % of its set voltage was missing at its terminals
-  supply_rise = 1u << 27,         ///< its terminals were more than 3 % above the set voltage: the motor fed back
+  unsettled = 1u << 23,       ///< the thrust still changed at the end of the step, or its speed came too late to tell
+  supply_limited = 1u << 24,  ///< the bench supply limited the current within the step
+  supply_off = 1u << 25,      ///< its output was off within the step, or its protection had switched it off
+  supply_sag = 1u << 26,      ///< more than 5 % of its set voltage was missing at its terminals
+  supply_rise = 1u << 27,     ///< its terminals were more than 3 % above the set voltage: the motor fed back
+  drifted = 1u << 28,         ///< thrust over speed² went on changing all through the step
+  lag_unknown = 1u << 29,     ///< the steps do not tell how much later than the speed the thrust shows
+  frozen = 1u << 30,          ///< the load cell repeated one value for 0.1 s or longer
+  speed_glitch = 1u << 31,    ///< speeds that no rotor can have were left out
 };
 
 inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
@@ -72,6 +77,16 @@ struct StepMean {
   double supply_w = kNotMeasured;  ///< mean of the products
   double air_density_kg_m3 = kNotMeasured;
   double air_density_u_kg_m3 = kNotMeasured;  ///< standard uncertainty
+  double discarded_s = kNotMeasured;          ///< from the command to the window's begin
+  double thrust_n_eff = kNotMeasured;         ///< independent samples that would give the same uncertainty of the mean
+  double thrust_u_n = kNotMeasured;           ///< standard uncertainty of thrust_n, with the zero's
+  double thrust_freedom = kNotMeasured;       ///< degrees of freedom of thrust_u_n
+  double speed_u_rad_s = kNotMeasured;        ///< standard uncertainty of the mean, without that of the clock gain
+  double zero_u_n = kNotMeasured;             ///< standard uncertainty of the zero; all steps of a run share it
+  double zero_moved_n = kNotMeasured;         ///< from before the run to after it
+  double lag_s = kNotMeasured;                ///< the thrust shows so much later than the speed
+  double lag_u_s = kNotMeasured;              ///< standard uncertainty
+  std::uint64_t speed_glitches = 0;           ///< speeds left out
 };
 
 }  // namespace kphi::results

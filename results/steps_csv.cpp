@@ -68,6 +68,11 @@ const std::array kGroups{
            Column{"supply_w", &StepMean::supply_w}}},
     Group{{Column{"air_density_kg_m3", &StepMean::air_density_kg_m3},
            Column{"air_density_u_kg_m3", &StepMean::air_density_u_kg_m3}}},
+    Group{{Column{"discarded_s", &StepMean::discarded_s}, Column{"thrust_n_eff", &StepMean::thrust_n_eff},
+           Column{"thrust_u_n", &StepMean::thrust_u_n}, Column{"thrust_freedom", &StepMean::thrust_freedom},
+           Column{"speed_u_rad_s", &StepMean::speed_u_rad_s}, Column{"zero_u_n", &StepMean::zero_u_n},
+           Column{"zero_moved_n", &StepMean::zero_moved_n}, Column{"lag_s", &StepMean::lag_s},
+           Column{"lag_u_s", &StepMean::lag_u_s}, Column{"speed_glitches", &StepMean::speed_glitches}}},
 };
 
 using Columns = std::vector<Column>;
@@ -121,6 +126,11 @@ constexpr std::array kDoubtNames{
     std::pair{Doubt::supply_off, std::string_view("supply_off")},
     std::pair{Doubt::supply_sag, std::string_view("supply_sag")},
     std::pair{Doubt::supply_rise, std::string_view("supply_rise")},
+    std::pair{Doubt::unsettled, std::string_view("unsettled")},
+    std::pair{Doubt::drifted, std::string_view("drifted")},
+    std::pair{Doubt::lag_unknown, std::string_view("lag_unknown")},
+    std::pair{Doubt::frozen, std::string_view("frozen")},
+    std::pair{Doubt::speed_glitch, std::string_view("speed_glitch")},
 };
 
 std::string quoted(const std::string& text) {

@@ -1,6 +1,6 @@
 // steps.csv: one row per step of every run. UTF-8, LF, a header line with the units in the names, shortest round trip
-// numbers; a number that was not measured is an empty field (NaN in memory). What a bench supply showed, and the
-// density of the air, stand in further columns at the end, where one of the steps has them.
+// numbers; a number that was not measured is an empty field (NaN in memory). Further columns (what a bench supply showed,
+// the density of the air, how certain the means are) stand in groups at the end, each where one of the steps has it.
 #pragma once
 
 #include <cstdint>

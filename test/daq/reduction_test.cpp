@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cmath>
 
-#include "daq/repetitions.hpp"
 #include "results/record_error.hpp"
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
@@ -39,7 +38,7 @@ TEST(Reduction, FindsTheKnownCoefficientWithoutDoubt) {
     EXPECT_NEAR(step.thrust_n, truth.k * truth.speeds[i] * truth.speeds[i], 5 * truth.noise_n / std::sqrt(1000.0));
     EXPECT_NEAR(step.thrust_sd_n, truth.noise_n, 0.1 * truth.noise_n);
     EXPECT_NEAR(step.torque_nm, truth.torque_share * step.thrust_n, 2e-4);
-    EXPECT_NEAR(static_cast<double>(step.thrust_samples), 1000, 2);
+    EXPECT_NEAR(static_cast<double>(step.thrust_samples), 850, 152) << "one slope in twenty looks like one by chance";
     EXPECT_EQ(step.supply_voltage_v, 16.0);
     EXPECT_TRUE(std::isnan(step.motor_current_a));
     EXPECT_EQ(step.propeller, "5x3");
@@ -120,6 +119,61 @@ TEST(Reduction, RefusesAClockGainThatCannotBeRead) {
   EXPECT_THROW((void)reduce(run), results::RecordError);
 }
 
+TEST(Reduction, TellsHowCertainItIs) {
+  Truth truth;
+  truth.thrust_delay_s = 0.05;
+  for (const StepMean& step : reduce(make_run(truth))) {
+    EXPECT_NEAR(step.thrust_u_n, truth.noise_n * std::sqrt(1 / 950.0 + 0.5 / 750.0), 0.0004) << "the step and its zero";
+    EXPECT_NEAR(step.zero_u_n, truth.noise_n * std::sqrt(0.5 / 750.0), 0.0003);
+    EXPECT_GT(step.thrust_n_eff, 400);
+    EXPECT_GT(step.thrust_freedom, 5);
+    EXPECT_NEAR(step.zero_moved_n, 0, 0.005);
+    EXPECT_NEAR(step.lag_s, 0.05, 0.005);
+    EXPECT_LT(step.lag_u_s, 0.01);
+    EXPECT_EQ(results::doubt_names(step.doubts), "");
+  }
+}
+
+TEST(Reduction, FlagsAStepThatDoesNotSettleAndDoesNotAverageItAsIfItHad) {
+  Truth truth;
+  truth.noise_n = 0.001;
+  truth.thrust_tau_s = 1.5;  // of the cell; the speed is there at once
+  const auto steps = reduce(make_run(truth));
+  EXPECT_TRUE(has(steps[1], Doubt::unsettled));
+  EXPECT_FALSE(has(steps[1], Doubt::speed_not_reached));
+}
+
+TEST(Reduction, CountsSpeedsThatNoRotorCanHaveAndLeavesThemOut) {
+  RunRecording run = make_run({});
+  for (auto& r : run.motor) {
+    if (r.channel == results::MotorChannel::speed && r.time_ns > 4'500'000'000 && r.time_ns < 4'515'000'000)
+      r.value *= 2;
+  }
+  const auto steps = reduce(run);
+  EXPECT_EQ(steps[1].speed_glitches, 1u);
+  EXPECT_EQ(results::doubt_names(steps[1].doubts), "speed_glitch");
+  EXPECT_NEAR(steps[1].speed_rad_s, 800, 0.01);
+  EXPECT_EQ(steps[0].speed_glitches, 0u);
+}
+
+TEST(Reduction, NoticesACellThatRepeatsOneValueWithinAStep) {
+  RunRecording run = make_run({});
+  for (std::size_t i = 4500; i < 4700; ++i) run.load_cell[i].counts = run.load_cell[4500].counts;
+  const auto steps = reduce(run);
+  EXPECT_TRUE(has(steps[1], Doubt::frozen));
+  EXPECT_FALSE(has(steps[0], Doubt::frozen));
+}
+
+TEST(Reduction, AThrustThatFadesAtConstantSpeedDrifts) {
+  RunRecording run = make_run({});
+  for (std::size_t i = 3000; i < 5000; ++i) {
+    run.load_cell[i].counts[2] += static_cast<std::int32_t>(40 * (static_cast<int>(i) - 3000));  // 80 mN of 770
+  }
+  const auto steps = reduce(run);
+  EXPECT_TRUE(has(steps[1], Doubt::drifted)) << results::doubt_names(steps[1].doubts);
+  EXPECT_FALSE(has(steps[0], Doubt::drifted));
+}
+
 TEST(Reduction, SignAndSpinOfTheMountingDoNotShow) {
   for (const int sign : {-1, 1}) {
     for (const int spin : {-1, 1}) {
@@ -169,7 +223,7 @@ TEST(Reduction, ARunWithoutOneOfItsZerosIsInDoubtBecauseNobodyKnowsHowFarItMoved
     EXPECT_NEAR(k_of(step), truth.k, 0.02 * truth.k);
   }
   run.outcome = results::Outcome::aborted;
-  EXPECT_EQ(results::doubt_names(reduce(run)[0].doubts), "") << "that it lacks the second zero is known";
+  EXPECT_EQ(results::doubt_names(reduce(run)[0].doubts), "lag_unknown") << "that it lacks the second zero is known";
 }
 
 TEST(Reduction, ALargeThrustToleratesHalfAPercentOfDrift) {
@@ -198,8 +252,10 @@ TEST(Reduction, ASlowMotorShrinksTheWindowInsteadOfSpoilingTheMean) {
   truth.motor_tau_s = 0.3;
   truth.dwell_s = 3;
   const auto steps = reduce(make_run(truth));
-  // 0 → 400 rad/s with 0.3 s is within 4 rad/s after 1.38 s.
-  EXPECT_NEAR(steps[0].window_begin_s, truth.zero_s + 1.38, 0.03);
+  // 0 → 400 rad/s with 0.3 s is within 4 rad/s after 1.38 s; the thrust is within 0.1 % after 2.3 s.
+  EXPECT_GE(steps[0].window_begin_s, truth.zero_s + 1.37);
+  EXPECT_LE(steps[0].window_begin_s, truth.zero_s + 2.4);
+  EXPECT_NEAR(steps[0].discarded_s, steps[0].window_begin_s - truth.zero_s, 1e-9);
   EXPECT_EQ(steps[0].window_end_s, truth.zero_s + truth.dwell_s);
   for (const StepMean& step : steps) {
     EXPECT_NEAR(k_of(step), truth.k, 2e-3 * truth.k);
@@ -236,7 +292,7 @@ TEST(Reduction, LostSamplesAreDoubtedWhereTheyWereLost) {
   truth.lose = [](std::uint64_t n) { return n >= 3100 && n < 3200; };  // in the discarded second of a step
   for (const StepMean& step : reduce(make_run(truth))) EXPECT_FALSE(has(step, Doubt::lost_samples));
 
-  truth.lose = [](std::uint64_t n) { return n >= 3900 && n < 4100; };  // across the begin of a window
+  truth.lose = [](std::uint64_t n) { return n >= 3900 && n < 4300; };  // across the begin of a window
   EXPECT_TRUE(has(reduce(make_run(truth))[1], Doubt::lost_samples));
 }
 
@@ -404,55 +460,6 @@ TEST(Reduction, TellsHowFastItIs) {
   }
   std::printf("%zu samples reduced in %.1f ms\n", run.load_cell.size(), 1e3 * best);
   EXPECT_EQ(steps, 83u);
-}
-
-// ---- repetitions ----
-
-TEST(Repetitions, AverageSoThatThrustOverSpeedSquaredStaysTheCoefficient) {
-  std::vector<StepMean> steps;
-  for (int rep = 1; rep <= 3; ++rep) {
-    StepMean s;
-    s.propeller = "5x3";
-    s.occlusion_deg = 90;
-    s.repetition = rep;
-    s.speed_rad_s = 900 + 50 * rep;
-    s.thrust_n = 1.3e-6 * s.speed_rad_s * s.speed_rad_s;
-    s.thrust_samples = 100;
-    s.doubts = rep == 2 ? static_cast<std::uint32_t>(Doubt::derated) : 0;
-    s.supply_current_a = rep == 1 ? std::nan("") : 2.0 * rep;
-    steps.push_back(s);
-  }
-  const auto mean = average_repetitions(steps);
-  ASSERT_EQ(mean.size(), 1u);
-  EXPECT_EQ(mean[0].repetition, 0);
-  EXPECT_NEAR(k_of(mean[0]), 1.3e-6, 1e-18);
-  EXPECT_EQ(mean[0].thrust_samples, 300u);
-  EXPECT_EQ(mean[0].supply_current_a, 5.0);
-  EXPECT_EQ(results::doubt_names(mean[0].doubts), "derated");
-}
-
-TEST(Repetitions, AreGroupedByPropellerOcclusionAndStep) {
-  std::vector<StepMean> steps;
-  for (const char* propeller : {"b", "a"}) {
-    for (const double phi : {90.0, 0.0}) {
-      for (int rep = 1; rep <= 2; ++rep) {
-        for (int step = 0; step < 3; ++step) {
-          StepMean s;
-          s.propeller = propeller;
-          s.occlusion_deg = phi;
-          s.repetition = rep;
-          s.step = step;
-          s.thrust_n = rep;
-          steps.push_back(s);
-        }
-      }
-    }
-  }
-  const auto means = average_repetitions(steps);
-  ASSERT_EQ(means.size(), 12u);
-  EXPECT_EQ(means[0].propeller, "b");
-  EXPECT_EQ(means[3].occlusion_deg, 0);
-  for (const StepMean& mean : means) EXPECT_EQ(mean.thrust_n, 1.5);
 }
 
 }  // namespace

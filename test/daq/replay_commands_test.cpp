@@ -85,6 +85,26 @@ TEST_F(Replay, MissesAndFindsRows) {
   EXPECT_EQ(say(folder_.path().string()).code, 5);
 }
 
+TEST_F(Replay, SaysThatAnOlderReductionWroteTheSteps) {
+  for (results::StepMean& step : steps_) {
+    step.discarded_s = results::kNotMeasured;
+  }
+  results::write_steps(folder_.steps(), steps_);
+  const Said said = say(folder_.path().string());
+  EXPECT_EQ(said.code, 5);
+  EXPECT_THAT(said.err, HasSubstr("older reduction"));
+}
+
+TEST_F(Replay, GivesTheSameBytesHoweverManyRunsAreUnderWay) {
+  std::string one_after_the_other;
+  for (int i = 0; i < 5; ++i) {
+    const Said said = say(folder_.path().string());
+    if (i == 0) one_after_the_other = said.out;
+    EXPECT_EQ(said.out, one_after_the_other);
+  }
+  EXPECT_EQ(one_after_the_other, results::format_steps(steps_)) << "these were reduced one by one";
+}
+
 TEST_F(Replay, WithoutStoredStepsJustTells) {
   std::filesystem::remove(folder_.steps());
   const Said said = say("--json " + folder_.path().string());

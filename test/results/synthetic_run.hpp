@@ -29,7 +29,14 @@ struct Truth {
   double zero_force_n = 0.35;  ///< at the start
   double drift_n_per_s = 0;
   double motor_tau_s = 0.1;
+  double thrust_delay_s = 0;  ///< of the thrust after the speed
+  double thrust_tau_s = 0;    ///< and a first-order lag
   double noise_n = 0.02;
+  double correlated_n = 0;      ///< deviation of a second noise …
+  double correlation_s = 0.01;  ///< … with this correlation time (first-order autoregressive)
+  double speed_noise_rad_s = 0;
+  double reading_s = 0.02;     ///< between two readings of the motor
+  double reading_phase_s = 0;  ///< of the first one
   double rate_hz = 1000;
   std::uint32_t ft_stride = 7;
   double skew_ppm = 30;
@@ -105,22 +112,38 @@ inline RunRecording make_run(const Truth& truth) {
   run.phases.push_back({Phase::end, -1, ns(end), 0});
 
   double speed = 0;
+  double felt = 0;  // speed² as the thrust shows it
+  double wander = 0;
   double last_t = 0;
-  double next_reading = 0;
+  double next_reading = truth.reading_phase_s;
+  std::normal_distribution<double> unit(0, 1);
+  std::mt19937_64 random_speed(truth.seed + 1);
+  const auto held_back = static_cast<std::size_t>(std::llround(truth.thrust_delay_s * truth.rate_hz));
+  std::vector<double> squares(held_back + 1, 0.0);  // a ring of the last speeds²
   std::uint32_t rdt = 1;
   const double period = (1 + 1e-6 * truth.skew_ppm) / truth.rate_hz;
   for (std::uint64_t n = 0; static_cast<double>(n) * period < end; ++n) {
     const double t = static_cast<double>(n) * period;
     speed += (commanded_at(truth, t) - speed) * (1 - std::exp(-(t - last_t) / truth.motor_tau_s));
+    const double since = t - last_t;
     last_t = t;
     if (t >= next_reading) {
-      next_reading += 0.02;
-      run.motor.push_back({MotorChannel::speed, ns(t), 300000, truth.spin * speed});
+      next_reading += truth.reading_s;
+      const double noise_of_speed = truth.speed_noise_rad_s > 0 ? truth.speed_noise_rad_s * unit(random_speed) : 0;
+      run.motor.push_back({MotorChannel::speed, ns(t), 300000, truth.spin * speed + noise_of_speed});
       run.motor.push_back({MotorChannel::supply_voltage, ns(t), 300000, 16.0});
       run.motor.push_back({MotorChannel::derate, ns(t), 300000, 1.0});
     }
-    const double thrust = truth.k * speed * speed;
-    const double force = truth.zero_force_n + truth.drift_n_per_s * t + truth.sign * thrust + noise(random);
+    squares[n % squares.size()] = speed * speed;
+    const double delayed = squares[(n + 1) % squares.size()];
+    felt = truth.thrust_tau_s > 0 ? delayed + (felt - delayed) * std::exp(-since / truth.thrust_tau_s) : delayed;
+    if (truth.correlated_n > 0) {
+      const double kept = std::exp(-since / truth.correlation_s);
+      wander = n == 0 ? truth.correlated_n * unit(random)
+                      : kept * wander + truth.correlated_n * std::sqrt(1 - kept * kept) * unit(random);
+    }
+    const double thrust = truth.k * felt;
+    const double force = truth.zero_force_n + truth.drift_n_per_s * t + truth.sign * thrust + noise(random) + wander;
     LoadCellRecord record;
     record.counts = {0, 0, static_cast<std::int32_t>(std::lround(1e6 * force)),
                      0, 0, static_cast<std::int32_t>(std::lround(1e6 * truth.sign * truth.torque_share * thrust))};

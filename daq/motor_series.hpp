@@ -1,0 +1,47 @@
+// What the motor module reported in one run, by channel and time.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "daq/mean_error.hpp"
+#include "daq/window.hpp"
+#include "results/records.hpp"
+
+namespace kphi::daq {
+
+struct Statistics {
+  std::uint64_t n = 0;
+  double mean = std::numeric_limits<double>::quiet_NaN();
+  double deviation = 0;
+  double least = std::numeric_limits<double>::infinity();
+  MeanError error;
+};
+
+/// A speed that a rotor cannot have: further than a quarter (at least 50 rad/s) from the median of itself, the two
+/// readings before and the two after. A monotonous change is never one.
+inline constexpr double kGlitchShare = 0.25;
+inline constexpr double kGlitchSpeed = 50;  ///< rad/s
+
+class MotorSeries {
+ public:
+  /// `readings`: sorted by channel, then time; must outlive the series.
+  explicit MotorSeries(std::span<const results::MotorReading> readings);
+
+  using Readings = std::span<const results::MotorReading>;
+
+  /// Of one channel within a window; speeds without glitches.
+  [[nodiscard]] Readings over(results::MotorChannel channel, const Window& window) const;
+  /// Values times `sign`.
+  [[nodiscard]] Statistics statistics(results::MotorChannel channel, const Window& window, double sign = 1) const;
+  [[nodiscard]] std::uint64_t glitches(const Window& window) const;
+
+ private:
+  Readings readings_;
+  std::vector<results::MotorReading> speeds_;
+  std::vector<results::Nanoseconds> glitches_;
+};
+
+}  // namespace kphi::daq

@@ -1,0 +1,174 @@
+#include "daq/repetitions.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "results/steps_csv.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using results::Doubt;
+using results::StepMean;
+using testing::HasSubstr;
+
+double k_of(const StepMean& step) { return step.thrust_n / (step.speed_rad_s * step.speed_rad_s); }
+
+TEST(Repetitions, AverageSoThatThrustOverSpeedSquaredStaysTheCoefficient) {
+  std::vector<StepMean> steps;
+  for (int rep = 1; rep <= 3; ++rep) {
+    StepMean s;
+    s.propeller = "5x3";
+    s.occlusion_deg = 90;
+    s.repetition = rep;
+    s.speed_rad_s = 900 + 50 * rep;
+    s.thrust_n = 1.3e-6 * s.speed_rad_s * s.speed_rad_s;
+    s.thrust_samples = 100;
+    s.doubts = rep == 2 ? static_cast<std::uint32_t>(Doubt::derated) : 0;
+    s.supply_current_a = rep == 1 ? std::nan("") : 2.0 * rep;
+    s.thrust_u_n = 0.003;
+    s.thrust_freedom = 20;
+    s.speed_glitches = 1;
+    steps.push_back(s);
+  }
+  const auto mean = average_repetitions(steps);
+  ASSERT_EQ(mean.size(), 1u);
+  EXPECT_EQ(mean[0].repetition, 0);
+  EXPECT_NEAR(k_of(mean[0]), 1.3e-6, 1e-18);
+  EXPECT_EQ(mean[0].thrust_samples, 300u);
+  EXPECT_EQ(mean[0].supply_current_a, 5.0);
+  EXPECT_NEAR(mean[0].thrust_u_n, 0.003 / std::sqrt(3.0), 1e-12);
+  EXPECT_NEAR(mean[0].thrust_freedom, 60, 1e-9);
+  EXPECT_EQ(mean[0].speed_glitches, 3u);
+  EXPECT_EQ(results::doubt_names(mean[0].doubts), "derated");
+}
+
+TEST(Repetitions, AreGroupedByPropellerOcclusionAndStep) {
+  std::vector<StepMean> steps;
+  for (const char* propeller : {"b", "a"}) {
+    for (const double phi : {90.0, 0.0}) {
+      for (int rep = 1; rep <= 2; ++rep) {
+        for (int step = 0; step < 3; ++step) {
+          StepMean s;
+          s.propeller = propeller;
+          s.occlusion_deg = phi;
+          s.repetition = rep;
+          s.step = step;
+          s.thrust_n = rep;
+          steps.push_back(s);
+        }
+      }
+    }
+  }
+  const auto means = average_repetitions(steps);
+  ASSERT_EQ(means.size(), 12u);
+  EXPECT_EQ(means[0].propeller, "b");
+  EXPECT_EQ(means[3].occlusion_deg, 0);
+  for (const StepMean& mean : means) EXPECT_EQ(mean.thrust_n, 1.5);
+}
+
+constexpr double kThrustU = 0.002;
+
+/// Runs of 20 steps; run i has the coefficient 1.5e-6 · (1 + off[i]).
+std::vector<StepMean> runs(const std::vector<double>& off, unsigned seed = 1) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, kThrustU);
+  std::vector<StepMean> steps;
+  for (std::size_t run = 0; run < off.size(); ++run) {
+    for (int i = 0; i < 20; ++i) {
+      StepMean s;
+      s.propeller = "5x3";
+      s.repetition = static_cast<int>(run) + 1;
+      s.step = i;
+      s.speed_rad_s = 200 + 90.0 * i;
+      s.thrust_n = 1.5e-6 * (1 + off[run]) * s.speed_rad_s * s.speed_rad_s + noise(random);
+      s.thrust_u_n = kThrustU;
+      s.thrust_freedom = 30;
+      s.zero_u_n = 0;
+      steps.push_back(s);
+    }
+  }
+  return steps;
+}
+
+RepetitionVerdict judged(const std::vector<StepMean>& steps, const RepetitionRule& rule = {}) {
+  const auto verdicts = judge_repetitions(steps, rule);
+  EXPECT_EQ(verdicts.size(), 1u);
+  return verdicts.at(0);
+}
+
+TEST(JudgeRepetitions, IsContentWithThreeThatAgree) {
+  int large = 0;
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    const auto verdict = judged(runs({0, 0, 0}, seed));
+    EXPECT_FALSE(verdict.asks_for_another) << seed << ": " << verdict.reason;
+    EXPECT_NEAR(verdict.k, 1.5e-6, 1.5e-6 * 0.001);
+    large += verdict.p < 0.05;
+  }
+  EXPECT_LE(large, 22) << "one in twenty by chance";
+  EXPECT_GE(large, 2);
+}
+
+TEST(JudgeRepetitions, TellsTheSpreadBetweenFromTheSpreadWithin) {
+  const auto verdict = judged(runs({-0.004, 0, 0.004}));
+  EXPECT_NEAR(verdict.between_sd, 0.004 * 1.5e-6, 0.0005 * 1.5e-6);
+  EXPECT_LT(verdict.within_u, 0.0005 * 1.5e-6);
+  EXPECT_GT(verdict.f, 30);
+  EXPECT_LT(verdict.p, 0.001);
+  EXPECT_FALSE(verdict.asks_for_another) << "0.8 % from end to end is what mounting and air do";
+}
+
+TEST(JudgeRepetitions, AsksForAnotherWhenOneOfThreeStandsOutAndKeepsIt) {
+  const auto verdict = judged(runs({0, 0.03, 0.0005}));
+  EXPECT_TRUE(verdict.asks_for_another);
+  EXPECT_THAT(verdict.reason, HasSubstr("repetition 2"));
+  ASSERT_EQ(verdict.repetitions.size(), 3u);
+  EXPECT_TRUE(verdict.repetitions[1].outlying);
+  EXPECT_NEAR(verdict.repetitions[1].k, 1.03 * 1.5e-6, 0.001 * 1.5e-6);
+  EXPECT_FALSE(verdict.repetitions[0].outlying);
+
+  const auto after = judged(runs({0, 0.03, 0.0005, -0.0003}));
+  EXPECT_FALSE(after.asks_for_another) << "three are good now";
+  EXPECT_TRUE(after.repetitions[1].outlying) << "and the failed one is still there";
+  EXPECT_THAT(after.reason, HasSubstr("repetition 2"));
+}
+
+TEST(JudgeRepetitions, AsksForAnotherWhenNoneAgreesButNotForEver) {
+  EXPECT_TRUE(judged(runs({-0.03, 0, 0.03})).asks_for_another);
+  EXPECT_THAT(judged(runs({-0.03, 0, 0.03})).reason, HasSubstr("none stands out"));
+  EXPECT_FALSE(judged(runs({-0.06, -0.03, 0, 0.03, 0.06})).asks_for_another);
+}
+
+TEST(JudgeRepetitions, AsksForAnotherWhenOneHasTooManyDoubtfulSteps) {
+  auto steps = runs({0, 0, 0});
+  for (auto& step : steps) {
+    if (step.repetition == 3 && step.step < 11) step.doubts = static_cast<std::uint32_t>(Doubt::unsettled);
+  }
+  const auto verdict = judged(steps);
+  EXPECT_TRUE(verdict.asks_for_another);
+  EXPECT_FALSE(verdict.repetitions[2].usable);
+  for (auto& step : steps) step.doubts = static_cast<std::uint32_t>(Doubt::coil_hot);
+  EXPECT_FALSE(judged(steps).asks_for_another) << "a hot coil changes no coefficient";
+}
+
+TEST(JudgeRepetitions, ComparesOnlyLevelsThatAllHave) {
+  auto steps = runs({0, 0, 0});
+  for (auto& step : steps) {
+    // k rises with speed; one run lacks its fast steps.
+    step.thrust_n *= 1 + 1e-4 * step.speed_rad_s;
+    if (step.repetition == 2 && step.step > 12) step.doubts = static_cast<std::uint32_t>(Doubt::derated);
+  }
+  EXPECT_FALSE(judged(steps).repetitions[1].outlying);
+}
+
+TEST(JudgeRepetitions, WaitsUntilTheWantedOnesAreThere) {
+  EXPECT_FALSE(judged(runs({0})).asks_for_another);
+  EXPECT_FALSE(judged(runs({0, 0.05})).asks_for_another);
+  EXPECT_FALSE(judged(runs({0}), {.wanted = 1}).asks_for_another);
+}
+
+}  // namespace
+}  // namespace kphi::daq

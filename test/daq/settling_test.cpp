@@ -1,0 +1,85 @@
+#include "daq/settling.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+namespace kphi::daq {
+namespace {
+
+constexpr double kBin = 0.01;
+
+/// 2 s in bins: `level`, plus `amplitude` that dies with `tau_s`, plus noise of 0.3 % of the level.
+std::vector<double> step(double level, double amplitude, double tau_s, unsigned seed = 1, double slope_per_s = 0) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, 0.003 * level);
+  std::vector<double> thrust;
+  for (int i = 0; i < 200; ++i) {
+    const double t = kBin * (i + 0.5);
+    thrust.push_back(level + amplitude * std::exp(-t / tau_s) + slope_per_s * t + noise(random));
+  }
+  return thrust;
+}
+
+TEST(Settling, TakesAllThatTheDiscardLeavesOfAStepAtRest) {
+  int whole = 0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    const Settling found = settle(step(3, 0, 1, seed), 100, 100, kBin);
+    EXPECT_TRUE(found.settled) << seed;
+    whole += found.begin == 100;
+  }
+  EXPECT_GE(whole, 90) << "one in twenty looks like a slope by chance";
+}
+
+TEST(Settling, WaitsUntilATransientHasDied) {
+  const Settling found = settle(step(3, -3, 0.2), 100, 100, kBin);
+  EXPECT_TRUE(found.settled);
+  EXPECT_GT(found.begin, 100u);
+  EXPECT_LT(found.begin, 150u);
+}
+
+TEST(Settling, NeverCallsAStepSettledThatStillMovesAtItsEnd) {
+  const Settling found = settle(step(3, -3, 1.5), 100, 100, kBin);
+  EXPECT_FALSE(found.settled);
+  EXPECT_EQ(found.begin, 150u) << "the last half second";
+}
+
+TEST(Settling, LetsPassWhatCannotSpoilTheCoefficient) {
+  std::vector<double> thrust(200, 3.0);
+  for (std::size_t i = 0; i < thrust.size(); ++i) thrust[i] += 1e-6 * (i % 3 == 0) + 1e-5 * static_cast<double>(i);
+  EXPECT_TRUE(settle(thrust, 100, 100, kBin).settled) << "0.03 % from end to end, though certain";
+  for (std::size_t i = 0; i < thrust.size(); ++i) thrust[i] += 9e-5 * static_cast<double>(i);
+  EXPECT_FALSE(settle(thrust, 100, 100, kBin).settled) << "0.15 % in the last half second";
+}
+
+TEST(Settling, IsNotToldByASpeedThatCameTooLate) {
+  EXPECT_FALSE(settle(step(3, 0, 1), 170, 100, kBin).settled);
+  EXPECT_EQ(settle(step(3, 0, 1), 170, 100, kBin).begin, 170u);
+  EXPECT_FALSE(settle({}, 0, 0, kBin).settled);
+}
+
+TEST(Settling, PassesOverBinsThatHoldNothing) {
+  std::vector<double> thrust = step(3, 0, 1);
+  for (std::size_t i = 120; i < 140; ++i) thrust[i] = std::nan("");
+  EXPECT_TRUE(settle(thrust, 100, 100, kBin).settled);
+}
+
+TEST(Drift, IsAChangeThatGoesOn) {
+  EXPECT_TRUE(drifts(step(3, 0, 1, 1, 0.06)));
+  EXPECT_TRUE(drifts(step(3, 0, 1, 1, -0.06)));
+  std::vector<double> jumps = step(3, 0, 1, 1, -0.06);
+  for (std::size_t i = 0; i < 70; ++i) jumps[i] += 1;
+  EXPECT_TRUE(drifts(jumps)) << "all the more";
+}
+
+TEST(Drift, IsNoNoiseNoSmallChangeAndNoTransient) {
+  for (unsigned seed = 1; seed <= 100; ++seed) EXPECT_FALSE(drifts(step(3, 0, 1, seed))) << seed;
+  EXPECT_FALSE(drifts(step(3, 0, 1, 1, 0.006))) << "0.2 % in the second half";
+  EXPECT_FALSE(drifts(step(3, -1, 0.15))) << "dies";
+  EXPECT_FALSE(drifts(std::vector<double>(4, 1.0)));
+}
+
+}  // namespace
+}  // namespace kphi::daq
