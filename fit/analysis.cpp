@@ -207,6 +207,20 @@ std::vector<LinePoint> with_errors(const Identification& identification) {
 
 }  // namespace
 
+std::vector<StatisticalTest> compare_setups(const Analysis& one, const Analysis& other) {
+  std::vector<StatisticalTest> tests;
+  for (const Budget& a : one.coefficients) {
+    for (const Budget& b : other.coefficients) {
+      if (a.quantity != b.quantity) continue;
+      StatisticalTest test = welch_test(a.estimate(), b.estimate());
+      test.name = a.quantity + " of two set-ups";
+      test.hypothesis = "both are the same";
+      tests.push_back(std::move(test));
+    }
+  }
+  return tests;
+}
+
 Analysis analyse(const Identification& identification, const AnalysisOptions& options) {
   Analysis analysis;
   std::vector<double> phis;

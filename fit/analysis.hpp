@@ -61,6 +61,10 @@ struct Analysis {
   std::vector<std::string> remarks;  ///< sentences on the line: clipping, zero, extrapolation, mismatch
 };
 
+/// One table of budgets against another, φ by φ, by Welch's test: the same propeller on two set-ups, or on two days.
+/// Whole uncertainties count: what neither bench knows of its cell or clock is missing in both.
+[[nodiscard]] std::vector<StatisticalTest> compare_setups(const Analysis& one, const Analysis& other);
+
 /// Of an identification from steps. From a table of coefficients only what the table allows.
 [[nodiscard]] Analysis analyse(const Identification& identification, const AnalysisOptions& options = {});
 

@@ -65,6 +65,7 @@ struct FitRequest {
   Weighting weighting = Weighting::equal;
   Loss loss = Loss::none;
   std::vector<std::string> uncertainties;
+  std::vector<std::string> family;
   bool raw = false;
   bool no_report = false;
   bool json = false;
@@ -215,6 +216,29 @@ Json raw_json(const Input& input) {
   return raw_to_json(identify_dynamics(runs), check_by_blade_pass(runs));
 }
 
+/// The paper's claims, by this propeller and the others of its family.
+std::vector<Claim> family_claims(const FitRequest& request, const Identification& identification,
+                                 const Analysis& analysis) {
+  std::vector<FamilyMember> family{{identification, analysis}};
+  for (const std::string& path : request.family) {
+    const Input input = load(path);
+    FitRequest same = request;
+    same.propeller.clear();
+    same.diameter_in = same.blades = 0;
+    Identification other = identify_input(input, same);
+    Analysis its = analyse(other, analysis_options(request, input));
+    family.push_back({std::move(other), std::move(its)});
+  }
+  return test_claims(family);
+}
+
+void print_claims(const std::vector<Claim>& claims) {
+  for (const Claim& claim : claims) {
+    fmt::print("{:<11} {}: {:.4g} ({:.4g} to {:.4g}) {}\n", name_of(claim.verdict), claim.statement, claim.value,
+               claim.lower, claim.upper, claim.unit);
+  }
+}
+
 void print_number(const char* name, double value, double error, const char* per) {
   const auto rpm = [](double k) { return to_newtons_per_rpm2(ThrustCoefficient(k)); };
   fmt::print("{:<10} {} N/(rad/s)^2{}  =  {} N/RPM^2{}\n", name, with_error(value, error), per,
@@ -227,8 +251,8 @@ void print_headline(const LineFit& line) {
   print_number("slope", line.slope_per_deg, std::sqrt(line.covariance[1][1]), " per degree");
 }
 
-void print_json(const Identification& identification, const Analysis& analysis, const Json& raw,
-                const fs::path& coefficients) {
+void print_json(const Identification& identification, const Analysis& analysis, const std::vector<Claim>& claims,
+                const Json& raw, const fs::path& coefficients) {
   const LineFit& line = identification.line;
   Json table = Json::array();
   for (const OcclusionCoefficient& row : identification.table)
@@ -251,6 +275,7 @@ void print_json(const Identification& identification, const Analysis& analysis, 
             {"weights", name_of(identification.weighting)},
             {"loss", name_of(identification.loss)},
             {"analysis", to_json(analysis)}};
+  if (!claims.empty()) json["claims"] = to_json(claims);
   if (!raw.is_null()) json["raw"] = raw;
   fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
 }
@@ -274,12 +299,15 @@ void run_fit(const FitRequest& request) {
                point.phi_deg, point.repetition, point.step + 1, point.residual_n, point.robust_weight);
   }
   const Json raw = request.raw && input.campaign ? raw_json(input) : Json();
+  std::vector<Claim> claims;
+  if (!request.family.empty()) claims = family_claims(request, identification, analysis);
   if (request.json) {
-    print_json(identification, analysis, raw, file);
+    print_json(identification, analysis, claims, raw, file);
   } else {
     print_headline(identification.line);
     if (const auto& standard = identification.table.front().standard)
       print_number("k_standard", standard->k, standard->standard_error, "");
+    print_claims(claims);
     if (!raw.is_null()) fmt::print("{}\n", raw.dump(2));
   }
   for (const std::string& remark : analysis.remarks) fmt::print(stderr, "line          {}\n", remark);
@@ -386,6 +414,8 @@ void add_fit(CLI::App& app, int& exit_code) {
   command->add_option("--u", request->uncertainties,
                       "NAME=VALUE, standard uncertainty of calibration, cross-axis, clock, density (relative) or "
                       "alignment-deg; may be repeated");
+  command->add_option("--family", request->family, "other propellers, fitted alike: the paper's claims as a table")
+      ->check(CLI::ExistingPath);
   command->add_flag("--raw", request->raw, "time constants, and the motor's clock by blade pass, from the first run");
   command->add_option("--out", request->out, "coefficient file; report and figures go beside it");
   command->add_option("--propeller", request->propeller, "id of the propeller (default: from the steps)");

@@ -29,20 +29,21 @@ double mean_of(const std::vector<TimedSample>& samples, double begin, double end
   return sum / n;  // NaN when there is none
 }
 
-/// ∫ value dt by trapezoids, held constant beyond the ends.
+/// ∫ value dt by trapezoids, held constant beyond the ends. Until `begin` nothing has moved: the trapezoid across it
+/// starts at the sample before, or the rise would be counted from where nobody looked.
 double integral(const std::vector<TimedSample>& samples, double begin, double end) {
-  double sum = 0, t = begin, value = samples.front().value;
+  double sum = 0, t = begin, value = samples.front().value, before = 0;
   for (const TimedSample& sample : samples) {
-    if (sample.t_s <= begin) {
-      value = sample.value;
-      continue;
-    }
     if (sample.t_s >= end) break;
-    sum += 0.5 * (value + sample.value) * (sample.t_s - t);
+    if (sample.t_s > begin) {
+      sum += 0.5 * (value + sample.value) * (sample.t_s - t);
+    } else {
+      before = sample.value * (begin - sample.t_s);
+    }
     t = sample.t_s;
     value = sample.value;
   }
-  return sum + value * (end - t);
+  return sum - before + value * (end - t);
 }
 
 std::vector<TimedSample> samples_of(const EvenSamples& even) {

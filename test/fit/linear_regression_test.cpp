@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 
@@ -20,7 +21,7 @@ struct Certified {
 };
 
 Certified read(const std::string& name) {
-  std::ifstream file(std::string(KPHI_SOURCE_DIR) + "/test/fit/nist/" + name + ".txt");
+  std::ifstream file((std::filesystem::path(KPHI_SOURCE_DIR) / "test/fit/nist" / name).replace_extension("txt"));
   Certified set;
   for (std::string line; std::getline(file, line);) {
     std::istringstream words(line);
