@@ -13,6 +13,16 @@ namespace kphi::fit {
 [[nodiscard]] std::string format_report(const Identification& identification, const Provenance& provenance,
                                         const Figures& figures);
 
+/// One campaign of a page of several.
+struct Chapter {
+  Identification identification;
+  Provenance provenance;
+  Figures figures;
+};
+
+/// Several campaigns on one page: what they have in common first, `family` is the figure of all, then each by itself.
+[[nodiscard]] std::string format_reports(const std::vector<Chapter>& chapters, const Figures& family);
+
 /// "1.5500e-06 ± 1.2e-09": the value to the second digit of its standard error; without one, six digits.
 [[nodiscard]] std::string with_error(double value, double standard_error);
 
