@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -129,8 +130,15 @@ std::string provenance_block(const Identification& identification, const Provena
 
 std::string estimator_words(const Identification& identification) {
   const bool from_steps = !identification.table.empty() && identification.table.front().fit.has_value();
-  return from_steps ? "least squares of T on w^2 through the origin, then a weighted line through k(phi)"
-                    : "a weighted line through given k(phi)";
+  if (!from_steps) return "a weighted line through given k(phi)";
+  constexpr std::array<const char*, 4> words{
+      "least squares of T on w^2 through the origin", "least squares of T on w^2 with an offset",
+      "T/w^2 at the reference speed, by least squares of T on w^2, w and 1", "mean T/w^2 at the reference speed"};
+  std::string text = words[static_cast<std::size_t>(identification.estimator)];
+  if (identification.weighting != Weighting::equal)
+    text += fmt::format(", weighted by {}", identification.weighting == Weighting::thrust ? "u(T)" : "u(T) and u(w)");
+  if (identification.loss != Loss::none) text += fmt::format(", {} loss", name_of(identification.loss));
+  return text + ", then a weighted line through k(phi)";
 }
 
 double printed_rpm(double speed_rad_s) { return std::round(to_rpm(RadPerSec(speed_rad_s)) * 1000) / 1000; }

@@ -6,24 +6,31 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "compensation/file/coefficient_file.hpp"
+#include "fit/analysis.hpp"
+#include "fit/analysis_json.hpp"
+#include "fit/blade_pass.hpp"
 #include "fit/coefficients.hpp"
 #include "fit/csv.hpp"
 #include "fit/detail_figures.hpp"
+#include "fit/dynamics.hpp"
 #include "fit/fit_error.hpp"
 #include "fit/k_table.hpp"
 #include "fit/on_run.hpp"
 #include "fit/raw_samples.hpp"
 #include "fit/report.hpp"
+#include "fit/uncertainty_block.hpp"
 #include "profiles/bench.hpp"
 #include "profiles/campaign.hpp"
 #include "profiles/configuration_error.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/journal.hpp"
+#include "results/run_reader.hpp"
 #include "results/sha256.hpp"
 #include "results/steps_csv.hpp"
 #include "results/version.hpp"
@@ -53,6 +60,11 @@ struct FitRequest {
   std::string propeller;
   double diameter_in = 0;
   int blades = 0;
+  Estimator estimator = Estimator::through_origin;
+  Weighting weighting = Weighting::equal;
+  Loss loss = Loss::none;
+  std::vector<std::string> uncertainties;
+  bool raw = false;
   bool no_report = false;
   bool json = false;
 };
@@ -163,6 +175,9 @@ IdentificationOptions options_of(const FitRequest& request) {
   if (request.at_speed_rpm) options.at_speed_rad_s = from_rpm(*request.at_speed_rpm).value();
   options.line.anchored = request.anchored;
   options.line.points_deg = request.points_deg;
+  options.estimator = request.estimator;
+  options.weighting = request.weighting;
+  options.loss = request.loss;
   return options;
 }
 
@@ -197,9 +212,25 @@ void write_page(const fs::path& page, const std::string& html) {
   fmt::print(stderr, "report        {}\n", page.string());
 }
 
-void write_report(const Identification& identification, Input& input, const fs::path& folder) {
-  const Figures figures = draw_all(identification, input, folder / "figures");
-  write_page(folder / "report.html", format_report(identification, input.provenance, figures));
+/// The clock's uncertainty is the bench file's own unless somebody knows better.
+AnalysisOptions analysis_options(const FitRequest& request, const Input& input) {
+  AnalysisOptions options;
+  if (const auto& clock = input.provenance.clock) options.bench.motor_clock = clock->u_gain;
+  for (const std::string& text : request.uncertainties) set_uncertainty(options.bench, text);
+  return options;
+}
+
+void write_report(const Identification& identification, const Analysis& analysis, Input& input, const fs::path& page) {
+  const Figures figures = draw_all(identification, input, page.parent_path() / "figures");
+  write_page(page, format_report(identification, input.provenance, figures, &analysis));
+}
+
+/// From the first run without occlusion: a whole one lies in memory, 30 MB for the paper's 80 s.
+Json raw_json(const Input& input) {
+  const auto files = results::CampaignFolder::open(input.folder).complete_runs();
+  if (files.empty()) throw FitError("no complete run lies in the folder; --raw needs one");
+  const std::vector<results::RunRecording> runs{results::read_run(files.front())};
+  return raw_to_json(identify_dynamics(runs), check_by_blade_pass(runs));
 }
 
 void print_number(const char* name, double value, double error, const char* per) {
@@ -214,22 +245,28 @@ void print_headline(const LineFit& line) {
   print_number("slope", line.slope_per_deg, std::sqrt(line.covariance[1][1]), " per degree");
 }
 
-void print_json(const Identification& identification, const fs::path& coefficients) {
+void print_json(const Identification& identification, const Analysis& analysis, const Json& raw,
+                const fs::path& coefficients) {
   const LineFit& line = identification.line;
   Json table = Json::array();
   for (const OcclusionCoefficient& row : identification.table)
     table.push_back({{"phi_deg", row.phi_deg}, {"k", row.k}, {"standard_error", row.standard_error}});
-  const Json json{{"coefficients", coefficients.string()},
-                  {"k_unit", "N/(rad/s)^2"},
-                  {"K_T", line.K_T},
-                  {"K_T_standard_error", line.K_T_standard_error},
-                  {"anchored", line.anchored},
-                  {"intercept", line.intercept},
-                  {"slope_per_deg", line.slope_per_deg},
-                  {"covariance", line.covariance},
-                  {"table", table},
-                  {"steps_used", identification.selection.used.size()},
-                  {"steps_doubtful", identification.selection.doubtful.size()}};
+  Json json{{"coefficients", coefficients.string()},
+            {"k_unit", "N/(rad/s)^2"},
+            {"K_T", line.K_T},
+            {"K_T_standard_error", line.K_T_standard_error},
+            {"anchored", line.anchored},
+            {"intercept", line.intercept},
+            {"slope_per_deg", line.slope_per_deg},
+            {"covariance", line.covariance},
+            {"table", table},
+            {"steps_used", identification.selection.used.size()},
+            {"steps_doubtful", identification.selection.doubtful.size()},
+            {"estimator", name_of(identification.estimator)},
+            {"weights", name_of(identification.weighting)},
+            {"loss", name_of(identification.loss)},
+            {"analysis", to_json(analysis)}};
+  if (!raw.is_null()) json["raw"] = raw;
   fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
@@ -240,18 +277,27 @@ void run_fit(const FitRequest& request) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   fs::create_directories(folder);
   results::MemoryOnlySync files;  // made again from steps.csv at any time
-  results::write_text(file, format_coefficients(identification, input.provenance), files);
+  const Analysis analysis = analyse(identification, analysis_options(request, input));
+  results::write_text(file, format_coefficients(identification, input.provenance) + format_uncertainty(analysis),
+                      files);
   for (const DoubtfulStep& doubtful : identification.selection.doubtful) {
     fmt::print(stderr, "{:<13} phi {} deg, repetition {}, step {}: {}\n", doubtful.left_out ? "left out" : "kept",
                doubtful.step.occlusion_deg, doubtful.step.repetition, doubtful.step.step + 1, doubtful.reason);
   }
+  for (const RejectedPoint& point : analysis.rejected) {
+    fmt::print(stderr, "rejected      phi {} deg, repetition {}, step {}: {:+.3f} N off, robust weight {:.2f}\n",
+               point.phi_deg, point.repetition, point.step + 1, point.residual_n, point.robust_weight);
+  }
+  const Json raw = request.raw && input.campaign ? raw_json(input) : Json();
   if (request.json) {
-    print_json(identification, file);
+    print_json(identification, analysis, raw, file);
   } else {
     print_headline(identification.line);
+    if (!raw.is_null()) fmt::print("{}\n", raw.dump(2));
   }
+  for (const std::string& remark : analysis.remarks) fmt::print(stderr, "line          {}\n", remark);
   fmt::print(stderr, "coefficients  {}\n", file.string());
-  if (!request.no_report) write_report(identification, input, folder);
+  if (!request.no_report) write_report(identification, analysis, input, folder / "report.html");
 }
 
 /// The speeds that carried the fit. The file prints them to a thousandth RPM; that much more on either side takes the
@@ -288,6 +334,7 @@ void report_several(const ReportRequest& request) {
   for (const std::string& path : request.folders) {
     Input input = load(path);
     Chapter chapter{identify_again(input, path), {}, {}};
+    chapter.analysis = analyse(chapter.identification, analysis_options({}, input));
     chapter.figures = draw_all(chapter.identification, input, figures / fmt::format("{}", chapters.size() + 1));
     chapter.provenance = std::move(input.provenance);
     chapters.push_back(std::move(chapter));
@@ -301,9 +348,15 @@ void run_report(const ReportRequest& request) {
   const std::string& path = request.folders.front();
   Input input = load(path);
   const Identification identification = identify_again(input, path);
-  if (request.out.empty()) return write_report(identification, input, path);
-  const Figures figures = draw_all(identification, input, fs::path(request.out).parent_path() / "figures");
-  write_page(request.out, format_report(identification, input.provenance, figures));
+  write_report(identification, analyse(identification, analysis_options({}, input)), input,
+               request.out.empty() ? fs::path(path) / "report.html" : fs::path(request.out));
+}
+
+template <class Enum>
+std::map<std::string, Enum> names(std::initializer_list<Enum> values) {
+  std::map<std::string, Enum> result;
+  for (const Enum value : values) result.emplace(name_of(value), value);
+  return result;
 }
 
 }  // namespace
@@ -321,6 +374,17 @@ void add_fit(CLI::App& app, int& exit_code) {
                       "A:B, speeds to fit (default 3000: and up; below, thrust is under the load cell's noise)");
   command->add_option("--at-speed-rpm", request->at_speed_rpm,
                       "speed of \"k at speed\" (default: the highest that every occlusion reached)");
+  command->add_option("--estimator", request->estimator, "which k: origin, offset, polynomial, speed (default: origin)")
+      ->transform(CLI::CheckedTransformer(
+          names({Estimator::through_origin, Estimator::with_offset, Estimator::polynomial, Estimator::at_speed})));
+  command->add_option("--weights", request->weighting, "equal, thrust, effective-variance (default: equal)")
+      ->transform(CLI::CheckedTransformer(names({Weighting::equal, Weighting::thrust, Weighting::effective_variance})));
+  command->add_option("--loss", request->loss, "none, huber, cauchy, tukey (default: none)")
+      ->transform(CLI::CheckedTransformer(names({Loss::none, Loss::huber, Loss::cauchy, Loss::tukey})));
+  command->add_option("--u", request->uncertainties,
+                      "NAME=VALUE, standard uncertainty of calibration, cross-axis, clock, density (relative) or "
+                      "alignment-deg; may be repeated");
+  command->add_flag("--raw", request->raw, "time constants, and the motor's clock by blade pass, from the first run");
   command->add_option("--out", request->out, "coefficient file; report and figures go beside it");
   command->add_option("--propeller", request->propeller, "id of the propeller (default: from the steps)");
   command->add_option("--diameter-in", request->diameter_in, "diameter in inches (default: from the steps)");

@@ -1,18 +1,20 @@
 #include "fit/compare.hpp"
 
 #include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "compensation/file/coefficient_file.hpp"
 #include "fit/fit_error.hpp"
+#include "fit/statistical_test.hpp"
 #include "fit/step_selection.hpp"
 #include "fit/thrust_fit.hpp"
 #include "profiles/configuration_error.hpp"
+#include "results/number.hpp"
 #include "results/steps_csv.hpp"
 
 namespace kphi::fit {
@@ -49,6 +51,31 @@ ComparedResult result_of(const compensation::Coefficients& file, const std::stri
   return result;
 }
 
+void take(const YAML::Node& node, double freedom, ComparedValue& value) {
+  const auto u = results::parse_double(node["u"].as<std::string>(""));
+  if (!u || !(*u > 0)) return;
+  value.standard_error = *u;
+  value.freedom = freedom;
+}
+
+/// The budgets' uncertainties in the place of the fit's standard errors. A block that does not read is none.
+void take_uncertainty(const std::string& path, ComparedResult& result) {
+  const YAML::Node block = YAML::LoadFile(path)["uncertainty"];
+  if (!block.IsDefined() || !block.IsMap() || !block["K_T"].IsMap()) return;
+  // .inf reads as nothing here: then it is infinite.
+  const double freedom = results::parse_double(block["K_T"]["freedom"].as<std::string>(""))
+                             .value_or(std::numeric_limits<double>::infinity());
+  std::size_t row = 1;  // 0 is K_T
+  for (ComparedValue& value : result.estimates) {
+    const bool of_line = !value.judged;
+    const YAML::Node node = value.name == "K_T"         ? block["K_T"]
+                            : value.name == "intercept" ? block["intercept"]
+                            : of_line                   ? block["slope_per_deg"]
+                                                        : block["table"][row++];
+    if (node.IsDefined() && node.IsMap()) take(node, freedom, value);
+  }
+}
+
 /// K_T alone, of steps without occlusion.
 ComparedResult result_of_steps(const std::string& file, const std::string& name) {
   const auto steps = results::read_steps(file);
@@ -76,9 +103,11 @@ Difference difference(const ComparedValue& a, const ComparedValue& b) {
   result.difference = b.value - a.value;
   result.judged = a.judged && b.judged;
   if (!(a.standard_error > 0) || !(b.standard_error > 0)) return result;
-  result.standard_error = std::hypot(a.standard_error, b.standard_error);
-  const boost::math::normal normal;
-  result.p = 2 * cdf(complement(normal, std::abs(result.difference) / *result.standard_error));
+  const Estimate apart =
+      difference(Estimate{b.value, b.standard_error, b.freedom}, Estimate{a.value, a.standard_error, a.freedom});
+  result.standard_error = apart.u;
+  result.coverage = coverage_factor(apart.freedom, 1 - kLevel);
+  result.p = student_test(apart, 0).p;
   return result;
 }
 
@@ -150,7 +179,11 @@ ComparedResult load_result(const std::string& path) {
   const fs::path coefficients = fs::is_directory(place) ? place / "coefficients.yaml" : place;
   const fs::path steps = fs::is_directory(place) ? place / "steps.csv" : place;
   if (!fs::is_directory(place) && place.extension() == ".csv") return result_of_steps(path, path);
-  if (fs::exists(coefficients)) return result_of(compensation::load_coefficients(coefficients.string()), path);
+  if (fs::exists(coefficients)) {
+    ComparedResult result = result_of(compensation::load_coefficients(coefficients.string()), path);
+    take_uncertainty(coefficients.string(), result);
+    return result;
+  }
   if (!fs::exists(steps)) throw ConfigurationError(path + ": holds neither coefficients.yaml nor steps.csv");
   const auto table = results::read_steps(steps);
   if (std::any_of(table.begin(), table.end(), [](const auto& step) { return step.occlusion_deg > 0; }))
@@ -168,10 +201,9 @@ Comparison compare(ComparedResult a, ComparedResult b) {
   }
   judge(comparison.differences);
   comparison.verdict = verdict_of(comparison.differences);
-  const double two_sided = quantile(boost::math::normal(), 1 - kLevel / 2);
   for (const Difference& entry : comparison.differences) {
     if (!entry.judged || !entry.standard_error) continue;
-    const double open = (std::abs(entry.difference) + two_sided * *entry.standard_error) / std::abs(entry.a);
+    const double open = (std::abs(entry.difference) + entry.coverage * *entry.standard_error) / std::abs(entry.a);
     comparison.largest_open_share = std::max(comparison.largest_open_share, open);
   }
   const double d_a = comparison.a.diameter_in, d_b = comparison.b.diameter_in;

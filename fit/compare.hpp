@@ -1,6 +1,7 @@
 // Two results side by side: what differs, by how much, and whether chance explains it.
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,7 @@ struct ComparedValue {
   double standard_error = 0;
   /// Counts for the verdict. K_T and k(φ) do; the line is made of them and is shown only.
   bool judged = true;
+  double freedom = std::numeric_limits<double>::infinity();  ///< degrees of freedom behind the standard error
 };
 
 struct ComparedResult {
@@ -26,6 +28,8 @@ struct ComparedResult {
   std::vector<ComparedValue> estimates;
 };
 
+/// Standard uncertainties are those of the file's `uncertainty` block where it has one (scatter from run to run and
+/// what the stand adds), else the standard errors of the fit.
 /// A coefficients.yaml, a campaign folder with one, or a folder or steps.csv without occlusions (K_T alone). Throws
 /// ConfigurationError, compensation::CoefficientError or FitError.
 [[nodiscard]] ComparedResult load_result(const std::string& path);
@@ -36,7 +40,8 @@ struct Difference {
   double a = 0, b = 0;
   double difference = 0;                 ///< b − a
   std::optional<double> standard_error;  ///< of it; none when one of the two is not known
-  std::optional<double> p;               ///< of a difference at least so large by chance (normal), two-sided
+  std::optional<double> p;               ///< of a difference at least so large by chance (Student, Welch-Satterthwaite)
+  double coverage = 0;                   ///< Student's factor for the 95 % interval
   bool judged = true;
   bool significant = false;  ///< after Holm's correction for the number of judged differences, level 5 %
   [[nodiscard]] double share() const { return difference / a; }

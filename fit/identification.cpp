@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <set>
 
 #include "compensation/units.hpp"
 #include "fit/fit_error.hpp"
+#include "fit/step_uncertainty.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -31,28 +33,71 @@ double highest_common_level(const StepsByAngle& by_angle) {
   return highest;
 }
 
-OcclusionCoefficient coefficient(double phi_deg, const std::vector<StepMean>& steps, double at_speed) {
+ThrustForm form_of(Estimator estimator) {
+  if (estimator == Estimator::with_offset) return ThrustForm::with_offset;
+  return estimator == Estimator::polynomial ? ThrustForm::three_terms : ThrustForm::through_origin;
+}
+
+/// T/ω² of the map at a speed, and its error by the covariance of the terms.
+void take_map_at(double speed, const ThrustFit& fit, OcclusionCoefficient& row) {
+  row.k = thrust(fit.parameters, speed) / (speed * speed);
+  const std::array<double, 3> gradient{1, 1 / speed, 1 / (speed * speed)};
+  double variance = 0;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) variance += gradient[i] * gradient[j] * fit.covariance[i][j];
+  row.standard_error = std::sqrt(std::max(0.0, variance));
+}
+
+OcclusionCoefficient coefficient(double phi_deg, std::vector<StepMean> steps, const IdentificationOptions& options,
+                                 double at_speed) {
   std::vector<Point> points, at_level;
   std::set<int> levels, repetitions;
   for (const StepMean& step : steps) {
-    points.push_back({step.speed_rad_s, step.thrust_n, 1});
+    points.push_back(point_of(step));
     if (at_speed > 0 && same_level(level(step), at_speed) && step.speed_rad_s > 0) at_level.push_back(points.back());
     levels.insert(step.step);
     repetitions.insert(step.repetition);
   }
   OcclusionCoefficient row;
   row.phi_deg = phi_deg;
-  try {
-    row.fit = fit_thrust(points);
-  } catch (const FitError& error) {
-    throw FitError(fmt::format("phi = {} deg: {}", phi_deg, error.what()));
-  }
+  ThrustFitOptions fit_options;
+  fit_options.form = form_of(options.estimator);
+  fit_options.weighting = options.weighting;
+  fit_options.loss = options.loss;
+  row.fit = fit_thrust(points, fit_options);
   row.k = row.fit->parameters.k;
   row.standard_error = row.fit->standard_error.k;
   row.steps = levels.size();
   row.repetitions = repetitions.size();
   if (!at_level.empty()) row.at_speed = k_at_speed(at_level);
+  if (options.estimator == Estimator::polynomial || options.estimator == Estimator::at_speed) {
+    if (!row.at_speed) throw FitError("no good step at the reference speed; name a speed of the profile");
+    if (options.estimator == Estimator::polynomial) take_map_at(at_speed, *row.fit, row);
+    if (options.estimator == Estimator::at_speed) {
+      row.k = row.at_speed->k;
+      if (!std::isnan(row.at_speed->standard_error)) row.standard_error = row.at_speed->standard_error;
+    }
+  }
+  row.measured = std::move(steps);
   return row;
+}
+
+/// Of "k at a speed" only the steps there; otherwise all of the fit, by its own weights.
+AngleScatter scatter_of(const OcclusionCoefficient& row, Estimator estimator, double at_speed) {
+  if (estimator != Estimator::at_speed) {
+    auto runs = sums_of_runs(row.phi_deg, row.measured, *row.fit, row.k);
+    const WithinRuns within = scatter_within_runs(row.measured, *row.fit, row.k, runs);
+    return scatter_of_angle(row.k, std::move(runs), within);
+  }
+  ThrustFit at_level = *row.fit;
+  at_level.parameters = {row.k, 0, 0};
+  for (std::size_t i = 0; i < row.measured.size(); ++i) {
+    const double square = row.measured[i].speed_rad_s * row.measured[i].speed_rad_s;
+    const bool there = same_level(level(row.measured[i]), at_speed) && square > 0;
+    at_level.points[i].weight = there ? 1 / (square * square) : 0;
+    at_level.robust_weights[i] = 1;
+  }
+  return scatter_of_angle(row.k, sums_of_runs(row.phi_deg, row.measured, at_level, row.k), {});
 }
 
 void require_one_propeller(std::span<const StepMean> steps) {
@@ -65,9 +110,14 @@ void require_one_propeller(std::span<const StepMean> steps) {
   }
 }
 
-StepsByAngle by_angle(const StepSelection& selection) {
+StepsByAngle by_angle(std::span<const StepMean> steps) {
   StepsByAngle result;
-  for (const StepMean& step : selection.used) result[step.occlusion_deg].push_back(step);
+  for (const StepMean& step : steps) result[step.occlusion_deg].push_back(step);
+  return result;
+}
+
+StepsByAngle by_angle_or_refuse(const StepSelection& selection) {
+  StepsByAngle result = by_angle(selection.used);
   if (result.empty()) {
     throw FitError(
         fmt::format("no step is left to fit: {} lie outside the speed range, {} are doubtful; widen the "
@@ -90,6 +140,40 @@ bool same_level(double a_rad_s, double b_rad_s) {
   return std::abs(a_rad_s - b_rad_s) <= kShare * std::max(a_rad_s, b_rad_s);
 }
 
+const char* name_of(Estimator estimator) {
+  constexpr std::array<const char*, 4> names{"origin", "offset", "polynomial", "speed"};
+  return names[static_cast<std::size_t>(estimator)];
+}
+
+const char* name_of(Weighting weighting) {
+  constexpr std::array<const char*, 3> names{"equal", "thrust", "effective-variance"};
+  return names[static_cast<std::size_t>(weighting)];
+}
+
+const char* name_of(Loss loss) {
+  constexpr std::array<const char*, 4> names{"none", "huber", "cauchy", "tukey"};
+  return names[static_cast<std::size_t>(loss)];
+}
+
+std::vector<OcclusionCoefficient> coefficients_of(std::span<const StepMean> steps, const IdentificationOptions& options,
+                                                  double at_speed_rad_s, Repeatability& repeatability) {
+  std::vector<OcclusionCoefficient> table;
+  std::vector<AngleScatter> scatter;
+  for (auto& [phi_deg, measured] : by_angle(steps)) {
+    try {
+      table.push_back(coefficient(phi_deg, measured, options, at_speed_rad_s));
+    } catch (const FitError& error) {
+      throw FitError(fmt::format("phi = {} deg: {}", phi_deg, error.what()));
+    }
+    scatter.push_back(scatter_of(table.back(), options.estimator, at_speed_rad_s));
+  }
+  repeatability = fit::repeatability(std::move(scatter));
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    if (repeatability.repeated) table[i].standard_error = repeatability.independent_u(i);
+  }
+  return table;
+}
+
 Identification identify(std::span<const StepMean> steps, const IdentificationOptions& options) {
   require_one_propeller(steps);
   Identification result;
@@ -97,20 +181,23 @@ Identification identify(std::span<const StepMean> steps, const IdentificationOpt
   result.diameter_in = steps.front().diameter_in;
   result.blades = steps.front().blades;
   result.selection = select_steps(steps, options.speed_range);
-  const StepsByAngle angles = by_angle(result.selection);
+  const StepsByAngle angles = by_angle_or_refuse(result.selection);
   result.at_speed_rad_s = options.at_speed_rad_s.value_or(highest_common_level(angles));
 
   result.speed_max_rad_s = std::numeric_limits<double>::infinity();
   for (const auto& [phi_deg, used] : angles) {
     const auto [low, high] = std::minmax_element(
         used.begin(), used.end(), [](const StepMean& a, const StepMean& b) { return level(a) < level(b); });
-    const bool first = result.table.empty();
+    const bool first = result.fitted.max_rad_s == 0;
     result.fitted.min_rad_s = first ? level(*low) : std::min(result.fitted.min_rad_s, level(*low));
     result.fitted.max_rad_s = std::max(result.fitted.max_rad_s, level(*high));
     result.speed_min_rad_s = std::max(result.speed_min_rad_s, level(*low));
     result.speed_max_rad_s = std::min(result.speed_max_rad_s, level(*high));
-    result.table.push_back(coefficient(phi_deg, used, result.at_speed_rad_s));
   }
+  result.table = coefficients_of(result.selection.used, options, result.at_speed_rad_s, result.repeatability);
+  result.estimator = options.estimator;
+  result.weighting = options.weighting;
+  result.loss = options.loss;
   if (options.at_speed_rad_s && !result.table.front().at_speed) {
     throw FitError(fmt::format("no good step at {:.0f} RPM; name a speed of the profile",
                                to_rpm(RadPerSec(*options.at_speed_rad_s))));

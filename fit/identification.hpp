@@ -7,12 +7,24 @@
 #include <vector>
 
 #include "fit/line_fit.hpp"
+#include "fit/repeatability.hpp"
 #include "fit/step_selection.hpp"
 #include "fit/thrust_fit.hpp"
 
 namespace kphi::fit {
 
+/// Which k of an occlusion the line is drawn through.
+enum class Estimator : std::uint8_t {
+  through_origin,  ///< k of T = k ω² over the speed range
+  with_offset,     ///< k of T = k ω² + offset
+  polynomial,      ///< T/ω² of the map k ω² + linear ω + offset at the reference speed
+  at_speed,        ///< mean T/ω² of the steps at the reference speed
+};
+
 struct IdentificationOptions {
+  Estimator estimator = Estimator::through_origin;
+  Weighting weighting = Weighting::equal;
+  Loss loss = Loss::none;
   SpeedRange speed_range{.min_rad_s = kSpeedMinRpm * 3.14159265358979323846 / 30};
   std::optional<double> at_speed_rad_s;  ///< for "k at speed"; default: the highest level measured at every φ
   LineFitOptions line;
@@ -21,11 +33,14 @@ struct IdentificationOptions {
 /// One row of the table: what was measured at one φ.
 struct OcclusionCoefficient {
   double phi_deg = 0;
-  double k = 0;               ///< N/(rad/s)², fitted over the speed range
-  double standard_error = 0;  ///< N/(rad/s)²
-  std::size_t steps = 0;      ///< distinct levels
+  double k = 0;  ///< N/(rad/s)², by the estimator
+  /// N/(rad/s)². Of several repetitions: noise, zero and scatter between runs (Repeatability), without what all k have
+  /// in common; of a single one: of the fit.
+  double standard_error = 0;
+  std::size_t steps = 0;  ///< distinct levels
   std::size_t repetitions = 0;
   std::optional<ThrustFit> fit;              ///< none in a table that came without steps
+  std::vector<results::StepMean> measured;   ///< behind `fit`, one per point of it
   std::optional<SpeedCoefficient> at_speed;  ///< none when no good step lies at that speed
 };
 
@@ -35,7 +50,11 @@ struct Identification {
   int blades = 0;                           ///< 0: not known
   std::vector<OcclusionCoefficient> table;  ///< ascending φ, the first is φ = 0
   LineFit line;
+  Repeatability repeatability;  ///< one angle per row of the table; empty in a table that came without steps
   StepSelection selection;
+  Estimator estimator = Estimator::through_origin;
+  Weighting weighting = Weighting::equal;
+  Loss loss = Loss::none;
   double at_speed_rad_s = 0;   ///< commanded level of "k at speed"; 0: none
   SpeedRange fitted{0, 0};     ///< lowest and highest level used at any φ
   double speed_min_rad_s = 0;  ///< speeds that were measured at every φ: those the line vouches for
@@ -44,6 +63,18 @@ struct Identification {
 
 /// Whether two speeds are the same level of a profile: they agree to 0.5 %.
 [[nodiscard]] bool same_level(double a_rad_s, double b_rad_s);
+
+/// Names for options and files: "origin", "offset", "polynomial", "speed"; "equal", "thrust", "effective-variance";
+/// "none", "huber", "cauchy", "tukey".
+[[nodiscard]] const char* name_of(Estimator estimator);
+[[nodiscard]] const char* name_of(Weighting weighting);
+[[nodiscard]] const char* name_of(Loss loss);
+
+/// One row per φ of `steps`, ascending, and how they repeat. `at_speed_rad_s` is the reference speed, 0: none. Throws
+/// FitError, naming φ.
+[[nodiscard]] std::vector<OcclusionCoefficient> coefficients_of(std::span<const results::StepMean> steps,
+                                                                const IdentificationOptions& options,
+                                                                double at_speed_rad_s, Repeatability& repeatability);
 
 /// Throws FitError when the steps are of several propellers, φ = 0 is missing, or a fit cannot be made (the message
 /// names φ).

@@ -25,10 +25,25 @@ void solve_exactly(ceres::Problem& problem, const char* what) {
   if (!summary.IsSolutionUsable()) throw FitError(fmt::format("{}: no solution ({})", what, summary.message));
 }
 
+void solve_robustly(ceres::Problem& problem, const char* what) {
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.logging_type = ceres::SILENT;
+  options.num_threads = 1;
+  options.max_num_iterations = 200;
+  options.function_tolerance = 1e-14;
+  options.gradient_tolerance = 1e-14;
+  options.parameter_tolerance = 1e-11;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  if (!summary.IsSolutionUsable()) throw FitError(fmt::format("{}: no solution ({})", what, summary.message));
+}
+
 std::vector<double> unit_covariance(ceres::Problem& problem, const std::vector<const double*>& blocks,
                                     const char* what) {
   ceres::Covariance::Options options;
   options.algorithm_type = ceres::DENSE_SVD;
+  options.apply_loss_function = false;
   options.num_threads = 1;
   ceres::Covariance covariance(options);
   std::vector<double> matrix(blocks.size() * blocks.size());

@@ -12,8 +12,11 @@ namespace kphi::fit {
 /// Throws FitError, naming `what`, when Ceres does not converge.
 void solve_exactly(ceres::Problem& problem, const char* what);
 
-/// Covariance (JᵀJ)⁻¹ between the listed scalar blocks, row by row. Throws FitError, naming `what`, if J is rank
-/// deficient.
+/// The same for problems with a robust loss: iterates until nothing moves any more.
+void solve_robustly(ceres::Problem& problem, const char* what);
+
+/// Covariance (JᵀJ)⁻¹ between the listed scalar blocks, row by row, losses left aside. Throws FitError, naming `what`,
+/// if J is rank deficient.
 [[nodiscard]] std::vector<double> unit_covariance(ceres::Problem& problem, const std::vector<const double*>& blocks,
                                                   const char* what);
 

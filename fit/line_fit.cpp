@@ -102,6 +102,32 @@ double LineFit::standard_error_at(double phi_deg) const {
   return std::sqrt(std::max(0.0, variance));
 }
 
+LineWeights LineFit::weights(std::span<const double> phis_deg) const {
+  double sum = 0, first = 0, second = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double weight = 1 / (sigmas[i] * sigmas[i]);
+    sum += weight;
+    first += weight * points[i].phi_deg;
+    second += weight * points[i].phi_deg * points[i].phi_deg;
+  }
+  const double determinant = sum * second - first * first;
+  LineWeights result{std::vector<double>(phis_deg.size()), std::vector<double>(phis_deg.size())};
+  for (std::size_t j = 0; j < phis_deg.size(); ++j) {
+    const double phi = phis_deg[j];
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (std::abs(points[i].phi_deg - phi) >= kSameAngleDeg) continue;
+      const double weight = 1 / (sigmas[i] * sigmas[i]);
+      if (!anchored) result.intercept[j] += weight * (second - first * phi) / determinant;
+      result.slope[j] += anchored ? weight * phi / second : weight * (sum * phi - first) / determinant;
+    }
+    if (anchored && std::abs(phi) < kSameAngleDeg) {
+      result.intercept[j] = 1;
+      result.slope[j] -= first / second;
+    }
+  }
+  return result;
+}
+
 LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& options) {
   const std::vector<LinePoint> all = sorted(points);
   if (all.empty() || std::abs(all.front().phi_deg) > kSameAngleDeg)
@@ -117,7 +143,7 @@ LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& option
   };
   fit.K_T_standard_error = known_error(all.front());
   fit.points = carriers(all, options);
-  std::vector<double> sigmas;
+  std::vector<double>& sigmas = fit.sigmas;
   for (const LinePoint& point : fit.points) sigmas.push_back(std::max(known_error(point), floor));
 
   const double phi_scale = fit.points.back().phi_deg;

@@ -28,6 +28,10 @@ struct LineFitOptions {
   double error_floor = 1e-3;
 };
 
+struct LineWeights {
+  std::vector<double> intercept, slope;  ///< one per φ; slope per degree
+};
+
 struct LineFit {
   bool anchored = false;
   double intercept = 0;      ///< N/(rad/s)²
@@ -38,6 +42,7 @@ struct LineFit {
   std::array<std::array<double, 2>, 2> covariance{};
   std::vector<LinePoint> points;  ///< used, ascending φ
   std::vector<double> residuals;  ///< k − line, N/(rad/s)², one per point used
+  std::vector<double> sigmas;     ///< the errors by which the points were weighted
   double K_T = 0;                 ///< N/(rad/s)², measured at φ = 0
   double K_T_standard_error = 0;
 
@@ -51,6 +56,9 @@ struct LineFit {
   [[nodiscard]] std::optional<double> zero_crossing_deg() const;
   /// Standard error of the line at φ.
   [[nodiscard]] double standard_error_at(double phi_deg) const;
+  /// The line as the linear function of the coefficients that it is: intercept and slope are Σ weight · k over
+  /// `phis_deg` (of the whole table, φ = 0 first), for weights as they were in the fit.
+  [[nodiscard]] LineWeights weights(std::span<const double> phis_deg) const;
 };
 
 /// `points` hold exactly one φ = 0 (K_T) and the occluded ones, each φ once. Throws FitError when K_T is missing, a φ

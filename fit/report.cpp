@@ -10,6 +10,8 @@
 #include <iterator>
 
 #include "compensation/units.hpp"
+#include "fit/analysis_section.hpp"
+#include "fit/claims.hpp"
 #include "fit/html.hpp"
 #include "fit/report_style.hpp"
 #include "results/campaign_folder.hpp"
@@ -290,11 +292,12 @@ std::string page_head(const std::string& title, const std::string& heading, cons
 
 /// The first figure belongs to the headline, the others behind the table.
 std::string body(const Identification& identification, const Provenance& provenance, const Figures& figures,
-                 int& number) {
+                 const Analysis* analysis, int& number) {
   std::string html = lead(identification) + headline(identification) + figure_blocks(figures, 0, 1, number) +
                      skipped_note(figures) + coefficient_table(identification);
   const std::string details = figure_blocks(figures, 1, figures.drawn.size(), number);
   if (!details.empty()) html += "<h2>How well the model holds</h2>\n" + details;
+  if (analysis != nullptr) html += analysis_sections(*analysis);
   return html + doubt_section(identification.selection) + run_section(provenance, identification.selection) +
          provenance_section(identification, provenance) + hash_section(provenance.runs);
 }
@@ -321,6 +324,13 @@ std::string family_table(const std::vector<Chapter>& chapters) {
   return html + "</tbody></table></div>\n";
 }
 
+std::string claims_of(const std::vector<Chapter>& chapters) {
+  std::vector<FamilyMember> family;
+  for (const Chapter& chapter : chapters)
+    if (chapter.analysis) family.push_back({chapter.identification, *chapter.analysis});
+  return family.size() < chapters.size() ? std::string() : claims_section(test_claims(family));
+}
+
 }  // namespace
 
 std::string with_error(double value, double standard_error) {
@@ -330,11 +340,12 @@ std::string with_error(double value, double standard_error) {
   return fmt::format("{:.{}e} ± {:.1e}", value, static_cast<int>(std::clamp(digits, 1.0, 12.0)), standard_error);
 }
 
-std::string format_report(const Identification& identification, const Provenance& provenance, const Figures& figures) {
+std::string format_report(const Identification& identification, const Provenance& provenance, const Figures& figures,
+                          const Analysis* analysis) {
   int number = 0;
   return page_head("k(φ) of " + html_escaped(identification.propeller), "How an occlusion costs thrust: k(φ)",
                    propeller_line(identification, provenance)) +
-         body(identification, provenance, figures, number) + kPageEnd;
+         body(identification, provenance, figures, analysis, number) + kPageEnd;
 }
 
 std::string format_reports(const std::vector<Chapter>& chapters, const Figures& family) {
@@ -348,10 +359,11 @@ std::string format_reports(const std::vector<Chapter>& chapters, const Figures& 
     contents += fmt::format("<a href=\"#chapter{}\">{}</a>", i + 1, name);
     bodies += fmt::format("<h2 class=\"chapter\" id=\"chapter{}\">{}</h2>\n", i + 1,
                           propeller_line(chapter.identification, chapter.provenance)) +
-              body(chapter.identification, chapter.provenance, chapter.figures, number);
+              body(chapter.identification, chapter.provenance, chapter.figures,
+                   chapter.analysis ? &*chapter.analysis : nullptr, number);
   }
   return page_head("k(φ) of " + names, "How an occlusion costs thrust: k(φ) of several propellers", names) + "<nav>" +
-         contents + "</nav>\n" + family_table(chapters) + together + bodies + kPageEnd;
+         contents + "</nav>\n" + family_table(chapters) + together + claims_of(chapters) + bodies + kPageEnd;
 }
 
 }  // namespace kphi::fit

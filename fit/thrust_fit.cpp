@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <set>
 
 #include "fit/fit_error.hpp"
@@ -77,18 +78,151 @@ void require_distinct_speeds(const std::vector<Point>& points, std::size_t terms
                              speeds.size(), terms));
 }
 
+/// Weights 1/u², scaled to a mean of 1, so that the rms stays one of thrust. `parameters`: for dT/dω; none: by T ~ ω².
+void weigh(std::vector<Point>& points, Weighting weighting, const ThrustParameters<double>* parameters) {
+  double sum = 0;
+  for (Point& point : points) {
+    double slope = 2 * point.thrust_n / point.speed_rad_s;
+    if (parameters != nullptr) slope = 2 * parameters->k * point.speed_rad_s + parameters->linear;
+    const double u_speed = weighting == Weighting::effective_variance ? slope * point.u_speed_rad_s : 0.0;
+    const double variance = point.u_thrust_n * point.u_thrust_n + u_speed * u_speed;
+    if (!(variance > 0) || !std::isfinite(variance)) {
+      throw FitError(
+          "thrust fit: a step does not know its own uncertainty, so it cannot be weighted by it; fit with equal "
+          "weights");
+    }
+    point.weight = 1 / variance;
+    sum += point.weight;
+  }
+  for (Point& point : points) point.weight *= static_cast<double>(points.size()) / sum;
+}
+
+double median_absolute(std::vector<double> values) {
+  for (double& value : values) value = std::abs(value);
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Null for Loss::none. `sigma` in units of the residuals.
+std::unique_ptr<ceres::LossFunction> loss_function(Loss loss, double sigma) {
+  switch (loss) {
+    case Loss::none:
+      return nullptr;
+    case Loss::huber:
+      return std::make_unique<ceres::HuberLoss>(1.345 * sigma);
+    case Loss::cauchy:
+      return std::make_unique<ceres::CauchyLoss>(2.385 * sigma);
+    case Loss::tukey:
+      return std::make_unique<ceres::TukeyLoss>(4.685 * sigma);
+  }
+  return nullptr;
+}
+
+/// Thrust and speed scaled to 1 at most; solved again and again, each time from where it stands.
+class Fitter {
+ public:
+  Fitter(const Scale& scale, std::size_t terms) : scale_(scale), terms_(terms) {}
+
+  void solve(const std::vector<Point>& points, Loss loss) {
+    std::vector<double> residuals;
+    for (const Point& point : points) residuals.push_back(residual(point));
+    const double sigma = loss == Loss::none ? 0 : 1.4826 * median_absolute(residuals);
+    loss_ = sigma > 0 ? loss_function(loss, sigma) : nullptr;  // points without scatter have no outliers
+    ceres::Problem::Options ownership;
+    ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    problem_ = std::make_unique<ceres::Problem>(ownership);
+    for (const Point& point : points) {
+      problem_->AddResidualBlock(
+          new ceres::AutoDiffCostFunction<ThrustResidual, 1, 1, 1, 1>(new ThrustResidual{
+              point.speed_rad_s / scale_.speed, point.thrust_n / scale_.thrust, std::sqrt(point.weight)}),
+          loss_.get(), &k_, &linear_, &offset_);
+    }
+    if (terms_ < 2) problem_->SetParameterBlockConstant(&offset_);
+    if (terms_ < 3) problem_->SetParameterBlockConstant(&linear_);
+    loss_ ? solve_robustly(*problem_, "thrust fit") : solve_exactly(*problem_, "thrust fit");
+    residuals_.clear();
+    for (const Point& point : points) residuals_.push_back(residual(point));
+  }
+
+  [[nodiscard]] ThrustParameters<double> parameters() const {
+    return {k_ * unit(0), linear_ * unit(1), offset_ * unit(2)};
+  }
+
+  [[nodiscard]] std::vector<double> robust_weights() const {
+    std::vector<double> weights;
+    for (const double r : residuals_) weights.push_back(rho(r)[1]);
+    return weights;
+  }
+
+  /// Of k, linear, offset. `rms_n` of the fit without a loss; with one the spread of its influence takes its place.
+  [[nodiscard]] std::array<std::array<double, 3>, 3> covariance(double rms_n) const {
+    std::vector<const double*> blocks{&k_};
+    std::vector<std::size_t> places{0};
+    if (terms_ >= 3) (blocks.push_back(&linear_), places.push_back(1));
+    if (terms_ >= 2) (blocks.push_back(&offset_), places.push_back(2));
+    const std::vector<double> unit_matrix = unit_covariance(*problem_, blocks, "thrust fit");
+    const double variance = loss_ ? robust_variance() : std::pow(rms_n / scale_.thrust, 2);
+    std::array<std::array<double, 3>, 3> result{};
+    for (std::size_t i = 0; i < terms_; ++i) {
+      for (std::size_t j = 0; j < terms_; ++j)
+        result[places[i]][places[j]] = unit_matrix[i * terms_ + j] * variance * unit(places[i]) * unit(places[j]);
+    }
+    return result;
+  }
+
+ private:
+  [[nodiscard]] double unit(std::size_t term) const {
+    return scale_.thrust / std::pow(scale_.speed, 2 - static_cast<double>(term));
+  }
+
+  [[nodiscard]] double residual(const Point& point) const {
+    const ThrustParameters<double> scaled{k_, linear_, offset_};
+    return std::sqrt(point.weight) *
+           (point.thrust_n / scale_.thrust - thrust(scaled, point.speed_rad_s / scale_.speed));
+  }
+
+  /// ρ, ρ', ρ'' of the squared residual.
+  [[nodiscard]] std::array<double, 3> rho(double r) const {
+    std::array<double, 3> value{r * r, 1, 0};
+    if (loss_) loss_->Evaluate(r * r, value.data());
+    return value;
+  }
+
+  /// Σψ²/(n − p) over the square of the mean ψ', ψ = r ρ'.
+  [[nodiscard]] double robust_variance() const {
+    double squares = 0, slope = 0;
+    for (const double r : residuals_) {
+      const auto [value, first, second] = rho(r);
+      squares += std::pow(r * first, 2);
+      slope += first + 2 * r * r * second;
+    }
+    const double n = static_cast<double>(residuals_.size());
+    return squares / (n - static_cast<double>(terms_)) / std::pow(slope / n, 2);
+  }
+
+  Scale scale_;
+  std::size_t terms_;
+  double k_ = 0, linear_ = 0, offset_ = 0;
+  std::unique_ptr<ceres::LossFunction> loss_;
+  std::unique_ptr<ceres::Problem> problem_;
+  std::vector<double> residuals_;
+};
+
 void judge(ThrustFit& fit, std::size_t terms) {
   double sum_w = 0, sum_wt = 0;
-  for (const Point& point : fit.points) {
-    sum_w += point.weight;
-    sum_wt += point.weight * point.thrust_n;
+  for (std::size_t i = 0; i < fit.n; ++i) {
+    const double weight = fit.points[i].weight * fit.robust_weights[i];
+    sum_w += weight;
+    sum_wt += weight * fit.points[i].thrust_n;
   }
   double residual_sum = 0, total_sum = 0;
-  for (const Point& point : fit.points) {
+  for (std::size_t i = 0; i < fit.n; ++i) {
+    const Point& point = fit.points[i];
     const double residual = point.thrust_n - thrust(fit.parameters, point.speed_rad_s);
     fit.residuals_n.push_back(residual);
-    residual_sum += point.weight * residual * residual;
-    total_sum += point.weight * std::pow(point.thrust_n - sum_wt / sum_w, 2);
+    residual_sum += point.weight * fit.robust_weights[i] * residual * residual;
+    total_sum += point.weight * fit.robust_weights[i] * std::pow(point.thrust_n - sum_wt / sum_w, 2);
   }
   fit.rms_n = std::sqrt(residual_sum / static_cast<double>(fit.n - terms));
   fit.r_squared = total_sum > 0 ? 1 - residual_sum / total_sum : 0;
@@ -111,34 +245,26 @@ ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& opti
                     "the range or measure more steps",
                     fit.n, points.size(), terms, terms + 1));
   }
-
   require_distinct_speeds(fit.points, terms);
-  const Scale scale = scale_of(fit.points);
-  double k = 0, linear = 0, offset = 0;
-  ceres::Problem problem;
-  for (const Point& point : fit.points) {
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<ThrustResidual, 1, 1, 1, 1>(new ThrustResidual{
-            point.speed_rad_s / scale.speed, point.thrust_n / scale.thrust, std::sqrt(point.weight)}),
-        nullptr, &k, &linear, &offset);
-  }
-  std::vector<const double*> free_blocks{&k};
-  if (terms >= 2) free_blocks.push_back(&offset);
-  if (terms >= 3) free_blocks.push_back(&linear);
-  if (terms < 2) problem.SetParameterBlockConstant(&offset);
-  if (terms < 3) problem.SetParameterBlockConstant(&linear);
-  solve_exactly(problem, "thrust fit");
-
-  const double k_unit = scale.thrust / (scale.speed * scale.speed);
-  const double linear_unit = scale.thrust / scale.speed;
-  fit.parameters = {k * k_unit, linear * linear_unit, offset * scale.thrust};
-  judge(fit, terms);
-
-  const std::vector<double> covariance = unit_covariance(problem, free_blocks, "thrust fit");
-  const auto standard_error = [&](std::size_t i, double unit) {
-    return i < terms ? std::sqrt(covariance[i * terms + i]) * unit * fit.rms_n / scale.thrust : 0.0;
+  if (options.weighting != Weighting::equal) weigh(fit.points, options.weighting, nullptr);
+  Fitter fitter(scale_of(fit.points), terms);
+  const auto solve = [&](Loss loss) {
+    fitter.solve(fit.points, loss);
+    fit.parameters = fitter.parameters();
   };
-  fit.standard_error = {standard_error(0, k_unit), standard_error(2, linear_unit), standard_error(1, scale.thrust)};
+  solve(Loss::none);
+  if (options.loss != Loss::none) solve(Loss::huber);  // a convex problem leads the others to the right minimum
+  constexpr int kReweightings = 3;
+  for (int i = 0; i < kReweightings && options.weighting == Weighting::effective_variance; ++i) {
+    weigh(fit.points, options.weighting, &fit.parameters);
+    solve(options.loss == Loss::none ? Loss::none : Loss::huber);
+  }
+  if (options.loss != Loss::none) solve(options.loss);
+  fit.robust_weights = fitter.robust_weights();
+  judge(fit, terms);
+  fit.covariance = fitter.covariance(fit.rms_n);
+  const auto error = [&](std::size_t i) { return std::sqrt(fit.covariance[i][i]); };
+  fit.standard_error = {error(0), error(1), error(2)};
   return fit;
 }
 

@@ -4,7 +4,9 @@
 // and such an average gives that noise the largest weight.
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <vector>
@@ -16,7 +18,9 @@ namespace kphi::fit {
 struct Point {
   double speed_rad_s = 0;
   double thrust_n = 0;
-  double weight = 1;  ///< of the squared residual, > 0
+  double weight = 1;         ///< of the squared residual, > 0
+  double u_thrust_n = 0;     ///< standard uncertainty of the mean; 0: not known
+  double u_speed_rad_s = 0;  ///< the same
 };
 
 /// Which terms of thrust() are free; the others are zero.
@@ -26,8 +30,26 @@ enum class ThrustForm {
   three_terms,     ///< k, linear and offset
 };
 
+/// What the points weigh.
+enum class Weighting : std::uint8_t {
+  equal,               ///< as given
+  thrust,              ///< by their own uncertainty of the thrust
+  effective_variance,  ///< u²(T) + (dT/dω)² u²(ω): errors in the speed count too (Orear 1982)
+};
+
+/// How much a point is believed that lies far off. Tuned to 95 % efficiency under normal errors, scaled by the median
+/// absolute deviation.
+enum class Loss : std::uint8_t {
+  none,
+  huber,   ///< 1.345 σ: beyond, the influence stays
+  cauchy,  ///< 2.385 σ: it falls
+  tukey,   ///< 4.685 σ: beyond, it is nothing
+};
+
 struct ThrustFitOptions {
   ThrustForm form = ThrustForm::through_origin;
+  Weighting weighting = Weighting::equal;
+  Loss loss = Loss::none;
   double speed_min_rad_s = 0;  ///< points below are left out
   double speed_max_rad_s = std::numeric_limits<double>::infinity();
 };
@@ -37,17 +59,23 @@ struct ThrustFit {
   /// Standard errors from Ceres' covariance times the residual variance Σ w r²/(n − p). They hold what scatters from
   /// point to point, not what all points have in common (zero, calibration, air density).
   ThrustParameters<double> standard_error;
-  double rms_n = 0;      ///< sqrt(Σ w r²/(n − p)), N
+  /// Of k, linear, offset; 0 for terms that are not free. Of a robust fit: asymptotic (Huber 1981, 7.6).
+  std::array<std::array<double, 3>, 3> covariance{};
+  double rms_n = 0;      ///< sqrt(Σ w r²/(n − p)), N; w with the robust weight
   double r_squared = 0;  ///< 1 − Σ w r²/Σ w (T − mean T)²
   std::size_t n = 0;
   double speed_min_rad_s = 0;  ///< of the points used
   double speed_max_rad_s = 0;
-  std::vector<Point> points;        ///< used, in the order given
-  std::vector<double> residuals_n;  ///< T − thrust(parameters, ω), one per point used
+  std::vector<Point> points;           ///< used, in the order given; weight as it was fitted with
+  std::vector<double> robust_weights;  ///< 1: believed, 0: ignored; one per point used
+  std::vector<double> residuals_n;     ///< T − thrust(parameters, ω), one per point used
 };
 
+/// Below this robust weight a point is as good as rejected and belongs into a list.
+inline constexpr double kRejectedWeight = 0.25;
+
 /// Throws FitError when fewer points than free terms + 1 remain in the speed range, when a number is not finite, a
-/// weight not positive, or when the points cannot tell the terms apart.
+/// weight not positive, an uncertainty missing that `weighting` wants, or when the points cannot tell the terms apart.
 [[nodiscard]] ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& options = {});
 
 /// k at one named speed, next to the k fitted over a range: on real propellers the two differ, k rises with speed.

@@ -1,0 +1,44 @@
+// Several propellers together: lines with one slope per diameter, and what they let expect of one not tested.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "fit/analysis.hpp"
+
+namespace kphi::fit {
+
+/// One fitted propeller.
+struct FamilyMember {
+  Identification identification;
+  Analysis analysis;
+};
+
+/// Lines of one diameter with a slope in common.
+struct SharedSlope {
+  double diameter_in = 0;
+  Estimate slope;                    ///< N/(rad/s)²/deg
+  std::vector<Estimate> intercepts;  ///< one per member of that diameter, in their order
+  std::vector<std::string> propellers;
+  StatisticalTest equal_slopes;
+};
+
+/// For every diameter of which there are two members or more.
+[[nodiscard]] std::vector<SharedSlope> shared_slopes(std::span<const FamilyMember> family);
+
+struct FamilyPrediction {
+  double diameter_in = 0;
+  int blades = 0;
+  double phi_deg = 0;
+  Estimate k;                   ///< N/(rad/s)², u with the scatter of propellers about the rule
+  double lower = 0, upper = 0;  ///< 95 %
+};
+
+/// k of a propeller that nobody tested, by the rule k = D⁴ (a + b·blades + c φ) through the occluded points of all
+/// members (K_T by one of its own). Its freedom is the number of propellers less those that the rule uses up: with two
+/// propellers more than terms the interval becomes bearable. Nothing with fewer than three members.
+[[nodiscard]] std::optional<FamilyPrediction> predict(std::span<const FamilyMember> family, double diameter_in,
+                                                      int blades, double phi_deg);
+
+}  // namespace kphi::fit

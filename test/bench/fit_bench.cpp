@@ -1,0 +1,97 @@
+// The fit of a whole campaign as a command against a scipy script, and the bootstrap against vectorised numpy; each
+// pair in one run, by the CPU time of the children and by the fastest of several.
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include "fit/bootstrap.hpp"
+#include "fit/identification.hpp"
+#include "results/steps_csv.hpp"
+#include "test/fit/campaign_steps.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+double cpu_of_children() {
+  rusage usage{};
+  getrusage(RUSAGE_CHILDREN, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+/// CPU milliseconds of the fastest of `times` runs of a command; leaves on a failure.
+double fastest(const std::string& command, int times) {
+  double best = 1e9;
+  for (int i = 0; i < times; ++i) {
+    const double before = cpu_of_children();
+    if (std::system(command.c_str()) != 0) {
+      fmt::print(stderr, "failed: {}\n", command);
+      std::exit(1);
+    }
+    best = std::min(best, 1e3 * (cpu_of_children() - before));
+  }
+  return best;
+}
+
+double bootstrap_ms() {
+  const kphi::fit::Identification found = kphi::fit::identify(kphi::fit::campaign_steps());
+  std::vector<kphi::fit::RunSums> runs;
+  std::vector<double> phis;
+  for (const auto& angle : found.repeatability.angles) {
+    runs.insert(runs.end(), angle.runs.begin(), angle.runs.end());
+    phis.push_back(angle.runs.front().phi_deg);
+  }
+  const auto weights = found.line.weights(phis);
+  double best = 1e9;
+  for (int i = 0; i < 15; ++i) {
+    const auto begin = std::chrono::steady_clock::now();
+    const auto intervals = kphi::fit::bootstrap(runs, weights, {10000, static_cast<std::uint64_t>(i), 0.95});
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
+    best = std::min(best, intervals.empty() ? 1e9 : took.count());
+  }
+  return best;
+}
+
+double number_from(const std::string& command) {
+  FILE* pipe = popen(command.c_str(), "r");
+  double value = 0;
+  if (pipe == nullptr || std::fscanf(pipe, "%lf", &value) != 1) value = 0;
+  if (pipe != nullptr) pclose(pipe);
+  return value;
+}
+
+}  // namespace
+
+int main() {
+  const fs::path folder = fs::temp_directory_path() / fmt::format("kphi_fit_bench_{}", getpid());
+  fs::create_directories(folder);
+  kphi::results::write_steps(folder / "steps.csv", kphi::fit::campaign_steps());
+  const std::string steps = (folder / "steps.csv").string();
+  const std::string peer = fmt::format("/usr/bin/python3 {}/test/bench/fit_peer.py", KPHI_SOURCE_DIR);
+  setenv("OPENBLAS_NUM_THREADS", "1", 1);
+  const double ours =
+      fastest(fmt::format("{} fit {} --loss huber --no-report --json >/dev/null 2>&1", KPHI_PROGRAM, steps), 7);
+  const double theirs = fastest(fmt::format("{} fit {} >/dev/null", peer, steps), 3);
+  fmt::print(
+      "fit of 600 rows, robust, covariance   kphi {:7.1f} ms   scipy {:7.1f} ms   {:5.1f} times   (15 wanted, 30 the "
+      "goal)\n",
+      ours, theirs, theirs / ours);
+  const double mine = bootstrap_ms(), numpy = number_from(peer + " bootstrap");
+  fmt::print(
+      "10,000 bootstrap resamples by run     kphi {:7.2f} ms   numpy {:7.2f} ms   {:5.1f} times   (5 wanted, 8 the "
+      "goal)\n",
+      mine, numpy, numpy / mine);
+  fs::remove_all(folder);
+  return theirs / ours >= 15 && numpy / mine >= 5 ? 0 : 1;
+}

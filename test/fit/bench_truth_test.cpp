@@ -1,0 +1,156 @@
+// Raw samples of the simulated bench against what it was built with: torque, lag of the thrust, clock of the motor.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "daq/campaign_run.hpp"
+#include "daq/deterministic_bench.hpp"
+#include "daq/reduction.hpp"
+#include "drivers/sim/truth.hpp"
+#include "fit/blade_pass.hpp"
+#include "fit/dynamics.hpp"
+#include "fit/identification.hpp"
+#include "fit/torque.hpp"
+#include "results/run_reader.hpp"
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::fit {
+namespace {
+
+constexpr double kClockError = 0.005;
+
+class WillingOperator final : public daq::Operator {
+ public:
+  void mount(const profiles::Propeller&, double) override {}
+};
+
+/// One short campaign for all tests: φ = 0 and 180, twice, 12 steps of 0.8 s.
+const std::vector<results::RunRecording>& runs() {
+  static const std::vector<results::RunRecording> recorded = [] {
+    test::TemporaryFolder folder;
+    const profiles::Bench place = test::deterministic_place(11);
+    sim::BenchSettings settings;
+    settings.oscillator_gain = kClockError;
+    daq::DeterministicBench bench(place, settings);
+    auto text = test::short_campaign_text("0, 180", 2, 12);
+    text.replace(text.find("dwell_s: 0.6"), 12, "dwell_s: 0.8");
+    auto results = results::CampaignFolder::create(folder.path(), "20210530T000000Z", "short");
+    WillingOperator person;
+    daq::NoProgress progress;
+    (void)daq::run_campaign(bench, profiles::parse_campaign(text, "short.yaml"), place, results, person, progress,
+                            [] { return false; });
+    std::vector<results::RunRecording> all;
+    for (const auto& file : results.complete_runs()) all.push_back(results::read_run(file));
+    return all;
+  }();
+  return recorded;
+}
+
+TEST(BladePass, FindsTheErrorOfTheMotorsClock) {
+  const auto check = check_by_blade_pass(runs());
+  ASSERT_TRUE(check);
+  EXPECT_EQ(check->lines.size(), 48u);
+  EXPECT_NEAR(check->gain.value, 1 + kClockError, 2e-4);
+  EXPECT_LT(check->gain.u, 1e-4);
+  EXPECT_LE(check->lower, 1 + kClockError);
+  EXPECT_GE(check->upper, 1 + kClockError);
+  EXPECT_FALSE(check->against({1 + kClockError, 1.2e-5}).rejected());
+  EXPECT_TRUE(check->against({1, 1.2e-5}).rejected()) << "a motor that believes its clock is found out";
+}
+
+TEST(BladePass, FindsNothingWithTheWrongNumberOfBlades) {
+  auto other = runs();
+  for (auto& run : other) run.header.blades = 4;
+  const auto check = check_by_blade_pass(other);
+  EXPECT_FALSE(check && check->lines.size() > 4);
+}
+
+TEST(Dynamics, FindTheLagOfTheThrust) {
+  const auto found = identify_dynamics(runs());
+  ASSERT_TRUE(found);
+  const double truth = sim::LoadCellParameters{}.thrust_lag;
+  EXPECT_NEAR(found->thrust_lag_s.value / truth, 1, 0.05);
+  EXPECT_NEAR(found->thrust_lag_s.value, truth, 3 * found->thrust_lag_s.u);
+  EXPECT_GT(found->motor_time_constant_s.value, 1e-3);
+  EXPECT_LT(found->motor_time_constant_s.value, 0.3);
+}
+
+TEST(Torque, IsFoundToOnePercent) {
+  std::vector<results::StepMean> steps;
+  for (const auto& run : runs()) {
+    for (auto step : daq::reduce(run)) {
+      step.speed_rad_s *= 1 + kClockError;  // what the bench file's clock gain does
+      steps.push_back(step);
+    }
+  }
+  const Identification found = identify(steps);
+  std::vector<double> phis;
+  std::vector<Estimate> k;
+  for (const auto& row : found.table) {
+    phis.push_back(row.phi_deg);
+    k.push_back({row.k, row.standard_error, 4});
+  }
+  const auto torque = identify_torque(found.selection.used, phis, k);
+  ASSERT_EQ(torque.size(), 2u);
+  for (const TorqueCoefficient& one : torque) {
+    const double truth = sim::torque_coefficient(*sim::find_propeller("5x3"), one.phi_deg);
+    EXPECT_NEAR(one.k_q.value / truth, 1, 0.01) << one.phi_deg;
+  }
+  EXPECT_NEAR(torque[1].share, 0.96, 0.01);
+}
+
+/// A motor of which every constant is known: 50 readings a second, at odd times.
+results::RunRecording known_motor(double time_constant, double delay, double lag) {
+  results::RunRecording run;
+  run.header.blades = 3;
+  run.header.load_cell.counts_per_newton = 1e6;
+  const double k = 1.5e-6, tick = 1.0 / 7000;
+  double commanded = 600, old = 600, speed = 600, thrust = k * speed * speed, since = 0;
+  double next_command = 1, next_reading = 0.003;
+  int step = 0;
+  run.phases.push_back({results::Phase::step, step, 0, commanded});
+  for (std::uint32_t i = 0; i < 21 * 7000; ++i) {
+    const double t = i * tick;
+    if (t >= next_command && step < 19) {
+      old = commanded;
+      commanded += 60;
+      run.phases.push_back({results::Phase::step, ++step, static_cast<results::Nanoseconds>(1e9 * t), commanded});
+      since = t;
+      next_command += 1.0;
+    }
+    const double after = t - since - delay;
+    speed = after > 0 ? commanded + (old - commanded) * std::exp(-after / time_constant) : old;
+    thrust += tick / lag * (k * speed * speed - thrust);
+    results::LoadCellRecord record;
+    record.counts[2] = static_cast<std::int32_t>(1e6 * thrust);
+    record.rdt_sequence = record.ft_sequence = i;
+    record.arrival_ns = static_cast<results::Nanoseconds>(1e9 * t);
+    run.load_cell.push_back(record);
+    if (t >= next_reading) {
+      run.motor.push_back({results::MotorChannel::speed, static_cast<results::Nanoseconds>(1e9 * t), 0, speed});
+      next_reading += 0.0197 + 0.0006 * ((i * 2654435761u >> 16) % 100) / 100.0;
+    }
+  }
+  run.phases.push_back({results::Phase::end, -1, static_cast<results::Nanoseconds>(21e9), 0});
+  return run;
+}
+
+TEST(Dynamics, FindTimeConstantAndDelayOfAKnownMotor) {
+  const std::vector<results::RunRecording> known{known_motor(0.045, 0.012, 0.08)};
+  const auto found = identify_dynamics(known);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->motor_time_constant_s.value / 0.045, 1, 0.05);
+  EXPECT_NEAR(found->motor_delay_s.value, 0.012, 0.0015);
+  EXPECT_NEAR(found->thrust_lag_s.value / 0.08, 1, 0.05);
+}
+
+TEST(Dynamics, NeedSteps) {
+  std::vector<results::RunRecording> known{known_motor(0.045, 0.012, 0.08)};
+  known[0].phases.erase(known[0].phases.begin() + 2, known[0].phases.end() - 1);
+  EXPECT_FALSE(identify_dynamics(known));
+  EXPECT_FALSE(identify_dynamics({}));
+}
+
+}  // namespace
+}  // namespace kphi::fit
