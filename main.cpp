@@ -16,6 +16,8 @@
 #include "drivers/device_error.hpp"
 #include "drivers/sim/commands.hpp"
 #include "fit/commands.hpp"
+#include "fit/import_commands.hpp"
+#include "fit/result_commands.hpp"
 #include "profiles/commands.hpp"
 #include "profiles/configuration_error.hpp"
 #include "results/commands.hpp"
@@ -91,6 +93,8 @@ int main(int argc, char** argv) {
   kphi::fit::add_import(program, exit_code);
   kphi::fit::add_fit(program, exit_code);
   kphi::fit::add_report(program, exit_code);
+  kphi::fit::add_compare(program, exit_code);
+  kphi::fit::add_export(program, exit_code);
   kphi::compensation::add_compensate(program, exit_code);
   kphi::flight::add_fly(program, exit_code);
 

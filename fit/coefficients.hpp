@@ -16,6 +16,14 @@ struct RunProvenance {
   std::string sha256;  ///< 64 hex digits
   std::string outcome;
   std::optional<results::SampleAccount> account;
+  std::vector<std::string> events{};  ///< what happened to the stream, the cell or the motor; one line each
+};
+
+/// A run that was begun and not accepted.
+struct RejectedRun {
+  std::string file;
+  std::string utc;
+  std::string reason;
 };
 
 /// Where the numbers come from. Nothing here is guessed: what is not known is empty and written as `unknown`.
@@ -34,6 +42,7 @@ struct Provenance {
   std::vector<RunProvenance> runs;
   std::optional<double> supply_v;
   std::optional<MotorClock> clock;  ///< of a campaign
+  std::vector<RejectedRun> rejected{};
 };
 
 /// What was minimised, in words; the same in file and report.

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <functional>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -17,10 +16,12 @@
 #include "fit/analysis_json.hpp"
 #include "fit/blade_pass.hpp"
 #include "fit/coefficients.hpp"
+#include "fit/csv.hpp"
+#include "fit/detail_figures.hpp"
 #include "fit/dynamics.hpp"
 #include "fit/fit_error.hpp"
-#include "fit/import_table.hpp"
 #include "fit/k_table.hpp"
+#include "fit/on_run.hpp"
 #include "fit/raw_samples.hpp"
 #include "fit/report.hpp"
 #include "fit/uncertainty_block.hpp"
@@ -39,8 +40,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-constexpr int kDataRejected = 5;
 
 /// What is fitted, and what is known about where it comes from.
 struct Input {
@@ -71,6 +70,15 @@ struct FitRequest {
   bool json = false;
 };
 
+void take_rejected(const results::CampaignFolder& folder, Provenance& provenance) {
+  const auto text = [](const nlohmann::json& data, const char* key) {
+    return data.contains(key) && data[key].is_string() ? data[key].get<std::string>() : std::string("unknown");
+  };
+  for (const results::JournalEntry& entry : results::read_journal(folder.journal()).entries)
+    if (entry.event == results::kRunAborted)
+      provenance.rejected.push_back({text(entry.data, "run"), entry.utc, text(entry.data, "reason")});
+}
+
 /// Accepted runs with the checksums the journal holds, and when the last of them ended; without a journal the files
 /// as they lie there.
 void take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
@@ -81,6 +89,7 @@ void take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
       provenance.runs.push_back({entry.data["file"], entry.data["sha256"], "", std::nullopt});
       provenance.measured_utc = entry.utc;
     }
+    take_rejected(folder, provenance);
     return;
   }
   for (const fs::path& run : folder.complete_runs())
@@ -185,19 +194,23 @@ Identification identify_input(const Input& input, const FitRequest& request) {
   return result;
 }
 
-void write_report(const Identification& identification, Input& input, const fs::path& folder) {
-  std::vector<ThrustShares> shares;
+/// Fills the runs of `input` from their files and draws.
+Figures draw_all(const Identification& identification, Input& input, const fs::path& figures) {
+  RawSamples raw;
   if (input.campaign) {
-    RawSamples raw = read_raw_samples(identification, std::move(input.provenance.runs), input.folder);
+    raw = read_raw_samples(identification, std::move(input.provenance.runs), input.folder);
     input.provenance.runs = std::move(raw.runs);
-    shares = std::move(raw.shares);
   }
-  if (shares.empty()) shares = shares_of_steps(identification);
-  const Figures figures = draw_figures(identification, shares, folder / "figures");
-  if (!figures.skipped.empty()) fmt::print(stderr, "kphi: figures skipped: {}\n", figures.skipped);
+  if (raw.shares.empty()) raw.shares = shares_of_steps(identification);
+  Figures drawn = draw_figures(identification, raw.shares, figures, "gnuplot", raw.settling ? &*raw.settling : nullptr);
+  if (!drawn.skipped.empty()) fmt::print(stderr, "kphi: figures skipped: {}\n", drawn.skipped);
+  return drawn;
+}
+
+void write_page(const fs::path& page, const std::string& html) {
   results::MemoryOnlySync files;
-  results::write_text(folder / "report.html", format_report(identification, input.provenance, figures), files);
-  fmt::print(stderr, "report        {}\n", (folder / "report.html").string());
+  results::write_text(page, html, files);
+  fmt::print(stderr, "report        {}\n", page.string());
 }
 
 /// The clock's uncertainty is the bench file's own unless somebody knows better.
@@ -206,6 +219,11 @@ AnalysisOptions analysis_options(const FitRequest& request, const Input& input) 
   if (const auto& clock = input.provenance.clock) options.bench.motor_clock = clock->u_gain;
   for (const std::string& text : request.uncertainties) set_uncertainty(options.bench, text);
   return options;
+}
+
+void write_report(const Identification& identification, const Analysis& analysis, Input& input, const fs::path& page) {
+  const Figures figures = draw_all(identification, input, page.parent_path() / "figures");
+  write_page(page, format_report(identification, input.provenance, figures, &analysis));
 }
 
 /// From the first run without occlusion: a whole one lies in memory, 30 MB for the paper's 80 s.
@@ -314,7 +332,7 @@ void run_fit(const FitRequest& request) {
   if (!identification.air)
     fmt::print(stderr, "air density   unknown: k holds for the air of that day; write ambient: into the bench file\n");
   fmt::print(stderr, "coefficients  {}\n", file.string());
-  if (!request.no_report) write_report(identification, input, folder);
+  if (!request.no_report) write_report(identification, analysis, input, folder / "report.html");
 }
 
 /// The speeds that carried the fit. The file prints them to a thousandth RPM; that much more on either side takes the
@@ -326,46 +344,47 @@ SpeedRange fitted_range(const std::string& path, SpeedRange range) {
   return {from_rpm(ends[0].as<double>() - slack).value(), from_rpm(ends[1].as<double>() + slack).value()};
 }
 
-void run_report(const std::string& path) {
-  Input input = load(path);
+/// The campaign as its coefficients.yaml says that it was fitted.
+Identification identify_again(const Input& input, const std::string& path) {
   const auto file = compensation::load_coefficients((fs::path(path) / "coefficients.yaml").string());
   IdentificationOptions options;
   options.line.anchored = file.line.anchored;
   for (const Radians& point : file.line.points) options.line.points_deg.push_back(to_degrees(point));
   options.speed_range = fitted_range(file.path, options.speed_range);
   if (!file.table.empty() && file.table.front().at_speed) options.at_speed_rad_s = file.table.front().at_speed->value();
-  write_report(identify(input.steps, options), input, path);
+  return identify(input.steps, options);
 }
 
-struct ImportRequest {
-  std::vector<std::string> files;
+struct ReportRequest {
+  std::vector<std::string> folders;
   std::string out;
-  std::string speed;
-  std::optional<double> diameter_in;
-  ImportOptions options;
 };
 
-void run_import(const ImportRequest& request, int& exit_code) {
-  ImportOptions options = request.options;
-  options.diameter_in = request.diameter_in;
-  if (!request.speed.empty())
-    options.rows.speed = request.speed == "optical" ? SpeedSource::optical : SpeedSource::electrical;
-  for (const std::string& path : request.files) {
-    const ImportedTable imported = import_table(results::read_text(path), path, options);
-    const std::string name = fs::path(path).stem().string();
-    const fs::path folder = fs::path(request.out) / name;
-    fs::create_directories(folder);
-    results::MemoryOnlySync files;
-    results::write_steps(folder / "steps.csv", imported.steps, files);
-    for (const TableProblem& problem : imported.problems)
-      fmt::print(stderr, "{}:{}: {}\n", path, problem.line, problem.what);
-    try {
-      fmt::print("{}: {}\n", name, summary_of(imported));
-    } catch (const FitError& error) {
-      fmt::print(stderr, "kphi: {}: {}\n", path, error.what());
-      exit_code = kDataRejected;
-    }
+/// One page of several campaigns; their figures go beside it, a folder each.
+void report_several(const ReportRequest& request) {
+  const fs::path page = request.out.empty() ? fs::path("report.html") : fs::path(request.out);
+  const fs::path figures = page.parent_path() / "figures";
+  std::vector<Chapter> chapters;
+  std::vector<const Identification*> family;
+  for (const std::string& path : request.folders) {
+    Input input = load(path);
+    Chapter chapter{identify_again(input, path), {}, {}};
+    chapter.analysis = analyse(chapter.identification, analysis_options({}, input));
+    chapter.figures = draw_all(chapter.identification, input, figures / fmt::format("{}", chapters.size() + 1));
+    chapter.provenance = std::move(input.provenance);
+    chapters.push_back(std::move(chapter));
   }
+  for (const Chapter& chapter : chapters) family.push_back(&chapter.identification);
+  write_page(page, format_reports(chapters, draw({family_figure(family)}, figures)));
+}
+
+void run_report(const ReportRequest& request) {
+  if (request.folders.size() > 1) return report_several(request);
+  const std::string& path = request.folders.front();
+  Input input = load(path);
+  const Identification identification = identify_again(input, path);
+  write_report(identification, analyse(identification, analysis_options({}, input)), input,
+               request.out.empty() ? fs::path(path) / "report.html" : fs::path(request.out));
 }
 
 template <class Enum>
@@ -373,20 +392,6 @@ std::map<std::string, Enum> names(std::initializer_list<Enum> values) {
   std::map<std::string, Enum> result;
   for (const Enum value : values) result.emplace(name_of(value), value);
   return result;
-}
-
-/// Runs `work` as the command's callback; data that cannot be fitted become one line and exit code 5.
-void on_run(CLI::App& command, int& exit_code, std::function<void()> work) {
-  command.callback([&exit_code, work = std::move(work)] {
-    try {
-      work();
-    } catch (const FitError& error) {
-      fmt::print(stderr, "kphi: {}\n", error.what());
-      exit_code = kDataRejected;
-    } catch (const compensation::CoefficientError& error) {
-      throw ConfigurationError(error.what());
-    }
-  });
 }
 
 }  // namespace
@@ -427,35 +432,14 @@ void add_fit(CLI::App& app, int& exit_code) {
   on_run(*command, exit_code, [request] { run_fit(*request); });
 }
 
-void add_import(CLI::App& app, int& exit_code) {
-  auto request = std::make_shared<ImportRequest>();
-  RcbenchmarkSelection& rows = request->options.rows;
-  CLI::App* command = app.add_subcommand("import", "RCbenchmark CSV and UIUC static tables → step tables");
-  command->add_option("FILE", request->files, "tables; the unit of thrust is taken from their header")
-      ->required()
-      ->check(CLI::ExistingFile);
-  command->add_option("--out", request->out, "folder; every table becomes <name>/steps.csv in it")->required();
-  command->add_option("--speed", request->speed, "which speed to take (default: electrical where it turns)")
-      ->check(CLI::IsMember({"electrical", "optical"}));
-  command->add_option("--speed-factor", rows.speed_factor, "on the speed; true over assumed pole count mends it")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--speed-above-rpm", rows.speed_above_rpm, "rows at or below are left out (default 0)");
-  command->add_option("--tare-rows", rows.tare_rows, "tare with so many first rows of a still motor (default 0)");
-  command->add_flag("--reverse-thrust", rows.reverse_thrust, "the stand measured thrust with the other sign");
-  command->add_option("--diameter-in", request->diameter_in, "diameter in inches (UIUC default: from the file's name)")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--propeller", request->options.propeller, "id of the propeller (default: the file's name)");
-  command->add_option("--blades", request->options.blades, "number of blades");
-  on_run(*command, exit_code, [request, &exit_code] { run_import(*request, exit_code); });
-}
-
 void add_report(CLI::App& app, int& exit_code) {
-  auto path = std::make_shared<std::string>();
-  CLI::App* command = app.add_subcommand("report", "draw report.html of a fitted campaign again");
-  command->add_option("DIR", *path, "campaign folder with steps.csv and coefficients.yaml")
+  auto request = std::make_shared<ReportRequest>();
+  CLI::App* command = app.add_subcommand("report", "draw report.html of fitted campaigns again, several on one page");
+  command->add_option("DIR", request->folders, "campaign folders with steps.csv and coefficients.yaml")
       ->required()
       ->check(CLI::ExistingDirectory);
-  on_run(*command, exit_code, [path] { run_report(*path); });
+  command->add_option("--out", request->out, "page (default: report.html in DIR; of several: here)");
+  on_run(*command, exit_code, [request] { run_report(*request); });
 }
 
 }  // namespace kphi::fit

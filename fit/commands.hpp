@@ -1,4 +1,4 @@
-// kphi fit, kphi import, kphi report.
+// kphi fit, kphi report.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -8,9 +8,6 @@ namespace kphi::fit {
 /// `kphi fit DIR|STEPS.csv|K.csv`: coefficients.yaml, report.html and figures/; the headline on stdout. Sets
 /// `exit_code` to 0 or 5 (data that cannot be fitted).
 void add_fit(CLI::App& app, int& exit_code);
-/// `kphi import FILE… --out DIR`: foreign tables → DIR/<name>/steps.csv. Sets `exit_code` to 0 or 5 (some table has too
-/// few rows).
-void add_import(CLI::App& app, int& exit_code);
 /// `kphi report DIR`: report.html and figures again, from steps.csv with the options that coefficients.yaml tells.
 void add_report(CLI::App& app, int& exit_code);
 

@@ -46,15 +46,15 @@ std::optional<std::string> take_quoted(std::string_view& rest) {
 }
 
 /// Nothing if the quotes of the line do not close, or if text follows a closing quote.
-std::optional<std::vector<std::string>> split_commas(std::string_view line) {
+std::optional<std::vector<std::string>> split_at(char separator, std::string_view line) {
   std::vector<std::string> fields;
   for (;;) {
     if (!line.empty() && line.front() == '"') {
       auto field = take_quoted(line);
-      if (!field || (!line.empty() && line.front() != ',')) return std::nullopt;
+      if (!field || (!line.empty() && line.front() != separator)) return std::nullopt;
       fields.push_back(std::move(*field));
     } else {
-      const std::size_t end = std::min(line.find(','), line.size());
+      const std::size_t end = std::min(line.find(separator), line.size());
       fields.emplace_back(trimmed(line.substr(0, end)));
       line.remove_prefix(end);
     }
@@ -88,8 +88,8 @@ void take_row(Table& table, std::size_t number, std::optional<std::vector<std::s
   table.rows.push_back({number, std::move(*fields)});
 }
 
-Table read_table(std::string_view text, std::string path,
-                 std::optional<std::vector<std::string>> (*split)(std::string_view)) {
+template <class Split>
+Table read_table(std::string_view text, std::string path, const Split& split) {
   Table table;
   table.path = std::move(path);
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
@@ -112,6 +112,15 @@ Table read_table(std::string_view text, std::string path,
   return table;
 }
 
+char likely_separator(std::string_view text) {
+  const std::string_view header = next_line(text);
+  char likely = ',';
+  for (const char candidate : {';', '\t'})
+    if (std::count(header.begin(), header.end(), candidate) > std::count(header.begin(), header.end(), likely))
+      likely = candidate;
+  return likely;
+}
+
 }  // namespace
 
 std::optional<std::size_t> Table::find_column(std::string_view name) const {
@@ -132,7 +141,12 @@ std::size_t Table::column(std::string_view name) const {
                                        times == 0 ? "no" : "more than one", name));
 }
 
-Table read_csv(std::string_view text, std::string path) { return read_table(text, std::move(path), split_commas); }
+Table read_csv(std::string_view text, std::string path) { return read_separated(text, std::move(path), ','); }
+
+Table read_separated(std::string_view text, std::string path, char separator) {
+  if (separator == 0) separator = likely_separator(text);
+  return read_table(text, std::move(path), [separator](std::string_view line) { return split_at(separator, line); });
+}
 
 Table read_blank_separated(std::string_view text, std::string path) {
   return read_table(text, std::move(path), split_blanks);

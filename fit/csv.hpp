@@ -36,6 +36,9 @@ struct Table {
 /// stand in double quotes, a quote in it doubled. Empty lines are skipped.
 [[nodiscard]] Table read_csv(std::string_view text, std::string path);
 
+/// As read_csv, separated by `separator`; 0: by the one of , ; tab that the header line has most of.
+[[nodiscard]] Table read_separated(std::string_view text, std::string path, char separator);
+
 /// Separated by blanks or tabs.
 [[nodiscard]] Table read_blank_separated(std::string_view text, std::string path);
 

@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "compensation/units.hpp"
 #include "fit/coefficients.hpp"
+#include "fit/detail_figures.hpp"
+#include "fit/figure_style.hpp"
 #include "fit/gnuplot.hpp"
 #include "results/file_layer.hpp"
 #include "results/number.hpp"
@@ -17,25 +18,10 @@ namespace {
 
 using results::shortest;
 
-/// Okabe and Ito's colours: apart for every kind of colour vision.
-constexpr std::array<const char*, 7> kColours{"#0072B2", "#009E73", "#CC79A7", "#D55E00",
-                                              "#56B4E9", "#B8A200", "#444444"};
-
-constexpr const char* kHead =
-    "set terminal svg size 800,470 noenhanced font 'Helvetica,Arial,sans-serif,14' linewidth 1.2 background '#ffffff'\n"
-    "set encoding utf8\n"
-    "set border lc rgb '#777777'\n"
-    "set tics nomirror textcolor rgb '#333333'\n"
-    "set grid ytics lc rgb '#e4e4e4' lt 1 lw 0.8\n";
-
 double mean(const std::vector<double>& values) {
   double sum = 0;
   for (const double value : values) sum += value;
   return values.empty() ? 0 : sum / static_cast<double>(values.size());
-}
-
-std::string block(const std::string& name, const std::string& rows) {
-  return fmt::format("${} << EOD\n{}EOD\n", name, rows);
 }
 
 /// Highest share in the figure, with room for its box.
@@ -159,69 +145,45 @@ Figure share_figure(const Identification& identification, const std::vector<Thru
       rows += fmt::format("{:.6g}\n", percent);
       figure.csv += fmt::format("thrust_percent,{},{},\n", shortest(shares[i].phi_deg), shortest(percent));
     }
-    if (!rows.empty()) data += block(fmt::format("share{}", i), rows);
+    if (!rows.empty()) data += data_block(fmt::format("share{}", i), rows);
   }
   for (const auto& row : identification.table) {
     figure.csv +=
         fmt::format("k_n_s2_per_rad2,{},{},{}\n", shortest(row.phi_deg), shortest(row.k), shortest(row.standard_error));
   }
   const double first = line.points.front().phi_deg, last = line.points.back().phi_deg;
-  data += block("line", line_rows(line, first, std::max(last, first + 1e-3)));
-  data += block("before", line_rows(line, 0, first));
-  data += block("k", coefficient_rows(identification));
+  data += data_block("line", line_rows(line, first, std::max(last, first + 1e-3)));
+  data += data_block("before", line_rows(line, 0, first));
+  data += data_block("k", coefficient_rows(identification));
   figure.script =
-      kHead + data + axes(identification, share_top(identification, shares)) + "plot \\\n" +
-      "  $line using 1:3:4 axes x1y2 with filledcurves fs transparent solid 0.2 noborder lc rgb '#f28e2b' notitle, "
+      figure_head() + "set border 11\n" + data + axes(identification, share_top(identification, shares)) + "plot \\\n" +
+      "  $line using 1:3:4 axes x1y2 with filledcurves fs transparent solid 0.2 noborder lc rgb '#D55E00' notitle, "
       "\\\n" +
       box_plots(shares) +
-      "  $before using 1:2 axes x1y2 with lines dt 2 lw 1.5 lc rgb '#f28e2b' notitle, \\\n"
-      "  $line using 1:2 axes x1y2 with lines lw 2.5 lc rgb '#f28e2b' title 'line k(φ)', \\\n"
+      "  $before using 1:2 axes x1y2 with lines dt 2 lw 1.5 lc rgb '#D55E00' notitle, \\\n"
+      "  $line using 1:2 axes x1y2 with lines lw 2.5 lc rgb '#D55E00' title 'line k(φ)', \\\n"
       "  $k using 1:2:3 axes x1y2 with yerrorbars pt 7 ps 0.6 lw 1.4 lc rgb '#222222' title 'k of each occlusion'\n";
   return figure;
 }
 
-Figure thrust_figure(const Identification& identification) {
-  Figure figure;
-  figure.name = "thrust_over_speed";
-  figure.caption =
-      "Thrust over squared speed with the fits T = k ω², one colour per occlusion. Steps that were left out are "
-      "not shown.";
-  figure.csv = "phi_deg,speed_rad_s,thrust_n,fitted_n\n";
-  std::string data, parts;
-  for (std::size_t i = 0; i < identification.table.size(); ++i) {
-    const OcclusionCoefficient& row = identification.table[i];
-    const ThrustFit& fit = *row.fit;
-    std::string points;
-    for (const Point& point : fit.points) {
-      const double fitted = thrust(fit.parameters, point.speed_rad_s);
-      points += fmt::format("{:.8g} {:.8g}\n", point.speed_rad_s * point.speed_rad_s * 1e-6, point.thrust_n);
-      figure.csv += fmt::format("{},{},{},{}\n", shortest(row.phi_deg), shortest(point.speed_rad_s),
-                                shortest(point.thrust_n), shortest(fitted));
-    }
-    const double end = fit.speed_max_rad_s;
-    data += block(fmt::format("points{}", i), points);
-    data += block(fmt::format("fit{}", i), fmt::format("0 {:.8g}\n{:.8g} {:.8g}\n", fit.parameters.offset,
-                                                       end * end * 1e-6, thrust(fit.parameters, end)));
-    const char* colour = kColours[i % kColours.size()];
-    parts += fmt::format(
-        "{}  $fit{} using 1:2 with lines lw 1.6 lc rgb '{}' title 'φ = {}°', \\\n"
-        "  $points{} using 1:2 with points pt 6 ps 0.45 lc rgb '{}' notitle",
-        i == 0 ? "" : ", \\\n", i, colour, shortest(row.phi_deg), i, colour);
+Figures draw_figures(const Identification& identification, const std::vector<ThrustShares>& shares,
+                     const std::filesystem::path& folder, const std::string& gnuplot, const Settling* settling) {
+  std::vector<Figure> wanted{share_figure(identification, shares)};
+  if (has_points(identification)) {
+    wanted.push_back(thrust_figure(identification));
+    wanted.push_back(speed_figure(identification));
+    wanted.push_back(repetition_figure(identification));
   }
-  figure.script = kHead + data +
-                  "set xrange [0:*]\nset yrange [*<0:*]\nset xlabel 'ω², 10⁶ (rad/s)²'\nset ylabel 'thrust T, N'\n"
-                  "set key top left samplen 2 spacing 1.2\nplot \\\n" +
-                  parts + "\n";
-  return figure;
+  if (settling != nullptr && !settling->thrust_n.empty()) wanted.push_back(settling_figure(*settling));
+  return draw(wanted, folder, gnuplot);
 }
 
-Figures draw_figures(const Identification& identification, const std::vector<ThrustShares>& shares,
-                     const std::filesystem::path& folder, const std::string& gnuplot) {
+Figures draw(const std::vector<Figure>& wanted, const std::filesystem::path& folder, const std::string& gnuplot) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);  // what failed shows at the first file
   Figures figures;
-  bool able = write_and_draw(share_figure(identification, shares), folder, gnuplot, figures);
-  if (able && has_points(identification)) write_and_draw(thrust_figure(identification), folder, gnuplot, figures);
+  for (const Figure& figure : wanted)
+    if (!write_and_draw(figure, folder, gnuplot, figures)) break;
   return figures;
 }
 

@@ -30,9 +30,6 @@ struct Figure {
 /// %, the coefficients with two standard errors and the line in solid orange (dashed where no occlusion was measured).
 [[nodiscard]] Figure share_figure(const Identification& identification, const std::vector<ThrustShares>& shares);
 
-/// Thrust over squared speed at every φ, with the fits.
-[[nodiscard]] Figure thrust_figure(const Identification& identification);
-
 struct DrawnFigure {
   std::string caption;
   std::filesystem::path svg;
@@ -43,9 +40,17 @@ struct Figures {
   std::string skipped;  ///< why figures are missing; empty when all are drawn
 };
 
-/// Writes name.gp, name.csv and name.svg into `folder` (made if missing) for every figure the data allow. Never throws
-/// for gnuplot's sake; throws results::RecordError when the folder cannot be written.
+struct Settling;
+
+/// All that the data allow, in the order of the report; `settling` may be null. Never throws for gnuplot's sake; throws
+/// results::RecordError when the folder cannot be written.
 [[nodiscard]] Figures draw_figures(const Identification& identification, const std::vector<ThrustShares>& shares,
-                                   const std::filesystem::path& folder, const std::string& gnuplot = "gnuplot");
+                                   const std::filesystem::path& folder, const std::string& gnuplot = "gnuplot",
+                                   const Settling* settling = nullptr);
+
+/// Writes name.gp, name.csv and name.svg into `folder` (made if missing) for every figure, up to the first that gnuplot
+/// refuses.
+[[nodiscard]] Figures draw(const std::vector<Figure>& wanted, const std::filesystem::path& folder,
+                           const std::string& gnuplot = "gnuplot");
 
 }  // namespace kphi::fit

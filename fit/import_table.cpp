@@ -2,21 +2,57 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
+#include "fit/fit_error.hpp"
+#include "fit/rcbenchmark_csv.hpp"
 #include "fit/report.hpp"
+#include "results/sha256.hpp"
 
 namespace kphi::fit {
+namespace {
 
-ImportedTable import_table(std::string_view text, const std::string& path, const ImportOptions& options) {
-  const Table header = read_blank_separated(text.substr(0, text.find('\n')), path);
-  const bool uiuc = header.find_column("RPM") && header.find_column("CT");
-  ImportedTable imported = uiuc ? read_uiuc(text, path, {.diameter_in = options.diameter_in})
-                                : select_rows(read_rcbenchmark(text, path), options.rows);
-  for (results::StepMean& step : imported.steps) {
+using Json = nlohmann::ordered_json;
+
+Import import_log(const StandLog& log, const RowSelection& selection) {
+  Import import;
+  import.findings = audit(log, selection);
+  for (const Finding& finding : import.findings) {
+    if (finding.kind == FindingKind::speed_ratio && !selection.speed)
+      throw FitError(fmt::format("{}: {}", log.path, finding.text));
+  }
+  import.table = select_rows(log, selection);
+  mark_doubts(import.table, import.findings);
+  return import;
+}
+
+Import import_uiuc(std::string_view text, const std::string& path, const ImportOptions& options) {
+  UiucOptions uiuc{.diameter_in = options.diameter_in};
+  if (options.air_density_kg_m3) uiuc.density_kg_m3 = *options.air_density_kg_m3;
+  Import import{read_uiuc(text, path, uiuc), {}};
+  for (const TableProblem& problem : import.table.problems)
+    import.findings.push_back({FindingKind::other_fields, 1, problem.line, problem.what, {problem.line}, false});
+  return import;
+}
+
+bool is_uiuc(std::string_view text) {
+  const Table header = read_blank_separated(text.substr(0, text.find('\n')), "");
+  return header.find_column("RPM") && header.find_column("CT");
+}
+
+}  // namespace
+
+Import import_table(std::string_view text, const std::string& path, const ImportOptions& options) {
+  Import import = !options.columns.empty()
+                      ? import_log(read_mapped(text, path, options.columns, options.dialect), options.rows)
+                  : is_uiuc(text) ? import_uiuc(text, path, options)
+                                  : import_log(read_rcbenchmark(text, path), options.rows);
+  for (results::StepMean& step : import.table.steps) {
     if (!options.propeller.empty()) step.propeller = options.propeller;
     if (options.diameter_in) step.diameter_in = *options.diameter_in;
     step.blades = options.blades;
   }
-  return imported;
+  return import;
 }
 
 std::string summary_of(const ImportedTable& imported) {
@@ -26,6 +62,36 @@ std::string summary_of(const ImportedTable& imported) {
   if (imported.tare_n != 0) text += fmt::format(", tare {:.4f} N", imported.tare_n);
   return text + fmt::format(", k = {} N/(rad/s)^2, rms {:.4f} N", with_error(fit.parameters.k, fit.standard_error.k),
                             fit.rms_n);
+}
+
+std::string import_record(const Import& import, std::string_view text, const std::string& path,
+                          const ImportOptions& options, const std::string& tool_version) {
+  Json findings = Json::array();
+  for (const Finding& finding : import.findings) {
+    findings.push_back({{"kind", name_of(finding.kind)},
+                        {"rows", finding.rows},
+                        {"first_line", finding.first_line},
+                        {"text", finding.text},
+                        {"lines", finding.lines}});
+  }
+  Json problems = Json::array();
+  for (const TableProblem& problem : import.table.problems)
+    problems.push_back({{"line", problem.line}, {"what", problem.what}});
+  const Json record{{"format", "kphi-import/1"},
+                    {"source", path},
+                    {"sha256", results::sha256(text)},
+                    {"tool_version", tool_version},
+                    {"thrust_unit", import.table.unit},
+                    {"speed_source", import.table.speed_source},
+                    {"speed_factor", options.rows.speed_factor},
+                    {"reverse_thrust", options.rows.reverse_thrust},
+                    {"tare_n", import.table.tare_n},
+                    {"rows_total", import.table.rows_total},
+                    {"rows_used", import.table.steps.size()},
+                    {"columns_left_out", import.table.unread},
+                    {"findings", findings},
+                    {"lines_left_out", problems}};
+  return record.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace kphi::fit

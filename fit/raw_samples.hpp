@@ -2,9 +2,11 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "fit/coefficients.hpp"
+#include "fit/detail_figures.hpp"
 #include "fit/figures.hpp"
 #include "results/records.hpp"
 #include "results/step_mean.hpp"
@@ -17,9 +19,13 @@ namespace kphi::fit {
 [[nodiscard]] std::vector<double> thrust_samples(const results::RunRecording& run, const results::StepMean& step,
                                                  std::size_t most);
 
+/// How `run` came to `step`. Nothing when the run has no mark of it or no sample in its window.
+[[nodiscard]] std::optional<Settling> settling_of(const results::RunRecording& run, const results::StepMean& step);
+
 struct RawSamples {
   std::vector<ThrustShares> shares;  ///< empty when some run of the top speed is not in the folder
-  std::vector<RunProvenance> runs;   ///< those given, with outcome and sample account filled in where the file is there
+  std::vector<RunProvenance> runs;  ///< those given, with outcome, account and events filled in where the file is there
+  std::optional<Settling> settling;  ///< of the top speed, from the first of the runs that have it
 };
 
 /// Reads each run once. `runs` name files below `folder`; at most 2000 samples per φ are kept.

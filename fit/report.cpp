@@ -3,61 +3,56 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "compensation/units.hpp"
+#include "fit/analysis_section.hpp"
+#include "fit/claims.hpp"
 #include "fit/html.hpp"
 #include "fit/power.hpp"
+#include "fit/report_style.hpp"
+#include "results/campaign_folder.hpp"
 
 namespace kphi::fit {
 namespace {
 
-constexpr const char* kStyle = R"(
-:root{--ink:#1c2430;--soft:#5c6675;--rule:#dfe3e8;--accent:#c2570c;--panel:#f7f8fa}
-*{box-sizing:border-box}
-body{font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,"Helvetica Neue",Arial,sans-serif;color:var(--ink);
- background:#fff;max-width:68rem;margin:2.5rem auto;padding:0 1.5rem}
-h1{font-size:1.75rem;line-height:1.2;margin:0 0 .25rem}
-h2{font-size:1.15rem;margin:2.5rem 0 .75rem;padding-bottom:.3rem;border-bottom:1px solid var(--rule)}
-p.sub{color:var(--soft);margin:0 0 1.5rem}
-p.note,figcaption{color:var(--soft);font-size:.9rem}
-.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(17rem,1fr));gap:1rem}
-.card{background:var(--panel);border:1px solid var(--rule);border-radius:8px;padding:1rem 1.2rem}
-.card h3{margin:0;font-size:.85rem;font-weight:600;color:var(--soft)}
-.card .value{font-size:1.3rem;font-weight:650;font-variant-numeric:tabular-nums;margin:.15rem 0;white-space:nowrap}
-.card .value .unit{display:block;font-size:.85rem;font-weight:400;color:var(--soft)}
-.card p{margin:0;font-size:.88rem;color:var(--soft);font-variant-numeric:tabular-nums}
-.line{border-left:4px solid var(--accent)}
-figure{margin:1.25rem 0}
-figure svg{display:block;width:100%;height:auto;border:1px solid var(--rule);border-radius:8px}
-figcaption{margin-top:.5rem}
-.scroll{overflow-x:auto}
-table{border-collapse:collapse;width:100%;font-size:.86rem;font-variant-numeric:tabular-nums}
-th{text-align:right;font-weight:600;color:var(--soft);border-bottom:2px solid var(--rule);padding:.35rem .5rem;
- vertical-align:bottom}
-td{text-align:right;border-bottom:1px solid var(--rule);padding:.35rem .5rem;white-space:nowrap}
-th.text,td.text{text-align:left;white-space:normal}
-td.hash{text-align:left;font:.66rem ui-monospace,"DejaVu Sans Mono",Menlo,monospace;white-space:normal;
- word-break:break-all;color:var(--soft)}
-.warning{background:#fff6e5;border:1px solid #f0c36d;border-radius:8px;padding:.7rem 1rem}
-dl{display:grid;grid-template-columns:max-content 1fr;gap:.3rem 1.2rem;margin:0;font-size:.92rem}
-dt{color:var(--soft)}dd{margin:0}
-@media print{body{margin:0;max-width:none;font-size:11pt}.card,figure,tr{break-inside:avoid}h2{break-after:avoid}
- .scroll{overflow:visible}}
-)";
-
 std::string rpm(double speed_rad_s) { return fmt::format("{:.0f}", to_rpm(RadPerSec(speed_rad_s))); }
 double per_rpm2(double k) { return to_newtons_per_rpm2(ThrustCoefficient(k)); }
 std::string angle(double phi_deg) { return fmt::format("{:g}°", phi_deg); }
+
+/// "1.550197e-06 ± 2.7e-11" as people write it: (1.550197 ± 0.000027) × 10⁻⁶, with a true minus.
+std::string pretty(double value, double error) {
+  if (!(std::abs(value) > 0) || !std::isfinite(value)) return with_error(value, error);
+  static constexpr std::array kDigits{"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
+  const int exponent = static_cast<int>(std::floor(std::log10(std::abs(value))));
+  const double unit = std::pow(10, exponent);
+  const bool known = error > 0 && std::isfinite(error);
+  const int digits = known ? std::clamp(1 - static_cast<int>(std::floor(std::log10(error / unit))), 0, 12) : 5;
+  std::string power = exponent < 0 ? "⁻" : "";
+  for (const char c : fmt::format("{}", std::abs(exponent))) power += kDigits[static_cast<std::size_t>(c - '0')];
+  const std::string sign = value < 0 ? "−" : "";
+  const std::string number = fmt::format("{}{:.{}f}", sign, std::abs(value) / unit, digits);
+  return known ? fmt::format("({} ± {:.{}f}) × 10{}", number, error / unit, digits, power)
+               : fmt::format("{} × 10{}", number, power);
+}
+
+/// Two decimals with a true minus, and no minus before nothing.
+std::string signed_percent(double percent) {
+  const std::string digits = fmt::format("{:.2f}", std::abs(percent));
+  if (digits == "0.00") return "0.00 %";
+  return (percent < 0 ? "−" : "+") + digits + " %";
+}
 
 std::string card(const std::string& title, double value, double error, const char* si, const char* rpm_unit,
                  const std::string& more) {
   return fmt::format(
       "<div class=\"card\"><h3>{}</h3><div class=\"value\">{} <span class=\"unit\">{}</span></div>"
       "<p>{} {}</p>{}</div>\n",
-      title, with_error(value, error), si, with_error(per_rpm2(value), per_rpm2(error)), rpm_unit, more);
+      title, pretty(value, error), si, pretty(per_rpm2(value), per_rpm2(error)), rpm_unit, more);
 }
 
 std::string headline(const Identification& identification) {
@@ -67,10 +62,10 @@ std::string headline(const Identification& identification) {
     crossings +=
         fmt::format("<p>meets K<sub>T</sub> at {:.1f}°; below, compensation clips to 1</p>", *line.clipping_deg());
   if (line.zero_crossing_deg()) crossings += fmt::format("<p>reaches zero at {:.1f}°</p>", *line.zero_crossing_deg());
-  const std::string mismatch = line.anchored
-                                   ? "<p>anchored at K<sub>T</sub></p>"
-                                   : fmt::format("<p>{:+.2f} % of K<sub>T</sub> above the measured K<sub>T</sub></p>",
-                                                 100 * line.mismatch() / line.K_T);
+  const std::string mismatch =
+      line.anchored ? "<p>anchored at K<sub>T</sub></p>"
+                    : fmt::format("<p>{:.2f} % {} the measured K<sub>T</sub></p>",
+                                  100 * std::abs(line.mismatch()) / line.K_T, line.mismatch() < 0 ? "below" : "above");
   return "<div class=\"cards\">\n" +
          card("Thrust coefficient K<sub>T</sub> = k(0)", line.K_T, line.K_T_standard_error, "N/(rad/s)²", "N/RPM²",
               "<p>measured without occlusion</p>") +
@@ -79,6 +74,11 @@ std::string headline(const Identification& identification) {
          card("Line k(φ): slope", line.slope_per_deg, std::sqrt(line.covariance[1][1]), "N/(rad/s)² per degree",
               "N/RPM² per degree", crossings) +
          "</div>\n";
+}
+
+double share_of(const Identification& identification, const OcclusionCoefficient& row) {
+  const auto& nominal = identification.table.front().at_speed;
+  return row.at_speed && nominal ? row.at_speed->k / nominal->k : row.k / identification.line.K_T;
 }
 
 std::string standard_section(const Identification& identification) {
@@ -98,8 +98,8 @@ std::string standard_section(const Identification& identification) {
   for (const OcclusionCoefficient& row : identification.table) {
     if (!row.standard) continue;
     html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td></tr>\n", angle(row.phi_deg),
-                        with_error(row.standard->k, row.standard->standard_error),
-                        with_error(per_rpm2(row.standard->k), per_rpm2(row.standard->standard_error)));
+                        pretty(row.standard->k, row.standard->standard_error),
+                        pretty(per_rpm2(row.standard->k), per_rpm2(row.standard->standard_error)));
   }
   return html + "</tbody></table></div>\n<p class=\"note\">± includes the standard uncertainty of the density.</p>\n";
 }
@@ -120,14 +120,20 @@ std::string power_section(const Identification& identification) {
   return html + "</tbody></table></div>\n";
 }
 
-std::string at_speed_cell(const OcclusionCoefficient& row) {
-  return row.at_speed ? with_error(row.at_speed->k, row.at_speed->standard_error) : "–";
+/// The result in one sentence.
+std::string lead(const Identification& identification) {
+  const OcclusionCoefficient& widest = identification.table.back();
+  const bool at = identification.at_speed_rad_s > 0 && widest.at_speed;
+  std::string text = fmt::format(
+      "{}an occlusion of {} leaves {:.1f} % of the thrust; each degree more costs {:.3f} % of K<sub>T</sub>.",
+      at ? "At " + rpm(identification.at_speed_rad_s) + " RPM " : "", angle(widest.phi_deg),
+      100 * share_of(identification, widest), -100 * identification.line.slope_per_deg / identification.line.K_T);
+  if (!at) text.front() = 'A';
+  return "<p class=\"lead\">" + text + "</p>\n";
 }
 
-std::string share_cell(const Identification& identification, const OcclusionCoefficient& row) {
-  const auto& nominal = identification.table.front().at_speed;
-  if (!row.at_speed || !nominal) return fmt::format("{:.1f} %", 100 * row.k / identification.line.K_T);
-  return fmt::format("{:.1f} %", 100 * row.at_speed->k / nominal->k);
+std::string at_speed_cell(const OcclusionCoefficient& row) {
+  return row.at_speed ? pretty(row.at_speed->k, row.at_speed->standard_error) : "–";
 }
 
 std::string coefficient_table(const Identification& identification) {
@@ -142,11 +148,12 @@ std::string coefficient_table(const Identification& identification) {
       at, at);
   for (const OcclusionCoefficient& row : identification.table) {
     html += fmt::format(
-        "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:+.2f} "
-        "%</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-        angle(row.phi_deg), with_error(row.k, row.standard_error),
-        with_error(per_rpm2(row.k), per_rpm2(row.standard_error)), at_speed_cell(row), share_cell(identification, row),
-        100 * (line.at(row.phi_deg) - row.k) / line.K_T, row.fit ? fmt::format("{:.4f}", row.fit->rms_n) : "–",
+        "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></"
+        "tr>\n",
+        angle(row.phi_deg), pretty(row.k, row.standard_error), pretty(per_rpm2(row.k), per_rpm2(row.standard_error)),
+        at_speed_cell(row), fmt::format("{:.1f} %", 100 * share_of(identification, row)),
+        signed_percent(100 * (line.at(row.phi_deg) - row.k) / line.K_T),
+        row.fit ? fmt::format("{:.4f}", row.fit->rms_n) : "–",
         row.fit ? fmt::format("{:.5f}", row.fit->r_squared) : "–", row.fit ? fmt::format("{}", row.fit->n) : "–");
   }
   return html +
@@ -156,16 +163,23 @@ std::string coefficient_table(const Identification& identification) {
          "speed.</p>\n";
 }
 
-std::string figure_section(const Figures& figures) {
-  std::string html = "<h2>Figures</h2>\n";
-  for (std::size_t i = 0; i < figures.drawn.size(); ++i) {
-    std::ifstream file(figures.drawn[i].svg, std::ios::binary);
-    const std::string svg((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    html += fmt::format("<figure>\n{}\n<figcaption>{}</figcaption>\n</figure>\n",
-                        inline_svg(svg, fmt::format("figure{}-", i + 1)), html_escaped(figures.drawn[i].caption));
-  }
-  if (!figures.skipped.empty())
-    html += fmt::format("<p class=\"warning\">Figures skipped: {}.</p>\n", html_escaped(figures.skipped));
+/// Numbers run through the page, and keep apart the ids of drawings.
+std::string figure_block(const DrawnFigure& figure, int number) {
+  std::ifstream file(figure.svg, std::ios::binary);
+  const std::string svg((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  return fmt::format("<figure>\n{}\n<figcaption><b>Figure {}.</b> {}</figcaption>\n</figure>\n",
+                     inline_svg(svg, fmt::format("figure{}-", number)), number, html_escaped(figure.caption));
+}
+
+std::string skipped_note(const Figures& figures) {
+  if (figures.skipped.empty()) return {};
+  return fmt::format("<p class=\"warning\">Figures skipped: {}.</p>\n", html_escaped(figures.skipped));
+}
+
+std::string figure_blocks(const Figures& figures, std::size_t begin, std::size_t end, int& number) {
+  std::string html;
+  for (std::size_t i = begin; i < std::min(end, figures.drawn.size()); ++i)
+    html += figure_block(figures.drawn[i], ++number);
   return html;
 }
 
@@ -199,17 +213,64 @@ std::string account_cells(const std::optional<results::SampleAccount>& account) 
                      account->lost_network + account->lost_host);
 }
 
-std::string run_section(const std::vector<RunProvenance>& runs) {
-  if (runs.empty()) return {};
+struct RunSteps {
+  std::size_t used = 0, left_out = 0;
+  std::string doubts;  ///< each once, in the order of their first step
+};
+
+bool is_of(const RunProvenance& run, const results::StepMean& step) {
+  return std::filesystem::path(run.file).filename() ==
+         results::run_file_name(step.propeller, step.occlusion_deg, step.repetition);
+}
+
+RunSteps steps_of(const RunProvenance& run, const StepSelection& selection) {
+  RunSteps steps;
+  for (const results::StepMean& step : selection.used) steps.used += is_of(run, step) ? 1 : 0;
+  for (const DoubtfulStep& doubtful : selection.doubtful) {
+    if (!is_of(run, doubtful.step)) continue;
+    steps.left_out += doubtful.left_out ? 1 : 0;
+    if (steps.doubts.find(doubtful.reason) == std::string::npos)
+      steps.doubts += (steps.doubts.empty() ? "" : "; ") + doubtful.reason;
+  }
+  return steps;
+}
+
+std::string run_row(const RunProvenance& run, const StepSelection& selection) {
+  const RunSteps steps = steps_of(run, selection);
+  const bool bad = !run.outcome.empty() && run.outcome != "complete";
+  std::string doubts = html_escaped(steps.doubts);
+  for (const std::string& event : run.events) doubts += (doubts.empty() ? "" : "<br/>") + html_escaped(event);
+  return fmt::format(
+      "<tr><td class=\"text\">{}</td><td class=\"text{}\">{}</td><td>{}</td><td>{}</td>{}<td "
+      "class=\"text\">{}</td></tr>\n",
+      html_escaped(run.file), bad ? " bad" : "", run.outcome.empty() ? "–" : html_escaped(run.outcome), steps.used,
+      steps.left_out, account_cells(run.account), doubts.empty() ? "none" : doubts);
+}
+
+std::string run_section(const Provenance& provenance, const StepSelection& selection) {
+  if (provenance.runs.empty() && provenance.rejected.empty()) return {};
   std::string html =
       "<h2>Runs</h2>\n<div class=\"scroll\"><table><thead><tr><th class=\"text\">file</th><th "
-      "class=\"text\">outcome</th>"
-      "<th>samples expected</th><th>received</th><th>lost</th><th class=\"text\">SHA-256</th></tr></thead><tbody>\n";
-  for (const RunProvenance& run : runs) {
-    html += fmt::format("<tr><td class=\"text\">{}</td><td class=\"text\">{}</td>{}<td class=\"hash\">{}</td></tr>\n",
-                        html_escaped(run.file), run.outcome.empty() ? "–" : html_escaped(run.outcome),
-                        account_cells(run.account), html_escaped(run.sha256));
+      "class=\"text\">outcome</th><th>steps fitted</th><th>left out</th><th>samples expected</th><th>received</th>"
+      "<th>lost</th><th class=\"text\">doubts and events</th></tr></thead><tbody>\n";
+  for (const RunProvenance& run : provenance.runs) html += run_row(run, selection);
+  for (const RejectedRun& run : provenance.rejected) {
+    html += fmt::format(
+        "<tr><td class=\"text\">{}</td><td class=\"text bad\">not accepted</td><td>0</td><td>–</td><td>–</td><td>–</td>"
+        "<td>–</td><td class=\"text\">{}: {}</td></tr>\n",
+        html_escaped(run.file), html_escaped(run.utc), html_escaped(run.reason));
   }
+  return html + "</tbody></table></div>\n";
+}
+
+std::string hash_section(const std::vector<RunProvenance>& runs) {
+  if (runs.empty()) return {};
+  std::string html =
+      "<h2>Hashes of the runs</h2>\n<div class=\"scroll\"><table><thead><tr><th class=\"text\">file</th><th "
+      "class=\"text\">SHA-256</th></tr></thead><tbody>\n";
+  for (const RunProvenance& run : runs)
+    html += fmt::format("<tr><td class=\"text\">{}</td><td class=\"hash\">{}</td></tr>\n", html_escaped(run.file),
+                        html_escaped(run.sha256));
   return html + "</tbody></table></div>\n";
 }
 
@@ -260,6 +321,58 @@ std::string propeller_line(const Identification& identification, const Provenanc
   return html_escaped(text);
 }
 
+constexpr const char* kPageEnd = "</body>\n</html>\n";
+
+std::string page_head(const std::string& title, const std::string& heading, const std::string& sub) {
+  return fmt::format(
+      "<!DOCTYPE html>\n<html xmlns=\"http://www.w3.org/1999/xhtml\" lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>{}</title>\n"
+      "<style>{}</style>\n</head>\n<body>\n<header><h1>{}</h1>\n<p class=\"sub\">{}</p></header>\n",
+      title, report_style(), heading, sub);
+}
+
+/// The first figure belongs to the headline, the others behind the table.
+std::string body(const Identification& identification, const Provenance& provenance, const Figures& figures,
+                 const Analysis* analysis, int& number) {
+  std::string html = lead(identification) + headline(identification) + figure_blocks(figures, 0, 1, number) +
+                     skipped_note(figures) + coefficient_table(identification) + standard_section(identification);
+  const std::string details = figure_blocks(figures, 1, figures.drawn.size(), number);
+  if (!details.empty()) html += "<h2>How well the model holds</h2>\n" + details;
+  if (analysis != nullptr) html += analysis_sections(*analysis);
+  return html + power_section(identification) + doubt_section(identification.selection) +
+         run_section(provenance, identification.selection) + provenance_section(identification, provenance) +
+         hash_section(provenance.runs);
+}
+
+std::string family_table(const std::vector<Chapter>& chapters) {
+  std::string html =
+      "<h2>Together</h2>\n<div class=\"scroll\"><table><thead><tr><th class=\"text\">propeller</th><th>diameter, "
+      "in</th>"
+      "<th>blades</th><th>K<sub>T</sub>, N/(rad/s)²</th><th>K<sub>T</sub>/D⁴, N/((rad/s)² m⁴)</th><th>slope, "
+      "N/(rad/s)² "
+      "per degree</th><th>slope, % of K<sub>T</sub> per degree</th></tr></thead><tbody>\n";
+  for (const Chapter& chapter : chapters) {
+    const Identification& one = chapter.identification;
+    const double diameter_m = 0.0254 * one.diameter_in;
+    html += fmt::format(
+        "<tr><td class=\"text\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+        html_escaped(one.propeller), one.diameter_in > 0 ? fmt::format("{:g}", one.diameter_in) : "–",
+        one.blades > 0 ? fmt::format("{}", one.blades) : "–", pretty(one.line.K_T, one.line.K_T_standard_error),
+        diameter_m > 0 ? fmt::format("{:.5f}", one.line.K_T / std::pow(diameter_m, 4)) : "–",
+        pretty(one.line.slope_per_deg, std::sqrt(one.line.covariance[1][1])),
+        fmt::format("{}{:.4f}", one.line.slope_per_deg < 0 ? "−" : "+",
+                    std::abs(100 * one.line.slope_per_deg / one.line.K_T)));
+  }
+  return html + "</tbody></table></div>\n";
+}
+
+std::string claims_of(const std::vector<Chapter>& chapters) {
+  std::vector<FamilyMember> family;
+  for (const Chapter& chapter : chapters)
+    if (chapter.analysis) family.push_back({chapter.identification, *chapter.analysis});
+  return family.size() < chapters.size() ? std::string() : claims_section(test_claims(family));
+}
+
 }  // namespace
 
 std::string with_error(double value, double standard_error) {
@@ -269,17 +382,30 @@ std::string with_error(double value, double standard_error) {
   return fmt::format("{:.{}e} ± {:.1e}", value, static_cast<int>(std::clamp(digits, 1.0, 12.0)), standard_error);
 }
 
-std::string format_report(const Identification& identification, const Provenance& provenance, const Figures& figures) {
-  return fmt::format(
-             "<!DOCTYPE html>\n<html xmlns=\"http://www.w3.org/1999/xhtml\" lang=\"en\">\n<head>\n<meta "
-             "charset=\"utf-8\"/>\n"
-             "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>k(φ) of {}</title>\n"
-             "<style>{}</style>\n</head>\n<body>\n<h1>How an occlusion costs thrust: k(φ)</h1>\n<p "
-             "class=\"sub\">{}</p>\n",
-             html_escaped(identification.propeller), kStyle, propeller_line(identification, provenance)) +
-         headline(identification) + figure_section(figures) + coefficient_table(identification) +
-         standard_section(identification) + power_section(identification) + doubt_section(identification.selection) +
-         run_section(provenance.runs) + provenance_section(identification, provenance) + "</body>\n</html>\n";
+std::string format_report(const Identification& identification, const Provenance& provenance, const Figures& figures,
+                          const Analysis* analysis) {
+  int number = 0;
+  return page_head("k(φ) of " + html_escaped(identification.propeller), "How an occlusion costs thrust: k(φ)",
+                   propeller_line(identification, provenance)) +
+         body(identification, provenance, figures, analysis, number) + kPageEnd;
+}
+
+std::string format_reports(const std::vector<Chapter>& chapters, const Figures& family) {
+  std::string names, contents, bodies;
+  int number = 0;
+  const std::string together = figure_blocks(family, 0, family.drawn.size(), number) + skipped_note(family);
+  for (std::size_t i = 0; i < chapters.size(); ++i) {
+    const Chapter& chapter = chapters[i];
+    const std::string name = html_escaped(chapter.identification.propeller);
+    names += (names.empty() ? "" : ", ") + name;
+    contents += fmt::format("<a href=\"#chapter{}\">{}</a>", i + 1, name);
+    bodies += fmt::format("<h2 class=\"chapter\" id=\"chapter{}\">{}</h2>\n", i + 1,
+                          propeller_line(chapter.identification, chapter.provenance)) +
+              body(chapter.identification, chapter.provenance, chapter.figures,
+                   chapter.analysis ? &*chapter.analysis : nullptr, number);
+  }
+  return page_head("k(φ) of " + names, "How an occlusion costs thrust: k(φ) of several propellers", names) + "<nav>" +
+         contents + "</nav>\n" + family_table(chapters) + together + claims_of(chapters) + bodies + kPageEnd;
 }
 
 }  // namespace kphi::fit

@@ -68,6 +68,7 @@ ImportedTable read_uiuc(std::string_view text, std::string path, const UiucOptio
     step.speed_sd_rad_s = step.thrust_sd_n = step.torque_nm = step.torque_sd_nm = kNotMeasured;
     step.supply_voltage_v = step.supply_current_a = step.motor_current_a = step.coil_temperature_degc = kNotMeasured;
     imported.steps.push_back(std::move(step));
+    imported.lines.push_back(row.line);
   }
   if (imported.steps.empty()) throw ConfigurationError(fmt::format("{}:1: no row with a speed above 0", table.path));
   refuse_reversed_thrust(imported.steps, table.path);

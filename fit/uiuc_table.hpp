@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "fit/rcbenchmark_csv.hpp"
+#include "fit/row_selection.hpp"
 
 namespace kphi::fit {
 

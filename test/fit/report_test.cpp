@@ -1,5 +1,6 @@
 #include "fit/report.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,8 +9,10 @@
 #include <iterator>
 #include <pugixml.hpp>
 #include <random>
+#include <set>
 #include <string>
 
+#include "fit/detail_figures.hpp"
 #include "fit/gnuplot.hpp"
 #include "fit/html.hpp"
 #include "results/file_layer.hpp"
@@ -126,7 +129,8 @@ TEST(Report, ShowsNamesAsTextOnly) {
 TEST(Report, TellsHeadlineTableDoubtsRunsAndProvenance) {
   const Identification fit = identify(steps_with_doubts());
   const std::string html = page();
-  EXPECT_THAT(html, HasSubstr(with_error(fit.line.K_T, fit.line.K_T_standard_error)));
+  EXPECT_THAT(html, HasSubstr(fmt::format("({:.6f} ± ", fit.line.K_T * 1e6).substr(0, 6)));
+  EXPECT_THAT(html, HasSubstr(") × 10⁻⁶"));
   EXPECT_THAT(html, HasSubstr("N/(rad/s)²"));
   EXPECT_THAT(html, HasSubstr("N/RPM²"));
   for (const char* angle : {"<td>0°</td>", "<td>45°</td>", "<td>90°</td>", "<td>180°</td>", "<td>270°</td>"})
@@ -137,6 +141,45 @@ TEST(Report, TellsHeadlineTableDoubtsRunsAndProvenance) {
   EXPECT_THAT(html, HasSubstr("<td>560000</td><td>559990</td><td>10</td>"));
   EXPECT_THAT(html, HasSubstr(std::string(64, 'b')));
   EXPECT_THAT(html, AllOf(HasSubstr("2021-05-30T00:00:00Z"), HasSubstr("kphi 0.1.0")));
+}
+
+TEST(Report, ListsEveryDoubtEventAndRejectionWithItsRun) {
+  Provenance told = provenance();
+  told.runs[0].events = {"3.20 s: restarted, the stream <began> anew"};
+  told.rejected = {{"5x3_phi090_rep2.h5", "2021-05-30T00:10:00Z", "speed error & more"}};
+  const std::string html = format_report(identify(steps_with_doubts()), told, {});
+  EXPECT_THAT(html, HasSubstr("3.20 s: restarted, the stream &lt;began&gt; anew"));
+  EXPECT_THAT(html, HasSubstr("not accepted"));
+  EXPECT_THAT(html, HasSubstr("2021-05-30T00:10:00Z: speed error &amp; more"));
+  EXPECT_THAT(html, HasSubstr("samples lost; commanded speed not reached")) << "of the run whose steps they are";
+}
+
+TEST(Report, OfSeveralCampaignsIsOnePage) {
+  if (!gnuplot_is_installed()) GTEST_SKIP() << "gnuplot is not installed";
+  const TemporaryFolder folder;
+  CampaignTruth larger;
+  larger.K_T *= 2;
+  larger.intercept *= 2;
+  larger.slope_per_deg *= 2;
+  std::vector<Chapter> chapters{{identify(campaign_steps()), provenance(), {}},
+                                {identify(campaign_steps(larger)), provenance(), {}}};
+  chapters[1].identification.propeller = "6x3 <b>";
+  for (Chapter& chapter : chapters) {
+    chapter.figures = draw_figures(chapter.identification, shares_of_steps(chapter.identification),
+                                   folder.path() / chapter.identification.propeller);
+  }
+  const Identification* const family[]{&chapters[0].identification, &chapters[1].identification};
+  const std::string html = format_reports(chapters, draw({family_figure(family)}, folder.path()));
+  pugi::xml_document document;
+  ASSERT_TRUE(document.load_buffer(html.data(), html.size()));
+  EXPECT_EQ(document.select_nodes("//svg").size(), 9u);
+  std::set<std::string> ids;
+  for (const pugi::xpath_node& node : document.select_nodes("//*[@id]"))
+    EXPECT_TRUE(ids.insert(node.node().attribute("id").value()).second) << node.node().attribute("id").value();
+  for (const pugi::xpath_node& link : document.select_nodes("//nav/a"))
+    EXPECT_TRUE(ids.contains(std::string(link.node().attribute("href").value()).substr(1)));
+  expect_no_loads(document.child("html"));
+  EXPECT_THAT(html, HasSubstr("6x3 &lt;b&gt;"));
 }
 
 TEST(Report, SaysWhyFiguresAreMissingAndHowToGetThem) {
@@ -164,7 +207,7 @@ TEST(Figures, AreDrawnAsSvgWithScriptAndDataBesideThem) {
   const Identification fit = identify(campaign_steps());
   const Figures figures = draw_figures(fit, shares_of_steps(fit), folder.path());
   EXPECT_EQ(figures.skipped, "");
-  ASSERT_EQ(figures.drawn.size(), 2u);
+  ASSERT_EQ(figures.drawn.size(), 4u);
   for (const DrawnFigure& figure : figures.drawn) {
     pugi::xml_document document;
     ASSERT_TRUE(document.load_file(figure.svg.c_str()));
@@ -175,7 +218,7 @@ TEST(Figures, AreDrawnAsSvgWithScriptAndDataBesideThem) {
   const std::string html = page(figures);
   pugi::xml_document document;
   ASSERT_TRUE(document.load_buffer(html.data(), html.size()));
-  EXPECT_EQ(document.select_nodes("//svg").size(), 2u);
+  EXPECT_EQ(document.select_nodes("//svg").size(), 4u);
   expect_no_loads(document.child("html"));
 }
 

@@ -1,12 +1,15 @@
-// libFuzzer: whatever the bytes are, the table readers refuse with a ConfigurationError or accept, and never crash.
+// libFuzzer: whatever the bytes are, the table readers and the judges of what they read refuse with a
+// ConfigurationError or FitError or accept, and never crash. The first byte picks the dialect of a table of any make.
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
 
+#include "fit/fit_error.hpp"
+#include "fit/import_table.hpp"
 #include "fit/k_table.hpp"
 #include "fit/rcbenchmark_csv.hpp"
-#include "fit/uiuc_table.hpp"
 #include "profiles/configuration_error.hpp"
+#include "results/steps_csv.hpp"
 
 namespace {
 
@@ -15,6 +18,7 @@ void accept_or_refuse(Read read) {
   try {
     (void)read();
   } catch (const kphi::ConfigurationError&) {
+  } catch (const kphi::fit::FitError&) {
   }
 }
 
@@ -22,9 +26,19 @@ void accept_or_refuse(Read read) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace kphi::fit;
-  const std::string_view text(reinterpret_cast<const char*>(data), size);
-  accept_or_refuse([&] { return select_rows(read_rcbenchmark(text, "log.csv")); });
-  accept_or_refuse([&] { return read_uiuc(text, "apc_5x4_static.txt"); });
+  if (size == 0) return 0;
+  const std::string_view text(reinterpret_cast<const char*>(data + 1), size - 1);
+  const CsvDialect dialect{data[0] % 4 == 0 ? ';' : data[0] % 4 == 1 ? '\t' : '\0', data[0] % 8 >= 4};
+  accept_or_refuse([&] { return audit(read_rcbenchmark(text, "log.csv"), {}); });
+  accept_or_refuse([&] { return import_table(text, "apc_5x4_static.txt", {}); });
+  accept_or_refuse([&] {
+    ImportOptions options;
+    options.columns = {{Role::thrust, "T", "N"}, {Role::speed, "n", "RPM"}, {Role::electrical_speed, "e", "RPM"}};
+    options.dialect = dialect;
+    return summary_of(import_table(text, "own.csv", options).table);
+  });
+  accept_or_refuse([&] { return parse_column_role(text); });
   accept_or_refuse([&] { return read_k_table(text, "K.csv"); });
+  accept_or_refuse([&] { return kphi::results::parse_steps(text, "steps.csv"); });
   return 0;
 }

@@ -1,0 +1,18 @@
+// What an analysis adds to the report: the budget, the tests, the torque, the claims.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "fit/analysis.hpp"
+#include "fit/claims.hpp"
+
+namespace kphi::fit {
+
+/// Sections of HTML (well-formed XML), each with its heading; what an analysis does not hold has none.
+[[nodiscard]] std::string analysis_sections(const Analysis& analysis);
+
+/// Claim, value found, interval, verdict.
+[[nodiscard]] std::string claims_section(std::span<const Claim> claims);
+
+}  // namespace kphi::fit

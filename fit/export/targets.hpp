@@ -1,0 +1,41 @@
+// The coefficients in the words of other programs. Each target says what it cannot hold, and why.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "compensation/file/coefficient_file.hpp"
+
+namespace kphi::fit {
+
+struct ExportOptions {
+  double phi_deg = 0;                     ///< for targets with one constant per motor
+  std::optional<double> speed_max_rpm{};  ///< at full output; default: the highest speed of the file
+  int motors = 4;
+};
+
+struct Export {
+  std::string text;               ///< bytes, for mcap
+  std::vector<std::string> lost;  ///< what the target cannot hold, with the reason; one line each
+};
+
+/// Throws ConfigurationError for an option that the file cannot answer (φ outside what was measured, no speed known).
+[[nodiscard]] Export to_agilicious(const compensation::Coefficients& file, const ExportOptions& options);
+[[nodiscard]] Export to_px4(const compensation::Coefficients& file, const ExportOptions& options);
+[[nodiscard]] Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& options);
+[[nodiscard]] Export to_ros2(const compensation::Coefficients& file, const ExportOptions& options);
+[[nodiscard]] Export to_header(const compensation::Coefficients& file, const ExportOptions& options);
+/// phi_deg,k,u_k first: `kphi fit` takes the table again.
+[[nodiscard]] Export to_csv(const compensation::Coefficients& file, const ExportOptions& options);
+[[nodiscard]] Export to_mcap(const compensation::Coefficients& file, const ExportOptions& options);
+
+struct Target {
+  const char* name;
+  const char* what;
+  Export (*write)(const compensation::Coefficients&, const ExportOptions&);
+};
+[[nodiscard]] std::span<const Target> targets();
+
+}  // namespace kphi::fit

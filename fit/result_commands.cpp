@@ -1,0 +1,130 @@
+#include "fit/result_commands.hpp"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fit/compare.hpp"
+#include "fit/export/run_export.hpp"
+#include "fit/export/targets.hpp"
+#include "fit/on_run.hpp"
+#include "results/file_layer.hpp"
+#include "results/record_error.hpp"
+#include "results/run_reader.hpp"
+
+namespace kphi::fit {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CompareRequest {
+  std::string a, b, expect;
+  bool json = false;
+};
+
+void run_compare(const CompareRequest& request, int& exit_code) {
+  const Comparison comparison = compare(load_result(request.a), load_result(request.b));
+  fmt::print("{}", request.json ? comparison_json(comparison) : comparison_table(comparison));
+  if (!request.expect.empty() && request.expect != word(comparison.verdict)) {
+    fmt::print(stderr, "kphi: expected that they {}, found: {}\n", request.expect, word(comparison.verdict));
+    exit_code = kDataRejected;
+  }
+}
+
+struct ExportRequest {
+  std::string file, to, out;
+  ExportOptions options;
+};
+
+void tell_lost(const std::vector<std::string>& lost) {
+  for (const std::string& line : lost) fmt::print(stderr, "not held  {}\n", line);
+}
+
+void refuse_terminal(const ExportRequest& request) {
+  if (request.out.empty() && request.to == "mcap" && ::isatty(STDOUT_FILENO) == 1)
+    throw ConfigurationError("mcap is no text; name a file with --out or send it into a pipe");
+}
+
+void export_run(const ExportRequest& request) {
+  if (request.to != "csv" && request.to != "mcap")
+    throw ConfigurationError(request.file +
+                             ": a run holds samples; they go --to csv or mcap. Coefficients come from `kphi fit`");
+  const results::RunRecording run = results::read_run(request.file);
+  std::ofstream file;
+  if (!request.out.empty()) file.open(request.out, std::ios::binary | std::ios::trunc);
+  std::ostream& out = request.out.empty() ? std::cout : file;
+  tell_lost(request.to == "csv" ? run_to_csv(run, out) : run_to_mcap(run, out));
+  out.flush();
+  if (!out) throw results::RecordError((request.out.empty() ? "stdout" : request.out) + ": could not be written");
+}
+
+void export_coefficients(const ExportRequest& request) {
+  const fs::path place(request.file);
+  const fs::path file = fs::is_directory(place) ? place / "coefficients.yaml" : place;
+  const compensation::Coefficients coefficients = compensation::load_coefficients(file.string());
+  for (const Target& target : targets()) {
+    if (request.to != target.name) continue;
+    const Export result = target.write(coefficients, request.options);
+    results::MemoryOnlySync files;  // made again at any time
+    if (request.out.empty()) std::fwrite(result.text.data(), 1, result.text.size(), stdout);
+    if (!request.out.empty()) results::write_text(request.out, result.text, files);
+    tell_lost(result.lost);
+  }
+}
+
+void run_export(const ExportRequest& request) {
+  refuse_terminal(request);
+  if (fs::path(request.file).extension() == ".h5") {
+    export_run(request);
+  } else {
+    export_coefficients(request);
+  }
+}
+
+}  // namespace
+
+void add_compare(CLI::App& app, int& exit_code) {
+  auto request = std::make_shared<CompareRequest>();
+  CLI::App* command = app.add_subcommand("compare", "two results: differences, their uncertainties, a verdict");
+  command->add_option("A", request->a, "coefficients.yaml, campaign folder, or steps.csv without occlusions")
+      ->required()
+      ->check(CLI::ExistingPath);
+  command->add_option("B", request->b, "the other")->required()->check(CLI::ExistingPath);
+  command->add_option("--expect", request->expect, "exit with 5 when the verdict is another")
+      ->check(CLI::IsMember({"agree", "differ"}));
+  command->add_flag("--json", request->json, "the comparison as JSON on stdout");
+  command->footer("kphi compare results/<monday> results/<tuesday> --expect agree");
+  on_run(*command, exit_code, [request, &exit_code] { run_compare(*request, exit_code); });
+}
+
+void add_export(CLI::App& app, int& exit_code) {
+  auto request = std::make_shared<ExportRequest>();
+  CLI::App* command = app.add_subcommand("export", "coefficients for a flight stack, samples for a viewer");
+  command->add_option("FILE", request->file, "coefficients.yaml, campaign folder, or a run (RUN.h5, to csv or mcap)")
+      ->required()
+      ->check(CLI::ExistingPath);
+  std::vector<std::string> names;
+  std::string footer;
+  for (const Target& target : targets()) {
+    names.emplace_back(target.name);
+    footer += fmt::format("  {:<11} {}\n", target.name, target.what);
+  }
+  command->add_option("--to", request->to, "the target")->required()->check(CLI::IsMember(names));
+  command->add_option("--out", request->out, "file (default: stdout)");
+  command->add_option("--phi-deg", request->options.phi_deg, "for targets with one constant per motor (default 0)");
+  command->add_option("--speed-max-rpm", request->options.speed_max_rpm, "at full output (default: the file's)")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--motors", request->options.motors, "for px4 and gazebo (default 4)")->check(CLI::Range(1, 12));
+  command->footer(
+      "Targets:\n" + footer +
+      "\nWhat a target cannot hold is told on stderr.\n"
+      "ArduPilot's MOT_THST_EXPO and Betaflight's thrust_linear are shapes of the command, not k: no export.");
+  on_run(*command, exit_code, [request] { run_export(*request); });
+}
+
+}  // namespace kphi::fit

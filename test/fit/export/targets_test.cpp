@@ -1,0 +1,193 @@
+#include "fit/export/targets.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <pugixml.hpp>
+#include <set>
+#include <sstream>
+
+#include "fit/coefficients.hpp"
+#include "fit/k_table.hpp"
+#include "profiles/configuration_error.hpp"
+#include "test/fit/campaign_steps.hpp"
+#include "test/fit/export/outside_reader.hpp"
+#include "test/temporary_folder.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using test::read_with;
+using test::TemporaryFolder;
+using test::works;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+const std::string kPython = "/usr/bin/python3";  // Debian's, which sees Debian's modules
+
+/// A name made to break out of comments and quotes.
+compensation::Coefficients coefficients(const std::string& name = "Tom's \"5x4\" -- */ <b> \\") {
+  Provenance provenance;
+  provenance.propeller_name = name;
+  provenance.tool_version = "0.1.0";
+  provenance.measured_utc = "2021-05-30T00:00:00Z";
+  provenance.runs = {{"runs/5x3_phi000_rep1.h5", std::string(64, 'a'), "", std::nullopt}};
+  return compensation::parse_coefficients(format_coefficients(identify(campaign_steps()), provenance), "c.yaml");
+}
+
+nlohmann::json yaml_as_json(const std::string& text) {
+  const TemporaryFolder folder;
+  test::write_file(folder.path() / "file.yaml", text);
+  const auto reading =
+      read_with(kPython + " -c 'import json,sys,yaml; print(json.dumps(yaml.safe_load(open(sys.argv[1]))))' " +
+                (folder.path() / "file.yaml").string());
+  EXPECT_EQ(reading.status, 0) << reading.out;
+  return nlohmann::json::parse(reading.out);
+}
+
+class Yaml : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!works(kPython + " -c 'import yaml'")) GTEST_SKIP() << "apt install python3-yaml";
+  }
+};
+
+TEST_F(Yaml, OfAgiliciousIsReadByPython) {
+  const auto file = coefficients();
+  const auto map = yaml_as_json(to_agilicious(file, {}).text);
+  EXPECT_EQ(map["thrust_map"][0].get<double>(), file.thrust_coefficient.value()) << "to the last bit, and as a float";
+  EXPECT_EQ(map["thrust_map"][1], 0.0);
+  EXPECT_EQ(map["motor_omega_max"].get<double>(), file.fastest_speed->value());
+  const auto covered = yaml_as_json(to_agilicious(file, {.phi_deg = 180}).text);
+  EXPECT_NEAR(covered["thrust_map"][0].get<double>(), CampaignTruth{}.k(180), 5e-9);
+}
+
+TEST_F(Yaml, OfRos2IsReadByPythonWithDoublesAndListsOfOneType) {
+  const auto file = coefficients();
+  const auto all = yaml_as_json(to_ros2(file, {}).text);
+  const auto& parameters = all["/**"]["ros__parameters"]["kphi"];
+  EXPECT_EQ(parameters["propeller"], "5x3");
+  EXPECT_EQ(parameters["thrust_coefficient_n_s2_per_rad2"].get<double>(), file.thrust_coefficient.value());
+  EXPECT_EQ(parameters["line_slope_n_s2_per_rad3"].get<double>(), file.line.slope_per_rad);
+  ASSERT_EQ(parameters["phi_deg"].size(), 5u);
+  for (const auto& [key, value] : parameters.items()) {
+    if (key == "propeller" || key == "overlap") continue;
+    for (const auto& number : value.is_array() ? value : nlohmann::json::array({value}))
+      EXPECT_TRUE(number.is_number_float()) << key << " " << number;
+  }
+  EXPECT_THAT(to_ros2(file, {}).lost, Contains(HasSubstr("air_density"))) << "what is unknown is said, not invented";
+}
+
+TEST(Px4, ParametersAreForceAtFullOutput) {
+  const auto file = coefficients();
+  const Export result = to_px4(file, {.speed_max_rpm = 20000, .motors = 3});
+  std::istringstream lines(result.text);
+  std::map<std::string, double> values;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with('#')) continue;
+    int vehicle = 0, component = 0, type = 0;
+    std::string name;
+    double value = 0;
+    std::istringstream(line) >> vehicle >> component >> name >> value >> type;
+    EXPECT_EQ(type, 9);
+    EXPECT_LE(name.size(), 16u) << "MAVLink's limit";
+    values[name] = value;
+  }
+  ASSERT_EQ(values.size(), 4u);
+  const double full = from_rpm(20000).value();
+  EXPECT_NEAR(values["CA_ROTOR2_CT"], file.thrust_coefficient.value() * full * full, 1e-9);
+  EXPECT_EQ(values["THR_MDL_FAC"], 1);
+  EXPECT_THAT(result.lost, Contains(HasSubstr("one constant per motor and cannot change it in flight")));
+  EXPECT_THROW((void)to_px4(file, {.speed_max_rpm = 200000}), ConfigurationError) << "above the parameter's range";
+}
+
+TEST(Gazebo, IsReadByXmllint) {
+  if (!works("xmllint --version")) GTEST_SKIP() << "apt install libxml2-utils";
+  const TemporaryFolder folder;
+  const auto file = coefficients();
+  const std::string path = (folder.path() / "motors.sdf").string();
+  test::write_file(path, to_gazebo(file, {}).text);
+  const auto read = [&](const std::string& xpath) {
+    const auto reading = read_with("xmllint --xpath 'string(" + xpath + ")' " + path);
+    EXPECT_EQ(reading.status, 0) << reading.out;
+    return std::strtod(reading.out.c_str(), nullptr);
+  };
+  EXPECT_EQ(read("/sdf/model/plugin[3]/motorConstant"), file.thrust_coefficient.value());
+  EXPECT_EQ(read("/sdf/model/plugin[1]/maxRotVelocity"), file.fastest_speed->value());
+  EXPECT_EQ(read("count(//plugin)"), 4);
+}
+
+TEST(Header, IsReadByACompilerAndAgreesWithTheLibraryThatFlies) {
+  if (!works("c++ --version")) GTEST_SKIP() << "no compiler";
+  const TemporaryFolder folder;
+  const auto file = coefficients();
+  test::write_file(folder.path() / "k.hpp", to_header(file, {}).text);
+  test::write_file(folder.path() / "main.cpp", R"(#include "k.hpp"
+#include <cstdio>
+static_assert(kphi_5x3::scaling_factor(0.0) == 1.0, "");
+static_assert(kphi_5x3::scaling_factor(100.0) == 0.1, "");
+int main() {
+  for (int degrees = 0; degrees <= 360; degrees += 15)
+    std::printf("%.17g\n", kphi_5x3::scaling_factor(degrees * 3.14159265358979323846 / 180));
+  std::printf("%.17g\n", kphi_5x3::squared_speed(5.0, 1.0));
+}
+)");
+  const std::string binary = (folder.path() / "main").string();
+  const auto compiled =
+      read_with("c++ -std=c++14 -Wall -Wextra -Wpedantic -Werror -o " + binary + " " + binary + ".cpp");
+  ASSERT_EQ(compiled.status, 0) << compiled.out;
+  const auto ran = read_with(binary);
+  std::istringstream numbers(ran.out);
+  const auto line = compensation::thrust_line(file);
+  double value = 0;
+  for (int degrees = 0; degrees <= 360; degrees += 15) {
+    numbers >> value;
+    EXPECT_NEAR(value, line.scaling_factor(from_degrees(degrees)), 1e-15) << degrees;
+  }
+  numbers >> value;
+  EXPECT_NEAR(value, 5.0 / (file.thrust_coefficient.value() * line.scaling_factor(Radians(1.0))), 1e-6);
+}
+
+TEST(CsvExport, IsFittedAgainToTheSameCoefficients) {
+  const auto file = coefficients();
+  const std::string text = to_csv(file, {}).text;
+  ASSERT_TRUE(is_k_table(text));
+  const auto points = read_k_table(text, "K.csv");
+  ASSERT_EQ(points.size(), 5u);
+  const LineFit line = fit_line(points);
+  EXPECT_NEAR(line.slope_per_deg / (file.line.slope_per_rad * kPi / 180), 1, 1e-9);
+  EXPECT_EQ(line.K_T, file.thrust_coefficient.value());
+}
+
+TEST(Targets, SayWhatTheyCannotHold) {
+  const auto file = coefficients();
+  std::set<std::string> names;
+  for (const Target& target : targets()) {
+    SCOPED_TRACE(target.name);
+    EXPECT_TRUE(names.insert(target.name).second);
+    const Export result = target.write(file, {});
+    EXPECT_FALSE(result.text.empty());
+    EXPECT_FALSE(result.lost.empty());
+    for (const std::string& reason : result.lost) EXPECT_THAT(reason, HasSubstr(": ")) << "what, and why";
+  }
+  EXPECT_EQ(names, (std::set<std::string>{"agilicious", "px4", "gazebo", "ros2", "header", "csv", "mcap"}));
+}
+
+TEST(Targets, RefuseAnOcclusionThatWasNotMeasured) {
+  for (const auto write : {to_agilicious, to_px4, to_gazebo}) {
+    EXPECT_THROW((void)write(coefficients(), {.phi_deg = 300}), ConfigurationError);
+    EXPECT_THROW((void)write(coefficients(), {.phi_deg = -1}), ConfigurationError);
+  }
+}
+
+TEST(Targets, ThatNeedASpeedSaySo) {
+  auto file = coefficients();
+  file.fastest_speed.reset();
+  EXPECT_THROW((void)to_px4(file, {}), ConfigurationError);
+  EXPECT_NO_THROW((void)to_agilicious(file, {}));
+}
+
+}  // namespace
+}  // namespace kphi::fit
