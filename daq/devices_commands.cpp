@@ -238,7 +238,12 @@ int devices(const Asked& asked) {
   std::vector<Answer> answers;
   answers.push_back(ask_load_cell(bench ? bench->netbox : factory, clock, probe_settings(asked, bench)));
   if (bench && bench->supply) answers.push_back(ask_supply(*bench->supply, clock));
+  const bool unpowered = bench && bench->supply && answers.back().details.value("output", true) == false;
   if (bench) answers.push_back(ask_motor(bench->iq, clock, asked.clock_gain_s));
+  if (unpowered && !answers.back().answers) {
+    answers.back().wanted = false;
+    answers.back().lines = {"note: its supply's output is off, so it cannot answer; kphi run switches it on"};
+  }
   ask_usb(bench, answers);
   print(answers, asked.json);
   if (!bench) fmt::print(stderr, "kphi: no bench file: only the Net Box's factory address was asked; use --bench\n");

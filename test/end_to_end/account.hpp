@@ -34,6 +34,13 @@ struct Account {
     }
     return last;
   }
+  /// The first coast after the last speed; that of the last speed without one.
+  [[nodiscard]] double coast_told_at() const {
+    for (const Command& command : commands) {
+      if (command.mode == "coast" && command.at > last_speed_at()) return command.at;
+    }
+    return last_speed_at();
+  }
 };
 
 inline Account account_of(const std::string& log) {

@@ -73,9 +73,9 @@ void close_the_pipes(const Scene& scene) { scene.run.close_pipes(); }
 
 /// The moment from which the milliseconds count.
 enum class Cause {
-  deed,         ///< what the test does in the second step
-  script,       ///< the fault of the bench
-  end_of_ramp,  ///< the last speed that is commanded, where the ramp down ends
+  deed,          ///< what the test does in the second step
+  script,        ///< the fault of the bench
+  end_of_steps,  ///< where a ramp down ends; on a supply of the bench, which could not sink it, the coast
 };
 
 struct Way {
@@ -104,7 +104,7 @@ constexpr Way of_supply(const char* name, const char* fault, const char* words, 
 
 constexpr auto kDeed = Cause::deed;
 constexpr auto kScript = Cause::script;
-constexpr auto kEnd = Cause::end_of_ramp;
+constexpr auto kEnd = Cause::end_of_steps;
 const Way kWays[] = {
     {"NormalEnd", kEnd, nullptr, "", 0, "next: kphi fit"},
     of_supply("SupplyOverVoltage", "kind=supply_trip code=1", "over-voltage protection has switched it off"),
@@ -184,7 +184,8 @@ Outcome take(const Way& way, double fault_at_s) {
   EXPECT_EQ(bench.process().wait(), 0) << bench.process().err();
   outcome.account = account_of(bytes_of(bench.path("wire.jsonl")));
   if (way.cause == Cause::script) outcome.cause_ms = 1e3 * fault_at_s;
-  if (way.cause == Cause::end_of_ramp) outcome.cause_ms = outcome.account.last_speed_at() + 1;
+  if (way.cause == Cause::end_of_steps)
+    outcome.cause_ms = way.has_supply() ? outcome.account.coast_told_at() : outcome.account.last_speed_at() + 1;
   return outcome;
 }
 
