@@ -66,9 +66,10 @@ double quietest_quarter(std::span<const double> values) {
   return least;
 }
 
-bool steady(const Line& line, double bins, const Noise& noise) {
+/// `variance_95`: of the noise, times the square of Student's t.
+bool steady(const Line& line, double bins, double variance_95) {
   const double change = std::abs(line.slope()) * bins;
-  const double certain = student_95(noise.freedom) * std::sqrt(noise.variance / line.spread()) * bins;
+  const double certain = std::sqrt(variance_95 / line.spread()) * bins;
   return change <= std::max(certain, kSteadyShare * std::abs(line.mean()));
 }
 
@@ -82,10 +83,11 @@ Settling settle(std::span<const double> thrust, std::size_t first, std::size_t p
   const auto tail = thrust.subspan(n - least);
   const Noise noise = noise_about(line_through(tail), tail);
   if (!(noise.freedom > 0)) return {n - least, false};
+  const double t = student_95(noise.freedom);
   const auto stride = std::max<std::size_t>(1, static_cast<std::size_t>(static_cast<double>(planned) / kSearches));
   for (std::size_t begin = first; begin + least <= n; begin += stride) {
     const auto rest = thrust.subspan(begin);
-    if (steady(line_through(rest), static_cast<double>(rest.size()), noise)) return {begin, true};
+    if (steady(line_through(rest), static_cast<double>(rest.size()), t * t * noise.variance)) return {begin, true};
   }
   return {n - least, false};
 }

@@ -1,0 +1,157 @@
+// What it costs to turn a recorded campaign into step means again: `kphi replay` against the same by numpy and h5py
+// (replay_peer.py), both as processes, interleaved, files in the page cache. First that both say the same.
+// Usage: kphi_replay_bench [runs [pairs]]; 15 runs are 8.4 million samples.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <sstream>
+#include <vector>
+
+#include "daq/reduction.hpp"
+#include "daq/replay_commands.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/steps_csv.hpp"
+#include "test/results/synthetic_run.hpp"
+
+namespace {
+
+using namespace kphi;
+using results::CampaignFolder;
+using results::StepMean;
+
+/// The paper's run: 40 steps of 2 s at 7 kHz.
+results::RunRecording paper_run(int repetition) {
+  results::test::Truth truth;
+  truth.rate_hz = 7000;
+  truth.ft_stride = 1;
+  truth.speeds.clear();
+  for (int i = 0; i < 40; ++i) truth.speeds.push_back((100 + 19000.0 * i / 39) * M_PI / 30);
+  truth.k = 1.55e-6;
+  truth.zero_s = 2;
+  truth.noise_n = 0.025;
+  truth.correlated_n = 0.005;
+  truth.speed_noise_rad_s = 0.2;
+  truth.thrust_delay_s = 0.04;
+  truth.reading_phase_s = 0.007;
+  truth.records_per_datagram = 40;
+  truth.seed = static_cast<std::uint64_t>(repetition);
+  results::RunRecording run = results::test::make_run(truth);
+  run.header.repetition = repetition;
+  return run;
+}
+
+std::size_t make_campaign(const CampaignFolder& folder, int runs, std::vector<StepMean>& steps) {
+  std::size_t samples = 0;
+  for (int repetition = 1; repetition <= runs; ++repetition) {
+    const results::RunRecording run = paper_run(repetition);
+    results::test::write_run(folder.run("5x3", 90, repetition), run);
+    const auto of_run = daq::reduce(run);
+    steps.insert(steps.end(), of_run.begin(), of_run.end());
+    samples += run.load_cell.size();
+  }
+  results::write_steps(folder.steps(), steps);
+  return samples;
+}
+
+struct Cost {
+  double wall_s = 0, cpu_s = 0;
+  int code = 0;
+};
+
+/// A child process with its output in `out`; `work` gives the exit code, or becomes another program.
+template <class Work>
+Cost cost_of(const std::string& out, Work&& work) {
+  const auto begun = std::chrono::steady_clock::now();
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const int file = ::open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
+    ::dup2(file, STDOUT_FILENO);
+    const int code = work();
+    std::fflush(stdout);
+    ::_exit(code);
+  }
+  int status = 0;
+  rusage used{};
+  ::wait4(child, &status, 0, &used);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return {std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(),
+          seconds(used.ru_utime) + seconds(used.ru_stime), WIFEXITED(status) ? WEXITSTATUS(status) : -1};
+}
+
+int replay(const std::string& folder) {
+  CLI::App app;
+  int code = 0;
+  daq::add_replay(app, code);
+  app.parse("replay " + folder);
+  return code;
+}
+
+int peer(const std::string& folder) {
+  const std::string script = std::string(KPHI_SOURCE_DIR) + "/test/bench/replay_peer.py";
+  ::execl("/usr/bin/python3", "python3", script.c_str(), folder.c_str(), nullptr);
+  return 127;
+}
+
+/// Largest relative difference of thrust between the two, over the steps; infinite when the peer has not as many.
+double difference(const std::vector<StepMean>& steps, const std::string& peer_csv) {
+  std::stringstream text(peer_csv);
+  std::string line;
+  std::getline(text, line);
+  double largest = 0;
+  std::size_t i = 0;
+  for (; std::getline(text, line) && i < steps.size(); ++i) {
+    double speed = 0, thrust = 0;
+    std::sscanf(line.c_str(), "%lf,%lf", &speed, &thrust);
+    if (steps[i].thrust_n > 0.1) {
+      largest =
+          std::max({largest, std::abs(thrust / steps[i].thrust_n - 1), std::abs(speed / steps[i].speed_rad_s - 1)});
+    }
+  }
+  return i == steps.size() ? largest : INFINITY;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int runs = argc > 1 && std::atoi(argv[1]) > 0 ? std::atoi(argv[1]) : 15;
+  const int pairs = argc > 2 ? std::atoi(argv[2]) : 7;
+  const results::test::TemporaryFolder place;
+  const auto folder = CampaignFolder::create(place.path(), "bench", "replay");
+  std::vector<StepMean> steps;
+  const std::size_t samples = make_campaign(folder, runs, steps);
+  const std::string ours = (place.path() / "ours.csv").string(), theirs = (place.path() / "theirs.csv").string();
+  std::vector<double> wall, cpu;
+  Cost a, b;
+  for (int i = 0; i < pairs; ++i) {
+    a = cost_of(ours, [&] { return replay(folder.path().string()); });
+    b = cost_of(theirs, [&] { return peer(folder.path().string()); });
+    if (b.code != 0) {
+      fmt::print("replay: the peer did not run (python3-numpy, python3-h5py?)\n");
+      return 1;
+    }
+    wall.push_back(b.wall_s / a.wall_s);
+    cpu.push_back(b.cpu_s / a.cpu_s);
+  }
+  const bool same = a.code == 0 && results::read_text(ours) == results::read_text(folder.steps());
+  fmt::print(
+      "replay of {} samples ({} runs): step means byte-identical: {}; numpy + h5py / kphi: {:.1f} (goal 10; worst pair "
+      "{:.1f}), CPU {:.1f}; last pair {:.2f} s / {:.2f} s; thrust and speed differ by {:.1e} at most\n",
+      samples, runs, same ? "yes" : "NO", median(wall), *std::min_element(wall.begin(), wall.end()), median(cpu),
+      b.wall_s, a.wall_s, difference(steps, results::read_text(theirs)));
+  return same ? 0 : 1;
+}
