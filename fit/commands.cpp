@@ -218,6 +218,8 @@ AnalysisOptions analysis_options(const FitRequest& request, const Input& input) 
   AnalysisOptions options;
   if (const auto& clock = input.provenance.clock) options.bench.motor_clock = clock->u_gain;
   for (const std::string& text : request.uncertainties) set_uncertainty(options.bench, text);
+  const bool nobody_looks = request.no_report && !request.json;
+  if (nobody_looks) options.bootstrap.resamples = 0;
   return options;
 }
 
@@ -252,8 +254,10 @@ std::vector<Claim> family_claims(const FitRequest& request, const Identification
 
 void print_claims(const std::vector<Claim>& claims) {
   for (const Claim& claim : claims) {
-    fmt::print("{:<11} {}: {:.4g} ({:.4g} to {:.4g}) {}\n", name_of(claim.verdict), claim.statement, claim.value,
-               claim.lower, claim.upper, claim.unit);
+    fmt::print("{:<11} {}", name_of(claim.verdict), claim.statement);
+    if (claim.verdict != Verdict::not_tested)
+      fmt::print(": {:.4g} ({:.4g} to {:.4g}) {}", claim.value, claim.lower, claim.upper, claim.unit);
+    fmt::print("\n");
   }
 }
 

@@ -87,7 +87,12 @@ OcclusionCoefficient coefficient(double phi_deg, std::vector<StepMean> steps, co
 AngleScatter scatter_of(const OcclusionCoefficient& row, Estimator estimator, double at_speed) {
   if (estimator != Estimator::at_speed) {
     auto runs = sums_of_runs(row.phi_deg, row.measured, *row.fit, row.k);
-    const WithinRuns within = scatter_within_runs(row.measured, *row.fit, row.k, runs);
+    WithinRuns within = scatter_within_runs(row.measured, *row.fit, row.k, runs);
+    if (estimator != Estimator::through_origin) {
+      // The other terms of the map are fitted too, and k takes part in their error.
+      within.variance = row.standard_error * row.standard_error * static_cast<double>(runs.size());
+      within.freedom = static_cast<double>(row.fit->n) - (estimator == Estimator::with_offset ? 2 : 3);
+    }
     return scatter_of_angle(row.k, std::move(runs), within);
   }
   ThrustFit at_level = *row.fit;

@@ -25,13 +25,13 @@ void solve_exactly(ceres::Problem& problem, const char* what) {
   if (!summary.IsSolutionUsable()) throw FitError(fmt::format("{}: no solution ({})", what, summary.message));
 }
 
-void solve_robustly(ceres::Problem& problem, const char* what) {
+void solve_robustly(ceres::Problem& problem, const char* what, double tolerance) {
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
   options.logging_type = ceres::SILENT;
   options.num_threads = 1;
   options.max_num_iterations = 200;
-  options.function_tolerance = 1e-14;
+  options.function_tolerance = tolerance;
   options.gradient_tolerance = 1e-14;
   options.parameter_tolerance = 1e-11;
   ceres::Solver::Summary summary;

@@ -12,8 +12,9 @@ namespace kphi::fit {
 /// Throws FitError, naming `what`, when Ceres does not converge.
 void solve_exactly(ceres::Problem& problem, const char* what);
 
-/// The same for problems with a robust loss: iterates until nothing moves any more.
-void solve_robustly(ceres::Problem& problem, const char* what);
+/// The same for problems that need iterations, such as those with a robust loss, until nothing moves any more.
+/// `tolerance`: of the cost, relative.
+void solve_robustly(ceres::Problem& problem, const char* what, double tolerance = 1e-14);
 
 /// Covariance (JᵀJ)⁻¹ between the listed scalar blocks, row by row, losses left aside. Throws FitError, naming `what`,
 /// if J is rank deficient.

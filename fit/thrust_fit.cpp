@@ -124,7 +124,8 @@ class Fitter {
  public:
   Fitter(const Scale& scale, std::size_t terms) : scale_(scale), terms_(terms) {}
 
-  void solve(const std::vector<Point>& points, Loss loss) {
+  /// A `coarse` solution is one to start from, and to take the scale of the next one from.
+  void solve(const std::vector<Point>& points, Loss loss, bool coarse = false) {
     std::vector<double> residuals;
     for (const Point& point : points) residuals.push_back(residual(point));
     const double sigma = loss == Loss::none ? 0 : 1.4826 * median_absolute(residuals);
@@ -140,7 +141,11 @@ class Fitter {
     }
     if (terms_ < 2) problem_->SetParameterBlockConstant(&offset_);
     if (terms_ < 3) problem_->SetParameterBlockConstant(&linear_);
-    loss_ ? solve_robustly(*problem_, "thrust fit") : solve_exactly(*problem_, "thrust fit");
+    if (loss_) {
+      solve_robustly(*problem_, "thrust fit", coarse ? 1e-4 : 1e-14);
+    } else {
+      solve_exactly(*problem_, "thrust fit");
+    }
     residuals_.clear();
     for (const Point& point : points) residuals_.push_back(residual(point));
   }
@@ -248,12 +253,12 @@ ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& opti
   require_distinct_speeds(fit.points, terms);
   if (options.weighting != Weighting::equal) weigh(fit.points, options.weighting, nullptr);
   Fitter fitter(scale_of(fit.points), terms);
-  const auto solve = [&](Loss loss) {
-    fitter.solve(fit.points, loss);
+  const auto solve = [&](Loss loss, bool coarse = false) {
+    fitter.solve(fit.points, loss, coarse);
     fit.parameters = fitter.parameters();
   };
   solve(Loss::none);
-  if (options.loss != Loss::none) solve(Loss::huber);  // a convex problem leads the others to the right minimum
+  if (options.loss != Loss::none) solve(Loss::huber, true);  // a convex problem leads the others to the right minimum
   constexpr int kReweightings = 3;
   for (int i = 0; i < kReweightings && options.weighting == Weighting::effective_variance; ++i) {
     weigh(fit.points, options.weighting, &fit.parameters);

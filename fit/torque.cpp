@@ -1,5 +1,6 @@
 #include "fit/torque.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "fit/fit_error.hpp"
@@ -48,7 +49,7 @@ std::vector<TorqueCoefficient> identify_torque(std::span<const results::StepMean
                repeatability.repeated ? freedom : static_cast<double>(table[i].fit->n - 1)};
     row.share = table[i].k / table.front().k;
     row.share_u = i == 0 ? 0 : std::abs(row.share) * std::hypot(relative(row.k_q), relative(result.front().k_q));
-    row.drag_per_thrust_m = {row.k_q.value / k[i].value, 0, freedom};
+    row.drag_per_thrust_m = {row.k_q.value / k[i].value, 0, std::min(row.k_q.freedom, k[i].freedom)};
     row.drag_per_thrust_m.u = std::abs(row.drag_per_thrust_m.value) * std::hypot(relative(row.k_q), relative(k[i]));
     result.push_back(row);
   }

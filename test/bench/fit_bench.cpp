@@ -81,7 +81,7 @@ int main() {
   const std::string peer = fmt::format("/usr/bin/python3 {}/test/bench/fit_peer.py", KPHI_SOURCE_DIR);
   setenv("OPENBLAS_NUM_THREADS", "1", 1);
   const double ours =
-      fastest(fmt::format("{} fit {} --loss huber --no-report --json >/dev/null 2>&1", KPHI_PROGRAM, steps), 7);
+      fastest(fmt::format("{} fit {} --loss huber --no-report >/dev/null 2>&1", KPHI_PROGRAM, steps), 7);
   const double theirs = fastest(fmt::format("{} fit {} >/dev/null", peer, steps), 3);
   fmt::print(
       "fit of 600 rows, robust, covariance   kphi {:7.1f} ms   scipy {:7.1f} ms   {:5.1f} times   (15 wanted, 30 the "

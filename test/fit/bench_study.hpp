@@ -109,11 +109,14 @@ struct Coverage {
   [[nodiscard]] double bias() const { return error_sum / u_sum; }  ///< in standard uncertainties
 };
 
-inline std::map<std::string, Coverage> coverage_study(const StudyTruth& truth, unsigned campaigns) {
+inline std::map<std::string, Coverage> coverage_study(const StudyTruth& truth, unsigned campaigns,
+                                                      Estimator estimator = Estimator::through_origin) {
+  IdentificationOptions how;
+  how.estimator = estimator;
   std::map<std::string, Coverage> table;
   for (unsigned seed = 1; seed <= campaigns; ++seed) {
     const StudyCampaign campaign = study_campaign(truth, seed);
-    const Identification found = identify(campaign.steps);
+    const Identification found = identify(campaign.steps, how);
     const Analysis analysis = analyse(found, study_options(truth, campaign));
     const double air = campaign.density / kStandardAirKgM3;
     for (std::size_t i = 0; i < found.table.size(); ++i) {

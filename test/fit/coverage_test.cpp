@@ -18,6 +18,15 @@ TEST(Coverage, IntervalsOfAHundredCampaignsHoldTheTruth) {
   EXPECT_LE(share, 99);
 }
 
+TEST(Coverage, OfTheOtherEstimatorsIsNoLess) {
+  for (const Estimator estimator : {Estimator::with_offset, Estimator::polynomial, Estimator::at_speed}) {
+    double share = 0;
+    const auto table = coverage_study({}, 60, estimator);
+    for (const auto& [quantity, coverage] : table) share += coverage.share() / static_cast<double>(table.size());
+    EXPECT_GE(share, 91) << name_of(estimator);
+  }
+}
+
 TEST(Coverage, ABentTruthIsReported) {
   StudyTruth bent;
   bent.bend = 0.03;
