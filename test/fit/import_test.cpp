@@ -53,7 +53,7 @@ TEST(Rcbenchmark, RefusesAFileWithoutUnitOrSpeedAtItsHeader) {
   EXPECT_THAT(refusal("Thrust (stone),Motor Optical Speed (RPM)\n1,2\n"),
               HasSubstr("none of N, mN, kN, gf, kgf, lbf, ozf"));
   EXPECT_THAT(refusal("Thrust (N)\n1\n"), HasSubstr("log.csv:1: neither"));
-  EXPECT_THAT(refusal("Thrust (N),Thrust (gf),Motor Optical Speed (RPM)\n1,1,1\n"), HasSubstr("two thrust columns"));
+  EXPECT_THAT(refusal("Thrust (N),Thrust (gf),Motor Optical Speed (RPM)\n1,1,1\n"), HasSubstr("two Thrust columns"));
   EXPECT_THAT(refusal("Thrust (N),Thrust (N),Motor Optical Speed (RPM)\n1,1,1\n"), HasSubstr("more than one column"));
   EXPECT_THAT(refusal(""), HasSubstr("log.csv:1"));
 }

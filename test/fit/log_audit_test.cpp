@@ -191,7 +191,7 @@ TEST(LogAudit, CountsIndependentRows) {
   const double memory = 0.9;
   std::vector<double> values{0};
   while (values.size() < 20000) values.push_back(memory * values.back() + noise(random));
-  EXPECT_NEAR(correlation_time(values), (1 + memory) / (1 - memory), 3) << "of a first-order process";
+  EXPECT_NEAR(correlation_time(values), (1 + memory) / (1 - memory), 5) << "of a first-order process";
   for (double& value : values) value = noise(random);
   EXPECT_NEAR(correlation_time(values), 1, 0.1);
   EXPECT_EQ(correlation_time({1, 1, 1, 1}), 1);
