@@ -178,7 +178,7 @@ TEST_F(FaultyCampaign, TellsWhatUnitsHaveToDoWithALimitThatWasPassed) {
 
 TEST_F(FaultyCampaign, DoubtsAllStepsOfARunDuringWhichTheZeroDrifted) {
   EXPECT_EQ(run("  - {at_s: 1.0, kind: zero_drift, amount: 1, tau_s: 1}\n").runs, 2);
-  for (const std::string& names : doubts(0)) EXPECT_EQ(names, "zero_drifted");
+  for (const std::string& names : doubts(0)) EXPECT_THAT(names, testing::StartsWith("zero_drifted"));
   EXPECT_THAT(said_.lines, Contains(AllOf(HasSubstr("its zero moved by 0.9"), HasSubstr("0.03 N are tolerated"))));
   expect_replay_agrees();
 }
