@@ -24,7 +24,7 @@ bool same(const NineFlights& a, const NineFlights& b) {
 }
 
 TEST(Study, IsTheSameForAnyNumberOfThreads) {
-  const std::vector<Draw> one = draws(5, 1), three = draws(5, 3);
+  const std::vector<Draw> one = draws(3, 1), three = draws(3, 3);
   for (std::size_t i = 0; i < one.size(); ++i) EXPECT_TRUE(same(one[i].flights, three[i].flights)) << i;
   EXPECT_FALSE(same(one[0].flights, one[1].flights));
   EXPECT_TRUE(same(draws(2, 2)[1].flights, one[1].flights)) << "a draw does not depend on how many there are";
@@ -32,7 +32,7 @@ TEST(Study, IsTheSameForAnyNumberOfThreads) {
 
 // The gates of 400 draws are in fly_study_test.cpp; these are those of a glance.
 TEST(Study, FindsCompensationBetterInAFewDraws) {
-  const Findings found = findings_of(draws(12, 2));
+  const Findings found = findings_of(draws(6, 2));
   EXPECT_LE(found.hover_z_ratio.p50, 0.45);
   EXPECT_LE(found.forward_ratio.p50, 0.7);
   EXPECT_GE(found.forward_better, 0.8);
