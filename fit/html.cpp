@@ -48,6 +48,8 @@ std::string_view escape_of(char c) {
 }
 
 void prefix_references(pugi::xml_node node, const std::string& prefix) {
+  // gnuplot numbers the curves of each panel anew, for a mouse that is not there.
+  if (std::string_view(node.attribute("id").value()).starts_with("gnuplot_plot_")) node.remove_attribute("id");
   for (pugi::xml_attribute attribute : node.attributes()) {
     const std::string_view name = attribute.name();
     const std::string value = attribute.value();

@@ -1,7 +1,7 @@
 // Where a SCPI instrument is, as a person writes it:
 //
 //     scpi-tcp:192.168.1.30:5025
-//     scpi-usb:1ab1:0e11            with :SERIAL or @PORT behind it if there are several
+//     scpi-usb:VVVV:PPPP            with :SERIAL or @PORT behind it if there are several
 #pragma once
 
 #include <memory>

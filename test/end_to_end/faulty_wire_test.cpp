@@ -123,7 +123,7 @@ class BadScript : public testing::Test {
 
 TEST_F(BadScript, IsRefusedByLineAndColumn) {
   refused_script("format: kphi-faults/1\nfaults:\n  - {at_s: 0, for_s: 1, kind: los}\n",
-                 ":3:31: no fault is called 'los'; there are loss, gilbert");
+                 ":3:31: no fault of the load cell is called 'los'; there are loss, gilbert");
   refused_script("format: kphi-faults/1\nfaults:\n  - at_s: 0\n    kind: reboot\n    down: 1\n",
                  ":5:11: reboot has no 'down'");
   refused_script("format: kphi-faults/1\nhabits: {axia: 1}\nfaults: []\n", ":2:16: '1' is neither false nor true");
@@ -131,8 +131,8 @@ TEST_F(BadScript, IsRefusedByLineAndColumn) {
 }
 
 TEST_F(BadScript, ThatCannotBeReadIsNamed) {
-  refused({"--faults", (folder_ / "none.yaml").string()}, 2, "none.yaml: cannot be read; name a fault script");
-  refused({"--faults", folder_.path().string()}, 2, "cannot be read; name a fault script");
+  refused({"--faults", (folder_ / "none.yaml").string()}, 2, "none.yaml: cannot be read; name a file that is there");
+  refused({"--faults", folder_.path().string()}, 2, "cannot be read; name a file that is there");
 }
 
 TEST_F(BadScript, OrATruthLogThatCannotBeWrittenIsRefusedAtTheBeginning) {

@@ -86,11 +86,15 @@ struct Way {
   int exit_code;
   const char* words = "";  ///< of the program
   double limit_ms = kPrompt;
-  bool heard = true;  ///< what the program says still reaches the module
+  bool heard = true;                   ///< what the program says still reaches the module
   const char* supply_fault = nullptr;  ///< of the bench's own supply, at full speed
   bool switchable = true;              ///< what the program says still reaches the supply
-  /// Those of the motor spoil the supply inside its simulator instead.
-  [[nodiscard]] bool has_supply() const { return std::string_view(fault).find("volt") == std::string_view::npos; }
+  /// Not where the motor's own electricity is the cause: the protection of a supply would speak first.
+  [[nodiscard]] bool has_supply() const {
+    const std::string_view text = fault;
+    const auto names = [&](const char* word) { return text.find(word) != std::string_view::npos; };
+    return !names("volt") && !names("coil") && !names("redline") && !names("brown_out");
+  }
 };
 
 std::ostream& operator<<(std::ostream& out, const Way& way) { return out << way.name; }
