@@ -22,7 +22,7 @@ nav{margin:1rem 0;font-size:.95rem}nav a{color:var(--blue);margin-right:1.2rem}
 .card{background:var(--panel);border:1px solid var(--rule);border-top:3px solid var(--blue);border-radius:4px;
  padding:.9rem 1.1rem}
 .card h3{margin:0;font-size:.86rem;font-weight:600;color:var(--soft)}
-.card .value{font-size:1.28rem;font-weight:650;font-variant-numeric:tabular-nums;margin:.2rem 0;white-space:nowrap}
+.card .value{font-size:1.02rem;font-weight:650;font-variant-numeric:tabular-nums;margin:.2rem 0;white-space:normal}
 .card .value .unit{display:block;font-size:.86rem;font-weight:400;color:var(--soft)}
 .card p{margin:0;font-size:.86rem;color:var(--soft);font-variant-numeric:tabular-nums}
 figure{margin:1.5rem 0 2rem}
