@@ -64,9 +64,10 @@ TEST(Port, NeverBlocks) {
   EXPECT_EQ(port.read(some), 0u);
   EXPECT_FALSE(port.wait(std::chrono::milliseconds(1)));
   const std::vector<std::uint8_t> much(4096);
-  for (int i = 0; i < 1000 && port.write(much) > 0; ++i) {
-  }
-  EXPECT_EQ(port.write(much), 0u) << "nobody reads at the other end";
+  // The kernel carries on what it was given, which may make room once more.
+  int refusals = 0;
+  for (int i = 0; i < 1000 && refusals < 10; ++i) refusals += port.write(much) == 0 ? 1 : 0;
+  EXPECT_EQ(refusals, 10) << "nobody reads at the other end";
 }
 
 TEST(Port, ThrowsWhenItIsUnplugged) {
