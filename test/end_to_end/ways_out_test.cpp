@@ -138,9 +138,9 @@ const Way kWays[] = {
     {"RotorLocked", kScript, nullptr, "kind: motor_locked, for_s: 1000", 4, "rotor"},
     {"SupplySag", kScript, nullptr, "kind: motor_sag, volts: 8.5, for_s: 1000", 4, "fault"},
     {"BrownOut", kScript, nullptr, "kind: motor_brown_out, down_s: 0.05", 4, "restarted"},
-    {"Unplugged", kScript, nullptr, "kind: motor_unplug, for_s: 1000", 4, "", kModuleAlone, false},
+    {"Unplugged", kScript, nullptr, "kind: motor_unplug, for_s: 1000", 4, "", kPrompt, false},
     {"ModuleUnheard", kScript, nullptr, "kind: motor_mute, for_s: 1000", 4, "motor reading"},
-    {"ModuleDeaf", kScript, nullptr, "kind: motor_deaf, for_s: 1000", 4, "", kModuleAlone, false},
+    {"ModuleDeaf", kScript, nullptr, "kind: motor_deaf, for_s: 1000", 4, "", kPrompt, false},
 };
 
 std::string campaign_text(const Way& way) {
