@@ -40,6 +40,7 @@ struct BiasTolerance {
 
 struct BiasStep {
   ZeroMeasurement before, after;
+  int draws = 0;                  ///< biases sent until one was good
   bool stream_restarted = false;  ///< this box stops its stream for a bias
 };
 
@@ -48,8 +49,9 @@ struct BiasStep {
 [[nodiscard]] ZeroMeasurement measure_zero(LoadCell& cell, std::uint64_t records,
                                            std::chrono::nanoseconds wall_timeout);
 
-/// Measures, sends the box's bias (0x42), waits until it can have worked, measures again. Throws DeviceError when the
-/// mean of an axis is then not within `tolerance`; the load must be at rest. Each measurement has `wall_timeout`.
+/// Measures, sends the box's bias (0x42), waits until it can have worked, measures again. The box takes one noisy
+/// sample as its zero: a bad draw is drawn again, three in all. Throws DeviceError when the mean of an axis is then
+/// still not within `tolerance`; the load must be at rest. Each measurement has `wall_timeout`.
 [[nodiscard]] BiasStep take_bias(LoadCell& cell, const Clock& clock, std::uint64_t records, BiasTolerance tolerance,
                                  std::chrono::nanoseconds wall_timeout);
 

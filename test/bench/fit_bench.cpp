@@ -16,6 +16,7 @@
 #include "fit/identification.hpp"
 #include "results/steps_csv.hpp"
 #include "test/fit/campaign_steps.hpp"
+#include "test/source_dir.hpp"
 
 namespace {
 
@@ -78,7 +79,7 @@ int main() {
   fs::create_directories(folder);
   kphi::results::write_steps(folder / "steps.csv", kphi::fit::campaign_steps());
   const std::string steps = (folder / "steps.csv").string();
-  const std::string peer = fmt::format("/usr/bin/python3 {}/test/bench/fit_peer.py", KPHI_SOURCE_DIR);
+  const std::string peer = fmt::format("/usr/bin/python3 {}/test/bench/fit_peer.py", kphi::test::source_dir());
   setenv("OPENBLAS_NUM_THREADS", "1", 1);
   const double ours =
       fastest(fmt::format("{} fit {} --loss huber --no-report >/dev/null 2>&1", KPHI_PROGRAM, steps), 7);

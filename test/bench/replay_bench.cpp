@@ -20,6 +20,7 @@
 #include "results/campaign_folder.hpp"
 #include "results/steps_csv.hpp"
 #include "test/results/synthetic_run.hpp"
+#include "test/source_dir.hpp"
 
 namespace {
 
@@ -97,7 +98,7 @@ int replay(const std::string& folder) {
 }
 
 int peer(const std::string& folder) {
-  const std::string script = std::string(KPHI_SOURCE_DIR) + "/test/bench/replay_peer.py";
+  const std::string script = kphi::test::source_dir() + "/test/bench/replay_peer.py";
   ::execl("/usr/bin/python3", "python3", script.c_str(), folder.c_str(), nullptr);
   return 127;
 }

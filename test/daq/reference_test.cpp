@@ -7,6 +7,7 @@
 #include "results/campaign_verification.hpp"
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -14,7 +15,7 @@ namespace {
 class Reference : public testing::Test {
  protected:
   results::CampaignFolder folder_ =
-      results::CampaignFolder::open(std::filesystem::path(KPHI_SOURCE_DIR) / "results/reference");
+      results::CampaignFolder::open(std::filesystem::path(kphi::test::source_dir()) / "results/reference");
 };
 
 TEST_F(Reference, IsWhole) {

@@ -16,6 +16,7 @@
 
 #include "results/run_reader.hpp"
 #include "test/end_to_end/running_bench.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::test {
 namespace {
@@ -49,7 +50,7 @@ TEST(Program, RunsACampaignOverTheRealTransportsAndFitsWhatTheBenchWasBuiltWith)
   EXPECT_TRUE(std::filesystem::exists(folder + "/report.html"));
 
   Process compensate({kphi(), "compensate", "--coefficients", folder + "/coefficients.yaml", "--vehicle",
-                      std::string(KPHI_SOURCE_DIR) + "/profiles/foldable_drone.yaml"},
+                      kphi::test::source_dir() + "/profiles/foldable_drone.yaml"},
                      "theta1_deg,theta2_deg,theta3_deg,theta4_deg,thrust1_n,thrust2_n,thrust3_n,thrust4_n\n"
                      "180,180,165.676,180,1.5,1.5,1.5,1.5\n");
   EXPECT_EQ(compensate.wait(), 0) << compensate.err();
@@ -310,7 +311,7 @@ TEST_F(BadInput, FullDiskMidRunKeepsWhatWasWritten) {
 }
 
 TEST(Check, TakesEveryShippedFile) {
-  for (const auto& entry : std::filesystem::directory_iterator(std::string(KPHI_SOURCE_DIR) + "/profiles")) {
+  for (const auto& entry : std::filesystem::directory_iterator(kphi::test::source_dir() + "/profiles")) {
     if (entry.path().extension() != ".yaml") continue;
     Process check({kphi(), "check", entry.path().string()});
     EXPECT_EQ(check.wait(), 0) << check.err();
@@ -318,7 +319,7 @@ TEST(Check, TakesEveryShippedFile) {
 }
 
 TEST(DryRun, PrintsThePlanAndTouchesNoDevice) {
-  const std::string profiles = std::string(KPHI_SOURCE_DIR) + "/profiles/";
+  const std::string profiles = kphi::test::source_dir() + "/profiles/";
   Process run({kphi(), "run", profiles + "icra2021_5in_3blade.yaml", "--bench", profiles + "bench_lab.yaml",
                "--dry-run", "--json"});
   EXPECT_EQ(run.wait(), 0) << run.err();

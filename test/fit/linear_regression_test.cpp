@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "fit/fit_error.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -21,7 +22,8 @@ struct Certified {
 };
 
 Certified read(const std::string& name) {
-  std::ifstream file((std::filesystem::path(KPHI_SOURCE_DIR) / "test/fit/nist" / name).replace_extension("txt"));
+  std::ifstream file(
+      (std::filesystem::path(kphi::test::source_dir()) / "test/fit/nist" / name).replace_extension("txt"));
   Certified set;
   for (std::string line; std::getline(file, line);) {
     std::istringstream words(line);

@@ -8,6 +8,8 @@
 #include <set>
 #include <sstream>
 
+#include "test/source_dir.hpp"
+
 namespace kphi::house {
 namespace {
 
@@ -23,7 +25,7 @@ std::string read(const std::filesystem::path& path) {
 }
 
 TEST(DependencyRules, AreKeptByEveryFile) {
-  const std::filesystem::path root(KPHI_SOURCE_DIR);
+  const std::filesystem::path root(kphi::test::source_dir());
   std::vector<std::string> found;
   int files = 0;
   for (const char* room : {"profiles", "drivers", "results", "daq", "fit", "compensation"}) {

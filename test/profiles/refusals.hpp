@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "profiles/finding.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::profiles {
 
@@ -29,7 +30,7 @@ inline std::string changed(std::string text, const std::string& from, const std:
   return at == std::string::npos ? text : text.replace(at, from.size(), to);
 }
 
-inline std::string shipped(const std::string& name) { return std::string(KPHI_SOURCE_DIR) + "/profiles/" + name; }
+inline std::string shipped(const std::string& name) { return kphi::test::source_dir() + "/profiles/" + name; }
 
 inline constexpr const char* kCampaignText =
     "format: kphi-campaign/1\n"            // 1

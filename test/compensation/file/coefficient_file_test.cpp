@@ -5,6 +5,8 @@
 
 #include <string>
 
+#include "test/source_dir.hpp"
+
 namespace kphi::compensation {
 namespace {
 
@@ -238,7 +240,7 @@ TEST(CoefficientFile, ThatCannotBeReadIsNamed) {
 }
 
 TEST(CoefficientFile, OfTheConsumerProjectIsRead) {
-  const Coefficients c = load_coefficients(std::string(KPHI_SOURCE_DIR) + "/test/consumer/coefficients.yaml");
+  const Coefficients c = load_coefficients(kphi::test::source_dir() + "/test/consumer/coefficients.yaml");
   EXPECT_NEAR(to_newtons_per_rpm2(c.thrust_coefficient), 1.7e-8, 1e-20);
 }
 

@@ -9,6 +9,7 @@
 
 #include "test/compensation/flight/bench_coefficients.hpp"
 #include "test/daq/bench_fixture.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::test {
 namespace {
@@ -17,7 +18,7 @@ using testing::HasSubstr;
 using testing::Not;
 namespace fs = std::filesystem;
 
-const std::string kVehicle = std::string(KPHI_SOURCE_DIR) + "/profiles/foldable_drone.yaml";
+const std::string kVehicle = kphi::test::source_dir() + "/profiles/foldable_drone.yaml";
 
 /// Bench and fit once for all tests here.
 class Fly : public testing::Test {

@@ -4,11 +4,12 @@
 #include <nlohmann/json.hpp>
 
 #include "test/compensation/flight/bench_coefficients.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::test {
 namespace {
 
-const std::string kProfiles = std::string(KPHI_SOURCE_DIR) + "/profiles/";
+const std::string kProfiles = kphi::test::source_dir() + "/profiles/";
 
 TEST(FlyStudy, OfFourHundredDrawsFindsWhatThePaperFound) {
   const TemporaryFolder folder;

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "test/drivers/iq/fake_module.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::iq {
 namespace {
@@ -51,7 +52,7 @@ Bytes bytes_of(const std::string& text) {
 }
 
 std::vector<Vector> golden() {
-  std::ifstream file(KPHI_SOURCE_DIR "/test/golden/iq_frames.txt");
+  std::ifstream file(kphi::test::source_dir() + "/test/golden/iq_frames.txt");
   std::vector<Vector> vectors;
   for (std::string line; std::getline(file, line);) {
     if (line.empty() || line[0] == '#') continue;

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "test/drivers/netbox/record_bytes.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::netbox {
 namespace {
@@ -35,7 +36,7 @@ Golden parse(const std::string& line) {
 }
 
 std::vector<Golden> golden(const std::string& kind) {
-  std::ifstream file(KPHI_SOURCE_DIR "/test/golden/netbox_rdt.txt");
+  std::ifstream file(kphi::test::source_dir() + "/test/golden/netbox_rdt.txt");
   std::vector<Golden> found;
   for (std::string line; std::getline(file, line);) {
     if (line.starts_with(kind)) found.push_back(parse(line));

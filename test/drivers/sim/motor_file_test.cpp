@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "drivers/sim/random.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::sim {
 namespace {
@@ -46,7 +47,7 @@ double time_constant(const MotorProfile& profile) {
 }
 
 TEST(MotorFile, ThatIsShippedIsTheMotorThatIsBuiltIn) {
-  std::ifstream file(KPHI_PROFILES "/motor_iq2306.yaml");
+  std::ifstream file(kphi::test::source_dir() + "/profiles/motor_iq2306.yaml");
   const std::string text((std::istreambuf_iterator<char>(file)), {});
   EXPECT_EQ(motor_profile_yaml(parse_motor_profile(text, "motor_iq2306.yaml")), motor_profile_yaml({}));
   for (std::size_t at = 0, end = 0; (end = motor_profile_yaml({}).find('\n', at)) != std::string::npos; at = end + 1) {

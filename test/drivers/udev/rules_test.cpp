@@ -9,6 +9,8 @@
 #include <sstream>
 #include <string>
 
+#include "test/source_dir.hpp"
+
 namespace kphi {
 namespace {
 
@@ -21,7 +23,7 @@ std::string text_of(const fs::path& path) {
   return text.str();
 }
 
-std::string rules() { return text_of(fs::path(KPHI_SOURCE_DIR) / "drivers/udev/60-kphi.rules"); }
+std::string rules() { return text_of(fs::path(kphi::test::source_dir()) / "drivers/udev/60-kphi.rules"); }
 
 Ids matches(const std::string& text, const std::regex& pattern) {
   Ids found;
@@ -46,7 +48,7 @@ Ids allowed() {
 
 TEST(UdevRules, KnowEveryDeviceThatADriverNames) {
   Ids named;
-  for (const auto& file : fs::recursive_directory_iterator(fs::path(KPHI_SOURCE_DIR) / "drivers")) {
+  for (const auto& file : fs::recursive_directory_iterator(fs::path(kphi::test::source_dir()) / "drivers")) {
     const std::string path = file.path().string();
     if (!file.is_regular_file() || path.find("/sim/") != std::string::npos || path.find("/udev/") != std::string::npos)
       continue;

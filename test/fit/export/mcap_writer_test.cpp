@@ -11,6 +11,7 @@
 #include "fit/export/targets.hpp"
 #include "test/fit/campaign_steps.hpp"
 #include "test/fit/export/outside_reader.hpp"
+#include "test/source_dir.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::fit {
@@ -56,7 +57,7 @@ class Mcap : public ::testing::Test {
  protected:
   void SetUp() override {
     const char* place = std::getenv("KPHI_NODE_MODULES");
-    modules = place != nullptr ? place : KPHI_SOURCE_DIR "/build/node_modules";
+    modules = place != nullptr ? place : kphi::test::source_dir() + "/build/node_modules";
     if (!works("NODE_PATH=" + modules + " node -e 'require(\"@mcap/core\")'"))
       GTEST_SKIP() << "no @mcap/core in " << modules
                    << "; npm install --prefix build @mcap/core, or set KPHI_NODE_MODULES";
