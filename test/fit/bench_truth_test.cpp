@@ -1,6 +1,7 @@
 // Raw samples of the simulated bench against what it was built with: torque, lag of the thrust, clock of the motor.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "daq/campaign_run.hpp"
@@ -10,6 +11,7 @@
 #include "fit/blade_pass.hpp"
 #include "fit/dynamics.hpp"
 #include "fit/identification.hpp"
+#include "fit/step_clock.hpp"
 #include "fit/torque.hpp"
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
@@ -24,14 +26,48 @@ class WillingOperator final : public daq::Operator {
   void mount(const profiles::Propeller&, double) override {}
 };
 
+/// The deterministic bench, which is looked at every half a millisecond while it runs.
+class WatchedBench final : public daq::Bench {
+ public:
+  explicit WatchedBench(daq::DeterministicBench& bench) : bench_(bench) {}
+  const Clock& clock() const override { return bench_.clock(); }
+  daq::MotorLink& motor() override { return bench_.motor(); }
+  daq::LoadCellLink& load_cell() override { return bench_.load_cell(); }
+  void wait_until(Instant when) override {
+    constexpr Duration kLook = std::chrono::microseconds(500);
+    for (Instant next = clock().now() + kLook; clock().now() < when; next += kLook) {
+      bench_.wait_until(std::min(next, when));
+      shaft.push_back({to_seconds(clock().now()), bench_.simulation().plant().motor().speed});
+    }
+  }
+  std::unique_ptr<daq::Background> keep_calling(std::function<void()> work) override {
+    return bench_.keep_calling(std::move(work));
+  }
+  results::FileLayer& files() override { return bench_.files(); }
+  Duration sync_interval() const override { return bench_.sync_interval(); }
+  void mounted(const std::string& propeller_id, double occlusion_deg) override {
+    bench_.mounted(propeller_id, occlusion_deg);
+  }
+  std::vector<TimedSample> shaft;  ///< true speeds, rad/s
+
+ private:
+  daq::DeterministicBench& bench_;
+};
+
+struct Recorded {
+  std::vector<results::RunRecording> runs;
+  std::vector<TimedSample> shaft;
+};
+
 /// One short campaign for all tests: φ = 0, 90 and 180, twice, 12 steps of 0.8 s.
-const std::vector<results::RunRecording>& runs() {
-  static const std::vector<results::RunRecording> recorded = [] {
+const Recorded& recorded() {
+  static const Recorded all = [] {
     test::TemporaryFolder folder;
     const profiles::Bench place = test::deterministic_place(11);
     sim::BenchSettings settings;
     settings.oscillator_gain = kClockError;
-    daq::DeterministicBench bench(place, settings);
+    daq::DeterministicBench simulated(place, settings);
+    WatchedBench bench(simulated);
     auto text = test::short_campaign_text("0, 90, 180", 2, 12);
     text.replace(text.find("dwell_s: 0.6"), 12, "dwell_s: 0.8");
     auto results = results::CampaignFolder::create(folder.path(), "20210530T000000Z", "short");
@@ -39,11 +75,64 @@ const std::vector<results::RunRecording>& runs() {
     daq::NoProgress progress;
     (void)daq::run_campaign(bench, profiles::parse_campaign(text, "short.yaml"), place, results, person, progress,
                             [] { return false; });
-    std::vector<results::RunRecording> all;
-    for (const auto& file : results.complete_runs()) all.push_back(results::read_run(file));
-    return all;
+    Recorded recorded{{}, std::move(bench.shaft)};
+    for (const auto& file : results.complete_runs()) recorded.runs.push_back(results::read_run(file));
+    return recorded;
   }();
-  return recorded;
+  return all;
+}
+
+const std::vector<results::RunRecording>& runs() { return recorded().runs; }
+
+struct FirstOrder {
+  double time_constant = 0, delay = 0;  // s
+};
+
+/// The first-order response with delay that comes nearest to what the shaft did after each command, by search.
+FirstOrder true_response() {
+  struct Point {
+    double t, y, weight;
+  };
+  std::vector<Point> points;
+  for (const results::RunRecording& run : runs()) {
+    for (const StepSpan& span : step_spans(run)) {
+      if (!(span.previous_rad_s > 0)) continue;
+      double before = 0, after = 0, settled = 0;
+      std::vector<TimedSample> during;
+      const std::vector<TimedSample>& shaft = recorded().shaft;
+      const auto earlier = [](const TimedSample& at, double t) { return at.t_s < t; };
+      for (auto it = std::lower_bound(shaft.begin(), shaft.end(), span.begin_s, earlier);
+           it != shaft.end() && it->t_s < span.end_s; ++it) {
+        const TimedSample& at = *it;
+        if (at.t_s <= span.begin_s) before = at.value;
+        if (at.t_s <= span.begin_s) continue;
+        during.push_back(at);
+        if (at.t_s > 0.5 * (span.begin_s + span.end_s)) after += at.value, ++settled;
+      }
+      const double change = after / settled - before;
+      for (const TimedSample& at : during)
+        points.push_back({at.t_s - span.begin_s, (at.value - before) / change, change * change});
+    }
+  }
+  const auto cost = [&](const FirstOrder& guess) {
+    double sum = 0;
+    for (const auto& [t, y, weight] : points) {
+      const double since = t - guess.delay, expected = since > 0 ? 1 - std::exp(-since / guess.time_constant) : 0;
+      sum += weight * std::pow(y - expected, 2);
+    }
+    return sum;
+  };
+  FirstOrder best{0.02, 0.002};
+  for (double width = 0.018; width > 1e-5; width *= 0.7) {
+    const FirstOrder centre = best;
+    for (int i = -4; i <= 4; ++i) {
+      for (int j = -4; j <= 4; ++j) {
+        const FirstOrder guess{std::max(1e-4, centre.time_constant + i * width / 4), centre.delay + j * width / 16};
+        if (cost(guess) < cost(best)) best = guess;
+      }
+    }
+  }
+  return best;
 }
 
 TEST(BladePass, FindsTheErrorOfTheMotorsClock) {
@@ -71,8 +160,14 @@ TEST(Dynamics, FindTheLagOfTheThrust) {
   const double truth = sim::LoadCellParameters{}.thrust_lag;
   EXPECT_NEAR(found->thrust_lag_s.value / truth, 1, 0.05);
   EXPECT_NEAR(found->thrust_lag_s.value, truth, 3 * found->thrust_lag_s.u);
-  EXPECT_GT(found->motor_time_constant_s.value, 1e-3);
-  EXPECT_LT(found->motor_time_constant_s.value, 0.3);
+}
+
+TEST(Dynamics, FindTheTimeConstantOfTheShaft) {
+  const auto found = identify_dynamics(runs());
+  ASSERT_TRUE(found);
+  const FirstOrder truth = true_response();
+  EXPECT_NEAR(found->motor_time_constant_s.value / truth.time_constant, 1, 0.05) << truth.time_constant;
+  EXPECT_NEAR(found->motor_delay_s.value, truth.delay, 0.001);
 }
 
 TEST(Torque, IsFoundToOnePercent) {
