@@ -121,13 +121,15 @@ struct Ended {
 };
 
 /// Whatever happens, the motor coasts when this returns; the supply is off then, unless the run is complete.
-Ended carry_out(Sequence& sequence, Bench& bench, Recorder& recorder) {
+Ended carry_out(Sequence& sequence, Bench& bench, Guard& guard, Recorder& recorder) {
   Ended ended;
+  const auto guarding = bench.keep_calling([&] { guard.look(); });
   const auto draining = bench.keep_calling([&] { recorder.drain(); });
   try {
     sequence.run();
   } catch (...) {
     ended.cause = std::current_exception();  // the motor coasts since the Spin has gone
+    guard.stand_down();
     if (bench.supply() != nullptr) bench.supply()->cut();
     ended.explanation = sequence.explanation();
     ended.aftermath = sequence.aftermath();
@@ -136,11 +138,18 @@ Ended carry_out(Sequence& sequence, Bench& bench, Recorder& recorder) {
 }
 
 /// After the stream has ended.
-void take_last_look(Sequence& sequence, Recorder& recorder, Ended& ended) {
-  recorder.drain();
-  if (const auto& event = sequence.supply_event()) recorder.note(*event);
+void take_last_look(Sequence& sequence, Guard& guard, Recorder& recorder, Ended& ended) {
+  guard.stand_down();
+  for (bool more = true; more; recorder.drain()) more = guard.relay();
+  try {
+    if (const auto event = guard.event()) recorder.note(*event);
+    if (const auto& event = sequence.supply_event()) recorder.note(*event);
+  } catch (const results::RecordError&) {
+    // The first cause matters more.
+  }
   if (!ended.cause) {
     try {
+      guard.latch().check();
       recorder.check_failure();
       sequence.compare_configuration(kReadings);
     } catch (...) {
@@ -168,12 +177,14 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   std::optional<Streaming> streaming(std::in_place, bench.load_cell());
   judge_changes(before, bench.load_cell(), order, progress);
   results::RunWriter writer(order.file, header_of(order, bench, streaming->scale()), bench.files());
-  Recorder recorder(bench, writer, {order.place.thrust_axis, order.place.thrust_sign, order.place.iq.spin},
+  const DeviceLimits devices = device_limits(bench);
+  Guard guard(bench, order.place, streaming->scale(), combine_limits(order.campaign, order.place, &devices));
+  Recorder recorder(bench, guard, writer, {order.place.thrust_axis, order.place.thrust_sign, order.place.iq.spin},
                     streaming->scale());
-  Sequence sequence(bench, recorder, order, progress, stop_asked);
-  Ended ended = carry_out(sequence, bench, recorder);
+  Sequence sequence(bench, recorder, guard, order, progress, stop_asked);
+  Ended ended = carry_out(sequence, bench, guard, recorder);
   streaming.reset();
-  take_last_look(sequence, recorder, ended);
+  take_last_look(sequence, guard, recorder, ended);
   const results::SampleAccount account = bench.load_cell().account();
   results::RunEnding ending{results::Outcome::complete, "", account, bench.load_cell().health(), sequence.box_bias()};
   if (!ended.cause) return {order.file, writer.finish(ending), account, sequence.stop()};

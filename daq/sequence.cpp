@@ -15,17 +15,6 @@ namespace {
 using results::Phase;
 
 constexpr Duration kTickWall = std::chrono::milliseconds(10);
-constexpr Duration kPatienceWall = std::chrono::milliseconds(500);
-constexpr Duration kSupplyPatienceWall = std::chrono::seconds(2);  // it is asked eight times per second
-// While the motor turns. Seen twice: after this host has stood still, what waits in the sockets is taken in between.
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr Duration kSpinPatienceWall = kPatienceWall;  // an instrumented bench is many times slower
-#else
-constexpr Duration kSpinPatienceWall = std::chrono::milliseconds(145);
-#endif
-constexpr Duration kSecondLookWall = std::chrono::milliseconds(20);
-// A program that was stopped for this long must not go on: the module may have let its motor coast meanwhile.
-constexpr Duration kLongestPauseWall = std::chrono::milliseconds(400);
 constexpr double kStandstillRadPerSec = 5.0;
 constexpr double kAnySpeed = 1e4;  // rad/s
 constexpr double kSpinDownLimitSeconds = 30.0;
@@ -45,16 +34,15 @@ bool explains_silence(results::EventKind kind) {
 
 }  // namespace
 
-Sequence::Sequence(Bench& bench, Recorder& recorder, const RunOrder& order, Progress& progress,
+Sequence::Sequence(Bench& bench, Recorder& recorder, Guard& guard, const RunOrder& order, Progress& progress,
                    const std::function<bool()>& stop_asked)
-    : bench_(bench), recorder_(recorder), order_(order), progress_(progress), stop_asked_(stop_asked) {
+    : bench_(bench), recorder_(recorder), guard_(guard), order_(order), progress_(progress), stop_asked_(stop_asked) {
   position_.propeller = order.campaign.propeller.id;
   position_.occlusion_deg = order.occlusion_deg;
   position_.repetition = order.repetition;
   position_.repetitions = order.campaign.repetitions;
   position_.steps = order.campaign.profile.steps;
-  begin_ = bench.clock().now();
-  end_ = begin_ + from_seconds(order.remaining_bench_s);
+  end_ = bench.clock().now() + from_seconds(order.remaining_bench_s);
 }
 
 void Sequence::run() {
@@ -63,10 +51,11 @@ void Sequence::run() {
   hold_zero(Phase::zero_before);
   require_rest();
   recorder_.take_zero();
+  guard_.take_zero(recorder_.measured());
   spin_through_the_steps();
   wait_for_standstill();
   hold_zero(Phase::zero_after);
-  recorder_.mark(Phase::end, -1, RadPerSec(0));
+  mark(Phase::end, -1, RadPerSec(0));
 }
 
 std::string Sequence::aftermath() {
@@ -89,16 +78,20 @@ std::string Sequence::aftermath() {
 
 std::string Sequence::power_off() {
   const Instant since = bench_.clock().now();
+  const Trip* trip = guard_.latch().trip();
+  const std::string told = trip != nullptr ? trip->reason : "";
   const std::string why = bench_.supply()->switch_off();
-  if (!why.empty()) return supply_event_ && supply_event_->text.ends_with(why) ? "" : "; " + why;
+  if (!why.empty()) return told.ends_with(why) ? "" : "; " + why;
   const Instant give_up = bench_.clock().now() + bench_.clock().stretched(kLastLookWall);
   while (recorder_.supply().time_ns < since.count() && bench_.clock().now() < give_up)
     bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
   const results::SupplyReading seen = recorder_.supply();
-  const bool tripped = seen.protection != results::SupplyProtection::none;
-  if (!tripped || supply_event_) return "; the supply's output is off";
-  note_supply(tripped_words(seen));
-  return "; " + supply_event_->text;
+  if (seen.protection == results::SupplyProtection::none || told.starts_with("supply:"))
+    return "; the supply's output is off";
+  const std::int64_t at = bench_.clock().now().count();
+  supply_event_ = {results::EventKind::supply_stop, at, 0,
+                   fmt::format("{:.3f} s: {}", 1e-9 * static_cast<double>(at), tripped_words(seen))};
+  return "; " + tripped_words(seen);
 }
 
 void Sequence::compare_configuration(int attempts) {
@@ -139,7 +132,7 @@ void Sequence::take_box_bias() {
 }
 
 void Sequence::set_box_bias() {
-  recorder_.mark(Phase::bias_settling, -1, RadPerSec(0));
+  mark(Phase::bias_settling, -1, RadPerSec(0));
   bench_.load_cell().set_bias();
   const netbox::Configuration& box = bench_.load_cell().configuration();
   hold(bench_.clock().stretched(kBiasWorksWall) + from_seconds(3 * box.records_per_datagram / box.rdt_rate_hz),
@@ -148,14 +141,14 @@ void Sequence::set_box_bias() {
 
 netbox::ZeroMeasurement Sequence::measure(Phase phase) {
   position_.phase = "bias";
-  recorder_.mark(phase, -1, RadPerSec(0));
+  mark(phase, -1, RadPerSec(0));
   hold(from_seconds(order_.campaign.zero.value()), nullptr);
   progress_.step_done(position_, seen_);
   return recorder_.measured();
 }
 
 void Sequence::spin_through_the_steps() {
-  Spin spin(bench_.motor(), order_.place.iq.spin);
+  Spin spin(bench_.motor(), order_.place.iq.spin, guard_.latch());
   has_spun_ = true;
   int step = 0;
   for (const RadPerSec level : order_.campaign.profile.levels()) {
@@ -163,7 +156,7 @@ void Sequence::spin_through_the_steps() {
     position_.commanded = level;
     change_speed();
     spin.at(level);
-    recorder_.mark(Phase::step, step, level);
+    mark(Phase::step, step, level);
     hold(from_seconds(order_.campaign.profile.dwell.value()), &spin);
     progress_.step_done(position_, seen_);
     ++step;
@@ -171,7 +164,7 @@ void Sequence::spin_through_the_steps() {
   position_.step = -1;
   position_.commanded = RadPerSec(0);
   position_.phase = "spin down";
-  recorder_.mark(Phase::spin_down, -1, RadPerSec(0));
+  mark(Phase::spin_down, -1, RadPerSec(0));
   change_speed();
   iq::StopSettings stop;
   // What a ramp feeds back raises the voltage of a bench supply, which cannot sink it, until its protection trips.
@@ -181,9 +174,19 @@ void Sequence::spin_through_the_steps() {
   if (!stop_->safe()) throw SafetyStop(stop_->summary());
 }
 
+void Sequence::mark(Phase phase, int step, RadPerSec commanded) {
+  const results::PhaseMark mark{phase, step, bench_.clock().now().count(), commanded.value()};
+  recorder_.mark(mark);
+  guard_.mark(mark);
+}
+
+void Sequence::change_speed() {
+  guard_.settles_until(bench_.clock().now() + from_seconds(order_.campaign.minimum_discard.value()));
+}
+
 void Sequence::hold_zero(Phase phase) {
   position_.phase = "zero";
-  recorder_.mark(phase, -1, RadPerSec(0));
+  mark(phase, -1, RadPerSec(0));
   hold(from_seconds(order_.campaign.zero.value()), nullptr);
   progress_.step_done(position_, seen_);
 }
@@ -225,61 +228,12 @@ void Sequence::tick(Spin* spin) {
   if (stop_asked_()) throw Interrupted("stopped by request");
   recorder_.check_failure();
   tell_events();
-  if (const auto trip = recorder_.range_trip()) throw SafetyStop("load cell: " + *trip);
-  for (const std::string& failure : {bench_.motor().failure(), bench_.load_cell().failure()}) {
-    if (!failure.empty()) throw SafetyStop(failure);
-  }
+  guard_.check(spin != nullptr);
   const Instant now = bench_.clock().now();
-  if (spin && spun_at_ != kNever && now - spun_at_ > bench_.clock().stretched(kLongestPauseWall)) {
-    throw SafetyStop(fmt::format("this program stood still for {:.2g} s while the motor turned",
-                                 to_seconds(bench_.clock().shrunk(now - spun_at_))));
-  }
-  spun_at_ = spin ? now : kNever;
   seen_ = recorder_.observe(now);
-  if (const auto trip = check(seen_, order_.campaign.limits)) throw SafetyStop(trip->reason);
-  check_ages_at(now, spin != nullptr);
-  watch_supply(now);
   if (spin) spin->renew();
   position_.remaining_s = to_seconds(bench_.clock().shrunk(std::max(Duration(0), end_ - now)));
   progress_.tick(position_, seen_);
-}
-
-void Sequence::watch_supply(Instant now) {
-  if (bench_.supply() == nullptr) return;
-  const std::string why = supply_trouble(now);
-  if (why.empty()) return;
-  note_supply(why);
-  throw SafetyStop(why);
-}
-
-std::string Sequence::supply_trouble(Instant now) const {
-  if (std::string failure = bench_.supply()->failure(); !failure.empty()) return failure;
-  const results::SupplyReading seen = recorder_.supply();
-  const bool any = seen.time_ns != 0;
-  const Instant last = any ? Instant(seen.time_ns) : begin_;
-  if (now - last > bench_.clock().stretched(kSupplyPatienceWall))
-    return fmt::format("supply: no reading for {:.3g} s", to_seconds(bench_.clock().shrunk(now - last)));
-  if (!any || !order_.place.supply) return {};
-  const auto trip = check(seen, *order_.place.supply, seen.time_ns >= settled_from_.count());
-  return trip ? trip->reason : std::string();
-}
-
-void Sequence::note_supply(const std::string& what) {
-  const std::int64_t at = bench_.clock().now().count();
-  const std::string where = position_.step < 0 ? "" : fmt::format("step {}: ", position_.step + 1);
-  supply_event_ = {results::EventKind::supply_stop, at, 0,
-                   fmt::format("{:.3f} s: {}{}", 1e-9 * static_cast<double>(at), where, what)};
-}
-
-void Sequence::check_ages_at(Instant now, bool spinning) {
-  const auto stretched = [&](Duration wall) { return bench_.clock().stretched(wall); };
-  const auto trip = check_ages(seen_, stretched(spinning ? kSpinPatienceWall : kPatienceWall));
-  if (!trip) {
-    stale_since_ = kNever;
-    return;
-  }
-  stale_since_ = std::min(stale_since_, now);
-  if (now - stale_since_ >= stretched(kSecondLookWall)) throw SafetyStop(trip->reason);
 }
 
 void Sequence::tell_events() {

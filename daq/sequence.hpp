@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "daq/guard.hpp"
 #include "daq/recorder.hpp"
 #include "daq/run.hpp"
 #include "daq/spin.hpp"
@@ -14,12 +15,12 @@ namespace kphi::daq {
 /// The runner's thread. Whoever makes it keeps all that it is given.
 class Sequence {
  public:
-  Sequence(Bench& bench, Recorder& recorder, const RunOrder& order, Progress& progress,
+  Sequence(Bench& bench, Recorder& recorder, Guard& guard, const RunOrder& order, Progress& progress,
            const std::function<bool()>& stop_asked);
   void run();
   [[nodiscard]] const results::BoxBias& box_bias() const { return box_bias_; }
   [[nodiscard]] const std::optional<iq::StopReport>& stop() const { return stop_; }
-  /// What the supply did that stopped the run.
+  /// That the supply had switched itself off, when another cause was seen first.
   [[nodiscard]] const std::optional<results::StreamEvent>& supply_event() const { return supply_event_; }
   /// After the motor was let go: what became of it, and what its module says of the cause; empty when it never turned,
   /// or that is told already.
@@ -37,31 +38,24 @@ class Sequence {
   void set_box_bias();
   netbox::ZeroMeasurement measure(results::Phase phase);
   void spin_through_the_steps();
-  void change_speed() { settled_from_ = bench_.clock().now() + from_seconds(order_.campaign.minimum_discard.value()); }
+  void mark(results::Phase phase, int step, RadPerSec commanded);
+  void change_speed();
   void hold_zero(results::Phase phase);
   /// Nothing turns while the cell is not at rest: the zero would be worth nothing, and all that is measured against it.
   void require_rest();
   void wait_for_standstill();
   void hold(Duration duration, Spin* spin);
   void tick(Spin* spin);
-  void watch_supply(Instant now);
-  /// Why the supply must stop the bench; empty: it need not.
-  [[nodiscard]] std::string supply_trouble(Instant now) const;
-  void note_supply(const std::string& what);
-  void check_ages_at(Instant now, bool spinning);
   void tell_events();
 
   Bench& bench_;
   Recorder& recorder_;
+  Guard& guard_;
   const RunOrder& order_;
   Progress& progress_;
   const std::function<bool()>& stop_asked_;
   Position position_;
   Observation seen_;
-  Instant begin_{};
-  Instant settled_from_{};  ///< until then a change of speed may load the supply as it likes
-  Instant stale_since_ = kNever;
-  Instant spun_at_ = kNever;  ///< the last tick, if the motor turned
   Instant end_{};
   int told_ = 0;
   std::string standstill_;  ///< of the box's measurement, as told; empty while it measures
