@@ -47,9 +47,9 @@ class MotorLink {
   [[nodiscard]] virtual const iq::AuditRecord& parameters() const = 0;
   /// Asks for it now; nothing when the module tells none. Throws DeviceError. The runner's thread.
   [[nodiscard]] virtual std::optional<Celsius> coil_temperature() = 0;
-  /// Takes what the module reported since the last call. The recorder's thread.
+  /// Takes what the module reported since the last call. The guard's thread.
   virtual std::size_t take(std::span<results::MotorReading> out) = 0;
-  /// What happened to the module and its line since the last call, oldest first. The recorder's thread.
+  /// What happened to the module and its line since the last call, oldest first. The guard's thread.
   [[nodiscard]] virtual std::vector<results::StreamEvent> take_events() = 0;
   /// Why the link is dead; empty while it lives. Any thread.
   [[nodiscard]] virtual std::string failure() const = 0;
@@ -68,9 +68,9 @@ class LoadCellLink {
   /// Reads the box's configuration and starts the stream. Throws DeviceError.
   virtual results::LoadCellScale start() = 0;
   virtual void stop() noexcept = 0;
-  /// Takes what came since the last call. The recorder's thread.
+  /// Takes what came since the last call. The guard's thread.
   virtual std::size_t take(std::span<results::LoadCellRecord> out) = 0;
-  /// What happened to the stream since the last call, oldest first. The recorder's thread.
+  /// What happened to the stream since the last call, oldest first. The guard's thread.
   [[nodiscard]] virtual std::vector<results::StreamEvent> take_events() = 0;
   /// netftapi2.xml of the box as it is now. The runner's thread. Throws DeviceError.
   [[nodiscard]] virtual std::string page() = 0;

@@ -18,7 +18,7 @@ namespace {
 
 constexpr Duration kHandshake = std::chrono::seconds(5);
 constexpr Duration kSupplyRises = std::chrono::milliseconds(500);
-constexpr Duration kWorkEvery = std::chrono::milliseconds(50);
+constexpr Duration kWorkEvery = std::chrono::milliseconds(5);
 constexpr Duration kSyncEvery = std::chrono::seconds(1);
 constexpr Duration kHttpTimeout = std::chrono::seconds(5);
 constexpr Duration kMotorWait = std::chrono::milliseconds(1);
@@ -83,14 +83,15 @@ std::string body_of(const std::string& response, const std::string& operation) {
 
 class WithinWaits final : public Background {
  public:
-  WithinWaits(std::function<void()> work, std::function<void()>*& place) : work_(std::move(work)), place_(place) {
-    place_ = &work_;
+  WithinWaits(std::function<void()> work, std::vector<std::function<void()>*>& all)
+      : work_(std::move(work)), all_(all) {
+    all_.push_back(&work_);
   }
-  ~WithinWaits() override { place_ = nullptr; }
+  ~WithinWaits() override { std::erase(all_, &work_); }
 
  private:
   std::function<void()> work_;
-  std::function<void()>*& place_;
+  std::vector<std::function<void()>*>& all_;
 };
 
 }  // namespace
@@ -141,8 +142,8 @@ void DeterministicBench::wait_until(Instant when) {
     next = std::min(next, motor_.deadline());
     if (stream_) next = std::min({next, stream_->deadline(), stream_->release_deadline(), sim_.wire().next_arrival()});
     step_to(std::max(next, clock_.now() + Duration(1)));
-    if (work_ && clock_.now() >= next_work_) {
-      (*work_)();
+    if (clock_.now() >= next_work_) {
+      for (const auto* work : work_) (*work)();
       next_work_ = clock_.now() + kWorkEvery;
     }
   }

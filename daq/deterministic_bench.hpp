@@ -80,7 +80,7 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   std::uint64_t events_dropped_ = 0;
   std::vector<netbox::StampedRecord> records_;
   std::size_t taken_ = 0;
-  std::function<void()>* work_ = nullptr;
+  std::vector<std::function<void()>*> work_;  ///< in the order in which it was given
   Instant next_work_{};
 };
 

@@ -2,45 +2,47 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <utility>
 
 namespace kphi::daq {
 namespace {
 
-std::optional<Trip> above(const char* what, double value, double limit, const char* unit) {
-  // Written so that NaN trips: a value that cannot be compared is no proof of safety.
-  if (value <= limit) return std::nullopt;
-  return Trip{fmt::format("{} {:.4g} {} is above {:.4g} {}", what, value, unit, limit, unit)};
+std::string words(const GuardLimit& limit, double value) {
+  if (limit.watched <= Watched::torque_z) {
+    const double range = limit.value / kRangeBorne;
+    return fmt::format("load cell: {} carries {:.0f} % of its range of {:g} {}", limit.name, 100 * value / range, range,
+                       limit.unit);
+  }
+  if (limit.watched == Watched::pause)
+    return fmt::format("this program stood still for {:.2g} s while the motor turned", value);
+  const std::string shown = limit.unit == "RPM" ? fmt::format("{:.0f}", value) : fmt::format("{:.4g}", value);
+  return fmt::format("{} {} {} is {} ({})", limit.name, shown, limit.unit, to_words(limit), limit.source);
 }
 
 }  // namespace
 
-std::optional<Trip> check(const Observation& seen, const profiles::Limits& limits) {
-  // A closed loop overshoots a little on every step; 5 % more is a runaway.
-  constexpr double kOvershoot = 1.05;
-  // One count of the module's fix16 is 1.5e-5.
-  constexpr double kNoDerate = 0.9999;
-  if (auto trip = above("speed", to_rpm(seen.speed), kOvershoot * to_rpm(limits.speed_max), "RPM")) return trip;
-  if (auto trip = above("thrust", std::abs(seen.thrust.value()), limits.thrust_max.value(), "N")) return trip;
-  if (auto trip = above("supply current", seen.supply_current.value(), limits.supply_current_max.value(), "A")) {
-    return trip;
-  }
-  if (auto trip = above("coil temperature", seen.coil_temperature.value(), limits.coil_temperature_max.value(), "°C")) {
-    return trip;
-  }
-  if (seen.fault_bits != 0)
-    return Trip{fmt::format("motor: the module reports a fault (bits 0x{:02X})", seen.fault_bits)};
-  if (!(seen.derate >= kNoDerate))
-    return Trip{fmt::format("motor: the module derates to {:.0f} % of its drive", 100 * seen.derate)};
-  // Last: fault and derating say why the rotor does not follow.
-  if (seen.speed_error.kind != SpeedError::Kind::none) return Trip{to_words(seen.speed_error)};
-  return std::nullopt;
+Trip passed(const GuardLimit& limit, double value, Instant sample) {
+  Trip trip;
+  trip.watched = limit.watched;
+  trip.reason = words(limit, value);
+  trip.value = value;
+  trip.limit = limit;
+  trip.sample = sample;
+  return trip;
 }
 
-std::optional<Trip> check_ages(const Observation& seen, Duration patience) {
-  const double most = to_seconds(patience);
-  if (auto trip = above("age of the newest load-cell sample", to_seconds(seen.load_cell_age), most, "s")) return trip;
-  return above("age of the newest motor reading", to_seconds(seen.motor_age), most, "s");
+bool Latch::set(Trip trip) noexcept {
+  State expected = State::open;
+  if (!state_.compare_exchange_strong(expected, State::closing)) return false;
+  trip_ = std::move(trip);
+  state_.store(State::closed);
+  return true;
+}
+
+const Trip* Latch::trip() const noexcept { return state_.load() == State::closed ? &trip_ : nullptr; }
+
+void Latch::check() const {
+  if (const Trip* trip = this->trip()) throw SafetyStop(trip->reason);
 }
 
 }  // namespace kphi::daq

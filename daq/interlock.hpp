@@ -1,13 +1,12 @@
-// When the bench must stop by itself. A trip is a value; the runner turns it into a stop.
+// When the bench must stop by itself. A trip is a value, and the first one holds: it is latched.
 #pragma once
 
-#include <optional>
+#include <atomic>
 #include <stdexcept>
 #include <string>
 
-#include "daq/speed_error.hpp"
+#include "daq/guard_limits.hpp"
 #include "drivers/clock.hpp"
-#include "profiles/campaign.hpp"
 
 namespace kphi::daq {
 
@@ -19,22 +18,39 @@ struct Observation {
   Celsius coil_temperature;
   Duration load_cell_age{};
   Duration motor_age{};
-  double derate = 1;               ///< share of its drive that the module allows itself; 1: all
-  unsigned fault_bits = 0;         ///< of power_safety.fault_now
-  SpeedError speed_error{};        ///< of speed against command
   bool load_cell_is_fresh = true;  ///< no older than the stream's and this host's delay: thrust is what is now
   bool motor_is_fresh = true;      ///< likewise, of speed, current and temperature
 };
 
-/// A limit that was passed, in words: "thrust 21.3 N is above 20 N".
+/// Why the motor was let go.
 struct Trip {
-  std::string reason;
+  std::string reason;                ///< one line: "thrust 21.3 N is above 20 N (campaign limits.thrust_max_n)"
+  Watched watched = Watched::state;  ///< state: there is no limit; what a device says of itself
+  double value = 0;                  ///< unit of the limit
+  GuardLimit limit{};                ///< what was passed
+  Instant sample{0};                 ///< bench time of the sample or reading; of silence: of the last one
+  Instant noticed{0};                ///< bench time
+  int step = -1;                     ///< 0-based, -1 outside steps
 };
 
-/// Of what was measured, of what the module says of itself, and whether its rotor does what it is told.
-[[nodiscard]] std::optional<Trip> check(const Observation& seen, const profiles::Limits& limits);
-/// Ages above `patience`, bench time.
-[[nodiscard]] std::optional<Trip> check_ages(const Observation& seen, Duration patience);
+/// `value` has passed `limit`, in words.
+[[nodiscard]] Trip passed(const GuardLimit& limit, double value, Instant sample);
+
+/// Holds the first trip. Any thread; nobody waits.
+class Latch {
+ public:
+  /// True: it was the first.
+  bool set(Trip trip) noexcept;
+  /// nullptr: none yet.
+  [[nodiscard]] const Trip* trip() const noexcept;
+  /// Throws SafetyStop with the reason.
+  void check() const;
+
+ private:
+  enum class State : int { open, closing, closed };
+  std::atomic<State> state_{State::open};
+  Trip trip_;  // written while closing, read once closed
+};
 
 /// A trip that stopped a run. The motor coasts already. Exit code 4.
 class SafetyStop : public std::runtime_error {

@@ -14,29 +14,22 @@ constexpr std::size_t kReadingsAtOnce = 512;
 /// What is younger is shown as what is: this host's own delay, and three times that of the device.
 constexpr Duration kFreshWall = std::chrono::milliseconds(60);
 constexpr Duration kFreshMotor = std::chrono::milliseconds(100);
-/// How late this host may tell a speed and take the reading that answers it.
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr Duration kHostWall = std::chrono::milliseconds(300);
-#else
-constexpr Duration kHostWall = std::chrono::milliseconds(60);
-#endif
 constexpr std::array kAxes{"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
 
 results::EventKind kind_of(netbox::RangeVerdict verdict) {
-  if (verdict == netbox::RangeVerdict::trip) return results::EventKind::range_trip;
-  return verdict == netbox::RangeVerdict::beyond ? results::EventKind::beyond_range : results::EventKind::near_range;
+  return verdict == netbox::RangeVerdict::near ? results::EventKind::near_range : results::EventKind::beyond_range;
 }
 
 }  // namespace
 
-Recorder::Recorder(Bench& bench, results::RunWriter& writer, const Mounting& mounting,
+Recorder::Recorder(Bench& bench, Streams& streams, results::RunWriter& writer, const Mounting& mounting,
                    const results::LoadCellScale& scale)
     : bench_(bench),
+      streams_(streams),
       writer_(writer),
       mounting_(mounting),
       scale_(to_configuration(scale)),
       watch_(scale_),
-      speed_watch_(mounting.spin, bench.clock().stretched(kHostWall)),
       fresh_load_cell_(bench.clock().stretched(kFreshWall) +
                        from_seconds(3 * bench.load_cell().configuration().records_per_datagram / scale.sample_rate_hz)),
       fresh_motor_(bench.clock().stretched(kFreshWall) + kFreshMotor),
@@ -44,10 +37,7 @@ Recorder::Recorder(Bench& bench, results::RunWriter& writer, const Mounting& mou
       records_(kRecordsAtOnce),
       readings_(kReadingsAtOnce),
       load_cell_ns_(bench.clock().now().count()),
-      motor_ns_(bench.clock().now().count()) {
-  while (bench.supply() != nullptr && bench.supply()->take(supply_readings_) > 0) {  // of the time before this run
-  }
-}
+      motor_ns_(bench.clock().now().count()) {}
 
 void Recorder::drain() noexcept {
   if (failed_.load(std::memory_order_relaxed)) return;
@@ -76,17 +66,11 @@ void Recorder::drain_marks() {
     measuring_ = mark.phase == results::Phase::bias_before || mark.phase == results::Phase::bias_after ||
                  mark.phase == results::Phase::zero_before;
     estimate_ = {};
-    if (mark.phase == results::Phase::step) {
-      speed_watch_.command(Instant(mark.time_ns), RadPerSec(mark.speed_rad_s));
-    } else {
-      speed_watch_.release();
-    }
   }
 }
 
 void Recorder::drain_events() {
-  for (const results::StreamEvent& event : bench_.load_cell().take_events()) note(event);
-  for (const results::StreamEvent& event : bench_.motor().take_events()) note(event);
+  for (const results::StreamEvent& event : streams_.take_events()) note(event);
 }
 
 void Recorder::note(const results::StreamEvent& event) {
@@ -97,7 +81,8 @@ void Recorder::note(const results::StreamEvent& event) {
 void Recorder::look_at(std::span<const results::LoadCellRecord> batch) {
   for (const results::LoadCellRecord& record : batch) {
     const netbox::StampedRecord stamped = to_stamped(record);
-    const netbox::RangeVerdict verdict = watch_.look(stamped.record);
+    // That it is too much for the cell is the guard's to say.
+    const netbox::RangeVerdict verdict = std::min(watch_.look(stamped.record), netbox::RangeVerdict::beyond);
     if (verdict > worst_) note_range(verdict, record.arrival_ns);
     if (measuring_) estimate_.add(stamped);
   }
@@ -110,13 +95,10 @@ void Recorder::note_range(netbox::RangeVerdict verdict, results::Nanoseconds at)
   const std::string load = fmt::format("{} carries {:.0f} % of its range of {:g} {}", kAxes[axis],
                                        100 * watch_.largest_load(), scale_.range[axis], axis < 3 ? "N" : "N m");
   note({kind_of(verdict), at, 0, fmt::format("{:.3f} s: {}", 1e-9 * static_cast<double>(at), load)});
-  if (verdict != netbox::RangeVerdict::trip) return;
-  trip_ = load;
-  tripped_.store(true, std::memory_order_release);
 }
 
 void Recorder::drain_load_cell() {
-  while (const std::size_t n = bench_.load_cell().take(records_)) {
+  while (const std::size_t n = streams_.take(records_)) {
     const std::span<const results::LoadCellRecord> batch(records_.data(), n);
     writer_.append(batch);
     look_at(batch);
@@ -133,35 +115,28 @@ void Recorder::drain_load_cell() {
 
 void Recorder::drain_motor() {
   using results::MotorChannel;
-  while (const std::size_t n = bench_.motor().take(readings_)) {
+  while (const std::size_t n = streams_.take(readings_)) {
     const std::span<const results::MotorReading> batch(readings_.data(), n);
     writer_.append(batch);
     for (const auto& reading : batch) {
-      speed_watch_.take(reading);
       if (reading.channel == MotorChannel::speed) speed_rad_s_ = std::abs(reading.value);
       if (reading.channel == MotorChannel::supply_current) supply_current_a_ = reading.value;
       if (reading.channel == MotorChannel::coil_temperature) coil_temperature_degc_ = reading.value;
-      if (reading.channel == MotorChannel::derate) derate_ = reading.value;
-      if (reading.channel == MotorChannel::fault_now) fault_bits_ = static_cast<unsigned>(reading.value);
     }
     motor_ns_ = batch.back().time_ns;
   }
-  speed_error_.publish(speed_watch_.error());
 }
 
 void Recorder::drain_supply() {
-  if (bench_.supply() == nullptr) return;
-  while (const std::size_t n = bench_.supply()->take(supply_readings_)) {
+  while (const std::size_t n = streams_.take(supply_readings_)) {
     writer_.append(std::span<const results::SupplyReading>(supply_readings_.data(), n));
     supply_.publish(supply_readings_[n - 1]);
   }
 }
 
-void Recorder::mark(results::Phase phase, int step, RadPerSec commanded) {
+void Recorder::mark(const results::PhaseMark& mark) {
   // The queue holds more marks than a run has; it can only be full when nobody drains it.
-  if (!marks_.push({phase, step, bench_.clock().now().count(), commanded.value()})) {
-    throw std::runtime_error("recorder: nobody takes the marks of the run");
-  }
+  if (!marks_.push(mark)) throw std::runtime_error("recorder: nobody takes the marks of the run");
 }
 
 std::vector<results::StreamEvent> Recorder::take_events() {
@@ -170,19 +145,11 @@ std::vector<results::StreamEvent> Recorder::take_events() {
   return taken;
 }
 
-std::optional<std::string> Recorder::range_trip() const {
-  if (!tripped_.load(std::memory_order_acquire)) return std::nullopt;
-  return trip_;
-}
-
 void Recorder::take_zero() noexcept { zero_n_ = phase_mean_n_.load(); }
 
 Observation Recorder::observe(Instant now) const noexcept {
   Observation seen{RadPerSec(speed_rad_s_),         Newtons(thrust_n_ - zero_n_), Amperes(supply_current_a_),
                    Celsius(coil_temperature_degc_), now - Instant(load_cell_ns_), now - Instant(motor_ns_)};
-  seen.derate = derate_;
-  seen.fault_bits = fault_bits_;
-  seen.speed_error = speed_error_.read();
   seen.load_cell_is_fresh = seen.load_cell_age <= fresh_load_cell_;
   seen.motor_is_fresh = seen.motor_age <= fresh_motor_;
   return seen;

@@ -1,43 +1,36 @@
-// Empties the devices' queues into the run file, looks at every sample and remembers the newest of everything.
+// Empties the streams into the run file and remembers the newest of everything.
 #pragma once
 
 #include <array>
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <exception>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "daq/bench.hpp"
 #include "daq/interlock.hpp"
+#include "daq/mounting.hpp"
+#include "daq/streams.hpp"
 #include "drivers/netbox/bias.hpp"
 #include "drivers/netbox/published.hpp"
 #include "drivers/netbox/range_watch.hpp"
 
 namespace kphi::daq {
 
-/// How thrust is read off the six axes, and which way the motor is told to turn.
-struct Mounting {
-  int axis = 2;   ///< 0..2 = Fx, Fy, Fz
-  int sign = +1;  ///< of the axis when the propeller pulls
-  int spin = +1;  ///< +1 counter-clockwise
-};
-
 /// Two threads: drain() belongs to one, all else to the runner. Neither waits for the other.
 class Recorder {
  public:
-  Recorder(Bench& bench, results::RunWriter& writer, const Mounting& mounting, const results::LoadCellScale& scale);
+  Recorder(Bench& bench, Streams& streams, results::RunWriter& writer, const Mounting& mounting,
+           const results::LoadCellScale& scale);
 
   /// Takes all that waits, appends it, secures the file when it is time. Keeps the first error for check_failure and
   /// does nothing after it.
   void drain() noexcept;
-  /// Begins a phase now.
-  void mark(results::Phase phase, int step, RadPerSec commanded);
+  /// Begins a phase.
+  void mark(const results::PhaseMark& mark);
   /// What happened to load cell and motor since the last call; all of it is in the file already.
   [[nodiscard]] std::vector<results::StreamEvent> take_events();
-  /// The load cell is in danger: an axis above 110 % of its range. Says which, and how much.
-  [[nodiscard]] std::optional<std::string> range_trip() const;
   /// For what the runner found out by itself, once nobody drains any more.
   void note(const results::StreamEvent& event);
   /// Mean and standard deviation of all axes over the present phase, which measures a bias or the zero before.
@@ -61,11 +54,11 @@ class Recorder {
   void note_range(netbox::RangeVerdict verdict, results::Nanoseconds at);
 
   Bench& bench_;
+  Streams& streams_;
   results::RunWriter& writer_;
   Mounting mounting_;
   const netbox::Configuration scale_;
   netbox::RangeWatch watch_;
-  SpeedWatch speed_watch_;
   netbox::RangeVerdict worst_ = netbox::RangeVerdict::inside;
   bool measuring_ = false;
   netbox::ZeroEstimate estimate_;
@@ -82,14 +75,9 @@ class Recorder {
 
   std::atomic<double> thrust_n_{0}, phase_mean_n_{0}, zero_n_{0};
   std::atomic<double> speed_rad_s_{0}, supply_current_a_{0}, coil_temperature_degc_{0};
-  std::atomic<double> derate_{1};
-  std::atomic<unsigned> fault_bits_{0};
   std::atomic<std::int64_t> load_cell_ns_, motor_ns_;
   netbox::Published<netbox::ZeroMeasurement> measured_;
-  netbox::Published<SpeedError> speed_error_;
   netbox::Published<results::SupplyReading> supply_;
-  std::atomic<bool> tripped_{false};
-  std::string trip_;  // written before tripped_, read after it
   std::atomic<bool> failed_{false};
   std::exception_ptr failure_;  // written before failed_, read after it
 };

@@ -37,7 +37,7 @@ void SpeedWatch::command(Instant at, RadPerSec speed) noexcept {
   commanded_ = speed.value();
 }
 
-void SpeedWatch::release() noexcept { *this = SpeedWatch(direction_, host_); }
+void SpeedWatch::release() noexcept { *this = SpeedWatch(direction_, host_, share_); }
 
 void SpeedWatch::take(const results::MotorReading& reading) noexcept {
   using results::MotorChannel;
@@ -64,7 +64,7 @@ void SpeedWatch::advance(Instant at) noexcept {
 
 void SpeedWatch::judge_speed(Instant at) noexcept {
   advance(at);
-  const double tolerance = kFloor + kShare * commanded_;
+  const double tolerance = kFloor + share_ * commanded_;
   // Written so that NaN strays.
   if (speed_ >= low_ - tolerance && speed_ <= high_ + tolerance) {
     stray_since_ = kNever;

@@ -52,8 +52,10 @@ class SpeedWatch {
   static constexpr Duration kStallPatience = std::chrono::milliseconds(100);
   static constexpr Duration kBlind = std::chrono::milliseconds(300);
 
-  /// `direction` +1 counter-clockwise, -1 clockwise. `host`: how late a command may leave and a reading come.
-  SpeedWatch(int direction, Duration host) noexcept : direction_(direction), host_(host) {}
+  /// `direction` +1 counter-clockwise, -1 clockwise. `host`: how late a command may leave and a reading come. `share`
+  /// of the command that the speed may be off, beside kFloor.
+  SpeedWatch(int direction, Duration host, double share = kShare) noexcept
+      : direction_(direction), host_(host), share_(share) {}
 
   /// Unsigned, from now on. The first one expects a motor at rest.
   void command(Instant at, RadPerSec speed) noexcept;
@@ -71,6 +73,7 @@ class SpeedWatch {
 
   int direction_;
   Duration host_;
+  double share_;
   bool watching_ = false;
   double commanded_ = 0, speed_ = 0, current_ = 0;
   double low_ = 0, high_ = 0;  ///< the band, rad/s

@@ -4,25 +4,30 @@
 #include <optional>
 
 #include "daq/bench.hpp"
+#include "daq/interlock.hpp"
 
 namespace kphi::daq {
 
 /// While a Spin lives the motor may turn; when it goes before a stop of its own has come to a good end, by whatever
-/// way, the motor is let go at once.
+/// way, the motor is let go at once. After a trip it turns no more.
 class Spin {
  public:
   /// `direction` +1 counter-clockwise, -1 clockwise.
-  Spin(MotorLink& motor, int direction) noexcept : motor_(motor), direction_(direction) {}
+  Spin(MotorLink& motor, int direction, const Latch& latch) noexcept
+      : motor_(motor), direction_(direction), latch_(latch) {}
   ~Spin() {
     if (!let_go_) motor_.emergency_stop();
   }
   Spin(const Spin&) = delete;
   Spin& operator=(const Spin&) = delete;
 
-  /// Unsigned speed.
+  /// Unsigned speed. Throws SafetyStop after a trip. One that comes while this speaks is seen afterwards: either its
+  /// own order to coast is the last word, or that of the destructor.
   void at(RadPerSec speed) {
+    latch_.check();
     let_go_ = stopping_ = false;
     motor_.spin_at(RadPerSec(direction_ * speed.value()));
+    latch_.check();
   }
   /// Tells the driver's watchdog that someone still watches.
   void renew() noexcept { motor_.renew(); }
@@ -41,6 +46,7 @@ class Spin {
  private:
   MotorLink& motor_;
   int direction_;
+  const Latch& latch_;
   bool stopping_ = false;
   bool let_go_ = false;  ///< the module has confirmed that it coasts
 };

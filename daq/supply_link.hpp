@@ -16,7 +16,7 @@ class SupplyLink {
   virtual ~SupplyLink() = default;
   /// One line: model, serial, firmware, and where.
   [[nodiscard]] virtual std::string identity() const = 0;
-  /// Takes what it showed since the last call. The recorder's thread.
+  /// Takes what it showed since the last call. The guard's thread.
   virtual std::size_t take(std::span<results::SupplyReading> out) = 0;
   /// Why the link is dead; empty while it lives. Any thread.
   [[nodiscard]] virtual std::string failure() const = 0;

@@ -48,6 +48,30 @@ std::optional<Cooling> read_cooling(ProfileReader& file) {
   return cooling;
 }
 
+template <class T>
+std::optional<T> read_limit(ProfileReader& file, const std::string& key, double factor = 1) {
+  const std::string pointer = "/limits/" + key;
+  return file.has(pointer) ? std::optional<T>(factor * file.number(pointer)) : std::nullopt;
+}
+
+Limits read_limits(ProfileReader& file) {
+  Limits limits{from_rpm(file.number("/limits/speed_max_rpm")), Newtons(file.number("/limits/thrust_max_n")),
+                Amperes(file.number("/limits/supply_current_max_a")),
+                Celsius(file.number("/limits/coil_temperature_max_degc")), read_cooling(file)};
+  limits.torque_max = read_limit<NewtonMetres>(file, "torque_max_nm");
+  limits.supply_voltage_min = read_limit<Volts>(file, "supply_voltage_min_v");
+  limits.supply_voltage_max = read_limit<Volts>(file, "supply_voltage_max_v");
+  limits.speed_error_max = read_limit<double>(file, "speed_error_max_percent", 0.01);
+  const double supply = file.number("/supply_v");
+  if (limits.supply_voltage_min && limits.supply_voltage_min->value() >= supply)
+    file.refuse("/limits/supply_voltage_min_v", fmt::format("is not below {:g} V (supply_v)", supply),
+                "lower it: the motor would never turn");
+  if (limits.supply_voltage_max && limits.supply_voltage_max->value() <= supply)
+    file.refuse("/limits/supply_voltage_max_v", fmt::format("is not above {:g} V (supply_v)", supply),
+                "raise it: the motor would never turn");
+  return limits;
+}
+
 }  // namespace
 
 std::vector<RadPerSec> StepProfile::levels() const {
@@ -73,9 +97,7 @@ Campaign parse_campaign(const std::string& text, const std::string& path) {
   campaign.zero = Seconds(file.number("/zero_s"));
   campaign.box_bias = file.get_or("/box_bias", campaign.box_bias);
   campaign.minimum_discard = Seconds(file.number("/minimum_discard_s"));
-  campaign.limits = {from_rpm(file.number("/limits/speed_max_rpm")), Newtons(file.number("/limits/thrust_max_n")),
-                     Amperes(file.number("/limits/supply_current_max_a")),
-                     Celsius(file.number("/limits/coil_temperature_max_degc")), read_cooling(file)};
+  campaign.limits = read_limits(file);
   campaign.supply = Volts(file.number("/supply_v"));
   campaign.text = text;
   campaign.path = path;

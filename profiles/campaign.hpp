@@ -41,6 +41,9 @@ struct Limits {
   Amperes supply_current_max;
   Celsius coil_temperature_max;
   std::optional<Cooling> cooling{};
+  std::optional<NewtonMetres> torque_max{};  ///< about the shaft
+  std::optional<Volts> supply_voltage_min{}, supply_voltage_max{};
+  std::optional<double> speed_error_max{};  ///< share of the command
 };
 
 struct Campaign {

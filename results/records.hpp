@@ -169,8 +169,9 @@ enum class EventKind : std::uint8_t {
   motor_another_module,   ///< another one answers
   motor_slow_round_trip,  ///< its readings are blurred in time
   supply_stop,            ///< what the bench supply showed stopped the run
+  guard_trip,             ///< a limit was passed or a stream fell silent: the motor was let go
 };
-inline constexpr std::array<const char*, 27> kEventNames{"restarted",
+inline constexpr std::array<const char*, 28> kEventNames{"restarted",
                                                          "rebooted",
                                                          "stalled",
                                                          "stall_ended",
@@ -196,7 +197,8 @@ inline constexpr std::array<const char*, 27> kEventNames{"restarted",
                                                          "motor_port_lost",
                                                          "motor_another_module",
                                                          "motor_slow_round_trip",
-                                                         "supply_stop"};
+                                                         "supply_stop",
+                                                         "guard_trip"};
 [[nodiscard]] constexpr const char* name_of(EventKind kind) { return kEventNames[static_cast<std::size_t>(kind)]; }
 
 /// Of the motor module; else of the load cell, or of the supply.

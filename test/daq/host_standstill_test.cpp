@@ -34,15 +34,15 @@ class SleepyBench final : public Bench {
       asleep_ = false;
       return;
     }
-    if (slept_ && !woken_) {  // the recorder's thread wakes as soon as the runner's
+    if (slept_ && !woken_) {  // the other threads wake as soon as the runner's
       woken_ = true;
-      (*work_)();
+      for (const auto& work : work_) (*work)();
     }
     bench.wait_until(when);
   }
   [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override {
-    work_ = std::make_shared<std::function<void()>>(std::move(work));
-    return bench.keep_calling([this, work = work_] {
+    work_.push_back(std::make_shared<std::function<void()>>(std::move(work)));
+    return bench.keep_calling([this, work = work_.back()] {
       if (!asleep_) (*work)();
     });
   }
@@ -52,7 +52,7 @@ class SleepyBench final : public Bench {
   Duration sleeps_for{0};
 
  private:
-  std::shared_ptr<std::function<void()>> work_;
+  std::vector<std::shared_ptr<std::function<void()>>> work_;
   bool slept_ = false, asleep_ = false, woken_ = false;
 };
 

@@ -2,75 +2,62 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
-#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
 
 namespace kphi::daq {
 namespace {
 
-using std::chrono::milliseconds;
+const GuardLimit kThrust{Watched::thrust, "thrust", 20, "N", "campaign limits.thrust_max_n"};
 
-constexpr Duration kPatience = milliseconds(500);
-
-profiles::Limits limits() { return {from_rpm(19100), Newtons(20), Amperes(35), Celsius(110)}; }
-
-Observation healthy() {
-  return {from_rpm(19100), Newtons(6.2), Amperes(18), Celsius(60), milliseconds(6), milliseconds(20)};
+TEST(Trip, SaysValueLimitAndSource) {
+  const Trip trip = passed(kThrust, 21.3, Instant(5));
+  EXPECT_EQ(trip.reason, "thrust 21.3 N is above 20 N (campaign limits.thrust_max_n)");
+  EXPECT_EQ(trip.watched, Watched::thrust);
+  EXPECT_EQ(trip.value, 21.3);
+  EXPECT_EQ(trip.limit, kThrust);
+  EXPECT_EQ(trip.sample, Instant(5));
 }
 
-std::optional<Trip> judge(const Observation& seen) {
-  const auto trip = check(seen, limits());
-  return trip ? trip : check_ages(seen, kPatience);
+TEST(Trip, SaysRevolutionsAsPeopleReadThem) {
+  const GuardLimit speed{Watched::speed, "speed", 20055, "RPM", "campaign"};
+  EXPECT_EQ(passed(speed, 20500.4, Instant(0)).reason, "speed 20500 RPM is above 20055 RPM (campaign)");
 }
 
-TEST(Interlock, LetsAHealthyBenchRun) { EXPECT_FALSE(judge(healthy())); }
-
-TEST(Interlock, AllowsTheOvershootOfAStep) {
-  Observation seen = healthy();
-  seen.speed = from_rpm(19100 * 1.04);
-  EXPECT_FALSE(judge(seen));
+TEST(Trip, SaysWhichLimitIsALowerOne) {
+  const GuardLimit low{Watched::supply_voltage_low, "supply voltage", 5, "V", "device", true};
+  EXPECT_EQ(passed(low, 4.2, Instant(0)).reason, "supply voltage 4.2 V is below 5 V (device)");
 }
 
-struct Case {
-  const char* name;
-  void (*spoil)(Observation&);
-  const char* words;
-};
-
-class EachLimit : public testing::TestWithParam<Case> {};
-
-TEST_P(EachLimit, TripsAndSaysWhich) {
-  Observation seen = healthy();
-  GetParam().spoil(seen);
-  const auto trip = judge(seen);
-  ASSERT_TRUE(trip);
-  EXPECT_NE(trip->reason.find(GetParam().words), std::string::npos) << trip->reason;
+TEST(Trip, SaysHowMuchOfItsRangeTheCellCarries) {
+  const GuardLimit range{Watched::torque_y, "Ty", kRangeBorne * 1.0, "N m", "device"};
+  EXPECT_EQ(passed(range, 1.15, Instant(0)).reason, "load cell: Ty carries 115 % of its range of 1 N m");
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Interlock, EachLimit,
-    testing::Values(
-        Case{"Speed", [](Observation& o) { o.speed = from_rpm(20500); }, "speed 2.05e+04 RPM is above"},
-        Case{"Thrust", [](Observation& o) { o.thrust = Newtons(21.3); }, "thrust 21.3 N is above 20 N"},
-        Case{"PushingThrust", [](Observation& o) { o.thrust = Newtons(-21.3); }, "thrust 21.3 N"},
-        Case{"Current", [](Observation& o) { o.supply_current = Amperes(36); }, "supply current 36 A is above 35 A"},
-        Case{"Temperature", [](Observation& o) { o.coil_temperature = Celsius(111); }, "coil temperature 111 °C"},
-        Case{"Derate", [](Observation& o) { o.derate = 0.8; }, "derates to 80 %"},
-        Case{"Fault", [](Observation& o) { o.fault_bits = 0x42; }, "reports a fault (bits 0x42)"},
-        Case{"HeldRotor",
-             [](Observation& o) {
-               o.speed_error = {SpeedError::Kind::strays, from_rpm(6000), RadPerSec(0), Amperes(30), milliseconds(120)};
-             },
-             "the rotor does not do what it is told: 0 RPM instead of 6000 RPM"},
-        Case{"DerateNotANumber", [](Observation& o) { o.derate = std::numeric_limits<double>::quiet_NaN(); },
-             "derates"},
-        Case{"SilentLoadCell", [](Observation& o) { o.load_cell_age = milliseconds(501); }, "load-cell sample 0.501 s"},
-        Case{"SilentMotor", [](Observation& o) { o.motor_age = milliseconds(700); }, "motor reading 0.7 s"},
-        Case{"SpeedNotANumber", [](Observation& o) { o.speed = RadPerSec(std::numeric_limits<double>::quiet_NaN()); },
-             "speed"},
-        Case{"ThrustNotANumber", [](Observation& o) { o.thrust = Newtons(std::numeric_limits<double>::quiet_NaN()); },
-             "thrust"}),
-    [](const testing::TestParamInfo<Case>& tested) { return std::string(tested.param.name); });
+TEST(Latch, HoldsTheFirstTrip) {
+  Latch latch;
+  EXPECT_EQ(latch.trip(), nullptr);
+  EXPECT_NO_THROW(latch.check());
+  EXPECT_TRUE(latch.set({"first"}));
+  EXPECT_FALSE(latch.set({"second"}));
+  ASSERT_NE(latch.trip(), nullptr);
+  EXPECT_EQ(latch.trip()->reason, "first");
+  EXPECT_THROW(latch.check(), SafetyStop);
+}
+
+TEST(Latch, HoldsOneOfThoseThatMeet) {
+  for (int round = 0; round < 200; ++round) {
+    Latch latch;
+    std::atomic<int> firsts{0};
+    std::vector<std::thread> threads;
+    for (const char* reason : {"one", "two", "three"})
+      threads.emplace_back([&latch, &firsts, reason] { firsts += latch.set({reason}); });
+    for (auto& thread : threads) thread.join();
+    EXPECT_EQ(firsts, 1);
+    EXPECT_NE(latch.trip(), nullptr);
+  }
+}
 
 }  // namespace
 }  // namespace kphi::daq

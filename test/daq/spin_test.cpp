@@ -8,7 +8,7 @@
 namespace kphi::daq {
 namespace {
 
-class ToldMotor final : public MotorLink {
+class ToldMotor : public MotorLink {
  public:
   void spin_at(RadPerSec speed) override {
     if (refuse) throw std::runtime_error("refused");
@@ -34,16 +34,18 @@ class ToldMotor final : public MotorLink {
   static std::string fmt(double v) { return "spin " + std::to_string(static_cast<int>(v)); }
 };
 
+const Latch kNoTrip;
+
 TEST(Spin, LetsTheMotorGoWhenItGoes) {
   ToldMotor motor;
-  { Spin(motor, +1).at(RadPerSec(100)); }
+  { Spin(motor, +1, kNoTrip).at(RadPerSec(100)); }
   EXPECT_EQ(motor.told, (std::vector<std::string>{"spin 100", "emergency stop"}));
 }
 
 TEST(Spin, LeavesAMotorAloneThatHasConfirmedItsStop) {
   ToldMotor motor;
   {
-    Spin spin(motor, +1);
+    Spin spin(motor, +1, kNoTrip);
     spin.at(RadPerSec(100));
     EXPECT_FALSE(spin.stopped()) << "nobody has asked for a stop";
     spin.begin_stop();
@@ -58,7 +60,7 @@ TEST(Spin, DoesNotBelieveAStopThatIsUnderWayUnconfirmedOrOverruled) {
   for (const bool reported : {false, true}) {
     ToldMotor motor;
     {
-      Spin spin(motor, +1);
+      Spin spin(motor, +1, kNoTrip);
       spin.begin_stop();
       if (reported) motor.report = iq::StopReport{};
       (void)spin.stopped();
@@ -67,7 +69,7 @@ TEST(Spin, DoesNotBelieveAStopThatIsUnderWayUnconfirmedOrOverruled) {
   }
   ToldMotor motor;
   {
-    Spin spin(motor, +1);
+    Spin spin(motor, +1, kNoTrip);
     spin.begin_stop();
     motor.report = iq::StopReport{iq::StopReport::Outcome::standing, 100, 0, {}, {}};
     (void)spin.stopped();
@@ -78,14 +80,14 @@ TEST(Spin, DoesNotBelieveAStopThatIsUnderWayUnconfirmedOrOverruled) {
 
 TEST(Spin, CoastsEvenWhenItNeverSpun) {
   ToldMotor motor;
-  { const Spin spin(motor, +1); }
+  { const Spin spin(motor, +1, kNoTrip); }
   EXPECT_EQ(motor.told, (std::vector<std::string>{"emergency stop"}));
 }
 
 TEST(Spin, CoastsWhenAnExceptionPasses) {
   ToldMotor motor;
   const auto fail = [&] {
-    Spin spin(motor, +1);
+    Spin spin(motor, +1, kNoTrip);
     spin.at(RadPerSec(2000));
     throw std::runtime_error("anything");
   };
@@ -96,14 +98,41 @@ TEST(Spin, CoastsWhenAnExceptionPasses) {
 TEST(Spin, CoastsWhenTheCommandItselfFails) {
   ToldMotor motor;
   motor.refuse = true;
-  EXPECT_THROW(Spin(motor, +1).at(RadPerSec(2000)), std::runtime_error);
+  EXPECT_THROW(Spin(motor, +1, kNoTrip).at(RadPerSec(2000)), std::runtime_error);
   EXPECT_EQ(motor.told.back(), "emergency stop");
 }
 
 TEST(Spin, TurnsTheOtherWayForAClockwisePropeller) {
   ToldMotor motor;
-  { Spin(motor, -1).at(RadPerSec(100)); }
+  { Spin(motor, -1, kNoTrip).at(RadPerSec(100)); }
   EXPECT_EQ(motor.told.front(), "spin -100");
+}
+
+TEST(Spin, TurnsNoMoreAfterATrip) {
+  ToldMotor motor;
+  Latch latch;
+  latch.set({"too hot"});
+  EXPECT_THROW(Spin(motor, +1, latch).at(RadPerSec(100)), SafetyStop);
+  EXPECT_EQ(motor.told, (std::vector<std::string>{"emergency stop"}));
+}
+
+TEST(Spin, CoastsWhenATripComesWhileItSpeaks) {
+  class TrippingMotor final : public ToldMotor {
+   public:
+    explicit TrippingMotor(Latch& latch) : latch_(latch) {}
+    void spin_at(RadPerSec speed) override {
+      latch_.set({"too hot"});
+      ToldMotor::emergency_stop();  // as the guard does, an instant before the command goes out
+      ToldMotor::spin_at(speed);
+    }
+
+   private:
+    Latch& latch_;
+  };
+  Latch latch;
+  TrippingMotor motor(latch);
+  EXPECT_THROW(Spin(motor, +1, latch).at(RadPerSec(100)), SafetyStop);
+  EXPECT_EQ(motor.told, (std::vector<std::string>{"emergency stop", "spin 100", "emergency stop"}));
 }
 
 TEST(Spin, CannotBeCopiedAwayFromItsGuard) {

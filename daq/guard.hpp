@@ -1,0 +1,109 @@
+// Watches the bench in a thread of its own, between the devices and the recorder, and lets the motor coast by itself.
+//
+// Every sample and reading passes through it before it is recorded: neither a runner that hangs nor a disk that does
+// not answer keeps it from seeing one. What it judges:
+//   load cell   every sample against the ranges, 5 ms means of thrust and shaft torque (load_watch.hpp tells why)
+//   motor       every reading by itself: a checksum protects it, and the module has filtered it
+//   supply      every reading: its state, its settings, its meters
+//   silence     the age of the newest of each stream; twice, so that what waits in this host's sockets is taken first
+//   the runner  that it still looks; the runner in turn looks whether the guard does
+//
+// From the sample that exceeds a limit to the order to coast: 5 ms of its own on a live bench, and what the window of
+// the means takes. Silence is found 25 ms after its patience, a rotor that does not follow after that of
+// speed_error.hpp. The first trip holds. It is latched before the motor is let go, and a Spin looks at the latch after
+// each command: in whichever order the two threads come, the motor coasts.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "daq/interlock.hpp"
+#include "daq/load_watch.hpp"
+#include "daq/relay.hpp"
+#include "daq/speed_error.hpp"
+#include "daq/streams.hpp"
+#include "drivers/netbox/bias.hpp"
+
+namespace kphi::daq {
+
+class Guard final : public Streams {
+ public:
+  /// Forgets what the supply showed before. The devices stream already.
+  Guard(Bench& bench, const profiles::Bench& place, const results::LoadCellScale& scale,
+        const std::vector<GuardLimit>& limits);
+
+  /// Takes what the devices have and judges it; lets the motor coast. The guard's thread, again and again.
+  void look() noexcept;
+  /// Passes on without judging. True: something was.
+  bool relay();
+
+  // The recorder's thread.
+  std::size_t take(std::span<results::LoadCellRecord> out) override { return samples_.take(out); }
+  std::size_t take(std::span<results::MotorReading> out) override { return readings_.take(out); }
+  std::size_t take(std::span<results::SupplyReading> out) override { return supply_readings_.take(out); }
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+
+  // The runner's thread.
+  /// A step begins or steps are over. Throws SafetyStop when the guard takes no more marks.
+  void mark(const results::PhaseMark& mark);
+  /// Thrust and torque are judged from then on.
+  void take_zero(const netbox::ZeroMeasurement& zero) noexcept;
+  /// Until then a change of speed may load the supply as it likes.
+  void settles_until(Instant when) noexcept { settled_from_ = when.count(); }
+  /// The runner is alive. Throws SafetyStop after a trip, and when the guard itself looks no more.
+  void check(bool spinning);
+  /// From now on nothing trips: the motor was let go for another reason, and the supply is switched off.
+  void stand_down() noexcept { judging_ = false; }
+
+  [[nodiscard]] const Latch& latch() const noexcept { return latch_; }
+  /// The trip, for the run file; nothing: none.
+  [[nodiscard]] std::optional<results::StreamEvent> event() const;
+
+ private:
+  struct Stream {
+    const GuardLimit* limit = nullptr;  ///< nullptr: there is no such stream
+    Instant newest{0};
+    Instant stale_since = kNever;
+  };
+  [[nodiscard]] const GuardLimit* limit_of(Watched watched) const noexcept {
+    return limits_[static_cast<std::size_t>(watched)];
+  }
+  void trip(Trip trip) noexcept;
+  void trip_state(const std::string& reason, Instant sample = Instant(0)) noexcept;
+  [[nodiscard]] Trip of_speed(const SpeedError& error, Instant sample) const;
+  void hold(Watched watched, double value, results::Nanoseconds at);
+  void take_marks();
+  void judge(const results::LoadCellRecord& sample);
+  void judge(const results::MotorReading& reading);
+  void judge(const results::SupplyReading& reading);
+  void judge_silence(Stream& stream, Instant now, bool spinning);
+  void judge_links();
+  void judge_pause(Instant now);
+
+  Bench& bench_;
+  BenchStreams devices_;
+  const Mounting mounting_;
+  const std::optional<profiles::SupplyPlace> supply_;
+  const std::vector<GuardLimit> table_;
+  std::array<const GuardLimit*, static_cast<std::size_t>(Watched::state)> limits_{};
+  LoadWatch load_;
+  SpeedWatch speed_watch_;
+  Stream load_cell_stream_, motor_stream_, supply_stream_;
+  Relay<results::LoadCellRecord> samples_;
+  Relay<results::MotorReading> readings_;
+  Relay<results::SupplyReading> supply_readings_;
+  boost::lockfree::spsc_queue<results::StreamEvent> events_{1024};
+  std::deque<results::StreamEvent> pending_events_;  ///< for which there is no room yet
+  boost::lockfree::spsc_queue<results::PhaseMark, boost::lockfree::capacity<1024>> marks_;
+
+  Latch latch_;
+  std::atomic<bool> judging_{true}, spinning_{false}, has_zero_{false};
+  std::atomic<int> step_{-1};
+  std::atomic<std::int64_t> looked_ns_, beat_ns_, settled_from_{0};
+  std::atomic<double> thrust_zero_{0}, torque_zero_{0};
+};
+
+}  // namespace kphi::daq

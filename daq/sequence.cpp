@@ -1,0 +1,250 @@
+#include "daq/sequence.hpp"
+
+#include <fmt/format.h>
+
+#include "daq/box_bias.hpp"
+#include "daq/box_configuration.hpp"
+#include "daq/device_records.hpp"
+#include "daq/interrupt.hpp"
+#include "daq/supply_interlock.hpp"
+#include "drivers/device_error.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using results::Phase;
+
+constexpr Duration kTickWall = std::chrono::milliseconds(10);
+constexpr double kStandstillRadPerSec = 5.0;
+constexpr double kAnySpeed = 1e4;  // rad/s
+constexpr double kSpinDownLimitSeconds = 30.0;
+constexpr Duration kBiasWorksWall = std::chrono::milliseconds(100);  // what was on its way still has the old zero
+constexpr Duration kExplanationWall = std::chrono::seconds(3);       // the box is asked over HTTP for 2 s
+constexpr Duration kAftermath = std::chrono::seconds(3);
+constexpr Duration kLastLookWall = std::chrono::milliseconds(500);  // at a supply whose output is off
+constexpr int kBiasAttempts = 3;
+constexpr int kLinesOfEvents = 10;
+
+/// The box has been asked why it is silent, or is so no more.
+bool explains_silence(results::EventKind kind) {
+  using results::EventKind;
+  return kind == EventKind::stolen || kind == EventKind::rdt_disabled || kind == EventKind::unreachable ||
+         kind == EventKind::unusable || kind == EventKind::resumed;
+}
+
+}  // namespace
+
+Sequence::Sequence(Bench& bench, Recorder& recorder, Guard& guard, const RunOrder& order, Progress& progress,
+                   const std::function<bool()>& stop_asked)
+    : bench_(bench), recorder_(recorder), guard_(guard), order_(order), progress_(progress), stop_asked_(stop_asked) {
+  position_.propeller = order.campaign.propeller.id;
+  position_.occlusion_deg = order.occlusion_deg;
+  position_.repetition = order.repetition;
+  position_.repetitions = order.campaign.repetitions;
+  position_.steps = order.campaign.profile.steps;
+  end_ = bench.clock().now() + from_seconds(order.remaining_bench_s);
+}
+
+void Sequence::run() {
+  wait_for_standstill();
+  if (order_.campaign.box_bias) take_box_bias();
+  hold_zero(Phase::zero_before);
+  require_rest();
+  recorder_.take_zero();
+  guard_.take_zero(recorder_.measured());
+  spin_through_the_steps();
+  wait_for_standstill();
+  hold_zero(Phase::zero_after);
+  mark(Phase::end, -1, RadPerSec(0));
+}
+
+std::string Sequence::aftermath() {
+  if (bench_.supply() != nullptr) return power_off();
+  if (!has_spun_ || stop_) return {};
+  iq::StopSettings settings;
+  settings.limit = kAftermath;
+  bench_.motor().begin_stop(settings);
+  const Instant give_up = bench_.clock().now() + 4 * kAftermath;
+  std::string cause;
+  while (bench_.clock().now() < give_up) {
+    for (const results::StreamEvent& event : recorder_.take_events()) {
+      if (cause.empty() && is_of_motor(event.kind) && ends_a_run(event.kind)) cause = "; " + event.text;
+    }
+    if ((stop_ = bench_.motor().stop_report())) return cause + "; " + stop_->summary();
+    bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
+  }
+  return cause + "; nobody knows whether the motor coasts";
+}
+
+std::string Sequence::power_off() {
+  const Instant since = bench_.clock().now();
+  const Trip* trip = guard_.latch().trip();
+  const std::string told = trip != nullptr ? trip->reason : "";
+  const std::string why = bench_.supply()->switch_off();
+  if (!why.empty()) return told.ends_with(why) ? "" : "; " + why;
+  const Instant give_up = bench_.clock().now() + bench_.clock().stretched(kLastLookWall);
+  while (recorder_.supply().time_ns < since.count() && bench_.clock().now() < give_up)
+    bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
+  const results::SupplyReading seen = recorder_.supply();
+  if (seen.protection == results::SupplyProtection::none || told.starts_with("supply:"))
+    return "; the supply's output is off";
+  const std::int64_t at = bench_.clock().now().count();
+  supply_event_ = {results::EventKind::supply_stop, at, 0,
+                   fmt::format("{:.3f} s: {}", 1e-9 * static_cast<double>(at), tripped_words(seen))};
+  return "; " + tripped_words(seen);
+}
+
+void Sequence::compare_configuration(int attempts) {
+  const auto event = configuration_event(
+      bench_.load_cell().configuration(), box_bias_.records > 0, [&] { return bench_.load_cell().page(); },
+      [&] { return bench_.clock().now(); }, attempts);
+  if (!event) return;
+  recorder_.note(*event);
+  progress_.say("load cell: " + event->text);
+}
+
+std::string Sequence::explanation() {
+  const Instant since = bench_.clock().now();
+  const auto stretched = [&](Duration wall) { return bench_.clock().stretched(wall); };
+  if (recorder_.observe(since).load_cell_age < stretched(kSpinPatienceWall) / 2) return {};
+  if (!standstill_.empty()) return "; " + standstill_;
+  while (bench_.clock().now() < since + stretched(kExplanationWall) && !stop_asked_()) {
+    for (const results::StreamEvent& event : recorder_.take_events()) {
+      if (explains_silence(event.kind)) return "; " + event.text;
+    }
+    bench_.wait_until(bench_.clock().now() + stretched(kTickWall));
+  }
+  return {};
+}
+
+void Sequence::take_box_bias() {
+  const netbox::ZeroMeasurement before = measure(Phase::bias_before);
+  if (const auto why = unrest(before)) throw DeviceError("Net Box", "take the bias", *why, kZeroNextMove);
+  // The box takes one noisy sample as its zero: a bad draw is drawn again.
+  for (int attempt = 1;; ++attempt) {
+    set_box_bias();
+    const netbox::ZeroMeasurement after = measure(Phase::bias_after);
+    box_bias_ = to_bias(before, after);
+    const auto remains = beyond_zero(after);
+    if (!remains) return;
+    if (attempt == kBiasAttempts) throw DeviceError("Net Box", "take the bias", *remains, kZeroNextMove);
+  }
+}
+
+void Sequence::set_box_bias() {
+  mark(Phase::bias_settling, -1, RadPerSec(0));
+  bench_.load_cell().set_bias();
+  const netbox::Configuration& box = bench_.load_cell().configuration();
+  hold(bench_.clock().stretched(kBiasWorksWall) + from_seconds(3 * box.records_per_datagram / box.rdt_rate_hz),
+       nullptr);
+}
+
+netbox::ZeroMeasurement Sequence::measure(Phase phase) {
+  position_.phase = "bias";
+  mark(phase, -1, RadPerSec(0));
+  hold(from_seconds(order_.campaign.zero.value()), nullptr);
+  progress_.step_done(position_, seen_);
+  return recorder_.measured();
+}
+
+void Sequence::spin_through_the_steps() {
+  Spin spin(bench_.motor(), order_.place.iq.spin, guard_.latch());
+  has_spun_ = true;
+  int step = 0;
+  for (const RadPerSec level : order_.campaign.profile.levels()) {
+    position_.step = step;
+    position_.commanded = level;
+    change_speed();
+    spin.at(level);
+    mark(Phase::step, step, level);
+    hold(from_seconds(order_.campaign.profile.dwell.value()), &spin);
+    progress_.step_done(position_, seen_);
+    ++step;
+  }
+  position_.step = -1;
+  position_.commanded = RadPerSec(0);
+  position_.phase = "spin down";
+  mark(Phase::spin_down, -1, RadPerSec(0));
+  change_speed();
+  iq::StopSettings stop;
+  // What a ramp feeds back raises the voltage of a bench supply, which cannot sink it, until its protection trips.
+  if (bench_.supply() != nullptr) stop.coast_below = kAnySpeed;
+  spin.begin_stop(stop);
+  while (!(stop_ = spin.stopped())) hold(bench_.clock().stretched(kTickWall), &spin);
+  if (!stop_->safe()) throw SafetyStop(stop_->summary());
+}
+
+void Sequence::mark(Phase phase, int step, RadPerSec commanded) {
+  const results::PhaseMark mark{phase, step, bench_.clock().now().count(), commanded.value()};
+  recorder_.mark(mark);
+  guard_.mark(mark);
+}
+
+void Sequence::change_speed() {
+  guard_.settles_until(bench_.clock().now() + from_seconds(order_.campaign.minimum_discard.value()));
+}
+
+void Sequence::hold_zero(Phase phase) {
+  position_.phase = "zero";
+  mark(phase, -1, RadPerSec(0));
+  hold(from_seconds(order_.campaign.zero.value()), nullptr);
+  progress_.step_done(position_, seen_);
+}
+
+void Sequence::require_rest() {
+  while (!seen_.load_cell_is_fresh) hold(bench_.clock().stretched(kTickWall), nullptr);  // check() ends this
+  const auto axis = static_cast<std::size_t>(order_.place.thrust_axis);
+  const double deviation = recorder_.measured().standard_deviation[axis];
+  if (deviation <= kNoisyZero) return;
+  throw DeviceError(
+      "Net Box", "take the zero",
+      fmt::format("F{} is noisy: deviation {:.3g} N where {:g} N are tolerated", "xyz"[axis], deviation, kNoisyZero),
+      kZeroNextMove);
+}
+
+void Sequence::wait_for_standstill() {
+  position_.phase = "spin down";
+  const Instant give_up = bench_.clock().now() + from_seconds(kSpinDownLimitSeconds);
+  // First a reading that is younger than the coast.
+  hold(bench_.clock().stretched(20 * kTickWall), nullptr);
+  while (recorder_.observe(bench_.clock().now()).speed.value() > kStandstillRadPerSec) {
+    if (bench_.clock().now() > give_up) {
+      throw SafetyStop(fmt::format("the motor coasts but still turns at {:.0f} RPM after {:.0f} s",
+                                   to_rpm(recorder_.observe(bench_.clock().now()).speed), kSpinDownLimitSeconds));
+    }
+    hold(bench_.clock().stretched(kTickWall), nullptr);
+  }
+}
+
+void Sequence::hold(Duration duration, Spin* spin) {
+  const Instant until = bench_.clock().now() + duration;
+  for (Instant now = bench_.clock().now(); now < until; now = bench_.clock().now()) {
+    bench_.wait_until(std::min(until, now + bench_.clock().stretched(kTickWall)));
+    tick(spin);
+  }
+}
+
+void Sequence::tick(Spin* spin) {
+  if (stop_asked_()) throw Interrupted("stopped by request");
+  recorder_.check_failure();
+  tell_events();
+  guard_.check(spin != nullptr);
+  const Instant now = bench_.clock().now();
+  seen_ = recorder_.observe(now);
+  if (spin) spin->renew();
+  position_.remaining_s = to_seconds(bench_.clock().shrunk(std::max(Duration(0), end_ - now)));
+  progress_.tick(position_, seen_);
+}
+
+void Sequence::tell_events() {
+  for (const results::StreamEvent& event : recorder_.take_events()) {
+    if (event.kind == results::EventKind::stalled) standstill_ = event.text;
+    if (event.kind == results::EventKind::stall_ended) standstill_.clear();
+    const std::string line = (is_of_motor(event.kind) ? "motor: " : "load cell: ") + event.text;
+    if (told_ < kLinesOfEvents) progress_.say(line);
+    if (++told_ == kLinesOfEvents) progress_.say("what else happens in this run is in its file: kphi info");
+    if (ends_a_run(event.kind)) throw SafetyStop(line);
+  }
+}
+
+}  // namespace kphi::daq

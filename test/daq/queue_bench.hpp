@@ -1,0 +1,87 @@
+// A bench whose devices say what a test puts in.
+#pragma once
+
+#include <deque>
+#include <utility>
+
+#include "daq/bench.hpp"
+
+namespace kphi::daq {
+
+template <class T>
+std::size_t move_out(std::deque<T>& from, std::span<T> out) {
+  const std::size_t n = std::min(from.size(), out.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    out[i] = from.front();
+    from.pop_front();
+  }
+  return n;
+}
+
+/// A motor that says what a test puts in.
+class QueueMotor final : public MotorLink {
+ public:
+  void spin_at(RadPerSec) override {}
+  void renew() noexcept override {}
+  void emergency_stop() noexcept override { ++coasted; }
+  void begin_stop(const iq::StopSettings&) override {}
+  [[nodiscard]] std::optional<iq::StopReport> stop_report() override { return std::nullopt; }
+  [[nodiscard]] const iq::AuditRecord& parameters() const override { return parameters_; }
+  [[nodiscard]] std::optional<Celsius> coil_temperature() override { return std::nullopt; }
+  std::size_t take(std::span<results::MotorReading> out) override { return move_out(readings, out); }
+  [[nodiscard]] std::string identity() const override { return "test"; }
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return std::exchange(events, {}); }
+  [[nodiscard]] std::string failure() const override { return lost; }
+
+  std::deque<results::MotorReading> readings;
+  std::vector<results::StreamEvent> events;
+  std::string lost;
+  int coasted = 0;
+
+ private:
+  iq::AuditRecord parameters_;
+};
+
+/// A bench of queues that a test fills.
+class QueueBench final : public Bench, private LoadCellLink {
+ public:
+  [[nodiscard]] const Clock& clock() const override { return time; }
+  [[nodiscard]] MotorLink& motor() override { return queue_motor; }
+  [[nodiscard]] LoadCellLink& load_cell() override { return *this; }
+  void wait_until(Instant when) override { time.set(when); }
+  [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()>) override { return nullptr; }
+  [[nodiscard]] results::FileLayer& files() override { return *layer; }
+  [[nodiscard]] Duration sync_interval() const override { return std::chrono::milliseconds(500); }
+  void mounted(const std::string&, double) override {}
+
+  ManualClock time;
+  results::FileLayer* layer = &results::disk();
+  std::deque<results::LoadCellRecord> records;
+  QueueMotor queue_motor;
+  std::deque<results::MotorReading>& readings = queue_motor.readings;
+  std::vector<results::StreamEvent> events;
+
+ private:
+  [[nodiscard]] const netbox::Configuration& configuration() const override { return configuration_; }
+  [[nodiscard]] std::vector<netbox::Finding> findings() const override { return {}; }
+  results::LoadCellScale start() override { return {}; }
+  void stop() noexcept override {}
+  std::size_t take(std::span<results::LoadCellRecord> out) override { return move_out(records, out); }
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return std::exchange(events, {}); }
+  std::string page() override { return {}; }
+  void set_bias() noexcept override {}
+  [[nodiscard]] results::SampleAccount account() const override { return {}; }
+  [[nodiscard]] results::StreamHealth health() const override { return {}; }
+  [[nodiscard]] std::string failure() const override { return {}; }
+
+  netbox::Configuration configuration_;
+};
+
+/// 20 N, 60 N along Fz, 1 N m.
+inline results::LoadCellScale mini40() {
+  results::LoadCellScale scale;
+  scale.range = {20, 20, 60, 1, 1, 1};
+  return scale;
+}
+
+}  // namespace kphi::daq

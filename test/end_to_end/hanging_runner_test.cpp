@@ -1,0 +1,112 @@
+// A runner that hangs in the middle of a step, on a bench over its true transports: the guard's thread lets the motor
+// go.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <signal.h>
+
+#include <atomic>
+#include <future>
+#include <thread>
+
+#include "daq/interlock.hpp"
+#include "daq/run.hpp"
+#include "drivers/sim/control_line.hpp"
+#include "test/end_to_end/account.hpp"
+#include "test/end_to_end/running_bench.hpp"
+
+namespace kphi::test {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+constexpr double kSoonerThanByPause = 250;  // ms; a runner that hangs is let go after 400 ms for that alone
+
+class HangingRunner : public testing::Test {
+ protected:
+  HangingRunner() : place_(profiles::load_bench(simulation_.path("bench.yaml"))), bench_(daq::connect(place_)) {
+    bench_->mounted("5x3", 0);
+    campaign_.profile.dwell = Seconds(1.5);
+  }
+  ~HangingRunner() override { release(); }
+
+  [[nodiscard]] json status() const { return json::parse(sim::tell(simulation_.path("control"), "status")); }
+  /// Polls; false when it never comes true.
+  template <class Predicate>
+  [[nodiscard]] static bool soon(Predicate&& predicate) {
+    const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!predicate()) {
+      if (std::chrono::steady_clock::now() > give_up) return false;
+      ::poll(nullptr, 0, 2);
+    }
+    return true;
+  }
+  /// Records a run whose runner hangs once the motor turns, until release().
+  void record() {
+    run_ = std::async(std::launch::async, [this]() -> std::string {
+      daq::NoProgress progress;
+      try {
+        (void)daq::record_run(*bench_, {campaign_, place_, 0.0, 1, 10.0, simulation_.path("run.h5")}, progress, [this] {
+          if (turns_) {
+            hangs_ = true;
+            go_on_.get_future().wait();
+            turns_ = false;
+          }
+          return false;
+        });
+      } catch (const daq::SafetyStop& stop) {
+        return stop.what();
+      }
+      return "nothing stopped the run";
+    });
+  }
+  void hang() {
+    ASSERT_TRUE(soon([&] { return status()["speed_rad_s"] > 500.0; }));
+    turns_ = true;
+    ASSERT_TRUE(soon([&] { return hangs_.load(); }));
+  }
+  void release() {
+    if (!std::exchange(released_, true)) go_on_.set_value();
+  }
+  [[nodiscard]] bool coasts() const { return status()["drive"]["mode"] == "coast"; }
+  [[nodiscard]] Account account() {
+    simulation_.process().signal(SIGTERM);
+    EXPECT_EQ(simulation_.process().wait(), 0);
+    return account_of(bytes_of(simulation_.path("wire.jsonl")));
+  }
+
+  RunningBench simulation_{Manner{1, 7000, "  []\n", false}};
+  profiles::Campaign campaign_ = short_campaign();
+  profiles::Bench place_;
+  std::unique_ptr<daq::Bench> bench_;
+  std::atomic<bool> turns_{false}, hangs_{false};
+  std::promise<void> go_on_;
+  bool released_ = false;
+  std::future<std::string> run_;
+};
+
+TEST_F(HangingRunner, DoesNotKeepTheGuardFromLettingTheMotorGo) {
+  record();
+  hang();
+  EXPECT_TRUE(soon([&] { return coasts(); })) << "while the runner hangs";
+  release();
+  EXPECT_THAT(run_.get(), HasSubstr("this program stood still for"));
+}
+
+TEST_F(HangingRunner, DoesNotKeepTheGuardFromSeeingALimit) {
+  record();
+  hang();
+  const std::string answer =
+      sim::tell(simulation_.path("control"), "fault kind=zero_drift axis=2 amount=40 tau_s=0.001");
+  ASSERT_THAT(answer, testing::StartsWith("ok "));
+  EXPECT_TRUE(soon([&] { return coasts(); })) << "while the runner hangs";
+  release();
+  EXPECT_THAT(run_.get(), HasSubstr("thrust"));
+  const double after_ms = account().stages.back().first - 1e3 * std::stod(answer.substr(3));
+  fmt::print("coasts {:.1f} ms after the limit was passed, its runner hanging\n", after_ms);
+  EXPECT_LT(after_ms, kSoonerThanByPause);
+}
+
+}  // namespace
+}  // namespace kphi::test
