@@ -1,12 +1,12 @@
 #include "daq/device_locks.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/udp.hpp>
 #include <cctype>
+#include <system_error>
 
 #include "drivers/device_error.hpp"
 #include "drivers/serial/discovery.hpp"
@@ -16,10 +16,14 @@
 namespace kphi::daq {
 namespace {
 
-/// For all users: a folder of one user's own would hide one's programs from another's.
+/// The same for all users, root among them: a folder of one's own would hide one's programs from another's.
 std::filesystem::path lock_folder_of_host() {
   const std::filesystem::path usual = "/run/lock";
-  return ::access(usual.c_str(), W_OK) == 0 ? usual : std::filesystem::path("/tmp");
+  std::error_code none;
+  const auto found = std::filesystem::status(usual, none);
+  const bool for_all = std::filesystem::is_directory(found) &&
+                       (found.permissions() & std::filesystem::perms::others_write) != std::filesystem::perms::none;
+  return for_all ? usual : std::filesystem::path("/tmp");
 }
 
 std::filesystem::path file_of(const std::string& name) {

@@ -32,6 +32,7 @@ class ModelDisk final : public results::FileLayer {
   }
   void sync_data(int descriptor) override {
     next();
+    if (forgets_syncs) return;
     struct stat status {};
     if (::fstat(descriptor, &status) != 0) throw std::system_error(errno, std::generic_category());
     std::string bytes(static_cast<std::size_t>(status.st_size), '\0');
@@ -58,6 +59,8 @@ class ModelDisk final : public results::FileLayer {
   }
 
   [[nodiscard]] int operations() const { return operations_; }
+  /// As a program that never syncs its files: shows that the model loses what it should.
+  bool forgets_syncs = false;
 
   /// What a power cut leaves of `folder`, as new files in `image`: of each folder the entries as last synced or as they
   /// are now, of each file page by page what was last synced or what is there now, by the lot of `seed`.

@@ -92,7 +92,7 @@ class Resume : public testing::Test {
 
   test::TemporaryFolder folder_;
   profiles::Bench place_ = test::deterministic_place(2);
-  profiles::Campaign campaign_ = test::short_campaign("0, 90, 180", 2, 3);
+  profiles::Campaign campaign_ = test::short_campaign("0, 90, 180", 2, 2);
   results::CampaignFolder results_ = results::CampaignFolder::create(folder_.path(), "20210530T000000Z", "short");
   StoppingOperator person_;
   Heard said_;
@@ -104,7 +104,7 @@ TEST_F(Resume, GoesOnAtTheFirstUnfinishedRunAndGivesTheBytesOfACampaignThatWasNe
   ASSERT_EQ(before.size(), 4u);
   const CampaignResult result = resume();
   EXPECT_EQ(result.runs, 6);
-  EXPECT_EQ(result.steps, 18);
+  EXPECT_EQ(result.steps, 12);
   EXPECT_THAT(person_.asked, ElementsAre(90, 180)) << "what was mounted then may not be now";
   EXPECT_TRUE(results::verify_campaign(results_).whole());
   const auto after = measured_in(results_);
@@ -190,7 +190,7 @@ TEST_F(Resume, AgainAndAgainLeavesOneAcceptanceOfEachRun) {
 TEST_F(Resume, RefusesAnotherCampaignFileUntilToldAndThenSaysAndKeepsBoth) {
   stop_before(90);
   const std::string before = campaign_.text;
-  campaign_ = profiles::parse_campaign(test::short_campaign_text("0, 90, 180", 1, 3), "short.yaml");
+  campaign_ = profiles::parse_campaign(test::short_campaign_text("0, 90, 180", 1, 2), "short.yaml");
   const std::string why = refusal<ConfigurationError>();
   EXPECT_THAT(why, AllOf(HasSubstr("the campaign file has changed"), HasSubstr("--accept-changes")));
   EXPECT_THAT(why, HasSubstr(results_.path().string()));
