@@ -18,7 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kImages = 6;  // that are resumed to the end; all are looked at
+constexpr int kImages = 6;    // that are resumed to the end
+constexpr int kGlances = 40;  // at others, whether anything is lost
 constexpr int kRefusals = 6;
 
 class Counting final : public Progress {
@@ -96,7 +97,9 @@ class AnyOperation : public testing::Test {
 };
 
 TEST_F(AnyOperation, KilledOrWithoutPowerLosesNoAcceptedRun) {
-  const std::set<int> moments = some_of(count_operations(), kImages);
+  const int operations = count_operations();
+  const std::set<int> moments = some_of(operations, kImages);
+  const std::set<int> glances = some_of(operations, kGlances);
   struct Image {
     fs::path path;
     int accepted;
@@ -107,7 +110,7 @@ TEST_F(AnyOperation, KilledOrWithoutPowerLosesNoAcceptedRun) {
   fs::path folder;
   test::ModelDisk* disk = nullptr;
   test::ModelDisk cut([&](int n) {
-    if (folder.empty()) return;
+    if (folder.empty() || !(moments.contains(n) || glances.contains(n))) return;
     const fs::path dark = folder_.path() / fmt::format("dark-{}", n);
     const std::string when = fmt::format("power cut before operation {}", n);
     disk->cut_power(folder, dark, static_cast<unsigned>(n));
@@ -126,7 +129,7 @@ TEST_F(AnyOperation, KilledOrWithoutPowerLosesNoAcceptedRun) {
   folder = results.path();
   run(cut, progress, results);
   EXPECT_EQ(progress.accepted, 2);
-  ASSERT_GE(images.size(), 2u * (kImages - 2));
+  ASSERT_GE(images.size(), 2u * (kImages - 1));
   for (const Image& image : images) expect_resumable(image.path, image.accepted, image.when);
 }
 

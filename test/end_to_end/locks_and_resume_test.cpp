@@ -76,7 +76,7 @@ TEST(Resume, RefusesAChangedCampaignBeforeAnyDeviceIsAsked) {
 }
 
 TEST(Resume, NeedsACampaignOrAFolder) {
-  Process nothing({kphi(), "run", "--bench", std::string(KPHI_SOURCE_DIR) + "/profiles/bench_deterministic.yaml"});
+  Process nothing({kphi(), "run", "--bench", KPHI_SOURCE_DIR "/profiles/bench_deterministic.yaml"});
   EXPECT_EQ(nothing.wait(), 2);
   EXPECT_THAT(nothing.err(), HasSubstr("no campaign: name its file, or a folder with --resume"));
 }
