@@ -21,6 +21,7 @@
 #include "profiles/commands.hpp"
 #include "profiles/configuration_error.hpp"
 #include "results/commands.hpp"
+#include "results/record_error.hpp"
 #include "results/version.hpp"
 
 namespace {
@@ -111,6 +112,8 @@ int main(int argc, char** argv) {
     return complain(error, kSafetyStop);
   } catch (const kphi::daq::Interrupted& error) {
     return complain(error, kInterrupted);
+  } catch (const kphi::results::DataRejected& error) {
+    return complain(error, kDataRejected);
   } catch (const std::exception& error) {
     return complain(error, kFailure);
   }

@@ -82,6 +82,13 @@ class LoadCellLink {
   [[nodiscard]] virtual results::StreamHealth health() const = 0;
 };
 
+/// Of one run, before anything of it happens.
+struct RunBeginning {
+  double occlusion_deg = 0;
+  int repetition = 1;
+  Instant after{0};  ///< bench time when the campaign's last run was accepted, be it by another program; 0: none was
+};
+
 class Bench {
  public:
   virtual ~Bench() = default;
@@ -100,6 +107,8 @@ class Bench {
   [[nodiscard]] virtual results::FileLayer& files() = 0;
   /// How often the recorder secures the run file, bench time.
   [[nodiscard]] virtual Duration sync_interval() const = 0;
+  /// A run begins; a bench in virtual time may begin anew with it. References to its parts may die.
+  virtual void begin_run(const RunBeginning&) {}
   /// Tells whoever must know what a person has mounted (a simulated bench). Throws DeviceError.
   virtual void mounted(const std::string& propeller_id, double occlusion_deg) = 0;
 };

@@ -6,22 +6,21 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 #include "daq/bench_audit.hpp"
 #include "daq/interrupt.hpp"
 #include "daq/reduction.hpp"
-#include "daq/repetitions.hpp"
 #include "daq/run.hpp"
+#include "daq/step_tables.hpp"
 #include "daq/zero_limits.hpp"
 #include "drivers/device_error.hpp"
 #include "drivers/iq/quality.hpp"
 #include "profiles/plan.hpp"
 #include "profiles/strict_yaml.hpp"
 #include "results/journal.hpp"
+#include "results/record_error.hpp"
 #include "results/run_reader.hpp"
-#include "results/sha256.hpp"
-#include "results/steps_csv.hpp"
-#include "results/version.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -58,45 +57,80 @@ class CampaignRun {
         progress_(progress),
         stop_asked_(stop_asked),
         plan_(profiles::make_plan(campaign, place)),
-        journal_(folder.journal(), bench.files()) {}
+        journal_(folder.journal(), bench.files()),
+        tables_(folder, campaign.occlusions_deg) {}
 
-  CampaignResult run() {
-    results::write_text(folder_.campaign_file(), campaign_.text, bench_.files());
-    results::write_text(folder_.bench_file(), place_.text, bench_.files());
-    json started{{"tool_version", kVersion},
-                 {"campaign_sha256", results::sha256(campaign_.text)},
-                 {"bench_sha256", results::sha256(place_.text)},
-                 {"motor", bench_.motor().identity()}};
-    if (place_.simulation) {
-      keep(place_.simulation->faults, folder_.faults_file(), "faults_sha256", started);
-      keep(place_.simulation->motor, folder_.motor_file(), "motor_sha256", started);
+  CampaignResult run(const Resumption* resumption) {
+    json identity = identity_of(campaign_, place_);
+    add_devices(identity, bench_);
+    if (resumption == nullptr || resumption->state.identity.is_null()) {
+      keep_files();
+      note(results::kCampaignStarted, identity);
+    } else {
+      resume(*resumption, std::move(identity));
     }
-    note("campaign_started", started);
     try {
       audit();
-      for (const profiles::PlannedRun& planned : plan_.runs) one(planned);
+      for (const profiles::PlannedRun& planned : plan_.runs) {
+        if (!is_accepted(planned)) one(planned);
+      }
     } catch (const std::exception& e) {
-      note("campaign_stopped", {{"reason", e.what()}});
+      note_the_end("campaign_stopped", {{"reason", e.what()}});
       progress_.say(fmt::format("{} of {} runs are finished and kept in {}", result_.runs, plan_.runs.size(),
+                                folder_.path().string()));
+      progress_.say(fmt::format("go on with: kphi run {} --bench {} --resume {}", campaign_.path, place_.path,
                                 folder_.path().string()));
       throw;
     }
-    note("campaign_finished", {{"runs", result_.runs}});
+    note(results::kCampaignFinished, {{"runs", result_.runs}});
     return result_;
   }
 
  private:
-  /// A file that the bench file names, if it names one, beside the copy of the bench file.
-  void keep(const std::string& file, const std::filesystem::path& copy, const char* hash, json& noted) {
-    if (file.empty()) return;
-    const std::string text = profiles::read_text(file);
-    results::write_text(copy, text, bench_.files());
-    noted[hash] = results::sha256(text);
+  /// Beside each other: the files of the campaign, and those that the bench file names.
+  void keep_files() {
+    keep_copy(folder_.campaign_file(), campaign_.text, bench_.files());
+    keep_copy(folder_.bench_file(), place_.text, bench_.files());
+    if (!place_.simulation) return;
+    const auto keep = [&](const std::string& file, const std::filesystem::path& copy) {
+      if (!file.empty()) keep_copy(copy, profiles::read_text(file), bench_.files());
+    };
+    keep(place_.simulation->faults, folder_.faults_file());
+    keep(place_.simulation->motor, folder_.motor_file());
+  }
+
+  void resume(const Resumption& resumption, json identity) {
+    const std::vector<std::string> changes = require_unchanged(folder_, resumption, identity);
+    if (!changes.empty()) keep_files();
+    const std::vector<std::string> aside = results::set_leftovers_aside(folder_, resumption.state, bench_.files());
+    identity["accepted_runs"] = resumption.state.accepted.size();
+    if (!changes.empty()) identity["accepted_changes"] = changes;
+    if (!aside.empty()) identity["set_aside"] = aside;
+    note(results::kCampaignResumed, identity);
+    for (const std::string& change : changes) progress_.say("going on although " + change);
+    for (const std::string& file : aside) progress_.say("left behind unfinished, kept as " + file);
+    for (const results::AcceptedRun& run : resumption.state.accepted) {
+      const auto file = folder_.path() / run.file;
+      const results::RunRecording recording = results::read_run(file);
+      count(file, recording, reduce(recording));
+      accepted_at_ = Instant(run.time_ns);
+    }
+    if (result_.runs > 0) tables_.write(bench_.files());
+    progress_.say(fmt::format("resumed: {} of {} runs are accepted", result_.runs, plan_.runs.size()));
+  }
+
+  [[nodiscard]] std::filesystem::path file_of(const profiles::PlannedRun& planned) const {
+    return folder_.run(campaign_.propeller.id, planned.occlusion_deg, planned.repetition);
+  }
+
+  [[nodiscard]] bool is_accepted(const profiles::PlannedRun& planned) const {
+    return accepted_.contains(file_of(planned).filename().string());
   }
 
   void one(const profiles::PlannedRun& planned) {
     if (planned.occlusion_deg != mounted_deg_) mount(planned.occlusion_deg);
-    const auto file = folder_.run(campaign_.propeller.id, planned.occlusion_deg, planned.repetition);
+    bench_.begin_run({planned.occlusion_deg, planned.repetition, accepted_at_});
+    const auto file = file_of(planned);
     const double per_run_s = plan_.bench.value() / static_cast<double>(plan_.runs.size());
     const double remaining_s =
         per_run_s * static_cast<double>(plan_.runs.size() - static_cast<std::size_t>(result_.runs));
@@ -107,7 +141,7 @@ class CampaignRun {
       const RunOrder order{campaign_, place_, planned.occlusion_deg, planned.repetition, remaining_s, file};
       accept(record_run(bench_, order, progress_, stop_asked_));
     } catch (const std::exception& e) {
-      note(results::kRunAborted, {{"run", file.filename().string()}, {"reason", e.what()}});
+      note_the_end(results::kRunAborted, {{"run", file.filename().string()}, {"reason", e.what()}});
       throw;
     }
   }
@@ -155,12 +189,9 @@ class CampaignRun {
     note("mounted", {{"propeller", campaign_.propeller.id}, {"occlusion_deg", occlusion_deg}});
   }
 
+  /// The file is whole, named and on disk: the journal's line accepts it. The tables follow from the files.
   void accept(const RunResult& run) {
     const results::RunRecording recording = results::read_run(run.file);
-    const auto [means, zero] = reduce_with_zeros(recording);
-    steps_.insert(steps_.end(), means.begin(), means.end());
-    results::write_steps(folder_.steps(), steps_, bench_.files());
-    results::write_steps(folder_.means(), average_repetitions(steps_), bench_.files());
     const std::uint64_t lost = run.account.lost_network + run.account.lost_host;
     json accepted = {{"file", "runs/" + run.file.filename().string()},
                      {"sha256", run.sha256},
@@ -168,18 +199,30 @@ class CampaignRun {
                      {"lost", lost}};
     if (run.stop) accepted["stop"] = to_json(*run.stop);
     for (const results::StreamEvent& event : recording.events) accepted["events"].push_back(event.text);
+    accepted_at_ = bench_.clock().now();
     note(results::kRunAccepted, accepted);
+    auto [means, zero] = reduce_with_zeros(recording);
+    const std::size_t steps = means.size();
+    const int doubtful = count(run.file, recording, std::move(means));
+    tables_.write(bench_.files());
     tell(zero);
+    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps in doubt{}", result_.runs,
+                              plan_.runs.size(), run.file.filename().string(), run.account.received, lost, doubtful,
+                              steps, standing_words(run.stop)));
+  }
+
+  /// Returns how many of its steps are in doubt.
+  int count(const std::filesystem::path& file, const results::RunRecording& run, std::vector<results::StepMean> means) {
     int doubtful = 0;
     for (const auto& step : means) doubtful += step.doubts != 0;
     ++result_.runs;
     result_.samples += run.account.received;
-    result_.lost += lost;
+    result_.lost += run.account.lost_network + run.account.lost_host;
     result_.steps += static_cast<int>(means.size());
     result_.doubtful_steps += doubtful;
-    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps in doubt{}", result_.runs,
-                              plan_.runs.size(), run.file.filename().string(), run.account.received, lost, doubtful,
-                              means.size(), standing_words(run.stop)));
+    accepted_.insert(file.filename().string());
+    tables_.add(file, std::move(means));
+    return doubtful;
   }
 
   void tell(const ZeroCheck& zero) {
@@ -204,6 +247,15 @@ class CampaignRun {
     journal_.append(event, data, now.count(), utc_text(bench_.clock(), now));
   }
 
+  /// After a failure, which matters more than that the disk takes this line no more.
+  void note_the_end(const std::string& event, const json& data) {
+    try {
+      note(event, data);
+    } catch (const results::RecordError& error) {
+      progress_.say(error.what());
+    }
+  }
+
   Bench& bench_;
   const profiles::Campaign& campaign_;
   const profiles::Bench& place_;
@@ -213,7 +265,9 @@ class CampaignRun {
   const std::function<bool()>& stop_asked_;
   const profiles::Plan plan_;
   results::Journal journal_;
-  std::vector<results::StepMean> steps_;
+  StepTables tables_;
+  std::set<std::string> accepted_;  ///< names of files
+  Instant accepted_at_{0};          ///< the last of them
   std::optional<double> mounted_deg_;
   CampaignResult result_;
 };
@@ -222,8 +276,8 @@ class CampaignRun {
 
 CampaignResult run_campaign(Bench& bench, const profiles::Campaign& campaign, const profiles::Bench& place,
                             const results::CampaignFolder& folder, Operator& person, Progress& progress,
-                            const std::function<bool()>& stop_asked) {
-  return CampaignRun(bench, campaign, place, folder, person, progress, stop_asked).run();
+                            const std::function<bool()>& stop_asked, const Resumption* resumption) {
+  return CampaignRun(bench, campaign, place, folder, person, progress, stop_asked).run(resumption);
 }
 
 }  // namespace kphi::daq

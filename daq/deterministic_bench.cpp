@@ -97,7 +97,8 @@ class WithinWaits final : public Background {
 }  // namespace
 
 DeterministicBench::DeterministicBench(const profiles::Bench& place, const sim::BenchSettings& other)
-    : air_(place.ambient, clock_),
+    : clock_(other.begin),
+      air_(place.ambient, clock_),
       sim_(settings_of(place, other)),
       supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, sim_.supply()->circuit(), clock_)
                            : nullptr),

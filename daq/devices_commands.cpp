@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "daq/air.hpp"
+#include "daq/device_locks.hpp"
 #include "daq/load_cell_audit.hpp"
 #include "daq/run.hpp"
 #include "daq/supply_probe.hpp"
@@ -232,6 +233,9 @@ int devices(const Asked& asked) {
     fmt::print(stderr, "kphi: {} is simulated inside the program: it has no devices to ask\n", asked.bench);
     return kOk;
   }
+  // Asking starts a stream and resets a module: whoever measures with them would be disturbed.
+  const DeviceLocks locks(bench ? lock_names(*bench)
+                                : std::vector<std::string>{fmt::format("Net Box {}:49152", kFactoryAddress)});
   const SteadyClock clock(bench && bench->simulation ? bench->simulation->time_scale : 1.0);
   profiles::NetBoxPlace factory;
   factory.host = kFactoryAddress;

@@ -29,6 +29,8 @@ class CampaignFolder {
   [[nodiscard]] std::filesystem::path faults_file() const { return path_ / "faults.yaml"; }
   [[nodiscard]] std::filesystem::path motor_file() const { return path_ / "motor.yaml"; }
   [[nodiscard]] std::filesystem::path journal() const { return path_ / "journal.jsonl"; }
+  /// Taken by the program that writes into the folder.
+  [[nodiscard]] std::filesystem::path lock() const { return path_ / ".lock"; }
   [[nodiscard]] std::filesystem::path runs() const { return path_ / "runs"; }
   [[nodiscard]] std::filesystem::path steps() const { return path_ / "steps.csv"; }
   /// Steps averaged over their repetitions.

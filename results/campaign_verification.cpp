@@ -1,6 +1,7 @@
 #include "results/campaign_verification.hpp"
 
 #include <map>
+#include <system_error>
 
 #include "results/journal.hpp"
 #include "results/record_error.hpp"
@@ -39,6 +40,14 @@ void check_digest(const CampaignFolder& folder, const std::string& file, const s
   }
 }
 
+/// A copy, or a version control system, may have lost it; the SHA-256 tells whether anybody made use of it.
+bool is_writable(const std::filesystem::path& path) {
+  using std::filesystem::perms;
+  std::error_code none;
+  const perms all = std::filesystem::status(path, none).permissions();
+  return (all & (perms::owner_write | perms::group_write | perms::others_write)) != perms::none;
+}
+
 }  // namespace
 
 CampaignVerification verify_campaign(const CampaignFolder& folder) {
@@ -47,6 +56,7 @@ CampaignVerification verify_campaign(const CampaignFolder& folder) {
   for (const auto& [file, digest] : digests) check_digest(folder, file, digest, found);
   for (const auto& path : folder.complete_runs()) {
     ++found.runs;
+    if (is_writable(path)) found.remarks.push_back(path.string() + ": is writable; chmod a-w it");
     for (const std::string& problem : verify_run(path).problems) {
       found.problems.push_back(problem.find(path.string()) == std::string::npos ? path.string() + ": " + problem
                                                                                 : problem);

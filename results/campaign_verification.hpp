@@ -14,6 +14,7 @@ struct CampaignVerification {
   std::size_t runs = 0;               ///< complete runs looked at
   bool torn_last_line = false;        ///< of the journal; no problem
   std::vector<std::string> problems;  ///< one line each, with the file's name
+  std::vector<std::string> remarks;   ///< likewise: what is whole, but not as kphi left it
   [[nodiscard]] bool whole() const { return problems.empty(); }
 };
 

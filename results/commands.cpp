@@ -146,7 +146,7 @@ void info(const Asked& asked) {
 
 int verify(const Asked& asked) {
   Json found{{"path", asked.path}};
-  std::vector<std::string> problems;
+  std::vector<std::string> problems, remarks;
   std::string words;
   if (std::filesystem::is_directory(asked.path)) {
     const CampaignVerification campaign = verify_campaign(CampaignFolder::open(asked.path));
@@ -154,6 +154,7 @@ int verify(const Asked& asked) {
     found["journal_entries"] = campaign.entries;
     found["torn_last_line"] = campaign.torn_last_line;
     problems = campaign.problems;
+    remarks = campaign.remarks;
     words =
         fmt::format("{} runs and {} journal entries{}", campaign.runs, campaign.entries,
                     campaign.torn_last_line ? " (the last line of the journal was cut short and does not count)" : "");
@@ -170,10 +171,12 @@ int verify(const Asked& asked) {
   }
   found["whole"] = problems.empty();
   found["problems"] = problems;
+  found["remarks"] = remarks;
   if (asked.json) {
     fmt::print("{}\n", dump(found));
   } else {
     for (const std::string& problem : problems) fmt::print("{}\n", problem);
+    for (const std::string& remark : remarks) fmt::print(stderr, "kphi: {}\n", remark);
     if (problems.empty()) fmt::print("{}: whole: {}\n", asked.path, words);
   }
   return problems.empty() ? kOk : kRejected;

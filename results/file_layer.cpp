@@ -99,6 +99,18 @@ void require_room(const std::filesystem::path& folder, std::uint64_t bytes, File
                                 folder.string(), 1e-6 * static_cast<double>(bytes), 1e-6 * static_cast<double>(free)));
 }
 
+std::filesystem::path free_name(const std::string& name, const std::string& ending) {
+  std::filesystem::path path = name + ending;
+  for (int i = 2; std::filesystem::exists(path); ++i) path = fmt::format("{}-{}{}", name, i, ending);
+  return path;
+}
+
+void sync_file(const std::filesystem::path& path, FileLayer& files) {
+  const Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (fd.get() < 0) fail("open");
+  files.sync_data(fd.get());
+}
+
 void write_text(const std::filesystem::path& path, const std::string& text, FileLayer& files) {
   const std::filesystem::path part = path.string() + ".part";
   try {

@@ -41,6 +41,12 @@ class MemoryOnlySync final : public FileLayer {
 /// Throws RecordError unless `folder` has room for `bytes`; the message names both and the folder.
 void require_room(const std::filesystem::path& folder, std::uint64_t bytes, FileLayer& files = disk());
 
+/// The first free of name+ending, name-2+ending, name-3+ending …
+[[nodiscard]] std::filesystem::path free_name(const std::string& name, const std::string& ending);
+
+/// Makes the bytes of a closed file last. Throws std::system_error.
+void sync_file(const std::filesystem::path& path, FileLayer& files);
+
 /// Writes `text` beside `path`, syncs it and puts it in the place of `path` in one step. Throws RecordError.
 void write_text(const std::filesystem::path& path, const std::string& text, FileLayer& files = disk());
 

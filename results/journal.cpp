@@ -58,9 +58,13 @@ Lines parse(std::string_view text) {
       lines.torn = true;
       break;
     }
+    const std::string_view line = text.substr(lines.whole_bytes, end - lines.whole_bytes);
+    if (end + 1 == text.size() && line.find('\0') != std::string_view::npos) {
+      lines.torn = true;
+      break;
+    }
     JournalEntry entry;
-    lines.problem = parse_line(text.substr(lines.whole_bytes, end - lines.whole_bytes), lines.entries.size() + 1,
-                               lines.check, entry);
+    lines.problem = parse_line(line, lines.entries.size() + 1, lines.check, entry);
     if (lines.problem) break;
     lines.entries.push_back(std::move(entry));
     lines.whole_bytes = end + 1;
@@ -92,6 +96,7 @@ Journal::Journal(std::filesystem::path path, FileLayer& files) : path_(std::move
   if (!found_.problems.empty()) throw RecordError(found_.problems.front() + "; begin a new campaign folder");
   next_ = found_.entries.size() + 1;
   check_ = lines.check;
+  whole_bytes_ = lines.whole_bytes;
   descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
   if (descriptor_ < 0) throw RecordError(failure_text(path_.string(), errno));
   try {
@@ -115,6 +120,7 @@ void Journal::append(const std::string& event, const nlohmann::json& data, Nanos
   line.pop_back();
   const std::string check = check_of(check_, line);
   line += fmt::format("{}{}\"}}\n", kCheckKey, check);
+  if (spoilt_) throw RecordError(path_.string() + ": an earlier line could not be written whole; see the first error");
   try {
     files_.before_write(line.size());
     for (std::size_t done = 0; done < line.size();) {
@@ -125,10 +131,12 @@ void Journal::append(const std::string& event, const nlohmann::json& data, Nanos
     }
     files_.sync_data(descriptor_);
   } catch (const std::system_error& error) {
+    spoilt_ = ::ftruncate(descriptor_, static_cast<off_t>(whole_bytes_)) != 0;
     throw RecordError(failure_text(path_.string(), error.code().value()));
   }
   ++next_;
   check_ = check;
+  whole_bytes_ += line.size();
 }
 
 }  // namespace kphi::results

@@ -16,6 +16,10 @@ namespace kphi::results {
 /// Data of this event: {"file": "runs/….h5", "sha256": "…"}. verify compares every entry that holds both keys.
 inline constexpr const char* kRunAccepted = "run_accepted";
 inline constexpr const char* kRunAborted = "run_aborted";
+/// Data: tool, files and devices of the campaign. The bench time of what follows begins anew with each of them.
+inline constexpr const char* kCampaignStarted = "campaign_started";
+inline constexpr const char* kCampaignResumed = "campaign_resumed";
+inline constexpr const char* kCampaignFinished = "campaign_finished";
 
 struct JournalEntry {
   std::uint64_t n = 0;      ///< 1, 2, 3 …
@@ -27,7 +31,8 @@ struct JournalEntry {
 
 struct JournalReading {
   std::vector<JournalEntry> entries;  ///< those whose checksum is right, up to the first that is not
-  bool torn_last_line = false;        ///< the last line has no end: its writer died; it was never promised to anybody
+  bool torn_last_line = false;        ///< the last line has no end: its writer died, or the power was cut (zeros
+                                      ///< where nothing was written); it was never promised to anybody
   std::vector<std::string> problems;  ///< "journal.jsonl:3: …"
 };
 
@@ -44,7 +49,8 @@ class Journal {
   Journal& operator=(const Journal&) = delete;
   ~Journal();
 
-  /// On disk when this returns. `data` is null or an object.
+  /// On disk when this returns. `data` is null or an object. What a failure left of the line is cut off; where even
+  /// that fails, every later one fails, too.
   void append(const std::string& event, const nlohmann::json& data, Nanoseconds time_ns, const std::string& utc);
 
   /// What the file held when it was opened.
@@ -55,7 +61,9 @@ class Journal {
   FileLayer& files_;
   JournalReading found_;
   std::uint64_t next_ = 1;
-  std::string check_;  ///< of the last line
+  std::string check_;              ///< of the last line
+  std::uint64_t whole_bytes_ = 0;  ///< up to its end
+  bool spoilt_ = false;            ///< part of a line lies behind them
   int descriptor_ = -1;
 };
 

@@ -11,4 +11,10 @@ class RecordError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What is there is not what was accepted (exit code 5).
+class DataRejected : public RecordError {
+ public:
+  using RecordError::RecordError;
+};
+
 }  // namespace kphi::results

@@ -218,13 +218,6 @@ struct EventSeries : Series {
   Column &kind, &time, &records, &text;
 };
 
-/// The first free of name, name-2, name-3 … before `ending`.
-std::filesystem::path free_name(const std::string& name, const std::string& ending) {
-  std::filesystem::path path = name + ending;
-  for (int i = 2; std::filesystem::exists(path); ++i) path = fmt::format("{}-{}{}", name, i, ending);
-  return path;
-}
-
 std::string without_ending(const std::filesystem::path& path) { return (path.parent_path() / path.stem()).string(); }
 
 /// Runs `action`; what the file layer refuses becomes a RecordError.
@@ -377,6 +370,7 @@ std::string RunWriter::finish(const RunEnding& ending) {
     secure();
   });
   close();
+  on_disk(path_, [&] { sync_file(path_, files_); });  // what closing wrote
 
   const Verification verification = verify_run(path_);
   if (outcome == Outcome::complete && !verification.whole()) {

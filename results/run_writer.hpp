@@ -35,8 +35,9 @@ class RunWriter {
   /// Everything appended so far is on disk when this returns (H5Fflush and fdatasync). Twice a second of wall time.
   void sync();
 
-  /// Closes, reopens and verifies, renames `.part` to `.h5` (aborted: `.aborted.h5`, or `.aborted-2.h5` …), makes it
-  /// read-only. Returns the file's SHA-256. Throws when a complete run does not pass: the .part stays for a look.
+  /// Closes and syncs, reopens and verifies, makes read-only, renames `.part` to `.h5` (aborted: `.aborted.h5`, or
+  /// `.aborted-2.h5` …), and syncs the folder. Returns the file's SHA-256. Throws when a complete run does not pass:
+  /// the .part stays for a look.
   [[nodiscard]] std::string finish(const RunEnding& ending);
 
   /// Where the record lies now: the .part, after finish() its final name.

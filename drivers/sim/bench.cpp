@@ -20,6 +20,7 @@ IqSettings module_of(const BenchSettings& settings) {
   module.oscillator_gain = settings.oscillator_gain;
   module.time_scale = settings.time_scale;
   module.seed = settings.seed ^ kModuleStream;
+  module.begin = settings.begin;
   return module;
 }
 
@@ -29,6 +30,10 @@ constexpr Instant time_of_tick(std::uint64_t tick) noexcept {
 }
 static_assert(kTicksPerSecond == 7000);
 
+constexpr std::uint64_t ticks_before(Instant time) noexcept {
+  return static_cast<std::uint64_t>(time.count()) / 1'000'000 * 7;
+}
+
 }  // namespace
 
 SimulatedBench::SimulatedBench(const BenchSettings& settings)
@@ -37,7 +42,9 @@ SimulatedBench::SimulatedBench(const BenchSettings& settings)
       wire_(netbox_, settings.faults, settings.seed ^ kWireStream, settings.keep),
       motor_(module_of(settings), plant_.motor()),
       motor_line_(motor_, {settings.motor_line_paced, settings.time_scale, settings.motor_usb_tick},
-                  settings.motor_faults, settings.seed ^ kLineStream, settings.motor_keep) {
+                  settings.motor_faults, settings.seed ^ kLineStream, settings.motor_keep),
+      ticks_(ticks_before(settings.begin)),
+      tick_at_(time_of_tick(ticks_)) {
   if (!settings.supply) return;
   supply_.emplace(*settings.supply);
   plant_.power([this](double amps, double siemens) { return supply_->advance({amps, siemens}, tick_at_); });

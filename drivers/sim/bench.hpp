@@ -19,6 +19,7 @@ namespace kphi::sim {
 
 struct BenchSettings {
   std::uint64_t seed = 1;
+  Instant begin{0};       ///< bench time at which it is switched on
   double time_scale = 1;  ///< stretches the module's communication timeout, nothing else: it is a deadline of wall time
   NetBoxSettings netbox;
   int module_id = 0;

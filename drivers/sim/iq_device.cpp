@@ -39,7 +39,7 @@ IqDevice::IqDevice(const IqSettings& settings, const MotorState& state)
   memory_.provide(16, 0, settings.baud);
   memory_.provide(52, 15, settings.timeout_s);
   replace(settings.uid);
-  boot(Instant{0});
+  boot(settings.begin);
 }
 
 void IqDevice::receive(std::span<const std::uint8_t> bytes, Instant now) {

@@ -39,6 +39,7 @@ struct IqSettings {
   double timeout_s = 0.5;     ///< saved
   std::array<std::uint32_t, 3> uid{0x00230006, 0x4d4b5011, 0x20343353};
   std::uint64_t seed = 1;
+  Instant begin{0};  ///< when it is switched on
 };
 
 /// One reply as the firmware meant it.

@@ -232,6 +232,43 @@ TEST_F(JournalFile, ATornLastLineIsToldAndCutOff) {
   EXPECT_EQ(reading.entries[2].event, "resumed");
 }
 
+TEST_F(JournalFile, ALastLineWithZerosInItIsWhatAPowerCutLeft) {
+  write(3);
+  std::string cut = text();
+  const std::size_t last = cut.rfind('\n', cut.size() - 2) + 1;
+  cut.replace(last + 5, 20, 20, '\0');
+  put(cut);
+  const JournalReading reading = read_journal(path_);
+  EXPECT_TRUE(reading.torn_last_line);
+  EXPECT_EQ(reading.entries.size(), 2u);
+  EXPECT_THAT(reading.problems, IsEmpty());
+  cut.replace(last - 20, 5, 5, '\0');
+  put(cut);
+  EXPECT_FALSE(read_journal(path_).problems.empty()) << "a line before the last was on disk";
+}
+
+TEST_F(JournalFile, ALineThatCouldNotBeSyncedLeavesNothingBehind) {
+  class Refusing : public FileLayer {
+   public:
+    void sync_data(int) override {
+      if (armed) throw std::system_error(EIO, std::generic_category());
+    }
+    bool armed = false;
+  } files;
+  Journal journal(path_, files);
+  journal.append("first", {}, 0, "");
+  const std::string whole = text();
+  files.armed = true;
+  EXPECT_THROW(journal.append("refused", {}, 1, ""), RecordError);
+  EXPECT_EQ(text(), whole);
+  files.armed = false;
+  journal.append("second", {}, 2, "");
+  const JournalReading reading = read_journal(path_);
+  EXPECT_THAT(reading.problems, IsEmpty());
+  ASSERT_EQ(reading.entries.size(), 2u);
+  EXPECT_EQ(reading.entries[1].event, "second");
+}
+
 TEST_F(JournalFile, EveryChangedByteShows) {
   write(3);
   const std::string whole = text();

@@ -1,0 +1,49 @@
+#include "daq/runs_apart.hpp"
+
+#include <bit>
+
+namespace kphi::daq {
+namespace {
+
+/// SplitMix64's finaliser: neighbouring keys give unrelated streams.
+std::uint64_t mixed(std::uint64_t key) noexcept {
+  key += 0x9e3779b9'7f4a7c15ull;
+  key = (key ^ (key >> 30)) * 0xbf58476d'1ce4e5b9ull;
+  key = (key ^ (key >> 27)) * 0x94d049bb'133111ebull;
+  return key ^ (key >> 31);
+}
+
+profiles::Bench seeded(profiles::Bench place, const RunBeginning& run) {
+  const auto angle = std::bit_cast<std::uint64_t>(run.occlusion_deg);
+  const auto repetition = static_cast<std::uint64_t>(run.repetition);
+  place.simulation->seed = mixed(mixed(mixed(place.simulation->seed) ^ angle) ^ repetition);
+  return place;
+}
+
+}  // namespace
+
+RunsApart::RunsApart(const profiles::Bench& place)
+    : place_(place), bench_(std::make_unique<DeterministicBench>(place)) {
+  bench_->use_files(*files_);
+}
+
+void RunsApart::begin_run(const RunBeginning& run) {
+  sim::BenchSettings settings;
+  settings.begin = run.after;
+  bench_.reset();
+  bench_ = std::make_unique<DeterministicBench>(seeded(place_, run), settings);
+  bench_->use_files(*files_);
+  if (mounted_) bench_->mounted(mounted_->first, mounted_->second);
+}
+
+void RunsApart::mounted(const std::string& propeller_id, double occlusion_deg) {
+  bench_->mounted(propeller_id, occlusion_deg);
+  mounted_ = {propeller_id, occlusion_deg};
+}
+
+void RunsApart::use_files(results::FileLayer& files) noexcept {
+  files_ = &files;
+  bench_->use_files(files);
+}
+
+}  // namespace kphi::daq

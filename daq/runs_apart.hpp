@@ -1,0 +1,47 @@
+// The deterministic bench, made anew for every run: what a run measures depends on the seed, its occlusion, its
+// repetition and the bench time at which it begins, and on nothing that happened before. A campaign that was killed and
+// resumed thus gives the same bytes as one that was not. The price: every run begins with a cold motor and a zero of
+// its own.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "daq/deterministic_bench.hpp"
+
+namespace kphi::daq {
+
+class RunsApart final : public Bench {
+ public:
+  explicit RunsApart(const profiles::Bench& place);
+  void begin_run(const RunBeginning& run) override;
+  void mounted(const std::string& propeller_id, double occlusion_deg) override;
+
+  [[nodiscard]] const Clock& clock() const override { return bench_->clock(); }
+  [[nodiscard]] MotorLink& motor() override { return bench_->motor(); }
+  [[nodiscard]] LoadCellLink& load_cell() override { return bench_->load_cell(); }
+  [[nodiscard]] SupplyLink* supply() override { return bench_->supply(); }
+  [[nodiscard]] std::optional<ambient::Density> air() const override { return bench_->air(); }
+  void wait_until(Instant when) override { bench_->wait_until(when); }
+  [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override {
+    return bench_->keep_calling(std::move(work));
+  }
+  [[nodiscard]] results::FileLayer& files() override { return *files_; }
+  [[nodiscard]] Duration sync_interval() const override { return bench_->sync_interval(); }
+
+  /// Of the present run; gone with the next one's beginning.
+  [[nodiscard]] sim::SimulatedBench& simulation() noexcept { return bench_->simulation(); }
+  /// For all runs to come, too.
+  void use_files(results::FileLayer& files) noexcept;
+
+ private:
+  const profiles::Bench place_;
+  results::MemoryOnlySync own_files_;
+  results::FileLayer* files_ = &own_files_;
+  std::unique_ptr<DeterministicBench> bench_;  ///< of the present run
+  std::optional<std::pair<std::string, double>> mounted_;
+};
+
+}  // namespace kphi::daq
