@@ -1,6 +1,7 @@
 // steps.csv: one row per step of every run. UTF-8, LF, a header line with the units in the names, shortest round trip
-// numbers; a number that was not measured is an empty field (NaN in memory). Further columns (what a bench supply showed,
-// the density of the air, how certain the means are) stand in groups at the end, each where one of the steps has it.
+// numbers; a number that was not measured is an empty field (NaN in memory). Further columns (what a bench supply
+// showed, the density of the air, how certain the means are) stand in groups at the end, each where one of the steps
+// has it.
 #pragma once
 
 #include <cstdint>
