@@ -8,11 +8,10 @@
 #include <optional>
 
 #include "daq/bench_audit.hpp"
+#include "daq/campaign_review.hpp"
 #include "daq/interrupt.hpp"
 #include "daq/reduction.hpp"
-#include "daq/repetitions.hpp"
 #include "daq/run.hpp"
-#include "daq/zero_limits.hpp"
 #include "drivers/device_error.hpp"
 #include "drivers/iq/quality.hpp"
 #include "profiles/plan.hpp"
@@ -20,7 +19,6 @@
 #include "results/journal.hpp"
 #include "results/run_reader.hpp"
 #include "results/sha256.hpp"
-#include "results/steps_csv.hpp"
 #include "results/version.hpp"
 
 namespace kphi::daq {
@@ -58,7 +56,14 @@ class CampaignRun {
         progress_(progress),
         stop_asked_(stop_asked),
         plan_(profiles::make_plan(campaign, place)),
-        journal_(folder.journal(), bench.files()) {}
+        journal_(folder.journal(), bench.files()),
+        review_(campaign, progress, [this](const char* event, const json& data) { note(event, data); }),
+        planned_(static_cast<int>(plan_.runs.size())) {
+    person.dictate_to([this](const char* event, const std::string& words) { note(event, {{"words", words}}); });
+  }
+  ~CampaignRun() { person_.dictate_to({}); }
+  CampaignRun(const CampaignRun&) = delete;
+  CampaignRun& operator=(const CampaignRun&) = delete;
 
   CampaignResult run() {
     results::write_text(folder_.campaign_file(), campaign_.text, bench_.files());
@@ -74,11 +79,15 @@ class CampaignRun {
     note("campaign_started", started);
     try {
       audit();
-      for (const profiles::PlannedRun& planned : plan_.runs) one(planned);
+      for (const profiles::PlannedRun& planned : plan_.runs) {
+        one(planned);
+        if (!planned.is_reference()) repeat(planned.occlusion_deg);
+      }
+      review_.conclude();
     } catch (const std::exception& e) {
       note("campaign_stopped", {{"reason", e.what()}});
-      progress_.say(fmt::format("{} of {} runs are finished and kept in {}", result_.runs, plan_.runs.size(),
-                                folder_.path().string()));
+      progress_.say(
+          fmt::format("{} of {} runs are finished and kept in {}", result_.runs, planned_, folder_.path().string()));
       throw;
     }
     note("campaign_finished", {{"runs", result_.runs}});
@@ -95,20 +104,35 @@ class CampaignRun {
   }
 
   void one(const profiles::PlannedRun& planned) {
-    if (planned.occlusion_deg != mounted_deg_) mount(planned.occlusion_deg);
+    mount(planned);
     const auto file = folder_.run(campaign_.propeller.id, planned.occlusion_deg, planned.repetition);
     const double per_run_s = plan_.bench.value() / static_cast<double>(plan_.runs.size());
-    const double remaining_s =
-        per_run_s * static_cast<double>(plan_.runs.size() - static_cast<std::size_t>(result_.runs));
+    const double remaining_s = per_run_s * (planned_ - result_.runs);
+    profiles::PlannedRun capped = planned;
+    const int left_out = review_.cap().apply(capped.steps);
     try {
       cool_down();
       if (place_.ambient.known() && !bench_.air())
         progress_.say("air: its sensor measures no more: the density of this run is unknown");
-      const RunOrder order{campaign_, place_, planned.occlusion_deg, planned.repetition, remaining_s, file};
-      accept(record_run(bench_, order, progress_, stop_asked_));
+      const RunOrder order{campaign_, place_, *mounted_, capped, remaining_s, file};
+      accept(record_run(bench_, order, progress_, stop_asked_), left_out);
     } catch (const std::exception& e) {
       note(results::kRunAborted, {{"run", file.filename().string()}, {"reason", e.what()}});
       throw;
+    }
+  }
+
+  /// While its repetitions disagree, and somebody agrees to another.
+  void repeat(double occlusion_deg) {
+    while (const auto question = review_.another(occlusion_deg)) {
+      const bool yes = person_.run_again(*question);
+      note("another_run", {{"occlusion_deg", occlusion_deg},
+                           {"reason", question->reason},
+                           {"decided", yes},
+                           {"decided_by", person_.name()}});
+      if (!yes) return;
+      ++planned_;
+      one(profiles::extra_run(campaign_, occlusion_deg, review_.repetitions(occlusion_deg) + 1));
     }
   }
 
@@ -148,28 +172,32 @@ class CampaignRun {
     }
   }
 
-  void mount(double occlusion_deg) {
-    person_.mount(campaign_.propeller, occlusion_deg);
+  void mount(const profiles::PlannedRun& planned) {
+    const double occlusion_deg = planned.occlusion_deg;
+    if (!planned.mount && mounted_ && mounted_->occlusion_deg() == occlusion_deg) return;
+    mounted_.reset();
+    const Mounted confirmed = person_.confirm_mounting(campaign_.propeller, occlusion_deg);
     bench_.mounted(campaign_.propeller.id, occlusion_deg);
-    mounted_deg_ = occlusion_deg;
-    note("mounted", {{"propeller", campaign_.propeller.id}, {"occlusion_deg", occlusion_deg}});
+    mounted_ = confirmed;
+    note("mounted",
+         {{"propeller", campaign_.propeller.id}, {"occlusion_deg", occlusion_deg}, {"confirmed_by", person_.name()}});
   }
 
-  void accept(const RunResult& run) {
+  void accept(const RunResult& run, int left_out) {
     const results::RunRecording recording = results::read_run(run.file);
     const auto [means, zero] = reduce_with_zeros(recording);
-    steps_.insert(steps_.end(), means.begin(), means.end());
-    results::write_steps(folder_.steps(), steps_, bench_.files());
-    results::write_steps(folder_.means(), average_repetitions(steps_), bench_.files());
     const std::uint64_t lost = run.account.lost_network + run.account.lost_host;
     json accepted = {{"file", "runs/" + run.file.filename().string()},
                      {"sha256", run.sha256},
                      {"samples", run.account.received},
                      {"lost", lost}};
+    if (left_out > 0) accepted["steps_left_out"] = left_out;
     if (run.stop) accepted["stop"] = to_json(*run.stop);
     for (const results::StreamEvent& event : recording.events) accepted["events"].push_back(event.text);
     note(results::kRunAccepted, accepted);
-    tell(zero);
+    review_.add(run.file.filename().string(), means);
+    review_.write(folder_, bench_.files());
+    for (const std::string& reason : zero.reasons()) progress_.say("load cell: " + reason);
     int doubtful = 0;
     for (const auto& step : means) doubtful += step.doubts != 0;
     ++result_.runs;
@@ -177,26 +205,9 @@ class CampaignRun {
     result_.lost += lost;
     result_.steps += static_cast<int>(means.size());
     result_.doubtful_steps += doubtful;
-    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps in doubt{}", result_.runs,
-                              plan_.runs.size(), run.file.filename().string(), run.account.received, lost, doubtful,
-                              means.size(), standing_words(run.stop)));
-  }
-
-  void tell(const ZeroCheck& zero) {
-    if (zero.only_one) {
-      progress_.say("load cell: only one of the two zeros of this run could be taken: all its steps are in doubt");
-    } else if (zero.drifted()) {
-      progress_.say(fmt::format(
-          "load cell: its zero moved by {:.3g} N during this run, {:.2g} N are tolerated: all its steps are "
-          "in doubt; let the cell warm up, keep draughts off it, see that nothing touches it",
-          zero.moved_n, zero.tolerated_n));
-    }
-    if (zero.noisy()) {
-      progress_.say(
-          fmt::format("load cell: at a zero of this run the samples scatter by {:.3g} N, {:g} N are tolerated: "
-                      "all its steps are in doubt; {}",
-                      zero.deviation_n, kNoisyZero, kZeroNextMove));
-    }
+    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps in doubt{}", result_.runs, planned_,
+                              run.file.filename().string(), run.account.received, lost, doubtful, means.size(),
+                              standing_words(run.stop)));
   }
 
   void note(const std::string& event, const json& data) {
@@ -213,8 +224,9 @@ class CampaignRun {
   const std::function<bool()>& stop_asked_;
   const profiles::Plan plan_;
   results::Journal journal_;
-  std::vector<results::StepMean> steps_;
-  std::optional<double> mounted_deg_;
+  CampaignReview review_;
+  int planned_;  ///< runs, with those that were added
+  std::optional<Mounted> mounted_;
   CampaignResult result_;
 };
 

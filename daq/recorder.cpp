@@ -78,6 +78,8 @@ void Recorder::drain_marks() {
     estimate_ = {};
     if (mark.phase == results::Phase::step) {
       speed_watch_.command(Instant(mark.time_ns), RadPerSec(mark.speed_rad_s));
+    } else if (mark.phase == results::Phase::ramp) {
+      speed_watch_.command_ramp(Instant(mark.time_ns), RadPerSec(mark.speed_rad_s));
     } else {
       speed_watch_.release();
     }

@@ -37,6 +37,8 @@ class Sequence {
   void set_box_bias();
   netbox::ZeroMeasurement measure(results::Phase phase);
   void spin_through_the_steps();
+  /// Takes no time when the campaign lets the speed change at once.
+  void ramp_to(RadPerSec level, Spin& spin);
   void change_speed() { settled_from_ = bench_.clock().now() + from_seconds(order_.campaign.minimum_discard.value()); }
   void hold_zero(results::Phase phase);
   /// Nothing turns while the cell is not at rest: the zero would be worth nothing, and all that is measured against it.
