@@ -9,11 +9,10 @@
 #include <set>
 
 #include "daq/bench_audit.hpp"
+#include "daq/campaign_review.hpp"
 #include "daq/interrupt.hpp"
 #include "daq/reduction.hpp"
 #include "daq/run.hpp"
-#include "daq/step_tables.hpp"
-#include "daq/zero_limits.hpp"
 #include "drivers/device_error.hpp"
 #include "drivers/iq/quality.hpp"
 #include "profiles/plan.hpp"
@@ -58,7 +57,13 @@ class CampaignRun {
         stop_asked_(stop_asked),
         plan_(profiles::make_plan(campaign, place)),
         journal_(folder.journal(), bench.files()),
-        tables_(folder, campaign.occlusions_deg) {}
+        review_(campaign, progress, [this](const char* event, const json& data) { note(event, data); }),
+        planned_(static_cast<int>(plan_.runs.size())) {
+    person.dictate_to([this](const char* event, const std::string& words) { note(event, {{"words", words}}); });
+  }
+  ~CampaignRun() { person_.dictate_to({}); }
+  CampaignRun(const CampaignRun&) = delete;
+  CampaignRun& operator=(const CampaignRun&) = delete;
 
   CampaignResult run(const Resumption* resumption) {
     json identity = identity_of(campaign_, place_);
@@ -73,11 +78,13 @@ class CampaignRun {
       audit();
       for (const profiles::PlannedRun& planned : plan_.runs) {
         if (!is_accepted(planned)) one(planned);
+        if (!planned.is_reference()) repeat(planned.occlusion_deg);
       }
+      review_.conclude();
     } catch (const std::exception& e) {
       note_the_end("campaign_stopped", {{"reason", e.what()}});
-      progress_.say(fmt::format("{} of {} runs are finished and kept in {}", result_.runs, plan_.runs.size(),
-                                folder_.path().string()));
+      progress_.say(
+          fmt::format("{} of {} runs are finished and kept in {}", result_.runs, planned_, folder_.path().string()));
       progress_.say(fmt::format("go on with: kphi run {} --bench {} --resume {}", campaign_.path, place_.path,
                                 folder_.path().string()));
       throw;
@@ -112,11 +119,16 @@ class CampaignRun {
     for (const results::AcceptedRun& run : resumption.state.accepted) {
       const auto file = folder_.path() / run.file;
       const results::RunRecording recording = results::read_run(file);
-      count(file, recording, reduce(recording));
+      const std::vector<results::StepMean> means = reduce(recording);
+      review_.restore(means);
+      count(file, recording, means);
       accepted_at_ = Instant(run.time_ns);
     }
-    if (result_.runs > 0) tables_.write(bench_.files());
-    progress_.say(fmt::format("resumed: {} of {} runs are accepted", result_.runs, plan_.runs.size()));
+    if (result_.runs > 0) review_.write(folder_, bench_.files());
+    const auto open = std::count_if(plan_.runs.begin(), plan_.runs.end(),
+                                    [this](const profiles::PlannedRun& planned) { return !is_accepted(planned); });
+    planned_ = result_.runs + static_cast<int>(open);
+    progress_.say(fmt::format("resumed: {} of {} runs are accepted", result_.runs, planned_));
   }
 
   [[nodiscard]] std::filesystem::path file_of(const profiles::PlannedRun& planned) const {
@@ -128,21 +140,37 @@ class CampaignRun {
   }
 
   void one(const profiles::PlannedRun& planned) {
-    if (planned.occlusion_deg != mounted_deg_) mount(planned.occlusion_deg);
+    mount(planned);
     bench_.begin_run({planned.occlusion_deg, planned.repetition, accepted_at_});
     const auto file = file_of(planned);
     const double per_run_s = plan_.bench.value() / static_cast<double>(plan_.runs.size());
-    const double remaining_s =
-        per_run_s * static_cast<double>(plan_.runs.size() - static_cast<std::size_t>(result_.runs));
+    const double remaining_s = per_run_s * (planned_ - result_.runs);
+    profiles::PlannedRun capped = planned;
+    const int left_out = review_.cap().apply(capped.steps);
     try {
       cool_down();
       if (place_.ambient.known() && !bench_.air())
         progress_.say("air: its sensor measures no more: the density of this run is unknown");
-      const RunOrder order{campaign_, place_, planned.occlusion_deg, planned.repetition, remaining_s, file};
-      accept(record_run(bench_, order, progress_, stop_asked_));
+      const RunOrder order{campaign_, place_, *mounted_, capped, remaining_s, file};
+      accept(record_run(bench_, order, progress_, stop_asked_), left_out);
     } catch (const std::exception& e) {
       note_the_end(results::kRunAborted, {{"run", file.filename().string()}, {"reason", e.what()}});
       throw;
+    }
+  }
+
+  /// While its repetitions disagree, and somebody agrees to another: once they are all there.
+  void repeat(double occlusion_deg) {
+    if (review_.repetitions(occlusion_deg) < campaign_.repetitions || !judged_.insert(occlusion_deg).second) return;
+    while (const auto question = review_.another(occlusion_deg)) {
+      const bool yes = person_.run_again(*question);
+      note("another_run", {{"occlusion_deg", occlusion_deg},
+                           {"reason", question->reason},
+                           {"decided", yes},
+                           {"decided_by", person_.name()}});
+      if (!yes) return;
+      ++planned_;
+      one(profiles::extra_run(campaign_, occlusion_deg, review_.repetitions(occlusion_deg) + 1));
     }
   }
 
@@ -182,37 +210,43 @@ class CampaignRun {
     }
   }
 
-  void mount(double occlusion_deg) {
-    person_.mount(campaign_.propeller, occlusion_deg);
+  void mount(const profiles::PlannedRun& planned) {
+    const double occlusion_deg = planned.occlusion_deg;
+    if (!planned.mount && mounted_ && mounted_->occlusion_deg() == occlusion_deg) return;
+    mounted_.reset();
+    const Mounted confirmed = person_.confirm_mounting(campaign_.propeller, occlusion_deg);
     bench_.mounted(campaign_.propeller.id, occlusion_deg);
-    mounted_deg_ = occlusion_deg;
-    note("mounted", {{"propeller", campaign_.propeller.id}, {"occlusion_deg", occlusion_deg}});
+    mounted_ = confirmed;
+    note("mounted",
+         {{"propeller", campaign_.propeller.id}, {"occlusion_deg", occlusion_deg}, {"confirmed_by", person_.name()}});
   }
 
   /// The file is whole, named and on disk: the journal's line accepts it. The tables follow from the files.
-  void accept(const RunResult& run) {
+  void accept(const RunResult& run, int left_out) {
     const results::RunRecording recording = results::read_run(run.file);
     const std::uint64_t lost = run.account.lost_network + run.account.lost_host;
     json accepted = {{"file", "runs/" + run.file.filename().string()},
                      {"sha256", run.sha256},
                      {"samples", run.account.received},
                      {"lost", lost}};
+    if (left_out > 0) accepted["steps_left_out"] = left_out;
     if (run.stop) accepted["stop"] = to_json(*run.stop);
     for (const results::StreamEvent& event : recording.events) accepted["events"].push_back(event.text);
     accepted_at_ = bench_.clock().now();
     note(results::kRunAccepted, accepted);
-    auto [means, zero] = reduce_with_zeros(recording);
-    const std::size_t steps = means.size();
-    const int doubtful = count(run.file, recording, std::move(means));
-    tables_.write(bench_.files());
-    tell(zero);
-    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps in doubt{}", result_.runs,
-                              plan_.runs.size(), run.file.filename().string(), run.account.received, lost, doubtful,
-                              steps, standing_words(run.stop)));
+    const auto [means, zero] = reduce_with_zeros(recording);
+    review_.add(run.file.filename().string(), means);
+    const int doubtful = count(run.file, recording, means);
+    review_.write(folder_, bench_.files());
+    for (const std::string& reason : zero.reasons()) progress_.say("load cell: " + reason);
+    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps in doubt{}", result_.runs, planned_,
+                              run.file.filename().string(), run.account.received, lost, doubtful, means.size(),
+                              standing_words(run.stop)));
   }
 
   /// Returns how many of its steps are in doubt.
-  int count(const std::filesystem::path& file, const results::RunRecording& run, std::vector<results::StepMean> means) {
+  int count(const std::filesystem::path& file, const results::RunRecording& run,
+            const std::vector<results::StepMean>& means) {
     int doubtful = 0;
     for (const auto& step : means) doubtful += step.doubts != 0;
     ++result_.runs;
@@ -221,25 +255,7 @@ class CampaignRun {
     result_.steps += static_cast<int>(means.size());
     result_.doubtful_steps += doubtful;
     accepted_.insert(file.filename().string());
-    tables_.add(file, std::move(means));
     return doubtful;
-  }
-
-  void tell(const ZeroCheck& zero) {
-    if (zero.only_one) {
-      progress_.say("load cell: only one of the two zeros of this run could be taken: all its steps are in doubt");
-    } else if (zero.drifted()) {
-      progress_.say(fmt::format(
-          "load cell: its zero moved by {:.3g} N during this run, {:.2g} N are tolerated: all its steps are "
-          "in doubt; let the cell warm up, keep draughts off it, see that nothing touches it",
-          zero.moved_n, zero.tolerated_n));
-    }
-    if (zero.noisy()) {
-      progress_.say(
-          fmt::format("load cell: at a zero of this run the samples scatter by {:.3g} N, {:g} N are tolerated: "
-                      "all its steps are in doubt; {}",
-                      zero.deviation_n, kNoisyZero, kZeroNextMove));
-    }
   }
 
   void note(const std::string& event, const json& data) {
@@ -265,10 +281,12 @@ class CampaignRun {
   const std::function<bool()>& stop_asked_;
   const profiles::Plan plan_;
   results::Journal journal_;
-  StepTables tables_;
+  CampaignReview review_;
+  int planned_;                     ///< runs, with those that were added
+  std::set<double> judged_;         ///< occlusions whose repetitions are all there
   std::set<std::string> accepted_;  ///< names of files
   Instant accepted_at_{0};          ///< the last of them
-  std::optional<double> mounted_deg_;
+  std::optional<Mounted> mounted_;
   CampaignResult result_;
 };
 

@@ -10,14 +10,15 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "daq/answering_operator.hpp"
 #include "daq/bench_audit.hpp"
 #include "daq/campaign_run.hpp"
 #include "daq/device_locks.hpp"
+#include "daq/dry_run.hpp"
 #include "daq/interrupt.hpp"
 #include "profiles/configuration_error.hpp"
 #include "profiles/plan.hpp"
 #include "results/file_layer.hpp"
-#include "results/run_writer.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -28,49 +29,21 @@ struct RunOptions {
   std::string out = "results";
   std::string resume;  ///< a campaign's folder
   bool accept_changes = false;
+  std::string answers;
   bool dry_run = false;
   bool yes = false;
   bool json = false;
 };
 
-double time_scale(const profiles::Bench& place) { return place.simulation ? place.simulation->time_scale : 1.0; }
-
-std::uint64_t bytes_needed(const profiles::Plan& plan, const profiles::Bench& place) {
-  const auto readings = static_cast<std::uint64_t>(2 * place.iq.telemetry_hz * plan.bench.value());
-  return results::RunWriter::bytes_needed(plan.samples, readings);
-}
-
-nlohmann::json plan_json(const profiles::Campaign& campaign, const profiles::Bench& place, const profiles::Plan& plan) {
-  return {{"campaign", campaign.name},     {"propeller", campaign.propeller.id},
-          {"runs", plan.runs.size()},      {"mountings", plan.mountings},
-          {"steps", plan.steps},           {"spinning_s", plan.spinning.value()},
-          {"bench_s", plan.bench.value()}, {"time_scale", time_scale(place)},
-          {"samples", plan.samples},       {"bytes", bytes_needed(plan, place)}};
-}
-
-std::string plan_text(const profiles::Campaign& campaign, const profiles::Bench& place, const profiles::Plan& plan) {
-  const auto& profile = campaign.profile;
-  std::string angles;
-  for (const double angle : campaign.occlusions_deg) angles += fmt::format(" {:g}°", angle);
-  return fmt::format(
-      "{}: propeller {} ({}), occlusions{}, {} repetitions\n"
-      "  {} runs of {} steps, {:.0f} to {:.0f} RPM, {:g} s each; {} mountings\n"
-      "  {:.0f} min spinning, {:.0f} min on the bench{}, {:.1f} million samples, {:.2f} GB",
-      campaign.name, campaign.propeller.id, campaign.propeller.name, angles, campaign.repetitions, plan.runs.size(),
-      profile.steps, to_rpm(profile.first), to_rpm(profile.last), profile.dwell.value(), plan.mountings,
-      plan.spinning.value() / 60, plan.bench.value() / 60,
-      time_scale(place) > 1 ? fmt::format(" ({:g} times as fast here)", time_scale(place)) : "",
-      1e-6 * static_cast<double>(plan.samples), 1e-9 * static_cast<double>(bytes_needed(plan, place)));
-}
-
 bool stop_asked() { return SignalWatch::count() > 0; }
 
-std::unique_ptr<Operator> person(const RunOptions& options) {
+std::unique_ptr<Operator> person(const RunOptions& options, const std::optional<profiles::Answers>& answers) {
+  if (answers) return std::make_unique<AnsweringOperator>(*answers);
   if (options.yes) return std::make_unique<AgreeingOperator>();
   if (!isatty(STDIN_FILENO)) {
     throw ConfigurationError(
-        "kphi run: nobody to ask for the mountings: standard input is no terminal; use --yes if "
-        "the bench mounts by itself");
+        "kphi run: nobody to ask for the mountings: standard input is no terminal; name a file "
+        "with the answers (--answers FILE), or use --yes if the bench mounts by itself");
   }
   return std::make_unique<TerminalOperator>(STDIN_FILENO, stderr, stop_asked);
 }
@@ -154,21 +127,23 @@ int tell_finished(const Destination& destination, bool json) {
 int run(const RunOptions& options) {
   const profiles::Campaign campaign = campaign_of(options);
   const profiles::Bench place = profiles::load_bench(options.bench);
+  std::optional<profiles::Answers> answers;
+  if (!options.answers.empty()) answers = profiles::load_answers(options.answers);
+  if (options.dry_run) {
+    const DryRun dry = dry_run(campaign, place, options.out, answers);
+    put(stdout, options.json ? to_json(dry, campaign, place).dump() + "\n" : to_text(dry, campaign, place));
+    return dry.ok() ? 0 : 2;
+  }
   profiles::require_within(campaign, place);
   const profiles::Plan plan = profiles::make_plan(campaign, place);
-  if (options.dry_run) {
-    if (options.json)
-      fmt::print("{}\n", plan_json(campaign, place, plan).dump());
-    else
-      fmt::print("{}\n", plan_text(campaign, place, plan));
-    return 0;
-  }
   Destination destination;
   if (!options.resume.empty()) destination.open(options, campaign, place);
   if (destination.finished) return tell_finished(destination, options.json);
+  // Resumed, only what is left is asked: the operator tells what is missing.
+  if (answers && !destination.resumption) profiles::require_mountings(*answers, plan.mounting_angles());
   put(stderr,
       fmt::format("{}\nCtrl-C lets the motor coast, closes the file and stops.\n", plan_text(campaign, place, plan)));
-  const auto operator_ = person(options);
+  const auto operator_ = person(options, answers);
   const SignalWatch signals;
   const DeviceLocks devices(lock_names(place));
   if (!destination.folder) std::filesystem::create_directories(options.out);
@@ -182,6 +157,7 @@ int run(const RunOptions& options) {
   const CampaignResult result = run_campaign(*bench, campaign, place, *destination.folder, *operator_, *progress,
                                              stop_asked, destination.resumption ? &*destination.resumption : nullptr);
   summarise(result, *destination.folder, options.json);
+  operator_->finish();
   return 0;
 }
 
@@ -200,8 +176,10 @@ void add_run(CLI::App& program, int& exit_code) {
       ->add_flag("--accept-changes", options->accept_changes,
                  "resume although files, program or devices are not what they were")
       ->needs("--resume");
-  command->add_flag("--dry-run", options->dry_run, "check everything, print the plan, touch no device");
-  command->add_flag("--yes", options->yes, "take every mounting as done (a simulated bench)");
+  command->add_flag("--dry-run", options->dry_run, "check every limit, print the plan, touch no device");
+  auto* yes = command->add_flag("--yes", options->yes, "take every mounting as done (a simulated bench)");
+  command->add_option("--answers", options->answers, "file with the operator's answers, for a run without a terminal")
+      ->excludes(yes);
   command->add_flag("--json", options->json, "the result as one JSON object on stdout");
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }

@@ -139,6 +139,8 @@ void Guard::take_marks() {
   while (marks_.pop(mark)) {
     if (mark.phase == results::Phase::step) {
       speed_watch_.command(Instant(mark.time_ns), RadPerSec(mark.speed_rad_s));
+    } else if (mark.phase == results::Phase::ramp) {
+      speed_watch_.command_ramp(Instant(mark.time_ns), RadPerSec(mark.speed_rad_s));
     } else {
       speed_watch_.release();
     }

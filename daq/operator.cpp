@@ -31,18 +31,39 @@ std::string TerminalOperator::read_line() {
   }
 }
 
+std::string TerminalOperator::answer_to(const std::string& question) {
+  fmt::print(words_, "{} ", question);
+  std::fflush(words_);
+  asked(question);
+  const std::string answer = read_line();
+  answered(answer);
+  return answer;
+}
+
 void TerminalOperator::mount(const profiles::Propeller& propeller, double occlusion_deg) {
   const std::string what =
       occlusion_deg == 0 ? std::string("no occlusion") : fmt::format("the {:g}° occlusion", occlusion_deg);
   fmt::print(words_, "\nMount {} under propeller {} ({}). The motor is locked. Step back, then\n", what, propeller.id,
              propeller.name);
   for (;;) {
-    fmt::print(words_, "type the mounted angle ({:g}) and Enter, or q to stop: ", occlusion_deg);
-    std::fflush(words_);
-    const std::string answer = read_line();
+    const std::string answer =
+        answer_to(fmt::format("type the mounted angle ({:g}) and Enter, or q to stop:", occlusion_deg));
     if (is_angle(answer, occlusion_deg)) return;
     if (answer == "q") throw NotMounted(fmt::format("mounting of {:g}° was not confirmed", occlusion_deg));
     fmt::print(words_, "\"{}\" is not {:g}.\n", answer, occlusion_deg);
+  }
+}
+
+bool TerminalOperator::run_again(const AnotherRun& question) {
+  fmt::print(words_, "\n{:g}°: {}. All of them stay on record.\n", question.occlusion_deg, question.reason);
+  for (;;) {
+    const std::string answer = answer_to(fmt::format(
+        "run {:g}° again (extra run {} of at most {})? Enter or y: yes, n: no, q to stop:", question.occlusion_deg,
+        question.extra, question.extra_max));
+    if (answer.empty() || answer == "y" || answer == "yes") return true;
+    if (answer == "n" || answer == "no") return false;
+    if (answer == "q") throw Interrupted("stopped at the question for another run");
+    fmt::print(words_, "\"{}\" is neither y nor n.\n", answer);
   }
 }
 

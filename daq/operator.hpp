@@ -1,4 +1,4 @@
-// The person who mounts occlusions.
+// The person who mounts occlusions, and decides what a program cannot.
 #pragma once
 
 #include <cstdio>
@@ -6,6 +6,7 @@
 #include <string>
 
 #include "daq/interrupt.hpp"
+#include "daq/mounted.hpp"
 #include "profiles/campaign.hpp"
 
 namespace kphi::daq {
@@ -16,16 +17,55 @@ class NotMounted : public Interrupted {
   using Interrupted::Interrupted;
 };
 
-/// Asks for one mounting and returns once it is confirmed. Throws NotMounted.
-class Operator {
- public:
-  virtual ~Operator() = default;
-  virtual void mount(const profiles::Propeller& propeller, double occlusion_deg) = 0;
+/// The repetitions of an occlusion disagree.
+struct AnotherRun {
+  double occlusion_deg = 0;
+  std::string reason;         ///< one line
+  int extra = 1;              ///< it would be the first, the second … beyond those planned
+  int extra_max = 1;          ///< that the campaign allows
+  bool mounted_anew = false;  ///< before it the occlusion is asked for
 };
 
-/// Takes every mounting as done (`--yes`): a simulated bench, or a robot's.
+/// Whoever stands at the bench. All members are called from the runner's thread, while the motor coasts.
+class Operator {
+ public:
+  /// Writes down each question and each answer, right or wrong, as it comes.
+  using Scribe = std::function<void(const char* event, const std::string& words)>;
+
+  virtual ~Operator() = default;
+  /// Asks for one mounting and returns once it is confirmed: the only way to what unlocks the motor. Throws NotMounted.
+  [[nodiscard]] Mounted confirm_mounting(const profiles::Propeller& propeller, double occlusion_deg) {
+    mount(propeller, occlusion_deg);
+    return Mounted(occlusion_deg);
+  }
+  /// Asks whether to run it again; no, when nobody is there. Throws Interrupted when the person wants to stop.
+  [[nodiscard]] virtual bool run_again(const AnotherRun&) { return false; }
+  /// Nothing more will be asked. Throws ConfigurationError when more was answered than asked.
+  virtual void finish() {}
+  /// How it answers, for the record: "terminal", "--yes", "answers.yaml".
+  [[nodiscard]] virtual std::string name() const { return "program"; }
+  void dictate_to(Scribe scribe) { scribe_ = std::move(scribe); }
+
+ protected:
+  virtual void mount(const profiles::Propeller& propeller, double occlusion_deg) = 0;
+  void asked(const std::string& words) { write_down("operator_asked", words); }
+  void answered(const std::string& words) { write_down("operator_answered", words); }
+
+ private:
+  void write_down(const char* event, const std::string& words) {
+    if (scribe_) scribe_(event, words);
+  }
+  Scribe scribe_;
+};
+
+/// Takes every mounting as done (`--yes`): a simulated bench, or a robot's. Runs an occlusion again once at most: what
+/// still disagrees then is for a person to look at.
 class AgreeingOperator final : public Operator {
  public:
+  [[nodiscard]] bool run_again(const AnotherRun& question) override { return question.extra == 1; }
+  [[nodiscard]] std::string name() const override { return "--yes"; }
+
+ protected:
   void mount(const profiles::Propeller&, double) override {}
 };
 
@@ -36,9 +76,14 @@ class TerminalOperator final : public Operator {
   /// `stop_asked`: true when a signal came while waiting.
   TerminalOperator(int input_descriptor, std::FILE* words, std::function<bool()> stop_asked)
       : input_(input_descriptor), words_(words), stop_asked_(std::move(stop_asked)) {}
+  [[nodiscard]] bool run_again(const AnotherRun& question) override;
+  [[nodiscard]] std::string name() const override { return "terminal"; }
+
+ protected:
   void mount(const profiles::Propeller& propeller, double occlusion_deg) override;
 
  private:
+  std::string answer_to(const std::string& question);
   std::string read_line();
   int input_;
   std::FILE* words_;

@@ -44,8 +44,10 @@ void put(std::FILE* stream, const std::string& text) noexcept {
 }
 
 std::string describe(const Position& position, const Observation& seen) {
-  const std::string where = fmt::format("{}  φ {:3g}°  rep {}/{}", position.propeller, position.occlusion_deg,
-                                        position.repetition, position.repetitions);
+  const std::string which = position.repetition < 0
+                                ? fmt::format("ref {}", -position.repetition)
+                                : fmt::format("rep {}/{}", position.repetition, position.repetitions);
+  const std::string where = fmt::format("{}  φ {:3g}°  {}", position.propeller, position.occlusion_deg, which);
   const std::string what = position.step < 0 ? fmt::format("{:<10}", position.phase)
                                              : fmt::format("step {:2}/{}", position.step + 1, position.steps);
   return fmt::format("{}  {}  cmd {:5.0f}  is {} RPM  thrust {} N  left {}", where, what, to_rpm(position.commanded),

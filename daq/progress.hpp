@@ -14,7 +14,7 @@ namespace kphi::daq {
 struct Position {
   std::string propeller;
   double occlusion_deg = 0;
-  int repetition = 0;  ///< 1-based
+  int repetition = 0;  ///< 1-based; negative: a reference run
   int repetitions = 0;
   int step = -1;  ///< 0-based; -1 outside steps
   int steps = 0;

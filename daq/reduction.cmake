@@ -3,12 +3,15 @@ add_library(kphi_reduction STATIC
   cell_stream.cpp
   clock_map.cpp
   event_doubts.cpp
+  hysteresis.cpp
   lag.cpp
   mean_error.cpp
   motor_series.cpp
   reduction.cpp
+  reference_drift.cpp
   repetitions.cpp
   settling.cpp
+  speed_cap.cpp
   step_doubts.cpp
   supply_means.cpp
   zeros.cpp

@@ -101,7 +101,8 @@ class Reduction {
   /// The step that an abort cut short is followed by whatever made the bench safe, never by another step.
   [[nodiscard]] bool held_to_its_end(std::size_t i) const {
     if (run_.phases[i].phase != Phase::step || i + 1 >= run_.phases.size()) return false;
-    return run_.outcome == results::Outcome::complete || run_.phases[i + 1].phase == Phase::step;
+    const Phase next = run_.phases[i + 1].phase;
+    return run_.outcome == results::Outcome::complete || next == Phase::step || next == Phase::ramp;
   }
 
   [[nodiscard]] std::vector<HeldStep> held_steps() const {
@@ -114,7 +115,8 @@ class Reduction {
       }
       const Window whole{run_.phases[i].time_ns, run_.phases[i + 1].time_ns};
       CellBins bins = cell_.bins(whole);
-      Transition transition = transition_of(whole, bins);
+      const bool ramped = i > 0 && run_.phases[i - 1].phase == Phase::ramp;
+      Transition transition = transition_of(whole, bins, ramped);
       held.push_back({run_.phases[i], whole, std::move(bins), std::move(transition)});
     }
     return held;
@@ -130,7 +132,7 @@ class Reduction {
     return thrust;
   }
 
-  [[nodiscard]] Transition transition_of(const Window& whole, const CellBins& bins) const {
+  [[nodiscard]] Transition transition_of(const Window& whole, const CellBins& bins, bool ramped) const {
     Transition transition;
     transition.bin_s = bins.bin_s();
     const auto history_bins = static_cast<Nanoseconds>(kThrustHistory / bins.bin_s());
@@ -140,8 +142,9 @@ class Reduction {
     for (const auto& r : motor_.over(MotorChannel::speed, history)) {
       auto& squared = transition.squared;
       const double time_s = seconds(r.time_ns - whole.begin);
-      // Until the command the motor held what it held before.
-      if (time_s > 0 && !squared.empty() && squared.back().time_s < 0) squared.push_back({0, squared.back().value});
+      // Until the command the motor held what it held before, unless it was on its way.
+      if (!ramped && time_s > 0 && !squared.empty() && squared.back().time_s < 0)
+        squared.push_back({0, squared.back().value});
       if (squared.empty() || squared.back().time_s < time_s) squared.push_back({time_s, r.value * r.value});
     }
     return transition;

@@ -113,25 +113,14 @@ constexpr std::uint32_t kHarmless = [] {
   return bits;
 }();
 
-bool good(const StepMean& step) {
-  return (step.doubts & ~kHarmless) == 0 && std::isfinite(step.thrust_n) && step.speed_rad_s > 0;
-}
-
 double square(double x) { return x * x; }
-
-/// Of the thrust from within the step alone; older files do not tell it.
-double within(const StepMean& step) {
-  const double n = static_cast<double>(std::max<std::uint64_t>(step.thrust_samples, 1));
-  if (std::isnan(step.thrust_u_n)) return step.thrust_sd_n / std::sqrt(n);
-  return std::sqrt(std::max(square(step.thrust_u_n) - square(step.zero_u_n), 0.0));
-}
 
 using Runs = std::map<int, Group>;  // by repetition
 
 std::set<int> good_levels(const Group& run) {
   std::set<int> levels;
   for (const StepMean* step : run) {
-    if (good(*step)) levels.insert(step->step);
+    if (tells_k(*step)) levels.insert(step->step);
   }
   return levels;
 }
@@ -146,7 +135,7 @@ RepetitionFigure figure_of(const Group& run, const std::set<int>& levels) {
     tx += step->thrust_n * x;
     xx += x * x;
     x_sum += x;
-    variance += x * x * (square(within(*step)) + square(of_speed));
+    variance += x * x * (square(thrust_u_within(*step)) + square(of_speed));
     zero = std::isnan(step->zero_u_n) ? 0 : std::max(zero, step->zero_u_n);
   }
   RepetitionFigure figure;
@@ -223,7 +212,7 @@ double freedom_within(const Runs& runs) {
   double freedom = 0;
   for (const auto& [repetition, run] : runs) {
     for (const StepMean* step : run) {
-      if (good(*step)) freedom += std::isnan(step->thrust_freedom) ? 1 : std::min(step->thrust_freedom, 1e3);
+      if (tells_k(*step)) freedom += std::isnan(step->thrust_freedom) ? 1 : std::min(step->thrust_freedom, 1e3);
     }
   }
   return freedom;
@@ -254,7 +243,49 @@ void decide(RepetitionVerdict& verdict, const RepetitionRule& rule) {
   verdict.asks_for_another = runs >= rule.wanted && runs < rule.at_most && too_few;
 }
 
+using RunName = std::tuple<std::string, double, int>;  // propeller, occlusion, repetition
+
+std::set<RunName> outlying_runs(std::span<const StepMean> steps) {
+  std::set<RunName> outlying;
+  for (const RepetitionVerdict& verdict : judge_repetitions(steps)) {
+    for (const RepetitionFigure& figure : verdict.repetitions) {
+      if (figure.outlying) outlying.emplace(verdict.propeller, verdict.occlusion_deg, figure.repetition);
+    }
+  }
+  return outlying;
+}
+
 }  // namespace
+
+bool tells_k(const StepMean& step) {
+  return (step.doubts & ~kHarmless) == 0 && std::isfinite(step.thrust_n) && step.speed_rad_s > 0;
+}
+
+double thrust_u_within(const StepMean& step) {
+  const double n = static_cast<double>(std::max<std::uint64_t>(step.thrust_samples, 1));
+  if (std::isnan(step.thrust_u_n)) return step.thrust_sd_n / std::sqrt(n);
+  return std::sqrt(std::max(square(step.thrust_u_n) - square(step.zero_u_n), 0.0));
+}
+
+std::vector<StepMean> means_of(std::span<const StepMean> steps) {
+  const std::set<RunName> outlying = outlying_runs(steps);
+  std::vector<StepMean> kept;
+  std::map<std::pair<std::string, double>, std::pair<std::set<int>, std::set<int>>> counts;  // averaged, left out
+  for (const StepMean& step : steps) {
+    const bool out = outlying.contains({step.propeller, step.occlusion_deg, step.repetition});
+    auto& [averaged, left_out] = counts[{step.propeller, step.occlusion_deg}];
+    (out ? left_out : averaged).insert(step.repetition);
+    if (!out) kept.push_back(step);
+  }
+  std::vector<StepMean> means = average_repetitions(kept);
+  for (StepMean& mean : means) {
+    const auto& [averaged, left_out] = counts.at({mean.propeller, mean.occlusion_deg});
+    if (left_out.empty()) continue;
+    mean.repetitions_averaged = static_cast<double>(averaged.size());
+    mean.repetitions_left_out = static_cast<double>(left_out.size());
+  }
+  return means;
+}
 
 std::vector<StepMean> average_repetitions(std::span<const StepMean> steps) {
   std::vector<Group> groups;

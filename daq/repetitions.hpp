@@ -19,6 +19,15 @@ namespace kphi::daq {
 /// is so. Numbers of samples: sums. Doubts: those of any repetition.
 [[nodiscard]] std::vector<results::StepMean> average_repetitions(std::span<const results::StepMean> steps);
 
+/// What means.csv holds: average_repetitions without the outlying ones (judge_repetitions), which stay in steps.csv.
+/// Rows from which one was left out tell it: repetitions_averaged, repetitions_left_out.
+[[nodiscard]] std::vector<results::StepMean> means_of(std::span<const results::StepMean> steps);
+
+/// Without a doubt about thrust over speed².
+[[nodiscard]] bool tells_k(const results::StepMean& step);
+/// Standard uncertainty of the thrust from within the step alone, N; older files do not tell it.
+[[nodiscard]] double thrust_u_within(const results::StepMean& step);
+
 /// k of one repetition, N/(rad/s)²: least squares of T = k ω² over the levels that all repetitions have.
 struct RepetitionFigure {
   int repetition = 0;

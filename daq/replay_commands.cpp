@@ -38,8 +38,10 @@ struct Asked {
 
 struct Replay {
   std::vector<StepMean> steps;
-  std::optional<std::filesystem::path> stored;  ///< steps.csv of the campaign folder, when there is one
-  std::optional<std::filesystem::path> means;   ///< means.csv likewise; of a whole campaign only
+  std::optional<std::filesystem::path> stored;      ///< steps.csv of the campaign folder, when there is one
+  std::optional<std::filesystem::path> means;       ///< means.csv likewise; of a whole campaign only
+  std::optional<std::filesystem::path> references;  ///< references.csv likewise
+  std::vector<StepMean> reference_steps;
   bool whole_campaign = false;
 };
 
@@ -77,10 +79,15 @@ Replay replay(const std::filesystem::path& path) {
     result.steps = reduced(runs_of(folder));
     steps = folder.steps();
     if (std::filesystem::exists(folder.means())) result.means = folder.means();
+    if (std::filesystem::exists(folder.references())) {
+      result.references = folder.references();
+      result.reference_steps = reduced(folder.reference_runs());
+    }
   } else {
     result.steps = reduce(results::read_run(path));
     const auto runs = std::filesystem::absolute(path).parent_path();
-    if (runs.filename() == "runs") steps = runs.parent_path() / "steps.csv";
+    const bool is_reference = !result.steps.empty() && result.steps.front().repetition < 0;
+    if (runs.filename() == "runs") steps = runs.parent_path() / (is_reference ? "references.csv" : "steps.csv");
   }
   if (!steps.empty() && std::filesystem::exists(steps)) result.stored = steps;
   return result;
@@ -166,9 +173,12 @@ int run_replay(const Asked& asked) {
   const Replay result = replay(asked.path);
   std::optional<std::string> differs;
   if (result.stored) differs = difference(result, results::read_text(*result.stored));
-  if (!differs && result.means &&
-      results::read_text(*result.means) != results::format_steps(average_repetitions(result.steps))) {
+  if (!differs && result.means && results::read_text(*result.means) != results::format_steps(means_of(result.steps))) {
     differs = "agrees, but means.csv beside it is not its average over the repetitions";
+  }
+  if (!differs && result.references &&
+      results::read_text(*result.references) != results::format_steps(result.reference_steps)) {
+    differs = "agrees, but references.csv beside it differs from what its runs give";
   }
   print(result, differs, asked.json);
   if (!differs) return kOk;

@@ -22,7 +22,7 @@ namespace {
 constexpr int kReadings = 2;  // of the box's configuration at the end; a page may be lost
 
 results::RunHeader header_of(const RunOrder& order, Bench& bench, const results::LoadCellScale& scale) {
-  const auto& [campaign, place, occlusion_deg, repetition, remaining, file] = order;
+  const auto& [campaign, place, mounted, planned, remaining, file] = order;
   results::RunHeader header;
   header.started_utc = utc_text(bench.clock(), bench.clock().now());
   // A name-based UUID: unique by campaign, place in it and time, and reproducible on the deterministic bench.
@@ -38,8 +38,8 @@ results::RunHeader header_of(const RunOrder& order, Bench& bench, const results:
   header.propeller_name = campaign.propeller.name;
   header.diameter_in = campaign.propeller.diameter_in;
   header.blades = campaign.propeller.blades;
-  header.occlusion_deg = occlusion_deg;
-  header.repetition = repetition;
+  header.occlusion_deg = mounted.occlusion_deg();
+  header.repetition = planned.repetition;
   header.thrust_axis = place.thrust_axis;
   header.thrust_sign = place.thrust_sign;
   header.spin = place.iq.spin;

@@ -8,10 +8,12 @@
 #include <string>
 
 #include "daq/bench.hpp"
+#include "daq/mounted.hpp"
 #include "daq/progress.hpp"
 #include "drivers/iq/stopping.hpp"
 #include "profiles/bench.hpp"
 #include "profiles/campaign.hpp"
+#include "profiles/plan.hpp"
 #include "results/records.hpp"
 
 namespace kphi::daq {
@@ -19,8 +21,8 @@ namespace kphi::daq {
 struct RunOrder {
   const profiles::Campaign& campaign;
   const profiles::Bench& place;
-  double occlusion_deg = 0;
-  int repetition = 1;            ///< 1-based
+  Mounted mounted;               ///< that somebody has confirmed it is what turns the motor's lock
+  profiles::PlannedRun planned;  ///< its steps may be fewer than those of the plan
   double remaining_bench_s = 0;  ///< of the campaign, this run included
   std::filesystem::path file;    ///< final path
 };

@@ -6,6 +6,7 @@
 #include "daq/box_configuration.hpp"
 #include "daq/device_records.hpp"
 #include "daq/interrupt.hpp"
+#include "daq/slew.hpp"
 #include "daq/supply_interlock.hpp"
 #include "drivers/device_error.hpp"
 
@@ -38,10 +39,10 @@ Sequence::Sequence(Bench& bench, Recorder& recorder, Guard& guard, const RunOrde
                    const std::function<bool()>& stop_asked)
     : bench_(bench), recorder_(recorder), guard_(guard), order_(order), progress_(progress), stop_asked_(stop_asked) {
   position_.propeller = order.campaign.propeller.id;
-  position_.occlusion_deg = order.occlusion_deg;
-  position_.repetition = order.repetition;
-  position_.repetitions = order.campaign.repetitions;
-  position_.steps = order.campaign.profile.steps;
+  position_.occlusion_deg = order.mounted.occlusion_deg();
+  position_.repetition = order.planned.repetition;
+  position_.repetitions = std::max(order.campaign.repetitions, order.planned.repetition);
+  position_.steps = static_cast<int>(order.planned.steps.size());
   end_ = bench.clock().now() + from_seconds(order.remaining_bench_s);
 }
 
@@ -147,19 +148,32 @@ netbox::ZeroMeasurement Sequence::measure(Phase phase) {
   return recorder_.measured();
 }
 
+void Sequence::ramp_to(RadPerSec level, Spin& spin) {
+  const Slew slew(position_.commanded, level, order_.campaign.profile.slew_rad_s2);
+  const Instant begun = bench_.clock().now();
+  if (slew.lasts() == Duration(0)) return;
+  position_.phase = "ramp";
+  mark(Phase::ramp, -1, level);
+  for (Instant now = begun; now - begun < slew.lasts(); now = bench_.clock().now()) {
+    position_.commanded = slew.at(now - begun);
+    change_speed();
+    spin.at(position_.commanded);
+    hold(std::min(bench_.clock().stretched(kTickWall), begun + slew.lasts() - now), &spin);
+  }
+}
+
 void Sequence::spin_through_the_steps() {
   Spin spin(bench_.motor(), order_.place.iq.spin, guard_.latch());
   has_spun_ = true;
-  int step = 0;
-  for (const RadPerSec level : order_.campaign.profile.levels()) {
-    position_.step = step;
+  for (const auto& [number, level] : order_.planned.steps) {
+    ramp_to(level, spin);
+    ++position_.step;
     position_.commanded = level;
     change_speed();
     spin.at(level);
-    mark(Phase::step, step, level);
+    mark(Phase::step, number, level);
     hold(from_seconds(order_.campaign.profile.dwell.value()), &spin);
     progress_.step_done(position_, seen_);
-    ++step;
   }
   position_.step = -1;
   position_.commanded = RadPerSec(0);

@@ -39,6 +39,8 @@ class Sequence {
   netbox::ZeroMeasurement measure(results::Phase phase);
   void spin_through_the_steps();
   void mark(results::Phase phase, int step, RadPerSec commanded);
+  /// Takes no time when the campaign lets the speed change at once.
+  void ramp_to(RadPerSec level, Spin& spin);
   void change_speed();
   void hold_zero(results::Phase phase);
   /// Nothing turns while the cell is not at rest: the zero would be worth nothing, and all that is measured against it.

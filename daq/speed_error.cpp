@@ -34,7 +34,15 @@ void SpeedWatch::command(Instant at, RadPerSec speed) noexcept {
   }
   watching_ = true;
   advance(at);
+  ramping_ = false;
   commanded_ = speed.value();
+}
+
+void SpeedWatch::command_ramp(Instant at, RadPerSec speed) noexcept {
+  command(at, speed);
+  ramping_ = true;
+  low_ = std::min(low_, commanded_);
+  high_ = std::max(high_, commanded_);
 }
 
 void SpeedWatch::release() noexcept { *this = SpeedWatch(direction_, host_, share_); }
@@ -58,6 +66,7 @@ void SpeedWatch::take(const results::MotorReading& reading) noexcept {
 void SpeedWatch::advance(Instant at) noexcept {
   const double passed = to_seconds(std::max(Duration(0), at - now_));
   now_ = std::max(now_, at);
+  if (ramping_) return;
   low_ = low_ < commanded_ ? std::min(commanded_, low_ + kSlowestRise * passed) : commanded_;
   high_ = high_ > commanded_ ? std::max(commanded_, high_ - kSlowestFall * passed) : commanded_;
 }

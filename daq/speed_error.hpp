@@ -59,6 +59,8 @@ class SpeedWatch {
 
   /// Unsigned, from now on. The first one expects a motor at rest.
   void command(Instant at, RadPerSec speed) noexcept;
+  /// The command goes to `speed` by and by: until the next one the rotor may be anywhere between.
+  void command_ramp(Instant at, RadPerSec speed) noexcept;
   /// Nobody commands a speed any more. What was found is forgotten.
   void release() noexcept;
   void take(const results::MotorReading& reading) noexcept;
@@ -75,6 +77,7 @@ class SpeedWatch {
   Duration host_;
   double share_;
   bool watching_ = false;
+  bool ramping_ = false;
   double commanded_ = 0, speed_ = 0, current_ = 0;
   double low_ = 0, high_ = 0;  ///< the band, rad/s
   Instant now_{0}, seen_at_{0};

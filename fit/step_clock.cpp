@@ -19,6 +19,7 @@ std::vector<StepSpan> step_spans(const results::RunRecording& run) {
   double previous = 0;
   for (std::size_t i = 0; i + 1 < run.phases.size(); ++i) {
     const results::PhaseMark& mark = run.phases[i];
+    if (mark.phase == results::Phase::ramp) previous = mark.speed_rad_s;  // it is there when the step begins
     if (mark.phase != results::Phase::step) continue;
     spans.push_back({mark.step, seconds(mark.time_ns), seconds(run.phases[i + 1].time_ns), mark.speed_rad_s, previous});
     previous = mark.speed_rad_s;

@@ -70,6 +70,24 @@ Limits read_limits(ProfileReader& file) {
     file.refuse("/limits/supply_voltage_max_v", fmt::format("is not above {:g} V (supply_v)", supply),
                 "raise it: the motor would never turn");
   return limits;
+Order read_order(ProfileReader& file) {
+  Order order;
+  order.runs = run_order_from(file.get_or<std::string>("/order/runs", name_of(order.runs)));
+  order.steps = step_order_from(file.get_or<std::string>("/order/steps", name_of(order.steps)));
+  order.seed = file.get_or<std::uint64_t>("/order/seed", order.seed);
+  order.remount_each_repetition = file.get_or("/order/remount_each_repetition", order.remount_each_repetition);
+  order.reference = file.get_or("/order/reference", order.reference);
+  for (const char* shuffled : {"/order/runs", "/order/steps"}) {
+    if (file.has("/order/seed") || file.get_or<std::string>(shuffled, "") != "shuffled") continue;
+    file.refuse(shuffled, "shuffled without a seed",
+                "add seed: and any whole number; the same one gives this order again");
+  }
+  return order;
+}
+
+std::optional<double> read_slew(ProfileReader& file) {
+  if (!file.has("/profile/slew_rpm_s")) return std::nullopt;
+  return from_rpm(file.number("/profile/slew_rpm_s")).value();
 }
 
 }  // namespace
@@ -92,8 +110,11 @@ Campaign parse_campaign(const std::string& text, const std::string& path) {
                         file.get<int>("/propeller/blades")};
   campaign.occlusions_deg = file.get<std::vector<double>>("/occlusions_deg");
   campaign.repetitions = file.get_or<int>("/repetitions", campaign.repetitions);
+  campaign.repetitions_extra_max = file.get_or<int>("/repetitions_extra_max", campaign.repetitions_extra_max);
+  campaign.order = read_order(file);
   campaign.profile = {file.get<int>("/profile/steps"), Seconds(file.number("/profile/dwell_s")),
-                      from_rpm(file.number("/profile/first_rpm")), from_rpm(file.number("/profile/last_rpm"))};
+                      from_rpm(file.number("/profile/first_rpm")), from_rpm(file.number("/profile/last_rpm")),
+                      read_slew(file)};
   campaign.zero = Seconds(file.number("/zero_s"));
   campaign.box_bias = file.get_or("/box_bias", campaign.box_bias);
   campaign.minimum_discard = Seconds(file.number("/minimum_discard_s"));

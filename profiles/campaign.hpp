@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "compensation/units.hpp"
+#include "profiles/order.hpp"
 
 namespace kphi::profiles {
 
@@ -24,6 +25,7 @@ struct StepProfile {
   Seconds dwell;
   RadPerSec first;
   RadPerSec last;
+  std::optional<double> slew_rad_s2{};  ///< the commanded speed changes no faster; none: at once
   /// All levels, ascending or descending, `steps` of them.
   [[nodiscard]] std::vector<RadPerSec> levels() const;
 };
@@ -52,6 +54,8 @@ struct Campaign {
   Propeller propeller;
   std::vector<double> occlusions_deg;  ///< degrees in [0, 360), each once, as listed
   int repetitions = 3;
+  int repetitions_extra_max = 1;  ///< runs of an occlusion beyond these, when its repetitions disagree
+  Order order;
   StepProfile profile;
   Seconds zero;             ///< motor off, before and after each run
   bool box_bias = false;    ///< before each run the box takes its load as zero, measured for `zero` before and after

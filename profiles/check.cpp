@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "compensation/occlusion.hpp"
+#include "profiles/answers.hpp"
 #include "profiles/key_names.hpp"
 #include "profiles/plan.hpp"
 #include "profiles/schema.hpp"
@@ -35,14 +36,15 @@ std::string summary_of(const Campaign& campaign, const Plan& plan, double rate_h
   return fmt::format(
       "  propeller  {} ({}, {} in, {} blades)\n"
       "  runs       {}: occlusions {:g} degrees, {} repetitions of each, {} mountings\n"
+      "  order      {}\n"
       "  steps      {}: {} per run, {:.6g} to {:.6g} RPM by {:.6g} RPM, {:g} s each\n"
       "  time       {} spinning, {} with the zeros, besides mounting\n"
       "  disk       {:.3g} million samples at {:g} Hz, {:.3g} MB\n",
       campaign.propeller.id, campaign.propeller.name, campaign.propeller.diameter_in, campaign.propeller.blades,
-      plan.runs.size(), fmt::join(campaign.occlusions_deg, ", "), campaign.repetitions, plan.mountings, plan.steps,
-      profile.steps, to_rpm(profile.first), to_rpm(profile.last), increment, profile.dwell.value(),
-      minutes(plan.spinning), minutes(plan.bench), static_cast<double>(plan.samples) / 1e6, rate_hz,
-      static_cast<double>(plan.bytes) / 1e6);
+      plan.runs.size(), fmt::join(campaign.occlusions_deg, ", "), campaign.repetitions, plan.mountings,
+      to_words(campaign.order), plan.steps, plan.runs.front().steps.size(), to_rpm(profile.first), to_rpm(profile.last),
+      increment, profile.dwell.value(), minutes(plan.spinning), minutes(plan.bench),
+      static_cast<double>(plan.samples) / 1e6, rate_hz, static_cast<double>(plan.bytes) / 1e6);
 }
 
 nlohmann::ordered_json report_of(const Plan& plan) {
@@ -66,6 +68,12 @@ std::string summary_of(const Bench& bench) {
       bench.netbox.host, bench.netbox.rdt_port, bench.netbox.http_port, bench.netbox.rate_hz,
       bench.netbox.records_per_datagram, bench.iq.device, bench.iq.baud, bench.iq.module_id, bench.iq.spin,
       to_rpm(bench.iq.speed_max), bench.thrust_sign > 0 ? '+' : '-', "xyz"[bench.thrust_axis], simulated);
+}
+
+std::string summary_of(const Answers& answers) {
+  std::string mountings;
+  for (const auto& [angle, mark] : answers.mountings) mountings += fmt::format(" {:g}", angle);
+  return fmt::format("  mountings {} degrees\n  run again  {} decisions\n", mountings, answers.run_again.size());
 }
 
 std::string in_words(const Vehicle& vehicle) {
@@ -119,12 +127,13 @@ std::string format_of(const std::string& text, const std::string& path) {
 }
 
 std::optional<FileKind> kind_by_keys(const SourceDocument& document) {
-  static constexpr std::array<std::pair<const char*, FileKind>, 6> kTelltales{{{"occlusions_deg", FileKind::campaign},
+  static constexpr std::array<std::pair<const char*, FileKind>, 7> kTelltales{{{"occlusions_deg", FileKind::campaign},
                                                                                {"profile", FileKind::campaign},
                                                                                {"netbox", FileKind::bench},
                                                                                {"iq", FileKind::bench},
                                                                                {"shapes_deg", FileKind::vehicle},
-                                                                               {"half_side_m", FileKind::vehicle}}};
+                                                                               {"half_side_m", FileKind::vehicle},
+                                                                               {"mountings", FileKind::answers}}};
   if (!document.value.is_object()) return std::nullopt;
   for (const auto& [key, kind] : kTelltales) {
     if (document.value.contains(key)) return kind;
@@ -176,6 +185,8 @@ void judge(CheckedFile& file, std::size_t number, const std::vector<ForeignKind>
   } else if (kind == FileKind::bench) {
     loaded.benches.push_back(parse_bench(text, file.path));
     file.summary = summary_of(loaded.benches.back());
+  } else if (kind == FileKind::answers) {
+    file.summary = summary_of(parse_answers(text, file.path));
   } else {
     file.summary = summary_of(parse_vehicle(text, file.path));
   }

@@ -14,21 +14,36 @@ inline constexpr std::uint64_t kBytesPerSample = 44;
 
 struct PlannedRun {
   double occlusion_deg = 0;
-  int repetition = 1;  ///< 1-based
+  int repetition = 1;                ///< 1-based; negative: a reference run, -1 the session's first, -2 its last
+  bool mount = true;                 ///< a person mounts the occlusion before it
+  std::vector<PlannedStep> steps{};  ///< in the order in which they are run
+
+  [[nodiscard]] bool is_reference() const { return repetition < 0; }
 };
 
 struct Plan {
-  std::vector<PlannedRun> runs;        ///< all repetitions of an occlusion follow its mounting
+  std::vector<PlannedRun> runs;        ///< in the order in which they are run
   int mountings = 0;                   ///< times that a person changes the occlusion, the first one included
   int steps = 0;                       ///< in all runs
-  Seconds spinning;                    ///< motor on
-  Seconds bench;                       ///< spinning and zeros; zeros and biases; not: mounting, spinning down
+  Seconds spinning;                    ///< motor on: steps, and ramps between them
+  Seconds bench;                       ///< spinning and zeros; zeros and biases; not: mounting, cooling, spinning down
   std::uint64_t samples_in_steps = 0;  ///< Net Box samples at the bench's rate
   std::uint64_t samples = 0;           ///< zeros included
   std::uint64_t bytes = 0;             ///< of the samples
+
+  /// The occlusions that a person is asked to mount, in order, degrees.
+  [[nodiscard]] std::vector<double> mounting_angles() const;
 };
 
+/// The same campaign gives the same plan everywhere. Shuffled, the repetitions of an occlusion stay together after its
+/// mounting, unless each is mounted anew: then all runs are shuffled.
 [[nodiscard]] Plan make_plan(const Campaign& campaign, const Bench& bench);
+
+/// Another repetition of an occlusion, beyond those that the campaign plans.
+[[nodiscard]] PlannedRun extra_run(const Campaign& campaign, double occlusion_deg, int repetition);
+
+/// That the commanded speed spends between the steps of a run, from standstill on; 0 without a slew limit.
+[[nodiscard]] Seconds ramp_time(const StepProfile& profile, const PlannedRun& run);
 
 /// Throws ConfigurationError, naming both files and both values, if the campaign asks for more speed than the
 /// bench's motor may be told.

@@ -29,6 +29,9 @@ class ProfileReader {
   /// The keys of an object.
   [[nodiscard]] std::vector<std::string> keys(const std::string& pointer) const;
 
+  /// Where a value stands.
+  [[nodiscard]] Mark mark(const std::string& pointer) const { return document_.value_mark(pointer); }
+
   /// Notes a finding at the value; `what` goes on after "name: ".
   void refuse(const std::string& pointer, const std::string& what, const std::string& next_move);
   /// Throws RefusedFile if anything was refused.

@@ -32,8 +32,8 @@ struct LoadedSchema {
 };
 
 const LoadedSchema& loaded(FileKind kind) {
-  static const std::array<LoadedSchema, 3> kSchemas{LoadedSchema(FileKind::campaign), LoadedSchema(FileKind::bench),
-                                                    LoadedSchema(FileKind::vehicle)};
+  static const std::array<LoadedSchema, 4> kSchemas{LoadedSchema(FileKind::campaign), LoadedSchema(FileKind::bench),
+                                                    LoadedSchema(FileKind::vehicle), LoadedSchema(FileKind::answers)};
   return kSchemas[static_cast<std::size_t>(kind)];
 }
 

@@ -1,4 +1,4 @@
-// The JSON Schemas of the three kinds of files, and what they say about a document, in words for its author.
+// The JSON Schemas of the four kinds of files, and what they say about a document, in words for its author.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace kphi::profiles {
 
-enum class FileKind { campaign, bench, vehicle };
+enum class FileKind { campaign, bench, vehicle, answers };
 
 struct FileKindInfo {
   FileKind kind;
@@ -16,10 +16,11 @@ struct FileKindInfo {
   const char* format;  ///< value of the key `format`
 };
 
-inline constexpr std::array<FileKindInfo, 3> kFileKinds{{
+inline constexpr std::array<FileKindInfo, 4> kFileKinds{{
     {FileKind::campaign, "campaign", "kphi-campaign/1"},
     {FileKind::bench, "bench", "kphi-bench/1"},
     {FileKind::vehicle, "vehicle", "kphi-vehicle/1"},
+    {FileKind::answers, "answers", "kphi-answers/1"},
 }};
 
 [[nodiscard]] constexpr const FileKindInfo& info(FileKind kind) { return kFileKinds[static_cast<std::size_t>(kind)]; }

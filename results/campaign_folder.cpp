@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cstdlib>
 #include <optional>
 #include <system_error>
 #include <tuple>
@@ -31,12 +32,13 @@ struct RunName {
 /// Inverse of run_file_name; nothing for other files.
 std::optional<RunName> parse_run_name(const std::string& name) {
   const std::size_t phi = name.rfind("_phi");
-  const std::size_t rep = name.rfind("_rep");
-  if (!name.ends_with(".h5") || phi == std::string::npos || rep == std::string::npos || rep < phi) return std::nullopt;
-  const auto angle = parse_double(name.substr(phi + 4, rep - phi - 4));
-  const auto repetition = parse_double(name.substr(rep + 4, name.size() - 3 - rep - 4));
-  if (!angle || !repetition) return std::nullopt;
-  return RunName{*angle, static_cast<int>(*repetition), name.substr(0, phi)};
+  const std::size_t place = std::min(name.find("_rep", phi), name.find("_ref", phi));
+  if (!name.ends_with(".h5") || phi == std::string::npos || place == std::string::npos) return std::nullopt;
+  const auto angle = parse_double(name.substr(phi + 4, place - phi - 4));
+  const auto number = parse_double(name.substr(place + 4, name.size() - 3 - place - 4));
+  if (!angle || !number) return std::nullopt;
+  const int sign = name[place + 3] == 'f' ? -1 : 1;
+  return RunName{*angle, sign * static_cast<int>(*number), name.substr(0, phi)};
 }
 
 std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder) {
@@ -53,7 +55,8 @@ std::string run_file_name(const std::string& propeller_id, double occlusion_deg,
   std::string angle = shortest(occlusion_deg);
   const std::size_t whole = std::min(angle.find('.'), angle.size());
   if (whole < 3) angle.insert(0, 3 - whole, '0');
-  return fmt::format("{}_phi{}_rep{}.h5", file_name_safe(propeller_id), angle, repetition);
+  return fmt::format("{}_phi{}_{}{}.h5", file_name_safe(propeller_id), angle, repetition < 0 ? "ref" : "rep",
+                     std::abs(repetition));
 }
 
 CampaignFolder CampaignFolder::create(const std::filesystem::path& parent, const std::string& utc,
@@ -87,7 +90,7 @@ std::vector<std::filesystem::path> CampaignFolder::complete_runs(std::span<const
   std::vector<std::pair<Key, std::filesystem::path>> found;
   for (const auto& file : files_in(runs())) {
     const auto name = parse_run_name(file.filename().string());
-    if (!name) continue;
+    if (!name || name->repetition < 0) continue;
     const auto place =
         std::find(occlusions_deg.begin(), occlusions_deg.end(), name->occlusion_deg) - occlusions_deg.begin();
     found.push_back({Key{place, name->occlusion_deg, name->repetition, name->propeller}, file});
@@ -95,6 +98,18 @@ std::vector<std::filesystem::path> CampaignFolder::complete_runs(std::span<const
   std::sort(found.begin(), found.end());
   std::vector<std::filesystem::path> paths;
   for (auto& [key, file] : found) paths.push_back(std::move(file));
+  return paths;
+}
+
+std::vector<std::filesystem::path> CampaignFolder::reference_runs() const {
+  std::vector<std::pair<int, std::filesystem::path>> found;
+  for (const auto& file : files_in(runs())) {
+    const auto name = parse_run_name(file.filename().string());
+    if (name && name->repetition < 0) found.emplace_back(-name->repetition, file);
+  }
+  std::sort(found.begin(), found.end());
+  std::vector<std::filesystem::path> paths;
+  for (auto& [number, file] : found) paths.push_back(std::move(file));
   return paths;
 }
 

@@ -10,7 +10,8 @@
 
 namespace kphi::results {
 
-/// "5x3_phi090_rep2.h5", "5x3_phi022.5_rep1.h5".
+/// "5x3_phi090_rep2.h5", "5x3_phi022.5_rep1.h5"; a reference run, whose repetition is -1 or below:
+/// "5x3_phi000_ref1.h5".
 [[nodiscard]] std::string run_file_name(const std::string& propeller_id, double occlusion_deg, int repetition);
 
 class CampaignFolder {
@@ -35,6 +36,8 @@ class CampaignFolder {
   [[nodiscard]] std::filesystem::path steps() const { return path_ / "steps.csv"; }
   /// Steps averaged over their repetitions.
   [[nodiscard]] std::filesystem::path means() const { return path_ / "means.csv"; }
+  /// Steps of the reference runs: checks of the bench, no repetitions.
+  [[nodiscard]] std::filesystem::path references() const { return path_ / "references.csv"; }
   [[nodiscard]] std::filesystem::path coefficients() const { return path_ / "coefficients.yaml"; }
   [[nodiscard]] std::filesystem::path report() const { return path_ / "report.html"; }
   [[nodiscard]] std::filesystem::path figures() const { return path_ / "figures"; }
@@ -45,6 +48,8 @@ class CampaignFolder {
   /// Complete runs: by place of their occlusion in `occlusions_deg` (unlisted ones behind, ascending), then repetition.
   /// Names alone are judged, no file is opened.
   [[nodiscard]] std::vector<std::filesystem::path> complete_runs(std::span<const double> occlusions_deg = {}) const;
+  /// Complete reference runs, in their order.
+  [[nodiscard]] std::vector<std::filesystem::path> reference_runs() const;
   /// Aborted and interrupted ones, by name.
   [[nodiscard]] std::vector<std::filesystem::path> other_runs() const;
 

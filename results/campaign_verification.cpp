@@ -54,7 +54,9 @@ CampaignVerification verify_campaign(const CampaignFolder& folder) {
   CampaignVerification found;
   const auto digests = recorded_digests(folder, found);
   for (const auto& [file, digest] : digests) check_digest(folder, file, digest, found);
-  for (const auto& path : folder.complete_runs()) {
+  std::vector<std::filesystem::path> runs = folder.complete_runs();
+  for (const auto& path : folder.reference_runs()) runs.push_back(path);
+  for (const auto& path : runs) {
     ++found.runs;
     if (is_writable(path)) found.remarks.push_back(path.string() + ": is writable; chmod a-w it");
     for (const std::string& problem : verify_run(path).problems) {

@@ -73,8 +73,9 @@ enum class Phase : std::uint8_t {
   bias_before,    ///< measured without load
   bias_settling,  ///< the box was told to take the load as zero
   bias_after,     ///< measured again
+  ramp,           ///< on the way to the speed of the next step, no faster than the campaign allows
 };
-inline constexpr Phase kLastPhase = Phase::bias_after;
+inline constexpr Phase kLastPhase = Phase::ramp;
 
 struct PhaseMark {
   Phase phase{};
@@ -111,7 +112,7 @@ struct RunHeader {
   double diameter_in = 0;
   int blades = 0;
   double occlusion_deg = 0;
-  int repetition = 0;   ///< 1-based
+  int repetition = 0;   ///< 1-based; negative: a reference run
   int thrust_axis = 2;  ///< 0..2
   int thrust_sign = +1;
   int spin = +1;

@@ -52,7 +52,7 @@ struct StepMean {
   int blades = 0;
   double diameter_in = 0;
   double occlusion_deg = 0;
-  int repetition = 0;  ///< 1-based; 0 in an average over repetitions
+  int repetition = 0;  ///< 1-based; 0 in an average over repetitions; -1, -2 … in the reference runs of a session
   int step = 0;        ///< 0-based
   double commanded_speed_rad_s = 0;
   double speed_rad_s = 0;  ///< mean, unsigned
@@ -76,17 +76,19 @@ struct StepMean {
   double supply_a = kNotMeasured;  ///< out of it
   double supply_w = kNotMeasured;  ///< mean of the products
   double air_density_kg_m3 = kNotMeasured;
-  double air_density_u_kg_m3 = kNotMeasured;  ///< standard uncertainty
-  double discarded_s = kNotMeasured;          ///< from the command to the window's begin
-  double thrust_n_eff = kNotMeasured;         ///< independent samples that would give the same uncertainty of the mean
-  double thrust_u_n = kNotMeasured;           ///< standard uncertainty of thrust_n, with the zero's
-  double thrust_freedom = kNotMeasured;       ///< degrees of freedom of thrust_u_n
-  double speed_u_rad_s = kNotMeasured;        ///< standard uncertainty of the mean, without that of the clock gain
-  double zero_u_n = kNotMeasured;             ///< standard uncertainty of the zero; all steps of a run share it
-  double zero_moved_n = kNotMeasured;         ///< from before the run to after it
-  double lag_s = kNotMeasured;                ///< the thrust shows so much later than the speed
-  double lag_u_s = kNotMeasured;              ///< standard uncertainty
-  std::uint64_t speed_glitches = 0;           ///< speeds left out
+  double air_density_u_kg_m3 = kNotMeasured;   ///< standard uncertainty
+  double discarded_s = kNotMeasured;           ///< from the command to the window's begin
+  double thrust_n_eff = kNotMeasured;          ///< independent samples that would give the same uncertainty of the mean
+  double thrust_u_n = kNotMeasured;            ///< standard uncertainty of thrust_n, with the zero's
+  double thrust_freedom = kNotMeasured;        ///< degrees of freedom of thrust_u_n
+  double speed_u_rad_s = kNotMeasured;         ///< standard uncertainty of the mean, without that of the clock gain
+  double zero_u_n = kNotMeasured;              ///< standard uncertainty of the zero; all steps of a run share it
+  double zero_moved_n = kNotMeasured;          ///< from before the run to after it
+  double lag_s = kNotMeasured;                 ///< the thrust shows so much later than the speed
+  double lag_u_s = kNotMeasured;               ///< standard uncertainty
+  std::uint64_t speed_glitches = 0;            ///< speeds left out
+  double repetitions_averaged = kNotMeasured;  ///< in an average from which outlying repetitions were left out
+  double repetitions_left_out = kNotMeasured;
 };
 
 }  // namespace kphi::results

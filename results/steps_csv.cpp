@@ -73,6 +73,8 @@ const std::array kGroups{
            Column{"speed_u_rad_s", &StepMean::speed_u_rad_s}, Column{"zero_u_n", &StepMean::zero_u_n},
            Column{"zero_moved_n", &StepMean::zero_moved_n}, Column{"lag_s", &StepMean::lag_s},
            Column{"lag_u_s", &StepMean::lag_u_s}, Column{"speed_glitches", &StepMean::speed_glitches}}},
+    Group{{Column{"repetitions_averaged", &StepMean::repetitions_averaged},
+           Column{"repetitions_left_out", &StepMean::repetitions_left_out}}},
 };
 
 using Columns = std::vector<Column>;

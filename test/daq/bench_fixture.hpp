@@ -9,6 +9,8 @@
 #include <iterator>
 #include <string>
 
+#include "daq/operator.hpp"
+#include "daq/run.hpp"
 #include "profiles/bench.hpp"
 #include "profiles/campaign.hpp"
 #include "test/temporary_folder.hpp"
@@ -24,7 +26,7 @@ inline std::string short_campaign_text(const std::string& occlusions = "0, 90", 
   return fmt::format(
       "format: kphi-campaign/1\nname: short\n"
       "propeller: {{id: 5x3, name: 5-inch three-blade, diameter_in: 5, blades: 3}}\n"
-      "occlusions_deg: [{}]\nrepetitions: {}\n"
+      "occlusions_deg: [{}]\nrepetitions: {}\nrepetitions_extra_max: 0\n"
       "profile: {{steps: {}, dwell_s: 0.6, first_rpm: 6000, last_rpm: 18000}}\n"
       "zero_s: 0.5\nminimum_discard_s: 0.3\nsupply_v: 12.0\n"
       "limits: {{speed_max_rpm: 19100, thrust_max_n: 20, supply_current_max_a: 35, coil_temperature_max_degc: 110}}\n",
@@ -45,6 +47,18 @@ inline profiles::Bench deterministic_place(int seed, const std::string& faults =
           "thrust_axis: \"+Fz\"\nsimulation: {{in_process: true, seed: {}{}}}\n",
           seed, faults.empty() ? "" : ", faults: " + faults),
       "bench.yaml");
+}
+
+/// The campaign's first run, without occlusion, as if somebody had confirmed that; keeps what it is given.
+inline daq::RunOrder first_run(const profiles::Campaign& campaign, const profiles::Bench& place,
+                               const std::filesystem::path& file) {
+  daq::AgreeingOperator person;
+  return {campaign,
+          place,
+          person.confirm_mounting(campaign.propeller, 0),
+          profiles::make_plan(campaign, place).runs.front(),
+          10.0,
+          file};
 }
 
 }  // namespace kphi::test

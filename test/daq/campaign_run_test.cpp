@@ -56,7 +56,8 @@ TEST_F(ShortCampaign, AsksForEachMountingOnceAndRunsAllItsRepetitions) {
   EXPECT_EQ(result.lost, 0u);
   EXPECT_EQ(results_.complete_runs().size(), 4u);
   EXPECT_THAT(events(), ElementsAre("campaign_started", "clock_unchecked", "mounted", "run_accepted", "run_accepted",
-                                    "mounted", "run_accepted", "run_accepted", "campaign_finished"));
+                                    "repetitions_judged", "mounted", "run_accepted", "run_accepted",
+                                    "repetitions_judged", "campaign_finished"));
 }
 
 TEST_F(ShortCampaign, LeavesAWholeFolderWhoseStepsAreAPureFunctionOfTheRuns) {

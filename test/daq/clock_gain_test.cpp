@@ -51,7 +51,7 @@ TEST(ClockGain, GivesTrueSpeedsFromAModuleWhoseClockIsFast) {
   TrueSpeed truth(bench);
   const test::TemporaryFolder folder;
   const auto file = folder.path() / "run.h5";
-  (void)record_run(bench, {campaign, place, 0.0, 1, 10.0, file}, truth, [] { return false; });
+  (void)record_run(bench, test::first_run(campaign, place, file), truth, [] { return false; });
   const auto steps = reduce(results::read_run(file));
   ASSERT_EQ(steps.size(), 3u);
   for (const auto& step : steps) {

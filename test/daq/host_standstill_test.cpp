@@ -60,7 +60,7 @@ class HostStandstill : public testing::Test {
  protected:
   RunResult record(Duration sleeps_for) {
     bench_.sleeps_for = sleeps_for;
-    return record_run(bench_, {campaign_, place_, 0.0, 1, 10.0, folder_.path() / "run.h5"}, progress_,
+    return record_run(bench_, test::first_run(campaign_, place_, folder_.path() / "run.h5"), progress_,
                       [] { return false; });
   }
   std::string stop(Duration sleeps_for) {

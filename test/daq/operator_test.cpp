@@ -1,5 +1,6 @@
 #include "daq/operator.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -27,7 +28,15 @@ class Prompt : public testing::Test {
     close(pipe_[1]);
   }
   void mount(double occlusion_deg) {
-    TerminalOperator(pipe_[0], words_, [this] { return stop_; }).mount({"5x3", "Test 5 inch", 5, 3}, occlusion_deg);
+    const Mounted mounted = person().confirm_mounting({"5x3", "Test 5 inch", 5, 3}, occlusion_deg);
+    EXPECT_EQ(mounted.occlusion_deg(), occlusion_deg);
+  }
+  bool run_again() { return person().run_again({90, "repetition 2 is 3 % off", 1, 2}); }
+  TerminalOperator person() {
+    TerminalOperator person(pipe_[0], words_, [this] { return stop_; });
+    person.dictate_to(
+        [this](const char* event, const std::string& words) { record_.push_back(event + (": " + words)); });
+    return person;
   }
   std::string said() {
     std::fflush(words_);
@@ -39,6 +48,7 @@ class Prompt : public testing::Test {
   std::size_t size_ = 0;
   std::FILE* words_ = nullptr;
   bool stop_ = false;
+  std::vector<std::string> record_;
 };
 
 TEST_F(Prompt, NamesWhatToMountAndThatTheMotorIsLocked) {
@@ -75,6 +85,40 @@ TEST_F(Prompt, StopsWhenASignalCame) {
   stop_ = true;
   answer("90\n");
   EXPECT_THROW(mount(90), Interrupted);
+}
+
+TEST_F(Prompt, RunsAgainWhenThePersonJustPressesEnter) {
+  answer("\n");
+  EXPECT_TRUE(run_again());
+  EXPECT_NE(said().find("90°: repetition 2 is 3 % off. All of them stay on record."), std::string::npos) << said();
+  EXPECT_NE(said().find("run 90° again (extra run 1 of at most 2)?"), std::string::npos);
+}
+
+TEST_F(Prompt, TakesYesAndNoAndAsksAgainOtherwise) {
+  answer("maybe\nn\n");
+  EXPECT_FALSE(run_again());
+  EXPECT_NE(said().find("\"maybe\" is neither y nor n."), std::string::npos) << said();
+}
+
+TEST_F(Prompt, StopsTheCampaignOnQInsteadOfAnotherRun) {
+  answer("q\n");
+  EXPECT_THROW((void)run_again(), Interrupted);
+}
+
+TEST_F(Prompt, DictatesWhatIsAskedAndWhateverIsTyped) {
+  answer("45\n90\n");
+  mount(90);
+  EXPECT_THAT(record_,
+              testing::ElementsAre(
+                  "operator_asked: type the mounted angle (90) and Enter, or q to stop:", "operator_answered: 45",
+                  "operator_asked: type the mounted angle (90) and Enter, or q to stop:", "operator_answered: 90"));
+}
+
+TEST(AgreeingOperator, AgreesToEachMountingAndToOneMoreRun) {
+  AgreeingOperator person;
+  EXPECT_EQ(person.confirm_mounting({"5x3", "Test 5 inch", 5, 3}, 45).occlusion_deg(), 45);
+  EXPECT_TRUE(person.run_again({90, "", 1, 3}));
+  EXPECT_FALSE(person.run_again({90, "", 2, 3}));
 }
 
 }  // namespace

@@ -45,6 +45,12 @@ std::string printed(void (*talk)(Progress&), bool terminal) {
   return result;
 }
 
+TEST(Progress, CallsAReferenceRunSo) {
+  Position position = in_a_step();
+  position.repetition = -2;
+  EXPECT_EQ(describe(position, seen()).substr(0, 30), "5x3  φ  90°  ref 2  step 17/");
+}
+
 TEST(Progress, NamesPropellerOcclusionRepetitionStepSpeedsThrustAndTimeLeft) {
   EXPECT_EQ(describe(in_a_step(), seen()),
             "5x3  φ  90°  rep 2/3  step 17/40  cmd  7895  is  7894 RPM  thrust  1.162 N  left 06:12");

@@ -31,7 +31,7 @@ TEST_F(Reference, GivesTheStoredStepMeansByteForByte) {
   }
   ASSERT_EQ(steps.size(), 12u);
   EXPECT_EQ(results::format_steps(steps), results::read_text(folder_.steps()));
-  EXPECT_EQ(results::format_steps(average_repetitions(steps)), results::read_text(folder_.means()));
+  EXPECT_EQ(results::format_steps(means_of(steps)), results::read_text(folder_.means()));
 }
 
 }  // namespace

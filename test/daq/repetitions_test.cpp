@@ -136,6 +136,28 @@ TEST(JudgeRepetitions, AsksForAnotherWhenOneOfThreeStandsOutAndKeepsIt) {
   EXPECT_THAT(after.reason, HasSubstr("repetition 2"));
 }
 
+TEST(MeansOf, LeaveOutlyingRepetitionsOutAndSaySo) {
+  const auto steps = runs({0, 0.03, 0.0005});
+  const auto means = means_of(steps);
+  ASSERT_EQ(means.size(), 20u);
+  for (int i = 0; i < 20; ++i) {
+    const StepMean& mean = means[static_cast<std::size_t>(i)];
+    EXPECT_NEAR(mean.thrust_n,
+                0.5 * (steps[static_cast<std::size_t>(i)].thrust_n + steps[static_cast<std::size_t>(40 + i)].thrust_n),
+                1e-12);
+    EXPECT_EQ(mean.repetitions_averaged, 2);
+    EXPECT_EQ(mean.repetitions_left_out, 1);
+  }
+  const auto again = results::parse_steps(results::format_steps(means), "means.csv");
+  EXPECT_EQ(again.at(3).repetitions_left_out, 1);
+}
+
+TEST(MeansOf, AreTheAveragesWhereNoneStandsOut) {
+  const auto steps = runs({0, 0.0002, -0.0002});
+  EXPECT_EQ(results::format_steps(means_of(steps)), results::format_steps(average_repetitions(steps)));
+  EXPECT_TRUE(std::isnan(means_of(steps).front().repetitions_averaged));
+}
+
 TEST(JudgeRepetitions, AsksForAnotherWhenNoneAgreesButNotForEver) {
   EXPECT_TRUE(judged(runs({-0.03, 0, 0.03})).asks_for_another);
   EXPECT_THAT(judged(runs({-0.03, 0, 0.03})).reason, HasSubstr("none stands out"));

@@ -28,7 +28,7 @@ class OneRun : public testing::Test {
   explicit OneRun(int seed = 1) : place_(test::deterministic_place(seed)), bench_(place_) { bench_.mounted("5x3", 0); }
 
   RunResult record(const std::function<bool()>& stop_asked = [] { return false; }) {
-    return record_run(bench_, {campaign_, place_, 0.0, 1, 10.0, file()}, progress_, stop_asked);
+    return record_run(bench_, test::first_run(campaign_, place_, file()), progress_, stop_asked);
   }
   [[nodiscard]] std::filesystem::path file() const { return folder_.path() / "5x3_phi000_rep1.h5"; }
   [[nodiscard]] std::filesystem::path aborted_file() const { return folder_.path() / "5x3_phi000_rep1.aborted.h5"; }
@@ -183,7 +183,7 @@ TEST_F(OneRun, StopsWhenAnExceptionComesFromTheProgressDisplay) {
     void step_done(const Position&, const Observation&) override {}
     void say(const std::string&) override {}
   } broken;
-  EXPECT_THROW((void)record_run(bench_, {campaign_, place_, 0.0, 1, 10.0, file()}, broken, [] { return false; }),
+  EXPECT_THROW((void)record_run(bench_, test::first_run(campaign_, place_, file()), broken, [] { return false; }),
                std::runtime_error);
   EXPECT_TRUE(motor_is_let_go());
 }
@@ -197,7 +197,7 @@ TEST(RunFromASeed, GivesTheSameBytesTwiceAndOthersFromAnotherSeed) {
     bench.mounted("5x3", 0);
     NoProgress progress;
     const auto file = folder.path() / "run.h5";
-    (void)record_run(bench, {campaign, place, 0.0, 1, 10.0, file}, progress, [] { return false; });
+    (void)record_run(bench, test::first_run(campaign, place, file), progress, [] { return false; });
     return test::bytes_of(file);
   };
   const std::string once = bytes_from(7);

@@ -53,6 +53,22 @@ class Watched {
   SpeedWatch watch;
 };
 
+TEST(SpeedWatch, LetsARotorBeAnywhereOnARampButNotBesideIt) {
+  for (const auto& [from, to] : {std::pair(300.0, 1800.0), std::pair(1800.0, 300.0)}) {
+    Watched rotor;
+    rotor.command(from);
+    rotor.show(from, 200);
+    rotor.watch.command_ramp(rotor.now, RadPerSec(to));
+    for (int i = 0; i <= 1000; ++i) rotor.show(from + (to - from) * i / 1000);  // 20 s: slower than any rotor
+    EXPECT_EQ(rotor.kind(), Kind::none) << from;
+    rotor.command(to);
+    rotor.show(to, 100);
+    EXPECT_EQ(rotor.kind(), Kind::none);
+    rotor.watch.command_ramp(rotor.now, RadPerSec(from));
+    EXPECT_GT(rotor.ms_until_found(1800 * 1.3), 0) << "a runaway is one on a ramp, too";
+  }
+}
+
 TEST(SpeedWatch, FindsNothingInARotorThatFollowsFortyStepsUpAndDown) {
   for (const int direction : {+1, -1}) {
     Watched rotor(direction);

@@ -50,6 +50,37 @@ TEST(Campaign, HasThreeRepetitionsAndNoOperatorUnlessItSaysSo) {
   EXPECT_EQ(campaign.operator_name, "");
 }
 
+TEST(Campaign, RunsAsListedUpwardsOnceMountedUnlessItsOrderSaysOtherwise) {
+  const Campaign plain = parse_campaign(kCampaignText, "c.yaml");
+  EXPECT_EQ(to_words(plain.order), "runs listed, steps up");
+  EXPECT_EQ(plain.repetitions_extra_max, 1);
+  EXPECT_FALSE(plain.profile.slew_rad_s2);
+  const Campaign campaign = parse_campaign(
+      changed(kCampaignText, "last_rpm: 19100\n", "last_rpm: 19100\n  slew_rpm_s: 3000\n") +
+          "repetitions_extra_max: 2\n"
+          "order: {runs: shuffled, steps: down, seed: 9, remount_each_repetition: true, reference: true}\n",
+      "c.yaml");
+  EXPECT_EQ(campaign.order.runs, RunOrderKind::shuffled);
+  EXPECT_EQ(campaign.order.steps, StepOrderKind::down);
+  EXPECT_EQ(campaign.order.seed, 9u);
+  EXPECT_TRUE(campaign.order.remount_each_repetition);
+  EXPECT_TRUE(campaign.order.reference);
+  EXPECT_EQ(campaign.repetitions_extra_max, 2);
+  EXPECT_DOUBLE_EQ(campaign.profile.slew_rad_s2.value(), from_rpm(3000).value());
+}
+
+TEST(Campaign, IsRefusedWhenItShufflesWithoutASeed) {
+  const auto order = [](const std::string& text) {
+    return refusals([&] { return parse_campaign(kCampaignText + text, "c.yaml"); });
+  };
+  EXPECT_THAT(order("order: {runs: shuffled}\n"),
+              ElementsAre("24:15: order.runs: shuffled without a seed; add seed: and any whole number; the same one "
+                          "gives this order again"));
+  EXPECT_THAT(order("order: {steps: shuffled}\n"), ElementsAre(StartsWith("24:16: order.steps: shuffled without")));
+  EXPECT_THAT(order("order: {steps: sideways}\n"), ElementsAre(StartsWith("24:16: order.steps: ")));
+  EXPECT_THAT(order("order: {runs: shuffled, seed: -1}\n"), ElementsAre(StartsWith("24:31: order.seed: ")));
+}
+
 TEST(Campaign, MayRunDownwards) {
   const auto text =
       changed(changed(kCampaignText, "first_rpm: 100", "first_rpm: 9000"), "last_rpm: 19100", "last_rpm: 50");
@@ -192,8 +223,9 @@ TEST(Campaign, SaysWhereAKeyBelongs) {
               ElementsAre("17:1: thrust_max_n is not a key; it belongs to limits"));
   EXPECT_THAT(refused("  steps: 4\n", "  steps: 4\n  zero_s: 3\n"),
               ElementsAre("13:3: zero_s is not a key of profile; it belongs to the top of the file"));
-  EXPECT_THAT(refused("  steps: 4\n", "  steps: 4\n  colour: red\n"),
-              ElementsAre("13:3: colour is not a key of profile; known here: dwell_s, first_rpm, last_rpm, steps"));
+  EXPECT_THAT(
+      refused("  steps: 4\n", "  steps: 4\n  colour: red\n"),
+      ElementsAre("13:3: colour is not a key of profile; known here: dwell_s, first_rpm, last_rpm, slew_rpm_s, steps"));
 }
 
 TEST(Campaign, RefusesMissingKeysAtTheObjectThatLacksThem) {

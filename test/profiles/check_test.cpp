@@ -63,6 +63,7 @@ TEST_F(Check, SumsUpACampaign) {
   EXPECT_EQ(file.summary,
             "  propeller  5x3 (5-inch three-blade, 5 in, 3 blades)\n"
             "  runs       15: occlusions 0, 45, 90, 180, 270 degrees, 3 repetitions of each, 5 mountings\n"
+            "  order      runs listed, steps up\n"
             "  steps      600: 40 per run, 100 to 19100 RPM by 487.179 RPM, 2 s each\n"
             "  time       20 min 00 s spinning, 21 min 00 s with the zeros, besides mounting\n"
             "  disk       8.82 million samples at 7000 Hz, 388 MB\n");

@@ -1,7 +1,11 @@
 #include "profiles/plan.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <map>
+#include <set>
 
 #include "profiles/configuration_error.hpp"
 #include "test/profiles/refusals.hpp"
@@ -45,6 +49,90 @@ TEST(Plan, KeepsAllRepetitionsOfAMountingTogetherInTheFilesOrder) {
   for (const PlannedRun& run : make_plan(campaign, Bench{}).runs) order.emplace_back(run.occlusion_deg, run.repetition);
   EXPECT_THAT(order,
               testing::ElementsAre(std::pair(90.0, 1), std::pair(90.0, 2), std::pair(0.0, 1), std::pair(0.0, 2)));
+}
+
+Campaign ordered(const std::string& order) { return parse_campaign(kCampaignText + order, "c.yaml"); }
+
+std::vector<std::string> names(const Plan& plan) {
+  std::vector<std::string> names;
+  for (const PlannedRun& run : plan.runs)
+    names.push_back(fmt::format("{:g}/{}{}", run.occlusion_deg, run.repetition, run.mount ? "!" : ""));
+  return names;
+}
+
+TEST(Plan, ShufflesOcclusionsAsBlocksBecauseMountingIsDear) {
+  std::set<std::vector<double>> orders;
+  for (int seed = 1; seed <= 50; ++seed) {
+    const Plan plan = make_plan(ordered(fmt::format("order: {{runs: shuffled, seed: {}}}\n", seed)), Bench{});
+    EXPECT_EQ(plan.mountings, 3);
+    for (std::size_t i = 0; i < plan.runs.size(); ++i) {
+      EXPECT_EQ(plan.runs[i].repetition, 1 + static_cast<int>(i % 2));
+      EXPECT_EQ(plan.runs[i].mount, i % 2 == 0);
+    }
+    orders.insert(plan.mounting_angles());
+  }
+  EXPECT_EQ(orders.size(), 6u) << "all orders of three occlusions come up";
+}
+
+TEST(Plan, ShufflesAllRunsWhenEachIsMountedAnewAndNumbersRepetitionsAsTheyAreRun) {
+  const Plan plan = make_plan(ordered("order: {runs: shuffled, seed: 5, remount_each_repetition: true}\n"), Bench{});
+  EXPECT_EQ(plan.mountings, 6);
+  std::map<double, int> last;
+  int blocks = 0;
+  for (std::size_t i = 0; i < plan.runs.size(); ++i) {
+    EXPECT_TRUE(plan.runs[i].mount);
+    EXPECT_EQ(plan.runs[i].repetition, ++last[plan.runs[i].occlusion_deg]);
+    blocks += i == 0 || plan.runs[i].occlusion_deg != plan.runs[i - 1].occlusion_deg;
+  }
+  EXPECT_THAT(last, testing::ElementsAre(testing::Pair(0, 2), testing::Pair(45, 2), testing::Pair(90, 2)));
+  EXPECT_GT(blocks, 3) << "repetitions of an occlusion are no longer together";
+}
+
+TEST(Plan, IsTheSameFromTheSameSeedAndIsWrittenDownHere) {
+  EXPECT_THAT(names(make_plan(ordered("order: {runs: shuffled, seed: 2021}\n"), Bench{})),
+              testing::ElementsAre("0/1!", "0/2", "90/1!", "90/2", "45/1!", "45/2"));
+}
+
+TEST(Plan, HasAReferenceRunAtBothEndsThatIsNoRepetition) {
+  EXPECT_THAT(names(make_plan(ordered("order: {reference: true}\n"), Bench{})),
+              testing::ElementsAre("0/-1!", "0/1", "0/2", "45/1!", "45/2", "90/1!", "90/2", "0/-2!"));
+  Campaign campaign = ordered("order: {reference: true}\n");
+  campaign.occlusions_deg = {90};
+  EXPECT_THAT(names(make_plan(campaign, Bench{})), testing::ElementsAre("0/-1!", "90/1!", "90/2", "0/-2!"));
+}
+
+TEST(Plan, ShufflesTheStepsOfEachRunByItsOwnSeed) {
+  const Plan plan = make_plan(ordered("order: {steps: shuffled, seed: 6}\n"), Bench{});
+  const Plan again = make_plan(ordered("order: {runs: shuffled, steps: shuffled, seed: 6}\n"), Bench{});
+  std::map<std::pair<double, int>, std::vector<int>> orders;
+  const auto numbers = [](const PlannedRun& run) {
+    std::vector<int> found;
+    for (const PlannedStep& step : run.steps) found.push_back(step.number);
+    return found;
+  };
+  std::set<std::vector<int>> different;
+  for (const PlannedRun& run : plan.runs) {
+    orders[{run.occlusion_deg, run.repetition}] = numbers(run);
+    different.insert(numbers(run));
+  }
+  EXPECT_GT(different.size(), 3u);
+  for (const PlannedRun& run : again.runs) {
+    const auto order = orders.at({run.occlusion_deg, run.repetition});
+    EXPECT_EQ(numbers(run), order) << "whatever else the campaign holds";
+  }
+}
+
+TEST(Plan, CountsTheStepsOfTheWayBackAndTheTimeOfRamps) {
+  EXPECT_EQ(make_plan(ordered("order: {steps: up_and_down}\n"), Bench{}).steps, 6 * 7);
+  const std::string slew = changed(kCampaignText, "last_rpm: 19100\n", "last_rpm: 19100\n  slew_rpm_s: 1910\n");
+  const Plan plain = make_plan(parse_campaign(kCampaignText, "c.yaml"), Bench{});
+  const Plan up = make_plan(parse_campaign(slew, "c.yaml"), Bench{});
+  EXPECT_NEAR((up.spinning - plain.spinning).value(), 6 * 10.0, 1e-6) << "0 to 19100 RPM by 1910 RPM/s, six times";
+  EXPECT_NEAR((up.bench - plain.bench).value(), 6 * 10.0, 1e-6);
+  EXPECT_EQ(up.samples_in_steps, plain.samples_in_steps) << "a ramp is not averaged";
+  EXPECT_EQ(up.samples - plain.samples, 60u * 7000);
+  const Plan both = make_plan(parse_campaign(slew + "order: {steps: up_and_down}\n", "c.yaml"), Bench{});
+  EXPECT_NEAR((both.spinning - plain.spinning).value(), 6 * (3 * 2 + 10 + 19000 / 1910.0), 1e-6);
 }
 
 TEST(Plan, CountsSamplesAtTheBenchsRate) {

@@ -313,6 +313,21 @@ TEST(CampaignFolder, NamesRunsSoThatTheySort) {
   EXPECT_EQ(run_file_name("5x3", 90, 2), "5x3_phi090_rep2.h5");
   EXPECT_EQ(run_file_name("5x3", 0, 1), "5x3_phi000_rep1.h5");
   EXPECT_EQ(run_file_name("a/b", 22.5, 1), "a_b_phi022.5_rep1.h5");
+  EXPECT_EQ(run_file_name("5x3", 0, -2), "5x3_phi000_ref2.h5");
+}
+
+TEST(CampaignFolder, TellsReferenceRunsFromRepetitions) {
+  const TemporaryFolder parent;
+  const auto folder = CampaignFolder::create(parent.path(), "u", "c");
+  for (const int repetition : {-10, -2, -1, 1}) std::ofstream(folder.run("5x3_rep7_ref1", 0, repetition)) << "x";
+  std::ofstream(folder.runs() / "5x3_phi000_ref3.aborted.h5") << "x";
+  std::vector<std::string> names;
+  for (const auto& path : folder.reference_runs()) names.push_back(path.filename().string());
+  EXPECT_THAT(names, ElementsAre("5x3_rep7_ref1_phi000_ref1.h5", "5x3_rep7_ref1_phi000_ref2.h5",
+                                 "5x3_rep7_ref1_phi000_ref10.h5"));
+  ASSERT_EQ(folder.complete_runs().size(), 1u);
+  EXPECT_EQ(folder.complete_runs()[0].filename(), "5x3_rep7_ref1_phi000_rep1.h5");
+  EXPECT_EQ(folder.other_runs().size(), 1u) << "a reference run is complete, too";
 }
 
 TEST(CampaignFolder, IsNeverUsedTwice) {

@@ -1,0 +1,324 @@
+#include "daq/dry_run.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "daq/settling.hpp"
+#include "daq/thrust_prior.hpp"
+#include "drivers/netbox/audit.hpp"
+#include "profiles/configuration_error.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/run_writer.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using nlohmann::json;
+using profiles::Campaign;
+
+constexpr double kSpeedOfSound = 343;  // m/s, at 20 °C
+constexpr double kSupplyBand = 0.1;    // beyond it every step is in doubt
+constexpr double kAliasHz = 2;         // a line that appears below is constant over a step
+
+double time_scale(const profiles::Bench& place) { return place.simulation ? place.simulation->time_scale : 1.0; }
+
+RadPerSec top_speed(const Campaign& campaign) { return std::max(campaign.profile.first, campaign.profile.last); }
+
+/// The folder itself, or the nearest one above it that is there.
+std::filesystem::path existing(const std::filesystem::path& folder) {
+  std::filesystem::path path = std::filesystem::absolute(folder);
+  while (!std::filesystem::exists(path) && path.has_relative_path()) path = path.parent_path();
+  return path;
+}
+
+std::string minutes(double seconds) {
+  const auto whole = std::llround(seconds);
+  return whole < 120 ? fmt::format("{} s", whole) : fmt::format("{} min {:02} s", whole / 60, whole % 60);
+}
+
+std::string gigabytes(std::uint64_t bytes) { return fmt::format("{:.2f} GB", 1e-9 * static_cast<double>(bytes)); }
+
+/// Fills the list, one member a limit.
+class Limits {
+ public:
+  Limits(const Campaign& campaign, const profiles::Bench& place) : campaign_(campaign), place_(place) {}
+
+  void speed() {
+    const RadPerSec top = top_speed(campaign_);
+    try {
+      profiles::require_within(campaign_, place_);
+    } catch (const ConfigurationError& refused) {
+      return add(Severity::fault, "speed", refused.what());
+    }
+    const double tip = top.value() * 0.0127 * campaign_.propeller.diameter_in;
+    add(Severity::note, "speed",
+        fmt::format("{:.0f} RPM at most; the campaign allows {:.0f}, the motor {:.0f} RPM; blade tips at {:.0f} m/s, "
+                    "Mach {:.2f}",
+                    to_rpm(top), to_rpm(campaign_.limits.speed_max), to_rpm(place_.iq.speed_max), tip,
+                    tip / kSpeedOfSound));
+  }
+
+  void thrust() {
+    const double limit = campaign_.limits.thrust_max.value();
+    const auto prior = thrust_prior(campaign_.propeller);
+    if (!prior)
+      return add(Severity::note, "thrust",
+                 fmt::format("limit {:g} N; nothing published tells what such a propeller pulls", limit));
+    const double low = ThrustPrior::at(prior->low, top_speed(campaign_)).value();
+    const double high = ThrustPrior::at(prior->high, top_speed(campaign_)).value();
+    const std::string words = fmt::format("about {:.1f} to {:.1f} N expected at top speed ({}), limit {:g} N", low,
+                                          high, prior->source, limit);
+    if (low > limit) return add(Severity::fault, "thrust", words, "raise limits.thrust_max_n, or lower the profile");
+    if (high > limit) return add(Severity::warning, "thrust", words, "the limit may stop the run");
+    add(Severity::note, "thrust", words);
+  }
+
+  void torque() {
+    add(Severity::note, "torque", "no published number predicts it; the ranges of the load cell are watched");
+  }
+
+  void range() {
+    add(Severity::note, "load cell range",
+        "told by the box itself: kphi devices --bench BENCH --campaign CAMPAIGN asks it, and so does the run");
+  }
+
+  void sampling() {
+    std::vector<double> speeds_rpm;
+    for (const RadPerSec level : campaign_.profile.levels()) speeds_rpm.push_back(to_rpm(level));
+    const auto lines = netbox::aliased_lines(place_.netbox.rate_hz, speeds_rpm, campaign_.propeller.blades, kAliasHz);
+    const double pass_hz = to_rpm(top_speed(campaign_)) / 60 * campaign_.propeller.blades;
+    const std::string words = fmt::format("{:g} Hz, blades pass at {:.0f} Hz at most", place_.netbox.rate_hz, pass_hz);
+    if (lines.empty()) return add(Severity::note, "sampling", words + "; no level folds down to a constant force");
+    const netbox::AliasedLine& line = lines.front();
+    add(Severity::warning, "sampling",
+        fmt::format(
+            "{}; at {} levels a line of the rotor folds down to nearly constant, first at {:.0f} RPM ({:.1f} Hz "
+            "appears as {:.2f} Hz)",
+            words, lines.size(), line.speed_rpm, line.true_hz, line.apparent_hz),
+        "choose another rate or levels, or a filter in the box");
+  }
+
+  void window() {
+    const double left = campaign_.profile.dwell.value() - campaign_.minimum_discard.value();
+    const std::string words = fmt::format("{:g} s of each step are left after minimum_discard_s, zeros of {:g} s", left,
+                                          campaign_.zero.value());
+    if (left < kLeastWindow)
+      return add(Severity::warning, "averages", words, fmt::format("{:g} s are needed to see it settle", kLeastWindow));
+    add(Severity::note, "averages", words);
+  }
+
+  void supply() {
+    const auto& limits = campaign_.limits;
+    if (!place_.supply)
+      return add(Severity::note, "supply",
+                 fmt::format("{:g} V expected, not ours to switch; the motor coasts above {:g} A",
+                             campaign_.supply.value(), limits.supply_current_max.value()));
+    const auto& set = *place_.supply;
+    const std::string words = fmt::format(
+        "set to {:g} V, at most {:g} A; the campaign expects {:g} V and coasts above {:g} A", set.voltage.value(),
+        set.current_limit.value(), campaign_.supply.value(), limits.supply_current_max.value());
+    const bool beside = std::abs(set.voltage / campaign_.supply - 1) > kSupplyBand;
+    if (beside) return add(Severity::warning, "supply", words, "every step will be in doubt: make them agree");
+    add(Severity::note, "supply", words);
+  }
+
+  void coil() {
+    const auto& limits = campaign_.limits;
+    const double most = limits.coil_temperature_max.value();
+    if (!limits.cooling)
+      return add(Severity::note, "coil",
+                 fmt::format("the motor coasts above {:g} °C; no pauses to cool down are asked for", most));
+    const std::string words =
+        fmt::format("above {:g} °C a run waits until {:g} °C; the motor coasts above {:g} °C",
+                    limits.cooling->pause_above.value(), limits.cooling->resume_below.value(), most);
+    if (limits.cooling->pause_above.value() >= most)
+      return add(Severity::warning, "coil", words, "pause below the limit, or runs begin that cannot end");
+    add(Severity::note, "coil", words);
+  }
+
+  void disk(std::uint64_t needed, std::uint64_t free, const std::filesystem::path& folder) {
+    const std::string words =
+        fmt::format("{} needed, {} free in {}", gigabytes(needed), gigabytes(free), folder.string());
+    if (needed > free) return add(Severity::fault, "disk", words, "make room, or name another folder with --out");
+    add(Severity::note, "disk", words);
+  }
+
+  void writable(const std::filesystem::path& folder) {
+    const bool may = std::filesystem::is_directory(folder) && access(folder.c_str(), W_OK | X_OK) == 0;
+    if (may) return add(Severity::note, "files", folder.string() + " can be written to");
+    add(Severity::fault, "files", folder.string() + " cannot be written to", "name another folder with --out");
+  }
+
+  void answers(const profiles::Answers& answers, const profiles::Plan& plan) {
+    try {
+      profiles::require_mountings(answers, plan.mounting_angles());
+      add(Severity::note, "answers", fmt::format("{}: one for each mounting", answers.path));
+    } catch (const ConfigurationError& refused) {
+      add(Severity::fault, "answers", refused.what());
+    }
+  }
+
+  [[nodiscard]] std::vector<LimitCheck> take() { return std::move(checks_); }
+
+ private:
+  void add(Severity severity, std::string subject, std::string what, std::string next_move = {}) {
+    checks_.push_back({std::move(subject), {severity, std::move(what), std::move(next_move)}});
+  }
+  const Campaign& campaign_;
+  const profiles::Bench& place_;
+  std::vector<LimitCheck> checks_;
+};
+
+/// "40 steps, 100 to 19100 RPM"; where the order is none that can be told by its ends, every level.
+std::string steps_text(const Campaign& campaign, const profiles::PlannedRun& run) {
+  const auto rpm = [](const profiles::PlannedStep& step) { return to_rpm(step.speed); };
+  const std::string number = fmt::format("{} steps, ", run.steps.size());
+  switch (campaign.order.steps) {
+    case profiles::StepOrderKind::up:
+    case profiles::StepOrderKind::down:
+      return number + fmt::format("{:.0f} to {:.0f} RPM", rpm(run.steps.front()), rpm(run.steps.back()));
+    case profiles::StepOrderKind::up_and_down:
+      return number + fmt::format("{:.0f} to {:.0f} to {:.0f} RPM", rpm(run.steps.front()),
+                                  to_rpm(campaign.profile.last), rpm(run.steps.back()));
+    case profiles::StepOrderKind::shuffled:
+      break;
+  }
+  std::string levels;
+  for (const auto& step : run.steps) levels += fmt::format(" {:.0f}", rpm(step));
+  return number + "RPM:" + levels;
+}
+
+std::string runs_text(const profiles::Plan& plan, const Campaign& campaign) {
+  std::string text;
+  for (std::size_t i = 0; i < plan.runs.size(); ++i) {
+    const profiles::PlannedRun& run = plan.runs[i];
+    if (run.mount)
+      text += fmt::format("  mount {}\n",
+                          run.occlusion_deg == 0 ? "no occlusion" : fmt::format("{:g}°", run.occlusion_deg));
+    text += fmt::format("  {:4}  {}  {}\n", i + 1,
+                        results::run_file_name(campaign.propeller.id, run.occlusion_deg, run.repetition),
+                        steps_text(campaign, run));
+  }
+  return text;
+}
+
+std::string checks_text(const std::vector<LimitCheck>& checks) {
+  std::string text;
+  for (const auto& [subject, finding] : checks) {
+    const char* mark = finding.severity == Severity::fault     ? "REFUSED"
+                       : finding.severity == Severity::warning ? "look"
+                                                               : "";
+    text += fmt::format("  {:7}  {:<15}  {}{}{}\n", mark, subject, finding.what, finding.next_move.empty() ? "" : "; ",
+                        finding.next_move);
+  }
+  return text;
+}
+
+json to_json(const profiles::PlannedRun& run, const Campaign& campaign) {
+  json steps = json::array();
+  for (const auto& [number, speed] : run.steps) steps.push_back({{"step", number}, {"speed_rpm", to_rpm(speed)}});
+  return {{"file", results::run_file_name(campaign.propeller.id, run.occlusion_deg, run.repetition)},
+          {"mount", run.mount},
+          {"occlusion_deg", run.occlusion_deg},
+          {"repetition", run.repetition},
+          {"reference", run.is_reference()},
+          {"steps", steps}};
+}
+
+}  // namespace
+
+bool DryRun::ok() const {
+  return std::none_of(checks.begin(), checks.end(),
+                      [](const LimitCheck& check) { return check.finding.severity == Severity::fault; });
+}
+
+std::uint64_t bytes_needed(const profiles::Plan& plan, const profiles::Bench& place) {
+  const auto readings = static_cast<std::uint64_t>(2 * place.iq.telemetry_hz * plan.bench.value());
+  return results::RunWriter::bytes_needed(plan.samples, readings);
+}
+
+DryRun dry_run(const Campaign& campaign, const profiles::Bench& place, const std::filesystem::path& out,
+               const std::optional<profiles::Answers>& answers, results::FileLayer& files) {
+  DryRun dry;
+  dry.plan = profiles::make_plan(campaign, place);
+  dry.bytes_needed = bytes_needed(dry.plan, place);
+  const std::filesystem::path folder = existing(out);
+  dry.bytes_free = files.free_bytes(folder);
+  Limits limits(campaign, place);
+  limits.speed();
+  limits.thrust();
+  limits.torque();
+  limits.range();
+  limits.sampling();
+  limits.window();
+  limits.supply();
+  limits.coil();
+  limits.disk(dry.bytes_needed, dry.bytes_free, folder);
+  limits.writable(folder);
+  if (answers) limits.answers(*answers, dry.plan);
+  dry.checks = limits.take();
+  return dry;
+}
+
+std::string plan_text(const Campaign& campaign, const profiles::Bench& place, const profiles::Plan& plan) {
+  const auto& profile = campaign.profile;
+  std::string angles;
+  for (const double angle : campaign.occlusions_deg) angles += fmt::format(" {:g}°", angle);
+  return fmt::format(
+      "{}: propeller {} ({}), occlusions{}, {} repetitions\n"
+      "  {} runs of {} steps, {:.0f} to {:.0f} RPM, {:g} s each; {} mountings\n"
+      "  {:.0f} min spinning, {:.0f} min on the bench{}, {:.1f} million samples, {}",
+      campaign.name, campaign.propeller.id, campaign.propeller.name, angles, campaign.repetitions, plan.runs.size(),
+      plan.runs.front().steps.size(), to_rpm(profile.first), to_rpm(profile.last), profile.dwell.value(),
+      plan.mountings, plan.spinning.value() / 60, plan.bench.value() / 60,
+      time_scale(place) > 1 ? fmt::format(" ({:g} times as fast here)", time_scale(place)) : "",
+      1e-6 * static_cast<double>(plan.samples), gigabytes(bytes_needed(plan, place)));
+}
+
+std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles::Bench& place) {
+  const auto refused = std::count_if(dry.checks.begin(), dry.checks.end(),
+                                     [](const LimitCheck& c) { return c.finding.severity == Severity::fault; });
+  const double slew_s = ramp_time(campaign.profile, dry.plan.runs.front()).value();
+  return fmt::format(
+      "{}\n\norder: {}\n{}\ntime: {} spinning{}, {} on the bench with the zeros; on top come mounting, which waits for "
+      "you, spinning down{}, and at most {} further runs of an occlusion whose repetitions disagree\n\nlimits: {}\n{}",
+      plan_text(campaign, place, dry.plan), profiles::to_words(campaign.order), runs_text(dry.plan, campaign),
+      minutes(dry.plan.spinning.value()),
+      slew_s > 0 ? fmt::format(" ({} of ramps in the first run)", minutes(slew_s)) : "",
+      minutes(dry.plan.bench.value()),
+      campaign.limits.cooling ? ", pauses to cool down, whose length nobody knows" : "", campaign.repetitions_extra_max,
+      refused == 0 ? "nothing is refused" : fmt::format("{} refused", refused), checks_text(dry.checks));
+}
+
+json to_json(const DryRun& dry, const Campaign& campaign, const profiles::Bench& place) {
+  json runs = json::array(), checks = json::array();
+  for (const auto& run : dry.plan.runs) runs.push_back(to_json(run, campaign));
+  for (const auto& [subject, finding] : dry.checks) {
+    checks.push_back({{"subject", subject},
+                      {"severity", name_of(finding.severity)},
+                      {"what", finding.what},
+                      {"next_move", finding.next_move}});
+  }
+  const profiles::Plan& plan = dry.plan;
+  return {{"campaign", campaign.name},
+          {"propeller", campaign.propeller.id},
+          {"runs", plan.runs.size()},
+          {"mountings", plan.mountings},
+          {"mounting_angles_deg", plan.mounting_angles()},
+          {"steps", plan.steps},
+          {"spinning_s", plan.spinning.value()},
+          {"bench_s", plan.bench.value()},
+          {"time_scale", time_scale(place)},
+          {"samples", plan.samples},
+          {"bytes", dry.bytes_needed},
+          {"bytes_free", dry.bytes_free},
+          {"order", runs},
+          {"checks", checks},
+          {"ok", dry.ok()}};
+}
+
+}  // namespace kphi::daq

@@ -1,0 +1,60 @@
+#include "profiles/answers.hpp"
+
+#include <fmt/format.h>
+
+#include "profiles/profile_reader.hpp"
+
+namespace kphi::profiles {
+namespace {
+
+/// Items `pointer`/0, /1, … as long as there are some.
+template <class Value>
+std::vector<Answer<Value>> read_list(const ProfileReader& file, const std::string& pointer) {
+  std::vector<Answer<Value>> answers;
+  for (std::size_t i = 0; file.has(fmt::format("{}/{}", pointer, i)); ++i) {
+    const std::string item = fmt::format("{}/{}", pointer, i);
+    answers.push_back({file.get<Value>(item), file.mark(item)});
+  }
+  return answers;
+}
+
+}  // namespace
+
+std::string Answers::place(const Mark& mark) const { return fmt::format("{}:{}:{}", path, mark.line, mark.column); }
+
+Answers parse_answers(const std::string& text, const std::string& path) {
+  const ProfileReader file(text, path, FileKind::answers);
+  Answers answers;
+  answers.mountings = read_list<double>(file, "/mountings");
+  answers.run_again = read_list<bool>(file, "/run_again");
+  answers.end_of_mountings = answers.mountings.empty() ? file.mark("/mountings") : answers.mountings.back().mark;
+  if (file.has("/run_again"))
+    answers.end_of_run_again = answers.run_again.empty() ? file.mark("/run_again") : answers.run_again.back().mark;
+  answers.path = path;
+  return answers;
+}
+
+Answers load_answers(const std::string& path) { return parse_answers(read_text(path), path); }
+
+void require_mountings(const Answers& answers, std::span<const double> expected_deg) {
+  for (std::size_t i = 0; i < expected_deg.size(); ++i) {
+    if (i == answers.mountings.size()) {
+      throw ConfigurationError(
+          fmt::format("{}: mountings ends after {} of {}: the next one asked for is {:g} degrees; "
+                      "kphi run --dry-run lists them",
+                      answers.place(answers.end_of_mountings), i, expected_deg.size(), expected_deg[i]));
+    }
+    const auto& [value, mark] = answers.mountings[i];
+    if (value == expected_deg[i]) continue;
+    throw ConfigurationError(
+        fmt::format("{}: mounting {} is {:g} degrees, the campaign asks for {:g}; kphi run --dry-run "
+                    "lists them",
+                    answers.place(mark), i + 1, value, expected_deg[i]));
+  }
+  if (answers.mountings.size() == expected_deg.size()) return;
+  throw ConfigurationError(fmt::format("{}: mounting {} is left over: the campaign asks for {}; take it out",
+                                       answers.place(answers.mountings[expected_deg.size()].mark),
+                                       expected_deg.size() + 1, expected_deg.size()));
+}
+
+}  // namespace kphi::profiles

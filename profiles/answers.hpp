@@ -1,0 +1,36 @@
+// What an operator would answer during a campaign, written down before it: for a run without a terminal.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "profiles/finding.hpp"
+
+namespace kphi::profiles {
+
+template <class Value>
+struct Answer {
+  Value value;
+  Mark mark;  ///< where it stands in the file
+};
+
+struct Answers {
+  std::vector<Answer<double>> mountings;  ///< the angles that were mounted, degrees, in the order asked
+  std::vector<Answer<bool>> run_again;    ///< when another run was asked for, in the order asked
+  Mark end_of_mountings;                  ///< of the list, for what it lacks
+  Mark end_of_run_again;                  ///< likewise; of the file's begin when there is no such list
+  std::string path;
+
+  /// "answers.yaml:4:5".
+  [[nodiscard]] std::string place(const Mark& mark) const;
+};
+
+/// Strict, as load_campaign. Throws ConfigurationError with file:line:column.
+[[nodiscard]] Answers load_answers(const std::string& path);
+[[nodiscard]] Answers parse_answers(const std::string& text, const std::string& path);
+
+/// Throws ConfigurationError, one line, unless the mountings are just these, in this order.
+void require_mountings(const Answers& answers, std::span<const double> expected_deg);
+
+}  // namespace kphi::profiles
