@@ -8,6 +8,7 @@
 #include "daq/speed_error.hpp"
 #include "drivers/clock.hpp"
 #include "profiles/campaign.hpp"
+#include "results/records.hpp"
 
 namespace kphi::daq {
 
@@ -24,6 +25,11 @@ struct Observation {
   SpeedError speed_error{};        ///< of speed against command
   bool load_cell_is_fresh = true;  ///< no older than the stream's and this host's delay: thrust is what is now
   bool motor_is_fresh = true;      ///< likewise, of speed, current and temperature
+  // For onlookers.
+  NewtonMetres torque{};             ///< about the thrust axis, zero subtracted
+  Volts module_voltage{};            ///< at the motor module's input
+  results::SupplyReading supply{};   ///< of the bench supply; time 0: nothing yet, or there is none
+  results::SampleAccount account{};  ///< of this run so far
 };
 
 /// A limit that was passed, in words: "thrust 21.3 N is above 20 N".
