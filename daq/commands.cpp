@@ -11,6 +11,7 @@
 #include "daq/bench_audit.hpp"
 #include "daq/campaign_run.hpp"
 #include "daq/interrupt.hpp"
+#include "daq/live/commands.hpp"
 #include "profiles/configuration_error.hpp"
 #include "profiles/plan.hpp"
 #include "results/file_layer.hpp"
@@ -26,6 +27,7 @@ struct RunOptions {
   bool dry_run = false;
   bool yes = false;
   bool json = false;
+  live::Wishes live;
 };
 
 double time_scale(const profiles::Bench& place) { return place.simulation ? place.simulation->time_scale : 1.0; }
@@ -58,9 +60,7 @@ std::string plan_text(const profiles::Campaign& campaign, const profiles::Bench&
       1e-6 * static_cast<double>(plan.samples), 1e-9 * static_cast<double>(bytes_needed(plan, place)));
 }
 
-bool stop_asked() { return SignalWatch::count() > 0; }
-
-std::unique_ptr<Operator> person(const RunOptions& options) {
+std::unique_ptr<Operator> person(const RunOptions& options, const std::function<bool()>& stop_asked) {
   if (options.yes) return std::make_unique<AgreeingOperator>();
   if (!isatty(STDIN_FILENO)) {
     throw ConfigurationError(
@@ -108,7 +108,10 @@ int run(const RunOptions& options) {
   }
   put(stderr,
       fmt::format("{}\nCtrl-C lets the motor coast, closes the file and stops.\n", plan_text(campaign, place, plan)));
-  const auto operator_ = person(options);
+  live::View view(options.live, live::subject_of(campaign));
+  put(stderr, live::greeting(view));
+  const std::function<bool()> stop_asked = [&view] { return SignalWatch::count() > 0 || view.stop_asked(); };
+  const auto operator_ = person(options, stop_asked);
   const SignalWatch signals;
   std::filesystem::create_directories(options.out);
   const auto bench = connect(place);
@@ -118,8 +121,10 @@ int run(const RunOptions& options) {
   const auto folder = results::CampaignFolder::create(
       options.out, fmt::format("{:%Y%m%dT%H%M%SZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(started))),
       campaign.name, bench->files());
-  const auto progress = display();
-  const CampaignResult result = run_campaign(*bench, campaign, place, folder, *operator_, *progress, stop_asked);
+  const auto terminal = display();
+  const auto progress = view.beside(*terminal, bench->clock());
+  const CampaignResult result = view.tell_the_end(
+      [&] { return run_campaign(*bench, campaign, place, folder, *operator_, *progress, stop_asked); });
   summarise(result, folder, options.json);
   return 0;
 }
@@ -135,6 +140,7 @@ void add_run(CLI::App& program, int& exit_code) {
   command->add_flag("--dry-run", options->dry_run, "check everything, print the plan, touch no device");
   command->add_flag("--yes", options->yes, "take every mounting as done (a simulated bench)");
   command->add_flag("--json", options->json, "the result as one JSON object on stdout");
+  live::add_options(*command, options->live);
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }
 
