@@ -245,11 +245,13 @@ class Server::Works::Request : public std::enable_shared_from_this<Request> {
 
   void read() {
     parser_.header_limit(kLongestHeader);
+    parser_.body_limit(0);
     stream_.expires_after(works_.settings_.request_limit);
     http::async_read(stream_, buffer_, parser_, [self = shared_from_this()](Error failed, std::size_t) {
       if (failed == http::error::header_limit || failed == http::error::buffer_overflow)
         return self->answer(431, "that is too long");
-      if (failed == http::error::unexpected_body) return self->answer(400, "a request has no body here");
+      if (failed == http::error::unexpected_body || failed == http::error::body_limit)
+        return self->answer(400, "a request has no body here");
       if (failed == beast::error::timeout || failed == http::error::end_of_stream) return;
       if (failed) return self->answer(400, "this is no request");
       self->judge();
@@ -290,7 +292,8 @@ class Server::Works::Request : public std::enable_shared_from_this<Request> {
     begin(200, "text/html; charset=utf-8");
     const std::string host(view(parser_.get()[http::field::host]));
     answer_.set("Content-Security-Policy",
-                fmt::format("default-src 'none'; script-src 'nonce-{0}'; style-src 'nonce-{0}'; img-src data:; "
+                fmt::format("default-src 'none'; script-src 'nonce-{0}'; style-src 'nonce-{0}'; "
+                            "style-src-attr 'unsafe-inline'; img-src data:; "
                             "connect-src ws://{1}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
                             nonce, host));
     answer_.body() = replaced(works_.settings_.page, "@NONCE@", nonce);

@@ -10,7 +10,8 @@ const state = { hello: null, tick: null, trace: [], steps: [], ended: false, ask
                 numbersDue: false, chartsDue: false, stepsDue: false };
 
 // ---- numbers as text
-const fixed = (value, digits) => value === null || value === undefined ? '?' : value.toFixed(digits).replace('-', '−');
+const fixed = (value, digits) => value === null || value === undefined ? '?'
+  : value.toFixed(digits).replace(/^-(?=0\.?0*$)/, '').replace('-', '−');
 const thousands = value => value === null || value === undefined ? '?' : Math.round(value).toString().replace(/\B(?=(\d{3})+$)/g, ' ');
 const clock = seconds => {
   const whole = Math.max(0, Math.round(seconds)), two = n => String(n).padStart(2, '0');
@@ -82,10 +83,14 @@ function drawSteps() {
     ...angles.map(angle => angle === step.occlusion_deg ? 1e6 * step.k_n_s2 : null)]);
   // What is too uncertain to be seen does not set the scale.
   const sure = steps.filter(step => step.u_k_n_s2 !== null && step.u_k_n_s2 < 0.05 * Math.abs(step.k_n_s2));
-  const ks = (sure.length ? sure : steps).map(step => 1e6 * step.k_n_s2);
-  const low = Math.min(...ks), high = Math.max(...ks), room = 0.1 * (high - low) || 0.02 * Math.abs(high) || 1;
+  const shown = sure.length ? sure : steps, u = step => step.u_k_n_s2 || 0;
+  const low = 1e6 * Math.min(...shown.map(step => step.k_n_s2 - u(step)));
+  const high = 1e6 * Math.max(...shown.map(step => step.k_n_s2 + u(step)));
+  const room = Math.max(0.08 * (high - low), 0.01 * Math.abs(high)) || 1;
+  const digits = Math.max(0, Math.ceil(0.5 - Math.log10(high - low + 2 * room)) + 1);
   charts.k.updateOptions({ file: rows.length > 1 ? rows : [rows[0], rows[0]], labels: ['x', ...angles.map(a => a + '°')],
-    colors: paints, dateWindow: [0, 1.05 * rows[rows.length - 1][0]], valueRange: [low - room, high + room] });
+    colors: paints, dateWindow: [0, 1.05 * rows[rows.length - 1][0]], valueRange: [low - room, high + room],
+    axes: { y: { axisLabelWidth: 62, axisLabelFormatter: value => fixed(value, digits) } } });
   at('k_keys').replaceChildren(...angles.map((angle, i) => {
     const key = document.createElement('span');
     key.className = 'key';
@@ -114,6 +119,7 @@ function showNumbers() {
   text('repetition', `${tick.repetition}/${tick.repetitions}`);
   const waits = tick.silent_s > kSilent_s && !state.ended;
   text('step', waits ? 'waiting' : turns ? `${tick.step + 1}/${tick.steps}` : tick.phase || '–');
+  text('step_word', waits ? 'see the terminal' : turns ? 'step' : '');
   text('left', clock(tick.remaining_s || 0));
   at('progress_bar').style.transform = `scaleX(${Math.min(1, Math.max(0, tick.progress))})`;
   at('progress').setAttribute('aria-valuenow', Math.round(100 * tick.progress));
@@ -123,7 +129,7 @@ function showNumbers() {
 
 function showReadings(tick) {
   const electric = (volts, amps) => volts === null || amps === null ? 'none'
-    : `${fixed(volts, 2)} V  ${fixed(amps, 2)} A  ${fixed(volts * amps, 0)} W`;
+    : `${fixed(volts, 2)} V · ${fixed(amps, 2)} A · ${fixed(volts * amps, 0)} W`;
   text('supply', electric(tick.supply_v, tick.supply_a));
   text('module', electric(tick.module_v, tick.module_a).replace('none', '?'));
   text('coil', fixed(tick.coil_degc, 0) + ' °C');
@@ -284,6 +290,7 @@ function connect() {
   };
 }
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { if (state.hello) makeCharts(); });
-addEventListener('resize', () => { state.chartsDue = state.stepsDue = true; });
+const sizes = new ResizeObserver(() => { for (const chart of Object.values(charts)) chart.resize(); });
+for (const place of document.querySelectorAll('.chart')) sizes.observe(place);
 requestAnimationFrame(frame);
 connect();
