@@ -16,6 +16,7 @@
 #include "daq/device_locks.hpp"
 #include "daq/dry_run.hpp"
 #include "daq/interrupt.hpp"
+#include "daq/live/commands.hpp"
 #include "profiles/configuration_error.hpp"
 #include "profiles/plan.hpp"
 #include "results/file_layer.hpp"
@@ -33,11 +34,11 @@ struct RunOptions {
   bool dry_run = false;
   bool yes = false;
   bool json = false;
+  live::Wishes live;
 };
 
-bool stop_asked() { return SignalWatch::count() > 0; }
-
-std::unique_ptr<Operator> person(const RunOptions& options, const std::optional<profiles::Answers>& answers) {
+std::unique_ptr<Operator> person(const RunOptions& options, const std::optional<profiles::Answers>& answers,
+                                 const std::function<bool()>& stop_asked) {
   if (answers) return std::make_unique<AnsweringOperator>(*answers);
   if (options.yes) return std::make_unique<AgreeingOperator>();
   if (!isatty(STDIN_FILENO)) {
@@ -143,7 +144,10 @@ int run(const RunOptions& options) {
   if (answers && !destination.resumption) profiles::require_mountings(*answers, plan.mounting_angles());
   put(stderr,
       fmt::format("{}\nCtrl-C lets the motor coast, closes the file and stops.\n", plan_text(campaign, place, plan)));
-  const auto operator_ = person(options, answers);
+  live::View view(options.live, live::subject_of(campaign));
+  put(stderr, live::greeting(view));
+  const std::function<bool()> stop_asked = [&view] { return SignalWatch::count() > 0 || view.stop_asked(); };
+  const auto operator_ = person(options, answers, stop_asked);
   const SignalWatch signals;
   const DeviceLocks devices(lock_names(place));
   if (!destination.folder) std::filesystem::create_directories(options.out);
@@ -153,9 +157,12 @@ int run(const RunOptions& options) {
       static_cast<std::uint64_t>(destination.share_left(plan) * static_cast<double>(bytes_needed(plan, place)));
   results::require_room(destination.folder ? destination.folder->path().string() : options.out, bytes, bench->files());
   if (!destination.folder) destination.create(options, campaign, *bench);
-  const auto progress = display();
-  const CampaignResult result = run_campaign(*bench, campaign, place, *destination.folder, *operator_, *progress,
-                                             stop_asked, destination.resumption ? &*destination.resumption : nullptr);
+  const auto terminal = display();
+  const auto progress = view.beside(*terminal, bench->clock());
+  const CampaignResult result = view.tell_the_end([&] {
+    return run_campaign(*bench, campaign, place, *destination.folder, *operator_, *progress, stop_asked,
+                        destination.resumption ? &*destination.resumption : nullptr);
+  });
   summarise(result, *destination.folder, options.json);
   operator_->finish();
   return 0;
@@ -181,6 +188,7 @@ void add_run(CLI::App& program, int& exit_code) {
   command->add_option("--answers", options->answers, "file with the operator's answers, for a run without a terminal")
       ->excludes(yes);
   command->add_flag("--json", options->json, "the result as one JSON object on stdout");
+  live::add_options(*command, options->live);
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }
 

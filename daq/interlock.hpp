@@ -7,6 +7,7 @@
 
 #include "daq/guard_limits.hpp"
 #include "drivers/clock.hpp"
+#include "results/records.hpp"
 
 namespace kphi::daq {
 
@@ -20,6 +21,11 @@ struct Observation {
   Duration motor_age{};
   bool load_cell_is_fresh = true;  ///< no older than the stream's and this host's delay: thrust is what is now
   bool motor_is_fresh = true;      ///< likewise, of speed, current and temperature
+  // For onlookers.
+  NewtonMetres torque{};             ///< about the thrust axis, zero subtracted
+  Volts module_voltage{};            ///< at the motor module's input
+  results::SupplyReading supply{};   ///< of the bench supply; time 0: nothing yet, or there is none
+  results::SampleAccount account{};  ///< of this run so far
 };
 
 /// Why the motor was let go.

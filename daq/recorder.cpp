@@ -61,7 +61,7 @@ void Recorder::drain_marks() {
   results::PhaseMark mark;
   while (marks_.pop(mark)) {
     writer_.mark(mark);
-    phase_sum_n_ = 0;
+    phase_sum_n_ = phase_sum_nm_ = 0;
     phase_count_ = 0;
     measuring_ = mark.phase == results::Phase::bias_before || mark.phase == results::Phase::bias_after ||
                  mark.phase == results::Phase::zero_before;
@@ -102,13 +102,21 @@ void Recorder::drain_load_cell() {
     const std::span<const results::LoadCellRecord> batch(records_.data(), n);
     writer_.append(batch);
     look_at(batch);
-    std::int64_t sum = 0;
-    for (const auto& record : batch) sum += record.counts[static_cast<std::size_t>(mounting_.axis)];
+    std::int64_t sum = 0, torque_sum = 0;
+    const auto axis = static_cast<std::size_t>(mounting_.axis);
+    for (const auto& record : batch) {
+      sum += record.counts[axis];
+      torque_sum += record.counts[3 + axis];
+    }
     const double newtons = mounting_.sign * static_cast<double>(sum) / scale_.counts_per_newton;
+    const double newton_metres = mounting_.sign * static_cast<double>(torque_sum) / scale_.counts_per_newton_metre;
     phase_sum_n_ += newtons;
+    phase_sum_nm_ += newton_metres;
     phase_count_ += n;
     thrust_n_ = newtons / static_cast<double>(n);
+    torque_nm_ = newton_metres / static_cast<double>(n);
     phase_mean_n_ = phase_sum_n_ / static_cast<double>(phase_count_);
+    phase_mean_nm_ = phase_sum_nm_ / static_cast<double>(phase_count_);
     load_cell_ns_ = batch.back().arrival_ns;
   }
 }
@@ -120,6 +128,7 @@ void Recorder::drain_motor() {
     writer_.append(batch);
     for (const auto& reading : batch) {
       if (reading.channel == MotorChannel::speed) speed_rad_s_ = std::abs(reading.value);
+      if (reading.channel == MotorChannel::supply_voltage) module_voltage_v_ = reading.value;
       if (reading.channel == MotorChannel::supply_current) supply_current_a_ = reading.value;
       if (reading.channel == MotorChannel::coil_temperature) coil_temperature_degc_ = reading.value;
     }
@@ -145,11 +154,18 @@ std::vector<results::StreamEvent> Recorder::take_events() {
   return taken;
 }
 
-void Recorder::take_zero() noexcept { zero_n_ = phase_mean_n_.load(); }
+void Recorder::take_zero() noexcept {
+  zero_n_ = phase_mean_n_.load();
+  zero_nm_ = phase_mean_nm_.load();
+}
 
 Observation Recorder::observe(Instant now) const noexcept {
   Observation seen{RadPerSec(speed_rad_s_),         Newtons(thrust_n_ - zero_n_), Amperes(supply_current_a_),
                    Celsius(coil_temperature_degc_), now - Instant(load_cell_ns_), now - Instant(motor_ns_)};
+  seen.torque = NewtonMetres(torque_nm_ - zero_nm_);
+  seen.module_voltage = Volts(module_voltage_v_);
+  seen.supply = supply_.read();
+  seen.account = bench_.load_cell().account();
   seen.load_cell_is_fresh = seen.load_cell_age <= fresh_load_cell_;
   seen.motor_is_fresh = seen.motor_age <= fresh_motor_;
   return seen;

@@ -71,10 +71,13 @@ class Recorder {
   // To the runner. Sized at run time: Boost 1.74's queue of fixed capacity never destroys what is left in it.
   boost::lockfree::spsc_queue<results::StreamEvent> events_{256};
   double phase_sum_n_ = 0;
+  double phase_sum_nm_ = 0;
   std::uint64_t phase_count_ = 0;
 
   std::atomic<double> thrust_n_{0}, phase_mean_n_{0}, zero_n_{0};
   std::atomic<double> speed_rad_s_{0}, supply_current_a_{0}, coil_temperature_degc_{0};
+  std::atomic<double> torque_nm_{0}, phase_mean_nm_{0}, zero_nm_{0};
+  std::atomic<double> module_voltage_v_{0};
   std::atomic<std::int64_t> load_cell_ns_, motor_ns_;
   netbox::Published<netbox::ZeroMeasurement> measured_;
   netbox::Published<results::SupplyReading> supply_;

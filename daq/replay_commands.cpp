@@ -15,9 +15,13 @@
 #include <utility>
 #include <vector>
 
+#include "daq/interrupt.hpp"
+#include "daq/live/commands.hpp"
+#include "daq/live/replayed_run.hpp"
 #include "daq/reduction.hpp"
 #include "daq/repetitions.hpp"
 #include "profiles/campaign.hpp"
+#include "profiles/configuration_error.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
@@ -34,6 +38,8 @@ constexpr int kRejected = 5;
 struct Asked {
   std::string path;
   bool json = false;
+  live::Wishes live;
+  double speed = 1;  ///< recorded seconds per second
 };
 
 struct Replay {
@@ -186,6 +192,26 @@ int run_replay(const Asked& asked) {
   return kRejected;
 }
 
+/// Shows a recorded run as it was. With a page it begins when the first page looks on.
+int show_replay(const Asked& asked) {
+  if (std::filesystem::is_directory(asked.path))
+    throw ConfigurationError(asked.path + ": --live and --udp-json show one run: name a file of its runs/");
+  const results::RunRecording recording = results::read_run(asked.path);
+  live::View view(asked.live, live::subject_of(recording));
+  put(stderr, live::greeting(view));
+  const SignalWatch signals;
+  const std::function<bool()> stop_asked = [] { return SignalWatch::count() > 0; };
+  while (asked.live.port && !view.is_watched() && !stop_asked())
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  ManualClock clock;
+  NoProgress nobody;
+  const auto progress = view.beside(nobody, clock);
+  const bool whole =
+      view.tell_the_end([&] { return live::play(recording, clock, *progress, asked.speed, stop_asked); });
+  if (whole) return kOk;
+  throw Interrupted("stopped by request");
+}
+
 }  // namespace
 
 void add_replay(CLI::App& app, int& exit_code) {
@@ -193,7 +219,11 @@ void add_replay(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("replay", "turn raw samples into step means again and compare with steps.csv");
   command->add_option("path", asked->path, "run file or campaign folder")->required()->check(CLI::ExistingPath);
   command->add_flag("--json", asked->json, "one JSON object on stdout");
-  command->callback([asked, &exit_code] { exit_code = run_replay(*asked); });
+  live::add_options(*command, asked->live);
+  command->add_option("--speed", asked->speed, "with --live or --udp-json: how many times as fast as it was")
+      ->check(CLI::Range(0.01, 1000.0))
+      ->capture_default_str();
+  command->callback([asked, &exit_code] { exit_code = asked->live.any() ? show_replay(*asked) : run_replay(*asked); });
 }
 
 }  // namespace kphi::daq

@@ -1,0 +1,450 @@
+#include "daq/live/server.hpp"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <deque>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "daq/live/gate.hpp"
+#include "daq/live/messages.hpp"
+#include "profiles/configuration_error.hpp"
+
+namespace kphi::daq::live {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using asio::ip::tcp;
+using Text = std::shared_ptr<const std::string>;
+using Error = boost::system::error_code;
+using Wall = std::chrono::steady_clock;
+
+constexpr int kYielding = 10;  // nice value of this thread
+constexpr int kSendBuffer = 1 << 16;
+constexpr std::size_t kMostRequests = 64;  // under way at once
+constexpr std::size_t kTraceLength = 2000;
+constexpr std::size_t kMostSteps = 20000, kMostLines = 500;
+constexpr std::chrono::milliseconds kFarewell{500};
+constexpr std::chrono::seconds kIdle{20};
+
+std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
+
+std::string replaced(std::string text, const std::string& what, const std::string& by) {
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size())
+    text.replace(at, what.size(), by);
+  return text;
+}
+
+/// What a page that comes late must know.
+class History {
+ public:
+  void keep(const std::string& message) {
+    const bool is_step = message.rfind("{\"type\":\"step\"", 0) == 0;
+    auto& kept = is_step ? steps_ : others_;
+    kept.push_back(message);
+    if (kept.size() > (is_step ? kMostSteps : kMostLines)) kept.pop_front();
+  }
+  void keep(const Tick& tick) {
+    if (!trace_.empty() && trace_.back().time_s == tick.time_s) return;
+    trace_.push_back({tick.time_s, tick.thrust_n, tick.commanded_rpm, tick.speed_rpm});
+    if (trace_.size() > kTraceLength) trace_.pop_front();
+  }
+  [[nodiscard]] std::string message() const {
+    std::string points, messages;
+    const auto number = [](double value) { return value == value ? fmt::format("{:.7g}", value) : "null"; };
+    for (const Point& point : trace_)
+      points += fmt::format("{}[{:.3f},{},{},{}]", points.empty() ? "" : ",", point.time_s, number(point.thrust_n),
+                            number(point.commanded_rpm), number(point.speed_rpm));
+    for (const auto* kept : {&steps_, &others_})
+      for (const std::string& message : *kept) messages += (messages.empty() ? "" : ",") + message;
+    return R"({"type":"history","trace":[)" + points + R"(],"messages":[)" + messages + "]}";
+  }
+
+ private:
+  struct Point {
+    double time_s, thrust_n, commanded_rpm, speed_rpm;
+  };
+  std::deque<Point> trace_;
+  std::deque<std::string> steps_, others_;
+};
+
+}  // namespace
+
+/// All but post() and the counts belongs to its thread.
+class Server::Works {
+ public:
+  Works(Settings settings, Feed& feed);
+  ~Works();
+  [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
+  [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
+  void draw() {
+    asio::post(io_, [this] { frame(); });
+  }
+  [[nodiscard]] Counts counts() const noexcept { return {clients_now_, refused_, frames_, skipped_, dropped_clients_}; }
+
+ private:
+  class Request;
+  class Client;
+  void listen();
+  void accept();
+  void run();
+  void arm();
+  void frame();
+  void broadcast(std::string message);
+  void stop_asked();
+  void say_goodbye();
+  void finish_if_all_is_said();
+
+  Settings settings_;
+  Feed& feed_;
+  std::size_t requests_ = 0;  // before the context: its end ends requests
+  asio::io_context io_{1};
+  tcp::acceptor acceptor_{io_};
+  asio::steady_timer frames_due_{io_}, farewell_{io_};
+  std::uint16_t port_ = 0;
+  History history_;
+  std::set<std::shared_ptr<Client>> clients_;
+  std::uint64_t last_shown_ = 0;
+  Wall::time_point shown_at_ = Wall::now();
+  bool leaving_ = false;
+  std::atomic<std::uint64_t> clients_now_{0}, refused_{0}, frames_{0}, skipped_{0}, dropped_clients_{0};
+  std::thread thread_;
+};
+
+/// One page's WebSocket. At most one message is under way; ticks replace each other, all else waits in order.
+class Server::Works::Client : public std::enable_shared_from_this<Client> {
+ public:
+  Client(Works& works, tcp::socket socket) : works_(works), stream_(std::move(socket)) {}
+
+  void open(const http::request<http::empty_body>& request) {
+    Error ignored;
+    beast::get_lowest_layer(stream_).socket().set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
+    beast::get_lowest_layer(stream_).socket().set_option(tcp::no_delay(true), ignored);
+    websocket::stream_base::timeout limits{};
+    limits.handshake_timeout = works_.settings_.request_limit;
+    limits.idle_timeout = kIdle;
+    limits.keep_alive_pings = true;
+    stream_.set_option(limits);
+    stream_.read_message_max(kLongestWord);
+    stream_.text(true);
+    stream_.async_accept(request, [self = shared_from_this()](Error failed) { self->opened(failed); });
+  }
+
+  void send(const Text& message) {
+    if (!open_ || closing_) return;
+    waiting_.push_back(message);
+    if (waiting_.size() > works_.settings_.most_waiting) return drop();
+    pump();
+  }
+  void send_tick(Text tick) {
+    if (!open_ || closing_) return;
+    if (newest_) ++skipped_, ++works_.skipped_;
+    newest_ = std::move(tick);
+    pump();
+  }
+  void drop_if_slow() {
+    if (sending_ && Wall::now() - began_ > works_.settings_.patience) drop();
+  }
+  [[nodiscard]] bool all_is_said() const { return !sending_ && waiting_.empty() && !newest_; }
+  [[nodiscard]] std::uint64_t skipped() const { return skipped_; }
+  void close() {
+    if (std::exchange(closing_, true)) return;
+    if (!open_) return drop();
+    stream_.async_close(websocket::close_reason(websocket::close_code::going_away, "over"),
+                        [self = shared_from_this()](Error) { self->leave(); });
+  }
+
+ private:
+  void opened(Error failed) {
+    if (failed) return leave();
+    open_ = true;
+    send(std::make_shared<const std::string>(works_.settings_.hello));
+    send(std::make_shared<const std::string>(works_.history_.message()));
+    read();
+  }
+
+  void read() {
+    stream_.async_read(heard_, [self = shared_from_this()](Error failed, std::size_t) {
+      if (failed) return self->leave();
+      const std::string word = beast::buffers_to_string(self->heard_.data());
+      self->heard_.clear();
+      if (word != kStopWord) return self->drop();
+      self->works_.stop_asked();
+      self->read();
+    });
+  }
+
+  void pump() {
+    if (sending_) return;
+    if (!waiting_.empty()) {
+      under_way_ = std::move(waiting_.front());
+      waiting_.pop_front();
+    } else if (newest_) {
+      under_way_ = std::move(newest_);
+      newest_.reset();
+      ++works_.frames_;
+    } else {
+      return;
+    }
+    sending_ = true;
+    began_ = Wall::now();
+    stream_.async_write(asio::buffer(*under_way_), [self = shared_from_this()](Error failed, std::size_t) {
+      self->sending_ = false;
+      if (failed) return self->leave();
+      self->pump();
+      if (self->works_.leaving_) self->works_.finish_if_all_is_said();
+    });
+  }
+
+  void drop() {
+    ++works_.dropped_clients_;
+    Error ignored;
+    beast::get_lowest_layer(stream_).socket().close(ignored);
+    leave();
+  }
+
+  void leave() {
+    open_ = false;
+    waiting_.clear();
+    newest_.reset();
+    works_.clients_.erase(shared_from_this());
+    works_.clients_now_ = works_.clients_.size();
+    if (works_.leaving_) works_.finish_if_all_is_said();
+  }
+
+  Works& works_;
+  websocket::stream<beast::tcp_stream> stream_;
+  beast::flat_buffer heard_;
+  std::deque<Text> waiting_;
+  Text newest_, under_way_;
+  Wall::time_point began_;
+  std::uint64_t skipped_ = 0;
+  bool open_ = false, sending_ = false, closing_ = false;
+};
+
+/// One request: answered, or handed on to a Client.
+class Server::Works::Request : public std::enable_shared_from_this<Request> {
+ public:
+  Request(Works& works, tcp::socket socket) : works_(works), stream_(std::move(socket)) { ++works_.requests_; }
+  ~Request() { --works_.requests_; }
+
+  void read() {
+    parser_.header_limit(kLongestHeader);
+    parser_.body_limit(0);
+    stream_.expires_after(works_.settings_.request_limit);
+    http::async_read(stream_, buffer_, parser_, [self = shared_from_this()](Error failed, std::size_t) {
+      if (failed == http::error::header_limit || failed == http::error::buffer_overflow)
+        return self->answer(431, "that is too long");
+      if (failed == http::error::unexpected_body || failed == http::error::body_limit)
+        return self->answer(400, "a request has no body here");
+      if (failed == beast::error::timeout || failed == http::error::end_of_stream) return;
+      if (failed) return self->answer(400, "this is no request");
+      self->judge();
+    });
+  }
+
+ private:
+  void judge() {
+    const auto& request = parser_.get();
+    const auto hosts = request.count(http::field::host), origins = request.count(http::field::origin);
+    if (hosts != 1 || origins > 1) return answer(400, "one Host, and one Origin at most");
+    Knock knock{view(request.method_string()),
+                view(request.target()),
+                view(request[http::field::host]),
+                {},
+                websocket::is_upgrade(request)};
+    if (origins == 1) knock.origin = view(request[http::field::origin]);
+    const Answer answer_to = admit(knock, works_.settings_.token);
+    if (answer_to.to == Admitted::page) return answer_page();
+    if (answer_to.to == Admitted::nowhere) return answer(answer_to.status, answer_to.words);
+    if (works_.clients_.size() >= works_.settings_.most_clients) return answer(503, "too many pages look on");
+    stream_.expires_never();
+    const auto client = std::make_shared<Client>(works_, stream_.release_socket());
+    works_.clients_.insert(client);
+    works_.clients_now_ = works_.clients_.size();
+    client->open(request);
+  }
+
+  void answer(unsigned status, const std::string& words) {
+    ++works_.refused_;
+    begin(status, "text/plain; charset=utf-8");
+    answer_.body() = "kphi: " + words + "\n";
+    send();
+  }
+
+  void answer_page() {
+    const std::string nonce = new_token();
+    begin(200, "text/html; charset=utf-8");
+    const std::string host(view(parser_.get()[http::field::host]));
+    answer_.set("Content-Security-Policy",
+                fmt::format("default-src 'none'; script-src 'nonce-{0}'; style-src 'nonce-{0}'; "
+                            "style-src-attr 'unsafe-inline'; img-src data:; "
+                            "connect-src ws://{1}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+                            nonce, host));
+    answer_.body() = replaced(works_.settings_.page, "@NONCE@", nonce);
+    send();
+  }
+
+  void begin(unsigned status, const char* type) {
+    answer_.result(status);
+    answer_.version(11);
+    answer_.set(http::field::content_type, type);
+    answer_.set(http::field::cache_control, "no-store");
+    answer_.set("Referrer-Policy", "no-referrer");
+    answer_.set("X-Content-Type-Options", "nosniff");
+    answer_.set("X-Frame-Options", "DENY");
+    answer_.keep_alive(false);
+  }
+
+  void send() {
+    answer_.prepare_payload();
+    stream_.expires_after(works_.settings_.request_limit);
+    http::async_write(stream_, answer_, [self = shared_from_this()](Error, std::size_t) {
+      Error ignored;
+      self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+      self->linger();
+    });
+  }
+
+  /// Reads what the other side still says, so that closing does not take the answer from it.
+  void linger() {
+    stream_.async_read_some(asio::buffer(rest_), [self = shared_from_this()](Error failed, std::size_t n) {
+      self->lingered_ += n;
+      if (!failed && self->lingered_ < 64 * kLongestHeader) self->linger();
+    });
+  }
+
+  Works& works_;
+  beast::tcp_stream stream_;
+  beast::flat_buffer buffer_{2 * kLongestHeader};
+  http::request_parser<http::empty_body> parser_;
+  http::response<http::string_body> answer_;
+  std::array<char, 4096> rest_;
+  std::size_t lingered_ = 0;
+};
+
+Server::Works::Works(Settings settings, Feed& feed) : settings_(std::move(settings)), feed_(feed) {
+  listen();
+  accept();
+  arm();
+  thread_ = std::thread([this] { run(); });
+}
+
+Server::Works::~Works() {
+  asio::post(io_, [this] { say_goodbye(); });
+  thread_.join();
+}
+
+void Server::Works::listen() {
+  Error failed;
+  const tcp::endpoint here(asio::ip::address_v4::loopback(), settings_.port);
+  acceptor_.open(here.protocol());
+  acceptor_.set_option(asio::socket_base::reuse_address(true));
+  acceptor_.bind(here, failed);
+  if (!failed) acceptor_.listen(asio::socket_base::max_listen_connections, failed);
+  if (failed) {
+    throw ConfigurationError(fmt::format(
+        "--live {0}: cannot listen on 127.0.0.1:{0}: {1}; give another port, or none and any free one is taken",
+        settings_.port, failed.message()));
+  }
+  port_ = acceptor_.local_endpoint().port();
+}
+
+void Server::Works::run() {
+  // Threads have nice values of their own on Linux: acquisition comes first.
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), kYielding);
+  io_.run();
+}
+
+void Server::Works::accept() {
+  acceptor_.async_accept([this](Error failed, tcp::socket socket) {
+    if (failed == asio::error::operation_aborted) return;
+    // One too many is closed unread; the descriptor's end of life is the answer.
+    if (!failed && requests_ < kMostRequests) std::make_shared<Request>(*this, std::move(socket))->read();
+    accept();
+  });
+}
+
+void Server::Works::arm() {
+  if (settings_.frame.count() == 0) return;
+  frames_due_.expires_after(settings_.frame);
+  frames_due_.async_wait([this](Error failed) {
+    if (failed || leaving_) return;
+    frame();
+    arm();
+  });
+}
+
+void Server::Works::frame() {
+  feed_.take([this](const std::string& message) { broadcast(message); });
+  const Tick tick = feed_.newest();
+  const std::uint64_t shown = feed_.shown();
+  if (shown != last_shown_) shown_at_ = Wall::now();
+  if (std::exchange(last_shown_, shown) != shown) history_.keep(tick);
+  const double silent_s = std::chrono::duration<double>(Wall::now() - shown_at_).count();
+  const auto clients = clients_;  // who is dropped leaves the set
+  for (const auto& client : clients) {
+    if (shown > 0)
+      client->send_tick(std::make_shared<const std::string>(
+          tick_message(tick, settings_.limits, silent_s, client->skipped() + feed_.dropped())));
+    client->drop_if_slow();
+  }
+}
+
+void Server::Works::broadcast(std::string message) {
+  history_.keep(message);
+  const Text text = std::make_shared<const std::string>(std::move(message));
+  const auto clients = clients_;
+  for (const auto& client : clients) client->send(text);
+}
+
+void Server::Works::stop_asked() {
+  if (!settings_.can_stop || !feed_.ask_stop()) return;
+  broadcast(stop_message(feed_.newest().time_s));
+}
+
+void Server::Works::say_goodbye() {
+  frame();
+  leaving_ = true;
+  Error ignored;
+  acceptor_.close(ignored);
+  frames_due_.cancel();
+  farewell_.expires_after(kFarewell);
+  farewell_.async_wait([this](Error) { io_.stop(); });
+  finish_if_all_is_said();
+}
+
+void Server::Works::finish_if_all_is_said() {
+  for (const auto& client : clients_)
+    if (!client->all_is_said()) return;
+  const auto clients = clients_;
+  for (const auto& client : clients) client->close();
+  // The closing handshake is a courtesy; who does not answer it is left.
+  if (clients.empty()) io_.stop();
+}
+
+Server::Server(Settings settings, Feed& feed) : works_(std::make_unique<Works>(std::move(settings), feed)) {}
+Server::~Server() = default;
+std::uint16_t Server::port() const noexcept { return works_->port(); }
+std::string Server::url() const {
+  return fmt::format("http://127.0.0.1:{}/?token={}", works_->port(), works_->settings().token);
+}
+Server::Counts Server::counts() const noexcept { return works_->counts(); }
+void Server::draw() { works_->draw(); }
+
+}  // namespace kphi::daq::live

@@ -1,0 +1,60 @@
+// One page on 127.0.0.1 and its WebSocket, in a thread of its own that yields to all others. It may drop frames, and
+// clients; the runner never waits for it.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "daq/live/feed.hpp"
+
+namespace kphi::daq::live {
+
+class Server {
+ public:
+  struct Settings {
+    std::uint16_t port = 0;               ///< 0: any that is free
+    std::string token;                    ///< who does not say it is refused
+    std::string page;                     ///< HTML; every "@NONCE@" in it becomes the nonce of its scripts and styles
+    std::string hello;                    ///< hello_message
+    std::size_t limits = 0;               ///< in every tick
+    bool can_stop = true;                 ///< false: "stop" does nothing
+    std::chrono::milliseconds frame{33};  ///< between ticks; 0: only draw() sends one
+    std::chrono::milliseconds patience{2000};       ///< with a client that does not take what it is sent
+    std::chrono::milliseconds request_limit{5000};  ///< for a whole request
+    std::size_t most_clients = 16;                  ///< WebSockets
+    std::size_t most_waiting = 1024;                ///< messages that are no ticks, per client
+  };
+  static constexpr std::size_t kLongestWord = 64;      ///< of a page, bytes
+  static constexpr std::size_t kLongestHeader = 8192;  ///< of a request, bytes
+
+  struct Counts {
+    std::uint64_t clients = 0;  ///< WebSockets open now
+    std::uint64_t refused = 0;  ///< requests answered with 4xx or 5xx
+    std::uint64_t frames = 0;   ///< ticks handed to clients
+    std::uint64_t skipped = 0;  ///< ticks that a client was too slow for
+    std::uint64_t dropped_clients = 0;
+  };
+
+  /// Listens at once. Throws ConfigurationError when the port is taken. `feed` must outlive this.
+  Server(Settings settings, Feed& feed);
+  /// Sends what waits, half a second at most, and closes.
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  [[nodiscard]] std::uint16_t port() const noexcept;
+  /// With the token.
+  [[nodiscard]] std::string url() const;
+  /// Any thread.
+  [[nodiscard]] Counts counts() const noexcept;
+  /// Sends messages and one tick now. Any thread; returns before it is done.
+  void draw();
+
+ private:
+  class Works;
+  std::unique_ptr<Works> works_;
+};
+
+}  // namespace kphi::daq::live

@@ -1,0 +1,68 @@
+#include "daq/live/udp_json.hpp"
+
+#include <fmt/format.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <boost/asio/ip/address.hpp>
+#include <boost/asio/ip/udp.hpp>
+#include <charconv>
+#include <cstring>
+
+#include "daq/live/messages.hpp"
+#include "profiles/configuration_error.hpp"
+
+namespace kphi::daq::live {
+namespace {
+
+using boost::asio::ip::udp;
+
+[[noreturn]] void refuse(const std::string& address, const std::string& why) {
+  throw ConfigurationError(
+      fmt::format("--udp-json {}: {}; say an address and a port, for PlotJuggler 127.0.0.1:9870", address, why));
+}
+
+std::string without_brackets(const std::string& host) {
+  if (host == "localhost") return "127.0.0.1";
+  return host.size() > 2 && host.front() == '[' && host.back() == ']' ? host.substr(1, host.size() - 2) : host;
+}
+
+udp::endpoint endpoint_of(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos) refuse(text, "there is no port");
+  std::uint16_t port = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data() + colon + 1, end, port);
+  if (error != std::errc() || stop != end || port == 0) refuse(text, "the port is none of 1 to 65535");
+  boost::system::error_code failed;
+  const auto address = boost::asio::ip::make_address(without_brackets(text.substr(0, colon)), failed);
+  if (failed) refuse(text, "the host is no address in numbers");
+  const bool everybody = address.is_v4() && address.to_v4() == boost::asio::ip::address_v4::broadcast();
+  if (address.is_unspecified() || address.is_multicast() || everybody) refuse(text, "that is not one machine");
+  return {address, port};
+}
+
+}  // namespace
+
+UdpJson::UdpJson(const std::string& address, std::vector<LimitBar> limits) : limits_(std::move(limits)) {
+  const udp::endpoint to = endpoint_of(address);
+  socket_ = ::socket(to.protocol().family(), SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (socket_ < 0 || ::connect(socket_, to.data(), static_cast<socklen_t>(to.size())) != 0) {
+    const std::string why = std::strerror(errno);
+    if (socket_ >= 0) ::close(socket_);
+    refuse(address, why);
+  }
+}
+
+UdpJson::~UdpJson() { ::close(socket_); }
+
+void UdpJson::send(const Tick& tick) noexcept {
+  try {
+    const std::string message = plot_message(tick, limits_);
+    if (::send(socket_, message.data(), message.size(), MSG_DONTWAIT | MSG_NOSIGNAL) < 0) ++dropped_;
+  } catch (const std::exception&) {
+    ++dropped_;
+  }
+}
+
+}  // namespace kphi::daq::live

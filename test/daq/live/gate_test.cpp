@@ -1,0 +1,83 @@
+#include "daq/live/gate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+namespace kphi::daq::live {
+namespace {
+
+constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
+
+Knock visit(std::string_view target = "/?token=0123456789abcdef0123456789abcdef") {
+  return {"GET", target, "127.0.0.1:8080", std::nullopt, false};
+}
+
+TEST(Gate, LetsInWhoKnowsTheToken) {
+  EXPECT_EQ(admit(visit(), kToken).to, Admitted::page);
+  Knock knock = visit("/live?token=0123456789abcdef0123456789abcdef");
+  knock.upgrade = true;
+  EXPECT_EQ(admit(knock, kToken).to, Admitted::live);
+}
+
+TEST(Gate, RefusesAWrongOrMissingToken) {
+  for (const char* target :
+       {"/", "/?", "/?token=", "/?token=0", "/?token=0123456789abcdef0123456789abcdee",
+        "/?Token="
+        "0123456789abcdef0123456789abcdef",
+        "/?a=b&token=0123456789abcdef0123456789abcdef", "/live", "/live?token=0123456789abcdef0123456789abcdef0",
+        "/live?token=0123456789abcdef0123456789abcdef&x=1"}) {
+    EXPECT_EQ(admit(visit(target), kToken).to, Admitted::nowhere) << target;
+    EXPECT_EQ(admit(visit(target), kToken).status, 403u) << target;
+  }
+}
+
+TEST(Gate, RefusesAForeignHostEvenWithTheToken) {
+  for (const char* host : {"evil.example", "evil.example:8080", "127.0.0.1.evil.example:8080", "localhost.evil.example",
+                           "192.168.1.5:8080", "", ":8080", "127.0.0.11"}) {
+    Knock knock = visit();
+    knock.host = host;
+    EXPECT_EQ(admit(knock, kToken).status, 403u) << host;
+  }
+}
+
+TEST(Gate, RefusesAForeignOriginEvenWithTheToken) {
+  for (const char* origin : {"http://evil.example", "https://127.0.0.1:8080", "http://127.0.0.1:3000", "null", "",
+                             "http://127.0.0.1:8080.evil.example", "http://localhost:8080"}) {
+    Knock knock = visit();
+    knock.origin = origin;
+    EXPECT_EQ(admit(knock, kToken).status, 403u) << origin;
+  }
+}
+
+TEST(Gate, AcceptsItsOwnPageAlsoThroughATunnel) {
+  for (const char* host : {"127.0.0.1:8080", "localhost:8080", "localhost:9999", "localhost"}) {
+    const std::string origin = std::string("http://") + host;
+    Knock knock = visit();
+    knock.host = host;
+    knock.origin = origin;
+    EXPECT_EQ(admit(knock, kToken).to, Admitted::page) << host;
+  }
+}
+
+TEST(Gate, KnowsTwoPathsAndOneMethod) {
+  EXPECT_EQ(admit(visit("/stop?token=0123456789abcdef0123456789abcdef"), kToken).status, 404u);
+  EXPECT_EQ(admit(visit("http://127.0.0.1/?token=0123456789abcdef0123456789abcdef"), kToken).status, 404u);
+  EXPECT_EQ(admit(visit("/live?token=0123456789abcdef0123456789abcdef"), kToken).status, 426u);
+  for (const char* method : {"POST", "HEAD", "OPTIONS", "PUT", "get"}) {
+    Knock knock = visit();
+    knock.method = method;
+    EXPECT_EQ(admit(knock, kToken).status, 405u) << method;
+  }
+}
+
+TEST(Gate, DrawsAnotherTokenEveryTime) {
+  std::set<std::string> tokens;
+  for (int i = 0; i < 1000; ++i) tokens.insert(new_token());
+  EXPECT_EQ(tokens.size(), 1000u);
+  EXPECT_EQ(tokens.begin()->size(), 32u);
+  EXPECT_EQ(tokens.begin()->find_first_not_of("0123456789abcdef"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace kphi::daq::live

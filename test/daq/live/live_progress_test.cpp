@@ -1,0 +1,138 @@
+#include "daq/live/live_progress.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::daq::live {
+namespace {
+
+using nlohmann::json;
+
+class Told final : public Progress {
+ public:
+  void tick(const Position&, const Observation&) override { ++ticks; }
+  void step_done(const Position&, const Observation&) override { ++steps; }
+  void say(const std::string& line) override { lines.push_back(line); }
+  int ticks = 0, steps = 0;
+  std::vector<std::string> lines;
+};
+
+class LiveProgressOf : public testing::Test {
+ protected:
+  /// Ticks every 10 ms for `duration` of step `step`.
+  void hold(int step, Duration duration, double thrust_n, double rpm) {
+    position_.step = step;
+    position_.commanded = from_rpm(rpm);
+    seen_.thrust = Newtons(thrust_n);
+    seen_.speed = from_rpm(rpm);
+    for (const Instant until = clock_.now() + duration; clock_.now() < until;) {
+      clock_.advance(std::chrono::milliseconds(10));
+      progress_.tick(position_, seen_);
+    }
+  }
+  std::vector<json> messages() {
+    std::vector<json> taken;
+    feed_.take([&](const std::string& message) { taken.push_back(json::parse(message)); });
+    return taken;
+  }
+
+  Told told_;
+  Feed feed_;
+  ManualClock clock_;
+  const Subject subject_ = subject_of(test::short_campaign());  // 0.3 s are discarded
+  LiveProgress progress_{told_, feed_, nullptr, subject_, clock_};
+  Position position_{"5x3", 90, 2, 3, -1, 40, "zero", RadPerSec(0), 100};
+  Observation seen_;
+};
+
+TEST_F(LiveProgressOf, TellsTheTerminalAllTheSame) {
+  hold(0, std::chrono::milliseconds(50), 1, 6000);
+  progress_.step_done(position_, seen_);
+  progress_.say("well");
+  EXPECT_EQ(told_.ticks, 5);
+  EXPECT_EQ(told_.steps, 1);
+  EXPECT_THAT(told_.lines, testing::ElementsAre("well"));
+}
+
+TEST_F(LiveProgressOf, ShowsTheNewestTickWithItsLimits) {
+  seen_.supply_current = Amperes(7);
+  seen_.account.lost_host = 3;
+  hold(4, std::chrono::milliseconds(20), -1.5, 9000);
+  const Tick tick = feed_.newest();
+  EXPECT_EQ(feed_.shown(), 2u);
+  EXPECT_DOUBLE_EQ(tick.thrust_n, -1.5);
+  EXPECT_DOUBLE_EQ(tick.speed_rpm, 9000);
+  EXPECT_EQ(tick.step, 4);
+  EXPECT_EQ(tick.lost_host, 3u);
+  EXPECT_STREQ(tick.phase.data(), "") << "in a step";
+  EXPECT_DOUBLE_EQ(tick.limit_values[0], 9000);
+  EXPECT_DOUBLE_EQ(tick.limit_values[1], 1.5) << "either way counts";
+  EXPECT_DOUBLE_EQ(tick.limit_values[2], 7);
+}
+
+TEST_F(LiveProgressOf, ShowsNoNumberForWhatNoLongerComes) {
+  seen_.load_cell_is_fresh = false;
+  seen_.load_cell_age = std::chrono::milliseconds(840);
+  hold(0, std::chrono::milliseconds(10), 1, 6000);
+  EXPECT_TRUE(std::isnan(feed_.newest().thrust_n));
+  EXPECT_DOUBLE_EQ(feed_.newest().thrust_age_s, 0.84);
+  EXPECT_DOUBLE_EQ(feed_.newest().speed_rpm, 6000);
+}
+
+TEST_F(LiveProgressOf, TellsKOfAStepWithoutItsBeginning) {
+  hold(0, std::chrono::milliseconds(300), 99, 6000);  // does not count
+  hold(0, std::chrono::milliseconds(500), 1, 6000);
+  progress_.step_done(position_, seen_);
+  const std::vector<json> told = messages();
+  ASSERT_EQ(told.size(), 1u);
+  const double omega = from_rpm(6000).value();
+  EXPECT_NEAR(told[0]["k_n_s2"].get<double>() * omega * omega, 1, 1e-7);
+  EXPECT_EQ(told[0]["occlusion_deg"], 90);
+  EXPECT_EQ(told[0]["step"], 0);
+}
+
+TEST_F(LiveProgressOf, BeginsEveryStepAnew) {
+  hold(0, std::chrono::milliseconds(800), 5, 6000);
+  hold(1, std::chrono::milliseconds(800), 1, 6000);
+  progress_.step_done(position_, seen_);
+  EXPECT_NEAR(messages().at(0)["thrust_n"].get<double>(), 1, 1e-9);
+}
+
+TEST_F(LiveProgressOf, CountsProgressFromTheLongestTimeLeft) {
+  hold(0, std::chrono::milliseconds(10), 1, 6000);
+  position_.remaining_s = 25;
+  hold(0, std::chrono::milliseconds(10), 1, 6000);
+  EXPECT_DOUBLE_EQ(feed_.newest().progress, 0.75);
+}
+
+TEST_F(LiveProgressOf, PassesOnWhatIsSaid) {
+  progress_.say("load cell: it is silent");
+  const std::vector<json> told = messages();
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0]["type"], "line");
+  EXPECT_EQ(told[0]["text"], "load cell: it is silent");
+}
+
+TEST(LiveFeed, DropsAndCountsWhatNobodyTakes) {
+  Feed feed(4);
+  for (int i = 0; i < 10; ++i) feed.tell("{}");
+  EXPECT_EQ(feed.dropped(), 6u);
+  int taken = 0;
+  feed.take([&](const std::string&) { ++taken; });
+  EXPECT_EQ(taken, 4);
+}
+
+TEST(LiveFeed, AsksForAStopOnce) {
+  Feed feed;
+  EXPECT_FALSE(feed.stop_asked());
+  EXPECT_TRUE(feed.ask_stop());
+  EXPECT_FALSE(feed.ask_stop());
+  EXPECT_TRUE(feed.stop_asked());
+}
+
+}  // namespace
+}  // namespace kphi::daq::live

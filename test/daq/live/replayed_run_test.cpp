@@ -1,0 +1,91 @@
+#include "daq/live/replayed_run.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daq/live/view.hpp"
+#include "results/run_reader.hpp"
+
+namespace kphi::daq::live {
+namespace {
+
+const results::RunRecording& recording() {
+  static const results::RunRecording kRecording =
+      results::read_run(KPHI_SOURCE_DIR "/results/reference/runs/5x3_phi090_rep1.h5");
+  return kRecording;
+}
+
+struct Seen final : Progress {
+  void tick(const Position& position, const Observation& seen) override { ticks.emplace_back(position, seen); }
+  void step_done(const Position& position, const Observation& seen) override { steps.emplace_back(position, seen); }
+  void say(const std::string&) override {}
+  std::vector<std::pair<Position, Observation>> ticks, steps;
+};
+
+Seen shown() {
+  Seen seen;
+  ManualClock clock;
+  ReplayedRun run(recording(), clock);
+  for (Instant when = run.begin(); when < run.end(); when += std::chrono::milliseconds(10)) run.show(when, seen, 1);
+  run.show(run.end(), seen, 1);
+  return seen;
+}
+
+TEST(ReplayedRun, GoesThroughEveryStepAtItsCommandedSpeed) {
+  const Seen seen = shown();
+  std::vector<double> commanded;
+  for (const auto& mark : recording().phases)
+    if (mark.phase == results::Phase::step) commanded.push_back(mark.speed_rad_s);
+  ASSERT_EQ(seen.steps.size(), commanded.size());
+  for (std::size_t i = 0; i < commanded.size(); ++i) {
+    EXPECT_EQ(seen.steps[i].first.step, static_cast<int>(i));
+    EXPECT_DOUBLE_EQ(seen.steps[i].first.commanded.value(), commanded[i]);
+    EXPECT_NEAR(seen.steps[i].second.speed.value(), commanded[i], 0.05 * commanded[i] + 5);
+  }
+}
+
+TEST(ReplayedRun, SubtractsTheZeroAndCountsEverySample) {
+  const Seen seen = shown();
+  double zero_sum = 0;
+  int zeros = 0;
+  for (const auto& [position, observation] : seen.ticks) {
+    if (position.phase == "zero" && seen.steps.empty() == false && position.remaining_s > 1) {
+      zero_sum += observation.thrust.value();
+      ++zeros;
+    }
+  }
+  ASSERT_GT(zeros, 0);
+  EXPECT_NEAR(zero_sum / zeros, 0, 0.05);
+  EXPECT_GT(seen.steps.back().second.thrust.value(), 0.5);
+  EXPECT_EQ(seen.ticks.back().second.account.received, recording().load_cell.size());
+  EXPECT_EQ(seen.ticks.back().first.remaining_s, 0);
+}
+
+TEST(ReplayedRun, HasTheLimitsOfItsCampaignAndCannotBeStopped) {
+  const Subject subject = subject_of(recording());
+  EXPECT_TRUE(subject.replay);
+  EXPECT_EQ(subject.limits.size(), 4u);
+  results::RunRecording older = recording();
+  older.header.campaign_text = "of another time";
+  EXPECT_TRUE(subject_of(older).limits.empty());
+  EXPECT_EQ(subject_of(older).propeller, recording().header.propeller_name);
+}
+
+TEST(ReplayedRun, IsPlayedToItsEndOrUntilAsked) {
+  ManualClock clock;
+  NoProgress nobody;
+  EXPECT_TRUE(play(recording(), clock, nobody, 1000, [] { return false; }));
+  EXPECT_EQ(clock.now().count(), recording().load_cell.back().arrival_ns);
+  EXPECT_FALSE(play(recording(), clock, nobody, 1, [] { return true; }));
+}
+
+TEST(LiveView, TellsHowTheWorkEndedAndLetsItsErrorPass) {
+  View view({}, subject_of(recording()));
+  EXPECT_EQ(view.url(), "");
+  EXPECT_EQ(view.tell_the_end([] { return 7; }), 7);
+  EXPECT_THROW(view.tell_the_end([]() -> int { throw std::runtime_error("no"); }), std::runtime_error);
+  EXPECT_FALSE(view.stop_asked());
+}
+
+}  // namespace
+}  // namespace kphi::daq::live

@@ -1,0 +1,383 @@
+#include "daq/live/server.hpp"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <boost/asio/connect.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/read.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/websocket.hpp>
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+#include <vector>
+
+#include "daq/live/messages.hpp"
+#include "daq/live/page.hpp"
+#include "profiles/configuration_error.hpp"
+
+namespace kphi::daq::live {
+namespace {
+
+namespace asio = boost::asio;
+namespace websocket = boost::beast::websocket;
+using asio::ip::tcp;
+using boost::system::error_code;
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+using namespace std::chrono_literals;
+
+static_assert(Server::Settings{}.frame.count() > 0 && 20 * Server::Settings{}.frame <= 1s, "20 frames a second");
+
+constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
+
+bool becomes_true(const std::function<bool()>& holds, std::chrono::seconds limit = 20s) {
+  const auto give_up = std::chrono::steady_clock::now() + limit;
+  while (!holds()) {
+    if (std::chrono::steady_clock::now() > give_up) return false;
+    std::this_thread::sleep_for(1ms);
+  }
+  return true;
+}
+
+/// A page's WebSocket, as a stranger's program would open it.
+class Onlooker {
+ public:
+  Onlooker(std::uint16_t port, const std::string& target, const std::string& host, const std::string& origin,
+           int receive_buffer = 0)
+      : stream_(io_) {
+    tcp::socket& socket = stream_.next_layer();
+    socket.open(tcp::v4());
+    if (receive_buffer > 0) socket.set_option(asio::socket_base::receive_buffer_size(receive_buffer));
+    socket.connect({asio::ip::address_v4::loopback(), port});
+    stream_.set_option(websocket::stream_base::decorator([&](websocket::request_type& request) {
+      if (!origin.empty()) request.set(boost::beast::http::field::origin, origin);
+    }));
+    stream_.handshake(host, target, refusal_);
+  }
+  [[nodiscard]] bool is_in() const { return !refusal_; }
+  void say(const std::string& word) {
+    error_code ignored;
+    stream_.write(asio::buffer(word), ignored);
+  }
+  /// The next message; discarded when the server has closed.
+  json hear() {
+    boost::beast::flat_buffer bytes;
+    error_code failed;
+    stream_.read(bytes, failed);
+    if (failed) return json(json::value_t::discarded);
+    return json::parse(boost::beast::buffers_to_string(bytes.data()));
+  }
+  json hear(const std::string& type) {
+    for (;;) {
+      json message = hear();
+      if (message.is_discarded() || message["type"] == type) return message;
+    }
+  }
+
+ private:
+  asio::io_context io_;
+  websocket::stream<tcp::socket> stream_;
+  error_code refusal_;
+};
+
+class LiveServer : public testing::Test {
+ protected:
+  void start(const std::function<void(Server::Settings&)>& change = [](auto&) {}) {
+    Server::Settings settings;
+    settings.token = kToken;
+    settings.page = page_text();
+    settings.hello = hello_message({});
+    settings.frame = 0ms;
+    change(settings);
+    server_ = std::make_unique<Server>(settings, feed_);
+  }
+  [[nodiscard]] std::string here() const { return fmt::format("127.0.0.1:{}", server_->port()); }
+  std::unique_ptr<Onlooker> onlooker(const std::string& token = kToken, int receive_buffer = 0) {
+    return std::make_unique<Onlooker>(server_->port(), "/live?token=" + token, here(), "http://" + here(),
+                                      receive_buffer);
+  }
+  void show(double time_s) {
+    Tick tick;
+    tick.time_s = time_s;
+    feed_.show(tick);
+  }
+  /// Everything that is answered to these bytes.
+  std::string answer_to(const std::string& bytes) {
+    asio::io_context io;
+    tcp::socket socket(io);
+    socket.connect({asio::ip::address_v4::loopback(), server_->port()});
+    error_code ignored;
+    asio::write(socket, asio::buffer(bytes), ignored);
+    std::string answer;
+    asio::read(socket, asio::dynamic_buffer(answer), ignored);
+    return answer;
+  }
+  std::string get(const std::string& target, const std::string& more = "") {
+    return answer_to(fmt::format("GET {} HTTP/1.1\r\nHost: {}\r\n{}\r\n", target, here(), more));
+  }
+  /// The first line of what is answered to one who asks for the WebSocket and is refused.
+  std::string refusal_of(const std::string& token, const std::string& host, const std::string& origin) {
+    const std::string answer = answer_to(fmt::format(
+        "GET /live?token={} HTTP/1.1\r\nHost: {}\r\nOrigin: {}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
+        token, host, origin));
+    return answer.substr(0, answer.find('\r'));
+  }
+
+  Feed feed_;
+  std::unique_ptr<Server> server_;
+};
+
+TEST_F(LiveServer, GivesThePageToWhoKnowsTheToken) {
+  start();
+  const std::string answer = get(std::string("/?token=") + kToken);
+  EXPECT_THAT(answer, StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(answer, HasSubstr("</html>"));
+  EXPECT_EQ(server_->url(), fmt::format("http://{}/?token={}", here(), kToken));
+}
+
+TEST_F(LiveServer, LetsThePageLoadNothingAndRunOnlyItsOwnScripts) {
+  start();
+  const std::string target = std::string("/?token=") + kToken;
+  const std::string answer = get(target), again = get(target);
+  const auto policy = [](const std::string& text) {
+    const std::size_t at = text.find("Content-Security-Policy");
+    return text.substr(at, text.find("\r\n", at) - at);
+  };
+  EXPECT_THAT(policy(answer), HasSubstr("default-src 'none'; script-src 'nonce-"));
+  EXPECT_NE(policy(answer), policy(again)) << "a nonce is used once";
+  EXPECT_THAT(answer, Not(HasSubstr("@NONCE@")));
+  EXPECT_THAT(answer, HasSubstr("Referrer-Policy: no-referrer"));
+}
+
+TEST_F(LiveServer, RefusesAWrongOrMissingToken) {
+  start();
+  EXPECT_THAT(get("/"), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(get("/?token=0123456789abcdef0123456789abcdee"), StartsWith("HTTP/1.1 403"));
+  EXPECT_EQ(refusal_of("", here(), "http://" + here()), "HTTP/1.1 403 Forbidden");
+  EXPECT_EQ(refusal_of("0123456789abcdef0123456789abcdee", here(), "http://" + here()), "HTTP/1.1 403 Forbidden");
+  EXPECT_EQ(server_->counts().clients, 0u);
+  EXPECT_EQ(server_->counts().refused, 4u);
+}
+
+TEST_F(LiveServer, RefusesForeignOriginsAndHosts) {
+  start();
+  const std::string foreign = fmt::format("evil.example:{}", server_->port());
+  EXPECT_EQ(refusal_of(kToken, here(), "http://evil.example"), "HTTP/1.1 403 Forbidden");
+  EXPECT_EQ(refusal_of(kToken, here(), "null"), "HTTP/1.1 403 Forbidden");
+  EXPECT_EQ(refusal_of(kToken, foreign, "http://" + foreign), "HTTP/1.1 403 Forbidden") << "DNS rebinding";
+  const std::string live = std::string("/live?token=") + kToken;
+  EXPECT_FALSE(Onlooker(server_->port(), live, here(), "http://evil.example").is_in());
+  EXPECT_TRUE(Onlooker(server_->port(), live, here(), "").is_in()) << "a program that is no browser";
+}
+
+TEST_F(LiveServer, RefusesWhatIsNoPlainGet) {
+  start();
+  const std::string target = std::string("/?token=") + kToken;
+  EXPECT_THAT(answer_to(fmt::format("POST {} HTTP/1.1\r\nHost: {}\r\n\r\n", target, here())),
+              StartsWith("HTTP/1.1 405"));
+  EXPECT_THAT(get(target, "Content-Length: 5\r\n"), StartsWith("HTTP/1.1 400"));
+  EXPECT_THAT(get(target, "Origin: http://" + here() + "\r\nOrigin: http://evil.example\r\n"),
+              StartsWith("HTTP/1.1 400"));
+  EXPECT_THAT(get("/../etc/passwd?token=" + std::string(kToken)), StartsWith("HTTP/1.1 404"));
+  EXPECT_THAT(answer_to("\x16\x03\x01 no http at all\r\n\r\n"), StartsWith("HTTP/1.1 400"));
+}
+
+TEST_F(LiveServer, RefusesARequestThatIsTooLong) {
+  start();
+  const std::string answer = get("/?token=" + std::string(kToken), "X: " + std::string(100'000, 'x') + "\r\n");
+  EXPECT_THAT(answer, Not(HasSubstr(" 200 ")));
+  EXPECT_THAT(get("/?token=" + std::string(kToken)), StartsWith("HTTP/1.1 200")) << "and goes on";
+}
+
+TEST_F(LiveServer, ClosesOnWhoNeverFinishesARequest) {
+  start([](Server::Settings& settings) { settings.request_limit = 50ms; });
+  EXPECT_THAT(answer_to("GET / HTTP/1.1\r\nHo"), Not(HasSubstr(" 200 ")));  // returns when the server closes
+}
+
+TEST_F(LiveServer, SendsOneTickPerFrameToWhoReads) {
+  start();
+  const auto page = onlooker();
+  EXPECT_EQ(page->hear()["type"], "hello");
+  EXPECT_EQ(page->hear()["type"], "history");
+  for (int i = 1; i <= 60; ++i) {
+    show(i);
+    server_->draw();
+    const json tick = page->hear();
+    ASSERT_EQ(tick["type"], "tick");
+    EXPECT_EQ(tick["time_s"], i);
+  }
+  EXPECT_EQ(server_->counts().frames, 60u);
+  EXPECT_EQ(server_->counts().skipped, 0u);
+}
+
+TEST_F(LiveServer, SendsFramesByItself) {
+  start([](Server::Settings& settings) { settings.frame = 33ms; });
+  show(1);
+  const auto page = onlooker();
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(page->hear("tick")["time_s"], 1);
+}
+
+TEST_F(LiveServer, TellsWhoComesLateWhatWas) {
+  start();
+  const auto first = onlooker();
+  (void)first->hear("history");
+  feed_.tell(line_message(1, "the first line"));
+  feed_.tell(step_message(Tick{}, {}));
+  for (int i = 1; i <= 2; ++i) {
+    show(i);
+    server_->draw();
+    (void)first->hear("tick");
+  }
+  const json history = onlooker()->hear("history");
+  EXPECT_EQ(history["trace"].size(), 2u);
+  ASSERT_EQ(history["messages"].size(), 2u);
+  EXPECT_EQ(history["messages"][0]["type"], "step");
+  EXPECT_EQ(history["messages"][1]["text"], "the first line");
+}
+
+TEST_F(LiveServer, AsksForTheStopExactlyOnce) {
+  start();
+  const auto page = onlooker(), other = onlooker();
+  (void)page->hear("history"), (void)other->hear("history");
+  EXPECT_FALSE(feed_.stop_asked());
+  for (int i = 0; i < 3; ++i) page->say("stop");
+  EXPECT_EQ(page->hear()["type"], "stop");
+  EXPECT_EQ(other->hear()["type"], "stop") << "every page is told";
+  EXPECT_TRUE(feed_.stop_asked());
+  other->say("stop");
+  show(1);
+  server_->draw();
+  EXPECT_EQ(page->hear()["type"], "tick") << "it is confirmed once";
+  EXPECT_FALSE(feed_.ask_stop());
+}
+
+TEST_F(LiveServer, StopsNothingThatIsOnlyReplayed) {
+  start([](Server::Settings& settings) { settings.can_stop = false; });
+  const auto page = onlooker();
+  (void)page->hear("history");
+  page->say("stop");
+  show(1);
+  server_->draw();
+  EXPECT_EQ(page->hear()["type"], "tick");
+  EXPECT_FALSE(feed_.stop_asked());
+}
+
+TEST_F(LiveServer, DropsWhoSaysAnythingElse) {
+  start();
+  for (const std::string& word : {std::string("Stop"), std::string("stop "), std::string(), std::string("{}"),
+                                  "stop" + std::string(1'000'000, ' ')}) {
+    const auto page = onlooker();
+    (void)page->hear("history");
+    page->say(word);
+    EXPECT_TRUE(page->hear().is_discarded()) << word.substr(0, 20);
+  }
+  EXPECT_TRUE(becomes_true([&] { return server_->counts().clients == 0; }));
+  EXPECT_FALSE(feed_.stop_asked());
+}
+
+TEST_F(LiveServer, ServesManyPagesAndRefusesOneTooMany) {
+  start([](Server::Settings& settings) { settings.most_clients = 8; });
+  std::vector<std::unique_ptr<Onlooker>> pages;
+  for (int i = 0; i < 8; ++i) {
+    pages.push_back(onlooker());
+    (void)pages.back()->hear("history");
+  }
+  EXPECT_EQ(refusal_of(kToken, here(), "http://" + here()), "HTTP/1.1 503 Service Unavailable");
+  show(7);
+  server_->draw();
+  for (const auto& page : pages) EXPECT_EQ(page->hear()["time_s"], 7);
+  pages.pop_back();
+  EXPECT_TRUE(becomes_true([&] { return server_->counts().clients == 7; }));
+  EXPECT_TRUE(onlooker()->is_in()) << "a place was left";
+}
+
+TEST_F(LiveServer, SkipsFramesForAClientThatDoesNotReadAndDropsItThen) {
+  start([](Server::Settings& settings) { settings.patience = 200ms; });
+  const auto slow = onlooker(kToken, 4096), quick = onlooker();
+  (void)quick->hear("history");
+  int frame = 0;
+  const auto draw = [&] {
+    show(++frame);
+    server_->draw();
+    EXPECT_EQ(quick->hear()["time_s"], frame) << "the others get every frame";
+  };
+  EXPECT_TRUE(becomes_true([&] { return draw(), server_->counts().dropped_clients == 1; }));
+  EXPECT_GT(server_->counts().skipped, 0u);
+  EXPECT_EQ(server_->counts().clients, 1u);
+}
+
+TEST_F(LiveServer, DropsAClientBehindWhichTooManyMessagesWait) {
+  start([](Server::Settings& settings) { settings.most_waiting = 20; });
+  const auto slow = onlooker(kToken, 4096), quick = onlooker();
+  (void)quick->hear("history");
+  const std::string words(1000, 'x');
+  EXPECT_TRUE(becomes_true([&] {
+    feed_.tell(line_message(1, words));
+    server_->draw();
+    EXPECT_EQ(quick->hear()["text"], words);
+    return server_->counts().dropped_clients == 1;
+  }));
+}
+
+TEST_F(LiveServer, NeverMakesTheRunnerWaitEvenWhenItStandsStill) {
+  start([](Server::Settings& settings) { settings.frame = std::chrono::hours(1); });
+  for (int i = 0; i < 100'000; ++i) show(i), feed_.tell("{}");  // returns: nobody takes anything
+  EXPECT_GT(feed_.dropped(), 90'000u);
+}
+
+TEST_F(LiveServer, DeliversTheLastWordsBeforeItGoes) {
+  start();
+  const auto page = onlooker();
+  (void)page->hear("history");
+  show(3);
+  feed_.tell(end_message(3, false, "stopped by request; coasted"));
+  std::thread going([&] { server_.reset(); });
+  const json end = page->hear("end");
+  EXPECT_EQ(end["text"], "stopped by request; coasted");
+  while (!page->hear().is_discarded()) {
+  }
+  going.join();
+}
+
+TEST_F(LiveServer, IsGoneSoonWhenAClientDoesNotRead) {
+  start();
+  const auto slow = onlooker(kToken, 4096);
+  for (int i = 0; i < 2000; ++i) {
+    feed_.tell(line_message(1, std::string(500, 'x')));
+    if (i % 100 == 0) server_->draw();
+  }
+  server_.reset();  // returns
+}
+
+TEST_F(LiveServer, SaysThatAPortIsTaken) {
+  start();
+  Feed feed;
+  Server::Settings settings;
+  settings.port = server_->port();
+  try {
+    const Server other(settings, feed);
+    FAIL() << "two servers on one port";
+  } catch (const ConfigurationError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("give another port"));
+  }
+}
+
+TEST(LivePage, IsOneTextThatNamesNoOtherPlace) {
+  const std::string page = page_text();
+  for (const char* left : {"@app.js@", "@style.css@", "@dygraph.min.js@", "@dygraph.min.css@", "sourceMappingURL",
+                           "src=\"http", "href=\"http", "url(http", "@import"}) {
+    EXPECT_THAT(page, Not(HasSubstr(left)));
+  }
+  EXPECT_THAT(page, HasSubstr("Dygraph"));
+}
+
+}  // namespace
+}  // namespace kphi::daq::live
