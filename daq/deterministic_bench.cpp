@@ -159,6 +159,7 @@ void DeterministicBench::step_to(Instant when) {
     stream_->advance(when);
   }
   exchange();
+  if (witness_.stepped) witness_.stepped();
 }
 
 void DeterministicBench::exchange() {
@@ -167,6 +168,7 @@ void DeterministicBench::exchange() {
 }
 
 void DeterministicBench::exchange_load_cell() {
+  if (abandoned_) return;
   if (stream_) {
     std::array<std::uint8_t, 8> request{};
     while (stream_->next_request(request)) sim_.wire().request(request, kHost, clock_.now());
@@ -175,9 +177,22 @@ void DeterministicBench::exchange_load_cell() {
   while (sim_.wire().next_datagram(datagram, clock_.now())) {
     if (!stream_ || datagram.foreign) continue;  // a connected socket does not see what others send
     const std::size_t before = records_.size();
+    const std::uint64_t drained = stream_->counters().drained;
     stream_->receive(datagram.payload(), datagram.at, records_);
+    if (witness_.heard) witness_.heard(datagram, stream_->counters().drained > drained);
     if (records_.size() > before) meter_->note(records_.back(), records_.size() - before, stream_->counters().reboots);
   }
+}
+
+void DeterministicBench::abandon() noexcept {
+  abandoned_ = true;
+  motor_.abandon();
+  if (supply_) supply_->link.abandon();
+}
+
+void DeterministicBench::outlive(Instant when) {
+  clock_.set(when);
+  sim_.advance(when);
 }
 
 std::unique_ptr<Background> DeterministicBench::keep_calling(std::function<void()> work) {
@@ -198,6 +213,7 @@ results::LoadCellScale DeterministicBench::start() {
   stream_.reset();
   read_box();
   stream_.emplace(stream_settings(configuration_));
+  if (witness_.stream_began) witness_.stream_began();
   meter_.emplace(configuration_.device_rate_hz);
   meter_->begin();
   records_.clear();

@@ -18,6 +18,14 @@
 
 namespace kphi::daq {
 
+/// Who looks at a bench from outside while a program drives it. What is empty is not called.
+struct BenchWitness {
+  std::function<void()> stepped;       ///< after every step of bench time; what it throws leaves through whoever waits
+  std::function<void()> stream_began;  ///< a fresh session of the load cell
+  /// What reached that session; `discarded`: it belonged to no stream of its own.
+  std::function<void(const sim::Datagram& datagram, bool discarded)> heard;
+};
+
 class DeterministicBench final : public Bench, private LoadCellLink {
  public:
   /// Throws DeviceError; ConfigurationError when a script or motor that the file names cannot be used.
@@ -37,6 +45,11 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   /// What a fault test looks at, and where it puts its finger.
   [[nodiscard]] sim::SimulatedBench& simulation() noexcept { return sim_; }
   void use_files(results::FileLayer& files) noexcept { files_ = &files; }
+  void let_watch(BenchWitness witness) { witness_ = std::move(witness); }
+  /// The program is gone, as after kill -9: from here on nothing it does reaches a device.
+  void abandon() noexcept;
+  /// The devices by themselves until `when`.
+  void outlive(Instant when);
 
  private:
   [[nodiscard]] const netbox::Configuration& configuration() const override { return configuration_; }
@@ -82,6 +95,8 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   std::size_t taken_ = 0;
   std::function<void()>* work_ = nullptr;
   Instant next_work_{};
+  BenchWitness witness_;
+  bool abandoned_ = false;
 };
 
 }  // namespace kphi::daq

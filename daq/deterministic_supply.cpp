@@ -36,7 +36,7 @@ void DeterministicSupply::switch_on() {
 }
 
 std::string DeterministicSupply::switch_off() noexcept {
-  circuit_.switch_output(false);
+  if (!abandoned_) circuit_.switch_output(false);
   return "";
 }
 

@@ -18,8 +18,10 @@ class DeterministicSupply final : public SupplyLink {
   [[nodiscard]] std::string identity() const override { return "simulated supply"; }
   std::size_t take(std::span<results::SupplyReading> out) override;
   [[nodiscard]] std::string failure() const override { return ""; }
-  void cut() noexcept override { circuit_.switch_output(false); }
+  void cut() noexcept override { (void)switch_off(); }
   [[nodiscard]] std::string switch_off() noexcept override;
+  /// The program is gone: the supply goes on as it is.
+  void abandon() noexcept { abandoned_ = true; }
   /// To be called when time has passed.
   void look();
 
@@ -29,6 +31,7 @@ class DeterministicSupply final : public SupplyLink {
   const profiles::SupplyPlace place_;
   sim::SupplyCircuit& circuit_;
   const Clock& clock_;
+  bool abandoned_ = false;
   Instant next_look_{0};
   std::vector<results::SupplyReading> readings_;
 };
