@@ -31,6 +31,7 @@ void load_faults(const std::string& path, sim::BenchSettings& settings) {
     settings.faults = sim::parse_faults(text, path);
     settings.netbox.habits = sim::parse_habits(text, path);
     settings.motor_faults = sim::parse_motor_faults(text, path);
+    settings.air_faults = sim::parse_ambient_faults(text, path);
     if (settings.supply) settings.supply->faults = sim::parse_supply_faults(text, path);
   } catch (const sim::FileError& error) {
     throw ConfigurationError(error.what());
@@ -96,14 +97,17 @@ class WithinWaits final : public Background {
 }  // namespace
 
 DeterministicBench::DeterministicBench(const profiles::Bench& place, const sim::BenchSettings& other)
-    : air_(place.ambient, clock_),
+    : air_({.sensor = "", .manual = place.ambient.manual}, clock_),
       sim_(settings_of(place, other)),
-      supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, sim_.supply()->circuit(), clock_)
-                           : nullptr),
+      supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, *sim_.supply(), clock_) : nullptr),
       motor_(place.iq, sim_.motor_line(), clock_, [this] { step_to(clock_.now() + kMotorWait); }) {
   if (supply_) {
     clock_.set(clock_.now() + kSupplyRises);
     sim_.advance(clock_.now());
+  }
+  if (!place.ambient.sensor.empty()) {
+    const sim::BenchSettings settings = settings_of(place, other);
+    measured_air_.emplace(clock_, settings.air, settings.air_faults);
   }
   motor_.connect();
   read_box();
@@ -152,6 +156,7 @@ void DeterministicBench::step_to(Instant when) {
   clock_.set(when);
   sim_.advance(when);
   if (supply_) supply_->link.look();
+  if (measured_air_) measured_air_->look();
   exchange();  // what came is received before anything is found to be late
   motor_.advance(when);
   if (stream_) {

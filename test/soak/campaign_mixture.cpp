@@ -90,6 +90,29 @@ constexpr std::array kSupplyFaults{
     "kind: supply_trip, code: <1..5>",
     "kind: supply_panel, register: 8, value: <900..1400>",
     "for_s: <0.1~2>, kind: supply_sag, volts: <0.1~8>",
+    "for_s: <0.05~3>, kind: supply_no_reply, p: <0.1~1>",
+    "for_s: <0.05~3>, kind: supply_deaf, p: <0.1~1>",
+    "for_s: <0.05~3>, kind: supply_bad_crc, p: <0.1~1>",
+    "for_s: <0.05~3>, kind: supply_truncated, p: <0.1~1>, size: <0..20>",
+    "for_s: <0.05~3>, kind: supply_garbage, p: <0.1~1>, size: <1..20>",
+    "for_s: <0.05~3>, kind: supply_wrong_slave, p: <0.1~1>, slave: 7",
+    "for_s: <0.05~3>, kind: supply_wrong_transaction, p: <0.1~1>",
+    "for_s: <0.05~3>, kind: supply_echo, p: <0.1~1>",
+    "for_s: <0.05~3>, kind: supply_exception, p: <0.1~1>, code: <1..11>",
+    "for_s: <0.05~3>, kind: supply_late, p: <0.1~1>, delay_s: <0~1>",
+    "for_s: <0.05~3>, kind: supply_dribble, p: <0.1~1>, gap_s: <0~0.02>",
+    "for_s: <0.05~3>, kind: supply_closed",
+};
+
+/// Of the sensor of the air; what of its faults concerns a bridge and its bus.
+constexpr std::array kAirFaults{
+    "for_s: <1~20>, kind: ambient_unplug",
+    "count: <1..9>, for_s: 30, kind: ambient_no_reply",
+    "count: <1..9>, for_s: 30, kind: ambient_late, delay_s: <0~3>",
+    "count: <1..9>, for_s: 30, kind: ambient_stall",
+    "count: <1..9>, for_s: 30, kind: ambient_nack",
+    "count: <1..9>, for_s: 30, kind: ambient_busy",
+    "count: <1..9>, for_s: 30, kind: ambient_stuck_bus",
 };
 
 constexpr std::array kPropellers{
@@ -131,12 +154,17 @@ std::string entry(const std::array<const char*, N>& patterns, double until_s, Di
   return fmt::format("  - {{at_s: {:.4f}, {}}}\n", at, filled_in(dice.one_of(patterns), dice));
 }
 
+/// What a bench has besides a load cell and a motor.
+struct Devices {
+  bool supply, sensor;
+};
+
 struct Shape {
   int first_deg, second_deg;
   bool box_bias;
   double dwell_s, zero_s;
   /// About, of bench time.
-  [[nodiscard]] double seconds() const { return 1 + 4 * (3 * dwell_s + (box_bias ? 4 : 2) * zero_s + 1.4); }
+  [[nodiscard]] double seconds() const { return 1 + 4 * (3 * dwell_s + (box_bias ? 4 : 2) * zero_s + 3.5); }
 };
 
 Shape shape_of(Dice& dice) {
@@ -146,9 +174,9 @@ Shape shape_of(Dice& dice) {
           dice.real(0.5, 0.7), dice.real(0.3, 0.5)};
 }
 
-std::string campaign_of(const Shape& shape, Dice& dice) {
+std::string campaign_of(const Shape& shape, bool powered, Dice& dice) {
   double low = dice.real(3000, 9000), high = dice.real(12000, 15000);
-  if (dice.once_in(4)) std::swap(low, high);
+  if (!powered && dice.once_in(4)) std::swap(low, high);  // what a ramp down feeds back trips a supply
   return fmt::format(
       "format: kphi-campaign/1\nname: soak\npropeller: {{{}}}\nocclusions_deg: [{}, {}]\nrepetitions: 2\n"
       "profile: {{steps: 3, dwell_s: {:.3f}, first_rpm: {:.0f}, last_rpm: {:.0f}}}\n"
@@ -158,7 +186,7 @@ std::string campaign_of(const Shape& shape, Dice& dice) {
       shape.box_bias);
 }
 
-std::string bench_of(bool powered, Dice& dice) {
+std::string bench_of(const Devices& devices, Dice& dice) {
   constexpr std::array kRates{500, 700, 1000, 1000, 1000, 1750, 3500};
   const int rate = dice.one_of(kRates);
   constexpr std::array kRecords{1, 5, 10, 20};
@@ -169,19 +197,24 @@ std::string bench_of(bool powered, Dice& dice) {
       "format: kphi-bench/1\nname: soak\n"
       "netbox: {{host: 127.0.0.1, rdt_port: 49152, http_port: 8049, rate_hz: {}, records_per_datagram: {}}}\n"
       "iq: {{device: /dev/null, baud: 921600, module_id: 0, spin: {:+}, telemetry_hz: {}, speed_max_rpm: 19300}}\n"
-      "thrust_axis: \"+Fz\"\n{}",
-      rate, dice.one_of(kRecords), dice.once_in(2) ? 1 : -1, dice.one_of(std::array{50, 100}), powered ? supply : "");
+      "thrust_axis: \"+Fz\"\n{}{}",
+      rate, dice.one_of(kRecords), dice.once_in(2) ? 1 : -1, dice.one_of(std::array{50, 100}),
+      devices.supply ? supply : "", devices.sensor ? "ambient: usb:04d8:00dd\n" : "");
 }
 
-std::string faults_of(bool powered, double until_s, Dice& dice) {
+std::string faults_of(const Devices& devices, double until_s, Dice& dice) {
   const int number = dice.once_in(6) ? 0 : dice.whole(1, 4);
   std::string faults = "format: kphi-faults/1\nfaults:\n";
   if (number == 0) return faults + "  []\n";
   for (int i = 0; i < number; ++i) {
-    const int device = dice.whole(1, powered ? 7 : 6);
-    faults += device <= 3   ? entry(kCellFaults, until_s, dice)
-              : device <= 6 ? entry(kMotorFaults, until_s, dice)
-                            : entry(kSupplyFaults, until_s, dice);
+    const int device = dice.whole(1, 8);
+    if (device == 1 && devices.supply) {
+      faults += entry(kSupplyFaults, until_s, dice);
+    } else if (device == 2 && devices.sensor) {
+      faults += entry(kAirFaults, until_s, dice);
+    } else {
+      faults += dice.once_in(2) ? entry(kCellFaults, until_s, dice) : entry(kMotorFaults, until_s, dice);
+    }
   }
   return faults;
 }
@@ -228,10 +261,10 @@ Mixture draw(std::uint64_t seed) {
   Mixture mixture;
   mixture.seed = seed;
   const Shape shape = shape_of(dice);
-  const bool powered = dice.once_in(2);
-  mixture.campaign = campaign_of(shape, dice);
-  mixture.bench = bench_of(powered, dice);
-  mixture.faults = faults_of(powered, shape.seconds(), dice);
+  const Devices devices{dice.once_in(2), dice.once_in(3)};
+  mixture.campaign = campaign_of(shape, devices.supply, dice);
+  mixture.bench = bench_of(devices, dice);
+  mixture.faults = faults_of(devices, shape.seconds(), dice);
   add_operator(mixture, shape, dice);
   add_ends(mixture, shape.seconds(), dice);
   return mixture;

@@ -43,6 +43,8 @@ Reaches::Reaches(const std::string& faults) : cell_(sim::parse_faults(faults, "f
     all_.push_back(
         {Device::motor, std::string(sim::name_of(f.kind)), f.at, end_of(f, goes_on(f.kind)), silences(f.kind)});
   }
+  for (const auto& f : sim::parse_ambient_faults(faults, "faults"))
+    all_.push_back({Device::air, std::string(sim::name_of(f.kind)), f.at, end_of(f, false)});
   for (const auto& f : sim::parse_supply_faults(faults, "faults")) {
     const bool instant = f.kind == sim::SupplyFaultKind::trip || f.kind == sim::SupplyFaultKind::panel;
     all_.push_back({Device::supply, std::string(sim::name_of(f.kind)), f.at, end_of(f, instant)});

@@ -11,7 +11,7 @@
 
 namespace kphi::soak {
 
-enum class Device { load_cell, motor, supply };
+enum class Device { load_cell, motor, supply, air };
 
 struct Reach {
   Device device;

@@ -15,9 +15,15 @@ namespace {
 
 using namespace kphi::soak;
 
+const char* name_of(kphi::sim::PowerStage::Mode mode) {
+  constexpr const char* kNames[] = {"coasts", "brakes", "drives"};
+  return kNames[static_cast<std::size_t>(mode)];
+}
+
 struct Tally {
   std::array<std::uint64_t, 8> ends{};
   std::uint64_t failed = 0;
+  std::uint64_t clean_steps = 0, clean_steps_in_doubt = 0;
 };
 
 /// One campaign; words on stdout when something is wrong, or always if `talkative`.
@@ -28,12 +34,18 @@ void live_one(std::uint64_t seed, bool talkative, Tally& tally) {
   try {
     World world(mixture, quick_folder());
     world.live();
-    wrong = judge(world);
+    Verdict verdict = judge(world);
+    wrong = std::move(verdict.wrong);
+    tally.clean_steps += static_cast<std::uint64_t>(verdict.clean_steps);
+    tally.clean_steps_in_doubt += static_cast<std::uint64_t>(verdict.clean_steps_in_doubt);
     ++tally.ends[static_cast<std::size_t>(world.story().end)];
     end = fmt::format("{} at {:.3f} s {}", name_of(world.story().end), kphi::to_seconds(world.story().ended),
                       world.story().reason);
-    if (talkative)
-      for (const std::string& line : world.story().said) end += "\n    " + line;
+    if (talkative) {
+      for (const std::string& line : world.story().said) end += "\n#     " + line;
+      for (const auto& change : world.story().stages)
+        end += fmt::format("\n#     {:.4f} s: {}", kphi::to_seconds(change.at), name_of(change.mode));
+    }
   } catch (const std::exception& error) {
     wrong.push_back(fmt::format("an exception: {}", error.what()));
   }
@@ -67,6 +79,8 @@ void take_from(int worker, Tally& sum) {
   const bool whole = ::read(worker, &tally, sizeof tally) == sizeof tally;
   ::close(worker);
   for (std::size_t i = 0; i < sum.ends.size(); ++i) sum.ends[i] += whole ? tally.ends[i] : 0;
+  sum.clean_steps += whole ? tally.clean_steps : 0;
+  sum.clean_steps_in_doubt += whole ? tally.clean_steps_in_doubt : 0;
   sum.failed += whole ? tally.failed : 1;
   if (!whole) fmt::print("a worker died\n");
 }
@@ -99,7 +113,10 @@ int main(int argc, char** argv) {
     tally = live_all(from, count);
     for (std::size_t i = 0; i < tally.ends.size(); ++i)
       if (tally.ends[i] > 0) fmt::print("{:6} {}\n", tally.ends[i], name_of(static_cast<End>(i)));
+    fmt::print("{:6} of {} clean steps unsettled or drifting by chance\n", tally.clean_steps_in_doubt,
+               tally.clean_steps);
     fmt::print("{:6} failed, of {} from seed {}\n", tally.failed, count, from);
   }
-  return tally.failed == 0 ? 0 : 1;
+  const bool chance = 50 * tally.clean_steps_in_doubt <= tally.clean_steps + 100;
+  return tally.failed == 0 && chance ? 0 : 1;
 }

@@ -9,8 +9,9 @@
 //           After a kill or with a refusing disk: all accepted runs are whole, the journal's chain is right, what was
 //           secured can be read, and at most one run is finished that the journal does not know yet.
 // Verdict   A step without a doubt shows the true thrust and speed. A step in whose window a record is missing says so.
-//           A run out of reach of every fault is accepted without a doubt, and nothing but a fault, the disk or the
-//           operator ends a campaign; the reason names the device concerned.
+//           A run out of reach of every fault is accepted without a doubt, but for those that short steps may have:
+//           the lag unknown, and now and then unsettled or drifting, which are counted. Nothing but a fault, the disk
+//           or the operator ends a campaign; the reason names the device concerned.
 #pragma once
 
 #include <string>
@@ -20,7 +21,13 @@
 
 namespace kphi::soak {
 
-/// Empty: nothing is wrong. `world` has lived.
-[[nodiscard]] std::vector<std::string> judge(World& world);
+struct Verdict {
+  std::vector<std::string> wrong;
+  int clean_steps = 0;           ///< out of reach of every fault
+  int clean_steps_in_doubt = 0;  ///< of them, that a test of significance found unsettled or drifting
+};
+
+/// `world` has lived.
+[[nodiscard]] Verdict judge(World& world);
 
 }  // namespace kphi::soak
