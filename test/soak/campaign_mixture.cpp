@@ -187,7 +187,7 @@ std::string campaign_of(const Shape& shape, bool powered, Dice& dice) {
 }
 
 std::string bench_of(const Devices& devices, Dice& dice) {
-  constexpr std::array kRates{500, 700, 1000, 1000, 1000, 1750, 3500};
+  constexpr std::array kRates{700, 1000, 1000, 1000, 1750, 1750, 3500};
   const int rate = dice.one_of(kRates);
   constexpr std::array kRecords{1, 5, 10, 20};
   const char* supply =
@@ -198,7 +198,7 @@ std::string bench_of(const Devices& devices, Dice& dice) {
       "netbox: {{host: 127.0.0.1, rdt_port: 49152, http_port: 8049, rate_hz: {}, records_per_datagram: {}}}\n"
       "iq: {{device: /dev/null, baud: 921600, module_id: 0, spin: {:+}, telemetry_hz: {}, speed_max_rpm: 19300}}\n"
       "thrust_axis: \"+Fz\"\n{}{}",
-      rate, dice.one_of(kRecords), dice.once_in(2) ? 1 : -1, dice.one_of(std::array{50, 100}),
+      rate, dice.one_of(kRecords), dice.once_in(2) ? 1 : -1, dice.one_of(std::array{100, 200}),
       devices.supply ? supply : "", devices.sensor ? "ambient: usb:04d8:00dd\n" : "");
 }
 

@@ -184,7 +184,7 @@ void World::look() {
   const Instant now = bench_->clock().now();
   const auto mode = bench_->simulation().motor().stage().mode;
   if (story_.stages.empty() || story_.stages.back().mode != mode) story_.stages.push_back({now, mode});
-  story_.moments.push_back({now, std::abs(plant.motor().speed), plant.thrust()});
+  story_.moments.push_back({now, std::abs(plant.motor().speed), plant.thrust(), plant.motor().supply_volts});
 }
 
 void World::at_operation(std::uint64_t number) {

@@ -33,6 +33,7 @@ struct Story {
     Instant at;
     double speed_rad_s;  ///< unsigned
     double thrust_n;     ///< without noise and zero
+    double supply_v;     ///< at the module
   };
   struct Stream {
     Instant began;
