@@ -31,6 +31,7 @@ void load_faults(const std::string& path, sim::BenchSettings& settings) {
     settings.faults = sim::parse_faults(text, path);
     settings.netbox.habits = sim::parse_habits(text, path);
     settings.motor_faults = sim::parse_motor_faults(text, path);
+    settings.air_faults = sim::parse_ambient_faults(text, path);
     if (settings.supply) settings.supply->faults = sim::parse_supply_faults(text, path);
   } catch (const sim::FileError& error) {
     throw ConfigurationError(error.what());
@@ -98,14 +99,17 @@ class WithinWaits final : public Background {
 
 DeterministicBench::DeterministicBench(const profiles::Bench& place, const sim::BenchSettings& other)
     : clock_(other.begin),
-      air_(place.ambient, clock_),
+      air_({.sensor = "", .manual = place.ambient.manual}, clock_),
       sim_(settings_of(place, other)),
-      supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, sim_.supply()->circuit(), clock_)
-                           : nullptr),
+      supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, *sim_.supply(), clock_) : nullptr),
       motor_(place.iq, sim_.motor_line(), clock_, [this] { step_to(clock_.now() + kMotorWait); }) {
   if (supply_) {
     clock_.set(clock_.now() + kSupplyRises);
     sim_.advance(clock_.now());
+  }
+  if (!place.ambient.sensor.empty()) {
+    const sim::BenchSettings settings = settings_of(place, other);
+    measured_air_.emplace(clock_, settings.air, settings.air_faults);
   }
   motor_.connect();
   read_box();
@@ -154,6 +158,7 @@ void DeterministicBench::step_to(Instant when) {
   clock_.set(when);
   sim_.advance(when);
   if (supply_) supply_->link.look();
+  if (measured_air_) measured_air_->look();
   exchange();  // what came is received before anything is found to be late
   motor_.advance(when);
   if (stream_) {
@@ -161,6 +166,7 @@ void DeterministicBench::step_to(Instant when) {
     stream_->advance(when);
   }
   exchange();
+  if (witness_.stepped) witness_.stepped();
 }
 
 void DeterministicBench::exchange() {
@@ -169,6 +175,7 @@ void DeterministicBench::exchange() {
 }
 
 void DeterministicBench::exchange_load_cell() {
+  if (abandoned_) return;
   if (stream_) {
     std::array<std::uint8_t, 8> request{};
     while (stream_->next_request(request)) sim_.wire().request(request, kHost, clock_.now());
@@ -177,9 +184,22 @@ void DeterministicBench::exchange_load_cell() {
   while (sim_.wire().next_datagram(datagram, clock_.now())) {
     if (!stream_ || datagram.foreign) continue;  // a connected socket does not see what others send
     const std::size_t before = records_.size();
+    const std::uint64_t drained = stream_->counters().drained;
     stream_->receive(datagram.payload(), datagram.at, records_);
+    if (witness_.heard) witness_.heard(datagram, stream_->counters().drained > drained);
     if (records_.size() > before) meter_->note(records_.back(), records_.size() - before, stream_->counters().reboots);
   }
+}
+
+void DeterministicBench::abandon() noexcept {
+  abandoned_ = true;
+  motor_.abandon();
+  if (supply_) supply_->link.abandon();
+}
+
+void DeterministicBench::outlive(Instant when) {
+  clock_.set(when);
+  sim_.advance(when);
 }
 
 std::unique_ptr<Background> DeterministicBench::keep_calling(std::function<void()> work) {
@@ -200,6 +220,7 @@ results::LoadCellScale DeterministicBench::start() {
   stream_.reset();
   read_box();
   stream_.emplace(stream_settings(configuration_));
+  if (witness_.stream_began) witness_.stream_began();
   meter_.emplace(configuration_.device_rate_hz);
   meter_->begin();
   records_.clear();

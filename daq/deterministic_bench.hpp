@@ -1,6 +1,5 @@
 // The bench in virtual time: driver sessions joined to simulated devices without transports, one thread, one seed.
-// The same campaign gives the same bytes, and takes seconds; also when a script spoils the load cell's wire or the
-// motor's line.
+// The same campaign gives the same bytes, and takes seconds; also when a script spoils the wires of its devices.
 #pragma once
 
 #include <memory>
@@ -9,6 +8,7 @@
 
 #include "daq/air.hpp"
 #include "daq/bench.hpp"
+#include "daq/deterministic_air.hpp"
 #include "daq/deterministic_motor.hpp"
 #include "daq/deterministic_supply.hpp"
 #include "drivers/netbox/configuration.hpp"
@@ -17,6 +17,14 @@
 #include "drivers/sim/bench.hpp"
 
 namespace kphi::daq {
+
+/// Who looks at a bench from outside while a program drives it. What is empty is not called.
+struct BenchWitness {
+  std::function<void()> stepped;       ///< after every step of bench time; what it throws leaves through whoever waits
+  std::function<void()> stream_began;  ///< a fresh session of the load cell
+  /// What reached that session; `discarded`: it belonged to no stream of its own.
+  std::function<void(const sim::Datagram& datagram, bool discarded)> heard;
+};
 
 class DeterministicBench final : public Bench, private LoadCellLink {
  public:
@@ -27,7 +35,9 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   [[nodiscard]] MotorLink& motor() override { return motor_; }
   [[nodiscard]] LoadCellLink& load_cell() override { return *this; }
   [[nodiscard]] SupplyLink* supply() override { return supply_ ? &supply_->link : nullptr; }
-  [[nodiscard]] std::optional<ambient::Density> air() const override { return air_.density(); }
+  [[nodiscard]] std::optional<ambient::Density> air() const override {
+    return measured_air_ ? measured_air_->density() : air_.density();
+  }
   void wait_until(Instant when) override;
   [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override;
   [[nodiscard]] results::FileLayer& files() override { return *files_; }
@@ -37,6 +47,11 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   /// What a fault test looks at, and where it puts its finger.
   [[nodiscard]] sim::SimulatedBench& simulation() noexcept { return sim_; }
   void use_files(results::FileLayer& files) noexcept { files_ = &files; }
+  void let_watch(BenchWitness witness) { witness_ = std::move(witness); }
+  /// The program is gone, as after kill -9: from here on nothing it does reaches a device.
+  void abandon() noexcept;
+  /// The devices by themselves until `when`.
+  void outlive(Instant when);
 
  private:
   [[nodiscard]] const netbox::Configuration& configuration() const override { return configuration_; }
@@ -60,13 +75,14 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   void exchange_load_cell();
 
   ManualClock clock_;
-  AirSource air_;
+  AirSource air_;  ///< as a person has read it off
+  std::optional<DeterministicAir> measured_air_;
   results::MemoryOnlySync own_files_;
   results::FileLayer* files_ = &own_files_;
   sim::SimulatedBench sim_;
   struct PoweredSupply {
-    PoweredSupply(const profiles::SupplyPlace& place, sim::SupplyCircuit& circuit, const Clock& clock)
-        : link(place, circuit, clock), powered(link) {}
+    PoweredSupply(const profiles::SupplyPlace& place, sim::SupplySlave& slave, const Clock& clock)
+        : link(place, slave, clock), powered(link) {}
     DeterministicSupply link;
     Powered powered;
   };
@@ -82,6 +98,8 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   std::size_t taken_ = 0;
   std::vector<std::function<void()>*> work_;  ///< in the order in which it was given
   Instant next_work_{};
+  BenchWitness witness_;
+  bool abandoned_ = false;
 };
 
 }  // namespace kphi::daq

@@ -43,6 +43,7 @@ std::vector<iq::Reply> DeterministicMotor::ask(std::vector<iq::Inquiry> asked) {
 }
 
 void DeterministicMotor::exchange() {
+  if (abandoned_) return;
   const Instant now = clock_.now();
   watch_plug();
   for (bool heard = true; heard || (plugged_ && !session_.output().empty());) {

@@ -22,6 +22,8 @@ class DeterministicMotor final : public MotorLink {
   /// Carries bytes both ways, at the clock's time.
   void exchange();
   void advance(Instant now) { session_.advance(now); }
+  /// The program is gone: nothing goes over the line any more.
+  void abandon() noexcept { abandoned_ = true; }
   /// When something is due at either end of the line.
   [[nodiscard]] Instant deadline() const { return std::min(session_.deadline(), line_.next_event()); }
 
@@ -48,6 +50,7 @@ class DeterministicMotor final : public MotorLink {
   iq::Session session_;
   iq::AuditRecord parameters_;
   bool plugged_ = true;
+  bool abandoned_ = false;
   std::string failure_;
 };
 

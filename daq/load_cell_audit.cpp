@@ -2,6 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "daq/settling.hpp"
+#include "profiles/configuration_error.hpp"
+
 namespace kphi::daq {
 namespace {
 
@@ -18,6 +23,9 @@ netbox::Intention intention_of(const profiles::Campaign& campaign, const profile
   intention.thrust_axis = place.thrust_axis;
   intention.rate_hz = place.netbox.rate_hz;
   intention.records_per_datagram = place.netbox.records_per_datagram;
+  // Over the shortest window that is averaged (settling.hpp) a line must show one period, or the mean has it.
+  const double left_s = (campaign.profile.dwell - campaign.minimum_discard).value();
+  if (left_s > 0) intention.alias_limit_hz = std::max(intention.alias_limit_hz, 1 / std::min(kLeastWindow, left_s / 2));
   return intention;
 }
 
@@ -49,6 +57,16 @@ std::vector<Finding> audit_load_cell(const LoadCellLink& cell, const profiles::C
     findings.insert(findings.end(), more.begin(), more.end());
   put_worst_first(findings);
   return findings;
+}
+
+void refuse_unsuitable(const LoadCellLink& cell, const profiles::Campaign& campaign, const profiles::Bench& place) {
+  std::string faults;
+  for (const Finding& found : audit_load_cell(cell, campaign, place)) {
+    if (found.severity != Severity::fault) continue;
+    faults += fmt::format("{}Net Box {}: {}; {}", faults.empty() ? "" : "\n  ", place.netbox.host, found.what,
+                          found.next_move);
+  }
+  if (!faults.empty()) throw ConfigurationError(faults);
 }
 
 }  // namespace kphi::daq

@@ -16,6 +16,9 @@ namespace kphi::daq {
 [[nodiscard]] std::vector<netbox::Finding> audit_load_cell(const LoadCellLink& cell, const profiles::Campaign& campaign,
                                                            const profiles::Bench& place);
 
+/// Throws ConfigurationError that names all faults with their remedies, if there are any.
+void refuse_unsuitable(const LoadCellLink& cell, const profiles::Campaign& campaign, const profiles::Bench& place);
+
 /// What of the settings the bench file asks for is not so in the box; rate and buffer are the audit's.
 [[nodiscard]] std::vector<netbox::Finding> unset(const netbox::Configuration& box,
                                                  const profiles::NetBoxSettings& wanted);

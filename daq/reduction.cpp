@@ -218,6 +218,7 @@ class Reduction {
                   supply_doubts(run_.supply, evidence.window.begin, evidence.window.end, true) |
                   bit(Doubt::rebooted, cell_.boot_at(step.whole.end) != zeros_.boot()) |
                   bit(Doubt::unsettled, !settling.settled) | bit(Doubt::lag_unknown, !lag_.known()) |
+                  bit(Doubt::few_samples, std::isnan(mean.thrust_u_n) || std::isnan(mean.speed_u_rad_s)) |
                   bit(Doubt::drifted, drifts(at_constant_speed(step, discarded)));
     return mean;
   }

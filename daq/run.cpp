@@ -76,7 +76,7 @@ void judge_changes(const netbox::Configuration& before, const LoadCellLink& cell
   if (changes == 0) return;
   progress.say("load cell: the box is configured otherwise than when it was read last: " + netbox::to_words(changes) +
                "; this run is recorded with its present scale");
-  (void)audit_load_cell(cell, order.campaign, order.place);
+  refuse_unsuitable(cell, order.campaign, order.place);
 }
 
 std::string what(const std::exception_ptr& cause) {

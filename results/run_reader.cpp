@@ -242,9 +242,10 @@ SequenceCheck check_sequence(const std::vector<LoadCellRecord>& records, std::ui
     } else if (ft < 0) {
       ++found.reboots;
     } else {
-      found.lost += static_cast<std::uint64_t>(ft / stride) - (ft >= stride ? 1 : 0);
-      found.off_stride += ft % stride != 0;
+      found.lost +=
+          std::max(1u, (static_cast<std::uint32_t>(ft) + ft_stride / 2) / static_cast<std::uint32_t>(stride)) - 1;
       found.restarts += rdt <= 0;
+      found.off_stride += rdt > 0 && ft % stride != 0;  // a stream begins anew at any sample of the box
     }
   }
   return found;

@@ -16,7 +16,7 @@ enum class Doubt : std::uint32_t {
   saturated = 1u << 2,               ///< a status word with the saturation bit, or a count at its limit
   lost_samples = 1u << 3,            ///< fewer records in the window than ft_sequence says, or than 90 % by rate
   derated = 1u << 4,                 ///< the module derated
-  few_samples = 1u << 5,             ///< under a tenth of the expected load-cell samples, or under 3 speed readings
+  few_samples = 1u << 5,             ///< under a tenth of the expected load-cell samples, or too few for an uncertainty
   bad_status = 1u << 6,              ///< another error bit of the box
   stream_restarted = 1u << 7,        ///< the stream began anew within the step
   rebooted = 1u << 8,                ///< the box started anew since the zero: its bias is another

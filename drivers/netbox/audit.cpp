@@ -93,6 +93,16 @@ std::optional<Finding> narrow_range(double expected, double range, const char* a
                  "choose a calibration with a larger range on the box's Configurations page, or lower the speeds"};
 }
 
+/// As a box set to pounds or kilograms of force counts: whole ones.
+std::optional<Finding> coarse_counts(const Configuration& box, const Intention& intention) {
+  constexpr double kCoarse = 0.001;  // of the largest thrust
+  const double count_n = 1 / box.counts_per_newton;
+  if (count_n <= kCoarse * intention.largest_thrust_n || intention.largest_thrust_n <= 0) return std::nullopt;
+  return Finding{Severity::fault,
+                 fmt::format("one count is {:.3g} N, where {:g} N are expected", count_n, intention.largest_thrust_n),
+                 "choose N as the force unit on the box's Configurations page"};
+}
+
 std::optional<Finding> narrow_force_range(const Configuration& box, const Intention& intention) {
   constexpr const char* kAxes[] = {"Fx", "Fy", "Fz"};
   const auto axis = static_cast<std::size_t>(std::clamp(intention.thrust_axis, 0, 2));
@@ -148,10 +158,12 @@ std::optional<Finding> receive_buffer(const Configuration& box, const Intention&
   return small_receive_buffer(intention.receive_buffer_bytes, box.records_per_datagram, box.rdt_rate_hz);
 }
 
-constexpr Check kChecks[] = {rdt_disabled,        empty_calibration,   other_rate,        aliased_rotor,
-                             narrow_force_range,  narrow_torque_range, other_buffer,      filter_above_half_the_rate,
-                             unfiltered_low_rate, unknown_filter,      slow_datagrams,    receive_buffer,
-                             tool_transform,      gage_bias,           monitor_conditions};
+constexpr Check kChecks[] = {rdt_disabled,        empty_calibration, other_rate,
+                             aliased_rotor,       coarse_counts,     narrow_force_range,
+                             narrow_torque_range, other_buffer,      filter_above_half_the_rate,
+                             unfiltered_low_rate, unknown_filter,    slow_datagrams,
+                             receive_buffer,      tool_transform,    gage_bias,
+                             monitor_conditions};
 
 }  // namespace
 

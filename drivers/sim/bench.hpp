@@ -8,11 +8,13 @@
 #include <string>
 
 #include "drivers/clock.hpp"
+#include "drivers/sim/bme280.hpp"
 #include "drivers/sim/iq_device.hpp"
 #include "drivers/sim/iq_line.hpp"
 #include "drivers/sim/netbox_device.hpp"
 #include "drivers/sim/plant.hpp"
 #include "drivers/sim/supply_slave.hpp"
+#include "drivers/sim/usb_faults.hpp"
 #include "drivers/sim/wire.hpp"
 
 namespace kphi::sim {
@@ -33,6 +35,8 @@ struct BenchSettings {
   Duration motor_usb_tick{0};     ///< see IqLineSettings
   MotorFaultScript motor_faults;  ///< of the motor's line, module and supply; drawn from `seed`
   IqLine::Keep motor_keep = IqLine::Keep::totals;
+  TrueAir air{18, 102689, 0.45};  ///< about its sensor; 1.225 kg/m³
+  UsbFaultScript air_faults;      ///< of that sensor, its bridge and their USB
 };
 
 class SimulatedBench {

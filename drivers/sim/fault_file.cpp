@@ -37,7 +37,22 @@ void read_entry(const YAML::Node& node, const std::string& path, FaultType (*mak
   }
 }
 
-bool is_load_cell_fault(const FaultEntry& entry) { return !is_motor_fault(entry) && !is_supply_fault(entry); }
+constexpr std::string_view kAmbient = "ambient_";
+
+bool is_ambient_fault(const FaultEntry& entry) {
+  const auto kind = entry.find("kind");
+  return kind != entry.end() && kind->second.starts_with(kAmbient);
+}
+
+UsbFault ambient_fault_of(const FaultEntry& entry) {
+  FaultEntry plain = entry;
+  plain["kind"].erase(0, kAmbient.size());
+  return usb_fault_of(plain);
+}
+
+bool is_load_cell_fault(const FaultEntry& entry) {
+  return !is_motor_fault(entry) && !is_supply_fault(entry) && !is_ambient_fault(entry);
+}
 bool of_motor(const FaultEntry& entry) { return is_motor_fault(entry); }
 bool of_supply(const FaultEntry& entry) { return is_supply_fault(entry); }
 
@@ -79,6 +94,10 @@ MotorFaultScript parse_motor_faults(const std::string& text, const std::string& 
 
 SupplyFaultScript parse_supply_faults(const std::string& text, const std::string& path) {
   return entries(text, path, supply_fault_of, of_supply);
+}
+
+UsbFaultScript parse_ambient_faults(const std::string& text, const std::string& path) {
+  return entries(text, path, ambient_fault_of, is_ambient_fault);
 }
 
 NetBoxHabits parse_habits(const std::string& text, const std::string& path) {

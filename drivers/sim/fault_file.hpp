@@ -16,15 +16,18 @@
 #include "drivers/sim/iq_faults.hpp"
 #include "drivers/sim/netbox_settings.hpp"
 #include "drivers/sim/supply_faults.hpp"
+#include "drivers/sim/usb_faults.hpp"
 
 namespace kphi::sim {
 
 /// Strict; throws FileError. `path` only names the text in messages. Entries of the motor, whose kinds begin with
-/// motor_, are for parse_motor_faults(), those of the supply (supply_) for parse_supply_faults(), all others for this.
+/// motor_, are for parse_motor_faults(), those of the supply (supply_) for parse_supply_faults(), those
+/// of the sensor of the air (ambient_ and a kind of usb_faults.hpp) for parse_ambient_faults(), all others for this.
 [[nodiscard]] FaultScript parse_faults(const std::string& text, const std::string& path);
 /// Of the same file; defaults where it names none.
 [[nodiscard]] NetBoxHabits parse_habits(const std::string& text, const std::string& path);
 [[nodiscard]] MotorFaultScript parse_motor_faults(const std::string& text, const std::string& path);
 [[nodiscard]] SupplyFaultScript parse_supply_faults(const std::string& text, const std::string& path);
+[[nodiscard]] UsbFaultScript parse_ambient_faults(const std::string& text, const std::string& path);
 
 }  // namespace kphi::sim

@@ -9,6 +9,7 @@ enum Function : std::uint8_t { kRead = 0x03, kWriteOne = 0x06, kWriteMany = 0x10
 enum Exception : int { kIllegalFunction = 1, kIllegalAddress = 2, kIllegalValue = 3 };
 constexpr std::size_t kFramesKept = 1000;
 constexpr std::uint8_t kGarbage = 0x55;
+constexpr int kLookBytes = 45;        // of an answer with twenty registers
 constexpr double kLongestStep = 1.0;  // s
 
 unsigned word(const std::vector<std::uint8_t>& bytes, std::size_t at) { return bytes[at] * 256u + bytes[at + 1]; }
@@ -83,6 +84,21 @@ const SupplyFault* SupplySlave::meet(SupplyFaultKind kind, Instant now) {
     return &fault;
   }
   return nullptr;
+}
+
+bool SupplySlave::hears(Instant now) { return !closed(now) && meet(SupplyFaultKind::deaf, now) == nullptr; }
+
+std::optional<Duration> SupplySlave::answers(Instant now) {
+  using K = SupplyFaultKind;
+  if (!hears(now)) return std::nullopt;
+  for (const K spoils : {K::exception, K::no_reply, K::wrong_slave, K::wrong_transaction, K::bad_crc, K::truncated,
+                         K::garbage, K::echo}) {
+    if (meet(spoils, now) != nullptr) return std::nullopt;
+  }
+  Duration wait{0};
+  if (const SupplyFault* late = meet(K::late, now)) wait += late->delay;
+  if (const SupplyFault* dribble = meet(K::dribble, now)) wait += kLookBytes * dribble->delay;
+  return wait;
 }
 
 void SupplySlave::answer(int client, ModbusFraming framing, const ModbusRequest& request, Instant now) {

@@ -4,6 +4,7 @@
 
 #include <deque>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -66,6 +67,11 @@ class SupplySlave {
   [[nodiscard]] bool makes_sense(int client) const;
   /// The fault `closed` reigns.
   [[nodiscard]] bool closed(Instant now) const noexcept;
+  // For who joins a client without frames and a wire between.
+  /// An order of now reaches it.
+  [[nodiscard]] bool hears(Instant now);
+  /// The whole answer to a question of now comes after so long; nothing: it does not.
+  [[nodiscard]] std::optional<Duration> answers(Instant now);
   /// One more fault, from now on.
   void add_fault(const SupplyFault& fault);
 

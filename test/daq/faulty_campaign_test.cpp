@@ -144,6 +144,17 @@ TEST_F(FaultyCampaign, DoubtsAllStepsOfARunInWhichTheBoxWasGivenOtherUnits) {
   expect_replay_agrees();
 }
 
+TEST_F(FaultyCampaign, RefusesTheNextRunOfABoxThatNoLongerSuitsTheCampaign) {
+  try {
+    (void)run("  - {at_s: 1.5, kind: units, force_unit: 5}\n");  // whole kilograms of force
+    FAIL() << "a thrust of 0 N without a doubt";
+  } catch (const ConfigurationError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("one count is 9.81 N"));
+  }
+  for (const std::string& names : doubts(0)) EXPECT_THAT(names, HasSubstr("configuration_changed"));
+  EXPECT_EQ(results_->complete_runs().size(), 1u);
+}
+
 TEST_F(FaultyCampaign, SaysThatItDoesNotKnowWhenTheBoxCannotBeReadAgain) {
   EXPECT_EQ(run("  - {at_s: 1.5, count: 2, kind: http_status, code: 500}\n").runs, 2);
   EXPECT_THAT(events(0), testing::ElementsAre(EventKind::unreachable));

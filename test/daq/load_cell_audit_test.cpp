@@ -45,6 +45,16 @@ TEST_F(Audit, RefusesARateThatFoldsAStepIntoAConstantForce) {
   EXPECT_THAT(refusal(), AllOf(HasSubstr("6000.0 RPM"), HasSubstr("set the RDT output rate to 7000 Hz")));
 }
 
+TEST_F(Audit, RefusesALineThatIsConstantOverTheShortWindowsOfTheCampaign) {
+  campaign_.profile.steps = 2;
+  campaign_.profile.first = from_rpm(9900);
+  settings_.rate_hz = place_.netbox.rate_hz = 500;
+  EXPECT_THAT(refusal(), HasSubstr("9900.0 RPM (3-blade pass at 495.00 Hz appears at 5.00 Hz)"));
+  campaign_.profile.dwell = Seconds(2);
+  campaign_.minimum_discard = Seconds(1);
+  EXPECT_EQ(refusal(), "");
+}
+
 TEST_F(Audit, RefusesALimitOfThrustThatTheCellCannotBear) {
   campaign_.limits.thrust_max = Newtons(60);
   EXPECT_THAT(refusal(), HasSubstr("60 N are expected on Fz, whose range is 60 N"));

@@ -307,6 +307,16 @@ TEST(Reduction, AlmostNoSamplesAreDoubted) {
   EXPECT_TRUE(std::isnan(step.thrust_n));
 }
 
+TEST(Reduction, StepsWhoseUncertaintyNobodyKnowsAreDoubted) {
+  Truth truth;
+  truth.reading_s = 0.25;  // four readings of the speed in a window
+  for (const StepMean& step : reduce(make_run(truth))) {
+    EXPECT_GE(step.speed_n, 3u);
+    EXPECT_TRUE(std::isnan(step.speed_u_rad_s));
+    EXPECT_TRUE(has(step, Doubt::few_samples));
+  }
+}
+
 TEST(Reduction, StatusWordsBecomeDoubts) {
   const auto doubts_with = [](std::uint32_t word) {
     Truth truth;

@@ -509,6 +509,27 @@ TEST_F(VerifiedRun, ADoubledSampleARebootAndALeftStrideShow) {
   EXPECT_THAT(problems_of(run), Contains(HasSubstr("left its stride")));
 }
 
+/// The counting stays a whole number of records where the box left out samples between two of them, or began anew.
+TEST_F(VerifiedRun, AGapThatIsNoMultipleOfTheStrideIsWholeWhenItWasCounted) {
+  RunRecording run = make_run({});
+  for (std::size_t i = 1000; i < run.load_cell.size(); ++i) run.load_cell[i].ft_sequence += 25;  // 4.6 strides
+  run.account.lost_network += 4;
+  run.account.expected += 4;
+  run.account.irregular += 1;
+  EXPECT_THAT(problems_of(run), testing::IsEmpty());
+}
+
+TEST_F(VerifiedRun, AStreamThatBeginsAnewAtAnySampleOfTheBoxIsWhole) {
+  RunRecording run = make_run({});
+  const std::uint32_t first = run.load_cell[2000].rdt_sequence - 1;
+  for (std::size_t i = 2000; i < run.load_cell.size(); ++i) {
+    run.load_cell[i].ft_sequence += 3;
+    run.load_cell[i].rdt_sequence -= first;
+  }
+  run.account.restarts += 1;
+  EXPECT_THAT(problems_of(run), testing::IsEmpty());
+}
+
 TEST_F(VerifiedRun, WithARestartOfTheBoxThatWasCountedIsWhole) {
   RunRecording run = make_run({});
   for (std::size_t i = 0; i < run.load_cell.size(); ++i)

@@ -5,31 +5,18 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <random>
 #include <string>
 
+#include "test/dice.hpp"
 #include "test/drivers/iq_faults/joined.hpp"
 
 namespace kphi::iq::test {
 namespace {
 
 using namespace std::chrono_literals;
+using kphi::test::Dice;
 using sim::MotorFault;
 using K = sim::MotorFaultKind;
-
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : generator_(seed) {}
-  int whole(int low, int high) {
-    return low + static_cast<int>(generator_() % static_cast<std::uint64_t>(high - low + 1));
-  }
-  double real(double low, double high) {
-    return low + (high - low) * static_cast<double>(generator_() >> 11) * 0x1p-53;
-  }
-
- private:
-  std::mt19937_64 generator_;
-};
 
 Manner random_manner(Dice& dice) {
   Manner manner;

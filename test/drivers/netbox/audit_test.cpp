@@ -94,6 +94,12 @@ INSTANTIATE_TEST_SUITE_P(
                intention.blades = 3;
              },
              Severity::fault, "4971.8 RPM (3-blade pass at 248.59 Hz appears at 1.41 Hz)", "7000 Hz"},
+        Case{"CoarseCounts",
+             [](Configuration& box, Intention& intention) {
+               box.counts_per_newton = 1 / 9.80665;  // kgf
+               intention.largest_thrust_n = 20;
+             },
+             Severity::fault, "one count is 9.81 N, where 20 N are expected", "force unit"},
         Case{"NarrowRange", [](Configuration&, Intention& intention) { intention.largest_thrust_n = 55; },
              Severity::warning, "55 N are expected on Fz, whose range is 60 N", "larger range"},
         Case{"SaturatingRange", [](Configuration&, Intention& intention) { intention.largest_thrust_n = 61; },

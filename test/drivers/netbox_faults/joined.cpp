@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
-#include <tuple>
 
 namespace kphi::netbox::test {
 namespace {
@@ -33,12 +31,6 @@ StreamSettings stream_settings(const Manner& manner) {
 
 /// Of 7000 a second; the time of tick `number`.
 Instant time_of(std::uint64_t number) { return Instant(static_cast<std::int64_t>(number * 1'000'000 / 7)); }
-
-/// Big-endian, independent of both sides.
-std::uint32_t word(const std::uint8_t* bytes) {
-  return static_cast<std::uint32_t>(bytes[0]) << 24 | static_cast<std::uint32_t>(bytes[1]) << 16 |
-         static_cast<std::uint32_t>(bytes[2]) << 8 | bytes[3];
-}
 
 }  // namespace
 
@@ -74,7 +66,7 @@ void Joined::pump(Instant now) {
     const bool drained = session_.counters().drained > drained_;
     drained_ = session_.counters().drained;
     if (whole && !drained)
-      arrivals_.push_back({datagram.boot, datagram.stream, word(datagram.bytes.data()), datagram.at});
+      arrivals_.push_back({datagram.boot, datagram.stream, first_rdt(datagram.payload()), datagram.at});
   }
   if (session_.release_deadline() <= now) session_.release(now, out_);
   if (session_.deadline() <= now) session_.advance(now);
@@ -91,56 +83,8 @@ void Joined::pump(Instant now) {
 void Joined::finish() { session_.flush(out_); }
 
 Ideal Joined::ideal() const {
-  struct Seen {
-    std::uint64_t times = 0;
-    Instant first{0};
-    bool late = false;
-  };
-  std::map<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>, Seen> seen;
-  for (const Arrival& arrival : arrivals_) {
-    Seen& s = seen[{arrival.boot, arrival.stream, arrival.first_rdt}];
-    if (s.times++ == 0) s.first = arrival.at;
-  }
-  Instant younger = kNever;
-  for (auto s = seen.rbegin(); s != seen.rend(); ++s) {
-    s->second.late = younger != kNever && s->second.first >= younger + session_.settings().reorder_patience;
-    younger = std::min(younger, s->second.first);
-  }
-  Ideal ideal;
-  ideal.malformed = wire_.truth().malformed;
-  Last last;
-  for (const sim::SentDatagram& sent : wire_.truth().log) {
-    const auto found = seen.find({sent.boot, sent.stream, sent.first_rdt});
-    if (found == seen.end()) continue;
-    if (found->second.late) {
-      ideal.late += found->second.times * sent.records;
-      continue;
-    }
-    ideal.duplicates += (found->second.times - 1) * sent.records;
-    for (std::uint32_t i = 0; i < sent.records; ++i) {
-      const std::uint32_t ft = wire_.truth().ft[sent.first_sample + i];
-      take_into(ideal, last, {sent.first_rdt + i, ft, found->second.first}, sent);
-    }
-  }
-  return ideal;
-}
-
-void Joined::take_into(Ideal& ideal, Last& last, const Ideal::Delivered& record, const sim::SentDatagram& sent) const {
-  const auto stride = static_cast<std::uint32_t>(manner_.divisor);
-  const std::uint32_t advance = record.ft - last.ft;
-  const bool anew = !last.any || sent.boot != last.boot || static_cast<std::int32_t>(advance) < 0;
-  if (!anew && advance == 0) {
-    ++ideal.stalled;
-    last.rdt = record.rdt;
-    return;
-  }
-  if (last.any && anew) ++ideal.reboots;
-  if (!anew && sent.stream != last.stream) ++ideal.restarts;
-  if (!anew && sent.stream == last.stream && (record.rdt - last.rdt) * stride != advance) ++ideal.irregular;
-  if (!anew) ideal.lost += std::max<std::uint32_t>(1, (advance + stride / 2) / stride) - 1;
-  ++ideal.received;
-  ideal.delivered.push_back(record);
-  last = {true, sent.boot, sent.stream, record.rdt, record.ft};
+  return ideal_of(wire_.truth(), arrivals_, static_cast<std::uint32_t>(manner_.divisor),
+                  session_.settings().reorder_patience);
 }
 
 std::string Joined::disagreement() const {
@@ -159,7 +103,7 @@ std::string Joined::disagreement() const {
   compare("restarts", account.restarts + account.renewals, truth.restarts);
   compare("reboots", account.reboots, truth.reboots);
   compare("irregular", account.irregular, truth.irregular);
-  compare("malformed", account.malformed, truth.malformed);
+  compare("malformed", account.malformed, wire_.truth().malformed);
   compare("sum", account.expected, account.received + account.lost_network + account.lost_host);
   compare("delivered", out_.size(), truth.received);
   for (std::size_t i = 0; i < std::min(out_.size(), truth.delivered.size()); ++i) {

@@ -7,6 +7,7 @@
 
 #include "drivers/netbox/session.hpp"
 #include "drivers/sim/wire.hpp"
+#include "test/drivers/netbox_faults/ideal.hpp"
 
 namespace kphi::netbox::test {
 
@@ -18,19 +19,6 @@ struct Manner {
   bool start_again_when_silent = true;
   sim::NetBoxHabits habits;
   Duration lease{0};
-};
-
-/// What the truth says the account must be. Late is what came when the driver had known of its absence for longer than
-/// it promises to wait.
-struct Ideal {
-  struct Delivered {
-    std::uint32_t rdt = 0, ft = 0;
-    Instant arrival{0};
-    friend bool operator==(const Delivered&, const Delivered&) = default;
-  };
-  std::uint64_t received = 0, lost = 0, duplicates = 0, late = 0, stalled = 0, restarts = 0, reboots = 0, irregular = 0,
-                malformed = 0;
-  std::vector<Delivered> delivered;  ///< in this order
 };
 
 class Joined {
@@ -54,17 +42,8 @@ class Joined {
   [[nodiscard]] int silences() const noexcept { return silences_; }
 
  private:
-  struct Arrival {
-    std::uint32_t boot, stream, first_rdt;
-    Instant at;
-  };
-  struct Last {
-    bool any = false;
-    std::uint32_t boot = 0, stream = 0, rdt = 0, ft = 0;
-  };
   Instant sample();
   void pump(Instant now);
-  void take_into(Ideal& ideal, Last& last, const Ideal::Delivered& record, const sim::SentDatagram& sent) const;
 
   Manner manner_;
   sim::NetBoxDevice box_;

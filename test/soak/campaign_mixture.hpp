@@ -1,0 +1,47 @@
+// One short campaign and all that goes wrong in it, drawn from a seed.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/clock.hpp"
+
+namespace kphi::soak {
+
+/// From its n-th operation on the disk refuses: so many operations, or all.
+struct DiskRefusal {
+  std::uint64_t from = 1;
+  std::uint64_t operations = 0;  ///< 0: for ever
+};
+
+/// The program is killed, as by kill -9.
+struct Kill {
+  enum class At : std::uint8_t { step, file_operation, prompt };
+  At at = At::step;
+  std::uint64_t number = 1;  ///< of the bench's steps of time, of file operations, of prompts; the first is 1
+};
+
+struct Mixture {
+  std::uint64_t seed = 0;
+  std::string campaign;  ///< YAML
+  std::string bench;     ///< YAML without the path of the fault script
+  std::string faults;    ///< YAML: a whole fault script
+  std::string answers;   ///< what the operator types; then end of file
+  bool answers_are_good = true;
+  std::optional<double> mounted_instead_deg;  ///< at the second mounting the operator says yes and mounts this
+  std::optional<DiskRefusal> disk;
+  std::optional<Kill> kill;
+  std::optional<Instant> interrupt;  ///< Ctrl-C
+
+  /// Nothing at all goes wrong.
+  [[nodiscard]] bool is_clean() const;
+};
+
+[[nodiscard]] Mixture draw(std::uint64_t seed);
+
+/// As a person reads it: a fault script, with all else as comments.
+[[nodiscard]] std::string words(const Mixture& mixture);
+
+}  // namespace kphi::soak

@@ -1,0 +1,408 @@
+#include "test/soak/soak_verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "daq/reduction.hpp"
+#include "daq/zero_limits.hpp"
+#include "drivers/netbox/session.hpp"
+#include "results/campaign_verification.hpp"
+#include "results/journal.hpp"
+#include "results/run_reader.hpp"
+#include "results/steps_csv.hpp"
+#include "test/soak/fault_reach.hpp"
+
+namespace kphi::soak {
+namespace {
+
+using namespace std::chrono_literals;
+using results::Doubt;
+using Lines = std::vector<std::string>;
+
+constexpr double kTrueDensity = 1.225;  // kg/m³, of the simulated bench
+constexpr Duration kHeard = 50ms;
+constexpr Duration kOwnTimeout = 600ms;
+constexpr Duration kOldest = 250ms;
+constexpr Duration kMisplaced = 20ms;  ///< by the clock map and the delays of a wire
+/// What short steps may say of themselves though nothing is wrong: three of them need not tell the lag, and a test of
+/// significance errs at times.
+constexpr auto kNeedNotTell = static_cast<std::uint32_t>(Doubt::lag_unknown);
+constexpr auto kByChance = static_cast<std::uint32_t>(Doubt::unsettled) | static_cast<std::uint32_t>(Doubt::drifted);
+
+struct FileOfRun {
+  std::filesystem::path path;
+  results::RunRecording run;
+};
+
+std::string name_of(const std::filesystem::path& path) { return path.filename().string(); }
+
+/// All that can be read of the runs; what cannot is told.
+std::vector<FileOfRun> read_all(const World& world, Lines& wrong) {
+  std::vector<FileOfRun> files;
+  if (!world.left()) return files;
+  const auto add = [&](const std::filesystem::path& path) {
+    try {
+      files.push_back({path, results::read_run(path)});
+    } catch (const results::RecordError& error) {
+      const bool promised = path.extension() != ".part" ||
+                            std::any_of(world.disk().secured().begin(), world.disk().secured().end(),
+                                        [&](const auto& secured) { return secured.filename() == path.filename(); });
+      if (promised) wrong.push_back(fmt::format("record: {} cannot be read: {}", name_of(path), error.what()));
+    }
+  };
+  for (const auto& path : world.left()->complete_runs()) add(path);
+  for (const auto& path : world.left()->other_runs()) add(path);
+  return files;
+}
+
+// Account.
+
+const Story::Stream* stream_of(const Story& story, const results::RunRecording& run) {
+  if (run.phases.empty()) return nullptr;
+  const Story::Stream* found = nullptr;
+  for (const Story::Stream& stream : story.streams) {
+    if (stream.began.count() <= run.phases.front().time_ns) found = &stream;
+  }
+  return found;
+}
+
+bool same(const results::LoadCellRecord& record, const netbox::test::Ideal::Delivered& true_one) {
+  return record.rdt_sequence == true_one.rdt && record.ft_sequence == true_one.ft &&
+         record.arrival_ns == true_one.arrival.count();
+}
+
+void check_records(const FileOfRun& file, const netbox::test::Ideal& truth, Lines& wrong) {
+  const auto& records = file.run.load_cell;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    if (i < truth.delivered.size() && same(records[i], truth.delivered[i])) continue;
+    wrong.push_back(fmt::format("account: {}: record {} of {} (rdt {}, ft {}, arrived {} ns) is not the one in truth",
+                                name_of(file.path), i, records.size(), records[i].rdt_sequence, records[i].ft_sequence,
+                                records[i].arrival_ns));
+    return;
+  }
+}
+
+void check_numbers(const FileOfRun& file, const Story::Stream& stream, const netbox::test::Ideal& truth, Lines& wrong) {
+  const results::SampleAccount& account = file.run.account;
+  const auto compare = [&](const char* what, std::uint64_t counted, std::uint64_t is) {
+    if (counted != is)
+      wrong.push_back(fmt::format("account: {}: {}: counted {}, in truth {}", name_of(file.path), what, counted, is));
+  };
+  compare("received", account.received, truth.received);
+  compare("records in the file", file.run.load_cell.size(), truth.received);
+  compare("lost in the network", account.lost_network, truth.lost);
+  compare("lost in the host", account.lost_host, 0);
+  compare("sum", account.received + account.lost_network + account.lost_host, account.expected);
+  compare("duplicates", account.duplicates, truth.duplicates);
+  compare("late", account.late, truth.late);
+  compare("stalled", account.stalled, truth.stalled);
+  compare("restarts", account.restarts, truth.restarts);
+  compare("reboots", account.reboots, truth.reboots);
+  compare("irregular", account.irregular, truth.irregular);
+  if (account.malformed > stream.malformed.size()) compare("malformed", account.malformed, stream.malformed.size());
+}
+
+void check_account(World& world, const std::vector<FileOfRun>& files, Lines& wrong) {
+  if (!world.bench()) return;
+  const sim::WireTruth& wire = world.bench()->simulation().wire().truth();
+  for (const FileOfRun& file : files) {
+    const Story::Stream* stream = stream_of(world.story(), file.run);
+    if (stream == nullptr) continue;
+    const auto truth = netbox::test::ideal_of(wire, stream->arrivals, file.run.header.load_cell.ft_stride,
+                                              netbox::StreamSettings{}.reorder_patience);
+    check_records(file, truth, wrong);
+    if (file.path.extension() != ".part") check_numbers(file, *stream, truth, wrong);
+  }
+}
+
+// Motion.
+
+/// When the power stage was open for good.
+Instant coasting_since(const Story& story) {
+  if (story.stages.empty()) return Instant{0};
+  if (story.stages.back().mode != sim::PowerStage::Mode::coast) return kNever;
+  return story.stages.size() == 1 ? Instant{0} : story.stages.back().at;
+}
+
+void check_end_of_motion(const World& world, const Reaches& reaches, Lines& wrong) {
+  const Story& story = world.story();
+  const Instant since = coasting_since(story);
+  const Instant decided = story.end == End::killed ? story.ended : story.last_good_tick + 10ms;
+  const bool alone = story.end == End::killed || reaches.line_silenced(decided - kOwnTimeout, decided + kOwnTimeout);
+  const Duration limit = alone ? kOwnTimeout : kHeard;
+  if (story.end == End::finished) return;
+  if (since == kNever)
+    wrong.push_back("motion: the motor never coasts");
+  else if (since > decided + limit)
+    wrong.push_back(fmt::format(
+        "motion: coasts {:.0f} ms after {}, {:.0f} ms are allowed", 1e3 * to_seconds(since - decided),
+        story.end == End::killed ? "the kill" : "the last look that found all well", 1e3 * to_seconds(limit)));
+}
+
+/// Arrivals of any stream, by time.
+void check_freshness(const World& world, Lines& wrong) {
+  std::vector<Instant> arrivals;
+  for (const auto& stream : world.story().streams)
+    for (const auto& arrival : stream.arrivals) arrivals.push_back(arrival.at);
+  std::sort(arrivals.begin(), arrivals.end());
+  const auto& stages = world.story().stages;
+  const Instant end = world.story().ended;
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    if (stages[i].mode != sim::PowerStage::Mode::drive || stages[i].at > end) continue;
+    const Instant until = std::min(end, i + 1 < stages.size() ? stages[i + 1].at : end);
+    Instant last = stages[i].at;
+    const auto note = [&](Instant at) {
+      if (at - last > kOldest)
+        wrong.push_back(fmt::format("motion: driven at {:.3f} s though no record came for {:.3f} s", to_seconds(at),
+                                    to_seconds(at - last)));
+      last = at;
+    };
+    for (auto at = std::lower_bound(arrivals.begin(), arrivals.end(), stages[i].at);
+         at != arrivals.end() && *at < until; ++at)
+      note(*at);
+    note(until);
+  }
+}
+
+void check_motion(const World& world, const Reaches& reaches, Lines& wrong) {
+  for (const std::string& line : world.story().danger) wrong.push_back("motion: " + line);
+  check_end_of_motion(world, reaches, wrong);
+  if (world.story().end != End::killed) check_freshness(world, wrong);
+}
+
+// Record.
+
+/// Finished, renamed, and killed or refused before the journal could tell.
+bool is_unannounced(const std::string& problem) {
+  return problem.find("the journal holds no SHA-256 of it") != std::string::npos;
+}
+
+void check_folder(const World& world, Lines& wrong) {
+  const bool cut_short = world.story().end == End::killed || world.disk().refused() > 0;
+  int unannounced = 0;
+  for (const std::string& problem : results::verify_campaign(*world.left()).problems) {
+    if (cut_short && is_unannounced(problem) && ++unannounced == 1) continue;
+    wrong.push_back("record: " + problem);
+  }
+  for (const auto& path : world.left()->other_runs()) {
+    if (path.extension() == ".part") {
+      if (!cut_short) wrong.push_back(fmt::format("record: {} is left over", name_of(path)));
+      continue;
+    }
+    for (const std::string& problem : results::verify_run(path).problems)
+      wrong.push_back(fmt::format("record: {}: {}", name_of(path), problem));
+  }
+}
+
+/// Events of the journal's accepted runs, in their order.
+std::vector<std::string> accepted_runs(const results::JournalReading& journal) {
+  std::vector<std::string> names;
+  for (const auto& entry : journal.entries)
+    if (entry.event == results::kRunAccepted) names.push_back(entry.data.at("file").get<std::string>());
+  return names;
+}
+
+void check_steps(const World& world, const results::JournalReading& journal, Lines& wrong) {
+  if (world.story().end == End::killed || world.disk().refused() > 0) return;  // between two files
+  std::vector<results::StepMean> again;
+  for (const std::string& name : accepted_runs(journal))
+    for (const auto& step : daq::reduce(results::read_run(world.left()->path() / name))) again.push_back(step);
+  if (again.empty()) return;
+  if (results::format_steps(again) != results::read_text(world.left()->steps()))
+    wrong.push_back("record: steps.csv is not the reduction of the accepted runs");
+}
+
+void check_journal(const World& world, const results::JournalReading& journal, Lines& wrong) {
+  const Story& story = world.story();
+  if (story.end == End::killed || world.disk().refused() > 0) return;
+  const std::string expected = story.end == End::finished ? "campaign_finished" : "campaign_stopped";
+  if (journal.entries.empty() || journal.entries.back().event != expected)
+    return wrong.push_back(fmt::format("record: the journal does not end with {}", expected));
+  if (story.end != End::finished && journal.entries.back().data.value("reason", "") != story.reason)
+    wrong.push_back("record: the journal ends with another reason than the campaign");
+}
+
+void check_record(const World& world, Lines& wrong) {
+  if (!world.left() || !std::filesystem::exists(world.left()->journal())) return;
+  check_folder(world, wrong);
+  const auto journal = results::read_journal(world.left()->journal());
+  check_steps(world, journal, wrong);
+  check_journal(world, journal, wrong);
+}
+
+// Verdict.
+
+struct Means {
+  double speed = 0, thrust = 0;
+  std::size_t n = 0;
+};
+
+Means true_means(const Story& story, double begin_s, double end_s) {
+  Means means;
+  for (const auto& moment : story.moments) {
+    const double at = to_seconds(moment.at);
+    if (at < begin_s || at > end_s) continue;
+    means.speed += moment.speed_rad_s;
+    means.thrust += moment.thrust_n;
+    ++means.n;
+  }
+  if (means.n > 0) means.speed /= static_cast<double>(means.n), means.thrust /= static_cast<double>(means.n);
+  return means;
+}
+
+std::string step_name(const FileOfRun& file, const results::StepMean& step) {
+  return fmt::format("verdict: {} step {}", name_of(file.path), step.step);
+}
+
+void check_truth(const World& world, const FileOfRun& file, const results::StepMean& step, Lines& wrong) {
+  const Means truth = true_means(world.story(), step.window_begin_s, step.window_end_s);
+  if (truth.n < 10) return;
+  const double allowed_thrust = 6 * step.thrust_u_n + daq::tolerated_drift(truth.thrust) + 0.003 * truth.thrust;
+  const double allowed_speed = 6 * step.speed_u_rad_s + 0.003 * truth.speed + 1;
+  if (!(std::abs(step.thrust_n - truth.thrust) <= allowed_thrust))
+    wrong.push_back(fmt::format("{}: {:.4f} N without a doubt, in truth {:.4f} N (u {:.4f})", step_name(file, step),
+                                step.thrust_n, truth.thrust, step.thrust_u_n));
+  if (!(std::abs(step.speed_rad_s - truth.speed) <= allowed_speed))
+    wrong.push_back(fmt::format("{}: {:.2f} rad/s without a doubt, in truth {:.2f} rad/s (u {:.2f})",
+                                step_name(file, step), step.speed_rad_s, truth.speed, step.speed_u_rad_s));
+}
+
+/// Samples that the box took well inside the window and sent, and that are not in the file.
+void check_missing(World& world, const FileOfRun& file, const results::StepMean& step, Lines& wrong) {
+  if ((step.doubts & static_cast<std::uint32_t>(Doubt::lost_samples)) != 0) return;
+  const Instant begin = from_seconds(step.window_begin_s) + kMisplaced,
+                end = from_seconds(step.window_end_s) - kMisplaced;
+  const sim::WireTruth& wire = world.bench()->simulation().wire().truth();
+  for (const auto& sent : wire.log) {
+    if (sent.arrivals > 0 || sent.records == 0) continue;
+    const Instant first = wire.sampled[sent.first_sample], last = wire.sampled[sent.first_sample + sent.records - 1];
+    if (last < begin || first > end) continue;
+    return wrong.push_back(
+        fmt::format("{}: records are missing in its window, it does not say so", step_name(file, step)));
+  }
+}
+
+/// The module's supply truly was outside of what the campaign tolerates, or at its edge, around the step's window.
+bool supply_was_out_of_band(const World& world, const results::StepMean& step) {
+  constexpr double kBand = 0.095;
+  const double set = world.campaign().supply.value();
+  return std::any_of(world.story().moments.begin(), world.story().moments.end(), [&](const Story::Moment& moment) {
+    const double at = to_seconds(moment.at);
+    return at > step.window_begin_s - 0.1 && at < step.window_end_s && std::abs(moment.supply_v / set - 1) > kBand;
+  });
+}
+
+std::string names(const std::vector<results::StepMean>& steps) {
+  std::string all;
+  for (const auto& step : steps) all += (all.empty() ? "" : ", ") + ("\"" + results::doubt_names(step.doubts) + "\"");
+  return all;
+}
+
+void check_run(World& world, const FileOfRun& file, const Reaches& reaches, Verdict& verdict) {
+  const auto& run = file.run;
+  if (run.outcome != results::Outcome::complete || run.phases.empty()) return;
+  const Instant begin(run.phases.front().time_ns), end(run.phases.back().time_ns);
+  const bool clean = !reaches.any(begin - 200ms, end);
+  const auto steps = daq::reduce(run);
+  std::uint32_t doubts = 0;
+  for (const auto& step : steps) {
+    doubts |= step.doubts;
+    if (supply_was_out_of_band(world, step)) doubts &= ~static_cast<std::uint32_t>(Doubt::supply_out_of_band);
+    if ((step.doubts & ~kNeedNotTell) == 0) check_truth(world, file, step, verdict.wrong);
+    check_missing(world, file, step, verdict.wrong);
+    verdict.clean_steps += clean;
+    verdict.clean_steps_in_doubt += clean && (step.doubts & kByChance) != 0;
+  }
+  if (steps.size() != static_cast<std::size_t>(world.campaign().profile.steps))
+    verdict.wrong.push_back(fmt::format("verdict: {} has {} steps", name_of(file.path), steps.size()));
+  if (clean && (doubts & ~(kNeedNotTell | kByChance)) != 0)
+    verdict.wrong.push_back(
+        fmt::format("verdict: {} is out of reach of every fault, its doubts are {}", name_of(file.path), names(steps)));
+}
+
+bool mentions(const std::string& reason, std::initializer_list<const char*> any) {
+  return std::any_of(any.begin(), any.end(), [&](const char* word) { return reason.find(word) != std::string::npos; });
+}
+
+/// Whose trouble the reason tells of.
+std::optional<Device> device_of(const std::string& whole_reason) {
+  const std::string reason = whole_reason.substr(0, whole_reason.find(';'));
+  if (mentions(reason, {"supply:"})) return Device::supply;
+  if (mentions(reason, {"sensor of the air", "BME280"})) return Device::air;
+  if (mentions(reason, {"Net Box", "load cell", "load-cell", "thrust"})) return Device::load_cell;
+  if (mentions(reason, {"IQ module", "motor", "rotor", "speed", "coil", "RPM", "supply current"})) return Device::motor;
+  return std::nullopt;
+}
+
+void check_reason(const World& world, const Reaches& reaches, Lines& wrong) {
+  const Story& story = world.story();
+  // The audit's word on a rate that does not suit the steps; nothing has turned.
+  if (story.end == End::refused && mentions(story.reason, {"folded into a constant force"})) return;
+  const auto blame = device_of(story.reason);
+  const std::string told = fmt::format("verdict: {}, \"{}\"", name_of(story.end), story.reason);
+  if (!blame) return wrong.push_back(told + " names no device");
+  const Instant until = story.ended + 500ms;  // a bench that could not be made has no time
+  const bool motor_or_supply =
+      reaches.any(Device::motor, Instant{0}, until) || reaches.any(Device::supply, Instant{0}, until);
+  const bool right = *blame == Device::load_cell ? reaches.any(Device::load_cell, Instant{0}, until) : motor_or_supply;
+  if (!right) wrong.push_back(told + ", where no fault of that device was");
+}
+
+void check_end(const World& world, const Reaches& reaches, Lines& wrong) {
+  const Story& story = world.story();
+  const Mixture& mixture = world.mixture();
+  const auto unless = [&](bool right) {
+    if (!right) wrong.push_back(fmt::format("verdict: {}, \"{}\": why?", name_of(story.end), story.reason));
+  };
+  switch (story.end) {
+    case End::finished:
+      return unless(mixture.answers_are_good);
+    case End::stopped:
+    case End::refused:
+      return check_reason(world, reaches, wrong);
+    case End::disk:
+      return unless(world.disk().refused() > 0 && mentions(story.reason, {"disk full"}));
+    case End::interrupted:
+      return unless(mixture.interrupt.has_value());
+    case End::not_mounted:
+      return unless(!mixture.answers_are_good);
+    case End::killed:
+      return unless(mixture.kill.has_value());
+    case End::unknown:
+      return unless(false);
+  }
+}
+
+/// With a sensor every run knows its air: no fault here lasts until the newest reading is too old.
+void check_air(const World& world, const FileOfRun& file, Lines& wrong) {
+  const double density = file.run.header.air_density_kg_m3;
+  const bool right = world.place().ambient.sensor.empty() ? density == 0 : std::abs(density / kTrueDensity - 1) < 0.005;
+  if (!right) wrong.push_back(fmt::format("verdict: {}: air of {} kg/m³", name_of(file.path), density));
+}
+
+void check_verdict(World& world, const std::vector<FileOfRun>& files, const Reaches& reaches, Verdict& verdict) {
+  check_end(world, reaches, verdict.wrong);
+  if (!world.bench()) return;
+  for (const FileOfRun& file : files) {
+    check_run(world, file, reaches, verdict);
+    check_air(world, file, verdict.wrong);
+  }
+}
+
+}  // namespace
+
+Verdict judge(World& world) {
+  Verdict verdict;
+  Lines& wrong = verdict.wrong;
+  const Reaches reaches(world.mixture().faults);
+  const auto files = read_all(world, wrong);
+  check_account(world, files, wrong);
+  check_motion(world, reaches, wrong);
+  check_record(world, wrong);
+  check_verdict(world, files, reaches, verdict);
+  return verdict;
+}
+
+}  // namespace kphi::soak

@@ -1,0 +1,33 @@
+// What must be true of every campaign, whatever went wrong in it: what is false is told, one line each.
+//
+// Account   Every record in a run's file is one that the box sent and that reached the stream's session, in order and
+//           with its arrival; all numbers of the account are those of a perfect driver; received + lost = expected.
+// Motion    At every prompt the motor coasts. From the last look that found all well, the power stage is open within
+//           50 ms where the module could hear, within 0.6 s where only its own time-out was left; likewise after a
+//           kill. While it drives, a record of the load cell has arrived within the last 0.25 s.
+// Record    The folder verifies; aborted runs are whole and say why; steps.csv is the reduction of the accepted runs.
+//           After a kill or with a refusing disk: all accepted runs are whole, the journal's chain is right, what was
+//           secured can be read, and at most one run is finished that the journal does not know yet.
+// Verdict   A step without a doubt shows the true thrust and speed. A step in whose window a record is missing says so.
+//           A run out of reach of every fault is accepted without a doubt, but for those that short steps may have:
+//           the lag unknown, and now and then unsettled or drifting, which are counted. Nothing but a fault, the disk
+//           or the operator ends a campaign; the reason names the device concerned.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "test/soak/soak_world.hpp"
+
+namespace kphi::soak {
+
+struct Verdict {
+  std::vector<std::string> wrong;
+  int clean_steps = 0;           ///< out of reach of every fault
+  int clean_steps_in_doubt = 0;  ///< of them, that a test of significance found unsettled or drifting
+};
+
+/// `world` has lived.
+[[nodiscard]] Verdict judge(World& world);
+
+}  // namespace kphi::soak

@@ -1,0 +1,103 @@
+// One mixture lived through on the deterministic bench, watched from outside.
+#pragma once
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daq/campaign_run.hpp"
+#include "daq/deterministic_bench.hpp"
+#include "test/drivers/netbox_faults/ideal.hpp"
+#include "test/soak/campaign_mixture.hpp"
+#include "test/soak/spoilt_disk.hpp"
+#include "test/temporary_folder.hpp"
+
+namespace kphi::soak {
+
+/// Thrown where a program dies by kill -9: no handler of the program's knows it.
+struct Killed {};
+
+enum class End { finished, stopped, refused, disk, interrupted, not_mounted, killed, unknown };
+[[nodiscard]] const char* name_of(End end) noexcept;
+
+/// What was true, in bench time.
+struct Story {
+  struct StageChange {
+    Instant at;
+    sim::PowerStage::Mode mode;
+  };
+  struct Moment {
+    Instant at;
+    double speed_rad_s;  ///< unsigned
+    double thrust_n;     ///< without noise and zero
+    double supply_v;     ///< at the module
+  };
+  struct Stream {
+    Instant began;
+    std::vector<netbox::test::Arrival> arrivals;
+    std::vector<Instant> malformed;
+  };
+  std::vector<StageChange> stages;
+  std::vector<Moment> moments;
+  std::vector<Stream> streams;
+  std::vector<std::string> said;
+  std::vector<std::string> danger;  ///< seen on the spot
+  Instant last_good_tick{0};        ///< when the runner looked at everything last and went on
+  Instant ended{0};
+  End end = End::unknown;
+  std::string reason;  ///< of the exception
+};
+
+class World {
+ public:
+  /// `quick_folder`: for what the campaign writes.
+  World(const Mixture& mixture, const std::filesystem::path& quick_folder);
+  ~World();
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
+
+  /// The campaign, to whatever end; then the devices by themselves for a second.
+  void live();
+
+  [[nodiscard]] const Mixture& mixture() const noexcept { return mixture_; }
+  [[nodiscard]] const Story& story() const noexcept { return story_; }
+  [[nodiscard]] const SpoiltDisk& disk() const noexcept { return disk_; }
+  [[nodiscard]] const profiles::Campaign& campaign() const noexcept { return campaign_; }
+  [[nodiscard]] const profiles::Bench& place() const noexcept { return place_; }
+  /// nullptr: it could not be made.
+  [[nodiscard]] daq::DeterministicBench* bench() noexcept { return bench_.get(); }
+  /// What is left of the campaign; after a kill as it was at that moment, whatever destructors did later. Nothing: it
+  /// did not come so far.
+  [[nodiscard]] const std::optional<results::CampaignFolder>& left() const noexcept { return left_; }
+
+ private:
+  class Watch;
+  class Person;
+  void begin();
+  void campaign_to_its_end();
+  void step();
+  void look();
+  void at_operation(std::uint64_t number);
+  void at_prompt();
+  void kill_at(Kill::At at, std::uint64_t number);
+  void keep_what_the_disk_holds();
+
+  const Mixture mixture_;
+  test::TemporaryFolder folder_;
+  SpoiltDisk disk_;
+  profiles::Campaign campaign_;
+  profiles::Bench place_;
+  std::unique_ptr<daq::DeterministicBench> bench_;
+  std::optional<results::CampaignFolder> written_, left_;
+  Story story_;
+  std::uint64_t steps_ = 0, prompts_ = 0;
+  bool killed_ = false, lie_is_due_ = false;
+};
+
+/// Where files cost least: memory, when the system offers it.
+[[nodiscard]] std::filesystem::path quick_folder();
+
+}  // namespace kphi::soak
