@@ -3,20 +3,18 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "daq/event_doubts.hpp"
 
 namespace kphi::daq {
 namespace {
 
-using results::LoadCellRecord;
 using results::Nanoseconds;
-
-constexpr std::uint32_t kMonitorBit = 1u << 16;  // a condition the user set; raises the summary bit, too
-constexpr std::uint32_t kSummaryBit = 1u << 31;
 
 constexpr Nanoseconds kBin = 10'000'000;
 constexpr double kLeastSamplesPerBin = 2;
+constexpr std::size_t kBlock = 1024;  // records looked at together
 
 CountMean mean_of(const CountSums& sums, std::int32_t origin, std::uint64_t samples) {
   if (samples == 0) return {std::numeric_limits<double>::quiet_NaN(), 0};
@@ -27,13 +25,35 @@ CountMean mean_of(const CountSums& sums, std::int32_t origin, std::uint64_t samp
   return {mean, std::sqrt(static_cast<double>(spread) / n / (n - 1))};
 }
 
-bool constant(const CountSums& sums, std::uint32_t n) {
-  return sums.squares * n == static_cast<Wide>(sums.sum) * sums.sum;
+std::uint32_t stride_of(const results::RunHeader& header) { return std::max(header.load_cell.ft_stride, 1u); }
+
+/// Where ft_sequence advances by `least` or more.
+std::vector<std::size_t> advances(std::span<const std::uint32_t> ft, std::uint32_t least) {
+  std::vector<std::size_t> found;
+  for (std::size_t begin = 1; begin < ft.size(); begin += kBlock) {
+    const std::size_t end = std::min(begin + kBlock, ft.size());
+    int any = 0;
+    for (std::size_t i = begin; i < end; ++i) any |= static_cast<int>(ft[i] - ft[i - 1] >= least);
+    for (std::size_t i = begin; any != 0 && i < end; ++i) {
+      if (ft[i] - ft[i - 1] >= least) found.push_back(i);
+    }
+  }
+  return found;
+}
+
+CountFrame frame_of(const results::RunHeader& header) {
+  CountFrame frame;
+  frame.axis = static_cast<std::size_t>(header.thrust_axis);
+  const auto& scale = header.load_cell;
+  for (std::size_t i = 0; i < frame.limits.size(); ++i) {
+    const double counts = scale.range[i] * (i < 3 ? scale.counts_per_newton : scale.counts_per_newton_metre);
+    const double full = std::numeric_limits<std::int32_t>::max();
+    frame.limits[i] = static_cast<std::int32_t>(counts > 0 && counts < full ? counts : full);
+  }
+  return frame;
 }
 
 }  // namespace
-
-bool CellBin::frozen() const { return n > 1 && constant(force, n) && constant(torque, n); }
 
 double CellBins::Gap::up_to(double time_ns) const {
   return std::clamp(std::ceil((time_ns - before_ns) / period_ns) - 1, 0.0, static_cast<double>(missing));
@@ -51,13 +71,13 @@ std::size_t CellBins::first_from(Nanoseconds time) const {
 double CellBins::force(std::size_t bin) const {
   const CellBin& b = bins_[bin];
   if (2.0 * b.n < expected_ || b.n == 0) return std::numeric_limits<double>::quiet_NaN();
-  return force_origin_ + static_cast<double>(b.force.sum) / b.n;
+  return frame_.force_origin + static_cast<double>(b.force.sum) / b.n;
 }
 
 double CellBins::torque(std::size_t bin) const {
   const CellBin& b = bins_[bin];
   if (2.0 * b.n < expected_ || b.n == 0) return std::numeric_limits<double>::quiet_NaN();
-  return torque_origin_ + static_cast<double>(b.torque.sum) / b.n;
+  return frame_.torque_origin + static_cast<double>(b.torque.sum) / b.n;
 }
 
 CellWindow CellBins::over(std::size_t first, std::size_t last) const {
@@ -76,8 +96,8 @@ CellWindow CellBins::over(std::size_t first, std::size_t last) const {
     if (!goes_on) frozen_since = bin.frozen() ? i : i + 1;
     found.frozen |= static_cast<double>(i + 1 - frozen_since) * bin_s() >= kFrozenSpan;
   }
-  found.force = mean_of(force, force_origin_, found.n);
-  found.torque = mean_of(torque, torque_origin_, found.n);
+  found.force = mean_of(force, frame_.force_origin, found.n);
+  found.torque = mean_of(torque, frame_.torque_origin, found.n);
   const Window whole = window(first, last);
   for (const Gap& gap : gaps_) {
     found.lost += static_cast<std::uint64_t>(gap.up_to(static_cast<double>(whole.end)) -
@@ -86,18 +106,14 @@ CellWindow CellBins::over(std::size_t first, std::size_t last) const {
   return found;
 }
 
-CellStream::CellStream(const results::RunRecording& run)
+CellStream::CellStream(const results::RunRecording& run, std::unique_ptr<results::LoadCellColumns> columns)
     : header_(run.header),
-      records_(run.load_cell),
-      clock_(run.load_cell, run.header.load_cell.device_rate_hz, stall_ends(run.events)) {
+      columns_(columns ? std::move(columns) : std::make_unique<results::RecordedColumns>(run.load_cell)),
+      clock_(columns_->stamps(), run.header.load_cell.device_rate_hz, stall_ends(run.events)),
+      gaps_(advances(clock_.ft_sequence(), 2 * stride_of(run.header))),
+      frame_(frame_of(run.header)) {
   for (const ClockEpoch& epoch : clock_.epochs()) {
     if (epoch.rebooted) reboots_.push_back(clock_.time_ns(epoch, epoch.begin));
-  }
-  const auto& scale = header_.load_cell;
-  for (std::size_t i = 0; i < limits_.size(); ++i) {
-    const double counts = scale.range[i] * (i < 3 ? scale.counts_per_newton : scale.counts_per_newton_metre);
-    const double full = std::numeric_limits<std::int32_t>::max();
-    limits_[i] = static_cast<std::int32_t>(counts > 0 && counts < full ? counts : full);
   }
 }
 
@@ -118,6 +134,7 @@ CellBins CellStream::bins(const Window& window) const {
   const double sparse = rate > 0 ? std::ceil(kLeastSamplesPerBin * 1e9 / rate) : 0;
   bins.begin_ = window.begin;
   bins.width_ = std::max(kBin, static_cast<Nanoseconds>(sparse));
+  bins.frame_ = frame_;
   bins.expected_ = 1e-9 * static_cast<double>(bins.width_) * rate;
   if (window.end <= window.begin) return bins;
   bins.bins_.resize(static_cast<std::size_t>((window.end - window.begin) / bins.width_));
@@ -126,55 +143,31 @@ CellBins CellStream::bins(const Window& window) const {
   for (const ClockEpoch& epoch : clock_.epochs()) {
     const std::size_t begin = clock_.first_at(epoch, whole.begin);
     const std::size_t end = clock_.first_at(epoch, whole.end);
-    find_gaps(epoch, begin, end, bins);
+    take_gaps(epoch, begin, end, bins);
     if (begin == end) continue;
     if (first) {
-      const auto axis = static_cast<std::size_t>(header_.thrust_axis);
-      bins.force_origin_ = records_[begin].counts[axis];
-      bins.torque_origin_ = records_[begin].counts[axis + 3];
+      const auto& counts = columns_->rows(begin, begin + 1).counts[0];
+      bins.frame_.force_origin = counts[frame_.axis];
+      bins.frame_.torque_origin = counts[frame_.axis + 3];
       first = false;
     }
     std::size_t from = begin;
     for (std::size_t i = 0; i < bins.size() && from < end; ++i) {
       const std::size_t to = clock_.first_at(epoch, bins.window(i, i + 1).end, from, end);
-      add(from, to, bins.bins_[i], bins);
+      bins.bins_[i].add(columns_->rows(from, to), bins.frame_);
       from = to;
     }
   }
   return bins;
 }
 
-void CellStream::add(std::size_t begin, std::size_t end, CellBin& bin, const CellBins& bins) const {
-  const auto axis = static_cast<std::size_t>(header_.thrust_axis);
-  CountSums force, torque;
-  std::uint32_t status = 0;
-  bool at_limit = false;
-  for (std::size_t r = begin; r < end; ++r) {
-    const LoadCellRecord& record = records_[r];
-    force.add(static_cast<std::int64_t>(record.counts[axis]) - bins.force_origin_);
-    torque.add(static_cast<std::int64_t>(record.counts[axis + 3]) - bins.torque_origin_);
-    if (record.status != (kSummaryBit | kMonitorBit)) status |= record.status;
-    for (std::size_t i = 0; i < 6; ++i) {
-      at_limit |= static_cast<bool>(static_cast<int>(record.counts[i] >= limits_[i]) |
-                                    static_cast<int>(record.counts[i] <= -limits_[i]));
-    }
-  }
-  bin.force.add(force);
-  bin.torque.add(torque);
-  bin.n += static_cast<std::uint32_t>(end - begin);
-  bin.status |= status;
-  bin.at_limit |= at_limit;
-}
-
 /// Gaps inside the window and across its ends.
-void CellStream::find_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const {
-  const std::uint32_t stride = std::max(header_.load_cell.ft_stride, 1u);
+void CellStream::take_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const {
   const std::size_t from = std::max(begin, epoch.begin + 1);
   const std::size_t to = std::min(end + 1, epoch.end);
-  for (std::size_t i = from; i < to; ++i) {
-    const std::uint32_t advance = records_[i].ft_sequence - records_[i - 1].ft_sequence;
-    if (advance < 2 * stride) continue;
-    const std::uint32_t missing = advance / stride - 1;
+  for (auto gap = std::lower_bound(gaps_.begin(), gaps_.end(), from); gap != gaps_.end() && *gap < to; ++gap) {
+    const std::size_t i = *gap;
+    const std::uint32_t missing = (clock_.ft_sequence()[i] - clock_.ft_sequence()[i - 1]) / stride_of(header_) - 1;
     const Nanoseconds before = clock_.time_ns(epoch, i - 1);
     const double period = static_cast<double>(clock_.time_ns(epoch, i) - before) / (missing + 1.0);
     bins.gaps_.push_back({static_cast<double>(before), period, missing});

@@ -1,42 +1,17 @@
-// The load cell of one run, with its samples placed in bench time and summed in bins.
-//
-// A bin holds whole numbers: counts about the first sample of its window, and their squares. So any order of adding,
-// any number of threads and any cut into bins gives the same sums, and the same bytes in steps.csv.
+// The load cell of one run, with its samples placed in bench time and summed in bins (cell_bin.hpp).
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "daq/cell_bin.hpp"
 #include "daq/clock_map.hpp"
 #include "daq/window.hpp"
+#include "results/load_cell_columns.hpp"
 #include "results/records.hpp"
 
 namespace kphi::daq {
-
-__extension__ using Wide = __int128;
-
-/// Of one axis, about `origin`.
-struct CountSums {
-  std::int64_t sum = 0;
-  Wide squares = 0;
-  void add(std::int64_t difference) {
-    sum += difference;
-    squares += static_cast<Wide>(difference) * difference;
-  }
-  void add(const CountSums& other) {
-    sum += other.sum;
-    squares += other.squares;
-  }
-};
-
-struct CellBin {
-  CountSums force, torque;
-  std::uint32_t n = 0;
-  std::uint32_t status = 0;           ///< all set bits, without healthy monitor words
-  bool at_limit = false;              ///< a count of some axis at the end of its range
-  [[nodiscard]] bool frozen() const;  ///< more than one sample, and none differs
-};
 
 /// Mean and deviation of one axis, counts; NaN and 0 without samples.
 struct CountMean {
@@ -84,16 +59,15 @@ class CellBins {
   results::Nanoseconds begin_ = 0;
   results::Nanoseconds width_ = 1;
   double expected_ = 0;  ///< samples per bin
-  std::int32_t force_origin_ = 0;
-  std::int32_t torque_origin_ = 0;
+  CountFrame frame_;
   std::vector<CellBin> bins_;
   std::vector<Gap> gaps_;
 };
 
 class CellStream {
  public:
-  /// The recording must outlive the stream.
-  explicit CellStream(const results::RunRecording& run);
+  /// The recording must outlive the stream. Without `columns` its records are taken.
+  explicit CellStream(const results::RunRecording& run, std::unique_ptr<results::LoadCellColumns> columns = nullptr);
 
   /// How often the box had started anew before `time`.
   [[nodiscard]] std::size_t boot_at(results::Nanoseconds time) const;
@@ -102,14 +76,14 @@ class CellStream {
   [[nodiscard]] CellBins bins(const Window& window) const;
 
  private:
-  void add(std::size_t begin, std::size_t end, CellBin& bin, const CellBins& bins) const;
-  void find_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const;
+  void take_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const;
 
   const results::RunHeader& header_;
-  const std::vector<results::LoadCellRecord>& records_;
+  std::unique_ptr<results::LoadCellColumns> columns_;
   ClockMap clock_;
+  std::vector<std::size_t> gaps_;  ///< records before which ft_sequence says that others are missing
   std::vector<results::Nanoseconds> reboots_;
-  std::array<std::int32_t, 6> limits_{};
+  CountFrame frame_;
 };
 
 }  // namespace kphi::daq

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace kphi::daq {
 namespace {
@@ -10,6 +11,8 @@ namespace {
 constexpr double kBinNs = 0.5e9;
 constexpr std::size_t kLeastBins = 4;
 constexpr results::Nanoseconds kNoBreak = std::numeric_limits<results::Nanoseconds>::max();
+constexpr std::uint64_t kCounts = std::uint64_t{1} << 32;  // of ft_sequence
+constexpr std::size_t kBlock = 1024;                       // records looked at together
 
 /// One fresh record: device time, and how much later it arrived than the device's clock says.
 struct Point {
@@ -17,45 +20,62 @@ struct Point {
   double delay_ns;
 };
 
+/// llround, without a call.
+results::Nanoseconds rounded(double value) {
+  const auto whole = static_cast<results::Nanoseconds>(value);
+  const double rest = value - static_cast<double>(whole);
+  return whole + static_cast<int>(rest >= 0.5) - static_cast<int>(rest <= -0.5);
+}
+
+/// Whether each of `n` records has counted on since the one before it. Signed difference: the wrap of the 32-bit
+/// counter goes forward, a restart of the box back.
+bool counts_on(const std::uint32_t* ft, std::size_t n) {
+  std::int32_t back = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    back |= static_cast<std::int32_t>(static_cast<std::int32_t>(ft[i] - ft[i - 1]) <= 0);
+  return back == 0;
+}
+
 }  // namespace
 
-ClockMap::ClockMap(std::span<const results::LoadCellRecord> records, double device_rate_hz,
-                   std::span<const results::Nanoseconds> breaks)
-    : records_(records), tick_ns_(1e9 / device_rate_hz) {
-  // Signed difference: the wrap of the 32-bit counter goes forward, a restart of the box back.
-  const auto counts_on = [&](std::size_t i) {
-    return static_cast<std::int32_t>(records[i].ft_sequence - records[i - 1].ft_sequence) > 0;
-  };
-  for (std::size_t begin = 0; begin < records.size();) {
-    while (!breaks.empty() && breaks.front() <= records[begin].arrival_ns) breaks = breaks.subspan(1);
-    const results::Nanoseconds next_break = breaks.empty() ? kNoBreak : breaks.front();
-    std::size_t end = begin + 1;
-    while (end < records.size() && counts_on(end) && records[end].arrival_ns < next_break) ++end;
+ClockMap::ClockMap(results::LoadCellStamps stamps, double device_rate_hz, std::span<const results::Nanoseconds> breaks)
+    : stamps_(std::move(stamps)), tick_ns_(1e9 / device_rate_hz) {
+  const auto& ft = stamps_.ft_sequence;
+  for (std::size_t begin = 0; begin < ft.size();) {
+    while (!breaks.empty() && breaks.front() <= stamps_.arrival_ns[begin]) breaks = breaks.subspan(1);
     ClockEpoch epoch;
-    epoch.rebooted = begin > 0 && !counts_on(begin);
+    epoch.rebooted = begin > 0 && !counts_on(&ft[begin], 1);
     epoch.begin = begin;
-    epoch.end = end;
-    epoch.ft_first = records[begin].ft_sequence;
+    epoch.end = counting_until(begin, breaks.empty() ? kNoBreak : breaks.front());
+    epoch.ft_first = ft[begin];
     fit(epoch);
     epochs_.push_back(epoch);
-    begin = end;
+    begin = epoch.end;
   }
 }
 
-double ClockMap::device_ns(const ClockEpoch& epoch, std::size_t index) const {
-  return static_cast<double>(records_[index].ft_sequence - epoch.ft_first) * tick_ns_;
+std::size_t ClockMap::counting_until(std::size_t begin, results::Nanoseconds next_break) const {
+  const auto& ft = stamps_.ft_sequence;
+  std::size_t end = begin + 1;
+  while (next_break == kNoBreak && end + kBlock <= ft.size() && counts_on(&ft[end], kBlock)) end += kBlock;
+  while (end < ft.size() && counts_on(&ft[end], 1) && stamps_.arrival_ns[end] < next_break) ++end;
+  return end;
+}
+
+std::uint32_t ClockMap::count(const ClockEpoch& epoch, std::size_t index) const {
+  return stamps_.ft_sequence[index] - epoch.ft_first;
 }
 
 /// Of a datagram of many records only the last is fresh: the others waited for it.
 bool ClockMap::fresh(const ClockEpoch& epoch, std::size_t index) const {
-  return index + 1 == epoch.end || records_[index + 1].arrival_ns != records_[index].arrival_ns;
+  return index + 1 == epoch.end || stamps_.arrival_ns[index + 1] != stamps_.arrival_ns[index];
 }
 
 void ClockMap::fit(ClockEpoch& epoch) const {
-  const results::Nanoseconds first_arrival = records_[epoch.begin].arrival_ns;
+  const results::Nanoseconds first_arrival = stamps_.arrival_ns[epoch.begin];
   const auto point = [&](std::size_t i) {
-    const double device = device_ns(epoch, i);
-    return Point{device, static_cast<double>(records_[i].arrival_ns - first_arrival) - device};
+    const double device = static_cast<double>(count(epoch, i)) * tick_ns_;
+    return Point{device, static_cast<double>(stamps_.arrival_ns[i] - first_arrival) - device};
   };
   std::vector<Point> bins;
   double bin_end = -1;
@@ -95,16 +115,42 @@ void ClockMap::fit(ClockEpoch& epoch) const {
 double ClockMap::residual_p99_ns(const ClockEpoch& epoch) const {
   std::vector<double> residuals;
   for (std::size_t i = epoch.begin; i < epoch.end; ++i) {
-    if (fresh(epoch, i)) residuals.push_back(static_cast<double>(records_[i].arrival_ns - time_ns(epoch, i)));
+    if (fresh(epoch, i)) residuals.push_back(static_cast<double>(stamps_.arrival_ns[i] - time_ns(epoch, i)));
   }
   const auto p99 = residuals.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(residuals.size() - 1));
   std::nth_element(residuals.begin(), p99, residuals.end());
   return *p99;
 }
 
+results::Nanoseconds ClockMap::time_of_count(const ClockEpoch& epoch, std::uint64_t count) const {
+  const double device = static_cast<double>(count) * tick_ns_;
+  return rounded(epoch.offset_ns + device + epoch.skew * device);
+}
+
 results::Nanoseconds ClockMap::time_ns(const ClockEpoch& epoch, std::size_t index) const {
-  const double device = device_ns(epoch, index);
-  return std::llround(epoch.offset_ns + device + epoch.skew * device);
+  return time_of_count(epoch, count(epoch, index));
+}
+
+/// The first count since the begin of the epoch that lies at or after `time`; kCounts when there is none.
+std::uint64_t ClockMap::count_at(const ClockEpoch& epoch, results::Nanoseconds time) const {
+  std::uint64_t low = 0, high = kCounts;
+  const double guess = (static_cast<double>(time) - epoch.offset_ns) / (tick_ns_ * (1 + epoch.skew));
+  if (guess > 2 && guess < static_cast<double>(kCounts - 2)) {
+    const auto near = static_cast<std::uint64_t>(guess);
+    if (time_of_count(epoch, near - 2) < time && time_of_count(epoch, near + 2) >= time) {
+      low = near - 1;
+      high = near + 2;
+    }
+  }
+  while (low < high) {
+    const std::uint64_t middle = low + (high - low) / 2;
+    if (time_of_count(epoch, middle) < time) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  return low;
 }
 
 std::size_t ClockMap::first_at(const ClockEpoch& epoch, results::Nanoseconds time) const {
@@ -113,22 +159,18 @@ std::size_t ClockMap::first_at(const ClockEpoch& epoch, results::Nanoseconds tim
 
 std::size_t ClockMap::first_at(const ClockEpoch& epoch, results::Nanoseconds time, std::size_t begin,
                                std::size_t end) const {
+  const std::uint64_t wanted = count_at(epoch, time);
   std::size_t low = begin;
   std::size_t stride = 1;
-  while (low + stride < end && time_ns(epoch, low + stride) < time) {
+  while (low + stride < end && count(epoch, low + stride) < wanted) {
     low += stride;
     stride *= 2;
   }
-  std::size_t high = std::min(low + stride, end);
-  while (low < high) {
-    const std::size_t middle = low + (high - low) / 2;
-    if (time_ns(epoch, middle) < time) {
-      low = middle + 1;
-    } else {
-      high = middle;
-    }
-  }
-  return low;
+  const auto first = stamps_.ft_sequence.begin();
+  const auto found = std::partition_point(first + static_cast<std::ptrdiff_t>(low),
+                                          first + static_cast<std::ptrdiff_t>(std::min(low + stride, end)),
+                                          [&](std::uint32_t ft) { return ft - epoch.ft_first < wanted; });
+  return static_cast<std::size_t>(found - first);
 }
 
 }  // namespace kphi::daq

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "results/load_cell_columns.hpp"
 #include "results/records.hpp"
 
 namespace kphi::daq {
@@ -24,11 +25,10 @@ struct ClockEpoch {
 
 class ClockMap {
  public:
-  /// `device_rate_hz`: rate at which ft_sequence counts. The records must outlive the map and be in order of arrival.
+  /// `device_rate_hz`: rate at which ft_sequence counts. The records must be in order of arrival.
   /// Constant delays of box, filter and wire cannot be seen one-way: times are late by their smallest sum.
   /// `breaks`: when the box took up counting after it had stood still; ascending.
-  ClockMap(std::span<const results::LoadCellRecord> records, double device_rate_hz,
-           std::span<const results::Nanoseconds> breaks = {});
+  ClockMap(results::LoadCellStamps stamps, double device_rate_hz, std::span<const results::Nanoseconds> breaks = {});
 
   [[nodiscard]] const std::vector<ClockEpoch>& epochs() const { return epochs_; }
   /// Bench time of the sample in record `index` of `epoch`. Increases with the index.
@@ -38,6 +38,8 @@ class ClockMap {
   /// The same among records [begin, end) of the epoch, of which all before begin are earlier.
   [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, results::Nanoseconds time, std::size_t begin,
                                      std::size_t end) const;
+  /// Of each record.
+  [[nodiscard]] std::span<const std::uint32_t> ft_sequence() const { return stamps_.ft_sequence; }
   /// 99 % of the fresh records of an epoch came less than this after the line, ns. Looks at all of them again.
   [[nodiscard]] double residual_p99_ns(const ClockEpoch& epoch) const;
   /// Skew of an epoch in parts per million.
@@ -46,10 +48,13 @@ class ClockMap {
   [[nodiscard]] static bool plausible(const ClockEpoch& epoch) { return epoch.skew < 500e-6 && epoch.skew > -500e-6; }
 
  private:
-  [[nodiscard]] double device_ns(const ClockEpoch& epoch, std::size_t index) const;
+  [[nodiscard]] std::uint32_t count(const ClockEpoch& epoch, std::size_t index) const;
+  [[nodiscard]] results::Nanoseconds time_of_count(const ClockEpoch& epoch, std::uint64_t count) const;
+  [[nodiscard]] std::uint64_t count_at(const ClockEpoch& epoch, results::Nanoseconds time) const;
+  [[nodiscard]] std::size_t counting_until(std::size_t begin, results::Nanoseconds next_break) const;
   [[nodiscard]] bool fresh(const ClockEpoch& epoch, std::size_t index) const;
   void fit(ClockEpoch& epoch) const;
-  std::span<const results::LoadCellRecord> records_;
+  results::LoadCellStamps stamps_;
   double tick_ns_;
   std::vector<ClockEpoch> epochs_;
 };

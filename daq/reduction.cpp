@@ -58,13 +58,13 @@ struct HeldStep {
 
 class Reduction {
  public:
-  explicit Reduction(const results::RunRecording& run)
+  explicit Reduction(const results::RunRecording& run, std::unique_ptr<results::LoadCellColumns> load_cell = nullptr)
       : run_(run),
         clock_factor_(clock_factor(run.header)),
         limits_(quality_limits(run.header)),
         newtons_(run.header.thrust_sign / run.header.load_cell.counts_per_newton),
         newton_metres_(run.header.thrust_sign / run.header.load_cell.counts_per_newton_metre),
-        cell_(run),
+        cell_(run, std::move(load_cell)),
         motor_(run.motor),
         zeros_(run, cell_, motor_),
         spans_(doubt_spans(run.events)) {}
@@ -302,6 +302,11 @@ void require_usable(const results::RunHeader& header) {
 Reduced reduce_with_zeros(const results::RunRecording& run) {
   require_usable(run.header);
   return Reduction(run).reduced();
+}
+
+Reduced reduce_with_zeros(results::RunFile file) {
+  require_usable(file.run.header);
+  return Reduction(file.run, std::move(file.load_cell)).reduced();
 }
 
 std::vector<StepMean> reduce(const results::RunRecording& run) { return reduce_with_zeros(run).steps; }

@@ -5,6 +5,7 @@
 
 #include "daq/zeros.hpp"
 #include "results/records.hpp"
+#include "results/run_reader.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::daq {
@@ -41,5 +42,8 @@ struct Reduced {
 
 /// The same, with what was found about the zeros.
 [[nodiscard]] Reduced reduce_with_zeros(const results::RunRecording& run);
+
+/// The same bits without a record of each sample: those of a window are read when it is their turn.
+[[nodiscard]] Reduced reduce_with_zeros(results::RunFile run);
 
 }  // namespace kphi::daq

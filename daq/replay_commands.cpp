@@ -3,13 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
-#include <deque>
+#include <exception>
 #include <filesystem>
-#include <future>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <thread>
 #include <utility>
@@ -56,23 +58,42 @@ std::vector<std::filesystem::path> runs_of(const CampaignFolder& folder) {
   return folder.complete_runs(profiles::load_campaign(folder.campaign_file().string()).occlusions_deg);
 }
 
-/// Reduces runs while the next one is read; HDF5 is only ever asked from here. Their order is that of the files.
-std::vector<StepMean> reduced(const std::vector<std::filesystem::path>& runs) {
-  const std::size_t at_once = std::max(1u, std::thread::hardware_concurrency());
-  std::deque<std::future<std::vector<StepMean>>> under_way;
+/// One run of several that are reduced at once.
+struct Work {
   std::vector<StepMean> steps;
-  const auto take_first = [&] {
-    const std::vector<StepMean> of_run = under_way.front().get();
-    under_way.pop_front();
-    steps.insert(steps.end(), of_run.begin(), of_run.end());
-  };
-  for (const auto& run : runs) {
-    while (under_way.size() >= at_once) take_first();
-    auto recording = std::make_shared<const results::RunRecording>(results::read_run(run));
-    under_way.push_back(
-        std::async(std::launch::async, [recording = std::move(recording)] { return reduce(*recording); }));
+  std::exception_ptr failure;
+};
+
+/// Takes runs until none is left. HDF5 is asked by one thread at a time; the samples are read without it.
+void reduce_some(std::span<const std::filesystem::path> runs, std::span<Work> work, std::atomic<std::size_t>& next,
+                 std::mutex& opening) {
+  for (std::size_t i = next++; i < runs.size(); i = next++) {
+    try {
+      std::unique_lock one_at_a_time(opening);
+      results::RunFile file = results::open_run(runs[i]);
+      one_at_a_time.unlock();
+      work[i].steps = reduce_with_zeros(std::move(file)).steps;
+    } catch (...) {
+      work[i].failure = std::current_exception();
+    }
   }
-  while (!under_way.empty()) take_first();
+}
+
+/// Steps in the order of the files; a thread per processor.
+std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
+  std::vector<Work> work(runs.size());
+  std::atomic<std::size_t> next = 0;
+  std::mutex opening;
+  std::vector<std::thread> others;
+  const std::size_t threads = std::min<std::size_t>(std::max(1u, std::thread::hardware_concurrency()), runs.size());
+  for (std::size_t i = 1; i < threads; ++i) others.emplace_back([&] { reduce_some(runs, work, next, opening); });
+  reduce_some(runs, work, next, opening);
+  for (std::thread& other : others) other.join();
+  std::vector<StepMean> steps;
+  for (Work& of_run : work) {
+    if (of_run.failure) std::rethrow_exception(of_run.failure);
+    steps.insert(steps.end(), of_run.steps.begin(), of_run.steps.end());
+  }
   return steps;
 }
 
@@ -90,7 +111,7 @@ Replay replay(const std::filesystem::path& path) {
       result.reference_steps = reduced(folder.reference_runs());
     }
   } else {
-    result.steps = reduce(results::read_run(path));
+    result.steps = reduced(std::span(&path, 1));
     const auto runs = std::filesystem::absolute(path).parent_path();
     const bool is_reference = !result.steps.empty() && result.steps.front().repetition < 0;
     if (runs.filename() == "runs") steps = runs.parent_path() / (is_reference ? "references.csv" : "steps.csv");

@@ -178,7 +178,7 @@ std::vector<StatisticalTest> neighbour_tests(const std::vector<Budget>& coeffici
 std::vector<Budget> standard_air(const std::vector<Budget>& coefficients, const AnalysisOptions& options) {
   std::vector<Budget> result;
   if (!options.air_density_kg_m3) return result;
-  const double scale = kStandardAirKgM3 / *options.air_density_kg_m3;
+  const double scale = kStandardDensity / *options.air_density_kg_m3;
   for (Budget budget : coefficients) {
     budget.quantity += " in standard air";
     budget.value *= scale;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/air.hpp"
 #include "fit/bench_uncertainty.hpp"
 #include "fit/bootstrap.hpp"
 #include "fit/budget.hpp"
@@ -17,11 +18,9 @@
 
 namespace kphi::fit {
 
-/// Of the air in which all was measured; its relative standard uncertainty is BenchUncertainty::air_density.
-inline constexpr double kStandardAirKgM3 = 1.225;
-
 struct AnalysisOptions {
   BenchUncertainty bench;
+  /// Of the air in which all was measured; its relative standard uncertainty is BenchUncertainty::air_density.
   std::optional<double> air_density_kg_m3;
   BootstrapOptions bootstrap;
   std::vector<double> prediction_deg{0, 15, 30, 45, 60, 75, 90, 120, 150, 180, 210, 240, 270};

@@ -50,11 +50,12 @@ void take_map_at(double speed, const ThrustFit& fit, OcclusionCoefficient& row) 
 
 OcclusionCoefficient coefficient(double phi_deg, std::vector<StepMean> steps, const IdentificationOptions& options,
                                  double at_speed) {
-  std::vector<Point> points, at_level;
+  const std::vector<Point> points = points_of(steps);
+  std::vector<Point> at_level;
   std::set<int> levels, repetitions;
-  for (const StepMean& step : steps) {
-    points.push_back(point_of(step));
-    if (at_speed > 0 && same_level(level(step), at_speed) && step.speed_rad_s > 0) at_level.push_back(points.back());
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const StepMean& step = steps[i];
+    if (at_speed > 0 && same_level(level(step), at_speed) && step.speed_rad_s > 0) at_level.push_back(points[i]);
     levels.insert(step.step);
     repetitions.insert(step.repetition);
   }

@@ -326,6 +326,28 @@ void ColumnReader::read(std::uint64_t first, std::uint64_t count, void* rows) {
   check(H5Dread(dataset_.get(), memory_type_, memory.get(), space_.get(), H5P_DEFAULT, rows), doing_);
 }
 
+std::optional<RawColumn> ColumnReader::raw() const {
+  const Handle list = own(H5Dget_create_plist(dataset_.get()), doing_);
+  const Handle type = own(H5Dget_type(dataset_.get()), doing_);
+  std::array<hsize_t, 2> chunk{};
+  const bool plain = H5Pget_layout(list.get()) == H5D_CHUNKED && H5Pget_nfilters(list.get()) == 0 &&
+                     H5Tequal(type.get(), memory_type_) > 0 &&
+                     H5Pget_chunk(list.get(), 2, chunk.data()) == static_cast<int>(dims_.size()) &&
+                     (dims_.size() == 1 || chunk[1] == dims_[1]);
+  if (!plain) return std::nullopt;
+  RawColumn column{doing_, row_bytes_, chunk[0], {}};
+  for (hsize_t at = 0; at < rows_; at += chunk[0]) {
+    const std::array<hsize_t, 2> offset{at, 0};
+    unsigned filters = 0;
+    haddr_t address = HADDR_UNDEF;
+    hsize_t bytes = 0;
+    check(H5Dget_chunk_info_by_coord(dataset_.get(), offset.data(), &filters, &address, &bytes), doing_);
+    if (address == HADDR_UNDEF) return std::nullopt;
+    column.chunks.push_back(address);
+  }
+  return column;
+}
+
 std::uint32_t ColumnReader::crc(std::uint64_t count) {
   constexpr std::uint64_t kBlock = 65536;
   std::vector<std::byte> rows(kBlock * row_bytes_);

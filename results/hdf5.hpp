@@ -10,10 +10,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "results/file_layer.hpp"
+#include "results/raw_column.hpp"
 
 namespace kphi::results::hdf5 {
 
@@ -120,6 +122,8 @@ class ColumnReader {
   void read(std::uint64_t first, std::uint64_t count, void* rows);
   /// CRC-32 of the first `count` rows.
   [[nodiscard]] std::uint32_t crc(std::uint64_t count);
+  /// Where its bytes lie; nothing when they are compressed, converted or laid out in another way than ours.
+  [[nodiscard]] std::optional<RawColumn> raw() const;
   [[nodiscard]] const Handle& dataset() const { return dataset_; }
 
  private:

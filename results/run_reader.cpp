@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "results/hdf5.hpp"
 #include "results/run_layout.hpp"
@@ -41,15 +42,22 @@ std::uint64_t valid_rows(const Handle& group, std::initializer_list<const Column
   return n;
 }
 
-std::vector<LoadCellRecord> load_cell_of(const Handle& root, const std::string& file) {
-  const Handle group = hdf5::open_group(root, "load_cell");
-  ColumnReader counts(group, "counts", H5T_NATIVE_INT32, 24, file);
-  ColumnReader rdt(group, "rdt_sequence", H5T_NATIVE_UINT32, 4, file);
-  ColumnReader ft(group, "ft_sequence", H5T_NATIVE_UINT32, 4, file);
-  ColumnReader status(group, "status", H5T_NATIVE_UINT32, 4, file);
-  ColumnReader arrival(group, "t_arrival_ns", H5T_NATIVE_INT64, 8, file);
-  const std::uint64_t rows = valid_rows(group, {&counts, &rdt, &ft, &status, &arrival});
+/// The five columns of the load cell, and how many of their rows are valid.
+struct LoadCellReader {
+  LoadCellReader(const Handle& root, const std::string& file)
+      : group(hdf5::open_group(root, "load_cell")),
+        counts(group, "counts", H5T_NATIVE_INT32, 24, file),
+        rdt(group, "rdt_sequence", H5T_NATIVE_UINT32, 4, file),
+        ft(group, "ft_sequence", H5T_NATIVE_UINT32, 4, file),
+        status(group, "status", H5T_NATIVE_UINT32, 4, file),
+        arrival(group, "t_arrival_ns", H5T_NATIVE_INT64, 8, file),
+        rows(valid_rows(group, {&counts, &rdt, &ft, &status, &arrival})) {}
+  Handle group;
+  ColumnReader counts, rdt, ft, status, arrival;
+  std::uint64_t rows;
+};
 
+std::vector<LoadCellRecord> records_of(LoadCellReader& cell) {
   struct Block {
     std::array<std::array<std::int32_t, 6>, kBlock> counts;
     std::array<std::uint32_t, kBlock> rdt, ft, status;
@@ -57,19 +65,47 @@ std::vector<LoadCellRecord> load_cell_of(const Handle& root, const std::string& 
   };
   const auto block = std::make_unique<Block>();
   std::vector<LoadCellRecord> records;
-  records.reserve(rows);
-  for (std::uint64_t at = 0; at < rows; at += kBlock) {
-    const std::uint64_t n = std::min(kBlock, rows - at);
-    counts.read(at, n, block->counts.data());
-    rdt.read(at, n, block->rdt.data());
-    ft.read(at, n, block->ft.data());
-    status.read(at, n, block->status.data());
-    arrival.read(at, n, block->arrival.data());
+  records.reserve(cell.rows);
+  for (std::uint64_t at = 0; at < cell.rows; at += kBlock) {
+    const std::uint64_t n = std::min(kBlock, cell.rows - at);
+    cell.counts.read(at, n, block->counts.data());
+    cell.rdt.read(at, n, block->rdt.data());
+    cell.ft.read(at, n, block->ft.data());
+    cell.status.read(at, n, block->status.data());
+    cell.arrival.read(at, n, block->arrival.data());
     for (std::uint64_t i = 0; i < n; ++i) {
       records.push_back({block->counts[i], block->rdt[i], block->ft[i], block->status[i], block->arrival[i]});
     }
   }
   return records;
+}
+
+/// Of a file that others compressed or converted.
+class ConvertedColumns : public RecordedColumns {
+ public:
+  explicit ConvertedColumns(std::unique_ptr<const std::vector<LoadCellRecord>> records)
+      : RecordedColumns(*records), records_(std::move(records)) {}
+
+ private:
+  std::unique_ptr<const std::vector<LoadCellRecord>> records_;
+};
+
+/// Straight from the file where it is as our writer leaves it; else by HDF5, whole.
+std::unique_ptr<LoadCellColumns> columns_of(const Handle& root, const std::filesystem::path& path) {
+  LoadCellReader cell(root, path.string());
+  const auto counts = cell.counts.raw(), ft = cell.ft.raw(), status = cell.status.raw(), arrival = cell.arrival.raw();
+  if (counts && ft && status && arrival) {
+    return std::make_unique<FileColumns>(OpenFile(path), cell.rows,
+                                         FileColumns::Places{*counts, *ft, *status, *arrival});
+  }
+  return std::make_unique<ConvertedColumns>(std::make_unique<const std::vector<LoadCellRecord>>(records_of(cell)));
+}
+
+template <class Row>
+std::vector<Row> rows_of(ColumnReader& column, std::uint64_t n) {
+  std::vector<Row> rows(n);
+  column.read(0, n, rows.data());
+  return rows;
 }
 
 void append_channel(const Handle& motor, const MotorChannelInfo& info, const std::string& file,
@@ -79,15 +115,23 @@ void append_channel(const Handle& motor, const MotorChannelInfo& info, const std
   ColumnReader time(group, "t_ns", H5T_NATIVE_INT64, 8, file);
   ColumnReader uncertainty(group, "t_uncertainty_ns", H5T_NATIVE_INT64, 8, file);
   const std::uint64_t rows = valid_rows(group, {&value, &time, &uncertainty});
-  std::vector<double> values(rows);
-  std::vector<Nanoseconds> times(rows), uncertainties(rows);
-  value.read(0, rows, values.data());
-  time.read(0, rows, times.data());
-  uncertainty.read(0, rows, uncertainties.data());
+  const auto values = rows_of<double>(value, rows);
+  const auto times = rows_of<Nanoseconds>(time, rows), uncertainties = rows_of<Nanoseconds>(uncertainty, rows);
   const auto first = static_cast<std::ptrdiff_t>(out.size());
   for (std::uint64_t i = 0; i < rows; ++i) out.push_back({info.channel, times[i], uncertainties[i], values[i]});
-  std::stable_sort(out.begin() + first, out.end(),
-                   [](const MotorReading& a, const MotorReading& b) { return a.time_ns < b.time_ns; });
+  const auto earlier = [](const MotorReading& a, const MotorReading& b) { return a.time_ns < b.time_ns; };
+  if (!std::is_sorted(out.begin() + first, out.end(), earlier)) {
+    std::stable_sort(out.begin() + first, out.end(), earlier);
+  }
+}
+
+std::vector<MotorReading> motor_of(const Handle& root, int format, const std::string& file) {
+  const Handle motor = hdf5::open_group(root, "motor");
+  std::vector<MotorReading> readings;
+  for (const MotorChannelInfo& info : kMotorChannels) {
+    if (info.since <= format) append_channel(motor, info, file, readings);
+  }
+  return readings;
 }
 
 std::vector<PhaseMark> phases_of(const Handle& root, const std::string& file) {
@@ -97,14 +141,10 @@ std::vector<PhaseMark> phases_of(const Handle& root, const std::string& file) {
   ColumnReader time(group, "t_ns", H5T_NATIVE_INT64, 8, file);
   ColumnReader speed(group, "speed_rad_s", H5T_NATIVE_DOUBLE, 8, file);
   const std::uint64_t rows = valid_rows(group, {&phase, &step, &time, &speed});
-  std::vector<std::uint8_t> codes(rows);
-  std::vector<std::int32_t> steps(rows);
-  std::vector<Nanoseconds> times(rows);
-  std::vector<double> speeds(rows);
-  phase.read(0, rows, codes.data());
-  step.read(0, rows, steps.data());
-  time.read(0, rows, times.data());
-  speed.read(0, rows, speeds.data());
+  const auto codes = rows_of<std::uint8_t>(phase, rows);
+  const auto steps = rows_of<std::int32_t>(step, rows);
+  const auto times = rows_of<Nanoseconds>(time, rows);
+  const auto speeds = rows_of<double>(speed, rows);
   std::vector<PhaseMark> marks;
   for (std::uint64_t i = 0; i < rows; ++i) {
     if (codes[i] > static_cast<std::uint8_t>(kLastPhase)) {
@@ -116,6 +156,7 @@ std::vector<PhaseMark> phases_of(const Handle& root, const std::string& file) {
 }
 
 std::vector<StreamEvent> events_of(const Handle& root, const std::string& file) {
+  using Text = std::array<char, kEventTextBytes>;
   const Handle group = hdf5::open_group(root, "events");
   const Handle type = hdf5::fixed_text_type(kEventTextBytes);
   ColumnReader kind(group, "kind", H5T_NATIVE_UINT8, 1, file);
@@ -123,21 +164,18 @@ std::vector<StreamEvent> events_of(const Handle& root, const std::string& file) 
   ColumnReader records(group, "records", H5T_NATIVE_UINT64, 8, file);
   ColumnReader text(group, "text", type.get(), kEventTextBytes, file);
   const std::uint64_t rows = valid_rows(group, {&kind, &time, &records, &text});
+  const auto codes = rows_of<std::uint8_t>(kind, rows);
+  const auto times = rows_of<Nanoseconds>(time, rows);
+  const auto counts = rows_of<std::uint64_t>(records, rows);
+  const auto texts = rows_of<Text>(text, rows);
   std::vector<StreamEvent> events;
   for (std::uint64_t i = 0; i < rows; ++i) {
-    std::uint8_t code = 0;
-    std::array<char, kEventTextBytes + 1> line{};
-    StreamEvent event;
-    kind.read(i, 1, &code);
-    time.read(i, 1, &event.time_ns);
-    records.read(i, 1, &event.records);
-    text.read(i, 1, line.data());
-    if (code >= kEventNames.size()) {
-      throw RecordError(fmt::format("{}: events row {} has the unknown kind {}", file, i, code));
+    if (codes[i] >= kEventNames.size()) {
+      throw RecordError(fmt::format("{}: events row {} has the unknown kind {}", file, i, codes[i]));
     }
-    event.kind = static_cast<EventKind>(code);
-    event.text = line.data();
-    events.push_back(std::move(event));
+    const Text& line = texts[i];
+    events.push_back({static_cast<EventKind>(codes[i]), times[i], counts[i],
+                      std::string(line.begin(), std::find(line.begin(), line.end(), '\0'))});
   }
   return events;
 }
@@ -156,37 +194,37 @@ std::vector<SupplyReading> supply_of(const Handle& root, const std::string& file
   const std::uint64_t rows = valid_rows(group, {&time, &uncertainty, &voltage, &current, &set_voltage, &current_limit,
                                                 &regulation, &protection, &output});
   std::vector<SupplyReading> readings(rows);
+  const auto take = [&]<class Value>(ColumnReader& column, Value SupplyReading::*member) {
+    const auto values = rows_of<Value>(column, rows);
+    for (std::uint64_t i = 0; i < rows; ++i) readings[i].*member = values[i];
+  };
+  take(time, &SupplyReading::time_ns);
+  take(uncertainty, &SupplyReading::uncertainty_ns);
+  take(voltage, &SupplyReading::voltage_v);
+  take(current, &SupplyReading::current_a);
+  take(set_voltage, &SupplyReading::set_voltage_v);
+  take(current_limit, &SupplyReading::current_limit_a);
+  const auto regulations = rows_of<std::uint8_t>(regulation, rows),
+             protections = rows_of<std::uint8_t>(protection, rows), outputs = rows_of<std::uint8_t>(output, rows);
   for (std::uint64_t i = 0; i < rows; ++i) {
-    SupplyReading& reading = readings[i];
-    std::uint8_t codes[3] = {};
-    time.read(i, 1, &reading.time_ns);
-    uncertainty.read(i, 1, &reading.uncertainty_ns);
-    voltage.read(i, 1, &reading.voltage_v);
-    current.read(i, 1, &reading.current_a);
-    set_voltage.read(i, 1, &reading.set_voltage_v);
-    current_limit.read(i, 1, &reading.current_limit_a);
-    regulation.read(i, 1, &codes[0]);
-    protection.read(i, 1, &codes[1]);
-    output.read(i, 1, &codes[2]);
-    if (codes[0] > static_cast<std::uint8_t>(SupplyRegulation::unknown) ||
-        codes[1] > static_cast<std::uint8_t>(SupplyProtection::unknown)) {
+    if (regulations[i] > static_cast<std::uint8_t>(SupplyRegulation::unknown) ||
+        protections[i] > static_cast<std::uint8_t>(SupplyProtection::unknown)) {
       throw RecordError(fmt::format("{}: supply row {} has an unknown code", file, i));
     }
-    reading.regulation = static_cast<SupplyRegulation>(codes[0]);
-    reading.protection = static_cast<SupplyProtection>(codes[1]);
-    reading.output = codes[2];
+    readings[i].regulation = static_cast<SupplyRegulation>(regulations[i]);
+    readings[i].protection = static_cast<SupplyProtection>(protections[i]);
+    readings[i].output = outputs[i];
   }
   return readings;
 }
 
+bool has_ending(const Handle& root) { return hdf5::has_attribute(root, "outcome_reason"); }
+
 void read_outcome(const Handle& root, RunRecording& run) {
   std::int32_t complete = 0;
   hdf5::read_attribute(root, "complete", complete);
-  if (!hdf5::has_attribute(root, "outcome_reason")) {
+  if (!has_ending(root)) {
     run.outcome_reason = "the writer was stopped before the end";
-    run.account.received = run.load_cell.size();
-    run.account.lost_network = check_sequence(run.load_cell, run.header.load_cell.ft_stride).lost;
-    run.account.expected = run.account.received + run.account.lost_network;
     return;
   }
   for_each_figure(run, run.header.format,
@@ -206,23 +244,38 @@ auto naming(const std::filesystem::path& path, Read&& read) {
   }
 }
 
+RunRecording without_load_cell(const Handle& root, const std::filesystem::path& path) {
+  const std::string file = path.string();
+  RunRecording run;
+  run.header = header_of(root, path);
+  run.motor = motor_of(root, run.header.format, file);
+  run.phases = phases_of(root, file);
+  if (run.header.format >= 2) run.events = events_of(root, file);
+  if (run.header.format >= 4) run.supply = supply_of(root, file);
+  read_outcome(root, run);
+  return run;
+}
+
 }  // namespace
 
 RunRecording read_run(const std::filesystem::path& path) {
   return naming(path, [&] {
     const Handle root = hdf5::open_file(path);
-    RunRecording run;
-    run.header = header_of(root, path);
-    run.load_cell = load_cell_of(root, path.string());
-    const Handle motor = hdf5::open_group(root, "motor");
-    for (const MotorChannelInfo& info : kMotorChannels) {
-      if (info.since <= run.header.format) append_channel(motor, info, path.string(), run.motor);
-    }
-    run.phases = phases_of(root, path.string());
-    if (run.header.format >= 2) run.events = events_of(root, path.string());
-    if (run.header.format >= 4) run.supply = supply_of(root, path.string());
-    read_outcome(root, run);
+    RunRecording run = without_load_cell(root, path);
+    LoadCellReader cell(root, path.string());
+    run.load_cell = records_of(cell);
+    if (has_ending(root)) return run;
+    run.account.received = run.load_cell.size();
+    run.account.lost_network = check_sequence(run.load_cell, run.header.load_cell.ft_stride).lost;
+    run.account.expected = run.account.received + run.account.lost_network;
     return run;
+  });
+}
+
+RunFile open_run(const std::filesystem::path& path) {
+  return naming(path, [&] {
+    const Handle root = hdf5::open_file(path);
+    return RunFile{without_load_cell(root, path), columns_of(root, path)};
   });
 }
 

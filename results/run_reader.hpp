@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "results/load_cell_columns.hpp"
 #include "results/record_error.hpp"
 #include "results/records.hpp"
 
@@ -13,6 +15,13 @@ namespace kphi::results {
 
 /// The whole run; of a .part what was valid at its last sync, as aborted. Checks no checksums: that is verify_run's.
 [[nodiscard]] RunRecording read_run(const std::filesystem::path& path);
+
+/// A run whose load-cell records are still in its file: for who passes over them once and needs no record of each.
+struct RunFile {
+  RunRecording run;  ///< without load_cell; of a .part without the account, which the records would tell
+  std::unique_ptr<LoadCellColumns> load_cell;
+};
+[[nodiscard]] RunFile open_run(const std::filesystem::path& path);
 
 /// What was known before the motor turned.
 [[nodiscard]] RunHeader read_header(const std::filesystem::path& path);

@@ -44,6 +44,4 @@ Density density_of(const Air& air) {
                              square(per_humidity * air.u_relative_humidity) + square(formula))};
 }
 
-double at_standard_density(double k, double density_kg_m3) noexcept { return k * (kStandardDensity / density_kg_m3); }
-
 }  // namespace kphi::ambient

@@ -18,9 +18,6 @@ struct Density {
   double u_kg_m3 = 0;  ///< standard uncertainty: that of the measured quantities and of the formula
 };
 
-/// To which k is normalised (ISA at sea level, 15 °C, dry).
-inline constexpr double kStandardDensity = 1.225;  // kg/m³
-
 /// What the formula is good for; also the limits beyond which a reading is a broken sensor.
 inline constexpr double kColdest = -40, kHottest = 60;                    // °C
 inline constexpr double kLowestPressure = 5e4, kHighestPressure = 1.1e5;  // Pa
@@ -31,8 +28,5 @@ inline constexpr double kLowestPressure = 5e4, kHighestPressure = 1.1e5;  // Pa
 /// within 15..27 °C and 600..1100 hPa. Outside, the terms of the enhancement factor are extrapolated: 1e-4 is taken.
 /// First-order propagation (JCGM 100, eq. 10). Throws std::invalid_argument unless plausible.
 [[nodiscard]] Density density_of(const Air& air);
-
-/// k · 1.225/ρ: what the propeller would give in standard air at the same speed.
-[[nodiscard]] double at_standard_density(double k, double density_kg_m3) noexcept;
 
 }  // namespace kphi::ambient

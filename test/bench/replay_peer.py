@@ -118,47 +118,28 @@ def settle(thrust, first, planned):
 
 
 class Lag:
-    """Delay and smoothing of the thrust, all steps at once: rows are steps, columns bins."""
+    """Delay of the thrust after the speed, all steps at once: rows are steps, columns bins. Without the time constant
+    that daq/lag.hpp finds besides."""
 
     def __init__(self, thrust, before, speeds, marks):
-        h = BIN_NS * 1e-9
-        self.h, nb = h, before.shape[1]
+        self.h, nb = BIN_NS * 1e-9, before.shape[1]
         self.y = np.concatenate([before, thrust[:, :120]], axis=1)
         self.y = self.y - self.y.mean(axis=1, keepdims=True)
-        self.edges = h * (np.arange(-nb - 30, 121))
-        self.skip = 30
-        self.knots = []
-        for mark in marks:
-            t = (speeds[0] - mark) * 1e-9
-            i, j = np.searchsorted(t, [-0.8, 2.0])
-            t, w = t[i:j], speeds[1][i:j] ** 2
-            k = np.searchsorted(t, 0.0)
-            t, w = np.insert(t, k, 0.0), np.insert(w, k, w[max(k - 1, 0)])
-            self.knots.append((t, w, np.concatenate([[0], np.cumsum(0.5 * (w[1:] + w[:-1]) * np.diff(t))])))
+        self.yy = (self.y * self.y).sum()
+        self.edges = marks[:, None] * 1e-9 + self.h * np.arange(-nb, 121)
+        # Until a command the motor held what it held before.
+        t, w, at = speeds[0] * 1e-9, speeds[1] ** 2, np.searchsorted(speeds[0], marks)
+        self.t, self.w = np.insert(t, at, marks * 1e-9), np.insert(w, at, w[np.maximum(at - 1, 0)])
+        self.integral = np.append(0, np.cumsum(0.5 * (self.w[1:] + self.w[:-1]) * np.diff(self.t)))
 
-    def model(self, delay, tau):
+    def squares(self, delay):
         edges = self.edges - delay
-        rows = []
-        for t, w, integral in self.knots:
-            value = np.interp(edges, t, w)
-            k = np.clip(np.searchsorted(t, edges, side="right") - 1, 0, len(t) - 1)
-            rows.append(np.diff(integral[k] + (edges - t[k]) * 0.5 * (w[k] + value)) / self.h)
-        x = np.array(rows)
-        if tau > 1e-6:
-            decay = math.exp(-self.h / tau)
-            share = tau / self.h * (1 - decay)
-            state = x[:, 0].copy()
-            for i in range(x.shape[1]):
-                away = state - x[:, i]
-                state = x[:, i] + away * decay
-                x[:, i] += away * share
-        x = x[:, self.skip:]
-        return x - x.mean(axis=1, keepdims=True)
-
-    def squares(self, delay, tau=0.0):
-        x = self.model(delay, tau)
+        k = np.searchsorted(self.t, edges, side="right") - 1
+        value = np.interp(edges, self.t, self.w)
+        x = np.diff(self.integral[k] + (edges - self.t[k]) * 0.5 * (self.w[k] + value), axis=1) / self.h
+        x -= x.mean(axis=1, keepdims=True)
         xy, xx = (x * self.y).sum(axis=1), (x * x).sum(axis=1)
-        return ((self.y * self.y).sum(axis=1) - np.where(xy > 0, xy * xy / xx, 0)).sum()
+        return self.yy - np.where(xy > 0, xy * xy / xx, 0).sum()
 
     def estimate(self):
         grid = np.arange(-0.01, 0.6, 0.04)
@@ -167,7 +148,7 @@ class Lag:
         while step > 5e-5:  # parabola through three delays
             a, b, c = self.squares(at - step), self.squares(at), self.squares(at + step)
             bend = a - 2 * b + c
-            at += np.clip(0.5 * (a - c) / bend, -1, 1) * step if bend > 0 else math.copysign(step, a - c)
+            at += min(max(0.5 * (a - c) / bend, -1), 1) * step if bend > 0 else math.copysign(step, a - c)
             step *= 0.4
         return at
 

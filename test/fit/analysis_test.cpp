@@ -84,7 +84,7 @@ TEST(Analysis, LineWeightsAreTheLine) {
 TEST(Analysis, StandardAirAddsTheDensity) {
   Study study;
   const Analysis analysis = analyse(study.found, study.options);
-  const double scale = kStandardAirKgM3 / study.campaign.measured_density;
+  const double scale = kStandardDensity / study.campaign.measured_density;
   EXPECT_NEAR(analysis.standard[0].value / (analysis.coefficients[0].value * scale), 1, 1e-12);
   EXPECT_NEAR(row_of(analysis.standard[0], "air density").contribution(), 3e-3 * analysis.standard[0].value, 1e-17);
   study.options.air_density_kg_m3.reset();
@@ -180,7 +180,7 @@ TEST(Analysis, EveryEstimatorFindsTheTruth) {
     const Identification found = identify(campaign.steps, options);
     const Analysis analysis = analyse(found, study_options(truth, campaign));
     for (std::size_t i = 0; i < found.table.size(); ++i) {
-      const double expected = truth.k(found.table[i].phi_deg) * campaign.density / kStandardAirKgM3;
+      const double expected = truth.k(found.table[i].phi_deg) * campaign.density / kStandardDensity;
       EXPECT_NEAR(found.table[i].k, expected, 4 * analysis.coefficients[i].combined())
           << name_of(estimator) << " at " << found.table[i].phi_deg;
     }

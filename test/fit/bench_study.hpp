@@ -44,7 +44,7 @@ inline StudyCampaign study_campaign(const StudyTruth& truth, unsigned seed) {
   for (const double phi : {0.0, 45.0, 90.0, 180.0, 270.0}) {
     for (int repetition = 1; repetition <= 3; ++repetition) {
       const double run_k =
-          truth.k(phi) * campaign.density / kStandardAirKgM3 * (1 + truth.between_runs * normal(random));
+          truth.k(phi) * campaign.density / kStandardDensity * (1 + truth.between_runs * normal(random));
       // The zero jumps once, anywhere: a line between the two zeros of the run misses it by up to half of the jump.
       const double moved = 0.02 * normal(random), jump = uniform(random);
       double slow = 0, before = 0;
@@ -118,7 +118,7 @@ inline std::map<std::string, Coverage> coverage_study(const StudyTruth& truth, u
     const StudyCampaign campaign = study_campaign(truth, seed);
     const Identification found = identify(campaign.steps, how);
     const Analysis analysis = analyse(found, study_options(truth, campaign));
-    const double air = campaign.density / kStandardAirKgM3;
+    const double air = campaign.density / kStandardDensity;
     for (std::size_t i = 0; i < found.table.size(); ++i) {
       const double k = truth.k(found.table[i].phi_deg);
       table[analysis.coefficients[i].quantity].add(analysis.coefficients[i], k * air);

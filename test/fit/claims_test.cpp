@@ -35,7 +35,7 @@ FamilyMember member(const PaperPropeller& propeller, unsigned seed, double slope
     step.propeller = fmt::format("{}x{}", propeller.diameter_in, propeller.blades);
     step.diameter_in = propeller.diameter_in;
     step.blades = propeller.blades;
-    step.thrust_n *= kStandardAirKgM3 / campaign.density;  // all four in the same air
+    step.thrust_n *= kStandardDensity / campaign.density;  // all four in the same air
   }
   FamilyMember result;
   result.identification = identify(campaign.steps);
