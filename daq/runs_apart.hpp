@@ -19,7 +19,8 @@ class RunsApart final : public Bench {
   void begin_run(const RunBeginning& run) override;
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
 
-  [[nodiscard]] const Clock& clock() const override { return bench_->clock(); }
+  /// The same object for all runs.
+  [[nodiscard]] const Clock& clock() const override { return clock_; }
   [[nodiscard]] MotorLink& motor() override { return bench_->motor(); }
   [[nodiscard]] LoadCellLink& load_cell() override { return bench_->load_cell(); }
   [[nodiscard]] SupplyLink* supply() override { return bench_->supply(); }
@@ -37,10 +38,29 @@ class RunsApart final : public Bench {
   void use_files(results::FileLayer& files) noexcept;
 
  private:
+  /// Tells the time of whichever bench there is.
+  class PresentClock final : public Clock {
+   public:
+    explicit PresentClock(const std::unique_ptr<DeterministicBench>& bench) noexcept : bench_(bench) {}
+    [[nodiscard]] Instant now() const noexcept override { return bench_->clock().now(); }
+    [[nodiscard]] Duration stretched(Duration wall) const noexcept override { return bench_->clock().stretched(wall); }
+    [[nodiscard]] Duration shrunk(Duration bench) const noexcept override { return bench_->clock().shrunk(bench); }
+    [[nodiscard]] Instant at_realtime(const timespec& stamp) const noexcept override {
+      return bench_->clock().at_realtime(stamp);
+    }
+    [[nodiscard]] std::chrono::system_clock::time_point epoch_utc() const noexcept override {
+      return bench_->clock().epoch_utc();
+    }
+
+   private:
+    const std::unique_ptr<DeterministicBench>& bench_;
+  };
+
   const profiles::Bench place_;
   results::MemoryOnlySync own_files_;
   results::FileLayer* files_ = &own_files_;
   std::unique_ptr<DeterministicBench> bench_;  ///< of the present run
+  const PresentClock clock_{bench_};
   std::optional<std::pair<std::string, double>> mounted_;
 };
 

@@ -126,7 +126,7 @@ int main(int argc, char** argv) {
   Cost a, b;
   for (int i = 0; i < pairs; ++i) {
     a = cost_of(ours, {KPHI_PROGRAM, "replay", folder.path()});
-    b = cost_of(theirs, {"/usr/bin/python3", KPHI_SOURCE_DIR "/test/bench/replay_peer.py", folder.path()});
+    b = cost_of(theirs, {"/usr/bin/python3", kphi::test::source_dir() + "/test/bench/replay_peer.py", folder.path()});
     if (b.code != 0) {
       fmt::print("replay: the peer did not run (python3-numpy, python3-h5py?)\n");
       return 1;

@@ -13,6 +13,7 @@
 #include "results/sha256.hpp"
 #include "test/daq/bench_fixture.hpp"
 #include "test/end_to_end/process.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::test {
 namespace {
@@ -20,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using Seconds = std::chrono::duration<double>;
 
-constexpr const char* kBench = KPHI_SOURCE_DIR "/profiles/bench_deterministic.yaml";
+const std::string kBench = kphi::test::source_dir() + "/profiles/bench_deterministic.yaml";
 constexpr int kKilled = 128 + SIGKILL;
 
 /// The folder of the one campaign below `out`, once it is there.

@@ -4,6 +4,7 @@
 
 #include "results/campaign_folder.hpp"
 #include "test/end_to_end/running_bench.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::test {
 namespace {
@@ -76,7 +77,7 @@ TEST(Resume, RefusesAChangedCampaignBeforeAnyDeviceIsAsked) {
 }
 
 TEST(Resume, NeedsACampaignOrAFolder) {
-  Process nothing({kphi(), "run", "--bench", KPHI_SOURCE_DIR "/profiles/bench_deterministic.yaml"});
+  Process nothing({kphi(), "run", "--bench", kphi::test::source_dir() + "/profiles/bench_deterministic.yaml"});
   EXPECT_EQ(nothing.wait(), 2);
   EXPECT_THAT(nothing.err(), HasSubstr("no campaign: name its file, or a folder with --resume"));
 }

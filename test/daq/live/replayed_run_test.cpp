@@ -5,13 +5,14 @@
 
 #include "daq/live/view.hpp"
 #include "results/run_reader.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::daq::live {
 namespace {
 
 const results::RunRecording& recording() {
   static const results::RunRecording kRecording =
-      results::read_run(KPHI_SOURCE_DIR "/results/reference/runs/5x3_phi090_rep1.h5");
+      results::read_run(kphi::test::source_dir() + "/results/reference/runs/5x3_phi090_rep1.h5");
   return kRecording;
 }
 
