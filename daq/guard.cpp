@@ -73,9 +73,8 @@ void Guard::look() noexcept {
     const bool spinning = spinning_;
     for (Stream* stream : {&load_cell_stream_, &motor_stream_, &supply_stream_}) judge_silence(*stream, now, spinning);
     looked_ns_ = now.count();
-  } catch (const std::exception& error) {
-    trip_state(std::string("the guard failed: ") + error.what());
   } catch (...) {
+    bench_.motor().emergency_stop();  // before words, for which there may be no memory
     trip_state("the guard failed");
   }
 }

@@ -132,7 +132,7 @@ const Way kWays[] = {
     {"BoxUnreachable", kScript, nullptr, "kind: address, address: 10.255.255.1, for_s: 1000", 4, "load-cell"},
     {"StreamStolen", kScript, nullptr, "kind: stolen", 4, "another client"},
     {"RangeTrip", kScript, nullptr, "kind: saturation, axes: 4, for_s: 1000", 4, "range"},
-    {"CoilHot", kScript, nullptr, "kind: motor_hot, coil_celsius: 130, for_s: 1000", 4, "coil temperature"},
+    {"CoilHot", kScript, nullptr, "kind: motor_hot, coil_celsius: 100, for_s: 1000", 4, "coil temperature"},
     {"Derate", kScript, nullptr, "kind: motor_redline, speed_rad_s: 500, for_s: 1000", 4, "derate"},
     {"PowerSafety", kScript, nullptr, "kind: motor_over_voltage, volts: 20, for_s: 1000", 4, "power_safety"},
     {"RotorLocked", kScript, nullptr, "kind: motor_locked, for_s: 1000", 4, "rotor"},
