@@ -131,9 +131,9 @@ class CampaignRun {
     if (planned.occlusion_deg != mounted_deg_) mount(planned.occlusion_deg);
     bench_.begin_run({planned.occlusion_deg, planned.repetition, accepted_at_});
     const auto file = file_of(planned);
-    const double per_run_s = plan_.bench.value() / static_cast<double>(plan_.runs.size());
-    const double remaining_s =
-        per_run_s * static_cast<double>(plan_.runs.size() - static_cast<std::size_t>(result_.runs));
+    const auto left = std::count_if(plan_.runs.begin(), plan_.runs.end(),
+                                    [&](const profiles::PlannedRun& run) { return !is_accepted(run); });
+    const double remaining_s = plan_.bench.value() / static_cast<double>(plan_.runs.size()) * static_cast<double>(left);
     try {
       cool_down();
       if (place_.ambient.known() && !bench_.air())
