@@ -11,7 +11,7 @@
 #include "results/campaign_verification.hpp"
 #include "results/journal.hpp"
 #include "results/record_error.hpp"
-#include "results/sha256.hpp"
+#include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
@@ -112,6 +112,17 @@ TEST_F(Resume, GoesOnAtTheFirstUnfinishedRunAndGivesTheBytesOfACampaignThatWasNe
   EXPECT_TRUE(after == uninterrupted());
 }
 
+TEST_F(Resume, GoesOnInBenchTime) {
+  stop_before(180);
+  (void)resume();
+  std::int64_t last = 0;
+  for (const auto& run : results_.complete_runs(campaign_.occlusions_deg)) {
+    const auto recording = results::read_run(run);
+    EXPECT_GT(recording.load_cell.front().arrival_ns, last) << run;
+    last = recording.load_cell.back().arrival_ns;
+  }
+}
+
 TEST_F(Resume, MountsAgainInTheMiddleOfAnOcclusion) {
   (void)begin(results_);
   // As if it had been killed before the last run was accepted.
@@ -201,6 +212,15 @@ TEST_F(Resume, RefusesAnotherCampaignFileUntilToldAndThenSaysAndKeepsBoth) {
   EXPECT_EQ(test::bytes_of(results_.campaign_file()), campaign_.text);
   EXPECT_EQ(test::bytes_of(results_.path() / "campaign.replaced.yaml"), before);
   EXPECT_EQ(refusal<ConfigurationError>(), "") << "what was accepted once is what it is now";
+}
+
+TEST_F(Resume, KeepsAcceptedRunsThatAChangedCampaignWantsNoMore) {
+  stop_before(180);
+  campaign_ = profiles::parse_campaign(test::short_campaign_text("180", 1, 2), "short.yaml");
+  const CampaignResult result = resume(true);
+  EXPECT_EQ(result.runs, 5);
+  EXPECT_EQ(results_.complete_runs().size(), 5u);
+  EXPECT_TRUE(results::verify_campaign(results_).whole());
 }
 
 TEST_F(Resume, RefusesAnotherBenchFile) {

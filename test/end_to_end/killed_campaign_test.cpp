@@ -10,7 +10,6 @@
 #include <thread>
 
 #include "results/campaign_state.hpp"
-#include "results/sha256.hpp"
 #include "test/daq/bench_fixture.hpp"
 #include "test/end_to_end/process.hpp"
 #include "test/source_dir.hpp"
