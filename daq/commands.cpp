@@ -78,10 +78,14 @@ int run(const RunOptions& options) {
     return dry.ok() ? 0 : 2;
   }
   profiles::require_within(campaign, place);
-  const profiles::Plan plan = profiles::make_plan(campaign, place);
+  const DryRun dry = dry_run(campaign, place, options.out, answers);
+  const profiles::Plan& plan = dry.plan;
   if (answers) profiles::require_mountings(*answers, plan.mounting_angles());
   put(stderr,
       fmt::format("{}\nCtrl-C lets the motor coast, closes the file and stops.\n", plan_text(campaign, place, plan)));
+  for (const LimitCheck& check : dry.checks) {
+    if (check.finding.severity != Severity::note) put(stderr, check.subject + ": " + check.finding.line() + "\n");
+  }
   const auto operator_ = person(options, answers);
   const SignalWatch signals;
   std::filesystem::create_directories(options.out);

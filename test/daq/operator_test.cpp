@@ -81,6 +81,12 @@ TEST_F(Prompt, TakesEndOfFileAsNo) {
   EXPECT_THROW(mount(90), NotMounted);
 }
 
+TEST_F(Prompt, DictatesThatTheInputEnded) {
+  answer("");
+  EXPECT_THROW(mount(90), NotMounted);
+  EXPECT_EQ(record_.back(), "operator_answered: (no more input)");
+}
+
 TEST_F(Prompt, StopsWhenASignalCame) {
   stop_ = true;
   answer("90\n");
