@@ -116,7 +116,9 @@ TEST_F(Prompt, DictatesWhatIsAskedAndWhateverIsTyped) {
   mount(90);
   EXPECT_THAT(record_,
               testing::ElementsAre(
-                  "operator_asked: type the mounted angle (90) and Enter, or q to stop:", "operator_answered: 45",
+                  "operator_asked: Mount the 90° occlusion under propeller 5x3 (Test 5 inch). The motor "
+                  "is locked. Step back, then type the mounted angle (90) and Enter, or q to stop:",
+                  "operator_answered: 45",
                   "operator_asked: type the mounted angle (90) and Enter, or q to stop:", "operator_answered: 90"));
 }
 
