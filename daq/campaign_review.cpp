@@ -51,10 +51,11 @@ std::string to_words(const RepetitionVerdict& verdict) {
   std::string words = fmt::format("{:g}°: ", verdict.occlusion_deg);
   if (!verdict.reason.empty()) words += verdict.reason + "; ";
   if (std::isnan(verdict.between_sd)) return words + "there is nothing to hold it against";
+  const auto known = std::count_if(verdict.repetitions.begin(), verdict.repetitions.end(),
+                                   [](const RepetitionFigure& figure) { return !std::isnan(figure.k); });
   return words +
-         fmt::format("k of {} repetitions scatters by {:.3f} % between them, {:.3f} % are explained within them",
-                     verdict.repetitions.size(), 100 * verdict.between_sd / std::abs(verdict.k),
-                     100 * verdict.within_u / std::abs(verdict.k));
+         fmt::format("k of {} repetitions scatters by {:.3f} % between them, {:.3f} % are explained within them", known,
+                     100 * verdict.between_sd / std::abs(verdict.k), 100 * verdict.within_u / std::abs(verdict.k));
 }
 
 }  // namespace

@@ -136,7 +136,8 @@ int run(const RunOptions& options) {
     return dry.ok() ? 0 : 2;
   }
   profiles::require_within(campaign, place);
-  const profiles::Plan plan = profiles::make_plan(campaign, place);
+  const DryRun dry = dry_run(campaign, place, options.out, answers);
+  const profiles::Plan& plan = dry.plan;
   Destination destination;
   if (!options.resume.empty()) destination.open(options, campaign, place);
   if (destination.finished) return tell_finished(destination, options.json);
@@ -144,6 +145,9 @@ int run(const RunOptions& options) {
   if (answers && !destination.resumption) profiles::require_mountings(*answers, plan.mounting_angles());
   put(stderr,
       fmt::format("{}\nCtrl-C lets the motor coast, closes the file and stops.\n", plan_text(campaign, place, plan)));
+  for (const LimitCheck& check : dry.checks) {
+    if (check.finding.severity != Severity::note) put(stderr, check.subject + ": " + check.finding.line() + "\n");
+  }
   live::View view(options.live, live::subject_of(campaign));
   put(stderr, live::greeting(view));
   const std::function<bool()> stop_asked = [&view] { return SignalWatch::count() > 0 || view.stop_asked(); };

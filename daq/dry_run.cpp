@@ -66,24 +66,22 @@ class Limits {
     const double limit = campaign_.limits.thrust_max.value();
     const auto prior = thrust_prior(campaign_.propeller);
     if (!prior)
-      return add(Severity::note, "thrust",
-                 fmt::format("limit {:g} N; nothing published tells what such a propeller pulls", limit));
+      return tell("thrust", fmt::format("limit {:g} N; nothing published tells what such a propeller pulls", limit));
     const double low = ThrustPrior::at(prior->low, top_speed(campaign_)).value();
     const double high = ThrustPrior::at(prior->high, top_speed(campaign_)).value();
     const std::string words = fmt::format("about {:.1f} to {:.1f} N expected at top speed ({}), limit {:g} N", low,
                                           high, prior->source, limit);
-    if (low > limit) return add(Severity::fault, "thrust", words, "raise limits.thrust_max_n, or lower the profile");
-    if (high > limit) return add(Severity::warning, "thrust", words, "the limit may stop the run");
+    if (high > limit)
+      return add(Severity::warning, "thrust", words,
+                 low > limit ? "the limit will stop the run" : "the limit may stop the run");
     add(Severity::note, "thrust", words);
   }
 
-  void torque() {
-    add(Severity::note, "torque", "no published number predicts it; the ranges of the load cell are watched");
-  }
+  void torque() { tell("torque", "no published number predicts it; the ranges of the load cell are watched"); }
 
   void range() {
-    add(Severity::note, "load cell range",
-        "told by the box itself: kphi devices --bench BENCH --campaign CAMPAIGN asks it, and so does the run");
+    tell("load cell range",
+         "told by the box itself: kphi devices --bench BENCH --campaign CAMPAIGN asks it, and so does the run");
   }
 
   void sampling() {
@@ -126,6 +124,25 @@ class Limits {
     add(Severity::note, "supply", words);
   }
 
+  /// What a rotor gives back when it is slowed down has nowhere to go.
+  void braking(const profiles::Plan& plan) {
+    const bool slows_down = std::any_of(plan.runs.begin(), plan.runs.end(), [](const profiles::PlannedRun& run) {
+      return !std::is_sorted(run.steps.begin(), run.steps.end(),
+                             [](const auto& a, const auto& b) { return a.speed < b.speed; });
+    });
+    if (!slows_down) return;
+    const auto& slew = campaign_.profile.slew_rad_s2;
+    if (slew)
+      return add(Severity::note, "braking",
+                 fmt::format("the speed falls by {:.0f} RPM/s at most", to_rpm(RadPerSec(*slew))));
+    if (!place_.supply)
+      return tell("braking", "the speed falls at once: whatever powers the motor takes what that gives back");
+    add(Severity::warning, "braking",
+        fmt::format("the speed falls at once, the supply takes nothing back and switches off above {:g} V",
+                    place_.supply->over_voltage.value()),
+        "set profile.slew_rpm_s, such as 2000");
+  }
+
   void coil() {
     const auto& limits = campaign_.limits;
     const double most = limits.coil_temperature_max.value();
@@ -165,8 +182,11 @@ class Limits {
   [[nodiscard]] std::vector<LimitCheck> take() { return std::move(checks_); }
 
  private:
+  void tell(std::string subject, std::string what) {
+    checks_.push_back({std::move(subject), {Severity::note, std::move(what), {}}, false});
+  }
   void add(Severity severity, std::string subject, std::string what, std::string next_move = {}) {
-    checks_.push_back({std::move(subject), {severity, std::move(what), std::move(next_move)}});
+    checks_.push_back({std::move(subject), {severity, std::move(what), std::move(next_move)}, true});
   }
   const Campaign& campaign_;
   const profiles::Bench& place_;
@@ -206,14 +226,18 @@ std::string runs_text(const profiles::Plan& plan, const Campaign& campaign) {
   return text;
 }
 
+const char* mark_of(const LimitCheck& check) {
+  if (check.finding.severity == Severity::fault) return "REFUSED";
+  if (check.finding.severity == Severity::warning) return "look";
+  return check.judged ? "ok" : "unknown";
+}
+
 std::string checks_text(const std::vector<LimitCheck>& checks) {
   std::string text;
-  for (const auto& [subject, finding] : checks) {
-    const char* mark = finding.severity == Severity::fault     ? "REFUSED"
-                       : finding.severity == Severity::warning ? "look"
-                                                               : "";
-    text += fmt::format("  {:7}  {:<15}  {}{}{}\n", mark, subject, finding.what, finding.next_move.empty() ? "" : "; ",
-                        finding.next_move);
+  for (const LimitCheck& check : checks) {
+    const Finding& finding = check.finding;
+    text += fmt::format("  {:7}  {:<15}  {}{}{}\n", mark_of(check), check.subject, finding.what,
+                        finding.next_move.empty() ? "" : "; ", finding.next_move);
   }
   return text;
 }
@@ -256,6 +280,7 @@ DryRun dry_run(const Campaign& campaign, const profiles::Bench& place, const std
   limits.sampling();
   limits.window();
   limits.supply();
+  limits.braking(dry.plan);
   limits.coil();
   limits.disk(dry.bytes_needed, dry.bytes_free, folder);
   limits.writable(folder);
@@ -271,10 +296,10 @@ std::string plan_text(const Campaign& campaign, const profiles::Bench& place, co
   return fmt::format(
       "{}: propeller {} ({}), occlusions{}, {} repetitions\n"
       "  {} runs of {} steps, {:.0f} to {:.0f} RPM, {:g} s each; {} mountings\n"
-      "  {:.0f} min spinning, {:.0f} min on the bench{}, {:.1f} million samples, {}",
+      "  {} spinning, {} on the bench{}, {:.1f} million samples, {}",
       campaign.name, campaign.propeller.id, campaign.propeller.name, angles, campaign.repetitions, plan.runs.size(),
       plan.runs.front().steps.size(), to_rpm(profile.first), to_rpm(profile.last), profile.dwell.value(),
-      plan.mountings, plan.spinning.value() / 60, plan.bench.value() / 60,
+      plan.mountings, minutes(plan.spinning.value()), minutes(plan.bench.value()),
       time_scale(place) > 1 ? fmt::format(" ({:g} times as fast here)", time_scale(place)) : "",
       1e-6 * static_cast<double>(plan.samples), gigabytes(bytes_needed(plan, place)));
 }
@@ -285,7 +310,7 @@ std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles:
   const double slew_s = ramp_time(campaign.profile, dry.plan.runs.front()).value();
   return fmt::format(
       "{}\n\norder: {}\n{}\ntime: {} spinning{}, {} on the bench with the zeros; on top come mounting, which waits for "
-      "you, spinning down{}, and at most {} further runs of an occlusion whose repetitions disagree\n\nlimits: {}\n{}",
+      "you, spinning down{}, and at most {} more of an occlusion whose repetitions disagree\n\nlimits: {}\n{}",
       plan_text(campaign, place, dry.plan), profiles::to_words(campaign.order), runs_text(dry.plan, campaign),
       minutes(dry.plan.spinning.value()),
       slew_s > 0 ? fmt::format(" ({} of ramps in the first run)", minutes(slew_s)) : "",
@@ -297,8 +322,9 @@ std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles:
 json to_json(const DryRun& dry, const Campaign& campaign, const profiles::Bench& place) {
   json runs = json::array(), checks = json::array();
   for (const auto& run : dry.plan.runs) runs.push_back(to_json(run, campaign));
-  for (const auto& [subject, finding] : dry.checks) {
+  for (const auto& [subject, finding, judged] : dry.checks) {
     checks.push_back({{"subject", subject},
+                      {"judged", judged},
                       {"severity", name_of(finding.severity)},
                       {"what", finding.what},
                       {"next_move", finding.next_move}});

@@ -15,10 +15,12 @@
 
 namespace kphi::daq {
 
-/// One limit that was looked at. A note: within it. A fault: the campaign would be refused or stopped.
+/// One limit that was looked at. A note: within it, if it was judged. A fault: the campaign would be refused or
+/// stopped.
 struct LimitCheck {
   std::string subject;  ///< "speed", "thrust", …
   Finding finding;
+  bool judged = true;  ///< false: only a device can tell, or nobody
 };
 
 struct DryRun {

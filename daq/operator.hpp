@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "daq/interrupt.hpp"
@@ -83,8 +84,10 @@ class TerminalOperator final : public Operator {
   void mount(const profiles::Propeller& propeller, double occlusion_deg) override;
 
  private:
-  std::string answer_to(const std::string& question);
-  std::string read_line();
+  /// `about` is what the question is about, printed before; a question that is asked again has none.
+  std::string answer_to(const std::string& about, const std::string& question);
+  /// Nothing: there is no more input.
+  std::optional<std::string> read_line();
   int input_;
   std::FILE* words_;
   std::function<bool()> stop_asked_;

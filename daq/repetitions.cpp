@@ -245,14 +245,18 @@ void decide(RepetitionVerdict& verdict, const RepetitionRule& rule) {
 
 using RunName = std::tuple<std::string, double, int>;  // propeller, occlusion, repetition
 
-std::set<RunName> outlying_runs(std::span<const StepMean> steps) {
-  std::set<RunName> outlying;
+/// Those that stand out, and, beside one that is usable, those that are not.
+std::set<RunName> spoiled_runs(std::span<const StepMean> steps) {
+  std::set<RunName> spoiled;
   for (const RepetitionVerdict& verdict : judge_repetitions(steps)) {
+    const bool any_usable = std::any_of(verdict.repetitions.begin(), verdict.repetitions.end(),
+                                        [](const RepetitionFigure& figure) { return figure.usable; });
     for (const RepetitionFigure& figure : verdict.repetitions) {
-      if (figure.outlying) outlying.emplace(verdict.propeller, verdict.occlusion_deg, figure.repetition);
+      if (figure.outlying || (any_usable && !figure.usable))
+        spoiled.emplace(verdict.propeller, verdict.occlusion_deg, figure.repetition);
     }
   }
-  return outlying;
+  return spoiled;
 }
 
 }  // namespace
@@ -268,11 +272,11 @@ double thrust_u_within(const StepMean& step) {
 }
 
 std::vector<StepMean> means_of(std::span<const StepMean> steps) {
-  const std::set<RunName> outlying = outlying_runs(steps);
+  const std::set<RunName> spoiled = spoiled_runs(steps);
   std::vector<StepMean> kept;
   std::map<std::pair<std::string, double>, std::pair<std::set<int>, std::set<int>>> counts;  // averaged, left out
   for (const StepMean& step : steps) {
-    const bool out = outlying.contains({step.propeller, step.occlusion_deg, step.repetition});
+    const bool out = spoiled.contains({step.propeller, step.occlusion_deg, step.repetition});
     auto& [averaged, left_out] = counts[{step.propeller, step.occlusion_deg}];
     (out ? left_out : averaged).insert(step.repetition);
     if (!out) kept.push_back(step);

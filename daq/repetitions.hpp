@@ -19,8 +19,9 @@ namespace kphi::daq {
 /// is so. Numbers of samples: sums. Doubts: those of any repetition.
 [[nodiscard]] std::vector<results::StepMean> average_repetitions(std::span<const results::StepMean> steps);
 
-/// What means.csv holds: average_repetitions without the outlying ones (judge_repetitions), which stay in steps.csv.
-/// Rows from which one was left out tell it: repetitions_averaged, repetitions_left_out.
+/// What means.csv holds: average_repetitions without the outlying ones and, beside a usable one, those that are not
+/// usable (judge_repetitions); they stay in steps.csv. Rows from which one was left out tell it: repetitions_averaged,
+/// repetitions_left_out.
 [[nodiscard]] std::vector<results::StepMean> means_of(std::span<const results::StepMean> steps);
 
 /// Without a doubt about thrust over speed².

@@ -23,6 +23,7 @@ namespace {
 struct Loaded {
   std::vector<std::pair<std::size_t, Campaign>> campaigns;  ///< with the file's number
   std::vector<Bench> benches;
+  std::vector<std::pair<std::size_t, Answers>> answers;  ///< with the file's number
 };
 
 std::string minutes(Seconds time) {
@@ -186,7 +187,8 @@ void judge(CheckedFile& file, std::size_t number, const std::vector<ForeignKind>
     loaded.benches.push_back(parse_bench(text, file.path));
     file.summary = summary_of(loaded.benches.back());
   } else if (kind == FileKind::answers) {
-    file.summary = summary_of(parse_answers(text, file.path));
+    loaded.answers.emplace_back(number, parse_answers(text, file.path));
+    file.summary = summary_of(loaded.answers.back().second);
   } else {
     file.summary = summary_of(parse_vehicle(text, file.path));
   }
@@ -232,6 +234,18 @@ void check_against_benches(std::vector<CheckedFile>& files, const Loaded& loaded
   }
 }
 
+void check_answers(std::vector<CheckedFile>& files, const Loaded& loaded) {
+  for (const auto& [number, answers] : loaded.answers) {
+    for (const auto& [unused, campaign] : loaded.campaigns) {
+      try {
+        require_mountings(answers, make_plan(campaign, Bench{}).mounting_angles());
+      } catch (const ConfigurationError& refused) {
+        refuse(files[number], refused.what());
+      }
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<CheckedFile> check_files(const std::vector<std::string>& paths, const std::vector<ForeignKind>& foreign) {
@@ -239,6 +253,7 @@ std::vector<CheckedFile> check_files(const std::vector<std::string>& paths, cons
   Loaded loaded;
   for (const std::string& path : paths) files.push_back(check_file(path, files.size(), foreign, loaded));
   check_against_benches(files, loaded);
+  check_answers(files, loaded);
   for (CheckedFile& file : files) {
     if (!file.kind.empty()) file.report["kind"] = file.kind;
     file.report["ok"] = file.ok();

@@ -26,7 +26,8 @@ struct ForeignKind {
   std::function<std::string(const std::string& path)> judge;
 };
 
-/// Checks every file by itself, then every campaign against every bench among them. Throws nothing about their content.
+/// Checks every file by itself, then every campaign against every bench, and all answers against every
+/// campaign, among them. Throws nothing about their content.
 [[nodiscard]] std::vector<CheckedFile> check_files(const std::vector<std::string>& paths,
                                                    const std::vector<ForeignKind>& foreign);
 

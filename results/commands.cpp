@@ -97,6 +97,7 @@ Json describe(const std::filesystem::path& path) {
 Json describe_folder(const CampaignFolder& folder) {
   Json runs = Json::array();
   for (const auto& path : folder.complete_runs()) runs.push_back(describe(path));
+  for (const auto& path : folder.reference_runs()) runs.push_back(describe(path));
   Json others = Json::array();
   for (const auto& path : folder.other_runs()) others.push_back(path.string());
   return {{"folder", folder.path().string()}, {"runs", runs}, {"not_complete", others}};

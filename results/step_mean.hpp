@@ -87,7 +87,7 @@ struct StepMean {
   double lag_s = kNotMeasured;                 ///< the thrust shows so much later than the speed
   double lag_u_s = kNotMeasured;               ///< standard uncertainty
   std::uint64_t speed_glitches = 0;            ///< speeds left out
-  double repetitions_averaged = kNotMeasured;  ///< in an average from which outlying repetitions were left out
+  double repetitions_averaged = kNotMeasured;  ///< in an average from which repetitions were left out
   double repetitions_left_out = kNotMeasured;
 };
 

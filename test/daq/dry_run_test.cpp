@@ -51,7 +51,7 @@ TEST_F(DryRunOfAShortCampaign, PrintsMountingsAndRunsInTheirOrder) {
                               "     2  5x3_phi000_rep2.h5  4 steps, 6000 to 18000 RPM\n"
                               "  mount 90°\n"
                               "     3  5x3_phi090_rep1.h5  4 steps, 6000 to 18000 RPM\n"));
-  EXPECT_THAT(text, HasSubstr("limits: nothing is refused"));
+  EXPECT_THAT(text, HasSubstr("limits: nothing is refused\n  ok       speed  "));
 }
 
 TEST_F(DryRunOfAShortCampaign, PrintsEveryLevelOfShuffledSteps) {
@@ -76,14 +76,15 @@ TEST_F(DryRunOfAShortCampaign, RefusesMoreSpeedThanTheMotorMayTurnButStillLooksA
   EXPECT_THAT(to_text(found, campaign_, place_), AllOf(HasSubstr("limits: 1 refused"), HasSubstr("REFUSED  speed")));
 }
 
-TEST_F(DryRunOfAShortCampaign, RefusesAThrustLimitThatThePropellerWillPass) {
+TEST_F(DryRunOfAShortCampaign, WarnsOfAThrustLimitThatThePropellerIsLikelyToPass) {
   campaign_.limits.thrust_max = Newtons(4.5);
-  EXPECT_THAT(line(dry(), "thrust"), HasSubstr("warning: about 4.0 to 4.9 N"));
+  EXPECT_THAT(line(dry(), "thrust"), AllOf(HasSubstr("warning: about 4.0 to 4.9 N"), HasSubstr("may stop")));
   EXPECT_TRUE(dry().ok());
   campaign_.limits.thrust_max = Newtons(3);
-  EXPECT_THAT(line(dry(), "thrust"), HasSubstr("fault: about 4.0 to 4.9 N"));
+  EXPECT_THAT(line(dry(), "thrust"), HasSubstr("the limit will stop the run"));
   campaign_.propeller.diameter_in = 9;
   EXPECT_THAT(line(dry(), "thrust"), HasSubstr("nothing published tells"));
+  EXPECT_THAT(to_text(dry(), campaign_, place_), HasSubstr("unknown  thrust"));
 }
 
 TEST_F(DryRunOfAShortCampaign, RefusesADiskThatIsTooFullAndAFolderThatCannotBeWritten) {
@@ -113,6 +114,17 @@ TEST_F(DryRunOfAShortCampaign, WarnsOfASupplyThatIsSetBesideTheCampaign) {
   EXPECT_THAT(line(dry(), "supply"), HasSubstr("warning: set to 15 V"));
   place_.supply->voltage = Volts(12.5);
   EXPECT_THAT(line(dry(), "supply"), HasSubstr("note: set to 12.5 V"));
+}
+
+TEST_F(DryRunOfAShortCampaign, WarnsOfStepsDownwardsOnASupplyThatTakesNothingBack) {
+  EXPECT_EQ(line(dry(), "braking"), "") << "upwards nothing is given back";
+  campaign_.order.steps = profiles::StepOrderKind::up_and_down;
+  EXPECT_THAT(line(dry(), "braking"), HasSubstr("note: the speed falls at once: whatever powers the motor"));
+  place_.supply = profiles::SupplyPlace{"scpi-tcp:host", Volts(12), Amperes(18), Volts(14), Amperes(20)};
+  EXPECT_THAT(line(dry(), "braking"), HasSubstr("warning: the speed falls at once, the supply takes nothing back and "
+                                                "switches off above 14 V; set profile.slew_rpm_s"));
+  campaign_.profile.slew_rad_s2 = from_rpm(2000).value();
+  EXPECT_EQ(line(dry(), "braking"), "note: the speed falls by 2000 RPM/s at most");
 }
 
 TEST_F(DryRunOfAShortCampaign, HoldsAnswersAgainstTheMountings) {

@@ -81,6 +81,12 @@ TEST_F(Prompt, TakesEndOfFileAsNo) {
   EXPECT_THROW(mount(90), NotMounted);
 }
 
+TEST_F(Prompt, DictatesThatTheInputEnded) {
+  answer("");
+  EXPECT_THROW(mount(90), NotMounted);
+  EXPECT_EQ(record_.back(), "operator_answered: (no more input)");
+}
+
 TEST_F(Prompt, StopsWhenASignalCame) {
   stop_ = true;
   answer("90\n");
@@ -110,7 +116,9 @@ TEST_F(Prompt, DictatesWhatIsAskedAndWhateverIsTyped) {
   mount(90);
   EXPECT_THAT(record_,
               testing::ElementsAre(
-                  "operator_asked: type the mounted angle (90) and Enter, or q to stop:", "operator_answered: 45",
+                  "operator_asked: Mount the 90° occlusion under propeller 5x3 (Test 5 inch). The motor "
+                  "is locked. Step back, then type the mounted angle (90) and Enter, or q to stop:",
+                  "operator_answered: 45",
                   "operator_asked: type the mounted angle (90) and Enter, or q to stop:", "operator_answered: 90"));
 }
 

@@ -152,6 +152,19 @@ TEST(MeansOf, LeaveOutlyingRepetitionsOutAndSaySo) {
   EXPECT_EQ(again.at(3).repetitions_left_out, 1);
 }
 
+TEST(MeansOf, LeaveOutARepetitionInDoubtWhenAnotherIsGood) {
+  auto steps = runs({0, 0.001});
+  for (auto& step : steps) {
+    if (step.repetition == 2) step.doubts = static_cast<std::uint32_t>(Doubt::zero_drifted);
+  }
+  EXPECT_EQ(means_of(steps).at(5).thrust_n, steps.at(5).thrust_n);
+  EXPECT_EQ(means_of(steps).at(5).doubts, 0u);
+  EXPECT_EQ(means_of(steps).at(5).repetitions_left_out, 1);
+  for (auto& step : steps) step.doubts = static_cast<std::uint32_t>(Doubt::zero_drifted);
+  EXPECT_EQ(results::format_steps(means_of(steps)), results::format_steps(average_repetitions(steps)))
+      << "all are in doubt: better that than nothing";
+}
+
 TEST(MeansOf, AreTheAveragesWhereNoneStandsOut) {
   const auto steps = runs({0, 0.0002, -0.0002});
   EXPECT_EQ(results::format_steps(means_of(steps)), results::format_steps(average_repetitions(steps)));

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "profiles/strict_yaml.hpp"
 #include "test/profiles/refusals.hpp"
 
 namespace kphi::profiles {
@@ -70,6 +71,18 @@ TEST_F(Check, SumsUpACampaign) {
   EXPECT_EQ(file.report["plan"]["runs"], 15);
   EXPECT_EQ(file.report["plan"]["spinning_s"], 1200.0);
   EXPECT_EQ(file.report["plan"]["bytes"], 388080000);
+}
+
+TEST_F(Check, HoldsAnswersAgainstTheCampaignsAmongTheFiles) {
+  const auto good = check({shipped("answers_example.yaml"), shipped("icra2021_6in_2blade.yaml")});
+  EXPECT_TRUE(good[0].ok());
+  EXPECT_EQ(good[0].summary, "  mountings  0 45 90 180 270 degrees\n  run again  0 decisions\n");
+  const std::string text = read_text(shipped("icra2021_6in_2blade.yaml"));
+  const std::string other = write("other.yaml", changed(text, "[0, 45,", "[0, 60,"));
+  const auto bad = check({shipped("answers_example.yaml"), other});
+  EXPECT_TRUE(bad[1].ok());
+  EXPECT_THAT(bad[0].errors,
+              testing::ElementsAre(testing::HasSubstr("mounting 2 is 45 degrees, the campaign asks for 60")));
 }
 
 TEST_F(Check, SumsUpAVehicleWithTheOcclusionsOfItsShapes) {
