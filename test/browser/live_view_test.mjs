@@ -6,7 +6,7 @@ import { existsSync, readdirSync, readFileSync } from 'node:fs';
 import http from 'node:http';
 import { createRequire } from 'node:module';
 import path from 'node:path';
-import { Bench } from './bench.mjs';
+import { Bench, Child } from './bench.mjs';
 
 const [kphi, modules, pictures] = process.argv.slice(2);
 const kSkipped = 77, kInterrupted = 130;
@@ -128,6 +128,7 @@ try {
     await page.waitForFunction(() => state.ended);
     assert.match(await page.locator('#banner').innerText(), /stopped by request/);
     assert.equal(await page.locator('#stop_word').innerText(), 'ENDED');
+    await page.waitForFunction(() => document.getElementById('speed').textContent === '–');
     await page.screenshot({ path: path.join(pictures, 'live_view_stopped.png') });
     const stages = await bench.stages();
     const drives = stages.filter(([at]) => at <= pressed).at(-1), end = stages.at(-1);
@@ -152,7 +153,25 @@ try {
     assert.ok(asked.length >= 2);
     assert.deepEqual(complaints.filter(text => !text.includes('ERR_CONNECTION_REFUSED')), []);
   });
-  console.log(`${results.length} of 6 shown`);
+  await it('shows a recorded run again, in which nothing can be stopped', async () => {
+    const file = new URL('../../results/reference/runs/5x3_phi090_rep1.h5', import.meta.url).pathname;
+    const replay = new Child(kphi, ['replay', file, '--live', '--speed', '20']);
+    try {
+      const seen = await browser.newPage({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
+      await seen.goto((await replay.waitFor(/^live: (\S+)$/m))[1]);
+      await seen.waitForFunction(() => state.steps.length >= 1);
+      assert.equal(await seen.locator('#stop_word').innerText(), 'REPLAY');
+      assert.ok(await seen.locator('#stop').isDisabled());
+      await seen.keyboard.press('Escape');
+      await seen.screenshot({ path: path.join(pictures, 'live_view_replay.png') });
+      await seen.waitForFunction(() => state.ended);
+      assert.equal(await replay.ended, 0, replay.words);
+      assert.equal(await seen.locator('#stop_word').innerText(), 'REPLAY OVER');
+    } finally {
+      if (replay.code === undefined) replay.signal('SIGKILL');
+    }
+  });
+  console.log(`${results.length} of 7 shown`);
 } finally {
   await browser?.close();
   bench.clear();
