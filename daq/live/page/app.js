@@ -191,6 +191,7 @@ function banner(kind, title, words) {
 }
 
 function showStop() {
+  document.body.classList.toggle('over', state.ended);
   const button = at('stop'), replay = state.hello && state.hello.replay;
   const open = link !== null && link.readyState === WebSocket.OPEN;
   const word = state.ended ? (replay ? 'REPLAY OVER' : 'ENDED') : replay ? 'REPLAY' : state.asked ? 'STOPPING' : 'STOP';
