@@ -110,7 +110,10 @@ std::string plot_message(const Tick& tick, const std::vector<LimitBar>& limits) 
   const auto drop_unknown = [](ordered_json& object) {
     for (auto item = object.begin(); item != object.end();) {
       const bool unknown = item->is_number_float() && !std::isfinite(item->get<double>());
-      item = unknown ? object.erase(item) : item + 1;
+      if (unknown)
+        item = object.erase(item);
+      else
+        ++item;
     }
   };
   drop_unknown(message);

@@ -87,7 +87,7 @@ function drawSteps() {
   const low = 1e6 * Math.min(...shown.map(step => step.k_n_s2 - u(step)));
   const high = 1e6 * Math.max(...shown.map(step => step.k_n_s2 + u(step)));
   const room = Math.max(0.08 * (high - low), 0.01 * Math.abs(high)) || 1;
-  const digits = Math.max(0, Math.ceil(0.5 - Math.log10(high - low + 2 * room)) + 1);
+  const digits = Math.max(0, Math.ceil(1 - Math.log10(high - low + 2 * room)));
   charts.k.updateOptions({ file: rows.length > 1 ? rows : [rows[0], rows[0]], labels: ['x', ...angles.map(a => a + '°')],
     colors: paints, dateWindow: [0, 1.05 * rows[rows.length - 1][0]], valueRange: [low - room, high + room],
     axes: { y: { axisLabelWidth: 62, axisLabelFormatter: value => fixed(value, digits) } } });
@@ -104,16 +104,12 @@ function drawSteps() {
 function showNumbers() {
   const tick = state.tick;
   if (!tick) return;
-  text('thrust', fixed(tick.thrust_n, 3));
-  text('speed', thousands(tick.speed_rpm));
-  const stale = (value, age) => value === null ? `nothing for ${age.toFixed(1)} s` : null;
-  const thrustStale = stale(tick.thrust_n, tick.thrust_age_s), speedStale = stale(tick.speed_rpm, tick.speed_age_s);
-  at('thrust').closest('.figure').classList.toggle('stale', thrustStale !== null);
-  at('speed').closest('.figure').classList.toggle('stale', speedStale !== null);
-  text('thrust_beside', thrustStale || (tick.torque_nm === null ? ' ' : `torque ${fixed(1e3 * tick.torque_nm, 1)} mN m`));
+  showFigure('thrust', tick.thrust_n, value => fixed(value, 3), tick.thrust_age_s,
+    tick.torque_nm === null ? '\u00a0' : `torque ${fixed(1e3 * tick.torque_nm, 1)} mN m`);
   const turns = tick.step >= 0;
-  text('speed_beside', speedStale || (turns ? `commanded ${thousands(tick.commanded_rpm)}` : 'not commanded'));
-  at('speed_beside').classList.toggle('off', turns && tick.speed_rpm !== null &&
+  showFigure('speed', tick.speed_rpm, thousands, tick.speed_age_s,
+    turns ? `commanded ${thousands(tick.commanded_rpm)}` : 'not commanded');
+  at('speed_beside').classList.toggle('off', turns && !state.ended && tick.speed_rpm !== null &&
     Math.abs(tick.speed_rpm - tick.commanded_rpm) > 0.05 * tick.commanded_rpm + 100);
   text('occlusion', fixed(tick.occlusion_deg, 0) + '°');
   text('repetition', `${tick.repetition}/${tick.repetitions}`);
@@ -125,6 +121,15 @@ function showNumbers() {
   at('progress').setAttribute('aria-valuenow', Math.round(100 * tick.progress));
   showReadings(tick);
   showLimits(tick);
+}
+
+/// What is no longer measured is no number.
+function showFigure(id, value, words, age_s, beside) {
+  const silent_s = Math.max(age_s, state.tick.silent_s), stale = value === null || state.tick.silent_s > kSilent_s;
+  text(id, state.ended ? '–' : stale ? '?' : words(value));
+  text(id + '_beside', state.ended ? `not measured any more, last ${words(value)}` : stale ? `nothing for ${fixed(silent_s, 1)} s` : beside);
+  at(id).closest('.figure').classList.toggle('stale', stale && !state.ended);
+  at(id).closest('.figure').classList.toggle('over', state.ended);
 }
 
 function showReadings(tick) {
@@ -186,12 +191,13 @@ function banner(kind, title, words) {
 }
 
 function showStop() {
+  document.body.classList.toggle('over', state.ended);
   const button = at('stop'), replay = state.hello && state.hello.replay;
   const open = link !== null && link.readyState === WebSocket.OPEN;
   const word = state.ended ? (replay ? 'REPLAY OVER' : 'ENDED') : replay ? 'REPLAY' : state.asked ? 'STOPPING' : 'STOP';
   text('stop_word', word);
   at('stop_word').classList.toggle('long', word.length > 5);
-  text('stop_keys', replay ? 'nothing turns here' : state.ended ? 'the motor was let go' : open ? 'Space or Esc' : 'no connection');
+  text('stop_keys', replay ? 'nothing turns here' : state.ended ? 'read below what happened' : open ? 'Space or Esc' : 'no connection');
   button.classList.toggle('asked', state.asked && !state.ended);
   button.classList.toggle('over', state.ended);
   button.disabled = state.ended || replay || !open;
@@ -243,6 +249,7 @@ const take = {
   },
   end(message) {
     state.ended = true;
+    state.numbersDue = true;
     addLine(message.time_s, message.text);
     const replay = state.hello.replay;
     banner(message.well ? 'good' : state.asked ? '' : 'bad', message.well ? (replay ? 'The replay is over.' : 'The campaign is finished.') : 'The run is over.', message.well ? '' : message.text);
