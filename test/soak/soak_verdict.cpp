@@ -294,6 +294,17 @@ bool supply_was_out_of_band(const World& world, const results::StepMean& step) {
   });
 }
 
+/// The box itself said, or its numbers did, that what it measured in the middle of the window is worth nothing.
+bool box_was_disturbed(const Reaches& reaches, const results::StepMean& step) {
+  using K = sim::FaultKind;
+  const Instant begin = from_seconds(step.window_begin_s) + 3 * kMisplaced;
+  const Instant end = from_seconds(step.window_end_s) - 3 * kMisplaced;
+  return std::any_of(reaches.cell().begin(), reaches.cell().end(), [&](const sim::Fault& fault) {
+    const bool disturbs = fault.kind == K::stall || fault.kind == K::saturation || fault.kind == K::status;
+    return disturbs && std::min(fault.end(), end) - std::max(fault.at, begin) > kMisplaced;
+  });
+}
+
 std::string names(const std::vector<results::StepMean>& steps) {
   std::string all;
   for (const auto& step : steps) all += (all.empty() ? "" : ", ") + ("\"" + results::doubt_names(step.doubts) + "\"");
@@ -312,6 +323,8 @@ void check_run(World& world, const FileOfRun& file, const Reaches& reaches, Verd
     if (supply_was_out_of_band(world, step)) doubts &= ~static_cast<std::uint32_t>(Doubt::supply_out_of_band);
     if ((step.doubts & ~kNeedNotTell) == 0) check_truth(world, file, step, verdict.wrong);
     check_missing(world, file, step, verdict.wrong);
+    if (box_was_disturbed(reaches, step) && (step.doubts & ~(kNeedNotTell | kByChance)) == 0)
+      verdict.wrong.push_back(step_name(file, step) + ": the box was disturbed in its window, it does not say so");
     verdict.clean_steps += clean;
     verdict.clean_steps_in_doubt += clean && (step.doubts & kByChance) != 0;
   }
