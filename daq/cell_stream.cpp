@@ -33,7 +33,7 @@ bool constant(const CountSums& sums, std::uint32_t n) {
 
 }  // namespace
 
-bool CellBin::frozen() const { return n > 1 && constant(force, n) && constant(torque, n); }
+bool CellBin::frozen() const { return n > 1 && constant(force, n); }
 
 double CellBins::Gap::up_to(double time_ns) const {
   return std::clamp(std::ceil((time_ns - before_ns) / period_ns) - 1, 0.0, static_cast<double>(missing));
