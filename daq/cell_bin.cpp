@@ -76,11 +76,6 @@ void CellBin::add(const results::LoadCellRows& rows, const CountFrame& frame) {
   at_limit |= reach(rows.counts, frame.limits);
 }
 
-bool CellBin::frozen() const {
-  const auto constant = [this](const CountSums& sums) {
-    return sums.squares * n == static_cast<Wide>(sums.sum) * sums.sum;
-  };
-  return n > 1 && constant(force) && constant(torque);
-}
+bool CellBin::frozen() const { return n > 1 && force.squares * n == static_cast<Wide>(force.sum) * force.sum; }
 
 }  // namespace kphi::daq

@@ -37,7 +37,7 @@ struct CellBin {
   std::uint32_t status = 0;  ///< all set bits, without healthy monitor words
   bool at_limit = false;     ///< a count of some axis at the end of its range
   void add(const results::LoadCellRows& rows, const CountFrame& frame);
-  [[nodiscard]] bool frozen() const;  ///< more than one sample, and none differs
+  [[nodiscard]] bool frozen() const;  ///< more than one sample, and no force differs
 };
 
 }  // namespace kphi::daq

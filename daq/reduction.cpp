@@ -93,7 +93,7 @@ class Reduction {
     check.moved_n = newtons_ * zeros_.movement();
     check.tolerated_n = tolerated_drift(largest_thrust_n);
     check.deviation_n = std::abs(newtons_) * zeros_.largest_deviation();
-    check.only_one = run_.outcome == results::Outcome::complete && !zeros_.both();
+    check.only_one = run_.outcome == results::Outcome::complete && std::isnan(check.moved_n);
     check.u_n = std::abs(newtons_) * zeros_.largest_u();
     return check;
   }

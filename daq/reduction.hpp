@@ -28,7 +28,8 @@ struct Reduced {
 /// Its standard uncertainty: that of the mean of correlated samples (mean_error.hpp) and that of the zero. Effective
 /// number of samples: variance of the samples over that of their mean; more than there are when the noise is periodic.
 /// Zero: see zeros.hpp. A zero holds for one power-up of the box: when the box started anew in the run, each step takes
-/// that of its own power-up if there is one, and all after the first are in doubt. Zeros that drifted or are not known
+/// that of its own power-up if there is one, and all after the first are in doubt. Nobody knows then how far the zero
+/// moved: that is a doubt of all steps. Zeros that drifted or are not known
 /// well (zero_limits.hpp) put all steps of the run in doubt.
 /// Standard deviations are those of the samples (n - 1). Speed is unsigned: positive in the direction of the spin;
 /// glitches (motor_series.hpp) are left out and counted.

@@ -20,7 +20,7 @@ struct ZeroCheck {
   double moved_n = 0;      ///< from before to after; NaN with one of them only, or when the box started anew between
   double tolerated_n = 0;  ///< of moved_n
   double deviation_n = 0;  ///< of the samples, the larger one
-  bool only_one = false;   ///< in a run that was finished: nobody knows how far it moved
+  bool only_one = false;   ///< of one power-up, in a run that was finished: nobody knows how far it moved
   double u_n = 0;          ///< standard uncertainty of a zero, the larger one; NaN: too short to tell
   [[nodiscard]] bool drifted() const;
   /// Its samples scatter, or its mean is less certain than half of what it may move.

@@ -46,8 +46,8 @@ std::string judge_coefficients(const std::string& path) {
 }
 
 template <class Fault>
-std::string in_words(const Fault& fault) {
-  std::string words = fmt::format("  at {:g} s  {}", to_seconds(fault.at), name_of(fault.kind));
+std::string in_words(const Fault& fault, const char* device = "") {
+  std::string words = fmt::format("  at {:g} s  {}{}", to_seconds(fault.at), device, name_of(fault.kind));
   if (fault.lasts > Duration{0}) words += fmt::format(" for {:g} s", to_seconds(fault.lasts));
   if (fault.count > 0) words += fmt::format(", {} times at most", fault.count);
   return words + "\n";
@@ -63,6 +63,7 @@ std::string judge_faults(const std::string& path) {
   tell(sim::parse_faults(text, path));
   tell(sim::parse_motor_faults(text, path));
   tell(sim::parse_supply_faults(text, path));
+  for (const auto& fault : sim::parse_ambient_faults(text, path)) summary += in_words(fault, "ambient_");
   return summary;
 }
 

@@ -91,6 +91,8 @@ void load_faults(const std::string& path, BenchSettings& bench) {
     if (bench.supply) bench.supply->faults = supply;
     if (!bench.supply && !supply.empty())
       throw ConfigurationError(path + ": there are faults of the supply, and the bench file has no supply:");
+    if (!parse_ambient_faults(text, path).empty())
+      throw ConfigurationError(path + ": there are faults of the sensor of the air, which only a bench in process has");
   } catch (const FileError& error) {
     throw ConfigurationError(error.what());
   }

@@ -48,6 +48,12 @@ TEST(CellBins, AreExactAtTheLargestCounts) {
   EXPECT_TRUE(all.at_limit);
 }
 
+TEST(CellBins, NoticeAThrustThatRepeatsOneValueWhileTheOtherAxesGoOn) {
+  auto run = make_run(Truth{});
+  for (std::size_t i = 2500; i < 2640; ++i) run.load_cell[i].counts[2] = run.load_cell[2500].counts[2];
+  EXPECT_TRUE(CellStream(run).bins(kSecond).over(0, 100).frozen);
+}
+
 TEST(CellBins, NoticeACellThatRepeatsOneValue) {
   auto run = make_run(Truth{});
   const auto freeze = [&](std::size_t begin, std::size_t end) {

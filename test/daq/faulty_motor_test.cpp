@@ -1,6 +1,4 @@
 // Campaigns on the deterministic bench whose motor module, its line or its supply go wrong by a script.
-#include <random>
-
 #include "test/daq/faulty_campaign.hpp"
 
 namespace kphi::daq {
@@ -110,73 +108,6 @@ TEST_F(FaultyMotor, WaitsUntilTheCoilHasCooledDown) {
   for (const auto& entry : results::read_journal(results_->journal()).entries) names.push_back(entry.event);
   EXPECT_THAT(names, testing::IsSupersetOf({"cooling", "cooled_down"}));
   EXPECT_THAT(said_.lines, Contains(HasSubstr("waiting for 50 °C")));
-}
-
-/// One entry of a fault script in the first run, drawn from `random`.
-std::string random_fault(std::mt19937& random) {
-  static const std::vector<std::string> kinds{"for_s: 0.5, kind: motor_flip, p: 0.2, bits: 2",
-                                              "for_s: 0.5, kind: motor_bad_crc, p: 0.3",
-                                              "for_s: 0.5, kind: motor_drop, p: 0.5",
-                                              "for_s: 0.5, kind: motor_duplicate, p: 0.5",
-                                              "for_s: 0.5, kind: motor_reorder, p: 0.3, delay_s: 0.005",
-                                              "for_s: 0.5, kind: motor_truncate, p: 0.2, size: 6",
-                                              "for_s: 0.5, kind: motor_garbage, p: 0.3, bytes: 55 3B 32",
-                                              "for_s: 0.5, kind: motor_merge, p: 0.5, delay_s: 0.016",
-                                              "for_s: 0.5, kind: motor_delay, delay_s: 0.01, jitter_s: 0.02",
-                                              "for_s: 0.5, kind: motor_value, p: 0.2, value: nan",
-                                              "for_s: 0.5, kind: motor_wrong_id, p: 0.3, id: 5",
-                                              "for_s: 0.5, kind: motor_stuck",
-                                              "for_s: 0.3, kind: motor_mute",
-                                              "for_s: 2, kind: motor_mute",
-                                              "for_s: 0.3, kind: motor_deaf",
-                                              "for_s: 2, kind: motor_deaf",
-                                              "for_s: 0.4, kind: motor_unplug",
-                                              "for_s: 0.4, kind: motor_unplug, other: 1",
-                                              "kind: motor_brown_out, down_s: 0.1",
-                                              "for_s: 0.5, kind: motor_ignore_sets",
-                                              "kind: motor_baud",
-                                              "for_s: 0.5, kind: motor_redline, speed_rad_s: 900",
-                                              "for_s: 0.5, kind: motor_hot, coil_celsius: 80",
-                                              "for_s: 0.5, kind: motor_sag, volts: 3",
-                                              "for_s: 0.5, kind: motor_over_voltage, volts: 4"};
-  const double at = std::uniform_real_distribution<double>(0.0, 3.5)(random);
-  return fmt::format("  - {{at_s: {:.4f}, {}}}\n", at, kinds[random() % kinds.size()]);
-}
-
-std::string random_faults(unsigned seed) {
-  std::mt19937 random(seed);
-  std::string faults;
-  for (unsigned n = 1 + random() % 3; n > 0; --n) faults += random_fault(random);
-  return faults;
-}
-
-TEST_F(FaultyMotor, IsWholeSafelyStoppedOrRefusedWhateverHappens) {
-  campaign_ = test::short_campaign("0", 1);
-  int finished = 0, stopped = 0, refused = 0;
-  for (unsigned seed = 1; seed <= 60; ++seed) {
-    const std::string faults = random_faults(seed);
-    SCOPED_TRACE(fmt::format("seed {}:\n{}", seed, faults));
-    bench_.reset();
-    try {
-      (void)run(faults, static_cast<int>(seed));
-      ++finished;
-      expect_replay_agrees();
-    } catch (const SafetyStop&) {
-      ++stopped;
-      EXPECT_TRUE(results::verify_run(results_->other_runs().at(0)).whole())
-          << testing::PrintToString(results::verify_run(results_->other_runs().at(0)).problems);
-    } catch (const DeviceError&) {
-      ++refused;  // before anything turned
-    } catch (const ConfigurationError&) {
-      ++refused;
-    }
-    EXPECT_TRUE(!bench_ || motor_is_let_go());
-  }
-  EXPECT_GT(finished, 15);
-  EXPECT_GT(stopped, 10);
-  RecordProperty("finished", finished);
-  RecordProperty("stopped", stopped);
-  RecordProperty("refused", refused);
 }
 
 TEST_F(FaultyMotor, GivesTheSameBytesFromTheSameSeed) {

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "daq/campaign_run.hpp"
 #include "daq/deterministic_bench.hpp"
 #include "daq/reduction.hpp"
@@ -40,6 +42,15 @@ class SupplyCampaign : public testing::Test {
     results_.emplace(results::CampaignFolder::create(folder_.path(), "u", "c"));
     AgreeingOperator person;
     return run_campaign(*bench_, campaign_, place_, *results_, person, progress_, [] { return false; });
+  }
+  /// From now on; `count` answers, or 0: all of a minute.
+  void spoil(sim::SupplyFaultKind kind, std::uint64_t count) {
+    sim::SupplyFault fault;
+    fault.kind = kind;
+    fault.at = bench_->clock().now();
+    fault.lasts = std::chrono::minutes(1);
+    fault.count = count;
+    bench_->simulation().supply()->add_fault(fault);
   }
   sim::SupplyCircuit& circuit() { return bench_->simulation().supply()->circuit(); }
   [[nodiscard]] results::RunRecording aborted() const {
@@ -127,6 +138,29 @@ TEST_F(SupplyCampaign, StopsWhenItsProtectionTrips) {
 TEST_F(SupplyCampaign, StopsWhenSomebodyTurnsTheKnob) {
   expect_stop(
       50, [&] { circuit().controls().volts = 11.8; }, "somebody has turned a knob");
+}
+
+TEST_F(SupplyCampaign, StopsWhenTheSupplyNoLongerAnswersAndSaysThatItMayBeOn) {
+  bool closed = false;
+  progress_.act = [&](const Position& position) {
+    if (position.step == 0 && !std::exchange(closed, true)) spoil(sim::SupplyFaultKind::closed, 0);
+  };
+  try {
+    (void)run();
+    FAIL() << "nobody missed the supply";
+  } catch (const SafetyStop& stop) {
+    EXPECT_THAT(stop.what(), testing::AllOf(testing::StartsWith("supply:"), HasSubstr("it may be ON")));
+  }
+  bench_->wait_until(bench_->clock().now() + std::chrono::milliseconds(200));
+  EXPECT_EQ(bench_->simulation().motor().stage().mode, sim::PowerStage::Mode::coast);
+}
+
+TEST_F(SupplyCampaign, BearsAnAnswerThatIsLost) {
+  bool lost = false;
+  progress_.act = [&](const Position& position) {
+    if (position.step == 1 && !std::exchange(lost, true)) spoil(sim::SupplyFaultKind::bad_crc, 2);
+  };
+  EXPECT_EQ(run().doubtful_steps, 0);
 }
 
 TEST_F(SupplyCampaign, IsTheSameForTheSameSeed) {

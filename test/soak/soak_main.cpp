@@ -43,6 +43,9 @@ void live_one(std::uint64_t seed, bool talkative, Tally& tally) {
                       world.story().reason);
     if (talkative) {
       for (const std::string& line : world.story().said) end += "\n#     " + line;
+      for (const auto& stream : world.story().streams)
+        end += fmt::format("\n#     {:.4f} s: a stream, {} datagrams", kphi::to_seconds(stream.began),
+                           stream.arrivals.size());
       for (const auto& change : world.story().stages)
         end += fmt::format("\n#     {:.4f} s: {}", kphi::to_seconds(change.at), name_of(change.mode));
     }

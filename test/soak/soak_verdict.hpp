@@ -8,10 +8,12 @@
 // Record    The folder verifies; aborted runs are whole and say why; steps.csv is the reduction of the accepted runs.
 //           After a kill or with a refusing disk: all accepted runs are whole, the journal's chain is right, what was
 //           secured can be read, and at most one run is finished that the journal does not know yet.
-// Verdict   A step without a doubt shows the true thrust and speed. A step in whose window a record is missing says so.
+// Verdict   A step without a doubt shows the true thrust and speed. A step in whose window a record is missing, or in
+// which
+//           the box stood still, was saturated or reported an error, says so.
 //           A run out of reach of every fault is accepted without a doubt, but for those that short steps may have:
-//           the lag unknown, and now and then unsettled or drifting, which are counted. Nothing but a fault, the disk
-//           or the operator ends a campaign; the reason names the device concerned.
+//           the lag unknown; now and then unsettled, drifting, or with a lag that is not there, which are counted.
+//           Nothing but a fault, the disk or the operator ends a campaign; the reason names the device concerned.
 #pragma once
 
 #include <string>
@@ -24,7 +26,7 @@ namespace kphi::soak {
 struct Verdict {
   std::vector<std::string> wrong;
   int clean_steps = 0;           ///< out of reach of every fault
-  int clean_steps_in_doubt = 0;  ///< of them, that a test of significance found unsettled or drifting
+  int clean_steps_in_doubt = 0;  ///< of them, by chance: unsettled, drifting, or a lag told that is not there
 };
 
 /// `world` has lived.

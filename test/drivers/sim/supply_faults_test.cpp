@@ -70,10 +70,13 @@ TEST(SupplyFaults, StandInOneScriptWithThoseOfTheOtherDevices) {
       "format: kphi-faults/1\nfaults:\n"
       "  - {at_s: 1, kind: reboot, down_s: 1}\n"
       "  - {at_s: 2, kind: supply_trip, code: 2}\n"
-      "  - {at_s: 3, kind: motor_locked, for_s: 1}\n";
+      "  - {at_s: 3, kind: motor_locked, for_s: 1}\n"
+      "  - {at_s: 4, kind: ambient_nack, count: 2}\n";
   EXPECT_EQ(parse_faults(text, "f.yaml").size(), 1u);
   EXPECT_EQ(parse_motor_faults(text, "f.yaml").size(), 1u);
   const SupplyFaultScript script = parse_supply_faults(text, "f.yaml");
+  ASSERT_EQ(parse_ambient_faults(text, "f.yaml").size(), 1u);
+  EXPECT_EQ(parse_ambient_faults(text, "f.yaml")[0].kind, UsbFaultKind::nack);
   ASSERT_EQ(script.size(), 1u);
   EXPECT_EQ(script[0].kind, SupplyFaultKind::trip);
   EXPECT_EQ(script[0].code, 2);
