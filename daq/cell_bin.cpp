@@ -42,21 +42,21 @@ bool reach(std::span<const Counts> counts, const Counts& limits) {
   // Two records at a time: twelve numbers side by side, in whole vector registers.
   std::array<std::int32_t, 12> found{}, high{}, low{};
   for (std::size_t i = 0; i < found.size(); ++i) {
-    high[i] = limits[i % 6];
-    low[i] = -limits[i % 6];
+    high[i] = limits[i % 6] - 1;
+    low[i] = 1 - limits[i % 6];
   }
   const std::int32_t* at = counts.empty() ? nullptr : counts.front().data();
   for (std::size_t pair = 0; pair < counts.size() / 2; ++pair, at += found.size()) {
     for (std::size_t i = 0; i < found.size(); ++i) {
-      found[i] |= static_cast<std::int32_t>(at[i] >= high[i]) | static_cast<std::int32_t>(at[i] <= low[i]);
+      found[i] |= -static_cast<std::int32_t>(at[i] > high[i]) | -static_cast<std::int32_t>(at[i] < low[i]);
     }
   }
   std::int32_t any = 0;
   for (const std::int32_t one : found) any |= one;
   if (counts.size() % 2 == 1) {
     for (std::size_t i = 0; i < 6; ++i) {
-      any |= static_cast<std::int32_t>(counts.back()[i] >= high[i]) |
-             static_cast<std::int32_t>(counts.back()[i] <= low[i]);
+      any |=
+          static_cast<std::int32_t>(counts.back()[i] > high[i]) | static_cast<std::int32_t>(counts.back()[i] < low[i]);
     }
   }
   return any != 0;
