@@ -109,7 +109,7 @@ CellWindow CellBins::over(std::size_t first, std::size_t last) const {
 CellStream::CellStream(const results::RunRecording& run, std::unique_ptr<results::LoadCellColumns> columns)
     : header_(run.header),
       columns_(columns ? std::move(columns) : std::make_unique<results::RecordedColumns>(run.load_cell)),
-      clock_(columns_->stamps(), run.header.load_cell.device_rate_hz, stall_ends(run.events)),
+      clock_(*columns_, run.header.load_cell.device_rate_hz, stall_ends(run.events)),
       gaps_(advances(clock_.ft_sequence(), 2 * stride_of(run.header))),
       frame_(frame_of(run.header)) {
   for (const ClockEpoch& epoch : clock_.epochs()) {

@@ -10,9 +10,9 @@ namespace {
 
 constexpr double kBinNs = 0.5e9;
 constexpr std::size_t kLeastBins = 4;
-constexpr results::Nanoseconds kNoBreak = std::numeric_limits<results::Nanoseconds>::max();
 constexpr std::uint64_t kCounts = std::uint64_t{1} << 32;  // of ft_sequence
 constexpr std::size_t kBlock = 1024;                       // records looked at together
+constexpr std::size_t kPiece = 8192;                       // records read together
 
 /// One fresh record: device time, and how much later it arrived than the device's clock says.
 struct Point {
@@ -36,59 +36,77 @@ bool counts_on(const std::uint32_t* ft, std::size_t n) {
   return back == 0;
 }
 
+/// Of a datagram of many records only the last is fresh: the others waited for it. `each`: of its index and arrival.
+template <class Each>
+void for_each_fresh(const results::LoadCellColumns& columns, std::size_t begin, std::size_t end, Each&& each) {
+  std::vector<results::Nanoseconds> piece;
+  for (std::size_t at = begin; at < end; at += kPiece) {
+    const std::size_t n = std::min(kPiece, end - at);
+    piece.resize(std::min(n + 1, end - at));
+    columns.read_arrival(at, piece);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (i + 1 == piece.size() || piece[i + 1] != piece[i]) each(at + i, piece[i]);
+    }
+  }
+}
+
+/// The first record that arrived at or after each break.
+std::vector<std::size_t> records_at(const results::LoadCellColumns& columns,
+                                    std::span<const results::Nanoseconds> breaks) {
+  std::vector<std::size_t> found;
+  if (breaks.empty()) return found;
+  std::vector<results::Nanoseconds> arrival(columns.size());
+  columns.read_arrival(0, arrival);
+  for (const results::Nanoseconds time : breaks) {
+    found.push_back(static_cast<std::size_t>(std::lower_bound(arrival.begin(), arrival.end(), time) - arrival.begin()));
+  }
+  return found;
+}
+
 }  // namespace
 
-ClockMap::ClockMap(results::LoadCellStamps stamps, double device_rate_hz, std::span<const results::Nanoseconds> breaks)
-    : stamps_(std::move(stamps)), tick_ns_(1e9 / device_rate_hz) {
-  const auto& ft = stamps_.ft_sequence;
-  for (std::size_t begin = 0; begin < ft.size();) {
-    while (!breaks.empty() && breaks.front() <= stamps_.arrival_ns[begin]) breaks = breaks.subspan(1);
+ClockMap::ClockMap(const results::LoadCellColumns& columns, double device_rate_hz,
+                   std::span<const results::Nanoseconds> breaks)
+    : ft_(columns.ft_sequence()), tick_ns_(1e9 / device_rate_hz) {
+  const std::vector<std::size_t> broken = records_at(columns, breaks);
+  for (std::size_t begin = 0; begin < ft_.size();) {
+    const auto next_break = std::upper_bound(broken.begin(), broken.end(), begin);
     ClockEpoch epoch;
-    epoch.rebooted = begin > 0 && !counts_on(&ft[begin], 1);
+    epoch.rebooted = begin > 0 && !counts_on(&ft_[begin], 1);
     epoch.begin = begin;
-    epoch.end = counting_until(begin, breaks.empty() ? kNoBreak : breaks.front());
-    epoch.ft_first = ft[begin];
-    fit(epoch);
+    epoch.end = counting_until(begin, next_break == broken.end() ? ft_.size() : *next_break);
+    epoch.ft_first = ft_[begin];
+    fit(columns, epoch);
     epochs_.push_back(epoch);
     begin = epoch.end;
   }
 }
 
-std::size_t ClockMap::counting_until(std::size_t begin, results::Nanoseconds next_break) const {
-  const auto& ft = stamps_.ft_sequence;
+/// `next_break`: a record that begins an epoch anyway.
+std::size_t ClockMap::counting_until(std::size_t begin, std::size_t next_break) const {
   std::size_t end = begin + 1;
-  while (next_break == kNoBreak && end + kBlock <= ft.size() && counts_on(&ft[end], kBlock)) end += kBlock;
-  while (end < ft.size() && counts_on(&ft[end], 1) && stamps_.arrival_ns[end] < next_break) ++end;
+  while (end + kBlock <= next_break && counts_on(&ft_[end], kBlock)) end += kBlock;
+  while (end < next_break && counts_on(&ft_[end], 1)) ++end;
   return end;
 }
 
-std::uint32_t ClockMap::count(const ClockEpoch& epoch, std::size_t index) const {
-  return stamps_.ft_sequence[index] - epoch.ft_first;
-}
+std::uint32_t ClockMap::count(const ClockEpoch& epoch, std::size_t index) const { return ft_[index] - epoch.ft_first; }
 
-/// Of a datagram of many records only the last is fresh: the others waited for it.
-bool ClockMap::fresh(const ClockEpoch& epoch, std::size_t index) const {
-  return index + 1 == epoch.end || stamps_.arrival_ns[index + 1] != stamps_.arrival_ns[index];
-}
-
-void ClockMap::fit(ClockEpoch& epoch) const {
-  const results::Nanoseconds first_arrival = stamps_.arrival_ns[epoch.begin];
-  const auto point = [&](std::size_t i) {
-    const double device = static_cast<double>(count(epoch, i)) * tick_ns_;
-    return Point{device, static_cast<double>(stamps_.arrival_ns[i] - first_arrival) - device};
-  };
+void ClockMap::fit(const results::LoadCellColumns& columns, ClockEpoch& epoch) const {
+  results::Nanoseconds first_arrival = 0;
+  columns.read_arrival(epoch.begin, std::span(&first_arrival, 1));
   std::vector<Point> bins;
   double bin_end = -1;
-  for (std::size_t i = epoch.begin; i < epoch.end; ++i) {
-    if (!fresh(epoch, i)) continue;
-    const Point p = point(i);
+  for_each_fresh(columns, epoch.begin, epoch.end, [&](std::size_t i, results::Nanoseconds arrival) {
+    const double device = static_cast<double>(count(epoch, i)) * tick_ns_;
+    const Point p{device, static_cast<double>(arrival - first_arrival) - device};
     if (p.device_ns >= bin_end) {
       bins.push_back(p);
       bin_end = (std::floor(p.device_ns / kBinNs) + 1) * kBinNs;
     } else if (p.delay_ns < bins.back().delay_ns) {
       bins.back() = p;
     }
-  }
+  });
 
   epoch.bins = bins.size();
   double mean_x = 0, mean_y = 0, xx = 0, xy = 0;
@@ -110,16 +128,6 @@ void ClockMap::fit(ClockEpoch& epoch) const {
   }
 
   epoch.offset_ns += static_cast<double>(first_arrival);
-}
-
-double ClockMap::residual_p99_ns(const ClockEpoch& epoch) const {
-  std::vector<double> residuals;
-  for (std::size_t i = epoch.begin; i < epoch.end; ++i) {
-    if (fresh(epoch, i)) residuals.push_back(static_cast<double>(stamps_.arrival_ns[i] - time_ns(epoch, i)));
-  }
-  const auto p99 = residuals.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(residuals.size() - 1));
-  std::nth_element(residuals.begin(), p99, residuals.end());
-  return *p99;
 }
 
 results::Nanoseconds ClockMap::time_of_count(const ClockEpoch& epoch, std::uint64_t count) const {
@@ -166,7 +174,7 @@ std::size_t ClockMap::first_at(const ClockEpoch& epoch, results::Nanoseconds tim
     low += stride;
     stride *= 2;
   }
-  const auto first = stamps_.ft_sequence.begin();
+  const auto first = ft_.begin();
   const auto found = std::partition_point(first + static_cast<std::ptrdiff_t>(low),
                                           first + static_cast<std::ptrdiff_t>(std::min(low + stride, end)),
                                           [&](std::uint32_t ft) { return ft - epoch.ft_first < wanted; });

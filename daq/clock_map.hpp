@@ -28,7 +28,8 @@ class ClockMap {
   /// `device_rate_hz`: rate at which ft_sequence counts. The records must be in order of arrival.
   /// Constant delays of box, filter and wire cannot be seen one-way: times are late by their smallest sum.
   /// `breaks`: when the box took up counting after it had stood still; ascending.
-  ClockMap(results::LoadCellStamps stamps, double device_rate_hz, std::span<const results::Nanoseconds> breaks = {});
+  ClockMap(const results::LoadCellColumns& columns, double device_rate_hz,
+           std::span<const results::Nanoseconds> breaks = {});
 
   [[nodiscard]] const std::vector<ClockEpoch>& epochs() const { return epochs_; }
   /// Bench time of the sample in record `index` of `epoch`. Increases with the index.
@@ -39,9 +40,7 @@ class ClockMap {
   [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, results::Nanoseconds time, std::size_t begin,
                                      std::size_t end) const;
   /// Of each record.
-  [[nodiscard]] std::span<const std::uint32_t> ft_sequence() const { return stamps_.ft_sequence; }
-  /// 99 % of the fresh records of an epoch came less than this after the line, ns. Looks at all of them again.
-  [[nodiscard]] double residual_p99_ns(const ClockEpoch& epoch) const;
+  [[nodiscard]] std::span<const std::uint32_t> ft_sequence() const { return ft_; }
   /// Skew of an epoch in parts per million.
   [[nodiscard]] static double skew_ppm(const ClockEpoch& epoch) { return 1e6 * epoch.skew; }
   /// Below 500 ppm; more means that rate or stride are not what the box said.
@@ -51,10 +50,9 @@ class ClockMap {
   [[nodiscard]] std::uint32_t count(const ClockEpoch& epoch, std::size_t index) const;
   [[nodiscard]] results::Nanoseconds time_of_count(const ClockEpoch& epoch, std::uint64_t count) const;
   [[nodiscard]] std::uint64_t count_at(const ClockEpoch& epoch, results::Nanoseconds time) const;
-  [[nodiscard]] std::size_t counting_until(std::size_t begin, results::Nanoseconds next_break) const;
-  [[nodiscard]] bool fresh(const ClockEpoch& epoch, std::size_t index) const;
-  void fit(ClockEpoch& epoch) const;
-  results::LoadCellStamps stamps_;
+  [[nodiscard]] std::size_t counting_until(std::size_t begin, std::size_t next_break) const;
+  void fit(const results::LoadCellColumns& columns, ClockEpoch& epoch) const;
+  std::vector<std::uint32_t> ft_;
   double tick_ns_;
   std::vector<ClockEpoch> epochs_;
 };

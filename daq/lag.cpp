@@ -19,37 +19,56 @@ constexpr std::size_t kFewSteps = 3;
 constexpr double kFewToldBy = 1.5;  // steps, by what they tell
 constexpr double kTold = 2;         // standard uncertainties from which on a smoothing is one
 
+/// One reading of ω², the integral up to it, and the slope to the next one; 0 behind the last.
+struct Knot {
+  double time, value, integral = 0, slope = 0;
+};
+
+std::vector<Knot> knots_of(std::span<const SquaredSpeed> readings) {
+  std::vector<Knot> knots;
+  knots.reserve(readings.size());
+  for (const SquaredSpeed& reading : readings) {
+    Knot knot{reading.time_s, reading.value};
+    if (!knots.empty()) {
+      Knot& last = knots.back();
+      knot.integral = last.integral + 0.5 * (last.value + knot.value) * (knot.time - last.time);
+      last.slope = (knot.value - last.value) / (knot.time - last.time);
+    }
+    knots.push_back(knot);
+  }
+  return knots;
+}
+
+/// A change of speed as it is looked at again and again.
+struct Prepared {
+  explicit Prepared(const Transition& t) : transition(t), knots(knots_of(t.squared)) {}
+  const Transition& transition;
+  std::vector<Knot> knots;
+};
+
 /// The integral of ω² between its readings, which are joined by lines.
 class Integral {
  public:
-  explicit Integral(std::span<const SquaredSpeed> readings) : readings_(readings) {}
+  explicit Integral(std::span<const Knot> knots) : knots_(knots) {}
 
   struct Point {
     double integral, value;
   };
   /// For times that ascend from call to call.
   Point at(double time) {
-    if (time <= readings_.front().time_s) {
-      return {(time - readings_.front().time_s) * readings_.front().value, readings_.front().value};
+    if (time <= knots_.front().time) {
+      return {(time - knots_.front().time) * knots_.front().value, knots_.front().value};
     }
-    while (next_ < readings_.size() && readings_[next_].time_s <= time) {
-      const auto& a = readings_[next_ - 1];
-      const auto& b = readings_[next_];
-      sum_ += 0.5 * (a.value + b.value) * (b.time_s - a.time_s);
-      ++next_;
-    }
-    const auto& a = readings_[next_ - 1];
-    const double since = time - a.time_s;
-    if (next_ == readings_.size()) return {sum_ + since * a.value, a.value};
-    const auto& b = readings_[next_];
-    const double slope = (b.value - a.value) / (b.time_s - a.time_s);
-    return {sum_ + since * (a.value + 0.5 * slope * since), a.value + slope * since};
+    while (next_ < knots_.size() && knots_[next_].time <= time) ++next_;
+    const Knot& knot = knots_[next_ - 1];
+    const double since = time - knot.time;
+    if (next_ == knots_.size()) return {knot.integral + since * knot.value, knot.value};
+    return {knot.integral + since * (knot.value + 0.5 * knot.slope * since), knot.value + knot.slope * since};
   }
 
  private:
-  std::span<const SquaredSpeed> readings_;
+  std::span<const Knot> knots_;
   std::size_t next_ = 1;
-  double sum_ = 0;
 };
 
 /// First-order smoothing of bin means: the input holds within a bin.
@@ -116,10 +135,11 @@ double thrust_in(const Transition& transition, std::ptrdiff_t bin) {
 }
 
 template <class Each>
-void for_each_bin(const Transition& transition, const Shape& shape, std::ptrdiff_t bins, Each&& each) {
+void for_each_bin(const Prepared& prepared, const Shape& shape, std::ptrdiff_t bins, Each&& each) {
+  const Transition& transition = prepared.transition;
   const double h = transition.bin_s;
   const double delay = shape[0] - shape[1];
-  Integral integral(transition.squared);
+  Integral integral(prepared.knots);
   Smoothing value(shape[1], h), slope(shape[1], h), value_on(shape[1] + kDerivative, h);
   const std::ptrdiff_t first = -bins_before(transition);
   const std::ptrdiff_t history = static_cast<std::ptrdiff_t>(kHistory / h) - first;
@@ -139,11 +159,12 @@ void for_each_bin(const Transition& transition, const Shape& shape, std::ptrdiff
   }
 }
 
-Misfit misfit_of(const Transition& transition, const Shape& shape) {
+Misfit misfit_of(const Prepared& prepared, const Shape& shape) {
+  const Transition& transition = prepared.transition;
   Sums sums;
   // About their levels, or the digits are spent on these.
   const double thrust = transition.thrust.front(), squared = transition.squared.front().value;
-  for_each_bin(transition, shape, concerned(transition),
+  for_each_bin(prepared, shape, concerned(transition),
                [&](std::ptrdiff_t i, double x, double x_delay, double x_smooth) {
                  const double y = thrust_in(transition, i);
                  if (!std::isnan(y)) sums.add({y - (std::isnan(thrust) ? 0 : thrust), x - squared, x_delay, x_smooth});
@@ -174,9 +195,9 @@ struct Total {
   [[nodiscard]] double steps() const { return squared_weights > 0 ? weights * weights / squared_weights : 0; }
 };
 
-Total misfits(std::span<const Transition> transitions, const Shape& shape) {
+Total misfits(std::span<const Prepared> transitions, const Shape& shape) {
   Total total;
-  for (const Transition& transition : transitions) {
+  for (const Prepared& transition : transitions) {
     const Misfit one = misfit_of(transition, shape);
     total.sum.squares += one.squares;
     total.sum.bins += one.bins;
@@ -209,8 +230,9 @@ Shape step_of(const Misfit& m, const Shape& at, double damping, bool held) {
 }
 
 /// What a delay without smoothing leaves.
-double squares_at(const Transition& transition, double delay) {
-  Integral integral(transition.squared);
+double squares_at(const Prepared& prepared, double delay) {
+  const Transition& transition = prepared.transition;
+  Integral integral(prepared.knots);
   const double h = transition.bin_s;
   const double thrust = transition.thrust.front(), squared = transition.squared.front().value;
   double n = 0, y = 0, x = 0, yy = 0, xx = 0, xy = 0;
@@ -234,12 +256,12 @@ double squares_at(const Transition& transition, double delay) {
   return yy - y * y / n - (sxy > 0 && sxx > 0 ? sxy * sxy / sxx : 0);
 }
 
-double best_of_grid(std::span<const Transition> transitions) {
+double best_of_grid(std::span<const Prepared> transitions) {
   double best = 0;
   double least = std::numeric_limits<double>::infinity();
   for (double delay = kEarliest + kGrid; delay < kLongest; delay += kGrid) {
     double squares = 0;
-    for (const Transition& transition : transitions) squares += squares_at(transition, delay);
+    for (const Prepared& transition : transitions) squares += squares_at(transition, delay);
     if (squares >= least) continue;
     least = squares;
     best = delay;
@@ -270,7 +292,7 @@ struct Fitted {
 };
 
 /// Least squares from `shape` on; `held`: without smoothing.
-Fitted fitted(std::span<const Transition> transitions, Shape shape, bool held) {
+Fitted fitted(std::span<const Prepared> transitions, Shape shape, bool held) {
   Total now = misfits(transitions, shape);
   double damping = 1e-3;
   for (int i = 0; i < kIterations; ++i) {
@@ -293,9 +315,9 @@ Fitted fitted(std::span<const Transition> transitions, Shape shape, bool held) {
 }  // namespace
 
 Lag estimate_lag(std::span<const Transition> transitions) {
-  std::vector<Transition> usable;
+  std::vector<Prepared> usable;
   for (const Transition& transition : transitions) {
-    if (transition.squared.size() > 2 && !transition.thrust.empty()) usable.push_back(transition);
+    if (transition.squared.size() > 2 && !transition.thrust.empty()) usable.emplace_back(transition);
   }
   if (usable.size() < kFewSteps) return {};
   Fitted best = fitted(usable, {best_of_grid(usable), 0}, true);
@@ -315,7 +337,7 @@ Lag estimate_lag(std::span<const Transition> transitions) {
 std::vector<double> delayed(const Transition& transition, const Lag& lag) {
   std::vector<double> squared(transition.thrust.size());
   if (transition.squared.size() < 2) return std::vector<double>(squared.size(), std::nan(""));
-  for_each_bin(transition, {lag.seconds, lag.smoothing}, static_cast<std::ptrdiff_t>(squared.size()),
+  for_each_bin(Prepared(transition), {lag.seconds, lag.smoothing}, static_cast<std::ptrdiff_t>(squared.size()),
                [&](std::ptrdiff_t i, double x, double, double) {
                  if (i >= 0) squared[static_cast<std::size_t>(i)] = x;
                });

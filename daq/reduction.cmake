@@ -18,5 +18,5 @@ add_library(kphi_reduction STATIC
   zeros.cpp
 )
 target_link_libraries(kphi_reduction PUBLIC kphi_options kphi_results kphi_iq PRIVATE kphi_profiles Boost::headers fmt::fmt)
-# Loops over every sample: worth their vectors.
-set_source_files_properties(cell_bin.cpp cell_stream.cpp clock_map.cpp PROPERTIES COMPILE_OPTIONS "$<$<CONFIG:Release>:-O3>")
+# Loops over every sample, or over every bin again and again: worth their vectors.
+set_source_files_properties(cell_bin.cpp cell_stream.cpp clock_map.cpp lag.cpp PROPERTIES COMPILE_OPTIONS "$<$<CONFIG:Release>:-O3>")

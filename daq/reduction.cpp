@@ -114,9 +114,16 @@ class Reduction {
             fmt::format("run {}: no load-cell samples while the motor stood; repeat the run", run_.header.uuid));
       }
       const Window whole{run_.phases[i].time_ns, run_.phases[i + 1].time_ns};
+      // In the order of time: what the cell's stream has just read, it need not read again.
+      const std::vector<double> before = thrust_before(whole);
       CellBins bins = cell_.bins(whole);
+<<<<<<< HEAD
       const bool ramped = i > 0 && run_.phases[i - 1].phase == Phase::ramp;
       Transition transition = transition_of(whole, bins, ramped);
+=======
+      Transition transition = transition_of(whole, bins);
+      transition.before = before;
+>>>>>>> replay
       held.push_back({run_.phases[i], whole, std::move(bins), std::move(transition)});
     }
     return held;
@@ -127,16 +134,24 @@ class Reduction {
     std::vector<double> thrust;
     for (std::size_t i = 0; i < bins.size(); ++i) {
       const Window bin = bins.window(i, i + 1);
-      thrust.push_back(newtons_ * (bins.force(i) - zeros_.at(bin.centre(), cell_.boot_at(bin.end)).force));
+      thrust.push_back(newtons_ * (bins.force(i) - zeros_.force_at(bin.centre(), cell_.boot_at(bin.end))));
     }
     return thrust;
   }
 
+<<<<<<< HEAD
   [[nodiscard]] Transition transition_of(const Window& whole, const CellBins& bins, bool ramped) const {
+=======
+  [[nodiscard]] std::vector<double> thrust_before(const Window& whole) const {
+    const CellBins none = cell_.bins({whole.begin, whole.begin});
+    const auto history_bins = static_cast<Nanoseconds>(kThrustHistory / none.bin_s());
+    return thrust_in(cell_.bins({whole.begin - history_bins * none.width(), whole.begin}));
+  }
+
+  [[nodiscard]] Transition transition_of(const Window& whole, const CellBins& bins) const {
+>>>>>>> replay
     Transition transition;
     transition.bin_s = bins.bin_s();
-    const auto history_bins = static_cast<Nanoseconds>(kThrustHistory / bins.bin_s());
-    transition.before = thrust_in(cell_.bins({whole.begin - history_bins * bins.width(), whole.begin}));
     transition.thrust = thrust_in(bins);
     const Window history{whole.begin - nanoseconds(kSpeedHistory), whole.end};
     for (const auto& r : motor_.over(MotorChannel::speed, history)) {

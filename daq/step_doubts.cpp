@@ -71,14 +71,10 @@ iq::StepReadings module_readings(const MotorSeries& motor, const Window& window)
   return readings;
 }
 
-}  // namespace
-
-double speed_tolerance(double commanded_rad_s) { return std::max(kSpeedShare * commanded_rad_s, kSpeedReached); }
-
-iq::QualityLimits quality_limits(const results::RunHeader& header) {
+iq::QualityLimits limits_of(const std::string& campaign_text) {
   iq::QualityLimits limits;
   try {
-    const profiles::Campaign campaign = profiles::parse_campaign(header.campaign_text, "campaign.yaml");
+    const profiles::Campaign campaign = profiles::parse_campaign(campaign_text, "campaign.yaml");
     limits.supply_lowest_v = (1 - kSupplyBand) * campaign.supply.value();
     limits.supply_highest_v = (1 + kSupplyBand) * campaign.supply.value();
     limits.coil_temperature_max_degc = campaign.limits.coil_temperature_max.value();
@@ -87,6 +83,21 @@ iq::QualityLimits quality_limits(const results::RunHeader& header) {
   }
   return limits;
 }
+
+}  // namespace
+
+iq::QualityLimits quality_limits(const results::RunHeader& header) {
+  // All runs of a campaign hold the same text, and reading it takes as long as a tenth of a run.
+  thread_local std::string last_text;
+  thread_local iq::QualityLimits last;
+  if (header.campaign_text != last_text) {
+    last = limits_of(header.campaign_text);
+    last_text = header.campaign_text;
+  }
+  return last;
+}
+
+double speed_tolerance(double commanded_rad_s) { return std::max(kSpeedShare * commanded_rad_s, kSpeedReached); }
 
 std::uint32_t step_doubts(const results::RunHeader& header, const iq::QualityLimits& limits, const MotorSeries& motor,
                           const StepEvidence& step) {

@@ -32,7 +32,7 @@ std::optional<Zero> zero_in(const Window& window, const CellStream& cell) {
   for (std::size_t i = 0; i < bins.size(); ++i) {
     if (const double force = bins.force(i); !std::isnan(force)) forces.push_back(force);
   }
-  Zero zero{bins.window(0, bins.size()).centre(), mean_error(without_trend(forces)), all.torque.mean,
+  Zero zero{bins.window(0, bins.size()).centre(), mean_error(without_trend(forces), 2), all.torque.mean,
             all.force.deviation, cell.boot_at(window.end)};
   zero.force.mean = all.force.mean;
   return zero;
@@ -58,19 +58,28 @@ Zeros::Zeros(const results::RunRecording& run, const CellStream& cell, const Mot
   }
 }
 
-ZeroThen Zeros::at(double time, std::size_t boot) const {
-  const auto alone = [](const Zero& zero) {
-    return ZeroThen{zero.force.mean, zero.torque, zero.force.u, zero.force.freedom};
-  };
+const Zero* Zeros::only(std::size_t boot) const {
   const Zero& a = *zeros_[0];
-  if (!zeros_[1] || zeros_[1]->time == a.time) return alone(a);
+  if (!zeros_[1] || zeros_[1]->time == a.time) return &a;
   const Zero& b = *zeros_[1];
-  if (a.boot != b.boot) return alone(b.boot == boot ? b : a);
-  const double share = (time - a.time) / (b.time - a.time);
-  const double of_a = std::abs(1 - share) * a.force.u;
-  const double of_b = std::abs(share) * b.force.u;
-  return {a.force.mean + share * (b.force.mean - a.force.mean), a.torque + share * (b.torque - a.torque),
-          std::hypot(of_a, of_b), joint_freedom(of_a, a.force.freedom, of_b, b.force.freedom)};
+  if (a.boot != b.boot) return b.boot == boot ? &b : &a;
+  return nullptr;
+}
+
+ZeroThen Zeros::at(double time, std::size_t boot) const {
+  if (const Zero* alone = only(boot)) {
+    return {alone->force.mean, alone->torque, alone->force.u, alone->force.freedom};
+  }
+  const Zero &a = *zeros_[0], &b = *zeros_[1];
+  const double of_a = std::abs(1 - share(time)) * a.force.u;
+  const double of_b = std::abs(share(time)) * b.force.u;
+  return {force_at(time, boot), a.torque + share(time) * (b.torque - a.torque), std::hypot(of_a, of_b),
+          joint_freedom(of_a, a.force.freedom, of_b, b.force.freedom)};
+}
+
+double Zeros::force_at(double time, std::size_t boot) const {
+  if (const Zero* alone = only(boot)) return alone->force.mean;
+  return zeros_[0]->force.mean + share(time) * (zeros_[1]->force.mean - zeros_[0]->force.mean);
 }
 
 double Zeros::movement() const {

@@ -58,6 +58,8 @@ class Zeros {
   [[nodiscard]] std::size_t boot() const { return zeros_[0]->boot; }
   /// Linear in time between the two; with one of them only, that one. Of another power-up, its own if there is one.
   [[nodiscard]] ZeroThen at(double time, std::size_t boot) const;
+  /// Of the same, the force alone.
+  [[nodiscard]] double force_at(double time, std::size_t boot) const;
   /// Counts from before to after; NaN when nobody can tell.
   [[nodiscard]] double movement() const;
   [[nodiscard]] double largest_deviation() const;
@@ -65,6 +67,11 @@ class Zeros {
 
  private:
   void add(const Zero& zero) { (zeros_[0] ? zeros_[1] : zeros_[0]) = zero; }
+  /// The only one that holds for a power-up; nullptr: both do.
+  [[nodiscard]] const Zero* only(std::size_t boot) const;
+  [[nodiscard]] double share(double time) const {
+    return (time - zeros_[0]->time) / (zeros_[1]->time - zeros_[0]->time);
+  }
   std::array<std::optional<Zero>, 2> zeros_;
 };
 

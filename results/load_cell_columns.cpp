@@ -9,17 +9,6 @@ constexpr std::size_t kPiece = 8192;  // rows: 230 kB, which the second-level ca
 
 }  // namespace
 
-LoadCellStamps stamps_of(std::span<const LoadCellRecord> records) {
-  LoadCellStamps stamps;
-  stamps.ft_sequence.reserve(records.size());
-  stamps.arrival_ns.reserve(records.size());
-  for (const LoadCellRecord& record : records) {
-    stamps.ft_sequence.push_back(record.ft_sequence);
-    stamps.arrival_ns.push_back(record.arrival_ns);
-  }
-  return stamps;
-}
-
 LoadCellRows LoadCellColumns::rows(std::size_t first, std::size_t last) {
   if (first < first_ || last > first_ + counts_.size()) {
     const std::size_t n = std::min(std::max(last - first, kPiece), size_ - first);
@@ -32,6 +21,17 @@ LoadCellRows LoadCellColumns::rows(std::size_t first, std::size_t last) {
           std::span(status_).subspan(first - first_, last - first)};
 }
 
+std::vector<std::uint32_t> RecordedColumns::ft_sequence() const {
+  std::vector<std::uint32_t> ft;
+  ft.reserve(records_.size());
+  for (const LoadCellRecord& record : records_) ft.push_back(record.ft_sequence);
+  return ft;
+}
+
+void RecordedColumns::read_arrival(std::size_t first, std::span<Nanoseconds> arrival_ns) const {
+  for (std::size_t i = 0; i < arrival_ns.size(); ++i) arrival_ns[i] = records_[first + i].arrival_ns;
+}
+
 void RecordedColumns::read(std::size_t first, std::span<std::array<std::int32_t, 6>> counts,
                            std::span<std::uint32_t> status) const {
   for (std::size_t i = 0; i < counts.size(); ++i) {
@@ -40,11 +40,14 @@ void RecordedColumns::read(std::size_t first, std::span<std::array<std::int32_t,
   }
 }
 
-LoadCellStamps FileColumns::stamps() const {
-  LoadCellStamps stamps{std::vector<std::uint32_t>(size_), std::vector<Nanoseconds>(size_)};
-  places_.ft_sequence.read(file_, 0, size_, stamps.ft_sequence.data());
-  places_.arrival.read(file_, 0, size_, stamps.arrival_ns.data());
-  return stamps;
+std::vector<std::uint32_t> FileColumns::ft_sequence() const {
+  std::vector<std::uint32_t> ft(size_);
+  places_.ft_sequence.read(file_, 0, size_, ft.data());
+  return ft;
+}
+
+void FileColumns::read_arrival(std::size_t first, std::span<Nanoseconds> arrival_ns) const {
+  places_.arrival.read(file_, first, arrival_ns.size(), arrival_ns.data());
 }
 
 void FileColumns::read(std::size_t first, std::span<std::array<std::int32_t, 6>> counts,

@@ -12,13 +12,6 @@
 
 namespace kphi::results {
 
-/// What says when the records were taken: 12 bytes of the 44 that each of them has.
-struct LoadCellStamps {
-  std::vector<std::uint32_t> ft_sequence;
-  std::vector<Nanoseconds> arrival_ns;
-};
-[[nodiscard]] LoadCellStamps stamps_of(std::span<const LoadCellRecord> records);
-
 /// What neighbouring records say.
 struct LoadCellRows {
   std::span<const std::array<std::int32_t, 6>> counts;
@@ -29,7 +22,10 @@ struct LoadCellRows {
 class LoadCellColumns {
  public:
   virtual ~LoadCellColumns() = default;
-  [[nodiscard]] virtual LoadCellStamps stamps() const = 0;
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] virtual std::vector<std::uint32_t> ft_sequence() const = 0;
+  /// Of the records from `first` on, as many as there is room for.
+  virtual void read_arrival(std::size_t first, std::span<Nanoseconds> arrival_ns) const = 0;
   /// Of records [first, last); valid until the next call. Neighbours are read along, so that going on is cheap.
   [[nodiscard]] LoadCellRows rows(std::size_t first, std::size_t last);
 
@@ -50,7 +46,8 @@ class RecordedColumns : public LoadCellColumns {
  public:
   explicit RecordedColumns(std::span<const LoadCellRecord> records)
       : LoadCellColumns(records.size()), records_(records) {}
-  [[nodiscard]] LoadCellStamps stamps() const override { return stamps_of(records_); }
+  [[nodiscard]] std::vector<std::uint32_t> ft_sequence() const override;
+  void read_arrival(std::size_t first, std::span<Nanoseconds> arrival_ns) const override;
 
  private:
   void read(std::size_t first, std::span<std::array<std::int32_t, 6>> counts,
@@ -65,7 +62,8 @@ class FileColumns : public LoadCellColumns {
   };
   FileColumns(OpenFile file, std::size_t rows, Places places)
       : LoadCellColumns(rows), file_(std::move(file)), places_(std::move(places)) {}
-  [[nodiscard]] LoadCellStamps stamps() const override;
+  [[nodiscard]] std::vector<std::uint32_t> ft_sequence() const override;
+  void read_arrival(std::size_t first, std::span<Nanoseconds> arrival_ns) const override;
 
  private:
   void read(std::size_t first, std::span<std::array<std::int32_t, 6>> counts,

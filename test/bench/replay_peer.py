@@ -69,13 +69,20 @@ class Bins:
         return force, torque
 
 
-def mean_error(values):
-    """Gamma method: standard uncertainty of the mean, degrees of freedom."""
+def mean_error(values, fitted=1):
+    """Gamma method, or slow cosines where the values swing: standard uncertainty of the mean, degrees of freedom."""
     n = len(values)
     centred = values - values.mean()
     variance = centred @ centred / n
     if variance <= 0:
         return 0.0, n - 1
+    chance = variance / math.sqrt(n)
+    covariances = np.array([centred[:-k] @ centred[k:] / (n - k) for k in range(1, min(10, n // 2) + 1)])
+    if covariances[0] < -chance or covariances[1:].min() < -2.5 * chance:
+        waves = max(n // 8, fitted + 3)
+        power = np.cos(np.pi / n * np.outer(np.arange(1, waves + 1), np.arange(n) + 0.5)) @ centred
+        freedom = waves - (fitted - 1)
+        return math.sqrt(2 * (power @ power) / n / freedom / n), freedom
     total, window = 0.5, 0
     while window < max(n // 4, 1):
         window += 1
@@ -102,11 +109,12 @@ def settle(thrust, first, planned):
     n, least = len(thrust), max(min(50, planned // 2), 6)
     if n < first + least:
         return min(first, n)
-    x = np.arange(least)
-    tail = thrust[n - least:]
-    slope, level = np.polyfit(x, tail, 1)
-    u, freedom = mean_error(tail - slope * x - level)
-    noise, factor = u * u * least, student_95(freedom)
+    x = np.arange(least) - 0.5 * (least - 1)
+    parts = 2 if n >= first + 2 * least else 1
+    ends = thrust[n - parts * least:].reshape(parts, least)
+    rest = ends - ends.mean(axis=1, keepdims=True) - np.outer(ends @ x / (x @ x), x)
+    u, freedom = mean_error(rest.ravel(), 2 * parts)
+    noise, factor = u * u * parts * least, student_95(freedom)
     for begin in range(first, n - least + 1, max(1, planned // 20)):
         rest = thrust[begin:]
         x = np.arange(len(rest)) - 0.5 * (len(rest) - 1)

@@ -60,6 +60,26 @@ TEST(MeanError, OfAPeriodicDisturbanceIsNoLargerThanThatOfWhiteNoise) {
   EXPECT_LT(mean_error(values).u, 1.05 * std::sqrt(0.5 / 400.0));
 }
 
+TEST(MeanError, CoversTheTruthInANoiseThatSwings) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> any(0, 1);
+  constexpr int kTrials = 2000;
+  for (const double amplitude : {0.4, 1.0, 3.0}) {
+    int inside = 0;
+    for (int trial = 0; trial < kTrials; ++trial) {
+      const double cycles = 0.05 + 0.45 * any(random), phase = any(random);
+      std::vector<double> values = noise(random, 100, 0);
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        values[i] += amplitude * std::sin(2 * M_PI * (cycles * static_cast<double>(i) + phase));
+      }
+      const MeanError error = mean_error(values);
+      inside += std::abs(error.mean) <= error.half_width_95();
+    }
+    EXPECT_GE(inside, 0.93 * kTrials) << amplitude;
+    EXPECT_LE(inside, 0.98 * kTrials) << amplitude;
+  }
+}
+
 TEST(MeanError, SaysNothingOfTooFewValuesAndNothingElseOfEqualOnes) {
   EXPECT_TRUE(std::isnan(mean_error({}).mean));
   EXPECT_TRUE(std::isnan(mean_error(std::vector<double>(kLeastValues - 1, 2.0)).u));

@@ -80,10 +80,13 @@ RunRecording recording(const std::vector<Row>& rows) {
   run.header.minimum_discard_s = 0.5;
   run.header.load_cell.sample_rate_hz = kRate;
   run.header.load_cell.device_rate_hz = kRate;
+  std::int32_t torque = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto time = static_cast<Nanoseconds>(1e9 * static_cast<double>(i) / kRate);
     results::LoadCellRecord record;
-    record.counts = {0, 0, static_cast<std::int32_t>(std::lround(1e6 * rows[i].thrust_n)), 0, 0, static_cast<int>(i)};
+    const bool frozen = i > 0 && rows[i].thrust_n == rows[i - 1].thrust_n;
+    if (!frozen) torque = static_cast<std::int32_t>(i);  // there is no torque channel: another count with every thrust
+    record.counts = {0, 0, static_cast<std::int32_t>(std::lround(1e6 * rows[i].thrust_n)), 0, 0, torque};
     record.rdt_sequence = record.ft_sequence = static_cast<std::uint32_t>(i + 1);
     record.arrival_ns = time;
     run.load_cell.push_back(record);
@@ -175,6 +178,46 @@ TEST_F(RealLogs, TheReductionSaysThatAStepOfTheDecayingLogDrifts) {
   const auto steps = reduce(run);
   ASSERT_EQ(steps.size(), 1u);
   EXPECT_NE(steps[0].doubts & static_cast<std::uint32_t>(Doubt::drifted), 0u) << results::doubt_names(steps[0].doubts);
+}
+
+/// Steps of 100 rows, without zeros but for rows that are put in front.
+std::vector<results::StepMean> steps_of(const std::vector<Row>& rows) {
+  std::vector<Row> all(60, Row{0, 1000, 0, 0});
+  all.insert(all.end(), rows.begin(), rows.end());
+  RunRecording run = recording(all);
+  run.phases.push_back({Phase::zero_before, -1, 0, 0});
+  constexpr std::size_t kPiece = 100;
+  for (std::size_t at = 60; at + kPiece <= all.size(); at += kPiece) {
+    run.phases.push_back({Phase::step, static_cast<int>(at / kPiece), at_row(at), kRpm * 3500});
+  }
+  run.phases.push_back({Phase::end, -1, at_row(all.size()), 0});
+  return reduce(run);
+}
+
+std::vector<int> steps_in_doubt(const std::vector<results::StepMean>& steps, Doubt doubt) {
+  std::vector<int> numbers;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    if ((steps[i].doubts & static_cast<std::uint32_t>(doubt)) != 0) numbers.push_back(static_cast<int>(i));
+  }
+  return numbers;
+}
+
+TEST_F(RealLogs, AFrozenChannelIsNamedAtItsStepsAndAtNoOther) {
+  auto log = rows("ConstVel_2021-06-17_084922");
+  log.resize(1500);
+  EXPECT_TRUE(steps_in_doubt(steps_of(log), Doubt::frozen).empty()) << "it has no such rows of its own";
+  for (std::size_t i = 400; i < 800; ++i) log[i].thrust_n = log[400].thrust_n;
+  EXPECT_EQ(steps_in_doubt(steps_of(log), Doubt::frozen), (std::vector{4, 5, 6, 7}));
+}
+
+TEST_F(RealLogs, ImpossibleSpeedsAreNamedAtTheirSteps) {
+  const auto log = rows("Run_142_Constant_RPM_2021-11-19_163918");
+  std::uint64_t counted = 0;
+  for (const auto& step : steps_of(log)) {
+    counted += step.speed_glitches;
+    EXPECT_EQ((step.doubts & static_cast<std::uint32_t>(Doubt::speed_glitch)) != 0, step.speed_glitches > 0);
+  }
+  EXPECT_GT(counted, 0u);
 }
 
 TEST_F(RealLogs, ImpossibleSpeedsAreCounted) {

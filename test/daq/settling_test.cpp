@@ -23,6 +23,80 @@ std::vector<double> step(double level, double amplitude, double tau_s, unsigned 
   return thrust;
 }
 
+/// What the bins of a step hold besides its thrust: white noise, one with a memory, and what is left of blades passing.
+struct Noise {
+  double white_n, correlated_n, correlation_s, periodic_n;
+};
+constexpr Noise kNoises[] = {
+    {0.003, 0, 1, 0}, {0.0015, 0.01, 0.003, 0}, {0.0015, 0.01, 0.01, 0}, {0.003, 0.004, 0.03, 0}, {0.003, 0, 1, 0.01}};
+
+/// 2 s in bins from the command on.
+std::vector<double> noisy_step(std::mt19937_64& random, const Noise& noise, double level, double share_per_s,
+                               double transient = 0, double tau_s = 1) {
+  std::normal_distribution<double> unit(0, 1);
+  std::uniform_real_distribution<double> any(0, 1);
+  const double kept = std::exp(-0.1 * kBin / noise.correlation_s);
+  const double cycles_per_bin = 0.02 + 0.48 * any(random), phase = any(random);
+  double wander = noise.correlated_n * unit(random);
+  std::vector<double> thrust;
+  for (int i = 0; i < 200; ++i) {
+    double mean = 0;
+    for (int k = 0; k < 10; ++k) {
+      wander = kept * wander + noise.correlated_n * std::sqrt(1 - kept * kept) * unit(random);
+      mean += 0.1 * wander;
+    }
+    const double t = kBin * (i + 0.5);
+    thrust.push_back(level * (1 + share_per_s * t) + transient * std::exp(-t / tau_s) + mean +
+                     noise.periodic_n * std::sin(2 * M_PI * (cycles_per_bin * i + phase)) +
+                     noise.white_n * unit(random));
+  }
+  return thrust;
+}
+
+struct Verdicts {
+  double unsettled = 0, drifted = 0;  ///< shares of the steps
+};
+
+template <class Step>
+Verdicts verdicts(int steps, Step&& step) {
+  std::mt19937_64 random(11);
+  int unsettled = 0, drifted = 0;
+  for (int i = 0; i < steps; ++i) {
+    const std::vector<double> thrust = step(random);
+    unsettled += static_cast<int>(!settle(thrust, 100, 100, kBin).settled);
+    drifted += static_cast<int>(drifts(std::span(thrust).subspan(100)));
+  }
+  return {static_cast<double>(unsettled) / steps, static_cast<double>(drifted) / steps};
+}
+
+TEST(Verdict, OfAStepAtRestIsFalseInFewerThanOneOfAThousand) {
+  Verdicts mean;
+  for (const Noise& noise : kNoises) {
+    const Verdicts found = verdicts(4000, [&](auto& random) { return noisy_step(random, noise, 0.05, 0); });
+    mean.unsettled += found.unsettled / std::size(kNoises);
+    mean.drifted += found.drifted / std::size(kNoises);
+    EXPECT_LT(found.unsettled, 0.002) << noise.correlation_s << " s " << noise.periodic_n << " N";
+    EXPECT_LT(found.drifted, 0.001) << noise.correlation_s << " s " << noise.periodic_n << " N";
+  }
+  EXPECT_LT(mean.unsettled, 0.001);
+  EXPECT_LT(mean.drifted, 0.0005);
+}
+
+TEST(Verdict, MissesHardlyAStepThatDriftsByTwoPercentPerSecond) {
+  for (const Noise& noise : kNoises) {
+    const Verdicts found = verdicts(300, [&](auto& random) { return noisy_step(random, noise, 6, -0.02); });
+    EXPECT_GT(found.drifted, 0.9) << noise.correlation_s << " s " << noise.periodic_n << " N";
+    EXPECT_GT(found.unsettled, 0.8) << noise.correlation_s << " s " << noise.periodic_n << " N";
+  }
+}
+
+TEST(Verdict, MissesHardlyATransientThatOutlastsTheStep) {
+  for (const Noise& noise : kNoises) {
+    const Verdicts found = verdicts(300, [&](auto& random) { return noisy_step(random, noise, 6, 0, -1.2, 0.8); });
+    EXPECT_GT(found.unsettled, 0.8) << noise.correlation_s << " s " << noise.periodic_n << " N: 2 % of the mean";
+  }
+}
+
 TEST(Settling, TakesAllThatTheDiscardLeavesOfAStepAtRest) {
   int whole = 0;
   for (unsigned seed = 1; seed <= 100; ++seed) {
