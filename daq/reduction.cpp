@@ -117,13 +117,9 @@ class Reduction {
       // In the order of time: what the cell's stream has just read, it need not read again.
       const std::vector<double> before = thrust_before(whole);
       CellBins bins = cell_.bins(whole);
-<<<<<<< HEAD
       const bool ramped = i > 0 && run_.phases[i - 1].phase == Phase::ramp;
       Transition transition = transition_of(whole, bins, ramped);
-=======
-      Transition transition = transition_of(whole, bins);
       transition.before = before;
->>>>>>> replay
       held.push_back({run_.phases[i], whole, std::move(bins), std::move(transition)});
     }
     return held;
@@ -139,17 +135,13 @@ class Reduction {
     return thrust;
   }
 
-<<<<<<< HEAD
-  [[nodiscard]] Transition transition_of(const Window& whole, const CellBins& bins, bool ramped) const {
-=======
   [[nodiscard]] std::vector<double> thrust_before(const Window& whole) const {
     const CellBins none = cell_.bins({whole.begin, whole.begin});
     const auto history_bins = static_cast<Nanoseconds>(kThrustHistory / none.bin_s());
     return thrust_in(cell_.bins({whole.begin - history_bins * none.width(), whole.begin}));
   }
 
-  [[nodiscard]] Transition transition_of(const Window& whole, const CellBins& bins) const {
->>>>>>> replay
+  [[nodiscard]] Transition transition_of(const Window& whole, const CellBins& bins, bool ramped) const {
     Transition transition;
     transition.bin_s = bins.bin_s();
     transition.thrust = thrust_in(bins);

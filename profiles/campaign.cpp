@@ -70,6 +70,8 @@ Limits read_limits(ProfileReader& file) {
     file.refuse("/limits/supply_voltage_max_v", fmt::format("is not above {:g} V (supply_v)", supply),
                 "raise it: the motor would never turn");
   return limits;
+}
+
 Order read_order(ProfileReader& file) {
   Order order;
   order.runs = run_order_from(file.get_or<std::string>("/order/runs", name_of(order.runs)));
