@@ -47,6 +47,8 @@ bool SequenceAccount::looks_rebooted(const Record& record, Instant arrival) cons
   // apart.
   const bool begins_anew = ft_step > 0 && step(last_rdt(), record.rdt_sequence) <= 0;
   if (begins_anew && counted_since_last(record.ft_sequence, arrival) && !in_time(ft_step, arrival)) return true;
+  // A stream that a session before this one has asked for: a copy of it can be on its way still.
+  if (ft_step < 0 && !sent_since_last(step(last_rdt(), record.rdt_sequence), arrival)) return false;
   // What is late or doubled lies on the line of this stream or of one before.
   return ft_step < 0 && line(record.rdt_sequence, record.ft_sequence) != line(last_rdt_, last_ft_) &&
          !on_former_line(record);
@@ -148,6 +150,11 @@ bool SequenceAccount::counted_since_last(std::uint32_t ft, Instant arrival) cons
 bool SequenceAccount::in_time(std::int32_t ft_step, Instant arrival) const noexcept {
   const double host_seconds = to_seconds(arrival - last_arrival_);
   return std::abs(ft_step / device_rate_hz_ - host_seconds) < kUsualDelaySeconds + kLargestSkew * host_seconds;
+}
+
+bool SequenceAccount::sent_since_last(std::int32_t rdt_step, Instant arrival) const noexcept {
+  const double device_seconds = static_cast<double>(rdt_step) * stride_ / device_rate_hz_;
+  return device_seconds < kUsualDelaySeconds + (1 + kLargestSkew) * to_seconds(arrival - last_arrival_);
 }
 
 void SequenceAccount::add_host_drops(std::uint64_t datagrams, std::uint64_t records_per_datagram) noexcept {

@@ -107,6 +107,8 @@ class SequenceAccount {
   /// A box that has booted after the last accepted record can have counted so far.
   bool counted_since_last(std::uint32_t ft, Instant arrival) const noexcept;
   bool in_time(std::int32_t ft_step, Instant arrival) const noexcept;
+  /// One stream can have gone on by so many records since the last accepted one.
+  bool sent_since_last(std::int32_t rdt_step, Instant arrival) const noexcept;
   bool accept_reboot(const Record& record, Instant arrival) noexcept;
   bool note_stray(const Record& record, Instant arrival, std::int32_t ft_step) noexcept;
   void note_stall(const Record& record, Instant arrival) noexcept;

@@ -9,11 +9,10 @@
 //           After a kill or with a refusing disk: all accepted runs are whole, the journal's chain is right, what was
 //           secured can be read, and at most one run is finished that the journal does not know yet.
 // Verdict   A step without a doubt shows the true thrust and speed. A step in whose window a record is missing, or in
-// which
-//           the box stood still, was saturated or reported an error, says so.
-//           A run out of reach of every fault is accepted without a doubt, but for those that short steps may have:
-//           the lag unknown; now and then unsettled, drifting, or with a lag that is not there, which are counted.
-//           Nothing but a fault, the disk or the operator ends a campaign; the reason names the device concerned.
+//           which the box stood still, was saturated or reported an error, says so. A run out of reach of every fault
+//           is accepted without a doubt, but for those that short steps may have: the lag unknown; now and then
+//           unsettled, drifting, or with a lag that is not there, which are counted; those of a speed that truly came
+//           late. Nothing but a fault, the disk or the operator ends a campaign; the reason names the device concerned.
 #pragma once
 
 #include <string>

@@ -146,14 +146,16 @@ void World::begin() {
   bench_->use_files(disk_);
   daq::BenchWitness witness;
   witness.stepped = [this] { step(); };
-  witness.stream_began = [this] { story_.streams.push_back({bench_->clock().now(), {}, {}}); };
+  witness.stream_began = [this] { story_.streams.push_back({bench_->clock().now(), {}, {}, newest_stream_, 0}); };
   witness.heard = [this](const sim::Datagram& datagram, bool discarded) {
     if (story_.streams.empty()) return;
     const auto bytes = datagram.payload();
     const bool whole = !bytes.empty() && bytes.size() % 36 == 0 && bytes.size() <= 1440;
     auto& stream = story_.streams.back();
     if (!whole) stream.malformed.push_back(datagram.at);
-    if (whole && !discarded)
+    if (whole) newest_stream_ = std::max(newest_stream_, datagram.stream);
+    if (whole && !discarded && datagram.stream <= stream.former) stream.strays += bytes.size() / 36;
+    if (whole && !discarded && datagram.stream > stream.former)
       stream.arrivals.push_back({datagram.boot, datagram.stream, netbox::test::first_rdt(bytes), datagram.at});
   };
   bench_->let_watch(std::move(witness));

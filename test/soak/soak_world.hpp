@@ -39,6 +39,8 @@ struct Story {
     Instant began;
     std::vector<netbox::test::Arrival> arrivals;
     std::vector<Instant> malformed;
+    std::uint32_t former = 0;  ///< number of the box's newest stream before it
+    std::uint64_t strays = 0;  ///< records of such a one that came after all: the session can only discard them
   };
   std::vector<StageChange> stages;
   std::vector<Moment> moments;
@@ -94,6 +96,7 @@ class World {
   std::optional<results::CampaignFolder> written_, left_;
   Story story_;
   std::uint64_t steps_ = 0, prompts_ = 0;
+  std::uint32_t newest_stream_ = 0;  ///< of the box, as heard
   bool killed_ = false, lie_is_due_ = false;
 };
 

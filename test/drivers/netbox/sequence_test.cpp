@@ -185,6 +185,17 @@ TEST(Sequence, ALateRecordOfTheEpochBeforeIsNoReboot) {
   EXPECT_EQ(stream.counters().restarts, 1u);
 }
 
+TEST(Sequence, ADelayedCopyOfTheStreamOfASessionBeforeIsNoReboot) {
+  Stream stream(2);
+  for (std::uint32_t i = 0; i < 50; ++i) EXPECT_TRUE(stream.accept(1 + i, 102'711 + 2 * i));
+  for (std::uint32_t i = 0; i < 10; ++i) EXPECT_FALSE(stream.accept(25'000 + i, 102'400 + 2 * i));
+  for (std::uint32_t i = 60; i < 100; ++i) EXPECT_TRUE(stream.accept(1 + i, 102'711 + 2 * i));
+  EXPECT_EQ(stream.counters().reboots, 0u);
+  EXPECT_EQ(stream.counters().duplicates + stream.counters().late, 10u);
+  EXPECT_EQ(stream.counters().received, 90u);
+  stream.expect_closed();
+}
+
 TEST(Sequence, AFarDropOfFtIsARebootOnceASecondRecordConfirmsIt) {
   Stream stream;
   for (std::uint32_t i = 1; i <= 100; ++i) stream.accept(i, 10'000'000 + i);
