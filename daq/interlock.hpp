@@ -22,6 +22,8 @@ struct Observation {
   bool load_cell_is_fresh = true;  ///< no older than the stream's and this host's delay: thrust is what is now
   bool motor_is_fresh = true;      ///< likewise, of speed, current and temperature
   // For onlookers.
+  double derate = 1;                 ///< share of its drive that the module allows itself; 1: all
+  unsigned fault_bits = 0;           ///< of power_safety.fault_now
   NewtonMetres torque{};             ///< about the thrust axis, zero subtracted
   Volts module_voltage{};            ///< at the motor module's input
   results::SupplyReading supply{};   ///< of the bench supply; time 0: nothing yet, or there is none

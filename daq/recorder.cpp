@@ -129,6 +129,8 @@ void Recorder::drain_motor() {
     for (const auto& reading : batch) {
       if (reading.channel == MotorChannel::speed) speed_rad_s_ = std::abs(reading.value);
       if (reading.channel == MotorChannel::supply_voltage) module_voltage_v_ = reading.value;
+      if (reading.channel == MotorChannel::derate) derate_ = reading.value;
+      if (reading.channel == MotorChannel::fault_now) fault_bits_ = static_cast<unsigned>(reading.value);
       if (reading.channel == MotorChannel::supply_current) supply_current_a_ = reading.value;
       if (reading.channel == MotorChannel::coil_temperature) coil_temperature_degc_ = reading.value;
     }
@@ -163,6 +165,8 @@ Observation Recorder::observe(Instant now) const noexcept {
   Observation seen{RadPerSec(speed_rad_s_),         Newtons(thrust_n_ - zero_n_), Amperes(supply_current_a_),
                    Celsius(coil_temperature_degc_), now - Instant(load_cell_ns_), now - Instant(motor_ns_)};
   seen.torque = NewtonMetres(torque_nm_ - zero_nm_);
+  seen.derate = derate_;
+  seen.fault_bits = fault_bits_;
   seen.module_voltage = Volts(module_voltage_v_);
   seen.supply = supply_.read();
   seen.account = bench_.load_cell().account();

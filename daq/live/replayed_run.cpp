@@ -27,6 +27,8 @@ const char* words_of(Phase phase) {
     case Phase::bias_settling:
     case Phase::bias_after:
       return "bias";
+    case Phase::ramp:
+      return "ramp";
     case Phase::step:
     case Phase::end:
       break;

@@ -70,7 +70,7 @@ class EachLimit : public testing::TestWithParam<Case> {
     prepare();
     NoProgress progress;
     try {
-      (void)record_run(*bench_, {campaign_, place_, 0.0, 1, 10.0, folder_.path() / "run.h5"}, progress,
+      (void)record_run(*bench_, test::first_run(campaign_, place_, folder_.path() / "run.h5"), progress,
                        [] { return false; });
     } catch (const SafetyStop& stop) {
       return stop.what();
@@ -216,7 +216,7 @@ class GuardedSupply : public testing::Test {
   std::string record(const std::function<void(Instant)>& act) {
     NoProgress progress;
     try {
-      (void)record_run(*bench_, {campaign_, place_, 0.0, 1, 10.0, folder_.path() / "run.h5"}, progress, [&] {
+      (void)record_run(*bench_, test::first_run(campaign_, place_, folder_.path() / "run.h5"), progress, [&] {
         act(bench_->clock().now());
         return false;
       });

@@ -12,6 +12,7 @@
 #include "daq/interlock.hpp"
 #include "daq/run.hpp"
 #include "drivers/sim/control_line.hpp"
+#include "test/daq/bench_fixture.hpp"
 #include "test/end_to_end/account.hpp"
 #include "test/end_to_end/running_bench.hpp"
 
@@ -47,14 +48,15 @@ class HangingRunner : public testing::Test {
     run_ = std::async(std::launch::async, [this]() -> std::string {
       daq::NoProgress progress;
       try {
-        (void)daq::record_run(*bench_, {campaign_, place_, 0.0, 1, 10.0, simulation_.path("run.h5")}, progress, [this] {
-          if (turns_) {
-            hangs_ = true;
-            go_on_.get_future().wait();
-            turns_ = false;
-          }
-          return false;
-        });
+        (void)daq::record_run(*bench_, test::first_run(campaign_, place_, simulation_.path("run.h5")), progress,
+                              [this] {
+                                if (turns_) {
+                                  hangs_ = true;
+                                  go_on_.get_future().wait();
+                                  turns_ = false;
+                                }
+                                return false;
+                              });
       } catch (const daq::SafetyStop& stop) {
         return stop.what();
       }
@@ -98,8 +100,7 @@ TEST_F(HangingRunner, DoesNotKeepTheGuardFromLettingTheMotorGo) {
 TEST_F(HangingRunner, DoesNotKeepTheGuardFromSeeingThatAKnobIsTurned) {
   record();
   hang();
-  const std::string answer =
-      sim::tell(simulation_.path("control"), "fault kind=supply_panel register=9 value=2000");
+  const std::string answer = sim::tell(simulation_.path("control"), "fault kind=supply_panel register=9 value=2000");
   ASSERT_THAT(answer, testing::StartsWith("ok "));
   EXPECT_TRUE(soon([&] { return coasts(); })) << "while the runner hangs";
   release();

@@ -82,7 +82,7 @@ class World::Person final : public daq::Operator {
         asked_(typed_.descriptor, nowhere_.stream, std::move(stop_asked)) {}
   void mount(const profiles::Propeller& propeller, double occlusion_deg) override {
     world_.at_prompt();
-    asked_.mount(propeller, occlusion_deg);
+    (void)asked_.confirm_mounting(propeller, occlusion_deg);
   }
 
  private:
