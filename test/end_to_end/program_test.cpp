@@ -267,7 +267,7 @@ TEST_F(BadInput, WrongUnit) {
   text.replace(text.find("dwell_s"), 7, "dwell_ms");
   write(path("unit.yaml"), text);
   expect({"run", path("unit.yaml"), "--bench", path("bench.yaml"), "--yes"}, 2,
-         "unit.yaml:6:21: dwell_ms is not a key of profile");
+         "unit.yaml:7:21: dwell_ms is not a key of profile");
 }
 
 TEST_F(BadInput, CampaignAboveTheMotorsLimit) {
