@@ -35,12 +35,23 @@ class Bits {
   std::uint32_t bits_ = 0;
 };
 
+/// The speed's window ends a lag earlier than the thrust's: what happens to the rotor between the two is in neither
+/// mean, but already in the thrust.
+bool leaves_at_the_end(const StepEvidence& step, const MotorSeries& motor) {
+  const double steady = 3 * std::max(kSpeedShare * std::abs(step.speed.mean), kSpeedSteady);
+  const auto late = motor.over(MotorChannel::speed, {step.motor_window.end, step.window.end});
+  return std::any_of(late.begin(), late.end(), [&](const results::MotorReading& reading) {
+    return !(std::abs(std::abs(reading.value) - std::abs(step.speed.mean)) <= steady);
+  });
+}
+
 void judge_speed(const StepEvidence& step, const MotorSeries& motor, Bits& bits) {
   // Without a single reading nobody knows: that is "not reached", too.
   bits.note(Doubt::speed_not_reached,
             !(std::abs(step.speed.mean - step.commanded_rad_s) <= speed_tolerance(step.commanded_rad_s)));
   bits.note(Doubt::speed_unsteady,
-            step.speed.deviation > std::max(kSpeedShare * std::abs(step.speed.mean), kSpeedSteady));
+            step.speed.deviation > std::max(kSpeedShare * std::abs(step.speed.mean), kSpeedSteady) ||
+                leaves_at_the_end(step, motor));
   bits.note(Doubt::speed_glitch, motor.glitches(step.motor_window) > 0);
   bits.note(Doubt::derated, motor.statistics(MotorChannel::derate, step.motor_window).least < 1);
 }

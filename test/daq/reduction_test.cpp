@@ -280,6 +280,20 @@ TEST(Reduction, AnUnsteadySpeedIsDoubted) {
   EXPECT_TRUE(has(reduce(run)[2], Doubt::speed_unsteady));
 }
 
+TEST(Reduction, ARotorThatIsHeldAtTheVeryEndOfAStepIsDoubtedThoughItsMeanSpeedEndsBefore) {
+  Truth truth;
+  truth.thrust_delay_s = 0.05;
+  RunRecording run = make_run(truth);
+  const auto end = static_cast<results::Nanoseconds>(1e9 * spin_down_at(truth));
+  for (auto& reading : run.motor) {
+    if (reading.channel == results::MotorChannel::speed && reading.time_ns >= end - 45'000'000) reading.value = 0;
+  }
+  const auto steps = reduce(run);
+  EXPECT_FALSE(has(steps[1], Doubt::speed_unsteady));
+  EXPECT_TRUE(has(steps.back(), Doubt::speed_unsteady));
+  EXPECT_NEAR(steps.back().speed_rad_s, steps.back().commanded_speed_rad_s, 1);
+}
+
 TEST(Reduction, LostSamplesAreDoubtedWhereTheyWereLost) {
   Truth truth;
   truth.lose = [](std::uint64_t n) { return n >= 4500 && n < 4510; };  // second step: 4 s to 5 s
