@@ -54,7 +54,8 @@ std::string sum_row(const std::vector<Budget>& budgets, const char* name, const 
   return html + "<td></td></tr>\n";
 }
 
-std::string budget_section(const std::vector<Budget>& budgets) {
+/// `standard`: of the same coefficients in standard air; may be empty.
+std::string budget_section(const std::vector<Budget>& budgets, const std::vector<Budget>& standard) {
   if (budgets.empty() || budgets.front().rows.empty()) return {};
   std::string heads = "<th class=\"text\">source</th><th>type</th><th>shared by</th>";
   for (const Budget& budget : budgets) heads += "<th>" + html_escaped(budget.quantity) + ", %</th>";
@@ -65,6 +66,10 @@ std::string budget_section(const std::vector<Budget>& budgets) {
     return std::isfinite(b.freedom()) ? fmt::format("{:.0f}", b.freedom()) : std::string("∞");
   });
   html += sum_row(budgets, "95 %: ±", [](const Budget& b) { return percent(b.expanded() / std::abs(b.value)); });
+  if (standard.size() == budgets.size()) {
+    html += sum_row(standard, "in standard air, 95 %: ±",
+                    [](const Budget& b) { return percent(b.expanded() / std::abs(b.value)); });
+  }
   return html + kTableEnd +
          "<p class=\"note\">By the GUM (JCGM 100): standard uncertainties in percent of each k. Type A comes from the "
          "scatter here, type B from elsewhere; what all coefficients share cancels in their ratios. A source that "
@@ -189,8 +194,9 @@ std::string interval(double lower, double upper) {
 }  // namespace
 
 std::string analysis_sections(const Analysis& analysis) {
-  return remark_section(analysis) + budget_section(analysis.coefficients) + prediction_section(analysis.predictions) +
-         speed_section(analysis.speed) + test_section(analysis) + torque_section(analysis.torque);
+  return remark_section(analysis) + budget_section(analysis.coefficients, analysis.standard) +
+         prediction_section(analysis.predictions) + speed_section(analysis.speed) + test_section(analysis) +
+         torque_section(analysis.torque);
 }
 
 std::string claims_section(std::span<const Claim> claims) {

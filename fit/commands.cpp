@@ -213,9 +213,13 @@ void write_page(const fs::path& page, const std::string& html) {
   fmt::print(stderr, "report        {}\n", page.string());
 }
 
-/// The clock's uncertainty is the bench file's own unless somebody knows better.
-AnalysisOptions analysis_options(const FitRequest& request, const Input& input) {
+/// The clock's uncertainty is the bench file's own, that of the air its instruments', unless somebody knows better.
+AnalysisOptions analysis_options(const FitRequest& request, const Input& input, const Identification& identification) {
   AnalysisOptions options;
+  if (const auto& air = identification.air) {
+    options.air_density_kg_m3 = air->kg_m3;
+    options.bench.air_density = air->u_kg_m3 / air->kg_m3;
+  }
   if (const auto& clock = input.provenance.clock) options.bench.motor_clock = clock->u_gain;
   for (const std::string& text : request.uncertainties) set_uncertainty(options.bench, text);
   const bool nobody_looks = request.no_report && !request.json;
@@ -246,7 +250,7 @@ std::vector<Claim> family_claims(const FitRequest& request, const Identification
     same.propeller.clear();
     same.diameter_in = same.blades = 0;
     Identification other = identify_input(input, same);
-    Analysis its = analyse(other, analysis_options(request, input));
+    Analysis its = analyse(other, analysis_options(request, input, other));
     family.push_back({std::move(other), std::move(its)});
   }
   return test_claims(family);
@@ -309,7 +313,7 @@ void run_fit(const FitRequest& request) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   fs::create_directories(folder);
   results::MemoryOnlySync files;  // made again from steps.csv at any time
-  const Analysis analysis = analyse(identification, analysis_options(request, input));
+  const Analysis analysis = analyse(identification, analysis_options(request, input, identification));
   results::write_text(file, format_coefficients(identification, input.provenance) + format_uncertainty(analysis),
                       files);
   for (const DoubtfulStep& doubtful : identification.selection.doubtful) {
@@ -373,7 +377,7 @@ void report_several(const ReportRequest& request) {
   for (const std::string& path : request.folders) {
     Input input = load(path);
     Chapter chapter{identify_again(input, path), {}, {}};
-    chapter.analysis = analyse(chapter.identification, analysis_options({}, input));
+    chapter.analysis = analyse(chapter.identification, analysis_options({}, input, chapter.identification));
     chapter.figures = draw_all(chapter.identification, input, figures / fmt::format("{}", chapters.size() + 1));
     chapter.provenance = std::move(input.provenance);
     chapters.push_back(std::move(chapter));
@@ -387,7 +391,7 @@ void run_report(const ReportRequest& request) {
   const std::string& path = request.folders.front();
   Input input = load(path);
   const Identification identification = identify_again(input, path);
-  write_report(identification, analyse(identification, analysis_options({}, input)), input,
+  write_report(identification, analyse(identification, analysis_options({}, input, identification)), input,
                request.out.empty() ? fs::path(path) / "report.html" : fs::path(request.out));
 }
 

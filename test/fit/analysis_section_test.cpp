@@ -30,6 +30,16 @@ TEST(AnalysisSections, ShowEveryRowOfTheBudgetAndWhatNobodyKnows) {
   EXPECT_THAT(html, HasSubstr("combined u"));
 }
 
+TEST(AnalysisSections, TellHowSureStandardAirIsWhereTheAirIsKnown) {
+  AnalysisOptions options;
+  EXPECT_THAT(analysis_sections(analyse(identify(campaign_steps()), options)), Not(HasSubstr("in standard air, 95 %")));
+  options.air_density_kg_m3 = 1.18;
+  options.bench.air_density = 0.002;
+  const std::string html = analysis_sections(analyse(identify(campaign_steps()), options));
+  ASSERT_TRUE(well_formed(html));
+  EXPECT_THAT(html, HasSubstr("in standard air, 95 %"));
+}
+
 TEST(AnalysisSections, ShowTestsWithTheirVerdicts) {
   Analysis found = analysis();
   EXPECT_THAT(analysis_sections(found), HasSubstr(">stands<"));
