@@ -17,12 +17,8 @@ constexpr std::size_t kAtOnce = 1024;
 constexpr Duration kSecondLookWall = std::chrono::milliseconds(20);
 constexpr double kPatienceAtRest = 0.5;  // s
 constexpr double kNoDerate = 0.9999;     // one count of the module's fix16 is 1.5e-5
-/// How late this host may tell a speed and take the reading that answers it.
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr Duration kHostWall = std::chrono::milliseconds(300);
-#else
-constexpr Duration kHostWall = std::chrono::milliseconds(60);
-#endif
+/// How late this host may tell a speed and take the reading that answers it; wall time.
+Duration host_delay(const profiles::Bench& place) { return std::chrono::milliseconds(is_slowed(place) ? 300 : 60); }
 
 Mounting mounting_of(const profiles::Bench& place) { return {place.thrust_axis, place.thrust_sign, place.iq.spin}; }
 
@@ -47,7 +43,7 @@ Guard::Guard(Bench& bench, const profiles::Bench& place, const results::LoadCell
       supply_(place.supply),
       table_(limits),
       load_(mounting_, scale),
-      speed_watch_(place.iq.spin, bench.clock().stretched(kHostWall), speed_share(limits)),
+      speed_watch_(place.iq.spin, bench.clock().stretched(host_delay(place)), speed_share(limits)),
       samples_(samples_relayed(scale), kAtOnce),
       readings_(kReadingsRelayed, kAtOnce),
       supply_readings_(kSupplyReadingsRelayed, 16),

@@ -114,11 +114,11 @@ void offer_devices(Table& table, const DeviceLimits& devices) {
 }
 
 /// What no file says and no device.
-void offer_own(Table& table, bool supply) {
+void offer_own(Table& table, const profiles::Bench& place) {
   table.offer(Watched::speed_error, 100 * SpeedWatch::kShare, "kphi");
-  table.offer(Watched::load_cell_age, to_seconds(kSpinPatienceWall), "kphi, while the motor turns");
-  table.offer(Watched::motor_age, to_seconds(kSpinPatienceWall), "kphi, while the motor turns");
-  if (supply) table.offer(Watched::supply_age, kSupplyPatience, "kphi");
+  table.offer(Watched::load_cell_age, to_seconds(spin_patience(place)), "kphi, while the motor turns");
+  table.offer(Watched::motor_age, to_seconds(spin_patience(place)), "kphi, while the motor turns");
+  if (place.supply) table.offer(Watched::supply_age, kSupplyPatience, "kphi");
   table.offer(Watched::pause, kLongestPause, "kphi, while the motor turns");
 }
 
@@ -134,7 +134,7 @@ std::vector<GuardLimit> combine_limits(const profiles::Campaign& campaign, const
   offer_campaign(table, campaign.limits);
   offer_bench(table, place);
   if (devices != nullptr) offer_devices(table, *devices);
-  offer_own(table, place.supply.has_value());
+  offer_own(table, place);
   auto rows = table.rows();
   if (!place.supply) std::erase_if(rows, [](const auto& row) { return row.watched == Watched::output_current; });
   return rows;

@@ -70,12 +70,19 @@ struct DeviceLimits {
 
 inline constexpr double kRangeBorne = 1.1;  ///< share of a range of the load cell: beyond it the cell is in danger
 inline constexpr double kOvershoot = 1.05;  ///< a closed loop overshoots a little on every step
-/// Of load cell and motor while it turns. Seen twice: after this host has stood still, what waits in the sockets is
-/// taken in between.
+/// Instrumented, a live bench is many times slower; a bench in process lives in time of its own.
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-inline constexpr Duration kSpinPatienceWall = std::chrono::milliseconds(500);  // instrumented: many times slower
+inline constexpr bool kInstrumented = true;
 #else
-inline constexpr Duration kSpinPatienceWall = std::chrono::milliseconds(145);
+inline constexpr bool kInstrumented = false;
 #endif
+[[nodiscard]] inline bool is_slowed(const profiles::Bench& place) {
+  return kInstrumented && !(place.simulation && place.simulation->in_process);
+}
+/// Wall time, of load cell and motor while it turns. Seen twice: after this host has stood still, what waits in the
+/// sockets is taken in between.
+[[nodiscard]] inline Duration spin_patience(const profiles::Bench& place) {
+  return std::chrono::milliseconds(is_slowed(place) ? 500 : 145);
+}
 
 }  // namespace kphi::daq

@@ -107,7 +107,7 @@ void Sequence::compare_configuration(int attempts) {
 std::string Sequence::explanation() {
   const Instant since = bench_.clock().now();
   const auto stretched = [&](Duration wall) { return bench_.clock().stretched(wall); };
-  if (recorder_.observe(since).load_cell_age < stretched(kSpinPatienceWall) / 2) return {};
+  if (recorder_.observe(since).load_cell_age < stretched(spin_patience(order_.place)) / 2) return {};
   if (!standstill_.empty()) return "; " + standstill_;
   while (bench_.clock().now() < since + stretched(kExplanationWall) && !stop_asked_()) {
     for (const results::StreamEvent& event : recorder_.take_events()) {

@@ -182,7 +182,7 @@ TEST_P(EachSilence, CoastsTheMotorWithinFiftyMillisecondsOfThePatience) {
   const results::RunRecording run = aborted();
   const Found last = GetParam().exceeded(run);
   ASSERT_TRUE(last);
-  const Duration after = bench_->coasts_at - *last - kSpinPatienceWall;
+  const Duration after = bench_->coasts_at - *last - spin_patience(place_);
   fmt::print("{:<20} coasts {:4.1f} ms after the patience\n", GetParam().name, 1e3 * to_seconds(after));
   EXPECT_GE(after, Duration(0));
   EXPECT_LE(after, kPrompt);
@@ -411,7 +411,7 @@ TEST_F(GuardAlone, LooksTwiceBeforeItBelievesASilence) {
   guard_.check(true);
   guard_.look();
   EXPECT_EQ(reason(), "");
-  while (bench_.time.now() <= milliseconds(300) + kSpinPatienceWall) {
+  while (bench_.time.now() <= milliseconds(300) + spin_patience(place_)) {
     guard_.look();
     bench_.time.set(bench_.time.now() + milliseconds(50));
     guard_.check(true);
