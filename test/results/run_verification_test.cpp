@@ -1,0 +1,183 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <random>
+
+#include "results/run_reader.hpp"
+#include "results/run_writer.hpp"
+#include "test/results/recordings.hpp"
+#include "test/results/synthetic_run.hpp"
+
+namespace kphi::results {
+namespace {
+
+using test::digest;
+using test::make_run;
+using test::make_writable;
+using test::same_rows;
+using test::TemporaryFolder;
+using test::Truth;
+using test::write_run;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+class VerifiedRun : public ::testing::Test {
+ protected:
+  void SetUp() override { path_ = folder_ / "a.h5"; }
+  /// Problems of the run, written as aborted, so that finish() does not refuse it.
+  std::vector<std::string> problems_of(RunRecording run) {
+    run.outcome = Outcome::aborted;
+    std::filesystem::remove(folder_ / "a.aborted.h5");
+    write_run(path_, run);
+    return verify_run(folder_ / "a.aborted.h5").problems;
+  }
+  TemporaryFolder folder_;
+  std::filesystem::path path_;
+};
+
+TEST_F(VerifiedRun, WithCountedLossesIsWhole) {
+  Truth truth;
+  truth.lose = [](std::uint64_t n) { return n % 1000 == 500 || (n > 3000 && n < 3050); };
+  const RunRecording run = make_run(truth);
+  write_run(path_, run);
+  const Verification found = verify_run(path_);
+  EXPECT_TRUE(found.whole()) << ::testing::PrintToString(found.problems);
+  EXPECT_EQ(found.lost, run.account.lost_network);
+  EXPECT_GT(found.lost, 50u);
+}
+
+TEST_F(VerifiedRun, FlippedBytesInTheSamplesShow) {
+  write_run(path_, make_run({}));
+  make_writable(path_);
+  const auto size = std::filesystem::file_size(path_);
+  std::mt19937_64 random(3);
+  std::string bytes = read_text(path_);
+  const RunRecording run = make_run({});
+  // The bytes of row 4321 of counts, found by their value.
+  const std::string row(reinterpret_cast<const char*>(run.load_cell[4321].counts.data()), 24);
+  const std::size_t at = bytes.find(row);
+  ASSERT_NE(at, std::string::npos);
+  ASSERT_LT(at, size);
+  bytes[at + 8] = static_cast<char>(bytes[at + 8] ^ 1);
+  std::ofstream(path_, std::ios::binary) << bytes;
+  EXPECT_THAT(verify_run(path_).problems, Contains(HasSubstr("load_cell/counts does not match its checksum")));
+}
+
+TEST_F(VerifiedRun, FlippedBytesAnywhereNeitherCrashNorGiveOtherSamples) {
+  const RunRecording run = make_run({});
+  write_run(path_, run);
+  make_writable(path_);
+  const std::string whole = read_text(path_);
+  std::mt19937_64 random(11);
+  int noticed = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    std::string bytes = whole;
+    // Half of them in the first 64 KiB, where most of the structure lies.
+    const std::size_t at = random() % (trial % 2 == 0 ? 65536 : bytes.size());
+    bytes[at] = static_cast<char>(bytes[at] ^ (1 << (random() % 8)));
+    std::ofstream(path_, std::ios::binary) << bytes;
+    if (!verify_run(path_).whole()) {
+      ++noticed;
+      continue;
+    }
+    const RunRecording again = read_run(path_);
+    EXPECT_TRUE(same_rows(run.load_cell, again.load_cell)) << "byte " << at;
+    EXPECT_TRUE(same_rows(run.motor, again.motor)) << "byte " << at;
+    EXPECT_EQ(digest(run), digest(again)) << "byte " << at;
+  }
+  EXPECT_GT(noticed, 20);
+}
+
+TEST_F(VerifiedRun, ChangedAttributesShow) {
+  write_run(path_, make_run({}));
+  make_writable(path_);
+  std::string bytes = read_text(path_);
+  const std::size_t at = bytes.find("5 inch, 3 blades");
+  ASSERT_NE(at, std::string::npos);
+  bytes[at] = '6';
+  std::ofstream(path_, std::ios::binary) << bytes;
+  EXPECT_FALSE(verify_run(path_).whole());
+}
+
+TEST_F(VerifiedRun, AMissingSampleShows) {
+  RunRecording run = make_run({});
+  run.load_cell.erase(run.load_cell.begin() + 777);
+  EXPECT_THAT(problems_of(run), Contains(HasSubstr("samples where")));
+  run.account.received -= 1;
+  run.account.expected -= 1;
+  EXPECT_THAT(problems_of(run), Contains("ft_sequence shows 1 missing samples where 0 were counted"));
+}
+
+TEST_F(VerifiedRun, ADoubledSampleARebootAndALeftStrideShow) {
+  RunRecording run = make_run({});
+  run.load_cell[100] = run.load_cell[99];
+  EXPECT_THAT(problems_of(run), Contains(HasSubstr("there twice")));
+  run = make_run({});
+  for (std::size_t i = 5000; i < run.load_cell.size(); ++i)
+    run.load_cell[i].ft_sequence = static_cast<std::uint32_t>(7 * (i - 5000));
+  for (std::size_t i = 0; i < 5000; ++i) run.load_cell[i].ft_sequence = static_cast<std::uint32_t>(7 * i);
+  EXPECT_THAT(problems_of(run), Contains(HasSubstr("the box restarted")));
+  run = make_run({});
+  run.load_cell[100].ft_sequence += 1;
+  EXPECT_THAT(problems_of(run), Contains(HasSubstr("left its stride")));
+}
+
+/// The counting stays a whole number of records where the box left out samples between two of them, or began anew.
+TEST_F(VerifiedRun, AGapThatIsNoMultipleOfTheStrideIsWholeWhenItWasCounted) {
+  RunRecording run = make_run({});
+  for (std::size_t i = 1000; i < run.load_cell.size(); ++i) run.load_cell[i].ft_sequence += 25;  // 4.6 strides
+  run.account.lost_network += 4;
+  run.account.expected += 4;
+  run.account.irregular += 1;
+  EXPECT_THAT(problems_of(run), testing::IsEmpty());
+}
+
+TEST_F(VerifiedRun, AStreamThatBeginsAnewAtAnySampleOfTheBoxIsWhole) {
+  RunRecording run = make_run({});
+  const std::uint32_t first = run.load_cell[2000].rdt_sequence - 1;
+  for (std::size_t i = 2000; i < run.load_cell.size(); ++i) {
+    run.load_cell[i].ft_sequence += 3;
+    run.load_cell[i].rdt_sequence -= first;
+  }
+  run.account.restarts += 1;
+  EXPECT_THAT(problems_of(run), testing::IsEmpty());
+}
+
+TEST_F(VerifiedRun, WithARestartOfTheBoxThatWasCountedIsWhole) {
+  RunRecording run = make_run({});
+  for (std::size_t i = 0; i < run.load_cell.size(); ++i)
+    run.load_cell[i].ft_sequence = static_cast<std::uint32_t>(7 * (i < 5000 ? i : i - 5000));
+  run.account.reboots = 1;
+  write_run(path_, run);
+  EXPECT_TRUE(verify_run(path_).whole()) << ::testing::PrintToString(verify_run(path_).problems);
+}
+
+TEST_F(VerifiedRun, ATruncatedFileShows) {
+  write_run(path_, make_run({}));
+  make_writable(path_);
+  const auto size = std::filesystem::file_size(path_);
+  for (const std::uintmax_t left : {size - 1, size / 2, std::uintmax_t{1000}, std::uintmax_t{0}}) {
+    std::filesystem::resize_file(path_, left);
+    EXPECT_FALSE(verify_run(path_).whole()) << left;
+    EXPECT_THROW((void)read_run(path_), RecordError) << left;
+  }
+}
+
+TEST_F(VerifiedRun, AStrangeScaleShows) {
+  RunRecording run = make_run({});
+  run.header.load_cell.counts_per_newton = 0;
+  EXPECT_THAT(problems_of(run), Contains("counts_per_newton is 0"));
+  run = make_run({});
+  run.header.load_cell.device_rate_hz = 5000;
+  EXPECT_THAT(problems_of(run), Contains(HasSubstr("do not make the box's")));
+}
+
+TEST_F(VerifiedRun, WhatIsNoRunFileIsSaidToBeNone) {
+  std::ofstream(path_) << "not a run";
+  EXPECT_THAT(verify_run(path_).problems, Contains(HasSubstr(path_.string())));
+  EXPECT_THROW((void)read_run(folder_ / "nothing.h5"), RecordError);
+}
+
+}  // namespace
+}  // namespace kphi::results

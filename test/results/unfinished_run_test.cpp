@@ -1,0 +1,200 @@
+// Writers that are killed, and disks that say no: what was synced stays.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/mount.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstring>
+#include <random>
+#include <system_error>
+
+#include "results/run_reader.hpp"
+#include "results/run_writer.hpp"
+#include "test/results/recordings.hpp"
+#include "test/results/synthetic_run.hpp"
+
+namespace kphi::results {
+namespace {
+
+using test::make_run;
+using test::same;
+using test::TemporaryFolder;
+using test::Truth;
+using test::write_run;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+/// The child appends and syncs for ever, telling each sync's sample count through the pipe; the parent kills it.
+TEST(KilledWriter, LeavesEverythingUpToItsLastSync) {
+  const RunRecording run = make_run({});
+  std::mt19937 random(7);
+  for (int trial = 0; trial < 12; ++trial) {
+    const TemporaryFolder folder;
+    int ends[2];
+    ASSERT_EQ(pipe(ends), 0);
+    const pid_t child = fork();
+    if (child == 0) {
+      RunWriter writer(folder / "a.h5", run.header);
+      for (const PhaseMark& mark : run.phases) writer.mark(mark);
+      std::uint64_t written = 0;
+      LoadCellRecord record;
+      for (;;) {
+        std::vector<LoadCellRecord> batch(700);
+        for (LoadCellRecord& r : batch) {
+          record.ft_sequence += run.header.load_cell.ft_stride;
+          record.rdt_sequence += 1;
+          record.counts[2] = static_cast<std::int32_t>(record.rdt_sequence);
+          r = record;
+        }
+        writer.append(batch);
+        written += batch.size();
+        writer.sync();
+        if (write(ends[1], &written, sizeof written) != sizeof written) _exit(1);
+      }
+    }
+    close(ends[1]);
+    std::uint64_t promised = 0;
+    const std::uint64_t enough = 700 * (1 + random() % 100);
+    while (promised < enough && read(ends[0], &promised, sizeof promised) == sizeof promised) {
+    }
+    kill(child, SIGKILL);
+    int status = 0;
+    waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFSIGNALED(status));
+    for (std::uint64_t more = 0; read(ends[0], &more, sizeof more) == sizeof more;) promised = more;
+    close(ends[0]);
+
+    const RunRecording rescued = read_run(folder / "a.h5.part");
+    EXPECT_GE(rescued.load_cell.size(), promised);
+    EXPECT_EQ(rescued.outcome, Outcome::aborted);
+    EXPECT_EQ(rescued.phases.size(), run.phases.size());
+    for (std::size_t i = 0; i < rescued.load_cell.size(); ++i) {
+      ASSERT_EQ(rescued.load_cell[i].counts[2], static_cast<std::int32_t>(i + 1));
+    }
+    EXPECT_FALSE(verify_run(folder / "a.h5.part").whole());
+  }
+}
+
+/// What the child tells through the pipe: the error's text.
+template <class Action>
+std::string error_in_child(Action&& action) {
+  int ends[2];
+  if (pipe(ends) != 0) return "no pipe";
+  const pid_t child = fork();
+  if (child == 0) {
+    std::string text = "no error";
+    try {
+      action();
+    } catch (const std::exception& error) {
+      text = error.what();
+    }
+    const bool told = write(ends[1], text.data(), text.size()) >= 0;
+    _exit(told ? 0 : 1);
+  }
+  close(ends[1]);
+  std::string text(4096, '\0');
+  const ssize_t n = read(ends[0], text.data(), text.size());
+  text.resize(n > 0 ? static_cast<std::size_t>(n) : 0);
+  close(ends[0]);
+  int status = 0;
+  waitpid(child, &status, 0);
+  if (status != 0) text += " (the child ended with status " + std::to_string(status) + ")";
+  return text;
+}
+
+TEST(DiskFull, ShowsAtTheVeryChunkAndSparesWhatWasSynced) {
+  const TemporaryFolder folder;
+  Truth truth;
+  truth.rate_hz = 7000;
+  truth.ft_stride = 1;
+  const RunRecording run = make_run(truth);
+  const std::string text = error_in_child([&] {
+    signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{1500000, 1500000};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    write_run(folder / "a.h5", run);
+  });
+  EXPECT_THAT(text, StartsWith("disk full: "));
+  EXPECT_THAT(text, HasSubstr("a.h5.part"));
+  EXPECT_THAT(text, ::testing::Not(HasSubstr("ended with status")));
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.h5"));
+
+  const RunRecording rescued = read_run(folder / "a.h5.part");
+  EXPECT_GE(rescued.load_cell.size(), 8192u);
+  EXPECT_LT(rescued.load_cell.size(), run.load_cell.size());
+  for (std::size_t i = 0; i < rescued.load_cell.size(); ++i)
+    ASSERT_TRUE(same(rescued.load_cell[i], run.load_cell[i])) << i;
+}
+
+TEST(DiskFull, OnARealFullFileSystemSaysNoSpaceLeft) {
+  const TemporaryFolder folder;
+  if (mount("none", folder.path().c_str(), "tmpfs", 0, "size=2m") != 0) {
+    GTEST_SKIP() << "cannot mount a small tmpfs: " << std::strerror(errno);
+  }
+  Truth truth;
+  truth.rate_hz = 7000;
+  truth.ft_stride = 1;
+  const RunRecording run = make_run(truth);
+  const std::string text = error_in_child([&] { write_run(folder / "a.h5", run); });
+  const RunRecording rescued = read_run(folder / "a.h5.part");
+  umount2(folder.path().c_str(), MNT_DETACH);
+  EXPECT_THAT(text, StartsWith("disk full: "));
+  EXPECT_THAT(text, HasSubstr("No space left on device"));
+  EXPECT_GE(rescued.load_cell.size(), 8192u);
+  for (std::size_t i = 0; i < rescued.load_cell.size(); ++i)
+    ASSERT_TRUE(same(rescued.load_cell[i], run.load_cell[i])) << i;
+}
+
+/// Refuses once so many bytes have gone to files.
+class FullAfter : public FileLayer {
+ public:
+  explicit FullAfter(std::uint64_t bytes) : left_(bytes) {}
+  void before_write(std::uint64_t bytes) override {
+    if (bytes > left_) throw std::system_error(ENOSPC, std::generic_category());
+    left_ -= bytes;
+  }
+  void sync_data(int) override {}
+
+ private:
+  std::uint64_t left_;
+};
+
+TEST(DiskFull, CanBeToldToTheWriterByTheFileLayer) {
+  const TemporaryFolder folder;
+  const RunRecording run = make_run({});
+  FullAfter files(600000);
+  try {
+    write_run(folder / "a.h5", run, files);
+    FAIL() << "was accepted";
+  } catch (const RecordError& error) {
+    EXPECT_THAT(error.what(), StartsWith("disk full: "));
+  }
+  const RunRecording rescued = read_run(folder / "a.h5.part");
+  EXPECT_GT(rescued.load_cell.size(), 0u);
+  EXPECT_LT(rescued.load_cell.size(), run.load_cell.size());
+}
+
+TEST(DiskFull, ARefusedSyncIsAnError) {
+  class NoSync : public FileLayer {
+   public:
+    void sync_data(int) override {
+      if (armed) throw std::system_error(EIO, std::generic_category());
+    }
+    bool armed = false;
+  } files;
+  const TemporaryFolder folder;
+  RunWriter writer(folder / "a.h5", make_run({}).header, files);
+  files.armed = true;
+  try {
+    writer.sync();
+    FAIL() << "was accepted";
+  } catch (const RecordError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("Input/output error"));
+  }
+}
+
+}  // namespace
+}  // namespace kphi::results
