@@ -8,6 +8,7 @@ kphi_test(kphi_reduction_test
     mean_error_test.cpp
     motor_series_test.cpp
     real_logs_test.cpp
+    reduction_doubts_test.cpp
     reduction_test.cpp
     reference_drift_test.cpp
     repetitions_test.cpp

@@ -1,0 +1,311 @@
+// Every doubt that a step can carry: what raises it, and what does not.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "daq/reduction.hpp"
+#include "results/steps_csv.hpp"
+#include "test/results/synthetic_run.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using results::Doubt;
+using results::RunRecording;
+using results::StepMean;
+using results::test::make_run;
+using results::test::spin_down_at;
+using results::test::Truth;
+
+bool has(const StepMean& step, Doubt doubt) { return (step.doubts & static_cast<std::uint32_t>(doubt)) != 0; }
+
+double k_of(const StepMean& step) { return step.thrust_n / (step.speed_rad_s * step.speed_rad_s); }
+
+/// A run whose module says `value` of `channel` once in the middle of each step.
+RunRecording with_readings(results::MotorChannel channel, double value) {
+  auto run = make_run(Truth{});
+  run.header.format = 3;
+  run.header.campaign_text =
+      "format: kphi-campaign/1\nname: short\n"
+      "propeller: {id: 5x3, name: 5-inch three-blade, diameter_in: 5, blades: 3}\n"
+      "occlusions_deg: [0]\nprofile: {steps: 4, dwell_s: 0.6, first_rpm: 6000, last_rpm: 18000}\n"
+      "zero_s: 0.5\nminimum_discard_s: 0.3\nsupply_v: 16.0\n"
+      "limits: {speed_max_rpm: 19100, thrust_max_n: 20, supply_current_max_a: 35, coil_temperature_max_degc: 110}\n";
+  for (std::size_t i = 0; i + 1 < run.phases.size(); ++i) {
+    if (run.phases[i].phase != results::Phase::step) continue;
+    const auto end = run.phases[i + 1].time_ns;
+    run.motor.push_back({channel, end - 1'000'000, 0, value});
+  }
+  std::stable_sort(run.motor.begin(), run.motor.end(), [](const auto& a, const auto& b) {
+    return a.channel != b.channel ? a.channel < b.channel : a.time_ns < b.time_ns;
+  });
+  return run;
+}
+
+TEST(Doubts, ShutsTheGatesOfMotorAndSupply) {
+  using results::MotorChannel;
+  const auto doubts = [](MotorChannel channel, double value) {
+    return results::doubt_names(reduce(with_readings(channel, value)).at(1).doubts);
+  };
+  EXPECT_EQ(doubts(MotorChannel::drive_pwm, 0.97), "");
+  EXPECT_EQ(doubts(MotorChannel::drive_pwm, 0.98), "drive_saturated");
+  EXPECT_EQ(doubts(MotorChannel::drive_pwm, -0.99), "drive_saturated");
+  EXPECT_EQ(doubts(MotorChannel::fault_now, 0), "");
+  EXPECT_EQ(doubts(MotorChannel::fault_now, 2), "motor_fault");
+  EXPECT_EQ(doubts(MotorChannel::supply_voltage, 14.5), "");
+  EXPECT_EQ(doubts(MotorChannel::supply_voltage, 14.3), "supply_out_of_band");
+  EXPECT_EQ(doubts(MotorChannel::supply_voltage, 17.7), "supply_out_of_band");
+  EXPECT_EQ(doubts(MotorChannel::coil_temperature, 109), "");
+  EXPECT_EQ(doubts(MotorChannel::coil_temperature, 110), "coil_hot");
+}
+
+TEST(Doubts, LeavesTheDoubtsOfOlderRunsAsTheyAre) {
+  auto run = with_readings(results::MotorChannel::supply_voltage, 5);
+  run.header.format = 2;
+  EXPECT_EQ(reduce(run).at(1).doubts, 0u);
+}
+
+TEST(Doubts, FlagsAStepThatDoesNotSettleAndDoesNotAverageItAsIfItHad) {
+  Truth truth;
+  truth.noise_n = 0.001;
+  truth.thrust_tau_s = 1.5;  // of the cell; the speed is there at once
+  const auto steps = reduce(make_run(truth));
+  EXPECT_TRUE(has(steps[1], Doubt::unsettled));
+  EXPECT_FALSE(has(steps[1], Doubt::speed_not_reached));
+}
+
+TEST(Doubts, CountsSpeedsThatNoRotorCanHaveAndLeavesThemOut) {
+  RunRecording run = make_run({});
+  for (auto& r : run.motor) {
+    if (r.channel == results::MotorChannel::speed && r.time_ns > 4'500'000'000 && r.time_ns < 4'515'000'000)
+      r.value *= 2;
+  }
+  const auto steps = reduce(run);
+  EXPECT_EQ(steps[1].speed_glitches, 1u);
+  EXPECT_EQ(results::doubt_names(steps[1].doubts), "speed_glitch");
+  EXPECT_NEAR(steps[1].speed_rad_s, 800, 0.01);
+  EXPECT_EQ(steps[0].speed_glitches, 0u);
+}
+
+TEST(Doubts, NoticesACellThatRepeatsOneValueWithinAStep) {
+  RunRecording run = make_run({});
+  for (std::size_t i = 4500; i < 4700; ++i) run.load_cell[i].counts = run.load_cell[4500].counts;
+  const auto steps = reduce(run);
+  EXPECT_TRUE(has(steps[1], Doubt::frozen));
+  EXPECT_FALSE(has(steps[0], Doubt::frozen));
+}
+
+TEST(Doubts, AThrustThatFadesAtConstantSpeedDrifts) {
+  RunRecording run = make_run({});
+  for (std::size_t i = 3000; i < 5000; ++i) {
+    run.load_cell[i].counts[2] += static_cast<std::int32_t>(40 * (static_cast<int>(i) - 3000));  // 80 mN of 770
+  }
+  const auto steps = reduce(run);
+  EXPECT_TRUE(has(steps[1], Doubt::drifted)) << results::doubt_names(steps[1].doubts);
+  EXPECT_FALSE(has(steps[0], Doubt::drifted));
+}
+
+TEST(Doubts, AZeroThatMovesFurtherThanToleratedPutsAllStepsInDoubt) {
+  Truth truth;  // 1.7 N at most: 0.02 N are tolerated; 10 s from zero to zero
+  truth.noise_n = 0.001;
+  truth.drift_n_per_s = 0.0018;
+  for (const StepMean& step : reduce(make_run(truth))) EXPECT_EQ(results::doubt_names(step.doubts), "");
+  truth.drift_n_per_s = 0.0024;
+  const Reduced reduced = reduce_with_zeros(make_run(truth));
+  EXPECT_NEAR(reduced.zero.moved_n, truth.sign * 0.0024 * 9.5, 0.002);
+  EXPECT_EQ(reduced.zero.tolerated_n, 0.02);
+  ASSERT_EQ(reduced.steps.size(), 3u);
+  for (const StepMean& step : reduced.steps) EXPECT_EQ(results::doubt_names(step.doubts), "zero_drifted");
+}
+
+TEST(Doubts, ARunWithoutOneOfItsZerosIsInDoubtBecauseNobodyKnowsHowFarItMoved) {
+  const Truth truth;
+  RunRecording run = make_run(truth);
+  const auto last = static_cast<results::Nanoseconds>(1e9 * spin_down_at(truth));
+  std::erase_if(run.load_cell, [&](const auto& record) { return record.arrival_ns > last; });
+  for (const StepMean& step : reduce(run)) {
+    EXPECT_EQ(results::doubt_names(step.doubts), "zero_drifted");
+    EXPECT_NEAR(k_of(step), truth.k, 0.02 * truth.k);
+  }
+  run.outcome = results::Outcome::aborted;
+  EXPECT_EQ(results::doubt_names(reduce(run)[0].doubts), "lag_unknown") << "that it lacks the second zero is known";
+}
+
+TEST(Doubts, ALargeThrustToleratesHalfAPercentOfDrift) {
+  Truth truth;
+  truth.noise_n = 0.001;
+  truth.k = 1.2e-5;  // 17.3 N
+  truth.drift_n_per_s = 0.0072;
+  const Reduced tolerated = reduce_with_zeros(make_run(truth));
+  EXPECT_NEAR(tolerated.zero.tolerated_n, 0.0864, 0.0002);
+  EXPECT_EQ(results::doubt_names(tolerated.steps[0].doubts), "");
+  truth.drift_n_per_s = 0.0105;
+  EXPECT_EQ(results::doubt_names(reduce(make_run(truth))[0].doubts), "zero_drifted");
+}
+
+TEST(Doubts, ANoisyZeroPutsAllStepsInDoubt) {
+  Truth truth;
+  truth.noise_n = 0.14;
+  for (const StepMean& step : reduce(make_run(truth))) EXPECT_FALSE(has(step, Doubt::zero_noisy));
+  truth.noise_n = 0.16;
+  for (const StepMean& step : reduce(make_run(truth))) EXPECT_TRUE(has(step, Doubt::zero_noisy));
+}
+
+TEST(Doubts, ASpeedThatNeverArrivesIsDoubted) {
+  Truth truth;
+  truth.motor_tau_s = 20;
+  const auto steps = reduce(make_run(truth));
+  EXPECT_TRUE(has(steps[0], Doubt::speed_not_reached));
+  EXPECT_EQ(steps[0].window_begin_s, truth.zero_s + 1);
+}
+
+TEST(Doubts, AnUnsteadySpeedIsDoubted) {
+  RunRecording run = make_run({});
+  int n = 0;
+  for (auto& reading : run.motor) {
+    if (reading.channel == results::MotorChannel::speed) reading.value += (n++ % 2 == 0 ? 30 : -30);
+  }
+  EXPECT_TRUE(has(reduce(run)[2], Doubt::speed_unsteady));
+}
+
+TEST(Doubts, ARotorThatIsHeldAtTheVeryEndOfAStepIsDoubtedThoughItsMeanSpeedEndsBefore) {
+  Truth truth;
+  truth.thrust_delay_s = 0.05;
+  RunRecording run = make_run(truth);
+  const auto end = static_cast<results::Nanoseconds>(1e9 * spin_down_at(truth));
+  for (auto& reading : run.motor) {
+    if (reading.channel == results::MotorChannel::speed && reading.time_ns >= end - 45'000'000) reading.value = 0;
+  }
+  const auto steps = reduce(run);
+  EXPECT_FALSE(has(steps[1], Doubt::speed_unsteady));
+  EXPECT_TRUE(has(steps.back(), Doubt::speed_unsteady));
+  EXPECT_NEAR(steps.back().speed_rad_s, steps.back().commanded_speed_rad_s, 1);
+}
+
+TEST(Doubts, LostSamplesAreDoubtedWhereTheyWereLost) {
+  Truth truth;
+  truth.lose = [](std::uint64_t n) { return n >= 4500 && n < 4510; };  // second step: 4 s to 5 s
+  const auto steps = reduce(make_run(truth));
+  EXPECT_FALSE(has(steps[0], Doubt::lost_samples));
+  EXPECT_TRUE(has(steps[1], Doubt::lost_samples));
+  EXPECT_FALSE(has(steps[2], Doubt::lost_samples));
+  EXPECT_NEAR(k_of(steps[1]), truth.k, 5e-3 * truth.k);
+
+  truth.lose = [](std::uint64_t n) { return n >= 3100 && n < 3200; };  // in the discarded second of a step
+  for (const StepMean& step : reduce(make_run(truth))) EXPECT_FALSE(has(step, Doubt::lost_samples));
+
+  truth.lose = [](std::uint64_t n) { return n >= 3900 && n < 4300; };  // across the begin of a window
+  EXPECT_TRUE(has(reduce(make_run(truth))[1], Doubt::lost_samples));
+}
+
+TEST(Doubts, AlmostNoSamplesAreDoubted) {
+  Truth truth;
+  truth.lose = [](std::uint64_t n) { return n >= 4050 && n < 5000; };
+  EXPECT_TRUE(has(reduce(make_run(truth))[1], Doubt::few_samples));
+  truth.lose = [](std::uint64_t n) { return n >= 3500 && n < 5500; };
+  const StepMean step = reduce(make_run(truth))[1];
+  EXPECT_TRUE(has(step, Doubt::few_samples));
+  EXPECT_TRUE(has(step, Doubt::lost_samples));
+  EXPECT_TRUE(std::isnan(step.thrust_n));
+}
+
+TEST(Doubts, StepsWhoseUncertaintyNobodyKnowsAreDoubted) {
+  Truth truth;
+  truth.reading_s = 0.25;  // four readings of the speed in a window
+  for (const StepMean& step : reduce(make_run(truth))) {
+    EXPECT_GE(step.speed_n, 3u);
+    EXPECT_TRUE(std::isnan(step.speed_u_rad_s));
+    EXPECT_TRUE(has(step, Doubt::few_samples));
+  }
+}
+
+TEST(Doubts, StatusWordsBecomeDoubts) {
+  const auto doubts_with = [](std::uint32_t word) {
+    Truth truth;
+    truth.status = [word](double t) { return t > 4.5 && t < 4.51 ? word : 0u; };
+    const auto steps = reduce(make_run(truth));
+    EXPECT_EQ(steps[0].doubts, 0u);
+    return results::doubt_names(steps[1].doubts);
+  };
+  EXPECT_EQ(doubts_with(0x80020000u), "saturated");
+  EXPECT_EQ(doubts_with(0x80010000u), "");  // a monitor condition is no error
+  EXPECT_EQ(doubts_with(0x80000010u), "bad_status");
+  EXPECT_EQ(doubts_with(0x80020010u), "saturated+bad_status");
+}
+
+/// The box starts anew at 4 s, in the second step, with another bias.
+RunRecording rebooted_run(double shift_n) {
+  Truth truth;
+  truth.drift_n_per_s = 0;
+  RunRecording run = make_run(truth);
+  for (std::size_t i = 4000; i < run.load_cell.size(); ++i) {
+    run.load_cell[i].ft_sequence = static_cast<std::uint32_t>(7 * (i - 4000));
+    run.load_cell[i].counts[2] += static_cast<std::int32_t>(1e6 * shift_n);
+  }
+  return run;
+}
+
+TEST(Doubts, AZeroHoldsForOnePowerUpOfTheBox) {
+  const Truth truth;
+  const auto steps = reduce(rebooted_run(0.5));
+  EXPECT_EQ(results::doubt_names(steps[0].doubts), "zero_drifted") << "nobody knows how far";
+  EXPECT_NEAR(k_of(steps[0]), truth.k, 0.02 * truth.k) << "the zero after the run is that of another bias";
+  EXPECT_TRUE(has(steps[1], Doubt::rebooted));
+  EXPECT_EQ(results::doubt_names(steps[2].doubts), "rebooted+zero_drifted");
+  EXPECT_NEAR(k_of(steps[2]), truth.k, 0.005 * truth.k) << "the zero after the run is of the same power-up";
+}
+
+TEST(Doubts, AGapThatARestartOfTheBoxHidesIsLostAllTheSame) {
+  RunRecording run = rebooted_run(0);
+  const auto cut = [&](std::ptrdiff_t from, std::ptrdiff_t to) {
+    run.load_cell.erase(run.load_cell.begin() + from, run.load_cell.begin() + to);
+  };
+  cut(4000, 4050);
+  EXPECT_FALSE(has(reduce(run)[1], Doubt::lost_samples)) << "a twentieth of the window";
+  cut(4000, 4250);
+  EXPECT_TRUE(has(reduce(run)[1], Doubt::lost_samples)) << "nearly a third";
+}
+
+TEST(Doubts, AZeroAfterARestartOfTheBoxIsAGoodZero) {
+  RunRecording run = make_run({});
+  for (std::size_t i = 0; i < run.load_cell.size(); ++i) {
+    run.load_cell[i].ft_sequence = static_cast<std::uint32_t>(7 * (i < 300 ? i : i - 300));
+    if (i < 300) run.load_cell[i].counts[2] += 900'000;
+  }
+  for (const StepMean& step : reduce(run)) {
+    EXPECT_EQ(results::doubt_names(step.doubts), "");
+    EXPECT_NEAR(step.thrust_n, 1.2e-6 * step.speed_rad_s * step.speed_rad_s, 0.01);
+  }
+}
+
+TEST(Doubts, EventsOfTheStreamAreDoubtedWhereTheyHappened) {
+  RunRecording run = make_run({});
+  run.events.push_back({results::EventKind::restarted, 4'000'000'000, 0, ""});
+  const auto steps = reduce(run);
+  EXPECT_EQ(results::doubt_names(steps[0].doubts), "");
+  EXPECT_EQ(results::doubt_names(steps[1].doubts), "stream_restarted");
+  EXPECT_EQ(results::doubt_names(steps[2].doubts), "");
+}
+
+TEST(Doubts, ACountAtTheEndOfItsRangeIsSaturation) {
+  RunRecording run = make_run({});
+  run.load_cell[4500].counts[2] = 120000000;
+  const auto steps = reduce(run);
+  EXPECT_TRUE(has(steps[1], Doubt::saturated));
+  EXPECT_FALSE(has(steps[0], Doubt::saturated));
+}
+
+TEST(Doubts, ADeratingModuleIsDoubted) {
+  RunRecording run = make_run({});
+  for (auto& r : run.motor) {
+    if (r.channel == results::MotorChannel::derate && r.time_ns > 4200000000 && r.time_ns < 4300000000) r.value = 0.9;
+  }
+  const auto steps = reduce(run);
+  EXPECT_TRUE(has(steps[1], Doubt::derated));
+  EXPECT_FALSE(has(steps[2], Doubt::derated));
+}
+
+}  // namespace
+}  // namespace kphi::daq
