@@ -309,7 +309,8 @@ std::string step_name(const FileOfRun& file, const results::StepMean& step) {
 void check_truth(const Evidence& evidence, const FileOfRun& file, const results::StepMean& step, Lines& wrong) {
   const Means truth = true_means(evidence.story, step.window_begin_s, step.window_end_s);
   if (truth.n < 10) return;
-  const double allowed_thrust = 6 * step.thrust_u_n + daq::tolerated_drift(truth.thrust) + 0.003 * truth.thrust;
+  const double thrust = std::abs(truth.thrust);  // it may push
+  const double allowed_thrust = 6 * step.thrust_u_n + daq::tolerated_drift(thrust) + 0.003 * thrust;
   const double allowed_speed = 6 * step.speed_u_rad_s + 0.003 * truth.speed + 1;
   if (!(std::abs(step.thrust_n - truth.thrust) <= allowed_thrust))
     wrong.push_back(fmt::format("{}: {:.4f} N without a doubt, in truth {:.4f} N (u {:.4f})", step_name(file, step),
