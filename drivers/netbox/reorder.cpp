@@ -19,8 +19,9 @@ bool before(const Record& a, const Record& b) noexcept {
 
 bool deliver(const StampedRecord& stamped, SequenceAccount& account, std::vector<StampedRecord>& out) {
   if (!account.accept(stamped.record, stamped.arrival)) return false;
-  if (const auto first = account.take_confirmed()) out.push_back(*first);
   out.push_back(stamped);
+  const auto other = account.take_confirmed();
+  if (other) out.insert(before(other->record, stamped.record) ? out.end() - 1 : out.end(), *other);
   return true;
 }
 

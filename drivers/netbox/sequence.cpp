@@ -10,6 +10,7 @@ namespace {
 // No datagram is on its way for longer: ft_sequence further back than this, or ahead of the time that has passed, was
 // counted by a box that has booted anew.
 constexpr double kLongestDelaySeconds = 5.0;
+constexpr std::uint32_t kLargestStride = 7000;
 constexpr double kUsualDelaySeconds = 0.05, kLargestSkew = 0.01;
 
 std::int32_t step(std::uint32_t from, std::uint32_t to) noexcept { return static_cast<std::int32_t>(to - from); }
@@ -19,6 +20,7 @@ std::int32_t step(std::uint32_t from, std::uint32_t to) noexcept { return static
 void SequenceAccount::begin_segment() noexcept {
   has_last_ = has_stray_ = false;
   stall_run_ = 0;
+  began_anew_stalled_ = false;
   former_count_ = 0;
 }
 
@@ -28,6 +30,8 @@ bool SequenceAccount::accept_unusual(const Record& record, Instant arrival) noex
   const std::int32_t ft_step = step(last_ft_, record.ft_sequence);
   if (ft_step == 0) {
     if (rdt_step == 0) return refuse(&Counters::duplicates);
+    // One stream shows the same measurement behind its first record, never before it.
+    began_anew_stalled_ |= step(last_rdt_, record.rdt_sequence) < 0;
     note_stall(record, arrival);
     return refuse(&Counters::stalled);
   }
@@ -62,27 +66,37 @@ bool SequenceAccount::on_former_line(const Record& record) const noexcept {
 }
 
 bool SequenceAccount::note_stray(const Record& record, Instant arrival, std::int32_t ft_step) noexcept {
-  const bool confirms = has_stray_ && record.rdt_sequence == stray_.record.rdt_sequence + 1 &&
-                        record.ft_sequence == stray_.record.ft_sequence + stride_;
-  if (confirms) return true;
+  if (has_stray_ && (confirms(stray_.record, record, arrival) || confirms(record, stray_.record, arrival))) return true;
   has_stray_ = true;
   stray_ = {record, arrival};
   stray_counted_ = ft_step < 0 && !in_recent_gap(record.ft_sequence) ? &Counters::duplicates : &Counters::late;
   return false;
 }
 
+/// A box far from where it was may count by another stride, too.
+bool SequenceAccount::confirms(const Record& first, const Record& second, Instant arrival) const noexcept {
+  if (second.rdt_sequence != first.rdt_sequence + 1) return false;
+  const std::uint32_t advance = second.ft_sequence - first.ft_sequence;
+  return advance == stride_ ||
+         (advance >= 1 && advance <= kLargestStride && !plausible(step(last_ft_, first.ft_sequence), arrival));
+}
+
 bool SequenceAccount::accept_reboot(const Record& record, Instant arrival) noexcept {
-  const StampedRecord first = stray_;
+  const StampedRecord newest{record, arrival};
+  const bool swapped = step(record.rdt_sequence, stray_.record.rdt_sequence) > 0;
+  const StampedRecord first = swapped ? newest : stray_, second = swapped ? stray_ : newest;
+  confirmed_ = stray_;
+  counters_.reordered += swapped;
   --(counters_.*stray_counted_);
   ++counters_.reboots;
   note_event(EventKind::rebooted, first.record, first.arrival, 0);
   leave_line();
   gap_count_ = 0;
   stall_run_ = 0;
+  began_anew_stalled_ = false;
   forget_host_drops();
   accept_first(first.record, first.arrival);
-  confirmed_ = first;
-  return accept(record, arrival);
+  return accept(second.record, second.arrival);
 }
 
 std::optional<StampedRecord> SequenceAccount::take_confirmed() noexcept {
@@ -110,13 +124,14 @@ bool SequenceAccount::accept_forward(const Record& record, Instant arrival, std:
                                      std::int32_t ft_step) noexcept {
   const auto advance = static_cast<std::uint64_t>(ft_step);
   const std::uint64_t records = std::max<std::uint64_t>(1, (advance + stride_ / 2) / stride_);
-  if (rdt_step <= 0) {
+  if (rdt_step <= 0 || began_anew_stalled_) {
     note_restart(record, arrival, records - 1);
   } else if (static_cast<std::uint64_t>(rdt_step) * stride_ != advance) {
     ++counters_.irregular;
   }
   if (stall_run_ > 0) note_event(EventKind::stall_ended, record, arrival, stall_run_);
   stall_run_ = 0;
+  began_anew_stalled_ = false;
   if (line(record.rdt_sequence, record.ft_sequence) != line(last_rdt_, last_ft_)) leave_line();
   if (records > 1) count_lost(records - 1, {last_ft_, record.ft_sequence});
   counters_.expected += records;

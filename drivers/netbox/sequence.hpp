@@ -69,7 +69,8 @@ class SequenceAccount {
   }
   /// The first record of a stream has come, though it may wait: what was dropped before it explains no gap.
   void forget_host_drops() noexcept { host_credit_ = 0; }
-  /// The first record of a rebooted box, once accept() has taken the second: it is to be delivered before that one.
+  /// Of the first two records of a rebooted box the one that came first, once accept() has taken the other: both are to
+  /// be delivered, in the order of their numbers.
   [[nodiscard]] std::optional<StampedRecord> take_confirmed() noexcept;
   /// Only a box that has booted anew can have sent it, as far as one record can tell.
   [[nodiscard]] bool looks_rebooted(const Record& record, Instant arrival) const noexcept;
@@ -111,6 +112,7 @@ class SequenceAccount {
   bool sent_since_last(std::int32_t rdt_step, Instant arrival) const noexcept;
   bool accept_reboot(const Record& record, Instant arrival) noexcept;
   bool note_stray(const Record& record, Instant arrival, std::int32_t ft_step) noexcept;
+  bool confirms(const Record& first, const Record& second, Instant arrival) const noexcept;
   void note_stall(const Record& record, Instant arrival) noexcept;
   void note_event(EventKind kind, const Record& record, Instant at, std::uint64_t records) noexcept;
   /// The same for all records of one stream: they lie on one line of rdt over ft.
@@ -133,7 +135,8 @@ class SequenceAccount {
   std::uint64_t former_count_ = 0;
   std::uint64_t stall_run_ = 0;  // records since the measurement stands still
   std::uint32_t stall_rdt_ = 0;
-  bool has_stray_ = false;  // the last record was one that only a rebooted box can have sent
+  bool began_anew_stalled_ = false;  // the stream did, while the measurement stood still
+  bool has_stray_ = false;           // the last record was one that only a rebooted box can have sent
   StampedRecord stray_;
   std::uint64_t Counters::*stray_counted_ = nullptr;  // as what it was discarded
   std::optional<StampedRecord> confirmed_;

@@ -250,6 +250,12 @@ void add_ends(Mixture& mixture, double until_s, Dice& dice) {
   mixture.kill = kill;
 }
 
+/// Drawn last, so that a seed stays what it was.
+void tear_a_write(Mixture& mixture, Dice& dice) {
+  if (mixture.kill && mixture.kill->at == Kill::At::file_operation && dice.once_in(2))
+    mixture.kill->at = Kill::At::write;
+}
+
 }  // namespace
 
 bool Mixture::is_clean() const {
@@ -264,14 +270,37 @@ Mixture draw(std::uint64_t seed) {
   const Devices devices{dice.once_in(2), dice.once_in(3)};
   mixture.campaign = campaign_of(shape, devices.supply, dice);
   mixture.bench = bench_of(devices, dice);
-  mixture.faults = faults_of(devices, shape.seconds(), dice);
+  mixture.lasts_s = shape.seconds();
+  mixture.faults = faults_of(devices, mixture.lasts_s, dice);
   add_operator(mixture, shape, dice);
-  add_ends(mixture, shape.seconds(), dice);
+  add_ends(mixture, mixture.lasts_s, dice);
+  tear_a_write(mixture, dice);
+  return mixture;
+}
+
+Mixture draw_resumed(const Mixture& former) {
+  Mixture mixture = former;
+  ++mixture.life;
+  Dice dice(former.seed + (static_cast<std::uint64_t>(mixture.life) << 40));
+  mixture.answers.clear();
+  mixture.answers_are_good = !dice.once_in(25);
+  mixture.mounted_instead_deg.reset();
+  mixture.disk.reset();
+  mixture.kill.reset();
+  mixture.interrupt.reset();
+  mixture.faults_are_others = !dice.once_in(3);
+  mixture.accepts_changes = mixture.life > 2 || !dice.once_in(10);
+  if (mixture.faults_are_others) {
+    const auto has = [&](const char* device) { return former.bench.find(device) != std::string::npos; };
+    mixture.faults = faults_of({has("supply: "), has("ambient: ")}, mixture.lasts_s, dice);
+  }
+  add_ends(mixture, mixture.lasts_s, dice);
+  tear_a_write(mixture, dice);
   return mixture;
 }
 
 std::string words(const Mixture& mixture) {
-  std::string out = fmt::format("# seed {}\n{}", mixture.seed, mixture.faults);
+  std::string out = fmt::format("# seed {}, life {}\n{}", mixture.seed, mixture.life, mixture.faults);
   const auto add = [&out](const std::string& title, const std::string& text) {
     out += "# " + title + ":\n";
     for (std::size_t at = 0; at < text.size();) {
@@ -282,7 +311,11 @@ std::string words(const Mixture& mixture) {
   };
   add("campaign", mixture.campaign);
   add("bench", mixture.bench);
-  add("the operator types, then end of file", mixture.answers);
+  if (mixture.life == 1) add("the operator types, then end of file", mixture.answers);
+  if (mixture.life > 1)
+    out += fmt::format("# resumed{}{}; the operator {}\n", mixture.faults_are_others ? " with other faults" : "",
+                       mixture.accepts_changes ? " and --accept-changes" : "",
+                       mixture.answers_are_good ? "types what he is asked for" : "is not there");
   if (mixture.mounted_instead_deg)
     out += fmt::format("# what is truly mounted the second time: {} deg\n", *mixture.mounted_instead_deg);
   if (mixture.disk)
@@ -290,10 +323,10 @@ std::string words(const Mixture& mixture) {
                        mixture.disk->operations == 0 ? "" : fmt::format(", {} of them", mixture.disk->operations));
   if (mixture.interrupt) out += fmt::format("# Ctrl-C at {:.4f} s\n", to_seconds(*mixture.interrupt));
   if (mixture.kill)
-    out +=
-        fmt::format("# killed at {} {}\n",
-                    std::array{"step of time", "file operation", "prompt"}[static_cast<std::size_t>(mixture.kill->at)],
-                    mixture.kill->number);
+    out += fmt::format("# killed at {} {}\n",
+                       std::array{"step of time", "file operation", "prompt",
+                                  "a write after file operation"}[static_cast<std::size_t>(mixture.kill->at)],
+                       mixture.kill->number);
   return out;
 }
 

@@ -2,40 +2,50 @@
 
 #include <unistd.h>
 
+#include <cmath>
 #include <fstream>
 #include <utility>
 
 #include "daq/interlock.hpp"
 #include "drivers/device_error.hpp"
 #include "profiles/configuration_error.hpp"
+#include "results/journal.hpp"
 #include "results/record_error.hpp"
 
 namespace kphi::soak {
 namespace {
 
 constexpr Duration kAfterwards = std::chrono::seconds(1);
-constexpr double kSafeToTouch = 5.0;  // rad/s
 
-std::string bench_text(const Mixture& mixture, const std::filesystem::path& faults) {
+std::string bench_text(const Mixture& mixture) {
   return mixture.bench + "simulation: {in_process: true, seed: " + std::to_string(mixture.seed) +
-         ", faults: " + faults.string() + "}\n";
+         ", faults: faults.yaml}\n";
 }
 
-/// What a person has typed already.
-class Typed {
+/// What a person types, not always after being asked.
+class Keyboard {
  public:
-  explicit Typed(const std::string& answers) {
-    int ends[2];
-    if (::pipe(ends) != 0) throw std::runtime_error("no pipe");
-    descriptor = ends[0];
-    const ssize_t written = ::write(ends[1], answers.data(), answers.size());
-    ::close(ends[1]);
-    if (written != static_cast<ssize_t>(answers.size())) throw std::runtime_error("no room in a pipe");
+  Keyboard() {
+    if (::pipe(ends_) != 0) throw std::runtime_error("no pipe");
   }
-  ~Typed() { ::close(descriptor); }
-  Typed(const Typed&) = delete;
-  Typed& operator=(const Typed&) = delete;
-  int descriptor = -1;
+  ~Keyboard() {
+    ::close(ends_[0]);
+    leave();
+  }
+  Keyboard(const Keyboard&) = delete;
+  Keyboard& operator=(const Keyboard&) = delete;
+  void type(const std::string& words) {
+    if (::write(ends_[1], words.data(), words.size()) != static_cast<ssize_t>(words.size()))
+      throw std::runtime_error("no room in a pipe");
+  }
+  /// Nothing more comes: end of file.
+  void leave() {
+    if (ends_[1] >= 0) ::close(std::exchange(ends_[1], -1));
+  }
+  [[nodiscard]] int descriptor() const noexcept { return ends_[0]; }
+
+ private:
+  int ends_[2] = {-1, -1};
 };
 
 class Nowhere {
@@ -59,6 +69,15 @@ std::filesystem::path quick_folder() {
   return ::access("/dev/shm", W_OK) == 0 ? std::filesystem::path("/dev/shm") : std::filesystem::temp_directory_path();
 }
 
+std::map<std::string, std::string> files_below(const std::filesystem::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file())
+      files[entry.path().lexically_relative(folder).string()] = results::read_text(entry.path());
+  }
+  return files;
+}
+
 /// The runner's progress, as far as it tells that all was well.
 class World::Watch final : public daq::Progress {
  public:
@@ -77,17 +96,20 @@ class World::Watch final : public daq::Progress {
 class World::Person final : public daq::Operator {
  public:
   Person(World& world, std::function<bool()> stop_asked)
-      : world_(world),
-        typed_(world.mixture_.answers),
-        asked_(typed_.descriptor, nowhere_.stream, std::move(stop_asked)) {}
+      : world_(world), asked_(keyboard_.descriptor(), nowhere_.stream, std::move(stop_asked)) {
+    keyboard_.type(world.mixture_.answers);
+    if (world.mixture_.life == 1 || !world.mixture_.answers_are_good) keyboard_.leave();
+  }
   void mount(const profiles::Propeller& propeller, double occlusion_deg) override {
     world_.at_prompt();
+    if (world_.mixture_.life > 1 && world_.mixture_.answers_are_good)
+      keyboard_.type(std::to_string(std::lround(occlusion_deg)) + "\n");
     (void)asked_.confirm_mounting(propeller, occlusion_deg);
   }
 
  private:
   World& world_;
-  Typed typed_;
+  Keyboard keyboard_;
   Nowhere nowhere_;
   daq::TerminalOperator asked_;
 };
@@ -96,11 +118,31 @@ World::World(const Mixture& mixture, const std::filesystem::path& quick_folder)
     : mixture_(mixture), folder_(quick_folder), disk_(mixture.disk) {
   std::ofstream(folder_ / "faults.yaml") << mixture.faults;
   campaign_ = profiles::parse_campaign(mixture.campaign, "campaign.yaml");
-  place_ = profiles::parse_bench(bench_text(mixture, folder_ / "faults.yaml"), "bench.yaml");
+  place_ = profiles::parse_bench(bench_text(mixture), (folder_ / "bench.yaml").string());
   disk_.watch = [this](std::uint64_t number) { at_operation(number); };
 }
 
+World::World(const Mixture& mixture, const std::filesystem::path& quick_folder, const results::CampaignFolder& left)
+    : World(mixture, quick_folder) {
+  const auto taken = folder_ / "resumed";
+  std::filesystem::rename(left.path(), taken);
+  written_ = results::CampaignFolder::open(taken);
+  look_at_inheritance();
+}
+
 World::~World() = default;
+
+void World::look_at_inheritance() {
+  inherited_.files = files_below(written_->path());
+  if (!std::filesystem::exists(written_->journal())) return;
+  inherited_.journal = results::read_text(written_->journal());
+  inherited_.journal.resize(inherited_.journal.rfind('\n') + 1);
+  for (const auto& entry : results::read_journal(written_->journal()).entries) {
+    if (entry.event == results::kRunAccepted) inherited_.accepted.insert(entry.data.at("file").get<std::string>());
+    if (entry.event == results::kCampaignStarted || entry.event == results::kCampaignResumed)
+      inherited_.faults_sha256 = entry.data.at("faults_sha256").get<std::string>();
+  }
+}
 
 void World::live() {
   try {
@@ -139,7 +181,12 @@ void World::live() {
     bench_->outlive(bench_->clock().now() + std::chrono::milliseconds(1));
 }
 
+/// As `kphi run` does: what is asked of files comes before any device.
 void World::begin() {
+  if (written_) {
+    resumption_ = daq::look_at(*written_, mixture_.accepts_changes);
+    (void)daq::require_unchanged(*written_, *resumption_, daq::identity_of(campaign_, place_));
+  }
   sim::BenchSettings settings;
   settings.keep = sim::FaultyWire::Keep::samples;
   bench_ = std::make_unique<daq::DeterministicBench>(place_, settings);
@@ -162,13 +209,14 @@ void World::begin() {
 }
 
 void World::campaign_to_its_end() {
-  written_.emplace(results::CampaignFolder::create(folder_.path(), "u", "soak", disk_));
+  if (!written_) written_.emplace(results::CampaignFolder::create(folder_.path(), "u", "soak", disk_));
   const std::function<bool()> stop_asked = [this] {
     return mixture_.interrupt && bench_->clock().now() >= *mixture_.interrupt;
   };
   Person person(*this, stop_asked);
   Watch watch(*this);
-  (void)daq::run_campaign(*bench_, campaign_, place_, *written_, person, watch, stop_asked);
+  (void)daq::run_campaign(*bench_, campaign_, place_, *written_, person, watch, stop_asked,
+                          resumption_ ? &*resumption_ : nullptr);
 }
 
 void World::step() {
@@ -192,21 +240,24 @@ void World::look() {
 void World::at_operation(std::uint64_t number) {
   if (killed_) throw Killed{};
   kill_at(Kill::At::file_operation, number);
+  if (!mixture_.kill || mixture_.kill->at != Kill::At::write || !written_) return;
+  if (number == mixture_.kill->number) torn_.before(written_->path());
+  if (number == mixture_.kill->number + 1) die();
 }
 
-/// Somebody is about to reach into the propeller.
 void World::at_prompt() {
-  const sim::SimulatedBench& bench = bench_->simulation();
-  if (bench_->simulation().motor().stage().mode != sim::PowerStage::Mode::coast)
-    story_.danger.push_back("at a prompt the motor does not coast");
-  if (std::abs(bench.plant().motor().speed) > kSafeToTouch) story_.danger.push_back("at a prompt the propeller turns");
+  story_.prompts.push_back({bench_->clock().now(), bench_->simulation().motor().stage().mode,
+                            std::abs(bench_->simulation().plant().motor().speed)});
   ++prompts_;
   lie_is_due_ = prompts_ == 2 && mixture_.mounted_instead_deg;
   kill_at(Kill::At::prompt, prompts_);
 }
 
 void World::kill_at(Kill::At at, std::uint64_t number) {
-  if (!mixture_.kill || mixture_.kill->at != at || mixture_.kill->number != number) return;
+  if (mixture_.kill && mixture_.kill->at == at && mixture_.kill->number == number) die();
+}
+
+void World::die() {
   killed_ = true;
   bench_->abandon();
   keep_what_the_disk_holds();
@@ -217,7 +268,9 @@ void World::keep_what_the_disk_holds() {
   if (!written_) return;
   const auto copy = folder_ / "left";
   std::filesystem::copy(written_->path(), copy, std::filesystem::copy_options::recursive);
-  if (std::filesystem::exists(copy / "journal.jsonl")) left_ = results::CampaignFolder::open(copy);
+  torn_.tear(written_->path(), copy, mixture_.seed);
+  if (std::filesystem::exists(copy / "journal.jsonl") || std::filesystem::exists(copy / "runs"))
+    left_ = results::CampaignFolder::open(copy);
 }
 
 }  // namespace kphi::soak

@@ -3,8 +3,10 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -13,6 +15,7 @@
 #include "test/drivers/netbox_faults/ideal.hpp"
 #include "test/soak/campaign_mixture.hpp"
 #include "test/soak/spoilt_disk.hpp"
+#include "test/soak/torn_write.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::soak {
@@ -35,6 +38,11 @@ struct Story {
     double thrust_n;     ///< without noise and zero
     double supply_v;     ///< at the module
   };
+  struct Prompt {
+    Instant at;
+    sim::PowerStage::Mode mode;
+    double speed_rad_s;  ///< unsigned
+  };
   struct Stream {
     Instant began;
     std::vector<netbox::test::Arrival> arrivals;
@@ -45,18 +53,31 @@ struct Story {
   std::vector<StageChange> stages;
   std::vector<Moment> moments;
   std::vector<Stream> streams;
+  std::vector<Prompt> prompts;  ///< somebody is about to reach into the propeller
   std::vector<std::string> said;
-  std::vector<std::string> danger;  ///< seen on the spot
-  Instant last_good_tick{0};        ///< when the runner looked at everything last and went on
+  Instant last_good_tick{0};  ///< when the runner looked at everything last and went on
   Instant ended{0};
   End end = End::unknown;
   std::string reason;  ///< of the exception
+};
+
+/// Name relative to `folder` → bytes, of all files in it and below.
+[[nodiscard]] std::map<std::string, std::string> files_below(const std::filesystem::path& folder);
+
+/// What a campaign's folder held when somebody went on with it.
+struct Inheritance {
+  std::map<std::string, std::string> files;  ///< as files_below() gives them
+  std::set<std::string> accepted;            ///< of these names
+  std::string journal;                       ///< its whole lines
+  std::string faults_sha256;                 ///< of the script it was begun or last resumed with; empty: none is known
 };
 
 class World {
  public:
   /// `quick_folder`: for what the campaign writes.
   World(const Mixture& mixture, const std::filesystem::path& quick_folder);
+  /// Goes on with the campaign in `left`, which it takes away from there.
+  World(const Mixture& mixture, const std::filesystem::path& quick_folder, const results::CampaignFolder& left);
   ~World();
   World(const World&) = delete;
   World& operator=(const World&) = delete;
@@ -71,6 +92,8 @@ class World {
   [[nodiscard]] const profiles::Bench& place() const noexcept { return place_; }
   /// nullptr: it could not be made.
   [[nodiscard]] daq::DeterministicBench* bench() noexcept { return bench_.get(); }
+  /// What was there before; empty for a new campaign.
+  [[nodiscard]] const Inheritance& inherited() const noexcept { return inherited_; }
   /// What is left of the campaign; after a kill as it was at that moment, whatever destructors did later. Nothing: it
   /// did not come so far.
   [[nodiscard]] const std::optional<results::CampaignFolder>& left() const noexcept { return left_; }
@@ -78,6 +101,7 @@ class World {
  private:
   class Watch;
   class Person;
+  void look_at_inheritance();
   void begin();
   void campaign_to_its_end();
   void step();
@@ -85,6 +109,7 @@ class World {
   void at_operation(std::uint64_t number);
   void at_prompt();
   void kill_at(Kill::At at, std::uint64_t number);
+  void die();
   void keep_what_the_disk_holds();
 
   const Mixture mixture_;
@@ -94,6 +119,9 @@ class World {
   profiles::Bench place_;
   std::unique_ptr<daq::DeterministicBench> bench_;
   std::optional<results::CampaignFolder> written_, left_;
+  Inheritance inherited_;
+  std::optional<daq::Resumption> resumption_;
+  TornWrite torn_;
   Story story_;
   std::uint64_t steps_ = 0, prompts_ = 0;
   std::uint32_t newest_stream_ = 0;  ///< of the box, as heard

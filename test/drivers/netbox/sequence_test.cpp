@@ -229,6 +229,35 @@ TEST(Sequence, ARebootThatLooksLikeAForwardJumpIsFoundByTheTimeItWouldHaveTaken)
   stream.expect_closed();
 }
 
+TEST(Sequence, ARebootWhoseFirstTwoRecordsOvertakeEachOtherLosesNeither) {
+  Stream stream;
+  for (std::uint32_t i = 1; i <= 100; ++i) stream.accept(i, 10'000'000 + i);
+  stream.wait(3s);
+  EXPECT_FALSE(stream.accept(2, 20'001));
+  EXPECT_TRUE(stream.accept(1, 20'000));
+  const auto second = stream.account().take_confirmed();
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->record.ft_sequence, 20'001u);
+  EXPECT_TRUE(stream.accept(3, 20'002));
+  EXPECT_EQ(stream.counters().reboots, 1u);
+  EXPECT_EQ(stream.counters().received, 103u);
+  EXPECT_EQ(stream.counters().reordered, 1u);
+  EXPECT_EQ(stream.counters().late + stream.counters().duplicates, 0u);
+  stream.expect_closed();
+}
+
+TEST(Sequence, ARebootIntoAnotherRateIsARebootToo) {
+  Stream stream(7);
+  for (std::uint32_t i = 1; i <= 100; ++i) stream.accept(i, 10'000'000 + 7 * i);
+  stream.wait(3s);
+  for (std::uint32_t i = 0; i < 50; ++i) EXPECT_EQ(stream.accept(1 + i, 20'000 + 2 * i), i > 0);
+  EXPECT_EQ(stream.counters().reboots, 1u);
+  EXPECT_EQ(stream.counters().received, 150u);
+  EXPECT_EQ(stream.counters().irregular, 49u);
+  EXPECT_EQ(stream.counters().late + stream.counters().duplicates, 0u);
+  stream.expect_closed();
+}
+
 TEST(Sequence, ASingleStrayRecordIsNoReboot) {
   Stream stream;
   for (std::uint32_t i = 1; i <= 100; ++i) {
@@ -288,6 +317,19 @@ TEST(Sequence, NamesAStallOnceAndItsEnd) {
   EXPECT_EQ(events[0].kind, EventKind::stalled);
   EXPECT_EQ(events[1].kind, EventKind::stall_ended);
   EXPECT_EQ(events[1].records, 29u);
+  EXPECT_EQ(stream.counters().irregular, 0u);
+  stream.expect_closed();
+}
+
+TEST(Sequence, AStreamThatBeginsAnewWhileTheMeasurementStandsStillHasBegunAnew) {
+  Stream stream;
+  for (std::uint32_t i = 1; i <= 10; ++i) stream.accept(i, 100 + i);
+  for (std::uint32_t i = 11; i <= 15; ++i) EXPECT_FALSE(stream.accept(i, 110));
+  for (std::uint32_t i = 1; i <= 20; ++i) EXPECT_FALSE(stream.accept(i, 110));
+  EXPECT_TRUE(stream.accept(21, 111));
+  EXPECT_TRUE(stream.accept(22, 112));
+  EXPECT_EQ(stream.counters().restarts, 1u);
+  EXPECT_EQ(stream.counters().stalled, 25u);
   EXPECT_EQ(stream.counters().irregular, 0u);
   stream.expect_closed();
 }
