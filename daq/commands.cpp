@@ -148,7 +148,7 @@ int run(const RunOptions& options) {
   for (const LimitCheck& check : dry.checks) {
     if (check.finding.severity != Severity::note) put(stderr, check.subject + ": " + check.finding.line() + "\n");
   }
-  live::View view(options.live, live::subject_of(campaign));
+  live::View view(options.live, live::subject_of(campaign, place));
   put(stderr, live::greeting(view));
   const std::function<bool()> stop_asked = [&view] { return SignalWatch::count() > 0 || view.stop_asked(); };
   const auto operator_ = person(options, answers, stop_asked);

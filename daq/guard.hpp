@@ -88,7 +88,7 @@ class Guard final : public Streams {
   const Mounting mounting_;
   const std::optional<profiles::SupplyPlace> supply_;
   const std::vector<GuardLimit> table_;
-  std::array<const GuardLimit*, static_cast<std::size_t>(Watched::state)> limits_{};
+  std::array<const GuardLimit*, kWatchedCount> limits_{};
   LoadWatch load_;
   SpeedWatch speed_watch_;
   Stream load_cell_stream_, motor_stream_, supply_stream_;

@@ -128,6 +128,10 @@ DeviceLimits device_limits(Bench& bench) {
   return {bench.load_cell().configuration().range, bench.motor().parameters()};
 }
 
+DeviceLimits device_limits(const results::RunHeader& header) {
+  return {header.load_cell.range, iq::AuditRecord::of(header.motor_parameters)};
+}
+
 std::vector<GuardLimit> combine_limits(const profiles::Campaign& campaign, const profiles::Bench& place,
                                        const DeviceLimits* devices) {
   Table table;

@@ -37,6 +37,7 @@ enum class Watched : std::uint8_t {
   pause,  ///< of the runner, while the motor turns
   state,  ///< no limit: what a device says of itself
 };
+inline constexpr std::size_t kWatchedCount = static_cast<std::size_t>(Watched::state);
 
 struct GuardLimit {
   Watched watched{};
@@ -57,6 +58,8 @@ struct DeviceLimits {
 
 /// Of a connected bench.
 [[nodiscard]] DeviceLimits device_limits(Bench& bench);
+/// Of a recorded run: what its header holds of them.
+[[nodiscard]] DeviceLimits device_limits(const results::RunHeader& header);
 
 /// Sorted by what is watched; what nobody limits has no row. Without `devices`: what the files say.
 [[nodiscard]] std::vector<GuardLimit> combine_limits(const profiles::Campaign& campaign, const profiles::Bench& place,

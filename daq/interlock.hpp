@@ -1,6 +1,7 @@
 // When the bench must stop by itself. A trip is a value, and the first one holds: it is latched.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <stdexcept>
 #include <string>
@@ -26,6 +27,8 @@ struct Observation {
   unsigned fault_bits = 0;           ///< of power_safety.fault_now
   NewtonMetres torque{};             ///< about the thrust axis, zero subtracted
   Volts module_voltage{};            ///< at the motor module's input
+  Amperes motor_current{};           ///< the module's estimate
+  std::array<double, 6> loads{};     ///< on the cell, its zero included; see borne_loads
   results::SupplyReading supply{};   ///< of the bench supply; time 0: nothing yet, or there is none
   results::SampleAccount account{};  ///< of this run so far
 };

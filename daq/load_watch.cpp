@@ -37,4 +37,19 @@ double LoadWatch::shaft_torque() const noexcept {
   return static_cast<double>(total_.torque) / (static_cast<double>(sums_.size()) * counts_per_newton_metre_);
 }
 
+std::array<double, 6> borne_loads(std::span<const results::LoadCellRecord> samples, double counts_per_newton,
+                                  double counts_per_newton_metre) noexcept {
+  std::array<double, 6> largest{};
+  const auto load = [&](std::size_t sample, std::size_t axis) {
+    return std::abs(static_cast<double>(samples[sample].counts[axis]));
+  };
+  for (std::size_t axis = 0; axis < largest.size(); ++axis) {
+    if (samples.size() == 1) largest[axis] = load(0, axis);
+    for (std::size_t i = 1; i < samples.size(); ++i)
+      largest[axis] = std::max(largest[axis], std::min(load(i - 1, axis), load(i, axis)));
+    largest[axis] /= axis < 3 ? counts_per_newton : counts_per_newton_metre;
+  }
+  return largest;
+}
+
 }  // namespace kphi::daq

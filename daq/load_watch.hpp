@@ -9,6 +9,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "daq/mounting.hpp"
@@ -44,5 +45,10 @@ class LoadWatch {
   std::vector<Pair> sums_;  ///< the medians of the window
   Pair total_;
 };
+
+/// For onlookers, of the newest samples: the largest load of each axis that two successive ones carry, unsigned, as the
+/// box shows it. Fx Fy Fz in N, Tx Ty Tz in N m; 0 without a sample.
+[[nodiscard]] std::array<double, 6> borne_loads(std::span<const results::LoadCellRecord> samples,
+                                                double counts_per_newton, double counts_per_newton_metre) noexcept;
 
 }  // namespace kphi::daq

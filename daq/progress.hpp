@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include "daq/interlock.hpp"
 #include "profiles/campaign.hpp"
@@ -30,6 +31,8 @@ void put(std::FILE* stream, const std::string& text) noexcept;
 class Progress {
  public:
   virtual ~Progress() = default;
+  /// A run begins, and its guard holds it to these.
+  virtual void guarded(const std::vector<GuardLimit>& limits) { static_cast<void>(limits); }
   /// Called on every tick; must return at once.
   virtual void tick(const Position& position, const Observation& seen) = 0;
   /// A step or phase is over.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "daq/device_records.hpp"
+#include "daq/load_watch.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -117,6 +118,7 @@ void Recorder::drain_load_cell() {
     torque_nm_ = newton_metres / static_cast<double>(n);
     phase_mean_n_ = phase_sum_n_ / static_cast<double>(phase_count_);
     phase_mean_nm_ = phase_sum_nm_ / static_cast<double>(phase_count_);
+    loads_.publish(borne_loads(batch, scale_.counts_per_newton, scale_.counts_per_newton_metre));
     load_cell_ns_ = batch.back().arrival_ns;
   }
 }
@@ -129,6 +131,7 @@ void Recorder::drain_motor() {
     for (const auto& reading : batch) {
       if (reading.channel == MotorChannel::speed) speed_rad_s_ = std::abs(reading.value);
       if (reading.channel == MotorChannel::supply_voltage) module_voltage_v_ = reading.value;
+      if (reading.channel == MotorChannel::motor_current) motor_current_a_ = reading.value;
       if (reading.channel == MotorChannel::derate) derate_ = reading.value;
       if (reading.channel == MotorChannel::fault_now) fault_bits_ = static_cast<unsigned>(reading.value);
       if (reading.channel == MotorChannel::supply_current) supply_current_a_ = reading.value;
@@ -168,6 +171,8 @@ Observation Recorder::observe(Instant now) const noexcept {
   seen.derate = derate_;
   seen.fault_bits = fault_bits_;
   seen.module_voltage = Volts(module_voltage_v_);
+  seen.motor_current = Amperes(motor_current_a_);
+  seen.loads = loads_.read();
   seen.supply = supply_.read();
   seen.account = bench_.load_cell().account();
   seen.load_cell_is_fresh = seen.load_cell_age <= fresh_load_cell_;

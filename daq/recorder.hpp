@@ -77,11 +77,12 @@ class Recorder {
   std::atomic<double> thrust_n_{0}, phase_mean_n_{0}, zero_n_{0};
   std::atomic<double> speed_rad_s_{0}, supply_current_a_{0}, coil_temperature_degc_{0};
   std::atomic<double> torque_nm_{0}, phase_mean_nm_{0}, zero_nm_{0};
-  std::atomic<double> module_voltage_v_{0}, derate_{1};
+  std::atomic<double> module_voltage_v_{0}, motor_current_a_{0}, derate_{1};
   std::atomic<unsigned> fault_bits_{0};
   std::atomic<std::int64_t> load_cell_ns_, motor_ns_;
   netbox::Published<netbox::ZeroMeasurement> measured_;
   netbox::Published<results::SupplyReading> supply_;
+  netbox::Published<std::array<double, 6>> loads_;
   std::atomic<bool> failed_{false};
   std::exception_ptr failure_;  // written before failed_, read after it
 };

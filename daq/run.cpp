@@ -178,7 +178,9 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   judge_changes(before, bench.load_cell(), order, progress);
   results::RunWriter writer(order.file, header_of(order, bench, streaming->scale()), bench.files());
   const DeviceLimits devices = device_limits(bench);
-  Guard guard(bench, order.place, streaming->scale(), combine_limits(order.campaign, order.place, &devices));
+  const std::vector<GuardLimit> limits = combine_limits(order.campaign, order.place, &devices);
+  progress.guarded(limits);
+  Guard guard(bench, order.place, streaming->scale(), limits);
   Recorder recorder(bench, guard, writer, {order.place.thrust_axis, order.place.thrust_sign, order.place.iq.spin},
                     streaming->scale());
   Sequence sequence(bench, recorder, guard, order, progress, stop_asked);

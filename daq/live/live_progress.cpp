@@ -1,6 +1,7 @@
 #include "daq/live/live_progress.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "daq/live/messages.hpp"
 
@@ -57,9 +58,12 @@ Tick LiveProgress::tick_of(const Position& position, const Observation& seen) {
     tick.supply_v = seen.supply.voltage_v;
     tick.supply_a = seen.supply.current_a;
   }
-  for (std::size_t i = 0; i < std::min(kMostLimits, subject_.limits.size()); ++i)
-    tick.limit_values[i] = subject_.limits[i].value(seen);
+  tick.watched = limit_values(position, seen, {is_settled(now), pause_}, clock_);
   return tick;
+}
+
+bool LiveProgress::is_settled(Instant now) const {
+  return step_ >= 0 && now - step_began_ >= from_seconds(subject_.minimum_discard.value());
 }
 
 void LiveProgress::look(const Position& position, const Observation& seen, Instant now) {
@@ -68,8 +72,15 @@ void LiveProgress::look(const Position& position, const Observation& seen, Insta
     step_began_ = now;
     quick_look_.begin();
   }
-  const bool settled = now - step_began_ >= from_seconds(subject_.minimum_discard.value());
-  if (step_ >= 0 && settled && seen.motor_is_fresh && seen.load_cell_is_fresh) quick_look_.add(seen.thrust, seen.speed);
+  pause_ = now - std::exchange(looked_, now);
+  if (is_settled(now) && seen.motor_is_fresh && seen.load_cell_is_fresh) quick_look_.add(seen.thrust, seen.speed);
+}
+
+void LiveProgress::guarded(const std::vector<GuardLimit>& limits) {
+  inner_.guarded(limits);
+  std::vector<LimitBar> bars = limit_bars(limits);
+  feed_.tell(limits_message(bars));
+  if (plotter_ != nullptr) plotter_->hold_to(std::move(bars));
 }
 
 void LiveProgress::tick(const Position& position, const Observation& seen) {

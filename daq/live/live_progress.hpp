@@ -16,6 +16,7 @@ class LiveProgress final : public Progress {
   /// All must outlive this. `inner` is told everything first; `plotter` may be nullptr.
   LiveProgress(Progress& inner, Feed& feed, UdpJson* plotter, const Subject& subject, const Clock& clock)
       : inner_(inner), feed_(feed), plotter_(plotter), subject_(subject), clock_(clock) {}
+  void guarded(const std::vector<GuardLimit>& limits) override;
   void tick(const Position& position, const Observation& seen) override;
   void step_done(const Position& position, const Observation& seen) override;
   void say(const std::string& line) override;
@@ -23,6 +24,7 @@ class LiveProgress final : public Progress {
  private:
   [[nodiscard]] Tick tick_of(const Position& position, const Observation& seen);
   void look(const Position& position, const Observation& seen, Instant now);
+  [[nodiscard]] bool is_settled(Instant now) const;
 
   Progress& inner_;
   Feed& feed_;
@@ -31,7 +33,8 @@ class LiveProgress final : public Progress {
   const Clock& clock_;
   QuickLook quick_look_;
   int step_ = -1;  ///< that is looked at
-  Instant step_began_{};
+  Instant step_began_{}, looked_{};
+  Duration pause_{};  ///< between the last two ticks
   double most_remaining_s_ = 0;
 };
 

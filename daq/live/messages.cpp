@@ -14,9 +14,9 @@ std::string text_of(const ordered_json& message) {
 }
 
 /// Nine digits are more than any of the devices has.
-double rounded(double value) {
+double rounded(double value, int digits = 9) {
   if (value == 0 || !std::isfinite(value)) return value;
-  const double scale = std::pow(10.0, 8 - std::floor(std::log10(std::abs(value))));
+  const double scale = std::pow(10.0, digits - 1 - std::floor(std::log10(std::abs(value))));
   return std::isfinite(scale) ? std::round(value * scale) / scale : value;
 }
 
@@ -40,22 +40,35 @@ void add_readings(ordered_json& to, const Tick& tick) {
   to["lost_host"] = tick.lost_host;
 }
 
+ordered_json to_json(const std::vector<LimitBar>& limits) {
+  ordered_json bars = ordered_json::array();
+  for (const LimitBar& bar : limits)
+    bars.push_back({{"key", bar.key},
+                    {"name", bar.name},
+                    {"unit", bar.unit},
+                    {"limit", rounded(bar.limit)},
+                    {"lower", bar.lower},
+                    {"source", bar.source}});
+  return bars;
+}
+
 }  // namespace
 
 std::string hello_message(const Subject& subject) {
-  ordered_json limits = ordered_json::array();
-  for (const LimitBar& bar : subject.limits)
-    limits.push_back({{"key", bar.key}, {"name", bar.name}, {"unit", bar.unit}, {"limit", bar.limit}});
   return text_of({{"type", "hello"},
-                  {"format", "kphi-live/1"},
+                  {"format", "kphi-live/2"},
                   {"replay", subject.replay},
                   {"name", subject.name},
                   {"propeller", subject.propeller},
                   {"speed_max_rpm", subject.speed_max_rpm},
-                  {"limits", limits}});
+                  {"limits", to_json(subject.limits)}});
 }
 
-std::string tick_message(const Tick& tick, std::size_t limits, double silent_s, std::uint64_t dropped) {
+std::string limits_message(const std::vector<LimitBar>& limits) {
+  return text_of({{"type", "limits"}, {"limits", to_json(limits)}});
+}
+
+std::string tick_message(const Tick& tick, double silent_s, std::uint64_t dropped) {
   ordered_json message{{"type", "tick"},
                        {"time_s", tick.time_s},
                        {"progress", rounded(tick.progress)},
@@ -68,8 +81,8 @@ std::string tick_message(const Tick& tick, std::size_t limits, double silent_s, 
                        {"repetition", tick.repetition},
                        {"repetitions", tick.repetitions}};
   add_readings(message, tick);
-  message["limits"] = ordered_json::array();
-  for (std::size_t i = 0; i < limits; ++i) message["limits"].push_back(rounded(tick.limit_values[i]));
+  for (std::size_t i = 0; i < kWatchedCount; ++i)
+    message["watched"][key_of(static_cast<Watched>(i))] = rounded(tick.watched[i], 4);
   message["silent_s"] = rounded(silent_s);
   message["dropped"] = dropped;
   return text_of(message);
@@ -105,8 +118,8 @@ std::string plot_message(const Tick& tick, const std::vector<LimitBar>& limits) 
                        {"repetition", tick.repetition},
                        {"step", tick.step}};
   add_readings(message, tick);
-  for (std::size_t i = 0; i < limits.size(); ++i)
-    message["limit_share"][limits[i].key] = rounded(tick.limit_values[i] / limits[i].limit);
+  for (const LimitBar& bar : limits)
+    message["limit_share"][bar.key] = rounded(share_of(bar, tick.watched[static_cast<std::size_t>(bar.watched)]), 4);
   const auto drop_unknown = [](ordered_json& object) {
     for (auto item = object.begin(); item != object.end();) {
       const bool unknown = item->is_number_float() && !std::isfinite(item->get<double>());

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <thread>
 
+#include "daq/load_watch.hpp"
 #include "profiles/configuration_error.hpp"
 
 namespace kphi::daq::live {
@@ -40,9 +42,19 @@ void take(const results::MotorReading& reading, Observation& seen) {
   if (reading.channel == MotorChannel::speed) seen.speed = RadPerSec(std::abs(reading.value));
   if (reading.channel == MotorChannel::supply_voltage) seen.module_voltage = Volts(reading.value);
   if (reading.channel == MotorChannel::supply_current) seen.supply_current = Amperes(reading.value);
+  if (reading.channel == MotorChannel::motor_current) seen.motor_current = Amperes(reading.value);
   if (reading.channel == MotorChannel::coil_temperature) seen.coil_temperature = Celsius(reading.value);
   if (reading.channel == MotorChannel::derate) seen.derate = reading.value;
   if (reading.channel == MotorChannel::fault_now) seen.fault_bits = static_cast<unsigned>(reading.value);
+}
+
+/// One that cannot be read any more limits nothing.
+profiles::Bench bench_of(const results::RunHeader& header) {
+  try {
+    return profiles::parse_bench(header.bench_text, "bench of the run");
+  } catch (const ConfigurationError&) {
+    return {};
+  }
 }
 
 }  // namespace
@@ -51,7 +63,9 @@ Subject subject_of(const results::RunRecording& recording) {
   const results::RunHeader& header = recording.header;
   Subject subject;
   try {
-    subject = subject_of(profiles::parse_campaign(header.campaign_text, "campaign of the run"));
+    const DeviceLimits devices = device_limits(header);
+    subject =
+        subject_of(profiles::parse_campaign(header.campaign_text, "campaign of the run"), bench_of(header), &devices);
   } catch (const ConfigurationError&) {
     subject.name = header.campaign_name;
     subject.propeller = header.propeller_name;
@@ -60,6 +74,7 @@ Subject subject_of(const results::RunRecording& recording) {
       subject.speed_max_rpm = std::max(subject.speed_max_rpm, to_rpm(RadPerSec(mark.speed_rad_s)));
   }
   subject.replay = true;
+  std::erase_if(subject.limits, [](const LimitBar& bar) { return bar.watched == Watched::pause; });  // not recorded
   return subject;
 }
 
@@ -107,6 +122,8 @@ void ReplayedRun::observe(Instant when) {
     const auto above_zero = [&](std::size_t of) { return mean_counts(of, from, sample_) - zero_[of]; };
     seen_.thrust = Newtons(header.thrust_sign * above_zero(axis) / header.load_cell.counts_per_newton);
     seen_.torque = NewtonMetres(header.thrust_sign * above_zero(3 + axis) / header.load_cell.counts_per_newton_metre);
+    seen_.loads = borne_loads(std::span(cell).subspan(from, sample_ - from), header.load_cell.counts_per_newton,
+                              header.load_cell.counts_per_newton_metre);
     seen_.account.received = sample_;
   }
   for (; reading_ < motor_.size() && motor_[reading_].time_ns <= when.count(); ++reading_)

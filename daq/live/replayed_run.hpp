@@ -10,7 +10,8 @@
 
 namespace kphi::daq::live {
 
-/// Limits come from the campaign that the run carries with it; none when that cannot be read any more.
+/// Limits are those of campaign, bench and devices that the run carries with it; none when its campaign cannot be read
+/// any more.
 [[nodiscard]] Subject subject_of(const results::RunRecording& recording);
 
 class ReplayedRun {

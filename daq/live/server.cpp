@@ -54,7 +54,11 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 class History {
  public:
   void keep(const std::string& message) {
-    const bool is_step = message.rfind("{\"type\":\"step\"", 0) == 0;
+    if (message.starts_with("{\"type\":\"limits\"")) {
+      limits_ = {message};  // the newest only
+      return;
+    }
+    const bool is_step = message.starts_with("{\"type\":\"step\"");
     auto& kept = is_step ? steps_ : others_;
     kept.push_back(message);
     if (kept.size() > (is_step ? kMostSteps : kMostLines)) kept.pop_front();
@@ -70,7 +74,7 @@ class History {
     for (const Point& point : trace_)
       points += fmt::format("{}[{:.3f},{},{},{}]", points.empty() ? "" : ",", point.time_s, number(point.thrust_n),
                             number(point.commanded_rpm), number(point.speed_rpm));
-    for (const auto* kept : {&steps_, &others_})
+    for (const auto* kept : {&limits_, &steps_, &others_})
       for (const std::string& message : *kept) messages += (messages.empty() ? "" : ",") + message;
     return R"({"type":"history","trace":[)" + points + R"(],"messages":[)" + messages + "]}";
   }
@@ -80,7 +84,7 @@ class History {
     double time_s, thrust_n, commanded_rpm, speed_rpm;
   };
   std::deque<Point> trace_;
-  std::deque<std::string> steps_, others_;
+  std::deque<std::string> limits_, steps_, others_;
 };
 
 }  // namespace
@@ -400,8 +404,8 @@ void Server::Works::frame() {
   const auto clients = clients_;  // who is dropped leaves the set
   for (const auto& client : clients) {
     if (shown > 0)
-      client->send_tick(std::make_shared<const std::string>(
-          tick_message(tick, settings_.limits, silent_s, client->skipped() + feed_.dropped())));
+      client->send_tick(
+          std::make_shared<const std::string>(tick_message(tick, silent_s, client->skipped() + feed_.dropped())));
     client->drop_if_slow();
   }
 }

@@ -18,7 +18,6 @@ class Server {
     std::string token;                    ///< who does not say it is refused
     std::string page;                     ///< HTML; every "@NONCE@" in it becomes the nonce of its scripts and styles
     std::string hello;                    ///< hello_message
-    std::size_t limits = 0;               ///< in every tick
     bool can_stop = true;                 ///< false: "stop" does nothing
     std::chrono::milliseconds frame{33};  ///< between ticks; 0: only draw() sends one
     std::chrono::milliseconds patience{2000};       ///< with a client that does not take what it is sent

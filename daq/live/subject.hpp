@@ -16,17 +16,19 @@ struct Subject {
   std::string propeller;
   double speed_max_rpm = 0;      ///< of the profile: how far the axis of speeds reaches
   Seconds minimum_discard;       ///< at the start of every step, not averaged
-  std::vector<LimitBar> limits;  ///< kMostLimits of them at most
+  std::vector<LimitBar> limits;  ///< until a guard tells its own
 };
 
-[[nodiscard]] inline Subject subject_of(const profiles::Campaign& campaign) {
+/// `devices`: what they told; nullptr: the limits are those of the files.
+[[nodiscard]] inline Subject subject_of(const profiles::Campaign& campaign, const profiles::Bench& place,
+                                        const DeviceLimits* devices = nullptr) {
   const double first = to_rpm(campaign.profile.first), last = to_rpm(campaign.profile.last);
   return {false,
           campaign.name,
           campaign.propeller.name,
           first > last ? first : last,
           campaign.minimum_discard,
-          limit_bars(campaign.limits)};
+          limit_bars(combine_limits(campaign, place, devices))};
 }
 
 }  // namespace kphi::daq::live

@@ -7,10 +7,11 @@
 #include <limits>
 #include <string_view>
 
+#include "daq/guard_limits.hpp"
+
 namespace kphi::daq::live {
 
 inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-inline constexpr std::size_t kMostLimits = 12;
 
 /// What is unknown or no longer fresh is kUnknown. Members are eight bytes or multiples: the whole has no gaps.
 struct Tick {
@@ -27,8 +28,8 @@ struct Tick {
   double module_v = kUnknown, module_a = kUnknown;  ///< at the motor module's input
   double supply_v = kUnknown, supply_a = kUnknown;  ///< at the bench supply's terminals
   double coil_degc = kUnknown;
-  double derate = kUnknown;                        ///< 1: none
-  std::array<double, kMostLimits> limit_values{};  ///< of Subject::limits, in their order
+  double derate = kUnknown;                     ///< 1: none
+  std::array<double, kWatchedCount> watched{};  ///< see limit_values()
   std::uint64_t fault_bits = 0;
   std::uint64_t received = 0, lost_network = 0, lost_host = 0;  ///< samples of this run
   std::int64_t repetition = 0, repetitions = 0;                 ///< 1-based

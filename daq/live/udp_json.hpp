@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daq/live/limit_bars.hpp"
@@ -17,6 +18,8 @@ class UdpJson {
   ~UdpJson();
   UdpJson(const UdpJson&) = delete;
   UdpJson& operator=(const UdpJson&) = delete;
+  /// What limit_share is of, from now on.
+  void hold_to(std::vector<LimitBar> limits) { limits_ = std::move(limits); }
   /// Never waits; what the kernel does not take is dropped and counted.
   void send(const Tick& tick) noexcept;
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }

@@ -15,15 +15,17 @@ View::View(const Wishes& wishes, Subject subject) : subject_(std::move(subject))
   settings.token = new_token();
   settings.page = page_text();
   settings.hello = hello_message(subject_);
-  settings.limits = subject_.limits.size();
   settings.can_stop = !subject_.replay;
   server_ = std::make_unique<Server>(std::move(settings), feed_);
 }
 
 std::unique_ptr<Progress> View::beside(Progress& behind, const Clock& clock) {
+  clock_ = &clock;
   return std::make_unique<LiveProgress>(behind, feed_, plotter_.get(), subject_, clock);
 }
 
-void View::end(bool well, const std::string& words) { feed_.tell(end_message(feed_.newest().time_s, well, words)); }
+void View::end(bool well, const std::string& words) {
+  feed_.tell(end_message(clock_ != nullptr ? to_seconds(clock_->now()) : 0, well, words));
+}
 
 }  // namespace kphi::daq::live

@@ -52,6 +52,7 @@ class View {
 
   Subject subject_;
   Feed feed_;
+  const Clock* clock_ = nullptr;  ///< of who is told; nullptr: nobody yet
   std::unique_ptr<UdpJson> plotter_;
   std::unique_ptr<Server> server_;  ///< goes first: it reads all else
 };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 
 #include "compensation/units.hpp"
@@ -372,6 +373,23 @@ std::string AuditRecord::text() const {
                         told.unit.empty() ? "" : "  # ", told.unit);
   }
   return text;
+}
+
+AuditRecord AuditRecord::of(std::string_view text) {
+  AuditRecord record;
+  while (!text.empty()) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(text.size(), line.size() + 1));
+    const std::size_t colon = line.find(": ");
+    if (colon == std::string_view::npos) continue;
+    double value = 0;
+    if (std::from_chars(line.data() + colon + 2, line.data() + line.size(), value).ec != std::errc()) continue;
+    for (std::size_t i = 0; i < kAuditedCount; ++i) {
+      if (line.substr(0, colon) == fmt::format("{}.{}", name_of(kAudited[i]->type), kAudited[i]->name))
+        record.values[i] = value;
+    }
+  }
+  return record;
 }
 
 AuditRecord read_audit(Dialogue& module) {

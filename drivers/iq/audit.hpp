@@ -5,6 +5,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "drivers/finding.hpp"
@@ -115,6 +116,8 @@ struct AuditRecord {
   /// For the run's header: YAML, a line for each value that was told ("brushless_drive.volts_limit: 27  # V"),
   /// beginning with the decoded versions. What was not told is not in it.
   [[nodiscard]] std::string text() const;
+  /// text() read again; lines that are none of these are passed over.
+  [[nodiscard]] static AuditRecord of(std::string_view text);
 };
 
 /// Asks for everything; takes as long as the silent entries' time-outs.

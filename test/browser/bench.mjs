@@ -37,9 +37,9 @@ name: browser
 propeller: {id: 5x3, name: 5-inch three-blade, diameter_in: 5, blades: 3}
 occlusions_deg: [90]
 repetitions: 2
-profile: {steps: 4, dwell_s: 0.9, first_rpm: 6000, last_rpm: 15000}
-zero_s: 0.4
-minimum_discard_s: 0.3
+profile: {steps: 3, dwell_s: 0.7, first_rpm: 6000, last_rpm: 12000}
+zero_s: 0.3
+minimum_discard_s: 0.25
 supply_v: 12.0
 limits: {speed_max_rpm: 19100, thrust_max_n: 20, supply_current_max_a: 35, coil_temperature_max_degc: 110}
 `;
@@ -68,6 +68,7 @@ export class Bench {
   }
   path(name) { return path.join(this.folder, name); }
   run(...more) {
+    if (this.child && this.child.code === undefined) throw new Error('another run is under way');
     this.child = new Child(this.kphi, ['run', this.path('campaign.yaml'), '--bench', this.path('bench.yaml'), '--yes',
       '--out', this.path('results'), ...more]);
     return this.child;

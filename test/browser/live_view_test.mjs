@@ -27,6 +27,7 @@ try {
   skip('no playwright-core; ./run peers installs it');
 }
 
+const began = performance.now();
 const results = [];
 async function it(says, what) {
   const began = performance.now();
@@ -35,9 +36,9 @@ async function it(says, what) {
   console.log(`ok   ${says} (${Math.round(performance.now() - began)} ms)`);
 }
 
-/// In the page, before anything of it: when keys came, and when the numbers changed.
+/// In the page, before anything of it: when keys and clicks came, and when the numbers changed.
 function watchThePage() {
-  window.seen = { keys: [], ticks: [], changes: [], last: null };
+  window.seen = { asked: [], ticks: [], changes: [], last: null };
   const Real = window.WebSocket;
   window.WebSocket = class extends Real {
     constructor(...args) {
@@ -50,7 +51,8 @@ function watchThePage() {
       });
     }
   };
-  addEventListener('keydown', event => window.seen.keys.push(performance.timeOrigin + event.timeStamp), { capture: true });
+  for (const kind of ['keydown', 'pointerdown'])
+    addEventListener(kind, event => window.seen.asked.push(performance.timeOrigin + event.timeStamp), { capture: true });
   addEventListener('DOMContentLoaded', () => new MutationObserver(() => window.seen.changes.push(performance.now()))
     .observe(document.getElementById('thrust'), { childList: true, characterData: true, subtree: true }));
 }
@@ -61,44 +63,92 @@ const answerTo = (url, headers) => new Promise((done, fail) => {
 });
 const upgrade = { Connection: 'Upgrade', Upgrade: 'websocket', 'Sec-WebSocket-Version': '13', 'Sec-WebSocket-Key': 'dGhlIHNhbXBsZSBub25jZQ==' };
 
-const bench = await Bench.start(kphi);
-let browser;
-try {
-  const run = bench.run('--live');
-  const url = (await run.waitFor(/^live: (http:\/\/127\.0\.0\.1:\d+\/\?token=[0-9a-f]{32})$/m))[1];
-  const origin = new URL(url).origin;
-  // Without its own checks of pages that reach into this machine: ours are asked.
-  browser = await playwright.chromium.launch({ executablePath: browserAt, args: ['--no-sandbox', '--disable-gpu', '--disable-features=LocalNetworkAccessChecks'] });
-  const page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
-  const asked = [], complaints = [];
-  page.on('request', request => asked.push(request.url()));
-  page.on('websocket', socket => asked.push(socket.url()));
+/// Where the page is, with the token.
+const addressOf = async child => (await child.waitFor(/^live: (http:\/\/127\.0\.0\.1:\d+\/\?token=[0-9a-f]{32})$/m))[1];
+
+const asked = [], complaints = [];
+async function open(browser, url, more = {}) {
+  const page = await browser.newPage({ viewport: { width: 1440, height: 900 }, ...more });
+  page.on('request', request => asked.push([url, request.url()]));
+  page.on('websocket', socket => asked.push([url, socket.url()]));
   page.on('console', message => { if (message.type() !== 'log') complaints.push(message.text()); });
   page.on('pageerror', error => complaints.push(error.message));
   await page.addInitScript(watchThePage);
   await page.goto(url);
+  return page;
+}
+
+/// Until the motor of `run` turns on the page that shows it.
+async function turns(page, run, repetition) {
+  const ended = run.ended.then(() => { throw new Error(`ended before it turned:\n${run.words}`); });
+  await Promise.race([ended, page.waitForFunction(of => window.seen.last && window.seen.last.repetition === of
+    && window.seen.last.step >= 0 && window.seen.last.speed_rpm > 5000, repetition)]);
+  ended.catch(() => {});  // it may end from now on
+}
+
+/// Asks for the stop on the page as a person would, sees the run to its end, and ends the bench: the motor has coasted
+/// within kPrompt_ms.
+async function stopBy(how, ask, page, bench, run) {
+  const offset = await bench.clockOffset();
+  const lost = await page.evaluate(() => window.seen.last.lost_network + window.seen.last.lost_host);
+  assert.equal(lost, 0, 'samples of the stopped run were lost');
+  await ask();
+  await page.waitForFunction(() => state.asked);
+  const asked = await page.evaluate(() => window.seen.asked.at(-1)) + offset;
+  assert.equal(await Promise.race([run.ended, new Promise(done => setTimeout(done, 20_000, 'no end'))]), kInterrupted, run.words);
+  await page.waitForFunction(() => state.ended);
+  assert.match(await page.locator('#banner').innerText(), /stopped by request/);
+  assert.equal(await page.locator('#stop_word').innerText(), 'ENDED');
+  await page.waitForFunction(() => document.getElementById('speed').textContent === '–');
+  await page.screenshot({ path: path.join(pictures, `live_view_stopped_by_${how}.png`) });
+  const stages = await bench.stages();
+  assert.equal(stages.filter(([at]) => at <= asked).at(-1)?.[1], 'drive', `it turned at the ${how}`);
+  const [coasts] = stages.find(([at, stage]) => at > asked && stage === 'coast');
+  console.log(`     coasts ${(coasts - asked).toFixed(1)} ms after the ${how}; ${lost} samples lost`);
+  assert.ok(coasts - asked <= kPrompt_ms, `${coasts - asked} ms`);
+  assert.equal(stages.at(-1)[1], 'coast');
+}
+
+const bench = await Bench.start(kphi);
+let other, browser;
+try {
+  // Without its own checks of pages that reach into this machine: ours are asked.
+  const launched = playwright.chromium.launch({ executablePath: browserAt, args: ['--no-sandbox', '--disable-gpu', '--disable-features=LocalNetworkAccessChecks'] });
+  const run = bench.run('--live');
+  browser = await launched;
+  const url = await addressOf(run);
+  const origin = new URL(url).origin;
+  const page = await open(browser, url);
 
   await it(`updates at ${kRate_hz} Hz or more`, async () => {
-    await page.waitForFunction(() => window.seen.last && window.seen.last.step >= 0);
+    await turns(page, run, 1);
     // A host that is busy with other things may stutter; what counts is one second in which it was not.
     const rates = await page.waitForFunction(rate => {
       const within = times => times.filter(time => time > performance.now() - 1000).length;
       const rates = [within(window.seen.ticks), within(window.seen.changes)];
       return Math.min(...rates) >= rate ? rates : false;
     }, kRate_hz, { timeout: 8000, polling: 50 });
-    console.log('     messages, numbers per second:', (await rates.jsonValue()).join(', '));
+    const [messages, numbers] = await rates.jsonValue();
+    console.log(`     ${messages} messages, ${numbers} changes of the number of thrust per second`);
   });
 
   await it('refuses a foreign origin, a foreign host, a wrong token', async () => {
     const live = url.replace('/?', '/live?');
-    const here = new URL(url).host;
-    assert.equal(await answerTo(live, { ...upgrade, Origin: 'http://evil.example' }), 403);
-    assert.equal(await answerTo(live, { ...upgrade, Host: 'evil.example', Origin: 'http://evil.example' }), 403);
-    assert.equal(await answerTo(live.replace(/.$/, c => c === '0' ? '1' : '0'), { ...upgrade, Origin: origin }), 403);
-    assert.equal(await answerTo(live, { ...upgrade, Host: here, Origin: origin }), 101, 'the page itself is let in');
+    const here = new URL(url).host, evil = 'http://evil.example';
+    const knocks = [
+      ['a foreign origin', live, { Host: here, Origin: evil }, 403],
+      ['a foreign host', live, { Host: 'evil.example', Origin: evil }, 403],
+      ['a wrong token', live.replace(/.$/, c => c === '0' ? '1' : '0'), { Host: here, Origin: origin }, 403],
+      ['the page itself', live, { Host: here, Origin: origin }, 101],
+    ];
+    const told = [];
+    for (const [who, address, headers, answer] of knocks) {
+      assert.equal(await answerTo(address, { ...upgrade, ...headers }), answer, who);
+      told.push(`${who} ${answer}`);
+    }
     const stranger = await browser.newPage();
-    await stranger.route('http://evil.example/', route => route.fulfill({ contentType: 'text/html', body: '<p>evil' }));
-    await stranger.goto('http://evil.example/');
+    await stranger.route(`${evil}/`, route => route.fulfill({ contentType: 'text/html', body: '<p>evil' }));
+    await stranger.goto(`${evil}/`);
     const came_in = await stranger.evaluate(address => new Promise(done => {
       const socket = new WebSocket(address);
       socket.onopen = () => { socket.send('stop'); done(true); };
@@ -106,74 +156,84 @@ try {
     }), live.replace('http', 'ws'));
     assert.equal(came_in, false);
     await stranger.close();
+    console.log(`     ${told.join(', ')}; a page of evil.example in the browser: refused`);
   });
 
-  await it('shows k of every step, limits and lines', async () => {
-    await run.waitFor(/run\s+1\/2/);
-    await page.waitForFunction(() => state.steps.length >= 4 && state.trace.length > 50);
-    assert.equal(await page.locator('.limit').count(), 4);
-    assert.match(await page.locator('#lines').innerText(), /run\s+1\/2/);
-    const k = await page.evaluate(() => state.steps.map(step => step.k_n_s2));
-    for (const value of k) assert.ok(value > 0.5e-6 && value < 3e-6, `k = ${value} N s²`);
-  });
-
-  await it(`coasts the motor within ${kPrompt_ms} ms of the key, and says so`, async () => {
-    await page.waitForFunction(() => window.seen.last.repetition === 2 && window.seen.last.step >= 2);
-    await page.screenshot({ path: path.join(pictures, 'live_view.png') });
-    const offset = await bench.clockOffset();
-    const lost = await page.evaluate(() => window.seen.last.lost_network + window.seen.last.lost_host);
-    await page.keyboard.press('Escape');
-    await page.waitForFunction(() => state.asked);
-    const pressed = await page.evaluate(() => window.seen.keys[0]) + offset;
-    assert.equal(await Promise.race([run.ended, new Promise(done => setTimeout(done, 20_000, 'no end'))]), kInterrupted, run.words);
-    await page.waitForFunction(() => state.ended);
-    assert.match(await page.locator('#banner').innerText(), /stopped by request/);
-    assert.equal(await page.locator('#stop_word').innerText(), 'ENDED');
-    await page.waitForFunction(() => document.getElementById('speed').textContent === '–');
-    await page.screenshot({ path: path.join(pictures, 'live_view_stopped.png') });
-    const stages = await bench.stages();
-    const drives = stages.filter(([at]) => at <= pressed).at(-1), end = stages.at(-1);
-    assert.equal(drives?.[1], 'drive', 'it turned when the key was pressed');
-    assert.equal(end[1], 'coast');
-    console.log(`     coasts ${(end[0] - pressed).toFixed(1)} ms after the key`);
-    assert.ok(end[0] - pressed <= kPrompt_ms, `${end[0] - pressed} ms`);
-    assert.equal(lost, 0, 'samples of the stopped run were lost');
-  });
-
-  await it('cost the acquisition at 7 kHz no sample', () => {
-    const results = bench.path('results'), journal = path.join(results, readdirSync(results)[0], 'journal.jsonl');
-    const accepted = readFileSync(journal, 'utf8').split('\n').filter(line => line.includes('"run_accepted"')).map(line => JSON.parse(line));
-    assert.equal(accepted.length, 1);
-    const entry = accepted[0].data ?? accepted[0];
-    assert.ok(entry.samples > 25_000, `${entry.samples} samples`);
-    assert.equal(entry.lost, 0);
-  });
-
-  await it('asks no other place for anything, and complains of nothing', () => {
-    for (const address of asked) assert.ok(address.startsWith(origin) || address.startsWith(origin.replace('http', 'ws')) || address.startsWith('data:'), address);
-    assert.ok(asked.length >= 2);
-    assert.deepEqual(complaints.filter(text => !text.includes('ERR_CONNECTION_REFUSED')), []);
-  });
+  // Meanwhile the first run goes on.
   await it('shows a recorded run again, in which nothing can be stopped', async () => {
     const file = new URL('../../results/reference/runs/5x3_phi090_rep1.h5', import.meta.url).pathname;
-    const replay = new Child(kphi, ['replay', file, '--live', '--speed', '20']);
+    const replay = new Child(kphi, ['replay', file, '--live', '--speed', '3']);
     try {
-      const seen = await browser.newPage({ viewport: { width: 1440, height: 900 }, colorScheme: 'dark' });
-      await seen.goto((await replay.waitFor(/^live: (\S+)$/m))[1]);
-      await seen.waitForFunction(() => state.steps.length >= 1);
-      assert.equal(await seen.locator('#stop_word').innerText(), 'REPLAY');
-      assert.ok(await seen.locator('#stop').isDisabled());
+      const seen = await open(browser, await addressOf(replay), { colorScheme: 'dark' });
+      const during = await seen.waitForFunction(() => state.steps.length >= 1 && !state.ended
+        && { word: at('stop_word').textContent, disabled: at('stop').disabled });
+      assert.deepEqual(await during.jsonValue(), { word: 'REPLAY', disabled: true });
+      assert.match(await seen.locator('.limit', { hasText: 'Thrust' }).innerText(), /≤ 20\.0 N/);
       await seen.keyboard.press('Escape');
       await seen.screenshot({ path: path.join(pictures, 'live_view_replay.png') });
       await seen.waitForFunction(() => state.ended);
       assert.equal(await replay.ended, 0, replay.words);
       assert.equal(await seen.locator('#stop_word').innerText(), 'REPLAY OVER');
+      await seen.close();
     } finally {
       if (replay.code === undefined) replay.signal('SIGKILL');
     }
   });
-  console.log(`${results.length} of 7 shown`);
+
+  await it('shows k of every step, lines, and what the guard holds the bench to', async () => {
+    await run.waitFor(/run\s+1\/2/);
+    await page.waitForFunction(() => state.steps.length >= 3 && state.trace.length > 50);
+    assert.match(await page.locator('#lines').innerText(), /run\s+1\/2/);
+    const k = await page.evaluate(() => state.steps.map(step => step.k_n_s2));
+    for (const value of k) assert.ok(value > 0.5e-6 && value < 3e-6, `k = ${value} N s²`);
+    const limits = await page.evaluate(() => Object.fromEntries(state.limits.map(limit => [limit.key, limit.source])));
+    assert.match(limits.thrust_n, /^campaign /);
+    assert.match(limits.voltage_high_v, /^bench /);
+    assert.match(limits.motor_a, /^device motor /);
+    assert.match(limits.fz_n, /^device load cell/);
+    assert.equal(await page.locator('.limit').count(), Object.keys(limits).length);
+    assert.match(await page.locator('.limit', { hasText: 'Coil' }).getAttribute('title'), /Set by: campaign limits\.coil/);
+    const cut = await page.evaluate(() => [...document.querySelectorAll('.limit b, .limit span')].filter(node => node.scrollWidth > node.clientWidth).map(node => node.textContent));
+    assert.deepEqual(cut, [], 'words that do not fit');
+  });
+
+  await it(`coasts the motor within ${kPrompt_ms} ms of a key`, async () => {
+    await turns(page, run, 2);
+    await page.screenshot({ path: path.join(pictures, 'live_view.png') });
+    await stopBy('key', () => page.keyboard.press('Escape'), page, bench, run);
+    await page.close();
+  });
+
+  await it(`coasts the motor within ${kPrompt_ms} ms of a click of the mouse`, async () => {
+    other = await Bench.start(kphi);  // what a cut supply leaves of the first one's module is latched in it
+    const again = other.run('--live');
+    const page = await open(browser, await addressOf(again));
+    await turns(page, again, 1);
+    const { x, y, width, height } = await page.locator('#stop').boundingBox();
+    await stopBy('click', () => page.mouse.click(x + width / 2, y + height / 2), page, other, again);
+    await page.close();
+  });
+
+  await it('cost the acquisition at 7 kHz no sample', () => {
+    const results = bench.path('results'), journal = path.join(results, readdirSync(results).sort()[0], 'journal.jsonl');
+    const accepted = readFileSync(journal, 'utf8').split('\n').filter(line => line.includes('"run_accepted"')).map(line => JSON.parse(line));
+    assert.equal(accepted.length, 1);
+    const entry = accepted[0].data ?? accepted[0];
+    assert.ok(entry.samples > 25_000, `${entry.samples} samples`);
+    assert.equal(entry.lost, 0);
+    console.log(`     ${entry.lost} of ${entry.samples} samples lost`);
+  });
+
+  await it('asks no other place for anything, and complains of nothing', () => {
+    for (const [page, address] of asked) {
+      const own = new URL(page).origin;
+      assert.ok([own, own.replace('http', 'ws'), 'data:'].some(start => address.startsWith(start)), address);
+    }
+    assert.ok(asked.length >= 6);
+    assert.deepEqual(complaints.filter(text => !text.includes('ERR_CONNECTION_REFUSED')), []);
+  });
+  console.log(`${results.length} of 8 shown in ${((performance.now() - began) / 1000).toFixed(1)} s`);
 } finally {
   await browser?.close();
-  bench.clear();
+  for (const each of [bench, other]) each?.clear();
 }

@@ -122,5 +122,15 @@ TEST_F(CombinedLimits, OfAConnectedBenchNameTheLoadCellAndTheMotor) {
               testing::Contains(testing::ContainsRegex("^thrust +above 20 N +campaign limits.thrust_max_n$")));
 }
 
+TEST_F(CombinedLimits, OfARecordedRunAreThoseThatItsGuardHad) {
+  DeterministicBench bench(place_);
+  devices_ = device_limits(bench);
+  results::RunHeader header;
+  header.load_cell.range = devices_->load_cell_range;
+  header.motor_parameters = bench.motor().parameters().text();
+  const DeviceLimits recorded = device_limits(header);
+  EXPECT_EQ(combine_limits(campaign_, place_, &recorded), combine_limits(campaign_, place_, &*devices_));
+}
+
 }  // namespace
 }  // namespace kphi::daq

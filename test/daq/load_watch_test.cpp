@@ -86,5 +86,16 @@ TEST(LoadWatch, HasAWindowOfOneSampleWhenTheyAreFew) {
   EXPECT_DOUBLE_EQ(watch.thrust(), 21);
 }
 
+TEST(BorneLoads, AreWhatTwoSuccessiveSamplesCarry) {
+  const std::vector<results::LoadCellRecord> samples{sample(6, 0.1), sample(-9, -0.3), sample(-7, 0.2),
+                                                     sample(2000, 0)};
+  const auto loads = borne_loads(samples, 1e6, 1e6);
+  EXPECT_DOUBLE_EQ(loads[2], 7) << "a single wild sample is none";
+  EXPECT_DOUBLE_EQ(loads[5], 0.2);
+  EXPECT_DOUBLE_EQ(loads[0], 0);
+  EXPECT_DOUBLE_EQ(borne_loads(std::span(samples).first(1), 1e6, 1e6)[2], 6);
+  EXPECT_DOUBLE_EQ(borne_loads({}, 1e6, 1e6)[2], 0);
+}
+
 }  // namespace
 }  // namespace kphi::daq

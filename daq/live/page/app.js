@@ -5,8 +5,9 @@ const kPoints = 1800;      // of the curves over time: a minute at 30 ticks a se
 const kGap_s = 1;          // no line is drawn across a longer silence
 const kSilent_s = 1;       // so long without a word from the runner: it waits for something
 const kMostLines = 500;
+const kNear = 0.9;         // of a limit
 
-const state = { hello: null, tick: null, trace: [], steps: [], ended: false, asked: false, drawn: 0, cost: 0,
+const state = { hello: null, limits: [], tick: null, trace: [], steps: [], ended: false, asked: false, drawn: 0, cost: 0,
                 numbersDue: false, chartsDue: false, stepsDue: false };
 
 // ---- numbers as text
@@ -138,7 +139,6 @@ function showReadings(tick) {
   text('supply', electric(tick.supply_v, tick.supply_a));
   text('module', electric(tick.module_v, tick.module_a).replace('none', '?'));
   text('coil', fixed(tick.coil_degc, 0) + ' °C');
-  text('torque', fixed(tick.torque_nm === null ? null : 1e3 * tick.torque_nm, 1) + ' mN m');
   const faulty = tick.fault_bits !== 0 || (tick.derate !== null && tick.derate < 0.9999);
   text('drive', tick.fault_bits !== 0 ? `fault 0x${tick.fault_bits.toString(16)}`
     : tick.derate === null ? '?' : faulty ? `derates to ${fixed(100 * tick.derate, 0)} %` : 'no fault');
@@ -148,28 +148,34 @@ function showReadings(tick) {
   at('lost').classList.toggle('bad', tick.lost_network + tick.lost_host > 0);
 }
 
+// ---- limits: what the guard holds the bench to, and who set it
 function makeLimits(limits) {
-  at('limits').replaceChildren(...limits.map((limit, i) => {
-    const row = document.createElement('div');
+  state.limits = limits;
+  at('limits').replaceChildren(...limits.map(limit => {
+    const row = document.createElement('div'), bar = document.createElement('div');
     row.className = 'limit';
-    row.id = 'limit_' + i;
-    row.append(document.createElement('b'), document.createElement('span'), document.createElement('div'));
+    row.title = `${limit.name} ${limit.lower ? 'below' : 'above'} ${limitNumber(limit, limit.limit)} ${limit.unit} lets the motor coast. Set by: ${limit.source}`;
+    bar.append(document.createElement('i'));
+    row.append(document.createElement('b'), bar, document.createElement('span'), document.createElement('small'));
     row.children[0].textContent = limit.name;
-    row.children[2].append(document.createElement('i'));
+    row.children[3].textContent = limit.source;
     return row;
   }));
 }
 
+/// Three digits of the limit.
+const limitNumber = (limit, value) => value === null || value === undefined ? '–' : limit.limit >= 1000 ? thousands(value)
+  : fixed(value, Math.max(0, 2 - Math.floor(Math.log10(limit.limit))));
+
 function showLimits(tick) {
-  state.hello.limits.forEach((limit, i) => {
-    const row = at('limit_' + i), value = tick.limits[i];
-    const share = value === null ? 0 : value / limit.limit;
-    const digits = limit.limit >= 1000 ? 0 : 1;
-    const number = v => v === null ? '?' : v >= 1000 ? thousands(v) : fixed(v, digits);
-    const words = `${number(value)} / ${number(limit.limit)} ${limit.unit}`;
-    if (row.children[1].textContent !== words) row.children[1].textContent = words;
-    row.querySelector('i').style.transform = `scaleX(${Math.min(1, Math.max(0, share))})`;
-    row.classList.toggle('near', share >= 0.8 && share <= 1);
+  state.limits.forEach((limit, i) => {
+    const row = at('limits').children[i], value = tick.watched[limit.key] ?? null;
+    const share = value === null ? 0 : limit.lower ? limit.limit / value : value / limit.limit;
+    const holds = limit.lower ? (share > 1 ? '<' : '≥') : (share > 1 ? '>' : '≤');
+    const words = `${limitNumber(limit, value)} ${holds} ${limitNumber(limit, limit.limit)} ${limit.unit}`;
+    if (row.children[2].textContent !== words) row.children[2].textContent = words;
+    row.querySelector('i').style.transform = `scaleX(${Math.min(1, Math.max(0, share)).toFixed(3)})`;
+    row.classList.toggle('near', share >= kNear && share <= 1);
     row.classList.toggle('over', share > 1);
   });
 }
@@ -239,6 +245,7 @@ const take = {
     if (message.silent_s < kSilent_s) addPoint(message.time_s, message.thrust_n, message.commanded_rpm, message.speed_rpm);
     state.numbersDue = true;
   },
+  limits(message) { makeLimits(message.limits); },
   step(message) { state.steps.push(message); state.stepsDue = true; },
   line(message) { addLine(message.time_s, message.text); },
   stop(message) {
@@ -288,7 +295,7 @@ function connect() {
   link.onopen = () => { at('link').className = 'good'; text('link', 'live'); showStop(); };
   link.onmessage = event => { const message = JSON.parse(event.data); if (take[message.type]) take[message.type](message); };
   link.onclose = () => {
-    at('link').className = state.ended ? '' : 'bad';
+    at('link').className = state.ended ? 'over' : 'bad';
     text('link', state.ended ? 'over' : 'no connection');
     showStop();
     if (state.ended) return;

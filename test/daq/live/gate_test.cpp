@@ -2,7 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 namespace kphi::daq::live {
 namespace {
@@ -42,8 +47,9 @@ TEST(Gate, RefusesAForeignHostEvenWithTheToken) {
 }
 
 TEST(Gate, RefusesAForeignOriginEvenWithTheToken) {
-  for (const char* origin : {"http://evil.example", "https://127.0.0.1:8080", "http://127.0.0.1:3000", "null", "",
-                             "http://127.0.0.1:8080.evil.example", "http://localhost:8080"}) {
+  for (const char* origin :
+       {"http://evil.example", "https://127.0.0.1:8080", "file://127.0.0.1:8080", "http://127.0.0.1:3000", "null", "",
+        "http://127.0.0.1:8080.evil.example", "http://localhost:8080"}) {
     Knock knock = visit();
     knock.origin = origin;
     EXPECT_EQ(admit(knock, kToken).status, 403u) << origin;
@@ -69,6 +75,50 @@ TEST(Gate, KnowsTwoPathsAndOneMethod) {
     knock.method = method;
     EXPECT_EQ(admit(knock, kToken).status, 405u) << method;
   }
+}
+
+/// A right answer to each of the gate's questions, and wrong ones.
+template <class T>
+struct Answers {
+  std::vector<T> right, wrong;
+  [[nodiscard]] std::vector<std::pair<T, bool>> all() const {
+    std::vector<std::pair<T, bool>> all;
+    for (const T& each : right) all.emplace_back(each, true);
+    for (const T& each : wrong) all.emplace_back(each, false);
+    return all;
+  }
+};
+
+TEST(Gate, RefusesEveryCombinationInWhichAnythingIsWrong) {
+  using Text = std::string_view;
+  using Origin = std::optional<std::string_view>;
+  constexpr Text kHost = "127.0.0.1:8080";
+  const Answers<Text> methods{{"GET"}, {"POST", ""}};
+  const Answers<Text> hosts{{kHost}, {"evil.example:8080", "127.0.0.1.evil.example", ""}};
+  const Answers<Origin> origins{{std::nullopt, Origin("http://127.0.0.1:8080")},
+                                {Origin("http://evil.example"), Origin("https://127.0.0.1:8080"),
+                                 Origin("file://127.0.0.1:8080"), Origin("null"), Origin("")}};
+  const Answers<std::pair<Text, bool>> paths{{{"/", false}, {"/", true}, {"/live", true}},
+                                             {{"/live", false}, {"/stop", true}, {"/live/", true}, {"//", false}}};
+  const Answers<Text> queries{{"?token=0123456789abcdef0123456789abcdef"},
+                              {"?token=1123456789abcdef0123456789abcdef", "?token=0123456789abcdef0123456789abcdee",
+                               "?token=0123456789abcdef", "?token=", "?", ""}};
+  int admitted = 0, refused = 0;
+  for (const auto& [method, method_is_right] : methods.all())
+    for (const auto& [host, host_is_right] : hosts.all())
+      for (const auto& [origin, origin_is_right] : origins.all())
+        for (const auto& [path, path_is_right] : paths.all())
+          for (const auto& [query, token_is_right] : queries.all()) {
+            const std::string target = std::string(path.first) + std::string(query);
+            const Answer answer = admit({method, target, host, origin, path.second}, kToken);
+            const bool right = method_is_right && host_is_right && origin_is_right && path_is_right && token_is_right;
+            EXPECT_EQ(answer.to != Admitted::nowhere, right)
+                << method << ' ' << target << " host " << host << " origin " << origin.value_or("(none)");
+            EXPECT_EQ(answer.status < 400, right);
+            ++(answer.to == Admitted::nowhere ? refused : admitted);
+          }
+  EXPECT_EQ(admitted, 2 * 3) << "of each origin: the page twice, its WebSocket once";
+  EXPECT_EQ(refused, 3 * 4 * 7 * 7 * 7 - admitted);
 }
 
 TEST(Gate, DrawsAnotherTokenEveryTime) {

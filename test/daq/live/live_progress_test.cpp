@@ -14,10 +14,12 @@ using nlohmann::json;
 
 class Told final : public Progress {
  public:
+  void guarded(const std::vector<GuardLimit>& all) override { limits = all.size(); }
   void tick(const Position&, const Observation&) override { ++ticks; }
   void step_done(const Position&, const Observation&) override { ++steps; }
   void say(const std::string& line) override { lines.push_back(line); }
   int ticks = 0, steps = 0;
+  std::size_t limits = 0;
   std::vector<std::string> lines;
 };
 
@@ -34,6 +36,7 @@ class LiveProgressOf : public testing::Test {
       progress_.tick(position_, seen_);
     }
   }
+  [[nodiscard]] double watched(Watched of) const { return feed_.newest().watched[static_cast<std::size_t>(of)]; }
   std::vector<json> messages() {
     std::vector<json> taken;
     feed_.take([&](const std::string& message) { taken.push_back(json::parse(message)); });
@@ -43,7 +46,7 @@ class LiveProgressOf : public testing::Test {
   Told told_;
   Feed feed_;
   ManualClock clock_;
-  const Subject subject_ = subject_of(test::short_campaign());  // 0.3 s are discarded
+  const Subject subject_ = subject_of(test::short_campaign(), test::deterministic_place(1));  // 0.3 s are discarded
   LiveProgress progress_{told_, feed_, nullptr, subject_, clock_};
   Position position_{"5x3", 90, 2, 3, -1, 40, "zero", RadPerSec(0), 100};
   Observation seen_;
@@ -69,9 +72,43 @@ TEST_F(LiveProgressOf, ShowsTheNewestTickWithItsLimits) {
   EXPECT_EQ(tick.step, 4);
   EXPECT_EQ(tick.lost_host, 3u);
   EXPECT_STREQ(tick.phase.data(), "") << "in a step";
-  EXPECT_DOUBLE_EQ(tick.limit_values[0], 9000);
-  EXPECT_DOUBLE_EQ(tick.limit_values[1], 1.5) << "either way counts";
-  EXPECT_DOUBLE_EQ(tick.limit_values[2], 7);
+  EXPECT_DOUBLE_EQ(watched(Watched::speed), 9000);
+  EXPECT_DOUBLE_EQ(watched(Watched::thrust), 1.5) << "either way counts";
+  EXPECT_DOUBLE_EQ(watched(Watched::supply_current), 7);
+}
+
+TEST_F(LiveProgressOf, ShowsTheErrorOfSpeedOnceTheRotorHasHadItsTime) {
+  hold(0, std::chrono::milliseconds(290), 1, 6000);
+  EXPECT_TRUE(std::isnan(watched(Watched::speed_error)));
+  hold(0, std::chrono::milliseconds(50), 1, 6000);
+  EXPECT_DOUBLE_EQ(watched(Watched::speed_error), 0);
+  position_.commanded = from_rpm(9000);
+  clock_.advance(std::chrono::milliseconds(10));
+  progress_.tick(position_, seen_);
+  EXPECT_NEAR(watched(Watched::speed_error), 100 * (3000 - to_rpm(RadPerSec(20))) / 9000, 1e-9) << "as the guard does";
+}
+
+TEST_F(LiveProgressOf, ShowsItsOwnPauseWhileTheMotorTurns) {
+  hold(0, std::chrono::milliseconds(20), 1, 6000);
+  EXPECT_DOUBLE_EQ(watched(Watched::pause), 0.01);
+  clock_.advance(std::chrono::milliseconds(300));
+  progress_.tick(position_, seen_);
+  EXPECT_DOUBLE_EQ(watched(Watched::pause), 0.3);
+  position_.commanded = RadPerSec(0);
+  progress_.tick(position_, seen_);
+  EXPECT_TRUE(std::isnan(watched(Watched::pause)));
+}
+
+TEST_F(LiveProgressOf, TellsTheTableOfTheGuardAndWhoSetEachLimit) {
+  progress_.guarded({{Watched::thrust, "thrust", 20, "N", "campaign limits.thrust_max_n"},
+                     {Watched::supply_voltage_low, "supply voltage", 5, "V", "device motor x", true}});
+  EXPECT_EQ(told_.limits, 2u);
+  const std::vector<json> told = messages();
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0]["type"], "limits");
+  EXPECT_EQ(told[0]["limits"][0]["source"], "campaign limits.thrust_max_n");
+  EXPECT_EQ(told[0]["limits"][1]["key"], "voltage_low_v");
+  EXPECT_EQ(told[0]["limits"][1]["lower"], true);
 }
 
 TEST_F(LiveProgressOf, ShowsNoNumberForWhatNoLongerComes) {
@@ -79,6 +116,8 @@ TEST_F(LiveProgressOf, ShowsNoNumberForWhatNoLongerComes) {
   seen_.load_cell_age = std::chrono::milliseconds(840);
   hold(0, std::chrono::milliseconds(10), 1, 6000);
   EXPECT_TRUE(std::isnan(feed_.newest().thrust_n));
+  EXPECT_TRUE(std::isnan(watched(Watched::thrust)));
+  EXPECT_DOUBLE_EQ(watched(Watched::load_cell_age), 0.84);
   EXPECT_DOUBLE_EQ(feed_.newest().thrust_age_s, 0.84);
   EXPECT_DOUBLE_EQ(feed_.newest().speed_rpm, 6000);
 }

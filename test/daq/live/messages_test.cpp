@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 
 namespace kphi::daq::live {
 namespace {
@@ -11,8 +12,14 @@ namespace {
 using nlohmann::json;
 
 Subject subject() {
-  profiles::Limits limits{from_rpm(19100), Newtons(20), Amperes(35), Celsius(110)};
-  return {false, "icra", "5-inch three-blade", 19100, Seconds(0.3), limit_bars(limits)};
+  return {false,
+          "icra",
+          "5-inch three-blade",
+          19100,
+          Seconds(0.3),
+          limit_bars({{Watched::thrust, "thrust", 20, "N", "campaign limits.thrust_max_n"},
+                      {Watched::speed, "speed", 20055, "RPM", "bench iq.speed_max_rpm"},
+                      {Watched::supply_voltage_low, "supply voltage", 5, "V", "device motor", true}})};
 }
 
 Tick full_tick() {
@@ -37,36 +44,52 @@ Tick full_tick() {
   tick.coil_degc = 41;
   tick.derate = 1;
   tick.received = 123456;
-  tick.limit_values = {7893.6, 1.1621, 3.2, 41};
+  tick.watched.fill(kUnknown);
+  tick.watched[static_cast<std::size_t>(Watched::thrust)] = 1.1621;
+  tick.watched[static_cast<std::size_t>(Watched::supply_voltage_low)] = 11.9;
   write(tick.phase, "");
   write(tick.propeller, "5x3");
   return tick;
 }
 
 TEST(LiveMessages, OfATickCarryEveryNumberWithItsUnitInTheKey) {
-  const json tick = json::parse(tick_message(full_tick(), 4, 0.01, 5));
+  const json tick = json::parse(tick_message(full_tick(), 0.01, 5));
   EXPECT_EQ(tick["type"], "tick");
   EXPECT_EQ(tick["thrust_n"], 1.1621);
   EXPECT_EQ(tick["speed_rpm"], 7893.6);
   EXPECT_EQ(tick["commanded_rpm"], 7895);
   EXPECT_EQ(tick["step"], 16);
   EXPECT_EQ(tick["propeller"], "5x3");
-  EXPECT_EQ(tick["limits"], json({7893.6, 1.1621, 3.2, 41}));
+  EXPECT_EQ(tick["watched"].size(), kWatchedCount);
+  EXPECT_EQ(tick["watched"]["thrust_n"], 1.162) << "four digits";
+  EXPECT_TRUE(tick["watched"]["fx_n"].is_null());
   EXPECT_EQ(tick["dropped"], 5);
 }
 
 TEST(LiveMessages, SayNullForWhatIsUnknown) {
-  const json tick = json::parse(tick_message(Tick{}, 0, 0, 0));
+  const json tick = json::parse(tick_message(Tick{}, 0, 0));
   for (const char* key : {"thrust_n", "speed_rpm", "torque_nm", "supply_v", "coil_degc"}) {
     EXPECT_TRUE(tick.at(key).is_null()) << key;
   }
 }
 
-TEST(LiveMessages, NameTheLimitsOnceInTheGreeting) {
+TEST(LiveMessages, NameTheLimitsAndWhoSetThem) {
   const json hello = json::parse(hello_message(subject()));
-  EXPECT_EQ(hello["format"], "kphi-live/1");
-  ASSERT_EQ(hello["limits"].size(), 4u);
-  EXPECT_EQ(hello["limits"][1], (json{{"key", "thrust_n"}, {"name", "Thrust"}, {"unit", "N"}, {"limit", 20.0}}));
+  EXPECT_EQ(hello["format"], "kphi-live/2");
+  ASSERT_EQ(hello["limits"].size(), 3u);
+  EXPECT_EQ(hello["limits"][0], (json{{"key", "thrust_n"},
+                                      {"name", "Thrust"},
+                                      {"unit", "N"},
+                                      {"limit", 20.0},
+                                      {"lower", false},
+                                      {"source", "campaign limits.thrust_max_n"}}));
+  EXPECT_EQ(json::parse(limits_message(subject().limits))["limits"], hello["limits"]);
+}
+
+TEST(LiveMessages, HaveAKeyOfItsOwnForEverythingWatched) {
+  std::set<std::string> keys;
+  for (std::size_t i = 0; i < kWatchedCount; ++i) keys.insert(key_of(static_cast<Watched>(i)));
+  EXPECT_EQ(keys.size(), kWatchedCount);
 }
 
 TEST(LiveMessages, SurviveWordsOfDevicesThatAreNoText) {
@@ -77,13 +100,14 @@ TEST(LiveMessages, SurviveWordsOfDevicesThatAreNoText) {
 TEST(PlotMessages, HaveATimestampAndNumbersOnly) {
   const json plot = json::parse(plot_message(full_tick(), subject().limits));
   EXPECT_EQ(plot["timestamp"], 1622332812.34);
-  EXPECT_DOUBLE_EQ(plot["limit_share"]["thrust_n"].get<double>(), 0.058105);
+  EXPECT_DOUBLE_EQ(plot["limit_share"]["thrust_n"].get<double>(), 0.05811);
+  EXPECT_DOUBLE_EQ(plot["limit_share"]["voltage_low_v"].get<double>(), 0.4202) << "5 V of 11.9 V";
   for (const auto& [key, value] : plot.items()) EXPECT_TRUE(value.is_number() || key == "limit_share") << key;
 }
 
 TEST(PlotMessages, LeaveOutWhatIsUnknown) {
   Tick tick;
-  tick.limit_values[0] = kUnknown;
+  tick.watched[static_cast<std::size_t>(Watched::speed)] = kUnknown;
   const json plot = json::parse(plot_message(tick, subject().limits));
   EXPECT_FALSE(plot.contains("thrust_n"));
   EXPECT_FALSE(plot["limit_share"].contains("speed_rpm"));
@@ -94,10 +118,10 @@ TEST(PlotMessages, FitIntoOneDatagramOfPlotJuggler) {
   Tick tick = full_tick();
   tick.time_s = tick.thrust_n = tick.torque_nm = tick.speed_rpm = tick.commanded_rpm = -1.23456789e-301;
   tick.fault_bits = tick.received = tick.lost_network = tick.lost_host = ~std::uint64_t{0};
-  std::vector<LimitBar> limits(kMostLimits, {"a_key_that_is_rather_long_a", "", "", 3, {}});
-  for (std::size_t i = 0; i < limits.size(); ++i) limits[i].key += std::to_string(i);
-  tick.limit_values.fill(-1.23456789e-301);
-  EXPECT_LT(plot_message(tick, limits).size(), 1400u);
+  std::vector<GuardLimit> limits;
+  for (std::size_t i = 0; i < kWatchedCount; ++i) limits.push_back({static_cast<Watched>(i), "", 3, "", ""});
+  tick.watched.fill(-1.23456789e-301);
+  EXPECT_LT(plot_message(tick, limit_bars(limits)).size(), 1400u);
 }
 
 }  // namespace

@@ -58,14 +58,26 @@ TEST(ReplayedRun, SubtractsTheZeroAndCountsEverySample) {
   ASSERT_GT(zeros, 0);
   EXPECT_NEAR(zero_sum / zeros, 0, 0.05);
   EXPECT_GT(seen.steps.back().second.thrust.value(), 0.5);
+  EXPECT_GT(seen.steps.back().second.loads[2], 0.5);
+  EXPECT_GT(seen.steps.back().second.motor_current.value(), 0.5);
   EXPECT_EQ(seen.ticks.back().second.account.received, recording().load_cell.size());
   EXPECT_EQ(seen.ticks.back().first.remaining_s, 0);
 }
 
 TEST(ReplayedRun, HasTheLimitsOfItsCampaignAndCannotBeStopped) {
-  const Subject subject = subject_of(recording());
+  results::RunRecording told = recording();
+  told.header.motor_parameters = "power_safety.motor_current_high: 60  # A\n";  // of a run file since format 3
+  const Subject subject = subject_of(told);
   EXPECT_TRUE(subject.replay);
-  EXPECT_EQ(subject.limits.size(), 4u);
+  const auto source_of = [&](Watched watched) {
+    for (const LimitBar& bar : subject.limits)
+      if (bar.watched == watched) return bar.source;
+    return std::string();
+  };
+  EXPECT_EQ(source_of(Watched::thrust), "campaign limits.thrust_max_n");
+  EXPECT_EQ(source_of(Watched::force_z), "device load cell, 110 % of its range");
+  EXPECT_EQ(source_of(Watched::motor_current), "device motor power_safety.motor_current_high");
+  EXPECT_EQ(source_of(Watched::pause), "") << "nobody recorded it";
   results::RunRecording older = recording();
   older.header.campaign_text = "of another time";
   EXPECT_TRUE(subject_of(older).limits.empty());

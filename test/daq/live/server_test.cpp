@@ -231,6 +231,8 @@ TEST_F(LiveServer, TellsWhoComesLateWhatWas) {
   (void)first->hear("history");
   feed_.tell(line_message(1, "the first line"));
   feed_.tell(step_message(Tick{}, {}));
+  for (const double limit : {3.0, 2.0})
+    feed_.tell(limits_message(limit_bars({{Watched::thrust, "thrust", limit, "N", "campaign"}})));
   for (int i = 1; i <= 2; ++i) {
     show(i);
     server_->draw();
@@ -238,9 +240,10 @@ TEST_F(LiveServer, TellsWhoComesLateWhatWas) {
   }
   const json history = onlooker()->hear("history");
   EXPECT_EQ(history["trace"].size(), 2u);
-  ASSERT_EQ(history["messages"].size(), 2u);
-  EXPECT_EQ(history["messages"][0]["type"], "step");
-  EXPECT_EQ(history["messages"][1]["text"], "the first line");
+  ASSERT_EQ(history["messages"].size(), 3u);
+  EXPECT_EQ(history["messages"][0]["limits"][0]["limit"], 2) << "the newest table only";
+  EXPECT_EQ(history["messages"][1]["type"], "step");
+  EXPECT_EQ(history["messages"][2]["text"], "the first line");
 }
 
 TEST_F(LiveServer, AsksForTheStopExactlyOnce) {

@@ -50,6 +50,15 @@ TEST(IqAudit, WritesWhatItWasToldForTheRunsHeader) {
   EXPECT_THAT(text, Not(HasSubstr("stopping_handler"))) << "not told";
 }
 
+TEST(IqAudit, ReadsWhatItWroteIntoTheRunsHeader) {
+  FakeDialogue module;
+  const AuditRecord told = read_audit(module);
+  const AuditRecord again = AuditRecord::of(told.text());
+  EXPECT_EQ(again.text(), told.text());
+  EXPECT_EQ(again.uid(), told.uid());
+  EXPECT_EQ(AuditRecord::of("nothing: of the kind\n\nbrushless_drive.volts_limit: many\nx").text(), "");
+}
+
 TEST(IqAudit, AsksAnAbsentClientOnlyOnce) {
   FakeDialogue module;
   module.asked.clear();
