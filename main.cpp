@@ -17,6 +17,7 @@
 #include "drivers/sim/commands.hpp"
 #include "fit/commands.hpp"
 #include "fit/import_commands.hpp"
+#include "fit/report_commands.hpp"
 #include "fit/result_commands.hpp"
 #include "profiles/commands.hpp"
 #include "profiles/configuration_error.hpp"

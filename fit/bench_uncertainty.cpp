@@ -41,4 +41,11 @@ void set_uncertainty(BenchUncertainty& bench, const std::string& text) {
       text));
 }
 
+std::vector<std::pair<std::string, double>> known_uncertainties(const BenchUncertainty& bench) {
+  std::vector<std::pair<std::string, double>> known;
+  for (const Entry& entry : kEntries)
+    if (const auto& value = bench.*entry.member) known.emplace_back(entry.name, *value / entry.unit);
+  return known;
+}
+
 }  // namespace kphi::fit

@@ -4,6 +4,8 @@
 
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace kphi::fit {
 
@@ -17,5 +19,8 @@ struct BenchUncertainty {
 
 /// "NAME=VALUE" with NAME one of calibration, cross-axis, alignment-deg, clock, density. Throws ConfigurationError.
 void set_uncertainty(BenchUncertainty& bench, const std::string& text);
+
+/// NAME and VALUE of those that are known; set_uncertainty takes them back.
+[[nodiscard]] std::vector<std::pair<std::string, double>> known_uncertainties(const BenchUncertainty& bench);
 
 }  // namespace kphi::fit

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "compensation/units.hpp"
+#include "fit/recorded_fit.hpp"
 #include "results/number.hpp"
 
 namespace kphi::fit {
@@ -42,11 +43,6 @@ std::string list(const std::vector<double>& values) {
   return "[" + text + "]";
 }
 
-bool speeds_known(const Identification& identification) {
-  return identification.speed_max_rad_s > identification.speed_min_rad_s &&
-         std::isfinite(identification.speed_max_rad_s);
-}
-
 std::string speed_range(double min_rad_s, double max_rad_s) {
   return list({printed_rpm(min_rad_s), printed_rpm(max_rad_s)});
 }
@@ -61,11 +57,11 @@ std::string head(const Identification& identification, const Provenance& provena
       "tool_version: {}\n"
       "propeller: {{id: {}, name: {}, diameter_in: {}, blades: {}}}\n"
       "k_unit: N/(rad/s)^2\n"
-      "overlap: rim_arc\n",
+      "overlap: {}\n",
       provenance.measured_utc.empty() ? "unknown" : quoted(provenance.measured_utc), quoted(provenance.tool_version),
       quoted(identification.propeller),
       quoted(provenance.propeller_name.empty() ? identification.propeller : provenance.propeller_name),
-      known_if_positive(identification.diameter_in), blades);
+      known_if_positive(identification.diameter_in), blades, compensation::name_of(identification.overlap));
 }
 
 std::string line_block(const LineFit& line) {
@@ -122,13 +118,10 @@ std::string provenance_block(const Identification& identification, const Provena
       "supply_v: {}\n"
       "provenance:\n"
       "  campaign: {}\n"
-      "  fit: {{model: \"T = k w^2\", estimator: {}",
+      "  fit: {{model: \"T = k w^2\", estimator: {}, {}}}\n",
       air ? yaml_number(air->kg_m3) : "unknown", air ? yaml_number(air->u_kg_m3) : "unknown",
       standard_block(identification), number_or_unknown(provenance.supply_v), quoted(provenance.campaign),
-      quoted(estimator_words(identification)));
-  if (speeds_known(identification))
-    text += ", speed_range_rpm: " + speed_range(identification.fitted.min_rad_s, identification.fitted.max_rad_s);
-  text += "}\n";
+      quoted(estimator_words(identification)), format_fit_options(identification, provenance.bench));
   if (const auto& clock = provenance.clock) {
     text += clock->u_gain ? fmt::format("  motor_clock: {{gain: {}, u: {}}}\n", clock->gain, *clock->u_gain)
                           : "  motor_clock: unchecked\n";

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "fit/bench_uncertainty.hpp"
 #include "fit/identification.hpp"
 #include "results/records.hpp"
 
@@ -43,6 +44,7 @@ struct Provenance {
   std::optional<double> supply_v;
   std::optional<MotorClock> clock;  ///< of a campaign
   std::vector<RejectedRun> rejected{};
+  std::optional<BenchUncertainty> bench{};  ///< with which the budget was made
 };
 
 /// What was minimised, in words; the same in file and report.

@@ -142,6 +142,11 @@ std::vector<LinePoint> line_points(const std::vector<OcclusionCoefficient>& tabl
 
 }  // namespace
 
+bool speeds_known(const Identification& identification) {
+  return identification.speed_max_rad_s > identification.speed_min_rad_s &&
+         std::isfinite(identification.speed_max_rad_s);
+}
+
 bool same_level(double a_rad_s, double b_rad_s) {
   constexpr double kShare = 0.005;
   return std::abs(a_rad_s - b_rad_s) <= kShare * std::max(a_rad_s, b_rad_s);

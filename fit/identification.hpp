@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "compensation/overlap_measure.hpp"
 #include "fit/air.hpp"
 #include "fit/line_fit.hpp"
 #include "fit/repeatability.hpp"
@@ -39,7 +40,7 @@ struct OcclusionCoefficient {
   /// in common; of a single one: of the fit.
   double standard_error = 0;
   std::optional<StandardCoefficient> standard;  ///< none where the air is unknown
-  std::size_t steps = 0;  ///< distinct levels
+  std::size_t steps = 0;                        ///< distinct levels
   std::size_t repetitions = 0;
   std::optional<ThrustFit> fit;              ///< none in a table that came without steps
   std::vector<results::StepMean> measured;   ///< behind `fit`, one per point of it
@@ -48,8 +49,10 @@ struct OcclusionCoefficient {
 
 struct Identification {
   std::string propeller;
-  double diameter_in = 0;                   ///< 0: not known
-  int blades = 0;                           ///< 0: not known
+  double diameter_in = 0;  ///< 0: not known
+  int blades = 0;          ///< 0: not known
+  /// In which measure φ is meant in flight. On the bench's sector plates all of them are the same angle.
+  compensation::OverlapMeasure overlap = compensation::OverlapMeasure::rim_arc;
   std::vector<OcclusionCoefficient> table;  ///< ascending φ, the first is φ = 0
   LineFit line;
   Repeatability repeatability;  ///< one angle per row of the table; empty in a table that came without steps
@@ -63,6 +66,9 @@ struct Identification {
   double speed_min_rad_s = 0;  ///< speeds that were measured at every φ: those the line vouches for
   double speed_max_rad_s = 0;
 };
+
+/// Whether a range of speeds is known; it is not in a table that came without.
+[[nodiscard]] bool speeds_known(const Identification& identification);
 
 /// Whether two speeds are the same level of a profile: they agree to 0.5 %.
 [[nodiscard]] bool same_level(double a_rad_s, double b_rad_s);

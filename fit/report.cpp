@@ -302,7 +302,7 @@ std::string provenance_section(const Identification& identification, const Prove
   if (identification.speed_max_rad_s > identification.speed_min_rad_s)
     html +=
         entry("Speeds", rpm(identification.speed_min_rad_s) + " to " + rpm(identification.speed_max_rad_s) + " RPM");
-  html += entry("Overlap", "rim arc");
+  html += entry("Overlap", std::string(compensation::name_of(identification.overlap)));
   const auto& air = identification.air;
   html += entry("Air density", air ? fmt::format("{:.4f} ± {:.4f} kg/m³", air->kg_m3, air->u_kg_m3) : "unknown");
   html += entry("Supply", optional_number(provenance.supply_v, "V"));

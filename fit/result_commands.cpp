@@ -12,7 +12,9 @@
 #include "fit/compare.hpp"
 #include "fit/export/run_export.hpp"
 #include "fit/export/targets.hpp"
+#include "fit/family_table.hpp"
 #include "fit/on_run.hpp"
+#include "fit/report_commands.hpp"
 #include "results/file_layer.hpp"
 #include "results/record_error.hpp"
 #include "results/run_reader.hpp"
@@ -23,12 +25,32 @@ namespace {
 namespace fs = std::filesystem;
 
 struct CompareRequest {
-  std::string a, b, expect;
+  std::vector<std::string> results;
+  std::string expect;
+  std::vector<std::string> predict;
+  bool claims = false;
   bool json = false;
 };
 
+/// Propellers of a family: every folder fitted again as its coefficients.yaml says.
+void compare_family(const CompareRequest& request) {
+  if (!request.expect.empty()) throw ConfigurationError("--expect is a verdict on two results");
+  std::vector<PropellerSize> sizes;
+  for (const std::string& text : request.predict) sizes.push_back(parse_propeller_size(text));
+  std::vector<FamilyMember> family;
+  for (const std::string& path : request.results) {
+    if (!fs::is_directory(path))
+      throw ConfigurationError(path + ": several propellers are compared from their folders, with steps.csv in them");
+    FittedFolder fitted = fitted_again(path);
+    family.push_back({std::move(fitted.identification), std::move(fitted.analysis)});
+  }
+  const FamilyFindings findings = findings_of(family, sizes);
+  fmt::print("{}", request.json ? to_json(findings).dump(2) + "\n" : family_text(findings));
+}
+
 void run_compare(const CompareRequest& request, int& exit_code) {
-  const Comparison comparison = compare(load_result(request.a), load_result(request.b));
+  if (request.results.size() > 2 || request.claims || !request.predict.empty()) return compare_family(request);
+  const Comparison comparison = compare(load_result(request.results.front()), load_result(request.results.back()));
   fmt::print("{}", request.json ? comparison_json(comparison) : comparison_table(comparison));
   if (!request.expect.empty() && request.expect != word(comparison.verdict)) {
     fmt::print(stderr, "kphi: expected that they {}, found: {}\n", request.expect, word(comparison.verdict));
@@ -90,15 +112,24 @@ void run_export(const ExportRequest& request) {
 
 void add_compare(CLI::App& app, int& exit_code) {
   auto request = std::make_shared<CompareRequest>();
-  CLI::App* command = app.add_subcommand("compare", "two results: differences, their uncertainties, a verdict");
-  command->add_option("A", request->a, "coefficients.yaml, campaign folder, or steps.csv without occlusions")
+  CLI::App* command = app.add_subcommand(
+      "compare",
+      "two results: differences, their uncertainties, a verdict; several propellers: the paper's statements");
+  command
+      ->add_option("RESULT", request->results,
+                   "two of: coefficients.yaml, campaign folder, steps.csv without occlusions; or fitted folders of "
+                   "several propellers")
       ->required()
+      ->expected(2, 100)
       ->check(CLI::ExistingPath);
-  command->add_option("B", request->b, "the other")->required()->check(CLI::ExistingPath);
   command->add_option("--expect", request->expect, "exit with 5 when the verdict is another")
       ->check(CLI::IsMember({"agree", "differ"}));
   command->add_flag("--json", request->json, "the comparison as JSON on stdout");
-  command->footer("kphi compare results/<monday> results/<tuesday> --expect agree");
+  command->add_flag("--claims", request->claims, "the paper's statements of two propellers, too (default of three)");
+  command->add_option("--predict", request->predict, "k of a propeller that nobody measured, such as 7x3, from three");
+  command->footer(
+      "kphi compare results/<monday> results/<tuesday> --expect agree\n"
+      "kphi compare results/<5x2> results/<5x3> results/<6x2> results/<6x3> --predict 7x3");
   on_run(*command, exit_code, [request, &exit_code] { run_compare(*request, exit_code); });
 }
 

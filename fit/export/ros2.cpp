@@ -51,7 +51,7 @@ void add_table(const compensation::Coefficients& file, Parameters& parameters) {
 Export to_ros2(const compensation::Coefficients& file, const ExportOptions&) {
   Parameters parameters;
   parameters.add("propeller", json_text(file.propeller.id));
-  parameters.add("overlap", "\"rim_arc\"");
+  parameters.add("overlap", fmt::format("\"{}\"", compensation::name_of(file.overlap)));
   parameters.number("thrust_coefficient_n_s2_per_rad2", file.thrust_coefficient.value());
   parameters.number("thrust_coefficient_standard_error_n_s2_per_rad2", value_of(file.thrust_coefficient_error));
   parameters.number("line_intercept_n_s2_per_rad2", file.line.intercept.value());

@@ -37,6 +37,7 @@ std::vector<std::string> provenance_lines(const compensation::Coefficients& file
   lines.push_back(fmt::format(
       "K_T {} N/(rad/s)^2, standard error {}", results::yaml_number(file.thrust_coefficient.value()),
       file.thrust_coefficient_error ? results::yaml_number(file.thrust_coefficient_error->value()) : "unknown"));
+  lines.push_back(fmt::format("phi is meant as the {} of the overlap", compensation::name_of(file.overlap)));
   lines.push_back(fmt::format("measured {}, campaign {}, {} runs, fitted by kphi {}", known(file.measured_utc),
                               known(file.provenance.campaign), file.provenance.runs.size(), known(file.tool_version)));
   lines.push_back(file.air_density_kg_m3

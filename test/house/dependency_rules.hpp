@@ -36,6 +36,8 @@ inline const std::vector<Rule>& rules() {
         "profiles/configuration_error.hpp", "compensation/units.hpp"}},
       {"daq/", {"daq/", "results/", "drivers/", "profiles/", "compensation/units.hpp"}},
       {"fit/", {"fit/", "results/", "compensation/", "profiles/configuration_error.hpp"}},
+      // The program's way in: a campaign folder brings its profile files.
+      {"fit/fit_input", {"fit/", "results/", "profiles/"}},
       {"compensation/", {"compensation/*", "compensation/flight/"}},
       {"compensation/flight/", {"compensation/*", "compensation/flight/"}},
       {"compensation/file/", {"compensation/*", "compensation/file/"}},
