@@ -8,6 +8,7 @@
 #include "compensation/compensate_rows.hpp"
 #include "compensation/compensator.hpp"
 #include "compensation/file/coefficient_file.hpp"
+#include "compensation/file/overlap_mismatch.hpp"
 #include "profiles/configuration_error.hpp"
 #include "profiles/vehicle.hpp"
 
@@ -21,19 +22,11 @@ struct Request {
   bool json = false;
 };
 
-/// By name and file; Compensator::build would refuse it, too.
-void require_one_measure(const ThrustLine& line, const profiles::Vehicle& vehicle, const Request& request) {
-  if (line.overlap() == vehicle.overlap) return;
-  const std::string fitted(name_of(line.overlap())), flown(name_of(vehicle.overlap));
-  throw ConfigurationError(request.coefficients + ": fitted with overlap " + fitted + ", but " + request.vehicle +
-                           " flies with " + flown + "; write `overlap: " + fitted +
-                           "` in the vehicle file, or fit again with " + flown);
-}
-
 Compensator compensator_of(const Request& request) {
   const ThrustLine line = thrust_line(load_coefficients(request.coefficients));
   const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
-  require_one_measure(line, vehicle, request);
+  const auto mismatch = overlap_mismatch(line.overlap(), request.coefficients, vehicle.overlap, request.vehicle);
+  if (mismatch) throw ConfigurationError(*mismatch);
   const ScalingLaw law = request.law == "published" ? ScalingLaw::published : ScalingLaw::clamped;
   const BuildOutcome outcome = Compensator::build({line, line, line, line}, profiles::airframe_of(vehicle), law);
   if (!outcome.compensator) throw ConfigurationError(request.vehicle + ": " + describe(outcome.refusal));

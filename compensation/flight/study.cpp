@@ -58,13 +58,12 @@ Merits merits_of(const NineFlights& flights) noexcept {
   return merits;
 }
 
-std::vector<Draw> fly_draws(const Vehicle& vehicle, const compensation::ThrustLine& line, const Shadow& shadow,
-                            std::uint64_t seed, std::size_t count, std::size_t threads) {
-  std::vector<Draw> draws(count, Draw{nominal_scene(vehicle, line, seed), {}});
+std::vector<Draw> fly_draws(const Scene& nominal, const Shadow& shadow, std::size_t count, std::size_t threads) {
+  std::vector<Draw> draws(count, Draw{nominal, {}});
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t i = next++; i < count; i = next++) {
-      draws[i].scene = drawn_scene(vehicle, line, seed, i);
+      draws[i].scene = drawn_scene(nominal, i);
       draws[i].flights = fly_all(draws[i].scene, shadow);
     }
   };

@@ -43,9 +43,8 @@ struct Draw {
   NineFlights flights;
 };
 
-/// Draws 0 to count − 1 on `threads` threads; the result does not depend on their number.
-[[nodiscard]] std::vector<Draw> fly_draws(const Vehicle& vehicle, const compensation::ThrustLine& line,
-                                          const Shadow& shadow, std::uint64_t seed, std::size_t count,
+/// Draws 0 to count − 1 around `nominal` on `threads` threads; the result does not depend on their number.
+[[nodiscard]] std::vector<Draw> fly_draws(const Scene& nominal, const Shadow& shadow, std::size_t count,
                                           std::size_t threads);
 
 struct Percentiles {

@@ -92,14 +92,7 @@ Latencies arms(const char* what, double clock, const Compensator& built, double 
   return found;
 }
 
-Compensator by_measure(OverlapMeasure measure) {
-  Airframe airframe = example_airframe();
-  airframe.overlap = measure;
-  const ThrustLine rim = paper_line();
-  const ThrustLine line =
-      *ThrustLine::from(rim.thrust_coefficient(), rim.intercept(), rim.slope_per_rad(), rim.largest_fitted(), measure);
-  return *Compensator::build({line, line, line, line}, airframe).compensator;
-}
+Compensator by_measure(OverlapMeasure measure) { return compensator_of(example_airframe(measure)); }
 
 void set_arms(double clock) {
   const Latencies rim = arms("set_arms, four overlaps, rim", clock, example_compensator(), 147.5, 180);

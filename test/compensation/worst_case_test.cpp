@@ -73,8 +73,6 @@ TEST_F(WorstCase, OfSpeedsForIsAUsualCall) {
       20);
 }
 
-Airframe square() { return example_airframe(); }
-
 Airframe hexagonal_airframe() {
   Position corners[6];
   for (std::size_t i = 0; i < 6; ++i) {
@@ -91,19 +89,12 @@ Airframe hexagonal_airframe() {
   return airframe;
 }
 
-Compensator flown_by(Airframe airframe, OverlapMeasure measure) {
-  airframe.overlap = measure;
-  const ThrustLine rim = paper_line();
-  const ThrustLine line =
-      *ThrustLine::from(rim.thrust_coefficient(), rim.intercept(), rim.slope_per_rad(), rim.largest_fitted(), measure);
-  return *Compensator::build({line, line, line, line}, airframe).compensator;
-}
-
 /// Four arms over the body, from first contact to O and a little beyond, all moved at every call.
 TEST_F(WorstCase, OfSetArmsIsAUsualOneOfArmsOverTheBodyInEveryMeasureOnEveryBody) {
-  for (const Airframe& airframe : {square(), hexagonal_airframe()}) {
+  for (Airframe airframe : {example_airframe(), hexagonal_airframe()}) {
     for (const OverlapMeasureName& entry : kOverlapMeasureNames) {
-      Compensator compensator = flown_by(airframe, entry.measure);
+      airframe.overlap = entry.measure;
+      Compensator compensator = compensator_of(airframe);
       const std::string what = std::string(entry.name) + (airframe.polygon ? "_hexagon" : "_square");
       SCOPED_TRACE(what);
       const Counts counts = counted(what, 6, [&](int i) {

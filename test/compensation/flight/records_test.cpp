@@ -41,7 +41,7 @@ TEST(TraceCsv, HasAFieldForEveryColumnAndARowForEveryTick) {
 }
 
 TEST(DrawsCsv, HasAFieldForEveryColumnAndARowForEveryDraw) {
-  const auto draws = fly_draws(example_vehicle(), bench_line(), example_shadow(), 1, 2, 2);
+  const auto draws = fly_draws(example_scene(), example_shadow(), 2, 2);
   const std::vector<std::string> lines = lines_of(draws_csv(draws));
   ASSERT_EQ(lines.size(), 3u);
   for (const std::string& line : lines) EXPECT_EQ(commas(line), commas(lines[0])) << line;
