@@ -139,6 +139,12 @@ void write(const fs::path& path, const std::string& text) {
   results::write_text(path, text, files);
 }
 
+void make_folder(const std::string& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error) throw std::runtime_error(path + ": cannot be made (" + error.message() + "); give another --out");
+}
+
 /// Why it could not be drawn, or nothing.
 std::string write_figure(const fs::path& folder, const std::string& name, const std::string& script) {
   write(folder / (name + ".gp"), script);
@@ -165,7 +171,7 @@ Flown fly_requested(const Request& request) {
   Flown flown{nominal_of(request), {}, {}};
   const Shadow shadow(flown.nominal.vehicle.airframe);
   std::array<std::vector<TraceRow>, 9> traces;
-  if (!request.out.empty()) fs::create_directories(request.out);
+  if (!request.out.empty()) make_folder(request.out);
   for (std::size_t i = 0; i < kExperiments.size(); ++i) {
     if (!request.experiment.empty() && request.experiment != kExperiments[i].name) continue;
     flown.flights[i] = fly_one(i, flown.nominal, shadow, request.out.empty() ? nullptr : &traces[i]);
@@ -206,7 +212,13 @@ void print_text(const Request& request, const Flown& flown) {
 Json json_of(const Percentiles& p) { return {{"p10", p.p10}, {"p50", p.p50}, {"p90", p.p90}}; }
 
 Json json_of(const Findings& found) {
+  Json by_law;
+  for (std::size_t law = 0; law < found.by_law.size(); ++law) {
+    by_law[name_of(static_cast<LossLaw>(law))] = {{"hover_z_ratio_p50", found.by_law[law].hover_z_ratio},
+                                                  {"forward_ratio_p50", found.by_law[law].forward_ratio}};
+  }
   return {{"draws", found.draws},
+          {"kept", found.kept},
           {"lost_plain", found.lost_plain},
           {"lost_compensated", found.lost_compensated},
           {"hover_z_better", found.hover_z_better},
@@ -221,7 +233,8 @@ Json json_of(const Findings& found) {
           {"forward_plain_m", json_of(found.forward_plain)},
           {"forward_compensated_m", json_of(found.forward_compensated)},
           {"forward_ratio", json_of(found.forward_ratio)},
-          {"square_speed_ratio", json_of(found.square_speed_ratio)}};
+          {"square_speed_ratio", json_of(found.square_speed_ratio)},
+          {"by_loss_law", by_law}};
 }
 
 Json json_of(const Experiment& experiment, const FlightResult& flight) {

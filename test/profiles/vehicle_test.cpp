@@ -220,6 +220,14 @@ TEST(Vehicle, HasABodyThatIsAPlateOrTellsItsInertia) {
               ElementsAre(StartsWith("17:36: dynamics.body_inertia_kg_m2[2]: 0.0021 is more than the other two")));
 }
 
+TEST(Vehicle, RefusesAFileOfAnotherKindWithOneLine) {
+  EXPECT_THAT(refused("kphi-vehicle/1", "kphi-coefficients/1"),
+              ElementsAre("1:9: this is a coefficients file, expected a vehicle file; name a file that begins with "
+                          "format: kphi-vehicle/1"));
+  EXPECT_THAT(refused("kphi-vehicle/1", "kphi-vehicel/1"),
+              ElementsAre(StartsWith("1:9: format: text \"kphi-vehicel/1\" is not known here")));
+}
+
 TEST(Vehicle, HasOneBody) {
   EXPECT_THAT(refused("half_side_m: 0.045\n", ""),
               ElementsAre(StartsWith("1:1: half_side_m: missing, and there is no body either")));

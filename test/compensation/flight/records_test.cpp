@@ -51,7 +51,7 @@ TEST(DrawsCsv, HasAFieldForEveryColumnAndARowForEveryDraw) {
 
 TEST(ErrorFigure, NamesTheFlightAndItsLegs) {
   const std::string script = error_figure(kExperiments[kHoverPlain], example_trace());
-  EXPECT_THAT(script, HasSubstr("title 'hover: X, O n.c., X'"));
+  EXPECT_THAT(script, HasSubstr("title 'hover: X, O n.c., X   (reference - estimate"));
   EXPECT_THAT(script, HasSubstr("set label 'O n.c.' at 10"));
   EXPECT_THAT(script, HasSubstr("set ylabel 'z error [m]'"));
 }
