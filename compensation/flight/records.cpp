@@ -121,14 +121,14 @@ std::string error_figure(const Experiment& experiment, const std::vector<TraceRo
     script += "\n";
   }
   script += "EOD\n" + leg_marks(experiment) + "unset key\nset lmargin 9\nset xrange [0:" + shortest(total) +
-            "]\nset yrange [" + aligned(lowest, 3, 0) + ":" + aligned(highest + 0.2 * (highest - lowest), 3, 0) +
+            "]\nset yrange [" + aligned(lowest - 0.02, 3, 0) + ":" + aligned(highest + 0.2 * (highest - lowest), 3, 0) +
             "]\nset ytics " + (highest - lowest < 0.6 ? "0.1" : "0.25") +
             "\nset mytics 2\nset multiplot layout 3,1 title '" + std::string(experiment.title) +
-            "   (reference - estimate; grey: averaged in the tables)'\n";
+            "   (reference - estimate, above 0 in z is below; grey: averaged)'\n";
   const char* colours[] = {"#0072B2", "#009E73", "#D55E00"};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::string name(1, static_cast<char>('x' + axis));
-    script += "set ylabel '" + name + " error [m]" + (axis == 2 ? ", + below" : "") + "'\n";
+    script += "set ylabel '" + name + " error [m]'\n";
     if (axis == 2) script += "set xlabel 'time [s]'\n";
     script += "plot 0 lc rgb '#bbbbbb', $error using 1:" + std::to_string(axis + 2) + " with lines lc rgb '" +
               colours[axis] + "'\n";
