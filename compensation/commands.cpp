@@ -1,6 +1,9 @@
 #include "compensation/commands.hpp"
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -8,6 +11,7 @@
 #include "compensation/compensate_rows.hpp"
 #include "compensation/compensator.hpp"
 #include "compensation/file/coefficient_file.hpp"
+#include "compensation/file/overlap_mismatch.hpp"
 #include "profiles/configuration_error.hpp"
 #include "profiles/vehicle.hpp"
 
@@ -21,19 +25,10 @@ struct Request {
   bool json = false;
 };
 
-/// By name and file; Compensator::build would refuse it, too.
-void require_one_measure(const ThrustLine& line, const profiles::Vehicle& vehicle, const Request& request) {
-  if (line.overlap() == vehicle.overlap) return;
-  const std::string fitted(name_of(line.overlap())), flown(name_of(vehicle.overlap));
-  throw ConfigurationError(request.coefficients + ": fitted with overlap " + fitted + ", but " + request.vehicle +
-                           " flies with " + flown + "; write `overlap: " + fitted +
-                           "` in the vehicle file, or fit again with " + flown);
-}
-
-Compensator compensator_of(const Request& request) {
+Compensator compensator_of(const Request& request, const profiles::Vehicle& vehicle) {
   const ThrustLine line = thrust_line(load_coefficients(request.coefficients));
-  const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
-  require_one_measure(line, vehicle, request);
+  const auto mismatch = overlap_mismatch(line.overlap(), request.coefficients, vehicle.overlap, request.vehicle);
+  if (mismatch) throw ConfigurationError(*mismatch);
   const ScalingLaw law = request.law == "published" ? ScalingLaw::published : ScalingLaw::clamped;
   const BuildOutcome outcome = Compensator::build({line, line, line, line}, profiles::airframe_of(vehicle), law);
   if (!outcome.compensator) throw ConfigurationError(request.vehicle + ": " + describe(outcome.refusal));
@@ -47,28 +42,39 @@ Compensator compensator_of(const Request& request) {
   return *outcome.compensator;
 }
 
+/// Tells what was odd about the rows; the exit code.
+int verdict(const RowCounts& counts, const profiles::Vehicle& vehicle) {
+  if (!std::cout) {
+    std::cerr << "standard output cannot be written; " << counts.written << " rows were on their way\n";
+    return 1;
+  }
+  if (counts.out_of_reach > 0) {
+    std::cerr << counts.out_of_reach << " of " << counts.written << " rows have an arm angle outside "
+              << std::round(to_degrees(vehicle.arm_angle_min)) << " to "
+              << std::round(to_degrees(vehicle.arm_angle_max)) << " degrees, where the servos of " << vehicle.path
+              << " do not go; they were computed all the same\n";
+  }
+  if (counts.rejected == 0) return 0;
+  std::cerr << counts.rejected << " of " << counts.rejected + counts.written << " rows were left out\n";
+  return 5;
+}
+
 int compensate(const Request& request) {
   std::ios::sync_with_stdio(false);
   std::cin.tie(nullptr);
   try {
-    Compensator compensator = compensator_of(request);
-    const RowCounts counts = compensate_rows(std::cin, std::cout, std::cerr, compensator,
-                                             request.json ? RowFormat::json_lines : RowFormat::csv);
-    if (!std::cout) {
-      std::cerr << "standard output cannot be written; " << counts.written << " rows were on their way\n";
-      return 1;
-    }
-    if (counts.rejected == 0) return 0;
-    std::cerr << counts.rejected << " of " << counts.rejected + counts.written << " rows were left out\n";
-    return 5;
+    const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
+    Compensator compensator = compensator_of(request, vehicle);
+    if (isatty(STDIN_FILENO) != 0) std::cerr << "reading CSV from the keyboard; Ctrl-D ends it\n";
+    const RowCounts counts =
+        compensate_rows(std::cin, std::cout, std::cerr, compensator, {vehicle.arm_angle_min, vehicle.arm_angle_max},
+                        request.json ? RowFormat::json_lines : RowFormat::csv);
+    return verdict(counts, vehicle);
   } catch (const CoefficientError& error) {
-    std::cerr << error.what() << '\n';
-  } catch (const ConfigurationError& error) {
-    std::cerr << error.what() << '\n';
+    throw ConfigurationError(error.what());
   } catch (const RowHeaderError& error) {
-    std::cerr << error.what() << '\n';
+    throw ConfigurationError(error.what());
   }
-  return 2;
 }
 
 }  // namespace
@@ -77,7 +83,10 @@ void add_compensate(CLI::App& program, int& exit_code) {
   auto request = std::make_shared<Request>();
   CLI::App* command = program.add_subcommand(
       "compensate", "CSV of arm angles and thrusts on stdin → occlusions, k_i and rotor speeds on stdout");
-  command->footer("Columns: theta1_deg … theta4_deg, thrust1_n … thrust4_n; others are ignored.");
+  command->footer(
+      "Columns in: theta1_deg … theta4_deg, thrust1_n … thrust4_n, in any order; others are ignored.\n"
+      "Columns out: phi1_deg …, k1 … (k_i of equation 4), speed1_rpm …, flags (rotor:what, separated by blanks).\n"
+      "A row that cannot be used is left out and told on stderr; the exit code is then 5.");
   command->add_option("--coefficients", request->coefficients, "coefficients.yaml of `kphi fit`")->required();
   command->add_option("--vehicle", request->vehicle, "Vehicle file, e.g. profiles/foldable_drone.yaml")->required();
   command->add_option("--law", request->law, "clamped, or published (equation 4 to the letter)")

@@ -54,9 +54,26 @@ struct Columns {
   std::size_t count = 0;
 };
 
+constexpr const char* kNextMove =
+    "; the first line must name theta1_deg..theta4_deg and thrust1_n..thrust4_n once each, separated by commas";
+
+/// What is wrong with a column that stands there `found` times; `names` may hold it in another unit.
+std::string complaint_about(std::string_view wanted, std::size_t found, const std::vector<std::string_view>& names) {
+  const std::string column = "stdin:1: column `" + std::string(wanted) + "` ";
+  if (found > 1) return column + "stands " + std::to_string(found) + " times" + kNextMove;
+  const std::string_view stem = wanted.substr(0, wanted.find('_') + 1);
+  for (const std::string_view name : names) {
+    if (name.substr(0, stem.size()) != stem) continue;
+    return column + "is missing, but there is `" + std::string(name) +
+           "`; the unit is part of the name, degrees and N are read";
+  }
+  return column + "is missing" + kNextMove;
+}
+
 Columns read_header(std::string_view line) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (line.substr(0, kByteOrderMark.size()) == kByteOrderMark) line.remove_prefix(kByteOrderMark.size());
+  if (trimmed(line).empty()) throw RowHeaderError(std::string("stdin:1: no header") + kNextMove);
   std::vector<std::string_view> names;
   split(line, names);
   Columns columns;
@@ -68,12 +85,7 @@ Columns read_header(std::string_view line) {
       columns.place[wanted] = i;
       ++found;
     }
-    if (found != 1) {
-      throw RowHeaderError("stdin:1: column `" + std::string(kColumnNames[wanted]) + "` stands " +
-                           std::to_string(found) +
-                           " times in the header; the first line must name theta1_deg..theta4_deg and "
-                           "thrust1_n..thrust4_n once each, separated by commas");
-    }
+    if (found != 1) throw RowHeaderError(complaint_about(kColumnNames[wanted], found, names));
   }
   return columns;
 }
@@ -161,7 +173,7 @@ void hand_on(std::string& buffer, std::ostream& out) {
 }  // namespace
 
 RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& words, Compensator& compensator,
-                          RowFormat format) {
+                          ArmRange reach, RowFormat format) {
   std::string line;
   std::getline(in, line);
   const Columns columns = read_header(line);
@@ -184,6 +196,11 @@ RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& wor
     for (std::size_t i = 0; i < 4; ++i) {
       arm_angles[i] = from_degrees(values[i]);
       thrusts[i] = Newtons(values[i + 4]);
+    }
+    for (const Radians angle : arm_angles) {
+      if (angle >= reach.from && angle <= reach.to) continue;
+      ++counts.out_of_reach;
+      break;
     }
     compensator.set_arms(arm_angles);
     const SpeedCommand command = compensator.speeds_for(thrusts);

@@ -49,6 +49,8 @@ ContactFreeWindow window_of(const Airframe& airframe) noexcept {
   return contact_free_window(airframe.half_side, airframe.arm_length, airframe.propeller_radius);
 }
 
+constexpr double worth(Flag flag) noexcept { return static_cast<double>(flag); }
+
 LineDoubts doubts_about(const ThrustLine& line, ScalingLaw law) noexcept {
   LineDoubts doubts;
   doubts.gains_with_occlusion = line.slope_per_rad() >= 0.0;
@@ -166,22 +168,26 @@ void Compensator::apply_occlusion(std::size_t rotor) noexcept {
 }
 
 SpeedCommand Compensator::speeds_for(const std::array<Newtons, 4>& thrusts) const noexcept {
-  // One loop for the roots, one for the flags: the compiler makes vector instructions of the first.
-  double wanted[4];
+  // In passes over all rotors, without a branch, flags as doubles: the compiler makes vector instructions of them.
+  double asked[4], wanted[4], held[4], raised[4];
+  for (std::size_t i = 0; i < 4; ++i) asked[i] = thrusts[i].value();
   for (std::size_t i = 0; i < 4; ++i) {
-    const double asked = thrusts[i].value();
-    const double thrust = asked > 0.0 ? asked : 0.0;  // NaN compares false
-    wanted[i] = std::sqrt(thrust / effective_coefficients_[i]);
+    wanted[i] = std::sqrt((asked[i] > 0.0 ? asked[i] : 0.0) / effective_coefficients_[i]);  // NaN compares false
+  }
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double raised_speed = wanted[i] < slowest_ ? slowest_ : wanted[i];
+    held[i] = raised_speed > fastest_ ? fastest_ : raised_speed;
+  }
+  for (std::size_t i = 0; i < 4; ++i) {
+    raised[i] = (asked[i] != asked[i] ? worth(Flag::thrust_nan) : 0.0) +
+                (asked[i] < 0.0 ? worth(Flag::thrust_negative) : 0.0) +
+                (wanted[i] < slowest_ ? worth(Flag::speed_at_slowest) : 0.0) +
+                (wanted[i] > fastest_ ? worth(Flag::speed_at_fastest) : 0.0);
   }
   SpeedCommand command;
+  for (std::size_t i = 0; i < 4; ++i) command.speeds[i] = RadPerSec(held[i]);
   for (std::size_t i = 0; i < 4; ++i) {
-    const double asked = thrusts[i].value();
-    command.speeds[i] = RadPerSec(std::min(std::max(wanted[i], slowest_), fastest_));
-    command.flags[i] = arm_flags_[i]
-                           .with(Flag::thrust_nan, asked != asked)
-                           .with(Flag::thrust_negative, asked < 0.0)
-                           .with(Flag::speed_at_slowest, wanted[i] < slowest_)
-                           .with(Flag::speed_at_fastest, wanted[i] > fastest_);
+    command.flags[i] = arm_flags_[i].with(static_cast<std::uint8_t>(static_cast<int>(raised[i])));
   }
   return command;
 }

@@ -43,6 +43,12 @@ class Flags {
     result.bits_ = static_cast<std::uint8_t>(bits_ | (raised ? static_cast<unsigned>(flag) : 0u));
     return result;
   }
+  /// These flags, and those of `bits`.
+  [[nodiscard]] constexpr Flags with(std::uint8_t bits) const noexcept {
+    Flags result;
+    result.bits_ = static_cast<std::uint8_t>(bits_ | bits);
+    return result;
+  }
 
  private:
   std::uint8_t bits_ = 0;

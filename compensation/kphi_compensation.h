@@ -73,14 +73,17 @@ typedef struct kphi_compensator {
 int kphi_compensator_build(kphi_compensator* out, const kphi_line lines[4], const kphi_airframe* airframe, int law);
 const char* kphi_refusal_text(int refusal);
 
-/* At servo rate: phi and k_i of the arms that moved. An angle that is not finite keeps the last phi. */
+/* At servo rate: phi [rad, 0 .. 2 pi] and k_i of the arms that moved. An angle that is not finite keeps the last phi and
+ * raises KPHI_ARM_ANGLE_UNKNOWN. */
 void kphi_set_arms(kphi_compensator* compensator, const double arm_angles_rad[4]);
-/* At control rate: sqrt(max(T, 0)/(K_T k_i)), held within the speed limits. `flags` may be null. */
+/* At control rate: sqrt(max(T, 0)/(K_T k_i)) (equation 4), held within the speed limits. NaN counts as no thrust. `flags`, the
+ * sum of the flags above per rotor, may be null. */
 void kphi_speeds_for(const kphi_compensator* compensator, const double thrusts_n[4], double speeds_rad_s[4],
                      unsigned char flags[4]);
 /* Compensated or not; off is the plain map sqrt(T/K_T) bit for bit. */
 void kphi_enable(kphi_compensator* compensator, int on);
 
+/* phi of each rotor [rad, 0 .. 2 pi], and k_i: [0.1, 1], or what equation 4 gives. */
 void kphi_occlusion_angles(const kphi_compensator* compensator, double angles_rad[4]);
 void kphi_scaling_factors(const kphi_compensator* compensator, double factors[4]);
 /* K_T k_i fastest_speed^2, for the mixer's limits. */
@@ -100,9 +103,13 @@ typedef struct kphi_mixer {
  * the drag torque points along +z (up); drag torque of a rotor = f0 (per_newton + per_square_newton f0), f0 = K_T omega^2. */
 int kphi_mixer_build(kphi_mixer* out, const double hubs[4][2], const int spins[4], double drag_per_newton,
                      double drag_per_square_newton);
-/* At servo rate. 0, and the layout before is kept, if this one cannot be flown. */
+/* At servo rate; drag_scale of kphi_drag_scale, each > 0. 0, and the layout before is kept, if this one cannot be flown: a
+ * number is not finite, a spin neither +1 nor -1, or the rotors cannot make every torque. */
 int kphi_mixer_set_layout(kphi_mixer* mixer, const double hubs[4][2], const int spins[4], const double drag_scale[4]);
-/* At control rate. wrench: [thrust, roll, pitch, yaw]. Returns what was given up (KPHI_GAVE_..). `achieved` may be null. */
+/* At control rate: thrusts f = A^-1 wrench within the limits, wrench = [thrust N, roll, pitch, yaw N m], A's columns
+ * [1; y_i; -x_i; s_i kappa_i(f_i)]. What the limits do not allow is given up in the order yaw (no further than to assured_yaw),
+ * collective thrust, roll and pitch. Returns the sum of what was given up (KPHI_GAVE_.., KPHI_DEMAND_NAN), 0 if nothing.
+ * `achieved`, the wrench of these thrusts, may be null. */
 int kphi_mix(const kphi_mixer* mixer, const double wrench[4], const double smallest_n[4], const double largest_n[4],
              double assured_yaw, double thrusts_n[4], double achieved[4]);
 

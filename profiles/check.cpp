@@ -93,6 +93,25 @@ std::string summary_of_shape(const std::string& name, const std::array<Radians, 
   return fmt::format("  shape {:<4} arms at{} degrees, occluded by{} degrees\n", name, arms, occlusions);
 }
 
+std::string summary_of(const Dynamics& dynamics) {
+  constexpr double kGravity = 9.80665;  // m/s²
+  return fmt::format("  dynamics   {:g} kg, of which {:g} kg at each hub; {:.3g} N per rotor carry it\n",
+                     dynamics.mass_kg, dynamics.hub_mass_kg, kGravity * dynamics.mass_kg / 4);
+}
+
+std::string summary_of(const Control& control) {
+  return fmt::format("  control    position {:g} 1/s2, velocity {:g} 1/s, attitude {:g} 1/s, rates {:g} 1/s\n",
+                     fmt::join(control.position_gain_per_s2, " "), fmt::join(control.velocity_gain_per_s, " "),
+                     fmt::join(control.attitude_gain_per_s, " "), fmt::join(control.rate_gain_per_s, " "));
+}
+
+std::string what_flies(const Vehicle& vehicle) {
+  if (vehicle.dynamics && vehicle.control) return summary_of(*vehicle.dynamics) + summary_of(*vehicle.control);
+  return fmt::format("  kphi fly   cannot fly it without {}\n", vehicle.dynamics  ? "control"
+                                                                : vehicle.control ? "dynamics"
+                                                                                  : "dynamics and control");
+}
+
 std::string summary_of(const Vehicle& vehicle) {
   std::string shapes;
   const compensation::Airframe airframe = airframe_of(vehicle);
@@ -100,9 +119,9 @@ std::string summary_of(const Vehicle& vehicle) {
   return fmt::format(
       "  body       {}, arms {:g} m, propeller radius {:g} m\n"
       "  speeds     {:.6g} to {:.6g} RPM\n"
-      "  overlap    {}\n{}",
+      "  overlap    {}\n{}{}",
       in_words(vehicle), vehicle.arm_length.value(), vehicle.propeller_radius.value(), to_rpm(vehicle.speed_min),
-      to_rpm(vehicle.speed_max), compensation::name_of(vehicle.overlap), shapes);
+      to_rpm(vehicle.speed_max), compensation::name_of(vehicle.overlap), shapes, what_flies(vehicle));
 }
 
 /// Value of the first line `format: …`: enough for a file that is no YAML, or YAML of another kind.

@@ -13,7 +13,7 @@ struct UnitSuffix {
 };
 
 /// Also units that we do not use and others do.
-constexpr std::array<UnitSuffix, 37> kUnits{{
+constexpr std::array<UnitSuffix, 38> kUnits{{
     {"_rad_s", "rad/s"},
     {"_rpm", "RPM"},
     {"_rpm_s", "RPM/s"},
@@ -45,6 +45,7 @@ constexpr std::array<UnitSuffix, 37> kUnits{{
     {"_gf", "gf"},
     {"_kgf", "kgf"},
     {"_g", "g"},
+    {"_kg", "kg"},
     {"_mv", "mV"},
     {"_ma", "mA"},
     {"_mm", "mm"},

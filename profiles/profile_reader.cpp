@@ -2,20 +2,31 @@
 
 #include <fmt/format.h>
 
+#include <string_view>
+
+#include "profiles/key_names.hpp"
+
 namespace kphi::profiles {
 namespace {
 
+/// "coefficients" of "kphi-coefficients/1"; empty if that is no format of ours.
+std::string word_of(const std::string& format) {
+  constexpr std::string_view kOurs = "kphi-";
+  const auto slash = format.find('/');
+  if (format.compare(0, kOurs.size(), kOurs) != 0 || slash == std::string::npos) return "";
+  return format.substr(kOurs.size(), slash - kOurs.size());
+}
+
+/// A file of another kind is one finding, not one for each of its keys. A slip of the pen is not another kind.
 void refuse_other_kind(const SourceDocument& document, FileKind kind) {
   if (!document.value.is_object()) return;
   const auto format = document.value.find("format");
-  if (format == document.value.end()) return;
-  for (const FileKindInfo& other : kFileKinds) {
-    if (other.kind == kind || *format != other.format) continue;
-    throw RefusedFile(document.path,
-                      {{document.value_mark("/format"), "/format",
-                        fmt::format("this is a {} file, expected a {} file", other.word, info(kind).word),
-                        fmt::format("name a file that begins with format: {}", info(kind).format)}});
-  }
+  if (format == document.value.end() || !format->is_string()) return;
+  const std::string word = word_of(format->get<std::string>());
+  if (word.empty() || nearest_name(word, {info(kind).word})) return;
+  throw RefusedFile(document.path, {{document.value_mark("/format"), "/format",
+                                     fmt::format("this is a {} file, expected a {} file", word, info(kind).word),
+                                     fmt::format("name a file that begins with format: {}", info(kind).format)}});
 }
 
 }  // namespace

@@ -85,6 +85,61 @@ std::array<Radians, 4> read_shape(ProfileReader& file, const std::string& shape)
   return angles;
 }
 
+/// A plate's inertia follows from its height; a body's own is told by three numbers.
+void check_body_inertia(ProfileReader& file, const Dynamics& dynamics) {
+  const bool plate = file.has("/dynamics/body_height_m");
+  if (plate == dynamics.body_inertia_kg_m2.has_value()) {
+    file.refuse(plate ? "/dynamics/body_inertia_kg_m2" : "/dynamics",
+                plate ? "is given, and body_height_m, too" : "neither body_height_m nor body_inertia_kg_m2",
+                "give one of the two: the height of a body that is a plate, or its moments of inertia");
+  }
+  if (!dynamics.body_inertia_kg_m2) return;
+  const auto& j = *dynamics.body_inertia_kg_m2;
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (j[i] <= j[(i + 1) % 3] + j[(i + 2) % 3]) continue;
+    file.refuse(fmt::format("/dynamics/body_inertia_kg_m2/{}", i),
+                fmt::format("{} is more than the other two together, which no body has", j[i]),
+                "check the three moments of inertia [kg m2]");
+  }
+}
+
+Dynamics read_dynamics(ProfileReader& file) {
+  const auto number = [&](const char* key) { return file.number(std::string("/dynamics/") + key); };
+  Dynamics dynamics;
+  dynamics.mass_kg = number("mass_kg");
+  dynamics.hub_mass_kg = number("hub_mass_kg");
+  dynamics.body_height = Metres(file.get_or("/dynamics/body_height_m", 0.0));
+  if (file.has("/dynamics/body_inertia_kg_m2")) {
+    dynamics.body_inertia_kg_m2 = file.get<std::array<double, 3>>("/dynamics/body_inertia_kg_m2");
+  }
+  dynamics.drag_torque_per_thrust = Metres(number("drag_torque_per_thrust_m"));
+  dynamics.rotor_lag = Seconds(number("rotor_lag_s"));
+  dynamics.air_drag_per_s = number("air_drag_per_s");
+  dynamics.morph = Seconds(number("morph_s"));
+  dynamics.rotor_spins = file.get<std::array<int, 4>>("/dynamics/rotor_spins");
+  check_body_inertia(file, dynamics);
+  if (!(4 * dynamics.hub_mass_kg < dynamics.mass_kg)) {
+    file.refuse("/dynamics/hub_mass_kg",
+                fmt::format("four times {} kg leave nothing of {} kg (mass_kg) for the body", dynamics.hub_mass_kg,
+                            dynamics.mass_kg),
+                "mass_kg is that of all, hub_mass_kg that of one arm's end");
+  }
+  return dynamics;
+}
+
+Control read_control(ProfileReader& file) {
+  const auto three = [&](const char* key) { return file.get<std::array<double, 3>>(std::string("/control/") + key); };
+  return {three("position_gain_per_s2"),
+          three("velocity_gain_per_s"),
+          three("attitude_gain_per_s"),
+          three("rate_gain_per_s"),
+          file.number("/control/torque_weight"),
+          three("position_error_max_m"),
+          three("velocity_error_max_m_s"),
+          file.number("/control/collective_min_m_s2"),
+          NewtonMetres(file.number("/control/assured_yaw_nm"))};
+}
+
 }  // namespace
 
 Vehicle parse_vehicle(const std::string& text, const std::string& path) {
@@ -104,6 +159,8 @@ Vehicle parse_vehicle(const std::string& text, const std::string& path) {
   vehicle.arm_angle_max = from_degrees(file.number("/arm_angle_max_deg"));
   vehicle.speed_min = from_rpm(file.number("/speed_min_rpm"));
   vehicle.speed_max = from_rpm(file.number("/speed_max_rpm"));
+  if (file.has("/dynamics")) vehicle.dynamics = read_dynamics(file);
+  if (file.has("/control")) vehicle.control = read_control(file);
   vehicle.text = text;
   vehicle.path = path;
   check_order(file, "/arm_angle_min_deg", "/arm_angle_max_deg");

@@ -7,13 +7,10 @@
 
 namespace kphi::flight {
 
-/// X to O takes this long.
-inline constexpr double kMorphSeconds = 1.5;
-
 class ArmMotion {
  public:
-  /// At rest.
-  explicit ArmMotion(const Angles& at) noexcept : from_(at), to_(at) {}
+  /// At rest. From one shape to the next it takes `seconds`, above 0.
+  ArmMotion(const Angles& at, double seconds) noexcept : from_(at), to_(at), seconds_(seconds), began_(-seconds) {}
 
   /// From where the arms are at `now` [s], at rest, to `to`.
   void begin(const Angles& to, double now) noexcept {
@@ -21,10 +18,10 @@ class ArmMotion {
     to_ = to;
     began_ = now;
   }
-  [[nodiscard]] bool moving(double now) const noexcept { return now < began_ + kMorphSeconds; }
+  [[nodiscard]] bool moving(double now) const noexcept { return now < began_ + seconds_; }
   [[nodiscard]] Angles angles(double now) const noexcept {
     if (!moving(now)) return to_;
-    const double s = (now - began_) / kMorphSeconds;
+    const double s = (now - began_) / seconds_;
     const double share = s * s * s * (10 + s * (6 * s - 15));
     Angles at = from_;
     for (std::size_t i = 0; i < at.size(); ++i) at[i] = at[i] + share * (to_[i] - from_[i]);
@@ -34,8 +31,8 @@ class ArmMotion {
   [[nodiscard]] std::array<double, 4> rates(double now) const noexcept {
     std::array<double, 4> found{};
     if (!moving(now)) return found;
-    const double s = (now - began_) / kMorphSeconds;
-    const double slope = 30 * s * s * (1 - s) * (1 - s) / kMorphSeconds;
+    const double s = (now - began_) / seconds_;
+    const double slope = 30 * s * s * (1 - s) * (1 - s) / seconds_;
     for (std::size_t i = 0; i < found.size(); ++i) found[i] = slope * (to_[i] - from_[i]).value();
     return found;
   }
@@ -43,7 +40,8 @@ class ArmMotion {
  private:
   Angles from_;
   Angles to_;
-  double began_ = -kMorphSeconds;
+  double seconds_;
+  double began_;
 };
 
 }  // namespace kphi::flight

@@ -13,6 +13,7 @@
 
 #include "compensation/compensator.hpp"
 #include "compensation/file/coefficient_file.hpp"
+#include "compensation/file/overlap_mismatch.hpp"
 #include "compensation/flight/paper.hpp"
 #include "compensation/flight/records.hpp"
 #include "compensation/flight/tables.hpp"
@@ -45,17 +46,58 @@ struct Flown {
   std::vector<Draw> draws;
 };
 
-Vehicle vehicle_of(const std::string& path) {
-  const profiles::Vehicle file = profiles::load_vehicle(path);
+Build build_of(const profiles::Dynamics& dynamics) {
+  Build build;
+  build.mass_kg = dynamics.mass_kg;
+  build.hub_mass_kg = dynamics.hub_mass_kg;
+  build.body_height_m = dynamics.body_height.value();
+  if (dynamics.body_inertia_kg_m2) build.body_inertia = Eigen::Vector3d(dynamics.body_inertia_kg_m2->data());
+  build.yaw_arm_m = dynamics.drag_torque_per_thrust.value();
+  build.rotor_lag_s = dynamics.rotor_lag.value();
+  build.air_drag_per_s = dynamics.air_drag_per_s;
+  build.morph_s = dynamics.morph.value();
+  for (std::size_t i = 0; i < 4; ++i) build.spin[i] = dynamics.rotor_spins[i];
+  return build;
+}
+
+PilotSettings pilot_of(const profiles::Control& control) {
+  const auto three = [](const std::array<double, 3>& values) { return Eigen::Vector3d(values.data()); };
+  PilotSettings pilot;
+  pilot.gains.position = three(control.position_gain_per_s2);
+  pilot.gains.velocity = three(control.velocity_gain_per_s);
+  pilot.gains.attitude = three(control.attitude_gain_per_s);
+  pilot.gains.rate = three(control.rate_gain_per_s);
+  pilot.gains.torque_weight = control.torque_weight;
+  pilot.gains.position_error_max = three(control.position_error_max_m);
+  pilot.gains.velocity_error_max = three(control.velocity_error_max_m_s);
+  pilot.gains.smallest_collective = control.collective_min_m_s2;
+  pilot.assured_yaw = control.assured_yaw.value();
+  return pilot;
+}
+
+/// What flying needs of the file and other uses of it do not.
+void require_flyable(const profiles::Vehicle& file) {
+  if (!file.dynamics) {
+    throw ConfigurationError(file.path +
+                             ": a simulated flight needs the section dynamics (mass_kg, hub_mass_kg, …); "
+                             "profiles/foldable_drone.yaml has one");
+  }
+  if (!file.control) {
+    throw ConfigurationError(file.path +
+                             ": a simulated flight needs the section control (the controller's gains); "
+                             "profiles/foldable_drone.yaml has one");
+  }
+}
+
+Vehicle vehicle_of(const profiles::Vehicle& file) {
   Vehicle vehicle;
   vehicle.airframe = profiles::airframe_of(file);
-  if (vehicle.airframe.polygon) {
-    throw ConfigurationError(path + ": the simulated air knows square bodies only; give half_side_m instead of body");
-  }
+  vehicle.build = build_of(*file.dynamics);
   for (const auto& [name, angles] : {std::pair{"X", &vehicle.x}, std::pair{"O", &vehicle.o}}) {
     const auto shape = file.shapes.find(name);
     if (shape == file.shapes.end()) {
-      throw ConfigurationError(path + ": the experiments need the shape " + name + "; give its angles in shapes_deg");
+      throw ConfigurationError(file.path + ": the experiments need the shape " + name +
+                               "; give its angles in shapes_deg");
     }
     *angles = shape->second;
   }
@@ -64,9 +106,20 @@ Vehicle vehicle_of(const std::string& path) {
 
 Scene nominal_of(const Request& request) {
   const auto line = compensation::thrust_line(compensation::load_coefficients(request.coefficients));
-  const Vehicle vehicle = vehicle_of(request.vehicle);
+  const profiles::Vehicle file = profiles::load_vehicle(request.vehicle);
+  require_flyable(file);
+  const auto mismatch =
+      compensation::overlap_mismatch(line.overlap(), request.coefficients, file.overlap, request.vehicle);
+  if (mismatch) throw ConfigurationError(*mismatch);
+  const Vehicle vehicle = vehicle_of(file);
   const auto built = compensation::Compensator::build({line, line, line, line}, vehicle.airframe);
   if (!built.compensator) throw ConfigurationError(request.vehicle + ": " + describe(built.refusal));
+  const PilotSettings pilot = pilot_of(*file.control);
+  if (!Pilot::build(vehicle, line, pilot)) {
+    throw ConfigurationError(request.vehicle +
+                             ": its rotors cannot make every torque in X and in O; check shapes_deg and "
+                             "rotor_spins (two of them 1, two -1, neighbours unlike)");
+  }
   const double hover = kGravity * vehicle.build.mass_kg / 4;
   if (built.compensator->thrust_max()[0].value() < 1.5 * hover) {
     throw ConfigurationError(
@@ -74,7 +127,7 @@ Scene nominal_of(const Request& request) {
                     "speed_max_rpm",
                     request.coefficients, built.compensator->thrust_max()[0].value(), vehicle.build.mass_kg, hover));
   }
-  return nominal_scene(vehicle, line, request.seed);
+  return nominal_scene(vehicle, pilot, line, request.seed);
 }
 
 std::size_t threads_of(const Request& request) {
@@ -84,6 +137,12 @@ std::size_t threads_of(const Request& request) {
 void write(const fs::path& path, const std::string& text) {
   results::MemoryOnlySync files;  // flown again at any time from the same files and seed
   results::write_text(path, text, files);
+}
+
+void make_folder(const std::string& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error) throw std::runtime_error(path + ": cannot be made (" + error.message() + "); give another --out");
 }
 
 /// Why it could not be drawn, or nothing.
@@ -112,13 +171,12 @@ Flown fly_requested(const Request& request) {
   Flown flown{nominal_of(request), {}, {}};
   const Shadow shadow(flown.nominal.vehicle.airframe);
   std::array<std::vector<TraceRow>, 9> traces;
-  if (!request.out.empty()) fs::create_directories(request.out);
+  if (!request.out.empty()) make_folder(request.out);
   for (std::size_t i = 0; i < kExperiments.size(); ++i) {
     if (!request.experiment.empty() && request.experiment != kExperiments[i].name) continue;
     flown.flights[i] = fly_one(i, flown.nominal, shadow, request.out.empty() ? nullptr : &traces[i]);
   }
-  flown.draws =
-      fly_draws(flown.nominal.vehicle, flown.nominal.line, shadow, request.seed, request.draws, threads_of(request));
+  flown.draws = fly_draws(flown.nominal, shadow, request.draws, threads_of(request));
   if (!request.out.empty()) write_out(request, flown, traces);
   return flown;
 }
@@ -154,7 +212,13 @@ void print_text(const Request& request, const Flown& flown) {
 Json json_of(const Percentiles& p) { return {{"p10", p.p10}, {"p50", p.p50}, {"p90", p.p90}}; }
 
 Json json_of(const Findings& found) {
+  Json by_law;
+  for (std::size_t law = 0; law < found.by_law.size(); ++law) {
+    by_law[name_of(static_cast<LossLaw>(law))] = {{"hover_z_ratio_p50", found.by_law[law].hover_z_ratio},
+                                                  {"forward_ratio_p50", found.by_law[law].forward_ratio}};
+  }
   return {{"draws", found.draws},
+          {"kept", found.kept},
           {"lost_plain", found.lost_plain},
           {"lost_compensated", found.lost_compensated},
           {"hover_z_better", found.hover_z_better},
@@ -169,7 +233,8 @@ Json json_of(const Findings& found) {
           {"forward_plain_m", json_of(found.forward_plain)},
           {"forward_compensated_m", json_of(found.forward_compensated)},
           {"forward_ratio", json_of(found.forward_ratio)},
-          {"square_speed_ratio", json_of(found.square_speed_ratio)}};
+          {"square_speed_ratio", json_of(found.square_speed_ratio)},
+          {"by_loss_law", by_law}};
 }
 
 Json json_of(const Experiment& experiment, const FlightResult& flight) {

@@ -9,18 +9,16 @@
 
 namespace kphi::flight {
 
-/// kpz and kdz are the only ones that satisfy Table II. The foldable drone's others are not public: these are of the
-/// lab's order, with the attitude at half the stiffness of the lab's default (krp 12, rate 18), because roll and pitch
-/// have a third of the inertia in O. Height errors do not depend on them; x and y do, so draws spread them.
+/// The section `control` of the vehicle file; x, y, z or roll, pitch, yaw.
 struct Gains {
-  Eigen::Vector3d position{6, 6, 15};                  ///< 1/s²
-  Eigen::Vector3d velocity{4, 4, 6};                   ///< 1/s
-  Eigen::Vector3d attitude{8.5, 8.5, 5};               ///< 1/s
-  Eigen::Vector3d rate{12.7, 12.7, 5};                 ///< 1/s: steady torque per rate error and inertia
-  double torque_weight = 0.5;                          ///< of the body-rate LQR, with that of the input 1
-  Eigen::Vector3d position_error_max{0.6, 0.6, 0.3};   ///< m
-  Eigen::Vector3d velocity_error_max{1.0, 1.0, 0.75};  ///< m/s
-  double smallest_collective = 1.0;                    ///< m/s²
+  Eigen::Vector3d position{0, 0, 0};            ///< 1/s²
+  Eigen::Vector3d velocity{0, 0, 0};            ///< 1/s
+  Eigen::Vector3d attitude{0, 0, 0};            ///< 1/s
+  Eigen::Vector3d rate{0, 0, 0};                ///< 1/s: steady torque per rate error and inertia
+  double torque_weight = 0;                     ///< of the body-rate LQR, with that of the input 1
+  Eigen::Vector3d position_error_max{0, 0, 0};  ///< m
+  Eigen::Vector3d velocity_error_max{0, 0, 0};  ///< m/s
+  double smallest_collective = 0;               ///< m/s²
 };
 
 struct AccelerationDemand {

@@ -32,30 +32,34 @@ void draw_truth(Truth& truth, Random& random) {
   for (double& factor : truth.thrust) factor = random.normal(1.0, 0.01);
   for (double& error : truth.arm_error) error = random.normal(0.0, 0.02);
   for (Eigen::Index i = 0; i < 2; ++i) truth.cog_error[i] = random.normal(0.0, 1.5e-3);
-  truth.drag = random.uniform(0.1, 0.5);
+  truth.drag *= random.uniform(1.0 / 3, 5.0 / 3);
   for (Eigen::Index i = 0; i < 2; ++i) truth.wind[i] = random.normal(0.0, 0.1);
 }
 
 void draw_gains(Gains& gains, Random& random) {
-  const double root = std::sqrt(random.uniform(0.4, 1.0));
-  gains.attitude.head<2>().setConstant(12 * root);
-  gains.rate.head<2>().setConstant(18 * root);
-  gains.position.head<2>().setConstant(random.uniform(5, 10));
+  const double root = std::sqrt(random.uniform(0.8, 2.0));
+  gains.attitude.head<2>() *= root;
+  gains.rate.head<2>() *= root;
+  gains.position.head<2>() *= random.uniform(5.0 / 6, 10.0 / 6);
 }
 
 }  // namespace
 
-Scene nominal_scene(const Vehicle& vehicle, const ThrustLine& line, std::uint64_t seed) {
-  return {vehicle, line, {}, {}, {}, seed};
+Scene nominal_scene(const Vehicle& vehicle, const PilotSettings& pilot, const ThrustLine& line, std::uint64_t seed) {
+  Scene scene{vehicle, line, {}, {}, pilot, seed};
+  scene.truth.drag = vehicle.build.air_drag_per_s;
+  return scene;
 }
 
-Scene drawn_scene(const Vehicle& vehicle, const ThrustLine& line, std::uint64_t seed, std::size_t index) {
-  Random random(seed, index);
-  Scene scene = nominal_scene(vehicle, line, random.bits());
+Scene drawn_scene(const Scene& nominal, std::size_t index) {
+  Random random(nominal.seed, index);
+  Scene scene = nominal;
+  scene.seed = random.bits();
   scene.truth.law = static_cast<LossLaw>(index % kLossLaws);
   draw_truth(scene.truth, random);
   draw_gains(scene.pilot.gains, random);
-  scene.vehicle.o = with_margin(vehicle.o, random.uniform(0.4, 2.0));
+  scene.vehicle.o = with_margin(nominal.vehicle.o, random.uniform(0.4, 2.0));
+  const ThrustLine& line = nominal.line;
   const double slope = line.slope_per_rad() * random.normal(1.0, 0.03);
   scene.line = line_with(line, line.intercept() + random.normal(0.0, 0.01) * line.thrust_coefficient(), slope);
   return scene;

@@ -9,15 +9,15 @@
 namespace kphi::flight {
 
 /// The one set of circumstances that single flights use. `seed` is of the estimator's noise.
-[[nodiscard]] Scene nominal_scene(const Vehicle& vehicle, const compensation::ThrustLine& line, std::uint64_t seed);
+[[nodiscard]] Scene nominal_scene(const Vehicle& vehicle, const PilotSettings& pilot,
+                                  const compensation::ThrustLine& line, std::uint64_t seed);
 
-/// Draw `index` of `seed`, whatever was drawn before: γ 1 to 1.5, the three loss laws in turn, attitude stiffness 0.4
-/// to 1 of the lab's default, kpxy 5 to 10, mass 1.5 %, K_T 1 % per rotor, arm angles 0.02 rad, centre of gravity 1.5
-/// mm per axis, how far arms stop short in O 0.4 to 2 times the vehicle file's, drag 0.1 to 0.5 1/s, draught 0.1 m/s
-/// per horizontal axis, and the line's slope 3 % and intercept 0.01 K_T off (ranges are uniform, else standard
-/// deviations).
-[[nodiscard]] Scene drawn_scene(const Vehicle& vehicle, const compensation::ThrustLine& line, std::uint64_t seed,
-                                std::size_t index);
+/// Draw `index` of the seed of `nominal`, whatever was drawn before: γ 1 to 1.5, the three loss laws in turn, mass 1.5
+/// %, K_T 1 % per rotor, arm angles 0.02 rad, centre of gravity 1.5 mm per axis, draught 0.1 m/s per horizontal axis,
+/// the line's slope 3 % and intercept 0.01 K_T off; and times those of the vehicle file: stiffness of the attitude (its
+/// gain times that of the rates, each by the root) 0.8 to 2, kpxy 5/6 to 10/6, drag 1/3 to 5/3, how far arms stop short
+/// in O 0.4 to 2 (ranges are uniform, else standard deviations).
+[[nodiscard]] Scene drawn_scene(const Scene& nominal, std::size_t index);
 
 /// The line with its slope and the distance of its intercept from K_T scaled; nothing else changes.
 /// 0 believes that no occlusion costs anything, 2 that each costs twice what the bench found.

@@ -56,7 +56,7 @@ class Flight {
         plant_(scene.vehicle, scene.truth, scene.line.thrust_coefficient(), shadow),
         pilot_(pilot_for(scene)),
         estimator_(scene.noise, kStep * kStepsPerTick, Random(scene.seed)),
-        motion_(scene.vehicle.angles(experiment.legs[0].shape)),
+        motion_(scene.vehicle.angles(experiment.legs[0].shape), scene.vehicle.build.morph_s),
         now_(plant_.configuration(motion_.angles(0), {})),
         trace_(trace) {
     const Reference start = reference_at(experiment.path, 0);

@@ -32,9 +32,9 @@ inline constexpr int kLossLaws = 3;
 }
 
 /// In flight more is lost than on the bench: η = 1 − γ (1 − η_bench), held above 0.05.
-[[nodiscard]] inline double thrust_share_in_flight(LossLaw law, double gamma, const Shadow& shadow,
+[[nodiscard]] inline double thrust_share_in_flight(LossLaw law, double gamma, const Shadow& shadow, std::size_t arm,
                                                    Radians arm_angle) noexcept {
-  const double covered = law == LossLaw::quadratic_by_load ? shadow.load(arm_angle) : shadow.arc(arm_angle);
+  const double covered = law == LossLaw::quadratic_by_load ? shadow.load(arm, arm_angle) : shadow.arc(arm, arm_angle);
   if (covered <= 0) return 1;
   return std::max(0.05, 1 - gamma * (1 - thrust_share(law, to_degrees(Radians(covered)))));
 }

@@ -25,6 +25,8 @@ std::optional<Pilot> Pilot::build(const Vehicle& vehicle, const compensation::Th
   const auto mixer =
       Mixer::build(layout_of(vehicle, mass_properties(vehicle, vehicle.x, {})), {Metres(vehicle.build.yaw_arm_m), 0.0});
   if (!built.compensator || !mixer) return std::nullopt;
+  Mixer in_o = *mixer;
+  if (!in_o.set_layout(layout_of(vehicle, mass_properties(vehicle, vehicle.o, {})))) return std::nullopt;
   return Pilot(vehicle, settings, *built.compensator, *mixer);
 }
 

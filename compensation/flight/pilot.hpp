@@ -17,13 +17,13 @@ inline constexpr int kStepsPerTick = 5;  ///< position and attitude: every 10 ms
 
 struct PilotSettings {
   Gains gains;
-  double assured_yaw = 0.02;                   ///< N m that the saturation leaves to yaw
+  double assured_yaw = 0;                      ///< N m that the saturation leaves to yaw
   std::array<int, 4> arm_order{{0, 1, 2, 3}};  ///< which arm's angle the compensation takes for rotor i's; else a fault
 };
 
 class Pilot {
  public:
-  /// Nothing if the compensator or the mixer refuses the vehicle.
+  /// Nothing if the compensator refuses the vehicle, or the mixer its rotors in X or in O.
   [[nodiscard]] static std::optional<Pilot> build(const Vehicle& vehicle, const compensation::ThrustLine& line,
                                                   const PilotSettings& settings);
 

@@ -25,7 +25,8 @@ Configuration Plant::configuration(const Angles& arms, const std::array<double, 
   found.mass = mass_properties(vehicle_, true_arms, rates, truth_.cog_error * (build.mass_kg / plate));
   for (std::size_t i = 0; i < arms.size(); ++i) {
     const double uncovered = thrust_coefficient_ * truth_.thrust[i];
-    found.thrust_per_square[i] = uncovered * thrust_share_in_flight(truth_.law, truth_.gamma, *shadow_, true_arms[i]);
+    found.thrust_per_square[i] =
+        uncovered * thrust_share_in_flight(truth_.law, truth_.gamma, *shadow_, i, true_arms[i]);
     found.torque_per_square[i] = build.spin[i] * build.yaw_arm_m * uncovered;
   }
   return found;

@@ -22,7 +22,7 @@ struct Truth {
   std::array<double, 4> thrust{{1.01, 0.99, 1.00, 1.01}};  ///< times K_T, per rotor
   std::array<double, 4> arm_error{};                       ///< rad, added to what the servos are told
   Eigen::Vector2d cog_error{1e-3, -0.5e-3};                ///< m
-  double drag = 0.3;                                       ///< 1/s: force per mass and air speed
+  double drag = 0;                                         ///< 1/s: force per mass and air speed
   Eigen::Vector3d wind{0, 0, 0};                           ///< m/s
 };
 

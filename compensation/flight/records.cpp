@@ -1,5 +1,6 @@
 #include "compensation/flight/records.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "compensation/flight/text.hpp"
@@ -51,11 +52,14 @@ std::string four(const std::string& prefix, const std::string& unit) {
 
 std::string leg_name(const Leg& leg) { return leg.shape == Shape::x ? "X" : leg.compensated ? "O c." : "O n.c."; }
 
+/// Where a leg begins, what it is, and, in grey, the part of it that the tables average.
 std::string leg_marks(const Experiment& experiment) {
   std::string marks;
   for (std::size_t i = 0; i < experiment.leg_count; ++i) {
     const double begins = static_cast<double>(i) * leg_seconds(experiment.path);
     const std::string at = shortest(begins);
+    marks += "set object rectangle from " + shortest(begins + settle_seconds(experiment.path)) + ", graph 0 to " +
+             shortest(begins + leg_seconds(experiment.path)) + ", graph 1 behind fc rgb '#f3f3f3' fs solid noborder\n";
     if (i > 0) marks += "set arrow from " + at + ", graph 0 to " + at + ", graph 1 nohead lc rgb '#999999' dt 2\n";
     marks +=
         "set label '" + leg_name(experiment.legs[i]) + "' at " + at + ", graph 0.91 offset 0.7,0 tc rgb '#555555'\n";
@@ -106,23 +110,28 @@ std::string draws_csv(const std::vector<Draw>& draws) {
 
 std::string error_figure(const Experiment& experiment, const std::vector<TraceRow>& trace) {
   const double total = static_cast<double>(experiment.leg_count) * leg_seconds(experiment.path);
-  std::string script = terminal(800, 560) + kFigureHead + "$error << EOD\n";
+  std::string script = terminal(800, 600) + kFigureHead + "$error << EOD\n";
+  double lowest = -0.05, highest = 0.05;
   for (std::size_t i = 0; i < trace.size(); i += kFigureStride) {
     const Eigen::Vector3d error = trace[i].reference - trace[i].estimate;
+    lowest = std::min(lowest, error.minCoeff());
+    highest = std::max(highest, error.maxCoeff());
     script += aligned(trace[i].time, 2, 0);
     for (const double axis : error) script += " " + aligned(axis, 5, 0);
     script += "\n";
   }
-  script += "EOD\n" + leg_marks(experiment) +
-            "unset key\nset lmargin 9\nset offsets 0, 0, graph 0.2, 0\nset xrange [0:" + shortest(total) +
-            "]\nset multiplot layout 3,1 title '" + std::string(experiment.title) + "'\n";
+  script += "EOD\n" + leg_marks(experiment) + "unset key\nset lmargin 9\nset xrange [0:" + shortest(total) +
+            "]\nset yrange [" + aligned(lowest - 0.02, 3, 0) + ":" + aligned(highest + 0.2 * (highest - lowest), 3, 0) +
+            "]\nset ytics " + (highest - lowest < 0.6 ? "0.1" : "0.25") +
+            "\nset mytics 2\nset multiplot layout 3,1 title '" + std::string(experiment.title) +
+            "   (reference - estimate, above 0 in z is below; grey: averaged)'\n";
   const char* colours[] = {"#0072B2", "#009E73", "#D55E00"};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::string name(1, static_cast<char>('x' + axis));
     script += "set ylabel '" + name + " error [m]'\n";
     if (axis == 2) script += "set xlabel 'time [s]'\n";
-    script += "set yrange [* < -0.05 : 0.05 < *]\nplot 0 lc rgb '#bbbbbb', $error using 1:" + std::to_string(axis + 2) +
-              " with lines lc rgb '" + colours[axis] + "'\n";
+    script += "plot 0 lc rgb '#bbbbbb', $error using 1:" + std::to_string(axis + 2) + " with lines lc rgb '" +
+              colours[axis] + "'\n";
   }
   return script + "unset multiplot\n";
 }

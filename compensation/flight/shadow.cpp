@@ -1,36 +1,51 @@
 #include "compensation/flight/shadow.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "compensation/flight/vehicle.hpp"
+
 namespace kphi::flight {
 namespace {
+
+using compensation::ConvexPolygon;
 
 constexpr int kRings = 32;
 constexpr std::size_t kTableSize = 2048;  // over one turn, from -π
 
+Eigen::Vector2d corner(const ConvexPolygon& outline, std::size_t i) noexcept {
+  const compensation::Position& at = outline.corner(i % outline.size());
+  return {at.x.value(), at.y.value()};
+}
+
+bool lies_inside(const ConvexPolygon& outline, const Eigen::Vector2d& point) noexcept {
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Eigen::Vector2d edge = corner(outline, i + 1) - corner(outline, i), to = point - corner(outline, i);
+    if (!(edge.x() * to.y() - edge.y() * to.x() > 0)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
-double covered_arc(double half_side, double radius, double x, double y) {
-  std::array<double, 10> crossings{};  // each edge's line meets the circle twice at most
+double covered_arc(const ConvexPolygon& outline, double radius, double x, double y) {
+  const Eigen::Vector2d hub(x, y);
+  std::array<double, 2 * ConvexPolygon::kMaxCorners + 2>
+      crossings{};  // each edge's line meets the circle twice at most
   std::size_t count = 0;
-  const auto note = [&](double dx, double dy) {
-    double angle = std::atan2(dy, dx);
-    if (angle < 0) angle += 2 * kPi;
-    crossings[count++] = angle;
+  const auto note = [&](const Eigen::Vector2d& from_hub) {
+    const double angle = std::atan2(from_hub.y(), from_hub.x());
+    crossings[count++] = angle < 0 ? angle + 2 * kPi : angle;
   };
-  for (const double edge : {-half_side, half_side}) {
-    const double across_x = edge - x, across_y = edge - y;
-    const double along_x = radius * radius - across_x * across_x, along_y = radius * radius - across_y * across_y;
-    if (along_x > 0) {
-      note(across_x, std::sqrt(along_x));
-      note(across_x, -std::sqrt(along_x));
-    }
-    if (along_y > 0) {
-      note(std::sqrt(along_y), across_y);
-      note(-std::sqrt(along_y), across_y);
-    }
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Eigen::Vector2d from = corner(outline, i) - hub, along = (corner(outline, i + 1) - hub - from).normalized();
+    const Eigen::Vector2d foot = from - from.dot(along) * along;
+    const double half_chord_squared = radius * radius - foot.squaredNorm();
+    if (!(half_chord_squared > 0)) continue;
+    note(foot + std::sqrt(half_chord_squared) * along);
+    note(foot - std::sqrt(half_chord_squared) * along);
   }
   crossings[count++] = 0;
   crossings[count++] = 2 * kPi;
@@ -38,29 +53,31 @@ double covered_arc(double half_side, double radius, double x, double y) {
   double covered = 0;
   for (std::size_t i = 0; i + 1 < count; ++i) {
     const double middle = (crossings[i] + crossings[i + 1]) / 2;
-    const bool inside =
-        std::fabs(x + radius * std::cos(middle)) < half_side && std::fabs(y + radius * std::sin(middle)) < half_side;
-    if (inside) covered += crossings[i + 1] - crossings[i];
+    const Eigen::Vector2d rim = hub + radius * Eigen::Vector2d(std::cos(middle), std::sin(middle));
+    if (lies_inside(outline, rim)) covered += crossings[i + 1] - crossings[i];
   }
   return covered;
 }
 
-double covered_load(double half_side, double radius, double x, double y) {
+double covered_load(const ConvexPolygon& outline, double radius, double x, double y) {
   double covered = 0;
   for (int ring = 0; ring < kRings; ++ring) {
     const double share = (ring + 0.5) / kRings;
-    covered += 3 * share * share * covered_arc(half_side, share * radius, x, y) / kRings;
+    covered += 3 * share * share * covered_arc(outline, share * radius, x, y) / kRings;
   }
   return covered;
 }
 
-Shadow::Shadow(const compensation::Airframe& airframe) : arc_(kTableSize + 1), load_(kTableSize + 1) {
-  const double a = airframe.half_side.value(), radius = airframe.propeller_radius.value();
-  for (std::size_t i = 0; i <= kTableSize; ++i) {
-    const Radians angle(2 * kPi * static_cast<double>(i) / kTableSize - kPi);
-    const auto hub = hub_seen_from_hinge(airframe, angle);
-    arc_[i] = covered_arc(a, radius, hub.x.value(), hub.y.value());
-    load_[i] = covered_load(a, radius, hub.x.value(), hub.y.value());
+Shadow::Shadow(const compensation::Airframe& airframe) {
+  const ConvexPolygon outline = outline_of(airframe);
+  const double radius = airframe.propeller_radius.value();
+  for (std::size_t arm = 0; arm < 4; ++arm) {
+    for (std::size_t i = 0; i <= kTableSize; ++i) {
+      const Radians angle(2 * kPi * static_cast<double>(i) / kTableSize - kPi);
+      const auto hub = hub_in_body(airframe, arm, angle);
+      arc_[arm].push_back(covered_arc(outline, radius, hub.x.value(), hub.y.value()));
+      load_[arm].push_back(covered_load(outline, radius, hub.x.value(), hub.y.value()));
+    }
   }
 }
 

@@ -58,13 +58,12 @@ Merits merits_of(const NineFlights& flights) noexcept {
   return merits;
 }
 
-std::vector<Draw> fly_draws(const Vehicle& vehicle, const compensation::ThrustLine& line, const Shadow& shadow,
-                            std::uint64_t seed, std::size_t count, std::size_t threads) {
-  std::vector<Draw> draws(count, Draw{nominal_scene(vehicle, line, seed), {}});
+std::vector<Draw> fly_draws(const Scene& nominal, const Shadow& shadow, std::size_t count, std::size_t threads) {
+  std::vector<Draw> draws(count, Draw{nominal, {}});
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t i = next++; i < count; i = next++) {
-      draws[i].scene = drawn_scene(vehicle, line, seed, i);
+      draws[i].scene = drawn_scene(nominal, i);
       draws[i].flights = fly_all(draws[i].scene, shadow);
     }
   };
@@ -89,6 +88,7 @@ Percentiles percentiles(std::vector<double> values) {
 
 Findings findings_of(const std::vector<Draw>& draws) {
   std::vector<Merits> kept;
+  std::array<std::vector<double>, kLossLaws> hover_by_law, forward_by_law;
   Findings found;
   found.draws = draws.size();
   double hover_better = 0, forward_better = 0;
@@ -99,7 +99,15 @@ Findings findings_of(const std::vector<Draw>& draws) {
     found.lost_compensated += merits.lost_compensated;
     hover_better += merits.lost() ? saved : merits.hover_z_ratio() < 1;
     forward_better += merits.lost() ? saved : merits.forward_ratio() < 1;
-    if (!merits.lost()) kept.push_back(merits);
+    if (merits.lost()) continue;
+    kept.push_back(merits);
+    const auto law = static_cast<std::size_t>(draw.scene.truth.law);
+    hover_by_law[law].push_back(merits.hover_z_ratio());
+    forward_by_law[law].push_back(merits.forward_ratio());
+  }
+  found.kept = kept.size();
+  for (std::size_t law = 0; law < found.by_law.size(); ++law) {
+    found.by_law[law] = {percentiles(hover_by_law[law]).p50, percentiles(forward_by_law[law]).p50};
   }
   if (found.draws > 0) {
     found.hover_z_better = hover_better / static_cast<double>(found.draws);

@@ -43,9 +43,8 @@ struct Draw {
   NineFlights flights;
 };
 
-/// Draws 0 to count − 1 on `threads` threads; the result does not depend on their number.
-[[nodiscard]] std::vector<Draw> fly_draws(const Vehicle& vehicle, const compensation::ThrustLine& line,
-                                          const Shadow& shadow, std::uint64_t seed, std::size_t count,
+/// Draws 0 to count − 1 around `nominal` on `threads` threads; the result does not depend on their number.
+[[nodiscard]] std::vector<Draw> fly_draws(const Scene& nominal, const Shadow& shadow, std::size_t count,
                                           std::size_t threads);
 
 struct Percentiles {
@@ -58,6 +57,7 @@ struct Percentiles {
 /// with compensation only if the flight was lost without it and none was lost with it.
 struct Findings {
   std::size_t draws = 0;
+  std::size_t kept = 0;  ///< draws of which no flight was lost
   std::size_t lost_plain = 0;
   std::size_t lost_compensated = 0;
   double hover_z_better = 0;  ///< share of the draws, |z|
@@ -66,6 +66,11 @@ struct Findings {
   Percentiles hover_xy_plain, hover_xy_compensated, hover_xy_ratio;
   Percentiles forward_x, forward_plain, forward_compensated, forward_ratio;
   Percentiles square_speed_ratio;
+  /// Medians of the draws with one law of loss.
+  struct OfLaw {
+    double hover_z_ratio = 0, forward_ratio = 0;
+  };
+  std::array<OfLaw, kLossLaws> by_law{};
 };
 
 [[nodiscard]] Findings findings_of(const std::vector<Draw>& draws);

@@ -87,8 +87,9 @@ std::string forward_table(const NineFlights& flights) {
 
 std::string findings_table(const Findings& found) {
   const auto percent = [](double share) { return aligned(100 * share, 1, 0) + " %"; };
-  std::string text = std::to_string(found.draws) + " draws; flights lost: " + std::to_string(found.lost_plain) +
-                     " without compensation, " + std::to_string(found.lost_compensated) + " with or in X\n" +
+  std::string text = std::to_string(found.draws) + " draws; with a flight lost: " + std::to_string(found.lost_plain) +
+                     " without compensation, " + std::to_string(found.lost_compensated) +
+                     " with or in X. Percentiles are over the " + std::to_string(found.kept) + " others.\n" +
                      padded("", 34) + "      p10      p50      p90   paper\n";
   text += percentile_row("hover z, O n.c. [m]", found.hover_z_plain, "0.17 / 0.159");
   text += percentile_row("hover z, O c. [m]", found.hover_z_compensated, "-0.043 / 0.011 (unsigned)");
@@ -101,8 +102,15 @@ std::string findings_table(const Findings& found) {
   text += percentile_row("forward, c. over n.c.", found.forward_ratio, "0.52 and 0.62");
   text += percentile_row("mean speed^2, O hover, c./n.c.", found.square_speed_ratio, "\"no additional power\"");
   text += "better with compensation: hover z in " + percent(found.hover_z_better) + ", forward flight in " +
-          percent(found.forward_better) + " of the draws\n\n";
-  return text;
+          percent(found.forward_better) +
+          " of the draws,\ncounting those as better that were lost without compensation only\n";
+  text += "median c. over n.c. by law of loss:";
+  for (std::size_t law = 0; law < found.by_law.size(); ++law) {
+    text += std::string(law == 0 ? " " : "; ") + name_of(static_cast<LossLaw>(law)) + " hover z " +
+            aligned(found.by_law[law].hover_z_ratio, 2, 0) + ", forward " +
+            aligned(found.by_law[law].forward_ratio, 2, 0);
+  }
+  return text + "\n\n";
 }
 
 std::string not_reproduced() {

@@ -1,8 +1,9 @@
-// The foldable drone as a mechanism: a plate with four arms that turn in its plane, each with a point mass at its hub.
+// The drone as a mechanism: a plate with four arms that turn in its plane, each with a point mass at its hub.
 #pragma once
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 
 #include "compensation/airframe.hpp"
 
@@ -10,14 +11,17 @@ namespace kphi::flight {
 
 using Angles = std::array<Radians, 4>;
 
-/// What the vehicle is made of. The paper gives none of these; they are assumed for a drone of its size.
+/// What the vehicle is made of: the section `dynamics` of its file.
 struct Build {
-  double mass_kg = 0.60;                               ///< all of it
-  double hub_mass_kg = 0.045;                          ///< motor, propeller and servo of one arm, a point at the hub
-  double body_height_m = 0.040;                        ///< the body is a plate, 2 half sides square
-  double yaw_arm_m = 0.0133;                           ///< κ: rotor torque per thrust without occlusion
-  double rotor_lag_s = 0.033;                          ///< time constant of a rotor's speed
-  std::array<double, 4> spin{{1.0, -1.0, 1.0, -1.0}};  ///< sign of the torque on the body
+  double mass_kg = 0;        ///< all of it
+  double hub_mass_kg = 0;    ///< motor, propeller and servo of one arm, a point at the hub
+  double body_height_m = 0;  ///< the rest is a plate of the body's outline, this high, unless `body_inertia` is given
+  std::optional<Eigen::Vector3d> body_inertia;  ///< kg m² of the body without hubs, about the middle of its outline
+  double yaw_arm_m = 0;                         ///< κ: rotor torque per thrust without occlusion
+  double rotor_lag_s = 0;                       ///< time constant of a rotor's speed
+  double air_drag_per_s = 0;                    ///< force per mass and air speed
+  double morph_s = 0;                           ///< from one shape to the next
+  std::array<double, 4> spin{};                 ///< sign of the torque on the body, about z (up)
 };
 
 enum class Shape { x, o };
@@ -31,6 +35,11 @@ struct Vehicle {
   [[nodiscard]] const Angles& angles(Shape shape) const noexcept { return shape == Shape::x ? x : o; }
 };
 
+/// The body seen from above, square or not.
+[[nodiscard]] inline compensation::ConvexPolygon outline_of(const compensation::Airframe& airframe) noexcept {
+  return airframe.polygon ? airframe.polygon->outline : compensation::ConvexPolygon::square(airframe.half_side);
+}
+
 /// The hub masses' motion is prescribed, so all that the arms do to the rigid-body equations is in these numbers.
 struct MassProperties {
   double mass_kg = 0;
@@ -42,7 +51,7 @@ struct MassProperties {
   double arm_momentum = 0;  ///< N m s about z: angular momentum of the arms' motion relative to the body
 };
 
-/// `rates` are the arms' angular speeds [rad/s]; `plate_offset` [m] moves the plate away from the middle of the square.
+/// `rates` are the arms' angular speeds [rad/s]; `plate_offset` [m] moves the body away from the middle of its outline.
 [[nodiscard]] MassProperties mass_properties(const Vehicle& vehicle, const Angles& arms,
                                              const std::array<double, 4>& rates,
                                              const Eigen::Vector2d& plate_offset = Eigen::Vector2d::Zero()) noexcept;

@@ -21,6 +21,8 @@ const std::string kHeader = "theta1_deg,theta2_deg,theta3_deg,theta4_deg,thrust1
 const std::string kOutputHeader =
     "phi1_deg,phi2_deg,phi3_deg,phi4_deg,k1,k2,k3,k4,speed1_rpm,speed2_rpm,speed3_rpm,speed4_rpm,flags\n";
 
+const ArmRange kReach{from_degrees(-90), from_degrees(180)};
+
 struct Result {
   RowCounts counts;
   std::string output;
@@ -32,7 +34,7 @@ Result compensated(const std::string& input, RowFormat format = RowFormat::csv) 
   std::ostringstream out, words;
   Compensator compensator = example_compensator();
   Result result;
-  result.counts = compensate_rows(in, out, words, compensator, format);
+  result.counts = compensate_rows(in, out, words, compensator, kReach, format);
   result.output = out.str();
   result.words = words.str();
   return result;
@@ -102,6 +104,29 @@ TEST(CompensateRows, RefusesAHeaderWithoutAllColumns) {
   }
 }
 
+TEST(CompensateRows, SaysWhatIsWrongWithTheHeader) {
+  const auto complaint = [](const std::string& header) -> std::string {
+    try {
+      (void)compensated(header + "\n1,2,3,4,5,6,7,8\n");
+    } catch (const RowHeaderError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string rest = "theta2_deg,theta3_deg,theta4_deg,thrust1_n,thrust2_n,thrust3_n,thrust4_n";
+  EXPECT_THAT(complaint(""), StartsWith("stdin:1: no header; the first line must name theta1_deg..theta4_deg"));
+  EXPECT_THAT(complaint(rest), StartsWith("stdin:1: column `theta1_deg` is missing; the first line must name"));
+  EXPECT_THAT(complaint("theta1_rad," + rest),
+              StartsWith("stdin:1: column `theta1_deg` is missing, but there is `theta1_rad`; the unit is part"));
+  EXPECT_THAT(complaint("theta1_deg,thrust1_n," + rest), StartsWith("stdin:1: column `thrust1_n` stands 2 times"));
+}
+
+TEST(CompensateRows, CountsRowsWithAnArmWhereNoServoGoes) {
+  const Result result = compensated(kHeader + "45,45,45,45,1,1,1,1\n45,45,200,-91,1,1,1,1\n45,45,45,180,1,1,1,1\n");
+  EXPECT_EQ(result.counts.written, 3u);
+  EXPECT_EQ(result.counts.out_of_reach, 1u);
+}
+
 TEST(CompensateRows, OfAHeaderAloneIsAHeaderAlone) { EXPECT_EQ(compensated(kHeader).output, kOutputHeader); }
 
 /// A source that hands out one line at a time and looks, at each, at what has come out so far.
@@ -130,7 +155,7 @@ TEST(CompensateRows, HandsARowOnBeforeWaitingForTheNext) {
   OneLineAtATime source({kHeader, "1,2,3,170,5,6,7,8\n", "1,2,3,170,5,6,7,9\n"}, out);
   std::istream in(&source);
   Compensator compensator = example_compensator();
-  (void)compensate_rows(in, out, words, compensator, RowFormat::csv);
+  (void)compensate_rows(in, out, words, compensator, kReach, RowFormat::csv);
   ASSERT_EQ(source.output_sizes.size(), 4u);
   EXPECT_GT(source.output_sizes[2], kOutputHeader.size());
   EXPECT_GT(source.output_sizes[3], source.output_sizes[2]);

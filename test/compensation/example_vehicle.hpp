@@ -17,8 +17,12 @@ inline ThrustLine example_line(double intercept, double slope_per_deg, double la
                            from_degrees(largest_fitted_deg));
 }
 
-/// Through (45°, 0.90) and (270°, 0.25).
-inline ThrustLine paper_line() { return example_line(1.03, -0.0028889); }
+/// Through (45°, 0.90) and (270°, 0.25); fitted on sector plates, where the measures agree, so flown by any of them.
+inline ThrustLine paper_line(OverlapMeasure measure = OverlapMeasure::rim_arc) {
+  const ThrustLine line = example_line(1.03, -0.0028889);
+  return *ThrustLine::from(line.thrust_coefficient(), line.intercept(), line.slope_per_rad(), line.largest_fitted(),
+                           measure);
+}
 
 inline Airframe example_airframe() {
   Airframe airframe;
@@ -29,9 +33,28 @@ inline Airframe example_airframe() {
   return airframe;
 }
 
+inline Airframe example_airframe(OverlapMeasure measure) {
+  Airframe airframe = example_airframe();
+  airframe.overlap = measure;
+  return airframe;
+}
+
+/// A square as an outline like any other, each arm hinged at its corner.
+inline PolygonBody square_as_polygon(Metres half_side) {
+  PolygonBody body{ConvexPolygon::square(half_side), {}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    body.hinges[i] = {body.outline.corner(i), Radians(kPi / 2 * static_cast<double>(i)), false};
+  }
+  return body;
+}
+
+/// Four rotors with the paper's line.
+inline Compensator compensator_of(const Airframe& airframe, ScalingLaw law = ScalingLaw::clamped) {
+  const ThrustLine line = paper_line(airframe.overlap);
+  return *Compensator::build({line, line, line, line}, airframe, law).compensator;
+}
 inline Compensator example_compensator(ScalingLaw law = ScalingLaw::clamped) {
-  const ThrustLine line = paper_line();
-  return *Compensator::build({line, line, line, line}, example_airframe(), law).compensator;
+  return compensator_of(example_airframe(), law);
 }
 
 inline std::array<Radians, 4> arms_at(double a, double b, double c, double d) {

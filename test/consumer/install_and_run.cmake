@@ -26,19 +26,30 @@ else()
 endif()
 run(${CMAKE_COMMAND} --install ${from} --component compensation --prefix ${prefix})
 
-# The example of the library's README, as it stands there.
-file(READ ${README} readme)
-if(NOT readme MATCHES "```cpp\n")
-  message(FATAL_ERROR "${README} has no example")
-endif()
-string(FIND "${readme}" "```cpp\n" begin)
-math(EXPR begin "${begin} + 7")
-string(SUBSTRING "${readme}" ${begin} -1 example)
-string(FIND "${example}" "```" end)
-string(SUBSTRING "${example}" 0 ${end} example)
-file(WRITE ${WORK}/readme_example.cpp "${example}")
+# The example of the library's README and the lines that link it, as they stand there.
+function(readme_block language into)
+  file(READ ${README} readme)
+  string(FIND "${readme}" "```${language}\n" begin)
+  if(begin EQUAL -1)
+    message(FATAL_ERROR "${README} has no block of ${language}")
+  endif()
+  string(LENGTH "```${language}\n" fence)
+  math(EXPR begin "${begin} + ${fence}")
+  string(SUBSTRING "${readme}" ${begin} -1 block)
+  string(FIND "${block}" "```" end)
+  string(SUBSTRING "${block}" 0 ${end} block)
+  set(${into} "${block}" PARENT_SCOPE)
+endfunction()
+readme_block(cpp example)
+readme_block(cmake linking)
+file(WRITE ${WORK}/readme/example.cpp "${example}")
+file(WRITE ${WORK}/readme/CMakeLists.txt
+  "cmake_minimum_required(VERSION 3.22)\nproject(readme LANGUAGES CXX)\nadd_library(my_controller STATIC example.cpp)\n"
+  "target_compile_options(my_controller PRIVATE -Wall -Wextra -Werror -fno-exceptions -fno-rtti)\n${linking}")
+run(${CMAKE_COMMAND} -S ${WORK}/readme -B ${WORK}/readme/build ${common} -DCMAKE_PREFIX_PATH=${prefix})
+run(${CMAKE_COMMAND} --build ${WORK}/readme/build --parallel 1)
 
-run(${CMAKE_COMMAND} -S ${CONSUMER} -B ${WORK}/stranger ${common} -DREADME_EXAMPLE=${WORK}/readme_example.cpp -DCMAKE_PREFIX_PATH=${prefix} -DWITH_FILE=${with_file})
+run(${CMAKE_COMMAND} -S ${CONSUMER} -B ${WORK}/stranger ${common} -DCMAKE_PREFIX_PATH=${prefix} -DWITH_FILE=${with_file})
 run(${CMAKE_COMMAND} --build ${WORK}/stranger --parallel 1)
 
 # sqrt(1.5 N / (1.7e-8 N/RPM² k_i)) with k_i = .84269, .84269, .91071, .84269.

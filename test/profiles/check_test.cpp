@@ -93,7 +93,14 @@ TEST_F(Check, SumsUpAVehicleWithTheOcclusionsOfItsShapes) {
             "  shape H    arms at 0 90 0 90 degrees, occluded by 0 0 0 0 degrees\n"
             "  shape O    arms at 180 180 165.676 180 degrees, occluded by 64.84 64.84 41.29 64.84 degrees\n"
             "  shape T    arms at 90 0 0 90 degrees, occluded by 0 0 0 0 degrees\n"
-            "  shape X    arms at 45 45 45 45 degrees, occluded by 0 0 0 0 degrees\n");
+            "  shape X    arms at 45 45 45 45 degrees, occluded by 0 0 0 0 degrees\n"
+            "  dynamics   0.6 kg, of which 0.045 kg at each hub; 1.47 N per rotor carry it\n"
+            "  control    position 6 6 15 1/s2, velocity 4 4 6 1/s, attitude 8.5 8.5 5 1/s, rates 12.7 12.7 5 1/s\n");
+}
+
+TEST_F(Check, SaysWhatAVehicleLacksThatASimulatedFlightNeeds) {
+  EXPECT_THAT(check({write("v.yaml", kVehicleText)}).front().summary,
+              testing::EndsWith("  kphi fly   cannot fly it without dynamics and control\n"));
 }
 
 TEST_F(Check, GivesCoefficientFilesToTheirJudge) {

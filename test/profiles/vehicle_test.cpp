@@ -137,6 +137,97 @@ TEST(Vehicle, RefusesABodyThatIsNotConvexOrGoesClockwise) {
               ElementsAre(StartsWith("6:5: body.hinges: 3 values; write at least 4")));
 }
 
+const std::string kFlightText =
+    "dynamics:\n"                                // 14
+    "  mass_kg: 0.6\n"                           // 15
+    "  hub_mass_kg: 0.045\n"                     // 16
+    "  body_height_m: 0.04\n"                    // 17
+    "  drag_torque_per_thrust_m: 0.0133\n"       // 18
+    "  rotor_lag_s: 0.033\n"                     // 19
+    "  air_drag_per_s: 0.3\n"                    // 20
+    "  morph_s: 1.5\n"                           // 21
+    "  rotor_spins: [1, -1, 1, -1]\n"            // 22
+    "control:\n"                                 // 23
+    "  position_gain_per_s2: [6, 6, 15]\n"       // 24
+    "  velocity_gain_per_s: [4, 4, 6]\n"         // 25
+    "  attitude_gain_per_s: [8.5, 8.5, 5]\n"     // 26
+    "  rate_gain_per_s: [12.7, 12.7, 5]\n"       // 27
+    "  torque_weight: 0.5\n"                     // 28
+    "  position_error_max_m: [0.6, 0.6, 0.3]\n"  // 29
+    "  velocity_error_max_m_s: [1, 1, 0.75]\n"   // 30
+    "  collective_min_m_s2: 1\n"                 // 31
+    "  assured_yaw_nm: 0.02\n";                  // 32
+
+std::vector<std::string> refused_in_flight(const std::string& from, const std::string& to) {
+  return refusals([&] { return parse_vehicle(changed(kVehicleText + kFlightText, from, to), "v.yaml"); });
+}
+
+TEST(Vehicle, TellsWhatASimulatedFlightNeeds) {
+  const Vehicle vehicle = parse_vehicle(kVehicleText + kFlightText, "v.yaml");
+  ASSERT_TRUE(vehicle.dynamics && vehicle.control);
+  EXPECT_EQ(vehicle.dynamics->mass_kg, 0.6);
+  EXPECT_EQ(vehicle.dynamics->hub_mass_kg, 0.045);
+  EXPECT_EQ(vehicle.dynamics->body_height, Metres(0.04));
+  EXPECT_FALSE(vehicle.dynamics->body_inertia_kg_m2);
+  EXPECT_EQ(vehicle.dynamics->drag_torque_per_thrust, Metres(0.0133));
+  EXPECT_EQ(vehicle.dynamics->rotor_lag, Seconds(0.033));
+  EXPECT_EQ(vehicle.dynamics->air_drag_per_s, 0.3);
+  EXPECT_EQ(vehicle.dynamics->morph, Seconds(1.5));
+  EXPECT_THAT(vehicle.dynamics->rotor_spins, ElementsAre(1, -1, 1, -1));
+  EXPECT_THAT(vehicle.control->position_gain_per_s2, ElementsAre(6, 6, 15));
+  EXPECT_THAT(vehicle.control->velocity_gain_per_s, ElementsAre(4, 4, 6));
+  EXPECT_THAT(vehicle.control->attitude_gain_per_s, ElementsAre(8.5, 8.5, 5));
+  EXPECT_THAT(vehicle.control->rate_gain_per_s, ElementsAre(12.7, 12.7, 5));
+  EXPECT_EQ(vehicle.control->torque_weight, 0.5);
+  EXPECT_THAT(vehicle.control->position_error_max_m, ElementsAre(0.6, 0.6, 0.3));
+  EXPECT_THAT(vehicle.control->velocity_error_max_m_s, ElementsAre(1, 1, 0.75));
+  EXPECT_EQ(vehicle.control->collective_min_m_s2, 1);
+  EXPECT_EQ(vehicle.control->assured_yaw, NewtonMetres(0.02));
+}
+
+TEST(Vehicle, NeedsNoneOfItForAnythingElse) {
+  const Vehicle vehicle = parse_vehicle(kVehicleText, "v.yaml");
+  EXPECT_FALSE(vehicle.dynamics);
+  EXPECT_FALSE(vehicle.control);
+}
+
+TEST(Vehicle, RefusesMassesAndGainsThatCannotBe) {
+  EXPECT_THAT(refused_in_flight("mass_kg: 0.6\n", "mass_kg: 0.18\n"),
+              ElementsAre("16:16: dynamics.hub_mass_kg: four times 0.045 kg leave nothing of 0.18 kg (mass_kg) for the "
+                          "body; mass_kg is that of all, hub_mass_kg that of one arm's end"));
+  EXPECT_THAT(
+      refused_in_flight("  mass_kg: 0.6\n", "  mass_g: 600\n"),
+      ElementsAre(StartsWith("15:3: mass_g is not a key of dynamics; the unit is part of the key: write mass_kg")));
+  EXPECT_THAT(refused_in_flight("[1, -1, 1, -1]", "[1, -1, 2, -1]"),
+              ElementsAre(StartsWith("22:24: dynamics.rotor_spins[2]: 2 is not known here")));
+  EXPECT_THAT(refused_in_flight("[6, 6, 15]", "[6, 6]"),
+              ElementsAre(StartsWith("24:25: control.position_gain_per_s2: 2 values; write at least 3")));
+  EXPECT_THAT(refused_in_flight("[6, 6, 15]", "[6, 6, 0]"),
+              ElementsAre(StartsWith("24:32: control.position_gain_per_s2[2]: 0 is not above 0")));
+  EXPECT_THAT(refused_in_flight("  rotor_lag_s: 0.033\n", ""),
+              ElementsAre(StartsWith("14:1: dynamics.rotor_lag_s is missing")));
+}
+
+TEST(Vehicle, HasABodyThatIsAPlateOrTellsItsInertia) {
+  const std::string plate = "body_height_m: 0.04\n", told = "body_inertia_kg_m2: [1e-3, 1e-3, 1.8e-3]\n";
+  const auto text = changed(kVehicleText + kFlightText, plate, told);
+  EXPECT_THAT(*parse_vehicle(text, "v").dynamics->body_inertia_kg_m2, ElementsAre(1e-3, 1e-3, 1.8e-3));
+  EXPECT_THAT(refused_in_flight("  " + plate, ""),
+              ElementsAre(StartsWith("15:3: dynamics: neither body_height_m nor body_inertia_kg_m2")));
+  EXPECT_THAT(refused_in_flight(plate, plate + "  " + told),
+              ElementsAre(StartsWith("18:23: dynamics.body_inertia_kg_m2: is given, and body_height_m, too")));
+  EXPECT_THAT(refused_in_flight(plate, "body_inertia_kg_m2: [1e-3, 1e-3, 2.1e-3]\n"),
+              ElementsAre(StartsWith("17:36: dynamics.body_inertia_kg_m2[2]: 0.0021 is more than the other two")));
+}
+
+TEST(Vehicle, RefusesAFileOfAnotherKindWithOneLine) {
+  EXPECT_THAT(refused("kphi-vehicle/1", "kphi-coefficients/1"),
+              ElementsAre("1:9: this is a coefficients file, expected a vehicle file; name a file that begins with "
+                          "format: kphi-vehicle/1"));
+  EXPECT_THAT(refused("kphi-vehicle/1", "kphi-vehicel/1"),
+              ElementsAre(StartsWith("1:9: format: text \"kphi-vehicel/1\" is not known here")));
+}
+
 TEST(Vehicle, HasOneBody) {
   EXPECT_THAT(refused("half_side_m: 0.045\n", ""),
               ElementsAre(StartsWith("1:1: half_side_m: missing, and there is no body either")));

@@ -7,9 +7,11 @@
 namespace kphi::flight {
 namespace {
 
+const double kMorphSeconds = example_build().morph_s;
+
 TEST(ArmMotion, RestsWhereItBegan) {
   const Vehicle vehicle = example_vehicle();
-  const ArmMotion motion(vehicle.x);
+  const ArmMotion motion(vehicle.x, kMorphSeconds);
   EXPECT_FALSE(motion.moving(0));
   EXPECT_EQ(motion.angles(0), vehicle.x);
   EXPECT_EQ(motion.rates(3), (std::array<double, 4>{}));
@@ -17,7 +19,7 @@ TEST(ArmMotion, RestsWhereItBegan) {
 
 TEST(ArmMotion, ArrivesExactlyAfterTheStatedTimeFromRestToRest) {
   const Vehicle vehicle = example_vehicle();
-  ArmMotion motion(vehicle.x);
+  ArmMotion motion(vehicle.x, kMorphSeconds);
   motion.begin(vehicle.o, 2.0);
   EXPECT_EQ(motion.angles(2.0), vehicle.x);
   EXPECT_TRUE(motion.moving(2.0 + kMorphSeconds - 1e-9));
@@ -30,7 +32,7 @@ TEST(ArmMotion, ArrivesExactlyAfterTheStatedTimeFromRestToRest) {
 
 TEST(ArmMotion, RatesAreTheDerivativeOfTheAngles) {
   const Vehicle vehicle = example_vehicle();
-  ArmMotion motion(vehicle.x);
+  ArmMotion motion(vehicle.x, kMorphSeconds);
   motion.begin(vehicle.o, 0);
   for (double t = 0.1; t < kMorphSeconds; t += 0.1) {
     for (std::size_t i = 0; i < 4; ++i) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "compensation/flight/random.hpp"
+#include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {
 namespace {
@@ -15,7 +16,7 @@ BodyMotion at(const Eigen::Vector3d& position, const Eigen::Vector3d& velocity =
 
 TEST(PositionControl, DemandsOnlyGravityOnTheReference) {
   const Reference reference;
-  const AccelerationDemand demand = position_control(Gains(), reference, at(reference.position), kLevel);
+  const AccelerationDemand demand = position_control(example_gains(), reference, at(reference.position), kLevel);
   EXPECT_EQ(demand.acceleration, Eigen::Vector3d(0, 0, kGravity));
   EXPECT_EQ(demand.collective, kGravity);
 }
@@ -24,7 +25,7 @@ TEST(PositionControl, WeighsErrorsWithItsGainsAndCarriesTheReferencesAcceleratio
   Reference reference;
   reference.acceleration = {0.1, 0.2, 0.3};
   const BodyMotion estimate = at(reference.position - Eigen::Vector3d(0.1, -0.2, 0.05), {-0.5, 0.25, 0.1});
-  const AccelerationDemand demand = position_control(Gains(), reference, estimate, kLevel);
+  const AccelerationDemand demand = position_control(example_gains(), reference, estimate, kLevel);
   const Eigen::Vector3d wanted(6 * 0.1 + 4 * 0.5 + 0.1, -6 * 0.2 - 4 * 0.25 + 0.2,
                                15 * 0.05 - 6 * 0.1 + 0.3 + kGravity);
   EXPECT_LT((demand.acceleration - wanted).norm(), 1e-12);
@@ -33,17 +34,17 @@ TEST(PositionControl, WeighsErrorsWithItsGainsAndCarriesTheReferencesAcceleratio
 TEST(PositionControl, HoldsEachErrorWithinItsLimit) {
   const Reference reference;
   const BodyMotion far = at(reference.position - Eigen::Vector3d(9, -9, 9), {-9, 9, -9});
-  const Eigen::Vector3d pd = pd_part(Gains(), reference, far);
+  const Eigen::Vector3d pd = pd_part(example_gains(), reference, far);
   EXPECT_LT((pd - Eigen::Vector3d(6 * 0.6 + 4, -6 * 0.6 - 4, 15 * 0.3 + 6 * 0.75)).norm(), 1e-12);
 }
 
 TEST(PositionControl, CountsOnlyWhatTheActualAttitudeCanGiveAndNeverStopsTheRotors) {
   const Reference reference;
   const Eigen::Quaterniond tilted(Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()));
-  EXPECT_NEAR(position_control(Gains(), reference, at(reference.position), tilted).collective, kGravity * std::cos(0.3),
-              1e-12);
+  EXPECT_NEAR(position_control(example_gains(), reference, at(reference.position), tilted).collective,
+              kGravity * std::cos(0.3), 1e-12);
   const Eigen::Quaterniond inverted(Eigen::AngleAxisd(kPi, Eigen::Vector3d::UnitX()));
-  EXPECT_EQ(position_control(Gains(), reference, at(reference.position), inverted).collective, 1.0);
+  EXPECT_EQ(position_control(example_gains(), reference, at(reference.position), inverted).collective, 1.0);
 }
 
 TEST(AttitudeAlong, PutsBodyZAlongTheAccelerationAndTheNoseWhereYawPoints) {
@@ -59,7 +60,7 @@ TEST(AttitudeAlong, PutsBodyZAlongTheAccelerationAndTheNoseWhereYawPoints) {
 }
 
 TEST(AttitudeControl, TurnsTheShortWayRoundWithTwiceTheGainTimesHalfTheAngle) {
-  const Gains gains;
+  const Gains gains = example_gains();
   const double angle = 0.01;
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     Eigen::Quaterniond wanted(Eigen::AngleAxisd(angle, Eigen::Vector3d::Unit(axis)));
@@ -87,7 +88,7 @@ TEST(RatesAlong, AreThoseOfTheAttitudeThatFollowsTheAcceleration) {
 TEST(RateControl, IsTheLinearQuadraticRegulatorThatItSaysItIs) {
   Random random(6);
   for (int i = 0; i < 200; ++i) {
-    Gains gains;
+    Gains gains = example_gains();
     const double rate = random.uniform(2, 30), inertia = random.uniform(5e-4, 1e-2), lag = random.uniform(0.01, 0.06);
     gains.rate.setConstant(rate);
     gains.torque_weight = random.uniform(0, 3);
@@ -106,7 +107,7 @@ TEST(RateControl, IsTheLinearQuadraticRegulatorThatItSaysItIs) {
 }
 
 TEST(RateControl, AnswersASteadyErrorWithInertiaTimesRate) {
-  const Gains gains;
+  const Gains gains = example_gains();
   RateControl control(gains, 0.033);
   const Eigen::Matrix3d inertia = Eigen::Vector3d(1e-3, 2e-3, 3e-3).asDiagonal();
   const Eigen::Vector3d feedback(0.1, -0.2, 0.3);
@@ -121,7 +122,7 @@ TEST(RateControl, AnswersASteadyErrorWithInertiaTimesRate) {
 TEST(RateControl, CancelsTheGyroscopicTorque) {
   const Eigen::Matrix3d inertia = Eigen::Vector3d(1e-3, 2e-3, 3e-3).asDiagonal();
   const Eigen::Vector3d rates(1, 2, 3);
-  const Eigen::Vector3d torque = RateControl(Gains(), 0.033).torque({0, 0, 0}, rates, rates, inertia);
+  const Eigen::Vector3d torque = RateControl(example_gains(), 0.033).torque({0, 0, 0}, rates, rates, inertia);
   EXPECT_LT((torque - rates.cross(inertia * rates)).norm(), 1e-15);
 }
 

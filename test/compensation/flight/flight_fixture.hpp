@@ -1,4 +1,4 @@
-// The default vehicle, and a line as a bench finds it: a little off the paper's.
+// The foldable drone and its controller, and a line as a bench finds it: a little off the paper's.
 #pragma once
 
 #include "compensation/flight/draw.hpp"
@@ -6,8 +6,38 @@
 
 namespace kphi::flight {
 
+/// As in profiles/foldable_drone.yaml, which shipped_files_test holds to the same numbers.
+inline Build example_build() {
+  Build build;
+  build.mass_kg = 0.60;
+  build.hub_mass_kg = 0.045;
+  build.body_height_m = 0.040;
+  build.yaw_arm_m = 0.0133;
+  build.rotor_lag_s = 0.033;
+  build.air_drag_per_s = 0.3;
+  build.morph_s = 1.5;
+  build.spin = {1, -1, 1, -1};
+  return build;
+}
+
+inline Gains example_gains() {
+  Gains gains;
+  gains.position = {6, 6, 15};
+  gains.velocity = {4, 4, 6};
+  gains.attitude = {8.5, 8.5, 5};
+  gains.rate = {12.7, 12.7, 5};
+  gains.torque_weight = 0.5;
+  gains.position_error_max = {0.6, 0.6, 0.3};
+  gains.velocity_error_max = {1.0, 1.0, 0.75};
+  gains.smallest_collective = 1.0;
+  return gains;
+}
+
+inline PilotSettings example_settings() { return {example_gains(), 0.02}; }
+
 inline Vehicle example_vehicle() {
   Vehicle vehicle;
+  vehicle.build = example_build();
   vehicle.airframe = compensation::example_airframe();
   vehicle.x = compensation::shape_x();
   vehicle.o = compensation::shape_o();
@@ -21,7 +51,9 @@ inline const Shadow& example_shadow() {
 
 inline compensation::ThrustLine bench_line() { return compensation::example_line(1.025, -0.0028889 * 1.02); }
 
-inline Scene example_scene(std::uint64_t seed = 1) { return nominal_scene(example_vehicle(), bench_line(), seed); }
+inline Scene example_scene(std::uint64_t seed = 1) {
+  return nominal_scene(example_vehicle(), example_settings(), bench_line(), seed);
+}
 
 /// No noise, no error of mass, rotors, arms or centre of gravity, no drag: only the loss is not what the line says.
 inline Scene clean_scene() {

@@ -28,7 +28,8 @@ TEST(Hover, SinksByWhatTheLostThrustAsksOfTheProportionalGain) {
   for (std::size_t i = 0; i < 4; ++i) {
     const double thrust = pilot.thrusts()[i].value();
     asked += thrust;
-    given += thrust * thrust_share_in_flight(scene.truth.law, scene.truth.gamma, example_shadow(), scene.vehicle.o[i]);
+    given +=
+        thrust * thrust_share_in_flight(scene.truth.law, scene.truth.gamma, example_shadow(), i, scene.vehicle.o[i]);
   }
   const double expected = kGravity / 15 * (asked / given - 1);
   EXPECT_GT(expected, 0.12);

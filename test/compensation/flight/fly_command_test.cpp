@@ -2,10 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <utility>
 
 #include "test/compensation/flight/bench_coefficients.hpp"
 #include "test/daq/bench_fixture.hpp"
@@ -103,39 +105,100 @@ TEST_F(Fly, FliesOneExperimentAlone) {
   EXPECT_EQ(fly({"--experiment", "loop"}).code, 2);
 }
 
+/// The foldable drone's file with some things changed, in a file of its own.
+std::string changed_vehicle(const TemporaryFolder& folder, const std::string& name,
+                            const std::vector<std::pair<std::string, std::string>>& changes) {
+  std::ostringstream read;
+  read << std::ifstream(kVehicle).rdbuf();
+  std::string text = read.str();
+  for (const auto& [from, to] : changes) {
+    const auto at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    if (at != std::string::npos) text.replace(at, from.size(), to);
+  }
+  const std::string path = folder / (name + ".yaml");
+  std::ofstream(path) << text;
+  return path;
+}
+
+const std::string kSquare = "half_side_m: 0.045 ", kTurns = "hinge_turn_deg: [0, 90, 180, 270]";
+
+/// With this arm at each corner of a body of these half sides.
+std::string outline(double x, double y) {
+  std::ostringstream text;
+  text << "body: {corners_m: [[" << x << "," << y << "],[" << -x << "," << y << "],[" << -x << "," << -y << "],[" << x
+       << "," << -y << "]], hinges: [{x_m: " << x << ", y_m: " << y << ", turn_deg: 0}, {x_m: " << -x << ", y_m: " << y
+       << ", turn_deg: 90}, {x_m: " << -x << ", y_m: " << -y << ", turn_deg: 180}, {x_m: " << x << ", y_m: " << -y
+       << ", turn_deg: 270}]}";
+  return text.str();
+}
+
+TEST_F(Fly, FliesABodyThatIsNoSquareAndASquareThatIsGivenAsAnOutlineAsTheSquare) {
+  const std::string square = changed_vehicle(*folder_, "outline", {{kSquare, outline(0.045, 0.045)}, {kTurns, ""}});
+  const Outcome flown = fly({}, coefficients_, square);
+  ASSERT_EQ(flown.code, 0) << flown.err;
+  EXPECT_EQ(flown.out, fly({}).out);
+
+  const std::string oblong = changed_vehicle(*folder_, "oblong", {{kSquare, outline(0.05, 0.04)}, {kTurns, ""}});
+  const Outcome other = fly({"--json"}, coefficients_, oblong);
+  ASSERT_EQ(other.code, 0) << other.err;
+  const auto flights = nlohmann::json::parse(other.out)["flights"];
+  for (const auto& flight : flights) EXPECT_FALSE(flight["lost"]) << flight["name"];
+  const double plain = flights[0]["legs"][1]["mean_error_m"][2], helped = flights[1]["legs"][1]["mean_error_m"][2];
+  EXPECT_GT(plain, 0.1);
+  EXPECT_LT(std::fabs(helped), 0.5 * plain);
+}
+
+TEST_F(Fly, FliesWhatTheVehicleFileSays) {
+  const std::string stiff = changed_vehicle(*folder_, "stiff", {{"[6, 6, 15]", "[6, 6, 30]"}});
+  const auto sag = [](const Outcome& flown) {
+    return nlohmann::json::parse(flown.out)["flights"][0]["legs"][1]["mean_error_m"][2].get<double>();
+  };
+  const double usual = sag(fly({"--json", "--experiment", "hover_xo_nc"}));
+  EXPECT_NEAR(sag(fly({"--json", "--experiment", "hover_xo_nc"}, coefficients_, stiff)) / usual, 0.5, 0.1)
+      << "half the height error for twice the gain";
+  const std::string heavy = changed_vehicle(*folder_, "heavy", {{"mass_kg: 0.60", "mass_kg: 2.60"}});
+  EXPECT_THAT(fly({}, coefficients_, heavy).err, HasSubstr("2.6 kg"));
+}
+
 TEST_F(Fly, RefusesWhatItCannotFlyWithOneLine) {
+  struct Case {
+    const char* name;
+    std::vector<std::pair<std::string, std::string>> changes;
+    std::vector<const char*> says;
+  };
+  for (const Case& refused : std::vector<Case>{
+           {"x_only", {{"  O: [180", "  P: [180"}}, {"shape O", "shapes_deg"}},
+           {"still", {{"dynamics:", "dynamic:"}}, {"dynamic is not a key"}},
+           {"slow", {{"speed_max_rpm: 19100", "speed_max_rpm: 9100"}}, {"speed_max_rpm"}},
+           {"spins", {{"[1, -1, 1, -1]", "[1, 1, 1, 1]"}}, {"rotor_spins"}},
+           {"by_area", {{"overlap: rim_arc", "overlap: area_share"}}, {"fitted with overlap rim_arc", "area_share"}},
+       }) {
+    const Outcome flown = fly({}, coefficients_, changed_vehicle(*folder_, refused.name, refused.changes));
+    EXPECT_EQ(flown.code, 2) << refused.name;
+    EXPECT_EQ(std::count(flown.err.begin(), flown.err.end(), '\n'), 1) << flown.err;
+    for (const char* part : refused.says) EXPECT_THAT(flown.err, HasSubstr(part));
+  }
   const Outcome no_file = fly({}, "nowhere.yaml");
   EXPECT_EQ(no_file.code, 2);
   EXPECT_THAT(no_file.err, HasSubstr("nowhere.yaml"));
+}
 
-  const std::string vehicle = *folder_ / "x_only.yaml";
-  std::ofstream(vehicle) << "format: kphi-vehicle/1\nname: x_only\nhalf_side_m: 0.045\narm_length_m: 0.117\n"
-                            "propeller_radius_m: 0.0635\nshapes_deg: {X: [45, 45, 45, 45]}\narm_angle_min_deg: -90\n"
-                            "arm_angle_max_deg: 180\nspeed_min_rpm: 0\nspeed_max_rpm: 19100\n";
-  const Outcome no_o = fly({}, coefficients_, vehicle);
-  EXPECT_EQ(no_o.code, 2);
-  EXPECT_THAT(no_o.err, HasSubstr("shape O"));
-
-  const std::string oblong = *folder_ / "oblong.yaml";
-  std::ofstream(oblong) << "format: kphi-vehicle/1\nname: oblong\narm_length_m: 0.117\npropeller_radius_m: 0.0635\n"
-                           "body: {corners_m: [[0.1, 0.05], [-0.1, 0.05], [-0.1, -0.05], [0.1, -0.05]], hinges: [\n"
-                           "  {x_m: 0.1, y_m: 0.05, turn_deg: 0}, {x_m: -0.1, y_m: 0.05, turn_deg: 90},\n"
-                           "  {x_m: -0.1, y_m: -0.05, turn_deg: 180}, {x_m: 0.1, y_m: -0.05, turn_deg: 270}]}\n"
-                           "shapes_deg: {X: [45, 45, 45, 45], O: [180, 180, 180, 180]}\narm_angle_min_deg: -90\n"
-                           "arm_angle_max_deg: 180\nspeed_min_rpm: 0\nspeed_max_rpm: 19100\n";
-  const Outcome no_square = fly({}, coefficients_, oblong);
-  EXPECT_EQ(no_square.code, 2);
-  EXPECT_THAT(no_square.err, HasSubstr("square bodies only"));
-
-  std::ostringstream text;
-  text << std::ifstream(kVehicle).rdbuf();
-  std::string slow = text.str();
-  slow.replace(slow.find("speed_max_rpm: 19100"), 20, "speed_max_rpm: 9100 ");
-  const std::string slow_vehicle = *folder_ / "slow.yaml";
-  std::ofstream(slow_vehicle) << slow;
-  const Outcome weak = fly({}, coefficients_, slow_vehicle);
-  EXPECT_EQ(weak.code, 2);
-  EXPECT_THAT(weak.err, HasSubstr("speed_max_rpm"));
+TEST_F(Fly, AsksForTheSectionsThatOnlyAFlightNeeds) {
+  std::ostringstream read;
+  read << std::ifstream(kVehicle).rdbuf();
+  const std::string text = read.str();
+  const auto without = [&](const std::string& from, const std::string& to) {
+    const auto begin = text.find("\n" + from), end = to.empty() ? text.size() : text.find("\n" + to);
+    const std::string path = *folder_ / ("without_" + from.substr(0, 7) + ".yaml");
+    std::ofstream(path) << text.substr(0, begin + 1) << text.substr(std::min(end, text.size()));
+    return fly({}, coefficients_, path);
+  };
+  for (const auto& [section, next] : {std::pair{"dynamics:", "control:"}, {"control:", ""}}) {
+    const Outcome flown = without(section, next);
+    EXPECT_EQ(flown.code, 2);
+    EXPECT_THAT(flown.err, HasSubstr("needs the section " + std::string(section).substr(0, 7)));
+  }
 }
 
 }  // namespace

@@ -35,11 +35,11 @@ TEST(LossLaw, LosesGammaTimesAsMuchInFlight) {
   const Shadow& shadow = example_shadow();
   const Radians o = from_degrees(180);
   for (const LossLaw law : kLaws) {
-    const double bench = thrust_share_in_flight(law, 1, shadow, o);
+    const double bench = thrust_share_in_flight(law, 1, shadow, 0, o);
     EXPECT_LT(bench, 0.95);
-    EXPECT_NEAR(1 - thrust_share_in_flight(law, 1.4, shadow, o), 1.4 * (1 - bench), 1e-12);
-    EXPECT_EQ(thrust_share_in_flight(law, 100, shadow, o), 0.05);
-    EXPECT_EQ(thrust_share_in_flight(law, 1.4, shadow, from_degrees(45)), 1) << "nothing is lost in X";
+    EXPECT_NEAR(1 - thrust_share_in_flight(law, 1.4, shadow, 0, o), 1.4 * (1 - bench), 1e-12);
+    EXPECT_EQ(thrust_share_in_flight(law, 100, shadow, 0, o), 0.05);
+    EXPECT_EQ(thrust_share_in_flight(law, 1.4, shadow, 0, from_degrees(45)), 1) << "nothing is lost in X";
   }
 }
 

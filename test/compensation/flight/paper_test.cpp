@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "compensation/flight/tables.hpp"
+#include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {
 namespace {
@@ -13,7 +14,7 @@ double rounding(const Gains& gains, double error_digit) {
 }
 
 TEST(TableTwo, IsSatisfiedByFifteenAndSixWithinItsRounding) {
-  const Gains gains;
+  const Gains gains = example_gains();
   ASSERT_EQ(gains.position.z(), 15);
   ASSERT_EQ(gains.velocity.z(), 6);
   const double digits[] = {1e-5, 1e-4};  // 0.16859 and -0.0434
@@ -26,7 +27,7 @@ TEST(TableTwo, IsSatisfiedByFifteenAndSixWithinItsRounding) {
 TEST(TableTwo, IsSatisfiedByNoOtherGainsASixthAway) {
   for (const auto& [kp, kd] :
        std::vector<std::pair<double, double>>{{15.2, 6}, {14.8, 6}, {15, 6.1}, {15, 5.9}, {10, 4}}) {
-    Gains gains;
+    Gains gains = example_gains();
     gains.position.z() = kp;
     gains.velocity.z() = kd;
     const HeightRow& row = kHeightRows[0];

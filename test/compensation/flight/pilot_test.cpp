@@ -8,7 +8,7 @@
 namespace kphi::flight {
 namespace {
 
-Pilot example_pilot(const PilotSettings& settings = {}) {
+Pilot example_pilot(const PilotSettings& settings = example_settings()) {
   return *Pilot::build(example_vehicle(), bench_line(), settings);
 }
 
@@ -51,7 +51,7 @@ TEST(Pilot, HoldsYawStillInOBecauseItAllocatesWithTheTorqueOfCoveredRotors) {
     pilot.compensate(on);
     pilot.look(Reference(), kOnReference, Eigen::Quaterniond::Identity());
     const Eigen::Vector4d squares = pilot.act({0, 0, 0}).cwiseAbs2();
-    const Build build;
+    const Build build = example_build();
     double yaw = 0;
     for (std::size_t i = 0; i < 4; ++i) {
       yaw += build.spin[i] * build.yaw_arm_m * k_t * squares[static_cast<Eigen::Index>(i)];
@@ -89,7 +89,7 @@ TEST(Pilot, KeepsEveryRotorWithinWhatItCanGiveWhateverIsDemanded) {
 TEST(Pilot, IsRefusedForAVehicleThatCannotFly) {
   Vehicle vehicle = example_vehicle();
   vehicle.airframe.arm_length = Metres(0.01);
-  EXPECT_FALSE(Pilot::build(vehicle, bench_line(), {}));
+  EXPECT_FALSE(Pilot::build(vehicle, bench_line(), example_settings()));
 }
 
 }  // namespace

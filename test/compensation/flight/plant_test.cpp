@@ -9,6 +9,8 @@
 namespace kphi::flight {
 namespace {
 
+const double kMorphSeconds = example_build().morph_s;
+
 constexpr double kWidth = 0.002;
 
 struct World {
@@ -57,7 +59,7 @@ TEST(Plant, KeepsMomentumAndEnergyOfABodyThatNothingTouches) {
 TEST(Plant, KeepsMomentumWhileTheArmsFoldAndTurnsTheBodyAgainstThem) {
   const World world;
   const Plant plant = world.plant();
-  ArmMotion motion(world.vehicle.x);
+  ArmMotion motion(world.vehicle.x, kMorphSeconds);
   motion.begin(world.vehicle.o, 0);
   const auto at = [&](double t) { return plant.configuration(motion.angles(t), motion.rates(t)); };
   Configuration now = at(0);
@@ -83,7 +85,7 @@ TEST(Plant, KeepsMomentumWhileTheArmsFoldAndTurnsTheBodyAgainstThem) {
 TEST(Plant, BodyMotionIsTheDerivativeOfTheBodysPosition) {
   const World world;
   const Plant plant = world.plant();
-  ArmMotion motion(compensation::shape_t());
+  ArmMotion motion(compensation::shape_t(), kMorphSeconds);
   motion.begin(world.vehicle.o, 0);
   const double t = 0.6, width = 1e-4;
   const auto at = [&](double time) { return plant.configuration(motion.angles(time), motion.rates(time)); };
@@ -143,7 +145,7 @@ TEST(Plant, LosesThrustButNoTorqueOverTheBody) {
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_EQ(x.thrust_per_square[i], k_t);
     const double share =
-        thrust_share_in_flight(world.truth.law, world.truth.gamma, example_shadow(), world.vehicle.o[i]);
+        thrust_share_in_flight(world.truth.law, world.truth.gamma, example_shadow(), i, world.vehicle.o[i]);
     EXPECT_EQ(o.thrust_per_square[i], k_t * share);
     EXPECT_EQ(o.torque_per_square[i], x.torque_per_square[i]);
   }

@@ -41,7 +41,7 @@ TEST(TraceCsv, HasAFieldForEveryColumnAndARowForEveryTick) {
 }
 
 TEST(DrawsCsv, HasAFieldForEveryColumnAndARowForEveryDraw) {
-  const auto draws = fly_draws(example_vehicle(), bench_line(), example_shadow(), 1, 2, 2);
+  const auto draws = fly_draws(example_scene(), example_shadow(), 2, 2);
   const std::vector<std::string> lines = lines_of(draws_csv(draws));
   ASSERT_EQ(lines.size(), 3u);
   for (const std::string& line : lines) EXPECT_EQ(commas(line), commas(lines[0])) << line;
@@ -51,7 +51,7 @@ TEST(DrawsCsv, HasAFieldForEveryColumnAndARowForEveryDraw) {
 
 TEST(ErrorFigure, NamesTheFlightAndItsLegs) {
   const std::string script = error_figure(kExperiments[kHoverPlain], example_trace());
-  EXPECT_THAT(script, HasSubstr("title 'hover: X, O n.c., X'"));
+  EXPECT_THAT(script, HasSubstr("title 'hover: X, O n.c., X   (reference - estimate"));
   EXPECT_THAT(script, HasSubstr("set label 'O n.c.' at 10"));
   EXPECT_THAT(script, HasSubstr("set ylabel 'z error [m]'"));
 }

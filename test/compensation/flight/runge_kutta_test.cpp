@@ -8,13 +8,15 @@
 namespace kphi::flight {
 namespace {
 
+const double kMorphSeconds = example_build().morph_s;
+
 /// 1.2 s of tumbling with rotors running up and arms folding, in `steps` steps.
 PlantState tumble(int steps) {
   const Vehicle vehicle = example_vehicle();
   const Plant plant(vehicle, Truth(), bench_line().thrust_coefficient(), example_shadow());
   Angles nearly = vehicle.x;  // stays away from the body: the occlusion's onset is no smooth function
   for (Radians& arm : nearly) arm = from_degrees(120);
-  ArmMotion motion(vehicle.x);
+  ArmMotion motion(vehicle.x, kMorphSeconds);
   motion.begin(nearly, 0);
   const auto at = [&](double t) { return plant.configuration(motion.angles(t), motion.rates(t)); };
   PlantState state = level_state({{0, 0, 1}, {0.3, 0, 0}}, at(0).mass, 500);

@@ -2,12 +2,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+
 #include "compensation/flight/random.hpp"
 #include "compensation/rim_arc.hpp"
 #include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {
 namespace {
+
+using compensation::ConvexPolygon;
 
 TEST(CoveredArc, AgreesWithTheFlyingLibraryThoughNoLineIsShared) {
   Random random(11);
@@ -16,38 +21,110 @@ TEST(CoveredArc, AgreesWithTheFlyingLibraryThoughNoLineIsShared) {
     const double a = random.uniform(0.02, 0.1), r = random.uniform(0.02, 0.1);
     const double x = random.uniform(-0.25, 0.25), y = random.uniform(-0.25, 0.25);
     const double library = compensation::rim_arc(Metres(a), Metres(r), Metres(x), Metres(y)).value();
-    ASSERT_NEAR(covered_arc(a, r, x, y), library, 1e-7) << a << " " << r << " " << x << " " << y;
+    ASSERT_NEAR(covered_arc(ConvexPolygon::square(Metres(a)), r, x, y), library, 1e-7)
+        << a << " " << r << " " << x << " " << y;
     overlapping += library > 0;
   }
   EXPECT_GT(overlapping, 2000);
 }
 
+/// Away from tangency, where a rounding of 1e-16 is an angle of 1e-8, the two agree to the last digits.
+TEST(CoveredArc, AgreesToTheLastDigitsWhereNoEdgeIsTouchedAndNoCornerIsOnTheRim) {
+  Random random(12);
+  int compared = 0;
+  for (int i = 0; i < 200000; ++i) {
+    const double a = random.uniform(0.02, 0.1), r = random.uniform(0.02, 0.1);
+    const double x = random.uniform(-0.25, 0.25), y = random.uniform(-0.25, 0.25);
+    bool touches = false;
+    for (const double sx : {-a, a}) {
+      touches = touches || std::fabs(std::fabs(sx - x) - r) < 1e-3 * r || std::fabs(std::fabs(sx - y) - r) < 1e-3 * r;
+      for (const double sy : {-a, a}) touches = touches || std::fabs(std::hypot(sx - x, sy - y) - r) < 1e-3 * r;
+    }
+    if (touches) continue;
+    const double library = compensation::rim_arc(Metres(a), Metres(r), Metres(x), Metres(y)).value();
+    ASSERT_NEAR(covered_arc(ConvexPolygon::square(Metres(a)), r, x, y), library, 1e-12);
+    compared += library > 0 && library < 2 * kPi;
+  }
+  EXPECT_GT(compared, 20000);
+}
+
+/// Corners on a circle, in any number.
+ConvexPolygon any_outline(Random& random) {
+  for (;;) {
+    const std::size_t count = 3 + random.bits() % 10;
+    std::array<double, ConvexPolygon::kMaxCorners> at{};
+    for (std::size_t i = 0; i < count; ++i) at[i] = random.uniform(0, 2 * kPi);
+    std::sort(at.begin(), at.begin() + static_cast<long>(count));
+    std::array<compensation::Position, ConvexPolygon::kMaxCorners> corners{};
+    for (std::size_t i = 0; i < count; ++i)
+      corners[i] = {Metres(0.08 * std::cos(at[i])), Metres(0.05 * std::sin(at[i]))};
+    if (const auto outline = ConvexPolygon::from(corners.data(), count)) return *outline;
+  }
+}
+
+TEST(CoveredArc, AgreesWithTheFlyingLibraryOverAnyConvexBody) {
+  Random random(13);
+  int overlapping = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const ConvexPolygon outline = any_outline(random);
+    const double r = random.uniform(0.01, 0.1), x = random.uniform(-0.2, 0.2), y = random.uniform(-0.2, 0.2);
+    const auto library = [&](compensation::OverlapMeasure measure) {
+      return occlusion_angle(outline, Metres(r), {Metres(x), Metres(y)}, measure).value();
+    };
+    ASSERT_NEAR(covered_arc(outline, r, x, y), library(compensation::OverlapMeasure::rim_arc), 1e-6);
+    if (i % 20 == 0) {
+      ASSERT_NEAR(covered_load(outline, r, x, y), library(compensation::OverlapMeasure::load_share), 0.02)
+          << "32 rings";
+    }
+    overlapping += library(compensation::OverlapMeasure::rim_arc) > 0;
+  }
+  EXPECT_GT(overlapping, 4000);
+}
+
 TEST(CoveredArc, IsZeroApartAndAFullTurnInside) {
-  EXPECT_EQ(covered_arc(0.05, 0.06, 0.2, 0), 0);
-  EXPECT_NEAR(covered_arc(0.05, 0.02, 0.01, 0), 2 * kPi, 1e-12);
-  EXPECT_NEAR(covered_arc(0.05, 0.01, 0.05, 0.0), kPi, 1e-12) << "hub on an edge";
-  EXPECT_NEAR(covered_arc(0.05, 0.01, 0.05, 0.05), kPi / 2, 1e-12) << "hub on a corner";
+  EXPECT_EQ(covered_arc(ConvexPolygon::square(Metres(0.05)), 0.06, 0.2, 0), 0);
+  EXPECT_NEAR(covered_arc(ConvexPolygon::square(Metres(0.05)), 0.02, 0.01, 0), 2 * kPi, 1e-12);
+  EXPECT_NEAR(covered_arc(ConvexPolygon::square(Metres(0.05)), 0.01, 0.05, 0.0), kPi, 1e-12) << "hub on an edge";
+  EXPECT_NEAR(covered_arc(ConvexPolygon::square(Metres(0.05)), 0.01, 0.05, 0.05), kPi / 2, 1e-12) << "hub on a corner";
 }
 
 TEST(CoveredLoad, IsThatOfASectorWhereTheBodyIsOne) {
-  EXPECT_NEAR(covered_load(1.0, 0.01, 1.0, 0.0), kPi, 2e-3) << "hub on a long edge";
-  EXPECT_NEAR(covered_load(0.05, 0.02, 0.01, 0), 2 * kPi, 2e-3) << "wholly over the body";
-  EXPECT_EQ(covered_load(0.05, 0.06, 0.2, 0), 0);
+  EXPECT_NEAR(covered_load(ConvexPolygon::square(Metres(1.0)), 0.01, 1.0, 0.0), kPi, 2e-3) << "hub on a long edge";
+  EXPECT_NEAR(covered_load(ConvexPolygon::square(Metres(0.05)), 0.02, 0.01, 0), 2 * kPi, 2e-3)
+      << "wholly over the body";
+  EXPECT_EQ(covered_load(ConvexPolygon::square(Metres(0.05)), 0.06, 0.2, 0), 0);
 }
 
 TEST(Shadow, OfTheDefaultVehicleInOIsThePapersSixtyFiveDegrees) {
   const Shadow& shadow = example_shadow();
-  EXPECT_NEAR(to_degrees(Radians(shadow.arc(from_degrees(180)))), 64.837, 0.01);
-  EXPECT_NEAR(to_degrees(Radians(shadow.arc(from_degrees(165.676)))), 41.293, 0.05);
-  EXPECT_NEAR(to_degrees(Radians(shadow.load(from_degrees(180)))), 50.51, 0.2);
-  EXPECT_EQ(shadow.arc(from_degrees(45)), 0);
-  EXPECT_EQ(shadow.load(from_degrees(45)), 0);
+  EXPECT_NEAR(to_degrees(Radians(shadow.arc(0, from_degrees(180)))), 64.837, 0.01);
+  EXPECT_NEAR(to_degrees(Radians(shadow.arc(2, from_degrees(165.676)))), 41.293, 0.05);
+  EXPECT_NEAR(to_degrees(Radians(shadow.load(0, from_degrees(180)))), 50.51, 0.2);
+  EXPECT_EQ(shadow.arc(0, from_degrees(45)), 0);
+  EXPECT_EQ(shadow.load(0, from_degrees(45)), 0);
+}
+
+TEST(Shadow, OfEachArmIsThatOfItsOwnHinge) {
+  compensation::Airframe airframe = compensation::example_airframe();
+  airframe.mirrored = {false, true, false, true};
+  const Shadow mirrored(airframe);
+  for (std::size_t arm = 0; arm < 4; ++arm) {
+    EXPECT_NEAR(mirrored.arc(arm, from_degrees(170)), example_shadow().arc(0, from_degrees(170)), 1e-9) << arm;
+  }
+  // Half of a long body, its front arms hinged far from its middle.
+  airframe.polygon = compensation::PolygonBody{ConvexPolygon::square(Metres(0.045)), {}};
+  for (std::size_t i = 0; i < 4; ++i) {
+    airframe.polygon->hinges[i] = {{Metres(i < 2 ? 0.3 : 0.045), Metres(0.045)}, Radians(0), false};
+  }
+  const Shadow uneven(airframe);
+  EXPECT_EQ(uneven.arc(0, from_degrees(180)), 0);
+  EXPECT_GT(uneven.arc(2, from_degrees(180)), 1);
 }
 
 TEST(Shadow, GoesRoundWithoutAStepAtHalfATurn) {
   const Shadow& shadow = example_shadow();
-  EXPECT_NEAR(shadow.arc(from_degrees(181)), shadow.arc(from_degrees(-179)), 1e-9);
-  EXPECT_NEAR(shadow.arc(from_degrees(179.99)), shadow.arc(from_degrees(180.01)), 2e-3);
+  EXPECT_NEAR(shadow.arc(0, from_degrees(181)), shadow.arc(0, from_degrees(-179)), 1e-9);
+  EXPECT_NEAR(shadow.arc(0, from_degrees(179.99)), shadow.arc(0, from_degrees(180.01)), 2e-3);
 }
 
 }  // namespace

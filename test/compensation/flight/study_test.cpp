@@ -9,7 +9,7 @@ namespace kphi::flight {
 namespace {
 
 std::vector<Draw> draws(std::size_t count, std::size_t threads) {
-  return fly_draws(example_vehicle(), bench_line(), example_shadow(), 1, count, threads);
+  return fly_draws(example_scene(), example_shadow(), count, threads);
 }
 
 bool same(const NineFlights& a, const NineFlights& b) {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "test/compensation/flight/flight_fixture.hpp"
+
 namespace kphi::flight {
 namespace {
 
@@ -32,11 +34,11 @@ TEST(HoverTable, SaysLostInsteadOfANumber) {
   flights[kHoverPlain].lost_leg = 1;
   EXPECT_THAT(hover_table(flights), HasSubstr("X       O n.c.      lost "));
   EXPECT_THAT(hover_table(flights), Not(HasSubstr("0.1535")));
-  EXPECT_THAT(height_table(flights, Gains()), testing::IsEmpty());
+  EXPECT_THAT(height_table(flights, example_gains()), testing::IsEmpty());
 }
 
 TEST(HeightTable, ShowsTheIdentityForOursAndThePapers) {
-  const std::string table = height_table(one_hover(), Gains());
+  const std::string table = height_table(one_hover(), example_gains());
   EXPECT_THAT(table, HasSubstr("0.1535  0.0036"));
   EXPECT_THAT(table, HasSubstr("  2.324 ")) << "15 * 0.1535 + 6 * 0.0036";
   EXPECT_THAT(table, HasSubstr("-0.5005")) << "the paper's, from its own e and e'";
@@ -53,7 +55,9 @@ TEST(ForwardTable, ShowsMeanAndDeviationBesideThePapers) {
   EXPECT_THAT(table, Not(HasSubstr("level")));
 }
 
-TEST(Tables, OfNothingFlownAreEmpty) { EXPECT_EQ(hover_table({}) + height_table({}, Gains()) + forward_table({}), ""); }
+TEST(Tables, OfNothingFlownAreEmpty) {
+  EXPECT_EQ(hover_table({}) + height_table({}, example_gains()) + forward_table({}), "");
+}
 
 TEST(NotReproduced, NamesTheXBaselineAndTheVelocityTerm) {
   EXPECT_THAT(not_reproduced(), HasSubstr("the errors in X of Tables I and III"));

@@ -20,6 +20,7 @@ TEST(MassProperties, OfTheFourShapesAreThoseComputedByHand) {
   for (const Known& known : std::vector<Known>{
            {"X", compensation::shape_x(), {0, 0}, {3.276, 3.276, 6.441}},
            {"H", compensation::shape_h(), {0, 0}, {0.704, 5.063, 5.655}},
+           // Without the plate's own m r² (0.42 kg, 17.55 mm off the common centre) T would have 2.570 and 5.341.
            {"T", compensation::shape_t(), {0, 17.55}, {2.699, 2.884, 5.471}},
            {"O", compensation::arms_at(180, 180, 165.676, 180), {-0.27, -2.17}, {1.138, 0.965, 1.992}},
        }) {
@@ -29,6 +30,69 @@ TEST(MassProperties, OfTheFourShapesAreThoseComputedByHand) {
     EXPECT_LT((found.inertia * found.inverse_inertia - Eigen::Matrix3d::Identity()).norm(), 1e-12) << known.shape;
     EXPECT_EQ(found.arm_momentum, 0) << known.shape;
   }
+}
+
+TEST(MassProperties, OfASquareGivenAsAPolygonAreThoseOfTheSquare) {
+  Vehicle vehicle = example_vehicle();
+  vehicle.airframe.polygon = compensation::square_as_polygon(Metres(0.045));
+  vehicle.airframe.half_side = Metres(0);
+  for (const Angles& shape : {compensation::shape_x(), compensation::shape_t(), compensation::shape_o()}) {
+    const std::array<double, 4> rates{{1, -2, 3, 0.5}};
+    const MassProperties found = mass_properties(vehicle, shape, rates);
+    const MassProperties square = mass_properties(example_vehicle(), shape, rates);
+    EXPECT_LT((found.cog - square.cog).norm(), 1e-15);
+    EXPECT_LT((found.inertia - square.inertia).norm(), 1e-15);
+    EXPECT_NEAR(found.arm_momentum, square.arm_momentum, 1e-15);
+  }
+}
+
+/// A plate cut off askew: its middle is not the origin, and its axes are not x and y.
+TEST(MassProperties, OfAnyConvexPlateAreThoseOfItsManySmallPieces) {
+  const compensation::Position corners[] = {{Metres(0.10), Metres(0.02)},
+                                            {Metres(0.03), Metres(0.07)},
+                                            {Metres(-0.08), Metres(0.04)},
+                                            {Metres(-0.02), Metres(-0.05)}};
+  Vehicle vehicle = example_vehicle();
+  vehicle.airframe.polygon = compensation::square_as_polygon(Metres(0.045));
+  vehicle.airframe.polygon->outline = *compensation::ConvexPolygon::from(corners, 4);
+  vehicle.build.hub_mass_kg = 1e-12;
+  const MassProperties found = mass_properties(vehicle, vehicle.x, {});
+
+  std::vector<Eigen::Vector2d> pieces;
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  for (double x = -0.12; x < 0.12; x += 2e-4) {
+    for (double y = -0.12; y < 0.12; y += 2e-4) {
+      bool inside = true;
+      for (std::size_t i = 0; i < 4; ++i) {
+        const auto &a = corners[i], &b = corners[(i + 1) % 4];
+        inside = inside && (b.x - a.x).value() * (y - a.y.value()) > (b.y - a.y).value() * (x - a.x.value());
+      }
+      if (inside) pieces.emplace_back(x, y);
+      if (inside) middle += pieces.back();
+    }
+  }
+  middle /= static_cast<double>(pieces.size());
+  Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
+  for (const Eigen::Vector2d& piece : pieces) moments += (piece - middle) * (piece - middle).transpose();
+  moments *= vehicle.build.mass_kg / static_cast<double>(pieces.size());
+  const double tall = vehicle.build.mass_kg * 0.04 * 0.04 / 12;
+  EXPECT_LT((found.cog - middle).norm(), 2e-4);
+  EXPECT_NEAR(found.inertia(0, 0), moments(1, 1) + tall, 1e-2 * moments(1, 1));
+  EXPECT_NEAR(found.inertia(1, 1), moments(0, 0) + tall, 1e-2 * moments(0, 0));
+  EXPECT_NEAR(found.inertia(2, 2), moments.trace(), 1e-2 * moments.trace());
+  EXPECT_NEAR(found.inertia(0, 1), -moments(0, 1), 1e-2 * moments.trace());
+  EXPECT_LT(found.inertia(0, 1), -0.1 * found.inertia(0, 0)) << "askew";
+}
+
+TEST(MassProperties, TakeTheBodysInertiaFromTheFileWhereItIsGiven) {
+  Vehicle vehicle = example_vehicle();
+  vehicle.build.body_inertia = Eigen::Vector3d(1e-3, 2e-3, 2.5e-3);
+  const MassProperties told = mass_properties(vehicle, vehicle.x, {});
+  vehicle.build.body_inertia = Eigen::Vector3d(2e-3, 2e-3, 2.5e-3);
+  const MassProperties more = mass_properties(vehicle, vehicle.x, {});
+  EXPECT_NEAR(more.inertia(0, 0) - told.inertia(0, 0), 1e-3, 1e-15);
+  EXPECT_NEAR((more.inertia - told.inertia).norm(), 1e-3, 1e-15);
+  EXPECT_NEAR(told.inertia(2, 2), 2.5e-3 + 4 * 0.045 * 2 * std::pow(0.045 + 0.117 * std::sqrt(0.5), 2), 1e-12);
 }
 
 TEST(MassProperties, OfMovingArmsAreThoseOfTheirPointMasses) {
