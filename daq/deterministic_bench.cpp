@@ -103,6 +103,7 @@ DeterministicBench::DeterministicBench(const profiles::Bench& place, const sim::
       sim_(settings_of(place, other)),
       supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, *sim_.supply(), clock_) : nullptr),
       motor_(place.iq, sim_.motor_line(), clock_, [this] { step_to(clock_.now() + kMotorWait); }) {
+  if (place.simulation && place.simulation->durable) files_ = &results::disk();
   if (supply_) {
     clock_.set(clock_.now() + kSupplyRises);
     sim_.advance(clock_.now());

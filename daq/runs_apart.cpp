@@ -24,6 +24,7 @@ profiles::Bench seeded(profiles::Bench place, const RunBeginning& run) {
 
 RunsApart::RunsApart(const profiles::Bench& place)
     : place_(place), bench_(std::make_unique<DeterministicBench>(place)) {
+  if (place.simulation && place.simulation->durable) files_ = &results::disk();
   bench_->use_files(*files_);
 }
 

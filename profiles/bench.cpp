@@ -100,6 +100,7 @@ Simulation read_simulation(ProfileReader& file, const std::filesystem::path& fol
   simulation.control = file.get_or("/simulation/control", simulation.control);
   if (file.has("/simulation/faults")) simulation.faults = (folder / file.text("/simulation/faults")).string();
   if (file.has("/simulation/motor")) simulation.motor = (folder / file.text("/simulation/motor")).string();
+  simulation.durable = file.get_or("/simulation/durable", simulation.durable);
   simulation.air_density_kg_m3 = file.get_or("/simulation/air_density_kg_m3", simulation.air_density_kg_m3);
   if (!simulation.in_process && simulation.control.empty()) {
     file.refuse("/simulation", "control is missing", "add control: a path for the socket, or in_process: true");

@@ -56,6 +56,7 @@ struct Simulation {
   std::string faults;   ///< path of a fault script; in the file relative to the file's folder; empty: none
   std::string motor;    ///< path of a simulated motor, likewise; empty: the 2306 that is built in
   double air_density_kg_m3 = 1.225;  ///< of the simulated air
+  bool durable = false;  ///< in process: what is recorded survives a power cut, as on a true bench; costs time
 };
 
 /// What a person has read off, with standard uncertainties.

@@ -20,6 +20,8 @@ class Process {
   /// the process ends without it, with all that was printed.
   std::string wait_for(const std::string& text, std::chrono::seconds limit = std::chrono::seconds(60));
   void signal(int number) const;
+  /// Reads what is printed, and returns as soon as something was, or after `limit`; false: it has closed both ends.
+  bool hear(std::chrono::milliseconds limit = {}) { return read_some(limit); }
   [[nodiscard]] int pid() const { return pid_; }
   /// Nobody listens any more: what it prints from now on meets a closed pipe.
   void close_pipes();
