@@ -146,13 +146,13 @@ class CampaignRun {
     const double per_run_s = plan_.bench.value() / static_cast<double>(plan_.runs.size());
     const double remaining_s = per_run_s * (planned_ - result_.runs);
     profiles::PlannedRun capped = planned;
-    const int left_out = review_.cap().apply(capped.steps);
+    (void)review_.cap().apply(capped.steps);
     try {
       cool_down();
       if (place_.ambient.known() && !bench_.air())
         progress_.say("air: its sensor measures no more: the density of this run is unknown");
       const RunOrder order{campaign_, place_, *mounted_, capped, remaining_s, file};
-      accept(record_run(bench_, order, progress_, stop_asked_), left_out);
+      accept(record_run(bench_, order, progress_, stop_asked_), planned);
     } catch (const std::exception& e) {
       note_the_end(results::kRunAborted, {{"run", file.filename().string()}, {"reason", e.what()}});
       throw;
@@ -222,14 +222,18 @@ class CampaignRun {
   }
 
   /// The file is whole, named and on disk: the journal's line accepts it. The tables follow from the files.
-  void accept(const RunResult& run, int left_out) {
+  void accept(const RunResult& run, const profiles::PlannedRun& planned) {
     const results::RunRecording recording = results::read_run(run.file);
     const std::uint64_t lost = run.account.lost_network + run.account.lost_host;
     json accepted = {{"file", "runs/" + run.file.filename().string()},
                      {"sha256", run.sha256},
                      {"samples", run.account.received},
                      {"lost", lost}};
-    if (left_out > 0) accepted["steps_left_out"] = left_out;
+    const auto driven = std::count_if(recording.phases.begin(), recording.phases.end(),
+                                      [](const auto& mark) { return mark.phase == results::Phase::step; });
+    // For want of drive: in earlier runs, or in this one.
+    if (const auto left_out = static_cast<std::ptrdiff_t>(planned.steps.size()) - driven; left_out > 0)
+      accepted["steps_left_out"] = left_out;
     if (run.stop) accepted["stop"] = to_json(*run.stop);
     for (const results::StreamEvent& event : recording.events) accepted["events"].push_back(event.text);
     accepted_at_ = bench_.clock().now();

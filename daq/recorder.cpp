@@ -132,6 +132,7 @@ void Recorder::drain_motor() {
       if (reading.channel == MotorChannel::speed) speed_rad_s_ = std::abs(reading.value);
       if (reading.channel == MotorChannel::supply_voltage) module_voltage_v_ = reading.value;
       if (reading.channel == MotorChannel::motor_current) motor_current_a_ = reading.value;
+      if (reading.channel == MotorChannel::drive_pwm) drive_pwm_ = reading.value;
       if (reading.channel == MotorChannel::derate) derate_ = reading.value;
       if (reading.channel == MotorChannel::fault_now) fault_bits_ = static_cast<unsigned>(reading.value);
       if (reading.channel == MotorChannel::supply_current) supply_current_a_ = reading.value;

@@ -39,6 +39,8 @@ class Recorder {
   void take_zero() noexcept;
   /// The newest of everything at bench time `now`.
   [[nodiscard]] Observation observe(Instant now) const noexcept;
+  /// Share of the supply voltage that drives the motor, -1..1, as read last.
+  [[nodiscard]] double drive_pwm() const noexcept { return drive_pwm_; }
   /// What the bench supply showed last; time 0: nothing yet.
   [[nodiscard]] results::SupplyReading supply() const noexcept { return supply_.read(); }
   /// Rethrows what drain() ran into.
@@ -77,7 +79,7 @@ class Recorder {
   std::atomic<double> thrust_n_{0}, phase_mean_n_{0}, zero_n_{0};
   std::atomic<double> speed_rad_s_{0}, supply_current_a_{0}, coil_temperature_degc_{0};
   std::atomic<double> torque_nm_{0}, phase_mean_nm_{0}, zero_nm_{0};
-  std::atomic<double> module_voltage_v_{0}, motor_current_a_{0}, derate_{1};
+  std::atomic<double> module_voltage_v_{0}, motor_current_a_{0}, drive_pwm_{0}, derate_{1};
   std::atomic<unsigned> fault_bits_{0};
   std::atomic<std::int64_t> load_cell_ns_, motor_ns_;
   netbox::Published<netbox::ZeroMeasurement> measured_;

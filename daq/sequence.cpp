@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "daq/box_bias.hpp"
 #include "daq/box_configuration.hpp"
 #include "daq/device_records.hpp"
 #include "daq/interrupt.hpp"
 #include "daq/slew.hpp"
+#include "daq/speed_cap.hpp"
 #include "daq/supply_interlock.hpp"
 #include "drivers/device_error.hpp"
 
@@ -165,15 +168,10 @@ void Sequence::ramp_to(RadPerSec level, Spin& spin) {
 void Sequence::spin_through_the_steps() {
   Spin spin(bench_.motor(), order_.place.iq.spin, guard_.latch());
   has_spun_ = true;
-  for (const auto& [number, level] : order_.planned.steps) {
-    ramp_to(level, spin);
-    ++position_.step;
-    position_.commanded = level;
-    change_speed();
-    spin.at(level);
-    mark(Phase::step, number, level);
-    hold(from_seconds(order_.campaign.profile.dwell.value()), &spin);
-    progress_.step_done(position_, seen_);
+  for (const profiles::PlannedStep& step : order_.planned.steps) {
+    if (out_of_reach_ && step.speed >= *out_of_reach_) continue;
+    hold_step(step, spin);
+    learn_from(step);
   }
   position_.step = -1;
   position_.commanded = RadPerSec(0);
@@ -186,6 +184,32 @@ void Sequence::spin_through_the_steps() {
   spin.begin_stop(stop);
   while (!(stop_ = spin.stopped())) hold(bench_.clock().stretched(kTickWall), &spin);
   if (!stop_->safe()) throw SafetyStop(stop_->summary());
+}
+
+void Sequence::hold_step(const profiles::PlannedStep& step, Spin& spin) {
+  ramp_to(step.speed, spin);
+  ++position_.step;
+  position_.commanded = step.speed;
+  change_speed();
+  spin.at(step.speed);
+  mark(Phase::step, step.number, step.speed);
+  hold(from_seconds(order_.campaign.profile.dwell.value()), &spin);
+  progress_.step_done(position_, seen_);
+}
+
+void Sequence::learn_from(const profiles::PlannedStep& step) {
+  if (!seen_.motor_is_fresh || !is_out_of_drive(step.speed, seen_.speed, recorder_.drive_pwm())) return;
+  out_of_reach_ = step.speed;
+  const auto& steps = order_.planned.steps;
+  const auto left_out = std::count_if(steps.begin() + position_.step + 1, steps.end(),
+                                      [&](const auto& later) { return later.speed >= *out_of_reach_; });
+  if (left_out == 0) return;
+  position_.steps -= static_cast<int>(left_out);
+  end_ -= left_out * from_seconds(order_.campaign.profile.dwell.value());
+  progress_.say(
+      fmt::format("motor: its drive is at its end at {:.0f} RPM where {:.0f} RPM are commanded: this run leaves out {} "
+                  "steps from there up",
+                  to_rpm(seen_.speed), to_rpm(step.speed), left_out));
 }
 
 void Sequence::mark(Phase phase, int step, RadPerSec commanded) {

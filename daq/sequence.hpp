@@ -38,6 +38,9 @@ class Sequence {
   void set_box_bias();
   netbox::ZeroMeasurement measure(results::Phase phase);
   void spin_through_the_steps();
+  void hold_step(const profiles::PlannedStep& step, Spin& spin);
+  /// The motor had no drive left at `level`: what the run still has from there up is left out.
+  void learn_from(const profiles::PlannedStep& step);
   void mark(results::Phase phase, int step, RadPerSec commanded);
   /// Takes no time when the campaign lets the speed change at once.
   void ramp_to(RadPerSec level, Spin& spin);
@@ -63,6 +66,7 @@ class Sequence {
   std::string standstill_;  ///< of the box's measurement, as told; empty while it measures
   results::BoxBias box_bias_;
   bool has_spun_ = false;
+  std::optional<RadPerSec> out_of_reach_;  ///< the lowest level for which the drive was not enough
   std::optional<iq::StopReport> stop_;
   std::optional<results::StreamEvent> supply_event_;
 };

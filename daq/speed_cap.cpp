@@ -1,6 +1,9 @@
 #include "daq/speed_cap.hpp"
 
 #include <algorithm>
+#include <cmath>
+
+#include "daq/step_doubts.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -19,6 +22,11 @@ bool fell_short(const StepMean& step) {
 }
 
 }  // namespace
+
+bool is_out_of_drive(RadPerSec commanded, RadPerSec reached, double drive_pwm) {
+  const bool is_short = commanded.value() - reached.value() > speed_tolerance(commanded.value());
+  return is_short && std::abs(drive_pwm) >= iq::QualityLimits{}.drive_pwm;
+}
 
 std::optional<CapLesson> SpeedCap::learn(std::span<const StepMean> run) {
   const StepMean* lowest = nullptr;

@@ -18,6 +18,11 @@ struct CapLesson {
   RadPerSec cap;      ///< the highest level below it that was reached with drive to spare (under 98 % of the supply)
 };
 
+/// A step at its end, by the newest readings: the speed falls short of its command, and no drive is left. What a run
+/// then still has at this level or above is left out of it: only the step that was driven gets doubts (and no mean a
+/// place in a fit), the coil is spared, and the levels below are measured all the same.
+[[nodiscard]] bool is_out_of_drive(RadPerSec commanded, RadPerSec reached, double drive_pwm);
+
 /// Of one propeller on one motor. Later runs leave out the levels above: a drive at its end holds no speed, heats the
 /// coil, and would only give steps in doubt. A cap falls and never rises.
 class SpeedCap {

@@ -70,6 +70,14 @@ class OrderedCampaign : public testing::Test {
   CampaignResult run(const profiles::Campaign& campaign) {
     return run_campaign(*bench_, campaign, place_, results_, person_, said_, [] { return false; });
   }
+  /// Another simulated motor; `rest` of its file.
+  void use_motor(const std::string& rest) {
+    std::ofstream(folder_.path() / "motor.yaml") << "format: kphi-sim-motor/1\n" << rest;
+    std::string text = place_.text;
+    text.replace(text.find("in_process: true"), 16, "in_process: true, motor: motor.yaml");
+    place_ = profiles::parse_bench(text, (folder_.path() / "bench.yaml").string());
+    bench_ = std::make_unique<DeterministicBench>(place_);
+  }
   /// Data of the journal's entries of one event.
   std::vector<json> events(const std::string& event) {
     std::vector<json> found;
@@ -278,13 +286,12 @@ TEST_F(OrderedCampaign, ChangesTheSpeedNoFasterThanItsSlewAndAveragesNoRamp) {
   expect_whole_and_replayable(slewed);
 }
 
+std::string motor_on(double volts) {
+  return fmt::format("supply: {{voltage_v: {}}}\nsensors: {{voltage_gain_error_relative: 0}}\n", volts);
+}
+
 TEST_F(OrderedCampaign, LearnsFromASaturatedMotorHowFastLaterRunsMayGo) {
-  std::ofstream(folder_.path() / "motor.yaml")
-      << "format: kphi-sim-motor/1\nsupply: {voltage_v: 8.3}\nsensors: {voltage_gain_error_relative: 0}\n";
-  std::string text = place_.text;
-  text.replace(text.find("in_process: true"), 16, "in_process: true, motor: motor.yaml");
-  place_ = profiles::parse_bench(text, (folder_.path() / "bench.yaml").string());
-  bench_ = std::make_unique<DeterministicBench>(place_);
+  use_motor(motor_on(8.3));
   auto weak = campaign("0, 90", 1, "", "", 18000);
   weak.supply = Volts(8.3);
   (void)run(weak);
@@ -299,6 +306,63 @@ TEST_F(OrderedCampaign, LearnsFromASaturatedMotorHowFastLaterRunsMayGo) {
   EXPECT_NEAR(second.back(), cap_rpm, 1);
   EXPECT_EQ(events("run_accepted").at(1).at("steps_left_out"), 4 - second.size());
   expect_whole_and_replayable(weak);
+}
+
+TEST_F(OrderedCampaign, LeavesOutWhatIsAboveASaturatedStepInTheSameRun) {
+  use_motor(motor_on(7.8));
+  auto weak = campaign("0", 2, "order: {steps: up_and_down}\n", "", 18000);
+  weak.profile.steps = 7;  // every 1500 RPM, up and down
+  weak.supply = Volts(7.8);
+  (void)run(weak);
+  EXPECT_THAT(said_.lines, Contains(testing::ContainsRegex("^motor: its drive is at its end at .* RPM are commanded: "
+                                                           "this run leaves out [0-9]+ steps from there up$")));
+  const auto steps = results::read_steps(results_.steps());
+  std::vector<results::StepMean> first, second;
+  for (const auto& step : steps) (step.repetition == 1 ? first : second).push_back(step);
+  const auto fell_short = [](const results::StepMean& step) {
+    return (step.doubts & static_cast<std::uint32_t>(results::Doubt::speed_not_reached)) != 0;
+  };
+  EXPECT_EQ(std::count_if(first.begin(), first.end(), fell_short), 1) << "one step was pushed, no more";
+  EXPECT_EQ(std::count_if(second.begin(), second.end(), fell_short), 0);
+  const auto fastest = std::max_element(first.begin(), first.end(), [](const auto& a, const auto& b) {
+    return a.commanded_speed_rad_s < b.commanded_speed_rad_s;
+  });
+  EXPECT_TRUE(fell_short(*fastest)) << "nothing above it was tried";
+  EXPECT_LT(to_rpm(RadPerSec(fastest->commanded_speed_rad_s)), 17500);
+  EXPECT_EQ(events("run_accepted").at(0).at("steps_left_out"), 13 - first.size());
+  EXPECT_EQ(events("run_accepted").at(1).at("steps_left_out"), 13 - second.size());
+  EXPECT_EQ(events("speed_cap").size(), 1u);
+  expect_whole_and_replayable(weak);
+}
+
+/// What one run leaves in the coil of the motor that is built in: some degrees, for the better part of a minute.
+TEST_F(OrderedCampaign, WaitsBetweenRunsUntilTheCoilHasCooledDown) {
+  auto warm = campaign("0", 2, "", "", 18000);
+  warm.limits.cooling = profiles::Cooling{Celsius(27), Celsius(26.5)};
+  (void)run(warm);
+  const auto cooling = events("cooling"), cooled = events("cooled_down");
+  ASSERT_EQ(cooling.size(), 1u) << "the first run begins cold, the second warm";
+  ASSERT_EQ(cooled.size(), 1u) << "the pause ends";
+  EXPECT_GT(cooling[0].at("coil_degc").get<double>(), 27);
+  EXPECT_THAT(said_.lines, Contains(testing::ContainsRegex("^the coil has [0-9]+ ..C: waiting for 26.5 ..C$")));
+  const double paused_s = cooled[0].at("seconds").get<double>();
+  EXPECT_GT(paused_s, 1);
+  const auto runs = results_.complete_runs(warm.occlusions_deg);
+  ASSERT_EQ(runs.size(), 2u);
+  const auto before = results::read_run(runs[0]), after = results::read_run(runs[1]);
+  const auto coil_degc = [](const results::RunRecording& run) {
+    std::vector<double> all;
+    for (const auto& reading : run.motor)
+      if (reading.channel == results::MotorChannel::coil_temperature &&
+          reading.time_ns >= run.load_cell.front().arrival_ns)
+        all.push_back(reading.value);
+    return all;
+  };
+  EXPECT_GT(coil_degc(before).back(), 27) << "warm at the end of the first";
+  EXPECT_LT(coil_degc(after).front(), 26.6) << "cool at the begin of the second";
+  const double apart_s =
+      1e-9 * static_cast<double>(after.load_cell.front().arrival_ns - before.load_cell.back().arrival_ns);
+  EXPECT_GE(apart_s, paused_s) << "nothing was driven meanwhile";
 }
 
 TEST_F(OrderedCampaign, JournalsWhatWasAskedAndAnswered) {

@@ -3,24 +3,31 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "daq/deterministic_bench.hpp"
 
 namespace kphi::daq {
 
-/// A supply whose answers end.
-class FallingSilent final : public SupplyLink {
+/// A supply whose answers are spoilt, or end.
+class SpoiltSupply final : public SupplyLink {
  public:
-  FallingSilent(SupplyLink& inner, const Clock& clock) : inner_(inner), clock_(clock) {}
+  SpoiltSupply(SupplyLink& inner, const Clock& clock) : inner_(inner), clock_(clock) {}
   [[nodiscard]] std::string identity() const override { return inner_.identity(); }
   std::size_t take(std::span<results::SupplyReading> out) override {
     const std::size_t n = inner_.take(out);
+    for (std::size_t i = 0; spoil && i < n; ++i) spoil(out[i]);
     return clock_.now() < silent_from ? n : 0;
   }
-  [[nodiscard]] std::string failure() const override { return ""; }
+  [[nodiscard]] std::string failure() const override { return lost; }
   void cut() noexcept override { inner_.cut(); }
   [[nodiscard]] std::string switch_off() noexcept override { return inner_.switch_off(); }
   Instant silent_from = kNever;
+  std::function<void(results::SupplyReading&)> spoil;
+  std::string lost;  ///< why the link is dead
 
  private:
   void switch_on() override {}
@@ -28,15 +35,40 @@ class FallingSilent final : public SupplyLink {
   const Clock& clock_;
 };
 
+/// A motor whose readings are spoilt.
+class SpoiltMotor final : public MotorLink {
+ public:
+  explicit SpoiltMotor(MotorLink& inner) : inner_(inner) {}
+  void spin_at(RadPerSec signed_speed) override { inner_.spin_at(signed_speed); }
+  void renew() noexcept override { inner_.renew(); }
+  void emergency_stop() noexcept override { inner_.emergency_stop(); }
+  void begin_stop(const iq::StopSettings& settings) override { inner_.begin_stop(settings); }
+  [[nodiscard]] std::optional<iq::StopReport> stop_report() override { return inner_.stop_report(); }
+  [[nodiscard]] const iq::AuditRecord& parameters() const override { return inner_.parameters(); }
+  [[nodiscard]] std::optional<Celsius> coil_temperature() override { return inner_.coil_temperature(); }
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return inner_.take_events(); }
+  [[nodiscard]] std::string failure() const override { return inner_.failure(); }
+  [[nodiscard]] std::string identity() const override { return inner_.identity(); }
+  std::size_t take(std::span<results::MotorReading> out) override {
+    const std::size_t n = inner_.take(out);
+    for (std::size_t i = 0; spoil && i < n; ++i) spoil(out[i]);
+    return n;
+  }
+  std::function<void(results::MotorReading&)> spoil;
+
+ private:
+  MotorLink& inner_;
+};
+
 class CoastingBench final : public Bench {
  public:
   explicit CoastingBench(const profiles::Bench& place) : bench(place) {
-    if (bench.supply() != nullptr) silent_supply = std::make_unique<FallingSilent>(*bench.supply(), bench.clock());
+    if (bench.supply() != nullptr) spoilt_supply = std::make_unique<SpoiltSupply>(*bench.supply(), bench.clock());
   }
   [[nodiscard]] const Clock& clock() const override { return bench.clock(); }
-  [[nodiscard]] MotorLink& motor() override { return bench.motor(); }
+  [[nodiscard]] MotorLink& motor() override { return spoilt_motor; }
   [[nodiscard]] LoadCellLink& load_cell() override { return bench.load_cell(); }
-  [[nodiscard]] SupplyLink* supply() override { return silent_supply.get(); }
+  [[nodiscard]] SupplyLink* supply() override { return spoilt_supply.get(); }
   [[nodiscard]] results::FileLayer& files() override { return bench.files(); }
   [[nodiscard]] Duration sync_interval() const override { return bench.sync_interval(); }
   void mounted(const std::string& propeller, double occlusion) override { bench.mounted(propeller, occlusion); }
@@ -53,7 +85,8 @@ class CoastingBench final : public Bench {
   }
 
   DeterministicBench bench;
-  std::unique_ptr<FallingSilent> silent_supply;
+  SpoiltMotor spoilt_motor{bench.motor()};
+  std::unique_ptr<SpoiltSupply> spoilt_supply;
   Instant coasts_at{0};  ///< the bridge has been open since
 
  private:

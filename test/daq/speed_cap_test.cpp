@@ -75,5 +75,13 @@ TEST(SpeedCap, TakesTheLevelsAboveOutOfARun) {
   EXPECT_EQ(steps[2].number, 3) << "what stays keeps its number";
 }
 
+TEST(OutOfDrive, IsAStepThatFallsShortWithNoDriveLeft) {
+  EXPECT_TRUE(is_out_of_drive(RadPerSec(1900), RadPerSec(1820), 0.985));
+  EXPECT_TRUE(is_out_of_drive(RadPerSec(1900), RadPerSec(1820), -1)) << "clockwise";
+  EXPECT_FALSE(is_out_of_drive(RadPerSec(1900), RadPerSec(1820), 0.97)) << "something else holds it back";
+  EXPECT_FALSE(is_out_of_drive(RadPerSec(1900), RadPerSec(1885), 1)) << "it was reached, if barely";
+  EXPECT_FALSE(is_out_of_drive(RadPerSec(1900), RadPerSec(1990), 1)) << "on its way down";
+}
+
 }  // namespace
 }  // namespace kphi::daq
