@@ -10,10 +10,11 @@
 #include <set>
 #include <tuple>
 
+#include "results/harmless_doubts.hpp"
+
 namespace kphi::daq {
 namespace {
 
-using results::Doubt;
 using results::StepMean;
 using Group = std::vector<const StepMean*>;
 
@@ -101,17 +102,19 @@ StepMean average(const Group& group) {
   return mean;
 }
 
-// ---- judgement ----
-
-/// Doubts that leave thrust over speed² as good as it is.
-constexpr std::uint32_t kHarmless = [] {
-  std::uint32_t bits = 0xFu << 24;  // of the bench supply
-  for (const Doubt doubt : {Doubt::lost_samples, Doubt::stream_restarted, Doubt::box_trouble, Doubt::supply_out_of_band,
-                            Doubt::coil_hot, Doubt::slow_round_trip, Doubt::lag_unknown, Doubt::speed_glitch}) {
-    bits |= static_cast<std::uint32_t>(doubt);
+/// By propeller, occlusion and step, in the order of first appearance.
+std::vector<Group> groups_of(std::span<const StepMean> steps) {
+  std::vector<Group> groups;
+  std::map<std::tuple<std::string, double, int>, std::size_t> places;
+  for (const StepMean& step : steps) {
+    const auto [place, is_new] = places.try_emplace({step.propeller, step.occlusion_deg, step.step}, groups.size());
+    if (is_new) groups.emplace_back();
+    groups[place->second].push_back(&step);
   }
-  return bits;
-}();
+  return groups;
+}
+
+// ---- judgement ----
 
 double square(double x) { return x * x; }
 
@@ -243,26 +246,10 @@ void decide(RepetitionVerdict& verdict, const RepetitionRule& rule) {
   verdict.asks_for_another = runs >= rule.wanted && runs < rule.at_most && too_few;
 }
 
-using RunName = std::tuple<std::string, double, int>;  // propeller, occlusion, repetition
-
-/// Those that stand out, and, beside one that is usable, those that are not.
-std::set<RunName> spoiled_runs(std::span<const StepMean> steps) {
-  std::set<RunName> spoiled;
-  for (const RepetitionVerdict& verdict : judge_repetitions(steps)) {
-    const bool any_usable = std::any_of(verdict.repetitions.begin(), verdict.repetitions.end(),
-                                        [](const RepetitionFigure& figure) { return figure.usable; });
-    for (const RepetitionFigure& figure : verdict.repetitions) {
-      if (figure.outlying || (any_usable && !figure.usable))
-        spoiled.emplace(verdict.propeller, verdict.occlusion_deg, figure.repetition);
-    }
-  }
-  return spoiled;
-}
-
 }  // namespace
 
 bool tells_k(const StepMean& step) {
-  return (step.doubts & ~kHarmless) == 0 && std::isfinite(step.thrust_n) && step.speed_rad_s > 0;
+  return (step.doubts & ~results::kHarmlessDoubts) == 0 && std::isfinite(step.thrust_n) && step.speed_rad_s > 0;
 }
 
 double thrust_u_within(const StepMean& step) {
@@ -272,35 +259,23 @@ double thrust_u_within(const StepMean& step) {
 }
 
 std::vector<StepMean> means_of(std::span<const StepMean> steps) {
-  const std::set<RunName> spoiled = spoiled_runs(steps);
-  std::vector<StepMean> kept;
-  std::map<std::pair<std::string, double>, std::pair<std::set<int>, std::set<int>>> counts;  // averaged, left out
-  for (const StepMean& step : steps) {
-    const bool out = spoiled.contains({step.propeller, step.occlusion_deg, step.repetition});
-    auto& [averaged, left_out] = counts[{step.propeller, step.occlusion_deg}];
-    (out ? left_out : averaged).insert(step.repetition);
-    if (!out) kept.push_back(step);
-  }
-  std::vector<StepMean> means = average_repetitions(kept);
-  for (StepMean& mean : means) {
-    const auto& [averaged, left_out] = counts.at({mean.propeller, mean.occlusion_deg});
-    if (left_out.empty()) continue;
-    mean.repetitions_averaged = static_cast<double>(averaged.size());
-    mean.repetitions_left_out = static_cast<double>(left_out.size());
+  std::vector<StepMean> means;
+  for (const Group& group : groups_of(steps)) {
+    Group good;
+    for (const StepMean* step : group)
+      if (tells_k(*step)) good.push_back(step);
+    const bool chosen = !good.empty() && good.size() < group.size();
+    means.push_back(average(chosen ? good : group));
+    if (!chosen) continue;
+    means.back().repetitions_averaged = static_cast<double>(good.size());
+    means.back().repetitions_left_out = static_cast<double>(group.size() - good.size());
   }
   return means;
 }
 
 std::vector<StepMean> average_repetitions(std::span<const StepMean> steps) {
-  std::vector<Group> groups;
-  std::map<std::tuple<std::string, double, int>, std::size_t> places;
-  for (const StepMean& step : steps) {
-    const auto [place, is_new] = places.try_emplace({step.propeller, step.occlusion_deg, step.step}, groups.size());
-    if (is_new) groups.emplace_back();
-    groups[place->second].push_back(&step);
-  }
   std::vector<StepMean> means;
-  for (const Group& group : groups) means.push_back(average(group));
+  for (const Group& group : groups_of(steps)) means.push_back(average(group));
   return means;
 }
 

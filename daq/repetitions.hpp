@@ -19,12 +19,13 @@ namespace kphi::daq {
 /// is so. Numbers of samples: sums. Doubts: those of any repetition.
 [[nodiscard]] std::vector<results::StepMean> average_repetitions(std::span<const results::StepMean> steps);
 
-/// What means.csv holds: average_repetitions without the outlying ones and, beside a usable one, those that are not
-/// usable (judge_repetitions); they stay in steps.csv. Rows from which one was left out tell it: repetitions_averaged,
-/// repetitions_left_out.
+/// What means.csv holds: average_repetitions without the steps that do not tell k, where another repetition does; the
+/// rows tell of it: repetitions_averaged, repetitions_left_out. The rule is that of the fit: a step is left out for a
+/// doubt, which names a cause, never for being far from the others (JCGM 100, 3.4.7 and 4.2: what repetitions scatter
+/// is their uncertainty). An outlying one asks for another run, and stays.
 [[nodiscard]] std::vector<results::StepMean> means_of(std::span<const results::StepMean> steps);
 
-/// Without a doubt about thrust over speed².
+/// Without a doubt about thrust over speed² (results::kHarmlessDoubts are none).
 [[nodiscard]] bool tells_k(const results::StepMean& step);
 /// Standard uncertainty of the thrust from within the step alone, N; older files do not tell it.
 [[nodiscard]] double thrust_u_within(const results::StepMean& step);

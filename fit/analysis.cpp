@@ -124,6 +124,11 @@ std::vector<std::string> remarks_of(const Identification& identification, const 
   std::vector<std::string> remarks;
   const double largest = identification.table.back().phi_deg;
   const double share = 100 * line.mismatch() / line.K_T;
+  for (const OutlyingRun& run : analysis.outlying)
+    remarks.push_back(fmt::format(
+        "repetition {} at {} deg stands out, {:+.2f} % from the others (p = {:.2g}); it is kept, and its scatter is in "
+        "the budget of every k: look for a cause, and run this occlusion again",
+        run.repetition, run.phi_deg, 100 * run.share, run.p));
   if (!line.anchored) {
     const bool beyond_error = student_test(analysis.shape.mismatch, 0).rejected();
     remarks.push_back(fmt::format("the line's intercept is {:+.2f} % from K_T, {} its error", share,
@@ -225,10 +230,12 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   Analysis analysis;
   std::vector<double> phis;
   std::vector<RunSums> runs;
+  std::vector<StepsOfAngle> measured;
   for (const OcclusionCoefficient& row : identification.table) {
     phis.push_back(row.phi_deg);
-    if (row.fit) analysis.speed.push_back(speed_dependence(row.phi_deg, row.measured));
+    if (row.fit) measured.push_back({row.phi_deg, row.measured});
   }
+  analysis.speed = speed_dependence(measured);
   for (const AngleScatter& angle : identification.repeatability.angles)
     runs.insert(runs.end(), angle.runs.begin(), angle.runs.end());
   const ErrorSources sources = sources_of(identification, analysis, options.bench);
@@ -251,6 +258,7 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   analysis.differences = neighbour_tests(analysis.coefficients, sources, identification);
   analysis.between_runs = identification.repeatability.between;
   analysis.shape = shape_of(identification, sources, weights, row);
+  analysis.outlying = outlying_runs(identification.repeatability);
   analysis.remarks = remarks_of(identification, analysis);
   analysis.rejected = rejected_points(identification);
   if (!runs.empty()) analysis.bootstrap = bootstrap(runs, weights, options.bootstrap);

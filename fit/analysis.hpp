@@ -54,6 +54,7 @@ struct Analysis {
   std::vector<BootstrapInterval> bootstrap;
   std::vector<TorqueCoefficient> torque;
   std::vector<RejectedPoint> rejected;
+  std::vector<OutlyingRun> outlying;  ///< kept; each is a remark, too
   /// Relative scatter of k between runs beyond what noise and zero explain, pooled over φ; its freedom.
   Estimate between_runs;
   LineShape shape;

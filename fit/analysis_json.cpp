@@ -136,6 +136,13 @@ Json to_json(const Analysis& analysis) {
                              })},
           {"torque", list(analysis.torque, torque)},
           {"between_runs_share", number(analysis.between_runs.u)},
+          {"outlying_runs", list(analysis.outlying,
+                                 [](const OutlyingRun& run) {
+                                   return Json{{"phi_deg", run.phi_deg},
+                                               {"repetition", run.repetition},
+                                               {"share", number(run.share)},
+                                               {"p", number(run.p)}};
+                                 })},
           {"rejected", list(analysis.rejected, rejected)}};
 }
 

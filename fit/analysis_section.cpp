@@ -27,11 +27,17 @@ std::string number(double value, const char* format = "{:.3g}") {
   return std::isfinite(value) ? with_minus(fmt::format(fmt::runtime(format), value)) : std::string("–");
 }
 
+/// Beyond some hundreds their number is no longer of interest.
+std::string freedom_words(double freedom) {
+  if (!std::isfinite(freedom)) return "∞";
+  return freedom > 999 ? "&gt; 999" : fmt::format("{:.0f}", freedom);
+}
+
 /// The cell of one source in one budget, as a share of the value.
 std::string budget_cell(const Budget& budget, const std::string& source) {
   for (const BudgetRow& row : budget.rows) {
     if (row.source != source) continue;
-    return row.known() ? percent(row.contribution() / std::abs(budget.value)) : "not known";
+    return row.known() ? percent(row.contribution() / std::abs(budget.value)) : "?";
   }
   return "–";
 }
@@ -39,10 +45,10 @@ std::string budget_cell(const Budget& budget, const std::string& source) {
 std::string budget_rows(const std::vector<Budget>& budgets) {
   std::string html;
   for (const BudgetRow& row : budgets.front().rows) {
-    html += fmt::format("<tr><td class=\"text\">{}</td><td>{}</td><td>{}</td>", html_escaped(row.source),
-                        row.evaluation == Evaluation::type_a ? "A" : "B", row.common ? "all" : "one");
+    html += fmt::format("<tr><td class=\"text\">{}</td><td>{}</td><td>{}</td>", typeset(row.source),
+                        row.evaluation == Evaluation::type_a ? "A" : "B", row.common ? "all φ" : "one φ");
     for (const Budget& budget : budgets) html += "<td>" + budget_cell(budget, row.source) + "</td>";
-    html += fmt::format("<td class=\"text\">{}</td></tr>\n", html_escaped(row.note));
+    html += fmt::format("<td class=\"text\">{}</td></tr>\n", typeset(row.note));
   }
   return html;
 }
@@ -58,13 +64,11 @@ std::string sum_row(const std::vector<Budget>& budgets, const char* name, const 
 std::string budget_section(const std::vector<Budget>& budgets, const std::vector<Budget>& standard) {
   if (budgets.empty() || budgets.front().rows.empty()) return {};
   std::string heads = "<th class=\"text\">source</th><th>type</th><th>shared by</th>";
-  for (const Budget& budget : budgets) heads += "<th>" + html_escaped(budget.quantity) + ", %</th>";
+  for (const Budget& budget : budgets) heads += "<th>" + typeset(budget.quantity) + ", %</th>";
   std::string html =
       "<h2>Uncertainty budget</h2>\n" + table(heads + "<th class=\"text\">from</th>") + budget_rows(budgets);
   html += sum_row(budgets, "combined u", [](const Budget& b) { return percent(b.combined() / std::abs(b.value)); });
-  html += sum_row(budgets, "degrees of freedom", [](const Budget& b) {
-    return std::isfinite(b.freedom()) ? fmt::format("{:.0f}", b.freedom()) : std::string("∞");
-  });
+  html += sum_row(budgets, "degrees of freedom", [](const Budget& b) { return freedom_words(b.freedom()); });
   html += sum_row(budgets, "95 %: ±", [](const Budget& b) { return percent(b.expanded() / std::abs(b.value)); });
   if (standard.size() == budgets.size()) {
     html += sum_row(standard, "in standard air, 95 %: ±",
@@ -78,12 +82,13 @@ std::string budget_section(const std::vector<Budget>& budgets, const std::vector
 
 std::string test_row(const StatisticalTest& test) {
   if (test.name.empty()) return {};
-  const std::string freedom = test.error_freedom > 0 ? fmt::format("{:.0f}, {:.0f}", test.freedom, test.error_freedom)
-                                                     : number(test.freedom, "{:.0f}");
+  const std::string freedom = (test.error_freedom > 0 ? fmt::format("{:.0f}, ", test.freedom) : "") +
+                              freedom_words(test.error_freedom > 0 ? test.error_freedom : test.freedom);
   return fmt::format(
       "<tr><td class=\"text\">{}</td><td class=\"text\">{}</td><td>{} = {}</td><td>{}</td><td>{}</td><td "
       "class=\"text{}\">{}</td></tr>\n",
-      html_escaped(test.name), html_escaped(test.hypothesis), html_escaped(test.statistic), number(test.value), freedom,
+      typeset(test.name), typeset(test.hypothesis), html_escaped(test.statistic),
+      number(test.value, std::abs(test.value) < 1000 ? "{:.3g}" : "{:.0f}"), freedom,
       !test.tested()    ? "–"
       : test.p < 0.0001 ? "&lt; 0.0001"
                         : fmt::format("{:.4f}", test.p),
@@ -121,14 +126,14 @@ std::string speed_section(const std::vector<SpeedDependence>& speed) {
 
 std::string torque_section(const std::vector<TorqueCoefficient>& torque) {
   if (torque.empty()) return {};
-  std::string html = "<h2>Torque</h2>\n" +
-                     table(
-                         "<th>φ</th><th>k<sub>Q</sub>, N m/(rad/s)²</th><th>±</th><th>share of k<sub>Q</sub>(0)</th>"
-                         "<th>±</th><th>κ = k<sub>Q</sub>/k, mm</th><th>±</th>");
+  std::string html =
+      "<h2>Torque</h2>\n" + table(
+                                "<th>φ</th><th>k<sub>Q</sub>, N m/(rad/s)²</th><th>share of k<sub>Q</sub>(0)</th>"
+                                "<th>±</th><th>κ = k<sub>Q</sub>/k, mm</th><th>±</th>");
   for (const TorqueCoefficient& one : torque) {
-    html += fmt::format("<tr><td>{:g}°</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-                        one.phi_deg, number(one.k_q.value, "{:.5e}"), number(one.k_q.u, "{:.1e}"),
-                        number(one.share, "{:.4f}"), number(one.share_u, "{:.4f}"),
+    html += fmt::format("<tr><td>{:g}°</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", one.phi_deg,
+                        with_power_of_ten(one.k_q.value, one.k_q.u), number(one.share, "{:.4f}"),
+                        one.phi_deg == 0 ? "–" : number(one.share_u, "{:.4f}"),
                         number(1e3 * one.drag_per_thrust_m.value, "{:.4f}"),
                         number(1e3 * one.drag_per_thrust_m.u, "{:.4f}"));
   }
@@ -148,16 +153,15 @@ std::string prediction_section(const std::vector<LinePrediction>& predictions) {
         one.phi_deg, number(1e6 * one.k.value, "{:.5f}"), number(1e6 * one.k.expanded(), "{:.5f}"),
         number(one.scaling_factor.value, "{:.4f}"), number(one.scaling_factor.expanded(), "{:.4f}"),
         number(100 * one.speed_u_share, "{:.3f}"),
-        one.clipped        ? "above K_T, held at 1"
+        one.clipped        ? "above K<sub>T</sub>, held at 1"
         : one.extrapolated ? "not measured here"
                            : "");
   }
   return html + kTableEnd;
 }
 
-std::string remark_section(const Analysis& analysis) {
+std::string rejected_section(const Analysis& analysis) {
   std::string html;
-  for (const std::string& remark : analysis.remarks) html += "<p class=\"warning\">" + html_escaped(remark) + "</p>\n";
   if (analysis.rejected.empty()) return html;
   html += "<h2>Points that the robust loss gave up</h2>\n" +
           table(
@@ -193,8 +197,15 @@ std::string interval(double lower, double upper) {
 
 }  // namespace
 
+std::string remark_section(std::span<const std::string> remarks) {
+  if (remarks.empty()) return {};
+  std::string html = "<div class=\"remarks\"><h3>To be known before this is flown</h3>\n<ul>\n";
+  for (const std::string& remark : remarks) html += "<li>" + typeset(remark) + "</li>\n";
+  return html + "</ul></div>\n";
+}
+
 std::string analysis_sections(const Analysis& analysis) {
-  return remark_section(analysis) + budget_section(analysis.coefficients, analysis.standard) +
+  return rejected_section(analysis) + budget_section(analysis.coefficients, analysis.standard) +
          prediction_section(analysis.predictions) + speed_section(analysis.speed) + test_section(analysis) +
          torque_section(analysis.torque);
 }
@@ -209,8 +220,8 @@ std::string claims_section(std::span<const Claim> claims) {
     html += fmt::format(
         "<tr><td class=\"text\">{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"text\">{}</td><td "
         "class=\"text{}\">{}</td></tr>\n",
-        html_escaped(claim.statement), number(claim.value, "{:.4g}"), interval(claim.lower, claim.upper),
-        interval(claim.allowed_lower, claim.allowed_upper), html_escaped(claim.unit),
+        typeset(claim.statement), number(claim.value, "{:.4g}"), interval(claim.lower, claim.upper),
+        interval(claim.allowed_lower, claim.allowed_upper), typeset(claim.unit),
         claim.verdict == Verdict::fails ? " bad" : "", words(claim.verdict));
   }
   return html + kTableEnd;

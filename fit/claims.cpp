@@ -22,17 +22,25 @@ const FamilyMember* find(Family family, double diameter_in, int blades) {
   return nullptr;
 }
 
-std::optional<Estimate> k_of(const FamilyMember* member, double phi_deg) {
+std::optional<Estimate> k_of(const FamilyMember* member, double phi_deg, Air air) {
   if (member == nullptr) return std::nullopt;
   const auto& table = member->identification.table;
+  const auto& budgets = air == Air::standard ? member->analysis.standard : member->analysis.coefficients;
   for (std::size_t i = 0; i < table.size(); ++i)
-    if (std::abs(table[i].phi_deg - phi_deg) < 1e-6) return member->analysis.coefficients[i].estimate();
+    if (std::abs(table[i].phi_deg - phi_deg) < 1e-6) return budgets[i].estimate();
   return std::nullopt;
 }
 
-std::optional<Estimate> slope_of(const FamilyMember* member) {
+std::optional<Estimate> slope_of(const FamilyMember* member, Air air) {
   if (member == nullptr) return std::nullopt;
-  return member->analysis.slope.estimate();
+  Estimate slope = member->analysis.slope.estimate();
+  if (air == Air::measured) return slope;
+  const Budget& standard = member->analysis.standard.front();
+  const double scale = standard.value / member->analysis.coefficients.front().value;
+  const double u_scale = standard.rows.back().contribution() / std::abs(standard.value);  // of the density
+  slope.u = scale * std::hypot(slope.u, slope.value * u_scale);
+  slope.value *= scale;
+  return slope;
 }
 
 std::optional<Estimate> ratio(const std::optional<Estimate>& a, const std::optional<Estimate>& b) {
@@ -89,13 +97,13 @@ Claim linear(const FamilyMember& member) {
                                      propeller, kTestLevel),
                          "1", kTestLevel, 1);
   if (!test.tested()) return claim;
-  claim.value = claim.lower = claim.upper = test.p;
+  claim.value = test.p;  // which has no interval
   claim.verdict = test.rejected() ? Verdict::fails : Verdict::holds;
   return claim;
 }
 
 std::optional<Estimate> share_of_thrust(const FamilyMember* member, double phi_deg) {
-  return ratio(k_of(member, phi_deg), k_of(member, 0));
+  return ratio(k_of(member, phi_deg, Air::measured), k_of(member, 0, Air::measured));
 }
 
 /// The φ at which three blades keep least more of their thrust than two.
@@ -108,17 +116,17 @@ std::optional<Estimate> least_lead(const FamilyMember* three, const FamilyMember
   return least;
 }
 
-void claims_of_diameter(Family family, double diameter, double offset, std::vector<Claim>& claims) {
+void claims_of_diameter(Family family, Air air, double diameter, double offset, std::vector<Claim>& claims) {
   const FamilyMember* two = find(family, diameter, 2);
   const FamilyMember* three = find(family, diameter, 3);
   claims.push_back(
       judged(fmt::format("slopes_{}in", diameter),
              fmt::format("{}-inch propellers of 2 and 3 blades have the same slope: ratio, 15 % allowed", diameter),
-             "1", ratio(slope_of(three), slope_of(two)), 0.85, 1.15));
+             "1", ratio(slope_of(three, air), slope_of(two, air)), 0.85, 1.15));
   claims.push_back(
       judged(fmt::format("offset_{}in", diameter),
              fmt::format("3 blades of {} inch have {:.1e} N/RPM^2 more k than 2: 25 % allowed", diameter, offset),
-             "N/RPM^2", in_rpm(minus(k_of(three, 0), k_of(two, 0))), 0.75 * offset, 1.25 * offset));
+             "N/RPM^2", in_rpm(minus(k_of(three, 0, air), k_of(two, 0, air))), 0.75 * offset, 1.25 * offset));
   claims.push_back(judged(
       fmt::format("order_{}in", diameter),
       fmt::format("beyond 45 deg 3 blades of {} inch keep more of their thrust than 2: least lead of shares", diameter),
@@ -126,13 +134,13 @@ void claims_of_diameter(Family family, double diameter, double offset, std::vect
 }
 
 /// Mean over the φ at which k is far from 0.
-std::optional<Estimate> growth_per_inch(Family family, int blades) {
+std::optional<Estimate> growth_per_inch(Family family, Air air, int blades) {
   const FamilyMember* five = find(family, 5, blades);
   const FamilyMember* six = find(family, 6, blades);
   std::optional<Estimate> mean;
   double n = 0;
   for (const double phi : {0.0, 45.0, 90.0, 180.0}) {
-    const auto one = ratio(k_of(six, phi), k_of(five, phi));
+    const auto one = ratio(k_of(six, phi, air), k_of(five, phi, air));
     if (!one) continue;
     ++n;
     if (!mean) mean = Estimate{0, 0, one->freedom};
@@ -154,16 +162,17 @@ const char* name_of(Verdict verdict) {
 std::vector<Claim> test_claims(std::span<const FamilyMember> family) {
   std::vector<Claim> claims;
   for (const FamilyMember& member : family) claims.push_back(linear(member));
+  const Air air = common_air(family);
   const FamilyMember* drone = find(family, 5, 3);
   claims.push_back(judged("share_45", "5-inch 3-blade at 45 deg: almost 90 % of its thrust, 0.87 to 0.91", "1",
                           share_of_thrust(drone, 45), 0.87, 0.91));
   claims.push_back(judged("share_270", "5-inch 3-blade at 270 deg: 25 % of its thrust, 0.22 to 0.28", "1",
                           share_of_thrust(drone, 270), 0.22, 0.28));
-  claims_of_diameter(family, 5, 0.4e-8, claims);
-  claims_of_diameter(family, 6, 0.5e-8, claims);
+  claims_of_diameter(family, air, 5, 0.4e-8, claims);
+  claims_of_diameter(family, air, 6, 0.5e-8, claims);
   const double power = std::pow(6.0 / 5.0, 4);
   for (const int blades : {2, 3}) {
-    const auto growth = growth_per_inch(family, blades);
+    const auto growth = growth_per_inch(family, air, blades);
     claims.push_back(judged(fmt::format("inch_{}b", blades),
                             fmt::format("one inch more doubles k, {} blades: ratio, 1.7 to 2.2", blades), "1", growth,
                             1.7, 2.2));

@@ -32,7 +32,7 @@ struct Claim {
 
 /// Every claim stands in the table, also those that these propellers cannot test. The paper gives no tolerances: those
 /// allowed here stand in the table, chosen so that its claims do not contradict each other (doubling per inch and both
-/// offsets cannot hold exactly together).
+/// offsets cannot hold exactly together). Propellers are compared in standard air where the air of all is known.
 [[nodiscard]] std::vector<Claim> test_claims(std::span<const FamilyMember> family);
 
 }  // namespace kphi::fit

@@ -15,22 +15,6 @@ namespace {
 
 using results::yaml_number;
 
-/// A YAML double-quoted scalar: propeller "5e3" stays text, and no text can end the quotes.
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      result += '\\';
-      result += c;
-    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
-      result += fmt::format("\\x{:02X}", static_cast<unsigned>(static_cast<unsigned char>(c)));
-    } else {
-      result += c;
-    }
-  }
-  return result + "\"";
-}
-
 std::string number_or_unknown(std::optional<double> value) {
   return value && std::isfinite(*value) ? yaml_number(*value) : "unknown";
 }
@@ -134,6 +118,21 @@ std::string provenance_block(const Identification& identification, const Provena
 }
 
 }  // namespace
+
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      result += '\\';
+      result += c;
+    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
+      result += fmt::format("\\x{:02X}", static_cast<unsigned>(static_cast<unsigned char>(c)));
+    } else {
+      result += c;
+    }
+  }
+  return result + "\"";
+}
 
 std::string estimator_words(const Identification& identification) {
   const bool from_steps = !identification.table.empty() && identification.table.front().fit.has_value();

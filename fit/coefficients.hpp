@@ -47,6 +47,9 @@ struct Provenance {
   std::optional<BenchUncertainty> bench{};  ///< with which the budget was made
 };
 
+/// A YAML double-quoted scalar: propeller "5e3" stays text, and no text can end the quotes.
+[[nodiscard]] std::string quoted(const std::string& text);
+
 /// What was minimised, in words; the same in file and report.
 [[nodiscard]] std::string estimator_words(const Identification& identification);
 

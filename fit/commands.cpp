@@ -46,6 +46,7 @@ struct FitRequest {
   Loss loss = Loss::none;
   compensation::OverlapMeasure overlap = compensation::OverlapMeasure::rim_arc;
   std::vector<std::string> uncertainties;
+  std::vector<std::string> left_out;
   std::vector<std::string> family;
   bool raw = false;
   bool no_report = false;
@@ -79,6 +80,7 @@ IdentificationOptions options_of(const FitRequest& request) {
   options.estimator = request.estimator;
   options.weighting = request.weighting;
   options.loss = request.loss;
+  for (const std::string& text : request.left_out) options.left_out.push_back(parse_left_out_run(text));
   return options;
 }
 
@@ -92,6 +94,7 @@ void refuse_for_table(const FitRequest& request) {
   refuse(request.loss != Loss::none, "--loss");
   refuse(request.at_speed_rpm.has_value(), "--at-speed-rpm");
   refuse(!request.uncertainties.empty(), "--u");
+  refuse(!request.left_out.empty(), "--leave-out");
 }
 
 Identification identify_input(const FitInput& input, const FitRequest& request) {
@@ -123,7 +126,12 @@ Json raw_json(const FitInput& input) {
   const auto files = results::CampaignFolder::open(input.folder).complete_runs();
   if (files.empty()) throw FitError("no complete run lies in the folder; --raw needs one");
   const std::vector<results::RunRecording> runs{results::read_run(files.front())};
-  return raw_to_json(identify_dynamics(runs), check_by_blade_pass(runs));
+  const auto check = check_by_blade_pass(runs);
+  Json json = raw_to_json(identify_dynamics(runs), check);
+  const auto& clock = input.provenance.clock;
+  if (check && clock && clock->u_gain)
+    json["blade_pass"]["against_clock_gain"] = to_json(check->against({clock->gain, *clock->u_gain}));
+  return json;
 }
 
 /// This propeller and the others of its family, all fitted alike.
@@ -135,6 +143,7 @@ FamilyFindings family_findings(const FitRequest& request, const Identification& 
     FitRequest same = request;
     same.propeller.clear();
     same.diameter_in = same.blades = 0;
+    same.left_out.clear();
     Identification other = identify_input(input, same);
     Analysis its = analyse(other, analysis_options(request, input, other));
     family.push_back({std::move(other), std::move(its)});
@@ -219,9 +228,15 @@ void add_fit(CLI::App& app, int& exit_code) {
           "how φ is measured in flight: rim_arc, area_share, load_share (default: rim_arc); who flies the file "
           "otherwise is refused")
       ->transform(CLI::CheckedTransformer(overlap_names()));
-  command->add_option("--u", request->uncertainties,
-                      "NAME=VALUE, standard uncertainty of calibration, cross-axis, clock, density (relative) or "
-                      "alignment-deg; may be repeated");
+  command
+      ->add_option("--u", request->uncertainties,
+                   "NAME=VALUE, standard uncertainty of calibration, cross-axis, clock, density (relative) or "
+                   "alignment-deg; may be repeated")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--leave-out", request->left_out,
+                   "PHI:REPETITION:CAUSE, a run that is known to be spoiled; listed in the report, may be repeated")
+      ->allow_extra_args(false);
   command->add_option("--family", request->family, "other propellers, fitted alike: the paper's claims as a table")
       ->check(CLI::ExistingPath);
   command->add_flag("--raw", request->raw, "time constants, and the motor's clock by blade pass, from the first run");

@@ -8,6 +8,7 @@
 
 #include "compensation/units.hpp"
 #include "fit/figure_style.hpp"
+#include "fit/power.hpp"
 #include "results/number.hpp"
 
 namespace kphi::fit {
@@ -189,6 +190,34 @@ Figure repetition_figure(const Identification& identification) {
                   "set offsets 0, 0, graph 0.1, graph 0.1\n"
                   "set xlabel 'angle of the occlusion φ'\nset ylabel 'k of one run against all, %'\n"
                   "set key outside top center horizontal samplen 1\nplot \\\n" +
+                  parts + "\n";
+  return figure;
+}
+
+Figure power_figure(const Identification& identification) {
+  Figure figure;
+  figure.name = "power";
+  figure.caption =
+      "What thrust costs: grams per watt over the thrust, one colour per occlusion, mean of the repetitions.";
+  figure.csv = "phi_deg,step,speed_rpm,thrust_n,power_w,gram_per_watt\n";
+  std::map<double, std::string> courses;
+  for (const StepPower& row : power_of(identification.selection.used)) {
+    courses[row.phi_deg] += fmt::format("{:.8g} {:.6g}\n", row.thrust_n, row.gram_per_watt());
+    figure.csv +=
+        fmt::format("{},{},{},{},{},{}\n", shortest(row.phi_deg), row.step + 1, shortest(rpm(row.speed_rad_s)),
+                    shortest(row.thrust_n), shortest(row.power_w), shortest(row.gram_per_watt()));
+  }
+  std::string data, parts;
+  std::size_t i = 0;
+  for (const auto& [phi_deg, rows] : courses) {
+    data += data_block(fmt::format("power{}", i), rows);
+    parts += fmt::format("{}  $power{} using 1:2 with linespoints pt {} ps 0.5 lw 1.2 lc rgb '{}' title 'φ = {}°'",
+                         i == 0 ? "" : ", \\\n", i, mark(i).shape, mark(i).colour, shortest(phi_deg));
+    ++i;
+  }
+  figure.script = figure_head(400) + data +
+                  "set xrange [0:*]\nset yrange [0:*]\nset xlabel 'thrust, N'\nset ylabel 'thrust per power, g/W'\n"
+                  "set key top right samplen 1 spacing 1.2\nplot \\\n" +
                   parts + "\n";
   return figure;
 }

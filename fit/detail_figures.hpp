@@ -19,6 +19,9 @@ namespace kphi::fit {
 /// k of each repetition against that of its occlusion, in percent, with two standard errors.
 [[nodiscard]] Figure repetition_figure(const Identification& identification);
 
+/// Thrust per electrical power over the thrust, one course per φ; without steps whose power nobody measured.
+[[nodiscard]] Figure power_figure(const Identification& identification);
+
 /// One step of one run: how speed and thrust come to rest after the command, and what of it was averaged.
 struct Settling {
   struct Sample {

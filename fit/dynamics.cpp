@@ -68,7 +68,7 @@ struct Exponential {
 /// The mean residence time, delay and time constant together, is a safe start.
 void fit_motor(const std::vector<NormalisedReading>& readings, double residence, Dynamics& dynamics) {
   double time_constant = 0.7 * residence, delay = 0.3 * residence;
-  ceres::Problem problem;
+  ceres::Problem problem(problem_options());
   for (const NormalisedReading& reading : readings) {
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Exponential, 1, 1, 1>(new Exponential{reading}), nullptr,
                              &time_constant, &delay);

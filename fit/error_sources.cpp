@@ -1,5 +1,7 @@
 #include "fit/error_sources.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -55,12 +57,13 @@ ErrorSource source_of(const char* name, Evaluation evaluation, const char* unit,
   return source;
 }
 
-/// A relative error of everything measured on the bench: `power` is that with which k follows it.
-void add_common(ErrorSources& sources, const char* name, const std::optional<double>& u, double power,
-                const char* unit = "1", const char* note = "") {
+/// A relative error of everything measured on the bench: `power` is that with which k follows it, `option` how to tell
+/// it.
+void add_common(ErrorSources& sources, const char* name, const char* option, const std::optional<double>& u,
+                double power, const char* unit = "1", const char* note = "") {
   ErrorSource source = source_of(name, Evaluation::type_b, unit, sources.k().size());
   source.common = true;
-  source.note = u ? note : "not known";
+  source.note = u ? note : fmt::format("not known: --u {}=VALUE tells it", option);
   for (std::size_t i = 0; i < sources.k().size(); ++i) {
     source.u[i] = u.value_or(kUnknown);
     source.sensitivity[i] = power * sources.k()[i];
@@ -69,12 +72,12 @@ void add_common(ErrorSources& sources, const char* name, const std::optional<dou
 }
 
 void add_bench(ErrorSources& sources, const BenchUncertainty& bench) {
-  add_common(sources, "cell calibration", bench.cell_calibration, 1);
-  add_common(sources, "cross-axis", bench.cross_axis, 1);
+  add_common(sources, "cell calibration", "calibration", bench.cell_calibration, 1);
+  add_common(sources, "cross-axis", "cross-axis", bench.cross_axis, 1);
   // cos α = 1 − α²/2: no first order. The standard deviation of α²/2 is u²/√2.
-  add_common(sources, "alignment", bench.alignment_rad, bench.alignment_rad.value_or(0) / std::numbers::sqrt2, "rad",
-             "second order");
-  add_common(sources, "motor clock", bench.motor_clock, -2);
+  add_common(sources, "alignment", "alignment-deg", bench.alignment_rad,
+             bench.alignment_rad.value_or(0) / std::numbers::sqrt2, "rad", "second order");
+  add_common(sources, "motor clock", "clock", bench.motor_clock, -2);
 }
 
 void add_repeatability(ErrorSources& sources, const Repeatability& all) {

@@ -16,12 +16,19 @@ struct Row {
   Estimate k;
 };
 
-std::vector<Row> occluded_rows(std::span<const FamilyMember* const> members) {
+/// From the air of its day into the common one.
+double scale_of(const Identification& one, Air air) {
+  return air == Air::standard && one.air ? kStandardDensity / one.air->kg_m3 : 1;
+}
+
+std::vector<Row> occluded_rows(std::span<const FamilyMember* const> members, Air air) {
   std::vector<Row> rows;
   for (std::size_t j = 0; j < members.size(); ++j) {
-    const auto& table = members[j]->identification.table;
-    for (const OcclusionCoefficient& row : table) {
-      if (row.phi_deg > 0 && row.standard_error > 0) rows.push_back({j, row.phi_deg, {row.k, row.standard_error}});
+    const Identification& one = members[j]->identification;
+    const double scale = scale_of(one, air);
+    for (const OcclusionCoefficient& row : one.table) {
+      if (row.phi_deg > 0 && row.standard_error > 0)
+        rows.push_back({j, row.phi_deg, {scale * row.k, scale * row.standard_error}});
     }
   }
   return rows;
@@ -49,12 +56,20 @@ Regression fit_lines(const std::vector<Row>& rows, std::size_t members, bool sha
 
 }  // namespace
 
+Air common_air(std::span<const FamilyMember> family) {
+  const bool known = std::all_of(family.begin(), family.end(), [](const FamilyMember& member) {
+    return member.identification.air && !member.analysis.standard.empty();
+  });
+  return known ? Air::standard : Air::measured;
+}
+
 std::vector<SharedSlope> shared_slopes(std::span<const FamilyMember> family) {
+  const Air air = common_air(family);
   std::map<double, std::vector<const FamilyMember*>> by_diameter;
   for (const FamilyMember& member : family) by_diameter[member.identification.diameter_in].push_back(&member);
   std::vector<SharedSlope> result;
   for (const auto& [diameter, members] : by_diameter) {
-    const std::vector<Row> rows = occluded_rows(members);
+    const std::vector<Row> rows = occluded_rows(members, air);
     const std::size_t n = members.size();
     if (n < 2 || rows.size() < 2 * n) continue;
     const Regression shared = fit_lines(rows, n, true), own = fit_lines(rows, n, false);
@@ -83,6 +98,7 @@ std::optional<FamilyPrediction> predict(std::span<const FamilyMember> family, do
   std::set<int> blade_numbers;
   for (const FamilyMember& member : family) blade_numbers.insert(member.identification.blades);
   const bool by_blades = blade_numbers.size() > 1;
+  const Air air = common_air(family);
   const auto terms_at = [&](int b, double phi) {
     std::vector<double> terms{1};
     if (by_blades) terms.push_back(b);
@@ -97,7 +113,7 @@ std::optional<FamilyPrediction> predict(std::span<const FamilyMember> family, do
     for (const OcclusionCoefficient& row : one.table) {
       if ((row.phi_deg > 0) != (phi_deg > 0)) continue;
       design.push_back(terms_at(one.blades, row.phi_deg));
-      reduced.push_back(row.k / std::pow(one.diameter_in, 4));
+      reduced.push_back(scale_of(one, air) * row.k / std::pow(one.diameter_in, 4));
       owner.push_back(j);
     }
   }

@@ -1,6 +1,7 @@
 // Several propellers together: lines with one slope per diameter, and what they let expect of one not tested.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -15,10 +16,15 @@ struct FamilyMember {
   Analysis analysis;
 };
 
+/// In which air k is compared from propeller to propeller: in standard air, where that of all of them is known, since
+/// days differ by some percent.
+enum class Air : std::uint8_t { measured, standard };
+[[nodiscard]] Air common_air(std::span<const FamilyMember> family);
+
 /// Lines of one diameter with a slope in common.
 struct SharedSlope {
   double diameter_in = 0;
-  Estimate slope;                    ///< N/(rad/s)²/deg
+  Estimate slope;                    ///< N/(rad/s)²/deg, in the common air
   std::vector<Estimate> intercepts;  ///< one per member of that diameter, in their order
   std::vector<std::string> propellers;
   StatisticalTest equal_slopes;
@@ -31,7 +37,7 @@ struct FamilyPrediction {
   double diameter_in = 0;
   int blades = 0;
   double phi_deg = 0;
-  Estimate k;                   ///< N/(rad/s)², u with the scatter of propellers about the rule
+  Estimate k;                   ///< N/(rad/s)², in the common air, u with the scatter of propellers about the rule
   double lower = 0, upper = 0;  ///< 95 %
 };
 

@@ -51,7 +51,7 @@ PropellerSize parse_propeller_size(const std::string& text) {
 }
 
 FamilyFindings findings_of(std::span<const FamilyMember> family, std::span<const PropellerSize> sizes) {
-  FamilyFindings findings{test_claims(family), shared_slopes(family), {}};
+  FamilyFindings findings{common_air(family), test_claims(family), shared_slopes(family), {}};
   std::set<double> phis;
   for (const FamilyMember& member : family)
     for (const OcclusionCoefficient& row : member.identification.table) phis.insert(row.phi_deg);
@@ -76,6 +76,9 @@ std::string family_text(const FamilyFindings& findings) {
   std::string text = fmt::format("{:<11} {:>12} {:>24} {:>24}  {:<9} {}\n", "verdict", "found", "95 %", "allowed",
                                  "unit", "the paper's statement");
   for (const Claim& claim : findings.claims) text += claim_line(claim);
+  text += findings.air == Air::standard
+              ? "\nPropellers are compared in standard air, 1.225 kg/m3.\n"
+              : "\nPropellers are compared in the air of their days: not all densities are known.\n";
   if (!findings.slopes.empty()) text += "\nOne slope for each diameter\n";
   for (const SharedSlope& one : findings.slopes) text += slope_line(one);
   if (!findings.predictions.empty()) text += "\nExpected of propellers that were not measured\n";
@@ -102,6 +105,7 @@ Json to_json(const FamilyFindings& findings) {
                            {"upper", one.upper}});
   }
   return {{"k_unit", "N/(rad/s)^2"},
+          {"air", findings.air == Air::standard ? "standard" : "measured"},
           {"claims", to_json(findings.claims)},
           {"shared_slopes", slopes},
           {"predictions", predictions}};

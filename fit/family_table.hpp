@@ -21,6 +21,7 @@ struct PropellerSize {
 [[nodiscard]] PropellerSize parse_propeller_size(const std::string& text);
 
 struct FamilyFindings {
+  Air air = Air::measured;  ///< in which propellers are compared
   std::vector<Claim> claims;
   std::vector<SharedSlope> slopes;
   std::vector<FamilyPrediction> predictions;

@@ -10,6 +10,7 @@
 #include "fit/detail_figures.hpp"
 #include "fit/figure_style.hpp"
 #include "fit/gnuplot.hpp"
+#include "fit/power.hpp"
 #include "results/file_layer.hpp"
 #include "results/number.hpp"
 
@@ -174,6 +175,7 @@ Figures draw_figures(const Identification& identification, const std::vector<Thr
     wanted.push_back(speed_figure(identification));
     wanted.push_back(repetition_figure(identification));
   }
+  if (!power_of(identification.selection.used).empty()) wanted.push_back(power_figure(identification));
   if (settling != nullptr && !settling->thrust_n.empty()) wanted.push_back(settling_figure(*settling));
   return draw(wanted, folder, gnuplot);
 }

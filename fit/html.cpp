@@ -1,5 +1,11 @@
 #include "fit/html.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
 #include <cstdint>
 #include <pugixml.hpp>
 #include <sstream>
@@ -91,6 +97,43 @@ std::string inline_svg(std::string_view svg, const std::string& prefix) {
   std::ostringstream text;
   root.print(text, "", pugi::format_raw | pugi::format_no_declaration);
   return std::move(text).str();
+}
+
+std::string typeset(std::string_view text) {
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kSigns{{{"K_T", "K<sub>T</sub>"},
+                                                                                        {"k_i", "k<sub>i</sub>"},
+                                                                                        {"w^2", "ω²"},
+                                                                                        {"phi", "φ"},
+                                                                                        {" deg", "°"},
+                                                                                        {"RPM^2", "RPM²"},
+                                                                                        {")^2", ")²"},
+                                                                                        {"D^4", "D⁴"}}};
+  std::string result = html_escaped(text);
+  const auto letter = [&](std::size_t at) {
+    return at < result.size() && std::isalpha(static_cast<unsigned char>(result[at])) != 0;
+  };
+  for (const auto& [plain, set] : kSigns) {
+    for (std::size_t at = result.find(plain); at != std::string::npos; at = result.find(plain, at + 1)) {
+      const bool in_a_word = letter(at + plain.size()) || (at > 0 && letter(at) && letter(at - 1));
+      if (!in_a_word) result.replace(at, plain.size(), set);
+    }
+  }
+  return result;
+}
+
+std::string with_power_of_ten(double value, double error) {
+  if (!(std::abs(value) > 0) || !std::isfinite(value)) return fmt::format("{:.5e}", value);
+  static constexpr std::array kDigits{"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
+  const int exponent = static_cast<int>(std::floor(std::log10(std::abs(value))));
+  const double unit = std::pow(10, exponent);
+  const bool known = error > 0 && std::isfinite(error);
+  const int digits = known ? std::clamp(1 - static_cast<int>(std::floor(std::log10(error / unit))), 0, 12) : 5;
+  std::string power = exponent < 0 ? "⁻" : "";
+  for (const char c : fmt::format("{}", std::abs(exponent))) power += kDigits[static_cast<std::size_t>(c - '0')];
+  const std::string sign = value < 0 ? "−" : "";
+  const std::string number = fmt::format("{}{:.{}f}", sign, std::abs(value) / unit, digits);
+  return known ? fmt::format("({} ± {:.{}f}) × 10{}", number, error / unit, digits, power)
+               : fmt::format("{} × 10{}", number, power);
 }
 
 }  // namespace kphi::fit

@@ -117,6 +117,17 @@ void require_one_propeller(std::span<const StepMean> steps) {
   }
 }
 
+/// A run that is not there was meant to be another.
+void require_runs(std::span<const StepMean> steps, const std::vector<LeftOutRun>& left_out) {
+  for (const LeftOutRun& run : left_out) {
+    const bool there = std::any_of(steps.begin(), steps.end(), [&](const StepMean& step) {
+      return step.occlusion_deg == run.phi_deg && step.repetition == run.repetition;
+    });
+    if (!there)
+      throw FitError(fmt::format("no run at phi = {} deg, repetition {}, to leave out", run.phi_deg, run.repetition));
+  }
+}
+
 StepsByAngle by_angle(std::span<const StepMean> steps) {
   StepsByAngle result;
   for (const StepMean& step : steps) result[step.occlusion_deg].push_back(step);
@@ -192,7 +203,9 @@ Identification identify(std::span<const StepMean> steps, const IdentificationOpt
   result.propeller = steps.front().propeller;
   result.diameter_in = steps.front().diameter_in;
   result.blades = steps.front().blades;
-  result.selection = select_steps(steps, options.speed_range);
+  require_runs(steps, options.left_out);
+  result.left_out = options.left_out;
+  result.selection = select_steps(steps, options.speed_range, options.left_out);
   result.air = air_of(result.selection.used);
   const StepsByAngle angles = by_angle_or_refuse(result.selection);
   result.at_speed_rad_s = options.at_speed_rad_s.value_or(highest_common_level(angles));

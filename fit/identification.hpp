@@ -28,6 +28,7 @@ struct IdentificationOptions {
   Weighting weighting = Weighting::equal;
   Loss loss = Loss::none;
   SpeedRange speed_range{.min_rad_s = kSpeedMinRpm * 3.14159265358979323846 / 30};
+  std::vector<LeftOutRun> left_out{};
   std::optional<double> at_speed_rad_s;  ///< for "k at speed"; default: the highest level measured at every φ
   LineFitOptions line;
 };
@@ -57,7 +58,8 @@ struct Identification {
   LineFit line;
   Repeatability repeatability;  ///< one angle per row of the table; empty in a table that came without steps
   StepSelection selection;
-  std::optional<AirDensity> air;  ///< of the steps used; none: unknown, and so is every k at standard density
+  std::vector<LeftOutRun> left_out;  ///< by hand
+  std::optional<AirDensity> air;     ///< of the steps used; none: unknown, and so is every k at standard density
   Estimator estimator = Estimator::through_origin;
   Weighting weighting = Weighting::equal;
   Loss loss = Loss::none;

@@ -2,9 +2,19 @@
 
 #include <fmt/format.h>
 
+#include <memory>
+
 #include "fit/fit_error.hpp"
 
 namespace kphi::fit {
+
+ceres::Problem::Options problem_options() {
+  static const std::unique_ptr<ceres::Context> context(ceres::Context::Create());
+  ceres::Problem::Options options;
+  options.context = context.get();
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  return options;
+}
 
 void solve_exactly(ceres::Problem& problem, const char* what) {
   ceres::Solver::Options options;

@@ -8,6 +8,10 @@
 
 namespace kphi::fit {
 
+/// For every problem of this folder: they share one context, since each of its own would start a thread of its own.
+/// Loss functions stay the caller's.
+[[nodiscard]] ceres::Problem::Options problem_options();
+
 /// Solves to rounding (the problems here are linear and scaled to about 1) and says nothing on stdout or stderr.
 /// Throws FitError, naming `what`, when Ceres does not converge.
 void solve_exactly(ceres::Problem& problem, const char* what);

@@ -148,7 +148,7 @@ LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& option
 
   const double phi_scale = fit.points.back().phi_deg;
   double intercept = fit.K_T / k_scale, slope = 0;
-  ceres::Problem problem;
+  ceres::Problem problem(problem_options());
   for (std::size_t i = 0; i < fit.points.size(); ++i) {
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<LineResidual, 1, 1, 1>(new LineResidual{
                                  fit.points[i].phi_deg / phi_scale, fit.points[i].k / k_scale, sigmas[i] / k_scale}),

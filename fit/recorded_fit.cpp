@@ -51,6 +51,11 @@ std::string format_fit_options(const Identification& identification, const std::
     text += fmt::format(", speed_range_rpm: [{}, {}]", yaml_number(printed_rpm(identification.fitted.min_rad_s)),
                         yaml_number(printed_rpm(identification.fitted.max_rad_s)));
   }
+  std::string left_out;
+  for (const LeftOutRun& run : identification.left_out)
+    left_out += fmt::format("{}{}", left_out.empty() ? "" : ", ",
+                            quoted(fmt::format("{}:{}:{}", results::shortest(run.phi_deg), run.repetition, run.cause)));
+  if (!left_out.empty()) text += ", leave_out: [" + left_out + "]";
   if (!bench) return text;
   std::string known;
   for (const auto& [name, value] : known_uncertainties(*bench))
@@ -78,6 +83,8 @@ RecordedFit read_recorded_fit(const std::string& path) {
   record.options.weighting =
       named(fit, "weights", path, {Weighting::equal, Weighting::thrust, Weighting::effective_variance});
   record.options.loss = named(fit, "loss", path, {Loss::none, Loss::huber, Loss::cauchy, Loss::tukey});
+  for (const YAML::Node& run : fit["leave_out"])
+    record.options.left_out.push_back(parse_left_out_run(run.as<std::string>("")));
   record.bench = bench_of(fit["u"], path);
   return record;
 }

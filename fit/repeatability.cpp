@@ -8,6 +8,12 @@ namespace {
 
 double count(const AngleScatter& angle) { return static_cast<double>(angle.runs.size()); }
 
+double mean_of(const AngleScatter& angle) {
+  double mean = 0;
+  for (const RunSums& run : angle.runs) mean += run.k() / count(angle);
+  return mean;
+}
+
 double between_u(const Repeatability& all, const AngleScatter& angle) {
   return all.between.u * std::abs(angle.k) / std::sqrt(std::max(1.0, count(angle)));
 }
@@ -52,6 +58,39 @@ Repeatability repeatability(std::vector<AngleScatter> angles) {
   result.repeated = freedom > 0;
   if (result.repeated) result.between = {0, std::sqrt(std::max(0.0, squares - expected) / freedom), freedom};
   return result;
+}
+
+std::vector<OutlyingRun> outlying_runs(const Repeatability& all) {
+  double scatter = 0, noise = 0, freedom = 0;  // shares of k, squared
+  for (const AngleScatter& angle : all.angles) {
+    for (const RunSums& run : angle.runs) scatter += std::pow((run.k() - mean_of(angle)) / angle.k, 2);
+    freedom += count(angle) - 1;
+    noise += (count(angle) - 1) * angle.within.variance / (angle.k * angle.k);
+  }
+  const double beyond = std::max(0.0, scatter - noise) / freedom;
+  std::vector<OutlyingRun> runs;
+  std::vector<double> squared;  // deviations in their variance
+  double squares = 0;
+  for (const AngleScatter& angle : all.angles) {
+    const double n = count(angle), mean = mean_of(angle);
+    const double variance = (angle.within.variance + beyond * angle.k * angle.k) * (1 - 1 / n);
+    for (const RunSums& run : angle.runs) {
+      const double off = run.k() - mean;
+      if (n < 2 || !(variance > 0)) continue;
+      runs.push_back({run.phi_deg, run.repetition, run.k() / (mean - off / (n - 1)) - 1, 1});
+      squared.push_back(off * off / variance);
+      squares += squared.back() * (n - 1) / n;
+    }
+  }
+  std::vector<OutlyingRun> outlying;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const double rest = (squares - squared[i]) / (freedom - 1);
+    if (freedom < 3 || !(rest > 0)) continue;
+    const StatisticalTest test = student_test({std::sqrt(squared[i]), std::sqrt(rest), freedom - 1}, 0);
+    runs[i].p = std::min(1.0, test.p * static_cast<double>(runs.size()));
+    if (runs[i].p < kTestLevel) outlying.push_back(runs[i]);
+  }
+  return outlying;
 }
 
 double Repeatability::independent_u(std::size_t i) const {

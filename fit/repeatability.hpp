@@ -35,6 +35,18 @@ struct Repeatability {
 
 [[nodiscard]] Repeatability repeatability(std::vector<AngleScatter> angles);
 
+/// A run further from the others of its φ than chance explains. It stays in k, and in what repetitions scatter.
+struct OutlyingRun {
+  double phi_deg = 0;
+  int repetition = 0;
+  double share = 0;  ///< its k / mean of the others − 1
+  double p = 1;      ///< of one of all runs so far off by chance
+};
+
+/// By externally studentised residuals (Cook, Weisberg: Residuals and Influence in Regression, 1982, 2.2), the scatter
+/// pooled over all φ without the run judged, corrected for their number (Bonferroni); level 5 % for the campaign.
+[[nodiscard]] std::vector<OutlyingRun> outlying_runs(const Repeatability& all);
+
 [[nodiscard]] AngleScatter scatter_of_angle(double k, std::vector<RunSums> runs, const WithinRuns& within);
 
 }  // namespace kphi::fit

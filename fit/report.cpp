@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 
 #include "compensation/units.hpp"
 #include "fit/analysis_section.hpp"
@@ -24,22 +25,6 @@ std::string rpm(double speed_rad_s) { return fmt::format("{:.0f}", to_rpm(RadPer
 double per_rpm2(double k) { return to_newtons_per_rpm2(ThrustCoefficient(k)); }
 std::string angle(double phi_deg) { return fmt::format("{:g}°", phi_deg); }
 
-/// "1.550197e-06 ± 2.7e-11" as people write it: (1.550197 ± 0.000027) × 10⁻⁶, with a true minus.
-std::string pretty(double value, double error) {
-  if (!(std::abs(value) > 0) || !std::isfinite(value)) return with_error(value, error);
-  static constexpr std::array kDigits{"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
-  const int exponent = static_cast<int>(std::floor(std::log10(std::abs(value))));
-  const double unit = std::pow(10, exponent);
-  const bool known = error > 0 && std::isfinite(error);
-  const int digits = known ? std::clamp(1 - static_cast<int>(std::floor(std::log10(error / unit))), 0, 12) : 5;
-  std::string power = exponent < 0 ? "⁻" : "";
-  for (const char c : fmt::format("{}", std::abs(exponent))) power += kDigits[static_cast<std::size_t>(c - '0')];
-  const std::string sign = value < 0 ? "−" : "";
-  const std::string number = fmt::format("{}{:.{}f}", sign, std::abs(value) / unit, digits);
-  return known ? fmt::format("({} ± {:.{}f}) × 10{}", number, error / unit, digits, power)
-               : fmt::format("{} × 10{}", number, power);
-}
-
 /// Two decimals with a true minus, and no minus before nothing.
 std::string signed_percent(double percent) {
   const std::string digits = fmt::format("{:.2f}", std::abs(percent));
@@ -52,7 +37,7 @@ std::string card(const std::string& title, double value, double error, const cha
   return fmt::format(
       "<div class=\"card\"><h3>{}</h3><div class=\"value\">{} <span class=\"unit\">{}</span></div>"
       "<p>{} {}</p>{}</div>\n",
-      title, pretty(value, error), si, pretty(per_rpm2(value), per_rpm2(error)), rpm_unit, more);
+      title, with_power_of_ten(value, error), si, with_power_of_ten(per_rpm2(value), per_rpm2(error)), rpm_unit, more);
 }
 
 std::string headline(const Identification& identification) {
@@ -98,24 +83,32 @@ std::string standard_section(const Identification& identification) {
   for (const OcclusionCoefficient& row : identification.table) {
     if (!row.standard) continue;
     html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td></tr>\n", angle(row.phi_deg),
-                        pretty(row.standard->k, row.standard->standard_error),
-                        pretty(per_rpm2(row.standard->k), per_rpm2(row.standard->standard_error)));
+                        with_power_of_ten(row.standard->k, row.standard->standard_error),
+                        with_power_of_ten(per_rpm2(row.standard->k), per_rpm2(row.standard->standard_error)));
   }
   return html + "</tbody></table></div>\n<p class=\"note\">± includes the standard uncertainty of the density.</p>\n";
 }
 
+std::string power_row(const StepPower& row) {
+  return fmt::format(
+      "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.4f}</td><td>{:.2f}</td><td>{:.3f}</td><td>{:.5f}</td><td "
+      "class=\"text\">{}</td></tr>\n",
+      angle(row.phi_deg), row.step + 1, rpm(row.speed_rad_s), row.thrust_n, row.power_w, row.gram_per_watt(),
+      row.newton_per_watt(), row.by_supply ? "supply" : "module");
+}
+
+/// A few steps of each φ, the fastest among them: the figure has all.
 std::string power_section(const Identification& identification) {
-  const std::vector<StepPower> rows = power_of(identification.selection.used);
-  if (rows.empty()) return {};
+  constexpr std::size_t kRows = 5;
+  std::map<double, std::vector<StepPower>> by_angle;
+  for (const StepPower& row : power_of(identification.selection.used)) by_angle[row.phi_deg].push_back(row);
+  if (by_angle.empty()) return {};
   std::string html =
       "<h2>Power</h2>\n<div class=\"scroll\"><table><thead><tr><th>φ</th><th>step</th><th>speed, RPM</th><th>thrust, "
       "N</th><th>power, W</th><th>g/W</th><th>N/W</th><th class=\"text\">measured by</th></tr></thead><tbody>\n";
-  for (const StepPower& row : rows) {
-    html += fmt::format(
-        "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.4f}</td><td>{:.2f}</td><td>{:.3f}</td><td>{:.5f}</td><td "
-        "class=\"text\">{}</td></tr>\n",
-        angle(row.phi_deg), row.step + 1, rpm(row.speed_rad_s), row.thrust_n, row.power_w, row.gram_per_watt(),
-        row.newton_per_watt(), row.by_supply ? "supply" : "module");
+  for (const auto& [phi, rows] : by_angle) {
+    const std::size_t n = std::min(kRows, rows.size());
+    for (std::size_t i = 1; i <= n; ++i) html += power_row(rows[i * rows.size() / n - 1]);
   }
   return html + "</tbody></table></div>\n";
 }
@@ -132,35 +125,37 @@ std::string lead(const Identification& identification) {
   return "<p class=\"lead\">" + text + "</p>\n";
 }
 
-std::string at_speed_cell(const OcclusionCoefficient& row) {
-  return row.at_speed ? pretty(row.at_speed->k, row.at_speed->standard_error) : "–";
+/// N/(rad/s)², and below it N/RPM².
+std::string both_units(double k, double error) {
+  return with_power_of_ten(k, error) + "<br/><span class=\"soft\">" + with_power_of_ten(per_rpm2(k), per_rpm2(error)) +
+         "</span>";
+}
+
+std::string coefficient_row(const OcclusionCoefficient& row, const Identification& identification) {
+  const LineFit& line = identification.line;
+  return fmt::format(
+      "<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.1f} %</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+      angle(row.phi_deg), both_units(row.k, row.standard_error),
+      row.at_speed ? both_units(row.at_speed->k, row.at_speed->standard_error) : "–",
+      100 * share_of(identification, row), signed_percent(100 * (line.at(row.phi_deg) - row.k) / line.K_T),
+      row.fit ? fmt::format("{:.2f}", 1e3 * row.fit->rms_n) : "–",
+      row.fit ? fmt::format("{:.5f}", row.fit->r_squared) : "–", row.fit ? fmt::format("{}", row.fit->n) : "–");
 }
 
 std::string coefficient_table(const Identification& identification) {
-  const LineFit& line = identification.line;
   const std::string at = identification.at_speed_rad_s > 0 ? " at " + rpm(identification.at_speed_rad_s) + " RPM" : "";
   std::string html = fmt::format(
-      "<h2>Coefficients</h2>\n<div class=\"scroll\"><table><thead><tr><th>φ</th><th>k, N/(rad/s)²</th><th>k, "
-      "N/RPM²</th>"
-      "<th>k{}, N/(rad/s)²</th><th>thrust share{}</th><th>line − k</th><th>residual rms, "
-      "N</th><th>R²</th><th>n</th></tr>"
-      "</thead><tbody>\n",
+      "<h2>Coefficients</h2>\n<div class=\"scroll\"><table><thead><tr><th>φ</th><th>k, N/(rad/s)²<br/><span "
+      "class=\"soft\">N/RPM²</span></th><th>k{}, N/(rad/s)²<br/><span class=\"soft\">N/RPM²</span></th><th>thrust "
+      "share<br/>{}</th><th>line − k</th><th>residual<br/>rms, mN</th><th>R²</th><th>steps</th></tr></thead><tbody>\n",
       at, at);
-  for (const OcclusionCoefficient& row : identification.table) {
-    html += fmt::format(
-        "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></"
-        "tr>\n",
-        angle(row.phi_deg), pretty(row.k, row.standard_error), pretty(per_rpm2(row.k), per_rpm2(row.standard_error)),
-        at_speed_cell(row), fmt::format("{:.1f} %", 100 * share_of(identification, row)),
-        signed_percent(100 * (line.at(row.phi_deg) - row.k) / line.K_T),
-        row.fit ? fmt::format("{:.4f}", row.fit->rms_n) : "–",
-        row.fit ? fmt::format("{:.5f}", row.fit->r_squared) : "–", row.fit ? fmt::format("{}", row.fit->n) : "–");
-  }
+  for (const OcclusionCoefficient& row : identification.table) html += coefficient_row(row, identification);
   return html +
-         "</tbody></table></div>\n<p class=\"note\">± is one standard error: of k from the residuals of the fit, of k "
-         "at one speed from the repetitions. It holds no error that all steps share (calibration of the load cell, air "
-         "density, mounting). Line − k is in percent of K<sub>T</sub>; the thrust share is k over k(0) at the same "
-         "speed.</p>\n";
+         "</tbody></table></div>\n<p class=\"note\">± is one standard error: of k from noise, zero and scatter between "
+         "the runs, of k at one speed from the repetitions. It holds no error that all steps share (calibration of the "
+         "load cell, air density, mounting); the budget below does. Line − k is in percent of K<sub>T</sub>; the "
+         "thrust "
+         "share is k over k(0) at the same speed.</p>\n";
 }
 
 /// Numbers run through the page, and keep apart the ids of drawings.
@@ -168,7 +163,7 @@ std::string figure_block(const DrawnFigure& figure, int number) {
   std::ifstream file(figure.svg, std::ios::binary);
   const std::string svg((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   return fmt::format("<figure>\n{}\n<figcaption><b>Figure {}.</b> {}</figcaption>\n</figure>\n",
-                     inline_svg(svg, fmt::format("figure{}-", number)), number, html_escaped(figure.caption));
+                     inline_svg(svg, fmt::format("figure{}-", number)), number, typeset(figure.caption));
 }
 
 std::string skipped_note(const Figures& figures) {
@@ -192,7 +187,7 @@ std::string doubt_section(const StepSelection& selection) {
       selection.used.size(), left_out, selection.outside_range);
   if (selection.doubtful.empty()) return html;
   html +=
-      "<div class=\"scroll\"><table><thead><tr><th>φ</th><th>repetition</th><th>step</th><th>commanded, RPM</th>"
+      "<div class=\"scroll long\"><table><thead><tr><th>φ</th><th>repetition</th><th>step</th><th>commanded, RPM</th>"
       "<th>measured, RPM</th><th>thrust, N</th><th class=\"text\">doubt</th><th "
       "class=\"text\">verdict</th></tr></thead>"
       "<tbody>\n";
@@ -250,7 +245,7 @@ std::string run_row(const RunProvenance& run, const StepSelection& selection) {
 std::string run_section(const Provenance& provenance, const StepSelection& selection) {
   if (provenance.runs.empty() && provenance.rejected.empty()) return {};
   std::string html =
-      "<h2>Runs</h2>\n<div class=\"scroll\"><table><thead><tr><th class=\"text\">file</th><th "
+      "<h2>Runs</h2>\n<div class=\"scroll long\"><table><thead><tr><th class=\"text\">file</th><th "
       "class=\"text\">outcome</th><th>steps fitted</th><th>left out</th><th>samples expected</th><th>received</th>"
       "<th>lost</th><th class=\"text\">doubts and events</th></tr></thead><tbody>\n";
   for (const RunProvenance& run : provenance.runs) html += run_row(run, selection);
@@ -266,7 +261,7 @@ std::string run_section(const Provenance& provenance, const StepSelection& selec
 std::string hash_section(const std::vector<RunProvenance>& runs) {
   if (runs.empty()) return {};
   std::string html =
-      "<h2>Hashes of the runs</h2>\n<div class=\"scroll\"><table><thead><tr><th class=\"text\">file</th><th "
+      "<h2>Hashes of the runs</h2>\n<div class=\"scroll long\"><table><thead><tr><th class=\"text\">file</th><th "
       "class=\"text\">SHA-256</th></tr></thead><tbody>\n";
   for (const RunProvenance& run : runs)
     html += fmt::format("<tr><td class=\"text\">{}</td><td class=\"hash\">{}</td></tr>\n", html_escaped(run.file),
@@ -280,6 +275,11 @@ std::string entry(const char* term, const std::string& description) {
 
 std::string optional_number(std::optional<double> value, const char* unit) {
   return value && std::isfinite(*value) ? fmt::format("{:g} {}", *value, unit) : "unknown";
+}
+
+std::string overlap_words(compensation::OverlapMeasure measure) {
+  const std::string name(compensation::name_of(measure));
+  return name + ": φ must be measured so in flight; on the bench's sector plates all measures are the same angle";
 }
 
 std::string clock_words(const MotorClock& clock) {
@@ -302,7 +302,7 @@ std::string provenance_section(const Identification& identification, const Prove
   if (identification.speed_max_rad_s > identification.speed_min_rad_s)
     html +=
         entry("Speeds", rpm(identification.speed_min_rad_s) + " to " + rpm(identification.speed_max_rad_s) + " RPM");
-  html += entry("Overlap", std::string(compensation::name_of(identification.overlap)));
+  html += entry("Overlap", overlap_words(identification.overlap));
   const auto& air = identification.air;
   html += entry("Air density", air ? fmt::format("{:.4f} ± {:.4f} kg/m³", air->kg_m3, air->u_kg_m3) : "unknown");
   html += entry("Supply", optional_number(provenance.supply_v, "V"));
@@ -334,8 +334,10 @@ std::string page_head(const std::string& title, const std::string& heading, cons
 /// The first figure belongs to the headline, the others behind the table.
 std::string body(const Identification& identification, const Provenance& provenance, const Figures& figures,
                  const Analysis* analysis, int& number) {
-  std::string html = lead(identification) + headline(identification) + figure_blocks(figures, 0, 1, number) +
-                     skipped_note(figures) + coefficient_table(identification) + standard_section(identification);
+  std::string html =
+      lead(identification) + headline(identification) + figure_blocks(figures, 0, 1, number) + skipped_note(figures);
+  if (analysis != nullptr) html += remark_section(analysis->remarks);
+  html += coefficient_table(identification) + standard_section(identification);
   const std::string details = figure_blocks(figures, 1, figures.drawn.size(), number);
   if (!details.empty()) html += "<h2>How well the model holds</h2>\n" + details;
   if (analysis != nullptr) html += analysis_sections(*analysis);
@@ -357,9 +359,10 @@ std::string family_table(const std::vector<Chapter>& chapters) {
     html += fmt::format(
         "<tr><td class=\"text\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
         html_escaped(one.propeller), one.diameter_in > 0 ? fmt::format("{:g}", one.diameter_in) : "–",
-        one.blades > 0 ? fmt::format("{}", one.blades) : "–", pretty(one.line.K_T, one.line.K_T_standard_error),
+        one.blades > 0 ? fmt::format("{}", one.blades) : "–",
+        with_power_of_ten(one.line.K_T, one.line.K_T_standard_error),
         diameter_m > 0 ? fmt::format("{:.5f}", one.line.K_T / std::pow(diameter_m, 4)) : "–",
-        pretty(one.line.slope_per_deg, std::sqrt(one.line.covariance[1][1])),
+        with_power_of_ten(one.line.slope_per_deg, std::sqrt(one.line.covariance[1][1])),
         fmt::format("{}{:.4f}", one.line.slope_per_deg < 0 ? "−" : "+",
                     std::abs(100 * one.line.slope_per_deg / one.line.K_T)));
   }

@@ -8,7 +8,7 @@ const char* report_style() {
 *{box-sizing:border-box}
 html{-webkit-text-size-adjust:100%}
 body{font:16px/1.55 system-ui,-apple-system,"Segoe UI",Roboto,"Helvetica Neue",Arial,"DejaVu Sans",sans-serif;
- color:var(--ink);background:#fff;max-width:66rem;margin:0 auto;padding:2.5rem 1.5rem 4rem}
+ color:var(--ink);background:#fff;max-width:70rem;margin:0 auto;padding:2.5rem 1.5rem 4rem}
 header{border-bottom:3px solid var(--ink);padding-bottom:1rem;margin-bottom:1.5rem}
 h1{font-size:1.9rem;line-height:1.2;letter-spacing:-.01em;margin:0 0 .3rem}
 h2{font-size:1.25rem;line-height:1.3;margin:2.75rem 0 .8rem;padding-bottom:.3rem;border-bottom:1px solid var(--rule)}
@@ -39,16 +39,19 @@ th.text,td.text{text-align:left;white-space:normal}
 td.bad{color:#9c3d00;font-weight:600}
 td.hash{text-align:left;font:.68rem/1.4 ui-monospace,"DejaVu Sans Mono",Menlo,monospace;white-space:normal;
  word-break:break-all;color:var(--soft)}
+.soft{color:var(--soft)}
+.remarks{background:var(--panel);border-left:4px solid var(--accent);padding:.7rem 1.2rem;margin:1.2rem 0}
+.remarks h3{margin:0 0 .3rem;font-size:.95rem}.remarks ul{margin:0;padding-left:1.2rem}.remarks li{margin:.15rem 0}
 .warning{background:#fff5e9;border-left:4px solid var(--accent);padding:.6rem 1rem}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:.3rem 1.4rem;margin:0;font-size:.92rem}
 dt{color:var(--soft)}dd{margin:0;overflow-wrap:anywhere}
 @media (max-width:40rem){dl{grid-template-columns:1fr}dd{margin-bottom:.4rem}}
 @page{size:A4;margin:16mm 15mm 18mm}
 @media print{body{margin:0;padding:0;max-width:none;font-size:9.5pt}
- .card,figure,tr,.warning{break-inside:avoid}h2{break-after:avoid}h2.chapter{break-before:page}
+ .card,figure,tr,.warning,.remarks,.scroll{break-inside:avoid}.scroll.long{break-inside:auto}h2{break-after:avoid}h2.chapter{break-before:page}
  thead{display:table-header-group}.scroll{overflow:visible}table{font-size:7.6pt}th,td{padding:.2rem .35rem}
- .cards{grid-template-columns:repeat(3,1fr);gap:.6rem}.card{padding:.5rem .6rem}.card .value{font-size:10.5pt;white-space:normal}
- figure{margin:.8rem 0 1.2rem}figure svg{max-width:none;width:92%}nav{display:none}
+ .cards{grid-template-columns:repeat(3,1fr);gap:.6rem}.card{padding:.45rem .55rem}.card h3,.card p{font-size:7.8pt}.card .value{font-size:9.2pt;white-space:nowrap}
+ figure{margin:.6rem 0 1rem}figure svg{max-width:none;width:78%}nav{display:none}
  *{-webkit-print-color-adjust:exact;print-color-adjust:exact}}
 )";
 }

@@ -88,6 +88,8 @@ void export_run(const ExportRequest& request) {
 void export_coefficients(const ExportRequest& request) {
   const fs::path place(request.file);
   const fs::path file = fs::is_directory(place) ? place / "coefficients.yaml" : place;
+  if (!fs::exists(file))
+    throw ConfigurationError(fmt::format("{}: not fitted yet; `kphi fit {}` comes first", request.file, request.file));
   const compensation::Coefficients coefficients = compensation::load_coefficients(file.string());
   for (const Target& target : targets()) {
     if (request.to != target.name) continue;
@@ -126,7 +128,10 @@ void add_compare(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember({"agree", "differ"}));
   command->add_flag("--json", request->json, "the comparison as JSON on stdout");
   command->add_flag("--claims", request->claims, "the paper's statements of two propellers, too (default of three)");
-  command->add_option("--predict", request->predict, "k of a propeller that nobody measured, such as 7x3, from three");
+  command
+      ->add_option("--predict", request->predict,
+                   "DIAMETERxBLADES, k of a propeller that nobody measured, from three; may be repeated")
+      ->allow_extra_args(false);
   command->footer(
       "kphi compare results/<monday> results/<tuesday> --expect agree\n"
       "kphi compare results/<5x2> results/<5x3> results/<6x2> results/<6x3> --predict 7x3");
@@ -153,6 +158,8 @@ void add_export(CLI::App& app, int& exit_code) {
   command->add_option("--motors", request->options.motors, "for px4 and gazebo (default 4)")->check(CLI::Range(1, 12));
   command->footer(
       "Targets:\n" + footer +
+      "\nkphi export results/<folder> --to px4 --speed-max-rpm 19100\n"
+      "kphi export results/<folder>/runs/5x3_phi090_rep2.h5 --to mcap --out run.mcap\n"
       "\nWhat a target cannot hold is told on stderr.\n"
       "ArduPilot's MOT_THST_EXPO and Betaflight's thrust_linear are shapes of the command, not k: no export.");
   on_run(*command, exit_code, [request] { run_export(*request); });

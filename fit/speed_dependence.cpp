@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -12,69 +13,81 @@
 namespace kphi::fit {
 namespace {
 
-/// The steps of one level: T about k_run ω², run by run.
-struct Level {
-  std::vector<double> residuals, local_k;
-  double speed = 0, x = 0;
-  [[nodiscard]] double n() const { return static_cast<double>(residuals.size()); }
-  [[nodiscard]] double mean(const std::vector<double>& values) const {
-    double sum = 0;
-    for (const double value : values) sum += value;
-    return sum / n();
-  }
-  [[nodiscard]] double variance(const std::vector<double>& values) const {
-    double squares = 0;
-    for (const double value : values) squares += std::pow(value - mean(values), 2);
-    return squares / (n() - 1);
-  }
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+double mean_of(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value;
+  return sum / static_cast<double>(values.size());
+}
+
+double variance_of(const std::vector<double>& values) {
+  const double mean = mean_of(values);
+  double squares = 0;
+  for (const double value : values) squares += std::pow(value - mean, 2);
+  return squares / static_cast<double>(values.size() - 1);
+}
+
+struct Sample {
+  int level = 0;
+  double speed = 0, x = 0, thrust = 0;  ///< x = ω²
 };
 
-std::map<int, double> k_of_runs(std::span<const results::StepMean> steps) {
-  std::map<int, std::pair<double, double>> sums;
+struct Run {
+  std::vector<Sample> samples;  ///< in the order of their steps
+  double k = 0;                 ///< through the origin
+  double zero_u_n = kNan;       ///< of the zero that they share; NaN: not known
+};
+
+/// Of the zero itself, and rectangular over half of what it moved.
+double zero_u(std::span<const results::StepMean> steps, int repetition) {
+  double told = kNan, low = std::numeric_limits<double>::infinity(), high = -low;
   for (const results::StepMean& step : steps) {
-    const double x = step.speed_rad_s * step.speed_rad_s;
-    sums[step.repetition].first += x * step.thrust_n;
-    sums[step.repetition].second += x * x;
+    if (step.repetition != repetition) continue;
+    if (std::isfinite(step.zero_u_n)) told = std::max(std::isnan(told) ? 0 : told, step.zero_u_n);
+    if (std::isfinite(step.zero_n)) low = std::min(low, step.zero_n), high = std::max(high, step.zero_n);
   }
-  std::map<int, double> k;
-  for (const auto& [repetition, sum] : sums) k[repetition] = sum.first / sum.second;
-  return k;
+  const double moved = high > low ? (high - low) / std::sqrt(12.0) : 0;
+  const double u = std::hypot(std::isnan(told) ? 0 : told, moved);
+  return u > 0 ? u : kNan;
 }
 
-std::map<int, Level> levels_of(std::span<const results::StepMean> steps, const std::map<int, double>& k) {
-  std::map<int, Level> levels;
+std::vector<Run> runs_of(std::span<const results::StepMean> steps) {
+  std::map<int, Run> runs;
   for (const results::StepMean& step : steps) {
-    const double x = step.speed_rad_s * step.speed_rad_s;
-    if (!(x > 0)) continue;
-    Level& level = levels[step.step];
-    level.residuals.push_back(step.thrust_n - k.at(step.repetition) * x);
-    level.local_k.push_back(step.thrust_n / x);
-    level.speed += step.speed_rad_s;
-    level.x += x;
+    if (!(step.speed_rad_s > 0)) continue;
+    runs[step.repetition].samples.push_back(
+        {step.step, step.speed_rad_s, step.speed_rad_s * step.speed_rad_s, step.thrust_n});
   }
-  for (auto& [index, level] : levels) {
-    level.speed /= level.n();
-    level.x /= level.n();
+  std::vector<Run> result;
+  for (auto& [repetition, run] : runs) {
+    double xt = 0, xx = 0;
+    for (const Sample& sample : run.samples) xt += sample.x * sample.thrust, xx += sample.x * sample.x;
+    run.k = xt / xx;
+    run.zero_u_n = zero_u(steps, repetition);
+    std::sort(run.samples.begin(), run.samples.end(),
+              [](const Sample& a, const Sample& b) { return a.level < b.level; });
+    result.push_back(std::move(run));
   }
-  return levels;
+  return result;
 }
 
-/// Variance of one residual as a + b x², neither negative: the cell's noise and the air's.
+/// Variance of one step as a + b x², neither negative: the cell's noise and the air's.
 struct NoiseModel {
-  double constant = 0, growing = 0;
+  double constant = 1, growing = 0;
   [[nodiscard]] double at(double x) const { return constant + growing * x * x; }
 };
 
-/// `scale` makes x about 1.
-NoiseModel noise_of(const std::vector<Level>& levels, double scale) {
-  std::vector<double> squares, variances;
+/// From the variance that the levels show, at x.
+NoiseModel noise_of(const std::vector<double>& x, const std::vector<double>& variances) {
+  const double scale = *std::max_element(x.begin(), x.end());
+  std::vector<double> squares;
   double mean = 0, share = 0, square_sum = 0;
-  for (const Level& level : levels) {
-    squares.push_back(std::pow(level.x / scale, 2));
-    variances.push_back(level.variance(level.residuals));
-    mean += variances.back() / static_cast<double>(levels.size());
-    share += variances.back() * squares.back();
-    square_sum += squares.back() * squares.back();
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    squares.push_back(std::pow(x[i] / scale, 2));
+    mean += variances[i] / static_cast<double>(x.size());
+    share += variances[i] * squares[i];
+    square_sum += squares[i] * squares[i];
   }
   NoiseModel model{mean, 0};
   try {
@@ -90,73 +103,282 @@ NoiseModel noise_of(const std::vector<Level>& levels, double scale) {
   return model;
 }
 
-/// k ω² (1 + c (ω − middle)/range) through all points: c is the change of k over the range.
-Estimate change_of(std::span<const results::StepMean> steps, const std::map<int, double>& k, double slowest,
-                   double fastest) {
-  std::vector<std::vector<double>> rows;
-  std::vector<double> thrusts;
-  for (const results::StepMean& step : steps) {
-    const double x = step.speed_rad_s * step.speed_rad_s;
-    rows.emplace_back();
-    double mean_k = 0;
-    for (const auto& [repetition, run_k] : k) {
-      rows.back().push_back(repetition == step.repetition ? x : 0);
-      mean_k += run_k / static_cast<double>(k.size());
-    }
-    rows.back().push_back(mean_k * x * (step.speed_rad_s - 0.5 * (slowest + fastest)) / (fastest - slowest));
-    thrusts.push_back(step.thrust_n);
+/// What least squares of one run found.
+struct RunFit {
+  std::vector<double> residuals;  ///< N; the last is the zero's own where that is known
+  double trend = 0, trend_u = 0;  ///< u as the weights have it
+  double freedom = 0;
+  double deviation = 0;  ///< of the weighted residuals
+};
+
+/// T of one run on ω², its zero and, with `spread`, k ω² (ω − middle)/spread. The zero as well known as it is.
+struct RunModel {
+  double middle = 0, spread = 0, k = 0;  ///< spread 0: without a trend
+  NoiseModel noise;
+  bool zero_is_free = false;
+
+  [[nodiscard]] RunFit fit(const std::vector<Sample>& samples, double zero_u_n) const;
+};
+
+RunFit RunModel::fit(const std::vector<Sample>& samples, double zero_u_n) const {
+  const auto n = static_cast<Eigen::Index>(samples.size()), terms = static_cast<Eigen::Index>(spread > 0 ? 3 : 2);
+  const Eigen::Index rows = n + (zero_is_free ? 0 : 1);
+  Eigen::MatrixXd design = Eigen::MatrixXd::Zero(rows, terms);
+  Eigen::VectorXd thrusts = Eigen::VectorXd::Zero(rows), roots(rows);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Sample& sample = samples[static_cast<std::size_t>(i)];
+    roots[i] = 1 / std::sqrt(noise.at(sample.x));
+    thrusts[i] = sample.thrust;
+    design(i, 0) = sample.x;
+    design(i, 1) = 1;
+    if (spread > 0) design(i, 2) = k * sample.x * (sample.speed - middle) / spread;
   }
-  const Regression fit = regress(rows, thrusts);
-  return {fit.estimates.back(), fit.standard_errors.back(), static_cast<double>(fit.freedom)};
+  if (!zero_is_free) {
+    roots[n] = 1 / zero_u_n;
+    design(n, 1) = 1;
+  }
+  const Eigen::VectorXd sizes = (roots.asDiagonal() * design).colwise().norm();  // ω² of 1e6 beside 1
+  const Eigen::MatrixXd scaled = roots.asDiagonal() * design * sizes.cwiseInverse().asDiagonal();
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(scaled);
+  const Eigen::MatrixXd upper = qr.matrixQR().topRows(terms).triangularView<Eigen::Upper>();
+  if (rows <= terms || !(upper.diagonal().cwiseAbs().minCoeff() > 1e-9))
+    throw FitError("k against speed: too few different speeds in a run");
+  const Eigen::VectorXd estimates = sizes.cwiseInverse().cwiseProduct(qr.solve(roots.cwiseProduct(thrusts)));
+  const Eigen::VectorXd residuals = thrusts - design * estimates;
+  RunFit result;
+  result.residuals.assign(residuals.data(), residuals.data() + rows);
+  result.freedom = static_cast<double>(rows - terms);
+  result.deviation = roots.cwiseProduct(residuals).norm() / std::sqrt(result.freedom);
+  if (terms < 3) return result;
+  result.trend = estimates[2];
+  result.trend_u = 1 / std::abs(upper(2, 2)) / sizes[2];  // the last row of R⁻¹
+  return result;
+}
+
+/// The levels that all runs measured, one column each: what tests compare.
+std::vector<Run> complete_levels(std::vector<Run> runs) {
+  std::map<int, std::size_t> counts;
+  for (const Run& run : runs)
+    for (const Sample& sample : run.samples) ++counts[sample.level];
+  for (Run& run : runs)
+    std::erase_if(run.samples, [&](const Sample& sample) { return counts[sample.level] < runs.size(); });
+  return runs;
+}
+
+/// Values of all runs at one place.
+std::vector<double> column(const std::vector<std::vector<double>>& runs, std::size_t i) {
+  std::vector<double> values;
+  for (const auto& run : runs) values.push_back(run[i]);
+  return values;
+}
+
+/// What is measured at one φ, prepared for its tests.
+struct Angle {
+  std::vector<Run> runs;  ///< as measured
+  RunModel model;
+  std::vector<std::vector<double>>
+      standardised;            ///< residuals of each run in its noise, complete levels, then the zero
+  std::vector<double> trends;  ///< of each run, shares of k
+  double trend_u = 0;          ///< of one run, as the noise has it
+  double alone_freedom = 0;    ///< of a single run
+};
+
+double mean_x(const std::vector<Run>& runs, std::size_t i) {
+  double sum = 0;
+  for (const Run& run : runs) sum += run.samples[i].x / static_cast<double>(runs.size());
+  return sum;
+}
+
+/// Noise from how the runs differ at each level, each about its own k and zero.
+void take_noise(const std::vector<Run>& complete, RunModel& model) {
+  std::vector<std::vector<double>> residuals;
+  RunModel free;
+  free.zero_is_free = true;
+  for (const Run& run : complete) residuals.push_back(free.fit(run.samples, kNan).residuals);
+  std::vector<double> x, variances;
+  for (std::size_t i = 0; i < complete.front().samples.size(); ++i) {
+    x.push_back(mean_x(complete, i));
+    variances.push_back(variance_of(column(residuals, i)));
+  }
+  model.noise = noise_of(x, variances);
+}
+
+void take_residuals(const std::vector<Run>& complete, Angle& angle) {
+  for (const Run& run : complete) {
+    auto residuals = angle.model.fit(run.samples, run.zero_u_n).residuals;
+    for (std::size_t i = 0; i < run.samples.size(); ++i)
+      residuals[i] /= std::sqrt(angle.model.noise.at(mean_x(complete, i)));
+    if (!angle.model.zero_is_free) residuals.back() /= run.zero_u_n;
+    angle.standardised.push_back(std::move(residuals));
+  }
+}
+
+void take_trends(Angle& angle, double slowest, double fastest) {
+  RunModel model = angle.model;
+  model.middle = 0.5 * (slowest + fastest);
+  model.spread = fastest - slowest;
+  model.k = 0;
+  for (const Run& run : angle.runs) model.k += run.k / static_cast<double>(angle.runs.size());
+  double squares = 0;
+  for (const Run& run : angle.runs) {
+    if (angle.runs.size() == 1) {  // its own residuals tell the noise
+      RunModel free = model;
+      free.zero_is_free = true;
+      model.noise.constant = std::pow(free.fit(run.samples, kNan).deviation, 2);
+    }
+    if (!(model.noise.at(run.samples.front().x) > 0)) return;
+    const RunFit found = model.fit(run.samples, run.zero_u_n);
+    angle.trends.push_back(found.trend);
+    squares += found.trend_u * found.trend_u;
+    angle.alone_freedom = found.freedom;
+  }
+  angle.trend_u = std::sqrt(squares / static_cast<double>(angle.runs.size()));
+}
+
+/// From how the residuals of neighbouring steps go together, after Box.
+double independent_share(const std::vector<Angle>& angles) {
+  std::vector<double> products;
+  double n = 0, length = 0;
+  for (const Angle& angle : angles) {
+    if (angle.standardised.size() < 2) continue;
+    const std::size_t levels = angle.standardised.front().size() - (angle.model.zero_is_free ? 0 : 1);
+    products.resize(std::max(products.size(), levels / 2 + 1));
+    std::vector<double> means;
+    for (std::size_t i = 0; i < levels; ++i) means.push_back(mean_of(column(angle.standardised, i)));
+    for (const auto& run : angle.standardised) {
+      for (std::size_t lag = 0; lag <= levels / 2; ++lag)
+        for (std::size_t i = 0; i + lag < levels; ++i)
+          products[lag] += (run[i] - means[i]) * (run[i + lag] - means[i + lag]);
+    }
+    n += static_cast<double>(levels * (angle.standardised.size() - 1));
+    length = std::max(length, static_cast<double>(levels));
+  }
+  double sum = 0;
+  for (std::size_t lag = 1; lag < products.size(); ++lag) {
+    const double rest = 1 - static_cast<double>(lag) / length;
+    const double correlation = products[0] > 0 ? products[lag] / products[0] / rest : 0;
+    sum += rest * (correlation * correlation - 1 / (n * rest));
+  }
+  return 1 / (1 + 2 * std::max(0.0, sum));
+}
+
+/// Of levels and zero, all with the k of their run taken out.
+StatisticalTest test_levels(const Angle& angle, double share) {
+  const double runs = static_cast<double>(angle.standardised.size());
+  double between = 0, within = 0;
+  for (std::size_t i = 0; i < angle.standardised.front().size(); ++i) {
+    const auto values = column(angle.standardised, i);
+    between += runs * std::pow(mean_of(values), 2);
+    within += (runs - 1) * variance_of(values);
+  }
+  const double freedom = static_cast<double>(angle.standardised.front().size()) - (angle.model.zero_is_free ? 2 : 1);
+  const double f = between / freedom / (within / (freedom * (runs - 1)));
+  return f_test(f, share * freedom, share * freedom * (runs - 1));
+}
+
+/// Rms of the levels' deviation about k ω² without a zero, less what noise makes of it.
+double inadequacy_of(const std::vector<Run>& complete) {
+  double excess = 0, xx = 0;
+  for (std::size_t i = 0; i < complete.front().samples.size(); ++i) {
+    std::vector<double> residuals;
+    for (const Run& run : complete) residuals.push_back(run.samples[i].thrust - run.k * run.samples[i].x);
+    const double noise = complete.size() > 1 ? variance_of(residuals) / static_cast<double>(complete.size()) : 0;
+    excess += std::pow(mean_of(residuals), 2) - noise;
+    xx += std::pow(mean_x(complete, i), 2);
+  }
+  const double n = static_cast<double>(complete.front().samples.size());
+  return std::sqrt(std::max(0.0, excess / xx * (complete.size() > 1 ? 1 : n / (n - 1))));
+}
+
+std::vector<LevelCoefficient> level_coefficients(const std::vector<Run>& runs) {
+  std::map<int, std::vector<Sample>> levels;
+  for (const Run& run : runs)
+    for (const Sample& sample : run.samples) levels[sample.level].push_back(sample);
+  std::vector<LevelCoefficient> rows;
+  for (const auto& [index, samples] : levels) {
+    LevelCoefficient row;
+    std::vector<double> k;
+    row.repetitions = samples.size();
+    for (const Sample& sample : samples) {
+      k.push_back(sample.thrust / sample.x);
+      row.speed_rad_s += sample.speed / static_cast<double>(samples.size());
+    }
+    row.k = mean_of(k);
+    if (k.size() > 1) row.standard_error = std::sqrt(variance_of(k) / static_cast<double>(k.size()));
+    rows.push_back(row);
+  }
+  std::sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.speed_rad_s < b.speed_rad_s; });
+  return rows;
+}
+
+Angle prepare(const SpeedDependence& found, std::vector<Run> runs, const std::vector<Run>& complete) {
+  Angle angle;
+  angle.model.zero_is_free =
+      std::any_of(runs.begin(), runs.end(), [](const Run& run) { return std::isnan(run.zero_u_n); });
+  angle.runs = std::move(runs);
+  try {
+    if (complete.size() > 1 && complete.front().samples.size() > 3) {
+      take_noise(complete, angle.model);
+      if (angle.model.noise.at(mean_x(complete, 0)) > 0) take_residuals(complete, angle);
+    }
+    take_trends(angle, found.levels.front().speed_rad_s, found.levels.back().speed_rad_s);
+  } catch (const FitError&) {
+    angle.trends.clear();
+  }
+  return angle;
+}
+
+/// How much more the trends scatter from run to run than the noise has it, as a ratio of variances; its freedom.
+Estimate scatter_of_trends(const std::vector<Angle>& angles) {
+  double squares = 0, freedom = 0;
+  for (const Angle& angle : angles) {
+    if (angle.trends.size() < 2 || !(angle.trend_u > 0)) continue;
+    const double more = static_cast<double>(angle.trends.size() - 1);
+    squares += more * variance_of(angle.trends) / (angle.trend_u * angle.trend_u);
+    freedom += more;
+  }
+  return {freedom > 0 ? squares / freedom : 1, 0, freedom};
+}
+
+void judge(const Angle& angle, const Estimate& scatter, double share, SpeedDependence& found) {
+  const double runs = static_cast<double>(angle.trends.size());
+  if (runs > 0) {
+    const bool alone = scatter.freedom == 0;
+    found.change = {mean_of(angle.trends), angle.trend_u * std::sqrt(scatter.value / runs),
+                    alone ? angle.alone_freedom : scatter.freedom};
+    found.trend = student_test(found.change, 0);
+  }
+  if (angle.standardised.size() > 1) found.lack_of_fit = test_levels(angle, share);
 }
 
 }  // namespace
 
-SpeedDependence speed_dependence(double phi_deg, std::span<const results::StepMean> steps) {
-  SpeedDependence result;
-  result.phi_deg = phi_deg;
-  result.lack_of_fit.statistic = "F";
-  const std::map<int, double> k = k_of_runs(steps);
-  std::vector<Level> complete;
-  double xx = 0, residual_squares = 0, points = 0;
-  for (const auto& [index, level] : levels_of(steps, k)) {
-    LevelCoefficient row{level.speed, level.mean(level.local_k), std::numeric_limits<double>::quiet_NaN(),
-                         level.residuals.size()};
-    if (row.repetitions > 1) row.standard_error = std::sqrt(level.variance(level.local_k) / level.n());
-    result.levels.push_back(row);
-    xx += level.x * level.x;
-    for (const double residual : level.residuals) residual_squares += residual * residual / level.n();
-    ++points;
-    if (level.residuals.size() == k.size()) complete.push_back(level);
+std::vector<SpeedDependence> speed_dependence(std::span<const StepsOfAngle> measured) {
+  std::vector<SpeedDependence> result;
+  std::vector<Angle> angles;
+  std::vector<std::vector<Run>> complete;
+  for (const StepsOfAngle& one : measured) {
+    std::vector<Run> runs = runs_of(one.steps);
+    result.push_back({});
+    result.back().phi_deg = one.phi_deg;
+    result.back().levels = level_coefficients(runs);
+    complete.push_back(complete_levels(runs));
+    const bool testable = result.back().levels.size() > 2;
+    angles.push_back(testable ? prepare(result.back(), std::move(runs), complete.back()) : Angle{});
   }
-  std::sort(result.levels.begin(), result.levels.end(),
-            [](const auto& a, const auto& b) { return a.speed_rad_s < b.speed_rad_s; });
-  if (points < 3) return result;
-  try {
-    result.change = change_of(steps, k, result.levels.front().speed_rad_s, result.levels.back().speed_rad_s);
-    result.trend = student_test(result.change, 0);
-  } catch (const FitError&) {
+  const Estimate scatter = scatter_of_trends(angles);
+  const double share = independent_share(angles);
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    SpeedDependence& found = result[i];
+    judge(angles[i], scatter, share, found);
+    const bool untested = !found.lack_of_fit.tested() && found.levels.size() > 2;
+    if ((untested || found.depends()) && !complete[i].front().samples.empty())
+      found.inadequacy = inadequacy_of(complete[i]);
+    found.lack_of_fit.statistic = "F";
+    found.lack_of_fit.name = fmt::format("lack of fit of T = k w^2 at phi = {} deg", found.phi_deg);
+    found.lack_of_fit.hypothesis = found.trend.hypothesis = "k does not depend on the speed";
+    found.trend.name = fmt::format("trend of k with the speed at phi = {} deg", found.phi_deg);
   }
-  const double runs = static_cast<double>(k.size()), n = static_cast<double>(complete.size());
-  if (runs < 2 || n < 3) {
-    result.inadequacy = std::sqrt(residual_squares / xx * points / (points - 1));
-  } else {
-    const NoiseModel noise = noise_of(complete, std::sqrt(xx / points));
-    double between = 0, within = 0, excess = 0, sum_xx = 0;
-    for (const Level& level : complete) {
-      const double variance = noise.at(level.x), mean = level.mean(level.residuals);
-      between += runs * mean * mean / variance;
-      within += level.variance(level.residuals) * (runs - 1) / variance;
-      excess += mean * mean - level.variance(level.residuals) / runs;
-      sum_xx += level.x * level.x;
-    }
-    result.lack_of_fit = f_test(between / (n - 1) / (within / ((n - 1) * (runs - 1))), n - 1, (n - 1) * (runs - 1));
-    if (result.lack_of_fit.rejected()) result.inadequacy = std::sqrt(std::max(0.0, excess / sum_xx));
-  }
-  result.lack_of_fit.name = fmt::format("lack of fit of T = k w^2 at phi = {} deg", phi_deg);
-  result.lack_of_fit.hypothesis = "k does not depend on the speed";
-  result.trend.name = fmt::format("trend of k with the speed at phi = {} deg", phi_deg);
-  result.trend.hypothesis = result.lack_of_fit.hypothesis;
   return result;
 }
 

@@ -1,61 +1,63 @@
 #include "fit/step_selection.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "fit/csv.hpp"
+#include "profiles/configuration_error.hpp"
+#include "results/harmless_doubts.hpp"
 
 namespace kphi::fit {
 namespace {
 
 using results::Doubt;
 
-struct DoubtPolicy {
+struct DoubtWords {
   Doubt doubt;
   const char* words;
-  bool spoils;
 };
 
-constexpr std::array<DoubtPolicy, 32> kPolicy{{
-    {Doubt::speed_not_reached, "commanded speed not reached", true},
-    {Doubt::speed_unsteady, "speed never settled", true},
-    {Doubt::saturated, "load cell saturated", true},
-    {Doubt::lost_samples, "samples lost", false},
-    {Doubt::derated, "motor derated", true},
-    {Doubt::few_samples, "too few samples", true},
-    {Doubt::bad_status, "load cell reported an error", true},
-    {Doubt::stream_restarted, "stream began anew", false},
-    {Doubt::rebooted, "load cell's box started anew since the zero", true},
-    {Doubt::stalled, "load cell repeated its measurement", true},
-    {Doubt::silent, "load cell fell silent", true},
-    {Doubt::box_trouble, "load cell's box saw its communication fail", false},
-    {Doubt::stolen, "another client took the stream", true},
-    {Doubt::configuration_changed, "load cell's box was set otherwise", true},
-    {Doubt::zero_drifted, "load cell's zero drifted during the run", true},
-    {Doubt::zero_noisy, "load cell was not at rest at a zero", true},
-    {Doubt::drive_saturated, "motor drive saturated", true},
-    {Doubt::motor_fault, "motor module reported a fault", true},
-    {Doubt::supply_out_of_band, "supply voltage off", false},
-    {Doubt::coil_hot, "motor coil hot", false},
-    {Doubt::motor_reset, "motor module restarted", true},
-    {Doubt::motor_lost, "motor module lost", true},
-    {Doubt::slow_round_trip, "motor readings blurred in time", false},
-    {Doubt::supply_limited, "supply limited the current", true},
-    {Doubt::supply_off, "supply was off", true},
-    {Doubt::supply_sag, "supply sagged", false},
-    {Doubt::supply_rise, "motor fed back into the supply", false},
-    {Doubt::unsettled, "thrust never settled", true},
-    {Doubt::drifted, "thrust drifted within the step", true},
-    {Doubt::lag_unknown, "lag of the thrust unknown", false},
-    {Doubt::frozen, "load cell repeated one value", true},
-    {Doubt::speed_glitch, "impossible speeds left out", false},
+constexpr std::array<DoubtWords, 32> kWords{{
+    {Doubt::speed_not_reached, "commanded speed not reached"},
+    {Doubt::speed_unsteady, "speed never settled"},
+    {Doubt::saturated, "load cell saturated"},
+    {Doubt::lost_samples, "samples lost"},
+    {Doubt::derated, "motor derated"},
+    {Doubt::few_samples, "too few samples"},
+    {Doubt::bad_status, "load cell reported an error"},
+    {Doubt::stream_restarted, "stream began anew"},
+    {Doubt::rebooted, "load cell's box started anew since the zero"},
+    {Doubt::stalled, "load cell repeated its measurement"},
+    {Doubt::silent, "load cell fell silent"},
+    {Doubt::box_trouble, "load cell's box saw its communication fail"},
+    {Doubt::stolen, "another client took the stream"},
+    {Doubt::configuration_changed, "load cell's box was set otherwise"},
+    {Doubt::zero_drifted, "load cell's zero drifted during the run"},
+    {Doubt::zero_noisy, "load cell was not at rest at a zero"},
+    {Doubt::drive_saturated, "motor drive saturated"},
+    {Doubt::motor_fault, "motor module reported a fault"},
+    {Doubt::supply_out_of_band, "supply voltage off"},
+    {Doubt::coil_hot, "motor coil hot"},
+    {Doubt::motor_reset, "motor module restarted"},
+    {Doubt::motor_lost, "motor module lost"},
+    {Doubt::slow_round_trip, "motor readings blurred in time"},
+    {Doubt::supply_limited, "supply limited the current"},
+    {Doubt::supply_off, "supply was off"},
+    {Doubt::supply_sag, "supply sagged"},
+    {Doubt::supply_rise, "motor fed back into the supply"},
+    {Doubt::unsettled, "thrust never settled"},
+    {Doubt::drifted, "thrust drifted within the step"},
+    {Doubt::lag_unknown, "lag of the thrust unknown"},
+    {Doubt::frozen, "load cell repeated one value"},
+    {Doubt::speed_glitch, "impossible speeds left out"},
 }};
 
 bool has(std::uint32_t doubts, Doubt doubt) { return (doubts & static_cast<std::uint32_t>(doubt)) != 0; }
 
-bool spoiled(std::uint32_t doubts) {
-  return std::any_of(kPolicy.begin(), kPolicy.end(),
-                     [&](const DoubtPolicy& policy) { return policy.spoils && has(doubts, policy.doubt); });
-}
+bool spoiled(std::uint32_t doubts) { return (doubts & ~results::kHarmlessDoubts) != 0; }
 
 }  // namespace
 
@@ -65,15 +67,31 @@ double level(const results::StepMean& step) {
 
 std::string doubts_in_words(std::uint32_t doubts) {
   std::string words;
-  for (const DoubtPolicy& policy : kPolicy) {
-    if (!has(doubts, policy.doubt)) continue;
+  for (const DoubtWords& one : kWords) {
+    if (!has(doubts, one.doubt)) continue;
     if (!words.empty()) words += ", ";
-    words += policy.words;
+    words += one.words;
   }
   return words;
 }
 
-StepSelection select_steps(std::span<const results::StepMean> steps, const SpeedRange& range) {
+LeftOutRun parse_left_out_run(const std::string& text) {
+  const std::size_t first = text.find(':');
+  const std::size_t second = first == std::string::npos ? first : text.find(':', first + 1);
+  const auto phi = parse_number(text.substr(0, first));
+  const auto repetition =
+      second == std::string::npos ? std::nullopt : parse_number(text.substr(first + 1, second - first - 1));
+  const std::string cause = second == std::string::npos ? "" : text.substr(second + 1);
+  if (!phi || !repetition || *repetition < 1 || *repetition != std::floor(*repetition) ||
+      cause.find_first_not_of(' ') == std::string::npos) {
+    throw ConfigurationError(
+        fmt::format("--leave-out {}: expected PHI:REPETITION:CAUSE, such as '90:2:plate slipped'", text));
+  }
+  return {*phi, static_cast<int>(*repetition), cause};
+}
+
+StepSelection select_steps(std::span<const results::StepMean> steps, const SpeedRange& range,
+                           std::span<const LeftOutRun> left_out_runs) {
   // Limits are typed in RPM and levels come through files: a level that is the limit must not fall out by rounding.
   constexpr double kSlack = 1e-9;
   const bool single_repetitions =
@@ -87,11 +105,16 @@ StepSelection select_steps(std::span<const results::StepMean> steps, const Speed
       continue;
     }
     const bool measured = std::isfinite(step.thrust_n) && std::isfinite(step.speed_rad_s);
-    const bool left_out = !measured || spoiled(step.doubts);
+    const auto by_hand = std::find_if(left_out_runs.begin(), left_out_runs.end(), [&](const LeftOutRun& run) {
+      return run.phi_deg == step.occlusion_deg && run.repetition == step.repetition;
+    });
+    const bool chosen = by_hand != left_out_runs.end();
+    const bool left_out = chosen || !measured || spoiled(step.doubts);
     if (left_out || step.doubts != 0) {
-      const std::string words = doubts_in_words(step.doubts);
-      const char* missing = measured ? "" : (words.empty() ? "nothing measured" : ", nothing measured");
-      selection.doubtful.push_back({step, words + missing, left_out});
+      std::string words = doubts_in_words(step.doubts);
+      if (!measured) words += words.empty() ? "nothing measured" : ", nothing measured";
+      if (chosen) words += (words.empty() ? "" : ", ") + ("by hand: " + by_hand->cause);
+      selection.doubtful.push_back({step, words, left_out});
     }
     if (!left_out) selection.used.push_back(step);
   }

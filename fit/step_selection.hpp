@@ -19,6 +19,15 @@ struct SpeedRange {
   double max_rad_s = std::numeric_limits<double>::infinity();
 };
 
+/// A run that a person leaves out, for a cause.
+struct LeftOutRun {
+  double phi_deg = 0;
+  int repetition = 0;
+  std::string cause;
+};
+/// "PHI:REPETITION:CAUSE", such as "90:2:plate slipped". Throws ConfigurationError.
+[[nodiscard]] LeftOutRun parse_left_out_run(const std::string& text);
+
 struct DoubtfulStep {
   results::StepMean step;
   std::string reason;    ///< "speed not reached, derated"
@@ -38,7 +47,11 @@ struct StepSelection {
 [[nodiscard]] std::string doubts_in_words(std::uint32_t doubts);
 
 /// Averages over repetitions (repetition 0) are dropped where single repetitions exist: they would count twice.
-/// Lost samples alone do not spoil a mean; every other doubt does.
-[[nodiscard]] StepSelection select_steps(std::span<const results::StepMean> steps, const SpeedRange& range);
+/// A step is left out for a doubt (results::kHarmlessDoubts are listed only), which names a cause, and never for being
+/// far from the others: what repetitions scatter is their uncertainty (JCGM 100, 3.4.7 and 4.2). means.csv follows the
+/// same rule.
+/// Runs that a person leaves out are listed step by step, with the cause.
+[[nodiscard]] StepSelection select_steps(std::span<const results::StepMean> steps, const SpeedRange& range,
+                                         std::span<const LeftOutRun> left_out = {});
 
 }  // namespace kphi::fit

@@ -130,9 +130,7 @@ class Fitter {
     for (const Point& point : points) residuals.push_back(residual(point));
     const double sigma = loss == Loss::none ? 0 : 1.4826 * median_absolute(residuals);
     loss_ = sigma > 0 ? loss_function(loss, sigma) : nullptr;  // points without scatter have no outliers
-    ceres::Problem::Options ownership;
-    ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    problem_ = std::make_unique<ceres::Problem>(ownership);
+    problem_ = std::make_unique<ceres::Problem>(problem_options());
     for (const Point& point : points) {
       problem_->AddResidualBlock(
           new ceres::AutoDiffCostFunction<ThrustResidual, 1, 1, 1, 1>(new ThrustResidual{

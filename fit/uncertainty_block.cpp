@@ -58,7 +58,8 @@ std::string format_uncertainty(const Analysis& analysis) {
   for (const SpeedDependence& one : analysis.speed)
     text += fmt::format("    - {{phi_deg: {}, change_share: {}, u: {}, lack_of_fit_p: {}}}\n", number(one.phi_deg),
                         number(one.change.value), number(one.change.u), number(one.lack_of_fit.p));
-  text += fmt::format("  rejected_points: {}\n", analysis.rejected.size());
+  text += fmt::format("  rejected_points: {}\n  outlying_runs: {}  # kept\n", analysis.rejected.size(),
+                      analysis.outlying.size());
   if (analysis.torque.empty()) return text;
   text += "torque:  # N m/(rad/s)^2, by the estimators of the thrust\n";
   for (const TorqueCoefficient& one : analysis.torque)

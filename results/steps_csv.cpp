@@ -173,29 +173,38 @@ struct Parse {
   void operator()(Doubts d) const { step.*d.member = doubts_from_names(text); }
 };
 
-/// Fields of one record from `at` on; leaves `at` after its line end and counts the line feeds passed.
-std::vector<std::string> next_record(std::string_view text, std::size_t& at, std::size_t& lines) {
-  std::vector<std::string> fields(1);
+/// Fields of one record from `at` on, into those of the last; leaves `at` after its line end and counts the line feeds
+/// passed.
+void next_record(std::string_view text, std::size_t& at, std::size_t& lines, std::vector<std::string>& fields) {
+  std::size_t n = 0;
+  const auto open_field = [&] {
+    if (n == fields.size()) fields.emplace_back();
+    fields[n++].clear();
+  };
+  open_field();
   bool inside = false;
-  for (; at < text.size(); ++at) {
-    const char c = text[at];
-    if (c == '\n') ++lines;
-    if (inside && c == '"' && at + 1 < text.size() && text[at + 1] == '"') {
-      fields.back() += text[++at];
+  while (at < text.size()) {
+    // What is nothing but text goes over in one piece.
+    const std::size_t begin = at;
+    while (at < text.size() && text[at] != '"' && text[at] != '\n' && (inside || text[at] != ',')) ++at;
+    fields[n - 1].append(text.substr(begin, at - begin));
+    if (at == text.size()) break;
+    const char c = text[at++];
+    if (c == ',') {
+      open_field();
     } else if (c == '"') {
-      inside = !inside;
-    } else if (!inside && c == ',') {
-      fields.emplace_back();
-    } else if (!inside && c == '\n') {
-      ++at;
-      break;
+      const bool doubled = inside && at < text.size() && text[at] == '"';
+      if (doubled) fields[n - 1] += text[at++];
+      if (!doubled) inside = !inside;
     } else {
-      fields.back() += c;
+      ++lines;
+      if (!inside) break;
+      fields[n - 1] += c;
     }
   }
+  fields.resize(n);
   if (inside) throw std::invalid_argument("a quoted field has no end");
   if (!fields.back().empty() && fields.back().back() == '\r') fields.back().pop_back();
-  return fields;
 }
 
 std::string row_of(const StepMean& step, const Columns& columns) {
@@ -282,10 +291,13 @@ std::vector<StepMean> parse_steps(std::string_view text, const std::string& name
     const std::size_t end = text.find('\n');
     if (end == std::string_view::npos) (void)columns_named("");
     const Columns columns = columns_named(text.substr(0, end));
-    (void)next_record(text, at, lines);
+    std::vector<std::string> fields;
+    next_record(text, at, lines, fields);
+    steps.reserve(static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')));
     while (at < text.size()) {
       line = lines + 1;
-      steps.push_back(step_from(next_record(text, at, lines), columns));
+      next_record(text, at, lines, fields);
+      steps.push_back(step_from(fields, columns));
     }
   } catch (const std::invalid_argument& error) {
     throw ConfigurationError(fmt::format("{}:{}: {}", name, line, error.what()));

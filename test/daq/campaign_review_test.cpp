@@ -217,7 +217,7 @@ TEST_F(OrderedCampaign, SaysWhenTheBenchHasDriftedBetweenTheReferenceRuns) {
   EXPECT_THAT(said_.lines.back(), HasSubstr("the bench has drifted"));
 }
 
-TEST_F(OrderedCampaign, RunsAnOutlyingRepetitionAgainAndAveragesWithoutIt) {
+TEST_F(OrderedCampaign, RunsAnOutlyingRepetitionAgainAndKeepsIt) {
   const auto three = campaign("0", 3, "");
   move_occlusion("5x3_phi000_rep1.h5", 20);
   move_occlusion("5x3_phi000_rep2.h5", 0);
@@ -228,8 +228,7 @@ TEST_F(OrderedCampaign, RunsAnOutlyingRepetitionAgainAndAveragesWithoutIt) {
   EXPECT_EQ(person_.mounted_deg.size(), 1u);
   EXPECT_EQ(results::read_steps(results_.steps()).size(), 16u) << "it stays on record";
   const auto means = results::read_steps(results_.means());
-  EXPECT_EQ(means.at(0).repetitions_averaged, 3);
-  EXPECT_EQ(means.at(0).repetitions_left_out, 1);
+  EXPECT_TRUE(std::isnan(means.at(0).repetitions_left_out)) << "being far from the others is no cause";
   const auto judged = events("repetitions_judged");
   ASSERT_EQ(judged.size(), 2u);
   EXPECT_EQ(judged[1].at("repetitions").at(1).at("outlying"), true);
@@ -245,7 +244,7 @@ TEST_F(OrderedCampaign, DoesNotRunAgainWhenThePersonOrTheCampaignSaysNo) {
   EXPECT_EQ(run(campaign("0", 3, "")).runs, 3);
   EXPECT_EQ(person_.questions.size(), 1u);
   EXPECT_EQ(events("another_run").at(0).at("decided"), false);
-  EXPECT_EQ(results::read_steps(results_.means()).at(0).repetitions_left_out, 1);
+  EXPECT_TRUE(std::isnan(results::read_steps(results_.means()).at(0).repetitions_left_out));
 }
 
 TEST_F(OrderedCampaign, NeverAsksBeyondWhatTheCampaignAllows) {

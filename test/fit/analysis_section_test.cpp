@@ -5,6 +5,7 @@
 
 #include <pugixml.hpp>
 
+#include "fit/html.hpp"
 #include "test/fit/campaign_steps.hpp"
 
 namespace kphi::fit {
@@ -25,7 +26,8 @@ TEST(AnalysisSections, ShowEveryRowOfTheBudgetAndWhatNobodyKnows) {
   const std::string html = analysis_sections(found);
   ASSERT_TRUE(well_formed(html));
   EXPECT_THAT(html, HasSubstr("Uncertainty budget"));
-  for (const BudgetRow& row : found.coefficients.front().rows) EXPECT_THAT(html, HasSubstr(">" + row.source + "<"));
+  for (const BudgetRow& row : found.coefficients.front().rows)
+    EXPECT_THAT(html, HasSubstr(">" + typeset(row.source) + "<"));
   EXPECT_THAT(html, HasSubstr("not known")) << "nobody gave the calibration of the cell";
   EXPECT_THAT(html, HasSubstr("combined u"));
 }

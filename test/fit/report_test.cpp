@@ -95,6 +95,18 @@ TEST(Html, NoBytesBreakThePage) {
   }
 }
 
+TEST(Html, SetsWhatPlainTextWritesInAscii) {
+  EXPECT_EQ(typeset("K_T: T = k w^2 at phi = 45 deg, 1e-8 N/RPM^2 <b>"),
+            "K<sub>T</sub>: T = k ω² at φ = 45°, 1e-8 N/RPM² &lt;b&gt;");
+  EXPECT_EQ(typeset("many degrees of Delphi"), "many degrees of Delphi");
+}
+
+TEST(Html, WritesPowersOfTenAsPeopleDo) {
+  EXPECT_EQ(with_power_of_ten(1.550197e-6, 2.7e-11), "(1.550197 ± 0.000027) × 10⁻⁶");
+  EXPECT_EQ(with_power_of_ten(-4.5e-9, 0), "−4.50000 × 10⁻⁹");
+  EXPECT_EQ(with_power_of_ten(0, 1), "0.00000e+00");
+}
+
 TEST(Html, PrefixesIdsAndReferencesOfDrawings) {
   const std::string svg = inline_svg(
       "<?xml version=\"1.0\"?><!DOCTYPE svg><svg xmlns=\"http://www.w3.org/2000/svg\"><circle id=\"p\"/>"

@@ -1,0 +1,145 @@
+// The paper's four campaigns on the deterministic bench, from the campaign files themselves with shorter sweeps,
+// through recording, reduction and fit: its statements as a table, and the truth that the bench was built with.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include "daq/campaign_run.hpp"
+#include "daq/deterministic_bench.hpp"
+#include "drivers/sim/truth.hpp"
+#include "fit/family_table.hpp"
+#include "profiles/configuration_error.hpp"
+#include "results/steps_csv.hpp"
+#include "test/daq/bench_fixture.hpp"
+#include "test/source_dir.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using ::testing::HasSubstr;
+
+class Silence final : public daq::Progress {
+ public:
+  void tick(const daq::Position&, const daq::Observation&) override {}
+  void step_done(const daq::Position&, const daq::Observation&) override {}
+  void say(const std::string&) override {}
+};
+
+class WillingOperator final : public daq::Operator {
+ public:
+  void mount(const profiles::Propeller&, double) override {}
+};
+
+void replace(std::string& text, const std::string& from, const std::string& to) {
+  ASSERT_NE(text.find(from), std::string::npos) << from;
+  text.replace(text.find(from), from.size(), to);
+}
+
+/// 10 steps of 1 s, twice, instead of 40 of 2 s three times.
+profiles::Campaign shortened(const std::string& name) {
+  std::ifstream file(test::source_dir() + "/profiles/" + name + ".yaml");
+  std::stringstream all;
+  all << file.rdbuf();
+  std::string text = all.str();
+  replace(text, "repetitions: 3", "repetitions: 2\nrepetitions_extra_max: 0");
+  replace(text, "steps: 40", "steps: 10");
+  replace(text, "dwell_s: 2.0", "dwell_s: 1.0");
+  replace(text, "zero_s: 2.0", "zero_s: 1.0");
+  replace(text, "minimum_discard_s: 1.0", "minimum_discard_s: 0.5");
+  return profiles::parse_campaign(text, name);
+}
+
+FamilyMember measured(const std::string& name, int seed) {
+  const test::TemporaryFolder folder;
+  const profiles::Bench place = test::deterministic_place(seed);
+  daq::DeterministicBench bench(place, sim::BenchSettings{});
+  const auto results = results::CampaignFolder::create(folder.path(), "20210530T000000Z", name);
+  WillingOperator person;
+  Silence silence;
+  (void)daq::run_campaign(bench, shortened(name), place, results, person, silence, [] { return false; });
+  FamilyMember member;
+  member.identification = identify(results::read_steps(results.steps()));
+  AnalysisOptions options;
+  options.bench.motor_clock = 2e-4;
+  options.bootstrap.resamples = 0;
+  member.analysis = analyse(member.identification, options);
+  return member;
+}
+
+const std::vector<FamilyMember>& four() {
+  static const std::vector<FamilyMember> members{
+      measured("icra2021_5in_2blade", 21), measured("icra2021_5in_3blade", 22), measured("icra2021_6in_2blade", 23),
+      measured("icra2021_6in_3blade", 24)};
+  return members;
+}
+
+TEST(FourPropellers, BearOutThePapersStatementsAndTheBenchsTruth) {
+  const FamilyFindings findings = findings_of(four(), {});
+  const std::string table = family_text(findings);
+  fmt::print("{}", table);
+  std::map<std::string, double> truth;
+  const auto& p52 = *sim::find_propeller("5x2");
+  const auto& p53 = *sim::find_propeller("5x3");
+  const auto& p62 = *sim::find_propeller("6x2");
+  const auto& p63 = *sim::find_propeller("6x3");
+  truth["share_45"] = sim::thrust_coefficient(p53, 45) / sim::thrust_coefficient(p53, 0);
+  truth["share_270"] = sim::thrust_coefficient(p53, 270) / sim::thrust_coefficient(p53, 0);
+  truth["slopes_5in"] = p53.line_slope_n_rpm2_deg / p52.line_slope_n_rpm2_deg;
+  truth["slopes_6in"] = p63.line_slope_n_rpm2_deg / p62.line_slope_n_rpm2_deg;
+  truth["offset_5in"] = p53.thrust_n_rpm2 - p52.thrust_n_rpm2;
+  truth["offset_6in"] = p63.thrust_n_rpm2 - p62.thrust_n_rpm2;
+  std::size_t tested = 0;
+  for (const Claim& claim : findings.claims) {
+    EXPECT_EQ(claim.verdict, Verdict::holds) << claim.id << ": " << claim.value;
+    EXPECT_THAT(table, HasSubstr(claim.statement));
+    if (const auto known = truth.find(claim.id); known != truth.end()) {
+      EXPECT_NEAR(claim.value / known->second, 1, 0.02) << claim.id;
+      ++tested;
+    }
+  }
+  EXPECT_EQ(tested, truth.size());
+  EXPECT_EQ(findings.claims.size(), 16u);
+}
+
+TEST(FourPropellers, ShareASlopeForEachDiameter) {
+  const FamilyFindings findings = findings_of(four(), {});
+  ASSERT_EQ(findings.slopes.size(), 2u);
+  const double per_rpm = from_newtons_per_rpm2(1).value();
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double truth = sim::find_propeller(i == 0 ? "5x3" : "6x3")->line_slope_n_rpm2_deg * per_rpm;
+    EXPECT_NEAR(findings.slopes[i].slope.value / truth, 1, 0.01);
+    EXPECT_FALSE(findings.slopes[i].equal_slopes.p < 0.01);
+  }
+}
+
+TEST(FourPropellers, LetExpectAFifthOne) {
+  const std::vector<PropellerSize> sizes{parse_propeller_size("5.5x3")};
+  const FamilyFindings findings = findings_of(four(), sizes);
+  ASSERT_EQ(findings.predictions.size(), 5u);
+  for (const FamilyPrediction& one : findings.predictions) {
+    const double below = sim::thrust_coefficient(*sim::find_propeller("5x3"), one.phi_deg);
+    const double above = sim::thrust_coefficient(*sim::find_propeller("6x3"), one.phi_deg);
+    EXPECT_GT(one.k.value, below) << one.phi_deg;
+    EXPECT_LT(one.k.value, above) << one.phi_deg;
+    EXPECT_LT(one.lower, one.k.value);
+  }
+  EXPECT_THAT(family_text(findings), HasSubstr("5.5x3 at 90 deg"));
+  EXPECT_THROW((void)findings_of(std::span(four()).first(2), sizes), ConfigurationError);
+}
+
+TEST(FourPropellers, ThatAreMixedUpFail) {
+  auto members = four();
+  std::swap(members[0].identification.blades, members[1].identification.blades);
+  std::map<std::string, Verdict> verdicts;
+  for (const Claim& claim : test_claims(members)) verdicts[claim.id] = claim.verdict;
+  EXPECT_EQ(verdicts.at("offset_5in"), Verdict::fails);
+  EXPECT_EQ(verdicts.at("order_5in"), Verdict::fails);
+  EXPECT_EQ(verdicts.at("offset_6in"), Verdict::holds);
+}
+
+}  // namespace
+}  // namespace kphi::fit

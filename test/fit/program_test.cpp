@@ -1,0 +1,184 @@
+// kphi fit, report, compare, export and import as a person types them, and types them wrong.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "results/file_layer.hpp"
+#include "results/steps_csv.hpp"
+#include "test/end_to_end/process.hpp"
+#include "test/fit/bench_study.hpp"
+#include "test/source_dir.hpp"
+#include "test/temporary_folder.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using nlohmann::json;
+using test::Process;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+struct Answer {
+  int code = -1;
+  std::string out, err;
+};
+
+Answer kphi(std::vector<std::string> arguments, const std::string& input = {}) {
+  arguments.insert(arguments.begin(), KPHI_PROGRAM);
+  Process process(arguments, input);
+  const int code = process.wait();
+  return {code, process.out(), process.err()};
+}
+
+class Program : public ::testing::Test {
+ protected:
+  /// A folder with the steps of one simulated campaign.
+  std::string steps(const std::string& name, unsigned seed = 1, double inches = 5, int blades = 3, double factor = 1) {
+    auto all = study_campaign({}, seed).steps;
+    for (auto& step : all) {
+      step.propeller = name;
+      step.diameter_in = inches;
+      step.blades = blades;
+      step.thrust_n *= factor;
+    }
+    std::filesystem::create_directories(folder_ / name);
+    results::write_steps(folder_ / (name + "/steps.csv"), all);
+    return (folder_ / name).string();
+  }
+  std::string file(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+    return (folder_ / name).string();
+  }
+  void expect_refused(const std::vector<std::string>& arguments, int code, const std::string& words) {
+    const Answer answer = kphi(arguments);
+    EXPECT_EQ(answer.code, code) << arguments.front() << ": " << answer.err;
+    EXPECT_THAT(answer.err, HasSubstr(words));
+    EXPECT_EQ(answer.out, "") << "words go to stderr";
+    EXPECT_LE(std::count(answer.err.begin(), answer.err.end(), '\n'), 3) << answer.err;
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(Program, DrawsTheReportOfTheFitAgainByteForByte) {
+  const std::string place = steps("5x3");
+  const std::vector<std::vector<std::string>> ways{
+      {"--u", "calibration=0.004", "--u", "alignment-deg=1.5", "--u", "clock=2e-5"},
+      {"--loss", "huber", "--weights", "thrust", "--estimator", "offset", "--anchored", "--points", "45,180"},
+      {"--leave-out", "90:2:plate slipped", "--propeller", "mine", "--at-speed-rpm", "19100"}};
+  for (std::vector<std::string> way : ways) {
+    way.insert(way.begin(), {"fit", place});
+    const Answer fit = kphi(way);
+    ASSERT_EQ(fit.code, 0) << fit.err;
+    const std::string page = results::read_text(place + "/report.html");
+    ASSERT_EQ(kphi({"report", place}).code, 0);
+    EXPECT_TRUE(results::read_text(place + "/report.html") == page) << way[2];
+  }
+}
+
+TEST_F(Program, HandsTheOverlapMeasureToWhoFlies) {
+  const std::string place = steps("5x3");
+  const std::string vehicle = test::source_dir() + "/profiles/foldable_drone.yaml";
+  const std::string row =
+      "theta1_deg,theta2_deg,theta3_deg,theta4_deg,thrust1_n,thrust2_n,thrust3_n,thrust4_n\n45,45,45,45,1,1,1,1\n";
+  const std::vector<std::string> compensate{"compensate", "--coefficients", place + "/coefficients.yaml", "--vehicle",
+                                            vehicle};
+  ASSERT_EQ(kphi({"fit", place, "--no-report"}).code, 0);
+  EXPECT_EQ(kphi(compensate, row).code, 0);
+  ASSERT_EQ(kphi({"fit", place, "--no-report", "--overlap", "load_share"}).code, 0);
+  const Answer refused = kphi(compensate, row);
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("load_share"), HasSubstr("rim_arc")));
+  EXPECT_THAT(kphi({"export", place, "--to", "ros2"}).out, HasSubstr("overlap: \"load_share\""));
+  expect_refused({"fit", place, "--overlap", "rim"}, 2, "rim_arc");
+}
+
+TEST_F(Program, ComparesAFamilyFromItsFolders) {
+  const std::vector<std::string> places{steps("5x2", 1, 5, 2, 0.76), steps("5x3", 2), steps("6x2", 3, 6, 2, 1.55),
+                                        steps("6x3", 4, 6, 3, 1.85)};
+  for (const auto& place : places) ASSERT_EQ(kphi({"fit", place, "--no-report"}).code, 0);
+  std::vector<std::string> words{"compare"};
+  words.insert(words.end(), places.begin(), places.end());
+  const Answer table = kphi(words);
+  EXPECT_EQ(table.code, 0) << table.err;
+  EXPECT_THAT(table.out, AllOf(HasSubstr("holds"), HasSubstr("the paper's statement"), HasSubstr("One slope")));
+  words.insert(words.end(), {"--predict", "7x3", "--json"});
+  const json found = json::parse(kphi(words).out);
+  EXPECT_EQ(found.at("claims").size(), 16u);
+  EXPECT_EQ(found.at("predictions").size(), 5u);
+  EXPECT_EQ(found.at("shared_slopes").size(), 2u);
+  expect_refused({"compare", places[0], places[1], "--predict", "7x3"}, 2, "at least three");
+  expect_refused({"compare", places[0], places[1], places[2], "--predict", "seven"}, 2, "such as 7x3");
+  expect_refused({"compare", places[0], places[1], places[2], "--expect", "agree"}, 2, "two results");
+  expect_refused({"compare", places[0]}, 2, "RESULT");
+}
+
+TEST_F(Program, RefusesWhatItCannotFitInOneLineWithTheNextMove) {
+  const std::string empty = (folder_ / "empty").string();
+  std::filesystem::create_directories(empty);
+  const std::string place = steps("5x3");
+  expect_refused({"fit", (folder_ / "none").string()}, 2, "does not exist");
+  expect_refused({"fit", empty}, 2, "kphi run or kphi import");
+  expect_refused({"fit", file("empty.csv", "")}, 2, "empty.csv");
+  expect_refused({"fit", file("word.csv", "phi_deg,k\n0,1.5e-6\n45,abc\n")}, 2, "word.csv:3");
+  expect_refused({"fit", file("nan.csv", "phi_deg,k\n0,nan\n45,1e-6\n90,1e-6\n")}, 2, "nan.csv:2");
+  expect_refused({"fit", file("nothing.csv", "a,b\n1,2\n")}, 2, "nothing.csv");
+  expect_refused({"fit", file("k.csv", "phi_deg,k\n0,1.5e-6\n45,1.4e-6\n90,1.2e-6\n"), "--u", "clock=1e-4"}, 2,
+                 "--u needs steps");
+  expect_refused({"fit", place, "--u", "clock"}, 2, "NAME=VALUE");
+  expect_refused({"fit", place, "--u", "clock=nan"}, 2, "NAME=VALUE");
+  expect_refused({"fit", place, "--raw"}, 2, "campaign folder");
+  expect_refused({"fit", place, "--leave-out", "90:2"}, 2, "plate slipped");
+  expect_refused({"fit", place, "--leave-out", "91:2:x"}, 5, "91");
+  expect_refused({"fit", place, "--points", "45,91"}, 5, "91");
+  expect_refused({"fit", place, "--speed-range-rpm", "5000"}, 2, "3000:19100");
+  expect_refused({"fit", place, "--speed-range-rpm", "30000:40000"}, 5, "outside the speed range");
+  expect_refused({"fit", place, "--at-speed-rpm", "123"}, 5, "name a speed of the profile");
+  expect_refused({"fit", place, "--loss", "soft"}, 2, "huber");
+  EXPECT_FALSE(std::filesystem::exists(place + "/coefficients.yaml")) << "what is refused leaves nothing behind";
+}
+
+TEST_F(Program, RefusesReportsComparisonsAndExportsOfWhatIsNotThere) {
+  const std::string place = steps("5x3");
+  expect_refused({"report", place}, 2, "kphi fit " + place);
+  expect_refused({"compare", place, place}, 2, "comes first");
+  expect_refused({"export", place, "--to", "px4"}, 2, "comes first");
+  ASSERT_EQ(kphi({"fit", place, "--no-report"}).code, 0);
+  expect_refused({"export", place, "--to", "ardupilot"}, 2, "agilicious");
+  expect_refused({"export", place, "--to", "gazebo", "--phi-deg", "300"}, 2, "0 to 270");
+  expect_refused({"export", place, "--to", "gazebo", "--phi-deg", "nan"}, 2, "0 to 270");
+  expect_refused({"import", file("unit.csv", "Thrust (stone),Motor Electrical Speed (RPM)\n1,2\n"), "--out",
+                  (folder_ / "tables").string()},
+                 2, "stone");
+  expect_refused({"import", folder_.path().string(), "--out", (folder_ / "tables").string()}, 2, "");
+}
+
+TEST_F(Program, TakesOneValueForEachOptionThatMayBeRepeated) {
+  const std::string place = steps("5x3");
+  EXPECT_EQ(kphi({"fit", "--no-report", "--u", "clock=1e-5", "--leave-out", "90:2:plate slipped", place}).code, 0)
+      << "the folder is no second value";
+}
+
+TEST_F(Program, TellsAllItFoundAsJson) {
+  const Answer fit = kphi({"fit", steps("5x3"), "--no-report", "--json"});
+  ASSERT_EQ(fit.code, 0);
+  const json found = json::parse(fit.out);
+  EXPECT_EQ(found.at("overlap"), "rim_arc");
+  EXPECT_EQ(found.at("analysis").at("speed").size(), 5u);
+  EXPECT_TRUE(found.at("analysis").at("outlying_runs").is_array());
+}
+
+TEST_F(Program, ExplainsEveryCommand) {
+  for (const char* command : {"fit", "report", "compare", "export", "import"}) {
+    const Answer help = kphi({command, "--help"});
+    EXPECT_EQ(help.code, 0);
+    EXPECT_THAT(help.out, HasSubstr("kphi " + std::string(command))) << "an example to type";
+  }
+}
+
+}  // namespace
+}  // namespace kphi::fit
