@@ -209,11 +209,16 @@ void print_text(const Request& request, const Flown& flown) {
   fmt::print("{}", not_reproduced());
 }
 
-Json json_of(const Percentiles& p) { return {{"p10", p.p10}, {"p50", p.p50}, {"p90", p.p90}}; }
+/// Of no draws there are none.
+Json json_of(const Findings& found, const Percentiles& p) {
+  if (found.kept == 0) return nullptr;
+  return {{"p10", p.p10}, {"p50", p.p50}, {"p90", p.p90}};
+}
 
 Json json_of(const Findings& found) {
-  Json by_law;
+  Json by_law = Json::object();
   for (std::size_t law = 0; law < found.by_law.size(); ++law) {
+    if (found.by_law[law].kept == 0) continue;
     by_law[name_of(static_cast<LossLaw>(law))] = {{"hover_z_ratio_p50", found.by_law[law].hover_z_ratio},
                                                   {"forward_ratio_p50", found.by_law[law].forward_ratio}};
   }
@@ -223,17 +228,17 @@ Json json_of(const Findings& found) {
           {"lost_compensated", found.lost_compensated},
           {"hover_z_better", found.hover_z_better},
           {"forward_better", found.forward_better},
-          {"hover_z_plain_m", json_of(found.hover_z_plain)},
-          {"hover_z_compensated_m", json_of(found.hover_z_compensated)},
-          {"hover_z_ratio", json_of(found.hover_z_ratio)},
-          {"hover_xy_plain_m", json_of(found.hover_xy_plain)},
-          {"hover_xy_compensated_m", json_of(found.hover_xy_compensated)},
-          {"hover_xy_ratio", json_of(found.hover_xy_ratio)},
-          {"forward_x_m", json_of(found.forward_x)},
-          {"forward_plain_m", json_of(found.forward_plain)},
-          {"forward_compensated_m", json_of(found.forward_compensated)},
-          {"forward_ratio", json_of(found.forward_ratio)},
-          {"square_speed_ratio", json_of(found.square_speed_ratio)},
+          {"hover_z_plain_m", json_of(found, found.hover_z_plain)},
+          {"hover_z_compensated_m", json_of(found, found.hover_z_compensated)},
+          {"hover_z_ratio", json_of(found, found.hover_z_ratio)},
+          {"hover_xy_plain_m", json_of(found, found.hover_xy_plain)},
+          {"hover_xy_compensated_m", json_of(found, found.hover_xy_compensated)},
+          {"hover_xy_ratio", json_of(found, found.hover_xy_ratio)},
+          {"forward_x_m", json_of(found, found.forward_x)},
+          {"forward_plain_m", json_of(found, found.forward_plain)},
+          {"forward_compensated_m", json_of(found, found.forward_compensated)},
+          {"forward_ratio", json_of(found, found.forward_ratio)},
+          {"square_speed_ratio", json_of(found, found.square_speed_ratio)},
           {"by_loss_law", by_law}};
 }
 

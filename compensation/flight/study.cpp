@@ -107,7 +107,8 @@ Findings findings_of(const std::vector<Draw>& draws) {
   }
   found.kept = kept.size();
   for (std::size_t law = 0; law < found.by_law.size(); ++law) {
-    found.by_law[law] = {percentiles(hover_by_law[law]).p50, percentiles(forward_by_law[law]).p50};
+    found.by_law[law] = {hover_by_law[law].size(), percentiles(hover_by_law[law]).p50,
+                         percentiles(forward_by_law[law]).p50};
   }
   if (found.draws > 0) {
     found.hover_z_better = hover_better / static_cast<double>(found.draws);

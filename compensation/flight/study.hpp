@@ -66,8 +66,9 @@ struct Findings {
   Percentiles hover_xy_plain, hover_xy_compensated, hover_xy_ratio;
   Percentiles forward_x, forward_plain, forward_compensated, forward_ratio;
   Percentiles square_speed_ratio;
-  /// Medians of the draws with one law of loss.
+  /// Medians of the kept draws with one law of loss; they mean nothing if there are none.
   struct OfLaw {
+    std::size_t kept = 0;
     double hover_z_ratio = 0, forward_ratio = 0;
   };
   std::array<OfLaw, kLossLaws> by_law{};

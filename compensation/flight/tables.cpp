@@ -87,6 +87,11 @@ std::string forward_table(const NineFlights& flights) {
 
 std::string findings_table(const Findings& found) {
   const auto percent = [](double share) { return aligned(100 * share, 1, 0) + " %"; };
+  if (found.kept == 0) {
+    return std::to_string(found.draws) +
+           " draws, and a flight was lost in each: no percentiles (without compensation " +
+           std::to_string(found.lost_plain) + ", with or in X " + std::to_string(found.lost_compensated) + ")\n\n";
+  }
   std::string text = std::to_string(found.draws) + " draws; with a flight lost: " + std::to_string(found.lost_plain) +
                      " without compensation, " + std::to_string(found.lost_compensated) +
                      " with or in X. Percentiles are over the " + std::to_string(found.kept) + " others.\n" +
@@ -104,13 +109,13 @@ std::string findings_table(const Findings& found) {
   text += "better with compensation: hover z in " + percent(found.hover_z_better) + ", forward flight in " +
           percent(found.forward_better) +
           " of the draws,\ncounting those as better that were lost without compensation only\n";
-  text += "median c. over n.c. by law of loss:";
   for (std::size_t law = 0; law < found.by_law.size(); ++law) {
-    text += std::string(law == 0 ? " " : "; ") + name_of(static_cast<LossLaw>(law)) + " hover z " +
-            aligned(found.by_law[law].hover_z_ratio, 2, 0) + ", forward " +
-            aligned(found.by_law[law].forward_ratio, 2, 0);
+    const Findings::OfLaw& of = found.by_law[law];
+    if (of.kept == 0) continue;
+    text += "median c. over n.c., law " + padded(name_of(static_cast<LossLaw>(law)), 18) + "hover z " +
+            aligned(of.hover_z_ratio, 2, 0) + ", forward " + aligned(of.forward_ratio, 2, 0) + "\n";
   }
-  return text + "\n\n";
+  return text + "\n";
 }
 
 std::string not_reproduced() {

@@ -66,9 +66,9 @@ MassProperties mass_properties(const Vehicle& vehicle, const Angles& arms, const
   const Eigen::Vector2d middle = area.middle + plate_offset;
   MassProperties found;
   found.mass_kg = build.mass_kg;
-  // All about the origin first, then back to the common centre of gravity (Steiner's theorem): J = Σ (J_own + m r²) − M
-  // c². The body's own m r² counts, too: in T of the foldable drone it lies 17.55 mm beside that centre, 0.129e-3 kg m²
-  // in J_xx and J_zz.
+  // About the origin first, then about the common centre of gravity c (Steiner's theorem): J = Σ (J_own + m r²) − M c².
+  // So the body's distance from c counts as the hubs' do: in T of the foldable drone 17.55 mm, 0.129e-3 kg m² of J_xx
+  // and J_zz.
   found.inertia = body_inertia(build, plate, area) + point_inertia(plate, middle);
   found.cog = plate * middle;
   for (std::size_t i = 0; i < arms.size(); ++i) {

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "compensation/compensator.hpp"
+#include "compensation/kphi_compensation.h"
 #include "compensation/mixing.hpp"
 
 namespace {
@@ -81,7 +82,7 @@ Airframe airframe(Bytes& bytes, OverlapMeasure overlap) {
   return frame;
 }
 
-void fly(Compensator& compensator, const Airframe& frame, Bytes& bytes) {
+void fly(Compensator& compensator, const Airframe& frame, ScalingLaw law, Bytes& bytes) {
   std::array<Radians, 4> arms;
   std::array<Newtons, 4> thrusts;
   for (Radians& arm : arms) arm = Radians(bytes.number(4));
@@ -93,7 +94,7 @@ void fly(Compensator& compensator, const Airframe& frame, Bytes& bytes) {
   for (std::size_t i = 0; i < 4; ++i) {
     const double phi = compensator.occlusion_angles()[i].value(), k = compensator.scaling_factors()[i];
     require(phi >= 0.0 && phi <= 2 * kPi);
-    require(k <= 1.0);
+    require(k <= 1.0 && (law == ScalingLaw::published || k >= kScalingFloor));
     require(command.speeds[i] >= frame.slowest_speed && command.speeds[i] <= frame.fastest_speed);
     require(compensator.thrust_max()[i].value() >= 0.0);
     require(compensator.drag_scale()[i] >= 1.0 && compensator.drag_scale()[i] <= 1.0 / kScalingFloor);
@@ -125,6 +126,42 @@ void mix(const Compensator* compensator, Bytes& bytes) {
   for (const double share : mixer->thrust_direction()) require(std::isfinite(share));
 }
 
+/// The plain interface, with codes and counts that may be any.
+void fly_in_c(Bytes& bytes) {
+  kphi_line line{};
+  line.thrust_coefficient = bytes.number(1e-6);
+  line.intercept = bytes.number(1e-6);
+  line.slope_per_rad = bytes.number(1e-6);
+  line.largest_fitted_rad = bytes.number(5);
+  line.overlap = static_cast<signed char>(bytes.byte());
+  line.has_uncertainty = bytes.byte() % 2;
+  line.thrust_coefficient_error = bytes.number(1e-8);
+  line.intercept_variance = bytes.number(1e-16);
+  kphi_airframe airframe{};
+  airframe.half_side = bytes.number(0.1);
+  airframe.arm_length = bytes.number(0.2);
+  airframe.propeller_radius = bytes.number(0.1);
+  airframe.fastest_speed = bytes.number(2000);
+  airframe.overlap = line.overlap;
+  airframe.corner_count = bytes.byte() % 3 == 0 ? static_cast<signed char>(bytes.byte()) : 0;
+  for (auto& corner : airframe.corners) corner[0] = bytes.number(0.2), corner[1] = bytes.number(0.2);
+  for (int i = 0; i < 4; ++i) airframe.hinge_turns[i] = i;
+  if (bytes.byte() % 4 == 0) airframe.hinge_turns[bytes.byte() % 4] = static_cast<signed char>(bytes.byte());
+  const kphi_line lines[4] = {line, line, line, line};
+  kphi_compensator compensator;
+  const int refusal =
+      kphi_compensator_build(&compensator, lines, &airframe, static_cast<signed char>(bytes.byte()) % 3);
+  require(std::strlen(kphi_refusal_text(refusal)) > 0);
+  if (refusal != 0) return;
+  double arms[4], thrusts[4], speeds[4], uncertainties[4];
+  unsigned char flags[4];
+  for (int i = 0; i < 4; ++i) arms[i] = bytes.number(4), thrusts[i] = bytes.number(8);
+  kphi_set_arms(&compensator, arms);
+  kphi_speeds_for(&compensator, thrusts, speeds, bytes.byte() % 2 == 0 ? flags : nullptr);
+  kphi_speed_uncertainties(&compensator, thrusts, bytes.number(0.1), uncertainties);
+  for (int i = 0; i < 4; ++i) require(speeds[i] >= 0 && speeds[i] <= airframe.fastest_speed && uncertainties[i] >= 0);
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -136,8 +173,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::optional<Compensator> compensator;
   if (some && other) compensator = Compensator::build({*some, *other, *some, *other}, frame, law).compensator;
   for (int i = 0; i < 50 && bytes.more(); ++i) {
-    if (compensator) fly(*compensator, frame, bytes);
+    if (compensator) fly(*compensator, frame, law, bytes);
     mix(compensator ? &*compensator : nullptr, bytes);
+    fly_in_c(bytes);
   }
   return 0;
 }

@@ -149,6 +149,16 @@ TEST_F(Fly, FliesABodyThatIsNoSquareAndASquareThatIsGivenAsAnOutlineAsTheSquare)
   EXPECT_LT(std::fabs(helped), 0.5 * plain);
 }
 
+TEST_F(Fly, SaysNothingInsteadOfZeroWhereEveryDrawLostAFlight) {
+  const std::string limp = changed_vehicle(*folder_, "limp", {{"[12.7, 12.7, 5]", "[1.0, 1.0, 5]"}});
+  const Outcome flown = fly({"--draws", "1", "--json"}, coefficients_, limp);
+  ASSERT_EQ(flown.code, 0) << flown.err;
+  const auto study = nlohmann::json::parse(flown.out)["study"];
+  EXPECT_EQ(study["kept"], 0);
+  EXPECT_TRUE(study["forward_ratio"].is_null());
+  EXPECT_TRUE(study["by_loss_law"].empty());
+}
+
 TEST_F(Fly, FliesWhatTheVehicleFileSays) {
   const std::string stiff = changed_vehicle(*folder_, "stiff", {{"[6, 6, 15]", "[6, 6, 30]"}});
   const auto sag = [](const Outcome& flown) {

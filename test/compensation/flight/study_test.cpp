@@ -102,6 +102,10 @@ TEST(Findings, CountALostFlightAgainstTheSideThatLostIt) {
   lost_in_x.flights[kLevelPlain].lost_leg = 0;
   const Findings found = findings_of({made_up(0.5), lost_plain, lost_compensated, lost_in_x});
   EXPECT_EQ(found.draws, 4u);
+  EXPECT_EQ(found.kept, 1u);
+  EXPECT_EQ(found.by_law[0].kept, 1u);
+  EXPECT_NEAR(found.by_law[0].hover_z_ratio, 0.5, 1e-12);
+  EXPECT_EQ(found.by_law[1].kept, 0u);
   EXPECT_EQ(found.lost_plain, 1u);
   EXPECT_EQ(found.lost_compensated, 2u);
   EXPECT_EQ(found.forward_better, 0.5) << "the whole one, and the one that only compensation saved";

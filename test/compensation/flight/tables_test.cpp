@@ -59,6 +59,26 @@ TEST(Tables, OfNothingFlownAreEmpty) {
   EXPECT_EQ(hover_table({}) + height_table({}, example_gains()) + forward_table({}), "");
 }
 
+TEST(FindingsTable, TellsOverWhichDrawsItsPercentilesGoAndOnlyOfLawsThatWereDrawn) {
+  Findings found;
+  found.draws = 3;
+  found.kept = 2;
+  found.lost_plain = 1;
+  found.by_law[0] = {2, 0.251, 0.462};
+  const std::string table = findings_table(found);
+  EXPECT_THAT(table, HasSubstr("3 draws; with a flight lost: 1 without compensation, 0 with or in X. Percentiles are "
+                               "over the 2 others."));
+  EXPECT_THAT(table, HasSubstr("law quadratic         hover z 0.25, forward 0.46\n"));
+  EXPECT_THAT(table, Not(HasSubstr("steep_onset")));
+}
+
+TEST(FindingsTable, HasNoNumbersWhereEveryDrawLostAFlight) {
+  Findings found;
+  found.draws = found.lost_plain = 3;
+  EXPECT_THAT(findings_table(found), HasSubstr("no percentiles"));
+  EXPECT_THAT(findings_table(found), Not(HasSubstr("0.000")));
+}
+
 TEST(NotReproduced, NamesTheXBaselineAndTheVelocityTerm) {
   EXPECT_THAT(not_reproduced(), HasSubstr("the errors in X of Tables I and III"));
   EXPECT_THAT(not_reproduced(), HasSubstr("the velocity term of Table II"));
