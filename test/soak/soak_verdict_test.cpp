@@ -129,8 +129,9 @@ void expect_each_named(const std::vector<Sabotage>& sabotages) {
     SCOPED_TRACE(sabotage.what);
     const test::TemporaryFolder folder(quick_folder());
     Evidence evidence = evidence_in(folder / "copy", sabotage.base);
-    if (right.insert(sabotage.base).second)
+    if (right.insert(sabotage.base).second) {
       EXPECT_THAT(judge(evidence).wrong, testing::IsEmpty()) << "before anything is spoilt";
+    }
     ASSERT_EQ(name_of(evidence.story.end), std::string(name_of(end_of(sabotage.base))));
     sabotage.spoil(evidence);
     EXPECT_THAT(judge(evidence).wrong, testing::Contains(testing::HasSubstr(sabotage.told)));
