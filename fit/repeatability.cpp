@@ -89,20 +89,13 @@ AngleScatter scatter_of_angle(double k, std::vector<RunSums> runs, const WithinR
 
 Repeatability repeatability(std::vector<AngleScatter> angles) {
   Repeatability result;
-  double squares = 0, expected = 0, freedom = 0;
-  for (const AngleScatter& angle : angles) {
-    const double n = count(angle);
-    if (n < 2 || angle.k == 0) continue;
-    double mean = 0;
-    for (const RunSums& run : angle.runs) mean += run.k() / n;
-    for (const RunSums& run : angle.runs) squares += std::pow((run.k() - mean) / angle.k, 2);
-    const double zero = angle.zero_u() * std::sqrt(n);  // of one run
-    expected += (n - 1) * (angle.within.variance + zero * zero) / (angle.k * angle.k);
-    freedom += n - 1;
-  }
+  std::vector<std::vector<RunShare>> shares;
+  for (const AngleScatter& angle : angles)
+    if (angle.k != 0) shares.push_back(shares_of(angle));
+  const double freedom = freedom_of(shares);
   result.angles = std::move(angles);
   result.repeated = freedom > 0;
-  if (result.repeated) result.between = {0, std::sqrt(std::max(0.0, squares - expected) / freedom), freedom};
+  if (result.repeated) result.between = {0, std::sqrt(scatter_beyond(shares)), freedom};
   return result;
 }
 
