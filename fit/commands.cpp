@@ -129,8 +129,11 @@ Json raw_json(const FitInput& input) {
   const auto check = check_by_blade_pass(runs);
   Json json = raw_to_json(identify_dynamics(runs), check);
   const auto& clock = input.provenance.clock;
-  if (check && clock && clock->u_gain)
-    json["blade_pass"]["against_clock_gain"] = to_json(check->against({clock->gain, *clock->u_gain}));
+  if (!check || !clock || !clock->u_gain) return json;
+  StatisticalTest agreement = check->against({clock->gain, *clock->u_gain});
+  agreement.name = "blade-pass line against the clock gain of the bench file";
+  agreement.hypothesis = "both are the same";
+  json["blade_pass"]["against_clock_gain"] = to_json(agreement);
   return json;
 }
 

@@ -34,6 +34,14 @@ double share_top(const Identification& identification, const std::vector<ThrustS
   return 10 * std::ceil((top + 3) / 10);
 }
 
+/// 0, or lower where samples are: near no thrust at all their noise reaches below.
+double share_bottom(const std::vector<ThrustShares>& shares) {
+  double bottom = 0;
+  for (const auto& entry : shares)
+    for (const double percent : entry.percent) bottom = std::min(bottom, percent);
+  return 10 * std::floor(bottom / 10);
+}
+
 std::string line_rows(const LineFit& line, double from_deg, double to_deg) {
   constexpr int kPieces = 60;
   std::string rows;
@@ -67,18 +75,19 @@ double box_width(const Identification& identification) {
   return 0.4 * gap;
 }
 
-std::string axes(const Identification& identification, double top) {
+std::string axes(const Identification& identification, double bottom, double top) {
   const double width = box_width(identification);
   return fmt::format(
-      "set xrange [{:.6g}:{:.6g}]\nset yrange [0:{:.6g}]\nset y2range [0:{:.8g}]\n"
+      "set xrange [{:.6g}:{:.6g}]\nset yrange [{:.6g}:{:.6g}]\nset y2range [{:.8g}:{:.8g}]\n"
       "set xtics ({})\nset ytics 20\nset y2tics\nset boxwidth {:.6g} absolute\n"
       "set xlabel 'angle of the occlusion φ'\nset ylabel 'thrust, % of the thrust at φ = 0'\n"
       "set y2label 'k(φ), 10⁻⁶ N/(rad/s)²'\n"
       "set key top right samplen 2 spacing 1.2\n"
       "set style fill solid 0.45 border lc rgb '#3b6ea5'\n"
       "set style boxplot range 1.5 outliers pointtype 7\nset pointsize 0.3\n",
-      identification.table.front().phi_deg - 1.2 * width, identification.table.back().phi_deg + 1.2 * width, top,
-      top / 100 * identification.line.K_T * 1e6, angle_tics(identification), width);
+      identification.table.front().phi_deg - 1.2 * width, identification.table.back().phi_deg + 1.2 * width, bottom,
+      top, bottom / 100 * identification.line.K_T * 1e6, top / 100 * identification.line.K_T * 1e6,
+      angle_tics(identification), width);
 }
 
 std::string box_plots(const std::vector<ThrustShares>& shares) {
@@ -157,7 +166,8 @@ Figure share_figure(const Identification& identification, const std::vector<Thru
   data += data_block("before", line_rows(line, 0, first));
   data += data_block("k", coefficient_rows(identification));
   figure.script =
-      figure_head() + "set border 11\n" + data + axes(identification, share_top(identification, shares)) + "plot \\\n" +
+      figure_head() + "set border 11\n" + data +
+      axes(identification, share_bottom(shares), share_top(identification, shares)) + "plot \\\n" +
       "  $line using 1:3:4 axes x1y2 with filledcurves fs transparent solid 0.2 noborder lc rgb '#D55E00' notitle, "
       "\\\n" +
       box_plots(shares) +

@@ -16,7 +16,7 @@ ceres::Problem::Options problem_options() {
   return options;
 }
 
-void solve_exactly(ceres::Problem& problem, const char* what) {
+void solve_exactly(ceres::Problem& problem, const char* what, int iterations) {
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
   options.logging_type = ceres::SILENT;
@@ -25,7 +25,7 @@ void solve_exactly(ceres::Problem& problem, const char* what) {
   // the cost no longer falls, which Ceres would count as failure; so many steps are simply taken.
   options.initial_trust_region_radius = 1e16;
   options.max_trust_region_radius = 1e32;
-  options.max_num_iterations = 4;
+  options.max_num_iterations = iterations;
   options.max_num_consecutive_invalid_steps = options.max_num_iterations + 1;
   options.function_tolerance = 0;
   options.gradient_tolerance = 0;

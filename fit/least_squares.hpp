@@ -13,8 +13,8 @@ namespace kphi::fit {
 [[nodiscard]] ceres::Problem::Options problem_options();
 
 /// Solves to rounding (the problems here are linear and scaled to about 1) and says nothing on stdout or stderr.
-/// Throws FitError, naming `what`, when Ceres does not converge.
-void solve_exactly(ceres::Problem& problem, const char* what);
+/// Throws FitError, naming `what`, when Ceres does not converge. One iteration is enough for a start.
+void solve_exactly(ceres::Problem& problem, const char* what, int iterations = 4);
 
 /// The same for problems that need iterations, such as those with a robust loss, until nothing moves any more.
 /// `tolerance`: of the cost, relative.

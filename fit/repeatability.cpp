@@ -8,10 +8,56 @@ namespace {
 
 double count(const AngleScatter& angle) { return static_cast<double>(angle.runs.size()); }
 
-double mean_of(const AngleScatter& angle) {
-  double mean = 0;
-  for (const RunSums& run : angle.runs) mean += run.k() / count(angle);
-  return mean;
+/// k of one run as a share of that of its φ, with the variance that its noise and its own zero explain.
+struct RunShare {
+  double k = 0, variance = 0;
+};
+
+std::vector<RunShare> shares_of(const AngleScatter& angle) {
+  std::vector<RunShare> shares;
+  for (const RunSums& run : angle.runs) {
+    const double zero = run.zero_moved_n / std::sqrt(12.0) * angle.zero_sensitivity;
+    shares.push_back({run.k() / angle.k, (angle.within.variance + zero * zero) / (angle.k * angle.k)});
+  }
+  return shares;
+}
+
+double freedom_of(const std::vector<std::vector<RunShare>>& angles) {
+  double freedom = 0;
+  for (const auto& runs : angles) freedom += runs.empty() ? 0 : static_cast<double>(runs.size() - 1);
+  return freedom;
+}
+
+/// χ² of the runs about the mean of their φ, were the variance from run to run larger by `beyond`.
+double chi_squared(const std::vector<std::vector<RunShare>>& angles, double beyond) {
+  double sum = 0;
+  for (const auto& runs : angles) {
+    const double n = static_cast<double>(runs.size());
+    if (n < 2) continue;
+    double mean = 0, variances = 0;
+    for (const RunShare& run : runs) {
+      mean += run.k / n;
+      variances += run.variance + beyond;
+    }
+    for (const RunShare& run : runs) {
+      const double variance = (run.variance + beyond) * (1 - 2 / n) + variances / (n * n);
+      sum += std::pow(run.k - mean, 2) / variance * (n - 1) / n;
+    }
+  }
+  return sum;
+}
+
+/// The variance from run to run at which χ² is what is to be expected (Mandel, Paule, Anal. Chem. 42 (1970) 1194).
+double scatter_beyond(const std::vector<std::vector<RunShare>>& angles) {
+  const double freedom = freedom_of(angles);
+  double low = 0, high = 1e-12;
+  if (chi_squared(angles, 1e-16) <= freedom) return 0;
+  while (chi_squared(angles, high) > freedom) high *= 4;
+  for (int i = 0; i < 40; ++i) {
+    const double middle = 0.5 * (low + high);
+    (chi_squared(angles, middle) > freedom ? low : high) = middle;
+  }
+  return high;
 }
 
 double between_u(const Repeatability& all, const AngleScatter& angle) {
@@ -43,52 +89,41 @@ AngleScatter scatter_of_angle(double k, std::vector<RunSums> runs, const WithinR
 
 Repeatability repeatability(std::vector<AngleScatter> angles) {
   Repeatability result;
-  double squares = 0, expected = 0, freedom = 0;
-  for (const AngleScatter& angle : angles) {
-    const double n = count(angle);
-    if (n < 2 || angle.k == 0) continue;
-    double mean = 0;
-    for (const RunSums& run : angle.runs) mean += run.k() / n;
-    for (const RunSums& run : angle.runs) squares += std::pow((run.k() - mean) / angle.k, 2);
-    const double zero = angle.zero_u() * std::sqrt(n);  // of one run
-    expected += (n - 1) * (angle.within.variance + zero * zero) / (angle.k * angle.k);
-    freedom += n - 1;
-  }
+  std::vector<std::vector<RunShare>> shares;
+  for (const AngleScatter& angle : angles)
+    if (angle.k != 0) shares.push_back(shares_of(angle));
+  const double freedom = freedom_of(shares);
   result.angles = std::move(angles);
   result.repeated = freedom > 0;
-  if (result.repeated) result.between = {0, std::sqrt(std::max(0.0, squares - expected) / freedom), freedom};
+  if (result.repeated) result.between = {0, std::sqrt(scatter_beyond(shares)), freedom};
   return result;
 }
 
 std::vector<OutlyingRun> outlying_runs(const Repeatability& all) {
-  double scatter = 0, noise = 0, freedom = 0;  // shares of k, squared
+  std::vector<std::vector<RunShare>> angles;
+  std::size_t runs = 0;
   for (const AngleScatter& angle : all.angles) {
-    for (const RunSums& run : angle.runs) scatter += std::pow((run.k() - mean_of(angle)) / angle.k, 2);
-    freedom += count(angle) - 1;
-    noise += (count(angle) - 1) * angle.within.variance / (angle.k * angle.k);
-  }
-  const double beyond = std::max(0.0, scatter - noise) / freedom;
-  std::vector<OutlyingRun> runs;
-  std::vector<double> squared;  // deviations in their variance
-  double squares = 0;
-  for (const AngleScatter& angle : all.angles) {
-    const double n = count(angle), mean = mean_of(angle);
-    const double variance = (angle.within.variance + beyond * angle.k * angle.k) * (1 - 1 / n);
-    for (const RunSums& run : angle.runs) {
-      const double off = run.k() - mean;
-      if (n < 2 || !(variance > 0)) continue;
-      runs.push_back({run.phi_deg, run.repetition, run.k() / (mean - off / (n - 1)) - 1, 1});
-      squared.push_back(off * off / variance);
-      squares += squared.back() * (n - 1) / n;
-    }
+    angles.push_back(shares_of(angle));
+    if (angle.runs.size() > 1) runs += angle.runs.size();
   }
   std::vector<OutlyingRun> outlying;
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    const double rest = (squares - squared[i]) / (freedom - 1);
-    if (freedom < 3 || !(rest > 0)) continue;
-    const StatisticalTest test = student_test({std::sqrt(squared[i]), std::sqrt(rest), freedom - 1}, 0);
-    runs[i].p = std::min(1.0, test.p * static_cast<double>(runs.size()));
-    if (runs[i].p < kTestLevel) outlying.push_back(runs[i]);
+  for (std::size_t i = 0; i < angles.size(); ++i) {
+    for (std::size_t r = 0; r < angles[i].size() && angles[i].size() > 1; ++r) {
+      auto others = angles;
+      others[i].erase(others[i].begin() + static_cast<std::ptrdiff_t>(r));
+      const double freedom = freedom_of(others);
+      if (freedom < 2) continue;
+      const double beyond = scatter_beyond(others), n = static_cast<double>(others[i].size());
+      double mean = 0, variance = angles[i][r].variance + beyond;
+      for (const RunShare& other : others[i]) {
+        mean += other.k / n;
+        variance += (other.variance + beyond) / (n * n);
+      }
+      const StatisticalTest test = student_test({angles[i][r].k, std::sqrt(variance), freedom}, mean);
+      const double p = std::min(1.0, test.p * static_cast<double>(runs));
+      const RunSums& run = all.angles[i].runs[r];
+      if (p < kTestLevel) outlying.push_back({run.phi_deg, run.repetition, angles[i][r].k / mean - 1, p});
+    }
   }
   return outlying;
 }

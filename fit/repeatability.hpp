@@ -43,8 +43,8 @@ struct OutlyingRun {
   double p = 1;      ///< of one of all runs so far off by chance
 };
 
-/// By externally studentised residuals (Cook, Weisberg: Residuals and Influence in Regression, 1982, 2.2), the scatter
-/// pooled over all φ without the run judged, corrected for their number (Bonferroni); level 5 % for the campaign.
+/// Each run against the mean of the others of its φ, by Student's test with what all other runs scatter (pooled over
+/// φ, each with its own noise and zero), corrected for their number (Bonferroni); level 5 % for the campaign.
 [[nodiscard]] std::vector<OutlyingRun> outlying_runs(const Repeatability& all);
 
 [[nodiscard]] AngleScatter scatter_of_angle(double k, std::vector<RunSums> runs, const WithinRuns& within);

@@ -183,7 +183,10 @@ std::string doubt_section(const StepSelection& selection) {
                                       [](const DoubtfulStep& doubtful) { return doubtful.left_out; });
   std::string html = fmt::format(
       "<h2>Steps left out</h2>\n<p>{} steps were fitted; {} left out for a doubt, {} lie outside the speed "
-      "range.</p>\n",
+      "range.</p>\n<p class=\"note\">A step is left out for a doubt or by hand, both of which name a cause, never for "
+      "being "
+      "far from the others: what repetitions scatter is their uncertainty (JCGM 100, 3.4.7 and 4.2), and is in the "
+      "budget.</p>\n",
       selection.used.size(), left_out, selection.outside_range);
   if (selection.doubtful.empty()) return html;
   html +=

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -106,7 +105,7 @@ NoiseModel noise_of(const std::vector<double>& x, const std::vector<double>& var
 /// What least squares of one run found.
 struct RunFit {
   std::vector<double> residuals;  ///< N; the last is the zero's own where that is known
-  double trend = 0, trend_u = 0;  ///< u as the weights have it
+  double trend = 0, trend_u = 0;  ///< of the last term; u as the weights have it
   double freedom = 0;
   double deviation = 0;  ///< of the weighted residuals
 };
@@ -120,38 +119,54 @@ struct RunModel {
   [[nodiscard]] RunFit fit(const std::vector<Sample>& samples, double zero_u_n) const;
 };
 
+double dot(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+void subtract(double times, const std::vector<double>& a, std::vector<double>& from) {
+  for (std::size_t i = 0; i < a.size(); ++i) from[i] -= times * a[i];
+}
+
+void scale(double by, std::vector<double>& a) {
+  for (double& one : a) one *= by;
+}
+
+/// By modified Gram-Schmidt on the weighted columns: what is left of the thrusts are the residuals, and the last column
+/// is the trend's.
 RunFit RunModel::fit(const std::vector<Sample>& samples, double zero_u_n) const {
-  const auto n = static_cast<Eigen::Index>(samples.size()), terms = static_cast<Eigen::Index>(spread > 0 ? 3 : 2);
-  const Eigen::Index rows = n + (zero_is_free ? 0 : 1);
-  Eigen::MatrixXd design = Eigen::MatrixXd::Zero(rows, terms);
-  Eigen::VectorXd thrusts = Eigen::VectorXd::Zero(rows), roots(rows);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const Sample& sample = samples[static_cast<std::size_t>(i)];
-    roots[i] = 1 / std::sqrt(noise.at(sample.x));
-    thrusts[i] = sample.thrust;
-    design(i, 0) = sample.x;
-    design(i, 1) = 1;
-    if (spread > 0) design(i, 2) = k * sample.x * (sample.speed - middle) / spread;
+  std::vector<std::vector<double>> columns(spread > 0 ? 3 : 2);
+  std::vector<double> roots, rest;
+  for (const Sample& sample : samples) {
+    const double root = 1 / std::sqrt(noise.at(sample.x));
+    roots.push_back(root);
+    rest.push_back(root * sample.thrust);
+    columns[0].push_back(root * sample.x);
+    columns[1].push_back(root);
+    if (spread > 0) columns[2].push_back(root * k * sample.x * (sample.speed - middle) / spread);
   }
   if (!zero_is_free) {
-    roots[n] = 1 / zero_u_n;
-    design(n, 1) = 1;
+    roots.push_back(1 / zero_u_n);
+    rest.push_back(0);
+    for (std::size_t j = 0; j < columns.size(); ++j) columns[j].push_back(j == 1 ? roots.back() : 0);
   }
-  const Eigen::VectorXd sizes = (roots.asDiagonal() * design).colwise().norm();  // ω² of 1e6 beside 1
-  const Eigen::MatrixXd scaled = roots.asDiagonal() * design * sizes.cwiseInverse().asDiagonal();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(scaled);
-  const Eigen::MatrixXd upper = qr.matrixQR().topRows(terms).triangularView<Eigen::Upper>();
-  if (rows <= terms || !(upper.diagonal().cwiseAbs().minCoeff() > 1e-9))
-    throw FitError("k against speed: too few different speeds in a run");
-  const Eigen::VectorXd estimates = sizes.cwiseInverse().cwiseProduct(qr.solve(roots.cwiseProduct(thrusts)));
-  const Eigen::VectorXd residuals = thrusts - design * estimates;
+  if (rest.size() <= columns.size()) throw FitError("k against speed: too few steps in a run");
   RunFit result;
-  result.residuals.assign(residuals.data(), residuals.data() + rows);
-  result.freedom = static_cast<double>(rows - terms);
-  result.deviation = roots.cwiseProduct(residuals).norm() / std::sqrt(result.freedom);
-  if (terms < 3) return result;
-  result.trend = estimates[2];
-  result.trend_u = 1 / std::abs(upper(2, 2)) / sizes[2];  // the last row of R⁻¹
+  for (std::size_t j = 0; j < columns.size(); ++j) {
+    const double whole = std::sqrt(dot(columns[j], columns[j]));
+    for (std::size_t i = 0; i < j; ++i) subtract(dot(columns[i], columns[j]), columns[i], columns[j]);
+    const double size = std::sqrt(dot(columns[j], columns[j]));
+    if (!(size > 1e-9 * whole)) throw FitError("k against speed: too few different speeds in a run");
+    scale(1 / size, columns[j]);
+    const double part = dot(columns[j], rest);
+    subtract(part, columns[j], rest);
+    result.trend = part / size;
+    result.trend_u = 1 / size;
+  }
+  result.freedom = static_cast<double>(rest.size() - columns.size());
+  result.deviation = std::sqrt(dot(rest, rest) / result.freedom);
+  for (std::size_t i = 0; i < rest.size(); ++i) result.residuals.push_back(rest[i] / roots[i]);
   return result;
 }
 

@@ -124,25 +124,30 @@ class Fitter {
  public:
   Fitter(const Scale& scale, std::size_t terms) : scale_(scale), terms_(terms) {}
 
-  /// A `coarse` solution is one to start from, and to take the scale of the next one from.
-  void solve(const std::vector<Point>& points, Loss loss, bool coarse = false) {
-    std::vector<double> residuals;
-    for (const Point& point : points) residuals.push_back(residual(point));
-    const double sigma = loss == Loss::none ? 0 : 1.4826 * median_absolute(residuals);
-    loss_ = sigma > 0 ? loss_function(loss, sigma) : nullptr;  // points without scatter have no outliers
+  /// With weights as they are now.
+  void take(const std::vector<Point>& points) {
     problem_ = std::make_unique<ceres::Problem>(problem_options());
     for (const Point& point : points) {
       problem_->AddResidualBlock(
           new ceres::AutoDiffCostFunction<ThrustResidual, 1, 1, 1, 1>(new ThrustResidual{
               point.speed_rad_s / scale_.speed, point.thrust_n / scale_.thrust, std::sqrt(point.weight)}),
-          loss_.get(), &k_, &linear_, &offset_);
+          &changing_loss_, &k_, &linear_, &offset_);
     }
     if (terms_ < 2) problem_->SetParameterBlockConstant(&offset_);
     if (terms_ < 3) problem_->SetParameterBlockConstant(&linear_);
+  }
+
+  /// The points taken last. A `coarse` solution is one to start from, and to take the scale of the next one from.
+  void solve(const std::vector<Point>& points, Loss loss, bool coarse = false) {
+    std::vector<double> residuals;
+    for (const Point& point : points) residuals.push_back(residual(point));
+    const double sigma = loss == Loss::none ? 0 : 1.4826 * median_absolute(residuals);
+    loss_ = sigma > 0 ? loss_function(loss, sigma) : nullptr;  // points without scatter have no outliers
+    changing_loss_.Reset(loss_.get(), ceres::DO_NOT_TAKE_OWNERSHIP);
     if (loss_) {
       solve_robustly(*problem_, "thrust fit", coarse ? 1e-4 : 1e-14);
     } else {
-      solve_exactly(*problem_, "thrust fit");
+      solve_exactly(*problem_, "thrust fit", coarse ? 1 : 4);
     }
     residuals_.clear();
     for (const Point& point : points) residuals_.push_back(residual(point));
@@ -208,6 +213,7 @@ class Fitter {
   std::size_t terms_;
   double k_ = 0, linear_ = 0, offset_ = 0;
   std::unique_ptr<ceres::LossFunction> loss_;
+  ceres::LossFunctionWrapper changing_loss_{nullptr, ceres::DO_NOT_TAKE_OWNERSHIP};
   std::unique_ptr<ceres::Problem> problem_;
   std::vector<double> residuals_;
 };
@@ -255,11 +261,13 @@ ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& opti
     fitter.solve(fit.points, loss, coarse);
     fit.parameters = fitter.parameters();
   };
-  solve(Loss::none);
+  fitter.take(fit.points);
+  solve(Loss::none, options.loss != Loss::none);
   if (options.loss != Loss::none) solve(Loss::huber, true);  // a convex problem leads the others to the right minimum
   constexpr int kReweightings = 3;
   for (int i = 0; i < kReweightings && options.weighting == Weighting::effective_variance; ++i) {
     weigh(fit.points, options.weighting, &fit.parameters);
+    fitter.take(fit.points);
     solve(options.loss == Loss::none ? Loss::none : Loss::huber);
   }
   if (options.loss != Loss::none) solve(options.loss);

@@ -293,10 +293,11 @@ std::vector<StepMean> parse_steps(std::string_view text, const std::string& name
     const Columns columns = columns_named(text.substr(0, end));
     std::vector<std::string> fields;
     next_record(text, at, lines, fields);
-    steps.reserve(static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n')));
     while (at < text.size()) {
       line = lines + 1;
+      const std::size_t begin = at;
       next_record(text, at, lines, fields);
+      if (steps.empty()) steps.reserve(text.size() / (at - begin) + 1);
       steps.push_back(step_from(fields, columns));
     }
   } catch (const std::invalid_argument& error) {
