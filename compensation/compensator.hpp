@@ -31,11 +31,13 @@ enum class Flag : std::uint8_t {
   at_ceiling = 128,        ///< covered, yet the line lies above K_T there: k_i is held at 1 (clamped law)
 };
 
+/// Any number of them: one rotor's.
 class Flags {
  public:
   constexpr Flags() noexcept = default;
   [[nodiscard]] constexpr bool any() const noexcept { return bits_ != 0; }
   [[nodiscard]] constexpr bool has(Flag flag) const noexcept { return (bits_ & static_cast<unsigned>(flag)) != 0; }
+  /// The sum of the enumerators, as the C interface tells it.
   [[nodiscard]] constexpr std::uint8_t bits() const noexcept { return bits_; }
   /// These flags, and `flag` if `raised`.
   [[nodiscard]] constexpr Flags with(Flag flag, bool raised) const noexcept {
@@ -55,7 +57,7 @@ class Flags {
 };
 
 struct SpeedCommand {
-  std::array<RadPerSec, 4> speeds;
+  std::array<RadPerSec, 4> speeds;  ///< rad/s, never NaN, within the airframe's speed limits
   std::array<Flags, 4> flags;
 };
 
@@ -98,6 +100,7 @@ class Compensator {
   /// Compensated or not. When off every k_i is 1 and speeds_for is the plain map bit for bit; φ is followed all the
   /// same.
   void enable(bool on) noexcept;
+  /// Whether it compensates; it does from the beginning.
   [[nodiscard]] bool enabled() const noexcept { return enabled_; }
 
   /// φ of each rotor [rad], in [0, 2π].

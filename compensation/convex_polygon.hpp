@@ -27,7 +27,9 @@ class ConvexPolygon {
   /// |x|, |y| <= half_side, which must be positive.
   [[nodiscard]] static ConvexPolygon square(Metres half_side) noexcept;
 
+  /// How many corners, 3 to kMaxCorners.
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  /// Corner 0 to size() − 1 [m].
   [[nodiscard]] const Position& corner(std::size_t i) const noexcept { return corners_[i]; }
 
  private:

@@ -58,6 +58,7 @@ enum class Concession : std::uint8_t {
   demand_nan = 8,  ///< a demand was NaN and counted as 0, or a rotor's limits were NaN or crossed and counted as closed
 };
 
+/// Any number of them.
 class Concessions {
  public:
   constexpr Concessions() noexcept = default;

@@ -40,11 +40,17 @@ class ThrustLine {
       OverlapMeasure overlap = OverlapMeasure::rim_arc,
       const std::optional<LineUncertainty>& uncertainty = std::nullopt) noexcept;
 
+  /// K_T [N/(rad/s)²], positive.
   [[nodiscard]] ThrustCoefficient thrust_coefficient() const noexcept { return thrust_coefficient_; }
+  /// k of the line at φ = 0 [N/(rad/s)²], positive; K_T only if the fit was anchored.
   [[nodiscard]] ThrustCoefficient intercept() const noexcept { return intercept_; }
+  /// [N/(rad/s)² per rad], finite, usually negative.
   [[nodiscard]] double slope_per_rad() const noexcept { return slope_per_rad_; }
+  /// The widest occlusion behind the line [rad], in (0, 2π].
   [[nodiscard]] Radians largest_fitted() const noexcept { return largest_fitted_; }
+  /// How the φ of the fit is measured, and that of the flight must be.
   [[nodiscard]] OverlapMeasure overlap() const noexcept { return overlap_; }
+  /// Nothing if the fit told none.
   [[nodiscard]] const std::optional<LineUncertainty>& uncertainty() const noexcept { return uncertainty_; }
 
   /// k(φ) on the line, also beyond the largest fitted angle, where it may be negative.

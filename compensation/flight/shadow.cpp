@@ -41,6 +41,7 @@ double covered_arc(const ConvexPolygon& outline, double radius, double x, double
   };
   for (std::size_t i = 0; i < outline.size(); ++i) {
     const Eigen::Vector2d from = corner(outline, i) - hub, along = (corner(outline, i + 1) - hub - from).normalized();
+    if (along.x() * from.y() - along.y() * from.x() >= radius) return 0;  // the circle lies beyond this edge
     const Eigen::Vector2d foot = from - from.dot(along) * along;
     const double half_chord_squared = radius * radius - foot.squaredNorm();
     if (!(half_chord_squared > 0)) continue;
