@@ -96,7 +96,7 @@ bool SequenceAccount::accept_reboot(const Record& record, Instant arrival) noexc
   began_anew_stalled_ = false;
   forget_host_drops();
   accept_first(first.record, first.arrival);
-  return accept(second.record, second.arrival);
+  return accept_forward(second.record, second.arrival, 1, step(first.record.ft_sequence, second.record.ft_sequence));
 }
 
 std::optional<StampedRecord> SequenceAccount::take_confirmed() noexcept {

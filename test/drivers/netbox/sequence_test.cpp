@@ -258,6 +258,19 @@ TEST(Sequence, ARebootIntoAnotherRateIsARebootToo) {
   stream.expect_closed();
 }
 
+TEST(Sequence, ARebootIsConfirmedByARecordThatCouldBelongToAStreamBefore) {
+  Stream stream;
+  stream.accept(1, 1001);
+  stream.accept(1, 2001);
+  ASSERT_EQ(stream.counters().restarts, 1u);
+  stream.accept(999'004, 1'000'000);
+  EXPECT_TRUE(stream.accept(999'005, 1'000'005)) << "on the line on which the first stream was";
+  EXPECT_EQ(stream.counters().reboots, 1u);
+  EXPECT_EQ(stream.counters().received, 4u);
+  EXPECT_TRUE(stream.account().take_confirmed());
+  stream.expect_closed();
+}
+
 TEST(Sequence, ASingleStrayRecordIsNoReboot) {
   Stream stream;
   for (std::uint32_t i = 1; i <= 100; ++i) {
