@@ -49,8 +49,6 @@ ContactFreeWindow window_of(const Airframe& airframe) noexcept {
   return contact_free_window(airframe.half_side, airframe.arm_length, airframe.propeller_radius);
 }
 
-constexpr double worth(Flag flag) noexcept { return static_cast<double>(flag); }
-
 LineDoubts doubts_about(const ThrustLine& line, ScalingLaw law) noexcept {
   LineDoubts doubts;
   doubts.gains_with_occlusion = line.slope_per_rad() >= 0.0;
@@ -168,28 +166,38 @@ void Compensator::apply_occlusion(std::size_t rotor) noexcept {
 }
 
 SpeedCommand Compensator::speeds_for(const std::array<Newtons, 4>& thrusts) const noexcept {
-  // In passes over all rotors, without a branch, flags as doubles: the compiler makes vector instructions of them.
-  double asked[4], wanted[4], held[4], raised[4];
-  for (std::size_t i = 0; i < 4; ++i) asked[i] = thrusts[i].value();
+  // In passes over all rotors: the compiler makes vector instructions of them. Flags are for what was changed alone.
+  double possible[4], wanted[4], held[4], change[4];
   for (std::size_t i = 0; i < 4; ++i) {
-    wanted[i] = std::sqrt((asked[i] > 0.0 ? asked[i] : 0.0) / effective_coefficients_[i]);  // NaN compares false
+    const double asked = thrusts[i].value();
+    possible[i] = asked > 0.0 ? asked : 0.0;  // NaN compares false
+    wanted[i] = std::sqrt(possible[i] / effective_coefficients_[i]);
   }
   for (std::size_t i = 0; i < 4; ++i) {
-    const double raised_speed = wanted[i] < slowest_ ? slowest_ : wanted[i];
-    held[i] = raised_speed > fastest_ ? fastest_ : raised_speed;
+    const double raised = wanted[i] < slowest_ ? slowest_ : wanted[i];
+    held[i] = raised > fastest_ ? fastest_ : raised;
   }
   for (std::size_t i = 0; i < 4; ++i) {
-    raised[i] = (asked[i] != asked[i] ? worth(Flag::thrust_nan) : 0.0) +
-                (asked[i] < 0.0 ? worth(Flag::thrust_negative) : 0.0) +
-                (wanted[i] < slowest_ ? worth(Flag::speed_at_slowest) : 0.0) +
-                (wanted[i] > fastest_ ? worth(Flag::speed_at_fastest) : 0.0);
+    change[i] = std::fabs(held[i] - wanted[i]) + std::fabs(possible[i] - thrusts[i].value());
   }
   SpeedCommand command;
   for (std::size_t i = 0; i < 4; ++i) command.speeds[i] = RadPerSec(held[i]);
-  for (std::size_t i = 0; i < 4; ++i) {
-    command.flags[i] = arm_flags_[i].with(static_cast<std::uint8_t>(static_cast<int>(raised[i])));
-  }
+  command.flags = arm_flags_;
+  const bool as_asked = change[0] + change[1] + (change[2] + change[3]) == 0.0;  // NaN compares false
+  if (!as_asked) flag(thrusts, wanted, command.flags);
   return command;
+}
+
+void Compensator::flag(const std::array<Newtons, 4>& thrusts, const double (&wanted)[4],
+                       std::array<Flags, 4>& flags) const noexcept {
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double asked = thrusts[i].value();
+    flags[i] = flags[i]
+                   .with(Flag::thrust_nan, asked != asked)
+                   .with(Flag::thrust_negative, asked < 0.0)
+                   .with(Flag::speed_at_slowest, wanted[i] < slowest_)
+                   .with(Flag::speed_at_fastest, wanted[i] > fastest_);
+  }
 }
 
 std::array<RadPerSec, 4> Compensator::speed_uncertainties(const std::array<Newtons, 4>& thrusts,

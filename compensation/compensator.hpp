@@ -120,6 +120,9 @@ class Compensator {
   enum class Arm : std::uint8_t { at_rest, left_body, near_body };
   [[nodiscard]] Arm take(std::size_t i, Radians angle) noexcept;
   void apply_occlusion(std::size_t rotor) noexcept;
+  /// Adds what was done to these thrusts and to the speeds that they want.
+  void flag(const std::array<Newtons, 4>& thrusts, const double (&wanted)[4],
+            std::array<Flags, 4>& flags) const noexcept;
 
   std::array<double, 4> effective_coefficients_{};  // K_T k_i, positive: what speeds_for divides by
   double slowest_;

@@ -41,12 +41,16 @@ std::vector<std::array<Four, 4>> drawn(std::size_t count, double low, double hig
   return result;
 }
 
-/// A quarter of them odd.
+/// Those of a flight, a quarter of them with one or four that are odd or beyond the limits.
 std::vector<std::array<Newtons, 4>> any_thrusts() {
-  auto thrusts = drawn<Newtons>(kInputs, -1, 9);
+  auto thrusts = drawn<Newtons>(kInputs, 0.5, 3);
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  const double odd[] = {0.0, std::numeric_limits<double>::quiet_NaN(), kInfinity, 1e-300};
-  for (std::size_t i = 0; i < kInputs; i += 4) thrusts[i][i / 4 % 4] = Newtons(odd[i / 16 % 4]);
+  const double odd[] = {0.0, std::numeric_limits<double>::quiet_NaN(), kInfinity, 1e-300, -1, 9};
+  for (std::size_t i = 0; i < kInputs; i += 4) {
+    const Newtons one(odd[i / 4 % std::size(odd)]);
+    thrusts[i][i / 24 % 4] = one;
+    if (i % 8 == 0) thrusts[i].fill(one);
+  }
   return thrusts;
 }
 
