@@ -2,8 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
+#include "fit/tail_percentiles.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -65,23 +64,11 @@ void resample(const Group& group, std::span<double> into, SplitMix& random) {
   }
 }
 
-BootstrapInterval summary(std::string quantity, double value, std::vector<double>& samples, double level) {
-  BootstrapInterval interval;
-  interval.quantity = std::move(quantity);
-  interval.value = value;
-  const double n = static_cast<double>(samples.size());
-  double mean = 0, squares = 0;
-  for (const double sample : samples) mean += sample / n;
-  for (const double sample : samples) squares += (sample - mean) * (sample - mean);
-  interval.standard_error = std::sqrt(squares / (n - 1));
-  const auto percentile = [&](double share) {
-    const auto at = samples.begin() + static_cast<std::ptrdiff_t>(share * (n - 1) + 0.5);
-    std::nth_element(samples.begin(), at, samples.end());
-    return *at;
-  };
-  interval.lower = percentile((1 - level) / 2);
-  interval.upper = percentile((1 + level) / 2);
-  return interval;
+BootstrapInterval summary(std::string quantity, double value, std::span<const double> samples, double level,
+                          std::vector<double>& room) {
+  const Scatter scatter = scatter_of(samples);
+  const TailPercentiles tails = tail_percentiles(samples, scatter, level, room);
+  return {std::move(quantity), value, scatter.deviation, tails.lower, tails.upper};
 }
 
 }  // namespace
@@ -92,7 +79,7 @@ std::vector<BootstrapInterval> bootstrap(std::span<const RunSums> runs, const Li
   std::vector<BootstrapInterval> result;
   if (groups.empty() || options.resamples < 2) return result;
   SplitMix random(options.seed);
-  std::vector<double> k(options.resamples), intercept(options.resamples), slope(options.resamples);
+  std::vector<double> k(options.resamples), intercept(options.resamples), slope(options.resamples), room;
   double intercept_value = 0, slope_value = 0;
   for (std::size_t i = 0; i < groups.size(); ++i) {
     resample(groups[i], k, random);
@@ -104,10 +91,10 @@ std::vector<BootstrapInterval> bootstrap(std::span<const RunSums> runs, const Li
     intercept_value += line.intercept[i] * value;
     slope_value += line.slope[i] * value;
     const double phi = groups[i].phi_deg;
-    result.push_back(summary(phi == 0 ? "K_T" : fmt::format("k({} deg)", phi), value, k, options.level));
+    result.push_back(summary(phi == 0 ? "K_T" : fmt::format("k({} deg)", phi), value, k, options.level, room));
   }
-  result.push_back(summary("intercept", intercept_value, intercept, options.level));
-  result.push_back(summary("slope", slope_value, slope, options.level));
+  result.push_back(summary("intercept", intercept_value, intercept, options.level, room));
+  result.push_back(summary("slope", slope_value, slope, options.level, room));
   return result;
 }
 
