@@ -6,7 +6,8 @@
 
 #include <CLI/CLI.hpp>
 #include <array>
-#include <map>
+#include <csignal>
+#include <optional>
 #include <thread>
 
 #include "test/soak/soak_lives.hpp"
@@ -22,11 +23,12 @@ const char* name_of(kphi::sim::PowerStage::Mode mode) {
 
 struct Tally {
   std::array<std::uint64_t, 8> ends{};
-  std::uint64_t failed = 0, resumed = 0, resumed_to_the_end = 0;
+  std::uint64_t lived = 0, failed = 0, resumed = 0, resumed_to_the_end = 0;
   std::uint64_t clean_steps = 0, clean_steps_in_doubt = 0;
 
   void add(const Tally& other) {
     for (std::size_t i = 0; i < ends.size(); ++i) ends[i] += other.ends[i];
+    lived += other.lived;
     failed += other.failed;
     resumed += other.resumed;
     resumed_to_the_end += other.resumed_to_the_end;
@@ -69,6 +71,7 @@ void live_one(std::uint64_t seed, bool talkative, Tally& tally) {
     text += fmt::format("WRONG seed {}: an exception: {}\n", seed, error.what());
     wrong = true;
   }
+  ++tally.lived;
   tally.failed += wrong;
   if (!wrong && !talkative) return;
   if (wrong) text += fmt::format("again: ./run soak --seed {}\n\n", seed);
@@ -76,39 +79,53 @@ void live_one(std::uint64_t seed, bool talkative, Tally& tally) {
   std::fflush(stdout);
 }
 
-/// Every `of`-th seed, in a process of its own: HDF5 has one lock for all threads.
-int start_worker(std::uint64_t from, std::uint64_t to, unsigned of) {
-  int ends[2];
-  if (::pipe(ends) != 0) throw std::runtime_error("no pipe");
-  if (::fork() == 0) {
-    ::close(ends[0]);
+volatile std::sig_atomic_t g_stop = 0;
+
+/// Every `of`-th seed, in a process of its own: HDF5 has one lock for all threads. What each seed adds goes into the
+/// pipe, in one write.
+pid_t start_worker(std::uint64_t from, std::uint64_t to, unsigned of, const int (&pipe)[2]) {
+  const pid_t worker = ::fork();
+  if (worker != 0) return worker;
+  std::signal(SIGINT, SIG_IGN);
+  std::signal(SIGTERM, SIG_DFL);
+  ::close(pipe[0]);
+  for (std::uint64_t seed = from; seed < to; seed += of) {
     Tally tally;
-    for (std::uint64_t seed = from; seed < to; seed += of) live_one(seed, false, tally);
-    const ssize_t told = ::write(ends[1], &tally, sizeof tally);
-    ::_exit(told == sizeof tally ? 0 : 1);
+    live_one(seed, false, tally);
+    if (::write(pipe[1], &tally, sizeof tally) != sizeof tally) ::_exit(1);
   }
-  ::close(ends[1]);
-  return ends[0];
+  ::_exit(0);
 }
 
-/// Adds what the worker found; a worker that died has failed.
-void take_from(int worker, Tally& sum) {
-  Tally tally;
-  const bool whole = ::read(worker, &tally, sizeof tally) == sizeof tally;
-  ::close(worker);
-  if (whole) return sum.add(tally);
-  ++sum.failed;
-  fmt::print("a worker died\n");
+/// On a terminal one line that stays, elsewhere a line for every five hundred.
+void show_progress(const Tally& sum, std::uint64_t count) {
+  const bool terminal = ::isatty(STDERR_FILENO) != 0;
+  if (!terminal && sum.lived % 500 != 0) return;
+  fmt::print(stderr, "{}{} of {} lived, {} failed{}", terminal ? "\r" : "", sum.lived, count, sum.failed,
+             terminal && sum.lived < count ? "" : "\n");
 }
 
 Tally live_all(std::uint64_t from, std::uint64_t count) {
-  const unsigned workers = std::max(1u, std::thread::hardware_concurrency());
-  std::vector<int> pipes;
-  for (unsigned i = 0; i < workers; ++i) pipes.push_back(start_worker(from + i, from + count, workers));
-  Tally sum;
-  for (const int pipe : pipes) take_from(pipe, sum);
-  while (::wait(nullptr) > 0) {
+  struct sigaction stop {};
+  stop.sa_handler = [](int) { g_stop = 1; };
+  ::sigaction(SIGINT, &stop, nullptr);
+  ::sigaction(SIGTERM, &stop, nullptr);
+  int pipe[2];
+  if (::pipe(pipe) != 0) throw std::runtime_error("no pipe");
+  const unsigned of = std::max(1u, std::thread::hardware_concurrency());
+  std::vector<pid_t> workers;
+  for (unsigned i = 0; i < of; ++i) workers.push_back(start_worker(from + i, from + count, of, pipe));
+  ::close(pipe[1]);
+  Tally sum, seed;
+  while (g_stop == 0 && ::read(pipe[0], &seed, sizeof seed) == sizeof seed) {
+    sum.add(seed);
+    show_progress(sum, count);
   }
+  for (const pid_t worker : workers) {
+    if (g_stop != 0) ::kill(worker, SIGTERM);
+    ::waitpid(worker, nullptr, 0);
+  }
+  ::close(pipe[0]);
   return sum;
 }
 
@@ -133,7 +150,12 @@ int main(int argc, char** argv) {
                tally.resumed_to_the_end);
     fmt::print("{:6} of {} clean steps unsettled or drifting by chance\n", tally.clean_steps_in_doubt,
                tally.clean_steps);
-    fmt::print("{:6} failed, of {} from seed {}\n", tally.failed, count, from);
+    fmt::print("{:6} failed, of {} from seed {}\n", tally.failed, tally.lived, from);
+    if (tally.lived < count)
+      fmt::print("{:6} did not live: {}\n", count - tally.lived, g_stop != 0 ? "stopped" : "a worker died");
   }
-  return tally.failed == 0 && is_chance(tally.clean_steps_in_doubt, tally.clean_steps) ? 0 : 1;
+  return tally.failed == 0 && tally.lived == (seed ? 1 : count) &&
+                 is_chance(tally.clean_steps_in_doubt, tally.clean_steps)
+             ? 0
+             : 1;
 }
