@@ -15,6 +15,7 @@
 #include "fit/bootstrap.hpp"
 #include "fit/identification.hpp"
 #include "results/steps_csv.hpp"
+#include "test/bench/figures.hpp"
 #include "test/fit/campaign_steps.hpp"
 #include "test/source_dir.hpp"
 
@@ -84,15 +85,10 @@ int main() {
   const double ours =
       fastest(fmt::format("{} fit {} --loss huber --no-report >/dev/null 2>&1", KPHI_PROGRAM, steps), 7);
   const double theirs = fastest(fmt::format("{} fit {} >/dev/null", peer, steps), 3);
-  fmt::print(
-      "fit of 600 rows, robust, covariance   kphi {:7.1f} ms   scipy {:7.1f} ms   {:5.1f} times   (15 wanted, 30 the "
-      "goal)\n",
-      ours, theirs, theirs / ours);
   const double mine = bootstrap_ms(), numpy = number_from(peer + " bootstrap");
-  fmt::print(
-      "10,000 bootstrap resamples by run     kphi {:7.2f} ms   numpy {:7.2f} ms   {:5.1f} times   (5 wanted, 8 the "
-      "goal)\n",
-      mine, numpy, numpy / mine);
   fs::remove_all(folder);
+  fmt::print("kphi fit {:.1f} ms, scipy {:.1f} ms; bootstrap {:.3f} ms, numpy {:.3f} ms\n", ours, theirs, mine, numpy);
+  kphi::bench::at_least(15, theirs / ours, "scipy / kphi fit: 600 rows, robust, covariance (30 hoped for)");
+  kphi::bench::at_least(5, numpy / mine, "numpy / bootstrap: 10,000 resamples by run (8 hoped for)");
   return theirs / ours >= 15 && numpy / mine >= 5 ? 0 : 1;
 }
