@@ -1,6 +1,7 @@
-// The deterministic bench, looked at every millisecond: when did the motor's bridge open?
+// The deterministic bench, looked at every millisecond: since when is the motor neither driven nor braked?
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -62,6 +63,7 @@ class SpoiltMotor final : public MotorLink {
 
 class CoastingBench final : public Bench {
  public:
+  static constexpr double kNothing = 0.1;  ///< A in the winding; a step of a campaign takes 2 to 20
   explicit CoastingBench(const profiles::Bench& place) : bench(place) {
     if (bench.supply() != nullptr) spoilt_supply = std::make_unique<SpoiltSupply>(*bench.supply(), bench.clock());
   }
@@ -78,7 +80,8 @@ class CoastingBench final : public Bench {
   void wait_until(Instant when) override {
     while (clock().now() < when) {
       bench.wait_until(std::min(when, clock().now() + std::chrono::milliseconds(1)));
-      const bool coasts = bench.simulation().motor().stage().mode == sim::PowerStage::Mode::coast;
+      const bool coasts = bench.simulation().motor().stage().mode == sim::PowerStage::Mode::coast ||
+                          std::abs(bench.simulation().plant().motor().motor_amps) < kNothing;
       if (coasts && !coasts_) coasts_at = clock().now();
       coasts_ = coasts;
     }
@@ -87,7 +90,9 @@ class CoastingBench final : public Bench {
   DeterministicBench bench;
   SpoiltMotor spoilt_motor{bench.motor()};
   std::unique_ptr<SpoiltSupply> spoilt_supply;
-  Instant coasts_at{0};  ///< the bridge has been open since
+  /// Since then the bridge is open, or (its supply cut, the bus down to what the rotor itself induces) it carries less
+  /// than kNothing.
+  Instant coasts_at{0};
 
  private:
   bool coasts_ = true;

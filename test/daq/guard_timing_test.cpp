@@ -1,5 +1,5 @@
 // Every row of the guard's table, and what devices say of themselves, each by itself on the deterministic bench: how
-// long after the data exceed the limit is the motor's bridge open? Virtual time, looked at every millisecond.
+// long after the data exceed the limit does the motor coast? Virtual time, looked at every millisecond.
 //
 // "The data exceed the limit" is the stamp of the sample or reading that shows it for the first time (a supply is read
 // eight times a second: the 50 ms count from the reading); where a patience belongs to the limit, its end.
@@ -268,9 +268,14 @@ const Case kCases[] = {
          if (reading.channel == MotorChannel::fault_now) reading.value = 0x42;
        };
      }},
+    // No order reaches a module without its adapter: a supply that can be cut takes the power from it, or its own
+    // timeout opens the bridge.
     {"MotorUnplugged", Watched::state, "  - {at_s: 2.2, for_s: 9, kind: motor_unplug}\n", nullptr,
      [](const auto&, Instant) -> Found { return milliseconds(2200); }, "motor: .* s: the serial port is gone",
      EventKind::guard_trip, nullptr, false, kModuleLease + kPrompt},
+    {"MotorUnpluggedBesideASupply", Watched::state, "  - {at_s: 4.2, for_s: 9, kind: motor_unplug}\n", nullptr,
+     [](const auto&, Instant) -> Found { return milliseconds(4200); }, "motor: .* s: the serial port is gone",
+     EventKind::guard_trip, nullptr, true},
     {"SupplyUnplugged", Watched::state, "", nullptr, [](const auto&, Instant acted) -> Found { return acted; },
      "supply: the serial port is gone", EventKind::supply_stop,
      [](CoastingBench& bench, Instant) { bench.spoilt_supply->lost = "supply: the serial port is gone"; }, true},
