@@ -8,8 +8,9 @@ namespace {
 
 // A stop that the box did not hear shows as datagrams that do not end: so many settle times are enough.
 constexpr int kDrainLimit = 20;
-// A new stream counts from 1. What is further on than this many datagrams belongs to the one before.
-constexpr std::uint32_t kFirstDatagrams = 64;
+// A new stream counts from 1. What is further on than so many datagrams, and so many times what the rate gives since
+// the box was asked, belongs to the one before.
+constexpr double kFirstDatagrams = 4, kLargestRate = 4;
 
 // Of the Net Box; the Axia has no such bits.
 constexpr std::uint32_t kTroubleBits =
@@ -125,7 +126,8 @@ void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, s
     return;
   }
   if (phase_ != Phase::streaming) {
-    const bool expected = phase_ == Phase::silent || (phase_ == Phase::awaiting && belongs_to_new_stream(decoded_[0]));
+    const bool expected =
+        phase_ == Phase::silent || (phase_ == Phase::awaiting && belongs_to_new_stream(decoded_[0], arrival));
     if (!expected) return discard(arrival);
   }
   datagram_records_ = count;
@@ -299,8 +301,10 @@ void Session::discard(Instant arrival) {
   if (phase_ == Phase::draining) due_ = std::min(arrival + settings_.settle, drain_limit_);
 }
 
-bool Session::belongs_to_new_stream(const Record& first) const noexcept {
-  return first.rdt_sequence <= kFirstDatagrams * static_cast<std::uint32_t>(kMaxRecords);
+bool Session::belongs_to_new_stream(const Record& first, Instant arrival) const noexcept {
+  const double datagrams = to_seconds(arrival - first_start_) / to_seconds(settings_.datagram_period());
+  const double records = settings_.buffered ? settings_.records_per_datagram : 1;
+  return first.rdt_sequence <= records * (kFirstDatagrams + kLargestRate * std::max(datagrams, 0.0));
 }
 
 void Session::send(Command command) noexcept {
@@ -314,6 +318,7 @@ void Session::send_stop(Instant now) noexcept {
 
 void Session::send_start(Instant now) noexcept {
   send(start_command());
+  if (attempt_ == 0) first_start_ = now;
   const Duration patience = settings_.reply_timeout * (attempt_ == 0 ? 1 : attempt_ == 1 ? 2 : 4);
   ++attempt_;
   phase_ = Phase::awaiting;

@@ -116,7 +116,7 @@ class Session {
   void note_status(std::uint32_t status, const Record& shown_by, Instant arrival) noexcept;
   void note_silence(Instant now) noexcept;
   void note_event(EventKind kind, Instant at, const Record& shown_by, std::uint32_t status = 0) noexcept;
-  bool belongs_to_new_stream(const Record& first) const noexcept;
+  bool belongs_to_new_stream(const Record& first, Instant arrival) const noexcept;
   [[nodiscard]] Command start_command() const noexcept;
   void begin_streaming(Instant arrival) noexcept;
   void tend_lease(Instant now) noexcept;
@@ -138,7 +138,7 @@ class Session {
   Instant renewal_due_ = kNever, lease_end_ = kNever;
   std::uint64_t renewals_seen_ = 0;
   int renewals_sent_ = 0;  // since the last one that showed
-  Instant drain_limit_{0}, stop_sent_{0};
+  Instant drain_limit_{0}, stop_sent_{0}, first_start_{0};
   int attempt_ = 0;
   std::size_t datagram_records_;  // of the last datagram
   std::uint64_t host_drops_ = 0;

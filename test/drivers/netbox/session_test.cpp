@@ -99,6 +99,27 @@ TEST_F(SessionTest, DiscardsWhatAnOldStreamStillSendsAndWaitsForItsEnd) {
   EXPECT_EQ(out.size(), 40u);
 }
 
+TEST_F(SessionTest, ADelayedDatagramOfAYoungStreamBeforeIsNotTheNewOnesFirst) {
+  start_streaming();
+  session.stop(now += 100ms);
+  session.start(now);
+  advance_to_deadline();
+  now += 10ms;
+  receive(records(601, 1600, 40));
+  EXPECT_EQ(session.state(), State::starting) << "nobody sends 640 records in 10 ms";
+  EXPECT_EQ(session.counters().drained, 1u);
+  receive(records(41, 2040, 40));
+  EXPECT_EQ(session.state(), State::streaming) << "the first datagram of the new one may be late";
+}
+
+TEST_F(SessionTest, ANewStreamIsKnownLateWhenItsFirstDatagramsAreLost) {
+  session.start(now);
+  advance_to_deadline();
+  now += 90ms;
+  receive(records(601, 1600, 40));
+  EXPECT_EQ(session.state(), State::streaming);
+}
+
 TEST_F(SessionTest, StartsAnywayWhenTheOldStreamDoesNotEnd) {
   session.start(now);
   const Instant begun = now;
