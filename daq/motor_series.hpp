@@ -25,6 +25,10 @@ struct Statistics {
 inline constexpr double kGlitchShare = 0.25;
 inline constexpr double kGlitchSpeed = 50;  ///< rad/s
 
+/// So many readings of a turning rotor's speed, bit for bit the same in a row and this long, are one that was repeated.
+inline constexpr std::ptrdiff_t kFrozenReadings = 8;
+inline constexpr double kFrozenSpeedSpan = 0.1;  ///< s
+
 class MotorSeries {
  public:
   /// `readings`: sorted by channel, then time; must outlive the series.
@@ -37,6 +41,8 @@ class MotorSeries {
   /// Values times `sign`.
   [[nodiscard]] Statistics statistics(results::MotorChannel channel, const Window& window, double sign = 1) const;
   [[nodiscard]] std::uint64_t glitches(const Window& window) const;
+  /// Its speed stands still somewhere within the window, other than at 0.
+  [[nodiscard]] bool speed_frozen(const Window& window) const;
 
  private:
   Readings readings_;

@@ -53,6 +53,7 @@ void judge_speed(const StepEvidence& step, const MotorSeries& motor, Bits& bits)
             step.speed.deviation > std::max(kSpeedShare * std::abs(step.speed.mean), kSpeedSteady) ||
                 leaves_at_the_end(step, motor));
   bits.note(Doubt::speed_glitch, motor.glitches(step.motor_window) > 0);
+  bits.note(Doubt::frozen, motor.speed_frozen(step.motor_window));
   bits.note(Doubt::derated, motor.statistics(MotorChannel::derate, step.motor_window).least < 1);
 }
 

@@ -51,7 +51,7 @@ constexpr std::array<DoubtWords, 32> kWords{{
     {Doubt::unsettled, "thrust never settled"},
     {Doubt::drifted, "thrust drifted within the step"},
     {Doubt::lag_unknown, "lag of the thrust unknown"},
-    {Doubt::frozen, "load cell repeated one value"},
+    {Doubt::frozen, "load cell or speed repeated one value"},
     {Doubt::speed_glitch, "impossible speeds left out"},
 }};
 

@@ -41,7 +41,7 @@ enum class Doubt : std::uint32_t {
   supply_rise = 1u << 27,     ///< its terminals were more than 3 % above the set voltage: the motor fed back
   drifted = 1u << 28,         ///< thrust over speed² went on changing all through the step
   lag_unknown = 1u << 29,     ///< the steps do not tell how much later than the speed the thrust shows
-  frozen = 1u << 30,          ///< the load cell repeated one value for 0.1 s or longer
+  frozen = 1u << 30,          ///< load cell or motor speed repeated one value for 0.1 s or longer
   speed_glitch = 1u << 31,    ///< speeds that no rotor can have were left out
 };
 

@@ -97,6 +97,21 @@ TEST(Doubts, NoticesACellThatRepeatsOneValueWithinAStep) {
   EXPECT_FALSE(has(steps[0], Doubt::frozen));
 }
 
+TEST(Doubts, NoticesASpeedThatIsRepeatedWithinAStep) {
+  const auto repeated_for = [](results::Nanoseconds span) {
+    RunRecording run = make_run({});
+    for (auto& r : run.motor) {
+      if (r.channel == results::MotorChannel::speed && r.time_ns >= 4'500'000'000 && r.time_ns <= 4'500'000'000 + span)
+        r.value = std::copysign(801, r.value);
+    }
+    return reduce(run);
+  };
+  const auto steps = repeated_for(150'000'000);
+  EXPECT_EQ(results::doubt_names(steps[1].doubts), "frozen");
+  EXPECT_FALSE(has(steps[0], Doubt::frozen));
+  EXPECT_FALSE(has(repeated_for(80'000'000)[1], Doubt::frozen)) << "less than a tenth of a second";
+}
+
 TEST(Doubts, AThrustThatFadesAtConstantSpeedDrifts) {
   RunRecording run = make_run({});
   for (std::size_t i = 3000; i < 5000; ++i) {
