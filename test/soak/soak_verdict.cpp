@@ -134,8 +134,8 @@ void check_prompts(const Story& story, Lines& wrong) {
   }
 }
 
-/// Arrivals of any stream, by time.
-void check_freshness(const Story& story, Lines& wrong) {
+/// A module that no order reaches drives until its own timeout.
+void check_freshness(const Story& story, const Reaches& reaches, Lines& wrong) {
   std::vector<Instant> arrivals;
   for (const auto& stream : story.streams)
     for (const auto& arrival : stream.arrivals) arrivals.push_back(arrival.at);
@@ -147,7 +147,9 @@ void check_freshness(const Story& story, Lines& wrong) {
     const Instant until = std::min(end, i + 1 < stages.size() ? stages[i + 1].at : end);
     Instant last = stages[i].at;
     const auto note = [&](Instant at) {
-      if (at - last > kOldest)
+      const Instant told = last + kOldest;
+      const bool alone = reaches.line_silenced(told - kOwnTimeout, at);
+      if (at > told + (alone ? kOwnTimeout : Duration(0)))
         wrong.push_back(fmt::format("motion: driven at {:.3f} s though no record came for {:.3f} s", to_seconds(at),
                                     to_seconds(at - last)));
       last = at;
@@ -162,7 +164,7 @@ void check_freshness(const Story& story, Lines& wrong) {
 void check_motion(const Evidence& evidence, const Reaches& reaches, Lines& wrong) {
   check_prompts(evidence.story, wrong);
   check_end_of_motion(evidence, reaches, wrong);
-  if (!evidence.killed()) check_freshness(evidence.story, wrong);
+  if (!evidence.killed()) check_freshness(evidence.story, reaches, wrong);
 }
 
 // Record.
@@ -214,7 +216,7 @@ std::vector<std::string> accepted_runs(const results::JournalReading& journal) {
 }
 
 void check_steps(const Evidence& evidence, const std::vector<std::string>& accepted, Lines& wrong) {
-  if (evidence.cut_short() || accepted.empty()) return;  // between two files
+  if (evidence.cut_short() || has_not_gone_on(evidence) || accepted.empty()) return;  // between two files
   std::vector<results::StepMean> again;
   for (const std::string& name : accepted) {
     const auto file = std::find_if(evidence.files.begin(), evidence.files.end(),
