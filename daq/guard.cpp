@@ -26,6 +26,14 @@ std::size_t samples_relayed(const results::LoadCellScale& scale) {
   return static_cast<std::size_t>(std::max(1024.0, kRelayed * scale.sample_rate_hz));
 }
 
+/// What waits from before this run, from a pause for a mounting for example.
+template <class Reading>
+void leave_out(BenchStreams& devices) {
+  std::array<Reading, 64> before_this_run;
+  while (devices.take(before_this_run) > 0) {
+  }
+}
+
 double speed_share(const std::vector<GuardLimit>& limits) {
   for (const GuardLimit& limit : limits) {
     if (limit.watched == Watched::speed_error) return limit.value / 100;
@@ -54,9 +62,8 @@ Guard::Guard(Bench& bench, const profiles::Bench& place, const results::LoadCell
   load_cell_stream_ = {limit_of(Watched::load_cell_age), now};
   motor_stream_ = {limit_of(Watched::motor_age), now};
   supply_stream_ = {bench.supply() != nullptr ? limit_of(Watched::supply_age) : nullptr, now};
-  std::array<results::SupplyReading, 16> before_this_run;
-  while (devices_.take(before_this_run) > 0) {
-  }
+  leave_out<results::SupplyReading>(devices_);
+  leave_out<results::MotorReading>(devices_);
 }
 
 void Guard::look() noexcept {

@@ -58,6 +58,15 @@ TEST_F(OneRun, RecordsZeroStepsSpinDownAndZeroInThisOrder) {
   EXPECT_EQ(run.outcome, Outcome::complete);
 }
 
+TEST_F(OneRun, HoldsNothingThatWasReadBeforeItBegan) {
+  bench_.wait_until(bench_.clock().now() + std::chrono::seconds(2));
+  const Instant began = bench_.clock().now();
+  const results::RunRecording run = results::read_run(record().file);
+  ASSERT_FALSE(run.motor.empty());
+  for (const auto& reading : run.motor) ASSERT_GE(Instant(reading.time_ns), began - std::chrono::milliseconds(20));
+  for (const auto& sample : run.load_cell) ASSERT_GE(Instant(sample.arrival_ns), began);
+}
+
 TEST_F(OneRun, LosesNoSampleAndSaysSo) {
   const RunResult result = record();
   EXPECT_EQ(result.account.received, result.account.expected);
