@@ -197,6 +197,22 @@ std::map<std::string, Enum> names(std::initializer_list<Enum> values) {
   return result;
 }
 
+/// One of the names, which the error tells all of. `into` must outlive the command.
+template <class Enum>
+void add_choice(CLI::App& command, const std::string& option, Enum& into, const std::string& words,
+                const std::map<std::string, Enum>& known) {
+  const auto take = [&into, option, known](const std::string& word) {
+    const auto found = known.find(word);
+    if (found == known.end()) {
+      std::string all;
+      for (const auto& [name, value] : known) all += (all.empty() ? "" : ", ") + name;
+      throw CLI::ValidationError(option, fmt::format("\"{}\" is none of {}", word, all));
+    }
+    into = found->second;
+  };
+  command.add_option_function<std::string>(option, take, words)->type_name("WORD");
+}
+
 std::map<std::string, compensation::OverlapMeasure> overlap_names() {
   std::map<std::string, compensation::OverlapMeasure> result;
   for (const auto& entry : compensation::kOverlapMeasureNames) result.emplace(entry.name, entry.measure);
@@ -218,19 +234,17 @@ void add_fit(CLI::App& app, int& exit_code) {
                       "A:B, speeds to fit (default 3000: and up; below, thrust is under the load cell's noise)");
   command->add_option("--at-speed-rpm", request->at_speed_rpm,
                       "speed of \"k at speed\" (default: the highest that every occlusion reached)");
-  command->add_option("--estimator", request->estimator, "which k: origin, offset, polynomial, speed (default: origin)")
-      ->transform(CLI::CheckedTransformer(
-          names({Estimator::through_origin, Estimator::with_offset, Estimator::polynomial, Estimator::at_speed})));
-  command->add_option("--weights", request->weighting, "equal, thrust, effective-variance (default: equal)")
-      ->transform(CLI::CheckedTransformer(names({Weighting::equal, Weighting::thrust, Weighting::effective_variance})));
-  command->add_option("--loss", request->loss, "none, huber, cauchy, tukey (default: none)")
-      ->transform(CLI::CheckedTransformer(names({Loss::none, Loss::huber, Loss::cauchy, Loss::tukey})));
-  command
-      ->add_option(
-          "--overlap", request->overlap,
-          "how φ is measured in flight: rim_arc, area_share, load_share (default: rim_arc); who flies the file "
-          "otherwise is refused")
-      ->transform(CLI::CheckedTransformer(overlap_names()));
+  add_choice(*command, "--estimator", request->estimator,
+             "which k: origin, offset, polynomial, speed (default: origin)",
+             names({Estimator::through_origin, Estimator::with_offset, Estimator::polynomial, Estimator::at_speed}));
+  add_choice(*command, "--weights", request->weighting, "equal, thrust, effective-variance (default: equal)",
+             names({Weighting::equal, Weighting::thrust, Weighting::effective_variance}));
+  add_choice(*command, "--loss", request->loss, "none, huber, cauchy, tukey (default: none)",
+             names({Loss::none, Loss::huber, Loss::cauchy, Loss::tukey}));
+  add_choice(*command, "--overlap", request->overlap,
+             "how φ is measured in flight: rim_arc, area_share, load_share (default: rim_arc); who flies the file "
+             "otherwise is refused",
+             overlap_names());
   command
       ->add_option("--u", request->uncertainties,
                    "NAME=VALUE, standard uncertainty of calibration, cross-axis, clock, density (relative) or "

@@ -138,7 +138,7 @@ TEST_F(Program, RefusesWhatItCannotFitInOneLineWithTheNextMove) {
   expect_refused({"fit", place, "--speed-range-rpm", "5000"}, 2, "3000:19100");
   expect_refused({"fit", place, "--speed-range-rpm", "30000:40000"}, 5, "outside the speed range");
   expect_refused({"fit", place, "--at-speed-rpm", "123"}, 5, "name a speed of the profile");
-  expect_refused({"fit", place, "--loss", "soft"}, 2, "huber");
+  expect_refused({"fit", place, "--loss", "soft"}, 2, "\"soft\" is none of cauchy, huber, none, tukey");
   EXPECT_FALSE(std::filesystem::exists(place + "/coefficients.yaml")) << "what is refused leaves nothing behind";
 }
 
@@ -177,6 +177,7 @@ TEST_F(Program, ExplainsEveryCommand) {
     const Answer help = kphi({command, "--help"});
     EXPECT_EQ(help.code, 0);
     EXPECT_THAT(help.out, HasSubstr("kphi " + std::string(command))) << "an example to type";
+    EXPECT_THAT(help.out, Not(HasSubstr("ENUM"))) << "a word of the program's own inside";
   }
 }
 
