@@ -3,9 +3,9 @@
 // Account   Every record in a run's file is one that the box sent and that reached the stream's session, in order and
 //           with its arrival; all numbers of the account are those of a perfect driver; received + lost = expected.
 // Motion    At every prompt the motor coasts and stands. From the last look that found all well, the power stage is
-// open within
-//           50 ms where the module could hear, within 0.6 s where only its own time-out was left; likewise after a
-//           kill. While it drives, a record of the load cell has arrived within the last 0.25 s.
+//           open within 50 ms where the module could hear, within 0.6 s where only its own timeout was left; likewise
+//           after a kill. While it drives, a record of the load cell has arrived within the last 0.25 s, or 0.6 s more
+//           where no order could reach the module.
 // Record    The folder verifies; aborted runs are whole and say why; steps.csv is the reduction of the accepted runs.
 //           After a kill or with a refusing disk: all accepted runs are whole, the journal's chain is right, what was
 //           secured can be read (unless the kill fell into a write), and at most one run is finished that the journal
