@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "daq/live/gate.hpp"
+#include "daq/live/history.hpp"
 #include "daq/live/messages.hpp"
 #include "profiles/configuration_error.hpp"
 
@@ -37,8 +38,6 @@ using Wall = std::chrono::steady_clock;
 constexpr int kYielding = 10;  // nice value of this thread
 constexpr int kSendBuffer = 1 << 16;
 constexpr std::size_t kMostRequests = 64;  // under way at once
-constexpr std::size_t kTraceLength = 2000;
-constexpr std::size_t kMostSteps = 20000, kMostLines = 500;
 constexpr std::chrono::milliseconds kFarewell{500};
 constexpr std::chrono::seconds kIdle{20};
 
@@ -49,43 +48,6 @@ std::string replaced(std::string text, const std::string& what, const std::strin
     text.replace(at, what.size(), by);
   return text;
 }
-
-/// What a page that comes late must know.
-class History {
- public:
-  void keep(const std::string& message) {
-    if (message.starts_with("{\"type\":\"limits\"")) {
-      limits_ = {message};  // the newest only
-      return;
-    }
-    const bool is_step = message.starts_with("{\"type\":\"step\"");
-    auto& kept = is_step ? steps_ : others_;
-    kept.push_back(message);
-    if (kept.size() > (is_step ? kMostSteps : kMostLines)) kept.pop_front();
-  }
-  void keep(const Tick& tick) {
-    if (!trace_.empty() && trace_.back().time_s == tick.time_s) return;
-    trace_.push_back({tick.time_s, tick.thrust_n, tick.commanded_rpm, tick.speed_rpm});
-    if (trace_.size() > kTraceLength) trace_.pop_front();
-  }
-  [[nodiscard]] std::string message() const {
-    std::string points, messages;
-    const auto number = [](double value) { return value == value ? fmt::format("{:.7g}", value) : "null"; };
-    for (const Point& point : trace_)
-      points += fmt::format("{}[{:.3f},{},{},{}]", points.empty() ? "" : ",", point.time_s, number(point.thrust_n),
-                            number(point.commanded_rpm), number(point.speed_rpm));
-    for (const auto* kept : {&limits_, &steps_, &others_})
-      for (const std::string& message : *kept) messages += (messages.empty() ? "" : ",") + message;
-    return R"({"type":"history","trace":[)" + points + R"(],"messages":[)" + messages + "]}";
-  }
-
- private:
-  struct Point {
-    double time_s, thrust_n, commanded_rpm, speed_rpm;
-  };
-  std::deque<Point> trace_;
-  std::deque<std::string> limits_, steps_, others_;
-};
 
 }  // namespace
 
