@@ -225,6 +225,7 @@ void IqDevice::set_baud(unsigned baud) noexcept {
 
 void IqDevice::brown_out(Instant now, Duration down) {
   off_until_ = now + down;
+  asleep_ = true;
   stage_ = {};
   boot(off_until_);
 }

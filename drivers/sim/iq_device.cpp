@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "drivers/iq/codes.hpp"
 #include "drivers/sim/bytes.hpp"
@@ -64,6 +65,8 @@ void IqDevice::advance(Instant now) noexcept {
     return;
   }
   if (state_->supply_volts < kBrownOutVolts) return brown_out(now, kBrownOut);
+  // Its filters begin with what is there when it wakes, not when its power went.
+  if (std::exchange(asleep_, false)) sensors_.restart(memory_, *state_);
   attend(now);
   sensors_.step(*state_);
   if (now >= timeout_at_) expire(now);

@@ -165,6 +165,7 @@ class IqDevice {
   Instant heard_{0};       ///< latest time that it was told
   Instant busy_until_{0};  ///< with a question
   Instant off_until_{0};
+  bool asleep_ = false;  // since its power went
   bool in_boot_loader_ = false;
   unsigned baud_;
   double joules_offset_ = 0;

@@ -36,6 +36,18 @@ TEST_F(Action, ABrownOutLooksLikeAReboot) {
   EXPECT_NEAR(number(5, 15, 2s), 0.95f, 1e-3f);
 }
 
+TEST_F(Action, PowerThatComesBackIsNoFaultThoughItsFiltersAreSlow) {
+  settings.sensors.perfect = false;
+  restart();
+  run(0s, 10ms);
+  state.supply_volts = 0;
+  run(1s, 1200ms);
+  state.supply_volts = 12;
+  run(1201ms, 1500ms);
+  EXPECT_EQ(get(84, 1, 1500ms), hex("00"));
+  EXPECT_NEAR(number(69, 0, 1500ms), 12, 0.5);
+}
+
 TEST_F(Action, PlainSavesOfTheBaudAndOfTheUnsaveableDoNothing) {
   send(16, 0, 2);
   send(50, 13, 2);
