@@ -38,14 +38,17 @@ TEST_F(Action, ABrownOutLooksLikeAReboot) {
 
 TEST_F(Action, PowerThatComesBackIsNoFaultThoughItsFiltersAreSlow) {
   settings.sensors.perfect = false;
-  restart();
-  run(0s, 10ms);
-  state.supply_volts = 0;
-  run(1s, 1200ms);
-  state.supply_volts = 12;
-  run(1201ms, 1500ms);
-  EXPECT_EQ(get(84, 1, 1500ms), hex("00"));
-  EXPECT_NEAR(number(69, 0, 1500ms), 12, 0.5);
+  for (int phase = 0; phase < 7; ++phase) {
+    restart();
+    run(0s, 10ms);
+    for (int i = 0; i < phase; ++i) device.advance(10ms);  // its limits are looked at every seven ticks
+    state.supply_volts = 0;
+    run(1s, 1200ms);
+    state.supply_volts = 12;
+    run(1201ms, 1500ms);
+    EXPECT_EQ(get(84, 1, 1500ms), hex("00")) << phase;
+    EXPECT_NEAR(number(69, 0, 1500ms), 12, 0.5);
+  }
 }
 
 TEST_F(Action, PlainSavesOfTheBaudAndOfTheUnsaveableDoNothing) {
