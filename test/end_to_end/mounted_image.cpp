@@ -51,9 +51,11 @@ void make_file_system(const fs::path& image, const std::string& kind) {
   expect_done({"mkfs." + kind, "-q", image.string()});
 }
 
-MountedImage::MountedImage(const fs::path& image, const fs::path& at) : image_(image), at_(at) {
+MountedImage::MountedImage(const fs::path& image, const std::string& kind, const fs::path& at)
+    : image_(image), at_(at) {
   fs::create_directories(at);
-  expect_done({"mount", "-o", "loop", image.string(), at.string()});
+  // A copy of a mounted image bears the same UUID, which XFS minds.
+  expect_done({"mount", "-o", kind == "xfs" ? "loop,nouuid" : "loop", image.string(), at.string()});
   struct stat status {};
   if (::stat(at.c_str(), &status) != 0) throw MountError(at.string() + ": " + cause());
   statistics_ = fmt::format("/sys/dev/block/{}:{}/stat", major(status.st_dev), minor(status.st_dev));

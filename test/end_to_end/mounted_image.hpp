@@ -22,9 +22,9 @@ void make_file_system(const std::filesystem::path& image, const std::string& kin
 
 class MountedImage {
  public:
-  /// Mounts `image` at the folder `at`, with the defaults of its kind: what its journal holds is replayed. Throws
-  /// MountError.
-  MountedImage(const std::filesystem::path& image, const std::filesystem::path& at);
+  /// Mounts `image`, of that kind, at the folder `at`, with the defaults of its kind: what its journal holds is
+  /// replayed. Throws MountError.
+  MountedImage(const std::filesystem::path& image, const std::string& kind, const std::filesystem::path& at);
   ~MountedImage();
   MountedImage(const MountedImage&) = delete;
   MountedImage& operator=(const MountedImage&) = delete;

@@ -58,7 +58,7 @@ class PowerCut : public testing::TestWithParam<std::string> {
     try {
       have_own_mounts();
       make_file_system(folder_ / "image", GetParam());
-      disk_.emplace(folder_ / "image", folder_ / "disk");
+      disk_.emplace(folder_ / "image", GetParam(), folder_ / "disk");
     } catch (const MountError& error) {
       GTEST_SKIP() << "no " << GetParam() << " to cut the power of: " << error.what();
     }
@@ -168,7 +168,7 @@ TEST_P(PowerCut, LosesNoRunThatWasAnnouncedAndTheCampaignGoesOn) {
   int unfinished = 0;
   for (std::size_t i = 0; i < copies_.size(); ++i) {
     SCOPED_TRACE(copies_[i].when);
-    const MountedImage rebooted(copies_[i].image, folder_ / "rebooted");
+    const MountedImage rebooted(copies_[i].image, GetParam(), folder_ / "rebooted");
     const int accepted = accepted_in(rebooted.path() / "out");
     EXPECT_GE(accepted, copies_[i].announced) << "an accepted run is lost";
     unfinished += accepted < kRuns;
@@ -183,7 +183,7 @@ TEST_P(PowerCut, WouldLoseRunsIfFilesWereNotSynced) {
   run.wait_for(fmt::format("run  {}/{}", kRuns, kRuns));
   cut(run, "at the end");
   ASSERT_EQ(run.wait(), 0) << run.err();
-  const MountedImage rebooted(copies_.front().image, folder_ / "rebooted");
+  const MountedImage rebooted(copies_.front().image, GetParam(), folder_ / "rebooted");
   int accepted = 0;
   try {
     accepted = accepted_in(rebooted.path() / "out");
