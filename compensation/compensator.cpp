@@ -49,6 +49,9 @@ ContactFreeWindow window_of(const Airframe& airframe) noexcept {
   return contact_free_window(airframe.half_side, airframe.arm_length, airframe.propeller_radius);
 }
 
+/// As a number that is added: the compiler makes vector instructions of it.
+constexpr double worth(Flag flag) noexcept { return static_cast<double>(flag); }
+
 LineDoubts doubts_about(const ThrustLine& line, ScalingLaw law) noexcept {
   LineDoubts doubts;
   doubts.gains_with_occlusion = line.slope_per_rad() >= 0.0;
@@ -190,13 +193,15 @@ SpeedCommand Compensator::speeds_for(const std::array<Newtons, 4>& thrusts) cons
 
 void Compensator::flag(const std::array<Newtons, 4>& thrusts, const double (&wanted)[4],
                        std::array<Flags, 4>& flags) const noexcept {
+  double raised[4];
   for (std::size_t i = 0; i < 4; ++i) {
     const double asked = thrusts[i].value();
-    flags[i] = flags[i]
-                   .with(Flag::thrust_nan, asked != asked)
-                   .with(Flag::thrust_negative, asked < 0.0)
-                   .with(Flag::speed_at_slowest, wanted[i] < slowest_)
-                   .with(Flag::speed_at_fastest, wanted[i] > fastest_);
+    raised[i] = (asked != asked ? worth(Flag::thrust_nan) : 0.0) + (asked < 0.0 ? worth(Flag::thrust_negative) : 0.0) +
+                (wanted[i] < slowest_ ? worth(Flag::speed_at_slowest) : 0.0) +
+                (wanted[i] > fastest_ ? worth(Flag::speed_at_fastest) : 0.0);
+  }
+  for (std::size_t i = 0; i < 4; ++i) {
+    flags[i] = flags[i].with(static_cast<std::uint8_t>(static_cast<int>(raised[i])));
   }
 }
 
