@@ -1,6 +1,7 @@
 #include "fit/analysis_section.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -225,6 +226,25 @@ std::string claims_section(std::span<const Claim> claims) {
         claim.verdict == Verdict::fails ? " bad" : "", words(claim.verdict));
   }
   return html + kTableEnd;
+}
+
+std::string slopes_section(std::span<const SharedSlope> slopes) {
+  if (slopes.empty()) return {};
+  std::string html =
+      "<h2>One slope for each diameter</h2>\n" +
+      table(
+          "<th>diameter, in</th><th class=\"text\">propellers</th><th>slope, N/(rad/s)² per degree</th><th>95 %, "
+          "±</th><th>equal slopes, p</th>");
+  for (const SharedSlope& one : slopes) {
+    html += fmt::format("<tr><td>{:g}</td><td class=\"text\">{}</td><td>{}</td><td>{:.1e}</td><td>{:.4f}</td></tr>\n",
+                        one.diameter_in, html_escaped(fmt::format("{}", fmt::join(one.propellers, ", "))),
+                        with_power_of_ten(one.slope.value, std::hypot(one.slope.u, one.common_u)), one.expanded(),
+                        one.equal_slopes.p);
+  }
+  return html + kTableEnd +
+         "<p class=\"note\">From the scatter of runs and steps, the zero, and what all share. The line of a single "
+         "propeller takes "
+         "none of its points for more certain than 0.1 % of K<sub>T</sub>.</p>\n";
 }
 
 }  // namespace kphi::fit

@@ -6,6 +6,7 @@
 
 #include "fit/analysis.hpp"
 #include "fit/claims.hpp"
+#include "fit/family.hpp"
 
 namespace kphi::fit {
 
@@ -17,5 +18,7 @@ namespace kphi::fit {
 
 /// Claim, value found, interval, verdict.
 [[nodiscard]] std::string claims_section(std::span<const Claim> claims);
+/// One slope for each diameter; empty without.
+[[nodiscard]] std::string slopes_section(std::span<const SharedSlope> slopes);
 
 }  // namespace kphi::fit

@@ -40,6 +40,18 @@ double freedom_of(std::span<const FamilyMember* const> members) {
   return sum;
 }
 
+/// Of what is the same in all coefficients of a campaign; the largest of the members.
+double common_u_of_slope(std::span<const FamilyMember* const> members) {
+  double largest = 0;
+  for (const FamilyMember* member : members) {
+    double squares = 0;
+    for (const BudgetRow& row : member->analysis.slope.rows)
+      squares += row.common ? row.contribution() * row.contribution() : 0;
+    largest = std::max(largest, std::sqrt(squares));
+  }
+  return largest;
+}
+
 Regression fit_lines(const std::vector<Row>& rows, std::size_t members, bool shared) {
   std::vector<std::vector<double>> design;
   std::vector<double> k, weights;
@@ -55,6 +67,8 @@ Regression fit_lines(const std::vector<Row>& rows, std::size_t members, bool sha
 }
 
 }  // namespace
+
+double SharedSlope::expanded() const { return coverage_factor(slope.freedom) * std::hypot(slope.u, common_u); }
 
 Air common_air(std::span<const FamilyMember> family) {
   const bool known = std::all_of(family.begin(), family.end(), [](const FamilyMember& member) {
@@ -84,6 +98,7 @@ std::vector<SharedSlope> shared_slopes(std::span<const FamilyMember> family) {
       one.propellers.push_back(members[i]->identification.propeller);
     }
     one.slope = estimate(n);
+    one.common_u = common_u_of_slope(members);
     const double extra = static_cast<double>(n - 1);
     one.equal_slopes = f_test(std::max(0.0, shared.weighted_squares - own.weighted_squares) / extra, extra, freedom);
     one.equal_slopes.name = "slopes of one diameter";

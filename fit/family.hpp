@@ -24,10 +24,14 @@ enum class Air : std::uint8_t { measured, standard };
 /// Lines of one diameter with a slope in common.
 struct SharedSlope {
   double diameter_in = 0;
-  Estimate slope;                    ///< N/(rad/s)²/deg, in the common air
+  Estimate slope;                    ///< N/(rad/s)²/deg, in the common air; u by what runs and steps scatter
+  double common_u = 0;               ///< besides, of what is the same for all of them: cell, clock, density
   std::vector<Estimate> intercepts;  ///< one per member of that diameter, in their order
   std::vector<std::string> propellers;
   StatisticalTest equal_slopes;
+
+  /// Half of the 95 % interval of the slope, both uncertainties together.
+  [[nodiscard]] double expanded() const;
 };
 
 /// For every diameter of which there are two members or more.

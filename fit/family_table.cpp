@@ -28,10 +28,9 @@ std::string claim_line(const Claim& claim) {
 }
 
 std::string slope_line(const SharedSlope& one) {
-  const double half = coverage_factor(one.slope.freedom) * one.slope.u;
   return fmt::format(
       "{:g} inch: {:.5e} ± {:.1e} N/(rad/s)^2 per degree (95 %), shared by {}; equal slopes: p = {:.4f}\n",
-      one.diameter_in, one.slope.value, half, fmt::join(one.propellers, ", "), one.equal_slopes.p);
+      one.diameter_in, one.slope.value, one.expanded(), fmt::join(one.propellers, ", "), one.equal_slopes.p);
 }
 
 std::string prediction_line(const FamilyPrediction& one) {
@@ -92,6 +91,7 @@ Json to_json(const FamilyFindings& findings) {
     slopes.push_back({{"diameter_in", one.diameter_in},
                       {"slope_per_deg", one.slope.value},
                       {"u", one.slope.u},
+                      {"u_common", one.common_u},
                       {"propellers", one.propellers},
                       {"equal_slopes", to_json(one.equal_slopes)}});
   }

@@ -372,11 +372,13 @@ std::string family_table(const std::vector<Chapter>& chapters) {
   return html + "</tbody></table></div>\n";
 }
 
-std::string claims_of(const std::vector<Chapter>& chapters) {
+/// The statements that need several propellers.
+std::string statements_of(const std::vector<Chapter>& chapters) {
   std::vector<FamilyMember> family;
   for (const Chapter& chapter : chapters)
     if (chapter.analysis) family.push_back({chapter.identification, *chapter.analysis});
-  return family.size() < chapters.size() ? std::string() : claims_section(test_claims(family));
+  if (family.size() < chapters.size()) return {};
+  return slopes_section(shared_slopes(family)) + claims_section(test_claims(family));
 }
 
 }  // namespace
@@ -411,7 +413,7 @@ std::string format_reports(const std::vector<Chapter>& chapters, const Figures& 
                    chapter.analysis ? &*chapter.analysis : nullptr, number);
   }
   return page_head("k(φ) of " + names, "How an occlusion costs thrust: k(φ) of several propellers", names) + "<nav>" +
-         contents + "</nav>\n" + family_table(chapters) + together + claims_of(chapters) + bodies + kPageEnd;
+         contents + "</nav>\n" + family_table(chapters) + together + statements_of(chapters) + bodies + kPageEnd;
 }
 
 }  // namespace kphi::fit

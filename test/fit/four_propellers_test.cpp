@@ -113,6 +113,8 @@ void expect_shared_slopes() {
     const double truth = sim::find_propeller(i == 0 ? "5x3" : "6x3")->line_slope_n_rpm2_deg * per_rpm;
     EXPECT_NEAR(findings.slopes[i].slope.value / truth, 1, 0.01);
     EXPECT_FALSE(findings.slopes[i].equal_slopes.p < 0.01);
+    EXPECT_LE(std::abs(findings.slopes[i].slope.value - truth), findings.slopes[i].expanded());
+    EXPECT_GT(findings.slopes[i].common_u, 0) << "a clock at least is the same for all of them";
   }
 }
 
