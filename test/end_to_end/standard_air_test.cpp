@@ -30,14 +30,14 @@ double pressure_of(double kg_m3) {
   return low;
 }
 
-/// Nothing but the air disturbs this bench.
+/// Nothing but the air disturbs this bench, beyond last digits: a force or a speed that never moves is called frozen.
 sim::BenchSettings quiet() {
   sim::BenchSettings settings;
   settings.module.sensors.perfect = true;
-  settings.plant.motor.turbulence = 0;
+  settings.plant.motor.turbulence = 1e-4;
   auto& cell = settings.plant.load_cell;
   cell.zero_spread = cell.drift_per_minute = cell.walk_per_root_minute = {};
-  cell.noise = {0, 0, 4e-6, 0, 0, 0};  // of the last digits: a channel that never moves would be called frozen
+  cell.noise = {0, 0, 4e-6, 0, 0, 0};
   cell.once_per_turn = cell.blade_pass = cell.blade_pass_occluded = 0;
   return settings;
 }
