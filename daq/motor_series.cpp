@@ -74,10 +74,11 @@ std::uint64_t MotorSeries::glitches(const Window& window) const {
 bool MotorSeries::speed_frozen(const Window& window) const {
   const Readings speeds = over(MotorChannel::speed, window);
   for (auto first = speeds.begin(); first != speeds.end();) {
-    const auto next = std::find_if(first, speeds.end(), [&](const MotorReading& r) { return r.value != first->value; });
+    const auto next =
+        std::find_if(std::next(first), speeds.end(), [&](const MotorReading& r) { return r.value != first->value; });
     const double span = 1e-9 * static_cast<double>(std::prev(next)->time_ns - first->time_ns);
     if (first->value != 0 && next - first >= kFrozenReadings && span >= kFrozenSpeedSpan) return true;
-    first = next == first ? std::next(first) : next;  // NaN differs from itself
+    first = next;
   }
   return false;
 }

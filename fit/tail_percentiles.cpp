@@ -40,16 +40,16 @@ TailPercentiles tail_percentiles(std::span<const double> samples, const Scatter&
   const double far = kFar * std::abs(scatter.deviation), low = scatter.mean - far, high = scatter.mean + far;
   picked.resize(n);
   // The low ones from the front, the high ones from the back; each sample is written, few advance the place.
-  double *front = picked.data(), *back = front + n - 1;
+  std::size_t lows = 0, highs = 0;
   for (const double sample : samples) {
-    *front = sample;
-    *back = sample;
-    front += sample < low;
-    back -= sample > high;
+    picked[lows] = sample;
+    picked[n - 1 - highs] = sample;
+    lows += sample < low;
+    highs += sample > high;
   }
-  const std::span lowest(picked.data(), front), highest(back + 1, picked.data() + n);
-  if (lower_rank < lowest.size() && upper_rank >= n - highest.size())
-    return {sample_of_rank(lowest, lower_rank), sample_of_rank(highest, upper_rank - (n - highest.size()))};
+  const auto lowest = std::span(picked).first(lows), highest = std::span(picked).last(highs);
+  if (lower_rank < lows && upper_rank >= n - highs)
+    return {sample_of_rank(lowest, lower_rank), sample_of_rank(highest, upper_rank - (n - highs))};
   std::copy(samples.begin(), samples.end(), picked.begin());
   const double lower = sample_of_rank(picked, lower_rank);
   return {lower, sample_of_rank(picked, upper_rank)};
