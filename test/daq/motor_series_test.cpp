@@ -37,6 +37,20 @@ TEST(MotorSeries, KeepsEveryChangeThatGoesOneWay) {
   }
 }
 
+TEST(MotorSeries, IsFrozenWhereEightReadingsOfATurningRotorAreTheSame) {
+  const auto frozen = [](std::initializer_list<double> values) {
+    const auto readings = speeds(values);
+    return MotorSeries(readings).speed_frozen(kAll);
+  };
+  const double nan = std::nan("");
+  EXPECT_TRUE(frozen({799, 800, 800, 800, 800, 800, 800, 800, 800, 801}));
+  EXPECT_TRUE(frozen({nan, 799, 800, 800, 800, 800, 800, 800, 800, 800}));
+  EXPECT_FALSE(frozen({800, 800, 800, 800, 800, 800, 800, 801, 800, 800}));
+  EXPECT_FALSE(frozen({0, 0, 0, 0, 0, 0, 0, 0, 0, 0})) << "it stands";
+  EXPECT_FALSE(frozen({nan, nan, nan, nan, nan, nan, nan, nan, nan}));
+  EXPECT_FALSE(frozen({}));
+}
+
 TEST(MotorSeries, TellsMeanDeviationAndLeastOfAWindow) {
   const auto readings = speeds({1, 2, 3, 4, 5, 6, 7});
   const Statistics s = MotorSeries(readings).statistics(MotorChannel::speed, {20'000'000, 100'000'000}, -1);
