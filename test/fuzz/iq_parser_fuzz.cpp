@@ -80,6 +80,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::size_t chunk = data[0] % 70 + 1;
   parse({data + 1, size - 1}, chunk);
   converse({data + 1, size - 1}, chunk);
-  share({data + 1, size - 1}, chunk);
+  if (data[0] >= 210) share({data + 1, size - 1}, chunk);  // takes a hundred times as long
   return 0;
 }
