@@ -19,6 +19,7 @@ using testing::ContainsRegex;
 
 constexpr double kPrompt = 200;                // ms
 constexpr double kModuleAlone = 600;           // ms: it is told 0.5 s
+constexpr double kStrayed = 250;               // ms: 100 of patience, 60 for a slow host, a reading, and then 50
 constexpr double kStrikesAt[]{1.8, 3.6, 6.0};  // s, bench time of a scripted fault; the later ones for a busy host
 constexpr int kSteps = 8;
 constexpr double kFullSpeed = 0.99 * 19100 * 2 * 3.14159265358979 / 60;  // rad/s
@@ -135,7 +136,7 @@ const Way kWays[] = {
     {"CoilHot", kScript, nullptr, "kind: motor_hot, coil_celsius: 100, for_s: 1000", 4, "coil temperature"},
     {"Derate", kScript, nullptr, "kind: motor_redline, speed_rad_s: 500, for_s: 1000", 4, "derate"},
     {"PowerSafety", kScript, nullptr, "kind: motor_over_voltage, volts: 20, for_s: 1000", 4, "power_safety"},
-    {"RotorLocked", kScript, nullptr, "kind: motor_locked, for_s: 1000", 4, "rotor"},
+    {"RotorLocked", kScript, nullptr, "kind: motor_locked, for_s: 1000", 4, "rotor", kStrayed},
     {"SupplySag", kScript, nullptr, "kind: motor_sag, volts: 8.5, for_s: 1000", 4, "power_safety"},
     {"BrownOut", kScript, nullptr, "kind: motor_brown_out, down_s: 0.05", 4, "restarted"},
     {"Unplugged", kScript, nullptr, "kind: motor_unplug, for_s: 1000", 4, "", kPrompt, false},
