@@ -84,6 +84,8 @@ constexpr std::array kMotorEvents{
     MotorEvent{iq::EventKind::port_lost, results::EventKind::motor_port_lost},
     MotorEvent{iq::EventKind::another_module, results::EventKind::motor_another_module},
     MotorEvent{iq::EventKind::slow_round_trip, results::EventKind::motor_slow_round_trip},
+    MotorEvent{iq::EventKind::host_absent, results::EventKind::motor_host_absent},
+    MotorEvent{iq::EventKind::let_go, results::EventKind::motor_let_go},
 };
 
 }  // namespace

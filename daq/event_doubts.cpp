@@ -39,6 +39,8 @@ constexpr Meaning kMeanings[] = {
     {EventKind::motor_lease_expired, Doubt::motor_lost, Concerns::instant},
     {EventKind::motor_port_lost, Doubt::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
     {EventKind::motor_another_module, Doubt::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_host_absent, Doubt::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_let_go, Doubt::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
     {EventKind::motor_slow_round_trip, Doubt::slow_round_trip, Concerns::until_it_ends,
      EventKind::motor_slow_round_trip},
 };

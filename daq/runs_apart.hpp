@@ -51,6 +51,7 @@ class RunsApart final : public Bench {
     [[nodiscard]] std::chrono::system_clock::time_point epoch_utc() const noexcept override {
       return bench_->clock().epoch_utc();
     }
+    [[nodiscard]] Duration suspended() const noexcept override { return bench_->clock().suspended(); }
 
    private:
     const std::unique_ptr<DeterministicBench>& bench_;

@@ -36,7 +36,12 @@ class Clock {
   [[nodiscard]] virtual Instant at_realtime(const timespec& stamp) const noexcept = 0;
   /// Calendar time of the epoch, UTC.
   [[nodiscard]] virtual std::chrono::system_clock::time_point epoch_utc() const noexcept = 0;
+  /// Wall time for which this computer was suspended since the epoch. now() stands still meanwhile.
+  [[nodiscard]] virtual Duration suspended() const noexcept = 0;
 };
+
+/// A shorter suspension cannot be told from the time between two readings of a clock. No computer sleeps that briefly.
+inline constexpr Duration kShortestSleep = std::chrono::milliseconds(50);
 
 /// CLOCK_MONOTONIC, `scale` times as fast as a person's: 1 on a real bench, N on a simulated one. Epoch: construction.
 class SteadyClock final : public Clock {
@@ -47,11 +52,14 @@ class SteadyClock final : public Clock {
   [[nodiscard]] Duration shrunk(Duration bench) const noexcept override;
   [[nodiscard]] Instant at_realtime(const timespec& stamp) const noexcept override;
   [[nodiscard]] std::chrono::system_clock::time_point epoch_utc() const noexcept override;
+  /// By how much CLOCK_BOOTTIME has got ahead of CLOCK_MONOTONIC.
+  [[nodiscard]] Duration suspended() const noexcept override;
 
  private:
   double scale_;
   std::int64_t epoch_monotonic_ns_;
   std::int64_t epoch_realtime_ns_;
+  std::int64_t epoch_lead_ns_;  ///< of CLOCK_BOOTTIME over CLOCK_MONOTONIC
 };
 
 /// Stands still until told: tests, and the deterministic bench. One thread.
@@ -68,9 +76,12 @@ class ManualClock final : public Clock {
   [[nodiscard]] std::chrono::system_clock::time_point epoch_utc() const noexcept override {
     return std::chrono::system_clock::time_point(std::chrono::seconds(1622332800));
   }
+  [[nodiscard]] Duration suspended() const noexcept override { return suspended_; }
+  void suspend(Duration wall) noexcept { suspended_ += wall; }
 
  private:
   Instant now_;
+  Duration suspended_{0};
 };
 
 }  // namespace kphi

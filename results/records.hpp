@@ -171,8 +171,10 @@ enum class EventKind : std::uint8_t {
   motor_slow_round_trip,  ///< its readings are blurred in time
   supply_stop,            ///< what the bench supply showed stopped the run
   guard_trip,             ///< a limit was passed or a stream fell silent: the motor was let go
+  motor_host_absent,      ///< this computer slept, or did not run kphi; the motor was let go
+  motor_let_go,           ///< the module stopped driving by itself
 };
-inline constexpr std::array<const char*, 28> kEventNames{"restarted",
+inline constexpr std::array<const char*, 30> kEventNames{"restarted",
                                                          "rebooted",
                                                          "stalled",
                                                          "stall_ended",
@@ -199,12 +201,15 @@ inline constexpr std::array<const char*, 28> kEventNames{"restarted",
                                                          "motor_another_module",
                                                          "motor_slow_round_trip",
                                                          "supply_stop",
-                                                         "guard_trip"};
+                                                         "guard_trip",
+                                                         "motor_host_absent",
+                                                         "motor_let_go"};
 [[nodiscard]] constexpr const char* name_of(EventKind kind) { return kEventNames[static_cast<std::size_t>(kind)]; }
 
 /// Of the motor module; else of the load cell, or of the supply.
 [[nodiscard]] constexpr bool is_of_motor(EventKind kind) {
-  return kind >= EventKind::motor_connected && kind <= EventKind::motor_slow_round_trip;
+  return (kind >= EventKind::motor_connected && kind <= EventKind::motor_slow_round_trip) ||
+         kind == EventKind::motor_host_absent || kind == EventKind::motor_let_go;
 }
 
 struct StreamEvent {

@@ -19,12 +19,14 @@ enum class EventKind : std::uint8_t {
   port_lost,        ///< unplugged
   another_module,   ///< what answers now is not the module of before
   slow_round_trip,  ///< the median is so long that readings are blurred in time
+  host_absent,      ///< this computer slept, or did not run kphi for so long that the module may have stopped driving
+  let_go,           ///< the module has stopped driving by itself
 };
 
 [[nodiscard]] constexpr std::string_view name_of(EventKind kind) noexcept {
-  constexpr std::string_view names[] = {"connected",     "no_answer",      "module_reset",
-                                        "module_silent", "coast_denied",   "lease_expired",
-                                        "port_lost",     "another_module", "slow_round_trip"};
+  constexpr std::string_view names[] = {"connected",       "no_answer",     "module_reset", "module_silent",
+                                        "coast_denied",    "lease_expired", "port_lost",    "another_module",
+                                        "slow_round_trip", "host_absent",   "let_go"};
   return names[static_cast<int>(kind)];
 }
 

@@ -88,7 +88,7 @@ void Exchange::ask_fence(int module_id, Instant now) noexcept {
 void Exchange::coast(int module_id, int times, bool padded, Instant now) noexcept {
   const Packet packet = make(entry<"propeller_motor_control.ctrl_coast">, Access::set, module_id);
   for (int i = 0; i < times; ++i) {
-    outbox_.push_coast(packet, padded && i == 0);
+    if (!outbox_.push_coast(packet, padded && i == 0)) continue;
     on_wire(nullptr, module_id, packet.length + kFrameOverhead + (padded && i == 0 ? Outbox::kPadding : 0), now);
     ++counters_.coasts;
   }

@@ -41,7 +41,7 @@ class Exchange {
   explicit Exchange(const Settings& settings);
 
   /// Withdraws all that has not begun to leave.
-  void withdraw() noexcept { outbox_.withdraw(); }
+  void withdraw() noexcept { wire_free_ -= byte_time_ * static_cast<std::int64_t>(outbox_.withdraw()); }
   /// The line is another one, or was closed: nothing of before may be sent or can come.
   void change_line() noexcept;
   /// Replies of these ids (bit per id) are other sessions' on the same line: no faults.

@@ -61,7 +61,8 @@ Link::Link(const std::string& device, unsigned baud, const std::vector<Settings>
       bus_(stretched(modules, device, baud, clock)),
       reopening_(kFirstPause, kLongestPause),
       reconnecting_(kFirstPause, kLongestPause),
-      was_ready_(modules.size(), false) {
+      was_ready_(modules.size(), false),
+      suspended_(clock.suspended()) {
   for (const Settings& settings : modules) {
     const std::string name = modules.size() == 1 ? "motor module on " + device
                                                  : fmt::format("motor module {} on {}", settings.module_id, device);
@@ -120,6 +121,7 @@ void Link::turn() {
     speak();
     publish();
     const Woken woken = sleep();
+    notice_sleep();
     if (woken.by_port) hear();
     bus_.advance(clock_.now());
     if (woken.by_bell) obey();
@@ -188,6 +190,17 @@ void Link::obey(const Orders& orders, Seat& seat, Session& session) {
   }
 }
 
+/// While this computer slept the module has let the motor go: what was ordered before is void.
+void Link::notice_sleep() {
+  const Duration suspended = clock_.suspended();
+  const Duration slept = suspended - suspended_;
+  if (slept < kShortestSleep) return;
+  suspended_ = suspended;
+  for (std::size_t i = 0; i < bus_.size(); ++i)
+    bus_.module(i).fail(EventKind::host_absent, fmt::format("this computer slept for {:.2g} s", to_seconds(slept)),
+                        clock_.now());
+}
+
 void Link::keep_leases() {
   const WallTime now = steady_clock::now();
   for (std::size_t i = 0; i < seats_.size(); ++i) {
@@ -244,6 +257,7 @@ void Link::reconnect_modules() {
 void Link::speak() {
   congested_ = false;
   if (!port_) return;
+  notice_sleep();
   for (auto bytes = bus_.output(); !bytes.empty(); bytes = bus_.output()) {
     const std::size_t n = port_->write(bytes);
     if (capture_ && n > 0) capture_->add(Capture::Direction::sent, bytes.first(n), clock_.now());

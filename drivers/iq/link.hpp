@@ -53,6 +53,7 @@ class Link {
   void hear();
   void obey();
   void obey(const Orders& orders, Seat& seat, Session& session);
+  void notice_sleep();
   void keep_leases();
   void recover();
   void reopen();
@@ -78,6 +79,7 @@ class Link {
   Backoff reopening_, reconnecting_;
   std::vector<bool> was_ready_;
   WallTime published_{};
+  Duration suspended_;  ///< of the host, as noticed so far
 
   std::thread thread_;
 };

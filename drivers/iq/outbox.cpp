@@ -14,7 +14,7 @@ bool Outbox::push(Kind kind, const Packet& packet) noexcept {
   return true;
 }
 
-void Outbox::push_coast(const Packet& packet, bool padded) noexcept {
+bool Outbox::push_coast(const Packet& packet, bool padded) noexcept {
   std::size_t waiting = 0;
   for (std::size_t i = first_whole(); i < count_;) {
     if (frames_[i].kind == Kind::motion) {
@@ -24,18 +24,22 @@ void Outbox::push_coast(const Packet& packet, bool padded) noexcept {
       ++i;
     }
   }
-  if (waiting < kWaitingCoasts) {
+  const bool has_room = waiting < kWaitingCoasts;
+  if (has_room) {
     if (count_ == kFrames) erase(count_ - 1);
     insert(first_whole(), Kind::coast, packet, padded ? kPadding : 0);
   }
   lay_out();
+  return has_room;
 }
 
-void Outbox::withdraw() noexcept {
+std::size_t Outbox::withdraw() noexcept {
+  const std::size_t before = wire_size_;
   for (std::size_t i = count_; i > first_whole(); --i) {
     if (frames_[i - 1].kind != Kind::coast) erase(i - 1);
   }
   lay_out();
+  return before - wire_size_;
 }
 
 void Outbox::clear() noexcept { count_ = begun_ = wire_size_ = 0; }

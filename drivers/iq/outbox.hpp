@@ -19,11 +19,11 @@ class Outbox {
 
   /// False when there is no room: nobody has taken bytes for long.
   [[nodiscard]] bool push(Kind kind, const Packet& packet) noexcept;
-  /// Withdraws every motion command that has not begun to leave, and goes out before all other frames. Never refused;
-  /// up to three may wait.
-  void push_coast(const Packet& packet, bool padded = false) noexcept;
-  /// Drops all that has not begun to leave, coasts excepted.
-  void withdraw() noexcept;
+  /// Withdraws every motion command that has not begun to leave, and goes out before all other frames. False: three
+  /// wait already.
+  bool push_coast(const Packet& packet, bool padded = false) noexcept;
+  /// Drops all that has not begun to leave, coasts excepted. Returns how many bytes that were.
+  std::size_t withdraw() noexcept;
   /// Drops everything.
   void clear() noexcept;
 

@@ -18,6 +18,8 @@ class Polling {
 
   void begin(const Identity& identity, Instant now);
   void end() noexcept { on_ = false; }
+  /// Asks at once what tells that the module has restarted.
+  void look_for_restart(Instant now) noexcept { watch_.next = now; }
   void take(const Heard& heard, Counters& counters);
   void advance(Exchange& exchange, Instant now);
   [[nodiscard]] Instant deadline() const noexcept;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 namespace kphi::iq {
@@ -11,6 +12,7 @@ namespace {
 
 constexpr std::size_t kEvents = 256;
 constexpr int kSilentTimeouts = 10;  ///< longest reply time-outs without any reply after which the module is gone
+constexpr int kRestartTimeouts = 3;  ///< in which a module that stopped driving can tell that it has restarted
 constexpr std::uint64_t kRoundTrips = 100;  ///< enough to judge their median
 constexpr const Entry& kVelocity = entry<"propeller_motor_control.ctrl_velocity">;
 
@@ -20,6 +22,7 @@ Session::Session(Settings settings)
     : settings_(completed(std::move(settings))),
       exchange_(settings_),
       coasting_(settings_),
+      drive_(settings_),
       connecting_(settings_),
       polling_(settings_),
       inquiries_(settings_.module_id) {}
@@ -59,6 +62,7 @@ void Session::fail(EventKind kind, const std::string& why, Instant now) {
   polling_.end();
   inquiries_.abandon();
   note(kind, why, now);
+  let_go_.clear();
   if (!coasting_.pending()) coast(3, now);
 }
 
@@ -70,8 +74,11 @@ void Session::spin_at(RadPerSec signed_speed, Instant now) {
   if (!armed()) throw std::logic_error("the motor may only spin when its module is ready and armed");
   if (speed == 0) return coast(now);
   stopping_.end(StopReport::Outcome::overruled);
+  check_drive(now);
+  if (!armed()) return;
   spinning_ = true;
   commanded_speed_ = speed;
+  drive_.begin(now);
   coasting_.end();
   wanted_speed_ = static_cast<float>(speed);
   flush_speed(now);
@@ -82,6 +89,8 @@ void Session::coast(int times, Instant now) noexcept {
   stopping_.coasted(now);
   wanted_speed_.reset();
   spinning_ = false;
+  let_go_.clear();
+  drive_.end();
   coasting_.begin(exchange_, times, now);
 }
 
@@ -92,8 +101,9 @@ void Session::stop(const StopSettings& settings, Instant now) {
   const bool slower = std::isfinite(measured) && std::abs(measured) < std::abs(commanded_speed_);
   const double from = spinning_ ? (slower ? std::copysign(measured, commanded_speed_) : commanded_speed_)
                                 : (std::isfinite(measured) ? measured : 0.0);
-  stopping_.begin(settings, from, spinning_, now);
-  if (!spinning_) coast(1, now);
+  const bool ramped = spinning_ && settings.deceleration.has_value();
+  stopping_.begin(settings, from, ramped, now);
+  if (!ramped) coast(1, now);
   service(now);
 }
 
@@ -111,17 +121,20 @@ void Session::inquire(const std::vector<Inquiry>& inquiries, Instant now) {
 }
 
 void Session::receive(std::span<const std::uint8_t> bytes, Instant now) {
+  check_drive(now);
   take_heard(exchange_.receive(bytes, now), now);
   service(now);
 }
 
 void Session::advance(Instant now) {
+  check_drive(now);
   take_heard(exchange_.advance(now), now);
   service(now);
 }
 
 Instant Session::deadline() const noexcept {
   Instant earliest = std::min({exchange_.deadline(), coasting_.deadline(), polling_.deadline(), stopping_.deadline()});
+  if (!let_go_.empty()) earliest = std::min(earliest, let_go_at_ + settings_.reply_timeout * kRestartTimeouts);
   if (state_ == State::ready) earliest = std::min(earliest, last_reply_ + settings_.reply_timeout * kSilentTimeouts);
   return earliest;
 }
@@ -133,6 +146,7 @@ void Session::take_heard(std::span<const Heard> all, Instant now) {
     if (coasting_.confirmed()) stopping_.confirmed(heard.end);
     if (state_ == State::connecting) connecting_.take(heard);
     take_restart(heard, now);
+    check_mode(heard, now);
     inquiries_.take(heard);
     polling_.take(heard, exchange_.counters());
     if (heard.answers(entry<"brushless_drive.obs_velocity">))
@@ -158,6 +172,7 @@ void Session::service(Instant now) {
   if (state_ == State::ready) inquiries_.advance(exchange_, identity().system_control_id, now);
   if (!silent()) exchange_.ask_fence(settings_.module_id, now);
   check_silence(now);
+  conclude_let_go(now);
   judge_round_trip(now);
 }
 
@@ -196,15 +211,43 @@ void Session::continue_connecting(Instant now) {
 }
 
 void Session::flush_speed(Instant now) {
-  if (!wanted_speed_) return;
+  if (!wanted_speed_ || !let_go_.empty() || !drive_.may_tell(exchange_, now)) return;
   const Packet packet = make(kVelocity, Access::set, settings_.module_id, *wanted_speed_);
-  if (exchange_.tell(Outbox::Kind::motion, packet, now)) wanted_speed_.reset();
+  if (!exchange_.tell(Outbox::Kind::motion, packet, now)) return;
+  wanted_speed_.reset();
+  drive_.told(exchange_.order(), now);
 }
 
 void Session::check_silence(Instant now) {
   if (state_ != State::ready || now - last_reply_ < settings_.reply_timeout * kSilentTimeouts) return;
   fail(EventKind::module_silent,
        fmt::format("the module stopped answering: no reply for {:.2f} s", to_seconds(now - last_reply_)), now);
+}
+
+void Session::check_drive(Instant now) {
+  const auto lapse = drive_.lapsed(last_reply_, now);
+  if (!lapse) return;
+  const double lasts = to_seconds(lapse->lasts);
+  if (lapse->of_host)
+    return fail(EventKind::host_absent, fmt::format("this computer did not run kphi for {:.2g} s", lasts), now);
+  fail(EventKind::module_silent, fmt::format("the module stopped answering: no reply for {:.2g} s", lasts), now);
+}
+
+void Session::check_mode(const Heard& heard, Instant now) {
+  const auto mode = drive_.take(heard);
+  if (!mode || !spinning_ || !let_go_.empty()) return;
+  let_go_ = fmt::format("the module stopped driving by itself: its drive mode reads {} where {:.0f} RPM were commanded",
+                        *mode == DriveMode::coast ? "coast" : fmt::format("{}", static_cast<int>(*mode)),
+                        std::abs(commanded_speed_) * 30 / std::numbers::pi);
+  let_go_at_ = now;
+  wanted_speed_.reset();
+  exchange_.coast(settings_.module_id, 3, false, now);
+  polling_.look_for_restart(now);
+}
+
+void Session::conclude_let_go(Instant now) {
+  if (let_go_.empty() || now < let_go_at_ + settings_.reply_timeout * kRestartTimeouts) return;
+  fail(EventKind::let_go, std::exchange(let_go_, {}), now);
 }
 
 void Session::judge_round_trip(Instant now) {

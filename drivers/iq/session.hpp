@@ -5,7 +5,8 @@
 // commands that wait, goes before all other frames, and is repeated until the module reports drive mode coast. The
 // module is told to coast by itself when it hears nothing for `module_timeout_s`; polling keeps it from doing so,
 // hence the session falls silent when the module does not confirm a coast or stops answering. After any failure it is
-// disarmed: it spins again only after a new connection and an explicit rearm().
+// disarmed: it spins again only after a new connection and an explicit rearm(). A speed is sent only to a module that
+// still drives (drive_watch.hpp): after a sleep of the host, a break of the line or a timeout there is none.
 #pragma once
 
 #include <optional>
@@ -17,6 +18,7 @@
 #include "drivers/clock.hpp"
 #include "drivers/iq/coasting.hpp"
 #include "drivers/iq/connecting.hpp"
+#include "drivers/iq/drive_watch.hpp"
 #include "drivers/iq/event.hpp"
 #include "drivers/iq/exchange.hpp"
 #include "drivers/iq/identity.hpp"
@@ -67,7 +69,8 @@ class Session {
   void coast(Instant now) noexcept { coast(1, now); }
   /// The coast three times at once.
   void emergency_stop(Instant now) noexcept { coast(3, now); }
-  /// Ramps down and coasts; see stopping.hpp. stop_report() tells the end. A coast or a new speed overrules the ramp.
+  /// Coasts, after a ramp if the settings want one; see stopping.hpp. stop_report() tells the end. A coast or a new
+  /// speed overrules the ramp.
   void stop(const StopSettings& settings, Instant now);
   /// The owner of the motor has not given a sign of life in time.
   void expire_lease(Instant now);
@@ -124,6 +127,9 @@ class Session {
   void continue_stopping(Instant now);
   void flush_speed(Instant now);
   void check_silence(Instant now);
+  void check_drive(Instant now);
+  void check_mode(const Heard& heard, Instant now);
+  void conclude_let_go(Instant now);
   void judge_round_trip(Instant now);
   void note(EventKind kind, const std::string& words, Instant now);
   [[nodiscard]] std::string why_no_answer() const;
@@ -136,6 +142,9 @@ class Session {
   std::optional<Identity> known_;  ///< of the first connection
   Exchange exchange_;
   Coasting coasting_;
+  DriveWatch drive_;
+  std::string let_go_;  ///< that the module stopped driving; told once it is known whether it restarted
+  Instant let_go_at_{0};
   Connecting connecting_;
   Polling polling_;
   ResetWatch reset_watch_;

@@ -31,7 +31,8 @@ std::string StopReport::summary() const {
 }
 
 void Stopping::check(const StopSettings& settings) {
-  const bool good = settings.deceleration >= 100 && settings.deceleration <= 1e5 && settings.coast_below >= 0 &&
+  const double deceleration = settings.deceleration.value_or(1000);
+  const bool good = deceleration >= 100 && deceleration <= 1e5 && settings.coast_below >= 0 &&
                     settings.coast_below <= 1e4 && settings.standing_below > 0 && settings.limit > Duration{0};
   if (!good) throw std::invalid_argument("a stop needs a deceleration of 100..100000 rad/s² and speeds above zero");
 }
@@ -50,7 +51,7 @@ void Stopping::begin(const StopSettings& settings, double speed, bool ramped, In
 std::optional<double> Stopping::ramp(Instant now) noexcept {
   if (phase_ != Phase::ramping || now < next_) return std::nullopt;
   next_ = now + kRampStep;
-  const double left = std::abs(open_.speed_at_start) - settings_.deceleration * to_seconds(now - asked_);
+  const double left = std::abs(open_.speed_at_start) - *settings_.deceleration * to_seconds(now - asked_);
   return left > settings_.coast_below ? std::copysign(left, open_.speed_at_start) : 0.0;
 }
 

@@ -258,10 +258,11 @@ INSTANTIATE_TEST_SUITE_P(
                     WayOut{"Coast", [](Stand& s) { s.motor->coast(); }},
                     WayOut{"ConfirmedCoast", [](Stand& s) { (void)s.motor->coast_and_confirm(1s); }},
                     WayOut{"EmergencyStop", [](Stand& s) { s.motor->emergency_stop(); }},
-                    WayOut{"SlowStop", [](Stand& s) { EXPECT_TRUE(s.motor->stop().safe()); }},
+                    WayOut{"SlowStop", [](Stand& s) { EXPECT_TRUE(s.motor->stop({.deceleration = 1000}).safe()); }},
                     WayOut{"SlowStopThatIsAbandoned",
                            [](Stand& s) {
-                             auto stop = std::async(std::launch::async, [&] { (void)s.motor->stop(); });
+                             auto stop =
+                                 std::async(std::launch::async, [&] { (void)s.motor->stop({.deceleration = 1000}); });
                              s.motor->coast();
                              stop.get();
                            }},

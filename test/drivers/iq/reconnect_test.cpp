@@ -133,7 +133,7 @@ TEST(Unplugging, EndsAStopThatIsWaitedFor) {
   const auto asked = [](const Module& m) { return m.count([](const auto& h) { return h.type == 50 && h.sub == 13; }); };
   const auto before = bench.line->with(asked);
   ASSERT_TRUE(bench.line->wait_for([&](const Module& m) { return asked(m) > before + 1; })) << "its speed is known";
-  auto stop = std::async(std::launch::async, [&] { return bench.motor->stop(); });
+  auto stop = std::async(std::launch::async, [&] { return bench.motor->stop({.deceleration = 1000}); });
   ASSERT_TRUE(bench.line->wait_for(
       [](const Module& m) { return m.last_motion()->is_speed() && fake::to_f32(m.last_motion()->data) < 2900; }));
   bench.pull();

@@ -15,6 +15,8 @@ using fake::State;
 using fake::Wire;
 using Outcome = StopReport::Outcome;
 
+const StopSettings kRamp{.deceleration = 1000};
+
 /// A module whose propeller needs a while to stand still after a coast.
 struct Propeller {
   Wire wire;
@@ -54,12 +56,22 @@ struct Propeller {
   }
 };
 
+TEST(Stop, CoastsAtOnceUnlessTheSupplySinksWhatARampFeedsBack) {
+  Propeller propeller;
+  propeller.spin(2000);
+  propeller.wire.session.stop({}, propeller.wire.now);
+  const StopReport report = propeller.finish();
+  EXPECT_TRUE(propeller.commands.empty());
+  EXPECT_EQ(report.outcome, Outcome::standing);
+  EXPECT_LT(to_seconds(*report.time_to_coast), 0.05);
+}
+
 TEST(Stop, RampsDownNoFasterThanAllowedAndThenCoasts) {
   for (const double sign : {1.0, -1.0}) {
     Propeller propeller;
     propeller.spin(sign * 2000);
     const Instant asked = propeller.wire.now;
-    propeller.wire.session.stop({}, propeller.wire.now);
+    propeller.wire.session.stop(kRamp, propeller.wire.now);
     const StopReport report = propeller.finish();
     EXPECT_EQ(report.outcome, Outcome::standing) << report.summary();
     EXPECT_TRUE(report.safe());
@@ -86,7 +98,7 @@ TEST(Stop, StartsFromTheSpeedThatIsTurnedWhenTheMotorIsStillOnItsWayUp) {
   Propeller propeller;
   propeller.spin(800);
   propeller.wire.session.spin_at(RadPerSec(3000), propeller.wire.now);
-  propeller.wire.session.stop({}, propeller.wire.now);
+  propeller.wire.session.stop(kRamp, propeller.wire.now);
   propeller.wire.flush();
   propeller.finish();
   for (const auto& [time, speed] : propeller.commands) EXPECT_LE(speed, 800);
@@ -109,6 +121,7 @@ TEST(Stop, SaysThatTheSpeedWasStillFallingAtTheLimit) {
   propeller.spin(1000);
   StopSettings settings;
   settings.limit = 2s;
+  settings.deceleration = 1000;
   propeller.wire.session.stop(settings, propeller.wire.now);
   EXPECT_EQ(propeller.finish().outcome, Outcome::slowing);
 }
@@ -117,7 +130,7 @@ TEST(Stop, SaysThatAMotorTurnsOnAlthoughItCoasts) {
   Propeller propeller;
   propeller.decay_s = 0;
   propeller.spin(1000);
-  propeller.wire.session.stop({}, propeller.wire.now);
+  propeller.wire.session.stop(kRamp, propeller.wire.now);
   const StopReport report = propeller.finish();
   EXPECT_EQ(report.outcome, Outcome::turning);
   EXPECT_FALSE(report.time_to_standing.has_value());
@@ -138,7 +151,7 @@ TEST(Stop, SaysThatTheModuleDoesNotConfirm) {
 TEST(Stop, CutShortByACoastCoastsAtOnce) {
   Propeller propeller;
   propeller.spin(3000);
-  propeller.wire.session.stop({}, propeller.wire.now);
+  propeller.wire.session.stop(kRamp, propeller.wire.now);
   propeller.wire.run_for(300ms);
   EXPECT_TRUE(propeller.wire.session.spinning());
   propeller.wire.coast();
@@ -152,7 +165,7 @@ TEST(Stop, CutShortByACoastCoastsAtOnce) {
 TEST(Stop, IsOverruledByANewSpeed) {
   Propeller propeller;
   propeller.spin(3000);
-  propeller.wire.session.stop({}, propeller.wire.now);
+  propeller.wire.session.stop(kRamp, propeller.wire.now);
   propeller.wire.run_for(300ms);
   propeller.wire.spin(1500);
   EXPECT_EQ(propeller.wire.session.stop_report()->outcome, Outcome::overruled);
@@ -164,7 +177,7 @@ TEST(Stop, IsOverruledByANewSpeed) {
 TEST(Stop, OfAModuleThatIsLostEndsInACoastAndSaysSo) {
   Propeller propeller;
   propeller.spin(2000);
-  propeller.wire.session.stop({}, propeller.wire.now);
+  propeller.wire.session.stop(kRamp, propeller.wire.now);
   propeller.wire.run_for(100ms);
   propeller.wire.module.mute = true;
   const StopReport report = propeller.finish();
@@ -175,7 +188,7 @@ TEST(Stop, OfAModuleThatIsLostEndsInACoastAndSaysSo) {
 TEST(Stop, OfAStandingMotorIsOverAtOnce) {
   Propeller propeller;
   propeller.wire.run_for(200ms);
-  propeller.wire.session.stop({}, propeller.wire.now);
+  propeller.wire.session.stop(kRamp, propeller.wire.now);
   EXPECT_EQ(propeller.finish(1s).outcome, Outcome::standing);
 }
 
