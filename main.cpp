@@ -52,6 +52,11 @@ int complain(const std::exception& error, int exit_code) {
   return exit_code;
 }
 
+int tell(const kphi::daq::RunStopped& stop, const char* headline, int exit_code) {
+  fmt::print(stderr, "{}", stop.words().text(headline));
+  return exit_code;
+}
+
 /// CLI11 says only "A subcommand is required" of a misspelt one.
 std::string nearest_command(const CLI::App& program, const std::string& word) {
   for (const CLI::App* command : program.get_subcommands({})) {
@@ -109,10 +114,10 @@ int main(int argc, char** argv) {
     return complain(error, kUsage);
   } catch (const kphi::DeviceError& error) {
     return complain(error, kNoDevice);
-  } catch (const kphi::daq::SafetyStop& error) {
-    return complain(error, kSafetyStop);
-  } catch (const kphi::daq::Interrupted& error) {
-    return complain(error, kInterrupted);
+  } catch (const kphi::daq::SafetyStop& stop) {
+    return tell(stop, "SAFETY STOP", kSafetyStop);
+  } catch (const kphi::daq::Interrupted& stop) {
+    return tell(stop, "STOPPED", kInterrupted);
   } catch (const kphi::results::DataRejected& error) {
     return complain(error, kDataRejected);
   } catch (const std::exception& error) {

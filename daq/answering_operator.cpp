@@ -13,7 +13,14 @@ namespace {
 
 }  // namespace
 
-void AnsweringOperator::mount(const profiles::Propeller& propeller, double occlusion_deg) {
+void AnsweringOperator::clear_safety_stop(const std::string& reason) {
+  if (answers_.continue_after_safety_stop) return;
+  throw ConfigurationError(fmt::format(
+      "{}: a safety stop ended this campaign: {}; look at the stand, then add continue_after_safety_stop: true",
+      answers_.path, reason));
+}
+
+void AnsweringOperator::mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string&) {
   asked(fmt::format("mounted angle for propeller {}, {:g} degrees?", propeller.id, occlusion_deg));
   if (remounting_) {
     remounting_ = false;

@@ -16,11 +16,12 @@ class AnsweringOperator final : public Operator {
  public:
   explicit AnsweringOperator(profiles::Answers answers) : answers_(std::move(answers)) {}
   [[nodiscard]] bool run_again(const AnotherRun& question) override;
+  void clear_safety_stop(const std::string& reason) override;
   void finish() override;
   [[nodiscard]] std::string name() const override { return answers_.path; }
 
  protected:
-  void mount(const profiles::Propeller& propeller, double occlusion_deg) override;
+  void mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string& condition) override;
 
  private:
   profiles::Answers answers_;

@@ -109,11 +109,18 @@ class Bench {
   [[nodiscard]] virtual Duration sync_interval() const = 0;
   /// A run begins; a bench in virtual time may begin anew with it. References to its parts may die.
   virtual void begin_run(const RunBeginning&) {}
+  /// Somebody is about to come near: takes the power from the motor where its supply is ours, and waits until the
+  /// supply confirms that. The motor must be at rest. False: the motor has power as before. Throws SafetyStop.
+  [[nodiscard]] virtual bool unpower() = 0;
+  /// Nobody is near any more: gives it back, and connects to the module again if it was lost. Throws DeviceError.
+  virtual void repower() = 0;
   /// Tells whoever must know what a person has mounted (a simulated bench). Throws DeviceError.
   virtual void mounted(const std::string& propeller_id, double occlusion_deg) = 0;
 };
 
-/// Connects to the devices that the file names. Throws DeviceError.
-[[nodiscard]] std::unique_ptr<Bench> connect(const profiles::Bench& bench);
+/// Connects to the devices that the file names. `stop_asked` is asked before anything is switched on. Throws
+/// DeviceError, Interrupted.
+[[nodiscard]] std::unique_ptr<Bench> connect(
+    const profiles::Bench& bench, const std::function<bool()>& stop_asked = [] { return false; });
 
 }  // namespace kphi::daq

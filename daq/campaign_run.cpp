@@ -8,10 +8,12 @@
 #include <optional>
 #include <set>
 
+#include "daq/awake.hpp"
 #include "daq/bench_audit.hpp"
 #include "daq/campaign_review.hpp"
 #include "daq/interrupt.hpp"
 #include "daq/reduction.hpp"
+#include "daq/rest_guard.hpp"
 #include "daq/run.hpp"
 #include "drivers/device_error.hpp"
 #include "drivers/iq/quality.hpp"
@@ -43,6 +45,16 @@ std::string standing_words(const std::optional<iq::StopReport>& stop) {
   return fmt::format(", stood after {:.1f} s", to_seconds(*stop->time_to_standing));
 }
 
+bool is_safety_stop(const std::exception_ptr& cause) {
+  try {
+    std::rethrow_exception(cause);
+  } catch (const SafetyStop&) {
+    return true;
+  } catch (...) {
+    return false;
+  }
+}
+
 class CampaignRun {
  public:
   CampaignRun(Bench& bench, const profiles::Campaign& campaign, const profiles::Bench& place,
@@ -61,7 +73,10 @@ class CampaignRun {
         planned_(static_cast<int>(plan_.runs.size())) {
     person.dictate_to([this](const char* event, const std::string& words) { note(event, {{"words", words}}); });
   }
-  ~CampaignRun() { person_.dictate_to({}); }
+  ~CampaignRun() {
+    person_.dictate_to({});
+    person_.let_watch({});
+  }
   CampaignRun(const CampaignRun&) = delete;
   CampaignRun& operator=(const CampaignRun&) = delete;
 
@@ -75,25 +90,52 @@ class CampaignRun {
       resume(*resumption, std::move(identity));
     }
     try {
+      require_awake(bench_.clock());
       audit();
       for (const profiles::PlannedRun& planned : plan_.runs) {
         if (!is_accepted(planned)) one(planned);
         if (!planned.is_reference()) repeat(planned.occlusion_deg);
       }
       review_.conclude();
-    } catch (const std::exception& e) {
-      note_the_end("campaign_stopped", {{"reason", e.what()}});
-      progress_.say(
-          fmt::format("{} of {} runs are finished and kept in {}", result_.runs, planned_, folder_.path().string()));
-      progress_.say(fmt::format("go on with: kphi run {} --bench {} --resume {}", campaign_.path, place_.path,
-                                folder_.path().string()));
-      throw;
+    } catch (...) {
+      end_early(std::current_exception());
     }
     note(results::kCampaignFinished, {{"runs", result_.runs}});
     return result_;
   }
 
  private:
+  /// Writes down why, and throws it again with what the person needs to continue.
+  [[noreturn]] void end_early(std::exception_ptr cause) {
+    if (has_slept(bench_.clock()) && !is_safety_stop(cause)) {
+      SafetyStop stop(slept(bench_.clock()));
+      StopWords words = stop.words();
+      words.also(words_of(cause).line());
+      cause = std::make_exception_ptr(SafetyStop(words));
+    }
+    StopWords words = words_of(cause);
+    note_the_end("campaign_stopped", {{"reason", words.line()}, {"safety_stop", is_safety_stop(cause)}});
+    const std::string runs =
+        fmt::format("{} of {} runs are finished, in {}", result_.runs, planned_, folder_.path().string());
+    const std::string how = fmt::format("continue with: kphi run {} --bench {} --resume {}", campaign_.path,
+                                        place_.path, folder_.path().string());
+    words.data = (words.data.empty() ? runs : fmt::format("{}; this run up to here in {}", runs, words.data)) +
+                 "\n         " + how;
+    try {
+      std::rethrow_exception(cause);
+    } catch (const SafetyStop&) {
+      throw SafetyStop(words);
+    } catch (const NotMounted&) {
+      throw NotMounted(words);
+    } catch (const Interrupted&) {
+      throw Interrupted(words);
+    } catch (...) {
+      progress_.say(runs);
+      progress_.say(how);
+      throw;
+    }
+  }
+
   /// Beside each other: the files of the campaign, and those that the bench file names.
   void keep_files() {
     keep_copy(folder_.campaign_file(), campaign_.text, bench_.files());
@@ -110,6 +152,12 @@ class CampaignRun {
     const std::vector<std::string> changes = require_unchanged(folder_, resumption, identity);
     if (!changes.empty()) keep_files();
     const std::vector<std::string> aside = results::set_leftovers_aside(folder_, resumption.state, bench_.files());
+    if (!resumption.state.safety_stop.empty()) {
+      if (resumption.cleared_by.empty())
+        throw ConfigurationError("a safety stop ended this campaign and nobody has cleared it: " +
+                                 resumption.state.safety_stop);
+      identity["cleared_safety_stop"] = {{"reason", resumption.state.safety_stop}, {"by", resumption.cleared_by}};
+    }
     identity["accepted_runs"] = resumption.state.accepted.size();
     if (!changes.empty()) identity["accepted_changes"] = changes;
     if (!aside.empty()) identity["set_aside"] = aside;
@@ -153,8 +201,11 @@ class CampaignRun {
         progress_.say("air: its sensor measures no more: the density of this run is unknown");
       const RunOrder order{campaign_, place_, *mounted_, capped, remaining_s, file};
       accept(record_run(bench_, order, progress_, stop_asked_), planned);
-    } catch (const std::exception& e) {
-      note_the_end(results::kRunAborted, {{"run", file.filename().string()}, {"reason", e.what()}});
+    } catch (...) {
+      const auto cause = std::current_exception();
+      note_the_end(results::kRunAborted, {{"run", file.filename().string()},
+                                          {"reason", words_of(cause).line()},
+                                          {"safety_stop", is_safety_stop(cause)}});
       throw;
     }
   }
@@ -163,7 +214,10 @@ class CampaignRun {
   void repeat(double occlusion_deg) {
     if (review_.repetitions(occlusion_deg) < campaign_.repetitions || !judged_.insert(occlusion_deg).second) return;
     while (const auto question = review_.another(occlusion_deg)) {
+      const RestGuard guard(bench_, true);
+      person_.let_watch([&] { guard.check(); });
       const bool yes = person_.run_again(*question);
+      person_.let_watch({});
       note("another_run", {{"occlusion_deg", occlusion_deg},
                            {"reason", question->reason},
                            {"decided", yes},
@@ -184,10 +238,11 @@ class CampaignRun {
     if (!place_.iq.clock_gain) note("clock_unchecked", {{"uid", bench_.motor().parameters().uid()}});
   }
 
-  /// The motor stands meanwhile.
+  /// The motor is at rest meanwhile, and watched.
   void cool_down() {
     const auto& limits = campaign_.limits;
     if (!limits.cooling) return;
+    const RestGuard guard(bench_, true);
     const iq::CoolingRule rule{limits.cooling->pause_above.value(), limits.cooling->resume_below.value()};
     const Instant begun = bench_.clock().now();
     for (bool pausing = false;; pausing = true) {
@@ -205,6 +260,7 @@ class CampaignRun {
       const Instant next = bench_.clock().now() + kCoolingLook;
       while (bench_.clock().now() < next) {
         if (stop_asked_()) throw Interrupted("stopped by request");
+        guard.check();
         bench_.wait_until(std::min(next, bench_.clock().now() + bench_.clock().stretched(kCoolingTickWall)));
       }
     }
@@ -214,11 +270,30 @@ class CampaignRun {
     const double occlusion_deg = planned.occlusion_deg;
     if (!planned.mount && mounted_ && mounted_->occlusion_deg() == occlusion_deg) return;
     mounted_.reset();
-    const Mounted confirmed = person_.confirm_mounting(campaign_.propeller, occlusion_deg);
+    const Mounted confirmed = let_mount(occlusion_deg);
     bench_.mounted(campaign_.propeller.id, occlusion_deg);
+    bench_.repower();
     mounted_ = confirmed;
     note("mounted",
          {{"propeller", campaign_.propeller.id}, {"occlusion_deg", occlusion_deg}, {"confirmed_by", person_.name()}});
+  }
+
+  /// Nobody is asked to come near before the rotor was seen at rest; without power if the supply is ours. Watched to
+  /// the end.
+  Mounted let_mount(double occlusion_deg) {
+    RestGuard(bench_, true).await_rest(stop_asked_);
+    const bool has_power = !bench_.unpower();
+    RestGuard guard(bench_, has_power);
+    guard.await_rest(stop_asked_);
+    person_.let_watch([&] { guard.check(); });
+    const Mounted confirmed = person_.confirm_mounting(
+        campaign_.propeller, occlusion_deg,
+        has_power ? "The rotor is at rest and its module coasts, but the motor HAS POWER: cut it at the switch first."
+                  : "The rotor is at rest and the supply's output is off.");
+    person_.let_watch({});
+    guard.check();
+    if (stop_asked_()) throw Interrupted("stopped by request");
+    return confirmed;
   }
 
   /// The file is whole, named and on disk: the journal's line accepts it. The tables follow from the files.

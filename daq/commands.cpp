@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "daq/answering_operator.hpp"
+#include "daq/awake.hpp"
 #include "daq/bench_audit.hpp"
 #include "daq/campaign_run.hpp"
 #include "daq/device_locks.hpp"
@@ -38,12 +39,12 @@ struct RunOptions {
 };
 
 std::unique_ptr<Operator> person(const RunOptions& options, const std::optional<profiles::Answers>& answers,
-                                 const std::function<bool()>& stop_asked) {
+                                 const profiles::Bench& place, const std::function<bool()>& stop_asked) {
   if (answers) return std::make_unique<AnsweringOperator>(*answers);
-  if (options.yes) return std::make_unique<AgreeingOperator>();
+  if (options.yes) return std::make_unique<AgreeingOperator>(place.simulation.has_value());
   if (!isatty(STDIN_FILENO)) {
     throw ConfigurationError(
-        "kphi run: nobody to ask for the mountings: standard input is no terminal; name a file "
+        "kphi run: cannot ask for the mountings: standard input is not a terminal; name a file "
         "with the answers (--answers FILE), or use --yes if the bench mounts by itself");
   }
   return std::make_unique<TerminalOperator>(STDIN_FILENO, stderr, stop_asked);
@@ -116,6 +117,34 @@ struct Destination {
   }
 };
 
+/// After a safety stop only a person's own word lets the campaign continue: before any device is asked.
+void clear_safety_stop(Destination& destination, Operator& person, const std::optional<profiles::Answers>& answers) {
+  const bool is_stopped = destination.resumption && !destination.resumption->state.safety_stop.empty();
+  if (is_stopped) {
+    person.clear_safety_stop(destination.resumption->state.safety_stop);
+    destination.resumption->cleared_by = person.name();
+  } else if (answers && answers->continue_after_safety_stop) {
+    throw ConfigurationError(
+        answers->path + ": continue_after_safety_stop is left over: no safety stop ended this campaign; take it out");
+  }
+}
+
+/// A computer that slept while its devices were connected: whatever they answered is of before.
+std::unique_ptr<Bench> connect_awake(const profiles::Bench& place, const std::function<bool()>& stop_asked) {
+  const SteadyClock wall;
+  std::unique_ptr<Bench> bench;
+  try {
+    bench = connect(place, stop_asked);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const std::exception&) {
+    require_awake(wall);
+    throw;
+  }
+  require_awake(wall);
+  return bench;
+}
+
 int tell_finished(const Destination& destination, bool json) {
   const std::string folder = destination.folder->path().string();
   const std::size_t runs = destination.resumption->state.accepted.size();
@@ -151,11 +180,12 @@ int run(const RunOptions& options) {
   live::View view(options.live, live::subject_of(campaign, place));
   put(stderr, live::greeting(view));
   const std::function<bool()> stop_asked = [&view] { return SignalWatch::count() > 0 || view.stop_asked(); };
-  const auto operator_ = person(options, answers, stop_asked);
+  const auto operator_ = person(options, answers, place, stop_asked);
+  clear_safety_stop(destination, *operator_, answers);
   const SignalWatch signals;
   const DeviceLocks devices(lock_names(place));
   if (!destination.folder) std::filesystem::create_directories(options.out);
-  const auto bench = connect(place);
+  const auto bench = connect_awake(place, stop_asked);
   (void)audit_bench(*bench, campaign, place);  // before a folder is made; its words come with the run
   const auto bytes =
       static_cast<std::uint64_t>(destination.share_left(plan) * static_cast<double>(bytes_needed(plan, place)));

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "daq/device_records.hpp"
+#include "daq/interlock.hpp"
 #include "daq/slot_pages.hpp"
 #include "drivers/device_error.hpp"
 #include "drivers/netbox/calinfo.hpp"
@@ -101,7 +102,8 @@ DeterministicBench::DeterministicBench(const profiles::Bench& place, const sim::
     : clock_(other.begin),
       air_({.sensor = "", .manual = place.ambient.manual}, clock_),
       sim_(settings_of(place, other)),
-      supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, *sim_.supply(), clock_) : nullptr),
+      supply_(place.supply ? std::make_unique<DeterministicSupply>(*place.supply, *sim_.supply(), clock_) : nullptr),
+      powered_(supply_ ? std::make_unique<Powered>(*supply_) : nullptr),
       motor_(place.iq, sim_.motor_line(), clock_, [this] { step_to(clock_.now() + kMotorWait); }) {
   if (place.simulation && place.simulation->durable) files_ = &results::disk();
   if (supply_) {
@@ -158,7 +160,7 @@ void DeterministicBench::wait_until(Instant when) {
 void DeterministicBench::step_to(Instant when) {
   clock_.set(when);
   sim_.advance(when);
-  if (supply_) supply_->link.look();
+  if (supply_) supply_->look();
   if (measured_air_) measured_air_->look();
   exchange();  // what came is received before anything is found to be late
   motor_.advance(when);
@@ -195,7 +197,7 @@ void DeterministicBench::exchange_load_cell() {
 void DeterministicBench::abandon() noexcept {
   abandoned_ = true;
   motor_.abandon();
-  if (supply_) supply_->link.abandon();
+  if (supply_) supply_->abandon();
 }
 
 void DeterministicBench::outlive(Instant when) {
@@ -208,6 +210,25 @@ std::unique_ptr<Background> DeterministicBench::keep_calling(std::function<void(
 }
 
 Duration DeterministicBench::sync_interval() const { return kSyncEvery; }
+
+bool DeterministicBench::unpower() {
+  if (!supply_) return false;
+  motor_.rest();
+  if (const std::string why = supply_->switch_off(); !why.empty())
+    throw SafetyStop(why, "cut the power of the motor at the switch before you go near");
+  powered_.reset();
+  return true;
+}
+
+void DeterministicBench::repower() {
+  if (supply_) {
+    powered_ = std::make_unique<Powered>(*supply_);
+    wait_until(clock_.now() + kSupplyRises);
+    motor_.wake();
+  } else if (!motor_.failure().empty()) {
+    motor_.wake();
+  }
+}
 
 void DeterministicBench::mounted(const std::string& propeller_id, double occlusion_deg) {
   try {

@@ -34,7 +34,7 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   [[nodiscard]] const Clock& clock() const override { return clock_; }
   [[nodiscard]] MotorLink& motor() override { return motor_; }
   [[nodiscard]] LoadCellLink& load_cell() override { return *this; }
-  [[nodiscard]] SupplyLink* supply() override { return supply_ ? &supply_->link : nullptr; }
+  [[nodiscard]] SupplyLink* supply() override { return supply_.get(); }
   [[nodiscard]] std::optional<ambient::Density> air() const override {
     return measured_air_ ? measured_air_->density() : air_.density();
   }
@@ -43,6 +43,8 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   [[nodiscard]] results::FileLayer& files() override { return *files_; }
   [[nodiscard]] Duration sync_interval() const override;
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
+  [[nodiscard]] bool unpower() override;
+  void repower() override;
 
   /// What a fault test looks at, and where it puts its finger.
   [[nodiscard]] sim::SimulatedBench& simulation() noexcept { return sim_; }
@@ -80,13 +82,8 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   results::MemoryOnlySync own_files_;
   results::FileLayer* files_ = &own_files_;
   sim::SimulatedBench sim_;
-  struct PoweredSupply {
-    PoweredSupply(const profiles::SupplyPlace& place, sim::SupplySlave& slave, const Clock& clock)
-        : link(place, slave, clock), powered(link) {}
-    DeterministicSupply link;
-    Powered powered;
-  };
-  std::unique_ptr<PoweredSupply> supply_;
+  std::unique_ptr<DeterministicSupply> supply_;
+  std::unique_ptr<Powered> powered_;
   DeterministicMotor motor_;
   netbox::Configuration configuration_;
   std::vector<netbox::Finding> findings_;

@@ -10,6 +10,8 @@
 namespace kphi::daq {
 namespace {
 
+constexpr Duration kWakes = std::chrono::seconds(5);  // of the module, after its power came back
+
 iq::Settings settings_of(const profiles::MotorPlace& place) {
   iq::Settings settings;
   settings.module_id = place.module_id;
@@ -35,6 +37,20 @@ void DeterministicMotor::connect() {
   (void)session_.take_events();  // that it is connected
 }
 
+void DeterministicMotor::wake() {
+  resting_ = false;
+  const Instant give_up = clock_.now() + kWakes;
+  do {
+    session_.connect_anew(clock_.now());
+    while (session_.state() == iq::Session::State::connecting) step_();
+  } while (session_.state() != iq::Session::State::ready && clock_.now() < give_up);
+  if (session_.state() != iq::Session::State::ready)
+    throw DeviceError("IQ module", "connect again", session_.failure());
+  session_.rearm();
+  failure_.clear();
+  (void)session_.take_events();
+}
+
 std::vector<iq::Reply> DeterministicMotor::ask(std::vector<iq::Inquiry> asked) {
   if (session_.state() != iq::Session::State::ready) throw DeviceError("IQ module", "ask", failure());
   session_.inquire(std::move(asked), clock_.now());
@@ -45,6 +61,7 @@ std::vector<iq::Reply> DeterministicMotor::ask(std::vector<iq::Inquiry> asked) {
 void DeterministicMotor::exchange() {
   if (abandoned_) return;
   const Instant now = clock_.now();
+  if (resting_) return discard(now);
   watch_plug();
   for (bool heard = true; heard || (plugged_ && !session_.output().empty());) {
     if (plugged_ && !session_.output().empty()) {
@@ -54,6 +71,13 @@ void DeterministicMotor::exchange() {
     line_.advance(now);
     heard = false;
     for (sim::IqChunk chunk; line_.next_chunk(chunk, now); heard = true) session_.receive(chunk.bytes, now);
+  }
+}
+
+/// The port is closed: what comes is lost.
+void DeterministicMotor::discard(Instant now) {
+  line_.advance(now);
+  for (sim::IqChunk chunk; line_.next_chunk(chunk, now);) {
   }
 }
 
@@ -72,6 +96,7 @@ void DeterministicMotor::spin_at(RadPerSec signed_speed) {
 }
 
 void DeterministicMotor::emergency_stop() noexcept {
+  if (resting_) return;
   session_.emergency_stop(clock_.now());
   exchange();
 }

@@ -19,13 +19,21 @@ class DeterministicMotor final : public MotorLink {
 
   /// Connects and reads the module's parameters. Throws DeviceError.
   void connect();
+  /// Its power is about to go: nothing is said until wake().
+  void rest() noexcept { resting_ = true; }
+  /// Connects again. Throws DeviceError.
+  void wake();
   /// Carries bytes both ways, at the clock's time.
   void exchange();
-  void advance(Instant now) { session_.advance(now); }
+  void advance(Instant now) {
+    if (!resting_) session_.advance(now);
+  }
   /// The program is gone: nothing goes over the line any more.
   void abandon() noexcept { abandoned_ = true; }
   /// When something is due at either end of the line.
-  [[nodiscard]] Instant deadline() const { return std::min(session_.deadline(), line_.next_event()); }
+  [[nodiscard]] Instant deadline() const {
+    return resting_ ? line_.next_event() : std::min(session_.deadline(), line_.next_event());
+  }
 
   void spin_at(RadPerSec signed_speed) override;
   // One thread: who asks for a speed cannot die apart from who watches it.
@@ -43,6 +51,7 @@ class DeterministicMotor final : public MotorLink {
  private:
   [[nodiscard]] std::vector<iq::Reply> ask(std::vector<iq::Inquiry> asked);
   void watch_plug();
+  void discard(Instant now);
 
   sim::IqLine& line_;
   const Clock& clock_;
@@ -51,6 +60,7 @@ class DeterministicMotor final : public MotorLink {
   iq::AuditRecord parameters_;
   bool plugged_ = true;
   bool abandoned_ = false;
+  bool resting_ = false;
   std::string failure_;
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "daq/awake.hpp"
 #include "daq/supply_interlock.hpp"
 
 namespace kphi::daq {
@@ -52,6 +53,7 @@ Guard::Guard(Bench& bench, const profiles::Bench& place, const results::LoadCell
       table_(limits),
       load_(mounting_, scale),
       speed_watch_(place.iq.spin, bench.clock().stretched(host_delay(place)), speed_share(limits)),
+      device_rate_hz_(scale.device_rate_hz),
       samples_(samples_relayed(scale), kAtOnce),
       readings_(kReadingsRelayed, kAtOnce),
       supply_readings_(kSupplyReadingsRelayed, 16),
@@ -69,10 +71,11 @@ Guard::Guard(Bench& bench, const profiles::Bench& place, const results::LoadCell
 void Guard::look() noexcept {
   try {
     take_marks();
+    notice_sleep();  // first: it is the cause of whatever else is found
+    judge_pause(bench_.clock().now());
     (void)relay();
     const Instant now = bench_.clock().now();
     judge_links();
-    judge_pause(now);
     const bool spinning = spinning_;
     for (Stream* stream : {&load_cell_stream_, &motor_stream_, &supply_stream_}) judge_silence(*stream, now, spinning);
     looked_ns_ = now.count();
@@ -151,6 +154,7 @@ void Guard::take_marks() {
 
 void Guard::judge(const results::LoadCellRecord& sample) {
   load_cell_stream_.newest = Instant(sample.arrival_ns);
+  judge_gap(sample);
   load_.add(sample);
   for (std::size_t axis = 0; axis < 6; ++axis) hold(static_cast<Watched>(axis), load_.load(axis), sample.arrival_ns);
   if (!has_zero_ || !load_.full()) return;
@@ -209,6 +213,19 @@ void Guard::judge(const results::SupplyReading& reading) {
   hold(Watched::output_current, reading.current_a, reading.time_ns);
 }
 
+/// Also when the newest sample is fresh: after a break of the network or of this computer nobody saw what happened.
+void Guard::judge_gap(const results::LoadCellRecord& sample) {
+  const std::optional<std::uint32_t> before = std::exchange(last_sequence_, sample.ft_sequence);
+  const GuardLimit* patience = limit_of(Watched::load_cell_age);
+  if (!before || !spinning_ || patience == nullptr) return;
+  const auto step = static_cast<std::int32_t>(sample.ft_sequence - *before);  // negative: the box started again
+  const double missing_s = step / device_rate_hz_;
+  if (missing_s <= patience->value) return;
+  const GuardLimit limit{Watched::samples_missing, "gap in the load cell's samples", patience->value, "s",
+                         patience->source};
+  trip(passed(limit, missing_s, Instant(sample.arrival_ns)));
+}
+
 void Guard::judge_links() {
   for (const std::string& failure : {bench_.motor().failure(), bench_.load_cell().failure(),
                                      bench_.supply() != nullptr ? bench_.supply()->failure() : std::string()}) {
@@ -233,7 +250,15 @@ void Guard::judge_pause(Instant now) {
   if (!spinning_ || limit == nullptr) return;
   const Instant beat(beat_ns_);
   const double pause = to_seconds(bench_.clock().shrunk(now - beat));
-  if (pause > limit->value) trip(passed(*limit, pause, beat));
+  if (pause <= limit->value) return;
+  Trip found = passed(*limit, pause, beat);
+  const double unwatched = to_seconds(bench_.clock().shrunk(now - Instant(looked_ns_)));
+  if (unwatched > limit->value) found.reason = fmt::format("this computer did not run kphi for {:.2g} s", unwatched);
+  trip(std::move(found));
+}
+
+void Guard::notice_sleep() noexcept {
+  if (has_slept(bench_.clock())) trip(slept(bench_.clock()));
 }
 
 void Guard::mark(const results::PhaseMark& mark) {
@@ -249,11 +274,12 @@ void Guard::take_zero(const netbox::ZeroMeasurement& zero) noexcept {
 }
 
 void Guard::check(bool spinning) {
+  notice_sleep();
   const Instant now = bench_.clock().now();
   judge_pause(now);
   const double unwatched = to_seconds(bench_.clock().shrunk(now - Instant(looked_ns_)));
   if (const GuardLimit* limit = limit_of(Watched::pause); spinning && limit != nullptr && unwatched > limit->value)
-    trip_state(fmt::format("the guard stood still for {:.2g} s while the motor turned", unwatched));
+    trip_state(fmt::format("the guard was blocked for {:.2g} s while the motor was turning", unwatched));
   beat_ns_ = now.count();
   spinning_ = spinning;
   latch_.check();

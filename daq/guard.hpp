@@ -53,8 +53,12 @@ class Guard final : public Streams {
   void take_zero(const netbox::ZeroMeasurement& zero) noexcept;
   /// Until then a change of speed may load the supply as it likes.
   void settles_until(Instant when) noexcept { settled_from_ = when.count(); }
-  /// The runner is alive. Throws SafetyStop after a trip, and when the guard itself looks no more.
+  /// The runner is alive; to be called before every order that turns the motor. Throws SafetyStop after a trip, when
+  /// the guard itself looks no more, and when runner or computer were away for so long that the module may have let the
+  /// motor go.
   void check(bool spinning);
+  /// Trips when this computer has slept. Any thread.
+  void notice_sleep() noexcept;
   /// From now on nothing trips: the motor was let go for another reason, and the supply is switched off.
   void stand_down() noexcept { judging_ = false; }
 
@@ -82,6 +86,7 @@ class Guard final : public Streams {
   void judge_silence(Stream& stream, Instant now, bool spinning);
   void judge_links();
   void judge_pause(Instant now);
+  void judge_gap(const results::LoadCellRecord& sample);
 
   Bench& bench_;
   BenchStreams devices_;
@@ -91,6 +96,8 @@ class Guard final : public Streams {
   std::array<const GuardLimit*, kWatchedCount> limits_{};
   LoadWatch load_;
   SpeedWatch speed_watch_;
+  const double device_rate_hz_;
+  std::optional<std::uint32_t> last_sequence_;  ///< of the load cell
   Stream load_cell_stream_, motor_stream_, supply_stream_;
   Relay<results::LoadCellRecord> samples_;
   Relay<results::MotorReading> readings_;

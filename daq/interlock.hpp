@@ -3,10 +3,10 @@
 
 #include <array>
 #include <atomic>
-#include <stdexcept>
 #include <string>
 
 #include "daq/guard_limits.hpp"
+#include "daq/run_stopped.hpp"
 #include "drivers/clock.hpp"
 #include "results/records.hpp"
 
@@ -63,10 +63,16 @@ class Latch {
   Trip trip_;  // written while closing, read once closed
 };
 
-/// A trip that stopped a run. The motor coasts already. Exit code 4.
-class SafetyStop : public std::runtime_error {
+/// What a person does about it.
+[[nodiscard]] std::string next_move(const Trip& trip);
+
+/// A trip that stopped a run. Exit code 4.
+class SafetyStop final : public RunStopped {
  public:
-  using std::runtime_error::runtime_error;
+  using RunStopped::RunStopped;
+  explicit SafetyStop(const std::string& cause, const std::string& next_move = {})
+      : RunStopped({cause, {}, next_move, {}, {}}) {}
+  explicit SafetyStop(const Trip& trip) : SafetyStop(trip.reason, next_move(trip)) {}
 };
 
 }  // namespace kphi::daq

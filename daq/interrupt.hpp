@@ -1,14 +1,15 @@
 // Ctrl-C, Ctrl-\\, SIGTERM and SIGHUP as a question that the runner asks on every tick.
 #pragma once
 
-#include <stdexcept>
+#include "daq/run_stopped.hpp"
 
 namespace kphi::daq {
 
 /// Thrown by the runner when a person or the system asked it to stop. Exit code 130.
-class Interrupted : public std::runtime_error {
+class Interrupted : public RunStopped {
  public:
-  using std::runtime_error::runtime_error;
+  using RunStopped::RunStopped;
+  explicit Interrupted(const std::string& cause) : RunStopped({cause, {}, {}, {}, {}}) {}
 };
 
 /// While it lives the signals SIGINT, SIGTERM, SIGHUP and SIGQUIT only count, and those of a reader that is gone and of

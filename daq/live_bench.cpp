@@ -9,6 +9,8 @@
 #include <filesystem>
 #include <thread>
 
+#include "daq/awake.hpp"
+#include "daq/interrupt.hpp"
 #include "daq/motor_audit.hpp"
 #include "daq/slot_pages.hpp"
 #include "drivers/device_error.hpp"
@@ -22,6 +24,7 @@ namespace {
 constexpr Duration kDrainWall = std::chrono::milliseconds(5);
 constexpr std::chrono::seconds kCalinfoTimeout{1};
 constexpr std::chrono::seconds kPageTimeout{5};
+constexpr std::chrono::seconds kWakes{5};  // of the module, after its power came back
 constexpr Duration kSyncWall = std::chrono::milliseconds(500);
 
 iq::Settings motor_settings(const profiles::MotorPlace& place) {
@@ -84,15 +87,57 @@ class Thread final : public Background {
 }  // namespace
 
 LiveMotor::LiveMotor(const profiles::MotorPlace& place, const Clock& clock)
-    : motor_(place.device, place.baud, motor_settings(place), clock, place.capture),
-      parameters_(read_parameters(motor_.identity(), [this](auto asked) { return motor_.inquire(std::move(asked)); })) {
-  (void)motor_.take_events();  // that it is connected
+    : place_(place), clock_(clock), motor_(connect()), identity_(motor_->identity().summary()) {
+  parameters_ = read_parameters(motor_->identity(), [this](auto asked) { return motor_->inquire(std::move(asked)); });
+}
+
+std::shared_ptr<iq::Motor> LiveMotor::connect() const {
+  auto motor = std::make_shared<iq::Motor>(place_.device, place_.baud, motor_settings(place_), clock_, place_.capture);
+  (void)motor->take_events();  // that it is connected
+  return motor;
+}
+
+std::shared_ptr<iq::Motor> LiveMotor::connected() const {
+  if (auto motor = this->motor()) return motor;
+  throw DeviceError("motor module on " + place_.device, "spin", "it has no power");
+}
+
+void LiveMotor::rest() { std::atomic_store(&motor_, std::shared_ptr<iq::Motor>()); }
+
+void LiveMotor::wake() {
+  rest();
+  const auto give_up = std::chrono::steady_clock::now() + kWakes;
+  for (std::shared_ptr<iq::Motor> found; !found;) {
+    try {
+      found = connect();
+    } catch (const DeviceError&) {
+      if (std::chrono::steady_clock::now() > give_up) throw;
+      std::this_thread::sleep_for(kDrainWall);  // it may still be starting
+      continue;
+    }
+    if (const std::string now = found->identity().summary(); now != identity_)
+      throw DeviceError("motor module on " + place_.device, "connect again",
+                        fmt::format("another module answers: {} instead of {}", now, identity_));
+    std::atomic_store(&motor_, std::move(found));
+    return;
+  }
+}
+
+void LiveMotor::spin_at(RadPerSec signed_speed) { connected()->spin_at(signed_speed); }
+
+void LiveMotor::renew() noexcept {
+  if (const auto motor = this->motor()) motor->renew();
+}
+
+void LiveMotor::emergency_stop() noexcept {
+  if (const auto motor = this->motor()) motor->emergency_stop();
 }
 
 void LiveMotor::begin_stop(const iq::StopSettings& settings) {
   if (stop_.valid() && !stop_report()) return;
   stop_report_.reset();
-  stop_ = std::async(std::launch::async, [this, settings] { return motor_.stop(settings); });
+  stop_ = std::async(std::launch::async,
+                     [motor = motor(), settings] { return motor ? motor->stop(settings) : iq::StopReport{}; });
 }
 
 std::optional<iq::StopReport> LiveMotor::stop_report() {
@@ -101,26 +146,32 @@ std::optional<iq::StopReport> LiveMotor::stop_report() {
 }
 
 std::optional<Celsius> LiveMotor::coil_temperature() {
-  return ask_coil_temperature(parameters_, [this](auto asked) { return motor_.inquire(std::move(asked)); });
+  return ask_coil_temperature(parameters_, [this](auto asked) { return connected()->inquire(std::move(asked)); });
 }
 
 std::vector<results::StreamEvent> LiveMotor::take_events() {
   std::vector<results::StreamEvent> events;
-  for (const iq::Event& event : motor_.take_events()) events.push_back(to_event(event));
+  const auto motor = this->motor();
+  if (!motor) return events;
+  for (const iq::Event& event : motor->take_events()) events.push_back(to_event(event));
   return events;
 }
 
 std::size_t LiveMotor::take(std::span<results::MotorReading> out) {
+  const auto motor = this->motor();
+  if (!motor) return 0;
   readings_.resize(out.size());
-  const std::size_t n = motor_.take(readings_);
+  const std::size_t n = motor->take(readings_);
   for (std::size_t i = 0; i < n; ++i) out[i] = to_reading(readings_[i]);
   return n;
 }
 
 std::string LiveMotor::failure() const {
-  if (const std::string failure = motor_.failure(); !failure.empty()) return "motor: " + failure;
-  if (motor_.counters().lease_expiries == 0) return "";
-  return "motor: nobody renewed the command in time and the driver let it coast; is this host overloaded?";
+  const auto motor = this->motor();
+  if (!motor) return "";
+  if (const std::string failure = motor->failure(); !failure.empty()) return "motor: " + failure;
+  if (motor->counters().lease_expiries == 0) return "";
+  return "motor: kphi did not renew its command in time, so the driver let it coast; close other programs";
 }
 
 LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock)
@@ -186,13 +237,39 @@ std::string LiveLoadCell::failure() const {
 
 results::SampleAccount LiveLoadCell::account() const { return to_account(cell_->counters()); }
 
-LiveBench::LiveBench(const profiles::Bench& place)
+LiveBench::LiveBench(const profiles::Bench& place, const std::function<bool()>& stop_asked)
     : place_(place),
       clock_(place.simulation ? place.simulation->time_scale : 1.0),
       air_(place.ambient, clock_),
-      supply_(place.supply ? std::make_unique<PoweredSupply>(*place.supply, clock_) : nullptr),
       load_cell_(place.netbox, clock_),
+      supply_(place.supply ? std::make_unique<LiveSupply>(*place.supply, clock_) : nullptr),
+      powered_(power(stop_asked)),
       motor_(place.iq, clock_) {}
+
+std::unique_ptr<Powered> LiveBench::power(const std::function<bool()>& stop_asked) {
+  if (stop_asked()) throw Interrupted("stopped by request, before anything was switched on");
+  require_awake(clock_);
+  return supply_ ? std::make_unique<Powered>(*supply_) : nullptr;
+}
+
+bool LiveBench::unpower() {
+  if (!supply_) return false;
+  motor_.rest();
+  if (const std::string why = supply_->switch_off(); !why.empty())
+    throw SafetyStop(why, "cut the power of the motor at the switch before you go near");
+  powered_.reset();
+  return true;
+}
+
+void LiveBench::repower() {
+  require_awake(clock_);
+  if (supply_) {
+    powered_ = std::make_unique<Powered>(*supply_);
+    motor_.wake();
+  } else if (!motor_.failure().empty()) {
+    motor_.wake();
+  }
+}
 
 void LiveBench::wait_until(Instant when) {
   const Duration left = clock_.shrunk(when - clock_.now());

@@ -1,8 +1,10 @@
 // The bench over its real transports: Net Box over UDP and HTTP, motor module over a serial line, a steady clock.
 #pragma once
 
+#include <functional>
 #include <future>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "daq/air.hpp"
@@ -19,9 +21,13 @@ class LiveMotor final : public MotorLink {
  public:
   /// Connects and reads the module's parameters. Throws DeviceError.
   LiveMotor(const profiles::MotorPlace& place, const Clock& clock);
-  void spin_at(RadPerSec signed_speed) override { motor_.spin_at(signed_speed); }
-  void renew() noexcept override { motor_.renew(); }
-  void emergency_stop() noexcept override { motor_.emergency_stop(); }
+  /// Coasts and closes the link: its power is about to go. Only wake() and the other thread's calls may follow.
+  void rest();
+  /// Connects again, to the same module. Throws DeviceError.
+  void wake();
+  void spin_at(RadPerSec signed_speed) override;
+  void renew() noexcept override;
+  void emergency_stop() noexcept override;
   void begin_stop(const iq::StopSettings& settings) override;
   [[nodiscard]] std::optional<iq::StopReport> stop_report() override;
   [[nodiscard]] const iq::AuditRecord& parameters() const override { return parameters_; }
@@ -29,10 +35,17 @@ class LiveMotor final : public MotorLink {
   std::size_t take(std::span<results::MotorReading> out) override;
   [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
   [[nodiscard]] std::string failure() const override;
-  [[nodiscard]] std::string identity() const override { return motor_.identity().summary(); }
+  [[nodiscard]] std::string identity() const override { return identity_; }
 
  private:
-  iq::Motor motor_;
+  [[nodiscard]] std::shared_ptr<iq::Motor> motor() const noexcept { return std::atomic_load(&motor_); }
+  [[nodiscard]] std::shared_ptr<iq::Motor> connected() const;
+  [[nodiscard]] std::shared_ptr<iq::Motor> connect() const;
+
+  const profiles::MotorPlace place_;
+  const Clock& clock_;
+  std::shared_ptr<iq::Motor> motor_;  ///< null while it rests; looked at by any thread
+  std::string identity_;
   iq::AuditRecord parameters_;
   std::vector<iq::Reading> readings_;
   std::optional<iq::StopReport> stop_report_;
@@ -66,33 +79,33 @@ class LiveLoadCell final : public LoadCellLink {
   std::string slots_json_;
 };
 
-struct PoweredSupply {
-  PoweredSupply(const profiles::SupplyPlace& place, const Clock& clock) : link(place, clock), powered(link) {}
-  LiveSupply link;
-  Powered powered;
-};
-
 class LiveBench final : public Bench {
  public:
-  /// Finds all devices, and switches the supply on; throws DeviceError.
-  explicit LiveBench(const profiles::Bench& place);
+  /// Finds all devices, and switches the supply on once the others have answered and `stop_asked` denies; throws
+  /// DeviceError, Interrupted.
+  LiveBench(const profiles::Bench& place, const std::function<bool()>& stop_asked);
   [[nodiscard]] const Clock& clock() const override { return clock_; }
   [[nodiscard]] MotorLink& motor() override { return motor_; }
   [[nodiscard]] LoadCellLink& load_cell() override { return load_cell_; }
-  [[nodiscard]] SupplyLink* supply() override { return supply_ ? &supply_->link : nullptr; }
+  [[nodiscard]] SupplyLink* supply() override { return supply_.get(); }
   [[nodiscard]] std::optional<ambient::Density> air() const override { return air_.density(); }
   void wait_until(Instant when) override;
   [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override;
   [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
   [[nodiscard]] Duration sync_interval() const override;
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
+  [[nodiscard]] bool unpower() override;
+  void repower() override;
 
  private:
+  [[nodiscard]] std::unique_ptr<Powered> power(const std::function<bool()>& stop_asked);
+
   profiles::Bench place_;
   SteadyClock clock_;
   AirSource air_;
-  std::unique_ptr<PoweredSupply> supply_;  ///< before the motor, which needs it to answer; goes after it
   LiveLoadCell load_cell_;
+  std::unique_ptr<LiveSupply> supply_;
+  std::unique_ptr<Powered> powered_;  ///< before the motor, which needs it to answer; goes after it
   LiveMotor motor_;
 };
 

@@ -1,13 +1,18 @@
 #include "daq/operator.hpp"
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <charconv>
 
+#include "profiles/configuration_error.hpp"
+
 namespace kphi::daq {
 namespace {
+
+constexpr int kWatchMs = 20;
 
 bool is_angle(const std::string& text, double expected_deg) {
   double value = 0;
@@ -21,9 +26,13 @@ bool is_angle(const std::string& text, double expected_deg) {
 std::optional<std::string> TerminalOperator::read_line() {
   std::string line;
   for (;;) {
+    pollfd waiting{input_, POLLIN, 0};
+    const int ready = ::poll(&waiting, 1, kWatchMs);
+    if (stop_asked_()) throw Interrupted("stopped at the prompt");
+    watch();
+    if (ready <= 0) continue;
     char c = 0;
     const ssize_t n = read(input_, &c, 1);
-    if (stop_asked_()) throw Interrupted("stopped at the prompt");
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) return std::nullopt;
     if (c == '\n') return line;
@@ -41,17 +50,35 @@ std::string TerminalOperator::answer_to(const std::string& about, const std::str
   return answer.value_or("q");
 }
 
-void TerminalOperator::mount(const profiles::Propeller& propeller, double occlusion_deg) {
+void AgreeingOperator::clear_safety_stop(const std::string& reason) {
+  if (clears_safety_stops_) return;
+  throw ConfigurationError(fmt::format(
+      "a safety stop ended this campaign: {}; look at the stand, then resume it at a terminal without --yes, "
+      "or with an answers file that says continue_after_safety_stop: true",
+      reason));
+}
+
+void TerminalOperator::clear_safety_stop(const std::string& reason) {
+  std::string about = fmt::format("A safety stop ended this campaign: {}.\nLook at the stand, then", reason);
+  for (;; about.clear()) {
+    const std::string answer = answer_to(about, "type continue and press Enter, or q to stop:");
+    if (answer == "continue") return;
+    if (answer == "q") throw NotMounted("not continued after the safety stop");
+    fmt::print(words_, "You typed \"{}\".\n", answer);
+  }
+}
+
+void TerminalOperator::mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string& condition) {
   const std::string what =
       occlusion_deg == 0 ? std::string("no occlusion") : fmt::format("the {:g}° occlusion", occlusion_deg);
-  std::string about = fmt::format("Mount {} under propeller {} ({}). The motor is locked. Step back, then", what,
-                                  propeller.id, propeller.name);
+  std::string about = fmt::format("{}{}Mount {} under propeller {} ({}). Step back, then", condition,
+                                  condition.empty() ? "" : "\n", what, propeller.id, propeller.name);
   for (;; about.clear()) {
-    const std::string answer =
-        answer_to(about, fmt::format("type the mounted angle ({:g}) and Enter, or q to stop:", occlusion_deg));
+    const std::string answer = answer_to(
+        about, fmt::format("type the mounted angle in degrees ({:g}) and press Enter, or q to stop:", occlusion_deg));
     if (is_angle(answer, occlusion_deg)) return;
     if (answer == "q") throw NotMounted(fmt::format("mounting of {:g}° was not confirmed", occlusion_deg));
-    fmt::print(words_, "\"{}\" is not {:g}.\n", answer, occlusion_deg);
+    fmt::print(words_, "You typed \"{}\"; this run needs {:g} degrees.\n", answer, occlusion_deg);
   }
 }
 

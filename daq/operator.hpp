@@ -35,10 +35,15 @@ class Operator {
 
   virtual ~Operator() = default;
   /// Asks for one mounting and returns once it is confirmed: the only way to what unlocks the motor. Throws NotMounted.
-  [[nodiscard]] Mounted confirm_mounting(const profiles::Propeller& propeller, double occlusion_deg) {
-    mount(propeller, occlusion_deg);
+  /// `condition`: one sentence on what motor and supply do, "The supply's output is off."
+  [[nodiscard]] Mounted confirm_mounting(const profiles::Propeller& propeller, double occlusion_deg,
+                                         const std::string& condition = {}) {
+    mount(propeller, occlusion_deg, condition);
     return Mounted(occlusion_deg);
   }
+  /// Shows what stopped the campaign and asks whether somebody has looked at the stand since. Returns when it may
+  /// continue; throws ConfigurationError, or NotMounted when the person says no.
+  virtual void clear_safety_stop(const std::string& reason) = 0;
   /// Asks whether to run it again; no, when nobody is there. Throws Interrupted when the person wants to stop.
   [[nodiscard]] virtual bool run_again(const AnotherRun&) { return false; }
   /// Nothing more will be asked. Throws ConfigurationError when more was answered than asked.
@@ -46,9 +51,14 @@ class Operator {
   /// How it answers, for the record: "terminal", "--yes", "answers.yaml".
   [[nodiscard]] virtual std::string name() const { return "program"; }
   void dictate_to(Scribe scribe) { scribe_ = std::move(scribe); }
+  /// Called again and again while a person is waited for; what it throws ends the question.
+  void let_watch(std::function<void()> watch) { watch_ = std::move(watch); }
 
  protected:
-  virtual void mount(const profiles::Propeller& propeller, double occlusion_deg) = 0;
+  virtual void mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string& condition) = 0;
+  void watch() const {
+    if (watch_) watch_();
+  }
   void asked(const std::string& words) { write_down("operator_asked", words); }
   void answered(const std::string& words) { write_down("operator_answered", words); }
 
@@ -57,17 +67,24 @@ class Operator {
     if (scribe_) scribe_(event, words);
   }
   Scribe scribe_;
+  std::function<void()> watch_;
 };
 
 /// Takes every mounting as done (`--yes`): a simulated bench, or a robot's. Runs an occlusion again once at most: what
 /// still disagrees then is for a person to look at.
 class AgreeingOperator final : public Operator {
  public:
+  /// `clears_safety_stops`: of a simulated bench, at which nobody can be hurt.
+  explicit AgreeingOperator(bool clears_safety_stops = false) : clears_safety_stops_(clears_safety_stops) {}
+  void clear_safety_stop(const std::string& reason) override;
   [[nodiscard]] bool run_again(const AnotherRun& question) override { return question.extra == 1; }
   [[nodiscard]] std::string name() const override { return "--yes"; }
 
  protected:
-  void mount(const profiles::Propeller&, double) override {}
+  void mount(const profiles::Propeller&, double, const std::string&) override {}
+
+ private:
+  const bool clears_safety_stops_;
 };
 
 /// Asks on a terminal; the person types the angle that was mounted. Waits without limit; a wrong angle is asked again,
@@ -78,10 +95,11 @@ class TerminalOperator final : public Operator {
   TerminalOperator(int input_descriptor, std::FILE* words, std::function<bool()> stop_asked)
       : input_(input_descriptor), words_(words), stop_asked_(std::move(stop_asked)) {}
   [[nodiscard]] bool run_again(const AnotherRun& question) override;
+  void clear_safety_stop(const std::string& reason) override;
   [[nodiscard]] std::string name() const override { return "terminal"; }
 
  protected:
-  void mount(const profiles::Propeller& propeller, double occlusion_deg) override;
+  void mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string& condition) override;
 
  private:
   /// `about` is what the question is about, printed before; a question that is asked again has none.

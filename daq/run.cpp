@@ -79,16 +79,6 @@ void judge_changes(const netbox::Configuration& before, const LoadCellLink& cell
   refuse_unsuitable(cell, order.campaign, order.place);
 }
 
-std::string what(const std::exception_ptr& cause) {
-  try {
-    std::rethrow_exception(cause);
-  } catch (const std::exception& e) {
-    return e.what();
-  } catch (...) {
-    return "unknown";
-  }
-}
-
 bool is_interrupted(const std::exception_ptr& cause) {
   try {
     std::rethrow_exception(cause);
@@ -99,26 +89,38 @@ bool is_interrupted(const std::exception_ptr& cause) {
   }
 }
 
-/// What went wrong, with what is known besides. Keeps the type of the exception, but for a DeviceError.
-[[noreturn]] void rethrow_with(const std::exception_ptr& cause, const std::string& more) {
+/// The same cause with all that is known of it. Keeps the type of the exception, but for a DeviceError.
+[[noreturn]] void rethrow_with(const std::exception_ptr& cause, const StopWords& words) {
   try {
     std::rethrow_exception(cause);
-  } catch (const Interrupted& e) {
-    throw Interrupted(e.what() + more);
-  } catch (const SafetyStop& e) {
-    throw SafetyStop(e.what() + more);
-  } catch (const results::RecordError& e) {
-    throw results::RecordError(e.what() + more);
-  } catch (const DeviceError& e) {
-    throw SafetyStop(e.what() + more);  // the device was there; what it refuses in the middle of a run stops the run
+  } catch (const Interrupted&) {
+    throw Interrupted(words);
+  } catch (const SafetyStop&) {
+    throw SafetyStop(words);
+  } catch (const results::RecordError&) {
+    throw results::RecordError(words.line() + "; recorded so far: " + words.data);
+  } catch (const DeviceError&) {
+    throw SafetyStop(words);  // the device was there; what it refuses in the middle of a run stops the run
   }
 }
 
 /// How a run went, as far as its sequence goes.
 struct Ended {
   std::exception_ptr cause;  ///< none: it is complete
-  std::string explanation, aftermath;
+  StopWords words;
 };
+
+/// The guard's trip comes before whatever the runner met because of it.
+void find_cause(Guard& guard, Ended& ended) {
+  guard.notice_sleep();
+  ended.words = words_of(ended.cause);
+  const Trip* trip = guard.latch().trip();
+  if (trip == nullptr || ended.words.cause == trip->reason) return;
+  const SafetyStop stop(*trip);
+  const std::string met = std::exchange(ended.words, stop.words()).cause;
+  if (!is_interrupted(ended.cause)) ended.words.also(met);
+  ended.cause = std::make_exception_ptr(stop);
+}
 
 /// Whatever happens, the motor coasts when this returns; the supply is off then, unless the run is complete.
 Ended carry_out(Sequence& sequence, Bench& bench, Guard& guard, Recorder& recorder) {
@@ -129,10 +131,11 @@ Ended carry_out(Sequence& sequence, Bench& bench, Guard& guard, Recorder& record
     sequence.run();
   } catch (...) {
     ended.cause = std::current_exception();  // the motor coasts since the Spin has gone
+    find_cause(guard, ended);
     guard.stand_down();
     if (bench.supply() != nullptr) bench.supply()->cut();
-    ended.explanation = sequence.explanation();
-    ended.aftermath = sequence.aftermath();
+    ended.words.also(sequence.explanation());
+    sequence.add_aftermath(ended.words);
   }
   return ended;
 }
@@ -154,9 +157,11 @@ void take_last_look(Sequence& sequence, Guard& guard, Recorder& recorder, Ended&
       sequence.compare_configuration(kReadings);
     } catch (...) {
       ended.cause = std::current_exception();
+      ended.words = words_of(ended.cause);
+      sequence.add_aftermath(ended.words);
     }
   }
-  if (ended.cause && ended.explanation.empty() && !is_interrupted(ended.cause)) {
+  if (ended.cause && ended.words.consequences.empty() && !is_interrupted(ended.cause)) {
     try {
       sequence.compare_configuration(1);  // units that changed can look like a limit that was passed
     } catch (const results::RecordError&) {
@@ -192,14 +197,14 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   if (!ended.cause) return {order.file, writer.finish(ending), account, sequence.stop()};
 
   ending.outcome = results::Outcome::aborted;
-  ending.outcome_reason = what(ended.cause) + ended.explanation + ended.aftermath;
+  ending.outcome_reason = ended.words.line();
   try {
     (void)writer.finish(ending);
   } catch (const results::RecordError&) {
     // The first cause matters more; the .part file stays as it was secured last.
   }
-  rethrow_with(ended.cause,
-               fmt::format("{}{}; recorded so far: {}", ended.explanation, ended.aftermath, writer.path().string()));
+  ended.words.data = writer.path().string();
+  rethrow_with(ended.cause, ended.words);
 }
 
 }  // namespace kphi::daq

@@ -25,6 +25,8 @@ class RunsApart final : public Bench {
   [[nodiscard]] LoadCellLink& load_cell() override { return bench_->load_cell(); }
   [[nodiscard]] SupplyLink* supply() override { return bench_->supply(); }
   [[nodiscard]] std::optional<ambient::Density> air() const override { return bench_->air(); }
+  [[nodiscard]] bool unpower() override { return bench_->unpower(); }
+  void repower() override { bench_->repower(); }
   void wait_until(Instant when) override { bench_->wait_until(when); }
   [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override {
     return bench_->keep_calling(std::move(work));

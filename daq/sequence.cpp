@@ -8,6 +8,7 @@
 #include "daq/box_configuration.hpp"
 #include "daq/device_records.hpp"
 #include "daq/interrupt.hpp"
+#include "daq/rest_guard.hpp"
 #include "daq/slew.hpp"
 #include "daq/speed_cap.hpp"
 #include "daq/supply_interlock.hpp"
@@ -19,9 +20,7 @@ namespace {
 using results::Phase;
 
 constexpr Duration kTickWall = std::chrono::milliseconds(10);
-constexpr double kStandstillRadPerSec = 5.0;
-constexpr double kAnySpeed = 1e4;  // rad/s
-constexpr double kSpinDownLimitSeconds = 30.0;
+constexpr double kEndRamp = 1000;  // rad/s², on a supply that sinks what it feeds back
 constexpr Duration kBiasWorksWall = std::chrono::milliseconds(100);  // what was on its way still has the old zero
 constexpr Duration kExplanationWall = std::chrono::seconds(3);       // the box is asked over HTTP for 2 s
 constexpr Duration kAftermath = std::chrono::seconds(3);
@@ -62,40 +61,48 @@ void Sequence::run() {
   mark(Phase::end, -1, RadPerSec(0));
 }
 
-std::string Sequence::aftermath() {
-  if (bench_.supply() != nullptr) return power_off();
-  if (!has_spun_ || stop_) return {};
+void Sequence::add_aftermath(StopWords& words) {
+  if (bench_.supply() != nullptr) switch_off(words);
+  // Without power nothing turns, and the module can tell nothing more.
+  if (bench_.supply() == nullptr || !power_is_off_) watch_the_coast(words);
+}
+
+void Sequence::watch_the_coast(StopWords& words) {
+  const auto tell = [&](const std::string& what) { add_words(words.state, "motor: " + what); };
+  if (!has_spun_) return tell("was not turning");
+  if (stop_) return tell(stop_->summary());
   iq::StopSettings settings;
   settings.limit = kAftermath;
   bench_.motor().begin_stop(settings);
   const Instant give_up = bench_.clock().now() + 4 * kAftermath;
-  std::string cause;
-  while (bench_.clock().now() < give_up) {
+  while (!stop_ && bench_.clock().now() < give_up) {
     for (const results::StreamEvent& event : recorder_.take_events()) {
-      if (cause.empty() && is_of_motor(event.kind) && ends_a_run(event.kind)) cause = "; " + event.text;
+      if (is_of_motor(event.kind) && ends_a_run(event.kind)) words.also(event.text);
     }
-    if ((stop_ = bench_.motor().stop_report())) return cause + "; " + stop_->summary();
-    bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
+    stop_ = bench_.motor().stop_report();
+    if (!stop_) bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
   }
-  return cause + "; nobody knows whether the motor coasts";
+  tell((stop_ ? *stop_ : iq::StopReport{}).summary());
 }
 
-std::string Sequence::power_off() {
+void Sequence::switch_off(StopWords& words) {
   const Instant since = bench_.clock().now();
-  const Trip* trip = guard_.latch().trip();
-  const std::string told = trip != nullptr ? trip->reason : "";
   const std::string why = bench_.supply()->switch_off();
-  if (!why.empty()) return told.ends_with(why) ? "" : "; " + why;
+  power_is_off_ = why.empty();
+  if (!power_is_off_) return add_words(words.state, why);
   const Instant give_up = bench_.clock().now() + bench_.clock().stretched(kLastLookWall);
   while (recorder_.supply().time_ns < since.count() && bench_.clock().now() < give_up)
     bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
+  words.state = has_spun_ ? "motor: ordered to coast, without power now; supply: output off"
+                          : "motor: was not turning; supply: output off";
   const results::SupplyReading seen = recorder_.supply();
-  if (seen.protection == results::SupplyProtection::none || told.starts_with("supply:"))
-    return "; the supply's output is off";
+  if (seen.protection == results::SupplyProtection::none) return;
+  const std::string tripped = tripped_words(seen);
+  if (words.cause.find(tripped) != std::string::npos) return;
   const std::int64_t at = bench_.clock().now().count();
   supply_event_ = {results::EventKind::supply_stop, at, 0,
-                   fmt::format("{:.3f} s: {}", 1e-9 * static_cast<double>(at), tripped_words(seen))};
-  return "; " + tripped_words(seen);
+                   fmt::format("{:.3f} s: {}", 1e-9 * static_cast<double>(at), tripped)};
+  words.also(tripped);
 }
 
 void Sequence::compare_configuration(int attempts) {
@@ -111,10 +118,10 @@ std::string Sequence::explanation() {
   const Instant since = bench_.clock().now();
   const auto stretched = [&](Duration wall) { return bench_.clock().stretched(wall); };
   if (recorder_.observe(since).load_cell_age < stretched(spin_patience(order_.place)) / 2) return {};
-  if (!standstill_.empty()) return "; " + standstill_;
+  if (!standstill_.empty()) return standstill_;
   while (bench_.clock().now() < since + stretched(kExplanationWall) && !stop_asked_()) {
     for (const results::StreamEvent& event : recorder_.take_events()) {
-      if (explains_silence(event.kind)) return "; " + event.text;
+      if (explains_silence(event.kind)) return event.text;
     }
     bench_.wait_until(bench_.clock().now() + stretched(kTickWall));
   }
@@ -166,7 +173,7 @@ void Sequence::ramp_to(RadPerSec level, Spin& spin) {
 }
 
 void Sequence::spin_through_the_steps() {
-  Spin spin(bench_.motor(), order_.place.iq.spin, guard_.latch());
+  Spin spin(bench_.motor(), order_.place.iq.spin, guard_);
   has_spun_ = true;
   for (const profiles::PlannedStep& step : order_.planned.steps) {
     if (out_of_reach_ && step.speed >= *out_of_reach_) continue;
@@ -179,11 +186,10 @@ void Sequence::spin_through_the_steps() {
   mark(Phase::spin_down, -1, RadPerSec(0));
   change_speed();
   iq::StopSettings stop;
-  // What a ramp feeds back raises the voltage of a bench supply, which cannot sink it, until its protection trips.
-  if (bench_.supply() != nullptr) stop.coast_below = kAnySpeed;
+  if (order_.place.supply_sinks_current) stop.deceleration = kEndRamp;
   spin.begin_stop(stop);
   while (!(stop_ = spin.stopped())) hold(bench_.clock().stretched(kTickWall), &spin);
-  if (!stop_->safe()) throw SafetyStop(stop_->summary());
+  if (!stop_->safe()) throw SafetyStop("motor: " + stop_->summary());
 }
 
 void Sequence::hold_step(const profiles::PlannedStep& step, Spin& spin) {
@@ -245,10 +251,11 @@ void Sequence::wait_for_standstill() {
   const Instant give_up = bench_.clock().now() + from_seconds(kSpinDownLimitSeconds);
   // First a reading that is younger than the coast.
   hold(bench_.clock().stretched(20 * kTickWall), nullptr);
-  while (recorder_.observe(bench_.clock().now()).speed.value() > kStandstillRadPerSec) {
+  while (recorder_.observe(bench_.clock().now()).speed.value() > kStandstill.value()) {
     if (bench_.clock().now() > give_up) {
       throw SafetyStop(fmt::format("the motor coasts but still turns at {:.0f} RPM after {:.0f} s",
-                                   to_rpm(recorder_.observe(bench_.clock().now()).speed), kSpinDownLimitSeconds));
+                                   to_rpm(recorder_.observe(bench_.clock().now()).speed), kSpinDownLimitSeconds),
+                       "keep away; wait until it is at rest, or cut its power");
     }
     hold(bench_.clock().stretched(kTickWall), nullptr);
   }
@@ -265,8 +272,8 @@ void Sequence::hold(Duration duration, Spin* spin) {
 void Sequence::tick(Spin* spin) {
   if (stop_asked_()) throw Interrupted("stopped by request");
   recorder_.check_failure();
-  tell_events();
   guard_.check(spin != nullptr);
+  tell_events();
   const Instant now = bench_.clock().now();
   seen_ = recorder_.observe(now);
   if (spin) spin->renew();

@@ -22,18 +22,18 @@ class Sequence {
   [[nodiscard]] const std::optional<iq::StopReport>& stop() const { return stop_; }
   /// That the supply had switched itself off, when another cause was seen first.
   [[nodiscard]] const std::optional<results::StreamEvent>& supply_event() const { return supply_event_; }
-  /// After the motor was let go: what became of it, and what its module says of the cause; empty when it never turned,
-  /// or that is told already.
-  std::string aftermath();
+  /// After the motor was let go: adds to `words` what became of motor and supply, and what else the module tells.
+  void add_aftermath(StopWords& words);
   /// After the stream has ended, and nobody drains any more.
   void compare_configuration(int attempts);
   /// After a stop: when the load cell has fallen silent, why, as far as the box tells; else empty.
   std::string explanation();
 
  private:
-  /// Without power nothing turns, and the module can tell nothing more. A supply that has tripped says so even when the
-  /// module, which starved, was heard first.
-  std::string power_off();
+  /// A supply that has tripped says so even when the module, which starved, was heard first.
+  void switch_off(StopWords& words);
+  /// Waits for the coast to be confirmed, and for standstill.
+  void watch_the_coast(StopWords& words);
   void take_box_bias();
   void set_box_bias();
   netbox::ZeroMeasurement measure(results::Phase phase);
@@ -66,6 +66,7 @@ class Sequence {
   std::string standstill_;  ///< of the box's measurement, as told; empty while it measures
   results::BoxBias box_bias_;
   bool has_spun_ = false;
+  bool power_is_off_ = false;              ///< confirmed by the supply
   std::optional<RadPerSec> out_of_reach_;  ///< the lowest level for which the drive was not enough
   std::optional<iq::StopReport> stop_;
   std::optional<results::StreamEvent> supply_event_;

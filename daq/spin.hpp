@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "daq/bench.hpp"
-#include "daq/interlock.hpp"
+#include "daq/guard.hpp"
 
 namespace kphi::daq {
 
@@ -13,25 +13,24 @@ namespace kphi::daq {
 class Spin {
  public:
   /// `direction` +1 counter-clockwise, -1 clockwise.
-  Spin(MotorLink& motor, int direction, const Latch& latch) noexcept
-      : motor_(motor), direction_(direction), latch_(latch) {}
+  Spin(MotorLink& motor, int direction, Guard& guard) noexcept : motor_(motor), direction_(direction), guard_(guard) {}
   ~Spin() {
     if (!let_go_) motor_.emergency_stop();
   }
   Spin(const Spin&) = delete;
   Spin& operator=(const Spin&) = delete;
 
-  /// Unsigned speed. Throws SafetyStop after a trip. One that comes while this speaks is seen afterwards: either its
-  /// own order to coast is the last word, or that of the destructor.
+  /// Unsigned speed. Throws SafetyStop when the guard does not allow it now. A trip that comes while this speaks is
+  /// seen afterwards: either its own order to coast is the last word, or that of the destructor.
   void at(RadPerSec speed) {
-    latch_.check();
+    guard_.check(true);
     let_go_ = stopping_ = false;
     motor_.spin_at(RadPerSec(direction_ * speed.value()));
-    latch_.check();
+    guard_.latch().check();
   }
   /// Tells the driver's watchdog that someone still watches.
   void renew() noexcept { motor_.renew(); }
-  /// Ramps down and coasts; returns at once.
+  /// Coasts, after a ramp if the settings want one; returns at once.
   void begin_stop(const iq::StopSettings& settings = {}) {
     motor_.begin_stop(settings);
     stopping_ = true;
@@ -46,7 +45,7 @@ class Spin {
  private:
   MotorLink& motor_;
   int direction_;
-  const Latch& latch_;
+  Guard& guard_;
   bool stopping_ = false;
   bool let_go_ = false;  ///< the module has confirmed that it coasts
 };

@@ -30,6 +30,7 @@ Answers parse_answers(const std::string& text, const std::string& path) {
   answers.end_of_mountings = answers.mountings.empty() ? file.mark("/mountings") : answers.mountings.back().mark;
   if (file.has("/run_again"))
     answers.end_of_run_again = answers.run_again.empty() ? file.mark("/run_again") : answers.run_again.back().mark;
+  answers.continue_after_safety_stop = file.get_or("/continue_after_safety_stop", answers.continue_after_safety_stop);
   answers.path = path;
   return answers;
 }

@@ -16,10 +16,11 @@ struct Answer {
 };
 
 struct Answers {
-  std::vector<Answer<double>> mountings;  ///< the angles that were mounted, degrees, in the order asked
-  std::vector<Answer<bool>> run_again;    ///< when another run was asked for, in the order asked
-  Mark end_of_mountings;                  ///< of the list, for what it lacks
-  Mark end_of_run_again;                  ///< likewise; of the file's begin when there is no such list
+  std::vector<Answer<double>> mountings;    ///< the angles that were mounted, degrees, in the order asked
+  std::vector<Answer<bool>> run_again;      ///< when another run was asked for, in the order asked
+  bool continue_after_safety_stop = false;  ///< somebody has looked at the stand since the stop
+  Mark end_of_mountings;                    ///< of the list, for what it lacks
+  Mark end_of_run_again;                    ///< likewise; of the file's begin when there is no such list
   std::string path;
 
   /// "answers.yaml:4:5".

@@ -81,6 +81,7 @@ struct Bench {
   int thrust_axis = 2;                ///< 0..2 = Fx, Fy, Fz
   int thrust_sign = +1;               ///< sign of the axis when the propeller pulls
   std::optional<SupplyPlace> supply;  ///< none: what powers the motor is not ours to switch
+  bool supply_sinks_current = false;  ///< what powers the motor takes current back, so a run may end with a ramp
   AmbientPlace ambient;
   std::optional<Simulation> simulation;
   std::string text;  ///< the file, verbatim

@@ -32,6 +32,8 @@ CampaignState state_of(const JournalReading& journal) {
   CampaignState state;
   for (const JournalEntry& entry : journal.entries) {
     if (entry.event == kCampaignStarted || entry.event == kCampaignResumed) state.identity = entry.data;
+    if (entry.event == kCampaignResumed) state.safety_stop.clear();
+    if (entry.data.value("safety_stop", false)) state.safety_stop = entry.data.value("reason", "unknown cause");
     state.finished = entry.event == kCampaignFinished;
     if (entry.event != kRunAccepted) continue;
     const auto file = entry.data.find("file");

@@ -22,6 +22,7 @@ struct CampaignState {
   nlohmann::json identity;
   std::vector<AcceptedRun> accepted;  ///< in the order of their acceptance
   bool finished = false;              ///< campaign_finished is the last word
+  std::string safety_stop;            ///< what stopped it, if that was a safety stop and nobody has resumed it since
 };
 
 [[nodiscard]] CampaignState state_of(const JournalReading& journal);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 
 namespace kphi::iq {
@@ -12,22 +13,28 @@ namespace {
 constexpr Duration kRampStep = std::chrono::milliseconds(20);
 constexpr double kFalling = 0.95;  ///< of the speed at the coast
 
-std::string seconds_text(const std::optional<Duration>& time) {
-  return time ? fmt::format("{:.2f} s", to_seconds(*time)) : std::string("never");
-}
+std::string rpm(double rad_s) { return fmt::format("{:.0f} RPM", std::abs(rad_s) * 30 / std::numbers::pi); }
 
 }  // namespace
 
 std::string StopReport::summary() const {
-  constexpr const char* outcomes[] = {"stands",
-                                      "is slowing down",
-                                      "still turns although it coasts",
-                                      "coasts unseen",
-                                      "did not confirm that it coasts",
-                                      "was told to move again"};
-  return fmt::format("the motor {}: from {:.0f} to {:.0f} rad/s, coast confirmed after {}, standing after {}",
-                     outcomes[static_cast<int>(outcome)], speed_at_start, speed_at_end, seconds_text(time_to_coast),
-                     seconds_text(time_to_standing));
+  const std::string coast = time_to_coast ? fmt::format("coast confirmed after {:.2f} s", to_seconds(*time_to_coast))
+                                          : std::string("coast NOT CONFIRMED");
+  switch (outcome) {
+    case Outcome::standing:
+      return fmt::format("{}, at rest after {:.1f} s", coast, to_seconds(time_to_standing.value_or(Duration(0))));
+    case Outcome::slowing:
+      return fmt::format("{}, still turning at {}", coast, rpm(speed_at_end));
+    case Outcome::turning:
+      return fmt::format("{}, but STILL TURNING at {}: cut its power", coast, rpm(speed_at_end));
+    case Outcome::unseen:
+      return coast + ", but its speed was not read afterwards: it may still be turning";
+    case Outcome::overruled:
+      return "coast overruled by a new speed";
+    case Outcome::unconfirmed:
+      break;
+  }
+  return coast + ": it MAY BE TURNING, cut its power at the switch; without orders its module stops driving after 0.5 s";
 }
 
 void Stopping::check(const StopSettings& settings) {

@@ -36,7 +36,7 @@ struct StopReport {
 
   /// The module has confirmed that it does not drive the motor.
   [[nodiscard]] bool safe() const noexcept { return outcome != Outcome::unconfirmed && outcome != Outcome::overruled; }
-  /// One line for a person.
+  /// One line: "coast confirmed after 0.01 s, at rest after 2.30 s".
   [[nodiscard]] std::string summary() const;
 };
 

@@ -1,0 +1,111 @@
+#include "daq/rest_guard.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "daq/awake.hpp"
+#include "daq/interrupt.hpp"
+#include "drivers/iq/codes.hpp"
+
+namespace kphi::daq {
+namespace {
+
+constexpr Duration kTickWall = std::chrono::milliseconds(10);
+constexpr Duration kUnseenWall = std::chrono::seconds(3);  // a module that answers is read fifty times per second
+constexpr Duration kStaleWall = std::chrono::milliseconds(200);
+constexpr const char* kKeepAway = "keep away; wait until the rotor is at rest, or cut its power at the switch";
+
+}  // namespace
+
+RestGuard::RestGuard(Bench& bench, bool motor_has_power)
+    : bench_(bench),
+      motor_has_power_(motor_has_power),
+      begun_(bench.clock().now()),
+      speed_at_ns_(begun_.count()),
+      looking_(bench.keep_calling([this] { look(); })) {}
+
+void RestGuard::await_rest(const std::function<bool()>& stop_asked) {
+  if (!motor_has_power_) return;
+  const Clock& clock = bench_.clock();
+  // What was on its way was measured before.
+  const Instant from = clock.now() + clock.stretched(kStaleWall);
+  const Instant unseen = from + clock.stretched(kUnseenWall), give_up = from + from_seconds(kSpinDownLimitSeconds);
+  for (;;) {
+    bench_.wait_until(clock.now() + clock.stretched(kTickWall));
+    check();
+    if (stop_asked()) throw Interrupted("stopped by request");
+    const bool seen = speed_at_ns_ >= from.count();
+    if (seen && speed_rad_s_ < kStandstill.value()) break;
+    if (!seen && clock.now() > unseen)
+      throw SafetyStop("the motor's speed cannot be read: it may be turning", kKeepAway);
+    if (clock.now() > give_up)
+      throw SafetyStop(fmt::format("the motor coasts but still turns at {:.0f} RPM after {:.0f} s",
+                                   to_rpm(RadPerSec(speed_rad_s_)), kSpinDownLimitSeconds),
+                       kKeepAway);
+  }
+  resting_ = true;
+}
+
+void RestGuard::check() const { latch_.check(); }
+
+void RestGuard::look() noexcept {
+  try {
+    if (has_slept(bench_.clock())) trip(slept(bench_.clock()));
+    take_readings();
+    take_supply();
+  } catch (...) {
+    bench_.motor().emergency_stop();
+    trip_state("the guard failed");
+  }
+}
+
+void RestGuard::take_readings() {
+  (void)bench_.motor().take_events();  // of a link that rests, or whose power a person has cut
+  std::array<results::MotorReading, 64> readings;
+  while (const std::size_t n = bench_.motor().take(readings))
+    for (std::size_t i = 0; i < n; ++i) judge(readings[i]);
+}
+
+void RestGuard::judge(const results::MotorReading& reading) {
+  if (Instant(reading.time_ns) < begun_) return;
+  if (reading.channel == results::MotorChannel::speed) {
+    speed_rad_s_ = std::abs(reading.value);
+    speed_at_ns_ = reading.time_ns;
+    // Written so that NaN trips.
+    if (resting_ && !(speed_rad_s_ < kStandstill.value()))
+      trip_state(fmt::format("motor: the rotor turns at {:.0f} RPM while somebody may be near",
+                             to_rpm(RadPerSec(speed_rad_s_))));
+  }
+  if (resting_ && reading.channel == results::MotorChannel::drive_mode &&
+      reading.value != static_cast<double>(iq::DriveMode::coast))
+    trip_state("motor: its module does not coast while somebody may be near");
+}
+
+void RestGuard::take_supply() {
+  if (bench_.supply() == nullptr) return;
+  std::array<results::SupplyReading, 16> readings;
+  while (const std::size_t n = bench_.supply()->take(readings)) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const bool late = Instant(readings[i].time_ns) >= begun_;
+      if (!motor_has_power_ && late && readings[i].output != 0)
+        trip_state("supply: its output is on while somebody may be near");
+    }
+  }
+}
+
+void RestGuard::trip_state(const std::string& reason) noexcept {
+  Trip found;
+  found.reason = reason;
+  trip(std::move(found));
+}
+
+void RestGuard::trip(Trip found) noexcept {
+  found.noticed = bench_.clock().now();
+  if (!latch_.set(std::move(found))) return;
+  bench_.motor().emergency_stop();
+  if (bench_.supply() != nullptr) bench_.supply()->cut();
+}
+
+}  // namespace kphi::daq
