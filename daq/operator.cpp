@@ -50,12 +50,15 @@ std::string TerminalOperator::answer_to(const std::string& about, const std::str
   return answer.value_or("q");
 }
 
-void AgreeingOperator::clear_safety_stop(const std::string& reason) {
-  if (clears_safety_stops_) return;
+void Operator::clear_safety_stop(const std::string& reason) {
   throw ConfigurationError(fmt::format(
       "a safety stop ended this campaign: {}; look at the stand, then resume it at a terminal without --yes, "
       "or with an answers file that says continue_after_safety_stop: true",
       reason));
+}
+
+void AgreeingOperator::clear_safety_stop(const std::string& reason) {
+  if (!clears_safety_stops_) Operator::clear_safety_stop(reason);
 }
 
 void TerminalOperator::clear_safety_stop(const std::string& reason) {

@@ -42,8 +42,8 @@ class Operator {
     return Mounted(occlusion_deg);
   }
   /// Shows what stopped the campaign and asks whether somebody has looked at the stand since. Returns when it may
-  /// continue; throws ConfigurationError, or NotMounted when the person says no.
-  virtual void clear_safety_stop(const std::string& reason) = 0;
+  /// continue; throws NotMounted when the person says no, and ConfigurationError when there is nobody to ask.
+  virtual void clear_safety_stop(const std::string& reason);
   /// Asks whether to run it again; no, when nobody is there. Throws Interrupted when the person wants to stop.
   [[nodiscard]] virtual bool run_again(const AnotherRun&) { return false; }
   /// Nothing more will be asked. Throws ConfigurationError when more was answered than asked.

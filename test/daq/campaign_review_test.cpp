@@ -48,7 +48,9 @@ class ScriptedOperator final : public Operator {
   bool decision = true;
 
  protected:
-  void mount(const profiles::Propeller&, double occlusion_deg) override { mounted_deg.push_back(occlusion_deg); }
+  void mount(const profiles::Propeller&, double occlusion_deg, const std::string&) override {
+    mounted_deg.push_back(occlusion_deg);
+  }
 };
 
 class OrderedCampaign : public testing::Test {

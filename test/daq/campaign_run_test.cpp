@@ -21,7 +21,7 @@ using testing::HasSubstr;
 /// Writes down what was asked; refuses at `refuse_at_deg`.
 class RememberingOperator final : public Operator {
  public:
-  void mount(const profiles::Propeller& propeller, double occlusion_deg) override {
+  void mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string&) override {
     asked.push_back(fmt::format("{} {:g}", propeller.id, occlusion_deg));
     if (occlusion_deg == refuse_at_deg) throw NotMounted("no");
   }

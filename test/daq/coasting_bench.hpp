@@ -73,6 +73,8 @@ class CoastingBench final : public Bench {
   [[nodiscard]] SupplyLink* supply() override { return spoilt_supply.get(); }
   [[nodiscard]] results::FileLayer& files() override { return bench.files(); }
   [[nodiscard]] Duration sync_interval() const override { return bench.sync_interval(); }
+  [[nodiscard]] bool unpower() override { return bench.unpower(); }
+  void repower() override { bench.repower(); }
   void mounted(const std::string& propeller, double occlusion) override { bench.mounted(propeller, occlusion); }
   [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override {
     return bench.keep_calling(std::move(work));

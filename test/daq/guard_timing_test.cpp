@@ -257,7 +257,7 @@ const Case kCases[] = {
      [](CoastingBench& bench, Instant now) { bench.spoilt_supply->silent_from = now; }, true},
     {"ProgramSilent", Watched::pause, "", nullptr,
      [](const auto&, Instant acted) -> Found { return acted - milliseconds(10) + milliseconds(400); },
-     "this program stood still for 0.4", EventKind::guard_trip,
+     "kphi was blocked for 0.4", EventKind::guard_trip,
      [](CoastingBench& bench, Instant now) { bench.wait_until(now + milliseconds(600)); }},
     {"Derates", Watched::state, "  - {at_s: 2.2, for_s: 9, kind: motor_redline, speed_rad_s: 800}\n", nullptr,
      reading_of(MotorChannel::derate, [](double v) { return v < 0.9999; }), "motor: the module derates to"},

@@ -7,10 +7,14 @@
 #include <array>
 #include <cstdlib>
 
+#include "daq/interlock.hpp"
 #include "daq/interrupt.hpp"
+#include "profiles/configuration_error.hpp"
 
 namespace kphi::daq {
 namespace {
+
+using testing::StartsWith;
 
 class Prompt : public testing::Test {
  protected:
@@ -28,7 +32,8 @@ class Prompt : public testing::Test {
     close(pipe_[1]);
   }
   void mount(double occlusion_deg) {
-    const Mounted mounted = person().confirm_mounting({"5x3", "Test 5 inch", 5, 3}, occlusion_deg);
+    const Mounted mounted =
+        person().confirm_mounting({"5x3", "Test 5 inch", 5, 3}, occlusion_deg, "The supply's output is off.");
     EXPECT_EQ(mounted.occlusion_deg(), occlusion_deg);
   }
   bool run_again() { return person().run_again({90, "repetition 2 is 3 % off", 1, 2}); }
@@ -51,11 +56,11 @@ class Prompt : public testing::Test {
   std::vector<std::string> record_;
 };
 
-TEST_F(Prompt, NamesWhatToMountAndThatTheMotorIsLocked) {
+TEST_F(Prompt, NamesWhatToMountAndWhatMotorAndSupplyDo) {
   answer("90\n");
   mount(90);
   EXPECT_NE(said().find("Mount the 90° occlusion under propeller 5x3"), std::string::npos) << said();
-  EXPECT_NE(said().find("motor is locked"), std::string::npos);
+  EXPECT_THAT(said(), StartsWith("\nThe supply's output is off.\nMount"));
 }
 
 TEST_F(Prompt, SaysNoOcclusionForZero) {
@@ -67,8 +72,8 @@ TEST_F(Prompt, SaysNoOcclusionForZero) {
 TEST_F(Prompt, AsksAgainAfterAWrongAngle) {
   answer("45\nninety\n\n90 \n90\n");
   mount(90);
-  EXPECT_NE(said().find("\"45\" is not 90."), std::string::npos);
-  EXPECT_NE(said().find("\"ninety\" is not 90."), std::string::npos);
+  EXPECT_NE(said().find("You typed \"45\"; this run needs 90 degrees."), std::string::npos);
+  EXPECT_NE(said().find("You typed \"ninety\"; this run needs 90 degrees."), std::string::npos);
 }
 
 TEST_F(Prompt, TakesQAsNo) {
@@ -116,10 +121,35 @@ TEST_F(Prompt, DictatesWhatIsAskedAndWhateverIsTyped) {
   mount(90);
   EXPECT_THAT(record_,
               testing::ElementsAre(
-                  "operator_asked: Mount the 90° occlusion under propeller 5x3 (Test 5 inch). The motor "
-                  "is locked. Step back, then type the mounted angle (90) and Enter, or q to stop:",
+                  "operator_asked: The supply's output is off.\nMount the 90° occlusion under propeller 5x3 (Test 5 "
+                  "inch). Step back, then type the mounted angle in degrees (90) and press Enter, or q to stop:",
                   "operator_answered: 45",
                   "operator_asked: type the mounted angle (90) and Enter, or q to stop:", "operator_answered: 90"));
+}
+
+TEST_F(Prompt, EndsAsSoonAsTheGuardThatLivesThroughItTrips) {
+  TerminalOperator asked = person();
+  int looks = 0;
+  asked.let_watch([&] {
+    if (++looks == 3) throw SafetyStop("motor: the rotor turns at 100 RPM while somebody may be near");
+  });
+  EXPECT_THROW((void)asked.confirm_mounting({"5x3", "Test 5 inch", 5, 3}, 90), SafetyStop) << "nobody types";
+}
+
+TEST_F(Prompt, ContinuesAfterASafetyStopOnlyByAPersonsWord) {
+  answer("y\n\ncontinue\n");
+  person().clear_safety_stop("thrust 21 N is above 20 N");
+  EXPECT_THAT(said(), StartsWith("\nA safety stop ended this campaign: thrust 21 N is above 20 N.\n"));
+}
+
+TEST_F(Prompt, LeavesACampaignStoppedWhenThePersonSaysNo) {
+  answer("q\n");
+  EXPECT_THROW(person().clear_safety_stop("thrust"), NotMounted);
+}
+
+TEST(AgreeingOperator, ClearsNoSafetyStopOfALiveBench) {
+  EXPECT_THROW(AgreeingOperator().clear_safety_stop("thrust"), ConfigurationError);
+  AgreeingOperator(true).clear_safety_stop("thrust");
 }
 
 TEST(AgreeingOperator, AgreesToEachMountingAndToOneMoreRun) {

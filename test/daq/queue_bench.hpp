@@ -53,6 +53,8 @@ class QueueBench final : public Bench, private LoadCellLink {
   [[nodiscard]] results::FileLayer& files() override { return *layer; }
   [[nodiscard]] Duration sync_interval() const override { return std::chrono::milliseconds(500); }
   void mounted(const std::string&, double) override {}
+  [[nodiscard]] bool unpower() override { return false; }
+  void repower() override {}
 
   ManualClock time;
   results::FileLayer* layer = &results::disk();

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 class StoppingOperator final : public Operator {
  public:
-  void mount(const profiles::Propeller&, double occlusion_deg) override {
+  void mount(const profiles::Propeller&, double occlusion_deg, const std::string&) override {
     asked.push_back(occlusion_deg);
     if (occlusion_deg == refuse_at_deg) throw NotMounted("no");
   }

@@ -5,6 +5,9 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "test/daq/bench_fixture.hpp"
+#include "test/daq/queue_bench.hpp"
+
 namespace kphi::daq {
 namespace {
 
@@ -34,18 +37,28 @@ class ToldMotor : public MotorLink {
   static std::string fmt(double v) { return "spin " + std::to_string(static_cast<int>(v)); }
 };
 
-const Latch kNoTrip;
+/// A guard over a bench that shows nothing.
+class Spinning : public testing::Test {
+ protected:
+  void trip() {
+    bench_.queue_motor.lost = "too hot";
+    guard_.look();
+  }
+  QueueBench bench_;
+  profiles::Bench place_ = test::deterministic_place(1);
+  Guard guard_{bench_, place_, mini40(), combine_limits(test::short_campaign(), place_)};
+};
 
-TEST(Spin, LetsTheMotorGoWhenItGoes) {
+TEST_F(Spinning, LetsTheMotorGoWhenItGoes) {
   ToldMotor motor;
-  { Spin(motor, +1, kNoTrip).at(RadPerSec(100)); }
+  { Spin(motor, +1, guard_).at(RadPerSec(100)); }
   EXPECT_EQ(motor.told, (std::vector<std::string>{"spin 100", "emergency stop"}));
 }
 
-TEST(Spin, LeavesAMotorAloneThatHasConfirmedItsStop) {
+TEST_F(Spinning, LeavesAMotorAloneThatHasConfirmedItsStop) {
   ToldMotor motor;
   {
-    Spin spin(motor, +1, kNoTrip);
+    Spin spin(motor, +1, guard_);
     spin.at(RadPerSec(100));
     EXPECT_FALSE(spin.stopped()) << "nobody has asked for a stop";
     spin.begin_stop();
@@ -56,11 +69,11 @@ TEST(Spin, LeavesAMotorAloneThatHasConfirmedItsStop) {
   EXPECT_EQ(motor.told, (std::vector<std::string>{"spin 100", "stop"}));
 }
 
-TEST(Spin, DoesNotBelieveAStopThatIsUnderWayUnconfirmedOrOverruled) {
+TEST_F(Spinning, DoesNotBelieveAStopThatIsUnderWayUnconfirmedOrOverruled) {
   for (const bool reported : {false, true}) {
     ToldMotor motor;
     {
-      Spin spin(motor, +1, kNoTrip);
+      Spin spin(motor, +1, guard_);
       spin.begin_stop();
       if (reported) motor.report = iq::StopReport{};
       (void)spin.stopped();
@@ -69,7 +82,7 @@ TEST(Spin, DoesNotBelieveAStopThatIsUnderWayUnconfirmedOrOverruled) {
   }
   ToldMotor motor;
   {
-    Spin spin(motor, +1, kNoTrip);
+    Spin spin(motor, +1, guard_);
     spin.begin_stop();
     motor.report = iq::StopReport{iq::StopReport::Outcome::standing, 100, 0, {}, {}};
     (void)spin.stopped();
@@ -78,16 +91,16 @@ TEST(Spin, DoesNotBelieveAStopThatIsUnderWayUnconfirmedOrOverruled) {
   EXPECT_EQ(motor.told.back(), "emergency stop");
 }
 
-TEST(Spin, CoastsEvenWhenItNeverSpun) {
+TEST_F(Spinning, CoastsEvenWhenItNeverSpun) {
   ToldMotor motor;
-  { const Spin spin(motor, +1, kNoTrip); }
+  { const Spin spin(motor, +1, guard_); }
   EXPECT_EQ(motor.told, (std::vector<std::string>{"emergency stop"}));
 }
 
-TEST(Spin, CoastsWhenAnExceptionPasses) {
+TEST_F(Spinning, CoastsWhenAnExceptionPasses) {
   ToldMotor motor;
   const auto fail = [&] {
-    Spin spin(motor, +1, kNoTrip);
+    Spin spin(motor, +1, guard_);
     spin.at(RadPerSec(2000));
     throw std::runtime_error("anything");
   };
@@ -95,47 +108,74 @@ TEST(Spin, CoastsWhenAnExceptionPasses) {
   EXPECT_EQ(motor.told.back(), "emergency stop");
 }
 
-TEST(Spin, CoastsWhenTheCommandItselfFails) {
+TEST_F(Spinning, CoastsWhenTheCommandItselfFails) {
   ToldMotor motor;
   motor.refuse = true;
-  EXPECT_THROW(Spin(motor, +1, kNoTrip).at(RadPerSec(2000)), std::runtime_error);
+  EXPECT_THROW(Spin(motor, +1, guard_).at(RadPerSec(2000)), std::runtime_error);
   EXPECT_EQ(motor.told.back(), "emergency stop");
 }
 
-TEST(Spin, TurnsTheOtherWayForAClockwisePropeller) {
+TEST_F(Spinning, TurnsTheOtherWayForAClockwisePropeller) {
   ToldMotor motor;
-  { Spin(motor, -1, kNoTrip).at(RadPerSec(100)); }
+  { Spin(motor, -1, guard_).at(RadPerSec(100)); }
   EXPECT_EQ(motor.told.front(), "spin -100");
 }
 
-TEST(Spin, TurnsNoMoreAfterATrip) {
+TEST_F(Spinning, TurnsNoMoreAfterATrip) {
   ToldMotor motor;
-  Latch latch;
-  latch.set({"too hot"});
-  EXPECT_THROW(Spin(motor, +1, latch).at(RadPerSec(100)), SafetyStop);
+  trip();
+  EXPECT_THROW(Spin(motor, +1, guard_).at(RadPerSec(100)), SafetyStop);
   EXPECT_EQ(motor.told, (std::vector<std::string>{"emergency stop"}));
 }
 
-TEST(Spin, CoastsWhenATripComesWhileItSpeaks) {
+TEST_F(Spinning, CoastsWhenATripComesWhileItSpeaks) {
   class TrippingMotor final : public ToldMotor {
    public:
-    explicit TrippingMotor(Latch& latch) : latch_(latch) {}
     void spin_at(RadPerSec speed) override {
-      latch_.set({"too hot"});
+      trip();
       ToldMotor::emergency_stop();  // as the guard does, an instant before the command goes out
       ToldMotor::spin_at(speed);
     }
-
-   private:
-    Latch& latch_;
+    std::function<void()> trip;
   };
-  Latch latch;
-  TrippingMotor motor(latch);
-  EXPECT_THROW(Spin(motor, +1, latch).at(RadPerSec(100)), SafetyStop);
+  TrippingMotor motor;
+  motor.trip = [this] { trip(); };
+  EXPECT_THROW(Spin(motor, +1, guard_).at(RadPerSec(100)), SafetyStop);
   EXPECT_EQ(motor.told, (std::vector<std::string>{"emergency stop", "spin 100", "emergency stop"}));
 }
 
-TEST(Spin, CannotBeCopiedAwayFromItsGuard) {
+TEST_F(Spinning, GivesNoOrderAfterTheComputerSlept) {
+  for (const bool turned_before : {false, true}) {
+    ToldMotor motor;
+    QueueBench bench;
+    Guard guard(bench, place_, mini40(), combine_limits(test::short_campaign(), place_));
+    const auto ramp = [&] {
+      Spin spin(motor, +1, guard);
+      if (turned_before) spin.at(RadPerSec(100));
+      bench.time.suspend(std::chrono::milliseconds(200));
+      spin.at(RadPerSec(110));
+    };
+    EXPECT_THROW(ramp(), SafetyStop);
+    EXPECT_EQ(motor.told.back(), "emergency stop");
+    EXPECT_EQ(std::count(motor.told.begin(), motor.told.end(), "spin 110"), 0);
+    EXPECT_EQ(bench.queue_motor.coasted, 1) << "the guard lets go, too";
+    EXPECT_EQ(guard.latch().trip()->watched, Watched::sleep);
+  }
+}
+
+TEST_F(Spinning, GivesNoOrderWhenTheLastOneIsOlderThanTheModuleWaits) {
+  ToldMotor motor;
+  const auto ramp = [&] {
+    Spin spin(motor, +1, guard_);
+    spin.at(RadPerSec(100));
+    bench_.time.advance(std::chrono::milliseconds(450));
+    spin.at(RadPerSec(110));
+  };
+  EXPECT_THROW(ramp(), SafetyStop);
+  EXPECT_EQ(motor.told, (std::vector<std::string>{"spin 100", "emergency stop"}));
+}
+
+TEST_F(Spinning, CannotBeCopiedAwayFromItsGuard) {
   EXPECT_FALSE(std::is_copy_constructible_v<Spin>);
   EXPECT_FALSE(std::is_move_constructible_v<Spin>);
 }

@@ -93,7 +93,7 @@ TEST_F(HangingRunner, DoesNotKeepTheGuardFromLettingTheMotorGo) {
   hang();
   EXPECT_TRUE(soon([&] { return coasts(); })) << "while the runner hangs";
   release();
-  EXPECT_THAT(run_.get(), HasSubstr("this program stood still for"));
+  EXPECT_THAT(run_.get(), HasSubstr("kphi was blocked for"));
 }
 
 /// What the supply shows is read eight times a second.

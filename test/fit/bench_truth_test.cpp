@@ -23,7 +23,7 @@ constexpr double kClockError = 0.005;
 
 class WillingOperator final : public daq::Operator {
  public:
-  void mount(const profiles::Propeller&, double) override {}
+  void mount(const profiles::Propeller&, double, const std::string&) override {}
 };
 
 /// The deterministic bench, which is looked at every half a millisecond while it runs.

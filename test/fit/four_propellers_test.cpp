@@ -31,7 +31,7 @@ class Silence final : public daq::Progress {
 
 class WillingOperator final : public daq::Operator {
  public:
-  void mount(const profiles::Propeller&, double) override {}
+  void mount(const profiles::Propeller&, double, const std::string&) override {}
 };
 
 void replace(std::string& text, const std::string& from, const std::string& to) {

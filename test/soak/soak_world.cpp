@@ -100,7 +100,7 @@ class World::Person final : public daq::Operator {
     keyboard_.type(world.mixture_.answers);
     if (world.mixture_.life == 1 || !world.mixture_.answers_are_good) keyboard_.leave();
   }
-  void mount(const profiles::Propeller& propeller, double occlusion_deg) override {
+  void mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string&) override {
     world_.at_prompt();
     if (world_.mixture_.life > 1 && world_.mixture_.answers_are_good)
       keyboard_.type(std::to_string(std::lround(occlusion_deg)) + "\n");
