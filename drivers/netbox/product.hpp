@@ -10,4 +10,8 @@ enum class Product : std::uint8_t {
   axia,  ///< Ethernet Axia (9610-05-Ethernet Axia), Schunk FTN-Axia
 };
 
+[[nodiscard]] constexpr const char* name_of(Product product) noexcept {
+  return product == Product::axia ? "Axia" : "Net Box";
+}
+
 }  // namespace kphi::netbox

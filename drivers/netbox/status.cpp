@@ -59,6 +59,14 @@ constexpr Entry kAxia[] = {
     {AxiaStatusBit::temperature, "temperature error"},
 };
 
+constexpr std::uint32_t mask(auto... bits) noexcept { return (0u | ... | (1u << static_cast<unsigned>(bits))); }
+
+constexpr std::uint32_t kNoError = mask(StatusBit::error_summary, StatusBit::monitor_condition);
+constexpr std::uint32_t kSaturation = mask(StatusBit::saturation);
+constexpr std::uint32_t kAxiaSaturation = mask(AxiaStatusBit::out_of_range, AxiaStatusBit::gage_out_of_range);
+constexpr std::uint32_t kCommunication = mask(StatusBit::network, StatusBit::can, StatusBit::rdt,
+                                              StatusBit::ethernet_ip, StatusBit::device_net, StatusBit::http_failure);
+
 std::span<const Entry> table_of(Product product) noexcept {
   return product == Product::axia ? std::span<const Entry>(kAxia) : std::span<const Entry>(kNetBox);
 }
@@ -70,6 +78,15 @@ std::string name_of(int bit, Product product) {
 }
 
 }  // namespace
+
+StatusVerdict verdict_of(std::uint32_t status, Product product) noexcept {
+  if (healthy(status)) return StatusVerdict::sound;
+  const std::uint32_t errors = status & ~kNoError;
+  const std::uint32_t communication = product == Product::axia ? 0 : kCommunication;
+  const std::uint32_t saturation = product == Product::axia ? kAxiaSaturation : kSaturation;
+  if (errors == 0 || (errors & ~(communication | saturation)) != 0) return StatusVerdict::faulty;
+  return saturated(status, product) ? StatusVerdict::saturated : StatusVerdict::communication;
+}
 
 std::vector<std::string> names(std::uint32_t status, Product product) {
   std::vector<std::string> set;

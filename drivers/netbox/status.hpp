@@ -27,6 +27,15 @@ namespace kphi::netbox {
   return has(status, StatusBit::saturation);
 }
 
+/// What a status word says about the sample that carries it.
+enum class StatusVerdict : std::uint8_t {
+  sound,          ///< see healthy()
+  saturated,      ///< the load is beyond what the cell can measure; the box is well
+  communication,  ///< trouble with a network or a field bus only, which no count goes through; Net Box only
+  faulty,         ///< whatever else: the counts may be anything
+};
+[[nodiscard]] StatusVerdict verdict_of(std::uint32_t status, Product product) noexcept;
+
 /// What is set, most significant bit first, without the error summary; a bit the table does not know is "bit N".
 [[nodiscard]] std::vector<std::string> names(std::uint32_t status, Product product = Product::net_box);
 

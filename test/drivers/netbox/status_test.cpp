@@ -84,6 +84,32 @@ TEST(Status, AnAxiasSaturationIsBit30AndItsGagesBit27) {
   EXPECT_FALSE(saturated(0x80010000, Product::axia));
 }
 
+TEST(Status, ANetBoxIsFaultyButForSaturationAndItsNetworks) {
+  const auto of = [](std::uint32_t status) { return verdict_of(status, Product::net_box); };
+  for (const std::uint32_t sound : {0u, 0x80010000u}) EXPECT_EQ(of(sound), StatusVerdict::sound);
+  for (const std::uint32_t saturated : {0x80020000u, 0x80030000u, 0x80120000u})
+    EXPECT_EQ(of(saturated), StatusVerdict::saturated) << saturated;
+  for (unsigned bit = 0; bit < 31; ++bit) {
+    if (bit == 16 || bit == 17) continue;
+    const bool network = (bit >= 18 && bit <= 22) || bit == 1;
+    EXPECT_EQ(of(0x80000000u | 1u << bit), network ? StatusVerdict::communication : StatusVerdict::faulty) << bit;
+    EXPECT_EQ(of(0x80030000u | 1u << bit), network ? StatusVerdict::saturated : StatusVerdict::faulty) << bit;
+  }
+  EXPECT_EQ(of(0x80000000), StatusVerdict::faulty) << "an error that has no name";
+  EXPECT_EQ(of(0x00010000), StatusVerdict::faulty) << "a latch without the summary is no word of a Net Box";
+}
+
+TEST(Status, AnAxiaIsFaultyButForItsOwnSaturation) {
+  const auto of = [](std::uint32_t status) { return verdict_of(status, Product::axia); };
+  for (const std::uint32_t sound : {0u, 0x80010000u}) EXPECT_EQ(of(sound), StatusVerdict::sound);
+  for (const std::uint32_t saturated : {0xC0000000u, 0x88000000u, 0xC8010000u})
+    EXPECT_EQ(of(saturated), StatusVerdict::saturated) << saturated;
+  for (unsigned bit = 0; bit < 31; ++bit) {
+    if (bit == 16 || bit == 27 || bit == 30) continue;
+    EXPECT_EQ(of(0x80000000u | 1u << bit), StatusVerdict::faulty) << bit;
+  }
+}
+
 TEST(Status, EveryBitOfTheAxiasMapHasItsName) {
   const std::pair<int, const char*> map[] = {{0, "temperature error"},
                                              {1, "supply voltage error"},
