@@ -67,6 +67,7 @@ sim::BenchSettings settings_of(const profiles::Bench& place, sim::BenchSettings 
 
 netbox::StreamSettings stream_settings(const netbox::Configuration& box) {
   netbox::StreamSettings settings;
+  settings.product = box.kind;
   settings.buffered = box.records_per_datagram > 1;
   settings.divisor = box.divisor;
   settings.records_per_datagram = box.records_per_datagram;
