@@ -171,10 +171,12 @@ enum class EventKind : std::uint8_t {
   motor_slow_round_trip,  ///< its readings are blurred in time
   supply_stop,            ///< what the bench supply showed stopped the run
   guard_trip,             ///< a limit was passed or a stream fell silent: the motor was let go
+  box_error,              ///< the box's status says that its samples cannot be trusted; the first time in a run
+  box_error_ended,        ///< its status is sound again; `records` samples were concerned
   motor_host_absent,      ///< this computer slept, or did not run kphi; the motor was let go
   motor_let_go,           ///< the module stopped driving by itself
 };
-inline constexpr std::array<const char*, 30> kEventNames{"restarted",
+inline constexpr std::array<const char*, 32> kEventNames{"restarted",
                                                          "rebooted",
                                                          "stalled",
                                                          "stall_ended",
@@ -202,6 +204,8 @@ inline constexpr std::array<const char*, 30> kEventNames{"restarted",
                                                          "motor_slow_round_trip",
                                                          "supply_stop",
                                                          "guard_trip",
+                                                         "box_error",
+                                                         "box_error_ended",
                                                          "motor_host_absent",
                                                          "motor_let_go"};
 [[nodiscard]] constexpr const char* name_of(EventKind kind) { return kEventNames[static_cast<std::size_t>(kind)]; }
@@ -215,7 +219,7 @@ inline constexpr std::array<const char*, 30> kEventNames{"restarted",
 struct StreamEvent {
   EventKind kind{};
   Nanoseconds time_ns = 0;
-  std::uint64_t records = 0;  ///< missing before it; of a stall: repeated
+  std::uint64_t records = 0;  ///< missing before it; of a stall: repeated; of a box error that ended: concerned
   std::string text;           ///< one line; the file holds kEventTextBytes of it
 };
 inline constexpr std::size_t kEventTextBytes = 240;
