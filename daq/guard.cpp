@@ -52,6 +52,8 @@ Guard::Guard(Bench& bench, const profiles::Bench& place, const results::LoadCell
       supply_(place.supply),
       table_(limits),
       load_(mounting_, scale),
+      status_watch_(bench.load_cell().configuration().kind, bench.load_cell().configuration().records_per_datagram,
+                    scale.sample_rate_hz),
       speed_watch_(place.iq.spin, bench.clock().stretched(host_delay(place)), speed_share(limits)),
       device_rate_hz_(scale.device_rate_hz),
       samples_(samples_relayed(scale), kAtOnce),
@@ -155,11 +157,21 @@ void Guard::take_marks() {
 void Guard::judge(const results::LoadCellRecord& sample) {
   load_cell_stream_.newest = Instant(sample.arrival_ns);
   judge_gap(sample);
+  judge_status(sample);
   load_.add(sample);
   for (std::size_t axis = 0; axis < 6; ++axis) hold(static_cast<Watched>(axis), load_.load(axis), sample.arrival_ns);
   if (!has_zero_ || !load_.full()) return;
   hold(Watched::thrust, std::abs(load_.thrust() - thrust_zero_), sample.arrival_ns);
   hold(Watched::shaft_torque, std::abs(load_.shaft_torque() - torque_zero_), sample.arrival_ns);
+}
+
+/// A faulty box stops the run also at rest, since the zeros are taken from these samples; saturation and trouble with
+/// a network may pass until the motor turns.
+void Guard::judge_status(const results::LoadCellRecord& sample) {
+  const StatusWatch::State state = status_watch_.take(sample);
+  if (auto event = status_watch_.take_event()) pending_events_.push_back(std::move(*event));
+  const bool untrusted = state == StatusWatch::State::untrusted || (state == StatusWatch::State::lasting && spinning_);
+  if (untrusted && latch_.trip() == nullptr) trip_state(status_watch_.reason(), Instant(sample.arrival_ns));
 }
 
 void Guard::judge(const results::MotorReading& reading) {

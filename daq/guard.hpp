@@ -2,7 +2,8 @@
 //
 // Every sample and reading passes through it before it is recorded: neither a runner that hangs nor a disk that does
 // not answer keeps it from seeing one. What it judges:
-//   load cell   every sample against the ranges, 5 ms means of thrust and shaft torque (load_watch.hpp tells why)
+//   load cell   every sample against the ranges, 5 ms means of thrust and shaft torque (load_watch.hpp tells why);
+//               what the box says of its samples (status_watch.hpp), also at rest: zeros are taken then
 //   motor       every reading by itself: a checksum protects it, and the module has filtered it
 //   supply      every reading: its state, its settings, its meters
 //   silence     the age of the newest of each stream; twice, so that what waits in this host's sockets is taken first
@@ -24,6 +25,7 @@
 #include "daq/load_watch.hpp"
 #include "daq/relay.hpp"
 #include "daq/speed_error.hpp"
+#include "daq/status_watch.hpp"
 #include "daq/streams.hpp"
 #include "drivers/netbox/bias.hpp"
 
@@ -84,6 +86,7 @@ class Guard final : public Streams {
   void judge(const results::MotorReading& reading);
   void judge(const results::SupplyReading& reading);
   void judge_silence(Stream& stream, Instant now, bool spinning);
+  void judge_status(const results::LoadCellRecord& sample);
   void judge_links();
   void judge_pause(Instant now);
   void judge_gap(const results::LoadCellRecord& sample);
@@ -95,6 +98,7 @@ class Guard final : public Streams {
   const std::vector<GuardLimit> table_;
   std::array<const GuardLimit*, kWatchedCount> limits_{};
   LoadWatch load_;
+  StatusWatch status_watch_;
   SpeedWatch speed_watch_;
   const double device_rate_hz_;
   std::optional<std::uint32_t> last_sequence_;  ///< of the load cell

@@ -124,6 +124,76 @@ TEST_F(FaultyCampaign, DoubtsTheStepInWhichTheBoxSawItsCommunicationFail) {
   EXPECT_EQ(doubts(0)[2], "");
 }
 
+TEST_F(FaultyCampaign, StopsTheMotorWhenTheBoxReportsAnErrorForGood) {
+  try {
+    (void)run("  - {at_s: 2.0, kind: status, bits: 0x88000000}\n");
+    FAIL() << "the motor turned on samples that the box does not answer for";
+  } catch (const SafetyStop& stop) {
+    EXPECT_THAT(stop.what(), HasSubstr("the Net Box reports \"serial link communication error\" (status 0x88000000)"));
+  }
+  EXPECT_TRUE(motor_is_let_go());
+  const results::RunRecording run = results::read_run(results_->other_runs().at(0));
+  ASSERT_EQ(run.events.size(), 2u);
+  EXPECT_EQ(run.events[0].kind, EventKind::box_error);
+  EXPECT_EQ(run.events[1].kind, EventKind::guard_trip);
+  const auto told = std::count_if(said_.lines.begin(), said_.lines.end(), [](const std::string& line) {
+    return line.starts_with("load cell: ") && line.find("the Net Box reports") != std::string::npos;
+  });
+  EXPECT_EQ(told, 1);
+  const auto journal = results::read_journal(results_->journal());
+  const auto aborted = std::find_if(journal.entries.begin(), journal.entries.end(),
+                                    [](const auto& entry) { return entry.event == results::kRunAborted; });
+  ASSERT_NE(aborted, journal.entries.end());
+  EXPECT_THAT(aborted->data.at("reason").get<std::string>(), HasSubstr("its samples cannot be trusted"));
+}
+
+TEST_F(FaultyCampaign, BearsAnErrorOfOneDatagramInDoubtAndTellsIt) {
+  (void)run("  - {at_s: 1.75, for_s: 0.005, kind: status, bits: 0x88000000}\n");
+  EXPECT_THAT(doubts(0)[1], HasSubstr("bad_status"));
+  EXPECT_EQ(doubts(0)[2], "");
+  ASSERT_THAT(events(0), testing::ElementsAre(EventKind::box_error, EventKind::box_error_ended));
+  EXPECT_EQ(recording(0).events[1].records, 35u) << "5 ms at 7 kHz";
+  EXPECT_EQ(std::count_if(said_.lines.begin(), said_.lines.end(),
+                          [](const auto& line) { return line.find("the Net Box reports") != std::string::npos; }),
+            2)
+      << "its beginning and its end";
+  const auto journal = results::read_journal(results_->journal());
+  const auto accepted = std::find_if(journal.entries.begin(), journal.entries.end(),
+                                     [](const auto& entry) { return entry.event == results::kRunAccepted; });
+  ASSERT_NE(accepted, journal.entries.end());
+  EXPECT_EQ(accepted->data.at("events").size(), 2u);
+  expect_replay_agrees();
+}
+
+TEST_F(FaultyCampaign, StopsBeforeTheMotorTurnsOnAZeroOfFaultySamples) {
+  EXPECT_THROW((void)run("  - {at_s: 0.3, for_s: 0.05, kind: status, bits: 0x88000000}\n"), SafetyStop);
+  const results::RunRecording run = results::read_run(results_->other_runs().at(0));
+  EXPECT_EQ(run.phases.size(), 1u);
+  EXPECT_THAT(run.outcome_reason, HasSubstr("its samples cannot be trusted"));
+}
+
+TEST_F(FaultyCampaign, BearsALatchedMonitorConditionWithoutADoubt) {
+  (void)run("  - {at_s: 0, kind: status, bits: 0x80010000}\n");
+  EXPECT_EQ(doubts(0), (std::vector<std::string>{"", "", "", ""}));
+  EXPECT_THAT(events(0), testing::IsEmpty());
+}
+
+TEST_F(FaultyCampaign, NamesTheErrorsOfAnAxiaByItsOwnBits) {
+  try {
+    (void)run("  - {at_s: 2.0, kind: status, bits: 0x80000004}\nhabits: {axia: true}\n");
+    FAIL() << "the motor turned on the samples of a broken gage";
+  } catch (const SafetyStop& stop) {
+    EXPECT_THAT(stop.what(), HasSubstr("the Axia reports \"broken gage\" (status 0x80000004)"));
+  }
+  EXPECT_TRUE(motor_is_let_go());
+}
+
+TEST_F(FaultyCampaign, BearsAShortSaturationOfAnAxiaInDoubt) {
+  (void)run("  - {at_s: 1.5, for_s: 0.2, kind: saturation, axes: 1}\nhabits: {axia: true}\n");
+  EXPECT_NE(doubts(0)[1], "");
+  EXPECT_THAT(events(0), testing::ElementsAre(EventKind::beyond_range));
+}
+
 TEST_F(FaultyCampaign, DoubtsAllStepsOfARunInWhichTheBoxWasGivenOtherUnits) {
   const CampaignResult result = run("  - {at_s: 1.5, kind: units, force_unit: 4}\n");  // kN
   EXPECT_EQ(result.runs, 2);

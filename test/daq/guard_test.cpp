@@ -24,6 +24,7 @@ class GuardAlone : public testing::Test {
   void sample(double fz_n, Instant at) {
     results::LoadCellRecord record;
     record.counts[2] = static_cast<std::int32_t>(1e6 * fz_n);
+    record.status = status_;
     record.arrival_ns = at.count();
     bench_.records.push_back(record);
   }
@@ -46,6 +47,7 @@ class GuardAlone : public testing::Test {
   }
   [[nodiscard]] std::string reason() const { return guard_.latch().trip() ? guard_.latch().trip()->reason : ""; }
 
+  std::uint32_t status_ = 0;  ///< of the next samples
   QueueBench bench_;
   profiles::Campaign campaign_ = test::short_campaign();
   profiles::Bench place_ = test::deterministic_place(1);
@@ -143,6 +145,57 @@ TEST_F(GuardAlone, SeesThatTheRotorDoesNotDoWhatItIsToldUntilTheStepsEnd) {
   EXPECT_THAT(reason(), HasSubstr("the rotor does not do what it is told: 0 RPM"));
   EXPECT_EQ(guard_.latch().trip()->watched, Watched::speed_error);
   EXPECT_EQ(guard_.latch().trip()->step, 1);
+}
+
+TEST_F(GuardAlone, LetsTheMotorGoWhenTheBoxReportsAnErrorForMoreThanADatagram) {
+  status_ = 0x88000000;
+  samples(6, 1);
+  guard_.look();
+  EXPECT_EQ(reason(), "") << "this box sends one sample per datagram";
+  samples(6, 1);
+  guard_.look();
+  EXPECT_EQ(bench_.queue_motor.coasted, 1);
+  EXPECT_THAT(reason(), StartsWith("load cell: the Net Box reports \"serial link communication error\" (status "
+                                   "0x88000000) for 0.3 ms: its samples cannot be trusted; "));
+  ASSERT_TRUE(guard_.event());
+  EXPECT_EQ(guard_.latch().trip()->watched, Watched::state);
+  EXPECT_EQ(guard_.event()->kind, EventKind::guard_trip);
+}
+
+TEST_F(GuardAlone, TellsOnceWhatTheBoxReportedAndWhenThatEnded) {
+  for (int hiccup = 0; hiccup < 3; ++hiccup) {
+    status_ = 0x80000004;
+    samples(6, 1);
+    status_ = 0;
+    samples(6, 50);
+  }
+  guard_.look();
+  EXPECT_EQ(reason(), "");
+  const auto events = guard_.take_events();
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events[0].kind, EventKind::box_error);
+  EXPECT_THAT(events[0].text, HasSubstr("the Net Box reports \"internal temperature error\" (status 0x80000004)"));
+  EXPECT_EQ(events[1].kind, EventKind::box_error_ended);
+}
+
+TEST_F(GuardAlone, BearsASaturatedCellAtRestButTurnsNoMotorOnIt) {
+  status_ = 0x80020000;
+  samples(6, 7000);
+  guard_.look();
+  EXPECT_EQ(reason(), "") << "the zero that is taken of nothing is refused by itself";
+  guard_.check(true);
+  samples(6, 1);
+  guard_.look();
+  EXPECT_THAT(reason(), HasSubstr("\"transducer saturation or A/D error\""));
+}
+
+TEST_F(GuardAlone, BearsALatchedMonitorCondition) {
+  guard_.check(true);
+  status_ = 0x80010000;
+  samples(6, 2000);
+  guard_.look();
+  EXPECT_EQ(reason(), "");
+  EXPECT_TRUE(guard_.take_events().empty());
 }
 
 TEST_F(GuardAlone, LooksTwiceBeforeItBelievesASilence) {

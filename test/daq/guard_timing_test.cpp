@@ -174,6 +174,9 @@ std::function<Found(const results::RunRecording&, Instant)> reading_of(MotorChan
   return [=](const results::RunRecording& run, Instant) { return first_reading(run, channel, beyond); };
 }
 
+/// In truth: the box sets its status with the sample of that time, which waits there until its datagram is full.
+Found box_fails(const results::RunRecording&, Instant) { return milliseconds(2200); }
+
 bool is_stray(double speed) { return speed < 0.85 * 1466 - SpeedWatch::kFloor; }  // the third step: 14,000 RPM
 
 const Case kCases[] = {
@@ -259,6 +262,13 @@ const Case kCases[] = {
      [](const auto&, Instant acted) -> Found { return acted - milliseconds(10) + milliseconds(400); },
      "kphi was blocked for 0.4", EventKind::guard_trip,
      [](CoastingBench& bench, Instant now) { bench.wait_until(now + milliseconds(600)); }},
+    {"BoxError", Watched::state, "  - {at_s: 2.2, kind: status, bits: 0x88000000}\n", nullptr, box_fails,
+     "load cell: the Net Box reports .serial link communication error. .status 0x88000000. for 5.9 ms: its samples "
+     "cannot be trusted; check the cell's cable"},
+    {"BoxErrorLatched", Watched::state, "  - {at_s: 2.2, for_s: 0.02, kind: status, bits: 0x90000000, latched: 1}\n",
+     nullptr, box_fails, "load cell: the Net Box reports .analog board error."},
+    {"AxiaError", Watched::state, "  - {at_s: 2.2, kind: status, bits: 0x80000004}\nhabits: {axia: true}\n", nullptr,
+     box_fails, "load cell: the Axia reports .broken gage. .status 0x80000004. for 5.9 ms"},
     {"Derates", Watched::state, "  - {at_s: 2.2, for_s: 9, kind: motor_redline, speed_rad_s: 800}\n", nullptr,
      reading_of(MotorChannel::derate, [](double v) { return v < 0.9999; }), "motor: the module derates to"},
     {"ModuleFault", Watched::state, "", nullptr, reading_of(MotorChannel::fault_now, [](double v) { return v != 0; }),
@@ -295,6 +305,20 @@ const Case kCases[] = {
      "supply: its current limit is 40 A where 50 A was set", EventKind::supply_stop,
      [](CoastingBench& bench, Instant) { bench.bench.simulation().supply()->circuit().controls().amps = 40; }, true},
 };
+// Patience of half a second: what may pass by itself.
+const Case kLasting[] = {
+    {"Saturated", Watched::state, "  - {at_s: 1.5, kind: saturation, axes: 1}\n", nullptr,
+     [](const auto&, Instant) -> Found { return milliseconds(2000); },
+     "load cell: the Net Box reports .transducer saturation or A/D error. .status 0x80020000. for 500.1 ms"},
+    {"AxiaSaturated", Watched::state, "  - {at_s: 1.5, kind: saturation, axes: 1}\nhabits: {axia: true}\n", nullptr,
+     [](const auto&, Instant) -> Found { return milliseconds(2000); },
+     "load cell: the Axia reports .force or torque out of range. .status 0xC0000000. for 500.1 ms"},
+    {"RdtTrouble", Watched::state, "  - {at_s: 1.5, kind: status, bits: 0x80100000}\n", nullptr,
+     [](const auto&, Instant) -> Found { return milliseconds(2000); },
+     "load cell: the Net Box reports .RDT communication error. .status 0x80100000. for 500.1 ms"},
+};
+INSTANTIATE_TEST_SUITE_P(OfWhatLasts, GuardTiming, testing::ValuesIn(kLasting),
+                         [](const testing::TestParamInfo<Case>& tested) { return std::string(tested.param.name); });
 INSTANTIATE_TEST_SUITE_P(Of, GuardTiming, testing::ValuesIn(kCases),
                          [](const testing::TestParamInfo<Case>& tested) { return std::string(tested.param.name); });
 

@@ -62,9 +62,10 @@ class QueueBench final : public Bench, private LoadCellLink {
   QueueMotor queue_motor;
   std::deque<results::MotorReading>& readings = queue_motor.readings;
   std::vector<results::StreamEvent> events;
+  netbox::Configuration box;
 
  private:
-  [[nodiscard]] const netbox::Configuration& configuration() const override { return configuration_; }
+  [[nodiscard]] const netbox::Configuration& configuration() const override { return box; }
   [[nodiscard]] std::vector<netbox::Finding> findings() const override { return {}; }
   results::LoadCellScale start() override { return {}; }
   void stop() noexcept override {}
@@ -75,8 +76,6 @@ class QueueBench final : public Bench, private LoadCellLink {
   [[nodiscard]] results::SampleAccount account() const override { return {}; }
   [[nodiscard]] results::StreamHealth health() const override { return {}; }
   [[nodiscard]] std::string failure() const override { return {}; }
-
-  netbox::Configuration configuration_;
 };
 
 /// 20 N, 60 N along Fz, 1 N m.
