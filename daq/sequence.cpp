@@ -238,7 +238,10 @@ void Sequence::hold_zero(Phase phase) {
 void Sequence::require_rest() {
   while (!seen_.load_cell_is_fresh) hold(bench_.clock().stretched(kTickWall), nullptr);  // check() ends this
   const auto axis = static_cast<std::size_t>(order_.place.thrust_axis);
-  const double deviation = recorder_.measured().standard_deviation[axis];
+  const netbox::ZeroMeasurement zero = recorder_.measured();
+  if (zero.records < 2)
+    throw DeviceError("Net Box", "take the zero", "no sound sample came", "see what the box reports: kphi devices");
+  const double deviation = zero.standard_deviation[axis];
   if (deviation <= kNoisyZero) return;
   throw DeviceError(
       "Net Box", "take the zero",

@@ -172,6 +172,13 @@ TEST_F(FaultyCampaign, StopsBeforeTheMotorTurnsOnAZeroOfFaultySamples) {
   EXPECT_THAT(run.outcome_reason, HasSubstr("its samples cannot be trusted"));
 }
 
+TEST_F(FaultyCampaign, TakesNoZeroOfNoSoundSample) {
+  EXPECT_THROW((void)run("  - {at_s: 0, for_s: 20, kind: saturation, axes: 1}\n"), SafetyStop);
+  const results::RunRecording run = results::read_run(results_->other_runs().at(0));
+  EXPECT_EQ(run.phases.size(), 1u);
+  EXPECT_THAT(run.outcome_reason, AllOf(HasSubstr("take the zero"), HasSubstr("no sound sample came")));
+}
+
 TEST_F(FaultyCampaign, BearsALatchedMonitorConditionWithoutADoubt) {
   (void)run("  - {at_s: 0, kind: status, bits: 0x80010000}\n");
   EXPECT_EQ(doubts(0), (std::vector<std::string>{"", "", "", ""}));
