@@ -28,16 +28,24 @@ bool silences(sim::MotorFaultKind kind) {
   return kind == K::deaf || kind == K::command_flip || kind == K::unplug || kind == K::ignore_sets || kind == K::baud;
 }
 
+/// A latched monitor condition is no error.
+bool is_harmless(const sim::Fault& fault) { return fault.kind == sim::FaultKind::status && fault.bits == 0x80010000u; }
+
+bool goes_on(const sim::Fault& fault) {
+  if (fault.kind == sim::FaultKind::status) return fault.latched || fault.lasts == Duration{0};
+  return goes_on(fault.kind);
+}
+
 }  // namespace
 
 Reaches::Reaches(const std::string& faults) : cell_(sim::parse_faults(faults, "faults")) {
+  std::erase_if(cell_, is_harmless);
   const auto end_of = [](const auto& fault, bool for_ever) {
     if (for_ever) return kNever;
     return fault.lasts > Duration{0} ? fault.at + fault.lasts + fault.delay + kEcho : fault.at + kEcho;
   };
   for (const auto& f : cell_) {
-    const bool for_ever = goes_on(f.kind);
-    all_.push_back({Device::load_cell, std::string(sim::name_of(f.kind)), f.at, end_of(f, for_ever)});
+    all_.push_back({Device::load_cell, std::string(sim::name_of(f.kind)), f.at, end_of(f, goes_on(f))});
   }
   for (const auto& f : sim::parse_motor_faults(faults, "faults")) {
     all_.push_back(

@@ -26,6 +26,7 @@ class Reaches {
  public:
   /// Of a whole fault script.
   explicit Reaches(const std::string& faults);
+  /// Of the load cell, without what harms nobody.
   [[nodiscard]] const sim::FaultScript& cell() const noexcept { return cell_; }
   [[nodiscard]] bool any(Instant from, Instant to) const noexcept;
   [[nodiscard]] bool any(Device device, Instant from, Instant to) const noexcept;

@@ -6,6 +6,9 @@
 //           open within 50 ms where the module could hear, within 0.6 s where only its own timeout was left; likewise
 //           after a kill. While it drives, a record of the load cell has arrived within the last 0.25 s, or 0.6 s more
 //           where no order could reach the module.
+// Status    A box that reports an error in more samples on end than a datagram holds stops the run, with the motor or
+//           without: the power stage is open within 50 ms of the first sample too many, or as above where no order
+//           could reach the module.
 // Record    The folder verifies; aborted runs are whole and say why; steps.csv is the reduction of the accepted runs.
 //           After a kill or with a refusing disk: all accepted runs are whole, the journal's chain is right, what was
 //           secured can be read (unless the kill fell into a write), and at most one run is finished that the journal

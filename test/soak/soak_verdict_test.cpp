@@ -47,7 +47,7 @@ std::unique_ptr<World> lived(std::unique_ptr<World> world) {
 
 std::unique_ptr<World> lived(const Mixture& mixture) { return lived(std::make_unique<World>(mixture, quick_folder())); }
 
-enum class Base { clean, lossy, stalled, stopped, killed, resumed };
+enum class Base { clean, lossy, stalled, stopped, erring, killed, resumed };
 World& world_of(Base base);
 
 /// In the middle of its second run, whose number of steps of time is that of the clean one.
@@ -68,6 +68,13 @@ Mixture stalled_mixture() {
       fmt::format("at_s: {:.4f}, for_s: 0.1, kind: stall", clean.files[0].steps[1].window_begin_s + 0.06));
 }
 
+/// For good, within a step of the clean one.
+Mixture erring_mixture() {
+  const Evidence clean = evidence_of(world_of(Base::clean));
+  return with_fault(
+      fmt::format("at_s: {:.4f}, kind: status, bits: 0x88000000", clean.files[0].steps[1].window_begin_s));
+}
+
 std::unique_ptr<World> lived_again() {
   const auto former = lived(killed_mixture());
   Mixture mixture = clean_mixture();
@@ -86,6 +93,8 @@ std::unique_ptr<World> lived(Base base) {
       return lived(stalled_mixture());
     case Base::stopped:
       return lived(with_fault("at_s: 9, kind: stolen"));
+    case Base::erring:
+      return lived(erring_mixture());
     case Base::killed:
       return lived(killed_mixture());
     case Base::resumed:
@@ -104,7 +113,8 @@ World& world_of(Base base) {
 }
 
 End end_of(Base base) {
-  return base == Base::stopped ? End::stopped : base == Base::killed ? End::killed : End::finished;
+  if (base == Base::stopped || base == Base::erring) return End::stopped;
+  return base == Base::killed ? End::killed : End::finished;
 }
 
 /// Of a folder of its own, which may be spoilt.
@@ -234,6 +244,32 @@ TEST(SoakVerdict, NamesWhatIsWrongWithTheMotion) {
        },
        "though no record came"},
   });
+}
+
+/// The box has reported it in `records` samples on end, in the middle of the first run.
+void report(Evidence& evidence, std::uint32_t status, std::size_t records) {
+  auto& samples = evidence.files[0].run.load_cell;
+  for (std::size_t i = 0; i < records; ++i) samples.at(samples.size() / 2 + i).status = status;
+}
+
+std::size_t patience_of(const Evidence& e) { return static_cast<std::size_t>(e.place.netbox.records_per_datagram); }
+
+TEST(SoakVerdict, NamesARunThatWentOnThoughTheBoxReportedAnError) {
+  expect_each_named({
+      {"an error is passed over", Base::clean, [](Evidence& e) { report(e, 0x88000000, patience_of(e) + 1); },
+       "is complete, though the box reported an error"},
+      {"the motor is driven on", Base::erring, [](Evidence& e) { e.story.stages.back().at += 100ms; },
+       "after the box reported an error in more samples than a datagram holds"},
+  });
+}
+
+TEST(SoakVerdict, LetsARunGoOnWhoseBoxReportedLess) {
+  const test::TemporaryFolder folder(quick_folder());
+  for (const std::uint32_t status : {0x88000000u, 0x80010000u, 0x80020000u, 0x80100000u}) {
+    Evidence evidence = evidence_in(folder / fmt::format("{:x}", status), Base::clean);
+    report(evidence, status, status == 0x88000000u ? patience_of(evidence) : 200);
+    EXPECT_THAT(judge(evidence).wrong, testing::IsEmpty());
+  }
 }
 
 TEST(SoakVerdict, NamesWhatIsWrongInTheRecord) {
