@@ -133,6 +133,8 @@ const Way kWays[] = {
     {"BoxUnreachable", kScript, nullptr, "kind: address, address: 10.255.255.1, for_s: 1000", 4, "load-cell"},
     {"StreamStolen", kScript, nullptr, "kind: stolen", 4, "another client"},
     {"RangeTrip", kScript, nullptr, "kind: saturation, axes: 4, for_s: 1000", 4, "its range|thrust .* is above"},
+    {"BoxError", kScript, nullptr, "kind: status, bits: 0x88000000", 4,
+     "the Net Box reports .serial link communication error. .status 0x88000000. for .*cannot be trusted"},
     {"CoilHot", kScript, nullptr, "kind: motor_hot, coil_celsius: 100, for_s: 1000", 4, "coil temperature"},
     {"Derate", kScript, nullptr, "kind: motor_redline, speed_rad_s: 500, for_s: 1000", 4, "derate"},
     {"PowerSafety", kScript, nullptr, "kind: motor_over_voltage, volts: 20, for_s: 1000", 4, "power_safety"},
