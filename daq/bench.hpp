@@ -114,6 +114,11 @@ class Bench {
   [[nodiscard]] virtual bool unpower() = 0;
   /// Nobody is near any more: gives it back, and connects to the module again if it was lost. Throws DeviceError.
   virtual void repower() = 0;
+  /// Keeps this computer from sleeping while the handle lives; `why_not` becomes one line when it cannot.
+  [[nodiscard]] virtual std::shared_ptr<void> keep_awake(std::string& why_not) {
+    why_not.clear();
+    return nullptr;
+  }
   /// Tells whoever must know what a person has mounted (a simulated bench). Throws DeviceError.
   virtual void mounted(const std::string& propeller_id, double occlusion_deg) = 0;
 };

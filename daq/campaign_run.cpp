@@ -199,6 +199,7 @@ class CampaignRun {
       cool_down();
       if (place_.ambient.known() && !bench_.air())
         progress_.say("air: its sensor measures no more: the density of this run is unknown");
+      const auto awake = keep_awake();
       const RunOrder order{campaign_, place_, *mounted_, capped, remaining_s, file};
       accept(record_run(bench_, order, progress_, stop_asked_), planned);
     } catch (...) {
@@ -236,6 +237,17 @@ class CampaignRun {
            {{"severity", name_of(finding.severity)}, {"what", finding.what}, {"next_move", finding.next_move}});
     }
     if (!place_.iq.clock_gain) note("clock_unchecked", {{"uid", bench_.motor().parameters().uid()}});
+  }
+
+  /// For as long as the handle lives; that it cannot be done is said once.
+  [[nodiscard]] std::shared_ptr<void> keep_awake() {
+    std::string why_not;
+    auto awake = bench_.keep_awake(why_not);
+    if (!why_not.empty() && !std::exchange(may_sleep_, true)) {
+      progress_.say(why_not);
+      note("may_sleep", {{"reason", why_not}});
+    }
+    return awake;
   }
 
   /// The motor is at rest meanwhile, and watched.
@@ -366,6 +378,7 @@ class CampaignRun {
   std::set<std::string> accepted_;  ///< names of files
   Instant accepted_at_{0};          ///< the last of them
   std::optional<Mounted> mounted_;
+  bool may_sleep_ = false;  ///< nothing keeps this computer awake
   CampaignResult result_;
 };
 

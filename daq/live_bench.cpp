@@ -12,6 +12,7 @@
 #include "daq/awake.hpp"
 #include "daq/interrupt.hpp"
 #include "daq/motor_audit.hpp"
+#include "daq/sleep_inhibitor.hpp"
 #include "daq/slot_pages.hpp"
 #include "drivers/device_error.hpp"
 #include "drivers/netbox/calinfo.hpp"
@@ -269,6 +270,12 @@ void LiveBench::repower() {
   } else if (!motor_.failure().empty()) {
     motor_.wake();
   }
+}
+
+std::shared_ptr<void> LiveBench::keep_awake(std::string& why_not) {
+  auto inhibitor = std::make_shared<SleepInhibitor>();
+  why_not = inhibitor->why_not();
+  return inhibitor;
 }
 
 void LiveBench::wait_until(Instant when) {

@@ -96,6 +96,7 @@ class LiveBench final : public Bench {
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
   [[nodiscard]] bool unpower() override;
   void repower() override;
+  [[nodiscard]] std::shared_ptr<void> keep_awake(std::string& why_not) override;
 
  private:
   [[nodiscard]] std::unique_ptr<Powered> power(const std::function<bool()>& stop_asked);
