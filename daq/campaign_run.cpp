@@ -215,10 +215,7 @@ class CampaignRun {
   void repeat(double occlusion_deg) {
     if (review_.repetitions(occlusion_deg) < campaign_.repetitions || !judged_.insert(occlusion_deg).second) return;
     while (const auto question = review_.another(occlusion_deg)) {
-      const RestGuard guard(bench_, true);
-      person_.let_watch([&] { guard.check(); });
-      const bool yes = person_.run_again(*question);
-      person_.let_watch({});
+      const bool yes = ask_for_another(*question);
       note("another_run", {{"occlusion_deg", occlusion_deg},
                            {"reason", question->reason},
                            {"decided", yes},
@@ -227,6 +224,14 @@ class CampaignRun {
       ++planned_;
       one(profiles::extra_run(campaign_, occlusion_deg, review_.repetitions(occlusion_deg) + 1));
     }
+  }
+
+  bool ask_for_another(const AnotherRun& question) {
+    const RestGuard guard(bench_, true);
+    person_.let_watch([&] { guard.check(); });
+    const bool yes = person_.run_again(question);
+    person_.let_watch({});
+    return yes;
   }
 
   void audit() {
@@ -293,17 +298,17 @@ class CampaignRun {
   /// Nobody is asked to come near before the rotor was seen at rest; without power if the supply is ours. Watched to
   /// the end.
   Mounted let_mount(double occlusion_deg) {
-    RestGuard(bench_, true).await_rest(stop_asked_);
+    std::optional<RestGuard> guard(std::in_place, bench_, true);
+    guard->await_rest(stop_asked_);
     const bool has_power = !bench_.unpower();
-    RestGuard guard(bench_, has_power);
-    guard.await_rest(stop_asked_);
-    person_.let_watch([&] { guard.check(); });
+    if (!has_power) guard.emplace(bench_, false);
+    person_.let_watch([&] { guard->check(); });
     const Mounted confirmed = person_.confirm_mounting(
         campaign_.propeller, occlusion_deg,
         has_power ? "The rotor is at rest and its module coasts, but the motor HAS POWER: cut it at the switch first."
                   : "The rotor is at rest and the supply's output is off.");
     person_.let_watch({});
-    guard.check();
+    guard->check();
     if (stop_asked_()) throw Interrupted("stopped by request");
     return confirmed;
   }

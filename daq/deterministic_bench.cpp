@@ -201,6 +201,14 @@ void DeterministicBench::abandon() noexcept {
   if (supply_) supply_->abandon();
 }
 
+void DeterministicBench::stand_still(Duration lasts, bool suspended) {
+  outlive(clock_.now() + lasts);
+  sim::Datagram lost;
+  while (sim_.wire().next_datagram(lost, clock_.now())) {
+  }
+  if (suspended) clock_.suspend(lasts);
+}
+
 void DeterministicBench::outlive(Instant when) {
   clock_.set(when);
   sim_.advance(when);

@@ -14,7 +14,6 @@ namespace {
 
 constexpr Duration kTickWall = std::chrono::milliseconds(10);
 constexpr Duration kUnseenWall = std::chrono::seconds(3);  // a module that answers is read fifty times per second
-constexpr Duration kStaleWall = std::chrono::milliseconds(200);
 constexpr const char* kKeepAway = "keep away; wait until the rotor is at rest, or cut its power at the switch";
 
 }  // namespace
@@ -23,14 +22,13 @@ RestGuard::RestGuard(Bench& bench, bool motor_has_power)
     : bench_(bench),
       motor_has_power_(motor_has_power),
       begun_(bench.clock().now()),
-      speed_at_ns_(begun_.count()),
+      speed_at_ns_(begun_.count() - 1),
       looking_(bench.keep_calling([this] { look(); })) {}
 
 void RestGuard::await_rest(const std::function<bool()>& stop_asked) {
   if (!motor_has_power_) return;
   const Clock& clock = bench_.clock();
-  // What was on its way was measured before.
-  const Instant from = clock.now() + clock.stretched(kStaleWall);
+  const Instant from = clock.now();
   const Instant unseen = from + clock.stretched(kUnseenWall), give_up = from + from_seconds(kSpinDownLimitSeconds);
   for (;;) {
     bench_.wait_until(clock.now() + clock.stretched(kTickWall));

@@ -114,7 +114,7 @@ TEST_F(ShortCampaign, JournalsHowLongTheMotorTookToStand) {
   const auto stop = results::read_journal(results_.journal()).entries.at(3).data.at("stop");
   EXPECT_EQ(stop.at("confirmed"), true);
   EXPECT_GT(stop.at("time_to_standing_s").get<double>(), stop.at("time_to_coast_s").get<double>());
-  EXPECT_GT(stop.at("time_to_coast_s").get<double>(), 1.0) << "18000 RPM are not thrown away at once";
+  EXPECT_LT(stop.at("time_to_coast_s").get<double>(), 0.1) << "a ramp would feed back";
 }
 
 TEST_F(ShortCampaign, DoesNotSayThatTheClockIsUncheckedWhenItsGainIsKnown) {

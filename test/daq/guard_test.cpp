@@ -244,7 +244,39 @@ TEST_F(GuardAlone, LetsTheMotorGoWhenTheRunnerLooksNoMore) {
   bench_.time.set(milliseconds(410));
   guard_.look();
   EXPECT_EQ(bench_.queue_motor.coasted, 1);
-  EXPECT_EQ(reason(), "this program stood still for 0.41 s while the motor turned");
+  EXPECT_EQ(reason(), "kphi was blocked for 0.41 s while the motor was turning");
+}
+
+TEST_F(GuardAlone, LetsTheMotorGoWhenTheComputerSleptThoughItsClockStoodStillMeanwhile) {
+  guard_.check(true);
+  bench_.time.suspend(milliseconds(200));
+  guard_.look();
+  EXPECT_EQ(bench_.queue_motor.coasted, 1);
+  EXPECT_EQ(reason(), "this computer slept for 0.2 s");
+}
+
+TEST_F(GuardAlone, TellsTheComputerThatDidNotRunFromTheRunnerThatHangs) {
+  guard_.check(true);
+  bench_.time.set(milliseconds(5000));
+  guard_.look();
+  EXPECT_EQ(reason(), "this computer did not run kphi for 5 s");
+}
+
+TEST_F(GuardAlone, LetsTheMotorGoWhenAStretchOfSamplesIsMissing) {
+  const auto sample_number = [&](std::uint32_t number) {
+    sample(6, bench_.time.now());
+    bench_.records.back().ft_sequence = number;
+    guard_.look();
+  };
+  guard_.check(true);
+  sample_number(1000);
+  sample_number(1900);
+  EXPECT_EQ(bench_.queue_motor.coasted, 0) << "0.129 s";
+  sample_number(400);
+  EXPECT_EQ(bench_.queue_motor.coasted, 0) << "the box started again: others tell";
+  sample_number(1500);
+  EXPECT_EQ(bench_.queue_motor.coasted, 1);
+  EXPECT_THAT(reason(), StartsWith("gap in the load cell's samples 0.1571 s is above 0.145 s"));
 }
 
 TEST_F(GuardAlone, IsMissedByTheRunnerWhenItLooksNoMore) {

@@ -124,7 +124,8 @@ TEST_F(Prompt, DictatesWhatIsAskedAndWhateverIsTyped) {
                   "operator_asked: The supply's output is off.\nMount the 90° occlusion under propeller 5x3 (Test 5 "
                   "inch). Step back, then type the mounted angle in degrees (90) and press Enter, or q to stop:",
                   "operator_answered: 45",
-                  "operator_asked: type the mounted angle (90) and Enter, or q to stop:", "operator_answered: 90"));
+                  "operator_asked: type the mounted angle in degrees (90) and press Enter, or q to stop:",
+                  "operator_answered: 90"));
 }
 
 TEST_F(Prompt, EndsAsSoonAsTheGuardThatLivesThroughItTrips) {

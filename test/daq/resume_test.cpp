@@ -57,7 +57,9 @@ class Resume : public testing::Test {
   CampaignResult resume(bool accept_changes = false) {
     person_ = {};
     said_ = {};
-    const Resumption resumption = look_at(results_, accept_changes);
+    return resume_with(look_at(results_, accept_changes));
+  }
+  CampaignResult resume_with(const Resumption& resumption) {
     RunsApart bench(place_);
     return run_campaign(
         bench, campaign_, place_, results_, person_, said_, [] { return false; }, &resumption);
@@ -277,8 +279,27 @@ TEST_F(Resume, RefusesAChangedJournal) {
 }
 
 TEST_F(Resume, TellsHowToGoOn) {
-  stop_before(90);
-  EXPECT_THAT(said_.lines, Contains(HasSubstr("--resume " + results_.path().string())));
+  person_.refuse_at_deg = 90;
+  try {
+    (void)begin(results_);
+    FAIL();
+  } catch (const NotMounted& stop) {
+    EXPECT_THAT(stop.words().data, HasSubstr("--resume " + results_.path().string()));
+  }
+}
+
+TEST_F(Resume, ContinuesAfterASafetyStopOnlyWhenSomebodyHasClearedIt) {
+  const Newtons limit = campaign_.limits.thrust_max;
+  campaign_.limits.thrust_max = Newtons(2.0);
+  EXPECT_THROW((void)begin(results_), SafetyStop);
+  campaign_.limits.thrust_max = limit;
+  Resumption stopped = look_at(results_, true);
+  EXPECT_THAT(stopped.state.safety_stop, HasSubstr("is above 2 N"));
+  EXPECT_THROW((void)resume_with(stopped), ConfigurationError);
+  stopped.cleared_by = "terminal";
+  (void)resume_with(stopped);
+  EXPECT_EQ(resumed_entry().at("cleared_safety_stop").at("by"), "terminal");
+  EXPECT_EQ(look_at(results_, true).state.safety_stop, "") << "cleared for good";
 }
 
 TEST_F(Resume, LeavesFinishedRunsReadOnlyAndVerifyRemarksWhatIsNot) {

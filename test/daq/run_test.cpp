@@ -90,7 +90,20 @@ TEST_F(OneRun, LeavesTheMotorCoasting) {
   EXPECT_TRUE(motor_is_let_go());
 }
 
-TEST_F(OneRun, StopsTheMotorGentlyAndWatchesItUntilItStands) {
+TEST_F(OneRun, EndsWithACoastThatFeedsNothingBack) {
+  double highest_v = 0;
+  bench_.let_watch(
+      {.stepped = [&] { highest_v = std::max(highest_v, bench_.simulation().plant().motor().supply_volts); },
+       .stream_began = {},
+       .heard = {}});
+  const RunResult result = record();
+  EXPECT_EQ(result.stop->outcome, iq::StopReport::Outcome::standing);
+  EXPECT_LT(to_seconds(result.stop->time_to_coast.value()), 0.05);
+  EXPECT_LT(highest_v, 12.1) << "the supply cannot sink";
+}
+
+TEST_F(OneRun, RampsDownOnASupplyThatSinksCurrent) {
+  place_.supply_sinks_current = true;
   const RunResult result = record();
   ASSERT_TRUE(result.stop);
   EXPECT_EQ(result.stop->outcome, iq::StopReport::Outcome::standing);
@@ -134,7 +147,8 @@ TEST_F(OneRun, StopsOnRequestAtAnyTickLetsTheMotorGoAndKeepsWhatItHas) {
       (void)record([&] { return ticks++ >= last_tick; });
       ADD_FAILURE() << "was not stopped at tick " << last_tick;
     } catch (const Interrupted& e) {
-      EXPECT_THAT(e.what(), HasSubstr("recorded so far: "));
+      EXPECT_THAT(e.words().data, HasSubstr("rep1.aborted"));
+      EXPECT_THAT(e.words().state, testing::StartsWith("motor: "));
     }
     EXPECT_TRUE(motor_is_let_go()) << "after tick " << last_tick;
   }
