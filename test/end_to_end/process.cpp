@@ -2,10 +2,12 @@
 
 #include <fcntl.h>
 #include <poll.h>
+#include <sched.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <stdexcept>
 #include <utility>
@@ -24,9 +26,23 @@ std::string line_with(const std::string& printed, const std::string& text) {
   return printed.substr(begin, end - begin);
 }
 
+/// For execvpe(): the later of two settings of a variable counts for nobody, so that the earlier ones are left out.
+std::vector<char*> environment_with(const std::vector<std::string>& further) {
+  const auto name_of = [](const std::string& setting) { return setting.substr(0, setting.find('=') + 1); };
+  std::vector<char*> settings;
+  for (char** setting = environ; *setting != nullptr; ++setting) {
+    const auto replaces = [&](const std::string& other) { return name_of(other) == name_of(*setting); };
+    if (std::none_of(further.begin(), further.end(), replaces)) settings.push_back(*setting);
+  }
+  for (const std::string& setting : further) settings.push_back(const_cast<char*>(setting.c_str()));
+  settings.push_back(nullptr);
+  return settings;
+}
+
 }  // namespace
 
-Process::Process(const std::vector<std::string>& arguments, const std::string& input) {
+Process::Process(const std::vector<std::string>& arguments, const std::string& input,
+                 const Surroundings& surroundings) {
   std::array<int, 2> in{}, out{}, err{};
   if (pipe2(in.data(), O_CLOEXEC) || pipe2(out.data(), O_CLOEXEC) || pipe2(err.data(), O_CLOEXEC)) {
     throw std::runtime_error("pipe");
@@ -35,12 +51,15 @@ Process::Process(const std::vector<std::string>& arguments, const std::string& i
   std::vector<char*> argv;
   for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
   argv.push_back(nullptr);
+  const std::vector<char*> environment = environment_with(surroundings.environment);
+  const sched_param priority{surroundings.fifo_priority};
   pid_ = fork();
   if (pid_ == 0) {
-    dup2(in[0], 0);
+    dup2(surroundings.input < 0 ? in[0] : surroundings.input, 0);
     dup2(out[1], 1);
     dup2(err[1], 2);
-    execvp(argv[0], argv.data());
+    if (surroundings.fifo_priority > 0) sched_setscheduler(0, SCHED_FIFO, &priority);
+    execvpe(argv[0], argv.data(), environment.data());
     _exit(127);
   }
   close(in[0]);
@@ -62,6 +81,15 @@ Process::~Process() {
 }
 
 void Process::signal(int number) const { kill(pid_, number); }
+
+bool Process::freeze() const {
+  signal(SIGSTOP);
+  siginfo_t state{};
+  return waitid(P_PID, static_cast<id_t>(pid_), &state, WSTOPPED | WEXITED | WNOWAIT) == 0 &&
+         state.si_code == CLD_STOPPED;
+}
+
+bool Process::is_real_time() const { return sched_getscheduler(pid_) == SCHED_FIFO; }
 
 void Process::close_pipes() {
   for (int* descriptor : {&out_descriptor_, &err_descriptor_}) close(std::exchange(*descriptor, -1));

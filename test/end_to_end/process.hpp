@@ -7,10 +7,18 @@
 
 namespace kphi::test {
 
+/// What a child has otherwise than this program.
+struct Surroundings {
+  std::vector<std::string> environment;  ///< further "NAME=value"
+  int input = -1;                        ///< descriptor of standard input; -1: what is handed to the child
+  int fifo_priority = 0;  ///< of SCHED_FIFO; 0: none. A child that is refused it goes on without: see is_real_time()
+};
+
 class Process {
  public:
   /// Starts `arguments[0]`; standard input is `input`, then closed.
-  explicit Process(const std::vector<std::string>& arguments, const std::string& input = {});
+  explicit Process(const std::vector<std::string>& arguments, const std::string& input = {},
+                   const Surroundings& surroundings = {});
   /// Kills and waits.
   ~Process();
   Process(const Process&) = delete;
@@ -20,6 +28,9 @@ class Process {
   /// the process ends without it, with all that was printed.
   std::string wait_for(const std::string& text, std::chrono::seconds limit = std::chrono::seconds(60));
   void signal(int number) const;
+  /// Stops it, and returns when all of it stands still; false: it has ended before.
+  [[nodiscard]] bool freeze() const;
+  [[nodiscard]] bool is_real_time() const;
   /// Reads what is printed, and returns as soon as something was, or after `limit`; false: it has closed both ends.
   bool hear(std::chrono::milliseconds limit = {}) { return read_some(limit); }
   [[nodiscard]] int pid() const { return pid_; }
