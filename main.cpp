@@ -1,9 +1,16 @@
 // kphi: the table of contents. Each folder owns its commands; what goes wrong becomes one line and an exit code here.
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
 #include <exception>
 #include <functional>
+#include <iostream>
 #include <vector>
 
 #include "compensation/commands.hpp"
@@ -40,15 +47,32 @@ enum ExitCode {
 constexpr const char* kFooter =
     "Exit codes: 0 ok, 1 failure, 2 usage or configuration, 3 device not found, 4 safety stop,\n"
     "            5 data rejected, 130 interrupted after a controlled spin-down.\n"
-    "Data goes to stdout, words to stderr. NO_COLOR is honoured.\n\n"
+    "Data goes to stdout, words to stderr. Data that cannot be written (closed pipe, full disk) is a failure (1);\n"
+    "a run continues, and its exit code tells how the run went. NO_COLOR is honoured.\n\n"
     "Without hardware:  kphi sim profiles/bench_simulated.yaml &\n"
     "                   kphi run profiles/icra2021_5in_3blade.yaml --bench profiles/bench_simulated.yaml --yes\n"
     "                   kphi fit results/<the folder it named>\n"
     "                   kphi fly --coefficients results/<the folder>/coefficients.yaml \\\n"
     "                            --vehicle profiles/foldable_drone.yaml";
 
+/// A write that fails tells as much as these signals, and leaves the program alive to let the motor go.
+void ignore_signals_of_writes() {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+/// A file that is opened later must not get the number of a closed standard stream: messages would go into the file.
+/// What takes the place can be neither read nor written.
+void fill_closed_streams() {
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(descriptor, F_GETFD) < 0) (void)::open("/dev/null", descriptor == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+  }
+}
+
+void tell(const std::string& words) { (void)std::fputs(words.c_str(), stderr); }
+
 int complain(const std::exception& error, int exit_code) {
-  fmt::print(stderr, "kphi: {}\n", error.what());
+  tell(fmt::format("kphi: {}\n", error.what()));
   return exit_code;
 }
 
@@ -71,19 +95,29 @@ std::string nearest_command(const CLI::App& program, const std::string& word) {
 
 int usage_error(const CLI::App& program, const CLI::ParseError& error, int argc, char** argv) {
   if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
-  fmt::print(stderr, "kphi: {}\n", error.what());
+  tell(fmt::format("kphi: {}\n", error.what()));
   if (argc > 1 && argv[1][0] != '-' && program.get_subcommands().empty()) {
     const std::string nearest = nearest_command(program, argv[1]);
-    fmt::print(stderr, "\"{}\" is no command{}\n", argv[1],
-               nearest.empty() ? "" : "; did you mean \"" + nearest + "\"?");
+    tell(
+        fmt::format("\"{}\" is no command{}\n", argv[1], nearest.empty() ? "" : "; did you mean \"" + nearest + "\"?"));
   }
-  fmt::print(stderr, "kphi --help lists the commands\n");
+  tell("kphi --help lists the commands\n");
   return kUsage;
 }
 
-}  // namespace
+/// Data that could not be written is a failure, even if only the last flush finds it.
+int end(int exit_code) {
+  errno = 0;
+  const bool is_written = std::cout.flush() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  if (!is_written && exit_code == kOk) {
+    tell(fmt::format("kphi: standard output could not be written{}{}\n", errno != 0 ? ": " : "",
+                     errno != 0 ? std::strerror(errno) : ""));
+    exit_code = kFailure;
+  }
+  return exit_code;
+}
 
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App program("kphi: propeller test stand to k(φ) line to flight", "kphi");
   program.footer(kFooter);
   program.set_version_flag("--version", std::string("kphi ") + kphi::kVersion);
@@ -123,4 +157,12 @@ int main(int argc, char** argv) {
   } catch (const std::exception& error) {
     return complain(error, kFailure);
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ignore_signals_of_writes();
+  fill_closed_streams();
+  return end(run(argc, argv));
 }

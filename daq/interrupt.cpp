@@ -12,9 +12,7 @@ std::atomic<int> g_count{0};
 static_assert(std::atomic<int>::is_always_lock_free);
 
 constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP, SIGQUIT};
-// What they would tell, a write that fails tells too.
-constexpr std::array kIgnored{SIGPIPE, SIGXFSZ};
-std::array<struct sigaction, kSignals.size() + kIgnored.size()> g_previous{};
+std::array<struct sigaction, kSignals.size()> g_previous{};
 
 void count_signal(int) { g_count.fetch_add(1); }
 
@@ -26,13 +24,10 @@ SignalWatch::SignalWatch() {
   action.sa_handler = count_signal;
   sigemptyset(&action.sa_mask);
   for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &action, &g_previous[i]);
-  action.sa_handler = SIG_IGN;
-  for (std::size_t i = 0; i < kIgnored.size(); ++i) sigaction(kIgnored[i], &action, &g_previous[kSignals.size() + i]);
 }
 
 SignalWatch::~SignalWatch() {
   for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &g_previous[i], nullptr);
-  for (std::size_t i = 0; i < kIgnored.size(); ++i) sigaction(kIgnored[i], &g_previous[kSignals.size() + i], nullptr);
 }
 
 int SignalWatch::count() noexcept { return g_count.load(); }

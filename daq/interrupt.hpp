@@ -12,8 +12,7 @@ class Interrupted : public RunStopped {
   explicit Interrupted(const std::string& cause) : RunStopped({cause, {}, {}, {}, {}}) {}
 };
 
-/// While it lives the signals SIGINT, SIGTERM, SIGHUP and SIGQUIT only count, and those of a reader that is gone and of
-/// a file that is too large do nothing; afterwards all do what they did before.
+/// While it lives the signals SIGINT, SIGTERM, SIGHUP and SIGQUIT only count; afterwards they do what they did before.
 class SignalWatch {
  public:
   SignalWatch();

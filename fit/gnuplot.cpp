@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -49,6 +50,22 @@ struct FileActions {
   FileActions& operator=(const FileActions&) = delete;
 };
 
+/// Signals that this program may ignore, and a child must not.
+struct DefaultSignals {
+  posix_spawnattr_t attributes;
+  DefaultSignals() {
+    sigset_t signals;
+    sigemptyset(&signals);
+    for (const int signal : {SIGPIPE, SIGXFSZ}) sigaddset(&signals, signal);
+    posix_spawnattr_init(&attributes);
+    posix_spawnattr_setsigdefault(&attributes, &signals);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
+  }
+  ~DefaultSignals() { posix_spawnattr_destroy(&attributes); }
+  DefaultSignals(const DefaultSignals&) = delete;
+  DefaultSignals& operator=(const DefaultSignals&) = delete;
+};
+
 /// Everything until the writer closes its end; only the beginning is kept.
 std::string read_all(int descriptor) {
   std::string text;
@@ -80,7 +97,9 @@ GnuplotOutcome draw(const std::filesystem::path& script, const std::filesystem::
   std::string name = program, settings = "--default-settings", from_stdin = "-";
   std::array<char*, 4> arguments{name.data(), settings.data(), from_stdin.data(), nullptr};
   pid_t child = -1;
-  const int error = ::posix_spawnp(&child, program.c_str(), &files.actions, nullptr, arguments.data(), environ);
+  const DefaultSignals signals;
+  const int error =
+      ::posix_spawnp(&child, program.c_str(), &files.actions, &signals.attributes, arguments.data(), environ);
   std::error_code ignored;
   if (error != 0) {
     std::filesystem::remove(svg, ignored);
