@@ -16,6 +16,7 @@
 #include "compensation/commands.hpp"
 #include "compensation/flight/commands.hpp"
 #include "daq/commands.hpp"
+#include "daq/console.hpp"
 #include "daq/devices_commands.hpp"
 #include "daq/interlock.hpp"
 #include "daq/interrupt.hpp"
@@ -69,7 +70,11 @@ void fill_closed_streams() {
   }
 }
 
-void tell(const std::string& words) { (void)std::fputs(words.c_str(), stderr); }
+/// After what a run has said; all other verbs write directly, however long that takes.
+void tell(const std::string& words) {
+  if (kphi::daq::console().is_used()) return kphi::daq::put(stderr, words);
+  (void)std::fputs(words.c_str(), stderr);
+}
 
 int complain(const std::exception& error, int exit_code) {
   tell(fmt::format("kphi: {}\n", error.what()));
@@ -105,7 +110,8 @@ int usage_error(const CLI::App& program, const CLI::ParseError& error, int argc,
   return kUsage;
 }
 
-/// Data that could not be written is a failure, even if only the last flush finds it.
+/// Gives the words of a run a second to leave. Data that could not be written is a failure, even if only the last flush
+/// finds it.
 int end(int exit_code) {
   errno = 0;
   const bool is_written = std::cout.flush() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
@@ -114,6 +120,7 @@ int end(int exit_code) {
                      errno != 0 ? std::strerror(errno) : ""));
     exit_code = kFailure;
   }
+  (void)kphi::daq::console().finish(kphi::daq::Console::kGiveUp);
   return exit_code;
 }
 

@@ -14,6 +14,7 @@
 #include "daq/awake.hpp"
 #include "daq/bench_audit.hpp"
 #include "daq/campaign_run.hpp"
+#include "daq/console.hpp"
 #include "daq/device_locks.hpp"
 #include "daq/dry_run.hpp"
 #include "daq/interrupt.hpp"
@@ -161,7 +162,7 @@ int run(const RunOptions& options) {
   if (!options.answers.empty()) answers = profiles::load_answers(options.answers);
   if (options.dry_run) {
     const DryRun dry = dry_run(campaign, place, options.out, answers);
-    put(stdout, options.json ? to_json(dry, campaign, place).dump() + "\n" : to_text(dry, campaign, place));
+    fmt::print("{}", options.json ? to_json(dry, campaign, place).dump() + "\n" : to_text(dry, campaign, place));
     return dry.ok() ? 0 : 2;
   }
   profiles::require_within(campaign, place);

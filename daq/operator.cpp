@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <charconv>
 
+#include "daq/console.hpp"
 #include "profiles/configuration_error.hpp"
 
 namespace kphi::daq {
@@ -41,9 +42,7 @@ std::optional<std::string> TerminalOperator::read_line() {
 }
 
 std::string TerminalOperator::answer_to(const std::string& about, const std::string& question) {
-  if (!about.empty()) fmt::print(words_, "\n{}\n", about);
-  fmt::print(words_, "{} ", question);
-  std::fflush(words_);
+  put(words_, (about.empty() ? "" : fmt::format("\n{}\n", about)) + question + " ");
   asked(about.empty() ? question : about + " " + question);
   const std::optional<std::string> answer = read_line();
   answered(answer.value_or("(no more input)"));
@@ -67,7 +66,7 @@ void TerminalOperator::clear_safety_stop(const std::string& reason) {
     const std::string answer = answer_to(about, "type continue and press Enter, or q to stop:");
     if (answer == "continue") return;
     if (answer == "q") throw NotMounted("not continued after the safety stop");
-    fmt::print(words_, "You typed \"{}\".\n", answer);
+    put(words_, fmt::format("You typed \"{}\".\n", answer));
   }
 }
 
@@ -81,7 +80,7 @@ void TerminalOperator::mount(const profiles::Propeller& propeller, double occlus
         about, fmt::format("type the mounted angle in degrees ({:g}) and press Enter, or q to stop:", occlusion_deg));
     if (is_angle(answer, occlusion_deg)) return;
     if (answer == "q") throw NotMounted(fmt::format("mounting of {:g}° was not confirmed", occlusion_deg));
-    fmt::print(words_, "You typed \"{}\"; this run needs {:g} degrees.\n", answer, occlusion_deg);
+    put(words_, fmt::format("You typed \"{}\"; this run needs {:g} degrees.\n", answer, occlusion_deg));
   }
 }
 
@@ -94,7 +93,7 @@ bool TerminalOperator::run_again(const AnotherRun& question) {
     if (answer.empty() || answer == "y" || answer == "yes") return true;
     if (answer == "n" || answer == "no") return false;
     if (answer == "q") throw Interrupted("stopped at the question for another run");
-    fmt::print(words_, "\"{}\" is neither y nor n.\n", answer);
+    put(words_, fmt::format("\"{}\" is neither y nor n.\n", answer));
   }
 }
 

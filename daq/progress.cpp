@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <sys/ioctl.h>
 
+#include <utility>
+
 namespace kphi::daq {
 namespace {
 
@@ -38,11 +40,6 @@ std::string silence(const Observation& seen) {
 
 }  // namespace
 
-void put(std::FILE* stream, const std::string& text) noexcept {
-  (void)std::fputs(text.c_str(), stream);
-  (void)std::fflush(stream);
-}
-
 std::string describe(const Position& position, const Observation& seen) {
   const std::string which = position.repetition < 0
                                 ? fmt::format("ref {}", -position.repetition)
@@ -57,31 +54,24 @@ std::string describe(const Position& position, const Observation& seen) {
          silence(seen);
 }
 
-TerminalProgress::~TerminalProgress() { clear(); }
+TerminalProgress::~TerminalProgress() { put(stream_, clearing(), Worth::live); }
 
-void TerminalProgress::clear() {
-  if (!drawn_) return;
-  put(stream_, "\r\x1b[K");
-  drawn_ = false;
-}
+std::string TerminalProgress::clearing() { return std::exchange(drawn_, false) ? "\r\x1b[K" : ""; }
 
 void TerminalProgress::tick(const Position& position, const Observation& seen) {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_) return;
   next_ = now + std::chrono::milliseconds(100);
-  put(stream_, fmt::format("\r{}\x1b[K", cut(describe(position, seen), width_of(stream_) - 1)));
+  put(stream_, fmt::format("\r{}\x1b[K", cut(describe(position, seen), width_of(stream_) - 1)), Worth::live);
   drawn_ = true;
 }
 
 void TerminalProgress::step_done(const Position&, const Observation&) {}
 
-void TerminalProgress::say(const std::string& line) {
-  clear();
-  put(stream_, fmt::format("{}\n", line));
-}
+void TerminalProgress::say(const std::string& line) { put(stream_, fmt::format("{}{}\n", clearing(), line)); }
 
 void PlainProgress::step_done(const Position& position, const Observation& seen) {
-  put(stream_, fmt::format("{}\n", describe(position, seen)));
+  put(stream_, fmt::format("{}\n", describe(position, seen)), Worth::passing);
 }
 
 void PlainProgress::say(const std::string& line) { put(stream_, fmt::format("{}\n", line)); }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "daq/console.hpp"
 #include "daq/interlock.hpp"
 #include "profiles/campaign.hpp"
 
@@ -23,9 +24,6 @@ struct Position {
   RadPerSec commanded;     ///< unsigned
   double remaining_s = 0;  ///< of the campaign, as a person's clock runs
 };
-
-/// A reader that is gone is no reason to stop a run: what cannot be written is lost in silence.
-void put(std::FILE* stream, const std::string& text) noexcept;
 
 /// Implementations are called from the runner's thread only.
 class Progress {
@@ -59,7 +57,8 @@ class TerminalProgress final : public Progress {
   void say(const std::string& line) override;
 
  private:
-  void clear();
+  /// What takes the line away, if there is one.
+  [[nodiscard]] std::string clearing();
   std::FILE* stream_;
   bool drawn_ = false;
   std::chrono::steady_clock::time_point next_{};
