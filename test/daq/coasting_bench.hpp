@@ -36,13 +36,19 @@ class SpoiltSupply final : public SupplyLink {
   const Clock& clock_;
 };
 
-/// A motor whose readings are spoilt.
+/// A motor whose readings are spoilt, or that obeys no order to stop.
 class SpoiltMotor final : public MotorLink {
  public:
   explicit SpoiltMotor(MotorLink& inner) : inner_(inner) {}
   void spin_at(RadPerSec signed_speed) override { inner_.spin_at(signed_speed); }
   void renew() noexcept override { inner_.renew(); }
-  void emergency_stop() noexcept override { inner_.emergency_stop(); }
+  void emergency_stop() noexcept override {
+    if (is_deaf) {
+      ++ignored;
+    } else {
+      inner_.emergency_stop();
+    }
+  }
   void begin_stop(const iq::StopSettings& settings) override { inner_.begin_stop(settings); }
   [[nodiscard]] std::optional<iq::StopReport> stop_report() override { return inner_.stop_report(); }
   [[nodiscard]] const iq::AuditRecord& parameters() const override { return inner_.parameters(); }
@@ -56,6 +62,8 @@ class SpoiltMotor final : public MotorLink {
     return n;
   }
   std::function<void(results::MotorReading&)> spoil;
+  bool is_deaf = false;
+  int ignored = 0;  ///< orders
 
  private:
   MotorLink& inner_;
