@@ -82,7 +82,7 @@ int complain(const std::exception& error, int exit_code) {
 }
 
 int tell(const kphi::daq::RunStopped& stop, const char* headline, int exit_code) {
-  fmt::print(stderr, "{}", stop.words().text(headline));
+  tell(stop.words().text(headline));
   return exit_code;
 }
 

@@ -1,0 +1,203 @@
+// A coast goes before everything that waits for the module: behind the frame that has begun come the coasts, and no
+// speed comes after them. Whatever waits, and wherever the line stopped taking bytes.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <memory>
+#include <random>
+
+#include "drivers/iq/motor.hpp"
+#include "test/drivers/iq/module_on_a_line.hpp"
+#include "test/drivers/iq/wire.hpp"
+#include "test/soon.hpp"
+
+namespace kphi::iq {
+namespace {
+
+using namespace std::chrono_literals;
+using fake::Bytes;
+using fake::Module;
+using fake::Wire;
+using Random = std::mt19937;
+
+constexpr std::size_t kCoasts = 3;  // of an emergency stop
+constexpr std::size_t kAround = 5;  // bytes of a frame around its payload, which has two before its data
+
+std::size_t below(Random& random, std::size_t limit) { return random() % limit; }
+
+/// The far end of a line that takes bytes when the test says so.
+class SlowLine {
+ public:
+  /// Takes the first `n` of what waits, fewer if there are fewer.
+  template <class Source>
+  void take(Source& source, std::span<const std::uint8_t> waiting, std::size_t n) {
+    n = std::min(n, waiting.size());
+    module_.receive(waiting.first(n));
+    taken_ += n;
+    source.sent(n);
+  }
+  /// Frames that have left or begun to leave.
+  [[nodiscard]] std::size_t begun() const {
+    std::size_t whole = 0;
+    for (const fake::Heard& frame : module_.heard) whole += frame.data.size() + 2 + kAround;
+    return module_.heard.size() + (taken_ > whole ? 1 : 0);
+  }
+  [[nodiscard]] const std::vector<fake::Heard>& heard() const { return module_.heard; }
+
+ private:
+  Module module_;
+  std::size_t taken_ = 0;
+};
+
+/// `begun`: frames that had left or begun to leave when the motor was to stop.
+void expect_coast_first(const std::vector<fake::Heard>& heard, std::size_t begun) {
+  ASSERT_GE(heard.size(), begun + kCoasts);
+  for (std::size_t i = begun; i < heard.size(); ++i) {
+    if (i < begun + kCoasts) {
+      ASSERT_TRUE(heard[i].is_coast()) << "frame " << i - begun << " after the stop is " << heard[i].type << "."
+                                       << heard[i].sub;
+    }
+    ASSERT_FALSE(heard[i].is_speed()) << "a speed " << i - begun << " frames after the stop";
+  }
+}
+
+Packet packet_of(Outbox::Kind kind, Random& random) {
+  if (kind == Outbox::Kind::motion)
+    return make(entry<"propeller_motor_control.ctrl_velocity">, Access::set, 0, 100.0 + below(random, 1000));
+  if (kind == Outbox::Kind::setting) return make(entry<"propeller_motor_control.timeout">, Access::set, 0, 0.5);
+  return make(entry<"brushless_drive.obs_velocity">, Access::get, 0);
+}
+
+TEST(CoastFirst, OfAnOutboxWithWhateverWaitsInIt) {
+  constexpr Outbox::Kind kKinds[] = {Outbox::Kind::request, Outbox::Kind::setting, Outbox::Kind::motion};
+  int full = 0, begun = 0;
+  for (unsigned seed = 1; seed <= 2000; ++seed) {
+    SCOPED_TRACE(seed);
+    Random random(seed);
+    Outbox outbox;
+    SlowLine line;
+    bool has_room = true;
+    for (std::size_t left = below(random, 60); left > 0 && has_room; --left) {
+      const Outbox::Kind kind = kKinds[below(random, 3)];
+      has_room = outbox.push(kind, packet_of(kind, random));
+      if (below(random, 4) == 0) line.take(outbox, outbox.bytes(), below(random, 12));
+    }
+    full += has_room ? 0 : 1;
+    begun += line.begun() > line.heard().size() ? 1 : 0;
+    const std::size_t before = line.begun();
+    const Packet coast = make(entry<"propeller_motor_control.ctrl_coast">, Access::set, 0);
+    for (std::size_t i = 0; i < kCoasts; ++i) outbox.push_coast(coast);
+    while (!outbox.bytes().empty()) line.take(outbox, outbox.bytes(), 1 + below(random, 20));
+    expect_coast_first(line.heard(), before);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(full, 200) << "stops with no room left";
+  EXPECT_GT(begun, 200) << "stops in the midst of a frame";
+}
+
+TEST(CoastFirst, OfASessionWhosePollsSettingsAndSpeedsWait) {
+  int with_settings = 0, with_speeds = 0;
+  std::size_t most_waiting = 0;
+  for (unsigned seed = 1; seed <= 300; ++seed) {
+    SCOPED_TRACE(seed);
+    Random random(seed);
+    Settings settings;
+    settings.telemetry_hz = 200;
+    settings.every_cycle = {Quantity::speed, Quantity::motor_current, Quantity::supply_voltage};
+    settings.credit_bytes = 18 + below(random, 250);
+    Wire wire(settings);
+    wire.connect();
+    Session& session = wire.session;
+    SlowLine line;
+    const Instant ends = wire.now + 40ms;
+    for (bool asked = false; wire.now < ends; wire.now += std::chrono::microseconds(below(random, 3000))) {
+      session.advance(wire.now);
+      if (below(random, 3) == 0) session.spin_at(RadPerSec(100.0 + below(random, 1000)), wire.now);
+      if (!asked && below(random, 4) == 0) {
+        session.inquire({{&entry<"propeller_motor_control.velocity_Kp">, 0.002},
+                         {&entry<"propeller_motor_control.velocity_Ki">, 0.001},
+                         {&entry<"propeller_motor_control.velocity_Kd">, 0.0}},
+                        wire.now);
+        asked = true;
+      }
+      if (below(random, 5) == 0) line.take(session, session.output(), below(random, 10));
+    }
+    Module waiting;
+    const std::size_t before = line.begun();
+    waiting.receive(session.output());
+    with_settings += waiting.count([](const auto& m) { return m.access == 1 && !m.is_motion(); }) > 0 ? 1 : 0;
+    with_speeds += waiting.count([](const auto& m) { return m.is_speed(); }) > 0 ? 1 : 0;
+    most_waiting = std::max(most_waiting, waiting.heard.size());
+
+    session.emergency_stop(wire.now);
+    for (int i = 0; i < 60; ++i, wire.now += std::chrono::microseconds(below(random, 500))) {
+      line.take(session, session.output(), 1 + below(random, 20));
+      session.advance(wire.now);
+    }
+    expect_coast_first(line.heard(), before);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(with_settings, 50);
+  EXPECT_GT(with_speeds, 50);
+  EXPECT_GE(most_waiting, 15u) << "of the 24 for which there is room";
+}
+
+/// What is on its way is ahead of anything: here the line is full of frames that nobody else sends.
+class FullLine {
+ public:
+  explicit FullLine(const std::string& device)
+      : host_end_(::open(device.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK)) {}
+  ~FullLine() { ::close(host_end_); }
+  FullLine(const FullLine&) = delete;
+  FullLine& operator=(const FullLine&) = delete;
+  void fill() const {
+    const Bytes frame = fake::message(kNobodys, 0, 0, 0);
+    for (std::size_t n = frame.size(); n > 0; n = n == 1 ? 0 : 1) {
+      while (::write(host_end_, frame.data(), n) > 0) {
+      }
+    }
+  }
+  /// Frames up to the last of them.
+  [[nodiscard]] static std::size_t ahead(const std::vector<fake::Heard>& heard) {
+    std::size_t n = heard.size();
+    while (n > 0 && heard[n - 1].type != kNobodys) --n;
+    return n;
+  }
+
+ private:
+  static constexpr int kNobodys = 200;
+  int host_end_;
+};
+
+TEST(CoastFirst, OfALinkWhoseLineTakesNoBytes) {
+  const SteadyClock clock;
+  fake::ModuleOnALine line;
+  const FullLine full(line.device());
+  Settings settings;
+  settings.telemetry_hz = 200;
+  Motor motor(line.device(), 115200, settings, clock);
+  motor.spin_at(RadPerSec(500));
+  ASSERT_TRUE(line.heard_a_speed(500));
+  line.with([&](Module&) {  // which hears nothing meanwhile
+    const auto before = motor.counters();
+    const auto polls_wait = [&] {
+      full.fill();  // again: the terminal moves bytes on within itself
+      return motor.counters().timeouts > before.timeouts;
+    };
+    ASSERT_TRUE(test::soon(polls_wait));
+    motor.spin_at(RadPerSec(600));
+    motor.emergency_stop();
+    ASSERT_TRUE(test::soon([&] { return motor.counters().coasts >= before.coasts + kCoasts; }));
+  });
+  ASSERT_TRUE(motor.coast_and_confirm(2s));
+  line.with([&](Module& module) {
+    const std::size_t first = FullLine::ahead(module.heard);
+    ASSERT_GT(first, 0u);
+    const bool begun = first < module.heard.size() && !module.heard[first].is_coast();
+    expect_coast_first(module.heard, first + (begun ? 1 : 0));
+  });
+}
+
+}  // namespace
+}  // namespace kphi::iq
