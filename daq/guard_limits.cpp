@@ -39,9 +39,7 @@ constexpr WatchedInfo kWatched[] = {
     {Watched::load_cell_age, "age of the newest load-cell sample", "s"},
     {Watched::motor_age, "age of the newest motor reading", "s"},
     {Watched::supply_age, "age of the newest supply reading", "s"},
-    {Watched::samples_missing, "load-cell samples missing in a row", "s"},
     {Watched::pause, "pause of kphi", "s"},
-    {Watched::sleep, "sleep of this computer", "s"},
 };
 
 /// One row for each quantity, the tightest that was offered.

@@ -34,12 +34,12 @@ enum class Watched : std::uint8_t {
   load_cell_age,        ///< s of wall time while the motor turns, likewise the next three
   motor_age,
   supply_age,
-  samples_missing,  ///< s of the load cell's stream, at once, while the motor turns
   pause,            ///< of the runner, while the motor turns
+  samples_missing,  ///< s of the load cell's stream in a row, while the motor turns; no row, nor the next
   sleep,            ///< of this computer; any
   state,            ///< no limit: what a device says of itself
 };
-inline constexpr std::size_t kWatchedCount = static_cast<std::size_t>(Watched::state);
+inline constexpr std::size_t kWatchedCount = static_cast<std::size_t>(Watched::samples_missing);
 
 struct GuardLimit {
   Watched watched{};

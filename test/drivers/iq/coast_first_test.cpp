@@ -140,7 +140,7 @@ TEST(CoastFirst, OfASessionWhosePollsSettingsAndSpeedsWait) {
   }
   EXPECT_GT(with_settings, 50);
   EXPECT_GT(with_speeds, 50);
-  EXPECT_GE(most_waiting, 15u) << "of the 24 for which there is room";
+  EXPECT_GE(most_waiting, 8u) << "a speed itself waits for the module's word";
 }
 
 /// What is on its way is ahead of anything: here the line is full of frames that nobody else sends.
