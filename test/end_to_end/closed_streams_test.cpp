@@ -88,11 +88,14 @@ TEST_P(LeftStreams, DoNotChangeTheExitCodeOfASafetyStop) {
 }
 
 TEST_P(LeftStreams, DoNotHarmARun) {
-  RunningBench bench;
+  RunningBench bench(Manner{3});
+  write(bench.path("short.yaml"), short_campaign_text("0, 90", 1, 2));
   Process run(with(GetParam(), bench.run_command()));
-  EXPECT_EQ(run.wait(), 0);
+  const int exit_code = run.wait();
+  ASSERT_TRUE(std::filesystem::exists(bench.path("results"))) << "exit code " << exit_code;
   int campaigns = 0;
   for (const auto& folder : std::filesystem::directory_iterator(bench.path("results"))) {
+    EXPECT_EQ(exit_code, 0) << bytes_of(folder.path() / "journal.jsonl");
     Process verify({kphi(), "verify", folder.path().string()});
     EXPECT_EQ(verify.wait(), 0) << verify.out();
     ++campaigns;
