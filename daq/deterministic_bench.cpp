@@ -201,12 +201,12 @@ void DeterministicBench::abandon() noexcept {
   if (supply_) supply_->abandon();
 }
 
-void DeterministicBench::stand_still(Duration lasts, bool suspended) {
-  outlive(clock_.now() + lasts);
-  sim::Datagram lost;
-  while (sim_.wire().next_datagram(lost, clock_.now())) {
+void DeterministicBench::sleep(Duration lasts, const std::function<void()>& each) {
+  for (const Instant wakes = clock_.now() + lasts; clock_.now() < wakes;) {
+    outlive(std::min(wakes, clock_.now() + std::chrono::milliseconds(1)));
+    if (each) each();
   }
-  if (suspended) clock_.suspend(lasts);
+  clock_.suspend(lasts);
 }
 
 void DeterministicBench::outlive(Instant when) {

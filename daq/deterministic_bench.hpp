@@ -52,9 +52,9 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   void let_watch(BenchWitness witness) { witness_ = std::move(witness); }
   /// The program is gone, as after kill -9: from here on nothing it does reaches a device.
   void abandon() noexcept;
-  /// This computer does not run for so long, and what the box sends meanwhile is lost; `suspended`: it sleeps, and its
-  /// clock can tell. From within wait_until, or between two.
-  void stand_still(Duration lasts, bool suspended);
+  /// This computer sleeps for so long, and its clock can tell. `each` is called after every millisecond of it. From
+  /// within wait_until, or between two.
+  void sleep(Duration lasts, const std::function<void()>& each = {});
   /// The devices by themselves until `when`.
   void outlive(Instant when);
 

@@ -24,7 +24,7 @@ std::string StopReport::summary() const {
     case Outcome::standing:
       return fmt::format("{}, at rest after {:.1f} s", coast, to_seconds(time_to_standing.value_or(Duration(0))));
     case Outcome::slowing:
-      return fmt::format("{}, still turning at {}", coast, rpm(speed_at_end));
+      return fmt::format("{}, slowing down at {}", coast, rpm(speed_at_end));
     case Outcome::turning:
       return fmt::format("{}, but STILL TURNING at {}: cut its power", coast, rpm(speed_at_end));
     case Outcome::unseen:

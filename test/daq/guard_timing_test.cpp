@@ -271,7 +271,7 @@ const Case kCases[] = {
      box_fails, "load cell: the Axia reports .broken gage. .status 0x80000004. for 5.9 ms"},
     {"Sleep", Watched::sleep, "", nullptr,
      [](const auto&, Instant acted) -> Found { return acted + milliseconds(300); }, "this computer slept for 0.3 s",
-     EventKind::guard_trip, [](CoastingBench& bench, Instant) { bench.bench.stand_still(milliseconds(300), true); }},
+     EventKind::guard_trip, [](CoastingBench& bench, Instant) { bench.bench.sleep(milliseconds(300)); }},
     {"Derates", Watched::state, "  - {at_s: 2.2, for_s: 9, kind: motor_redline, speed_rad_s: 800}\n", nullptr,
      reading_of(MotorChannel::derate, [](double v) { return v < 0.9999; }), "motor: the module derates to"},
     {"ModuleFault", Watched::state, "", nullptr, reading_of(MotorChannel::fault_now, [](double v) { return v != 0; }),

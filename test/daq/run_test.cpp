@@ -127,7 +127,7 @@ TEST_F(OneRun, LetsGoAtOnceAtATripAndSaysWhatBecameOfTheMotor) {
     FAIL();
   } catch (const SafetyStop& stop) {
     EXPECT_THAT(stop.what(),
-                testing::ContainsRegex("motor: coast confirmed after 0[.]0.*(at rest after|still turning)"));
+                testing::ContainsRegex("motor: coast confirmed after 0[.]0.*(at rest after|slowing down at)"));
   }
 }
 

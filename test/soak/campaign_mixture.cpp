@@ -260,10 +260,16 @@ void tear_a_write(Mixture& mixture, Dice& dice) {
     mixture.kill->at = Kill::At::write;
 }
 
+void add_sleep(Mixture& mixture, Dice& dice) {
+  if (dice.once_in(12))
+    mixture.sleep = HostSleep{from_seconds(dice.real(0, mixture.lasts_s)),
+                              from_seconds(dice.one_of(std::array{0.1, 0.2, 0.4, 1.0, 5.0}))};
+}
+
 }  // namespace
 
 bool Mixture::is_clean() const {
-  return faults.find("kind") == std::string::npos && answers_are_good && !disk && !kill && !interrupt;
+  return faults.find("kind") == std::string::npos && answers_are_good && !disk && !kill && !interrupt && !sleep;
 }
 
 Mixture draw(std::uint64_t seed) {
@@ -279,6 +285,7 @@ Mixture draw(std::uint64_t seed) {
   add_operator(mixture, shape, dice);
   add_ends(mixture, mixture.lasts_s, dice);
   tear_a_write(mixture, dice);
+  add_sleep(mixture, dice);
   return mixture;
 }
 
@@ -292,6 +299,7 @@ Mixture draw_resumed(const Mixture& former) {
   mixture.disk.reset();
   mixture.kill.reset();
   mixture.interrupt.reset();
+  mixture.sleep.reset();
   mixture.faults_are_others = !dice.once_in(3);
   mixture.accepts_changes = mixture.life > 2 || !dice.once_in(10);
   if (mixture.faults_are_others) {
@@ -300,6 +308,7 @@ Mixture draw_resumed(const Mixture& former) {
   }
   add_ends(mixture, mixture.lasts_s, dice);
   tear_a_write(mixture, dice);
+  add_sleep(mixture, dice);
   return mixture;
 }
 
@@ -326,6 +335,9 @@ std::string words(const Mixture& mixture) {
     out += fmt::format("# the disk refuses from operation {} on{}\n", mixture.disk->from,
                        mixture.disk->operations == 0 ? "" : fmt::format(", {} of them", mixture.disk->operations));
   if (mixture.interrupt) out += fmt::format("# Ctrl-C at {:.4f} s\n", to_seconds(*mixture.interrupt));
+  if (mixture.sleep)
+    out += fmt::format("# the computer sleeps at {:.4f} s for {:g} s\n", to_seconds(mixture.sleep->at),
+                       to_seconds(mixture.sleep->lasts));
   if (mixture.kill)
     out += fmt::format("# killed at {} {}\n",
                        std::array{"step of time", "file operation", "prompt",

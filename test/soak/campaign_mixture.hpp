@@ -24,6 +24,12 @@ struct Kill {
   std::uint64_t number = 1;  ///< of the bench's steps of time, of file operations, of prompts; the first is 1
 };
 
+/// The computer sleeps.
+struct HostSleep {
+  Instant at{0};  ///< the first step of the bench from then on
+  Duration lasts{0};
+};
+
 struct Mixture {
   std::uint64_t seed = 0;
   int life = 1;          ///< of the campaign: the second goes on with what the first left
@@ -37,8 +43,9 @@ struct Mixture {
   std::optional<DiskRefusal> disk;
   std::optional<Kill> kill;
   std::optional<Instant> interrupt;  ///< Ctrl-C
-  bool faults_are_others = false;    ///< than those of the life before
-  bool accepts_changes = false;      ///< --accept-changes
+  std::optional<HostSleep> sleep;
+  bool faults_are_others = false;  ///< than those of the life before
+  bool accepts_changes = false;    ///< --accept-changes
 
   /// Nothing at all goes wrong.
   [[nodiscard]] bool is_clean() const;

@@ -185,6 +185,7 @@ void World::live() {
 void World::begin() {
   if (written_) {
     resumption_ = daq::look_at(*written_, mixture_.accepts_changes);
+    resumption_->cleared_by = "soak";
     (void)daq::require_unchanged(*written_, *resumption_, daq::identity_of(campaign_, place_));
   }
   sim::BenchSettings settings;
@@ -227,6 +228,13 @@ void World::step() {
     bench_->simulation().mount(campaign_.propeller.id, *mixture_.mounted_instead_deg);
   }
   kill_at(Kill::At::step, ++steps_);
+  if (mixture_.sleep && !story_.woke && bench_->clock().now() >= mixture_.sleep->at) sleep();
+}
+
+void World::sleep() {
+  story_.woke = bench_->clock().now();  // no second time
+  bench_->sleep(mixture_.sleep->lasts, [this] { look(); });
+  story_.woke = bench_->clock().now();
 }
 
 void World::look() {

@@ -55,7 +55,8 @@ struct Story {
   std::vector<Stream> streams;
   std::vector<Prompt> prompts;  ///< somebody is about to reach into the propeller
   std::vector<std::string> said;
-  Instant last_good_tick{0};  ///< when the runner looked at everything last and went on
+  std::optional<Instant> woke;  ///< of the computer's sleep; nullopt: it did not sleep
+  Instant last_good_tick{0};    ///< when the runner looked at everything last and went on
   Instant ended{0};
   End end = End::unknown;
   std::string reason;  ///< of the exception
@@ -106,6 +107,7 @@ class World {
   void campaign_to_its_end();
   void step();
   void look();
+  void sleep();
   void at_operation(std::uint64_t number);
   void at_prompt();
   void kill_at(Kill::At at, std::uint64_t number);

@@ -56,6 +56,10 @@ void check_end(const Evidence& evidence, const Reaches& reaches, Lines& wrong) {
   };
   if (must_refuse(evidence))
     return unless(story.end == End::refused && mentions(story.reason, {"the fault script has changed"}));
+  const bool told_of_sleep = story.reason.starts_with("this computer slept");
+  if (story.end == End::stopped && told_of_sleep) return unless(story.woke.has_value());
+  // What else stopped it was seen before, in the same moment, or while what had stopped it was told.
+  if (story.woke && story.end == End::finished) return unless(false);
   switch (story.end) {
     case End::finished:
       return unless(mixture.answers_are_good);

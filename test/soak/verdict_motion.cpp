@@ -30,12 +30,23 @@ void check_end_of_motion(const Evidence& evidence, const Reaches& reaches, Lines
     return;
   }
   const Instant decided = evidence.killed() ? story.ended : story.last_good_tick + 10ms;
-  const bool alone = evidence.killed() || reaches.line_silenced(decided - kOwnTimeout, decided + kOwnTimeout);
+  const bool slept = story.woke && *story.woke - evidence.mixture.sleep->lasts <= decided + kHeard;
+  const bool alone = evidence.killed() || slept || reaches.line_silenced(decided - kOwnTimeout, decided + kOwnTimeout);
   const Duration limit = alone ? kOwnTimeout : kHeard;
   if (since > decided + limit)
     wrong.push_back(
         fmt::format("motion: coasts {:.0f} ms after {}, {:.0f} ms are allowed", 1e3 * to_seconds(since - decided),
                     evidence.killed() ? "the kill" : "the last look that found all well", 1e3 * to_seconds(limit)));
+}
+
+/// The module let the motor go while the computer slept, or coasts since: whatever was ordered before is void.
+void check_waking(const Story& story, Lines& wrong) {
+  if (!story.woke) return;
+  for (const Story::StageChange& change : story.stages) {
+    if (change.at > *story.woke && change.mode == sim::PowerStage::Mode::drive)
+      wrong.push_back(fmt::format("motion: driven at {:.3f} s, though the computer slept until {:.3f} s",
+                                  to_seconds(change.at), to_seconds(*story.woke)));
+  }
 }
 
 /// Somebody is about to reach into the propeller.
@@ -77,6 +88,7 @@ void check_freshness(const Story& story, const Reaches& reaches, Lines& wrong) {
 
 void check_motion(const Evidence& evidence, const Reaches& reaches, Lines& wrong) {
   check_prompts(evidence.story, wrong);
+  check_waking(evidence.story, wrong);
   check_end_of_motion(evidence, reaches, wrong);
   if (!evidence.killed()) check_freshness(evidence.story, reaches, wrong);
 }

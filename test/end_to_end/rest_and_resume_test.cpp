@@ -1,0 +1,192 @@
+// Nobody is asked to come near a rotor that turns or a motor that has power, and nothing starts again by itself after a
+// safety stop: the program beside the simulated bench, over the real transports.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <signal.h>
+
+#include "drivers/sim/control_line.hpp"
+#include "test/end_to_end/account.hpp"
+#include "test/end_to_end/running_bench.hpp"
+#include "test/end_to_end/terminal.hpp"
+
+namespace kphi::test {
+namespace {
+
+using testing::AllOf;
+using testing::ContainsRegex;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr double kRpm = 60 / (2 * 3.14159265358979);
+constexpr double kStandstill = 5;  // rad/s
+
+class Stand {
+ public:
+  explicit Stand(bool supply, const std::string& faults = "  []\n") : bench({1, 7000, faults, supply}) {
+    std::string text = short_campaign_text("0, 90", 1, 3);
+    const std::string::size_type last = text.find("last_rpm: 18000");
+    text.replace(last, 15, "last_rpm: 15000");
+    write(bench.path("short.yaml"), text);
+  }
+  [[nodiscard]] nlohmann::json status() const {
+    return nlohmann::json::parse(sim::tell(bench.path("control"), "status"));
+  }
+  [[nodiscard]] double speed() const { return std::abs(status()["speed_rad_s"].get<double>()); }
+  template <class Predicate>
+  [[nodiscard]] static bool soon(Predicate&& predicate) {
+    const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (!predicate()) {
+      if (std::chrono::steady_clock::now() > give_up) return false;
+      ::poll(nullptr, 0, 2);
+    }
+    return true;
+  }
+  [[nodiscard]] std::string folder() const {
+    return std::filesystem::directory_iterator(bench.path("results"))->path().string();
+  }
+  [[nodiscard]] std::vector<std::string> command(const std::vector<std::string>& more) const {
+    std::vector<std::string> all{kphi(), "run", "--bench", bench.path("bench.yaml")};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+  [[nodiscard]] std::vector<std::string> first(const std::vector<std::string>& more) const {
+    std::vector<std::string> all = command({bench.path("short.yaml"), "--out", bench.path("results")});
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+  /// A campaign that a limit of its own stops in its first run.
+  void stop_by_the_guard() {
+    std::string text = bytes_of(bench.path("short.yaml"));
+    text.replace(text.find("thrust_max_n: 20"), 16, "thrust_max_n: 1");
+    write(bench.path("short.yaml"), text);
+    Process run(first({"--yes"}));
+    EXPECT_EQ(run.wait(), 4) << run.err();
+    words = run.err();
+  }
+  [[nodiscard]] Account account() {
+    bench.process().signal(SIGTERM);
+    EXPECT_EQ(bench.process().wait(), 0) << bench.process().err();
+    return account_of(bytes_of(bench.path("wire.jsonl")));
+  }
+
+  RunningBench bench;
+  std::string words;
+};
+
+class AfterAKill : public testing::TestWithParam<bool> {
+ protected:
+  /// At full speed.
+  void kill_the_program() {
+    Process run(stand_.first({"--yes"}));
+    ASSERT_TRUE(Stand::soon([&] { return !run.hear() || stand_.speed() * kRpm > 14500; })) << run.err();
+    ASSERT_GT(stand_.speed() * kRpm, 13000) << run.err();
+    run.signal(SIGKILL);
+    EXPECT_EQ(run.wait(), 128 + SIGKILL);
+  }
+  Stand stand_{GetParam()};
+};
+
+TEST_P(AfterAKill, TheNextProgramWaitsForStandstillBeforeAnythingIsMounted) {
+  kill_the_program();
+  Process resumed(stand_.command({"--yes", "--resume", stand_.folder()}));
+  EXPECT_EQ(resumed.wait(), 0) << "the simulated bench refuses a mounting while its rotor turns: " << resumed.err();
+}
+
+TEST_P(AfterAKill, NobodyIsAskedToComeNearATurningRotor) {
+  kill_the_program();
+  const Terminal terminal;
+  Process resumed(stand_.command({"--resume", stand_.folder()}), {}, {{}, terminal.descriptor()});
+  resumed.wait_for("Mount no occlusion");
+  EXPECT_LT(stand_.speed(), kStandstill);
+  EXPECT_THAT(resumed.err(), HasSubstr(GetParam() ? "the supply's output is off" : "the motor HAS POWER"));
+  resumed.signal(SIGINT);
+  EXPECT_EQ(resumed.wait(), 130);
+  if (!GetParam()) return;
+  const Account account = stand_.account();
+  ASSERT_FALSE(account.outputs.empty());
+  EXPECT_FALSE(account.outputs.back());
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, AfterAKill, testing::Bool(), [](const testing::TestParamInfo<bool>& supply) {
+  return std::string(supply.param ? "ABenchWithSupply" : "ABenchWithout");
+});
+
+TEST(Signal, WhileConnectingIsHeardBeforeAnythingIsSwitchedOn) {
+  Stand stand(true, "  - {at_s: 0, for_s: 1000, kind: http_slow, delay_s: 1.5}\n");
+  Process run(stand.first({"--yes"}));
+  run.wait_for("Ctrl-C lets the motor coast");
+  run.signal(SIGINT);
+  EXPECT_EQ(run.wait(), 130) << run.err();
+  EXPECT_THAT(run.err(), HasSubstr("STOPPED: stopped by request, before anything was switched on"));
+  const Account account = stand.account();
+  EXPECT_EQ(std::count(account.outputs.begin(), account.outputs.end(), true), 0);
+}
+
+TEST(SafetyStop, IsToldByCauseNextMoveDataAndWhatMotorAndSupplyDid) {
+  for (const bool supply : {false, true}) {
+    Stand stand(supply);
+    stand.stop_by_the_guard();
+    const std::string::size_type begin = stand.words.find("SAFETY STOP: thrust ");
+    ASSERT_NE(begin, std::string::npos) << stand.words;
+    const std::string told = stand.words.substr(begin);
+    EXPECT_THAT(told, ContainsRegex("^SAFETY STOP: thrust .* N is above 1 N .campaign limits.thrust_max_n.\n"
+                                    "  next:  check propeller, occlusion and load cell.*\n"
+                                    "  data:  0 of 2 runs are finished, in .*aborted.h5\n"
+                                    " +continue with: kphi run .*--resume .*\n"
+                                    "  motor: "));
+    EXPECT_THAT(told, HasSubstr(supply ? "supply: output off\n" : "motor: coast confirmed after"));
+    EXPECT_EQ(told.find("is above"), told.rfind("is above")) << "no sentence twice: " << told;
+  }
+}
+
+TEST(SafetyStop, IsClearedOnlyByAPersonsOwnWord) {
+  Stand stand(false);
+  stand.stop_by_the_guard();
+  std::string live = bytes_of(stand.bench.path("bench.yaml"));
+  const std::string::size_type simulation = live.find("simulation:");
+  live.erase(simulation, live.find('\n', simulation) + 1 - simulation);
+  write(stand.bench.path("live.yaml"), live);
+  const auto resume = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words{kphi(),     "run",          "--bench",         stand.bench.path("live.yaml"),
+                                   "--resume", stand.folder(), "--accept-changes"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  };
+  Process agreed(resume({"--yes"}));
+  EXPECT_EQ(agreed.wait(), 2) << "never --yes alone on a live bench";
+  EXPECT_THAT(agreed.err(), AllOf(HasSubstr("a safety stop ended this campaign: thrust "), HasSubstr("is above 1 N")));
+
+  write(stand.bench.path("answers.yaml"), "format: kphi-answers/1\nmountings: [0, 90]\n");
+  Process answered(resume({"--answers", stand.bench.path("answers.yaml")}));
+  EXPECT_EQ(answered.wait(), 2);
+  EXPECT_THAT(answered.err(), HasSubstr("add continue_after_safety_stop: true"));
+
+  const Terminal terminal;
+  Process asked(resume({}), {}, {{}, terminal.descriptor()});
+  asked.wait_for("A safety stop ended this campaign: thrust ");
+  terminal.type("q");
+  EXPECT_EQ(asked.wait(), 130) << asked.err();
+  EXPECT_EQ(stand.account().last_speed_at() > 0, true) << "of the first run";
+}
+
+TEST(SafetyStop, IsClearedByTheAnswersFileOnceAndNotBeforeItHappened) {
+  Stand stand(false);
+  write(stand.bench.path("answers.yaml"),
+        "format: kphi-answers/1\nmountings: [0, 90]\ncontinue_after_safety_stop: true\n");
+  Process early(stand.first({"--answers", stand.bench.path("answers.yaml")}));
+  EXPECT_EQ(early.wait(), 2);
+  EXPECT_THAT(early.err(), HasSubstr("continue_after_safety_stop is left over"));
+
+  stand.stop_by_the_guard();
+  std::string text = bytes_of(stand.bench.path("short.yaml"));
+  text.replace(text.find("thrust_max_n: 1"), 15, "thrust_max_n: 20");
+  write(stand.bench.path("short.yaml"), text);
+  Process resumed(stand.command({stand.bench.path("short.yaml"), "--resume", stand.folder(), "--accept-changes",
+                                 "--answers", stand.bench.path("answers.yaml")}));
+  EXPECT_EQ(resumed.wait(), 0) << resumed.err();
+  EXPECT_THAT(bytes_of(std::filesystem::path(stand.folder()) / "journal.jsonl"), HasSubstr("cleared_safety_stop"));
+}
+
+}  // namespace
+}  // namespace kphi::test
