@@ -66,6 +66,10 @@ std::string page_of(const profiles::NetBoxPlace& place, const std::string& targe
   return netbox::http_get(place.host, place.http_port, target, kPageTimeout);
 }
 
+void require_no_stop(const std::function<bool()>& stop_asked) {
+  if (stop_asked()) throw Interrupted("stopped by request, before anything was switched on");
+}
+
 class Thread final : public Background {
  public:
   explicit Thread(std::function<void()> work)
@@ -175,7 +179,7 @@ std::string LiveMotor::failure() const {
   return "motor: kphi did not renew its command in time, so the driver let it coast; close other programs";
 }
 
-LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock)
+LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock, const std::function<bool()>& stop_asked)
     : place_(std::move(place)),
       clock_(clock),
       settings_(rdt_place(place_), wanted_settings(place_), settings_journal(place_)),
@@ -187,7 +191,10 @@ LiveLoadCell::LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock)
       throw DeviceError("Net Box " + place_.host, "compare its scale", finding->what, finding->next_move);
     findings_.push_back(std::move(*finding));
   }
-  SlotPages slots = read_slot_pages([&](const std::string& target) { return page_of(place_, target); });
+  SlotPages slots = read_slot_pages([&](const std::string& target) {
+    require_no_stop(stop_asked);
+    return page_of(place_, target);
+  });
   slots_json_ = std::move(slots.json);
   findings_.insert(findings_.end(), slots.findings.begin(), slots.findings.end());
 }
@@ -242,13 +249,13 @@ LiveBench::LiveBench(const profiles::Bench& place, const std::function<bool()>& 
     : place_(place),
       clock_(place.simulation ? place.simulation->time_scale : 1.0),
       air_(place.ambient, clock_),
-      load_cell_(place.netbox, clock_),
+      load_cell_(place.netbox, clock_, stop_asked),
       supply_(place.supply ? std::make_unique<LiveSupply>(*place.supply, clock_) : nullptr),
       powered_(power(stop_asked)),
       motor_(place.iq, clock_) {}
 
 std::unique_ptr<Powered> LiveBench::power(const std::function<bool()>& stop_asked) {
-  if (stop_asked()) throw Interrupted("stopped by request, before anything was switched on");
+  require_no_stop(stop_asked);
   require_awake(clock_);
   return supply_ ? std::make_unique<Powered>(*supply_) : nullptr;
 }

@@ -55,8 +55,9 @@ class LiveMotor final : public MotorLink {
 class LiveLoadCell final : public LoadCellLink {
  public:
   /// Sets the box as the bench file wants it, reads the configuration, holds it against what TCP says, reads the pages
-  /// of all slots. The box's settings come back when this dies, or when the next program starts. Throws DeviceError.
-  LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock);
+  /// of all slots. The box's settings come back when this dies, or when the next program starts. `stop_asked` is asked
+  /// before each page. Throws DeviceError, Interrupted.
+  LiveLoadCell(profiles::NetBoxPlace place, const Clock& clock, const std::function<bool()>& stop_asked);
   [[nodiscard]] const netbox::Configuration& configuration() const override { return cell_->configuration(); }
   [[nodiscard]] std::vector<netbox::Finding> findings() const override { return findings_; }
   results::LoadCellScale start() override;

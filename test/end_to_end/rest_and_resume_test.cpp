@@ -113,7 +113,7 @@ INSTANTIATE_TEST_SUITE_P(Of, AfterAKill, testing::Bool(), [](const testing::Test
 });
 
 TEST(Signal, WhileConnectingIsHeardBeforeAnythingIsSwitchedOn) {
-  Stand stand(true, "  - {at_s: 0, for_s: 1000, kind: http_slow, delay_s: 1.5}\n");
+  Stand stand(true, "  - {at_s: 0, for_s: 1000, kind: http_slow, delay_s: 1}\n");
   Process run(stand.first({"--yes"}));
   run.wait_for("Ctrl-C lets the motor coast");
   run.signal(SIGINT);
