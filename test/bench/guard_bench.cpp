@@ -38,6 +38,8 @@ class CellBench final : public daq::Bench, private daq::LoadCellLink {
   [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
   [[nodiscard]] Duration sync_interval() const override { return std::chrono::milliseconds(500); }
   void mounted(const std::string&, double) override {}
+  [[nodiscard]] bool unpower() override { return false; }
+  void repower() override {}
   results::LoadCellScale start() override {
     cell_.start();
     return daq::to_scale(cell_.configuration());

@@ -45,6 +45,8 @@ class WatchedBench final : public daq::Bench {
   }
   results::FileLayer& files() override { return bench_.files(); }
   Duration sync_interval() const override { return bench_.sync_interval(); }
+  [[nodiscard]] bool unpower() override { return bench_.unpower(); }
+  void repower() override { bench_.repower(); }
   void mounted(const std::string& propeller_id, double occlusion_deg) override {
     bench_.mounted(propeller_id, occlusion_deg);
   }
