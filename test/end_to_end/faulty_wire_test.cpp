@@ -98,7 +98,7 @@ TEST(FaultyWire, AStolenStreamEndsTheCampaignWithTheMotorStopped) {
   write(bench.path("short.yaml"), short_campaign_text("0", 1, 60));  // one run of 36 s and more
   Process run(bench.run_command());
   EXPECT_EQ(run.wait(), 4) << run.err();
-  EXPECT_THAT(run.err(), HasSubstr("recorded so far: "));
+  EXPECT_THAT(run.err(), HasSubstr("this run up to here in "));
   EXPECT_TRUE(bench.motor_stops());
 }
 

@@ -64,7 +64,7 @@ TEST(Resume, RefusesAChangedCampaignBeforeAnyDeviceIsAsked) {
   run.wait_for("run  1/3");
   run.signal(SIGINT);
   EXPECT_EQ(run.wait(), 130) << run.err();
-  EXPECT_THAT(run.err(), HasSubstr("go on with: kphi run "));
+  EXPECT_THAT(run.err(), HasSubstr("continue with: kphi run "));
   const std::string folder = folder_of(bench);
   bench.process().signal(SIGKILL);
 

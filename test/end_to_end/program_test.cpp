@@ -79,7 +79,7 @@ TEST(Program, StopsOnCtrlCWithTheMotorCoastingAndTheFileKept) {
     run.wait_for("step  2/4");
     run.signal(signal_number);
     EXPECT_EQ(run.wait(), 130) << run.err();
-    EXPECT_THAT(run.err(), HasSubstr("recorded so far: "));
+    EXPECT_THAT(run.err(), HasSubstr("this run up to here in "));
     EXPECT_TRUE(bench.motor_stops());
   }
 }
@@ -99,7 +99,7 @@ TEST(Program, StopsWhenTheBenchVanishesMidRun) {
   run.wait_for("step  2/4");
   bench.process().signal(SIGKILL);
   EXPECT_EQ(run.wait(), 4) << run.err();
-  EXPECT_THAT(run.err(), HasSubstr("recorded so far: "));
+  EXPECT_THAT(run.err(), HasSubstr("this run up to here in "));
 }
 
 json info_of(const std::string& path) {

@@ -47,7 +47,7 @@ TEST(SlowSupply, DisturbsNothingAndNoneOfItsLateAnswersBecomesAValue) {
   ASSERT_GT(kept.supply.size(), 8u);
   std::int64_t longest = 0;
   for (std::size_t i = 0; i < kept.supply.size(); ++i) {
-    EXPECT_GT(kept.supply[i].voltage_v, 11.3) << "a late answer";
+    EXPECT_GT(kept.supply[i].voltage_v, 10) << "a late answer; a step up may load the supply down to 10.9 V";
     EXPECT_EQ(kept.supply[i].set_voltage_v, 12);
     if (i > 0) longest = std::max(longest, kept.supply[i].time_ns - kept.supply[i - 1].time_ns);
   }

@@ -139,7 +139,7 @@ const Way kWays[] = {
     {"Derate", kScript, nullptr, "kind: motor_redline, speed_rad_s: 500, for_s: 1000", 4, "derate"},
     {"PowerSafety", kScript, nullptr, "kind: motor_over_voltage, volts: 20, for_s: 1000", 4, "power_safety"},
     {"RotorLocked", kScript, nullptr, "kind: motor_locked, for_s: 1000", 4, "rotor", kStrayed},
-    {"SupplySag", kScript, nullptr, "kind: motor_sag, volts: 8.5, for_s: 1000", 4, "power_safety"},
+    {"SupplySag", kScript, nullptr, "kind: motor_sag, volts: 8.5, for_s: 1000", 4, "power_safety|under-voltage"},
     {"BrownOut", kScript, nullptr, "kind: motor_brown_out, down_s: 0.05", 4, "restarted"},
     {"Unplugged", kScript, nullptr, "kind: motor_unplug, for_s: 1000", 4, "", kPrompt, false},
     {"ModuleUnheard", kScript, nullptr, "kind: motor_mute, for_s: 1000", 4, "motor reading"},
