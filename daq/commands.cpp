@@ -212,7 +212,7 @@ void add_run(CLI::App& program, int& exit_code) {
                       "campaign file; with --resume that of the folder if none is named");
   command->add_option("--bench", options->bench, "bench file")->required();
   command->add_option("--out", options->out, "where the campaign's folder is made")->capture_default_str();
-  command->add_option("--resume", options->resume, "go on with the campaign of this folder at its first unfinished run")
+  command->add_option("--resume", options->resume, "continue the campaign of this folder at its first unfinished run")
       ->check(CLI::ExistingDirectory);
   command
       ->add_flag("--accept-changes", options->accept_changes,
