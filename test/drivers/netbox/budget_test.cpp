@@ -18,7 +18,8 @@ struct Budget {
 };
 
 /// Where each record wakes its consumer, the cost beside a bare read is the kernel's price of a wake-up: the same code
-/// measured 0.9 on one machine and 2.6 to 4.8 on another. How many wake-ups there are is the driver's.
+/// stayed within 1.0 and 2.5 on one machine and took 2.6 to 4.8 on another. How many wake-ups there are is the
+/// driver's.
 constexpr double kAnyCost = 1e9;
 
 struct Way {
