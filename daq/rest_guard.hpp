@@ -3,7 +3,7 @@
 //
 // Trips when the rotor turns, when its module drives or brakes it, when a supply of ours has its output on without
 // having been asked, and when this computer slept; then it lets the motor go and cuts the supply. A module that does
-// not answer, since somebody has cut its power, is no trip.
+// not answer, for example because its power was cut by hand, does not trip.
 #pragma once
 
 #include <atomic>
@@ -21,7 +21,7 @@ inline constexpr double kSpinDownLimitSeconds = 30;  ///< a rotor that coasts is
 
 class RestGuard {
  public:
-  /// `motor_has_power`: as far as the bench knows. The bench outlives this; nobody else takes its readings meanwhile.
+  /// `motor_has_power`: as far as the bench knows. The bench outlives this. Takes all its readings.
   RestGuard(Bench& bench, bool motor_has_power);
   RestGuard(const RestGuard&) = delete;
   RestGuard& operator=(const RestGuard&) = delete;

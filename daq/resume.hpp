@@ -15,7 +15,7 @@ namespace kphi::daq {
 
 struct Resumption {
   results::CampaignState state;
-  std::string cleared_by;       ///< who has looked at the stand since a safety stop; empty: nobody
+  std::string cleared_by;       ///< name of the operator who cleared the safety stop; empty: not cleared
   bool accept_changes = false;  ///< the person wants to go on although something is not what it was
 };
 

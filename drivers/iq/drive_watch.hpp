@@ -1,7 +1,7 @@
 // Whether the module still drives as it was told to. It may have stopped by itself meanwhile: by its communication
-// timeout, a fault, an order of somebody else. A speed sent then would start a rotor that was let go, so each speed but
-// the first of a spin waits until the module has just said, to a question put after the speed before, that it drives.
-// All times are bench time.
+// timeout, a fault, an order from another program. A speed sent then would start a rotor that was let go, so each speed
+// but the first of a spin waits until the module has just said, to a question put after the speed before, that it
+// drives. All times are bench time.
 #pragma once
 
 #include <optional>
