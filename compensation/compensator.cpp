@@ -52,11 +52,11 @@ ContactFreeWindow window_of(const Airframe& airframe) noexcept {
 /// As a number that is added: the compiler makes vector instructions of it.
 constexpr double worth(Flag flag) noexcept { return static_cast<double>(flag); }
 
-LineDoubts doubts_about(const ThrustLine& line, ScalingLaw law) noexcept {
+LineDoubts doubts_about(const ThrustCurve& line, ScalingLaw law) noexcept {
   LineDoubts doubts;
-  doubts.gains_with_occlusion = line.slope_per_rad() >= 0.0;
-  // A line forced through K_T may miss it by the rounding of its file.
-  const double offset = line.intercept() / line.thrust_coefficient() - 1.0;
+  doubts.gains_with_occlusion = line.at(line.largest_fitted()) >= line.at(Radians(0.0));
+  // A curve forced through K_T may miss it by the rounding of its file.
+  const double offset = line.at(Radians(0.0)) / line.thrust_coefficient() - 1.0;
   doubts.steps_at_contact = offset < -1e-9 || (law == ScalingLaw::published && offset > 1e-9);
   return doubts;
 }
@@ -80,17 +80,16 @@ const char* describe(Refusal refusal) noexcept {
       return "a hinge of the polygon body is not finite; check its place [m] and turn [rad]";
     case Refusal::overlap:
       return "a line was fitted with another overlap measure than the airframe flies with; fly the measure of the fit, "
-             "or "
-             "fit again";
+             "or fit again";
   }
   return "unknown refusal";
 }
 
-BuildOutcome Compensator::build(const std::array<ThrustLine, 4>& lines, const Airframe& airframe,
+BuildOutcome Compensator::build(const std::array<ThrustCurve, 4>& lines, const Airframe& airframe,
                                 ScalingLaw law) noexcept {
   BuildOutcome outcome;
   outcome.refusal = refusal_of(airframe);
-  for (const ThrustLine& line : lines) {
+  for (const ThrustCurve& line : lines) {
     if (outcome.refusal == Refusal::none && line.overlap() != airframe.overlap) outcome.refusal = Refusal::overlap;
   }
   if (outcome.refusal != Refusal::none) return outcome;
@@ -99,7 +98,7 @@ BuildOutcome Compensator::build(const std::array<ThrustLine, 4>& lines, const Ai
   return outcome;
 }
 
-Compensator::Compensator(const std::array<ThrustLine, 4>& lines, const Airframe& airframe, ScalingLaw law) noexcept
+Compensator::Compensator(const std::array<ThrustCurve, 4>& lines, const Airframe& airframe, ScalingLaw law) noexcept
     : slowest_(airframe.slowest_speed.value()),
       fastest_(airframe.fastest_speed.value()),
       law_(law),
@@ -150,7 +149,7 @@ void Compensator::enable(bool on) noexcept {
 }
 
 void Compensator::apply_occlusion(std::size_t rotor) noexcept {
-  const ThrustLine& line = lines_[rotor];
+  const ThrustCurve& line = lines_[rotor];
   const Radians phi = occlusion_angles_[rotor];
   const bool covered = enabled_ && phi.value() > 0.0;
   const double scaling = covered ? line.scaling_factor(phi, law_) : 1.0;

@@ -13,7 +13,7 @@
 
 #include "compensation/airframe.hpp"
 #include "compensation/rim_arc.hpp"
-#include "compensation/thrust_line.hpp"
+#include "compensation/thrust_curve.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::compensation {
@@ -80,7 +80,7 @@ struct BuildOutcome;
 class Compensator {
  public:
   /// The only place that refuses. `lines` and `airframe` in the order of the rotors.
-  [[nodiscard]] static BuildOutcome build(const std::array<ThrustLine, 4>& lines, const Airframe& airframe,
+  [[nodiscard]] static BuildOutcome build(const std::array<ThrustCurve, 4>& lines, const Airframe& airframe,
                                           ScalingLaw law = ScalingLaw::clamped) noexcept;
 
   /// At servo rate. Recomputes φ and k_i of the arms that moved; an angle that is not finite keeps the last φ.
@@ -115,7 +115,7 @@ class Compensator {
   [[nodiscard]] const std::array<Flags, 4>& arm_flags() const noexcept { return arm_flags_; }
 
  private:
-  Compensator(const std::array<ThrustLine, 4>& lines, const Airframe& airframe, ScalingLaw law) noexcept;
+  Compensator(const std::array<ThrustCurve, 4>& lines, const Airframe& airframe, ScalingLaw law) noexcept;
   /// What a new angle means for φ: nothing, that it is 0 again, or that it must be computed.
   enum class Arm : std::uint8_t { at_rest, left_body, near_body };
   [[nodiscard]] Arm take(std::size_t i, Radians angle) noexcept;
@@ -135,7 +135,7 @@ class Compensator {
   std::array<double, 4> scaling_factors_{};
   std::array<Newtons, 4> thrust_max_{};
   std::array<double, 4> drag_scale_{};
-  std::array<ThrustLine, 4> lines_;
+  std::array<ThrustCurve, 4> lines_;
   Airframe airframe_;
   ContactFreeWindow contact_free_;
 };

@@ -48,7 +48,7 @@ std::optional<OverlapMeasure> measure_of(int code) noexcept {
   return static_cast<OverlapMeasure>(code);
 }
 
-std::optional<ThrustLine> line_of(const kphi_line& line) noexcept {
+std::optional<ThrustCurve> curve_of(const kphi_line& line) noexcept {
   const auto overlap = measure_of(line.overlap);
   if (!overlap) return std::nullopt;
   std::optional<LineUncertainty> uncertainty;
@@ -56,8 +56,8 @@ std::optional<ThrustLine> line_of(const kphi_line& line) noexcept {
     uncertainty =
         LineUncertainty{line.thrust_coefficient_error, line.intercept_variance, line.covariance, line.slope_variance};
   }
-  return ThrustLine::from(ThrustCoefficient(line.thrust_coefficient), ThrustCoefficient(line.intercept),
-                          line.slope_per_rad, Radians(line.largest_fitted_rad), *overlap, uncertainty);
+  return ThrustCurve::from_line(ThrustCoefficient(line.thrust_coefficient), ThrustCoefficient(line.intercept),
+                                line.slope_per_rad, Radians(line.largest_fitted_rad), *overlap, uncertainty);
 }
 
 std::optional<PolygonBody> body_of(const kphi_airframe& airframe) noexcept {
@@ -104,8 +104,8 @@ int kphi_compensator_build(kphi_compensator* out, const kphi_line lines[4], cons
     frame.polygon = body_of(*airframe);
     if (!frame.polygon) return kBadOutline;
   }
-  const std::optional<ThrustLine> made[4] = {line_of(lines[0]), line_of(lines[1]), line_of(lines[2]),
-                                             line_of(lines[3])};
+  const std::optional<ThrustCurve> made[4] = {curve_of(lines[0]), curve_of(lines[1]), curve_of(lines[2]),
+                                              curve_of(lines[3])};
   for (const auto& line : made) {
     if (!line) return kBadLine;
   }
@@ -120,8 +120,7 @@ const char* kphi_refusal_text(int refusal) {
   switch (refusal) {
     case kBadLine:
       return "a line needs K_T > 0, intercept > 0, a finite slope, a largest angle in (0, 2 pi], a known overlap "
-             "measure, "
-             "and variances that are not negative";
+             "measure, and variances that are not negative";
     case kBadOutline:
       return "the body must have 3 to 12 corners, finite, counter-clockwise and convex";
     case kBadLaw:

@@ -14,7 +14,7 @@ extern "C" {
 
 /* How the overlap of disk and body becomes one angle phi (overlap_measure.hpp). */
 enum { KPHI_RIM_ARC = 0, KPHI_AREA_SHARE = 1, KPHI_LOAD_SHARE = 2 };
-/* How k(phi) becomes k_i (thrust_line.hpp): held in [0.1, 1], or equation 4 of the paper to the letter. */
+/* How k(phi) becomes k_i (thrust_curve.hpp): held in [0.1, 1], or equation 4 of the paper to the letter. */
 enum { KPHI_LAW_CLAMPED = 0, KPHI_LAW_PUBLISHED = 1 };
 /* Flags of one rotor (compensator.hpp). */
 enum {

@@ -1,16 +1,16 @@
-#include "daq/deterministic_bench.hpp"
-#include "daq/live_bench.hpp"
-#include "daq/runs_apart.hpp"
+#include "daq/hardware/live_bench.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
+#include "daq/virtual/per_run_bench.hpp"
 
 namespace kphi::daq {
 
-std::unique_ptr<Bench> connect(const profiles::Bench& place, const std::function<bool()>& stop_asked) {
-  if (place.simulation && place.simulation->in_process) {
+std::unique_ptr<Bench> connect(const profiles::BenchConfig& config, const std::function<bool()>& stop_asked) {
+  if (config.simulation && config.simulation->in_process) {
     // A script of faults speaks of one bench that lives through the whole campaign.
-    if (!place.simulation->faults.empty()) return std::make_unique<DeterministicBench>(place);
-    return std::make_unique<RunsApart>(place);
+    if (!config.simulation->faults.empty()) return std::make_unique<DeterministicBench>(config);
+    return std::make_unique<PerRunBench>(config);
   }
-  return std::make_unique<LiveBench>(place, stop_asked);
+  return std::make_unique<LiveBench>(config, stop_asked);
 }
 
 }  // namespace kphi::daq

@@ -41,19 +41,19 @@ void require_mountings(const Answers& answers, std::span<const double> expected_
   for (std::size_t i = 0; i < expected_deg.size(); ++i) {
     if (i == answers.mountings.size()) {
       throw ConfigurationError(
-          fmt::format("{}: mountings ends after {} of {}: the next one asked for is {:g} degrees; "
+          fmt::format("{}: mountings ends after {} of {}: the next one is {:g}°; "
                       "kphi run --dry-run lists them",
                       answers.place(answers.end_of_mountings), i, expected_deg.size(), expected_deg[i]));
     }
     const auto& [value, mark] = answers.mountings[i];
     if (value == expected_deg[i]) continue;
     throw ConfigurationError(
-        fmt::format("{}: mounting {} is {:g} degrees, the campaign asks for {:g}; kphi run --dry-run "
+        fmt::format("{}: mounting {} is {:g}°, the campaign needs {:g}°; kphi run --dry-run "
                     "lists them",
                     answers.place(mark), i + 1, value, expected_deg[i]));
   }
   if (answers.mountings.size() == expected_deg.size()) return;
-  throw ConfigurationError(fmt::format("{}: mounting {} is left over: the campaign asks for {}; take it out",
+  throw ConfigurationError(fmt::format("{}: mounting {} is one too many: the campaign needs {}; remove it",
                                        answers.place(answers.mountings[expected_deg.size()].mark),
                                        expected_deg.size() + 1, expected_deg.size()));
 }

@@ -1,11 +1,11 @@
-// What an operator would answer during a campaign, written down before it: for a run without a terminal.
+// The answers file: the operator's answers during a campaign, written before it, for a run without a terminal.
 #pragma once
 
 #include <span>
 #include <string>
 #include <vector>
 
-#include "profiles/finding.hpp"
+#include "profiles/refused_file.hpp"
 
 namespace kphi::profiles {
 
@@ -18,9 +18,9 @@ struct Answer {
 struct Answers {
   std::vector<Answer<double>> mountings;    ///< the angles that were mounted, degrees, in the order asked
   std::vector<Answer<bool>> run_again;      ///< when another run was asked for, in the order asked
-  bool continue_after_safety_stop = false;  ///< somebody has looked at the stand since the stop
-  Mark end_of_mountings;                    ///< of the list, for what it lacks
-  Mark end_of_run_again;                    ///< likewise; of the file's begin when there is no such list
+  bool continue_after_safety_stop = false;  ///< a person has inspected the stand since the stop
+  Mark end_of_mountings;                    ///< of the list, for a missing angle
+  Mark end_of_run_again;                    ///< likewise; the file's beginning without such a list
   std::string path;
 
   /// "answers.yaml:4:5".
@@ -31,7 +31,7 @@ struct Answers {
 [[nodiscard]] Answers load_answers(const std::string& path);
 [[nodiscard]] Answers parse_answers(const std::string& text, const std::string& path);
 
-/// Throws ConfigurationError, one line, unless the mountings are just these, in this order.
+/// Throws ConfigurationError, one line, unless the mountings are exactly these, in this order.
 void require_mountings(const Answers& answers, std::span<const double> expected_deg);
 
 }  // namespace kphi::profiles

@@ -14,7 +14,7 @@ void check_speeds(ProfileReader& file) {
   for (const char* end : {"/profile/first_rpm", "/profile/last_rpm"}) {
     if (file.number(end) <= most) continue;
     file.refuse(end, fmt::format("{} is above {} RPM (limits.speed_max_rpm)", file.number(end), most),
-                "lower it, or raise the limit if propeller and motor bear it");
+                "lower it, or raise the limit if propeller and motor tolerate it");
   }
 }
 
@@ -31,8 +31,8 @@ void check_occlusions(ProfileReader& file, const std::vector<double>& occlusions
     for (std::size_t j = 0; j < i; ++j) {
       if (occlusions_deg[i] != occlusions_deg[j]) continue;
       file.refuse(fmt::format("/occlusions_deg/{}", i),
-                  fmt::format("{} degrees is listed before, at [{}]", occlusions_deg[i], j),
-                  "list each occlusion once; repetitions says how often it is run");
+                  fmt::format("{}° is already listed at [{}]", occlusions_deg[i], j),
+                  "list each occlusion once; repetitions sets how often it is run");
       break;
     }
   }
@@ -82,7 +82,7 @@ Order read_order(ProfileReader& file) {
   for (const char* shuffled : {"/order/runs", "/order/steps"}) {
     if (file.has("/order/seed") || file.get_or<std::string>(shuffled, "") != "shuffled") continue;
     file.refuse(shuffled, "shuffled without a seed",
-                "add seed: and any whole number; the same one gives this order again");
+                "add seed: and any whole number; the same seed gives the same order");
   }
   return order;
 }

@@ -1,4 +1,4 @@
-// What a campaign file says: propeller × occlusions × repetitions of one step profile.
+// The campaign file: propeller × occlusions × repetitions of one step profile.
 #pragma once
 
 #include <cstdint>
@@ -25,18 +25,18 @@ struct StepProfile {
   Seconds dwell;
   RadPerSec first;
   RadPerSec last;
-  std::optional<double> slew_rad_s2{};  ///< the commanded speed changes no faster; none: at once
+  std::optional<double> slew_rad_s2{};  ///< limit of the commanded acceleration; nullopt: steps
   /// All levels, ascending or descending, `steps` of them.
   [[nodiscard]] std::vector<RadPerSec> levels() const;
 };
 
-/// Between runs the motor stands until its coil has cooled down.
+/// The motor rests between runs until its coil has cooled down.
 struct Cooling {
   Celsius pause_above;
   Celsius resume_below;
 };
 
-/// Beyond these the run is refused (speed) or stopped (the rest).
+/// A plan beyond the speed is refused; exceeding any of them during a run coasts the motor.
 struct Limits {
   RadPerSec speed_max;
   Newtons thrust_max;
@@ -54,11 +54,11 @@ struct Campaign {
   Propeller propeller;
   std::vector<double> occlusions_deg;  ///< degrees in [0, 360), each once, as listed
   int repetitions = 3;
-  int repetitions_extra_max = 1;  ///< runs of an occlusion beyond these, when its repetitions disagree
+  int repetitions_extra_max = 1;  ///< more runs of an occlusion whose repetitions disagree
   Order order;
   StepProfile profile;
   Seconds zero;             ///< motor off, before and after each run
-  bool box_bias = false;    ///< before each run the box takes its load as zero, measured for `zero` before and after
+  bool box_bias = false;    ///< the box is tared before each run; the load is measured for `zero` before and after
   Seconds minimum_discard;  ///< at the start of every step, not averaged
   Limits limits;
   Volts supply;

@@ -19,10 +19,10 @@
 namespace kphi::profiles {
 namespace {
 
-/// What the files of one call were, for the checks of one against another.
+/// The files of one call, for the checks of one against another.
 struct Loaded {
   std::vector<std::pair<std::size_t, Campaign>> campaigns;  ///< with the file's number
-  std::vector<Bench> benches;
+  std::vector<BenchConfig> benches;
   std::vector<std::pair<std::size_t, Answers>> answers;  ///< with the file's number
 };
 
@@ -36,10 +36,10 @@ std::string summary_of(const Campaign& campaign, const Plan& plan, double rate_h
   const double increment = (to_rpm(profile.last) - to_rpm(profile.first)) / (profile.steps - 1);
   return fmt::format(
       "  propeller  {} ({}, {} in, {} blades)\n"
-      "  runs       {}: occlusions {:g} degrees, {} repetitions of each, {} mountings\n"
+      "  runs       {}: occlusions {:g}°, {} repetitions of each, {} mountings\n"
       "  order      {}\n"
       "  steps      {}: {} per run, {:.6g} to {:.6g} RPM by {:.6g} RPM, {:g} s each\n"
-      "  time       {} spinning, {} with the zeros, besides mounting\n"
+      "  time       {} spinning, {} with the zeros, without mounting\n"
       "  disk       {:.3g} million samples at {:g} Hz, {:.3g} MB\n",
       campaign.propeller.id, campaign.propeller.name, campaign.propeller.diameter_in, campaign.propeller.blades,
       plan.runs.size(), fmt::join(campaign.occlusions_deg, ", "), campaign.repetitions, plan.mountings,
@@ -55,7 +55,7 @@ nlohmann::ordered_json report_of(const Plan& plan) {
           {"samples", plan.samples},       {"bytes", plan.bytes}};
 }
 
-std::string summary_of(const Bench& bench) {
+std::string summary_of(const BenchConfig& bench) {
   const std::string simulated =
       !bench.simulation ? "no"
       : bench.simulation->in_process
@@ -74,7 +74,7 @@ std::string summary_of(const Bench& bench) {
 std::string summary_of(const Answers& answers) {
   std::string mountings;
   for (const auto& [angle, mark] : answers.mountings) mountings += fmt::format(" {:g}", angle);
-  return fmt::format("  mountings {} degrees\n  run again  {} decisions\n", mountings, answers.run_again.size());
+  return fmt::format("  mountings {}°\n  run again  {} decisions\n", mountings, answers.run_again.size());
 }
 
 std::string in_words(const Vehicle& vehicle) {
@@ -82,7 +82,7 @@ std::string in_words(const Vehicle& vehicle) {
   return fmt::format("{} corners", vehicle.body->outline.size());
 }
 
-/// Each shape with the φ that its arms give.
+/// A shape with the occlusion of each arm.
 std::string summary_of_shape(const std::string& name, const std::array<Radians, 4>& angles,
                              const compensation::Airframe& airframe) {
   std::string arms, occlusions;
@@ -90,7 +90,7 @@ std::string summary_of_shape(const std::string& name, const std::array<Radians, 
     arms += fmt::format(" {:.6g}", to_degrees(angles[i]));
     occlusions += fmt::format(" {:.4g}", to_degrees(compensation::occlusion_of_arm(airframe, i, angles[i])));
   }
-  return fmt::format("  shape {:<4} arms at{} degrees, occluded by{} degrees\n", name, arms, occlusions);
+  return fmt::format("  shape {:<4} arms at{}°, occluded by{}°\n", name, arms, occlusions);
 }
 
 std::string summary_of(const Dynamics& dynamics) {
@@ -124,7 +124,7 @@ std::string summary_of(const Vehicle& vehicle) {
       to_rpm(vehicle.speed_max), compensation::name_of(vehicle.overlap), shapes, what_flies(vehicle));
 }
 
-/// Value of the first line `format: …`: enough for a file that is no YAML, or YAML of another kind.
+/// Value of the first line `format: …`: enough for a file that is not YAML.
 std::string format_line(const std::string& text) {
   constexpr std::string_view kKey = "format:";
   std::size_t begin = text.compare(0, kKey.size(), kKey) == 0 ? 0 : text.find("\nformat:");
@@ -168,7 +168,7 @@ std::optional<FileKind> kind_of(const std::string& format) {
   return std::nullopt;
 }
 
-/// By its format; without a known one by its keys, so that it gets all its findings at once.
+/// By its format; without a known one by its keys, so that all findings come at once.
 FileKind recognise(const std::string& text, const std::string& path, const std::string& format,
                    const std::vector<ForeignKind>& foreign) {
   if (const auto kind = kind_of(format)) return *kind;
@@ -179,7 +179,7 @@ FileKind recognise(const std::string& text, const std::string& path, const std::
   for (const FileKindInfo& candidate : kFileKinds) formats.emplace_back(candidate.format);
   const auto near = nearest_name(format, formats);
   throw RefusedFile(path, {{document.value_mark("/format"), "/format",
-                            format.empty() ? "the file does not say what it is" : format + " is not a known format",
+                            format.empty() ? "unknown kind of file: no format given" : "unknown format " + format,
                             near ? fmt::format("did you mean format: {}?", *near)
                                  : fmt::format("begin it with format: and one of {}", fmt::join(formats, ", "))}});
 }
@@ -197,7 +197,7 @@ void judge(CheckedFile& file, std::size_t number, const std::vector<ForeignKind>
   file.kind = info(kind).word;
   if (kind == FileKind::campaign) {
     const Campaign campaign = parse_campaign(text, file.path);
-    const Bench usual;
+    const BenchConfig usual;
     const Plan plan = make_plan(campaign, usual);
     file.summary = summary_of(campaign, plan, usual.netbox.rate_hz);
     file.report["plan"] = report_of(plan);
@@ -228,7 +228,7 @@ CheckedFile check_file(const std::string& path, std::size_t number, const std::v
   try {
     judge(file, number, foreign, loaded);
   } catch (const RefusedFile& refused) {
-    for (const Finding& finding : refused.findings()) {
+    for (const FileFinding& finding : refused.findings()) {
       refuse(file, describe(path, finding),
              {{"line", finding.mark.line},
               {"column", finding.mark.column},
@@ -243,7 +243,7 @@ CheckedFile check_file(const std::string& path, std::size_t number, const std::v
 
 void check_against_benches(std::vector<CheckedFile>& files, const Loaded& loaded) {
   for (const auto& [number, campaign] : loaded.campaigns) {
-    for (const Bench& bench : loaded.benches) {
+    for (const BenchConfig& bench : loaded.benches) {
       try {
         require_within(campaign, bench);
       } catch (const ConfigurationError& refused) {
@@ -257,7 +257,7 @@ void check_answers(std::vector<CheckedFile>& files, const Loaded& loaded) {
   for (const auto& [number, answers] : loaded.answers) {
     for (const auto& [unused, campaign] : loaded.campaigns) {
       try {
-        require_mountings(answers, make_plan(campaign, Bench{}).mounting_angles());
+        require_mountings(answers, make_plan(campaign, BenchConfig{}).mounting_angles());
       } catch (const ConfigurationError& refused) {
         refuse(files[number], refused.what());
       }

@@ -1,4 +1,4 @@
-// Names of keys: the unit at their end, and the key that somebody meant who wrote another one.
+// Names of keys: their unit, and the known key that an unknown one was meant to be.
 #pragma once
 
 #include <optional>
@@ -14,7 +14,7 @@ struct KeyParts {
 };
 [[nodiscard]] KeyParts split_unit(const std::string& key);
 
-/// The one of `names` that differs from `name` by the fewest slips of the finger, if that is few for its length.
+/// The one of `names` with the fewest typing errors from `name`, if these are few for its length.
 [[nodiscard]] std::optional<std::string> nearest_name(const std::string& name, const std::vector<std::string>& names);
 
 /// The one of `names` that is `name` but for the unit: dwell_ms or dwell → dwell_s.

@@ -6,7 +6,7 @@
 #include <array>
 #include <string_view>
 
-#include "profiles/shuffle.hpp"
+#include "base/random.hpp"
 
 namespace kphi::profiles {
 namespace {
@@ -47,8 +47,8 @@ std::string to_words(const Order& order) {
   const bool seeded = order.runs == RunOrderKind::shuffled || order.steps == StepOrderKind::shuffled;
   return fmt::format("runs {}, steps {}{}{}{}", name_of(order.runs), name_of(order.steps),
                      seeded ? fmt::format(" (seed {})", order.seed) : "",
-                     order.remount_each_repetition ? ", mounted anew for each repetition" : "",
-                     order.reference ? ", a reference run at begin and end" : "");
+                     order.remount_each_repetition ? ", remounted for each repetition" : "",
+                     order.reference ? ", reference runs first and last" : "");
 }
 
 }  // namespace kphi::profiles

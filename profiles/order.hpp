@@ -1,4 +1,4 @@
-// In which order a campaign runs its occlusions and, within each run, its speeds.
+// The order of a campaign's runs, and of the speeds within each.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,15 @@
 namespace kphi::profiles {
 
 enum class RunOrderKind : std::uint8_t { listed, shuffled };
-/// From first_rpm to last_rpm; the other way; at random; from first to last and back, the turning point held once.
+/// From first_rpm to last_rpm; from last to first; at random; from first to last and back, the turning point held once.
 enum class StepOrderKind : std::uint8_t { up, down, shuffled, up_and_down };
 
 struct Order {
   RunOrderKind runs = RunOrderKind::listed;
   StepOrderKind steps = StepOrderKind::up;
-  std::uint64_t seed = 0;                ///< of what is shuffled
+  std::uint64_t seed = 0;                ///< of the shuffling
   bool remount_each_repetition = false;  ///< the occlusion is taken off and mounted again for each run
-  bool reference = false;                ///< a run without occlusion at the begin and at the end of the session
+  bool reference = false;                ///< the session begins and ends with a run without occlusion
 };
 
 /// One commanded speed of a run.
@@ -29,7 +29,7 @@ struct PlannedStep {
   RadPerSec speed;
 };
 
-/// `run_seed`: of this run alone, so that its order depends on no other run.
+/// `run_seed`: this run's own, so that its order depends on no other run.
 [[nodiscard]] std::vector<PlannedStep> steps_in_order(const std::vector<RadPerSec>& levels, StepOrderKind kind,
                                                       std::uint64_t run_seed);
 
@@ -37,7 +37,7 @@ struct PlannedStep {
 [[nodiscard]] StepOrderKind step_order_from(const std::string& name);
 [[nodiscard]] const char* name_of(RunOrderKind kind);
 [[nodiscard]] const char* name_of(StepOrderKind kind);
-/// "runs shuffled (seed 7), steps up_and_down, mounted anew for each repetition, a reference run at begin and end".
+/// "runs shuffled (seed 7), steps up_and_down, remounted for each repetition, reference runs first and last".
 [[nodiscard]] std::string to_words(const Order& order);
 
 }  // namespace kphi::profiles

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "profiles/shuffle.hpp"
+#include "base/random.hpp"
 #include "profiles/strict_yaml.hpp"
 
 namespace kphi::profiles {
@@ -71,7 +71,7 @@ std::vector<double> Plan::mounting_angles() const {
   return angles_deg;
 }
 
-Plan make_plan(const Campaign& campaign, const Bench& bench) {
+Plan make_plan(const Campaign& campaign, const BenchConfig& bench) {
   Plan plan;
   plan.runs = measuring_runs(campaign);
   if (campaign.order.reference) {
@@ -111,7 +111,7 @@ Seconds ramp_time(const StepProfile& profile, const PlannedRun& run) {
   return Seconds(change / *profile.slew_rad_s2);
 }
 
-void require_within(const Campaign& campaign, const Bench& bench) {
+void require_within(const Campaign& campaign, const BenchConfig& bench) {
   const bool last_is_top = campaign.profile.last >= campaign.profile.first;
   const RadPerSec top = last_is_top ? campaign.profile.last : campaign.profile.first;
   if (top <= bench.iq.speed_max) return;

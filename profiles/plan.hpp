@@ -1,10 +1,10 @@
-// What a campaign means in runs, minutes and bytes, before anything turns.
+// The runs of a campaign, its duration and size, before anything turns.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "profiles/bench.hpp"
+#include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 
 namespace kphi::profiles {
@@ -23,10 +23,10 @@ struct PlannedRun {
 
 struct Plan {
   std::vector<PlannedRun> runs;        ///< in the order in which they are run
-  int mountings = 0;                   ///< times that a person changes the occlusion, the first one included
+  int mountings = 0;                   ///< how often a person mounts an occlusion, the first one included
   int steps = 0;                       ///< in all runs
   Seconds spinning;                    ///< motor on: steps, and ramps between them
-  Seconds bench;                       ///< spinning and zeros; zeros and biases; not: mounting, cooling, spinning down
+  Seconds bench;                       ///< spinning, zeros and biases; without mounting, cooling, spinning down
   std::uint64_t samples_in_steps = 0;  ///< Net Box samples at the bench's rate
   std::uint64_t samples = 0;           ///< zeros included
   std::uint64_t bytes = 0;             ///< of the samples
@@ -36,17 +36,17 @@ struct Plan {
 };
 
 /// The same campaign gives the same plan everywhere. Shuffled, the repetitions of an occlusion stay together after its
-/// mounting, unless each is mounted anew: then all runs are shuffled.
-[[nodiscard]] Plan make_plan(const Campaign& campaign, const Bench& bench);
+/// mounting, unless each is remounted: then all runs are shuffled.
+[[nodiscard]] Plan make_plan(const Campaign& campaign, const BenchConfig& bench);
 
 /// Another repetition of an occlusion, beyond those that the campaign plans.
 [[nodiscard]] PlannedRun extra_run(const Campaign& campaign, double occlusion_deg, int repetition);
 
-/// That the commanded speed spends between the steps of a run, from standstill on; 0 without a slew limit.
+/// Time of all ramps of a run, from standstill on; 0 without a slew limit.
 [[nodiscard]] Seconds ramp_time(const StepProfile& profile, const PlannedRun& run);
 
 /// Throws ConfigurationError, naming both files and both values, if the campaign asks for more speed than the
-/// bench's motor may be told.
-void require_within(const Campaign& campaign, const Bench& bench);
+/// bench's motor allows.
+void require_within(const Campaign& campaign, const BenchConfig& bench);
 
 }  // namespace kphi::profiles

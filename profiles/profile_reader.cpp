@@ -9,7 +9,7 @@
 namespace kphi::profiles {
 namespace {
 
-/// "coefficients" of "kphi-coefficients/1"; empty if that is no format of ours.
+/// "coefficients" of "kphi-coefficients/1"; empty for any other format.
 std::string word_of(const std::string& format) {
   constexpr std::string_view kOurs = "kphi-";
   const auto slash = format.find('/');
@@ -17,7 +17,7 @@ std::string word_of(const std::string& format) {
   return format.substr(kOurs.size(), slash - kOurs.size());
 }
 
-/// A file of another kind is one finding, not one for each of its keys. A slip of the pen is not another kind.
+/// A file of another kind is one finding, not one for each of its keys. A misspelt kind is not another kind.
 void refuse_other_kind(const SourceDocument& document, FileKind kind) {
   if (!document.value.is_object()) return;
   const auto format = document.value.find("format");
@@ -34,7 +34,7 @@ void refuse_other_kind(const SourceDocument& document, FileKind kind) {
 ProfileReader::ProfileReader(const std::string& text, const std::string& path, FileKind kind)
     : document_(parse_strict_yaml(text, path)) {
   refuse_other_kind(document_, kind);
-  for (Finding& finding : check_schema(document_, kind)) document_.findings.push_back(std::move(finding));
+  for (FileFinding& finding : check_schema(document_, kind)) document_.findings.push_back(std::move(finding));
   finish();
 }
 

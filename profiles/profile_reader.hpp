@@ -7,10 +7,10 @@
 
 namespace kphi::profiles {
 
-/// Reads values by JSON pointer. What the schema requires is there and has its type; other values need a default.
+/// Reads values by JSON pointer. Values that the schema requires are present with their type; others need a default.
 class ProfileReader {
  public:
-  /// Throws RefusedFile with all that strict YAML and the schema find.
+  /// Throws RefusedFile with everything that strict YAML and the schema find.
   ProfileReader(const std::string& text, const std::string& path, FileKind kind);
 
   [[nodiscard]] bool has(const std::string& pointer) const;
@@ -32,7 +32,7 @@ class ProfileReader {
   /// Where a value stands.
   [[nodiscard]] Mark mark(const std::string& pointer) const { return document_.value_mark(pointer); }
 
-  /// Notes a finding at the value; `what` goes on after "name: ".
+  /// Adds a finding at the value; `what` follows "name: ".
   void refuse(const std::string& pointer, const std::string& what, const std::string& next_move);
   /// Throws RefusedFile if anything was refused.
   void finish() const;

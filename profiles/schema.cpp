@@ -1,53 +1,35 @@
-// The only file that sees valijson: it takes some ten seconds to compile.
 #include "profiles/schema.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
+#include <functional>
+#include <optional>
+#include <regex>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
-#include <valijson/adapters/nlohmann_json_adapter.hpp>
-#include <valijson/schema.hpp>
-#include <valijson/schema_parser.hpp>
-#include <valijson/validation_results.hpp>
-#include <valijson/validator.hpp>
 
 #include "profiles/key_names.hpp"
+#include "profiles/yaml_text.hpp"
 
 namespace kphi::profiles {
 namespace {
 
 using nlohmann::json;
+using Findings = std::vector<FileFinding>;
 
-struct LoadedSchema {
-  json text;
-  valijson::Schema rules;
-  explicit LoadedSchema(FileKind kind) : text(json::parse(schema_text(kind))) {
-    valijson::adapters::NlohmannJsonAdapter adapter(text);
-    valijson::SchemaParser(valijson::SchemaParser::kDraft7).populateSchema(adapter, rules);
-  }
-};
-
-const LoadedSchema& loaded(FileKind kind) {
-  static const std::array<LoadedSchema, 4> kSchemas{LoadedSchema(FileKind::campaign), LoadedSchema(FileKind::bench),
-                                                    LoadedSchema(FileKind::vehicle), LoadedSchema(FileKind::answers)};
-  return kSchemas[static_cast<std::size_t>(kind)];
-}
-
-/// One complaint of valijson, with the value and the part of the schema that it is about.
-struct Complaint {
+/// A value of the document, and the part of the schema that it must fit.
+struct Spot {
   const SourceDocument& document;
   const json& whole_schema;
   const json& schema;
   const json& value;
   std::string pointer;
-  std::string description;  ///< valijson's words
 
   std::string name() const { return pointer.empty() ? "the file" : dotted(pointer); }
-  std::string own_key() const { return pointer.substr(pointer.rfind('/') + 1); }
   /// " RPM" after a number of a key like last_rpm, or of a list like occlusions_deg.
   std::string unit() const {
     for (std::string rest = pointer; !rest.empty(); rest.resize(rest.rfind('/'))) {
@@ -56,28 +38,46 @@ struct Complaint {
     }
     return "";
   }
-  Finding at_value(std::string what, std::string next_move) const {
-    return {document.value_mark(pointer), pointer, name() + ": " + std::move(what), std::move(next_move)};
+  FileFinding at_value(const std::string& what, const std::string& next_move) const {
+    return {document.value_mark(pointer), pointer, name() + ": " + what, next_move};
   }
   std::string purpose(std::string_view otherwise) const { return schema.value("description", std::string(otherwise)); }
 };
 
-constexpr std::size_t kShownBytes = 60;
+void check(const Spot& spot, Findings& findings);
+
+struct Type {
+  std::string_view name;
+  std::string_view words;
+  bool (json::*is)() const noexcept;
+};
+
+constexpr std::array<Type, 6> kTypes{{{"integer", "a whole number", &json::is_number_integer},
+                                      {"number", "a number", &json::is_number},
+                                      {"string", "text", &json::is_string},
+                                      {"boolean", "true or false", &json::is_boolean},
+                                      {"array", "a list", &json::is_array},
+                                      {"object", "keys", &json::is_object}}};
+
+const Type& type_named(const std::string& name) {
+  const auto* found = std::find_if(kTypes.begin(), kTypes.end(), [&](const Type& type) { return type.name == name; });
+  if (found == kTypes.end()) throw std::invalid_argument("schema: unknown type " + name);
+  return *found;
+}
 
 std::string shown(const json& value) {
+  constexpr std::size_t kShownBytes = 60;
   if (value.is_null()) return "nothing";
   if (value.is_object()) return "keys";
   if (value.is_array()) return "a list";
   std::string text = value.dump();
   if (text.size() > kShownBytes) {
     std::size_t end = kShownBytes;
-    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0u) == 0x80u) --end;  // not inside a character
+    while (end > 0 && is_continuation(text[end])) --end;
     text = text.substr(0, end) + "...";
   }
   return value.is_string() ? "text " + text : text;
 }
-
-std::string joined(const std::vector<std::string>& words) { return fmt::format("{}", fmt::join(words, ", ")); }
 
 std::vector<std::string> keys_of(const json& object) {
   std::vector<std::string> keys;
@@ -85,84 +85,104 @@ std::vector<std::string> keys_of(const json& object) {
   return keys;
 }
 
-std::vector<std::string> known_keys(const json& schema) {
-  const auto properties = schema.find("properties");
-  return properties == schema.end() ? std::vector<std::string>{} : keys_of(*properties);
+std::vector<std::string> known_keys(const json& schema) { return keys_of(schema.value("properties", json::object())); }
+
+bool contains(const std::vector<std::string>& words, const std::string& word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
 }
 
-std::vector<Finding> wrong_type(const Complaint& c) {
-  static const std::array<std::pair<std::string_view, std::string_view>, 6> kWords{{{"integer", "a whole number"},
-                                                                                    {"number", "a number"},
-                                                                                    {"string", "text"},
-                                                                                    {"boolean", "true or false"},
-                                                                                    {"array", "a list"},
-                                                                                    {"object", "keys"}}};
-  if (c.schema["type"].is_array()) {
-    return {c.at_value(fmt::format("{} does not fit", shown(c.value)), "write " + c.schema.value("x_expected", ""))};
+void check_type(const Spot& s, const json& type, Findings& findings) {
+  const auto fits = [&](const json& name) { return (s.value.*type_named(name).is)(); };
+  if (type.is_array()) {
+    if (std::none_of(type.begin(), type.end(), fits))
+      findings.push_back(s.at_value(shown(s.value) + " does not fit", "write " + s.schema.value("x_expected", "")));
+    return;
   }
-  const std::string type = c.schema.value("type", "");
-  const auto* word = std::find_if(kWords.begin(), kWords.end(), [&](const auto& w) { return w.first == type; });
-  const std::string expected(word->second);
-  std::string next_move = fmt::format("write {} here ({})", expected, c.purpose(c.name()));
-  const bool number_as_text = c.value.is_string() && (type == "number" || type == "integer");
-  if (number_as_text && !c.unit().empty()) next_move = fmt::format("write the number alone, in{}", c.unit());
-  if (type == "string" && c.value.is_number()) next_move = fmt::format("quote it: \"{}\"", c.value.dump());
-  if (type == "array" && c.value.is_number()) next_move = fmt::format("write a list: [{}]", c.value.dump());
-  return {c.at_value(fmt::format("expected {}, found {}", expected, shown(c.value)), next_move)};
+  if (fits(type)) return;
+  const std::string_view expected = type_named(type).words;
+  std::string next_move = fmt::format("write {} here ({})", expected, s.purpose(s.name()));
+  const bool number_as_text = s.value.is_string() && (type == "number" || type == "integer");
+  if (number_as_text && !s.unit().empty()) next_move = fmt::format("write the number alone, in{}", s.unit());
+  if (type == "string" && s.value.is_number()) next_move = fmt::format("quote it: \"{}\"", s.value.dump());
+  if (type == "array" && s.value.is_number()) next_move = fmt::format("write a list: [{}]", s.value.dump());
+  findings.push_back(s.at_value(fmt::format("expected {}, found {}", expected, shown(s.value)), next_move));
+}
+
+void check_enum(const Spot& s, const json& values, Findings& findings) {
+  if (std::find(values.begin(), values.end(), s.value) != values.end()) return;
+  std::vector<std::string> allowed;
+  for (const json& value : values) allowed.push_back(value.is_string() ? value.get<std::string>() : value.dump());
+  std::string next_move =
+      allowed.size() > 1 ? fmt::format("write one of {}", fmt::join(allowed, ", ")) : "write " + allowed.front();
+  if (s.value.is_string() && allowed.size() > 1) {
+    if (const auto near = nearest_name(s.value.get<std::string>(), allowed))
+      next_move = fmt::format("did you mean {}? {}", *near, next_move);
+  }
+  findings.push_back(s.at_value(shown(s.value) + " is not allowed", next_move));
+}
+
+void check_pattern(const Spot& s, const json& pattern, Findings& findings) {
+  if (!s.value.is_string()) return;
+  if (std::regex_search(s.value.get_ref<const std::string&>(), std::regex(pattern.get<std::string>()))) return;
+  findings.push_back(
+      s.at_value(shown(s.value) + " does not fit", "write " + s.schema.value("x_expected", "another text")));
 }
 
 /// "write a value from 1 to 20"
-std::string allowed_range(const Complaint& c) {
+std::string allowed_range(const Spot& s) {
   const auto bound = [&](const char* closed, const char* open, const char* before_open) -> std::string {
-    if (c.schema.contains(closed)) return c.schema[closed].dump();
-    return c.schema.contains(open) ? before_open + c.schema[open].dump() : "";
+    if (s.schema.contains(closed)) return s.schema[closed].dump();
+    return s.schema.contains(open) ? before_open + s.schema[open].dump() : "";
   };
   return fmt::format("write a value from {} to {}{}", bound("minimum", "exclusiveMinimum", "above "),
-                     bound("maximum", "exclusiveMaximum", "below "), c.unit());
+                     bound("maximum", "exclusiveMaximum", "below "), s.unit());
 }
 
-std::vector<Finding> out_of_range(const Complaint& c, std::string_view relation, const char* keyword) {
-  return {c.at_value(fmt::format("{} is {} {}{}", c.value.dump(), relation, c.schema[keyword].dump(), c.unit()),
-                     allowed_range(c))};
+template <class Within>
+void check_bound(const Spot& s, const json& bound, std::string_view relation, Findings& findings) {
+  if (!s.value.is_number() || Within{}(s.value.get<double>(), bound.get<double>())) return;
+  findings.push_back(
+      s.at_value(fmt::format("{} is {} {}{}", s.value.dump(), relation, bound.dump(), s.unit()), allowed_range(s)));
 }
-std::vector<Finding> above(const Complaint& c) { return out_of_range(c, "above", "maximum"); }
-std::vector<Finding> not_below(const Complaint& c) { return out_of_range(c, "not below", "exclusiveMaximum"); }
-std::vector<Finding> below(const Complaint& c) { return out_of_range(c, "below", "minimum"); }
-std::vector<Finding> not_above(const Complaint& c) { return out_of_range(c, "not above", "exclusiveMinimum"); }
-
-std::vector<Finding> not_in_list(const Complaint& c) {
-  std::vector<std::string> allowed;
-  for (const json& value : c.schema["enum"])
-    allowed.push_back(value.is_string() ? value.get<std::string>() : value.dump());
-  std::string next_move = "write " + (allowed.size() > 1 ? "one of " + joined(allowed) : allowed.front());
-  if (c.value.is_string()) {
-    const auto near = nearest_name(c.value.get<std::string>(), allowed);
-    if (near && allowed.size() > 1) next_move = fmt::format("did you mean {}? {}", *near, next_move);
-  }
-  return {c.at_value(fmt::format("{} is not known here", shown(c.value)), next_move)};
+void check_maximum(const Spot& s, const json& most, Findings& f) {
+  check_bound<std::less_equal<>>(s, most, "above", f);
 }
+void check_below(const Spot& s, const json& end, Findings& f) { check_bound<std::less<>>(s, end, "not below", f); }
+void check_minimum(const Spot& s, const json& least, Findings& f) {
+  check_bound<std::greater_equal<>>(s, least, "below", f);
+}
+void check_above(const Spot& s, const json& end, Findings& f) { check_bound<std::greater<>>(s, end, "not above", f); }
 
-std::vector<Finding> wrong_pattern(const Complaint& c) {
-  return {c.at_value(shown(c.value) + " does not fit", "write " + c.schema.value("x_expected", "another text"))};
+std::size_t characters(const json& text) {
+  const auto& bytes = text.get_ref<const std::string&>();
+  return bytes.size() - static_cast<std::size_t>(std::count_if(bytes.begin(), bytes.end(), is_continuation));
 }
 
-std::vector<Finding> too_long(const Complaint& c) {
-  return {
-      c.at_value("this text is too long", fmt::format("write at most {} characters", c.schema["maxLength"].dump()))};
+void check_longest(const Spot& s, const json& most, Findings& findings) {
+  if (!s.value.is_string() || characters(s.value) <= most.get<std::size_t>()) return;
+  findings.push_back(s.at_value("this text is too long", "write at most " + most.dump() + " characters"));
 }
-std::vector<Finding> too_short(const Complaint& c) {
-  return {c.at_value("this text is empty", "say " + c.purpose("what it is"))};
+
+void check_shortest(const Spot& s, const json& least, Findings& findings) {
+  if (!s.value.is_string() || characters(s.value) >= least.get<std::size_t>()) return;
+  findings.push_back(s.at_value(fmt::format("this text is {}", characters(s.value) == 0 ? "empty" : "too short"),
+                                "write " + s.purpose("what it is")));
 }
-std::vector<Finding> too_many(const Complaint& c) {
-  return {c.at_value(fmt::format("{} values", c.value.size()),
-                     fmt::format("write at most {}", c.schema["maxItems"].dump()))};
+
+void check_most_items(const Spot& s, const json& most, Findings& findings) {
+  if (!s.value.is_array() || s.value.size() <= most.get<std::size_t>()) return;
+  findings.push_back(s.at_value(fmt::format("{} values", s.value.size()), "write at most " + most.dump()));
 }
-std::vector<Finding> too_few(const Complaint& c) {
-  return {c.at_value(fmt::format("{} values", c.value.size()),
-                     fmt::format("write at least {}", c.schema["minItems"].dump()))};
+
+void check_fewest_items(const Spot& s, const json& least, Findings& findings) {
+  if (!s.value.is_array() || s.value.size() >= least.get<std::size_t>()) return;
+  findings.push_back(s.at_value(fmt::format("{} values", s.value.size()), "write at least " + least.dump()));
 }
-std::vector<Finding> too_few_keys(const Complaint& c) {
-  return {c.at_value("no keys", fmt::format("write at least {}", c.schema["minProperties"].dump()))};
+
+void check_fewest_keys(const Spot& s, const json& least, Findings& findings) {
+  if (!s.value.is_object() || s.value.size() >= least.get<std::size_t>()) return;
+  findings.push_back(s.at_value(s.value.empty() ? "no keys" : fmt::format("{} keys", s.value.size()),
+                                "write at least " + least.dump()));
 }
 
 /// Dotted names of the objects, other than the one at hand, that know `key`.
@@ -174,14 +194,7 @@ void find_homes(const json& schema, const std::string& key, const std::string& p
   for (const auto& [name, child] : properties->items()) find_homes(child, key, child_pointer(pointer, name), homes);
 }
 
-/// The known key that was meant by the unknown one, if that can be told.
-std::optional<std::string> meant(const std::string& key, const std::vector<std::string>& known) {
-  const auto by_unit = same_but_for_unit(key, known);
-  return by_unit ? by_unit : nearest_name(key, known);
-}
-
-std::string advice(const Complaint& c, const std::string& key) {
-  const std::vector<std::string> known = known_keys(c.schema);
+std::string advice_for_unknown(const Spot& s, const std::string& key, const std::vector<std::string>& known) {
   if (const auto other_unit = same_but_for_unit(key, known)) {
     const std::string unit = split_unit(*other_unit).unit;
     return unit.empty() ? fmt::format("write {}", *other_unit)
@@ -189,114 +202,142 @@ std::string advice(const Complaint& c, const std::string& key) {
   }
   if (const auto near = nearest_name(key, known)) return fmt::format("did you mean {}?", *near);
   std::vector<std::string> homes;
-  find_homes(c.whole_schema, key, "", homes);
-  if (!homes.empty()) return "it belongs to " + joined(homes);
-  return "known here: " + joined(known);
+  find_homes(s.whole_schema, key, "", homes);
+  return homes.empty() ? fmt::format("known here: {}", fmt::join(known, ", "))
+                       : fmt::format("it belongs to {}", fmt::join(homes, ", "));
 }
 
-std::vector<Finding> unknown_keys(const Complaint& c) {
-  const std::vector<std::string> known = known_keys(c.schema);
-  std::vector<Finding> findings;
-  for (const std::string& key : keys_of(c.value)) {
-    if (std::find(known.begin(), known.end(), key) != known.end()) continue;
-    const std::string pointer = child_pointer(c.pointer, key);
-    const std::string where = c.pointer.empty() ? "" : " of " + c.name();
-    findings.push_back(
-        {c.document.key_mark(pointer), pointer, fmt::format("{} is not a key{}", key, where), advice(c, key)});
+void check_properties(const Spot& s, const json& properties, Findings& findings) {
+  if (!s.value.is_object()) return;
+  for (const auto& [key, schema] : properties.items()) {
+    const auto value = s.value.find(key);
+    if (value != s.value.end())
+      check({s.document, s.whole_schema, schema, *value, child_pointer(s.pointer, key)}, findings);
   }
-  return findings;
+}
+
+void check_other_keys(const Spot& s, const json& rule, Findings& findings) {
+  if (!s.value.is_object()) return;
+  const std::vector<std::string> known = known_keys(s.schema);
+  for (const auto& [key, value] : s.value.items()) {
+    if (contains(known, key)) continue;
+    const std::string pointer = child_pointer(s.pointer, key);
+    if (rule.is_object()) {
+      check({s.document, s.whole_schema, rule, value, pointer}, findings);
+    } else if (rule == false) {
+      findings.push_back({s.document.key_mark(pointer), pointer,
+                          fmt::format("{} is not a key{}", key, s.pointer.empty() ? "" : " of " + s.name()),
+                          advice_for_unknown(s, key, known)});
+    }
+  }
 }
 
 /// Silent where an unknown key was meant to be this one: that finding says it all.
-std::vector<Finding> missing_key(const Complaint& c) {
-  const auto open = c.description.find('\'');
-  const std::string key = c.description.substr(open + 1, c.description.rfind('\'') - open - 1);
-  const std::vector<std::string> known = known_keys(c.schema);
-  for (const std::string& present : keys_of(c.value)) {
-    const bool is_known = std::find(known.begin(), known.end(), present) != known.end();
-    if (!is_known && meant(present, known) == key) return {};
+void check_required(const Spot& s, const json& required, Findings& findings) {
+  if (!s.value.is_object()) return;
+  const std::vector<std::string> known = known_keys(s.schema);
+  const auto meant_elsewhere = [&](const std::string& key) {
+    for (const std::string& present : keys_of(s.value)) {
+      if (contains(known, present)) continue;
+      const auto by_unit = same_but_for_unit(present, known);
+      if ((by_unit ? by_unit : nearest_name(present, known)) == key) return true;
+    }
+    return false;
+  };
+  for (const json& name : required) {
+    const std::string key = name;
+    if (s.value.contains(key) || meant_elsewhere(key)) continue;
+    const std::string pointer = child_pointer(s.pointer, key);
+    findings.push_back(
+        {s.document.key_mark(s.pointer), pointer, dotted(pointer) + " is missing",
+         fmt::format("add the key {} ({})", key,
+                     s.schema.value(json::json_pointer(child_pointer("/properties", key) + "/description"), key))});
   }
-  const std::string pointer = child_pointer(c.pointer, key);
-  const std::string purpose = c.schema["properties"][key].value("description", key);
-  return {{c.document.key_mark(c.pointer), pointer, dotted(pointer) + " is missing",
-           fmt::format("add the key {} ({})", key, purpose)}};
 }
 
-struct Explanation {
-  std::string_view begin;  ///< of valijson's description
-  std::vector<Finding> (*explain)(const Complaint&);
+void check_items(const Spot& s, const json& schema, Findings& findings) {
+  if (!s.value.is_array()) return;
+  for (std::size_t i = 0; i < s.value.size(); ++i)
+    check({s.document, s.whole_schema, schema, s.value[i], fmt::format("{}/{}", s.pointer, i)}, findings);
+}
+
+struct Keyword {
+  std::string_view name;
+  void (*check)(const Spot&, const json& argument, Findings&);  ///< nullptr: an annotation
 };
 
-/// The longer of two beginnings comes first. "Failed to validate" is the chain of objects around a fault.
-const std::array<Explanation, 15> kExplanations{{
-    {"Value type not permitted", wrong_type},
-    {"Expected number less than or equal", above},
-    {"Expected number less than", not_below},
-    {"Expected number greater than or equal", below},
-    {"Expected number greater than", not_above},
-    {"Failed to match against any enum", not_in_list},
-    {"Failed to match regex", wrong_pattern},
-    {"String should be no more", too_long},
-    {"String should be no fewer", too_short},
-    {"Array should contain no more", too_many},
-    {"Array should contain no fewer", too_few},
-    {"Object should have no fewer", too_few_keys},
-    {"Object contains a property", unknown_keys},
-    {"Missing required property", missing_key},
-    {"Failed to validate", [](const Complaint&) { return std::vector<Finding>{}; }},
-}};
+/// All that a schema may say. The type first: of the findings at one value the first is shown.
+constexpr std::array<Keyword, 20> kKeywords{{{"type", check_type},
+                                             {"enum", check_enum},
+                                             {"pattern", check_pattern},
+                                             {"maximum", check_maximum},
+                                             {"exclusiveMaximum", check_below},
+                                             {"minimum", check_minimum},
+                                             {"exclusiveMinimum", check_above},
+                                             {"maxLength", check_longest},
+                                             {"minLength", check_shortest},
+                                             {"maxItems", check_most_items},
+                                             {"minItems", check_fewest_items},
+                                             {"minProperties", check_fewest_keys},
+                                             {"properties", check_properties},
+                                             {"additionalProperties", check_other_keys},
+                                             {"required", check_required},
+                                             {"items", check_items},
+                                             {"$schema", nullptr},
+                                             {"title", nullptr},
+                                             {"description", nullptr},
+                                             {"x_expected", nullptr}}};
 
-std::vector<Finding> explain(const Complaint& complaint) {
-  for (const Explanation& explanation : kExplanations) {
-    if (complaint.description.compare(0, explanation.begin.size(), explanation.begin) == 0) {
-      return explanation.explain(complaint);
+void check(const Spot& spot, Findings& findings) {
+  for (const Keyword& keyword : kKeywords) {
+    const auto argument = spot.schema.find(keyword.name);
+    if (keyword.check != nullptr && argument != spot.schema.end()) keyword.check(spot, *argument, findings);
+  }
+}
+
+void require_known_keywords(const json& schema) {
+  for (const auto& [keyword, argument] : schema.items()) {
+    const std::string& name = keyword;
+    if (std::none_of(kKeywords.begin(), kKeywords.end(), [&](const Keyword& k) { return k.name == name; }))
+      throw std::invalid_argument(fmt::format("schema: unknown keyword \"{}\"", name));
+    if (name == "items" && !argument.is_object())
+      throw std::invalid_argument("schema: items must be one schema for all of them");
+    if (name == "properties") {
+      for (const auto& [key, child] : argument.items()) require_known_keywords(child);
+    } else if (argument.is_object()) {
+      require_known_keywords(argument);
+    } else if (name == "type" && argument.is_string()) {
+      (void)type_named(argument);
     }
   }
-  return {complaint.at_value(complaint.description, "see the schema of this kind of file")};
 }
 
-const json& schema_of_child(const json& schema, const std::string& token) {
-  static const json kNothing = json::object();
-  if (const auto p = schema.find("properties"); p != schema.end() && p->contains(token)) return (*p)[token];
-  for (const char* keyword : {"additionalProperties", "items"}) {
-    if (const auto child = schema.find(keyword); child != schema.end() && child->is_object()) return *child;
-  }
-  return kNothing;
-}
-
-/// valijson's context is {"<root>", "[profile]", "[steps]"}.
-std::vector<Finding> explain(const SourceDocument& document, const json& whole_schema,
-                             const valijson::ValidationResults::Error& error) {
-  const json* schema = &whole_schema;
-  const json* value = &document.value;
-  std::string pointer;
-  for (std::size_t i = 1; i < error.context.size(); ++i) {
-    const std::string token = error.context[i].substr(1, error.context[i].size() - 2);
-    schema = &schema_of_child(*schema, token);
-    value = value->is_array() ? &value->at(static_cast<std::size_t>(std::stoul(token))) : &value->at(token);
-    pointer = child_pointer(pointer, token);
-  }
-  return explain(Complaint{document, whole_schema, *schema, *value, pointer, error.description});
+Findings checked(const SourceDocument& document, const json& schema) {
+  Findings all;
+  check({document, schema, schema, document.value, ""}, all);
+  std::set<std::string> judged;
+  for (const FileFinding& finding : document.findings) judged.insert(finding.pointer);
+  Findings first;
+  for (FileFinding& finding : all)
+    if (judged.insert(finding.pointer).second) first.push_back(std::move(finding));
+  return first;
 }
 
 }  // namespace
 
-std::vector<Finding> check_schema(const SourceDocument& document, FileKind kind) {
-  const LoadedSchema& schema = loaded(kind);
-  const valijson::adapters::NlohmannJsonAdapter target(document.value);
-  valijson::ValidationResults results;
-  valijson::Validator validator(valijson::Validator::kStrongTypes);
-  if (validator.validate(schema.rules, target, &results)) return {};
+std::vector<FileFinding> check_schema(const SourceDocument& document, const json& schema) {
+  require_known_keywords(schema);
+  return checked(document, schema);
+}
 
-  std::set<std::string> judged;
-  for (const Finding& finding : document.findings) judged.insert(finding.pointer);
-  std::vector<Finding> findings;
-  for (const auto& error : results) {
-    for (Finding& finding : explain(document, schema.text, error)) {
-      if (judged.insert(finding.pointer).second) findings.push_back(std::move(finding));
-    }
-  }
-  return findings;
+std::vector<FileFinding> check_schema(const SourceDocument& document, FileKind kind) {
+  static const auto kSchemas = [] {
+    std::array<json, kFileKinds.size()> schemas;
+    for (const FileKindInfo& one : kFileKinds)
+      require_known_keywords(schemas[static_cast<std::size_t>(one.kind)] = json::parse(schema_text(one.kind)));
+    return schemas;
+  }();
+  return checked(document, kSchemas[static_cast<std::size_t>(kind)]);
 }
 
 }  // namespace kphi::profiles

@@ -1,4 +1,4 @@
-// The JSON Schemas of the four kinds of files, and what they say about a document, in words for its author.
+// The JSON Schemas of the four kinds of files, and what they find in a document, in words for its author.
 #pragma once
 
 #include <array>
@@ -30,6 +30,10 @@ inline constexpr std::array<FileKindInfo, 4> kFileKinds{{
 
 /// One finding per fault (the innermost value or key, never the objects around it); empty if the document fits.
 /// Values that `document.findings` already names are not judged again.
-[[nodiscard]] std::vector<Finding> check_schema(const SourceDocument& document, FileKind kind);
+[[nodiscard]] std::vector<FileFinding> check_schema(const SourceDocument& document, FileKind kind);
+
+/// As above, with any schema of the keywords in schema.cpp (JSON Schema draft 7). Throws std::invalid_argument for a
+/// schema with another keyword: it would be ignored in silence.
+[[nodiscard]] std::vector<FileFinding> check_schema(const SourceDocument& document, const nlohmann::json& schema);
 
 }  // namespace kphi::profiles

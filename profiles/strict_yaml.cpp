@@ -13,8 +13,7 @@
 #include <sstream>
 #include <utility>
 
-#include "profiles/characters.hpp"
-#include "profiles/scalar.hpp"
+#include "profiles/yaml_text.hpp"
 
 namespace kphi::profiles {
 namespace {
@@ -31,7 +30,7 @@ void copy_marks(std::map<std::string, Mark>& marks, const std::string& from, con
   for (auto& [pointer, mark] : copies) marks.emplace(std::move(pointer), mark);
 }
 
-/// Builds the JSON from yaml-cpp's events. Not from its nodes: those expand aliases and drop what was said twice.
+/// Builds the JSON from yaml-cpp's events. Not from its nodes: those expand aliases and drop duplicate keys.
 class Builder final : public YAML::EventHandler {
  public:
   Builder(const std::string& text, const std::string& path) : lines_(text) { document_.path = path; }
@@ -40,8 +39,7 @@ class Builder final : public YAML::EventHandler {
 
   void OnDocumentStart(const YAML::Mark& mark) override {
     if (started_) {
-      stop(mark, "more follows after the end of the document",
-           "keep one document in a file; look for a stray --- or bracket");
+      stop(mark, "a second document follows", "keep one document per file; look for a stray --- or bracket");
     }
     started_ = true;
   }
@@ -76,7 +74,7 @@ class Builder final : public YAML::EventHandler {
     refuse_as_key(mark);
     const auto target = anchors_.find(anchor);
     if (target == anchors_.end())
-      stop(mark, "this alias names a key, or a value that it is part of", "write the value out");
+      stop(mark, "this alias names a key, or a value that contains it", "write the value out");
     count(mark, target->second.values);
     const std::string pointer = next_pointer();
     copy_marks(document_.value_marks, target->second.pointer, pointer);
@@ -129,12 +127,12 @@ class Builder final : public YAML::EventHandler {
 
   void refuse_tag(const YAML::Mark& mark, const std::string& tag, const std::string& pointer) {
     if (tag == "?" || tag == "!" || tag.empty()) return;
-    add(mark, pointer, fmt::format("the tag {} is not read", tag), "write the value without a tag");
+    add(mark, pointer, fmt::format("the tag {} is not supported", tag), "write the value without a tag");
   }
 
   void take_key(const YAML::Mark& mark, const std::string& key) {
     if (key.size() > kMaxKeyBytes) stop(mark, "this key is too long", "shorten it");
-    if (key == "<<") stop(mark, "merge keys are not read", "write the keys out");
+    if (key == "<<") stop(mark, "merge keys are not supported", "write the keys out");
     Frame& frame = stack_.back();
     const std::string pointer = child_pointer(frame.pointer, key);
     frame.key = key;
@@ -142,7 +140,7 @@ class Builder final : public YAML::EventHandler {
     frame.is_duplicate = frame.value.contains(key);
     if (frame.is_duplicate) {
       add(mark, pointer,
-          fmt::format("{} was given before, on line {}", dotted(pointer), document_.key_mark(pointer).line),
+          fmt::format("{} is already given on line {}", dotted(pointer), document_.key_mark(pointer).line),
           "keep one of the two");
       return;
     }
@@ -242,7 +240,7 @@ SourceDocument parse_strict_yaml(const std::string& whole_text, const std::strin
   try {
     YAML::Parser parser(stream);
     if (!parser.HandleNextDocument(builder)) {
-      refuse(path, {}, "the file says nothing", "start from a copy of one of the shipped files");
+      refuse(path, {}, "the file is empty", "start from a copy of one of the shipped files");
     }
     parser.HandleNextDocument(builder);
   } catch (const YAML::Exception& fault) {

@@ -1,8 +1,8 @@
-// YAML without its traps: text in, JSON and the place of every value out.
+// YAML without its traps: text in, JSON and the mark of every value out.
 //
-// Refused, each with its place: duplicate keys, yes/no/on/off and other spellings of booleans, numbers that some YAML
+// Refused, each with its mark: duplicate keys, yes/no/on/off and other spellings of booleans, numbers that some YAML
 // reads as octal, hexadecimal, sexagesimal or with separators, numbers that are not finite, tags, merge keys, a second
-// document, tabs in the indentation, control characters, bytes that are no UTF-8. Quoted text stays text.
+// document, tabs in the indentation, control characters, bytes that are not UTF-8. Quoted text stays text.
 #pragma once
 
 #include <cstddef>
@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "profiles/finding.hpp"
+#include "profiles/refused_file.hpp"
 
 namespace kphi::profiles {
 
-/// Beyond these a text is refused: no file of ours comes near.
+/// A text beyond these is refused: no real file comes near.
 inline constexpr std::size_t kMaxTextBytes = 1u << 20;
 inline constexpr int kMaxDepth = 16;
 inline constexpr int kMaxValues = 10'000;  ///< aliases count as often as they are used
@@ -27,15 +27,15 @@ struct SourceDocument {
   nlohmann::json value;
   std::map<std::string, Mark> value_marks;  ///< by JSON pointer; an aliased value lies where its anchor is
   std::map<std::string, Mark> key_marks;    ///< by JSON pointer of the value that the key names
-  std::vector<Finding> findings;            ///< what is wrong but left the rest readable; such values are null
+  std::vector<FileFinding> findings;        ///< what is wrong but left the rest readable; such values are null
 
-  /// Place of the value, or of the nearest one around it.
+  /// Of the value, or of the nearest one around it.
   [[nodiscard]] Mark value_mark(std::string pointer) const;
-  /// Place of the key that names it, else of the value.
+  /// Of the key that names it, else of the value.
   [[nodiscard]] Mark key_mark(const std::string& pointer) const;
 };
 
-/// Throws RefusedFile where the text cannot be read on at all; lesser faults go into `findings`.
+/// Throws RefusedFile where the rest of the text cannot be read; lesser faults go into `findings`.
 [[nodiscard]] SourceDocument parse_strict_yaml(const std::string& text, const std::string& path);
 
 /// The bytes of a file. Throws ConfigurationError if it cannot be read or is larger than kMaxTextBytes.

@@ -12,7 +12,7 @@ namespace {
 void check_order(ProfileReader& file, const char* low, const char* high) {
   if (file.number(low) < file.number(high)) return;
   file.refuse(high, fmt::format("{} is not above {} ({})", file.number(high), file.number(low), dotted(low)),
-              "swap or mend the two");
+              "swap or fix the two");
 }
 
 /// Closer in, an arm's own corner would be covered at every angle, and the closed forms do not hold.
@@ -28,13 +28,13 @@ void check_arm_length(ProfileReader& file) {
 void check_one_body(ProfileReader& file) {
   if (!file.has("/body")) {
     if (file.has("/half_side_m")) return;
-    file.refuse("/half_side_m", "missing, and there is no body either",
+    file.refuse("/half_side_m", "missing, and body is missing as well",
                 "give half_side_m of a square body, or body with corners_m and hinges");
     return;
   }
   for (const char* key : {"/half_side_m", "/hinge_turn_deg", "/arm_mirrored"}) {
     if (!file.has(key)) continue;
-    file.refuse(key, "belongs to a square body, but body gives another one", "keep one of the two");
+    file.refuse(key, "belongs to a square body, but body describes another one", "keep one of the two");
   }
 }
 
@@ -80,17 +80,17 @@ std::array<Radians, 4> read_shape(ProfileReader& file, const std::string& shape)
     if (angle >= low && angle <= high) continue;
     file.refuse(pointer,
                 fmt::format("{} is outside {} to {} degrees (arm_angle_min_deg, arm_angle_max_deg)", angle, low, high),
-                "the servo cannot go there; mend the angle or the range");
+                "the servo cannot go there; fix the angle or the range");
   }
   return angles;
 }
 
-/// A plate's inertia follows from its height; a body's own is told by three numbers.
+/// A plate's inertia follows from its height; any other body's is given by three numbers.
 void check_body_inertia(ProfileReader& file, const Dynamics& dynamics) {
   const bool plate = file.has("/dynamics/body_height_m");
   if (plate == dynamics.body_inertia_kg_m2.has_value()) {
     file.refuse(plate ? "/dynamics/body_inertia_kg_m2" : "/dynamics",
-                plate ? "is given, and body_height_m, too" : "neither body_height_m nor body_inertia_kg_m2",
+                plate ? "given together with body_height_m" : "neither body_height_m nor body_inertia_kg_m2",
                 "give one of the two: the height of a body that is a plate, or its moments of inertia");
   }
   if (!dynamics.body_inertia_kg_m2) return;
@@ -122,7 +122,7 @@ Dynamics read_dynamics(ProfileReader& file) {
     file.refuse("/dynamics/hub_mass_kg",
                 fmt::format("four times {} kg leave nothing of {} kg (mass_kg) for the body", dynamics.hub_mass_kg,
                             dynamics.mass_kg),
-                "mass_kg is that of all, hub_mass_kg that of one arm's end");
+                "mass_kg is the mass of the whole vehicle, hub_mass_kg of one arm's end");
   }
   return dynamics;
 }

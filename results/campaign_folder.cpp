@@ -10,8 +10,8 @@
 #include <system_error>
 #include <tuple>
 
-#include "results/number.hpp"
-#include "results/record_error.hpp"
+#include "base/error.hpp"
+#include "base/number.hpp"
 
 namespace kphi::results {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <system_error>
 
-#include "results/record_error.hpp"
+#include "base/error.hpp"
 #include "results/sha256.hpp"
 
 namespace kphi::results {

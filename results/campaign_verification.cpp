@@ -3,8 +3,8 @@
 #include <map>
 #include <system_error>
 
+#include "base/error.hpp"
 #include "results/journal.hpp"
-#include "results/record_error.hpp"
 #include "results/run_reader.hpp"
 #include "results/sha256.hpp"
 

@@ -12,7 +12,7 @@
 #include <iterator>
 #include <system_error>
 
-#include "results/record_error.hpp"
+#include "base/error.hpp"
 
 namespace kphi::results {
 namespace {

@@ -15,8 +15,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/error.hpp"
 #include "results/file_layer.hpp"
-#include "results/record_error.hpp"
 
 namespace kphi::results {
 namespace {

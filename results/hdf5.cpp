@@ -10,10 +10,12 @@
 #include <system_error>
 #include <utility>
 
-#include "results/record_error.hpp"
+#include "base/error.hpp"
 
 namespace kphi::results::hdf5 {
 namespace {
+
+constexpr hsize_t kComponents = 6;  // of counts
 
 static_assert(std::endian::native == std::endian::little, "chunks are written as they lie in memory");
 
@@ -104,6 +106,31 @@ hobj_ref_t reference_to(const Handle& object) {
   hobj_ref_t reference{};
   check(H5Rcreate(&reference, object.get(), ".", H5R_OBJECT, -1), "reference");
   return reference;
+}
+
+/// Of one value: in the file little-endian, and in memory the same, for this machine is.
+Handle type_of(Stored stored) {
+  switch (stored) {
+    case Stored::u8:
+      return own(H5Tcopy(H5T_STD_U8LE), "type");
+    case Stored::i32:
+    case Stored::counts:
+      return own(H5Tcopy(H5T_STD_I32LE), "type");
+    case Stored::u32:
+      return own(H5Tcopy(H5T_STD_U32LE), "type");
+    case Stored::i64:
+      return own(H5Tcopy(H5T_STD_I64LE), "type");
+    case Stored::u64:
+      return own(H5Tcopy(H5T_STD_U64LE), "type");
+    case Stored::f64:
+      return own(H5Tcopy(H5T_IEEE_F64LE), "type");
+    case Stored::text:
+      break;
+  }
+  Handle type = fixed_text(kEventTextBytes);
+  check(H5Tset_cset(type.get(), H5T_CSET_UTF8), "text type");
+  check(H5Tset_strpad(type.get(), H5T_STR_NULLPAD), "text type");
+  return type;
 }
 
 }  // namespace
@@ -237,31 +264,27 @@ void read_attribute(const Handle& object, const char* name, std::array<double, 6
   get(object, name, H5T_NATIVE_DOUBLE, static_cast<hssize_t>(value.size()), value.data());
 }
 
-Handle fixed_text_type(std::size_t bytes) {
-  Handle type = own(H5Tcopy(H5T_C_S1), "text type");
-  check(H5Tset_size(type.get(), bytes), "text type");
-  check(H5Tset_cset(type.get(), H5T_CSET_UTF8), "text type");
-  check(H5Tset_strpad(type.get(), H5T_STR_NULLPAD), "text type");
-  return type;
-}
-
 Column::Column(const Handle& group, const ColumnShape& shape, FileLayer& files, std::string file_name)
-    : shape_(shape), files_(&files), doing_(fmt::format("{}: write {}", file_name, shape.name)) {
-  const int rank = shape.width == 0 ? 1 : 2;
-  const std::array<hsize_t, 2> none{0, shape.width};
-  const std::array<hsize_t, 2> most{H5S_UNLIMITED, shape.width};
-  const std::array<hsize_t, 2> chunk{shape.chunk_rows, shape.width};
+    : shape_(shape),
+      row_bytes_(bytes_of(shape.stored)),
+      files_(&files),
+      doing_(fmt::format("{}: write {}", file_name, shape.name)) {
+  const int rank = shape.stored == Stored::counts ? 2 : 1;
+  const std::array<hsize_t, 2> none{0, kComponents};
+  const std::array<hsize_t, 2> most{H5S_UNLIMITED, kComponents};
+  const std::array<hsize_t, 2> chunk{shape.chunk_rows, kComponents};
+  const Handle type = type_of(shape.stored);
   const Handle space = own(H5Screate_simple(rank, none.data(), most.data()), doing_);
   const Handle list = creation_list(H5P_DATASET_CREATE, [&](hid_t id) {
     check(H5Pset_chunk(id, rank, chunk.data()), doing_);
     check(H5Pset_fill_time(id, H5D_FILL_TIME_NEVER), doing_);
   });
   dataset_ =
-      own(H5Dcreate2(group.get(), shape.name, shape.type, space.get(), H5P_DEFAULT, list.get(), H5P_DEFAULT), doing_);
+      own(H5Dcreate2(group.get(), shape.name, type.get(), space.get(), H5P_DEFAULT, list.get(), H5P_DEFAULT), doing_);
   write_attribute(dataset_, "units", std::string(shape.units));
-  write_attribute(dataset_, "long_name", std::string(shape.long_name));
+  write_attribute(dataset_, "long_name", shape.long_name);
   write_attribute(dataset_, "crc32", std::uint32_t{0});
-  chunk_.resize(shape.chunk_rows * shape.row_bytes);
+  chunk_.resize(shape.chunk_rows * row_bytes_);
 }
 
 void Column::append(const void* rows, std::size_t count) {
@@ -269,10 +292,10 @@ void Column::append(const void* rows, std::size_t count) {
   while (count > 0) {
     const std::size_t filled = rows_ % shape_.chunk_rows;
     const std::size_t n = std::min<std::size_t>(count, shape_.chunk_rows - filled);
-    std::memcpy(chunk_.data() + filled * shape_.row_bytes, from, n * shape_.row_bytes);
-    crc_.process_bytes(from, n * shape_.row_bytes);
+    std::memcpy(chunk_.data() + filled * row_bytes_, from, n * row_bytes_);
+    crc_.process_bytes(from, n * row_bytes_);
     rows_ += n;
-    from += n * shape_.row_bytes;
+    from += n * row_bytes_;
     count -= n;
     if (rows_ % shape_.chunk_rows == 0) write_chunk();
   }
@@ -283,7 +306,7 @@ void Column::flush() {
 }
 
 void Column::write_chunk() {
-  const std::array<hsize_t, 2> extent{rows_, shape_.width};
+  const std::array<hsize_t, 2> extent{rows_, kComponents};
   const std::array<hsize_t, 2> offset{(rows_ - 1) / shape_.chunk_rows * shape_.chunk_rows, 0};
   try {
     files_->before_write(chunk_.size());
@@ -298,9 +321,8 @@ void Column::write_chunk() {
 
 void Column::write_crc() { write_attribute(dataset_, "crc32", crc()); }
 
-ColumnReader::ColumnReader(const Handle& group, const char* name, hid_t memory_type, std::size_t row_bytes,
-                           const std::string& file)
-    : doing_(fmt::format("{}: read {}", file, name)), memory_type_(memory_type), row_bytes_(row_bytes) {
+ColumnReader::ColumnReader(const Handle& group, const char* name, Stored stored, const std::string& file)
+    : doing_(fmt::format("{}: read {}", file, name)), type_(type_of(stored)), row_bytes_(bytes_of(stored)) {
   const Handle access = own(H5Pcreate(H5P_DATASET_ACCESS), doing_);
   // No chunk cache: rows go from the file to the caller's memory at once.
   check(H5Pset_chunk_cache(access.get(), 1, 0, 1.0), doing_);
@@ -311,7 +333,7 @@ ColumnReader::ColumnReader(const Handle& group, const char* name, hid_t memory_t
   dims_.resize(static_cast<std::size_t>(rank));
   check(H5Sget_simple_extent_dims(space_.get(), dims_.data(), nullptr), doing_);
   const std::size_t width = rank == 2 ? dims_[1] : 1;
-  if (width * H5Tget_size(memory_type) != row_bytes) throw RecordError(doing_ + ": has a strange shape");
+  if (width * H5Tget_size(type_.get()) != row_bytes_) throw RecordError(doing_ + ": has a strange shape");
   rows_ = dims_[0];
 }
 
@@ -319,7 +341,7 @@ void ColumnReader::read(std::uint64_t first, std::uint64_t count, void* rows) {
   if (count == 0) return;
   if (first + count > rows_) throw RecordError(doing_ + ": holds fewer rows than asked for");
   if (first == 0 && count == rows_) {  // without the cost of a selection
-    check(H5Dread(dataset_.get(), memory_type_, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows), doing_);
+    check(H5Dread(dataset_.get(), type_.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, rows), doing_);
     return;
   }
   const int rank = static_cast<int>(dims_.size());
@@ -327,7 +349,7 @@ void ColumnReader::read(std::uint64_t first, std::uint64_t count, void* rows) {
   const std::array<hsize_t, 2> block{count, rank == 2 ? dims_[1] : 1};
   check(H5Sselect_hyperslab(space_.get(), H5S_SELECT_SET, start.data(), nullptr, block.data(), nullptr), doing_);
   const Handle memory = own(H5Screate_simple(rank, block.data(), nullptr), doing_);
-  check(H5Dread(dataset_.get(), memory_type_, memory.get(), space_.get(), H5P_DEFAULT, rows), doing_);
+  check(H5Dread(dataset_.get(), type_.get(), memory.get(), space_.get(), H5P_DEFAULT, rows), doing_);
 }
 
 std::optional<RawColumn> ColumnReader::raw() const {
@@ -335,7 +357,7 @@ std::optional<RawColumn> ColumnReader::raw() const {
   const Handle type = own(H5Dget_type(dataset_.get()), doing_);
   std::array<hsize_t, 2> chunk{};
   const bool plain = H5Pget_layout(list.get()) == H5D_CHUNKED && H5Pget_nfilters(list.get()) == 0 &&
-                     H5Tequal(type.get(), memory_type_) > 0 &&
+                     H5Tequal(type.get(), type_.get()) > 0 &&
                      H5Pget_chunk(list.get(), 2, chunk.data()) == static_cast<int>(dims_.size()) &&
                      (dims_.size() == 1 || chunk[1] == dims_[1]);
   if (!plain) return std::nullopt;

@@ -1,6 +1,6 @@
 // HDF5's C API behind handles that close themselves and errors that throw. Its automatic error print is off. Files are
 // made without time stamps, with metadata checksums and tracked creation order: the same calls give the same bytes.
-// hid_t appears only here, in run_writer and in run_reader. Debian's library is thread-safe; one object, one thread.
+// hid_t appears only here and in run_writer. Debian's library is thread-safe; one object, one thread.
 #pragma once
 
 #include <hdf5.h>
@@ -16,6 +16,7 @@
 
 #include "results/file_layer.hpp"
 #include "results/raw_column.hpp"
+#include "results/run_layout.hpp"
 
 namespace kphi::results::hdf5 {
 
@@ -70,18 +71,13 @@ void read_attribute(const Handle& object, const char* name, std::uint32_t& value
 void read_attribute(const Handle& object, const char* name, std::uint64_t& value);
 void read_attribute(const Handle& object, const char* name, std::array<double, 6>& value);
 
-/// Of `bytes` bytes, UTF-8, filled up with zeros.
-[[nodiscard]] Handle fixed_text_type(std::size_t bytes);
-
-/// What a column holds. Bytes on disk are little-endian.
+/// What a column holds. Counts have a second dimension of six.
 struct ColumnShape {
   const char* name;
-  hid_t type;             ///< the little-endian file type
-  std::size_t row_bytes;  ///< of one row
-  hsize_t width;          ///< 0: one-dimensional, else the second dimension
-  hsize_t chunk_rows;
+  Stored stored;
+  std::size_t chunk_rows;
   const char* units;  ///< UDUNITS spelling
-  const char* long_name;
+  std::string long_name;
 };
 
 /// A growing dataset, written chunk by chunk with H5Dwrite_chunk and never filled beforehand. A partly filled chunk is
@@ -104,6 +100,7 @@ class Column {
  private:
   void write_chunk();
   ColumnShape shape_;
+  std::size_t row_bytes_;
   FileLayer* files_;
   std::string doing_;
   Handle dataset_;
@@ -116,8 +113,7 @@ class Column {
 /// A dataset read in blocks of rows.
 class ColumnReader {
  public:
-  ColumnReader(const Handle& group, const char* name, hid_t memory_type, std::size_t row_bytes,
-               const std::string& file);
+  ColumnReader(const Handle& group, const char* name, Stored stored, const std::string& file);
   [[nodiscard]] std::uint64_t rows() const { return rows_; }
   void read(std::uint64_t first, std::uint64_t count, void* rows);
   /// CRC-32 of the first `count` rows.
@@ -128,7 +124,7 @@ class ColumnReader {
 
  private:
   std::string doing_;
-  hid_t memory_type_;
+  Handle type_;  ///< of a value in memory
   std::size_t row_bytes_;
   Handle dataset_;
   Handle space_;

@@ -10,7 +10,7 @@
 #include <system_error>
 #include <utility>
 
-#include "results/record_error.hpp"
+#include "base/error.hpp"
 #include "results/sha256.hpp"
 
 namespace kphi::results {

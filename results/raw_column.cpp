@@ -7,8 +7,8 @@
 #include <cerrno>
 #include <utility>
 
+#include "base/error.hpp"
 #include "results/file_layer.hpp"
-#include "results/record_error.hpp"
 
 namespace kphi::results {
 namespace {

@@ -14,6 +14,15 @@ namespace kphi::results {
 /// Nanoseconds of bench time since the run's epoch.
 using Nanoseconds = std::int64_t;
 
+/// A stretch of bench time.
+struct Window {
+  Nanoseconds begin = 0;
+  Nanoseconds end = 0;  ///< not in it
+
+  [[nodiscard]] double centre() const { return 0.5 * (static_cast<double>(begin) + static_cast<double>(end)); }
+  [[nodiscard]] double seconds() const { return 1e-9 * static_cast<double>(end - begin); }
+};
+
 /// One Net Box sample as it came, with the stamp of the datagram that brought it.
 struct LoadCellRecord {
   std::array<std::int32_t, 6> counts{};  ///< Fx Fy Fz Tx Ty Tz
@@ -41,7 +50,6 @@ struct MotorChannelInfo {
   const char* name;  ///< the group's name in the file
   const char* unit;  ///< UDUNITS spelling
   const char* long_name;
-  int since = 1;  ///< format of the run file that has it first
 };
 
 inline constexpr std::array<MotorChannelInfo, 9> kMotorChannels{{
@@ -52,8 +60,8 @@ inline constexpr std::array<MotorChannelInfo, 9> kMotorChannels{{
     {MotorChannel::coil_temperature, "coil_temperature", "degC", "coil temperature, estimated by the module"},
     {MotorChannel::derate, "derate", "1", "drive derating factor, 1 = none"},
     {MotorChannel::drive_mode, "drive_mode", "1", "drive mode code, 5 = coast"},
-    {MotorChannel::drive_pwm, "drive_pwm", "1", "share of the supply voltage that drives the motor", 3},
-    {MotorChannel::fault_now, "fault_now", "1", "bits of power_safety.fault_now, 0 = no fault", 3},
+    {MotorChannel::drive_pwm, "drive_pwm", "1", "share of the supply voltage that drives the motor"},
+    {MotorChannel::fault_now, "fault_now", "1", "bits of power_safety.fault_now, 0 = no fault"},
 }};
 
 struct MotorReading {
@@ -63,7 +71,7 @@ struct MotorReading {
   double value = 0;                ///< unit of the channel
 };
 
-/// What the runner asked for, and when the motor was told. The last three: the box's own bias, before zero_before.
+/// What the runner asks for. Codes as in the run file. The box's own bias is taken before zero_before.
 enum class Phase : std::uint8_t {
   zero_before,
   step,
@@ -75,7 +83,8 @@ enum class Phase : std::uint8_t {
   bias_after,     ///< measured again
   ramp,           ///< on the way to the speed of the next step, no faster than the campaign allows
 };
-inline constexpr Phase kLastPhase = Phase::ramp;
+inline constexpr std::array<const char*, 9> kPhaseNames{
+    "zero before", "step", "spin down", "zero after", "end", "bias before", "bias settling", "bias after", "ramp"};
 
 struct PhaseMark {
   Phase phase{};
@@ -92,6 +101,8 @@ struct LoadCellScale {
   std::uint32_t ft_stride = 1;    ///< ft_sequence counts per record
   double device_rate_hz = 7000;   ///< rate at which ft_sequence counts
   std::array<double, 6> range{};  ///< N and N m
+  /// Bits of the status word that say that the load is beyond what the cell can measure: they differ by product.
+  std::uint32_t saturation_bits = 1u << 17;
   std::string serial;             ///< of the calibration
   std::string configuration_xml;  ///< verbatim
   std::string slots_json;         ///< pages of all slots, verbatim: {"netftapi2.xml?index=0": "<?xml …", …}
@@ -99,7 +110,6 @@ struct LoadCellScale {
 
 /// Everything about a run that is known before the motor turns.
 struct RunHeader {
-  int format = 4;  ///< of the run file: kphi-run/1 to kphi-run/4
   std::string uuid;
   std::string started_utc;  ///< ISO 8601, Z
   std::string tool_version;
@@ -117,6 +127,10 @@ struct RunHeader {
   int thrust_sign = +1;
   int spin = +1;
   double minimum_discard_s = 0;
+  double supply_voltage_v = 0;           ///< that the campaign wants at the motor module; 0: not checked
+  double coil_temperature_max_degc = 0;  ///< the campaign's limit; 0: not checked
+  double clock_gain = 1;                 ///< true speed per speed that the motor module reports
+  double clock_gain_u = 0;               ///< its standard uncertainty; 0: the gain was not measured
   LoadCellScale load_cell;
   std::string motor_identity;      ///< one line: firmware, hardware, uid
   std::string motor_parameters;    ///< YAML: what the module told of itself, one line each
@@ -150,7 +164,7 @@ enum class EventKind : std::uint8_t {
   silent,
   resumed,
   box_trouble,
-  stolen,
+  taken_over,
   rdt_disabled,
   unreachable,
   near_range,             ///< an axis above 80 % of its range; the first time in a run
@@ -183,7 +197,7 @@ inline constexpr std::array<const char*, 32> kEventNames{"restarted",
                                                          "silent",
                                                          "resumed",
                                                          "box_trouble",
-                                                         "stolen",
+                                                         "taken_over",
                                                          "rdt_disabled",
                                                          "unreachable",
                                                          "near_range",

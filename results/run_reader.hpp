@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "base/error.hpp"
 #include "results/load_cell_columns.hpp"
-#include "results/record_error.hpp"
 #include "results/records.hpp"
 
 namespace kphi::results {

@@ -13,74 +13,33 @@ namespace {
 using hdf5::Handle;
 using Problems = std::vector<std::string>;
 
-struct ColumnPlace {
-  const char* name;
-  hid_t type;
-  std::size_t row_bytes;
-};
-
-void check_columns(const Handle& parent, const char* name, std::initializer_list<ColumnPlace> columns,
-                   Problems& problems) {
-  const Handle group = hdf5::open_group(parent, name);
+template <class Row>
+void check_columns(const Handle& parent, const RunGroup<Row>& layout, Problems& problems) {
+  const Handle group = hdf5::open_group(parent, layout.name);
   std::uint64_t n_valid = 0;
   hdf5::read_attribute(group, "n_valid", n_valid);
-  for (const ColumnPlace& place : columns) {
-    hdf5::ColumnReader column(group, place.name, place.type, place.row_bytes, name);
+  for (const RunColumn<Row>& described : layout.columns) {
+    hdf5::ColumnReader column(group, described.name, described.stored, layout.name);
     if (column.rows() != n_valid) {
       problems.push_back(
-          fmt::format("{}/{} has {} rows where n_valid is {}", name, place.name, column.rows(), n_valid));
+          fmt::format("{}/{} has {} rows where n_valid is {}", layout.name, described.name, column.rows(), n_valid));
       continue;
     }
     std::uint32_t crc = 0;
     hdf5::read_attribute(column.dataset(), "crc32", crc);
     if (column.crc(n_valid) != crc)
-      problems.push_back(fmt::format("{}/{} does not match its checksum", name, place.name));
+      problems.push_back(fmt::format("{}/{} does not match its checksum", layout.name, described.name));
   }
 }
 
-void check_all_columns(const std::filesystem::path& path, int format, Problems& problems) {
+void check_all_columns(const std::filesystem::path& path, Problems& problems) {
   const Handle root = hdf5::open_file(path);
-  check_columns(root, "load_cell",
-                {{"counts", H5T_NATIVE_INT32, 24},
-                 {"rdt_sequence", H5T_NATIVE_UINT32, 4},
-                 {"ft_sequence", H5T_NATIVE_UINT32, 4},
-                 {"status", H5T_NATIVE_UINT32, 4},
-                 {"t_arrival_ns", H5T_NATIVE_INT64, 8}},
-                problems);
+  check_columns(root, kLoadCellGroup, problems);
   const Handle motor = hdf5::open_group(root, "motor");
-  for (const MotorChannelInfo& info : kMotorChannels) {
-    if (info.since > format) continue;
-    check_columns(
-        motor, info.name,
-        {{"value", H5T_NATIVE_DOUBLE, 8}, {"t_ns", H5T_NATIVE_INT64, 8}, {"t_uncertainty_ns", H5T_NATIVE_INT64, 8}},
-        problems);
-  }
-  check_columns(root, "commands",
-                {{"phase", H5T_NATIVE_UINT8, 1},
-                 {"step", H5T_NATIVE_INT32, 4},
-                 {"t_ns", H5T_NATIVE_INT64, 8},
-                 {"speed_rad_s", H5T_NATIVE_DOUBLE, 8}},
-                problems);
-  if (format < 2) return;
-  const Handle text = hdf5::fixed_text_type(kEventTextBytes);
-  check_columns(root, "events",
-                {{"kind", H5T_NATIVE_UINT8, 1},
-                 {"t_ns", H5T_NATIVE_INT64, 8},
-                 {"records", H5T_NATIVE_UINT64, 8},
-                 {"text", text.get(), kEventTextBytes}},
-                problems);
-  if (format < 4) return;
-  check_columns(root, "supply",
-                {{"t_ns", H5T_NATIVE_INT64, 8},
-                 {"t_uncertainty_ns", H5T_NATIVE_INT64, 8},
-                 {"voltage", H5T_NATIVE_DOUBLE, 8},
-                 {"current", H5T_NATIVE_DOUBLE, 8},
-                 {"set_voltage", H5T_NATIVE_DOUBLE, 8},
-                 {"current_limit", H5T_NATIVE_DOUBLE, 8},
-                 {"regulation", H5T_NATIVE_UINT8, 1},
-                 {"protection", H5T_NATIVE_UINT8, 1},
-                 {"output", H5T_NATIVE_UINT8, 1}},
-                problems);
+  for (const MotorChannelInfo& info : kMotorChannels) check_columns(motor, motor_group(info), problems);
+  check_columns(root, kCommandGroup, problems);
+  check_columns(root, kEventGroup, problems);
+  check_columns(root, kSupplyGroup, problems);
 }
 
 void check_end(const std::filesystem::path& path, const RunRecording& run, Problems& problems) {
@@ -140,7 +99,8 @@ void check_scale(const RunHeader& header, Problems& problems) {
                                                {"counts_per_newton_metre", scale.counts_per_newton_metre},
                                                {"sample_rate_hz", scale.sample_rate_hz},
                                                {"device_rate_hz", scale.device_rate_hz},
-                                               {"ft_stride", scale.ft_stride}};
+                                               {"ft_stride", scale.ft_stride},
+                                               {"clock_gain", header.clock_gain}};
   for (const auto& [name, value] : positive) {
     if (!(std::isfinite(value) && value > 0)) problems.push_back(fmt::format("{} is {}", name, value));
   }
@@ -166,7 +126,7 @@ Verification verify_run(const std::filesystem::path& path) {
     found.outcome = run.outcome;
     found.samples = run.load_cell.size();
     check_end(path, run, found.problems);
-    check_all_columns(path, run.header.format, found.problems);
+    check_all_columns(path, found.problems);
     const SequenceCheck sequence = check_sequence(run.load_cell, run.header.load_cell.ft_stride);
     found.lost = sequence.lost;
     check_account(run, sequence, found.problems);

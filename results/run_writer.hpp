@@ -10,8 +10,8 @@
 #include <span>
 #include <string>
 
+#include "base/error.hpp"
 #include "results/file_layer.hpp"
-#include "results/record_error.hpp"
 #include "results/records.hpp"
 
 namespace kphi::results {

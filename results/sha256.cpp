@@ -9,8 +9,8 @@
 #include <memory>
 #include <vector>
 
+#include "base/error.hpp"
 #include "results/file_layer.hpp"
-#include "results/record_error.hpp"
 
 namespace kphi::results {
 namespace {

@@ -9,7 +9,7 @@
 namespace kphi::results {
 
 /// Why a step is not to be trusted without a look. A set of bits; the names stand in steps.csv, joined by '+'.
-enum class Doubt : std::uint32_t {
+enum class QualityFlag : std::uint32_t {
   none = 0,
   speed_not_reached = 1u << 0,       ///< mean speed further than 1 % (and 2 rad/s) from the command
   speed_unsteady = 1u << 1,          ///< speed spread over the window above 1 % of its mean (and 5 rad/s)
@@ -23,7 +23,7 @@ enum class Doubt : std::uint32_t {
   stalled = 1u << 9,                 ///< the box repeated its measurement within the step
   silent = 1u << 10,                 ///< no record for long within the step
   box_trouble = 1u << 11,            ///< the box saw its own communication fail within the step
-  stolen = 1u << 12,                 ///< another client took the stream within the step
+  taken_over = 1u << 12,             ///< another client took the stream within the step
   configuration_changed = 1u << 13,  ///< the box was set otherwise at some time of the run
   zero_drifted = 1u << 14,  ///< the zeros before and after the run differ by more than is tolerated, or one is missing
   zero_noisy = 1u << 15,    ///< the samples of a zero of the run scatter by more than is tolerated
@@ -44,6 +44,17 @@ enum class Doubt : std::uint32_t {
   frozen = 1u << 30,          ///< load cell or motor speed repeated one value for 0.1 s or longer
   speed_glitch = 1u << 31,    ///< speeds that no rotor can have were left out
 };
+
+/// Flags that leave thrust over speed² as good as it is; all others keep a step out of averages and fits.
+inline constexpr std::uint32_t kHarmlessFlags = [] {
+  std::uint32_t bits = 0;
+  for (const QualityFlag flag :
+       {QualityFlag::lost_samples, QualityFlag::stream_restarted, QualityFlag::box_trouble,
+        QualityFlag::supply_out_of_band, QualityFlag::coil_hot, QualityFlag::slow_round_trip, QualityFlag::supply_sag,
+        QualityFlag::supply_rise, QualityFlag::lag_unknown, QualityFlag::speed_glitch})
+    bits |= static_cast<std::uint32_t>(flag);
+  return bits;
+}();
 
 inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 
@@ -70,8 +81,8 @@ struct StepMean {
   double coil_temperature_degc = 0;
   double window_begin_s = 0;  ///< since the run's epoch
   double window_end_s = 0;
-  std::uint32_t doubts = 0;  ///< bits of Doubt
-  // Beyond the doubts: columns of their own groups, which a file has when one of its steps has them.
+  std::uint32_t quality_flags = 0;  ///< bits of QualityFlag
+  // Beyond the flags: columns of their own groups, which a file has when one of its steps has them.
   double supply_v = kNotMeasured;  ///< at the terminals of the bench supply
   double supply_a = kNotMeasured;  ///< out of it
   double supply_w = kNotMeasured;  ///< mean of the products

@@ -12,17 +12,17 @@
 #include <variant>
 #include <vector>
 
-#include "profiles/configuration_error.hpp"
-#include "results/number.hpp"
+#include "base/error.hpp"
+#include "base/number.hpp"
 
 namespace kphi::results {
 namespace {
 
-struct Doubts {
+struct Flags {
   std::uint32_t StepMean::*member;
 };
 using Field =
-    std::variant<std::string StepMean::*, int StepMean::*, std::uint64_t StepMean::*, double StepMean::*, Doubts>;
+    std::variant<std::string StepMean::*, int StepMean::*, std::uint64_t StepMean::*, double StepMean::*, Flags>;
 
 struct Column {
   const char* name;
@@ -52,7 +52,7 @@ const std::array kColumns{
     Column{"coil_temperature_degc", &StepMean::coil_temperature_degc},
     Column{"window_begin_s", &StepMean::window_begin_s},
     Column{"window_end_s", &StepMean::window_end_s},
-    Column{"doubts", Doubts{&StepMean::doubts}},
+    Column{"quality_flags", Flags{&StepMean::quality_flags}},
 };
 
 /// Columns that a file has when one of its steps has a value for the first of them.
@@ -100,39 +100,39 @@ std::string header_of(const Columns& columns) {
   return line;
 }
 
-constexpr std::array kDoubtNames{
-    std::pair{Doubt::speed_not_reached, std::string_view("speed_not_reached")},
-    std::pair{Doubt::speed_unsteady, std::string_view("speed_unsteady")},
-    std::pair{Doubt::saturated, std::string_view("saturated")},
-    std::pair{Doubt::lost_samples, std::string_view("lost_samples")},
-    std::pair{Doubt::derated, std::string_view("derated")},
-    std::pair{Doubt::few_samples, std::string_view("few_samples")},
-    std::pair{Doubt::bad_status, std::string_view("bad_status")},
-    std::pair{Doubt::stream_restarted, std::string_view("stream_restarted")},
-    std::pair{Doubt::rebooted, std::string_view("rebooted")},
-    std::pair{Doubt::stalled, std::string_view("stalled")},
-    std::pair{Doubt::silent, std::string_view("silent")},
-    std::pair{Doubt::box_trouble, std::string_view("box_trouble")},
-    std::pair{Doubt::stolen, std::string_view("stolen")},
-    std::pair{Doubt::configuration_changed, std::string_view("configuration_changed")},
-    std::pair{Doubt::zero_drifted, std::string_view("zero_drifted")},
-    std::pair{Doubt::zero_noisy, std::string_view("zero_noisy")},
-    std::pair{Doubt::drive_saturated, std::string_view("drive_saturated")},
-    std::pair{Doubt::motor_fault, std::string_view("motor_fault")},
-    std::pair{Doubt::supply_out_of_band, std::string_view("supply_out_of_band")},
-    std::pair{Doubt::coil_hot, std::string_view("coil_hot")},
-    std::pair{Doubt::motor_reset, std::string_view("motor_reset")},
-    std::pair{Doubt::motor_lost, std::string_view("motor_lost")},
-    std::pair{Doubt::slow_round_trip, std::string_view("slow_round_trip")},
-    std::pair{Doubt::supply_limited, std::string_view("supply_limited")},
-    std::pair{Doubt::supply_off, std::string_view("supply_off")},
-    std::pair{Doubt::supply_sag, std::string_view("supply_sag")},
-    std::pair{Doubt::supply_rise, std::string_view("supply_rise")},
-    std::pair{Doubt::unsettled, std::string_view("unsettled")},
-    std::pair{Doubt::drifted, std::string_view("drifted")},
-    std::pair{Doubt::lag_unknown, std::string_view("lag_unknown")},
-    std::pair{Doubt::frozen, std::string_view("frozen")},
-    std::pair{Doubt::speed_glitch, std::string_view("speed_glitch")},
+constexpr std::array kFlagNames{
+    std::pair{QualityFlag::speed_not_reached, std::string_view("speed_not_reached")},
+    std::pair{QualityFlag::speed_unsteady, std::string_view("speed_unsteady")},
+    std::pair{QualityFlag::saturated, std::string_view("saturated")},
+    std::pair{QualityFlag::lost_samples, std::string_view("lost_samples")},
+    std::pair{QualityFlag::derated, std::string_view("derated")},
+    std::pair{QualityFlag::few_samples, std::string_view("few_samples")},
+    std::pair{QualityFlag::bad_status, std::string_view("bad_status")},
+    std::pair{QualityFlag::stream_restarted, std::string_view("stream_restarted")},
+    std::pair{QualityFlag::rebooted, std::string_view("rebooted")},
+    std::pair{QualityFlag::stalled, std::string_view("stalled")},
+    std::pair{QualityFlag::silent, std::string_view("silent")},
+    std::pair{QualityFlag::box_trouble, std::string_view("box_trouble")},
+    std::pair{QualityFlag::taken_over, std::string_view("taken_over")},
+    std::pair{QualityFlag::configuration_changed, std::string_view("configuration_changed")},
+    std::pair{QualityFlag::zero_drifted, std::string_view("zero_drifted")},
+    std::pair{QualityFlag::zero_noisy, std::string_view("zero_noisy")},
+    std::pair{QualityFlag::drive_saturated, std::string_view("drive_saturated")},
+    std::pair{QualityFlag::motor_fault, std::string_view("motor_fault")},
+    std::pair{QualityFlag::supply_out_of_band, std::string_view("supply_out_of_band")},
+    std::pair{QualityFlag::coil_hot, std::string_view("coil_hot")},
+    std::pair{QualityFlag::motor_reset, std::string_view("motor_reset")},
+    std::pair{QualityFlag::motor_lost, std::string_view("motor_lost")},
+    std::pair{QualityFlag::slow_round_trip, std::string_view("slow_round_trip")},
+    std::pair{QualityFlag::supply_limited, std::string_view("supply_limited")},
+    std::pair{QualityFlag::supply_off, std::string_view("supply_off")},
+    std::pair{QualityFlag::supply_sag, std::string_view("supply_sag")},
+    std::pair{QualityFlag::supply_rise, std::string_view("supply_rise")},
+    std::pair{QualityFlag::unsettled, std::string_view("unsettled")},
+    std::pair{QualityFlag::drifted, std::string_view("drifted")},
+    std::pair{QualityFlag::lag_unknown, std::string_view("lag_unknown")},
+    std::pair{QualityFlag::frozen, std::string_view("frozen")},
+    std::pair{QualityFlag::speed_glitch, std::string_view("speed_glitch")},
 };
 
 std::string quoted(const std::string& text) {
@@ -148,14 +148,14 @@ struct Format {
   std::string operator()(int StepMean::*m) const { return std::to_string(step.*m); }
   std::string operator()(std::uint64_t StepMean::*m) const { return std::to_string(step.*m); }
   std::string operator()(double StepMean::*m) const { return std::isnan(step.*m) ? std::string() : shortest(step.*m); }
-  std::string operator()(Doubts d) const { return doubt_names(step.*d.member); }
+  std::string operator()(Flags d) const { return quality_flag_names(step.*d.member); }
 };
 
 template <class Integer>
 Integer parse_integer(const std::string& text) {
   Integer value{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) throw std::invalid_argument("is no whole number");
+  if (error != std::errc() || end != text.data() + text.size()) throw std::invalid_argument("is not a whole number");
   return value;
 }
 
@@ -167,10 +167,10 @@ struct Parse {
   void operator()(std::uint64_t StepMean::*m) const { step.*m = parse_integer<std::uint64_t>(text); }
   void operator()(double StepMean::*m) const {
     const auto value = text.empty() ? std::numeric_limits<double>::quiet_NaN() : parse_double(text);
-    if (!value) throw std::invalid_argument("is no number");
+    if (!value) throw std::invalid_argument("is not a number");
     step.*m = *value;
   }
-  void operator()(Doubts d) const { step.*d.member = doubts_from_names(text); }
+  void operator()(Flags d) const { step.*d.member = quality_flags_from_names(text); }
 };
 
 /// Fields of one record from `at` on, into those of the last; leaves `at` after its line end and counts the line feeds
@@ -184,7 +184,7 @@ void next_record(std::string_view text, std::size_t& at, std::size_t& lines, std
   open_field();
   bool inside = false;
   while (at < text.size()) {
-    // What is nothing but text goes over in one piece.
+    // Plain text is copied in one piece.
     const std::size_t begin = at;
     while (at < text.size() && text[at] != '"' && text[at] != '\n' && (inside || text[at] != ',')) ++at;
     fields[n - 1].append(text.substr(begin, at - begin));
@@ -203,7 +203,7 @@ void next_record(std::string_view text, std::size_t& at, std::size_t& lines, std
     }
   }
   fields.resize(n);
-  if (inside) throw std::invalid_argument("a quoted field has no end");
+  if (inside) throw std::invalid_argument("a quoted field does not end");
   if (!fields.back().empty() && fields.back().back() == '\r') fields.back().pop_back();
 }
 
@@ -216,15 +216,25 @@ std::string row_of(const StepMean& step, const Columns& columns) {
   return line;
 }
 
-/// The columns that a header names; the base, then any groups in order.
-Columns columns_named(std::string_view header) {
-  for (unsigned set = 0; set < 1u << kGroups.size(); ++set) {
-    std::array<bool, kGroups.size()> present{};
-    for (std::size_t i = 0; i < present.size(); ++i) present[i] = (set >> i & 1u) != 0;
-    Columns columns = with_groups(present);
-    if (header_of(columns) == header) return columns;
+/// The columns that a header names, in its order. All but those of the groups must be there, none twice.
+Columns columns_named(const std::vector<std::string>& names) {
+  Columns known(kColumns.begin(), kColumns.end());
+  for (const Group& group : kGroups) known.insert(known.end(), group.columns.begin(), group.columns.end());
+  Columns columns;
+  for (const std::string& name : names) {
+    const auto is_it = [&](const Column& column) { return column.name == name; };
+    const auto found = std::find_if(known.begin(), known.end(), is_it);
+    if (found == known.end()) throw std::invalid_argument(fmt::format("unknown column \"{}\"", name));
+    if (std::any_of(columns.begin(), columns.end(), is_it))
+      throw std::invalid_argument(fmt::format("column {} occurs twice", name));
+    columns.push_back(*found);
   }
-  throw std::invalid_argument("is no header of a steps file; expected " + steps_header());
+  for (const Column& required : kColumns) {
+    const auto is_it = [&](const Column& column) { return std::string_view(column.name) == required.name; };
+    if (std::none_of(columns.begin(), columns.end(), is_it))
+      throw std::invalid_argument(fmt::format("column {} is missing; expected {}", required.name, steps_header()));
+  }
+  return columns;
 }
 
 StepMean step_from(const std::vector<std::string>& fields, const Columns& columns) {
@@ -244,30 +254,30 @@ StepMean step_from(const std::vector<std::string>& fields, const Columns& column
 
 }  // namespace
 
-std::string doubt_names(std::uint32_t doubts) {
+std::string quality_flag_names(std::uint32_t flags) {
   std::string names;
-  for (const auto& [bit, name] : kDoubtNames) {
-    if ((doubts & static_cast<std::uint32_t>(bit)) == 0) continue;
+  for (const auto& [bit, name] : kFlagNames) {
+    if ((flags & static_cast<std::uint32_t>(bit)) == 0) continue;
     if (!names.empty()) names += '+';
     names += name;
   }
   return names;
 }
 
-std::uint32_t doubts_from_names(std::string_view names) {
-  std::uint32_t doubts = 0;
+std::uint32_t quality_flags_from_names(std::string_view names) {
+  std::uint32_t flags = 0;
   while (!names.empty()) {
     const std::size_t plus = std::min(names.find('+'), names.size());
     const std::string_view word = names.substr(0, plus);
     std::uint32_t bit = 0;
-    for (const auto& [value, name] : kDoubtNames) {
+    for (const auto& [value, name] : kFlagNames) {
       if (name == word) bit = static_cast<std::uint32_t>(value);
     }
-    if (bit == 0) throw std::invalid_argument(fmt::format("names the unknown doubt \"{}\"", word));
-    doubts |= bit;
+    if (bit == 0) throw std::invalid_argument(fmt::format("unknown quality flag \"{}\"", word));
+    flags |= bit;
     names.remove_prefix(std::min(plus + 1, names.size()));
   }
-  return doubts;
+  return flags;
 }
 
 std::string steps_header() { return header_of(with_groups({})); }
@@ -279,8 +289,6 @@ std::string format_steps(std::span<const StepMean> steps) {
   return text;
 }
 
-std::string format_step(const StepMean& step) { return row_of(step, columns_of({&step, 1})); }
-
 std::vector<StepMean> parse_steps(std::string_view text, const std::string& name) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   std::size_t at = 0;
@@ -288,11 +296,9 @@ std::vector<StepMean> parse_steps(std::string_view text, const std::string& name
   std::size_t line = 1;
   std::vector<StepMean> steps;
   try {
-    const std::size_t end = text.find('\n');
-    if (end == std::string_view::npos) (void)columns_named("");
-    const Columns columns = columns_named(text.substr(0, end));
     std::vector<std::string> fields;
     next_record(text, at, lines, fields);
+    const Columns columns = columns_named(fields);
     while (at < text.size()) {
       line = lines + 1;
       const std::size_t begin = at;

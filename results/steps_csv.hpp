@@ -16,19 +16,18 @@
 
 namespace kphi::results {
 
-/// Names of the set bits of Doubt joined by '+'; empty for none.
-[[nodiscard]] std::string doubt_names(std::uint32_t doubts);
-/// Inverse of doubt_names. Throws std::invalid_argument that names the unknown word.
-[[nodiscard]] std::uint32_t doubts_from_names(std::string_view names);
+/// Names of the set bits of QualityFlag joined by '+'; empty for none.
+[[nodiscard]] std::string quality_flag_names(std::uint32_t flags);
+/// Inverse of quality_flag_names. Throws std::invalid_argument that names the unknown word.
+[[nodiscard]] std::uint32_t quality_flags_from_names(std::string_view names);
 
 /// The header line without further columns, without a line feed.
 [[nodiscard]] std::string steps_header();
-/// One row, without a line feed.
-[[nodiscard]] std::string format_step(const StepMean& step);
 /// The whole file: the same bytes live and in replay.
 [[nodiscard]] std::string format_steps(std::span<const StepMean> steps);
 
-/// Throws ConfigurationError "name:line: …" for a header or field it does not understand.
+/// Columns by name, in any order; those in groups may be missing. Throws ConfigurationError "name:line: …" for an
+/// unknown, missing or repeated column and for a field that it does not understand.
 [[nodiscard]] std::vector<StepMean> parse_steps(std::string_view text, const std::string& name);
 
 /// Replaces `path` in one step. Throws RecordError.

@@ -7,6 +7,7 @@
 namespace kphi::results {
 
 enum class SupplyRegulation : std::uint32_t { constant_voltage, constant_current, unknown };
+inline constexpr std::array<const char*, 3> kSupplyRegulationNames{"constant voltage", "constant current", "unknown"};
 
 /// Why the supply switched its output off by itself.
 enum class SupplyProtection : std::uint32_t {
@@ -35,5 +36,10 @@ struct SupplyReading {
   SupplyProtection protection = SupplyProtection::none;
   std::uint64_t output = 0;  ///< 1: on
 };
+
+// At a settled speed: share of the set voltage that may be missing at the terminals, and share above it that is more
+// than a meter errs by, so that the motor feeds back.
+inline constexpr double kSupplySag = 0.05;
+inline constexpr double kSupplyRise = 0.03;
 
 }  // namespace kphi::results

@@ -2,17 +2,19 @@
 
 #include <cerrno>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <sstream>
 #include <utility>
 
+#include "compensation/file/coefficient_keys.hpp"
 #include "compensation/file/yaml_reader.hpp"
 
 namespace kphi::compensation {
 namespace {
 
-constexpr const char* kFormat = "kphi-coefficients/1";
+constexpr const char* kFitAgain = "write the file again with `kphi fit`";
 constexpr double kPerDegreeToPerRad = 180.0 / kPi;
 
 /// The fit's own rounding; beyond it an anchored line contradicts its K_T.
@@ -49,59 +51,60 @@ std::optional<ThrustCoefficient> optional_coefficient(const YamlReader& reader, 
   return ThrustCoefficient(*value * scale);
 }
 
-void read_thrust_coefficient(const YamlReader& reader, double scale, Coefficients& into) {
-  const YAML::Node map = reader.required_map(reader.top(), "K_T");
-  into.thrust_coefficient = ThrustCoefficient(reader.number_at(map, "value") * scale);
-  if (!(into.thrust_coefficient.value() > 0.0)) {
-    reader.refuse(reader.required(map, "value"), "K_T must be positive",
-                  "fit again from a campaign with a run at 0 degrees");
+std::optional<LineUncertainty> read_uncertainty(const YamlReader& reader, const YAML::Node& map, double scale,
+                                                const std::optional<ThrustCoefficient>& error) {
+  const std::vector<YAML::Node> rows = reader.list(map, "covariance");
+  if (rows.empty()) return std::nullopt;
+  const double units[2] = {scale, scale * kPerDegreeToPerRad};
+  double covariance[2][2] = {};
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (rows.size() != 2 || !rows[i].IsSequence() || rows[i].size() != 2)
+      reader.refuse(rows[i], "covariance is not two rows of two numbers", kFitAgain);
+    for (std::size_t j = 0; j < 2; ++j)
+      covariance[i][j] = reader.number(rows[i][j], "covariance") * units[i] * units[j];
+    if (covariance[i][i] < 0.0) reader.refuse(rows[i], "a variance is below 0", kFitAgain);
   }
+  if (!error) return std::nullopt;
+  return LineUncertainty{error->value(), covariance[0][0], covariance[0][1], covariance[1][1]};
+}
+
+ThrustCoefficient read_thrust_coefficient(const YamlReader& reader, const YAML::Node& map, double scale) {
+  const ThrustCoefficient k(reader.number_at(map, "value") * scale);
+  constexpr const char* kMeasureAtZero = "fit again from a campaign with a run at 0 degrees";
+  if (!(k.value() > 0.0)) reader.refuse(reader.required(map, "value"), "K_T must be positive", kMeasureAtZero);
   if (reader.optional_number_at(map, "phi_deg").value_or(0.0) != 0.0) {
     reader.refuse(reader.required(map, "phi_deg"), "K_T is the coefficient without occlusion, but phi_deg is not 0",
-                  "fit again from a campaign with a run at 0 degrees");
+                  kMeasureAtZero);
   }
-  into.thrust_coefficient_error = optional_coefficient(reader, map, "standard_error", scale);
-  if (into.thrust_coefficient_error && into.thrust_coefficient_error->value() < 0.0) {
-    reader.refuse(reader.required(map, "standard_error"), "a standard error is below 0",
-                  "write the file again with `kphi fit`");
-  }
+  return k;
 }
 
-void read_covariance(const YamlReader& reader, const YAML::Node& map, double scale, Coefficients::Line& line) {
-  const std::vector<YAML::Node> rows = reader.list(map, "covariance");
-  if (rows.empty()) return;
-  const double units[2] = {scale, scale * kPerDegreeToPerRad};
-  std::array<std::array<double, 2>, 2> covariance{};
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (rows.size() != 2 || !rows[i].IsSequence() || rows[i].size() != 2) {
-      reader.refuse(rows[i], "covariance is not two rows of two numbers", "write the file again with `kphi fit`");
-    }
-    for (std::size_t j = 0; j < 2; ++j) {
-      covariance[i][j] = reader.number(rows[i][j], "covariance") * units[i] * units[j];
-    }
-    if (covariance[i][i] < 0.0) reader.refuse(rows[i], "a variance is below 0", "write the file again with `kphi fit`");
-  }
-  line.covariance = covariance;
+std::optional<ThrustCoefficient> read_error(const YamlReader& reader, const YAML::Node& map, double scale) {
+  const auto error = optional_coefficient(reader, map, "standard_error", scale);
+  if (error && error->value() < 0.0)
+    reader.refuse(reader.required(map, "standard_error"), "a standard error is below 0", kFitAgain);
+  return error;
 }
 
-void read_line(const YamlReader& reader, double scale, Coefficients& into) {
+ThrustCurve read_curve(const YamlReader& reader, double scale, Radians largest) {
+  const OverlapMeasure overlap = overlap_of(reader);
+  const YAML::Node reference = reader.required_map(reader.top(), "K_T");
+  const ThrustCoefficient k_t = read_thrust_coefficient(reader, reference, scale);
   const YAML::Node map = reader.required_map(reader.top(), "line");
-  Coefficients::Line& line = into.line;
-  line.anchored = reader.truth_at(map, "anchored");
-  line.intercept = ThrustCoefficient(reader.number_at(map, "intercept") * scale);
-  line.slope_per_rad = reader.number_at(map, "slope_per_deg") * scale * kPerDegreeToPerRad;
-  read_covariance(reader, map, scale, line);
-  for (const YAML::Node& point : reader.list(map, "points_deg")) {
-    line.points.push_back(from_degrees(reader.number(point, "points_deg")));
-  }
-  if (!(line.intercept.value() > 0.0)) {
+  const ThrustCoefficient intercept(reader.number_at(map, "intercept") * scale);
+  const double slope = reader.number_at(map, "slope_per_deg") * scale * kPerDegreeToPerRad;
+  const auto uncertainty = read_uncertainty(reader, map, scale, read_error(reader, reference, scale));
+  if (!(intercept.value() > 0.0)) {
     reader.refuse(reader.required(map, "intercept"), "the intercept must be positive",
                   "check sign and unit of the fit");
   }
-  if (line.anchored && std::fabs(line.intercept / into.thrust_coefficient - 1.0) > kAnchorTolerance) {
-    reader.refuse(reader.required(map, "intercept"), "the line is called anchored, yet its intercept is not K_T",
-                  "write the file again with `kphi fit`");
+  if (reader.truth_at(map, "anchored") && std::fabs(intercept / k_t - 1.0) > kAnchorTolerance) {
+    reader.refuse(reader.required(map, "intercept"), "the line is called anchored, but its intercept is not K_T",
+                  kFitAgain);
   }
+  const auto curve = ThrustCurve::from_line(k_t, intercept, slope, largest, overlap, uncertainty);
+  if (!curve) reader.refuse(map, "the numbers of K_T, line and valid are too large to fly", kFitAgain);
+  return *curve;
 }
 
 std::optional<std::pair<double, double>> read_range(const YamlReader& reader, const YAML::Node& map,
@@ -117,24 +120,18 @@ std::optional<std::pair<double, double>> read_range(const YamlReader& reader, co
   return range;
 }
 
-void read_validity(const YamlReader& reader, Coefficients& into) {
+std::pair<double, double> read_occlusions(const YamlReader& reader) {
   const YAML::Node map = reader.required_map(reader.top(), "valid");
-  const YAML::Node phi_node = reader.required(map, "phi_deg");
-  const auto phi = read_range(reader, map, "phi_deg");
-  if (!phi || phi->second > 360.0) {
-    reader.refuse(phi_node, "`phi_deg` is not a range of occlusions", "write [smallest, largest], at most 360");
-  }
-  into.smallest_occlusion = from_degrees(phi->first);
-  into.largest_occlusion = from_degrees(phi->second);
-  if (const auto speed = read_range(reader, map, "speed_rpm")) {
-    into.slowest_speed = from_rpm(speed->first);
-    into.fastest_speed = from_rpm(speed->second);
-  }
+  const YAML::Node node = reader.required(map, "phi_deg");
+  const auto range = read_range(reader, map, "phi_deg");
+  if (!range || range->second > 360.0)
+    reader.refuse(node, "`phi_deg` is not a range of occlusions", "write [smallest, largest], at most 360");
+  return *range;
 }
 
 void read_table(const YamlReader& reader, double scale, Coefficients& into) {
   for (const YAML::Node& node : reader.list(reader.top(), "table")) {
-    if (!node.IsMap()) reader.refuse(node, "a row of the table has no keys", "write the file again with `kphi fit`");
+    if (!node.IsMap()) reader.refuse(node, "a row of the table has no keys", kFitAgain);
     Coefficients::Row row;
     row.occlusion = from_degrees(reader.number_at(node, "phi_deg"));
     row.k = ThrustCoefficient(reader.number_at(node, "k") * scale);
@@ -155,30 +152,65 @@ void read_propeller(const YamlReader& reader, Coefficients& into) {
   into.propeller.blades = reader.optional_count_at(map, "blades").value_or(0);
 }
 
+void read_fit(const YamlReader& reader, const YAML::Node& map, Coefficients::Fit& into) {
+  into.model = reader.optional_text_at(map, "model");
+  into.estimator = reader.optional_text_at(map, "estimator");
+  into.k_by = reader.optional_text_at(map, "k_by");
+  into.weights = reader.optional_text_at(map, "weights");
+  into.loss = reader.optional_text_at(map, "loss");
+  into.speed_range_rpm = read_range(reader, map, "speed_range_rpm");
+  for (const YAML::Node& run : reader.list(map, "leave_out")) {
+    if (!run.IsScalar()) reader.refuse(run, "a run in `leave_out` is not a text", kFitAgain);
+    into.leave_out.push_back(run.Scalar());
+  }
+  if (!reader.optional(map, "u").IsDefined()) return;
+  into.bench.emplace();
+  for (const auto& entry : reader.required_map(map, "u"))
+    into.bench->emplace_back(entry.first.Scalar(), reader.number(entry.second, entry.first.Scalar()));
+}
+
 void read_provenance(const YamlReader& reader, Coefficients& into) {
   const YAML::Node map = reader.optional(reader.top(), "provenance");
   if (!map.IsDefined() || !map.IsMap()) return;
   into.provenance.campaign = reader.optional_text_at(map, "campaign");
   const YAML::Node fit = reader.optional(map, "fit");
-  if (fit.IsDefined() && fit.IsMap()) {
-    into.provenance.model = reader.optional_text_at(fit, "model");
-    into.provenance.estimator = reader.optional_text_at(fit, "estimator");
-  }
+  if (fit.IsDefined() && fit.IsMap()) read_fit(reader, fit, into.provenance.fit);
   for (const YAML::Node& run : reader.list(map, "runs")) {
-    if (!run.IsMap()) reader.refuse(run, "a run has no keys", "write the file again with `kphi fit`");
+    if (!run.IsMap()) reader.refuse(run, "a run has no keys", kFitAgain);
     into.provenance.runs.push_back({reader.text_at(run, "file"), reader.optional_text_at(run, "sha256")});
+  }
+}
+
+void read_budgets(const YamlReader& reader, double scale, Coefficients& into) {
+  if (!reader.optional(reader.top(), "uncertainty").IsDefined()) return;
+  const YAML::Node map = reader.required_map(reader.top(), "uncertainty");
+  const auto u_of = [&](const YAML::Node& budget) -> std::optional<double> {
+    const auto u = reader.optional_number_at(budget, "u");
+    return u ? std::optional<double>(*u * scale) : std::nullopt;
+  };
+  into.uncertainty = Coefficients::Uncertainty{};
+  Coefficients::Uncertainty& budgets = *into.uncertainty;
+  const YAML::Node k_t = reader.required_map(map, "K_T");
+  budgets.thrust_coefficient = u_of(k_t);
+  budgets.intercept = u_of(reader.required_map(map, "intercept"));
+  budgets.slope_per_deg = u_of(reader.required_map(map, "slope_per_deg"));
+  if (reader.optional_text_at(k_t, "freedom") != ".inf")
+    budgets.freedom = reader.optional_number_at(k_t, "freedom").value_or(budgets.freedom);
+  for (const YAML::Node& row : reader.list(map, "table")) {
+    if (!row.IsMap()) reader.refuse(row, "a row of the budgets has no keys", kFitAgain);
+    budgets.table.push_back(u_of(row));
   }
 }
 
 void refuse_other_format(const YamlReader& reader) {
   const YAML::Node node = reader.optional(reader.top(), "format");
   if (!node.IsDefined()) {
-    reader.refuse(reader.top(), "no `format`, so this is no coefficient file",
+    reader.refuse(reader.top(), "no `format`, so this is not a coefficient file",
                   "give the coefficients.yaml that `kphi fit` wrote");
   }
   const std::string format = reader.text_at(reader.top(), "format");
-  if (format != kFormat) {
-    reader.refuse(node, "format `" + format + "` is not " + kFormat,
+  if (format != kCoefficientFormat) {
+    reader.refuse(node, "format `" + format + "` is not " + kCoefficientFormat,
                   "fit again with this version of kphi, or update it");
   }
 }
@@ -188,20 +220,28 @@ void refuse_other_format(const YamlReader& reader) {
 Coefficients parse_coefficients(const std::string& text, const std::string& path) {
   const YamlReader reader(text, path);
   refuse_other_format(reader);
-  Coefficients coefficients;
-  coefficients.path = path;
   const double scale = scale_of_unit(reader);
-  coefficients.overlap = overlap_of(reader);
+  const auto [smallest, largest] = read_occlusions(reader);
+  Coefficients coefficients(read_curve(reader, scale, from_degrees(largest)));
+  coefficients.path = path;
+  coefficients.smallest_occlusion = from_degrees(smallest);
+  coefficients.thrust_coefficient_error = read_error(reader, reader.required_map(reader.top(), "K_T"), scale);
+  const YAML::Node line = reader.required_map(reader.top(), "line");
+  coefficients.anchored = reader.truth_at(line, "anchored");
+  for (const YAML::Node& point : reader.list(line, "points_deg"))
+    coefficients.points.push_back(from_degrees(reader.number(point, "points_deg")));
+  if (const auto speed = read_range(reader, reader.required_map(reader.top(), "valid"), "speed_rpm")) {
+    coefficients.slowest_speed = from_rpm(speed->first);
+    coefficients.fastest_speed = from_rpm(speed->second);
+  }
   coefficients.measured_utc = reader.optional_text_at(reader.top(), "measured_utc");
   coefficients.tool_version = reader.optional_text_at(reader.top(), "tool_version");
   read_propeller(reader, coefficients);
-  read_thrust_coefficient(reader, scale, coefficients);
-  read_line(reader, scale, coefficients);
-  read_validity(reader, coefficients);
   read_table(reader, scale, coefficients);
   coefficients.air_density_kg_m3 = reader.optional_number_at(reader.top(), "air_density_kg_m3");
   if (const auto volts = reader.optional_number_at(reader.top(), "supply_v")) coefficients.supply = Volts(*volts);
   read_provenance(reader, coefficients);
+  read_budgets(reader, scale, coefficients);
   return coefficients;
 }
 
@@ -216,17 +256,20 @@ Coefficients load_coefficients(const std::string& path) {
   return parse_coefficients(text.str(), path);
 }
 
-ThrustLine thrust_line(const Coefficients& coefficients) {
-  std::optional<LineUncertainty> uncertainty;
-  if (const auto& covariance = coefficients.line.covariance; covariance && coefficients.thrust_coefficient_error) {
-    uncertainty = LineUncertainty{coefficients.thrust_coefficient_error->value(), (*covariance)[0][0],
-                                  (*covariance)[0][1], (*covariance)[1][1]};
-  }
-  const auto line =
-      ThrustLine::from(coefficients.thrust_coefficient, coefficients.line.intercept, coefficients.line.slope_per_rad,
-                       coefficients.largest_occlusion, coefficients.overlap, uncertainty);
-  if (!line) throw CoefficientError(coefficients.path + ": not a line that can fly; read the file again");
-  return *line;
+std::string words_of(const ThrustCurve& curve) {
+  char words[64];
+  const double slope = curve.line().slope_per_rad;
+  std::snprintf(words, sizeof words, "%.6g %c %.6g phi/rad", curve.line().intercept.value(), slope < 0 ? '-' : '+',
+                std::fabs(slope));
+  return words;
+}
+
+std::optional<std::string> overlap_mismatch(OverlapMeasure fitted, const std::string& coefficients,
+                                            OverlapMeasure flown, const std::string& vehicle) {
+  if (fitted == flown) return std::nullopt;
+  const std::string as_fitted(name_of(fitted)), as_flown(name_of(flown));
+  return coefficients + ": fitted with overlap " + as_fitted + ", but " + vehicle + " flies with " + as_flown +
+         "; write `overlap: " + as_fitted + "` in the vehicle file, or fit again with " + as_flown;
 }
 
 }  // namespace kphi::compensation

@@ -1,38 +1,30 @@
 // Reads the coefficient file that `kphi fit` writes (format kphi-coefficients/1). For the ground: allocates and throws.
 #pragma once
 
-#include <array>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "compensation/file/coefficient_error.hpp"
 #include "compensation/overlap_measure.hpp"
-#include "compensation/thrust_line.hpp"
+#include "compensation/thrust_curve.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::compensation {
 
-/// The message reads "file:line: what is wrong; the next move".
-class CoefficientError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
-/// One coefficient file in SI units, whatever its k_unit. What the file leaves out or calls `unknown` is empty.
+/// One coefficient file in SI units, whatever its k_unit. What the file leaves out or calls `unknown` is empty. Its
+/// keys are listed in coefficient_keys.hpp.
 struct Coefficients {
+  explicit Coefficients(const ThrustCurve& fitted) : curve(fitted) {}
+
   struct Propeller {
     std::string id;
     std::string name;
     double diameter_in = 0;  ///< 0 if unknown
     int blades = 0;          ///< 0 if unknown
-  };
-  struct Line {
-    bool anchored = false;                                           ///< forced through K_T at φ = 0
-    ThrustCoefficient intercept;                                     ///< k at φ = 0
-    double slope_per_rad = 0;                                        ///< N/(rad/s)² per rad
-    std::optional<std::array<std::array<double, 2>, 2>> covariance;  ///< of intercept and slope_per_rad, SI
-    std::vector<Radians> points;                                     ///< occlusions behind the line
   };
   struct Row {
     Radians occlusion;
@@ -47,29 +39,45 @@ struct Coefficients {
     std::string file;
     std::string sha256;
   };
-  struct Provenance {
-    std::string campaign;
+  /// How the coefficients were fitted, in the words of `kphi fit`; empty in a file that does not say.
+  struct Fit {
     std::string model;
     std::string estimator;
+    std::string k_by, weights, loss;
+    std::optional<std::pair<double, double>> speed_range_rpm;          ///< lowest and highest level fitted
+    std::vector<std::string> leave_out;                                ///< "PHI:REPETITION:CAUSE"
+    std::optional<std::vector<std::pair<std::string, double>>> bench;  ///< `u`: uncertainties of the stand, by name
+  };
+  struct Provenance {
+    std::string campaign;
+    Fit fit;
     std::vector<Run> runs;
+  };
+  /// The budgets: standard uncertainties by the GUM, N/(rad/s)²; nullopt where unknown.
+  struct Uncertainty {
+    std::optional<double> thrust_coefficient, intercept, slope_per_deg;
+    double freedom = std::numeric_limits<double>::infinity();  ///< degrees of freedom of K_T's
+    std::vector<std::optional<double>> table;                  ///< one per row of `table`
   };
 
   std::string path;
   std::string measured_utc;
   std::string tool_version;
   Propeller propeller;
-  OverlapMeasure overlap = OverlapMeasure::rim_arc;  ///< a line must be flown with the measure it was fitted with
-  ThrustCoefficient thrust_coefficient;              ///< K_T, measured at φ = 0
+  /// What flies: K_T, the line, its overlap measure and the largest valid φ; with its uncertainty if the file has both
+  /// the covariance and the standard error of K_T.
+  ThrustCurve curve;
   std::optional<ThrustCoefficient> thrust_coefficient_error;  ///< standard error of K_T
-  Line line;
-  Radians smallest_occlusion;  ///< valid range of φ
-  Radians largest_occlusion;
-  std::optional<RadPerSec> slowest_speed;  ///< valid range of speeds
+  bool anchored = false;                                      ///< the line is forced through K_T at φ = 0
+  std::vector<Radians> points;                                ///< occlusions behind the line
+  Radians smallest_occlusion;                                 ///< of the valid range of φ
+  std::optional<RadPerSec> slowest_speed;                     ///< valid range of speeds
   std::optional<RadPerSec> fastest_speed;
   std::vector<Row> table;
   std::optional<double> air_density_kg_m3;
   std::optional<Volts> supply;
   Provenance provenance;
+  std::optional<Uncertainty> uncertainty;
 };
 
 /// Refuses a file of another format, without k_unit or overlap, with a K_T that is not positive, with numbers that are
@@ -79,9 +87,12 @@ struct Coefficients {
 /// As load_coefficients, from text; `path` only names it in messages.
 [[nodiscard]] Coefficients parse_coefficients(const std::string& text, const std::string& path);
 
-/// What flies: the line of the file, with its overlap measure, and with its uncertainty if the file tells both the
-/// covariance and the standard error of K_T. Throws CoefficientError if `coefficients` was altered into something
-/// invalid.
-[[nodiscard]] ThrustLine thrust_line(const Coefficients& coefficients);
+/// "1.59668e-06 - 2.5658e-07 phi/rad": k(φ) in N/(rad/s)², for people.
+[[nodiscard]] std::string words_of(const ThrustCurve& curve);
+
+/// A message for coefficients and a vehicle that measure φ differently, naming both files; nullopt if they agree.
+/// Compensator::build refuses them too, but knows no files.
+[[nodiscard]] std::optional<std::string> overlap_mismatch(OverlapMeasure fitted, const std::string& coefficients,
+                                                          OverlapMeasure flown, const std::string& vehicle);
 
 }  // namespace kphi::compensation

@@ -5,7 +5,7 @@
 #include <set>
 #include <utility>
 
-#include "compensation/file/coefficient_file.hpp"
+#include "compensation/file/coefficient_error.hpp"
 
 namespace kphi::compensation {
 namespace {

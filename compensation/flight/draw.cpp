@@ -9,13 +9,14 @@
 namespace kphi::flight {
 namespace {
 
-using compensation::ThrustLine;
+using compensation::ThrustCurve;
 
-ThrustLine line_with(const ThrustLine& line, ThrustCoefficient intercept, double slope_per_rad) {
-  const auto made = ThrustLine::from(line.thrust_coefficient(), intercept, slope_per_rad, line.largest_fitted(),
-                                     line.overlap(), line.uncertainty());
-  if (!made) throw std::invalid_argument("the line k(φ) has no positive intercept left; check the coefficient file");
-  return *made;
+/// The slope first, then the start: the order of the draws.
+ThrustCurve drawn_curve(const ThrustCurve& curve, Random& random) {
+  const double steepness = random.normal(1.0, 0.03);
+  const auto drawn = curve.perturbed(random.normal(0.0, 0.01) * curve.thrust_coefficient(), steepness);
+  if (!drawn) throw std::invalid_argument("k(0) is not positive in a draw; check the coefficient file");
+  return *drawn;
 }
 
 /// The arms that stop short of the farthest one do so `factor` times as far.
@@ -45,8 +46,8 @@ void draw_gains(Gains& gains, Random& random) {
 
 }  // namespace
 
-Scene nominal_scene(const Vehicle& vehicle, const PilotSettings& pilot, const ThrustLine& line, std::uint64_t seed) {
-  Scene scene{vehicle, line, {}, {}, pilot, seed};
+Scene nominal_scene(const Vehicle& vehicle, const PilotSettings& pilot, const ThrustCurve& curve, std::uint64_t seed) {
+  Scene scene{vehicle, curve, {}, {}, pilot, seed};
   scene.truth.drag = vehicle.build.air_drag_per_s;
   return scene;
 }
@@ -59,15 +60,8 @@ Scene drawn_scene(const Scene& nominal, std::size_t index) {
   draw_truth(scene.truth, random);
   draw_gains(scene.pilot.gains, random);
   scene.vehicle.o = with_margin(nominal.vehicle.o, random.uniform(0.4, 2.0));
-  const ThrustLine& line = nominal.line;
-  const double slope = line.slope_per_rad() * random.normal(1.0, 0.03);
-  scene.line = line_with(line, line.intercept() + random.normal(0.0, 0.01) * line.thrust_coefficient(), slope);
+  scene.curve = drawn_curve(nominal.curve, random);
   return scene;
-}
-
-ThrustLine scaled_loss(const ThrustLine& line, double factor) {
-  const ThrustCoefficient above = line.intercept() - line.thrust_coefficient();
-  return line_with(line, line.thrust_coefficient() + factor * above, factor * line.slope_per_rad());
 }
 
 }  // namespace kphi::flight

@@ -10,7 +10,7 @@ namespace kphi::flight {
 
 /// The one set of circumstances that single flights use. `seed` is of the estimator's noise.
 [[nodiscard]] Scene nominal_scene(const Vehicle& vehicle, const PilotSettings& pilot,
-                                  const compensation::ThrustLine& line, std::uint64_t seed);
+                                  const compensation::ThrustCurve& curve, std::uint64_t seed);
 
 /// Draw `index` of the seed of `nominal`, whatever was drawn before: γ 1 to 1.5, the three loss laws in turn, mass 1.5
 /// %, K_T 1 % per rotor, arm angles 0.02 rad, centre of gravity 1.5 mm per axis, draught 0.1 m/s per horizontal axis,
@@ -18,9 +18,5 @@ namespace kphi::flight {
 /// gain times that of the rates, each by the root) 0.8 to 2, kpxy 5/6 to 10/6, drag 1/3 to 5/3, how far arms stop short
 /// in O 0.4 to 2 (ranges are uniform, else standard deviations).
 [[nodiscard]] Scene drawn_scene(const Scene& nominal, std::size_t index);
-
-/// The line with its slope and the distance of its intercept from K_T scaled; nothing else changes.
-/// 0 believes that no occlusion costs anything, 2 that each costs twice what the bench found.
-[[nodiscard]] compensation::ThrustLine scaled_loss(const compensation::ThrustLine& line, double factor);
 
 }  // namespace kphi::flight

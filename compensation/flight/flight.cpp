@@ -53,14 +53,14 @@ class Flight {
   Flight(const Experiment& experiment, const Scene& scene, const Shadow& shadow, std::vector<TraceRow>* trace)
       : experiment_(experiment),
         scene_(scene),
-        plant_(scene.vehicle, scene.truth, scene.line.thrust_coefficient(), shadow),
+        plant_(scene.vehicle, scene.truth, scene.curve.thrust_coefficient(), shadow),
         pilot_(pilot_for(scene)),
         estimator_(scene.noise, kStep * kStepsPerTick, Random(scene.seed)),
         motion_(scene.vehicle.angles(experiment.legs[0].shape), scene.vehicle.build.morph_s),
         now_(plant_.configuration(motion_.angles(0), {})),
         trace_(trace) {
     const Reference start = reference_at(experiment.path, 0);
-    const double hover = kGravity * scene.vehicle.build.mass_kg / 4 / scene.line.thrust_coefficient().value();
+    const double hover = kGravity * scene.vehicle.build.mass_kg / 4 / scene.curve.thrust_coefficient().value();
     state_ = level_state({start.position, start.velocity}, now_.mass, std::sqrt(hover));
     pilot_.set_arms(motion_.angles(0));
   }
@@ -78,7 +78,7 @@ class Flight {
 
  private:
   static Pilot pilot_for(const Scene& scene) {
-    const auto pilot = Pilot::build(scene.vehicle, scene.line, scene.pilot);
+    const auto pilot = Pilot::build(scene.vehicle, scene.curve, scene.pilot);
     if (!pilot) throw std::invalid_argument("no controller can be built for this vehicle; check its sizes and spins");
     return *pilot;
   }

@@ -14,7 +14,7 @@ namespace kphi::flight {
 /// All that one flight depends on.
 struct Scene {
   Vehicle vehicle;
-  compensation::ThrustLine line;  ///< of the coefficient file; its K_T is that of a rotor without error
+  compensation::ThrustCurve curve;  ///< of the coefficient file; its K_T is that of a rotor without error
   Truth truth;
   EstimatorNoise noise;
   PilotSettings pilot;

@@ -19,9 +19,9 @@ RotorLayout layout_of(const Vehicle& vehicle, const MassProperties& mass) noexce
 
 }  // namespace
 
-std::optional<Pilot> Pilot::build(const Vehicle& vehicle, const compensation::ThrustLine& line,
+std::optional<Pilot> Pilot::build(const Vehicle& vehicle, const compensation::ThrustCurve& curve,
                                   const PilotSettings& settings) {
-  const auto built = Compensator::build({line, line, line, line}, vehicle.airframe);
+  const auto built = Compensator::build({curve, curve, curve, curve}, vehicle.airframe);
   const auto mixer =
       Mixer::build(layout_of(vehicle, mass_properties(vehicle, vehicle.x, {})), {Metres(vehicle.build.yaw_arm_m), 0.0});
   if (!built.compensator || !mixer) return std::nullopt;

@@ -24,7 +24,7 @@ struct PilotSettings {
 class Pilot {
  public:
   /// Nothing if the compensator refuses the vehicle, or the mixer its rotors in X or in O.
-  [[nodiscard]] static std::optional<Pilot> build(const Vehicle& vehicle, const compensation::ThrustLine& line,
+  [[nodiscard]] static std::optional<Pilot> build(const Vehicle& vehicle, const compensation::ThrustCurve& curve,
                                                   const PilotSettings& settings);
 
   void compensate(bool on) noexcept;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/random.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::flight {
@@ -11,16 +12,12 @@ namespace kphi::flight {
 /// SplitMix64 with Box and Muller's normal numbers.
 class Random {
  public:
-  explicit Random(std::uint64_t seed) noexcept : state_(seed) {}
+  explicit Random(std::uint64_t seed) noexcept : draw_(seed) {}
   /// Of stream `stream` of `seed`: no stream depends on how many numbers another one took.
-  Random(std::uint64_t seed, std::uint64_t stream) noexcept : state_(seed) { state_ = bits() ^ (stream * kOdd + kOdd); }
+  Random(std::uint64_t seed, std::uint64_t stream) noexcept
+      : draw_(SplitMix64(seed)() ^ (stream * SplitMix64::kGamma + SplitMix64::kGamma)) {}
 
-  [[nodiscard]] std::uint64_t bits() noexcept {
-    std::uint64_t z = (state_ += kOdd);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-  }
+  [[nodiscard]] std::uint64_t bits() noexcept { return draw_(); }
   /// In [from, to).
   [[nodiscard]] double uniform(double from, double to) noexcept {
     return from + (to - from) * static_cast<double>(bits() >> 11) * 0x1p-53;
@@ -37,8 +34,7 @@ class Random {
   }
 
  private:
-  static constexpr std::uint64_t kOdd = 0x9e3779b97f4a7c15u;
-  std::uint64_t state_;
+  SplitMix64 draw_;
   double spare_value_ = 0;
   bool spare_ = false;
 };

@@ -86,19 +86,21 @@ std::string trace_csv(const std::vector<TraceRow>& trace) {
 std::string draws_csv(const std::vector<Draw>& draws) {
   Csv csv("draw,law,gamma,mass,cog_x_m,cog_y_m,drag_per_s,wind_x_m_s,wind_y_m_s,kp_xy_per_s2,attitude_gain_per_s" +
           four("thrust", "") + four("arm_error", "_rad") + four("o_arm", "_rad") +
-          ",line_intercept,line_slope_per_rad,lost_plain,lost_compensated,hover_z_plain_m,hover_z_compensated_m,"
+          ",k_start,k_mean_slope_per_rad,lost_plain,lost_compensated,hover_z_plain_m,hover_z_compensated_m,"
           "hover_xy_plain_m,hover_xy_compensated_m,forward_x_m,forward_plain_m,forward_compensated_m,"
           "square_speed_ratio");
   for (std::size_t i = 0; i < draws.size(); ++i) {
     const Truth& truth = draws[i].scene.truth;
     const Gains& gains = draws[i].scene.pilot.gains;
-    const compensation::ThrustLine& line = draws[i].scene.line;
+    const compensation::ThrustCurve& curve = draws[i].scene.curve;
+    const double k_t = curve.thrust_coefficient().value(), start = curve.at(Radians(0)).value();
+    const double rise = curve.at(curve.largest_fitted()).value() - start;
     const Merits merits = merits_of(draws[i].flights);
     csv.add(std::to_string(i)).add(name_of(truth.law)).add(truth.gamma).add(truth.mass);
     csv.add_all(truth.cog_error).add(truth.drag).add_all(Eigen::Vector2d(truth.wind.head<2>()));
     csv.add(gains.position.x()).add(gains.attitude.x()).add_all(truth.thrust).add_all(truth.arm_error);
     for (const Radians& arm : draws[i].scene.vehicle.o) csv.add(arm.value());
-    csv.add(line.intercept() / line.thrust_coefficient()).add(line.slope_per_rad() / line.thrust_coefficient().value());
+    csv.add(start / k_t).add(rise / curve.largest_fitted().value() / k_t);
     csv.add(merits.lost_plain ? "1" : "0").add(merits.lost_compensated ? "1" : "0");
     csv.add(merits.hover_z_plain).add(merits.hover_z_compensated).add(merits.hover_xy_plain);
     csv.add(merits.hover_xy_compensated).add(merits.forward_x).add(merits.forward_plain);

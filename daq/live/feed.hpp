@@ -1,14 +1,14 @@
-// From the runner to whoever looks on, and one word back. The runner never waits: a tick replaces the one before, a
-// message that finds no room is dropped and counted.
+// From the runner to the live view, and one word back. The runner never waits: a tick replaces the one before, a
+// message without room is dropped and counted.
 #pragma once
 
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <cstdint>
-#include <string>
 
+#include "base/published.hpp"
+#include "daq/live/messages.hpp"
 #include "daq/live/tick.hpp"
-#include "drivers/netbox/published.hpp"
 
 namespace kphi::daq::live {
 
@@ -21,11 +21,11 @@ class Feed {
     tick_.publish(tick);
     shown_.fetch_add(1, std::memory_order_release);
   }
-  /// The runner's thread. One message as pages read it (messages.hpp).
-  void tell(const std::string& message) {
+  /// The runner's thread.
+  void tell(const Message& message) {
     if (!messages_.push(message)) dropped_.fetch_add(1);
   }
-  /// The onlooker's thread; one.
+  /// The server's thread.
   template <class Take>
   void take(Take&& take) {
     messages_.consume_all(take);
@@ -36,16 +36,16 @@ class Feed {
   [[nodiscard]] std::uint64_t shown() const noexcept { return shown_.load(std::memory_order_acquire); }
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(); }
 
-  /// Any thread. True: nobody had asked before.
+  /// Any thread. True: the first request.
   bool ask_stop() noexcept { return !stop_.exchange(true); }
-  /// Any thread: the runner asks on every tick.
+  /// Any thread: the runner checks it on every tick.
   [[nodiscard]] bool stop_asked() const noexcept { return stop_.load(); }
 
  private:
-  netbox::Published<Tick> tick_;
+  Published<Tick> tick_;
   std::atomic<std::uint64_t> shown_{0}, dropped_{0};
   std::atomic<bool> stop_{false};
-  boost::lockfree::spsc_queue<std::string> messages_;  // sized at run time: see recorder.hpp
+  boost::lockfree::spsc_queue<Message> messages_;  // sized at run time: see recorder.hpp
 };
 
 }  // namespace kphi::daq::live

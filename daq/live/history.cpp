@@ -4,14 +4,14 @@
 
 namespace kphi::daq::live {
 
-void History::keep(const std::string& message) {
-  if (message.starts_with("{\"type\":\"limits\"")) {
-    limits_ = {message};
+void History::keep(const Message& message) {
+  if (message.kind == Message::Kind::limits) {
+    limits_ = {message.text};
     return;
   }
-  const bool is_step = message.starts_with("{\"type\":\"step\"");
+  const bool is_step = message.kind == Message::Kind::step;
   auto& kept = is_step ? steps_ : others_;
-  kept.push_back(message);
+  kept.push_back(message.text);
   if (kept.size() > (is_step ? kMostSteps : kMostLines)) kept.pop_front();
 }
 

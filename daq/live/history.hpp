@@ -1,4 +1,4 @@
-// What a page that comes late must know.
+// What a page that joins late must know.
 #pragma once
 
 #include <deque>
@@ -13,12 +13,12 @@ class History {
  public:
   static constexpr std::size_t kTraceLength = 2000, kMostSteps = 20000, kMostLines = 500;
 
-  /// A message that all pages have been sent. Of limits the newest counts.
-  void keep(const std::string& message);
-  /// A point of the trace, unless that of this time is there already.
+  /// A message that was sent to all pages. Only the newest limits are kept.
+  void keep(const Message& message);
+  /// A point of the trace, unless it has one of this time.
   void keep(const Tick& tick);
-  /// {"type":"history","trace":[[time_s, thrust_n, commanded_rpm, speed_rpm] …],"messages":[…]}; null for what is not
-  /// known. Limits first, then steps, then all else, each oldest first.
+  /// {"type":"history","trace":[[time_s, thrust_n, commanded_rpm, speed_rpm] …],"messages":[…]}; null if unknown.
+  /// Limits first, then steps, then the others, each oldest first.
   [[nodiscard]] std::string message() const;
 
  private:

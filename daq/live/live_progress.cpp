@@ -1,7 +1,6 @@
 #include "daq/live/live_progress.hpp"
 
 #include <algorithm>
-#include <utility>
 
 #include "daq/live/messages.hpp"
 
@@ -16,10 +15,10 @@ double calendar_seconds(const Clock& clock, Instant now) {
 void add_motor(Tick& tick, const Observation& seen) {
   tick.speed_age_s = to_seconds(seen.motor_age);
   if (!seen.motor_is_fresh) return;
-  tick.speed_rpm = to_rpm(seen.speed);
-  tick.module_v = seen.module_voltage.value();
-  tick.module_a = seen.supply_current.value();
-  tick.coil_degc = seen.coil_temperature.value();
+  tick.speed_rpm = to_rpm(seen.speed());
+  tick.module_v = seen.judged[Watched::supply_voltage_low];
+  tick.module_a = seen.judged[Watched::supply_current];
+  tick.coil_degc = seen.judged[Watched::coil_temperature];
   tick.derate = seen.derate;
   tick.fault_bits = seen.fault_bits;
 }
@@ -30,8 +29,8 @@ void add_load_cell(Tick& tick, const Observation& seen) {
   tick.lost_network = seen.account.lost_network;
   tick.lost_host = seen.account.lost_host;
   if (!seen.load_cell_is_fresh) return;
-  tick.thrust_n = seen.thrust.value();
-  tick.torque_nm = seen.torque.value();
+  tick.thrust_n = seen.thrust_n;
+  tick.torque_nm = seen.torque_nm;
 }
 
 }  // namespace
@@ -58,7 +57,7 @@ Tick LiveProgress::tick_of(const Position& position, const Observation& seen) {
     tick.supply_v = seen.supply.voltage_v;
     tick.supply_a = seen.supply.current_a;
   }
-  tick.watched = limit_values(position, seen, {is_settled(now), pause_}, clock_);
+  tick.watched = seen.judged;
   return tick;
 }
 
@@ -66,26 +65,24 @@ bool LiveProgress::is_settled(Instant now) const {
   return step_ >= 0 && now - step_began_ >= from_seconds(subject_.minimum_discard.value());
 }
 
-void LiveProgress::look(const Position& position, const Observation& seen, Instant now) {
+void LiveProgress::add_to_step(const Position& position, const Observation& seen, Instant now) {
   if (position.step != step_) {
     step_ = position.step;
     step_began_ = now;
     quick_look_.begin();
   }
-  pause_ = now - std::exchange(looked_, now);
-  if (is_settled(now) && seen.motor_is_fresh && seen.load_cell_is_fresh) quick_look_.add(seen.thrust, seen.speed);
+  if (is_settled(now) && seen.motor_is_fresh && seen.load_cell_is_fresh) quick_look_.add(seen.thrust(), seen.speed());
 }
 
 void LiveProgress::guarded(const std::vector<GuardLimit>& limits) {
   inner_.guarded(limits);
-  std::vector<LimitBar> bars = limit_bars(limits);
-  feed_.tell(limits_message(bars));
-  if (plotter_ != nullptr) plotter_->hold_to(std::move(bars));
+  feed_.tell(limits_message(limits));
+  if (plotter_ != nullptr) plotter_->hold_to(limits);
 }
 
 void LiveProgress::tick(const Position& position, const Observation& seen) {
   inner_.tick(position, seen);
-  look(position, seen, clock_.now());
+  add_to_step(position, seen, clock_.now());
   const Tick tick = tick_of(position, seen);
   feed_.show(tick);
   if (plotter_ != nullptr) plotter_->send(tick);

@@ -1,4 +1,4 @@
-// Tells onlookers what the terminal is told, and more often. The runner's thread; nothing here waits.
+// Sends the progress to live pages and plotters, too. The runner's thread; nothing here waits.
 #pragma once
 
 #include <string>
@@ -7,13 +7,13 @@
 #include "daq/live/quick_look.hpp"
 #include "daq/live/subject.hpp"
 #include "daq/live/udp_json.hpp"
-#include "daq/progress.hpp"
+#include "daq/run/progress.hpp"
 
 namespace kphi::daq::live {
 
 class LiveProgress final : public Progress {
  public:
-  /// All must outlive this. `inner` is told everything first; `plotter` may be nullptr.
+  /// All must outlive this. `inner` gets every call first; `plotter` may be nullptr.
   LiveProgress(Progress& inner, Feed& feed, UdpJson* plotter, const Subject& subject, const Clock& clock)
       : inner_(inner), feed_(feed), plotter_(plotter), subject_(subject), clock_(clock) {}
   void guarded(const std::vector<GuardLimit>& limits) override;
@@ -23,7 +23,7 @@ class LiveProgress final : public Progress {
 
  private:
   [[nodiscard]] Tick tick_of(const Position& position, const Observation& seen);
-  void look(const Position& position, const Observation& seen, Instant now);
+  void add_to_step(const Position& position, const Observation& seen, Instant now);
   [[nodiscard]] bool is_settled(Instant now) const;
 
   Progress& inner_;
@@ -32,9 +32,8 @@ class LiveProgress final : public Progress {
   const Subject& subject_;
   const Clock& clock_;
   QuickLook quick_look_;
-  int step_ = -1;  ///< that is looked at
-  Instant step_began_{}, looked_{};
-  Duration pause_{};  ///< between the last two ticks
+  int step_ = -1;
+  Instant step_began_{};
   double most_remaining_s_ = 0;
 };
 

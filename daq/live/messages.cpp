@@ -8,7 +8,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// NaN becomes null; bytes that are no UTF-8 become U+FFFD.
+/// NaN becomes null; bytes that are not UTF-8 become U+FFFD.
 std::string text_of(const ordered_json& message) {
   return message.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
@@ -40,15 +40,15 @@ void add_readings(ordered_json& to, const Tick& tick) {
   to["lost_host"] = tick.lost_host;
 }
 
-ordered_json to_json(const std::vector<LimitBar>& limits) {
+ordered_json to_json(const std::vector<GuardLimit>& limits) {
   ordered_json bars = ordered_json::array();
-  for (const LimitBar& bar : limits)
-    bars.push_back({{"key", bar.key},
-                    {"name", bar.name},
-                    {"unit", bar.unit},
-                    {"limit", rounded(bar.limit)},
-                    {"lower", bar.lower},
-                    {"source", bar.source}});
+  for (const GuardLimit& limit : limits)
+    bars.push_back({{"key", row_of(limit.watched).key},
+                    {"name", row_of(limit.watched).label},
+                    {"unit", limit.unit},
+                    {"limit", rounded(limit.value)},
+                    {"lower", limit.lower},
+                    {"source", limit.source}});
   return bars;
 }
 
@@ -64,8 +64,8 @@ std::string hello_message(const Subject& subject) {
                   {"limits", to_json(subject.limits)}});
 }
 
-std::string limits_message(const std::vector<LimitBar>& limits) {
-  return text_of({{"type", "limits"}, {"limits", to_json(limits)}});
+Message limits_message(const std::vector<GuardLimit>& limits) {
+  return {Message::Kind::limits, text_of({{"type", "limits"}, {"limits", to_json(limits)}})};
 }
 
 std::string tick_message(const Tick& tick, double silent_s, std::uint64_t dropped) {
@@ -81,45 +81,44 @@ std::string tick_message(const Tick& tick, double silent_s, std::uint64_t droppe
                        {"repetition", tick.repetition},
                        {"repetitions", tick.repetitions}};
   add_readings(message, tick);
-  for (std::size_t i = 0; i < kWatchedCount; ++i)
-    message["watched"][key_of(static_cast<Watched>(i))] = rounded(tick.watched[i], 4);
+  for (const GuardedQuantity& row : kQuantities) message["watched"][row.key] = rounded(tick.watched[row.watched], 4);
   message["silent_s"] = rounded(silent_s);
   message["dropped"] = dropped;
   return text_of(message);
 }
 
-std::string step_message(const Tick& at, const QuickLook::Result& seen) {
-  return text_of({{"type", "step"},
-                  {"occlusion_deg", at.occlusion_deg},
-                  {"repetition", at.repetition},
-                  {"step", at.step},
-                  {"speed_rpm", rounded(to_rpm(RadPerSec(seen.speed_rad_s)))},
-                  {"speed2_rad2_s2", rounded(seen.speed_rad_s * seen.speed_rad_s)},
-                  {"thrust_n", rounded(seen.thrust_n)},
-                  {"k_n_s2", rounded(seen.k)},
-                  {"u_k_n_s2", rounded(seen.u_k)},
-                  {"n", seen.n}});
+Message step_message(const Tick& at, const QuickLook::Result& seen) {
+  return {Message::Kind::step, text_of({{"type", "step"},
+                                        {"occlusion_deg", at.occlusion_deg},
+                                        {"repetition", at.repetition},
+                                        {"step", at.step},
+                                        {"speed_rpm", rounded(to_rpm(RadPerSec(seen.speed_rad_s)))},
+                                        {"speed2_rad2_s2", rounded(seen.speed_rad_s * seen.speed_rad_s)},
+                                        {"thrust_n", rounded(seen.thrust_n)},
+                                        {"k_n_s2", rounded(seen.k)},
+                                        {"u_k_n_s2", rounded(seen.u_k)},
+                                        {"n", seen.n}})};
 }
 
-std::string line_message(double time_s, const std::string& text) {
-  return text_of({{"type", "line"}, {"time_s", time_s}, {"text", text}});
+Message line_message(double time_s, const std::string& text) {
+  return {Message::Kind::other, text_of({{"type", "line"}, {"time_s", time_s}, {"text", text}})};
 }
 
-std::string stop_message(double time_s) { return text_of({{"type", "stop"}, {"time_s", time_s}}); }
+Message stop_message(double time_s) { return {Message::Kind::other, text_of({{"type", "stop"}, {"time_s", time_s}})}; }
 
-std::string end_message(double time_s, bool well, const std::string& text) {
-  return text_of({{"type", "end"}, {"time_s", time_s}, {"well", well}, {"text", text}});
+Message end_message(double time_s, bool well, const std::string& text) {
+  return {Message::Kind::other, text_of({{"type", "end"}, {"time_s", time_s}, {"well", well}, {"text", text}})};
 }
 
-std::string plot_message(const Tick& tick, const std::vector<LimitBar>& limits) {
+std::string plot_message(const Tick& tick, const std::vector<GuardLimit>& limits) {
   ordered_json message{{"timestamp", tick.timestamp_s},
                        {"time_s", tick.time_s},
                        {"occlusion_deg", tick.occlusion_deg},
                        {"repetition", tick.repetition},
                        {"step", tick.step}};
   add_readings(message, tick);
-  for (const LimitBar& bar : limits)
-    message["limit_share"][bar.key] = rounded(share_of(bar, tick.watched[static_cast<std::size_t>(bar.watched)]), 4);
+  for (const GuardLimit& limit : limits)
+    message["limit_share"][row_of(limit.watched).key] = rounded(share_of(limit, tick.watched[limit.watched]), 4);
   const auto drop_unknown = [](ordered_json& object) {
     for (auto item = object.begin(); item != object.end();) {
       const bool unknown = item->is_number_float() && !std::isfinite(item->get<double>());

@@ -1,4 +1,4 @@
-// k of a step while the next one is already turning: for the eye, not for the record. Step means come from the raw
+// k of a step right after it, for the page; not for the record. Step means come from the raw
 // samples (daq/reduction.hpp).
 #pragma once
 

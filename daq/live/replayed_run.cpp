@@ -1,17 +1,14 @@
 #include "daq/live/replayed_run.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <span>
 #include <thread>
 
-#include "daq/load_watch.hpp"
-#include "profiles/configuration_error.hpp"
+#include "base/error.hpp"
+#include "daq/guard/observation.hpp"
 
 namespace kphi::daq::live {
 namespace {
 
-using results::MotorChannel;
 using results::Phase;
 using Wall = std::chrono::steady_clock;
 
@@ -38,23 +35,32 @@ const char* words_of(Phase phase) {
   return "";
 }
 
-void take(const results::MotorReading& reading, Observation& seen) {
-  if (reading.channel == MotorChannel::speed) seen.speed = RadPerSec(std::abs(reading.value));
-  if (reading.channel == MotorChannel::supply_voltage) seen.module_voltage = Volts(reading.value);
-  if (reading.channel == MotorChannel::supply_current) seen.supply_current = Amperes(reading.value);
-  if (reading.channel == MotorChannel::motor_current) seen.motor_current = Amperes(reading.value);
-  if (reading.channel == MotorChannel::coil_temperature) seen.coil_temperature = Celsius(reading.value);
-  if (reading.channel == MotorChannel::derate) seen.derate = reading.value;
-  if (reading.channel == MotorChannel::fault_now) seen.fault_bits = static_cast<unsigned>(reading.value);
-}
-
-/// One that cannot be read any more limits nothing.
-profiles::Bench bench_of(const results::RunHeader& header) {
+/// Without limits if it cannot be read.
+profiles::BenchConfig bench_of(const results::RunHeader& header) {
   try {
     return profiles::parse_bench(header.bench_text, "bench of the run");
   } catch (const ConfigurationError&) {
     return {};
   }
+}
+
+/// Mean of each axis before the motor turns, N and N m.
+std::array<double, 6> zero_of(const results::RunRecording& recording) {
+  std::array<double, 6> sum{};
+  std::size_t n = 0;
+  for (std::size_t i = 0; i + 1 < recording.phases.size(); ++i) {
+    if (recording.phases[i].phase != Phase::zero_before) continue;
+    for (const results::LoadCellRecord& sample : recording.load_cell) {
+      if (sample.arrival_ns < recording.phases[i].time_ns || sample.arrival_ns >= recording.phases[i + 1].time_ns)
+        continue;
+      for (std::size_t axis = 0; axis < sum.size(); ++axis) sum[axis] += sample.counts[axis];
+      ++n;
+    }
+  }
+  const results::LoadCellScale& scale = recording.header.load_cell;
+  for (std::size_t axis = 0; n > 0 && axis < sum.size(); ++axis)
+    sum[axis] /= static_cast<double>(n) * (axis < 3 ? scale.counts_per_newton : scale.counts_per_newton_metre);
+  return sum;
 }
 
 }  // namespace
@@ -74,30 +80,25 @@ Subject subject_of(const results::RunRecording& recording) {
       subject.speed_max_rpm = std::max(subject.speed_max_rpm, to_rpm(RadPerSec(mark.speed_rad_s)));
   }
   subject.replay = true;
-  std::erase_if(subject.limits, [](const LimitBar& bar) { return bar.watched == Watched::pause; });  // not recorded
+  std::erase_if(subject.limits,
+                [](const GuardLimit& limit) { return limit.watched == Watched::pause; });  // not recorded
   return subject;
 }
 
 ReplayedRun::ReplayedRun(const results::RunRecording& recording, ManualClock& clock)
-    : recording_(recording), clock_(clock), motor_(recording.motor) {
+    : recording_(recording),
+      clock_(clock),
+      motor_(recording.motor),
+      observer_({recording.header.thrust_axis, recording.header.thrust_sign, recording.header.spin},
+                recording.header.load_cell, SpeedWatch(recording.header.spin, Duration(0))) {
   std::stable_sort(motor_.begin(), motor_.end(), [](const auto& a, const auto& b) { return a.time_ns < b.time_ns; });
   const auto& cell = recording.load_cell;
   if (!cell.empty()) {
     begin_ = Instant(cell.front().arrival_ns);
     end_ = Instant(cell.back().arrival_ns);
   }
-  for (std::size_t i = 0; i + 1 < recording.phases.size(); ++i) {
-    const auto& mark = recording.phases[i];
-    if (mark.phase != Phase::zero_before) continue;
-    const auto at = [&](results::Nanoseconds time) {
-      return static_cast<std::size_t>(
-          std::lower_bound(cell.begin(), cell.end(), time,
-                           [](const auto& record, results::Nanoseconds t) { return record.arrival_ns < t; }) -
-          cell.begin());
-    };
-    for (std::size_t axis = 0; axis < 6; ++axis)
-      zero_[axis] = mean_counts(axis, at(mark.time_ns), at(recording.phases[i + 1].time_ns));
-  }
+  observer_.begin(begin_);
+  observer_.take_zero(zero_of(recording));
   position_.propeller = recording.header.propeller_id;
   position_.occlusion_deg = recording.header.occlusion_deg;
   position_.repetition = position_.repetitions = recording.header.repetition;
@@ -105,41 +106,24 @@ ReplayedRun::ReplayedRun(const results::RunRecording& recording, ManualClock& cl
   seen_.account = recording.account;
 }
 
-double ReplayedRun::mean_counts(std::size_t axis, std::size_t from, std::size_t to) const {
-  if (from >= to) return 0;
-  double sum = 0;
-  for (std::size_t i = from; i < to; ++i) sum += recording_.load_cell[i].counts[axis];
-  return sum / static_cast<double>(to - from);
-}
-
 void ReplayedRun::observe(Instant when) {
-  const auto& header = recording_.header;
   const auto& cell = recording_.load_cell;
-  const std::size_t from = sample_;
-  while (sample_ < cell.size() && cell[sample_].arrival_ns <= when.count()) ++sample_;
-  if (sample_ > from) {
-    const auto axis = static_cast<std::size_t>(header.thrust_axis);
-    const auto above_zero = [&](std::size_t of) { return mean_counts(of, from, sample_) - zero_[of]; };
-    seen_.thrust = Newtons(header.thrust_sign * above_zero(axis) / header.load_cell.counts_per_newton);
-    seen_.torque = NewtonMetres(header.thrust_sign * above_zero(3 + axis) / header.load_cell.counts_per_newton_metre);
-    seen_.loads = borne_loads(std::span(cell).subspan(from, sample_ - from), header.load_cell.counts_per_newton,
-                              header.load_cell.counts_per_newton_metre);
-    seen_.account.received = sample_;
-  }
+  for (; sample_ < cell.size() && cell[sample_].arrival_ns <= when.count(); ++sample_) observer_.take(cell[sample_]);
   for (; reading_ < motor_.size() && motor_[reading_].time_ns <= when.count(); ++reading_)
-    take(motor_[reading_], seen_);
+    observer_.take(motor_[reading_]);
   const auto& supply = recording_.supply;
-  for (; supply_ < supply.size() && supply[supply_].time_ns <= when.count(); ++supply_) seen_.supply = supply[supply_];
-  seen_.load_cell_age = sample_ > 0 ? when - Instant(cell[sample_ - 1].arrival_ns) : when - begin_;
-  seen_.motor_age = reading_ > 0 ? when - Instant(motor_[reading_ - 1].time_ns) : when - begin_;
-  seen_.load_cell_is_fresh = seen_.load_cell_age <= kFresh;
-  seen_.motor_is_fresh = reading_ > 0 && seen_.motor_age <= kFresh;
+  for (; supply_ < supply.size() && supply[supply_].time_ns <= when.count(); ++supply_) observer_.take(supply[supply_]);
+  const results::SampleAccount account = seen_.account;
+  seen_ = daq::observe(observer_.readings(), when, {kFresh, kFresh}, clock_);
+  seen_.account = account;
+  seen_.account.received = sample_;
 }
 
-void ReplayedRun::tell_phases(Instant when, Progress& progress) {
+void ReplayedRun::report_phases(Instant when, Progress& progress) {
   for (; phase_ < recording_.phases.size() && recording_.phases[phase_].time_ns <= when.count(); ++phase_) {
     if (position_.step >= 0) progress.step_done(position_, seen_);
     const auto& mark = recording_.phases[phase_];
+    observer_.take(mark);
     position_.step = mark.step;
     position_.phase = words_of(mark.phase);
     position_.commanded = RadPerSec(mark.speed_rad_s);
@@ -151,7 +135,7 @@ void ReplayedRun::tell_phases(Instant when, Progress& progress) {
 }
 
 void ReplayedRun::show(Instant when, Progress& progress, double speed) {
-  tell_phases(when, progress);
+  report_phases(when, progress);
   observe(when);
   clock_.set(when);
   position_.remaining_s = to_seconds(std::max(Duration(0), end_ - when)) / speed;

@@ -18,10 +18,10 @@
 #include <thread>
 #include <vector>
 
-#include "daq/live/gate.hpp"
+#include "base/error.hpp"
+#include "daq/live/access_control.hpp"
 #include "daq/live/history.hpp"
 #include "daq/live/messages.hpp"
-#include "profiles/configuration_error.hpp"
 
 namespace kphi::daq::live {
 namespace {
@@ -38,7 +38,7 @@ using Wall = std::chrono::steady_clock;
 constexpr int kYielding = 10;  // nice value of this thread
 constexpr int kSendBuffer = 1 << 16;
 constexpr std::size_t kMostRequests = 64;  // under way at once
-constexpr std::chrono::milliseconds kFarewell{500};
+constexpr std::chrono::milliseconds kClosingLimit{500};
 constexpr std::chrono::seconds kIdle{20};
 
 std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
@@ -51,11 +51,11 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 
 }  // namespace
 
-/// All but post() and the counts belongs to its thread.
-class Server::Works {
+/// Except draw() and the counts, everything belongs to its thread.
+class Server::Impl {
  public:
-  Works(Settings settings, Feed& feed);
-  ~Works();
+  Impl(Settings settings, Feed& feed);
+  ~Impl();
   [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
   [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
   void draw() {
@@ -71,38 +71,38 @@ class Server::Works {
   void run();
   void arm();
   void frame();
-  void broadcast(std::string message);
+  void broadcast(const Message& message);
   void stop_asked();
-  void say_goodbye();
-  void finish_if_all_is_said();
+  void begin_closing();
+  void finish_if_all_sent();
 
   Settings settings_;
   Feed& feed_;
   std::size_t requests_ = 0;  // before the context: its end ends requests
   asio::io_context io_{1};
   tcp::acceptor acceptor_{io_};
-  asio::steady_timer frames_due_{io_}, farewell_{io_};
+  asio::steady_timer frames_due_{io_}, closing_limit_{io_};
   std::uint16_t port_ = 0;
   History history_;
   std::set<std::shared_ptr<Client>> clients_;
   std::uint64_t last_shown_ = 0;
   Wall::time_point shown_at_ = Wall::now();
-  bool leaving_ = false;
+  bool closing_ = false;
   std::atomic<std::uint64_t> clients_now_{0}, refused_{0}, frames_{0}, skipped_{0}, dropped_clients_{0};
   std::thread thread_;
 };
 
-/// One page's WebSocket. At most one message is under way; ticks replace each other, all else waits in order.
-class Server::Works::Client : public std::enable_shared_from_this<Client> {
+/// One page's WebSocket. At most one message is under way; ticks replace each other, other messages wait in order.
+class Server::Impl::Client : public std::enable_shared_from_this<Client> {
  public:
-  Client(Works& works, tcp::socket socket) : works_(works), stream_(std::move(socket)) {}
+  Client(Impl& impl, tcp::socket socket) : impl_(impl), stream_(std::move(socket)) {}
 
   void open(const http::request<http::empty_body>& request) {
     Error ignored;
     beast::get_lowest_layer(stream_).socket().set_option(asio::socket_base::send_buffer_size(kSendBuffer), ignored);
     beast::get_lowest_layer(stream_).socket().set_option(tcp::no_delay(true), ignored);
     websocket::stream_base::timeout limits{};
-    limits.handshake_timeout = works_.settings_.request_limit;
+    limits.handshake_timeout = impl_.settings_.request_limit;
     limits.idle_timeout = kIdle;
     limits.keep_alive_pings = true;
     stream_.set_option(limits);
@@ -114,19 +114,19 @@ class Server::Works::Client : public std::enable_shared_from_this<Client> {
   void send(const Text& message) {
     if (!open_ || closing_) return;
     waiting_.push_back(message);
-    if (waiting_.size() > works_.settings_.most_waiting) return drop();
+    if (waiting_.size() > impl_.settings_.most_waiting) return drop();
     pump();
   }
   void send_tick(Text tick) {
     if (!open_ || closing_) return;
-    if (newest_) ++skipped_, ++works_.skipped_;
+    if (newest_) ++skipped_, ++impl_.skipped_;
     newest_ = std::move(tick);
     pump();
   }
   void drop_if_slow() {
-    if (sending_ && Wall::now() - began_ > works_.settings_.patience) drop();
+    if (sending_ && Wall::now() - began_ > impl_.settings_.patience) drop();
   }
-  [[nodiscard]] bool all_is_said() const { return !sending_ && waiting_.empty() && !newest_; }
+  [[nodiscard]] bool all_sent() const { return !sending_ && waiting_.empty() && !newest_; }
   [[nodiscard]] std::uint64_t skipped() const { return skipped_; }
   void close() {
     if (std::exchange(closing_, true)) return;
@@ -139,18 +139,18 @@ class Server::Works::Client : public std::enable_shared_from_this<Client> {
   void opened(Error failed) {
     if (failed) return leave();
     open_ = true;
-    send(std::make_shared<const std::string>(works_.settings_.hello));
-    send(std::make_shared<const std::string>(works_.history_.message()));
+    send(std::make_shared<const std::string>(impl_.settings_.hello));
+    send(std::make_shared<const std::string>(impl_.history_.message()));
     read();
   }
 
   void read() {
-    stream_.async_read(heard_, [self = shared_from_this()](Error failed, std::size_t) {
+    stream_.async_read(read_buffer_, [self = shared_from_this()](Error failed, std::size_t) {
       if (failed) return self->leave();
-      const std::string word = beast::buffers_to_string(self->heard_.data());
-      self->heard_.clear();
+      const std::string word = beast::buffers_to_string(self->read_buffer_.data());
+      self->read_buffer_.clear();
       if (word != kStopWord) return self->drop();
-      self->works_.stop_asked();
+      self->impl_.stop_asked();
       self->read();
     });
   }
@@ -163,7 +163,7 @@ class Server::Works::Client : public std::enable_shared_from_this<Client> {
     } else if (newest_) {
       under_way_ = std::move(newest_);
       newest_.reset();
-      ++works_.frames_;
+      ++impl_.frames_;
     } else {
       return;
     }
@@ -173,12 +173,12 @@ class Server::Works::Client : public std::enable_shared_from_this<Client> {
       self->sending_ = false;
       if (failed) return self->leave();
       self->pump();
-      if (self->works_.leaving_) self->works_.finish_if_all_is_said();
+      if (self->impl_.closing_) self->impl_.finish_if_all_sent();
     });
   }
 
   void drop() {
-    ++works_.dropped_clients_;
+    ++impl_.dropped_clients_;
     Error ignored;
     beast::get_lowest_layer(stream_).socket().close(ignored);
     leave();
@@ -188,14 +188,14 @@ class Server::Works::Client : public std::enable_shared_from_this<Client> {
     open_ = false;
     waiting_.clear();
     newest_.reset();
-    works_.clients_.erase(shared_from_this());
-    works_.clients_now_ = works_.clients_.size();
-    if (works_.leaving_) works_.finish_if_all_is_said();
+    impl_.clients_.erase(shared_from_this());
+    impl_.clients_now_ = impl_.clients_.size();
+    if (impl_.closing_) impl_.finish_if_all_sent();
   }
 
-  Works& works_;
+  Impl& impl_;
   websocket::stream<beast::tcp_stream> stream_;
-  beast::flat_buffer heard_;
+  beast::flat_buffer read_buffer_;
   std::deque<Text> waiting_;
   Text newest_, under_way_;
   Wall::time_point began_;
@@ -204,22 +204,22 @@ class Server::Works::Client : public std::enable_shared_from_this<Client> {
 };
 
 /// One request: answered, or handed on to a Client.
-class Server::Works::Request : public std::enable_shared_from_this<Request> {
+class Server::Impl::Request : public std::enable_shared_from_this<Request> {
  public:
-  Request(Works& works, tcp::socket socket) : works_(works), stream_(std::move(socket)) { ++works_.requests_; }
-  ~Request() { --works_.requests_; }
+  Request(Impl& impl, tcp::socket socket) : impl_(impl), stream_(std::move(socket)) { ++impl_.requests_; }
+  ~Request() { --impl_.requests_; }
 
   void read() {
     parser_.header_limit(kLongestHeader);
     parser_.body_limit(0);
-    stream_.expires_after(works_.settings_.request_limit);
+    stream_.expires_after(impl_.settings_.request_limit);
     http::async_read(stream_, buffer_, parser_, [self = shared_from_this()](Error failed, std::size_t) {
       if (failed == http::error::header_limit || failed == http::error::buffer_overflow)
-        return self->answer(431, "that is too long");
+        return self->answer(431, "the request is too long");
       if (failed == http::error::unexpected_body || failed == http::error::body_limit)
-        return self->answer(400, "a request has no body here");
+        return self->answer(400, "requests must not have a body");
       if (failed == beast::error::timeout || failed == http::error::end_of_stream) return;
-      if (failed) return self->answer(400, "this is no request");
+      if (failed) return self->answer(400, "not an HTTP request");
       self->judge();
     });
   }
@@ -228,26 +228,26 @@ class Server::Works::Request : public std::enable_shared_from_this<Request> {
   void judge() {
     const auto& request = parser_.get();
     const auto hosts = request.count(http::field::host), origins = request.count(http::field::origin);
-    if (hosts != 1 || origins > 1) return answer(400, "one Host, and one Origin at most");
-    Knock knock{view(request.method_string()),
-                view(request.target()),
-                view(request[http::field::host]),
-                {},
-                websocket::is_upgrade(request)};
-    if (origins == 1) knock.origin = view(request[http::field::origin]);
-    const Answer answer_to = admit(knock, works_.settings_.token);
-    if (answer_to.to == Admitted::page) return answer_page();
-    if (answer_to.to == Admitted::nowhere) return answer(answer_to.status, answer_to.words);
-    if (works_.clients_.size() >= works_.settings_.most_clients) return answer(503, "too many pages look on");
+    if (hosts != 1 || origins > 1) return answer(400, "exactly one Host and at most one Origin header");
+    AccessRequest asked{view(request.method_string()),
+                        view(request.target()),
+                        view(request[http::field::host]),
+                        {},
+                        websocket::is_upgrade(request)};
+    if (origins == 1) asked.origin = view(request[http::field::origin]);
+    const Answer answer_to = authorize(asked, impl_.settings_.token);
+    if (answer_to.to == Access::page) return answer_page();
+    if (answer_to.to == Access::denied) return answer(answer_to.status, answer_to.words);
+    if (impl_.clients_.size() >= impl_.settings_.most_clients) return answer(503, "too many pages are open");
     stream_.expires_never();
-    const auto client = std::make_shared<Client>(works_, stream_.release_socket());
-    works_.clients_.insert(client);
-    works_.clients_now_ = works_.clients_.size();
+    const auto client = std::make_shared<Client>(impl_, stream_.release_socket());
+    impl_.clients_.insert(client);
+    impl_.clients_now_ = impl_.clients_.size();
     client->open(request);
   }
 
   void answer(unsigned status, const std::string& words) {
-    ++works_.refused_;
+    ++impl_.refused_;
     begin(status, "text/plain; charset=utf-8");
     answer_.body() = "kphi: " + words + "\n";
     send();
@@ -262,7 +262,7 @@ class Server::Works::Request : public std::enable_shared_from_this<Request> {
                             "style-src-attr 'unsafe-inline'; img-src data:; "
                             "connect-src ws://{1}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
                             nonce, host));
-    answer_.body() = replaced(works_.settings_.page, "@NONCE@", nonce);
+    answer_.body() = replaced(impl_.settings_.page, "@NONCE@", nonce);
     send();
   }
 
@@ -279,7 +279,7 @@ class Server::Works::Request : public std::enable_shared_from_this<Request> {
 
   void send() {
     answer_.prepare_payload();
-    stream_.expires_after(works_.settings_.request_limit);
+    stream_.expires_after(impl_.settings_.request_limit);
     http::async_write(stream_, answer_, [self = shared_from_this()](Error, std::size_t) {
       Error ignored;
       self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
@@ -287,7 +287,7 @@ class Server::Works::Request : public std::enable_shared_from_this<Request> {
     });
   }
 
-  /// Reads what the other side still says, so that closing does not take the answer from it.
+  /// Reads the rest of the request, since closing before that could discard the answer.
   void linger() {
     stream_.async_read_some(asio::buffer(rest_), [self = shared_from_this()](Error failed, std::size_t n) {
       self->lingered_ += n;
@@ -295,7 +295,7 @@ class Server::Works::Request : public std::enable_shared_from_this<Request> {
     });
   }
 
-  Works& works_;
+  Impl& impl_;
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_{2 * kLongestHeader};
   http::request_parser<http::empty_body> parser_;
@@ -304,19 +304,19 @@ class Server::Works::Request : public std::enable_shared_from_this<Request> {
   std::size_t lingered_ = 0;
 };
 
-Server::Works::Works(Settings settings, Feed& feed) : settings_(std::move(settings)), feed_(feed) {
+Server::Impl::Impl(Settings settings, Feed& feed) : settings_(std::move(settings)), feed_(feed) {
   listen();
   accept();
   arm();
   thread_ = std::thread([this] { run(); });
 }
 
-Server::Works::~Works() {
-  asio::post(io_, [this] { say_goodbye(); });
+Server::Impl::~Impl() {
+  asio::post(io_, [this] { begin_closing(); });
   thread_.join();
 }
 
-void Server::Works::listen() {
+void Server::Impl::listen() {
   Error failed;
   const tcp::endpoint here(asio::ip::address_v4::loopback(), settings_.port);
   acceptor_.open(here.protocol());
@@ -324,46 +324,46 @@ void Server::Works::listen() {
   acceptor_.bind(here, failed);
   if (!failed) acceptor_.listen(asio::socket_base::max_listen_connections, failed);
   if (failed) {
-    throw ConfigurationError(fmt::format(
-        "--live {0}: cannot listen on 127.0.0.1:{0}: {1}; give another port, or none and any free one is taken",
-        settings_.port, failed.message()));
+    throw ConfigurationError(
+        fmt::format("--live {0}: cannot listen on 127.0.0.1:{0}: {1}; give another port, or none for any free one",
+                    settings_.port, failed.message()));
   }
   port_ = acceptor_.local_endpoint().port();
 }
 
-void Server::Works::run() {
+void Server::Impl::run() {
   // Threads have nice values of their own on Linux: acquisition comes first.
   ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), kYielding);
   io_.run();
 }
 
-void Server::Works::accept() {
+void Server::Impl::accept() {
   acceptor_.async_accept([this](Error failed, tcp::socket socket) {
     if (failed == asio::error::operation_aborted) return;
-    // One too many is closed unread; the descriptor's end of life is the answer.
+    // Beyond the limit the connection is closed unread.
     if (!failed && requests_ < kMostRequests) std::make_shared<Request>(*this, std::move(socket))->read();
     accept();
   });
 }
 
-void Server::Works::arm() {
+void Server::Impl::arm() {
   if (settings_.frame.count() == 0) return;
   frames_due_.expires_after(settings_.frame);
   frames_due_.async_wait([this](Error failed) {
-    if (failed || leaving_) return;
+    if (failed || closing_) return;
     frame();
     arm();
   });
 }
 
-void Server::Works::frame() {
-  feed_.take([this](const std::string& message) { broadcast(message); });
+void Server::Impl::frame() {
+  feed_.take([this](const Message& message) { broadcast(message); });
   const Tick tick = feed_.newest();
   const std::uint64_t shown = feed_.shown();
   if (shown != last_shown_) shown_at_ = Wall::now();
   if (std::exchange(last_shown_, shown) != shown) history_.keep(tick);
   const double silent_s = std::chrono::duration<double>(Wall::now() - shown_at_).count();
-  const auto clients = clients_;  // who is dropped leaves the set
+  const auto clients = clients_;  // a dropped client leaves the set
   for (const auto& client : clients) {
     if (shown > 0)
       client->send_tick(
@@ -372,45 +372,45 @@ void Server::Works::frame() {
   }
 }
 
-void Server::Works::broadcast(std::string message) {
+void Server::Impl::broadcast(const Message& message) {
   history_.keep(message);
-  const Text text = std::make_shared<const std::string>(std::move(message));
+  const Text text = std::make_shared<const std::string>(message.text);
   const auto clients = clients_;
   for (const auto& client : clients) client->send(text);
 }
 
-void Server::Works::stop_asked() {
+void Server::Impl::stop_asked() {
   if (!settings_.can_stop || !feed_.ask_stop()) return;
   broadcast(stop_message(feed_.newest().time_s));
 }
 
-void Server::Works::say_goodbye() {
+void Server::Impl::begin_closing() {
   frame();
-  leaving_ = true;
+  closing_ = true;
   Error ignored;
   acceptor_.close(ignored);
   frames_due_.cancel();
-  farewell_.expires_after(kFarewell);
-  farewell_.async_wait([this](Error) { io_.stop(); });
-  finish_if_all_is_said();
+  closing_limit_.expires_after(kClosingLimit);
+  closing_limit_.async_wait([this](Error) { io_.stop(); });
+  finish_if_all_sent();
 }
 
-void Server::Works::finish_if_all_is_said() {
+void Server::Impl::finish_if_all_sent() {
   for (const auto& client : clients_)
-    if (!client->all_is_said()) return;
+    if (!client->all_sent()) return;
   const auto clients = clients_;
   for (const auto& client : clients) client->close();
-  // The closing handshake is a courtesy; who does not answer it is left.
+  // The closing handshake is optional: do not wait for its answer.
   if (clients.empty()) io_.stop();
 }
 
-Server::Server(Settings settings, Feed& feed) : works_(std::make_unique<Works>(std::move(settings), feed)) {}
+Server::Server(Settings settings, Feed& feed) : impl_(std::make_unique<Impl>(std::move(settings), feed)) {}
 Server::~Server() = default;
-std::uint16_t Server::port() const noexcept { return works_->port(); }
+std::uint16_t Server::port() const noexcept { return impl_->port(); }
 std::string Server::url() const {
-  return fmt::format("http://127.0.0.1:{}/?token={}", works_->port(), works_->settings().token);
+  return fmt::format("http://127.0.0.1:{}/?token={}", impl_->port(), impl_->settings().token);
 }
-Server::Counts Server::counts() const noexcept { return works_->counts(); }
-void Server::draw() { works_->draw(); }
+Server::Counts Server::counts() const noexcept { return impl_->counts(); }
+void Server::draw() { impl_->draw(); }
 
 }  // namespace kphi::daq::live

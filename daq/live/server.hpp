@@ -1,5 +1,5 @@
-// One page on 127.0.0.1 and its WebSocket, in a thread of its own that yields to all others. It may drop frames, and
-// clients; the runner never waits for it.
+// One page on 127.0.0.1 and its WebSocket, in a thread of low priority. It may drop frames, and clients; the runner
+// never waits for it.
 #pragma once
 
 #include <chrono>
@@ -15,15 +15,15 @@ class Server {
  public:
   struct Settings {
     std::uint16_t port = 0;               ///< 0: any that is free
-    std::string token;                    ///< who does not say it is refused
+    std::string token;                    ///< required in every request
     std::string page;                     ///< HTML; every "@NONCE@" in it becomes the nonce of its scripts and styles
     std::string hello;                    ///< hello_message
     bool can_stop = true;                 ///< false: "stop" does nothing
     std::chrono::milliseconds frame{33};  ///< between ticks; 0: only draw() sends one
-    std::chrono::milliseconds patience{2000};       ///< with a client that does not take what it is sent
+    std::chrono::milliseconds patience{2000};       ///< with a client that does not read
     std::chrono::milliseconds request_limit{5000};  ///< for a whole request
     std::size_t most_clients = 16;                  ///< WebSockets
-    std::size_t most_waiting = 1024;                ///< messages that are no ticks, per client
+    std::size_t most_waiting = 1024;                ///< messages except ticks, per client
   };
   static constexpr std::size_t kLongestWord = 64;      ///< of a page, bytes
   static constexpr std::size_t kLongestHeader = 8192;  ///< of a request, bytes
@@ -38,7 +38,7 @@ class Server {
 
   /// Listens at once. Throws ConfigurationError when the port is taken. `feed` must outlive this.
   Server(Settings settings, Feed& feed);
-  /// Sends what waits, half a second at most, and closes.
+  /// Sends waiting messages for at most half a second, and closes.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -52,8 +52,8 @@ class Server {
   void draw();
 
  private:
-  class Works;
-  std::unique_ptr<Works> works_;
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace kphi::daq::live

@@ -1,26 +1,26 @@
-// What is looked at: told to every page once, before anything else.
+// What the live view shows: sent to every page once, before anything else.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "compensation/units.hpp"
-#include "daq/live/limit_bars.hpp"
+#include "daq/guard/guard_limits.hpp"
 #include "profiles/campaign.hpp"
 
 namespace kphi::daq::live {
 
 struct Subject {
-  bool replay = false;  ///< a recorded run: nothing can be stopped
+  bool replay = false;  ///< a recorded run, which cannot be stopped
   std::string name;     ///< of the campaign, or of the file
   std::string propeller;
-  double speed_max_rpm = 0;      ///< of the profile: how far the axis of speeds reaches
-  Seconds minimum_discard;       ///< at the start of every step, not averaged
-  std::vector<LimitBar> limits;  ///< until a guard tells its own
+  double speed_max_rpm = 0;        ///< of the profile: how far the axis of speeds reaches
+  Seconds minimum_discard;         ///< at the start of every step, not averaged
+  std::vector<GuardLimit> limits;  ///< until a guard publishes its own
 };
 
-/// `devices`: what they told; nullptr: the limits are those of the files.
-[[nodiscard]] inline Subject subject_of(const profiles::Campaign& campaign, const profiles::Bench& place,
+/// `devices`: their reported limits; nullptr: limits of the files only.
+[[nodiscard]] inline Subject subject_of(const profiles::Campaign& campaign, const profiles::BenchConfig& config,
                                         const DeviceLimits* devices = nullptr) {
   const double first = to_rpm(campaign.profile.first), last = to_rpm(campaign.profile.last);
   return {false,
@@ -28,7 +28,7 @@ struct Subject {
           campaign.propeller.name,
           first > last ? first : last,
           campaign.minimum_discard,
-          limit_bars(combine_limits(campaign, place, devices))};
+          combine_limits(campaign, config, devices)};
 }
 
 }  // namespace kphi::daq::live

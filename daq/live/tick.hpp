@@ -1,24 +1,23 @@
-// What the bench shows at one moment, as plain words of memory: the runner writes it a hundred times a second, and
-// whoever looks on reads the newest whole.
+// What the bench shows at one moment, trivially copyable: the runner writes it a hundred times a second, the live view
+// reads the newest as a whole.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <string_view>
 
-#include "daq/guard_limits.hpp"
+#include "daq/guard/observation.hpp"
 
 namespace kphi::daq::live {
 
-inline constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+using daq::kUnknown;
 
-/// What is unknown or no longer fresh is kUnknown. Members are eight bytes or multiples: the whole has no gaps.
+/// Unknown and stale values are kUnknown. Members are eight bytes or multiples: no padding.
 struct Tick {
   double time_s = 0;              ///< bench time
   double timestamp_s = 0;         ///< calendar time, seconds since 1970, UTC
   double progress = 0;            ///< of the campaign, 0 to 1
-  double remaining_s = kUnknown;  ///< of the campaign, as a person's clock runs
+  double remaining_s = kUnknown;  ///< of the campaign, wall clock
   double occlusion_deg = kUnknown;
   double commanded_rpm = 0;
   double speed_rpm = kUnknown;
@@ -28,8 +27,8 @@ struct Tick {
   double module_v = kUnknown, module_a = kUnknown;  ///< at the motor module's input
   double supply_v = kUnknown, supply_a = kUnknown;  ///< at the bench supply's terminals
   double coil_degc = kUnknown;
-  double derate = kUnknown;                     ///< 1: none
-  std::array<double, kWatchedCount> watched{};  ///< see limit_values()
+  double derate = kUnknown;  ///< 1: none
+  GuardedValues watched;     ///< as the guard judged them
   std::uint64_t fault_bits = 0;
   std::uint64_t received = 0, lost_network = 0, lost_host = 0;  ///< samples of this run
   std::int64_t repetition = 0, repetitions = 0;                 ///< 1-based

@@ -6,11 +6,11 @@
 
 #include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/udp.hpp>
-#include <charconv>
 #include <cstring>
 
+#include "base/error.hpp"
+#include "base/number.hpp"
 #include "daq/live/messages.hpp"
-#include "profiles/configuration_error.hpp"
 
 namespace kphi::daq::live {
 namespace {
@@ -19,7 +19,7 @@ using boost::asio::ip::udp;
 
 [[noreturn]] void refuse(const std::string& address, const std::string& why) {
   throw ConfigurationError(
-      fmt::format("--udp-json {}: {}; say an address and a port, for PlotJuggler 127.0.0.1:9870", address, why));
+      fmt::format("--udp-json {}: {}; give an address and a port, for PlotJuggler 127.0.0.1:9870", address, why));
 }
 
 std::string without_brackets(const std::string& host) {
@@ -29,22 +29,20 @@ std::string without_brackets(const std::string& host) {
 
 udp::endpoint endpoint_of(const std::string& text) {
   const std::size_t colon = text.rfind(':');
-  if (colon == std::string::npos) refuse(text, "there is no port");
-  std::uint16_t port = 0;
-  const char* const end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data() + colon + 1, end, port);
-  if (error != std::errc() || stop != end || port == 0) refuse(text, "the port is none of 1 to 65535");
+  if (colon == std::string::npos) refuse(text, "no port given");
+  const auto port = parse_integer<std::uint16_t>(std::string_view(text).substr(colon + 1));
+  if (port.value_or(0) == 0) refuse(text, "the port must be 1 to 65535");
   boost::system::error_code failed;
   const auto address = boost::asio::ip::make_address(without_brackets(text.substr(0, colon)), failed);
-  if (failed) refuse(text, "the host is no address in numbers");
+  if (failed) refuse(text, "the host must be a numeric address");
   const bool everybody = address.is_v4() && address.to_v4() == boost::asio::ip::address_v4::broadcast();
-  if (address.is_unspecified() || address.is_multicast() || everybody) refuse(text, "that is not one machine");
-  return {address, port};
+  if (address.is_unspecified() || address.is_multicast() || everybody) refuse(text, "must be a unicast address");
+  return {address, *port};
 }
 
 }  // namespace
 
-UdpJson::UdpJson(const std::string& address, std::vector<LimitBar> limits) : limits_(std::move(limits)) {
+UdpJson::UdpJson(const std::string& address, std::vector<GuardLimit> limits) : limits_(std::move(limits)) {
   const udp::endpoint to = endpoint_of(address);
   socket_ = ::socket(to.protocol().family(), SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (socket_ < 0 || ::connect(socket_, to.data(), static_cast<socklen_t>(to.size())) != 0) {

@@ -15,10 +15,10 @@ struct Air {
 
 struct Density {
   double kg_m3 = 0;
-  double u_kg_m3 = 0;  ///< standard uncertainty: that of the measured quantities and of the formula
+  double u_kg_m3 = 0;  ///< standard uncertainty, of the measured quantities and of the formula
 };
 
-/// What the formula is good for; also the limits beyond which a reading is a broken sensor.
+/// The range of the formula; a reading outside it means a broken sensor.
 inline constexpr double kColdest = -40, kHottest = 60;                    // °C
 inline constexpr double kLowestPressure = 5e4, kHighestPressure = 1.1e5;  // Pa
 

@@ -1,4 +1,4 @@
-// Where the state of the air comes from.
+// A source of the state of the air.
 #pragma once
 
 #include <string>
@@ -10,8 +10,7 @@ namespace kphi::ambient {
 class Ambient {
  public:
   virtual ~Ambient() = default;
-  /// One measurement. Blocks for some tens of milliseconds at most when all is well, for two seconds when not; throws
-  /// DeviceError.
+  /// One measurement. Blocks for some 110 ms, at most about two seconds; throws DeviceError.
   [[nodiscard]] virtual Air read() = 0;
   /// "BME280 at 0x76 behind USB device 04d8:00dd, serial 0001".
   [[nodiscard]] virtual const std::string& identity() const noexcept = 0;

@@ -1,16 +1,15 @@
 #include "drivers/ambient/ambient_worker.hpp"
 
-#include <signal.h>
-
 #include <algorithm>
 #include <utility>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
+#include "base/thread.hpp"
 
 namespace kphi::ambient {
 
 AmbientWorker::AmbientWorker(Open open, const Clock& clock, const Rhythm& rhythm)
-    : open_(std::move(open)), clock_(clock), rhythm_(rhythm), thread_([this] { run(); }) {}
+    : open_(std::move(open)), clock_(clock), rhythm_(rhythm), thread_(start_thread([this] { run(); })) {}
 
 AmbientWorker::~AmbientWorker() {
   {
@@ -50,11 +49,6 @@ bool AmbientWorker::wait_for_first(Duration wall) const {
 }
 
 void AmbientWorker::run() noexcept {
-  // Signals belong to the program's main thread.
-  sigset_t all;
-  sigfillset(&all);
-  pthread_sigmask(SIG_BLOCK, &all, nullptr);
-
   std::unique_ptr<Ambient> sensor;
   Duration pause = rhythm_.first_pause;
   Duration rest{0};
@@ -68,7 +62,7 @@ void AmbientWorker::run() noexcept {
   }
 }
 
-/// False: it has failed, and is closed.
+/// False: the sensor failed and is closed.
 bool AmbientWorker::look(std::unique_ptr<Ambient>& sensor) noexcept {
   std::string why;
   try {

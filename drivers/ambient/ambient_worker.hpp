@@ -1,5 +1,5 @@
-// The state of the air, asked every few seconds by a thread of its own, and the newest answer with its age. A sensor
-// that fails is closed and opened again, after longer and longer pauses; nobody else ever waits for it.
+// The state of the air, read every few seconds by a thread of its own; callers get the newest reading with its age and
+// never wait. A sensor that fails is closed and opened again, after increasing pauses.
 #pragma once
 
 #include <condition_variable>
@@ -11,12 +11,12 @@
 #include <string>
 #include <thread>
 
+#include "base/clock.hpp"
 #include "drivers/ambient/ambient.hpp"
-#include "drivers/clock.hpp"
 
 namespace kphi::ambient {
 
-/// Wall time: the air of a bench does not change faster because it is simulated.
+/// Wall time, also on a simulated bench: its air does not change faster.
 struct Rhythm {
   Duration between_readings = std::chrono::seconds(5);
   Duration first_pause = std::chrono::seconds(1);  ///< after a failure; each further one doubles it
@@ -36,24 +36,24 @@ class AmbientWorker {
 
   /// Opens nothing yet; `clock` must outlive this.
   AmbientWorker(Open open, const Clock& clock, const Rhythm& rhythm = {});
-  /// Waits for a reading under way: 0.2 s when all is well, some seconds when the bridge no longer answers.
+  /// Waits for a reading in progress: 0.2 s, or some seconds if the bridge no longer answers.
   ~AmbientWorker();
   AmbientWorker(const AmbientWorker&) = delete;
   AmbientWorker& operator=(const AmbientWorker&) = delete;
 
-  // Any thread; they wait for nothing.
-  /// Nothing before the first reading. Stays when the sensor fails: its age tells.
+  // Any thread; they do not wait.
+  /// nullopt before the first reading. After a failure of the sensor it stays and ages.
   [[nodiscard]] std::optional<AirReading> newest() const;
-  /// Why there is no fresher reading; empty while all is well.
+  /// Why there is no newer reading; empty while the sensor works.
   [[nodiscard]] std::string failure() const;
-  /// Of the sensor that was last open; empty before.
+  /// The last sensor that was open; empty before.
   [[nodiscard]] std::string identity() const;
   struct Counters {
     std::uint64_t readings = 0, failures = 0, openings = 0;
   };
   [[nodiscard]] Counters counters() const;
 
-  /// Waits until there is a reading or `wall` has passed; false: none yet, see failure(). For preflight.
+  /// Waits at most `wall` for the first reading; false: no reading yet, see failure(). For the check before a run.
   [[nodiscard]] bool wait_for_first(Duration wall) const;
 
  private:
@@ -66,7 +66,7 @@ class AmbientWorker {
   const Clock& clock_;
   const Rhythm rhythm_;
 
-  // Callers of any thread and the worker's own meet here; held for copies only, never during traffic.
+  // Shared by callers and the thread; locked only while copying, never during traffic.
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   bool stop_asked_ = false;

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 
 namespace kphi::ambient {
 namespace {
@@ -40,7 +40,8 @@ Air Bme280Sensor::read() {
   std::array<std::uint8_t, 8> data{};
   bus_.read(address_, bme280::kData, data);
   const bme280::Raw raw = bme280::raw_of(data);
-  if (!bme280::complete(raw)) fail("measure", "a quantity was not measured", "was the sensor reset? try again");
+  if (!bme280::complete(raw))
+    fail("measure", "a quantity was not measured", "try again; the sensor may have been reset");
   const bme280::Measured measured = bme280::compensate(raw, calibration_);
   const double rectangular = 1 / std::sqrt(3.0);
   const Air air{measured.temperature_c(),
@@ -51,7 +52,7 @@ Air Bme280Sensor::read() {
                 bme280::kHumidityTolerance * rectangular};
   if (!plausible(air)) {
     fail("measure",
-         fmt::format("{:.1f} °C, {:.0f} Pa, {:.0f} %RH: no air is like this", air.temperature_c, air.pressure_pa,
+         fmt::format("{:.1f} °C, {:.0f} Pa, {:.0f} %RH: implausible for air", air.temperature_c, air.pressure_pa,
                      100 * air.relative_humidity),
          "check the wiring, replace the sensor");
   }
@@ -72,7 +73,7 @@ void Bme280Sensor::find() {
     if (id == bme280::kId) return;
     why += fmt::format("{}0x{:02X}: chip id 0x{:02X} instead of 0x60", why.empty() ? "" : "; ", address, id);
   }
-  fail("find it", why, "a BMP280 (0x58) has no humidity and is not supported");
+  fail("find", why, "a BMP280 (0x58) has no humidity and is not supported");
 }
 
 void Bme280Sensor::reset() {
@@ -86,7 +87,7 @@ void Bme280Sensor::wait_while(std::uint8_t status_bits, const char* operation) {
     if ((get(bme280::kStatusRegister) & status_bits) == 0) return;
     pause_(kPoll);
   }
-  fail(operation, "it does not end", "plug the sensor in again");
+  fail(operation, "not finished in time", "plug the sensor in again");
 }
 
 bme280::Calibration Bme280Sensor::read_calibration() {

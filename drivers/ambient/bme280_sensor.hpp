@@ -10,12 +10,12 @@ namespace kphi::ambient {
 
 class Bme280Sensor final : public Ambient {
  public:
-  /// Looks for it at 0x76, then at 0x77; resets it, waits until it has loaded its calibration, and reads that;
-  /// twice, for a damaged copy is not damaged in the same way again. `bus` must outlive this; `where` names it in
-  /// messages. Throws DeviceError: nobody there, another chip, calibration damaged.
+  /// Searches at 0x76, then at 0x77; resets the sensor, waits until it has loaded its calibration, and reads that
+  /// twice, because damage is unlikely to repeat. `bus` must outlive this; `where` names it in messages. Throws
+  /// DeviceError: no answer, another chip, calibration damaged.
   Bme280Sensor(I2c& bus, const std::string& where, Mcp2221::Pause pause = Mcp2221::sleep);
 
-  /// 16 samples of each quantity, about 110 ms. Throws DeviceError also for values that no air has.
+  /// 16 samples of each quantity, about 110 ms. Throws DeviceError also for implausible values.
   [[nodiscard]] Air read() override;
   [[nodiscard]] const std::string& identity() const noexcept override { return identity_; }
   [[nodiscard]] const bme280::Calibration& calibration() const noexcept { return calibration_; }

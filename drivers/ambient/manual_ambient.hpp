@@ -1,4 +1,4 @@
-// What a person has read off a thermometer and a barometer: the same for a whole campaign.
+// Values read off a thermometer and a barometer: constant during a campaign.
 #pragma once
 
 #include "drivers/ambient/ambient.hpp"

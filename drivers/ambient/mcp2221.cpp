@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <thread>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 
 namespace kphi::ambient {
 namespace {
@@ -14,8 +14,8 @@ using namespace std::chrono_literals;
 
 constexpr auto kBetweenCommands = 1ms;
 constexpr usb::Transport::Timeout kReply = 500ms;
-constexpr int kAttempts = 20;     // of what the bridge calls busy, a pause apart
-constexpr int kStaleReplies = 4;  // answers to commands of a killed predecessor
+constexpr int kAttempts = 20;     // while the bridge reports busy, one pause apart
+constexpr int kStaleReplies = 4;  // answers to commands of a process that was killed
 constexpr std::size_t kPayload = 60;
 constexpr std::uint8_t kHid = 0x03;
 
@@ -40,7 +40,7 @@ const char* meaning(std::uint8_t engine_state) noexcept {
       return "no start condition: the bus is held low";
     case 0x21:
     case kAddressNack:
-      return "nobody answers at this address";
+      return "no device answers at this address";
     case 0x23:
       return "the address took too long";
     case 0x44:
@@ -72,7 +72,7 @@ Mcp2221::Mcp2221(usb::Transport& transport, Pause pause) : transport_(transport)
     out_ = endpoint(false);
   }
   if (in_.address == 0 || out_.address == 0)
-    fail("open", "it has no HID interface with two interrupt endpoints", "is this an MCP2221A?");
+    fail("open", "it has no HID interface with two interrupt endpoints", "check that this is an MCP2221A");
   transport_.claim(hid->number);
   cancel();
   set_speed();
@@ -100,7 +100,7 @@ void Mcp2221::read(std::uint8_t address, std::uint8_t register_number, std::span
         reply[1] == 0 && (state == kIdle || state == kPartialData || state == kReadPartial || state == kReadComplete);
     if (!data || count == kReadError || count == 0) continue;  // not there yet
     if (count > kPayload || count > into.size() - have)
-      fail("read", "more bytes than were asked for", "reset the bridge");
+      fail("read", "received more bytes than requested", "plug the bridge in again");
     std::copy_n(reply.begin() + 4, count, into.begin() + static_cast<std::ptrdiff_t>(have));
     have += count;
     attempt = 0;
@@ -113,25 +113,26 @@ Mcp2221::Report Mcp2221::exchange(const Report& command, const char* operation) 
   pause_(kBetweenCommands);
   in_step_ = false;
   const usb::Transfer sent = transport_.write(out_, command, kReply);
-  if (sent.outcome != usb::Outcome::done) fail(operation, usb::name_of(sent.outcome), "is the bridge plugged in?");
+  if (sent.outcome != usb::Outcome::done)
+    fail(operation, usb::name_of(sent.outcome), "check that the bridge is plugged in");
   const Report reply = fetch(command[0], operation);
   in_step_ = true;
   return reply;
 }
 
-/// Answers come in the order of the commands: all that come before the one to a command used for nothing else are old.
+/// Answers come in the order of the commands: those before the answer to a command that is used only here are old.
 void Mcp2221::synchronise() {
   Report command{};
   command[0] = get_settings;
   pause_(kBetweenCommands);
   const usb::Transfer sent = transport_.write(out_, command, kReply);
   if (sent.outcome != usb::Outcome::done)
-    fail("find its step", usb::name_of(sent.outcome), "is the bridge plugged in?");
-  fetch(get_settings, "find its step");
+    fail("synchronise", usb::name_of(sent.outcome), "check that the bridge is plugged in");
+  fetch(get_settings, "synchronise");
   in_step_ = true;
 }
 
-/// Nothing but the echoed command tells whose answer it is.
+/// Only the echoed command code tells which command an answer belongs to.
 Mcp2221::Report Mcp2221::fetch(std::uint8_t command_code, const char* operation) {
   Report reply{};
   for (int i = 0; i < kStaleReplies; ++i) {
@@ -140,10 +141,11 @@ Mcp2221::Report Mcp2221::fetch(std::uint8_t command_code, const char* operation)
       (void)transport_.clear_halt(in_);
       continue;
     }
-    if (got.outcome != usb::Outcome::done) fail(operation, usb::name_of(got.outcome), "is the bridge plugged in?");
+    if (got.outcome != usb::Outcome::done)
+      fail(operation, usb::name_of(got.outcome), "check that the bridge is plugged in");
     if (got.bytes == reply.size() && reply[0] == command_code) return reply;
   }
-  fail(operation, "answers to other commands", "does another program use the bridge?");
+  fail(operation, "received answers to other commands", "close other programs that use the bridge");
 }
 
 void Mcp2221::set_speed() {
@@ -202,7 +204,7 @@ void Mcp2221::fail(const char* operation, const std::string& cause, const char* 
 }
 
 void Mcp2221::fail(const char* operation, std::uint8_t engine_state) {
-  // Leave the bus free for the next call; what failed is told either way.
+  // Leave the bus free for the next call; the failure is reported either way.
   try {
     cancel();
   } catch (const DeviceError&) {

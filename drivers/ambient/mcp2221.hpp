@@ -1,5 +1,5 @@
 // Microchip's MCP2221A, a bridge from USB to I²C: 64-byte reports by interrupt transfers, one command outstanding.
-// Codes as the Linux kernel's driver and NetBSD's have them.
+// Codes as in the drivers of Linux and NetBSD.
 #pragma once
 
 #include <array>
@@ -16,12 +16,12 @@ class Mcp2221 final : public I2c {
  public:
   static constexpr std::uint16_t kVendor = 0x04d8, kProduct = 0x00dd;
   using Report = std::array<std::uint8_t, 64>;
-  /// Waits for that long; the bridge wants a millisecond between two commands.
+  /// Waits this long; the bridge needs a millisecond between two commands.
   using Pause = std::function<void(std::chrono::microseconds)>;
 
-  /// Claims the HID interface, throws away the answers that a killed predecessor did not fetch, frees a bus that it
-  /// left in the middle of a transfer, and sets 100 kHz. `transport` must outlive this. Throws DeviceError: not such a
-  /// bridge, does not answer, bus stuck.
+  /// Claims the HID interface, discards answers that a killed process did not fetch, frees a bus that it left in the
+  /// middle of a transfer, and sets 100 kHz. `transport` must outlive this. Throws DeviceError: not such a bridge, no
+  /// answer, bus stuck.
   explicit Mcp2221(usb::Transport& transport, Pause pause = sleep);
 
   void write(std::uint8_t address, std::span<const std::uint8_t> bytes) override;

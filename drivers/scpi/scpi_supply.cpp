@@ -2,39 +2,71 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 
-#include "drivers/device_error.hpp"
-#include "drivers/scpi/common_commands.hpp"
-#include "drivers/scpi/numbers.hpp"
+#include "base/error.hpp"
+#include "drivers/scpi/wire.hpp"
 
 namespace kphi::scpi {
 namespace {
 
 constexpr double kMarginOfReading = 1.1;  // a supply shows a little more than it can be set to
+constexpr int kLongestQueue = 64;         // of errors; real ones hold 10 to 32
 
 void demand_range(const char* what, double value, double most) {
   if (std::isfinite(value) && value >= 0 && value <= most * kMarginOfReading) return;
-  throw std::invalid_argument(fmt::format("{} {:g} is not within 0 and {:g}", what, value, most));
+  throw std::invalid_argument(fmt::format("{} {:g} is not within 0 to {:g}", what, value, most));
 }
 
 }  // namespace
 
-ScpiSupply::ScpiSupply(Line& line, const Clock& clock) : line_(line), clock_(clock) {
-  identity_.device = line.name();
-  const std::string who = line_.query("*IDN?");
+/// The commands of one maker's family of supplies, without their argument; empty: this family has none.
+struct ScpiSupply::Dialect {
+  std::string_view identity;         ///< part of *IDN?; empty: any
+  std::string_view over_voltage;     ///< threshold
+  std::string_view over_voltage_on;  ///< whole command that arms it; empty: always armed
+  std::string_view over_current;
+  std::string_view over_current_on;
+  std::string_view over_voltage_tripped;  ///< query; answers 1 or YES
+  std::string_view over_current_tripped;
+  std::string_view regulation;  ///< query
+  /// True: `regulation` answers CV, CC or UR. False: bits of the questionable status (SCPI-99, 20.3): bit 1 = current
+  /// is what is held.
+  bool regulation_by_name = false;
+  double voltage_step_v = 0.001, current_step_a = 0.001;
+};
+
+/// The first whose pattern is part of the answer to *IDN?.
+const ScpiSupply::Dialect& ScpiSupply::dialect_of(std::string_view identity) noexcept {
+  // SCPI-99 volume 2 for the last row; the makers' programming guides for the others.
+  static constexpr Dialect kDialects[] = {
+      {"RIGOL TECHNOLOGIES,DP8", "OUTP:OVP:VAL", "OUTP:OVP ON", "OUTP:OCP:VAL", "OUTP:OCP ON", "OUTP:OVP:QUES?",
+       "OUTP:OCP:QUES?", "OUTP:MODE?", true, 0.001, 0.001},
+      {"", "VOLT:PROT", "VOLT:PROT:STAT ON", "CURR:PROT", "CURR:PROT:STAT ON", "VOLT:PROT:TRIP?", "CURR:PROT:TRIP?",
+       "STAT:QUES:COND?", false, 0.001, 0.001},
+  };
+  return *std::find_if(std::begin(kDialects), std::end(kDialects) - 1, [&](const Dialect& dialect) {
+    return identity.find(dialect.identity) != std::string_view::npos;
+  });
+}
+
+ScpiSupply::ScpiSupply(std::unique_ptr<Line> line, const Clock& clock) : line_(std::move(line)), clock_(clock) {
+  identity_.device = line_->name();
+  const std::string who = line_->query("*IDN?");
   const auto fields = identity_fields(who);
-  if (fields[1].empty()) fail("*IDN?", "\"" + who + "\" names no model", "is this an instrument that speaks SCPI?");
+  if (fields[1].empty()) fail("*IDN?", "\"" + who + "\" names no model", "check that this is a SCPI instrument");
   dialect_ = &dialect_of(who);
-  identity_ = {fmt::format("supply {} on {}", fields[1], line.name()), fields[1], fields[2], fields[3]};
-  forget_errors(line_);
+  identity_ = {fmt::format("supply {} on {}", fields[1], line_->name()), fields[1], fields[2], fields[3]};
+  forget_errors();
   identity_.voltage_step_v = dialect_->voltage_step_v;
   identity_.current_step_a = dialect_->current_step_a;
   identity_.voltage_max_v = ask("VOLT? MAX");
   identity_.current_max_a = ask("CURR? MAX");
   if (identity_.voltage_max_v <= 0 || identity_.current_max_a <= 0)
-    fail("VOLT? MAX", "it says that it gives nothing", "is this a supply?");
+    fail("VOLT? MAX", "reports a maximum of 0 V or 0 A", "check that this is a power supply");
 }
 
 supply::Limits ScpiSupply::apply(const supply::Limits& limits) {
@@ -80,22 +112,41 @@ void ScpiSupply::switch_output(bool on) {
 
 supply::Counters ScpiSupply::counters() const noexcept {
   supply::Counters counters = counters_;
-  const LineCounters line = line_.counters();
+  const LineCounters line = line_->counters();
   counters.timeouts = line.timeouts;
   counters.damaged += line.damaged;
   counters.flushes = line.recoveries;
   return counters;
 }
 
+/// The oldest error in the instrument's queue, taken out of it; empty: none. Errors of the conversation (-400 to -499:
+/// a query interrupted or not fetched) blame no command and are skipped.
+std::string ScpiSupply::next_error() {
+  std::string error;
+  for (int i = 0; i < kLongestQueue; ++i) {
+    error = line_->query("SYST:ERR?");
+    const auto code = number_of(std::string_view(error).substr(0, error.find(',')));
+    if (code && *code == 0) return {};
+    if (!code || *code > -400 || *code < -499) break;
+  }
+  return error;
+}
+
+/// Empties the queue, so that no command is blamed for older errors.
+void ScpiSupply::forget_errors() {
+  for (int i = 0; i < kLongestQueue && !next_error().empty(); ++i) {
+  }
+}
+
 void ScpiSupply::tell(const std::string& command) {
   if (command.empty()) return;
   ++counters_.requests;
-  line_.write(command);
-  const std::string error = next_error(line_);
+  line_->write(command);
+  const std::string error = next_error();
   if (error.empty()) return;
   ++counters_.refused;
-  forget_errors(line_);
-  fail(command, "the instrument answers " + error, "is this within what it can do?");
+  forget_errors();
+  fail(command, "the instrument answers " + error, "check the ranges of the instrument");
 }
 
 void ScpiSupply::set(std::string_view command, double value, double step) {
@@ -104,14 +155,14 @@ void ScpiSupply::set(std::string_view command, double value, double step) {
 
 double ScpiSupply::ask(std::string_view query) {
   ++counters_.requests;
-  const std::string answer = line_.query(query);
+  const std::string answer = line_->query(query);
   ++counters_.replies;
   // OUTP? answers 0 and 1, or ON and OFF.
   if (answer == "ON") return 1;
   if (answer == "OFF") return 0;
   if (const auto number = number_of(answer)) return *number;
   ++counters_.damaged;
-  fail(query, "\"" + answer + "\" is no number");
+  fail(query, "\"" + answer + "\" is not a number");
 }
 
 double ScpiSupply::ask_within(std::string_view query, double most) {
@@ -119,13 +170,13 @@ double ScpiSupply::ask_within(std::string_view query, double most) {
   // Converters show a few counts below zero.
   if (value >= -0.01 * most && value <= most * kMarginOfReading) return value;
   ++counters_.implausible;
-  fail(query, fmt::format("{:g} cannot be: it gives at most {:g}", value, most));
+  fail(query, fmt::format("reading {:g} is impossible: its maximum is {:g}", value, most));
 }
 
 bool ScpiSupply::tripped(std::string_view query) {
   if (query.empty()) return false;
   ++counters_.requests;
-  const std::string answer = line_.query(query);
+  const std::string answer = line_->query(query);
   ++counters_.replies;
   return answer == "1" || answer == "YES";
 }
@@ -138,7 +189,7 @@ supply::Regulation ScpiSupply::regulation() {
     return (bits & 2u) != 0 ? Regulation::constant_current : Regulation::constant_voltage;
   }
   ++counters_.requests;
-  const std::string answer = line_.query(dialect_->regulation);
+  const std::string answer = line_->query(dialect_->regulation);
   ++counters_.replies;
   if (answer == "CV") return Regulation::constant_voltage;
   return answer == "CC" ? Regulation::constant_current : Regulation::unknown;

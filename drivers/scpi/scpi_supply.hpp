@@ -3,18 +3,17 @@
 
 #include <memory>
 
-#include "drivers/clock.hpp"
-#include "drivers/scpi/dialect.hpp"
+#include "base/clock.hpp"
 #include "drivers/scpi/line.hpp"
 #include "drivers/supply/supply.hpp"
 
 namespace kphi::scpi {
 
-class ScpiSupply : public supply::Supply {
+class ScpiSupply final : public supply::Supply {
  public:
-  /// Asks who it is and what it can do (*IDN?, VOLT? MAX, CURR? MAX); writes nothing. `line` and `clock` must outlive
-  /// this. Throws DeviceError.
-  ScpiSupply(Line& line, const Clock& clock);
+  /// Asks who it is and what it can do (*IDN?, VOLT? MAX, CURR? MAX); writes nothing. `clock` must outlive this. Throws
+  /// DeviceError.
+  ScpiSupply(std::unique_ptr<Line> line, const Clock& clock);
 
   [[nodiscard]] const supply::Identity& identity() const noexcept override { return identity_; }
   /// After each command the instrument's error queue is asked (SYST:ERR?).
@@ -24,8 +23,12 @@ class ScpiSupply : public supply::Supply {
   [[nodiscard]] supply::Counters counters() const noexcept override;
 
  private:
+  struct Dialect;
+  [[nodiscard]] static const Dialect& dialect_of(std::string_view identity) noexcept;
   void switch_on() override;
   void switch_output(bool on);
+  [[nodiscard]] std::string next_error();
+  void forget_errors();
   void tell(const std::string& command);
   void set(std::string_view command, double value, double step);
   [[nodiscard]] double ask(std::string_view query);
@@ -34,7 +37,7 @@ class ScpiSupply : public supply::Supply {
   [[nodiscard]] supply::Regulation regulation();
   [[noreturn]] void fail(std::string_view operation, const std::string& cause, const char* next_move = "");
 
-  Line& line_;
+  const std::unique_ptr<Line> line_;
   const Clock& clock_;
   supply::Identity identity_;
   const Dialect* dialect_ = nullptr;

@@ -8,7 +8,7 @@
 #include <boost/asio/write.hpp>
 #include <boost/beast/core/error.hpp>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 
 namespace kphi::scpi {
 namespace {
@@ -48,7 +48,7 @@ void Tcp::write(std::string_view command) {
 std::string Tcp::query(std::string_view command) {
   ++counters_.queries;
   if (!received_.empty()) {
-    // Nobody has asked for that: whatever it is, it is no answer to what comes now.
+    // Unrequested bytes: they are not the answer to this query.
     ++counters_.damaged;
     stream_.reset();
   }
@@ -73,13 +73,13 @@ void Tcp::carry_out(std::string_view operation, Start&& start) {
   if (!result) return;
   if (result == boost::beast::error::timeout) {
     ++counters_.timeouts;
-    fail(operation, "no answer in time", "does the instrument know this command?");
+    fail(operation, "no answer in time", "check that the instrument knows this command");
   }
   if (result == asio::error::not_found) {
     ++counters_.damaged;
     fail(operation, "the answer does not end", "");
   }
-  fail(operation, result.message(), "is the instrument on, and its network address right?");
+  fail(operation, result.message(), "check its power and its network address");
 }
 
 void Tcp::fail(std::string_view operation, const std::string& cause, const char* next_move) {

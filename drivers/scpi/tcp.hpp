@@ -17,7 +17,7 @@ class Tcp final : public Line {
   /// Connects. Throws DeviceError.
   Tcp(std::string host, std::uint16_t port, std::chrono::milliseconds timeout = std::chrono::milliseconds(1000));
 
-  /// After a failure the connection is closed, and the next call opens a new one: a late answer dies with the old one.
+  /// After a failure the connection is closed, and late answers with it; the next call opens a new one.
   void write(std::string_view command) override;
   [[nodiscard]] std::string query(std::string_view command) override;
   [[nodiscard]] const std::string& name() const noexcept override { return name_; }

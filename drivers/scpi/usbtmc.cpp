@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <array>
 
-#include "drivers/device_error.hpp"
-#include "drivers/scpi/usbtmc_header.hpp"
+#include "base/error.hpp"
+#include "drivers/scpi/wire.hpp"
 
 namespace kphi::scpi {
 namespace {
@@ -28,12 +28,12 @@ enum Request : std::uint8_t {
 constexpr std::uint8_t kSuccess = 0x01, kPending = 0x02;
 constexpr int kChecks = 100;  // of a clear or abort that is pending
 constexpr usb::Transport::Timeout kControlTimeout = 500ms, kDrainTimeout = 20ms;
-// A host must have room for whole packets, of 64, 512 or 1024 bytes: header and data fill four of the largest.
+// A host must have room for complete packets, of 64, 512 or 1024 bytes: header and data fill four of the largest.
 constexpr std::size_t kRoom = 4096;
 constexpr std::uint32_t kPart = kRoom - usbtmc::kHeaderBytes;  // bytes asked for at once
-constexpr std::size_t kLongestAnswer = 65536;                  // nothing asked here is longer
+constexpr std::size_t kLongestAnswer = 65536;                  // no answer used here is longer
 
-/// They claim remote/local and must not be sent REN.
+/// They claim remote/local but hang on REN.
 struct Choker {
   std::uint16_t vendor, product;  // product 0: all of the vendor's
 };
@@ -65,7 +65,7 @@ void Usbtmc::find_endpoints() {
     interface_ = candidate.number;
     if (in_.address != 0 && out_.address != 0) return;
   }
-  fail("open", "it has no USBTMC interface", "is this a measuring instrument?");
+  fail("open", "it has no USBTMC interface", "check that this is a SCPI instrument");
 }
 
 void Usbtmc::read_capabilities() {
@@ -73,14 +73,13 @@ void Usbtmc::read_capabilities() {
   const usb::Transfer got =
       transport_.control_in({kFromInterface, get_capabilities, 0, interface_}, answer, kControlTimeout);
   if (got.outcome != usb::Outcome::done || got.bytes != answer.size() || answer[0] != kSuccess) return;
-  capabilities_ = {(answer[4] & 4) != 0,  (answer[5] & 1) != 0,  (answer[15] & 2) != 0,
-                   (answer[15] & 4) != 0, (answer[15] & 1) != 0, (answer[15] & 8) != 0};
+  remote_local_ = (answer[15] & 2) != 0;
 }
 
 void Usbtmc::take_remote_control() {
-  if (!capabilities_.remote_local || chokes(transport_)) return;
+  if (!remote_local_ || chokes(transport_)) return;
   std::array<std::uint8_t, 1> answer{};
-  // Without it instruments obey all the same; their front panel stays unlocked.
+  // Instruments obey without it, too; only their front panel stays unlocked.
   (void)transport_.control_in({kFromInterface, ren_control, 1, interface_}, answer, kControlTimeout);
 }
 
@@ -150,14 +149,15 @@ bool Usbtmc::receive_part(std::string& answer, bool may_be_empty) {
   if (got.outcome == usb::Outcome::done && got.bytes == 0 && may_be_empty) got = transport_.read(in_, buffer, timeout_);
   if (got.outcome != usb::Outcome::done) {
     recover_in(got.outcome);
-    fail("read the answer", usb::name_of(got.outcome), "does the instrument know this command?");
+    fail("read the answer", usb::name_of(got.outcome), "check that the instrument knows this command");
   }
   const auto header = usbtmc::answer_header(std::span(buffer).first(got.bytes), tag_);
   const bool goes_nowhere = header && header->bytes == 0 && !header->end_of_message;
   if (!header || header->bytes > kPart || goes_nowhere) {
     ++counters_.damaged;
     recover_in(got.outcome);
-    fail("read the answer", goes_nowhere ? "it is empty and does not end" : "it answers another request");
+    fail("read the answer",
+         goes_nowhere ? "the answer is empty and does not end" : "the reply belongs to another request");
   }
   std::size_t have = std::min<std::size_t>(got.bytes - usbtmc::kHeaderBytes, header->bytes);
   answer.append(reinterpret_cast<const char*>(buffer.data()) + usbtmc::kHeaderBytes, have);
@@ -165,7 +165,7 @@ bool Usbtmc::receive_part(std::string& answer, bool may_be_empty) {
     got = transport_.read(in_, buffer, timeout_);
     if (got.outcome != usb::Outcome::done || got.bytes == 0) {
       recover_in(got.outcome);
-      fail("read the answer", got.bytes == 0 ? "it breaks off" : usb::name_of(got.outcome));
+      fail("read the answer", got.bytes == 0 ? "the answer breaks off" : usb::name_of(got.outcome));
     }
     const std::size_t more = std::min<std::size_t>(got.bytes, header->bytes - have);
     answer.append(reinterpret_cast<const char*>(buffer.data()), more);

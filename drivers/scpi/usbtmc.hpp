@@ -8,26 +8,18 @@
 
 namespace kphi::scpi {
 
-/// What GET_CAPABILITIES says (USBTMC 4.2.1.8, USB488 4.2.2).
-struct Capabilities {
-  bool indicator_pulse = false, term_char = false;
-  bool remote_local = false;  ///< RL1: REN, go to local, local lockout
-  bool service_request = false, device_trigger = false, scpi = false;
-};
-
 class Usbtmc final : public Line {
  public:
   using Timeout = usb::Transport::Timeout;
 
-  /// Claims the interface, clears the instrument's buffers, and puts it under remote control where it has that and is
-  /// not known to choke on it. Throws DeviceError: no such interface, does not answer. `transport` must outlive this.
+  /// Claims the interface, clears the instrument's buffers, and puts it under remote control, unless it lacks that or
+  /// is known to hang on it. Throws DeviceError: no such interface, does not answer. `transport` must outlive this.
   explicit Usbtmc(usb::Transport& transport, Timeout timeout = std::chrono::milliseconds(1000));
 
   void write(std::string_view command) override;
   [[nodiscard]] std::string query(std::string_view command) override;
   [[nodiscard]] const std::string& name() const noexcept override { return transport_.name(); }
   [[nodiscard]] LineCounters counters() const noexcept override { return counters_; }
-  [[nodiscard]] const Capabilities& capabilities() const noexcept { return capabilities_; }
 
  private:
   void find_endpoints();
@@ -46,7 +38,7 @@ class Usbtmc final : public Line {
   const Timeout timeout_;
   std::uint8_t interface_ = 0;
   usb::Endpoint in_, out_;
-  Capabilities capabilities_;
+  bool remote_local_ = false;  ///< RL1 of GET_CAPABILITIES (USBTMC 4.2.1.8, USB488 4.2.2): REN, go to local
   std::uint8_t tag_ = 0;
   bool out_of_order_ = false;  ///< clear before the next command
   LineCounters counters_;

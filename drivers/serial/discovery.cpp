@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 #include <iterator>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
+#include "base/number.hpp"
 
 namespace kphi::serial {
 namespace {
@@ -24,29 +24,6 @@ std::string attribute(const fs::path& file) {
   return text;
 }
 
-template <class Number>
-std::optional<Number> number(const std::string& text, int base) {
-  Number value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
-/// Four hexadecimal digits, or '*' for any.
-bool read_id(const std::string& text, std::optional<std::uint16_t>& id) {
-  if (text == "*") return true;
-  if (text.size() == 4) id = number<std::uint16_t>(text, 16);
-  return id.has_value();
-}
-
-/// "1-1.2", or with an interface "1-1.2:1.0".
-bool is_socket(const std::string& text) {
-  if (text.empty() || text.find_first_not_of("0123456789-.:") != std::string::npos) return false;
-  const auto dash = text.find('-');
-  return dash != 0 && dash != std::string::npos && dash == text.rfind('-') && dash + 1 < text.size() &&
-         text.find(':') == text.rfind(':');
-}
-
 bool has(const fs::path& folder, const char* attribute) {
   std::error_code none;
   return fs::exists(folder / attribute, none);
@@ -57,12 +34,13 @@ std::optional<Adapter> look_up_from(fs::path folder, const Roots& roots) {
   Adapter adapter;
   adapter.device = roots.dev / folder.filename();
   for (; folder.has_relative_path(); folder = folder.parent_path()) {
-    if (has(folder, "latency_timer")) adapter.latency_timer_ms = number<int>(attribute(folder / "latency_timer"), 10);
+    if (has(folder, "latency_timer"))
+      adapter.latency_timer_ms = parse_integer<int>(attribute(folder / "latency_timer"), 10);
     if (has(folder, "bInterfaceNumber")) adapter.interface = folder.filename();
     if (has(folder, "idVendor")) break;
   }
-  const auto vendor = number<std::uint16_t>(attribute(folder / "idVendor"), 16);
-  const auto product = number<std::uint16_t>(attribute(folder / "idProduct"), 16);
+  const auto vendor = parse_integer<std::uint16_t>(attribute(folder / "idVendor"), 16);
+  const auto product = parse_integer<std::uint16_t>(attribute(folder / "idProduct"), 16);
   if (!vendor || !product) return std::nullopt;
   adapter.vendor = *vendor;
   adapter.product = *product;
@@ -107,40 +85,17 @@ std::string list(const std::vector<Adapter>& adapters) {
 }  // namespace
 
 std::string Adapter::specification() const {
-  const std::string place = interface.empty() ? port : interface;
-  return fmt::format("usb:{:04x}:{:04x}{}", vendor, product, serial.empty() ? "@" + place : ":" + serial);
+  return UsbAddress{vendor, product, serial, serial.empty() ? socket() : ""}.text();
+}
+
+bool Adapter::fits(const UsbAddress& wanted) const {
+  return wanted.fits(vendor, product, serial) &&
+         (wanted.port_path.empty() || wanted.port_path == port || wanted.port_path == interface);
 }
 
 std::string Adapter::line() const {
   return fmt::format("{} is {}{} in socket {}", device.string(), specification(),
-                     words.empty() ? "" : " (" + words + ")", interface.empty() ? port : interface);
-}
-
-std::optional<Wanted> Wanted::parse(const std::string& specification) {
-  if (!specification.starts_with("usb:")) return std::nullopt;
-  std::string rest = specification.substr(4);
-  Wanted wanted;
-  if (const auto at = rest.rfind('@'); at != std::string::npos && is_socket(rest.substr(at + 1))) {
-    wanted.port = rest.substr(at + 1);
-    rest.resize(at);
-  }
-  const auto colon = rest.find(':');
-  if (colon == std::string::npos) return std::nullopt;
-  const auto second = rest.find(':', colon + 1);
-  if (second != std::string::npos) {
-    wanted.serial = rest.substr(second + 1);
-    if (wanted.serial.empty() || wanted.serial[0] == ':' || wanted.serial[0] == '@') return std::nullopt;
-    rest.resize(second);
-  }
-  if (!read_id(rest.substr(0, colon), wanted.vendor)) return std::nullopt;
-  if (!read_id(rest.substr(colon + 1), wanted.product)) return std::nullopt;
-  return wanted;
-}
-
-bool Wanted::fits(const Adapter& adapter) const {
-  return (!vendor || *vendor == adapter.vendor) && (!product || *product == adapter.product) &&
-         (serial.empty() || serial == adapter.serial) &&
-         (port.empty() || port == adapter.port || port == adapter.interface);
+                     words.empty() ? "" : " (" + words + ")", socket());
 }
 
 std::vector<Adapter> adapters(const Roots& roots) {
@@ -164,14 +119,14 @@ std::optional<Adapter> adapter_of(const fs::path& device, const Roots& roots) {
 
 std::string path_of(const std::string& specification, const Roots& roots) {
   if (!specification.starts_with("usb:")) return specification;
-  const auto wanted = Wanted::parse(specification);
+  const auto wanted = UsbAddress::read(specification);
   if (!wanted) {
-    refuse(specification, "this is no specification of a USB adapter",
+    refuse(specification, "not the address of a USB adapter",
            "write usb:VID:PID[:SERIAL][@PORT] or a path, as in usb:0403:6001:A10K0000");
   }
   const std::vector<Adapter> all = adapters(roots);
   std::vector<Adapter> fitting;
-  std::copy_if(all.begin(), all.end(), std::back_inserter(fitting), [&](const Adapter& a) { return wanted->fits(a); });
+  std::copy_if(all.begin(), all.end(), std::back_inserter(fitting), [&](const Adapter& a) { return a.fits(*wanted); });
   if (fitting.size() == 1) return fitting.front().device.string();
   if (fitting.size() > 1) {
     refuse(specification, fmt::format("{} adapters fit: {}", fitting.size(), list(fitting)),
@@ -179,7 +134,7 @@ std::string path_of(const std::string& specification, const Roots& roots) {
                        specification.substr(0, specification.find('@')), fitting.front().interface));
   }
   if (all.empty()) refuse(specification, "no USB serial adapter is plugged in", "plug it in and try again");
-  refuse(specification, "no adapter fits; there are: " + list(all), "plug it in, or name one of these");
+  refuse(specification, "no adapter fits; found: " + list(all), "plug it in, or use one of these");
 }
 
 std::optional<Finding> judge_latency_timer(const Adapter& adapter) {
@@ -187,10 +142,9 @@ std::optional<Finding> judge_latency_timer(const Adapter& adapter) {
   const std::string name = adapter.device.filename();
   return Finding{
       Severity::warning,
-      fmt::format("the adapter {} holds replies back for up to {} ms (its latency timer): about {:.0f} questions per "
-                  "second, one at a time",
+      fmt::format("latency timer of adapter {}: replies are delayed by up to {} ms, about {:.0f} queries per second",
                   name, *adapter.latency_timer_ms, 1000.0 / *adapter.latency_timer_ms),
-      fmt::format("as root: echo 1 > /sys/bus/usb-serial/devices/{}/latency_timer; for good, the udev rule "
+      fmt::format("as root: echo 1 > /sys/bus/usb-serial/devices/{}/latency_timer; permanently with the udev rule "
                   "SUBSYSTEM==\"usb-serial\", DRIVER==\"ftdi_sio\", ATTR{{latency_timer}}=\"1\"",
                   name)};
 }

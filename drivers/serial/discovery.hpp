@@ -1,4 +1,4 @@
-// Which serial port an adapter has got: from its USB identity to the path of its terminal, by sysfs alone.
+// Finds the path of a serial adapter's terminal from its USB identity, by sysfs alone.
 //
 // A bench file names the adapter in one of two ways:
 //   /dev/serial/by-id/…               a path that begins with '/': taken as it is
@@ -15,11 +15,12 @@
 #include <string>
 #include <vector>
 
-#include "drivers/finding.hpp"
+#include "base/finding.hpp"
+#include "base/uri.hpp"
 
 namespace kphi::serial {
 
-/// Where the system's view of its devices is mounted; tests put their own here.
+/// Where sysfs and devtmpfs are mounted; tests use their own.
 struct Roots {
   std::filesystem::path sys = "/sys";
   std::filesystem::path dev = "/dev";
@@ -28,42 +29,33 @@ struct Roots {
 /// A serial port behind USB.
 struct Adapter {
   std::filesystem::path device;  ///< /dev/ttyUSB0
-  std::filesystem::path by_id;   ///< the name that stays the same in every socket; empty: udev gave none
+  std::filesystem::path by_id;   ///< a name that does not depend on the socket; empty: udev made none
   std::uint16_t vendor = 0, product = 0;
   std::string serial;                   ///< empty: the adapter has none (CH340)
-  std::string words;                    ///< maker and product, as the adapter tells them
+  std::string words;                    ///< maker and product, from the adapter
   std::string port;                     ///< "1-1.2": bus and sockets on the way
   std::string interface;                ///< "1-1.2:1.0"
   std::optional<int> latency_timer_ms;  ///< only FTDI's driver has one
 
-  /// What a bench file may call it: by its serial number, or by its socket where there is none.
+  /// Its address in a bench file: with its serial number, or with its socket if it has none.
   [[nodiscard]] std::string specification() const;
+  [[nodiscard]] const std::string& socket() const noexcept { return interface.empty() ? port : interface; }
+  [[nodiscard]] bool fits(const UsbAddress& wanted) const;
   /// "/dev/ttyUSB0 is usb:0403:6001:A10K0000 (FTDI FT232R USB UART) in socket 1-1.2"
   [[nodiscard]] std::string line() const;
-};
-
-/// A usb: specification, taken apart. Empty and nothing: any.
-struct Wanted {
-  std::optional<std::uint16_t> vendor, product;
-  std::string serial;
-  std::string port;
-
-  /// Nothing when `specification` is not of the form above.
-  [[nodiscard]] static std::optional<Wanted> parse(const std::string& specification);
-  [[nodiscard]] bool fits(const Adapter& adapter) const;
 };
 
 /// All that are plugged in, by name of their terminal.
 [[nodiscard]] std::vector<Adapter> adapters(const Roots& roots = {});
 
-/// The adapter whose terminal `device` is or links to; nothing for a pseudo-terminal or a port of the mainboard.
+/// The adapter whose terminal `device` is or links to; nullopt for a pseudo-terminal or a port of the mainboard.
 [[nodiscard]] std::optional<Adapter> adapter_of(const std::filesystem::path& device, const Roots& roots = {});
 
-/// The path that `specification` means now; asked anew after an adapter was unplugged. Throws DeviceError, which lists
+/// The present path of `specification`; may change when an adapter is plugged in again. Throws DeviceError, which lists
 /// the candidates, when the specification is malformed, or fits no adapter or more than one.
 [[nodiscard]] std::string path_of(const std::string& specification, const Roots& roots = {});
 
-/// The timer's effect on a get and its reply, and the remedy; nothing when it is 4 ms or less, or there is none.
+/// The timer's effect on queries, and the remedy; nullopt when it is 4 ms or less, or absent.
 [[nodiscard]] std::optional<Finding> judge_latency_timer(const Adapter& adapter);
 
 }  // namespace kphi::serial

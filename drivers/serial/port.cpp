@@ -7,7 +7,6 @@
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <termios.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -15,7 +14,6 @@
 #include <filesystem>
 #include <iterator>
 #include <thread>
-#include <utility>
 
 #include "drivers/serial/discovery.hpp"
 
@@ -43,14 +41,14 @@ const Rate& known_rate(const std::string& device, unsigned baud) {
   if (const Rate* rate = rate_of(baud)) return *rate;
   std::vector<unsigned> known;
   for (const Rate& rate : kRates) known.push_back(rate.baud);
-  throw DeviceError("serial port " + device, "open", fmt::format("{} baud is not a rate this system knows", baud),
+  throw DeviceError("serial port " + device, "open", fmt::format("unknown baud rate {}", baud),
                     fmt::format("use one of {}", fmt::join(known, ", ")));
 }
 
 std::string advice_for_missing() {
   const std::vector<std::string> names = stable_names();
-  if (names.empty()) return "no serial adapter is plugged in (/dev/serial/by-id is empty); plug it in and try again";
-  return fmt::format("these are there: {}", fmt::join(names, ", "));
+  if (names.empty()) return "no serial adapter found (/dev/serial/by-id is empty); plug it in and try again";
+  return fmt::format("available: {}", fmt::join(names, ", "));
 }
 
 std::string advice_for(int error, const std::string& device) {
@@ -71,30 +69,14 @@ std::string advice_for(int error, const std::string& device) {
 }
 
 std::string words_for(int error) {
-  if (error == ENOTTY) return "it is no serial port";
-  if (error == EBUSY || error == EWOULDBLOCK) return "it is in use by another program";
+  if (error == ENOTTY) return "not a serial port";
+  if (error == EBUSY || error == EWOULDBLOCK) return "in use by another program";
   return std::strerror(error);
 }
 
 [[noreturn]] void refuse(const std::string& device, const char* operation, int error) {
   throw DeviceError("serial port " + device, operation, words_for(error), advice_for(error, device));
 }
-
-/// Closes unless released.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) noexcept : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const noexcept { return fd_; }
-  int release() noexcept { return std::exchange(fd_, -1); }
-
- private:
-  int fd_;
-};
 
 void make_raw(int fd, const std::string& device, const Rate& rate) {
   termios line{};
@@ -107,33 +89,37 @@ void make_raw(int fd, const std::string& device, const Rate& rate) {
   cfsetispeed(&line, rate.code);
   cfsetospeed(&line, rate.code);
   if (tcsetattr(fd, TCSANOW, &line) != 0) refuse(device, "set line raw", errno);
-  // It may obey in part: that is no error to tcsetattr.
+  // tcsetattr reports success even if it has applied only a part.
   termios now{};
   if (tcgetattr(fd, &now) != 0 || cfgetospeed(&now) != rate.code) {
-    throw DeviceError("serial port " + device, fmt::format("set {} baud 8N1", rate.baud), "it keeps another rate",
+    throw DeviceError("serial port " + device, fmt::format("set {} baud 8N1", rate.baud), "the port keeps another rate",
                       "check that the adapter supports this rate");
   }
 }
 
-bool ask_low_latency(int fd) noexcept {
+/// To have bytes handed over at once. Most USB adapters' drivers and pseudo-terminals ignore it.
+void ask_low_latency(int fd) noexcept {
   serial_struct settings{};
-  if (ioctl(fd, TIOCGSERIAL, &settings) != 0) return false;
+  if (ioctl(fd, TIOCGSERIAL, &settings) != 0) return;
   settings.flags |= ASYNC_LOW_LATENCY;
-  return ioctl(fd, TIOCSSERIAL, &settings) == 0;
+  ioctl(fd, TIOCSSERIAL, &settings);
 }
 
-int open_exclusively(const std::string& device) {
+Descriptor open_exclusively(const std::string& device) {
   Descriptor port(::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-  if (port.get() < 0) refuse(device, "open", errno);
-  if (isatty(port.get()) == 0) refuse(device, "open", ENOTTY);
-  if (flock(port.get(), LOCK_EX | LOCK_NB) != 0) refuse(device, "lock", errno);
-  if (ioctl(port.get(), TIOCEXCL) != 0) refuse(device, "open exclusively", errno);
-  return port.release();
+  if (port.number() < 0) refuse(device, "open", errno);
+  if (isatty(port.number()) == 0) refuse(device, "open", ENOTTY);
+  if (flock(port.number(), LOCK_EX | LOCK_NB) != 0) refuse(device, "lock", errno);
+  if (ioctl(port.number(), TIOCEXCL) != 0) refuse(device, "open exclusively", errno);
+  return port;
 }
 
 }  // namespace
 
-bool known_baud(unsigned baud) noexcept { return rate_of(baud) != nullptr; }
+unsigned speed_code(unsigned baud) noexcept {
+  const Rate* rate = rate_of(baud);
+  return rate == nullptr ? B0 : rate->code;
+}
 
 std::vector<std::string> stable_names() {
   std::vector<std::string> names;
@@ -148,42 +134,37 @@ std::vector<std::string> stable_names() {
 Port::Port(const std::string& specification, unsigned baud) : device_(specification) {
   (void)known_rate(specification, baud);
   device_ = path_of(specification);
-  Descriptor opened(open_exclusively(device_));
-  fd_ = opened.get();
+  port_ = open_exclusively(device_);
   apply(baud);
-  tcflush(fd_, TCIOFLUSH);
-  low_latency_ = ask_low_latency(fd_);
-  fd_ = opened.release();
+  tcflush(fd(), TCIOFLUSH);
+  ask_low_latency(fd());
 }
 
-Port::~Port() {
-  ioctl(fd_, TIOCNXCL);
-  ::close(fd_);
-}
+Port::~Port() { ioctl(fd(), TIOCNXCL); }
 
 std::size_t Port::read(std::span<std::uint8_t> into) {
-  const auto n = ::read(fd_, into.data(), into.size());
+  const auto n = ::read(fd(), into.data(), into.size());
   if (n > 0) return static_cast<std::size_t>(n);
   if (n < 0 && (errno == EAGAIN || errno == EINTR)) return 0;
   gone("read", n == 0 ? ENODEV : errno);
 }
 
 std::size_t Port::write(std::span<const std::uint8_t> bytes) {
-  const auto n = ::write(fd_, bytes.data(), bytes.size());
+  const auto n = ::write(fd(), bytes.data(), bytes.size());
   if (n >= 0) return static_cast<std::size_t>(n);
   if (errno == EAGAIN || errno == EINTR) return 0;
   gone("write", errno);
 }
 
 bool Port::wait(Duration wall) const noexcept {
-  pollfd line{fd_, POLLIN, 0};
+  pollfd line{fd(), POLLIN, 0};
   const timespec limit{static_cast<time_t>(wall.count() / 1'000'000'000), wall.count() % 1'000'000'000};
   return wall >= Duration{0} && ppoll(&line, 1, &limit, nullptr) > 0;
 }
 
 std::size_t Port::unsent() const noexcept {
   int waiting = 0;
-  return ioctl(fd_, TIOCOUTQ, &waiting) == 0 && waiting > 0 ? static_cast<std::size_t>(waiting) : 0;
+  return ioctl(fd(), TIOCOUTQ, &waiting) == 0 && waiting > 0 ? static_cast<std::size_t>(waiting) : 0;
 }
 
 void Port::drain(Duration wall) const noexcept {
@@ -195,17 +176,18 @@ void Port::drain(Duration wall) const noexcept {
 
 void Port::set_baud(unsigned baud) {
   apply(baud);
-  tcflush(fd_, TCIOFLUSH);
+  tcflush(fd(), TCIOFLUSH);
 }
 
 void Port::apply(unsigned baud) {
-  make_raw(fd_, device_, known_rate(device_, baud));
+  make_raw(fd(), device_, known_rate(device_, baud));
   baud_ = baud;
 }
 
 void Port::gone(const char* operation, int error) const {
-  throw PortGone("serial port " + device_, operation, fmt::format("it is gone ({}): unplugged?", std::strerror(error)),
-                 "plug it in again");
+  throw PortGone("serial port " + device_, operation,
+                 fmt::format("the port is gone, probably unplugged ({})", std::strerror(error)),
+                 "plug the adapter in again");
 }
 
 }  // namespace kphi::serial

@@ -1,4 +1,4 @@
-// A serial port of our own: exclusive, raw, 8N1, no flow control, never blocking.
+// A serial port, opened exclusively: raw, 8N1, no flow control, never blocking.
 #pragma once
 
 #include <cstddef>
@@ -7,18 +7,19 @@
 #include <string>
 #include <vector>
 
-#include "drivers/clock.hpp"
-#include "drivers/device_error.hpp"
+#include "base/clock.hpp"
+#include "base/descriptor.hpp"
+#include "base/error.hpp"
 
 namespace kphi::serial {
 
-/// Whether Linux knows this rate; others are refused before the port is touched.
-[[nodiscard]] bool known_baud(unsigned baud) noexcept;
+/// Its code in termios, B115200 for 115200; 0: unknown.
+[[nodiscard]] unsigned speed_code(unsigned baud) noexcept;
 
-/// Names under /dev/serial/by-id: they stay the same whichever socket the adapter is plugged into.
+/// Names under /dev/serial/by-id: they do not depend on the socket.
 [[nodiscard]] std::vector<std::string> stable_names();
 
-/// The port was there and is no more: unplugged. Only a new Port can help.
+/// The port was open and has disappeared: unplugged. It must be opened again.
 class PortGone : public DeviceError {
  public:
   using DeviceError::DeviceError;
@@ -27,32 +28,30 @@ class PortGone : public DeviceError {
 class Port {
  public:
   /// `specification`: a path, or a USB adapter as discovery.hpp names it. Throws DeviceError: unknown baud, no such
-  /// device, no permission, not a terminal, or in use. A second program is refused by TIOCEXCL, root too by flock(2)
-  /// when it asks the same way.
+  /// device, no permission, not a terminal, or in use. TIOCEXCL refuses a second program; flock(2) also refuses root,
+  /// if that program uses flock.
   Port(const std::string& specification, unsigned baud);
   ~Port();
   Port(const Port&) = delete;
   Port& operator=(const Port&) = delete;
 
   /// For poll(2).
-  [[nodiscard]] int fd() const noexcept { return fd_; }
+  [[nodiscard]] int fd() const noexcept { return port_.number(); }
   /// The path that was opened.
   [[nodiscard]] const std::string& device() const noexcept { return device_; }
   [[nodiscard]] unsigned baud() const noexcept { return baud_; }
-  /// The driver agreed to hand bytes over at once. False on most USB adapters' drivers and on pseudo-terminals.
-  [[nodiscard]] bool low_latency() const noexcept { return low_latency_; }
 
-  /// What is there, 0 if nothing is. Throws PortGone.
+  /// Reads the available bytes; 0: there are none. Throws PortGone.
   std::size_t read(std::span<std::uint8_t> into);
-  /// As much as there is room for. Throws PortGone.
+  /// Writes as much as there is room for. Throws PortGone.
   std::size_t write(std::span<const std::uint8_t> bytes);
-  /// Waits until read() has something to tell, be it that the port is gone; false after `wall`.
+  /// Waits until there are bytes or the port is gone; false after `wall`.
   [[nodiscard]] bool wait(Duration wall) const noexcept;
-  /// Bytes handed over that have not left yet; 0 when nobody knows.
+  /// Bytes handed over that have not left yet; 0 if unknown.
   [[nodiscard]] std::size_t unsent() const noexcept;
-  /// Waits until all has left or `wall` is over.
+  /// Waits until all bytes have left, at most `wall`.
   void drain(Duration wall) const noexcept;
-  /// Throws DeviceError. What is on its way in either direction is lost.
+  /// Throws DeviceError. Bytes on their way in either direction are lost.
   void set_baud(unsigned baud);
 
  private:
@@ -61,8 +60,7 @@ class Port {
 
   std::string device_;
   unsigned baud_ = 0;
-  int fd_ = -1;
-  bool low_latency_ = false;
+  Descriptor port_;
 };
 
 }  // namespace kphi::serial

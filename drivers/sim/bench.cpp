@@ -53,14 +53,15 @@ SimulatedBench::SimulatedBench(const BenchSettings& settings)
 void SimulatedBench::mount(const std::string& propeller_id, double occlusion_deg) {
   const PropellerTruth* propeller = find_propeller(propeller_id);
   if (propeller == nullptr) {
-    throw std::invalid_argument("no propeller '" + propeller_id + "' here; there are 5x2, 5x3, 6x2, 6x3");
+    throw std::invalid_argument("unknown propeller \"" + propeller_id + "\"; known: 5x2, 5x3, 6x2, 6x3");
   }
   if (!(occlusion_deg >= 0 && occlusion_deg < 360)) {
-    throw std::invalid_argument(fmt::format("occlusion {} deg is outside [0, 360)", occlusion_deg));
+    throw std::invalid_argument(fmt::format("occlusion {}° is outside 0° to below 360°", occlusion_deg));
   }
   const double speed = plant_.motor().speed;
   if (std::abs(speed) > kSafeToTouch) {
-    throw std::invalid_argument(fmt::format("the motor turns at {:.0f} rad/s; coast it and wait", speed));
+    throw std::invalid_argument(
+        fmt::format("the motor is turning at {:.0f} rad/s; coast it and wait for standstill", speed));
   }
   plant_.mount(propeller, occlusion_deg);
   mounted_ = fmt::format("{} {}", propeller_id, occlusion_deg);

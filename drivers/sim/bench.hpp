@@ -7,15 +7,15 @@
 #include <optional>
 #include <string>
 
-#include "drivers/clock.hpp"
-#include "drivers/sim/bme280.hpp"
-#include "drivers/sim/iq_device.hpp"
-#include "drivers/sim/iq_line.hpp"
-#include "drivers/sim/netbox_device.hpp"
-#include "drivers/sim/plant.hpp"
-#include "drivers/sim/supply_slave.hpp"
-#include "drivers/sim/usb_faults.hpp"
-#include "drivers/sim/wire.hpp"
+#include "base/clock.hpp"
+#include "drivers/sim/iq/device.hpp"
+#include "drivers/sim/iq/line.hpp"
+#include "drivers/sim/netbox/device.hpp"
+#include "drivers/sim/netbox/fault_injector.hpp"
+#include "drivers/sim/physics/plant.hpp"
+#include "drivers/sim/supply/slave.hpp"
+#include "drivers/sim/usb/bme280.hpp"
+#include "drivers/sim/usb/faults.hpp"
 
 namespace kphi::sim {
 
@@ -25,17 +25,17 @@ struct BenchSettings {
   double time_scale = 1;  ///< stretches the module's communication timeout, nothing else: it is a deadline of wall time
   NetBoxSettings netbox;
   int module_id = 0;
-  double oscillator_gain = 0;  ///< see IqSettings; none, until those who read the speed correct for it
-  IqSettings module;           ///< the rest of the module: module_id, oscillator_gain, time_scale and seed are of above
+  double oscillator_gain = 0;  ///< see IqSettings; 0 unless asked for
+  IqSettings module;           ///< its module_id, oscillator_gain, time_scale and seed are replaced by those above
   PlantParameters plant;
-  std::optional<SupplySettings> supply;  ///< powers the motor, off at first; none: the supply of plant.motor does
+  std::optional<SupplySettings> supply;  ///< powers the motor, off at first; nullopt: the supply of plant.motor
   FaultScript faults;                    ///< of the load cell's wire and box; drawn from `seed`
-  FaultyWire::Keep keep = FaultyWire::Keep::totals;
+  FaultInjector::Keep keep = FaultInjector::Keep::totals;
   bool motor_line_paced = false;  ///< see IqLineSettings
   Duration motor_usb_tick{0};     ///< see IqLineSettings
   MotorFaultScript motor_faults;  ///< of the motor's line, module and supply; drawn from `seed`
   IqLine::Keep motor_keep = IqLine::Keep::totals;
-  TrueAir air{18, 102689, 0.45};  ///< about its sensor; 1.225 kg/m³
+  TrueAir air{18, 102689, 0.45};  ///< around its sensor; 1.225 kg/m³
   UsbFaultScript air_faults;      ///< of that sensor, its bridge and their USB
 };
 
@@ -46,23 +46,23 @@ class SimulatedBench {
   SimulatedBench& operator=(const SimulatedBench&) = delete;
 
   /// Occlusion in degrees, [0, 360). Throws std::invalid_argument for an unknown propeller, an angle out of range, or
-  /// while the shaft turns faster than 5 rad/s: nobody reaches into a turning propeller.
+  /// while the shaft turns faster than 5 rad/s.
   void mount(const std::string& propeller_id, double occlusion_deg);
-  /// "5x3 90"; empty while only the bare motor stands there, as after power-up.
+  /// "5x3 90"; empty for the bare motor, as after power-up.
   [[nodiscard]] std::string mounted() const { return mounted_; }
 
   /// Physics up to and including `now`, 7000 internal ticks per second; the past is ignored. Bytes for the devices are
   /// given to them after this was called with the time of their arrival.
   void advance(Instant now);
 
-  /// Datagrams and pages taken from here know only the faults of the box itself; see wire().
+  /// Its datagrams and pages have only the faults of the box itself; see wire().
   [[nodiscard]] NetBoxDevice& netbox() noexcept { return netbox_; }
-  [[nodiscard]] FaultyWire& wire() noexcept { return wire_; }
-  /// The module itself, for who joins a driver without a line between.
+  [[nodiscard]] FaultInjector& wire() noexcept { return wire_; }
+  /// The module itself, for joining a driver without the line.
   [[nodiscard]] IqDevice& motor() noexcept { return motor_; }
-  /// Bytes given to it and taken from it know rate, adapter and faults. It is carried along by advance().
+  /// The line with its rate, adapter and faults; advance() moves it on.
   [[nodiscard]] IqLine& motor_line() noexcept { return motor_line_; }
-  /// nullptr: none was asked for.
+  /// nullptr: this bench has none.
   [[nodiscard]] SupplySlave* supply() noexcept { return supply_ ? &*supply_ : nullptr; }
   [[nodiscard]] const Plant& plant() const noexcept { return plant_; }
   [[nodiscard]] std::uint64_t ticks() const noexcept { return ticks_; }
@@ -71,7 +71,7 @@ class SimulatedBench {
   std::optional<SupplySlave> supply_;
   Plant plant_;
   NetBoxDevice netbox_;
-  FaultyWire wire_;
+  FaultInjector wire_;
   IqDevice motor_;
   IqLine motor_line_;
   std::string mounted_;

@@ -6,16 +6,16 @@
 
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <vector>
 
-#include "drivers/device_error.hpp"
-#include "drivers/sim/descriptor.hpp"
-#include "drivers/sim/motion_log.hpp"
+#include "base/descriptor.hpp"
+#include "base/error.hpp"
+#include "base/number.hpp"
+#include "drivers/sim/truth_log.hpp"
 
 namespace kphi::sim {
 namespace {
@@ -34,11 +34,10 @@ std::vector<std::string> words_of(std::string_view line) {
 }
 
 std::string mount(SimulatedBench& bench, const std::string& propeller, const std::string& angle) {
-  double occlusion_deg = 0;
-  const auto [end, error] = std::from_chars(angle.data(), angle.data() + angle.size(), occlusion_deg);
-  if (error != std::errc{} || end != angle.data() + angle.size()) return "error '" + angle + "' is no angle in degrees";
+  const auto occlusion_deg = parse_double(angle);
+  if (!occlusion_deg) return "error \"" + angle + "\" is not an angle in degrees";
   try {
-    bench.mount(propeller, occlusion_deg);
+    bench.mount(propeller, *occlusion_deg);
   } catch (const std::invalid_argument& refusal) {
     return std::string("error ") + refusal.what();
   }
@@ -72,11 +71,11 @@ std::string fail(SimulatedBench& bench, std::vector<std::string> words) {
   FaultEntry entry{{"at_s", fmt::format("{}", static_cast<double>(bench.ticks()) * kTick)}};
   for (std::size_t i = 1; i < words.size(); ++i) {
     const std::size_t equals = words[i].find('=');
-    if (equals == std::string::npos) return "error '" + words[i] + "' is no key=value";
+    if (equals == std::string::npos) return "error \"" + words[i] + "\" is not key=value";
     entry[words[i].substr(0, equals)] = words[i].substr(equals + 1);
   }
   try {
-    bench.supply()->add_fault(supply_fault_of(entry));
+    bench.supply()->add_fault(supply_faults().read(entry));
   } catch (const FaultEntryError& error) {
     return std::string("error ") + error.what();
   }
@@ -104,7 +103,7 @@ std::string tell(const std::string& path, const std::string& line) {
   };
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  if (path.size() >= sizeof address.sun_path) throw refuse("connect", "the path is longer than a socket's may be");
+  if (path.size() >= sizeof address.sun_path) throw refuse("connect", "the path is longer than a socket path may be");
   std::memcpy(address.sun_path, path.data(), path.size());
   const Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
   const timeval patience{3, 0};

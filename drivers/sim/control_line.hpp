@@ -1,4 +1,4 @@
-// The line on which a person (or a campaign in their place) tells the simulated bench what is mounted: a Unix-domain
+// The line on which a person, or a campaign, tells the simulated bench what is mounted: a Unix-domain
 // socket, one line in, one line out. `mount 5x3 90` -> `ok 5x3 90`; `status` -> one line of JSON; else `error …`.
 #pragma once
 
@@ -15,8 +15,8 @@ namespace kphi::sim {
 /// Where the socket is: a relative path lies in the system's temporary folder.
 [[nodiscard]] std::string control_path(const std::string& configured);
 
-/// Says one line to a running simulator and returns its answer, both without newline. Waits 3 s at most.
-/// Throws DeviceError when nobody answers.
+/// Sends one line to a running simulator and returns its answer, both without newline. Waits 3 s at most.
+/// Throws DeviceError without an answer.
 [[nodiscard]] std::string tell(const std::string& path, const std::string& line);
 
 }  // namespace kphi::sim

@@ -12,7 +12,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 #include "drivers/sim/control_line.hpp"
 
 namespace kphi::sim {
@@ -21,7 +21,6 @@ namespace {
 constexpr std::chrono::milliseconds kWakeUp{1};  // wall time
 constexpr int kCatchUp = 8;                      // bench time per wake-up, in wake-ups
 constexpr int kQuiet = 1000;                     // wake-ups without a byte: the client is gone
-constexpr std::size_t kHttpConnections = 4;      // of a box that serves more than one at a time
 constexpr std::size_t kBatch = 64;               // datagrams per system call
 
 [[noreturn]] void refuse(const std::string& where, const std::string& operation, const std::string& cause,
@@ -45,7 +44,7 @@ sockaddr_un unix_address_of(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.empty() || path.size() >= sizeof address.sun_path) {
-    refuse("control '" + path + "'", "open control line", "no path, or longer than a socket's may be",
+    refuse("control \"" + path + "\"", "open control line", "the path is empty or longer than a socket path may be",
            "set simulation.control in the bench file");
   }
   std::memcpy(address.sun_path, path.data(), path.size());
@@ -70,8 +69,7 @@ Server::Server(const ServerSettings& settings)
       web_(listen_at(settings.host, SOCK_STREAM, settings.http_port)),
       coarse_(listen_at(settings.host, SOCK_STREAM, settings.tcp_port)),
       pty_(settings.device, settings.bench.module.baud),
-      http_(std::move(web_.socket),
-            {"\r\n\r\n", true, settings.bench.netbox.habits.one_http_connection ? 1 : kHttpConnections},
+      http_(std::move(web_.socket), {"\r\n\r\n", true, 1},
             [this](std::string_view request) { return in_wall_time(bench_.wire().http(request, reached_)); }),
       tcp_(std::move(coarse_.socket), 4,
            [this](std::string& heard) { return in_wall_time(bench_.wire().tcp(heard, reached_)); }),
@@ -101,7 +99,7 @@ Descriptor Server::listen_for_control() const {
   const auto folder = std::filesystem::path(path).parent_path();
   std::filesystem::create_directories(folder, error);
   if (std::filesystem::is_socket(path, error)) {
-    if (answers(address)) refuse(path, "open control line", "another simulator answers there", "end it first");
+    if (answers(address)) refuse(path, "open control line", "another simulator answers there", "stop it first");
     ::unlink(path.c_str());
   }
   Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
@@ -188,7 +186,7 @@ void Server::step(Instant now) {
   send_datagrams();
   send_motor();
   if (!supply_) return;
-  supply_->hear(*bench_.supply(), now);
+  supply_->receive(*bench_.supply(), now);
   supply_->send(*bench_.supply(), now);
 }
 

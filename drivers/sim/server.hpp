@@ -1,4 +1,4 @@
-// The simulated bench on its true transports: UDP, HTTP and TCP for the load cell's box, a pseudo-terminal for the
+// The simulated bench on real transports: UDP, HTTP and TCP for the load cell's box, a pseudo-terminal for the
 // motor, a Unix-domain socket for the person who mounts propellers. One thread, poll(), a wake-up per millisecond at
 // least.
 #pragma once
@@ -10,29 +10,28 @@
 #include <string>
 #include <vector>
 
-#include "drivers/clock.hpp"
+#include "base/clock.hpp"
+#include "base/descriptor.hpp"
 #include "drivers/sim/bench.hpp"
-#include "drivers/sim/conversations.hpp"
-#include "drivers/sim/descriptor.hpp"
-#include "drivers/sim/listening.hpp"
-#include "drivers/sim/motion_log.hpp"
-#include "drivers/sim/pty.hpp"
-#include "drivers/sim/supply_port.hpp"
+#include "drivers/sim/supply/port.hpp"
+#include "drivers/sim/transport/conversations.hpp"
+#include "drivers/sim/transport/pty.hpp"
+#include "drivers/sim/truth_log.hpp"
 
 namespace kphi::sim {
 
 struct ServerSettings {
-  BenchSettings bench;                 ///< time_scale there is also the scale of the clock
-  std::string host = "127.0.0.1";      ///< IPv4 name or address to listen on
-  std::uint16_t rdt_port = 0;          ///< 0: any free one
-  std::uint16_t http_port = 0;         ///< 0: any free one
-  std::uint16_t tcp_port = 0;          ///< 0: any free one; 49151 on a real box
-  std::string device;                  ///< symlink to the motor's pseudo-terminal; empty: its own /dev/pts name only
-  std::optional<SupplyPlaces> supply;  ///< where bench.supply can be reached
-  std::string control;                 ///< path of the control socket; see control_path
+  BenchSettings bench;                    ///< time_scale there is also the scale of the clock
+  std::string host = "127.0.0.1";         ///< IPv4 name or address to listen on
+  std::uint16_t rdt_port = 0;             ///< 0: any free one
+  std::uint16_t http_port = 0;            ///< 0: any free one
+  std::uint16_t tcp_port = 0;             ///< 0: any free one; 49151 on a real box
+  std::string device;                     ///< symlink to the motor's pseudo-terminal; empty: its own /dev/pts name only
+  std::optional<SupplyAddresses> supply;  ///< where bench.supply can be reached
+  std::string control;                    ///< path of the control socket; see control_path
 };
 
-/// Where it can be reached, after ports and names were given out.
+/// The actual ports and names.
 struct Addresses {
   std::string host;
   std::uint16_t rdt_port = 0;
@@ -44,15 +43,15 @@ struct Addresses {
   std::uint16_t supply_port = 0;  ///< 0: none
 };
 
-/// What the transports would not take.
+/// What the transports did not accept.
 struct Unsent {
   std::uint64_t datagrams = 0;    ///< socket buffer full
-  std::uint64_t motor_bytes = 0;  ///< nobody reads the serial line
+  std::uint64_t motor_bytes = 0;  ///< the serial line is not read
 };
 
 class Server {
  public:
-  /// Opens everything. Throws DeviceError; another simulator on the same control socket is such an error.
+  /// Opens everything. Throws DeviceError, also if another simulator has the control socket.
   explicit Server(const ServerSettings& settings);
   ~Server();  ///< removes control socket and symlink
   Server(const Server&) = delete;
@@ -61,14 +60,14 @@ class Server {
   [[nodiscard]] const Addresses& addresses() const noexcept { return addresses_; }
   /// Runs the bench until request_stop(). After a stall it catches up at most eight times as fast as time passes.
   void run();
-  /// From any thread, and from a signal handler.
+  /// Thread-safe and signal-safe.
   void request_stop() noexcept;
-  /// To be read when run() has returned: what the script of faults did.
+  /// What the fault script did; after run().
   [[nodiscard]] const WireTruth& truth() noexcept { return bench_.wire().truth(); }
   [[nodiscard]] const IqTruth& motor_truth() noexcept { return bench_.motor_line().truth(); }
   /// Kept when the motor's replies are, too.
   [[nodiscard]] const MotionLog& motion() const noexcept { return motion_; }
-  /// To be read when run() has returned.
+  /// After run().
   [[nodiscard]] const Unsent& unsent() const noexcept { return unsent_; }
 
  private:
@@ -92,7 +91,7 @@ class Server {
   MotionLog motion_;
   Descriptor stop_;
   Listening rdt_;
-  Listening foreign_;  ///< sends what a script lets come from elsewhere
+  Listening foreign_;  ///< sends datagrams that a script makes come from another address
   Listening web_;
   Listening coarse_;
   Pty pty_;
@@ -102,7 +101,7 @@ class Server {
   Conversations control_;
   std::vector<Datagram> batch_;
   Unsent unsent_;
-  std::string present_host_;  ///< empty: the box has an address that this machine has not
+  std::string present_host_;  ///< empty: the box has an address that this computer does not have
   std::string last_wanted_;
   int quiet_steps_ = 0;  ///< of the serial line
   Instant reached_{0};   ///< bench time

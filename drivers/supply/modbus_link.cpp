@@ -9,9 +9,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <map>
 #include <stdexcept>
 #include <thread>
+
+#include "drivers/serial/port.hpp"
 
 namespace kphi::supply {
 namespace {
@@ -19,14 +20,6 @@ namespace {
 using std::chrono::steady_clock;
 constexpr auto kLongestQuiet = std::chrono::seconds(2);
 constexpr double kBitsPerByte = 10, kSilentBytes = 3.5;
-
-speed_t speed_of(unsigned baud) {
-  static const std::map<unsigned, speed_t> kSpeeds{
-      {1200, B1200},   {2400, B2400},     {4800, B4800},     {9600, B9600},     {19200, B19200},  {38400, B38400},
-      {57600, B57600}, {115200, B115200}, {230400, B230400}, {460800, B460800}, {921600, B921600}};
-  const auto found = kSpeeds.find(baud);
-  return found == kSpeeds.end() ? B0 : found->second;
-}
 
 Failure failure_of(int error) noexcept {
   switch (error) {
@@ -51,10 +44,10 @@ std::string words_for(int error) {
     case Failure::timeout:
       return "no answer";
     case Failure::damaged:
-      return fmt::format("a damaged answer ({})", modbus_strerror(error));
+      return fmt::format("damaged answer ({})", modbus_strerror(error));
     case Failure::refused:
     case Failure::busy:
-      return fmt::format("it answers \"{}\"", modbus_strerror(error));
+      return fmt::format("the device answers \"{}\"", modbus_strerror(error));
     default:
       return fmt::format("the line is lost ({})", std::strerror(error));
   }
@@ -62,10 +55,10 @@ std::string words_for(int error) {
 
 modbus_t* make_context(const Address& address) {
   if (address.slave < 1 || (address.slave > 247 && address.slave != 255)) {
-    throw std::invalid_argument(fmt::format("{} is no Modbus address; use 1 to 247", address.slave));
+    throw std::invalid_argument(fmt::format("{} is not a Modbus address; use 1 to 247", address.slave));
   }
   if (address.wire == Address::Wire::tcp) {
-    return modbus_new_tcp_pi(address.host.c_str(), std::to_string(address.port).c_str());
+    return modbus_new_tcp_pi(address.tcp.host.c_str(), std::to_string(address.tcp.port).c_str());
   }
   if (!known_baud(address.baud)) {
     throw std::invalid_argument(fmt::format("{} baud is not a rate that can be set; use 9600 or 115200", address.baud));
@@ -113,11 +106,11 @@ Outcome ModbusLink::open() {
 Outcome ModbusLink::take_port() {
   const int port = modbus_get_socket(context_.get());
   termios line{};
-  if (tcgetattr(port, &line) != 0) return {Failure::lost, "it is no serial port"};
-  if (cfgetospeed(&line) != speed_of(address_.baud)) {
-    return {Failure::lost, fmt::format("the port does not take {} baud", address_.baud)};
+  if (tcgetattr(port, &line) != 0) return {Failure::lost, "not a serial port"};
+  if (cfgetospeed(&line) != serial::speed_code(address_.baud)) {
+    return {Failure::lost, fmt::format("the port does not accept {} baud", address_.baud)};
   }
-  if (flock(port, LOCK_EX | LOCK_NB) != 0) return {Failure::lost, "it is in use by another program"};
+  if (flock(port, LOCK_EX | LOCK_NB) != 0) return {Failure::lost, "in use by another program"};
   ioctl(port, TIOCEXCL);
   return {};
 }
@@ -145,7 +138,7 @@ Outcome ModbusLink::outcome(int result, int expected) {
   const int error = errno;
   last_ = steady_clock::now();
   if (result == expected) return {};
-  if (result >= 0) return {Failure::damaged, "an answer of another length"};
+  if (result >= 0) return {Failure::damaged, "answer of the wrong length"};
   return {failure_of(error), words_for(error)};
 }
 
@@ -157,7 +150,7 @@ void ModbusLink::fall_silent() {
     const int arrived = ::poll(&line, 1, static_cast<int>(timing_.quiet.count()));
     if (arrived <= 0 || (line.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) break;
     const int flushed = modbus_flush(context_.get());  // bytes of TCP, 0 on a serial line
-    if (flushed < 0 || (tcp && flushed == 0)) break;   // its end: the next request will tell
+    if (flushed < 0 || (tcp && flushed == 0)) break;   // closed by the device: the next request reports it
   }
   modbus_flush(context_.get());
 }

@@ -1,4 +1,4 @@
-// One Modbus line: libmodbus opened, asked once per call, and closed, with its traps held shut. One thread.
+// One Modbus line on libmodbus, guarded against its pitfalls: one request per call. One thread.
 //
 // libmodbus 3.1.6 takes a late answer for the answer to the next request when their lengths agree (RTU has no
 // transaction number), does not recover from bytes before a frame until it is flushed, and runs at 9600 baud when it
@@ -24,15 +24,15 @@ struct Timing {
   std::chrono::milliseconds quiet{150};   ///< silence after which a late answer is no longer expected
 };
 
-/// Registers by address, as far as they have been read.
+/// Registers by address; zero until read.
 using RegisterImage = std::array<std::uint16_t, 128>;
 
 enum class Failure : std::uint8_t {
   none,
   timeout,  ///< no answer, or only its beginning
   damaged,  ///< bad CRC, foreign sender, wrong shape
-  busy,     ///< the device asks for patience
-  refused,  ///< the device will not: another try is of no use
+  busy,     ///< the device is not ready yet
+  refused,  ///< the device refuses: retrying is useless
   lost,     ///< the port or connection is gone
 };
 
@@ -44,19 +44,19 @@ struct Outcome {
 
 class ModbusLink {
  public:
-  /// Opens nothing yet. Throws std::invalid_argument for what must never reach libmodbus: baud, slave.
+  /// Opens nothing yet. Throws std::invalid_argument for a baud rate or slave that libmodbus must not get.
   ModbusLink(const Address& address, const Timing& timing);
   ~ModbusLink();
   ModbusLink(const ModbusLink&) = delete;
   ModbusLink& operator=(const ModbusLink&) = delete;
 
-  /// Anew when it was open. A serial port is taken exclusively.
+  /// Opens, or reopens. A serial port is opened exclusively.
   [[nodiscard]] Outcome open();
   /// One request, one answer. `block` lies within the image.
   [[nodiscard]] Outcome read(const Block& block, RegisterImage& into);
   /// One register, by function 0x10 if `multiple`, else 0x06.
   [[nodiscard]] Outcome write(Writable at, std::uint16_t value, bool multiple);
-  /// Waits until nothing has arrived for Timing::quiet (2 s at most) and forgets what had.
+  /// Waits until nothing has arrived for Timing::quiet (2 s at most) and discards all bytes received.
   void fall_silent();
 
  private:

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 #include "drivers/serial/port.hpp"
 
 namespace kphi::supply {
@@ -40,22 +40,22 @@ void ModbusSupply::identify() {
     if (model_ != nullptr) break;
   }
   if (model_ == nullptr) {
-    throw DeviceError(identity_.device, "identify", "no known model: " + answers,
+    throw DeviceError(identity_.device, "identify", "unknown model: " + answers,
                       fmt::format("known are {}", fmt::join(model_names(), ", ")));
   }
   if (wanted != nullptr && wanted != model_) {
-    throw DeviceError(identity_.device, "identify", fmt::format("it is a {}, not a {}", model_->name, wanted->name),
+    throw DeviceError(identity_.device, "identify", fmt::format("found a {}, not a {}", model_->name, wanted->name),
                       "correct model= in its address, or the port");
   }
   if (const int at = model_->map->decimals; at != kAbsent && registers_[static_cast<std::size_t>(at)] != kDecimals) {
     throw DeviceError(identity_.device, "identify",
-                      fmt::format("its values have decimals {:#06x}", registers_[static_cast<std::size_t>(at)]),
+                      fmt::format("unknown format of its values {:#06x}", registers_[static_cast<std::size_t>(at)]),
                       fmt::format("only {:#06x} is known", kDecimals));
   }
   known_ = registers_;
 }
 
-/// nullptr when it is none of this family; `answers` gathers what it said.
+/// nullptr: not of this family. Appends its answer to `answers`.
 const Model* ModbusSupply::ask_model(const RegisterMap& map, std::string& answers) {
   const char* const join = answers.empty() ? "" : ", ";
   bool refused = false;
@@ -122,7 +122,7 @@ double ModbusSupply::over_current_counts_per_a() const noexcept {
   return model_->over_current_counts_per_a > 0 ? model_->over_current_counts_per_a : range().counts_per_a;
 }
 
-/// Fills the reading from the registers. What cannot be; empty when all can.
+/// Fills the reading from the registers. Returns what is impossible; empty: plausible.
 std::string ModbusSupply::implausible(Reading& reading) const {
   const RegisterMap& map = *model_->map;
   const auto at = [&](int address) { return registers_[static_cast<std::size_t>(address)]; };
@@ -136,7 +136,7 @@ std::string ModbusSupply::implausible(Reading& reading) const {
   if (map.regulation != kAbsent) {
     reading.regulation = at(map.regulation) != 0 ? Regulation::constant_current : Regulation::constant_voltage;
   } else {
-    // No register tells: at the limit, and the voltage has given way.
+    // There is no register for it: constant current if at the limit with a reduced voltage.
     const bool limited = reading.output && at(map.current) + 1 >= at(map.current_limit);
     const bool gave_way = at(map.voltage) + 5 < at(map.set_voltage);
     reading.regulation = limited && gave_way ? Regulation::constant_current : Regulation::constant_voltage;
@@ -151,7 +151,7 @@ std::string ModbusSupply::implausible(Reading& reading) const {
         beyond("an output state", at(map.output), 1),
         beyond("a regulation", map.regulation == kAbsent ? 0 : at(map.regulation), 1),
         beyond("a current range", model_->ranges[1].max_a > 0 ? at(map.current_range) : 0, 1)}) {
-    if (!doubt.empty()) return "it reports " + doubt + ", which cannot be";
+    if (!doubt.empty()) return "implausible reply: " + doubt;
   }
   return {};
 }
@@ -201,24 +201,22 @@ void ModbusSupply::put(const char* operation, Writable at, std::uint16_t value) 
 
 void ModbusSupply::confirm(const char* what, std::uint16_t at, std::uint16_t value, double counts_per_unit) {
   if (registers_[at] == value) return;
-  throw DeviceError(
-      identity_.device, fmt::format("set {}", what),
-      fmt::format("it was told {} and reports {}", value / counts_per_unit, registers_[at] / counts_per_unit),
-      "unlock its panel, recall preset M0, and let nobody turn its knobs");
+  throw DeviceError(identity_.device, fmt::format("set {}", what),
+                    fmt::format("set to {}, reads back {}", value / counts_per_unit, registers_[at] / counts_per_unit),
+                    "unlock its panel, recall preset M0, and do not touch its front panel");
 }
 
 void ModbusSupply::switch_on() {
   if (!limits_applied_) {
-    throw DeviceError(identity_.device, "switch on", "its limits have not been set by this program",
-                      "apply limits first");
+    throw DeviceError(identity_.device, "switch on", "its limits are not set", "apply limits first");
   }
   persist("switch on", [&] { return write_once(model_->map->output, 1, false); });
   const Reading reading = read();
   if (reading.output && reading.protection == Protection::none) return;
   throw DeviceError(identity_.device, "switch on",
                     reading.protection == Protection::none
-                        ? std::string("it has acknowledged and stays off")
-                        : fmt::format("it has switched off by itself: {}", name_of(reading.protection)),
+                        ? std::string("acknowledged, but the output stays off")
+                        : fmt::format("switched off by itself: {}", name_of(reading.protection)),
                     "check the load, the thresholds and the panel");
 }
 
@@ -231,7 +229,7 @@ void ModbusSupply::switch_off() {
   if (!read().output) return;
   persist("switch off", [&] { return write_once(output, 0, false); });
   if (!read().output) return;
-  throw DeviceError(identity_.device, "switch off", "it has acknowledged and reports that its output is on",
+  throw DeviceError(identity_.device, "switch off", "acknowledged, but the output is still ON",
                     "switch it off by hand");
 }
 
@@ -281,7 +279,7 @@ void ModbusSupply::persist(const char* operation, const std::function<Outcome()>
   throw DeviceError(identity_.device, operation, outcome.words, remedy(outcome.failure));
 }
 
-/// Afterwards, if it succeeded, nothing that was sent before is under way.
+/// After success no answer to an earlier request can arrive.
 Outcome ModbusSupply::settle() {
   if (lost_) {
     if (Outcome opened = link_.open(); !opened.ok()) return opened;
@@ -297,7 +295,7 @@ Outcome ModbusSupply::settle() {
     };
     if (!same(map.model) || !same(map.serial) || (map.serial != kAbsent && !same(map.serial + 1))) {
       ++counters_.implausible;
-      return {Failure::damaged, "another device answers in its place"};
+      return {Failure::damaged, "another device answers"};
     }
   }
   unsettled_ = false;
@@ -309,12 +307,12 @@ std::string ModbusSupply::remedy(Failure failure) const {
   switch (failure) {
     case Failure::timeout:
       return rtu ? fmt::format(
-                       "is it on and its interface enabled, is {} its baud rate (Riden 115200, DPS and HM 9600), "
-                       "{} its address?",
+                       "check its power, that its interface is enabled, its baud rate ({} here; Riden 115200, DPS "
+                       "and HM 9600) and its address ({} here)",
                        address_.baud, address_.slave)
-                 : std::string("is it on, and does it speak Modbus TCP?");
+                 : std::string("check its power, and that it supports Modbus TCP");
     case Failure::damaged:
-      return "check cable and ground, and that nobody else speaks on this line";
+      return "check cable and ground, and that no other program uses this line";
     case Failure::busy:
     case Failure::refused:
       return "check its model, firmware and panel lock";
@@ -324,10 +322,10 @@ std::string ModbusSupply::remedy(Failure failure) const {
   if (!rtu) return "check host, port and network";
   const char* const device = address_.device.c_str();
   if (::access(device, F_OK) == 0 && ::access(device, R_OK | W_OK) != 0)
-    return "this user may not open it: install drivers/udev/60-kphi.rules, or join the group dialout";
+    return "permission denied; install drivers/udev/60-kphi.rules, or join the group dialout";
   const auto names = serial::stable_names();
-  if (names.empty()) return "no serial adapter is plugged in; plug it in and try again";
-  return fmt::format("plug it in, close other programs; these are there: {}", fmt::join(names, ", "));
+  if (names.empty()) return "no serial adapter found; plug it in and try again";
+  return fmt::format("plug it in, close other programs; available: {}", fmt::join(names, ", "));
 }
 
 }  // namespace kphi::supply

@@ -1,8 +1,8 @@
 // A supply behind Modbus, RTU or TCP. Blocking, one thread.
 //
-// No stale value. After any failure the line is left to fall silent and flushed, and then the device is asked who it
-// is: answers come in the order of requests, and no other answer has the shape of this one, so when it has come nothing
-// older can follow. The same question notices that another device has been plugged in.
+// No stale values. After any failure the line is left to fall silent and flushed, and then the device is asked for its
+// identity: answers come in the order of requests, and no other answer has this length, so once it has arrived no older
+// answer can follow. The same request detects that another device has been plugged in.
 #pragma once
 
 #include <functional>
@@ -17,15 +17,15 @@ namespace kphi::supply {
 
 class ModbusSupply final : public Supply {
  public:
-  /// Opens, asks who it is, and looks once; writes nothing. Throws DeviceError: no such port or host, in use, no
-  /// answer, a model that is unknown or not the one that the address names. `clock` outlives the supply and stamps
-  /// readings only; deadlines are wall time.
+  /// Opens, identifies the device, and reads once; writes nothing. Throws DeviceError: no such port or host, in use, no
+  /// answer, unknown model, or not the model of the address. `clock` outlives the supply and stamps readings only;
+  /// deadlines are wall time.
   ModbusSupply(const Address& address, const Clock& clock, const Timing& timing = {});
 
   [[nodiscard]] const Identity& identity() const noexcept override { return identity_; }
   Limits apply(const Limits& limits) override;
   [[nodiscard]] Reading read() override;
-  /// The order goes out at least once even when nothing is heard from the device.
+  /// Sends the command at least once, even if the device does not answer.
   void switch_off() override;
   [[nodiscard]] Counters counters() const noexcept override { return counters_; }
 
@@ -57,11 +57,11 @@ class ModbusSupply final : public Supply {
   ModbusLink link_;
   const Model* model_ = nullptr;
   RegisterImage registers_{};
-  RegisterImage known_{};  ///< as they were when the device was identified
+  RegisterImage known_{};  ///< at identification
   Identity identity_;
   Counters counters_;
   bool lost_ = true;       ///< to be opened
-  bool unsettled_ = true;  ///< old answers may be under way
+  bool unsettled_ = true;  ///< old answers may still arrive
   bool limits_applied_ = false;
 };
 

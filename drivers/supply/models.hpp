@@ -1,4 +1,4 @@
-// Every supply that is known, in two tables: where the registers of a family lie, and how a model counts.
+// All known supplies, in two tables: the registers of a family, and the scales of a model.
 // Riden RD60xx, RuiDeng DPS/DPH, Hanmatek HM3xx (eTommens). Registers are 16 bit; a double one has its high word first.
 // Left out because sources disagree: Riden 12 (charge, energy or half of the power), 13 (scale of the power on P
 // models: power is the product), 19 (preset: not reliable to read).

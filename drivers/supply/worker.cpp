@@ -1,25 +1,17 @@
 #include "drivers/supply/worker.hpp"
 
-#include <signal.h>
-
 #include <stdexcept>
 #include <utility>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
+#include "base/thread.hpp"
 
 namespace kphi::supply {
 namespace {
 
-/// Signals belong to the program's main thread.
-void refuse_signals() noexcept {
-  sigset_t all;
-  sigfillset(&all);
-  pthread_sigmask(SIG_BLOCK, &all, nullptr);
-}
-
 Duration period_of(double looks_per_second) {
   if (!(looks_per_second >= 0.1 && looks_per_second <= 100)) {
-    throw std::invalid_argument("a supply is looked at 0.1 to 100 times per second");
+    throw std::invalid_argument("a supply can be read 0.1 to 100 times per second");
   }
   return from_seconds(1 / looks_per_second);
 }
@@ -41,7 +33,7 @@ Worker::Worker(std::unique_ptr<Supply> supply, const Clock& clock, double looks_
       clock_(clock),
       period_(period_of(looks_per_second)),
       identity_(supply_->identity()),
-      thread_([this] { run(); }) {}
+      thread_(start_thread([this] { run(); })) {}
 
 Worker::~Worker() {
   {
@@ -69,7 +61,7 @@ void Worker::switch_on() {
       const std::lock_guard lock(mutex_);
       if (offs_asked_ != offs) throw DeviceError(identity_.device, "switch on", "it was switched off meanwhile");
     }
-    if (output_ && !supply_->read().output) output_.reset();  // it has tripped
+    if (output_ && !supply_->read().output) output_.reset();  // tripped
     if (!output_) output_.emplace(*supply_);
   });
 }
@@ -79,7 +71,7 @@ void Worker::ask(std::function<void()> act) {
   {
     const std::lock_guard lock(mutex_);
     if (ended_ || stop_asked_) {
-      throw DeviceError(identity_.device, "command", failure_.empty() ? "it is being closed" : failure_,
+      throw DeviceError(identity_.device, "command", failure_.empty() ? "the supply is being closed" : failure_,
                         "open it again");
     }
     orders_.push_back({std::move(act), {}});
@@ -138,11 +130,10 @@ std::string Worker::failure() const {
 }
 
 void Worker::run() noexcept {
-  refuse_signals();
   std::string why;
   try {
     next_look_ = clock_.now();
-    while (obey()) {
+    while (serve()) {
       if (clock_.now() < next_look_) continue;
       look();
       next_look_ = std::max(next_look_ + period_, clock_.now());
@@ -153,15 +144,15 @@ void Worker::run() noexcept {
   finish(std::move(why));
 }
 
-/// Waits until something is asked or a look is due, and does what is asked. False: it is time to go.
-bool Worker::obey() {
+/// Waits for an order or until the next reading is due, and carries out the orders. False: the worker is to end.
+bool Worker::serve() {
   std::unique_lock lock(mutex_);
   const auto asked = [&] { return stop_asked_ || !orders_.empty() || offs_asked_ != offs_done_; };
   changed_.wait_for(lock, clock_.shrunk(std::max(Duration{0}, next_look_ - clock_.now())), asked);
   if (stop_asked_) return false;
   if (offs_asked_ != offs_done_) {
     lock.unlock();
-    obey_off();
+    apply_off();
     lock.lock();
   }
   while (!orders_.empty()) {
@@ -185,8 +176,8 @@ Worker::Answer Worker::answer_to(const std::function<void()>& act) {
   }
 }
 
-/// Throws what kept the output from being reported off.
-void Worker::obey_off() {
+/// Throws if the output was not reported off.
+void Worker::apply_off() {
   std::uint64_t asked = 0;
   {
     const std::lock_guard lock(mutex_);
@@ -234,7 +225,7 @@ void Worker::finish(std::string why) noexcept {
   }
   counters_ = supply_->counters();
   ended_ = true;
-  const DeviceError gone(identity_.device, "command", failure_.empty() ? "it is being closed" : failure_,
+  const DeviceError gone(identity_.device, "command", failure_.empty() ? "the supply is being closed" : failure_,
                          "open it again");
   for (Order& order : orders_) order.answer.set_value({Answer::Kind::failed, gone.what()});
   orders_.clear();

@@ -1,9 +1,8 @@
-// A supply with a thread of its own: looks at it a few times per second and hands the readings out. However slow the
-// wire, nobody waits for it who has not asked it for something.
+// A supply with a thread of its own, which reads it a few times per second. Only callers of apply() and switch_on()
+// wait for the wire.
 //
-// Safety. The output is switched off, whoever had switched it on: when asked, from any thread; when the supply fails;
-// when the thread ends for whatever reason; and when the object dies. If that could not be confirmed, failure() says
-// so.
+// Safety. The output is switched off: when asked, from any thread; when the supply fails; when the thread ends for
+// whatever reason; and when the object is destroyed. If that could not be confirmed, failure() says so.
 #pragma once
 
 #include <boost/lockfree/spsc_queue.hpp>
@@ -25,7 +24,7 @@ namespace kphi::supply {
 
 class Worker {
  public:
-  /// Looks per second of bench time; 2 to 5 is what real supplies bear.
+  /// Readings per second of bench time; real supplies tolerate 2 to 5.
   static constexpr double kUsualRate = 4;
 
   /// `clock` outlives the worker. Throws std::invalid_argument for a rate outside 0.1 to 100.
@@ -37,12 +36,12 @@ class Worker {
 
   /// Any thread; wait for the device. Throw what Supply throws, and DeviceError when the worker is not alive.
   Limits apply(const Limits& limits);
-  /// Returns with the output on. Overruled by any switch_off() after its call, with DeviceError.
+  /// Returns with the output on. A switch_off() after this call overrules it, with DeviceError.
   void switch_on();
-  /// Any thread; waits for nothing.
+  /// Any thread; does not wait.
   void switch_off() noexcept;
-  /// Any thread: the same, and waits for the device to report it. False after `wall` or when the supply has failed: the
-  /// output may be on.
+  /// Any thread: as switch_off, then waits for the device to report it. False after `wall` or when the supply has
+  /// failed: the output may be on.
   [[nodiscard]] bool switch_off_and_confirm(Duration wall) noexcept;
 
   /// Oldest readings first; one consumer thread. Holds 4096, 17 minutes at 4 Hz; further ones are dropped and counted.
@@ -51,15 +50,15 @@ class Worker {
   [[nodiscard]] std::optional<Reading> newest() const;
   [[nodiscard]] Counters counters() const;
   [[nodiscard]] std::uint64_t dropped_readings() const;
-  /// Known since the construction.
+  /// Read at construction.
   [[nodiscard]] const Identity& identity() const noexcept { return identity_; }
-  /// False once the supply has failed; it stays false.
+  /// False once the supply has failed; stays false.
   [[nodiscard]] bool alive() const;
   /// Why it is not alive, and whether the output may still be on.
   [[nodiscard]] std::string failure() const;
 
  private:
-  /// Words instead of an exception: those stay on the thread that has thrown them.
+  /// Text instead of an exception, which cannot leave its thread.
   struct Answer {
     enum class Kind : std::uint8_t { done, unfit, failed };
     Kind kind = Kind::done;
@@ -76,8 +75,8 @@ class Worker {
   // The thread.
   void run() noexcept;
   [[nodiscard]] static Answer answer_to(const std::function<void()>& act);
-  [[nodiscard]] bool obey();
-  void obey_off();
+  [[nodiscard]] bool serve();
+  void apply_off();
   [[nodiscard]] std::string turn_off() noexcept;
   void look();
   void finish(std::string why) noexcept;
@@ -87,11 +86,11 @@ class Worker {
   const Duration period_;  ///< bench time
   const Identity identity_;
 
-  // Only the thread touches these.
+  // Only the thread uses these.
   std::optional<PoweredOutput> output_;
   Instant next_look_{0};
 
-  // Callers of any thread and the worker's own meet here; held for some copies only, never during traffic.
+  // Shared by callers and the thread; locked only while copying, never during traffic.
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Order> orders_;

@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 #include <libusb.h>
-#include <pthread.h>
-#include <signal.h>
 
 #include <array>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
+#include "base/thread.hpp"
 #include "drivers/usb/device.hpp"
 
 namespace kphi::usb {
@@ -83,23 +82,13 @@ class Snapshot {
 
 }  // namespace
 
-Bus::Bus(PlugListener listener) : listener_(std::move(listener)) {
+Bus::Bus() {
   if (const int error = libusb_init(&context_); error != 0)
-    throw DeviceError("USB", "start", libusb_error_name(error), "is /dev/bus/usb mounted?");
-  if (listener_ && libusb_has_capability(LIBUSB_CAP_HAS_HOTPLUG) != 0) {
-    const int events = LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED | LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT;
-    const auto callback = [](libusb_context* c, libusb_device* d, libusb_hotplug_event event, void* bus) {
-      return on_plug(c, d, event, bus);
-    };
-    plug_registered_ =
-        libusb_hotplug_register_callback(context_, events, 0, LIBUSB_HOTPLUG_MATCH_ANY, LIBUSB_HOTPLUG_MATCH_ANY,
-                                         LIBUSB_HOTPLUG_MATCH_ANY, callback, this, &plug_handle_) == 0;
-  }
-  thread_ = std::thread([this] { handle_events(); });
+    throw DeviceError("USB", "start", libusb_error_name(error), "check that /dev/bus/usb is mounted");
+  thread_ = start_thread([this] { handle_events(); });
 }
 
 Bus::~Bus() {
-  if (plug_registered_) libusb_hotplug_deregister_callback(context_, plug_handle_);
   stopping_ = true;
   libusb_interrupt_event_handler(context_);
   thread_.join();
@@ -112,7 +101,7 @@ std::vector<Listing> Bus::list() const {
   return listings;
 }
 
-std::unique_ptr<Transport> Bus::open(const Address& address) const {
+std::unique_ptr<Transport> Bus::open(const UsbAddress& address) const {
   const std::string device_name = "USB device " + address.text();
   const Snapshot snapshot(context_);
   libusb_device* chosen = nullptr;
@@ -121,19 +110,19 @@ std::unique_ptr<Transport> Bus::open(const Address& address) const {
   int count = 0;
   for (libusb_device* device : snapshot) {
     Listing found = listing_without_serial(device);
-    if (found.vendor != address.vendor || found.product != address.product) continue;
+    if (!UsbAddress{address.vendor, address.product, "", ""}.fits(found.vendor, found.product, "")) continue;
     found = listing_of(device);
-    if (!found.readable && address.serial != found.serial)
+    if (!found.readable && address.vendor && address.product && address.serial != found.serial)
       throw DeviceError(device_name, "open", "this user may not open " + to_string(found), kRule);
     if (!fits(address, found)) continue;
     candidates += (count++ == 0 ? "" : "; ") + to_string(found);
     chosen = device;
     listing = found;
   }
-  if (count == 0) throw DeviceError(device_name, "open", "it is not plugged in", "see what `kphi devices` lists");
+  if (count == 0) throw DeviceError(device_name, "open", "not plugged in", "see the list of `kphi devices`");
   if (count > 1) {
     throw DeviceError(device_name, "open", "several fit: " + candidates,
-                      "name one by its serial number (:SERIAL) or by its socket (@PORT)");
+                      "add the serial number (:SERIAL) or the socket (@PORT)");
   }
   libusb_device_handle* handle = nullptr;
   if (const int error = libusb_open(chosen, &handle); error != 0)
@@ -141,20 +130,7 @@ std::unique_ptr<Transport> Bus::open(const Address& address) const {
   return std::make_unique<Device>(handle, listing);
 }
 
-int Bus::on_plug(libusb_context*, libusb_device* device, int event, void* bus) noexcept {
-  const auto& self = *static_cast<const Bus*>(bus);
-  try {
-    self.listener_(listing_without_serial(device), event == LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED);
-  } catch (...) {
-    // A listener that throws has heard nothing; libusb must not see it.
-  }
-  return 0;
-}
-
 void Bus::handle_events() noexcept {
-  sigset_t all;
-  sigfillset(&all);
-  pthread_sigmask(SIG_BLOCK, &all, nullptr);
   while (!stopping_) {
     timeval patience{1, 0};
     libusb_handle_events_timeout_completed(context_, &patience, nullptr);

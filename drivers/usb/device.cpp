@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 
 namespace kphi::usb {
 namespace {
@@ -22,7 +22,7 @@ EndpointKind kind_of(std::uint8_t attributes) noexcept {
   }
 }
 
-/// Those of the active configuration, in their first setting.
+/// The interfaces of the active configuration, in their first setting.
 std::vector<Interface> interfaces_of(libusb_device* device) {
   std::vector<Interface> interfaces;
   libusb_config_descriptor* configuration = nullptr;
@@ -97,7 +97,7 @@ Device::~Device() {
 
 void Device::claim(std::uint8_t interface_number) {
   if (const int error = libusb_claim_interface(handle_, interface_number); error != 0) {
-    throw DeviceError(name_, "take its interface",
+    throw DeviceError(name_, "claim its interface",
                       error == LIBUSB_ERROR_BUSY ? "another program uses it" : libusb_error_name(error),
                       "close the other program, or plug the device in again");
   }

@@ -4,7 +4,6 @@
 #include <condition_variable>
 #include <mutex>
 
-#include "drivers/usb/address.hpp"
 #include "drivers/usb/transport.hpp"
 
 struct libusb_device_handle;
@@ -16,7 +15,7 @@ class Device final : public Transport {
  public:
   /// Takes over an open handle, reads the descriptors.
   Device(libusb_device_handle* handle, const Listing& listing);
-  /// Gives the interfaces back, to the kernel's driver too.
+  /// Releases the interfaces, to the kernel's driver too.
   ~Device() override;
 
   const std::string& name() const noexcept override { return name_; }

@@ -1,5 +1,7 @@
 #include "drivers/usb/transport.hpp"
 
+#include <fmt/format.h>
+
 namespace kphi::usb {
 
 const char* name_of(Outcome outcome) noexcept {
@@ -18,6 +20,16 @@ const char* name_of(Outcome outcome) noexcept {
       break;
   }
   return "the transfer failed";
+}
+
+bool fits(const UsbAddress& wanted, const Listing& found) noexcept {
+  return wanted.fits(found.vendor, found.product, found.serial) &&
+         (wanted.port_path.empty() || wanted.port_path == found.port_path);
+}
+
+std::string to_string(const Listing& l) {
+  return fmt::format("{:04x}:{:04x}{}{}, port {}{}", l.vendor, l.product, l.serial.empty() ? "" : ", serial ", l.serial,
+                     l.port_path, l.readable ? "" : " (not readable by this user)");
 }
 
 }  // namespace kphi::usb

@@ -1,5 +1,5 @@
-// What a USB device's driver needs of the bus, whoever carries it: libusb, or a test. Calls block until done or until
-// their time is up, and belong to one thread at a time; cancel() may come from any.
+// A USB device as listed, and an opened one, through libusb or in a test. Calls block until done or timed out and
+// belong to one thread at a time; cancel() may come from any thread.
 #pragma once
 
 #include <chrono>
@@ -8,6 +8,8 @@
 #include <span>
 #include <string>
 #include <vector>
+
+#include "base/uri.hpp"
 
 namespace kphi::usb {
 
@@ -25,7 +27,7 @@ enum class Outcome : std::uint8_t {
 
 struct Transfer {
   Outcome outcome = Outcome::done;
-  std::size_t bytes = 0;  ///< moved, also when it ended early
+  std::size_t bytes = 0;  ///< transferred, also when it ended early
 };
 
 enum class EndpointKind : std::uint8_t { bulk, interrupt, other };
@@ -51,6 +53,20 @@ struct Setup {
   std::uint16_t index = 0;        ///< wIndex
 };
 
+/// One device as it is on the bus.
+struct Listing {
+  std::uint16_t vendor = 0, product = 0;
+  std::string serial;       ///< empty: it has none, or this user has no access to it
+  std::string port_path;    ///< "1-1.4"
+  bool readable = true;     ///< false: this user may not open it
+  bool instrument = false;  ///< has an interface of the Test and Measurement Class
+  friend bool operator==(const Listing&, const Listing&) = default;
+};
+
+[[nodiscard]] bool fits(const UsbAddress& wanted, const Listing& found) noexcept;
+/// "04d8:00dd, serial 0001AB, port 1-1.4".
+[[nodiscard]] std::string to_string(const Listing& listing);
+
 class Transport {
  public:
   using Timeout = std::chrono::milliseconds;
@@ -65,7 +81,7 @@ class Transport {
   [[nodiscard]] virtual std::uint16_t vendor() const noexcept = 0;
   [[nodiscard]] virtual std::uint16_t product() const noexcept = 0;
   [[nodiscard]] virtual const std::vector<Interface>& interfaces() const noexcept = 0;
-  /// Takes the interface for this process alone, from the kernel's driver too, until the transport dies. Throws
+  /// Claims the interface exclusively, from the kernel's driver too, until the transport is destroyed. Throws
   /// DeviceError.
   virtual void claim(std::uint8_t interface_number) = 0;
 

@@ -1,8 +1,339 @@
+// One function per target. A target without φ gets the one coefficient that flies at options.phi_deg.
 #include "fit/export/targets.hpp"
 
+#include <fmt/format.h>
+
 #include <array>
+#include <cctype>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "base/error.hpp"
+#include "base/number.hpp"
+#include "fit/export/mcap_writer.hpp"
+#include "fit/report/html.hpp"
 
 namespace kphi::fit {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// K_T k_i(φ), as it flies (ScalingLaw::clamped), N/(rad/s)². Throws ConfigurationError for a φ beyond the file's.
+double coefficient_at(const compensation::Coefficients& file, double phi_deg) {
+  if (!(phi_deg >= 0) || phi_deg > to_degrees(file.curve.largest_fitted()) + 1e-9) {
+    throw ConfigurationError(fmt::format("{}: --phi-deg {} lies outside the occlusions that were measured, 0 to {:g}",
+                                         file.path, phi_deg, to_degrees(file.curve.largest_fitted())));
+  }
+  return file.curve.thrust_coefficient().value() * file.curve.scaling_factor(from_degrees(phi_deg));
+}
+
+/// rad/s at full output: as asked, else the file's. Throws ConfigurationError when neither is known.
+double speed_max_of(const compensation::Coefficients& file, const ExportOptions& options) {
+  if (options.speed_max_rpm) return from_rpm(*options.speed_max_rpm).value();
+  if (file.fastest_speed) return file.fastest_speed->value();
+  throw ConfigurationError(file.path + ": holds no range of speeds; give the speed at full output, --speed-max-rpm");
+}
+
+/// Control characters become blanks.
+std::string one_line(const std::string& text) {
+  std::string result = text;
+  for (char& c : result)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+  return result;
+}
+
+/// "5x3, Cyclone T5040C; 1.23e-06 N/(rad/s)^2 at phi = 0 deg; measured …, fitted by kphi …; 15 runs", one line each.
+std::vector<std::string> provenance_lines(const compensation::Coefficients& file) {
+  const auto known = [](const std::string& text) { return text.empty() ? std::string("unknown") : one_line(text); };
+  std::vector<std::string> lines;
+  lines.push_back(fmt::format("propeller {}, {}", known(file.propeller.id), known(file.propeller.name)));
+  lines.push_back(fmt::format(
+      "K_T {} N/(rad/s)^2, standard error {}", yaml_number(file.curve.thrust_coefficient().value()),
+      file.thrust_coefficient_error ? yaml_number(file.thrust_coefficient_error->value()) : "unknown"));
+  lines.push_back(fmt::format("phi is meant as the {} of the overlap", compensation::name_of(file.curve.overlap())));
+  lines.push_back(fmt::format("measured {}, campaign {}, {} runs, fitted by kphi {}", known(file.measured_utc),
+                              known(file.provenance.campaign), file.provenance.runs.size(), known(file.tool_version)));
+  lines.push_back(file.air_density_kg_m3
+                      ? fmt::format("in air of {:.4g} kg/m3; k scales with density", *file.air_density_kg_m3)
+                      : std::string("air density unknown; k holds for the air of that day"));
+  return lines;
+}
+
+/// Those lines, each behind `mark`.
+std::string comment(const compensation::Coefficients& file, const std::string& mark) {
+  std::string text;
+  for (const std::string& line : provenance_lines(file)) text += mark + line + "\n";
+  return text;
+}
+
+/// A double-quoted scalar that YAML and JSON read alike.
+std::string json_text(const std::string& text) {
+  return Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+/// The reason why a target with one constant loses the line.
+std::string no_phi(const char* target, double phi_deg) {
+  return fmt::format(
+      "k(phi): {} has one constant per motor and cannot change it in flight; this is phi = {:g} deg, for the others "
+      "fly "
+      "the compensation library",
+      target, phi_deg);
+}
+
+/// Two hyphens end an XML comment.
+std::string xml_comment_safe(std::string text) {
+  for (std::size_t at = text.find("--"); at != std::string::npos; at = text.find("--", at)) text[at + 1] = ' ';
+  if (!text.empty() && text.back() == '-') text += ' ';
+  return html_escaped(text);
+}
+
+class Parameters {
+ public:
+  void add(const std::string& key, const std::string& value) { text_ += "      " + key + ": " + value + "\n"; }
+  void number(const std::string& key, std::optional<double> value) {
+    if (value) add(key, yaml_number(*value));
+    if (!value) unknown_ += (unknown_.empty() ? "" : ", ") + key;
+  }
+  void list(const std::string& key, const std::vector<double>& values) {
+    std::string joined;
+    for (const double value : values) joined += (joined.empty() ? "" : ", ") + yaml_number(value);
+    add(key, "[" + joined + "]");
+  }
+  [[nodiscard]] const std::string& text() const { return text_; }
+  [[nodiscard]] const std::string& unknown() const { return unknown_; }
+
+ private:
+  std::string text_, unknown_;
+};
+
+template <class Unit>
+std::optional<double> value_of(const std::optional<Quantity<Unit>>& quantity) {
+  return quantity ? std::optional(quantity->value()) : std::nullopt;
+}
+
+void add_table(const compensation::Coefficients& file, Parameters& parameters) {
+  std::vector<double> angles, coefficients, errors;
+  for (const auto& row : file.table) {
+    angles.push_back(to_degrees(row.occlusion));
+    coefficients.push_back(row.k.value());
+    if (row.standard_error) errors.push_back(row.standard_error->value());
+  }
+  if (angles.empty()) return;
+  parameters.list("phi_deg", angles);
+  parameters.list("k_n_s2_per_rad2", coefficients);
+  if (errors.size() == angles.size()) parameters.list("k_standard_error_n_s2_per_rad2", errors);
+}
+
+std::string identifier(const std::string& id) {
+  std::string name = "kphi_";
+  for (const char c : id) name += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
+  return name;
+}
+
+/// A backslash at the end of a comment's line would take in the next.
+std::string cpp_comment_safe(std::string text) {
+  for (char& c : text)
+    if (c == '\\') c = '/';
+  return text;
+}
+
+constexpr const char* kHeaderFunctions = R"(
+/// k on the line, N/(rad/s)^2; phi in rad. Beyond kLargestPhi it is an extrapolation and may be negative.
+constexpr double coefficient_at(double phi) { return kIntercept + kSlope * phi; }
+
+/// k_i in [0.1, 1]: 1 without occlusion (and for a NaN), never a slower propeller, never a diverging one.
+constexpr double scaling_factor(double phi) {
+  return !(phi > 0) ? 1.0
+         : !(coefficient_at(phi) < kThrustCoefficient) ? 1.0
+         : coefficient_at(phi) < 0.1 * kThrustCoefficient ? 0.1
+                                                          : coefficient_at(phi) / kThrustCoefficient;
+}
+
+/// The square of the speed [rad^2/s^2] that gives `thrust` [N] with occlusion `phi` [rad]: equation 4, squared.
+constexpr double squared_speed(double thrust, double phi) {
+  return thrust / (kThrustCoefficient * scaling_factor(phi));
+}
+)";
+
+std::string error_at(const compensation::ThrustCurve& curve, Radians phi) {
+  const double error = curve.standard_error_at(phi);
+  return std::isfinite(error) ? shortest(error) : "";
+}
+
+constexpr const char* kCoefficientSchema =
+    R"({"type":"object","properties":{"phi_deg":{"type":"number"},"k":{"type":"number"},"standard_error":{"type":"number"},)"
+    R"("line_k":{"type":"number"},"scaling_factor":{"type":"number"}}})";
+
+std::map<std::string, std::string> provenance(const compensation::Coefficients& file) {
+  std::map<std::string, std::string> values{{"propeller", file.propeller.id},
+                                            {"k_unit", "N/(rad/s)^2"},
+                                            {"K_T", Json(file.curve.thrust_coefficient().value()).dump()},
+                                            {"intercept", Json(file.curve.line().intercept.value()).dump()},
+                                            {"slope_per_rad", Json(file.curve.line().slope_per_rad).dump()},
+                                            {"measured_utc", file.measured_utc},
+                                            {"tool_version", file.tool_version}};
+  for (const auto& run : file.provenance.runs) values["sha256 " + run.file] = run.sha256;
+  return values;
+}
+
+}  // namespace
+
+/// T = c2 ω² + c1 ω + c0, ω in rad/s: `thrust_map: [c2, c1, c0]` of a quadrotor file.
+Export to_agilicious(const compensation::Coefficients& file, const ExportOptions& options) {
+  Export result;
+  result.text = comment(file, "# ") +
+                fmt::format("# phi = {:g} deg; c2 N/(rad/s)^2, c1 N/(rad/s), c0 N\nthrust_map: [{}, 0.0, 0.0]\n",
+                            options.phi_deg, yaml_number(coefficient_at(file, options.phi_deg)));
+  if (options.speed_max_rpm || file.fastest_speed)
+    result.text += fmt::format("motor_omega_max: {}  # rad/s\n", yaml_number(speed_max_of(file, options)));
+  if (file.slowest_speed)
+    result.text +=
+        fmt::format("motor_omega_min: {}  # rad/s, the slowest measured\n", yaml_number(file.slowest_speed->value()));
+  result.lost = {no_phi("thrust_map", options.phi_deg),
+                 "standard errors, covariance, air density: the file has no keys for them; they stand in comments"};
+  return result;
+}
+
+/// Parameters as QGroundControl loads them. Control allocation takes thrust = CT u², u the normalised output, so that
+/// CT = k ω_max² in N where the output is proportional to speed (a speed-controlled motor); THR_MDL_FAC = 1 says so.
+Export to_px4(const compensation::Coefficients& file, const ExportOptions& options) {
+  constexpr double kLargestCt = 100;  // module.yaml of control_allocator
+  constexpr int kReal32 = 9;          // MAV_PARAM_TYPE_REAL32
+  const double speed_max = speed_max_of(file, options);
+  const double ct = coefficient_at(file, options.phi_deg) * speed_max * speed_max;
+  if (!(ct <= kLargestCt)) {
+    throw ConfigurationError(
+        fmt::format("{}: {:.1f} N at full output is above 100, the largest CA_ROTORn_CT; no file", file.path, ct));
+  }
+  Export result;
+  result.text = comment(file, "# ") +
+                fmt::format(
+                    "# phi = {:g} deg; CT in N at {:.0f} RPM, thrust = CT u^2 with u proportional to speed\n"
+                    "# Vehicle-Id Component-Id Name Value Type\n",
+                    options.phi_deg, to_rpm(RadPerSec(speed_max)));
+  for (int motor = 0; motor < options.motors; ++motor)
+    result.text += fmt::format("1\t1\tCA_ROTOR{}_CT\t{}\t{}\n", motor, shortest(ct), kReal32);
+  result.text += fmt::format("1\t1\tTHR_MDL_FAC\t1.0\t{}\n", kReal32);
+  result.lost = {no_phi("CA_ROTORn_CT", options.phi_deg),
+                 "rad/s: PX4 knows a normalised output only; CT holds for the speed at full output named above",
+                 "standard errors: parameters have none"};
+  return result;
+}
+
+/// SDF for gz-sim's MulticopterMotorModel: motorConstant in N/(rad/s)², maxRotVelocity in rad/s. RotorS' motorConstant
+/// is the same number.
+Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& options) {
+  const double k = coefficient_at(file, options.phi_deg);
+  Export result;
+  result.text = "<?xml version=\"1.0\"?>\n<sdf version=\"1.9\">\n";
+  for (const std::string& line : provenance_lines(file)) result.text += "  <!-- " + xml_comment_safe(line) + " -->\n";
+  result.text += fmt::format("  <!-- phi = {:g} deg; motorConstant in N/(rad/s)^2, maxRotVelocity in rad/s -->\n",
+                             options.phi_deg);
+  result.text += fmt::format("  <model name=\"{}\">\n", html_escaped(one_line(file.propeller.id)));
+  for (int motor = 0; motor < options.motors; ++motor) {
+    result.text += fmt::format(
+        "    <plugin filename=\"gz-sim-multicopter-motor-model-system\" "
+        "name=\"gz::sim::systems::MulticopterMotorModel\">\n"
+        "      <jointName>rotor_{0}_joint</jointName>\n      <linkName>rotor_{0}</linkName>\n"
+        "      <motorNumber>{0}</motorNumber>\n      <motorType>velocity</motorType>\n"
+        "      <motorConstant>{1}</motorConstant>\n      <maxRotVelocity>{2}</maxRotVelocity>\n    </plugin>\n",
+        motor, shortest(k), shortest(speed_max_of(file, options)));
+  }
+  result.text += "  </model>\n</sdf>\n";
+  result.lost = {
+      no_phi("MulticopterMotorModel", options.phi_deg),
+      "torque and time constants: the coefficient file does not hold them; momentConstant, timeConstantUp and "
+      "timeConstantDown stay at the plugin's defaults",
+      "names of joints and links, turning directions: rotor_N and the defaults stand in; make them the model's"};
+  return result;
+}
+
+/// A parameter file for any node. Arrays are of one type, and a double must look like one (45.0, not 45).
+Export to_ros2(const compensation::Coefficients& file, const ExportOptions&) {
+  Parameters parameters;
+  parameters.add("propeller", json_text(file.propeller.id));
+  parameters.add("overlap", fmt::format("\"{}\"", compensation::name_of(file.curve.overlap())));
+  parameters.number("thrust_coefficient_n_s2_per_rad2", file.curve.thrust_coefficient().value());
+  parameters.number("thrust_coefficient_standard_error_n_s2_per_rad2", value_of(file.thrust_coefficient_error));
+  parameters.number("line_intercept_n_s2_per_rad2", file.curve.line().intercept.value());
+  parameters.number("line_slope_n_s2_per_rad3", file.curve.line().slope_per_rad);
+  if (const auto& u = file.curve.uncertainty())
+    parameters.list("line_covariance", {u->intercept_variance, u->covariance, u->covariance, u->slope_variance});
+  parameters.number("phi_max_rad", file.curve.largest_fitted().value());
+  parameters.number("speed_min_rad_s", value_of(file.slowest_speed));
+  parameters.number("speed_max_rad_s", value_of(file.fastest_speed));
+  parameters.number("air_density_kg_m3", file.air_density_kg_m3);
+  add_table(file, parameters);
+  Export result;
+  result.text = comment(file, "# ") + "/**:\n  ros__parameters:\n    kphi:\n" + parameters.text();
+  result.lost = {"hashes of the runs: parameters are for the flight; they stay in the coefficient file",
+                 "the covariance's shape: parameters have no matrices; row by row of (intercept, slope per rad)"};
+  if (!parameters.unknown().empty())
+    result.lost.push_back("what is not known: parameters have no null; left out: " + parameters.unknown());
+  return result;
+}
+
+/// A constexpr header for flight controllers without YAML: C++14, includes nothing, the law of ScalingLaw::clamped.
+Export to_header(const compensation::Coefficients& file, const ExportOptions&) {
+  Export result;
+  for (const std::string& line : provenance_lines(file)) result.text += "// " + cpp_comment_safe(line) + "\n";
+  result.text += fmt::format("#pragma once\n\nnamespace {} {{\n\n", identifier(file.propeller.id));
+  const auto constant = [&](const char* name, double value, const char* what) {
+    result.text += fmt::format("constexpr double {} = {};  ///< {}\n", name, yaml_number(value), what);
+  };
+  constant("kThrustCoefficient", file.curve.thrust_coefficient().value(), "K_T, N/(rad/s)^2");
+  if (file.thrust_coefficient_error)
+    constant("kThrustCoefficientError", file.thrust_coefficient_error->value(), "its standard error");
+  constant("kIntercept", file.curve.line().intercept.value(), "of the line, N/(rad/s)^2");
+  constant("kSlope", file.curve.line().slope_per_rad, "of the line, N/(rad/s)^2 per rad");
+  constant("kLargestPhi", file.curve.largest_fitted().value(), "rad, the largest occlusion measured");
+  if (file.fastest_speed) constant("kFastestSpeed", file.fastest_speed->value(), "rad/s, the fastest measured");
+  result.text += kHeaderFunctions;
+  result.text += fmt::format("\n}}  // namespace {}\n", identifier(file.propeller.id));
+  result.lost = {
+      "the table per occlusion, covariance, hashes of the runs: the header is for the flight, the line is all "
+      "it needs"};
+  return result;
+}
+
+/// The table per occlusion with the line beside it. phi_deg,k,u_k come first: `kphi fit` takes them again.
+Export to_csv(const compensation::Coefficients& file, const ExportOptions&) {
+  const compensation::ThrustCurve& curve = file.curve;
+  Export result;
+  result.text = "phi_deg,k,u_k,line_k,u_line_k,scaling_factor\n";
+  for (const auto& row : file.table) {
+    result.text += fmt::format(
+        "{},{},{},{},{},{}\n", shortest(std::round(to_degrees(row.occlusion) * 1e9) / 1e9), shortest(row.k.value()),
+        shortest(row.standard_error.value_or(ThrustCoefficient()).value()), shortest(curve.at(row.occlusion).value()),
+        error_at(curve, row.occlusion), shortest(curve.scaling_factor(row.occlusion)));
+  }
+  result.lost = {
+      "units: k, u_k and line_k are in N/(rad/s)^2, a header line has no place to say so",
+      "slope, covariance, validity, hashes of the runs: a table has rows only; they stay in the coefficient file"};
+  return result;
+}
+
+/// One message per occlusion, a second apart: Foxglove and PlotJuggler know no other axis than time.
+Export to_mcap(const compensation::Coefficients& file, const ExportOptions&) {
+  std::ostringstream bytes;
+  McapWriter writer(bytes, "kphi " + file.tool_version);
+  const auto channel =
+      writer.add_channel("/kphi/coefficient", "kphi.Coefficient", kCoefficientSchema, {{"k_unit", "N/(rad/s)^2"}});
+  std::uint64_t time_ns = 0;
+  for (const auto& row : file.table) {
+    Json message{{"phi_deg", to_degrees(row.occlusion)}, {"k", row.k.value()}};
+    if (row.standard_error) message["standard_error"] = row.standard_error->value();
+    message["line_k"] = file.curve.at(row.occlusion).value();
+    message["scaling_factor"] = file.curve.scaling_factor(row.occlusion);
+    writer.write(channel, time_ns, message.dump());
+    time_ns += 1'000'000'000;
+  }
+  writer.add_metadata("kphi-coefficients", provenance(file));
+  writer.close();
+  return {std::move(bytes).str(),
+          {"phi as an axis: the format knows time only; the occlusions follow one another a second apart"}};
+}
 
 std::span<const Target> targets() {
   static constexpr std::array<Target, 7> kTargets{{

@@ -6,7 +6,7 @@
 #include <thread>
 #include <unordered_map>
 
-#include "drivers/netbox/load_cell.hpp"
+#include "drivers/netbox/receive/load_cell.hpp"
 #include "drivers/sim/server.hpp"
 #include "test/bench/figures.hpp"
 #include "test/drivers/netbox/busy_loops.hpp"
@@ -78,7 +78,7 @@ void over_real_sockets(Command mode, int busy_loops) {
   settings.control = folder / "control";
   settings.bench.netbox.rate_hz = 7000;
   settings.bench.netbox.records_per_datagram = 40;
-  settings.bench.keep = sim::FaultyWire::Keep::samples;
+  settings.bench.keep = sim::FaultInjector::Keep::samples;
   sim::Fault skew;
   skew.kind = sim::FaultKind::clock_skew;
   skew.lasts = kNever;

@@ -19,8 +19,8 @@ using namespace kphi::compensation;
 
 constexpr int kCalls = 4000, kPairs = 101;
 
-/// Keeps the compiler from leaving out what reads or fills `place`.
-void use(const void* place) { asm volatile("" : : "r"(place) : "memory"); }
+/// Keeps the compiler from leaving out what reads or fills `config`.
+void use(const void* config) { asm volatile("" : : "r"(config) : "memory"); }
 
 double cpu_seconds() {
   timespec now{};
@@ -71,7 +71,7 @@ double shared(double from, double to, double other_from, double other_to) {
 }
 
 /// The closed form of the rim arc and what follows from it, for every arm at every call, without a shortcut.
-[[gnu::noinline]] Update straightforward(const Airframe& frame, const ThrustLine& line,
+[[gnu::noinline]] Update straightforward(const Airframe& frame, const ThrustCurve& line,
                                          const std::array<Radians, 4>& arms) {
   Update update{};
   const double a = frame.half_side.value(), arm = frame.arm_length.value(), r = frame.propeller_radius.value();
@@ -82,7 +82,7 @@ double shared(double from, double to, double other_from, double other_to) {
     const double b1 = std::asin(held((-a - y) / r)), b2 = std::asin(held((a - y) / r));
     update.phi[i] = shared(a1, a2, b1, b2) + shared(-a2, -a1, b1, b2) + shared(a1, a2, kPi - b2, kPi - b1) +
                     shared(2 * kPi - a2, 2 * kPi - a1, kPi - b2, kPi - b1);
-    const double k = line.intercept().value() + line.slope_per_rad() * update.phi[i];
+    const double k = line.line().intercept.value() + line.line().slope_per_rad * update.phi[i];
     update.factor[i] =
         update.phi[i] > 0 ? std::min(std::max(k / line.thrust_coefficient().value(), kScalingFloor), 1.0) : 1.0;
     const double fastest = frame.fastest_speed.value();
@@ -102,7 +102,7 @@ void compare_set_arms(const char* what, const std::array<Radians, 4>& arms, doub
   const std::array<std::array<Radians, 4>, 2> both = {arms, moved(arms, move_deg)};
   Compensator compensator = example_compensator();
   const Airframe frame = example_airframe();
-  const ThrustLine line = paper_line();
+  const ThrustCurve line = paper_line();
   compare(
       what,
       [&](int i) {

@@ -20,8 +20,8 @@ using namespace kphi::compensation;
 constexpr std::size_t kInputs = 2000, kRounds = 301;
 constexpr int kBatch = 32;
 
-/// Keeps the compiler from leaving out what reads or fills `place`.
-void use(const void* place) { asm volatile("" : : "r"(place) : "memory"); }
+/// Keeps the compiler from leaving out what reads or fills `config`.
+void use(const void* config) { asm volatile("" : : "r"(config) : "memory"); }
 
 void tell(const char* what, const Latencies& l) {
   std::printf(

@@ -12,8 +12,8 @@
 #include <filesystem>
 #include <string>
 
-#include "fit/bootstrap.hpp"
-#include "fit/identification.hpp"
+#include "fit/model/identification.hpp"
+#include "fit/uncertainty/bootstrap.hpp"
 #include "results/steps_csv.hpp"
 #include "test/bench/figures.hpp"
 #include "test/fit/campaign_steps.hpp"

@@ -6,9 +6,9 @@
 #include <atomic>
 #include <thread>
 
-#include "daq/device_records.hpp"
-#include "daq/guard.hpp"
-#include "daq/recorder.hpp"
+#include "daq/bench/device_records.hpp"
+#include "daq/guard/guard.hpp"
+#include "daq/run/recorder.hpp"
 #include "test/bench/figures.hpp"
 #include "test/daq/queue_bench.hpp"
 #include "test/drivers/netbox/receivers.hpp"
@@ -34,12 +34,12 @@ class CellBench final : public daq::Bench, private daq::LoadCellLink {
   [[nodiscard]] daq::MotorLink& motor() override { return motor_; }
   [[nodiscard]] daq::LoadCellLink& load_cell() override { return *this; }
   void wait_until(Instant) override {}
-  [[nodiscard]] std::unique_ptr<daq::Background> keep_calling(std::function<void()>) override { return nullptr; }
+  [[nodiscard]] std::unique_ptr<daq::Background> run_periodically(std::function<void()>) override { return nullptr; }
   [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
   [[nodiscard]] Duration sync_interval() const override { return std::chrono::milliseconds(500); }
   void mounted(const std::string&, double) override {}
-  [[nodiscard]] bool unpower() override { return false; }
-  void repower() override {}
+  [[nodiscard]] bool switch_off_power() override { return false; }
+  void restore_power() override {}
   results::LoadCellScale start() override {
     cell_.start();
     return daq::to_scale(cell_.configuration());
@@ -122,14 +122,14 @@ Shares run(const BoxProcess& box, bool buffered, bool guarded) {
   results::RunWriter writer(folder.path() / "run.h5", header);
   daq::Guard guard(bench, {}, scale, limits());
   daq::BenchStreams plain(bench);
-  daq::Recorder recorder(bench, guarded ? static_cast<daq::Streams&>(guard) : plain, writer, {}, scale);
+  daq::Recorder recorder(bench, guarded ? static_cast<daq::Streams&>(guard) : plain, writer, scale);
   guard.take_zero({});
   Shares shares;
   {
     const Working idling([] {});
     const Working recording([&] { recorder.drain(); });
     std::optional<Working> guarding;
-    if (guarded) guarding.emplace([&] { guard.look(); });
+    if (guarded) guarding.emplace([&] { guard.poll(); });
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     const auto now = [&] {
       return Shares{cpu_seconds(cpu_clock_of(receiver)), guarding ? guarding->cpu_s() : 0, recording.cpu_s(),

@@ -8,7 +8,7 @@
 #include <array>
 #include <thread>
 
-#include "drivers/iq/motor.hpp"
+#include "drivers/iq/link/motor.hpp"
 #include "test/drivers/iq/paced_module.hpp"
 
 namespace kphi::iq {

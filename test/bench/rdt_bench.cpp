@@ -2,7 +2,7 @@
 // the bytes of its nine words one by one. Interleaved; each line the median of many pairs.
 #include <boost/endian/conversion.hpp>
 
-#include "drivers/netbox/session.hpp"
+#include "drivers/netbox/stream/session.hpp"
 #include "test/bench/figures.hpp"
 #include "test/drivers/netbox/receivers.hpp"
 
@@ -14,8 +14,8 @@ using test::Bytes;
 
 constexpr unsigned kRecords = 40'000, kPairs = 31;
 
-/// Keeps the compiler from leaving out what fills `place`.
-void use(const void* place) { asm volatile("" : : "r"(place) : "memory"); }
+/// Keeps the compiler from leaving out what fills `config`.
+void use(const void* config) { asm volatile("" : : "r"(config) : "memory"); }
 
 template <class Work>
 double seconds_of(Work&& work) {

@@ -15,8 +15,8 @@
 #include <sstream>
 #include <vector>
 
-#include "daq/reduction.hpp"
 #include "results/campaign_folder.hpp"
+#include "results/reduction/reduction.hpp"
 #include "results/steps_csv.hpp"
 #include "test/bench/figures.hpp"
 #include "test/results/synthetic_run.hpp"
@@ -54,7 +54,7 @@ std::size_t make_campaign(const CampaignFolder& folder, int runs, std::vector<St
   for (int repetition = 1; repetition <= runs; ++repetition) {
     const results::RunRecording run = paper_run(repetition);
     results::test::write_run(folder.run("5x3", 90, repetition), run);
-    const auto of_run = daq::reduce(run);
+    const auto of_run = results::reduce(run);
     steps.insert(steps.end(), of_run.begin(), of_run.end());
     samples += run.load_cell.size();
   }
@@ -117,11 +117,11 @@ double median(std::vector<double> values) {
 int main(int argc, char** argv) {
   const int runs = argc > 1 && std::atoi(argv[1]) > 0 ? std::atoi(argv[1]) : 15;
   const int pairs = argc > 2 ? std::atoi(argv[2]) : 7;
-  const results::test::TemporaryFolder place;
-  const auto folder = CampaignFolder::create(place.path(), "bench", "replay");
+  const results::test::TemporaryFolder config;
+  const auto folder = CampaignFolder::create(config.path(), "bench", "replay");
   std::vector<StepMean> steps;
   const std::size_t samples = make_campaign(folder, runs, steps);
-  const std::string ours = (place.path() / "ours.csv").string(), theirs = (place.path() / "theirs.csv").string();
+  const std::string ours = (config.path() / "ours.csv").string(), theirs = (config.path() / "theirs.csv").string();
   std::vector<double> wall, cpu;
   Cost a, b;
   for (int i = 0; i < pairs; ++i) {

@@ -3,7 +3,7 @@
 
 The peer of `kphi replay` in replay_bench. Vectorised over samples, and over bins where one formula does for all; what
 depends on the step before (the search for a settled window, the window of the autocorrelation) is a loop over steps.
-Not in it, to its advantage: doubts of events, gates of the motor, electrical means.
+Not in it, to its advantage: flags of events, gates of the motor, electrical means.
 """
 import glob
 import math

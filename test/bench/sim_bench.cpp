@@ -27,7 +27,7 @@ NetBoxSettings settings_of(bool all_on) {
 /// Box and wire alone, in one mode; the datagrams are taken as a server would, every millisecond.
 void tick_of_the_box(benchmark::State& state, bool all_on, std::uint8_t command, FaultScript faults = {}) {
   NetBoxDevice box(settings_of(all_on));
-  FaultyWire wire(box, std::move(faults), 1);
+  FaultInjector wire(box, std::move(faults), 1);
   wire.request(std::array<std::uint8_t, 8>{0x12, 0x34, 0, command, 0, 0, 0, 0}, 7, Instant{0});
   Datagram datagram;
   std::int64_t tick = 0;

@@ -27,7 +27,6 @@ TEST(Airframe, PutsTheHubsOfTheNamedShapesWhereTheyBelong) {
 
 TEST(Airframe, AgreesWithTheKnownHubs) {
   const auto vectors = geometry_vectors();
-  if (vectors.empty()) GTEST_SKIP() << kNoVectors;
   for (const GeometryVector& v : vectors) {
     if (!v.arm) continue;
     Airframe airframe;

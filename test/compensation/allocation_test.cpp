@@ -35,7 +35,7 @@ TEST(FlyingCalls, AllocateNothing) {
   ASSERT_GT(allocations.load(), before_control) << "the count must see an allocation at all";
 
   const long before = allocations.load();
-  const ThrustLine line = paper_line();
+  const ThrustCurve line = paper_line();
   BuildOutcome built = Compensator::build({line, line, line, line}, example_airframe());
   Compensator compensator = *built.compensator;
   double sum = 0;

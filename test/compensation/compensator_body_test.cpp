@@ -68,7 +68,7 @@ TEST(CompensatorBody, KnowsBodiesAndHingesOfAnyConvexShape) {
     EXPECT_NEAR(phi.value(), compensator.occlusion_angles()[0].value(), 1e-12) << "the shape is symmetric";
   }
   airframe.polygon->hinges[2].turn = Radians(kNaN);
-  const ThrustLine line = paper_line();
+  const ThrustCurve line = paper_line();
   EXPECT_EQ(Compensator::build({line, line, line, line}, airframe).refusal, Refusal::hinges);
 }
 

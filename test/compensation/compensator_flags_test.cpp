@@ -16,7 +16,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 TEST(CompensatorFlags, HoldsTheSpeedLimitsAndSaysSo) {
   Airframe airframe = example_airframe();
   airframe.slowest_speed = from_rpm(1000);
-  const ThrustLine line = paper_line();
+  const ThrustCurve line = paper_line();
   const Compensator compensator = *Compensator::build({line, line, line, line}, airframe).compensator;
   const SpeedCommand command = compensator.speeds_for(thrusts_of(0.0, 100.0, 1.5, kInfinity));
   EXPECT_EQ(command.speeds[0], from_rpm(1000));
@@ -64,7 +64,7 @@ TEST(CompensatorFlags, EnablingKeepsTheFlagOfAnUnknownArm) {
 }
 
 TEST(CompensatorFlags, SaysWhenTheOcclusionLiesBeyondTheFit) {
-  const ThrustLine narrow = example_line(1.03, -0.0028889, 60), wide = example_line(1.03, -0.0028889, 65);
+  const ThrustCurve narrow = example_line(1.03, -0.0028889, 60), wide = example_line(1.03, -0.0028889, 65);
   Compensator compensator = *Compensator::build({narrow, wide, narrow, wide}, example_airframe()).compensator;
   compensator.set_arms(shape_o());
   EXPECT_TRUE(compensator.arm_flags()[0].has(Flag::beyond_fit));
@@ -73,7 +73,7 @@ TEST(CompensatorFlags, SaysWhenTheOcclusionLiesBeyondTheFit) {
 }
 
 TEST(CompensatorFlags, SaysWhenTheScalingFactorIsAtItsFloor) {
-  const ThrustLine collapsing = example_line(1.0, -0.02);
+  const ThrustCurve collapsing = example_line(1.0, -0.02);
   Compensator compensator =
       *Compensator::build({collapsing, collapsing, collapsing, collapsing}, example_airframe()).compensator;
   compensator.set_arms(shape_o());
@@ -83,7 +83,7 @@ TEST(CompensatorFlags, SaysWhenTheScalingFactorIsAtItsFloor) {
 }
 
 TEST(CompensatorFlags, PublishedLawBeyondZeroSpinsAtTheFastestSpeedNotAtNaN) {
-  const ThrustLine collapsing = example_line(1.0, -0.02);  // k < 0 beyond 50°
+  const ThrustCurve collapsing = example_line(1.0, -0.02);  // k < 0 beyond 50°
   Compensator compensator =
       *Compensator::build({collapsing, collapsing, collapsing, collapsing}, example_airframe(), ScalingLaw::published)
            .compensator;

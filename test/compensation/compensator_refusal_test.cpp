@@ -13,7 +13,7 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 void expect_refused(const Airframe& airframe, Refusal reason) {
-  const ThrustLine line = paper_line();
+  const ThrustCurve line = paper_line();
   const BuildOutcome outcome = Compensator::build({line, line, line, line}, airframe);
   EXPECT_FALSE(outcome.compensator);
   EXPECT_EQ(outcome.refusal, reason) << describe(outcome.refusal);
@@ -50,7 +50,7 @@ TEST(CompensatorBuild, IsRefusedForAnAirframeThatCannotBe) {
 }
 
 TEST(CompensatorBuild, IsRefusedWhereALineWasFittedWithAnotherMeasure) {
-  const ThrustLine rim = paper_line(), area = paper_line(OverlapMeasure::area_share);
+  const ThrustCurve rim = paper_line(), area = paper_line(OverlapMeasure::area_share);
   Airframe airframe = example_airframe();
   EXPECT_EQ(Compensator::build({rim, rim, area, rim}, airframe).refusal, Refusal::overlap);
   airframe.overlap = OverlapMeasure::area_share;
@@ -59,7 +59,7 @@ TEST(CompensatorBuild, IsRefusedWhereALineWasFittedWithAnotherMeasure) {
 }
 
 TEST(CompensatorBuild, DoubtsALineThatStepsAtContactOrGainsWithOcclusion) {
-  const auto doubts = [](const ThrustLine& line, ScalingLaw law) {
+  const auto doubts = [](const ThrustCurve& line, ScalingLaw law) {
     return Compensator::build({line, line, line, line}, example_airframe(), law).doubts[0];
   };
   EXPECT_FALSE(doubts(paper_line(), ScalingLaw::clamped).steps_at_contact);

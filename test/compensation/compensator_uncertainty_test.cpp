@@ -13,11 +13,12 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST(CompensatorUncertainty, TellsTheUncertaintyOfItsSpeeds) {
-  const ThrustLine rim = paper_line();
+  const ThrustCurve rim = paper_line();
   const double k = kExampleCoefficient.value();
   const LineUncertainty u{0.01 * k, 0.0004 * k * k, 0, 0};
-  const ThrustLine line = *ThrustLine::from(rim.thrust_coefficient(), rim.intercept(), rim.slope_per_rad(),
-                                            rim.largest_fitted(), OverlapMeasure::rim_arc, u);
+  const ThrustCurve line =
+      *ThrustCurve::from_line(rim.thrust_coefficient(), rim.line().intercept, rim.line().slope_per_rad,
+                              rim.largest_fitted(), OverlapMeasure::rim_arc, u);
   Compensator compensator = *Compensator::build({line, line, line, rim}, example_airframe()).compensator;
   const auto thrusts = thrusts_of(1.5, 1.5, 1.5, 1.5);
   compensator.set_arms(arms_at(45, 180, 180, 180));

@@ -11,17 +11,17 @@ namespace kphi::compensation {
 inline const ThrustCoefficient kExampleCoefficient = from_newtons_per_rpm2(1.7e-8);
 
 /// A line given in units of K_T, slope per degree.
-inline ThrustLine example_line(double intercept, double slope_per_deg, double largest_fitted_deg = 270) {
+inline ThrustCurve example_line(double intercept, double slope_per_deg, double largest_fitted_deg = 270) {
   const double slope_per_rad = slope_per_deg * 180 / kPi * kExampleCoefficient.value();
-  return *ThrustLine::from(kExampleCoefficient, kExampleCoefficient * intercept, slope_per_rad,
-                           from_degrees(largest_fitted_deg));
+  return *ThrustCurve::from_line(kExampleCoefficient, kExampleCoefficient * intercept, slope_per_rad,
+                                 from_degrees(largest_fitted_deg));
 }
 
 /// Through (45°, 0.90) and (270°, 0.25); fitted on sector plates, where the measures agree, so flown by any of them.
-inline ThrustLine paper_line(OverlapMeasure measure = OverlapMeasure::rim_arc) {
-  const ThrustLine line = example_line(1.03, -0.0028889);
-  return *ThrustLine::from(line.thrust_coefficient(), line.intercept(), line.slope_per_rad(), line.largest_fitted(),
-                           measure);
+inline ThrustCurve paper_line(OverlapMeasure measure = OverlapMeasure::rim_arc) {
+  const ThrustCurve line = example_line(1.03, -0.0028889);
+  return *ThrustCurve::from_line(line.thrust_coefficient(), line.line().intercept, line.line().slope_per_rad,
+                                 line.largest_fitted(), measure);
 }
 
 inline Airframe example_airframe() {
@@ -50,7 +50,7 @@ inline PolygonBody square_as_polygon(Metres half_side) {
 
 /// Four rotors with the paper's line.
 inline Compensator compensator_of(const Airframe& airframe, ScalingLaw law = ScalingLaw::clamped) {
-  const ThrustLine line = paper_line(airframe.overlap);
+  const ThrustCurve line = paper_line(airframe.overlap);
   return *Compensator::build({line, line, line, line}, airframe, law).compensator;
 }
 inline Compensator example_compensator(ScalingLaw law = ScalingLaw::clamped) {

@@ -1,14 +1,15 @@
-// The known answers of geometry_vectors.csv (folder KPHI_TEST_DATA).
+// The known answers of test/golden/geometry_vectors.csv; test/golden/README.md says what its columns are.
 #pragma once
 
 #include <charconv>
-#include <cstdlib>
 #include <fstream>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "test/source_dir.hpp"
 
 namespace kphi::compensation {
 
@@ -33,10 +34,9 @@ inline double exact_number(const std::string& text) {
   return value;
 }
 
-/// Empty when the data are not at hand.
 inline std::vector<GeometryVector> geometry_vectors() {
-  const char* folder = std::getenv("KPHI_TEST_DATA");
-  std::ifstream file(std::string(folder == nullptr ? "/nonexistent" : folder) + "/geometry_vectors.csv");
+  std::ifstream file(kphi::test::source_dir() + "/test/golden/geometry_vectors.csv");
+  if (!file) throw std::runtime_error("test/golden/geometry_vectors.csv cannot be read");
   std::vector<GeometryVector> vectors;
   std::string line;
   std::getline(file, line);
@@ -62,8 +62,5 @@ inline std::vector<GeometryVector> geometry_vectors() {
   }
   return vectors;
 }
-
-inline constexpr const char* kNoVectors =
-    "geometry_vectors.csv not found: set KPHI_TEST_DATA to the folder that holds it";
 
 }  // namespace kphi::compensation

@@ -15,11 +15,11 @@ namespace kphi::compensation {
 namespace {
 
 kphi_line plain_line() {
-  const ThrustLine line = paper_line();
+  const ThrustCurve line = paper_line();
   kphi_line plain{};
   plain.thrust_coefficient = line.thrust_coefficient().value();
-  plain.intercept = line.intercept().value();
-  plain.slope_per_rad = line.slope_per_rad();
+  plain.intercept = line.line().intercept.value();
+  plain.slope_per_rad = line.line().slope_per_rad;
   plain.largest_fitted_rad = line.largest_fitted().value();
   return plain;
 }

@@ -31,7 +31,7 @@ class Draw {
     return airframe;
   }
   /// Falls with occlusion; the intercept on either side of K_T.
-  ThrustLine line() { return example_line(between(0.8, 1.2), -between(0.0, 0.01)); }
+  ThrustCurve line() { return example_line(between(0.8, 1.2), -between(0.0, 0.01)); }
   std::array<Radians, 4> arms() {
     return {Radians(between(-kPi / 2, kPi)), Radians(between(-kPi / 2, kPi)), Radians(between(-kPi / 2, kPi)),
             Radians(between(-kPi / 2, kPi))};
@@ -149,7 +149,7 @@ TEST(Properties, TheSpeedGrowsWithThrustAndWithOverlapAndReturnsTheThrust) {
   Draw draw(105);
   int occluded = 0;
   for (int i = 0; i < kDraws / 4; ++i) {  // four rotors each
-    const ThrustLine line = draw.line();
+    const ThrustCurve line = draw.line();
     const auto built = Compensator::build({line, line, line, line}, draw.airframe());
     Compensator compensator = *built.compensator;
     compensator.set_arms(draw.arms());
@@ -210,7 +210,7 @@ TEST(Properties, XAndHAndTAndOffAreThePlainMapBitForBit) {
   Draw draw(106);
   const std::array<std::array<Radians, 4>, 4> shapes = {shape_x(), shape_h(), shape_t(), shape_o()};
   for (int i = 0; i < kDraws; ++i) {  // four rotors each: a million speeds per shape
-    const ThrustLine line = draw.line();
+    const ThrustCurve line = draw.line();
     const auto law = i % 2 == 0 ? ScalingLaw::clamped : ScalingLaw::published;
     Compensator compensator = *Compensator::build({line, line, line, line}, example_airframe(), law).compensator;
     const std::size_t shape = static_cast<std::size_t>(i) % 4;

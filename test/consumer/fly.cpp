@@ -7,8 +7,8 @@ namespace flying = kphi::compensation;
 
 int main() {
   const auto k_t = kphi::from_newtons_per_rpm2(1.7e-8);
-  const auto line =
-      flying::ThrustLine::from(k_t, k_t * 1.03, -0.0028889 * k_t.value() * 180 / kphi::kPi, kphi::from_degrees(270));
+  const auto line = flying::ThrustCurve::from_line(k_t, k_t * 1.03, -0.0028889 * k_t.value() * 180 / kphi::kPi,
+                                                   kphi::from_degrees(270));
   if (!line) return 1;
   flying::Airframe airframe;
   airframe.half_side = kphi::Metres(0.045);

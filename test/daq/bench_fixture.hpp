@@ -9,9 +9,9 @@
 #include <iterator>
 #include <string>
 
-#include "daq/operator.hpp"
-#include "daq/run.hpp"
-#include "profiles/bench.hpp"
+#include "daq/campaign/operator.hpp"
+#include "daq/run/run.hpp"
+#include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 #include "test/temporary_folder.hpp"
 
@@ -38,7 +38,7 @@ inline profiles::Campaign short_campaign(const std::string& occlusions = "0, 90"
 }
 
 /// `faults`: path of a fault script; empty: none.
-inline profiles::Bench deterministic_place(int seed, const std::string& faults = {}) {
+inline profiles::BenchConfig deterministic_config(int seed, const std::string& faults = {}) {
   return profiles::parse_bench(
       fmt::format(
           "format: kphi-bench/1\nname: test\n"
@@ -50,13 +50,13 @@ inline profiles::Bench deterministic_place(int seed, const std::string& faults =
 }
 
 /// The campaign's first run, without occlusion, as if somebody had confirmed that; keeps what it is given.
-inline daq::RunOrder first_run(const profiles::Campaign& campaign, const profiles::Bench& place,
+inline daq::RunOrder first_run(const profiles::Campaign& campaign, const profiles::BenchConfig& config,
                                const std::filesystem::path& file) {
-  daq::AgreeingOperator person;
+  daq::AutoConfirmOperator person;
   return {campaign,
-          place,
+          config,
           person.confirm_mounting(campaign.propeller, 0),
-          profiles::make_plan(campaign, place).runs.front(),
+          profiles::make_plan(campaign, config).runs.front(),
           10.0,
           file};
 }

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "daq/deterministic_bench.hpp"
-#include "daq/reduction.hpp"
-#include "daq/run.hpp"
+#include "daq/run/run.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
+#include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
 
@@ -38,27 +38,27 @@ class TrueSpeed final : public Progress {
 };
 
 TEST(ClockGain, GivesTrueSpeedsFromAModuleWhoseClockIsFast) {
-  std::string text = test::deterministic_place(3).text;
+  std::string text = test::deterministic_config(3).text;
   text.replace(text.find("speed_max_rpm: 19300"), 20, "speed_max_rpm: 19300, clock_gain: {factor: 1.005, u: 1e-5}");
-  const profiles::Bench place = profiles::parse_bench(text, "bench.yaml");
+  const profiles::BenchConfig config = profiles::parse_bench(text, "bench.yaml");
   std::string profile = test::short_campaign_text("0", 1, 3);
   profile.replace(profile.find("dwell_s: 0.6"), 12, "dwell_s: 3.0");
   const profiles::Campaign campaign = profiles::parse_campaign(profile, "slow.yaml");
   sim::BenchSettings fast;
   fast.oscillator_gain = 0.005;
-  DeterministicBench bench(place, fast);
+  DeterministicBench bench(config, fast);
   bench.mounted("5x3", 0);
   TrueSpeed truth(bench);
   const test::TemporaryFolder folder;
   const auto file = folder.path() / "run.h5";
-  (void)record_run(bench, test::first_run(campaign, place, file), truth, [] { return false; });
+  (void)record_run(bench, test::first_run(campaign, config, file), truth, [] { return false; });
   const auto steps = reduce(results::read_run(file));
   ASSERT_EQ(steps.size(), 3u);
   for (const auto& step : steps) {
     const double true_mean = truth.mean(step.window_begin_s, step.window_end_s);
     EXPECT_NEAR(step.speed_rad_s, true_mean, 2e-4 * true_mean);
     EXPECT_NEAR(true_mean, 1.005 * step.commanded_speed_rad_s, 1e-3 * true_mean) << "it holds what it reports";
-    EXPECT_EQ(step.doubts, 0u);
+    EXPECT_EQ(step.quality_flags, 0u);
   }
 }
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "daq/deterministic_bench.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
 
 namespace kphi::daq {
 
@@ -72,7 +72,7 @@ class SpoiltMotor final : public MotorLink {
 class CoastingBench final : public Bench {
  public:
   static constexpr double kNothing = 0.1;  ///< A in the winding; a step of a campaign takes 2 to 20
-  explicit CoastingBench(const profiles::Bench& place) : bench(place) {
+  explicit CoastingBench(const profiles::BenchConfig& config) : bench(config) {
     if (bench.supply() != nullptr) spoilt_supply = std::make_unique<SpoiltSupply>(*bench.supply(), bench.clock());
   }
   [[nodiscard]] const Clock& clock() const override { return bench.clock(); }
@@ -81,11 +81,11 @@ class CoastingBench final : public Bench {
   [[nodiscard]] SupplyLink* supply() override { return spoilt_supply.get(); }
   [[nodiscard]] results::FileLayer& files() override { return bench.files(); }
   [[nodiscard]] Duration sync_interval() const override { return bench.sync_interval(); }
-  [[nodiscard]] bool unpower() override { return bench.unpower(); }
-  void repower() override { bench.repower(); }
+  [[nodiscard]] bool switch_off_power() override { return bench.switch_off_power(); }
+  void restore_power() override { bench.restore_power(); }
   void mounted(const std::string& propeller, double occlusion) override { bench.mounted(propeller, occlusion); }
-  [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override {
-    return bench.keep_calling(std::move(work));
+  [[nodiscard]] std::unique_ptr<Background> run_periodically(std::function<void()> work) override {
+    return bench.run_periodically(std::move(work));
   }
   void wait_until(Instant when) override {
     while (clock().now() < when) {

@@ -8,14 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "daq/campaign_run.hpp"
-#include "daq/deterministic_bench.hpp"
-#include "daq/interlock.hpp"
-#include "daq/reduction.hpp"
-#include "drivers/device_error.hpp"
-#include "profiles/configuration_error.hpp"
+#include "base/error.hpp"
+#include "daq/campaign/campaign_run.hpp"
+#include "daq/guard/interlock.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
 #include "results/campaign_verification.hpp"
 #include "results/journal.hpp"
+#include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
 #include "results/sha256.hpp"
 #include "results/steps_csv.hpp"
@@ -37,21 +36,21 @@ class FaultyCampaign : public testing::Test {
   CampaignResult run(const std::string& faults, int seed = 4) {
     const auto script = folder_.path() / "faults.yaml";
     std::ofstream(script) << "format: kphi-faults/1\nfaults:\n" << faults;
-    place_ = test::deterministic_place(seed, script.string());
-    bench_.emplace(place_);
+    config_ = test::deterministic_config(seed, script.string());
+    bench_.emplace(config_);
     prepare(*bench_);
     results_.emplace(results::CampaignFolder::create(folder_.path(), "u", "c"));
-    AgreeingOperator person;
-    return run_campaign(*bench_, campaign_, place_, *results_, person, said_, [] { return false; });
+    AutoConfirmOperator person;
+    return run_campaign(*bench_, campaign_, config_, *results_, person, said_, [] { return false; });
   }
   virtual void prepare(DeterministicBench&) {}
 
   [[nodiscard]] results::RunRecording recording(std::size_t i) const {
     return results::read_run(results_->complete_runs(campaign_.occlusions_deg).at(i));
   }
-  [[nodiscard]] std::vector<std::string> doubts(std::size_t run) const {
+  [[nodiscard]] std::vector<std::string> flags(std::size_t run) const {
     std::vector<std::string> names;
-    for (const auto& step : reduce(recording(run))) names.push_back(results::doubt_names(step.doubts));
+    for (const auto& step : reduce(recording(run))) names.push_back(results::quality_flag_names(step.quality_flags));
     return names;
   }
   [[nodiscard]] std::vector<results::EventKind> events(std::size_t run) const {
@@ -79,7 +78,7 @@ class FaultyCampaign : public testing::Test {
 
   test::TemporaryFolder folder_;
   profiles::Campaign campaign_ = test::short_campaign();
-  profiles::Bench place_;
+  profiles::BenchConfig config_;
   std::optional<DeterministicBench> bench_;
   std::optional<results::CampaignFolder> results_;
   SaidLines said_;

@@ -50,7 +50,7 @@ TEST_F(FaultyMotor, StopsWhenTheModuleFallsSilentOrDeaf) {
 TEST_F(FaultyMotor, StopsWhenTheRotorIsHeldAndTellsSo) {
   for (const int seed : {4, 5, 6, 7, 8}) {
     EXPECT_THAT(stop(fmt::format("  - {{at_s: {}, for_s: 10, kind: motor_locked}}\n", 0.8 + 0.4 * (seed - 4))),
-                HasSubstr("the rotor does not do what it is told"));
+                HasSubstr("speed off target"));
     EXPECT_TRUE(motor_is_let_go());
   }
 }
@@ -64,10 +64,9 @@ TEST_F(FaultyMotor, StopsWhenARotorIsHeldAtASpeedThatTellsNothing) {
 }
 
 TEST_F(FaultyMotor, StopsWhenItsSpeedCannotBeReadOrIsNotBelieved) {
-  EXPECT_THAT(stop("  - {at_s: 1.5, for_s: 10, kind: motor_drop, type: 50, sub: 13}\n"), HasSubstr("was not read"));
+  EXPECT_THAT(stop("  - {at_s: 1.5, for_s: 10, kind: motor_drop, type: 50, sub: 13}\n"), HasSubstr("no speed reading"));
   EXPECT_TRUE(motor_is_let_go());
-  EXPECT_THAT(stop("  - {at_s: 1.2, for_s: 10, kind: motor_stuck, type: 50, sub: 13}\n"),
-              HasSubstr("instead of 10000 RPM"));
+  EXPECT_THAT(stop("  - {at_s: 1.2, for_s: 10, kind: motor_stuck, type: 50, sub: 13}\n"), HasSubstr(" of 10000 RPM"));
   EXPECT_TRUE(motor_is_let_go());
 }
 
@@ -82,20 +81,20 @@ TEST_F(FaultyMotor, FindsNothingWrongWithTheRotorInALongCleanRun) {
   EXPECT_NO_THROW((void)run("  []\n", 5));
 }
 
-TEST_F(FaultyMotor, DoubtsStepsWithoutEnoughSupply) {
+TEST_F(FaultyMotor, FlagsStepsWithoutEnoughSupply) {
   (void)run("  - {at_s: 1.4, for_s: 0.5, kind: motor_sag, volts: 1.5}\n");
-  EXPECT_EQ(doubts(0)[0], "");
-  EXPECT_THAT(doubts(0)[1], HasSubstr("supply_out_of_band"));
-  EXPECT_EQ(doubts(0)[3], "");
+  EXPECT_EQ(flags(0)[0], "");
+  EXPECT_THAT(flags(0)[1], HasSubstr("supply_out_of_band"));
+  EXPECT_EQ(flags(0)[3], "");
   expect_replay_agrees();
 }
 
-TEST_F(FaultyMotor, BearsLostDoubledAndDamagedRepliesWithoutADoubt) {
+TEST_F(FaultyMotor, BearsLostDoubledAndDamagedRepliesWithoutAFlag) {
   (void)run(
       "  - {at_s: 1.0, for_s: 2, kind: motor_drop, p: 0.05}\n"
       "  - {at_s: 1.0, for_s: 2, kind: motor_flip, p: 0.05}\n"
       "  - {at_s: 1.0, for_s: 2, kind: motor_duplicate, p: 0.2}\n");
-  EXPECT_EQ(doubts(0), (std::vector<std::string>{"", "", "", ""}));
+  EXPECT_EQ(flags(0), (std::vector<std::string>{"", "", "", ""}));
   EXPECT_GT(bench_->simulation().motor_line().truth().done[static_cast<std::size_t>(sim::MotorFaultKind::drop)], 0u);
   expect_replay_agrees();
 }
@@ -107,7 +106,7 @@ TEST_F(FaultyMotor, WaitsUntilTheCoilHasCooledDown) {
   std::vector<std::string> names;
   for (const auto& entry : results::read_journal(results_->journal()).entries) names.push_back(entry.event);
   EXPECT_THAT(names, testing::IsSupersetOf({"cooling", "cooled_down"}));
-  EXPECT_THAT(said_.lines, Contains(HasSubstr("waiting for 50 °C")));
+  EXPECT_THAT(said_.lines, Contains(HasSubstr("pausing until below 50 °C")));
 }
 
 TEST_F(FaultyMotor, GivesTheSameBytesFromTheSameSeed) {

@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daq/deterministic_bench.hpp"
-#include "daq/interlock.hpp"
-#include "daq/run.hpp"
+#include "daq/guard/interlock.hpp"
+#include "daq/run/run.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
 
@@ -18,15 +18,15 @@ using testing::HasSubstr;
 /// The deterministic bench under a host whose threads all stand still once.
 class SleepyBench final : public Bench {
  public:
-  explicit SleepyBench(const profiles::Bench& place) : bench(place) { bench.mounted("5x3", 0); }
+  explicit SleepyBench(const profiles::BenchConfig& config) : bench(config) { bench.mounted("5x3", 0); }
 
   [[nodiscard]] const Clock& clock() const override { return bench.clock(); }
   [[nodiscard]] MotorLink& motor() override { return bench.motor(); }
   [[nodiscard]] LoadCellLink& load_cell() override { return bench.load_cell(); }
   [[nodiscard]] results::FileLayer& files() override { return bench.files(); }
   [[nodiscard]] Duration sync_interval() const override { return bench.sync_interval(); }
-  [[nodiscard]] bool unpower() override { return bench.unpower(); }
-  void repower() override { bench.repower(); }
+  [[nodiscard]] bool switch_off_power() override { return bench.switch_off_power(); }
+  void restore_power() override { bench.restore_power(); }
   void mounted(const std::string& propeller, double occlusion) override { bench.mounted(propeller, occlusion); }
 
   void wait_until(Instant when) override {
@@ -42,9 +42,9 @@ class SleepyBench final : public Bench {
     }
     bench.wait_until(when);
   }
-  [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()> work) override {
+  [[nodiscard]] std::unique_ptr<Background> run_periodically(std::function<void()> work) override {
     work_.push_back(std::make_shared<std::function<void()>>(std::move(work)));
-    return bench.keep_calling([this, work = work_.back()] {
+    return bench.run_periodically([this, work = work_.back()] {
       if (!asleep_) (*work)();
     });
   }
@@ -62,7 +62,7 @@ class HostStandstill : public testing::Test {
  protected:
   RunResult record(Duration sleeps_for) {
     bench_.sleeps_for = sleeps_for;
-    return record_run(bench_, test::first_run(campaign_, place_, folder_.path() / "run.h5"), progress_,
+    return record_run(bench_, test::first_run(campaign_, config_, folder_.path() / "run.h5"), progress_,
                       [] { return false; });
   }
   std::string stop(Duration sleeps_for) {
@@ -76,8 +76,8 @@ class HostStandstill : public testing::Test {
 
   test::TemporaryFolder folder_;
   profiles::Campaign campaign_ = test::short_campaign();
-  profiles::Bench place_ = test::deterministic_place(1);
-  SleepyBench bench_{place_};
+  profiles::BenchConfig config_ = test::deterministic_config(1);
+  SleepyBench bench_{config_};
   NoProgress progress_;
 };
 

@@ -5,12 +5,12 @@
 #include <map>
 #include <set>
 
-#include "daq/campaign_run.hpp"
-#include "daq/resume.hpp"
-#include "daq/runs_apart.hpp"
+#include "base/error.hpp"
+#include "daq/campaign/campaign_run.hpp"
+#include "daq/campaign/resume.hpp"
+#include "daq/virtual/per_run_bench.hpp"
 #include "results/campaign_verification.hpp"
 #include "results/journal.hpp"
-#include "results/record_error.hpp"
 #include "test/daq/model_disk.hpp"
 
 namespace kphi::daq {
@@ -43,10 +43,10 @@ Files measured_in(const results::CampaignFolder& folder) {
 class AnyOperation : public testing::Test {
  protected:
   void run(results::FileLayer& files, Progress& progress, const results::CampaignFolder& folder) {
-    RunsApart bench(place_);
+    PerRunBench bench(config_);
     bench.use_files(files);
-    AgreeingOperator person;
-    (void)run_campaign(bench, campaign_, place_, folder, person, progress, [] { return false; });
+    AutoConfirmOperator person;
+    (void)run_campaign(bench, campaign_, config_, folder, person, progress, [] { return false; });
   }
   /// The same campaign on another disk, and nothing happens.
   int count_operations() {
@@ -68,7 +68,7 @@ class AnyOperation : public testing::Test {
   void expect_nothing_lost(const fs::path& path, int accepted, const std::string& when) {
     SCOPED_TRACE(when);
     try {
-      const Resumption resumption = look_at(results::CampaignFolder::open(path), false);
+      const Resumption resumption = inspect(results::CampaignFolder::open(path), false);
       EXPECT_GE(static_cast<int>(resumption.state.accepted.size()), accepted) << "an accepted run is lost";
     } catch (const std::exception& error) {
       ADD_FAILURE() << error.what();
@@ -79,19 +79,19 @@ class AnyOperation : public testing::Test {
     expect_nothing_lost(path, accepted, when);
     SCOPED_TRACE(when);
     const auto folder = results::CampaignFolder::open(path);
-    const Resumption resumption = look_at(folder, false);
+    const Resumption resumption = inspect(folder, false);
     NoProgress progress;
-    AgreeingOperator person;
-    RunsApart bench(place_);
+    AutoConfirmOperator person;
+    PerRunBench bench(config_);
     (void)run_campaign(
-        bench, campaign_, place_, folder, person, progress, [] { return false; }, &resumption);
+        bench, campaign_, config_, folder, person, progress, [] { return false; }, &resumption);
     const auto found = results::verify_campaign(folder);
     EXPECT_TRUE(found.whole()) << testing::PrintToString(found.problems);
     EXPECT_TRUE(measured_in(folder) == whole_);
   }
 
   test::TemporaryFolder folder_;
-  profiles::Bench place_ = test::deterministic_place(6);
+  profiles::BenchConfig config_ = test::deterministic_config(6);
   profiles::Campaign campaign_ = test::short_campaign("0, 90", 1, 2);
   Files whole_;
 };
@@ -144,8 +144,8 @@ TEST_F(AnyOperation, WouldLoseRunsIfFilesWereNotSynced) {
     const fs::path dark = folder_.path() / fmt::format("dark-{}", seed);
     disk.cut_power(folder.path(), dark, seed);
     try {
-      lost += static_cast<int>(look_at(results::CampaignFolder::open(dark), false).state.accepted.size()) < 2;
-    } catch (const results::DataRejected&) {
+      lost += static_cast<int>(inspect(results::CampaignFolder::open(dark), false).state.accepted.size()) < 2;
+    } catch (const DataRejected&) {
       ++lost;
     }
   }
@@ -163,11 +163,11 @@ TEST_F(AnyOperation, RefusedStopsTheMotorSaysWhyAndCanBeResumed) {
     });
     const auto folder = results::CampaignFolder::create(folder_.path(), fmt::format("full-{}", moment), "c", disk);
     armed = true;
-    RunsApart bench(place_);
+    PerRunBench bench(config_);
     bench.use_files(disk);
-    AgreeingOperator person;
+    AutoConfirmOperator person;
     try {
-      (void)run_campaign(bench, campaign_, place_, folder, person, progress, [] { return false; });
+      (void)run_campaign(bench, campaign_, config_, folder, person, progress, [] { return false; });
       ADD_FAILURE() << "went on without a disk";
     } catch (const std::exception& error) {
       EXPECT_THAT(error.what(), testing::HasSubstr("disk full: ")) << error.what();

@@ -4,7 +4,7 @@
 #include <deque>
 #include <utility>
 
-#include "daq/bench.hpp"
+#include "daq/bench/bench.hpp"
 
 namespace kphi::daq {
 
@@ -49,12 +49,12 @@ class QueueBench final : public Bench, private LoadCellLink {
   [[nodiscard]] MotorLink& motor() override { return queue_motor; }
   [[nodiscard]] LoadCellLink& load_cell() override { return *this; }
   void wait_until(Instant when) override { time.set(when); }
-  [[nodiscard]] std::unique_ptr<Background> keep_calling(std::function<void()>) override { return nullptr; }
+  [[nodiscard]] std::unique_ptr<Background> run_periodically(std::function<void()>) override { return nullptr; }
   [[nodiscard]] results::FileLayer& files() override { return *layer; }
   [[nodiscard]] Duration sync_interval() const override { return std::chrono::milliseconds(500); }
   void mounted(const std::string&, double) override {}
-  [[nodiscard]] bool unpower() override { return false; }
-  void repower() override {}
+  [[nodiscard]] bool switch_off_power() override { return false; }
+  void restore_power() override {}
 
   ManualClock time;
   results::FileLayer* layer = &results::disk();

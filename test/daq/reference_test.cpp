@@ -1,10 +1,10 @@
 // results/reference was recorded once and must be understood for ever: a reader that changes its mind shows here.
 #include <gtest/gtest.h>
 
-#include "daq/reduction.hpp"
-#include "daq/repetitions.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/campaign_verification.hpp"
+#include "results/reduction/reduction.hpp"
+#include "results/reduction/repetitions.hpp"
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
 #include "test/source_dir.hpp"

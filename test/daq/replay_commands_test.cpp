@@ -1,12 +1,11 @@
-#include "daq/replay_commands.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "daq/reduction.hpp"
+#include "commands/replay.hpp"
 #include "results/campaign_folder.hpp"
+#include "results/reduction/reduction.hpp"
 #include "results/steps_csv.hpp"
 #include "test/results/synthetic_run.hpp"
 
@@ -83,16 +82,6 @@ TEST_F(Replay, MissesAndFindsRows) {
   steps_.push_back(steps_.back());
   results::write_steps(folder_.steps(), steps_);
   EXPECT_EQ(say(folder_.path().string()).code, 5);
-}
-
-TEST_F(Replay, SaysThatAnOlderReductionWroteTheSteps) {
-  for (results::StepMean& step : steps_) {
-    step.discarded_s = results::kNotMeasured;
-  }
-  results::write_steps(folder_.steps(), steps_);
-  const Said said = say(folder_.path().string());
-  EXPECT_EQ(said.code, 5);
-  EXPECT_THAT(said.err, HasSubstr("older reduction"));
 }
 
 TEST_F(Replay, GivesTheSameBytesHoweverManyRunsAreUnderWay) {

@@ -4,10 +4,10 @@
 
 #include <utility>
 
-#include "daq/campaign_run.hpp"
-#include "daq/deterministic_bench.hpp"
-#include "daq/reduction.hpp"
+#include "daq/campaign/campaign_run.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
 #include "results/campaign_verification.hpp"
+#include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
 #include "test/daq/bench_fixture.hpp"
@@ -17,11 +17,11 @@ namespace {
 
 using testing::HasSubstr;
 
-profiles::Bench powered_place(double current_limit_a) {
-  profiles::Bench place = test::deterministic_place(4);
-  place.supply =
-      profiles::SupplyPlace{"modbus-rtu:/dev/null", Volts(12), Amperes(current_limit_a), Volts(13.5), Amperes(60)};
-  return place;
+profiles::BenchConfig powered_config(double current_limit_a) {
+  profiles::BenchConfig config = test::deterministic_config(4);
+  config.supply =
+      profiles::SupplyConfig{"modbus-rtu:/dev/null", Volts(12), Amperes(current_limit_a), Volts(13.5), Amperes(60)};
+  return config;
 }
 
 class NoteMotor final : public Progress {
@@ -37,11 +37,11 @@ class NoteMotor final : public Progress {
 class SupplyCampaign : public testing::Test {
  protected:
   CampaignResult run(double current_limit_a = 50) {
-    place_ = powered_place(current_limit_a);
-    bench_.emplace(place_);
+    config_ = powered_config(current_limit_a);
+    bench_.emplace(config_);
     results_.emplace(results::CampaignFolder::create(folder_.path(), "u", "c"));
-    AgreeingOperator person;
-    return run_campaign(*bench_, campaign_, place_, *results_, person, progress_, [] { return false; });
+    AutoConfirmOperator person;
+    return run_campaign(*bench_, campaign_, config_, *results_, person, progress_, [] { return false; });
   }
   /// From now on; `count` answers, or 0: all of a minute.
   void spoil(sim::SupplyFaultKind kind, std::uint64_t count) {
@@ -84,7 +84,7 @@ class SupplyCampaign : public testing::Test {
 
   test::TemporaryFolder folder_;
   profiles::Campaign campaign_ = test::short_campaign("0, 90");
-  profiles::Bench place_;
+  profiles::BenchConfig config_;
   std::optional<DeterministicBench> bench_;
   std::optional<results::CampaignFolder> results_;
   NoteMotor progress_;
@@ -93,7 +93,7 @@ class SupplyCampaign : public testing::Test {
 TEST_F(SupplyCampaign, RecordsWhatTheSupplyShows) {
   const CampaignResult result = run();
   EXPECT_EQ(result.runs, 2);
-  EXPECT_EQ(result.doubtful_steps, 0);
+  EXPECT_EQ(result.flagged_steps, 0);
   const auto recording = results::read_run(results_->complete_runs(campaign_.occlusions_deg).at(0));
   EXPECT_EQ(recording.header.supply_identity, "simulated supply");
   ASSERT_GT(recording.supply.size(), 8u);
@@ -122,22 +122,22 @@ TEST_F(SupplyCampaign, StepsWithoutASupplyHaveNoSuchColumns) {
   results::StepMean step;
   EXPECT_THAT(results::format_steps({&step, 1}), testing::Not(HasSubstr("supply_w")));
   step.supply_v = step.supply_a = step.supply_w = 2;
-  EXPECT_THAT(results::format_steps({&step, 1}), HasSubstr(",doubts,supply_v,supply_a,supply_w\n"));
+  EXPECT_THAT(results::format_steps({&step, 1}), HasSubstr(",quality_flags,supply_v,supply_a,supply_w\n"));
 }
 
 TEST_F(SupplyCampaign, StopsWhenTheSupplyLimitsTheCurrent) {
   expect_stop(
-      50, [&] { circuit().controls().amps = 0.9 * circuit().amps(); }, "it limits the current");
+      50, [&] { circuit().controls().amps = 0.9 * circuit().amps(); }, "current limit reached");
 }
 
 TEST_F(SupplyCampaign, StopsWhenItsProtectionTrips) {
   expect_stop(
-      50, [&] { circuit().trip(sim::SupplyTrip::over_voltage); }, "over-voltage protection has switched it off");
+      50, [&] { circuit().trip(sim::SupplyTrip::over_voltage); }, "over-voltage protection switched the output off");
 }
 
 TEST_F(SupplyCampaign, StopsWhenSomebodyTurnsTheKnob) {
   expect_stop(
-      50, [&] { circuit().controls().volts = 11.8; }, "somebody has turned a knob");
+      50, [&] { circuit().controls().volts = 11.8; }, "changed on the front panel");
 }
 
 TEST_F(SupplyCampaign, StopsWhenTheSupplyNoLongerAnswersAndSaysThatItMayBeOn) {
@@ -160,7 +160,7 @@ TEST_F(SupplyCampaign, BearsAnAnswerThatIsLost) {
   progress_.act = [&](const Position& position) {
     if (position.step == 1 && !std::exchange(lost, true)) spoil(sim::SupplyFaultKind::bad_crc, 2);
   };
-  EXPECT_EQ(run().doubtful_steps, 0);
+  EXPECT_EQ(run().flagged_steps, 0);
 }
 
 TEST_F(SupplyCampaign, IsTheSameForTheSameSeed) {

@@ -18,7 +18,7 @@ class Answered : public testing::Test {
  protected:
   Answered() {
     write("campaign.yaml", short_campaign_text("0, 90", 1, 2));
-    write("bench.yaml", deterministic_place(1).text);
+    write("bench.yaml", deterministic_config(1).text);
   }
   [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
   void write(const std::string& name, const std::string& text) const { std::ofstream(path(name)) << text; }
@@ -49,9 +49,9 @@ TEST_F(Answered, RunsTheWholeCampaignAndWritesDownWhatWasAskedAndAnswered) {
 }
 
 TEST_F(Answered, RefusesWrongMissingAndLeftOverMountingsBeforeAnythingIsTouched) {
-  for (const auto& [lists, words] : {std::pair("mountings: [0, 45]\n", ":2:16: mounting 2 is 45 degrees"),
+  for (const auto& [lists, words] : {std::pair("mountings: [0, 45]\n", ":2:16: mounting 2 is 45°"),
                                      std::pair("mountings: [0]\n", ":2:13: mountings ends after 1 of 2"),
-                                     std::pair("mountings: [0, 90, 90]\n", ":2:20: mounting 3 is left over"),
+                                     std::pair("mountings: [0, 90, 90]\n", ":2:20: mounting 3 is one too many"),
                                      std::pair("mountings: [0, ninety]\n", ":2:16: mountings[1]: ")}) {
     answers(lists);
     Process run(command({"--answers", path("answers.yaml")}));

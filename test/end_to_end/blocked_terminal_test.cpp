@@ -114,7 +114,7 @@ TEST(TerminalThatGoesOn, ShowsWhatWasSaidMeanwhile) {
   blocked.output.resume();
   EXPECT_EQ(run.wait(seconds(60)), 0);
   const std::string said = blocked.output.read();
-  EXPECT_THAT(said, testing::HasSubstr("Ctrl-C lets the motor coast"));
+  EXPECT_THAT(said, testing::HasSubstr("Ctrl-C coasts the motor"));
   EXPECT_THAT(said, testing::HasSubstr("run  1/1"));
   EXPECT_THAT(said, testing::HasSubstr("\nnext: kphi fit ")) << "the last words";
 }

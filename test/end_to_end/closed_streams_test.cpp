@@ -136,7 +136,7 @@ class LeftOutput : public testing::Test {
  protected:
   LeftOutput() {
     write(path("campaign.yaml"), short_campaign_text("0, 45, 180", 1, 4));
-    write(path("bench.yaml"), deterministic_place(1).text);
+    write(path("bench.yaml"), deterministic_config(1).text);
     Process run({kphi(), "run", path("campaign.yaml"), "--bench", path("bench.yaml"), "--out", path("out"), "--yes"});
     EXPECT_EQ(run.wait(), 0) << run.err();
     campaign_ = run.out().substr(0, run.out().find('\n'));

@@ -36,7 +36,7 @@ std::map<std::string, std::string> campaign_on(const std::string& bench, const s
 }
 
 std::map<std::string, std::string> campaign_from(int seed) {
-  return campaign_on(deterministic_place(seed).text, short_campaign_text("0, 90, 180", 2));
+  return campaign_on(deterministic_config(seed).text, short_campaign_text("0, 90, 180", 2));
 }
 
 const std::string& file_named(const std::map<std::string, std::string>& files, const std::string& ending) {
@@ -67,7 +67,7 @@ TEST(DeterministicCampaign, GivesTheSameFilesByteForByteFromOneSeedAndOthersFrom
 
 TEST(DeterministicCampaign, TellsInTheReportWhetherTheMotorsClockWasCheckedAndCorrectsByIt) {
   const std::string campaign = short_campaign_text("0, 90, 180", 1);
-  const std::string unchecked_bench = deterministic_place(7).text;
+  const std::string unchecked_bench = deterministic_config(7).text;
   std::string checked_bench = unchecked_bench;
   const std::string last_key = "speed_max_rpm: 19300";
   checked_bench.replace(checked_bench.find(last_key), last_key.size(),
@@ -88,14 +88,14 @@ TEST(DeterministicCampaign, TellsInTheReportWhetherTheMotorsClockWasCheckedAndCo
 TEST(DeterministicCampaign, StopsWithExitCodeFourWhenItsFaultScriptTakesTheStreamAway) {
   const TemporaryFolder folder;
   const auto path = [&](const char* name) { return (folder.path() / name).string(); };
-  std::ofstream(path("faults.yaml")) << "format: kphi-faults/1\nfaults:\n  - {at_s: 8, kind: stolen}\n";
+  std::ofstream(path("faults.yaml")) << "format: kphi-faults/1\nfaults:\n  - {at_s: 8, kind: taken_over}\n";
   std::ofstream(path("campaign.yaml")) << short_campaign_text("0, 90, 180", 2);
-  std::ofstream(path("bench.yaml")) << deterministic_place(5, "faults.yaml").text;  // beside the bench file
+  std::ofstream(path("bench.yaml")) << deterministic_config(5, "faults.yaml").text;  // beside the bench file
   Process run(
       {KPHI_PROGRAM, "run", path("campaign.yaml"), "--bench", path("bench.yaml"), "--yes", "--out", path("out")});
   EXPECT_EQ(run.wait(), 4) << run.err();
   EXPECT_NE(run.err().find("another client has taken the stream"), std::string::npos) << run.err();
-  EXPECT_NE(run.err().find("1 of 6 runs are finished"), std::string::npos) << run.err();
+  EXPECT_NE(run.err().find("1 of 6 runs finished"), std::string::npos) << run.err();
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ std::uint64_t truly_lost(const std::vector<json>& log, std::uint32_t first_ft, s
   return lost;
 }
 
-TEST(FaultyWire, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
+TEST(FaultInjector, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
   RunningBench bench(Manner{8, 7000,
                             "  - {at_s: 0, for_s: 100000, kind: loss, p: 0.01, burst: 3}\n"
                             "  - {at_s: 0, for_s: 100000, kind: duplicate, p: 0.02}\n"
@@ -67,7 +67,7 @@ TEST(FaultyWire, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
   EXPECT_GT(lost, 0u);
 }
 
-TEST(FaultyWire, NamesInLatin1ReachNoTerminalAsRawBytes) {
+TEST(FaultInjector, NamesInLatin1ReachNoTerminalAsRawBytes) {
   RunningBench bench(Manner{8, 7000, "  - {at_s: 0, for_s: 100000, kind: http_charset}\n"});
   Process devices({kphi(), "devices", "--bench", bench.path("bench.yaml")});
   EXPECT_EQ(devices.wait(), 0) << devices.err();
@@ -75,30 +75,30 @@ TEST(FaultyWire, NamesInLatin1ReachNoTerminalAsRawBytes) {
   EXPECT_THAT(devices.out() + devices.err(), testing::Not(HasSubstr("\xFC")));
 }
 
-TEST(FaultyWire, APageInUtf16IsRefusedInOneLine) {
+TEST(FaultInjector, APageInUtf16IsRefusedInOneLine) {
   RunningBench bench(Manner{8, 7000, "  - {at_s: 0, for_s: 100000, kind: http_charset, utf16: true}\n"});
   Process run(bench.run_command());
   EXPECT_EQ(run.wait(), 3) << run.err();
   EXPECT_THAT(run.err(), AllOf(HasSubstr("NUL byte"), HasSubstr("power-cycle the box")));
 }
 
-TEST(FaultyWire, OtherUnitsDuringARunAreNoticedAtItsEnd) {
+TEST(FaultInjector, OtherUnitsDuringARunAreNoticedAtItsEnd) {
   RunningBench bench(Manner{8, 7000, "  - {at_s: 20, kind: units, force_unit: 4}\n"});
   write(bench.path("short.yaml"), short_campaign_text("0", 1, 60));  // one run of 36 s and more
   Process run(bench.run_command());
   EXPECT_EQ(run.wait(), 0) << run.err();
-  EXPECT_THAT(run.err(), AllOf(HasSubstr("configured otherwise than when the run began: units, counts per unit"),
-                               HasSubstr("60 of 60 steps in doubt")));
+  EXPECT_THAT(run.err(), AllOf(HasSubstr("configuration changed since the run began: units, counts per unit"),
+                               HasSubstr("60 of 60 steps flagged")));
   const std::string folder = run.out().substr(0, run.out().find('\n'));
   EXPECT_EQ(bytes_of(folder + "/faults.yaml"), bytes_of(bench.path("faults.yaml")));
 }
 
-TEST(FaultyWire, AStolenStreamEndsTheCampaignWithTheMotorStopped) {
-  RunningBench bench(Manner{8, 7000, "  - {at_s: 24, kind: stolen}\n"});
+TEST(FaultInjector, AStreamTakenOverEndsTheCampaignWithTheMotorStopped) {
+  RunningBench bench(Manner{8, 7000, "  - {at_s: 24, kind: taken_over}\n"});
   write(bench.path("short.yaml"), short_campaign_text("0", 1, 60));  // one run of 36 s and more
   Process run(bench.run_command());
   EXPECT_EQ(run.wait(), 4) << run.err();
-  EXPECT_THAT(run.err(), HasSubstr("this run up to here in "));
+  EXPECT_THAT(run.err(), HasSubstr("this run so far in "));
   EXPECT_TRUE(bench.motor_stops());
 }
 
@@ -123,20 +123,20 @@ class BadScript : public testing::Test {
 
 TEST_F(BadScript, IsRefusedByLineAndColumn) {
   refused_script("format: kphi-faults/1\nfaults:\n  - {at_s: 0, for_s: 1, kind: los}\n",
-                 ":3:31: no fault of the load cell is called 'los'; there are loss, gilbert");
+                 ":3:31: unknown fault \"los\" of the load cell; known: loss, gilbert");
   refused_script("format: kphi-faults/1\nfaults:\n  - at_s: 0\n    kind: reboot\n    down: 1\n",
-                 ":5:11: reboot has no 'down'");
-  refused_script("format: kphi-faults/1\nhabits: {axia: 1}\nfaults: []\n", ":2:16: '1' is neither false nor true");
+                 ":5:11: reboot has no key \"down\"");
+  refused_script("format: kphi-faults/1\nquirks: {axia: 1}\nfaults: []\n", ":2:16: \"1\" is not one of false, true");
   refused_script("faults: [\n", ":2:1: ");
 }
 
 TEST_F(BadScript, ThatCannotBeReadIsNamed) {
-  refused({"--faults", (folder_ / "none.yaml").string()}, 2, "none.yaml: cannot be read; name a file that is there");
-  refused({"--faults", folder_.path().string()}, 2, "cannot be read; name a file that is there");
+  refused({"--faults", (folder_ / "none.yaml").string()}, 2, "none.yaml: cannot be read; name an existing file");
+  refused({"--faults", folder_.path().string()}, 2, "cannot be read; name an existing file");
 }
 
 TEST_F(BadScript, OrATruthLogThatCannotBeWrittenIsRefusedAtTheBeginning) {
-  refused({"--truth-log", (folder_ / "no/such/log.jsonl").string()}, 3, "name a file that you may write");
+  refused({"--truth-log", (folder_ / "no/such/log.jsonl").string()}, 3, "name a writable file");
 }
 
 }  // namespace

@@ -9,8 +9,8 @@
 #include <future>
 #include <thread>
 
-#include "daq/interlock.hpp"
-#include "daq/run.hpp"
+#include "daq/guard/interlock.hpp"
+#include "daq/run/run.hpp"
 #include "drivers/sim/control_line.hpp"
 #include "test/daq/bench_fixture.hpp"
 #include "test/end_to_end/account.hpp"
@@ -80,7 +80,7 @@ class HangingRunner : public testing::Test {
 
   RunningBench simulation_{Manner{1, 7000, "  []\n", true}};
   profiles::Campaign campaign_ = short_campaign();
-  profiles::Bench place_;
+  profiles::BenchConfig place_;
   std::unique_ptr<daq::Bench> bench_;
   std::atomic<bool> turns_{false}, hangs_{false};
   std::promise<void> go_on_;
@@ -104,7 +104,7 @@ TEST_F(HangingRunner, DoesNotKeepTheGuardFromSeeingThatAKnobIsTurned) {
   ASSERT_THAT(answer, testing::StartsWith("ok "));
   EXPECT_TRUE(soon([&] { return coasts(); })) << "while the runner hangs";
   release();
-  EXPECT_THAT(run_.get(), HasSubstr("somebody has turned a knob"));
+  EXPECT_THAT(run_.get(), HasSubstr("changed on the front panel"));
   const double after_ms = account().stages.back().first - 1e3 * std::stod(answer.substr(3));
   fmt::print("coasts {:.1f} ms after the knob was turned, its runner hanging\n", after_ms);
   EXPECT_LT(after_ms, kSoonerThanByPause);

@@ -33,7 +33,7 @@ TEST(Locks, RefuseASecondProgramAndNameTheFirstWhichIsNotDisturbed) {
   }
   Process third(resume_command(bench, folder_of(bench)));
   EXPECT_EQ(third.wait(), 2) << third.err();
-  EXPECT_THAT(third.err(), HasSubstr("writes into it; wait for it, or stop it with"));
+  EXPECT_THAT(third.err(), AllOf(HasSubstr(holder), HasSubstr("wait for it, or stop it with")));
   EXPECT_EQ(first.wait(), 0) << first.err();
 }
 
@@ -48,13 +48,13 @@ TEST(Resume, GoesOnAfterAKillAndSaysSoWhenAllIsDone) {
 
   Process resumed(resume_command(bench, folder));
   EXPECT_EQ(resumed.wait(), 0) << "a dead program's locks are no obstacle: " << resumed.err();
-  EXPECT_THAT(resumed.err(), AllOf(HasSubstr("of 3 runs are accepted"), HasSubstr("run  3/3")));
+  EXPECT_THAT(resumed.err(), AllOf(HasSubstr("of 3 runs accepted"), HasSubstr("run  3/3")));
   Process verify({kphi(), "verify", folder});
   EXPECT_EQ(verify.wait(), 0) << verify.out();
 
   Process again(resume_command(bench, folder));
   EXPECT_EQ(again.wait(), 0);
-  EXPECT_THAT(again.err(), HasSubstr("is finished: its 3 runs are accepted"));
+  EXPECT_THAT(again.err(), HasSubstr("is finished: all 3 runs accepted"));
   EXPECT_EQ(again.out(), folder + "\n");
 }
 
@@ -79,7 +79,7 @@ TEST(Resume, RefusesAChangedCampaignBeforeAnyDeviceIsAsked) {
 TEST(Resume, NeedsACampaignOrAFolder) {
   Process nothing({kphi(), "run", "--bench", kphi::test::source_dir() + "/profiles/bench_deterministic.yaml"});
   EXPECT_EQ(nothing.wait(), 2);
-  EXPECT_THAT(nothing.err(), HasSubstr("no campaign: name its file, or a folder with --resume"));
+  EXPECT_THAT(nothing.err(), HasSubstr("no campaign; give its file, or a folder with --resume"));
 }
 
 }  // namespace

@@ -10,8 +10,8 @@
 #include <random>
 #include <set>
 
-#include "daq/resume.hpp"
-#include "results/record_error.hpp"
+#include "base/error.hpp"
+#include "daq/campaign/resume.hpp"
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
 #include "test/end_to_end/mounted_image.hpp"
@@ -43,7 +43,7 @@ Files measured_in(const results::CampaignFolder& folder) {
   return files;
 }
 
-/// A place where loop devices cost least.
+/// A config where loop devices cost least.
 fs::path memory() { return ::access("/dev/shm", W_OK) == 0 ? "/dev/shm" : fs::temp_directory_path(); }
 
 struct Copy {
@@ -134,7 +134,7 @@ class PowerCut : public testing::TestWithParam<std::string> {
   static int accepted_in(const fs::path& out) {
     const auto folder = campaign_below(out);
     if (!folder) return 0;
-    const daq::Resumption found = daq::look_at(*folder, false);  // compares each with its SHA-256
+    const daq::Resumption found = daq::inspect(*folder, false);  // compares each with its SHA-256
     for (const auto& run : found.state.accepted) {
       const auto verification = results::verify_run(folder->path() / run.file);
       EXPECT_TRUE(verification.whole()) << run.file << testing::PrintToString(verification.problems);
@@ -187,7 +187,7 @@ TEST_P(PowerCut, WouldLoseRunsIfFilesWereNotSynced) {
   int accepted = 0;
   try {
     accepted = accepted_in(rebooted.path() / "out");
-  } catch (const results::DataRejected&) {
+  } catch (const DataRejected&) {
   }
   EXPECT_LT(accepted, kRuns) << "the copy holds what no power cut would have left";
 }

@@ -79,7 +79,7 @@ TEST(Program, StopsOnCtrlCWithTheMotorCoastingAndTheFileKept) {
     run.wait_for("step  2/4");
     run.signal(signal_number);
     EXPECT_EQ(run.wait(), 130) << run.err();
-    EXPECT_THAT(run.err(), HasSubstr("this run up to here in "));
+    EXPECT_THAT(run.err(), HasSubstr("this run so far in "));
     EXPECT_TRUE(bench.motor_stops());
   }
 }
@@ -99,7 +99,7 @@ TEST(Program, StopsWhenTheBenchVanishesMidRun) {
   run.wait_for("step  2/4");
   bench.process().signal(SIGKILL);
   EXPECT_EQ(run.wait(), 4) << run.err();
-  EXPECT_THAT(run.err(), HasSubstr("this run up to here in "));
+  EXPECT_THAT(run.err(), HasSubstr("this run so far in "));
 }
 
 json info_of(const std::string& path) {
@@ -144,7 +144,7 @@ TEST(Program, AccountsForWhatTheWireLoses) {
 }
 
 /// Sends what a second client would send to the box.
-void steal_stream(int rdt_port) {
+void take_stream_over(int rdt_port) {
   const int socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_in box{};
   box.sin_family = AF_INET;
@@ -159,7 +159,7 @@ TEST(Program, StopsWhenAnotherClientTakesTheStreamAndSaysSo) {
   RunningBench bench;
   Process run(bench.run_command());
   run.wait_for("step  2/4");
-  steal_stream(YAML::LoadFile(bench.path("bench.yaml"))["netbox"]["rdt_port"].as<int>());
+  take_stream_over(YAML::LoadFile(bench.path("bench.yaml"))["netbox"]["rdt_port"].as<int>());
   EXPECT_EQ(run.wait(), 4) << run.err();
   EXPECT_THAT(run.err(), HasSubstr("another client has taken the stream"));
   EXPECT_TRUE(bench.motor_stops());

@@ -115,10 +115,10 @@ INSTANTIATE_TEST_SUITE_P(Of, AfterAKill, testing::Bool(), [](const testing::Test
 TEST(Signal, WhileConnectingIsHeardBeforeAnythingIsSwitchedOn) {
   Stand stand(true, "  - {at_s: 0, for_s: 1000, kind: http_slow, delay_s: 1}\n");
   Process run(stand.first({"--yes"}));
-  run.wait_for("Ctrl-C lets the motor coast");
+  run.wait_for("Ctrl-C coasts the motor");
   run.signal(SIGINT);
   EXPECT_EQ(run.wait(), 130) << run.err();
-  EXPECT_THAT(run.err(), HasSubstr("STOPPED: stopped by request, before anything was switched on"));
+  EXPECT_THAT(run.err(), HasSubstr("STOPPED: stopped by request before anything was switched on"));
   const Account account = stand.account();
   EXPECT_EQ(std::count(account.outputs.begin(), account.outputs.end(), true), 0);
 }
@@ -132,7 +132,7 @@ TEST(SafetyStop, IsToldByCauseNextMoveDataAndWhatMotorAndSupplyDid) {
     const std::string told = stand.words.substr(begin);
     EXPECT_THAT(told, ContainsRegex("^SAFETY STOP: thrust .* N is above 1 N .campaign limits.thrust_max_n.\n"
                                     "  next:  check propeller, occlusion and load cell.*\n"
-                                    "  data:  0 of 2 runs are finished, in .*aborted.h5\n"
+                                    "  data:  0 of 2 runs finished, in .*aborted.h5\n"
                                     " +continue with: kphi run .*--resume .*\n"
                                     "  motor: "));
     EXPECT_THAT(told, HasSubstr(supply ? "supply: output off\n" : "motor: coast confirmed after"));

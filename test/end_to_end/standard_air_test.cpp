@@ -2,10 +2,10 @@
 // coefficients differ as the air does, those in standard air not at all.
 #include <gtest/gtest.h>
 
-#include "daq/campaign_run.hpp"
-#include "daq/deterministic_bench.hpp"
+#include "daq/campaign/campaign_run.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
 #include "drivers/ambient/air.hpp"
-#include "fit/identification.hpp"
+#include "fit/model/identification.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/steps_csv.hpp"
 #include "test/daq/bench_fixture.hpp"
@@ -42,8 +42,8 @@ sim::BenchSettings quiet() {
   return settings;
 }
 
-profiles::Bench place_in(double kg_m3) {
-  std::string text = deterministic_place(5).text;
+profiles::BenchConfig place_in(double kg_m3) {
+  std::string text = deterministic_config(5).text;
   const std::string seed = "seed: 5";
   text.replace(text.find(seed), seed.size(), fmt::format("{}, air_density_kg_m3: {}", seed, kg_m3));
   text += fmt::format(
@@ -65,13 +65,13 @@ profiles::Campaign patient_campaign() {
 
 fit::Identification identified_in(double kg_m3) {
   const TemporaryFolder folder;
-  const profiles::Bench place = place_in(kg_m3);
+  const profiles::BenchConfig config = place_in(kg_m3);
   const profiles::Campaign campaign = patient_campaign();
-  daq::DeterministicBench bench(place, quiet());
+  daq::DeterministicBench bench(config, quiet());
   const auto results = results::CampaignFolder::create(folder.path(), "u", "c");
-  daq::AgreeingOperator person;
+  daq::AutoConfirmOperator person;
   Silence silence;
-  (void)daq::run_campaign(bench, campaign, place, results, person, silence, [] { return false; });
+  (void)daq::run_campaign(bench, campaign, config, results, person, silence, [] { return false; });
   return fit::identify(results::read_steps(results.steps()));
 }
 

@@ -6,9 +6,9 @@
 
 #include "drivers/ambient/air.hpp"
 #include "drivers/sim/control_line.hpp"
-#include "drivers/sim/mcp2221.hpp"
-#include "drivers/sim/usbtmc.hpp"
+#include "drivers/sim/usb/mcp2221.hpp"
 #include "results/run_reader.hpp"
+#include "test/drivers/sim_equipment/usbtmc.hpp"
 #include "test/drivers/usb/virtual_bus.hpp"
 #include "test/end_to_end/account.hpp"
 #include "test/end_to_end/running_bench.hpp"

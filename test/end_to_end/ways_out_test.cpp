@@ -112,8 +112,8 @@ constexpr auto kScript = Cause::script;
 constexpr auto kEnd = Cause::end_of_steps;
 const Way kWays[] = {
     {"NormalEnd", kEnd, nullptr, "", 0, "next: kphi fit"},
-    of_supply("SupplyOverVoltage", "kind=supply_trip code=1", "over-voltage protection has switched it off"),
-    of_supply("SupplyOverCurrent", "kind=supply_trip code=2", "over-current protection has switched it off"),
+    of_supply("SupplyOverVoltage", "kind=supply_trip code=1", "over-voltage protection switched the output off"),
+    of_supply("SupplyOverCurrent", "kind=supply_trip code=2", "over-current protection switched the output off"),
     of_supply("SupplyLimitsTheCurrent", "kind=supply_panel register=9 value=500", "limit"),
     of_supply("SupplySagsALittle", "kind=supply_sag volts=0.8 for_s=1000", "below the 12 V set"),
     of_supply("MainsFail", "kind=supply_sag volts=12 for_s=1000", ""),
@@ -131,7 +131,7 @@ const Way kWays[] = {
     {"BoxSilent", kScript, nullptr, "kind: hold, for_s: 1000", 4, "load-cell"},
     {"BoxDead", kScript, nullptr, "kind: reboot, down_s: 1000", 4, "load-cell"},
     {"BoxUnreachable", kScript, nullptr, "kind: address, address: 10.255.255.1, for_s: 1000", 4, "load-cell"},
-    {"StreamStolen", kScript, nullptr, "kind: stolen", 4, "another client"},
+    {"StreamTakenOver", kScript, nullptr, "kind: taken_over", 4, "another client"},
     {"RangeTrip", kScript, nullptr, "kind: saturation, axes: 4, for_s: 1000", 4, "its range|thrust .* is above"},
     {"BoxError", kScript, nullptr, "kind: status, bits: 0x88000000", 4,
      "the Net Box reports .serial link communication error. .status 0x88000000. for .*cannot be trusted"},

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <random>
 
-#include "fit/analysis.hpp"
+#include "fit/uncertainty/analysis.hpp"
 #include "test/fit/campaign_steps.hpp"
 
 namespace kphi::fit {

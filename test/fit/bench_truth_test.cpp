@@ -4,15 +4,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "daq/campaign_run.hpp"
-#include "daq/deterministic_bench.hpp"
-#include "daq/reduction.hpp"
-#include "drivers/sim/truth.hpp"
-#include "fit/blade_pass.hpp"
-#include "fit/dynamics.hpp"
-#include "fit/identification.hpp"
-#include "fit/step_clock.hpp"
-#include "fit/torque.hpp"
+#include "daq/campaign/campaign_run.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
+#include "drivers/sim/physics/truth.hpp"
+#include "fit/model/identification.hpp"
+#include "fit/model/torque.hpp"
+#include "fit/signal/blade_pass.hpp"
+#include "fit/signal/dynamics.hpp"
+#include "fit/signal/step_clock.hpp"
+#include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
 
@@ -40,13 +40,13 @@ class WatchedBench final : public daq::Bench {
       shaft.push_back({to_seconds(clock().now()), bench_.simulation().plant().motor().speed});
     }
   }
-  std::unique_ptr<daq::Background> keep_calling(std::function<void()> work) override {
-    return bench_.keep_calling(std::move(work));
+  std::unique_ptr<daq::Background> run_periodically(std::function<void()> work) override {
+    return bench_.run_periodically(std::move(work));
   }
   results::FileLayer& files() override { return bench_.files(); }
   Duration sync_interval() const override { return bench_.sync_interval(); }
-  [[nodiscard]] bool unpower() override { return bench_.unpower(); }
-  void repower() override { bench_.repower(); }
+  [[nodiscard]] bool switch_off_power() override { return bench_.switch_off_power(); }
+  void restore_power() override { bench_.restore_power(); }
   void mounted(const std::string& propeller_id, double occlusion_deg) override {
     bench_.mounted(propeller_id, occlusion_deg);
   }
@@ -64,18 +64,18 @@ struct Recorded {
 /// A short campaign of 12 steps of 0.8 s.
 Recorded record(const std::string& occlusions, int repetitions, const sim::PlantParameters& plant = {}) {
   test::TemporaryFolder folder;
-  const profiles::Bench place = test::deterministic_place(11);
+  const profiles::BenchConfig config = test::deterministic_config(11);
   sim::BenchSettings settings;
   settings.oscillator_gain = kClockError;
   settings.plant = plant;
-  daq::DeterministicBench simulated(place, settings);
+  daq::DeterministicBench simulated(config, settings);
   WatchedBench bench(simulated);
   auto text = test::short_campaign_text(occlusions, repetitions, 12);
   text.replace(text.find("dwell_s: 0.6"), 12, "dwell_s: 0.8");
   auto results = results::CampaignFolder::create(folder.path(), "20210530T000000Z", "short");
   WillingOperator person;
   daq::NoProgress progress;
-  (void)daq::run_campaign(bench, profiles::parse_campaign(text, "short.yaml"), place, results, person, progress,
+  (void)daq::run_campaign(bench, profiles::parse_campaign(text, "short.yaml"), config, results, person, progress,
                           [] { return false; });
   Recorded recorded{{}, std::move(bench.shaft)};
   for (const auto& file : results.complete_runs()) recorded.runs.push_back(results::read_run(file));
@@ -181,7 +181,7 @@ TEST(Dynamics, FindTheTimeConstantOfTheShaft) {
 TEST(Torque, IsFoundToOnePercent) {
   std::vector<results::StepMean> steps;
   for (const auto& run : runs()) {
-    for (auto step : daq::reduce(run)) {
+    for (auto step : results::reduce(run)) {
       step.speed_rad_s *= 1 + kClockError;  // what the bench file's clock gain does
       steps.push_back(step);
     }

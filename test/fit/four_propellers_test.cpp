@@ -8,11 +8,11 @@
 #include <map>
 #include <sstream>
 
-#include "daq/campaign_run.hpp"
-#include "daq/deterministic_bench.hpp"
-#include "drivers/sim/truth.hpp"
-#include "fit/family_table.hpp"
-#include "profiles/configuration_error.hpp"
+#include "base/error.hpp"
+#include "daq/campaign/campaign_run.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
+#include "drivers/sim/physics/truth.hpp"
+#include "fit/report/family_table.hpp"
 #include "results/steps_csv.hpp"
 #include "test/daq/bench_fixture.hpp"
 #include "test/source_dir.hpp"
@@ -55,12 +55,12 @@ profiles::Campaign shortened(const std::string& name) {
 
 FamilyMember measured(const std::string& name, int seed) {
   const test::TemporaryFolder folder;
-  const profiles::Bench place = test::deterministic_place(seed);
-  daq::DeterministicBench bench(place, sim::BenchSettings{});
+  const profiles::BenchConfig config = test::deterministic_config(seed);
+  daq::DeterministicBench bench(config, sim::BenchSettings{});
   const auto results = results::CampaignFolder::create(folder.path(), "20210530T000000Z", name);
   WillingOperator person;
   Silence silence;
-  (void)daq::run_campaign(bench, shortened(name), place, results, person, silence, [] { return false; });
+  (void)daq::run_campaign(bench, shortened(name), config, results, person, silence, [] { return false; });
   FamilyMember member;
   member.identification = identify(results::read_steps(results.steps()));
   AnalysisOptions options;

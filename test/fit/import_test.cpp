@@ -9,13 +9,12 @@
 #include <set>
 #include <string>
 
+#include "base/csv.hpp"
+#include "base/error.hpp"
 #include "compensation/units.hpp"
-#include "fit/csv.hpp"
-#include "fit/fit_error.hpp"
-#include "fit/import_table.hpp"
-#include "fit/rcbenchmark_csv.hpp"
-#include "fit/uiuc_table.hpp"
-#include "profiles/configuration_error.hpp"
+#include "fit/logs/import_table.hpp"
+#include "fit/logs/rcbenchmark_csv.hpp"
+#include "fit/logs/uiuc_table.hpp"
 #include "results/file_layer.hpp"
 
 namespace kphi::fit {

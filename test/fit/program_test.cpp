@@ -65,42 +65,42 @@ class Program : public ::testing::Test {
 };
 
 TEST_F(Program, DrawsTheReportOfTheFitAgainByteForByte) {
-  const std::string place = steps("5x3");
+  const std::string config = steps("5x3");
   const std::vector<std::vector<std::string>> ways{
       {"--u", "calibration=0.004", "--u", "alignment-deg=1.5", "--u", "clock=2e-5"},
       {"--loss", "huber", "--weights", "thrust", "--estimator", "offset", "--anchored", "--points", "45,180"},
       {"--leave-out", "90:2:plate slipped", "--propeller", "mine", "--at-speed-rpm", "19100"}};
   for (std::vector<std::string> way : ways) {
-    way.insert(way.begin(), {"fit", place});
+    way.insert(way.begin(), {"fit", config});
     const Answer fit = kphi(way);
     ASSERT_EQ(fit.code, 0) << fit.err;
-    const std::string page = results::read_text(place + "/report.html");
-    ASSERT_EQ(kphi({"report", place}).code, 0);
-    EXPECT_TRUE(results::read_text(place + "/report.html") == page) << way[2];
+    const std::string page = results::read_text(config + "/report.html");
+    ASSERT_EQ(kphi({"report", config}).code, 0);
+    EXPECT_TRUE(results::read_text(config + "/report.html") == page) << way[2];
   }
 }
 
 TEST_F(Program, HandsTheOverlapMeasureToWhoFlies) {
-  const std::string place = steps("5x3");
+  const std::string config = steps("5x3");
   const std::string vehicle = test::source_dir() + "/profiles/foldable_drone.yaml";
   const std::string row =
       "theta1_deg,theta2_deg,theta3_deg,theta4_deg,thrust1_n,thrust2_n,thrust3_n,thrust4_n\n45,45,45,45,1,1,1,1\n";
-  const std::vector<std::string> compensate{"compensate", "--coefficients", place + "/coefficients.yaml", "--vehicle",
+  const std::vector<std::string> compensate{"compensate", "--coefficients", config + "/coefficients.yaml", "--vehicle",
                                             vehicle};
-  ASSERT_EQ(kphi({"fit", place, "--no-report"}).code, 0);
+  ASSERT_EQ(kphi({"fit", config, "--no-report"}).code, 0);
   EXPECT_EQ(kphi(compensate, row).code, 0);
-  ASSERT_EQ(kphi({"fit", place, "--no-report", "--overlap", "load_share"}).code, 0);
+  ASSERT_EQ(kphi({"fit", config, "--no-report", "--overlap", "load_share"}).code, 0);
   const Answer refused = kphi(compensate, row);
   EXPECT_EQ(refused.code, 2);
   EXPECT_THAT(refused.err, AllOf(HasSubstr("load_share"), HasSubstr("rim_arc")));
-  EXPECT_THAT(kphi({"export", place, "--to", "ros2"}).out, HasSubstr("overlap: \"load_share\""));
-  expect_refused({"fit", place, "--overlap", "rim"}, 2, "rim_arc");
+  EXPECT_THAT(kphi({"export", config, "--to", "ros2"}).out, HasSubstr("overlap: \"load_share\""));
+  expect_refused({"fit", config, "--overlap", "rim"}, 2, "rim_arc");
 }
 
 TEST_F(Program, ComparesAFamilyFromItsFolders) {
   const std::vector<std::string> places{steps("5x2", 1, 5, 2, 0.76), steps("5x3", 2), steps("6x2", 3, 6, 2, 1.55),
                                         steps("6x3", 4, 6, 3, 1.85)};
-  for (const auto& place : places) ASSERT_EQ(kphi({"fit", place, "--no-report"}).code, 0);
+  for (const auto& config : places) ASSERT_EQ(kphi({"fit", config, "--no-report"}).code, 0);
   std::vector<std::string> words{"compare"};
   words.insert(words.end(), places.begin(), places.end());
   const Answer table = kphi(words);
@@ -120,7 +120,7 @@ TEST_F(Program, ComparesAFamilyFromItsFolders) {
 TEST_F(Program, RefusesWhatItCannotFitInOneLineWithTheNextMove) {
   const std::string empty = (folder_ / "empty").string();
   std::filesystem::create_directories(empty);
-  const std::string place = steps("5x3");
+  const std::string config = steps("5x3");
   expect_refused({"fit", (folder_ / "none").string()}, 2, "does not exist");
   expect_refused({"fit", empty}, 2, "kphi run or kphi import");
   expect_refused({"fit", file("empty.csv", "")}, 2, "empty.csv");
@@ -129,28 +129,28 @@ TEST_F(Program, RefusesWhatItCannotFitInOneLineWithTheNextMove) {
   expect_refused({"fit", file("nothing.csv", "a,b\n1,2\n")}, 2, "nothing.csv");
   expect_refused({"fit", file("k.csv", "phi_deg,k\n0,1.5e-6\n45,1.4e-6\n90,1.2e-6\n"), "--u", "clock=1e-4"}, 2,
                  "--u needs steps");
-  expect_refused({"fit", place, "--u", "clock"}, 2, "NAME=VALUE");
-  expect_refused({"fit", place, "--u", "clock=nan"}, 2, "NAME=VALUE");
-  expect_refused({"fit", place, "--raw"}, 2, "campaign folder");
-  expect_refused({"fit", place, "--leave-out", "90:2"}, 2, "plate slipped");
-  expect_refused({"fit", place, "--leave-out", "91:2:x"}, 5, "91");
-  expect_refused({"fit", place, "--points", "45,91"}, 5, "91");
-  expect_refused({"fit", place, "--speed-range-rpm", "5000"}, 2, "3000:19100");
-  expect_refused({"fit", place, "--speed-range-rpm", "30000:40000"}, 5, "outside the speed range");
-  expect_refused({"fit", place, "--at-speed-rpm", "123"}, 5, "name a speed of the profile");
-  expect_refused({"fit", place, "--loss", "soft"}, 2, "\"soft\" is none of cauchy, huber, none, tukey");
-  EXPECT_FALSE(std::filesystem::exists(place + "/coefficients.yaml")) << "what is refused leaves nothing behind";
+  expect_refused({"fit", config, "--u", "clock"}, 2, "NAME=VALUE");
+  expect_refused({"fit", config, "--u", "clock=nan"}, 2, "NAME=VALUE");
+  expect_refused({"fit", config, "--raw"}, 2, "campaign folder");
+  expect_refused({"fit", config, "--leave-out", "90:2"}, 2, "plate slipped");
+  expect_refused({"fit", config, "--leave-out", "91:2:x"}, 5, "91");
+  expect_refused({"fit", config, "--points", "45,91"}, 5, "91");
+  expect_refused({"fit", config, "--speed-range-rpm", "5000"}, 2, "3000:19100");
+  expect_refused({"fit", config, "--speed-range-rpm", "30000:40000"}, 5, "outside the speed range");
+  expect_refused({"fit", config, "--at-speed-rpm", "123"}, 5, "name a speed of the profile");
+  expect_refused({"fit", config, "--loss", "soft"}, 2, "\"soft\" is none of cauchy, huber, none, tukey");
+  EXPECT_FALSE(std::filesystem::exists(config + "/coefficients.yaml")) << "what is refused leaves nothing behind";
 }
 
 TEST_F(Program, RefusesReportsComparisonsAndExportsOfWhatIsNotThere) {
-  const std::string place = steps("5x3");
-  expect_refused({"report", place}, 2, "kphi fit " + place);
-  expect_refused({"compare", place, place}, 2, "comes first");
-  expect_refused({"export", place, "--to", "px4"}, 2, "comes first");
-  ASSERT_EQ(kphi({"fit", place, "--no-report"}).code, 0);
-  expect_refused({"export", place, "--to", "ardupilot"}, 2, "agilicious");
-  expect_refused({"export", place, "--to", "gazebo", "--phi-deg", "300"}, 2, "0 to 270");
-  expect_refused({"export", place, "--to", "gazebo", "--phi-deg", "nan"}, 2, "0 to 270");
+  const std::string config = steps("5x3");
+  expect_refused({"report", config}, 2, "kphi fit " + config);
+  expect_refused({"compare", config, config}, 2, "comes first");
+  expect_refused({"export", config, "--to", "px4"}, 2, "comes first");
+  ASSERT_EQ(kphi({"fit", config, "--no-report"}).code, 0);
+  expect_refused({"export", config, "--to", "ardupilot"}, 2, "agilicious");
+  expect_refused({"export", config, "--to", "gazebo", "--phi-deg", "300"}, 2, "0 to 270");
+  expect_refused({"export", config, "--to", "gazebo", "--phi-deg", "nan"}, 2, "0 to 270");
   expect_refused({"import", file("unit.csv", "Thrust (stone),Motor Electrical Speed (RPM)\n1,2\n"), "--out",
                   (folder_ / "tables").string()},
                  2, "stone");
@@ -158,8 +158,8 @@ TEST_F(Program, RefusesReportsComparisonsAndExportsOfWhatIsNotThere) {
 }
 
 TEST_F(Program, TakesOneValueForEachOptionThatMayBeRepeated) {
-  const std::string place = steps("5x3");
-  EXPECT_EQ(kphi({"fit", "--no-report", "--u", "clock=1e-5", "--leave-out", "90:2:plate slipped", place}).code, 0)
+  const std::string config = steps("5x3");
+  EXPECT_EQ(kphi({"fit", "--no-report", "--u", "clock=1e-5", "--leave-out", "90:2:plate slipped", config}).code, 0)
       << "the folder is no second value";
 }
 

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <random>
 
-#include "fit/fit_error.hpp"
-#include "fit/linear_regression.hpp"
-#include "fit/thrust_fit.hpp"
+#include "base/error.hpp"
+#include "fit/model/thrust_fit.hpp"
+#include "fit/numerics/linear_regression.hpp"
 
 namespace kphi::fit {
 namespace {

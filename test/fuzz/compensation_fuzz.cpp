@@ -46,13 +46,13 @@ class Bytes {
 
 OverlapMeasure measure(Bytes& bytes) { return static_cast<OverlapMeasure>(bytes.byte() % 3); }
 
-std::optional<ThrustLine> line(Bytes& bytes, OverlapMeasure overlap) {
+std::optional<ThrustCurve> line(Bytes& bytes, OverlapMeasure overlap) {
   std::optional<LineUncertainty> uncertainty;
   if (bytes.byte() % 2 == 0) {
     uncertainty = LineUncertainty{bytes.number(1e-8), bytes.number(1e-16), bytes.number(1e-16), bytes.number(1e-16)};
   }
-  return ThrustLine::from(ThrustCoefficient(bytes.number(1e-6)), ThrustCoefficient(bytes.number(1e-6)),
-                          bytes.number(1e-6), Radians(bytes.number(5)), overlap, uncertainty);
+  return ThrustCurve::from_line(ThrustCoefficient(bytes.number(1e-6)), ThrustCoefficient(bytes.number(1e-6)),
+                                bytes.number(1e-6), Radians(bytes.number(5)), overlap, uncertainty);
 }
 
 Airframe airframe(Bytes& bytes, OverlapMeasure overlap) {

@@ -4,11 +4,10 @@
 #include <cstdint>
 #include <string_view>
 
-#include "fit/fit_error.hpp"
-#include "fit/import_table.hpp"
-#include "fit/k_table.hpp"
-#include "fit/rcbenchmark_csv.hpp"
-#include "profiles/configuration_error.hpp"
+#include "base/error.hpp"
+#include "fit/logs/import_table.hpp"
+#include "fit/logs/k_table.hpp"
+#include "fit/logs/rcbenchmark_csv.hpp"
 #include "results/steps_csv.hpp"
 
 namespace {
@@ -18,7 +17,7 @@ void accept_or_refuse(Read read) {
   try {
     (void)read();
   } catch (const kphi::ConfigurationError&) {
-  } catch (const kphi::fit::FitError&) {
+  } catch (const kphi::FitError&) {
   }
 }
 

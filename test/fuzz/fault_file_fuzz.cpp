@@ -2,8 +2,8 @@
 #include <cstdlib>
 #include <string>
 
-#include "drivers/sim/fault_file.hpp"
-#include "drivers/sim/wire.hpp"
+#include "drivers/sim/input_files.hpp"
+#include "drivers/sim/netbox/fault_injector.hpp"
 #include "test/fuzz/tokens.hpp"
 
 namespace {
@@ -23,7 +23,7 @@ constexpr std::string_view kTokens[] = {
     "  - {at_s: 0, for_s: 1, kind: short_block, records: 3}\n",
     "  - {at_s: 0, for_s: 1, kind: foreign_source}\n",
     "  - {at_s: 0, count: 1, kind: doubled_start, delay_s: 0.01}\n",
-    "  - {at_s: 0.01, kind: stolen}\n",
+    "  - {at_s: 0.01, kind: taken_over}\n",
     "  - {at_s: 0.01, kind: reboot, down_s: 0.01, resume: true}\n",
     "  - {at_s: 0.01, for_s: 0.01, kind: stall}\n",
     "  - {at_s: 0.01, kind: overrun, samples: 3}\n",
@@ -32,7 +32,7 @@ constexpr std::string_view kTokens[] = {
     "  - {at_s: 0, kind: zero_drift, axis: 2, amount: 0.5}\n",
     "  - {at_s: 0, kind: units, force_unit: 1}\n",
     "  - {at_s: 0, count: 1, kind: http_missing_tag, tag: cfgcpf}\n",
-    "habits: {rate_write: continues, first_rdt_sequence: 0}\n",
+    "quirks: {rate_write: continues, last_block: padded}\n",
 };
 
 void require(bool condition) {
@@ -42,9 +42,10 @@ void require(bool condition) {
 void stream_through(const std::string& text) {
   sim::NetBoxSettings settings;
   settings.records_per_datagram = 7;
-  settings.habits = sim::parse_habits(text, "faults.yaml");
+  const sim::FaultFile file = sim::parse_faults(text, "faults.yaml");
+  settings.quirks = file.quirks;
   sim::NetBoxDevice box(settings);
-  sim::FaultyWire wire(box, sim::parse_faults(text, "faults.yaml"), 1);
+  sim::FaultInjector wire(box, file.load_cell, 1);
   wire.request(std::array<std::uint8_t, 8>{0x12, 0x34, 0, 3, 0, 0, 0, 0}, 7, Instant{0});
   sim::Datagram datagram;
   std::uint64_t taken = 0;
@@ -70,7 +71,7 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
     stream_through({reinterpret_cast<const char*>(data), size});
-  } catch (const sim::FileError&) {
+  } catch (const ConfigurationError&) {
   }
   return 0;
 }

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "drivers/netbox/calinfo.hpp"
+#include "drivers/netbox/configuration/calinfo.hpp"
 #include "test/fuzz/tokens.hpp"
 
 namespace {

@@ -11,8 +11,8 @@
 #include <thread>
 #include <utility>
 
-#include "drivers/device_error.hpp"
-#include "drivers/netbox/http.hpp"
+#include "base/error.hpp"
+#include "drivers/netbox/configuration/http.hpp"
 #include "test/fuzz/tokens.hpp"
 
 namespace {

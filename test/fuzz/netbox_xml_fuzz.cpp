@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "drivers/device_error.hpp"
-#include "drivers/netbox/configuration.hpp"
+#include "base/error.hpp"
+#include "drivers/netbox/configuration/configuration.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace kphi;

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "drivers/netbox/session.hpp"
+#include "drivers/netbox/stream/session.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace kphi;

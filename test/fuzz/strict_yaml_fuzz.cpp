@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <string>
 
+#include "base/error.hpp"
 #include "profiles/campaign.hpp"
-#include "profiles/configuration_error.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {

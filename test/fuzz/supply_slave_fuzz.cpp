@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "drivers/sim/supply_slave.hpp"
+#include "drivers/sim/supply/slave.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace kphi::sim;

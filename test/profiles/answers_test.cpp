@@ -58,11 +58,11 @@ TEST(RequireMountings, IsContentWithJustThose) { EXPECT_EQ(refused({0, 45, 90}),
 
 TEST(RequireMountings, NamesTheFirstThatIsWrongMissingOrLeftOver) {
   EXPECT_EQ(refused({0, 90, 45}),
-            "a.yaml:2:16: mounting 2 is 45 degrees, the campaign asks for 90; kphi run --dry-run lists them");
+            "a.yaml:2:16: mounting 2 is 45°, the campaign needs 90°; kphi run --dry-run lists them");
   EXPECT_EQ(refused({0, 45, 90, 180}),
-            "a.yaml:3:13: mountings ends after 3 of 4: the next one asked for is 180 degrees; kphi run --dry-run lists "
+            "a.yaml:3:13: mountings ends after 3 of 4: the next one is 180°; kphi run --dry-run lists "
             "them");
-  EXPECT_EQ(refused({0, 45}), "a.yaml:3:13: mounting 3 is left over: the campaign asks for 2; take it out");
+  EXPECT_EQ(refused({0, 45}), "a.yaml:3:13: mounting 3 is one too many: the campaign needs 2; remove it");
   EXPECT_THAT(refused({0}, "format: kphi-answers/1\nmountings: []\n"),
               StartsWith("a.yaml:2:12: mountings ends after 0"));
 }

@@ -74,8 +74,8 @@ TEST(Campaign, IsRefusedWhenItShufflesWithoutASeed) {
     return refusals([&] { return parse_campaign(kCampaignText + text, "c.yaml"); });
   };
   EXPECT_THAT(order("order: {runs: shuffled}\n"),
-              ElementsAre("24:15: order.runs: shuffled without a seed; add seed: and any whole number; the same one "
-                          "gives this order again"));
+              ElementsAre("24:15: order.runs: shuffled without a seed; add seed: and any whole number; the same "
+                          "seed gives the same order"));
   EXPECT_THAT(order("order: {steps: shuffled}\n"), ElementsAre(StartsWith("24:16: order.steps: shuffled without")));
   EXPECT_THAT(order("order: {steps: sideways}\n"), ElementsAre(StartsWith("24:16: order.steps: ")));
   EXPECT_THAT(order("order: {runs: shuffled, seed: -1}\n"), ElementsAre(StartsWith("24:31: order.seed: ")));
@@ -116,7 +116,7 @@ TEST(Campaign, RefusesSpeedsAboveItsOwnLimit) {
   EXPECT_THAT(
       refused("last_rpm: 19100", "last_rpm: 25000"),
       ElementsAre("15:13: profile.last_rpm: 25000 is above 19100 RPM (limits.speed_max_rpm); lower it, or raise "
-                  "the limit if propeller and motor bear it"));
+                  "the limit if propeller and motor tolerate it"));
   EXPECT_THAT(refused("first_rpm: 100", "first_rpm: 19101"),
               ElementsAre(StartsWith("14:14: profile.first_rpm: 19101 is above")));
 }
@@ -131,8 +131,8 @@ TEST(Campaign, RefusesDwellsThatLeaveNothingToAverage) {
 
 TEST(Campaign, RefusesAnOcclusionListedTwice) {
   EXPECT_THAT(refused("[0, 45, 90]", "[0, 45, 45.0]"),
-              ElementsAre("9:25: occlusions_deg[2]: 45 degrees is listed before, at [1]; list each occlusion once; "
-                          "repetitions says how often it is run"));
+              ElementsAre("9:25: occlusions_deg[2]: 45° is already listed at [1]; list each occlusion once; "
+                          "repetitions sets how often it is run"));
 }
 
 TEST(Campaign, RefusesOcclusionsOutsideTheCircle) {
@@ -267,7 +267,7 @@ TEST(Campaign, RefusesNamesThatCannotBeFileNames) {
   }
   EXPECT_THAT(refused("name: short", "name: \"a\\nb\""), ElementsAre(StartsWith("2:7: ")));
   EXPECT_THAT(refused("name: five inches, three blades", "name: \"\""),
-              ElementsAre("6:9: propeller.name: this text is empty; say maker and type, as on the hub"));
+              ElementsAre("6:9: propeller.name: this text is empty; write maker and type, as on the hub"));
 }
 
 TEST(Campaign, RefusesFilesOfAnotherKindInOneSentence) {
@@ -275,7 +275,7 @@ TEST(Campaign, RefusesFilesOfAnotherKindInOneSentence) {
               ElementsAre("1:9: this is a bench file, expected a campaign file; name a file that begins with format: "
                           "kphi-campaign/1"));
   EXPECT_THAT(refused("kphi-campaign/1", "kphi-campaign/2"),
-              ElementsAre("1:9: format: text \"kphi-campaign/2\" is not known here; write kphi-campaign/1"));
+              ElementsAre("1:9: format: text \"kphi-campaign/2\" is not allowed; write kphi-campaign/1"));
 }
 
 TEST(Campaign, SaysAllThatIsWrongAtOnceAndEachThingOnce) {

@@ -63,10 +63,10 @@ TEST_F(Check, SumsUpACampaign) {
   const auto file = check({shipped("icra2021_5in_3blade.yaml")}).front();
   EXPECT_EQ(file.summary,
             "  propeller  5x3 (5-inch three-blade, 5 in, 3 blades)\n"
-            "  runs       15: occlusions 0, 45, 90, 180, 270 degrees, 3 repetitions of each, 5 mountings\n"
+            "  runs       15: occlusions 0, 45, 90, 180, 270°, 3 repetitions of each, 5 mountings\n"
             "  order      runs listed, steps up\n"
             "  steps      600: 40 per run, 100 to 19100 RPM by 487.179 RPM, 2 s each\n"
-            "  time       20 min 00 s spinning, 21 min 00 s with the zeros, besides mounting\n"
+            "  time       20 min 00 s spinning, 21 min 00 s with the zeros, without mounting\n"
             "  disk       8.82 million samples at 7000 Hz, 388 MB\n");
   EXPECT_EQ(file.report["plan"]["runs"], 15);
   EXPECT_EQ(file.report["plan"]["spinning_s"], 1200.0);
@@ -76,13 +76,12 @@ TEST_F(Check, SumsUpACampaign) {
 TEST_F(Check, HoldsAnswersAgainstTheCampaignsAmongTheFiles) {
   const auto good = check({shipped("answers_example.yaml"), shipped("icra2021_6in_2blade.yaml")});
   EXPECT_TRUE(good[0].ok());
-  EXPECT_EQ(good[0].summary, "  mountings  0 45 90 180 270 degrees\n  run again  0 decisions\n");
+  EXPECT_EQ(good[0].summary, "  mountings  0 45 90 180 270°\n  run again  0 decisions\n");
   const std::string text = read_text(shipped("icra2021_6in_2blade.yaml"));
   const std::string other = write("other.yaml", changed(text, "[0, 45,", "[0, 60,"));
   const auto bad = check({shipped("answers_example.yaml"), other});
   EXPECT_TRUE(bad[1].ok());
-  EXPECT_THAT(bad[0].errors,
-              testing::ElementsAre(testing::HasSubstr("mounting 2 is 45 degrees, the campaign asks for 60")));
+  EXPECT_THAT(bad[0].errors, testing::ElementsAre(testing::HasSubstr("mounting 2 is 45°, the campaign needs 60°")));
 }
 
 TEST_F(Check, SumsUpAVehicleWithTheOcclusionsOfItsShapes) {
@@ -90,10 +89,10 @@ TEST_F(Check, SumsUpAVehicleWithTheOcclusionsOfItsShapes) {
             "  body       half side 0.045 m, arms 0.117 m, propeller radius 0.0635 m\n"
             "  speeds     0 to 19100 RPM\n"
             "  overlap    rim_arc\n"
-            "  shape H    arms at 0 90 0 90 degrees, occluded by 0 0 0 0 degrees\n"
-            "  shape O    arms at 180 180 165.676 180 degrees, occluded by 64.84 64.84 41.29 64.84 degrees\n"
-            "  shape T    arms at 90 0 0 90 degrees, occluded by 0 0 0 0 degrees\n"
-            "  shape X    arms at 45 45 45 45 degrees, occluded by 0 0 0 0 degrees\n"
+            "  shape H    arms at 0 90 0 90°, occluded by 0 0 0 0°\n"
+            "  shape O    arms at 180 180 165.676 180°, occluded by 64.84 64.84 41.29 64.84°\n"
+            "  shape T    arms at 90 0 0 90°, occluded by 0 0 0 0°\n"
+            "  shape X    arms at 45 45 45 45°, occluded by 0 0 0 0°\n"
             "  dynamics   0.6 kg, of which 0.045 kg at each hub; 1.47 N per rotor carry it\n"
             "  control    position 6 6 15 1/s2, velocity 4 4 6 1/s, attitude 8.5 8.5 5 1/s, rates 12.7 12.7 5 1/s\n");
 }
@@ -140,12 +139,10 @@ TEST_F(Check, GuessesTheKindOfAFileWithoutFormatFromItsKeys) {
 
 TEST_F(Check, SaysWhenItCannotTellWhatAFileIs) {
   EXPECT_THAT(check({write("a.yaml", "colour: red\n")}).front().errors,
-              ElementsAre(HasSubstr("the file does not say what it is; begin it with format:")));
-  EXPECT_THAT(
-      check({write("b.yaml", "format: kphi-campain/1\n")}).front().errors,
-      ElementsAre(HasSubstr(":1:9: kphi-campain/1 is not a known format; did you mean format: kphi-campaign/1?")));
-  EXPECT_THAT(check({write("c.yaml", "just words\n")}).front().errors,
-              ElementsAre(HasSubstr("does not say what it is")));
+              ElementsAre(HasSubstr("unknown kind of file: no format given; begin it with format:")));
+  EXPECT_THAT(check({write("b.yaml", "format: kphi-campain/1\n")}).front().errors,
+              ElementsAre(HasSubstr(":1:9: unknown format kphi-campain/1; did you mean format: kphi-campaign/1?")));
+  EXPECT_THAT(check({write("c.yaml", "just words\n")}).front().errors, ElementsAre(HasSubstr("unknown kind of file")));
   EXPECT_EQ(check({write("c.yaml", "just words\n")}).front().report["kind"], nullptr);
 }
 

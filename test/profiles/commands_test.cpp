@@ -1,5 +1,3 @@
-#include "profiles/commands.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "commands/check.hpp"
 #include "test/profiles/refusals.hpp"
 #include "test/temporary_folder.hpp"
 
@@ -35,7 +34,7 @@ Outcome run(const std::string& line) {
 TEST(CheckCommand, PrintsSummariesAndExitsWithZero) {
   const Outcome outcome = run("check " + shipped("icra2021_5in_3blade.yaml"));
   EXPECT_EQ(outcome.exit_code, 0);
-  EXPECT_THAT(outcome.out, testing::HasSubstr("icra2021_5in_3blade.yaml: campaign in order\n  propeller  5x3"));
+  EXPECT_THAT(outcome.out, testing::HasSubstr("icra2021_5in_3blade.yaml: valid campaign\n  propeller  5x3"));
   EXPECT_EQ(outcome.err, "");
 }
 
@@ -43,7 +42,7 @@ TEST(CheckCommand, PrintsErrorsOnStderrAndExitsWithTwo) {
   const Outcome outcome = run("check /no/such.yaml " + shipped("bench_lab.yaml"));
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_EQ(outcome.err, "/no/such.yaml: cannot be opened: No such file or directory; check the name\n");
-  EXPECT_THAT(outcome.out, testing::HasSubstr("bench_lab.yaml: bench in order"));
+  EXPECT_THAT(outcome.out, testing::HasSubstr("bench_lab.yaml: valid bench"));
 }
 
 TEST(CheckCommand, PrintsOneJsonObjectPerFile) {
@@ -63,16 +62,15 @@ TEST(CheckCommand, ReadsTheShippedFaultScriptAndTellsWhatWillGoWrong) {
   const Outcome outcome = run("check " + shipped("faults_example.yaml"));
   EXPECT_EQ(outcome.exit_code, 0);
   EXPECT_EQ(outcome.err, "");
-  EXPECT_THAT(outcome.out,
-              testing::HasSubstr("faults_example.yaml: fault script in order\n  at 0 s  loss for 3600 s\n"));
+  EXPECT_THAT(outcome.out, testing::HasSubstr("faults_example.yaml: valid fault script\n  at 0 s  loss for 3600 s\n"));
   EXPECT_THAT(outcome.out, testing::HasSubstr("\n  at 60 s  reboot\n"));
-  EXPECT_THAT(outcome.out, testing::HasSubstr("\n  at 500 s  http_slow, 1 times at most\n"));
+  EXPECT_THAT(outcome.out, testing::HasSubstr("\n  at 500 s  http_slow, at most 1 times\n"));
 }
 
 TEST(CheckCommand, ReadsTheShippedMotor) {
   const Outcome outcome = run("check " + shipped("motor_iq2306.yaml"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, testing::HasSubstr("simulated motor in order\n  motor      2221 RPM/V, 0.045 ohm"));
+  EXPECT_THAT(outcome.out, testing::HasSubstr("valid simulated motor\n  motor      2221 RPM/V, 0.045 ohm"));
 }
 
 TEST(CheckCommand, RefusesAFaultScriptAtItsLineAndColumn) {
@@ -86,12 +84,12 @@ TEST(CheckCommand, RefusesAFaultScriptAtItsLineAndColumn) {
     EXPECT_THAT(outcome.err, testing::StartsWith(path + words));
   };
   refused("format: kphi-faults/1\nfaults:\n  - {at_s: 0, for_s: 1, kind: los}\n",
-          ":3:31: no fault of the load cell is called 'los'");
+          ":3:31: unknown fault \"los\" of the load cell");
   refused("format: kphi-faults/1\nfaults:\n  - {at_s: 0, kind: motor_sag}\n", ":3:5: motor_sag needs for_s");
   refused("format: kphi-sim-motor/1\nmotor: {resistance_ohm: 0}\n", ":2:25: resistance_ohm: 0 is outside 0.001 to 10");
-  refused("format: kphi-faults/1\nhabits: {axia: 1}\nfaults: []\n", ":2:16: '1' is neither false nor true");
+  refused("format: kphi-faults/1\nquirks: {axia: 1}\nfaults: []\n", ":2:16: \"1\" is not one of false, true");
   refused("format: kphi-fault/1\nfaults: []\n",
-          ":1:9: kphi-fault/1 is not a known format; did you mean format: "
+          ":1:9: unknown format kphi-fault/1; did you mean format: "
           "kphi-faults/1?");
 }
 

@@ -56,8 +56,8 @@ TEST(StepOrder, ShuffledDiffersFromSeedToSeed) {
 TEST(Order, IsToldInWords) {
   EXPECT_EQ(to_words(Order{}), "runs listed, steps up");
   EXPECT_EQ(to_words({RunOrderKind::shuffled, StepOrderKind::up_and_down, 7, true, true}),
-            "runs shuffled, steps up_and_down (seed 7), mounted anew for each repetition, a reference run at begin and "
-            "end");
+            "runs shuffled, steps up_and_down (seed 7), remounted for each repetition, reference runs first and "
+            "last");
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "profiles/configuration_error.hpp"
+#include "base/error.hpp"
 #include "test/profiles/refusals.hpp"
 
 namespace kphi::profiles {
@@ -28,16 +28,16 @@ TEST(Plan, OfThePapersCampaignHasFifteenRunsAndTwentyMinutesOfSpinning) {
 
 TEST(Plan, CountsTheTimeThatTheBoxesBiasTakes) {
   Campaign campaign = parse_campaign(kCampaignText, "c.yaml");
-  const Seconds without = make_plan(campaign, Bench{}).bench;
+  const Seconds without = make_plan(campaign, BenchConfig{}).bench;
   campaign.box_bias = true;  // before each run measured twice for as long as a zero
-  EXPECT_EQ(make_plan(campaign, Bench{}).bench, without + campaign.zero * 12.0);
+  EXPECT_EQ(make_plan(campaign, BenchConfig{}).bench, without + campaign.zero * 12.0);
 }
 
 TEST(Plan, OfThePapersFourPropellersSpinsEightyMinutes) {
   Seconds spinning;
   for (const char* name : {"5in_2blade", "5in_3blade", "6in_2blade", "6in_3blade"}) {
     const auto campaign = load_campaign(shipped(std::string("icra2021_") + name + ".yaml"));
-    spinning = spinning + make_plan(campaign, Bench{}).spinning;
+    spinning = spinning + make_plan(campaign, BenchConfig{}).spinning;
   }
   EXPECT_EQ(spinning, Seconds(80 * 60));
 }
@@ -46,7 +46,8 @@ TEST(Plan, KeepsAllRepetitionsOfAMountingTogetherInTheFilesOrder) {
   Campaign campaign = parse_campaign(kCampaignText, "c.yaml");
   campaign.occlusions_deg = {90, 0};
   std::vector<std::pair<double, int>> order;
-  for (const PlannedRun& run : make_plan(campaign, Bench{}).runs) order.emplace_back(run.occlusion_deg, run.repetition);
+  for (const PlannedRun& run : make_plan(campaign, BenchConfig{}).runs)
+    order.emplace_back(run.occlusion_deg, run.repetition);
   EXPECT_THAT(order,
               testing::ElementsAre(std::pair(90.0, 1), std::pair(90.0, 2), std::pair(0.0, 1), std::pair(0.0, 2)));
 }
@@ -63,7 +64,7 @@ std::vector<std::string> names(const Plan& plan) {
 TEST(Plan, ShufflesOcclusionsAsBlocksBecauseMountingIsDear) {
   std::set<std::vector<double>> orders;
   for (int seed = 1; seed <= 50; ++seed) {
-    const Plan plan = make_plan(ordered(fmt::format("order: {{runs: shuffled, seed: {}}}\n", seed)), Bench{});
+    const Plan plan = make_plan(ordered(fmt::format("order: {{runs: shuffled, seed: {}}}\n", seed)), BenchConfig{});
     EXPECT_EQ(plan.mountings, 3);
     for (std::size_t i = 0; i < plan.runs.size(); ++i) {
       EXPECT_EQ(plan.runs[i].repetition, 1 + static_cast<int>(i % 2));
@@ -75,7 +76,8 @@ TEST(Plan, ShufflesOcclusionsAsBlocksBecauseMountingIsDear) {
 }
 
 TEST(Plan, ShufflesAllRunsWhenEachIsMountedAnewAndNumbersRepetitionsAsTheyAreRun) {
-  const Plan plan = make_plan(ordered("order: {runs: shuffled, seed: 5, remount_each_repetition: true}\n"), Bench{});
+  const Plan plan =
+      make_plan(ordered("order: {runs: shuffled, seed: 5, remount_each_repetition: true}\n"), BenchConfig{});
   EXPECT_EQ(plan.mountings, 6);
   std::map<double, int> last;
   int blocks = 0;
@@ -89,21 +91,21 @@ TEST(Plan, ShufflesAllRunsWhenEachIsMountedAnewAndNumbersRepetitionsAsTheyAreRun
 }
 
 TEST(Plan, IsTheSameFromTheSameSeedAndIsWrittenDownHere) {
-  EXPECT_THAT(names(make_plan(ordered("order: {runs: shuffled, seed: 2021}\n"), Bench{})),
+  EXPECT_THAT(names(make_plan(ordered("order: {runs: shuffled, seed: 2021}\n"), BenchConfig{})),
               testing::ElementsAre("0/1!", "0/2", "90/1!", "90/2", "45/1!", "45/2"));
 }
 
 TEST(Plan, HasAReferenceRunAtBothEndsThatIsNoRepetition) {
-  EXPECT_THAT(names(make_plan(ordered("order: {reference: true}\n"), Bench{})),
+  EXPECT_THAT(names(make_plan(ordered("order: {reference: true}\n"), BenchConfig{})),
               testing::ElementsAre("0/-1!", "0/1", "0/2", "45/1!", "45/2", "90/1!", "90/2", "0/-2!"));
   Campaign campaign = ordered("order: {reference: true}\n");
   campaign.occlusions_deg = {90};
-  EXPECT_THAT(names(make_plan(campaign, Bench{})), testing::ElementsAre("0/-1!", "90/1!", "90/2", "0/-2!"));
+  EXPECT_THAT(names(make_plan(campaign, BenchConfig{})), testing::ElementsAre("0/-1!", "90/1!", "90/2", "0/-2!"));
 }
 
 TEST(Plan, ShufflesTheStepsOfEachRunByItsOwnSeed) {
-  const Plan plan = make_plan(ordered("order: {steps: shuffled, seed: 6}\n"), Bench{});
-  const Plan again = make_plan(ordered("order: {runs: shuffled, steps: shuffled, seed: 6}\n"), Bench{});
+  const Plan plan = make_plan(ordered("order: {steps: shuffled, seed: 6}\n"), BenchConfig{});
+  const Plan again = make_plan(ordered("order: {runs: shuffled, steps: shuffled, seed: 6}\n"), BenchConfig{});
   std::map<std::pair<double, int>, std::vector<int>> orders;
   const auto numbers = [](const PlannedRun& run) {
     std::vector<int> found;
@@ -123,15 +125,15 @@ TEST(Plan, ShufflesTheStepsOfEachRunByItsOwnSeed) {
 }
 
 TEST(Plan, CountsTheStepsOfTheWayBackAndTheTimeOfRamps) {
-  EXPECT_EQ(make_plan(ordered("order: {steps: up_and_down}\n"), Bench{}).steps, 6 * 7);
+  EXPECT_EQ(make_plan(ordered("order: {steps: up_and_down}\n"), BenchConfig{}).steps, 6 * 7);
   const std::string slew = changed(kCampaignText, "last_rpm: 19100\n", "last_rpm: 19100\n  slew_rpm_s: 1910\n");
-  const Plan plain = make_plan(parse_campaign(kCampaignText, "c.yaml"), Bench{});
-  const Plan up = make_plan(parse_campaign(slew, "c.yaml"), Bench{});
+  const Plan plain = make_plan(parse_campaign(kCampaignText, "c.yaml"), BenchConfig{});
+  const Plan up = make_plan(parse_campaign(slew, "c.yaml"), BenchConfig{});
   EXPECT_NEAR((up.spinning - plain.spinning).value(), 6 * 10.0, 1e-6) << "0 to 19100 RPM by 1910 RPM/s, six times";
   EXPECT_NEAR((up.bench - plain.bench).value(), 6 * 10.0, 1e-6);
   EXPECT_EQ(up.samples_in_steps, plain.samples_in_steps) << "a ramp is not averaged";
   EXPECT_EQ(up.samples - plain.samples, 60u * 7000);
-  const Plan both = make_plan(parse_campaign(slew + "order: {steps: up_and_down}\n", "c.yaml"), Bench{});
+  const Plan both = make_plan(parse_campaign(slew + "order: {steps: up_and_down}\n", "c.yaml"), BenchConfig{});
   EXPECT_NEAR((both.spinning - plain.spinning).value(), 6 * (3 * 2 + 10 + 19000 / 1910.0), 1e-6);
 }
 
@@ -144,7 +146,7 @@ TEST(Plan, CountsSamplesAtTheBenchsRate) {
 
 TEST(Plan, IsRefusedOnABenchWhoseMotorMayNotTurnSoFast) {
   const Campaign campaign = parse_campaign(kCampaignText, "c.yaml");
-  const Bench bench = parse_bench(changed(kBenchText, "19300", "18000"), "b.yaml");
+  const BenchConfig bench = parse_bench(changed(kBenchText, "19300", "18000"), "b.yaml");
   EXPECT_THAT(
       [&] { require_within(campaign, bench); },
       testing::ThrowsMessage<ConfigurationError>(
@@ -155,7 +157,7 @@ TEST(Plan, IsRefusedOnABenchWhoseMotorMayNotTurnSoFast) {
 TEST(Plan, IsRefusedForItsFirstSpeedWhereThatIsTheTop) {
   auto text = changed(kCampaignText, "first_rpm: 100", "first_rpm: 19000");
   text = changed(text, "last_rpm: 19100", "last_rpm: 100");
-  const Bench bench = parse_bench(changed(kBenchText, "19300", "18000"), "b.yaml");
+  const BenchConfig bench = parse_bench(changed(kBenchText, "19300", "18000"), "b.yaml");
   EXPECT_THAT(
       [&] { require_within(parse_campaign(text, "c.yaml"), bench); },
       testing::ThrowsMessage<ConfigurationError>(testing::StartsWith("c.yaml:14:14: profile.first_rpm: 19000 RPM")));
@@ -170,7 +172,7 @@ TEST(Plan, IsRefusedWithoutPlacesIfTheFilesTextsAreUnknown) {
   Campaign campaign;
   campaign.path = "c.yaml";
   campaign.profile.last = from_rpm(100);
-  Bench bench;
+  BenchConfig bench;
   bench.path = "b.yaml";
   bench.iq.speed_max = from_rpm(50);
   EXPECT_THAT([&] { require_within(campaign, bench); }, testing::ThrowsMessage<ConfigurationError>(testing::StartsWith(

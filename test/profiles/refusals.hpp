@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "profiles/finding.hpp"
+#include "profiles/refused_file.hpp"
 #include "test/source_dir.hpp"
 
 namespace kphi::profiles {
@@ -18,7 +18,7 @@ std::vector<std::string> refusals(Read read) {
   try {
     static_cast<void>(read());
   } catch (const RefusedFile& refused) {
-    for (const Finding& finding : refused.findings()) lines.push_back(describe("", finding).substr(1));
+    for (const FileFinding& finding : refused.findings()) lines.push_back(describe("", finding).substr(1));
   }
   return lines;
 }

@@ -10,7 +10,7 @@
 #include <set>
 
 #include "profiles/answers.hpp"
-#include "profiles/bench.hpp"
+#include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 #include "profiles/plan.hpp"
 #include "profiles/schema.hpp"
@@ -108,7 +108,7 @@ TEST(ShippedFiles, FitEachOther) {
 }
 
 TEST(ShippedFiles, DescribeTheThreeBenches) {
-  const Bench simulated = load_bench(shipped("bench_simulated.yaml"));
+  const BenchConfig simulated = load_bench(shipped("bench_simulated.yaml"));
   ASSERT_TRUE(simulated.simulation);
   EXPECT_FALSE(simulated.simulation->in_process);
   EXPECT_EQ(simulated.simulation->time_scale, 20);

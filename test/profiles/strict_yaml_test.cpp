@@ -87,8 +87,8 @@ TEST(StrictYaml, TakesAByteOrderMark) {
 
 TEST(StrictYaml, RefusesDuplicateKeysWithBothLines) {
   EXPECT_EQ(finding_of("a: 1\nb:\n  c: 2\n  d: 3\n  c: 4\n"),
-            "5:3: b.c was given before, on line 3; keep one of the two");
-  EXPECT_EQ(finding_of("a: 1\n\"a\": 2"), "2:1: a was given before, on line 1; keep one of the two");
+            "5:3: b.c is already given on line 3; keep one of the two");
+  EXPECT_EQ(finding_of("a: 1\n\"a\": 2"), "2:1: a is already given on line 1; keep one of the two");
 }
 
 TEST(StrictYaml, RefusesOtherSpellingsOfBooleans) {
@@ -127,13 +127,13 @@ TEST(StrictYaml, RefusesNumbersThatAreNotFinite) {
 }
 
 TEST(StrictYaml, CollectsWhatDoesNotStopTheReading) {
-  EXPECT_THAT(
-      findings_of("a: no\nb: 010\nb: 1\nc: .nan\n"),
-      ElementsAre(HasSubstr("1:4: no"), HasSubstr("2:4: 010"), HasSubstr("3:1: b was given"), HasSubstr("4:4: .nan")));
+  EXPECT_THAT(findings_of("a: no\nb: 010\nb: 1\nc: .nan\n"),
+              ElementsAre(HasSubstr("1:4: no"), HasSubstr("2:4: 010"), HasSubstr("3:1: b is already given"),
+                          HasSubstr("4:4: .nan")));
 }
 
 TEST(StrictYaml, RefusesASecondDocument) {
-  EXPECT_THAT(finding_of("a: 1\n---\nb: 2\n"), HasSubstr("2:1: more follows after the end of the document; keep one"));
+  EXPECT_THAT(finding_of("a: 1\n---\nb: 2\n"), HasSubstr("2:1: a second document follows; keep one"));
   EXPECT_EQ(value_of("---\na: 1\n...\n"), json({{"a", 1}}));
 }
 
@@ -168,7 +168,7 @@ TEST(StrictYaml, FollowsAliasesAndPointsToTheirAnchors) {
 }
 
 TEST(StrictYaml, RefusesAliasesThatContainThemselves) {
-  EXPECT_THAT(finding_of("a: &x [1, *x]"), HasSubstr("1:11: this alias names a key, or a value that it is part of"));
+  EXPECT_THAT(finding_of("a: &x [1, *x]"), HasSubstr("1:11: this alias names a key, or a value that contains it"));
 }
 
 TEST(StrictYaml, RefusesAliasesThatMultiplyBeyondReason) {
@@ -182,15 +182,15 @@ TEST(StrictYaml, RefusesAliasesThatMultiplyBeyondReason) {
 }
 
 TEST(StrictYaml, RefusesTagsAndMergeKeysAndKeysThatAreNoWords) {
-  EXPECT_THAT(finding_of("a: !!str 5"), HasSubstr("1:4: the tag tag:yaml.org,2002:str is not read"));
-  EXPECT_THAT(finding_of("a: &x {k: 1}\nb: {<<: *x}"), HasSubstr("2:5: merge keys are not read"));
+  EXPECT_THAT(finding_of("a: !!str 5"), HasSubstr("1:4: the tag tag:yaml.org,2002:str is not supported"));
+  EXPECT_THAT(finding_of("a: &x {k: 1}\nb: {<<: *x}"), HasSubstr("2:5: merge keys are not supported"));
   EXPECT_THAT(finding_of("[a, b]: 1"), HasSubstr("1:1: a key must be a word"));
   EXPECT_THAT(finding_of("a: 1\n: 2\n"), HasSubstr("a key must be a word"));
 }
 
 TEST(StrictYaml, RefusesTextsThatSayNothing) {
   for (const char* text : {"", "\n\n", "# only a comment\n"})
-    EXPECT_THAT(finding_of(text), HasSubstr("1:1: the file says nothing"));
+    EXPECT_THAT(finding_of(text), HasSubstr("1:1: the file is empty"));
 }
 
 TEST(StrictYaml, RefusesBrokenYamlWhereItBreaks) {
@@ -235,11 +235,11 @@ TEST(Files, ThatCannotBeReadAreNamedWithTheReason) {
 }
 
 TEST(Refusals, ListTheirFindingsInTheOrderOfTheFileAndNotWithoutEnd) {
-  std::vector<Finding> findings;
-  for (int line = 30; line > 0; --line) findings.push_back({{line, 1}, "", "wrong", "mend it"});
+  std::vector<FileFinding> findings;
+  for (int line = 30; line > 0; --line) findings.push_back({{line, 1}, "", "wrong", "fix it"});
   const std::string message = RefusedFile("f.yaml", findings).what();
-  EXPECT_THAT(message, testing::StartsWith("f.yaml:1:1: wrong; mend it\nf.yaml:2:1: wrong; mend it\n"));
-  EXPECT_THAT(message, testing::EndsWith("f.yaml:20:1: wrong; mend it\nf.yaml: 10 more findings; mend these first"));
+  EXPECT_THAT(message, testing::StartsWith("f.yaml:1:1: wrong; fix it\nf.yaml:2:1: wrong; fix it\n"));
+  EXPECT_THAT(message, testing::EndsWith("f.yaml:20:1: wrong; fix it\nf.yaml: 10 more problems; fix these first"));
 }
 
 }  // namespace

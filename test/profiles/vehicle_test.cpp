@@ -41,13 +41,13 @@ TEST(Vehicle, HasOneArmPerCornerInOrderUnlessItSaysOtherwise) {
   EXPECT_THAT(refused("[0, 90, 180, 270]", "[0, 90, 90, 270]"),
               ElementsAre("6:25: hinge_turn_deg[2]: corner 90 has an arm already; give each corner one arm"));
   EXPECT_THAT(refused("[0, 90, 180, 270]", "[0, 90, 180, 271]"),
-              ElementsAre("6:30: hinge_turn_deg[3]: 271 is not known here; write one of 0, 90, 180, 270"));
+              ElementsAre("6:30: hinge_turn_deg[3]: 271 is not allowed; write one of 0, 90, 180, 270"));
 }
 
 TEST(Vehicle, RefusesShapesThatTheServosCannotReach) {
   EXPECT_THAT(refused("165.676, 180]", "180.5, 180]"),
               ElementsAre("9:17: shapes_deg.O[2]: 180.5 is outside -90 to 180 degrees (arm_angle_min_deg, "
-                          "arm_angle_max_deg); the servo cannot go there; mend the angle or the range"));
+                          "arm_angle_max_deg); the servo cannot go there; fix the angle or the range"));
 }
 
 TEST(Vehicle, RefusesShapesWithoutFourArms) {
@@ -61,7 +61,7 @@ TEST(Vehicle, RefusesShapesWithoutFourArms) {
 
 TEST(Vehicle, RefusesRangesThatAreEmpty) {
   EXPECT_THAT(refused("speed_min_rpm: 0", "speed_min_rpm: 19100"),
-              ElementsAre("13:16: speed_max_rpm: 19100 is not above 19100 (speed_min_rpm); swap or mend the two"));
+              ElementsAre("13:16: speed_max_rpm: 19100 is not above 19100 (speed_min_rpm); swap or fix the two"));
   EXPECT_THAT(refused("arm_angle_max_deg: 180", "arm_angle_max_deg: -91"),
               testing::Contains(StartsWith("11:20: arm_angle_max_deg: -91 is not above -90")));
 }
@@ -194,12 +194,12 @@ TEST(Vehicle, NeedsNoneOfItForAnythingElse) {
 TEST(Vehicle, RefusesMassesAndGainsThatCannotBe) {
   EXPECT_THAT(refused_in_flight("mass_kg: 0.6\n", "mass_kg: 0.18\n"),
               ElementsAre("16:16: dynamics.hub_mass_kg: four times 0.045 kg leave nothing of 0.18 kg (mass_kg) for the "
-                          "body; mass_kg is that of all, hub_mass_kg that of one arm's end"));
+                          "body; mass_kg is the mass of the whole vehicle, hub_mass_kg of one arm's end"));
   EXPECT_THAT(
       refused_in_flight("  mass_kg: 0.6\n", "  mass_g: 600\n"),
       ElementsAre(StartsWith("15:3: mass_g is not a key of dynamics; the unit is part of the key: write mass_kg")));
   EXPECT_THAT(refused_in_flight("[1, -1, 1, -1]", "[1, -1, 2, -1]"),
-              ElementsAre(StartsWith("22:24: dynamics.rotor_spins[2]: 2 is not known here")));
+              ElementsAre(StartsWith("22:24: dynamics.rotor_spins[2]: 2 is not allowed")));
   EXPECT_THAT(refused_in_flight("[6, 6, 15]", "[6, 6]"),
               ElementsAre(StartsWith("24:25: control.position_gain_per_s2: 2 values; write at least 3")));
   EXPECT_THAT(refused_in_flight("[6, 6, 15]", "[6, 6, 0]"),
@@ -215,7 +215,7 @@ TEST(Vehicle, HasABodyThatIsAPlateOrTellsItsInertia) {
   EXPECT_THAT(refused_in_flight("  " + plate, ""),
               ElementsAre(StartsWith("15:3: dynamics: neither body_height_m nor body_inertia_kg_m2")));
   EXPECT_THAT(refused_in_flight(plate, plate + "  " + told),
-              ElementsAre(StartsWith("18:23: dynamics.body_inertia_kg_m2: is given, and body_height_m, too")));
+              ElementsAre(StartsWith("18:23: dynamics.body_inertia_kg_m2: given together with body_height_m")));
   EXPECT_THAT(refused_in_flight(plate, "body_inertia_kg_m2: [1e-3, 1e-3, 2.1e-3]\n"),
               ElementsAre(StartsWith("17:36: dynamics.body_inertia_kg_m2[2]: 0.0021 is more than the other two")));
 }
@@ -225,12 +225,12 @@ TEST(Vehicle, RefusesAFileOfAnotherKindWithOneLine) {
               ElementsAre("1:9: this is a coefficients file, expected a vehicle file; name a file that begins with "
                           "format: kphi-vehicle/1"));
   EXPECT_THAT(refused("kphi-vehicle/1", "kphi-vehicel/1"),
-              ElementsAre(StartsWith("1:9: format: text \"kphi-vehicel/1\" is not known here")));
+              ElementsAre(StartsWith("1:9: format: text \"kphi-vehicel/1\" is not allowed")));
 }
 
 TEST(Vehicle, HasOneBody) {
   EXPECT_THAT(refused("half_side_m: 0.045\n", ""),
-              ElementsAre(StartsWith("1:1: half_side_m: missing, and there is no body either")));
+              ElementsAre(StartsWith("1:1: half_side_m: missing, and body is missing as well")));
   const auto both = refusals([] {
     return parse_vehicle(vehicle_with_body() + "half_side_m: 0.045\narm_mirrored: [true, true, true, true]\n", "v");
   });

@@ -1,11 +1,10 @@
-#include "results/commands.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "commands/info_verify.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/journal.hpp"
 #include "test/results/synthetic_run.hpp"

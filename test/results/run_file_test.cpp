@@ -16,6 +16,7 @@
 #include "results/sha256.hpp"
 #include "test/results/recordings.hpp"
 #include "test/results/synthetic_run.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::results {
 namespace {
@@ -30,6 +31,16 @@ using test::write_run;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
+
+template <class Action>
+std::string error_of(Action&& action) {
+  try {
+    action();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "no error";
+}
 
 TEST(RunFile, ReadsBackAsWritten) {
   const TemporaryFolder folder;
@@ -71,6 +82,61 @@ TEST(RunFile, KeepsWhatHappenedToTheStreamItsHealthAndTheBoxesBias) {
     EXPECT_EQ(again.events[i].records, run.events[i].records);
     EXPECT_EQ(again.events[i].text, run.events[i].text.substr(0, kEventTextBytes));
   }
+}
+
+TEST(RunFile, KeepsWhatTheReductionNeedsToKnowOfCampaignAndBench) {
+  const TemporaryFolder folder;
+  RunRecording run = make_run({});
+  run.header.supply_voltage_v = 16;
+  run.header.coil_temperature_max_degc = 110;
+  run.header.clock_gain = 1.004;
+  run.header.clock_gain_u = 2e-5;
+  run.header.load_cell.saturation_bits = 1u << 27 | 1u << 30;
+  write_run(folder / "a.h5", run);
+  const RunHeader again = read_header(folder / "a.h5");
+  EXPECT_EQ(again.supply_voltage_v, 16);
+  EXPECT_EQ(again.coil_temperature_max_degc, 110);
+  EXPECT_EQ(again.clock_gain, 1.004);
+  EXPECT_EQ(again.clock_gain_u, 2e-5);
+  EXPECT_EQ(again.load_cell.saturation_bits, 1u << 27 | 1u << 30);
+}
+
+TEST(RunFile, RefusesAnotherFormat) {
+  const TemporaryFolder folder;
+  write_run(folder / "a.h5", make_run({}));
+  test::make_writable(folder / "a.h5");
+  std::string bytes = read_text(folder / "a.h5");
+  bytes.replace(bytes.find(kRunFormat), 10, "kphi-run/9");
+  std::ofstream(folder / "a.h5", std::ios::binary) << bytes;
+  EXPECT_THAT(error_of([&] { (void)read_run(folder / "a.h5"); }),
+              HasSubstr("format \"kphi-run/9\" cannot be read, only \"kphi-run/1\"; use the version of kphi"));
+}
+
+/// Every dataset, unit, code and attribute of the file stands in the specification.
+TEST(RunFile, IsDescribedInTheReadme) {
+  const std::string readme = read_text(kphi::test::source_dir() + "/results/README.md");
+  const auto told = [&](const std::string& words) { EXPECT_THAT(readme, HasSubstr(words)); };
+  const auto tell_group = [&](const auto& group, const std::string& path) {
+    for (const auto& column : group.columns) {
+      told(path + column.name + "`");
+      for (std::size_t code = 0; code < column.codes.size(); ++code) {
+        const std::string name = column.codes[code];
+        const bool is_event = std::string_view(column.name) == "kind";
+        told(std::to_string(code) + " " + (is_event ? "`" + name + "`" : name));
+      }
+    }
+  };
+  tell_group(kLoadCellGroup, "`/load_cell/");
+  tell_group(kCommandGroup, "`/commands/");
+  tell_group(kSupplyGroup, "`/supply/");
+  tell_group(kEventGroup, "`/events/");
+  tell_group(motor_group(kMotorChannels[0]), "`/motor/<channel>/");
+  for (const MotorChannelInfo& channel : kMotorChannels) told(std::string("`") + channel.name + "`");
+  const RunHeader header;
+  const RunEnding ending;
+  for_each_attribute(header, [&](const char* name, const auto&) { told(name); });
+  for_each_figure(ending, [&](const char* name, const auto&) { told(name); });
+  told(std::string("`") + kRunFormat + "`");
 }
 
 TEST(RunFile, IsReadOnlyUnderItsFinalNameWithTheDigestThatFinishGave) {

@@ -9,12 +9,11 @@
 #include <limits>
 #include <stdexcept>
 
-#include "profiles/configuration_error.hpp"
+#include "base/error.hpp"
+#include "base/number.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/campaign_verification.hpp"
 #include "results/journal.hpp"
-#include "results/number.hpp"
-#include "results/record_error.hpp"
 #include "results/sha256.hpp"
 #include "results/steps_csv.hpp"
 #include "test/results/synthetic_run.hpp"
@@ -104,7 +103,7 @@ std::vector<StepMean> arbitrary_steps() {
     s.speed_rad_s = number();
     s.supply_voltage_v = number();
     s.window_end_s = number();
-    s.doubts = *rc::gen::inRange<std::uint32_t>(0, 128);
+    s.quality_flags = *rc::gen::inRange<std::uint32_t>(0, 128);
     return s;
   }));
 }
@@ -118,7 +117,7 @@ TEST(StepsCsv, ReadsBackAsWritten) {
     RC_ASSERT(format_steps(again) == text);
     for (std::size_t i = 0; i < steps.size(); ++i) {
       RC_ASSERT(again[i].propeller == steps[i].propeller);
-      RC_ASSERT(again[i].doubts == steps[i].doubts);
+      RC_ASSERT(again[i].quality_flags == steps[i].quality_flags);
       const bool both_missing = std::isnan(steps[i].thrust_n) && std::isnan(again[i].thrust_n);
       RC_ASSERT(both_missing || again[i].thrust_n == steps[i].thrust_n);
     }
@@ -131,7 +130,7 @@ TEST(StepsCsv, IsPlainAndShort) {
   step.diameter_in = 5;
   step.thrust_n = 0.1;
   step.supply_voltage_v = std::nan("");
-  step.doubts = 5;
+  step.quality_flags = 5;
   const std::string text = format_steps(std::span(&step, 1));
   EXPECT_THAT(text, StartsWith("propeller,blades,diameter_in,occlusion_deg,repetition,step,commanded_speed_rad_s,"));
   EXPECT_THAT(text, HasSubstr("\n5x3,0,5,0,0,0,0,0,0,0,0.1,0,0,0,0,0,,0,0,0,0,0,speed_not_reached+saturated\n"));
@@ -151,11 +150,38 @@ TEST(StepsCsv, SaysWhereItDoesNotUnderstand) {
   EXPECT_THAT(complaint(good + "5x3,1\n"), StartsWith("steps.csv:5: 2 fields where the header has 23"));
   std::string bad = good;
   bad.replace(bad.rfind("5x3,0,0"), 7, "5x3,0,x");
-  EXPECT_THAT(complaint(bad), StartsWith("steps.csv:4: diameter_in: \"x\" is no number"));
+  EXPECT_THAT(complaint(bad), StartsWith("steps.csv:4: diameter_in: \"x\" is not a number"));
   bad = good;
   bad.insert(bad.size() - 1, "tired");
-  EXPECT_THAT(complaint(bad), AllOf(StartsWith("steps.csv:4: doubts"), HasSubstr("unknown doubt \"tired\"")));
+  EXPECT_THAT(complaint(bad),
+              AllOf(StartsWith("steps.csv:4: quality_flags"), HasSubstr("unknown quality flag \"tired\"")));
   EXPECT_THROW((void)parse_steps("", "steps.csv"), ConfigurationError);
+}
+
+TEST(StepsCsv, IsReadByTheNamesOfItsColumns) {
+  StepMean step;
+  step.propeller = "5x3";
+  step.blades = 3;
+  step.lag_s = 0.05;
+  step.discarded_s = 1;
+  const std::string text = format_steps(std::span(&step, 1));
+  const auto complaint = [](const std::string& changed) {
+    return error_of([&] { (void)parse_steps(changed, "steps.csv"); });
+  };
+  const auto replaced = [&](const char* from, const char* to) {
+    std::string changed = text;
+    return changed.replace(changed.find(from), std::string_view(from).size(), to);
+  };
+  std::string swapped = replaced("propeller,blades", "blades,propeller");
+  swapped.replace(swapped.find("5x3,3"), 5, "3,5x3");
+  const auto again = parse_steps(swapped, "steps.csv");
+  EXPECT_EQ(again.at(0).propeller, "5x3");
+  EXPECT_EQ(again.at(0).blades, 3);
+  EXPECT_EQ(again.at(0).lag_s, 0.05);
+  EXPECT_THAT(complaint(replaced("thrust_n,", "thrust,")), HasSubstr("steps.csv:1: unknown column \"thrust\""));
+  EXPECT_THAT(complaint(replaced("torque_nm,", "thrust_n,")), HasSubstr("steps.csv:1: column thrust_n occurs twice"));
+  EXPECT_THAT(complaint(replaced("torque_nm,", "lag_u_s,")), HasSubstr("occurs twice"));
+  EXPECT_THAT(complaint("propeller\n"), HasSubstr("steps.csv:1: column blades is missing"));
 }
 
 TEST(StepsCsv, FilesAreReplacedWhole) {
@@ -168,10 +194,12 @@ TEST(StepsCsv, FilesAreReplacedWhole) {
   EXPECT_THROW((void)read_steps(folder / "none.csv"), RecordError);
 }
 
-TEST(Doubts, HaveNamesBothWays) {
-  EXPECT_EQ(doubt_names(0), "");
-  EXPECT_EQ(doubt_names(127), "speed_not_reached+speed_unsteady+saturated+lost_samples+derated+few_samples+bad_status");
-  for (std::uint32_t doubts = 0; doubts < 128; ++doubts) EXPECT_EQ(doubts_from_names(doubt_names(doubts)), doubts);
+TEST(QualityFlags, HaveNamesBothWays) {
+  EXPECT_EQ(quality_flag_names(0), "");
+  EXPECT_EQ(quality_flag_names(127),
+            "speed_not_reached+speed_unsteady+saturated+lost_samples+derated+few_samples+bad_status");
+  for (std::uint32_t flags = 0; flags < 128; ++flags)
+    EXPECT_EQ(quality_flags_from_names(quality_flag_names(flags)), flags);
 }
 
 // ---- journal ----

@@ -25,7 +25,7 @@ constexpr std::array kCellFaults{
     "count: 1, for_s: 20, kind: lost_start",
     "count: 1, for_s: 20, kind: doubled_start, delay_s: <0~0.05>",
     "count: 1, for_s: 20, kind: delayed_start, delay_s: <0~0.05>",
-    "kind: stolen",
+    "kind: taken_over",
     "kind: restart",
     "kind: reboot, down_s: <0~1.5>, resume: <0..1>",
     "for_s: <0.01~0.6>, kind: stall",

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/clock.hpp"
+#include "base/clock.hpp"
 
 namespace kphi::soak {
 

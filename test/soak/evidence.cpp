@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "daq/reduction.hpp"
+#include "base/error.hpp"
 #include "results/file_layer.hpp"
-#include "results/record_error.hpp"
+#include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
 
 namespace kphi::soak {
@@ -22,9 +22,10 @@ void read(const std::filesystem::path& path, Evidence& evidence) {
   const bool inherited = is_inherited(path, evidence.inherited);
   try {
     FileOfRun file{path, results::read_run(path), {}, inherited};
-    if (file.run.outcome == results::Outcome::complete && !file.run.phases.empty()) file.steps = daq::reduce(file.run);
+    if (file.run.outcome == results::Outcome::complete && !file.run.phases.empty())
+      file.steps = results::reduce(file.run);
     evidence.files.push_back(std::move(file));
-  } catch (const results::RecordError& error) {
+  } catch (const RecordError& error) {
     if (!inherited) evidence.unreadable.push_back({path, error.what()});
   }
 }
@@ -34,7 +35,7 @@ void read(const std::filesystem::path& path, Evidence& evidence) {
 Evidence evidence_of(World& world) {
   Evidence evidence{world.mixture(),
                     world.campaign(),
-                    world.place(),
+                    world.config(),
                     world.story(),
                     nullptr,
                     world.inherited(),

@@ -32,7 +32,7 @@ struct Unreadable {
 struct Evidence {
   Mixture mixture;
   profiles::Campaign campaign;
-  profiles::Bench place;
+  profiles::BenchConfig config;
   Story story;
   const sim::WireTruth* wire = nullptr;  ///< none: the bench could not be made
   Inheritance inherited;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "drivers/sim/fault_file.hpp"
+#include "drivers/sim/input_files.hpp"
 
 namespace kphi::soak {
 namespace {
@@ -14,8 +14,8 @@ constexpr Duration kEcho = 1s;
 
 bool goes_on(sim::FaultKind kind) {
   using K = sim::FaultKind;
-  return kind == K::zero_drift || kind == K::clock_skew || kind == K::stolen || kind == K::reboot || kind == K::rate ||
-         kind == K::units || kind == K::ft_jump_back || kind == K::overrun || kind == K::wrap;
+  return kind == K::zero_drift || kind == K::clock_skew || kind == K::taken_over || kind == K::reboot ||
+         kind == K::rate || kind == K::units || kind == K::ft_jump_back || kind == K::overrun || kind == K::wrap;
 }
 
 bool goes_on(sim::MotorFaultKind kind) {
@@ -38,7 +38,9 @@ bool goes_on(const sim::Fault& fault) {
 
 }  // namespace
 
-Reaches::Reaches(const std::string& faults) : cell_(sim::parse_faults(faults, "faults")) {
+Reaches::Reaches(const std::string& faults) {
+  const sim::FaultFile file = sim::parse_faults(faults, "faults");
+  cell_ = file.load_cell;
   std::erase_if(cell_, is_harmless);
   const auto end_of = [](const auto& fault, bool for_ever) {
     if (for_ever) return kNever;
@@ -47,15 +49,15 @@ Reaches::Reaches(const std::string& faults) : cell_(sim::parse_faults(faults, "f
   for (const auto& f : cell_) {
     all_.push_back({Device::load_cell, std::string(sim::name_of(f.kind)), f.at, end_of(f, goes_on(f))});
   }
-  for (const auto& f : sim::parse_motor_faults(faults, "faults")) {
+  for (const auto& f : file.motor) {
     all_.push_back(
         {Device::motor, std::string(sim::name_of(f.kind)), f.at, end_of(f, goes_on(f.kind)), silences(f.kind)});
   }
-  for (const auto& f : sim::parse_ambient_faults(faults, "faults"))
-    all_.push_back({Device::air, std::string(sim::name_of(f.kind)), f.at, end_of(f, false)});
-  for (const auto& f : sim::parse_supply_faults(faults, "faults")) {
+  for (const auto& f : file.air)
+    all_.push_back({Device::air, std::string(sim::ambient_faults().name_of(f.kind)), f.at, end_of(f, false)});
+  for (const auto& f : file.supply) {
     const bool instant = f.kind == sim::SupplyFaultKind::trip || f.kind == sim::SupplyFaultKind::panel;
-    all_.push_back({Device::supply, std::string(sim::name_of(f.kind)), f.at, end_of(f, instant)});
+    all_.push_back({Device::supply, std::string(sim::supply_faults().name_of(f.kind)), f.at, end_of(f, instant)});
   }
 }
 

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "drivers/clock.hpp"
-#include "drivers/sim/faults.hpp"
-#include "drivers/sim/iq_faults.hpp"
-#include "drivers/sim/supply_faults.hpp"
+#include "base/clock.hpp"
+#include "drivers/sim/iq/faults.hpp"
+#include "drivers/sim/netbox/faults.hpp"
+#include "drivers/sim/supply/faults.hpp"
 
 namespace kphi::soak {
 
@@ -17,7 +17,7 @@ struct Reach {
   Device device;
   std::string kind;
   Instant begin, end;          ///< acts between the two
-  bool silences_line = false;  ///< the module may not hear, or not obey, the host
+  bool silences_line = false;  ///< the module may not hear, or not apply, the host
 
   [[nodiscard]] bool meets(Instant from, Instant to) const noexcept { return begin <= to && end >= from; }
 };

@@ -24,7 +24,7 @@ const char* name_of(kphi::sim::PowerStage::Mode mode) {
 struct Tally {
   std::array<std::uint64_t, 8> ends{};
   std::uint64_t lived = 0, failed = 0, resumed = 0, resumed_to_the_end = 0;
-  std::uint64_t clean_steps = 0, clean_steps_in_doubt = 0;
+  std::uint64_t clean_steps = 0, clean_steps_flagged = 0;
 
   void add(const Tally& other) {
     for (std::size_t i = 0; i < ends.size(); ++i) ends[i] += other.ends[i];
@@ -33,7 +33,7 @@ struct Tally {
     resumed += other.resumed;
     resumed_to_the_end += other.resumed_to_the_end;
     clean_steps += other.clean_steps;
-    clean_steps_in_doubt += other.clean_steps_in_doubt;
+    clean_steps_flagged += other.clean_steps_flagged;
   }
 };
 
@@ -57,7 +57,7 @@ void live_one(std::uint64_t seed, bool talkative, Tally& tally) {
     live_through(seed, [&](const Evidence& evidence, const Verdict& verdict) {
       const Story& story = evidence.story;
       tally.clean_steps += verdict.clean_steps;
-      tally.clean_steps_in_doubt += verdict.clean_steps_in_doubt;
+      tally.clean_steps_flagged += verdict.clean_steps_flagged;
       ++tally.ends[static_cast<std::size_t>(story.end)];
       tally.resumed += evidence.mixture.life > 1;
       tally.resumed_to_the_end += evidence.mixture.life > 1 && story.end == End::finished;
@@ -148,14 +148,14 @@ int main(int argc, char** argv) {
       if (tally.ends[i] > 0) fmt::print("{:6} {}\n", tally.ends[i], name_of(static_cast<End>(i)));
     fmt::print("{:6} lives were resumed, {} of them to the end of the campaign\n", tally.resumed,
                tally.resumed_to_the_end);
-    fmt::print("{:6} of {} clean steps unsettled or drifting by chance\n", tally.clean_steps_in_doubt,
+    fmt::print("{:6} of {} clean steps unsettled or drifting by chance\n", tally.clean_steps_flagged,
                tally.clean_steps);
     fmt::print("{:6} failed, of {} from seed {}\n", tally.failed, tally.lived, from);
     if (tally.lived < count)
       fmt::print("{:6} did not live: {}\n", count - tally.lived, g_stop != 0 ? "stopped" : "a worker died");
   }
   return tally.failed == 0 && tally.lived == (seed ? 1 : count) &&
-                 is_chance(tally.clean_steps_in_doubt, tally.clean_steps)
+                 is_chance(tally.clean_steps_flagged, tally.clean_steps)
              ? 0
              : 1;
 }

@@ -6,10 +6,10 @@
 
 namespace kphi::soak {
 
-bool is_chance(std::uint64_t in_doubt, std::uint64_t clean) {
-  if (clean == 0) return in_doubt == 0;
-  const boost::math::binomial steps(static_cast<double>(clean), kDoubtedByChance);
-  return in_doubt == 0 || boost::math::cdf(boost::math::complement(steps, static_cast<double>(in_doubt - 1))) > 1e-6;
+bool is_chance(std::uint64_t flagged, std::uint64_t clean) {
+  if (clean == 0) return flagged == 0;
+  const boost::math::binomial steps(static_cast<double>(clean), kFlaggedByChance);
+  return flagged == 0 || boost::math::cdf(boost::math::complement(steps, static_cast<double>(flagged - 1))) > 1e-6;
 }
 
 Verdict judge(const Evidence& evidence) {

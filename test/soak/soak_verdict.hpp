@@ -15,9 +15,9 @@
 //           does not know yet. Finished, all runs of the plan are accepted, each once.
 // Resumed   Every run that was accepted before is there, byte by byte; whatever else was there is, at most with another
 //           name; the journal goes on where it ended. Refused because of other faults, nothing has been touched.
-// Verdict   A step without a doubt shows the true thrust and speed. A step in whose window a record is missing, or in
+// Verdict   A step without a flag shows the true thrust and speed. A step in whose window a record is missing, or in
 //           which the box stood still, was saturated or reported an error, says so. A run out of reach of every fault
-//           is accepted without a doubt, but for those that short steps may have: the lag unknown; now and then
+//           is accepted without a flag, but for those that short steps may have: the lag unknown; now and then
 //           unsettled, drifting, or with a lag that is not there, which are counted; those of a speed that truly came
 //           late. Nothing but a fault, the disk or the operator ends a campaign; the reason names the device concerned.
 #pragma once
@@ -32,16 +32,16 @@ namespace kphi::soak {
 
 struct Verdict {
   std::vector<std::string> wrong;
-  std::uint64_t clean_steps = 0;           ///< out of reach of every fault
-  std::uint64_t clean_steps_in_doubt = 0;  ///< of them, by chance: unsettled, drifting, or a lag told that is not there
+  std::uint64_t clean_steps = 0;          ///< out of reach of every fault
+  std::uint64_t clean_steps_flagged = 0;  ///< of them, by chance: unsettled, drifting, or a lag told that is not there
 };
 
 [[nodiscard]] Verdict judge(const Evidence& evidence);
 
-/// Of clean steps, the share that their tests of significance doubt although nothing is wrong with them: 105 of 40,383
+/// Of clean steps, the share that their tests of significance flag although nothing is wrong with them: 105 of 40,383
 /// were seen.
-inline constexpr double kDoubtedByChance = 0.003;
-/// So many of them, or more, would be doubted at least once in a million times.
-[[nodiscard]] bool is_chance(std::uint64_t in_doubt, std::uint64_t clean);
+inline constexpr double kFlaggedByChance = 0.003;
+/// So many of them, or more, would be flagged at least once in a million times.
+[[nodiscard]] bool is_chance(std::uint64_t flagged, std::uint64_t clean);
 
 }  // namespace kphi::soak

@@ -15,7 +15,7 @@ namespace kphi::soak {
 namespace {
 
 using namespace std::chrono_literals;
-using results::Doubt;
+using results::QualityFlag;
 namespace fs = std::filesystem;
 
 constexpr const char* kNoFaults = "format: kphi-faults/1\nfaults:\n  []\n";
@@ -92,7 +92,7 @@ std::unique_ptr<World> lived(Base base) {
     case Base::stalled:
       return lived(stalled_mixture());
     case Base::stopped:
-      return lived(with_fault("at_s: 9, kind: stolen"));
+      return lived(with_fault("at_s: 9, kind: taken_over"));
     case Base::erring:
       return lived(erring_mixture());
     case Base::killed:
@@ -178,9 +178,9 @@ fs::path other_run(const Evidence& evidence, const std::string& words) {
 }
 
 /// Of all steps.
-void withdraw(Evidence& evidence, std::uint32_t doubts) {
+void withdraw(Evidence& evidence, std::uint32_t flags) {
   for (FileOfRun& file : evidence.files)
-    for (auto& step : file.steps) step.doubts &= ~doubts;
+    for (auto& step : file.steps) step.quality_flags &= ~flags;
 }
 
 Sabotage counted_once_more(const char* what, std::uint64_t results::SampleAccount::*count, const char* told) {
@@ -252,7 +252,7 @@ void report(Evidence& evidence, std::uint32_t status, std::size_t records) {
   for (std::size_t i = 0; i < records; ++i) samples.at(samples.size() / 2 + i).status = status;
 }
 
-std::size_t patience_of(const Evidence& e) { return static_cast<std::size_t>(e.place.netbox.records_per_datagram); }
+std::size_t patience_of(const Evidence& e) { return static_cast<std::size_t>(e.config.netbox.records_per_datagram); }
 
 TEST(SoakVerdict, NamesARunThatWentOnThoughTheBoxReportedAnError) {
   expect_each_named({
@@ -358,20 +358,20 @@ Sabotage ended_as(const char* what, End end, const char* reason, const char* tol
 
 TEST(SoakVerdict, NamesAWrongVerdictOfTheDrivers) {
   expect_each_named({
-      {"5 % more thrust without a doubt", Base::clean, [](Evidence& e) { e.files[0].steps[1].thrust_n *= 1.05; },
-       "N without a doubt, in truth"},
-      {"5 % more speed without a doubt", Base::clean, [](Evidence& e) { e.files[0].steps[1].speed_rad_s *= 1.05; },
-       "rad/s without a doubt, in truth"},
+      {"5 % more thrust without a flag", Base::clean, [](Evidence& e) { e.files[0].steps[1].thrust_n *= 1.05; },
+       "N without a flag, in truth"},
+      {"5 % more speed without a flag", Base::clean, [](Evidence& e) { e.files[0].steps[1].speed_rad_s *= 1.05; },
+       "rad/s without a flag, in truth"},
       {"no thrust that is a number", Base::clean, [](Evidence& e) { e.files[0].steps[1].thrust_n = std::nan(""); },
-       "N without a doubt, in truth"},
-      {"lost samples without a doubt", Base::lossy,
-       [](Evidence& e) { withdraw(e, static_cast<std::uint32_t>(Doubt::lost_samples)); },
+       "N without a flag, in truth"},
+      {"lost samples without a flag", Base::lossy,
+       [](Evidence& e) { withdraw(e, static_cast<std::uint32_t>(QualityFlag::lost_samples)); },
        "records are missing in its window, it does not say so"},
-      {"a measurement that stands still without a doubt", Base::stalled, [](Evidence& e) { withdraw(e, ~0u); },
+      {"a measurement that stands still without a flag", Base::stalled, [](Evidence& e) { withdraw(e, ~0u); },
        "the box was disturbed in its window, it does not say so"},
-      {"a doubt without a reason", Base::clean,
-       [](Evidence& e) { e.files[0].steps[1].doubts |= static_cast<std::uint32_t>(Doubt::derated); },
-       "is out of reach of every fault, its doubts are"},
+      {"a flag without a reason", Base::clean,
+       [](Evidence& e) { e.files[0].steps[1].quality_flags |= static_cast<std::uint32_t>(QualityFlag::derated); },
+       "is out of reach of every fault, its flags are"},
       {"a step is missing", Base::clean, [](Evidence& e) { e.files[0].steps.pop_back(); }, " has 2 steps"},
       {"the air is another", Base::clean, [](Evidence& e) { e.files[0].run.header.air_density_kg_m3 = 1.1; },
        "air of 1.1 kg/m³"},
@@ -390,15 +390,15 @@ TEST(SoakVerdict, NamesAWrongVerdictOfTheDrivers) {
   });
 }
 
-TEST(SoakVerdict, BearsOnlyAsManyCleanStepsInDoubtAsChanceExplains) {
+TEST(SoakVerdict, BearsOnlyAsManyCleanStepsFlaggedAsChanceExplains) {
   EXPECT_TRUE(is_chance(0, 0));
   EXPECT_TRUE(is_chance(0, 40'000));
   const auto of = [](double share, std::uint64_t steps) {
     return is_chance(static_cast<std::uint64_t>(std::lround(share * static_cast<double>(steps))), steps);
   };
-  EXPECT_TRUE(of(kDoubtedByChance, 200));
-  EXPECT_TRUE(of(kDoubtedByChance, 40'000));
-  EXPECT_FALSE(of(1.5 * kDoubtedByChance, 40'000)) << "seen in ten thousand campaigns";
+  EXPECT_TRUE(of(kFlaggedByChance, 200));
+  EXPECT_TRUE(of(kFlaggedByChance, 40'000));
+  EXPECT_FALSE(of(1.5 * kFlaggedByChance, 40'000)) << "seen in ten thousand campaigns";
   EXPECT_FALSE(of(0.05, 200)) << "and a larger one in fifty";
 }
 

@@ -6,11 +6,9 @@
 #include <fstream>
 #include <utility>
 
-#include "daq/interlock.hpp"
-#include "drivers/device_error.hpp"
-#include "profiles/configuration_error.hpp"
+#include "base/error.hpp"
+#include "daq/guard/interlock.hpp"
 #include "results/journal.hpp"
-#include "results/record_error.hpp"
 
 namespace kphi::soak {
 namespace {
@@ -118,7 +116,7 @@ World::World(const Mixture& mixture, const std::filesystem::path& quick_folder)
     : mixture_(mixture), folder_(quick_folder), disk_(mixture.disk) {
   std::ofstream(folder_ / "faults.yaml") << mixture.faults;
   campaign_ = profiles::parse_campaign(mixture.campaign, "campaign.yaml");
-  place_ = profiles::parse_bench(bench_text(mixture), (folder_ / "bench.yaml").string());
+  config_ = profiles::parse_bench(bench_text(mixture), (folder_ / "bench.yaml").string());
   disk_.watch = [this](std::uint64_t number) { at_operation(number); };
 }
 
@@ -160,7 +158,7 @@ void World::live() {
   } catch (const daq::SafetyStop& e) {
     story_.end = End::stopped;
     story_.reason = e.what();
-  } catch (const results::RecordError& e) {
+  } catch (const RecordError& e) {
     story_.end = End::disk;
     story_.reason = e.what();
   } catch (const DeviceError& e) {
@@ -184,13 +182,13 @@ void World::live() {
 /// As `kphi run` does: what is asked of files comes before any device.
 void World::begin() {
   if (written_) {
-    resumption_ = daq::look_at(*written_, mixture_.accepts_changes);
+    resumption_ = daq::inspect(*written_, mixture_.accepts_changes);
     resumption_->cleared_by = "soak";
-    (void)daq::require_unchanged(*written_, *resumption_, daq::identity_of(campaign_, place_));
+    (void)daq::require_unchanged(*written_, *resumption_, daq::identity_of(campaign_, config_));
   }
   sim::BenchSettings settings;
-  settings.keep = sim::FaultyWire::Keep::samples;
-  bench_ = std::make_unique<daq::DeterministicBench>(place_, settings);
+  settings.keep = sim::FaultInjector::Keep::samples;
+  bench_ = std::make_unique<daq::DeterministicBench>(config_, settings);
   bench_->use_files(disk_);
   daq::BenchWitness witness;
   witness.stepped = [this] { step(); };
@@ -216,7 +214,7 @@ void World::campaign_to_its_end() {
   };
   Person person(*this, stop_asked);
   Watch watch(*this);
-  (void)daq::run_campaign(*bench_, campaign_, place_, *written_, person, watch, stop_asked,
+  (void)daq::run_campaign(*bench_, campaign_, config_, *written_, person, watch, stop_asked,
                           resumption_ ? &*resumption_ : nullptr);
 }
 

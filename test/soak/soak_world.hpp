@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "daq/campaign_run.hpp"
-#include "daq/deterministic_bench.hpp"
+#include "daq/campaign/campaign_run.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
 #include "test/drivers/netbox_faults/ideal.hpp"
 #include "test/soak/campaign_mixture.hpp"
 #include "test/soak/spoilt_disk.hpp"
@@ -90,7 +90,7 @@ class World {
   [[nodiscard]] const Story& story() const noexcept { return story_; }
   [[nodiscard]] const SpoiltDisk& disk() const noexcept { return disk_; }
   [[nodiscard]] const profiles::Campaign& campaign() const noexcept { return campaign_; }
-  [[nodiscard]] const profiles::Bench& place() const noexcept { return place_; }
+  [[nodiscard]] const profiles::BenchConfig& config() const noexcept { return config_; }
   /// nullptr: it could not be made.
   [[nodiscard]] daq::DeterministicBench* bench() noexcept { return bench_.get(); }
   /// What was there before; empty for a new campaign.
@@ -118,7 +118,7 @@ class World {
   test::TemporaryFolder folder_;
   SpoiltDisk disk_;
   profiles::Campaign campaign_;
-  profiles::Bench place_;
+  profiles::BenchConfig config_;
   std::unique_ptr<daq::DeterministicBench> bench_;
   std::optional<results::CampaignFolder> written_, left_;
   Inheritance inherited_;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "drivers/netbox/session.hpp"
+#include "drivers/netbox/stream/session.hpp"
 #include "test/soak/verdict_checks.hpp"
 
 namespace kphi::soak {

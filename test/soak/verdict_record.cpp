@@ -87,7 +87,7 @@ void check_journal(const Evidence& evidence, const results::JournalReading& jour
 /// Of a finished campaign.
 void check_plan(const Evidence& evidence, const std::vector<std::string>& accepted, Lines& wrong) {
   if (evidence.story.end != End::finished) return;
-  for (const auto& planned : profiles::make_plan(evidence.campaign, evidence.place).runs) {
+  for (const auto& planned : profiles::make_plan(evidence.campaign, evidence.config).runs) {
     const std::string name =
         "runs/" + results::run_file_name(evidence.campaign.propeller.id, planned.occlusion_deg, planned.repetition);
     const auto times = std::count(accepted.begin(), accepted.end(), name);

@@ -37,7 +37,7 @@ void check_status(const Evidence& evidence, const Reaches& reaches, Lines& wrong
   const Story& story = evidence.story;
   for (const FileOfRun& file : evidence.files) {
     const auto noticed =
-        file.inherited ? std::nullopt : one_too_many(file.run, evidence.place.netbox.records_per_datagram);
+        file.inherited ? std::nullopt : one_too_many(file.run, evidence.config.netbox.records_per_datagram);
     if (!noticed) continue;
     if (file.run.outcome == results::Outcome::complete) {
       if (was_judged(file.run, *noticed))

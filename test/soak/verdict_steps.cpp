@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "daq/zero_limits.hpp"
+#include "results/reduction/zeros.hpp"
 #include "results/steps_csv.hpp"
 #include "test/soak/verdict_checks.hpp"
 
@@ -11,14 +11,15 @@ namespace kphi::soak {
 namespace {
 
 using namespace std::chrono_literals;
-using results::Doubt;
+using results::QualityFlag;
 
 constexpr double kTrueDensity = 1.225;  // kg/m³, of the simulated bench
 constexpr Duration kMisplaced = 20ms;   ///< by the clock map and the delays of a wire
 /// What short steps may say of themselves though nothing is wrong: three of them need not tell the lag, and a test of
 /// significance errs at times.
-constexpr auto kNeedNotTell = static_cast<std::uint32_t>(Doubt::lag_unknown);
-constexpr auto kByChance = static_cast<std::uint32_t>(Doubt::unsettled) | static_cast<std::uint32_t>(Doubt::drifted);
+constexpr auto kNeedNotTell = static_cast<std::uint32_t>(QualityFlag::lag_unknown);
+constexpr auto kByChance =
+    static_cast<std::uint32_t>(QualityFlag::unsettled) | static_cast<std::uint32_t>(QualityFlag::drifted);
 
 struct Means {
   double speed = 0, thrust = 0;
@@ -46,19 +47,19 @@ void check_truth(const Evidence& evidence, const FileOfRun& file, const results:
   const Means truth = true_means(evidence.story, step.window_begin_s, step.window_end_s);
   if (truth.n < 10) return;
   const double thrust = std::abs(truth.thrust);  // it may push
-  const double allowed_thrust = 6 * step.thrust_u_n + daq::tolerated_drift(thrust) + 0.003 * thrust;
+  const double allowed_thrust = 6 * step.thrust_u_n + results::tolerated_drift(thrust) + 0.003 * thrust;
   const double allowed_speed = 6 * step.speed_u_rad_s + 0.003 * truth.speed + 1;
   if (!(std::abs(step.thrust_n - truth.thrust) <= allowed_thrust))
-    wrong.push_back(fmt::format("{}: {:.4f} N without a doubt, in truth {:.4f} N (u {:.4f})", step_name(file, step),
+    wrong.push_back(fmt::format("{}: {:.4f} N without a flag, in truth {:.4f} N (u {:.4f})", step_name(file, step),
                                 step.thrust_n, truth.thrust, step.thrust_u_n));
   if (!(std::abs(step.speed_rad_s - truth.speed) <= allowed_speed))
-    wrong.push_back(fmt::format("{}: {:.2f} rad/s without a doubt, in truth {:.2f} rad/s (u {:.2f})",
+    wrong.push_back(fmt::format("{}: {:.2f} rad/s without a flag, in truth {:.2f} rad/s (u {:.2f})",
                                 step_name(file, step), step.speed_rad_s, truth.speed, step.speed_u_rad_s));
 }
 
 /// Samples that the box took well inside the window and sent, and that are not in the file.
 void check_missing(const Evidence& evidence, const FileOfRun& file, const results::StepMean& step, Lines& wrong) {
-  if ((step.doubts & static_cast<std::uint32_t>(Doubt::lost_samples)) != 0) return;
+  if ((step.quality_flags & static_cast<std::uint32_t>(QualityFlag::lost_samples)) != 0) return;
   const Instant begin = from_seconds(step.window_begin_s) + kMisplaced,
                 end = from_seconds(step.window_end_s) - kMisplaced;
   const sim::WireTruth& wire = *evidence.wire;
@@ -104,7 +105,8 @@ bool speed_came_late(const Evidence& evidence, const results::StepMean& step) {
 
 std::string names(const std::vector<results::StepMean>& steps) {
   std::string all;
-  for (const auto& step : steps) all += (all.empty() ? "" : ", ") + ("\"" + results::doubt_names(step.doubts) + "\"");
+  for (const auto& step : steps)
+    all += (all.empty() ? "" : ", ") + ("\"" + results::quality_flag_names(step.quality_flags) + "\"");
   return all;
 }
 
@@ -113,30 +115,31 @@ void check_run(const Evidence& evidence, const FileOfRun& file, const Reaches& r
   if (run.outcome != results::Outcome::complete || run.phases.empty()) return;
   const Instant begin(run.phases.front().time_ns), end(run.phases.back().time_ns);
   const bool clean = !reaches.any(begin - 200ms, end);
-  std::uint32_t doubts = 0;
+  std::uint32_t flags = 0;
   for (const auto& step : file.steps) {
-    std::uint32_t unexplained = step.doubts;
-    if (supply_was_out_of_band(evidence, step)) unexplained &= ~static_cast<std::uint32_t>(Doubt::supply_out_of_band);
-    if (!lag_is_wrong(step) && !speed_came_late(evidence, step)) doubts |= unexplained;
-    if ((step.doubts & ~kNeedNotTell) == 0) check_truth(evidence, file, step, verdict.wrong);
+    std::uint32_t unexplained = step.quality_flags;
+    if (supply_was_out_of_band(evidence, step))
+      unexplained &= ~static_cast<std::uint32_t>(QualityFlag::supply_out_of_band);
+    if (!lag_is_wrong(step) && !speed_came_late(evidence, step)) flags |= unexplained;
+    if ((step.quality_flags & ~kNeedNotTell) == 0) check_truth(evidence, file, step, verdict.wrong);
     check_missing(evidence, file, step, verdict.wrong);
-    if (box_was_disturbed(reaches, step) && (step.doubts & ~(kNeedNotTell | kByChance)) == 0)
+    if (box_was_disturbed(reaches, step) && (step.quality_flags & ~(kNeedNotTell | kByChance)) == 0)
       verdict.wrong.push_back(step_name(file, step) + ": the box was disturbed in its window, it does not say so");
     verdict.clean_steps += clean;
-    verdict.clean_steps_in_doubt += clean && ((step.doubts & kByChance) != 0 || lag_is_wrong(step));
+    verdict.clean_steps_flagged += clean && ((step.quality_flags & kByChance) != 0 || lag_is_wrong(step));
   }
   if (file.steps.size() != static_cast<std::size_t>(evidence.campaign.profile.steps))
     verdict.wrong.push_back(fmt::format("verdict: {} has {} steps", file.name(), file.steps.size()));
-  if (clean && (doubts & ~(kNeedNotTell | kByChance)) != 0)
+  if (clean && (flags & ~(kNeedNotTell | kByChance)) != 0)
     verdict.wrong.push_back(
-        fmt::format("verdict: {} is out of reach of every fault, its doubts are {}", file.name(), names(file.steps)));
+        fmt::format("verdict: {} is out of reach of every fault, its flags are {}", file.name(), names(file.steps)));
 }
 
 /// With a sensor every run knows its air: no fault here lasts until the newest reading is too old.
 void check_air(const Evidence& evidence, const FileOfRun& file, Lines& wrong) {
   const double density = file.run.header.air_density_kg_m3;
   const bool right =
-      evidence.place.ambient.sensor.empty() ? density == 0 : std::abs(density / kTrueDensity - 1) < 0.005;
+      evidence.config.ambient.sensor.empty() ? density == 0 : std::abs(density / kTrueDensity - 1) < 0.005;
   if (!right) wrong.push_back(fmt::format("verdict: {}: air of {} kg/m³", file.name(), density));
 }
 

@@ -3,7 +3,7 @@
 const at = id => document.getElementById(id);
 const kPoints = 1800;      // of the curves over time: a minute at 30 ticks a second
 const kGap_s = 1;          // no line is drawn across a longer silence
-const kSilent_s = 1;       // so long without a word from the runner: it waits for something
+const kSilent_s = 1;       // without a tick from the runner: it is waiting
 const kMostLines = 500;
 const kNear = 0.9;         // of a limit
 
@@ -82,7 +82,7 @@ function drawSteps() {
   const paints = angles.map((_, i) => occlusionColours()[i % 8]);
   const rows = steps.map(step => [step.speed2_rad2_s2 / 1e6,
     ...angles.map(angle => angle === step.occlusion_deg ? 1e6 * step.k_n_s2 : null)]);
-  // What is too uncertain to be seen does not set the scale.
+  // Points too uncertain to be seen do not set the scale.
   const sure = steps.filter(step => step.u_k_n_s2 !== null && step.u_k_n_s2 < 0.05 * Math.abs(step.k_n_s2));
   const shown = sure.length ? sure : steps, u = step => step.u_k_n_s2 || 0;
   const low = 1e6 * Math.min(...shown.map(step => step.k_n_s2 - u(step)));
@@ -124,11 +124,11 @@ function showNumbers() {
   showLimits(tick);
 }
 
-/// What is no longer measured is no number.
+/// Stale values are shown as '?' with their age.
 function showFigure(id, value, words, age_s, beside) {
   const silent_s = Math.max(age_s, state.tick.silent_s), stale = value === null || state.tick.silent_s > kSilent_s;
   text(id, state.ended ? '–' : stale ? '?' : words(value));
-  text(id + '_beside', state.ended ? `not measured any more, last ${words(value)}` : stale ? `nothing for ${fixed(silent_s, 1)} s` : beside);
+  text(id + '_beside', state.ended ? `run over, last value ${words(value)}` : stale ? `no reading for ${fixed(silent_s, 1)} s` : beside);
   at(id).closest('.figure').classList.toggle('stale', stale && !state.ended);
   at(id).closest('.figure').classList.toggle('over', state.ended);
 }
@@ -148,13 +148,13 @@ function showReadings(tick) {
   at('lost').classList.toggle('bad', tick.lost_network + tick.lost_host > 0);
 }
 
-// ---- limits: what the guard holds the bench to, and who set it
+// ---- limits of the guard, and who set them
 function makeLimits(limits) {
   state.limits = limits;
   at('limits').replaceChildren(...limits.map(limit => {
     const row = document.createElement('div'), bar = document.createElement('div');
     row.className = 'limit';
-    row.title = `${limit.name} ${limit.lower ? 'below' : 'above'} ${limitNumber(limit, limit.limit)} ${limit.unit} lets the motor coast. Set by: ${limit.source}`;
+    row.title = `${limit.name} ${limit.lower ? 'below' : 'above'} ${limitNumber(limit, limit.limit)} ${limit.unit} coasts the motor. Set by: ${limit.source}`;
     bar.append(document.createElement('i'));
     row.append(document.createElement('b'), bar, document.createElement('span'), document.createElement('small'));
     row.children[0].textContent = limit.name;
@@ -203,7 +203,7 @@ function showStop() {
   const word = state.ended ? (replay ? 'REPLAY OVER' : 'ENDED') : replay ? 'REPLAY' : state.asked ? 'STOPPING' : 'STOP';
   text('stop_word', word);
   at('stop_word').classList.toggle('long', word.length > 5);
-  text('stop_keys', replay ? 'nothing turns here' : state.ended ? 'read below what happened' : open ? 'Space or Esc' : 'no connection');
+  text('stop_keys', replay ? 'recorded run' : state.ended ? 'see the log' : open ? 'Space or Esc' : 'no connection');
   button.classList.toggle('asked', state.asked && !state.ended);
   button.classList.toggle('over', state.ended);
   button.disabled = state.ended || replay || !open;
@@ -212,7 +212,7 @@ function showStop() {
 function stop() {
   if (state.ended || !state.hello || state.hello.replay || !link || link.readyState !== WebSocket.OPEN) return;
   link.send('stop');
-  banner('', 'STOP is sent.', 'Waiting for kphi to confirm.');
+  banner('', 'STOP sent.', 'Waiting for kphi to confirm.');
 }
 
 addEventListener('keydown', event => {
@@ -250,8 +250,8 @@ const take = {
   line(message) { addLine(message.time_s, message.text); },
   stop(message) {
     state.asked = true;
-    addLine(message.time_s, 'STOP was asked on this page');
-    banner('', 'STOP: kphi has it.', 'The motor is being let go.');
+    addLine(message.time_s, 'STOP pressed on this page');
+    banner('', 'STOP received.', 'Coasting the motor.');
     showStop();
   },
   end(message) {
@@ -259,7 +259,7 @@ const take = {
     state.numbersDue = true;
     addLine(message.time_s, message.text);
     const replay = state.hello.replay;
-    banner(message.well ? 'good' : state.asked ? '' : 'bad', message.well ? (replay ? 'The replay is over.' : 'The campaign is finished.') : 'The run is over.', message.well ? '' : message.text);
+    banner(message.well ? 'good' : state.asked ? '' : 'bad', message.well ? (replay ? 'The replay is over.' : 'Campaign finished.') : 'The run is over.', message.well ? '' : message.text);
     showStop();
   },
 };
@@ -299,7 +299,7 @@ function connect() {
     text('link', state.ended ? 'over' : 'no connection');
     showStop();
     if (state.ended) return;
-    banner('bad', 'No connection to kphi.', 'STOP does nothing here now. If the motor turns: Ctrl-C in the terminal of kphi, or cut the 12 V.');
+    banner('bad', 'No connection to kphi.', 'STOP does not work here now. If the motor is turning, press Ctrl-C in the terminal of kphi, or cut the 12 V.');
     setTimeout(connect, 500);
   };
 }

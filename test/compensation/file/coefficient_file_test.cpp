@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
+#include <vector>
 
 #include "test/source_dir.hpp"
 
@@ -61,19 +63,15 @@ TEST(CoefficientFile, GivesWhatTheFileSaysInSiUnits) {
   EXPECT_EQ(c.propeller.id, "5x3");
   EXPECT_EQ(c.propeller.diameter_in, 5.0);
   EXPECT_EQ(c.propeller.blades, 3);
-  EXPECT_EQ(c.overlap, OverlapMeasure::rim_arc);
-  EXPECT_EQ(c.thrust_coefficient.value(), 1.55e-6);
+  EXPECT_EQ(c.curve.overlap(), OverlapMeasure::rim_arc);
+  EXPECT_EQ(c.curve.thrust_coefficient().value(), 1.55e-6);
   EXPECT_EQ(c.thrust_coefficient_error->value(), 1e-9);
-  EXPECT_FALSE(c.line.anchored);
-  EXPECT_EQ(c.line.intercept.value(), 1.6e-6);
-  EXPECT_DOUBLE_EQ(c.line.slope_per_rad, -4.5e-9 * 180 / kPi);
-  ASSERT_TRUE(c.line.covariance);
-  EXPECT_EQ((*c.line.covariance)[0][0], 1e-18);
-  EXPECT_DOUBLE_EQ((*c.line.covariance)[0][1], -5e-21 * 180 / kPi);
-  EXPECT_DOUBLE_EQ((*c.line.covariance)[1][1], 4e-23 * (180 / kPi) * (180 / kPi));
-  ASSERT_EQ(c.line.points.size(), 4u);
-  EXPECT_EQ(c.line.points[3], from_degrees(270));
-  EXPECT_EQ(c.largest_occlusion, from_degrees(270));
+  EXPECT_FALSE(c.anchored);
+  EXPECT_EQ(c.curve.line().intercept.value(), 1.6e-6);
+  EXPECT_DOUBLE_EQ(c.curve.line().slope_per_rad, -4.5e-9 * 180 / kPi);
+  ASSERT_EQ(c.points.size(), 4u);
+  EXPECT_EQ(c.points[3], from_degrees(270));
+  EXPECT_EQ(c.curve.largest_fitted(), from_degrees(270));
   EXPECT_EQ(c.fastest_speed, from_rpm(19100));
   ASSERT_EQ(c.table.size(), 2u);
   EXPECT_EQ(c.table[1].k.value(), 1.4e-6);
@@ -82,7 +80,7 @@ TEST(CoefficientFile, GivesWhatTheFileSaysInSiUnits) {
   EXPECT_EQ(c.air_density_kg_m3, 1.2);
   EXPECT_EQ(c.supply->value(), 12.0);
   EXPECT_EQ(c.provenance.campaign, "icra2021_5in_3blade");
-  EXPECT_EQ(c.provenance.estimator, "huber");
+  EXPECT_EQ(c.provenance.fit.estimator, "huber");
   ASSERT_EQ(c.provenance.runs.size(), 1u);
   EXPECT_EQ(c.provenance.runs[0].sha256, "00ff");
 }
@@ -91,21 +89,45 @@ TEST(CoefficientFile, ConvertsEveryCoefficientFromNewtonsPerRpmSquared) {
   const Coefficients si = parse_coefficients(kGood, "si");
   const Coefficients rpm = parse_coefficients(with(kGood, "N/(rad/s)^2", "N/RPM^2"), "rpm");
   const double scale = from_newtons_per_rpm2(1.0).value();
-  EXPECT_DOUBLE_EQ(rpm.thrust_coefficient / si.thrust_coefficient, scale);
+  EXPECT_DOUBLE_EQ(rpm.curve.thrust_coefficient() / si.curve.thrust_coefficient(), scale);
   EXPECT_DOUBLE_EQ(*rpm.thrust_coefficient_error / *si.thrust_coefficient_error, scale);
-  EXPECT_DOUBLE_EQ(rpm.line.intercept / si.line.intercept, scale);
-  EXPECT_DOUBLE_EQ(rpm.line.slope_per_rad / si.line.slope_per_rad, scale);
-  EXPECT_DOUBLE_EQ((*rpm.line.covariance)[0][1] / (*si.line.covariance)[0][1], scale * scale);
+  EXPECT_DOUBLE_EQ(rpm.curve.line().intercept / si.curve.line().intercept, scale);
+  EXPECT_DOUBLE_EQ(rpm.curve.line().slope_per_rad / si.curve.line().slope_per_rad, scale);
+  EXPECT_DOUBLE_EQ(rpm.curve.uncertainty()->covariance / si.curve.uncertainty()->covariance, scale * scale);
   EXPECT_DOUBLE_EQ(rpm.table[0].k / si.table[0].k, scale);
   EXPECT_DOUBLE_EQ(*rpm.table[0].standard_error / *si.table[0].standard_error, scale);
   EXPECT_DOUBLE_EQ(*rpm.table[0].k_at_speed / *si.table[0].k_at_speed, scale);
 }
 
 TEST(CoefficientFile, GivesTheLineThatFlies) {
-  const ThrustLine line = thrust_line(parse_coefficients(kGood, "c.yaml"));
+  const ThrustCurve line = parse_coefficients(kGood, "c.yaml").curve;
   EXPECT_EQ(line.thrust_coefficient().value(), 1.55e-6);
   EXPECT_NEAR(line.at(from_degrees(100)).value(), 1.6e-6 - 4.5e-7, 1e-18);
   EXPECT_EQ(line.largest_fitted(), from_degrees(270));
+}
+
+TEST(CoefficientFile, GivesTheFitAndTheBudgets) {
+  const std::string with_fit =
+      with(kGood, "estimator: huber}",
+           "estimator: huber, k_by: offset, weights: thrust, loss: none, speed_range_rpm: [3000.0, 17000.0], "
+           "leave_out: [\"90:2:slipped\"], u: {clock: 1.0e-05}}");
+  const std::string budgets =
+      "uncertainty:\n  K_T: {u: 2.0e-09, freedom: .inf}\n  intercept: {u: unknown}\n"
+      "  slope_per_deg: {u: 3.0e-12}\n  table:\n    - {u: 2.0e-09}\n    - {u: 2.5e-09}\n";
+  const Coefficients c = parse_coefficients(with_fit + budgets, "c.yaml");
+  EXPECT_EQ(c.provenance.fit.k_by, "offset");
+  EXPECT_EQ(c.provenance.fit.speed_range_rpm->second, 17000);
+  EXPECT_EQ(c.provenance.fit.leave_out, std::vector<std::string>{"90:2:slipped"});
+  ASSERT_TRUE(c.provenance.fit.bench);
+  EXPECT_EQ(c.provenance.fit.bench->front().second, 1e-5);
+  ASSERT_TRUE(c.uncertainty);
+  EXPECT_EQ(c.uncertainty->thrust_coefficient, 2e-9);
+  EXPECT_TRUE(std::isinf(c.uncertainty->freedom));
+  EXPECT_FALSE(c.uncertainty->intercept);
+  EXPECT_EQ(c.uncertainty->table.back(), 2.5e-9);
+  EXPECT_THAT(refusal_of(with_fit + "uncertainty: 0.3\n"), StartsWith("c.yaml:24: "));
+  EXPECT_THAT(refusal_of(with(with_fit + budgets, "u: 2.5e-09", "u: small")), HasSubstr("`u`"));
+  EXPECT_THAT(refusal_of(with(with_fit, "[3000.0, 17000.0]", "[3000.0]")), HasSubstr("speed_range_rpm"));
 }
 
 TEST(CoefficientFile, LetsKeysOfNewerWritersPass) {
@@ -139,19 +161,19 @@ TEST(CoefficientFile, IsRefusedWithoutOverlapDefinitionOrWithAnUnknownOne) {
 }
 
 TEST(CoefficientFile, HandsItsOverlapMeasureAndItsUncertaintyToTheLine) {
-  EXPECT_EQ(thrust_line(parse_coefficients(kGood, "c")).overlap(), OverlapMeasure::rim_arc);
+  EXPECT_EQ(parse_coefficients(kGood, "c").curve.overlap(), OverlapMeasure::rim_arc);
   for (const OverlapMeasure measure : {OverlapMeasure::area_share, OverlapMeasure::load_share}) {
     const std::string text = with(kGood, "rim_arc", std::string(name_of(measure)));
-    EXPECT_EQ(thrust_line(parse_coefficients(text, "c")).overlap(), measure);
+    EXPECT_EQ(parse_coefficients(text, "c").curve.overlap(), measure);
   }
-  const auto uncertainty = thrust_line(parse_coefficients(kGood, "c")).uncertainty();
+  const auto uncertainty = parse_coefficients(kGood, "c").curve.uncertainty();
   ASSERT_TRUE(uncertainty);
   EXPECT_EQ(uncertainty->thrust_coefficient, 1e-9);
   EXPECT_EQ(uncertainty->intercept_variance, 1e-18);
   EXPECT_DOUBLE_EQ(uncertainty->covariance, -5e-21 * 180 / kPi);
   EXPECT_DOUBLE_EQ(uncertainty->slope_variance, 4e-23 * (180 / kPi) * (180 / kPi));
-  EXPECT_FALSE(thrust_line(parse_coefficients(with(kGood, "standard_error: 1.0e-09", "standard_error: unknown"), "c"))
-                   .uncertainty());
+  EXPECT_FALSE(
+      parse_coefficients(with(kGood, "standard_error: 1.0e-09", "standard_error: unknown"), "c").curve.uncertainty());
 }
 
 TEST(CoefficientFile, IsRefusedWithAVarianceBelowZeroOrAnErrorBelowZero) {
@@ -241,7 +263,7 @@ TEST(CoefficientFile, ThatCannotBeReadIsNamed) {
 
 TEST(CoefficientFile, OfTheConsumerProjectIsRead) {
   const Coefficients c = load_coefficients(kphi::test::source_dir() + "/test/consumer/coefficients.yaml");
-  EXPECT_NEAR(to_newtons_per_rpm2(c.thrust_coefficient), 1.7e-8, 1e-20);
+  EXPECT_NEAR(to_newtons_per_rpm2(c.curve.thrust_coefficient()), 1.7e-8, 1e-20);
 }
 
 }  // namespace

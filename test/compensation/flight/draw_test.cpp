@@ -40,17 +40,5 @@ TEST(Draw, StaysWithinItsStatedRanges) {
   EXPECT_NEAR(std::sqrt(squares / 600), 0.01, 0.001);
 }
 
-TEST(ScaledLoss, ScalesWhatIsLostAndNothingElse) {
-  const compensation::ThrustLine line = bench_line(), twice = scaled_loss(line, 2), none = scaled_loss(line, 0);
-  const double k_t = line.thrust_coefficient().value();
-  for (const double degrees : {0.0, 40.0, 65.0}) {
-    const Radians phi = from_degrees(degrees);
-    EXPECT_NEAR(k_t - twice.at(phi).value(), 2 * (k_t - line.at(phi).value()), 1e-12 * k_t);
-    EXPECT_EQ(none.scaling_factor(phi), 1.0);
-  }
-  EXPECT_EQ(twice.thrust_coefficient(), line.thrust_coefficient());
-  EXPECT_EQ(twice.largest_fitted(), line.largest_fitted());
-}
-
 }  // namespace
 }  // namespace kphi::flight

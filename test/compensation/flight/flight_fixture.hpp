@@ -49,7 +49,14 @@ inline const Shadow& example_shadow() {
   return shadow;
 }
 
-inline compensation::ThrustLine bench_line() { return compensation::example_line(1.025, -0.0028889 * 1.02); }
+inline compensation::ThrustCurve bench_line() { return compensation::example_line(1.025, -0.0028889 * 1.02); }
+
+/// The curve with all that it loses against K_T scaled: 0 believes that no occlusion costs anything.
+inline compensation::ThrustCurve scaled_loss(const compensation::ThrustCurve& curve, double factor) {
+  const ThrustCoefficient k_t = curve.thrust_coefficient();
+  return *compensation::ThrustCurve::from_line(k_t, k_t + factor * (curve.line().intercept - k_t),
+                                               factor * curve.line().slope_per_rad, curve.largest_fitted());
+}
 
 inline Scene example_scene(std::uint64_t seed = 1) {
   return nominal_scene(example_vehicle(), example_settings(), bench_line(), seed);

@@ -28,7 +28,7 @@ class Fly : public testing::Test {
   static void SetUpTestSuite() {
     folder_ = new TemporaryFolder();
     std::ofstream(*folder_ / "campaign.yaml") << short_campaign_text("0, 45, 90, 180, 270", 1);
-    std::ofstream(*folder_ / "bench.yaml") << deterministic_place(1).text;
+    std::ofstream(*folder_ / "bench.yaml") << deterministic_config(1).text;
     coefficients_ = bench_coefficients(*folder_ / "campaign.yaml", *folder_ / "bench.yaml", *folder_);
   }
   static void TearDownTestSuite() {

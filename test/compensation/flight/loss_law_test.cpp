@@ -19,7 +19,7 @@ TEST(LossLaw, GoesThroughWhatThePaperMeasured) {
 }
 
 TEST(LossLaw, FallsWithOcclusionAndIsNeverTheControllersLine) {
-  const compensation::ThrustLine line = compensation::paper_line();
+  const compensation::ThrustCurve line = compensation::paper_line();
   for (const LossLaw law : kLaws) {
     double largest_difference = 0;
     for (double degrees = 1; degrees <= 270; ++degrees) {

@@ -29,10 +29,10 @@ Tick tick_at(double time_s) {
 
 TEST(History, KeepsStepsAndLinesInTheirOrderAndTheNewestLimitsAlone) {
   History history;
-  history.keep(R"({"type":"limits","n":1})");
-  history.keep(R"({"type":"line"})");
-  history.keep(R"({"type":"step"})");
-  history.keep(R"({"type":"limits","n":2})");
+  history.keep({Message::Kind::limits, R"({"type":"limits","n":1})"});
+  history.keep({Message::Kind::other, R"({"type":"line"})"});
+  history.keep({Message::Kind::step, R"({"type":"step"})"});
+  history.keep({Message::Kind::limits, R"({"type":"limits","n":2})"});
   EXPECT_THAT(types(history), ElementsAre("limits", "step", "line"));
   EXPECT_EQ(json::parse(history.message())["messages"][0]["n"], 2);
 }
@@ -52,7 +52,7 @@ TEST(History, ForgetsTheOldestWhenItIsFull) {
   History history;
   for (std::size_t i = 0; i < 2 * History::kTraceLength; ++i) {
     history.keep(tick_at(static_cast<double>(i)));
-    history.keep(R"({"type":"line","n":)" + std::to_string(i) + "}");
+    history.keep({Message::Kind::other, R"({"type":"line","n":)" + std::to_string(i) + "}"});
   }
   const json message = json::parse(history.message());
   EXPECT_EQ(message["trace"].size(), History::kTraceLength);

@@ -29,24 +29,24 @@ class LiveProgressOf : public testing::Test {
   void hold(int step, Duration duration, double thrust_n, double rpm) {
     position_.step = step;
     position_.commanded = from_rpm(rpm);
-    seen_.thrust = Newtons(thrust_n);
-    seen_.speed = from_rpm(rpm);
+    seen_.thrust_n = thrust_n;
+    seen_.speed_rad_s = from_rpm(rpm).value();
     for (const Instant until = clock_.now() + duration; clock_.now() < until;) {
       clock_.advance(std::chrono::milliseconds(10));
       progress_.tick(position_, seen_);
     }
   }
-  [[nodiscard]] double watched(Watched of) const { return feed_.newest().watched[static_cast<std::size_t>(of)]; }
+  [[nodiscard]] double watched(Watched of) const { return feed_.newest().watched[of]; }
   std::vector<json> messages() {
     std::vector<json> taken;
-    feed_.take([&](const std::string& message) { taken.push_back(json::parse(message)); });
+    feed_.take([&](const Message& message) { taken.push_back(json::parse(message.text)); });
     return taken;
   }
 
   Told told_;
   Feed feed_;
   ManualClock clock_;
-  const Subject subject_ = subject_of(test::short_campaign(), test::deterministic_place(1));  // 0.3 s are discarded
+  const Subject subject_ = subject_of(test::short_campaign(), test::deterministic_config(1));  // 0.3 s are discarded
   LiveProgress progress_{told_, feed_, nullptr, subject_, clock_};
   Position position_{"5x3", 90, 2, 3, -1, 40, "zero", RadPerSec(0), 100};
   Observation seen_;
@@ -62,7 +62,8 @@ TEST_F(LiveProgressOf, TellsTheTerminalAllTheSame) {
 }
 
 TEST_F(LiveProgressOf, ShowsTheNewestTickWithItsLimits) {
-  seen_.supply_current = Amperes(7);
+  seen_.judged[Watched::supply_current] = 7;
+  seen_.judged[Watched::thrust] = 1.5;
   seen_.account.lost_host = 3;
   hold(4, std::chrono::milliseconds(20), -1.5, 9000);
   const Tick tick = feed_.newest();
@@ -72,31 +73,10 @@ TEST_F(LiveProgressOf, ShowsTheNewestTickWithItsLimits) {
   EXPECT_EQ(tick.step, 4);
   EXPECT_EQ(tick.lost_host, 3u);
   EXPECT_STREQ(tick.phase.data(), "") << "in a step";
-  EXPECT_DOUBLE_EQ(watched(Watched::speed), 9000);
-  EXPECT_DOUBLE_EQ(watched(Watched::thrust), 1.5) << "either way counts";
+  EXPECT_DOUBLE_EQ(tick.module_a, 7);
+  EXPECT_DOUBLE_EQ(watched(Watched::thrust), 1.5) << "as the guard judged it";
   EXPECT_DOUBLE_EQ(watched(Watched::supply_current), 7);
-}
-
-TEST_F(LiveProgressOf, ShowsTheErrorOfSpeedOnceTheRotorHasHadItsTime) {
-  hold(0, std::chrono::milliseconds(290), 1, 6000);
   EXPECT_TRUE(std::isnan(watched(Watched::speed_error)));
-  hold(0, std::chrono::milliseconds(50), 1, 6000);
-  EXPECT_DOUBLE_EQ(watched(Watched::speed_error), 0);
-  position_.commanded = from_rpm(9000);
-  clock_.advance(std::chrono::milliseconds(10));
-  progress_.tick(position_, seen_);
-  EXPECT_NEAR(watched(Watched::speed_error), 100 * (3000 - to_rpm(RadPerSec(20))) / 9000, 1e-9) << "as the guard does";
-}
-
-TEST_F(LiveProgressOf, ShowsItsOwnPauseWhileTheMotorTurns) {
-  hold(0, std::chrono::milliseconds(20), 1, 6000);
-  EXPECT_DOUBLE_EQ(watched(Watched::pause), 0.01);
-  clock_.advance(std::chrono::milliseconds(300));
-  progress_.tick(position_, seen_);
-  EXPECT_DOUBLE_EQ(watched(Watched::pause), 0.3);
-  position_.commanded = RadPerSec(0);
-  progress_.tick(position_, seen_);
-  EXPECT_TRUE(std::isnan(watched(Watched::pause)));
 }
 
 TEST_F(LiveProgressOf, TellsTheTableOfTheGuardAndWhoSetEachLimit) {
@@ -116,8 +96,6 @@ TEST_F(LiveProgressOf, ShowsNoNumberForWhatNoLongerComes) {
   seen_.load_cell_age = std::chrono::milliseconds(840);
   hold(0, std::chrono::milliseconds(10), 1, 6000);
   EXPECT_TRUE(std::isnan(feed_.newest().thrust_n));
-  EXPECT_TRUE(std::isnan(watched(Watched::thrust)));
-  EXPECT_DOUBLE_EQ(watched(Watched::load_cell_age), 0.84);
   EXPECT_DOUBLE_EQ(feed_.newest().thrust_age_s, 0.84);
   EXPECT_DOUBLE_EQ(feed_.newest().speed_rpm, 6000);
 }
@@ -158,10 +136,10 @@ TEST_F(LiveProgressOf, PassesOnWhatIsSaid) {
 
 TEST(LiveFeed, DropsAndCountsWhatNobodyTakes) {
   Feed feed(4);
-  for (int i = 0; i < 10; ++i) feed.tell("{}");
+  for (int i = 0; i < 10; ++i) feed.tell({Message::Kind::other, "{}"});
   EXPECT_EQ(feed.dropped(), 6u);
   int taken = 0;
-  feed.take([&](const std::string&) { ++taken; });
+  feed.take([&](const Message&) { ++taken; });
   EXPECT_EQ(taken, 4);
 }
 

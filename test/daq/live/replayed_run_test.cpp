@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daq/live/view.hpp"
+#include "daq/live/live_session.hpp"
 #include "results/run_reader.hpp"
 #include "test/source_dir.hpp"
 
@@ -41,7 +41,7 @@ TEST(ReplayedRun, GoesThroughEveryStepAtItsCommandedSpeed) {
   for (std::size_t i = 0; i < commanded.size(); ++i) {
     EXPECT_EQ(seen.steps[i].first.step, static_cast<int>(i));
     EXPECT_DOUBLE_EQ(seen.steps[i].first.commanded.value(), commanded[i]);
-    EXPECT_NEAR(seen.steps[i].second.speed.value(), commanded[i], 0.05 * commanded[i] + 5);
+    EXPECT_NEAR(seen.steps[i].second.speed_rad_s, commanded[i], 0.05 * commanded[i] + 5);
   }
 }
 
@@ -51,15 +51,15 @@ TEST(ReplayedRun, SubtractsTheZeroAndCountsEverySample) {
   int zeros = 0;
   for (const auto& [position, observation] : seen.ticks) {
     if (position.phase == "zero" && seen.steps.empty() == false && position.remaining_s > 1) {
-      zero_sum += observation.thrust.value();
+      zero_sum += observation.thrust_n;
       ++zeros;
     }
   }
   ASSERT_GT(zeros, 0);
   EXPECT_NEAR(zero_sum / zeros, 0, 0.05);
-  EXPECT_GT(seen.steps.back().second.thrust.value(), 0.5);
-  EXPECT_GT(seen.steps.back().second.loads[2], 0.5);
-  EXPECT_GT(seen.steps.back().second.motor_current.value(), 0.5);
+  EXPECT_GT(seen.steps.back().second.thrust_n, 0.5);
+  EXPECT_GT(seen.steps.back().second.judged[Watched::force_z], 0.5);
+  EXPECT_GT(seen.steps.back().second.judged[Watched::motor_current], 0.5);
   EXPECT_EQ(seen.ticks.back().second.account.received, recording().load_cell.size());
   EXPECT_EQ(seen.ticks.back().first.remaining_s, 0);
 }
@@ -70,8 +70,8 @@ TEST(ReplayedRun, HasTheLimitsOfItsCampaignAndCannotBeStopped) {
   const Subject subject = subject_of(told);
   EXPECT_TRUE(subject.replay);
   const auto source_of = [&](Watched watched) {
-    for (const LimitBar& bar : subject.limits)
-      if (bar.watched == watched) return bar.source;
+    for (const GuardLimit& limit : subject.limits)
+      if (limit.watched == watched) return limit.source;
     return std::string();
   };
   EXPECT_EQ(source_of(Watched::thrust), "campaign limits.thrust_max_n");
@@ -93,7 +93,7 @@ TEST(ReplayedRun, IsPlayedToItsEndOrUntilAsked) {
 }
 
 TEST(LiveView, TellsHowTheWorkEndedAndLetsItsErrorPass) {
-  View view({}, subject_of(recording()));
+  LiveSession view({}, subject_of(recording()));
   EXPECT_EQ(view.url(), "");
   EXPECT_EQ(view.tell_the_end([] { return 7; }), 7);
   EXPECT_THROW(view.tell_the_end([]() -> int { throw std::runtime_error("no"); }), std::runtime_error);

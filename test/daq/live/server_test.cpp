@@ -16,9 +16,9 @@
 #include <thread>
 #include <vector>
 
+#include "base/error.hpp"
 #include "daq/live/messages.hpp"
 #include "daq/live/page.hpp"
-#include "profiles/configuration_error.hpp"
 
 namespace kphi::daq::live {
 namespace {
@@ -232,7 +232,7 @@ TEST_F(LiveServer, TellsWhoComesLateWhatWas) {
   feed_.tell(line_message(1, "the first line"));
   feed_.tell(step_message(Tick{}, {}));
   for (const double limit : {3.0, 2.0})
-    feed_.tell(limits_message(limit_bars({{Watched::thrust, "thrust", limit, "N", "campaign"}})));
+    feed_.tell(limits_message({{Watched::thrust, "thrust", limit, "N", "campaign"}}));
   for (int i = 1; i <= 2; ++i) {
     show(i);
     server_->draw();
@@ -332,7 +332,8 @@ TEST_F(LiveServer, DropsAClientBehindWhichTooManyMessagesWait) {
 
 TEST_F(LiveServer, NeverMakesTheRunnerWaitEvenWhenItStandsStill) {
   start([](Server::Settings& settings) { settings.frame = std::chrono::hours(1); });
-  for (int i = 0; i < 100'000; ++i) show(i), feed_.tell("{}");  // returns: nobody takes anything
+  for (int i = 0; i < 100'000; ++i)
+    show(i), feed_.tell({Message::Kind::other, "{}"});  // returns: nobody takes anything
   EXPECT_GT(feed_.dropped(), 90'000u);
 }
 

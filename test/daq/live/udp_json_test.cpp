@@ -7,7 +7,7 @@
 #include <boost/asio/ip/udp.hpp>
 #include <nlohmann/json.hpp>
 
-#include "profiles/configuration_error.hpp"
+#include "base/error.hpp"
 
 namespace kphi::daq::live {
 namespace {

@@ -6,7 +6,7 @@
 #include <atomic>
 #include <stdexcept>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 
 namespace kphi::ambient {
 namespace {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 #include "test/drivers/ambient/fake_bridge.hpp"
 
 namespace kphi::ambient {
@@ -58,7 +58,7 @@ TEST_F(Bme280SensorTest, RefusesAnotherChip) {
 
 TEST_F(Bme280SensorTest, SaysWhenNobodyIsThere) {
   usb.sensor_address = 0x10;
-  EXPECT_THAT(refusal(), HasSubstr("nobody answers"));
+  EXPECT_THAT(refusal(), HasSubstr("no device answers"));
 }
 
 TEST_F(Bme280SensorTest, RefusesACalibrationThatChangesBetweenTwoReadings) {
@@ -89,7 +89,7 @@ TEST_F(Bme280SensorTest, RefusesAirThatCannotBe) {
     (void)measured.read();
     FAIL();
   } catch (const DeviceError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("no air is like this"));
+    EXPECT_THAT(error.what(), HasSubstr("implausible for air"));
   }
 }
 
@@ -100,7 +100,7 @@ TEST_F(Bme280SensorTest, GivesUpAMeasurementThatDoesNotEnd) {
     (void)measured.read();
     FAIL();
   } catch (const DeviceError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("does not end"));
+    EXPECT_THAT(error.what(), HasSubstr("not finished in time"));
   }
 }
 

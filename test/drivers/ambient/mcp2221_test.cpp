@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 #include "test/drivers/ambient/fake_bridge.hpp"
 
 namespace kphi::ambient {
@@ -54,7 +54,7 @@ TEST(Mcp2221, SeesAMissingAcknowledgement) {
   FakeBridge usb;
   Mcp2221 bridge(usb, no_pause);
   std::array<std::uint8_t, 1> data{};
-  EXPECT_THAT(refusal([&] { bridge.read(0x40, 0xD0, data); }), HasSubstr("nobody answers at this address"));
+  EXPECT_THAT(refusal([&] { bridge.read(0x40, 0xD0, data); }), HasSubstr("no device answers at this address"));
   EXPECT_THAT(refusal([&] { bridge.write(0x40, data); }), HasSubstr("0x25"));
   bridge.read(0x76, 0xD0, data);
   EXPECT_EQ(data[0], 0x60) << "the bus is free again";

@@ -5,13 +5,13 @@
 
 #include <future>
 
+#include "base/random.hpp"
 #include "drivers/ambient/ambient_worker.hpp"
 #include "drivers/ambient/bme280_sensor.hpp"
-#include "drivers/ambient/place.hpp"
-#include "drivers/sim/mcp2221.hpp"
-#include "drivers/sim/random.hpp"
-#include "drivers/sim/usb_socket.hpp"
+#include "drivers/ambient/source.hpp"
+#include "drivers/sim/usb/mcp2221.hpp"
 #include "drivers/usb/bus.hpp"
+#include "test/drivers/sim_equipment/usb_socket.hpp"
 #include "test/drivers/usb/virtual_bus.hpp"
 
 namespace kphi::ambient {
@@ -33,7 +33,7 @@ void expect_equal(const Air& air, const sim::TrueAir& truth) {
 
 class UsbSensorTest : public OnVirtualBus {
  protected:
-  std::unique_ptr<Ambient> sensor() { return open(place_of(kAddress)); }
+  std::unique_ptr<Ambient> sensor() { return open(source_of(kAddress)); }
   void expect_true_air(Ambient& from) { expect_equal(from.read(), truth); }
   /// The bridge's manual is kept.
   void TearDown() override {
@@ -50,7 +50,7 @@ TEST_F(UsbSensorTest, ReadsTheTrueAirWithinItsResolution) {
   wire->plug(1, bridge);
   const auto air = sensor();
   EXPECT_THAT(air->identity(), HasSubstr("BME280 at 0x76 behind USB device 04d8:00dd, serial 0001, port 1-1"));
-  sim::Random random(1);
+  Random random(1);
   for (int i = 0; i < 8; ++i) {
     truth = {25 + 30 * random.symmetric(), 85'000 + 25'000 * random.symmetric(), 0.5 + 0.4 * random.symmetric()};
     bridge.set_air(truth);
@@ -71,7 +71,7 @@ TEST_F(UsbSensorTest, ReadsTheExampleOfTheDataSheet) {
 TEST_F(UsbSensorTest, MovesAReportThereAndBackByInterruptTransfers) {
   wire->plug(1, bridge);
   const usb::Bus bus;
-  const auto device = bus.open(usb::Address::parse(kAddress));
+  const auto device = bus.open(UsbAddress::parse(kAddress));
   device->claim(2);
   const usb::Interface& hid = device->interfaces().at(2);
   ASSERT_EQ(hid.class_code, 3);
@@ -97,15 +97,15 @@ TEST_F(UsbSensorTest, IsFoundAtItsOtherAddress) {
 TEST_F(UsbSensorTest, SaysWhenNobodyIsBehindTheBridge) {
   break_with(UsbFaultKind::nack, 1000);
   wire->plug(1, bridge);
-  EXPECT_THAT(refusal([&] { (void)sensor(); }), HasSubstr("nobody answers at this address"));
-  EXPECT_THAT(refusal([&] { (void)open(place_of("usb:04d8:00dd:0002")); }), HasSubstr("not plugged in"));
+  EXPECT_THAT(refusal([&] { (void)sensor(); }), HasSubstr("no device answers at this address"));
+  EXPECT_THAT(refusal([&] { (void)open(source_of("usb:04d8:00dd:0002")); }), HasSubstr("not plugged in"));
 }
 
 TEST_F(UsbSensorTest, SaysWhenAnAcknowledgementIsMissingAndGoesOn) {
   wire->plug(1, bridge);
   const auto air = sensor();
   break_with(UsbFaultKind::nack);
-  EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("nobody answers at this address"));
+  EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("no device answers at this address"));
   expect_true_air(*air);
 }
 
@@ -206,7 +206,7 @@ TEST_F(UsbSensorTest, EndsAtOnceWhenItIsUnpluggedInTheMiddle) {
 
 TEST_F(UsbSensorTest, ComesBackByItselfAfterAReplug) {
   wire->plug(1, bridge);
-  const AmbientWorker worker([] { return open(place_of(kAddress)); }, clock, {10ms, 20ms, 80ms});
+  const AmbientWorker worker([] { return open(source_of(kAddress)); }, clock, {10ms, 20ms, 80ms});
   ASSERT_TRUE(worker.wait_for_first(10s)) << worker.failure();
   wire->unplug(1);
   ASSERT_TRUE(eventually([&] { return worker.failure().find("not plugged in") != std::string::npos; }));
@@ -220,7 +220,7 @@ TEST_F(UsbSensorTest, ComesBackByItselfAfterAReplug) {
 }
 
 TEST_F(UsbSensorTest, IsPulledOutAndPluggedInAsAScriptSays) {
-  faults.set({sim::UsbFault{UsbFaultKind::unplug, clock.now() + 100ms, 50ms}});
+  faults.set({sim::UsbFault{{UsbFaultKind::unplug, clock.now() + 100ms, 50ms}}});
   const usb::Bus bus;
   const sim::UsbSocket socket(*wire, 1, bridge, faults);
   ASSERT_TRUE(eventually([&] { return bus.list().size() == 1; }));

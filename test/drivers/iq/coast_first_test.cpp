@@ -7,7 +7,7 @@
 #include <memory>
 #include <random>
 
-#include "drivers/iq/motor.hpp"
+#include "drivers/iq/link/motor.hpp"
 #include "test/drivers/iq/module_on_a_line.hpp"
 #include "test/drivers/iq/wire.hpp"
 #include "test/soon.hpp"
@@ -40,10 +40,10 @@ class SlowLine {
   /// Frames that have left or begun to leave.
   [[nodiscard]] std::size_t begun() const {
     std::size_t whole = 0;
-    for (const fake::Heard& frame : module_.heard) whole += frame.data.size() + 2 + kAround;
+    for (const fake::QueryResult& frame : module_.heard) whole += frame.data.size() + 2 + kAround;
     return module_.heard.size() + (taken_ > whole ? 1 : 0);
   }
-  [[nodiscard]] const std::vector<fake::Heard>& heard() const { return module_.heard; }
+  [[nodiscard]] const std::vector<fake::QueryResult>& heard() const { return module_.heard; }
 
  private:
   Module module_;
@@ -51,7 +51,7 @@ class SlowLine {
 };
 
 /// `begun`: frames that had left or begun to leave when the motor was to stop.
-void expect_coast_first(const std::vector<fake::Heard>& heard, std::size_t begun) {
+void expect_coast_first(const std::vector<fake::QueryResult>& heard, std::size_t begun) {
   ASSERT_GE(heard.size(), begun + kCoasts);
   for (std::size_t i = begun; i < heard.size(); ++i) {
     if (i < begun + kCoasts) {
@@ -62,33 +62,33 @@ void expect_coast_first(const std::vector<fake::Heard>& heard, std::size_t begun
   }
 }
 
-Packet packet_of(Outbox::Kind kind, Random& random) {
-  if (kind == Outbox::Kind::motion)
+Packet packet_of(TxQueue::Kind kind, Random& random) {
+  if (kind == TxQueue::Kind::motion)
     return make(entry<"propeller_motor_control.ctrl_velocity">, Access::set, 0, 100.0 + below(random, 1000));
-  if (kind == Outbox::Kind::setting) return make(entry<"propeller_motor_control.timeout">, Access::set, 0, 0.5);
+  if (kind == TxQueue::Kind::setting) return make(entry<"propeller_motor_control.timeout">, Access::set, 0, 0.5);
   return make(entry<"brushless_drive.obs_velocity">, Access::get, 0);
 }
 
 TEST(CoastFirst, OfAnOutboxWithWhateverWaitsInIt) {
-  constexpr Outbox::Kind kKinds[] = {Outbox::Kind::request, Outbox::Kind::setting, Outbox::Kind::motion};
+  constexpr TxQueue::Kind kKinds[] = {TxQueue::Kind::request, TxQueue::Kind::setting, TxQueue::Kind::motion};
   int full = 0, begun = 0;
   for (unsigned seed = 1; seed <= 2000; ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
-    Outbox outbox;
+    TxQueue tx_queue;
     SlowLine line;
     bool has_room = true;
     for (std::size_t left = below(random, 60); left > 0 && has_room; --left) {
-      const Outbox::Kind kind = kKinds[below(random, 3)];
-      has_room = outbox.push(kind, packet_of(kind, random));
-      if (below(random, 4) == 0) line.take(outbox, outbox.bytes(), below(random, 12));
+      const TxQueue::Kind kind = kKinds[below(random, 3)];
+      has_room = tx_queue.push(kind, packet_of(kind, random));
+      if (below(random, 4) == 0) line.take(tx_queue, tx_queue.bytes(), below(random, 12));
     }
     full += has_room ? 0 : 1;
     begun += line.begun() > line.heard().size() ? 1 : 0;
     const std::size_t before = line.begun();
     const Packet coast = make(entry<"propeller_motor_control.ctrl_coast">, Access::set, 0);
-    for (std::size_t i = 0; i < kCoasts; ++i) outbox.push_coast(coast);
-    while (!outbox.bytes().empty()) line.take(outbox, outbox.bytes(), 1 + below(random, 20));
+    for (std::size_t i = 0; i < kCoasts; ++i) tx_queue.push_coast(coast);
+    while (!tx_queue.bytes().empty()) line.take(tx_queue, tx_queue.bytes(), 1 + below(random, 20));
     expect_coast_first(line.heard(), before);
     if (HasFatalFailure()) return;
   }
@@ -159,7 +159,7 @@ class FullLine {
     }
   }
   /// Frames up to the last of them.
-  [[nodiscard]] static std::size_t ahead(const std::vector<fake::Heard>& heard) {
+  [[nodiscard]] static std::size_t ahead(const std::vector<fake::QueryResult>& heard) {
     std::size_t n = heard.size();
     while (n > 0 && heard[n - 1].type != kNobodys) --n;
     return n;

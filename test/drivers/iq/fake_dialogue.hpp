@@ -6,7 +6,7 @@
 #include <map>
 #include <vector>
 
-#include "drivers/iq/dialogue.hpp"
+#include "drivers/iq/service/dialogue.hpp"
 
 namespace kphi::iq::fake {
 

@@ -67,7 +67,7 @@ inline std::string hex(std::span<const std::uint8_t> bytes) {
   return text;
 }
 
-struct Heard {
+struct QueryResult {
   int type = 0, sub = 0, access = 0, id = 0;
   Bytes data;
   [[nodiscard]] bool is_coast() const { return type == 52 && sub == 2 && access == 1; }
@@ -84,11 +84,9 @@ class Module {
   std::set<Key> silent;         ///< entries this firmware lacks
   std::set<Key> read_only;      ///< entries that a set does not change
   std::map<Key, Bytes> values;  ///< what a get brings
-  std::vector<Heard> heard;
-  bool old_system_control = false;    ///< system_control answers on id 0 only
-  unsigned baud = 0;                  ///< 0: any
-  bool baud_needs_reboot = false;     ///< a new rate takes effect after a reboot
-  bool baud_of_others_fails = false;  ///< at another rate than the first, three of four replies are lost
+  std::vector<QueryResult> heard;
+  bool old_system_control = false;  ///< system_control answers on id 0 only
+  unsigned baud = 0;                ///< 0: any
   int restarts = 0;
   bool turns_at_once = true;  ///< it has the commanded speed at once; else the test says how fast it turns
 
@@ -110,7 +108,6 @@ class Module {
     values = Module().values;
     values[{5, 14}] = id_value;
     values[{5, 15}] = f32(0.25);
-    if (next_baud_ != 0) baud = next_baud_;
     ++restarts;
   }
 
@@ -143,21 +140,21 @@ class Module {
     return replies;
   }
 
-  [[nodiscard]] const Heard* last_motion() const {
+  [[nodiscard]] const QueryResult* last_motion() const {
     for (auto it = heard.rbegin(); it != heard.rend(); ++it) {
       if (it->is_motion()) return &*it;
     }
     return nullptr;
   }
-  [[nodiscard]] std::size_t count(const std::function<bool(const Heard&)>& what) const {
+  [[nodiscard]] std::size_t count(const std::function<bool(const QueryResult&)>& what) const {
     std::size_t n = 0;
-    for (const Heard& message : heard) n += what(message) ? 1 : 0;
+    for (const QueryResult& message : heard) n += what(message) ? 1 : 0;
     return n;
   }
 
  private:
   void act(const std::uint8_t* bytes, std::size_t length, std::vector<Bytes>& replies) {
-    Heard message{bytes[2], bytes[3], bytes[4] & 3, bytes[4] >> 2, Bytes(bytes + 5, bytes + 3 + length)};
+    QueryResult message{bytes[2], bytes[3], bytes[4] & 3, bytes[4] >> 2, Bytes(bytes + 5, bytes + 3 + length)};
     heard.push_back(message);
     const bool for_system = message.type == 5 && old_system_control;
     const bool broadcast = message.id == 63 && message.access == 1;
@@ -166,19 +163,16 @@ class Module {
     if (message.access == 0 && !mute && silent.count(key) == 0 && values.count(key) != 0) {
       replies.push_back(frame_of_reply(message));
     }
-    if (message.access == 1 && !ignore_sets && read_only.count(key) == 0) obey(message, key);
+    if (message.access == 1 && !ignore_sets && read_only.count(key) == 0) apply(message, key);
   }
 
-  [[nodiscard]] Bytes frame_of_reply(const Heard& message) const {
+  [[nodiscard]] Bytes frame_of_reply(const QueryResult& message) const {
     return kphi::iq::fake::message(message.type, message.sub, 3, message.id, values.at({message.type, message.sub}));
   }
 
-  void obey(const Heard& message, const Key& key) {
+  void apply(const QueryResult& message, const Key& key) {
     if (key == Key{5, 0}) {
       restart();
-    } else if (key == Key{16, 0}) {
-      next_baud_ = static_cast<unsigned>(message.data[0] | message.data[1] << 8 | message.data[2] << 16);
-      if (!baud_needs_reboot) baud = next_baud_;
     } else if (message.is_coast()) {
       values[{50, 0}] = u8(5);
       if (turns_at_once) values[{50, 13}] = f32(0);
@@ -191,7 +185,6 @@ class Module {
   }
 
   Bytes buffer_;
-  unsigned next_baud_ = 0;
 };
 
 }  // namespace kphi::iq::fake

@@ -77,24 +77,19 @@ class ModuleOnALine {
   /// At the wrong rate both sides hear garbage.
   void answer(std::span<std::uint8_t> bytes) {
     const bool understood = module_.baud == 0 || module_.baud == terminal_.baud();
-    const bool unreliable = module_.baud_of_others_fails && module_.baud != first_baud_;
-    if (first_baud_ == 0) first_baud_ = module_.baud;
     if (!understood) {
       for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(byte * 37 + 0x55);
     }
     for (Module& other : others_) {
-      for (const Bytes& reply : other.receive(bytes)) send(reply, false);
+      for (const Bytes& reply : other.receive(bytes)) send(reply);
     }
-    for (const Bytes& reply : module_.receive(bytes)) send(reply, unreliable && ++replies_ % 4 != 0);
-    if (!understood) send({0x55, 0x3B, 0x80, 0x00}, false);
+    for (const Bytes& reply : module_.receive(bytes)) send(reply);
+    if (!understood) send({0x55, 0x3B, 0x80, 0x00});
   }
-  void send(const Bytes& bytes, bool lost) {
-    if (lost) return;
+  void send(const Bytes& bytes) {
     [[maybe_unused]] const auto written = ::write(terminal_.master(), bytes.data(), bytes.size());
   }
 
-  unsigned first_baud_ = 0;
-  int replies_ = 0;
   serial::fake::PseudoTerminal terminal_;
   std::mutex mutex_;
   std::condition_variable heard_;

@@ -8,8 +8,8 @@
 #include <memory>
 #include <optional>
 
-#include "drivers/device_error.hpp"
-#include "drivers/iq/motor.hpp"
+#include "base/error.hpp"
+#include "drivers/iq/link/motor.hpp"
 #include "test/drivers/iq/module_on_a_line.hpp"
 #include "test/soon.hpp"
 #include "test/temporary_folder.hpp"

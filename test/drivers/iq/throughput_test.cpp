@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <map>
 
-#include "drivers/iq/motor.hpp"
+#include "drivers/iq/link/motor.hpp"
 #include "test/drivers/iq/paced_module.hpp"
 
 namespace kphi::iq {

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/iq/session.hpp"
+#include "drivers/iq/session/session.hpp"
 #include "test/drivers/iq/fake_module.hpp"
 
 namespace kphi::iq::fake {

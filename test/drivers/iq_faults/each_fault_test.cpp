@@ -315,7 +315,7 @@ Manner usb() {
 }
 Manner legacy() {
   Manner manner;
-  manner.habits = sim::legacy_habits();
+  manner.quirks = sim::kLegacyFirmware;
   return manner;
 }
 Manner instant() {

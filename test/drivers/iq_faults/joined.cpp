@@ -25,7 +25,7 @@ sim::IqSettings module_settings(const Manner& manner, std::uint64_t seed) {
   settings.baud = manner.baud;
   settings.reply_latency = manner.reply_latency;
   settings.reply_jitter = manner.reply_jitter;
-  settings.habits = manner.habits;
+  settings.quirks = manner.quirks;
   settings.seed = seed;
   return settings;
 }
@@ -254,7 +254,7 @@ std::string Joined::wrong_readings() const {
   int wrong = 0;
   for (std::size_t i = 0; i < readings_.size(); ++i) {
     const Reading& reading = readings_[i];
-    const Key key = key_of(reading.quantity, manner_.habits.legacy_estimator);
+    const Key key = key_of(reading.quantity, manner_.quirks.legacy);
     const auto& candidates = sent[key];
     const std::size_t none = candidates.size();
     std::size_t best = none;

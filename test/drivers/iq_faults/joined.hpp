@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "drivers/iq/session.hpp"
-#include "drivers/sim/iq_line.hpp"
-#include "drivers/sim/plant.hpp"
+#include "drivers/iq/session/session.hpp"
+#include "drivers/sim/iq/line.hpp"
+#include "drivers/sim/physics/plant.hpp"
 
 namespace kphi::iq::test {
 
@@ -22,7 +22,7 @@ struct Manner {
   Duration reply_jitter = std::chrono::microseconds(50);
   Duration usb_tick{0};
   std::size_t port_takes = 0;  ///< bytes that the host's port takes per tick; 0: all
-  sim::IqHabits habits;
+  sim::IqQuirks quirks;
 };
 
 class Joined {

@@ -25,8 +25,8 @@ Manner random_manner(Dice& dice) {
   manner.telemetry_hz = std::array{20.0, 50.0, 200.0}[static_cast<std::size_t>(dice.whole(0, 2))];
   manner.module_id = dice.whole(0, 1) * 17;
   manner.usb_tick = std::array<Duration, 3>{0ms, 1ms, 16ms}[static_cast<std::size_t>(dice.whole(0, 2))];
-  if (dice.whole(0, 4) == 0) manner.habits = sim::legacy_habits();
-  manner.habits.system_control_on_id_zero = false;
+  if (dice.whole(0, 4) == 0) manner.quirks = sim::kLegacyFirmware;
+  manner.quirks.system_control_on_id_zero = false;
   return manner;
 }
 

@@ -9,8 +9,9 @@
 #include <optional>
 #include <thread>
 
-#include "drivers/device_error.hpp"
-#include "drivers/iq/motor.hpp"
+#include "base/error.hpp"
+#include "drivers/iq/link/motor.hpp"
+#include "drivers/iq/service/probe.hpp"
 #include "drivers/sim/server.hpp"
 #include "test/soon.hpp"
 #include "test/temporary_folder.hpp"
@@ -116,6 +117,17 @@ TEST_F(OverAPort, WhenTheModuleFallsBackToItsFirstRateTheDriverGivesUpAndTheModu
   }
   stop();
   EXPECT_GT(server->motor_truth().done[static_cast<std::size_t>(sim::MotorFaultKind::baud)], 0u);
+}
+
+TEST_F(OverAPort, AModuleAtAnotherRateIsFoundAndNothingIsChanged) {
+  serve({}, 921600);
+  for (int i = 0; i < 2; ++i) {
+    const Probe found = probe({device, 115200, 0}, clock);
+    ASSERT_EQ(found.findings.size(), 2u);
+    EXPECT_EQ(found.findings[1].line(),
+              "fault: module 0 answers at 921600 baud, not at 115200; write baud: 921600 under iq: in the bench file");
+  }
+  EXPECT_TRUE(probe({device, 921600, 0}, clock).answers()) << "it still speaks at its own rate";
 }
 
 }  // namespace

@@ -153,12 +153,12 @@ class FakeBox {
     prctl(PR_SET_TIMERSLACK, 1);
     while (!ending_) {
       pollfd readable{socket_.descriptor(), POLLIN, 0};
-      const timespec nap{0, streaming_ ? until_next_ns() : 2'000'000};
-      if (ppoll(&readable, 1, &nap, nullptr) > 0) obey();
+      const timespec sleep_time{0, streaming_ ? until_next_ns() : 2'000'000};
+      if (ppoll(&readable, 1, &sleep_time, nullptr) > 0) apply();
       if (streaming_) send_what_is_due();
     }
   }
-  void obey() {
+  void apply() {
     std::uint8_t request[64];
     sockaddr_in from{};
     socklen_t length = sizeof from;

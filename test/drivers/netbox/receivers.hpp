@@ -15,7 +15,7 @@
 #include <set>
 #include <vector>
 
-#include "drivers/netbox/load_cell.hpp"
+#include "drivers/netbox/receive/load_cell.hpp"
 #include "test/drivers/netbox/box_process.hpp"
 
 namespace kphi::netbox::test {
@@ -61,7 +61,7 @@ inline std::uint64_t sleeps_of(int thread_id) {
   return 0;
 }
 
-/// Receives a stream and swaps its bytes, nothing else: no stamps, no account, no queue. Sleeps `nap` after each
+/// Receives a stream and swaps its bytes, nothing else: no stamps, no account, no queue. Sleeps `sleep_time` after each
 /// wake-up, so that datagrams gather.
 class BareReceiver {
  public:
@@ -78,13 +78,13 @@ class BareReceiver {
   }
   ~BareReceiver() { request(0); }
 
-  Cost run(double seconds, std::chrono::nanoseconds nap) {
-    static_cast<void>(drain(nap));  // the first comes after the start only
+  Cost run(double seconds, std::chrono::nanoseconds sleep_time) {
+    static_cast<void>(drain(sleep_time));  // the first comes after the start only
     Cost cost;
     const std::uint32_t first = newest_rdt();
     const double cpu = cpu_seconds(), wall = cpu_seconds(CLOCK_MONOTONIC);
     while (cost.wall_s < seconds) {
-      cost.records += drain(nap);
+      cost.records += drain(sleep_time);
       cost.wall_s = cpu_seconds(CLOCK_MONOTONIC) - wall;
     }
     cost.receiver_cpu_s = cpu_seconds() - cpu;
@@ -98,11 +98,11 @@ class BareReceiver {
     const std::array<std::uint8_t, 8> bytes{0x12, 0x34, 0, command, 0, 0, 0, 0};
     socket_.send(bytes);
   }
-  std::uint64_t drain(std::chrono::nanoseconds nap) {
+  std::uint64_t drain(std::chrono::nanoseconds sleep_time) {
     pollfd readable{socket_.native_handle(), POLLIN, 0};
     poll(&readable, 1, 1000);
-    if (nap.count() > 0) {
-      const timespec time{0, nap.count()};
+    if (sleep_time.count() > 0) {
+      const timespec time{0, sleep_time.count()};
       nanosleep(&time, nullptr);
     }
     std::uint64_t records = 0;

@@ -7,7 +7,7 @@
 #include <array>
 #include <vector>
 
-#include "drivers/netbox/session.hpp"
+#include "drivers/netbox/stream/session.hpp"
 #include "test/drivers/netbox/record_bytes.hpp"
 
 namespace kphi::netbox::test {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/netbox/place.hpp"
+#include "drivers/netbox/configuration/address.hpp"
 #include "test/drivers/netbox/fake_box.hpp"
 
 namespace kphi::netbox::test {
@@ -23,7 +23,7 @@ class SettableWeb {
   SettableWeb() : web_({{}, {}, false, [this](const std::string& request) { return answer(request); }}) {}
 
   std::uint16_t port() const { return web_.port(); }
-  Place place() const { return {"127.0.0.1", 1, port()}; }
+  Address address() const { return {"127.0.0.1", 1, port()}; }
   std::string value(const std::string& key) const {
     const std::lock_guard lock(mutex_);
     return values_.at(key);

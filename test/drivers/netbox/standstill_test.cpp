@@ -6,7 +6,7 @@
 #include <functional>
 #include <vector>
 
-#include "drivers/netbox/load_cell.hpp"
+#include "drivers/netbox/receive/load_cell.hpp"
 #include "test/drivers/netbox/box_process.hpp"
 
 namespace kphi::netbox {

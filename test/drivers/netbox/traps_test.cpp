@@ -4,14 +4,14 @@
 #include <signal.h>
 #include <sys/time.h>
 
-#include "drivers/device_error.hpp"
-#include "drivers/netbox/calinfo.hpp"
-#include "drivers/netbox/http.hpp"
-#include "drivers/netbox/load_cell.hpp"
-#include "drivers/netbox/session.hpp"
-#include "drivers/netbox/settings.hpp"
-#include "drivers/netbox/status.hpp"
-#include "drivers/netbox/udp_socket.hpp"
+#include "base/error.hpp"
+#include "drivers/netbox/configuration/calinfo.hpp"
+#include "drivers/netbox/configuration/http.hpp"
+#include "drivers/netbox/configuration/settings.hpp"
+#include "drivers/netbox/receive/load_cell.hpp"
+#include "drivers/netbox/receive/udp_socket.hpp"
+#include "drivers/netbox/stream/session.hpp"
+#include "drivers/netbox/wire/status.hpp"
 #include "test/drivers/netbox/fake_box.hpp"
 #include "test/drivers/netbox/settable_web.hpp"
 
@@ -132,7 +132,7 @@ TEST_F(TrapsOfTheSequence, NoFilterTouchesTheCounts) {
 TEST(Traps, ASettingIsWrittenByItsNameAndWithAnEqualsSign) {
   test::SettableWeb web;
   const auto journal = std::filesystem::temp_directory_path() / ("kphi_traps_" + std::to_string(getpid()));
-  const SettingsKeeper keeper(web.place(), {.rate_hz = 1000, .records_per_datagram = 10}, journal);
+  const SettingsKeeper keeper(web.address(), {.rate_hz = 1000, .records_per_datagram = 10}, journal);
   EXPECT_THAT(web.writes(), testing::ElementsAre("/comm.cgi?comrdtrate=1000&comrdtbsiz=10"));
 }
 

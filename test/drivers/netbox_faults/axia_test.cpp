@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "drivers/netbox/status.hpp"
-#include "drivers/sim/faults.hpp"
+#include "drivers/netbox/wire/status.hpp"
+#include "drivers/sim/netbox/faults.hpp"
 #include "test/drivers/netbox_faults/joined.hpp"
 
 namespace kphi::netbox::test {
@@ -15,7 +15,7 @@ using namespace std::chrono_literals;
 Manner axia(bool buffered) {
   Manner manner;
   manner.buffered = buffered;
-  manner.habits.axia = true;
+  manner.quirks.axia = true;
   return manner;
 }
 

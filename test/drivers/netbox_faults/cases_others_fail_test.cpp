@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "drivers/netbox/bias.hpp"
+#include "drivers/netbox/receive/bias.hpp"
 #include "test/drivers/netbox_faults/live_box.hpp"
 
 namespace kphi::netbox::test {
@@ -29,7 +29,7 @@ void expect_all_delivered(LoadCell& cell, Consumer& consumer) {
 void clean_stream(Command mode, int records_per_datagram) {
   LiveBox box({.records_per_datagram = records_per_datagram});
   const SteadyClock clock;
-  LoadCell cell(box.place(), clock, mode);
+  LoadCell cell(box.address(), clock, mode);
   Consumer consumer(cell);
   cell.start();
   ASSERT_TRUE(consumer.take_until(10'500));
@@ -50,7 +50,7 @@ TEST(CasesOthersFail, AdjacentSwapsAreNoLoss) {
                .time_scale = 4,
                .faults = {{{"kind", "reorder"}, {"at_s", "0"}, {"for_s", "1000"}, {"p", "0.01"}, {"depth", "1"}}}});
   const SteadyClock clock(4);
-  LoadCell cell(box.place(), clock, Command::real_time);
+  LoadCell cell(box.address(), clock, Command::real_time);
   Consumer consumer(cell);
   cell.start();
   ASSERT_TRUE(consumer.take_until(5000));
@@ -61,7 +61,7 @@ TEST(CasesOthersFail, AdjacentSwapsAreNoLoss) {
 TEST(CasesOthersFail, FiveRecordsPerSecond) {
   LiveBox box({.rate_hz = 5, .records_per_datagram = 1});
   const SteadyClock clock;
-  LoadCell cell(box.place(), clock, Command::real_time);
+  LoadCell cell(box.address(), clock, Command::real_time);
   Consumer consumer(cell);
   cell.start();
   ASSERT_TRUE(consumer.take_until(7));
@@ -74,7 +74,7 @@ TEST(CasesOthersFail, FiveRecordsPerSecond) {
 TEST(CasesOthersFail, FiveRecordsPerSecondInBlocksOfForty) {
   LiveBox box({.rate_hz = 5, .records_per_datagram = 40, .time_scale = 20});
   const SteadyClock clock(20);
-  LoadCell cell(box.place(), clock);
+  LoadCell cell(box.address(), clock);
   Consumer consumer(cell);
   cell.start();
   ASSERT_TRUE(consumer.take_until(120));
@@ -86,7 +86,7 @@ TEST(CasesOthersFail, FiveRecordsPerSecondInBlocksOfForty) {
 void blocked_consumer(std::uint64_t records) {
   LiveBox box({.records_per_datagram = 1});
   const SteadyClock clock;
-  LoadCell cell(box.place(), clock, Command::real_time);
+  LoadCell cell(box.address(), clock, Command::real_time);
   Consumer consumer(cell);
   cell.start();
   for (std::uint64_t second = 1; second <= 2; ++second) {
@@ -108,7 +108,7 @@ TEST(CasesOthersFail, AStreamThatBeginsAnewAfterTwoThousandRecords) {
                .time_scale = 4,
                .faults = {{{"kind", "doubled_start"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "2"}}}});
   const SteadyClock clock(4);
-  LoadCell cell(box.place(), clock, Command::real_time);
+  LoadCell cell(box.address(), clock, Command::real_time);
   Consumer consumer(cell);
   cell.start();
   ASSERT_TRUE(consumer.take_until(4998));
@@ -122,7 +122,7 @@ TEST(CasesOthersFail, AStreamThatBeginsAnewAfterTwoThousandRecords) {
 TEST(CasesOthersFail, ARebootWithTheStreamComingOn) {
   LiveBox box({.time_scale = 4, .faults = {{{"kind", "reboot"}, {"at_s", "4"}, {"down_s", "0.2"}, {"resume", "1"}}}});
   const SteadyClock clock(4);
-  LoadCell cell(box.place(), clock);
+  LoadCell cell(box.address(), clock);
   Consumer consumer(cell);
   cell.start();
   ASSERT_TRUE(consumer.take_while([&] { return cell.counters().reboots == 0; }));
@@ -139,13 +139,13 @@ TEST(CasesOthersFail, ARebootWithTheStreamComingOn) {
 TEST(CasesOthersFail, ARebootWithTheStreamStopping) {
   LiveBox box({.time_scale = 4, .faults = {{{"kind", "reboot"}, {"at_s", "4"}, {"down_s", "0.2"}}}});
   const SteadyClock clock(4);
-  LoadCell cell(box.place(), clock);
+  LoadCell cell(box.address(), clock);
   Consumer consumer(cell);
   cell.start();
-  EXPECT_THAT(events_until(cell, EventKind::stolen), ElementsAre(EventKind::silent, EventKind::stolen))
+  EXPECT_THAT(events_until(cell, EventKind::taken_over), ElementsAre(EventKind::silent, EventKind::taken_over))
       << "the box answers again, and the driver does not fight for what may be another client's stream";
   // Who streams again reads the configuration again.
-  LoadCell anew(box.place(), clock);
+  LoadCell anew(box.address(), clock);
   Consumer again(anew);
   anew.start();
   ASSERT_TRUE(again.take_until(1000));
@@ -156,11 +156,11 @@ TEST(CasesOthersFail, ARebootWithTheStreamStopping) {
   EXPECT_EQ(truth.starts, 2u);
 }
 
-/// A functor that cannot be copied is called in place, and keeps its state.
+/// A functor that cannot be copied is called in address, and keeps its state.
 TEST(CasesOthersFail, AConsumerWithAStateIsNeverCopied) {
   LiveBox box({.time_scale = 4});
   const SteadyClock clock(4);
-  LoadCell cell(box.place(), clock);
+  LoadCell cell(box.address(), clock);
   Consumer consumer(cell);  // neither copyable nor movable: it compiles, so nobody copies it
   static_assert(!std::is_copy_constructible_v<Consumer> && !std::is_move_constructible_v<Consumer>);
   cell.start();
@@ -181,10 +181,10 @@ TEST(CasesOthersFail, AConsumerWithAStateIsNeverCopied) {
 void bias(bool stops_stream) {
   LiveBox::Manner manner;
   manner.time_scale = 4;
-  manner.habits.bias_stops_stream = stops_stream;
+  manner.quirks.bias_stops_stream = stops_stream;
   LiveBox box(manner);
   const SteadyClock clock(4);
-  LoadCell cell(box.place(), clock);
+  LoadCell cell(box.address(), clock);
   cell.start();
   const BiasStep step = take_bias(cell, clock, 2000, {}, kPatience);
   EXPECT_EQ(step.stream_restarted, stops_stream);

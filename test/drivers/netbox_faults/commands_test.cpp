@@ -1,7 +1,7 @@
 // Commands beyond start and stop: multi-unit mode, and the latch of the monitor conditions.
 #include <gtest/gtest.h>
 
-#include "drivers/netbox/status.hpp"
+#include "drivers/netbox/wire/status.hpp"
 #include "test/drivers/netbox_faults/joined.hpp"
 
 namespace kphi::netbox::test {
@@ -36,7 +36,7 @@ struct Wired {
   std::uint32_t newest_status() const { return out.empty() ? ~0u : out.back().record.status; }
 
   sim::NetBoxDevice box;
-  sim::FaultyWire wire;
+  sim::FaultInjector wire;
   Session session;
   std::vector<StampedRecord> out;
   std::int64_t tick = 0;
@@ -53,7 +53,7 @@ TEST(MultiUnit, StreamsLikeRealTimeMode) {
 
 TEST(MultiUnit, ABoxThatDoesNotKnowItIsAFailureInTime) {
   sim::NetBoxSettings box;
-  box.habits.command_four_streams = false;
+  box.quirks.command_four_streams = false;
   Wired wired(box, multi_unit());
   wired.run(5 * 7000);
   EXPECT_EQ(wired.session.state(), State::failed);

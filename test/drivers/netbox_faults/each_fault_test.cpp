@@ -8,7 +8,7 @@
 #include <map>
 #include <optional>
 
-#include "drivers/sim/faults.hpp"
+#include "drivers/sim/netbox/faults.hpp"
 #include "test/drivers/netbox_faults/joined.hpp"
 
 namespace kphi::netbox::test {
@@ -169,17 +169,17 @@ TEST_P(EachFault, RestartUnasked) {
   EXPECT_EQ(joined->counters().restarts, 1u);
 }
 
-TEST_P(EachFault, StolenStreamIsTakenBackWhenAsked) {
-  run(script({{{"kind", "stolen"}, {"at_s", "1.5"}}}), 5s);
+TEST_P(EachFault, StreamTakenOverIsTakenBackWhenAsked) {
+  run(script({{{"kind", "taken_over"}, {"at_s", "1.5"}}}), 5s);
   EXPECT_EQ(joined->silences(), 1);
   EXPECT_EQ(joined->counters().restarts, 1u);
   EXPECT_GT(joined->counters().lost_network, 0u);
 }
 
-TEST_P(EachFault, StolenStreamStaysSilent) {
+TEST_P(EachFault, StreamTakenOverStaysSilent) {
   Manner manner = GetParam().manner;
   manner.start_again_when_silent = false;
-  Joined j(manner, script({{{"kind", "stolen"}, {"at_s", "1.5"}}}), 42);
+  Joined j(manner, script({{{"kind", "taken_over"}, {"at_s", "1.5"}}}), 42);
   j.run_until(5s);
   j.finish();
   EXPECT_EQ(j.session().state(), State::silent);
@@ -221,7 +221,7 @@ TEST_P(EachFault, AnOverrunIsIrregularAndItsSamplesAreMissing) {
 
 TEST_P(EachFault, AChangedRateIsIrregular) {
   Manner manner = GetParam().manner;
-  manner.habits.rate_write = sim::NetBoxHabits::RateWrite::continues;
+  manner.quirks.rate_write = sim::NetBoxQuirks::RateWrite::continues;
   Joined j(manner, script({{{"kind", "rate"}, {"at_s", "1.5"}, {"rate_hz", "500"}}}), 42);
   j.run_until(3s);
   j.finish();
@@ -322,14 +322,14 @@ TEST_P(EachFault, SaturationIsInTheRecords) {
 
 /// Of a finite request, as a client with a lease sends it.
 TEST(LastBlock, PartialPaddedOrDroppedIsAccountedFor) {
-  using LastBlock = sim::NetBoxHabits::LastBlock;
+  using LastBlock = sim::NetBoxQuirks::LastBlock;
   const std::map<LastBlock, std::uint64_t> expected{
       {LastBlock::partial, 100}, {LastBlock::padded, 120}, {LastBlock::dropped, 80}};
   for (const auto& [habit, records] : expected) {
     sim::NetBoxSettings settings;
-    settings.habits.last_block = habit;
+    settings.quirks.last_block = habit;
     sim::NetBoxDevice box(settings);
-    sim::FaultyWire wire(box, {}, 1);
+    sim::FaultInjector wire(box, {}, 1);
     Session session{StreamSettings{}};
     session.start(Instant{0});
     session.advance(session.deadline());

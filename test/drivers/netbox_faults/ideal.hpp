@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "drivers/sim/wire_truth.hpp"
+#include "drivers/sim/netbox/fault_injector.hpp"
 
 namespace kphi::netbox::test {
 

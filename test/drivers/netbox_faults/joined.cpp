@@ -15,7 +15,7 @@ sim::NetBoxSettings box_settings(const Manner& manner) {
   settings.rate_hz = static_cast<double>(kTicksPerSecond) / manner.divisor;
   settings.records_per_datagram = manner.records_per_datagram;
   settings.first_ft_sequence = manner.first_ft;
-  settings.habits = manner.habits;
+  settings.quirks = manner.quirks;
   return settings;
 }
 
@@ -24,7 +24,7 @@ StreamSettings stream_settings(const Manner& manner) {
   settings.buffered = manner.buffered;
   settings.divisor = static_cast<unsigned>(manner.divisor);
   settings.records_per_datagram = manner.records_per_datagram;
-  settings.product = manner.habits.axia ? Product::axia : Product::net_box;
+  settings.product = manner.quirks.axia ? Product::axia : Product::net_box;
   settings.lease = manner.lease;
   return settings;
 }
@@ -37,7 +37,7 @@ Instant time_of(std::uint64_t number) { return Instant(static_cast<std::int64_t>
 Joined::Joined(const Manner& manner, sim::FaultScript script, std::uint64_t seed)
     : manner_(manner),
       box_(box_settings(manner)),
-      wire_(box_, std::move(script), seed, sim::FaultyWire::Keep::samples),
+      wire_(box_, std::move(script), seed, sim::FaultInjector::Keep::samples),
       session_(stream_settings(manner)) {
   session_.start(Instant{0});
 }

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/netbox/session.hpp"
-#include "drivers/sim/wire.hpp"
+#include "drivers/netbox/stream/session.hpp"
+#include "drivers/sim/netbox/fault_injector.hpp"
 #include "test/drivers/netbox_faults/ideal.hpp"
 
 namespace kphi::netbox::test {
@@ -17,7 +17,7 @@ struct Manner {
   int divisor = 1;
   std::uint32_t first_ft = 0;
   bool start_again_when_silent = true;
-  sim::NetBoxHabits habits;
+  sim::NetBoxQuirks quirks;
   Duration lease{0};
 };
 
@@ -36,7 +36,7 @@ class Joined {
 
   [[nodiscard]] Session& session() noexcept { return session_; }
   [[nodiscard]] const Counters& counters() const noexcept { return session_.counters(); }
-  [[nodiscard]] sim::FaultyWire& wire() noexcept { return wire_; }
+  [[nodiscard]] sim::FaultInjector& wire() noexcept { return wire_; }
   [[nodiscard]] sim::NetBoxDevice& box() noexcept { return box_; }
   [[nodiscard]] const std::vector<StampedRecord>& out() const noexcept { return out_; }
   [[nodiscard]] int silences() const noexcept { return silences_; }
@@ -47,7 +47,7 @@ class Joined {
 
   Manner manner_;
   sim::NetBoxDevice box_;
-  sim::FaultyWire wire_;
+  sim::FaultInjector wire_;
   Session session_;
   std::vector<StampedRecord> out_;
   std::vector<Arrival> arrivals_;  // of whole datagrams that the session did not drain

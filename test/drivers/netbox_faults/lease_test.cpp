@@ -3,20 +3,20 @@
 
 #include <optional>
 
-#include "drivers/sim/faults.hpp"
+#include "drivers/sim/netbox/faults.hpp"
 #include "test/drivers/netbox_faults/joined.hpp"
 
 namespace kphi::netbox::test {
 namespace {
 
 using namespace std::chrono_literals;
-using sim::NetBoxHabits;
+using sim::NetBoxQuirks;
 
 struct Mode {
   const char* name;
   bool buffered;
   int records, divisor;
-  NetBoxHabits::LastBlock last_block;
+  NetBoxQuirks::LastBlock last_block;
 };
 
 class Lease : public testing::TestWithParam<Mode> {
@@ -26,9 +26,9 @@ class Lease : public testing::TestWithParam<Mode> {
                   .records_per_datagram = GetParam().records,
                   .divisor = GetParam().divisor,
                   .start_again_when_silent = false,
-                  .habits = {},
+                  .quirks = {},
                   .lease = 2200ms};
-    manner.habits.last_block = GetParam().last_block;
+    manner.quirks.last_block = GetParam().last_block;
     return joined.emplace(manner, std::move(faults), 7);
   }
   std::optional<Joined> joined;
@@ -120,23 +120,23 @@ TEST_P(Lease, ARestartThatNobodyAskedForIsStillADoubt) {
   EXPECT_EQ(events[0].kind, EventKind::restarted);
 }
 
-TEST_P(Lease, AStolenStreamIsNotFoughtForByRenewals) {
-  const sim::FaultEntry stolen{{"kind", "stolen"}, {"at_s", "2.2"}};
-  Joined& j = join({sim::fault_of(stolen)});
+TEST_P(Lease, AStreamTakenOverIsNotFoughtForByRenewals) {
+  const sim::FaultEntry taken_over{{"kind", "taken_over"}, {"at_s", "2.2"}};
+  Joined& j = join({sim::fault_of(taken_over)});
   j.run_until(2200ms);
   const std::uint64_t starts = j.wire().truth().starts;
   j.run_until(12s);
   EXPECT_EQ(j.session().state(), State::silent);
-  EXPECT_LE(j.wire().truth().starts, starts + 1);  // the thief's own
+  EXPECT_LE(j.wire().truth().starts, starts + 1);  // the other client's own
 }
 
 INSTANTIATE_TEST_SUITE_P(
     , Lease,
-    testing::Values(Mode{"Buffered40LastBlockPartial", true, 40, 1, NetBoxHabits::LastBlock::partial},
-                    Mode{"Buffered40LastBlockPadded", true, 40, 1, NetBoxHabits::LastBlock::padded},
-                    Mode{"Buffered40LastBlockDropped", true, 40, 1, NetBoxHabits::LastBlock::dropped},
-                    Mode{"Buffered7At1000LastBlockDropped", true, 7, 7, NetBoxHabits::LastBlock::dropped},
-                    Mode{"RealTimeAt7000", false, 1, 1, NetBoxHabits::LastBlock::partial}),
+    testing::Values(Mode{"Buffered40LastBlockPartial", true, 40, 1, NetBoxQuirks::LastBlock::partial},
+                    Mode{"Buffered40LastBlockPadded", true, 40, 1, NetBoxQuirks::LastBlock::padded},
+                    Mode{"Buffered40LastBlockDropped", true, 40, 1, NetBoxQuirks::LastBlock::dropped},
+                    Mode{"Buffered7At1000LastBlockDropped", true, 7, 7, NetBoxQuirks::LastBlock::dropped},
+                    Mode{"RealTimeAt7000", false, 1, 1, NetBoxQuirks::LastBlock::partial}),
     [](const auto& mode) { return std::string(mode.param.name); });
 
 TEST(LeaseSize, IsWholeDatagramsAndLongEnoughToNoticeASilence) {

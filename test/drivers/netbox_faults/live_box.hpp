@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "drivers/netbox/load_cell.hpp"
+#include "drivers/netbox/receive/load_cell.hpp"
 #include "drivers/sim/server.hpp"
 #include "test/temporary_folder.hpp"
 
@@ -34,7 +34,7 @@ class LiveBox {
     int records_per_datagram = 40;
     double time_scale = 1;
     std::vector<sim::FaultEntry> faults = {};
-    sim::NetBoxHabits habits = {};
+    sim::NetBoxQuirks quirks = {};
   };
 
   explicit LiveBox(const Manner& manner) : server_(settings(manner)), thread_([this] { server_.run(); }) {}
@@ -43,7 +43,7 @@ class LiveBox {
   LiveBox& operator=(const LiveBox&) = delete;
 
   [[nodiscard]] const sim::Addresses& addresses() const { return server_.addresses(); }
-  [[nodiscard]] Place place() const { return {addresses().host, addresses().rdt_port, addresses().http_port}; }
+  [[nodiscard]] Address address() const { return {addresses().host, addresses().rdt_port, addresses().http_port}; }
   /// What truly happened; the box is gone then.
   const sim::WireTruth& stop() {
     if (thread_.joinable()) {
@@ -59,9 +59,9 @@ class LiveBox {
     settings.bench.time_scale = manner.time_scale;
     settings.bench.netbox.rate_hz = manner.rate_hz;
     settings.bench.netbox.records_per_datagram = manner.records_per_datagram;
-    settings.bench.netbox.habits = manner.habits;
+    settings.bench.netbox.quirks = manner.quirks;
     for (const sim::FaultEntry& entry : manner.faults) settings.bench.faults.push_back(sim::fault_of(entry));
-    settings.bench.keep = sim::FaultyWire::Keep::samples;
+    settings.bench.keep = sim::FaultInjector::Keep::samples;
     settings.control = (folder_.path() / "control").string();
     return settings;
   }

@@ -9,10 +9,10 @@
 #include <optional>
 #include <thread>
 
-#include "drivers/netbox/http.hpp"
-#include "drivers/netbox/load_cell.hpp"
-#include "drivers/netbox/probe.hpp"
-#include "drivers/netbox/settings.hpp"
+#include "drivers/netbox/configuration/http.hpp"
+#include "drivers/netbox/configuration/settings.hpp"
+#include "drivers/netbox/receive/load_cell.hpp"
+#include "drivers/netbox/receive/probe.hpp"
 #include "drivers/sim/server.hpp"
 
 namespace kphi::netbox::test {
@@ -44,7 +44,7 @@ class Live : public testing::Test {
     server->request_stop();
     thread.join();
   }
-  [[nodiscard]] Place place() const {
+  [[nodiscard]] Address address() const {
     const sim::Addresses& at = server->addresses();
     return {at.host, at.rdt_port, at.http_port};
   }
@@ -81,7 +81,7 @@ class Live : public testing::Test {
 TEST_F(Live, ABoxThatBootsAndDoesNotStreamIsStartedAgainAndItsConfigurationReadAgain) {
   start({fault({{"kind", "reboot"}, {"at_s", "1.5"}, {"down_s", "1.2"}}),
          fault({{"kind", "http_refused"}, {"at_s", "1.5"}, {"for_s", "1.2"}})});
-  LoadCell cell(place(), clock);
+  LoadCell cell(address(), clock);
   cell.start();
   ASSERT_TRUE(follow(cell, [&] { return seen(EventKind::reconnected) && cell.state() == State::streaming; }))
       << testing::PrintToString(kinds());
@@ -95,16 +95,16 @@ TEST_F(Live, ABoxThatBootsAndDoesNotStreamIsStartedAgainAndItsConfigurationReadA
   expect_closed(cell.counters());
 }
 
-TEST_F(Live, AStolenStreamIsReportedAndNotFoughtFor) {
-  start({fault({{"kind", "stolen"}, {"at_s", "1"}})});
-  LoadCell cell(place(), clock);
+TEST_F(Live, AStreamTakenOverIsReportedAndNotFoughtFor) {
+  start({fault({{"kind", "taken_over"}, {"at_s", "1"}})});
+  LoadCell cell(address(), clock);
   cell.start();
-  ASSERT_TRUE(follow(cell, [&] { return seen(EventKind::stolen); }));
+  ASSERT_TRUE(follow(cell, [&] { return seen(EventKind::taken_over); }));
   // Longer than all that a reconnection would wait for at first.
   const auto until = std::chrono::steady_clock::now() + 1s;
   EXPECT_TRUE(follow(cell, [&] { return std::chrono::steady_clock::now() > until; }));
   EXPECT_EQ(cell.state(), State::silent);
-  EXPECT_THAT(kinds(), testing::ElementsAre(EventKind::silent, EventKind::stolen));
+  EXPECT_THAT(kinds(), testing::ElementsAre(EventKind::silent, EventKind::taken_over));
   stop();
   EXPECT_EQ(server->truth().starts, 1u);
 }
@@ -112,7 +112,7 @@ TEST_F(Live, AStolenStreamIsReportedAndNotFoughtFor) {
 TEST_F(Live, UnitsThatChangeWithABootAreNamedAlthoughTheStreamGoesOn) {
   start({fault({{"kind", "units"}, {"at_s", "1"}, {"force_unit", "1"}, {"torque_unit", "3"}}),
          fault({{"kind", "reboot"}, {"at_s", "1"}, {"down_s", "0.1"}, {"resume", "1"}})});
-  LoadCell cell(place(), clock);
+  LoadCell cell(address(), clock);
   cell.start();
   ASSERT_TRUE(follow(cell, [&] { return seen(EventKind::configuration_changed); })) << testing::PrintToString(kinds());
   EXPECT_TRUE(seen(EventKind::rebooted));
@@ -126,14 +126,14 @@ TEST_F(Live, UnitsThatChangeWithABootAreNamedAlthoughTheStreamGoesOn) {
 
 TEST_F(Live, AnotherRateAfterABootIsStreamedByItsOwnCount) {
   sim::NetBoxSettings box;
-  box.habits.rate_write = sim::NetBoxHabits::RateWrite::continues;
+  box.quirks.rate_write = sim::NetBoxQuirks::RateWrite::continues;
   start({fault({{"kind", "reboot"}, {"at_s", "2"}, {"down_s", "1"}}),
          fault({{"kind", "http_refused"}, {"at_s", "2"}, {"for_s", "1.2"}})},
         box);
-  LoadCell cell(place(), clock);
+  LoadCell cell(address(), clock);
   cell.start();
   ASSERT_TRUE(follow(cell, [&] { return taken > 350; }));
-  http_write(place().host, place().http_port, "/comm.cgi?comrdtrate=1000", 2s);
+  http_write(address().host, address().http_port, "/comm.cgi?comrdtrate=1000", 2s);
   ASSERT_TRUE(follow(cell, [&] { return seen(EventKind::reconnected); })) << testing::PrintToString(kinds());
   EXPECT_TRUE(seen(EventKind::configuration_changed));
   const Counters before = cell.counters();
@@ -148,7 +148,7 @@ TEST_F(Live, AnotherRateAfterABootIsStreamedByItsOwnCount) {
 
 TEST_F(Live, ALeaseIsRenewedOverTheWire) {
   start({});
-  LoadCell cell(place(), clock, Command::buffered, {.lease = 2s});
+  LoadCell cell(address(), clock, Command::buffered, {.lease = 2s});
   cell.start();
   ASSERT_TRUE(follow(cell, [&] { return cell.counters().renewals >= 3; }));
   cell.stop();
@@ -162,10 +162,10 @@ TEST_F(Live, ALeaseIsRenewedOverTheWire) {
 
 TEST_F(Live, AnAxiaStreamsInBothModes) {
   sim::NetBoxSettings axia;
-  axia.habits.axia = true;
+  axia.quirks.axia = true;
   start({}, axia);
   for (const Command mode : {Command::buffered, Command::real_time}) {
-    LoadCell cell(place(), clock, mode);
+    LoadCell cell(address(), clock, mode);
     EXPECT_EQ(cell.configuration().kind, Product::axia);
     cell.start();
     ASSERT_TRUE(follow(cell, [&] { return cell.counters().received >= 2000; }));
@@ -179,12 +179,12 @@ TEST_F(Live, AnAxiaStreamsInBothModes) {
 
 TEST_F(Live, TheProbeNamesAnAxiasFaultByItsOwnMap) {
   sim::NetBoxSettings axia;
-  axia.habits.axia = true;
+  axia.quirks.axia = true;
   start({fault({{"kind", "status"}, {"at_s", "0"}, {"for_s", "60"}, {"bits", "0xC0000000"}})}, axia);
   ProbeSettings settings;
   settings.tcp_port = server->addresses().tcp_port;
   settings.stream = 300ms;
-  const Probe found = probe(place(), clock, settings);
+  const Probe found = probe(address(), clock, settings);
   std::string all;
   for (const std::string& line : found.lines()) all += line + "\n";
   EXPECT_THAT(all, HasSubstr("the box reports: force or torque out of range"));
@@ -193,18 +193,18 @@ TEST_F(Live, TheProbeNamesAnAxiasFaultByItsOwnMap) {
 
 TEST_F(Live, SettingsAreWrittenAndSetBackOnABoxThatServesThreeWritesASecond) {
   sim::NetBoxSettings box;
-  box.habits.only_three_writes = true;
+  box.quirks.only_three_writes = true;
   start({}, box);
   const std::filesystem::path journal =
       std::filesystem::temp_directory_path() / ("kphi_live_" + std::to_string(getpid()) + ".journal");
   for (int round = 0; round < 3; ++round) {
-    SettingsKeeper keeper(place(), {.rate_hz = 150, .records_per_datagram = 4, .filter = 5}, journal);
+    SettingsKeeper keeper(address(), {.rate_hz = 150, .records_per_datagram = 4, .filter = 5}, journal);
     EXPECT_EQ(keeper.after().divisor, 46u);
     EXPECT_EQ(keeper.after().records_per_datagram, 4);
     EXPECT_EQ(keeper.after().filter_code, 5);
     keeper.restore();
   }
-  const LoadCell cell(place(), clock);
+  const LoadCell cell(address(), clock);
   EXPECT_EQ(cell.configuration().divisor, 1u);
   EXPECT_EQ(cell.configuration().records_per_datagram, 40);
   EXPECT_EQ(cell.configuration().filter_code, 0);

@@ -89,7 +89,7 @@ void add_upheaval(Dice& dice, sim::FaultScript& script) {
       fault.kind = FaultKind::restart;
       break;
     case 1:
-      fault.kind = FaultKind::stolen;
+      fault.kind = FaultKind::taken_over;
       break;
     case 2:
       fault.kind = FaultKind::reboot;

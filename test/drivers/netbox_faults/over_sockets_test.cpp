@@ -2,9 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "drivers/device_error.hpp"
-#include "drivers/netbox/calinfo.hpp"
-#include "drivers/netbox/http.hpp"
+#include "base/error.hpp"
+#include "drivers/netbox/configuration/calinfo.hpp"
+#include "drivers/netbox/configuration/http.hpp"
 #include "test/drivers/netbox_faults/live_box.hpp"
 
 namespace kphi::netbox::test {
@@ -30,7 +30,7 @@ std::string error_of(Act act) {
 std::string reading_with(const FaultEntry& fault) {
   LiveBox box({.faults = {fault}});
   const SteadyClock clock;
-  return error_of([&] { LoadCell cell(box.place(), clock); });
+  return error_of([&] { LoadCell cell(box.address(), clock); });
 }
 
 FaultEntry on_pages(const std::string& kind, const std::string& key, const std::string& value) {
@@ -75,7 +75,7 @@ TEST(PagesOverSockets, ARefusedConnectionIsNamed) {
 TEST(PagesOverSockets, ALatin1LetterSpoilsNoNumber) {
   LiveBox box({.faults = {on_pages("http_charset", "utf16", "0")}});
   const SteadyClock clock;
-  LoadCell cell(box.place(), clock);
+  LoadCell cell(box.address(), clock);
   EXPECT_EQ(cell.configuration().counts_per_newton, 1e6);
   EXPECT_EQ(cell.configuration().records_per_datagram, 40);
   EXPECT_EQ(cell.configuration().slot_name, "Pr\uFFFDfstand");
@@ -102,12 +102,12 @@ TEST(PagesOverSockets, AMissingOrDoubledElementIsNamed) {
 TEST(PagesOverSockets, OtherSpellingsReadTheSame) {
   for (const char separator : {',', ' '}) {
     LiveBox::Manner manner;
-    manner.habits.array_separator = separator;
-    manner.habits.flags_as_digits = true;
-    manner.habits.torque_text_with_hyphen = true;
+    manner.quirks.array_separator = separator;
+    manner.quirks.flags_as_digits = true;
+    manner.quirks.torque_text_with_hyphen = true;
     LiveBox box(manner);
     const SteadyClock clock;
-    const LoadCell cell(box.place(), clock);
+    const LoadCell cell(box.address(), clock);
     EXPECT_TRUE(cell.configuration().rdt_enabled);
     EXPECT_EQ(cell.configuration().range[2], 60);
     EXPECT_EQ(cell.configuration().counts_per_newton_metre, 1e6);
@@ -116,10 +116,10 @@ TEST(PagesOverSockets, OtherSpellingsReadTheSame) {
 
 TEST(PagesOverSockets, AnAxiaIsKnownByName) {
   LiveBox::Manner manner;
-  manner.habits.axia = true;
+  manner.quirks.axia = true;
   LiveBox box(manner);
   const SteadyClock clock;
-  const LoadCell cell(box.place(), clock);
+  const LoadCell cell(box.address(), clock);
   EXPECT_EQ(cell.configuration().kind, Product::axia);
 }
 
@@ -143,7 +143,7 @@ TEST(TcpOverSockets, AShortReplyIsAnErrorAndInACrossCheckANote) {
                 AllOf(HasSubstr("read the calibration over TCP"), HasSubstr("check that this is a Net Box")))
         << size;
     const SteadyClock clock;
-    const LoadCell cell(box.place(), clock);
+    const LoadCell cell(box.address(), clock);
     const auto finding = cross_check("127.0.0.1", box.addresses().tcp_port, cell.configuration(), 5s);
     ASSERT_TRUE(finding);
     EXPECT_EQ(finding->severity, Severity::note);
@@ -154,7 +154,7 @@ TEST(TcpOverSockets, AShortReplyIsAnErrorAndInACrossCheckANote) {
 /// A stream at four times the speed, with one fault.
 struct Stream {
   explicit Stream(const FaultEntry& fault, Command mode = Command::buffered)
-      : box({.time_scale = 4, .faults = {fault}}), cell(box.place(), clock, mode), consumer(cell) {}
+      : box({.time_scale = 4, .faults = {fault}}), cell(box.address(), clock, mode), consumer(cell) {}
   LiveBox box;
   const SteadyClock clock{4};
   LoadCell cell;
@@ -197,10 +197,10 @@ TEST(StreamOverSockets, LostStartsAreRepeated) {
   EXPECT_EQ(s.box.stop().starts, 3u);
 }
 
-TEST(StreamOverSockets, AStolenStreamIsNamedAndNotFoughtFor) {
-  Stream s({{"kind", "stolen"}, {"at_s", "4"}});
+TEST(StreamOverSockets, AStreamTakenOverIsNamedAndNotFoughtFor) {
+  Stream s({{"kind", "taken_over"}, {"at_s", "4"}});
   s.cell.start();
-  EXPECT_THAT(events_until(s.cell, EventKind::stolen), ElementsAre(EventKind::silent, EventKind::stolen));
+  EXPECT_THAT(events_until(s.cell, EventKind::taken_over), ElementsAre(EventKind::silent, EventKind::taken_over));
   EXPECT_EQ(s.cell.state(), State::silent);
   EXPECT_EQ(s.box.stop().starts, 1u);
 }
@@ -222,7 +222,7 @@ TEST(StreamOverSockets, AnAddressGivenAnewIsUnreachableAndThenFoundThere) {
   EXPECT_THAT(events_until(s.cell, EventKind::unreachable), ElementsAre(EventKind::silent, EventKind::unreachable));
   s.cell.stop();
   EXPECT_THAT(error_of([&] { s.cell.start(); }), AllOf(HasSubstr("refuses the RDT port"), HasSubstr("check rdt_port")));
-  Place there = s.box.place();
+  Address there = s.box.address();
   there.host = "127.0.0.2";
   LoadCell found(there, s.clock);
   EXPECT_THAT(found.configuration().xml, HasSubstr("<netip>127.0.0.2</netip>"));

@@ -13,7 +13,7 @@ class FakeInstrument final : public usb::Transport {
  public:
   using Bytes = std::vector<std::uint8_t>;
 
-  std::function<std::string(const std::string&)> obey = [](const std::string& command) {
+  std::function<std::string(const std::string&)> apply = [](const std::string& command) {
     return command == "*IDN?" ? "KPHI,FAKE,1,0" : "";
   };
   std::vector<std::string> commands;
@@ -79,7 +79,7 @@ class FakeInstrument final : public usb::Transport {
       std::string text(b.begin() + 12, b.begin() + 12 + size);
       while (!text.empty() && text.back() == '\n') text.pop_back();
       commands.push_back(text);
-      answer_ = obey(text);
+      answer_ = apply(text);
       if (!answer_.empty()) answer_ += '\n';
     } else if (b[0] == 2) {
       request(b[1]);

@@ -6,7 +6,8 @@
 #include <map>
 #include <vector>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
+#include "test/drivers/scpi/lent_line.hpp"
 
 namespace kphi::scpi {
 namespace {
@@ -60,7 +61,7 @@ class ScpiSupplyTest : public testing::Test {
   ManualClock clock;
   std::string refusal(const std::function<void(ScpiSupply&)>& call) {
     try {
-      ScpiSupply supply(line, clock);
+      ScpiSupply supply(lend(line), clock);
       call(supply);
     } catch (const DeviceError& error) {
       return error.what();
@@ -70,7 +71,7 @@ class ScpiSupplyTest : public testing::Test {
 };
 
 TEST_F(ScpiSupplyTest, AsksWhoItIsBeforeAnythingIsWritten) {
-  const ScpiSupply supply(line, clock);
+  const ScpiSupply supply(lend(line), clock);
   EXPECT_EQ(supply.identity().model, "PS30");
   EXPECT_EQ(supply.identity().serial, "SN7");
   EXPECT_EQ(supply.identity().firmware, "2.1");
@@ -79,7 +80,7 @@ TEST_F(ScpiSupplyTest, AsksWhoItIsBeforeAnythingIsWritten) {
 }
 
 TEST_F(ScpiSupplyTest, SetsThresholdsFirstAndReadsAllBack) {
-  ScpiSupply supply(line, clock);
+  ScpiSupply supply(lend(line), clock);
   EXPECT_EQ(supply.apply(kTwelveVolts), kTwelveVolts);
   EXPECT_THAT(line.told, ElementsAre("VOLT:PROT 13.200", "VOLT:PROT:STAT ON", "CURR:PROT 6.000", "CURR:PROT:STAT ON",
                                      "CURR 5.000", "VOLT 12.000"));
@@ -93,7 +94,7 @@ TEST_F(ScpiSupplyTest, SpeaksTheDialectOfTheMaker) {
   line.answers["OUTP:OCP:QUES?"] = "YES";
   line.answers["OUTP:MODE?"] = "CC";
   line.answers["OUTP?"] = "OFF";
-  ScpiSupply supply(line, clock);
+  ScpiSupply supply(lend(line), clock);
   supply.apply(kTwelveVolts);
   EXPECT_EQ(line.told.front(), "OUTP:OVP:VAL 13.200");
   const supply::Reading reading = supply.read();
@@ -103,7 +104,7 @@ TEST_F(ScpiSupplyTest, SpeaksTheDialectOfTheMaker) {
 }
 
 TEST_F(ScpiSupplyTest, ReadsWhatItGives) {
-  ScpiSupply supply(line, clock);
+  ScpiSupply supply(lend(line), clock);
   const supply::Reading reading = supply.read();
   EXPECT_DOUBLE_EQ(reading.voltage_v, 11.98);
   EXPECT_DOUBLE_EQ(reading.current_a, 1.234);
@@ -117,7 +118,7 @@ TEST_F(ScpiSupplyTest, ReadsWhatItGives) {
 }
 
 TEST_F(ScpiSupplyTest, SwitchesOnOnlyWhileAGuardLivesAndVerifies) {
-  ScpiSupply supply(line, clock);
+  ScpiSupply supply(lend(line), clock);
   {
     const supply::PoweredOutput output(supply);
     EXPECT_EQ(line.answers["OUTP?"], "1");
@@ -135,15 +136,15 @@ TEST_F(ScpiSupplyTest, SurfacesTheInstrumentsOwnErrors) {
 
 TEST_F(ScpiSupplyTest, RefusesNumbersThatCannotBe) {
   line.answers["MEAS:VOLT?"] = "112";
-  EXPECT_THAT(refusal([](ScpiSupply& supply) { (void)supply.read(); }), HasSubstr("cannot be"));
+  EXPECT_THAT(refusal([](ScpiSupply& supply) { (void)supply.read(); }), HasSubstr("is impossible"));
   line.answers["MEAS:VOLT?"] = "9.91E37";
-  EXPECT_THAT(refusal([](ScpiSupply& supply) { (void)supply.read(); }), HasSubstr("is no number"));
+  EXPECT_THAT(refusal([](ScpiSupply& supply) { (void)supply.read(); }), HasSubstr("is not a number"));
   line.answers["*IDN?"] = "hello";
   EXPECT_THAT(refusal([](ScpiSupply&) {}), HasSubstr("names no model"));
 }
 
 TEST_F(ScpiSupplyTest, RefusesLimitsBeyondTheDevice) {
-  ScpiSupply supply(line, clock);
+  ScpiSupply supply(lend(line), clock);
   for (const supply::Limits& limits : {supply::Limits{Volts(40), Amperes(5), Volts(13), Amperes(6)},
                                        supply::Limits{Volts(12), Amperes(-1), Volts(13), Amperes(6)},
                                        supply::Limits{Volts(12), Amperes(5), Volts(std::nan("")), Amperes(6)}}) {

@@ -1,13 +1,13 @@
-// The drivers of supply and meter over TCP, against a simulated instrument that shares no line with them.
+// The driver of a supply over TCP, against a simulated instrument that shares no line with them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "drivers/device_error.hpp"
-#include "drivers/scpi/scpi_meter.hpp"
+#include "base/error.hpp"
+#include "base/random.hpp"
 #include "drivers/scpi/scpi_supply.hpp"
 #include "drivers/scpi/tcp.hpp"
-#include "drivers/sim/random.hpp"
-#include "drivers/sim/scpi_tcp.hpp"
+#include "test/drivers/scpi/lent_line.hpp"
+#include "test/drivers/sim_equipment/scpi_tcp.hpp"
 
 namespace kphi::scpi {
 namespace {
@@ -36,7 +36,7 @@ class TcpInstrumentTest : public testing::Test {
 };
 
 TEST_F(TcpInstrumentTest, IsASupply) {
-  ScpiSupply supply(line, clock);
+  ScpiSupply supply(lend(line), clock);
   instrument.connect_load(6);
   const supply::Limits limits{Volts(12), Amperes(5), Volts(13.2), Amperes(6)};
   EXPECT_EQ(supply.apply(limits), limits);
@@ -48,13 +48,13 @@ TEST_F(TcpInstrumentTest, SpeaksTheDialectOfRigol) {
   sim::ScpiInstrument rigol({"RIGOL TECHNOLOGIES,DP832,DP8A1,1.0", sim::ScpiKind::supply, sim::ScpiFamily::rigol});
   const sim::ScpiTcp other(rigol, faults);
   Tcp there("127.0.0.1", other.port(), 200ms);
-  ScpiSupply supply(there, clock);
+  ScpiSupply supply(lend(there), clock);
   rigol.connect_load(1);
   const supply::Limits limits{Volts(12), Amperes(5), Volts(13.2), Amperes(6)};
   EXPECT_EQ(supply.apply(limits), limits);
   const supply::PoweredOutput output(supply);
   EXPECT_EQ(supply.read().regulation, supply::Regulation::constant_current);
-  (void)rigol.obey("OUTP:OCP:VAL 4");
+  (void)rigol.apply("OUTP:OCP:VAL 4");
   EXPECT_EQ(supply.read().protection, supply::Protection::over_current);
 }
 
@@ -75,7 +75,7 @@ TEST_F(TcpInstrumentTest, ConnectsAgainAfterSilenceAndAfterAnEnd) {
 
 TEST_F(TcpInstrumentTest, AnswersTrulyOrNotAtAllUnderAnyMixtureOfFaults) {
   Tcp fast("127.0.0.1", server.port(), 20ms);
-  sim::Random random(1);
+  Random random(1);
   int answered = 0, failed = 0;
   for (int i = 0; i < 200; ++i) {
     constexpr UsbFaultKind kKinds[] = {UsbFaultKind::no_reply, UsbFaultKind::late, UsbFaultKind::closed};
@@ -92,34 +92,6 @@ TEST_F(TcpInstrumentTest, AnswersTrulyOrNotAtAllUnderAnyMixtureOfFaults) {
   }
   EXPECT_GT(answered, 100);
   EXPECT_GT(failed, 20);
-}
-
-class ScpiMeterTest : public TcpInstrumentTest {
- protected:
-  sim::ScpiInstrument seen{{"KPHI,DMM,1,1", sim::ScpiKind::meter, sim::ScpiFamily::standard, 0, 0, false}};
-  sim::ScpiTcp other{seen, faults};
-  Tcp there{"127.0.0.1", other.port(), 100ms};
-};
-
-TEST_F(ScpiMeterTest, MeasuresOnlyWhatIsAskedFor) {
-  seen.present(12.5, 3);
-  ScpiMeter meter(there, clock, {true, false, false});
-  const MeterReading reading = meter.read();
-  EXPECT_DOUBLE_EQ(*reading.voltage_v, 12.5);
-  EXPECT_FALSE(reading.current_a);
-  EXPECT_FALSE(reading.power_w);
-  for (const std::string& message : seen.heard()) EXPECT_EQ(message.find("CURR"), std::string::npos);
-}
-
-TEST_F(ScpiMeterTest, IsRefusedAtOnceWhenItCannotMeasureThat) {
-  EXPECT_THAT(refusal([&] { ScpiMeter(there, clock, {true, true, true}); }), HasSubstr("MEAS:POW?"));
-  EXPECT_THROW(ScpiMeter(there, clock, {false, false, false}), std::invalid_argument);
-}
-
-TEST_F(ScpiMeterTest, GivesNoNumberForAnInputBeyondItsRange) {
-  ScpiMeter meter(there, clock, {true, false, false});
-  seen.present(9.9e37, 0);
-  EXPECT_THAT(refusal([&] { (void)meter.read(); }), HasSubstr("beyond its range"));
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 #include <functional>
 #include <thread>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 
 namespace kphi::scpi {
 namespace {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 #include "test/drivers/scpi/fake_instrument.hpp"
 
 namespace kphi::scpi {
@@ -30,8 +30,6 @@ class UsbtmcTest : public testing::Test {
 TEST_F(UsbtmcTest, ClearsTheInstrumentAndTakesRemoteControl) {
   Usbtmc line(usb);
   EXPECT_THAT(usb.class_requests, ElementsAre(7, 5, 6, 160));
-  EXPECT_TRUE(line.capabilities().scpi);
-  EXPECT_TRUE(line.capabilities().indicator_pulse);
 }
 
 TEST_F(UsbtmcTest, SendsNoRemoteControlToWhomItChokes) {
@@ -64,7 +62,7 @@ TEST_F(UsbtmcTest, SurvivesTheEmptyFirstPacketOfSome) {
 TEST_F(UsbtmcTest, GathersAnAnswerInManyPacketsAndParts) {
   std::string longest;
   for (int i = 0; i < 3000; ++i) longest += static_cast<char>('a' + i % 26);
-  usb.obey = [&](const std::string&) { return longest; };
+  usb.apply = [&](const std::string&) { return longest; };
   for (const std::size_t part : {4096u, 1000u, 57u}) {
     usb.part = part;
     for (const std::size_t packet : {512u, 64u}) {
@@ -86,7 +84,7 @@ TEST_F(UsbtmcTest, NeverTakesTheAnswerToAnotherRequest) {
 TEST_F(UsbtmcTest, AbortsAndClearsAfterSilenceSoThatALateAnswerIsNobodys) {
   Usbtmc line(usb);
   usb.mute = 1;
-  usb.obey = [](const std::string& command) { return command == "VOLT?" ? "12.0" : "5.0"; };
+  usb.apply = [](const std::string& command) { return command == "VOLT?" ? "12.0" : "5.0"; };
   usb.class_requests.clear();
   EXPECT_THAT(refusal(line, "VOLT?"), HasSubstr("no answer in time"));
   EXPECT_THAT(usb.class_requests, ElementsAre(3, 4));
@@ -126,7 +124,7 @@ TEST_F(UsbtmcTest, RefusesAnInstrumentThatCannotBeCleared) {
 TEST_F(UsbtmcTest, GivesUpAnAnswerThatNeverEnds) {
   Usbtmc line(usb);
   usb.part = 4000;
-  usb.obey = [](const std::string&) { return std::string(200000, '7'); };
+  usb.apply = [](const std::string&) { return std::string(200000, '7'); };
   EXPECT_THAT(refusal(line, "CURV?"), HasSubstr("does not end"));
   usb.part = 0;
   EXPECT_THAT(refusal(line, "CURV?"), HasSubstr("does not end")) << "one empty part after the other";

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 #include "test/drivers/serial/fake_sysfs.hpp"
 
 namespace kphi::serial {
@@ -110,7 +110,7 @@ TEST_F(Discovery, RefusesAnAmbiguousNameAndListsTheCandidates) {
 TEST_F(Discovery, SaysWhatIsThereWhenNothingFits) {
   bus.plug(kFtdi);
   EXPECT_THAT(refusal("usb:0403:6001:A10K9999"),
-              AllOf(HasSubstr("no adapter fits"), HasSubstr("usb:0403:6001:A10K0000"), HasSubstr("name one of these")));
+              AllOf(HasSubstr("no adapter fits"), HasSubstr("usb:0403:6001:A10K0000"), HasSubstr("use one of these")));
 }
 
 TEST_F(Discovery, RefusesWhatIsNoSpecification) {
@@ -144,7 +144,7 @@ TEST_F(Discovery, WarnsOfALongLatencyTimerAndNamesTheRemedy) {
   };
   ASSERT_TRUE(finding("ttyUSB0"));
   EXPECT_EQ(finding("ttyUSB0")->severity, Severity::warning);
-  EXPECT_THAT(finding("ttyUSB0")->what, AllOf(HasSubstr("up to 16 ms"), HasSubstr("about 62 questions per second")));
+  EXPECT_THAT(finding("ttyUSB0")->what, AllOf(HasSubstr("up to 16 ms"), HasSubstr("about 62 queries per second")));
   EXPECT_THAT(finding("ttyUSB0")->next_move,
               AllOf(HasSubstr("echo 1 > /sys/bus/usb-serial/devices/ttyUSB0/latency_timer"), HasSubstr("udev rule")));
   EXPECT_FALSE(finding("ttyUSB1")) << "1 ms";

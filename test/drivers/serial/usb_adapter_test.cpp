@@ -8,7 +8,7 @@
 #include <chrono>
 #include <memory>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 #include "drivers/serial/discovery.hpp"
 #include "drivers/serial/port.hpp"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/sim/iq_device.hpp"
+#include "drivers/sim/iq/device.hpp"
 #include "test/drivers/sim/hex.hpp"
 
 namespace kphi::sim::test {

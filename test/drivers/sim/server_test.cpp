@@ -16,7 +16,7 @@
 #include <optional>
 #include <thread>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 #include "drivers/sim/control_line.hpp"
 #include "test/drivers/sim/hex.hpp"
 

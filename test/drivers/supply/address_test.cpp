@@ -35,18 +35,18 @@ TEST(SupplyAddress, LeavesTheUsualUnsaid) {
   EXPECT_EQ(riden.slave, 1);
   EXPECT_EQ(parse_address("modbus-rtu:/dev/ttyUSB1?model=HM310P").baud, 9600u);
   EXPECT_EQ(parse_address("modbus-rtu:/dev/ttyUSB1?model=HM310P&baud=115200").baud, 115200u);
-  EXPECT_EQ(parse_address("modbus-tcp:psu.lab").port, 502u);
+  EXPECT_EQ(parse_address("modbus-tcp:psu.lab").tcp.port, 502u);
 }
 
 TEST(SupplyAddress, NamesAHost) {
   const Address address = parse_address("modbus-tcp:192.168.1.20:1502?slave=255&model=RD6006");
   EXPECT_EQ(address.wire, Address::Wire::tcp);
-  EXPECT_EQ(address.host, "192.168.1.20");
-  EXPECT_EQ(address.port, 1502u);
+  EXPECT_EQ(address.tcp.host, "192.168.1.20");
+  EXPECT_EQ(address.tcp.port, 1502u);
   EXPECT_EQ(address.slave, 255);
   EXPECT_EQ(address.where(), "192.168.1.20:1502");
   const Address six = parse_address("modbus-tcp:[fe80::1]:1502");
-  EXPECT_EQ(six.host, "fe80::1");
+  EXPECT_EQ(six.tcp.host, "fe80::1");
   EXPECT_EQ(six.where(), "[fe80::1]:1502");
 }
 
@@ -56,7 +56,7 @@ TEST(SupplyAddress, RefusesABaudRateThatLibmodbusWouldSilentlyReplace) {
   }
   EXPECT_EQ(
       refusal("modbus-rtu:/dev/ttyUSB0?baud=12345"),
-      "supply \"modbus-rtu:/dev/ttyUSB0?baud=12345\": \"12345\" is no baud rate that can be set; use one of 1200, "
+      "supply \"modbus-rtu:/dev/ttyUSB0?baud=12345\": \"12345\" is not a baud rate that can be set; use one of 1200, "
       "2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600");
 }
 

@@ -4,7 +4,7 @@
 
 #include <ostream>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 #include "drivers/supply/modbus_supply.hpp"
 #include "test/drivers/supply/simulated_supply.hpp"
 

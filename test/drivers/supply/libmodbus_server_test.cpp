@@ -1,6 +1,7 @@
 // The happy path against the library's own server: a third opinion on the wire.
 #include <gtest/gtest.h>
 #include <modbus/modbus.h>
+#include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
 

@@ -53,7 +53,7 @@ TEST(ModbusLink, SpeaksTheFramesOfTheRiden) {
   EXPECT_EQ(image[0], 60062);
   const Outcome refused = link.read({82, 2}, image);
   EXPECT_EQ(refused.failure, Failure::refused);
-  EXPECT_EQ(refused.words, "it answers \"Illegal data address\"");
+  EXPECT_EQ(refused.words, "the device answers \"Illegal data address\"");
   EXPECT_TRUE(link.read({8, 1}, image).ok());
   EXPECT_EQ(image[8], 1200);
   EXPECT_TRUE(link.read({10, 1}, image).ok());

@@ -7,7 +7,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 #include "test/drivers/serial/pseudo_terminal.hpp"
 #include "test/drivers/supply/simulated_supply.hpp"
 
@@ -149,7 +149,7 @@ TEST_F(Riden, AsksWhoItIsBeforeAnythingElse) {
 
 TEST_F(Riden, RefusesToBeSwitchedOnWithoutLimits) {
   ModbusSupply supply(simulated.address(), clock, kShort);
-  EXPECT_THAT(what_of([&] { PoweredOutput on(supply); }), HasSubstr("limits have not been set"));
+  EXPECT_THAT(what_of([&] { PoweredOutput on(supply); }), HasSubstr("its limits are not set"));
   for (const auto& [at, value] : simulated.truth().writes) EXPECT_EQ(value, 0) << at;
 }
 
@@ -184,8 +184,8 @@ TEST_F(Riden, NoticesWhenItDoesNotDoWhatItAcknowledges) {
   EXPECT_THAT(what_of([&] {
                 supply.apply({Volts(11), Amperes(2.5), Volts(13), Amperes(3)});
               }),
-              HasSubstr("it was told 11 and reports 12"));
-  EXPECT_THAT(what_of([&] { PoweredOutput on(supply); }), HasSubstr("it has acknowledged and stays off"));
+              HasSubstr("set to 11, reads back 12"));
+  EXPECT_THAT(what_of([&] { PoweredOutput on(supply); }), HasSubstr("acknowledged, but the output stays off"));
 }
 
 TEST_F(Riden, SaysWhenItCannotBeSwitchedOff) {
@@ -196,7 +196,7 @@ TEST_F(Riden, SaysWhenItCannotBeSwitchedOff) {
   ignored.kind = SupplyFaultKind::ignored_writes;
   ignored.lasts = 1h;
   simulated.spoil(ignored);
-  EXPECT_THAT(on.off(), HasSubstr("reports that its output is on; switch it off by hand"));
+  EXPECT_THAT(on.off(), HasSubstr("the output is still ON; switch it off by hand"));
 }
 
 /// The order leaves even when nothing comes back: the device may hear though it is not heard.
@@ -222,7 +222,7 @@ TEST_F(Riden, IsTriedAtMostThreeTimes) {
   simulated.spoil(deaf);
   const std::uint64_t before = simulated.truth().requests;
   EXPECT_THAT(what_of([&] { (void)supply.read(); }),
-              AllOf(HasSubstr("read: no answer"), HasSubstr("is 115200 its baud rate")));
+              AllOf(HasSubstr("read: no answer"), HasSubstr("its baud rate (115200 here")));
   EXPECT_EQ(simulated.truth().requests - before, 3u);
   EXPECT_EQ(supply.counters().timeouts, 3u);
   EXPECT_EQ(supply.counters().retries, 2u);
@@ -243,7 +243,7 @@ TEST_F(Riden, AbsentIsNamed) {
 
 TEST_F(Riden, OfAnotherModelThanNamedIsRefused) {
   EXPECT_THAT(what_of([&] { ModbusSupply(simulated.address(Over::rtu, "?model=RD6012"), clock, kShort); }),
-              HasSubstr("it is a RD6006, not a RD6012"));
+              HasSubstr("found a RD6006, not a RD6012"));
 }
 
 TEST_F(Riden, OfUnknownModelIsRefusedAndLeftAlone) {
@@ -254,7 +254,7 @@ TEST_F(Riden, OfUnknownModelIsRefusedAndLeftAlone) {
   unknown.value = 60301;
   simulated.spoil(unknown);
   EXPECT_THAT(what_of([&] { ModbusSupply(simulated.address(), clock, kShort); }),
-              AllOf(HasSubstr("no known model: RD60xx register 0 is 60301"), HasSubstr("known are RD6006")));
+              AllOf(HasSubstr("unknown model: RD60xx register 0 is 60301"), HasSubstr("known are RD6006")));
   EXPECT_TRUE(simulated.truth().writes.empty());
 }
 
@@ -271,7 +271,7 @@ TEST_F(Riden, ReplacedByAnotherIsNoticed) {
   lost.kind = SupplyFaultKind::no_reply;
   lost.count = 1;
   simulated.spoil(lost);
-  EXPECT_THAT(what_of([&] { (void)supply.read(); }), HasSubstr("another device answers in its place"));
+  EXPECT_THAT(what_of([&] { (void)supply.read(); }), HasSubstr("another device answers"));
 }
 
 TEST_F(Riden, ReportingWhatCannotBeIsNotBelieved) {
@@ -287,7 +287,7 @@ TEST_F(Riden, ReportingWhatCannotBeIsNotBelieved) {
     SimulatedSupply another;
     ModbusSupply doubted(another.address(), clock, kShort);
     another.spoil(fault);
-    EXPECT_THAT(what_of([&] { (void)doubted.read(); }), HasSubstr("which cannot be")) << at;
+    EXPECT_THAT(what_of([&] { (void)doubted.read(); }), HasSubstr("implausible reply")) << at;
     EXPECT_EQ(doubted.counters().implausible, 3u);
   }
 }

@@ -8,9 +8,9 @@
 #include <string>
 #include <thread>
 
-#include "drivers/sim/supply_server.hpp"
 #include "drivers/supply/address.hpp"
 #include "drivers/supply/modbus_link.hpp"
+#include "test/drivers/sim_equipment/supply_server.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::supply::test {

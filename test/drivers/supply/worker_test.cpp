@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "drivers/device_error.hpp"
+#include "base/error.hpp"
 #include "drivers/supply/modbus_supply.hpp"
 #include "test/drivers/supply/simulated_supply.hpp"
 

@@ -10,8 +10,8 @@
 #include <mutex>
 #include <thread>
 
-#include "drivers/device_error.hpp"
-#include "drivers/sim/virtual_usb.hpp"
+#include "base/error.hpp"
+#include "test/drivers/sim_equipment/virtual_usb.hpp"
 
 namespace kphi::usb {
 namespace {
@@ -77,7 +77,7 @@ class VirtualBusTest : public testing::Test {
   }
   std::string refusal(const Bus& bus, const char* address) {
     try {
-      (void)bus.open(Address::parse(address));
+      (void)bus.open(UsbAddress::parse(address));
     } catch (const DeviceError& error) {
       return error.what();
     }
@@ -108,14 +108,14 @@ TEST_F(VirtualBusTest, RefusesToGuessBetweenTwoAlike) {
   const Bus bus;
   EXPECT_THAT(refusal(bus, "usb:1209:0001"),
               testing::AllOf(HasSubstr("several fit"), HasSubstr("0001"), HasSubstr("0002")));
-  EXPECT_THAT(bus.open(Address::parse("usb:1209:0001:0002"))->name(), HasSubstr("port 1-4"));
-  EXPECT_THAT(bus.open(Address::parse("usb:1209:0001@1-1"))->name(), HasSubstr("serial 0001"));
+  EXPECT_THAT(bus.open(UsbAddress::parse("usb:1209:0001:0002"))->name(), HasSubstr("port 1-4"));
+  EXPECT_THAT(bus.open(UsbAddress::parse("usb:1209:0001@1-1"))->name(), HasSubstr("serial 0001"));
 }
 
 TEST_F(VirtualBusTest, ReadsTheDescriptors) {
   wire->plug(1, one);
   const Bus bus;
-  const auto device = bus.open(Address::parse("usb:1209:0001"));
+  const auto device = bus.open(UsbAddress::parse("usb:1209:0001"));
   ASSERT_EQ(device->interfaces().size(), 2u);
   const Interface& first = device->interfaces()[0];
   EXPECT_EQ(first.class_code, 0xFF);
@@ -132,7 +132,7 @@ TEST_F(VirtualBusTest, ReadsTheDescriptors) {
 TEST_F(VirtualBusTest, MovesControlBulkAndInterruptTransfers) {
   wire->plug(1, one);
   const Bus bus;
-  const auto device = bus.open(Address::parse("usb:1209:0001"));
+  const auto device = bus.open(UsbAddress::parse("usb:1209:0001"));
   device->claim(0);
   device->claim(1);
   std::array<std::uint8_t, 8> data{};
@@ -159,7 +159,7 @@ TEST_F(VirtualBusTest, MovesControlBulkAndInterruptTransfers) {
 TEST_F(VirtualBusTest, ReportsAStallAndClearsIt) {
   wire->plug(1, one);
   const Bus bus;
-  const auto device = bus.open(Address::parse("usb:1209:0001"));
+  const auto device = bus.open(UsbAddress::parse("usb:1209:0001"));
   device->claim(0);
   std::array<std::uint8_t, 8> data{};
   one.halted = true;
@@ -173,7 +173,7 @@ TEST_F(VirtualBusTest, ReportsAStallAndClearsIt) {
 TEST_F(VirtualBusTest, GivesUpInTime) {
   wire->plug(1, one);
   const Bus bus;
-  const auto device = bus.open(Address::parse("usb:1209:0001"));
+  const auto device = bus.open(UsbAddress::parse("usb:1209:0001"));
   device->claim(0);
   std::array<std::uint8_t, 8> data{};
   EXPECT_EQ(device->read(endpoint(*device, 0x82), data, 50ms).outcome, Outcome::timed_out);
@@ -182,7 +182,7 @@ TEST_F(VirtualBusTest, GivesUpInTime) {
 TEST_F(VirtualBusTest, EndsAtOnceWhenItIsCancelled) {
   wire->plug(1, one);
   const Bus bus;
-  const auto device = bus.open(Address::parse("usb:1209:0001"));
+  const auto device = bus.open(UsbAddress::parse("usb:1209:0001"));
   device->claim(0);
   std::array<std::uint8_t, 8> data{};
   std::thread canceller([&] { device->cancel(); });
@@ -191,31 +191,27 @@ TEST_F(VirtualBusTest, EndsAtOnceWhenItIsCancelled) {
   EXPECT_EQ(device->read(endpoint(*device, 0x82), data, 60000ms).outcome, Outcome::cancelled) << "and stays so";
 }
 
-TEST_F(VirtualBusTest, TellsOfPluggingAndEndsTransfersOfWhatIsGone) {
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::vector<std::pair<std::string, bool>> seen;
-  const Bus bus([&](const Listing& listing, bool arrived) {
-    const std::lock_guard lock(mutex);
-    seen.emplace_back(listing.port_path, arrived);
-    changed.notify_all();
-  });
-  const auto wait_for = [&](std::size_t n) {
-    std::unique_lock lock(mutex);
-    return changed.wait_for(lock, 10s, [&] { return seen.size() >= n; });
-  };
+TEST_F(VirtualBusTest, EndsATransferWhenItsDeviceIsUnplugged) {
   wire->plug(1, one);
-  ASSERT_TRUE(wait_for(1));
-  const auto device = bus.open(Address::parse("usb:1209:0001"));
+  const Bus bus;
+  const auto device = bus.open(UsbAddress::parse("usb:1209:0001"));
   device->claim(0);
   std::thread reader([&] {
     std::array<std::uint8_t, 8> data{};
     EXPECT_EQ(device->read(endpoint(*device, 0x82), data, 60000ms).outcome, Outcome::gone);
   });
   wire->unplug(1);
-  ASSERT_TRUE(wait_for(2));
   reader.join();
-  EXPECT_THAT(seen, ElementsAre(std::pair<std::string, bool>("1-1", true), std::pair<std::string, bool>("1-1", false)));
+}
+
+TEST(UsbListing, FitsByWhatTheAddressNames) {
+  const Listing one{0x04d8, 0x00dd, "0001AB", "1-1.4", true};
+  EXPECT_TRUE(fits(UsbAddress::parse("usb:04d8:00dd"), one));
+  EXPECT_TRUE(fits(UsbAddress::parse("usb:*:*:0001AB"), one));
+  EXPECT_TRUE(fits(UsbAddress::parse("usb:04d8:00dd:0001AB@1-1.4"), one));
+  EXPECT_FALSE(fits(UsbAddress::parse("usb:04d8:00dd:0001AC"), one));
+  EXPECT_FALSE(fits(UsbAddress::parse("usb:04d8:00dd@1-1"), one));
+  EXPECT_FALSE(fits(UsbAddress::parse("usb:04d8:00de"), one));
 }
 
 }  // namespace

@@ -7,9 +7,9 @@
 #include <memory>
 #include <thread>
 
-#include "drivers/device_error.hpp"
-#include "drivers/sim/usb_faults.hpp"
-#include "drivers/sim/virtual_usb.hpp"
+#include "base/error.hpp"
+#include "drivers/sim/usb/faults.hpp"
+#include "test/drivers/sim_equipment/virtual_usb.hpp"
 
 namespace kphi {
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "fit/coefficients.hpp"
+#include "fit/coefficients/coefficients.hpp"
 #include "fit/export/run_export.hpp"
 #include "fit/export/targets.hpp"
 #include "test/fit/campaign_steps.hpp"
@@ -56,8 +56,8 @@ const fs = require("fs");
 class Mcap : public ::testing::Test {
  protected:
   void SetUp() override {
-    const char* place = std::getenv("KPHI_NODE_MODULES");
-    modules = place != nullptr ? place : kphi::test::source_dir() + "/build/node_modules";
+    const char* config = std::getenv("KPHI_NODE_MODULES");
+    modules = config != nullptr ? config : kphi::test::source_dir() + "/build/node_modules";
     if (!works("NODE_PATH=" + modules + " node -e 'require(\"@mcap/core\")'"))
       GTEST_SKIP() << "no @mcap/core in " << modules
                    << "; npm install --prefix build @mcap/core, or set KPHI_NODE_MODULES";
@@ -114,7 +114,7 @@ TEST_F(Mcap, OfCoefficientsHoldsTheTableAndItsProvenance) {
   const auto file = compensation::parse_coefficients(format_coefficients(identify(campaign_steps()), provenance), "c");
   const auto json = read(to_mcap(file, {}).text);
   ASSERT_EQ(json["messages"].size(), 5u);
-  EXPECT_EQ(json["messages"][0]["data"]["k"].get<double>(), file.thrust_coefficient.value());
+  EXPECT_EQ(json["messages"][0]["data"]["k"].get<double>(), file.curve.thrust_coefficient().value());
   EXPECT_NEAR(json["messages"][4]["data"]["phi_deg"].get<double>(), 270, 1e-9);
   EXPECT_EQ(json["metadata"]["k_unit"], "N/(rad/s)^2");
   EXPECT_EQ(json["metadata"]["sha256 runs/a.h5"], std::string(64, 'a'));

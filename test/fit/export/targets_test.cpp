@@ -9,9 +9,9 @@
 #include <set>
 #include <sstream>
 
-#include "fit/coefficients.hpp"
-#include "fit/k_table.hpp"
-#include "profiles/configuration_error.hpp"
+#include "base/error.hpp"
+#include "fit/coefficients/coefficients.hpp"
+#include "fit/logs/k_table.hpp"
 #include "test/fit/campaign_steps.hpp"
 #include "test/fit/export/outside_reader.hpp"
 #include "test/temporary_folder.hpp"
@@ -57,7 +57,8 @@ class Yaml : public ::testing::Test {
 TEST_F(Yaml, OfAgiliciousIsReadByPython) {
   const auto file = coefficients();
   const auto map = yaml_as_json(to_agilicious(file, {}).text);
-  EXPECT_EQ(map["thrust_map"][0].get<double>(), file.thrust_coefficient.value()) << "to the last bit, and as a float";
+  EXPECT_EQ(map["thrust_map"][0].get<double>(), file.curve.thrust_coefficient().value())
+      << "to the last bit, and as a float";
   EXPECT_EQ(map["thrust_map"][1], 0.0);
   EXPECT_EQ(map["motor_omega_max"].get<double>(), file.fastest_speed->value());
   const auto covered = yaml_as_json(to_agilicious(file, {.phi_deg = 180}).text);
@@ -69,8 +70,8 @@ TEST_F(Yaml, OfRos2IsReadByPythonWithDoublesAndListsOfOneType) {
   const auto all = yaml_as_json(to_ros2(file, {}).text);
   const auto& parameters = all["/**"]["ros__parameters"]["kphi"];
   EXPECT_EQ(parameters["propeller"], "5x3");
-  EXPECT_EQ(parameters["thrust_coefficient_n_s2_per_rad2"].get<double>(), file.thrust_coefficient.value());
-  EXPECT_EQ(parameters["line_slope_n_s2_per_rad3"].get<double>(), file.line.slope_per_rad);
+  EXPECT_EQ(parameters["thrust_coefficient_n_s2_per_rad2"].get<double>(), file.curve.thrust_coefficient().value());
+  EXPECT_EQ(parameters["line_slope_n_s2_per_rad3"].get<double>(), file.curve.line().slope_per_rad);
   ASSERT_EQ(parameters["phi_deg"].size(), 5u);
   for (const auto& [key, value] : parameters.items()) {
     if (key == "propeller" || key == "overlap") continue;
@@ -97,7 +98,7 @@ TEST(Px4, ParametersAreForceAtFullOutput) {
   }
   ASSERT_EQ(values.size(), 4u);
   const double full = from_rpm(20000).value();
-  EXPECT_NEAR(values["CA_ROTOR2_CT"], file.thrust_coefficient.value() * full * full, 1e-9);
+  EXPECT_NEAR(values["CA_ROTOR2_CT"], file.curve.thrust_coefficient().value() * full * full, 1e-9);
   EXPECT_EQ(values["THR_MDL_FAC"], 1);
   EXPECT_THAT(result.lost, Contains(HasSubstr("one constant per motor and cannot change it in flight")));
   EXPECT_THROW((void)to_px4(file, {.speed_max_rpm = 200000}), ConfigurationError) << "above the parameter's range";
@@ -114,7 +115,7 @@ TEST(Gazebo, IsReadByXmllint) {
     EXPECT_EQ(reading.status, 0) << reading.out;
     return std::strtod(reading.out.c_str(), nullptr);
   };
-  EXPECT_EQ(read("/sdf/model/plugin[3]/motorConstant"), file.thrust_coefficient.value());
+  EXPECT_EQ(read("/sdf/model/plugin[3]/motorConstant"), file.curve.thrust_coefficient().value());
   EXPECT_EQ(read("/sdf/model/plugin[1]/maxRotVelocity"), file.fastest_speed->value());
   EXPECT_EQ(read("count(//plugin)"), 4);
 }
@@ -140,14 +141,14 @@ int main() {
   ASSERT_EQ(compiled.status, 0) << compiled.out;
   const auto ran = read_with(binary);
   std::istringstream numbers(ran.out);
-  const auto line = compensation::thrust_line(file);
+  const auto line = file.curve;
   double value = 0;
   for (int degrees = 0; degrees <= 360; degrees += 15) {
     numbers >> value;
     EXPECT_NEAR(value, line.scaling_factor(from_degrees(degrees)), 1e-15) << degrees;
   }
   numbers >> value;
-  EXPECT_NEAR(value, 5.0 / (file.thrust_coefficient.value() * line.scaling_factor(Radians(1.0))), 1e-6);
+  EXPECT_NEAR(value, 5.0 / (file.curve.thrust_coefficient().value() * line.scaling_factor(Radians(1.0))), 1e-6);
 }
 
 TEST(CsvExport, IsFittedAgainToTheSameCoefficients) {
@@ -157,8 +158,8 @@ TEST(CsvExport, IsFittedAgainToTheSameCoefficients) {
   const auto points = read_k_table(text, "K.csv");
   ASSERT_EQ(points.size(), 5u);
   const LineFit line = fit_line(points);
-  EXPECT_NEAR(line.slope_per_deg / (file.line.slope_per_rad * kPi / 180), 1, 1e-9);
-  EXPECT_EQ(line.K_T, file.thrust_coefficient.value());
+  EXPECT_NEAR(line.slope_per_deg / (file.curve.line().slope_per_rad * kPi / 180), 1, 1e-9);
+  EXPECT_EQ(line.K_T, file.curve.thrust_coefficient().value());
 }
 
 TEST(Targets, SayWhatTheyCannotHold) {

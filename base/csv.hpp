@@ -1,0 +1,48 @@
+// A small strict reader of tables: comma separated or separated by blanks, one header line, numbers in from_chars'
+// form. Whatever the bytes are, it does not throw: a line that does not fit the header is left out and reported.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace kphi::fit {
+
+struct TableRow {
+  std::size_t line = 0;  ///< in the file, 1-based
+  std::vector<std::string> fields;
+};
+
+struct TableProblem {
+  std::size_t line = 0;
+  std::string what;
+};
+
+struct Table {
+  std::string path;  ///< only for messages
+  std::size_t header_line = 0;
+  std::vector<std::string> header;
+  std::vector<TableRow> rows;  ///< every row has as many fields as the header
+  std::vector<TableProblem> problems;
+
+  /// Index of the column named exactly so. Throws ConfigurationError (path:line) if it is missing or stands twice.
+  [[nodiscard]] std::size_t column(std::string_view name) const;
+  [[nodiscard]] std::optional<std::size_t> find_column(std::string_view name) const;
+};
+
+/// Comma separated: a byte order mark, CRLF and a trailing empty field on each line are taken as they come; a field may
+/// stand in double quotes, a quote in it doubled. Empty lines are skipped.
+[[nodiscard]] Table read_csv(std::string_view text, std::string path);
+
+/// As read_csv, separated by `separator`; 0: by the one of , ; tab that the header line has most of.
+[[nodiscard]] Table read_separated(std::string_view text, std::string path, char separator);
+
+/// Separated by blanks or tabs.
+[[nodiscard]] Table read_blank_separated(std::string_view text, std::string path);
+
+/// The whole field as a finite number, blanks around it allowed; nullopt otherwise.
+[[nodiscard]] std::optional<double> parse_number(std::string_view field);
+
+}  // namespace kphi::fit

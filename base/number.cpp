@@ -1,0 +1,37 @@
+#include "base/number.hpp"
+
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
+namespace kphi {
+
+std::string shortest(double value) {
+  std::array<char, 32> text{};
+  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
+  return std::string(text.data(), end);
+}
+
+std::string yaml_number(double value) {
+  if (!std::isfinite(value))
+    throw std::invalid_argument("a coefficient file holds finite numbers only, not " + shortest(value));
+  std::string text = shortest(value);
+  const std::size_t e = text.find('e');
+  std::string mantissa = text.substr(0, e);
+  if (mantissa.find('.') == std::string::npos) mantissa += ".0";
+  return e == std::string::npos ? mantissa : mantissa + text.substr(e);  // to_chars always signs the exponent
+}
+
+std::optional<double> parse_double(std::string_view text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+std::optional<double> parse_finite(std::string_view text) {
+  const auto value = parse_double(text);
+  return value && std::isfinite(*value) ? value : std::nullopt;
+}
+
+}  // namespace kphi

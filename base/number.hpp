@@ -1,0 +1,35 @@
+// Numbers in files and addresses, whatever the locale: text to number, and the shortest text that reads back as the
+// same bits.
+#pragma once
+
+#include <charconv>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace kphi {
+
+/// Shortest round trip (std::to_chars): 45, 1e-06, nan.
+[[nodiscard]] std::string shortest(double value);
+
+/// As `shortest`, but every YAML 1.1 and 1.2 reader takes it for a float: the mantissa has a '.', the exponent a sign
+/// (45.0, 1.0e-06, 1.0e+300). Throws std::invalid_argument for NaN and infinities.
+[[nodiscard]] std::string yaml_number(double value);
+
+/// The whole of `text` as a number (std::from_chars), NaN and infinities included; nullopt for anything else, such as
+/// "", " 1" and "+1".
+[[nodiscard]] std::optional<double> parse_double(std::string_view text);
+
+/// As parse_double; nullopt also for NaN and infinities.
+[[nodiscard]] std::optional<double> parse_finite(std::string_view text);
+
+/// The whole of `text` as a whole number that fits the type; nullopt for anything else, such as "", " 1", "+1", "0x1".
+template <class Integer>
+[[nodiscard]] std::optional<Integer> parse_integer(std::string_view text, int base = 10) {
+  Integer value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+}  // namespace kphi

@@ -1,0 +1,99 @@
+#include "commands/compensate.hpp"
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "base/error.hpp"
+#include "compensation/compensate_rows.hpp"
+#include "compensation/compensator.hpp"
+#include "compensation/file/coefficient_file.hpp"
+#include "profiles/vehicle.hpp"
+
+namespace kphi::compensation {
+namespace {
+
+struct Request {
+  std::string coefficients;
+  std::string vehicle;
+  std::string law = "clamped";
+  bool json = false;
+};
+
+Compensator compensator_of(const Request& request, const profiles::Vehicle& vehicle) {
+  const ThrustCurve curve = load_coefficients(request.coefficients).curve;
+  const auto mismatch = overlap_mismatch(curve.overlap(), request.coefficients, vehicle.overlap, request.vehicle);
+  if (mismatch) throw ConfigurationError(*mismatch);
+  const ScalingLaw law = request.law == "published" ? ScalingLaw::published : ScalingLaw::clamped;
+  const BuildOutcome outcome = Compensator::build({curve, curve, curve, curve}, profiles::airframe_of(vehicle), law);
+  if (!outcome.compensator) throw ConfigurationError(request.vehicle + ": " + describe(outcome.refusal));
+  if (outcome.doubts[0].gains_with_occlusion) {
+    std::cerr << request.coefficients
+              << ": k(phi) does not fall with the occlusion; check that this is the right file\n";
+  }
+  if (outcome.doubts[0].steps_at_contact) {
+    std::cerr << request.coefficients << ": k(phi) misses K_T at 0°, so the speeds step at first contact; "
+              << "`kphi fit --anchored` avoids this\n";
+  }
+  return *outcome.compensator;
+}
+
+/// Reports rows that were skipped or out of reach; returns the exit code.
+ExitCode verdict(const RowCounts& counts, const profiles::Vehicle& vehicle) {
+  if (!std::cout) {
+    std::cerr << "cannot write to standard output; " << counts.written << " rows were computed\n";
+    return ExitCode::failure;
+  }
+  if (counts.out_of_reach > 0) {
+    std::cerr << counts.out_of_reach << " of " << counts.written << " rows have an arm angle outside "
+              << std::round(to_degrees(vehicle.arm_angle_min)) << " to "
+              << std::round(to_degrees(vehicle.arm_angle_max)) << "°, the range of the servos of " << vehicle.path
+              << "; they were computed all the same\n";
+  }
+  if (counts.rejected == 0) return ExitCode::ok;
+  std::cerr << counts.rejected << " of " << counts.rejected + counts.written << " rows were skipped\n";
+  return ExitCode::data_rejected;
+}
+
+ExitCode compensate(const Request& request) {
+  std::ios::sync_with_stdio(false);
+  std::cin.tie(nullptr);
+  try {
+    const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
+    Compensator compensator = compensator_of(request, vehicle);
+    if (isatty(STDIN_FILENO) != 0) std::cerr << "reading CSV from the keyboard; Ctrl-D ends the input\n";
+    const RowCounts counts =
+        compensate_rows(std::cin, std::cout, std::cerr, compensator, {vehicle.arm_angle_min, vehicle.arm_angle_max},
+                        request.json ? RowFormat::json_lines : RowFormat::csv);
+    return verdict(counts, vehicle);
+  } catch (const RowHeaderError& error) {
+    throw ConfigurationError(error.what());
+  }
+}
+
+}  // namespace
+
+void add_compensate(CLI::App& program, int& exit_code) {
+  auto request = std::make_shared<Request>();
+  CLI::App* command = program.add_subcommand(
+      "compensate", "CSV of arm angles and thrusts on stdin → occlusions, k_i and rotor speeds on stdout");
+  command->footer(
+      "Columns in: theta1_deg … theta4_deg, thrust1_n … thrust4_n, in any order; others are ignored.\n"
+      "Columns out: phi1_deg …, k1 … (k_i of equation 4), speed1_rpm …, flags (rotor:what, separated by blanks).\n"
+      "A row that cannot be used is skipped and reported on stderr; the exit code is then 5.");
+  command->add_option("--coefficients", request->coefficients, "coefficients.yaml of `kphi fit`")->required();
+  command->add_option("--vehicle", request->vehicle, "vehicle file, such as profiles/foldable_drone.yaml")->required();
+  command
+      ->add_option("--law", request->law,
+                   "how k(φ) becomes k_i: clamped to [0.1, 1], or published (equation 4 to the letter)")
+      ->check(CLI::IsMember({"clamped", "published"}))
+      ->capture_default_str();
+  command->add_flag("--json", request->json, "one JSON object per row instead of CSV");
+  command->callback([request, &exit_code] { exit_code = static_cast<int>(compensate(*request)); });
+}
+
+}  // namespace kphi::compensation

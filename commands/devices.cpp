@@ -1,0 +1,284 @@
+#include "commands/devices.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/error.hpp"
+#include "base/finding.hpp"
+#include "daq/audit/load_cell_audit.hpp"
+#include "daq/bench/air.hpp"
+#include "daq/hardware/device_locks.hpp"
+#include "daq/hardware/supply_probe.hpp"
+#include "daq/hardware/usb_probe.hpp"
+#include "daq/run/run.hpp"
+#include "drivers/iq/service/probe.hpp"
+#include "drivers/netbox/receive/probe.hpp"
+#include "profiles/bench_config.hpp"
+#include "profiles/campaign.hpp"
+
+namespace kphi::daq {
+namespace {
+
+constexpr const char* kFactoryAddress = "192.168.1.1";
+
+struct Asked {
+  std::string bench;
+  std::string campaign;
+  bool json = false;
+  std::optional<double> clock_gain_s;
+};
+
+struct Answer {
+  std::string device;
+  bool answers = false;
+  std::vector<std::string> lines;
+  nlohmann::ordered_json details;
+  bool wanted = true;  ///< named in the bench file
+};
+
+nlohmann::ordered_json to_json(const netbox::Configuration& box) {
+  return {{"product", box.product},
+          {"firmware", box.firmware},
+          {"calibration", box.calibration_serial},
+          {"slot", box.slot},
+          {"counts_per_n", box.counts_per_newton},
+          {"counts_per_nm", box.counts_per_newton_metre},
+          {"range", box.range},
+          {"rate_hz", box.rdt_rate_hz},
+          {"records_per_datagram", box.records_per_datagram},
+          {"rdt_enabled", box.rdt_enabled},
+          {"filter_hz", netbox::filter_cutoff_hz(box.filter_code).value_or(0)},
+          {"gage_bias", box.gage_bias}};
+}
+
+nlohmann::ordered_json to_json(const netbox::Counters& counters, const netbox::Health& health) {
+  return {{"expected", counters.expected},
+          {"received", counters.received},
+          {"lost_network", counters.lost_network},
+          {"lost_host", counters.lost_host},
+          {"late", counters.late},
+          {"duplicates", counters.duplicates},
+          {"reordered", counters.reordered},
+          {"malformed", counters.malformed},
+          {"records_per_second", health.records_per_second},
+          {"jitter_p50_ns", health.jitter_p50_ns},
+          {"jitter_p99_ns", health.jitter_p99_ns},
+          {"skew_ppm", health.skew_ppm},
+          {"queue_high_water", health.queue_high_water}};
+}
+
+nlohmann::ordered_json to_json(const std::vector<Finding>& findings) {
+  auto all = nlohmann::ordered_json::array();
+  for (const Finding& finding : findings) {
+    all.push_back({{"severity", name_of(finding.severity)}, {"what", finding.what}, {"next_move", finding.next_move}});
+  }
+  return all;
+}
+
+netbox::ProbeSettings probe_settings(const Asked& asked, const std::optional<profiles::BenchConfig>& bench) {
+  netbox::ProbeSettings settings;
+  if (!bench) return settings;
+  settings.tcp_port = bench->netbox.tcp_port;
+  settings.intention.rate_hz = bench->netbox.rate_hz;
+  settings.intention.records_per_datagram = bench->netbox.records_per_datagram;
+  if (!asked.campaign.empty()) settings.intention = intention_of(profiles::load_campaign(asked.campaign), *bench);
+  return settings;
+}
+
+Answer ask_load_cell(const profiles::NetBoxConfig& config, const Clock& clock, const netbox::ProbeSettings& settings) {
+  const netbox::Probe probe = netbox::probe({config.host, config.rdt_port, config.http_port}, clock, settings);
+  Answer answer{"Net Box " + config.host, probe.answers(), probe.lines(), {}};
+  if (probe.configuration) answer.details["configuration"] = to_json(*probe.configuration);
+  if (probe.streamed) answer.details["stream"] = to_json(probe.counters, probe.health);
+  answer.details["findings"] = to_json(probe.findings);
+  return answer;
+}
+
+nlohmann::ordered_json to_json(const iq::AuditRecord& module) {
+  nlohmann::ordered_json all = {{"uid", module.uid()},
+                                {"firmware", module.firmware() ? module.firmware()->text() : ""},
+                                {"hardware", module.hardware() ? module.hardware()->text() : ""},
+                                {"electronics", module.electronics() ? module.electronics()->text() : ""}};
+  auto& parameters = all["parameters"] = nlohmann::ordered_json::object();
+  for (std::size_t i = 0; i < iq::kAuditedCount; ++i) {
+    const iq::Entry& told = *iq::kAudited[i];
+    if (module.values[i]) parameters[fmt::format("{}.{}", name_of(told.type), told.name)] = *module.values[i];
+  }
+  return all;
+}
+
+nlohmann::ordered_json to_json(const serial::Adapter& adapter) {
+  nlohmann::ordered_json one = {{"device", adapter.device.string()},
+                                {"specification", adapter.specification()},
+                                {"words", adapter.words},
+                                {"socket", adapter.port}};
+  if (adapter.latency_timer_ms) one["latency_timer_ms"] = *adapter.latency_timer_ms;
+  return one;
+}
+
+nlohmann::ordered_json to_json(const iq::Counters& counters) {
+  return {{"requests", counters.requests},
+          {"replies", counters.replies},
+          {"timeouts", counters.timeouts},
+          {"late_replies", counters.late_replies},
+          {"unasked", counters.unasked},
+          {"wrong_module", counters.wrong_module},
+          {"crc_errors", counters.crc_errors},
+          {"wrong_length", counters.wrong_length},
+          {"discarded_bytes", counters.discarded_bytes}};
+}
+
+nlohmann::ordered_json to_json(const iq::ClockGain& gain) {
+  return {{"factor", gain.factor},         {"u", gain.u_factor},       {"lowest", gain.lowest},
+          {"highest", gain.highest},       {"uid", gain.uid},          {"measured_utc", gain.measured_utc},
+          {"duration_s", gain.duration_s}, {"readings", gain.readings}};
+}
+
+/// What the bench file demands of the module.
+iq::ProbeSettings probe_settings(const profiles::MotorConfig& config, std::optional<double> clock_gain_s) {
+  iq::ProbeSettings settings;
+  settings.intention.speed_max_rad_s = config.speed_max.value();
+  settings.intention.clock_unchecked = !config.clock_gain && !clock_gain_s;
+  if (config.clock_gain && !clock_gain_s) settings.intention.uid = config.clock_gain->uid;
+  if (clock_gain_s) {
+    settings.clock_gain.emplace();
+    settings.clock_gain->duration_s = *clock_gain_s;
+  }
+  return settings;
+}
+
+Answer ask_motor(const profiles::MotorConfig& config, const Clock& clock, std::optional<double> clock_gain_s,
+                 bool powered) {
+  iq::ProbeSettings settings = probe_settings(config, clock_gain_s);
+  settings.search = powered;
+  iq::Probe probe = iq::probe({config.device, config.baud, config.module_id}, clock, settings);
+  if (probe.clock_gain) probe.clock_gain->measured_utc = utc_text(clock, clock.now());
+  Answer answer{"IQ module " + config.device, probe.answers(), probe.lines(), {}};
+  if (probe.record) {
+    answer.details = to_json(*probe.record);
+    answer.details["round_trip_ns"] = probe.round_trip.count();
+    answer.details["counters"] = to_json(probe.counters);
+  }
+  if (probe.adapter) answer.details["adapter"] = to_json(*probe.adapter);
+  if (probe.clock_gain) answer.details["clock_gain"] = to_json(*probe.clock_gain);
+  answer.details["findings"] = to_json(probe.findings);
+  return answer;
+}
+
+Answer ask_supply(const profiles::SupplyConfig& config, const Clock& clock) {
+  const SupplyProbe probe = probe_supply(config, clock);
+  Answer answer{"supply " + config.uri, probe.answers(), probe.lines(), {}};
+  if (probe.identity) {
+    answer.details["model"] = probe.identity->model;
+    answer.details["serial"] = probe.identity->serial;
+    answer.details["firmware"] = probe.identity->firmware;
+  }
+  if (probe.reading) {
+    answer.details["voltage_v"] = probe.reading->voltage_v;
+    answer.details["current_a"] = probe.reading->current_a;
+    answer.details["set_voltage_v"] = probe.reading->set_voltage_v;
+    answer.details["current_limit_a"] = probe.reading->current_limit_a;
+    answer.details["output"] = probe.reading->output;
+  }
+  answer.details["findings"] = to_json(probe.findings);
+  return answer;
+}
+
+Answer answer_of(const UsbProbe& probe, bool wanted) {
+  Answer answer{probe.device, probe.answers, probe.lines(), {}, wanted};
+  answer.details["words"] = probe.words;
+  answer.details["findings"] = to_json(probe.findings);
+  return answer;
+}
+
+void ask_usb(const std::optional<profiles::BenchConfig>& bench, std::vector<Answer>& answers) {
+  if (bench && !bench->ambient.sensor.empty()) answers.push_back(answer_of(probe_sensor(bench->ambient.sensor), true));
+  if (bench && bench->ambient.manual) {
+    const auto air = AirSource(bench->ambient, SteadyClock()).density();
+    answers.push_back(
+        {"air, read off by hand", true, {words_of(*air)}, {{"kg_m3", air->kg_m3}, {"u_kg_m3", air->u_kg_m3}}});
+  }
+  if (bench && !bench->ambient.known())
+    fmt::print(stderr, "kphi: {}: air density unknown, so k of different days is not comparable; add ambient:\n",
+               bench->path);
+  std::vector<std::string> known;
+  for (const Answer& answer : answers) known.push_back(answer.device);
+  for (const UsbProbe& probe : probe_usb(known)) answers.push_back(answer_of(probe, false));
+}
+
+void print(const std::vector<Answer>& answers, bool json) {
+  if (json) {
+    auto all = nlohmann::ordered_json::array();
+    for (const Answer& answer : answers) {
+      nlohmann::ordered_json one = {{"device", answer.device}, {"answers", answer.answers}};
+      one.update(answer.details);
+      all.push_back(one);
+    }
+    fmt::print("{}\n", all.dump(2));
+    return;
+  }
+  for (const Answer& answer : answers) {
+    fmt::print("{}: {}\n", answer.device, answer.answers ? "answers" : "does not answer");
+    for (const std::string& line : answer.lines) fmt::print("  {}\n", line);
+  }
+}
+
+ExitCode devices(const Asked& asked) {
+  std::optional<profiles::BenchConfig> bench;
+  if (!asked.bench.empty()) bench = profiles::load_bench(asked.bench);
+  if (bench && bench->simulation && bench->simulation->in_process) {
+    fmt::print(stderr, "kphi: {}: simulation.in_process has no devices to ask\n", asked.bench);
+    return ExitCode::ok;
+  }
+  // Asking starts a stream and resets a module, which would disturb a running measurement.
+  const DeviceLocks locks(bench ? lock_names(*bench)
+                                : std::vector<std::string>{fmt::format("Net Box {}:49152", kFactoryAddress)});
+  const SteadyClock clock(bench && bench->simulation ? bench->simulation->time_scale : 1.0);
+  profiles::NetBoxConfig factory;
+  factory.host = kFactoryAddress;
+  std::vector<Answer> answers;
+  answers.push_back(ask_load_cell(bench ? bench->netbox : factory, clock, probe_settings(asked, bench)));
+  if (bench && bench->supply) answers.push_back(ask_supply(*bench->supply, clock));
+  const bool unpowered = bench && bench->supply && answers.back().details.value("output", true) == false;
+  if (bench) answers.push_back(ask_motor(bench->iq, clock, asked.clock_gain_s, !unpowered));
+  if (unpowered && !answers.back().answers) {
+    answers.back().wanted = false;
+    answers.back().lines = {"note: cannot answer while the supply's output is off; kphi run switches it on"};
+  }
+  ask_usb(bench, answers);
+  print(answers, asked.json);
+  if (!bench) fmt::print(stderr, "kphi: no bench file, so only the Net Box's factory address was tried; use --bench\n");
+  for (const Answer& answer : answers) {
+    if (answer.wanted && !answer.answers) return ExitCode::no_device;
+  }
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_devices(CLI::App& program, int& exit_code) {
+  auto asked = std::make_shared<Asked>();
+  CLI::App* command = program.add_subcommand("devices", "find and identify the devices, list what is wrong with them");
+  CLI::Option* bench =
+      command->add_option("--bench", asked->bench, "bench file (default: only the Net Box's factory address is tried)")
+          ->check(CLI::ExistingFile);
+  command
+      ->add_option("--clock-gain", asked->clock_gain_s,
+                   "measure the motor module's clock against this computer's, for SECONDS of bench time")
+      ->expected(0, 1)
+      ->default_str("60")
+      ->check(CLI::Range(1.0, 1e5))
+      ->needs(bench);
+  command->add_option("--campaign", asked->campaign, "campaign file: check that rate and ranges suit its speeds")
+      ->needs(bench)
+      ->check(CLI::ExistingFile);
+  command->add_flag("--json", asked->json, "one JSON array on stdout");
+  command->callback([asked, &exit_code] { exit_code = static_cast<int>(devices(*asked)); });
+}
+
+}  // namespace kphi::daq

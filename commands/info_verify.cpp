@@ -1,0 +1,210 @@
+#include "commands/info_verify.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "base/error.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/campaign_verification.hpp"
+#include "results/run_reader.hpp"
+#include "results/sha256.hpp"
+
+namespace kphi::results {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Asked {
+  std::string path;
+  bool json = false;
+};
+
+std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
+
+Json describe(const StreamHealth& health) {
+  return {{"records_per_second", health.records_per_second},
+          {"datagrams_per_second", health.datagrams_per_second},
+          {"jitter_p50_s", health.jitter_p50_s},
+          {"jitter_p99_s", health.jitter_p99_s},
+          {"skew_ppm", health.skew_ppm},
+          {"clock_uncertainty_s", health.clock_uncertainty_s},
+          {"queue_high_water", health.queue_high_water},
+          {"events_dropped", health.events_dropped}};
+}
+
+Json describe(const BoxBias& bias) {
+  if (bias.records == 0) return nullptr;
+  return {{"records", bias.records},
+          {"before", bias.before},
+          {"before_sd", bias.before_sd},
+          {"after", bias.after},
+          {"after_sd", bias.after_sd}};
+}
+
+Json describe(const std::vector<StreamEvent>& events) {
+  Json list = Json::array();
+  for (const StreamEvent& event : events) {
+    list.push_back({{"kind", name_of(event.kind)}, {"t_ns", event.time_ns}, {"text", event.text}});
+  }
+  return list;
+}
+
+Json describe(const std::filesystem::path& path) {
+  const RunRecording run = read_run(path);
+  const RunHeader& header = run.header;
+  const double seconds =
+      run.phases.empty() ? 0 : 1e-9 * static_cast<double>(run.phases.back().time_ns - run.phases.front().time_ns);
+  const auto steps =
+      std::count_if(run.phases.begin(), run.phases.end(), [](const PhaseMark& m) { return m.phase == Phase::step; });
+  return {{"file", path.string()},
+          {"outcome", run.outcome == Outcome::complete ? "complete" : "aborted"},
+          {"outcome_reason", run.outcome_reason},
+          {"campaign", header.campaign_name},
+          {"propeller", header.propeller_name},
+          {"occlusion_deg", header.occlusion_deg},
+          {"repetition", header.repetition},
+          {"started_utc", header.started_utc},
+          {"duration_s", seconds},
+          {"steps", steps},
+          {"samples", run.load_cell.size()},
+          {"lost_network", run.account.lost_network},
+          {"lost_host", run.account.lost_host},
+          {"duplicates", run.account.duplicates},
+          {"late", run.account.late},
+          {"reordered", run.account.reordered},
+          {"stalled", run.account.stalled},
+          {"malformed", run.account.malformed},
+          {"restarts", run.account.restarts},
+          {"reboots", run.account.reboots},
+          {"events", describe(run.events)},
+          {"health", describe(run.health)},
+          {"box_bias", describe(run.box_bias)},
+          {"motor_readings", run.motor.size()},
+          {"calibration_serial", header.load_cell.serial},
+          {"configuration_sha256", sha256(header.load_cell.configuration_xml)},
+          {"sample_rate_hz", header.load_cell.sample_rate_hz},
+          {"saturation_bits", fmt::format("{:#010x}", header.load_cell.saturation_bits)},
+          {"motor", header.motor_identity},
+          {"clock_gain", header.clock_gain_u > 0 ? Json{header.clock_gain, header.clock_gain_u} : Json()},
+          {"supply_voltage_v", header.supply_voltage_v},
+          {"coil_temperature_max_degc", header.coil_temperature_max_degc},
+          {"tool_version", header.tool_version},
+          {"uuid", header.uuid}};
+}
+
+Json describe_folder(const CampaignFolder& folder) {
+  Json runs = Json::array();
+  for (const auto& path : folder.complete_runs()) runs.push_back(describe(path));
+  for (const auto& path : folder.reference_runs()) runs.push_back(describe(path));
+  Json others = Json::array();
+  for (const auto& path : folder.other_runs()) others.push_back(path.string());
+  return {{"folder", folder.path().string()}, {"runs", runs}, {"not_complete", others}};
+}
+
+void print_run(const Json& run) {
+  const auto line = [](const std::string& name, const Json& value) {
+    fmt::print("{:28} {}\n", name, value.is_string() ? value.get<std::string>() : value.dump());
+  };
+  for (const auto& [key, value] : run.items()) {
+    if (value.is_null()) continue;
+    if (key == "events") {
+      for (const Json& event : value) line("event", event["text"]);
+    } else if (value.is_object()) {
+      for (const auto& [inner, figure] : value.items()) line(key + " " + inner, figure);
+    } else {
+      line(key, value);
+    }
+  }
+}
+
+void print_folder(const Json& folder) {
+  fmt::print("{}: {} complete runs\n", folder["folder"].get<std::string>(), folder["runs"].size());
+  for (const Json& run : folder["runs"]) {
+    fmt::print("  {}: {} at {}°, repetition {}, {} steps, {} samples, {} lost\n",
+               std::filesystem::path(run["file"].get<std::string>()).filename().string(),
+               run["propeller"].get<std::string>(), run["occlusion_deg"].dump(), run["repetition"].dump(),
+               run["steps"].dump(), run["samples"].dump(),
+               run["lost_network"].get<std::uint64_t>() + run["lost_host"].get<std::uint64_t>());
+  }
+  for (const Json& file : folder["not_complete"]) {
+    fmt::print("  {}: not complete\n", std::filesystem::path(file.get<std::string>()).filename().string());
+  }
+}
+
+void info(const Asked& asked) {
+  const bool folder = std::filesystem::is_directory(asked.path);
+  const Json found = folder ? describe_folder(CampaignFolder::open(asked.path)) : describe(asked.path);
+  if (asked.json) {
+    fmt::print("{}\n", dump(found));
+  } else if (folder) {
+    print_folder(found);
+  } else {
+    print_run(found);
+  }
+}
+
+ExitCode verify(const Asked& asked) {
+  Json found{{"path", asked.path}};
+  std::vector<std::string> problems, remarks;
+  std::string words;
+  if (std::filesystem::is_directory(asked.path)) {
+    const CampaignVerification campaign = verify_campaign(CampaignFolder::open(asked.path));
+    found["runs"] = campaign.runs;
+    found["journal_entries"] = campaign.entries;
+    found["torn_last_line"] = campaign.torn_last_line;
+    problems = campaign.problems;
+    remarks = campaign.remarks;
+    words = fmt::format("{} runs and {} journal entries{}", campaign.runs, campaign.entries,
+                        campaign.torn_last_line ? " (the last line of the journal was cut short and is ignored)" : "");
+  } else {
+    const Verification run = verify_run(asked.path);
+    found["outcome"] = run.outcome == Outcome::complete ? "complete" : "aborted";
+    found["samples"] = run.samples;
+    found["lost"] = run.lost;
+    for (const std::string& problem : run.problems) {
+      problems.push_back(problem.find(asked.path) == std::string::npos ? asked.path + ": " + problem : problem);
+    }
+    words = fmt::format("{} run, {} samples, {} lost and accounted for", found["outcome"].get<std::string>(),
+                        run.samples, run.lost);
+  }
+  found["whole"] = problems.empty();
+  found["problems"] = problems;
+  found["remarks"] = remarks;
+  if (asked.json) {
+    fmt::print("{}\n", dump(found));
+  } else {
+    for (const std::string& problem : problems) fmt::print("{}\n", problem);
+    for (const std::string& remark : remarks) fmt::print(stderr, "kphi: {}\n", remark);
+    if (problems.empty()) fmt::print("{}: intact: {}\n", asked.path, words);
+  }
+  return problems.empty() ? ExitCode::ok : ExitCode::data_rejected;
+}
+
+CLI::App* add(CLI::App& app, const char* name, const char* description, const std::shared_ptr<Asked>& asked) {
+  CLI::App* command = app.add_subcommand(name, description);
+  command->add_option("path", asked->path, "run file or campaign folder")->required()->check(CLI::ExistingPath);
+  command->add_flag("--json", asked->json, "one JSON object on stdout");
+  return command;
+}
+
+}  // namespace
+
+void add_info(CLI::App& app, int& exit_code) {
+  const auto asked = std::make_shared<Asked>();
+  add(app, "info", "show the contents of a run or campaign folder", asked)->callback([asked, &exit_code] {
+    info(*asked);
+    exit_code = static_cast<int>(ExitCode::ok);
+  });
+}
+
+void add_verify(CLI::App& app, int& exit_code) {
+  const auto asked = std::make_shared<Asked>();
+  add(app, "verify", "check a run or campaign folder for damage (exit code 5: damaged)", asked)
+      ->callback([asked, &exit_code] { exit_code = static_cast<int>(verify(*asked)); });
+}
+
+}  // namespace kphi::results

@@ -1,0 +1,162 @@
+// kphi: the table of contents. Every error becomes one line and an exit code here.
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <functional>
+#include <iostream>
+#include <vector>
+
+#include "base/error.hpp"
+#include "commands/check.hpp"
+#include "commands/compare_export.hpp"
+#include "commands/compensate.hpp"
+#include "commands/devices.hpp"
+#include "commands/fit.hpp"
+#include "commands/fly.hpp"
+#include "commands/import.hpp"
+#include "commands/info_verify.hpp"
+#include "commands/replay.hpp"
+#include "commands/report.hpp"
+#include "commands/run.hpp"
+#include "commands/sim.hpp"
+#include "compensation/file/coefficient_file.hpp"
+#include "daq/guard/run_stopped.hpp"
+#include "daq/run/console.hpp"
+#include "results/version.hpp"
+
+namespace {
+
+using kphi::ExitCode;
+
+constexpr const char* kFooter =
+    "Exit codes: 0 ok, 1 failure, 2 usage or configuration, 3 device not found, 4 safety stop,\n"
+    "            5 data rejected, 130 interrupted after a controlled spin-down.\n"
+    "Data goes to stdout, messages to stderr. Data that cannot be written (closed pipe, full disk) is a failure (1);\n"
+    "a run continues, and its exit code says how the run ended. NO_COLOR is honoured.\n\n"
+    "Without hardware:  kphi sim profiles/bench_simulated.yaml &\n"
+    "                   kphi run profiles/icra2021_5in_3blade.yaml --bench profiles/bench_simulated.yaml --yes\n"
+    "                   kphi fit results/<the folder it printed>\n"
+    "                   kphi fly --coefficients results/<the folder>/coefficients.yaml \\\n"
+    "                            --vehicle profiles/foldable_drone.yaml";
+
+/// A failed write says as much as these signals, and leaves the program alive to coast the motor.
+void ignore_signals_of_writes() {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+/// A file that is opened later must not get the number of a closed standard stream: messages would go into the file.
+/// The replacement can be neither read nor written.
+void fill_closed_streams() {
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(descriptor, F_GETFD) < 0) (void)::open("/dev/null", descriptor == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+  }
+}
+
+/// After the messages of a run; all other verbs write directly, however long that takes.
+void tell(const std::string& words) {
+  if (kphi::daq::console().is_used()) return kphi::daq::put(stderr, words);
+  (void)std::fputs(words.c_str(), stderr);
+}
+
+int complain(const std::exception& error, ExitCode exit_code) {
+  tell(fmt::format("kphi: {}\n", error.what()));
+  return static_cast<int>(exit_code);
+}
+
+int complain(const kphi::daq::RunStopped& stop) {
+  tell(stop.words().text(stop.exit_code() == ExitCode::safety_stop ? "SAFETY STOP" : "STOPPED"));
+  return static_cast<int>(stop.exit_code());
+}
+
+/// CLI11 reports a misspelt command only as "A subcommand is required".
+std::string nearest_command(const CLI::App& program, const std::string& word) {
+  for (const CLI::App* command : program.get_subcommands({})) {
+    const std::string& name = command->get_name();
+    if (name.starts_with(word.substr(0, 3)) ||
+        name.ends_with(word.substr(word.size() - std::min<std::size_t>(3, word.size())))) {
+      return name;
+    }
+  }
+  return {};
+}
+
+int usage_error(const CLI::App& program, const CLI::ParseError& error, int argc, char** argv) {
+  if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
+  if (argc > 1 && argv[1][0] != '-' && program.get_subcommands().empty()) {
+    const std::string nearest = nearest_command(program, argv[1]);
+    tell(fmt::format("kphi: unknown command \"{}\"{}\n", argv[1],
+                     nearest.empty() ? "" : "; did you mean \"" + nearest + "\"?"));
+  } else {
+    tell(fmt::format("kphi: {}\n", error.what()));
+  }
+  tell("kphi --help lists the commands\n");
+  return static_cast<int>(ExitCode::usage);
+}
+
+/// Gives the messages of a run a second to leave. Data that could not be written is a failure, even if only the last
+/// flush finds it.
+int end(int exit_code) {
+  errno = 0;
+  const bool is_written = std::cout.flush() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  if (!is_written && exit_code == 0) {
+    tell(fmt::format("kphi: cannot write to standard output{}{}\n", errno != 0 ? ": " : "",
+                     errno != 0 ? std::strerror(errno) : ""));
+    exit_code = static_cast<int>(ExitCode::failure);
+  }
+  (void)kphi::daq::console().finish(kphi::daq::Console::kGiveUp);
+  return exit_code;
+}
+
+int run(int argc, char** argv) {
+  CLI::App program("kphi: propeller test stand to k(φ) line to flight", "kphi");
+  program.footer(kFooter);
+  program.set_version_flag("--version", std::string("kphi ") + kphi::kVersion);
+  program.require_subcommand(1);
+  int exit_code = 0;
+
+  kphi::profiles::add_check(program, exit_code);
+  kphi::sim::add_sim(program, exit_code);
+  kphi::daq::add_devices(program, exit_code);
+  kphi::daq::add_run(program, exit_code);
+  kphi::daq::add_replay(program, exit_code);
+  kphi::results::add_info(program, exit_code);
+  kphi::results::add_verify(program, exit_code);
+  kphi::fit::add_import(program, exit_code);
+  kphi::fit::add_fit(program, exit_code);
+  kphi::fit::add_report(program, exit_code);
+  kphi::fit::add_compare(program, exit_code);
+  kphi::fit::add_export(program, exit_code);
+  kphi::compensation::add_compensate(program, exit_code);
+  kphi::flight::add_fly(program, exit_code);
+
+  try {
+    program.parse(argc, argv);
+    return exit_code;
+  } catch (const CLI::ParseError& error) {
+    return usage_error(program, error, argc, argv);
+  } catch (const kphi::daq::RunStopped& stop) {
+    return complain(stop);
+  } catch (const kphi::Error& error) {
+    return complain(error, error.exit_code());
+  } catch (const kphi::compensation::CoefficientError& error) {
+    return complain(error, ExitCode::usage);
+  } catch (const std::exception& error) {
+    return complain(error, ExitCode::failure);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ignore_signals_of_writes();
+  fill_closed_streams();
+  return end(run(argc, argv));
+}

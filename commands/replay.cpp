@@ -1,0 +1,245 @@
+#include "commands/replay.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "base/error.hpp"
+#include "commands/live_options.hpp"
+#include "daq/guard/interrupt.hpp"
+#include "daq/live/replayed_run.hpp"
+#include "profiles/campaign.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/reduction/reduction.hpp"
+#include "results/reduction/repetitions.hpp"
+#include "results/run_reader.hpp"
+#include "results/steps_csv.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using results::CampaignFolder;
+using results::StepMean;
+
+constexpr int kOk = 0;
+constexpr int kRejected = 5;
+
+struct Asked {
+  std::string path;
+  bool json = false;
+  live::LiveOptions live;
+  double speed = 1;  ///< recorded seconds per second
+};
+
+struct Replay {
+  std::vector<StepMean> steps;
+  std::optional<std::filesystem::path> stored;      ///< steps.csv of the campaign folder, when there is one
+  std::optional<std::filesystem::path> means;       ///< means.csv likewise; of a whole campaign only
+  std::optional<std::filesystem::path> references;  ///< references.csv likewise
+  std::vector<StepMean> reference_steps;
+  bool whole_campaign = false;
+};
+
+std::vector<std::filesystem::path> runs_of(const CampaignFolder& folder) {
+  if (!std::filesystem::exists(folder.campaign_file())) return folder.complete_runs();
+  return folder.complete_runs(profiles::load_campaign(folder.campaign_file().string()).occlusions_deg);
+}
+
+/// One run of several that are reduced at once.
+struct Work {
+  std::vector<StepMean> steps;
+  std::exception_ptr failure;
+};
+
+/// Takes runs until none is left. HDF5 is asked by one thread at a time; the samples are read without it.
+void reduce_some(std::span<const std::filesystem::path> runs, std::span<Work> work, std::atomic<std::size_t>& next,
+                 std::mutex& opening) {
+  for (std::size_t i = next++; i < runs.size(); i = next++) {
+    try {
+      std::unique_lock one_at_a_time(opening);
+      results::RunFile file = results::open_run(runs[i]);
+      one_at_a_time.unlock();
+      work[i].steps = reduce_with_zeros(std::move(file)).steps;
+    } catch (...) {
+      work[i].failure = std::current_exception();
+    }
+  }
+}
+
+/// Steps in the order of the files; a thread per processor.
+std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
+  std::vector<Work> work(runs.size());
+  std::atomic<std::size_t> next = 0;
+  std::mutex opening;
+  std::vector<std::thread> others;
+  const std::size_t threads = std::min<std::size_t>(std::max(1u, std::thread::hardware_concurrency()), runs.size());
+  for (std::size_t i = 1; i < threads; ++i) others.emplace_back([&] { reduce_some(runs, work, next, opening); });
+  reduce_some(runs, work, next, opening);
+  for (std::thread& other : others) other.join();
+  std::vector<StepMean> steps;
+  for (Work& of_run : work) {
+    if (of_run.failure) std::rethrow_exception(of_run.failure);
+    steps.insert(steps.end(), of_run.steps.begin(), of_run.steps.end());
+  }
+  return steps;
+}
+
+Replay replay(const std::filesystem::path& path) {
+  Replay result;
+  result.whole_campaign = std::filesystem::is_directory(path);
+  std::filesystem::path steps;
+  if (result.whole_campaign) {
+    const CampaignFolder folder = CampaignFolder::open(path);
+    result.steps = reduced(runs_of(folder));
+    steps = folder.steps();
+    if (std::filesystem::exists(folder.means())) result.means = folder.means();
+    if (std::filesystem::exists(folder.references())) {
+      result.references = folder.references();
+      result.reference_steps = reduced(folder.reference_runs());
+    }
+  } else {
+    result.steps = reduced(std::span(&path, 1));
+    const auto runs = std::filesystem::absolute(path).parent_path();
+    const bool is_reference = !result.steps.empty() && result.steps.front().repetition < 0;
+    if (runs.filename() == "runs") steps = runs.parent_path() / (is_reference ? "references.csv" : "steps.csv");
+  }
+  if (!steps.empty() && std::filesystem::exists(steps)) result.stored = steps;
+  return result;
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find('\n', at), text.size());
+    lines.push_back(text.substr(at, end - at));
+    at = end + 1;
+  }
+  return lines;
+}
+
+/// Of the whole campaign every byte counts; of one run its block of lines must be in the file as it is.
+std::optional<std::string> difference(const Replay& replay, const std::string& stored) {
+  const std::string again = results::format_steps(replay.steps);
+  if (again == stored) return std::nullopt;
+  const std::vector<std::string> old_lines = lines_of(stored);
+  std::vector<std::string> new_lines = lines_of(again);
+  std::size_t at = 0;
+  if (!replay.whole_campaign) {
+    new_lines.erase(new_lines.begin());
+    if (new_lines.empty()) return std::nullopt;
+    // Propeller, blades, diameter, occlusion and repetition open each line of the run.
+    std::size_t comma = 0;
+    for (int i = 0; i < 5; ++i) comma = new_lines.front().find(',', comma) + 1;
+    const std::string opening = new_lines.front().substr(0, comma);
+    while (at < old_lines.size() && !old_lines[at].starts_with(opening)) ++at;
+  }
+  for (std::size_t i = 0; i < new_lines.size() || (replay.whole_campaign && at + i < old_lines.size()); ++i) {
+    const std::string was = at + i < old_lines.size() ? old_lines[at + i] : "(no line)";
+    const std::string is = i < new_lines.size() ? new_lines[i] : "(no line)";
+    if (was != is) return fmt::format("line {} differs\n  stored: {}\n  again:  {}", at + i + 1, was, is);
+  }
+  if (!replay.whole_campaign) return std::nullopt;
+  return std::string("the line ends differ");
+}
+
+nlohmann::ordered_json number(double value) {
+  return std::isnan(value) ? nlohmann::ordered_json() : nlohmann::ordered_json(value);
+}
+
+nlohmann::ordered_json to_json(const StepMean& step) {
+  return {{"propeller", step.propeller},
+          {"occlusion_deg", step.occlusion_deg},
+          {"repetition", step.repetition},
+          {"step", step.step},
+          {"commanded_speed_rad_s", step.commanded_speed_rad_s},
+          {"speed_rad_s", number(step.speed_rad_s)},
+          {"thrust_n", number(step.thrust_n)},
+          {"thrust_sd_n", step.thrust_sd_n},
+          {"torque_nm", number(step.torque_nm)},
+          {"zero_n", step.zero_n},
+          {"thrust_samples", step.thrust_samples},
+          {"thrust_u_n", number(step.thrust_u_n)},
+          {"thrust_n_eff", number(step.thrust_n_eff)},
+          {"lag_s", number(step.lag_s)},
+          {"quality_flags", results::quality_flag_names(step.quality_flags)}};
+}
+
+void print(const Replay& replay, const std::optional<std::string>& differs, bool json) {
+  if (!json) {
+    fmt::print("{}", results::format_steps(replay.steps));
+    return;
+  }
+  nlohmann::ordered_json out;
+  out["steps"] = nlohmann::ordered_json::array();
+  for (const StepMean& step : replay.steps) out["steps"].push_back(to_json(step));
+  out["compared_with"] = replay.stored ? nlohmann::ordered_json(replay.stored->string()) : nlohmann::ordered_json();
+  out["same"] = replay.stored ? nlohmann::ordered_json(!differs) : nlohmann::ordered_json();
+  out["difference"] = differs ? nlohmann::ordered_json(*differs) : nlohmann::ordered_json();
+  fmt::print("{}\n", out.dump(2));
+}
+
+int run_replay(const Asked& asked) {
+  const Replay result = replay(asked.path);
+  std::optional<std::string> differs;
+  if (result.stored) differs = difference(result, results::read_text(*result.stored));
+  if (!differs && result.means && results::read_text(*result.means) != results::format_steps(means_of(result.steps))) {
+    differs = "agrees, but means.csv beside it is not its average over the repetitions";
+  }
+  if (!differs && result.references &&
+      results::read_text(*result.references) != results::format_steps(result.reference_steps)) {
+    differs = "agrees, but references.csv beside it differs from what its runs give";
+  }
+  print(result, differs, asked.json);
+  if (!differs) return kOk;
+  fmt::print(stderr, "{}: {}; the raw files are the truth, see kphi verify\n", result.stored->string(), *differs);
+  return kRejected;
+}
+
+/// Shows a recorded run as it was. With a page it begins when the first page looks on.
+int show_replay(const Asked& asked) {
+  if (std::filesystem::is_directory(asked.path))
+    throw ConfigurationError(asked.path + ": --live and --udp-json show one run: name a file of its runs/");
+  const results::RunRecording recording = results::read_run(asked.path);
+  live::LiveSession view(asked.live, live::subject_of(recording));
+  put(stderr, live::greeting(view));
+  const SignalWatch signals;
+  const std::function<bool()> stop_asked = [] { return SignalWatch::count() > 0; };
+  while (asked.live.port && !view.is_watched() && !stop_asked())
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  ManualClock clock;
+  NoProgress nobody;
+  const auto progress = view.beside(nobody, clock);
+  const bool whole =
+      view.tell_the_end([&] { return live::play(recording, clock, *progress, asked.speed, stop_asked); });
+  if (whole) return kOk;
+  throw Interrupted("stopped by request");
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, int& exit_code) {
+  const auto asked = std::make_shared<Asked>();
+  CLI::App* command = app.add_subcommand("replay", "turn raw samples into step means again and compare with steps.csv");
+  command->add_option("path", asked->path, "run file or campaign folder")->required()->check(CLI::ExistingPath);
+  command->add_flag("--json", asked->json, "one JSON object on stdout");
+  live::add_options(*command, asked->live);
+  command->add_option("--speed", asked->speed, "with --live or --udp-json: how many times as fast as it was")
+      ->check(CLI::Range(0.01, 1000.0))
+      ->capture_default_str();
+  command->callback([asked, &exit_code] { exit_code = asked->live.any() ? show_replay(*asked) : run_replay(*asked); });
+}
+
+}  // namespace kphi::daq

@@ -1,0 +1,253 @@
+#include "commands/run.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "base/error.hpp"
+#include "commands/live_options.hpp"
+#include "daq/audit/bench_audit.hpp"
+#include "daq/campaign/answering_operator.hpp"
+#include "daq/campaign/campaign_run.hpp"
+#include "daq/campaign/dry_run.hpp"
+#include "daq/guard/awake.hpp"
+#include "daq/guard/interrupt.hpp"
+#include "daq/hardware/device_locks.hpp"
+#include "daq/run/console.hpp"
+#include "profiles/plan.hpp"
+#include "results/file_layer.hpp"
+
+namespace kphi::daq {
+namespace {
+
+struct RunOptions {
+  std::string campaign;
+  std::string bench;
+  std::string out = "results";
+  std::string resume;  ///< a campaign's folder
+  bool accept_changes = false;
+  std::string answers;
+  bool dry_run = false;
+  bool yes = false;
+  bool json = false;
+  live::LiveOptions live;
+};
+
+std::unique_ptr<Operator> person(const RunOptions& options, const std::optional<profiles::Answers>& answers,
+                                 const profiles::BenchConfig& config, const std::function<bool()>& stop_asked) {
+  if (answers) return std::make_unique<AnsweringOperator>(*answers);
+  if (options.yes) return std::make_unique<AutoConfirmOperator>(config.simulation.has_value());
+  if (!isatty(STDIN_FILENO)) {
+    throw ConfigurationError(
+        "kphi run: cannot ask for the mountings: standard input is not a terminal; name a file "
+        "with the answers (--answers FILE), or use --yes if the bench mounts by itself");
+  }
+  return std::make_unique<TerminalOperator>(STDIN_FILENO, stderr, stop_asked);
+}
+
+std::unique_ptr<Progress> display() {
+  const char* term = std::getenv("TERM");
+  const bool dumb = term && std::string(term) == "dumb";
+  if (isatty(STDERR_FILENO) && !dumb) return std::make_unique<TerminalProgress>(stderr);
+  return std::make_unique<PlainProgress>(stderr);
+}
+
+void summarise(const CampaignResult& result, const results::CampaignFolder& folder, bool json) {
+  if (json) {
+    put(stdout, nlohmann::json{{"folder", folder.path().string()},
+                               {"runs", result.runs},
+                               {"samples", result.samples},
+                               {"lost", result.lost},
+                               {"steps", result.steps},
+                               {"flagged_steps", result.flagged_steps}}
+                        .dump() +
+                    "\n");
+  } else {
+    put(stdout, folder.path().string() + "\n");
+  }
+  put(stderr, fmt::format("{} runs, {} samples, {} lost, {} of {} steps flagged\nnext: kphi fit {}\n", result.runs,
+                          result.samples, result.lost, result.flagged_steps, result.steps, folder.path().string()));
+}
+
+profiles::Campaign campaign_of(const RunOptions& options) {
+  if (!options.campaign.empty()) return profiles::load_campaign(options.campaign);
+  if (options.resume.empty())
+    throw ConfigurationError("kphi run: no campaign; give its file, or a folder with --resume");
+  const auto file = results::CampaignFolder::open(options.resume).campaign_file();
+  if (!std::filesystem::exists(file))
+    throw ConfigurationError(options.resume +
+                             ": no campaign.yaml in this folder: no campaign was started in it; give a campaign file");
+  return profiles::load_campaign(file.string());
+}
+
+/// The campaign's folder, and how far it is.
+struct Destination {
+  std::optional<results::CampaignFolder> folder;
+  std::optional<results::FileLock> lock;
+  std::optional<Resumption> resumption;  ///< nullopt: a new folder
+  bool finished = false;                 ///< with unchanged files
+
+  void open(const RunOptions& options, const profiles::Campaign& campaign, const profiles::BenchConfig& config) {
+    folder = results::CampaignFolder::open(options.resume);
+    lock.emplace(lock_folder(*folder));
+    resumption = inspect(*folder, options.accept_changes);
+    nlohmann::json now = identity_of(campaign, config);
+    nlohmann::json files = now;
+    files.erase("tool_version");  // a finished campaign needs no program
+    finished = resumption->state.finished && changes_since(resumption->state.identity, files).empty();
+    if (!finished) (void)require_unchanged(*folder, *resumption, now);
+  }
+  void create(const RunOptions& options, const profiles::Campaign& campaign, Bench& bench) {
+    const auto started = std::chrono::time_point_cast<std::chrono::seconds>(bench.clock().epoch_utc());
+    folder = results::CampaignFolder::create(
+        options.out, fmt::format("{:%Y%m%dT%H%M%SZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(started))),
+        campaign.name, bench.files());
+    lock.emplace(lock_folder(*folder));
+  }
+  /// Share of the runs that are still to be made.
+  [[nodiscard]] double share_left(const profiles::Plan& plan) const {
+    if (!resumption || plan.runs.empty()) return 1;
+    return std::max(0.0,
+                    1 - static_cast<double>(resumption->state.accepted.size()) / static_cast<double>(plan.runs.size()));
+  }
+};
+
+/// After a safety stop only a person may let the campaign continue, before any device is connected.
+void clear_safety_stop(Destination& destination, Operator& person, const std::optional<profiles::Answers>& answers) {
+  const bool is_stopped = destination.resumption && !destination.resumption->state.safety_stop.empty();
+  if (is_stopped) {
+    person.clear_safety_stop(destination.resumption->state.safety_stop);
+    destination.resumption->cleared_by = person.name();
+  } else if (answers && answers->continue_after_safety_stop) {
+    throw ConfigurationError(
+        answers->path + ": continue_after_safety_stop is left over: no safety stop ended this campaign; remove it");
+  }
+}
+
+/// Refuses a computer that slept while it connected: the answers of the devices are outdated.
+std::unique_ptr<Bench> connect_awake(const profiles::BenchConfig& config, const std::function<bool()>& stop_asked) {
+  const SteadyClock wall;
+  std::unique_ptr<Bench> bench;
+  try {
+    bench = connect(config, stop_asked);
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const std::exception&) {
+    require_awake(wall);
+    throw;
+  }
+  require_awake(wall);
+  return bench;
+}
+
+int tell_finished(const Destination& destination, bool json) {
+  const std::string folder = destination.folder->path().string();
+  const std::size_t runs = destination.resumption->state.accepted.size();
+  put(stdout, (json ? nlohmann::json{{"folder", folder}, {"runs", runs}}.dump() : folder) + "\n");
+  put(stderr, fmt::format("{} is finished: all {} runs accepted, nothing left to resume\nnext: kphi fit {}\n", folder,
+                          runs, folder));
+  return 0;
+}
+
+/// What the command line and the files ask for.
+struct Request {
+  const RunOptions& options;
+  profiles::Campaign campaign;
+  profiles::BenchConfig config;
+  std::optional<profiles::Answers> answers;
+};
+
+Request read_files(const RunOptions& options) {
+  Request request{options, campaign_of(options), profiles::load_bench(options.bench), std::nullopt};
+  if (!options.answers.empty()) request.answers = profiles::load_answers(options.answers);
+  return request;
+}
+
+int print_plan(const Request& request) {
+  const auto& [options, campaign, config, answers] = request;
+  const DryRun dry = dry_run(campaign, config, options.out, answers);
+  fmt::print("{}", options.json ? to_json(dry, campaign, config).dump() + "\n" : to_text(dry, campaign, config));
+  return static_cast<int>(dry.ok() ? ExitCode::ok : ExitCode::usage);
+}
+
+void announce(const Request& request, const DryRun& dry) {
+  put(stderr, plan_text(request.campaign, request.config, dry.plan) +
+                  "\nCtrl-C coasts the motor, closes the file and stops.\n");
+  for (const PlanCheck& check : dry.checks) {
+    if (check.finding.severity != Severity::note) put(stderr, check.subject + ": " + check.finding.line() + "\n");
+  }
+}
+
+/// Connects, checks devices and disk, makes the folder, and runs what is left of the campaign.
+CampaignResult execute(const Request& request, const profiles::Plan& plan, Destination& destination, Operator& person,
+                       live::LiveSession& view, const std::function<bool()>& stop_asked) {
+  const auto& [options, campaign, config, answers] = request;
+  const DeviceLocks devices(lock_names(config));
+  if (!destination.folder) std::filesystem::create_directories(options.out);
+  const auto bench = connect_awake(config, stop_asked);
+  const std::vector<BenchFinding> findings =
+      audit_bench(*bench, campaign, config);  // faults throw before a folder is made
+  const auto bytes =
+      static_cast<std::uint64_t>(destination.share_left(plan) * static_cast<double>(bytes_needed(plan, config)));
+  results::require_room(destination.folder ? destination.folder->path().string() : options.out, bytes, bench->files());
+  if (!destination.folder) destination.create(options, campaign, *bench);
+  const auto terminal = display();
+  const auto progress = view.beside(*terminal, bench->clock());
+  return view.tell_the_end([&] {
+    return run_campaign(*bench, campaign, config, *destination.folder, person, *progress, stop_asked,
+                        destination.resumption ? &*destination.resumption : nullptr, &findings);
+  });
+}
+
+int run(const RunOptions& options) {
+  const Request request = read_files(options);
+  if (options.dry_run) return print_plan(request);
+  const auto& [unused, campaign, config, answers] = request;
+  profiles::require_within(campaign, config);
+  const DryRun dry = dry_run(campaign, config, options.out, answers);
+  Destination destination;
+  if (!options.resume.empty()) destination.open(options, campaign, config);
+  if (destination.finished) return tell_finished(destination, options.json);
+  // A resumption asks only for the missing runs: the operator reports missing answers.
+  if (answers && !destination.resumption) profiles::require_mountings(*answers, dry.plan.mounting_angles());
+  announce(request, dry);
+  live::LiveSession view(options.live, live::subject_of(campaign, config));
+  put(stderr, live::greeting(view));
+  const std::function<bool()> stop_asked = [&view] { return SignalWatch::count() > 0 || view.stop_asked(); };
+  const auto operator_ = person(options, answers, config, stop_asked);
+  clear_safety_stop(destination, *operator_, answers);
+  const SignalWatch signals;
+  summarise(execute(request, dry.plan, destination, *operator_, view, stop_asked), *destination.folder, options.json);
+  operator_->finish();
+  return 0;
+}
+
+}  // namespace
+
+void add_run(CLI::App& program, int& exit_code) {
+  auto options = std::make_shared<RunOptions>();
+  CLI::App* command = program.add_subcommand("run", "run a campaign on a bench and record it");
+  command->add_option("campaign", options->campaign,
+                      "campaign file (optional with --resume: default is the folder's copy)");
+  command->add_option("--bench", options->bench, "bench file")->required();
+  command->add_option("--out", options->out, "parent folder of the campaign's folder")->capture_default_str();
+  command->add_option("--resume", options->resume, "resume the campaign of this folder at its first unfinished run")
+      ->check(CLI::ExistingDirectory);
+  command->add_flag("--accept-changes", options->accept_changes, "resume although files, program or devices changed")
+      ->needs("--resume");
+  command->add_flag("--dry-run", options->dry_run, "check and print the plan and every limit, touch no device");
+  auto* yes = command->add_flag("--yes", options->yes, "take every mounting as done (for a simulated bench)");
+  command->add_option("--answers", options->answers, "file with the operator's answers, for a run without a terminal")
+      ->excludes(yes);
+  command->add_flag("--json", options->json, "print the result as one JSON object on stdout");
+  live::add_options(*command, options->live);
+  command->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace kphi::daq

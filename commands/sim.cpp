@@ -1,0 +1,255 @@
+#include "commands/sim.hpp"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "base/error.hpp"
+#include "drivers/sim/control_line.hpp"
+#include "drivers/sim/input_files.hpp"
+#include "drivers/sim/physics/truth.hpp"
+#include "drivers/sim/server.hpp"
+#include "drivers/sim/truth_log.hpp"
+#include "profiles/bench_config.hpp"
+
+namespace kphi::sim {
+namespace {
+
+struct Options {
+  std::string bench;
+  std::string truth;
+  std::string resolved;
+  std::string faults;
+  std::string truth_log;
+  std::string mount;
+  bool status = false;
+  bool free_ports = false;
+  double clock_gain = 0;
+  double reply_latency_us = 0;
+  double usb_tick_ms = 0;
+  bool legacy = false;
+  bool paced = false;
+  std::optional<double> time_scale;
+  std::optional<std::uint64_t> seed;
+};
+
+std::atomic<Server*> running{nullptr};
+
+void stop_running(int) {
+  if (Server* server = running.load()) server->request_stop();
+}
+
+[[noreturn]] void refuse(const profiles::BenchConfig& bench, const std::string& what) {
+  throw ConfigurationError(bench.path + ": " + what);
+}
+
+profiles::BenchConfig load_simulated(const Options& options) {
+  profiles::BenchConfig bench = profiles::load_bench(options.bench);
+  if (!bench.simulation) refuse(bench, "a real bench cannot be simulated; add a `simulation` section");
+  if (bench.simulation->in_process) refuse(bench, "`simulation.in_process` needs no server; start `kphi run` directly");
+  if (bench.thrust_axis != 2 || bench.thrust_sign != 1 || bench.iq.spin != 1) {
+    refuse(bench,
+           "the simulated propellers pull along +Fz and spin counter-clockwise; set `thrust_axis: +Fz` and "
+           "`iq.spin: +1`");
+  }
+  if (options.time_scale) bench.simulation->time_scale = *options.time_scale;
+  if (options.seed) bench.simulation->seed = *options.seed;
+  if (!options.faults.empty()) bench.simulation->faults = options.faults;
+  return bench;
+}
+
+std::string text_of(const std::string& path) {
+  try {
+    std::ifstream file(path);
+    const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    if (file) return text;
+  } catch (const std::ios_base::failure&) {  // a folder
+  }
+  throw ConfigurationError(path + ": cannot be read; name an existing file");
+}
+
+void load_faults(const std::string& path, BenchSettings& bench) {
+  sim::load_faults(text_of(path), path, bench);
+  if (!bench.air_faults.empty())
+    throw ConfigurationError(path + ": faults of the air sensor need a bench with `simulation.in_process`");
+}
+
+void load_motor(const std::string& path, BenchSettings& bench) {
+  const MotorProfile profile = parse_motor_profile(text_of(path), path);
+  bench.plant.motor = profile.motor;
+  bench.module.sensors = profile.sensors;
+}
+
+void load_supply(const profiles::BenchConfig& bench, const Options& options, ServerSettings& settings) {
+  try {
+    const SupplyUri uri = parse_supply_uri(bench.supply->uri);
+    auto& supply = settings.bench.supply.emplace();
+    supply.model = uri.model;
+    supply.slave = uri.slave;
+    supply.seed = bench.simulation->seed;
+    (void)SupplySlave(supply);  // refuses an unknown model
+    settings.supply = uri.addresses;
+    if (options.free_ports) settings.supply->port = 0;
+  } catch (const std::invalid_argument& error) {
+    refuse(bench, error.what());
+  }
+}
+
+ServerSettings settings_of(const profiles::BenchConfig& bench, const Options& options) {
+  ServerSettings settings;
+  settings.bench.seed = bench.simulation->seed;
+  settings.bench.time_scale = bench.simulation->time_scale;
+  settings.bench.module_id = bench.iq.module_id;
+  settings.bench.module.baud = bench.iq.baud;
+  settings.bench.oscillator_gain = options.clock_gain;
+  settings.bench.module.quirks = options.legacy ? kLegacyFirmware : IqQuirks{};
+  settings.bench.module.reply_latency = from_seconds(1e-6 * options.reply_latency_us);
+  settings.bench.motor_line_paced = options.paced;
+  settings.bench.motor_usb_tick = from_seconds(1e-3 * options.usb_tick_ms);
+  settings.bench.netbox.rate_hz = bench.netbox.rate_hz;
+  settings.bench.netbox.records_per_datagram = bench.netbox.records_per_datagram;
+  settings.bench.netbox.address = bench.netbox.host;
+  settings.host = bench.netbox.host;
+  settings.rdt_port = options.free_ports ? 0 : bench.netbox.rdt_port;
+  settings.http_port = options.free_ports ? 0 : bench.netbox.http_port;
+  settings.tcp_port = options.free_ports ? 0 : bench.netbox.tcp_port;
+  if (bench.supply) load_supply(bench, options, settings);
+  if (!bench.simulation->faults.empty()) load_faults(bench.simulation->faults, settings.bench);
+  if (!bench.simulation->motor.empty()) load_motor(bench.simulation->motor, settings.bench);
+  if (!options.truth_log.empty()) {
+    settings.bench.keep = FaultInjector::Keep::datagrams;
+    settings.bench.motor_keep = IqLine::Keep::replies;
+  }
+  settings.bench.plant.air_density_kg_m3 = bench.simulation->air_density_kg_m3;
+  settings.device = bench.iq.device;
+  settings.control = bench.simulation->control;
+  return settings;
+}
+
+void write_file(const std::string& path, const std::string& text) {
+  std::ofstream file(path);
+  file << text << std::flush;
+  if (!file) throw DeviceError("file " + path, "write", "failed", "name a writable file");
+}
+
+std::string resolved_text(const profiles::BenchConfig& bench, const Addresses& addresses) {
+  YAML::Node file = YAML::Load(bench.text);
+  file["netbox"]["rdt_port"] = addresses.rdt_port;
+  file["netbox"]["http_port"] = addresses.http_port;
+  file["netbox"]["tcp_port"] = addresses.tcp_port;
+  file["iq"]["device"] = addresses.device;
+  if (bench.supply && addresses.supply_port != 0) {
+    const std::size_t query = bench.supply->uri.find('?');
+    file["supply"]["uri"] =
+        fmt::format("modbus-tcp:{}:{}{}", parse_supply_uri(bench.supply->uri).addresses.host.value_or(""),
+                    addresses.supply_port, query == std::string::npos ? "" : bench.supply->uri.substr(query));
+  }
+  file["simulation"]["control"] = addresses.control;
+  file["simulation"]["time_scale"] = fmt::format("{}", bench.simulation->time_scale);
+  file["simulation"]["seed"] = bench.simulation->seed;
+  // The copy may lie in another folder.
+  const std::string &faults = bench.simulation->faults, &motor = bench.simulation->motor;
+  if (!faults.empty()) file["simulation"]["faults"] = std::filesystem::absolute(faults).string();
+  if (!motor.empty()) file["simulation"]["motor"] = std::filesystem::absolute(motor).string();
+  return YAML::Dump(file) + "\n";
+}
+
+std::string ready_line(const profiles::BenchConfig& bench, const Addresses& addresses) {
+  nlohmann::ordered_json json{{"rdt", fmt::format("{}:{}", addresses.host, addresses.rdt_port)},
+                              {"http", fmt::format("{}:{}", addresses.host, addresses.http_port)},
+                              {"tcp", fmt::format("{}:{}", addresses.host, addresses.tcp_port)},
+                              {"device", addresses.device},
+                              {"control", addresses.control},
+                              {"time_scale", bench.simulation->time_scale},
+                              {"seed", bench.simulation->seed}};
+  if (!addresses.supply_device.empty()) json["supply"] = addresses.supply_device;
+  if (addresses.supply_port != 0) json["supply"] = fmt::format("{}:{}", addresses.host, addresses.supply_port);
+  return json.dump();
+}
+
+int talk(const profiles::BenchConfig& bench, const std::string& line) {
+  const std::string answer = tell(control_path(bench.simulation->control), line);
+  fmt::print("{}\n", answer);
+  return answer.rfind("error", 0) == 0 ? 1 : 0;
+}
+
+void serve(const profiles::BenchConfig& bench, const Options& options) {
+  Server server(settings_of(bench, options));
+  if (!options.truth_log.empty()) write_file(options.truth_log, "");  // refuses an unwritable file now, not at the end
+  if (!options.truth.empty()) write_file(options.truth, truth_yaml(bench.simulation->seed));
+  if (!options.resolved.empty()) write_file(options.resolved, resolved_text(bench, server.addresses()));
+  running = &server;
+  std::signal(SIGINT, stop_running);
+  std::signal(SIGTERM, stop_running);
+  fmt::print("{}\n", ready_line(bench, server.addresses()));
+  std::fflush(stdout);
+  fmt::print(stderr, "kphi sim: simulating {} at {} times real time; Ctrl-C ends it\n", bench.path,
+             bench.simulation->time_scale);
+  server.run();
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+  running = nullptr;
+  if (!options.truth_log.empty())
+    write_file(options.truth_log,
+               json_lines(server.truth()) + server.motion().json_lines() + json_lines(server.motor_truth()));
+  if (!bench.simulation->faults.empty()) fmt::print(stderr, "kphi sim: {}\n", summary(server.truth()));
+  const auto& unsent = server.unsent();
+  if (unsent.datagrams + unsent.motor_bytes > 0) {
+    fmt::print(stderr, "kphi sim: dropped because a buffer was full: {} datagrams, {} motor bytes\n", unsent.datagrams,
+               unsent.motor_bytes);
+  }
+}
+
+int run(const Options& options) {
+  const profiles::BenchConfig bench = load_simulated(options);
+  if (!options.mount.empty()) return talk(bench, "mount " + options.mount);
+  if (options.status) return talk(bench, "status");
+  serve(bench, options);
+  return 0;
+}
+
+}  // namespace
+
+void add_sim(CLI::App& program, int& exit_code) {
+  auto options = std::make_shared<Options>();
+  CLI::App* sim = program.add_subcommand("sim", "run the simulated bench of a bench file, or control a running one");
+  sim->add_option("BENCH", options->bench, "bench file with a `simulation` section")->required();
+  sim->add_option("--truth", options->truth, "file for the true coefficients of the simulated propellers (YAML)");
+  sim->add_option("--faults", options->faults, "fault script of wires and devices (YAML; default: the bench file's)");
+  sim->add_option("--truth-log", options->truth_log,
+                  "file for the fate of every datagram, reply and motor command, written at exit (JSON lines)");
+  sim->add_option("--time-scale", options->time_scale, "bench seconds per second (default: the bench file's)")
+      ->check(CLI::Range(0.1, 1000.0));
+  sim->add_option("--seed", options->seed, "seed of the noise (default: the bench file's)");
+  sim->add_option("--resolved", options->resolved, "file for a copy of the bench file with the actual addresses");
+  sim->add_flag("--free-ports", options->free_ports,
+                "listen on any free ports instead of the bench file's; see --resolved");
+  sim->add_option("--clock-gain", options->clock_gain,
+                  "relative error of the motor module's clock, about 0.005 in a real one (default 0)")
+      ->check(CLI::Range(-0.05, 0.05));
+  sim->add_option("--reply-latency-us", options->reply_latency_us, "reply latency of the motor module (default 0)")
+      ->check(CLI::Range(0.0, 1e6));
+  sim->add_option("--usb-tick-ms", options->usb_tick_ms,
+                  "latency timer of the motor's serial adapter, 1 or 16 (default 0: none)")
+      ->check(CLI::Range(0.0, 255.0));
+  sim->add_flag("--paced", options->paced, "transmit the motor's bytes at its baud rate, not at once");
+  sim->add_flag("--legacy", options->legacy, "simulate a motor module with old firmware");
+  auto* mount = sim->add_option("--mount", options->mount,
+                                "tell the running simulator the mounted propeller and occlusion: \"5x3 90\"");
+  sim->add_flag("--status", options->status, "print the state of the running simulator as one line of JSON")
+      ->excludes(mount);
+  sim->callback([options, &exit_code] { exit_code = run(*options); });
+}
+
+}  // namespace kphi::sim

@@ -1,0 +1,133 @@
+// The bench as runner and guard see it. Two exist: the live one (real transports, threads, a steady clock) and the
+// deterministic one (sessions joined to simulated devices in virtual time, one thread). Runner and guard cannot tell
+// them apart.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/clock.hpp"
+#include "compensation/units.hpp"
+#include "daq/bench/supply_link.hpp"
+#include "drivers/ambient/air.hpp"
+#include "drivers/iq/service/audit.hpp"
+#include "drivers/iq/session/stopping.hpp"
+#include "drivers/netbox/configuration/configuration.hpp"
+#include "drivers/netbox/configuration/finding.hpp"
+#include "profiles/bench_config.hpp"
+#include "results/records.hpp"
+#include "results/run_writer.hpp"
+
+namespace kphi::daq {
+
+/// Work that is called again and again while this lives.
+class Background {
+ public:
+  virtual ~Background() = default;
+};
+
+/// The motor. Turn it only through MotorEnable (guard/motor_enable.hpp), whose destructor coasts it.
+class MotorLink {
+ public:
+  virtual ~MotorLink() = default;
+  /// Positive = counter-clockwise. Also renews the lease without which the driver coasts the motor by itself.
+  virtual void spin_at(RadPerSec signed_speed) = 0;
+  virtual void renew() noexcept = 0;
+  /// Sends the order to coast three times at once; tries also when the link has failed.
+  virtual void emergency_stop() noexcept = 0;
+  /// Ramps down, coasts and watches until the rotor is at rest; returns at once. Ignored while another stop is under
+  /// way.
+  virtual void begin_stop(const iq::StopSettings& settings) = 0;
+  /// How the last stop ended; nullopt while it is under way or before the first.
+  [[nodiscard]] virtual std::optional<iq::StopReport> stop_report() = 0;
+  /// The module's parameters as read when the link was made.
+  [[nodiscard]] virtual const iq::AuditRecord& parameters() const = 0;
+  /// Reads it now; nullopt if the module reports none. Throws DeviceError. The runner's thread.
+  [[nodiscard]] virtual std::optional<Celsius> coil_temperature() = 0;
+  /// Takes the readings since the last call. The guard's thread.
+  virtual std::size_t take(std::span<results::MotorReading> out) = 0;
+  /// Events of the module and its line since the last call, oldest first. The guard's thread.
+  [[nodiscard]] virtual std::vector<results::StreamEvent> take_events() = 0;
+  /// Why the link failed; empty while it works. Thread-safe.
+  [[nodiscard]] virtual std::string failure() const = 0;
+  /// One line: firmware, hardware, uid.
+  [[nodiscard]] virtual std::string identity() const = 0;
+};
+
+/// The load cell's stream. A fresh one for every run: counters start at zero with it.
+class LoadCellLink {
+ public:
+  virtual ~LoadCellLink() = default;
+  /// As last read: when the link was made, or at start().
+  [[nodiscard]] virtual const netbox::Configuration& configuration() const = 0;
+  /// Findings of making the link, worst first; without faults, which throw.
+  [[nodiscard]] virtual std::vector<netbox::Finding> findings() const = 0;
+  /// Reads the box's configuration and starts the stream. Throws DeviceError.
+  virtual results::LoadCellScale start() = 0;
+  virtual void stop() noexcept = 0;
+  /// Takes the samples since the last call. The guard's thread.
+  virtual std::size_t take(std::span<results::LoadCellRecord> out) = 0;
+  /// Events of the stream since the last call, oldest first. The guard's thread.
+  [[nodiscard]] virtual std::vector<results::StreamEvent> take_events() = 0;
+  /// The box's present netftapi2.xml. The runner's thread. Throws DeviceError.
+  [[nodiscard]] virtual std::string page() = 0;
+  /// Sets the box's bias: its present load becomes zero; the stream continues. The runner's thread.
+  virtual void set_bias() noexcept = 0;
+  /// Why the stream failed; empty while it works. Thread-safe.
+  [[nodiscard]] virtual std::string failure() const = 0;
+  [[nodiscard]] virtual results::SampleAccount account() const = 0;
+  [[nodiscard]] virtual results::StreamHealth health() const = 0;
+};
+
+/// One run, before it begins.
+struct RunBeginning {
+  double occlusion_deg = 0;
+  int repetition = 1;
+  Instant after{0};  ///< bench time when the campaign's last run was accepted, before a resumption, too; 0: none
+};
+
+class Bench {
+ public:
+  virtual ~Bench() = default;
+  [[nodiscard]] virtual const Clock& clock() const = 0;
+  [[nodiscard]] virtual MotorLink& motor() = 0;
+  [[nodiscard]] virtual LoadCellLink& load_cell() = 0;
+  /// nullptr: kphi does not control the motor's power. Otherwise the motor is powered while the bench lives.
+  [[nodiscard]] virtual SupplyLink* supply() { return nullptr; }
+  /// Current air density; nullopt if unknown.
+  [[nodiscard]] virtual std::optional<ambient::Density> air() const { return std::nullopt; }
+  /// Returns at bench time `when`, or a little later on a live bench.
+  virtual void wait_until(Instant when) = 0;
+  /// Calls `work` while the handle lives: from a thread of its own, or from within wait_until.
+  [[nodiscard]] virtual std::unique_ptr<Background> run_periodically(std::function<void()> work) = 0;
+  /// Writes the run files.
+  [[nodiscard]] virtual results::FileLayer& files() = 0;
+  /// How often the recorder syncs the run file, bench time.
+  [[nodiscard]] virtual Duration sync_interval() const = 0;
+  /// A run begins; a bench in virtual time may be made again for it, which invalidates references to its parts.
+  virtual void begin_run(const RunBeginning&) {}
+  /// Before somebody comes near: cuts the motor's power if kphi controls it, and waits until the supply confirms that.
+  /// The motor must be at rest. False: the motor still has power. Throws SafetyStop.
+  [[nodiscard]] virtual bool switch_off_power() = 0;
+  /// After everybody has stepped back: restores the power, and connects to the module again if it was lost. Throws
+  /// DeviceError.
+  virtual void restore_power() = 0;
+  /// Keeps this computer awake while the handle lives; `why_not` becomes one line if that is impossible.
+  [[nodiscard]] virtual std::shared_ptr<void> keep_awake(std::string& why_not) {
+    why_not.clear();
+    return nullptr;
+  }
+  /// Tells a simulated bench what was mounted. Throws DeviceError.
+  virtual void mounted(const std::string& propeller_id, double occlusion_deg) = 0;
+};
+
+/// Connects to the devices of the bench file. `stop_asked` is checked before anything is switched on. Throws
+/// DeviceError, Interrupted.
+[[nodiscard]] std::unique_ptr<Bench> connect(
+    const profiles::BenchConfig& bench, const std::function<bool()>& stop_asked = [] { return false; });
+
+}  // namespace kphi::daq

@@ -1,0 +1,155 @@
+#include "daq/campaign/campaign_review.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <tuple>
+
+#include "results/reduction/repetitions.hpp"
+#include "results/steps_csv.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using nlohmann::json;
+using results::StepMean;
+
+json number(double value) { return std::isnan(value) ? json() : json(value); }
+
+json to_json(const results::RepetitionVerdict& verdict) {
+  json list = json::array();
+  for (const results::RepetitionFigure& figure : verdict.repetitions) {
+    list.push_back({{"repetition", figure.repetition},
+                    {"k_n_s2_per_rad2", number(figure.k)},
+                    {"u_k", number(figure.u)},
+                    {"usable", figure.usable},
+                    {"outlying", figure.outlying}});
+  }
+  return {{"occlusion_deg", verdict.occlusion_deg},
+          {"repetitions", list},
+          {"k_n_s2_per_rad2", number(verdict.k)},
+          {"between_sd", number(verdict.between_sd)},
+          {"within_u", number(verdict.within_u)},
+          {"f", number(verdict.f)},
+          {"p", number(verdict.p)},
+          {"reason", verdict.reason}};
+}
+
+json to_json(const results::Hysteresis& hysteresis) {
+  json speeds = json::array();
+  for (const results::HysteresisPoint& point : hysteresis.speeds)
+    speeds.push_back(
+        {{"speed_rad_s", point.speed_rad_s}, {"up_minus_down_n", point.up_minus_down_n}, {"u_n", point.u_n}});
+  return {{"share_of_k", hysteresis.share}, {"u_share_of_k", hysteresis.u_share}, {"speeds", speeds}};
+}
+
+std::string to_words(const results::RepetitionVerdict& verdict) {
+  std::string words = fmt::format("{:g}°: ", verdict.occlusion_deg);
+  words += verdict.reason.empty() ? "repetitions agree: " : verdict.reason + "; ";
+  if (std::isnan(verdict.between_sd)) return words + "nothing to compare it with";
+  const auto known = std::count_if(verdict.repetitions.begin(), verdict.repetitions.end(),
+                                   [](const results::RepetitionFigure& figure) { return !std::isnan(figure.k); });
+  return words + fmt::format("spread {:.3f} %, expected up to {:.3f} % ({} repetitions)",
+                             100 * verdict.between_sd / std::abs(verdict.k),
+                             100 * verdict.within_u / std::abs(verdict.k), known);
+}
+
+}  // namespace
+
+void CampaignReview::restore(const std::vector<StepMean>& means) {
+  if (means.empty()) return;
+  const bool is_reference = means.front().repetition < 0;
+  auto& rows = is_reference ? references_ : steps_;
+  rows.insert(rows.end(), means.begin(), means.end());
+  sort();
+  if (!is_reference) ++repetitions_[means.front().occlusion_deg];
+  (void)cap_.learn(means);
+}
+
+void CampaignReview::add(const std::string& run, const std::vector<StepMean>& means) {
+  SpeedCap before = cap_;
+  restore(means);
+  if (const auto lesson = before.learn(means)) {
+    progress_.say(
+        fmt::format("motor: full drive gives {:.0f} of {:.0f} RPM; later runs of {} skip the steps above {:.0f} RPM",
+                    to_rpm(lesson->reached), to_rpm(lesson->commanded), campaign_.propeller.id, to_rpm(lesson->cap)));
+    note_("speed_cap", {{"run", run},
+                        {"commanded_rad_s", lesson->commanded.value()},
+                        {"reached_rad_s", lesson->reached.value()},
+                        {"cap_rad_s", lesson->cap.value()}});
+  }
+  if (campaign_.order.steps == profiles::StepOrderKind::up_and_down) report_hysteresis(run, means);
+}
+
+void CampaignReview::report_hysteresis(const std::string& run, const std::vector<StepMean>& means) {
+  const auto hysteresis = hysteresis_of(means);
+  if (!hysteresis) return;
+  progress_.say(fmt::format("{}: {}", run, hysteresis->to_words()));
+  json data = to_json(*hysteresis);
+  data["run"] = run;
+  note_("hysteresis", data);
+}
+
+/// As replay finds the runs: occlusions as listed, then repetitions; within a run as measured.
+void CampaignReview::sort() {
+  const auto& listed = campaign_.occlusions_deg;
+  const auto key = [&](const StepMean& step) {
+    const auto place = std::find(listed.begin(), listed.end(), step.occlusion_deg) - listed.begin();
+    return std::tuple(place, step.occlusion_deg, std::abs(step.repetition));
+  };
+  const auto by_key = [&](const StepMean& a, const StepMean& b) { return key(a) < key(b); };
+  std::stable_sort(steps_.begin(), steps_.end(), by_key);
+  std::stable_sort(references_.begin(), references_.end(), by_key);
+}
+
+void CampaignReview::write(const results::CampaignFolder& folder, results::FileLayer& files) const {
+  results::write_steps(folder.steps(), steps_, files);
+  results::write_steps(folder.means(), means_of(steps_), files);
+  if (!references_.empty()) results::write_steps(folder.references(), references_, files);
+}
+
+int CampaignReview::repetitions(double occlusion_deg) const {
+  const auto found = repetitions_.find(occlusion_deg);
+  return found == repetitions_.end() ? 0 : found->second;
+}
+
+std::optional<AnotherRun> CampaignReview::another(double occlusion_deg) {
+  const int made = repetitions(occlusion_deg);
+  if (made < campaign_.repetitions) return std::nullopt;
+  std::vector<StepMean> rows;
+  std::copy_if(steps_.begin(), steps_.end(), std::back_inserter(rows),
+               [&](const StepMean& step) { return step.occlusion_deg == occlusion_deg; });
+  results::RepetitionRule rule;
+  rule.wanted = campaign_.repetitions;
+  rule.at_most = campaign_.repetitions + campaign_.repetitions_extra_max;
+  const results::RepetitionVerdict verdict = judge_repetitions(rows, rule).at(0);
+  if (made > 1 || !verdict.reason.empty()) {
+    progress_.say(to_words(verdict));
+    note_("repetitions_judged", to_json(verdict));
+  }
+  if (!verdict.asks_for_another) return std::nullopt;
+  return AnotherRun{occlusion_deg, verdict.reason, made - campaign_.repetitions + 1, campaign_.repetitions_extra_max,
+                    campaign_.order.remount_each_repetition};
+}
+
+void CampaignReview::conclude() {
+  if (references_.empty()) return;
+  const auto drift = reference_drift(references_);
+  if (!drift) {
+    progress_.say("drift unknown: too few unflagged steps in the reference runs");
+    note_("reference_drift", {{"known", false}});
+    return;
+  }
+  progress_.say(drift->to_words());
+  note_("reference_drift", {{"known", true},
+                            {"k_begin_n_s2_per_rad2", drift->k_begin},
+                            {"k_end_n_s2_per_rad2", drift->k_end},
+                            {"share", drift->share},
+                            {"u_share", drift->u_share},
+                            {"at_equal_air_density", drift->same_air},
+                            {"drifted", drift->drifted()}});
+}
+
+}  // namespace kphi::daq

@@ -1,0 +1,53 @@
+// What the runs of a campaign show, run by run: rows, the motor's cap, hysteresis, repetitions, drift of the bench.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daq/campaign/operator.hpp"
+#include "daq/run/progress.hpp"
+#include "daq/run/speed_cap.hpp"
+#include "profiles/plan.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/step_mean.hpp"
+
+namespace kphi::daq {
+
+/// The runner's thread. Findings are shown and recorded.
+class CampaignReview {
+ public:
+  using Note = std::function<void(const char* event, const nlohmann::json& data)>;
+  CampaignReview(const profiles::Campaign& campaign, Progress& progress, Note note)
+      : campaign_(campaign), progress_(progress), note_(std::move(note)) {}
+
+  /// The means of a run accepted before a resumption: counts, but is not reported again.
+  void restore(const std::vector<results::StepMean>& means);
+  /// The means of a run that was just accepted. `run`: its file's name.
+  void add(const std::string& run, const std::vector<results::StepMean>& means);
+  /// steps.csv, means.csv and, with reference runs, references.csv: the same whatever the order of the runs.
+  void write(const results::CampaignFolder& folder, results::FileLayer& files) const;
+  /// Once all planned repetitions of the occlusion are there: the question to ask if they disagree and the campaign
+  /// allows another run.
+  [[nodiscard]] std::optional<AnotherRun> another(double occlusion_deg);
+  /// Repetitions of the occlusion so far, reference runs not counted.
+  [[nodiscard]] int repetitions(double occlusion_deg) const;
+  [[nodiscard]] const SpeedCap& cap() const { return cap_; }
+  /// After the last run.
+  void conclude();
+
+ private:
+  void report_hysteresis(const std::string& run, const std::vector<results::StepMean>& means);
+  void sort();
+  const profiles::Campaign& campaign_;
+  Progress& progress_;
+  Note note_;
+  SpeedCap cap_;
+  std::vector<results::StepMean> steps_, references_;
+  std::map<double, int> repetitions_;
+};
+
+}  // namespace kphi::daq

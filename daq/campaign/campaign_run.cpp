@@ -1,0 +1,398 @@
+#include "daq/campaign/campaign_run.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "base/error.hpp"
+#include "daq/audit/bench_audit.hpp"
+#include "daq/campaign/campaign_review.hpp"
+#include "daq/guard/awake.hpp"
+#include "daq/guard/interrupt.hpp"
+#include "daq/guard/rest_guard.hpp"
+#include "daq/run/run.hpp"
+#include "profiles/plan.hpp"
+#include "profiles/strict_yaml.hpp"
+#include "results/journal.hpp"
+#include "results/reduction/reduction.hpp"
+#include "results/run_reader.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using nlohmann::json;
+
+constexpr Duration kCoolingPoll = std::chrono::seconds(1);
+constexpr Duration kCoolingTickWall = std::chrono::milliseconds(100);
+
+json to_json(const iq::StopReport& stop) {
+  const auto seconds = [](const std::optional<Duration>& time) { return time ? json(to_seconds(*time)) : json(); };
+  return {{"confirmed", stop.safe()},
+          {"time_to_coast_s", seconds(stop.time_to_coast)},
+          {"time_to_standing_s", seconds(stop.time_to_standing)},
+          {"words", stop.summary()}};
+}
+
+std::string rest_words(const std::optional<iq::StopReport>& stop) {
+  if (!stop) return "";
+  if (!stop->time_to_standing) return ", " + stop->summary();
+  return fmt::format(", at rest after {:.1f} s", to_seconds(*stop->time_to_standing));
+}
+
+bool is_safety_stop(const std::exception_ptr& cause) {
+  try {
+    std::rethrow_exception(cause);
+  } catch (const SafetyStop&) {
+    return true;
+  } catch (...) {
+    return false;
+  }
+}
+
+class CampaignRun {
+ public:
+  CampaignRun(Bench& bench, const profiles::Campaign& campaign, const profiles::BenchConfig& config,
+              const results::CampaignFolder& folder, Operator& person, Progress& progress,
+              const std::function<bool()>& stop_asked)
+      : bench_(bench),
+        campaign_(campaign),
+        config_(config),
+        folder_(folder),
+        person_(person),
+        progress_(progress),
+        stop_asked_(stop_asked),
+        plan_(profiles::make_plan(campaign, config)),
+        journal_(folder.journal(), bench.files()),
+        review_(campaign, progress, [this](const char* event, const json& data) { note(event, data); }),
+        planned_(static_cast<int>(plan_.runs.size())) {
+    person.log_to([this](const char* event, const std::string& words) { note(event, {{"words", words}}); });
+  }
+  ~CampaignRun() {
+    person_.log_to({});
+    person_.while_waiting({});
+  }
+  CampaignRun(const CampaignRun&) = delete;
+  CampaignRun& operator=(const CampaignRun&) = delete;
+
+  CampaignResult run(const Resumption* resumption, const std::vector<BenchFinding>* audited) {
+    json identity = identity_of(campaign_, config_);
+    add_devices(identity, bench_);
+    if (resumption == nullptr || resumption->state.identity.is_null()) {
+      keep_files();
+      note(results::kCampaignStarted, identity);
+    } else {
+      resume(*resumption, std::move(identity));
+    }
+    try {
+      require_awake(bench_.clock());
+      note_findings(audited != nullptr ? *audited : audit_bench(bench_, campaign_, config_));
+      for (const profiles::PlannedRun& planned : plan_.runs) {
+        if (!is_accepted(planned)) execute_run(planned);
+        if (!planned.is_reference()) add_repetitions(planned.occlusion_deg);
+      }
+      review_.conclude();
+    } catch (...) {
+      end_early(std::current_exception());
+    }
+    note(results::kCampaignFinished, {{"runs", result_.runs}});
+    return result_;
+  }
+
+ private:
+  /// Records why, and throws it again with what the person needs to continue.
+  [[noreturn]] void end_early(std::exception_ptr cause) {
+    if (has_slept(bench_.clock()) && !is_safety_stop(cause)) {
+      SafetyStop stop(slept(bench_.clock()));
+      StopWords words = stop.words();
+      words.also(words_of(cause).line());
+      cause = std::make_exception_ptr(SafetyStop(words));
+    }
+    StopWords words = words_of(cause);
+    note_the_end("campaign_stopped", {{"reason", words.line()}, {"safety_stop", is_safety_stop(cause)}});
+    const std::string runs =
+        fmt::format("{} of {} runs finished, in {}", result_.runs, planned_, folder_.path().string());
+    const std::string how = fmt::format("continue with: kphi run {} --bench {} --resume {}", campaign_.path,
+                                        config_.path, folder_.path().string());
+    words.data =
+        (words.data.empty() ? runs : fmt::format("{}; this run so far in {}", runs, words.data)) + "\n         " + how;
+    try {
+      std::rethrow_exception(cause);
+    } catch (const SafetyStop&) {
+      throw SafetyStop(words);
+    } catch (const NotMounted&) {
+      throw NotMounted(words);
+    } catch (const Interrupted&) {
+      throw Interrupted(words);
+    } catch (...) {
+      progress_.say(runs);
+      progress_.say(how);
+      throw;
+    }
+  }
+
+  /// Copies the campaign's files, and those that the bench file names.
+  void keep_files() {
+    keep_copy(folder_.campaign_file(), campaign_.text, bench_.files());
+    keep_copy(folder_.bench_file(), config_.text, bench_.files());
+    if (!config_.simulation) return;
+    const auto keep = [&](const std::string& file, const std::filesystem::path& copy) {
+      if (!file.empty()) keep_copy(copy, profiles::read_text(file), bench_.files());
+    };
+    keep(config_.simulation->faults, folder_.faults_file());
+    keep(config_.simulation->motor, folder_.motor_file());
+  }
+
+  void resume(const Resumption& resumption, json identity) {
+    const std::vector<std::string> changes = require_unchanged(folder_, resumption, identity);
+    if (!changes.empty()) keep_files();
+    const std::vector<std::string> aside = results::set_leftovers_aside(folder_, resumption.state, bench_.files());
+    if (!resumption.state.safety_stop.empty()) {
+      if (resumption.cleared_by.empty())
+        throw ConfigurationError("a safety stop ended this campaign and has not been cleared: " +
+                                 resumption.state.safety_stop);
+      identity["cleared_safety_stop"] = {{"reason", resumption.state.safety_stop}, {"by", resumption.cleared_by}};
+    }
+    identity["accepted_runs"] = resumption.state.accepted.size();
+    if (!changes.empty()) identity["accepted_changes"] = changes;
+    if (!aside.empty()) identity["set_aside"] = aside;
+    note(results::kCampaignResumed, identity);
+    for (const std::string& change : changes) progress_.say("resuming although " + change);
+    for (const std::string& file : aside) progress_.say("unfinished run kept as " + file);
+    for (const results::AcceptedRun& run : resumption.state.accepted) {
+      const auto file = folder_.path() / run.file;
+      const results::RunRecording recording = results::read_run(file);
+      const std::vector<results::StepMean> means = reduce(recording);
+      review_.restore(means);
+      count(file, recording, means);
+      accepted_at_ = Instant(run.time_ns);
+    }
+    if (result_.runs > 0) review_.write(folder_, bench_.files());
+    const auto open = std::count_if(plan_.runs.begin(), plan_.runs.end(),
+                                    [this](const profiles::PlannedRun& planned) { return !is_accepted(planned); });
+    planned_ = result_.runs + static_cast<int>(open);
+    progress_.say(fmt::format("resumed: {} of {} runs accepted", result_.runs, planned_));
+  }
+
+  [[nodiscard]] std::filesystem::path file_of(const profiles::PlannedRun& planned) const {
+    return folder_.run(campaign_.propeller.id, planned.occlusion_deg, planned.repetition);
+  }
+
+  [[nodiscard]] bool is_accepted(const profiles::PlannedRun& planned) const {
+    return accepted_.contains(file_of(planned).filename().string());
+  }
+
+  void execute_run(const profiles::PlannedRun& planned) {
+    mount(planned);
+    bench_.begin_run({planned.occlusion_deg, planned.repetition, accepted_at_});
+    const auto file = file_of(planned);
+    const double per_run_s = plan_.bench.value() / static_cast<double>(plan_.runs.size());
+    const double remaining_s = per_run_s * (planned_ - result_.runs);
+    profiles::PlannedRun capped = planned;
+    (void)review_.cap().apply(capped.steps);
+    try {
+      cool_down();
+      if (config_.ambient.known() && !bench_.air())
+        progress_.say("air: no current reading; air density of this run unknown");
+      const auto awake = keep_awake();
+      const RunOrder order{campaign_, config_, *mounted_, capped, remaining_s, file};
+      accept(record_run(bench_, order, progress_, stop_asked_), planned);
+    } catch (...) {
+      const auto cause = std::current_exception();
+      note_the_end(results::kRunAborted, {{"run", file.filename().string()},
+                                          {"reason", words_of(cause).line()},
+                                          {"safety_stop", is_safety_stop(cause)}});
+      throw;
+    }
+  }
+
+  /// Once all repetitions are there: adds runs while they disagree and the operator agrees.
+  void add_repetitions(double occlusion_deg) {
+    if (review_.repetitions(occlusion_deg) < campaign_.repetitions || !judged_.insert(occlusion_deg).second) return;
+    while (const auto question = review_.another(occlusion_deg)) {
+      const bool yes = ask_for_another(*question);
+      note("another_run", {{"occlusion_deg", occlusion_deg},
+                           {"reason", question->reason},
+                           {"decided", yes},
+                           {"decided_by", person_.name()}});
+      if (!yes) return;
+      ++planned_;
+      execute_run(profiles::extra_run(campaign_, occlusion_deg, review_.repetitions(occlusion_deg) + 1));
+    }
+  }
+
+  bool ask_for_another(const AnotherRun& question) {
+    const RestGuard guard(bench_, true);
+    person_.while_waiting([&] { guard.check(); });
+    const bool yes = person_.run_again(question);
+    person_.while_waiting({});
+    return yes;
+  }
+
+  void note_findings(const std::vector<BenchFinding>& findings) {
+    for (const BenchFinding& found : findings) {
+      const Finding& finding = found.finding;
+      if (finding.severity != Severity::note) progress_.say(found.line());
+      note(found.device == Source::motor ? "motor_finding" : "load_cell_finding",
+           {{"severity", name_of(finding.severity)}, {"what", finding.what}, {"next_move", finding.next_move}});
+    }
+    if (!config_.iq.clock_gain) note("clock_unchecked", {{"uid", bench_.motor().parameters().uid()}});
+  }
+
+  /// For as long as the handle lives; a refusal is reported once.
+  [[nodiscard]] std::shared_ptr<void> keep_awake() {
+    std::string why_not;
+    auto awake = bench_.keep_awake(why_not);
+    if (!why_not.empty() && !std::exchange(may_sleep_, true)) {
+      progress_.say(why_not);
+      note("may_sleep", {{"reason", why_not}});
+    }
+    return awake;
+  }
+
+  /// The motor is at rest meanwhile, and watched.
+  void cool_down() {
+    const auto& limits = campaign_.limits;
+    if (!limits.cooling) return;
+    const RestGuard guard(bench_, true);
+    const CoolingRule rule{limits.cooling->pause_above.value(), limits.cooling->resume_below.value()};
+    const Instant begun = bench_.clock().now();
+    for (bool pausing = false;; pausing = true) {
+      const auto coil = bench_.motor().coil_temperature();
+      if (!rule.pauses(pausing, coil ? coil->value() : std::nan(""))) {
+        if (pausing) note("cooled_down", {{"seconds", to_seconds(bench_.clock().now() - begun)}});
+        return;
+      }
+      if (!coil)
+        throw DeviceError("IQ module", "read coil temperature", "the module reports none", "remove limits.cooling");
+      if (!pausing) {
+        progress_.say(
+            fmt::format("coil at {:.0f} °C: pausing until below {:g} °C", coil->value(), rule.resume_below_degc));
+        note("cooling", {{"coil_degc", coil->value()}, {"resume_below_degc", rule.resume_below_degc}});
+      }
+      const Instant next = bench_.clock().now() + kCoolingPoll;
+      while (bench_.clock().now() < next) {
+        if (stop_asked_()) throw Interrupted("stopped by request");
+        guard.check();
+        bench_.wait_until(std::min(next, bench_.clock().now() + bench_.clock().stretched(kCoolingTickWall)));
+      }
+    }
+  }
+
+  void mount(const profiles::PlannedRun& planned) {
+    const double occlusion_deg = planned.occlusion_deg;
+    if (!planned.mount && mounted_ && mounted_->occlusion_deg() == occlusion_deg) return;
+    mounted_.reset();
+    const MountConfirmation confirmed = let_mount(occlusion_deg);
+    bench_.mounted(campaign_.propeller.id, occlusion_deg);
+    bench_.restore_power();
+    mounted_ = confirmed;
+    note("mounted",
+         {{"propeller", campaign_.propeller.id}, {"occlusion_deg", occlusion_deg}, {"confirmed_by", person_.name()}});
+  }
+
+  /// Asks for the mounting only once the rotor was seen at rest, without power if kphi controls the supply. Guarded to
+  /// the end.
+  MountConfirmation let_mount(double occlusion_deg) {
+    std::optional<RestGuard> guard(std::in_place, bench_, true);
+    guard->await_rest(stop_asked_);
+    const bool has_power = !bench_.switch_off_power();
+    if (!has_power) guard.emplace(bench_, false);
+    person_.while_waiting([&] { guard->check(); });
+    const MountConfirmation confirmed = person_.confirm_mounting(
+        campaign_.propeller, occlusion_deg,
+        has_power ? "The rotor is at rest and its module coasts, but the motor HAS POWER. Cut it at the switch first."
+                  : "The rotor is at rest and the supply's output is off.");
+    person_.while_waiting({});
+    guard->check();
+    if (stop_asked_()) throw Interrupted("stopped by request");
+    return confirmed;
+  }
+
+  /// The file is complete, named and on disk: the journal's line accepts it. The tables follow from the files.
+  void accept(const RunResult& run, const profiles::PlannedRun& planned) {
+    const results::RunRecording recording = results::read_run(run.file);
+    const std::uint64_t lost = run.account.lost_network + run.account.lost_host;
+    json accepted = {{"file", "runs/" + run.file.filename().string()},
+                     {"sha256", run.sha256},
+                     {"samples", run.account.received},
+                     {"lost", lost}};
+    const auto driven = std::count_if(recording.phases.begin(), recording.phases.end(),
+                                      [](const auto& mark) { return mark.phase == results::Phase::step; });
+    // For lack of drive, in earlier runs or in this one.
+    if (const auto left_out = static_cast<std::ptrdiff_t>(planned.steps.size()) - driven; left_out > 0)
+      accepted["steps_left_out"] = left_out;
+    if (run.stop) accepted["stop"] = to_json(*run.stop);
+    for (const results::StreamEvent& event : recording.events) accepted["events"].push_back(event.text);
+    accepted_at_ = bench_.clock().now();
+    note(results::kRunAccepted, accepted);
+    const auto [means, zero] = reduce_with_zeros(recording);
+    review_.add(run.file.filename().string(), means);
+    const int flagged = count(run.file, recording, means);
+    review_.write(folder_, bench_.files());
+    for (const std::string& reason : zero.reasons()) progress_.say("load cell: " + reason);
+    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps flagged{}", result_.runs, planned_,
+                              run.file.filename().string(), run.account.received, lost, flagged, means.size(),
+                              rest_words(run.stop)));
+  }
+
+  /// Returns how many of its steps are flagged.
+  int count(const std::filesystem::path& file, const results::RunRecording& run,
+            const std::vector<results::StepMean>& means) {
+    int flagged = 0;
+    for (const auto& step : means) flagged += step.quality_flags != 0;
+    ++result_.runs;
+    result_.samples += run.account.received;
+    result_.lost += run.account.lost_network + run.account.lost_host;
+    result_.steps += static_cast<int>(means.size());
+    result_.flagged_steps += flagged;
+    accepted_.insert(file.filename().string());
+    return flagged;
+  }
+
+  void note(const std::string& event, const json& data) {
+    const Instant now = bench_.clock().now();
+    journal_.append(event, data, now.count(), utc_text(bench_.clock(), now));
+  }
+
+  /// After a failure, which matters more than a disk that refuses this line.
+  void note_the_end(const std::string& event, const json& data) {
+    try {
+      note(event, data);
+    } catch (const RecordError& error) {
+      progress_.say(error.what());
+    }
+  }
+
+  Bench& bench_;
+  const profiles::Campaign& campaign_;
+  const profiles::BenchConfig& config_;
+  const results::CampaignFolder& folder_;
+  Operator& person_;
+  Progress& progress_;
+  const std::function<bool()>& stop_asked_;
+  const profiles::Plan plan_;
+  results::Journal journal_;
+  CampaignReview review_;
+  int planned_;                     ///< runs, with those that were added
+  std::set<double> judged_;         ///< occlusions with all repetitions
+  std::set<std::string> accepted_;  ///< names of files
+  Instant accepted_at_{0};          ///< the last of them
+  std::optional<MountConfirmation> mounted_;
+  bool may_sleep_ = false;  ///< the operator knows that nothing keeps this computer awake
+  CampaignResult result_;
+};
+
+}  // namespace
+
+CampaignResult run_campaign(Bench& bench, const profiles::Campaign& campaign, const profiles::BenchConfig& config,
+                            const results::CampaignFolder& folder, Operator& person, Progress& progress,
+                            const std::function<bool()>& stop_asked, const Resumption* resumption,
+                            const std::vector<BenchFinding>* audited) {
+  return CampaignRun(bench, campaign, config, folder, person, progress, stop_asked).run(resumption, audited);
+}
+
+}  // namespace kphi::daq

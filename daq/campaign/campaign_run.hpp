@@ -1,0 +1,48 @@
+// A whole campaign: mountings, runs, step means, journal, in one folder.
+#pragma once
+
+#include <functional>
+#include <limits>
+
+#include "daq/audit/bench_audit.hpp"
+#include "daq/bench/bench.hpp"
+#include "daq/guard/interlock.hpp"
+#include "daq/campaign/operator.hpp"
+#include "daq/campaign/resume.hpp"
+#include "daq/run/progress.hpp"
+#include "profiles/bench_config.hpp"
+#include "profiles/campaign.hpp"
+#include "results/campaign_folder.hpp"
+
+namespace kphi::daq {
+
+/// Whether to wait before the next run, with hysteresis: a pause begins above `pause_above` and ends below
+/// `resume_below`. A temperature that is not a number begins a pause and ends none.
+struct CoolingRule {
+  double pause_above_degc = std::numeric_limits<double>::infinity();
+  double resume_below_degc = std::numeric_limits<double>::infinity();
+  [[nodiscard]] bool pauses(bool pausing, double coil_temperature_degc) const {
+    return pausing ? !(coil_temperature_degc < resume_below_degc) : !(coil_temperature_degc <= pause_above_degc);
+  }
+};
+
+struct CampaignResult {
+  int runs = 0;  ///< all accepted ones, those from before a resumption included
+  std::uint64_t samples = 0;
+  std::uint64_t lost = 0;  ///< in the network and in this host
+  int steps = 0;
+  int flagged_steps = 0;
+};
+
+/// Runs everything in order into `folder`. Each finished run is hashed in the journal and its step means are in
+/// steps.csv before the next begins. Throws what record_run and Operator::mount throw; the journal then holds why.
+/// `resumption`: of an existing folder. Its accepted runs stay as they are, unfinished runs are renamed, steps.csv and
+/// means.csv are written again, and only the missing runs are made. Throws ConfigurationError if devices, files or
+/// program changed.
+[[nodiscard]] CampaignResult run_campaign(Bench& bench, const profiles::Campaign& campaign,
+                                          const profiles::BenchConfig& config, const results::CampaignFolder& folder,
+                                          Operator& person, Progress& progress, const std::function<bool()>& stop_asked,
+                                          const Resumption* resumption = nullptr,
+                                          const std::vector<BenchFinding>* audited = nullptr);
+
+}  // namespace kphi::daq

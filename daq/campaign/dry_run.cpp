@@ -1,0 +1,364 @@
+#include "daq/campaign/dry_run.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "base/error.hpp"
+#include "daq/campaign/thrust_prior.hpp"
+#include "drivers/netbox/receive/audit.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/reduction/quality_flags.hpp"
+#include "results/reduction/settling.hpp"
+#include "results/run_writer.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using nlohmann::json;
+using profiles::Campaign;
+
+constexpr double kSpeedOfSound = 343;  // m/s, at 20 °C
+constexpr double kAliasHz = 2;         // a line aliased below this is constant over a step
+
+double time_scale(const profiles::BenchConfig& config) {
+  return config.simulation ? config.simulation->time_scale : 1.0;
+}
+
+RadPerSec top_speed(const Campaign& campaign) { return std::max(campaign.profile.first, campaign.profile.last); }
+
+/// The folder itself, or its nearest existing parent.
+std::filesystem::path existing(const std::filesystem::path& folder) {
+  std::filesystem::path path = std::filesystem::absolute(folder);
+  while (!std::filesystem::exists(path) && path.has_relative_path()) path = path.parent_path();
+  return path;
+}
+
+std::string minutes(double seconds) {
+  const auto whole = std::llround(seconds);
+  return whole < 120 ? fmt::format("{} s", whole) : fmt::format("{} min {:02} s", whole / 60, whole % 60);
+}
+
+std::string gigabytes(std::uint64_t bytes) { return fmt::format("{:.2f} GB", 1e-9 * static_cast<double>(bytes)); }
+
+/// Fills the list, one member per check.
+class Checks {
+ public:
+  Checks(const Campaign& campaign, const profiles::BenchConfig& config) : campaign_(campaign), config_(config) {}
+
+  void speed() {
+    const RadPerSec top = top_speed(campaign_);
+    try {
+      profiles::require_within(campaign_, config_);
+    } catch (const ConfigurationError& refused) {
+      return add(Severity::fault, "speed", refused.what());
+    }
+    const double tip = top.value() * 0.0127 * campaign_.propeller.diameter_in;
+    add(Severity::note, "speed",
+        fmt::format("{:.0f} RPM at most; the campaign allows {:.0f}, the motor {:.0f} RPM; blade tips at {:.0f} m/s, "
+                    "Mach {:.2f}",
+                    to_rpm(top), to_rpm(campaign_.limits.speed_max), to_rpm(config_.iq.speed_max), tip,
+                    tip / kSpeedOfSound));
+  }
+
+  void thrust() {
+    const double limit = campaign_.limits.thrust_max.value();
+    const auto prior = thrust_prior(campaign_.propeller);
+    if (!prior)
+      return tell("thrust", fmt::format("limit {:g} N; no published thrust data for such a propeller", limit));
+    const double low = ThrustPrior::at(prior->low, top_speed(campaign_)).value();
+    const double high = ThrustPrior::at(prior->high, top_speed(campaign_)).value();
+    const std::string words = fmt::format("about {:.1f} to {:.1f} N expected at top speed ({}), limit {:g} N", low,
+                                          high, prior->source, limit);
+    if (high > limit)
+      return add(Severity::warning, "thrust", words,
+                 low > limit ? "the limit will stop the run" : "the limit may stop the run");
+    add(Severity::note, "thrust", words);
+  }
+
+  void range() {
+    tell("load cell range",
+         "read from the box: `kphi devices --bench BENCH --campaign CAMPAIGN`, or when the run starts");
+  }
+
+  void sampling() {
+    std::vector<double> speeds_rpm;
+    for (const RadPerSec level : campaign_.profile.levels()) speeds_rpm.push_back(to_rpm(level));
+    const auto lines = netbox::aliased_lines(config_.netbox.rate_hz, speeds_rpm, campaign_.propeller.blades, kAliasHz);
+    const double pass_hz = to_rpm(top_speed(campaign_)) / 60 * campaign_.propeller.blades;
+    const std::string words = fmt::format("{:g} Hz, blades pass at {:.0f} Hz at most", config_.netbox.rate_hz, pass_hz);
+    if (lines.empty()) return add(Severity::note, "sampling", words + "; no level aliases to a constant force");
+    const netbox::AliasedLine& line = lines.front();
+    add(Severity::warning, "sampling",
+        fmt::format(
+            "{}; at {} levels a rotor harmonic aliases to nearly constant, first at {:.0f} RPM ({:.1f} Hz appears as "
+            "{:.2f} Hz)",
+            words, lines.size(), line.speed_rpm, line.true_hz, line.apparent_hz),
+        "choose another rate or levels, or a filter in the box");
+  }
+
+  void window() {
+    const double left = campaign_.profile.dwell.value() - campaign_.minimum_discard.value();
+    const std::string words = fmt::format("{:g} s of each step averaged after minimum_discard_s, zeros of {:g} s", left,
+                                          campaign_.zero.value());
+    if (left < results::kLeastWindow)
+      return add(Severity::warning, "averages", words,
+                 fmt::format("at least {:g} s needed to see the thrust settle", results::kLeastWindow));
+    add(Severity::note, "averages", words);
+  }
+
+  void supply() {
+    const auto& limits = campaign_.limits;
+    if (!config_.supply)
+      return add(Severity::note, "supply",
+                 fmt::format("{:g} V expected, not controlled by kphi; the motor coasts above {:g} A",
+                             campaign_.supply.value(), limits.supply_current_max.value()));
+    const auto& set = *config_.supply;
+    const std::string words = fmt::format(
+        "set to {:g} V, at most {:g} A; the campaign expects {:g} V and coasts above {:g} A", set.voltage.value(),
+        set.current_limit.value(), campaign_.supply.value(), limits.supply_current_max.value());
+    const bool beside = std::abs(set.voltage / campaign_.supply - 1) > results::kSupplyBand;
+    if (beside)
+      return add(Severity::warning, "supply", words, "every step would be flagged; make the two voltages agree");
+    add(Severity::note, "supply", words);
+  }
+
+  /// A supply that cannot sink current has nowhere to put what a decelerating rotor feeds back.
+  void braking(const profiles::Plan& plan) {
+    const bool slows_down = std::any_of(plan.runs.begin(), plan.runs.end(), [](const profiles::PlannedRun& run) {
+      return !std::is_sorted(run.steps.begin(), run.steps.end(),
+                             [](const auto& a, const auto& b) { return a.speed < b.speed; });
+    });
+    if (!slows_down) return;
+    const auto& slew = campaign_.profile.slew_rad_s2;
+    if (slew)
+      return add(Severity::note, "braking",
+                 fmt::format("the speed falls by {:.0f} RPM/s at most", to_rpm(RadPerSec(*slew))));
+    if (!config_.supply) return tell("braking", "no ramp: the power supply must absorb what the rotor feeds back");
+    add(Severity::warning, "braking",
+        fmt::format("no ramp: the supply cannot absorb what the rotor feeds back and switches off above {:g} V",
+                    config_.supply->over_voltage.value()),
+        "set profile.slew_rpm_s, for example 2000");
+  }
+
+  void coil() {
+    const auto& limits = campaign_.limits;
+    const double most = limits.coil_temperature_max.value();
+    if (!limits.cooling)
+      return add(Severity::note, "coil", fmt::format("the motor coasts above {:g} °C; no pauses for cooling", most));
+    const std::string words =
+        fmt::format("runs start below {:g} °C, otherwise kphi waits for {:g} °C; the motor coasts above {:g} °C",
+                    limits.cooling->pause_above.value(), limits.cooling->resume_below.value(), most);
+    if (limits.cooling->pause_above.value() >= most)
+      return add(Severity::warning, "coil", words,
+                 "set cooling.pause_above_degc below the limit, or runs start that cannot finish");
+    add(Severity::note, "coil", words);
+  }
+
+  void disk(std::uint64_t needed, std::uint64_t free, const std::filesystem::path& folder) {
+    const std::string words =
+        fmt::format("{} needed, {} free in {}", gigabytes(needed), gigabytes(free), folder.string());
+    if (needed > free)
+      return add(Severity::fault, "disk", words, "free some space, or choose another folder with --out");
+    add(Severity::note, "disk", words);
+  }
+
+  void writable(const std::filesystem::path& folder) {
+    const bool may = std::filesystem::is_directory(folder) && access(folder.c_str(), W_OK | X_OK) == 0;
+    if (may) return add(Severity::note, "files", folder.string() + " is writable");
+    add(Severity::fault, "files", folder.string() + " is not writable", "choose another folder with --out");
+  }
+
+  void answers(const profiles::Answers& answers, const profiles::Plan& plan) {
+    try {
+      profiles::require_mountings(answers, plan.mounting_angles());
+      add(Severity::note, "answers", fmt::format("{}: one answer per mounting", answers.path));
+    } catch (const ConfigurationError& refused) {
+      add(Severity::fault, "answers", refused.what());
+    }
+  }
+
+  [[nodiscard]] std::vector<PlanCheck> take() { return std::move(checks_); }
+
+ private:
+  void tell(std::string subject, std::string what) {
+    checks_.push_back({std::move(subject), {Severity::note, std::move(what), {}}, false});
+  }
+  void add(Severity severity, std::string subject, std::string what, std::string next_move = {}) {
+    checks_.push_back({std::move(subject), {severity, std::move(what), std::move(next_move)}, true});
+  }
+  const Campaign& campaign_;
+  const profiles::BenchConfig& config_;
+  std::vector<PlanCheck> checks_;
+};
+
+/// "40 steps, 100 to 19100 RPM"; every level when shuffled.
+std::string steps_text(const Campaign& campaign, const profiles::PlannedRun& run) {
+  const auto rpm = [](const profiles::PlannedStep& step) { return to_rpm(step.speed); };
+  const std::string number = fmt::format("{} steps, ", run.steps.size());
+  switch (campaign.order.steps) {
+    case profiles::StepOrderKind::up:
+    case profiles::StepOrderKind::down:
+      return number + fmt::format("{:.0f} to {:.0f} RPM", rpm(run.steps.front()), rpm(run.steps.back()));
+    case profiles::StepOrderKind::up_and_down:
+      return number + fmt::format("{:.0f} to {:.0f} to {:.0f} RPM", rpm(run.steps.front()),
+                                  to_rpm(campaign.profile.last), rpm(run.steps.back()));
+    case profiles::StepOrderKind::shuffled:
+      break;
+  }
+  std::string levels;
+  for (const auto& step : run.steps) levels += fmt::format(" {:.0f}", rpm(step));
+  return number + "RPM:" + levels;
+}
+
+std::string runs_text(const profiles::Plan& plan, const Campaign& campaign) {
+  std::string text;
+  for (std::size_t i = 0; i < plan.runs.size(); ++i) {
+    const profiles::PlannedRun& run = plan.runs[i];
+    if (run.mount)
+      text += fmt::format("  mount {}\n",
+                          run.occlusion_deg == 0 ? "no occlusion" : fmt::format("{:g}°", run.occlusion_deg));
+    text += fmt::format("  {:4}  {}  {}\n", i + 1,
+                        results::run_file_name(campaign.propeller.id, run.occlusion_deg, run.repetition),
+                        steps_text(campaign, run));
+  }
+  return text;
+}
+
+const char* mark_of(const PlanCheck& check) {
+  if (check.finding.severity == Severity::fault) return "REFUSED";
+  if (check.finding.severity == Severity::warning) return "WARN";
+  return check.judged ? "ok" : "not checked";
+}
+
+std::string checks_text(const std::vector<PlanCheck>& checks) {
+  std::string text;
+  for (const PlanCheck& check : checks) {
+    const Finding& finding = check.finding;
+    text += fmt::format("  {:11}  {:<15}  {}{}{}\n", mark_of(check), check.subject, finding.what,
+                        finding.next_move.empty() ? "" : "; ", finding.next_move);
+  }
+  return text;
+}
+
+json to_json(const profiles::PlannedRun& run, const Campaign& campaign) {
+  json steps = json::array();
+  for (const auto& [number, speed] : run.steps) steps.push_back({{"step", number}, {"speed_rpm", to_rpm(speed)}});
+  return {{"file", results::run_file_name(campaign.propeller.id, run.occlusion_deg, run.repetition)},
+          {"mount", run.mount},
+          {"occlusion_deg", run.occlusion_deg},
+          {"repetition", run.repetition},
+          {"reference", run.is_reference()},
+          {"steps", steps}};
+}
+
+}  // namespace
+
+bool DryRun::ok() const {
+  return std::none_of(checks.begin(), checks.end(),
+                      [](const PlanCheck& check) { return check.finding.severity == Severity::fault; });
+}
+
+std::uint64_t bytes_needed(const profiles::Plan& plan, const profiles::BenchConfig& config) {
+  const auto readings = static_cast<std::uint64_t>(2 * config.iq.telemetry_hz * plan.bench.value());
+  return results::RunWriter::bytes_needed(plan.samples, readings);
+}
+
+DryRun dry_run(const Campaign& campaign, const profiles::BenchConfig& config, const std::filesystem::path& out,
+               const std::optional<profiles::Answers>& answers, results::FileLayer& files) {
+  DryRun dry;
+  dry.plan = profiles::make_plan(campaign, config);
+  dry.bytes_needed = bytes_needed(dry.plan, config);
+  const std::filesystem::path folder = existing(out);
+  dry.bytes_free = files.free_bytes(folder);
+  Checks checks(campaign, config);
+  checks.speed();
+  checks.thrust();
+  checks.range();
+  checks.sampling();
+  checks.window();
+  checks.supply();
+  checks.braking(dry.plan);
+  checks.coil();
+  checks.disk(dry.bytes_needed, dry.bytes_free, folder);
+  checks.writable(folder);
+  if (answers) checks.answers(*answers, dry.plan);
+  dry.checks = checks.take();
+  dry.limits = combine_limits(campaign, config);
+  return dry;
+}
+
+std::string plan_text(const Campaign& campaign, const profiles::BenchConfig& config, const profiles::Plan& plan) {
+  const auto& profile = campaign.profile;
+  std::string angles;
+  for (const double angle : campaign.occlusions_deg) angles += fmt::format(" {:g}°", angle);
+  return fmt::format(
+      "{}: propeller {} ({}), occlusions{}, {} repetitions\n"
+      "  {} runs of {} steps, {:.0f} to {:.0f} RPM, {:g} s each; {} mountings\n"
+      "  {} spinning, {} on the bench{}, {:.1f} million samples, {}",
+      campaign.name, campaign.propeller.id, campaign.propeller.name, angles, campaign.repetitions, plan.runs.size(),
+      plan.runs.front().steps.size(), to_rpm(profile.first), to_rpm(profile.last), profile.dwell.value(),
+      plan.mountings, minutes(plan.spinning.value()), minutes(plan.bench.value()),
+      time_scale(config) > 1 ? fmt::format(" ({:g} times as fast here)", time_scale(config)) : "",
+      1e-6 * static_cast<double>(plan.samples), gigabytes(bytes_needed(plan, config)));
+}
+
+std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles::BenchConfig& config) {
+  const auto refused = std::count_if(dry.checks.begin(), dry.checks.end(),
+                                     [](const PlanCheck& c) { return c.finding.severity == Severity::fault; });
+  const double slew_s = ramp_time(campaign.profile, dry.plan.runs.front()).value();
+  return fmt::format(
+      "{}\n\norder: {}\n{}\ntime: {} spinning{}, {} on the bench with the zeros; plus mounting (waits for you), "
+      "spinning "
+      "down{}, and at most {} extra runs per occlusion if repetitions disagree\n\nchecks: {}\n{}\nthe motor coasts "
+      "when "
+      "the guard sees:\n  {}\n",
+      plan_text(campaign, config, dry.plan), profiles::to_words(campaign.order), runs_text(dry.plan, campaign),
+      minutes(dry.plan.spinning.value()),
+      slew_s > 0 ? fmt::format(" ({} of ramps in the first run)", minutes(slew_s)) : "",
+      minutes(dry.plan.bench.value()), campaign.limits.cooling ? ", pauses for cooling (of unknown length)" : "",
+      campaign.repetitions_extra_max, refused == 0 ? "nothing refused" : fmt::format("{} refused", refused),
+      checks_text(dry.checks), fmt::join(to_lines(dry.limits), "\n  "));
+}
+
+json to_json(const DryRun& dry, const Campaign& campaign, const profiles::BenchConfig& config) {
+  json runs = json::array(), checks = json::array(), limits = json::array();
+  for (const auto& run : dry.plan.runs) runs.push_back(to_json(run, campaign));
+  for (const auto& [subject, finding, judged] : dry.checks) {
+    checks.push_back({{"subject", subject},
+                      {"judged", judged},
+                      {"severity", name_of(finding.severity)},
+                      {"what", finding.what},
+                      {"next_move", finding.next_move}});
+  }
+  for (const GuardLimit& limit : dry.limits) {
+    limits.push_back({{"key", row_of(limit.watched).key},
+                      {"name", limit.name},
+                      {"unit", limit.unit},
+                      {"limit", limit.value},
+                      {"lower", limit.lower},
+                      {"source", limit.source}});
+  }
+  const profiles::Plan& plan = dry.plan;
+  return {{"campaign", campaign.name},
+          {"propeller", campaign.propeller.id},
+          {"runs", plan.runs.size()},
+          {"mountings", plan.mountings},
+          {"mounting_angles_deg", plan.mounting_angles()},
+          {"steps", plan.steps},
+          {"spinning_s", plan.spinning.value()},
+          {"bench_s", plan.bench.value()},
+          {"time_scale", time_scale(config)},
+          {"samples", plan.samples},
+          {"bytes", dry.bytes_needed},
+          {"bytes_free", dry.bytes_free},
+          {"order", runs},
+          {"checks", checks},
+          {"guard_limits", limits},
+          {"ok", dry.ok()}};
+}
+
+}  // namespace kphi::daq

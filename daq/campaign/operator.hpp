@@ -1,0 +1,114 @@
+// The person who mounts occlusions and takes the decisions that a program cannot.
+#pragma once
+
+#include <cstdio>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "daq/guard/interrupt.hpp"
+#include "daq/run/mount_confirmation.hpp"
+#include "profiles/campaign.hpp"
+
+namespace kphi::daq {
+
+/// The person said no, or there was nobody to ask. This mounting has no record.
+class NotMounted : public Interrupted {
+ public:
+  using Interrupted::Interrupted;
+};
+
+/// The repetitions of an occlusion disagree.
+struct AnotherRun {
+  double occlusion_deg = 0;
+  std::string reason;         ///< one line
+  int extra = 1;              ///< it would be the first, the second … beyond those planned
+  int extra_max = 1;          ///< that the campaign allows
+  bool mounted_anew = false;  ///< the occlusion must be mounted again before it
+};
+
+/// Whoever stands at the bench. All members are called from the runner's thread, while the motor coasts.
+class Operator {
+ public:
+  /// Records each question and each answer, right or wrong, as it comes.
+  using AuditLog = std::function<void(const char* event, const std::string& words)>;
+
+  virtual ~Operator() = default;
+  /// Asks for one mounting and returns once it is confirmed: the only way to unlock the motor. Throws NotMounted.
+  /// `condition`: one sentence on the state of motor and supply, "The supply's output is off."
+  [[nodiscard]] MountConfirmation confirm_mounting(const profiles::Propeller& propeller, double occlusion_deg,
+                                                   const std::string& condition = {}) {
+    mount(propeller, occlusion_deg, condition);
+    return MountConfirmation(occlusion_deg);
+  }
+  /// Shows what stopped the campaign and asks whether somebody has looked at the stand since. Returns if it may
+  /// continue; throws NotMounted if the person says no, ConfigurationError if there is nobody to ask.
+  virtual void clear_safety_stop(const std::string& reason);
+  /// Asks whether to run it again; no, when nobody is there. Throws Interrupted when the person wants to stop.
+  [[nodiscard]] virtual bool run_again(const AnotherRun&) { return false; }
+  /// No more questions follow. Throws ConfigurationError if answers are left over.
+  virtual void finish() {}
+  /// How it answers, for the record: "terminal", "--yes", "answers.yaml".
+  [[nodiscard]] virtual std::string name() const { return "program"; }
+  void log_to(AuditLog log) { log_ = std::move(log); }
+  /// `poll` is called again and again while a person is waited for; an exception from it ends the question.
+  void while_waiting(std::function<void()> poll) { poll_ = std::move(poll); }
+
+ protected:
+  virtual void mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string& condition) = 0;
+  void poll() const {
+    if (poll_) poll_();
+  }
+  void asked(const std::string& words) { record("operator_asked", words); }
+  void answered(const std::string& words) { record("operator_answered", words); }
+
+ private:
+  void record(const char* event, const std::string& words) {
+    if (log_) log_(event, words);
+  }
+  AuditLog log_;
+  std::function<void()> poll_;
+};
+
+/// Takes every mounting as done (`--yes`): for a simulated bench, or a robot. Runs an occlusion again at most once; a
+/// person should look at what still disagrees then.
+class AutoConfirmOperator final : public Operator {
+ public:
+  /// `clears_safety_stops`: of a simulated bench, at which nobody can be hurt.
+  explicit AutoConfirmOperator(bool clears_safety_stops = false) : clears_safety_stops_(clears_safety_stops) {}
+  void clear_safety_stop(const std::string& reason) override;
+  [[nodiscard]] bool run_again(const AnotherRun& question) override { return question.extra == 1; }
+  [[nodiscard]] std::string name() const override { return "--yes"; }
+
+ protected:
+  void mount(const profiles::Propeller&, double, const std::string&) override {}
+
+ private:
+  const bool clears_safety_stops_;
+};
+
+/// Asks on a terminal; the person types the angle that was mounted. Waits without limit; a wrong angle is asked again,
+/// "q" or end of file means no.
+class TerminalOperator final : public Operator {
+ public:
+  /// `stop_asked`: true when a signal came while waiting.
+  TerminalOperator(int input_descriptor, std::FILE* words, std::function<bool()> stop_asked)
+      : input_(input_descriptor), words_(words), stop_asked_(std::move(stop_asked)) {}
+  [[nodiscard]] bool run_again(const AnotherRun& question) override;
+  void clear_safety_stop(const std::string& reason) override;
+  [[nodiscard]] std::string name() const override { return "terminal"; }
+
+ protected:
+  void mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string& condition) override;
+
+ private:
+  /// `about` explains the question and is printed first; empty when it is asked again.
+  std::string answer_to(const std::string& about, const std::string& question);
+  /// nullopt at end of file.
+  std::optional<std::string> read_line();
+  int input_;
+  std::FILE* words_;
+  std::function<bool()> stop_asked_;
+};
+
+}  // namespace kphi::daq

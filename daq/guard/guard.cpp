@@ -1,0 +1,303 @@
+#include "daq/guard/guard.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "daq/guard/awake.hpp"
+#include "daq/guard/supply_interlock.hpp"
+
+namespace kphi::daq {
+namespace {
+
+constexpr double kRelayed = 10;  // s that the recorder may be behind
+constexpr std::size_t kReadingsRelayed = 16384;
+constexpr std::size_t kSupplyReadingsRelayed = 256;
+constexpr std::size_t kAtOnce = 1024;
+constexpr Duration kSecondCheckWall = std::chrono::milliseconds(20);
+constexpr double kPatienceAtRest = 0.5;  // s
+constexpr double kNoDerate = 0.9999;     // one count of the module's fix16 is 1.5e-5
+/// What is younger is shown as present: this computer's own delay, and three times that of the device.
+constexpr Duration kFreshWall = std::chrono::milliseconds(60);
+constexpr Duration kFreshMotor = std::chrono::milliseconds(100);
+/// How late this computer may send a speed and take the reading that answers it; wall time.
+Duration host_delay(const profiles::BenchConfig& config) {
+  return std::chrono::milliseconds(is_slowed(config) ? 300 : 60);
+}
+
+Mounting mounting_of(const profiles::BenchConfig& config) {
+  return {config.thrust_axis, config.thrust_sign, config.iq.spin};
+}
+
+std::size_t samples_relayed(const results::LoadCellScale& scale) {
+  return static_cast<std::size_t>(std::max(1024.0, kRelayed * scale.sample_rate_hz));
+}
+
+/// Readings from before this run, for example from a pause for a mounting.
+template <class Reading>
+void discard(BenchStreams& devices) {
+  std::array<Reading, 64> before_this_run;
+  while (devices.take(before_this_run) > 0) {
+  }
+}
+
+double speed_share(const std::vector<GuardLimit>& limits) {
+  for (const GuardLimit& limit : limits) {
+    if (limit.watched == Watched::speed_error) return limit.value / 100;
+  }
+  return SpeedWatch::kShare;
+}
+
+}  // namespace
+
+Guard::Guard(Bench& bench, const profiles::BenchConfig& config, const results::LoadCellScale& scale,
+             const std::vector<GuardLimit>& limits)
+    : bench_(bench),
+      devices_(bench),
+      supply_(config.supply),
+      table_(limits),
+      observer_(mounting_of(config), scale,
+                SpeedWatch(config.iq.spin, bench.clock().stretched(host_delay(config)), speed_share(limits)),
+                [this](Watched watched, double value, results::Nanoseconds at) { hold(watched, value, at); }),
+      status_watch_(bench.load_cell().configuration().kind, bench.load_cell().configuration().records_per_datagram,
+                    scale.sample_rate_hz),
+      device_rate_hz_(scale.device_rate_hz),
+      fresh_{bench.clock().stretched(kFreshWall) +
+                 from_seconds(3 * bench.load_cell().configuration().records_per_datagram / scale.sample_rate_hz),
+             bench.clock().stretched(kFreshWall) + kFreshMotor},
+      samples_(samples_relayed(scale), kAtOnce),
+      readings_(kReadingsRelayed, kAtOnce),
+      supply_readings_(kSupplyReadingsRelayed, 16),
+      polled_ns_(bench.clock().now().count()),
+      beat_ns_(polled_ns_.load()) {
+  for (const GuardLimit& limit : table_) limits_[static_cast<std::size_t>(limit.watched)] = &limit;
+  const Instant now = bench.clock().now();
+  load_cell_stream_ = {limit_of(Watched::load_cell_age), now};
+  motor_stream_ = {limit_of(Watched::motor_age), now};
+  supply_stream_ = {bench.supply() != nullptr ? limit_of(Watched::supply_age) : nullptr, now};
+  observer_.begin(now);
+  shown_.publish(observer_.readings());
+  discard<results::SupplyReading>(devices_);
+  discard<results::MotorReading>(devices_);
+}
+
+void Guard::poll() noexcept {
+  try {
+    take_marks();
+    notice_sleep();  // first: it is the cause of whatever else is found
+    judge_pause(bench_.clock().now());
+    (void)relay();
+    shown_.publish(observer_.readings());
+    const Instant now = bench_.clock().now();
+    judge_links();
+    const bool spinning = spinning_;
+    for (Stream* stream : {&load_cell_stream_, &motor_stream_, &supply_stream_}) judge_silence(*stream, now, spinning);
+    polled_ns_ = now.count();
+  } catch (...) {
+    bench_.motor().emergency_stop();  // before words, for which there may be no memory
+    trip_state(Source::guard, "the guard failed");
+  }
+}
+
+bool Guard::relay() {
+  const auto take = [this](auto out) { return devices_.take(out); };
+  const auto inspect = [this](auto batch) {
+    for (const auto& each : batch) judge(each);
+  };
+  bool moved = samples_.move(take, inspect);
+  for (auto& event : devices_.take_events()) pending_events_.push_back(std::move(event));
+  while (!pending_events_.empty() && events_.push(pending_events_.front())) {
+    pending_events_.pop_front();
+    moved = true;
+  }
+  moved = readings_.move(take, inspect) || moved;
+  return supply_readings_.move(take, inspect) || moved;
+}
+
+std::vector<results::StreamEvent> Guard::take_events() {
+  std::vector<results::StreamEvent> taken;
+  events_.consume_all([&](const results::StreamEvent& event) { taken.push_back(event); });
+  return taken;
+}
+
+void Guard::trip(Trip trip) noexcept {
+  if (!judging_ || latch_.trip() != nullptr) return;
+  trip.noticed = bench_.clock().now();
+  trip.step = step_;
+  if (!latch_.set(std::move(trip))) return;
+  bench_.motor().emergency_stop();
+  if (bench_.supply() != nullptr) bench_.supply()->cut();
+}
+
+void Guard::trip_state(Source source, const std::string& reason, Instant sample) noexcept {
+  Trip state;
+  state.reason = reason;
+  state.source = source;
+  state.sample = sample;
+  trip(std::move(state));
+}
+
+Trip Guard::of_speed(const SpeedError& error, Instant sample) const {
+  Trip strays;
+  strays.reason = to_words(error);
+  strays.source = Source::motor;
+  strays.watched = Watched::speed_error;
+  strays.value = 100 * std::abs((error.measured - error.commanded) / error.commanded);
+  if (const GuardLimit* limit = limit_of(Watched::speed_error)) strays.limit = *limit;
+  strays.sample = sample;
+  return strays;
+}
+
+/// Written so that NaN trips: a value that cannot be compared is no proof of safety.
+void Guard::hold(Watched watched, double value, results::Nanoseconds at) {
+  const GuardLimit* limit = limit_of(watched);
+  if (limit == nullptr || (limit->lower ? value >= limit->value : value <= limit->value)) return;
+  trip(passed(*limit, value, Instant(at)));
+}
+
+void Guard::take_marks() {
+  results::PhaseMark mark;
+  while (marks_.pop(mark)) observer_.take(mark);
+}
+
+void Guard::judge(const results::LoadCellRecord& sample) {
+  load_cell_stream_.newest = Instant(sample.arrival_ns);
+  judge_gap(sample);
+  judge_status(sample);
+  observer_.take(sample);
+}
+
+/// A faulty box stops the run also at rest, since the zeros are taken from these samples; saturation and trouble with
+/// a network may pass until the motor turns.
+void Guard::judge_status(const results::LoadCellRecord& sample) {
+  const StatusWatch::State state = status_watch_.take(sample);
+  if (auto event = status_watch_.take_event()) pending_events_.push_back(std::move(*event));
+  const bool untrusted = state == StatusWatch::State::untrusted || (state == StatusWatch::State::lasting && spinning_);
+  if (untrusted && latch_.trip() == nullptr)
+    trip_state(Source::load_cell, status_watch_.reason(), Instant(sample.arrival_ns));
+}
+
+void Guard::judge(const results::MotorReading& reading) {
+  using results::MotorChannel;
+  const Instant at(reading.time_ns);
+  motor_stream_.newest = at;
+  observer_.take(reading);
+  if (reading.channel == MotorChannel::fault_now && reading.value != 0)
+    trip_state(Source::motor,
+               fmt::format("motor: the module reports a fault (power_safety.fault_now 0x{:02X})",
+                           static_cast<unsigned>(reading.value)),
+               at);
+  if (reading.channel == MotorChannel::derate && !(reading.value >= kNoDerate))
+    trip_state(Source::motor, fmt::format("motor: the module derates to {:.0f} % of its drive", 100 * reading.value),
+               at);
+  // Last: fault and derating are why the rotor does not follow.
+  if (observer_.speed_error().kind != SpeedError::Kind::none) trip(of_speed(observer_.speed_error(), at));
+}
+
+void Guard::judge(const results::SupplyReading& reading) {
+  supply_stream_.newest = Instant(reading.time_ns);
+  if (!supply_) return;
+  if (auto trouble = daq::check(reading, *supply_, reading.time_ns >= settled_from_)) {
+    trouble->sample = Instant(reading.time_ns);
+    trip(std::move(*trouble));
+  }
+  observer_.take(reading);
+}
+
+/// Also when the newest sample is fresh: after a break of the network or of this computer nobody saw what happened.
+void Guard::judge_gap(const results::LoadCellRecord& sample) {
+  const std::optional<std::uint32_t> before = std::exchange(last_sequence_, sample.ft_sequence);
+  const GuardLimit* patience = limit_of(Watched::load_cell_age);
+  if (!before || !spinning_ || patience == nullptr) return;
+  const auto step = static_cast<std::int32_t>(sample.ft_sequence - *before);  // negative: the box started again
+  const double missing_s = step / device_rate_hz_;
+  if (missing_s <= patience->value) return;
+  const GuardLimit limit{Watched::samples_missing, "gap in the load cell's samples", patience->value, "s",
+                         patience->source};
+  trip(passed(limit, missing_s, Instant(sample.arrival_ns)));
+}
+
+void Guard::judge_links() {
+  const auto judge = [this](Source source, const std::string& failure) {
+    if (!failure.empty()) trip_state(source, failure);
+  };
+  judge(Source::motor, bench_.motor().failure());
+  judge(Source::load_cell, bench_.load_cell().failure());
+  if (bench_.supply() != nullptr) judge(Source::supply, bench_.supply()->failure());
+}
+
+double Guard::wall_seconds_since(std::int64_t at_ns, Instant now) const {
+  return to_seconds(bench_.clock().shrunk(now - Instant(at_ns)));
+}
+
+void Guard::judge_silence(Stream& stream, Instant now, bool spinning) {
+  if (stream.limit == nullptr) return;
+  const Clock& clock = bench_.clock();
+  const double age = wall_seconds_since(stream.newest.count(), now);
+  if (age <= (spinning ? stream.limit->value : std::max(stream.limit->value, kPatienceAtRest))) {
+    stream.stale_since = kNever;
+    return;
+  }
+  stream.stale_since = std::min(stream.stale_since, now);
+  if (now - stream.stale_since >= clock.stretched(kSecondCheckWall)) trip(passed(*stream.limit, age, stream.newest));
+}
+
+void Guard::judge_pause(Instant now) {
+  const GuardLimit* limit = limit_of(Watched::pause);
+  if (!spinning_ || limit == nullptr) return;
+  const Instant beat(beat_ns_);
+  const double pause = wall_seconds_since(beat.count(), now);
+  if (pause <= limit->value) return;
+  Trip found = passed(*limit, pause, beat);
+  const double unwatched = wall_seconds_since(polled_ns_, now);
+  if (unwatched > limit->value) {
+    found.source = Source::computer;
+    found.reason = fmt::format("this computer did not run kphi for {:.2g} s", unwatched);
+  }
+  trip(std::move(found));
+}
+
+void Guard::notice_sleep() noexcept {
+  if (has_slept(bench_.clock())) trip(slept(bench_.clock()));
+}
+
+void Guard::mark(const results::PhaseMark& mark) {
+  step_ = mark.step;
+  if (!marks_.push(mark)) throw SafetyStop("the guard has stalled: it takes no more marks");
+}
+
+void Guard::check(bool spinning) {
+  notice_sleep();
+  const Instant now = bench_.clock().now();
+  judge_pause(now);
+  const double unwatched = wall_seconds_since(polled_ns_, now);
+  if (const GuardLimit* limit = limit_of(Watched::pause); spinning && limit != nullptr && unwatched > limit->value)
+    trip_state(Source::guard, fmt::format("the guard was blocked for {:.2g} s while the motor was turning", unwatched));
+  pause_s_ = spinning ? wall_seconds_since(beat_ns_, now) : kUnknown;
+  beat_ns_ = now.count();
+  spinning_ = spinning;
+  latch_.check();
+}
+
+Observation Guard::observe(Instant now) const {
+  Observation seen = daq::observe(shown_.read(), now, fresh_, bench_.clock());
+  seen.judged[Watched::pause] = pause_s_;
+  seen.account = bench_.load_cell().account();
+  return seen;
+}
+
+std::optional<results::StreamEvent> Guard::event() const {
+  using results::EventKind;
+  const Trip* trip = latch_.trip();
+  if (trip == nullptr) return std::nullopt;
+  const bool of_supply = trip->watched == Watched::state && trip->source == Source::supply;
+  const std::string where = trip->step < 0 ? "" : fmt::format("step {}: ", trip->step + 1);
+  return results::StreamEvent{is_load_cell_axis(trip->watched) ? EventKind::range_trip
+                              : of_supply                      ? EventKind::supply_stop
+                                                               : EventKind::guard_trip,
+                              trip->noticed.count(), 0,
+                              fmt::format("{:.3f} s: {}{}", to_seconds(trip->noticed), where, trip->reason)};
+}
+
+}  // namespace kphi::daq

@@ -1,0 +1,124 @@
+// Watches the bench in a thread of its own, between the devices and the recorder, and coasts the motor by itself.
+//
+// Every sample and reading passes through it before it is recorded: neither a runner that hangs nor a disk that does
+// not answer keeps it from seeing one. What it judges:
+//   load cell   every sample against the ranges, 5 ms means of thrust and shaft torque (load_watch.hpp tells why);
+//               the box's status word (status_watch.hpp), also at rest: zeros are taken then
+//   motor       every reading by itself: a checksum protects it, and the module has filtered it
+//   supply      every reading: its state, its settings, its meters
+//   silence     the age of the newest of each stream; twice, so that what waits in this computer's sockets is taken
+//   first the runner  its heartbeat; the runner in turn checks the guard's
+//
+// From the sample that exceeds a limit to the order to coast: 5 ms of its own on a live bench, plus the window of the
+// means. Silence is found 25 ms after its patience, a rotor that does not follow after that of speed_error.hpp. The
+// first trip holds. It is latched before the motor is coasted, and a MotorEnable checks the latch after each command:
+// in whichever order the two threads come, the motor coasts.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "base/published.hpp"
+#include "daq/bench/streams.hpp"
+#include "daq/guard/interlock.hpp"
+#include "daq/guard/observation.hpp"
+#include "daq/guard/relay.hpp"
+#include "daq/guard/status_watch.hpp"
+
+namespace kphi::daq {
+
+class Guard final : public Streams {
+ public:
+  /// Discards readings from before this run. The devices stream already.
+  Guard(Bench& bench, const profiles::BenchConfig& config, const results::LoadCellScale& scale,
+        const std::vector<GuardLimit>& limits);
+
+  /// Takes what the devices have, judges it, publishes it; coasts the motor after a trip. The guard's thread, again and
+  /// again.
+  void poll() noexcept;
+  /// Takes, judges and passes on what the devices have. True: something moved. The guard's thread, or whoever comes
+  /// after it.
+  bool relay();
+
+  // The recorder's thread.
+  std::size_t take(std::span<results::LoadCellRecord> out) override { return samples_.take(out); }
+  std::size_t take(std::span<results::MotorReading> out) override { return readings_.take(out); }
+  std::size_t take(std::span<results::SupplyReading> out) override { return supply_readings_.take(out); }
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+
+  // The runner's thread.
+  /// A step or another phase begins. Throws SafetyStop when the guard has stalled and takes no more marks.
+  void mark(const results::PhaseMark& mark);
+  /// Mean of each axis without load, N and N m. Thrust and torque are judged from then on.
+  void take_zero(const std::array<double, 6>& mean) noexcept { observer_.take_zero(mean); }
+  /// Until then a change of speed may load the supply as it likes.
+  void settles_until(Instant when) noexcept { settled_from_ = when.count(); }
+  /// Heartbeat of the run thread; to be called before every order that turns the motor. Throws SafetyStop after a trip,
+  /// if the guard has stalled, or if runner or computer were away for so long that the module may have coasted the
+  /// motor.
+  void check(bool spinning);
+  /// What the guard saw last, as it is at bench time `now`.
+  [[nodiscard]] Observation observe(Instant now) const;
+  /// Trips when this computer has slept. Any thread.
+  void notice_sleep() noexcept;
+  /// From now on nothing trips: the motor was coasted for another reason, and the supply is switched off.
+  void stand_down() noexcept { judging_ = false; }
+
+  [[nodiscard]] const Latch& latch() const noexcept { return latch_; }
+  /// The trip for the run file; nullopt without one.
+  [[nodiscard]] std::optional<results::StreamEvent> event() const;
+
+ private:
+  struct Stream {
+    const GuardLimit* limit = nullptr;  ///< nullptr: there is no such stream
+    Instant newest{0};
+    Instant stale_since = kNever;
+  };
+  [[nodiscard]] const GuardLimit* limit_of(Watched watched) const noexcept {
+    return limits_[static_cast<std::size_t>(watched)];
+  }
+  void trip(Trip trip) noexcept;
+  void trip_state(Source source, const std::string& reason, Instant sample = Instant(0)) noexcept;
+  [[nodiscard]] Trip of_speed(const SpeedError& error, Instant sample) const;
+  void hold(Watched watched, double value, results::Nanoseconds at);
+  void take_marks();
+  void judge(const results::LoadCellRecord& sample);
+  void judge(const results::MotorReading& reading);
+  void judge(const results::SupplyReading& reading);
+  void judge_silence(Stream& stream, Instant now, bool spinning);
+  void judge_status(const results::LoadCellRecord& sample);
+  void judge_links();
+  void judge_pause(Instant now);
+  void judge_gap(const results::LoadCellRecord& sample);
+  [[nodiscard]] double wall_seconds_since(std::int64_t at_ns, Instant now) const;
+
+  Bench& bench_;
+  BenchStreams devices_;
+  const std::optional<profiles::SupplyConfig> supply_;
+  const std::vector<GuardLimit> table_;
+  std::array<const GuardLimit*, kWatchedCount> limits_{};
+  Observer observer_;
+  StatusWatch status_watch_;
+  const double device_rate_hz_;
+  const Freshness fresh_;
+  std::optional<std::uint32_t> last_sequence_;  ///< of the load cell
+  Stream load_cell_stream_, motor_stream_, supply_stream_;
+  Relay<results::LoadCellRecord> samples_;
+  Relay<results::MotorReading> readings_;
+  Relay<results::SupplyReading> supply_readings_;
+  boost::lockfree::spsc_queue<results::StreamEvent> events_{1024};
+  std::deque<results::StreamEvent> pending_events_;  ///< for which there is no room yet
+  boost::lockfree::spsc_queue<results::PhaseMark, boost::lockfree::capacity<1024>> marks_;
+
+  Latch latch_;
+  Published<Readings> shown_;
+  std::atomic<bool> judging_{true}, spinning_{false};
+  std::atomic<int> step_{-1};
+  std::atomic<std::int64_t> polled_ns_, beat_ns_, settled_from_{0};
+  std::atomic<double> pause_s_{kUnknown};  ///< between the last two heartbeats while the motor turns
+};
+
+}  // namespace kphi::daq

@@ -1,0 +1,30 @@
+// Two programs never share a device: one lock per box, serial port and supply, for all programs and users of this host.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "profiles/bench_config.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/file_lock.hpp"
+
+namespace kphi::daq {
+
+/// Names of the locks, by device and not by its name in a bench file: "Net Box 192.168.1.1:49152", "port
+/// /dev/ttyUSB0", "supply 10.0.0.5:502". Nothing for a bench inside the process.
+[[nodiscard]] std::vector<std::string> lock_names(const profiles::BenchConfig& config);
+
+/// The devices of a bench, taken while this lives.
+class DeviceLocks {
+ public:
+  /// Throws DeviceError with the program that uses one of them, and the next move.
+  explicit DeviceLocks(const std::vector<std::string>& names);
+
+ private:
+  std::vector<results::FileLock> locks_;
+};
+
+/// Locks a campaign's folder. Throws ConfigurationError with the program that uses it.
+[[nodiscard]] results::FileLock lock_folder(const results::CampaignFolder& folder);
+
+}  // namespace kphi::daq

@@ -1,0 +1,309 @@
+#include "daq/hardware/live_bench.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <thread>
+
+#include "base/error.hpp"
+#include "daq/audit/motor_audit.hpp"
+#include "daq/bench/slot_pages.hpp"
+#include "daq/guard/awake.hpp"
+#include "daq/guard/interrupt.hpp"
+#include "daq/hardware/sleep_inhibitor.hpp"
+#include "drivers/netbox/configuration/calinfo.hpp"
+#include "drivers/netbox/configuration/http.hpp"
+#include "drivers/sim/control_line.hpp"
+
+namespace kphi::daq {
+namespace {
+
+constexpr Duration kDrainWall = std::chrono::milliseconds(5);
+constexpr std::chrono::seconds kCalinfoTimeout{1};
+constexpr std::chrono::seconds kPageTimeout{5};
+constexpr std::chrono::seconds kBootTime{5};  // of the module, after its power came back
+constexpr Duration kSyncWall = std::chrono::milliseconds(500);
+
+iq::Settings motor_settings(const profiles::MotorConfig& config) {
+  iq::Settings settings;
+  settings.module_id = config.module_id;
+  settings.telemetry_hz = config.telemetry_hz;
+  return settings;
+}
+
+netbox::Address rdt_address(const profiles::NetBoxConfig& config) {
+  return {config.host, config.rdt_port, config.http_port};
+}
+
+netbox::WantedSettings wanted_settings(const profiles::NetBoxConfig& config) {
+  netbox::WantedSettings wanted;
+  if (config.settings.rate_hz) wanted.rate_hz = static_cast<int>(std::lround(*config.settings.rate_hz));
+  wanted.records_per_datagram = config.settings.records_per_datagram;
+  wanted.configuration = config.settings.configuration;
+  if (!config.settings.filter_hz) return wanted;
+  for (int code = 0; const auto cutoff_hz = netbox::filter_cutoff_hz(code); ++code) {
+    if (*cutoff_hz == *config.settings.filter_hz) wanted.filter = code;
+  }
+  return wanted;
+}
+
+/// The journal in which the next program finds settings that a killed one left changed in this box.
+std::filesystem::path settings_journal(const profiles::NetBoxConfig& config) {
+  const auto variable = [](const char* name) { return std::string(std::getenv(name) ? std::getenv(name) : ""); };
+  std::filesystem::path folder = variable("XDG_STATE_HOME");
+  if (folder.empty()) {
+    folder = variable("HOME").empty() ? std::filesystem::temp_directory_path()
+                                      : std::filesystem::path(variable("HOME")) / ".local" / "state";
+  }
+  std::string name = fmt::format("netbox_{}_{}.journal", config.host, config.http_port);
+  std::replace(name.begin(), name.end(), '/', '_');
+  return folder / "kphi" / name;
+}
+
+std::string page_of(const profiles::NetBoxConfig& config, const std::string& target) {
+  return netbox::http_get(config.host, config.http_port, target, kPageTimeout);
+}
+
+void require_no_stop(const std::function<bool()>& stop_asked) {
+  if (stop_asked()) throw Interrupted("stopped by request before anything was switched on");
+}
+
+class Thread final : public Background {
+ public:
+  explicit Thread(std::function<void()> work)
+      : thread_([this, work = std::move(work)] {
+          while (!stop_) {
+            work();
+            std::this_thread::sleep_for(kDrainWall);
+          }
+        }) {}
+  ~Thread() override {
+    stop_ = true;
+    thread_.join();
+  }
+
+ private:
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace
+
+LiveMotor::LiveMotor(const profiles::MotorConfig& config, const Clock& clock)
+    : config_(config), clock_(clock), motor_(connect()), identity_(motor_->identity().summary()) {
+  parameters_ = read_parameters(motor_->identity(), [this](auto asked) { return motor_->inquire(std::move(asked)); });
+}
+
+std::shared_ptr<iq::Motor> LiveMotor::connect() const {
+  auto motor =
+      std::make_shared<iq::Motor>(config_.device, config_.baud, motor_settings(config_), clock_, config_.capture);
+  (void)motor->take_events();  // that it is connected
+  return motor;
+}
+
+std::shared_ptr<iq::Motor> LiveMotor::connected() const {
+  if (auto motor = this->motor()) return motor;
+  throw DeviceError("motor module on " + config_.device, "spin", "the module has no power");
+}
+
+void LiveMotor::rest() { std::atomic_store(&motor_, std::shared_ptr<iq::Motor>()); }
+
+void LiveMotor::wake() {
+  rest();
+  const auto give_up = std::chrono::steady_clock::now() + kBootTime;
+  for (std::shared_ptr<iq::Motor> found; !found;) {
+    try {
+      found = connect();
+    } catch (const DeviceError&) {
+      if (std::chrono::steady_clock::now() > give_up) throw;
+      std::this_thread::sleep_for(kDrainWall);  // it may still be starting
+      continue;
+    }
+    if (const std::string now = found->identity().summary(); now != identity_)
+      throw DeviceError("motor module on " + config_.device, "connect again",
+                        fmt::format("a different module answers: {} instead of {}", now, identity_));
+    std::atomic_store(&motor_, std::move(found));
+    return;
+  }
+}
+
+void LiveMotor::spin_at(RadPerSec signed_speed) { connected()->spin_at(signed_speed); }
+
+void LiveMotor::renew() noexcept {
+  if (const auto motor = this->motor()) motor->renew();
+}
+
+void LiveMotor::emergency_stop() noexcept {
+  if (const auto motor = this->motor()) motor->emergency_stop();
+}
+
+void LiveMotor::begin_stop(const iq::StopSettings& settings) {
+  if (stop_.valid() && !stop_report()) return;
+  stop_report_.reset();
+  stop_ = std::async(std::launch::async,
+                     [motor = motor(), settings] { return motor ? motor->stop(settings) : iq::StopReport{}; });
+}
+
+std::optional<iq::StopReport> LiveMotor::stop_report() {
+  if (stop_.valid() && stop_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) stop_report_ = stop_.get();
+  return stop_report_;
+}
+
+std::optional<Celsius> LiveMotor::coil_temperature() {
+  return ask_coil_temperature(parameters_, [this](auto asked) { return connected()->inquire(std::move(asked)); });
+}
+
+std::vector<results::StreamEvent> LiveMotor::take_events() {
+  std::vector<results::StreamEvent> events;
+  const auto motor = this->motor();
+  if (!motor) return events;
+  for (const iq::Event& event : motor->take_events()) events.push_back(to_event(event));
+  return events;
+}
+
+std::size_t LiveMotor::take(std::span<results::MotorReading> out) {
+  const auto motor = this->motor();
+  if (!motor) return 0;
+  readings_.resize(out.size());
+  const std::size_t n = motor->take(readings_);
+  for (std::size_t i = 0; i < n; ++i) out[i] = to_reading(readings_[i]);
+  return n;
+}
+
+std::string LiveMotor::failure() const {
+  const auto motor = this->motor();
+  if (!motor) return "";
+  if (const std::string failure = motor->failure(); !failure.empty()) return "motor: " + failure;
+  if (motor->counters().lease_expiries == 0) return "";
+  return "motor: kphi did not renew its command in time, so the driver coasted it; close other programs";
+}
+
+LiveLoadCell::LiveLoadCell(profiles::NetBoxConfig config, const Clock& clock, const std::function<bool()>& stop_asked)
+    : config_(std::move(config)),
+      clock_(clock),
+      settings_(rdt_address(config_), wanted_settings(config_), settings_journal(config_)),
+      // Checks that the box answers before anybody mounts anything.
+      cell_(std::make_unique<netbox::LoadCell>(rdt_address(config_), clock_)),
+      findings_(settings_.notes()) {
+  if (auto finding = netbox::cross_check(config_.host, config_.tcp_port, configuration(), kCalinfoTimeout)) {
+    if (finding->severity == netbox::Severity::fault)
+      throw DeviceError("Net Box " + config_.host, "compare its scale", finding->what, finding->next_move);
+    findings_.push_back(std::move(*finding));
+  }
+  SlotPages slots = read_slot_pages([&](const std::string& target) {
+    require_no_stop(stop_asked);
+    return page_of(config_, target);
+  });
+  slots_json_ = std::move(slots.json);
+  findings_.insert(findings_.end(), slots.findings.begin(), slots.findings.end());
+}
+
+results::LoadCellScale LiveLoadCell::start() {
+  cell_.reset();
+  cell_ = std::make_unique<netbox::LoadCell>(rdt_address(config_), clock_);
+  const netbox::Configuration& found = cell_->configuration();
+  if (std::abs(found.rdt_rate_hz - config_.rate_hz) > 0.5) {
+    throw DeviceError(
+        "Net Box " + config_.host, "compare settings",
+        fmt::format("the box streams at {:g} Hz, the bench file expects {:g} Hz", found.rdt_rate_hz, config_.rate_hz),
+        "set the RDT output rate on the box's communication page or rate_hz in the bench file");
+  }
+  cell_->start();
+  results::LoadCellScale scale = to_scale(found);
+  scale.slots_json = slots_json_;
+  return scale;
+}
+
+std::vector<results::StreamEvent> LiveLoadCell::take_events() {
+  std::vector<results::StreamEvent> events;
+  for (const netbox::Event& event : cell_->take_events()) events.push_back(to_event(event));
+  return events;
+}
+
+std::string LiveLoadCell::page() { return page_of(config_, "/netftapi2.xml"); }
+
+void LiveLoadCell::stop() noexcept { cell_->stop(); }
+
+std::size_t LiveLoadCell::take(std::span<results::LoadCellRecord> out) {
+  records_.resize(out.size());
+  const std::size_t n = cell_->take(records_);
+  for (std::size_t i = 0; i < n; ++i) out[i] = to_record(records_[i]);
+  return n;
+}
+
+std::string LiveLoadCell::failure() const {
+  switch (cell_->state()) {
+    case netbox::State::silent:
+      return "load cell: the stream fell silent";
+    case netbox::State::failed:
+      return "load cell: the stream could not be started again";
+    default:
+      return "";
+  }
+}
+
+results::SampleAccount LiveLoadCell::account() const { return to_account(cell_->counters()); }
+
+LiveBench::LiveBench(const profiles::BenchConfig& config, const std::function<bool()>& stop_asked)
+    : config_(config),
+      clock_(config.simulation ? config.simulation->time_scale : 1.0),
+      air_(config.ambient, clock_),
+      load_cell_(config.netbox, clock_, stop_asked),
+      supply_(config.supply ? std::make_unique<LiveSupply>(*config.supply, clock_) : nullptr),
+      powered_(power(stop_asked)),
+      motor_(config.iq, clock_) {}
+
+std::unique_ptr<OutputEnable> LiveBench::power(const std::function<bool()>& stop_asked) {
+  require_no_stop(stop_asked);
+  require_awake(clock_);
+  return supply_ ? std::make_unique<OutputEnable>(*supply_) : nullptr;
+}
+
+bool LiveBench::switch_off_power() {
+  if (!supply_) return false;
+  motor_.rest();
+  if (const std::string why = supply_->switch_off(); !why.empty())
+    throw SafetyStop(why, "cut the power of the motor at the switch before you go near");
+  powered_.reset();
+  return true;
+}
+
+void LiveBench::restore_power() {
+  require_awake(clock_);
+  if (supply_) {
+    powered_ = std::make_unique<OutputEnable>(*supply_);
+    motor_.wake();
+  } else if (!motor_.failure().empty()) {
+    motor_.wake();
+  }
+}
+
+std::shared_ptr<void> LiveBench::keep_awake(std::string& why_not) {
+  auto inhibitor = std::make_shared<SleepInhibitor>();
+  why_not = inhibitor->why_not();
+  return inhibitor;
+}
+
+void LiveBench::wait_until(Instant when) {
+  const Duration left = clock_.shrunk(when - clock_.now());
+  if (left > Duration(0)) std::this_thread::sleep_for(left);
+}
+
+std::unique_ptr<Background> LiveBench::run_periodically(std::function<void()> work) {
+  return std::make_unique<Thread>(std::move(work));
+}
+
+Duration LiveBench::sync_interval() const { return clock_.stretched(kSyncWall); }
+
+void LiveBench::mounted(const std::string& propeller_id, double occlusion_deg) {
+  if (!config_.simulation || config_.simulation->control.empty()) return;
+  const std::string answer =
+      sim::tell(config_.simulation->control, fmt::format("mount {} {:g}", propeller_id, occlusion_deg));
+  if (!answer.starts_with("ok")) throw DeviceError("simulated bench", "mount", answer);
+}
+
+}  // namespace kphi::daq

@@ -1,0 +1,114 @@
+// The bench over its real transports: Net Box over UDP and HTTP, motor module over a serial line, a steady clock.
+#pragma once
+
+#include <functional>
+#include <future>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "daq/bench/air.hpp"
+#include "daq/bench/bench.hpp"
+#include "daq/bench/device_records.hpp"
+#include "daq/hardware/live_supply.hpp"
+#include "drivers/iq/link/motor.hpp"
+#include "drivers/netbox/configuration/settings.hpp"
+#include "drivers/netbox/receive/load_cell.hpp"
+
+namespace kphi::daq {
+
+class LiveMotor final : public MotorLink {
+ public:
+  /// Connects and reads the module's parameters. Throws DeviceError.
+  LiveMotor(const profiles::MotorConfig& config, const Clock& clock);
+  /// Coasts and closes the link, before its power is cut. Only wake() and calls from the guard's thread may follow.
+  void rest();
+  /// Connects again, to the same module. Throws DeviceError.
+  void wake();
+  void spin_at(RadPerSec signed_speed) override;
+  void renew() noexcept override;
+  void emergency_stop() noexcept override;
+  void begin_stop(const iq::StopSettings& settings) override;
+  [[nodiscard]] std::optional<iq::StopReport> stop_report() override;
+  [[nodiscard]] const iq::AuditRecord& parameters() const override { return parameters_; }
+  [[nodiscard]] std::optional<Celsius> coil_temperature() override;
+  std::size_t take(std::span<results::MotorReading> out) override;
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+  [[nodiscard]] std::string failure() const override;
+  [[nodiscard]] std::string identity() const override { return identity_; }
+
+ private:
+  [[nodiscard]] std::shared_ptr<iq::Motor> motor() const noexcept { return std::atomic_load(&motor_); }
+  [[nodiscard]] std::shared_ptr<iq::Motor> connected() const;
+  [[nodiscard]] std::shared_ptr<iq::Motor> connect() const;
+
+  const profiles::MotorConfig config_;
+  const Clock& clock_;
+  std::shared_ptr<iq::Motor> motor_;  ///< null while it rests; read by any thread
+  std::string identity_;
+  iq::AuditRecord parameters_;
+  std::vector<iq::Reading> readings_;
+  std::optional<iq::StopReport> stop_report_;
+  std::future<iq::StopReport> stop_;  ///< last member: its destructor waits for the stop under way
+};
+
+class LiveLoadCell final : public LoadCellLink {
+ public:
+  /// Applies the settings of the bench file, reads the configuration, checks it against the one over TCP, reads the
+  /// pages of all slots. The destructor, or the next program, restores the box's settings. `stop_asked` is checked
+  /// before each page. Throws DeviceError, Interrupted.
+  LiveLoadCell(profiles::NetBoxConfig config, const Clock& clock, const std::function<bool()>& stop_asked);
+  [[nodiscard]] const netbox::Configuration& configuration() const override { return cell_->configuration(); }
+  [[nodiscard]] std::vector<netbox::Finding> findings() const override { return findings_; }
+  results::LoadCellScale start() override;
+  void stop() noexcept override;
+  std::size_t take(std::span<results::LoadCellRecord> out) override;
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+  [[nodiscard]] std::string page() override;
+  void set_bias() noexcept override { cell_->set_bias(); }
+  [[nodiscard]] std::string failure() const override;
+  [[nodiscard]] results::SampleAccount account() const override;
+  [[nodiscard]] results::StreamHealth health() const override { return to_health(cell_->health(), clock_); }
+
+ private:
+  profiles::NetBoxConfig config_;
+  const Clock& clock_;
+  netbox::SettingsKeeper settings_;
+  std::unique_ptr<netbox::LoadCell> cell_;  ///< of the present or last run
+  std::vector<netbox::StampedRecord> records_;
+  std::vector<netbox::Finding> findings_;
+  std::string slots_json_;
+};
+
+class LiveBench final : public Bench {
+ public:
+  /// Finds all devices; switches the supply on once the others have answered, unless `stop_asked`. Throws DeviceError,
+  /// Interrupted.
+  LiveBench(const profiles::BenchConfig& config, const std::function<bool()>& stop_asked);
+  [[nodiscard]] const Clock& clock() const override { return clock_; }
+  [[nodiscard]] MotorLink& motor() override { return motor_; }
+  [[nodiscard]] LoadCellLink& load_cell() override { return load_cell_; }
+  [[nodiscard]] SupplyLink* supply() override { return supply_.get(); }
+  [[nodiscard]] std::optional<ambient::Density> air() const override { return air_.density(); }
+  void wait_until(Instant when) override;
+  [[nodiscard]] std::unique_ptr<Background> run_periodically(std::function<void()> work) override;
+  [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
+  [[nodiscard]] Duration sync_interval() const override;
+  void mounted(const std::string& propeller_id, double occlusion_deg) override;
+  [[nodiscard]] bool switch_off_power() override;
+  void restore_power() override;
+  [[nodiscard]] std::shared_ptr<void> keep_awake(std::string& why_not) override;
+
+ private:
+  [[nodiscard]] std::unique_ptr<OutputEnable> power(const std::function<bool()>& stop_asked);
+
+  profiles::BenchConfig config_;
+  SteadyClock clock_;
+  AirSource air_;
+  LiveLoadCell load_cell_;
+  std::unique_ptr<LiveSupply> supply_;
+  std::unique_ptr<OutputEnable> powered_;  ///< before the motor, which needs it to answer; goes after it
+  LiveMotor motor_;
+};
+
+}  // namespace kphi::daq

@@ -1,0 +1,109 @@
+#include "daq/hardware/live_supply.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <thread>
+
+#include "base/error.hpp"
+#include "drivers/scpi/open.hpp"
+#include "drivers/supply/address.hpp"
+#include "drivers/supply/modbus_supply.hpp"
+
+namespace kphi::daq {
+namespace {
+
+constexpr double kReadingsPerSecond = 8;      // the motor must coast 0.2 s after a trip; stock Riden allow up to 10
+constexpr std::chrono::seconds kRise{3};      // wall time until the voltage must be there
+constexpr std::chrono::seconds kConfirm{3};   // wall time for the order to switch off
+constexpr std::chrono::milliseconds kAsk{2};  // between two checks of the newest reading
+
+}  // namespace
+
+std::unique_ptr<supply::Supply> open_supply(const profiles::SupplyConfig& config, const Clock& clock) {
+  try {
+    if (scpi::is_scpi(config.uri)) return scpi::open_supply(config.uri, clock);
+    return std::make_unique<supply::ModbusSupply>(supply::parse_address(config.uri), clock);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigurationError(std::string("supply.uri: ") + error.what());
+  }
+}
+
+supply::Limits limits_of(const profiles::SupplyConfig& config) {
+  return {config.voltage, config.current_limit, config.over_voltage, config.over_current};
+}
+
+results::SupplyReading to_reading(const supply::Reading& reading) {
+  // The drivers' enums have the codes of the file: see the assertions.
+  static_assert(static_cast<int>(supply::Protection::unknown) == static_cast<int>(results::SupplyProtection::unknown));
+  static_assert(static_cast<int>(supply::Regulation::unknown) == static_cast<int>(results::SupplyRegulation::unknown));
+  return {reading.at.count(),
+          reading.uncertainty.count(),
+          reading.voltage_v,
+          reading.current_a,
+          reading.set_voltage_v,
+          reading.current_limit_a,
+          static_cast<results::SupplyRegulation>(reading.regulation),
+          static_cast<results::SupplyProtection>(reading.protection),
+          reading.output ? 1u : 0u};
+}
+
+std::string summary(const supply::Identity& identity) {
+  std::string text = identity.model;
+  if (!identity.serial.empty()) text += ", serial " + identity.serial;
+  if (!identity.firmware.empty()) text += ", firmware " + identity.firmware;
+  return text;
+}
+
+LiveSupply::LiveSupply(const profiles::SupplyConfig& config, const Clock& clock)
+    : config_(config), worker_(open_supply(config, clock), clock, kReadingsPerSecond) {}
+
+std::string LiveSupply::identity() const { return summary(worker_.identity()); }
+
+void LiveSupply::switch_on() {
+  try {
+    worker_.apply(limits_of(config_));
+  } catch (const std::invalid_argument& error) {
+    throw ConfigurationError(std::string("supply: ") + error.what());
+  }
+  worker_.switch_on();
+  const auto give_up = std::chrono::steady_clock::now() + kRise;
+  const double enough = (1 - results::kSupplySag) * config_.voltage.value();
+  for (std::optional<supply::Reading> seen;; std::this_thread::sleep_for(kAsk)) {
+    seen = worker_.newest();
+    if (seen && seen->output && seen->voltage_v >= enough) return;
+    if (!worker_.alive()) throw DeviceError(worker_.identity().device, "switch on", worker_.failure());
+    if (std::chrono::steady_clock::now() < give_up) continue;
+    throw DeviceError(
+        worker_.identity().device, "switch on",
+        fmt::format("{:.4g} V at the terminals, {:g} V set", seen ? seen->voltage_v : 0.0, config_.voltage.value()),
+        "check for a short circuit, or a current limit that is too low");
+  }
+}
+
+std::size_t LiveSupply::take(std::span<results::SupplyReading> out) {
+  readings_.resize(out.size());
+  const std::size_t n = worker_.take(readings_);
+  for (std::size_t i = 0; i < n; ++i) out[i] = to_reading(readings_[i]);
+  return n;
+}
+
+std::string LiveSupply::failure() const { return worker_.alive() ? "" : words(); }
+
+/// Why it has failed, beginning with whose failure it is.
+std::string LiveSupply::words() const {
+  const std::string why = worker_.failure();
+  if (why.empty()) return "supply: its thread has ended";
+  return why.starts_with("supply") ? why : "supply: " + why;
+}
+
+std::string LiveSupply::switch_off() noexcept {
+  if (worker_.switch_off_and_confirm(kConfirm)) return "";
+  try {
+    return worker_.alive() ? kNotOff : words();
+  } catch (...) {
+    return "supply: output may be ON; cut the 12 V at the switch";
+  }
+}
+
+}  // namespace kphi::daq

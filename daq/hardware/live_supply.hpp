@@ -1,0 +1,39 @@
+// The bench supply over Modbus or SCPI, in a thread of its own.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "daq/bench/supply_link.hpp"
+#include "drivers/supply/worker.hpp"
+#include "profiles/bench_config.hpp"
+
+namespace kphi::daq {
+
+class LiveSupply final : public SupplyLink {
+ public:
+  /// Finds it; its output is as it was. Throws DeviceError. `clock` outlives this.
+  LiveSupply(const profiles::SupplyConfig& config, const Clock& clock);
+  [[nodiscard]] std::string identity() const override;
+  std::size_t take(std::span<results::SupplyReading> out) override;
+  [[nodiscard]] std::string failure() const override;
+  void cut() noexcept override { worker_.switch_off(); }
+  [[nodiscard]] std::string switch_off() noexcept override;
+
+ private:
+  void switch_on() override;
+  [[nodiscard]] std::string words() const;
+
+  const profiles::SupplyConfig config_;
+  supply::Worker worker_;
+  std::vector<supply::Reading> readings_;
+};
+
+/// Over Modbus or SCPI, as its URI says. Throws ConfigurationError, DeviceError.
+[[nodiscard]] std::unique_ptr<supply::Supply> open_supply(const profiles::SupplyConfig& config, const Clock& clock);
+[[nodiscard]] supply::Limits limits_of(const profiles::SupplyConfig& config);
+[[nodiscard]] results::SupplyReading to_reading(const supply::Reading& reading);
+/// "RD6018, serial 4711, firmware 1.28".
+[[nodiscard]] std::string summary(const supply::Identity& identity);
+
+}  // namespace kphi::daq

@@ -1,0 +1,29 @@
+// Keeps this computer awake while the motor may turn, by a lock of logind, which is a file descriptor.
+#pragma once
+
+#include <string>
+
+namespace kphi::daq {
+
+/// Asks logind on the system bus for a lock against sleep, and releases it at its end; a program that dies releases it,
+/// too. Take one for each run: it costs a few ms, and at most 1.5 s if bus or logind do not answer. Any thread.
+class SleepInhibitor {
+ public:
+  SleepInhibitor() noexcept;
+  ~SleepInhibitor();
+  SleepInhibitor(const SleepInhibitor&) = delete;
+  SleepInhibitor& operator=(const SleepInhibitor&) = delete;
+
+  [[nodiscard]] bool held() const noexcept { return descriptor_ >= 0; }
+  /// What logind blocks meanwhile, in its own words: "sleep:idle:handle-lid-switch", or less; empty if not held.
+  [[nodiscard]] const std::string& what() const noexcept { return what_; }
+  /// One line for the operator with consequence, cause and next move; empty if held.
+  [[nodiscard]] const std::string& why_not() const noexcept { return why_not_; }
+
+ private:
+  int descriptor_ = -1;
+  std::string what_;
+  std::string why_not_;
+};
+
+}  // namespace kphi::daq

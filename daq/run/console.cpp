@@ -1,0 +1,188 @@
+#include "daq/run/console.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <pthread.h>
+#include <signal.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <condition_variable>
+#include <list>
+#include <mutex>
+#include <system_error>
+#include <thread>
+#include <vector>
+
+namespace kphi::daq {
+namespace {
+
+constexpr std::size_t kAtOnce = 512;  // bytes; a pipe with room has room for that many (POSIX's least PIPE_BUF)
+constexpr int kPauseMs = 10;  // a terminal whose room is one byte, and that byte would be a new line, which takes two
+
+/// Signals belong to the program's main thread; blocked, SIGTTOU does not stop a program in the background either.
+void refuse_signals() noexcept {
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_BLOCK, &all, nullptr);
+}
+
+/// Of the same terminal, but one whose write() does not block: that of `descriptor` itself is shared with whoever
+/// started the program. Anything else: `descriptor`.
+int without_blocking(int descriptor) {
+  if (::isatty(descriptor) == 0) return descriptor;
+  const std::string name = fmt::format("/proc/self/fd/{}", descriptor);
+  const int own = ::open(name.c_str(), O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+  return own < 0 ? descriptor : own;
+}
+
+}  // namespace
+
+struct Console::Shared {
+  struct Stream {
+    explicit Stream(int named) : name(named), descriptor(without_blocking(named)) {}
+    ~Stream() {
+      if (descriptor != name) ::close(descriptor);
+    }
+    Stream(const Stream&) = delete;
+    Stream& operator=(const Stream&) = delete;
+    const int name, descriptor;
+    WordQueue queue;
+  };
+
+  Shared() : bell(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    if (bell < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+  }
+  ~Shared() { ::close(bell); }
+  Shared(const Shared&) = delete;
+  Shared& operator=(const Shared&) = delete;
+
+  void ring() const noexcept {
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const auto written = ::write(bell, &one, sizeof one);
+  }
+  [[nodiscard]] bool is_idle() const noexcept {
+    return std::all_of(streams.begin(), streams.end(), [](const Stream& stream) { return stream.queue.empty(); });
+  }
+  [[nodiscard]] Stream& stream(int name) {
+    for (Stream& known : streams) {
+      if (known.name == name) return known;
+    }
+    return streams.emplace_back(name);
+  }
+  /// The bell, and each stream for which something waits; false: no more of them.
+  [[nodiscard]] bool list(std::vector<pollfd>& waiting) {
+    const std::lock_guard lock(mutex);
+    waiting.assign(1, {bell, POLLIN, 0});
+    for (const Stream& each : streams) waiting.push_back({each.queue.empty() ? -1 : each.descriptor, POLLOUT, 0});
+    return !quit;
+  }
+  /// Of the streams that can be written the one that has waited longest; nullptr: none.
+  [[nodiscard]] Stream* choose(const std::vector<pollfd>& waited) {
+    const std::lock_guard lock(mutex);
+    Stream* chosen = nullptr;
+    auto each = streams.begin();
+    for (std::size_t i = 1; i < waited.size() && !quit; ++i, ++each) {
+      if (waited[i].revents == 0) continue;
+      if (chosen == nullptr || each->queue.order() < chosen->queue.order()) chosen = &*each;
+    }
+    return chosen;
+  }
+  void write_some(Stream& to) {
+    std::string_view bytes;
+    {
+      const std::lock_guard lock(mutex);
+      bytes = to.queue.begin(kAtOnce);
+    }
+    const ssize_t n = ::write(to.descriptor, bytes.data(), bytes.size());
+    const bool has_no_room = n < 0 && errno == EAGAIN;
+    {
+      const std::lock_guard lock(mutex);
+      if (n > 0) to.queue.taken(static_cast<std::size_t>(n));
+      if (n < 0 && !has_no_room) to.queue.clear();
+      if (is_idle()) changed.notify_all();
+    }
+    if (has_no_room) ::poll(nullptr, 0, kPauseMs);
+  }
+
+  const int bell;
+  mutable std::mutex mutex;
+  std::condition_variable changed;
+  std::list<Stream> streams;
+  std::uint64_t order = 0;  ///< of the newest text of all
+  bool quit = false, ended = false, has_thread = false;
+};
+
+Console::Console() : shared_(std::make_shared<Shared>()) {}
+
+Console::~Console() {
+  std::unique_lock lock(shared_->mutex);
+  if (!shared_->has_thread) return;
+  shared_->quit = true;
+  shared_->ring();
+  shared_->changed.wait_for(lock, kGiveUp, [this] { return shared_->ended; });
+}
+
+void Console::put(int descriptor, std::string text, Worth worth) noexcept {
+  try {
+    const std::lock_guard lock(shared_->mutex);
+    if (!shared_->has_thread) {
+      std::thread(write_on, shared_).detach();
+      shared_->has_thread = true;
+    }
+    shared_->stream(descriptor).queue.push(std::move(text), worth, ++shared_->order);
+  } catch (...) {
+    // No memory, or no thread: words are not worth a run.
+  }
+  shared_->ring();
+}
+
+bool Console::finish(std::chrono::milliseconds limit) noexcept {
+  std::unique_lock lock(shared_->mutex);
+  return shared_->changed.wait_for(lock, limit, [this] { return shared_->is_idle(); });
+}
+
+bool Console::is_used() const noexcept {
+  const std::lock_guard lock(shared_->mutex);
+  return shared_->order > 0;
+}
+
+std::uint64_t Console::lost() const noexcept {
+  const std::lock_guard lock(shared_->mutex);
+  std::uint64_t lost = 0;
+  for (const Shared::Stream& stream : shared_->streams) lost += stream.queue.lost();
+  return lost;
+}
+
+void Console::write_on(const std::shared_ptr<Shared>& shared) noexcept {
+  refuse_signals();
+  try {
+    for (std::vector<pollfd> waiting; shared->list(waiting);) {
+      if (::poll(waiting.data(), waiting.size(), -1) <= 0) continue;
+      std::uint64_t rings = 0;
+      [[maybe_unused]] const auto heard = ::read(shared->bell, &rings, sizeof rings);
+      if (Shared::Stream* chosen = shared->choose(waiting)) shared->write_some(*chosen);
+    }
+  } catch (const std::bad_alloc&) {
+    // Nothing is written any more; finish() waits in vain, and no longer than its limit.
+  }
+  const std::lock_guard lock(shared->mutex);
+  shared->ended = true;
+  shared->changed.notify_all();
+}
+
+Console& console() noexcept {
+  static Console* const the_programs = new Console;
+  return *the_programs;
+}
+
+void put(std::FILE* stream, const std::string& text, Worth worth) noexcept {
+  if (stream == stdout || stream == stderr) return console().put(fileno(stream), text, worth);
+  (void)std::fputs(text.c_str(), stream);
+  (void)std::fflush(stream);
+}
+
+}  // namespace kphi::daq

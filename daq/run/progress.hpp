@@ -1,0 +1,83 @@
+// Progress for the person at the stand: one live line on a terminal, one plain line per step elsewhere.
+#pragma once
+
+#include <chrono>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "daq/guard/observation.hpp"
+#include "daq/run/console.hpp"
+#include "profiles/campaign.hpp"
+
+namespace kphi::daq {
+
+/// How far the campaign is.
+struct Position {
+  std::string propeller;
+  double occlusion_deg = 0;
+  int repetition = 0;  ///< 1-based; negative: a reference run
+  int repetitions = 0;
+  int step = -1;  ///< 0-based; -1 outside steps
+  int steps = 0;
+  std::string phase;       ///< "zero", "spin down"; empty in a step
+  RadPerSec commanded;     ///< unsigned
+  double remaining_s = 0;  ///< of the campaign, wall clock
+};
+
+/// Implementations are called from the runner's thread only.
+class Progress {
+ public:
+  virtual ~Progress() = default;
+  /// A run begins, under these limits of its guard.
+  virtual void guarded(const std::vector<GuardLimit>& limits) { static_cast<void>(limits); }
+  /// Called on every tick; must return at once.
+  virtual void tick(const Position& position, const Observation& seen) = 0;
+  /// A step or phase is over.
+  virtual void step_done(const Position& position, const Observation& seen) = 0;
+  /// A line to keep.
+  virtual void say(const std::string& line) = 0;
+};
+
+/// Silent, for tests.
+class NoProgress final : public Progress {
+ public:
+  void tick(const Position&, const Observation&) override {}
+  void step_done(const Position&, const Observation&) override {}
+  void say(const std::string&) override {}
+};
+
+/// One line rewritten in place, at most ten times a second.
+class TerminalProgress final : public Progress {
+ public:
+  explicit TerminalProgress(std::FILE* stream) : stream_(stream) {}
+  ~TerminalProgress() override;
+  void tick(const Position& position, const Observation& seen) override;
+  void step_done(const Position& position, const Observation& seen) override;
+  void say(const std::string& line) override;
+
+ private:
+  /// The text that clears the live line; empty if none is drawn.
+  [[nodiscard]] std::string clearing();
+  std::FILE* stream_;
+  bool drawn_ = false;
+  std::chrono::steady_clock::time_point next_{};
+};
+
+/// One line per step.
+class PlainProgress final : public Progress {
+ public:
+  explicit PlainProgress(std::FILE* stream) : stream_(stream) {}
+  void tick(const Position&, const Observation&) override {}
+  void step_done(const Position& position, const Observation& seen) override;
+  void say(const std::string& line) override;
+
+ private:
+  std::FILE* stream_;
+};
+
+/// "5x3  φ  90°  rep 2/3  step 17/40  speed  7894 of  7895 RPM  thrust  1.162 N  left 06:12"; stale values are shown as
+/// '?' with their age: "…  thrust      ? N  left 06:12  no thrust for 0.8 s".
+[[nodiscard]] std::string describe(const Position& position, const Observation& seen);
+
+}  // namespace kphi::daq

@@ -1,0 +1,67 @@
+// Empties the streams into the run file.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <boost/lockfree/spsc_queue.hpp>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "base/published.hpp"
+#include "daq/bench/bench.hpp"
+#include "daq/bench/streams.hpp"
+#include "drivers/netbox/receive/bias.hpp"
+#include "drivers/netbox/receive/range_watch.hpp"
+
+namespace kphi::daq {
+
+/// Two threads: drain() belongs to one, all else to the runner. Neither waits for the other.
+class Recorder {
+ public:
+  Recorder(Bench& bench, Streams& streams, results::RunWriter& writer, const results::LoadCellScale& scale);
+
+  /// Takes all that waits, appends it, syncs the file when it is time. Keeps the first error for check_failure and does
+  /// nothing after it.
+  void drain() noexcept;
+  /// Begins a phase.
+  void mark(const results::PhaseMark& mark);
+  /// Events of load cell and motor since the last call, already in the file.
+  [[nodiscard]] std::vector<results::StreamEvent> take_events();
+  /// For events that the runner found, once drain() is no longer called.
+  void note(const results::StreamEvent& event);
+  /// Mean and standard deviation of all axes over the present phase, if it measures a bias or the zero before.
+  [[nodiscard]] netbox::ZeroMeasurement measured() const noexcept { return measured_.read(); }
+  /// Rethrows what drain() ran into.
+  void check_failure();
+
+ private:
+  void drain_load_cell();
+  void drain_motor();
+  void drain_supply();
+  void drain_marks();
+  void drain_events();
+  void inspect(std::span<const results::LoadCellRecord> batch);
+  void note_range(netbox::RangeVerdict verdict, results::Nanoseconds at);
+
+  Bench& bench_;
+  Streams& streams_;
+  results::RunWriter& writer_;
+  const netbox::Configuration scale_;
+  netbox::RangeWatch range_;
+  netbox::RangeVerdict worst_ = netbox::RangeVerdict::inside;
+  bool measuring_ = false;
+  netbox::ZeroEstimate estimate_;
+  Instant next_sync_;
+  std::vector<results::LoadCellRecord> records_;
+  std::vector<results::MotorReading> readings_;
+  std::array<results::SupplyReading, 16> supply_readings_;
+  boost::lockfree::spsc_queue<results::PhaseMark, boost::lockfree::capacity<1024>> marks_;
+  // To the runner. Sized at run time: Boost 1.74's queue of fixed capacity never destroys what is left in it.
+  boost::lockfree::spsc_queue<results::StreamEvent> events_{256};
+  Published<netbox::ZeroMeasurement> measured_;
+  std::atomic<bool> failed_{false};
+  std::exception_ptr failure_;  // written before failed_, read after it
+};
+
+}  // namespace kphi::daq

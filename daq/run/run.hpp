@@ -1,0 +1,35 @@
+// One run: zero, steps, spin-down, zero, recorded into one file. Whatever happens, the motor coasts and what was
+// recorded is kept.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "daq/bench/bench.hpp"
+#include "daq/guard/interlock.hpp"
+#include "daq/run/progress.hpp"
+#include "daq/run/run_order.hpp"
+#include "drivers/iq/session/stopping.hpp"
+#include "results/records.hpp"
+
+namespace kphi::daq {
+
+struct RunResult {
+  std::filesystem::path file;
+  std::string sha256;
+  results::SampleAccount account;
+  std::optional<iq::StopReport> stop;  ///< how the motor came to stand
+};
+
+/// `stop_asked` is asked on every tick. Throws Interrupted, SafetyStop or RecordError after the motor was let go and
+/// the file was closed as aborted; the exception's message names the file that holds what was recorded, and why the
+/// load cell fell silent when that was it. Throws DeviceError when the stream does not start.
+[[nodiscard]] RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress,
+                                   const std::function<bool()>& stop_asked);
+
+/// Calendar time of bench time `when`: ISO 8601 with seconds, UTC, "2021-05-30T00:00:00Z".
+[[nodiscard]] std::string utc_text(const Clock& clock, Instant when);
+
+}  // namespace kphi::daq

@@ -1,0 +1,298 @@
+#include "daq/run/sequence.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/error.hpp"
+#include "daq/bench/device_records.hpp"
+#include "daq/guard/interrupt.hpp"
+#include "daq/guard/rest_guard.hpp"
+#include "daq/guard/supply_interlock.hpp"
+#include "daq/run/box_bias.hpp"
+#include "daq/run/box_configuration.hpp"
+#include "daq/run/slew.hpp"
+#include "daq/run/speed_cap.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using results::Phase;
+
+constexpr Duration kTickWall = std::chrono::milliseconds(10);
+constexpr double kEndRamp = 1000;  // rad/s², on a supply that sinks what it feeds back
+constexpr Duration kBiasWorksWall = std::chrono::milliseconds(100);  // samples in transit still carry the old zero
+constexpr Duration kExplanationWall = std::chrono::seconds(3);       // the box is asked over HTTP for 2 s
+constexpr Duration kAftermath = std::chrono::seconds(3);
+constexpr Duration kLastReadingWall = std::chrono::milliseconds(500);  // of a supply whose output is off
+constexpr int kBiasAttempts = 3;
+constexpr int kEventsShown = 10;
+
+/// The box was asked why it is silent, or is no longer silent.
+bool explains_silence(results::EventKind kind) {
+  using results::EventKind;
+  return kind == EventKind::taken_over || kind == EventKind::rdt_disabled || kind == EventKind::unreachable ||
+         kind == EventKind::unusable || kind == EventKind::resumed;
+}
+
+}  // namespace
+
+Sequence::Sequence(Bench& bench, Recorder& recorder, Guard& guard, const RunOrder& order, Progress& progress,
+                   const std::function<bool()>& stop_asked)
+    : bench_(bench), recorder_(recorder), guard_(guard), order_(order), progress_(progress), stop_asked_(stop_asked) {
+  position_.propeller = order.campaign.propeller.id;
+  position_.occlusion_deg = order.mounted.occlusion_deg();
+  position_.repetition = order.planned.repetition;
+  position_.repetitions = std::max(order.campaign.repetitions, order.planned.repetition);
+  position_.steps = static_cast<int>(order.planned.steps.size());
+  end_ = bench.clock().now() + from_seconds(order.remaining_bench_s);
+}
+
+void Sequence::run() {
+  wait_for_standstill();
+  if (order_.campaign.box_bias) take_box_bias();
+  hold_zero(Phase::zero_before);
+  require_rest();
+  guard_.take_zero(recorder_.measured().mean);
+  spin_through_the_steps();
+  wait_for_standstill();
+  hold_zero(Phase::zero_after);
+  mark(Phase::end, -1, RadPerSec(0));
+}
+
+void Sequence::add_aftermath(StopWords& words) {
+  if (bench_.supply() != nullptr) switch_off(words);
+  // Without power nothing turns, and the module can tell nothing more.
+  if (bench_.supply() == nullptr || !power_is_off_) watch_the_coast(words);
+}
+
+void Sequence::watch_the_coast(StopWords& words) {
+  const auto add = [&](const std::string& what) { add_words(words.state, "motor: " + what); };
+  if (!has_spun_) return add("was not turning");
+  if (stop_) return add(stop_->summary());
+  iq::StopSettings settings;
+  settings.limit = kAftermath;
+  bench_.motor().begin_stop(settings);
+  const Instant give_up = bench_.clock().now() + 4 * kAftermath;
+  while (!stop_ && bench_.clock().now() < give_up) {
+    for (const results::StreamEvent& event : recorder_.take_events()) {
+      if (is_of_motor(event.kind) && ends_a_run(event.kind)) words.also(event.text);
+    }
+    stop_ = bench_.motor().stop_report();
+    if (!stop_) bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
+  }
+  add((stop_ ? *stop_ : iq::StopReport{}).summary());
+}
+
+void Sequence::switch_off(StopWords& words) {
+  const Instant since = bench_.clock().now();
+  const std::string why = bench_.supply()->switch_off();
+  power_is_off_ = why.empty();
+  if (!power_is_off_) return add_words(words.state, why);
+  const Instant give_up = bench_.clock().now() + bench_.clock().stretched(kLastReadingWall);
+  const auto newest = [this] { return guard_.observe(bench_.clock().now()).supply; };
+  while (newest().time_ns < since.count() && bench_.clock().now() < give_up)
+    bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
+  words.state = has_spun_ ? "motor: ordered to coast, now without power; supply: output off"
+                          : "motor: was not turning; supply: output off";
+  const results::SupplyReading seen = newest();
+  if (seen.protection == results::SupplyProtection::none) return;
+  const Trip* trip = guard_.latch().trip();
+  if (trip != nullptr && trip->protection == seen.protection) return;
+  const std::string tripped = tripped_words(seen);
+  const std::int64_t at = bench_.clock().now().count();
+  supply_event_ = {results::EventKind::supply_stop, at, 0,
+                   fmt::format("{:.3f} s: {}", 1e-9 * static_cast<double>(at), tripped)};
+  words.also(tripped);
+}
+
+void Sequence::compare_configuration(int attempts) {
+  const auto event = configuration_event(
+      bench_.load_cell().configuration(), box_bias_.records > 0, [&] { return bench_.load_cell().page(); },
+      [&] { return bench_.clock().now(); }, attempts);
+  if (!event) return;
+  recorder_.note(*event);
+  progress_.say("load cell: " + event->text);
+}
+
+std::string Sequence::explanation() {
+  const Instant since = bench_.clock().now();
+  const auto stretched = [&](Duration wall) { return bench_.clock().stretched(wall); };
+  if (guard_.observe(since).load_cell_age < stretched(spin_patience(order_.config)) / 2) return {};
+  if (!stalled_.empty()) return stalled_;
+  while (bench_.clock().now() < since + stretched(kExplanationWall) && !stop_asked_()) {
+    for (const results::StreamEvent& event : recorder_.take_events()) {
+      if (explains_silence(event.kind)) return event.text;
+    }
+    bench_.wait_until(bench_.clock().now() + stretched(kTickWall));
+  }
+  return {};
+}
+
+void Sequence::take_box_bias() {
+  const netbox::ZeroMeasurement before = measure(Phase::bias_before);
+  if (const auto why = unrest(before)) throw DeviceError("Net Box", "take the bias", *why, results::kZeroNextMove);
+  // The box takes one noisy sample as its zero: after a bad one, try again.
+  for (int attempt = 1;; ++attempt) {
+    set_box_bias();
+    const netbox::ZeroMeasurement after = measure(Phase::bias_after);
+    box_bias_ = to_bias(before, after);
+    const auto remains = beyond_zero(after);
+    if (!remains) return;
+    if (attempt == kBiasAttempts) throw DeviceError("Net Box", "take the bias", *remains, results::kZeroNextMove);
+  }
+}
+
+void Sequence::set_box_bias() {
+  mark(Phase::bias_settling, -1, RadPerSec(0));
+  bench_.load_cell().set_bias();
+  const netbox::Configuration& box = bench_.load_cell().configuration();
+  hold(bench_.clock().stretched(kBiasWorksWall) + from_seconds(3 * box.records_per_datagram / box.rdt_rate_hz),
+       nullptr);
+}
+
+netbox::ZeroMeasurement Sequence::measure(Phase phase) {
+  position_.phase = "bias";
+  mark(phase, -1, RadPerSec(0));
+  hold(from_seconds(order_.campaign.zero.value()), nullptr);
+  progress_.step_done(position_, seen_);
+  return recorder_.measured();
+}
+
+void Sequence::ramp_to(RadPerSec level, MotorEnable& spin) {
+  const Slew slew(position_.commanded, level, order_.campaign.profile.slew_rad_s2);
+  const Instant begun = bench_.clock().now();
+  if (slew.lasts() == Duration(0)) return;
+  position_.phase = "ramp";
+  mark(Phase::ramp, -1, level);
+  for (Instant now = begun; now - begun < slew.lasts(); now = bench_.clock().now()) {
+    position_.commanded = slew.at(now - begun);
+    change_speed();
+    spin.at(position_.commanded);
+    hold(std::min(bench_.clock().stretched(kTickWall), begun + slew.lasts() - now), &spin);
+  }
+}
+
+void Sequence::spin_through_the_steps() {
+  MotorEnable spin(bench_.motor(), order_.config.iq.spin, guard_);
+  has_spun_ = true;
+  for (const profiles::PlannedStep& step : order_.planned.steps) {
+    if (out_of_reach_ && step.speed >= *out_of_reach_) continue;
+    hold_step(step, spin);
+    learn_from(step);
+  }
+  position_.step = -1;
+  position_.commanded = RadPerSec(0);
+  position_.phase = "spin down";
+  mark(Phase::spin_down, -1, RadPerSec(0));
+  change_speed();
+  iq::StopSettings stop;
+  if (order_.config.supply_sinks_current) stop.deceleration = kEndRamp;
+  spin.begin_stop(stop);
+  while (!(stop_ = spin.stopped())) hold(bench_.clock().stretched(kTickWall), &spin);
+  if (!stop_->safe()) throw SafetyStop("motor: " + stop_->summary());
+}
+
+void Sequence::hold_step(const profiles::PlannedStep& step, MotorEnable& spin) {
+  ramp_to(step.speed, spin);
+  ++position_.step;
+  position_.commanded = step.speed;
+  change_speed();
+  spin.at(step.speed);
+  mark(Phase::step, step.number, step.speed);
+  hold(from_seconds(order_.campaign.profile.dwell.value()), &spin);
+  progress_.step_done(position_, seen_);
+}
+
+void Sequence::learn_from(const profiles::PlannedStep& step) {
+  if (!seen_.motor_is_fresh || !is_out_of_drive(step.speed, seen_.speed(), seen_.drive_pwm)) return;
+  out_of_reach_ = step.speed;
+  const auto& steps = order_.planned.steps;
+  const auto left_out = std::count_if(steps.begin() + position_.step + 1, steps.end(),
+                                      [&](const auto& later) { return later.speed >= *out_of_reach_; });
+  if (left_out == 0) return;
+  position_.steps -= static_cast<int>(left_out);
+  end_ -= left_out * from_seconds(order_.campaign.profile.dwell.value());
+  progress_.say(fmt::format("motor: full drive gives {:.0f} of {:.0f} RPM; skipping {} steps at or above",
+                            to_rpm(seen_.speed()), to_rpm(step.speed), left_out));
+}
+
+void Sequence::mark(Phase phase, int step, RadPerSec commanded) {
+  const results::PhaseMark mark{phase, step, bench_.clock().now().count(), commanded.value()};
+  recorder_.mark(mark);
+  guard_.mark(mark);
+}
+
+void Sequence::change_speed() {
+  guard_.settles_until(bench_.clock().now() + from_seconds(order_.campaign.minimum_discard.value()));
+}
+
+void Sequence::hold_zero(Phase phase) {
+  position_.phase = "zero";
+  mark(phase, -1, RadPerSec(0));
+  hold(from_seconds(order_.campaign.zero.value()), nullptr);
+  progress_.step_done(position_, seen_);
+}
+
+void Sequence::require_rest() {
+  while (!seen_.load_cell_is_fresh) hold(bench_.clock().stretched(kTickWall), nullptr);  // check() ends this
+  const auto axis = static_cast<std::size_t>(order_.config.thrust_axis);
+  const netbox::ZeroMeasurement zero = recorder_.measured();
+  if (zero.records < 2)
+    throw DeviceError("Net Box", "take the zero", "no valid sample arrived", "check the box's status: `kphi devices`");
+  const double deviation = zero.standard_deviation[axis];
+  if (deviation <= results::kNoisyZero) return;
+  throw DeviceError(
+      "Net Box", "take the zero",
+      fmt::format("F{} is noisy: standard deviation {:.3g} N, limit {:g} N", "xyz"[axis], deviation, results::kNoisyZero),
+      results::kZeroNextMove);
+}
+
+void Sequence::wait_for_standstill() {
+  position_.phase = "spin down";
+  const Instant give_up = bench_.clock().now() + from_seconds(kSpinDownLimitSeconds);
+  // Wait for a speed reading taken after the coast.
+  hold(bench_.clock().stretched(20 * kTickWall), nullptr);
+  // Written so that NaN is not at rest.
+  for (RadPerSec speed; !((speed = guard_.observe(bench_.clock().now()).speed()) <= kStandstill);) {
+    if (bench_.clock().now() > give_up) {
+      throw SafetyStop(fmt::format("motor: coasting but still turning at {:.0f} RPM after {:.0f} s", to_rpm(speed),
+                                   kSpinDownLimitSeconds),
+                       kKeepAway);
+    }
+    hold(bench_.clock().stretched(kTickWall), nullptr);
+  }
+}
+
+void Sequence::hold(Duration duration, MotorEnable* spin) {
+  const Instant until = bench_.clock().now() + duration;
+  for (Instant now = bench_.clock().now(); now < until; now = bench_.clock().now()) {
+    bench_.wait_until(std::min(until, now + bench_.clock().stretched(kTickWall)));
+    tick(spin);
+  }
+}
+
+void Sequence::tick(MotorEnable* spin) {
+  if (stop_asked_()) throw Interrupted("stopped by request");
+  recorder_.check_failure();
+  guard_.check(spin != nullptr);
+  show_events();
+  const Instant now = bench_.clock().now();
+  seen_ = guard_.observe(now);
+  if (spin) spin->renew();
+  position_.remaining_s = to_seconds(bench_.clock().shrunk(std::max(Duration(0), end_ - now)));
+  progress_.tick(position_, seen_);
+}
+
+void Sequence::show_events() {
+  for (const results::StreamEvent& event : recorder_.take_events()) {
+    if (event.kind == results::EventKind::stalled) stalled_ = event.text;
+    if (event.kind == results::EventKind::stall_ended) stalled_.clear();
+    const std::string line = (is_of_motor(event.kind) ? "motor: " : "load cell: ") + event.text;
+    if (events_shown_ < kEventsShown) progress_.say(line);
+    if (++events_shown_ == kEventsShown) progress_.say("further events of this run go to its file only: `kphi info`");
+    if (ends_a_run(event.kind)) throw SafetyStop(line);
+  }
+}
+
+}  // namespace kphi::daq

@@ -1,0 +1,77 @@
+// Steps through the phases of one run: zero, steps, spin-down, zero.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "daq/guard/guard.hpp"
+#include "daq/guard/motor_enable.hpp"
+#include "daq/run/progress.hpp"
+#include "daq/run/recorder.hpp"
+#include "daq/run/run_order.hpp"
+#include "drivers/iq/session/stopping.hpp"
+
+namespace kphi::daq {
+
+/// The runner's thread. All that it is given must outlive it.
+class Sequence {
+ public:
+  Sequence(Bench& bench, Recorder& recorder, Guard& guard, const RunOrder& order, Progress& progress,
+           const std::function<bool()>& stop_asked);
+  void run();
+  [[nodiscard]] const results::BoxBias& box_bias() const { return box_bias_; }
+  [[nodiscard]] const std::optional<iq::StopReport>& stop() const { return stop_; }
+  /// The supply switched itself off, but another cause was seen first.
+  [[nodiscard]] const std::optional<results::StreamEvent>& supply_event() const { return supply_event_; }
+  /// After the motor was coasted: adds to `words` the state of motor and supply, and what else the module reported.
+  void add_aftermath(StopWords& words);
+  /// After the stream has ended and the recorder is no longer drained.
+  void compare_configuration(int attempts);
+  /// After a stop: why the load cell fell silent, as far as the box tells; empty if it did not.
+  std::string explanation();
+
+ private:
+  /// Reports a tripped supply even when the failure of the starved module was seen first.
+  void switch_off(StopWords& words);
+  /// Waits for the coast to be confirmed, and for standstill.
+  void watch_the_coast(StopWords& words);
+  void take_box_bias();
+  void set_box_bias();
+  netbox::ZeroMeasurement measure(results::Phase phase);
+  void spin_through_the_steps();
+  void hold_step(const profiles::PlannedStep& step, MotorEnable& spin);
+  /// If the motor missed a speed at full drive, the run skips the remaining steps at or above it.
+  void learn_from(const profiles::PlannedStep& step);
+  void mark(results::Phase phase, int step, RadPerSec commanded);
+  /// Takes no time if the campaign sets no ramp.
+  void ramp_to(RadPerSec level, MotorEnable& spin);
+  void change_speed();
+  void hold_zero(results::Phase phase);
+  /// Refuses a noisy zero before anything turns: all thrusts would inherit its error.
+  void require_rest();
+  void wait_for_standstill();
+  void hold(Duration duration, MotorEnable* spin);
+  void tick(MotorEnable* spin);
+  void show_events();
+
+  Bench& bench_;
+  Recorder& recorder_;
+  Guard& guard_;
+  const RunOrder& order_;
+  Progress& progress_;
+  const std::function<bool()>& stop_asked_;
+  Position position_;
+  Observation seen_;
+  Instant end_{};
+  int events_shown_ = 0;
+  std::string stalled_;  ///< the event that says that the box's measurement stalled; empty while it measures
+  results::BoxBias box_bias_;
+  bool has_spun_ = false;
+  bool power_is_off_ = false;              ///< confirmed by the supply
+  std::optional<RadPerSec> out_of_reach_;  ///< the lowest speed missed at full drive
+  std::optional<iq::StopReport> stop_;
+  std::optional<results::StreamEvent> supply_event_;
+};
+
+}  // namespace kphi::daq

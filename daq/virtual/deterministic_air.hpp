@@ -1,0 +1,46 @@
+// The simulated sensor of the air behind its simulated bridge, joined to the drivers without a bus, in virtual time.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/clock.hpp"
+#include "drivers/ambient/air.hpp"
+#include "drivers/sim/usb/faults.hpp"
+#include "drivers/sim/usb/mcp2221.hpp"
+
+namespace kphi::daq {
+
+class DeterministicAir {
+ public:
+  /// Waits for the first reading, in a time of its own: on a live bench another thread does so. Throws DeviceError:
+  /// none came. `bench` outlives this.
+  DeterministicAir(const Clock& bench, const sim::TrueAir& air, sim::UsbFaultScript faults);
+  ~DeterministicAir();
+  DeterministicAir(const DeterministicAir&) = delete;
+  DeterministicAir& operator=(const DeterministicAir&) = delete;
+
+  /// To be called when time has passed: measures every five seconds; after a failure it opens the sensor anew, after
+  /// longer and longer pauses.
+  void look();
+  /// Of the newest reading; nothing when that is older than a minute.
+  [[nodiscard]] std::optional<ambient::Density> density() const;
+
+ private:
+  class Sensor;
+  void measure();
+
+  const Clock& bench_;
+  ManualClock time_;  ///< of the sensor's thread, which may be ahead of the bench while it waits
+  sim::UsbFaults faults_;
+  sim::Mcp2221 bridge_;
+  std::unique_ptr<Sensor> sensor_;
+  Instant next_{0};
+  Duration pause_;
+  std::optional<ambient::Density> newest_;
+  Instant newest_at_{0};
+  std::string failure_;
+};
+
+}  // namespace kphi::daq

@@ -1,0 +1,98 @@
+// The requests that the module may still be working on. IQUART has no sequence numbers: a reply belongs to the oldest
+// open request of its type, sub and module that was sent before the reply began to arrive. A request that timed out
+// stays as an expired request and absorbs late replies, so that they do not answer the next request of the same entry;
+// while it stays, that entry is not asked again. It is removed by order: a module answers requests in sequence and a
+// serial line keeps the sequence, so a reply that was overtaken cannot come any more.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "base/clock.hpp"
+#include "drivers/iq/wire/entries.hpp"
+
+namespace kphi::iq {
+
+struct Request {
+  const Entry* entry = nullptr;  ///< null: a set, which has no reply and only fills the module's receive buffer
+  int module_id = 0;
+  std::size_t bytes = 0;    ///< of the frame
+  std::uint64_t order = 0;  ///< position among all frames given to the wire
+  Instant queued{0};        ///< when it was handed over
+  Instant started{0};       ///< when its first byte left, by the wire time of the frames before it
+  Instant earliest{0};      ///< a reply that began to arrive before belongs to another request
+  Duration patience{0};     ///< from `started` to the time-out
+  bool alone = false;       ///< nothing else was open when it was sent
+  bool expired = false;     ///< timed out, and absorbs a late reply
+  Instant expired_at{0};
+  int overtaken = 0;  ///< replies that came to later requests
+};
+
+/// Allocates nothing.
+class Requests {
+ public:
+  struct Answer {
+    Request request;
+    bool late = false;
+  };
+
+  /// `quarantine`: longer than any reply may be late.
+  explicit Requests(Duration quarantine) noexcept : quarantine_(quarantine) {}
+
+  /// A request of this entry is open or expired.
+  [[nodiscard]] bool busy(const Entry& entry, int module_id) const noexcept;
+  /// No request waits for a reply; there may be expired ones.
+  [[nodiscard]] bool none_open() const noexcept;
+  /// There is an expired request.
+  [[nodiscard]] bool has_expired() const noexcept;
+  /// Bytes that may still lie in the module's receive buffer.
+  [[nodiscard]] std::size_t outstanding_bytes() const noexcept;
+  [[nodiscard]] bool full() const noexcept { return count_ == kRequests; }
+  void add(const Request& request) noexcept;
+
+  /// The request that this reply answers, removed unless it is expired. nullopt: the module cannot have received it by
+  /// `begun`, when the reply's first byte arrived, so this is a second copy of the previous reply.
+  [[nodiscard]] std::optional<Answer> answer(std::uint8_t type, std::uint8_t sub, int module_id,
+                                             Instant begun) noexcept;
+  /// The line is a new one: no reply to an earlier request can come.
+  void clear() noexcept { count_ = 0; }
+
+  /// Expires requests that have waited too long. An expired request is removed when two later requests have been
+  /// answered (one more than a line that swaps neighbours needs); otherwise ten quarantines after it was sent, but at
+  /// least one after its expiry, so that it is still there when a host that slept continues. Calls `timed_out(const
+  /// Request&)`.
+  template <class TimedOut>
+  void expire(Instant now, TimedOut&& timed_out) {
+    for (std::size_t i = 0; i < count_;) {
+      Request& request = requests_[i];
+      if (now < due(request)) {
+        ++i;
+      } else if (request.entry != nullptr && !request.expired) {
+        request.expired = true;
+        request.expired_at = now;
+        const Request copy = request;
+        timed_out(copy);
+      } else {
+        erase(i);
+      }
+    }
+  }
+
+  /// When the next one expires or is removed.
+  [[nodiscard]] Instant deadline() const noexcept;
+
+ private:
+  static constexpr std::size_t kRequests = 32;
+  static constexpr int kOvertaken = 2;
+  [[nodiscard]] Instant due(const Request& request) const noexcept;
+  void erase(std::size_t at) noexcept;
+  void overtake(std::uint64_t order) noexcept;
+
+  Duration quarantine_;
+  std::array<Request, kRequests> requests_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace kphi::iq

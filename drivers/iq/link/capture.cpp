@@ -1,0 +1,93 @@
+#include "drivers/iq/link/capture.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "base/error.hpp"
+#include "base/thread.hpp"
+
+namespace kphi::iq {
+namespace {
+
+constexpr char kTitle[] = "kphi iq capture 1\n";
+constexpr std::size_t kTitleSize = sizeof kTitle - 1;
+constexpr std::size_t kRecordHead = 13;
+constexpr auto kBatch = std::chrono::milliseconds(50);
+
+[[noreturn]] void refuse(const std::string& path, const char* operation, const std::string& why) {
+  throw DeviceError("capture " + path, operation, why, "choose another file");
+}
+
+void append(std::vector<std::uint8_t>& to, std::uint64_t value, int bytes) {
+  for (int i = 0; i < bytes; ++i) to.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+}
+
+bool write_all(int fd, std::span<const std::uint8_t> bytes) noexcept {
+  while (!bytes.empty()) {
+    const auto n = ::write(fd, bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
+  }
+  return true;
+}
+
+}  // namespace
+
+Capture::Capture(const std::string& path)
+    : file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)) {
+  if (file_.number() < 0) refuse(path, "create", std::strerror(errno));
+  waiting_.assign(kTitle, kTitle + kTitleSize);
+  writer_ = start_thread([this] { run(); });
+}
+
+Capture::~Capture() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  news_.notify_one();
+  writer_.join();
+}
+
+void Capture::add(Direction direction, std::span<const std::uint8_t> bytes, Instant time) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (waiting_.size() + bytes.size() + 2 * kRecordHead > kMostWaiting) {
+      missing_bytes_ += bytes.size();
+      gap_ = true;
+      return;
+    }
+    if (std::exchange(gap_, false)) put(Direction::missing, {}, time);
+    put(direction, bytes, time);
+  }
+  news_.notify_one();
+}
+
+void Capture::put(Direction direction, std::span<const std::uint8_t> bytes, Instant time) {
+  waiting_.push_back(static_cast<std::uint8_t>(direction));
+  append(waiting_, static_cast<std::uint64_t>(time.count()), 8);
+  append(waiting_, bytes.size(), 4);
+  waiting_.insert(waiting_.end(), bytes.begin(), bytes.end());
+}
+
+void Capture::run() noexcept {
+  std::vector<std::uint8_t> batch;
+  for (bool last = false; !last;) {
+    {
+      std::unique_lock lock(mutex_);
+      news_.wait(lock, [&] { return ended_ || !waiting_.empty(); });
+      news_.wait_for(lock, kBatch, [&] { return ended_; });
+      last = ended_;
+      batch.clear();
+      batch.swap(waiting_);
+    }
+    if (!write_all(file_.number(), batch)) missing_bytes_ += batch.size();
+  }
+}
+
+}  // namespace kphi::iq

@@ -1,0 +1,51 @@
+// Every byte of a line, with its time and direction, in a file: shows what really went over the wire.
+//
+// The file: the line "kphi iq capture 1", then records without gaps: one byte '<' (received) or '>' (sent) or '!'
+// (something is missing here), the bench time in ns (int64), the number of bytes (uint32), the bytes; little-endian.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <mutex>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "base/clock.hpp"
+#include "base/descriptor.hpp"
+
+namespace kphi::iq {
+
+/// Writes in a thread of its own: a slow disk never delays the line. Bytes that it cannot take are marked as missing.
+class Capture {
+ public:
+  enum class Direction : char { came = '<', sent = '>', missing = '!' };
+
+  /// Throws DeviceError when the file cannot be written.
+  explicit Capture(const std::string& path);
+  ~Capture();
+  Capture(const Capture&) = delete;
+  Capture& operator=(const Capture&) = delete;
+
+  /// From one thread; never waits for the disk.
+  void add(Direction direction, std::span<const std::uint8_t> bytes, Instant time);
+  [[nodiscard]] std::uint64_t missing_bytes() const noexcept { return missing_bytes_; }
+
+ private:
+  static constexpr std::size_t kMostWaiting = 4 << 20;
+  void run() noexcept;
+  void put(Direction direction, std::span<const std::uint8_t> bytes, Instant time);
+
+  Descriptor file_;
+  std::mutex mutex_;  ///< the line's thread and the writer
+  std::condition_variable news_;
+  std::vector<std::uint8_t> waiting_;
+  bool ended_ = false;
+  bool gap_ = false;
+  std::atomic<std::uint64_t> missing_bytes_{0};
+  std::thread writer_;
+};
+
+}  // namespace kphi::iq

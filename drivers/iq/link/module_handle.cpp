@@ -1,0 +1,206 @@
+#include "drivers/iq/link/module_handle.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "base/error.hpp"
+
+namespace kphi::iq {
+namespace {
+
+using std::chrono::steady_clock;
+constexpr std::size_t kEvents = 256;
+constexpr auto kAnswerLimit = std::chrono::seconds(20);
+constexpr double kFastest = entry<"propeller_motor_control.ctrl_velocity">.max;
+
+}  // namespace
+
+void ModuleHandle::spin_at(RadPerSec signed_speed) {
+  if (!(std::abs(signed_speed.value()) <= kFastest)) {
+    throw std::invalid_argument(fmt::format("speed {} rad/s is beyond what the module takes", signed_speed.value()));
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    if (!alive_) refuse("spin", ended_ ? "connect again" : "find the cause, then rearm it");
+    renew();
+    commands_.speed = signed_speed;
+    commands_.stop.reset();
+  }
+  commanded_.raise();
+}
+
+void ModuleHandle::renew() noexcept {
+  lease_end_ns_ = std::chrono::nanoseconds((steady_clock::now() + kLease).time_since_epoch()).count();
+}
+
+std::uint64_t ModuleHandle::order_coast(bool emergency) noexcept {
+  std::uint64_t ticket = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    commands_.speed.reset();
+    commands_.stop.reset();
+    (emergency ? commands_.emergency : commands_.coast) = true;
+    ticket = ++coasts_.asked;
+  }
+  commanded_.raise();
+  return ticket;
+}
+
+bool ModuleHandle::await_coast(std::uint64_t ticket, Duration wall) noexcept {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, wall, [&] { return ended_ || !line_ || coasts_.done >= ticket; });
+  return coasts_.done >= ticket;
+}
+
+StopReport ModuleHandle::stop(const StopSettings& settings) {
+  Stopping::check(settings);
+  std::unique_lock lock(mutex_);
+  commands_.speed.reset();
+  commands_.stop = settings;
+  const std::uint64_t ticket = ++stops_.asked;
+  commanded_.raise();
+  // A caller that waits here is alive.
+  do {
+    renew();
+  } while (!changed_.wait_for(lock, kLease / 4, [&] { return ended_ || stops_.done >= ticket; }));
+  return stops_.done >= ticket ? stop_report_ : StopReport{};
+}
+
+std::vector<Reply> ModuleHandle::inquire(std::vector<Inquiry> inquiries) {
+  Inquiries::check(inquiries);
+  const std::lock_guard turn(inquiring_);
+  std::unique_lock lock(mutex_);
+  if (state_ != Session::State::ready || ended_) refuse("ask", "wait until it is connected");
+  commands_.inquiry = std::move(inquiries);
+  const std::uint64_t ticket = ++inquiries_.asked;
+  commanded_.raise();
+  changed_.wait_for(lock, kAnswerLimit, [&] { return ended_ || inquiries_.done >= ticket; });
+  if (inquiries_.done < ticket) refuse("ask", "connect again");
+  return replies_;
+}
+
+void ModuleHandle::rearm() {
+  std::unique_lock lock(mutex_);
+  if (alive_) return;
+  if (state_ != Session::State::ready || ended_) refuse("rearm", "wait until it is connected again");
+  commands_.rearm = true;
+  const std::uint64_t ticket = ++rearms_.asked;
+  commanded_.raise();
+  changed_.wait_for(lock, kAnswerLimit, [&] { return ended_ || rearms_.done >= ticket; });
+  if (!alive_) refuse("rearm", "wait until it is connected again");
+}
+
+std::optional<bool> ModuleHandle::await_connection(Duration wall) {
+  std::unique_lock lock(mutex_);
+  const bool decided = changed_.wait_for(lock, wall, [&] { return lost() || state_ == Session::State::ready; });
+  if (!decided) return std::nullopt;
+  return !lost();
+}
+
+std::vector<Event> ModuleHandle::take_events() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(events_, {});
+}
+
+bool ModuleHandle::connected() const {
+  const std::lock_guard lock(mutex_);
+  return !ended_ && state_ == Session::State::ready;
+}
+
+std::string ModuleHandle::failure() const {
+  const std::lock_guard lock(mutex_);
+  return failure_;
+}
+
+Identity ModuleHandle::identity() const {
+  const std::lock_guard lock(mutex_);
+  return identity_;
+}
+
+Counters ModuleHandle::counters() const {
+  const std::lock_guard lock(mutex_);
+  return counters_;
+}
+
+RoundTripHistogram ModuleHandle::round_trips() const {
+  const std::lock_guard lock(mutex_);
+  return round_trips_;
+}
+
+void ModuleHandle::refuse(const char* operation, const char* next_move) const {
+  throw DeviceError("motor module on " + device_, operation, failure_.empty() ? "it is not connected" : failure_,
+                    next_move);
+}
+
+Commands ModuleHandle::take_commands() {
+  const std::lock_guard lock(mutex_);
+  for (Ticket* ticket : {&coasts_, &stops_, &rearms_, &inquiries_}) ticket->taken = ticket->asked;
+  return std::exchange(commands_, {});
+}
+
+void ModuleHandle::move_readings(Session& session) {
+  std::array<Reading, 64> batch;
+  while (const std::size_t n = session.take(batch)) dropped_readings_ += n - readings_.push(batch.data(), n);
+  newest_reading_ns_ = session.newest_reading().count();
+}
+
+void ModuleHandle::publish(Session& session, bool line, bool all) {
+  bool news = false;
+  {
+    const std::lock_guard lock(mutex_);
+    news = note_state(session) || line != std::exchange(line_, line) || all;
+    if (close_tickets(session)) news = true;
+    for (Event& event : session.take_events()) {
+      if (events_.size() == kEvents) events_.erase(events_.begin());
+      events_.push_back(std::move(event));
+    }
+    if (news) {
+      counters_ = session.counters();
+      counters_.dropped_readings += dropped_readings_;
+      counters_.lease_expiries = lease_expiries_;
+      counters_.reconnections = reconnections_;
+      round_trips_ = session.round_trips();
+    }
+  }
+  if (news) changed_.notify_all();
+}
+
+bool ModuleHandle::note_state(const Session& session) {
+  if (!session.failure().empty()) failure_ = session.failure();
+  if (session.armed()) failure_.clear();
+  const bool alive = session.armed() || (alive_ && session.state() == Session::State::connecting);
+  const bool news = state_ != session.state() || alive_ != alive;
+  state_ = session.state();
+  alive_ = alive;
+  if (news && state_ == Session::State::ready) identity_ = session.identity();
+  return news;
+}
+
+bool ModuleHandle::close_tickets(const Session& session) {
+  bool news = false;
+  const auto close = [&](Ticket& ticket, bool done) {
+    if (!ticket.open() || !done) return false;
+    ticket.done = ticket.taken;
+    return news = true;
+  };
+  close(coasts_, session.coasting());
+  if (close(stops_, !session.stopping() && session.stop_report().has_value())) stop_report_ = *session.stop_report();
+  if (close(inquiries_, session.inquiries().done())) replies_ = session.inquiries().replies();
+  close(rearms_, true);
+  return news;
+}
+
+void ModuleHandle::end(const std::string& why) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (failure_.empty()) failure_ = why;
+    ended_ = true;
+    alive_ = false;
+  }
+  changed_.notify_all();
+}
+
+}  // namespace kphi::iq

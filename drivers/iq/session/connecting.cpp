@@ -1,0 +1,164 @@
+#include "drivers/iq/session/connecting.hpp"
+
+#include <fmt/format.h>
+
+namespace kphi::iq {
+namespace {
+
+constexpr int kOptionalAttempts = 2;
+
+/// What is asked and set at connection, in this order, after the coast is confirmed.
+struct Step {
+  enum class Kind {
+    own_id,       ///< must be the id that is being spoken to; old firmware answers on id 0 only, or not at all
+    required,     ///< no answer: the connection fails
+    last_of_uid,  ///< as required; afterwards another module than before is refused, before it is told anything
+    optional,     ///< no answer: an older firmware, go on
+    legacy_coil,  ///< only asked when the newer client did not answer
+    set_timeout,  ///< set to Settings::module_timeout_s, then read back; required
+    set_zero,     ///< set to 0, then read back; firmware without the entry stays silent and is accepted
+  };
+  const Entry* entry;
+  Kind kind;
+  void (*store)(Identity&, double);
+
+  [[nodiscard]] constexpr bool sets() const noexcept { return kind == Kind::set_timeout || kind == Kind::set_zero; }
+  [[nodiscard]] constexpr bool must_answer() const noexcept {
+    return kind == Kind::required || kind == Kind::last_of_uid || kind == Kind::set_timeout;
+  }
+};
+
+constexpr Step kScript[] = {
+    {&entry<"system_control.module_id">, Step::Kind::own_id, [](Identity&, double) {}},
+    {&entry<"system_control.uid1">, Step::Kind::required,
+     [](Identity& i, double v) { i.uid1 = static_cast<std::uint32_t>(v); }},
+    {&entry<"system_control.uid2">, Step::Kind::required,
+     [](Identity& i, double v) { i.uid2 = static_cast<std::uint32_t>(v); }},
+    {&entry<"system_control.uid3">, Step::Kind::last_of_uid,
+     [](Identity& i, double v) { i.uid3 = static_cast<std::uint32_t>(v); }},
+    // Before anything is set: a restart from here on is noticed by the first poll.
+    {&entry<"system_control.time">, Step::Kind::optional, [](Identity& i, double v) { i.uptime_s = v; }},
+    {&entry<"propeller_motor_control.timeout">, Step::Kind::set_timeout,
+     [](Identity& i, double v) { i.timeout_s = v; }},
+    {&entry<"propeller_motor_control.timeout_behavior">, Step::Kind::set_zero,
+     [](Identity& i, double) { i.timeout_behavior_set = true; }},
+    {&entry<"propeller_motor_control.timeout_song_option">, Step::Kind::set_zero, [](Identity&, double) {}},
+    {&entry<"system_control.firmware_version">, Step::Kind::required,
+     [](Identity& i, double v) { i.firmware = static_cast<std::uint32_t>(v); }},
+    {&entry<"system_control.hardware_version">, Step::Kind::required,
+     [](Identity& i, double v) { i.hardware = static_cast<std::uint32_t>(v); }},
+    {&entry<"system_control.electronics_version">, Step::Kind::required,
+     [](Identity& i, double v) { i.electronics = static_cast<std::uint32_t>(v); }},
+    {&entry<"brushless_drive.motor_pole_pairs">, Step::Kind::optional,
+     [](Identity& i, double v) { i.pole_pairs = static_cast<int>(v); }},
+    {&entry<"brushless_drive.motor_Kv">, Step::Kind::optional,
+     [](Identity& i, double v) { i.motor_kv_rpm_per_volt = v; }},
+    {&entry<"power_safety.fault_now">, Step::Kind::optional,
+     [](Identity& i, double v) { i.fault_now = static_cast<int>(v); }},
+    {&entry<"power_safety.fault_ever">, Step::Kind::optional,
+     [](Identity& i, double v) { i.fault_ever = static_cast<int>(v); }},
+    {&entry<"coil_temperature_estimator.t_coil">, Step::Kind::optional,
+     [](Identity& i, double) { i.coil_temperature_client = 83; }},
+    {&entry<"temperature_estimator.temp">, Step::Kind::legacy_coil,
+     [](Identity& i, double) { i.coil_temperature_client = 77; }},
+};
+
+}  // namespace
+
+Connecting::Connecting(const Settings& settings)
+    : module_id_(settings.module_id), module_timeout_s_(settings.module_timeout_s) {}
+
+void Connecting::begin(const std::optional<Identity>& known) {
+  known_ = known;
+  identity_ = {};
+  identity_.system_control_id = module_id_;
+  step_ = 0;
+  open_.reset();
+  asked_ = false;
+  failure_.clear();
+  another_module_ = false;
+}
+
+bool Connecting::done() const noexcept { return step_ == std::size(kScript); }
+
+void Connecting::advance(Exchange& exchange, Instant now) {
+  if (asked_ || !failure_.empty()) return;
+  while (!done() && kScript[step_].kind == Step::Kind::legacy_coil && identity_.coil_temperature_client != 0) next();
+  if (done()) return;
+  if (!open_) open_ = inquiry();
+  const auto& [wanted, set_to] = open_->inquiry();
+  const int id = id_of(*wanted);
+  asked_ = set_to ? exchange.tell_and_ask(*wanted, *set_to, id, now) : exchange.ask(*wanted, id, now);
+}
+
+void Connecting::take(const QueryResult& result) {
+  if (!asked_ || done() || &result.entry() != kScript[step_].entry) return;
+  asked_ = false;
+  open_->take(result.kind == QueryResult::Kind::answer ? std::optional(result.value()) : std::nullopt);
+  if (open_->done())
+    conclude(result.kind == QueryResult::Kind::wrong_length ? "a reply of the wrong length" : "no reply");
+}
+
+void Connecting::conclude(const char* why_silent) {
+  const Step& step = kScript[step_];
+  const Reply reply = open_->reply();
+  if (!reply.value) return take_silence(why_silent);
+  if (step.sets() && !reply.accepted) {
+    failure_ = fmt::format(
+        "the module did not accept its communication timeout ({} reads {} instead of {}): the motor would keep "
+        "turning if this host died",
+        step.entry->name, *reply.value, *wanted());
+    return;
+  }
+  step.store(identity_, *reply.value);
+  if (step.kind == Step::Kind::own_id) take_own_id(*reply.value);
+  if (step.kind == Step::Kind::last_of_uid) compare_uid();
+  next();
+}
+
+void Connecting::take_silence(const char* why) {
+  const Step& step = kScript[step_];
+  if (step.must_answer()) {
+    failure_ = fmt::format("{} to get {}.{}", why, name_of(step.entry->type), step.entry->name);
+  } else if (step.kind == Step::Kind::own_id && identity_.system_control_id != 0) {
+    identity_.system_control_id = 0;
+    open_.reset();
+  } else {
+    next();
+  }
+}
+
+void Connecting::take_own_id(double id) {
+  if (id == module_id_) return;
+  failure_ = fmt::format("module {} answers on id {}: its other clients have that id; set module_id to {}", id,
+                         identity_.system_control_id, id);
+}
+
+void Connecting::compare_uid() {
+  if (!known_ || known_->same_module(identity_)) return;
+  another_module_ = true;
+  failure_ = fmt::format("another module answers, uid {} instead of {}", identity_.uid_text(), known_->uid_text());
+}
+
+void Connecting::next() noexcept {
+  ++step_;
+  open_.reset();
+}
+
+int Connecting::id_of(const Entry& asked) const noexcept {
+  return asked.type == Client::system_control ? identity_.system_control_id : module_id_;
+}
+
+std::optional<double> Connecting::wanted() const noexcept {
+  const Step& step = kScript[step_];
+  if (!step.sets()) return std::nullopt;
+  return step.kind == Step::Kind::set_timeout ? module_timeout_s_ : 0;
+}
+
+OpenInquiry Connecting::inquiry() const noexcept {
+  const Step& step = kScript[step_];
+  const bool vital = step.must_answer() || step.sets();
+  return OpenInquiry({step.entry, wanted()}, vital ? OpenInquiry::kAttempts : kOptionalAttempts);
+}
+
+}  // namespace kphi::iq

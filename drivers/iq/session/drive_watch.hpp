@@ -1,0 +1,52 @@
+// Checks that the module still drives the motor as commanded. It may have stopped by itself: by its communication
+// timeout, a fault, a command from another program. A speed sent then would restart a coasting rotor, so each speed but
+// the first of a spin waits until the module has reported, to a query sent after the previous speed, that it is
+// driving. All times are bench time.
+#pragma once
+
+#include <optional>
+
+#include "drivers/iq/exchange/exchange.hpp"
+#include "drivers/iq/wire/codes.hpp"
+
+namespace kphi::iq {
+
+class DriveWatch {
+ public:
+  /// `settings` are completed.
+  explicit DriveWatch(const Settings& settings)
+      : module_id_(settings.module_id),
+        settles_(settings.reply_timeout / 2),
+        fresh_(settings.reply_timeout / 4),
+        longest_(settings.longest_silence * 9 / 10) {}
+
+  /// A spin begins, from rest.
+  void begin(Instant now) noexcept;
+  /// Coast was ordered.
+  void end() noexcept { watching_ = false; }
+  /// A speed was handed to the line.
+  void told(std::uint64_t order, Instant now) noexcept;
+  /// Whether the next speed may be sent; queries the module when it has not yet reported that it is driving.
+  [[nodiscard]] bool may_tell(Exchange& exchange, Instant now) noexcept;
+  /// The drive mode, if it is not that of a driven motor.
+  [[nodiscard]] std::optional<DriveMode> take(const QueryResult& result) noexcept;
+  struct Lapse {
+    bool of_host = false;  ///< the session was not served; otherwise the module did not answer
+    Duration lasts{0};
+  };
+  /// A silence so long that the module's own timeout may have coasted the motor. To be called whenever the session is
+  /// served, before anything is sent.
+  [[nodiscard]] std::optional<Lapse> lapsed(Instant last_reply, Instant now) noexcept;
+
+ private:
+  int module_id_;
+  Duration settles_;  ///< from a speed to the drive mode that results from it
+  Duration fresh_;    ///< age up to which an answer is valid
+  Duration longest_;  ///< silence after which the module's own timeout may have run out
+  bool watching_ = false;
+  std::optional<std::uint64_t> order_;  ///< position of the last speed; nullopt: no speed in this spin
+  Instant told_at_{0}, served_{0};
+  std::optional<Instant> drives_at_;  ///< when it reported driving, asked after the last speed
+};
+
+}  // namespace kphi::iq

@@ -1,0 +1,282 @@
+#include "drivers/iq/session/session.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+namespace kphi::iq {
+namespace {
+
+constexpr std::size_t kEvents = 256;
+constexpr int kSilentTimeouts = 10;  ///< longest reply time-outs without any reply after which the module is gone
+constexpr int kRestartTimeouts = 3;  ///< within which a restart explains why the module stopped driving
+constexpr std::uint64_t kRoundTrips = 100;  ///< enough to judge their median
+constexpr const Entry& kVelocity = entry<"propeller_motor_control.ctrl_velocity">;
+
+}  // namespace
+
+Session::Session(Settings settings)
+    : settings_(completed(std::move(settings))),
+      exchange_(settings_),
+      coasting_(settings_),
+      drive_(settings_),
+      connecting_(settings_),
+      polling_(settings_),
+      inquiries_(settings_.module_id) {}
+
+void Session::connect(Instant now) {
+  exchange_.withdraw();
+  restart(now);
+}
+
+void Session::connect_anew(Instant now) {
+  exchange_.change_line();
+  coasting_.end();
+  restart(now);
+}
+
+void Session::restart(Instant now) {
+  state_ = State::connecting;
+  failure_.clear();
+  connecting_.begin(known_);
+  inquiries_.abandon();
+  polling_.end();
+  last_reply_ = now;
+  coasting_.forget_mode();
+  coast(1, now);
+  service(now);
+}
+
+void Session::rearm() {
+  if (state_ != State::ready) throw std::logic_error("cannot rearm before the module is connected again");
+  armed_ = true;
+}
+
+void Session::fail(EventKind kind, const std::string& why, Instant now) {
+  state_ = State::failed;
+  failure_ = why;
+  armed_ = false;
+  polling_.end();
+  inquiries_.abandon();
+  note(kind, why, now);
+  let_go_.clear();
+  if (!coasting_.pending()) coast(3, now);
+}
+
+void Session::spin_at(RadPerSec signed_speed, Instant now) {
+  const double speed = signed_speed.value();
+  if (!(std::abs(speed) <= kVelocity.max)) {
+    throw std::invalid_argument(fmt::format("speed {} rad/s is not within ±{} rad/s", speed, kVelocity.max));
+  }
+  if (!armed()) throw std::logic_error("cannot spin: the module is not ready and armed");
+  if (speed == 0) return coast(now);
+  stopping_.end(StopReport::Outcome::overruled);
+  check_drive(now);
+  if (!armed()) return;
+  spinning_ = true;
+  commanded_speed_ = speed;
+  drive_.begin(now);
+  coasting_.end();
+  wanted_speed_ = static_cast<float>(speed);
+  flush_speed(now);
+}
+
+void Session::coast(int times, Instant now) noexcept {
+  if (spinning_ && !stopping_.active()) stopping_.begin({}, commanded_speed_, false, now);
+  stopping_.coasted(now);
+  wanted_speed_.reset();
+  spinning_ = false;
+  let_go_.clear();
+  drive_.end();
+  coasting_.begin(exchange_, times, now);
+}
+
+void Session::stop(const StopSettings& settings, Instant now) {
+  Stopping::check(settings);
+  const double measured = polling_.speed();
+  // Never faster than it turns: the motor may still be accelerating.
+  const bool slower = std::isfinite(measured) && std::abs(measured) < std::abs(commanded_speed_);
+  const double from = spinning_ ? (slower ? std::copysign(measured, commanded_speed_) : commanded_speed_)
+                                : (std::isfinite(measured) ? measured : 0.0);
+  const bool ramped = spinning_ && settings.deceleration.has_value();
+  stopping_.begin(settings, from, ramped, now);
+  if (!ramped) coast(1, now);
+  service(now);
+}
+
+void Session::expire_lease(Instant now) {
+  note(EventKind::lease_expired, "no caller renewed the command in time", now);
+  emergency_stop(now);
+}
+
+void Session::inquire(const std::vector<Inquiry>& inquiries, Instant now) {
+  if (state_ != State::ready) throw std::logic_error("cannot ask before the module is connected");
+  if (!inquiries_.done()) throw std::logic_error("the previous inquiry is not finished");
+  Inquiries::check(inquiries);
+  inquiries_.begin(inquiries);
+  service(now);
+}
+
+void Session::receive(std::span<const std::uint8_t> bytes, Instant now) {
+  check_drive(now);
+  take_results(exchange_.receive(bytes, now), now);
+  service(now);
+}
+
+void Session::advance(Instant now) {
+  check_drive(now);
+  take_results(exchange_.advance(now), now);
+  service(now);
+}
+
+Instant Session::deadline() const noexcept {
+  Instant earliest = std::min({exchange_.deadline(), coasting_.deadline(), polling_.deadline(), stopping_.deadline()});
+  if (!let_go_.empty()) earliest = std::min(earliest, let_go_at_ + settings_.reply_timeout * kRestartTimeouts);
+  if (state_ == State::ready) earliest = std::min(earliest, last_reply_ + settings_.reply_timeout * kSilentTimeouts);
+  return earliest;
+}
+
+void Session::take_results(std::span<const QueryResult> all, Instant now) {
+  for (const QueryResult& result : all) {
+    if (result.kind != QueryResult::Kind::timeout) last_reply_ = std::max(last_reply_, result.end);
+    coasting_.take(result, exchange_);
+    if (coasting_.confirmed()) stopping_.confirmed(result.end);
+    if (state_ == State::connecting) connecting_.take(result);
+    take_restart(result, now);
+    check_mode(result, now);
+    inquiries_.take(result);
+    polling_.take(result, exchange_.counters());
+    if (result.answers(entry<"brushless_drive.obs_velocity">))
+      stopping_.measured(polling_.speed(), polling_.speed_time());
+  }
+}
+
+void Session::take_restart(const QueryResult& result, Instant now) {
+  if (state_ != State::ready) return;
+  if (inquiries_.sets(result.entry())) return reset_watch_.expect_new_time();
+  const auto sign = reset_watch_.take(result);
+  if (!sign) return;
+  ++exchange_.counters().module_resets;
+  fail(EventKind::module_reset, "the module restarted by itself: " + *sign + "; its settings are lost", now);
+}
+
+void Session::service(Instant now) {
+  continue_stopping(now);
+  continue_coasting(now);
+  continue_connecting(now);
+  flush_speed(now);
+  polling_.advance(exchange_, now);
+  if (state_ == State::ready) inquiries_.advance(exchange_, identity().system_control_id, now);
+  if (!coasting_.silent()) exchange_.ask_barrier(settings_.module_id, now);
+  check_silence(now);
+  conclude_let_go(now);
+  judge_round_trip(now);
+}
+
+void Session::continue_stopping(Instant now) {
+  stopping_.advance(now);
+  const auto speed = stopping_.ramp(now);
+  if (!speed) return;
+  if (*speed == 0) return coast(1, now);
+  wanted_speed_ = static_cast<float>(*speed);
+}
+
+void Session::continue_coasting(Instant now) {
+  if (!coasting_.advance(exchange_, now)) return;
+  ++exchange_.counters().unconfirmed_coasts;
+  stopping_.end(StopReport::Outcome::unconfirmed);
+  if (state_ != State::failed) {
+    fail(state_ == State::connecting ? EventKind::no_answer : EventKind::coast_denied, why_no_answer(), now);
+  }
+}
+
+void Session::continue_connecting(Instant now) {
+  if (state_ != State::connecting || coasting_.pending()) return;
+  connecting_.advance(exchange_, now);
+  if (!connecting_.failure().empty()) {
+    return fail(connecting_.another_module() ? EventKind::another_module : EventKind::no_answer, connecting_.failure(),
+                now);
+  }
+  if (!connecting_.done()) return;
+  state_ = State::ready;
+  if (!known_) armed_ = true;
+  known_ = identity();
+  last_reply_ = now;
+  reset_watch_.begin(identity());
+  polling_.begin(identity(), now);
+  note(EventKind::connected, identity().summary(), now);
+}
+
+void Session::flush_speed(Instant now) {
+  if (!wanted_speed_ || !let_go_.empty() || !drive_.may_tell(exchange_, now)) return;
+  const Packet packet = make(kVelocity, Access::set, settings_.module_id, *wanted_speed_);
+  if (!exchange_.tell(TxQueue::Kind::motion, packet, now)) return;
+  wanted_speed_.reset();
+  drive_.told(exchange_.order(), now);
+}
+
+void Session::check_silence(Instant now) {
+  if (state_ != State::ready || now - last_reply_ < settings_.reply_timeout * kSilentTimeouts) return;
+  fail(EventKind::module_silent,
+       fmt::format("the module stopped answering: no reply for {:.2f} s", to_seconds(now - last_reply_)), now);
+}
+
+void Session::check_drive(Instant now) {
+  const auto lapse = drive_.lapsed(last_reply_, now);
+  if (!lapse) return;
+  const double lasts = to_seconds(lapse->lasts);
+  if (lapse->of_host)
+    return fail(EventKind::host_absent, fmt::format("this computer did not run kphi for {:.2g} s", lasts), now);
+  fail(EventKind::module_silent, fmt::format("the module stopped answering: no reply for {:.2g} s", lasts), now);
+}
+
+void Session::check_mode(const QueryResult& result, Instant now) {
+  const auto mode = drive_.take(result);
+  if (!mode || !spinning_ || !let_go_.empty()) return;
+  let_go_ = fmt::format("the module stopped driving by itself: its drive mode reads {} where {:.0f} RPM were commanded",
+                        *mode == DriveMode::coast ? "coast" : fmt::format("{}", static_cast<int>(*mode)),
+                        std::abs(commanded_speed_) * 30 / std::numbers::pi);
+  let_go_at_ = now;
+  wanted_speed_.reset();
+  exchange_.coast(settings_.module_id, 3, false, now);
+  polling_.look_for_restart(now);
+}
+
+void Session::conclude_let_go(Instant now) {
+  if (let_go_.empty() || now < let_go_at_ + settings_.reply_timeout * kRestartTimeouts) return;
+  fail(EventKind::let_go, std::exchange(let_go_, {}), now);
+}
+
+void Session::judge_round_trip(Instant now) {
+  if (round_trip_judged_ || exchange_.round_trips().count() < kRoundTrips) return;
+  round_trip_judged_ = true;
+  const Duration median = exchange_.round_trips().quantile(0.5);
+  if (median <= settings_.slow_round_trip) return;
+  note(
+      EventKind::slow_round_trip,
+      fmt::format("slow line: median reply time {:.1f} ms, without wire time; set the adapter's latency timer to 1 ms, "
+                  "or plug it into its own USB port",
+                  1e3 * to_seconds(median)),
+      now);
+}
+
+void Session::note(EventKind kind, const std::string& words, Instant now) {
+  if (events_.size() == kEvents) events_.erase(events_.begin());
+  events_.push_back({kind, now, words});
+}
+
+std::string Session::why_no_answer() const {
+  const Counters& counted = counters();
+  if (counted.bytes_in == 0) return "nothing was received";
+  if (counted.packets == 0) return "bytes were received, but no valid packet";
+  if (counted.replies == 0 && counted.wrong_module > 0) return "only modules with another id answer";
+  if (coasting_.last_mode() < 0) return "no reply to get brushless_drive.drive_mode";
+  const bool sings = coasting_.last_mode() == static_cast<int>(DriveMode::phase_volts);
+  return fmt::format("coast not confirmed: the drive mode last read {}{}", coasting_.last_mode(),
+                     sings ? ": old firmware plays its song after a time-out; switch its supply off and on" : "");
+}
+
+}  // namespace kphi::iq

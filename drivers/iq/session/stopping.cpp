@@ -1,0 +1,110 @@
+#include "drivers/iq/session/stopping.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+namespace kphi::iq {
+namespace {
+
+constexpr Duration kRampStep = std::chrono::milliseconds(20);
+constexpr double kFalling = 0.95;  ///< of the speed at the coast
+
+std::string rpm(double rad_s) { return fmt::format("{:.0f} RPM", std::abs(rad_s) * 30 / std::numbers::pi); }
+
+}  // namespace
+
+std::string StopReport::summary() const {
+  const std::string coast = time_to_coast ? fmt::format("coast confirmed after {:.2f} s", to_seconds(*time_to_coast))
+                                          : std::string("coast NOT CONFIRMED");
+  switch (outcome) {
+    case Outcome::standing:
+      return fmt::format("{}, at rest after {:.1f} s", coast, to_seconds(time_to_standing.value_or(Duration(0))));
+    case Outcome::slowing:
+      return fmt::format("{}, slowing down at {}", coast, rpm(speed_at_end));
+    case Outcome::turning:
+      return fmt::format("{}, but STILL TURNING at {}: cut its power", coast, rpm(speed_at_end));
+    case Outcome::unseen:
+      return coast + ", but its speed was not read afterwards: it may still be turning";
+    case Outcome::overruled:
+      return "coast overruled by a new speed";
+    case Outcome::unconfirmed:
+      break;
+  }
+  return coast +
+         ": it MAY BE TURNING, cut its power at the switch; without orders its module stops driving after 0.5 s";
+}
+
+void Stopping::check(const StopSettings& settings) {
+  const double deceleration = settings.deceleration.value_or(1000);
+  const bool good = deceleration >= 100 && deceleration <= 1e5 && settings.coast_below >= 0 &&
+                    settings.coast_below <= 1e4 && settings.standing_below > 0 && settings.limit > Duration{0};
+  if (!good) throw std::invalid_argument("a stop needs a deceleration of 100..100000 rad/s² and speeds above zero");
+}
+
+void Stopping::begin(const StopSettings& settings, double speed, bool ramped, Instant now) noexcept {
+  settings_ = settings;
+  phase_ = ramped ? Phase::ramping : Phase::coasting;
+  asked_ = next_ = coasted_ = now;
+  speed_at_coast_ = speed_ = speed;
+  measured_after_coast_ = false;
+  report_.reset();
+  open_ = {};
+  open_.speed_at_start = speed;
+}
+
+std::optional<double> Stopping::ramp(Instant now) noexcept {
+  if (phase_ != Phase::ramping || now < next_) return std::nullopt;
+  next_ = now + kRampStep;
+  const double left = std::abs(open_.speed_at_start) - *settings_.deceleration * to_seconds(now - asked_);
+  return left > settings_.coast_below ? std::copysign(left, open_.speed_at_start) : 0.0;
+}
+
+void Stopping::coasted(Instant now) noexcept {
+  if (phase_ != Phase::ramping) return;
+  phase_ = Phase::coasting;
+  coasted_ = now;
+  speed_at_coast_ = speed_;
+}
+
+void Stopping::confirmed(Instant now) noexcept {
+  if (phase_ == Phase::coasting && !open_.time_to_coast) open_.time_to_coast = now - asked_;
+}
+
+void Stopping::measured(double speed, Instant time) noexcept {
+  if (phase_ == Phase::none) return;
+  speed_ = speed;
+  if (phase_ != Phase::coasting || time < coasted_) return;
+  if (!measured_after_coast_) speed_at_coast_ = speed;
+  measured_after_coast_ = true;
+  speed_time_ = time;
+  if (std::abs(speed) < settings_.standing_below && !open_.time_to_standing) open_.time_to_standing = time - asked_;
+}
+
+void Stopping::advance(Instant now) noexcept {
+  if (phase_ != Phase::coasting) return;
+  if (open_.time_to_coast && open_.time_to_standing) return end(StopReport::Outcome::standing);
+  if (now < coasted_ + settings_.limit) return;
+  if (!open_.time_to_coast) return end(StopReport::Outcome::unconfirmed);
+  if (!measured_after_coast_) return end(StopReport::Outcome::unseen);
+  const bool falling = std::abs(speed_) < kFalling * std::abs(speed_at_coast_);
+  end(falling ? StopReport::Outcome::slowing : StopReport::Outcome::turning);
+}
+
+void Stopping::end(StopReport::Outcome outcome) noexcept {
+  if (phase_ == Phase::none) return;
+  phase_ = Phase::none;
+  open_.outcome = outcome;
+  open_.speed_at_end = speed_;
+  report_ = open_;
+}
+
+Instant Stopping::deadline() const noexcept {
+  if (phase_ == Phase::ramping) return next_;
+  return phase_ == Phase::coasting ? coasted_ + settings_.limit : kNever;
+}
+
+}  // namespace kphi::iq

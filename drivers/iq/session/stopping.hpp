@@ -1,0 +1,77 @@
+// Stopping a spinning motor, and the report of it. The motor coasts at once, or, on a supply that can sink current fed
+// back by the rotor, ramps down first. The stop ends when the module reports drive mode coast and the propeller is at
+// rest. Speeds in rad/s, times in bench time.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "base/clock.hpp"
+
+namespace kphi::iq {
+
+struct StopSettings {
+  /// rad/s², 100..100000. A ramp feeds current back: at 1000 an IQ 2306 raises a 12 V supply that cannot sink current
+  /// to 18.7 V. nullopt: the motor coasts at once.
+  std::optional<double> deceleration;
+  double coast_below = 500;                   ///< rad/s: below it a ramp ends and the motor coasts
+  double standing_below = 10;                 ///< rad/s
+  Duration limit = std::chrono::seconds(10);  ///< from the coast to standstill
+};
+
+struct StopReport {
+  enum class Outcome {
+    standing,     ///< drive mode coast is confirmed and the speed fell below the threshold
+    slowing,      ///< confirmed, and the speed was falling when the limit came
+    turning,      ///< confirmed, but the speed does not fall
+    unseen,       ///< confirmed, but no speed was read afterwards
+    unconfirmed,  ///< the module did not confirm; its own communication timeout must coast the motor
+    overruled,    ///< motion was commanded before the end
+  };
+  Outcome outcome = Outcome::unconfirmed;
+  double speed_at_start = 0;  ///< rad/s
+  double speed_at_end = 0;
+  std::optional<Duration> time_to_coast;     ///< from the request to the module's report of drive mode coast
+  std::optional<Duration> time_to_standing;  ///< from the request to the first speed below the threshold
+
+  /// The module has confirmed that it does not drive the motor.
+  [[nodiscard]] bool safe() const noexcept { return outcome != Outcome::unconfirmed && outcome != Outcome::overruled; }
+  /// One line: "coast confirmed after 0.01 s, at rest after 2.30 s".
+  [[nodiscard]] std::string summary() const;
+};
+
+class Stopping {
+ public:
+  /// Throws std::invalid_argument for settings that make no sense.
+  static void check(const StopSettings& settings);
+
+  /// From `speed`, signed; `ramped` else coasting at once.
+  void begin(const StopSettings& settings, double speed, bool ramped, Instant now) noexcept;
+  /// The speed to command now, zero: coast; nullopt: not ramping, or no new speed is due.
+  [[nodiscard]] std::optional<double> ramp(Instant now) noexcept;
+  void coasted(Instant now) noexcept;
+  void confirmed(Instant now) noexcept;
+  void measured(double speed, Instant time) noexcept;
+  /// Ends the stop when it is complete or its limit has passed.
+  void advance(Instant now) noexcept;
+  void end(StopReport::Outcome outcome) noexcept;
+
+  [[nodiscard]] bool active() const noexcept { return phase_ != Phase::none; }
+  [[nodiscard]] bool ramping() const noexcept { return phase_ == Phase::ramping; }
+  [[nodiscard]] Instant deadline() const noexcept;
+  /// The report of the last stop that ended.
+  [[nodiscard]] const std::optional<StopReport>& report() const noexcept { return report_; }
+
+ private:
+  enum class Phase { none, ramping, coasting };
+
+  Phase phase_ = Phase::none;
+  StopSettings settings_;
+  Instant asked_{0}, next_{0}, coasted_{0}, speed_time_{0};
+  double speed_at_coast_ = 0, speed_ = 0;
+  bool measured_after_coast_ = false;
+  StopReport open_;
+  std::optional<StopReport> report_;
+};
+
+}  // namespace kphi::iq

@@ -1,0 +1,260 @@
+#include "drivers/netbox/configuration/settings.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <pugixml.hpp>
+#include <thread>
+#include <utility>
+
+#include "base/error.hpp"
+#include "base/number.hpp"
+#include "drivers/netbox/configuration/http.hpp"
+#include "drivers/netbox/configuration/settings_journal.hpp"
+
+namespace kphi::netbox {
+namespace {
+
+constexpr std::chrono::seconds kTimeout{2};
+constexpr int kSlots = 16;
+// Some boxes serve only the first three writes of a second: what was ignored is asked for again, later each time.
+constexpr int kAttempts = 4;
+constexpr std::chrono::milliseconds kPause{400};
+
+/// All that can be written, and on which page. The address of the box and its kin are not here: a wrong one is mended
+/// with a screwdriver only.
+struct Setting {
+  const char* page;
+  const char* key;
+  const char* name;
+  std::optional<int> WantedSettings::*wanted;
+  int low, high;
+};
+constexpr Setting kSettings[] = {
+    {"setting.cgi", "setcfgsel", "configuration", &WantedSettings::configuration, 0, kSlots - 1},
+    {"setting.cgi", "setuserfilter", "filter", &WantedSettings::filter, 0, 12},
+    {"comm.cgi", "comrdtrate", "rate_hz", &WantedSettings::rate_hz, 1, 7000},
+    {"comm.cgi", "comrdtbsiz", "records_per_datagram", &WantedSettings::records_per_datagram, 1, 40},
+};
+
+const Setting* setting_of(const std::string& key) noexcept {
+  const auto found =
+      std::find_if(std::begin(kSettings), std::end(kSettings), [&](const Setting& s) { return key == s.key; });
+  return found == std::end(kSettings) ? nullptr : found;
+}
+
+std::string device(const Address& address) { return "Net Box " + address.host; }
+
+/// netftapi2.xml as far as it is needed to write: works for a slot that measures nothing, too.
+class Shown {
+ public:
+  explicit Shown(const Address& address)
+      : device_(device(address)), xml_(http_get(address.host, address.http_port, "/netftapi2.xml", kTimeout)) {
+    document_.load_buffer(xml_.data(), xml_.size());
+  }
+  [[nodiscard]] std::string text(const char* key) const { return document_.child("netft").child_value(key); }
+  [[nodiscard]] int number(const std::string& key) const {
+    const std::string value = text(key.c_str());
+    if (const auto number = parse_integer<int>(value)) return *number;
+    throw DeviceError(device_, "read its settings", fmt::format("<{}> holds \"{}\"", key, value),
+                      "open netftapi2.xml in a browser and compare");
+  }
+  [[nodiscard]] const std::string& xml() const noexcept { return xml_; }
+
+ private:
+  std::string device_, xml_;
+  pugi::xml_document document_;
+};
+
+/// From what the box shows to what it shall show.
+struct Assignment {
+  const Setting* setting;
+  int before, asked, expected;
+};
+
+void write_once(const Address& address, const std::vector<Assignment>& assignments) {
+  for (const char* page : {"setting.cgi", "comm.cgi"}) {
+    std::string query;
+    for (const Assignment& a : assignments) {
+      if (std::string_view(a.setting->page) == page)
+        query += fmt::format("{}{}={}", query.empty() ? '?' : '&', a.setting->key, a.asked);
+    }
+    if (!query.empty()) http_write(address.host, address.http_port, fmt::format("/{}{}", page, query), kTimeout);
+  }
+}
+
+/// Again while the box shows what it did before.
+Shown write_and_read_back(const Address& address, std::vector<Assignment> assignments) {
+  for (int attempt = 0;; ++attempt) {
+    write_once(address, assignments);
+    Shown shown(address);
+    std::erase_if(assignments, [&](const Assignment& a) { return shown.number(a.setting->key) != a.before; });
+    if (assignments.empty() || attempt + 1 == kAttempts) return shown;
+    std::this_thread::sleep_for((attempt + 1) * kPause);
+  }
+}
+
+/// What the box will show for what is asked.
+int expected(const Setting& setting, int asked, const Configuration& box) {
+  if (std::string_view(setting.key) != "comrdtrate") return asked;
+  const int device_rate = static_cast<int>(box.device_rate_hz);
+  return device_rate / std::max(1, device_rate / asked);
+}
+
+void check_ranges(const Address& address, const WantedSettings& wanted) {
+  for (const Setting& s : kSettings) {
+    const auto& value = wanted.*s.wanted;
+    if (!value || (*value >= s.low && *value <= s.high)) continue;
+    throw DeviceError(device(address), "write its settings",
+                      fmt::format("{} {} is not from {} to {}", s.name, *value, s.low, s.high), "nothing was written");
+  }
+}
+
+/// Its rate is that of its converter, and its filters depend on that: neither is known well enough to write it.
+void check_product(const Address& address, const Configuration& box, const WantedSettings& wanted) {
+  if (box.kind == Product::net_box || (!wanted.rate_hz && !wanted.filter)) return;
+  throw DeviceError(device(address), "write its settings",
+                    "rate_hz and filter of an Ethernet Axia cannot be written from here",
+                    "set them on the sensor's web pages and leave them out of the bench file; nothing was written");
+}
+
+std::vector<Assignment> differences(const Shown& shown, const Configuration& box, const WantedSettings& wanted) {
+  std::vector<Assignment> found;
+  for (const Setting& s : kSettings) {
+    const auto& asked = wanted.*s.wanted;
+    if (!asked) continue;
+    const Assignment a{&s, shown.number(s.key), *asked, expected(s, *asked, box)};
+    if (a.before != a.expected) found.push_back(a);
+  }
+  return found;
+}
+
+std::vector<std::string> read_slots(const Address& address) {
+  std::vector<std::string> slots;
+  for (int slot = 0; slot < kSlots; ++slot)
+    slots.push_back(http_get(address.host, address.http_port, fmt::format("/netftapi2.xml?index={}", slot), kTimeout));
+  return slots;
+}
+
+/// Findings: what was set back, and what somebody else has changed since.
+std::vector<Finding> set_back(const Address& address, const std::vector<ChangedSetting>& changed) {
+  const Shown present(address);
+  std::vector<Assignment> assignments;
+  std::vector<Finding> findings;
+  for (const ChangedSetting& c : changed) {
+    const Setting* setting = setting_of(c.key);
+    if (setting == nullptr || present.number(c.key) == c.before) continue;
+    if (present.number(c.key) == c.applied) {
+      assignments.push_back({setting, c.applied, c.before, c.before});
+    } else {
+      findings.push_back({Severity::warning,
+                          fmt::format("{} was set from {} to {}, and somebody has set it to {} since: left so",
+                                      setting->name, c.before, c.applied, present.number(c.key)),
+                          "check the box's settings"});
+    }
+  }
+  if (assignments.empty()) return findings;
+  const Shown after = write_and_read_back(address, assignments);
+  for (const Assignment& a : assignments) {
+    if (after.number(a.setting->key) != a.expected) {
+      throw DeviceError(device(address), "set its settings back",
+                        fmt::format("{} is {} and not {}", a.setting->name, after.number(a.setting->key), a.expected),
+                        fmt::format("set {} to {} on the box's web pages", a.setting->key, a.expected));
+    }
+    findings.push_back(
+        {Severity::note, fmt::format("{} was set back from {} to {}", a.setting->name, a.before, a.expected), ""});
+  }
+  return findings;
+}
+
+}  // namespace
+
+SettingsKeeper::SettingsKeeper(Address address, const WantedSettings& wanted, std::filesystem::path journal)
+    : address_(std::move(address)), journal_(std::move(journal)) {
+  check_ranges(address_, wanted);
+  notes_ = recover(address_, journal_);
+  try {
+    apply(wanted);
+  } catch (...) {
+    try {
+      restore();
+    } catch (const std::exception&) {
+      // The journal stays; the first failure is the one to tell.
+    }
+    throw;
+  }
+}
+
+SettingsKeeper::~SettingsKeeper() {
+  try {
+    restore();
+  } catch (const std::exception&) {
+    // The journal stays: the next start sets back.
+  }
+}
+
+void SettingsKeeper::apply(const WantedSettings& wanted) {
+  const Shown shown(address_);
+  before_ = after_ = parse_configuration(shown.xml(), device(address_));
+  check_product(address_, before_, wanted);
+  const std::vector<Assignment> assignments = differences(shown, before_, wanted);
+  if (assignments.empty()) return;
+  SettingsJournal journal{shown.text("mfgdigsn"), {}, read_slots(address_)};
+  if (wanted.configuration) {
+    (void)parse_configuration(journal.slots[static_cast<std::size_t>(*wanted.configuration)],
+                              fmt::format("{}, slot {}", device(address_), *wanted.configuration));
+  }
+  for (const Assignment& a : assignments) journal.changed.push_back({a.setting->key, a.before, a.expected});
+  write_journal(journal_, journal);
+  changed_ = journal.changed;
+  const Shown after = write_and_read_back(address_, assignments);
+  for (std::size_t i = 0; i < assignments.size(); ++i) {
+    const Assignment& a = assignments[i];
+    changed_[i].applied = after.number(a.setting->key);
+    if (changed_[i].applied == a.before) {
+      throw DeviceError(device(address_), "write its settings",
+                        fmt::format("the box keeps {} at {} and does not take {}", a.setting->name, a.before, a.asked),
+                        "close the box's web pages and other programs that write to it");
+    }
+  }
+  if (changed_ != journal.changed) {
+    journal.changed = changed_;
+    write_journal(journal_, journal);
+  }
+  after_ = parse_configuration(after.xml(), device(address_));
+  for (std::size_t i = 0; i < assignments.size(); ++i) {
+    if (changed_[i].applied == assignments[i].asked) continue;
+    const bool quantised = changed_[i].applied == assignments[i].expected;
+    notes_.push_back({quantised ? Severity::note : Severity::warning,
+                      fmt::format("{} {} was asked for, the box runs {}", assignments[i].setting->name,
+                                  assignments[i].asked, changed_[i].applied),
+                      quantised ? "" : "the measurement is made with the box's value"});
+  }
+}
+
+void SettingsKeeper::restore() {
+  if (changed_.empty()) return;
+  const std::vector<Finding> findings = set_back(address_, changed_);
+  for (const Finding& finding : findings) {
+    if (finding.severity != Severity::note) notes_.push_back(finding);
+  }
+  changed_.clear();
+  remove_journal(journal_);
+}
+
+std::vector<Finding> SettingsKeeper::recover(const Address& address, const std::filesystem::path& journal) {
+  const std::optional<SettingsJournal> left = read_journal(journal);
+  if (!left) return {};
+  const std::string box = Shown(address).text("mfgdigsn");
+  if (box != left->box) {
+    throw DeviceError(device(address), "set its settings back",
+                      fmt::format("{} was left by a program that changed box \"{}\", this one is \"{}\"",
+                                  journal.string(), left->box, box),
+                      "connect that box, or remove the file");
+  }
+  std::vector<Finding> findings = set_back(address, left->changed);
+  remove_journal(journal);
+  return findings;
+}
+
+}  // namespace kphi::netbox

@@ -1,0 +1,126 @@
+#include "drivers/netbox/receive/probe.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "base/error.hpp"
+#include "drivers/netbox/configuration/calinfo.hpp"
+#include "drivers/netbox/wire/status.hpp"
+
+namespace kphi::netbox {
+namespace {
+
+std::string status_words(std::uint32_t status, Product product) {
+  std::string words;
+  for (const std::string& name : names(status, product)) words += (words.empty() ? "" : ", ") + name;
+  return words;
+}
+
+void judge_stream(Probe& probe, std::uint32_t status, bool known_skew) {
+  const Counters& counters = probe.counters;
+  const auto find = [&](Severity severity, std::string what, std::string next_move) {
+    probe.findings.push_back({severity, std::move(what), std::move(next_move)});
+  };
+  if (counters.lost_network > 0)
+    find(Severity::warning,
+         fmt::format("{} of {} records were lost in the network", counters.lost_network, counters.expected),
+         "connect the box directly, or through a switch of its own");
+  if (counters.lost_host > 0)
+    find(Severity::warning,
+         fmt::format("{} of {} records were lost in this host", counters.lost_host, counters.expected),
+         "raise net.core.rmem_max to 4194304");
+  if (counters.malformed > 0)
+    find(Severity::warning, fmt::format("{} datagrams have a wrong size", counters.malformed),
+         "is another device at this address?");
+  if (!healthy(status))
+    find(Severity::fault, "the box reports: " + status_words(status, probe.configuration->kind),
+         "power-cycle the box; unload the cell if saturated");
+  if (known_skew && std::abs(probe.health.skew_ppm) > ClockEstimate::kBelievableSkewPpm)
+    find(Severity::fault,
+         fmt::format("the box's clock deviates by {:.0f} ppm: its rate is another than configured",
+                     probe.health.skew_ppm),
+         "read the RDT output rate on the box's Communications page again");
+  for (const Event& event : probe.events) find(Severity::warning, to_string(event), "");
+}
+
+void look_at_stream(Probe& probe, LoadCell& cell, const Clock& clock, std::chrono::nanoseconds duration) {
+  cell.start();
+  const auto end = std::chrono::steady_clock::now() + duration;
+  std::vector<StampedRecord> batch(4096);
+  std::uint32_t status = 0;
+  for (auto now = std::chrono::steady_clock::now(); now < end; now = std::chrono::steady_clock::now()) {
+    if (!cell.wait(end - now)) break;
+    const std::size_t count = cell.take(batch);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!healthy(batch[i].record.status)) status |= batch[i].record.status;
+    }
+  }
+  cell.stop();
+  probe.streamed = true;
+  probe.counters = cell.counters();
+  probe.health = cell.health();
+  // Jitter is this host's and the network's: told as a person's clock runs.
+  probe.health.jitter_p50_ns = clock.shrunk(Duration(probe.health.jitter_p50_ns)).count();
+  probe.health.jitter_p99_ns = clock.shrunk(Duration(probe.health.jitter_p99_ns)).count();
+  probe.receive_buffer = cell.receive_buffer_note();
+  probe.events = cell.take_events();
+  judge_stream(probe, status, clock.shrunk(std::chrono::seconds(1)) == std::chrono::seconds(1));
+}
+
+std::string filter_words(const Configuration& box) {
+  if (!filter_cutoff_hz(box)) return fmt::format("filter code {}", box.filter_code);
+  const double cutoff = *filter_cutoff_hz(box);
+  return cutoff > 0 ? fmt::format("filter {:g} Hz", cutoff) : "no filter";
+}
+
+}  // namespace
+
+std::vector<std::string> Probe::lines() const {
+  std::vector<std::string> text;
+  if (configuration) {
+    const Configuration& box = *configuration;
+    text.push_back(fmt::format("{}, serial {}, firmware {}", box.product.empty() ? "Net Box" : box.product,
+                               box.serial.empty() ? "not told" : box.serial, box.firmware));
+    text.push_back(fmt::format("calibration {} in slot {} \"{}\", {:.0f} counts per N, {:.0f} per Nm",
+                               box.calibration_serial, box.slot, box.slot_name, box.counts_per_newton,
+                               box.counts_per_newton_metre));
+    text.push_back(fmt::format("ranges {:g} {:g} {:g} N, {:g} {:g} {:g} Nm", box.range[0], box.range[1], box.range[2],
+                               box.range[3], box.range[4], box.range[5]));
+    text.push_back(fmt::format("RDT {}, {:.4g} Hz, {} records per datagram, {}",
+                               box.rdt_enabled ? "enabled" : "disabled", box.rdt_rate_hz, box.records_per_datagram,
+                               filter_words(box)));
+    text.push_back(fmt::format("gage bias {:g} {:g} {:g} {:g} {:g} {:g}", box.gage_bias[0], box.gage_bias[1],
+                               box.gage_bias[2], box.gage_bias[3], box.gage_bias[4], box.gage_bias[5]));
+  }
+  if (streamed) {
+    text.push_back(fmt::format("{} records, {:.1f} per second, {} lost, {} late, {} duplicates, {} overtaken",
+                               counters.received, health.records_per_second, counters.lost_network + counters.lost_host,
+                               counters.late, counters.duplicates, counters.reordered));
+    text.push_back(fmt::format("clock {:+.1f} ppm, jitter p50 {:.0f} us, p99 {:.0f} us", health.skew_ppm,
+                               1e-3 * static_cast<double>(health.jitter_p50_ns),
+                               1e-3 * static_cast<double>(health.jitter_p99_ns)));
+    text.push_back("receive buffer " + receive_buffer);
+  }
+  for (const Finding& finding : findings) text.push_back(finding.line());
+  return text;
+}
+
+Probe probe(const Address& address, const Clock& clock, const ProbeSettings& settings) {
+  Probe found;
+  try {
+    LoadCell cell(address, clock, Command::buffered, {.reconnect = false});
+    found.configuration = cell.configuration();
+    found.findings = audit(*found.configuration, settings.intention);
+    if (auto finding = cell.receive_buffer_finding()) found.findings.push_back(std::move(*finding));
+    if (auto finding = cross_check(address.host, settings.tcp_port, *found.configuration, settings.tcp_timeout))
+      found.findings.push_back(std::move(*finding));
+    look_at_stream(found, cell, clock, settings.stream);
+  } catch (const DeviceError& error) {
+    found.findings.push_back({Severity::fault, error.what(), ""});
+  }
+  put_worst_first(found.findings);
+  return found;
+}
+
+}  // namespace kphi::netbox

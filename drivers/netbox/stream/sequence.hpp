@@ -1,0 +1,147 @@
+// Which records count, and what is missing between them. Both sequence numbers are compared as signed differences
+// modulo 2^32. No bytes, no I/O; one thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "base/clock.hpp"
+#include "drivers/netbox/stream/events.hpp"
+#include "drivers/netbox/wire/rdt.hpp"
+
+namespace kphi::netbox {
+
+struct StampedRecord {
+  Record record;
+  Instant arrival{0};  ///< bench time at which the datagram that brought it reached this host
+};
+
+/// Records unless said otherwise. expected = received + lost_network + lost_host, always.
+struct Counters {
+  std::uint64_t received = 0;      ///< accepted
+  std::uint64_t expected = 0;      ///< that the box took from the first to the last accepted one (ft_sequence / stride)
+  std::uint64_t lost_network = 0;  ///< never reached this host; late ones stay counted here
+  std::uint64_t lost_host = 0;     ///< reached this host while the socket's buffer was full
+  std::uint64_t duplicates = 0;    ///< came a second time; discarded
+  std::uint64_t late = 0;          ///< came after a younger one had been delivered; discarded
+  std::uint64_t reordered = 0;     ///< came after a younger one, but before its delivery; in their place again
+  std::uint64_t stalled = 0;       ///< repeated an old measurement under a new rdt_sequence; discarded
+  std::uint64_t irregular = 0;     ///< accepted, but rdt and ft disagree about the gap before them (rate changed?)
+  std::uint64_t restarts = 0;      ///< times the stream began anew, ft_sequence going on
+  std::uint64_t reboots = 0;       ///< times ft_sequence began anew: bias and scale are to be doubted
+  std::uint64_t datagrams = 0;     ///< of any kind
+  std::uint64_t malformed = 0;     ///< datagrams of wrong size
+  std::uint64_t drained = 0;       ///< datagrams that came while none was asked for
+  std::uint64_t host_drops = 0;    ///< datagrams that the socket dropped (SO_RXQ_OVFL)
+  std::uint64_t reconnects = 0;    ///< times the stream was started again after it had ended
+  std::uint64_t renewals = 0;      ///< times the stream began anew because its lease was renewed: no restarts
+  std::uint64_t lost_at_renewals = 0;  ///< of lost_network and lost_host: missing where that happened
+  std::uint64_t queue_overflows = 0;   ///< accepted, then lost because the consumer did not take them in time
+};
+
+class LossTracker {
+ public:
+  /// `stride`: ft_sequence per record, 1..7000. `device_rate_hz`: ft_sequence per second.
+  LossTracker(unsigned stride, double device_rate_hz) noexcept : stride_(stride), device_rate_hz_(device_rate_hz) {}
+
+  /// The next record is the first of a stream that was asked for: nothing is missing before it.
+  void begin_segment() noexcept;
+  /// So many of the next restarts are asked for: no doubt, and no event.
+  void expect_renewals(int count) noexcept { renewals_expected_ = count; }
+  /// True: deliver it. False: counted and to be discarded.
+  [[nodiscard]] bool accept(const Record& record, Instant arrival) noexcept {
+    if (is_next(record)) [[likely]] {
+      accept_run(record, 1, arrival);
+      return true;
+    }
+    return accept_unusual(record, arrival);
+  }
+  /// Follows the last accepted one in both numbers.
+  [[nodiscard]] bool is_next(const Record& record) const noexcept {
+    return has_last_ && record.rdt_sequence == last_rdt_ + 1 && record.ft_sequence == last_ft_ + stride_;
+  }
+  /// `count` records that follow each other, the first is_next(); `last` is the last of them.
+  void accept_run(const Record& last, std::size_t count, Instant arrival) noexcept {
+    remember(last, arrival);
+    counters_.received += count;
+    counters_.expected += count;
+  }
+  /// The first record of a stream has come, though it may wait: what was dropped before it explains no gap.
+  void forget_host_drops() noexcept { host_credit_ = 0; }
+  /// Of the first two records of a rebooted box the one that came first, once accept() has taken the other: both are to
+  /// be delivered, in the order of their numbers.
+  [[nodiscard]] std::optional<StampedRecord> take_confirmed() noexcept;
+  /// Only a box that has booted anew can have sent it, as far as one record can tell.
+  [[nodiscard]] bool looks_rebooted(const Record& record, Instant arrival) const noexcept;
+  [[nodiscard]] bool has_last() const noexcept { return has_last_; }
+  [[nodiscard]] std::uint32_t last_ft() const noexcept { return last_ft_; }
+  [[nodiscard]] std::uint32_t last_rdt() const noexcept { return stall_run_ > 0 ? stall_rdt_ : last_rdt_; }
+  /// As many records more were dropped by this host's socket: they explain the gaps seen from now on.
+  void add_host_drops(std::uint64_t datagrams, std::uint64_t records_per_datagram) noexcept;
+
+  [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
+  [[nodiscard]] Counters& counters() noexcept { return counters_; }
+  /// Restarts, reboots and stalls; the owner takes them.
+  [[nodiscard]] EventLog& events() noexcept { return events_; }
+
+ private:
+  struct Gap {
+    std::uint32_t after_ft = 0, before_ft = 0;  // both were received
+  };
+
+  void remember(const Record& record, Instant arrival) noexcept {
+    last_rdt_ = record.rdt_sequence;
+    last_ft_ = record.ft_sequence;
+    last_arrival_ = arrival;
+    has_stray_ = false;
+  }
+  bool accept_unusual(const Record& record, Instant arrival) noexcept;
+  bool accept_forward(const Record& record, Instant arrival, std::int32_t rdt_step, std::int32_t ft_step) noexcept;
+  bool refuse(std::uint64_t Counters::*as) noexcept {
+    ++(counters_.*as);
+    return false;
+  }
+  bool accept_first(const Record& record, Instant arrival) noexcept;
+  void note_restart(const Record& record, Instant arrival, std::uint64_t missing) noexcept;
+  bool plausible(std::int32_t ft_step, Instant arrival) const noexcept;
+  /// A box that has booted after the last accepted record can have counted so far.
+  bool counted_since_last(std::uint32_t ft, Instant arrival) const noexcept;
+  bool in_time(std::int32_t ft_step, Instant arrival) const noexcept;
+  /// One stream can have gone on by so many records since the last accepted one.
+  bool sent_since_last(std::int32_t rdt_step, Instant arrival) const noexcept;
+  bool accept_reboot(const Record& record, Instant arrival) noexcept;
+  bool note_stray(const Record& record, Instant arrival, std::int32_t ft_step) noexcept;
+  bool confirms(const Record& first, const Record& second, Instant arrival) const noexcept;
+  void note_stall(const Record& record, Instant arrival) noexcept;
+  void note_event(EventKind kind, const Record& record, Instant at, std::uint64_t records) noexcept;
+  /// The same for all records of one stream: they lie on one line of rdt over ft.
+  std::uint32_t line(std::uint32_t rdt, std::uint32_t ft) const noexcept { return rdt * stride_ - ft; }
+  bool on_former_line(const Record& record) const noexcept;
+  void leave_line() noexcept { former_lines_[former_count_++ % former_lines_.size()] = line(last_rdt_, last_ft_); }
+  void count_lost(std::uint64_t records, const Gap& gap) noexcept;
+  bool in_recent_gap(std::uint32_t ft) const noexcept;
+
+  const std::uint32_t stride_;
+  const double device_rate_hz_;
+  bool has_last_ = false;
+  std::uint32_t last_rdt_ = 0, last_ft_ = 0;
+  Instant last_arrival_{0};
+  int renewals_expected_ = 0;
+  std::uint64_t host_credit_ = 0;  // records dropped by the socket and not yet found missing
+  std::array<Gap, 16> gaps_{};
+  std::uint64_t gap_count_ = 0;
+  std::array<std::uint32_t, 4> former_lines_{};
+  std::uint64_t former_count_ = 0;
+  std::uint64_t stall_run_ = 0;  // records since the measurement stands still
+  std::uint32_t stall_rdt_ = 0;
+  bool began_anew_stalled_ = false;  // the stream did, while the measurement stood still
+  bool has_stray_ = false;           // the last record was one that only a rebooted box can have sent
+  StampedRecord candidate_reboot_;
+  std::uint64_t Counters::*stray_counted_ = nullptr;  // as what it was discarded
+  std::optional<StampedRecord> confirmed_;
+  Counters counters_;
+  EventLog events_;
+};
+
+}  // namespace kphi::netbox

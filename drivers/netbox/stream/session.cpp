@@ -1,0 +1,327 @@
+#include "drivers/netbox/stream/session.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace kphi::netbox {
+namespace {
+
+// A stop that the box did not hear shows as datagrams that do not end: so many settle times are enough.
+constexpr int kDrainLimit = 20;
+// A new stream counts from 1. What is further on than so many datagrams, and so many times what the rate gives since
+// the box was asked, belongs to the one before.
+constexpr double kFirstDatagrams = 4, kLargestRate = 4;
+
+// Of the Net Box; the Axia has no such bits.
+constexpr std::uint32_t kTroubleBits =
+    1u << static_cast<unsigned>(StatusBit::rdt) | 1u << static_cast<unsigned>(StatusBit::network);
+
+// A lease of fewer silences could end before a silence is noticed: whether somebody has taken the stream or it has run
+// out could not be told then.
+constexpr int kLeastLease = 4;
+
+bool same_count(const StreamSettings& a, const StreamSettings& b) noexcept {
+  return a.divisor == b.divisor && a.device_rate_hz == b.device_rate_hz;
+}
+
+std::size_t window_records(const StreamSettings& settings) {
+  const auto four_datagrams = static_cast<std::size_t>(settings.buffered ? 4 * settings.records_per_datagram : 4);
+  return std::max(settings.reorder_records, four_datagrams);
+}
+
+}  // namespace
+
+Duration StreamSettings::datagram_period() const noexcept {
+  return from_seconds((buffered ? records_per_datagram : 1) * (divisor / device_rate_hz));
+}
+
+std::uint32_t StreamSettings::sample_count() const noexcept {
+  if (lease <= Duration{0}) return 0;
+  const Duration period = datagram_period();
+  const std::int64_t datagrams = (std::max(lease, kLeastLease * silence()) + period - Duration{1}) / period;
+  return static_cast<std::uint32_t>(datagrams * (buffered ? records_per_datagram : 1));
+}
+
+Session::Session(StreamSettings settings) : Session(settings, LossTracker(settings.divisor, settings.device_rate_hz)) {}
+
+Session::Session(StreamSettings settings, const Session& before)
+    : Session(settings, same_count(settings, before.settings_)
+                            ? before.account_
+                            : LossTracker(settings.divisor, settings.device_rate_hz)) {
+  account_.counters() = before.account_.counters();
+  host_drops_ = before.host_drops_;
+  renewals_seen_ = before.renewals_seen_;
+  phase_ = before.phase_;
+}
+
+Session::Session(StreamSettings settings, LossTracker account)
+    : settings_(settings),
+      silence_(settings.silence()),
+      lease_(from_seconds(settings.sample_count() * (settings.divisor / settings.device_rate_hz))),
+      account_(std::move(account)),
+      window_(window_records(settings), settings.reorder_patience, settings.divisor),
+      datagram_records_(settings.buffered ? static_cast<std::size_t>(settings.records_per_datagram) : 1) {}
+
+void Session::start(Instant now) {
+  if (phase_ == Phase::idle || phase_ == Phase::failed) {
+    account_.begin_segment();
+    window_.forget();
+    resuming_ = false;
+  } else if (phase_ == Phase::streaming || phase_ == Phase::silent) {
+    resuming_ = true;
+    silence_told_ = phase_ == Phase::silent;
+  }
+  attempt_ = 0;
+  request_count_ = 0;
+  send_stop(now);
+  phase_ = Phase::draining;
+  bias_due_ = renewal_due_ = kNever;
+  due_ = now + settings_.settle;
+  drain_limit_ = now + kDrainLimit * settings_.settle;
+}
+
+void Session::stop(Instant now) {
+  request_count_ = 0;
+  send_stop(now);
+  phase_ = Phase::idle;
+  due_ = bias_due_ = renewal_due_ = kNever;
+}
+
+std::size_t Session::receive_in_order(std::span<const std::uint8_t> datagram, Instant arrival,
+                                      std::span<StampedRecord> out) noexcept {
+  const std::size_t count = records_in(datagram.size());
+  if (phase_ != Phase::streaming || !window_.empty() || count == 0 || count > out.size()) return 0;
+  decode(datagram.data(), out[0].record);
+  if (!account_.is_next(out[0].record)) return 0;
+  std::uint32_t rdt = out[0].record.rdt_sequence, ft = out[0].record.ft_sequence;
+  std::uint32_t deviation = 0, status = out[0].record.status;
+  out[0].arrival = arrival;
+  for (std::size_t i = 1; i < count; ++i) {
+    Record& record = out[i].record;
+    decode(datagram.data() + i * kRecordBytes, record);
+    out[i].arrival = arrival;
+    deviation |= (record.rdt_sequence ^ ++rdt) | (record.ft_sequence ^ (ft += settings_.divisor));
+    status |= record.status;
+  }
+  if (deviation != 0) return 0;
+  ++account_.counters().datagrams;
+  account_.accept_run(out[count - 1].record, count, arrival);
+  if (status != trouble_) note_status(status, out[0].record, arrival);
+  note_arrival(count, arrival);
+  return count;
+}
+
+void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out) {
+  const std::size_t before = out.size();
+  out.resize(before + records_in(datagram.size()));
+  const std::size_t in_order = receive_in_order(datagram, arrival, std::span(out).subspan(before));
+  out.resize(before + in_order);
+  if (in_order > 0) return;
+  Counters& counters = account_.counters();
+  ++counters.datagrams;
+  const std::size_t count = decode(datagram, decoded_);
+  if (count == 0) {
+    ++counters.malformed;
+    return;
+  }
+  if (phase_ != Phase::streaming) {
+    const bool expected =
+        phase_ == Phase::silent || (phase_ == Phase::awaiting && belongs_to_new_stream(decoded_[0], arrival));
+    if (!expected) return discard(arrival);
+  }
+  datagram_records_ = count;
+  if (!take_records(count, arrival, out)) return;
+  if (phase_ != Phase::streaming) begin_streaming(arrival);
+  note_arrival(count, arrival);
+}
+
+void Session::begin_streaming(Instant arrival) noexcept {
+  if (phase_ == Phase::silent) note_event(EventKind::resumed, arrival, decoded_[0]);
+  if (resuming_ && phase_ == Phase::awaiting) {
+    ++account_.counters().reconnects;
+    note_event(EventKind::reconnected, arrival, decoded_[0]);
+  }
+  phase_ = Phase::streaming;
+  resuming_ = false;
+  if (lease_ == Duration{0}) return;
+  renewal_due_ = arrival + lease_ / 2;
+  lease_end_ = arrival + lease_;
+}
+
+/// Only ever behind a datagram of ours: a renewal of a stream that another client has taken would be a fight for it.
+void Session::tend_lease(Instant now) noexcept {
+  const std::uint64_t renewals = account_.counters().renewals;
+  if (renewals != renewals_seen_) {
+    renewals_seen_ = renewals;
+    renewals_sent_ = 0;
+    account_.expect_renewals(0);
+    renewal_due_ = now + lease_ / 2;
+    lease_end_ = now + lease_;
+  } else if (now >= renewal_due_) {
+    renew_lease(now);
+  }
+}
+
+void Session::renew_lease(Instant now) noexcept {
+  account_.expect_renewals(++renewals_sent_);
+  send(start_command());
+  renewal_due_ = now + 3 * settings_.datagram_period() + settings_.reply_timeout;
+}
+
+Command Session::start_command() const noexcept {
+  if (settings_.product == Product::axia)
+    return settings_.buffered ? Command::axia_multi_block : Command::axia_single_block;
+  if (settings_.buffered) return Command::buffered;
+  return settings_.multi_unit ? Command::multi_unit : Command::real_time;
+}
+
+bool Session::take_records(std::size_t count, Instant arrival, std::vector<StampedRecord>& out) {
+  bool any_new = false;
+  std::uint32_t status = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    status |= decoded_[i].status;
+    any_new |= window_.receive(decoded_[i], arrival, account_, out);
+  }
+  note_status(status, decoded_[0], arrival);
+  return any_new;
+}
+
+void Session::note_arrival(std::size_t count, Instant arrival) noexcept {
+  datagram_records_ = count;
+  newest_arrival_ = arrival;
+  due_ = arrival + silence_;
+  if (lease_ > Duration{0}) tend_lease(arrival);
+}
+
+void Session::note_status(std::uint32_t status, const Record& shown_by, Instant arrival) noexcept {
+  const std::uint32_t trouble = settings_.product == Product::net_box ? status & kTroubleBits : 0;
+  if ((trouble & ~trouble_) != 0) note_event(EventKind::box_trouble, arrival, shown_by, trouble);
+  trouble_ = trouble;
+}
+
+void Session::note_silence(Instant now) noexcept {
+  Record last;
+  last.rdt_sequence = account_.last_rdt();
+  last.ft_sequence = account_.last_ft();
+  note_event(EventKind::silent, now, last);
+}
+
+void Session::note_event(EventKind kind, Instant at, const Record& shown_by, std::uint32_t status) noexcept {
+  account_.events().note(
+      {kind, at, shown_by.rdt_sequence, shown_by.ft_sequence, account_.last_rdt(), account_.last_ft(), 0, status});
+}
+
+void Session::set_bias(Instant now) {
+  if (phase_ != Phase::streaming) return;
+  send(Command::set_bias);
+  bias_starts_ = 0;
+  bias_due_ = now + 3 * settings_.datagram_period() + settings_.bias_patience;
+}
+
+void Session::check_bias(Instant now) noexcept {
+  const bool flows = newest_arrival_ + 2 * settings_.datagram_period() + settings_.bias_patience / 2 > now;
+  if (flows || bias_starts_ == settings_.attempts) {
+    bias_due_ = kNever;
+    return;
+  }
+  send(start_command());
+  ++bias_starts_;
+  bias_due_ = now + 3 * settings_.datagram_period() + settings_.reply_timeout;
+}
+
+void Session::advance(Instant now) {
+  if (now >= bias_due_) check_bias(now);
+  if (now < due_) return;
+  switch (phase_) {
+    case Phase::draining:
+      return send_start(now);
+    case Phase::awaiting:
+      if (attempt_ < settings_.attempts) return send_start(now);
+      stop(now);
+      phase_ = resuming_ ? Phase::silent : Phase::failed;
+      if (resuming_ && !silence_told_) note_silence(now);
+      return;
+    case Phase::streaming:
+      renewal_due_ = kNever;
+      if (now >= lease_end_) {
+        // This host stood still for too long, and the box has stopped by itself: nobody has taken the stream.
+        start(now);
+        account_.expect_renewals(1);
+        return;
+      }
+      phase_ = Phase::silent;
+      due_ = kNever;
+      note_silence(now);
+      return;
+    case Phase::idle:
+    case Phase::silent:
+    case Phase::failed:
+      due_ = kNever;
+  }
+}
+
+bool Session::next_request(std::array<std::uint8_t, 8>& request) noexcept {
+  if (request_count_ == 0) return false;
+  request = encode_request(requests_[0], requests_[0] == start_command() ? settings_.sample_count() : 0);
+  std::copy(requests_.begin() + 1, requests_.end(), requests_.begin());
+  --request_count_;
+  return true;
+}
+
+Instant Session::deadline() const noexcept { return std::min(due_, bias_due_); }
+
+State Session::state() const noexcept {
+  switch (phase_) {
+    case Phase::draining:
+    case Phase::awaiting:
+      return State::starting;
+    case Phase::streaming:
+      return State::streaming;
+    case Phase::silent:
+      return State::silent;
+    case Phase::failed:
+      return State::failed;
+    case Phase::idle:
+      break;
+  }
+  return State::idle;
+}
+
+void Session::note_host_drops(std::uint64_t total) noexcept {
+  if (total <= host_drops_) return;
+  account_.add_host_drops(total - host_drops_, datagram_records_);
+  host_drops_ = total;
+}
+
+void Session::discard(Instant arrival) {
+  ++account_.counters().drained;
+  if (phase_ == Phase::awaiting) return;
+  if (arrival - stop_sent_ >= settings_.settle) send_stop(arrival);
+  if (phase_ == Phase::draining) due_ = std::min(arrival + settings_.settle, drain_limit_);
+}
+
+bool Session::belongs_to_new_stream(const Record& first, Instant arrival) const noexcept {
+  const double datagrams = to_seconds(arrival - first_start_) / to_seconds(settings_.datagram_period());
+  const double records = settings_.buffered ? settings_.records_per_datagram : 1;
+  return first.rdt_sequence <= records * (kFirstDatagrams + kLargestRate * std::max(datagrams, 0.0));
+}
+
+void Session::send(Command command) noexcept {
+  if (request_count_ < requests_.size()) requests_[request_count_++] = command;
+}
+
+void Session::send_stop(Instant now) noexcept {
+  send(Command::stop);
+  stop_sent_ = now;
+}
+
+void Session::send_start(Instant now) noexcept {
+  send(start_command());
+  if (attempt_ == 0) first_start_ = now;
+  const Duration patience = settings_.reply_timeout * (attempt_ == 0 ? 1 : attempt_ == 1 ? 2 : 4);
+  ++attempt_;
+  phase_ = Phase::awaiting;
+  due_ = now + patience + 2 * settings_.datagram_period();
+}
+
+}  // namespace kphi::netbox

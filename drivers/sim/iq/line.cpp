@@ -1,0 +1,399 @@
+#include "drivers/sim/iq/line.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "drivers/sim/iq/frame.hpp"
+#include "drivers/sim/transport/bytes.hpp"
+
+namespace kphi::sim {
+namespace {
+
+constexpr double kBitsPerByte = 10;       // 8N1
+constexpr double kRateTolerance = 0.045;  // beyond it the stop bit is missed
+constexpr std::uint8_t kReply = 3;
+constexpr std::array<std::uint32_t, 3> kOtherUid{0x00410018, 0x4d4b5022, 0x20343354};
+
+constexpr std::uint32_t bit(MotorFaultKind kind) noexcept { return 1u << static_cast<unsigned>(kind); }
+
+/// Faults of a moment or a span; all others wait for replies or bytes.
+bool is_event(const MotorFault& fault) noexcept {
+  return fault.kind >= MotorFaultKind::mute && fault.kind != MotorFaultKind::command_flip;
+}
+
+}  // namespace
+
+IqLine::IqLine(IqDevice& module, const IqLineSettings& settings, MotorFaultScript script, std::uint64_t seed, Keep keep)
+    : module_(module),
+      settings_(settings),
+      script_(std::move(script)),
+      random_(seed),
+      keep_(keep),
+      progress_(script_.size()) {
+  for (std::size_t i = 0; i < script_.size(); ++i) {
+    if (!is_event(script_[i])) continue;
+    events_.push_back({script_[i].at, i, true});
+    if (script_[i].end() != kNever) events_.push_back({script_[i].end(), i, false});
+  }
+  std::stable_sort(events_.begin(), events_.end(), [](const Event& a, const Event& b) { return a.at > b.at; });
+}
+
+void IqLine::send(std::span<const std::uint8_t> bytes, Instant now) {
+  truth_.bytes_from_host += bytes.size();
+  if (!plugged_) return;
+  const Duration each = byte_time(host_rate_ > 0 ? host_rate_ : module_.line_rate());
+  for (const std::uint8_t byte : bytes) {
+    host_free_ = std::max(host_free_, now) + each;
+    to_module_.push_back({host_free_, byte});
+  }
+}
+
+void IqLine::advance(Instant now) {
+  meet_events(now);
+  carry_commands(now);
+  take_replies(now);
+  let_pass(now);
+  arrive(now);
+}
+
+bool IqLine::next_chunk(IqChunk& out, Instant now) {
+  if (chunks_.empty() || chunks_.front().at > now) return false;
+  out = std::move(chunks_.front());
+  chunks_.pop_front();
+  return true;
+}
+
+Instant IqLine::next_event() const noexcept {
+  Instant next = module_.next_reply_at();
+  if (!events_.empty()) next = std::min(next, events_.back().at);
+  if (!to_module_.empty()) next = std::min(next, to_module_.front().due);
+  if (!to_host_.empty()) next = std::min(next, arrival_of(to_host_.front()));
+  if (!chunks_.empty()) next = std::min(next, chunks_.front().at);
+  if (held_) next = std::min(next, hold_until_);
+  return next;
+}
+
+// --- to the module
+
+void IqLine::carry_commands(Instant now) {
+  while (!to_module_.empty() && to_module_.front().due <= now) {
+    Byte carried = to_module_.front();
+    to_module_.pop_front();
+    take_replies(carried.due);
+    if (deaf_) continue;
+    if (!rates_match()) carried.byte = random_byte();
+    for (std::size_t i = 0; i < script_.size(); ++i) {
+      if (script_[i].kind != MotorFaultKind::command_flip || !active(i, carried.due) || !chance(script_[i].p)) continue;
+      carried.byte ^= static_cast<std::uint8_t>(1u << (random_.bits() & 7));
+      ++progress_[i].used;
+      ++truth_.done[static_cast<std::size_t>(MotorFaultKind::command_flip)];
+    }
+    ++truth_.bytes_to_module;
+    module_.receive({&carried.byte, 1}, carried.due);
+  }
+}
+
+// --- from the module
+
+void IqLine::take_replies(Instant now) {
+  IqReply reply;
+  while (module_.next_reply(reply, now)) carry(reply);
+}
+
+void IqLine::carry(const IqReply& reply) {
+  ++truth_.replies;
+  FaultDecision decision;
+  decision.reply = reply;
+  decision.passage.ready = reply.at;
+  for (std::size_t i = 0; i < script_.size(); ++i) {
+    if (is_event(script_[i]) || !active(i, reply.at) || !concerns(script_[i], reply) || !chance(script_[i].p)) continue;
+    ++progress_[i].used;
+    ++truth_.done[static_cast<std::size_t>(script_[i].kind)];
+    decision.done |= bit(script_[i].kind);
+    act(i, decision);
+  }
+  if (decision.overtaken && !decision.dropped && !held_) {
+    hold_until_ = reply.at + decision.overtaken_for;
+    held_ = std::move(decision);
+    return;
+  }
+  const Instant at = reply.at;
+  emit(std::move(decision));
+  if (!held_) return;
+  held_->passage.ready = std::max(held_->passage.ready, at);
+  emit(*std::exchange(held_, std::nullopt));
+}
+
+void IqLine::act(std::size_t index, FaultDecision& decision) {
+  const MotorFault& fault = script_[index];
+  IqReply& reply = decision.reply;
+  switch (fault.kind) {
+    case MotorFaultKind::drop:
+      decision.dropped = true;
+      break;
+    case MotorFaultKind::duplicate:
+      ++decision.copies;
+      break;
+    case MotorFaultKind::reorder:
+      decision.overtaken = true;
+      decision.overtaken_for = fault.delay;
+      break;
+    case MotorFaultKind::value:
+      if (reply.size == 4)
+        put_little(reply.bytes.data(), std::bit_cast<std::uint32_t>(static_cast<float>(fault.value)), 4);
+      break;
+    case MotorFaultKind::wrong_length:
+      reply.size = static_cast<std::uint8_t>(fault.size);
+      break;
+    case MotorFaultKind::wrong_id:
+      reply.id = static_cast<std::uint8_t>(fault.id);
+      break;
+    case MotorFaultKind::stuck: {
+      const auto& first = progress_[index].first.try_emplace(iq_key(reply.type, reply.sub), reply).first->second;
+      reply.bytes = first.bytes;
+      break;
+    }
+    default:
+      act_on_bytes(fault, decision);
+  }
+}
+
+void IqLine::act_on_bytes(const MotorFault& fault, FaultDecision& decision) {
+  switch (fault.kind) {
+    case MotorFaultKind::flip:
+      decision.flips += fault.bits;
+      break;
+    case MotorFaultKind::bad_crc:
+      decision.bad_crc = true;
+      break;
+    case MotorFaultKind::truncate:
+      decision.truncated = static_cast<std::size_t>(fault.size);
+      break;
+    case MotorFaultKind::garbage:
+      for (std::size_t i = 0; fault.bytes.empty() && i < fault.size; ++i) decision.before.push_back(random_byte());
+      decision.before.insert(decision.before.end(), fault.bytes.begin(), fault.bytes.end());
+      break;
+    case MotorFaultKind::merge: {
+      const auto period = std::max<std::int64_t>(1, fault.delay.count());
+      decision.passage.together = Instant((decision.reply.at.count() / period + 1) * period);
+      break;
+    }
+    case MotorFaultKind::split:
+      decision.passage.between = fault.delay;
+      break;
+    case MotorFaultKind::stall:
+      decision.passage.stall_after = static_cast<std::size_t>(fault.size);
+      decision.passage.stall = fault.delay;
+      break;
+    case MotorFaultKind::delay:
+      decision.passage.ready += fault.delay + from_seconds(0.5 * (random_.symmetric() + 1) * to_seconds(fault.jitter));
+      break;
+    default:
+      break;
+  }
+}
+
+void IqLine::emit(FaultDecision decision) {
+  SentIqReply sent;
+  sent.asked = decision.reply.asked;
+  sent.type = decision.reply.type;
+  sent.sub = decision.reply.sub;
+  sent.id = decision.reply.id;
+  sent.size = decision.reply.size;
+  sent.bytes = decision.reply.bytes;
+  sent.truth = decision.reply.truth;
+  sent.done = decision.done;
+  const std::size_t entry = truth_.log.size();
+  if (keep_ == Keep::replies) truth_.log.push_back(sent);
+  if (decision.dropped) {
+    ++truth_.spoilt;
+    return;
+  }
+  if (!decision.before.empty()) {
+    Passage garbage;
+    garbage.bytes = decision.before;
+    garbage.ready = decision.passage.ready;
+    garbage.together = decision.passage.together;
+    schedule(std::move(garbage));
+  }
+  for (int copy = 0; copy < decision.copies; ++copy) put(decision, entry);
+}
+
+void IqLine::put(const FaultDecision& decision, std::size_t entry) {
+  Passage passage = decision.passage;
+  passage.entry = entry;
+  append_iq_frame(passage.bytes, decision.reply.type, decision.reply.sub,
+                  static_cast<std::uint8_t>(decision.reply.id << 2 | kReply), decision.reply.data());
+  const std::vector<std::uint8_t> intact = passage.bytes;
+  if (decision.bad_crc) passage.bytes.back() ^= 0x5a;
+  for (std::uint64_t i = 0; i < decision.flips; ++i) {
+    const std::uint64_t place = random_.bits() % (8 * passage.bytes.size());
+    passage.bytes[place / 8] ^= static_cast<std::uint8_t>(1u << (place % 8));
+  }
+  if (decision.truncated) passage.bytes.resize(std::min(passage.bytes.size(), *decision.truncated));
+  passage.whole = passage.bytes == intact;
+  schedule(std::move(passage));
+}
+
+void IqLine::schedule(Passage passage) {
+  truth_.bytes_from_module += passage.bytes.size();
+  if (!passage.whole) ++truth_.spoilt;
+  if (passage.bytes.empty()) return;
+  to_host_.push_back(std::move(passage));
+}
+
+void IqLine::let_pass(Instant now) {
+  if (held_ && hold_until_ <= now) {
+    held_->passage.ready = std::max(held_->passage.ready, hold_until_);
+    emit(*std::exchange(held_, std::nullopt));
+  }
+}
+
+/// When the next byte of what is first in the line reaches the host's port.
+Instant IqLine::arrival_of(const Passage& passage) const noexcept {
+  const Duration each = byte_time(module_.line_rate());
+  const Instant begun = passage.begun >= Instant{0} ? passage.begun : std::max(passage.ready, module_free_);
+  Instant at = begun + (each + passage.between) * static_cast<std::int64_t>(passage.done + 1) - passage.between;
+  if (passage.stall > Duration{0} && passage.done >= passage.stall_after) at += passage.stall;
+  if (passage.together) at = std::max(at, *passage.together);
+  return std::max(handed_over(at), last_arrival_);
+}
+
+void IqLine::arrive(Instant now) {
+  while (!to_host_.empty()) {
+    Passage& passage = to_host_.front();
+    const Instant at = arrival_of(passage);
+    if (at > now) return;
+    last_arrival_ = at;
+    if (passage.begun < Instant{0}) {
+      passage.begun = std::max(passage.ready, module_free_);
+      if (keep_ == Keep::replies && passage.entry < truth_.log.size() && passage.whole)
+        truth_.log[passage.entry].begun = passage.begun;
+    }
+    std::uint8_t byte = passage.bytes[passage.done++];
+    const bool lost = mute_ || !plugged_;
+    const bool garbled = !lost && !rates_match();
+    if (garbled) byte = random_byte();
+    passage.spoilt = passage.spoilt || lost || garbled;
+    if (!lost) {
+      ++truth_.bytes_to_host;
+      if (chunks_.empty() || chunks_.back().at != at) chunks_.push_back({at, {}});
+      chunks_.back().bytes.push_back(byte);
+    }
+    if (passage.done < passage.bytes.size()) continue;
+    finish(passage, at);
+    to_host_.pop_front();
+  }
+}
+
+void IqLine::finish(const Passage& passage, Instant at) {
+  const Duration each = byte_time(module_.line_rate()) + passage.between;
+  module_free_ = passage.begun + each * static_cast<std::int64_t>(passage.bytes.size()) + passage.stall;
+  if (!passage.whole) return;
+  if (passage.spoilt) {
+    ++truth_.spoilt;
+    return;
+  }
+  ++truth_.frames_arrived;
+  if (keep_ == Keep::totals) return;
+  SentIqReply& sent = truth_.log[passage.entry];
+  if (sent.arrivals++ == 0) sent.arrived = at;
+}
+
+// --- the script
+
+bool IqLine::active(std::size_t index, Instant at) const noexcept {
+  return script_[index].active(at, progress_[index].used);
+}
+
+bool IqLine::concerns(const MotorFault& fault, const IqReply& reply) const noexcept {
+  if (fault.kind == MotorFaultKind::command_flip) return false;
+  return (fault.type < 0 || fault.type == reply.type) && (fault.sub < 0 || fault.sub == reply.sub);
+}
+
+void IqLine::meet_events(Instant now) {
+  while (!events_.empty() && events_.back().at <= now) {
+    const Event event = events_.back();
+    events_.pop_back();
+    carry_commands(event.at);
+    take_replies(event.at);
+    arrive(event.at);
+    const MotorFault& fault = script_[event.fault];
+    event.begins ? begin(fault, event.at) : end(fault, event.at);
+    recompute(event.at);
+  }
+}
+
+void IqLine::begin(const MotorFault& fault, Instant now) {
+  ++truth_.done[static_cast<std::size_t>(fault.kind)];
+  note(now, fault, fault.lasts > Duration{0} ? " begins" : "");
+  if (fault.kind == MotorFaultKind::brown_out) {
+    module_.brown_out(now, fault.down);
+    cut();
+  }
+  if (fault.kind == MotorFaultKind::baud) module_.set_baud(static_cast<unsigned>(fault.baud));
+  if (fault.kind == MotorFaultKind::unplug) cut();
+}
+
+void IqLine::end(const MotorFault& fault, Instant now) {
+  note(now, fault, " ends");
+  if (fault.kind != MotorFaultKind::unplug || !fault.other) return;
+  module_.replace(kOtherUid);
+  module_.brown_out(now, Duration{0});
+}
+
+void IqLine::recompute(Instant now) {
+  mute_ = deaf_ = false;
+  plugged_ = true;
+  upset_ = {};
+  IqUpset module;
+  for (const MotorFault& fault : script_) {
+    if (!is_event(fault) || !fault.active(now)) continue;
+    mute_ = mute_ || fault.kind == MotorFaultKind::mute;
+    deaf_ = deaf_ || fault.kind == MotorFaultKind::deaf;
+    plugged_ = plugged_ && fault.kind != MotorFaultKind::unplug;
+    module.deaf_to_sets = module.deaf_to_sets || fault.kind == MotorFaultKind::ignore_sets;
+    if (fault.kind == MotorFaultKind::redline) module.redline = fault.speed;
+    if (fault.kind == MotorFaultKind::hot) {
+      module.heat.coil += fault.coil;
+      module.heat.controller += fault.controller;
+    }
+    if (fault.kind == MotorFaultKind::over_voltage) upset_.supply_volts += fault.volts;
+    if (fault.kind == MotorFaultKind::sag) upset_.supply_volts -= fault.volts;
+    upset_.locked = upset_.locked || fault.kind == MotorFaultKind::locked;
+  }
+  module_.upset(module);
+}
+
+void IqLine::note(Instant at, const MotorFault& fault, const char* what) {
+  truth_.events.push_back({at, std::string(name_of(fault.kind)) + what});
+}
+
+/// What was under way is gone.
+void IqLine::cut() noexcept {
+  for (const Passage& passage : to_host_) truth_.spoilt += passage.whole ? 1 : 0;
+  to_host_.clear();
+  to_module_.clear();
+  held_.reset();
+}
+
+// --- rate and adapter
+
+Duration IqLine::byte_time(double rate) const noexcept {
+  if (!settings_.paced || rate <= 0) return Duration{0};
+  return from_seconds(kBitsPerByte / rate * settings_.time_scale);
+}
+
+bool IqLine::rates_match() const noexcept {
+  return host_rate_ <= 0 || std::abs(module_.line_rate() / host_rate_ - 1) <= kRateTolerance;
+}
+
+Instant IqLine::handed_over(Instant at) const noexcept {
+  const auto tick = static_cast<std::int64_t>(static_cast<double>(settings_.usb_tick.count()) * settings_.time_scale);
+  if (tick <= 0) return at;
+  return Instant((at.count() + tick - 1) / tick * tick);
+}
+
+}  // namespace kphi::sim

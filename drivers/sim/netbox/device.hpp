@@ -1,0 +1,142 @@
+// The other end of the load cell's wire: an ATI Net Box as bytes in and bytes out. No socket, clock or thread.
+// Byte layout: Net F/T manual, RDT request and record. Answers to open questions: NetBoxQuirks.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "drivers/sim/netbox/settings.hpp"
+#include "drivers/sim/netbox/signal.hpp"
+#include "drivers/sim/physics/load_cell.hpp"
+
+namespace kphi::sim {
+
+/// Sender of a datagram; the transport gives it a meaning.
+using Peer = std::uint64_t;
+
+inline constexpr std::size_t kRecordBytes = 36;
+inline constexpr std::size_t kRecordsPerDatagramMax = 40;
+/// Room for the largest datagram that a fault makes up: one record too many.
+inline constexpr std::size_t kDatagramBytesMax = kRecordBytes * (kRecordsPerDatagramMax + 1);
+
+struct Datagram {
+  Datagram() = default;
+  Datagram(const Datagram& other) noexcept { *this = other; }
+  /// Only what is in use.
+  Datagram& operator=(const Datagram& other) noexcept;
+
+  Peer peer = 0;
+  Instant at{0};             ///< bench time of its last record; from a FaultInjector: of its arrival
+  std::uint32_t boot = 0;    ///< power-ups of the box before it was written
+  std::uint32_t stream = 0;  ///< starts that the box obeyed before it was written, since it was made
+  bool foreign = false;      ///< not from the box's address
+  std::size_t size = 0;
+  std::array<std::uint8_t, kDatagramBytesMax> bytes{};
+  std::array<Instant, kRecordsPerDatagramMax> sampled{};  ///< bench time of each record
+  [[nodiscard]] std::span<const std::uint8_t> payload() const noexcept { return {bytes.data(), size}; }
+};
+
+class NetBoxDevice {
+ public:
+  explicit NetBoxDevice(const NetBoxSettings& settings);
+
+  /// An RDT request, or anything else, which is ignored. The newest command wins, also from another peer.
+  void receive(std::span<const std::uint8_t> datagram, Peer peer);
+  /// One internal sample; 7000 of them are one second of the box's time.
+  void sample(const LoadCellSample& sample);
+  /// Next datagram to send, oldest first; false when there is none.
+  bool next_datagram(Datagram& out);
+  /// Complete answer to one complete HTTP request; the box closes the connection after it.
+  [[nodiscard]] std::string http(std::string_view request);
+  /// Takes whole commands of 20 bytes off the front of `received` and returns the answers to them.
+  [[nodiscard]] std::string tcp(std::string& received);
+
+  // What happens to a box.
+  /// Off and on: counts from 0 again; settings that live in its memory only are gone. `resume`: it streams again.
+  void power_cycle(bool resume);
+  /// Stops the acquisition: records repeat sample and ft_sequence.
+  void stall(bool stalled) noexcept { stalled_ = stalled; }
+  void set_ft_sequence(std::uint32_t next) noexcept { ft_sequence_ = next - 1; }
+  [[nodiscard]] std::uint32_t ft_sequence() const noexcept { return ft_sequence_; }  ///< of the last sample
+  /// Restarts the stream's numbering without a request.
+  void restart_stream() noexcept;
+  /// ORed into every status word until cleared.
+  void set_status(std::uint32_t bits) noexcept { forced_status_ |= bits; }
+  void clear_status(std::uint32_t bits) noexcept { forced_status_ &= ~bits; }
+  void force_saturation(unsigned axes) noexcept { signal_.force_saturation(axes); }
+  /// As written through the web pages: quantised and clamped silently.
+  void configure(const NetBoxSettings& settings);
+
+  [[nodiscard]] bool streaming() const noexcept { return streaming_; }
+  [[nodiscard]] int divisor() const noexcept { return divisor_; }
+  [[nodiscard]] std::uint32_t status() const noexcept { return status_; }
+  [[nodiscard]] std::uint64_t records_sent() const noexcept { return records_sent_; }
+  [[nodiscard]] std::uint64_t requests_ignored() const noexcept { return requests_ignored_; }
+  [[nodiscard]] std::uint32_t boots() const noexcept { return boots_; }
+  [[nodiscard]] std::uint32_t streams() const noexcept { return streams_; }
+  [[nodiscard]] const NetBoxSettings& settings() const noexcept { return settings_; }
+  [[nodiscard]] const NetBoxSignal& signal() const noexcept { return signal_; }
+  /// Largest and smallest counts since power-up.
+  [[nodiscard]] const std::array<std::int32_t, 6>& peaks_high() const noexcept { return peaks_high_; }
+  [[nodiscard]] const std::array<std::int32_t, 6>& peaks_low() const noexcept { return peaks_low_; }
+
+ private:
+  void apply(std::uint32_t command, std::uint32_t sample_count, Peer peer);
+  void start(Peer peer, int records_per_datagram, std::uint32_t sample_count) noexcept;
+  void stop() noexcept;
+  void bias() noexcept;
+  void measure(const Wrench& wrench) noexcept;
+  void append_record(Instant at);
+  void close_datagram();
+  void count_write();
+  std::string write(std::string_view page, std::string_view query);
+  void answer_tcp(std::span<const std::uint8_t> command, std::string& out);
+
+  NetBoxSettings settings_;
+  NetBoxSignal signal_;
+  int divisor_;
+  std::uint32_t ft_sequence_;
+  std::uint32_t status_ = 0;
+  std::uint32_t forced_status_ = 0;
+  bool stalled_ = false;
+  std::array<std::int32_t, 6> peaks_high_{};
+  std::array<std::int32_t, 6> peaks_low_{};
+  std::uint32_t boots_ = 0;
+  std::uint32_t streams_ = 0;
+
+  bool streaming_ = false;
+  bool finite_ = false;
+  std::uint32_t remaining_ = 0;
+  std::uint32_t rdt_sequence_ = 0;
+  std::size_t records_per_datagram_ = 1;
+  int ticks_to_record_ = 0;
+  Datagram open_;
+
+  struct Waiting {
+    Peer peer;
+    Instant at;
+    std::uint32_t boot, stream;
+    std::size_t offset;  ///< into waiting_bytes_
+    std::size_t size;
+    std::size_t first_instant;  ///< into waiting_instants_
+  };
+  std::vector<Waiting> waiting_;
+  std::vector<std::uint8_t> waiting_bytes_;
+  std::vector<Instant> waiting_instants_;
+  std::size_t next_ = 0;
+  std::uint64_t records_sent_ = 0;
+  std::uint64_t requests_ignored_ = 0;
+  std::uint64_t ticks_ = 0;         ///< since it was made
+  std::uint64_t writes_since_ = 0;  ///< tick of the first CGI write of the present second
+  int writes_ = 0;                  ///< in that second
+};
+
+/// HTTP/1.0 response to one request. GET of the two XML pages, with or without ?index=0..15; anything else is 404.
+[[nodiscard]] std::string netbox_answer(const NetBoxDevice& box, std::string_view request);
+
+}  // namespace kphi::sim

@@ -1,0 +1,267 @@
+// The way of the datagrams. What the script does to the box itself: fault_injector_box.cpp.
+#include "drivers/sim/netbox/fault_injector.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "drivers/sim/transport/bytes.hpp"
+
+namespace kphi::sim {
+namespace {
+
+std::uint32_t word(const Datagram& datagram, std::size_t offset) noexcept {
+  return big(datagram.payload().subspan(offset, 4));
+}
+
+}  // namespace
+
+FaultInjector::FaultInjector(NetBoxDevice& box, FaultScript script, std::uint64_t seed, Keep keep)
+    : box_(box),
+      script_(std::move(script)),
+      random_(seed),
+      keep_(keep),
+      progress_(script_.size()),
+      first_address_(box.settings().address) {
+  for (std::size_t i = 0; i < script_.size(); ++i) {
+    const Fault& fault = script_[i];
+    direct_ = direct_ && !on_datagrams(fault.kind);
+    if (!on_box(fault.kind)) continue;
+    events_.push_back({fault.at, i, true});
+    if (fault.kind == FaultKind::reboot) events_.push_back({fault.at + fault.down, i, false});
+    if (fault.end() != kNever) events_.push_back({fault.end(), i, false});
+  }
+  // A beginning before an end at the same time, or a fault without duration would never end.
+  std::stable_sort(events_.begin(), events_.end(), [](const Event& a, const Event& b) { return a.at < b.at; });
+  std::reverse(events_.begin(), events_.end());
+  schedule();
+}
+
+bool FaultInjector::active(std::size_t fault, Instant at) const noexcept {
+  return script_[fault].active(at, progress_[fault].used);
+}
+
+bool FaultInjector::next_datagram(Datagram& out, Instant now) {
+  if (direct_) {
+    while (box_.next_datagram(out)) {
+      const std::size_t entry = enter(out);
+      if (out.peer == kHijacker) continue;
+      if (keep_ == Keep::totals) {
+        ++truth_.arrived;
+        truth_.records_arrived += out.size / kRecordBytes;
+      } else {
+        passing_.entry = entry;
+        passing_.datagram.size = out.size;
+        count_arrival(passing_, out.at);
+      }
+      return true;
+    }
+    return false;
+  }
+  carry_all(now);
+  const Instant due = under_way_.next();
+  if (due > now || due == kNever) return false;
+  const InFlightDatagram& first = under_way_.first();
+  out = first.datagram;
+  out.at = due;
+  count_arrival(first, due);
+  under_way_.drop_first();
+  return true;
+}
+
+Instant FaultInjector::next_arrival() const noexcept {
+  Instant next = under_way_.next();
+  for (const Held& held : held_) next = std::min(next, held.give_up);
+  return next;
+}
+
+void FaultInjector::carry_all(Instant now) {
+  while (box_.next_datagram(passing_.datagram)) {
+    if (passing_.datagram.peer != kHijacker) shorten(passing_.datagram);
+    passing_.entry = enter(passing_.datagram);
+    if (passing_.datagram.peer != kHijacker) carry(passing_);
+  }
+  give_up_holding(now);
+}
+
+void FaultInjector::shorten(Datagram& datagram) {
+  for (std::size_t i = 0; i < script_.size(); ++i) {
+    const Fault& fault = script_[i];
+    if (fault.kind != FaultKind::short_block || !active(i, datagram.at) || !chance(fault.p)) continue;
+    const std::size_t records = datagram.size / kRecordBytes;
+    const std::size_t left_out = std::min(static_cast<std::size_t>(fault.records), records - 1);
+    datagram.size -= left_out * kRecordBytes;
+    truth_.records_left_out += left_out;
+    ++progress_[i].used;
+  }
+}
+
+void FaultInjector::make_up(const InFlightDatagram& after, std::size_t size, bool foreign, Instant due) {
+  InFlightDatagram made = after;
+  Datagram& datagram = made.datagram;
+  made.whole = false;
+  if (size > datagram.size) std::fill_n(datagram.bytes.data() + datagram.size, size - datagram.size, std::uint8_t{0});
+  datagram.size = size;
+  datagram.foreign = foreign;
+  if (foreign) put_big(datagram.bytes.data(), word(datagram, 0) + 1000);
+  under_way_.add(made, due);
+}
+
+void FaultInjector::carry(const InFlightDatagram& in_flight) {
+  const Instant sent = in_flight.datagram.at;
+  give_up_holding(sent);
+  const FaultDecision decision = decide(sent);
+  last_due_ = decision.due;
+  for (std::uint64_t i = 0; i < decision.foreign; ++i) make_up(in_flight, in_flight.datagram.size, true, decision.due);
+  for (const std::uint64_t size : decision.sizes)
+    make_up(in_flight, static_cast<std::size_t>(size), false, decision.due);
+  if (decision.dropped || decision.replaced) {
+    ++truth_.dropped;
+    truth_.records_dropped += in_flight.datagram.size / kRecordBytes;
+    return;
+  }
+  for (const Duration after : decision.copies) {
+    InFlightDatagram copy = in_flight;
+    copy.copy = true;
+    under_way_.add(copy, decision.due + after);
+  }
+  if (decision.depth > 0) {
+    held_.push_back({in_flight, decision.depth, std::max(decision.due, sent + decision.overtaken_for)});
+    return;
+  }
+  under_way_.add(in_flight, decision.due);
+  let_pass(decision.due);
+}
+
+FaultInjector::FaultDecision FaultInjector::decide(Instant at) {
+  FaultDecision decision;
+  decision.due = at;
+  for (std::size_t i = 0; i < script_.size(); ++i) {
+    if (on_datagrams(script_[i].kind) && active(i, at)) act(script_[i], progress_[i], at, decision);
+  }
+  if (decision.due > at) ++truth_.delayed;
+  decision.due = std::max(decision.due, last_due_);
+  return decision;
+}
+
+void FaultInjector::act(const Fault& fault, Progress& progress, Instant at, FaultDecision& decision) {
+  switch (fault.kind) {
+    case FaultKind::loss:
+      if (progress.burst_left == 0 && chance(fault.p)) progress.burst_left = fault.burst;
+      if (progress.burst_left == 0) return;
+      --progress.burst_left;
+      decision.dropped = true;
+      break;
+    case FaultKind::gilbert:
+      if (chance(progress.bad ? fault.p_bad_good : fault.p_good_bad)) progress.bad = !progress.bad;
+      if (!progress.bad || !chance(fault.loss)) return;
+      decision.dropped = true;
+      break;
+    case FaultKind::delay:
+      decision.due = std::max(
+          decision.due, at + fault.delay + from_seconds(to_seconds(fault.jitter) * 0.5 * (random_.symmetric() + 1)));
+      break;
+    case FaultKind::jitter: {
+      const double mean_times = -std::log(0.5 * (random_.symmetric() + 1) + 0x1p-54);
+      const double spike = chance(fault.p) ? 0.5 * (random_.symmetric() + 1) : 0;
+      decision.due = std::max(
+          decision.due, at + from_seconds(mean_times * to_seconds(fault.jitter) + spike * to_seconds(fault.spike)));
+      break;
+    }
+    case FaultKind::short_block:
+      return;
+    case FaultKind::hold:
+      decision.due = std::max(decision.due, fault.end());
+      break;
+    default:
+      if (!chance(fault.p)) return;
+      if (fault.kind == FaultKind::duplicate) decision.copies.push_back(fault.delay);
+      if (fault.kind == FaultKind::foreign_source) ++decision.foreign;
+      if (fault.kind == FaultKind::reorder) {
+        decision.depth = std::max(decision.depth, fault.depth);
+        decision.overtaken_for = std::max(decision.overtaken_for, fault.delay);
+      }
+      if (fault.kind == FaultKind::wrong_size) {
+        decision.sizes.push_back(fault.size);
+        decision.replaced = decision.replaced || fault.replaces;
+      }
+  }
+  ++progress.used;
+}
+
+void FaultInjector::let_pass(Instant due) {
+  for (std::size_t i = 0; i < held_.size();) {
+    if (--held_[i].to_pass > 0) {
+      ++i;
+      continue;
+    }
+    ++truth_.overtaken;
+    under_way_.add(held_[i].in_flight, due);
+    held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+}
+
+void FaultInjector::give_up_holding(Instant now) {
+  for (std::size_t i = 0; i < held_.size();) {
+    if (held_[i].give_up > now) {
+      ++i;
+      continue;
+    }
+    under_way_.add(held_[i].in_flight, held_[i].give_up);
+    held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+}
+
+std::size_t FaultInjector::enter(const Datagram& datagram) {
+  const std::size_t records = datagram.size / kRecordBytes;
+  if (datagram.peer == kHijacker) {
+    ++truth_.to_others;
+    truth_.records_to_others += records;
+    return 0;
+  }
+  ++truth_.sent;
+  truth_.records_sent += records;
+  if (keep_ == Keep::totals) return 0;
+  SentDatagram entry;
+  entry.boot = datagram.boot;
+  entry.stream = datagram.stream;
+  entry.first_rdt = word(datagram, 0);
+  entry.first_ft = word(datagram, 4);
+  entry.last_ft = word(datagram, datagram.size - kRecordBytes + 4);
+  entry.records = static_cast<std::uint32_t>(records);
+  entry.samples = 1;
+  for (std::size_t at = kRecordBytes; at < datagram.size; at += kRecordBytes) {
+    if (word(datagram, at + 4) != word(datagram, at + 4 - kRecordBytes)) ++entry.samples;
+  }
+  entry.sent = datagram.at;
+  entry.first_sample = truth_.sampled.size();
+  if (keep_ == Keep::samples) {
+    truth_.sampled.insert(truth_.sampled.end(), datagram.sampled.begin(),
+                          datagram.sampled.begin() + static_cast<std::ptrdiff_t>(records));
+    for (std::size_t at = 4; at < datagram.size; at += kRecordBytes) truth_.ft.push_back(word(datagram, at));
+  }
+  truth_.log.push_back(entry);
+  return truth_.log.size() - 1;
+}
+
+void FaultInjector::count_arrival(const InFlightDatagram& in_flight, Instant at) {
+  if (!in_flight.whole) {
+    ++(in_flight.datagram.foreign ? truth_.foreign : truth_.malformed);
+    return;
+  }
+  const std::uint64_t records = in_flight.datagram.size / kRecordBytes;
+  if (keep_ != Keep::totals) {
+    SentDatagram& entry = truth_.log[in_flight.entry];
+    if (entry.arrivals++ == 0) {
+      entry.first_arrival = at;
+      entry.arrival_place = truth_.arrived;
+    }
+  }
+  ++truth_.arrived;
+  truth_.records_arrived += records;
+  if (in_flight.copy) {
+    ++truth_.duplicated;
+    truth_.records_duplicated += records;
+  }
+}
+
+}  // namespace kphi::sim

@@ -1,0 +1,227 @@
+// The wire between the simulated box and its clients, with the faults of a script: virtual time, seeded, no I/O. With
+// the same seed, script and inputs the same bytes arrive at the same times, however often it is asked.
+#pragma once
+
+#include <array>
+#include <deque>
+#include <iterator>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/random.hpp"
+#include "drivers/sim/netbox/device.hpp"
+#include "drivers/sim/netbox/faults.hpp"
+
+namespace kphi::sim {
+
+/// The client that takes streams over; what the box sends to it is not delivered.
+inline constexpr Peer kHijacker = ~Peer{0};
+
+/// One datagram of whole records that the box sent to the host.
+struct SentDatagram {
+  std::uint32_t boot = 0, stream = 0;  ///< see Datagram
+  std::uint32_t first_rdt = 0, first_ft = 0, last_ft = 0;
+  std::uint32_t records = 0;
+  std::uint32_t samples = 0;  ///< fewer than records when the measurement stood still
+  Instant sent{0};
+  std::uint32_t arrivals = 0;  ///< 0: lost
+  Instant first_arrival{0};
+  std::uint64_t arrival_place = 0;  ///< of the first: how many datagrams had arrived before
+  std::size_t first_sample = 0;     ///< into WireTruth::sampled
+};
+
+/// What truly happened on the load cell's wire: a driver's own counts are checked against it.
+struct WireTruth {
+  // Datagrams to the host; records where it says so.
+  std::uint64_t sent = 0, records_sent = 0;
+  std::uint64_t arrived = 0, records_arrived = 0;  ///< copies of duplicates included
+  std::uint64_t dropped = 0, records_dropped = 0;
+  std::uint64_t duplicated = 0, records_duplicated = 0;  ///< copies beyond the first that arrived
+  std::uint64_t overtaken = 0;                           ///< held back so that younger ones arrived before
+  std::uint64_t delayed = 0;
+  std::uint64_t malformed = 0;         ///< of wrong size, arrived
+  std::uint64_t foreign = 0;           ///< from another address, arrived
+  std::uint64_t records_left_out = 0;  ///< of short blocks; never sent
+  std::uint64_t to_others = 0, records_to_others = 0;
+  // Requests.
+  std::uint64_t starts = 0;  ///< that the host sent
+  std::uint64_t starts_lost = 0, starts_doubled = 0, starts_delayed = 0;
+  std::uint64_t unheard = 0;  ///< requests of any kind while the box was dead
+  // The box.
+  std::uint64_t takeovers = 0, restarts = 0, reboots = 0, stalls = 0, jumps = 0, overruns = 0, rate_changes = 0,
+                moves = 0;
+  // Answers over stream sockets that a fault spoilt.
+  std::uint64_t http_spoilt = 0, tcp_spoilt = 0;
+
+  std::vector<FaultEvent> events;
+  std::vector<SentDatagram> log;  ///< in the order of sending; only if asked for
+  // Of each record in `log`; only if asked for.
+  std::vector<Instant> sampled;   ///< true sample time
+  std::vector<std::uint32_t> ft;  ///< ft_sequence as sent
+};
+
+/// Things with a time of arrival, in that order; those of the same time in the order of add(). Slots are
+/// reused: nothing is allocated once there are enough.
+template <class Thing>
+class DelayQueue {
+ public:
+  void add(const Thing& thing, Instant due) {
+    if (free_.empty()) {
+      free_.push_back(static_cast<std::uint32_t>(things_.size()));
+      things_.emplace_back();
+    }
+    const std::uint32_t slot = free_.back();
+    free_.pop_back();
+    things_[slot] = thing;
+    auto behind = order_.end();
+    while (behind != order_.begin() && std::prev(behind)->first > due) --behind;
+    order_.insert(behind, {due, slot});
+  }
+  /// kNever when empty.
+  [[nodiscard]] Instant next() const noexcept { return order_.empty() ? kNever : order_.front().first; }
+  /// Requires one; valid until the next add().
+  [[nodiscard]] const Thing& first() const noexcept { return things_[order_.front().second]; }
+  void drop_first() {
+    free_.push_back(order_.front().second);
+    order_.pop_front();
+  }
+
+ private:
+  std::deque<std::pair<Instant, std::uint32_t>> order_;
+  std::vector<Thing> things_;
+  std::vector<std::uint32_t> free_;
+};
+
+/// An answer of the box over a stream socket. Bench times.
+struct StreamReply {
+  std::string bytes;
+  Duration wait{0};         ///< before the first byte
+  std::size_t segment = 0;  ///< at most so many bytes at once; 0: all
+  Duration pause{0};        ///< between two segments
+  bool close = false;       ///< after the last byte
+};
+
+class FaultInjector {
+ public:
+  /// How much truth is kept beside the totals.
+  enum class Keep : std::uint8_t { totals, datagrams, samples };
+  /// `box` must outlive this. Faults act in the order of the script.
+  FaultInjector(NetBoxDevice& box, FaultScript script, std::uint64_t seed, Keep keep = Keep::totals);
+  FaultInjector(const FaultInjector&) = delete;
+  FaultInjector& operator=(const FaultInjector&) = delete;
+
+  /// One tick of the bench: what NetBoxDevice::sample takes, here by the box's own, perhaps skewed, clock.
+  void sample(const LoadCellSample& sample) {
+    if (sample.at >= next_event_) [[unlikely]]
+      meet_events(sample.at);
+    if (disturbed_) [[unlikely]]
+      return sample_disturbed(sample);
+    box_.sample(sample);
+  }
+  /// A datagram to the box's RDT port, sent at `now` to the address that the box has then.
+  void request(std::span<const std::uint8_t> datagram, Peer peer, Instant now);
+  /// Next datagram that has arrived until `now`; `out.at` is the time of its arrival.
+  bool next_datagram(Datagram& out, Instant now);
+  /// Earliest arrival of a datagram in flight; kNever: none.
+  [[nodiscard]] Instant next_arrival() const noexcept;
+
+  /// Answer to one complete request.
+  [[nodiscard]] StreamReply http(std::string_view request, Instant now);
+  /// The web server's port is closed now.
+  [[nodiscard]] bool http_refused(Instant now) const noexcept;
+  /// As NetBoxDevice::tcp; an empty reply when `received` holds no whole command.
+  [[nodiscard]] StreamReply tcp(std::string& received, Instant now);
+  [[nodiscard]] bool dead() const noexcept { return dead_; }
+  /// Address that a fault gave the box, and from which it sends; empty: its own.
+  [[nodiscard]] const std::string& moved_to() const noexcept { return moved_to_; }
+  [[nodiscard]] const WireTruth& truth() const noexcept { return truth_; }
+
+ private:
+  struct Progress {
+    std::uint64_t used = 0;        ///< of Fault::count
+    std::uint64_t burst_left = 0;  ///< of a loss
+    bool bad = false;              ///< Gilbert-Elliott
+  };
+  struct Event {
+    Instant at;
+    std::size_t fault;
+    bool begins;
+  };
+  struct InFlightDatagram {
+    Datagram datagram;
+    std::size_t entry = 0;  ///< in the log
+    bool whole = true;      ///< records of the box, not made up
+    bool copy = false;
+  };
+  struct Held {
+    InFlightDatagram in_flight;
+    std::uint64_t to_pass;
+    Instant give_up;
+  };
+  struct LateRequest {
+    Instant due;
+    std::vector<std::uint8_t> bytes;
+    Peer peer;
+  };
+  /// What the script does to one datagram.
+  struct FaultDecision {
+    bool dropped = false;
+    bool replaced = false;
+    Instant due{0};
+    std::uint64_t depth = 0;
+    Duration overtaken_for{0};
+    std::vector<Duration> copies;
+    std::vector<std::uint64_t> sizes;
+    std::uint64_t foreign = 0;
+  };
+  void meet_events(Instant now);
+  void schedule() noexcept;
+  void begin(const Fault& fault, Instant now);
+  void end(const Fault& fault);
+  void note(Instant at, std::string what);
+  void sample_disturbed(LoadCellSample sample);
+  void sample_skewed(const LoadCellSample& sample);
+  void move_to(const std::string& address);
+  void count_use(std::size_t fault, Instant now, std::uint64_t WireTruth::*counter);
+  void hand_over(std::span<const std::uint8_t> datagram, Peer peer);
+
+  void carry_all(Instant now);
+  void carry(const InFlightDatagram& in_flight);
+  void make_up(const InFlightDatagram& after, std::size_t size, bool foreign, Instant due);
+  [[nodiscard]] FaultDecision decide(Instant at);
+  void act(const Fault& fault, Progress& progress, Instant at, FaultDecision& decision);
+  void let_pass(Instant due);
+  void give_up_holding(Instant now);
+  void shorten(Datagram& datagram);
+  std::size_t enter(const Datagram& datagram);
+  void count_arrival(const InFlightDatagram& in_flight, Instant at);
+  [[nodiscard]] bool active(std::size_t fault, Instant at) const noexcept;
+  [[nodiscard]] bool chance(double p) noexcept { return 0.5 * (random_.symmetric() + 1) < p; }
+
+  NetBoxDevice& box_;
+  const FaultScript script_;
+  Random random_;
+  const Keep keep_;
+  bool direct_ = true;  ///< no fault concerns datagrams on their way
+  std::vector<Progress> progress_;
+  std::vector<Event> events_;  ///< latest first
+  std::vector<LateRequest> late_requests_;
+  Instant next_event_ = kNever;
+  bool disturbed_ = false;  ///< dead, skewed or drifting
+  bool dead_ = false;
+  bool skewed_ = false;
+  std::vector<std::size_t> drifting_;
+  std::string moved_to_, first_address_;
+  const Fault* skew_ = nullptr;
+  double phase_ = 0;  ///< of the box's clock, in its samples
+  DelayQueue<InFlightDatagram> under_way_;
+  std::vector<Held> held_;
+  Instant last_due_{0};
+  InFlightDatagram passing_;
+  WireTruth truth_;
+};
+
+}  // namespace kphi::sim

@@ -1,0 +1,73 @@
+// The registers of simulated supplies: Riden RD60xx, RuiDeng DPS/DPH, Hanmatek HM3xx. Where sources disagree,
+// SupplyDisputes chooses.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "drivers/sim/supply/circuit.hpp"
+
+namespace kphi::sim {
+
+/// Registers on which sources disagree.
+struct SupplyDisputes {
+  enum class Twelve : std::uint8_t { zero, milliampere_hours, power_high_word };
+  Twelve register_12 = Twelve::zero;       ///< Riden
+  bool power_in_milliwatts = false;        ///< Riden 13 on P models: /1000, else /100
+  bool preset_reads_zero = true;           ///< Riden 19, else the preset that was recalled
+  bool over_current_in_milliamps = false;  ///< Hanmatek 0x21: three decimals, else two
+};
+
+struct SupplyModel {
+  enum class Family : std::uint8_t { riden, dps, hanmatek };
+  std::string_view name;
+  Family family;
+  std::uint16_t id;
+  double counts_per_v, counts_per_a, counts_per_a_wide;  ///< wide: RD6012P with register 20 at 1; 0: no such range
+  double volts_max;
+  unsigned most_registers;  ///< in one request
+};
+
+[[nodiscard]] const std::vector<SupplyModel>& supply_models();
+
+class SupplyRegisters {
+ public:
+  /// Throws std::invalid_argument for a model that is not in the table.
+  SupplyRegisters(const std::string& model, std::uint32_t serial, const SupplyDisputes& disputes,
+                  SupplyCircuit& circuit);
+
+  /// nullopt: no such register.
+  [[nodiscard]] std::optional<std::uint16_t> read(std::uint16_t at) const;
+  /// False: no such register, or read-only.
+  bool write(std::uint16_t at, std::uint16_t value);
+  [[nodiscard]] const SupplyModel& model() const noexcept { return *model_; }
+  /// Writes to calibration and bootloader so far: what a driver must never do.
+  [[nodiscard]] std::uint64_t harmful_writes() const noexcept { return harmful_writes_; }
+
+ private:
+  [[nodiscard]] std::optional<std::uint16_t> read_riden(std::uint16_t at) const;
+  [[nodiscard]] std::optional<std::uint16_t> read_dps(std::uint16_t at) const;
+  [[nodiscard]] std::optional<std::uint16_t> read_hanmatek(std::uint16_t at) const;
+  bool write_riden(std::uint16_t at, std::uint16_t value);
+  bool write_dps(std::uint16_t at, std::uint16_t value);
+  bool write_hanmatek(std::uint16_t at, std::uint16_t value);
+  void recall(std::uint16_t preset);
+  [[nodiscard]] std::uint16_t remembered(std::uint16_t at) const;
+  [[nodiscard]] double per_v() const noexcept { return model_->counts_per_v; }
+  [[nodiscard]] double per_a() const noexcept;
+  [[nodiscard]] double per_over_a() const noexcept;
+  [[nodiscard]] std::uint16_t trip_code() const noexcept;
+
+  const SupplyModel* model_;
+  std::uint32_t serial_;
+  SupplyDisputes disputes_;
+  SupplyCircuit& circuit_;
+  std::map<std::uint16_t, std::uint16_t> memory_;  ///< what is only kept
+  std::uint64_t harmful_writes_ = 0;
+};
+
+}  // namespace kphi::sim

@@ -1,0 +1,210 @@
+#include "drivers/sim/supply/slave.hpp"
+
+#include <algorithm>
+
+namespace kphi::sim {
+namespace {
+
+enum Function : std::uint8_t { kRead = 0x03, kWriteOne = 0x06, kWriteMany = 0x10 };
+enum Exception : int { kIllegalFunction = 1, kIllegalAddress = 2, kIllegalValue = 3 };
+constexpr std::size_t kFramesKept = 1000;
+constexpr std::uint8_t kGarbage = 0x55;
+constexpr int kLookBytes = 45;        // of an answer with twenty registers
+constexpr double kLongestStep = 1.0;  // s
+
+unsigned word(const std::vector<std::uint8_t>& bytes, std::size_t at) { return bytes[at] * 256u + bytes[at + 1]; }
+
+void append(std::vector<std::uint8_t>& out, unsigned value) {
+  out.push_back(static_cast<std::uint8_t>(value >> 8));
+  out.push_back(static_cast<std::uint8_t>(value));
+}
+
+}  // namespace
+
+SupplySlave::SupplySlave(const SupplySettings& settings)
+    : settings_(settings),
+      circuit_(settings.circuit),
+      registers_(settings.model, settings.serial, settings.disputes, circuit_),
+      random_(settings.seed),
+      used_(settings.faults.size(), 0) {}
+
+void SupplySlave::add_fault(const SupplyFault& fault) {
+  settings_.faults.push_back(fault);
+  used_.push_back(0);
+}
+
+double SupplySlave::advance(const SupplyLoad& load, Instant now) {
+  double sag = 0;
+  for (std::size_t i = 0; i < used_.size(); ++i) {
+    const SupplyFault& fault = settings_.faults[i];
+    if (fault.kind == SupplyFaultKind::sag && fault.active(now)) sag += fault.volts;
+    if (used_[i] > 0 || now < fault.at) continue;
+    if (fault.kind == SupplyFaultKind::trip) circuit_.trip(static_cast<SupplyTrip>(fault.code));
+    if (fault.kind == SupplyFaultKind::panel) registers_.write(fault.address, fault.value);
+    if (fault.kind == SupplyFaultKind::trip || fault.kind == SupplyFaultKind::panel) ++used_[i];
+  }
+  circuit_.sag(sag);
+  if (now > reached_) circuit_.step(load, std::min(kLongestStep, to_seconds(now - reached_)));
+  reached_ = std::max(reached_, now);
+  return circuit_.volts();
+}
+
+void SupplySlave::receive(int client, ModbusFraming framing, std::span<const std::uint8_t> bytes, Instant now) {
+  ModbusScanner& scanner = scanners_.try_emplace(client, framing).first->second;
+  const std::uint64_t before = scanner.damaged();
+  scanner.feed(bytes, now);
+  while (const auto request = scanner.next()) answer(client, framing, *request, now);
+  truth_.damaged += scanner.damaged() - before;
+}
+
+bool SupplySlave::makes_sense(int client) const {
+  const auto found = scanners_.find(client);
+  return found == scanners_.end() || !found->second.broken();
+}
+
+void SupplySlave::forget(int client) {
+  scanners_.erase(client);
+  std::erase_if(under_way_, [&](const PendingReply& pending) { return pending.reply.client == client; });
+}
+
+bool SupplySlave::closed(Instant now) const noexcept {
+  return std::any_of(settings_.faults.begin(), settings_.faults.end(), [&](const SupplyFault& fault) {
+    return fault.kind == SupplyFaultKind::closed && fault.active(now);
+  });
+}
+
+const SupplyFault* SupplySlave::meet(SupplyFaultKind kind, Instant now) {
+  for (std::size_t i = 0; i < settings_.faults.size(); ++i) {
+    const SupplyFault& fault = settings_.faults[i];
+    if (fault.kind != kind || !fault.active(now, used_[i])) continue;
+    if (fault.p < 1 && 0.5 * (random_.symmetric() + 1) >= fault.p) continue;
+    ++used_[i];
+    ++truth_.faults;
+    return &fault;
+  }
+  return nullptr;
+}
+
+bool SupplySlave::hears(Instant now) { return !closed(now) && meet(SupplyFaultKind::deaf, now) == nullptr; }
+
+std::optional<Duration> SupplySlave::answers(Instant now) {
+  using K = SupplyFaultKind;
+  if (!hears(now)) return std::nullopt;
+  for (const K spoils : {K::exception, K::no_reply, K::wrong_slave, K::wrong_transaction, K::bad_crc, K::truncated,
+                         K::garbage, K::echo}) {
+    if (meet(spoils, now) != nullptr) return std::nullopt;
+  }
+  Duration wait{0};
+  if (const SupplyFault* late = meet(K::late, now)) wait += late->delay;
+  if (const SupplyFault* dribble = meet(K::dribble, now)) wait += kLookBytes * dribble->delay;
+  return wait;
+}
+
+void SupplySlave::answer(int client, ModbusFraming framing, const ModbusRequest& request, Instant now) {
+  using K = SupplyFaultKind;
+  const bool everybody = framing == ModbusFraming::rtu && request.unit == 0;
+  if (framing == ModbusFraming::rtu && !everybody && request.unit != settings_.slave) return;
+  ++truth_.requests;
+  if (truth_.frames.size() < kFramesKept) truth_.frames.push_back(request.adu);
+  if (meet(K::deaf, now) != nullptr) return;
+  const SupplyFault* exception = meet(K::exception, now);
+  const Pdu pdu = exception != nullptr ? refuse(request.pdu[0], exception->code) : apply(request.pdu, now);
+  if (everybody || meet(K::no_reply, now) != nullptr) return;
+
+  const SupplyFault* stranger = meet(K::wrong_slave, now);
+  const auto transaction =
+      static_cast<std::uint16_t>(request.transaction + (meet(K::wrong_transaction, now) != nullptr ? 1 : 0));
+  auto bytes = modbus_frame(framing, stranger != nullptr ? stranger->slave : request.unit, transaction, pdu);
+  if (framing == ModbusFraming::rtu && meet(K::bad_crc, now) != nullptr) bytes.back() ^= 0xFFu;
+  if (const SupplyFault* cut = meet(K::truncated, now)) bytes.resize(std::min<std::size_t>(bytes.size(), cut->size));
+  if (const SupplyFault* noise = meet(K::garbage, now)) bytes.insert(bytes.begin(), noise->size, kGarbage);
+  if (meet(K::echo, now) != nullptr) bytes.insert(bytes.begin(), request.adu.begin(), request.adu.end());
+  const SupplyFault* late = meet(K::late, now);
+  const SupplyFault* dribble = meet(K::dribble, now);
+  Instant due = std::max(now + settings_.turnaround, next_turn_);
+  if (settings_.replies_per_s > 0) next_turn_ = due + from_seconds(1 / settings_.replies_per_s);
+  if (late != nullptr) due += late->delay;
+  send(client, std::move(bytes), due, dribble != nullptr ? dribble->delay : Duration{0});
+}
+
+/// Whole, or byte by byte; nothing overtakes.
+void SupplySlave::send(int client, std::vector<std::uint8_t> bytes, Instant due, Duration gap) {
+  last_due_ = std::max(last_due_, due);
+  if (gap == Duration{0}) {
+    under_way_.push_back({last_due_, {client, std::move(bytes)}});
+    return;
+  }
+  for (const std::uint8_t byte : bytes) {
+    under_way_.push_back({last_due_, {client, {byte}}});
+    last_due_ += gap;
+  }
+}
+
+bool SupplySlave::next_reply(SupplyReply& out, Instant now) {
+  if (under_way_.empty() || under_way_.front().due > now) return false;
+  out = std::move(under_way_.front().reply);
+  under_way_.pop_front();
+  return true;
+}
+
+SupplySlave::Pdu SupplySlave::refuse(std::uint8_t function, int code) {
+  ++truth_.exceptions;
+  return {static_cast<std::uint8_t>(function | 0x80u), static_cast<std::uint8_t>(code)};
+}
+
+SupplySlave::Pdu SupplySlave::apply(const Pdu& pdu, Instant now) {
+  switch (pdu[0]) {
+    case kRead:
+      return pdu.size() == 5 ? read(pdu, now) : refuse(pdu[0], kIllegalValue);
+    case kWriteOne:
+      return pdu.size() == 5 ? write_one(pdu, now) : refuse(pdu[0], kIllegalValue);
+    case kWriteMany:
+      return pdu.size() >= 6 ? write_many(pdu, now) : refuse(pdu[0], kIllegalValue);
+    default:
+      return refuse(pdu[0], kIllegalFunction);
+  }
+}
+
+std::uint16_t SupplySlave::value_at(std::uint16_t at, std::uint16_t value, Instant now) const {
+  for (const SupplyFault& fault : settings_.faults) {
+    if (fault.kind == SupplyFaultKind::reads_as && fault.active(now) && fault.address == at) return fault.value;
+  }
+  return value;
+}
+
+SupplySlave::Pdu SupplySlave::read(const Pdu& pdu, Instant now) {
+  const unsigned first = word(pdu, 1), count = word(pdu, 3);
+  if (count < 1 || count > registers_.model().most_registers) return refuse(pdu[0], kIllegalValue);
+  Pdu out{pdu[0], static_cast<std::uint8_t>(2 * count)};
+  for (unsigned at = first; at < first + count; ++at) {
+    const auto value = at <= 0xFFFF ? registers_.read(static_cast<std::uint16_t>(at)) : std::nullopt;
+    if (!value) return refuse(pdu[0], kIllegalAddress);
+    append(out, value_at(static_cast<std::uint16_t>(at), *value, now));
+  }
+  return out;
+}
+
+SupplySlave::Pdu SupplySlave::write_one(const Pdu& pdu, Instant now) {
+  const auto at = static_cast<std::uint16_t>(word(pdu, 1)), value = static_cast<std::uint16_t>(word(pdu, 3));
+  if (!registers_.read(at)) return refuse(pdu[0], kIllegalAddress);
+  truth_.writes.emplace_back(at, value);
+  if (meet(SupplyFaultKind::ignored_writes, now) != nullptr) return pdu;
+  return registers_.write(at, value) ? pdu : refuse(pdu[0], kIllegalAddress);
+}
+
+SupplySlave::Pdu SupplySlave::write_many(const Pdu& pdu, Instant now) {
+  const unsigned first = word(pdu, 1), count = word(pdu, 3);
+  if (count < 1 || count > registers_.model().most_registers || pdu[5] != 2 * count || pdu.size() != 6 + 2 * count) {
+    return refuse(pdu[0], kIllegalValue);
+  }
+  const bool ignored = meet(SupplyFaultKind::ignored_writes, now) != nullptr;
+  for (unsigned i = 0; i < count; ++i) {
+    const auto at = static_cast<std::uint16_t>(first + i), value = static_cast<std::uint16_t>(word(pdu, 6 + 2 * i));
+    if (first + i > 0xFFFF || !registers_.read(at)) return refuse(pdu[0], kIllegalAddress);
+    truth_.writes.emplace_back(at, value);
+    if (!ignored && !registers_.write(at, value)) return refuse(pdu[0], kIllegalAddress);
+  }
+  return {pdu.begin(), pdu.begin() + 5};
+}
+
+}  // namespace kphi::sim

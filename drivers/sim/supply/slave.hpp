@@ -1,0 +1,111 @@
+// A simulated bench supply behind Modbus: requests in, replies out, with the faults of a script. Virtual time, seeded,
+// no I/O: the same inputs at the same times give the same bytes.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/random.hpp"
+#include "drivers/sim/supply/circuit.hpp"
+#include "drivers/sim/supply/faults.hpp"
+#include "drivers/sim/supply/modbus_frame.hpp"
+#include "drivers/sim/supply/registers.hpp"
+
+namespace kphi::sim {
+
+struct SupplySettings {
+  std::string model = "RD6006";
+  std::uint32_t serial = 4711;
+  int slave = 1;
+  double replies_per_s = 10;  ///< stock Riden firmware; about 65 with another; 0: as fast as asked
+  Duration turnaround = std::chrono::milliseconds(1);
+  SupplyParameters circuit;
+  SupplyDisputes disputes;
+  SupplyFaultScript faults;
+  std::uint64_t seed = 1;  ///< of the faults' probabilities
+};
+
+/// Bytes on their way to a client.
+struct SupplyReply {
+  int client = 0;
+  std::vector<std::uint8_t> bytes;
+};
+
+/// What the slave was told.
+struct SupplyTruth {
+  std::uint64_t requests = 0;  ///< whole, and for this slave
+  std::uint64_t exceptions = 0;
+  std::uint64_t damaged = 0;                                    ///< requests with a bad CRC or header
+  std::uint64_t faults = 0;                                     ///< times that a fault met a reply
+  std::vector<std::pair<std::uint16_t, std::uint16_t>> writes;  ///< register and value, in order
+  std::vector<std::vector<std::uint8_t>> frames;                ///< requests as they came; the first 1000
+};
+
+class SupplySlave {
+ public:
+  /// Throws std::invalid_argument for an unknown model.
+  explicit SupplySlave(const SupplySettings& settings);
+  SupplySlave(const SupplySlave&) = delete;
+  SupplySlave& operator=(const SupplySlave&) = delete;
+
+  /// Physics up to `now` with this load, in one step of at most a second; returns the voltage at the terminals.
+  double advance(const SupplyLoad& load, Instant now);
+  /// Bytes of a client, one stream each; `framing` is the client's for good.
+  void receive(int client, ModbusFraming framing, std::span<const std::uint8_t> bytes, Instant now);
+  /// The next reply that has left until `now`.
+  [[nodiscard]] bool next_reply(SupplyReply& out, Instant now);
+  /// When the next reply leaves; kNever.
+  [[nodiscard]] Instant next_due() const noexcept { return under_way_.empty() ? kNever : under_way_.front().due; }
+  /// A client has gone: drops its pending replies.
+  void forget(int client);
+  /// False: its stream is broken; close it.
+  [[nodiscard]] bool makes_sense(int client) const;
+  /// The fault `closed` is active.
+  [[nodiscard]] bool closed(Instant now) const noexcept;
+  // For joining a client without frames and a wire.
+  /// A command sent now reaches it.
+  [[nodiscard]] bool hears(Instant now);
+  /// Delay of the whole answer to a request sent now; nullopt: no answer.
+  [[nodiscard]] std::optional<Duration> answers(Instant now);
+  /// One more fault, from now on.
+  void add_fault(const SupplyFault& fault);
+
+  [[nodiscard]] SupplyCircuit& circuit() noexcept { return circuit_; }
+  [[nodiscard]] SupplyRegisters& registers() noexcept { return registers_; }
+  [[nodiscard]] const SupplyTruth& truth() const noexcept { return truth_; }
+
+ private:
+  struct PendingReply {
+    Instant due;
+    SupplyReply reply;
+  };
+  using Pdu = std::vector<std::uint8_t>;
+
+  void answer(int client, ModbusFraming framing, const ModbusRequest& request, Instant now);
+  [[nodiscard]] Pdu apply(const Pdu& pdu, Instant now);
+  [[nodiscard]] Pdu read(const Pdu& pdu, Instant now);
+  [[nodiscard]] Pdu write_one(const Pdu& pdu, Instant now);
+  [[nodiscard]] Pdu write_many(const Pdu& pdu, Instant now);
+  [[nodiscard]] Pdu refuse(std::uint8_t function, int code);
+  [[nodiscard]] std::uint16_t value_at(std::uint16_t at, std::uint16_t value, Instant now) const;
+  void send(int client, std::vector<std::uint8_t> bytes, Instant due, Duration gap);
+  /// The first active fault of this kind that meets this reply; nullptr.
+  [[nodiscard]] const SupplyFault* meet(SupplyFaultKind kind, Instant now);
+
+  SupplySettings settings_;
+  SupplyCircuit circuit_;
+  SupplyRegisters registers_;
+  Random random_;
+  std::vector<std::uint64_t> used_;  ///< of each fault's count; of an instant: whether it has happened
+  std::map<int, ModbusScanner> scanners_;
+  std::deque<PendingReply> under_way_;
+  Instant reached_{0}, last_due_{0}, next_turn_{0};
+  SupplyTruth truth_;
+};
+
+}  // namespace kphi::sim

@@ -1,0 +1,78 @@
+// Sockets of the simulated bench, and text questions and answers over them without ever blocking: the box's web server
+// and the control line.
+#pragma once
+
+#include <poll.h>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/descriptor.hpp"
+
+namespace kphi::sim {
+
+struct Listening {
+  Descriptor socket;
+  std::uint16_t port = 0;
+};
+
+/// Non-blocking; `type`: SOCK_DGRAM (with a large send buffer) or SOCK_STREAM; port 0: any free one. `host`: IPv4 name
+/// or address. Throws DeviceError.
+[[nodiscard]] Listening listen_at(const std::string& host, int type, std::uint16_t port);
+
+class Conversations {
+ public:
+  struct Answer {
+    std::string bytes;
+    std::chrono::nanoseconds wait{0};   ///< wall time before the first byte
+    bool close = false;                 ///< after the last one
+    std::size_t segment = 0;            ///< at most this many bytes at once; 0: all
+    std::chrono::nanoseconds pause{0};  ///< wall time between two segments
+  };
+  /// Takes whole questions off the front of `heard` and returns what to send.
+  using Answerer = std::function<Answer(std::string& heard)>;
+  struct Manners {
+    std::string terminator;   ///< ends a question
+    bool one_answer = false;  ///< close after the first
+    std::size_t at_once = 1;  ///< connections served at the same time; others wait in the queue
+  };
+  /// `listener`: non-blocking and listening. `answer`: question without its terminator -> what to send.
+  Conversations(Descriptor listener, const Manners& manners, std::function<Answer(std::string_view)> answer);
+  /// For questions without a terminator.
+  Conversations(Descriptor listener, std::size_t at_once, Answerer answerer);
+
+  void append_polls(std::vector<pollfd>& polls) const;
+  /// Replaces the listener; an empty one refuses connections and ends the open ones.
+  void listen_at(Descriptor listener);
+  [[nodiscard]] bool listening() const noexcept { return listener_.number() >= 0; }
+  /// Does what can be done now; also drops clients that were silent for 3 s of wall time.
+  void serve();
+
+ private:
+  struct Connection {
+    Descriptor socket;
+    std::string heard;
+    std::string to_say;
+    bool closing = false;
+    std::size_t segment = 0;
+    std::chrono::nanoseconds pause{0};
+    std::chrono::steady_clock::time_point speak_at{};
+    std::chrono::steady_clock::time_point heard_at = std::chrono::steady_clock::now();
+  };
+  void welcome();
+  void hear(Connection& connection);
+  void say(Connection& connection);
+
+  Descriptor listener_;
+  std::size_t at_once_;
+  Answerer answerer_;
+  std::list<Connection> connections_;
+};
+
+}  // namespace kphi::sim

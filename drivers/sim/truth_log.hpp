@@ -1,0 +1,48 @@
+// What truly happened on a simulated bench, as text: `kphi sim --truth-log`. One JSON object per line, bench time.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "drivers/sim/iq/line.hpp"
+#include "drivers/sim/netbox/fault_injector.hpp"
+#include "drivers/sim/supply/circuit.hpp"
+
+namespace kphi::sim {
+
+/// The events, the datagrams of the log, then {"totals": …}.
+[[nodiscard]] std::string json_lines(const WireTruth& truth);
+/// The totals that are not zero, in one line: "sent 700, records_sent 28000, …".
+[[nodiscard]] std::string summary(const WireTruth& truth);
+/// The events, the replies of the log, then {"motor_totals": …}.
+[[nodiscard]] std::string json_lines(const IqTruth& truth);
+
+[[nodiscard]] std::string_view name_of(MotorDrive::Mode mode) noexcept;
+
+/// What the motor was told and what its power stage did about it, sampled by look(): tests check
+/// every way out of a program against this.
+class MotionLog {
+ public:
+  /// Notes what has changed since the last look; of several commands since then, the last one. `speed` in rad/s.
+  void look(const IqDevice& motor, double speed, Instant now);
+  /// The same for the output of the supply.
+  void look(const SupplyCircuit& supply, Instant now);
+  /// {"at_ns", "motion_command": "velocity", "target_rad_s"}, other modes with
+  /// their plain "target"; {"at_ns", "stage": "drive", "speed_rad_s"}, the stage is what the physics obeys;
+  /// {"at_ns", "supply_output": true}.
+  [[nodiscard]] std::string json_lines() const;
+
+ private:
+  struct Stage {
+    Instant at;
+    PowerStage::Mode mode;
+    double speed;
+  };
+  std::vector<IqMotion> commands_;
+  std::vector<Stage> stages_;
+  std::vector<std::pair<Instant, bool>> outputs_;
+};
+
+}  // namespace kphi::sim

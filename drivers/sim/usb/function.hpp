@@ -1,0 +1,54 @@
+// A simulated USB device: what it is and how it answers, without a bus.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace kphi::sim {
+
+struct UsbEndpointShape {
+  std::uint8_t address = 0;     ///< bit 7: IN
+  std::uint8_t attributes = 2;  ///< 2 bulk, 3 interrupt
+  std::uint16_t packet_bytes = 64;
+};
+
+struct UsbInterfaceShape {
+  std::uint8_t class_code = 0, subclass = 0, protocol = 0;
+  std::vector<UsbEndpointShape> endpoints;
+};
+
+/// What its descriptors state.
+struct UsbShape {
+  std::uint16_t vendor = 0, product = 0;
+  std::string manufacturer, product_name, serial;  ///< an empty serial: it has none
+  std::vector<UsbInterfaceShape> interfaces;
+};
+
+struct UsbSetup {
+  std::uint8_t request_type = 0, request = 0;
+  std::uint16_t value = 0, index = 0, length = 0;
+};
+
+/// How a function answers: bytes, a stall, or nothing yet.
+struct UsbAnswer {
+  enum class Kind : std::uint8_t { bytes, stall, nothing_yet } kind = Kind::bytes;
+  std::vector<std::uint8_t> bytes;
+};
+
+/// Called by one thread, the bus's.
+class UsbFunction {
+ public:
+  virtual ~UsbFunction() = default;
+  [[nodiscard]] virtual const UsbShape& shape() const noexcept = 0;
+  /// A class or vendor request; `out`: data of an OUT request.
+  virtual UsbAnswer control(const UsbSetup& setup, std::span<const std::uint8_t> out) = 0;
+  virtual UsbAnswer out(std::uint8_t endpoint, std::span<const std::uint8_t> bytes) = 0;
+  /// Asked again and again while it has nothing yet, until the host gives up.
+  virtual UsbAnswer in(std::uint8_t endpoint, std::size_t at_most) = 0;
+  virtual void halt_cleared(std::uint8_t endpoint) { (void)endpoint; }
+};
+
+}  // namespace kphi::sim

@@ -1,0 +1,247 @@
+#include "drivers/sim/usb/mcp2221.hpp"
+
+#include <algorithm>
+
+namespace kphi::sim {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::uint8_t kHidOut = 0x03, kHidIn = 0x83;
+constexpr std::size_t kChunk = 60;
+constexpr Duration kBreath = 900us;
+
+// Command codes (data sheet DS20005565, table 3-1).
+constexpr std::uint8_t kStatus = 0x10, kGetData = 0x40, kGetSettings = 0x61, kWrite = 0x90, kRead = 0x91,
+                       kWriteRestart = 0x92, kReadRestart = 0x93, kWriteNoStop = 0x94;
+// Of the answers.
+constexpr std::uint8_t kNotNow = 0x01, kNoSuchCommand = 0x02, kNoData = 127;
+// States of the I²C engine.
+constexpr std::uint8_t kIdle = 0x00, kOccupied = 0x01, kNoStart = 0x12, kNobody = 0x25, kOpenWrite = 0x45,
+                       kSomeRead = 0x54, kAllRead = 0x55;
+
+UsbShape shape_with(std::string serial) {
+  return {0x04d8,
+          0x00dd,
+          "Microchip Technology Inc.",
+          "MCP2221 USB-I2C/UART Combo",
+          std::move(serial),
+          {{0x02, 0x02, 0x01, {{0x81, 3, 8}}},
+           {0x0A, 0x00, 0x00, {{0x82, 2, 16}, {0x02, 2, 16}}},
+           {0x03, 0x00, 0x00, {{kHidIn, 3, 64}, {kHidOut, 3, 64}}}}};
+}
+
+}  // namespace
+
+Mcp2221::Mcp2221(UsbFaults& faults, std::string serial, const Bme280& sensor)
+    : shape_(shape_with(std::move(serial))), faults_(faults), sensor_(sensor) {}
+
+void Mcp2221::set_air(const TrueAir& air) {
+  const std::lock_guard lock(mutex_);
+  sensor_.set_air(air);
+}
+
+BridgeTruth Mcp2221::truth() const {
+  const std::lock_guard lock(mutex_);
+  return truth_;
+}
+
+UsbAnswer Mcp2221::control(const UsbSetup&, std::span<const std::uint8_t>) { return {UsbAnswer::Kind::stall, {}}; }
+
+UsbAnswer Mcp2221::out(std::uint8_t endpoint, std::span<const std::uint8_t> bytes) {
+  const std::lock_guard lock(mutex_);
+  if (endpoint != kHidOut) return {};  // the serial port, which leads nowhere
+  if (bytes.size() != 64) {
+    ++truth_.malformed;
+    return {};
+  }
+  if (next_command_) return {UsbAnswer::Kind::nothing_yet, {}};
+  Report command{};
+  std::copy(bytes.begin(), bytes.end(), command.begin());
+  ++truth_.commands;
+  if (!answers_.empty()) {
+    ++truth_.overlapped;
+    next_command_ = command;
+    return {};
+  }
+  if (faults_.now() - fetched_ < kBreath) ++truth_.hasty;
+  const Report answer = apply(command);
+  if (faults_.strikes(UsbFaultKind::stall)) halted_ = true;
+  if (faults_.strikes(UsbFaultKind::no_reply)) return {};
+  const auto late = faults_.strikes(UsbFaultKind::late);
+  answers_.push_back({answer, faults_.now() + (late ? late->delay : Duration{0})});
+  return {};
+}
+
+UsbAnswer Mcp2221::in(std::uint8_t endpoint, std::size_t at_most) {
+  const std::lock_guard lock(mutex_);
+  if (endpoint != kHidIn) return {UsbAnswer::Kind::nothing_yet, {}};
+  if (halted_) return {UsbAnswer::Kind::stall, {}};
+  if (answers_.empty() || answers_.front().due > faults_.now()) return {UsbAnswer::Kind::nothing_yet, {}};
+  const Report report = answers_.front().report;
+  answers_.pop_front();
+  fetched_ = faults_.now();
+  if (next_command_) {
+    answers_.push_back({apply(*next_command_), faults_.now()});
+    next_command_.reset();
+  }
+  return {UsbAnswer::Kind::bytes,
+          {report.begin(), report.begin() + static_cast<std::ptrdiff_t>(std::min(at_most, report.size()))}};
+}
+
+void Mcp2221::halt_cleared(std::uint8_t) {
+  const std::lock_guard lock(mutex_);
+  halted_ = false;
+}
+
+Mcp2221::Report Mcp2221::apply(const Report& command) {
+  Report answer{};
+  answer[0] = command[0];
+  busy_ = faults_.strikes(UsbFaultKind::busy).has_value();
+  switch (command[0]) {
+    case kStatus:
+      status(command, answer);
+      break;
+    case kWrite:
+    case kWriteRestart:
+    case kWriteNoStop:
+      write(command, answer);
+      break;
+    case kRead:
+    case kReadRestart:
+      begin_read(command, answer);
+      break;
+    case kGetData:
+      get_data(answer);
+      break;
+    case kGetSettings:
+      break;
+    default:
+      answer[1] = kNoSuchCommand;
+  }
+  return answer;
+}
+
+/// Table 3-3: cancel, set the speed, and how the engine is.
+void Mcp2221::status(const Report& command, Report& answer) {
+  if (command[2] == 0x10) {
+    answer[2] = engine() == kIdle ? 0x11 : 0x10;
+    cancel();
+  }
+  if (command[3] == 0x20) {
+    const bool settable = engine() == kIdle;
+    answer[3] = settable ? 0x20 : 0x21;
+    answer[4] = command[4];
+    if (settable) divider_ = command[4];
+  }
+  answer[8] = engine();
+  answer[9] = static_cast<std::uint8_t>(requested_);
+  answer[10] = static_cast<std::uint8_t>(requested_ >> 8);
+  answer[11] = static_cast<std::uint8_t>(transferred_);
+  answer[12] = static_cast<std::uint8_t>(transferred_ >> 8);
+  answer[14] = divider_;
+  answer[16] = address_byte_;
+  answer[20] = nack_ ? 0x40 : 0x00;
+  const bool stuck = faults_.active(UsbFaultKind::stuck_bus);
+  answer[22] = 1;
+  answer[23] = stuck ? 0 : 1;
+  std::copy_n(
+      "A6"
+      "11",
+      4, answer.begin() + 46);
+}
+
+void Mcp2221::write(const Report& command, Report& answer) {
+  const std::size_t total = static_cast<std::size_t>(command[1]) | static_cast<std::size_t>(command[2]) << 8;
+  const bool goes_on = !written_.empty() && total == requested_;
+  if (!goes_on && !takes_transfer(answer)) return;
+  if (!goes_on) {
+    written_.clear();
+    requested_ = total;
+    transferred_ = 0;
+    if (!addressed(command[3])) return;
+  }
+  const std::size_t more = std::min(kChunk, total - written_.size());
+  written_.insert(written_.end(), command.begin() + 4, command.begin() + 4 + static_cast<std::ptrdiff_t>(more));
+  occupy(more + (goes_on ? 0 : 1));
+  if (written_.size() == total) finish_write(command[0] != kWriteNoStop);
+}
+
+void Mcp2221::finish_write(bool stop) {
+  sensor_.write(written_, faults_.now());
+  transferred_ = written_.size();
+  written_.clear();
+  state_ = stop ? kIdle : kOpenWrite;
+}
+
+void Mcp2221::begin_read(const Report& command, Report& answer) {
+  if (!takes_transfer(answer)) return;
+  requested_ = static_cast<std::size_t>(command[1]) | static_cast<std::size_t>(command[2]) << 8;
+  transferred_ = still_to_read_ = 0;
+  if (requested_ == 0) ++truth_.malformed;
+  if (!addressed(command[3])) return;
+  still_to_read_ = requested_;
+  state_ = requested_ > kChunk ? kSomeRead : kAllRead;
+  occupy(1 + requested_);
+}
+
+void Mcp2221::get_data(Report& answer) {
+  answer[2] = engine();
+  answer[3] = kNoData;
+  if (answer[2] != kSomeRead && answer[2] != kAllRead) return;
+  const std::size_t count = std::min(kChunk, still_to_read_);
+  for (std::size_t i = 0; i < count; ++i) answer[4 + i] = sensor_byte();
+  answer[3] = static_cast<std::uint8_t>(count);
+  still_to_read_ -= count;
+  transferred_ += count;
+  state_ = still_to_read_ == 0 ? kIdle : still_to_read_ > kChunk ? kSomeRead : kAllRead;
+}
+
+/// A transfer may begin when the engine is idle, or holds the bus after a write without a stop.
+bool Mcp2221::takes_transfer(Report& answer) {
+  const std::uint8_t now = engine();
+  if (now == kIdle || now == kOpenWrite) return true;
+  answer[1] = kNotNow;
+  answer[2] = now;
+  return false;
+}
+
+/// Seven bits of address; the lowest bit of a read's may be either. An absent acknowledgement shows later only.
+bool Mcp2221::addressed(std::uint8_t address_byte) {
+  address_byte_ = address_byte;
+  if (faults_.strikes(UsbFaultKind::stuck_bus)) {
+    state_ = kNoStart;
+    return false;
+  }
+  if (address_byte >> 1 == sensor_.address() && !faults_.strikes(UsbFaultKind::nack)) return true;
+  ++truth_.nacks;
+  nack_ = true;
+  state_ = kNobody;
+  occupy(1);
+  return false;
+}
+
+/// Nine bits for each byte at the set speed.
+void Mcp2221::occupy(std::size_t bytes) {
+  const double bit_s = (divider_ + 3) / 12e6;
+  free_at_ = std::max(free_at_, faults_.now()) + from_seconds(9.0 * static_cast<double>(bytes) * bit_s);
+}
+
+std::uint8_t Mcp2221::engine() const { return busy_ || faults_.now() < free_at_ ? kOccupied : state_; }
+
+std::uint8_t Mcp2221::sensor_byte() {
+  const std::uint8_t at = sensor_.pointer();
+  const std::uint8_t value = sensor_.read(faults_.now());
+  const auto fault = faults_.strikes(UsbFaultKind::reads_as, at);
+  return fault ? fault->value : value;
+}
+
+void Mcp2221::cancel() {
+  state_ = kIdle;
+  free_at_ = faults_.now();
+  nack_ = false;
+  written_.clear();
+  still_to_read_ = 0;
+}
+
+}  // namespace kphi::sim

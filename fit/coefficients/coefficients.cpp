@@ -1,0 +1,237 @@
+#include "fit/coefficients/coefficients.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "base/number.hpp"
+#include "compensation/file/coefficient_keys.hpp"
+#include "compensation/units.hpp"
+
+namespace kphi::fit {
+namespace {
+
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// A YAML double-quoted scalar: propeller "5e3" stays text, and no text can end the quotes.
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      result += '\\';
+      result += c;
+    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
+      result += fmt::format("\\x{:02X}", static_cast<unsigned>(static_cast<unsigned char>(c)));
+    } else {
+      result += c;
+    }
+  }
+  return result + "\"";
+}
+
+/// In RPM to a thousandth, which hides the rounding of π/30 and nothing else.
+double printed_rpm(double speed_rad_s) { return std::round(to_rpm(RadPerSec(speed_rad_s)) * 1000) / 1000; }
+
+std::string number(double value) { return std::isfinite(value) ? yaml_number(value) : "unknown"; }
+
+std::string known_if_positive(double value) { return value > 0 ? yaml_number(value) : "unknown"; }
+
+std::string list(const std::vector<double>& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : ", ") + yaml_number(value);
+  return "[" + text + "]";
+}
+
+std::string speed_range(double min_rad_s, double max_rad_s) {
+  return list({printed_rpm(min_rad_s), printed_rpm(max_rad_s)});
+}
+
+std::string per_rpm2(double k) { return fmt::format("{:.6g} N/RPM^2", to_newtons_per_rpm2(ThrustCoefficient(k))); }
+
+std::string head(const Identification& identification, const Provenance& provenance) {
+  const std::string blades = identification.blades > 0 ? fmt::format("{}", identification.blades) : "unknown";
+  return fmt::format(
+      "format: {}\n"
+      "measured_utc: {}\n"
+      "tool_version: {}\n"
+      "propeller: {{id: {}, name: {}, diameter_in: {}, blades: {}}}\n"
+      "k_unit: N/(rad/s)^2\n"
+      "overlap: {}\n",
+      compensation::kCoefficientFormat, provenance.measured_utc.empty() ? "unknown" : quoted(provenance.measured_utc),
+      quoted(provenance.tool_version), quoted(identification.propeller),
+      quoted(provenance.propeller_name.empty() ? identification.propeller : provenance.propeller_name),
+      known_if_positive(identification.diameter_in), blades, compensation::name_of(identification.overlap));
+}
+
+std::string line_block(const LineFit& line) {
+  std::vector<double> points;
+  for (const LinePoint& point : line.points) points.push_back(point.phi_deg);
+  const auto& c = line.covariance;
+  return fmt::format(
+      "K_T: {{value: {}, standard_error: {}, phi_deg: 0.0}}  # {}\n"
+      "line:\n"
+      "  anchored: {}\n"
+      "  intercept: {}  # {}\n"
+      "  slope_per_deg: {}  # {}\n"
+      "  covariance: [{}, {}]  # of intercept, slope_per_deg\n"
+      "  points_deg: {}\n",
+      yaml_number(line.K_T), yaml_number(line.K_T_standard_error), per_rpm2(line.K_T), line.anchored,
+      yaml_number(line.intercept), per_rpm2(line.intercept), yaml_number(line.slope_per_deg),
+      per_rpm2(line.slope_per_deg) + " per degree", list({c[0][0], c[0][1]}), list({c[1][0], c[1][1]}), list(points));
+}
+
+std::string valid_block(const Identification& identification) {
+  std::string text = "valid: {phi_deg: " + list({0, identification.table.back().phi_deg});
+  if (speeds_known(identification))
+    text += ", speed_rpm: " + speed_range(identification.speed_min_rad_s, identification.speed_max_rad_s);
+  return text + "}\n";
+}
+
+std::string table_row(const OcclusionCoefficient& row, double at_speed_rad_s) {
+  std::string text = fmt::format("  - {{phi_deg: {}, k: {}, standard_error: {}", yaml_number(row.phi_deg),
+                                 yaml_number(row.k), known_if_positive(row.standard_error));
+  if (row.at_speed) {
+    text += fmt::format(", k_at_speed: {}, at_speed_rpm: {}", yaml_number(row.at_speed->k),
+                        yaml_number(printed_rpm(at_speed_rad_s)));
+  }
+  if (row.standard)
+    text += fmt::format(", k_standard: {}, k_standard_error: {}", yaml_number(row.standard->k),
+                        yaml_number(row.standard->standard_error));
+  if (row.fit) text += fmt::format(", steps: {}, repetitions: {}", row.steps, row.repetitions);
+  return text + "}\n";
+}
+
+std::string standard_block(const Identification& identification) {
+  const auto& standard = identification.table.front().standard;
+  if (!identification.air || !standard) return "unknown";
+  return fmt::format("{{value: {}, standard_error: {}, air_density_kg_m3: {}}}", yaml_number(standard->k),
+                     yaml_number(standard->standard_error), yaml_number(kStandardDensity));
+}
+
+/// What `provenance.fit` holds besides the model in words: all that is needed to fit the same again.
+std::string fit_options(const Identification& identification, const std::optional<BenchUncertainty>& bench) {
+  std::string text = fmt::format("k_by: {}, weights: {}, loss: {}", name_of(identification.estimator),
+                                 name_of(identification.weighting), name_of(identification.loss));
+  if (speeds_known(identification)) {
+    text += fmt::format(", speed_range_rpm: [{}, {}]", yaml_number(printed_rpm(identification.fitted.min_rad_s)),
+                        yaml_number(printed_rpm(identification.fitted.max_rad_s)));
+  }
+  std::string left_out;
+  for (const LeftOutRun& run : identification.left_out)
+    left_out += fmt::format("{}{}", left_out.empty() ? "" : ", ",
+                            quoted(fmt::format("{}:{}:{}", shortest(run.phi_deg), run.repetition, run.cause)));
+  if (!left_out.empty()) text += ", leave_out: [" + left_out + "]";
+  if (!bench) return text;
+  std::string known;
+  for (const auto& [name, value] : known_uncertainties(*bench))
+    known += fmt::format("{}{}: {}", known.empty() ? "" : ", ", name, yaml_number(value));
+  return text + ", u: {" + known + "}";
+}
+
+std::string provenance_block(const Identification& identification, const Provenance& provenance) {
+  const auto& air = identification.air;
+  std::string text = fmt::format(
+      "air_density_kg_m3: {}\n"
+      "air_density_u_kg_m3: {}\n"
+      "k_standard: {}  # K_T in standard air\n"
+      "supply_v: {}\n"
+      "provenance:\n"
+      "  campaign: {}\n"
+      "  fit: {{model: \"T = k w^2\", estimator: {}, {}}}\n",
+      air ? yaml_number(air->kg_m3) : "unknown", air ? yaml_number(air->u_kg_m3) : "unknown",
+      standard_block(identification), number(provenance.supply_v.value_or(kUnknown)), quoted(provenance.campaign),
+      quoted(estimator_words(identification)), fit_options(identification, provenance.bench));
+  if (const auto& clock = provenance.clock) {
+    text += clock->u_gain ? fmt::format("  motor_clock: {{gain: {}, u: {}}}\n", clock->gain, *clock->u_gain)
+                          : "  motor_clock: unchecked\n";
+  }
+  if (provenance.runs.empty()) return text + "  runs: []\n";
+  text += "  runs:\n";
+  for (const RunProvenance& run : provenance.runs)
+    text += fmt::format("    - {{file: {}, sha256: {}}}\n", quoted(run.file), quoted(run.sha256));
+  return text;
+}
+
+std::string number_or_none(const std::optional<double>& value) { return value ? number(*value) : "none"; }
+
+std::string errors(const Budget& budget) {
+  return fmt::format("{{u: {}, freedom: {}, expanded_95: {}}}", number(budget.combined()),
+                     std::isfinite(budget.freedom()) ? number(budget.freedom()) : ".inf", number(budget.expanded()));
+}
+
+std::string matrix(const std::vector<std::vector<double>>& rows) {
+  std::vector<std::string> lines;
+  for (const auto& row : rows) {
+    std::vector<std::string> numbers;
+    for (const double value : row) numbers.push_back(number(value));
+    lines.push_back(fmt::format("[{}]", fmt::join(numbers, ", ")));
+  }
+  return fmt::format("[{}]", fmt::join(lines, ", "));
+}
+
+std::vector<std::string> not_known(const Budget& budget) {
+  std::vector<std::string> names;
+  for (const BudgetRow& row : budget.rows)
+    if (!row.known()) names.push_back(row.source);
+  return names;
+}
+
+std::string analysis_blocks(const Analysis& analysis) {
+  std::string text = "uncertainty:  # standard uncertainties by the GUM; expanded: 95 %\n";
+  text += fmt::format("  K_T: {}\n", errors(analysis.coefficients.front()));
+  text += fmt::format("  intercept: {}\n  slope_per_deg: {}\n", errors(analysis.intercept), errors(analysis.slope));
+  text += fmt::format("  covariance: {}  # of K_T, intercept, slope_per_deg\n", matrix(analysis.covariance));
+  text += fmt::format("  not_known: [{}]  # sources that the sums lack\n",
+                      fmt::join(not_known(analysis.coefficients.front()), ", "));
+  text += "  table:\n";
+  for (const Budget& budget : analysis.coefficients)
+    text += fmt::format("    - {{quantity: {}, u: {}, expanded_95: {}}}\n", budget.quantity, number(budget.combined()),
+                        number(budget.expanded()));
+  text += fmt::format("  line: {{clipping_deg: {}, zero_deg: {}, intercept_minus_K_T: {}, u: {}}}\n",
+                      number_or_none(analysis.shape.clipping_deg), number_or_none(analysis.shape.zero_deg),
+                      number(analysis.shape.mismatch.value), number(analysis.shape.mismatch.u));
+  text += fmt::format("  line_lack_of_fit_p: {}\n  line_quadratic_p: {}\n", number(analysis.curvature.lack_of_fit.p),
+                      number(analysis.curvature.quadratic.p));
+  if (!analysis.speed.empty()) text += "  speed:\n";
+  for (const SpeedDependence& one : analysis.speed)
+    text += fmt::format("    - {{phi_deg: {}, change_share: {}, u: {}, lack_of_fit_p: {}}}\n", number(one.phi_deg),
+                        number(one.change.value), number(one.change.u), number(one.lack_of_fit.p));
+  text += fmt::format("  rejected_points: {}\n  outlying_runs: {}  # kept\n", analysis.rejected.size(),
+                      analysis.outlying.size());
+  if (analysis.torque.empty()) return text;
+  text += "torque:  # N m/(rad/s)^2, by the estimators of the thrust\n";
+  for (const TorqueCoefficient& one : analysis.torque)
+    text += fmt::format("  - {{phi_deg: {}, k_q: {}, u: {}, drag_per_thrust_m: {}}}\n", number(one.phi_deg),
+                        number(one.k_q.value), number(one.k_q.u), number(one.drag_per_thrust_m.value));
+  return text;
+}
+
+}  // namespace
+
+std::string estimator_words(const Identification& identification) {
+  const bool from_steps = !identification.table.empty() && identification.table.front().fit.has_value();
+  if (!from_steps) return "a weighted line through given k(phi)";
+  constexpr std::array<const char*, 4> words{
+      "least squares of T on w^2 through the origin", "least squares of T on w^2 with an offset",
+      "T/w^2 at the reference speed, by least squares of T on w^2, w and 1", "mean T/w^2 at the reference speed"};
+  std::string text = words[static_cast<std::size_t>(identification.estimator)];
+  if (identification.weighting != Weighting::equal)
+    text += fmt::format(", weighted by {}", identification.weighting == Weighting::thrust ? "u(T)" : "u(T) and u(w)");
+  if (identification.loss != Loss::none) text += fmt::format(", {} loss", name_of(identification.loss));
+  return text + ", then a weighted line through k(phi)";
+}
+
+std::string format_coefficients(const Identification& identification, const Provenance& provenance,
+                                const Analysis* analysis) {
+  std::string text = head(identification, provenance) + line_block(identification.line) + valid_block(identification);
+  text += "table:\n";
+  for (const OcclusionCoefficient& row : identification.table) text += table_row(row, identification.at_speed_rad_s);
+  text += provenance_block(identification, provenance);
+  return analysis == nullptr ? text : text + analysis_blocks(*analysis);
+}
+
+}  // namespace kphi::fit

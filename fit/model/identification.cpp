@@ -1,0 +1,272 @@
+#include "fit/model/identification.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "base/error.hpp"
+#include "compensation/units.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using results::StepMean;
+
+using StepsByAngle = std::map<double, std::vector<StepMean>>;
+
+bool measured_at(const std::vector<StepMean>& steps, double speed) {
+  return std::any_of(steps.begin(), steps.end(), [&](const StepMean& step) { return same_level(level(step), speed); });
+}
+
+double highest_common_level(const StepsByAngle& by_angle) {
+  double highest = 0;
+  for (const StepMean& step : by_angle.begin()->second) {
+    const bool everywhere = std::all_of(by_angle.begin(), by_angle.end(),
+                                        [&](const auto& entry) { return measured_at(entry.second, level(step)); });
+    if (everywhere) highest = std::max(highest, level(step));
+  }
+  return highest;
+}
+
+ThrustForm form_of(Estimator estimator) {
+  if (estimator == Estimator::with_offset) return ThrustForm::with_offset;
+  return estimator == Estimator::polynomial ? ThrustForm::three_terms : ThrustForm::through_origin;
+}
+
+/// T/ω² of the map at a speed, and its error by the covariance of the terms.
+void take_map_at(double speed, const ThrustFit& fit, OcclusionCoefficient& row) {
+  row.k = thrust(fit.parameters, speed) / (speed * speed);
+  const std::array<double, 3> gradient{1, 1 / speed, 1 / (speed * speed)};
+  double variance = 0;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) variance += gradient[i] * gradient[j] * fit.covariance[i][j];
+  row.standard_error = std::sqrt(std::max(0.0, variance));
+}
+
+OcclusionCoefficient coefficient(double phi_deg, std::vector<StepMean> steps, const IdentificationOptions& options,
+                                 double at_speed) {
+  const std::vector<Point> points = points_of(steps);
+  std::vector<Point> at_level;
+  std::set<int> levels, repetitions;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const StepMean& step = steps[i];
+    if (at_speed > 0 && same_level(level(step), at_speed) && step.speed_rad_s > 0) at_level.push_back(points[i]);
+    levels.insert(step.step);
+    repetitions.insert(step.repetition);
+  }
+  OcclusionCoefficient row;
+  row.phi_deg = phi_deg;
+  ThrustFitOptions fit_options;
+  fit_options.form = form_of(options.estimator);
+  fit_options.weighting = options.weighting;
+  fit_options.loss = options.loss;
+  row.fit = fit_thrust(points, fit_options);
+  row.k = row.fit->parameters.k;
+  row.standard_error = row.fit->standard_error.k;
+  row.steps = levels.size();
+  row.repetitions = repetitions.size();
+  if (const auto air = air_of(steps)) row.standard = at_standard(row.k, row.standard_error, *air);
+  if (!at_level.empty()) row.at_speed = k_at_speed(at_level);
+  if (options.estimator == Estimator::polynomial || options.estimator == Estimator::at_speed) {
+    if (!row.at_speed) throw FitError("no good step at the reference speed; name a speed of the profile");
+    if (options.estimator == Estimator::polynomial) take_map_at(at_speed, *row.fit, row);
+    if (options.estimator == Estimator::at_speed) {
+      row.k = row.at_speed->k;
+      if (!std::isnan(row.at_speed->standard_error)) row.standard_error = row.at_speed->standard_error;
+    }
+  }
+  row.measured = std::move(steps);
+  return row;
+}
+
+/// Of "k at a speed" only the steps there; otherwise all of the fit, by its own weights.
+AngleScatter scatter_of(const OcclusionCoefficient& row, Estimator estimator, double at_speed) {
+  if (estimator != Estimator::at_speed) {
+    auto runs = sums_of_runs(row.phi_deg, row.measured, *row.fit, row.k);
+    WithinRuns within = scatter_within_runs(row.measured, *row.fit, row.k, runs);
+    if (estimator != Estimator::through_origin) {
+      // The other terms of the map are fitted too, and k takes part in their error.
+      within.variance = row.standard_error * row.standard_error * static_cast<double>(runs.size());
+      within.freedom = static_cast<double>(row.fit->n) - (estimator == Estimator::with_offset ? 2 : 3);
+    }
+    return scatter_of_angle(row.k, std::move(runs), within);
+  }
+  ThrustFit at_level = *row.fit;
+  at_level.parameters = {row.k, 0, 0};
+  for (std::size_t i = 0; i < row.measured.size(); ++i) {
+    const double square = row.measured[i].speed_rad_s * row.measured[i].speed_rad_s;
+    const bool there = same_level(level(row.measured[i]), at_speed) && square > 0;
+    at_level.points[i].weight = there ? 1 / (square * square) : 0;
+    at_level.robust_weights[i] = 1;
+  }
+  return scatter_of_angle(row.k, sums_of_runs(row.phi_deg, row.measured, at_level, row.k), {});
+}
+
+void require_one_propeller(std::span<const StepMean> steps) {
+  if (steps.empty()) throw FitError("no steps: the table is empty");
+  for (const StepMean& step : steps) {
+    if (step.propeller != steps.front().propeller) {
+      throw FitError(fmt::format("steps of two propellers, '{}' and '{}'; fit each by itself", steps.front().propeller,
+                                 step.propeller));
+    }
+  }
+}
+
+/// A run that is not there was meant to be another.
+void require_runs(std::span<const StepMean> steps, const std::vector<LeftOutRun>& left_out) {
+  for (const LeftOutRun& run : left_out) {
+    const bool there = std::any_of(steps.begin(), steps.end(), [&](const StepMean& step) {
+      return step.occlusion_deg == run.phi_deg && step.repetition == run.repetition;
+    });
+    if (!there)
+      throw FitError(fmt::format("no run at phi = {} deg, repetition {}, to leave out", run.phi_deg, run.repetition));
+  }
+}
+
+StepsByAngle by_angle(std::span<const StepMean> steps) {
+  StepsByAngle result;
+  for (const StepMean& step : steps) result[step.occlusion_deg].push_back(step);
+  return result;
+}
+
+StepsByAngle by_angle_or_refuse(const StepSelection& selection) {
+  StepsByAngle result = by_angle(selection.used);
+  if (result.empty()) {
+    throw FitError(
+        fmt::format("no step is left to fit: {} lie outside the speed range, {} are flagged; widen the "
+                    "range or repeat the runs",
+                    selection.outside_range, selection.flagged.size()));
+  }
+  return result;
+}
+
+std::vector<LinePoint> line_points(const std::vector<OcclusionCoefficient>& table) {
+  std::vector<LinePoint> points;
+  for (const OcclusionCoefficient& row : table) points.push_back({row.phi_deg, row.k, row.standard_error});
+  return points;
+}
+
+}  // namespace
+
+std::optional<AirDensity> air_of(std::span<const results::StepMean> steps) {
+  if (steps.empty()) return std::nullopt;
+  AirDensity mean;
+  const double n = static_cast<double>(steps.size());
+  for (const results::StepMean& step : steps) {
+    if (!(step.air_density_kg_m3 > 0)) return std::nullopt;
+    mean.kg_m3 += step.air_density_kg_m3 / n;
+    mean.u_kg_m3 += (std::isnan(step.air_density_u_kg_m3) ? 0.0 : step.air_density_u_kg_m3) / n;
+  }
+  return mean;
+}
+
+StandardCoefficient at_standard(double k, double standard_error, const AirDensity& air) {
+  const double scaled = k * (kStandardDensity / air.kg_m3);
+  return {scaled, std::hypot(scaled * standard_error / k, scaled * air.u_kg_m3 / air.kg_m3)};
+}
+
+bool speeds_known(const Identification& identification) {
+  return identification.speed_max_rad_s > identification.speed_min_rad_s &&
+         std::isfinite(identification.speed_max_rad_s);
+}
+
+bool same_level(double a_rad_s, double b_rad_s) {
+  constexpr double kShare = 0.005;
+  return std::abs(a_rad_s - b_rad_s) <= kShare * std::max(a_rad_s, b_rad_s);
+}
+
+const char* name_of(Estimator estimator) {
+  constexpr std::array<const char*, 4> names{"origin", "offset", "polynomial", "speed"};
+  return names[static_cast<std::size_t>(estimator)];
+}
+
+const char* name_of(Weighting weighting) {
+  constexpr std::array<const char*, 3> names{"equal", "thrust", "effective-variance"};
+  return names[static_cast<std::size_t>(weighting)];
+}
+
+const char* name_of(Loss loss) {
+  constexpr std::array<const char*, 4> names{"none", "huber", "cauchy", "tukey"};
+  return names[static_cast<std::size_t>(loss)];
+}
+
+std::vector<OcclusionCoefficient> coefficients_of(std::span<const StepMean> steps, const IdentificationOptions& options,
+                                                  double at_speed_rad_s, Repeatability& repeatability) {
+  std::vector<OcclusionCoefficient> table;
+  std::vector<AngleScatter> scatter;
+  for (auto& [phi_deg, measured] : by_angle(steps)) {
+    try {
+      table.push_back(coefficient(phi_deg, measured, options, at_speed_rad_s));
+    } catch (const FitError& error) {
+      throw FitError(fmt::format("phi = {} deg: {}", phi_deg, error.what()));
+    }
+    scatter.push_back(scatter_of(table.back(), options.estimator, at_speed_rad_s));
+  }
+  repeatability = fit::repeatability(std::move(scatter));
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    if (repeatability.repeated) table[i].standard_error = repeatability.independent_u(i);
+  }
+  return table;
+}
+
+Identification identify(std::span<const StepMean> steps, const IdentificationOptions& options) {
+  require_one_propeller(steps);
+  Identification result;
+  result.propeller = steps.front().propeller;
+  result.diameter_in = steps.front().diameter_in;
+  result.blades = steps.front().blades;
+  require_runs(steps, options.left_out);
+  result.left_out = options.left_out;
+  result.selection = select_steps(steps, options.speed_range, options.left_out);
+  result.air = air_of(result.selection.used);
+  const StepsByAngle angles = by_angle_or_refuse(result.selection);
+  result.at_speed_rad_s = options.at_speed_rad_s.value_or(highest_common_level(angles));
+
+  result.speed_max_rad_s = std::numeric_limits<double>::infinity();
+  for (const auto& [phi_deg, used] : angles) {
+    const auto [low, high] = std::minmax_element(
+        used.begin(), used.end(), [](const StepMean& a, const StepMean& b) { return level(a) < level(b); });
+    const bool first = result.fitted.max_rad_s == 0;
+    result.fitted.min_rad_s = first ? level(*low) : std::min(result.fitted.min_rad_s, level(*low));
+    result.fitted.max_rad_s = std::max(result.fitted.max_rad_s, level(*high));
+    result.speed_min_rad_s = std::max(result.speed_min_rad_s, level(*low));
+    result.speed_max_rad_s = std::min(result.speed_max_rad_s, level(*high));
+  }
+  result.table = coefficients_of(result.selection.used, options, result.at_speed_rad_s, result.repeatability);
+  result.estimator = options.estimator;
+  result.weighting = options.weighting;
+  result.loss = options.loss;
+  if (options.at_speed_rad_s && !result.table.front().at_speed) {
+    throw FitError(fmt::format("no good step at {:.0f} RPM; name a speed of the profile",
+                               to_rpm(RadPerSec(*options.at_speed_rad_s))));
+  }
+  result.line = fit_line(line_points(result.table), options.line);
+  (void)result.curve();  // refuses what cannot fly
+  return result;
+}
+
+Identification identify_table(std::span<const LinePoint> points, const LineFitOptions& options,
+                              const SpeedRange& speed) {
+  Identification result;
+  result.line = fit_line(points, options);
+  for (const LinePoint& point : points) {
+    OcclusionCoefficient row;
+    row.phi_deg = point.phi_deg;
+    row.k = point.k;
+    row.standard_error = point.standard_error;
+    result.table.push_back(row);
+  }
+  std::sort(result.table.begin(), result.table.end(),
+            [](const auto& a, const auto& b) { return a.phi_deg < b.phi_deg; });
+  result.fitted = speed;
+  result.speed_min_rad_s = speed.min_rad_s;
+  result.speed_max_rad_s = speed.max_rad_s;
+  (void)result.curve();  // refuses what cannot fly
+  return result;
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,119 @@
+// Steps of one propeller → one k per occlusion → the line k(φ).
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "compensation/overlap_measure.hpp"
+#include "fit/model/line_fit.hpp"
+#include "fit/model/repeatability.hpp"
+#include "fit/model/step_selection.hpp"
+#include "fit/model/thrust_fit.hpp"
+
+namespace kphi::fit {
+
+inline constexpr double kStandardDensity = 1.225;  ///< kg/m³: ISA at sea level
+
+struct AirDensity {
+  double kg_m3 = 0;
+  double u_kg_m3 = 0;  ///< standard uncertainty, shared by all steps
+};
+
+/// Mean over the steps; nullopt if one of them lacks its air: kphi never assumes standard air.
+[[nodiscard]] std::optional<AirDensity> air_of(std::span<const results::StepMean> steps);
+
+struct StandardCoefficient {
+  double k = 0;  ///< N/(rad/s)² at kStandardDensity
+  double standard_error = 0;
+};
+
+/// k · 1.225/ρ; the error of the density joins that of k (JCGM 100, eq. 12).
+[[nodiscard]] StandardCoefficient at_standard(double k, double standard_error, const AirDensity& air);
+
+/// Which k of an occlusion the line is drawn through.
+enum class Estimator : std::uint8_t {
+  through_origin,  ///< k of T = k ω² over the speed range
+  with_offset,     ///< k of T = k ω² + offset
+  polynomial,      ///< T/ω² of the map k ω² + linear ω + offset at the reference speed
+  at_speed,        ///< mean T/ω² of the steps at the reference speed
+};
+
+struct IdentificationOptions {
+  Estimator estimator = Estimator::through_origin;
+  Weighting weighting = Weighting::equal;
+  Loss loss = Loss::none;
+  SpeedRange speed_range{.min_rad_s = kSpeedMinRpm * 3.14159265358979323846 / 30};
+  std::vector<LeftOutRun> left_out{};
+  std::optional<double> at_speed_rad_s;  ///< for "k at speed"; default: the highest level measured at every φ
+  LineFitOptions line;
+};
+
+/// One row of the table: what was measured at one φ.
+struct OcclusionCoefficient {
+  double phi_deg = 0;
+  double k = 0;  ///< N/(rad/s)², by the estimator
+  /// N/(rad/s)². Of several repetitions: noise, zero and scatter between runs (Repeatability), without what all k have
+  /// in common; of a single one: of the fit.
+  double standard_error = 0;
+  std::optional<StandardCoefficient> standard;  ///< none where the air is unknown
+  std::size_t steps = 0;                        ///< distinct levels
+  std::size_t repetitions = 0;
+  std::optional<ThrustFit> fit;              ///< none in a table that came without steps
+  std::vector<results::StepMean> measured;   ///< behind `fit`, one per point of it
+  std::optional<SpeedCoefficient> at_speed;  ///< none when no good step lies at that speed
+};
+
+struct Identification {
+  std::string propeller;
+  double diameter_in = 0;  ///< 0: not known
+  int blades = 0;          ///< 0: not known
+  /// In which measure φ is meant in flight. On the bench's sector plates all of them are the same angle.
+  compensation::OverlapMeasure overlap = compensation::OverlapMeasure::rim_arc;
+  std::vector<OcclusionCoefficient> table;  ///< ascending φ, the first is φ = 0
+  LineFit line;
+  Repeatability repeatability;  ///< one angle per row of the table; empty in a table that came without steps
+  StepSelection selection;
+  std::vector<LeftOutRun> left_out;  ///< by hand
+  std::optional<AirDensity> air;     ///< of the steps used; none: unknown, and so is every k at standard density
+  Estimator estimator = Estimator::through_origin;
+  Weighting weighting = Weighting::equal;
+  Loss loss = Loss::none;
+  double at_speed_rad_s = 0;   ///< commanded level of "k at speed"; 0: none
+  SpeedRange fitted{0, 0};     ///< lowest and highest level used at any φ
+  double speed_min_rad_s = 0;  ///< speeds that were measured at every φ: those the line vouches for
+  double speed_max_rad_s = 0;
+
+  /// What flies, valid up to the widest occlusion measured.
+  [[nodiscard]] compensation::ThrustCurve curve() const { return line.curve(table.back().phi_deg, overlap); }
+};
+
+/// Whether a range of speeds is known; it is not in a table that came without.
+[[nodiscard]] bool speeds_known(const Identification& identification);
+
+/// Whether two speeds are the same level of a profile: they agree to 0.5 %.
+[[nodiscard]] bool same_level(double a_rad_s, double b_rad_s);
+
+/// Names for options and files: "origin", "offset", "polynomial", "speed"; "equal", "thrust", "effective-variance";
+/// "none", "huber", "cauchy", "tukey".
+[[nodiscard]] const char* name_of(Estimator estimator);
+[[nodiscard]] const char* name_of(Weighting weighting);
+[[nodiscard]] const char* name_of(Loss loss);
+
+/// One row per φ of `steps`, ascending, and how they repeat. `at_speed_rad_s` is the reference speed, 0: none. Throws
+/// FitError, naming φ.
+[[nodiscard]] std::vector<OcclusionCoefficient> coefficients_of(std::span<const results::StepMean> steps,
+                                                                const IdentificationOptions& options,
+                                                                double at_speed_rad_s, Repeatability& repeatability);
+
+/// Throws FitError when the steps are of several propellers, φ = 0 is missing, or a fit cannot be made (the message
+/// names φ).
+[[nodiscard]] Identification identify(std::span<const results::StepMean> steps,
+                                      const IdentificationOptions& options = {});
+
+/// The same from coefficients found elsewhere. `speed` is the range they hold for, as the caller says.
+[[nodiscard]] Identification identify_table(std::span<const LinePoint> points, const LineFitOptions& options,
+                                            const SpeedRange& speed);
+
+}  // namespace kphi::fit

@@ -1,0 +1,195 @@
+#include "fit/model/line_fit.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.hpp"
+#include "fit/numerics/least_squares.hpp"
+
+namespace kphi::fit {
+namespace {
+
+/// Angles travel through files and options as decimal degrees; two of them closer than this are the same.
+constexpr double kSameAngleDeg = 1e-6;
+
+struct LineResidual {
+  double phi;
+  double k;
+  double sigma;
+
+  template <class Scalar>
+  bool operator()(const Scalar* intercept, const Scalar* slope, Scalar* residual) const {
+    residual[0] = (k - (*intercept + *slope * phi)) / sigma;
+    return true;
+  }
+};
+
+std::vector<LinePoint> sorted(std::span<const LinePoint> points) {
+  std::vector<LinePoint> result(points.begin(), points.end());
+  std::sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.phi_deg < b.phi_deg; });
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    if (!std::isfinite(result[i].phi_deg) || !std::isfinite(result[i].k))
+      throw FitError("line fit: an angle or a coefficient is no number");
+    if (i > 0 && result[i].phi_deg - result[i - 1].phi_deg < kSameAngleDeg)
+      throw FitError(fmt::format("line fit: phi = {} deg is listed twice", result[i].phi_deg));
+  }
+  return result;
+}
+
+const LinePoint& point_at(const std::vector<LinePoint>& points, double phi_deg) {
+  for (const LinePoint& point : points)
+    if (std::abs(point.phi_deg - phi_deg) < kSameAngleDeg) return point;
+  std::vector<double> measured;
+  for (const LinePoint& point : points) measured.push_back(point.phi_deg);
+  throw FitError(
+      fmt::format("line fit: phi = {} deg was not measured; there are {} deg", phi_deg, fmt::join(measured, ", ")));
+}
+
+std::vector<LinePoint> carriers(const std::vector<LinePoint>& points, const LineFitOptions& options) {
+  std::vector<LinePoint> used;
+  if (options.points_deg.empty()) {
+    std::copy_if(points.begin(), points.end(), std::back_inserter(used),
+                 [](const LinePoint& point) { return point.phi_deg > kSameAngleDeg; });
+  }
+  for (const double phi : options.points_deg) used.push_back(point_at(points, phi));
+  used = sorted(used);
+  const std::size_t needed = options.anchored ? 1 : 2;
+  const auto occluded =
+      std::count_if(used.begin(), used.end(), [](const auto& p) { return p.phi_deg > kSameAngleDeg; });
+  if (used.size() < needed || occluded < 1) {
+    throw FitError(
+        fmt::format("line fit: {} points carry the line, it needs {} with phi > 0; measure more occlusions{}",
+                    used.size(), needed, options.anchored ? "" : " or anchor the line at K_T"));
+  }
+  return used;
+}
+
+double largest_k(const std::vector<LinePoint>& points) {
+  double largest = 0;
+  for (const LinePoint& point : points) largest = std::max(largest, std::abs(point.k));
+  if (largest == 0) throw FitError("line fit: every coefficient is 0");
+  return largest;
+}
+
+/// d(slope)/d(intercept) of the anchored line: what an error of K_T does to the slope.
+double slope_per_intercept(const std::vector<LinePoint>& points, const std::vector<double>& sigmas) {
+  double first = 0, second = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double weight = 1 / (sigmas[i] * sigmas[i]);
+    first += weight * points[i].phi_deg;
+    second += weight * points[i].phi_deg * points[i].phi_deg;
+  }
+  return -first / second;
+}
+
+}  // namespace
+
+std::optional<double> LineFit::clipping_deg() const {
+  if (!(slope_per_deg < 0)) return std::nullopt;
+  return (K_T - intercept) / slope_per_deg;
+}
+
+std::optional<double> LineFit::zero_crossing_deg() const {
+  if (!(slope_per_deg < 0)) return std::nullopt;
+  return -intercept / slope_per_deg;
+}
+
+compensation::ThrustCurve LineFit::curve(std::optional<double> largest_deg,
+                                         compensation::OverlapMeasure overlap) const {
+  constexpr double kPerRad = 180 / kPi;
+  const auto curve = compensation::ThrustCurve::from_line(
+      ThrustCoefficient(K_T), ThrustCoefficient(intercept), slope_per_deg * kPerRad,
+      from_degrees(largest_deg.value_or(points.back().phi_deg)), overlap,
+      compensation::LineUncertainty{K_T_standard_error, std::max(0.0, covariance[0][0]), covariance[0][1] * kPerRad,
+                                    std::max(0.0, covariance[1][1]) * kPerRad * kPerRad});
+  if (curve) return *curve;
+  throw FitError(fmt::format(
+      "line fit: K_T = {:.4g} and k of the line at phi = 0, {:.4g} N/(rad/s)^2, must be positive; check the "
+      "sign of the thrust and which points carry the line",
+      K_T, intercept));
+}
+
+LineWeights LineFit::weights(std::span<const double> phis_deg) const {
+  double sum = 0, first = 0, second = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double weight = 1 / (sigmas[i] * sigmas[i]);
+    sum += weight;
+    first += weight * points[i].phi_deg;
+    second += weight * points[i].phi_deg * points[i].phi_deg;
+  }
+  const double determinant = sum * second - first * first;
+  LineWeights result{std::vector<double>(phis_deg.size()), std::vector<double>(phis_deg.size())};
+  for (std::size_t j = 0; j < phis_deg.size(); ++j) {
+    const double phi = phis_deg[j];
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (std::abs(points[i].phi_deg - phi) >= kSameAngleDeg) continue;
+      const double weight = 1 / (sigmas[i] * sigmas[i]);
+      if (!anchored) result.intercept[j] += weight * (second - first * phi) / determinant;
+      result.slope[j] += anchored ? weight * phi / second : weight * (sum * phi - first) / determinant;
+    }
+    if (anchored && std::abs(phi) < kSameAngleDeg) {
+      result.intercept[j] = 1;
+      result.slope[j] -= first / second;
+    }
+  }
+  return result;
+}
+
+LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& options) {
+  const std::vector<LinePoint> all = sorted(points);
+  if (all.empty() || std::abs(all.front().phi_deg) > kSameAngleDeg)
+    throw FitError("line fit: no run at phi = 0; K_T is measured without an occlusion on the same stand");
+
+  LineFit fit;
+  fit.anchored = options.anchored;
+  fit.K_T = all.front().k;
+  const double k_scale = largest_k(all);
+  const double floor = options.error_floor * k_scale;
+  const auto known_error = [&](const LinePoint& point) {
+    return point.standard_error > 0 ? point.standard_error : floor;
+  };
+  fit.K_T_standard_error = known_error(all.front());
+  fit.points = carriers(all, options);
+  std::vector<double>& sigmas = fit.sigmas;
+  for (const LinePoint& point : fit.points) sigmas.push_back(std::max(known_error(point), floor));
+
+  const double phi_scale = fit.points.back().phi_deg;
+  double intercept = fit.K_T / k_scale, slope = 0;
+  ceres::Problem problem(problem_options());
+  for (std::size_t i = 0; i < fit.points.size(); ++i) {
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<LineResidual, 1, 1, 1>(new LineResidual{
+                                 fit.points[i].phi_deg / phi_scale, fit.points[i].k / k_scale, sigmas[i] / k_scale}),
+                             nullptr, &intercept, &slope);
+  }
+  if (options.anchored) problem.SetParameterBlockConstant(&intercept);
+  solve_exactly(problem, "line fit");
+  const double slope_unit = k_scale / phi_scale;
+  fit.intercept = options.anchored ? fit.K_T : intercept * k_scale;
+  fit.slope_per_deg = slope * slope_unit;
+
+  double chi_squared = 0;
+  for (std::size_t i = 0; i < fit.points.size(); ++i) {
+    fit.residuals.push_back(fit.points[i].k - (fit.intercept + fit.slope_per_deg * fit.points[i].phi_deg));
+    chi_squared += std::pow(fit.residuals.back() / sigmas[i], 2);
+  }
+  const std::size_t terms = options.anchored ? 1 : 2;
+  const std::size_t freedom = fit.points.size() - terms;
+  const double enlarge = freedom > 0 ? std::max(1.0, chi_squared / static_cast<double>(freedom)) : 1.0;
+  if (options.anchored) {
+    const double slope_variance = unit_covariance(problem, {&slope}, "line fit")[0] * slope_unit * slope_unit * enlarge;
+    const double anchor_variance = fit.K_T_standard_error * fit.K_T_standard_error;
+    const double gradient = slope_per_intercept(fit.points, sigmas);
+    fit.covariance = {{{anchor_variance, gradient * anchor_variance},
+                       {gradient * anchor_variance, slope_variance + gradient * gradient * anchor_variance}}};
+  } else {
+    const auto c = unit_covariance(problem, {&intercept, &slope}, "line fit");
+    fit.covariance = {{{c[0] * k_scale * k_scale * enlarge, c[1] * k_scale * slope_unit * enlarge},
+                       {c[2] * k_scale * slope_unit * enlarge, c[3] * slope_unit * slope_unit * enlarge}}};
+  }
+  return fit;
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,300 @@
+#include "fit/model/thrust_fit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <set>
+
+#include "base/error.hpp"
+#include "base/statistics.hpp"
+#include "fit/numerics/least_squares.hpp"
+
+namespace kphi::fit {
+namespace {
+
+/// ω and T divided by the largest of the points: k of about 1e-6 becomes about 1, so that tolerances mean digits.
+struct Scale {
+  double speed = 0;
+  double thrust = 0;
+};
+
+struct ThrustResidual {
+  double speed;
+  double thrust_value;
+  double root_weight;
+
+  template <class Scalar>
+  bool operator()(const Scalar* k, const Scalar* linear, const Scalar* offset, Scalar* residual) const {
+    residual[0] = root_weight * (thrust_value - thrust(ThrustParameters<Scalar>{*k, *linear, *offset}, speed));
+    return true;
+  }
+};
+
+std::vector<Point> points_in_range(std::span<const Point> points, const ThrustFitOptions& options) {
+  std::vector<Point> used;
+  for (const Point& point : points) {
+    if (!std::isfinite(point.speed_rad_s) || !std::isfinite(point.thrust_n) || !(point.weight > 0) ||
+        !std::isfinite(point.weight)) {
+      throw FitError(
+          fmt::format("thrust fit: a point is no number or its weight is not positive (speed {} rad/s, "
+                      "thrust {} N, weight {})",
+                      point.speed_rad_s, point.thrust_n, point.weight));
+    }
+    if (point.speed_rad_s >= options.speed_min_rad_s && point.speed_rad_s <= options.speed_max_rad_s)
+      used.push_back(point);
+  }
+  return used;
+}
+
+Scale scale_of(const std::vector<Point>& points) {
+  Scale scale;
+  for (const Point& point : points) {
+    scale.speed = std::max(scale.speed, std::abs(point.speed_rad_s));
+    scale.thrust = std::max(scale.thrust, std::abs(point.thrust_n));
+  }
+  if (scale.speed == 0) throw FitError("thrust fit: every point has speed 0; is the speed column the right one?");
+  if (scale.thrust == 0) scale.thrust = 1;
+  return scale;
+}
+
+std::size_t free_terms(ThrustForm form) {
+  switch (form) {
+    case ThrustForm::through_origin:
+      return 1;
+    case ThrustForm::with_offset:
+      return 2;
+    case ThrustForm::three_terms:
+      return 3;
+  }
+  return 3;
+}
+
+void require_distinct_speeds(const std::vector<Point>& points, std::size_t terms) {
+  std::set<double> speeds;
+  for (const Point& point : points) speeds.insert(point.speed_rad_s);
+  if (speeds.size() >= terms) return;
+  throw FitError(fmt::format("thrust fit: {} distinct speeds cannot tell {} terms apart; measure at more speeds",
+                             speeds.size(), terms));
+}
+
+/// Weights 1/u², scaled to a mean of 1, so that the rms stays one of thrust. `parameters`: for dT/dω; none: by T ~ ω².
+void weigh(std::vector<Point>& points, Weighting weighting, const ThrustParameters<double>* parameters) {
+  double sum = 0;
+  for (Point& point : points) {
+    double slope = 2 * point.thrust_n / point.speed_rad_s;
+    if (parameters != nullptr) slope = 2 * parameters->k * point.speed_rad_s + parameters->linear;
+    const double u_speed = weighting == Weighting::effective_variance ? slope * point.u_speed_rad_s : 0.0;
+    const double variance = point.u_thrust_n * point.u_thrust_n + u_speed * u_speed;
+    if (!(variance > 0) || !std::isfinite(variance)) {
+      throw FitError(
+          "thrust fit: a step does not know its own uncertainty, so it cannot be weighted by it; fit with equal "
+          "weights");
+    }
+    point.weight = 1 / variance;
+    sum += point.weight;
+  }
+  for (Point& point : points) point.weight *= static_cast<double>(points.size()) / sum;
+}
+
+double median_absolute(std::vector<double> values) {
+  for (double& value : values) value = std::abs(value);
+  return upper_median(std::move(values));
+}
+
+/// Null for Loss::none. `sigma` in units of the residuals.
+std::unique_ptr<ceres::LossFunction> loss_function(Loss loss, double sigma) {
+  switch (loss) {
+    case Loss::none:
+      return nullptr;
+    case Loss::huber:
+      return std::make_unique<ceres::HuberLoss>(1.345 * sigma);
+    case Loss::cauchy:
+      return std::make_unique<ceres::CauchyLoss>(2.385 * sigma);
+    case Loss::tukey:
+      return std::make_unique<ceres::TukeyLoss>(4.685 * sigma);
+  }
+  return nullptr;
+}
+
+/// Thrust and speed scaled to 1 at most; solved again and again, each time from where it stands.
+class Fitter {
+ public:
+  Fitter(const Scale& scale, std::size_t terms) : scale_(scale), terms_(terms) {}
+
+  /// With weights as they are now.
+  void take(const std::vector<Point>& points) {
+    problem_ = std::make_unique<ceres::Problem>(problem_options());
+    for (const Point& point : points) {
+      problem_->AddResidualBlock(
+          new ceres::AutoDiffCostFunction<ThrustResidual, 1, 1, 1, 1>(new ThrustResidual{
+              point.speed_rad_s / scale_.speed, point.thrust_n / scale_.thrust, std::sqrt(point.weight)}),
+          &changing_loss_, &k_, &linear_, &offset_);
+    }
+    if (terms_ < 2) problem_->SetParameterBlockConstant(&offset_);
+    if (terms_ < 3) problem_->SetParameterBlockConstant(&linear_);
+  }
+
+  /// The points taken last. A `coarse` solution is one to start from, and to take the scale of the next one from.
+  void solve(const std::vector<Point>& points, Loss loss, bool coarse = false) {
+    std::vector<double> residuals;
+    for (const Point& point : points) residuals.push_back(residual(point));
+    const double sigma = loss == Loss::none ? 0 : 1.4826 * median_absolute(residuals);
+    loss_ = sigma > 0 ? loss_function(loss, sigma) : nullptr;  // points without scatter have no outliers
+    changing_loss_.Reset(loss_.get(), ceres::DO_NOT_TAKE_OWNERSHIP);
+    if (loss_) {
+      solve_robustly(*problem_, "thrust fit", coarse ? 1e-4 : 1e-14);
+    } else {
+      solve_exactly(*problem_, "thrust fit", coarse ? 1 : 4);
+    }
+    residuals_.clear();
+    for (const Point& point : points) residuals_.push_back(residual(point));
+  }
+
+  [[nodiscard]] ThrustParameters<double> parameters() const {
+    return {k_ * unit(0), linear_ * unit(1), offset_ * unit(2)};
+  }
+
+  [[nodiscard]] std::vector<double> robust_weights() const {
+    std::vector<double> weights;
+    for (const double r : residuals_) weights.push_back(rho(r)[1]);
+    return weights;
+  }
+
+  /// Of k, linear, offset. `rms_n` of the fit without a loss; with one the spread of its influence takes its place.
+  [[nodiscard]] std::array<std::array<double, 3>, 3> covariance(double rms_n) const {
+    std::vector<const double*> blocks{&k_};
+    std::vector<std::size_t> places{0};
+    if (terms_ >= 3) (blocks.push_back(&linear_), places.push_back(1));
+    if (terms_ >= 2) (blocks.push_back(&offset_), places.push_back(2));
+    const std::vector<double> unit_matrix = unit_covariance(*problem_, blocks, "thrust fit");
+    const double variance = loss_ ? robust_variance() : std::pow(rms_n / scale_.thrust, 2);
+    std::array<std::array<double, 3>, 3> result{};
+    for (std::size_t i = 0; i < terms_; ++i) {
+      for (std::size_t j = 0; j < terms_; ++j)
+        result[places[i]][places[j]] = unit_matrix[i * terms_ + j] * variance * unit(places[i]) * unit(places[j]);
+    }
+    return result;
+  }
+
+ private:
+  [[nodiscard]] double unit(std::size_t term) const {
+    return scale_.thrust / std::pow(scale_.speed, 2 - static_cast<double>(term));
+  }
+
+  [[nodiscard]] double residual(const Point& point) const {
+    const ThrustParameters<double> scaled{k_, linear_, offset_};
+    return std::sqrt(point.weight) *
+           (point.thrust_n / scale_.thrust - thrust(scaled, point.speed_rad_s / scale_.speed));
+  }
+
+  /// ρ, ρ', ρ'' of the squared residual.
+  [[nodiscard]] std::array<double, 3> rho(double r) const {
+    std::array<double, 3> value{r * r, 1, 0};
+    if (loss_) loss_->Evaluate(r * r, value.data());
+    return value;
+  }
+
+  /// Σψ²/(n − p) over the square of the mean ψ', ψ = r ρ'.
+  [[nodiscard]] double robust_variance() const {
+    double squares = 0, slope = 0;
+    for (const double r : residuals_) {
+      const auto [value, first, second] = rho(r);
+      squares += std::pow(r * first, 2);
+      slope += first + 2 * r * r * second;
+    }
+    const double n = static_cast<double>(residuals_.size());
+    return squares / (n - static_cast<double>(terms_)) / std::pow(slope / n, 2);
+  }
+
+  Scale scale_;
+  std::size_t terms_;
+  double k_ = 0, linear_ = 0, offset_ = 0;
+  std::unique_ptr<ceres::LossFunction> loss_;
+  ceres::LossFunctionWrapper changing_loss_{nullptr, ceres::DO_NOT_TAKE_OWNERSHIP};
+  std::unique_ptr<ceres::Problem> problem_;
+  std::vector<double> residuals_;
+};
+
+void judge(ThrustFit& fit, std::size_t terms) {
+  double sum_w = 0, sum_wt = 0;
+  for (std::size_t i = 0; i < fit.n; ++i) {
+    const double weight = fit.points[i].weight * fit.robust_weights[i];
+    sum_w += weight;
+    sum_wt += weight * fit.points[i].thrust_n;
+  }
+  double residual_sum = 0, total_sum = 0;
+  for (std::size_t i = 0; i < fit.n; ++i) {
+    const Point& point = fit.points[i];
+    const double residual = point.thrust_n - thrust(fit.parameters, point.speed_rad_s);
+    fit.residuals_n.push_back(residual);
+    residual_sum += point.weight * fit.robust_weights[i] * residual * residual;
+    total_sum += point.weight * fit.robust_weights[i] * std::pow(point.thrust_n - sum_wt / sum_w, 2);
+  }
+  fit.rms_n = std::sqrt(residual_sum / static_cast<double>(fit.n - terms));
+  fit.r_squared = total_sum > 0 ? 1 - residual_sum / total_sum : 0;
+  const auto [low, high] = std::minmax_element(
+      fit.points.begin(), fit.points.end(), [](const auto& a, const auto& b) { return a.speed_rad_s < b.speed_rad_s; });
+  fit.speed_min_rad_s = low->speed_rad_s;
+  fit.speed_max_rad_s = high->speed_rad_s;
+}
+
+}  // namespace
+
+ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& options) {
+  ThrustFit fit;
+  fit.points = points_in_range(points, options);
+  fit.n = fit.points.size();
+  const std::size_t terms = free_terms(options.form);
+  if (fit.n < terms + 1) {
+    throw FitError(
+        fmt::format("thrust fit: {} of {} points lie in the speed range, {} terms need at least {}; widen "
+                    "the range or measure more steps",
+                    fit.n, points.size(), terms, terms + 1));
+  }
+  require_distinct_speeds(fit.points, terms);
+  if (options.weighting != Weighting::equal) weigh(fit.points, options.weighting, nullptr);
+  Fitter fitter(scale_of(fit.points), terms);
+  const auto solve = [&](Loss loss, bool coarse = false) {
+    fitter.solve(fit.points, loss, coarse);
+    fit.parameters = fitter.parameters();
+  };
+  fitter.take(fit.points);
+  solve(Loss::none, options.loss != Loss::none);
+  if (options.loss != Loss::none) solve(Loss::huber, true);  // a convex problem leads the others to the right minimum
+  constexpr int kReweightings = 3;
+  for (int i = 0; i < kReweightings && options.weighting == Weighting::effective_variance; ++i) {
+    weigh(fit.points, options.weighting, &fit.parameters);
+    fitter.take(fit.points);
+    solve(options.loss == Loss::none ? Loss::none : Loss::huber);
+  }
+  if (options.loss != Loss::none) solve(options.loss);
+  fit.robust_weights = fitter.robust_weights();
+  judge(fit, terms);
+  fit.covariance = fitter.covariance(fit.rms_n);
+  const auto error = [&](std::size_t i) { return std::sqrt(fit.covariance[i][i]); };
+  fit.standard_error = {error(0), error(1), error(2)};
+  return fit;
+}
+
+SpeedCoefficient k_at_speed(std::span<const Point> points) {
+  if (points.empty()) throw FitError("k at a speed: no step was measured there; name a speed of the profile");
+  SpeedCoefficient result;
+  result.repetitions = points.size();
+  const double n = static_cast<double>(points.size());
+  const auto local_k = [](const Point& point) { return point.thrust_n / (point.speed_rad_s * point.speed_rad_s); };
+  for (const Point& point : points) {
+    if (!(point.speed_rad_s > 0)) throw FitError("k at a speed: a step has no measured speed");
+    result.k += local_k(point) / n;
+    result.speed_rad_s += point.speed_rad_s / n;
+  }
+  if (points.size() > 1) {
+    double squares = 0;
+    for (const Point& point : points) squares += std::pow(local_k(point) - result.k, 2);
+    result.standard_error = std::sqrt(squares / (n - 1) / n);
+  }
+  return result;
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,108 @@
+// Least squares of thrust on squared speed: one propeller, one occlusion, one k.
+//
+// T is fitted on ω²; T/ω² is never averaged over the steps, because at low speed thrust is under the load cell's noise
+// and such an average gives that noise the largest weight.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace kphi::fit {
+
+/// T = k ω² + linear ω + offset. The paper's model (equations 2 and 3) is k alone; maps of the flight community also
+/// come with three terms. Residuals, tests and figures all call thrust(). Scalar is double, or a Ceres Jet while
+/// fitting.
+template <class Scalar>
+struct ThrustParameters {
+  Scalar k{};       ///< N/(rad/s)²
+  Scalar linear{};  ///< N/(rad/s)
+  Scalar offset{};  ///< N
+};
+
+/// Thrust in N at `speed` in rad/s; the same form holds in any consistently scaled units.
+template <class Scalar>
+[[nodiscard]] constexpr Scalar thrust(const ThrustParameters<Scalar>& parameters, double speed) {
+  return (parameters.k * speed + parameters.linear) * speed + parameters.offset;
+}
+
+struct Point {
+  double speed_rad_s = 0;
+  double thrust_n = 0;
+  double weight = 1;         ///< of the squared residual, > 0
+  double u_thrust_n = 0;     ///< standard uncertainty of the mean; 0: not known
+  double u_speed_rad_s = 0;  ///< the same
+};
+
+/// Which terms of thrust() are free; the others are zero.
+enum class ThrustForm {
+  through_origin,  ///< k
+  with_offset,     ///< k and offset
+  three_terms,     ///< k, linear and offset
+};
+
+/// What the points weigh.
+enum class Weighting : std::uint8_t {
+  equal,               ///< as given
+  thrust,              ///< by their own uncertainty of the thrust
+  effective_variance,  ///< u²(T) + (dT/dω)² u²(ω): errors in the speed count too (Orear 1982)
+};
+
+/// How much a point is believed that lies far off. Tuned to 95 % efficiency under normal errors, scaled by the median
+/// absolute deviation.
+enum class Loss : std::uint8_t {
+  none,
+  huber,   ///< 1.345 σ: beyond, the influence stays
+  cauchy,  ///< 2.385 σ: it falls
+  tukey,   ///< 4.685 σ: beyond, it is nothing
+};
+
+struct ThrustFitOptions {
+  ThrustForm form = ThrustForm::through_origin;
+  Weighting weighting = Weighting::equal;
+  Loss loss = Loss::none;
+  double speed_min_rad_s = 0;  ///< points below are left out
+  double speed_max_rad_s = std::numeric_limits<double>::infinity();
+};
+
+struct ThrustFit {
+  ThrustParameters<double> parameters;
+  /// Standard errors from Ceres' covariance times the residual variance Σ w r²/(n − p). They hold what scatters from
+  /// point to point, not what all points have in common (zero, calibration, air density).
+  ThrustParameters<double> standard_error;
+  /// Of k, linear, offset; 0 for terms that are not free. Of a robust fit: asymptotic (Huber 1981, 7.6).
+  std::array<std::array<double, 3>, 3> covariance{};
+  double rms_n = 0;      ///< sqrt(Σ w r²/(n − p)), N; w with the robust weight
+  double r_squared = 0;  ///< 1 − Σ w r²/Σ w (T − mean T)²
+  std::size_t n = 0;
+  double speed_min_rad_s = 0;  ///< of the points used
+  double speed_max_rad_s = 0;
+  std::vector<Point> points;           ///< used, in the order given; weight as it was fitted with
+  std::vector<double> robust_weights;  ///< 1: believed, 0: ignored; one per point used
+  std::vector<double> residuals_n;     ///< T − thrust(parameters, ω), one per point used
+};
+
+/// Below this robust weight a point is as good as rejected and belongs into a list.
+inline constexpr double kRejectedWeight = 0.25;
+
+/// Throws FitError when fewer points than free terms + 1 remain in the speed range, when a number is not finite, a
+/// weight not positive, an uncertainty missing that `weighting` wants, or when the points cannot tell the terms apart.
+[[nodiscard]] ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& options = {});
+
+/// k at one named speed, next to the k fitted over a range: on real propellers the two differ, k rises with speed.
+struct SpeedCoefficient {
+  double k = 0;  ///< mean of T/ω² over the repetitions, N/(rad/s)²
+  /// s/√n of the repetitions; quiet NaN from one repetition.
+  double standard_error = std::numeric_limits<double>::quiet_NaN();
+  double speed_rad_s = 0;  ///< mean measured speed
+  std::size_t repetitions = 0;
+};
+
+/// `points`: one per repetition, all measured at the same commanded speed. Throws FitError when there is none or one
+/// has no speed.
+[[nodiscard]] SpeedCoefficient k_at_speed(std::span<const Point> points);
+
+}  // namespace kphi::fit

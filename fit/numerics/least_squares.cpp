@@ -1,0 +1,66 @@
+#include "fit/numerics/least_squares.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "base/error.hpp"
+
+namespace kphi::fit {
+
+ceres::Problem::Options problem_options() {
+  static const std::unique_ptr<ceres::Context> context(ceres::Context::Create());
+  ceres::Problem::Options options;
+  options.context = context.get();
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  return options;
+}
+
+void solve_exactly(ceres::Problem& problem, const char* what, int iterations) {
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.logging_type = ceres::SILENT;
+  options.num_threads = 1;
+  // The problem is linear: an almost undamped first step lands on the minimum, the next polish the last digits. There
+  // the cost no longer falls, which Ceres would count as failure; so many steps are simply taken.
+  options.initial_trust_region_radius = 1e16;
+  options.max_trust_region_radius = 1e32;
+  options.max_num_iterations = iterations;
+  options.max_num_consecutive_invalid_steps = options.max_num_iterations + 1;
+  options.function_tolerance = 0;
+  options.gradient_tolerance = 0;
+  options.parameter_tolerance = 0;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  if (!summary.IsSolutionUsable()) throw FitError(fmt::format("{}: no solution ({})", what, summary.message));
+}
+
+void solve_robustly(ceres::Problem& problem, const char* what, double tolerance) {
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.logging_type = ceres::SILENT;
+  options.num_threads = 1;
+  options.max_num_iterations = 200;
+  options.function_tolerance = tolerance;
+  options.gradient_tolerance = 1e-14;
+  options.parameter_tolerance = 1e-11;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  if (!summary.IsSolutionUsable()) throw FitError(fmt::format("{}: no solution ({})", what, summary.message));
+}
+
+std::vector<double> unit_covariance(ceres::Problem& problem, const std::vector<const double*>& blocks,
+                                    const char* what) {
+  ceres::Covariance::Options options;
+  options.algorithm_type = ceres::DENSE_SVD;
+  options.apply_loss_function = false;
+  options.num_threads = 1;
+  ceres::Covariance covariance(options);
+  std::vector<double> matrix(blocks.size() * blocks.size());
+  if (!covariance.Compute(blocks, &problem) || !covariance.GetCovarianceMatrix(blocks, matrix.data())) {
+    throw FitError(fmt::format("{}: the points cannot tell the terms apart; measure at more speeds or angles", what));
+  }
+  return matrix;
+}
+
+}  // namespace kphi::fit

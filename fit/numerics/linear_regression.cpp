@@ -1,0 +1,125 @@
+#include "fit/numerics/linear_regression.hpp"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+#include "base/error.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using Long = long double;
+using Matrix = Eigen::Matrix<Long, Eigen::Dynamic, Eigen::Dynamic>;
+using Vector = Eigen::Matrix<Long, Eigen::Dynamic, 1>;
+
+/// Columns scaled to lengths between 1/2 and 1: powers of x differ by many orders of magnitude. By powers of two, which
+/// rounds nothing.
+Vector equilibrate(Matrix& design) {
+  Vector lengths(design.cols());
+  for (Eigen::Index j = 0; j < design.cols(); ++j) {
+    const Long norm = design.col(j).norm();
+    if (norm == 0) throw FitError("regression: a term is 0 in every row");
+    lengths[j] = std::ldexp(Long{1}, std::ilogb(norm) + 1);
+    design.col(j) /= lengths[j];
+  }
+  return lengths;
+}
+
+/// Σ a b as if in twice the precision: what a product and a sum round off is carried along (Ogita, Rump, Oishi 2005).
+Long accurate_dot(const Vector& a, const Vector& b) {
+  Long sum = 0, lost = 0;
+  for (Eigen::Index i = 0; i < a.size(); ++i) {
+    const Long product = a[i] * b[i];
+    const Long next = sum + product;
+    const Long part = next - sum;
+    lost += (sum - (next - part)) + (product - part) + std::fma(a[i], b[i], -product);
+    sum = next;
+  }
+  return sum + lost;
+}
+
+/// Where residuals are large, least squares lose twice the digits that solving an equation would. What is left of Xᵀr
+/// tells how far the minimum was missed.
+template <class Upper>
+void refine(const Matrix& design, const Upper& upper, const Vector& y, Vector& beta) {
+  for (int step = 0; step < 2; ++step) {
+    const Vector residual = y - design * beta;
+    Vector gradient(design.cols());
+    for (Eigen::Index j = 0; j < design.cols(); ++j) gradient[j] = accurate_dot(design.col(j), residual);
+    beta += upper.solve(upper.transpose().solve(gradient));
+  }
+}
+
+Regression solve(Matrix design, Vector y, const Vector& root_weights) {
+  if (design.rows() < design.cols()) throw FitError("regression: fewer rows than terms; measure more");
+  const Matrix plain = design;
+  const Vector values = y;
+  for (Eigen::Index i = 0; i < design.rows(); ++i) design.row(i) *= root_weights[i];
+  y = y.cwiseProduct(root_weights);
+  const Vector lengths = equilibrate(design);
+  const Eigen::HouseholderQR<Matrix> qr(design);
+  const Matrix factor = qr.matrixQR().topRows(design.cols());
+  const auto upper = factor.template triangularView<Eigen::Upper>();
+  constexpr Long kSingular = 1e-17L;
+  for (Eigen::Index j = 0; j < design.cols(); ++j) {
+    if (std::abs(qr.matrixQR()(j, j)) < kSingular) throw FitError("regression: the rows cannot tell the terms apart");
+  }
+  Vector beta = qr.solve(y);
+  refine(design, upper, y, beta);
+  const Matrix inverse = upper.solve(Matrix::Identity(design.cols(), design.cols()));
+  const Matrix covariance = inverse * inverse.transpose();
+
+  Regression result;
+  for (Eigen::Index j = 0; j < beta.size(); ++j) result.estimates.push_back(static_cast<double>(beta[j] / lengths[j]));
+  const Vector residuals = values - plain * beta.cwiseQuotient(lengths);
+  const Long squares = residuals.cwiseProduct(root_weights).squaredNorm();
+  result.weighted_squares = static_cast<double>(squares);
+  result.freedom = static_cast<std::size_t>(design.rows() - design.cols());
+  const Long variance = result.freedom > 0 ? squares / static_cast<Long>(result.freedom) : 0;
+  result.residual_deviation = static_cast<double>(std::sqrt(variance));
+  for (Eigen::Index i = 0; i < beta.size(); ++i) {
+    result.standard_errors.push_back(static_cast<double>(std::sqrt(variance * covariance(i, i)) / lengths[i]));
+    result.covariance.emplace_back();
+    for (Eigen::Index j = 0; j < beta.size(); ++j)
+      result.covariance.back().push_back(static_cast<double>(covariance(i, j) / lengths[i] / lengths[j]));
+  }
+  for (const Long residual : residuals) result.residuals.push_back(static_cast<double>(residual));
+  return result;
+}
+
+Vector roots(std::span<const double> weights, Eigen::Index n) {
+  Vector result = Vector::Ones(n);
+  for (std::size_t i = 0; i < weights.size(); ++i)
+    result[static_cast<Eigen::Index>(i)] = std::sqrt(static_cast<Long>(weights[i]));
+  return result;
+}
+
+Vector vector_of(std::span<const double> values) {
+  Vector result(static_cast<Eigen::Index>(values.size()));
+  for (std::size_t i = 0; i < values.size(); ++i) result[static_cast<Eigen::Index>(i)] = values[i];
+  return result;
+}
+
+}  // namespace
+
+Regression regress(const std::vector<std::vector<double>>& rows, std::span<const double> y,
+                   std::span<const double> weights) {
+  if (rows.empty()) throw FitError("regression: no rows");
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  Matrix design(n, static_cast<Eigen::Index>(rows.front().size()));
+  for (Eigen::Index i = 0; i < n; ++i) design.row(i) = vector_of(rows[static_cast<std::size_t>(i)]).transpose();
+  return solve(std::move(design), vector_of(y), roots(weights, n));
+}
+
+Regression regress_polynomial(std::span<const double> x, std::span<const double> y, int lowest, int highest,
+                              std::span<const double> weights) {
+  const auto n = static_cast<Eigen::Index>(x.size());
+  Matrix design(n, highest - lowest + 1);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (int power = lowest; power <= highest; ++power)
+      design(i, power - lowest) = std::pow(static_cast<Long>(x[static_cast<std::size_t>(i)]), power);
+  }
+  return solve(std::move(design), vector_of(y), roots(weights, n));
+}
+
+}  // namespace kphi::fit

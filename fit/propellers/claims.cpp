@@ -1,0 +1,186 @@
+#include "fit/propellers/claims.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "compensation/units.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using Family = std::span<const FamilyMember>;
+
+const FamilyMember* find(Family family, double diameter_in, int blades) {
+  for (const FamilyMember& member : family) {
+    const Identification& one = member.identification;
+    if (std::abs(one.diameter_in - diameter_in) < 0.01 && one.blades == blades) return &member;
+  }
+  return nullptr;
+}
+
+std::optional<Estimate> k_of(const FamilyMember* member, double phi_deg, Air air) {
+  if (member == nullptr) return std::nullopt;
+  const auto& table = member->identification.table;
+  const auto& budgets = air == Air::standard ? member->analysis.standard : member->analysis.coefficients;
+  for (std::size_t i = 0; i < table.size(); ++i)
+    if (std::abs(table[i].phi_deg - phi_deg) < 1e-6) return budgets[i].estimate();
+  return std::nullopt;
+}
+
+std::optional<Estimate> slope_of(const FamilyMember* member, Air air) {
+  if (member == nullptr) return std::nullopt;
+  Estimate slope = member->analysis.slope.estimate();
+  if (air == Air::measured) return slope;
+  const Budget& standard = member->analysis.standard.front();
+  const double scale = standard.value / member->analysis.coefficients.front().value;
+  const double u_scale = standard.rows.back().contribution() / std::abs(standard.value);  // of the density
+  slope.u = scale * std::hypot(slope.u, slope.value * u_scale);
+  slope.value *= scale;
+  return slope;
+}
+
+std::optional<Estimate> ratio(const std::optional<Estimate>& a, const std::optional<Estimate>& b) {
+  if (!a || !b || a->value == 0 || b->value == 0) return std::nullopt;
+  const Estimate relative =
+      difference({0, a->u / std::abs(a->value), a->freedom}, {0, b->u / std::abs(b->value), b->freedom});
+  const double value = a->value / b->value;
+  return Estimate{value, std::abs(value) * relative.u, relative.freedom};
+}
+
+std::optional<Estimate> in_rpm(std::optional<Estimate> k) {
+  if (!k) return k;
+  k->value = to_newtons_per_rpm2(ThrustCoefficient(k->value));
+  k->u = to_newtons_per_rpm2(ThrustCoefficient(k->u));
+  return k;
+}
+
+std::optional<Estimate> minus(const std::optional<Estimate>& a, const std::optional<Estimate>& b) {
+  if (!a || !b) return std::nullopt;
+  return difference(*a, *b);
+}
+
+Claim claim_of(std::string id, std::string statement, std::string unit, double allowed_lower, double allowed_upper) {
+  Claim claim;
+  claim.id = std::move(id);
+  claim.statement = std::move(statement);
+  claim.unit = std::move(unit);
+  claim.allowed_lower = allowed_lower;
+  claim.allowed_upper = allowed_upper;
+  return claim;
+}
+
+Claim judged(std::string id, std::string statement, std::string unit, const std::optional<Estimate>& found,
+             double allowed_lower, double allowed_upper) {
+  Claim claim = claim_of(std::move(id), std::move(statement), std::move(unit), allowed_lower, allowed_upper);
+  if (!found) return claim;
+  const double half = coverage_factor(found->freedom) * found->u;
+  claim.value = found->value;
+  claim.lower = found->value - half;
+  claim.upper = found->value + half;
+  if (!std::isfinite(half) || !std::isfinite(found->value)) return claim;
+  const bool inside = claim.lower >= allowed_lower && claim.upper <= allowed_upper;
+  const bool outside = claim.upper < allowed_lower || claim.lower > allowed_upper;
+  claim.verdict = inside ? Verdict::holds : outside ? Verdict::fails : Verdict::undecided;
+  return claim;
+}
+
+/// A test that does not reject only says that nothing was found: the claim then holds as far as these data see.
+Claim linear(const FamilyMember& member) {
+  const HypothesisTest& test = member.analysis.curvature.lack_of_fit;
+  const std::string& propeller = member.identification.propeller;
+  Claim claim = claim_of(fmt::format("linear_{}", propeller),
+                         fmt::format("thrust falls linearly with the occlusion ({}); p of the lack of fit, {} or above",
+                                     propeller, kTestLevel),
+                         "1", kTestLevel, 1);
+  if (!test.tested()) return claim;
+  claim.value = test.p;  // which has no interval
+  claim.verdict = test.rejected() ? Verdict::fails : Verdict::holds;
+  return claim;
+}
+
+std::optional<Estimate> share_of_thrust(const FamilyMember* member, double phi_deg) {
+  return ratio(k_of(member, phi_deg, Air::measured), k_of(member, 0, Air::measured));
+}
+
+/// The φ at which three blades keep least more of their thrust than two.
+std::optional<Estimate> least_lead(const FamilyMember* three, const FamilyMember* two) {
+  std::optional<Estimate> least;
+  for (const double phi : {90.0, 180.0, 270.0}) {
+    const auto lead = minus(share_of_thrust(three, phi), share_of_thrust(two, phi));
+    if (lead && (!least || lead->value < least->value)) least = lead;
+  }
+  return least;
+}
+
+void claims_of_diameter(Family family, Air air, double diameter, double offset, std::vector<Claim>& claims) {
+  const FamilyMember* two = find(family, diameter, 2);
+  const FamilyMember* three = find(family, diameter, 3);
+  claims.push_back(
+      judged(fmt::format("slopes_{}in", diameter),
+             fmt::format("{}-inch propellers of 2 and 3 blades have the same slope: ratio, 15 % allowed", diameter),
+             "1", ratio(slope_of(three, air), slope_of(two, air)), 0.85, 1.15));
+  claims.push_back(
+      judged(fmt::format("offset_{}in", diameter),
+             fmt::format("3 blades of {} inch have {:.1e} N/RPM^2 more k than 2: 25 % allowed", diameter, offset),
+             "N/RPM^2", in_rpm(minus(k_of(three, 0, air), k_of(two, 0, air))), 0.75 * offset, 1.25 * offset));
+  claims.push_back(judged(
+      fmt::format("order_{}in", diameter),
+      fmt::format("beyond 45 deg 3 blades of {} inch keep more of their thrust than 2: least lead of shares", diameter),
+      "1", least_lead(three, two), 0, 1));
+}
+
+/// Mean over the φ at which k is far from 0.
+std::optional<Estimate> growth_per_inch(Family family, Air air, int blades) {
+  const FamilyMember* five = find(family, 5, blades);
+  const FamilyMember* six = find(family, 6, blades);
+  std::optional<Estimate> mean;
+  double n = 0;
+  for (const double phi : {0.0, 45.0, 90.0, 180.0}) {
+    const auto one = ratio(k_of(six, phi, air), k_of(five, phi, air));
+    if (!one) continue;
+    ++n;
+    if (!mean) mean = Estimate{0, 0, one->freedom};
+    mean->value += one->value;
+    mean->u += one->u;  // the bench's part is common: not averaged down
+    mean->freedom = std::min(mean->freedom, one->freedom);
+  }
+  if (mean) mean = Estimate{mean->value / n, mean->u / n, mean->freedom};
+  return mean;
+}
+
+}  // namespace
+
+const char* name_of(Verdict verdict) {
+  constexpr std::array<const char*, 4> names{"holds", "fails", "undecided", "not tested"};
+  return names[static_cast<std::size_t>(verdict)];
+}
+
+std::vector<Claim> test_claims(std::span<const FamilyMember> family) {
+  std::vector<Claim> claims;
+  for (const FamilyMember& member : family) claims.push_back(linear(member));
+  const Air air = common_air(family);
+  const FamilyMember* drone = find(family, 5, 3);
+  claims.push_back(judged("share_45", "5-inch 3-blade at 45 deg: almost 90 % of its thrust, 0.87 to 0.91", "1",
+                          share_of_thrust(drone, 45), 0.87, 0.91));
+  claims.push_back(judged("share_270", "5-inch 3-blade at 270 deg: 25 % of its thrust, 0.22 to 0.28", "1",
+                          share_of_thrust(drone, 270), 0.22, 0.28));
+  claims_of_diameter(family, air, 5, 0.4e-8, claims);
+  claims_of_diameter(family, air, 6, 0.5e-8, claims);
+  const double power = std::pow(6.0 / 5.0, 4);
+  for (const int blades : {2, 3}) {
+    const auto growth = growth_per_inch(family, air, blades);
+    claims.push_back(judged(fmt::format("inch_{}b", blades),
+                            fmt::format("one inch more doubles k, {} blades: ratio, 1.7 to 2.2", blades), "1", growth,
+                            1.7, 2.2));
+    claims.push_back(judged(fmt::format("d4_{}b", blades),
+                            fmt::format("k goes with D^4, {} blades: ratio, {:.3f} within 15 %", blades, power), "1",
+                            growth, 0.85 * power, 1.15 * power));
+  }
+  return claims;
+}
+
+}  // namespace kphi::fit

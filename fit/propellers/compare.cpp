@@ -1,0 +1,270 @@
+#include "fit/propellers/compare.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "base/error.hpp"
+#include "base/number.hpp"
+#include "compensation/file/coefficient_file.hpp"
+#include "fit/model/step_selection.hpp"
+#include "fit/model/thrust_fit.hpp"
+#include "fit/numerics/hypothesis_test.hpp"
+#include "results/steps_csv.hpp"
+
+namespace kphi::fit {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr double kLevel = 0.05;
+constexpr const char* kUnit = "N/(rad/s)^2";
+
+std::string coefficient_name(double phi_deg) { return fmt::format("k({:g}°)", std::round(phi_deg * 1e6) / 1e6); }
+
+ComparedResult result_of(const compensation::Coefficients& file, const std::string& name) {
+  ComparedResult result;
+  result.name = name;
+  result.propeller = file.propeller.id;
+  result.diameter_in = file.propeller.diameter_in;
+  if (file.slowest_speed) result.speed_min_rad_s = file.slowest_speed->value();
+  if (file.fastest_speed) result.speed_max_rad_s = file.fastest_speed->value();
+  result.air_density_kg_m3 = file.air_density_kg_m3;
+  const auto& curve = file.curve;
+  // The budgets' uncertainties where the file has them, else the standard errors of the fit.
+  const auto budgets = file.uncertainty.value_or(compensation::Coefficients::Uncertainty{});
+  const auto add = [&](const std::string& of, const char* unit, double value, const std::optional<double>& budget,
+                       double error, bool judged = true) {
+    const bool known = budget && *budget > 0;
+    result.estimates.push_back({of, unit, value, known ? *budget : error, judged});
+    if (known) result.estimates.back().freedom = budgets.freedom;
+  };
+  const auto error_of = [](const std::optional<ThrustCoefficient>& error) { return error ? error->value() : 0; };
+  add("K_T", kUnit, curve.thrust_coefficient().value(), budgets.thrust_coefficient,
+      error_of(file.thrust_coefficient_error));
+  for (std::size_t i = 0; i < file.table.size(); ++i) {
+    const auto& row = file.table[i];
+    if (row.occlusion.value() <= 0) continue;  // that is K_T
+    add(coefficient_name(to_degrees(row.occlusion)), kUnit, row.k.value(),
+        i < budgets.table.size() ? budgets.table[i] : std::nullopt, error_of(row.standard_error));
+  }
+  const auto u = curve.uncertainty().value_or(compensation::LineUncertainty{});
+  constexpr double kPerDegree = kPi / 180;
+  add("intercept", kUnit, curve.line().intercept.value(), budgets.intercept, std::sqrt(u.intercept_variance), false);
+  add("slope", "N/(rad/s)^2 per degree", curve.line().slope_per_rad * kPerDegree, budgets.slope_per_deg,
+      std::sqrt(u.slope_variance) * kPerDegree, false);
+  return result;
+}
+
+/// K_T alone, of steps without occlusion.
+ComparedResult result_of_steps(const std::string& file, const std::string& name) {
+  const auto steps = results::read_steps(file);
+  std::vector<Point> points;
+  for (const results::StepMean& step : select_steps(steps, {}).used)
+    if (step.occlusion_deg == 0) points.push_back({step.speed_rad_s, step.thrust_n, 1});
+  if (points.empty()) throw FitError(file + ": no good step without occlusion");
+  const ThrustFit fit = fit_thrust(points);
+  ComparedResult result;
+  result.name = name;
+  result.propeller = steps.front().propeller;
+  result.diameter_in = steps.front().diameter_in;
+  result.speed_min_rad_s = fit.speed_min_rad_s;
+  result.speed_max_rad_s = fit.speed_max_rad_s;
+  result.estimates.push_back({"K_T", kUnit, fit.parameters.k, fit.standard_error.k});
+  return result;
+}
+
+Difference difference(const ComparedValue& a, const ComparedValue& b) {
+  Difference result;
+  result.name = a.name;
+  result.unit = a.unit;
+  result.a = a.value;
+  result.b = b.value;
+  result.difference = b.value - a.value;
+  result.judged = a.judged && b.judged;
+  if (!(a.standard_error > 0) || !(b.standard_error > 0)) return result;
+  const Estimate apart =
+      difference(Estimate{b.value, b.standard_error, b.freedom}, Estimate{a.value, a.standard_error, a.freedom});
+  result.standard_error = apart.u;
+  result.coverage = coverage_factor(apart.freedom, 1 - kLevel);
+  result.p = student_test(apart, 0).p;
+  return result;
+}
+
+/// Holm: the smallest p against level/m, the next against level/(m − 1), until one stands.
+void judge(std::vector<Difference>& differences) {
+  std::vector<Difference*> judged;
+  for (Difference& entry : differences)
+    if (entry.judged && entry.p) judged.push_back(&entry);
+  std::sort(judged.begin(), judged.end(), [](const Difference* a, const Difference* b) { return *a->p < *b->p; });
+  for (std::size_t i = 0; i < judged.size(); ++i) {
+    if (!(*judged[i]->p < kLevel / static_cast<double>(judged.size() - i))) break;
+    judged[i]->significant = true;
+  }
+  for (Difference& entry : differences)
+    if (!entry.judged && entry.p) entry.significant = *entry.p < kLevel;
+}
+
+Agreement verdict_of(const std::vector<Difference>& differences) {
+  bool known = false;
+  for (const Difference& entry : differences) {
+    if (!entry.judged || !entry.p) continue;
+    known = true;
+    if (entry.significant) return Agreement::differ;
+  }
+  return known ? Agreement::agree : Agreement::undecided;
+}
+
+void remark(Comparison& comparison) {
+  const ComparedResult &a = comparison.a, &b = comparison.b;
+  const auto say = [&](std::string text) { comparison.remarks.push_back(std::move(text)); };
+  if (a.propeller != b.propeller) say(fmt::format("other propellers: {} and {}", a.propeller, b.propeller));
+  const auto apart = [](double x, double y) { return std::abs(x - y) > 0.02 * std::max(x, y); };
+  if (apart(a.speed_min_rad_s, b.speed_min_rad_s) || apart(a.speed_max_rad_s, b.speed_max_rad_s)) {
+    const auto rpm = [](double speed) { return to_rpm(RadPerSec(speed)); };
+    say(fmt::format("other speeds: {:.0f} to {:.0f} and {:.0f} to {:.0f} RPM; k rises with speed on real propellers",
+                    rpm(a.speed_min_rad_s), rpm(a.speed_max_rad_s), rpm(b.speed_min_rad_s), rpm(b.speed_max_rad_s)));
+  }
+  if (!a.air_density_kg_m3 || !b.air_density_kg_m3) {
+    say("air density unknown: a day's weather changes k by 3 %");
+  } else if (apart(*a.air_density_kg_m3, *b.air_density_kg_m3)) {
+    say(fmt::format("other air: {:.4g} and {:.4g} kg/m³; k scales with it", *a.air_density_kg_m3,
+                    *b.air_density_kg_m3));
+  }
+}
+
+void remark_missing(Comparison& comparison) {
+  const auto only = [&](const ComparedResult& has, const ComparedResult& lacks) {
+    std::string names;
+    for (const ComparedValue& estimate : has.estimates) {
+      const bool there = std::any_of(lacks.estimates.begin(), lacks.estimates.end(),
+                                     [&](const ComparedValue& other) { return other.name == estimate.name; });
+      if (!there) names += (names.empty() ? "" : ", ") + estimate.name;
+    }
+    if (!names.empty()) comparison.remarks.push_back("only in " + has.name + ": " + names);
+  };
+  only(comparison.a, comparison.b);
+  only(comparison.b, comparison.a);
+}
+
+std::string probability(const std::optional<double>& p) {
+  if (!p) return "?";
+  return *p < 1e-4 ? "<0.0001" : fmt::format("{:.4f}", *p);
+}
+
+}  // namespace
+
+ComparedResult load_result(const std::string& path) {
+  const fs::path place(path);
+  const fs::path coefficients = fs::is_directory(place) ? place / "coefficients.yaml" : place;
+  const fs::path steps = fs::is_directory(place) ? place / "steps.csv" : place;
+  if (!fs::is_directory(place) && place.extension() == ".csv") return result_of_steps(path, path);
+  if (fs::exists(coefficients)) return result_of(compensation::load_coefficients(coefficients.string()), path);
+  if (!fs::exists(steps)) throw ConfigurationError(path + ": holds neither coefficients.yaml nor steps.csv");
+  const auto table = results::read_steps(steps);
+  if (std::any_of(table.begin(), table.end(), [](const auto& step) { return step.occlusion_deg > 0; }))
+    throw ConfigurationError(path + ": not fitted yet; `kphi fit " + path + "` comes first");
+  return result_of_steps(steps.string(), path);
+}
+
+Comparison compare(ComparedResult a, ComparedResult b) {
+  Comparison comparison;
+  comparison.a = std::move(a);
+  comparison.b = std::move(b);
+  for (const ComparedValue& of_a : comparison.a.estimates) {
+    for (const ComparedValue& of_b : comparison.b.estimates)
+      if (of_a.name == of_b.name) comparison.differences.push_back(difference(of_a, of_b));
+  }
+  judge(comparison.differences);
+  comparison.verdict = verdict_of(comparison.differences);
+  for (const Difference& entry : comparison.differences) {
+    if (!entry.judged || !entry.standard_error) continue;
+    const double open = (std::abs(entry.difference) + entry.coverage * *entry.standard_error) / std::abs(entry.a);
+    comparison.largest_open_share = std::max(comparison.largest_open_share, open);
+  }
+  const double d_a = comparison.a.diameter_in, d_b = comparison.b.diameter_in;
+  if (d_a > 0 && d_b > 0 && d_a != d_b) comparison.diameter_ratio4 = std::pow(d_b / d_a, 4);
+  remark(comparison);
+  remark_missing(comparison);
+  return comparison;
+}
+
+const char* word(Agreement verdict) {
+  switch (verdict) {
+    case Agreement::agree:
+      return "agree";
+    case Agreement::differ:
+      return "differ";
+    case Agreement::undecided:
+      return "undecided";
+  }
+  return "undecided";
+}
+
+std::string comparison_table(const Comparison& comparison) {
+  std::string text = fmt::format("A  {}\nB  {}\n\n{:<10} {:>13} {:>13} {:>11} {:>9} {:>9} {:>9}\n", comparison.a.name,
+                                 comparison.b.name, "", "A", "B", "B - A", "u", "B/A - 1", "p");
+  for (const Difference& entry : comparison.differences) {
+    // fmt pads by display width, so that k(45°) keeps its column.
+    text +=
+        fmt::format("{:<10} {:>13.5e} {:>13.5e} {:>+11.2e} {:>9} {:>+7.2f} % {:>9}{}\n", entry.name, entry.a, entry.b,
+                    entry.difference, entry.standard_error ? fmt::format("{:.1e}", *entry.standard_error) : "?",
+                    100 * entry.share(), probability(entry.p), entry.significant ? " *" : "");
+  }
+  text += "\n";
+  if (comparison.diameter_ratio4) {
+    for (const Difference& entry : comparison.differences) {
+      if (entry.name == "K_T") {
+        text += fmt::format("K_T  B/A = {:.3f}; (diameter B/A)^4 = {:.3f}\n", entry.b / entry.a,
+                            *comparison.diameter_ratio4);
+      }
+    }
+  }
+  for (const std::string& line : comparison.remarks) text += "note  " + line + "\n";
+  switch (comparison.verdict) {
+    case Agreement::agree:
+      text += fmt::format(
+          "verdict  agree: chance explains every difference; what the data leave open is at most {:.2f} %\n",
+          100 * comparison.largest_open_share);
+      break;
+    case Agreement::differ:
+      text += "verdict  differ: the differences marked * are larger than chance makes them (5 %, Holm)\n";
+      break;
+    case Agreement::undecided:
+      text += "verdict  undecided: no coefficient has a standard error in both\n";
+      break;
+  }
+  return text;
+}
+
+std::string comparison_json(const Comparison& comparison) {
+  const auto maybe = [](const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); };
+  Json rows = Json::array();
+  for (const Difference& entry : comparison.differences) {
+    rows.push_back({{"name", entry.name},
+                    {"unit", entry.unit},
+                    {"a", entry.a},
+                    {"b", entry.b},
+                    {"difference", entry.difference},
+                    {"standard_error", maybe(entry.standard_error)},
+                    {"share", entry.share()},
+                    {"p", maybe(entry.p)},
+                    {"judged", entry.judged},
+                    {"significant", entry.significant}});
+  }
+  const Json json{{"a", comparison.a.name},
+                  {"b", comparison.b.name},
+                  {"verdict", word(comparison.verdict)},
+                  {"level", kLevel},
+                  {"largest_open_share", comparison.largest_open_share},
+                  {"diameter_ratio4", maybe(comparison.diameter_ratio4)},
+                  {"differences", rows},
+                  {"remarks", comparison.remarks}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace kphi::fit

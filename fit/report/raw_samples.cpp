@@ -1,0 +1,149 @@
+#include "fit/report/raw_samples.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "results/campaign_folder.hpp"
+#include "results/run_reader.hpp"
+
+namespace kphi::fit {
+namespace {
+
+constexpr std::size_t kSamplesPerAngle = 2000;
+
+double mean(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value;
+  return values.empty() ? 0 : sum / static_cast<double>(values.size());
+}
+
+std::vector<double> every_nth(const std::vector<double>& values, std::size_t most) {
+  if (values.size() <= most) return values;
+  std::vector<double> kept;
+  for (std::size_t i = 0; i < most; ++i) kept.push_back(values[i * values.size() / most]);
+  return kept;
+}
+
+bool is_run(const RunProvenance& run, const results::StepMean& step) {
+  return std::filesystem::path(run.file).filename() ==
+         results::run_file_name(step.propeller, step.occlusion_deg, step.repetition);
+}
+
+double seconds(results::Nanoseconds time) { return 1e-9 * static_cast<double>(time); }
+
+/// Newtons per count of the thrust axis.
+double newtons_per_count(const results::RunHeader& header) {
+  return header.thrust_sign / header.load_cell.counts_per_newton;
+}
+
+std::size_t thrust_axis(const results::RunHeader& header) {
+  return static_cast<std::size_t>(std::clamp(header.thrust_axis, 0, 2));
+}
+
+std::vector<std::string> event_lines(const results::RunRecording& run) {
+  std::vector<std::string> lines;
+  for (const results::StreamEvent& event : run.events)
+    lines.push_back(fmt::format("{:.2f} s: {}{}", seconds(event.time_ns), results::name_of(event.kind),
+                                event.text.empty() ? "" : ", " + event.text));
+  return lines;
+}
+
+}  // namespace
+
+std::vector<double> thrust_samples(const results::RunRecording& run, const results::StepMean& step, std::size_t most) {
+  const double newtons = newtons_per_count(run.header);
+  const std::size_t axis = thrust_axis(run.header);
+  std::vector<double> samples;
+  for (const results::LoadCellRecord& record : run.load_cell) {
+    const double time_s = seconds(record.arrival_ns);
+    if (time_s >= step.window_begin_s && time_s <= step.window_end_s) samples.push_back(record.counts[axis] * newtons);
+  }
+  const double shift = step.thrust_n - mean(samples);
+  for (double& sample : samples) sample += shift;
+  return every_nth(samples, most);
+}
+
+std::optional<Settling> settling_of(const results::RunRecording& run, const results::StepMean& step) {
+  constexpr double kBefore_s = 0.15, kBin_s = 0.01;
+  const auto command = std::find_if(run.phases.begin(), run.phases.end(), [&](const results::PhaseMark& mark) {
+    return mark.phase == results::Phase::step && mark.step == step.step;
+  });
+  if (command == run.phases.end()) return std::nullopt;
+  const double zero_s = seconds(command->time_ns);
+  Settling settling;
+  settling.commanded_rad_s = command->speed_rad_s;
+  settling.window_begin_s = step.window_begin_s - zero_s;
+  settling.window_end_s = step.window_end_s - zero_s;
+  const auto inside = [&](double t) { return t >= -kBefore_s && t <= settling.window_end_s; };
+  for (const results::MotorReading& reading : run.motor) {
+    const double t = seconds(reading.time_ns) - zero_s;
+    if (reading.channel == results::MotorChannel::speed && inside(t))
+      settling.speed_rad_s.push_back({t, std::abs(reading.value)});
+  }
+  std::map<int, std::pair<double, std::size_t>> bins;
+  double sum = 0;
+  std::size_t n = 0;
+  for (const results::LoadCellRecord& record : run.load_cell) {
+    const double t = seconds(record.arrival_ns) - zero_s;
+    if (!inside(t)) continue;
+    const double thrust = record.counts[thrust_axis(run.header)] * newtons_per_count(run.header);
+    auto& bin = bins[static_cast<int>(std::floor(t / kBin_s))];
+    bin.first += thrust;
+    ++bin.second;
+    if (t < settling.window_begin_s) continue;
+    sum += thrust;
+    ++n;
+  }
+  if (n == 0) return std::nullopt;
+  const double shift = step.thrust_n - sum / static_cast<double>(n);  // the zero
+  for (const auto& [bin, total] : bins)
+    settling.thrust_n.push_back({(bin + 0.5) * kBin_s, total.first / static_cast<double>(total.second) + shift});
+  return settling;
+}
+
+RawSamples read_raw_samples(const Identification& identification, std::vector<RunProvenance> runs,
+                            const std::filesystem::path& folder) {
+  std::vector<results::StepMean> top;
+  std::map<double, std::size_t> repetitions;
+  for (const results::StepMean& step : identification.selection.used) {
+    if (!same_level(level(step), identification.at_speed_rad_s)) continue;
+    top.push_back(step);
+    ++repetitions[step.occlusion_deg];
+  }
+  std::map<double, std::vector<double>> by_angle;
+  std::size_t found = 0;
+  std::optional<Settling> settling;
+  for (RunProvenance& run : runs) {
+    const std::filesystem::path path = folder / run.file;
+    std::error_code unknown;
+    if (!std::filesystem::exists(path, unknown)) continue;
+    const results::RunRecording recording = results::read_run(path);
+    run.account = recording.account;
+    run.outcome = recording.outcome == results::Outcome::complete ? "complete" : "aborted: " + recording.outcome_reason;
+    run.events = event_lines(recording);
+    for (const results::StepMean& step : top) {
+      if (!is_run(run, step)) continue;
+      if (!settling) {
+        settling = settling_of(recording, step);
+        if (settling) settling->run = path.filename().string();
+      }
+      const auto samples = thrust_samples(recording, step, kSamplesPerAngle / repetitions[step.occlusion_deg]);
+      auto& all = by_angle[step.occlusion_deg];
+      all.insert(all.end(), samples.begin(), samples.end());
+      found += samples.empty() ? 0 : 1;
+    }
+  }
+  RawSamples result{{}, std::move(runs), std::move(settling)};
+  const double nominal = mean(by_angle[0]);
+  if (found < top.size() || !(nominal > 0)) return result;
+  for (auto& [phi_deg, samples] : by_angle) {
+    for (double& sample : samples) sample *= 100 / nominal;
+    result.shares.push_back({phi_deg, std::move(samples)});
+  }
+  return result;
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,35 @@
+// Raw samples of the top speed, for the box plots: they show how thrust scatters within a step, which means cannot.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "fit/coefficients/coefficients.hpp"
+#include "fit/report/detail_figures.hpp"
+#include "fit/report/figures.hpp"
+#include "results/records.hpp"
+#include "results/step_mean.hpp"
+
+namespace kphi::fit {
+
+/// At most `most` samples of the run inside the step's window, evenly taken, in N. They scatter about the step's mean:
+/// the window is cut by arrival stamps here, a little coarser than the reduction did, so their own mean is replaced by
+/// it.
+[[nodiscard]] std::vector<double> thrust_samples(const results::RunRecording& run, const results::StepMean& step,
+                                                 std::size_t most);
+
+/// How `run` came to `step`. Nothing when the run has no mark of it or no sample in its window.
+[[nodiscard]] std::optional<Settling> settling_of(const results::RunRecording& run, const results::StepMean& step);
+
+struct RawSamples {
+  std::vector<ThrustShares> shares;  ///< empty when some run of the top speed is not in the folder
+  std::vector<RunProvenance> runs;  ///< those given, with outcome, account and events filled in where the file is there
+  std::optional<Settling> settling;  ///< of the top speed, from the first of the runs that have it
+};
+
+/// Reads each run once. `runs` name files below `folder`; at most 2000 samples per φ are kept.
+[[nodiscard]] RawSamples read_raw_samples(const Identification& identification, std::vector<RunProvenance> runs,
+                                          const std::filesystem::path& folder);
+
+}  // namespace kphi::fit

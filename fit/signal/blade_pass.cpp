@@ -1,0 +1,148 @@
+#include "fit/signal/blade_pass.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <unsupported/Eigen/FFT>
+
+#include "compensation/units.hpp"
+#include "fit/signal/step_clock.hpp"
+
+namespace kphi::fit {
+namespace {
+
+/// Hann's window, after the mean is taken away: the once-per-turn line must not leak into the blades'.
+std::vector<double> windowed(std::vector<double> values) {
+  const double n = static_cast<double>(values.size());
+  double mean = 0;
+  for (const double value : values) mean += value / n;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = (values[i] - mean) * (0.5 - 0.5 * std::cos(2 * kPi * (static_cast<double>(i) + 0.5) / n));
+  return values;
+}
+
+/// |Σ x e^{−iωt}| at any frequency, cycles per sample; the phasor is turned, not computed anew.
+double amplitude_at(const std::vector<double>& values, double cycles) {
+  const std::complex<double> turn = std::polar(1.0, -2 * kPi * cycles);
+  std::complex<double> sum = 0, phasor = 1;
+  for (const double value : values) {
+    sum += value * phasor;
+    phasor *= turn;
+  }
+  return std::abs(sum);
+}
+
+/// The maximum of a single peak between low and high, by golden section.
+double peak_between(const std::vector<double>& values, double low, double high) {
+  constexpr double kGolden = 0.6180339887498949;
+  double left = high - kGolden * (high - low), right = low + kGolden * (high - low);
+  double at_left = amplitude_at(values, left), at_right = amplitude_at(values, right);
+  for (int i = 0; i < 24; ++i) {
+    if (at_left > at_right) {
+      high = right;
+      right = left;
+      at_right = at_left;
+      at_left = amplitude_at(values, left = high - kGolden * (high - low));
+    } else {
+      low = left;
+      left = right;
+      at_left = at_right;
+      at_right = amplitude_at(values, right = low + kGolden * (high - low));
+    }
+  }
+  return 0.5 * (low + high);
+}
+
+struct SpectrumPeak {
+  double cycles = 0;  // per sample
+  double signal_to_noise = 0;
+  double u_cycles = 0;
+};
+
+/// The highest line within `search` of `expected` (cycles per sample).
+SpectrumPeak find_peak(const std::vector<double>& samples, double expected, double search) {
+  const std::vector<double> values = windowed(samples);
+  const double n = static_cast<double>(values.size());
+  Eigen::FFT<double> fft;
+  fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
+  std::vector<std::complex<double>> spectrum;
+  fft.fwd(spectrum, values);
+  const auto low = static_cast<std::size_t>(std::max(1.0, std::floor(expected * (1 - search) * n)));
+  const auto high = std::min(spectrum.size() - 2, static_cast<std::size_t>(std::ceil(expected * (1 + search) * n)));
+  if (high <= low + 8) return {};
+  std::size_t top = low;
+  for (std::size_t i = low; i <= high; ++i)
+    if (std::abs(spectrum[i]) > std::abs(spectrum[top])) top = i;
+  double noise = 0, count = 0;
+  for (std::size_t i = low; i <= high; ++i) {
+    if (i + 4 > top && i < top + 4) continue;
+    noise += std::norm(spectrum[i]);
+    ++count;
+  }
+  SpectrumPeak peak;
+  peak.cycles = peak_between(values, (static_cast<double>(top) - 1) / n, (static_cast<double>(top) + 1) / n);
+  if (count == 0 || noise == 0) return peak;
+  peak.signal_to_noise = amplitude_at(values, peak.cycles) / std::sqrt(noise / count);
+  // Rife and Boorstyn's bound for one tone, √6/(π n) over the ratio of peak to noise bin, and Hann's 1.6 of it.
+  peak.u_cycles = 1.6 * std::sqrt(6.0) / (kPi * n * peak.signal_to_noise * std::sqrt(2.0));
+  return peak;
+}
+
+std::optional<BladePassLine> line_of(const results::RunRecording& run, const StepSpan& span,
+                                     const BladePassOptions& options) {
+  const double settled = std::max(run.header.minimum_discard_s, 0.4 * (span.end_s - span.begin_s));
+  const EvenSamples thrust = thrust_between(run, span.begin_s + settled, span.end_s);
+  const auto speeds = speeds_between(run, span.begin_s + settled, span.end_s);
+  if (thrust.values.size() < 256 || speeds.size() < 3) return std::nullopt;
+  double mean = 0, squares = 0;
+  for (const TimedSample& sample : speeds) mean += sample.value / static_cast<double>(speeds.size());
+  for (const TimedSample& sample : speeds) squares += std::pow(sample.value - mean, 2);
+  const double expected = run.header.blades * mean / (2 * kPi) / thrust.rate_hz;
+  if (!(expected > 0) || expected * (1 + options.search) > 0.5) return std::nullopt;
+  const SpectrumPeak peak = find_peak(thrust.values, expected, options.search);
+  if (peak.signal_to_noise < options.least_signal_to_noise) return std::nullopt;
+  BladePassLine line;
+  line.step = span.step;
+  line.frequency_hz = peak.cycles * thrust.rate_hz;
+  line.reported_speed_rad_s = mean;
+  line.gain = peak.cycles / expected;
+  const double readings = static_cast<double>(speeds.size());
+  line.u_gain = std::hypot(peak.u_cycles / expected, std::sqrt(squares / (readings - 1) / readings) / mean);
+  line.signal_to_noise = peak.signal_to_noise;
+  return line;
+}
+
+/// Weighted mean; enlarged where the lines scatter more than they claim (Birge's ratio).
+Estimate mean_gain(const std::vector<BladePassLine>& lines, double u_box) {
+  double sum = 0, weights = 0, chi_squared = 0;
+  for (const BladePassLine& line : lines) {
+    sum += line.gain / (line.u_gain * line.u_gain);
+    weights += 1 / (line.u_gain * line.u_gain);
+  }
+  const double gain = sum / weights, n = static_cast<double>(lines.size());
+  for (const BladePassLine& line : lines) chi_squared += std::pow((line.gain - gain) / line.u_gain, 2);
+  const double enlarge = n > 1 ? std::max(1.0, chi_squared / (n - 1)) : 1.0;
+  const double u = std::sqrt(enlarge / weights);
+  const double whole = std::hypot(u, gain * u_box);
+  return {gain, whole, std::max(1.0, n - 1) * std::pow(whole / u, 4)};
+}
+
+}  // namespace
+
+std::optional<BladePassCheck> check_by_blade_pass(std::span<const results::RunRecording> runs,
+                                                  const BladePassOptions& options) {
+  BladePassCheck check;
+  for (const results::RunRecording& run : runs) {
+    for (const StepSpan& span : step_spans(run)) {
+      if (const auto line = line_of(run, span, options)) check.lines.push_back(*line);
+    }
+  }
+  if (check.lines.empty()) return std::nullopt;
+  check.gain = mean_gain(check.lines, options.u_box);
+  const double half = coverage_factor(check.gain.freedom) * check.gain.u;
+  check.lower = check.gain.value - half;
+  check.upper = check.gain.value + half;
+  return check;
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,258 @@
+#include "fit/uncertainty/analysis.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fit/uncertainty/error_sources.hpp"
+
+namespace kphi::fit {
+namespace {
+
+constexpr const char* kUnitOfK = "N/(rad/s)^2";
+
+std::vector<double> unit_vector(std::size_t n, std::size_t i) {
+  std::vector<double> weights(n);
+  weights[i] = 1;
+  return weights;
+}
+
+std::string name_of_k(double phi_deg) { return phi_deg == 0 ? "K_T" : fmt::format("k({} deg)", phi_deg); }
+
+ErrorSources sources_of(const Identification& identification, const Analysis& analysis, const BenchUncertainty& bench) {
+  if (!identification.repeatability.angles.empty())
+    return error_sources(identification.repeatability, analysis.speed, bench);
+  std::vector<double> k, errors;
+  for (const OcclusionCoefficient& row : identification.table) {
+    k.push_back(row.k);
+    errors.push_back(row.standard_error);
+  }
+  return error_sources(std::move(k), std::move(errors));
+}
+
+/// What the line misses beyond the errors of its points, once a test has found it to be no line.
+BudgetRow line_row(const LineFit& line, const Curvature& curvature) {
+  BudgetRow row;
+  row.source = "line k(phi)";
+  row.unit = kUnitOfK;
+  row.sensitivity = 1;
+  row.note = "what its points deviate beyond their errors, where a test finds it";
+  if (!curvature.bends()) return row;
+  double excess = 0;
+  const double terms = line.anchored ? 1 : 2;
+  const double n = static_cast<double>(line.points.size());
+  for (std::size_t i = 0; i < line.points.size(); ++i)
+    excess += line.residuals[i] * line.residuals[i] / (n - terms) - std::pow(line.points[i].standard_error, 2) / n;
+  row.u = std::sqrt(std::max(0.0, excess));
+  row.freedom = n - terms;
+  return row;
+}
+
+/// Of K_T, intercept and slope; the line's own row is in the last two.
+std::vector<std::vector<double>> covariance_of(const ErrorSources& sources, const LineWeights& weights,
+                                               const BudgetRow& row) {
+  const std::vector<std::vector<double>> functions{unit_vector(weights.slope.size(), 0), weights.intercept,
+                                                   weights.slope};
+  std::vector<std::vector<double>> result(3, std::vector<double>(3));
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      result[i][j] = sources.covariance(functions[i], functions[j]);
+      if (i == 0 || j == 0) continue;
+      for (std::size_t m = 0; m < functions[i].size(); ++m)
+        result[i][j] += functions[i][m] * functions[j][m] * row.u * row.u;
+    }
+  }
+  return result;
+}
+
+BudgetRow scaled(BudgetRow row, double by) {
+  row.sensitivity *= by;
+  return row;
+}
+
+double norm(const std::vector<double>& weights) {
+  double squares = 0;
+  for (const double weight : weights) squares += weight * weight;
+  return std::sqrt(squares);
+}
+
+/// The line's own row weighs by how much of each point's deviation gets into the weights.
+Budget line_budget(const ErrorSources& sources, const char* quantity, const char* unit, double value,
+                   const std::vector<double>& weights, const BudgetRow& row) {
+  Budget budget = sources.budget(quantity, unit, value, weights);
+  budget.rows.push_back(scaled(row, norm(weights)));
+  return budget;
+}
+
+LinePrediction predict(const Identification& identification, const ErrorSources& sources, const LineWeights& weights,
+                       double phi_deg, const BudgetRow& row) {
+  const LineFit& line = identification.line;
+  const compensation::ThrustCurve curve = identification.curve();
+  std::vector<double> at(weights.slope.size());
+  for (std::size_t i = 0; i < at.size(); ++i) at[i] = weights.intercept[i] + phi_deg * weights.slope[i];
+  LinePrediction prediction;
+  prediction.phi_deg = phi_deg;
+  const double k = curve.at(from_degrees(phi_deg)).value();
+  prediction.k = sources.budget(fmt::format("line at {} deg", phi_deg), kUnitOfK, k, at);
+  prediction.k.rows.push_back(scaled(row, std::sqrt(1 + std::pow(norm(at), 2))));
+  prediction.speed_u_share = k > 0 ? 0.5 * prediction.k.combined() / k : std::numeric_limits<double>::infinity();
+  std::vector<double> ratio = at;
+  for (double& weight : ratio) weight /= line.K_T;
+  ratio.front() -= k / (line.K_T * line.K_T);
+  prediction.clipped = k >= line.K_T;
+  prediction.scaling_factor =
+      sources.budget(fmt::format("k_i({} deg)", phi_deg), "1", curve.scaling_factor(from_degrees(phi_deg)), ratio);
+  prediction.scaling_factor.rows.push_back(scaled(row, std::sqrt(1 + std::pow(norm(at), 2)) / line.K_T));
+  const auto [low, high] = std::minmax_element(line.points.begin(), line.points.end(),
+                                               [](const auto& a, const auto& b) { return a.phi_deg < b.phi_deg; });
+  prediction.extrapolated = phi_deg < low->phi_deg || phi_deg > high->phi_deg;
+  return prediction;
+}
+
+LineShape shape_of(const Identification& identification, const ErrorSources& sources, const LineWeights& weights,
+                   const BudgetRow& row) {
+  const LineFit& line = identification.line;
+  std::vector<double> difference_weights = weights.intercept;
+  difference_weights.front() -= 1;
+  Budget mismatch = sources.budget("intercept - K_T", kUnitOfK, line.mismatch(), difference_weights);
+  mismatch.rows.push_back(scaled(row, line.anchored ? 0 : norm(weights.intercept)));
+  return {line.clipping_deg(), line.zero_crossing_deg(), mismatch.estimate()};
+}
+
+std::vector<std::string> remarks_of(const Identification& identification, const Analysis& analysis) {
+  const LineFit& line = identification.line;
+  std::vector<std::string> remarks;
+  const double largest = identification.table.back().phi_deg;
+  const double share = 100 * line.mismatch() / line.K_T;
+  for (const OutlyingRun& run : analysis.outlying)
+    remarks.push_back(fmt::format(
+        "repetition {} at {} deg stands out, {:+.2f} % from the others (p = {:.2g}); it is kept, and its scatter is in "
+        "the budget of every k: look for a cause, and run this occlusion again",
+        run.repetition, run.phi_deg, 100 * run.share, run.p));
+  if (!line.anchored) {
+    const bool beyond_error = student_test(analysis.shape.mismatch, 0).rejected();
+    remarks.push_back(fmt::format("the line's intercept is {:+.2f} % from K_T, {} its error", share,
+                                  beyond_error ? "beyond" : "within"));
+  }
+  if (line.slope_per_deg >= 0) {
+    remarks.push_back("the line does not fall: this occlusion costs no thrust, or the runs were mixed up");
+    return remarks;
+  }
+  const double clipping = *line.clipping_deg(), zero = *line.zero_crossing_deg();
+  if (clipping > 0)
+    remarks.push_back(fmt::format("up to {:.1f} deg the line lies above K_T: k_i is held at 1 there", clipping));
+  if (clipping < 0)
+    remarks.push_back(
+        fmt::format("at first contact the line already lies {:.2f} % below K_T: k_i steps there", -share));
+  if (zero < 360)
+    remarks.push_back(fmt::format("the line reaches 0 at {:.1f} deg; it was measured up to {} deg", zero, largest));
+  return remarks;
+}
+
+std::vector<RejectedPoint> rejected_points(const Identification& identification) {
+  std::vector<RejectedPoint> rejected;
+  for (const OcclusionCoefficient& row : identification.table) {
+    if (!row.fit) continue;
+    for (std::size_t i = 0; i < row.measured.size(); ++i) {
+      if (row.fit->robust_weights[i] >= kRejectedWeight) continue;
+      const results::StepMean& step = row.measured[i];
+      rejected.push_back({row.phi_deg, step.repetition, step.step, step.speed_rad_s, step.thrust_n,
+                          row.fit->residuals_n[i], row.fit->robust_weights[i]});
+    }
+  }
+  return rejected;
+}
+
+std::vector<HypothesisTest> neighbour_tests(const std::vector<Budget>& coefficients, const ErrorSources& sources,
+                                            const Identification& identification) {
+  std::vector<HypothesisTest> tests;
+  for (std::size_t i = 1; i < coefficients.size(); ++i) {
+    std::vector<double> weights(coefficients.size());
+    weights[i - 1] = 1;
+    weights[i] = -1;
+    const double value = coefficients[i - 1].value - coefficients[i].value;
+    HypothesisTest test = student_test(sources.budget("", kUnitOfK, value, weights).estimate(), 0);
+    test.name = fmt::format("k({} deg) against k({} deg)", identification.table[i - 1].phi_deg,
+                            identification.table[i].phi_deg);
+    test.hypothesis = "both are the same";
+    tests.push_back(test);
+  }
+  return tests;
+}
+
+std::vector<Budget> standard_air(const std::vector<Budget>& coefficients, const AnalysisOptions& options) {
+  std::vector<Budget> result;
+  if (!options.air_density_kg_m3) return result;
+  const double scale = kStandardDensity / *options.air_density_kg_m3;
+  for (Budget budget : coefficients) {
+    budget.quantity += " in standard air";
+    budget.value *= scale;
+    for (BudgetRow& row : budget.rows) row.sensitivity *= scale;
+    BudgetRow density;
+    density.source = "air density";
+    density.evaluation = Evaluation::type_b;
+    density.unit = "1";
+    density.u = options.bench.air_density.value_or(std::numeric_limits<double>::quiet_NaN());
+    density.sensitivity = -budget.value;
+    density.common = true;
+    density.note = density.known() ? "" : "not known";
+    budget.rows.push_back(density);
+    result.push_back(std::move(budget));
+  }
+  return result;
+}
+
+std::vector<LinePoint> with_errors(const Identification& identification) {
+  std::vector<LinePoint> points = identification.line.points;
+  const bool zero_carries = points.front().phi_deg == 0;
+  if (identification.line.anchored && !zero_carries)
+    points.insert(points.begin(), {0, identification.line.K_T, identification.line.K_T_standard_error});
+  return points;
+}
+
+}  // namespace
+
+Analysis analyse(const Identification& identification, const AnalysisOptions& options) {
+  Analysis analysis;
+  std::vector<double> phis;
+  std::vector<RunSums> runs;
+  std::vector<StepsOfAngle> measured;
+  for (const OcclusionCoefficient& row : identification.table) {
+    phis.push_back(row.phi_deg);
+    if (row.fit) measured.push_back({row.phi_deg, row.measured});
+  }
+  analysis.speed = speed_dependence(measured);
+  for (const AngleScatter& angle : identification.repeatability.angles)
+    runs.insert(runs.end(), angle.runs.begin(), angle.runs.end());
+  const ErrorSources sources = sources_of(identification, analysis, options.bench);
+  for (std::size_t i = 0; i < phis.size(); ++i)
+    analysis.coefficients.push_back(
+        sources.budget(name_of_k(phis[i]), kUnitOfK, identification.table[i].k, unit_vector(phis.size(), i)));
+
+  const double freedom =
+      runs.empty() ? std::numeric_limits<double>::infinity() : identification.repeatability.freedom();
+  analysis.curvature = curvature(with_errors(identification), freedom);
+  const LineFit& line = identification.line;
+  const LineWeights weights = line.weights(phis);
+  const BudgetRow row = line_row(line, analysis.curvature);
+  analysis.intercept = line_budget(sources, "intercept", kUnitOfK, line.intercept, weights.intercept, row);
+  analysis.slope = line_budget(sources, "slope", "N/(rad/s)^2/deg", line.slope_per_deg, weights.slope, row);
+  analysis.covariance = covariance_of(sources, weights, row);
+  for (const double phi : options.prediction_deg)
+    analysis.predictions.push_back(predict(identification, sources, weights, phi, row));
+  analysis.standard = standard_air(analysis.coefficients, options);
+  analysis.differences = neighbour_tests(analysis.coefficients, sources, identification);
+  analysis.between_runs = identification.repeatability.between;
+  analysis.shape = shape_of(identification, sources, weights, row);
+  analysis.outlying = outlying_runs(identification.repeatability);
+  analysis.remarks = remarks_of(identification, analysis);
+  analysis.rejected = rejected_points(identification);
+  if (!runs.empty()) analysis.bootstrap = bootstrap(runs, weights, options.bootstrap);
+  std::vector<Estimate> k;
+  for (const Budget& budget : analysis.coefficients) k.push_back(budget.estimate());
+  if (!runs.empty()) analysis.torque = identify_torque(identification.selection.used, phis, k);
+  return analysis;
+}
+
+}  // namespace kphi::fit

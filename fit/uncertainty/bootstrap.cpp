@@ -1,0 +1,87 @@
+#include "fit/uncertainty/bootstrap.hpp"
+
+#include <fmt/format.h>
+
+#include "base/random.hpp"
+#include "fit/numerics/tail_percentiles.hpp"
+
+namespace kphi::fit {
+namespace {
+
+/// The runs of one φ.
+struct Group {
+  double phi_deg;
+  std::span<const RunSums> runs;
+};
+
+std::vector<Group> groups_of(std::span<const RunSums> runs) {
+  std::vector<Group> groups;
+  for (std::size_t begin = 0; begin < runs.size();) {
+    std::size_t end = begin;
+    while (end < runs.size() && runs[end].phi_deg == runs[begin].phi_deg) ++end;
+    groups.push_back({runs[begin].phi_deg, runs.subspan(begin, end - begin)});
+    begin = end;
+  }
+  return groups;
+}
+
+double pooled(std::span<const RunSums> runs) {
+  double xt = 0, xx = 0;
+  for (const RunSums& run : runs) {
+    xt += run.xt;
+    xx += run.xx;
+  }
+  return xt / xx;
+}
+
+/// One resample per entry of `into`. Two 32-bit draws come out of each 64-bit number; n/2³² of bias is nothing here.
+void resample(const Group& group, std::span<double> into, SplitMix64& random) {
+  const std::uint64_t n = group.runs.size();
+  for (double& k : into) {
+    double xt = 0, xx = 0;
+    std::uint64_t bits = 0;
+    for (std::uint64_t i = 0; i < n; ++i) {
+      bits = i % 2 == 0 ? random() : bits >> 32;
+      const RunSums& run = group.runs[((bits & 0xffffffffu) * n) >> 32];
+      xt += run.xt;
+      xx += run.xx;
+    }
+    k = xt / xx;
+  }
+}
+
+BootstrapInterval summary(std::string quantity, double value, std::span<const double> samples, double level,
+                          std::vector<double>& room) {
+  const Scatter scatter = scatter_of(samples);
+  const TailPercentiles tails = tail_percentiles(samples, scatter, level, room);
+  return {std::move(quantity), value, scatter.deviation, tails.lower, tails.upper};
+}
+
+}  // namespace
+
+std::vector<BootstrapInterval> bootstrap(std::span<const RunSums> runs, const LineWeights& line,
+                                         const BootstrapOptions& options) {
+  const std::vector<Group> groups = groups_of(runs);
+  std::vector<BootstrapInterval> result;
+  if (groups.empty() || options.resamples < 2) return result;
+  SplitMix64 random(options.seed);
+  std::vector<double> k(options.resamples), intercept(options.resamples), slope(options.resamples), room;
+  double intercept_value = 0, slope_value = 0;
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    resample(groups[i], k, random);
+    for (std::size_t j = 0; j < k.size(); ++j) {
+      intercept[j] += line.intercept[i] * k[j];
+      slope[j] += line.slope[i] * k[j];
+    }
+    const double value = pooled(groups[i].runs);
+    intercept_value += line.intercept[i] * value;
+    slope_value += line.slope[i] * value;
+    const double phi = groups[i].phi_deg;
+    result.push_back(summary(phi == 0 ? "K_T" : fmt::format("k({} deg)", phi), value, k, options.level, room));
+  }
+  result.push_back(summary("intercept", intercept_value, intercept, options.level, room));
+  result.push_back(summary("slope", slope_value, slope, options.level, room));
+  return result;
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,388 @@
+#include "fit/uncertainty/speed_dependence.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "base/error.hpp"
+#include "base/statistics.hpp"
+#include "fit/numerics/linear_regression.hpp"
+
+namespace kphi::fit {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+struct Sample {
+  int level = 0;
+  double speed = 0, x = 0, thrust = 0;  ///< x = ω²
+};
+
+struct Run {
+  std::vector<Sample> samples;  ///< in the order of their steps
+  double k = 0;                 ///< through the origin
+  double zero_u_n = kNan;       ///< of the zero that they share; NaN: not known
+};
+
+/// Of the zero itself, and rectangular over half of what it moved.
+double zero_u(std::span<const results::StepMean> steps, int repetition) {
+  double told = kNan, low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const results::StepMean& step : steps) {
+    if (step.repetition != repetition) continue;
+    if (std::isfinite(step.zero_u_n)) told = std::max(std::isnan(told) ? 0 : told, step.zero_u_n);
+    if (std::isfinite(step.zero_n)) low = std::min(low, step.zero_n), high = std::max(high, step.zero_n);
+  }
+  const double moved = high > low ? (high - low) / std::sqrt(12.0) : 0;
+  const double u = std::hypot(std::isnan(told) ? 0 : told, moved);
+  return u > 0 ? u : kNan;
+}
+
+std::vector<Run> runs_of(std::span<const results::StepMean> steps) {
+  std::map<int, Run> runs;
+  for (const results::StepMean& step : steps) {
+    if (!(step.speed_rad_s > 0)) continue;
+    runs[step.repetition].samples.push_back(
+        {step.step, step.speed_rad_s, step.speed_rad_s * step.speed_rad_s, step.thrust_n});
+  }
+  std::vector<Run> result;
+  for (auto& [repetition, run] : runs) {
+    double xt = 0, xx = 0;
+    for (const Sample& sample : run.samples) xt += sample.x * sample.thrust, xx += sample.x * sample.x;
+    run.k = xt / xx;
+    run.zero_u_n = zero_u(steps, repetition);
+    std::sort(run.samples.begin(), run.samples.end(),
+              [](const Sample& a, const Sample& b) { return a.level < b.level; });
+    result.push_back(std::move(run));
+  }
+  return result;
+}
+
+/// Variance of one step as a + b x², neither negative: the cell's noise and the air's.
+struct NoiseModel {
+  double constant = 1, growing = 0;
+  [[nodiscard]] double at(double x) const { return constant + growing * x * x; }
+};
+
+/// From the variance that the levels show, at x.
+NoiseModel noise_of(const std::vector<double>& x, const std::vector<double>& variances) {
+  const double scale = *std::max_element(x.begin(), x.end());
+  std::vector<double> squares;
+  double mean = 0, share = 0, square_sum = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    squares.push_back(std::pow(x[i] / scale, 2));
+    mean += variances[i] / static_cast<double>(x.size());
+    share += variances[i] * squares[i];
+    square_sum += squares[i] * squares[i];
+  }
+  NoiseModel model{mean, 0};
+  try {
+    const Regression line = regress_polynomial(squares, variances, 0, 1);
+    if (line.estimates[0] > 0 && line.estimates[1] >= 0) {
+      model = {line.estimates[0], line.estimates[1] / (scale * scale)};
+    } else if (line.estimates[0] <= 0 && share > 0) {
+      // All of it grows; a hundredth of the mean keeps the lowest levels from weighing without limit.
+      model = {0.01 * mean, share / square_sum / (scale * scale)};
+    }
+  } catch (const FitError&) {
+  }
+  return model;
+}
+
+/// What least squares of one run found.
+struct RunFit {
+  std::vector<double> residuals;  ///< N; the last is the zero's own where that is known
+  double trend = 0, trend_u = 0;  ///< of the last term; u as the weights have it
+  double freedom = 0;
+  double deviation = 0;  ///< of the weighted residuals
+};
+
+/// T of one run on ω², its zero and, with `spread`, k ω² (ω − middle)/spread. The zero as well known as it is.
+struct RunModel {
+  double middle = 0, spread = 0, k = 0;  ///< spread 0: without a trend
+  NoiseModel noise;
+  bool zero_is_free = false;
+
+  [[nodiscard]] RunFit fit(const std::vector<Sample>& samples, double zero_u_n) const;
+};
+
+double dot(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+void subtract(double times, const std::vector<double>& a, std::vector<double>& from) {
+  for (std::size_t i = 0; i < a.size(); ++i) from[i] -= times * a[i];
+}
+
+void scale(double by, std::vector<double>& a) {
+  for (double& one : a) one *= by;
+}
+
+/// By modified Gram-Schmidt on the weighted columns: what is left of the thrusts are the residuals, and the last column
+/// is the trend's.
+RunFit RunModel::fit(const std::vector<Sample>& samples, double zero_u_n) const {
+  std::vector<std::vector<double>> columns(spread > 0 ? 3 : 2);
+  std::vector<double> roots, rest;
+  for (const Sample& sample : samples) {
+    const double root = 1 / std::sqrt(noise.at(sample.x));
+    roots.push_back(root);
+    rest.push_back(root * sample.thrust);
+    columns[0].push_back(root * sample.x);
+    columns[1].push_back(root);
+    if (spread > 0) columns[2].push_back(root * k * sample.x * (sample.speed - middle) / spread);
+  }
+  if (!zero_is_free) {
+    roots.push_back(1 / zero_u_n);
+    rest.push_back(0);
+    for (std::size_t j = 0; j < columns.size(); ++j) columns[j].push_back(j == 1 ? roots.back() : 0);
+  }
+  if (rest.size() <= columns.size()) throw FitError("k against speed: too few steps in a run");
+  RunFit result;
+  for (std::size_t j = 0; j < columns.size(); ++j) {
+    const double whole = std::sqrt(dot(columns[j], columns[j]));
+    for (std::size_t i = 0; i < j; ++i) subtract(dot(columns[i], columns[j]), columns[i], columns[j]);
+    const double size = std::sqrt(dot(columns[j], columns[j]));
+    if (!(size > 1e-9 * whole)) throw FitError("k against speed: too few different speeds in a run");
+    scale(1 / size, columns[j]);
+    const double part = dot(columns[j], rest);
+    subtract(part, columns[j], rest);
+    result.trend = part / size;
+    result.trend_u = 1 / size;
+  }
+  result.freedom = static_cast<double>(rest.size() - columns.size());
+  result.deviation = std::sqrt(dot(rest, rest) / result.freedom);
+  for (std::size_t i = 0; i < rest.size(); ++i) result.residuals.push_back(rest[i] / roots[i]);
+  return result;
+}
+
+/// The levels that all runs measured, one column each: what tests compare.
+std::vector<Run> complete_levels(std::vector<Run> runs) {
+  std::map<int, std::size_t> counts;
+  for (const Run& run : runs)
+    for (const Sample& sample : run.samples) ++counts[sample.level];
+  for (Run& run : runs)
+    std::erase_if(run.samples, [&](const Sample& sample) { return counts[sample.level] < runs.size(); });
+  return runs;
+}
+
+/// Values of all runs at one place.
+std::vector<double> column(const std::vector<std::vector<double>>& runs, std::size_t i) {
+  std::vector<double> values;
+  for (const auto& run : runs) values.push_back(run[i]);
+  return values;
+}
+
+/// What is measured at one φ, prepared for its tests.
+struct Angle {
+  std::vector<Run> runs;  ///< as measured
+  RunModel model;
+  std::vector<std::vector<double>>
+      standardised;            ///< residuals of each run in its noise, complete levels, then the zero
+  std::vector<double> trends;  ///< of each run, shares of k
+  double trend_u = 0;          ///< of one run, as the noise has it
+  double alone_freedom = 0;    ///< of a single run
+};
+
+double mean_x(const std::vector<Run>& runs, std::size_t i) {
+  double sum = 0;
+  for (const Run& run : runs) sum += run.samples[i].x / static_cast<double>(runs.size());
+  return sum;
+}
+
+/// Noise from how the runs differ at each level, each about its own k and zero.
+void take_noise(const std::vector<Run>& complete, RunModel& model) {
+  std::vector<std::vector<double>> residuals;
+  RunModel free;
+  free.zero_is_free = true;
+  for (const Run& run : complete) residuals.push_back(free.fit(run.samples, kNan).residuals);
+  std::vector<double> x, variances;
+  for (std::size_t i = 0; i < complete.front().samples.size(); ++i) {
+    x.push_back(mean_x(complete, i));
+    variances.push_back(variance(column(residuals, i)));
+  }
+  model.noise = noise_of(x, variances);
+}
+
+void take_residuals(const std::vector<Run>& complete, Angle& angle) {
+  for (const Run& run : complete) {
+    auto residuals = angle.model.fit(run.samples, run.zero_u_n).residuals;
+    for (std::size_t i = 0; i < run.samples.size(); ++i)
+      residuals[i] /= std::sqrt(angle.model.noise.at(mean_x(complete, i)));
+    if (!angle.model.zero_is_free) residuals.back() /= run.zero_u_n;
+    angle.standardised.push_back(std::move(residuals));
+  }
+}
+
+void take_trends(Angle& angle, double slowest, double fastest) {
+  RunModel model = angle.model;
+  model.middle = 0.5 * (slowest + fastest);
+  model.spread = fastest - slowest;
+  model.k = 0;
+  for (const Run& run : angle.runs) model.k += run.k / static_cast<double>(angle.runs.size());
+  double squares = 0;
+  for (const Run& run : angle.runs) {
+    if (angle.runs.size() == 1) {  // its own residuals tell the noise
+      RunModel free = model;
+      free.zero_is_free = true;
+      model.noise.constant = std::pow(free.fit(run.samples, kNan).deviation, 2);
+    }
+    if (!(model.noise.at(run.samples.front().x) > 0)) return;
+    const RunFit found = model.fit(run.samples, run.zero_u_n);
+    angle.trends.push_back(found.trend);
+    squares += found.trend_u * found.trend_u;
+    angle.alone_freedom = found.freedom;
+  }
+  angle.trend_u = std::sqrt(squares / static_cast<double>(angle.runs.size()));
+}
+
+/// From how the residuals of neighbouring steps go together, after Box.
+double independent_share(const std::vector<Angle>& angles) {
+  std::vector<double> products;
+  double n = 0, length = 0;
+  for (const Angle& angle : angles) {
+    if (angle.standardised.size() < 2) continue;
+    const std::size_t levels = angle.standardised.front().size() - (angle.model.zero_is_free ? 0 : 1);
+    products.resize(std::max(products.size(), levels / 2 + 1));
+    std::vector<double> means;
+    for (std::size_t i = 0; i < levels; ++i) means.push_back(mean(column(angle.standardised, i)));
+    for (const auto& run : angle.standardised) {
+      for (std::size_t lag = 0; lag <= levels / 2; ++lag)
+        for (std::size_t i = 0; i + lag < levels; ++i)
+          products[lag] += (run[i] - means[i]) * (run[i + lag] - means[i + lag]);
+    }
+    n += static_cast<double>(levels * (angle.standardised.size() - 1));
+    length = std::max(length, static_cast<double>(levels));
+  }
+  double sum = 0;
+  for (std::size_t lag = 1; lag < products.size(); ++lag) {
+    const double rest = 1 - static_cast<double>(lag) / length;
+    const double correlation = products[0] > 0 ? products[lag] / products[0] / rest : 0;
+    sum += rest * (correlation * correlation - 1 / (n * rest));
+  }
+  return 1 / (1 + 2 * std::max(0.0, sum));
+}
+
+/// Of levels and zero, all with the k of their run taken out.
+HypothesisTest test_levels(const Angle& angle, double share) {
+  const double runs = static_cast<double>(angle.standardised.size());
+  double between = 0, within = 0;
+  for (std::size_t i = 0; i < angle.standardised.front().size(); ++i) {
+    const auto values = column(angle.standardised, i);
+    between += runs * std::pow(mean(values), 2);
+    within += (runs - 1) * variance(values);
+  }
+  const double freedom = static_cast<double>(angle.standardised.front().size()) - (angle.model.zero_is_free ? 2 : 1);
+  const double f = between / freedom / (within / (freedom * (runs - 1)));
+  return f_test(f, share * freedom, share * freedom * (runs - 1));
+}
+
+/// Rms of the levels' deviation about k ω² without a zero, less what noise makes of it.
+double inadequacy_of(const std::vector<Run>& complete) {
+  double excess = 0, xx = 0;
+  for (std::size_t i = 0; i < complete.front().samples.size(); ++i) {
+    std::vector<double> residuals;
+    for (const Run& run : complete) residuals.push_back(run.samples[i].thrust - run.k * run.samples[i].x);
+    const double noise = complete.size() > 1 ? variance(residuals) / static_cast<double>(complete.size()) : 0;
+    excess += std::pow(mean(residuals), 2) - noise;
+    xx += std::pow(mean_x(complete, i), 2);
+  }
+  const double n = static_cast<double>(complete.front().samples.size());
+  return std::sqrt(std::max(0.0, excess / xx * (complete.size() > 1 ? 1 : n / (n - 1))));
+}
+
+std::vector<LevelCoefficient> level_coefficients(const std::vector<Run>& runs) {
+  std::map<int, std::vector<Sample>> levels;
+  for (const Run& run : runs)
+    for (const Sample& sample : run.samples) levels[sample.level].push_back(sample);
+  std::vector<LevelCoefficient> rows;
+  for (const auto& [index, samples] : levels) {
+    LevelCoefficient row;
+    std::vector<double> k;
+    row.repetitions = samples.size();
+    for (const Sample& sample : samples) {
+      k.push_back(sample.thrust / sample.x);
+      row.speed_rad_s += sample.speed / static_cast<double>(samples.size());
+    }
+    row.k = mean(k);
+    if (k.size() > 1) row.standard_error = std::sqrt(variance(k) / static_cast<double>(k.size()));
+    rows.push_back(row);
+  }
+  std::sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.speed_rad_s < b.speed_rad_s; });
+  return rows;
+}
+
+Angle prepare(const SpeedDependence& found, std::vector<Run> runs, const std::vector<Run>& complete) {
+  Angle angle;
+  angle.model.zero_is_free =
+      std::any_of(runs.begin(), runs.end(), [](const Run& run) { return std::isnan(run.zero_u_n); });
+  angle.runs = std::move(runs);
+  try {
+    if (complete.size() > 1 && complete.front().samples.size() > 3) {
+      take_noise(complete, angle.model);
+      if (angle.model.noise.at(mean_x(complete, 0)) > 0) take_residuals(complete, angle);
+    }
+    take_trends(angle, found.levels.front().speed_rad_s, found.levels.back().speed_rad_s);
+  } catch (const FitError&) {
+    angle.trends.clear();
+  }
+  return angle;
+}
+
+/// How much more the trends scatter from run to run than the noise has it, as a ratio of variances; its freedom.
+Estimate scatter_of_trends(const std::vector<Angle>& angles) {
+  double squares = 0, freedom = 0;
+  for (const Angle& angle : angles) {
+    if (angle.trends.size() < 2 || !(angle.trend_u > 0)) continue;
+    const double more = static_cast<double>(angle.trends.size() - 1);
+    squares += more * variance(angle.trends) / (angle.trend_u * angle.trend_u);
+    freedom += more;
+  }
+  return {freedom > 0 ? squares / freedom : 1, 0, freedom};
+}
+
+void judge(const Angle& angle, const Estimate& scatter, double share, SpeedDependence& found) {
+  const double runs = static_cast<double>(angle.trends.size());
+  if (runs > 0) {
+    const bool alone = scatter.freedom == 0;
+    found.change = {mean(angle.trends), angle.trend_u * std::sqrt(scatter.value / runs),
+                    alone ? angle.alone_freedom : scatter.freedom};
+    found.trend = student_test(found.change, 0);
+  }
+  if (angle.standardised.size() > 1) found.lack_of_fit = test_levels(angle, share);
+}
+
+}  // namespace
+
+std::vector<SpeedDependence> speed_dependence(std::span<const StepsOfAngle> measured) {
+  std::vector<SpeedDependence> result;
+  std::vector<Angle> angles;
+  std::vector<std::vector<Run>> complete;
+  for (const StepsOfAngle& one : measured) {
+    std::vector<Run> runs = runs_of(one.steps);
+    result.push_back({});
+    result.back().phi_deg = one.phi_deg;
+    result.back().levels = level_coefficients(runs);
+    complete.push_back(complete_levels(runs));
+    const bool testable = result.back().levels.size() > 2;
+    angles.push_back(testable ? prepare(result.back(), std::move(runs), complete.back()) : Angle{});
+  }
+  const Estimate scatter = scatter_of_trends(angles);
+  const double share = independent_share(angles);
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    SpeedDependence& found = result[i];
+    judge(angles[i], scatter, share, found);
+    const bool untested = !found.lack_of_fit.tested() && found.levels.size() > 2;
+    if ((untested || found.depends()) && !complete[i].front().samples.empty())
+      found.inadequacy = inadequacy_of(complete[i]);
+    found.lack_of_fit.statistic = "F";
+    found.lack_of_fit.name = fmt::format("lack of fit of T = k w^2 at phi = {} deg", found.phi_deg);
+    found.lack_of_fit.hypothesis = found.trend.hypothesis = "k does not depend on the speed";
+    found.trend.name = fmt::format("trend of k with the speed at phi = {} deg", found.phi_deg);
+  }
+  return result;
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,54 @@
+// Is T = k ω² true? k level by level, its trend with speed, and the lack-of-fit test against what repetitions scatter.
+// On real propellers k rises by up to a fifth over the speeds of a sweep, far above all noise.
+//
+// All steps of a run share its zero: an error z of it makes T/ω² change by z/ω², which looks like a dependence on the
+// speed. So every run has a zero of its own in these tests, known to within the uncertainty that its steps tell (a
+// pseudo-observation: Theil, Goldberger, Int. Econ. Rev. 2 (1961) 65); where they do not tell, it is free, and what a
+// constant force explains is taken for the zero's. What else neighbouring steps share (slow noise, a zero that wanders)
+// is in how the repetitions differ: the trend is judged by how it scatters from run to run, pooled over all φ, and the
+// lack of fit with degrees of freedom reduced for correlated steps (Box, Ann. Math. Stat. 25 (1954) 484).
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "fit/numerics/hypothesis_test.hpp"
+#include "results/step_mean.hpp"
+
+namespace kphi::fit {
+
+/// k at one commanded speed.
+struct LevelCoefficient {
+  double speed_rad_s = 0;  ///< mean measured
+  double k = 0;            ///< N/(rad/s)², mean of T/ω² over the repetitions
+  double standard_error = std::numeric_limits<double>::quiet_NaN();  ///< s/√n; NaN from one repetition
+  std::size_t repetitions = 0;
+};
+
+struct SpeedDependence {
+  double phi_deg = 0;
+  std::vector<LevelCoefficient> levels;  ///< ascending speed
+  /// Of k from the lowest to the highest speed, as a share of k, by the straight line through T/ω² weighted in ω⁴ and
+  /// by the noise; mean over the runs.
+  Estimate change;
+  /// Level means about k ω² and zero against the interaction of level and repetition: an error that a whole run shares
+  /// (mounting, air) is in neither. From one repetition it cannot be tested.
+  HypothesisTest lack_of_fit;
+  HypothesisTest trend;  ///< change = 0
+  /// Either test at half the level, so that both together call one straight truth in twenty bent.
+  [[nodiscard]] bool depends() const { return lack_of_fit.p < kTestLevel / 2 || trend.p < kTestLevel / 2; }
+  /// Rms deviation of the levels' k from the k of the range, weighted in ω⁴, beyond what noise explains, where k
+  /// depends on the speed; from one repetition with its noise. N/(rad/s)².
+  double inadequacy = 0;
+};
+
+struct StepsOfAngle {
+  double phi_deg = 0;
+  std::span<const results::StepMean> steps;
+};
+
+/// One per φ, in their order. Levels that not every repetition of a φ measured are left out of its lack-of-fit test.
+[[nodiscard]] std::vector<SpeedDependence> speed_dependence(std::span<const StepsOfAngle> angles);
+
+}  // namespace kphi::fit

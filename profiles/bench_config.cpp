@@ -1,0 +1,135 @@
+#include "profiles/bench_config.hpp"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "profiles/profile_reader.hpp"
+
+namespace kphi::profiles {
+namespace {
+
+template <class T>
+std::optional<T> optional(const ProfileReader& file, const std::string& pointer) {
+  return file.has(pointer) ? std::optional<T>(file.get<T>(pointer)) : std::nullopt;
+}
+
+/// A value to be set is also the one expected; another one beside it is a contradiction.
+template <class T>
+void agree(ProfileReader& file, const std::string& key, const std::optional<T>& set, T& expected) {
+  if (!set) return;
+  if (file.has("/netbox/" + key) && expected != *set) {
+    file.refuse("/netbox/settings/" + key, fmt::format("{} contradicts the {} of netbox.{}", *set, expected, key),
+                "write the same, or remove netbox." + key);
+  }
+  expected = *set;
+}
+
+NetBoxConfig read_netbox(ProfileReader& file) {
+  NetBoxConfig config;
+  config.host = file.text("/netbox/host");
+  config.rdt_port = file.get_or("/netbox/rdt_port", config.rdt_port);
+  config.http_port = file.get_or("/netbox/http_port", config.http_port);
+  config.tcp_port = file.get_or("/netbox/tcp_port", static_cast<std::uint16_t>(config.rdt_port - 1));
+  config.rate_hz = file.get_or("/netbox/rate_hz", config.rate_hz);
+  config.records_per_datagram = file.get_or("/netbox/records_per_datagram", config.records_per_datagram);
+  config.settings = {
+      optional<double>(file, "/netbox/settings/rate_hz"), optional<int>(file, "/netbox/settings/records_per_datagram"),
+      optional<int>(file, "/netbox/settings/filter_hz"), optional<int>(file, "/netbox/settings/configuration")};
+  agree(file, "rate_hz", config.settings.rate_hz, config.rate_hz);
+  agree(file, "records_per_datagram", config.settings.records_per_datagram, config.records_per_datagram);
+  return config;
+}
+
+ClockGain read_clock_gain(const ProfileReader& file) {
+  ClockGain gain;
+  gain.factor = file.number("/iq/clock_gain/factor");
+  gain.u_factor = file.number("/iq/clock_gain/u");
+  gain.uid = file.get_or("/iq/clock_gain/uid", gain.uid);
+  gain.measured_utc = file.get_or("/iq/clock_gain/measured_utc", gain.measured_utc);
+  return gain;
+}
+
+MotorConfig read_motor(const ProfileReader& file, const std::filesystem::path& folder) {
+  MotorConfig config;
+  config.device = file.text("/iq/device");
+  config.baud = file.get_or("/iq/baud", config.baud);
+  config.module_id = file.get_or("/iq/module_id", config.module_id);
+  config.spin = file.get_or("/iq/spin", config.spin);
+  config.telemetry_hz = file.get_or("/iq/telemetry_hz", config.telemetry_hz);
+  config.speed_max = from_rpm(file.number("/iq/speed_max_rpm"));
+  if (file.has("/iq/clock_gain")) config.clock_gain = read_clock_gain(file);
+  if (file.has("/iq/capture")) config.capture = (folder / file.text("/iq/capture")).string();
+  return config;
+}
+
+SupplyConfig read_supply(ProfileReader& file) {
+  const SupplyConfig config{file.text("/supply/uri"), Volts(file.number("/supply/voltage_v")),
+                            Amperes(file.number("/supply/current_limit_a")),
+                            Volts(file.number("/supply/over_voltage_v")),
+                            Amperes(file.number("/supply/over_current_a"))};
+  if (!(config.over_voltage.value() > config.voltage.value())) {
+    file.refuse(
+        "/supply/over_voltage_v",
+        fmt::format("{:g} V is not above the {:g} V of voltage_v", config.over_voltage.value(), config.voltage.value()),
+        "write more: it would switch off at once");
+  }
+  if (config.over_current.value() < config.current_limit.value()) {
+    file.refuse("/supply/over_current_a",
+                fmt::format("{:g} A is below the {:g} A of current_limit_a", config.over_current.value(),
+                            config.current_limit.value()),
+                "write that or more");
+  }
+  return config;
+}
+
+AmbientConfig read_ambient(const ProfileReader& file) {
+  if (!file.has("/ambient/manual")) {
+    const std::string sensor = file.text("/ambient");
+    return {sensor == "unknown" ? "" : sensor, std::nullopt};
+  }
+  const auto value = [&](const char* key) { return file.number(std::string("/ambient/manual/") + key); };
+  return {"", ManualAir{value("temperature_c"), value("pressure_pa"), value("relative_humidity"),
+                        value("u_temperature_c"), value("u_pressure_pa"), value("u_relative_humidity")}};
+}
+
+Simulation read_simulation(ProfileReader& file, const std::filesystem::path& folder) {
+  Simulation simulation;
+  simulation.in_process = file.get_or("/simulation/in_process", simulation.in_process);
+  simulation.time_scale = file.get_or("/simulation/time_scale", simulation.time_scale);
+  simulation.seed = file.get_or("/simulation/seed", simulation.seed);
+  simulation.control = file.get_or("/simulation/control", simulation.control);
+  if (file.has("/simulation/faults")) simulation.faults = (folder / file.text("/simulation/faults")).string();
+  if (file.has("/simulation/motor")) simulation.motor = (folder / file.text("/simulation/motor")).string();
+  simulation.durable = file.get_or("/simulation/durable", simulation.durable);
+  simulation.air_density_kg_m3 = file.get_or("/simulation/air_density_kg_m3", simulation.air_density_kg_m3);
+  if (!simulation.in_process && simulation.control.empty()) {
+    file.refuse("/simulation", "control is missing", "add control: a path for the socket, or in_process: true");
+  }
+  return simulation;
+}
+
+}  // namespace
+
+BenchConfig parse_bench(const std::string& text, const std::string& path) {
+  ProfileReader file(text, path, FileKind::bench);
+  BenchConfig bench;
+  bench.name = file.text("/name");
+  bench.netbox = read_netbox(file);
+  bench.iq = read_motor(file, std::filesystem::path(path).parent_path());
+  const std::string axis = file.text("/thrust_axis");  // "+Fz"
+  bench.thrust_sign = axis[0] == '-' ? -1 : +1;
+  bench.thrust_axis = axis[2] - 'x';
+  if (file.has("/supply")) bench.supply = read_supply(file);
+  bench.supply_sinks_current = file.get_or("/supply_sinks_current", bench.supply_sinks_current);
+  if (file.has("/ambient")) bench.ambient = read_ambient(file);
+  if (file.has("/simulation")) bench.simulation = read_simulation(file, std::filesystem::path(path).parent_path());
+  bench.text = text;
+  bench.path = path;
+  file.finish();
+  return bench;
+}
+
+BenchConfig load_bench(const std::string& path) { return parse_bench(read_text(path), path); }
+
+}  // namespace kphi::profiles

@@ -1,0 +1,252 @@
+#include "results/reduction/cell_stream.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <span>
+#include <utility>
+
+namespace kphi::results {
+namespace {
+
+using Counts = std::array<std::int32_t, 6>;
+
+constexpr std::uint32_t kMonitorBit = 1u << 16;  // a condition the user set; raises the summary bit, too
+constexpr std::uint32_t kSummaryBit = 1u << 31;
+
+CountSums wide_sums(std::span<const Counts> counts, std::size_t axis, std::int32_t origin) {
+  CountSums sums;
+  for (const Counts& c : counts) {
+    const std::int64_t difference = static_cast<std::int64_t>(c[axis]) - origin;
+    sums.sum += difference;
+    sums.squares += static_cast<Wide>(difference) * difference;
+  }
+  return sums;
+}
+
+/// Of so few or so small differences that their squares fit into 64 bits together.
+CountSums sums_of(std::span<const Counts> counts, std::size_t axis, std::int32_t origin) {
+  std::int64_t sum = 0, squares = 0;
+  for (const Counts& c : counts) {
+    const std::int64_t difference = static_cast<std::int64_t>(c[axis]) - origin;
+    sum += difference;
+    squares += difference * difference;
+  }
+  return {sum, squares};
+}
+
+/// Whether the squares of `n` differences between counts inside their limit and an origin fit into 64 bits together.
+bool fit(std::size_t n, std::int32_t limit, std::int32_t origin) {
+  const Wide farthest = static_cast<Wide>(limit) + std::abs(static_cast<std::int64_t>(origin));
+  return farthest * farthest * static_cast<Wide>(n) <= std::numeric_limits<std::int64_t>::max();
+}
+
+bool reach(std::span<const Counts> counts, const Counts& limits) {
+  // Two records at a time: twelve numbers side by side, in whole vector registers.
+  std::array<std::int32_t, 12> found{}, high{}, low{};
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    high[i] = limits[i % 6] - 1;
+    low[i] = 1 - limits[i % 6];
+  }
+  const std::int32_t* at = counts.empty() ? nullptr : counts.front().data();
+  for (std::size_t pair = 0; pair < counts.size() / 2; ++pair, at += found.size()) {
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      found[i] |= -static_cast<std::int32_t>(at[i] > high[i]) | -static_cast<std::int32_t>(at[i] < low[i]);
+    }
+  }
+  std::int32_t any = 0;
+  for (const std::int32_t one : found) any |= one;
+  if (counts.size() % 2 == 1) {
+    for (std::size_t i = 0; i < 6; ++i) {
+      any |=
+          static_cast<std::int32_t>(counts.back()[i] > high[i]) | static_cast<std::int32_t>(counts.back()[i] < low[i]);
+    }
+  }
+  return any != 0;
+}
+
+std::uint32_t bits_of(std::span<const std::uint32_t> status) {
+  std::uint32_t bits = 0;
+  for (const std::uint32_t word : status) bits |= word == (kSummaryBit | kMonitorBit) ? 0u : word;
+  return bits;
+}
+
+constexpr Nanoseconds kBin = 10'000'000;
+constexpr double kLeastSamplesPerBin = 2;
+constexpr std::size_t kBlock = 1024;  // records looked at together
+
+CountMean mean_of(const CountSums& sums, std::int32_t origin, std::uint64_t samples) {
+  if (samples == 0) return {std::numeric_limits<double>::quiet_NaN(), 0};
+  const double n = static_cast<double>(samples);
+  const double mean = origin + static_cast<double>(sums.sum) / n;
+  if (samples < 2) return {mean, 0};
+  const Wide spread = sums.squares * static_cast<Wide>(samples) - static_cast<Wide>(sums.sum) * sums.sum;
+  return {mean, std::sqrt(static_cast<double>(spread) / n / (n - 1))};
+}
+
+std::uint32_t stride_of(const RunHeader& header) { return std::max(header.load_cell.ft_stride, 1u); }
+
+/// Where ft_sequence advances by `least` or more.
+std::vector<std::size_t> advances(std::span<const std::uint32_t> ft, std::uint32_t least) {
+  std::vector<std::size_t> found;
+  for (std::size_t begin = 1; begin < ft.size(); begin += kBlock) {
+    const std::size_t end = std::min(begin + kBlock, ft.size());
+    int any = 0;
+    for (std::size_t i = begin; i < end; ++i) any |= static_cast<int>(ft[i] - ft[i - 1] >= least);
+    for (std::size_t i = begin; any != 0 && i < end; ++i) {
+      if (ft[i] - ft[i - 1] >= least) found.push_back(i);
+    }
+  }
+  return found;
+}
+
+CountFrame frame_of(const RunHeader& header) {
+  CountFrame frame;
+  frame.axis = static_cast<std::size_t>(header.thrust_axis);
+  const auto& scale = header.load_cell;
+  for (std::size_t i = 0; i < frame.limits.size(); ++i) {
+    const double counts = scale.range[i] * (i < 3 ? scale.counts_per_newton : scale.counts_per_newton_metre);
+    const double full = std::numeric_limits<std::int32_t>::max();
+    frame.limits[i] = static_cast<std::int32_t>(counts > 0 && counts < full ? counts : full);
+  }
+  return frame;
+}
+
+}  // namespace
+
+void CellBin::add(const LoadCellRows& rows, const CountFrame& frame) {
+  const bool reached = reach(rows.counts, frame.limits);
+  const auto take = [&](std::size_t axis, std::int32_t origin) {
+    const bool near = !reached && fit(rows.counts.size(), frame.limits[axis], origin);
+    return near ? sums_of(rows.counts, axis, origin) : wide_sums(rows.counts, axis, origin);
+  };
+  force.add(take(frame.axis, frame.force_origin));
+  torque.add(take(frame.axis + 3, frame.torque_origin));
+  n += static_cast<std::uint32_t>(rows.counts.size());
+  status |= bits_of(rows.status);
+  at_limit |= reached;
+}
+
+bool CellBin::frozen() const { return n > 1 && force.squares * n == static_cast<Wide>(force.sum) * force.sum; }
+
+double CellBins::Gap::up_to(double time_ns) const {
+  return std::clamp(std::ceil((time_ns - before_ns) / period_ns) - 1, 0.0, static_cast<double>(missing));
+}
+
+Window CellBins::window(std::size_t first, std::size_t last) const {
+  return {begin_ + static_cast<Nanoseconds>(first) * width_, begin_ + static_cast<Nanoseconds>(last) * width_};
+}
+
+std::size_t CellBins::first_from(Nanoseconds time) const {
+  if (time <= begin_) return 0;
+  return std::min(static_cast<std::size_t>((time - begin_ + width_ - 1) / width_), bins_.size());
+}
+
+double CellBins::force(std::size_t bin) const {
+  const CellBin& b = bins_[bin];
+  if (2.0 * b.n < expected_ || b.n == 0) return std::numeric_limits<double>::quiet_NaN();
+  return frame_.force_origin + static_cast<double>(b.force.sum) / b.n;
+}
+
+double CellBins::torque(std::size_t bin) const {
+  const CellBin& b = bins_[bin];
+  if (2.0 * b.n < expected_ || b.n == 0) return std::numeric_limits<double>::quiet_NaN();
+  return frame_.torque_origin + static_cast<double>(b.torque.sum) / b.n;
+}
+
+CellWindow CellBins::over(std::size_t first, std::size_t last) const {
+  CellWindow found;
+  CountSums force, torque;
+  std::size_t frozen_since = first;
+  for (std::size_t i = first; i < last; ++i) {
+    const CellBin& bin = bins_[i];
+    found.n += bin.n;
+    force.add(bin.force);
+    torque.add(bin.torque);
+    found.status |= bin.status;
+    found.at_limit |= bin.at_limit;
+    const bool goes_on =
+        bin.frozen() && (i == frozen_since || bin.force.sum * bins_[i - 1].n == bins_[i - 1].force.sum * bin.n);
+    if (!goes_on) frozen_since = bin.frozen() ? i : i + 1;
+    found.frozen |= static_cast<double>(i + 1 - frozen_since) * bin_s() >= kFrozenSpan;
+  }
+  found.force = mean_of(force, frame_.force_origin, found.n);
+  found.torque = mean_of(torque, frame_.torque_origin, found.n);
+  const Window whole = window(first, last);
+  for (const Gap& gap : gaps_) {
+    found.lost += static_cast<std::uint64_t>(gap.up_to(static_cast<double>(whole.end)) -
+                                             gap.up_to(static_cast<double>(whole.begin)));
+  }
+  return found;
+}
+
+CellStream::CellStream(const RunRecording& run, std::unique_ptr<LoadCellColumns> columns)
+    : header_(run.header),
+      columns_(columns ? std::move(columns) : std::make_unique<RecordedColumns>(run.load_cell)),
+      clock_(*columns_, run.header.load_cell.device_rate_hz, stall_ends(run.events)),
+      gaps_(advances(clock_.ft_sequence(), 2 * stride_of(run.header))),
+      frame_(frame_of(run.header)) {
+  for (const ClockEpoch& epoch : clock_.epochs()) {
+    if (epoch.rebooted) reboots_.push_back(clock_.time_ns(epoch, epoch.begin));
+  }
+}
+
+std::size_t CellStream::boot_at(Nanoseconds time) const {
+  return static_cast<std::size_t>(std::count_if(reboots_.begin(), reboots_.end(), [&](auto t) { return t < time; }));
+}
+
+Window CellStream::since_reboot(Window window) const {
+  for (const Nanoseconds time : reboots_) {
+    if (time < window.end) window.begin = std::max(window.begin, time);
+  }
+  return window;
+}
+
+CellBins CellStream::bins(const Window& window) const {
+  CellBins bins;
+  const double rate = header_.load_cell.sample_rate_hz;
+  const double sparse = rate > 0 ? std::ceil(kLeastSamplesPerBin * 1e9 / rate) : 0;
+  bins.begin_ = window.begin;
+  bins.width_ = std::max(kBin, static_cast<Nanoseconds>(sparse));
+  bins.frame_ = frame_;
+  bins.expected_ = 1e-9 * static_cast<double>(bins.width_) * rate;
+  if (window.end <= window.begin) return bins;
+  bins.bins_.resize(static_cast<std::size_t>((window.end - window.begin) / bins.width_));
+  const Window whole = bins.window(0, bins.size());
+  bool first = true;
+  for (const ClockEpoch& epoch : clock_.epochs()) {
+    const std::size_t begin = clock_.first_at(epoch, whole.begin);
+    const std::size_t end = clock_.first_at(epoch, whole.end);
+    take_gaps(epoch, begin, end, bins);
+    if (begin == end) continue;
+    if (first) {
+      const auto& counts = columns_->rows(begin, begin + 1).counts[0];
+      bins.frame_.force_origin = counts[frame_.axis];
+      bins.frame_.torque_origin = counts[frame_.axis + 3];
+      first = false;
+    }
+    std::size_t from = begin;
+    for (std::size_t i = 0; i < bins.size() && from < end; ++i) {
+      const std::size_t to = clock_.first_at(epoch, bins.window(i, i + 1).end, from, end);
+      bins.bins_[i].add(columns_->rows(from, to), bins.frame_);
+      from = to;
+    }
+  }
+  return bins;
+}
+
+/// Gaps inside the window and across its ends.
+void CellStream::take_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const {
+  const std::size_t from = std::max(begin, epoch.begin + 1);
+  const std::size_t to = std::min(end + 1, epoch.end);
+  for (auto gap = std::lower_bound(gaps_.begin(), gaps_.end(), from); gap != gaps_.end() && *gap < to; ++gap) {
+    const std::size_t i = *gap;
+    const std::uint32_t missing = (clock_.ft_sequence()[i] - clock_.ft_sequence()[i - 1]) / stride_of(header_) - 1;
+    const Nanoseconds before = clock_.time_ns(epoch, i - 1);
+    const double period = static_cast<double>(clock_.time_ns(epoch, i) - before) / (missing + 1.0);
+    bins.gaps_.push_back({static_cast<double>(before), period, missing});
+  }
+}
+
+}  // namespace kphi::results

@@ -1,0 +1,120 @@
+// The load cell of one run, with its samples placed in bench time and summed in bins of equal length. The sums are
+// whole numbers: counts about an origin, and their squares. So any order of adding, any number of threads and any cut
+// into bins gives the same sums, and the same bytes in steps.csv.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "results/load_cell_columns.hpp"
+#include "results/records.hpp"
+#include "results/reduction/clock_map.hpp"
+
+namespace kphi::results {
+
+__extension__ using Wide = __int128;
+
+/// Of one axis, about `origin`.
+struct CountSums {
+  std::int64_t sum = 0;
+  Wide squares = 0;
+  void add(const CountSums& other) {
+    sum += other.sum;
+    squares += other.squares;
+  }
+};
+
+/// What is summed: the thrust axis, the torque about it, and what both are counted from.
+struct CountFrame {
+  std::size_t axis = 2;  ///< 0..2
+  std::int32_t force_origin = 0;
+  std::int32_t torque_origin = 0;
+  std::array<std::int32_t, 6> limits{};  ///< ends of the ranges, counts
+};
+
+struct CellBin {
+  CountSums force, torque;
+  std::uint32_t n = 0;
+  std::uint32_t status = 0;  ///< all set bits, without healthy monitor words
+  bool at_limit = false;     ///< a count of some axis at the end of its range
+  void add(const LoadCellRows& rows, const CountFrame& frame);
+  [[nodiscard]] bool frozen() const;  ///< more than one sample, and no force differs
+};
+
+/// Mean and deviation of one axis, counts; NaN and 0 without samples.
+struct CountMean {
+  double mean = 0;
+  double deviation = 0;
+};
+
+/// What was measured within whole bins.
+struct CellWindow {
+  std::uint64_t n = 0;
+  CountMean force, torque;
+  std::uint64_t lost = 0;
+  std::uint32_t status = 0;
+  bool at_limit = false;
+  bool frozen = false;  ///< it repeated one value for kFrozenSpan
+};
+
+/// Bit for bit the same force and torque for so long is no measurement, s.
+inline constexpr double kFrozenSpan = 0.1;
+
+/// The samples of one window in bins of equal length; the last piece that fills no bin is left out.
+class CellBins {
+ public:
+  [[nodiscard]] std::size_t size() const { return bins_.size(); }
+  [[nodiscard]] double bin_s() const { return 1e-9 * static_cast<double>(width_); }
+  [[nodiscard]] Nanoseconds width() const { return width_; }
+  /// Of bins [first, last).
+  [[nodiscard]] Window window(std::size_t first, std::size_t last) const;
+  /// The first bin that begins at `time` or later; size() when none does.
+  [[nodiscard]] std::size_t first_from(Nanoseconds time) const;
+  /// Mean counts of the force; NaN of a bin that holds less than half of its samples.
+  [[nodiscard]] double force(std::size_t bin) const;
+  [[nodiscard]] double torque(std::size_t bin) const;
+  [[nodiscard]] CellWindow over(std::size_t first, std::size_t last) const;
+
+ private:
+  friend class CellStream;
+  /// Records that ft_sequence says are missing between two others: at before + k · period, k = 1…missing.
+  struct Gap {
+    double before_ns = 0;
+    double period_ns = 0;
+    std::uint32_t missing = 0;
+    [[nodiscard]] double up_to(double time_ns) const;
+  };
+  Nanoseconds begin_ = 0;
+  Nanoseconds width_ = 1;
+  double expected_ = 0;  ///< samples per bin
+  CountFrame frame_;
+  std::vector<CellBin> bins_;
+  std::vector<Gap> gaps_;
+};
+
+class CellStream {
+ public:
+  /// The recording must outlive the stream. Without `columns` its records are taken.
+  explicit CellStream(const RunRecording& run, std::unique_ptr<LoadCellColumns> columns = nullptr);
+
+  /// How often the box had started anew before `time`.
+  [[nodiscard]] std::size_t boot_at(Nanoseconds time) const;
+  /// The part of a window after the last restart of the box in it.
+  [[nodiscard]] Window since_reboot(Window window) const;
+  [[nodiscard]] CellBins bins(const Window& window) const;
+
+ private:
+  void take_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const;
+
+  const RunHeader& header_;
+  std::unique_ptr<LoadCellColumns> columns_;
+  ClockMap clock_;
+  std::vector<std::size_t> gaps_;  ///< records before which ft_sequence says that others are missing
+  std::vector<Nanoseconds> reboots_;
+  CountFrame frame_;
+};
+
+}  // namespace kphi::results

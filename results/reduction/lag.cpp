@@ -1,0 +1,347 @@
+#include "results/reduction/lag.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace kphi::results {
+namespace {
+
+constexpr double kLongest = 0.6;      // s, of delay and time constant
+constexpr double kEarliest = -0.05;   // s, delay
+constexpr double kGrid = 0.04;        // s
+constexpr double kConcerned = 1.2;    // s after the command: what comes later tells nothing about the lag
+constexpr double kHistory = 0.3;      // s before it, in which the smoothing forgets where it began
+constexpr double kDerivative = 1e-3;  // s
+constexpr double kConverged = 5e-5;   // s
+constexpr int kIterations = 25;
+constexpr std::size_t kFewSteps = 3;
+constexpr double kFewToldBy = 1.5;  // steps, by what they tell
+constexpr double kTold = 2;         // standard uncertainties from which on a smoothing is one
+
+/// One reading of ω², the integral up to it, and the slope to the next one; 0 behind the last.
+struct Knot {
+  double time, value, integral = 0, slope = 0;
+};
+
+std::vector<Knot> knots_of(std::span<const SquaredSpeed> readings) {
+  std::vector<Knot> knots;
+  knots.reserve(readings.size());
+  for (const SquaredSpeed& reading : readings) {
+    Knot knot{reading.time_s, reading.value};
+    if (!knots.empty()) {
+      Knot& last = knots.back();
+      knot.integral = last.integral + 0.5 * (last.value + knot.value) * (knot.time - last.time);
+      last.slope = (knot.value - last.value) / (knot.time - last.time);
+    }
+    knots.push_back(knot);
+  }
+  return knots;
+}
+
+/// A change of speed as it is looked at again and again.
+struct Prepared {
+  explicit Prepared(const Transition& t) : transition(t), knots(knots_of(t.squared)) {}
+  const Transition& transition;
+  std::vector<Knot> knots;
+};
+
+/// The integral of ω² between its readings, which are joined by lines.
+class Integral {
+ public:
+  explicit Integral(std::span<const Knot> knots) : knots_(knots) {}
+
+  struct Point {
+    double integral, value;
+  };
+  /// For times that ascend from call to call.
+  Point at(double time) {
+    if (time <= knots_.front().time) {
+      return {(time - knots_.front().time) * knots_.front().value, knots_.front().value};
+    }
+    while (next_ < knots_.size() && knots_[next_].time <= time) ++next_;
+    const Knot& knot = knots_[next_ - 1];
+    const double since = time - knot.time;
+    if (next_ == knots_.size()) return {knot.integral + since * knot.value, knot.value};
+    return {knot.integral + since * (knot.value + 0.5 * knot.slope * since), knot.value + knot.slope * since};
+  }
+
+ private:
+  std::span<const Knot> knots_;
+  std::size_t next_ = 1;
+};
+
+/// First-order smoothing of bin means: the input holds within a bin.
+class Smoothing {
+ public:
+  Smoothing(double tau_s, double bin_s) {
+    if (tau_s < 1e-6) return;
+    decay_ = std::exp(-bin_s / tau_s);
+    share_ = tau_s / bin_s * (1 - decay_);
+  }
+  void start(double value) { state_ = value; }
+  double operator()(double value) {
+    const double away = state_ - value;
+    state_ = value + away * decay_;
+    return value + away * share_;
+  }
+
+ private:
+  double state_ = 0, decay_ = 0, share_ = 0;
+};
+
+/// Mean delay and smoothing, s.
+using Shape = std::array<double, 2>;
+
+/// Least squares of one step: what is left, how it changes with the shape.
+struct Misfit {
+  double squares = 0;
+  double bins = 0;
+  Shape gradient{};                   ///< half of that of the squares, downhill
+  std::array<double, 3> curvature{};  ///< dd, ds, ss
+};
+
+struct Sums {
+  double n = 0;
+  std::array<double, 4> sum{};       ///< y, x, xd, xs
+  std::array<double, 10> product{};  ///< upper triangle
+  void add(const std::array<double, 4>& v) {
+    n += 1;
+    std::size_t k = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      sum[i] += v[i];
+      for (std::size_t j = i; j < 4; ++j) product[k++] += v[i] * v[j];
+    }
+  }
+  [[nodiscard]] double centred(std::size_t i, std::size_t j) const {
+    const std::size_t k = i * 4 - i * (i + 1) / 2 + j;
+    return product[k] - sum[i] * sum[j] / n;
+  }
+};
+
+std::ptrdiff_t bins_before(const Transition& transition) {
+  return static_cast<std::ptrdiff_t>(transition.before.size());
+}
+
+std::ptrdiff_t concerned(const Transition& transition) {
+  return std::min(static_cast<std::ptrdiff_t>(transition.thrust.size()),
+                  static_cast<std::ptrdiff_t>(kConcerned / transition.bin_s));
+}
+
+/// Of a bin counted from the command.
+double thrust_in(const Transition& transition, std::ptrdiff_t bin) {
+  return bin < 0 ? transition.before[static_cast<std::size_t>(bin + bins_before(transition))]
+                 : transition.thrust[static_cast<std::size_t>(bin)];
+}
+
+template <class Each>
+void for_each_bin(const Prepared& prepared, const Shape& shape, std::ptrdiff_t bins, Each&& each) {
+  const Transition& transition = prepared.transition;
+  const double h = transition.bin_s;
+  const double delay = shape[0] - shape[1];
+  Integral integral(prepared.knots);
+  Smoothing value(shape[1], h), slope(shape[1], h), value_on(shape[1] + kDerivative, h);
+  const std::ptrdiff_t first = -bins_before(transition);
+  const std::ptrdiff_t history = static_cast<std::ptrdiff_t>(kHistory / h) - first;
+  auto left = integral.at(-static_cast<double>(history) * h - delay);
+  value.start(left.value);
+  value_on.start(left.value);
+  slope.start(0);
+  for (std::ptrdiff_t i = -history; i < bins; ++i) {
+    const auto right = integral.at(static_cast<double>(i + 1) * h - delay);
+    const double mean = (right.integral - left.integral) / h;
+    const double later = -(right.value - left.value) / h;
+    left = right;
+    const double x = value(mean);
+    const double x_delay = slope(later);
+    const double x_smooth = (value_on(mean) - x) / kDerivative - x_delay;
+    if (i >= first) each(i, x, x_delay, x_smooth);
+  }
+}
+
+Misfit misfit_of(const Prepared& prepared, const Shape& shape) {
+  const Transition& transition = prepared.transition;
+  Sums sums;
+  // About their levels, or the digits are spent on these.
+  const double thrust = transition.thrust.front(), squared = transition.squared.front().value;
+  for_each_bin(prepared, shape, concerned(transition),
+               [&](std::ptrdiff_t i, double x, double x_delay, double x_smooth) {
+                 const double y = thrust_in(transition, i);
+                 if (!std::isnan(y)) sums.add({y - (std::isnan(thrust) ? 0 : thrust), x - squared, x_delay, x_smooth});
+               });
+  Misfit misfit;
+  const double yy = sums.centred(0, 0), xx = sums.centred(1, 1), xy = sums.centred(0, 1);
+  if (sums.n < 4) return misfit;
+  misfit.bins = sums.n - 2;
+  const double b = xx > 0 ? xy / xx : 0;
+  if (!(b > 0)) {
+    misfit.squares = yy;
+    return misfit;
+  }
+  misfit.squares = yy - b * xy;
+  const auto projected = [&](std::size_t i, std::size_t j) {
+    return sums.centred(i, j) - sums.centred(1, i) * sums.centred(1, j) / xx;
+  };
+  for (std::size_t i = 0; i < 2; ++i) misfit.gradient[i] = b * (sums.centred(0, i + 2) - b * sums.centred(1, i + 2));
+  misfit.curvature = {b * b * projected(2, 2), b * b * projected(2, 3), b * b * projected(3, 3)};
+  return misfit;
+}
+
+struct Total {
+  Misfit sum;
+  std::array<double, 3> scatter{};  ///< of the gradients
+  double weights = 0, squared_weights = 0;
+  /// Steps, by what they tell about the delay.
+  [[nodiscard]] double steps() const { return squared_weights > 0 ? weights * weights / squared_weights : 0; }
+};
+
+Total misfits(std::span<const Prepared> transitions, const Shape& shape) {
+  Total total;
+  for (const Prepared& transition : transitions) {
+    const Misfit one = misfit_of(transition, shape);
+    total.sum.squares += one.squares;
+    total.sum.bins += one.bins;
+    for (std::size_t i = 0; i < 2; ++i) total.sum.gradient[i] += one.gradient[i];
+    for (std::size_t i = 0; i < 3; ++i) total.sum.curvature[i] += one.curvature[i];
+    total.scatter[0] += one.gradient[0] * one.gradient[0];
+    total.scatter[1] += one.gradient[0] * one.gradient[1];
+    total.scatter[2] += one.gradient[1] * one.gradient[1];
+    total.weights += one.curvature[0];
+    total.squared_weights += one.curvature[0] * one.curvature[0];
+  }
+  return total;
+}
+
+Shape clamped(const Shape& shape) {
+  const double smoothing = std::clamp(shape[1], 0.0, kLongest);
+  return {std::clamp(shape[0], kEarliest + smoothing, kLongest + smoothing), smoothing};
+}
+
+/// Gauss-Newton step with Marquardt's damping; at the edge of no smoothing only the delay moves.
+Shape step_of(const Misfit& m, const Shape& at, double damping, bool held) {
+  const double dd = m.curvature[0] * (1 + damping), ds = m.curvature[1], ss = m.curvature[2] * (1 + damping);
+  const double det = dd * ss - ds * ds;
+  if (!held && det > 1e-9 * dd * ss) {
+    const Shape step{(ss * m.gradient[0] - ds * m.gradient[1]) / det, (dd * m.gradient[1] - ds * m.gradient[0]) / det};
+    if (at[1] + step[1] >= 0) return step;
+    return {(m.gradient[0] + ds * at[1]) / dd, -at[1]};
+  }
+  return {dd > 0 ? m.gradient[0] / dd : 0, 0};
+}
+
+/// What a delay without smoothing leaves.
+double squares_at(const Prepared& prepared, double delay) {
+  const Transition& transition = prepared.transition;
+  Integral integral(prepared.knots);
+  const double h = transition.bin_s;
+  const double thrust = transition.thrust.front(), squared = transition.squared.front().value;
+  double n = 0, y = 0, x = 0, yy = 0, xx = 0, xy = 0;
+  const std::ptrdiff_t first = -bins_before(transition), last = concerned(transition);
+  auto left = integral.at(static_cast<double>(first) * h - delay);
+  for (std::ptrdiff_t i = first; i < last; ++i) {
+    const auto right = integral.at(static_cast<double>(i + 1) * h - delay);
+    const double q = (right.integral - left.integral) / h - squared;
+    const double t = thrust_in(transition, i) - (std::isnan(thrust) ? 0 : thrust);
+    left = right;
+    if (std::isnan(t)) continue;
+    n += 1;
+    y += t;
+    x += q;
+    yy += t * t;
+    xx += q * q;
+    xy += t * q;
+  }
+  if (n < 4) return 0;
+  const double sxx = xx - x * x / n, sxy = xy - x * y / n;
+  return yy - y * y / n - (sxy > 0 && sxx > 0 ? sxy * sxy / sxx : 0);
+}
+
+double best_of_grid(std::span<const Prepared> transitions) {
+  double best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (double delay = kEarliest + kGrid; delay < kLongest; delay += kGrid) {
+    double squares = 0;
+    for (const Prepared& transition : transitions) squares += squares_at(transition, delay);
+    if (squares >= least) continue;
+    least = squares;
+    best = delay;
+  }
+  return best;
+}
+
+/// Standard uncertainties of mean delay and smoothing: from the residuals, and from how the steps disagree (sandwich),
+/// which few steps cannot tell alone. Only of the delay when the smoothing is held.
+Shape uncertainties(const Total& total, bool held) {
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  const double n = total.steps();
+  const auto& h = total.sum.curvature;
+  const auto& g = total.scatter;
+  if (n < kFewToldBy || !(h[0] > 0)) return {kUnknown, kUnknown};
+  const double spare = n / std::max(n - (held ? 1 : 2), 0.5);
+  const double noise = total.sum.squares / std::max(total.sum.bins, 1.0);
+  if (held) return {std::sqrt(spare * g[0] / (h[0] * h[0]) + noise / h[0]), kUnknown};
+  const double det = h[0] * h[2] - h[1] * h[1];
+  const double a = h[2] / det, b = -h[1] / det, c = h[0] / det;
+  return {std::sqrt(spare * (a * a * g[0] + 2 * a * b * g[1] + b * b * g[2]) + noise * a),
+          std::sqrt(spare * (b * b * g[0] + 2 * b * c * g[1] + c * c * g[2]) + noise * c)};
+}
+
+struct Fitted {
+  Shape shape;
+  Total total;
+};
+
+/// Least squares from `shape` on; `held`: without smoothing.
+Fitted fitted(std::span<const Prepared> transitions, Shape shape, bool held) {
+  Total now = misfits(transitions, shape);
+  double damping = 1e-3;
+  for (int i = 0; i < kIterations; ++i) {
+    const Shape step = step_of(now.sum, shape, damping, held);
+    const Shape next = clamped({shape[0] + step[0], shape[1] + step[1]});
+    const double moved = std::max(std::abs(next[0] - shape[0]), std::abs(next[1] - shape[1]));
+    const Total then = misfits(transitions, next);
+    if (then.sum.squares <= now.sum.squares) {
+      shape = next;
+      now = then;
+      damping *= 0.2;
+    } else {
+      damping = std::max(damping * 10, 1e-4);
+    }
+    if (moved < kConverged) break;
+  }
+  return {shape, now};
+}
+
+}  // namespace
+
+Lag estimate_lag(std::span<const Transition> transitions) {
+  std::vector<Prepared> usable;
+  for (const Transition& transition : transitions) {
+    if (transition.squared.size() > 2 && !transition.thrust.empty()) usable.emplace_back(transition);
+  }
+  if (usable.size() < kFewSteps) return {};
+  Fitted best = fitted(usable, {best_of_grid(usable), 0}, true);
+  Shape u = uncertainties(best.total, true);
+  // A first guess of half the delay: at none the two look alike.
+  const Fitted smooth = fitted(usable, {best.shape[0], std::max(0.5 * best.shape[0], 0.0)}, false);
+  const Shape u_smooth = uncertainties(smooth.total, false);
+  if (smooth.shape[1] > kTold * u_smooth[1]) {
+    best = smooth;
+    u = u_smooth;
+  }
+  const double delay = best.shape[0] - best.shape[1];
+  const bool at_edge = delay <= kEarliest || delay >= kLongest || best.shape[1] >= kLongest;
+  return {best.shape[0], at_edge ? std::numeric_limits<double>::quiet_NaN() : u[0], best.shape[1]};
+}
+
+std::vector<double> delayed(const Transition& transition, const Lag& lag) {
+  std::vector<double> squared(transition.thrust.size());
+  if (transition.squared.size() < 2) return std::vector<double>(squared.size(), std::nan(""));
+  for_each_bin(Prepared(transition), {lag.seconds, lag.smoothing}, static_cast<std::ptrdiff_t>(squared.size()),
+               [&](std::ptrdiff_t i, double x, double, double) {
+                 if (i >= 0) squared[static_cast<std::size_t>(i)] = x;
+               });
+  return squared;
+}
+
+}  // namespace kphi::results

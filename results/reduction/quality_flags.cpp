@@ -1,0 +1,180 @@
+#include "results/reduction/quality_flags.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace kphi::results {
+namespace {
+
+constexpr std::uint32_t kMonitorBit = 1u << 16;  // a condition the user set; raises the summary bit, too
+constexpr std::uint32_t kSummaryBit = 1u << 31;
+constexpr double kSpeedShare = 0.01;   // of the command
+constexpr double kSpeedReached = 2.0;  // rad/s
+constexpr double kSpeedSteady = 5.0;   // rad/s
+constexpr double kFewSamples = 0.1;    // of those expected
+// Of the window's: a restart of the box leaves a gap that ft_sequence does not show.
+constexpr double kMostSamples = 0.9;
+constexpr std::uint64_t kFewSpeeds = 3;
+
+class Bits {
+ public:
+  void note(QualityFlag flag, bool applies) { bits_ |= applies ? static_cast<std::uint32_t>(flag) : 0u; }
+  [[nodiscard]] std::uint32_t all() const { return bits_; }
+
+ private:
+  std::uint32_t bits_ = 0;
+};
+
+/// The speed's window ends a lag earlier than the thrust's: what happens to the rotor between the two is in neither
+/// mean, but already in the thrust.
+bool leaves_at_the_end(const StepEvidence& step, const MotorSeries& motor) {
+  const double steady = 3 * std::max(kSpeedShare * std::abs(step.speed.mean), kSpeedSteady);
+  const auto late = motor.over(MotorChannel::speed, {step.motor_window.end, step.window.end});
+  return std::any_of(late.begin(), late.end(), [&](const MotorReading& reading) {
+    return !(std::abs(std::abs(reading.value) - std::abs(step.speed.mean)) <= steady);
+  });
+}
+
+void judge_speed(const StepEvidence& step, const MotorSeries& motor, Bits& bits) {
+  // Without a single reading nobody knows: that is "not reached", too.
+  bits.note(QualityFlag::speed_not_reached,
+            !(std::abs(step.speed.mean - step.commanded_rad_s) <= speed_tolerance(step.commanded_rad_s)));
+  bits.note(QualityFlag::speed_unsteady,
+            step.speed.deviation > std::max(kSpeedShare * std::abs(step.speed.mean), kSpeedSteady) ||
+                leaves_at_the_end(step, motor));
+  bits.note(QualityFlag::speed_glitch, motor.glitches(step.motor_window) > 0);
+  bits.note(QualityFlag::frozen, motor.speed_frozen(step.motor_window));
+  bits.note(QualityFlag::derated, motor.statistics(MotorChannel::derate, step.motor_window).least < 1);
+}
+
+void judge_cell(const StepEvidence& step, const LoadCellScale& scale, Bits& bits) {
+  const CellWindow& cell = step.cell;
+  const double n = static_cast<double>(cell.n);
+  const double rate_hz = scale.sample_rate_hz;
+  const bool saturated = (cell.status & scale.saturation_bits) != 0;
+  bits.note(QualityFlag::saturated, saturated || cell.at_limit);
+  bits.note(QualityFlag::lost_samples, cell.lost > 0 || n < kMostSamples * step.window.seconds() * rate_hz);
+  bits.note(QualityFlag::few_samples,
+            n < kFewSamples * std::max(step.planned_s, 0.0) * rate_hz || cell.n == 0 || step.speed.n < kFewSpeeds);
+  bits.note(QualityFlag::frozen, cell.frozen);
+  const std::uint32_t others = cell.status & ~(scale.saturation_bits | kMonitorBit);
+  bits.note(QualityFlag::bad_status, (others & ~kSummaryBit) != 0 || (others != 0 && !saturated));
+}
+
+/// Written so that NaN is never good.
+void judge_module(const RunHeader& header, const MotorSeries& motor, const Window& window, Bits& bits) {
+  const auto note_unless = [&](QualityFlag flag, MotorChannel channel, auto&& good) {
+    const auto readings = motor.over(channel, window);
+    bits.note(flag, !std::all_of(readings.begin(), readings.end(), [&](const auto& r) { return good(r.value); }));
+  };
+  note_unless(QualityFlag::drive_saturated, MotorChannel::drive_pwm,
+              [](double pwm) { return std::abs(pwm) < kFullDrive; });
+  note_unless(QualityFlag::motor_fault, MotorChannel::fault_now, [](double fault) { return fault == 0; });
+  if (const double volts = header.supply_voltage_v; volts > 0) {
+    note_unless(QualityFlag::supply_out_of_band, MotorChannel::supply_voltage,
+                [&](double v) { return v >= (1 - kSupplyBand) * volts && v <= (1 + kSupplyBand) * volts; });
+  }
+  if (const double limit = header.coil_temperature_max_degc; limit > 0) {
+    note_unless(QualityFlag::coil_hot, MotorChannel::coil_temperature, [&](double degc) { return degc < limit; });
+  }
+}
+
+constexpr Nanoseconds kSinceEver = std::numeric_limits<Nanoseconds>::min();
+constexpr Nanoseconds kForEver = std::numeric_limits<Nanoseconds>::max();
+
+enum class Concerns : std::uint8_t { instant, until_it_ends, whole_run };
+
+struct Meaning {
+  EventKind kind;
+  QualityFlag flag;
+  Concerns concerns;
+  EventKind end{};  ///< of what lasts until it ends
+};
+
+constexpr Meaning kMeanings[] = {
+    {EventKind::restarted, QualityFlag::stream_restarted, Concerns::instant},
+    {EventKind::stalled, QualityFlag::stalled, Concerns::until_it_ends, EventKind::stall_ended},
+    {EventKind::silent, QualityFlag::silent, Concerns::until_it_ends, EventKind::resumed},
+    {EventKind::box_trouble, QualityFlag::box_trouble, Concerns::instant},
+    {EventKind::taken_over, QualityFlag::taken_over, Concerns::until_it_ends, EventKind::resumed},
+    // The box is read at times; nobody knows when between two readings it was set otherwise.
+    {EventKind::unusable, QualityFlag::configuration_changed, Concerns::whole_run},
+    {EventKind::configuration_changed, QualityFlag::configuration_changed, Concerns::whole_run},
+    {EventKind::motor_reset, QualityFlag::motor_reset, Concerns::instant},
+    {EventKind::motor_connected, QualityFlag::motor_lost, Concerns::instant},
+    {EventKind::motor_no_answer, QualityFlag::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_silent, QualityFlag::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_coast_denied, QualityFlag::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_lease_expired, QualityFlag::motor_lost, Concerns::instant},
+    {EventKind::motor_port_lost, QualityFlag::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_another_module, QualityFlag::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_host_absent, QualityFlag::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_let_go, QualityFlag::motor_lost, Concerns::until_it_ends, EventKind::motor_connected},
+    {EventKind::motor_slow_round_trip, QualityFlag::slow_round_trip, Concerns::until_it_ends,
+     EventKind::motor_slow_round_trip},
+};
+
+Nanoseconds end_of(const Meaning& meaning, std::span<const StreamEvent> later, Nanoseconds begin) {
+  if (meaning.concerns == Concerns::instant) return begin;
+  if (meaning.concerns == Concerns::whole_run) return kForEver;
+  for (const StreamEvent& event : later) {
+    if (event.kind == meaning.end) return event.time_ns;
+  }
+  return kForEver;
+}
+
+}  // namespace
+
+double speed_tolerance(double commanded_rad_s) { return std::max(kSpeedShare * commanded_rad_s, kSpeedReached); }
+
+std::uint32_t step_flags(const RunHeader& header, const MotorSeries& motor, const StepEvidence& step) {
+  Bits bits;
+  judge_speed(step, motor, bits);
+  judge_cell(step, header.load_cell, bits);
+  judge_module(header, motor, step.motor_window, bits);
+  return bits.all();
+}
+
+std::span<const SupplyReading> within(std::span<const SupplyReading> readings, const Window& window) {
+  const auto at = [&](Nanoseconds time) {
+    return std::partition_point(readings.begin(), readings.end(), [&](const auto& r) { return r.time_ns < time; });
+  };
+  const auto first = at(window.begin);
+  return {first, std::max(first, at(window.end))};
+}
+
+std::uint32_t supply_flags(std::span<const SupplyReading> readings, bool settled) {
+  Bits bits;
+  for (const SupplyReading& seen : readings) {
+    bits.note(QualityFlag::supply_off, seen.output == 0 || seen.protection != SupplyProtection::none);
+    if (!settled) continue;
+    bits.note(QualityFlag::supply_limited, seen.regulation == SupplyRegulation::constant_current);
+    bits.note(QualityFlag::supply_sag, !(seen.voltage_v >= (1 - kSupplySag) * seen.set_voltage_v));
+    bits.note(QualityFlag::supply_rise, seen.voltage_v > (1 + kSupplyRise) * seen.set_voltage_v);
+  }
+  return bits.all();
+}
+
+std::vector<FlagSpan> flag_spans(std::span<const StreamEvent> events) {
+  std::vector<FlagSpan> spans;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    for (const Meaning& meaning : kMeanings) {
+      if (meaning.kind != events[i].kind) continue;
+      const Nanoseconds begin = events[i].time_ns;
+      spans.push_back({meaning.concerns == Concerns::whole_run ? kSinceEver : begin,
+                       end_of(meaning, events.subspan(i + 1), begin), meaning.flag});
+    }
+  }
+  return spans;
+}
+
+std::uint32_t flags_within(std::span<const FlagSpan> spans, Nanoseconds begin, Nanoseconds end) {
+  std::uint32_t bits = 0;
+  for (const FlagSpan& span : spans) {
+    if (span.begin < end && span.end >= begin) bits |= static_cast<std::uint32_t>(span.flag);
+  }
+  return bits;
+}
+
+}  // namespace kphi::results

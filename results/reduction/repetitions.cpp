@@ -1,0 +1,419 @@
+#include "results/reduction/repetitions.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/math/distributions/fisher_f.hpp>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <tuple>
+
+#include "compensation/units.hpp"
+
+namespace kphi::results {
+namespace {
+using Group = std::vector<const StepMean*>;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+constexpr double StepMean::*kMeans[] = {
+    &StepMean::commanded_speed_rad_s,
+    &StepMean::thrust_n,
+    &StepMean::torque_nm,
+    &StepMean::zero_n,
+    &StepMean::supply_voltage_v,
+    &StepMean::supply_current_a,
+    &StepMean::motor_current_a,
+    &StepMean::window_begin_s,
+    &StepMean::coil_temperature_degc,
+    &StepMean::window_end_s,
+    &StepMean::supply_v,
+    &StepMean::supply_a,
+    &StepMean::supply_w,
+    &StepMean::air_density_kg_m3,
+    &StepMean::air_density_u_kg_m3,
+    &StepMean::discarded_s,
+    &StepMean::zero_moved_n,
+    &StepMean::lag_s,
+};
+constexpr double StepMean::*kRootMeanSquares[] = {&StepMean::speed_rad_s, &StepMean::speed_sd_rad_s,
+                                                  &StepMean::thrust_sd_n, &StepMean::torque_sd_nm};
+constexpr double StepMean::*kUncertainties[] = {&StepMean::thrust_u_n, &StepMean::speed_u_rad_s, &StepMean::zero_u_n,
+                                                &StepMean::lag_u_s};
+
+/// Mean of f(value) over the rows that have the value; NaN without any.
+template <class Function>
+double mean_over(const Group& group, double StepMean::*member, Function f) {
+  double sum = 0;
+  int n = 0;
+  for (const StepMean* step : group) {
+    if (std::isnan(step->*member)) continue;
+    sum += f(step->*member);
+    ++n;
+  }
+  return n == 0 ? kNan : sum / n;
+}
+
+double sum_over(const Group& group, double StepMean::*member) {
+  double sum = 0;
+  for (const StepMean* step : group) sum += step->*member;
+  return sum;
+}
+
+/// Welch-Satterthwaite, of the mean of the repetitions.
+double freedom_of(const Group& group) {
+  double squares = 0, share = 0;
+  for (const StepMean* step : group) {
+    const double square = step->thrust_u_n * step->thrust_u_n;
+    squares += square;
+    share += square * square / step->thrust_freedom;
+  }
+  return squares * squares / share;
+}
+
+StepMean average(const Group& group) {
+  const double n = static_cast<double>(group.size());
+  StepMean mean = *group.front();
+  mean.repetition = 0;
+  for (const auto member : kMeans) mean.*member = mean_over(group, member, [](double x) { return x; });
+  for (const auto member : kRootMeanSquares) {
+    mean.*member = std::sqrt(mean_over(group, member, [](double x) { return x * x; }));
+  }
+  for (const auto member : kUncertainties) {
+    mean.*member = std::sqrt(mean_over(group, member, [](double x) { return x * x; }) / n);
+  }
+  mean.thrust_n_eff = sum_over(group, &StepMean::thrust_n_eff);
+  mean.thrust_freedom = freedom_of(group);
+  mean.speed_n = 0;
+  mean.thrust_samples = 0;
+  mean.speed_glitches = 0;
+  for (const StepMean* step : group) {
+    mean.speed_n += step->speed_n;
+    mean.thrust_samples += step->thrust_samples;
+    mean.speed_glitches += step->speed_glitches;
+    mean.quality_flags |= step->quality_flags;
+  }
+  return mean;
+}
+
+/// By propeller, occlusion and step, in the order of first appearance.
+std::vector<Group> groups_of(std::span<const StepMean> steps) {
+  std::vector<Group> groups;
+  std::map<std::tuple<std::string, double, int>, std::size_t> places;
+  for (const StepMean& step : steps) {
+    const auto [place, is_new] = places.try_emplace({step.propeller, step.occlusion_deg, step.step}, groups.size());
+    if (is_new) groups.emplace_back();
+    groups[place->second].push_back(&step);
+  }
+  return groups;
+}
+
+double square(double x) { return x * x; }
+
+using Runs = std::map<int, Group>;  // by repetition
+
+std::set<int> good_levels(const Group& run) {
+  std::set<int> levels;
+  for (const StepMean* step : run) {
+    if (tells_k(*step)) levels.insert(step->step);
+  }
+  return levels;
+}
+
+RepetitionFigure figure_of(const Group& run, const std::set<int>& levels) {
+  double tx = 0, xx = 0, x_sum = 0, variance = 0, zero = 0;
+  for (const StepMean* step : run) {
+    if (!levels.contains(step->step)) continue;
+    const double x = square(step->speed_rad_s);
+    const double of_speed =
+        std::isnan(step->speed_u_rad_s) ? 0 : 2 * step->thrust_n * step->speed_u_rad_s / step->speed_rad_s;
+    tx += step->thrust_n * x;
+    xx += x * x;
+    x_sum += x;
+    variance += x * x * (square(thrust_u_within(*step)) + square(of_speed));
+    zero = std::isnan(step->zero_u_n) ? 0 : std::max(zero, step->zero_u_n);
+  }
+  RepetitionFigure figure;
+  figure.k = tx / xx;
+  figure.u = std::sqrt(variance + square(zero * x_sum)) / xx;
+  return figure;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+}
+
+std::vector<RepetitionFigure> figures_of(const Runs& runs) {
+  std::vector<RepetitionFigure> figures;
+  std::optional<std::set<int>> common;
+  for (const auto& [repetition, run] : runs) {
+    const std::set<int> levels = good_levels(run);
+    figures.push_back({repetition, kNan, kNan, !levels.empty() && 2 * levels.size() >= run.size(), false});
+    if (!figures.back().usable) continue;
+    if (!common) common = levels;
+    std::erase_if(*common, [&](int level) { return !levels.contains(level); });
+  }
+  for (RepetitionFigure& figure : figures) {
+    if (!figure.usable || common->empty()) continue;
+    const RepetitionFigure found = figure_of(runs.at(figure.repetition), *common);
+    figure.k = found.k;
+    figure.u = found.u;
+  }
+  return figures;
+}
+
+/// Marks the outlying ones; the median of all usable ones.
+double identify_outliers(std::vector<RepetitionFigure>& figures, const RepetitionRule& rule) {
+  std::vector<double> k, u, away;
+  for (const RepetitionFigure& figure : figures) {
+    if (std::isnan(figure.k)) continue;
+    k.push_back(figure.k);
+    u.push_back(figure.u);
+  }
+  if (k.empty()) return kNan;
+  const double middle = median(k);
+  if (k.size() < 3) return middle;
+  for (const double value : k) away.push_back(std::abs(value - middle));
+  const double scale = std::max({1.4826 * median(away), median(u), rule.least_share * std::abs(middle)});
+  for (RepetitionFigure& figure : figures) figure.outlying = std::abs(figure.k - middle) > rule.threshold * scale;
+  return middle;
+}
+
+/// One-way analysis of variance: the repetitions are the groups, and how certain each is comes from within it.
+void analyse(RepetitionVerdict& verdict, double freedom_within) {
+  double n = 0, mean = 0, squares = 0, u_squares = 0;
+  for (const RepetitionFigure& figure : verdict.repetitions) {
+    if (std::isnan(figure.k)) continue;
+    n += 1;
+    mean += figure.k;
+    u_squares += square(figure.u);
+  }
+  if (n < 2) return;
+  mean /= n;
+  for (const RepetitionFigure& figure : verdict.repetitions) {
+    if (!std::isnan(figure.k)) squares += square(figure.k - mean);
+  }
+  verdict.between_sd = std::sqrt(squares / (n - 1));
+  verdict.within_u = std::sqrt(u_squares / n);
+  if (!(verdict.within_u > 0)) return;
+  verdict.f = square(verdict.between_sd / verdict.within_u);
+  const boost::math::fisher_f distribution(n - 1, std::max(freedom_within, 1.0));
+  verdict.p = boost::math::cdf(boost::math::complement(distribution, verdict.f));
+}
+
+double freedom_within(const Runs& runs) {
+  double freedom = 0;
+  for (const auto& [repetition, run] : runs) {
+    for (const StepMean* step : run) {
+      if (tells_k(*step)) freedom += std::isnan(step->thrust_freedom) ? 1 : std::min(step->thrust_freedom, 1e3);
+    }
+  }
+  return freedom;
+}
+
+void decide(RepetitionVerdict& verdict, const RepetitionRule& rule) {
+  int standing = 0;
+  std::vector<double> k;
+  for (const RepetitionFigure& figure : verdict.repetitions) {
+    if (!figure.usable) {
+      verdict.reason = fmt::format("repetition {} has too few steps without a flag", figure.repetition);
+    } else if (figure.outlying) {
+      verdict.reason = fmt::format("repetition {} gives a k that is {:+.2f} % off the median of all (Hampel)",
+                                   figure.repetition, 100 * (figure.k / verdict.k - 1));
+    } else {
+      ++standing;
+      k.push_back(figure.k);
+    }
+  }
+  const auto runs = static_cast<int>(verdict.repetitions.size());
+  const auto [low, high] = std::minmax_element(k.begin(), k.end());
+  const bool spread = k.size() > 1 && verdict.p < 0.05 && *high - *low > rule.spread_share * std::abs(verdict.k);
+  if (spread && verdict.reason.empty()) {
+    verdict.reason = fmt::format("the repetitions spread over {:.2f} % of k, and none stands out",
+                                 100 * (*high - *low) / std::abs(verdict.k));
+  }
+  const bool too_few = standing < rule.wanted || spread;
+  verdict.asks_for_another = runs >= rule.wanted && runs < rule.at_most && too_few;
+}
+
+/// Standard, of the thrust at this speed: from the samples, and from what the speed is uncertain.
+double u_within(const StepMean& step) {
+  const double of_speed =
+      std::isnan(step.speed_u_rad_s) ? 0 : 2 * step.thrust_n * step.speed_u_rad_s / step.speed_rad_s;
+  return std::hypot(thrust_u_within(step), of_speed);
+}
+
+struct Pair {
+  const StepMean* up = nullptr;
+  const StepMean* down = nullptr;
+};
+
+/// The profile's own way comes first, and it rises when its first step is not its fastest.
+bool rises(std::span<const StepMean> run) {
+  const auto first =
+      std::min_element(run.begin(), run.end(), [](const StepMean& a, const StepMean& b) { return a.step < b.step; });
+  return std::any_of(run.begin(), run.end(),
+                     [&](const StepMean& step) { return step.commanded_speed_rad_s > first->commanded_speed_rad_s; });
+}
+
+/// By commanded speed, of those that were held twice.
+std::map<double, Pair> pairs_of(std::span<const StepMean> run) {
+  std::map<double, std::vector<const StepMean*>> by_level;
+  for (const StepMean& step : run) {
+    if (tells_k(step)) by_level[step.commanded_speed_rad_s].push_back(&step);
+  }
+  std::map<double, Pair> pairs;
+  for (const auto& [level, steps] : by_level) {
+    if (steps.size() != 2) continue;
+    const bool in_order = (steps[0]->step < steps[1]->step) == rises(run);
+    pairs[level] = in_order ? Pair{steps[0], steps[1]} : Pair{steps[1], steps[0]};
+  }
+  return pairs;
+}
+
+constexpr int kBegin = 1, kEnd = 2;
+
+/// Of the first and the last reference run, as repetitions of each other.
+std::vector<StepMean> two_runs(std::span<const StepMean> steps) {
+  int first = -1, last = -1;
+  for (const StepMean& step : steps) last = std::min(last, step.repetition);
+  std::vector<StepMean> chosen;
+  for (const StepMean& step : steps) {
+    if (step.repetition != first && step.repetition != last) continue;
+    chosen.push_back(step);
+    chosen.back().repetition = step.repetition == first ? kBegin : kEnd;
+  }
+  return chosen;
+}
+
+/// Of the air during a run, kg/m³; NaN: unknown.
+double density_of(std::span<const StepMean> steps, int repetition) {
+  for (const StepMean& step : steps) {
+    if (step.repetition == repetition) return step.air_density_kg_m3;
+  }
+  return kNotMeasured;
+}
+
+}  // namespace
+
+bool tells_k(const StepMean& step) {
+  return (step.quality_flags & ~kHarmlessFlags) == 0 && std::isfinite(step.thrust_n) && step.speed_rad_s > 0;
+}
+
+double thrust_u_within(const StepMean& step) {
+  const double n = static_cast<double>(std::max<std::uint64_t>(step.thrust_samples, 1));
+  if (std::isnan(step.thrust_u_n)) return step.thrust_sd_n / std::sqrt(n);
+  return std::sqrt(std::max(square(step.thrust_u_n) - square(step.zero_u_n), 0.0));
+}
+
+std::vector<StepMean> means_of(std::span<const StepMean> steps) {
+  std::vector<StepMean> means;
+  for (const Group& group : groups_of(steps)) {
+    Group good;
+    for (const StepMean* step : group)
+      if (tells_k(*step)) good.push_back(step);
+    const bool chosen = !good.empty() && good.size() < group.size();
+    means.push_back(average(chosen ? good : group));
+    if (!chosen) continue;
+    means.back().repetitions_averaged = static_cast<double>(good.size());
+    means.back().repetitions_left_out = static_cast<double>(group.size() - good.size());
+  }
+  return means;
+}
+
+std::vector<StepMean> average_repetitions(std::span<const StepMean> steps) {
+  std::vector<StepMean> means;
+  for (const Group& group : groups_of(steps)) means.push_back(average(group));
+  return means;
+}
+
+std::vector<RepetitionVerdict> judge_repetitions(std::span<const StepMean> steps, const RepetitionRule& rule) {
+  std::vector<RepetitionVerdict> verdicts;
+  std::vector<Runs> runs;
+  std::map<std::pair<std::string, double>, std::size_t> places;
+  for (const StepMean& step : steps) {
+    if (step.repetition == 0) continue;
+    const auto [place, is_new] = places.try_emplace({step.propeller, step.occlusion_deg}, runs.size());
+    if (is_new) {
+      runs.emplace_back();
+      verdicts.emplace_back();
+      verdicts.back().propeller = step.propeller;
+      verdicts.back().occlusion_deg = step.occlusion_deg;
+    }
+    runs[place->second][step.repetition].push_back(&step);
+  }
+  for (std::size_t i = 0; i < verdicts.size(); ++i) {
+    verdicts[i].repetitions = figures_of(runs[i]);
+    verdicts[i].k = identify_outliers(verdicts[i].repetitions, rule);
+    analyse(verdicts[i], freedom_within(runs[i]));
+    decide(verdicts[i], rule);
+  }
+  return verdicts;
+}
+
+std::string Hysteresis::to_words() const {
+  const auto largest = std::max_element(speeds.begin(), speeds.end(), [](const auto& a, const auto& b) {
+    return std::abs(a.up_minus_down_n) < std::abs(b.up_minus_down_n);
+  });
+  const auto beyond = std::count_if(speeds.begin(), speeds.end(), [](const auto& p) { return p.significant(); });
+  return fmt::format(
+      "thrust going up less that going down: {:+.3f} ± {:.3f} % of k{}; at most {:+.4f} ± {:.4f} N, at {:.0f} RPM; {} "
+      "of "
+      "{} speeds beyond twice their uncertainty",
+      100 * share, 100 * u_share, significant() ? "" : ", no hysteresis is seen", largest->up_minus_down_n,
+      largest->u_n, to_rpm(RadPerSec(largest->speed_rad_s)), beyond, speeds.size());
+}
+
+std::optional<Hysteresis> hysteresis_of(std::span<const StepMean> run) {
+  Hysteresis found;
+  double difference = 0, thrust = 0, weight = 0, variance = 0;
+  for (const auto& [level, pair] : pairs_of(run)) {
+    const double x = square(pair.up->speed_rad_s);
+    const double scale = x / square(pair.down->speed_rad_s);
+    const double down = pair.down->thrust_n * scale;
+    const double u = std::hypot(u_within(*pair.up), scale * u_within(*pair.down));
+    found.speeds.push_back({pair.up->speed_rad_s, pair.up->thrust_n - down, u});
+    difference += x * found.speeds.back().up_minus_down_n;
+    thrust += x * 0.5 * (pair.up->thrust_n + down);
+    weight += x * x;
+    variance += square(x * u);
+  }
+  if (found.speeds.size() < 2 || !(thrust > 0)) return std::nullopt;
+  const double k = thrust / weight;
+  found.share = difference / weight / k;
+  found.u_share = std::sqrt(variance) / weight / k;
+  return found;
+}
+
+bool ReferenceDrift::drifted() const { return std::abs(share) > std::max(2 * u_share, kReferenceDriftShare); }
+
+std::string ReferenceDrift::to_words() const {
+  return fmt::format("from the first to the last reference run k changed by {:+.3f} ± {:.3f} %{}{}", 100 * share,
+                     100 * u_share, same_air ? " at equal density of the air" : "",
+                     drifted() ? ": the bench has drifted; look at propeller, mounting and load cell, and take "
+                                 "what lies between with care"
+                               : "");
+}
+
+std::optional<ReferenceDrift> reference_drift(std::span<const StepMean> steps) {
+  const std::vector<StepMean> runs = two_runs(steps);
+  const auto verdicts = judge_repetitions(runs);
+  if (verdicts.size() != 1 || verdicts[0].repetitions.size() != 2) return std::nullopt;
+  const RepetitionFigure &begin = verdicts[0].repetitions[0], &end = verdicts[0].repetitions[1];
+  if (std::isnan(begin.k) || std::isnan(end.k) || !(begin.k > 0)) return std::nullopt;
+  ReferenceDrift drift;
+  drift.k_begin = begin.k;
+  drift.k_end = end.k;
+  const double thinning = density_of(runs, kBegin) / density_of(runs, kEnd);
+  drift.same_air = std::isfinite(thinning);
+  drift.share = end.k / begin.k * (drift.same_air ? thinning : 1) - 1;
+  drift.u_share = std::hypot(begin.u / begin.k, end.u / end.k);
+  return drift;
+}
+
+}  // namespace kphi::results

@@ -1,0 +1,42 @@
+#include "base/number.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+
+namespace kphi {
+namespace {
+
+TEST(ParseDouble, TakesTheWholeTextOrNothing) {
+  EXPECT_EQ(parse_double("1.5e3"), 1500);
+  EXPECT_EQ(parse_double("-0.25"), -0.25);
+  EXPECT_TRUE(std::isnan(parse_double("nan").value()));
+  for (const char* text : {"", " 1", "1 ", "+1", "1,5", "0x10", "1e999", "1.2.3", "-"})
+    EXPECT_FALSE(parse_double(text)) << text;
+  EXPECT_FALSE(parse_double({}));
+}
+
+TEST(ParseFinite, RefusesNanAndInfinities) {
+  EXPECT_EQ(parse_finite("2"), 2);
+  for (const char* text : {"nan", "inf", "-inf", "", "x"}) EXPECT_FALSE(parse_finite(text)) << text;
+}
+
+TEST(ParseInteger, HoldsTheRangeOfItsType) {
+  EXPECT_EQ(parse_integer<std::uint16_t>("65535"), 65535);
+  EXPECT_EQ(parse_integer<int>("-7"), -7);
+  EXPECT_EQ(parse_integer<std::uint16_t>("dd", 16), 0xdd);
+  EXPECT_FALSE(parse_integer<std::uint16_t>("65536"));
+  EXPECT_FALSE(parse_integer<unsigned>("-1"));
+  for (const char* text : {"", " 1", "1 ", "+1", "1.0", "0x1", "a"}) EXPECT_FALSE(parse_integer<int>(text)) << text;
+}
+
+TEST(Shortest, ReadsBackAsTheSameBits) {
+  for (const double value : {45.0, 1e-6, 0.1, 1.0 / 3, -2.5e300, std::numeric_limits<double>::denorm_min()})
+    EXPECT_EQ(parse_double(shortest(value)), value);
+}
+
+}  // namespace
+}  // namespace kphi

@@ -1,0 +1,213 @@
+#include "compensation/thrust_curve.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <type_traits>
+#include <utility>
+
+#include "test/compensation/example_vehicle.hpp"
+
+namespace kphi::compensation {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+double factor(const ThrustCurve& line, double phi_deg, ScalingLaw law) {
+  return line.scaling_factor(from_degrees(phi_deg), law);
+}
+
+TEST(ThrustCurve, GivesTheScalingFactorsAndSpeedRatiosOfThePapersLine) {
+  const ThrustCurve line = paper_line();
+  struct Known {
+    double phi_deg, k, speed_ratio;
+  };
+  for (const Known known : {Known{45, .9000, 1.0541}, Known{65, .8422, 1.0896}, Known{90, .7700, 1.1396},
+                            Known{180, .5100, 1.4003}, Known{270, .2500, 2.0}}) {
+    for (const ScalingLaw law : {ScalingLaw::clamped, ScalingLaw::published}) {
+      EXPECT_NEAR(factor(line, known.phi_deg, law), known.k, 5e-5) << known.phi_deg;
+      EXPECT_NEAR(1 / std::sqrt(factor(line, known.phi_deg, law)), known.speed_ratio, 1e-4) << known.phi_deg;
+    }
+  }
+}
+
+TEST(ThrustCurve, PublishedLawReflectsWhereTheLineLiesAboveTheThrustCoefficient) {
+  const ThrustCurve line = paper_line();
+  EXPECT_NEAR(factor(line, 0, ScalingLaw::published), 0.97, 1e-12);
+  EXPECT_NEAR(factor(line, 10.384, ScalingLaw::published), 1.0, 1e-5);
+  EXPECT_LT(factor(line, 5, ScalingLaw::published), 1.0);
+}
+
+TEST(ThrustCurve, PublishedLawDivergesNear356DegreesAndGoesNegativeBeyond) {
+  const ThrustCurve line = paper_line();
+  EXPECT_NEAR(1 / std::sqrt(factor(line, 356, ScalingLaw::published)), 25.0, 1.5);
+  EXPECT_LT(factor(line, 358, ScalingLaw::published), 0.0);
+}
+
+TEST(ThrustCurve, ClampedLawIsExactlyOneWithoutOcclusionWhateverTheIntercept) {
+  for (const double intercept : {0.9, 1.0, 1.03}) {
+    const ThrustCurve line = example_line(intercept, -0.0028889);
+    EXPECT_EQ(line.scaling_factor(Radians(0)), 1.0);
+    EXPECT_EQ(line.scaling_factor(Radians(-0.0)), 1.0);
+  }
+}
+
+TEST(ThrustCurve, ClampedLawNeverSlowsAPropellerDownNorGoesBelowTheFloor) {
+  const ThrustCurve line = paper_line();
+  EXPECT_EQ(factor(line, 5, ScalingLaw::clamped), 1.0);
+  EXPECT_EQ(factor(line, 340, ScalingLaw::clamped), kScalingFloor);
+  EXPECT_EQ(factor(line, 360, ScalingLaw::clamped), kScalingFloor);
+}
+
+TEST(ThrustCurve, ClampedLawStaysInRangeForAnyLineAndAngle) {
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> intercept(1e-3, 3), slope(-0.1, 0.1), phi(-10, 400);
+  for (int i = 0; i < 100000; ++i) {
+    const ThrustCurve line = example_line(intercept(random), slope(random));
+    const double k = factor(line, phi(random), ScalingLaw::clamped);
+    ASSERT_GE(k, kScalingFloor);
+    ASSERT_LE(k, 1.0);
+  }
+  for (const double odd : {kNaN, kInfinity, -kInfinity, 1e308}) {
+    const double k = paper_line().scaling_factor(Radians(odd));
+    EXPECT_GE(k, kScalingFloor);
+    EXPECT_LE(k, 1.0);
+  }
+}
+
+TEST(ThrustCurve, FactorFallsMonotonicallyWithOcclusion) {
+  const ThrustCurve line = paper_line();
+  for (double phi = 0; phi < 360; phi += 0.25) {
+    EXPECT_GE(factor(line, phi, ScalingLaw::clamped), factor(line, phi + 0.25, ScalingLaw::clamped));
+  }
+}
+
+TEST(ThrustCurve, AtIsTheLineItself) {
+  const ThrustCurve line = paper_line();
+  EXPECT_DOUBLE_EQ(line.at(Radians(0)) / line.thrust_coefficient(), 1.03);
+  EXPECT_NEAR(line.at(from_degrees(356.5371)) / line.thrust_coefficient(), 0.0, 1e-6);
+}
+
+TEST(ThrustCurve, CannotExistInvalid) {
+  const ThrustCoefficient k(1.55e-6);
+  const Radians reach(4.7);
+  EXPECT_TRUE(ThrustCurve::from_line(k, k, -1e-7, reach));
+  EXPECT_TRUE(ThrustCurve::from_line(k, k, +1e-7, reach)) << "no loss is odd, not invalid";
+  for (const double bad : {kNaN, kInfinity, -kInfinity, 0.0, -1e-6}) {
+    EXPECT_FALSE(ThrustCurve::from_line(ThrustCoefficient(bad), k, -1e-7, reach)) << bad;
+    EXPECT_FALSE(ThrustCurve::from_line(k, ThrustCoefficient(bad), -1e-7, reach)) << bad;
+    EXPECT_FALSE(ThrustCurve::from_line(k, k, -1e-7, Radians(bad))) << bad;
+  }
+  for (const double bad : {kNaN, kInfinity, -kInfinity}) EXPECT_FALSE(ThrustCurve::from_line(k, k, bad, reach)) << bad;
+  EXPECT_FALSE(ThrustCurve::from_line(k, k, -1e-7, Radians(6.3)));
+}
+
+ThrustCurve line_with(const LineUncertainty& uncertainty) {
+  const ThrustCurve line = paper_line();
+  return *ThrustCurve::from_line(line.thrust_coefficient(), line.line().intercept, line.line().slope_per_rad,
+                                 line.largest_fitted(), OverlapMeasure::rim_arc, uncertainty);
+}
+
+/// 1 % of K_T, 1.5 % of the intercept, 4 % of the slope, correlated as lines through distant points are.
+LineUncertainty example_uncertainty() {
+  const double k = kExampleCoefficient.value();
+  const double intercept = 0.015 * k, slope = 0.04 * paper_line().line().slope_per_rad;
+  return {0.01 * k, intercept * intercept, 0.8 * intercept * slope, slope * slope};
+}
+
+TEST(ThrustCurve, PropagatesItsUncertaintyAsDrawingManyLinesDoes) {
+  const LineUncertainty u = example_uncertainty();
+  const ThrustCurve line = line_with(u);
+  std::mt19937_64 random(17);
+  std::normal_distribution<double> normal;
+  constexpr int kDraws = 40000;
+  for (const double phi_deg : {2.0, 65.0, 150.0}) {
+    for (const ScalingLaw law : {ScalingLaw::clamped, ScalingLaw::published}) {
+      const double phi = phi_deg * kPi / 180, angle_error = 0.02;
+      if (law == ScalingLaw::clamped && phi_deg == 2.0) continue;  // held at 1 there
+      double sum = 0, squares = 0;
+      for (int i = 0; i < kDraws; ++i) {
+        const double a = normal(random), b = normal(random);
+        const double k_t = kExampleCoefficient.value() + u.thrust_coefficient * normal(random);
+        const double intercept = line.line().intercept.value() + std::sqrt(u.intercept_variance) * a;
+        const double slope = line.line().slope_per_rad - std::sqrt(u.slope_variance) * (0.8 * a + 0.6 * b);
+        const double k = intercept + slope * (phi + angle_error * normal(random));
+        const double effective = law == ScalingLaw::published ? k_t - std::fabs(k_t - k) : k;
+        sum += effective;
+        squares += effective * effective;
+      }
+      const double mean = sum / kDraws, drawn = std::sqrt(squares / kDraws - mean * mean) / mean;
+      // Near K_T the fold of the published law narrows the draws.
+      const double tolerance = phi_deg == 2.0 ? 0.25 : 0.03;
+      EXPECT_NEAR(line.relative_uncertainty(Radians(phi), Radians(angle_error), law) / drawn, 1.0, tolerance)
+          << phi_deg << " degrees";
+    }
+  }
+}
+
+TEST(ThrustCurve, HasTheUncertaintyOfKtWhereTheLawLeavesTheLine) {
+  const ThrustCurve line = line_with(example_uncertainty());
+  EXPECT_DOUBLE_EQ(line.relative_uncertainty(Radians(0), Radians(0)), 0.01);
+  EXPECT_DOUBLE_EQ(line.relative_uncertainty(from_degrees(5), Radians(0.1)), 0.01) << "held at 1";
+}
+
+TEST(ThrustCurve, SaysInfiniteWhereNoUncertaintyCanBeGiven) {
+  EXPECT_EQ(paper_line().relative_uncertainty(from_degrees(65), Radians(0)), kInfinity) << "none is known";
+  const ThrustCurve line = line_with(example_uncertainty());
+  EXPECT_EQ(line.relative_uncertainty(from_degrees(350), Radians(0)), kInfinity) << "at the floor";
+  EXPECT_EQ(line.relative_uncertainty(Radians(kNaN), Radians(0)), kInfinity);
+  EXPECT_EQ(line.relative_uncertainty(from_degrees(65), Radians(kNaN)), kInfinity);
+}
+
+TEST(ThrustCurve, RefusesAnUncertaintyOrAMeasureThatCannotBe) {
+  const ThrustCurve line = paper_line();
+  const auto made = [&](const LineUncertainty& u, OverlapMeasure overlap = OverlapMeasure::area_share) {
+    return ThrustCurve::from_line(line.thrust_coefficient(), line.line().intercept, line.line().slope_per_rad,
+                                  line.largest_fitted(), overlap, u);
+  };
+  ASSERT_TRUE(made(example_uncertainty()));
+  EXPECT_EQ(made(example_uncertainty())->overlap(), OverlapMeasure::area_share);
+  EXPECT_EQ(line.overlap(), OverlapMeasure::rim_arc);
+  EXPECT_FALSE(made({-1e-9, 0, 0, 0}));
+  EXPECT_FALSE(made({0, -1e-20, 0, 0}));
+  EXPECT_FALSE(made({0, 0, kNaN, 0}));
+  EXPECT_FALSE(made({0, 0, 0, kInfinity}));
+  EXPECT_FALSE(made({}, static_cast<OverlapMeasure>(3)));
+}
+
+TEST(ThrustCurve, PerturbedIsRaisedAndScaledAndKeepsTheRest) {
+  const ThrustCurve curve = line_with(example_uncertainty());
+  const ThrustCoefficient raised = 0.02 * kExampleCoefficient;
+  const auto perturbed = curve.perturbed(raised, 1.5);
+  ASSERT_TRUE(perturbed);
+  const double start = curve.at(Radians(0)).value();
+  for (const double phi : {0.0, 0.7, 4.0}) {
+    const double expected = start + raised.value() + 1.5 * (curve.at(Radians(phi)).value() - start);
+    EXPECT_NEAR(perturbed->at(Radians(phi)).value(), expected, 1e-12 * start) << phi;
+    EXPECT_EQ(perturbed->standard_error_at(Radians(phi)), curve.standard_error_at(Radians(phi)));
+  }
+  EXPECT_EQ(perturbed->thrust_coefficient(), curve.thrust_coefficient());
+  EXPECT_EQ(perturbed->largest_fitted(), curve.largest_fitted());
+  EXPECT_FALSE(curve.perturbed(-2.0 * kExampleCoefficient, 1)) << "k(0) below 0";
+}
+
+TEST(ThrustCurve, StandardErrorIsThatOfTheLineAndInfiniteIfUnknown) {
+  const LineUncertainty u = example_uncertainty();
+  const ThrustCurve curve = line_with(u);
+  EXPECT_DOUBLE_EQ(curve.standard_error_at(Radians(0)), std::sqrt(u.intercept_variance));
+  EXPECT_DOUBLE_EQ(curve.standard_error_at(Radians(2)),
+                   std::sqrt(u.intercept_variance + 4 * u.covariance + 4 * u.slope_variance));
+  EXPECT_EQ(paper_line().standard_error_at(Radians(1)), kInfinity);
+}
+
+TEST(ThrustCurve, IsMadeWithoutExceptions) {
+  static_assert(noexcept(ThrustCurve::from_line(ThrustCoefficient(), ThrustCoefficient(), 0.0, Radians())));
+  static_assert(noexcept(std::declval<const ThrustCurve&>().scaling_factor(Radians())));
+  static_assert(!std::is_default_constructible_v<ThrustCurve>);
+}
+
+}  // namespace
+}  // namespace kphi::compensation

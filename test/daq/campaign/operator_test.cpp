@@ -1,0 +1,164 @@
+#include "daq/campaign/operator.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdlib>
+
+#include "base/error.hpp"
+#include "daq/guard/interlock.hpp"
+#include "daq/guard/interrupt.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using testing::StartsWith;
+
+class Prompt : public testing::Test {
+ protected:
+  Prompt() {
+    EXPECT_EQ(pipe(pipe_.data()), 0);
+    words_ = open_memstream(&text_, &size_);
+  }
+  ~Prompt() override {
+    close(pipe_[0]);
+    std::fclose(words_);
+    std::free(text_);
+  }
+  void answer(const std::string& typed) {
+    EXPECT_EQ(write(pipe_[1], typed.data(), typed.size()), static_cast<ssize_t>(typed.size()));
+    close(pipe_[1]);
+  }
+  void mount(double occlusion_deg) {
+    const MountConfirmation mounted =
+        person().confirm_mounting({"5x3", "Test 5 inch", 5, 3}, occlusion_deg, "The supply's output is off.");
+    EXPECT_EQ(mounted.occlusion_deg(), occlusion_deg);
+  }
+  bool run_again() { return person().run_again({90, "repetition 2 is 3 % off", 1, 2}); }
+  TerminalOperator person() {
+    TerminalOperator person(pipe_[0], words_, [this] { return stop_; });
+    person.log_to([this](const char* event, const std::string& words) { record_.push_back(event + (": " + words)); });
+    return person;
+  }
+  std::string said() {
+    std::fflush(words_);
+    return {text_, size_};
+  }
+
+  std::array<int, 2> pipe_{};
+  char* text_ = nullptr;
+  std::size_t size_ = 0;
+  std::FILE* words_ = nullptr;
+  bool stop_ = false;
+  std::vector<std::string> record_;
+};
+
+TEST_F(Prompt, NamesWhatToMountAndWhatMotorAndSupplyDo) {
+  answer("90\n");
+  mount(90);
+  EXPECT_NE(said().find("Mount the 90° occlusion under propeller 5x3"), std::string::npos) << said();
+  EXPECT_THAT(said(), StartsWith("\nThe supply's output is off.\nMount"));
+}
+
+TEST_F(Prompt, SaysNoOcclusionForZero) {
+  answer("0\n");
+  mount(0);
+  EXPECT_NE(said().find("Mount no occlusion"), std::string::npos);
+}
+
+TEST_F(Prompt, AsksAgainAfterAWrongAngle) {
+  answer("45\nninety\n\n90 \n90\n");
+  mount(90);
+  EXPECT_NE(said().find("You typed \"45\"; this run needs 90 degrees."), std::string::npos);
+  EXPECT_NE(said().find("You typed \"ninety\"; this run needs 90 degrees."), std::string::npos);
+}
+
+TEST_F(Prompt, TakesQAsNo) {
+  answer("q\n");
+  EXPECT_THROW(mount(90), NotMounted);
+}
+
+TEST_F(Prompt, TakesEndOfFileAsNo) {
+  answer("9");
+  EXPECT_THROW(mount(90), NotMounted);
+}
+
+TEST_F(Prompt, DictatesThatTheInputEnded) {
+  answer("");
+  EXPECT_THROW(mount(90), NotMounted);
+  EXPECT_EQ(record_.back(), "operator_answered: (no more input)");
+}
+
+TEST_F(Prompt, StopsWhenASignalCame) {
+  stop_ = true;
+  answer("90\n");
+  EXPECT_THROW(mount(90), Interrupted);
+}
+
+TEST_F(Prompt, RunsAgainWhenThePersonJustPressesEnter) {
+  answer("\n");
+  EXPECT_TRUE(run_again());
+  EXPECT_NE(said().find("90°: repetition 2 is 3 % off. All runs are kept, whatever you answer."), std::string::npos)
+      << said();
+  EXPECT_NE(said().find("Run 90° again (extra run 1 of 2)?"), std::string::npos);
+}
+
+TEST_F(Prompt, TakesYesAndNoAndAsksAgainOtherwise) {
+  answer("maybe\nn\n");
+  EXPECT_FALSE(run_again());
+  EXPECT_NE(said().find("You typed \"maybe\"; type y, n or q."), std::string::npos) << said();
+}
+
+TEST_F(Prompt, StopsTheCampaignOnQInsteadOfAnotherRun) {
+  answer("q\n");
+  EXPECT_THROW((void)run_again(), Interrupted);
+}
+
+TEST_F(Prompt, DictatesWhatIsAskedAndWhateverIsTyped) {
+  answer("45\n90\n");
+  mount(90);
+  EXPECT_THAT(record_,
+              testing::ElementsAre(
+                  "operator_asked: The supply's output is off.\nMount the 90° occlusion under propeller 5x3 (Test 5 "
+                  "inch). Step back. Type the mounted angle in degrees (90) and press Enter, or q to stop:",
+                  "operator_answered: 45",
+                  "operator_asked: Type the mounted angle in degrees (90) and press Enter, or q to stop:",
+                  "operator_answered: 90"));
+}
+
+TEST_F(Prompt, EndsAsSoonAsTheGuardThatLivesThroughItTrips) {
+  TerminalOperator asked = person();
+  int looks = 0;
+  asked.while_waiting([&] {
+    if (++looks == 3) throw SafetyStop("motor: the rotor turns at 100 RPM while somebody may be near");
+  });
+  EXPECT_THROW((void)asked.confirm_mounting({"5x3", "Test 5 inch", 5, 3}, 90), SafetyStop) << "nobody types";
+}
+
+TEST_F(Prompt, ContinuesAfterASafetyStopOnlyByAPersonsWord) {
+  answer("y\n\ncontinue\n");
+  person().clear_safety_stop("thrust 21 N is above 20 N");
+  EXPECT_THAT(said(), StartsWith("\nA safety stop ended this campaign: thrust 21 N is above 20 N.\n"));
+}
+
+TEST_F(Prompt, LeavesACampaignStoppedWhenThePersonSaysNo) {
+  answer("q\n");
+  EXPECT_THROW(person().clear_safety_stop("thrust"), NotMounted);
+}
+
+TEST(AutoConfirmOperator, ClearsNoSafetyStopOfALiveBench) {
+  EXPECT_THROW(AutoConfirmOperator().clear_safety_stop("thrust"), ConfigurationError);
+  AutoConfirmOperator(true).clear_safety_stop("thrust");
+}
+
+TEST(AutoConfirmOperator, AgreesToEachMountingAndToOneMoreRun) {
+  AutoConfirmOperator person;
+  EXPECT_EQ(person.confirm_mounting({"5x3", "Test 5 inch", 5, 3}, 45).occlusion_deg(), 45);
+  EXPECT_TRUE(person.run_again({90, "", 1, 3}));
+  EXPECT_FALSE(person.run_again({90, "", 2, 3}));
+}
+
+}  // namespace
+}  // namespace kphi::daq

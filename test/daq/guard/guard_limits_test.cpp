@@ -1,0 +1,136 @@
+#include "daq/guard/guard_limits.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "daq/virtual/deterministic_bench.hpp"
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using testing::HasSubstr;
+
+class CombinedLimits : public testing::Test {
+ protected:
+  [[nodiscard]] std::optional<GuardLimit> row(Watched watched) const {
+    for (const GuardLimit& limit : combine_limits(campaign_, config_, devices_ ? &*devices_ : nullptr)) {
+      if (limit.watched == watched) return limit;
+    }
+    return std::nullopt;
+  }
+  void expect(Watched watched, double value, const std::string& source) const {
+    const auto found = row(watched);
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(found->value, value, 1e-9 * value);
+    EXPECT_THAT(found->source, HasSubstr(source));
+  }
+  void told(const iq::Entry& entry, double value) {
+    if (!devices_) devices_.emplace();
+    devices_->motor.values[iq::audited_index(entry)] = value;
+  }
+
+  profiles::Campaign campaign_ = test::short_campaign();
+  profiles::BenchConfig config_ = test::deterministic_config(1);
+  std::optional<DeviceLimits> devices_;
+};
+
+TEST_F(CombinedLimits, AreThoseOfTheCampaignWhenNobodySaysLess) {
+  expect(Watched::thrust, 20, "campaign limits.thrust_max_n");
+  expect(Watched::speed, 1.05 * 19100, "campaign limits.speed_max_rpm");
+  expect(Watched::supply_current, 35, "campaign limits.supply_current_max_a");
+  expect(Watched::coil_temperature, 110, "campaign limits.coil_temperature_max_degc");
+}
+
+TEST_F(CombinedLimits, HaveNoRowForWhatNobodyLimits) {
+  EXPECT_FALSE(row(Watched::shaft_torque));
+  EXPECT_FALSE(row(Watched::force_z));
+  EXPECT_FALSE(row(Watched::supply_voltage_high));
+  EXPECT_FALSE(row(Watched::supply_age)) << "there is no supply";
+  EXPECT_FALSE(row(Watched::output_current)) << "there is no supply";
+}
+
+TEST_F(CombinedLimits, TakeTheTighterOfCampaignAndBench) {
+  config_.iq.speed_max = from_rpm(15000);
+  expect(Watched::speed, 1.05 * 15000, "bench iq.speed_max_rpm");
+  config_.supply = profiles::SupplyConfig{"x", Volts(12), Amperes(20), Volts(14), Amperes(22)};
+  expect(Watched::supply_voltage_high, 14, "bench supply.over_voltage_v");
+  expect(Watched::output_current, 1.02 * 22, "bench supply.over_current_a");
+  campaign_.limits.supply_current_max = Amperes(18);
+  campaign_.limits.supply_voltage_max = Volts(13.2);
+  expect(Watched::output_current, 18, "campaign");
+  expect(Watched::supply_voltage_high, 13.2, "campaign limits.supply_voltage_max_v");
+}
+
+TEST_F(CombinedLimits, TakeWhatTheDevicesBearWhenThatIsLess) {
+  told(iq::entry<"brushless_drive.motor_redline_start">, 1500);
+  told(iq::entry<"power_safety.current_input_high">, 30);
+  told(iq::entry<"power_safety.temperature_coil_high">, 105);
+  told(iq::entry<"coil_temperature_estimator.otw">, 95);
+  devices_->load_cell_range = {20, 20, 60, 1, 1, 1};
+  expect(Watched::speed, to_rpm(RadPerSec(1500)), "device motor brushless_drive.motor_redline_start");
+  expect(Watched::supply_current, 30, "device motor power_safety.current_input_high");
+  expect(Watched::coil_temperature, 95, "device motor coil_temperature_estimator.otw");
+  expect(Watched::force_z, 66, "device load cell");
+  expect(Watched::torque_x, 1.1, "device load cell");
+}
+
+TEST_F(CombinedLimits, OfAVoltageTheHigherOfTheLowerOnesIsTheTighter) {
+  told(iq::entry<"power_safety.volt_input_low">, 5);
+  expect(Watched::supply_voltage_low, 5, "device motor power_safety.volt_input_low");
+  campaign_.limits.supply_voltage_min = Volts(10.5);
+  expect(Watched::supply_voltage_low, 10.5, "campaign limits.supply_voltage_min_v");
+  EXPECT_TRUE(row(Watched::supply_voltage_low)->lower);
+}
+
+TEST_F(CombinedLimits, BelieveNoDeviceThatSaysNonsense) {
+  for (const double nonsense : {0.0, -1.0, std::nan(""), 1.0 / 0.0}) {
+    told(iq::entry<"power_safety.current_input_high">, nonsense);
+    expect(Watched::supply_current, 35, "campaign");
+  }
+}
+
+TEST_F(CombinedLimits, OfASpeedErrorCanOnlyBeTightened) {
+  expect(Watched::speed_error, 15, "kphi");
+  campaign_.limits.speed_error_max = 0.05;
+  expect(Watched::speed_error, 5, "campaign limits.speed_error_max_percent");
+}
+
+TEST_F(CombinedLimits, AreReadFromACampaignFile) {
+  std::string text = test::short_campaign_text();
+  text.replace(text.find("coil_temperature_max_degc: 110"), 30,
+               "coil_temperature_max_degc: 110, torque_max_nm: 0.3, supply_voltage_min_v: 10, "
+               "supply_voltage_max_v: 13.5, speed_error_max_percent: 4");
+  campaign_ = profiles::parse_campaign(text, "c.yaml");
+  expect(Watched::shaft_torque, 0.3, "campaign limits.torque_max_nm");
+  expect(Watched::supply_voltage_low, 10, "campaign");
+  expect(Watched::supply_voltage_high, 13.5, "campaign");
+  expect(Watched::speed_error, 4, "campaign");
+}
+
+TEST_F(CombinedLimits, OfAConnectedBenchNameTheLoadCellAndTheMotor) {
+  DeterministicBench bench(config_);
+  devices_ = device_limits(bench);
+  const auto limits = combine_limits(campaign_, config_, &*devices_);
+  EXPECT_TRUE(
+      std::is_sorted(limits.begin(), limits.end(), [](const auto& a, const auto& b) { return a.watched < b.watched; }));
+  expect(Watched::force_z, 66, "110 % of its range");
+  expect(Watched::supply_voltage_high, 30, "device motor power_safety.volt_input_high");
+  EXPECT_THAT(to_lines(limits),
+              testing::Contains(testing::ContainsRegex("^thrust +above 20 N +campaign limits.thrust_max_n$")));
+}
+
+TEST_F(CombinedLimits, OfARecordedRunAreThoseThatItsGuardHad) {
+  DeterministicBench bench(config_);
+  devices_ = device_limits(bench);
+  results::RunHeader header;
+  header.load_cell.range = devices_->load_cell_range;
+  header.motor_parameters = bench.motor().parameters().text();
+  const DeviceLimits recorded = device_limits(header);
+  EXPECT_EQ(combine_limits(campaign_, config_, &recorded), combine_limits(campaign_, config_, &*devices_));
+}
+
+}  // namespace
+}  // namespace kphi::daq

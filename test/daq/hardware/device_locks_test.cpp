@@ -1,0 +1,71 @@
+#include "daq/hardware/device_locks.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include "base/error.hpp"
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+profiles::BenchConfig config(const std::string& host, int port, const std::string& device,
+                             const std::string& supply = {}) {
+  profiles::BenchConfig config;
+  config.netbox.host = host;
+  config.netbox.rdt_port = static_cast<std::uint16_t>(port);
+  config.iq.device = device;
+  if (!supply.empty()) config.supply.emplace().uri = supply;
+  return config;
+}
+
+TEST(LockNames, AreOfTheDeviceAndNotOfHowABenchFileNamesIt) {
+  const test::TemporaryFolder folder;
+  const auto port = folder.path() / "ttyUSB0";
+  std::ofstream(port) << "";
+  std::filesystem::create_symlink(port, folder.path() / "by-id");
+  const auto direct = lock_names(config("127.0.0.1", 49152, port.string()));
+  EXPECT_EQ(lock_names(config("localhost", 49152, (folder.path() / "by-id").string())), direct);
+  EXPECT_THAT(direct, ElementsAre("Net Box 127.0.0.1:49152", "port " + std::filesystem::canonical(port).string()));
+}
+
+TEST(LockNames, OfASupplyAreItsPortOrItsAddress) {
+  const auto name = [](const std::string& uri) { return lock_names(config("127.0.0.1", 1, "/dev/a", uri)).at(2); };
+  EXPECT_EQ(name("modbus-rtu:/dev/null?model=RD6018"), "port /dev/null");
+  EXPECT_EQ(name("modbus-tcp:127.0.0.1:502"), "supply 127.0.0.1:502");
+  EXPECT_EQ(name("scpi-tcp:127.0.0.1:502"), "supply 127.0.0.1:502");
+  EXPECT_EQ(name("scpi-usb:1ab1:0e11"), "supply 1ab1:0e11");
+}
+
+TEST(LockNames, OfABenchInsideTheProcessAreNone) { EXPECT_TRUE(lock_names(test::deterministic_config(1)).empty()); }
+
+/// Names that no other test and no other user has.
+std::string own_name(const char* what) { return fmt::format("test {} {}", ::getpid(), what); }
+
+TEST(DeviceLocks, RefuseTheSecondAndSayWhoHasIt) {
+  const DeviceLocks first({own_name("a"), own_name("b")});
+  try {
+    const DeviceLocks second({own_name("c"), own_name("b")});
+    FAIL();
+  } catch (const DeviceError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr(own_name("b")), HasSubstr(fmt::format("process {} (", ::getpid())),
+                                    HasSubstr("kill -INT")));
+  }
+  EXPECT_NO_THROW(DeviceLocks({own_name("c")})) << "what the refused one had taken is free again";
+}
+
+TEST(FolderLock, RefusesTheSecondWriter) {
+  const test::TemporaryFolder folder;
+  const auto results = results::CampaignFolder::create(folder.path(), "u", "c");
+  {
+    const auto first = lock_folder(results);
+    EXPECT_THROW((void)lock_folder(results), ConfigurationError);
+  }
+  EXPECT_NO_THROW((void)lock_folder(results));
+}
+
+}  // namespace
+}  // namespace kphi::daq

@@ -1,0 +1,138 @@
+#include "daq/run/console.hpp"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <thread>
+#include <vector>
+
+#include "test/blockable_output.hpp"
+#include "test/soon.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+using test::BlockableOutput;
+using Kind = BlockableOutput::Kind;
+
+constexpr auto kAtOnce = 200ms;  // of a call that waits for nobody, on a busy host
+
+/// What the console writes to, as a program has it: a descriptor that blocks.
+class Opened {
+ public:
+  explicit Opened(BlockableOutput& output)
+      : descriptor(::open(output.path().c_str(), O_WRONLY | O_NOCTTY | O_CLOEXEC)) {}
+  ~Opened() { ::close(descriptor); }
+  Opened(const Opened&) = delete;
+  Opened& operator=(const Opened&) = delete;
+  const int descriptor;
+};
+
+class BlockedConsole : public testing::TestWithParam<Kind> {
+ protected:
+  BlockableOutput blocked_{GetParam()}, free_{Kind::full_pipe};
+  Opened to_blocked_{blocked_}, to_free_{free_};
+};
+
+TEST_P(BlockedConsole, KeepsNobodyWaitingAndTheOtherStreamGoing) {
+  blocked_.block();
+  {
+    Console console;
+    const auto begun = steady_clock::now();
+    const std::string line = std::string(99, 'x').append("\n");
+    for (int i = 0; i < 5000; ++i) console.put(to_blocked_.descriptor, line, Worth::kept);
+    console.put(to_free_.descriptor, "data\n", Worth::kept);
+    EXPECT_LT(steady_clock::now() - begun, 5 * kAtOnce);
+    EXPECT_TRUE(test::soon([&] { return free_.read() == "data\n"; }));
+    EXPECT_GT(console.lost(), 2000u) << "there is room for 2600 of them";
+    const auto asked = steady_clock::now();
+    EXPECT_FALSE(console.finish(100ms));
+    EXPECT_LT(steady_clock::now() - asked, 100ms + kAtOnce);
+  }
+  SUCCEED() << "and its end waits for no terminal";
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, BlockedConsole, testing::ValuesIn(test::kBlockableKinds),
+                         testing::PrintToStringParamName());
+
+TEST(ConsoleWords, ComeInTheirOrderWhenTheTerminalGoesOn) {
+  BlockableOutput terminal(Kind::stopped_terminal);
+  const Opened opened(terminal);
+  Console console;
+  console.put(opened.descriptor, "before\n", Worth::kept);
+  ASSERT_TRUE(console.finish(5s));
+  terminal.block();
+  std::string expected = "before\r\n";
+  for (int i = 0; i < 300; ++i) {
+    console.put(opened.descriptor, "line " + std::to_string(i) + "\n", i % 2 == 0 ? Worth::kept : Worth::passing);
+    expected += "line " + std::to_string(i) + "\r\n";
+  }
+  EXPECT_FALSE(console.finish(20ms));
+  EXPECT_EQ(terminal.read(), "before\r\n");
+  terminal.resume();
+  EXPECT_TRUE(console.finish(5s));
+  EXPECT_TRUE(test::soon([&] { return terminal.read() == expected; })) << terminal.read();
+}
+
+TEST(ConsoleWords, OfTwoStreamsOnOneOutputKeepTheirOrder) {
+  BlockableOutput output(Kind::full_pipe);
+  const Opened out(output), words(output);
+  Console console;
+  std::string expected;
+  for (int i = 0; i < 200; ++i) {
+    console.put(i % 2 == 0 ? out.descriptor : words.descriptor, std::to_string(i) + "\n", Worth::kept);
+    expected += std::to_string(i) + "\n";
+  }
+  ASSERT_TRUE(console.finish(5s));
+  EXPECT_EQ(output.read(), expected);
+}
+
+TEST(ConsoleWords, OfManyThreadsAreAllWrittenAndNeverMixed) {
+  BlockableOutput output(Kind::full_pipe);
+  const Opened opened(output);
+  Console console;
+  std::vector<std::thread> callers;
+  for (const char letter : {'a', 'b', 'c', 'd'}) {
+    callers.emplace_back([&, letter] {
+      for (int i = 0; i < 100; ++i) console.put(opened.descriptor, std::string(60, letter) + "\n", Worth::kept);
+    });
+  }
+  for (auto& caller : callers) caller.join();
+  ASSERT_TRUE(console.finish(5s));
+  const std::string text = output.read();
+  ASSERT_EQ(text.size(), 400u * 61);
+  for (std::size_t line = 0; line < 400; ++line) {
+    EXPECT_EQ(text.substr(61 * line, 60), std::string(60, text[61 * line])) << line;
+  }
+}
+
+TEST(ConsoleWords, AreForgottenWhenTheirReaderIsGone) {
+  const auto ignored = ::signal(SIGPIPE, SIG_IGN);
+  std::array<int, 2> ends{};
+  ASSERT_EQ(::pipe2(ends.data(), O_CLOEXEC), 0);
+  ::close(ends[0]);
+  {
+    Console console;
+    EXPECT_FALSE(console.is_used());
+    for (int i = 0; i < 10; ++i) console.put(ends[1], "to nobody\n", Worth::kept);
+    console.put(ends[0], "to nothing\n", Worth::kept);
+    EXPECT_TRUE(console.finish(5s));
+    EXPECT_TRUE(console.is_used());
+  }
+  ::close(ends[1]);
+  ::signal(SIGPIPE, ignored);
+}
+
+TEST(ConsoleWords, NeedNoThreadBeforeThereAreAny) {
+  Console console;
+  EXPECT_TRUE(console.finish(0ms));
+}
+
+}  // namespace
+}  // namespace kphi::daq

@@ -1,0 +1,240 @@
+#include "daq/run/run.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "daq/guard/interlock.hpp"
+#include "daq/guard/interrupt.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
+#include "results/reduction/reduction.hpp"
+#include "results/run_reader.hpp"
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using results::Outcome;
+using results::Phase;
+using testing::HasSubstr;
+
+double to_rad_per_sec(double rpm) { return from_rpm(rpm).value(); }
+
+constexpr double kTrueK5x3 = 1.7e-8 / (kRadPerSecPerRpm * kRadPerSecPerRpm);
+
+class OneRun : public testing::Test {
+ protected:
+  explicit OneRun(int seed = 1) : config_(test::deterministic_config(seed)), bench_(config_) {
+    bench_.mounted("5x3", 0);
+  }
+
+  RunResult record(const std::function<bool()>& stop_asked = [] { return false; }) {
+    return record_run(bench_, test::first_run(campaign_, config_, file()), progress_, stop_asked);
+  }
+  [[nodiscard]] std::filesystem::path file() const { return folder_.path() / "5x3_phi000_rep1.h5"; }
+  [[nodiscard]] std::filesystem::path aborted_file() const { return folder_.path() / "5x3_phi000_rep1.aborted.h5"; }
+
+  /// True when the simulated motor is neither driven nor driven up again within the next second.
+  bool motor_is_let_go() {
+    const double before = std::abs(bench_.simulation().plant().motor().speed);
+    bench_.wait_until(bench_.clock().now() + std::chrono::seconds(1));
+    const double after = std::abs(bench_.simulation().plant().motor().speed);
+    return after < 1.0 || after < 0.7 * before;
+  }
+
+  test::TemporaryFolder folder_;
+  profiles::Campaign campaign_ = test::short_campaign();
+  profiles::BenchConfig config_;
+  DeterministicBench bench_;
+  NoProgress progress_;
+};
+
+TEST_F(OneRun, RecordsZeroStepsSpinDownAndZeroInThisOrder) {
+  const RunResult result = record();
+  const results::RunRecording run = results::read_run(result.file);
+  std::vector<Phase> phases;
+  for (const auto& mark : run.phases) phases.push_back(mark.phase);
+  EXPECT_THAT(phases, testing::ElementsAre(Phase::zero_before, Phase::step, Phase::step, Phase::step, Phase::step,
+                                           Phase::spin_down, Phase::zero_after, Phase::end));
+  EXPECT_EQ(run.outcome, Outcome::complete);
+}
+
+TEST_F(OneRun, HoldsNothingThatWasReadBeforeItBegan) {
+  bench_.wait_until(bench_.clock().now() + std::chrono::seconds(2));
+  const Instant began = bench_.clock().now();
+  const results::RunRecording run = results::read_run(record().file);
+  ASSERT_FALSE(run.motor.empty());
+  for (const auto& reading : run.motor) ASSERT_GE(Instant(reading.time_ns), began - std::chrono::milliseconds(20));
+  for (const auto& sample : run.load_cell) ASSERT_GE(Instant(sample.arrival_ns), began);
+}
+
+TEST_F(OneRun, LosesNoSampleAndSaysSo) {
+  const RunResult result = record();
+  EXPECT_EQ(result.account.received, result.account.expected);
+  EXPECT_EQ(result.account.lost_network + result.account.lost_host, 0u);
+  EXPECT_EQ(results::read_run(result.file).load_cell.size(), result.account.received);
+  EXPECT_TRUE(results::verify_run(result.file).whole());
+}
+
+TEST_F(OneRun, MeasuresTheThrustThatTheBenchWasBuiltWith) {
+  const auto steps = reduce(results::read_run(record().file));
+  ASSERT_EQ(steps.size(), 4u);
+  for (const auto& step : steps) {
+    EXPECT_EQ(step.quality_flags, 0u) << step.step;
+    EXPECT_NEAR(step.speed_rad_s, step.commanded_speed_rad_s, 0.005 * step.commanded_speed_rad_s);
+    EXPECT_NEAR(step.thrust_n, kTrueK5x3 * step.speed_rad_s * step.speed_rad_s, 0.01 + 0.01 * step.thrust_n);
+  }
+}
+
+TEST_F(OneRun, LeavesTheMotorCoasting) {
+  (void)record();
+  EXPECT_TRUE(motor_is_let_go());
+}
+
+TEST_F(OneRun, EndsWithACoastThatFeedsNothingBack) {
+  double highest_v = 0;
+  bench_.let_watch(
+      {.stepped = [&] { highest_v = std::max(highest_v, bench_.simulation().plant().motor().supply_volts); },
+       .stream_began = {},
+       .heard = {}});
+  const RunResult result = record();
+  EXPECT_EQ(result.stop->outcome, iq::StopReport::Outcome::standing);
+  EXPECT_LT(to_seconds(result.stop->time_to_coast.value()), 0.05);
+  EXPECT_LT(highest_v, 12.1) << "the supply cannot sink";
+}
+
+TEST_F(OneRun, RampsDownOnASupplyThatSinksCurrent) {
+  config_.supply_sinks_current = true;
+  const RunResult result = record();
+  ASSERT_TRUE(result.stop);
+  EXPECT_EQ(result.stop->outcome, iq::StopReport::Outcome::standing);
+  EXPECT_NEAR(result.stop->speed_at_start, to_rad_per_sec(18000), 20);
+  // 1000 rad/s² down to 500 rad/s, then it coasts.
+  EXPECT_NEAR(to_seconds(result.stop->time_to_coast.value()), 1.39, 0.05);
+  const results::RunRecording run = results::read_run(result.file);
+  const auto spin_down = std::find_if(run.phases.begin(), run.phases.end(),
+                                      [](const auto& mark) { return mark.phase == Phase::spin_down; });
+  for (const auto& reading : run.motor) {
+    const double since = 1e-9 * static_cast<double>(reading.time_ns - spin_down->time_ns);
+    if (reading.channel != results::MotorChannel::speed || since < 0.1 || since > 1.3) continue;
+    EXPECT_NEAR(reading.value, to_rad_per_sec(18000) - 1000 * since, 60) << since;
+  }
+}
+
+TEST_F(OneRun, LetsGoAtOnceAtATripAndSaysWhatBecameOfTheMotor) {
+  campaign_.limits.thrust_max = Newtons(2.0);
+  try {
+    (void)record();
+    FAIL();
+  } catch (const SafetyStop& stop) {
+    EXPECT_THAT(stop.what(),
+                testing::ContainsRegex("motor: coast confirmed after 0[.]0.*(at rest after|slowing down at)"));
+  }
+}
+
+TEST_F(OneRun, NeverOverwritesAnEarlierRun) {
+  (void)record();
+  const std::string before = test::bytes_of(file());
+  EXPECT_ANY_THROW((void)record());
+  EXPECT_EQ(test::bytes_of(file()), before);
+  EXPECT_TRUE(motor_is_let_go());
+}
+
+TEST_F(OneRun, StopsOnRequestAtAnyTickLetsTheMotorGoAndKeepsWhatItHas) {
+  // The run has about 370 ticks; these cover every phase.
+  for (const int last_tick : {0, 1, 30, 60, 90, 150, 200, 280, 300, 340}) {
+    int ticks = 0;
+    try {
+      (void)record([&] { return ticks++ >= last_tick; });
+      ADD_FAILURE() << "was not stopped at tick " << last_tick;
+    } catch (const Interrupted& e) {
+      EXPECT_THAT(e.words().data, HasSubstr("rep1.aborted"));
+      EXPECT_THAT(e.words().state, testing::StartsWith("motor: "));
+    }
+    EXPECT_TRUE(motor_is_let_go()) << "after tick " << last_tick;
+  }
+  EXPECT_EQ(results::read_run(aborted_file()).outcome, Outcome::aborted);
+  EXPECT_FALSE(std::filesystem::exists(file()));
+}
+
+TEST_F(OneRun, StopsWhenALimitIsPassedAndNamesIt) {
+  campaign_.limits.thrust_max = Newtons(2.0);
+  try {
+    (void)record();
+    FAIL() << "6 N of thrust passed a limit of 2 N";
+  } catch (const SafetyStop& e) {
+    EXPECT_THAT(e.what(), HasSubstr("is above 2 N"));
+  }
+  EXPECT_TRUE(motor_is_let_go());
+  EXPECT_THAT(results::read_run(aborted_file()).outcome_reason, HasSubstr("is above 2 N"));
+}
+
+/// A disk that is full after so many bytes.
+class FullDisk final : public results::FileLayer {
+ public:
+  explicit FullDisk(std::uint64_t room) : room_(room) {}
+  void before_write(std::uint64_t bytes) override {
+    if (bytes > room_) throw std::system_error(ENOSPC, std::generic_category());
+    room_ -= bytes;
+  }
+
+ private:
+  std::uint64_t room_;
+};
+
+TEST_F(OneRun, StopsWhenTheDiskIsFullAndLosesNothingWritten) {
+  FullDisk disk(600'000);
+  bench_.use_files(disk);
+  try {
+    (void)record();
+    FAIL() << "a full disk went unnoticed";
+  } catch (const RecordError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("disk full"));
+  }
+  EXPECT_TRUE(motor_is_let_go());
+  std::filesystem::path left;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_.path())) left = entry.path();
+  const results::RunRecording run = results::read_run(left);
+  EXPECT_GT(run.load_cell.size(), 3000u);
+  EXPECT_EQ(results::check_sequence(run.load_cell, 1).lost, 0u);
+}
+
+TEST_F(OneRun, StopsWhenAnExceptionComesFromTheProgressDisplay) {
+  class Broken final : public Progress {
+   public:
+    void tick(const Position& position, const Observation&) override {
+      if (position.step == 2) throw std::runtime_error("the terminal went away");
+    }
+    void step_done(const Position&, const Observation&) override {}
+    void say(const std::string&) override {}
+  } broken;
+  EXPECT_THROW((void)record_run(bench_, test::first_run(campaign_, config_, file()), broken, [] { return false; }),
+               std::runtime_error);
+  EXPECT_TRUE(motor_is_let_go());
+}
+
+TEST(RunFromASeed, GivesTheSameBytesTwiceAndOthersFromAnotherSeed) {
+  const auto bytes_from = [](int seed) {
+    const test::TemporaryFolder folder;
+    const profiles::BenchConfig config = test::deterministic_config(seed);
+    const profiles::Campaign campaign = test::short_campaign();
+    DeterministicBench bench(config);
+    bench.mounted("5x3", 0);
+    NoProgress progress;
+    const auto file = folder.path() / "run.h5";
+    (void)record_run(bench, test::first_run(campaign, config, file), progress, [] { return false; });
+    return test::bytes_of(file);
+  };
+  const std::string once = bytes_from(7);
+  EXPECT_GT(once.size(), 500'000u);
+  EXPECT_TRUE(once == bytes_from(7));
+  EXPECT_FALSE(once == bytes_from(8));
+}
+
+TEST(UtcText, IsIso8601) {
+  EXPECT_EQ(utc_text(ManualClock(), Instant(std::chrono::seconds(61))), "2021-05-30T00:01:01Z");
+}
+
+}  // namespace
+}  // namespace kphi::daq

@@ -1,0 +1,51 @@
+#include "daq/virtual/deterministic_air.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.hpp"
+
+namespace kphi::daq {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr sim::TrueAir kAir{18, 102689, 0.45};
+
+sim::UsbFault unplugged(Instant at, Duration lasts) {
+  sim::UsbFault fault;
+  fault.kind = sim::UsbFaultKind::unplug;
+  fault.at = at;
+  fault.lasts = lasts;
+  return fault;
+}
+
+void pass_until(Instant when, ManualClock& clock, DeterministicAir& air) {
+  for (; clock.now() < when; clock.advance(100ms)) air.look();
+}
+
+TEST(DeterministicAir, MeasuresTheTrueAir) {
+  const ManualClock clock;
+  const DeterministicAir air(clock, kAir, {});
+  ASSERT_TRUE(air.density());
+  EXPECT_NEAR(air.density()->kg_m3, 1.225, 0.003);
+}
+
+TEST(DeterministicAir, IsRefusedWhenNoReadingComes) {
+  const ManualClock clock;
+  EXPECT_THROW(DeterministicAir(clock, kAir, {unplugged(0s, 60s)}), DeviceError);
+}
+
+TEST(DeterministicAir, KnowsNothingOnceItsReadingIsAMinuteOldAndComesBackWithTheSensor) {
+  ManualClock clock;
+  DeterministicAir air(clock, kAir, {unplugged(8s, 100s)});
+  pass_until(60s, clock, air);
+  EXPECT_TRUE(air.density());
+  pass_until(75s, clock, air);
+  EXPECT_FALSE(air.density());
+  pass_until(160s, clock, air);
+  EXPECT_TRUE(air.density());
+}
+
+}  // namespace
+}  // namespace kphi::daq

@@ -1,0 +1,260 @@
+#include "drivers/iq/exchange/exchange.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "test/drivers/iq/wire.hpp"
+
+namespace kphi::iq {
+namespace {
+
+using namespace std::chrono_literals;
+using fake::Bytes;
+using fake::Wire;
+
+constexpr Duration kTimeout = 100ms;
+
+bool is_reply(const Bytes& reply, int type, int sub) { return reply.size() > 4 && reply[2] == type && reply[3] == sub; }
+
+TEST(Replies, ThatComeLateNeverAnswerTheNextRequest) {
+  // Alone: what a module answers later leaves after them.
+  for (const double factor : {1.01, 1.5, 1.99, 5.0}) {
+    Wire wire;
+    wire.connect();
+    wire.run_for(500ms);
+    wire.readings();
+    bool delayed = false;
+    Instant line_free{0};
+    wire.spoil = [&](Bytes& reply, Duration& delay) {
+      if (!delayed && is_reply(reply, 50, 13)) {
+        delayed = true;
+        reply = fake::message(50, 13, 3, 0, fake::f32(999));
+        delay = from_seconds(factor * to_seconds(kTimeout));
+      }
+      line_free = std::max(line_free, wire.now + delay);
+      delay = line_free - wire.now;
+    };
+    wire.run_for(2s);
+    EXPECT_GE(wire.session.counters().late_replies, 1u) << factor;
+    EXPECT_EQ(wire.session.counters().late_replies, wire.session.counters().timeouts);
+    const auto speeds = wire.values(Quantity::speed);
+    EXPECT_EQ(std::count(speeds.begin(), speeds.end(), 999.0), 0) << factor;
+    EXPECT_GT(static_cast<double>(speeds.size()), 90 - 5 * factor) << "and polling goes on behind it";
+  }
+}
+
+TEST(Replies, OfALineThatStallsInOrderAreNeverTakenForLaterOnes) {
+  // A true serial line keeps the order: while it stalls, nothing passes. Each value tells when it was asked.
+  std::mt19937 random(11);
+  Wire wire;
+  wire.connect();
+  wire.run_for(200ms);
+  wire.readings();
+  Instant line_free{0};
+  wire.spoil = [&](Bytes& reply, Duration& delay) {
+    if (is_reply(reply, 50, 13)) reply = fake::message(50, 13, 3, 0, fake::f32(to_seconds(wire.now)));
+    Instant at = wire.now + 2ms;
+    if (random() % 40 == 0) at += std::chrono::milliseconds(random() % 380);
+    line_free = std::max(line_free, at);
+    delay = line_free - wire.now;
+  };
+  wire.run_for(60s);
+  EXPECT_GT(wire.session.counters().late_replies, 5u);
+  int checked = 0;
+  for (const Reading& reading : wire.readings()) {
+    if (reading.quantity != Quantity::speed) continue;
+    ++checked;
+    const Instant asked = from_seconds(reading.value);
+    EXPECT_LT(std::abs(to_seconds(asked - (reading.time - reading.uncertainty))), 1e-4) << checked;
+  }
+  EXPECT_GT(checked, 100);
+}
+
+TEST(Replies, LeftUnreadByAHostThatSleptAreNotTakenForLaterOnes) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(500ms);
+  Session& session = wire.session;
+  while (session.output().empty()) {
+    wire.now = session.deadline();
+    session.advance(wire.now);
+  }
+  session.sent(session.output().size());
+  wire.now += 800ms;
+  session.advance(wire.now);  // the timers come first, then the bytes of before
+  wire.readings();
+  session.receive(fake::message(50, 13, 3, 0, fake::f32(111)), wire.now);
+  EXPECT_TRUE(wire.values(Quantity::speed).empty());
+  EXPECT_EQ(session.counters().late_replies, 1u);
+}
+
+TEST(Replies, ThatBeganToComeBeforeTheirQuestionAreSecondCopies) {
+  for (const bool paced : {false, true}) {
+    Settings settings;
+    settings.slow_hz = 0.001;
+    settings.wire_byte_time = paced ? 100us : 0us;
+    settings.wire_paces = paced;
+    Wire wire(settings);
+    wire.latency = paced ? 6ms : 2ms;
+    wire.connect();
+    wire.run_for(500ms);
+    wire.readings();
+    wire.spoil = [&](Bytes& reply, Duration&) {
+      if (!is_reply(reply, 50, 13)) return;
+      const Bytes copy = fake::message(50, 13, 3, 0, fake::f32(999));
+      // The next question follows 18 ms after this reply. On a line whose bytes take their time the copy may begin
+      // together with it.
+      wire.deliver(Bytes(copy.begin(), copy.begin() + 1), paced ? 20ms + 200us : 19ms);
+      wire.deliver(Bytes(copy.begin() + 1, copy.end()), paced ? 20ms + 1200us : 21ms);
+    };
+    const auto before = wire.session.counters().unasked;
+    wire.run_for(1s);
+    const auto speeds = wire.values(Quantity::speed);
+    EXPECT_GT(speeds.size(), 45u);
+    EXPECT_EQ(std::count(speeds.begin(), speeds.end(), 999.0), 0) << paced;
+    EXPECT_GT(wire.session.counters().unasked, before + 45);
+  }
+}
+
+TEST(Replies, OfAnotherModuleAreRejectedAndCounted) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(100ms);
+  wire.readings();
+  wire.spoil = [](Bytes& reply, Duration&) {
+    if (is_reply(reply, 50, 13)) reply = fake::message(50, 13, 3, 5, fake::f32(999));
+  };
+  wire.run_for(25ms);
+  wire.readings();
+  wire.run_for(500ms);
+  EXPECT_TRUE(wire.values(Quantity::speed).empty());
+  EXPECT_GT(wire.session.counters().wrong_module, 0u);
+}
+
+TEST(Replies, OfTheWrongLengthAreCountedAndNotStored) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(100ms);
+  wire.readings();
+  for (const Bytes& data : {Bytes{}, Bytes{1}, Bytes{1, 2, 3, 4, 5}, Bytes(57, 0)}) {
+    const auto before = wire.session.counters().wrong_length;
+    wire.module.values[{50, 13}] = data;
+    wire.run_for(25ms);
+    wire.readings();
+    wire.run_for(200ms);
+    EXPECT_TRUE(wire.values(Quantity::speed).empty()) << data.size();
+    EXPECT_GT(wire.session.counters().wrong_length, before);
+  }
+}
+
+TEST(Replies, ThatAreNoNumbersAreCountedAndNotStored) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(100ms);
+  wire.readings();
+  wire.module.values[{50, 13}] = fake::u32(0x7FC00000);
+  wire.run_for(100ms);
+  wire.module.values[{50, 13}] = fake::u32(0xFF800000);
+  wire.run_for(100ms);
+  for (const Reading& reading : wire.readings()) EXPECT_TRUE(std::isfinite(reading.value));
+  EXPECT_GE(wire.session.counters().bad_values, 8u);
+}
+
+TEST(Replies, ToNothingThatWasAskedAreCounted) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(100ms);
+  const auto before = wire.session.counters();
+  wire.deliver(fake::message(50, 37, 3, 0, fake::f32(1)));
+  wire.deliver(fake::message(50, 13, 0, 0));  // an echo of our own request
+  wire.deliver(fake::message(200, 1, 3, 0));
+  wire.deliver(fake::frame(7, {}));
+  wire.run_for(1ms);
+  EXPECT_EQ(wire.session.counters().unasked - before.unasked, 3u);
+  EXPECT_EQ(wire.session.counters().unknown_entries - before.unknown_entries, 1u);
+}
+
+TEST(Resync, BringsTheNextReplyWithinOneTimeoutAfterAFalseHeader) {
+  for (const std::uint8_t length : {0x0A, 0x1E, 0x3B}) {
+    Wire wire;
+    wire.connect();
+    wire.run_for(100ms);
+    wire.readings();
+    const auto timeouts = wire.session.counters().timeouts;
+    wire.deliver({0x55, length, 0x32});
+    wire.run_for(kTimeout);
+    EXPECT_GE(wire.values(Quantity::speed).size(), 4u) << int{length};
+    EXPECT_EQ(wire.session.counters().timeouts, timeouts);
+  }
+}
+
+TEST(Resync, WaitsForTheSecondHalfOfAFrameFromASlowAdapter) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(100ms);
+  wire.readings();
+  wire.spoil = [&](Bytes& reply, Duration& delay) {
+    if (!is_reply(reply, 50, 13)) return;
+    wire.deliver(Bytes(reply.begin() + 5, reply.end()), 16ms);
+    reply.resize(5);
+    delay = 1us;
+  };
+  wire.module.silent = {{69, 0}, {69, 1}, {50, 36}, {83, 0}, {50, 41}, {50, 0}, {5, 15}, {84, 1}, {50, 8}, {84, 0}};
+  wire.run_for(200ms);
+  EXPECT_GE(wire.values(Quantity::speed).size(), 9u);
+  EXPECT_EQ(wire.session.counters().resyncs, 0u);
+}
+
+TEST(Timeouts, FollowTheMeasuredRoundTripBetweenTheirBounds) {
+  Wire wire;
+  wire.connect();
+  EXPECT_EQ(wire.session.reply_timeout(), 40ms) << "a quick module: the shortest";
+  wire.latency = 60ms;
+  wire.run_for(3s);
+  EXPECT_GT(wire.session.reply_timeout(), 60ms);
+  EXPECT_LE(wire.session.reply_timeout(), 100ms);
+  const auto timeouts = wire.session.counters().timeouts;
+  wire.run_for(1s);
+  EXPECT_EQ(wire.session.counters().timeouts, timeouts) << "it has learned";
+  wire.latency = 2ms;
+  wire.run_for(3s);
+  EXPECT_EQ(wire.session.reply_timeout(), 40ms);
+}
+
+TEST(Timeouts, OfALostReplyCostOneGapOfThatEntryAndNoOther) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(500ms);
+  wire.readings();
+  bool lost = false;
+  wire.spoil = [&](Bytes& reply, Duration&) {
+    if (!std::exchange(lost, lost || is_reply(reply, 50, 13)) && is_reply(reply, 50, 13)) reply.clear();
+  };
+  wire.run_for(1s);
+  EXPECT_EQ(wire.session.counters().timeouts, 1u);
+  const auto readings = wire.readings();
+  const auto speeds =
+      std::count_if(readings.begin(), readings.end(), [](const Reading& r) { return r.quantity == Quantity::speed; });
+  EXPECT_GE(speeds, 50 - 4) << "a time-out of 40 ms at 50 Hz: others have overtaken it by then";
+  EXPECT_GE(readings.size() - static_cast<std::size_t>(speeds), 49u);
+}
+
+TEST(RoundTrips, AreToldWhenTheyBlurReadingsInTime) {
+  for (const Duration latency : {2ms, 16ms}) {
+    Wire wire;
+    wire.latency = latency;
+    wire.connect();
+    wire.run_for(5s);
+    EXPECT_NEAR(to_seconds(wire.session.round_trips().quantile(0.5)), to_seconds(latency), 0.1 * to_seconds(latency));
+    const auto events = wire.session.take_events();
+    const auto slow = std::count_if(events.begin(), events.end(),
+                                    [](const Event& e) { return e.kind == EventKind::slow_round_trip; });
+    EXPECT_EQ(slow, latency > 4ms ? 1 : 0);
+  }
+}
+
+}  // namespace
+}  // namespace kphi::iq

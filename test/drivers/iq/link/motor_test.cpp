@@ -1,0 +1,310 @@
+#include "drivers/iq/link/motor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <future>
+#include <memory>
+#include <stdexcept>
+
+#include "base/error.hpp"
+#include "test/drivers/iq/module_on_a_line.hpp"
+#include "test/soon.hpp"
+
+namespace kphi::iq {
+namespace {
+
+using namespace std::chrono_literals;
+using fake::Module;
+using fake::ModuleOnALine;
+using std::chrono::steady_clock;
+using test::soon;
+
+struct Stand {
+  SteadyClock clock;
+  ModuleOnALine line;
+  std::unique_ptr<Motor> motor = std::make_unique<Motor>(line.device(), 115200, Settings{}, clock);
+
+  void spin(double speed) {
+    motor->spin_at(RadPerSec(speed));
+    ASSERT_TRUE(line.heard_a_speed(speed));
+  }
+};
+
+std::string refusal(const std::string& device, unsigned baud = 115200) {
+  const SteadyClock clock;
+  try {
+    Motor motor(device, baud, Settings{}, clock);
+  } catch (const DeviceError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Motor, ConnectsCoastingAndKnowsItsModule) {
+  Stand stand;
+  EXPECT_TRUE(stand.line.with([](Module& m) { return m.heard.at(0).is_coast(); }));
+  EXPECT_EQ(stand.motor->identity().firmware_text(), "speed 0.0.32");
+  EXPECT_TRUE(stand.motor->alive());
+  EXPECT_EQ(stand.motor->failure(), "");
+  EXPECT_EQ(stand.line.with([](Module& m) { return fake::to_f32(m.values.at({52, 15})); }), 0.5f);
+}
+
+TEST(Motor, SpinsAndBringsTelemetry) {
+  Stand stand;
+  stand.spin(1234.5);
+  std::array<Reading, 32> some;
+  Reading speed;
+  ASSERT_TRUE(soon(
+      [&] {
+        stand.motor->renew();
+        const std::size_t n = stand.motor->take(some);
+        for (std::size_t i = 0; i < n; ++i) {
+          if (some[i].quantity == Quantity::speed) speed = some[i];
+        }
+        return speed.value == 1234.5;
+      },
+      2000ms));
+  EXPECT_GT(stand.motor->newest_reading(), Instant{0});
+  EXPECT_LE(stand.motor->newest_reading(), stand.clock.now());
+  EXPECT_LT(speed.uncertainty, 50ms);
+  EXPECT_GT(stand.motor->counters().replies, 10u);
+}
+
+TEST(Motor, ConfirmsThatItCoasts) {
+  Stand stand;
+  stand.spin(700);
+  EXPECT_TRUE(stand.motor->coast_and_confirm(1s));
+  EXPECT_TRUE(stand.line.left_coasting());
+  EXPECT_EQ(stand.line.with([](Module& m) { return m.values.at({50, 0}); }), fake::u8(5));
+}
+
+TEST(Motor, DoesNotClaimACoastThatTheModuleDenies) {
+  Stand stand;
+  stand.spin(700);
+  stand.line.with([](Module& m) { m.ignore_sets = true; });
+  EXPECT_FALSE(stand.motor->coast_and_confirm(150ms));
+}
+
+TEST(Motor, TakesOnlyTheLastOfManyCommandsWhenItCannotKeepUp) {
+  Stand stand;
+  for (int i = 1; i <= 1000; ++i) stand.motor->spin_at(RadPerSec(i));
+  EXPECT_TRUE(stand.line.heard_a_speed(1000));
+}
+
+TEST(Motor, ObeysManyThreads) {
+  Stand stand;
+  std::vector<std::future<void>> callers;
+  for (int i = 0; i < 4; ++i) {
+    callers.push_back(std::async(std::launch::async, [&, i] {
+      for (int n = 0; n < 200; ++n) {
+        if (i == 0) stand.motor->coast();
+        if (i == 1) stand.motor->renew();
+        if (i >= 2) stand.motor->spin_at(RadPerSec(100 * i + n % 7));
+        (void)stand.motor->counters();
+        (void)stand.motor->identity();
+        (void)stand.motor->newest_reading();
+      }
+    }));
+  }
+  for (auto& caller : callers) caller.get();
+  EXPECT_TRUE(stand.motor->coast_and_confirm(1s));
+  EXPECT_TRUE(stand.line.left_coasting());
+}
+
+TEST(Motor, RefusesNonsenseInTheCallersThread) {
+  Stand stand;
+  EXPECT_THROW(stand.motor->spin_at(RadPerSec(4000)), std::invalid_argument);
+  EXPECT_THROW(stand.motor->spin_at(RadPerSec(std::nan(""))), std::invalid_argument);
+}
+
+TEST(Motor, NoticesAPulledPlugAtOnce) {
+  Stand stand;
+  stand.line.unplug();
+  EXPECT_TRUE(soon([&] { return !stand.motor->alive(); }, 100ms));
+  EXPECT_NE(stand.motor->failure().find("unplugged"), std::string::npos) << stand.motor->failure();
+  EXPECT_THROW(stand.motor->spin_at(RadPerSec(100)), DeviceError);
+  EXPECT_FALSE(stand.motor->coast_and_confirm(10s)) << "without waiting for it";
+}
+
+TEST(Motor, RefusesASecondOwner) {
+  Stand stand;
+  EXPECT_NE(refusal(stand.line.device()).find("in use by another program"), std::string::npos);
+  EXPECT_TRUE(stand.motor->alive());
+}
+
+TEST(Motor, SaysWithinTwoSecondsThatNoModuleAnswers) {
+  ModuleOnALine line;
+  line.with([](Module& m) { m.mute = true; });
+  const auto start = steady_clock::now();
+  const std::string words = refusal(line.device());
+  EXPECT_LT(steady_clock::now() - start, 2s);
+  EXPECT_NE(words.find("connect at 115200 baud: nothing was received; check its supply"), std::string::npos) << words;
+}
+
+TEST(Motor, StretchesProtocolDeadlinesOnAFastBench) {
+  const SteadyClock clock(20);
+  ModuleOnALine line;
+  Motor motor(line.device(), 115200, Settings{}, clock);
+  EXPECT_EQ(line.with([](Module& m) { return fake::to_f32(m.values.at({52, 15})); }), 0.5f) << "its own seconds";
+  std::array<Reading, 512> readings;
+  std::size_t speeds = 0;
+  ASSERT_TRUE(soon(
+      [&] {
+        const std::size_t n = motor.take(readings);
+        for (std::size_t i = 0; i < n; ++i) speeds += readings[i].quantity == Quantity::speed ? 1 : 0;
+        return speeds > 200;
+      },
+      2000ms));
+}
+
+TEST(Motor, AnswersQuestionsInPassing) {
+  Stand stand;
+  stand.spin(700);
+  const auto replies = stand.motor->inquire({{find("brushless_drive.motor_Kv"), {}},
+                                             {find("propeller_motor_control.ctrl_thrust"), {}},
+                                             {find("propeller_motor_control.timeout"), 0.25}});
+  ASSERT_EQ(replies.size(), 3u);
+  EXPECT_EQ(replies[0].value, 2200.0);
+  EXPECT_EQ(replies[1].value, std::nullopt);
+  EXPECT_TRUE(replies[2].accepted);
+  EXPECT_THROW((void)stand.motor->inquire({{find("propeller_motor_control.ctrl_pwm"), 0.1}}), std::invalid_argument);
+  EXPECT_TRUE(stand.motor->alive());
+}
+
+TEST(Lease, CoastsAMotorWhoseCallerFellSilentWhilePollingGoesOn) {
+  Stand stand;
+  const auto start = steady_clock::now();
+  stand.spin(900);
+  ASSERT_TRUE(stand.line.wait_for([](const Module& m) { return m.last_motion()->is_coast(); }, 1000ms));
+  EXPECT_GE(steady_clock::now() - start, 490ms);
+  EXPECT_TRUE(soon([&] { return stand.motor->counters().lease_expiries == 1; }, 500ms));
+  EXPECT_TRUE(stand.motor->alive()) << "it may spin again when told";
+  stand.spin(100);
+}
+
+TEST(Lease, IsKeptByACallerThatIsAlive) {
+  Stand stand;
+  stand.spin(900);
+  EXPECT_FALSE(soon(
+      [&] {
+        stand.motor->renew();
+        return stand.line.left_coasting();
+      },
+      900ms));
+}
+
+TEST(Lease, IsNotNeededToStayCoasting) {
+  Stand stand;
+  stand.spin(900);
+  ASSERT_TRUE(stand.motor->coast_and_confirm(1s));
+  stand.motor->renew();
+  EXPECT_FALSE(soon([&] { return !stand.line.left_coasting(); }, 100ms));
+}
+
+struct WayOut {
+  const char* name;
+  void (*leave)(Stand&);
+};
+
+class EveryWayOut : public testing::TestWithParam<WayOut> {};
+
+TEST_P(EveryWayOut, LeavesCoastAsTheLastMotionCommand) {
+  Stand stand;
+  stand.spin(2000);
+  GetParam().leave(stand);
+  EXPECT_TRUE(stand.line.wait_for([](const Module& m) { return m.last_motion()->is_coast(); }, 3000ms));
+  stand.motor.reset();
+  EXPECT_TRUE(stand.line.left_coasting());
+  EXPECT_GE(stand.line.with([](Module& m) { return m.count([](const auto& h) { return h.is_coast(); }); }), 4u);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Motor, EveryWayOut,
+    testing::Values(WayOut{"Destruction", [](Stand& s) { s.motor.reset(); }},
+                    WayOut{"Exception",
+                           [](Stand& s) {
+                             try {
+                               const auto motor = std::move(s.motor);
+                               throw std::runtime_error("the runner failed");
+                             } catch (const std::runtime_error&) {
+                             }
+                           }},
+                    WayOut{"Coast", [](Stand& s) { s.motor->coast(); }},
+                    WayOut{"ConfirmedCoast", [](Stand& s) { (void)s.motor->coast_and_confirm(1s); }},
+                    WayOut{"EmergencyStop", [](Stand& s) { s.motor->emergency_stop(); }},
+                    WayOut{"SlowStop", [](Stand& s) { EXPECT_TRUE(s.motor->stop({.deceleration = 1000}).safe()); }},
+                    WayOut{"SlowStopThatIsAbandoned",
+                           [](Stand& s) {
+                             auto stop =
+                                 std::async(std::launch::async, [&] { (void)s.motor->stop({.deceleration = 1000}); });
+                             s.motor->coast();
+                             stop.get();
+                           }},
+                    WayOut{"ModuleThatRestarts",
+                           [](Stand& s) {
+                             s.line.with([](Module& m) { m.restart(); });
+                             EXPECT_TRUE(soon(
+                                 [&] {
+                                   s.motor->renew();
+                                   return !s.motor->alive();
+                                 },
+                                 3000ms));
+                           }},
+                    WayOut{"SpeedZero", [](Stand& s) { s.motor->spin_at(RadPerSec(0)); }},
+                    WayOut{"SilentCaller", [](Stand&) {}},
+                    WayOut{"DestructionWithACommandOnItsWay",
+                           [](Stand& s) {
+                             s.motor->spin_at(RadPerSec(1000));
+                             s.motor.reset();
+                           }},
+                    WayOut{"DestructionFromAnotherThread",
+                           [](Stand& s) { std::async(std::launch::async, [&] { s.motor.reset(); }).get(); }},
+                    WayOut{"ModuleThatStopsAnswering",
+                           [](Stand& s) {
+                             s.line.with([](Module& m) { m.mute = true; });
+                             EXPECT_TRUE(soon(
+                                 [&] {
+                                   s.motor->renew();
+                                   return !s.motor->alive();
+                                 },
+                                 3000ms));
+                           }},
+                    WayOut{"ModuleThatDeniesTheCoast",
+                           [](Stand& s) {
+                             s.line.with([](Module& m) { m.ignore_sets = true; });
+                             s.motor.reset();
+                           }},
+                    WayOut{"ModuleThatSendsGarbage",
+                           [](Stand& s) {
+                             s.line.with([](Module& m) {
+                               m.ignore_sets = true;
+                               for (auto& [key, value] : m.values) value = fake::Bytes(57, 0x55);
+                             });
+                             s.motor.reset();
+                           }}),
+    [](const auto& way) { return std::string(way.param.name); });
+
+TEST(FailedConnection, LeavesCoastAsTheOnlyMotionCommand) {
+  for (const auto& spoil : std::vector<void (*)(Module&)>{[](Module& m) { m.mute = true; },
+                                                          [](Module& m) {
+                                                            m.read_only = {{52, 15}};
+                                                          },
+                                                          [](Module& m) {
+                                                            m.silent = {{5, 16}};
+                                                          },
+                                                          [](Module& m) {
+                                                            m.values[{50, 0}] = fake::u8(3);
+                                                            m.ignore_sets = true;
+                                                          }}) {
+    ModuleOnALine line;
+    line.with(spoil);
+    EXPECT_NE(refusal(line.device()), "");
+    EXPECT_TRUE(line.left_coasting());
+    EXPECT_EQ(
+        line.with([](Module& m) { return m.count([](const auto& h) { return h.is_motion() && !h.is_coast(); }); }), 0u);
+  }
+}
+
+}  // namespace
+}  // namespace kphi::iq

@@ -1,0 +1,202 @@
+#include "drivers/iq/session/connecting.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "test/drivers/iq/wire.hpp"
+
+namespace kphi::iq {
+namespace {
+
+using namespace std::chrono_literals;
+using fake::Bytes;
+using fake::State;
+using fake::Wire;
+
+TEST(Connecting, CoastsBeforeAnythingElse) {
+  Wire wire;
+  wire.connect();
+  ASSERT_FALSE(wire.module.heard.empty());
+  EXPECT_TRUE(wire.module.heard[0].is_coast());
+  EXPECT_EQ(fake::hex(std::span(wire.batches[0].second).first(7)), "55 02 34 02 01 8E 06");
+}
+
+TEST(Connecting, ReadsWhoTheModuleIs) {
+  Wire wire;
+  wire.connect();
+  const Identity& identity = wire.session.identity();
+  EXPECT_EQ(identity.firmware_text(), "speed 0.0.32");
+  EXPECT_EQ(identity.uid_text(), "111111112222222233333333");
+  EXPECT_EQ(identity.hardware, 0x10100u);
+  EXPECT_EQ(identity.electronics, 0x30000u);
+  EXPECT_EQ(identity.pole_pairs, 7);
+  EXPECT_EQ(identity.motor_kv_rpm_per_volt, 2200);
+  EXPECT_EQ(identity.timeout_s, 0.5);
+  EXPECT_EQ(identity.coil_temperature_client, 83);
+  EXPECT_NE(identity.summary().find("speed 0.0.32"), std::string::npos);
+}
+
+TEST(Connecting, MakesTheModuleCoastByItselfWithoutASong) {
+  Wire wire;
+  wire.connect();
+  EXPECT_EQ(fake::to_f32(wire.module.values.at({52, 15})), 0.5f);
+  EXPECT_EQ(wire.module.values.at({52, 18}), fake::u8(0));
+  EXPECT_EQ(wire.module.values.at({52, 19}), fake::u8(0));
+  EXPECT_EQ(wire.module.count([](const auto& m) { return m.access == 2; }), 0u) << "nothing is ever saved";
+}
+
+TEST(Connecting, FailsWhenTheTimeoutIsNotAccepted) {
+  for (const int sub : {15, 18, 19}) {
+    Wire wire;
+    wire.module.read_only = {{52, sub}};
+    wire.session.connect(wire.now);
+    ASSERT_TRUE(wire.run_to_state(State::failed, 3s)) << sub;
+    EXPECT_NE(wire.session.failure().find("the motor would keep turning if this host died"), std::string::npos)
+        << wire.session.failure();
+    EXPECT_TRUE(wire.module.last_motion()->is_coast());
+  }
+}
+
+TEST(Connecting, ComparesTheTimeoutBitByBit) {
+  Wire wire;
+  wire.module.read_only = {{52, 15}};
+  wire.module.values[{52, 15}] = fake::f32(std::nextafter(0.5f, 1.0f));
+  wire.session.connect(wire.now);
+  EXPECT_TRUE(wire.run_to_state(State::failed, 3s));
+}
+
+TEST(Connecting, RepeatsASetThatWasLost) {
+  Wire wire;
+  wire.module.ignore_sets = true;
+  wire.session.connect(wire.now);
+  const auto sets = [&] {
+    return wire.module.count([](const auto& m) { return m.type == 52 && m.sub == 15 && m.access == 1; });
+  };
+  while (sets() == 0) wire.run_for(1ms);
+  wire.module.ignore_sets = false;
+  EXPECT_TRUE(wire.run_to_state(State::ready, 1s)) << wire.session.failure();
+  EXPECT_GE(sets(), 2u);
+}
+
+TEST(Connecting, AcceptsOldFirmwareWithoutTimeoutBehaviour) {
+  Wire wire;
+  wire.module.silent = {{77, 0}, {52, 18}, {52, 19}};
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::ready, 10s)) << wire.session.failure();
+  EXPECT_FALSE(wire.session.identity().timeout_behavior_set);
+}
+
+TEST(Connecting, TakesTheCoilTemperatureOfOldFirmware) {
+  Wire wire;
+  wire.module.silent = {{83, 0}};
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::ready, 3s)) << wire.session.failure();
+  EXPECT_EQ(wire.session.identity().coil_temperature_client, 77);
+  wire.readings();
+  wire.run_for(1s);
+  const auto temperatures = wire.values(Quantity::coil_temperature);
+  ASSERT_FALSE(temperatures.empty());
+  EXPECT_EQ(temperatures[0], 44.5);
+}
+
+TEST(Connecting, GoesOnWithoutACoilTemperature) {
+  Wire wire;
+  wire.module.silent = {{83, 0}, {77, 0}};
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::ready, 3s)) << wire.session.failure();
+  wire.run_for(1s);
+  EXPECT_TRUE(wire.values(Quantity::coil_temperature).empty());
+  EXPECT_EQ(wire.session.state(), State::ready);
+}
+
+TEST(Connecting, FailsWithinASecondWhenNothingAnswers) {
+  Wire wire;
+  wire.module.mute = true;
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
+  EXPECT_EQ(wire.session.failure(), "nothing was received");
+}
+
+TEST(Connecting, SaysWhenOnlyGarbageComes) {
+  Wire wire;
+  wire.spoil = [](Bytes& reply, Duration&) { reply = {0x00, 0xE6, 0x55, 0x80}; };
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
+  EXPECT_EQ(wire.session.failure(), "bytes were received, but no valid packet");
+}
+
+TEST(Connecting, SaysWhenAnotherModuleAnswers) {
+  Wire wire;
+  wire.spoil = [](Bytes& reply, Duration&) { reply = fake::message(50, 0, 3, 5, fake::u8(5)); };
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
+  EXPECT_EQ(wire.session.failure(), "only modules with another id answer");
+  EXPECT_GT(wire.session.counters().wrong_module, 0u);
+}
+
+TEST(Connecting, FailsWhenTheModuleDoesNotCoast) {
+  Wire wire;
+  wire.module.ignore_sets = true;
+  wire.module.values[{50, 0}] = fake::u8(3);
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::failed, 2s));
+  EXPECT_NE(wire.session.failure().find("coast not confirmed"), std::string::npos);
+}
+
+TEST(Reconnecting, SendsNothingOfBefore) {
+  Wire wire;
+  wire.connect();
+  wire.session.spin_at(RadPerSec(700), wire.now);
+  wire.session.sent(3);  // the rest has not left when the plug is pulled
+  wire.session.fail(EventKind::port_lost, "unplugged", wire.now);
+  wire.session.connect_anew(wire.now + 1s);
+  wire.now += 1s;
+  EXPECT_EQ(fake::hex(wire.session.output().first(7)), "55 02 34 02 01 8E 06") << "a whole coast, not half a speed";
+  wire.flush();
+  ASSERT_TRUE(wire.run_to_state(State::ready, 1s));
+  EXPECT_EQ(wire.module.count([](const auto& m) { return m.is_speed(); }), 0u);
+}
+
+TEST(Reconnecting, RefusesAnotherModuleBeforeTellingItAnythingButCoast) {
+  Wire wire;
+  wire.connect();
+  wire.session.fail(EventKind::port_lost, "unplugged", wire.now);
+  wire.module.heard.clear();
+  wire.module.values[{5, 6}] = fake::u32(0x99999999);
+  wire.session.connect_anew(wire.now);
+  wire.flush();
+  ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
+  EXPECT_NE(wire.session.failure().find("another module answers, uid 111111112222222299999999"), std::string::npos)
+      << wire.session.failure();
+  EXPECT_EQ(wire.session.take_events().back().kind, EventKind::another_module);
+  EXPECT_EQ(wire.module.count([](const auto& m) { return m.access == 1 && !m.is_coast(); }), 0u);
+}
+
+TEST(OldFirmware, AnswersForItsSystemOnIdZero) {
+  Settings settings;
+  settings.module_id = 7;
+  Wire wire(settings);
+  wire.module.id = 7;
+  wire.module.values[{5, 14}] = fake::u8(7);
+  wire.module.old_system_control = true;
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::ready, 3s)) << wire.session.failure();
+  EXPECT_EQ(wire.session.identity().system_control_id, 0);
+  EXPECT_EQ(wire.session.identity().uid1, 0x11111111u);
+  wire.run_for(1s);
+  EXPECT_EQ(wire.session.counters().wrong_module, 0u);
+  wire.module.restart();
+  EXPECT_TRUE(wire.run_to_state(State::failed, 400ms)) << "its uptime is read there too";
+}
+
+TEST(OldFirmware, IsNotTakenForModuleZeroWhenItsOtherClientsHaveAnotherId) {
+  Wire wire;
+  wire.module.values[{5, 14}] = fake::u8(7);
+  wire.session.connect(wire.now);
+  ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
+  EXPECT_NE(wire.session.failure().find("set module_id to 7"), std::string::npos) << wire.session.failure();
+}
+
+}  // namespace
+}  // namespace kphi::iq

@@ -1,0 +1,184 @@
+#include "drivers/iq/session/polling.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "test/drivers/iq/wire.hpp"
+
+namespace kphi::iq {
+namespace {
+
+using namespace std::chrono_literals;
+using fake::Bytes;
+using fake::State;
+using fake::Wire;
+
+bool is_reply(const Bytes& reply, int type, int sub) { return reply.size() > 4 && reply[2] == type && reply[3] == sub; }
+
+TEST(Telemetry, ReadsSpeedEveryCycleAndTheOthersInTurn) {
+  Wire wire;
+  wire.connect();
+  wire.spin(1000);
+  wire.run_for(200ms);
+  wire.readings();
+  wire.run_for(3s);
+  std::map<Quantity, int> count;
+  std::map<Quantity, double> value;
+  for (const Reading& reading : wire.readings()) {
+    ++count[reading.quantity];
+    value[reading.quantity] = reading.value;
+  }
+  EXPECT_NEAR(count[Quantity::speed], 150, 1);
+  for (int i = 1; i < kQuantities; ++i) EXPECT_NEAR(count[static_cast<Quantity>(i)], 150.0 / (kQuantities - 1), 1) << i;
+  EXPECT_EQ(value[Quantity::speed], 1000);
+  EXPECT_EQ(value[Quantity::supply_voltage], 12.5);
+  EXPECT_EQ(value[Quantity::supply_current], 3.25);
+  EXPECT_EQ(value[Quantity::motor_current], 10);
+  EXPECT_EQ(value[Quantity::coil_temperature], 55.25);
+  EXPECT_EQ(value[Quantity::derate], 1.0);
+  EXPECT_EQ(value[Quantity::drive_mode], 3);
+}
+
+TEST(Telemetry, AsksBothOfACycleInOneBatch) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(100ms);
+  wire.batches.clear();
+  wire.run_for(1s);
+  const auto both = [](const auto& batch) { return batch.second.size() >= 14; };
+  EXPECT_EQ(std::count_if(wire.batches.begin(), wire.batches.end(), both), 50 + 2)
+      << "twice it looks for a restart alone";
+  EXPECT_EQ(wire.batches.size(), 50u + 2u);
+}
+
+TEST(Telemetry, IsNotDoubledWhenTheModuleIsSlow) {
+  Wire wire;
+  wire.connect();
+  wire.latency = 55ms;
+  wire.run_for(100ms);
+  wire.module.heard.clear();
+  wire.run_for(1s);
+  const auto speeds = wire.module.count([](const auto& m) { return m.type == 50 && m.sub == 13; });
+  EXPECT_LE(speeds, 1000u / 55 + 1);
+  EXPECT_GE(speeds, 15u);
+  EXPECT_GT(wire.session.counters().skipped_polls, 0u);
+}
+
+TEST(Telemetry, StaysInsideTheCreditWindow) {
+  for (const std::size_t credit : {18u, 21u, 63u}) {
+    Settings settings;
+    settings.credit_bytes = credit;
+    settings.telemetry_hz = 1000;
+    settings.slow_hz = 1000;
+    Wire wire(settings);
+    wire.latency = 9ms;
+    std::size_t most = 0;
+    wire.spoil = [&](Bytes&, Duration&) { most = std::max(most, 7 * (wire.replies_on_their_way() + 1)); };
+    wire.session.connect(wire.now);
+    for (int i = 0; i < 3000; ++i) {
+      wire.run_for(100us);
+      if (wire.session.state() == State::ready && i % 50 == 0) wire.spin(100 + i);
+    }
+    EXPECT_LE(most, credit);
+    EXPECT_GE(most, std::min<std::size_t>(credit, 42) / 7 * 7) << "pipelined";
+  }
+}
+
+TEST(Telemetry, StampsTheMiddleLessTheTimeOnTheWire) {
+  Settings settings;
+  settings.wire_byte_time = 100us;
+  Wire wire(settings);
+  wire.latency = 7 * 100us + 11 * 100us + 2ms;
+  wire.connect();
+  wire.run_for(1s);
+  wire.readings();
+  wire.batches.clear();
+  wire.run_for(20ms);
+  ASSERT_EQ(wire.batches.size(), 1u);
+  wire.run_for(10ms);
+  const auto readings = wire.readings();
+  EXPECT_TRUE(std::any_of(readings.begin(), readings.end(), [&](const Reading& reading) {
+    return reading.quantity == Quantity::speed && reading.time == wire.batches[0].first + 700us + 1ms &&
+           reading.uncertainty == 1ms;
+  }));
+}
+
+TEST(Telemetry, UncertaintyCoversTheMomentOfMeasurement) {
+  Wire wire;
+  wire.connect();
+  wire.run_for(30ms);
+  std::mt19937 random(5);
+  wire.spoil = [&](Bytes& reply, Duration& delay) {
+    delay = std::chrono::microseconds(20 + random() % 9000);
+    const Duration until_measured = delay * (random() % 11) / 10;
+    if (is_reply(reply, 50, 13)) {
+      reply = fake::message(50, 13, 3, 0, fake::f32(to_seconds(wire.now + until_measured)));
+    }
+  };
+  wire.run_for(30ms);
+  wire.readings();
+  wire.run_for(2s);
+  int checked = 0;
+  for (const Reading& reading : wire.readings()) {
+    if (reading.quantity != Quantity::speed) continue;
+    EXPECT_LE(std::abs(reading.value - to_seconds(reading.time)), to_seconds(reading.uncertainty) + 1e-6);
+    ++checked;
+  }
+  EXPECT_GT(checked, 90);
+}
+
+TEST(Telemetry, KeepsABoundedNumberOfReadings) {
+  Settings settings;
+  settings.telemetry_hz = 10000;
+  Wire wire(settings);
+  wire.latency = 10us;
+  wire.connect();
+  wire.run_for(1s);
+  EXPECT_EQ(wire.readings().size(), 4096u);
+  EXPECT_GT(wire.session.counters().dropped_readings, 0u);
+}
+
+TEST(Telemetry, CarriesItsThreeStamps) {
+  Settings settings;
+  settings.wire_byte_time = 100us;
+  Wire wire(settings);
+  wire.latency = 5ms;
+  wire.connect();
+  wire.run_for(1s);
+  wire.readings();
+  wire.batches.clear();
+  while (wire.batches.empty()) wire.run_for(1ms);
+  wire.run_for(6ms);
+  bool seen = false;
+  for (const Reading& reading : wire.readings()) {
+    if (reading.quantity != Quantity::speed || reading.stamps.sent != wire.batches[0].first) continue;
+    seen = true;
+    EXPECT_EQ(reading.stamps.parsed, wire.batches[0].first + 5ms);
+    EXPECT_EQ(reading.stamps.first_byte, reading.stamps.parsed - 10 * 100us) << "11 bytes, the last one just now";
+  }
+  EXPECT_TRUE(seen);
+}
+
+TEST(Telemetry, AsksForAllThatIsWantedInEveryCycle) {
+  Settings settings;
+  settings.telemetry_hz = 100;
+  settings.slow_hz = 10;
+  settings.every_cycle = {Quantity::speed, Quantity::motor_current, Quantity::supply_voltage, Quantity::supply_current};
+  Wire wire(settings);
+  wire.connect();
+  wire.run_for(100ms);
+  wire.readings();
+  wire.run_for(1s);
+  std::map<Quantity, int> count;
+  for (const Reading& reading : wire.readings()) ++count[reading.quantity];
+  for (const Quantity quantity : settings.every_cycle) EXPECT_NEAR(count[quantity], 100, 1) << name_of(quantity);
+  EXPECT_NEAR(count[Quantity::coil_temperature] + count[Quantity::derate] + count[Quantity::drive_mode] +
+                  count[Quantity::drive_pwm] + count[Quantity::fault_now],
+              10, 1);
+}
+
+}  // namespace
+}  // namespace kphi::iq

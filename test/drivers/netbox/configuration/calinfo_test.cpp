@@ -1,0 +1,160 @@
+#include "drivers/netbox/configuration/calinfo.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.hpp"
+#include "drivers/netbox/wire/codes.hpp"
+#include "test/drivers/netbox/fake_box.hpp"
+
+namespace kphi::netbox {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+/// The manual's example: N, N-m, 1e6 each; an SI-40-2.
+const test::Bytes kExample = {0x12, 0x34, 0x02, 0x03, 0x00, 0x0f, 0x42, 0x40, 0x00, 0x0f, 0x42, 0x40,
+                              0x04, 0xc5, 0x04, 0xc5, 0x0e, 0x4e, 0x00, 0x3d, 0x00, 0x3d, 0x00, 0x3d};
+
+Configuration si_box() {
+  Configuration configuration;
+  configuration.counts_per_newton = configuration.counts_per_newton_metre = 1e6;
+  return configuration;
+}
+
+/// Answers one request per connection with given bytes, in pieces.
+class FakeTcp {
+ public:
+  explicit FakeTcp(std::vector<test::Bytes> pieces) : pieces_(std::move(pieces)), socket_(SOCK_STREAM) {
+    if (listen(socket_.descriptor(), 4) != 0) throw std::runtime_error("listen");
+    thread_ = std::thread([this] { serve(); });
+  }
+  ~FakeTcp() {
+    shutdown(socket_.descriptor(), SHUT_RDWR);
+    thread_.join();
+  }
+  std::uint16_t port() const { return socket_.port(); }
+  test::Bytes request;  ///< of the last connection that has ended
+
+ private:
+  void serve() {
+    for (int client; (client = accept(socket_.descriptor(), nullptr, nullptr)) >= 0; close(client)) {
+      test::Bytes bytes(20);
+      if (recv(client, bytes.data(), bytes.size(), MSG_WAITALL) != 20) continue;
+      request = bytes;
+      for (const test::Bytes& piece : pieces_) {
+        send(client, piece.data(), piece.size(), MSG_NOSIGNAL);
+        usleep(2000);  // so that the pieces travel apart
+      }
+    }
+  }
+  std::vector<test::Bytes> pieces_;
+  test::LoopbackSocket socket_;
+  std::thread thread_;
+};
+
+std::string failure_of(std::uint16_t port, std::chrono::nanoseconds timeout = 2s) {
+  try {
+    static_cast<void>(read_calinfo("127.0.0.1", port, timeout));
+  } catch (const DeviceError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(Calinfo, TheRequestIsTwentyBytes) {
+  std::array<std::uint8_t, 20> expected{};
+  expected[0] = 1;
+  EXPECT_EQ(encode_read_calinfo(), expected);
+}
+
+TEST(Calinfo, DecodesTheManualsExample) {
+  const auto calinfo = decode_calinfo(kExample);
+  ASSERT_TRUE(calinfo);
+  EXPECT_EQ(calinfo->force_unit, 2);
+  EXPECT_EQ(calinfo->torque_unit, 3);
+  EXPECT_EQ(calinfo->counts_per_force, 1'000'000u);
+  EXPECT_EQ(calinfo->counts_per_torque, 1'000'000u);
+  EXPECT_THAT(calinfo->scale_factors, testing::ElementsAre(1221, 1221, 3662, 61, 61, 61));
+}
+
+TEST(Calinfo, RefusesWrongSizesAndHeaders) {
+  for (std::size_t size = 0; size < kExample.size(); ++size)
+    EXPECT_FALSE(decode_calinfo(std::span(kExample).first(size)));
+  test::Bytes longer = kExample, other = kExample;
+  longer.push_back(0);
+  other[1] = 0x35;
+  EXPECT_FALSE(decode_calinfo(longer));
+  EXPECT_FALSE(decode_calinfo(other));
+}
+
+TEST(Calinfo, ReadsAnAnswerInPieces) {
+  FakeTcp box({test::Bytes(kExample.begin(), kExample.begin() + 5), test::Bytes(kExample.begin() + 5, kExample.end())});
+  EXPECT_EQ(read_calinfo("127.0.0.1", box.port(), 2s), decode_calinfo(kExample));
+}
+
+TEST(Calinfo, AShortAnswerIsAnError) {
+  FakeTcp box({test::Bytes(kExample.begin(), kExample.begin() + 18)});
+  EXPECT_THAT(failure_of(box.port()), HasSubstr("read the calibration over TCP"));
+}
+
+TEST(Calinfo, AnAnswerOfSomethingElseIsAnError) {
+  FakeTcp box({test::Bytes(24, 'H')});
+  EXPECT_THAT(failure_of(box.port()), HasSubstr("none of a Net Box"));
+}
+
+TEST(Calinfo, ABoxThatIsMuteIsAnErrorInTime) {
+  test::LoopbackSocket mute(SOCK_STREAM);
+  listen(mute.descriptor(), 4);
+  const auto begun = std::chrono::steady_clock::now();
+  EXPECT_THAT(failure_of(mute.port(), 50ms), HasSubstr("no answer within 0.1 s"));
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, 2s);
+}
+
+TEST(CalinfoComparison, FindsNothingWhenBothAgree) { EXPECT_FALSE(compare(*decode_calinfo(kExample), si_box())); }
+
+TEST(CalinfoComparison, KnowsThatUnitsMayDiffer) {
+  Calinfo calinfo = *decode_calinfo(kExample);
+  calinfo.torque_unit = static_cast<std::uint8_t>(TorqueUnit::newton_millimetre);
+  calinfo.counts_per_torque = 1000;
+  EXPECT_FALSE(compare(calinfo, si_box()));
+}
+
+TEST(CalinfoComparison, ADisagreementIsAFault) {
+  for (int which = 0; which < 3; ++which) {
+    Calinfo calinfo = *decode_calinfo(kExample);
+    if (which == 0) calinfo.counts_per_force = 600'000;
+    if (which == 1) calinfo.counts_per_torque = 1'000'010;
+    if (which == 2) calinfo.force_unit = static_cast<std::uint8_t>(ForceUnit::lbf);
+    const auto finding = compare(calinfo, si_box());
+    ASSERT_TRUE(finding);
+    EXPECT_EQ(finding->severity, Severity::fault);
+    EXPECT_THAT(finding->what, HasSubstr("is not that read over HTTP"));
+  }
+}
+
+TEST(CalinfoComparison, AnUnknownUnitIsAFault) {
+  Calinfo calinfo = *decode_calinfo(kExample);
+  calinfo.force_unit = 7;
+  EXPECT_EQ(compare(calinfo, si_box())->severity, Severity::fault);
+}
+
+TEST(CalinfoCrossCheck, ABoxWithoutTheInterfaceIsANote) {
+  std::uint16_t closed = 0;
+  {
+    const test::LoopbackSocket gone(SOCK_STREAM);
+    closed = gone.port();
+  }
+  const auto finding = cross_check("127.0.0.1", closed, si_box(), 2s);
+  ASSERT_TRUE(finding);
+  EXPECT_EQ(finding->severity, Severity::note);
+}
+
+TEST(CalinfoCrossCheck, AsksAndCompares) {
+  FakeTcp box({kExample});
+  EXPECT_FALSE(cross_check("127.0.0.1", box.port(), si_box(), 2s));
+}
+
+}  // namespace
+}  // namespace kphi::netbox

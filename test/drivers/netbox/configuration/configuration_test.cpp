@@ -1,0 +1,306 @@
+#include "drivers/netbox/configuration/configuration.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <clocale>
+#include <random>
+
+#include "base/error.hpp"
+#include "test/drivers/netbox/record_bytes.hpp"
+
+namespace kphi::netbox {
+namespace {
+
+using test::captured_xml;
+using test::with;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+std::string refusal(const std::string& xml) {
+  try {
+    (void)parse_configuration(xml, "Net Box 192.168.1.11");
+  } catch (const DeviceError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(Configuration, ReadsACapturedBox) {
+  const Configuration configuration = parse_configuration(captured_xml());
+  EXPECT_EQ(configuration.product, "");
+  EXPECT_EQ(configuration.firmware, "2.2.59");
+  EXPECT_EQ(configuration.serial, "LOTxxxx");
+  EXPECT_EQ(configuration.calibration_serial, "FTxxxxx");
+  EXPECT_EQ(configuration.slot, 0);
+  EXPECT_EQ(configuration.slot_name, "empty");
+  EXPECT_EQ(configuration.force_unit, "N");
+  EXPECT_EQ(configuration.torque_unit, "Nm");
+  EXPECT_EQ(configuration.counts_per_newton, 1e6);
+  EXPECT_EQ(configuration.counts_per_newton_metre, 1e6);
+  EXPECT_THAT(configuration.range, ElementsAre(330, 330, 990, 30, 30, 30));
+  EXPECT_EQ(configuration.device_rate_hz, 7000);
+  EXPECT_EQ(configuration.divisor, 70u);
+  EXPECT_EQ(configuration.rdt_rate_hz, 100);
+  EXPECT_EQ(configuration.records_per_datagram, 1);
+  EXPECT_TRUE(configuration.rdt_enabled);
+  EXPECT_EQ(configuration.filter_code, 0);
+  EXPECT_THAT(configuration.tool_transform, ElementsAre(0, 0, 132.71, 0, 0, 0));
+  EXPECT_EQ(configuration.tool_distance_unit, "mm");
+  EXPECT_EQ(configuration.tool_angle_unit, "degrees");
+  EXPECT_THAT(configuration.gage_bias, ElementsAre(745, 17, 447, 184, -596, -253));
+  EXPECT_EQ(configuration.xml, captured_xml());
+}
+
+TEST(Configuration, TellsTheMonitorConditionsThatAreOn) {
+  const Configuration captured = parse_configuration(captured_xml());
+  EXPECT_FALSE(captured.monitoring);
+  ASSERT_TRUE(captured.monitor_conditions);
+  ASSERT_EQ(captured.monitor_conditions->size(), 2u);
+  const MonitorCondition& first = captured.monitor_conditions->front();
+  EXPECT_EQ(first.number, 0);
+  EXPECT_EQ(first.axis, 3);
+  EXPECT_FALSE(first.above);
+  EXPECT_EQ(first.threshold, 0.1);
+  EXPECT_EQ(captured.monitor_conditions->back().threshold, -0.01);
+  EXPECT_TRUE(parse_configuration(with(captured_xml(), "setmce", "1")).monitoring);
+}
+
+TEST(Configuration, MonitorConditionsThatItDoesNotUnderstandAreUnknownAndNoReasonToRefuse) {
+  for (const char* content :
+       {"", "1;1", "1;1;0;0;0;0;0;0;0;0;0;0;0;0;0;x", "99999999999;1;0;0;0;0;0;0;0;0;0;0;0;0;0;0"})
+    EXPECT_FALSE(parse_configuration(with(captured_xml(), "mcv", content)).monitor_conditions) << content;
+  EXPECT_FALSE(parse_configuration(with(captured_xml(), "mce", nullptr)).monitor_conditions);
+}
+
+TEST(Configuration, TellsTheProductWhereTheBoxDoes) {
+  EXPECT_EQ(parse_configuration(with(captured_xml(), "prodname", "Net F/T")).product, "Net F/T");
+}
+
+TEST(Configuration, KnowsEverySpellingOfTheUnits) {
+  const std::pair<const char*, double> forces[] = {
+      {"N", 1},         {"kN", 1000},      {"lbf", 4.4482216152605}, {"klbf", 4448.2216152605},
+      {"kgf", 9.80665}, {"gf", 0.00980665}};
+  for (const auto& [name, newtons] : forces) {
+    const Configuration configuration = parse_configuration(with(captured_xml(), "scfgfu", name));
+    EXPECT_EQ(configuration.force_unit, name);
+    EXPECT_NEAR(configuration.counts_per_newton * newtons, 1e6, 1e-8) << name;
+    EXPECT_NEAR(configuration.range[2], 990 * newtons, 1e-9 * 990 * newtons) << name;
+  }
+  const std::pair<const char*, double> torques[] = {{"Nm", 1},
+                                                    {"N-m", 1},
+                                                    {"Nmm", 0.001},
+                                                    {"N-mm", 0.001},
+                                                    {"kg-cm", 0.0980665},
+                                                    {"kgf-cm", 0.0980665},
+                                                    {"kNm", 1000},
+                                                    {"kN-m", 1000},
+                                                    {"lbf-in", 0.1129848290276167},
+                                                    {"lbf-ft", 1.3558179483314004}};
+  for (const auto& [name, newton_metres] : torques) {
+    const Configuration configuration = parse_configuration(with(captured_xml(), "scfgtu", name));
+    EXPECT_EQ(configuration.torque_unit, name);
+    EXPECT_NEAR(configuration.counts_per_newton_metre * newton_metres, 1e6, 1e-8) << name;
+    EXPECT_NEAR(configuration.range[5], 30 * newton_metres, 1e-9 * 30 * newton_metres) << name;
+  }
+}
+
+TEST(Configuration, OneCountPerPoundForceIsAScaleLikeAnother) {
+  const std::string xml = with(with(captured_xml(), "scfgfu", "lbf"), "cfgcpf", "1");
+  EXPECT_DOUBLE_EQ(parse_configuration(xml).counts_per_newton, 1 / 4.4482216152605);
+}
+
+TEST(Configuration, FallsBackToTheUnitsCodes) {
+  std::string xml = with(with(captured_xml(), "scfgfu", nullptr), "cfgfu", "4");
+  xml = with(with(xml, "scfgtu", nullptr), "cfgtu", "6");
+  const Configuration configuration = parse_configuration(xml);
+  EXPECT_EQ(configuration.counts_per_newton, 1000);
+  EXPECT_EQ(configuration.counts_per_newton_metre, 1000);
+}
+
+TEST(Configuration, RefusesUnitsItDoesNotKnow) {
+  EXPECT_THAT(refusal(with(captured_xml(), "scfgfu", "pond")),
+              AllOf(HasSubstr("Net Box 192.168.1.11"), HasSubstr("unknown unit \"pond\""), HasSubstr("choose N")));
+  EXPECT_THAT(refusal(with(captured_xml(), "scfgfu", "n")), HasSubstr("unknown unit"));
+  EXPECT_THAT(refusal(with(captured_xml(), "scfgtu", "N")), HasSubstr("unknown unit"));
+  EXPECT_THAT(refusal(with(with(captured_xml(), "scfgfu", nullptr), "cfgfu", "7")), HasSubstr("unknown unit \"7\""));
+}
+
+TEST(Configuration, ReadsArraysHoweverTheyAreSeparated) {
+  for (const char* ranges : {"20;20;60;1;1;1", "20,20,60,1,1,1", "20 20 60 1 1 1", " 20; 20; 60; 1; 1; 1 "})
+    EXPECT_THAT(parse_configuration(with(captured_xml(), "cfgmr", ranges)).range, ElementsAre(20, 20, 60, 1, 1, 1));
+}
+
+TEST(Configuration, ReadsFlagsHoweverTheyAreSpelt) {
+  for (const char* on : {"Enabled", "enabled", "1"})
+    EXPECT_TRUE(parse_configuration(with(captured_xml(), "comrdte", on)).rdt_enabled) << on;
+  for (const char* off : {"Disabled", "0"})
+    EXPECT_FALSE(parse_configuration(with(captured_xml(), "comrdte", off)).rdt_enabled) << off;
+  EXPECT_THAT(refusal(with(captured_xml(), "comrdte", "maybe")), HasSubstr("neither Enabled nor Disabled"));
+}
+
+TEST(Configuration, RefusesASlotThatMeasuresNothing) {
+  EXPECT_THAT(refusal(with(captured_xml(), "cfgcpf", "0")), HasSubstr("not usable"));
+  EXPECT_THAT(refusal(with(captured_xml(), "cfgcpt", "0")), HasSubstr("not usable"));
+  EXPECT_THAT(refusal(with(captured_xml(), "cfgcpf", "-1000000")), HasSubstr("not usable"));
+  EXPECT_THAT(refusal(with(captured_xml(), "cfgmr", "0;0;0;0;0;0")), HasSubstr("not usable"));
+  EXPECT_THAT(refusal(with(captured_xml(), "cfgcalsn", "FT0000")), HasSubstr("empty calibration"));
+}
+
+TEST(Configuration, TellsTheProductByItsName) {
+  const std::pair<const char*, Product> known[] = {{"Net F/T", Product::net_box},
+                                                   {"NetFT", Product::net_box},
+                                                   {"Net Box", Product::net_box},
+                                                   {"Ethernet Axia", Product::axia},
+                                                   {"ETHERNET AXIA80-M20", Product::axia}};
+  for (const auto& [name, kind] : known)
+    EXPECT_EQ(parse_configuration(with(captured_xml(), "prodname", name)).kind, kind) << name;
+}
+
+TEST(Configuration, TellsTheProductByItsFirmwareWhereItHasNoName) {
+  EXPECT_EQ(parse_configuration(captured_xml()).kind, Product::net_box);
+  EXPECT_EQ(parse_configuration(with(captured_xml(), "mfgdigver", "1.0.3")).kind, Product::net_box);
+  EXPECT_EQ(parse_configuration(with(captured_xml(), "setrate", "7812")).kind, Product::axia);
+  EXPECT_THAT(refusal(with(captured_xml(), "mfgdigver", "7.1")), HasSubstr("neither a Net Box nor an Ethernet Axia"));
+}
+
+TEST(Configuration, RefusesAProductItDoesNotKnow) {
+  EXPECT_THAT(refusal(with(captured_xml(), "prodname", "Wireless F/T")),
+              HasSubstr("\"Wireless F/T\" with firmware 2.2.59 is neither"));
+}
+
+TEST(Configuration, TheFiveRatesOfAnAxiaAreRoundedDownFrom7812AndAHalf) {
+  const std::string axia = with(with(captured_xml(), "prodname", "Ethernet Axia"), "comrdtrate", "488");
+  const std::pair<const char*, double> rates[] = {
+      {"488", 488.28125}, {"976", 976.5625}, {"1953", 1953.125}, {"3906", 3906.25}, {"7812", 7812.5}};
+  for (const auto& [shown, true_hz] : rates) {
+    const Configuration box = parse_configuration(with(axia, "setrate", shown));
+    EXPECT_EQ(box.device_rate_hz, true_hz);
+    EXPECT_EQ(parse_configuration(with(with(axia, "setrate", shown), "comrdtrate", shown)).divisor, 1u);
+  }
+  EXPECT_EQ(parse_configuration(with(axia, "setrate", "7812")).divisor, 16u);
+  EXPECT_THAT(refusal(with(axia, "setrate", "7000")), HasSubstr("488, 976, 1953, 3906 and 7812"));
+}
+
+TEST(Configuration, DoesNotPretendToKnowAnAxiasFilters) {
+  const std::string axia = with(captured_xml(), "prodname", "Ethernet Axia");
+  EXPECT_EQ(filter_cutoff_hz(parse_configuration(axia)), 0.0);
+  EXPECT_EQ(filter_cutoff_hz(parse_configuration(with(axia, "setuserfilter", "3"))), std::nullopt);
+  EXPECT_EQ(filter_cutoff_hz(parse_configuration(with(captured_xml(), "setuserfilter", "3"))), 152.0);
+}
+
+TEST(Configuration, KnowsThePeaksWhereTheBoxKeepsThem) {
+  const Configuration box = parse_configuration(captured_xml());
+  ASSERT_TRUE(box.peaks.has_value());
+  EXPECT_EQ(box.peaks->high[2], 20557075);
+  EXPECT_EQ(box.peaks->low[5], -729991);
+  EXPECT_FALSE(parse_configuration(with(captured_xml(), "setpke", "0")).peaks.has_value());
+}
+
+TEST(Configuration, RefusesWhenAnElementItNeedsIsMissingOrTwice) {
+  for (const char* element :
+       {"runrate", "cfgcalsn", "scfgfu", "scfgtu", "cfgcpf", "cfgcpt", "cfgmr", "setcfgsel", "setuserfilter", "comrdte",
+        "comrdtrate", "comrdtbsiz", "mfgdigver", "cfgtfx", "setbias"}) {
+    EXPECT_THAT(refusal(with(captured_xml(), element, nullptr)), HasSubstr("missing")) << element;
+    std::string twice = captured_xml();
+    twice.insert(twice.find("</netft>"), std::string("<") + element + ">1</" + element + ">");
+    EXPECT_THAT(refusal(twice), HasSubstr("more than once")) << element;
+  }
+}
+
+TEST(Configuration, RefusesNumbersThatAreNone) {
+  for (const char* nonsense : {"abc", "1e6x", "1 000 000", "nan", "inf", "1e999", "0x10"})
+    EXPECT_THAT(refusal(with(captured_xml(), "cfgcpf", nonsense)), HasSubstr("not a number")) << nonsense;
+  EXPECT_THAT(refusal(with(captured_xml(), "cfgmr", "1;2;3;4;5")), HasSubstr("not six numbers"));
+  EXPECT_THAT(refusal(with(captured_xml(), "comrdtbsiz", "41")), HasSubstr("from 1 to 40"));
+  EXPECT_THAT(refusal(with(captured_xml(), "comrdtbsiz", "1.5")), HasSubstr("from 1 to 40"));
+  EXPECT_THAT(refusal(with(captured_xml(), "comrdtrate", "0")), HasSubstr("from 1 to 7000"));
+  EXPECT_THAT(refusal(with(captured_xml(), "setuserfilter", "13")), HasSubstr("from 0 to 12"));
+}
+
+TEST(Configuration, RefusesWhatIsNoNetBox) {
+  EXPECT_THAT(refusal("<html><body>404</body></html>"), HasSubstr("no element <netft>"));
+  EXPECT_THAT(refusal(""), HasSubstr("broken"));
+  EXPECT_THAT(refusal(captured_xml().substr(0, 900)), HasSubstr("broken"));
+}
+
+TEST(Configuration, RefusesAPageWithNulBytesWhichNoFileCouldKeepVerbatim) {
+  std::string utf16 = "\xff\xfe";
+  for (const char c : captured_xml()) (utf16 += c) += '\0';
+  EXPECT_THAT(refusal(utf16), HasSubstr("NUL byte at 3: it is not in UTF-8"));
+  EXPECT_THAT(refusal(captured_xml() + '\0'), HasSubstr("NUL byte"));
+}
+
+TEST(Configuration, ShowsNamesThatAreNoUtf8WithoutTheirRawBytes) {
+  const Configuration box = parse_configuration(with(captured_xml(), "cfgnam",
+                                                     "Pr\xFC"
+                                                     "fstand \x1B[2J"));
+  EXPECT_EQ(box.slot_name, "Pr\uFFFDfstand \uFFFD[2J");
+  EXPECT_THAT(box.xml, HasSubstr("Pr\xFC"
+                                 "fstand"))
+      << "verbatim";
+}
+
+TEST(Configuration, AnyCutOfTheXmlIsRefusedNeverMisread) {
+  const std::string xml = captured_xml();
+  for (std::size_t length = 0; length < xml.size(); ++length)
+    ASSERT_NE(refusal(xml.substr(0, length)), "accepted") << length;
+}
+
+TEST(Configuration, RandomDamageIsRefusedOrReadNeverWorse) {
+  std::mt19937 random(7);
+  for (int trial = 0; trial < 3000; ++trial) {
+    std::string xml = captured_xml();
+    for (int damage = 0; damage < 3; ++damage) xml[random() % xml.size()] = static_cast<char>(random());
+    try {
+      const Configuration configuration = parse_configuration(xml);
+      EXPECT_GT(configuration.counts_per_newton, 0);
+      EXPECT_GE(configuration.divisor, 1u);
+    } catch (const DeviceError&) {
+    }
+  }
+}
+
+TEST(Configuration, DoesNotDependOnTheLocale) {
+  const std::string before = std::setlocale(LC_ALL, nullptr);
+  const char* const found = std::setlocale(LC_ALL, "de_DE.UTF-8");
+  const Configuration configuration = parse_configuration(captured_xml());
+  std::setlocale(LC_ALL, before.c_str());
+  EXPECT_EQ(configuration.tool_transform[2], 132.71);
+  if (!found) GTEST_SKIP() << "no locale with a decimal comma is installed";
+}
+
+TEST(Configuration, FindsTheTrueRateBehindEachOfThe166ThatTheBoxShows) {
+  int distinct = 0;
+  int before = 0;
+  for (int requested = 7000; requested >= 1; --requested) {
+    const int divisor = 7000 / requested;
+    const int shown = 7000 / divisor;
+    if (shown == before) continue;
+    before = shown;
+    ++distinct;
+    const Configuration configuration =
+        parse_configuration(with(captured_xml(), "comrdtrate", std::to_string(shown).c_str()));
+    ASSERT_EQ(configuration.divisor, static_cast<unsigned>(divisor)) << shown;
+    ASSERT_DOUBLE_EQ(configuration.rdt_rate_hz, 7000.0 / divisor) << shown;
+  }
+  EXPECT_EQ(distinct, 166);
+}
+
+TEST(Configuration, TheTrueRateBehind2333IsAThirdOf7000) {
+  EXPECT_DOUBLE_EQ(parse_configuration(with(captured_xml(), "comrdtrate", "2333")).rdt_rate_hz, 7000.0 / 3);
+}
+
+TEST(Filter, CutoffsAreNotMonotonicInTheCode) {
+  EXPECT_EQ(filter_cutoff_hz(0), 0);
+  EXPECT_EQ(filter_cutoff_hz(1), 838);
+  EXPECT_EQ(filter_cutoff_hz(8), 5);
+  EXPECT_EQ(filter_cutoff_hz(9), 1500);
+  EXPECT_EQ(filter_cutoff_hz(12), 3000);
+  EXPECT_EQ(filter_cutoff_hz(13), std::nullopt);
+  EXPECT_EQ(filter_cutoff_hz(-1), std::nullopt);
+}
+
+}  // namespace
+}  // namespace kphi::netbox

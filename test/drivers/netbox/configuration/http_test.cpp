@@ -1,0 +1,110 @@
+#include "drivers/netbox/configuration/http.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/error.hpp"
+#include "test/drivers/netbox/fake_box.hpp"
+
+namespace kphi::netbox {
+namespace {
+
+using namespace std::chrono_literals;
+using test::FakeWeb;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+std::string failure(std::uint16_t port, std::chrono::nanoseconds timeout = 10s) {
+  try {
+    (void)http_get("127.0.0.1", port, "/netftapi2.xml", timeout);
+  } catch (const DeviceError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(HttpGet, ReturnsTheBodyAndAsksForNothingElse) {
+  std::string request;
+  {
+    FakeWeb web(FakeWeb::page("<netft/>"));
+    EXPECT_EQ(http_get("127.0.0.1", web.port(), "/netftapi2.xml", 10s), "<netft/>");
+    request = web.last_request();
+  }
+  EXPECT_THAT(request, StartsWith("GET /netftapi2.xml HTTP/1.0\r\n"));
+}
+
+TEST(HttpGet, TakesAnAnswerWithoutALengthUpToTheEnd) {
+  FakeWeb web({{"HTTP/1.0 200 OK\r\n\r\n<netft>", "</netft>"}});
+  EXPECT_EQ(http_get("127.0.0.1", web.port(), "/", 10s), "<netft></netft>");
+}
+
+TEST(HttpGet, TakesAnAnswerInPieces) {
+  FakeWeb web({{"HTTP/1.", "0 200 O", "K\r\nContent-Le", "ngth: 8\r\n\r", "\n<netft", "/>"}, 2ms});
+  EXPECT_EQ(http_get("127.0.0.1", web.port(), "/", 10s), "<netft/>");
+}
+
+TEST(HttpGet, NamesTheStatusOfARefusal) {
+  FakeWeb missing(FakeWeb::page("no", "404 Not Found"));
+  EXPECT_THAT(failure(missing.port()), AllOf(HasSubstr("Net Box 127.0.0.1:"), HasSubstr("GET /netftapi2.xml"),
+                                             HasSubstr("HTTP status 404"), HasSubstr("is this a Net Box?")));
+  FakeWeb broken(FakeWeb::page("no", "500 Internal Server Error"));
+  EXPECT_THAT(failure(broken.port()), HasSubstr("HTTP status 500"));
+}
+
+TEST(HttpGet, ASlowBoxEndsInATimeoutNotInWaiting) {
+  FakeWeb web({{"HTTP/1.0 200 OK\r\n", "\r\n"}, 60s});
+  const auto begun = std::chrono::steady_clock::now();
+  EXPECT_THAT(failure(web.port(), 50ms), AllOf(HasSubstr("no answer within 0.1 s"), HasSubstr("read the answer")));
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, 10s);
+}
+
+TEST(HttpGet, ABoxThatNeverEndsItsAnswerEndsInATimeout) {
+  FakeWeb web({{"HTTP/1.0 200 OK\r\nContent-Length: 100\r\n\r\n<netft>"}, 0ms, true});
+  EXPECT_THAT(failure(web.port(), 50ms), HasSubstr("no answer within"));
+}
+
+TEST(HttpGet, ATruncatedAnswerIsNoAnswer) {
+  FakeWeb web({{"HTTP/1.0 200 OK\r\nContent-Length: 100\r\n\r\n<netft>"}});
+  EXPECT_THAT(failure(web.port()), AllOf(HasSubstr("read the answer"), HasSubstr("broke off")));
+}
+
+TEST(HttpGet, AnEmptyAnswerIsNoAnswer) {
+  FakeWeb web(FakeWeb::Manner{});
+  EXPECT_THAT(failure(web.port()), AllOf(HasSubstr("read the answer"), HasSubstr("broke off")));
+}
+
+TEST(HttpGet, AnAnswerAboveOneMebibyteIsRefused) {
+  const std::string page(1 << 16, 'x');
+  std::vector<std::string> pieces{"HTTP/1.0 200 OK\r\n\r\n"};
+  for (int i = 0; i < 17; ++i) pieces.push_back(page);
+  FakeWeb web({pieces});
+  EXPECT_THAT(failure(web.port()), HasSubstr("this is no Net Box"));
+}
+
+TEST(HttpGet, JustUnderOneMebibyteIsTaken) {
+  FakeWeb web(FakeWeb::page(std::string((1 << 20) - 1, 'x')));
+  EXPECT_EQ(http_get("127.0.0.1", web.port(), "/", 10s).size(), (1u << 20) - 1);
+}
+
+TEST(HttpGet, SomethingElseThanHttpIsRefused) {
+  FakeWeb web({{"SSH-2.0-OpenSSH_9.2\r\n\r\n"}});
+  EXPECT_THAT(failure(web.port()), HasSubstr("this is no Net Box"));
+}
+
+TEST(HttpGet, AClosedPortIsNamedAtOnce) {
+  const test::LoopbackSocket closed(SOCK_STREAM);  // bound, not listening
+  EXPECT_THAT(failure(closed.port()), AllOf(HasSubstr("could not connect"), HasSubstr("no web server on port")));
+}
+
+TEST(HttpGet, AnUnknownNameIsNamed) {
+  try {
+    (void)http_get("no such host", 80, "/", 10s);
+    FAIL();
+  } catch (const DeviceError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("look up the name"));
+  }
+}
+
+}  // namespace
+}  // namespace kphi::netbox

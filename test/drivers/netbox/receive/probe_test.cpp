@@ -1,0 +1,82 @@
+#include "drivers/netbox/receive/probe.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "test/drivers/netbox/fake_box.hpp"
+
+namespace kphi::netbox {
+namespace {
+
+using namespace std::chrono_literals;
+using test::captured_xml;
+using test::FakeBox;
+using test::FakeWeb;
+using test::with;
+using testing::Contains;
+using testing::HasSubstr;
+
+ProbeSettings quick() {
+  ProbeSettings settings;
+  settings.stream = 300ms;
+  settings.tcp_timeout = 100ms;
+  settings.tcp_port = 1;
+  return settings;
+}
+
+std::string xml() { return with(with(captured_xml(), "comrdtrate", "7000"), "comrdtbsiz", "40"); }
+
+TEST(Probe, TellsWhoAnswersAndHowWellItStreams) {
+  FakeWeb web(FakeWeb::page(xml()));
+  FakeBox box({});
+  const SteadyClock clock;
+  const Probe found = probe({"127.0.0.1", box.port(), web.port()}, clock, quick());
+  EXPECT_TRUE(found.answers());
+  EXPECT_GT(found.counters.received, 1000u);
+  EXPECT_EQ(found.counters.lost_network + found.counters.lost_host, 0u);
+  for (const Finding& finding : found.findings) EXPECT_EQ(finding.severity, Severity::note) << finding.what;
+  const std::vector<std::string> lines = found.lines();
+  EXPECT_THAT(lines, Contains(HasSubstr("firmware 2.2.59")));
+  EXPECT_THAT(lines, Contains(HasSubstr("ranges 330 330 990 N, 30 30 30 Nm")));
+  EXPECT_THAT(lines, Contains(HasSubstr("RDT enabled, 7000 Hz, 40 records per datagram, no filter")));
+  EXPECT_THAT(lines, Contains(HasSubstr("0 lost, 0 late, 0 duplicates")));
+  EXPECT_THAT(lines, Contains(HasSubstr("note: the scale could not be cross-checked")));
+  EXPECT_EQ(box.settings_written() + box.biases(), 0) << "a probe changes nothing";
+}
+
+TEST(Probe, SaysThatRdtIsDisabledInsteadOfWaiting) {
+  FakeWeb web(FakeWeb::page(with(xml(), "comrdte", "Disabled")));
+  FakeBox box({});
+  const SteadyClock clock;
+  const Probe found = probe({"127.0.0.1", box.port(), web.port()}, clock, quick());
+  EXPECT_FALSE(found.answers());
+  ASSERT_FALSE(found.findings.empty());
+  EXPECT_EQ(found.findings[0].severity, Severity::fault);
+  EXPECT_THAT(found.findings[0].what, HasSubstr("RDT is disabled"));
+  EXPECT_EQ(box.starts(), 0);
+}
+
+TEST(Probe, CountsWhatTheNetworkLoses) {
+  FakeWeb web(FakeWeb::page(xml()));
+  FakeBox box({.skip_every = 10});
+  const SteadyClock clock;
+  const Probe found = probe({"127.0.0.1", box.port(), web.port()}, clock, quick());
+  EXPECT_TRUE(found.answers());
+  EXPECT_THAT(found.lines(), Contains(testing::AllOf(HasSubstr("warning"), HasSubstr("lost in the network"))));
+}
+
+TEST(Probe, ABoxThatDoesNotAnswerIsAFindingAndNoException) {
+  std::uint16_t closed = 0;
+  {
+    const test::LoopbackSocket gone(SOCK_STREAM);
+    closed = gone.port();
+  }
+  const SteadyClock clock;
+  const Probe found = probe({"127.0.0.1", 1, closed}, clock, quick());
+  EXPECT_FALSE(found.answers());
+  ASSERT_EQ(found.findings.size(), 1u);
+  EXPECT_THAT(found.findings[0].what, HasSubstr("check the address"));
+}
+
+}  // namespace
+}  // namespace kphi::netbox

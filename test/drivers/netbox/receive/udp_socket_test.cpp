@@ -1,0 +1,134 @@
+#include "drivers/netbox/receive/udp_socket.hpp"
+
+#include <gtest/gtest.h>
+
+#include "base/clock.hpp"
+#include "base/error.hpp"
+#include "test/drivers/netbox/fake_box.hpp"
+
+namespace kphi::netbox {
+namespace {
+
+using namespace std::chrono_literals;
+using test::LoopbackSocket;
+
+class UdpSocketTest : public testing::Test {
+ protected:
+  UdpSocketTest() {
+    socklen_t length = sizeof own;
+    getsockname(socket.native_handle(), reinterpret_cast<sockaddr*>(&own), &length);
+  }
+  void send_from(const LoopbackSocket& sender, std::size_t size) {
+    const std::string bytes(size, 'x');
+    ASSERT_EQ(sendto(sender.descriptor(), bytes.data(), size, 0, reinterpret_cast<sockaddr*>(&own), sizeof own),
+              static_cast<ssize_t>(size));
+  }
+
+  LoopbackSocket box{SOCK_DGRAM};
+  UdpSocket socket{"127.0.0.1", box.port()};
+  sockaddr_in own{};
+};
+
+TEST_F(UdpSocketTest, ReceivesNothingWhereNothingWaits) { EXPECT_TRUE(socket.receive().empty()); }
+
+TEST_F(UdpSocketTest, TakesAllThatWaitsWithItsSizesAndStamps) {
+  timespec before{}, after{};
+  clock_gettime(CLOCK_REALTIME, &before);
+  for (const std::size_t size : {36u, 0u, 1440u, 1476u}) send_from(box, size);
+  clock_gettime(CLOCK_REALTIME, &after);
+  const auto datagrams = socket.receive();
+  ASSERT_EQ(datagrams.size(), 4u);
+  EXPECT_EQ(datagrams[0].bytes.size(), 36u);
+  EXPECT_EQ(datagrams[1].bytes.size(), 0u);
+  EXPECT_EQ(datagrams[2].bytes.size(), 1440u);
+  EXPECT_EQ(datagrams[3].bytes.size(), 1476u);
+  for (const UdpSocket::Datagram& datagram : datagrams) {
+    EXPECT_GE(datagram.stamp.tv_sec, before.tv_sec);
+    EXPECT_EQ(datagram.dropped, 0u);
+  }
+}
+
+TEST_F(UdpSocketTest, WhatIsTooLongIsCutToASizeThatNoRecordHas) {
+  send_from(box, 9000);
+  const auto datagrams = socket.receive();
+  ASSERT_EQ(datagrams.size(), 1u);
+  EXPECT_NE(datagrams[0].bytes.size() % 36, 0u);
+}
+
+TEST_F(UdpSocketTest, HearsNobodyButItsPeer) {
+  const LoopbackSocket stranger(SOCK_DGRAM);
+  send_from(stranger, 36);
+  send_from(box, 72);
+  const auto datagrams = socket.receive();
+  ASSERT_EQ(datagrams.size(), 1u);
+  EXPECT_EQ(datagrams[0].bytes.size(), 72u);
+}
+
+TEST_F(UdpSocketTest, CountsWhatItsBufferCouldNotHold) {
+  const std::size_t held = datagrams_held(socket.receive_buffer_bytes(), 36);
+  const std::size_t sent = 2 * held + 1000;
+  for (std::size_t i = 0; i < sent; ++i) send_from(box, 36);
+  std::size_t received = 0;
+  while (const std::size_t count = socket.receive().size()) received += count;
+  EXPECT_LT(received, sent);
+  send_from(box, 36);
+  const auto last = socket.receive();
+  ASSERT_EQ(last.size(), 1u);
+  EXPECT_EQ(last[0].dropped, sent - received) << "the datagram behind the drops tells how many there were";
+}
+
+TEST_F(UdpSocketTest, ASmallBufferToleratesTheStallThatItTellsAndNoMore) {
+  UdpSocket small("127.0.0.1", box.port(), 64 << 10);
+  const std::string note =
+      tolerated_stall(small.receive_buffer_bytes(), 36, std::chrono::nanoseconds(1'000'000'000 / 7000));
+  EXPECT_EQ(note, "0.1 MiB, tolerates 22 ms; for longer set net.core.rmem_max to 4194304");
+  socklen_t length = sizeof own;
+  getsockname(small.native_handle(), reinterpret_cast<sockaddr*>(&own), &length);
+  const auto received_of = [&](std::size_t sent) {
+    for (std::size_t i = 0; i < sent; ++i) send_from(box, 36);
+    std::size_t received = 0;
+    while (const std::size_t count = small.receive().size()) received += count;
+    return received;
+  };
+  const std::size_t held = 22 * 7;
+  EXPECT_EQ(received_of(held), held);
+  EXPECT_LT(received_of(2 * held), 2 * held);
+}
+
+TEST_F(UdpSocketTest, SendsToItsPeer) {
+  const std::array<std::uint8_t, 8> request{1, 2, 3, 4, 5, 6, 7, 8};
+  EXPECT_TRUE(socket.send(request));
+  std::array<std::uint8_t, 64> got{};
+  EXPECT_EQ(recv(box.descriptor(), got.data(), got.size(), 0), 8);
+  EXPECT_EQ(got[7], 8);
+}
+
+TEST(UdpSocket, CountsRefusalsAndGoesOn) {
+  std::uint16_t closed = 0;
+  {
+    const LoopbackSocket gone(SOCK_DGRAM);
+    closed = gone.port();
+  }
+  UdpSocket socket("127.0.0.1", closed);
+  const std::array<std::uint8_t, 8> request{};
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_TRUE(socket.send(request));
+    EXPECT_TRUE(socket.receive().empty());
+  }
+  EXPECT_EQ(socket.refusals(), 5u);
+  EXPECT_EQ(socket.last_error(), 0);
+}
+
+TEST(UdpSocket, AsksForFourMebibytesAndReadsBackWhatItGot) {
+  UdpSocket socket("127.0.0.1", 9);
+  int granted = 0;
+  socklen_t length = sizeof granted;
+  getsockopt(socket.native_handle(), SOL_SOCKET, SO_RCVBUF, &granted, &length);
+  EXPECT_EQ(socket.receive_buffer_bytes(), static_cast<std::size_t>(granted));
+  EXPECT_GT(granted, 0);
+}
+
+TEST(UdpSocket, AnUnknownNameIsAnError) { EXPECT_THROW(UdpSocket("no such host", 1), DeviceError); }
+
+}  // namespace
+}  // namespace kphi::netbox

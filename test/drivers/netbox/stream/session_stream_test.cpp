@@ -1,0 +1,236 @@
+// What a session makes of the datagrams of a stream: order, sizes, losses, wraps.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "test/drivers/netbox/session_fixture.hpp"
+
+namespace kphi::netbox {
+namespace {
+
+using namespace std::chrono_literals;
+using test::Bytes;
+using test::records;
+using test::SessionTest;
+using testing::IsEmpty;
+
+TEST_F(SessionTest, PutsSwappedDatagramsInOrder) {
+  start_streaming();
+  now += 5ms;
+  receive(records(81, 1080, 40));
+  EXPECT_EQ(out.size(), 40u);
+  EXPECT_EQ(session.release_deadline(), now + settings.reorder_patience);
+  EXPECT_EQ(session.counters().lost_network, 0u);
+  now += 1ms;
+  receive(records(41, 1040, 40));
+  ASSERT_EQ(out.size(), 120u);
+  for (std::uint32_t i = 0; i < 120; ++i) EXPECT_EQ(out[i].record.ft_sequence, 1000 + i);
+  EXPECT_EQ(session.release_deadline(), kNever);
+  EXPECT_EQ(session.counters().lost_network + session.counters().late, 0u);
+}
+
+TEST_F(SessionTest, GivesUpAGapWhenItsTimeIsOverWithoutAFurtherDatagram) {
+  start_streaming();
+  receive(records(81, 1080, 40));
+  now = session.release_deadline();
+  session.release(now, out);
+  EXPECT_EQ(out.size(), 80u);
+  EXPECT_EQ(session.counters().lost_network, 40u);
+  receive(records(41, 1040, 40));
+  EXPECT_EQ(session.counters().late, 40u);
+  EXPECT_EQ(out.size(), 80u);
+}
+
+TEST_F(SessionTest, WhatWaitsKeepsTheStreamAlive) {
+  start_streaming();
+  now += 400ms;
+  receive(records(81, 1080, 40));
+  EXPECT_GT(session.deadline(), now + 500ms);
+}
+
+TEST_F(SessionTest, CountsWrongSizesAndGoesOn) {
+  start_streaming();
+  for (const std::size_t size : {0u, 35u, 37u, 71u, 1476u}) receive(Bytes(size, 0));
+  EXPECT_EQ(session.counters().malformed, 5u);
+  receive(records(41, 1040, 40));
+  EXPECT_EQ(session.counters().received, 80u);
+  EXPECT_EQ(session.counters().datagrams, 7u);
+}
+
+TEST_F(SessionTest, TakesDatagramsOfAnySizeInOneStream) {
+  start_streaming();
+  std::uint32_t sent = 40;
+  for (unsigned count = 1; count <= 40; ++count) {
+    receive(records(1 + sent, 1000 + sent, count));
+    sent += count;
+  }
+  EXPECT_EQ(session.counters().received, sent);
+  EXPECT_EQ(session.counters().expected, sent);
+}
+
+TEST_F(SessionTest, ChargesTheHostWithWholeDatagrams) {
+  start_streaming();
+  session.note_host_drops(3);
+  receive(records(41 + 160, 1040 + 160, 40));  // four datagrams missing, three of them dropped here
+  session.flush(out);
+  EXPECT_EQ(session.counters().lost_host, 120u);
+  EXPECT_EQ(session.counters().lost_network, 40u);
+  session.note_host_drops(3);
+  receive(records(241 + 40, 1240 + 40, 40));
+  EXPECT_EQ(session.counters().lost_network, 40u) << "one datagram may have been overtaken";
+  session.flush(out);
+  EXPECT_EQ(session.counters().lost_host, 120u);
+  EXPECT_EQ(session.counters().lost_network, 80u);
+}
+
+TEST_F(SessionTest, ADuplicatedStartLosesNothing) {
+  start_streaming();
+  for (std::uint32_t i = 0; i < 50; ++i) {
+    now += 5ms;
+    receive(records(1 + 40 * i, 1040 + 40 * i, 40));
+  }
+  EXPECT_EQ(session.counters().restarts, 1u);
+  EXPECT_EQ(session.counters().received, 2040u);
+  EXPECT_EQ(session.counters().expected, 2040u);
+}
+
+TEST_F(SessionTest, StreamsAcrossBothWraps) {
+  session.start(now);
+  advance_to_deadline();
+  receive(records(1, 0xffffffff - 50, 1));
+  std::uint32_t rdt = 2, ft = 0xffffffff - 49;
+  for (int i = 0; i < 10; ++i, rdt += 40, ft += 40) receive(records(rdt, ft, 40));
+  EXPECT_EQ(session.counters().received, 401u);
+  EXPECT_EQ(session.counters().expected, 401u);
+}
+
+TEST_F(SessionTest, TheShortWayCountsAsTheLongOne) {
+  start_streaming();
+  std::vector<StampedRecord> room(40);
+  for (std::uint32_t i = 1; i <= 50; ++i) {
+    const Bytes datagram = records(1 + 40 * i, 1000 + 40 * i, 40);
+    ASSERT_EQ(session.receive_in_order(datagram, now += 5ms, room), 40u);
+    for (std::uint32_t j = 0; j < 40; ++j) {
+      EXPECT_EQ(room[j].record.rdt_sequence, 1 + 40 * i + j);
+      EXPECT_EQ(room[j].arrival, now);
+    }
+  }
+  EXPECT_EQ(session.counters().datagrams, 51u);
+  EXPECT_EQ(session.counters().received, 2040u);
+  EXPECT_EQ(session.counters().expected, 2040u);
+  EXPECT_GT(session.deadline(), now + 500ms);
+}
+
+TEST_F(SessionTest, TheShortWayTakesNothingOutOfOrder) {
+  std::vector<StampedRecord> room(40);
+  EXPECT_EQ(session.receive_in_order(records(1, 1000, 40), now, room), 0u) << "it does not stream";
+  start_streaming();
+  Bytes broken = records(41, 1040, 40);
+  broken[36 * 20 + 3] ^= 1;  // rdt of one in the middle
+  Bytes jumping = records(41, 1040, 40);
+  jumping[36 * 20 + 7] ^= 1;  // ft
+  for (const Bytes& datagram : {records(42, 1041, 40), records(41, 1041, 40), records(1, 1000, 40), broken, jumping,
+                                Bytes(35, 0), Bytes(1476, 0), Bytes{}})
+    EXPECT_EQ(session.receive_in_order(datagram, now, room), 0u);
+  EXPECT_EQ(session.receive_in_order(records(41, 1040, 40), now, std::span(room).first(39)), 0u) << "no room";
+  EXPECT_EQ(session.counters().datagrams, 1u);
+  receive(records(81, 1080, 40));
+  EXPECT_EQ(session.receive_in_order(records(41, 1040, 40), now, room), 0u) << "others wait for it";
+  receive(records(41, 1040, 40));
+  EXPECT_EQ(session.counters().received, 120u);
+}
+
+TEST_F(SessionTest, TheShortWayHearsOfTroubleToo) {
+  start_streaming();
+  std::vector<StampedRecord> room(2);
+  Bytes datagram;
+  test::put_record(datagram, 41, 1040);
+  test::put_record(datagram, 42, 1041, 0x80400000);
+  EXPECT_EQ(session.receive_in_order(datagram, now, room), 2u);
+  const std::vector<Event> events = session.take_events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].kind, EventKind::box_trouble);
+  EXPECT_EQ(events[0].ft, 1040u);
+}
+
+TEST_F(SessionTest, NeverAllocatesInTheCallersVectorOnceItIsLargeEnough) {
+  start_streaming();
+  out.clear();
+  out.reserve(40);
+  const StampedRecord* const address = out.data();
+  for (std::uint32_t i = 1; i < 100; ++i) {
+    out.clear();
+    receive(records(1 + 40 * i, 1000 + 40 * i, 40));
+    EXPECT_EQ(out.size(), 40u);
+  }
+  EXPECT_EQ(out.data(), address);
+}
+
+// A channel between a box and the session: loses, repeats, swaps and damages whole datagrams, the socket drops some,
+// the stream begins anew. The account must close, and name the host's share.
+TEST(SessionProperty, TheAccountClosesForEveryChannel) {
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    std::mt19937 random(seed);
+    const auto chance = [&](unsigned in) { return random() % in == 0; };
+    StreamSettings settings;
+    settings.divisor = 1 + random() % 100;
+    settings.records_per_datagram = static_cast<int>(1 + random() % 40);
+    const auto k = static_cast<unsigned>(settings.records_per_datagram);
+    Session session(settings);
+    std::vector<StampedRecord> out;
+    Instant now = 1s;
+    session.start(now);
+    session.advance(now = session.deadline());
+    std::uint32_t rdt = 1, ft = random();
+    std::uint64_t malformed = 0, dropped = 0, dropped_seen = 0;
+    for (int i = 0; i < 400; ++i, rdt += k, ft += k * settings.divisor) {
+      if (chance(100)) rdt = 1;
+      now += settings.datagram_period();
+      const Bytes datagram = records(rdt, ft, k, settings.divisor);
+      if (i > 0 && chance(20)) {
+        if (chance(2)) ++dropped;
+        continue;
+      }
+      if (chance(30)) {
+        session.receive(std::span(datagram).first(datagram.size() - 1 - random() % 35), now, out);
+        ++malformed;
+        continue;
+      }
+      session.note_host_drops(dropped);
+      dropped_seen = dropped;
+      session.receive(datagram, now, out);
+      if (chance(25)) session.receive(datagram, now, out);
+    }
+    session.flush(out);
+    const Counters& c = session.counters();
+    EXPECT_EQ(c.expected, c.received + c.lost_network + c.lost_host) << seed;
+    EXPECT_EQ(c.received, out.size()) << seed;
+    EXPECT_EQ(c.lost_host, dropped_seen * k) << seed;
+    EXPECT_EQ(c.malformed, malformed) << seed;
+    EXPECT_EQ(c.reboots + c.late, 0u) << seed;
+    for (std::size_t i = 1; i < out.size(); ++i)
+      ASSERT_GT(static_cast<std::int32_t>(out[i].record.ft_sequence - out[i - 1].record.ft_sequence), 0) << seed;
+  }
+}
+
+TEST(SessionProperty, RandomDatagramsNeverBreakTheAccount) {
+  std::mt19937 random(3);
+  Session session{StreamSettings{}};
+  std::vector<StampedRecord> out;
+  Instant now = 1s;
+  session.start(now);
+  for (int i = 0; i < 20'000; ++i) {
+    Bytes datagram(random() % 2 == 0 ? 36 * (1 + random() % 40) : random() % 1500);
+    for (auto& byte : datagram) byte = static_cast<std::uint8_t>(random() % 4);
+    now += Duration(random() % 100'000'000);
+    out.clear();
+    session.receive(datagram, now, out);
+    session.advance(now);
+    const Counters& c = session.counters();
+    ASSERT_EQ(c.expected, c.received + c.lost_network + c.lost_host);
+  }
+}
+
+}  // namespace
+}  // namespace kphi::netbox

@@ -1,0 +1,298 @@
+#include "drivers/sim/supply/slave.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "test/drivers/sim/hex.hpp"
+
+namespace kphi::sim {
+namespace {
+
+using namespace std::chrono_literals;
+using test::bytes;
+using test::hex;
+
+class Asked {
+ public:
+  explicit Asked(SupplySettings settings = {}) : slave(fast(settings)) {}
+
+  /// The reply to a request without its CRC, as a manual prints it, also without.
+  std::string ask(const std::string& request) {
+    auto adu = bytes(request);
+    const unsigned crc = modbus_crc(adu);
+    adu.push_back(static_cast<std::uint8_t>(crc));
+    adu.push_back(static_cast<std::uint8_t>(crc >> 8));
+    std::string reply = raw(adu);
+    return reply.empty() ? reply : reply.substr(0, reply.size() - 6);
+  }
+  std::string raw(const std::vector<std::uint8_t>& adu) {
+    now += 10ms;
+    slave.receive(0, ModbusFraming::rtu, adu, now);
+    std::vector<std::uint8_t> all;
+    SupplyReply reply;
+    while (slave.next_due() != kNever) {
+      now = std::max(now, slave.next_due());
+      while (slave.next_reply(reply, now)) all.insert(all.end(), reply.bytes.begin(), reply.bytes.end());
+    }
+    return hex(all);
+  }
+  void run(const SupplyLoad& load, Duration time) {
+    for (const Instant end = now + time; now < end; now += 1ms) slave.advance(load, now);
+  }
+  void spoil(SupplyFaultKind kind, std::uint16_t address = 0, std::uint16_t value = 0) {
+    SupplyFault fault;
+    fault.kind = kind;
+    fault.at = now;
+    fault.lasts = 1h;
+    fault.address = address;
+    fault.value = value;
+    slave.add_fault(fault);
+  }
+
+  SupplySlave slave;
+  Instant now{0};
+
+ private:
+  static SupplySettings fast(SupplySettings settings) {
+    settings.replies_per_s = 0;
+    return settings;
+  }
+};
+
+SupplySettings of_model(const std::string& model) {
+  SupplySettings settings;
+  settings.model = model;
+  return settings;
+}
+
+/// Byte for byte what is known of the device.
+TEST(SimulatedRiden, AnswersInTheKnownFrames) {
+  Asked supply;
+  supply.slave.registers().write(8, 1200);
+  supply.slave.registers().write(9, 5000);
+  supply.spoil(SupplyFaultKind::reads_as, 10, 1198);
+  supply.spoil(SupplyFaultKind::reads_as, 11, 1234);
+  supply.spoil(SupplyFaultKind::reads_as, 13, 1478);
+  EXPECT_EQ(supply.raw(bytes("01 06 00 12 00 01 E8 0F")), hex("01 06 00 12 00 01 E8 0F"));
+  EXPECT_EQ(supply.raw(bytes("01 03 00 08 00 0D 05 CD")),
+            hex("01 03 1A 04 B0 13 88 04 AE 04 D2 00 00 05 C6 09 65 00 00 00 00 00 00 00 01 00 00 00 00 1E B6"));
+  EXPECT_EQ(supply.raw(bytes("01 03 00 08 00 01 05 C8")), hex("01 03 02 04 B0 BB 30"));
+  EXPECT_EQ(supply.raw(bytes("01 03 00 0A 00 01 A4 08")), hex("01 03 02 04 AE 3B 38"));
+  EXPECT_EQ(supply.raw(bytes("01 06 00 12 00 00 29 CF")), hex("01 06 00 12 00 00 29 CF"));
+  EXPECT_EQ(supply.raw(bytes("01 10 00 08 00 01 02 04 B0 A4 6C")), hex("01 10 00 08 00 01 80 0B"));
+}
+
+TEST(SimulatedRiden, RefusesWhatItDoesNotHave) {
+  Asked supply;
+  const auto with_crc = supply.raw(bytes("01 03 00 78 00 01 04 13"));
+  EXPECT_EQ(with_crc, hex("01 83 02 C0 F1"));
+  EXPECT_EQ(supply.ask("01 04 00 08 00 01"), hex("01 84 01")) << "function";
+  EXPECT_EQ(supply.ask("01 03 00 08 00 00"), hex("01 83 03")) << "none";
+  EXPECT_EQ(supply.ask("01 03 00 08 00 7E"), hex("01 83 03")) << "too many";
+  EXPECT_EQ(supply.ask("01 03 00 77 00 02"), hex("01 83 02")) << "across the end";
+  EXPECT_EQ(supply.ask("01 06 00 00 00 01"), hex("01 86 02")) << "only to be read";
+  EXPECT_EQ(supply.ask("01 10 00 08 00 02 02 04 B0"), hex("01 90 03")) << "byte count";
+  EXPECT_EQ(supply.ask("02 03 00 08 00 01"), "") << "another's";
+}
+
+TEST(SimulatedRiden, LetsItselfBeReadInOneRequest) {
+  Asked supply;
+  EXPECT_EQ(supply.ask("01 03 00 00 00 54").substr(0, 9), hex("01 03 A8"));
+}
+
+TEST(SimulatedRiden, CountsEveryHarmfulWrite) {
+  Asked supply;
+  for (int at = 55; at <= 62; ++at) supply.slave.registers().write(static_cast<std::uint16_t>(at), 1);
+  supply.slave.registers().write(256, 5633);
+  EXPECT_EQ(supply.slave.registers().harmful_writes(), 9u);
+}
+
+TEST(SimulatedRiden, CountsInTheScaleOfItsModel) {
+  const auto twelve = [](const std::string& model) {
+    Asked supply(of_model(model));
+    supply.slave.circuit().controls().volts = 12;
+    supply.slave.circuit().controls().amps = 5;
+    return std::pair(*supply.slave.registers().read(8), *supply.slave.registers().read(9));
+  };
+  EXPECT_EQ(twelve("RD6006"), std::pair(std::uint16_t{1200}, std::uint16_t{5000}));
+  EXPECT_EQ(twelve("RD6006P"), std::pair(std::uint16_t{12000}, std::uint16_t{50000}));
+  EXPECT_EQ(twelve("RD6012"), std::pair(std::uint16_t{1200}, std::uint16_t{500}));
+  EXPECT_EQ(twelve("RD6024"), std::pair(std::uint16_t{1200}, std::uint16_t{500}));
+  EXPECT_EQ(twelve("RD6012P"), std::pair(std::uint16_t{12000}, std::uint16_t{50000}));
+}
+
+TEST(SimulatedRiden, ChangesItsScaleWithTheRange) {
+  Asked supply(of_model("RD6012P"));
+  supply.slave.circuit().controls().amps = 5;
+  EXPECT_EQ(supply.slave.registers().read(9), 50000);
+  supply.slave.registers().write(20, 1);
+  EXPECT_EQ(supply.slave.registers().read(9), 5000);
+}
+
+TEST(SimulatedRiden, DoesDisputedRegistersEitherWay) {
+  const auto registers = [](const SupplyDisputes& disputes) {
+    SupplySettings settings = of_model("RD6006P");
+    settings.disputes = disputes;
+    Asked supply(settings);
+    supply.slave.circuit().controls() = {50, 5, 60, 6};
+    supply.slave.circuit().switch_output(true);
+    supply.run({0, 0.05}, 2s);
+    supply.slave.registers().write(19, 0);
+    return std::array{*supply.slave.registers().read(12), *supply.slave.registers().read(13)};
+  };
+  EXPECT_NEAR(registers({})[1], 12724, 10);  // 50 V, 0.020 ohm, 0.050 S and the bleeder of 0.001 S
+  EXPECT_EQ(registers({})[0], 0);
+  SupplyDisputes other;
+  other.power_in_milliwatts = true;
+  other.register_12 = SupplyDisputes::Twelve::power_high_word;
+  EXPECT_EQ(registers(other)[0], 1);  // 127240 mW = 65536 + 61704
+  EXPECT_NEAR(registers(other)[1], 61704, 100);
+  other.register_12 = SupplyDisputes::Twelve::milliampere_hours;
+  EXPECT_EQ(registers(other)[0], 1);  // 2.5 A for 2 s
+}
+
+TEST(SimulatedRiden, HidesTheLiveThresholdsAfterAPreset) {
+  for (const bool reads_zero : {true, false}) {
+    SupplySettings settings;
+    settings.disputes.preset_reads_zero = reads_zero;
+    Asked supply(settings);
+    supply.slave.registers().write(82, 1300);
+    supply.slave.registers().write(83, 3000);
+    supply.slave.registers().write(84 + 2, 2000);  // M1: OVP
+    supply.slave.registers().write(19, 1);
+    EXPECT_EQ(supply.slave.circuit().controls().over_volts, 20);
+    EXPECT_EQ(supply.slave.registers().read(82), 1300);
+    EXPECT_EQ(supply.slave.registers().read(19), reads_zero ? 0 : 1);
+  }
+}
+
+TEST(SimulatedDps, TakesNoMoreThan32Registers) {
+  Asked supply(of_model("DPS5005"));
+  EXPECT_EQ(supply.ask("01 03 00 00 00 0D").substr(0, 9), hex("01 03 1A"));
+  EXPECT_EQ(supply.ask("01 03 00 50 00 08").substr(0, 9), hex("01 03 10"));
+  EXPECT_EQ(supply.ask("01 03 00 00 00 21"), hex("01 83 03"));
+  EXPECT_EQ(supply.ask("01 03 00 0B 00 01"), hex("01 03 02 13 8D"));
+  EXPECT_EQ(supply.ask("01 03 00 0D 00 01"), hex("01 83 02"));
+}
+
+TEST(SimulatedHanmatek, HasItsGaps) {
+  Asked supply(of_model("HM310P"));
+  EXPECT_EQ(supply.ask("01 03 00 01 00 05"), hex("01 03 0A 00 00 00 00 0B C2 4B 50 02 33"));
+  EXPECT_EQ(supply.ask("01 03 00 01 00 06"), hex("01 83 02"));
+  EXPECT_EQ(supply.ask("01 03 00 00 00 04"), hex("01 83 02"));
+}
+
+TEST(SimulatedHanmatek, TellsItsTripAsABit) {
+  Asked supply(of_model("HM310P"));
+  supply.slave.circuit().trip(SupplyTrip::over_temperature);
+  EXPECT_EQ(supply.slave.registers().read(2), 0b1000);
+}
+
+TEST(SupplySlave, AnswersNoFasterThanItsFirmware) {
+  SupplySettings settings;
+  settings.replies_per_s = 10;
+  SupplySlave slave(settings);
+  const auto request = bytes("01 03 00 08 00 01 05 C8");
+  std::vector<Instant> times;
+  SupplyReply reply;
+  for (int i = 0; i < 5; ++i) slave.receive(0, ModbusFraming::rtu, request, 1ms);
+  while (slave.next_due() != kNever) {
+    times.push_back(slave.next_due());
+    EXPECT_FALSE(slave.next_reply(reply, times.back() - 1ns));
+    EXPECT_TRUE(slave.next_reply(reply, times.back()));
+  }
+  ASSERT_EQ(times.size(), 5u);
+  for (std::size_t i = 1; i < times.size(); ++i) EXPECT_EQ(times[i] - times[i - 1], 100ms);
+}
+
+TEST(SupplySlave, DelaysInOrder) {
+  SupplySettings settings;
+  settings.replies_per_s = 0;
+  SupplyFault late;
+  late.kind = SupplyFaultKind::late;
+  late.count = 1;
+  late.delay = 150ms;
+  settings.faults = {late};
+  SupplySlave slave(settings);
+  slave.receive(0, ModbusFraming::rtu, bytes("01 03 00 08 00 01 05 C8"), 0ms);
+  slave.receive(0, ModbusFraming::rtu, bytes("01 03 00 0A 00 01 A4 08"), 100ms);
+  SupplyReply reply;
+  EXPECT_FALSE(slave.next_reply(reply, 150ms));
+  EXPECT_TRUE(slave.next_reply(reply, 151ms));
+  EXPECT_TRUE(slave.next_reply(reply, 151ms));
+}
+
+TEST(SupplySlave, DribblesByteByByte) {
+  SupplySettings settings;
+  SupplyFault slow;
+  slow.kind = SupplyFaultKind::dribble;
+  slow.count = 1;
+  slow.delay = 300us;
+  settings.faults = {slow};
+  SupplySlave slave(settings);
+  slave.receive(0, ModbusFraming::rtu, bytes("01 03 00 08 00 01 05 C8"), 0ms);
+  SupplyReply reply;
+  std::size_t count = 0;
+  for (Instant at = 1ms; slave.next_due() != kNever; at += 300us, ++count) {
+    EXPECT_EQ(slave.next_due(), at);
+    EXPECT_TRUE(slave.next_reply(reply, at));
+    EXPECT_EQ(reply.bytes.size(), 1u);
+  }
+  EXPECT_EQ(count, 7u);
+}
+
+TEST(SupplySlave, AnswersOverTcpWithTheTransactionOfTheRequest) {
+  SupplySlave slave({});
+  slave.receive(4, ModbusFraming::tcp, bytes("12 34 00 00 00 06 01 03 00 00 00 01"), 0ms);
+  SupplyReply reply;
+  ASSERT_TRUE(slave.next_reply(reply, 1s));
+  EXPECT_EQ(reply.client, 4);
+  EXPECT_EQ(hex(reply.bytes), hex("12 34 00 00 00 05 01 03 02 EA 9E"));
+  slave.receive(4, ModbusFraming::tcp, bytes("47 45 54 20 2F 20 48"), 1s);
+  EXPECT_FALSE(slave.makes_sense(4));
+  slave.forget(4);
+  EXPECT_TRUE(slave.makes_sense(4));
+}
+
+TEST(SupplySlave, IsTheSameForTheSameSeed) {
+  const auto play = [](std::uint64_t seed) {
+    SupplySettings settings;
+    settings.seed = seed;
+    SupplyFault crc;
+    crc.kind = SupplyFaultKind::bad_crc;
+    crc.lasts = 1h;
+    crc.p = 0.5;
+    settings.faults = {crc};
+    Asked supply(settings);
+    std::string all;
+    for (int i = 0; i < 50; ++i) all += supply.raw(bytes("01 03 00 08 00 01 05 C8"));
+    return all;
+  };
+  EXPECT_EQ(play(1), play(1));
+  EXPECT_NE(play(1), play(2));
+}
+
+TEST(SupplySlave, SurvivesAnyRequest) {
+  std::mt19937_64 random(3);
+  for (const SupplyModel& model : supply_models()) {
+    SupplySettings settings = of_model(std::string(model.name));
+    settings.replies_per_s = 0;
+    SupplySlave slave(settings);
+    for (int i = 0; i < 3000; ++i) {
+      std::vector<std::uint8_t> pdu(1 + random() % 12);
+      for (auto& byte : pdu) byte = static_cast<std::uint8_t>(random() % 3 == 0 ? random() : random() % 20);
+      const int client = static_cast<int>(random() % 2);
+      const auto framing = client == 0 ? ModbusFraming::rtu : ModbusFraming::tcp;
+      const Instant now = Duration(i) * 1'000'000;
+      slave.receive(client, framing, modbus_frame(framing, 1, 7, pdu), now);
+      slave.advance({0, 0.1}, now);
+      SupplyReply reply;
+      while (slave.next_reply(reply, now)) ASSERT_LE(reply.bytes.size(), 260u);
+    }
+    EXPECT_GT(slave.truth().requests, 1000u);
+  }
+}
+
+}  // namespace
+}  // namespace kphi::sim

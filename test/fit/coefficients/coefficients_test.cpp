@@ -1,0 +1,163 @@
+#include "fit/coefficients/coefficients.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <fstream>
+#include <set>
+
+#include "compensation/file/coefficient_file.hpp"
+#include "compensation/file/coefficient_keys.hpp"
+#include "test/fit/bench_study.hpp"
+#include "test/fit/campaign_steps.hpp"
+#include "test/source_dir.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+Provenance provenance() {
+  Provenance result;
+  result.measured_utc = "2021-05-30T00:00:00Z";
+  result.tool_version = "0.1.0";
+  result.campaign = "icra2021";
+  result.propeller_name = "HQProp \"5x4\" \\ three\nblades";
+  result.runs = {{"runs/5x3_phi000_rep1.h5", std::string(64, 'a'), "complete", std::nullopt}};
+  result.supply_v = 12;
+  return result;
+}
+
+TEST(Coefficients, RoundTripThroughYamlBitForBit) {
+  const Identification fit = identify(campaign_steps());
+  const YAML::Node file = YAML::Load(format_coefficients(fit, provenance()));
+  EXPECT_EQ(file["format"].as<std::string>(), "kphi-coefficients/1");
+  EXPECT_EQ(file["k_unit"].as<std::string>(), "N/(rad/s)^2");
+  EXPECT_EQ(file["overlap"].as<std::string>(), "rim_arc");
+  EXPECT_EQ(file["propeller"]["id"].as<std::string>(), "5x3");
+  EXPECT_EQ(file["propeller"]["name"].as<std::string>(), provenance().propeller_name);
+  EXPECT_EQ(file["propeller"]["blades"].as<int>(), 3);
+  EXPECT_EQ(file["K_T"]["value"].as<double>(), fit.line.K_T);
+  EXPECT_EQ(file["K_T"]["standard_error"].as<double>(), fit.line.K_T_standard_error);
+  EXPECT_FALSE(file["line"]["anchored"].as<bool>());
+  EXPECT_EQ(file["line"]["intercept"].as<double>(), fit.line.intercept);
+  EXPECT_EQ(file["line"]["slope_per_deg"].as<double>(), fit.line.slope_per_deg);
+  for (std::size_t i = 0; i < 2; ++i)
+    for (std::size_t j = 0; j < 2; ++j)
+      EXPECT_EQ(file["line"]["covariance"][i][j].as<double>(), fit.line.covariance[i][j]);
+  EXPECT_EQ(file["line"]["points_deg"].as<std::vector<double>>(), (std::vector<double>{45, 90, 180, 270}));
+  ASSERT_EQ(file["table"].size(), 5u);
+  EXPECT_EQ(file["table"][4]["k"].as<double>(), fit.table[4].k);
+  EXPECT_EQ(file["table"][4]["k_at_speed"].as<double>(), fit.table[4].at_speed->k);
+  EXPECT_EQ(file["table"][4]["repetitions"].as<int>(), 3);
+  EXPECT_NEAR(file["valid"]["speed_rpm"][1].as<double>(), 19100, 1e-9);
+  EXPECT_EQ(file["air_density_kg_m3"].as<std::string>(), "unknown");
+  EXPECT_EQ(file["supply_v"].as<double>(), 12);
+  EXPECT_EQ(file["provenance"]["runs"][0]["sha256"].as<std::string>(), std::string(64, 'a'));
+}
+
+TEST(Coefficients, AreReadByTheLibraryThatFlies) {
+  for (const bool anchored : {false, true}) {
+    IdentificationOptions options;
+    options.line.anchored = anchored;
+    const Identification fit = identify(campaign_steps(), options);
+    const auto file = compensation::parse_coefficients(format_coefficients(fit, provenance()), "coefficients.yaml");
+    EXPECT_EQ(file.anchored, anchored);
+    EXPECT_EQ(file.curve.thrust_coefficient().value(), fit.line.K_T);
+    EXPECT_EQ(file.curve.line().intercept.value(), fit.line.intercept);
+    EXPECT_NEAR(file.curve.line().slope_per_rad * kPi / 180 / fit.line.slope_per_deg, 1, 1e-15);
+    EXPECT_NEAR(to_degrees(file.curve.largest_fitted()), 270, 1e-9);
+    ASSERT_TRUE(file.curve.uncertainty());
+    EXPECT_EQ(file.table.size(), 5u);
+    EXPECT_EQ(file.provenance.runs.size(), 1u);
+    EXPECT_EQ(file.curve.at(from_degrees(100)), fit.curve().at(from_degrees(100)));
+  }
+}
+
+TEST(Coefficients, OfABareTableAreReadToo) {
+  const std::vector<LinePoint> points{{0, 1.55e-6, 0}, {45, 1.4e-6, 0}, {270, 0.4e-6, 0}};
+  Identification fit = identify_table(points, {}, {});
+  fit.propeller = "5e3";
+  const std::string text = format_coefficients(fit, {});
+  const auto file = compensation::parse_coefficients(text, "k.yaml");
+  EXPECT_FALSE(file.fastest_speed) << "a range nobody gave is not invented";
+  EXPECT_EQ(file.propeller.id, "5e3");
+  EXPECT_EQ(file.table.size(), 3u);
+  EXPECT_FALSE(file.table[0].standard_error);
+  EXPECT_EQ(file.curve.at(from_degrees(100)), fit.curve().at(from_degrees(100)));
+}
+
+TEST(Coefficients, AreTheSameBytesForTheSameSteps) {
+  EXPECT_EQ(format_coefficients(identify(campaign_steps()), provenance()),
+            format_coefficients(identify(campaign_steps()), provenance()));
+  EXPECT_NE(format_coefficients(identify(campaign_steps({}, 1)), provenance()),
+            format_coefficients(identify(campaign_steps({}, 2)), provenance()));
+}
+
+TEST(Coefficients, PrintTheOtherUnitBesideThem) {
+  EXPECT_THAT(format_coefficients(identify(campaign_steps()), provenance()), HasSubstr("N/RPM^2"));
+}
+
+TEST(Coefficients, NeverHoldAnExponentOrIntegerThatReadsAsText) {
+  const std::string text = format_coefficients(identify(campaign_steps()), provenance());
+  EXPECT_THAT(text, Not(HasSubstr(": nan")));
+  EXPECT_THAT(text, HasSubstr("points_deg: [45.0, 90.0, 180.0, 270.0]"));
+}
+
+/// Paths as in kCoefficientKeys.
+void collect_keys(const YAML::Node& node, const std::string& path, std::set<std::string>& keys) {
+  const bool of_maps = node.IsSequence() && node.size() > 0 && node[0].IsMap();
+  if (of_maps) {
+    for (const YAML::Node& entry : node) collect_keys(entry, path + "[]", keys);
+  } else if (node.IsMap() && path != "provenance.fit.u") {
+    for (const auto& entry : node)
+      collect_keys(entry.second, (path.empty() ? "" : path + ".") + entry.first.as<std::string>(), keys);
+  } else {
+    keys.insert(path);
+  }
+}
+
+std::set<std::string> listed_keys() {
+  std::set<std::string> keys;
+  for (const auto& key : compensation::kCoefficientKeys) keys.insert(key.path);
+  return keys;
+}
+
+TEST(Coefficients, HaveExactlyTheKeysOfTheList) {
+  const StudyCampaign campaign = study_campaign({}, 4);
+  auto steps = campaign.steps;
+  for (results::StepMean& step : steps) {
+    step.torque_nm = 0.013 * step.thrust_n;
+    step.air_density_kg_m3 = 1.2;
+    step.air_density_u_kg_m3 = 0.01;
+  }
+  IdentificationOptions options;
+  options.left_out = {{90, 2, "plate slipped"}};
+  const Identification fit = identify(steps, options);
+  Provenance all = provenance();
+  all.clock = MotorClock{1.0001, 1e-5};
+  all.bench.emplace().motor_clock = 1e-5;
+  const Analysis analysis = analyse(fit);
+  std::set<std::string> written;
+  collect_keys(YAML::Load(format_coefficients(fit, all, &analysis)), "", written);
+  EXPECT_EQ(written, listed_keys());
+}
+
+TEST(Coefficients, AreSpecifiedByTheReadmeKeyByKey) {
+  std::ifstream page(test::source_dir() + "/fit/coefficients/README.md");
+  std::string rows, line;
+  while (std::getline(page, line))
+    if (line.starts_with("| `")) rows += line + "\n";
+  std::string expected;
+  for (const auto& key : compensation::kCoefficientKeys) {
+    const std::string unit = *key.unit == '\0' ? "–" : key.unit;
+    expected += "| `" + std::string(key.path) + "` | " + unit + " | " + key.meaning + " |\n";
+  }
+  EXPECT_EQ(rows, expected);
+}
+
+}  // namespace
+}  // namespace kphi::fit

@@ -1,0 +1,224 @@
+#include "fit/logs/log_audit.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "compensation/units.hpp"
+#include "fit/logs/series_audit.hpp"
+#include "fit/logs/speed_audit.hpp"
+#include "fit/logs/zero_audit.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using results::QualityFlag;
+using ::testing::HasSubstr;
+
+constexpr double kK = 1.5e-6;
+
+double thrust_of(double rpm) { return kK * from_rpm(rpm).value() * from_rpm(rpm).value(); }
+
+/// A clean sweep of averaged steps, both speeds, a supply that sags a little.
+StandLog sweep() {
+  StandLog log{.path = "log.csv", .thrust_unit = "N", .has_electrical = true, .has_optical = true};
+  for (int i = 0; i < 12; ++i) {
+    const double rpm = 3000 + 1200.0 * i;
+    StandRow row{.line = static_cast<std::size_t>(i) + 2, .thrust_n = thrust_of(rpm)};
+    row.time_s = 5.0 * i;
+    row.throttle_us = 1050 + 80.0 * i;
+    row.electrical_rpm = row.optical_rpm = rpm;
+    row.voltage_v = 12 - 0.05 * i;
+    row.current_a = 0.1 * i * i;
+    log.rows.push_back(row);
+  }
+  return log;
+}
+
+/// A clean time series: 40 rows still, 400 rows at 5000 RPM, 40 rows still; white noise.
+StandLog series(unsigned seed = 1) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, 0.002);
+  StandLog log{.path = "log.csv", .thrust_unit = "N", .has_optical = true};
+  for (int i = 0; i < 480; ++i) {
+    const bool turning = i >= 40 && i < 440;
+    StandRow row{.line = static_cast<std::size_t>(i) + 2};
+    row.time_s = 0.04 * i;
+    row.throttle_us = turning ? 1500 : 1000;
+    row.optical_rpm = turning ? 5000 + 3 * noise(random) : 0;
+    row.thrust_n = (turning ? thrust_of(5000) : 0.0) + noise(random);
+    log.rows.push_back(row);
+  }
+  return log;
+}
+
+std::vector<std::string> names(const std::vector<Finding>& findings) {
+  std::vector<std::string> result;
+  for (const Finding& finding : findings) {
+    if (finding.kind != FindingKind::negative_thrust) result.push_back(name_of(finding.kind));
+  }
+  return result;
+}
+
+std::vector<std::string> found(const StandLog& log, const RowSelection& selection = {}) {
+  return names(audit(log, selection));
+}
+
+using Names = std::vector<std::string>;
+
+TEST(LogAudit, FindsNothingInCleanLogs) {
+  EXPECT_EQ(found(sweep()), Names{});
+  for (unsigned seed = 1; seed <= 20; ++seed) EXPECT_EQ(found(series(seed)), Names{}) << "seed " << seed;
+}
+
+TEST(LogAudit, NamesThePoleCountBehindARatio) {
+  for (const auto& [set, actual] : {std::pair(14, 12), std::pair(12, 14), std::pair(14, 24), std::pair(8, 14)}) {
+    StandLog log = sweep();
+    for (StandRow& row : log.rows) row.electrical_rpm = *row.electrical_rpm * actual / set;
+    const auto findings = audit(log, {});
+    ASSERT_EQ(names(findings), Names{"speed_ratio"}) << set << " for " << actual;
+    const auto ratio = pole_ratio(static_cast<double>(set) / actual);
+    ASSERT_TRUE(ratio);
+    EXPECT_EQ(ratio->numerator * actual, ratio->denominator * set);
+    EXPECT_THAT(findings[0].text, HasSubstr("--speed-factor"));
+  }
+}
+
+TEST(LogAudit, DoesNotInventAPoleCount) {
+  EXPECT_FALSE(pole_ratio(1.0));
+  EXPECT_FALSE(pole_ratio(1.005));
+  EXPECT_FALSE(pole_ratio(1.0371)) << "no ratio of small whole numbers within 0.2 %";
+  EXPECT_FALSE(pole_ratio(0));
+  EXPECT_FALSE(pole_ratio(-2));
+  EXPECT_EQ(pole_ratio(2.0)->numerator, 2);
+}
+
+TEST(LogAudit, MarksTheStepOfOneBadSpeed) {
+  StandLog log = sweep();
+  log.rows[6].electrical_rpm = *log.rows[6].electrical_rpm * 2;
+  const auto findings = audit(log, {});
+  ASSERT_EQ(names(findings), Names{"speed_disagrees"});
+  EXPECT_EQ(findings[0].first_line, 8u);
+  ImportedTable table = select_rows(log);
+  flag_steps(table, findings);
+  for (std::size_t i = 0; i < table.steps.size(); ++i)
+    EXPECT_EQ(table.steps[i].quality_flags, i == 6 ? static_cast<std::uint32_t>(QualityFlag::speed_unsteady) : 0u);
+}
+
+TEST(LogAudit, FindsASensorThatDies) {
+  StandLog log = sweep();
+  for (std::size_t i = 8; i < log.rows.size(); ++i) log.rows[i].optical_rpm = 300;
+  const auto findings = audit(log, {});
+  ASSERT_EQ(names(findings), Names{"speed_dead"});
+  EXPECT_EQ(findings[0].rows, 4u);
+  for (StandRow& row : log.rows) row.optical_rpm = 0;
+  EXPECT_EQ(found(log), Names{}) << "a channel that never turns is not connected";
+}
+
+TEST(LogAudit, FindsAOneSampleDoubling) {
+  StandLog log = series();
+  log.rows[200].optical_rpm = 10000;
+  const auto findings = audit(log, {});
+  ASSERT_THAT(names(findings), ::testing::Contains("speed_spike"));
+  EXPECT_EQ(findings[0].rows, 1u);
+  EXPECT_EQ(findings[0].first_line, 202u);
+}
+
+TEST(LogAudit, FindsSpeedsThatAreMissing) {
+  StandLog log = sweep();
+  log.rows[3].electrical_rpm = log.rows[3].optical_rpm = 0;
+  EXPECT_EQ(found(log), Names{"speed_missing"});
+  log = sweep();
+  log.rows[0].electrical_rpm = log.rows[0].optical_rpm = 0;
+  log.rows[0].thrust_n = 0.01;
+  EXPECT_EQ(found(log), Names{"not_turning"});
+  log.rows[0].electrical_rpm = 2;
+  EXPECT_EQ(found(log), Names{"barely_turning"});
+}
+
+TEST(LogAudit, FindsTheCurrentLimit) {
+  StandLog log = sweep();
+  for (std::size_t i : {10u, 11u}) {
+    log.rows[i].electrical_rpm = log.rows[i].optical_rpm = *log.rows[i - 1].electrical_rpm * 0.97;
+    log.rows[i].thrust_n = thrust_of(*log.rows[i].electrical_rpm);
+    log.rows[i].voltage_v = *log.rows[i - 1].voltage_v * 0.85;
+  }
+  const auto findings = audit(log, {});
+  ASSERT_EQ(names(findings), Names{"current_limit"});
+  EXPECT_EQ(findings[0].rows, 2u);
+  ImportedTable table = select_rows(log);
+  flag_steps(table, findings);
+  EXPECT_EQ(table.steps[11].quality_flags, static_cast<std::uint32_t>(QualityFlag::supply_out_of_band));
+}
+
+TEST(LogAudit, FindsAZeroThatIsNone) {
+  StandLog untared = series();
+  for (StandRow& row : untared.rows) row.thrust_n -= 0.1;
+  EXPECT_EQ(found(untared), Names{"untared"});
+  EXPECT_EQ(found(untared, {.tare_rows = 40}), Names{}) << "the import tares";
+  StandLog drifted = series();
+  for (std::size_t i = 440; i < 480; ++i) drifted.rows[i].thrust_n += 0.03;
+  EXPECT_EQ(found(drifted), Names{"zero_drifted"});
+  StandLog noisy = series();
+  for (std::size_t i = 0; i < 40; ++i) noisy.rows[i].thrust_n += i % 2 == 0 ? 0.05 : -0.05;
+  EXPECT_EQ(found(noisy), Names{"zero_scatters"});
+  StandLog missing = series();
+  missing.rows.erase(missing.rows.begin(), missing.rows.begin() + 40);
+  EXPECT_EQ(found(missing), Names{"zero_missing"});
+}
+
+TEST(LogAudit, FindsAFrozenChannel) {
+  StandLog log = series();
+  for (std::size_t i = 150; i < 450; ++i) log.rows[i].thrust_n = log.rows[150].thrust_n;
+  const auto findings = audit(log, {});
+  ASSERT_THAT(names(findings), ::testing::Contains("thrust_frozen"));
+  ImportedTable table = select_rows(log);
+  flag_steps(table, findings);
+  EXPECT_EQ(table.steps[200].quality_flags, static_cast<std::uint32_t>(QualityFlag::bad_status));
+  EXPECT_EQ(table.steps[0].quality_flags, 0u);
+}
+
+TEST(LogAudit, FindsThrustThatDriftsAtConstantSpeed) {
+  StandLog log = series();
+  for (std::size_t i = 40; i < 440; ++i) log.rows[i].thrust_n *= 1 - 0.1 * static_cast<double>(i - 40) / 400;
+  EXPECT_THAT(found(log), ::testing::Contains("thrust_drifts"));
+}
+
+TEST(LogAudit, CountsIndependentRows) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0, 1);
+  const double memory = 0.9;
+  std::vector<double> values{0};
+  while (values.size() < 20000) values.push_back(memory * values.back() + noise(random));
+  EXPECT_NEAR(correlation_time(values), (1 + memory) / (1 - memory), 5) << "of a first-order process";
+  for (double& value : values) value = noise(random);
+  EXPECT_NEAR(correlation_time(values), 1, 0.1);
+  EXPECT_EQ(correlation_time({1, 1, 1, 1}), 1);
+}
+
+TEST(LogAudit, CountsStampsThatGoBackOrStandTwice) {
+  StandLog log = series();
+  log.rows[100].time_s = *log.rows[99].time_s;
+  log.rows[200].time_s = 0;
+  log.rows[300].time_s = 306;
+  EXPECT_EQ(found(log), (Names{"time_backward", "time_repeated"}));
+  const auto findings = audit_series(log, SpeedSource::optical);
+  EXPECT_EQ(findings[0].rows, 2u);
+}
+
+TEST(GroupOutliers, NeedAGroupAndADistance) {
+  std::vector<NamedCoefficient> group;
+  for (int i = 0; i < 8; ++i) group.push_back({"f" + std::to_string(i), 1e-6 * (1 + 0.01 * (i % 3))});
+  EXPECT_TRUE(group_outliers(group).empty());
+  group.push_back({"odd", 0.6e-6});
+  const auto outliers = group_outliers(group);
+  ASSERT_EQ(outliers.size(), 1u);
+  EXPECT_EQ(outliers[0].name, "odd");
+  EXPECT_NEAR(outliers[0].share, -0.4, 0.02);
+  group.resize(4);
+  EXPECT_TRUE(group_outliers(group).empty());
+}
+
+}  // namespace
+}  // namespace kphi::fit

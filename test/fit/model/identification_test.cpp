@@ -1,0 +1,151 @@
+#include "fit/model/identification.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "base/error.hpp"
+#include "test/fit/campaign_steps.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using results::QualityFlag;
+using ::testing::HasSubstr;
+
+TEST(Identification, RecoversTheTruthOfASyntheticCampaign) {
+  const CampaignTruth truth;
+  const Identification result = identify(campaign_steps(truth));
+  ASSERT_EQ(result.table.size(), 5u);
+  for (const auto& row : result.table) {
+    EXPECT_NEAR(row.k, truth.k(row.phi_deg), 4 * row.standard_error) << row.phi_deg;
+    EXPECT_EQ(row.repetitions, 3u);
+    EXPECT_EQ(row.steps, 34u) << "40 steps less those below 3000 RPM";
+    ASSERT_TRUE(row.at_speed);
+    EXPECT_EQ(row.at_speed->repetitions, 3u);
+    EXPECT_NEAR(row.at_speed->k, truth.k(row.phi_deg), 2e-8);
+  }
+  EXPECT_NEAR(result.line.intercept / truth.intercept, 1, 0.003);
+  EXPECT_NEAR(result.line.slope_per_deg / truth.slope_per_deg, 1, 0.005);
+  EXPECT_NEAR(to_rpm(RadPerSec(result.at_speed_rad_s)), 19100, 1e-6);
+  EXPECT_NEAR(to_rpm(RadPerSec(result.speed_max_rad_s)), 19100, 1e-6);
+  EXPECT_GT(to_rpm(RadPerSec(result.speed_min_rad_s)), 3000);
+  EXPECT_EQ(result.selection.outside_range, 5u * 3u * 6u);
+}
+
+TEST(Identification, CoversTheTruthOfTheLineAsOftenAsItClaims) {
+  CampaignTruth truth;
+  truth.noise_n = 0.2;  // well above the floor of 0.1 %
+  int within = 0;
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    const Identification result = identify(campaign_steps(truth, seed));
+    const double error = std::abs(result.curve().at(from_degrees(135)).value() - truth.k(135));
+    within += error <= 2 * result.curve().standard_error_at(from_degrees(135)) ? 1 : 0;
+  }
+  EXPECT_GE(within, 88);
+}
+
+TEST(Identification, LeavesSpoiledStepsOutAndListsThem) {
+  auto steps = campaign_steps({}, 3);
+  const double clean = identify(steps).table[1].k;
+  int spoiled = 0;
+  for (auto& step : steps) {
+    if (step.occlusion_deg != 45 || step.step < 20 || step.step % 3 != 0) continue;
+    step.thrust_n *= 0.5;
+    step.quality_flags =
+        static_cast<std::uint32_t>(QualityFlag::speed_not_reached) | static_cast<std::uint32_t>(QualityFlag::derated);
+    ++spoiled;
+  }
+  const Identification result = identify(steps);
+  EXPECT_NEAR(result.table[1].k / clean, 1, 0.002);
+  ASSERT_EQ(result.selection.flagged.size(), static_cast<std::size_t>(spoiled));
+  EXPECT_EQ(result.selection.flagged.front().reason, "commanded speed not reached, motor derated");
+  EXPECT_TRUE(result.selection.flagged.front().left_out);
+}
+
+TEST(Identification, KeepsStepsThatOnlyLostSamplesButListsThem) {
+  auto steps = campaign_steps();
+  const double clean = identify(steps).table[0].k;
+  steps[39].quality_flags = static_cast<std::uint32_t>(QualityFlag::lost_samples);
+  const Identification result = identify(steps);
+  EXPECT_EQ(result.table[0].k, clean);
+  ASSERT_EQ(result.selection.flagged.size(), 1u);
+  EXPECT_FALSE(result.selection.flagged.front().left_out);
+  EXPECT_EQ(result.selection.flagged.front().reason, "samples lost");
+}
+
+TEST(Identification, EveryOtherFlagSpoils) {
+  for (const QualityFlag flag : {QualityFlag::speed_not_reached, QualityFlag::speed_unsteady, QualityFlag::saturated,
+                                 QualityFlag::derated, QualityFlag::few_samples, QualityFlag::bad_status}) {
+    auto steps = campaign_steps();
+    steps[39].quality_flags = static_cast<std::uint32_t>(flag);
+    const StepSelection selection = select_steps(steps, {});
+    EXPECT_EQ(selection.used.size(), steps.size() - 1);
+    ASSERT_EQ(selection.flagged.size(), 1u);
+    EXPECT_FALSE(selection.flagged.front().reason.empty());
+  }
+}
+
+TEST(Identification, DropsAveragesThatWouldCountTwice) {
+  auto steps = campaign_steps();
+  const double single = identify(steps).table[0].k;
+  auto average = steps[39];
+  average.repetition = 0;
+  average.thrust_n *= 3;
+  steps.push_back(average);
+  EXPECT_EQ(identify(steps).table[0].k, single);
+  for (auto& step : steps) step.repetition = 0;
+  EXPECT_NE(identify(steps).table[0].k, single) << "where there are only averages, they are what is fitted";
+}
+
+TEST(Identification, TakesTheTopLevelThatEveryAngleReached) {
+  auto steps = campaign_steps();
+  for (auto& step : steps)
+    if (step.occlusion_deg == 180 && step.step == 39)
+      step.quality_flags = static_cast<std::uint32_t>(QualityFlag::speed_not_reached);
+  const Identification result = identify(steps);
+  EXPECT_NEAR(to_rpm(RadPerSec(result.at_speed_rad_s)), 100 + 19000.0 * 38 / 39, 1e-6);
+  EXPECT_NEAR(result.speed_max_rad_s, result.at_speed_rad_s, 1e-9) << "the file vouches for common speeds only";
+}
+
+TEST(Identification, EvaluatesAtTheNamedSpeed) {
+  IdentificationOptions options;
+  options.at_speed_rad_s = from_rpm(100 + 19000.0 * 20 / 39).value();
+  const Identification result = identify(campaign_steps(), options);
+  EXPECT_NEAR(result.table[0].at_speed->speed_rad_s / *options.at_speed_rad_s, 1, 1e-3);
+  options.at_speed_rad_s = from_rpm(50000).value();
+  EXPECT_THROW((void)identify(campaign_steps(), options), FitError);
+}
+
+TEST(Identification, RefusesMixedPropellersAndEmptyTables) {
+  auto steps = campaign_steps();
+  steps.back().propeller = "6x2";
+  EXPECT_THROW((void)identify(steps), FitError);
+  EXPECT_THROW((void)identify({}), FitError);
+  IdentificationOptions beyond;
+  beyond.speed_range.min_rad_s = 1e6;
+  EXPECT_THROW((void)identify(campaign_steps(), beyond), FitError);
+}
+
+TEST(Identification, NamesTheAngleThatCannotBeFitted) {
+  auto steps = campaign_steps();
+  std::erase_if(steps, [](const auto& s) { return s.occlusion_deg == 90 && (s.step != 39 || s.repetition != 1); });
+  try {
+    (void)identify(steps);
+    FAIL() << "one step is no fit";
+  } catch (const FitError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("phi = 90 deg"));
+  }
+}
+
+TEST(Identification, OfATableKeepsTheRangeItWasGiven) {
+  const std::vector<LinePoint> points{{90, 1.2e-6, 1e-8}, {0, 1.5e-6, 1e-8}, {270, 0.4e-6, 1e-8}};
+  const Identification result = identify_table(points, {}, {300, 2000});
+  EXPECT_EQ(result.table.front().phi_deg, 0);
+  EXPECT_FALSE(result.table.front().fit);
+  EXPECT_EQ(result.speed_max_rad_s, 2000);
+}
+
+}  // namespace
+}  // namespace kphi::fit

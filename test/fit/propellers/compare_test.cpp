@@ -1,0 +1,142 @@
+#include "fit/propellers/compare.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "base/error.hpp"
+#include "fit/coefficients/coefficients.hpp"
+#include "results/steps_csv.hpp"
+#include "test/fit/campaign_steps.hpp"
+#include "test/temporary_folder.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using test::TemporaryFolder;
+using ::testing::HasSubstr;
+
+ComparedResult result(std::initializer_list<ComparedValue> values) {
+  ComparedResult made;
+  made.name = "made";
+  made.propeller = "5x3";
+  made.speed_min_rad_s = 300;
+  made.speed_max_rad_s = 2000;
+  made.air_density_kg_m3 = 1.2;
+  made.estimates = values;
+  return made;
+}
+
+std::string campaign(const TemporaryFolder& folder, const char* name, const CampaignTruth& truth, unsigned seed) {
+  const auto path = folder.path() / name;
+  std::filesystem::create_directories(path);
+  std::ofstream(path / "coefficients.yaml") << format_coefficients(identify(campaign_steps(truth, seed)), {});
+  return path.string();
+}
+
+TEST(Compare, FindsADifferenceLargerThanItsUncertainty) {
+  const Comparison apart = compare(result({{"K_T", "", 1.50e-6, 1e-9}}), result({{"K_T", "", 1.51e-6, 1e-9}}));
+  EXPECT_EQ(apart.verdict, Agreement::differ);
+  EXPECT_NEAR(apart.differences[0].difference, 1e-8, 1e-15);
+  EXPECT_NEAR(*apart.differences[0].standard_error, std::sqrt(2) * 1e-9, 1e-15);
+  const Comparison close = compare(result({{"K_T", "", 1.50e-6, 1e-8}}), result({{"K_T", "", 1.51e-6, 1e-8}}));
+  EXPECT_EQ(close.verdict, Agreement::agree);
+  EXPECT_NEAR(*close.differences[0].p, 0.4795, 1e-4) << "two-sided, z = 1/sqrt(2)";
+  EXPECT_NEAR(close.largest_open_share, (1e-8 + 1.95996 * std::sqrt(2) * 1e-8) / 1.5e-6, 1e-6)
+      << "agreement is only as good as the data";
+}
+
+TEST(Compare, DoesNotDecideWithoutUncertainties) {
+  EXPECT_EQ(compare(result({{"K_T", "", 1, 0}}), result({{"K_T", "", 2, 0.1}})).verdict, Agreement::undecided);
+  EXPECT_EQ(compare(result({{"K_T", "", 1, 1}}), result({{"k(45°)", "", 2, 0.1}})).verdict, Agreement::undecided);
+}
+
+TEST(Compare, CorrectsForTheNumberOfComparisons) {
+  // One of five at p = 0.03 is what chance does; of one comparison it is a finding.
+  const double z = 2.17;
+  std::vector<ComparedValue> a, b;
+  for (int i = 0; i < 5; ++i) {
+    a.push_back({"k" + std::to_string(i), "", 1, 0.01 / std::sqrt(2)});
+    b.push_back({"k" + std::to_string(i), "", 1 + (i == 2 ? 0.01 * z : 0), 0.01 / std::sqrt(2)});
+  }
+  ComparedResult five_a = result({}), five_b = result({});
+  five_a.estimates = a;
+  five_b.estimates = b;
+  EXPECT_EQ(compare(five_a, five_b).verdict, Agreement::agree);
+  EXPECT_EQ(compare(result({a[2]}), result({b[2]})).verdict, Agreement::differ);
+}
+
+TEST(Compare, IsWrongOnceInTwentyOfEqualPairs) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 1);
+  int differ = 0;
+  constexpr int kTrials = 4000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    ComparedResult a = result({}), b = result({});
+    for (int i = 0; i < 5; ++i) {
+      a.estimates.push_back({"k" + std::to_string(i), "", 10 + noise(random), 1});
+      b.estimates.push_back({"k" + std::to_string(i), "", 10 + noise(random), 1});
+    }
+    differ += compare(a, b).verdict == Agreement::differ ? 1 : 0;
+  }
+  EXPECT_NEAR(differ / static_cast<double>(kTrials), 0.05, 0.012);
+}
+
+TEST(Compare, ReadsCampaignFolders) {
+  const TemporaryFolder folder;
+  CampaignTruth other;
+  other.K_T *= 1.02;
+  other.intercept *= 1.02;
+  const std::string monday = campaign(folder, "monday", {}, 1), tuesday = campaign(folder, "tuesday", {}, 2),
+                    changed = campaign(folder, "changed", other, 3);
+  const Comparison same = compare(load_result(monday), load_result(tuesday));
+  EXPECT_EQ(same.verdict, Agreement::agree) << comparison_table(same);
+  EXPECT_EQ(same.differences.size(), 7u) << "K_T, four occlusions, intercept, slope";
+  const Comparison apart = compare(load_result(monday), load_result(changed));
+  EXPECT_EQ(apart.verdict, Agreement::differ);
+  EXPECT_THAT(comparison_table(apart), HasSubstr("verdict  differ"));
+  EXPECT_THAT(comparison_table(same), HasSubstr("k(45°)"));
+}
+
+TEST(Compare, ReadsStepsWithoutOcclusion) {
+  const TemporaryFolder folder;
+  auto steps = campaign_steps();
+  std::erase_if(steps, [](const results::StepMean& step) { return step.occlusion_deg > 0; });
+  results::write_steps(folder.path() / "steps.csv", steps);
+  const ComparedResult loaded = load_result(folder.path().string());
+  ASSERT_EQ(loaded.estimates.size(), 1u);
+  EXPECT_NEAR(loaded.estimates[0].value, CampaignTruth{}.K_T, 3e-9);
+  results::write_steps(folder.path() / "steps.csv", campaign_steps());
+  EXPECT_THROW((void)load_result(folder.path().string()), ConfigurationError) << "not fitted yet";
+}
+
+TEST(Compare, RemarksWhatMakesResultsUnlike) {
+  ComparedResult a = result({{"K_T", "", 1, 0.1}, {"k(90°)", "", 1, 0.1}}), b = result({{"K_T", "", 2.07, 0.1}});
+  b.propeller = "6x3";
+  a.diameter_in = 5;
+  b.diameter_in = 6;
+  b.speed_max_rad_s = 1800;
+  b.air_density_kg_m3 = 1.1;
+  const Comparison comparison = compare(a, b);
+  EXPECT_NEAR(*comparison.diameter_ratio4, 2.0736, 1e-12);
+  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("5x3 and 6x3")));
+  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("other speeds")));
+  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("other air")));
+  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("only in made: k(90°)")));
+}
+
+TEST(Compare, GivesTheSameAsJson) {
+  const Comparison comparison = compare(result({{"K_T", "N", 1, 0.1}, {"slope", "N", 1, 0, false}}),
+                                        result({{"K_T", "N", 2, 0.1}, {"slope", "N", 2, 1, false}}));
+  const auto json = nlohmann::json::parse(comparison_json(comparison));
+  EXPECT_EQ(json["verdict"], "differ");
+  EXPECT_EQ(json["differences"].size(), 2u);
+  EXPECT_EQ(json["differences"][0]["difference"], 1.0);
+  EXPECT_TRUE(json["differences"][1]["standard_error"].is_null());
+}
+
+}  // namespace
+}  // namespace kphi::fit

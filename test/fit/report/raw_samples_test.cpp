@@ -1,0 +1,66 @@
+#include "fit/report/raw_samples.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "test/fit/campaign_steps.hpp"
+#include "test/temporary_folder.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using test::TemporaryFolder;
+
+/// 1 kHz for 4 s; Fz reads −(second) N in counts, so every second has its own level.
+results::RunRecording recording() {
+  results::RunRecording run;
+  run.header.thrust_sign = -1;
+  run.header.load_cell.counts_per_newton = 1e6;
+  for (int i = 0; i < 4000; ++i) {
+    results::LoadCellRecord record;
+    record.arrival_ns = std::int64_t{i} * 1'000'000;
+    record.counts[2] = -1'000'000 * (i / 1000) - (i % 2) * 1000;
+    run.load_cell.push_back(record);
+  }
+  return run;
+}
+
+results::StepMean step() {
+  results::StepMean result;
+  result.window_begin_s = 2;
+  result.window_end_s = 2.9995;
+  result.thrust_n = 1.75;  // with a zero taken off, whatever its sign
+  return result;
+}
+
+TEST(RawSamples, ScatterAboutTheStepsMeanInsideItsWindow) {
+  const auto samples = thrust_samples(recording(), step(), 10000);
+  ASSERT_EQ(samples.size(), 1000u);
+  EXPECT_NEAR(std::accumulate(samples.begin(), samples.end(), 0.0) / 1000, 1.75, 1e-9);
+  EXPECT_NEAR(samples[1] - samples[0], 0.001, 1e-12) << "the sign of the axis is applied";
+}
+
+TEST(RawSamples, AreThinnedEvenly) {
+  EXPECT_EQ(thrust_samples(recording(), step(), 100).size(), 100u);
+  EXPECT_EQ(thrust_samples(recording(), step(), 666).size(), 666u);
+}
+
+TEST(RawSamples, AreNoneOutsideTheRun) {
+  auto late = step();
+  late.window_begin_s = 10;
+  late.window_end_s = 11;
+  EXPECT_TRUE(thrust_samples(recording(), late, 100).empty());
+}
+
+TEST(RawSamples, AreNotShownWhenARunIsMissing) {
+  const TemporaryFolder folder;
+  const RawSamples raw =
+      read_raw_samples(identify(campaign_steps()), {{"runs/5x3_phi000_rep1.h5", "", "", std::nullopt}}, folder.path());
+  EXPECT_TRUE(raw.shares.empty());
+  ASSERT_EQ(raw.runs.size(), 1u);
+  EXPECT_FALSE(raw.runs[0].account);
+}
+
+}  // namespace
+}  // namespace kphi::fit

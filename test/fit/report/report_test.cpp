@@ -1,0 +1,278 @@
+#include "fit/report/report.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <pugixml.hpp>
+#include <random>
+#include <set>
+#include <string>
+
+#include "fit/report/detail_figures.hpp"
+#include "fit/report/gnuplot.hpp"
+#include "fit/report/html.hpp"
+#include "results/file_layer.hpp"
+#include "test/fit/campaign_steps.hpp"
+#include "test/temporary_folder.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using results::QualityFlag;
+using test::TemporaryFolder;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+bool gnuplot_is_installed() { return std::system("command -v gnuplot >/dev/null 2>&1") == 0; }
+
+Provenance provenance() {
+  Provenance result;
+  result.measured_utc = "2021-05-30T00:00:00Z";
+  result.tool_version = "0.1.0";
+  result.campaign = "icra <script>alert(1)</script> & \"co\"";
+  result.propeller_name = "Tom's 5x4 & more";
+  result.source = "steps.csv";
+  results::SampleAccount account;
+  account.expected = 560000;
+  account.received = 559990;
+  account.lost_network = 7;
+  account.lost_host = 3;
+  result.runs = {{"runs/5x3_phi000_rep1.h5", std::string(64, 'a'), "complete", account},
+                 {"runs/5x3_phi045_rep1.h5", std::string(64, 'b'), "", std::nullopt}};
+  return result;
+}
+
+std::vector<results::StepMean> steps_with_flags() {
+  auto steps = campaign_steps();
+  steps[39].quality_flags = static_cast<std::uint32_t>(QualityFlag::speed_not_reached);
+  steps[38].quality_flags = static_cast<std::uint32_t>(QualityFlag::lost_samples);
+  return steps;
+}
+
+std::string page(const Figures& figures = {}) {
+  return format_report(identify(steps_with_flags()), provenance(), figures);
+}
+
+/// Every attribute that makes a browser load something.
+void expect_no_loads(const pugi::xml_node& node) {
+  for (const pugi::xml_attribute attribute : node.attributes()) {
+    const std::string name = attribute.name(), value = attribute.value();
+    if (name == "src" || name == "href" || name == "xlink:href" || name == "data" || name == "srcset") {
+      EXPECT_TRUE(value.starts_with('#')) << node.name() << ' ' << name << '=' << value;
+    }
+    if (!name.starts_with("xmlns")) {
+      EXPECT_EQ(value.find("http"), std::string::npos) << value;
+    }
+  }
+  for (const pugi::xml_node child : node.children()) expect_no_loads(child);
+}
+
+TEST(Html, EscapesMarkup) {
+  EXPECT_EQ(html_escaped("<a href=\"x\">&'"), "&lt;a href=&quot;x&quot;&gt;&amp;&#39;");
+  EXPECT_EQ(html_escaped("φ = 45° ± 1 µs"), "φ = 45° ± 1 µs");
+}
+
+TEST(Html, ReplacesWhatXmlDoesNotAllow) {
+  EXPECT_EQ(html_escaped(std::string("a\0b\x1b", 4)),
+            "a\xEF\xBF\xBD"
+            "b\xEF\xBF\xBD");
+  for (const char* bad : {"\xC3", "\xC0\x80", "\xED\xA0\x80", "\xF5\x80\x80\x80", "\xEF\xBF\xBF", "\x80"})
+    EXPECT_EQ(html_escaped(bad).rfind("\xEF\xBF\xBD", 0), 0u);
+}
+
+TEST(Html, NoBytesBreakThePage) {
+  std::mt19937 random(3);
+  for (int trial = 0; trial < 2000; ++trial) {
+    std::string text;
+    for (int i = 0; i < 30; ++i) text += static_cast<char>(random());
+    pugi::xml_document document;
+    const std::string xml = "<p a=\"" + html_escaped(text) + "\">" + html_escaped(text) + "</p>";
+    ASSERT_TRUE(document.load_buffer(xml.data(), xml.size()));
+    EXPECT_EQ(std::distance(document.child("p").begin(), document.child("p").end()), 1);
+  }
+}
+
+TEST(Html, SetsWhatPlainTextWritesInAscii) {
+  EXPECT_EQ(typeset("K_T: T = k w^2 at phi = 45 deg, 1e-8 N/RPM^2 <b>"),
+            "K<sub>T</sub>: T = k ω² at φ = 45°, 1e-8 N/RPM² &lt;b&gt;");
+  EXPECT_EQ(typeset("many degrees of Delphi"), "many degrees of Delphi");
+}
+
+TEST(Html, WritesPowersOfTenAsPeopleDo) {
+  EXPECT_EQ(with_power_of_ten(1.550197e-6, 2.7e-11), "(1.550197 ± 0.000027) × 10⁻⁶");
+  EXPECT_EQ(with_power_of_ten(-4.5e-9, 0), "−4.50000 × 10⁻⁹");
+  EXPECT_EQ(with_power_of_ten(0, 1), "0.00000e+00");
+}
+
+TEST(Html, PrefixesIdsAndReferencesOfDrawings) {
+  const std::string svg = inline_svg(
+      "<?xml version=\"1.0\"?><!DOCTYPE svg><svg xmlns=\"http://www.w3.org/2000/svg\"><circle id=\"p\"/>"
+      "<use xlink:href='#p'/><g fill=\"url(#q)\"/></svg>",
+      "f1-");
+  EXPECT_THAT(svg, HasSubstr("id=\"f1-p\""));
+  EXPECT_THAT(svg, HasSubstr("\"#f1-p\""));
+  EXPECT_THAT(svg, HasSubstr("url(#f1-q)"));
+  EXPECT_THAT(svg, Not(HasSubstr("DOCTYPE")));
+  EXPECT_EQ(inline_svg("no svg", "f1-"), "");
+}
+
+TEST(Report, IsWellFormedAndLoadsNothing) {
+  const std::string html = page();
+  pugi::xml_document document;
+  const auto result = document.load_buffer(html.data(), html.size(), pugi::parse_default | pugi::parse_doctype);
+  ASSERT_TRUE(result) << result.description() << " at " << result.offset;
+  EXPECT_TRUE(document.select_nodes("//script").empty());
+  EXPECT_TRUE(document.select_nodes("//link").empty());
+  expect_no_loads(document.child("html"));
+  EXPECT_THAT(html, Not(HasSubstr("@import")));
+  EXPECT_THAT(html, HasSubstr("@media print"));
+}
+
+TEST(Report, ShowsNamesAsTextOnly) {
+  const std::string html = page();
+  EXPECT_THAT(html, HasSubstr("&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;co&quot;"));
+  EXPECT_THAT(html, HasSubstr("Tom&#39;s 5x4 &amp; more"));
+}
+
+TEST(Report, TellsHeadlineTableFlagsRunsAndProvenance) {
+  const std::string html = page();
+  EXPECT_THAT(html, HasSubstr("k(0)</h3><div class=\"value\">(1.5"));
+  EXPECT_THAT(html, HasSubstr(") × 10⁻⁶"));
+  EXPECT_THAT(html, HasSubstr("N/(rad/s)²"));
+  EXPECT_THAT(html, HasSubstr("N/RPM²"));
+  for (const char* angle : {"<td>0°</td>", "<td>45°</td>", "<td>90°</td>", "<td>180°</td>", "<td>270°</td>"})
+    EXPECT_THAT(html, HasSubstr(angle));
+  EXPECT_THAT(html, HasSubstr("commanded speed not reached"));
+  EXPECT_THAT(html, HasSubstr("<td class=\"text\">left out</td>"));
+  EXPECT_THAT(html, HasSubstr("<td class=\"text\">kept</td>"));
+  EXPECT_THAT(html, HasSubstr("<td>560000</td><td>559990</td><td>10</td>"));
+  EXPECT_THAT(html, HasSubstr(std::string(64, 'b')));
+  EXPECT_THAT(html, AllOf(HasSubstr("2021-05-30T00:00:00Z"), HasSubstr("kphi 0.1.0")));
+}
+
+TEST(Report, ListsEveryFlagEventAndRejectionWithItsRun) {
+  Provenance told = provenance();
+  told.runs[0].events = {"3.20 s: restarted, the stream <began> anew"};
+  told.rejected = {{"5x3_phi090_rep2.h5", "2021-05-30T00:10:00Z", "speed error & more"}};
+  const std::string html = format_report(identify(steps_with_flags()), told, {});
+  EXPECT_THAT(html, HasSubstr("3.20 s: restarted, the stream &lt;began&gt; anew"));
+  EXPECT_THAT(html, HasSubstr("not accepted"));
+  EXPECT_THAT(html, HasSubstr("2021-05-30T00:10:00Z: speed error &amp; more"));
+  EXPECT_THAT(html, HasSubstr("samples lost; commanded speed not reached")) << "of the run whose steps they are";
+}
+
+TEST(Report, OfSeveralCampaignsIsOnePage) {
+  if (!gnuplot_is_installed()) GTEST_SKIP() << "gnuplot is not installed";
+  const TemporaryFolder folder;
+  CampaignTruth larger;
+  larger.K_T *= 2;
+  larger.intercept *= 2;
+  larger.slope_per_deg *= 2;
+  std::vector<Chapter> chapters{{identify(campaign_steps()), provenance(), {}},
+                                {identify(campaign_steps(larger)), provenance(), {}}};
+  chapters[1].identification.propeller = "6x3 <b>";
+  for (Chapter& chapter : chapters) {
+    chapter.figures = draw_figures(chapter.identification, shares_of_steps(chapter.identification),
+                                   folder.path() / chapter.identification.propeller);
+  }
+  const Identification* const family[]{&chapters[0].identification, &chapters[1].identification};
+  const std::string html = format_reports(chapters, draw({family_figure(family)}, folder.path()));
+  pugi::xml_document document;
+  ASSERT_TRUE(document.load_buffer(html.data(), html.size()));
+  EXPECT_EQ(document.select_nodes("//svg").size(), 9u);
+  std::set<std::string> ids;
+  for (const pugi::xpath_node& node : document.select_nodes("//*[@id]"))
+    EXPECT_TRUE(ids.insert(node.node().attribute("id").value()).second) << node.node().attribute("id").value();
+  for (const pugi::xpath_node& link : document.select_nodes("//nav/a"))
+    EXPECT_TRUE(ids.contains(std::string(link.node().attribute("href").value()).substr(1)));
+  expect_no_loads(document.child("html"));
+  EXPECT_THAT(html, HasSubstr("6x3 &lt;b&gt;"));
+}
+
+TEST(Report, SaysWhyFiguresAreMissingAndHowToGetThem) {
+  const TemporaryFolder folder;
+  const Identification fit = identify(campaign_steps());
+  const Figures figures = draw_figures(fit, shares_of_steps(fit), folder.path() / "figures", "no-such-gnuplot");
+  EXPECT_TRUE(figures.drawn.empty());
+  EXPECT_THAT(figures.skipped, HasSubstr("apt install gnuplot-nox"));
+  EXPECT_THAT(page(figures), HasSubstr("Figures skipped: gnuplot is not installed"));
+  EXPECT_TRUE(std::filesystem::exists(folder.path() / "figures/thrust_share.gp"))
+      << "the script stays, to draw by hand";
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "figures/thrust_share.svg"));
+}
+
+TEST(Report, NumbersCarryTheDigitsTheirErrorAllows) {
+  EXPECT_EQ(with_error(1.5512345e-6, 1.2e-9), "1.5512e-06 ± 1.2e-09");
+  EXPECT_EQ(with_error(-4.4567e-9, 3e-11), "-4.457e-09 ± 3.0e-11");
+  EXPECT_EQ(with_error(1.5e-6, 0), "1.50000e-06");
+  EXPECT_EQ(with_error(0, 1), "0.00000e+00");
+}
+
+TEST(Figures, AreDrawnAsSvgWithScriptAndDataBesideThem) {
+  if (!gnuplot_is_installed()) GTEST_SKIP() << "gnuplot is not installed";
+  const TemporaryFolder folder;
+  const Identification fit = identify(campaign_steps());
+  const Figures figures = draw_figures(fit, shares_of_steps(fit), folder.path());
+  EXPECT_EQ(figures.skipped, "");
+  ASSERT_EQ(figures.drawn.size(), 4u);
+  for (const DrawnFigure& figure : figures.drawn) {
+    pugi::xml_document document;
+    ASSERT_TRUE(document.load_file(figure.svg.c_str()));
+    EXPECT_FALSE(document.select_nodes("//path").empty());
+    for (const char* ending : {".gp", ".csv"})
+      EXPECT_GT(std::filesystem::file_size(std::filesystem::path(figure.svg).replace_extension(ending)), 100u);
+  }
+  const std::string html = page(figures);
+  pugi::xml_document document;
+  ASSERT_TRUE(document.load_buffer(html.data(), html.size()));
+  EXPECT_EQ(document.select_nodes("//svg").size(), 4u);
+  expect_no_loads(document.child("html"));
+}
+
+TEST(Figures, AreTheSameBytesForTheSameSteps) {
+  if (!gnuplot_is_installed()) GTEST_SKIP() << "gnuplot is not installed";
+  const TemporaryFolder one, two;
+  const Identification fit = identify(campaign_steps());
+  const Figures first = draw_figures(fit, shares_of_steps(fit), one.path());
+  const Figures second = draw_figures(fit, shares_of_steps(fit), two.path());
+  ASSERT_EQ(first.drawn.size(), second.drawn.size());
+  for (std::size_t i = 0; i < first.drawn.size(); ++i)
+    EXPECT_EQ(results::read_text(first.drawn[i].svg), results::read_text(second.drawn[i].svg));
+  EXPECT_EQ(page(first), page(second));
+}
+
+TEST(Figures, OfABareTableShowTheLineOnly) {
+  if (!gnuplot_is_installed()) GTEST_SKIP() << "gnuplot is not installed";
+  const TemporaryFolder folder;
+  const std::vector<LinePoint> points{{0, 1.55e-6, 0}, {45, 1.4e-6, 1e-8}, {270, 0.4e-6, 1e-8}};
+  const Figures figures = draw_figures(identify_table(points, {}, {}), {}, folder.path());
+  EXPECT_EQ(figures.skipped, "");
+  EXPECT_EQ(figures.drawn.size(), 1u);
+}
+
+TEST(Figures, ABadScriptIsAReasonAndNoFigure) {
+  if (!gnuplot_is_installed()) GTEST_SKIP() << "gnuplot is not installed";
+  const TemporaryFolder folder;
+  std::ofstream(folder.path() / "bad.gp") << "plot nonsense(((\n";
+  const GnuplotOutcome outcome = draw(folder.path() / "bad.gp", folder.path() / "bad.svg");
+  EXPECT_FALSE(outcome.drawn);
+  EXPECT_THAT(outcome.reason, HasSubstr("bad.gp"));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "bad.svg"));
+}
+
+TEST(ThrustShares, AreInPercentOfTheThrustWithoutOcclusion) {
+  const CampaignTruth truth;
+  const Identification fit = identify(campaign_steps(truth));
+  const auto shares = shares_of_steps(fit);
+  ASSERT_EQ(shares.size(), 5u);
+  for (const ThrustShares& entry : shares) {
+    ASSERT_EQ(entry.percent.size(), 3u) << "one per repetition";
+    EXPECT_NEAR(entry.percent[0], 100 * truth.k(entry.phi_deg) / truth.K_T, 1);
+  }
+}
+
+}  // namespace
+}  // namespace kphi::fit

@@ -1,0 +1,211 @@
+#include "fit/uncertainty/analysis.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "fit/coefficients/coefficients.hpp"
+#include "fit/report/analysis_json.hpp"
+#include "test/fit/bench_study.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using ::testing::HasSubstr;
+
+const BudgetRow& row_of(const Budget& budget, const std::string& source) {
+  for (const BudgetRow& row : budget.rows)
+    if (row.source == source) return row;
+  throw std::out_of_range(source);
+}
+
+struct Study {
+  StudyCampaign campaign = study_campaign({}, 5);
+  Identification found = identify(campaign.steps);
+  AnalysisOptions options = study_options({}, campaign);
+};
+
+TEST(Analysis, ABudgetHasEverySourceAndSaysWhichNobodyKnows) {
+  Study study;
+  const Budget budget = analyse(study.found, study.options).coefficients[1];
+  EXPECT_EQ(budget.quantity, "k(45 deg)");
+  for (const char* source : {"noise within runs", "repetitions", "zero drift", "model T = k w^2", "cell calibration",
+                             "cross-axis", "alignment", "motor clock"})
+    EXPECT_NO_THROW((void)row_of(budget, source)) << source;
+  EXPECT_FALSE(row_of(budget, "cross-axis").known());
+  EXPECT_EQ(row_of(budget, "repetitions").freedom, 10) << "five angles, three runs each";
+  EXPECT_NEAR(row_of(budget, "motor clock").contribution(), 2 * 2e-4 * budget.value, 1e-18);
+  EXPECT_NEAR(row_of(budget, "cell calibration").contribution(), 2e-3 * budget.value, 1e-18);
+  double shares = 0;
+  for (const BudgetRow& row : budget.rows) shares += budget.share(row);
+  EXPECT_NEAR(shares, 1, 1e-12);
+}
+
+TEST(Analysis, WhatIsCommonToAllCancelsInTheScalingFactor) {
+  Study study;
+  const Analysis before = analyse(study.found, study.options);
+  study.options.bench.cell_calibration = 0.5;
+  study.options.bench.motor_clock = 0.5;
+  const Analysis after = analyse(study.found, study.options);
+  EXPECT_GT(after.coefficients[0].combined(), 0.4 * after.coefficients[0].value);
+  EXPECT_GT(after.predictions[0].speed_u_share, 0.2);
+  EXPECT_NEAR(after.predictions[0].scaling_factor.combined() / before.predictions[0].scaling_factor.combined(), 1,
+              1e-9);
+}
+
+TEST(Analysis, CovarianceBelongsToTheBudgets) {
+  Study study;
+  const Analysis analysis = analyse(study.found, study.options);
+  EXPECT_NEAR(std::sqrt(analysis.covariance[0][0]) / analysis.coefficients[0].combined(), 1, 1e-12);
+  EXPECT_NEAR(std::sqrt(analysis.covariance[1][1]) / analysis.intercept.combined(), 1, 1e-9);
+  EXPECT_NEAR(std::sqrt(analysis.covariance[2][2]) / analysis.slope.combined(), 1, 1e-9);
+  EXPECT_LT(analysis.covariance[1][2], 0);
+}
+
+TEST(Analysis, LineWeightsAreTheLine) {
+  for (const bool anchored : {false, true}) {
+    IdentificationOptions options;
+    options.line.anchored = anchored;
+    const Identification found = identify(study_campaign({}, 6).steps, options);
+    std::vector<double> phis;
+    for (const auto& row : found.table) phis.push_back(row.phi_deg);
+    const LineWeights weights = found.line.weights(phis);
+    double intercept = 0, slope = 0;
+    for (std::size_t i = 0; i < phis.size(); ++i) {
+      intercept += weights.intercept[i] * found.table[i].k;
+      slope += weights.slope[i] * found.table[i].k;
+    }
+    EXPECT_NEAR(intercept / found.line.intercept, 1, 1e-12);
+    EXPECT_NEAR(slope / found.line.slope_per_deg, 1, 1e-11);
+  }
+}
+
+TEST(Analysis, StandardAirAddsTheDensity) {
+  Study study;
+  const Analysis analysis = analyse(study.found, study.options);
+  const double scale = kStandardDensity / study.campaign.measured_density;
+  EXPECT_NEAR(analysis.standard[0].value / (analysis.coefficients[0].value * scale), 1, 1e-12);
+  EXPECT_NEAR(row_of(analysis.standard[0], "air density").contribution(), 3e-3 * analysis.standard[0].value, 1e-17);
+  study.options.air_density_kg_m3.reset();
+  EXPECT_TRUE(analyse(study.found, study.options).standard.empty()) << "never 1.225 in silence";
+}
+
+TEST(Analysis, ReportsWhatEquationFourWillMeet) {
+  Study study;
+  const Analysis analysis = analyse(study.found, study.options);
+  ASSERT_TRUE(analysis.shape.clipping_deg);
+  EXPECT_NEAR(*analysis.shape.clipping_deg, 10.4, 4);
+  EXPECT_NEAR(*analysis.shape.zero_deg, 356.5, 4);
+  EXPECT_GT(analysis.shape.mismatch.value, 0);
+  EXPECT_THAT(analysis.remarks, ::testing::Contains(HasSubstr("k_i is held at 1")));
+  EXPECT_THAT(analysis.remarks, ::testing::Contains(HasSubstr("reaches 0 at")));
+}
+
+TEST(Analysis, TorqueFollowsTheSameEstimators) {
+  Study study;
+  const Analysis analysis = analyse(study.found, study.options);
+  ASSERT_EQ(analysis.torque.size(), 5u);
+  for (std::size_t i = 0; i < 5; ++i)
+    EXPECT_NEAR(analysis.torque[i].drag_per_thrust_m.value, 0.013, 4 * analysis.torque[i].drag_per_thrust_m.u + 1e-5);
+  EXPECT_EQ(analysis.torque[0].share, 1);
+  EXPECT_LT(analysis.torque[4].share, 0.3);
+}
+
+TEST(Analysis, OneRunEachLeavesTheRepetitionsUnknown) {
+  auto steps = study_campaign({}, 7).steps;
+  std::erase_if(steps, [](const auto& step) { return step.repetition > 1; });
+  const Analysis analysis = analyse(identify(steps));
+  EXPECT_FALSE(row_of(analysis.coefficients[0], "repetitions").known());
+  EXPECT_FALSE(analysis.speed[0].lack_of_fit.tested());
+  EXPECT_GT(analysis.speed[0].inadequacy, 0) << "noise and model are not told apart, and are not left out either";
+  EXPECT_TRUE(analysis.speed[0].trend.tested());
+}
+
+TEST(Analysis, OfATableUsesItsOwnErrors) {
+  const std::vector<LinePoint> points{{0, 1.5e-6, 1e-8}, {90, 1.2e-6, 1e-8}, {180, 0.8e-6, 2e-8}, {270, 0.4e-6, 1e-8}};
+  const Analysis analysis = analyse(identify_table(points, {}, {300, 2000}));
+  EXPECT_NEAR(analysis.coefficients[2].combined(), 2e-8, 1e-20);
+  EXPECT_TRUE(analysis.speed.empty());
+  EXPECT_TRUE(analysis.torque.empty());
+  EXPECT_TRUE(analysis.bootstrap.empty());
+  EXPECT_TRUE(analysis.curvature.lack_of_fit.tested());
+}
+
+TEST(Analysis, ListsThePointsThatTheLossIgnored) {
+  auto steps = study_campaign({}, 8).steps;
+  steps[35].thrust_n *= 3;
+  IdentificationOptions options;
+  options.loss = Loss::tukey;
+  const Analysis analysis = analyse(identify(steps, options));
+  ASSERT_FALSE(analysis.rejected.empty());
+  bool listed = false;
+  for (const RejectedPoint& point : analysis.rejected)
+    listed = listed || (point.phi_deg == 0 && point.repetition == 1 && point.step == 35 && point.robust_weight == 0);
+  EXPECT_TRUE(listed);
+}
+
+TEST(Analysis, NeighbouringOcclusionsDiffer) {
+  Study study;
+  const Analysis analysis = analyse(study.found, study.options);
+  ASSERT_EQ(analysis.differences.size(), 4u);
+  for (const HypothesisTest& test : analysis.differences) EXPECT_TRUE(test.rejected()) << test.name;
+}
+
+/// Each k by Welch's test: the same propeller on two set-ups.
+std::vector<HypothesisTest> compare_setups(const Analysis& one, const Analysis& other) {
+  std::vector<HypothesisTest> tests;
+  for (std::size_t i = 0; i < one.coefficients.size(); ++i)
+    tests.push_back(welch_test(one.coefficients[i].estimate(), other.coefficients[i].estimate()));
+  return tests;
+}
+
+TEST(Analysis, TellsTwoSetupsApartOnlyWhereTheyDiffer) {
+  int differ = 0;
+  for (unsigned seed = 100; seed < 120; ++seed) {
+    StudyCampaign one = study_campaign({}, seed), other = study_campaign({}, seed + 1000);
+    for (auto& step : other.steps) step.thrust_n *= one.density / other.density;
+    const auto tests = compare_setups(analyse(identify(one.steps), study_options({}, one)),
+                                      analyse(identify(other.steps), study_options({}, other)));
+    ASSERT_EQ(tests.size(), 5u);
+    for (const HypothesisTest& test : tests) differ += test.rejected() ? 1 : 0;
+  }
+  EXPECT_LE(differ, 15) << "5 % of 100";
+  StudyCampaign one = study_campaign({}, 1), bigger = one;
+  for (auto& step : bigger.steps) step.thrust_n *= 1.04;
+  for (const auto& test : compare_setups(analyse(identify(one.steps), study_options({}, one)),
+                                         analyse(identify(bigger.steps), study_options({}, bigger))))
+    EXPECT_TRUE(test.rejected()) << test.name;
+}
+
+TEST(Analysis, EveryEstimatorFindsTheTruth) {
+  StudyTruth truth;
+  const StudyCampaign campaign = study_campaign(truth, 9);
+  for (const Estimator estimator :
+       {Estimator::through_origin, Estimator::with_offset, Estimator::polynomial, Estimator::at_speed}) {
+    IdentificationOptions options;
+    options.estimator = estimator;
+    const Identification found = identify(campaign.steps, options);
+    const Analysis analysis = analyse(found, study_options(truth, campaign));
+    for (std::size_t i = 0; i < found.table.size(); ++i) {
+      const double expected = truth.k(found.table[i].phi_deg) * campaign.density / kStandardDensity;
+      EXPECT_NEAR(found.table[i].k, expected, 4 * analysis.coefficients[i].combined())
+          << name_of(estimator) << " at " << found.table[i].phi_deg;
+    }
+  }
+}
+
+TEST(Analysis, IsWrittenWithoutWhatJsonCannotHold) {
+  Study study;
+  const Analysis analysis = analyse(study.found, study.options);
+  const std::string text = to_json(analysis).dump();
+  EXPECT_EQ(text.find("nan"), std::string::npos);
+  EXPECT_EQ(text.find("inf"), std::string::npos);
+  EXPECT_THAT(text, HasSubstr("\"source\":\"zero drift\""));
+  const std::string yaml = format_coefficients(study.found, {}, &analysis);
+  EXPECT_THAT(yaml, HasSubstr("not_known: [cross-axis, alignment]"));
+  EXPECT_EQ(yaml, format_coefficients(study.found, {}, &analysis));
+}
+
+}  // namespace
+}  // namespace kphi::fit

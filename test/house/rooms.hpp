@@ -1,0 +1,92 @@
+// The rooms of the house from the ground floor up, and who may see whom. The table is the rule.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace kphi::house {
+
+/// A folder and what its files may include from this repository besides their own folder. An entry names a folder (with
+/// all rooms in it that stand earlier in the table) or one header.
+struct Room {
+  std::string_view folder;
+  std::vector<std::string_view> sees;
+};
+
+/// Nobody sees a room that stands later: no arrow runs up, and there is no circle.
+inline const std::vector<Room>& rooms() {
+  static const std::vector<Room> kRooms{
+      {"base", {}},
+      // The library that flies stands alone.
+      {"compensation", {}},
+      {"compensation/file", {"compensation"}},
+      {"compensation/flight", {"compensation", "base"}},
+      {"profiles", {"base", "compensation"}},
+
+      {"drivers/serial", {"base"}},
+      {"drivers/usb", {"base"}},
+      {"drivers/netbox/wire", {"base"}},
+      {"drivers/netbox/configuration", {"base", "drivers/netbox"}},
+      {"drivers/netbox/stream", {"base", "drivers/netbox"}},
+      {"drivers/netbox/receive", {"base", "drivers/netbox"}},
+      {"drivers/iq/wire", {"base", "compensation/units.hpp"}},
+      {"drivers/iq/exchange", {"base", "compensation/units.hpp", "drivers/iq"}},
+      {"drivers/iq/session", {"base", "compensation/units.hpp", "drivers/iq"}},
+      {"drivers/iq/link", {"base", "compensation/units.hpp", "drivers/iq", "drivers/serial"}},
+      {"drivers/iq/service", {"base", "compensation/units.hpp", "drivers/iq", "drivers/serial"}},
+      {"drivers/supply", {"base", "compensation/units.hpp", "drivers/serial"}},
+      {"drivers/ambient", {"base", "drivers/usb"}},
+      // An instrument that speaks SCPI is one kind of supply: it sees what a supply is, not how another one is driven.
+      {"drivers/scpi", {"base", "drivers/usb", "drivers/supply/supply.hpp"}},
+
+      // The other end of each wire: of the drivers only the enums of codes.
+      {"drivers/sim/physics", {"base", "compensation/units.hpp"}},
+      {"drivers/sim/script", {"base"}},
+      {"drivers/sim/transport", {"base"}},
+      {"drivers/sim/netbox", {"base", "drivers/sim/physics", "drivers/sim/script", "drivers/sim/transport"}},
+      {"drivers/sim/iq",
+       {"base", "compensation/units.hpp", "drivers/sim/physics", "drivers/sim/script", "drivers/sim/transport",
+        "drivers/iq/wire/codes.hpp"}},
+      {"drivers/sim/supply", {"base", "drivers/sim/script", "drivers/sim/transport"}},
+      {"drivers/sim/usb", {"base", "drivers/sim/script"}},
+      {"drivers/sim", {"base", "drivers/sim"}},
+
+      {"results", {"base", "compensation/units.hpp"}},
+      {"results/reduction", {"base", "compensation/units.hpp", "results"}},
+
+      {"daq/bench", {"base", "compensation/units.hpp", "profiles", "results", "drivers"}},
+      {"daq/guard", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
+      {"daq/audit", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
+      {"daq/hardware", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
+      {"daq/virtual", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
+      {"daq/run", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
+      {"daq/campaign", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
+      {"daq/live", {"base", "compensation/units.hpp", "profiles", "results", "daq"}},
+      {"daq", {"base", "profiles", "daq"}},
+
+      {"fit/numerics", {"base", "results"}},
+      {"fit/model", {"base", "compensation", "results", "fit"}},
+      {"fit/signal", {"base", "compensation", "results", "fit"}},
+      {"fit/uncertainty", {"base", "compensation", "results", "fit"}},
+      {"fit/propellers", {"base", "compensation", "results", "fit"}},
+      {"fit/coefficients", {"base", "compensation", "results", "fit"}},
+      {"fit/report", {"base", "compensation", "results", "fit"}},
+      {"fit/logs", {"base", "compensation", "results", "fit"}},
+      {"fit/export", {"base", "compensation", "results", "fit"}},
+
+      {"commands", {"base", "compensation", "profiles", "drivers", "results", "daq", "fit"}},
+  };
+  return kRooms;
+}
+
+/// At most this many units (a header and its source are one) side by side.
+inline constexpr int kUnitsSideBySide = 20;
+
+/// The room of a file; nullptr: of none.
+[[nodiscard]] const Room* room_of(std::string_view path);
+
+/// What the file at `path` (from the repository's root) includes against the rules: "path:line: …".
+[[nodiscard]] std::vector<std::string> violations(const std::string& path, const std::string& text);
+
+}  // namespace kphi::house

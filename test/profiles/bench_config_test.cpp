@@ -1,0 +1,317 @@
+#include "profiles/bench_config.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "test/profiles/refusals.hpp"
+
+namespace kphi::profiles {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+std::vector<std::string> refused(const std::string& from, const std::string& to) {
+  return refusals([&] { return parse_bench(changed(kBenchText, from, to), "b.yaml"); });
+}
+
+TEST(BenchConfig, IsReadWhole) {
+  const BenchConfig bench = parse_bench(kBenchText, "b.yaml");
+  EXPECT_EQ(bench.name, "bench");
+  EXPECT_EQ(bench.netbox.host, "192.168.1.1");
+  EXPECT_EQ(bench.netbox.rdt_port, 50000);
+  EXPECT_EQ(bench.netbox.http_port, 8080);
+  EXPECT_EQ(bench.netbox.rate_hz, 3500);
+  EXPECT_EQ(bench.netbox.records_per_datagram, 20);
+  EXPECT_EQ(bench.iq.device, "/dev/ttyUSB0");
+  EXPECT_EQ(bench.iq.baud, 921600u);
+  EXPECT_EQ(bench.iq.module_id, 7);
+  EXPECT_EQ(bench.iq.spin, -1);
+  EXPECT_EQ(bench.iq.telemetry_hz, 100);
+  EXPECT_EQ(bench.iq.speed_max, from_rpm(19300));
+  EXPECT_EQ(bench.thrust_axis, 0);
+  EXPECT_EQ(bench.thrust_sign, -1);
+  ASSERT_TRUE(bench.simulation);
+  EXPECT_FALSE(bench.simulation->in_process);
+  EXPECT_EQ(bench.simulation->time_scale, 20);
+  EXPECT_EQ(bench.simulation->seed, 5u);
+  EXPECT_EQ(bench.simulation->control, "/tmp/control");
+  EXPECT_EQ(bench.text, kBenchText);
+  EXPECT_EQ(bench.path, "b.yaml");
+}
+
+TEST(BenchConfig, NeedsOnlyAddressesAxisAndSpeedLimit) {
+  const BenchConfig bench = parse_bench(
+      "format: kphi-bench/1\nname: b\nnetbox: {host: netbox.lab}\niq: {device: /dev/ttyS1, speed_max_rpm: 9000}\n"
+      "thrust_axis: +Fz\n",
+      "b.yaml");
+  EXPECT_EQ(bench.netbox.rdt_port, 49152);
+  EXPECT_EQ(bench.netbox.http_port, 80);
+  EXPECT_EQ(bench.netbox.rate_hz, 7000);
+  EXPECT_EQ(bench.netbox.records_per_datagram, 40);
+  EXPECT_EQ(bench.netbox.tcp_port, 49151);
+  EXPECT_FALSE(bench.netbox.settings.rate_hz || bench.netbox.settings.filter_hz);
+  EXPECT_EQ(bench.iq.baud, 115200u);
+  EXPECT_EQ(bench.iq.module_id, 0);
+  EXPECT_EQ(bench.iq.spin, +1);
+  EXPECT_EQ(bench.iq.telemetry_hz, 50);
+  EXPECT_FALSE(bench.simulation);
+}
+
+TEST(BenchConfig, KnowsSixThrustAxes) {
+  const std::vector<std::string> axes{"+Fx", "-Fx", "+Fy", "-Fy", "+Fz", "-Fz"};
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const BenchConfig bench = parse_bench(changed(kBenchText, "-Fx", axes[i]), "b.yaml");
+    EXPECT_EQ(bench.thrust_axis, static_cast<int>(i / 2)) << axes[i];
+    EXPECT_EQ(bench.thrust_sign, i % 2 == 0 ? +1 : -1) << axes[i];
+  }
+  EXPECT_THAT(refused("-Fx", "Fz"),
+              ElementsAre("16:14: thrust_axis: text \"Fz\" is not allowed; did you mean +Fz? write "
+                          "one of +Fx, -Fx, +Fy, -Fy, +Fz, -Fz"));
+}
+
+TEST(BenchConfig, HoldsPortsAndIdentifiers) {
+  EXPECT_THAT(refused("50000", "0"), ElementsAre("5:13: netbox.rdt_port: 0 is below 1; write a value from 1 to 65535"));
+  EXPECT_THAT(refused("8080", "65536"),
+              ElementsAre("6:14: netbox.http_port: 65536 is above 65535; write a value from 1 to 65535"));
+  EXPECT_THAT(refused("module_id: 7", "module_id: 63"),
+              ElementsAre("12:14: iq.module_id: 63 is above 62; write a value from 0 to 62"));
+  EXPECT_THAT(refused("module_id: 7", "module_id: -1"), ElementsAre(StartsWith("12:14: iq.module_id: -1 is below 0")));
+  EXPECT_THAT(refused("datagram: 20", "datagram: 41"),
+              ElementsAre(StartsWith("8:25: netbox.records_per_datagram: 41 is above 40")));
+  EXPECT_THAT(refused("3500", "7001"),
+              ElementsAre("7:12: netbox.rate_hz: 7001 is above 7000 Hz; write a value from 1 to 7000 Hz"));
+}
+
+TEST(BenchConfig, KnowsWhereTheBoxSpeaksTcp) {
+  EXPECT_EQ(parse_bench(kBenchText, "b.yaml").netbox.tcp_port, 49999) << "one below the port of RDT";
+  EXPECT_EQ(parse_bench(changed(kBenchText, "  rate_hz", "  tcp_port: 50017\n  rate_hz"), "b.yaml").netbox.tcp_port,
+            50017);
+}
+
+TEST(BenchConfig, SaysWhatTheBoxIsToBeSetTo) {
+  const BenchConfig bench = parse_bench(
+      changed(kBenchText, "iq:\n", "  settings: {rate_hz: 3500, filter_hz: 838, configuration: 2}\niq:\n"), "b.yaml");
+  EXPECT_EQ(bench.netbox.settings.rate_hz, 3500);
+  EXPECT_EQ(bench.netbox.settings.records_per_datagram, std::nullopt);
+  EXPECT_EQ(bench.netbox.settings.filter_hz, 838);
+  EXPECT_EQ(bench.netbox.settings.configuration, 2);
+  const BenchConfig alone =
+      parse_bench(changed(kBenchText, "  rate_hz: 3500\n", "  settings: {rate_hz: 1000}\n"), "b.yaml");
+  EXPECT_EQ(alone.netbox.rate_hz, 1000) << "what is set is expected";
+}
+
+TEST(BenchConfig, RefusesSettingsThatContradictOrDoNotExist) {
+  const auto with = [](const std::string& settings) {
+    return refused("iq:\n", "  settings: {" + settings + "}\niq:\n");
+  };
+  EXPECT_THAT(
+      with("rate_hz: 7000"),
+      ElementsAre("9:23: netbox.settings.rate_hz: 7000 contradicts the 3500 of netbox.rate_hz; write the same, or "
+                  "remove netbox.rate_hz"));
+  EXPECT_THAT(with("filter_hz: 100"), ElementsAre(StartsWith("9:25: netbox.settings.filter_hz: 100 is not allowed")));
+  EXPECT_THAT(with("configuration: 16"),
+              ElementsAre(StartsWith("9:29: netbox.settings.configuration: 16 is above 15")));
+  EXPECT_THAT(with("comnetip: 1"), ElementsAre(StartsWith("9:14: comnetip is not a key of netbox.settings")));
+}
+
+TEST(BenchConfig, FindsItsFaultScriptBesideItself) {
+  const auto text = changed(kBenchText, "  seed: 5\n", "  seed: 5\n  faults: bad_day.yaml\n");
+  EXPECT_EQ(parse_bench(text, "/lab/benches/b.yaml").simulation->faults, "/lab/benches/bad_day.yaml");
+  EXPECT_EQ(parse_bench(changed(text, "bad_day", "/tmp/bad_day"), "/lab/b.yaml").simulation->faults,
+            "/tmp/bad_day.yaml");
+  EXPECT_EQ(parse_bench(kBenchText, "b.yaml").simulation->faults, "");
+}
+
+TEST(BenchConfig, TakesOnlyStandardBaudRates) {
+  for (const char* baud :
+       {"9600", "19200", "38400", "57600", "115200", "230400", "460800", "921600", "1000000", "2000000"}) {
+    EXPECT_THAT(refused("921600", baud), IsEmpty()) << baud;
+  }
+  EXPECT_THAT(
+      refused("921600", "115201"),
+      ElementsAre("11:9: iq.baud: 115201 is not allowed; write one of 9600, 19200, 38400, 57600, 115200, 230400, "
+                  "460800, 921600, 1000000, 2000000"));
+}
+
+TEST(BenchConfig, SpinsOneWayOrTheOther) {
+  EXPECT_THAT(refused("spin: -1", "spin: +1"), IsEmpty());
+  for (const char* spin : {"0", "2", "-1.5", "\"+1\""})
+    EXPECT_EQ(refused("spin: -1", std::string("spin: ") + spin).size(), 1u) << spin;
+}
+
+TEST(BenchConfig, WantsADeviceThatIsAPathAndAHostThatIsAName) {
+  EXPECT_THAT(refused("/dev/ttyUSB0", "ttyUSB0"),
+              ElementsAre("10:11: iq.device: text \"ttyUSB0\" does not fit; write a path that begins with /, or "
+                          "usb:VID:PID[:SERIAL][@PORT] with four hexadecimal digits or * each"));
+  EXPECT_THAT(refused("/dev/ttyUSB0", "usb:403:6001"), ElementsAre(StartsWith("10:11: iq.device: text")));
+  EXPECT_THAT(refused("/dev/ttyUSB0", "usb:0403:6001@here"), ElementsAre(StartsWith("10:11: iq.device: text")));
+  for (const char* fine : {"usb:0403:6001", "usb:0403:6001:A10K0000", "usb:*:*:A10K0000", "usb:1a86:7523@1-4.2",
+                           "usb:1a86:7523@1-4.2:1.0"}) {
+    EXPECT_THAT(refused("/dev/ttyUSB0", fine), IsEmpty()) << fine;
+  }
+  EXPECT_THAT(refused("192.168.1.1", "\"http://192.168.1.1\""),
+              ElementsAre(StartsWith("4:9: netbox.host: text \"http://192.168.1.1\" does not fit")));
+  EXPECT_THAT(refused("192.168.1.1", "\"::1\""), IsEmpty());
+}
+
+TEST(BenchConfig, MayKnowTheGainOfTheModulesClock) {
+  EXPECT_FALSE(parse_bench(kBenchText, "b.yaml").iq.clock_gain);
+  const auto with = [](const std::string& gain) { return "  clock_gain: {" + gain + "}\n  baud:"; };
+  const BenchConfig bench =
+      parse_bench(changed(kBenchText, "  baud:",
+                          with("factor: 1.0050312, u: 3.0e-05, uid: \"002300064d4b501120343353\", measured_utc: "
+                               "\"2026-05-01T12:00:00Z\", duration_s: 60.0")),
+                  "b.yaml");
+  ASSERT_TRUE(bench.iq.clock_gain);
+  EXPECT_EQ(bench.iq.clock_gain->factor, 1.0050312);
+  EXPECT_EQ(bench.iq.clock_gain->u_factor, 3.0e-5);
+  EXPECT_EQ(bench.iq.clock_gain->uid, "002300064d4b501120343353");
+  EXPECT_EQ(bench.iq.clock_gain->measured_utc, "2026-05-01T12:00:00Z");
+  EXPECT_THAT(refused("  baud:", with("factor: 1.005, u: 1e-5")), IsEmpty());
+  EXPECT_THAT(refused("  baud:", with("factor: 5031, u: 1e-5")),
+              ElementsAre(StartsWith("11:24: iq.clock_gain.factor: 5031 is above 1.03")));
+  EXPECT_THAT(refused("  baud:", with("factor: 1.005")), ElementsAre(testing::HasSubstr("u is missing")));
+  EXPECT_THAT(refused("  baud:", with("factor: 1.005, u: 1e-5, uid: \"12\"")),
+              ElementsAre(testing::HasSubstr("24 hexadecimal digits")));
+}
+
+TEST(BenchConfig, PutsTheCaptureOfTheMotorsLineBesideItself) {
+  EXPECT_EQ(parse_bench(kBenchText, "folder/b.yaml").iq.capture, "");
+  EXPECT_EQ(parse_bench(changed(kBenchText, "  baud:", "  capture: line.iq\n  baud:"), "folder/b.yaml").iq.capture,
+            "folder/line.iq");
+}
+
+TEST(BenchConfig, SimulatesInProcessWithoutAControlLineOnly) {
+  EXPECT_THAT(
+      refused("  control: /tmp/control\n", ""),
+      ElementsAre("18:3: simulation: control is missing; add control: a path for the socket, or in_process: true"));
+  EXPECT_THAT(refused("  control: /tmp/control\n", "  in_process: true\n"), IsEmpty());
+  EXPECT_THAT(refused("seed: 5", "seed: -5"), ElementsAre(StartsWith("19:9: simulation.seed: -5 is below 0")));
+  EXPECT_THAT(refused("time_scale: 20", "time_scale: 0"),
+              ElementsAre(StartsWith("18:15: simulation.time_scale: 0 is below 0.1")));
+  EXPECT_THAT(refused("  seed: 5\n", "  in_process: yes\n"),
+              ElementsAre(StartsWith("19:15: yes is a boolean to some")));
+}
+
+std::vector<std::string> refused_air(const std::string& ambient) {
+  return refusals([&] { return parse_bench(kBenchText + ambient, "b.yaml"); });
+}
+
+constexpr const char* kManualAir =
+    "ambient:\n"                        // 21
+    "  manual:\n"                       // 22
+    "    temperature_c: 21.5\n"         // 23
+    "    pressure_pa: 98700\n"          // 24
+    "    relative_humidity: 0.45\n"     // 25
+    "    u_temperature_c: 0.5\n"        // 26
+    "    u_pressure_pa: 100\n"          // 27
+    "    u_relative_humidity: 0.05\n";  // 28
+
+TEST(BenchConfig, KnowsWhereTheStateOfTheAirComesFrom) {
+  EXPECT_FALSE(parse_bench(kBenchText, "b.yaml").ambient.known()) << "absent";
+  const auto config = [](const std::string& text) { return parse_bench(kBenchText + text, "b.yaml").ambient; };
+  EXPECT_FALSE(config("ambient: unknown\n").known());
+  for (const char* sensor : {"usb:04d8:00dd", "usb:04D8:00DD:0001AB", "usb:04d8:00dd@1-1.4", "usb:04d8:00dd:A1@2-3"})
+    EXPECT_EQ(config(std::string("ambient: ") + sensor + "\n").sensor, sensor);
+  const AmbientConfig by_hand = config(kManualAir);
+  EXPECT_TRUE(by_hand.known());
+  EXPECT_EQ(by_hand.sensor, "");
+  ASSERT_TRUE(by_hand.manual);
+  EXPECT_EQ(by_hand.manual->temperature_c, 21.5);
+  EXPECT_EQ(by_hand.manual->pressure_pa, 98700);
+  EXPECT_EQ(by_hand.manual->relative_humidity, 0.45);
+  EXPECT_EQ(by_hand.manual->u_temperature_c, 0.5);
+  EXPECT_EQ(by_hand.manual->u_pressure_pa, 100);
+  EXPECT_EQ(by_hand.manual->u_relative_humidity, 0.05);
+}
+
+TEST(BenchConfig, RefusesAirFromNowhere) {
+  const std::string advice =
+      "write unknown, or usb:04d8:00dd (a BME280 behind an MCP2221A; :SERIAL or @PORT behind it if there are several), "
+      "or manual: and the values";
+  EXPECT_THAT(refused_air("ambient: usb:0403:6001\n"),
+              ElementsAre("21:10: ambient: text \"usb:0403:6001\" does not fit; " + advice));
+  EXPECT_THAT(refused_air("ambient: 21\n"), ElementsAre("21:10: ambient: 21 does not fit; " + advice));
+  for (const char* text : {"Unknown", "usb:04d8:00dd:", "usb:04d8:00dd@", "[]", "\"\""})
+    EXPECT_EQ(refused_air(std::string("ambient: ") + text + "\n").size(), 1u) << text;
+}
+
+TEST(BenchConfig, WantsAirByHandWholeWithUncertaintiesAndInItsUnits) {
+  const auto changed_air = [](const std::string& from, const std::string& to) {
+    return refused_air(changed(kManualAir, from, to));
+  };
+  EXPECT_THAT(
+      changed_air("    u_pressure_pa: 100\n", ""),
+      ElementsAre("22:3: ambient.manual.u_pressure_pa is missing; add the key u_pressure_pa (standard uncertainty "
+                  "of pressure_pa)"));
+  EXPECT_THAT(changed_air("pressure_pa: 98700", "pressure_hpa: 987"),
+              ElementsAre("24:5: pressure_hpa is not a key of ambient.manual; the unit is part of the key: write "
+                          "pressure_pa and the value in Pa"));
+  EXPECT_THAT(
+      changed_air("98700", "987"),
+      ElementsAre("24:18: ambient.manual.pressure_pa: 987 is below 50000 Pa; write a value from 50000 to 110000 "
+                  "Pa"));
+  EXPECT_THAT(changed_air("0.45", "45"),
+              ElementsAre(StartsWith("25:24: ambient.manual.relative_humidity: 45 is above 1")));
+  EXPECT_THAT(changed_air("temperature_c: 21.5", "temperature_c: 294.6"),
+              ElementsAre(StartsWith("23:20: ambient.manual.temperature_c: 294.6 is above 60 °C")));
+  EXPECT_THAT(changed_air("u_temperature_c: 0.5", "u_temperature_c: 0"),
+              ElementsAre(StartsWith("26:22: ambient.manual.u_temperature_c: 0 is not above 0")));
+  EXPECT_EQ(refused_air("ambient: {}\n").size(), 1u);
+}
+
+TEST(BenchConfig, NamesTheKeyThatWasMeant) {
+  EXPECT_THAT(refused("  baud:", "  baud_rate:"),
+              ElementsAre(StartsWith("11:3: baud_rate is not a key of iq; known here: baud,")));
+  EXPECT_THAT(refused("rdt_port", "rtd_port"),
+              ElementsAre("5:3: rtd_port is not a key of netbox; did you mean rdt_port?"));
+  EXPECT_THAT(
+      refused("speed_max_rpm", "speed_max_rad_s"),
+      ElementsAre("15:3: speed_max_rad_s is not a key of iq; the unit is part of the key: write speed_max_rpm and "
+                  "the value in RPM"));
+}
+
+std::string with_power(const std::string& more) {
+  return "format: kphi-bench/1\nname: b\nnetbox: {host: netbox.lab}\niq: {device: /dev/ttyS1, speed_max_rpm: 9000}\n"
+         "thrust_axis: +Fz\n" +
+         more;
+}
+
+constexpr const char* kSupply =
+    "supply: {uri: \"modbus-rtu:/dev/ttyUSB1?model=RD6018\", voltage_v: 12, current_limit_a: 17, over_voltage_v: 14, "
+    "over_current_a: 18}\n";
+
+TEST(BenchConfig, KnowsTheSupply) {
+  const BenchConfig bench = parse_bench(with_power(kSupply), "b.yaml");
+  ASSERT_TRUE(bench.supply);
+  EXPECT_EQ(bench.supply->uri, "modbus-rtu:/dev/ttyUSB1?model=RD6018");
+  EXPECT_EQ(bench.supply->voltage, Volts(12));
+  EXPECT_EQ(bench.supply->current_limit, Amperes(17));
+  EXPECT_EQ(bench.supply->over_voltage, Volts(14));
+  EXPECT_EQ(bench.supply->over_current, Amperes(18));
+}
+
+TEST(BenchConfig, HasNoSupplyAndKnowsNoAirUnlessTheFileSaysSo) {
+  const BenchConfig bench = parse_bench(with_power(""), "b.yaml");
+  EXPECT_FALSE(bench.supply);
+  EXPECT_FALSE(bench.ambient.known());
+}
+
+TEST(BenchConfig, RefusesASupplyThatWouldTripAtOnce) {
+  const auto refused_supply = [](const std::string& from, const std::string& to) {
+    return refusals([&] { return parse_bench(with_power(changed(kSupply, from, to)), "b.yaml"); });
+  };
+  EXPECT_THAT(refused_supply("over_voltage_v: 14", "over_voltage_v: 12"),
+              ElementsAre(testing::HasSubstr("supply.over_voltage_v: 12 V is not above the 12 V of voltage_v")));
+  EXPECT_THAT(refused_supply("over_current_a: 18", "over_current_a: 16.9"),
+              ElementsAre(testing::HasSubstr("supply.over_current_a: 16.9 A is below the 17 A of current_limit_a")));
+  EXPECT_THAT(refused_supply("modbus-rtu:", "riden:"),
+              ElementsAre(testing::HasSubstr("write modbus-rtu:/dev/ttyUSB1")));
+  EXPECT_THAT(refused_supply("current_limit_a: 17, ", ""),
+              ElementsAre(testing::HasSubstr("supply.current_limit_a is missing")));
+}
+
+}  // namespace
+}  // namespace kphi::profiles

@@ -1,0 +1,88 @@
+#include "profiles/schema.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+namespace kphi::profiles {
+namespace {
+
+using nlohmann::json;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+/// What the schema finds in the YAML text `x: VALUE`, where VALUE must fit `rule`: "pointer: what".
+std::vector<std::string> found(const std::string& value, const json& rule) {
+  const SourceDocument document = parse_strict_yaml("x: " + value + "\n", "x.yaml");
+  std::vector<std::string> lines;
+  for (const FileFinding& finding : check_schema(document, json{{"type", "object"}, {"properties", {{"x", rule}}}}))
+    lines.push_back(finding.pointer + ": " + finding.what);
+  return lines;
+}
+
+struct Case {
+  json rule;
+  std::vector<std::string> fitting, refused;
+};
+
+TEST(Schema, ChecksEveryKeywordThatItsFilesUse) {
+  const std::vector<Case> cases{
+      {{{"type", "integer"}}, {"1", "-1"}, {"1.5", "1.0", "\"1\"", "true", "[]", "{}", ""}},
+      {{{"type", "number"}}, {"1", "1.0"}, {"\"1\"", "true", "[]", "{}", ""}},
+      {{{"type", "string"}}, {"a", "\"1\""}, {"1", "true", "[]", "{}", ""}},
+      {{{"type", "boolean"}}, {"true", "false"}, {"1", "a", "[]", "{}", ""}},
+      {{{"type", "array"}}, {"[]", "[1]"}, {"1", "a", "true", "{}", ""}},
+      {{{"type", "object"}}, {"{}", "{a: 1}"}, {"1", "a", "true", "[]", ""}},
+      {{{"type", {"string", "object"}}, {"x_expected", "text"}}, {"a", "{}"}, {"1", "true", "[]", ""}},
+      {{{"enum", {1, 90, "a"}}}, {"1", "90", "90.0", "a"}, {"2", "b", "\"1\"", "true"}},
+      {{{"pattern", "^a[0-9]{2}$"}}, {"a12", "3"}, {"a1", "a123", "b12", "\"\""}},
+      {{{"maximum", 3}}, {"3", "-9", "a"}, {"4", "3.1"}},
+      {{{"exclusiveMaximum", 3}}, {"2.9", "a"}, {"3", "4"}},
+      {{{"minimum", 3}}, {"3", "9", "a"}, {"2", "2.9"}},
+      {{{"exclusiveMinimum", 3}}, {"3.1", "a"}, {"3", "2"}},
+      {{{"maxLength", 2}}, {"ab", "φφ", "123"}, {"abc", "φφφ"}},
+      {{{"minLength", 1}}, {"a", "φ", "3"}, {"\"\""}},
+      {{{"maxItems", 2}}, {"[]", "[1, 2]", "123"}, {"[1, 2, 3]"}},
+      {{{"minItems", 2}}, {"[1, 2]", "[1, 2, 3]", "1"}, {"[]", "[1]"}},
+      {{{"minProperties", 1}}, {"{a: 1}", "1"}, {"{}"}},
+      {{{"properties", {{"a", {{"type", "number"}}}}}}, {"{}", "{a: 1}", "{b: c}", "3"}, {"{a: b}"}},
+      {{{"additionalProperties", false}, {"properties", {{"a", json::object()}}}}, {"{a: 1}", "3"}, {"{b: 1}"}},
+      {{{"additionalProperties", {{"type", "number"}}}}, {"{a: 1}", "3"}, {"{a: b}"}},
+      {{{"required", {"a"}}}, {"{a: 1}", "3"}, {"{}", "{bbb: 1}"}},
+      {{{"items", {{"type", "number"}}}}, {"[1]", "[]", "3"}, {"[a]"}},
+  };
+  for (const Case& one : cases) {
+    for (const std::string& value : one.fitting) EXPECT_THAT(found(value, one.rule), IsEmpty()) << one.rule << value;
+    for (const std::string& value : one.refused) EXPECT_EQ(found(value, one.rule).size(), 1u) << one.rule << value;
+  }
+}
+
+TEST(Schema, NamesTheInnermostValueAndEachValueOnce) {
+  const json rule{{"items", {{"properties", {{"b", {{"type", "integer"}, {"enum", {1}}, {"maximum", 2}}}}}}}};
+  EXPECT_THAT(found("[{b: 1}, {b: 3.5}]", rule), ElementsAre("/x/1/b: x[1].b: expected a whole number, found 3.5"));
+}
+
+TEST(Schema, LeavesValuesAloneThatAreRefusedAlready) {
+  EXPECT_THAT(found("010", {{"type", "number"}}), IsEmpty()) << "the YAML reader refused it: it looks octal";
+}
+
+TEST(Schema, RefusesASchemaThatItWouldNotCheckCompletely) {
+  const std::vector<json> unknown{
+      {{"multipleOf", 3}},
+      {{"items", {{"uniqueItems", true}}}},
+      {{"items", json::array({json::object()})}},
+      {{"properties", {{"a", {{"properties", {{"b", {{"format", "date"}}}}}}}}}},
+      {{"additionalProperties", {{"oneOf", json::array()}}}},
+      {{"type", "nubmer"}},
+  };
+  for (const json& rule : unknown) EXPECT_THROW((void)found("1", rule), std::invalid_argument) << rule;
+}
+
+TEST(Schema, OfEveryKindIsCheckedCompletely) {
+  const SourceDocument nothing = parse_strict_yaml("{}", "x.yaml");
+  for (const FileKindInfo& kind : kFileKinds) EXPECT_FALSE(check_schema(nothing, kind.kind).empty()) << kind.word;
+}
+
+}  // namespace
+}  // namespace kphi::profiles

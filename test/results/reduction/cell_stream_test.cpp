@@ -1,0 +1,90 @@
+#include "results/reduction/cell_stream.hpp"
+
+#include <gtest/gtest.h>
+
+#include "test/results/synthetic_run.hpp"
+
+namespace kphi::results {
+namespace {
+
+using test::make_run;
+using test::Truth;
+
+constexpr Window kSecond{2'000'000'000, 3'000'000'000};
+
+TEST(CellBins, HoldEverySampleOnceHoweverTheyAreCut) {
+  const auto run = make_run(Truth{});
+  const CellStream cell(run);
+  const CellBins bins = cell.bins(kSecond);
+  ASSERT_EQ(bins.size(), 100u);
+  const CellWindow whole = bins.over(0, 100);
+  const CellWindow left = bins.over(0, 37), right = bins.over(37, 100);
+  EXPECT_EQ(left.n + right.n, whole.n);
+  EXPECT_NEAR(static_cast<double>(whole.n), 1000, 2);
+  const double joined =
+      (static_cast<double>(left.n) * left.force.mean + static_cast<double>(right.n) * right.force.mean) /
+      static_cast<double>(whole.n);
+  EXPECT_NEAR(joined, whole.force.mean, 1e-6 * std::abs(whole.force.mean));
+}
+
+TEST(CellBins, ComeToTheSameBitsFromAnotherBeginning) {
+  const auto run = make_run(Truth{});
+  const CellStream cell(run);
+  const CellWindow late = cell.bins(kSecond).over(50, 100);
+  const CellWindow alone = cell.bins({2'500'000'000, 3'000'000'000}).over(0, 50);
+  EXPECT_EQ(late.n, alone.n);
+  EXPECT_EQ(late.force.deviation, alone.force.deviation) << "integer sums do not care where they are counted from";
+}
+
+TEST(CellBins, AreExactAtTheLargestCounts) {
+  auto run = make_run(Truth{});
+  bool high = false;
+  for (auto& record : run.load_cell) record.counts[2] = (high = !high) ? 2'147'483'647 : -2'147'483'647 - 1;
+  const CellStream cell(run);
+  const CellBins bins = cell.bins(kSecond);
+  const CellWindow all = bins.over(0, bins.size());
+  EXPECT_NEAR(all.force.mean, -0.5, 5e6);
+  EXPECT_NEAR(all.force.deviation, 2147483647.5, 2e6);
+  EXPECT_TRUE(all.at_limit);
+}
+
+TEST(CellBins, NoticeAThrustThatRepeatsOneValueWhileTheOtherAxesGoOn) {
+  auto run = make_run(Truth{});
+  for (std::size_t i = 2500; i < 2640; ++i) run.load_cell[i].counts[2] = run.load_cell[2500].counts[2];
+  EXPECT_TRUE(CellStream(run).bins(kSecond).over(0, 100).frozen);
+}
+
+TEST(CellBins, NoticeACellThatRepeatsOneValue) {
+  auto run = make_run(Truth{});
+  const auto freeze = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) run.load_cell[i].counts = run.load_cell[begin].counts;
+  };
+  freeze(2300, 2380);
+  EXPECT_FALSE(CellStream(run).bins(kSecond).over(0, 100).frozen) << "less than a tenth of a second";
+  freeze(2500, 2640);
+  EXPECT_TRUE(CellStream(run).bins(kSecond).over(0, 100).frozen);
+  EXPECT_FALSE(CellStream(run).bins(kSecond).over(0, 50).frozen);
+}
+
+TEST(CellBins, AreWiderWhereSamplesAreRare) {
+  Truth truth;
+  truth.rate_hz = 26;
+  truth.ft_stride = 1;
+  const auto run = make_run(truth);
+  const CellBins bins = CellStream(run).bins(kSecond);
+  EXPECT_NEAR(bins.bin_s(), 2.0 / 26, 1e-6);
+  for (std::size_t i = 0; i < bins.size(); ++i) EXPECT_FALSE(std::isnan(bins.force(i)));
+}
+
+TEST(CellBins, TellWhatWasLostToTheSample) {
+  Truth truth;
+  truth.lose = [](std::uint64_t n) { return n >= 2495 && n < 2505; };
+  const auto run = make_run(truth);
+  const CellBins bins = CellStream(run).bins(kSecond);
+  EXPECT_EQ(bins.over(0, 100).lost, 10u);
+  EXPECT_EQ(bins.over(0, 50).lost + bins.over(50, 100).lost, 10u);
+  EXPECT_EQ(bins.over(60, 100).lost, 0u);
+}
+
+}  // namespace
+}  // namespace kphi::results

@@ -1,0 +1,162 @@
+#include "results/reduction/clock_map.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "test/results/synthetic_run.hpp"
+
+namespace kphi::results {
+namespace {
+using test::make_run;
+using test::Truth;
+
+Truth stream_of(double skew_ppm, int records_per_datagram, double jitter_us) {
+  Truth truth;
+  truth.rate_hz = 7000;
+  truth.ft_stride = 1;
+  truth.skew_ppm = skew_ppm;
+  truth.records_per_datagram = records_per_datagram;
+  truth.jitter_us = jitter_us;
+  truth.speeds.assign(20, 500);
+  return truth;
+}
+
+/// Largest distance to the true sample time plus the smallest delay, which nobody can see; in µs.
+double worst_error_us(const Truth& truth, const std::vector<LoadCellRecord>& records, const ClockMap& map) {
+  double worst = 0;
+  for (const ClockEpoch& epoch : map.epochs()) {
+    for (std::size_t i = epoch.begin; i < epoch.end; ++i) {
+      const double n = static_cast<double>(records[i].ft_sequence - truth.ft_begin) / truth.ft_stride;
+      const double sampled_ns = 1e9 * n * (1 + 1e-6 * truth.skew_ppm) / truth.rate_hz;
+      const double error = static_cast<double>(map.time_ns(epoch, i)) - sampled_ns - 1e3 * truth.delay_us;
+      worst = std::max(worst, std::abs(error));
+    }
+  }
+  return 1e-3 * worst;
+}
+
+/// 99 % of the last records of datagrams came less than this after the line, µs.
+double lateness_p99_us(const std::vector<LoadCellRecord>& records, const ClockMap& map) {
+  std::vector<double> late;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    if (i + 1 < records.size() && records[i + 1].arrival_ns == records[i].arrival_ns) continue;
+    late.push_back(1e-3 * static_cast<double>(records[i].arrival_ns - map.time_ns(map.epochs()[0], i)));
+  }
+  std::sort(late.begin(), late.end());
+  return late[static_cast<std::size_t>(0.99 * static_cast<double>(late.size() - 1))];
+}
+
+TEST(ClockMap, FindsASkewedJitteredDeviceClockWithinATenthOfAMillisecond) {
+  for (const double skew : {-60.0, 0.0, 60.0}) {
+    for (const int records : {1, 40}) {
+      for (const double jitter : {30.0, 200.0}) {
+        const Truth truth = stream_of(skew, records, jitter);
+        const auto run = make_run(truth);
+        const ClockMap map(RecordedColumns(run.load_cell), 7000);
+        ASSERT_EQ(map.epochs().size(), 1u);
+        const double worst = worst_error_us(truth, run.load_cell, map);
+        EXPECT_LT(worst, 100) << skew << " ppm, " << records << " records, jitter " << jitter << " µs";
+        EXPECT_NEAR(ClockMap::skew_ppm(map.epochs()[0]), skew, 2);
+        EXPECT_TRUE(ClockMap::plausible(map.epochs()[0]));
+        EXPECT_NEAR(lateness_p99_us(run.load_cell, map), jitter * std::log(100), 0.5 * jitter * std::log(100));
+      }
+    }
+  }
+}
+
+TEST(ClockMap, BeatsTheArrivalStampsOfBufferedRecords) {
+  const Truth truth = stream_of(30, 40, 30);
+  const auto run = make_run(truth);
+  const ClockMap map(RecordedColumns(run.load_cell), 7000);
+  // The first record of a datagram waited 39 periods for its stamp: 5.6 ms.
+  const double waited = 1e-3 * static_cast<double>(run.load_cell[0].arrival_ns - map.time_ns(map.epochs()[0], 0));
+  EXPECT_GT(waited, 5000);
+  EXPECT_LT(worst_error_us(truth, run.load_cell, map), 100);
+}
+
+TEST(ClockMap, IsNotMovedByLateDatagramsOrGaps) {
+  Truth truth = stream_of(60, 1, 30);
+  truth.lose = [](std::uint64_t n) { return (n > 70000 && n < 90000) || n % 97 == 3; };
+  auto run = make_run(truth);
+  for (std::size_t i = 0; i < run.load_cell.size(); i += 500) run.load_cell[i].arrival_ns += 20000000;
+  const ClockMap map(RecordedColumns(run.load_cell), 7000);
+  EXPECT_LT(worst_error_us(truth, run.load_cell, map), 100);
+}
+
+TEST(ClockMap, GoesThroughTheWrapOfTheCounter) {
+  Truth truth = stream_of(0, 1, 30);
+  truth.ft_begin = 4294967295u - 1000;
+  const auto run = make_run(truth);
+  const ClockMap map(RecordedColumns(run.load_cell), 7000);
+  EXPECT_EQ(map.epochs().size(), 1u);
+  EXPECT_LT(worst_error_us(truth, run.load_cell, map), 100);
+}
+
+TEST(ClockMap, ARestartedBoxIsANewClock) {
+  Truth truth = stream_of(0, 1, 30);
+  truth.ft_begin = 1000000;
+  auto run = make_run(truth);
+  const std::size_t half = run.load_cell.size() / 2;
+  for (std::size_t i = half; i < run.load_cell.size(); ++i)
+    run.load_cell[i].ft_sequence -= run.load_cell[half].ft_sequence;
+  for (std::size_t i = half + 1; i < run.load_cell.size(); ++i) {
+    run.load_cell[i].ft_sequence = static_cast<std::uint32_t>(i - half);
+  }
+  run.load_cell[half].ft_sequence = 0;
+  const ClockMap map(RecordedColumns(run.load_cell), 7000);
+  ASSERT_EQ(map.epochs().size(), 2u);
+  const ClockEpoch& second = map.epochs()[1];
+  EXPECT_EQ(second.begin, half);
+  const double true_ns = 1e9 * static_cast<double>(half) / 7000 + 80000;
+  EXPECT_NEAR(static_cast<double>(map.time_ns(second, half)), true_ns, 100000);
+}
+
+TEST(ClockMap, AWrongRateIsNotPlausible) {
+  const auto run = make_run(stream_of(0, 1, 30));
+  const ClockMap map(RecordedColumns(run.load_cell), 7010);
+  EXPECT_FALSE(ClockMap::plausible(map.epochs()[0]));
+}
+
+TEST(ClockMap, FindsTheFirstSampleAtATime) {
+  const auto run = make_run(stream_of(10, 40, 30));
+  const ClockMap map(RecordedColumns(run.load_cell), 7000);
+  const ClockEpoch& epoch = map.epochs()[0];
+  for (const std::size_t i : {std::size_t{1}, std::size_t{777}, run.load_cell.size() - 1}) {
+    EXPECT_EQ(map.first_at(epoch, map.time_ns(epoch, i)), i);
+    EXPECT_EQ(map.first_at(epoch, map.time_ns(epoch, i) - 1), i);
+  }
+  EXPECT_EQ(map.first_at(epoch, 1000000000000000), epoch.end);
+  EXPECT_EQ(map.first_at(epoch, -1000000000), epoch.begin);
+}
+
+TEST(ClockMap, LivesWithAlmostNothing) {
+  EXPECT_TRUE(ClockMap(RecordedColumns({}), 7000).epochs().empty());
+  const std::vector<LoadCellRecord> one(1);
+  const ClockMap map(RecordedColumns(one), 7000);
+  ASSERT_EQ(map.epochs().size(), 1u);
+  EXPECT_EQ(map.time_ns(map.epochs()[0], 0), 0);
+}
+
+/// One record each millisecond; the box stands still for a second after the 2000th.
+TEST(ClockMap, BeginsAnewWhereTheBoxTookUpCountingAgain) {
+  std::vector<LoadCellRecord> records(6000);
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    records[i].ft_sequence = static_cast<std::uint32_t>(7 * i);
+    records[i].arrival_ns = static_cast<Nanoseconds>(1'000'000 * i + (i < 2000 ? 0 : 1'000'000'000));
+  }
+  const std::vector<Nanoseconds> breaks{3'000'000'000};
+  const ClockMap map(RecordedColumns(records), 7000, breaks);
+  ASSERT_EQ(map.epochs().size(), 2u);
+  EXPECT_FALSE(map.epochs()[1].rebooted);
+  EXPECT_EQ(map.epochs()[1].begin, 2000u);
+  EXPECT_NEAR(static_cast<double>(map.time_ns(map.epochs()[1], 4000)), 5e9, 1e3);
+  EXPECT_NEAR(ClockMap::skew_ppm(map.epochs()[0]), 0, 1);
+
+  const ClockMap unaware(RecordedColumns(records), 7000);
+  EXPECT_FALSE(ClockMap::plausible(unaware.epochs()[0])) << "without the break the clock seems far off";
+}
+
+}  // namespace
+}  // namespace kphi::results

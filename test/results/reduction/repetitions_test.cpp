@@ -1,0 +1,203 @@
+#include "results/reduction/repetitions.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "results/steps_csv.hpp"
+
+namespace kphi::results {
+namespace {
+using testing::HasSubstr;
+
+double k_of(const StepMean& step) { return step.thrust_n / (step.speed_rad_s * step.speed_rad_s); }
+
+TEST(Repetitions, AverageSoThatThrustOverSpeedSquaredStaysTheCoefficient) {
+  std::vector<StepMean> steps;
+  for (int rep = 1; rep <= 3; ++rep) {
+    StepMean s;
+    s.propeller = "5x3";
+    s.occlusion_deg = 90;
+    s.repetition = rep;
+    s.speed_rad_s = 900 + 50 * rep;
+    s.thrust_n = 1.3e-6 * s.speed_rad_s * s.speed_rad_s;
+    s.thrust_samples = 100;
+    s.quality_flags = rep == 2 ? static_cast<std::uint32_t>(QualityFlag::derated) : 0;
+    s.supply_current_a = rep == 1 ? std::nan("") : 2.0 * rep;
+    s.thrust_u_n = 0.003;
+    s.thrust_freedom = 20;
+    s.speed_glitches = 1;
+    steps.push_back(s);
+  }
+  const auto mean = average_repetitions(steps);
+  ASSERT_EQ(mean.size(), 1u);
+  EXPECT_EQ(mean[0].repetition, 0);
+  EXPECT_NEAR(k_of(mean[0]), 1.3e-6, 1e-18);
+  EXPECT_EQ(mean[0].thrust_samples, 300u);
+  EXPECT_EQ(mean[0].supply_current_a, 5.0);
+  EXPECT_NEAR(mean[0].thrust_u_n, 0.003 / std::sqrt(3.0), 1e-12);
+  EXPECT_NEAR(mean[0].thrust_freedom, 60, 1e-9);
+  EXPECT_EQ(mean[0].speed_glitches, 3u);
+  EXPECT_EQ(quality_flag_names(mean[0].quality_flags), "derated");
+}
+
+TEST(Repetitions, AreGroupedByPropellerOcclusionAndStep) {
+  std::vector<StepMean> steps;
+  for (const char* propeller : {"b", "a"}) {
+    for (const double phi : {90.0, 0.0}) {
+      for (int rep = 1; rep <= 2; ++rep) {
+        for (int step = 0; step < 3; ++step) {
+          StepMean s;
+          s.propeller = propeller;
+          s.occlusion_deg = phi;
+          s.repetition = rep;
+          s.step = step;
+          s.thrust_n = rep;
+          steps.push_back(s);
+        }
+      }
+    }
+  }
+  const auto means = average_repetitions(steps);
+  ASSERT_EQ(means.size(), 12u);
+  EXPECT_EQ(means[0].propeller, "b");
+  EXPECT_EQ(means[3].occlusion_deg, 0);
+  for (const StepMean& mean : means) EXPECT_EQ(mean.thrust_n, 1.5);
+}
+
+constexpr double kThrustU = 0.002;
+
+/// Runs of 20 steps; run i has the coefficient 1.5e-6 · (1 + off[i]).
+std::vector<StepMean> runs(const std::vector<double>& off, unsigned seed = 1) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, kThrustU);
+  std::vector<StepMean> steps;
+  for (std::size_t run = 0; run < off.size(); ++run) {
+    for (int i = 0; i < 20; ++i) {
+      StepMean s;
+      s.propeller = "5x3";
+      s.repetition = static_cast<int>(run) + 1;
+      s.step = i;
+      s.speed_rad_s = 200 + 90.0 * i;
+      s.thrust_n = 1.5e-6 * (1 + off[run]) * s.speed_rad_s * s.speed_rad_s + noise(random);
+      s.thrust_u_n = kThrustU;
+      s.thrust_freedom = 30;
+      s.zero_u_n = 0;
+      steps.push_back(s);
+    }
+  }
+  return steps;
+}
+
+RepetitionVerdict judged(const std::vector<StepMean>& steps, const RepetitionRule& rule = {}) {
+  const auto verdicts = judge_repetitions(steps, rule);
+  EXPECT_EQ(verdicts.size(), 1u);
+  return verdicts.at(0);
+}
+
+TEST(JudgeRepetitions, IsContentWithThreeThatAgree) {
+  int large = 0;
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    const auto verdict = judged(runs({0, 0, 0}, seed));
+    EXPECT_FALSE(verdict.asks_for_another) << seed << ": " << verdict.reason;
+    EXPECT_NEAR(verdict.k, 1.5e-6, 1.5e-6 * 0.001);
+    large += verdict.p < 0.05;
+  }
+  EXPECT_LE(large, 22) << "one in twenty by chance";
+  EXPECT_GE(large, 2);
+}
+
+TEST(JudgeRepetitions, TellsTheSpreadBetweenFromTheSpreadWithin) {
+  const auto verdict = judged(runs({-0.004, 0, 0.004}));
+  EXPECT_NEAR(verdict.between_sd, 0.004 * 1.5e-6, 0.0005 * 1.5e-6);
+  EXPECT_LT(verdict.within_u, 0.0005 * 1.5e-6);
+  EXPECT_GT(verdict.f, 30);
+  EXPECT_LT(verdict.p, 0.001);
+  EXPECT_FALSE(verdict.asks_for_another) << "0.8 % from end to end is what mounting and air do";
+}
+
+TEST(JudgeRepetitions, AsksForAnotherWhenOneOfThreeStandsOutAndKeepsIt) {
+  const auto verdict = judged(runs({0, 0.03, 0.0005}));
+  EXPECT_TRUE(verdict.asks_for_another);
+  EXPECT_THAT(verdict.reason, HasSubstr("repetition 2"));
+  ASSERT_EQ(verdict.repetitions.size(), 3u);
+  EXPECT_TRUE(verdict.repetitions[1].outlying);
+  EXPECT_NEAR(verdict.repetitions[1].k, 1.03 * 1.5e-6, 0.001 * 1.5e-6);
+  EXPECT_FALSE(verdict.repetitions[0].outlying);
+
+  const auto after = judged(runs({0, 0.03, 0.0005, -0.0003}));
+  EXPECT_FALSE(after.asks_for_another) << "three are good now";
+  EXPECT_TRUE(after.repetitions[1].outlying) << "and the failed one is still there";
+  EXPECT_THAT(after.reason, HasSubstr("repetition 2"));
+}
+
+TEST(MeansOf, KeepWhatIsFarFromTheOthers) {
+  const auto steps = runs({0, 0.03, 0.0005});
+  ASSERT_TRUE(judged(steps).repetitions[1].outlying);
+  EXPECT_EQ(format_steps(means_of(steps)), format_steps(average_repetitions(steps))) << "being far is no cause";
+}
+
+TEST(MeansOf, LeaveOutAFlaggedStepWhenAnotherRepetitionIsGoodAndSaySo) {
+  auto steps = runs({0, 0.001});
+  for (auto& step : steps)
+    if (step.repetition == 2)
+      step.quality_flags =
+          static_cast<std::uint32_t>(step.step < 10 ? QualityFlag::zero_drifted : QualityFlag::coil_hot);
+  const auto means = means_of(steps);
+  EXPECT_EQ(means.at(5).thrust_n, steps.at(5).thrust_n);
+  EXPECT_EQ(means.at(5).quality_flags, 0u);
+  EXPECT_EQ(means.at(5).repetitions_averaged, 1);
+  EXPECT_EQ(means.at(5).repetitions_left_out, 1);
+  EXPECT_NEAR(means.at(15).thrust_n, 0.5 * (steps.at(15).thrust_n + steps.at(35).thrust_n), 1e-12) << "hot is harmless";
+  const auto again = parse_steps(format_steps(means), "means.csv");
+  EXPECT_EQ(again.at(3).repetitions_left_out, 1);
+  EXPECT_TRUE(std::isnan(again.at(15).repetitions_left_out));
+  for (auto& step : steps) step.quality_flags = static_cast<std::uint32_t>(QualityFlag::zero_drifted);
+  EXPECT_EQ(format_steps(means_of(steps)), format_steps(average_repetitions(steps)))
+      << "all are flagged: better that than nothing";
+}
+
+TEST(MeansOf, AreTheAveragesWhereNoneIsFlagged) {
+  const auto steps = runs({0, 0.0002, -0.0002});
+  EXPECT_EQ(format_steps(means_of(steps)), format_steps(average_repetitions(steps)));
+  EXPECT_TRUE(std::isnan(means_of(steps).front().repetitions_averaged));
+}
+
+TEST(JudgeRepetitions, AsksForAnotherWhenNoneAgreesButNotForEver) {
+  EXPECT_TRUE(judged(runs({-0.03, 0, 0.03})).asks_for_another);
+  EXPECT_THAT(judged(runs({-0.03, 0, 0.03})).reason, HasSubstr("none stands out"));
+  EXPECT_FALSE(judged(runs({-0.06, -0.03, 0, 0.03, 0.06})).asks_for_another);
+}
+
+TEST(JudgeRepetitions, AsksForAnotherWhenOneHasTooManyFlaggedSteps) {
+  auto steps = runs({0, 0, 0});
+  for (auto& step : steps) {
+    if (step.repetition == 3 && step.step < 11) step.quality_flags = static_cast<std::uint32_t>(QualityFlag::unsettled);
+  }
+  const auto verdict = judged(steps);
+  EXPECT_TRUE(verdict.asks_for_another);
+  EXPECT_FALSE(verdict.repetitions[2].usable);
+  for (auto& step : steps) step.quality_flags = static_cast<std::uint32_t>(QualityFlag::coil_hot);
+  EXPECT_FALSE(judged(steps).asks_for_another) << "a hot coil changes no coefficient";
+}
+
+TEST(JudgeRepetitions, ComparesOnlyLevelsThatAllHave) {
+  auto steps = runs({0, 0, 0});
+  for (auto& step : steps) {
+    // k rises with speed; one run lacks its fast steps.
+    step.thrust_n *= 1 + 1e-4 * step.speed_rad_s;
+    if (step.repetition == 2 && step.step > 12) step.quality_flags = static_cast<std::uint32_t>(QualityFlag::derated);
+  }
+  EXPECT_FALSE(judged(steps).repetitions[1].outlying);
+}
+
+TEST(JudgeRepetitions, WaitsUntilTheWantedOnesAreThere) {
+  EXPECT_FALSE(judged(runs({0})).asks_for_another);
+  EXPECT_FALSE(judged(runs({0, 0.05})).asks_for_another);
+  EXPECT_FALSE(judged(runs({0}), {.wanted = 1}).asks_for_another);
+}
+
+}  // namespace
+}  // namespace kphi::results

@@ -1,0 +1,77 @@
+#include "results/reduction/zeros.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "test/results/synthetic_run.hpp"
+
+namespace kphi::results {
+namespace {
+
+using test::make_run;
+using test::Truth;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+struct Built {
+  explicit Built(const Truth& truth) : run(make_run(truth)) {}
+  RunRecording run;
+  CellStream cell{run};
+  MotorSeries motor{run.motor};
+  Zeros zeros{run, cell, motor};
+};
+
+TEST(Zeros, LieOnALineBetweenBeforeAndAfter) {
+  Truth truth;
+  truth.noise_n = 0.001;
+  truth.drift_n_per_s = 0.01;
+  const Built built(truth);
+  for (const double t : {1.0, 4.0, 8.0}) {
+    EXPECT_NEAR(built.zeros.at(1e9 * t, 0).force, 1e6 * (truth.zero_force_n + 0.01 * t), 300) << t;
+  }
+}
+
+TEST(Zeros, AreLeastCertainNearEachAndMoreBetweenThem) {
+  const Built built({});
+  const double at_one = built.zeros.at(0.5e9, 0).u;
+  const double between = built.zeros.at(5e9, 0).u;
+  EXPECT_NEAR(at_one, 1e6 * 0.02 / std::sqrt(1000.0), 300);
+  EXPECT_NEAR(between, at_one / std::sqrt(2.0), 0.3 * at_one) << "there both count half";
+}
+
+TEST(Zeros, AreNoLessCertainForDrifting) {
+  Truth truth;
+  truth.zero_s = 8;
+  const double still = Built(truth).zeros.largest_u();
+  truth.drift_n_per_s = 0.003;
+  EXPECT_NEAR(Built(truth).zeros.largest_u(), still, 0.01 * still);
+}
+
+TEST(ZeroCheck, SaysNothingOfAGoodZero) {
+  EXPECT_THAT((ZeroCheck{0.001, 0.02, 0.03, false, 0.001}.reasons()), IsEmpty());
+}
+
+TEST(ZeroCheck, SaysWhyAZeroIsRefused) {
+  EXPECT_THAT((ZeroCheck{0.03, 0.02, 0.03, false, 0.001}.reasons()), ElementsAre(HasSubstr("moved by 0.03 N")));
+  EXPECT_THAT((ZeroCheck{0.001, 0.02, 2.0, false, 0.001}.reasons()), ElementsAre(HasSubstr("scatter by 2 N")));
+  EXPECT_THAT((ZeroCheck{0.001, 0.02, 0.1, false, 0.011}.reasons()), ElementsAre(HasSubstr("known to 0.011 N only")));
+  EXPECT_THAT((ZeroCheck{0, 0.02, 0.1, true, 0.001}.reasons()), ElementsAre(HasSubstr("only one")));
+}
+
+TEST(ZeroCheck, RefusesAZeroThatWandersThoughItsSamplesScatterLittle) {
+  Truth truth;
+  truth.zero_s = 3;
+  truth.correlated_n = 0.08;
+  truth.correlation_s = 0.1;
+  const Built built(truth);
+  const ZeroCheck check{0, tolerated_drift(1), 1e-6 * built.zeros.largest_deviation(), false,
+                        1e-6 * built.zeros.largest_u()};
+  EXPECT_LT(check.deviation_n, kNoisyZero);
+  EXPECT_TRUE(check.noisy());
+}
+
+}  // namespace
+}  // namespace kphi::results
