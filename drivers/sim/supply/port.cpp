@@ -62,7 +62,11 @@ SupplyPort::SupplyPort(SupplyAddresses addresses) : addresses_(std::move(address
 }
 
 void SupplyPort::open() {
-  if (addresses_.device) pty_.emplace(*addresses_.device);
+  if (pty_) {
+    pty_->plug();
+  } else if (addresses_.device) {
+    pty_.emplace(*addresses_.device);
+  }
   if (addresses_.host) listening_ = listen_at(*addresses_.host, SOCK_STREAM, addresses_.port);
   open_ = true;
 }
@@ -86,7 +90,7 @@ void SupplyPort::open_or_close(SupplySlave& slave, Instant now) {
     open_ = false;
     slave.forget(kLine);
     for (const auto& [number, socket] : clients_) slave.forget(number);
-    pty_.reset();
+    if (pty_) pty_->unplug();
     listening_.reset();
     clients_.clear();
   } else if (!closed && !open_) {
@@ -97,7 +101,7 @@ void SupplyPort::open_or_close(SupplySlave& slave, Instant now) {
 void SupplyPort::hear_line(SupplySlave& slave, Instant now) {
   std::array<std::uint8_t, 512> buffer{};
   if (++quiet_steps_ == kQuietSteps && pty_) pty_->unlock();
-  while (pty_) {
+  while (pty_ && pty_->plugged()) {
     const std::size_t count = pty_->read(buffer);
     if (count == 0) break;
     quiet_steps_ = 0;

@@ -83,7 +83,7 @@ void Pty::plug() {
 void Pty::unplug() noexcept {
   std::error_code error;
   if (path_ != slave_path_ && fs::read_symlink(path_, error) == fs::path(slave_path_)) fs::remove(path_, error);
-  slave_ = Descriptor();
+  if (plugged()) gone_.push_back(std::move(slave_));
   master_ = Descriptor();
 }
 

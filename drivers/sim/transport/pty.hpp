@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "base/descriptor.hpp"
 
@@ -29,7 +30,8 @@ class Pty {
   [[nodiscard]] std::size_t write(std::span<const std::uint8_t> bytes) noexcept;
   /// Rate at which the client has set its end, bits per second; 0: one without a number.
   [[nodiscard]] unsigned baud() const noexcept;
-  /// Pulls the adapter: the client sees a hang-up, the link is gone.
+  /// Pulls the adapter: the client sees a hang-up, the link is gone. Its number stays taken, so that no other bench gets a
+  /// number whose lock the client still holds.
   void unplug() noexcept;
   /// Another pseudo-terminal under the same link. Throws DeviceError.
   void plug();
@@ -44,6 +46,7 @@ class Pty {
   std::string slave_path_;
   Descriptor master_;
   Descriptor slave_;
+  std::vector<Descriptor> gone_;  ///< slaves of pulled adapters
 };
 
 }  // namespace kphi::sim

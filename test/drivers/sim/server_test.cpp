@@ -18,6 +18,7 @@
 
 #include "base/error.hpp"
 #include "drivers/sim/control_line.hpp"
+#include "drivers/sim/transport/pty.hpp"
 #include "test/drivers/sim/hex.hpp"
 
 namespace kphi::sim {
@@ -421,6 +422,21 @@ TEST(Server, ReplacesTheSocketAndLinkOfADeadSimulator) {
   }
   Server server(settings);
   EXPECT_NE(fs::read_symlink(settings.device), "/dev/pts/no-such");
+  fs::remove_all(folder);
+}
+
+// The client still holds the lock of that number: whoever got it would be refused as a second program.
+TEST(Pty, KeepsTheNumberOfAPulledAdapter) {
+  const fs::path folder = fresh_folder();
+  Pty line(folder / "motor");
+  const fs::path pulled = fs::read_symlink(folder / "motor");
+  line.unplug();
+  EXPECT_FALSE(fs::exists(pulled)) << "the client sees a hang-up";
+  const Pty other(folder / "other"), third(folder / "third");
+  EXPECT_NE(fs::read_symlink(folder / "other"), pulled);
+  EXPECT_NE(fs::read_symlink(folder / "third"), pulled);
+  line.plug();
+  EXPECT_NE(fs::read_symlink(folder / "motor"), pulled);
   fs::remove_all(folder);
 }
 
