@@ -17,7 +17,7 @@ std::string folder_of(const RunningBench& bench) {
 }
 
 std::vector<std::string> resume_command(const RunningBench& bench, const std::string& folder) {
-  return {kphi(), "run", "--bench", bench.path("bench.yaml"), "--yes", "--resume", folder};
+  return in_real_time({kphi(), "run", "--bench", bench.path("bench.yaml"), "--yes", "--resume", folder});
 }
 
 TEST(Locks, RefuseASecondProgramAndNameTheFirstWhichIsNotDisturbed) {

@@ -39,7 +39,23 @@ std::vector<char*> environment_with(const std::vector<std::string>& further) {
   return settings;
 }
 
+bool may_set_real_time() {
+  const pid_t trial = fork();
+  if (trial == 0) {
+    const sched_param priority{1};
+    _exit(sched_setscheduler(0, SCHED_FIFO, &priority));
+  }
+  int status = 0;
+  return trial > 0 && waitpid(trial, &status, 0) == trial && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
 }  // namespace
+
+std::vector<std::string> in_real_time(std::vector<std::string> command, int priority) {
+  static const bool may = may_set_real_time();
+  if (may) command.insert(command.begin(), {"chrt", "-f", std::to_string(priority)});
+  return command;
+}
 
 Process::Process(const std::vector<std::string>& arguments, const std::string& input,
                  const Surroundings& surroundings) {

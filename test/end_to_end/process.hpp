@@ -53,4 +53,8 @@ class Process {
   std::string err_;
 };
 
+/// The command at a real-time priority of 1 to 99, where this process may grant one: other work of the host then does
+/// not delay it, just as it would not delay a device or the only program of a bench's computer.
+[[nodiscard]] std::vector<std::string> in_real_time(std::vector<std::string> command, int priority = 10);
+
 }  // namespace kphi::test

@@ -48,7 +48,7 @@ class Stand {
   [[nodiscard]] std::vector<std::string> command(const std::vector<std::string>& more) const {
     std::vector<std::string> all{kphi(), "run", "--bench", bench.path("bench.yaml")};
     all.insert(all.end(), more.begin(), more.end());
-    return all;
+    return in_real_time(all);
   }
   [[nodiscard]] std::vector<std::string> first(const std::vector<std::string>& more) const {
     std::vector<std::string> all = command({bench.path("short.yaml"), "--out", bench.path("results")});

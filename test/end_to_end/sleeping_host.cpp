@@ -108,14 +108,14 @@ void SleepingHost::complete(Awakening& awakening) {
 json SleepingHost::status() const { return json::parse(sim::tell(bench_.path("control"), "status")); }
 
 std::vector<std::string> SleepingHost::first_command() const {
-  std::vector<std::string> command = bench_.run_command();
+  std::vector<std::string> command = bench_.run_command_at_any_priority();
   if (sleep_.moment == Moment::prompt) std::erase(command, "--yes");
   return command;
 }
 
 /// What a person must answer before a campaign goes on that a safety stop has ended.
 std::vector<std::string> SleepingHost::resume_command(const std::string& folder) const {
-  return {kphi(), "run", "--bench", bench_.path("bench.yaml"), "--yes", "--resume", folder};
+  return in_real_time({kphi(), "run", "--bench", bench_.path("bench.yaml"), "--yes", "--resume", folder});
 }
 
 Surroundings SleepingHost::surroundings() const {

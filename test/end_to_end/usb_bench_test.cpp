@@ -37,8 +37,8 @@ class UsbBench : public OnVirtualBus {
     write(bench->path("usb.yaml"), bytes_of(bench->path("bench.yaml")) + kDevices);
   }
   [[nodiscard]] std::vector<std::string> run_command() const {
-    return {kphi(),  "run",   bench->path("short.yaml"), "--bench", bench->path("usb.yaml"),
-            "--yes", "--out", bench->path("results")};
+    return in_real_time({kphi(), "run", bench->path("short.yaml"), "--bench", bench->path("usb.yaml"), "--yes", "--out",
+                         bench->path("results")});
   }
   [[nodiscard]] results::RunRecording recording(const std::string& ending) const {
     for (const auto& entry : std::filesystem::recursive_directory_iterator(bench->path("results"))) {

@@ -69,6 +69,20 @@ TEST(Compare, CorrectsForTheNumberOfComparisons) {
   EXPECT_EQ(compare(result({a[2]}), result({b[2]})).verdict, Agreement::differ);
 }
 
+// Holm: the second smallest p is judged against level/(m − 1), Bonferroni would judge it against level/m.
+TEST(Compare, JudgesEachFurtherDifferenceAgainstAHigherLevel) {
+  const auto found = [](double first_z, double second_z) {
+    const double u = 0.01 / std::sqrt(2);
+    const Comparison both =
+        compare(result({{"K_T", "", 1, u}, {"slope", "", 1, u}}),
+                result({{"K_T", "", 1 + 0.01 * first_z, u}, {"slope", "", 1 + 0.01 * second_z, u}}));
+    return std::pair(both.differences[0].significant, both.differences[1].significant);
+  };
+  constexpr double kOf0p01 = 2.576, kOf0p03 = 2.170, kOf0p04 = 2.054;
+  EXPECT_EQ(found(kOf0p01, kOf0p04), std::pair(true, true));
+  EXPECT_EQ(found(kOf0p03, kOf0p04), std::pair(false, false)) << "the smallest p stands above level/2";
+}
+
 TEST(Compare, IsWrongOnceInTwentyOfEqualPairs) {
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0, 1);
