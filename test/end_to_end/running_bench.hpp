@@ -41,7 +41,7 @@ inline std::string supply_text(const std::filesystem::path& folder) {
 }
 
 struct Manner {
-  double time_scale = 8;
+  double time_scale = 4;
   double rate_hz = 7000;
   std::string faults = "  []\n";  ///< entries of a fault script
   bool supply = false;            ///< the bench has one of its own
