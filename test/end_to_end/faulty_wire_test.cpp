@@ -35,7 +35,7 @@ std::uint64_t truly_lost(const std::vector<json>& log, std::uint32_t first_ft, s
 }
 
 TEST(FaultInjector, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
-  RunningBench bench(Manner{8, 7000,
+  RunningBench bench(Manner{4, 7000,
                             "  - {at_s: 0, for_s: 100000, kind: loss, p: 0.01, burst: 3}\n"
                             "  - {at_s: 0, for_s: 100000, kind: duplicate, p: 0.02}\n"
                             "  - {at_s: 0, for_s: 100000, kind: foreign_source, p: 0.02}\n"
@@ -68,7 +68,7 @@ TEST(FaultInjector, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
 }
 
 TEST(FaultInjector, NamesInLatin1ReachNoTerminalAsRawBytes) {
-  RunningBench bench(Manner{8, 7000, "  - {at_s: 0, for_s: 100000, kind: http_charset}\n"});
+  RunningBench bench(Manner{4, 7000, "  - {at_s: 0, for_s: 100000, kind: http_charset}\n"});
   Process devices({kphi(), "devices", "--bench", bench.path("bench.yaml")});
   EXPECT_EQ(devices.wait(), 0) << devices.err();
   EXPECT_THAT(devices.out(), HasSubstr("Pr\uFFFDfstand"));
@@ -76,14 +76,14 @@ TEST(FaultInjector, NamesInLatin1ReachNoTerminalAsRawBytes) {
 }
 
 TEST(FaultInjector, APageInUtf16IsRefusedInOneLine) {
-  RunningBench bench(Manner{8, 7000, "  - {at_s: 0, for_s: 100000, kind: http_charset, utf16: true}\n"});
+  RunningBench bench(Manner{4, 7000, "  - {at_s: 0, for_s: 100000, kind: http_charset, utf16: true}\n"});
   Process run(bench.run_command());
   EXPECT_EQ(run.wait(), 3) << run.err();
   EXPECT_THAT(run.err(), AllOf(HasSubstr("NUL byte"), HasSubstr("power-cycle the box")));
 }
 
 TEST(FaultInjector, OtherUnitsDuringARunAreNoticedAtItsEnd) {
-  RunningBench bench(Manner{8, 7000, "  - {at_s: 20, kind: units, force_unit: 4}\n"});
+  RunningBench bench(Manner{4, 7000, "  - {at_s: 20, kind: units, force_unit: 4}\n"});
   write(bench.path("short.yaml"), short_campaign_text("0", 1, 60));  // one run of 36 s and more
   Process run(bench.run_command());
   EXPECT_EQ(run.wait(), 0) << run.err();
@@ -94,7 +94,7 @@ TEST(FaultInjector, OtherUnitsDuringARunAreNoticedAtItsEnd) {
 }
 
 TEST(FaultInjector, AStreamTakenOverEndsTheCampaignWithTheMotorStopped) {
-  RunningBench bench(Manner{8, 7000, "  - {at_s: 24, kind: taken_over}\n"});
+  RunningBench bench(Manner{4, 7000, "  - {at_s: 24, kind: taken_over}\n"});
   write(bench.path("short.yaml"), short_campaign_text("0", 1, 60));  // one run of 36 s and more
   Process run(bench.run_command());
   EXPECT_EQ(run.wait(), 4) << run.err();
