@@ -1,5 +1,5 @@
-// The one clock: nanoseconds of bench time since the epoch of whoever owns the clock. It is handed to all that
-// waits or stamps. Sessions and simulated devices hold no clock: they are told the time.
+// The one clock: nanoseconds of bench time since the clock's own epoch. Everything that waits or stamps gets it as an
+// argument. Sessions and simulated devices hold no clock: their callers pass the time.
 #pragma once
 
 #include <time.h>
@@ -13,7 +13,7 @@ using Duration = std::chrono::nanoseconds;
 /// Bench time since the clock's epoch, in ns. Stored in files as `*_ns`.
 using Instant = std::chrono::nanoseconds;
 
-/// Later than anything: the deadline of who waits for nothing.
+/// Later than any time: no deadline.
 inline constexpr Instant kNever = Instant::max();
 
 [[nodiscard]] constexpr double to_seconds(Duration duration) noexcept {
@@ -23,27 +23,27 @@ inline constexpr Instant kNever = Instant::max();
   return Duration(static_cast<std::int64_t>(seconds * 1e9 + (seconds < 0 ? -0.5 : 0.5)));
 }
 
-/// All members may be called from any thread.
+/// Thread-safe.
 class Clock {
  public:
   virtual ~Clock() = default;
   [[nodiscard]] virtual Instant now() const noexcept = 0;
-  /// Bench time that passes while `wall` passes for a person: deadlines of protocols are given in wall time.
+  /// Bench time that passes during `wall` of wall time: deadlines of protocols are given in wall time.
   [[nodiscard]] virtual Duration stretched(Duration wall) const noexcept = 0;
-  /// Wall time that passes while `bench` passes on the bench: what a thread may sleep.
+  /// Wall time that passes during `bench` of bench time: how long a thread may sleep.
   [[nodiscard]] virtual Duration shrunk(Duration bench) const noexcept = 0;
   /// Bench time of a kernel receive stamp (SO_TIMESTAMPNS, CLOCK_REALTIME).
   [[nodiscard]] virtual Instant at_realtime(const timespec& stamp) const noexcept = 0;
   /// Calendar time of the epoch, UTC.
   [[nodiscard]] virtual std::chrono::system_clock::time_point epoch_utc() const noexcept = 0;
-  /// Wall time for which this computer was suspended since the epoch. now() stands still meanwhile.
+  /// Wall time for which this computer was suspended since the epoch; now() stopped meanwhile.
   [[nodiscard]] virtual Duration suspended() const noexcept = 0;
 };
 
-/// A shorter suspension cannot be told from the time between two readings of a clock. No computer sleeps that briefly.
+/// Shortest suspension that is told apart from the time between two readings of a clock. No computer sleeps as briefly.
 inline constexpr Duration kShortestSleep = std::chrono::milliseconds(50);
 
-/// CLOCK_MONOTONIC, `scale` times as fast as a person's: 1 on a real bench, N on a simulated one. Epoch: construction.
+/// CLOCK_MONOTONIC, `scale` times as fast as the wall clock: 1 on a real bench, N simulated. Epoch: construction.
 class SteadyClock final : public Clock {
  public:
   explicit SteadyClock(double scale = 1.0) noexcept;
@@ -52,7 +52,7 @@ class SteadyClock final : public Clock {
   [[nodiscard]] Duration shrunk(Duration bench) const noexcept override;
   [[nodiscard]] Instant at_realtime(const timespec& stamp) const noexcept override;
   [[nodiscard]] std::chrono::system_clock::time_point epoch_utc() const noexcept override;
-  /// By how much CLOCK_BOOTTIME has got ahead of CLOCK_MONOTONIC.
+  /// Growth of CLOCK_BOOTTIME over CLOCK_MONOTONIC.
   [[nodiscard]] Duration suspended() const noexcept override;
 
  private:
@@ -62,7 +62,7 @@ class SteadyClock final : public Clock {
   std::int64_t epoch_lead_ns_;  ///< of CLOCK_BOOTTIME over CLOCK_MONOTONIC
 };
 
-/// Stands still until told: tests, and the deterministic bench. One thread.
+/// Moves only by set() and advance(): for tests and the deterministic bench. One thread.
 class ManualClock final : public Clock {
  public:
   explicit ManualClock(Instant start = Instant{0}) noexcept : now_(start) {}

@@ -7,7 +7,7 @@
 #include "base/error.hpp"
 #include "base/number.hpp"
 
-namespace kphi::fit {
+namespace kphi {
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
@@ -153,4 +153,4 @@ Table read_blank_separated(std::string_view text, std::string path) {
 
 std::optional<double> parse_number(std::string_view field) { return parse_finite(trimmed(field)); }
 
-}  // namespace kphi::fit
+}  // namespace kphi

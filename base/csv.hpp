@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace kphi::fit {
+namespace kphi {
 
 struct TableRow {
   std::size_t line = 0;  ///< in the file, 1-based
@@ -27,13 +27,13 @@ struct Table {
   std::vector<TableRow> rows;  ///< every row has as many fields as the header
   std::vector<TableProblem> problems;
 
-  /// Index of the column named exactly so. Throws ConfigurationError (path:line) if it is missing or stands twice.
+  /// Index of the column named exactly so. Throws ConfigurationError (path:line) if it is missing or given twice.
   [[nodiscard]] std::size_t column(std::string_view name) const;
   [[nodiscard]] std::optional<std::size_t> find_column(std::string_view name) const;
 };
 
-/// Comma separated: a byte order mark, CRLF and a trailing empty field on each line are taken as they come; a field may
-/// stand in double quotes, a quote in it doubled. Empty lines are skipped.
+/// Comma separated: a byte order mark, CRLF and a trailing empty field on each line are accepted; a field may be
+/// in double quotes, a quote in it doubled. Empty lines are skipped.
 [[nodiscard]] Table read_csv(std::string_view text, std::string path);
 
 /// As read_csv, separated by `separator`; 0: by the one of , ; tab that the header line has most of.
@@ -45,4 +45,4 @@ struct Table {
 /// The whole field as a finite number, blanks around it allowed; nullopt otherwise.
 [[nodiscard]] std::optional<double> parse_number(std::string_view field);
 
-}  // namespace kphi::fit
+}  // namespace kphi

@@ -3,25 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <stdexcept>
+
+#include "base/number.hpp"
 
 namespace kphi {
 namespace {
 
 constexpr std::string_view kUsb = "usb:";
 
-template <class Number>
-std::optional<Number> whole(std::string_view text, int base) noexcept {
-  Number value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
 /// False: neither four hexadecimal digits nor '*'.
 bool read_id(std::string_view text, std::optional<std::uint16_t>& id) noexcept {
-  if (text.size() == 4) id = whole<std::uint16_t>(text, 16);
+  if (text.size() == 4) id = parse_integer<std::uint16_t>(text, 16);
   return id || text == "*";
 }
 
@@ -36,8 +29,6 @@ bool is_port_path(std::string_view text) noexcept {
 std::string id_text(const std::optional<std::uint16_t>& id) { return id ? fmt::format("{:04x}", *id) : "*"; }
 
 }  // namespace
-
-std::optional<unsigned> parse_whole(std::string_view text) noexcept { return whole<unsigned>(text, 10); }
 
 std::string HostPort::text() const {
   return host.find(':') == std::string::npos ? fmt::format("{}:{}", host, port) : fmt::format("[{}]:{}", host, port);
@@ -72,7 +63,7 @@ HostPort Uri::host_and_port(std::uint16_t usual_port) const {
   if (place.host.empty()) refuse("no host given");
   const std::string rest = location_.substr(end + bracketed);
   if (rest.empty()) return place;
-  const auto port = rest.front() == ':' ? whole<std::uint16_t>(std::string_view(rest).substr(1), 10) : std::nullopt;
+  const auto port = rest.front() == ':' ? parse_integer<std::uint16_t>(std::string_view(rest).substr(1)) : std::nullopt;
   if (!port || *port == 0) refuse(fmt::format("\"{}\" is not a port, 1 to 65535", rest));
   place.port = *port;
   return place;

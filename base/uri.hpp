@@ -10,9 +10,6 @@
 
 namespace kphi {
 
-/// Decimal digits only: no sign, no blank, nothing after them.
-[[nodiscard]] std::optional<unsigned> parse_whole(std::string_view text) noexcept;
-
 /// A name, an IPv4 address, or an IPv6 address in brackets, then :PORT (1 to 65535).
 struct HostPort {
   std::string host;  ///< without brackets

@@ -1,22 +1,18 @@
-#include "commands/check.hpp"
+#include "profiles/check.hpp"
 
-#include <fmt/format.h>
-
-#include <CLI/CLI.hpp>
 #include <cstdio>
-#include <memory>
-#include <string>
 #include <vector>
 
-#include "base/error.hpp"
+#include "commands/commands.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "compensation/file/coefficient_keys.hpp"
 #include "drivers/sim/input_files.hpp"
-#include "profiles/check.hpp"
 #include "profiles/strict_yaml.hpp"
 
-namespace kphi::profiles {
+namespace kphi::commands {
 namespace {
+
+using namespace profiles;
 
 struct CheckOptions {
   std::vector<std::string> paths;
@@ -59,13 +55,13 @@ std::string in_words(const std::vector<Fault>& script, const sim::FaultTable<Fau
 }
 
 std::string judge_faults(const std::string& path) {
-  const sim::FaultFile file = sim::parse_faults(read_text(path), path);
+  const sim::FaultFile file = sim::parse_faults(profiles::read_text(path), path);
   return in_words(file.load_cell, sim::load_cell_faults()) + in_words(file.motor, sim::motor_faults()) +
          in_words(file.supply, sim::supply_faults()) + in_words(file.air, sim::ambient_faults());
 }
 
 std::string judge_motor(const std::string& path) {
-  const sim::MotorParameters motor = sim::parse_motor_profile(read_text(path), path).motor;
+  const sim::MotorParameters motor = sim::parse_motor_profile(profiles::read_text(path), path).motor;
   return fmt::format(
       "  motor      {:.4g} RPM/V, {:g} ohm, {:g} kg m^2 without propeller\n"
       "  supply     {:g} V behind {:g} ohm, at most {:g} A\n",
@@ -81,32 +77,31 @@ const std::vector<ForeignKind>& foreign_kinds() {
 }
 
 void print(const CheckedFile& file, bool json) {
-  if (json) {
-    fmt::print("{}\n", file.report.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
-    return;
-  }
+  if (json) return print_json(file.report, -1);
   if (file.ok()) fmt::print("{}: valid {}\n{}", file.path, file.kind, file.summary);
   for (const std::string& error : file.errors) fmt::print(stderr, "{}\n", error);
 }
 
-}  // namespace
-
-void add_check(CLI::App& program, int& exit_code) {
-  auto* command = program.add_subcommand(
-      "check", "check campaign, bench, vehicle, answers and coefficient files, fault scripts and simulated motors");
-  auto options = std::make_shared<CheckOptions>();
-  command
-      ->add_option("FILE", options->paths,
-                   "files; campaigns are also checked against the benches and answers among them")
-      ->required();
-  command->add_flag("--json", options->json, "one JSON object per file and line on stdout");
-  command->callback([options, &exit_code] {
-    exit_code = static_cast<int>(ExitCode::ok);
-    for (const CheckedFile& file : check_files(options->paths, foreign_kinds())) {
-      print(file, options->json);
-      if (!file.ok()) exit_code = static_cast<int>(ExitCode::usage);
-    }
-  });
+ExitCode check(const CheckOptions& options) {
+  ExitCode exit_code = ExitCode::ok;
+  for (const CheckedFile& file : check_files(options.paths, foreign_kinds())) {
+    print(file, options.json);
+    if (!file.ok()) exit_code = ExitCode::usage;
+  }
+  return exit_code;
 }
 
-}  // namespace kphi::profiles
+}  // namespace
+
+void add_check(CLI::App& program, ExitCode& exit_code) {
+  const auto [command, options] = add_verb<CheckOptions>(
+      program, exit_code, "check",
+      "check campaign, bench, vehicle, answers and coefficient files, fault scripts and simulated motors", check);
+  command
+      .add_option("FILE", options.paths, "files; campaigns are also checked against the benches and answers among them")
+      ->type_name("")
+      ->required();
+  command.add_flag("--json", options.json, "print one JSON object per file on a line of its own");
+}
+
+}  // namespace kphi::commands

@@ -1,21 +1,17 @@
-#include "commands/compensate.hpp"
-
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <iostream>
-#include <memory>
-#include <string>
 
-#include "base/error.hpp"
+#include "commands/commands.hpp"
+#include "commands/inputs.hpp"
 #include "compensation/compensate_rows.hpp"
 #include "compensation/compensator.hpp"
-#include "compensation/file/coefficient_file.hpp"
-#include "profiles/vehicle.hpp"
 
-namespace kphi::compensation {
+namespace kphi::commands {
 namespace {
+
+using namespace compensation;
 
 struct Request {
   std::string coefficients;
@@ -25,18 +21,15 @@ struct Request {
 };
 
 Compensator compensator_of(const Request& request, const profiles::Vehicle& vehicle) {
-  const ThrustCurve curve = load_coefficients(request.coefficients).curve;
-  const auto mismatch = overlap_mismatch(curve.overlap(), request.coefficients, vehicle.overlap, request.vehicle);
-  if (mismatch) throw ConfigurationError(*mismatch);
+  const ThrustCurve curve = load_curve_for(request.coefficients, vehicle);
   const ScalingLaw law = request.law == "published" ? ScalingLaw::published : ScalingLaw::clamped;
   const BuildOutcome outcome = Compensator::build({curve, curve, curve, curve}, profiles::airframe_of(vehicle), law);
   if (!outcome.compensator) throw ConfigurationError(request.vehicle + ": " + describe(outcome.refusal));
   if (outcome.doubts[0].gains_with_occlusion) {
-    std::cerr << request.coefficients
-              << ": k(phi) does not fall with the occlusion; check that this is the right file\n";
+    std::cerr << request.coefficients << ": k(φ) does not fall with the occlusion; check that this is the right file\n";
   }
   if (outcome.doubts[0].steps_at_contact) {
-    std::cerr << request.coefficients << ": k(phi) misses K_T at 0°, so the speeds step at first contact; "
+    std::cerr << request.coefficients << ": k(φ) misses K_T at 0°, so the speeds step at first contact; "
               << "`kphi fit --anchored` avoids this\n";
   }
   return *outcome.compensator;
@@ -77,23 +70,21 @@ ExitCode compensate(const Request& request) {
 
 }  // namespace
 
-void add_compensate(CLI::App& program, int& exit_code) {
-  auto request = std::make_shared<Request>();
-  CLI::App* command = program.add_subcommand(
-      "compensate", "CSV of arm angles and thrusts on stdin → occlusions, k_i and rotor speeds on stdout");
-  command->footer(
+void add_compensate(CLI::App& program, ExitCode& exit_code) {
+  const auto [command, request] = add_verb<Request>(
+      program, exit_code, "compensate",
+      "turn rows of arm angles and thrusts (CSV on stdin) into occlusions, k_i and rotor speeds", compensate);
+  command.footer(
       "Columns in: theta1_deg … theta4_deg, thrust1_n … thrust4_n, in any order; others are ignored.\n"
       "Columns out: phi1_deg …, k1 … (k_i of equation 4), speed1_rpm …, flags (rotor:what, separated by blanks).\n"
       "A row that cannot be used is skipped and reported on stderr; the exit code is then 5.");
-  command->add_option("--coefficients", request->coefficients, "coefficients.yaml of `kphi fit`")->required();
-  command->add_option("--vehicle", request->vehicle, "vehicle file, such as profiles/foldable_drone.yaml")->required();
+  add_flight_files(command, request.coefficients, request.vehicle);
   command
-      ->add_option("--law", request->law,
-                   "how k(φ) becomes k_i: clamped to [0.1, 1], or published (equation 4 to the letter)")
+      .add_option("--law", request.law,
+                  "how k(φ) becomes k_i: clamped to [0.1, 1], or published (equation 4 to the letter)")
       ->check(CLI::IsMember({"clamped", "published"}))
       ->capture_default_str();
-  command->add_flag("--json", request->json, "one JSON object per row instead of CSV");
-  command->callback([request, &exit_code] { exit_code = static_cast<int>(compensate(*request)); });
+  command.add_flag("--json", request.json, "print one JSON object per row instead of CSV");
 }
 
-}  // namespace kphi::compensation
+}  // namespace kphi::commands

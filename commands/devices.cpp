@@ -1,28 +1,22 @@
-#include "commands/devices.hpp"
-
-#include <fmt/format.h>
-
-#include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
-#include <string>
 #include <vector>
 
-#include "base/error.hpp"
 #include "base/finding.hpp"
-#include "daq/audit/load_cell_audit.hpp"
+#include "commands/commands.hpp"
+#include "daq/audit/bench_audit.hpp"
 #include "daq/bench/air.hpp"
 #include "daq/hardware/device_locks.hpp"
-#include "daq/hardware/supply_probe.hpp"
-#include "daq/hardware/usb_probe.hpp"
+#include "daq/hardware/probe.hpp"
 #include "daq/run/run.hpp"
 #include "drivers/iq/service/probe.hpp"
 #include "drivers/netbox/receive/probe.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 
-namespace kphi::daq {
+namespace kphi::commands {
 namespace {
+
+using namespace daq;
 
 constexpr const char* kFactoryAddress = "192.168.1.1";
 
@@ -37,11 +31,11 @@ struct Answer {
   std::string device;
   bool answers = false;
   std::vector<std::string> lines;
-  nlohmann::ordered_json details;
+  Json details;
   bool wanted = true;  ///< named in the bench file
 };
 
-nlohmann::ordered_json to_json(const netbox::Configuration& box) {
+Json to_json(const netbox::Configuration& box) {
   return {{"product", box.product},
           {"firmware", box.firmware},
           {"calibration", box.calibration_serial},
@@ -56,7 +50,7 @@ nlohmann::ordered_json to_json(const netbox::Configuration& box) {
           {"gage_bias", box.gage_bias}};
 }
 
-nlohmann::ordered_json to_json(const netbox::Counters& counters, const netbox::Health& health) {
+Json to_json(const netbox::Counters& counters, const netbox::Health& health) {
   return {{"expected", counters.expected},
           {"received", counters.received},
           {"lost_network", counters.lost_network},
@@ -72,8 +66,8 @@ nlohmann::ordered_json to_json(const netbox::Counters& counters, const netbox::H
           {"queue_high_water", health.queue_high_water}};
 }
 
-nlohmann::ordered_json to_json(const std::vector<Finding>& findings) {
-  auto all = nlohmann::ordered_json::array();
+Json to_json(const std::vector<Finding>& findings) {
+  auto all = Json::array();
   for (const Finding& finding : findings) {
     all.push_back({{"severity", name_of(finding.severity)}, {"what", finding.what}, {"next_move", finding.next_move}});
   }
@@ -99,29 +93,29 @@ Answer ask_load_cell(const profiles::NetBoxConfig& config, const Clock& clock, c
   return answer;
 }
 
-nlohmann::ordered_json to_json(const iq::AuditRecord& module) {
-  nlohmann::ordered_json all = {{"uid", module.uid()},
-                                {"firmware", module.firmware() ? module.firmware()->text() : ""},
-                                {"hardware", module.hardware() ? module.hardware()->text() : ""},
-                                {"electronics", module.electronics() ? module.electronics()->text() : ""}};
-  auto& parameters = all["parameters"] = nlohmann::ordered_json::object();
+Json to_json(const iq::AuditRecord& module) {
+  Json all = {{"uid", module.uid()},
+              {"firmware", module.firmware() ? module.firmware()->text() : ""},
+              {"hardware", module.hardware() ? module.hardware()->text() : ""},
+              {"electronics", module.electronics() ? module.electronics()->text() : ""}};
+  auto& parameters = all["parameters"] = Json::object();
   for (std::size_t i = 0; i < iq::kAuditedCount; ++i) {
-    const iq::Entry& told = *iq::kAudited[i];
-    if (module.values[i]) parameters[fmt::format("{}.{}", name_of(told.type), told.name)] = *module.values[i];
+    const iq::Entry& entry = *iq::kAudited[i];
+    if (module.values[i]) parameters[fmt::format("{}.{}", name_of(entry.type), entry.name)] = *module.values[i];
   }
   return all;
 }
 
-nlohmann::ordered_json to_json(const serial::Adapter& adapter) {
-  nlohmann::ordered_json one = {{"device", adapter.device.string()},
-                                {"specification", adapter.specification()},
-                                {"words", adapter.words},
-                                {"socket", adapter.port}};
+Json to_json(const serial::Adapter& adapter) {
+  Json one = {{"device", adapter.device.string()},
+              {"specification", adapter.specification()},
+              {"words", adapter.words},
+              {"socket", adapter.port}};
   if (adapter.latency_timer_ms) one["latency_timer_ms"] = *adapter.latency_timer_ms;
   return one;
 }
 
-nlohmann::ordered_json to_json(const iq::Counters& counters) {
+Json to_json(const iq::Counters& counters) {
   return {{"requests", counters.requests},
           {"replies", counters.replies},
           {"timeouts", counters.timeouts},
@@ -133,7 +127,7 @@ nlohmann::ordered_json to_json(const iq::Counters& counters) {
           {"discarded_bytes", counters.discarded_bytes}};
 }
 
-nlohmann::ordered_json to_json(const iq::ClockGain& gain) {
+Json to_json(const iq::ClockGain& gain) {
   return {{"factor", gain.factor},         {"u", gain.u_factor},       {"lowest", gain.lowest},
           {"highest", gain.highest},       {"uid", gain.uid},          {"measured_utc", gain.measured_utc},
           {"duration_s", gain.duration_s}, {"readings", gain.readings}};
@@ -213,14 +207,12 @@ void ask_usb(const std::optional<profiles::BenchConfig>& bench, std::vector<Answ
 
 void print(const std::vector<Answer>& answers, bool json) {
   if (json) {
-    auto all = nlohmann::ordered_json::array();
+    auto all = Json::array();
     for (const Answer& answer : answers) {
-      nlohmann::ordered_json one = {{"device", answer.device}, {"answers", answer.answers}};
-      one.update(answer.details);
-      all.push_back(one);
+      all.push_back({{"device", answer.device}, {"answers", answer.answers}});
+      all.back().update(answer.details);
     }
-    fmt::print("{}\n", all.dump(2));
-    return;
+    return print_json(all);
   }
   for (const Answer& answer : answers) {
     fmt::print("{}: {}\n", answer.device, answer.answers ? "answers" : "does not answer");
@@ -261,24 +253,27 @@ ExitCode devices(const Asked& asked) {
 
 }  // namespace
 
-void add_devices(CLI::App& program, int& exit_code) {
-  auto asked = std::make_shared<Asked>();
-  CLI::App* command = program.add_subcommand("devices", "find and identify the devices, list what is wrong with them");
+void add_devices(CLI::App& program, ExitCode& exit_code) {
+  const auto [command, asked] = add_verb<Asked>(program, exit_code, "devices",
+                                                "find and identify the devices, list what is wrong with them", devices);
   CLI::Option* bench =
-      command->add_option("--bench", asked->bench, "bench file (default: only the Net Box's factory address is tried)")
-          ->check(CLI::ExistingFile);
+      command.add_option("--bench", asked.bench, "bench file (default: try only the Net Box's factory address)")
+          ->type_name("FILE")
+          ->check(kExistingFile);
   command
-      ->add_option("--clock-gain", asked->clock_gain_s,
-                   "measure the motor module's clock against this computer's, for SECONDS of bench time")
+      .add_option("--clock-gain", asked.clock_gain_s,
+                  "compare the motor module's clock with this computer's, for SECONDS of bench time")
       ->expected(0, 1)
       ->default_str("60")
+      ->type_name("SECONDS")
       ->check(CLI::Range(1.0, 1e5))
       ->needs(bench);
-  command->add_option("--campaign", asked->campaign, "campaign file: check that rate and ranges suit its speeds")
+  command
+      .add_option("--campaign", asked.campaign, "campaign file: check that the box's rate and ranges suit its speeds")
       ->needs(bench)
-      ->check(CLI::ExistingFile);
-  command->add_flag("--json", asked->json, "one JSON array on stdout");
-  command->callback([asked, &exit_code] { exit_code = static_cast<int>(devices(*asked)); });
+      ->type_name("FILE")
+      ->check(kExistingFile);
+  command.add_flag("--json", asked.json, "print one JSON array");
 }
 
-}  // namespace kphi::daq
+}  // namespace kphi::commands

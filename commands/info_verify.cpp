@@ -1,29 +1,21 @@
-#include "commands/info_verify.hpp"
-
-#include <fmt/format.h>
-
 #include <cstdio>
 #include <filesystem>
-#include <memory>
-#include <nlohmann/json.hpp>
 
-#include "base/error.hpp"
+#include "commands/commands.hpp"
 #include "results/campaign_folder.hpp"
-#include "results/campaign_verification.hpp"
+#include "results/campaign_state.hpp"
+#include "results/file_layer.hpp"
 #include "results/run_reader.hpp"
-#include "results/sha256.hpp"
 
-namespace kphi::results {
+namespace kphi::commands {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using namespace results;
 
 struct Asked {
   std::string path;
   bool json = false;
 };
-
-std::string dump(const Json& json) { return json.dump(2, ' ', false, Json::error_handler_t::replace); }
 
 Json describe(const StreamHealth& health) {
   return {{"records_per_second", health.records_per_second},
@@ -135,16 +127,11 @@ void print_folder(const Json& folder) {
   }
 }
 
-void info(const Asked& asked) {
+ExitCode info(const Asked& asked) {
   const bool folder = std::filesystem::is_directory(asked.path);
   const Json found = folder ? describe_folder(CampaignFolder::open(asked.path)) : describe(asked.path);
-  if (asked.json) {
-    fmt::print("{}\n", dump(found));
-  } else if (folder) {
-    print_folder(found);
-  } else {
-    print_run(found);
-  }
+  asked.json ? print_json(found) : folder ? print_folder(found) : print_run(found);
+  return ExitCode::ok;
 }
 
 ExitCode verify(const Asked& asked) {
@@ -175,7 +162,7 @@ ExitCode verify(const Asked& asked) {
   found["problems"] = problems;
   found["remarks"] = remarks;
   if (asked.json) {
-    fmt::print("{}\n", dump(found));
+    print_json(found);
   } else {
     for (const std::string& problem : problems) fmt::print("{}\n", problem);
     for (const std::string& remark : remarks) fmt::print(stderr, "kphi: {}\n", remark);
@@ -184,27 +171,23 @@ ExitCode verify(const Asked& asked) {
   return problems.empty() ? ExitCode::ok : ExitCode::data_rejected;
 }
 
-CLI::App* add(CLI::App& app, const char* name, const char* description, const std::shared_ptr<Asked>& asked) {
-  CLI::App* command = app.add_subcommand(name, description);
-  command->add_option("path", asked->path, "run file or campaign folder")->required()->check(CLI::ExistingPath);
-  command->add_flag("--json", asked->json, "one JSON object on stdout");
-  return command;
+void add(CLI::App& program, ExitCode& exit_code, const char* name, const char* what, ExitCode (*run)(const Asked&)) {
+  const auto [command, asked] = add_verb<Asked>(program, exit_code, name, what, run);
+  command.add_option("PATH", asked.path, "run file or campaign folder")
+      ->required()
+      ->type_name("")
+      ->check(kExistingPath);
+  command.add_flag("--json", asked.json, "print one JSON object");
 }
 
 }  // namespace
 
-void add_info(CLI::App& app, int& exit_code) {
-  const auto asked = std::make_shared<Asked>();
-  add(app, "info", "show the contents of a run or campaign folder", asked)->callback([asked, &exit_code] {
-    info(*asked);
-    exit_code = static_cast<int>(ExitCode::ok);
-  });
+void add_info(CLI::App& program, ExitCode& exit_code) {
+  add(program, exit_code, "info", "show the contents of a run or campaign folder", info);
 }
 
-void add_verify(CLI::App& app, int& exit_code) {
-  const auto asked = std::make_shared<Asked>();
-  add(app, "verify", "check a run or campaign folder for damage (exit code 5: damaged)", asked)
-      ->callback([asked, &exit_code] { exit_code = static_cast<int>(verify(*asked)); });
+void add_verify(CLI::App& program, ExitCode& exit_code) {
+  add(program, exit_code, "verify", "check a run or campaign folder for damage (exit code 5: damaged)", verify);
 }
 
-}  // namespace kphi::results
+}  // namespace kphi::commands

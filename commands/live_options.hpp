@@ -5,12 +5,12 @@
 
 #include "daq/live/live_session.hpp"
 
-namespace kphi::daq::live {
+namespace kphi::commands {
 
-/// Adds `--live [PORT]` and `--udp-json HOST:PORT`; `wishes` must outlive the command.
-void add_options(CLI::App& command, LiveOptions& wishes);
+/// Adds `--live [PORT]` and `--udp-json HOST:PORT`; `options` must outlive the command.
+void add_live_options(CLI::App& command, daq::live::LiveOptions& options);
 
-/// "the page: http://…" as a line; empty without one.
-[[nodiscard]] std::string greeting(const LiveSession& view);
+/// "live: http://…" as a line; empty without one.
+[[nodiscard]] std::string live_greeting(const daq::live::LiveSession& view);
 
-}  // namespace kphi::daq::live
+}  // namespace kphi::commands

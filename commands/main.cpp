@@ -1,9 +1,7 @@
 // kphi: the table of contents. Every error becomes one line and an exit code here.
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -13,19 +11,7 @@
 #include <iostream>
 #include <vector>
 
-#include "base/error.hpp"
-#include "commands/check.hpp"
-#include "commands/compare_export.hpp"
-#include "commands/compensate.hpp"
-#include "commands/devices.hpp"
-#include "commands/fit.hpp"
-#include "commands/fly.hpp"
-#include "commands/import.hpp"
-#include "commands/info_verify.hpp"
-#include "commands/replay.hpp"
-#include "commands/report.hpp"
-#include "commands/run.hpp"
-#include "commands/sim.hpp"
+#include "commands/commands.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/run/console.hpp"
@@ -61,19 +47,19 @@ void fill_closed_streams() {
 }
 
 /// After the messages of a run; all other verbs write directly, however long that takes.
-void tell(const std::string& words) {
+void print_message(const std::string& words) {
   if (kphi::daq::console().is_used()) return kphi::daq::put(stderr, words);
   (void)std::fputs(words.c_str(), stderr);
 }
 
-int complain(const std::exception& error, ExitCode exit_code) {
-  tell(fmt::format("kphi: {}\n", error.what()));
-  return static_cast<int>(exit_code);
+ExitCode complain(const std::exception& error, ExitCode exit_code) {
+  print_message(fmt::format("kphi: {}\n", error.what()));
+  return exit_code;
 }
 
-int complain(const kphi::daq::RunStopped& stop) {
-  tell(stop.words().text(stop.exit_code() == ExitCode::safety_stop ? "SAFETY STOP" : "STOPPED"));
-  return static_cast<int>(stop.exit_code());
+ExitCode complain(const kphi::daq::RunStopped& stop) {
+  print_message(stop.words().text(stop.exit_code() == ExitCode::safety_stop ? "SAFETY STOP" : "STOPPED"));
+  return stop.exit_code();
 }
 
 /// CLI11 reports a misspelt command only as "A subcommand is required".
@@ -88,54 +74,43 @@ std::string nearest_command(const CLI::App& program, const std::string& word) {
   return {};
 }
 
-int usage_error(const CLI::App& program, const CLI::ParseError& error, int argc, char** argv) {
-  if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
+ExitCode usage_error(const CLI::App& program, const CLI::ParseError& error, int argc, char** argv) {
+  if (error.get_exit_code() == 0) {  // --help, --version
+    program.exit(error);
+    return ExitCode::ok;
+  }
   if (argc > 1 && argv[1][0] != '-' && program.get_subcommands().empty()) {
     const std::string nearest = nearest_command(program, argv[1]);
-    tell(fmt::format("kphi: unknown command \"{}\"{}\n", argv[1],
-                     nearest.empty() ? "" : "; did you mean \"" + nearest + "\"?"));
+    print_message(fmt::format("kphi: unknown command \"{}\"{}\n", argv[1],
+                              nearest.empty() ? "" : "; did you mean \"" + nearest + "\"?"));
   } else {
-    tell(fmt::format("kphi: {}\n", error.what()));
+    print_message(fmt::format("kphi: {}\n", error.what()));
   }
-  tell("kphi --help lists the commands\n");
-  return static_cast<int>(ExitCode::usage);
+  print_message("kphi --help lists the commands\n");
+  return ExitCode::usage;
 }
 
 /// Gives the messages of a run a second to leave. Data that could not be written is a failure, even if only the last
 /// flush finds it.
-int end(int exit_code) {
+int end(ExitCode exit_code) {
   errno = 0;
   const bool is_written = std::cout.flush() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
-  if (!is_written && exit_code == 0) {
-    tell(fmt::format("kphi: cannot write to standard output{}{}\n", errno != 0 ? ": " : "",
-                     errno != 0 ? std::strerror(errno) : ""));
-    exit_code = static_cast<int>(ExitCode::failure);
+  if (!is_written && exit_code == ExitCode::ok) {
+    print_message(fmt::format("kphi: cannot write to standard output{}{}\n", errno != 0 ? ": " : "",
+                              errno != 0 ? std::strerror(errno) : ""));
+    exit_code = ExitCode::failure;
   }
   (void)kphi::daq::console().finish(kphi::daq::Console::kGiveUp);
-  return exit_code;
+  return static_cast<int>(exit_code);
 }
 
-int run(int argc, char** argv) {
+ExitCode run(int argc, char** argv) {
   CLI::App program("kphi: propeller test stand to k(φ) line to flight", "kphi");
-  program.footer(kFooter);
   program.set_version_flag("--version", std::string("kphi ") + kphi::kVersion);
   program.require_subcommand(1);
-  int exit_code = 0;
-
-  kphi::profiles::add_check(program, exit_code);
-  kphi::sim::add_sim(program, exit_code);
-  kphi::daq::add_devices(program, exit_code);
-  kphi::daq::add_run(program, exit_code);
-  kphi::daq::add_replay(program, exit_code);
-  kphi::results::add_info(program, exit_code);
-  kphi::results::add_verify(program, exit_code);
-  kphi::fit::add_import(program, exit_code);
-  kphi::fit::add_fit(program, exit_code);
-  kphi::fit::add_report(program, exit_code);
-  kphi::fit::add_compare(program, exit_code);
-  kphi::fit::add_export(program, exit_code);
-  kphi::compensation::add_compensate(program, exit_code);
-  kphi::flight::add_fly(program, exit_code);
+  ExitCode exit_code = ExitCode::ok;
+  for (kphi::commands::AddVerb* add : kphi::commands::kVerbs) add(program, exit_code);
+  program.footer(kFooter);  // a verb added later would repeat it
 
   try {
     program.parse(argc, argv);

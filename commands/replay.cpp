@@ -1,25 +1,18 @@
-#include "commands/replay.hpp"
-
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <exception>
 #include <filesystem>
-#include <memory>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
-#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
-#include "base/error.hpp"
+#include "commands/commands.hpp"
 #include "commands/live_options.hpp"
-#include "daq/guard/interrupt.hpp"
+#include "daq/guard/run_stopped.hpp"
 #include "daq/live/replayed_run.hpp"
 #include "profiles/campaign.hpp"
 #include "results/campaign_folder.hpp"
@@ -28,14 +21,13 @@
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
 
-namespace kphi::daq {
+namespace kphi::commands {
 namespace {
+
+using namespace daq;
 
 using results::CampaignFolder;
 using results::StepMean;
-
-constexpr int kOk = 0;
-constexpr int kRejected = 5;
 
 struct Asked {
   std::string path;
@@ -155,11 +147,9 @@ std::optional<std::string> difference(const Replay& replay, const std::string& s
   return std::string("the line ends differ");
 }
 
-nlohmann::ordered_json number(double value) {
-  return std::isnan(value) ? nlohmann::ordered_json() : nlohmann::ordered_json(value);
-}
+Json number(double value) { return std::isnan(value) ? Json() : Json(value); }
 
-nlohmann::ordered_json to_json(const StepMean& step) {
+Json to_json(const StepMean& step) {
   return {{"propeller", step.propeller},
           {"occlusion_deg", step.occlusion_deg},
           {"repetition", step.repetition},
@@ -182,16 +172,16 @@ void print(const Replay& replay, const std::optional<std::string>& differs, bool
     fmt::print("{}", results::format_steps(replay.steps));
     return;
   }
-  nlohmann::ordered_json out;
-  out["steps"] = nlohmann::ordered_json::array();
+  Json out;
+  out["steps"] = Json::array();
   for (const StepMean& step : replay.steps) out["steps"].push_back(to_json(step));
-  out["compared_with"] = replay.stored ? nlohmann::ordered_json(replay.stored->string()) : nlohmann::ordered_json();
-  out["same"] = replay.stored ? nlohmann::ordered_json(!differs) : nlohmann::ordered_json();
-  out["difference"] = differs ? nlohmann::ordered_json(*differs) : nlohmann::ordered_json();
-  fmt::print("{}\n", out.dump(2));
+  out["compared_with"] = replay.stored ? Json(replay.stored->string()) : Json();
+  out["same"] = replay.stored ? Json(!differs) : Json();
+  out["difference"] = differs ? Json(*differs) : Json();
+  print_json(out);
 }
 
-int run_replay(const Asked& asked) {
+ExitCode run_replay(const Asked& asked) {
   const Replay result = replay(asked.path);
   std::optional<std::string> differs;
   if (result.stored) differs = difference(result, results::read_text(*result.stored));
@@ -203,18 +193,19 @@ int run_replay(const Asked& asked) {
     differs = "agrees, but references.csv beside it differs from what its runs give";
   }
   print(result, differs, asked.json);
-  if (!differs) return kOk;
+  if (!differs) return ExitCode::ok;
   fmt::print(stderr, "{}: {}; the raw files are the truth, see kphi verify\n", result.stored->string(), *differs);
-  return kRejected;
+  return ExitCode::data_rejected;
 }
 
-/// Shows a recorded run as it was. With a page it begins when the first page looks on.
-int show_replay(const Asked& asked) {
+/// Plays a recorded run. With a page it waits for the first browser.
+ExitCode show_replay(const Asked& asked) {
   if (std::filesystem::is_directory(asked.path))
-    throw ConfigurationError(asked.path + ": --live and --udp-json show one run: name a file of its runs/");
+    throw ConfigurationError(asked.path +
+                             ": --live and --udp-json show one run, not a folder; name a file of its runs/");
   const results::RunRecording recording = results::read_run(asked.path);
   live::LiveSession view(asked.live, live::subject_of(recording));
-  put(stderr, live::greeting(view));
+  put(stderr, live_greeting(view));
   const SignalWatch signals;
   const std::function<bool()> stop_asked = [] { return SignalWatch::count() > 0; };
   while (asked.live.port && !view.is_watched() && !stop_asked())
@@ -224,22 +215,27 @@ int show_replay(const Asked& asked) {
   const auto progress = view.beside(nobody, clock);
   const bool whole =
       view.tell_the_end([&] { return live::play(recording, clock, *progress, asked.speed, stop_asked); });
-  if (whole) return kOk;
+  if (whole) return ExitCode::ok;
   throw Interrupted("stopped by request");
 }
 
+ExitCode replay_as_asked(const Asked& asked) { return asked.live.any() ? show_replay(asked) : run_replay(asked); }
+
 }  // namespace
 
-void add_replay(CLI::App& app, int& exit_code) {
-  const auto asked = std::make_shared<Asked>();
-  CLI::App* command = app.add_subcommand("replay", "turn raw samples into step means again and compare with steps.csv");
-  command->add_option("path", asked->path, "run file or campaign folder")->required()->check(CLI::ExistingPath);
-  command->add_flag("--json", asked->json, "one JSON object on stdout");
-  live::add_options(*command, asked->live);
-  command->add_option("--speed", asked->speed, "with --live or --udp-json: how many times as fast as it was")
+void add_replay(CLI::App& program, ExitCode& exit_code) {
+  const auto [command, asked] = add_verb<Asked>(
+      program, exit_code, "replay", "compute the step means again from the raw samples and compare them with steps.csv",
+      replay_as_asked);
+  command.add_option("PATH", asked.path, "run file or campaign folder")
+      ->required()
+      ->type_name("")
+      ->check(kExistingPath);
+  command.add_flag("--json", asked.json, "print one JSON object");
+  add_live_options(command, asked.live);
+  command.add_option("--speed", asked.speed, "with --live or --udp-json: recorded seconds per second")
       ->check(CLI::Range(0.01, 1000.0))
       ->capture_default_str();
-  command->callback([asked, &exit_code] { exit_code = asked->live.any() ? show_replay(*asked) : run_replay(*asked); });
 }
 
-}  // namespace kphi::daq
+}  // namespace kphi::commands

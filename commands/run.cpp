@@ -1,30 +1,28 @@
-#include "commands/run.hpp"
-
 #include <fmt/chrono.h>
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
-#include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 
-#include "base/error.hpp"
+#include "commands/commands.hpp"
 #include "commands/live_options.hpp"
 #include "daq/audit/bench_audit.hpp"
-#include "daq/campaign/answering_operator.hpp"
 #include "daq/campaign/campaign_run.hpp"
 #include "daq/campaign/dry_run.hpp"
-#include "daq/guard/awake.hpp"
-#include "daq/guard/interrupt.hpp"
+#include "daq/campaign/operator.hpp"
+#include "daq/campaign/resume.hpp"
+#include "daq/guard/interlock.hpp"
+#include "daq/guard/run_stopped.hpp"
 #include "daq/hardware/device_locks.hpp"
 #include "daq/run/console.hpp"
 #include "profiles/plan.hpp"
 #include "results/file_layer.hpp"
 
-namespace kphi::daq {
+namespace kphi::commands {
 namespace {
+
+using namespace daq;
 
 struct RunOptions {
   std::string campaign;
@@ -81,8 +79,7 @@ profiles::Campaign campaign_of(const RunOptions& options) {
     throw ConfigurationError("kphi run: no campaign; give its file, or a folder with --resume");
   const auto file = results::CampaignFolder::open(options.resume).campaign_file();
   if (!std::filesystem::exists(file))
-    throw ConfigurationError(options.resume +
-                             ": no campaign.yaml in this folder: no campaign was started in it; give a campaign file");
+    throw ConfigurationError(options.resume + ": no campaign.yaml in this folder; give a campaign file");
   return profiles::load_campaign(file.string());
 }
 
@@ -146,13 +143,13 @@ std::unique_ptr<Bench> connect_awake(const profiles::BenchConfig& config, const 
   return bench;
 }
 
-int tell_finished(const Destination& destination, bool json) {
+ExitCode print_finished(const Destination& destination, bool json) {
   const std::string folder = destination.folder->path().string();
   const std::size_t runs = destination.resumption->state.accepted.size();
   put(stdout, (json ? nlohmann::json{{"folder", folder}, {"runs", runs}}.dump() : folder) + "\n");
   put(stderr, fmt::format("{} is finished: all {} runs accepted, nothing left to resume\nnext: kphi fit {}\n", folder,
                           runs, folder));
-  return 0;
+  return ExitCode::ok;
 }
 
 /// What the command line and the files ask for.
@@ -169,11 +166,11 @@ Request read_files(const RunOptions& options) {
   return request;
 }
 
-int print_plan(const Request& request) {
+ExitCode print_plan(const Request& request) {
   const auto& [options, campaign, config, answers] = request;
   const DryRun dry = dry_run(campaign, config, options.out, answers);
   fmt::print("{}", options.json ? to_json(dry, campaign, config).dump() + "\n" : to_text(dry, campaign, config));
-  return static_cast<int>(dry.ok() ? ExitCode::ok : ExitCode::usage);
+  return dry.ok() ? ExitCode::ok : ExitCode::usage;
 }
 
 void announce(const Request& request, const DryRun& dry) {
@@ -205,7 +202,7 @@ CampaignResult execute(const Request& request, const profiles::Plan& plan, Desti
   });
 }
 
-int run(const RunOptions& options) {
+ExitCode run(const RunOptions& options) {
   const Request request = read_files(options);
   if (options.dry_run) return print_plan(request);
   const auto& [unused, campaign, config, answers] = request;
@@ -213,41 +210,45 @@ int run(const RunOptions& options) {
   const DryRun dry = dry_run(campaign, config, options.out, answers);
   Destination destination;
   if (!options.resume.empty()) destination.open(options, campaign, config);
-  if (destination.finished) return tell_finished(destination, options.json);
+  if (destination.finished) return print_finished(destination, options.json);
   // A resumption asks only for the missing runs: the operator reports missing answers.
   if (answers && !destination.resumption) profiles::require_mountings(*answers, dry.plan.mounting_angles());
   announce(request, dry);
   live::LiveSession view(options.live, live::subject_of(campaign, config));
-  put(stderr, live::greeting(view));
+  put(stderr, live_greeting(view));
   const std::function<bool()> stop_asked = [&view] { return SignalWatch::count() > 0 || view.stop_asked(); };
   const auto operator_ = person(options, answers, config, stop_asked);
   clear_safety_stop(destination, *operator_, answers);
   const SignalWatch signals;
   summarise(execute(request, dry.plan, destination, *operator_, view, stop_asked), *destination.folder, options.json);
   operator_->finish();
-  return 0;
+  return ExitCode::ok;
 }
 
 }  // namespace
 
-void add_run(CLI::App& program, int& exit_code) {
-  auto options = std::make_shared<RunOptions>();
-  CLI::App* command = program.add_subcommand("run", "run a campaign on a bench and record it");
-  command->add_option("campaign", options->campaign,
-                      "campaign file (optional with --resume: default is the folder's copy)");
-  command->add_option("--bench", options->bench, "bench file")->required();
-  command->add_option("--out", options->out, "parent folder of the campaign's folder")->capture_default_str();
-  command->add_option("--resume", options->resume, "resume the campaign of this folder at its first unfinished run")
-      ->check(CLI::ExistingDirectory);
-  command->add_flag("--accept-changes", options->accept_changes, "resume although files, program or devices changed")
+void add_run(CLI::App& program, ExitCode& exit_code) {
+  const auto [command, options] =
+      add_verb<RunOptions>(program, exit_code, "run", "run a campaign on a bench and record it", run);
+  command
+      .add_option("CAMPAIGN", options.campaign, "campaign file (optional with --resume: default is the folder's copy)")
+      ->type_name("");
+  command.add_option("--bench", options.bench, "bench file")->required()->type_name("FILE");
+  command.add_option("--out", options.out, "parent folder of the campaign's folder")
+      ->capture_default_str()
+      ->type_name("DIR");
+  command.add_option("--resume", options.resume, "resume the campaign of this folder at its first unfinished run")
+      ->type_name("DIR")
+      ->check(kExistingFolder);
+  command.add_flag("--accept-changes", options.accept_changes, "resume although files, program or devices changed")
       ->needs("--resume");
-  command->add_flag("--dry-run", options->dry_run, "check and print the plan and every limit, touch no device");
-  auto* yes = command->add_flag("--yes", options->yes, "take every mounting as done (for a simulated bench)");
-  command->add_option("--answers", options->answers, "file with the operator's answers, for a run without a terminal")
+  command.add_flag("--dry-run", options.dry_run, "check and print the plan and every limit; touch no device");
+  auto* yes = command.add_flag("--yes", options.yes, "take every mounting as done (for a simulated bench)");
+  command.add_option("--answers", options.answers, "file with the operator's answers, for a run without a terminal")
+      ->type_name("FILE")
       ->excludes(yes);
-  command->add_flag("--json", options->json, "print the result as one JSON object on stdout");
-  live::add_options(*command, options->live);
-  command->callback([options, &exit_code] { exit_code = run(*options); });
+  command.add_flag("--json", options.json, "print the result as one JSON object");
+  add_live_options(command, options.live);
 }
 
-}  // namespace kphi::daq
+}  // namespace kphi::commands

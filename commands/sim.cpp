@@ -1,30 +1,25 @@
-#include "commands/sim.hpp"
-
-#include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
-#include <CLI/CLI.hpp>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
-#include <string>
 
-#include "base/error.hpp"
+#include "commands/commands.hpp"
+#include "commands/inputs.hpp"
 #include "drivers/sim/control_line.hpp"
 #include "drivers/sim/input_files.hpp"
 #include "drivers/sim/physics/truth.hpp"
 #include "drivers/sim/server.hpp"
 #include "drivers/sim/truth_log.hpp"
 #include "profiles/bench_config.hpp"
+#include "profiles/strict_yaml.hpp"
 
-namespace kphi::sim {
+namespace kphi::commands {
 namespace {
+
+using namespace sim;
 
 struct Options {
   std::string bench;
@@ -69,24 +64,14 @@ profiles::BenchConfig load_simulated(const Options& options) {
   return bench;
 }
 
-std::string text_of(const std::string& path) {
-  try {
-    std::ifstream file(path);
-    const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    if (file) return text;
-  } catch (const std::ios_base::failure&) {  // a folder
-  }
-  throw ConfigurationError(path + ": cannot be read; name an existing file");
-}
-
 void load_faults(const std::string& path, BenchSettings& bench) {
-  sim::load_faults(text_of(path), path, bench);
+  sim::load_faults(profiles::read_text(path), path, bench);
   if (!bench.air_faults.empty())
     throw ConfigurationError(path + ": faults of the air sensor need a bench with `simulation.in_process`");
 }
 
 void load_motor(const std::string& path, BenchSettings& bench) {
-  const MotorProfile profile = parse_motor_profile(text_of(path), path);
+  const MotorProfile profile = parse_motor_profile(profiles::read_text(path), path);
   bench.plant.motor = profile.motor;
   bench.module.sensors = profile.sensors;
 }
@@ -137,12 +122,6 @@ ServerSettings settings_of(const profiles::BenchConfig& bench, const Options& op
   return settings;
 }
 
-void write_file(const std::string& path, const std::string& text) {
-  std::ofstream file(path);
-  file << text << std::flush;
-  if (!file) throw DeviceError("file " + path, "write", "failed", "name a writable file");
-}
-
 std::string resolved_text(const profiles::BenchConfig& bench, const Addresses& addresses) {
   YAML::Node file = YAML::Load(bench.text);
   file["netbox"]["rdt_port"] = addresses.rdt_port;
@@ -166,29 +145,30 @@ std::string resolved_text(const profiles::BenchConfig& bench, const Addresses& a
 }
 
 std::string ready_line(const profiles::BenchConfig& bench, const Addresses& addresses) {
-  nlohmann::ordered_json json{{"rdt", fmt::format("{}:{}", addresses.host, addresses.rdt_port)},
-                              {"http", fmt::format("{}:{}", addresses.host, addresses.http_port)},
-                              {"tcp", fmt::format("{}:{}", addresses.host, addresses.tcp_port)},
-                              {"device", addresses.device},
-                              {"control", addresses.control},
-                              {"time_scale", bench.simulation->time_scale},
-                              {"seed", bench.simulation->seed}};
+  Json json{{"rdt", fmt::format("{}:{}", addresses.host, addresses.rdt_port)},
+            {"http", fmt::format("{}:{}", addresses.host, addresses.http_port)},
+            {"tcp", fmt::format("{}:{}", addresses.host, addresses.tcp_port)},
+            {"device", addresses.device},
+            {"control", addresses.control},
+            {"time_scale", bench.simulation->time_scale},
+            {"seed", bench.simulation->seed}};
   if (!addresses.supply_device.empty()) json["supply"] = addresses.supply_device;
   if (addresses.supply_port != 0) json["supply"] = fmt::format("{}:{}", addresses.host, addresses.supply_port);
   return json.dump();
 }
 
-int talk(const profiles::BenchConfig& bench, const std::string& line) {
+ExitCode send(const profiles::BenchConfig& bench, const std::string& line) {
   const std::string answer = tell(control_path(bench.simulation->control), line);
   fmt::print("{}\n", answer);
-  return answer.rfind("error", 0) == 0 ? 1 : 0;
+  return answer.starts_with("error") ? ExitCode::failure : ExitCode::ok;
 }
 
-void serve(const profiles::BenchConfig& bench, const Options& options) {
+ExitCode serve(const profiles::BenchConfig& bench, const Options& options) {
   Server server(settings_of(bench, options));
-  if (!options.truth_log.empty()) write_file(options.truth_log, "");  // refuses an unwritable file now, not at the end
-  if (!options.truth.empty()) write_file(options.truth, truth_yaml(bench.simulation->seed));
-  if (!options.resolved.empty()) write_file(options.resolved, resolved_text(bench, server.addresses()));
+  if (!options.truth_log.empty())
+    write_output(options.truth_log, "");  // refuses an unwritable file now, not at the end
+  if (!options.truth.empty()) write_output(options.truth, truth_yaml(bench.simulation->seed));
+  if (!options.resolved.empty()) write_output(options.resolved, resolved_text(bench, server.addresses()));
   running = &server;
   std::signal(SIGINT, stop_running);
   std::signal(SIGTERM, stop_running);
@@ -201,55 +181,58 @@ void serve(const profiles::BenchConfig& bench, const Options& options) {
   std::signal(SIGTERM, SIG_DFL);
   running = nullptr;
   if (!options.truth_log.empty())
-    write_file(options.truth_log,
-               json_lines(server.truth()) + server.motion().json_lines() + json_lines(server.motor_truth()));
+    write_output(options.truth_log,
+                 json_lines(server.truth()) + server.motion().json_lines() + json_lines(server.motor_truth()));
   if (!bench.simulation->faults.empty()) fmt::print(stderr, "kphi sim: {}\n", summary(server.truth()));
   const auto& unsent = server.unsent();
   if (unsent.datagrams + unsent.motor_bytes > 0) {
     fmt::print(stderr, "kphi sim: dropped because a buffer was full: {} datagrams, {} motor bytes\n", unsent.datagrams,
                unsent.motor_bytes);
   }
+  return ExitCode::ok;
 }
 
-int run(const Options& options) {
+ExitCode run(const Options& options) {
   const profiles::BenchConfig bench = load_simulated(options);
-  if (!options.mount.empty()) return talk(bench, "mount " + options.mount);
-  if (options.status) return talk(bench, "status");
-  serve(bench, options);
-  return 0;
+  if (!options.mount.empty()) return send(bench, "mount " + options.mount);
+  if (options.status) return send(bench, "status");
+  return serve(bench, options);
 }
 
 }  // namespace
 
-void add_sim(CLI::App& program, int& exit_code) {
-  auto options = std::make_shared<Options>();
-  CLI::App* sim = program.add_subcommand("sim", "run the simulated bench of a bench file, or control a running one");
-  sim->add_option("BENCH", options->bench, "bench file with a `simulation` section")->required();
-  sim->add_option("--truth", options->truth, "file for the true coefficients of the simulated propellers (YAML)");
-  sim->add_option("--faults", options->faults, "fault script of wires and devices (YAML; default: the bench file's)");
-  sim->add_option("--truth-log", options->truth_log,
-                  "file for the fate of every datagram, reply and motor command, written at exit (JSON lines)");
-  sim->add_option("--time-scale", options->time_scale, "bench seconds per second (default: the bench file's)")
+void add_sim(CLI::App& program, ExitCode& exit_code) {
+  const auto [sim, options] = add_verb<Options>(
+      program, exit_code, "sim", "run the simulated bench of a bench file, or control a running one", run);
+  sim.add_option("BENCH", options.bench, "bench file with a `simulation` section")->required()->type_name("");
+  sim.add_option("--truth", options.truth, "write the true coefficients of the simulated propellers to FILE (YAML)")
+      ->type_name("FILE");
+  sim.add_option("--faults", options.faults, "fault script of wires and devices (YAML; default: the bench file's)")
+      ->type_name("FILE");
+  sim.add_option("--truth-log", options.truth_log,
+                 "write at exit what became of every datagram, reply and motor command to FILE (JSON lines)")
+      ->type_name("FILE");
+  sim.add_option("--time-scale", options.time_scale, "bench seconds per second (default: the bench file's)")
       ->check(CLI::Range(0.1, 1000.0));
-  sim->add_option("--seed", options->seed, "seed of the noise (default: the bench file's)");
-  sim->add_option("--resolved", options->resolved, "file for a copy of the bench file with the actual addresses");
-  sim->add_flag("--free-ports", options->free_ports,
-                "listen on any free ports instead of the bench file's; see --resolved");
-  sim->add_option("--clock-gain", options->clock_gain,
-                  "relative error of the motor module's clock, about 0.005 in a real one (default 0)")
+  sim.add_option("--seed", options.seed, "seed of the noise (default: the bench file's)");
+  sim.add_option("--resolved", options.resolved, "write a copy of the bench file with the actual addresses to FILE")
+      ->type_name("FILE");
+  sim.add_flag("--free-ports", options.free_ports,
+               "listen on any free ports instead of the bench file's; see --resolved");
+  sim.add_option("--clock-gain", options.clock_gain,
+                 "relative error of the motor module's clock, about 0.005 in a real one (default 0)")
       ->check(CLI::Range(-0.05, 0.05));
-  sim->add_option("--reply-latency-us", options->reply_latency_us, "reply latency of the motor module (default 0)")
+  sim.add_option("--reply-latency-us", options.reply_latency_us, "reply latency of the motor module (default 0)")
       ->check(CLI::Range(0.0, 1e6));
-  sim->add_option("--usb-tick-ms", options->usb_tick_ms,
-                  "latency timer of the motor's serial adapter, 1 or 16 (default 0: none)")
+  sim.add_option("--usb-tick-ms", options.usb_tick_ms,
+                 "latency timer of the motor's serial adapter, 1 or 16 (default 0: none)")
       ->check(CLI::Range(0.0, 255.0));
-  sim->add_flag("--paced", options->paced, "transmit the motor's bytes at its baud rate, not at once");
-  sim->add_flag("--legacy", options->legacy, "simulate a motor module with old firmware");
-  auto* mount = sim->add_option("--mount", options->mount,
-                                "tell the running simulator the mounted propeller and occlusion: \"5x3 90\"");
-  sim->add_flag("--status", options->status, "print the state of the running simulator as one line of JSON")
+  sim.add_flag("--paced", options.paced, "transmit the motor's bytes at its baud rate, not at once");
+  sim.add_flag("--legacy", options.legacy, "simulate a motor module with old firmware");
+  auto* mount = sim.add_option("--mount", options.mount,
+                               "tell the running simulator the mounted propeller and occlusion: \"5x3 90\"");
+  sim.add_flag("--status", options.status, "print the state of the running simulator as one line of JSON")
       ->excludes(mount);
-  sim->callback([options, &exit_code] { exit_code = run(*options); });
 }
 
-}  // namespace kphi::sim
+}  // namespace kphi::commands

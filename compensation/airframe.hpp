@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "compensation/convex_polygon.hpp"
-#include "compensation/overlap_measure.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::compensation {

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "compensation/occlusion.hpp"
-
 namespace kphi::compensation {
 namespace {
 

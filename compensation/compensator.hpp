@@ -12,7 +12,7 @@
 #include <type_traits>
 
 #include "compensation/airframe.hpp"
-#include "compensation/rim_arc.hpp"
+#include "compensation/occlusion.hpp"
 #include "compensation/thrust_curve.hpp"
 #include "compensation/units.hpp"
 

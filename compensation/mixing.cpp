@@ -277,9 +277,4 @@ Wrench Mixer::wrench_of(const std::array<Newtons, 4>& thrusts) const noexcept {
           NewtonMetres(dot(yaw_arms(f), f))};
 }
 
-std::array<double, 4> Mixer::thrust_direction() const noexcept {
-  const Four arms = yaw_arms({{0, 0, 0, 0}}), unit = without_yaw(1.0, 0.0, 0.0);
-  return moved(unit, -dot(arms, unit) / dot(arms, torque_free_), torque_free_);
-}
-
 }  // namespace kphi::compensation

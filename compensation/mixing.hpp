@@ -107,10 +107,6 @@ class Mixer {
   /// A f, the wrench of these thrusts [N], with κ(f).
   [[nodiscard]] Wrench wrench_of(const std::array<Newtons, 4>& thrusts) const noexcept;
 
-  /// A⁻¹e_thrust: thrusts of sum 1 without any torque, κ at no load (per_square_newton = 0). A quarter each only where
-  /// the hubs lie symmetric about the centre of gravity.
-  [[nodiscard]] std::array<double, 4> thrust_direction() const noexcept;
-
  private:
   explicit Mixer(DragTorque drag) noexcept : drag_(drag) {}
   using Four = std::array<double, 4>;

@@ -1,4 +1,5 @@
-// The occlusion angle φ of one arm of a vehicle.
+// The occlusion angle φ of one arm of a vehicle: how much of the propeller's disk lies over the body (in the paper
+// "near the tips"). Here the closed form over the square body; any other body in convex_polygon.hpp.
 #pragma once
 
 #include <cstddef>
@@ -8,6 +9,25 @@
 
 namespace kphi::compensation {
 
+/// Length in radians, [0, 2π], of the rim of the disk (hub_x, hub_y, radius) that lies inside the square |x|, |y| <=
+/// half_side; the arm is hinged at its corner (half_side, half_side).
+/// Blind to a body wholly under the disk (then 0). Steep at tangency: 1 µm over an edge is already 0.6°. Never NaN:
+/// where an argument is NaN, or the square is at least one radius away, the answer is 0.
+[[nodiscard]] Radians rim_arc(Metres half_side, Metres radius, Metres hub_x, Metres hub_y) noexcept;
+
+/// Arm angles, within [−90°, 180°] and symmetric about 45°, at which the disk does not touch the body.
+struct ContactFreeWindow {
+  Radians from;
+  Radians to;
+  [[nodiscard]] constexpr bool contains(Radians arm_angle) const noexcept {
+    return arm_angle >= from && arm_angle <= to;
+  }
+};
+
+/// The window between the first contacts on either side: with the next corner or, on long bodies, with the edge. Empty
+/// when the arm is no longer than the propeller radius: its own corner is covered then at every angle.
+[[nodiscard]] ContactFreeWindow contact_free_window(Metres half_side, Metres arm_length, Metres radius) noexcept;
+
 /// Where the hub of arm 0..3 stands beside the outline that covers it: in the body frame, on a square body turned and
 /// mirrored with the hinge, as the square looks alike from each of its corners.
 [[nodiscard]] inline HubPosition hub_beside_body(const Airframe& airframe, std::size_t arm,
@@ -16,8 +36,8 @@ namespace kphi::compensation {
   return hub_seen_from_hinge(airframe, arm_angle);
 }
 
-/// φ in [0, 2π] rad of a disk there, in the airframe's overlap measure. The rim over a square body by its closed form
-/// (rim_arc.hpp), all else by occlusion_angle (convex_polygon.hpp). Never NaN: 0 where an argument is.
+/// φ in [0, 2π] rad of a disk there, in the airframe's overlap measure. The rim over a square body by rim_arc, all
+/// else by occlusion_angle. Never NaN: 0 where an argument is.
 [[nodiscard]] Radians occlusion_beside_body(const Airframe& airframe, HubPosition hub) noexcept;
 
 /// φ of arm 0..3 at this angle.

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "compensation/overlap_measure.hpp"
+#include "compensation/convex_polygon.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::compensation {

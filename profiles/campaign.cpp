@@ -2,12 +2,26 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <string_view>
+#include <tuple>
 
 #include "profiles/profile_reader.hpp"
 
 namespace kphi::profiles {
 namespace {
+
+// In the order of the enumerators; the schema lists the same words.
+constexpr std::array<const char*, 2> kRunOrders{"listed", "shuffled"};
+constexpr std::array<const char*, 4> kStepOrders{"up", "down", "shuffled", "up_and_down"};
+
+template <class Kind, std::size_t n>
+Kind kind_of(const std::array<const char*, n>& names, const std::string& name) {
+  const auto found = std::find(names.begin(), names.end(), std::string_view(name));
+  return static_cast<Kind>(found == names.end() ? 0 : found - names.begin());
+}
 
 void check_speeds(ProfileReader& file) {
   const double most = file.number("/limits/speed_max_rpm");
@@ -63,19 +77,21 @@ Limits read_limits(ProfileReader& file) {
   limits.supply_voltage_max = read_limit<Volts>(file, "supply_voltage_max_v");
   limits.speed_error_max = read_limit<double>(file, "speed_error_max_percent", 0.01);
   const double supply = file.number("/supply_v");
-  if (limits.supply_voltage_min && limits.supply_voltage_min->value() >= supply)
-    file.refuse("/limits/supply_voltage_min_v", fmt::format("is not below {:g} V (supply_v)", supply),
-                "lower it: the motor would never turn");
-  if (limits.supply_voltage_max && limits.supply_voltage_max->value() <= supply)
-    file.refuse("/limits/supply_voltage_max_v", fmt::format("is not above {:g} V (supply_v)", supply),
-                "raise it: the motor would never turn");
+  const auto refuse = [&](const char* key, double volts, const char* relation, const char* remedy) {
+    file.refuse(std::string("/limits/") + key,
+                fmt::format("{:g} V is not {} the {:g} V of supply_v", volts, relation, supply),
+                fmt::format("{} it: the motor would never turn", remedy));
+  };
+  const auto& [low, high] = std::tie(limits.supply_voltage_min, limits.supply_voltage_max);
+  if (low && low->value() >= supply) refuse("supply_voltage_min_v", low->value(), "below", "lower");
+  if (high && high->value() <= supply) refuse("supply_voltage_max_v", high->value(), "above", "raise");
   return limits;
 }
 
 Order read_order(ProfileReader& file) {
   Order order;
-  order.runs = run_order_from(file.get_or<std::string>("/order/runs", name_of(order.runs)));
-  order.steps = step_order_from(file.get_or<std::string>("/order/steps", name_of(order.steps)));
+  order.runs = kind_of<RunOrderKind>(kRunOrders, file.get_or<std::string>("/order/runs", name_of(order.runs)));
+  order.steps = kind_of<StepOrderKind>(kStepOrders, file.get_or<std::string>("/order/steps", name_of(order.steps)));
   order.seed = file.get_or<std::uint64_t>("/order/seed", order.seed);
   order.remount_each_repetition = file.get_or("/order/remount_each_repetition", order.remount_each_repetition);
   order.reference = file.get_or("/order/reference", order.reference);
@@ -132,5 +148,16 @@ Campaign parse_campaign(const std::string& text, const std::string& path) {
 }
 
 Campaign load_campaign(const std::string& path) { return parse_campaign(read_text(path), path); }
+
+const char* name_of(RunOrderKind kind) { return kRunOrders[static_cast<std::size_t>(kind)]; }
+const char* name_of(StepOrderKind kind) { return kStepOrders[static_cast<std::size_t>(kind)]; }
+
+std::string to_words(const Order& order) {
+  const bool seeded = order.runs == RunOrderKind::shuffled || order.steps == StepOrderKind::shuffled;
+  return fmt::format("runs {}, steps {}{}{}{}", name_of(order.runs), name_of(order.steps),
+                     seeded ? fmt::format(" (seed {})", order.seed) : "",
+                     order.remount_each_repetition ? ", remounted for each repetition" : "",
+                     order.reference ? ", reference runs first and last" : "");
+}
 
 }  // namespace kphi::profiles

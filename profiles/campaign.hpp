@@ -7,9 +7,26 @@
 #include <vector>
 
 #include "compensation/units.hpp"
-#include "profiles/order.hpp"
 
 namespace kphi::profiles {
+
+/// The order of a campaign's runs.
+enum class RunOrderKind : std::uint8_t { listed, shuffled };
+/// From first_rpm to last_rpm; from last to first; at random; from first to last and back, the turning point held once.
+enum class StepOrderKind : std::uint8_t { up, down, shuffled, up_and_down };
+
+struct Order {
+  RunOrderKind runs = RunOrderKind::listed;
+  StepOrderKind steps = StepOrderKind::up;
+  std::uint64_t seed = 0;                ///< of the shuffling
+  bool remount_each_repetition = false;  ///< the occlusion is taken off and mounted again for each run
+  bool reference = false;                ///< the session begins and ends with a run without occlusion
+};
+
+[[nodiscard]] const char* name_of(RunOrderKind kind);
+[[nodiscard]] const char* name_of(StepOrderKind kind);
+/// "runs shuffled (seed 7), steps up_and_down, remounted for each repetition, reference runs first and last".
+[[nodiscard]] std::string to_words(const Order& order);
 
 /// One physical propeller. `id` is short and goes into file names ("5x3").
 struct Propeller {

@@ -11,7 +11,6 @@
 
 #include "compensation/occlusion.hpp"
 #include "profiles/answers.hpp"
-#include "profiles/key_names.hpp"
 #include "profiles/plan.hpp"
 #include "profiles/schema.hpp"
 #include "profiles/vehicle.hpp"
@@ -93,20 +92,16 @@ std::string summary_of_shape(const std::string& name, const std::array<Radians, 
   return fmt::format("  shape {:<4} arms at{}°, occluded by{}°\n", name, arms, occlusions);
 }
 
-std::string summary_of(const Dynamics& dynamics) {
-  constexpr double kGravity = 9.80665;  // m/s²
-  return fmt::format("  dynamics   {:g} kg, of which {:g} kg at each hub; {:.3g} N per rotor carry it\n",
-                     dynamics.mass_kg, dynamics.hub_mass_kg, kGravity * dynamics.mass_kg / 4);
-}
-
-std::string summary_of(const Control& control) {
-  return fmt::format("  control    position {:g} 1/s2, velocity {:g} 1/s, attitude {:g} 1/s, rates {:g} 1/s\n",
-                     fmt::join(control.position_gain_per_s2, " "), fmt::join(control.velocity_gain_per_s, " "),
-                     fmt::join(control.attitude_gain_per_s, " "), fmt::join(control.rate_gain_per_s, " "));
+std::string summary_of(const flight::Build& build, const flight::Gains& gains) {
+  return fmt::format(
+      "  dynamics   {:g} kg, of which {:g} kg at each hub; {:.3g} N per rotor carry it\n"
+      "  control    position {:g} 1/s2, velocity {:g} 1/s, attitude {:g} 1/s, rates {:g} 1/s\n",
+      build.mass_kg, build.hub_mass_kg, flight::kGravity * build.mass_kg / 4, fmt::join(gains.position, " "),
+      fmt::join(gains.velocity, " "), fmt::join(gains.attitude, " "), fmt::join(gains.rate, " "));
 }
 
 std::string what_flies(const Vehicle& vehicle) {
-  if (vehicle.dynamics && vehicle.control) return summary_of(*vehicle.dynamics) + summary_of(*vehicle.control);
+  if (vehicle.dynamics && vehicle.control) return summary_of(*vehicle.dynamics, vehicle.control->gains);
   return fmt::format("  kphi fly   cannot fly it without {}\n", vehicle.dynamics  ? "control"
                                                                 : vehicle.control ? "dynamics"
                                                                                   : "dynamics and control");

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/random.hpp"
@@ -121,6 +122,21 @@ void require_within(const Campaign& campaign, const BenchConfig& bench) {
       "or choose another bench",
       place(campaign.path, campaign.text, "/profile/" + key), key, to_rpm(top), to_rpm(bench.iq.speed_max),
       place(bench.path, bench.text, "/iq/speed_max_rpm")));
+}
+
+std::vector<PlannedStep> steps_in_order(const std::vector<RadPerSec>& levels, StepOrderKind kind,
+                                        std::uint64_t run_seed) {
+  std::vector<PlannedStep> steps;
+  for (std::size_t i = 0; i < levels.size(); ++i) steps.push_back({static_cast<int>(i), levels[i]});
+  if (kind == StepOrderKind::down) std::reverse(steps.begin(), steps.end());
+  if (kind == StepOrderKind::shuffled) {
+    SplitMix64 draw(run_seed);
+    shuffle(steps, draw);
+  }
+  if (kind == StepOrderKind::up_and_down) {
+    for (std::size_t i = levels.size() - 1; i-- > 0;) steps.push_back({static_cast<int>(steps.size()), levels[i]});
+  }
+  return steps;
 }
 
 }  // namespace kphi::profiles

@@ -9,6 +9,18 @@
 
 namespace kphi::profiles {
 
+/// One commanded speed of a run.
+struct PlannedStep {
+  /// 0-based, unique in the run; the same number means the same speed, reached from the same side, in all runs of a
+  /// campaign whose order of steps is the same: place in the profile, on the way back n, n + 1, …
+  int number = 0;
+  RadPerSec speed;
+};
+
+/// `run_seed`: this run's own, so that its order depends on no other run.
+[[nodiscard]] std::vector<PlannedStep> steps_in_order(const std::vector<RadPerSec>& levels, StepOrderKind kind,
+                                                      std::uint64_t run_seed);
+
 /// One Net Box sample on disk: six int32 counts, three uint32 (two sequences, status), one int64 stamp.
 inline constexpr std::uint64_t kBytesPerSample = 44;
 

@@ -4,7 +4,7 @@
 
 #include <string_view>
 
-#include "profiles/key_names.hpp"
+#include "profiles/schema.hpp"
 
 namespace kphi::profiles {
 namespace {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "profiles/strict_yaml.hpp"
@@ -35,5 +37,19 @@ inline constexpr std::array<FileKindInfo, 4> kFileKinds{{
 /// As above, with any schema of the keywords in schema.cpp (JSON Schema draft 7). Throws std::invalid_argument for a
 /// schema with another keyword: it would be ignored in silence.
 [[nodiscard]] std::vector<FileFinding> check_schema(const SourceDocument& document, const nlohmann::json& schema);
+
+/// A key without its unit and the unit in words: dwell_s → {"dwell", "s"}, steps → {"steps", ""}.
+struct KeyParts {
+  std::string stem;
+  std::string unit;
+};
+[[nodiscard]] KeyParts split_unit(const std::string& key);
+
+/// The one of `names` with the fewest typing errors from `name`, if these are few for its length.
+[[nodiscard]] std::optional<std::string> nearest_name(const std::string& name, const std::vector<std::string>& names);
+
+/// The one of `names` that is `name` but for the unit: dwell_ms or dwell → dwell_s.
+[[nodiscard]] std::optional<std::string> same_but_for_unit(const std::string& name,
+                                                           const std::vector<std::string>& names);
 
 }  // namespace kphi::profiles

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "profiles/refused_file.hpp"
+#include "profiles/yaml_text.hpp"
 
 namespace kphi::profiles {
 

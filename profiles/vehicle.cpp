@@ -85,17 +85,21 @@ std::array<Radians, 4> read_shape(ProfileReader& file, const std::string& shape)
   return angles;
 }
 
+Eigen::Vector3d read_vector(const ProfileReader& file, const std::string& pointer) {
+  return Eigen::Vector3d(file.get<std::array<double, 3>>(pointer).data());
+}
+
 /// A plate's inertia follows from its height; any other body's is given by three numbers.
-void check_body_inertia(ProfileReader& file, const Dynamics& dynamics) {
+void check_body_inertia(ProfileReader& file, const flight::Build& build) {
   const bool plate = file.has("/dynamics/body_height_m");
-  if (plate == dynamics.body_inertia_kg_m2.has_value()) {
+  if (plate == build.body_inertia.has_value()) {
     file.refuse(plate ? "/dynamics/body_inertia_kg_m2" : "/dynamics",
                 plate ? "given together with body_height_m" : "neither body_height_m nor body_inertia_kg_m2",
                 "give one of the two: the height of a body that is a plate, or its moments of inertia");
   }
-  if (!dynamics.body_inertia_kg_m2) return;
-  const auto& j = *dynamics.body_inertia_kg_m2;
-  for (std::size_t i = 0; i < 3; ++i) {
+  if (!build.body_inertia) return;
+  const Eigen::Vector3d& j = *build.body_inertia;
+  for (Eigen::Index i = 0; i < 3; ++i) {
     if (j[i] <= j[(i + 1) % 3] + j[(i + 2) % 3]) continue;
     file.refuse(fmt::format("/dynamics/body_inertia_kg_m2/{}", i),
                 fmt::format("{} is more than the other two together, which no body has", j[i]),
@@ -103,41 +107,37 @@ void check_body_inertia(ProfileReader& file, const Dynamics& dynamics) {
   }
 }
 
-Dynamics read_dynamics(ProfileReader& file) {
+flight::Build read_dynamics(ProfileReader& file) {
   const auto number = [&](const char* key) { return file.number(std::string("/dynamics/") + key); };
-  Dynamics dynamics;
-  dynamics.mass_kg = number("mass_kg");
-  dynamics.hub_mass_kg = number("hub_mass_kg");
-  dynamics.body_height = Metres(file.get_or("/dynamics/body_height_m", 0.0));
-  if (file.has("/dynamics/body_inertia_kg_m2")) {
-    dynamics.body_inertia_kg_m2 = file.get<std::array<double, 3>>("/dynamics/body_inertia_kg_m2");
+  flight::Build build;
+  build.mass_kg = number("mass_kg");
+  build.hub_mass_kg = number("hub_mass_kg");
+  build.body_height_m = file.get_or("/dynamics/body_height_m", 0.0);
+  if (file.has("/dynamics/body_inertia_kg_m2")) build.body_inertia = read_vector(file, "/dynamics/body_inertia_kg_m2");
+  build.yaw_arm_m = number("drag_torque_per_thrust_m");
+  build.rotor_lag_s = number("rotor_lag_s");
+  build.air_drag_per_s = number("air_drag_per_s");
+  build.morph_s = number("morph_s");
+  build.spin = file.get<std::array<double, 4>>("/dynamics/rotor_spins");
+  check_body_inertia(file, build);
+  if (!(4 * build.hub_mass_kg < build.mass_kg)) {
+    file.refuse(
+        "/dynamics/hub_mass_kg",
+        fmt::format("four times {} kg leave nothing of {} kg (mass_kg) for the body", build.hub_mass_kg, build.mass_kg),
+        "mass_kg is the mass of the whole vehicle, hub_mass_kg of one arm's end");
   }
-  dynamics.drag_torque_per_thrust = Metres(number("drag_torque_per_thrust_m"));
-  dynamics.rotor_lag = Seconds(number("rotor_lag_s"));
-  dynamics.air_drag_per_s = number("air_drag_per_s");
-  dynamics.morph = Seconds(number("morph_s"));
-  dynamics.rotor_spins = file.get<std::array<int, 4>>("/dynamics/rotor_spins");
-  check_body_inertia(file, dynamics);
-  if (!(4 * dynamics.hub_mass_kg < dynamics.mass_kg)) {
-    file.refuse("/dynamics/hub_mass_kg",
-                fmt::format("four times {} kg leave nothing of {} kg (mass_kg) for the body", dynamics.hub_mass_kg,
-                            dynamics.mass_kg),
-                "mass_kg is the mass of the whole vehicle, hub_mass_kg of one arm's end");
-  }
-  return dynamics;
+  return build;
 }
 
-Control read_control(ProfileReader& file) {
-  const auto three = [&](const char* key) { return file.get<std::array<double, 3>>(std::string("/control/") + key); };
-  return {three("position_gain_per_s2"),
-          three("velocity_gain_per_s"),
-          three("attitude_gain_per_s"),
-          three("rate_gain_per_s"),
-          file.number("/control/torque_weight"),
-          three("position_error_max_m"),
-          three("velocity_error_max_m_s"),
-          file.number("/control/collective_min_m_s2"),
-          NewtonMetres(file.number("/control/assured_yaw_nm"))};
+flight::PilotSettings read_control(const ProfileReader& file) {
+  const auto vector = [&](const char* key) { return read_vector(file, std::string("/control/") + key); };
+  flight::PilotSettings pilot;
+  pilot.gains = {vector("position_gain_per_s2"),        vector("velocity_gain_per_s"),
+                 vector("attitude_gain_per_s"),         vector("rate_gain_per_s"),
+                 file.number("/control/torque_weight"), vector("position_error_max_m"),
+                 vector("velocity_error_max_m_s"),      file.number("/control/collective_min_m_s2")};
+  pilot.assured_yaw = file.number("/control/assured_yaw_nm");
+  return pilot;
 }
 
 }  // namespace

@@ -8,35 +8,10 @@
 #include <string>
 
 #include "compensation/airframe.hpp"
+#include "compensation/flight/pilot.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::profiles {
-
-/// What only a simulated flight needs to know of the mechanism.
-struct Dynamics {
-  double mass_kg = 0;      ///< all of it
-  double hub_mass_kg = 0;  ///< motor, propeller and servo of one arm, a point at the hub
-  Metres body_height;      ///< the rest is a plate of the body's outline, this high; 0 if `body_inertia_kg_m2` is given
-  std::optional<std::array<double, 3>> body_inertia_kg_m2;  ///< of the body without hubs, about its middle: x, y, z
-  Metres drag_torque_per_thrust;                            ///< κ, without occlusion [N m/N]
-  Seconds rotor_lag;                                        ///< time constant of a rotor's speed
-  double air_drag_per_s = 0;                                ///< force per mass and air speed
-  Seconds morph;                                            ///< from one shape to the next
-  std::array<int, 4> rotor_spins{};                         ///< +1 where the drag torque points along +z, −1 else
-};
-
-/// Gains of the position, attitude and body-rate control; x, y, z or roll, pitch, yaw.
-struct Control {
-  std::array<double, 3> position_gain_per_s2{};
-  std::array<double, 3> velocity_gain_per_s{};
-  std::array<double, 3> attitude_gain_per_s{};
-  std::array<double, 3> rate_gain_per_s{};
-  double torque_weight = 0;  ///< of the body-rate LQR, with that of the input 1
-  std::array<double, 3> position_error_max_m{};
-  std::array<double, 3> velocity_error_max_m_s{};
-  double collective_min_m_s2 = 0;
-  NewtonMetres assured_yaw;  ///< what the saturation leaves to yaw
-};
 
 struct Vehicle {
   std::string name;
@@ -52,8 +27,8 @@ struct Vehicle {
   Radians arm_angle_max;
   RadPerSec speed_min;
   RadPerSec speed_max;
-  std::optional<Dynamics> dynamics;  ///< for `kphi fly`, as is control
-  std::optional<Control> control;
+  std::optional<flight::Build> dynamics;  ///< for `kphi fly`, as is control
+  std::optional<flight::PilotSettings> control;
   std::string text;
   std::string path;
 };

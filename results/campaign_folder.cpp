@@ -29,7 +29,7 @@ struct RunName {
   std::string propeller;
 };
 
-/// Inverse of run_file_name; nothing for other files.
+/// Inverse of run_file_name(); nullopt for other files.
 std::optional<RunName> parse_run_name(const std::string& name) {
   const std::size_t phi = name.rfind("_phi");
   const std::size_t place = std::min(name.find("_rep", phi), name.find("_ref", phi));
@@ -80,9 +80,8 @@ CampaignFolder CampaignFolder::create(const std::filesystem::path& parent, const
 CampaignFolder CampaignFolder::open(const std::filesystem::path& path) {
   CampaignFolder folder(path.has_filename() ? path : path.parent_path());
   if (std::filesystem::exists(folder.journal()) || std::filesystem::is_directory(folder.runs())) return folder;
-  throw RecordError(
-      path.string() +
-      ": is no campaign folder: neither journal.jsonl nor runs/ is in it; name a folder that kphi run made");
+  throw RecordError(path.string() +
+                    ": not a campaign folder: no journal.jsonl and no runs/ in it; name a folder made by kphi run");
 }
 
 std::vector<std::filesystem::path> CampaignFolder::complete_runs(std::span<const double> occlusions_deg) const {

@@ -16,12 +16,12 @@ namespace kphi::results {
 
 class CampaignFolder {
  public:
-  /// Makes `<parent>/<utc>_<name>` with runs/ and figures/; when the name is taken, `…-2`, `…-3`. `utc` as the caller
+  /// Creates `<parent>/<utc>_<name>` with runs/ and figures/; if the name is taken, `…-2`, `…-3`. `utc` as the caller
   /// writes it, such as 20210530T080000Z; of `name` and `utc`, characters outside [A-Za-z0-9._-] become '_'. Throws
   /// RecordError.
   [[nodiscard]] static CampaignFolder create(const std::filesystem::path& parent, const std::string& utc,
                                              const std::string& name, FileLayer& files = disk());
-  /// A folder that is there. Throws RecordError when it holds neither a journal nor runs.
+  /// An existing folder. Throws RecordError if it has neither a journal nor runs.
   [[nodiscard]] static CampaignFolder open(const std::filesystem::path& folder);
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
@@ -30,13 +30,13 @@ class CampaignFolder {
   [[nodiscard]] std::filesystem::path faults_file() const { return path_ / "faults.yaml"; }
   [[nodiscard]] std::filesystem::path motor_file() const { return path_ / "motor.yaml"; }
   [[nodiscard]] std::filesystem::path journal() const { return path_ / "journal.jsonl"; }
-  /// Taken by the program that writes into the folder.
+  /// Lock of the program that writes into the folder.
   [[nodiscard]] std::filesystem::path lock() const { return path_ / ".lock"; }
   [[nodiscard]] std::filesystem::path runs() const { return path_ / "runs"; }
   [[nodiscard]] std::filesystem::path steps() const { return path_ / "steps.csv"; }
   /// Steps averaged over their repetitions.
   [[nodiscard]] std::filesystem::path means() const { return path_ / "means.csv"; }
-  /// Steps of the reference runs: checks of the bench, no repetitions.
+  /// Steps of the reference runs, which check the bench.
   [[nodiscard]] std::filesystem::path references() const { return path_ / "references.csv"; }
   [[nodiscard]] std::filesystem::path coefficients() const { return path_ / "coefficients.yaml"; }
   [[nodiscard]] std::filesystem::path report() const { return path_ / "report.html"; }
@@ -46,7 +46,7 @@ class CampaignFolder {
   }
 
   /// Complete runs: by place of their occlusion in `occlusions_deg` (unlisted ones behind, ascending), then repetition.
-  /// Names alone are judged, no file is opened.
+  /// Uses the names only; opens no file.
   [[nodiscard]] std::vector<std::filesystem::path> complete_runs(std::span<const double> occlusions_deg = {}) const;
   /// Complete reference runs, in their order.
   [[nodiscard]] std::vector<std::filesystem::path> reference_runs() const;

@@ -1,10 +1,12 @@
 #include "results/campaign_state.hpp"
 
 #include <algorithm>
+#include <map>
 #include <system_error>
+#include <utility>
 
 #include "base/error.hpp"
-#include "results/sha256.hpp"
+#include "results/run_reader.hpp"
 
 namespace kphi::results {
 namespace {
@@ -24,6 +26,40 @@ std::string set_aside(const CampaignFolder& folder, const std::filesystem::path&
   } catch (const std::system_error& error) {
     throw RecordError(failure_text(file.string(), error.code().value()));
   }
+}
+
+/// File (relative to the folder) → SHA-256, as last written down.
+std::map<std::string, std::string> recorded_digests(const CampaignFolder& folder, CampaignVerification& found) {
+  std::map<std::string, std::string> digests;
+  if (!std::filesystem::exists(folder.journal())) {
+    found.problems.push_back(folder.journal().string() + ": missing");
+    return digests;
+  }
+  const JournalReading journal = read_journal(folder.journal());
+  found.entries = journal.entries.size();
+  found.torn_last_line = journal.torn_last_line;
+  found.problems.insert(found.problems.end(), journal.problems.begin(), journal.problems.end());
+  for (const JournalEntry& entry : journal.entries) {
+    const auto& data = entry.data;
+    if (!data.is_object() || !data.contains("file") || !data.contains("sha256")) continue;
+    if (data["file"].is_string() && data["sha256"].is_string()) digests[data["file"]] = data["sha256"];
+  }
+  return digests;
+}
+
+/// Empty: the file is the one of the journal.
+std::string problem_with(const std::filesystem::path& path, const std::string& sha256) {
+  if (!std::filesystem::exists(path)) return path.string() + ": missing, but in the journal";
+  if (sha256_of_file(path) != sha256) return path.string() + ": SHA-256 does not match the journal";
+  return {};
+}
+
+/// Copying or version control may have made it writable; the SHA-256 shows whether anybody changed it.
+bool is_writable(const std::filesystem::path& path) {
+  using std::filesystem::perms;
+  std::error_code none;
+  const perms all = std::filesystem::status(path, none).permissions();
+  return (all & (perms::owner_write | perms::group_write | perms::others_write)) != perms::none;
 }
 
 }  // namespace
@@ -47,12 +83,8 @@ CampaignState state_of(const JournalReading& journal) {
 std::vector<std::string> changed_runs(const CampaignFolder& folder, const CampaignState& state) {
   std::vector<std::string> problems;
   for (const AcceptedRun& run : state.accepted) {
-    const std::filesystem::path path = folder.path() / run.file;
-    if (!std::filesystem::exists(path)) {
-      problems.push_back(path.string() + ": is missing, the journal names it");
-    } else if (sha256_of_file(path) != run.sha256) {
-      problems.push_back(path.string() + ": is not the file whose SHA-256 the journal holds");
-    }
+    if (std::string problem = problem_with(folder.path() / run.file, run.sha256); !problem.empty())
+      problems.push_back(std::move(problem));
   }
   return problems;
 }
@@ -72,6 +104,29 @@ std::vector<std::string> set_leftovers_aside(const CampaignFolder& folder, const
     names.push_back(set_aside(folder, file, kPart, ".interrupted", files));
   }
   return names;
+}
+
+CampaignVerification verify_campaign(const CampaignFolder& folder) {
+  CampaignVerification found;
+  const auto digests = recorded_digests(folder, found);
+  for (const auto& [file, digest] : digests) {
+    if (std::string problem = problem_with(folder.path() / file, digest); !problem.empty())
+      found.problems.push_back(std::move(problem));
+  }
+  std::vector<std::filesystem::path> runs = folder.complete_runs();
+  for (const auto& path : folder.reference_runs()) runs.push_back(path);
+  for (const auto& path : runs) {
+    ++found.runs;
+    if (is_writable(path)) found.remarks.push_back(path.string() + ": writable; run chmod a-w on it");
+    for (const std::string& problem : verify_run(path).problems) {
+      found.problems.push_back(problem.find(path.string()) == std::string::npos ? path.string() + ": " + problem
+                                                                                : problem);
+    }
+    if (!digests.contains("runs/" + path.filename().string())) {
+      found.problems.push_back(path.string() + ": not in the journal");
+    }
+  }
+  return found;
 }
 
 }  // namespace kphi::results

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <openssl/evp.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
@@ -9,9 +10,11 @@
 #include <cerrno>
 #include <cstdio>
 #include <fstream>
-#include <iterator>
+#include <memory>
 #include <system_error>
+#include <vector>
 
+#include "base/descriptor.hpp"
 #include "base/error.hpp"
 
 namespace kphi::results {
@@ -19,30 +22,45 @@ namespace {
 
 [[noreturn]] void fail(const char* operation) { throw std::system_error(errno, std::generic_category(), operation); }
 
-class Descriptor {
+/// Throws std::system_error with `operation` if open(2) fails.
+Descriptor opened(const std::filesystem::path& path, int flags, const char* operation) {
+  Descriptor file(::open(path.empty() ? "." : path.c_str(), flags | O_CLOEXEC, 0666));
+  if (file.number() < 0) fail(operation);
+  return file;
+}
+
+class Digest {
  public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
+  Digest() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
+    check(context_ != nullptr && EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) == 1);
   }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  [[nodiscard]] int get() const { return fd_; }
+  void update(const void* bytes, std::size_t size) { check(EVP_DigestUpdate(context_.get(), bytes, size) == 1); }
+  [[nodiscard]] std::string hex() {
+    std::array<unsigned char, EVP_MAX_MD_SIZE> raw{};
+    unsigned size = 0;
+    check(EVP_DigestFinal_ex(context_.get(), raw.data(), &size) == 1);
+    std::string text;
+    for (unsigned i = 0; i < size; ++i) text += fmt::format("{:02x}", raw[i]);
+    return text;
+  }
 
  private:
-  int fd_;
+  static void check(bool ok) {
+    if (!ok) throw RecordError("OpenSSL: SHA-256 is not available; check the OpenSSL configuration");
+  }
+  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
 };
 
-void write_all(int fd, const std::string& text) {
+}  // namespace
+
+void write_all(int descriptor, std::string_view text) {
   for (std::size_t done = 0; done < text.size();) {
-    const ssize_t n = ::write(fd, text.data() + done, text.size() - done);
+    const ssize_t n = ::write(descriptor, text.data() + done, text.size() - done);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) fail("write");
     done += static_cast<std::size_t>(n);
   }
 }
-
-}  // namespace
 
 void FileLayer::before_write(std::uint64_t) {}
 
@@ -57,9 +75,8 @@ void FileLayer::sync_data(int descriptor) {
 }
 
 void FileLayer::sync_folder(const std::filesystem::path& folder) {
-  const Descriptor fd(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (fd.get() < 0) fail("open folder");
-  if (::fsync(fd.get()) != 0) fail("fsync folder");
+  const Descriptor fd = opened(folder, O_RDONLY | O_DIRECTORY, "open folder");
+  if (::fsync(fd.number()) != 0) fail("fsync folder");
 }
 
 void FileLayer::rename(const std::filesystem::path& from, const std::filesystem::path& to) {
@@ -107,19 +124,16 @@ std::filesystem::path free_name(const std::string& name, const std::string& endi
 }
 
 void sync_file(const std::filesystem::path& path, FileLayer& files) {
-  const Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (fd.get() < 0) fail("open");
-  files.sync_data(fd.get());
+  files.sync_data(opened(path, O_RDONLY, "open").number());
 }
 
 void write_text(const std::filesystem::path& path, const std::string& text, FileLayer& files) {
   const std::filesystem::path part = path.string() + ".part";
   try {
     files.before_write(text.size());
-    const Descriptor fd(::open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
-    if (fd.get() < 0) fail("open");
-    write_all(fd.get(), text);
-    files.sync_data(fd.get());
+    const Descriptor fd = opened(part, O_WRONLY | O_CREAT | O_TRUNC, "open");
+    write_all(fd.number(), text);
+    files.sync_data(fd.number());
     files.replace(part, path);
     files.sync_folder(path.parent_path());
   } catch (const std::system_error& error) {
@@ -141,6 +155,22 @@ std::string failure_text(const std::string& where, int error) {
   const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
   return fmt::format("{}{}: {}{}", full ? "disk full: " : "", where, std::generic_category().message(error),
                      full ? "; make room or choose another folder" : "");
+}
+
+std::string sha256(std::string_view bytes) {
+  Digest digest;
+  digest.update(bytes.data(), bytes.size());
+  return digest.hex();
+}
+
+std::string sha256_of_file(const std::filesystem::path& path) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
+  if (!file) throw RecordError(failure_text(path.string(), errno));
+  Digest digest;
+  std::vector<char> block(1 << 18);
+  while (const std::size_t n = std::fread(block.data(), 1, block.size(), file.get())) digest.update(block.data(), n);
+  if (std::ferror(file.get())) throw RecordError(failure_text(path.string(), errno));
+  return digest.hex();
 }
 
 }  // namespace kphi::results

@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::size_t kLongestCommand = 200;
 
-/// As the kernel shows it to others.
+/// The command line as the kernel shows it.
 std::string own_command() {
   std::ifstream file("/proc/self/cmdline", std::ios::binary);
   std::string command{std::istreambuf_iterator<char>(file), {}};
@@ -44,17 +44,17 @@ std::string own_words() {
 LockHolder read_holder(int descriptor) {
   std::array<char, 4096> text{};
   const ssize_t n = ::pread(descriptor, text.data(), text.size(), 0);
-  const auto told =
+  const auto words =
       nlohmann::json::parse(text.begin(), text.begin() + std::max<ssize_t>(n, 0), nullptr, /*allow_exceptions=*/false);
-  if (!told.is_object()) return {};
+  if (!words.is_object()) return {};
   try {
-    return {told.value("pid", 0), told.value("command", ""), told.value("since", "")};
+    return {words.value("pid", 0), words.value("command", ""), words.value("since", "")};
   } catch (const nlohmann::json::exception&) {
     return {};
   }
 }
 
-/// A sticky folder's files are opened without O_CREAT: with it the kernel refuses those of other users.
+/// Opens existing files without O_CREAT: in a sticky folder the kernel would refuse those of other users.
 int open_or_create(const std::filesystem::path& path) {
   constexpr int kFlags = O_CLOEXEC | O_NOFOLLOW;
   for (;;) {
@@ -63,14 +63,14 @@ int open_or_create(const std::filesystem::path& path) {
     if (errno != ENOENT) return -1;
     const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | kFlags, 0666);
     if (fd >= 0) {
-      (void)::fchmod(fd, 0666);  // whatever the umask: the next user must be able to lock it
+      (void)::fchmod(fd, 0666);  // despite the umask: the next user must be able to lock it
       return fd;
     }
     if (errno != EEXIST) return -1;
   }
 }
 
-/// A holder that goes removes its file: what was opened before may have no name any more.
+/// False if the former holder removed the file after it was opened here.
 bool is_still_at(int descriptor, const std::filesystem::path& path) {
   struct stat mine {
   }, there{};
@@ -89,32 +89,23 @@ std::string LockHolder::words() const {
 
 std::optional<FileLock> FileLock::take(const std::filesystem::path& path, LockHolder& holder) {
   for (;;) {
-    const int fd = open_or_create(path);
+    Descriptor file(open_or_create(path));
+    const int fd = file.number();
     if (fd < 0) throw RecordError(failure_text(path.string(), errno));
-    FileLock lock(path, fd);
     if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
-      if (knows_no_locks(errno)) return lock;
+      if (knows_no_locks(errno)) return FileLock(path, std::move(file));
       holder = read_holder(fd);
-      ::close(std::exchange(lock.descriptor_, -1));
       return std::nullopt;
     }
-    if (!is_still_at(fd, path)) {
-      ::close(std::exchange(lock.descriptor_, -1));
-      continue;
-    }
+    if (!is_still_at(fd, path)) continue;
     const std::string words = own_words();
     if (::ftruncate(fd, 0) == 0) (void)!::pwrite(fd, words.data(), words.size(), 0);
-    return lock;
+    return FileLock(path, std::move(file));
   }
 }
 
-FileLock::FileLock(FileLock&& other) noexcept
-    : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)) {}
-
 FileLock::~FileLock() {
-  if (descriptor_ < 0) return;
-  ::unlink(path_.c_str());
-  ::close(descriptor_);
+  if (file_.number() >= 0) ::unlink(path_.c_str());
 }
 
 }  // namespace kphi::results

@@ -1,16 +1,19 @@
-// A lock between programs: flock(2) on a file that says who holds it. It goes with its holder, however that ends, so a
-// file left behind by a dead one is no obstacle.
+// A lock between programs: flock(2) on a file that names the holder. The kernel releases it when the holder ends,
+// however that happens, so a file left behind does not block anybody.
 #pragma once
 
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
+
+#include "base/descriptor.hpp"
 
 namespace kphi::results {
 
-/// Who holds a lock, as far as its file tells.
+/// The holder of a lock, as its file names it.
 struct LockHolder {
-  int pid = 0;  ///< 0: not told
+  int pid = 0;  ///< 0: unknown
   std::string command;
   std::string since_utc;  ///< ISO 8601, Z
   /// "process 4711 (kphi run …) since 2021-05-30T08:00:00Z"
@@ -19,18 +22,18 @@ struct LockHolder {
 
 class FileLock {
  public:
-  /// Takes the lock at `path`, or tells who holds it in `holder`. Another user's file is good, too. A file system that
-  /// knows no locks gives none, and none is missed. Throws RecordError when the file cannot be opened.
+  /// Takes the lock at `path`, also in another user's file. nullopt: taken; `holder` names the other program. On a file
+  /// system without locks it always succeeds. Throws RecordError if the file cannot be opened.
   [[nodiscard]] static std::optional<FileLock> take(const std::filesystem::path& path, LockHolder& holder);
-  FileLock(FileLock&& other) noexcept;
+  FileLock(FileLock&&) = default;
   FileLock& operator=(FileLock&&) = delete;
-  /// Gives it back and removes the file.
+  /// Removes the file, then releases the lock.
   ~FileLock();
 
  private:
-  FileLock(std::filesystem::path path, int descriptor) : path_(std::move(path)), descriptor_(descriptor) {}
+  FileLock(std::filesystem::path path, Descriptor file) : path_(std::move(path)), file_(std::move(file)) {}
   std::filesystem::path path_;
-  int descriptor_ = -1;
+  Descriptor file_;
 };
 
 }  // namespace kphi::results

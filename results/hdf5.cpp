@@ -8,6 +8,7 @@
 #include <bit>
 #include <cstring>
 #include <system_error>
+#include <type_traits>
 #include <utility>
 
 #include "base/error.hpp"
@@ -100,6 +101,18 @@ Handle fixed_text(std::size_t size) {
 void put_fixed_text(const Handle& object, const char* name, const std::string& value) {
   const Handle type = fixed_text(value.size() + 1);
   put(object, name, type.get(), type.get(), scalar_space(), value.c_str());
+}
+
+template <class Value>
+constexpr bool is_row = std::is_same_v<Value, std::array<double, 6>>;
+
+/// In the file and, on this little-endian machine, in memory.
+template <class Value>
+hid_t number_type() {
+  if constexpr (std::is_same_v<Value, std::int32_t>) return H5T_STD_I32LE;
+  if constexpr (std::is_same_v<Value, std::uint32_t>) return H5T_STD_U32LE;
+  if constexpr (std::is_same_v<Value, std::uint64_t>) return H5T_STD_U64LE;
+  return H5T_IEEE_F64LE;
 }
 
 hobj_ref_t reference_to(const Handle& object) {
@@ -219,20 +232,10 @@ void write_attribute(const Handle& object, const char* name, const std::string& 
   const char* text = value.c_str();
   put(object, name, type.get(), type.get(), scalar_space(), &text);
 }
-void write_attribute(const Handle& object, const char* name, double value) {
-  put(object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, scalar_space(), &value);
-}
-void write_attribute(const Handle& object, const char* name, std::int32_t value) {
-  put(object, name, H5T_STD_I32LE, H5T_NATIVE_INT32, scalar_space(), &value);
-}
-void write_attribute(const Handle& object, const char* name, std::uint32_t value) {
-  put(object, name, H5T_STD_U32LE, H5T_NATIVE_UINT32, scalar_space(), &value);
-}
-void write_attribute(const Handle& object, const char* name, std::uint64_t value) {
-  put(object, name, H5T_STD_U64LE, H5T_NATIVE_UINT64, scalar_space(), &value);
-}
-void write_attribute(const Handle& object, const char* name, const std::array<double, 6>& value) {
-  put(object, name, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, row_space(value.size()), value.data());
+template <class Value>
+void write_attribute(const Handle& object, const char* name, const Value& value) {
+  const hid_t type = number_type<Value>();
+  put(object, name, type, type, is_row<Value> ? row_space(sizeof value / sizeof(double)) : scalar_space(), &value);
 }
 
 bool has_attribute(const Handle& object, const char* name) {
@@ -248,21 +251,21 @@ void read_attribute(const Handle& object, const char* name, std::string& value) 
   value = text == nullptr ? "" : text;
   H5free_memory(text);
 }
-void read_attribute(const Handle& object, const char* name, double& value) {
-  get(object, name, H5T_NATIVE_DOUBLE, 1, &value);
+template <class Value>
+void read_attribute(const Handle& object, const char* name, Value& value) {
+  get(object, name, number_type<Value>(), is_row<Value> ? sizeof value / sizeof(double) : 1, &value);
 }
-void read_attribute(const Handle& object, const char* name, std::int32_t& value) {
-  get(object, name, H5T_NATIVE_INT32, 1, &value);
-}
-void read_attribute(const Handle& object, const char* name, std::uint32_t& value) {
-  get(object, name, H5T_NATIVE_UINT32, 1, &value);
-}
-void read_attribute(const Handle& object, const char* name, std::uint64_t& value) {
-  get(object, name, H5T_NATIVE_UINT64, 1, &value);
-}
-void read_attribute(const Handle& object, const char* name, std::array<double, 6>& value) {
-  get(object, name, H5T_NATIVE_DOUBLE, static_cast<hssize_t>(value.size()), value.data());
-}
+
+template void write_attribute(const Handle&, const char*, const double&);
+template void read_attribute(const Handle&, const char*, double&);
+template void write_attribute(const Handle&, const char*, const std::int32_t&);
+template void read_attribute(const Handle&, const char*, std::int32_t&);
+template void write_attribute(const Handle&, const char*, const std::uint32_t&);
+template void read_attribute(const Handle&, const char*, std::uint32_t&);
+template void write_attribute(const Handle&, const char*, const std::uint64_t&);
+template void read_attribute(const Handle&, const char*, std::uint64_t&);
+template void write_attribute(const Handle&, const char*, const std::array<double, 6>&);
+template void read_attribute(const Handle&, const char*, std::array<double, 6>&);
 
 Column::Column(const Handle& group, const ColumnShape& shape, FileLayer& files, std::string file_name)
     : shape_(shape),

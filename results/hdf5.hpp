@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "results/file_layer.hpp"
-#include "results/raw_column.hpp"
+#include "results/load_cell_columns.hpp"
 #include "results/run_layout.hpp"
 
 namespace kphi::results::hdf5 {
@@ -30,7 +30,7 @@ class Handle {
   ~Handle() { drop(); }
   [[nodiscard]] hid_t get() const { return id_; }
   [[nodiscard]] explicit operator bool() const { return id_ >= 0; }
-  /// Lets go without a word about failure.
+  /// Releases it; ignores failures.
   void drop() noexcept;
 
  private:
@@ -47,29 +47,22 @@ void check(herr_t status, const std::string& doing);
 [[nodiscard]] Handle open_group(const Handle& parent, const char* name);
 /// The file's descriptor, for fdatasync.
 [[nodiscard]] int descriptor_of(const Handle& file);
-/// Bytes the file has or will have when HDF5 has written what it holds back.
+/// Size of the file in bytes once HDF5 has written everything it holds back.
 [[nodiscard]] std::uint64_t size_of(const Handle& file);
-/// HDF5 prints its errors on stderr unless told not to, by every thread that calls it. Creating and opening files does
-/// so.
+/// Stops HDF5 from printing errors on stderr in the calling thread. Creating and opening files does that, too.
 void be_quiet() noexcept;
-/// From here on nothing HDF5 writes reaches the file; it can then be closed without changing a byte.
+/// Keeps everything that HDF5 writes from now on away from the file, so that closing does not change a byte.
 void sever(const Handle& file) noexcept;
 
-// Attributes. Writing an existing one of the same kind replaces its value in place. Strings are UTF-8.
+// Attributes: std::string (UTF-8), double, std::int32_t, std::uint32_t, std::uint64_t, std::array<double, 6>. Writing
+// an existing one of the same type replaces its value in place.
 void write_attribute(const Handle& object, const char* name, const std::string& value);
-void write_attribute(const Handle& object, const char* name, double value);
-void write_attribute(const Handle& object, const char* name, std::int32_t value);
-void write_attribute(const Handle& object, const char* name, std::uint32_t value);
-void write_attribute(const Handle& object, const char* name, std::uint64_t value);
-void write_attribute(const Handle& object, const char* name, const std::array<double, 6>& value);
-
+template <class Value>
+void write_attribute(const Handle& object, const char* name, const Value& value);
 [[nodiscard]] bool has_attribute(const Handle& object, const char* name);
 void read_attribute(const Handle& object, const char* name, std::string& value);
-void read_attribute(const Handle& object, const char* name, double& value);
-void read_attribute(const Handle& object, const char* name, std::int32_t& value);
-void read_attribute(const Handle& object, const char* name, std::uint32_t& value);
-void read_attribute(const Handle& object, const char* name, std::uint64_t& value);
-void read_attribute(const Handle& object, const char* name, std::array<double, 6>& value);
+template <class Value>
+void read_attribute(const Handle& object, const char* name, Value& value);
 
 /// What a column holds. Counts have a second dimension of six.
 struct ColumnShape {

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "base/error.hpp"
-#include "results/sha256.hpp"
+#include "results/file_layer.hpp"
 
 namespace kphi::results {
 namespace {
@@ -32,13 +32,13 @@ struct Lines {
   std::optional<std::string> problem;
 };
 
-/// The entry, or why it is none.
+/// Fills `entry`; the problem if the line is not an entry.
 std::optional<std::string> parse_line(std::string_view line, std::uint64_t n, std::string& check, JournalEntry& entry) {
   const std::size_t at = line.rfind(kCheckKey);
   if (at == std::string_view::npos || line.size() != at + kCheckKey.size() + kCheckDigits + 2) return "has no checksum";
   const std::string stored(line.substr(at + kCheckKey.size(), kCheckDigits));
   if (stored != check_of(check, line.substr(0, at)))
-    return "does not match its checksum: it or the line before was changed";
+    return "does not match its checksum: this line or the one before was changed";
   try {
     const nlohmann::json object = nlohmann::json::parse(line);
     entry = {object.at("n"), object.at("t_ns"), object.at("utc"), object.at("event"), object.at("data")};
@@ -93,24 +93,21 @@ Journal::Journal(std::filesystem::path path, FileLayer& files) : path_(std::move
   const bool is_new = !std::filesystem::exists(path_);
   Lines lines = is_new ? Lines{} : parse(read_text(path_));
   found_ = reading_of(lines, path_);
-  if (!found_.problems.empty()) throw RecordError(found_.problems.front() + "; begin a new campaign folder");
+  if (!found_.problems.empty()) throw RecordError(found_.problems.front() + "; start a new campaign folder");
   next_ = found_.entries.size() + 1;
   check_ = lines.check;
   whole_bytes_ = lines.whole_bytes;
-  descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-  if (descriptor_ < 0) throw RecordError(failure_text(path_.string(), errno));
+  file_ = Descriptor(::open(path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666));
+  if (file_.number() < 0) throw RecordError(failure_text(path_.string(), errno));
   try {
-    if (::ftruncate(descriptor_, static_cast<off_t>(lines.whole_bytes)) != 0) {
+    if (::ftruncate(file_.number(), static_cast<off_t>(whole_bytes_)) != 0) {
       throw std::system_error(errno, std::generic_category());
     }
     if (is_new) files_.sync_folder(path_.parent_path());
   } catch (const std::system_error& error) {
-    ::close(descriptor_);
     throw RecordError(failure_text(path_.string(), error.code().value()));
   }
 }
-
-Journal::~Journal() { ::close(descriptor_); }
 
 void Journal::append(const std::string& event, const nlohmann::json& data, Nanoseconds time_ns,
                      const std::string& utc) {
@@ -120,18 +117,13 @@ void Journal::append(const std::string& event, const nlohmann::json& data, Nanos
   line.pop_back();
   const std::string check = check_of(check_, line);
   line += fmt::format("{}{}\"}}\n", kCheckKey, check);
-  if (spoilt_) throw RecordError(path_.string() + ": an earlier line could not be written whole; see the first error");
+  if (spoilt_) throw RecordError(path_.string() + ": an earlier line was not written completely; see the first error");
   try {
     files_.before_write(line.size());
-    for (std::size_t done = 0; done < line.size();) {
-      const ssize_t n = ::write(descriptor_, line.data() + done, line.size() - done);
-      if (n < 0 && errno == EINTR) continue;
-      if (n < 0) throw std::system_error(errno, std::generic_category());
-      done += static_cast<std::size_t>(n);
-    }
-    files_.sync_data(descriptor_);
+    write_all(file_.number(), line);
+    files_.sync_data(file_.number());
   } catch (const std::system_error& error) {
-    spoilt_ = ::ftruncate(descriptor_, static_cast<off_t>(whole_bytes_)) != 0;
+    spoilt_ = ::ftruncate(file_.number(), static_cast<off_t>(whole_bytes_)) != 0;
     throw RecordError(failure_text(path_.string(), error.code().value()));
   }
   ++next_;

@@ -1,5 +1,5 @@
-// journal.jsonl: what happened in a campaign, one JSON object per line, appended and synced one by one. Each line ends
-// with a checksum over itself and the line before it, so that a changed, lost or moved line shows.
+// journal.jsonl: the events of a campaign, one JSON object per line, each synced when appended. Each line ends with a
+// checksum over itself and the line before it, which reveals a changed, missing or moved line.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/descriptor.hpp"
 #include "results/file_layer.hpp"
 #include "results/records.hpp"
 
@@ -16,7 +17,7 @@ namespace kphi::results {
 /// Data of this event: {"file": "runs/….h5", "sha256": "…"}. verify compares every entry that holds both keys.
 inline constexpr const char* kRunAccepted = "run_accepted";
 inline constexpr const char* kRunAborted = "run_aborted";
-/// Data: tool, files and devices of the campaign. The bench time of what follows begins anew with each of them.
+/// Data: tool, files and devices of the campaign. Bench time restarts with each of them.
 inline constexpr const char* kCampaignStarted = "campaign_started";
 inline constexpr const char* kCampaignResumed = "campaign_resumed";
 inline constexpr const char* kCampaignFinished = "campaign_finished";
@@ -30,9 +31,9 @@ struct JournalEntry {
 };
 
 struct JournalReading {
-  std::vector<JournalEntry> entries;  ///< those whose checksum is right, up to the first that is not
-  bool torn_last_line = false;        ///< the last line has no end: its writer died, or the power was cut (zeros
-                                      ///< where nothing was written); it was never promised to anybody
+  std::vector<JournalEntry> entries;  ///< up to the first line with a wrong checksum
+  /// The last line has no end, or zeros in it: the writer died, or the power was cut. It was never reported as written.
+  bool torn_last_line = false;
   std::vector<std::string> problems;  ///< "journal.jsonl:3: …"
 };
 
@@ -42,18 +43,15 @@ struct JournalReading {
 /// Appends to a journal. One thread. Failures throw RecordError.
 class Journal {
  public:
-  /// Begins the file or goes on after its last whole line; a torn last line is cut off. Refuses a journal with
+  /// Starts the file or continues after its last complete line, cutting off a torn one. Refuses a journal with
   /// problems.
   explicit Journal(std::filesystem::path path, FileLayer& files = disk());
-  Journal(const Journal&) = delete;
-  Journal& operator=(const Journal&) = delete;
-  ~Journal();
 
-  /// On disk when this returns. `data` is null or an object. What a failure left of the line is cut off; where even
-  /// that fails, every later one fails, too.
+  /// Returns once the line is on disk. `data` is null or an object. After a failure the partial line is cut off; if
+  /// that fails too, every later call fails.
   void append(const std::string& event, const nlohmann::json& data, Nanoseconds time_ns, const std::string& utc);
 
-  /// What the file held when it was opened.
+  /// The content of the file when it was opened.
   [[nodiscard]] const JournalReading& found() const { return found_; }
 
  private:
@@ -62,9 +60,9 @@ class Journal {
   JournalReading found_;
   std::uint64_t next_ = 1;
   std::string check_;              ///< of the last line
-  std::uint64_t whole_bytes_ = 0;  ///< up to its end
-  bool spoilt_ = false;            ///< part of a line lies behind them
-  int descriptor_ = -1;
+  std::uint64_t whole_bytes_ = 0;  ///< of the file, up to the end of the last line
+  bool spoilt_ = false;            ///< part of a line follows
+  Descriptor file_;
 };
 
 }  // namespace kphi::results

@@ -1,13 +1,46 @@
 #include "results/load_cell_columns.hpp"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <utility>
+
+#include "base/error.hpp"
+#include "results/file_layer.hpp"
 
 namespace kphi::results {
 namespace {
 
 constexpr std::size_t kPiece = 8192;  // rows: 230 kB, which the second-level cache holds
 
+void read_all(int file, std::uint64_t offset, std::size_t bytes, std::byte* to, const std::string& doing) {
+  while (bytes > 0) {
+    const ssize_t n = ::pread(file, to, bytes, static_cast<off_t>(offset));
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) throw RecordError(failure_text(doing, errno));
+    if (n == 0) throw RecordError(doing + ": the file ends too early; see kphi verify");
+    to += n;
+    offset += static_cast<std::uint64_t>(n);
+    bytes -= static_cast<std::size_t>(n);
+  }
+}
+
 }  // namespace
+
+void RawColumn::read(const Descriptor& file, std::uint64_t first, std::uint64_t count, void* rows) const {
+  auto* to = static_cast<std::byte*>(rows);
+  while (count > 0) {
+    const std::uint64_t chunk = first / chunk_rows, row = first % chunk_rows;
+    const std::uint64_t n = std::min(count, chunk_rows - row);
+    if (chunk >= chunks.size()) throw RecordError(doing + ": holds fewer rows than asked for");
+    read_all(file.number(), chunks[chunk] + row * row_bytes, n * row_bytes, to, doing);
+    to += n * row_bytes;
+    first += n;
+    count -= n;
+  }
+}
 
 LoadCellRows LoadCellColumns::rows(std::size_t first, std::size_t last) {
   if (first < first_ || last > first_ + counts_.size()) {
@@ -38,6 +71,11 @@ void RecordedColumns::read(std::size_t first, std::span<std::array<std::int32_t,
     counts[i] = records_[first + i].counts;
     status[i] = records_[first + i].status;
   }
+}
+
+FileColumns::FileColumns(const std::filesystem::path& path, std::size_t rows, Places places)
+    : LoadCellColumns(rows), file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)), places_(std::move(places)) {
+  if (file_.number() < 0) throw RecordError(failure_text(path.string() + ": open", errno));
 }
 
 std::vector<std::uint32_t> FileColumns::ft_sequence() const {

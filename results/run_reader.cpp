@@ -107,8 +107,7 @@ std::unique_ptr<LoadCellColumns> columns_of(const Handle& root, const std::files
   };
   const auto counts = raw("counts"), ft = raw("ft_sequence"), status = raw("status"), arrival = raw("t_arrival_ns");
   if (counts && ft && status && arrival) {
-    return std::make_unique<FileColumns>(OpenFile(path), cell.rows,
-                                         FileColumns::Places{*counts, *ft, *status, *arrival});
+    return std::make_unique<FileColumns>(path, cell.rows, FileColumns::Places{*counts, *ft, *status, *arrival});
   }
   return std::make_unique<ConvertedColumns>(
       std::make_unique<const std::vector<LoadCellRecord>>(rows_of(cell, path.string())));
@@ -184,10 +183,6 @@ RunFile open_run(const std::filesystem::path& path) {
     const Handle root = hdf5::open_file(path);
     return RunFile{without_load_cell(root, path), columns_of(root, path)};
   });
-}
-
-RunHeader read_header(const std::filesystem::path& path) {
-  return naming(path, [&] { return header_of(hdf5::open_file(path), path); });
 }
 
 SequenceCheck check_sequence(const std::vector<LoadCellRecord>& records, std::uint32_t ft_stride) {

@@ -1,4 +1,4 @@
-// Reads runs back and says whether they are whole. Every function throws RecordError for a file that cannot be read.
+// Reads and verifies run files. Every function throws RecordError for an unreadable file.
 #pragma once
 
 #include <cstdint>
@@ -13,26 +13,23 @@
 
 namespace kphi::results {
 
-/// The whole run; of a .part what was valid at its last sync, as aborted. Checks no checksums: that is verify_run's.
+/// The whole run; of a .part the rows valid at its last sync, as aborted. Does not check checksums; see verify_run().
 [[nodiscard]] RunRecording read_run(const std::filesystem::path& path);
 
-/// A run whose load-cell records are still in its file: for who passes over them once and needs no record of each.
+/// A run whose load-cell records stay in its file, for a single pass over them.
 struct RunFile {
-  RunRecording run;  ///< without load_cell; of a .part without the account, which the records would tell
+  RunRecording run;  ///< without load_cell; of a .part without the account, which needs the records
   std::unique_ptr<LoadCellColumns> load_cell;
 };
 [[nodiscard]] RunFile open_run(const std::filesystem::path& path);
 
-/// What was known before the motor turned.
-[[nodiscard]] RunHeader read_header(const std::filesystem::path& path);
-
-/// What sequence numbers tell about a stream of records.
+/// Gaps and restarts in a stream of records, by its sequence numbers.
 struct SequenceCheck {
-  std::uint64_t lost = 0;        ///< records that ft_sequence says are missing between the first and the last
+  std::uint64_t lost = 0;        ///< records missing between the first and the last
   std::uint64_t reboots = 0;     ///< ft_sequence jumped back
-  std::uint64_t restarts = 0;    ///< rdt_sequence jumped back while ft_sequence went on
+  std::uint64_t restarts = 0;    ///< rdt_sequence jumped back while ft_sequence continued
   std::uint64_t repeated = 0;    ///< neither number moved: a duplicate that should have been discarded
-  std::uint64_t off_stride = 0;  ///< ft_sequence advanced by no multiple of the stride
+  std::uint64_t off_stride = 0;  ///< ft_sequence did not advance by a multiple of the stride
 };
 [[nodiscard]] SequenceCheck check_sequence(const std::vector<LoadCellRecord>& records, std::uint32_t ft_stride);
 
@@ -48,7 +45,7 @@ struct Verification {
 };
 
 /// Checksums of columns and attributes, numbers of rows, sequences, losses against the account, the scale, the end. An
-/// unreadable file is a problem, not an exception. An aborted run can be whole: nothing but its outcome tells.
+/// unreadable file is a problem, not an exception. An aborted run can be undamaged.
 [[nodiscard]] Verification verify_run(const std::filesystem::path& path);
 
 }  // namespace kphi::results

@@ -2,7 +2,9 @@
 
 #include <cmath>
 #include <map>
+#include <nlohmann/json.hpp>
 
+#include "results/file_layer.hpp"
 #include "results/hdf5.hpp"
 #include "results/run_layout.hpp"
 #include "results/run_reader.hpp"
@@ -115,6 +117,18 @@ void check_scale(const RunHeader& header, Problems& problems) {
 }
 
 }  // namespace
+
+std::string attributes_digest(const RunHeader& header, const RunEnding& ending) {
+  nlohmann::json all;
+  const auto add = [&](const char* name, const auto& value) { all[name] = value; };
+  for_each_attribute(header, add);
+  for_each_figure(ending, add);
+  add("outcome", outcome_name(ending.outcome));
+  add("outcome_reason", ending.outcome_reason);
+  return sha256(all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
+const char* outcome_name(Outcome outcome) { return outcome == Outcome::complete ? "complete" : "aborted"; }
 
 Verification verify_run(const std::filesystem::path& path) {
   Verification found;

@@ -11,10 +11,10 @@
 #include <utility>
 #include <vector>
 
+#include "results/file_layer.hpp"
 #include "results/hdf5.hpp"
 #include "results/run_layout.hpp"
 #include "results/run_reader.hpp"
-#include "results/sha256.hpp"
 
 namespace kphi::results {
 namespace {
@@ -22,7 +22,7 @@ namespace {
 using hdf5::Column;
 using hdf5::Handle;
 
-/// What a person reads about a column; of a code "0 zero before, 1 step, …".
+/// The long_name of a column; for a code "0 zero before, 1 step, …".
 template <class Row>
 std::string described(const RunColumn<Row>& column) {
   std::string list;
@@ -115,7 +115,7 @@ void on_disk(const std::filesystem::path& path, Action&& action) {
 
 std::filesystem::path prepared_part(const std::filesystem::path& final_path, FileLayer& files) {
   if (std::filesystem::exists(final_path)) {
-    throw RecordError(final_path.string() + ": exists already and is not overwritten; choose another name");
+    throw RecordError(final_path.string() + ": exists already; choose another name");
   }
   const std::filesystem::path part = final_path.string() + ".part";
   if (std::filesystem::exists(part)) {
@@ -158,11 +158,11 @@ struct RunWriter::File {
   Series<SupplyReading> supply;
 };
 
-/// Everything that touches the open file goes through here. After the first failure nothing more may reach the disk:
-/// what HDF5 would write on closing, half of it refused, can spoil what the last sync left.
+/// Runs every operation on the open file. After the first failure nothing more may reach the disk: partial writes of
+/// HDF5 on closing could damage what the last sync secured.
 template <class Action>
 void RunWriter::guarded(Action&& action) {
-  if (!file_) throw RecordError(path_.string() + ": is closed: the recording has ended, see the first error");
+  if (!file_) throw RecordError(path_.string() + ": closed, the recording has ended; see the first error");
   hdf5::be_quiet();
   try {
     on_disk(path_, action);
@@ -227,7 +227,7 @@ std::uint64_t RunWriter::samples() const { return file_ ? file_->load_cell.rows(
 void RunWriter::close() {
   hid_t root = H5I_INVALID_HID;
   {
-    // The groups and columns go first, the file last: its close is the one that can tell of a failure.
+    // Closes groups and columns first: then closing the file reports every failure.
     const std::unique_ptr<File> file = std::move(file_);
     root = file->root.get();
     hdf5::check(H5Iinc_ref(root) < 0 ? -1 : 0, path_.string() + ": close");
@@ -251,7 +251,7 @@ std::string RunWriter::finish(const RunEnding& ending) {
 
   const Verification verification = verify_run(path_);
   if (outcome == Outcome::complete && !verification.whole()) {
-    throw RecordError(fmt::format("{}: the finished run is not whole: {}; repeat the run", path_.string(),
+    throw RecordError(fmt::format("{}: the finished file failed verification: {}; repeat the run", path_.string(),
                                   fmt::join(verification.problems, "; ")));
   }
   const std::string digest = sha256_of_file(path_);

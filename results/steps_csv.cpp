@@ -4,9 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
-#include <limits>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 #include <variant>
@@ -55,7 +54,7 @@ const std::array kColumns{
     Column{"quality_flags", Flags{&StepMean::quality_flags}},
 };
 
-/// Columns that a file has when one of its steps has a value for the first of them.
+/// Columns that are written if any step has a value for the first of them.
 struct Group {
   std::vector<Column> columns;
   [[nodiscard]] bool in(const StepMean& step) const {
@@ -151,24 +150,22 @@ struct Format {
   std::string operator()(Flags d) const { return quality_flag_names(step.*d.member); }
 };
 
-template <class Integer>
-Integer parse_integer(const std::string& text) {
-  Integer value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) throw std::invalid_argument("is not a whole number");
-  return value;
+template <class Value>
+Value required(std::optional<Value> value, const char* problem) {
+  if (!value) throw std::invalid_argument(problem);
+  return *value;
 }
 
 struct Parse {
   StepMean& step;
   const std::string& text;
   void operator()(std::string StepMean::*m) const { step.*m = text; }
-  void operator()(int StepMean::*m) const { step.*m = parse_integer<int>(text); }
-  void operator()(std::uint64_t StepMean::*m) const { step.*m = parse_integer<std::uint64_t>(text); }
+  void operator()(int StepMean::*m) const { step.*m = required(parse_integer<int>(text), "is not a whole number"); }
+  void operator()(std::uint64_t StepMean::*m) const {
+    step.*m = required(parse_integer<std::uint64_t>(text), "is not a whole number");
+  }
   void operator()(double StepMean::*m) const {
-    const auto value = text.empty() ? std::numeric_limits<double>::quiet_NaN() : parse_double(text);
-    if (!value) throw std::invalid_argument("is not a number");
-    step.*m = *value;
+    step.*m = text.empty() ? kNotMeasured : required(parse_double(text), "is not a number");
   }
   void operator()(Flags d) const { step.*d.member = quality_flags_from_names(text); }
 };

@@ -1,7 +1,6 @@
 // steps.csv: one row per step of every run. UTF-8, LF, a header line with the units in the names, shortest round trip
-// numbers; a number that was not measured is an empty field (NaN in memory). Further columns (what a bench supply
-// showed, the density of the air, how certain the means are) stand in groups at the end, each where one of the steps
-// has it.
+// numbers; an unmeasured number is an empty field (NaN in memory). Optional columns (bench supply, air density,
+// uncertainties) follow in groups, each present if one of the steps has it.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +17,7 @@ namespace kphi::results {
 
 /// Names of the set bits of QualityFlag joined by '+'; empty for none.
 [[nodiscard]] std::string quality_flag_names(std::uint32_t flags);
-/// Inverse of quality_flag_names. Throws std::invalid_argument that names the unknown word.
+/// Inverse of quality_flag_names(). Throws std::invalid_argument naming the unknown word.
 [[nodiscard]] std::uint32_t quality_flags_from_names(std::string_view names);
 
 /// The header line without further columns, without a line feed.
@@ -26,13 +25,13 @@ namespace kphi::results {
 /// The whole file: the same bytes live and in replay.
 [[nodiscard]] std::string format_steps(std::span<const StepMean> steps);
 
-/// Columns by name, in any order; those in groups may be missing. Throws ConfigurationError "name:line: …" for an
-/// unknown, missing or repeated column and for a field that it does not understand.
+/// Columns by name, in any order; optional ones may be missing. Throws ConfigurationError "name:line: …" for an
+/// unknown, missing or repeated column and for an invalid field.
 [[nodiscard]] std::vector<StepMean> parse_steps(std::string_view text, const std::string& name);
 
-/// Replaces `path` in one step. Throws RecordError.
+/// Replaces `path` atomically. Throws RecordError.
 void write_steps(const std::filesystem::path& path, std::span<const StepMean> steps, FileLayer& files = disk());
-/// Throws RecordError when it cannot be read, ConfigurationError when it cannot be understood.
+/// Throws RecordError for an unreadable file, ConfigurationError for an invalid one.
 [[nodiscard]] std::vector<StepMean> read_steps(const std::filesystem::path& path);
 
 }  // namespace kphi::results

@@ -1,15 +1,18 @@
 #include "compensation/file/coefficient_file.hpp"
 
+#include <yaml-cpp/yaml.h>
+
 #include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <set>
 #include <sstream>
 #include <utility>
 
 #include "compensation/file/coefficient_keys.hpp"
-#include "compensation/file/yaml_reader.hpp"
 
 namespace kphi::compensation {
 namespace {
@@ -19,6 +22,108 @@ constexpr double kPerDegreeToPerRad = 180.0 / kPi;
 
 /// The fit's own rounding; beyond it an anchored line contradicts its K_T.
 constexpr double kAnchorTolerance = 1e-6;
+
+/// In quotes "unknown" is a text like any other.
+bool is_unknown(const YAML::Node& node) {
+  return !node.IsDefined() || node.IsNull() || (node.IsScalar() && node.Scalar() == "unknown" && node.Tag() != "!");
+}
+
+/// Values of a YAML map. Every member throws CoefficientError, with file and line, if the value is not what the
+/// member's name says. `unknown` and null count as not given.
+class YamlReader {
+ public:
+  /// The top of `text` must be a map without a key given twice anywhere below it.
+  YamlReader(const std::string& text, std::string path) : path_(std::move(path)) {
+    try {
+      top_ = YAML::Load(text);
+    } catch (const YAML::Exception& error) {
+      refuse_line(error.mark.line, "not YAML: " + error.msg, "restore the file as `kphi fit` wrote it");
+    }
+    if (!top_.IsMap()) refuse_line(0, "not a coefficient file", "give the coefficients.yaml that `kphi fit` wrote");
+    refuse_repeated_keys(top_);
+  }
+
+  [[nodiscard]] const YAML::Node& top() const { return top_; }
+
+  /// Undefined if the key is not given.
+  [[nodiscard]] YAML::Node optional(const YAML::Node& map, const std::string& key) const {
+    const YAML::Node value = map[key];
+    return is_unknown(value) ? YAML::Node(YAML::NodeType::Undefined) : value;
+  }
+  [[nodiscard]] YAML::Node required(const YAML::Node& map, const std::string& key) const {
+    const YAML::Node value = optional(map, key);
+    if (!value.IsDefined()) refuse(map, "`" + key + "` is missing here", kFitAgain);
+    return value;
+  }
+  [[nodiscard]] YAML::Node required_map(const YAML::Node& map, const std::string& key) const {
+    const YAML::Node value = required(map, key);
+    if (!value.IsMap()) refuse(value, "`" + key + "` must hold keys of its own", kFitAgain);
+    return value;
+  }
+  /// Empty if the key is not given.
+  [[nodiscard]] std::vector<YAML::Node> list(const YAML::Node& map, const std::string& key) const {
+    const YAML::Node value = optional(map, key);
+    if (!value.IsDefined()) return {};
+    if (!value.IsSequence()) refuse(value, "`" + key + "` must be a list", "write it as [ … ]");
+    return {value.begin(), value.end()};
+  }
+  [[nodiscard]] double number(const YAML::Node& node, const std::string& name) const {
+    const std::string text = node.IsScalar() ? node.Scalar() : std::string();
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) return value;
+    refuse(node, "`" + name + "` is " + (node.IsScalar() ? "`" + text + "`, " : "") + "not a finite number",
+           "write one finite number");
+  }
+  [[nodiscard]] double number_at(const YAML::Node& map, const std::string& key) const {
+    return number(required(map, key), key);
+  }
+  [[nodiscard]] std::optional<double> optional_number_at(const YAML::Node& map, const std::string& key) const {
+    const YAML::Node value = optional(map, key);
+    return value.IsDefined() ? std::optional<double>(number(value, key)) : std::nullopt;
+  }
+  [[nodiscard]] std::optional<int> optional_count_at(const YAML::Node& map, const std::string& key) const {
+    const std::optional<double> value = optional_number_at(map, key);
+    if (!value) return std::nullopt;
+    if (*value < 0 || *value > 1e9 || *value != std::floor(*value))
+      refuse(optional(map, key), "`" + key + "` is not a count", "write a whole number, 0 or more");
+    return static_cast<int>(*value);
+  }
+  [[nodiscard]] bool truth_at(const YAML::Node& map, const std::string& key) const {
+    const YAML::Node value = required(map, key);
+    if (value.IsScalar() && (value.Scalar() == "true" || value.Scalar() == "false")) return value.Scalar() == "true";
+    refuse(value, "`" + key + "` is neither true nor false", "write true or false");
+  }
+  [[nodiscard]] std::string text_at(const YAML::Node& map, const std::string& key) const {
+    const YAML::Node value = required(map, key);
+    if (!value.IsScalar()) refuse(value, "`" + key + "` must be one word or text", kFitAgain);
+    return value.Scalar();
+  }
+  [[nodiscard]] std::string optional_text_at(const YAML::Node& map, const std::string& key) const {
+    return optional(map, key).IsDefined() ? text_at(map, key) : std::string();
+  }
+
+  /// "path:line: what; next_move".
+  [[noreturn]] void refuse(const YAML::Node& at, const std::string& what, const std::string& next_move) const {
+    refuse_line(at.Mark().line, what, next_move);
+  }
+
+ private:
+  void refuse_repeated_keys(const YAML::Node& node) const {
+    std::set<std::string> seen;
+    for (const auto& entry : node) {
+      if (node.IsMap() && entry.first.IsScalar() && !seen.insert(entry.first.Scalar()).second)
+        refuse(entry.first, "`" + entry.first.Scalar() + "` is given twice", "keep one of the two");
+      refuse_repeated_keys(node.IsMap() ? entry.second : entry);
+    }
+  }
+  [[noreturn]] void refuse_line(int line, const std::string& what, const std::string& next_move) const {
+    throw CoefficientError(path_ + ":" + std::to_string(line + 1) + ": " + what + "; " + next_move);
+  }
+
+  std::string path_;
+  YAML::Node top_;
+};
 
 /// N/(rad/s)² per unit of the file.
 double scale_of_unit(const YamlReader& reader) {
@@ -46,9 +151,8 @@ OverlapMeasure overlap_of(const YamlReader& reader) {
 
 std::optional<ThrustCoefficient> optional_coefficient(const YamlReader& reader, const YAML::Node& map,
                                                       const std::string& key, double scale) {
-  const std::optional<double> value = reader.optional_number_at(map, key);
-  if (!value) return std::nullopt;
-  return ThrustCoefficient(*value * scale);
+  const auto value = reader.optional_number_at(map, key);
+  return value ? std::optional(ThrustCoefficient(*value * scale)) : std::nullopt;
 }
 
 std::optional<LineUncertainty> read_uncertainty(const YamlReader& reader, const YAML::Node& map, double scale,
@@ -111,13 +215,11 @@ std::optional<std::pair<double, double>> read_range(const YamlReader& reader, co
                                                     const std::string& key) {
   const std::vector<YAML::Node> ends = reader.list(map, key);
   if (ends.empty()) return std::nullopt;
-  const auto refuse = [&] {
-    reader.refuse(reader.required(map, key), "`" + key + "` is not a range", "write [smallest, largest]");
-  };
-  if (ends.size() != 2) refuse();
-  const std::pair<double, double> range(reader.number(ends[0], key), reader.number(ends[1], key));
-  if (!(range.first >= 0.0) || !(range.second > range.first)) refuse();
-  return range;
+  if (ends.size() == 2) {
+    const std::pair<double, double> range(reader.number(ends[0], key), reader.number(ends[1], key));
+    if (range.first >= 0.0 && range.second > range.first) return range;
+  }
+  reader.refuse(reader.required(map, key), "`" + key + "` is not a range", "write [smallest, largest]");
 }
 
 std::pair<double, double> read_occlusions(const YamlReader& reader) {
@@ -184,7 +286,7 @@ void read_provenance(const YamlReader& reader, Coefficients& into) {
 void read_budgets(const YamlReader& reader, double scale, Coefficients& into) {
   if (!reader.optional(reader.top(), "uncertainty").IsDefined()) return;
   const YAML::Node map = reader.required_map(reader.top(), "uncertainty");
-  const auto u_of = [&](const YAML::Node& budget) -> std::optional<double> {
+  const auto u_of = [&](const YAML::Node& budget) {
     const auto u = reader.optional_number_at(budget, "u");
     return u ? std::optional<double>(*u * scale) : std::nullopt;
   };

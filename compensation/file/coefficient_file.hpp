@@ -8,12 +8,17 @@
 #include <utility>
 #include <vector>
 
-#include "compensation/file/coefficient_error.hpp"
-#include "compensation/overlap_measure.hpp"
+#include "compensation/convex_polygon.hpp"
 #include "compensation/thrust_curve.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::compensation {
+
+/// A coefficient file that cannot be used. The message is "file:line: what is wrong; the next step".
+class CoefficientError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 /// One coefficient file in SI units, whatever its k_unit. What the file leaves out or calls `unknown` is empty. Its
 /// keys are listed in coefficient_keys.hpp.

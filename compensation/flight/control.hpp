@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "compensation/flight/experiment.hpp"
 #include "compensation/flight/plant.hpp"
-#include "compensation/flight/reference.hpp"
 
 namespace kphi::flight {
 

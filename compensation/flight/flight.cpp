@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "compensation/flight/arm_motion.hpp"
+#include "compensation/flight/vehicle.hpp"
 
 namespace kphi::flight {
 namespace {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "compensation/flight/estimator.hpp"
 #include "compensation/flight/experiment.hpp"
+#include "compensation/flight/noise.hpp"
 #include "compensation/flight/pilot.hpp"
 
 namespace kphi::flight {

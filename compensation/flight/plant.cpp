@@ -1,7 +1,5 @@
 #include "compensation/flight/plant.hpp"
 
-#include "compensation/flight/runge_kutta.hpp"
-
 namespace kphi::flight {
 namespace {
 

@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 #include <array>
 
-#include "compensation/flight/loss_law.hpp"
+#include "compensation/flight/shadow.hpp"
 #include "compensation/flight/vehicle.hpp"
 
 namespace kphi::flight {
@@ -90,5 +90,16 @@ struct BodyMotion {
 [[nodiscard]] BodyMotion body_motion(const PlantState& state, const MassProperties& mass) noexcept;
 /// The inverse: a state at rest relative to a body at `motion`, level, with the rotors at `speed` [rad/s].
 [[nodiscard]] PlantState level_state(const BodyMotion& motion, const MassProperties& mass, double speed) noexcept;
+
+/// One classical fourth-order Runge-Kutta step; `slope(stage, y)` is dy/dt; `stage` 0, 1, 2 stands for the step's
+/// beginning, middle and end.
+template <class State, class Slope>
+[[nodiscard]] State runge_kutta_step(const State& y, double width, const Slope& slope) {
+  const State first = slope(0, y);
+  const State second = slope(1, State(y + width / 2 * first));
+  const State third = slope(1, State(y + width / 2 * second));
+  const State fourth = slope(2, State(y + width * third));
+  return y + width / 6 * (first + 2 * second + 2 * third + fourth);
+}
 
 }  // namespace kphi::flight

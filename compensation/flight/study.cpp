@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <functional>
 #include <future>
+#include <stdexcept>
+#include <utility>
 
 namespace kphi::flight {
 namespace {
+
+using compensation::ThrustCurve;
 
 double horizontal(const LegResult& leg) noexcept { return leg.mean_error.head<2>().norm(); }
 
@@ -18,7 +21,58 @@ void count_lost(Merits& merits, const Experiment& experiment, const FlightResult
   (plain ? merits.lost_plain : merits.lost_compensated) = true;
 }
 
+/// The slope first, then the start: the order of the draws.
+ThrustCurve drawn_curve(const ThrustCurve& curve, Random& random) {
+  const double steepness = random.normal(1.0, 0.03);
+  const auto drawn = curve.perturbed(random.normal(0.0, 0.01) * curve.thrust_coefficient(), steepness);
+  if (!drawn) throw std::invalid_argument("k(0) is not positive in a draw; check the coefficient file");
+  return *drawn;
+}
+
+/// The arms that stop short of the farthest one do so `factor` times as far.
+Angles with_margin(const Angles& arms, double factor) {
+  const Radians farthest = *std::max_element(arms.begin(), arms.end());
+  Angles moved = arms;
+  for (Radians& arm : moved) arm = farthest - factor * (farthest - arm);
+  return moved;
+}
+
+void draw_truth(Truth& truth, Random& random) {
+  truth.gamma = random.uniform(1.0, 1.5);
+  truth.mass = random.normal(1.0, 0.015);
+  for (double& factor : truth.thrust) factor = random.normal(1.0, 0.01);
+  for (double& error : truth.arm_error) error = random.normal(0.0, 0.02);
+  for (Eigen::Index i = 0; i < 2; ++i) truth.cog_error[i] = random.normal(0.0, 1.5e-3);
+  truth.drag *= random.uniform(1.0 / 3, 5.0 / 3);
+  for (Eigen::Index i = 0; i < 2; ++i) truth.wind[i] = random.normal(0.0, 0.1);
+}
+
+void draw_gains(Gains& gains, Random& random) {
+  const double root = std::sqrt(random.uniform(0.8, 2.0));
+  gains.attitude.head<2>() *= root;
+  gains.rate.head<2>() *= root;
+  gains.position.head<2>() *= random.uniform(5.0 / 6, 10.0 / 6);
+}
+
 }  // namespace
+
+Scene nominal_scene(const Vehicle& vehicle, const PilotSettings& pilot, const ThrustCurve& curve, std::uint64_t seed) {
+  Scene scene{vehicle, curve, {}, {}, pilot, seed};
+  scene.truth.drag = vehicle.build.air_drag_per_s;
+  return scene;
+}
+
+Scene drawn_scene(const Scene& nominal, std::size_t index) {
+  Random random(nominal.seed, index);
+  Scene scene = nominal;
+  scene.seed = random.bits();
+  scene.truth.law = static_cast<LossLaw>(index % kLossLaws);
+  draw_truth(scene.truth, random);
+  draw_gains(scene.pilot.gains, random);
+  scene.vehicle.o = with_margin(nominal.vehicle.o, random.uniform(0.4, 2.0));
+  scene.curve = drawn_curve(nominal.curve, random);
+  return scene;
+}
 
 FlightResult fly_one(std::size_t index, Scene scene, const Shadow& shadow, std::vector<TraceRow>* trace) {
   scene.seed = Random(scene.seed, index).bits();
@@ -37,21 +91,23 @@ Merits merits_of(const NineFlights& flights) noexcept {
   const auto leg = [&](ExperimentIndex flight, std::size_t index) -> const LegResult& {
     return flights[flight].legs[index];
   };
-  const auto distance = [&](ExperimentIndex flight, std::size_t index) { return leg(flight, index).mean_distance; };
   Merits merits;
   merits.hover_z_plain = leg(kHoverPlain, 1).mean_error.z();
   merits.hover_z_compensated = leg(kHoverCompensated, 1).mean_error.z();
   merits.hover_xy_plain = horizontal(leg(kHoverPlain, 1));
   merits.hover_xy_compensated = horizontal(leg(kHoverCompensated, 1));
-  merits.forward_x = (distance(kLevelPlain, 0) + distance(kLevelCompensated, 0) + distance(kRisingPlain, 0) +
-                      distance(kRisingCompensated, 0)) /
-                     4;
-  merits.forward_plain = (distance(kLevelPlain, 1) + distance(kLevelSwitched, 0) + distance(kRisingPlain, 1) +
-                          distance(kRisingSwitched, 0)) /
-                         4;
-  merits.forward_compensated = (distance(kLevelCompensated, 1) + distance(kLevelSwitched, 1) +
-                                distance(kRisingCompensated, 1) + distance(kRisingSwitched, 1)) /
-                               4;
+  using Place = std::pair<ExperimentIndex, std::size_t>;  // flight and leg
+  const auto mean_distance = [&](const std::array<Place, 4>& legs) {
+    double sum = 0;
+    for (const auto& [flight, index] : legs) sum += leg(flight, index).mean_distance;
+    return sum / 4;
+  };
+  merits.forward_x =
+      mean_distance({{{kLevelPlain, 0}, {kLevelCompensated, 0}, {kRisingPlain, 0}, {kRisingCompensated, 0}}});
+  merits.forward_plain =
+      mean_distance({{{kLevelPlain, 1}, {kLevelSwitched, 0}, {kRisingPlain, 1}, {kRisingSwitched, 0}}});
+  merits.forward_compensated =
+      mean_distance({{{kLevelCompensated, 1}, {kLevelSwitched, 1}, {kRisingCompensated, 1}, {kRisingSwitched, 1}}});
   merits.square_speed_ratio = (leg(kHoverSwitched, 0).mean_square_speed + leg(kHoverSwitched, 2).mean_square_speed) /
                               (2 * leg(kHoverSwitched, 1).mean_square_speed);
   for (std::size_t i = 0; i < flights.size(); ++i) count_lost(merits, kExperiments[i], flights[i]);
@@ -114,22 +170,11 @@ Findings findings_of(const std::vector<Draw>& draws) {
     found.hover_z_better = hover_better / static_cast<double>(found.draws);
     found.forward_better = forward_better / static_cast<double>(found.draws);
   }
-  const auto over = [&](auto of) {
+  for (std::size_t i = 0; i < kMerits.size(); ++i) {
     std::vector<double> values;
-    for (const Merits& merits : kept) values.push_back(std::invoke(of, merits));
-    return percentiles(std::move(values));
-  };
-  found.hover_z_plain = over(&Merits::hover_z_plain);
-  found.hover_z_compensated = over(&Merits::hover_z_compensated);
-  found.hover_z_ratio = over(&Merits::hover_z_ratio);
-  found.hover_xy_plain = over(&Merits::hover_xy_plain);
-  found.hover_xy_compensated = over(&Merits::hover_xy_compensated);
-  found.hover_xy_ratio = over(&Merits::hover_xy_ratio);
-  found.forward_x = over(&Merits::forward_x);
-  found.forward_plain = over(&Merits::forward_plain);
-  found.forward_compensated = over(&Merits::forward_compensated);
-  found.forward_ratio = over(&Merits::forward_ratio);
-  found.square_speed_ratio = over(&Merits::square_speed_ratio);
+    for (const Merits& merits : kept) values.push_back(kMerits[i].of(merits));
+    found.merits[i] = percentiles(std::move(values));
+  }
   return found;
 }
 

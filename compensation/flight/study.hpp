@@ -6,9 +6,20 @@
 #include <cstdint>
 #include <vector>
 
-#include "compensation/flight/draw.hpp"
+#include "compensation/flight/flight.hpp"
 
 namespace kphi::flight {
+
+/// The one set of circumstances that single flights use. `seed` is of the estimator's noise.
+[[nodiscard]] Scene nominal_scene(const Vehicle& vehicle, const PilotSettings& pilot,
+                                  const compensation::ThrustCurve& curve, std::uint64_t seed);
+
+/// Draw `index` of the seed of `nominal`, whatever was drawn before: γ 1 to 1.5, the three loss laws in turn, mass 1.5
+/// %, K_T 1 % per rotor, arm angles 0.02 rad, centre of gravity 1.5 mm per axis, draught 0.1 m/s per horizontal axis,
+/// the line's slope 3 % and intercept 0.01 K_T off; and times those of the vehicle file: stiffness of the attitude (its
+/// gain times that of the rates, each by the root) 0.8 to 2, kpxy 5/6 to 10/6, drag 1/3 to 5/3, how far arms stop short
+/// in O 0.4 to 2 (ranges are uniform, else standard deviations).
+[[nodiscard]] Scene drawn_scene(const Scene& nominal, std::size_t index);
 
 using NineFlights = std::array<FlightResult, kExperiments.size()>;
 
@@ -38,6 +49,31 @@ struct Merits {
 
 [[nodiscard]] Merits merits_of(const NineFlights& flights) noexcept;
 
+/// One of these numbers, as `kphi fly` prints it and writes it with --json.
+struct Merit {
+  const char* key;
+  const char* title;  ///< empty: only in JSON
+  const char* paper;  ///< what the paper found
+  double (*of)(const Merits&);
+};
+inline constexpr std::array<Merit, 11> kMerits{{
+    {"hover_z_plain_m", "hover z, O n.c. [m]", "0.17 / 0.159", [](const Merits& m) { return m.hover_z_plain; }},
+    {"hover_z_compensated_m", "hover z, O c. [m]", "-0.043 / 0.011 (unsigned)",
+     [](const Merits& m) { return m.hover_z_compensated; }},
+    {"hover_z_ratio", "hover z, c. over n.c.", "0.25 / 0.067", [](const Merits& m) { return m.hover_z_ratio(); }},
+    {"hover_xy_plain_m", "hover xy, O n.c. [m]", "0.246 / 0.078", [](const Merits& m) { return m.hover_xy_plain; }},
+    {"hover_xy_compensated_m", "hover xy, O c. [m]", "0.053 / 0.010",
+     [](const Merits& m) { return m.hover_xy_compensated; }},
+    {"hover_xy_ratio", "", "", [](const Merits& m) { return m.hover_xy_ratio(); }},
+    {"forward_x_m", "forward, X [m]", "0.077 to 0.121", [](const Merits& m) { return m.forward_x; }},
+    {"forward_plain_m", "forward, O n.c. [m]", "0.213 to 0.269", [](const Merits& m) { return m.forward_plain; }},
+    {"forward_compensated_m", "forward, O c. [m]", "0.104 to 0.139",
+     [](const Merits& m) { return m.forward_compensated; }},
+    {"forward_ratio", "forward, c. over n.c.", "0.52 and 0.62", [](const Merits& m) { return m.forward_ratio(); }},
+    {"square_speed_ratio", "mean speed^2, O hover, c./n.c.", "\"no additional power\"",
+     [](const Merits& m) { return m.square_speed_ratio; }},
+}};
+
 struct Draw {
   Scene scene;
   NineFlights flights;
@@ -60,13 +96,10 @@ struct Findings {
   std::size_t kept = 0;  ///< draws of which no flight was lost
   std::size_t lost_plain = 0;
   std::size_t lost_compensated = 0;
-  double hover_z_better = 0;  ///< share of the draws, |z|
-  double forward_better = 0;  ///< share of the draws
-  Percentiles hover_z_plain, hover_z_compensated, hover_z_ratio;
-  Percentiles hover_xy_plain, hover_xy_compensated, hover_xy_ratio;
-  Percentiles forward_x, forward_plain, forward_compensated, forward_ratio;
-  Percentiles square_speed_ratio;
-  /// Medians of the kept draws with one law of loss; they mean nothing if there are none.
+  double hover_z_better = 0;                         ///< share of the draws, |z|
+  double forward_better = 0;                         ///< share of the draws
+  std::array<Percentiles, kMerits.size()> merits{};  ///< in the order of kMerits
+  /// Medians of the kept draws with one law of loss; without meaning if there are none.
   struct OfLaw {
     std::size_t kept = 0;
     double hover_z_ratio = 0, forward_ratio = 0;

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "compensation/flight/paper.hpp"
 #include "compensation/flight/text.hpp"
 
 namespace kphi::flight {
@@ -96,16 +95,9 @@ std::string findings_table(const Findings& found) {
                      " without compensation, " + std::to_string(found.lost_compensated) +
                      " with or in X. Percentiles are over the " + std::to_string(found.kept) + " others.\n" +
                      padded("", 34) + "      p10      p50      p90   paper\n";
-  text += percentile_row("hover z, O n.c. [m]", found.hover_z_plain, "0.17 / 0.159");
-  text += percentile_row("hover z, O c. [m]", found.hover_z_compensated, "-0.043 / 0.011 (unsigned)");
-  text += percentile_row("hover z, c. over n.c.", found.hover_z_ratio, "0.25 / 0.067");
-  text += percentile_row("hover xy, O n.c. [m]", found.hover_xy_plain, "0.246 / 0.078");
-  text += percentile_row("hover xy, O c. [m]", found.hover_xy_compensated, "0.053 / 0.010");
-  text += percentile_row("forward, X [m]", found.forward_x, "0.077 to 0.121");
-  text += percentile_row("forward, O n.c. [m]", found.forward_plain, "0.213 to 0.269");
-  text += percentile_row("forward, O c. [m]", found.forward_compensated, "0.104 to 0.139");
-  text += percentile_row("forward, c. over n.c.", found.forward_ratio, "0.52 and 0.62");
-  text += percentile_row("mean speed^2, O hover, c./n.c.", found.square_speed_ratio, "\"no additional power\"");
+  for (std::size_t i = 0; i < kMerits.size(); ++i) {
+    if (*kMerits[i].title != '\0') text += percentile_row(kMerits[i].title, found.merits[i], kMerits[i].paper);
+  }
   text += "better with compensation: hover z in " + percent(found.hover_z_better) + ", forward flight in " +
           percent(found.forward_better) +
           " of the draws,\ncounting those as better that were lost without compensation only\n";

@@ -11,34 +11,82 @@
 #include <vector>
 
 #include "base/clock.hpp"
+#include "base/finding.hpp"
 #include "compensation/units.hpp"
-#include "daq/bench/supply_link.hpp"
 #include "drivers/ambient/air.hpp"
 #include "drivers/iq/service/audit.hpp"
 #include "drivers/iq/session/stopping.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
-#include "drivers/netbox/configuration/finding.hpp"
 #include "profiles/bench_config.hpp"
 #include "results/records.hpp"
 #include "results/run_writer.hpp"
 
 namespace kphi::daq {
 
-/// Work that is called again and again while this lives.
+class OutputEnable;
+
+/// The supply did not confirm switch_off().
+inline constexpr const char* kNotOff = "supply: output NOT confirmed off, it may be ON; cut the 12 V at the switch";
+
+/// Only OutputEnable can switch the output on; its destructor switches it off.
+class SupplyLink {
+ public:
+  virtual ~SupplyLink() = default;
+  /// One line: model, serial, firmware, and where.
+  [[nodiscard]] virtual std::string identity() const = 0;
+  /// Takes its readings since the last call. The guard's thread.
+  virtual std::size_t take(std::span<results::SupplyReading> out) = 0;
+  /// Why the link failed; empty while it works. Thread-safe.
+  [[nodiscard]] virtual std::string failure() const = 0;
+  /// Output off. Thread-safe; does not wait.
+  virtual void cut() noexcept = 0;
+  /// Output off, and waits until the supply confirms it. Returns why it may still be on; empty: it is off.
+  [[nodiscard]] virtual std::string switch_off() noexcept = 0;
+
+ private:
+  friend class OutputEnable;
+  /// Sets and verifies the limits, then switches the output on; returns once the voltage is there. Throws DeviceError.
+  virtual void switch_on() = 0;
+};
+
+/// The motor has power while this lives.
+class [[nodiscard]] OutputEnable {
+ public:
+  explicit OutputEnable(SupplyLink& supply) : supply_(supply) {
+    try {
+      supply_.switch_on();
+    } catch (...) {
+      (void)supply_.switch_off();
+      throw;
+    }
+  }
+  ~OutputEnable() { (void)supply_.switch_off(); }
+  OutputEnable(const OutputEnable&) = delete;
+  OutputEnable& operator=(const OutputEnable&) = delete;
+
+ private:
+  SupplyLink& supply_;
+};
+
+/// Work that runs periodically while this lives.
 class Background {
  public:
   virtual ~Background() = default;
 };
 
-/// The motor. Turn it only through MotorEnable (guard/motor_enable.hpp), whose destructor coasts it.
+/// The motor. Turn it only through MotorEnable (guard/guard.hpp), whose destructor coasts it.
 class MotorLink {
  public:
   virtual ~MotorLink() = default;
   /// Positive = counter-clockwise. Also renews the lease without which the driver coasts the motor by itself.
   virtual void spin_at(RadPerSec signed_speed) = 0;
   virtual void renew() noexcept = 0;
-  /// Sends the order to coast three times at once; tries also when the link has failed.
+  /// Sends the order to coast three times at once, also when the link has failed.
   virtual void emergency_stop() noexcept = 0;
+  /// Coasts and closes the link, before its power is cut. Until wake() only calls of the guard's thread may follow.
+  virtual void rest() {}
+  /// Connects again, to the same module. Throws DeviceError.
+  virtual void wake() {}
   /// Ramps down, coasts and watches until the rotor is at rest; returns at once. Ignored while another stop is under
   /// way.
   virtual void begin_stop(const iq::StopSettings& settings) = 0;
@@ -58,14 +106,14 @@ class MotorLink {
   [[nodiscard]] virtual std::string identity() const = 0;
 };
 
-/// The load cell's stream. A fresh one for every run: counters start at zero with it.
+/// The load cell's stream. Every run starts a new one, with counters at zero.
 class LoadCellLink {
  public:
   virtual ~LoadCellLink() = default;
   /// As last read: when the link was made, or at start().
   [[nodiscard]] virtual const netbox::Configuration& configuration() const = 0;
-  /// Findings of making the link, worst first; without faults, which throw.
-  [[nodiscard]] virtual std::vector<netbox::Finding> findings() const = 0;
+  /// Findings of connecting, worst first; faults throw instead.
+  [[nodiscard]] virtual std::vector<Finding> findings() const = 0;
   /// Reads the box's configuration and starts the stream. Throws DeviceError.
   virtual results::LoadCellScale start() = 0;
   virtual void stop() noexcept = 0;
@@ -87,7 +135,7 @@ class LoadCellLink {
 struct RunBeginning {
   double occlusion_deg = 0;
   int repetition = 1;
-  Instant after{0};  ///< bench time when the campaign's last run was accepted, before a resumption, too; 0: none
+  Instant after{0};  ///< bench time at which the campaign's last run was accepted, also before a resumption; 0: none
 };
 
 class Bench {
@@ -110,11 +158,11 @@ class Bench {
   [[nodiscard]] virtual Duration sync_interval() const = 0;
   /// A run begins; a bench in virtual time may be made again for it, which invalidates references to its parts.
   virtual void begin_run(const RunBeginning&) {}
-  /// Before somebody comes near: cuts the motor's power if kphi controls it, and waits until the supply confirms that.
-  /// The motor must be at rest. False: the motor still has power. Throws SafetyStop.
+  /// Before anybody comes near: cuts the motor's power if kphi controls it, and waits until the supply confirms it. The
+  /// motor must be at rest. False: the motor still has power. Throws SafetyStop.
   [[nodiscard]] virtual bool switch_off_power() = 0;
   /// After everybody has stepped back: restores the power, and connects to the module again if it was lost. Throws
-  /// DeviceError.
+  /// DeviceError, SafetyStop.
   virtual void restore_power() = 0;
   /// Keeps this computer awake while the handle lives; `why_not` becomes one line if that is impossible.
   [[nodiscard]] virtual std::shared_ptr<void> keep_awake(std::string& why_not) {

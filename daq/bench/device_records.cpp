@@ -10,85 +10,66 @@
 namespace kphi::daq {
 namespace {
 
-results::MotorChannel channel_of(iq::Quantity quantity) noexcept {
-  using results::MotorChannel;
-  switch (quantity) {
-    case iq::Quantity::speed:
-      return MotorChannel::speed;
-    case iq::Quantity::supply_voltage:
-      return MotorChannel::supply_voltage;
-    case iq::Quantity::supply_current:
-      return MotorChannel::supply_current;
-    case iq::Quantity::motor_current:
-      return MotorChannel::motor_current;
-    case iq::Quantity::coil_temperature:
-      return MotorChannel::coil_temperature;
-    case iq::Quantity::derate:
-      return MotorChannel::derate;
-    case iq::Quantity::drive_mode:
-      return MotorChannel::drive_mode;
-    case iq::Quantity::drive_pwm:
-      return MotorChannel::drive_pwm;
-    case iq::Quantity::fault_now:
-      return MotorChannel::fault_now;
-  }
-  return MotorChannel::speed;
-}
-
-results::EventKind event_kind_of(netbox::EventKind kind) noexcept {
-  using From = netbox::EventKind;
-  using To = results::EventKind;
-  switch (kind) {
-    case From::restarted:
-      return To::restarted;
-    case From::rebooted:
-      return To::rebooted;
-    case From::stalled:
-      return To::stalled;
-    case From::stall_ended:
-      return To::stall_ended;
-    case From::silent:
-      return To::silent;
-    case From::resumed:
-      return To::resumed;
-    case From::box_trouble:
-      return To::box_trouble;
-    case From::taken_over:
-      return To::taken_over;
-    case From::rdt_disabled:
-      return To::rdt_disabled;
-    case From::unreachable:
-      return To::unreachable;
-    case From::unusable:
-      return To::unusable;
-    case From::reconnected:
-      return To::reconnected;
-    case From::configuration_changed:
-      return To::configuration_changed;
-    case From::given_up:
-      return To::given_up;
-  }
-  return To::box_trouble;
-}
-
-struct MotorEvent {
-  iq::EventKind from;
-  results::EventKind to;
+template <class From, class To>
+struct Pair {
+  From from;
+  To to;
 };
 
-constexpr std::array kMotorEvents{
-    MotorEvent{iq::EventKind::connected, results::EventKind::motor_connected},
-    MotorEvent{iq::EventKind::no_answer, results::EventKind::motor_no_answer},
-    MotorEvent{iq::EventKind::module_reset, results::EventKind::motor_reset},
-    MotorEvent{iq::EventKind::module_silent, results::EventKind::motor_silent},
-    MotorEvent{iq::EventKind::coast_denied, results::EventKind::motor_coast_denied},
-    MotorEvent{iq::EventKind::lease_expired, results::EventKind::motor_lease_expired},
-    MotorEvent{iq::EventKind::port_lost, results::EventKind::motor_port_lost},
-    MotorEvent{iq::EventKind::another_module, results::EventKind::motor_another_module},
-    MotorEvent{iq::EventKind::slow_round_trip, results::EventKind::motor_slow_round_trip},
-    MotorEvent{iq::EventKind::host_absent, results::EventKind::motor_host_absent},
-    MotorEvent{iq::EventKind::let_go, results::EventKind::motor_let_go},
-};
+/// The table's entry for `from`; `unknown` without one.
+template <class From, class To, std::size_t N>
+To found_in(const std::array<Pair<From, To>, N>& table, From from, To unknown) noexcept {
+  for (const auto& entry : table) {
+    if (entry.from == from) return entry.to;
+  }
+  return unknown;
+}
+
+using Channel = results::MotorChannel;
+using Kind = results::EventKind;
+
+constexpr std::array<Pair<iq::Quantity, Channel>, 9> kChannels{{
+    {iq::Quantity::speed, Channel::speed},
+    {iq::Quantity::supply_voltage, Channel::supply_voltage},
+    {iq::Quantity::supply_current, Channel::supply_current},
+    {iq::Quantity::motor_current, Channel::motor_current},
+    {iq::Quantity::coil_temperature, Channel::coil_temperature},
+    {iq::Quantity::derate, Channel::derate},
+    {iq::Quantity::drive_mode, Channel::drive_mode},
+    {iq::Quantity::drive_pwm, Channel::drive_pwm},
+    {iq::Quantity::fault_now, Channel::fault_now},
+}};
+
+constexpr std::array<Pair<netbox::EventKind, Kind>, 14> kLoadCellEvents{{
+    {netbox::EventKind::restarted, Kind::restarted},
+    {netbox::EventKind::rebooted, Kind::rebooted},
+    {netbox::EventKind::stalled, Kind::stalled},
+    {netbox::EventKind::stall_ended, Kind::stall_ended},
+    {netbox::EventKind::silent, Kind::silent},
+    {netbox::EventKind::resumed, Kind::resumed},
+    {netbox::EventKind::box_trouble, Kind::box_trouble},
+    {netbox::EventKind::taken_over, Kind::taken_over},
+    {netbox::EventKind::rdt_disabled, Kind::rdt_disabled},
+    {netbox::EventKind::unreachable, Kind::unreachable},
+    {netbox::EventKind::unusable, Kind::unusable},
+    {netbox::EventKind::reconnected, Kind::reconnected},
+    {netbox::EventKind::configuration_changed, Kind::configuration_changed},
+    {netbox::EventKind::given_up, Kind::given_up},
+}};
+
+constexpr std::array<Pair<iq::EventKind, Kind>, 11> kMotorEvents{{
+    {iq::EventKind::connected, Kind::motor_connected},
+    {iq::EventKind::no_answer, Kind::motor_no_answer},
+    {iq::EventKind::module_reset, Kind::motor_reset},
+    {iq::EventKind::module_silent, Kind::motor_silent},
+    {iq::EventKind::coast_denied, Kind::motor_coast_denied},
+    {iq::EventKind::lease_expired, Kind::motor_lease_expired},
+    {iq::EventKind::port_lost, Kind::motor_port_lost},
+    {iq::EventKind::another_module, Kind::motor_another_module},
+    {iq::EventKind::slow_round_trip, Kind::motor_slow_round_trip},
+    {iq::EventKind::host_absent, Kind::motor_host_absent},
+    {iq::EventKind::let_go, Kind::motor_let_go},
+}};
 
 }  // namespace
 
@@ -98,7 +79,8 @@ results::LoadCellRecord to_record(const netbox::StampedRecord& stamped) noexcept
 }
 
 results::MotorReading to_reading(const iq::Reading& reading) noexcept {
-  return {channel_of(reading.quantity), reading.time.count(), reading.uncertainty.count(), reading.value};
+  return {found_in(kChannels, reading.quantity, Channel::speed), reading.time.count(), reading.uncertainty.count(),
+          reading.value};
 }
 
 netbox::StampedRecord to_stamped(const results::LoadCellRecord& record) noexcept {
@@ -108,20 +90,18 @@ netbox::StampedRecord to_stamped(const results::LoadCellRecord& record) noexcept
 results::StreamEvent to_event(const netbox::Event& event) {
   std::string text = netbox::to_string(event);
   if (event.kind == netbox::EventKind::rebooted) text += "; the steps that follow in this run are flagged";
-  return {event_kind_of(event.kind), event.at.count(), event.records, std::move(text)};
+  return {found_in(kLoadCellEvents, event.kind, Kind::box_trouble), event.at.count(), event.records, std::move(text)};
 }
 
 results::StreamEvent to_event(const iq::Event& event) {
-  const auto* known = std::find_if(kMotorEvents.begin(), kMotorEvents.end(),
-                                   [&](const MotorEvent& each) { return each.from == event.kind; });
   // An unknown kind is treated as the worst.
-  const auto kind = known != kMotorEvents.end() ? known->to : results::EventKind::motor_silent;
+  const Kind kind = found_in(kMotorEvents, event.kind, Kind::motor_silent);
   return {kind, event.time.count(), 0, fmt::format("{:.3f} s: {}", to_seconds(event.time), event.words)};
 }
 
 bool ends_a_run(results::EventKind kind) noexcept {
   return std::any_of(kMotorEvents.begin(), kMotorEvents.end(),
-                     [&](const MotorEvent& each) { return each.to == kind && iq::spoils_a_run(each.from); });
+                     [&](const auto& each) { return each.to == kind && iq::spoils_a_run(each.from); });
 }
 
 results::StreamHealth to_health(const netbox::Health& health, const Clock& clock) noexcept {

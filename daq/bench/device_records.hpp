@@ -1,7 +1,7 @@
 // Converts the drivers' types to those of a run file, and back where a driver's function needs records.
 #pragma once
 
-#include "drivers/iq/exchange/reading.hpp"
+#include "drivers/iq/exchange/telemetry.hpp"
 #include "drivers/iq/session/events.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
 #include "drivers/netbox/stream/events.hpp"

@@ -25,7 +25,8 @@ json to_json(const results::RepetitionVerdict& verdict) {
                     {"k_n_s2_per_rad2", number(figure.k)},
                     {"u_k", number(figure.u)},
                     {"usable", figure.usable},
-                    {"outlying", figure.outlying}});
+                    {"outlying", figure.outlying},
+                    {"p", number(figure.p)}});
   }
   return {{"occlusion_deg", verdict.occlusion_deg},
           {"repetitions", list},
@@ -118,13 +119,12 @@ int CampaignReview::repetitions(double occlusion_deg) const {
 std::optional<AnotherRun> CampaignReview::another(double occlusion_deg) {
   const int made = repetitions(occlusion_deg);
   if (made < campaign_.repetitions) return std::nullopt;
-  std::vector<StepMean> rows;
-  std::copy_if(steps_.begin(), steps_.end(), std::back_inserter(rows),
-               [&](const StepMean& step) { return step.occlusion_deg == occlusion_deg; });
   results::RepetitionRule rule;
   rule.wanted = campaign_.repetitions;
   rule.at_most = campaign_.repetitions + campaign_.repetitions_extra_max;
-  const results::RepetitionVerdict verdict = judge_repetitions(rows, rule).at(0);
+  const auto verdicts = judge_repetitions(steps_, rule);
+  const results::RepetitionVerdict verdict = *std::find_if(
+      verdicts.begin(), verdicts.end(), [&](const auto& one) { return one.occlusion_deg == occlusion_deg; });
   if (made > 1 || !verdict.reason.empty()) {
     progress_.say(to_words(verdict));
     note_("repetitions_judged", to_json(verdict));

@@ -1,4 +1,4 @@
-// What the runs of a campaign show, run by run: rows, the motor's cap, hysteresis, repetitions, drift of the bench.
+// Results of a campaign, run by run: step means, the motor's speed cap, hysteresis, repetitions, drift of the bench.
 #pragma once
 
 #include <functional>

@@ -11,9 +11,10 @@
 #include "base/error.hpp"
 #include "daq/audit/bench_audit.hpp"
 #include "daq/campaign/campaign_review.hpp"
-#include "daq/guard/awake.hpp"
-#include "daq/guard/interrupt.hpp"
+#include "daq/campaign/resume.hpp"
+#include "daq/guard/interlock.hpp"
 #include "daq/guard/rest_guard.hpp"
+#include "daq/guard/run_stopped.hpp"
 #include "daq/run/run.hpp"
 #include "profiles/plan.hpp"
 #include "profiles/strict_yaml.hpp"
@@ -43,15 +44,7 @@ std::string rest_words(const std::optional<iq::StopReport>& stop) {
   return fmt::format(", at rest after {:.1f} s", to_seconds(*stop->time_to_standing));
 }
 
-bool is_safety_stop(const std::exception_ptr& cause) {
-  try {
-    std::rethrow_exception(cause);
-  } catch (const SafetyStop&) {
-    return true;
-  } catch (...) {
-    return false;
-  }
-}
+bool is_safety_stop(const std::exception_ptr& cause) { return as<SafetyStop>(cause) != nullptr; }
 
 class CampaignRun {
  public:
@@ -103,7 +96,7 @@ class CampaignRun {
   }
 
  private:
-  /// Records why, and throws it again with what the person needs to continue.
+  /// Records the cause, and throws it again with what the person needs to continue.
   [[noreturn]] void end_early(std::exception_ptr cause) {
     if (has_slept(bench_.clock()) && !is_safety_stop(cause)) {
       SafetyStop stop(slept(bench_.clock()));
@@ -253,7 +246,7 @@ class CampaignRun {
     return awake;
   }
 
-  /// The motor is at rest meanwhile, and watched.
+  /// Waits for the coil while a RestGuard watches the motor at rest.
   void cool_down() {
     const auto& limits = campaign_.limits;
     if (!limits.cooling) return;
@@ -294,8 +287,8 @@ class CampaignRun {
          {{"propeller", campaign_.propeller.id}, {"occlusion_deg", occlusion_deg}, {"confirmed_by", person_.name()}});
   }
 
-  /// Asks for the mounting only once the rotor was seen at rest, without power if kphi controls the supply. Guarded to
-  /// the end.
+  /// Asks for the mounting only once the rotor is seen at rest, without power if kphi controls the supply. A RestGuard
+  /// watches all the time.
   MountConfirmation let_mount(double occlusion_deg) {
     std::optional<RestGuard> guard(std::in_place, bench_, true);
     guard->await_rest(stop_asked_);
@@ -312,7 +305,7 @@ class CampaignRun {
     return confirmed;
   }
 
-  /// The file is complete, named and on disk: the journal's line accepts it. The tables follow from the files.
+  /// The file is complete, named and on disk: the journal's line accepts it. The tables are made from the files.
   void accept(const RunResult& run, const profiles::PlannedRun& planned) {
     const results::RunRecording recording = results::read_run(run.file);
     const std::uint64_t lost = run.account.lost_network + run.account.lost_host;
@@ -322,7 +315,7 @@ class CampaignRun {
                      {"lost", lost}};
     const auto driven = std::count_if(recording.phases.begin(), recording.phases.end(),
                                       [](const auto& mark) { return mark.phase == results::Phase::step; });
-    // For lack of drive, in earlier runs or in this one.
+    // Skipped at full drive, learned in earlier runs or in this one.
     if (const auto left_out = static_cast<std::ptrdiff_t>(planned.steps.size()) - driven; left_out > 0)
       accepted["steps_left_out"] = left_out;
     if (run.stop) accepted["stop"] = to_json(*run.stop);
@@ -358,7 +351,7 @@ class CampaignRun {
     journal_.append(event, data, now.count(), utc_text(bench_.clock(), now));
   }
 
-  /// After a failure, which matters more than a disk that refuses this line.
+  /// After a failure, which matters more than an error while this line is written.
   void note_the_end(const std::string& event, const json& data) {
     try {
       note(event, data);

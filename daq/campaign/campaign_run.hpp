@@ -6,9 +6,8 @@
 
 #include "daq/audit/bench_audit.hpp"
 #include "daq/bench/bench.hpp"
-#include "daq/guard/interlock.hpp"
 #include "daq/campaign/operator.hpp"
-#include "daq/campaign/resume.hpp"
+#include "daq/guard/interlock.hpp"
 #include "daq/run/progress.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
@@ -16,8 +15,10 @@
 
 namespace kphi::daq {
 
+struct Resumption;
+
 /// Whether to wait before the next run, with hysteresis: a pause begins above `pause_above` and ends below
-/// `resume_below`. A temperature that is not a number begins a pause and ends none.
+/// `resume_below`. NaN begins a pause and never ends one.
 struct CoolingRule {
   double pause_above_degc = std::numeric_limits<double>::infinity();
   double resume_below_degc = std::numeric_limits<double>::infinity();

@@ -1,4 +1,4 @@
-// What a campaign will do and need, and whether it may: printed before any device is touched.
+// What a campaign will do and need, and what is wrong with it: printed before any device is touched.
 #pragma once
 
 #include <cstdint>
@@ -9,18 +9,33 @@
 #include <vector>
 
 #include "base/finding.hpp"
+#include "compensation/units.hpp"
 #include "daq/guard/guard_limits.hpp"
 #include "profiles/answers.hpp"
+#include "profiles/campaign.hpp"
 #include "profiles/plan.hpp"
 #include "results/file_layer.hpp"
 
 namespace kphi::daq {
 
+/// The thrust to expect of a propeller that was never measured, without occlusion.
+struct ThrustPrior {
+  ThrustCoefficient low;
+  ThrustCoefficient high;
+  std::string source;
+  [[nodiscard]] static Newtons at(ThrustCoefficient k, RadPerSec speed) {
+    return Newtons(k.value() * speed.value() * speed.value());
+  }
+};
+
+/// By diameter and number of blades; nullopt without a published measurement. A plausibility check, not a result.
+[[nodiscard]] std::optional<ThrustPrior> thrust_prior(const profiles::Propeller& propeller);
+
 /// One check of a plan. A note: passed, if it was judged. A fault: the campaign would be refused or stopped.
 struct PlanCheck {
   std::string subject;  ///< "speed", "thrust", …
   Finding finding;
-  bool judged = true;  ///< false: not checked, because only a device can tell, or nothing is known
+  bool judged = true;  ///< false: not checked: it needs a device, or data that are not known
 };
 
 struct DryRun {

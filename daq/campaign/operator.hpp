@@ -1,18 +1,20 @@
-// The person who mounts occlusions and takes the decisions that a program cannot.
+// The person who mounts occlusions and takes the decisions that a program cannot; or a file with their answers.
 #pragma once
 
+#include <cstddef>
 #include <cstdio>
 #include <functional>
 #include <optional>
 #include <string>
 
-#include "daq/guard/interrupt.hpp"
-#include "daq/run/mount_confirmation.hpp"
+#include "daq/guard/run_stopped.hpp"
+#include "daq/run/run_order.hpp"
+#include "profiles/answers.hpp"
 #include "profiles/campaign.hpp"
 
 namespace kphi::daq {
 
-/// The person said no, or there was nobody to ask. This mounting has no record.
+/// The person said no, or there was nobody to ask. This mounting is not recorded.
 class NotMounted : public Interrupted {
  public:
   using Interrupted::Interrupted;
@@ -22,12 +24,12 @@ class NotMounted : public Interrupted {
 struct AnotherRun {
   double occlusion_deg = 0;
   std::string reason;         ///< one line
-  int extra = 1;              ///< it would be the first, the second … beyond those planned
-  int extra_max = 1;          ///< that the campaign allows
+  int extra = 1;              ///< number of this run among those beyond the plan, from 1
+  int extra_max = 1;          ///< the campaign allows this many
   bool mounted_anew = false;  ///< the occlusion must be mounted again before it
 };
 
-/// Whoever stands at the bench. All members are called from the runner's thread, while the motor coasts.
+/// The person at the bench. All members are called from the runner's thread, while the motor coasts.
 class Operator {
  public:
   /// Records each question and each answer, right or wrong, as it comes.
@@ -41,17 +43,17 @@ class Operator {
     mount(propeller, occlusion_deg, condition);
     return MountConfirmation(occlusion_deg);
   }
-  /// Shows what stopped the campaign and asks whether somebody has looked at the stand since. Returns if it may
+  /// Shows what stopped the campaign and asks whether a person has looked at the stand since. Returns if it may
   /// continue; throws NotMounted if the person says no, ConfigurationError if there is nobody to ask.
   virtual void clear_safety_stop(const std::string& reason);
-  /// Asks whether to run it again; no, when nobody is there. Throws Interrupted when the person wants to stop.
+  /// Asks whether to run the occlusion again; false without a person. Throws Interrupted if the person wants to stop.
   [[nodiscard]] virtual bool run_again(const AnotherRun&) { return false; }
   /// No more questions follow. Throws ConfigurationError if answers are left over.
   virtual void finish() {}
   /// How it answers, for the record: "terminal", "--yes", "answers.yaml".
   [[nodiscard]] virtual std::string name() const { return "program"; }
   void log_to(AuditLog log) { log_ = std::move(log); }
-  /// `poll` is called again and again while a person is waited for; an exception from it ends the question.
+  /// `poll` is called periodically while kphi waits for a person; an exception from it ends the question.
   void while_waiting(std::function<void()> poll) { poll_ = std::move(poll); }
 
  protected:
@@ -70,11 +72,11 @@ class Operator {
   std::function<void()> poll_;
 };
 
-/// Takes every mounting as done (`--yes`): for a simulated bench, or a robot. Runs an occlusion again at most once; a
-/// person should look at what still disagrees then.
+/// Takes every mounting as done (`--yes`): for a simulated bench, or a robot. Runs an occlusion again at most once; if
+/// the repetitions still disagree, a person should look at the stand.
 class AutoConfirmOperator final : public Operator {
  public:
-  /// `clears_safety_stops`: of a simulated bench, at which nobody can be hurt.
+  /// `clears_safety_stops`: only for a simulated bench, where nobody can be hurt.
   explicit AutoConfirmOperator(bool clears_safety_stops = false) : clears_safety_stops_(clears_safety_stops) {}
   void clear_safety_stop(const std::string& reason) override;
   [[nodiscard]] bool run_again(const AnotherRun& question) override { return question.extra == 1; }
@@ -91,7 +93,7 @@ class AutoConfirmOperator final : public Operator {
 /// "q" or end of file means no.
 class TerminalOperator final : public Operator {
  public:
-  /// `stop_asked`: true when a signal came while waiting.
+  /// `stop_asked`: true after a signal.
   TerminalOperator(int input_descriptor, std::FILE* words, std::function<bool()> stop_asked)
       : input_(input_descriptor), words_(words), stop_asked_(std::move(stop_asked)) {}
   [[nodiscard]] bool run_again(const AnotherRun& question) override;
@@ -109,6 +111,27 @@ class TerminalOperator final : public Operator {
   int input_;
   std::FILE* words_;
   std::function<bool()> stop_asked_;
+};
+
+/// Strict: each question takes the next answer of its kind. A missing, wrong or left-over answer throws
+/// ConfigurationError with its line in the file. Agreeing to another run of an occlusion that is mounted again for each
+/// run also confirms that mounting.
+class AnsweringOperator final : public Operator {
+ public:
+  explicit AnsweringOperator(profiles::Answers answers) : answers_(std::move(answers)) {}
+  [[nodiscard]] bool run_again(const AnotherRun& question) override;
+  void clear_safety_stop(const std::string& reason) override;
+  void finish() override;
+  [[nodiscard]] std::string name() const override { return answers_.path; }
+
+ protected:
+  void mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string& condition) override;
+
+ private:
+  profiles::Answers answers_;
+  std::size_t mountings_ = 0;  ///< taken
+  std::size_t decisions_ = 0;  ///< taken
+  bool remounting_ = false;    ///< the next mounting belongs to another run that was agreed to
 };
 
 }  // namespace kphi::daq

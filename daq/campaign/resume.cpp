@@ -4,8 +4,8 @@
 
 #include "base/error.hpp"
 #include "profiles/strict_yaml.hpp"
+#include "results/file_layer.hpp"
 #include "results/journal.hpp"
-#include "results/sha256.hpp"
 #include "results/version.hpp"
 
 namespace kphi::daq {

@@ -16,7 +16,7 @@ namespace kphi::daq {
 struct Resumption {
   results::CampaignState state;
   std::string cleared_by;       ///< name of the operator who cleared the safety stop; empty: not cleared
-  bool accept_changes = false;  ///< the person wants to resume in spite of changes
+  bool accept_changes = false;  ///< resume in spite of changes
 };
 
 /// Program and files, and, once `bench` is connected, devices, as the journal's first line records them.

@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "daq/guard/awake.hpp"
-#include "daq/guard/supply_interlock.hpp"
+#include "daq/guard/interlock.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -18,7 +17,7 @@ constexpr std::size_t kAtOnce = 1024;
 constexpr Duration kSecondCheckWall = std::chrono::milliseconds(20);
 constexpr double kPatienceAtRest = 0.5;  // s
 constexpr double kNoDerate = 0.9999;     // one count of the module's fix16 is 1.5e-5
-/// What is younger is shown as present: this computer's own delay, and three times that of the device.
+/// Younger values are shown as present: this computer's own delay, plus three times the device's.
 constexpr Duration kFreshWall = std::chrono::milliseconds(60);
 constexpr Duration kFreshMotor = std::chrono::milliseconds(100);
 /// How late this computer may send a speed and take the reading that answers it; wall time.
@@ -95,7 +94,7 @@ void Guard::poll() noexcept {
     for (Stream* stream : {&load_cell_stream_, &motor_stream_, &supply_stream_}) judge_silence(*stream, now, spinning);
     polled_ns_ = now.count();
   } catch (...) {
-    bench_.motor().emergency_stop();  // before words, for which there may be no memory
+    bench_.motor().emergency_stop();  // first: there may be no memory for the message
     trip_state(Source::guard, "the guard failed");
   }
 }
@@ -168,8 +167,8 @@ void Guard::judge(const results::LoadCellRecord& sample) {
   observer_.take(sample);
 }
 
-/// A faulty box stops the run also at rest, since the zeros are taken from these samples; saturation and trouble with
-/// a network may pass until the motor turns.
+/// A faulty box stops the run also at rest, since the zeros are taken from these samples; saturation and network
+/// trouble stop it only while the motor turns.
 void Guard::judge_status(const results::LoadCellRecord& sample) {
   const StatusWatch::State state = status_watch_.take(sample);
   if (auto event = status_watch_.take_event()) pending_events_.push_back(std::move(*event));
@@ -205,7 +204,7 @@ void Guard::judge(const results::SupplyReading& reading) {
   observer_.take(reading);
 }
 
-/// Also when the newest sample is fresh: after a break of the network or of this computer nobody saw what happened.
+/// Also when the newest sample is fresh: nothing was judged during a break of the network or of this computer.
 void Guard::judge_gap(const results::LoadCellRecord& sample) {
   const std::optional<std::uint32_t> before = std::exchange(last_sequence_, sample.ft_sequence);
   const GuardLimit* patience = limit_of(Watched::load_cell_age);
@@ -220,7 +219,12 @@ void Guard::judge_gap(const results::LoadCellRecord& sample) {
 
 void Guard::judge_links() {
   const auto judge = [this](Source source, const std::string& failure) {
-    if (!failure.empty()) trip_state(source, failure);
+    if (failure.empty()) return;
+    Trip failed;
+    failed.reason = failure;
+    failed.source = source;
+    failed.link_failed = true;
+    trip(std::move(failed));
   };
   judge(Source::motor, bench_.motor().failure());
   judge(Source::load_cell, bench_.load_cell().failure());
@@ -264,7 +268,7 @@ void Guard::notice_sleep() noexcept {
 
 void Guard::mark(const results::PhaseMark& mark) {
   step_ = mark.step;
-  if (!marks_.push(mark)) throw SafetyStop("the guard has stalled: it takes no more marks");
+  if (!marks_.push(mark)) throw SafetyStop("the guard has stalled: its queue of marks is full");
 }
 
 void Guard::check(bool spinning) {

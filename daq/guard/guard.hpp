@@ -6,13 +6,13 @@
 //               the box's status word (status_watch.hpp), also at rest: zeros are taken then
 //   motor       every reading by itself: a checksum protects it, and the module has filtered it
 //   supply      every reading: its state, its settings, its meters
-//   silence     the age of the newest of each stream; twice, so that what waits in this computer's sockets is taken
-//   first the runner  its heartbeat; the runner in turn checks the guard's
+//   silence     the age of each stream's newest element; twice, so that what waits in this computer's sockets is taken
+//   the runner  its heartbeat, first; the runner in turn checks the guard's
 //
 // From the sample that exceeds a limit to the order to coast: 5 ms of its own on a live bench, plus the window of the
-// means. Silence is found 25 ms after its patience, a rotor that does not follow after that of speed_error.hpp. The
-// first trip holds. It is latched before the motor is coasted, and a MotorEnable checks the latch after each command:
-// in whichever order the two threads come, the motor coasts.
+// means. Silence is found 25 ms after its patience, a rotor that does not follow after the times in speed_error.hpp.
+// The first trip holds. It is latched before the motor is coasted, and a MotorEnable checks the latch after each
+// command: in whichever order the two threads come, the motor coasts.
 #pragma once
 
 #include <array>
@@ -22,10 +22,10 @@
 #include <vector>
 
 #include "base/published.hpp"
+#include "daq/bench/bench.hpp"
 #include "daq/bench/streams.hpp"
 #include "daq/guard/interlock.hpp"
 #include "daq/guard/observation.hpp"
-#include "daq/guard/relay.hpp"
 #include "daq/guard/status_watch.hpp"
 
 namespace kphi::daq {
@@ -36,11 +36,11 @@ class Guard final : public Streams {
   Guard(Bench& bench, const profiles::BenchConfig& config, const results::LoadCellScale& scale,
         const std::vector<GuardLimit>& limits);
 
-  /// Takes what the devices have, judges it, publishes it; coasts the motor after a trip. The guard's thread, again and
-  /// again.
+  /// Takes what the devices have, judges and publishes it; coasts the motor after a trip. The guard's thread calls it
+  /// periodically.
   void poll() noexcept;
-  /// Takes, judges and passes on what the devices have. True: something moved. The guard's thread, or whoever comes
-  /// after it.
+  /// Takes, judges and passes on what the devices have. True: something moved. The guard's thread, or after its end the
+  /// runner's.
   bool relay();
 
   // The recorder's thread.
@@ -54,17 +54,17 @@ class Guard final : public Streams {
   void mark(const results::PhaseMark& mark);
   /// Mean of each axis without load, N and N m. Thrust and torque are judged from then on.
   void take_zero(const std::array<double, 6>& mean) noexcept { observer_.take_zero(mean); }
-  /// Until then a change of speed may load the supply as it likes.
+  /// Until then sag, rise and current limit of the supply are excused: the speed is changing.
   void settles_until(Instant when) noexcept { settled_from_ = when.count(); }
   /// Heartbeat of the run thread; to be called before every order that turns the motor. Throws SafetyStop after a trip,
   /// if the guard has stalled, or if runner or computer were away for so long that the module may have coasted the
   /// motor.
   void check(bool spinning);
-  /// What the guard saw last, as it is at bench time `now`.
+  /// What the guard saw last, with its age at bench time `now`.
   [[nodiscard]] Observation observe(Instant now) const;
   /// Trips when this computer has slept. Any thread.
   void notice_sleep() noexcept;
-  /// From now on nothing trips: the motor was coasted for another reason, and the supply is switched off.
+  /// From now on nothing trips: the motor coasts for another reason, and the supply is switched off.
   void stand_down() noexcept { judging_ = false; }
 
   [[nodiscard]] const Latch& latch() const noexcept { return latch_; }
@@ -119,6 +119,53 @@ class Guard final : public Streams {
   std::atomic<int> step_{-1};
   std::atomic<std::int64_t> polled_ns_, beat_ns_, settled_from_{0};
   std::atomic<double> pause_s_{kUnknown};  ///< between the last two heartbeats while the motor turns
+};
+
+/// The motor may turn while a MotorEnable lives. Its destructor coasts the motor at once, unless a stop of its own was
+/// confirmed. After a trip the motor does not turn again.
+class MotorEnable {
+ public:
+  /// `direction` +1 counter-clockwise, -1 clockwise.
+  MotorEnable(MotorLink& motor, int direction, Guard& guard) noexcept
+      : motor_(motor), direction_(direction), guard_(guard) {}
+  ~MotorEnable() {
+    if (!coasting_) motor_.emergency_stop();
+  }
+  MotorEnable(const MotorEnable&) = delete;
+  MotorEnable& operator=(const MotorEnable&) = delete;
+
+  /// Unsigned speed. Throws SafetyStop if the guard does not allow it now. A trip during this call is seen afterwards:
+  /// the last order is then its order to coast, or the destructor's.
+  void at(RadPerSec speed) {
+    guard_.check(true);
+    coasting_ = stopping_ = false;
+    try {
+      motor_.spin_at(RadPerSec(direction_ * speed.value()));
+    } catch (const DeviceError& error) {
+      throw SafetyStop(StopWords{.cause = error.what(), .motor_failure = MotorFailure::event_to_come});
+    }
+    guard_.latch().check();
+  }
+  /// Feeds the driver's watchdog.
+  void renew() noexcept { motor_.renew(); }
+  /// Coasts, after a ramp if the settings ask for one; returns at once.
+  void begin_stop(const iq::StopSettings& settings = {}) {
+    motor_.begin_stop(settings);
+    stopping_ = true;
+  }
+  /// How the stop ended; nullopt while it is under way.
+  [[nodiscard]] std::optional<iq::StopReport> stopped() {
+    auto report = stopping_ ? motor_.stop_report() : std::nullopt;
+    coasting_ = report && report->safe();
+    return report;
+  }
+
+ private:
+  MotorLink& motor_;
+  int direction_;
+  Guard& guard_;
+  bool stopping_ = false;
+  bool coasting_ = false;  ///< the module has confirmed that it coasts
 };
 
 }  // namespace kphi::daq

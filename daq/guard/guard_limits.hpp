@@ -1,4 +1,4 @@
-// What the guard watches, and up to where. One row per guarded quantity serves guard, --dry-run, live page and replay;
+// The guarded quantities and their limits. One row per guarded quantity serves guard, --dry-run, live page and replay;
 // of several limits on one quantity the tightest holds, and names its source.
 #pragma once
 
@@ -35,13 +35,13 @@ enum class Watched : std::uint8_t {
   motor_age,
   supply_age,
   pause,
-  samples_missing,  ///< s of the load cell's stream in a row, while the motor turns; has no row, nor have the next two
-  sleep,            ///< of this computer; any
-  state,            ///< no quantity: what a device says of itself
+  samples_missing,  ///< s of the load cell's stream in a row, while the motor turns; this and the next two have no row
+  sleep,            ///< of this computer, however short
+  state,            ///< no quantity: trouble that a device reports
 };
 inline constexpr std::size_t kWatchedCount = static_cast<std::size_t>(Watched::samples_missing);
 
-/// Who told what was judged, or failed.
+/// What reported a value or a failure.
 enum class Source : std::uint8_t { load_cell, motor, supply, runner, computer, guard };
 
 /// On which side of its limit a quantity is safe.
@@ -49,7 +49,7 @@ enum class Sense : std::uint8_t { upper, lower };
 
 using CampaignLimit = std::optional<double> (*)(const profiles::Limits&);
 
-/// All there is to say of one guarded quantity, but how it is measured (observation.cpp) and what a device limits.
+/// One guarded quantity, except how it is measured (observation.cpp) and how a device limits it (guard_limits.cpp).
 struct GuardedQuantity {
   Watched watched;
   Source source;
@@ -96,7 +96,7 @@ inline constexpr std::array<GuardedQuantity, kWatchedCount> kQuantities{{
     {Watched::speed, Source::motor, Sense::upper, "speed", "RPM", "speed_rpm", "Speed", kCheckRotor, "speed_max_rpm",
      [](const profiles::Limits& limits) { return std::optional(kOvershoot * to_rpm(limits.speed_max)); },
      ", 5 % overshoot allowed"},
-    // Of the command, beside 20 rad/s: see speed_error.hpp.
+    // Share of the command, in addition to 20 rad/s: see speed_error.hpp.
     {Watched::speed_error, Source::motor, Sense::upper, "speed error", "%", "speed_error_percent", "Speed error",
      kCheckStand, "speed_error_max_percent",
      [](const profiles::Limits& limits) {
@@ -122,7 +122,7 @@ inline constexpr std::array<GuardedQuantity, kWatchedCount> kQuantities{{
     {Watched::coil_temperature, Source::motor, Sense::upper, "coil temperature", "°C", "coil_degc", "Coil",
      "let the motor cool; add limits.cooling to the campaign, or use shorter steps", "coil_temperature_max_degc",
      [](const profiles::Limits& limits) { return std::optional(limits.coil_temperature_max.value()); }},
-    // Of wall time, while the motor turns; so are the next three.
+    // Wall time, while the motor turns; likewise the next three.
     {Watched::load_cell_age, Source::load_cell, Sense::upper, "age of the newest load-cell sample", "s",
      "load_cell_age_s", "Cell silent", kCheckBox},
     {Watched::motor_age, Source::motor, Sense::upper, "age of the newest motor reading", "s", "motor_age_s",
@@ -157,9 +157,9 @@ struct GuardLimit {
   friend bool operator==(const GuardLimit&, const GuardLimit&) = default;
 };
 
-/// What the devices reported when they were connected.
+/// Limits that the devices reported when they were connected.
 struct DeviceLimits {
-  std::array<double, 6> load_cell_range{};  ///< N and N m; 0: not known
+  std::array<double, 6> load_cell_range{};  ///< N and N m; 0: unknown
   iq::AuditRecord motor;
 };
 
@@ -173,7 +173,7 @@ struct DeviceLimits {
                                                      const profiles::BenchConfig& config,
                                                      const DeviceLimits* devices = nullptr);
 
-/// "thrust                               above 20 N        campaign limits.thrust_max_n": where the motor coasts.
+/// "thrust                               above 20 N        campaign limits.thrust_max_n", one line per limit.
 [[nodiscard]] std::vector<std::string> to_lines(const std::vector<GuardLimit>& limits);
 
 /// "below 5 V", "above 20 N".
@@ -185,7 +185,7 @@ struct DeviceLimits {
 }
 
 inline constexpr double kRangeBorne = 1.1;  ///< share of a range of the load cell: beyond it the cell is in danger
-/// Instrumented, a live bench is many times slower; a bench in process lives in virtual time.
+/// A sanitizer makes a live bench many times slower; a bench in process has virtual time.
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
 inline constexpr bool kInstrumented = true;
 #else
@@ -194,8 +194,8 @@ inline constexpr bool kInstrumented = false;
 [[nodiscard]] inline bool is_slowed(const profiles::BenchConfig& config) {
   return kInstrumented && !(config.simulation && config.simulation->in_process);
 }
-/// Oldest sample or reading while the motor turns, wall time. Checked twice: after this computer was blocked, what
-/// waits in the sockets is taken in between.
+/// Oldest sample or reading while the motor turns, wall time. Checked twice: after this computer was blocked, the guard
+/// takes what waits in the sockets in between.
 [[nodiscard]] inline Duration spin_patience(const profiles::BenchConfig& config) {
   return std::chrono::milliseconds(is_slowed(config) ? 500 : 145);
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <utility>
 
 namespace kphi::daq {
@@ -17,6 +18,21 @@ std::string words(const GuardLimit& limit, double value) {
     return fmt::format("kphi was blocked for {:.2g} s while the motor was turning", value);
   const std::string shown = limit.unit == "RPM" ? fmt::format("{:.0f}", value) : fmt::format("{:.4g}", value);
   return fmt::format("{} {} {} is {} ({})", limit.name, shown, limit.unit, to_words(limit), limit.source);
+}
+
+constexpr double kSetting = 0.011;  // V and A: the coarsest step of a supply, and rounding
+
+Trip supply_trip(std::string reason) {
+  Trip trip;
+  trip.reason = "supply: " + std::move(reason);
+  trip.source = Source::supply;
+  return trip;
+}
+
+std::optional<Trip> moved(const char* what, double now, double wanted, const char* unit) {
+  if (std::abs(now - wanted) <= kSetting) return std::nullopt;
+  return supply_trip(
+      fmt::format("{} is {:g} {}, kphi set {:g} {}: changed on the front panel", what, now, unit, wanted, unit));
 }
 
 }  // namespace
@@ -40,6 +56,15 @@ std::string next_move(const Trip& trip) {
   return kCheckStand;
 }
 
+SafetyStop::SafetyStop(const Trip& trip)
+    : SafetyStop(StopWords{.cause = trip.reason,
+                           .next_move = daq::next_move(trip),
+                           .motor_failure = trip.link_failed && trip.source == Source::motor
+                                                ? MotorFailure::event_to_come
+                                                : MotorFailure::none}) {
+  is_trip_ = true;
+}
+
 bool Latch::set(Trip trip) noexcept {
   State expected = State::open;
   if (!state_.compare_exchange_strong(expected, State::closing)) return false;
@@ -52,6 +77,70 @@ const Trip* Latch::trip() const noexcept { return state_.load() == State::closed
 
 void Latch::check() const {
   if (const Trip* trip = this->trip()) throw SafetyStop(*trip);
+}
+
+Trip slept(const Clock& clock) {
+  Trip trip;
+  trip.watched = Watched::sleep;
+  trip.source = Source::computer;
+  trip.value = to_seconds(clock.suspended());
+  trip.reason = fmt::format("this computer slept for {:.2g} s", trip.value);
+  return trip;
+}
+
+void require_awake(const Clock& clock) {
+  if (has_slept(clock)) throw SafetyStop(slept(clock));
+}
+
+std::string tripped_words(const results::SupplyReading& seen) {
+  return fmt::format("supply: {} protection switched the output off", name_of(seen.protection));
+}
+
+std::optional<Trip> check(const results::SupplyReading& seen, const profiles::SupplyConfig& wanted, bool settled) {
+  const double volts = wanted.voltage.value();
+  const bool limits = seen.regulation == results::SupplyRegulation::constant_current;
+  if (seen.protection != results::SupplyProtection::none) {
+    Trip trip = supply_trip("");
+    trip.reason = tripped_words(seen);
+    trip.protection = seen.protection;
+    return trip;
+  }
+  if (seen.output == 0) return supply_trip("output is off");
+  if (limits && settled)
+    return supply_trip(fmt::format("current limit reached: {:.3g} A at {:.4g} V", seen.current_a, seen.voltage_v));
+  if (auto trip = moved("set voltage", seen.set_voltage_v, volts, "V")) return trip;
+  if (auto trip = moved("current limit", seen.current_limit_a, wanted.current_limit.value(), "A")) return trip;
+  if (!settled) return std::nullopt;
+  // Written so that NaN trips.
+  if (!(seen.voltage_v >= (1 - results::kSupplySag) * volts))
+    return supply_trip(fmt::format("{:.4g} V at the terminals, more than {:g} % below the {:g} V set", seen.voltage_v,
+                                   100 * results::kSupplySag, volts));
+  if (seen.voltage_v > (1 + results::kSupplyRise) * volts)
+    return supply_trip(
+        fmt::format("{:.4g} V at the terminals, more than {:g} % above the {:g} V set: the motor feeds back",
+                    seen.voltage_v, 100 * results::kSupplyRise, volts));
+  return std::nullopt;
+}
+
+MotorPower::MotorPower(SupplyLink* supply)
+    : supply_(supply), on_(supply != nullptr ? std::make_unique<OutputEnable>(*supply) : nullptr) {}
+
+bool MotorPower::off(MotorLink& motor) {
+  if (supply_ == nullptr) return false;
+  motor.rest();
+  if (const std::string why = supply_->switch_off(); !why.empty())
+    throw SafetyStop(why, "cut the power of the motor at the switch before you go near");
+  on_.reset();
+  return true;
+}
+
+void MotorPower::restore(MotorLink& motor, const Clock& clock, const std::function<void()>& wait_for_voltage) {
+  require_awake(clock);
+  if (supply_ != nullptr) {
+    on_ = std::make_unique<OutputEnable>(*supply_);
+    wait_for_voltage();
+  }
+  if (supply_ != nullptr || !motor.failure().empty()) motor.wake();
 }
 
 }  // namespace kphi::daq

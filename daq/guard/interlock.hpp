@@ -1,12 +1,17 @@
-// When the bench must stop by itself. A trip is a value; the first one is latched.
+// When the bench must stop by itself. A trip is a value; the first one is latched. Two kinds of trip have no limit: a
+// computer that slept, and a supply that reports trouble.
 #pragma once
 
 #include <atomic>
+#include <functional>
+#include <memory>
+#include <optional>
 #include <string>
 
 #include "base/clock.hpp"
 #include "daq/guard/guard_limits.hpp"
 #include "daq/guard/run_stopped.hpp"
+#include "profiles/bench_config.hpp"
 #include "results/records.hpp"
 
 namespace kphi::daq {
@@ -14,12 +19,13 @@ namespace kphi::daq {
 /// Why the motor was coasted.
 struct Trip {
   std::string reason;                ///< one line: "thrust 21.3 N is above 20 N (campaign limits.thrust_max_n)"
-  Source source = Source::guard;     ///< who told it, or failed
-  Watched watched = Watched::state;  ///< state: no limit; what a device says of itself
-  results::SupplyProtection protection = results::SupplyProtection::none;  ///< which switched the supply off by itself
+  Source source = Source::guard;     ///< what reported it, or failed
+  Watched watched = Watched::state;  ///< state: no limit; a device reported trouble
+  bool link_failed = false;          ///< no reading, but the link to the source reported it
+  results::SupplyProtection protection = results::SupplyProtection::none;  ///< that switched the supply's output off
   double value = 0;                                                        ///< unit of the limit
-  GuardLimit limit{};                                                      ///< that was passed
-  Instant sample{0};   ///< bench time of the sample or reading; after silence of the last one
+  GuardLimit limit{};                                                      ///< the limit that was passed
+  Instant sample{0};   ///< bench time of the sample or reading; after a silence, of the last one
   Instant noticed{0};  ///< bench time
   int step = -1;       ///< 0-based, -1 outside steps
 };
@@ -27,12 +33,12 @@ struct Trip {
 /// `value` has passed `limit`.
 [[nodiscard]] Trip passed(const GuardLimit& limit, double value, Instant sample);
 
-/// Holds the first trip. Any thread; nobody waits.
+/// Holds the first trip. Thread-safe, without waiting.
 class Latch {
  public:
   /// True: it was the first.
   bool set(Trip trip) noexcept;
-  /// nullptr: none yet.
+  /// nullptr before the first.
   [[nodiscard]] const Trip* trip() const noexcept;
   /// Throws SafetyStop with the reason.
   void check() const;
@@ -43,7 +49,7 @@ class Latch {
   Trip trip_;  // written while closing, read once closed
 };
 
-/// What a person should do about it.
+/// What the person at the stand should do about it.
 [[nodiscard]] std::string next_move(const Trip& trip);
 
 /// A trip that stopped a run.
@@ -51,13 +57,45 @@ class SafetyStop final : public RunStopped {
  public:
   explicit SafetyStop(StopWords words) : RunStopped(std::move(words), ExitCode::safety_stop) {}
   explicit SafetyStop(const std::string& cause, const std::string& next_move = {})
-      : SafetyStop(StopWords{cause, {}, next_move, {}, {}}) {}
-  explicit SafetyStop(const Trip& trip) : SafetyStop(trip.reason, next_move(trip)) { is_trip_ = true; }
-  /// The guard's own trip, not what the runner met because of it.
+      : SafetyStop(StopWords{.cause = cause, .next_move = next_move}) {}
+  explicit SafetyStop(const Trip& trip);
+  /// A trip of the guard; false: an error of the runner, perhaps because of a trip.
   [[nodiscard]] bool is_trip() const noexcept { return is_trip_; }
 
  private:
   bool is_trip_ = false;
+};
+
+/// This computer slept since the clock's epoch. Meanwhile the bench was unwatched, and the module has coasted the motor
+/// by its own timeout: nothing may turn until a person has looked at the stand.
+[[nodiscard]] inline bool has_slept(const Clock& clock) noexcept { return clock.suspended() >= kShortestSleep; }
+[[nodiscard]] Trip slept(const Clock& clock);
+/// Throws SafetyStop if this computer slept.
+void require_awake(const Clock& clock);
+
+/// "supply: over-current protection switched the output off".
+[[nodiscard]] std::string tripped_words(const results::SupplyReading& seen);
+
+/// Checks one reading while the motor may turn: protection, output, settings changed on the front panel; and, once the
+/// speed has `settled`, constant current, sag and rise, which a change of speed may bring. nullopt: no trip.
+[[nodiscard]] std::optional<Trip> check(const results::SupplyReading& seen, const profiles::SupplyConfig& wanted,
+                                        bool settled);
+
+/// Power of a bench's motor: on when this is made and until it is destroyed, except from off() to restore(). One
+/// thread.
+class MotorPower {
+ public:
+  /// `supply` outlives this; nullptr: kphi does not control the power. Throws DeviceError.
+  explicit MotorPower(SupplyLink* supply);
+  /// See Bench::switch_off_power.
+  [[nodiscard]] bool off(MotorLink& motor);
+  /// See Bench::restore_power. `wait_for_voltage`: for a supply that does not wait by itself. Throws SafetyStop, too.
+  void restore(
+      MotorLink& motor, const Clock& clock, const std::function<void()>& wait_for_voltage = [] {});
+
+ private:
+  SupplyLink* supply_;
+  std::unique_ptr<OutputEnable> on_;
 };
 
 }  // namespace kphi::daq

@@ -1,8 +1,8 @@
 // The load on the cell from every sample; a single outlier is rejected: each axis goes through a median of three, which
-// delays a true value by one sample. The load of an axis is that median: a
-// peak that lasts for two samples counts, since it strains the cell. Thrust and the torque about the shaft are means of
-// the median over 5 ms, one turn at 12,000 RPM: the blades' beat, up to 8 % of the thrust, is no excess, and noise
-// shrinks sixfold at 7 kHz. A jump from a third of a limit to half beyond it is seen within 4 ms; below 200 Hz the
+// delays a true value by one sample. The load of an axis is that median: a peak of two samples counts, since it strains
+// the cell. Thrust and the torque about the shaft are means of
+// the median over 5 ms, one turn at 12,000 RPM: the blades' beat, up to 8 % of the thrust, averages out, and noise
+// shrinks sixfold at 7 kHz. A jump from a third of a limit to 1.5 times the limit is seen within 4 ms; below 200 Hz the
 // window is one sample.
 #pragma once
 
@@ -11,10 +11,16 @@
 #include <cstdint>
 #include <vector>
 
-#include "daq/bench/mounting.hpp"
 #include "results/records.hpp"
 
 namespace kphi::daq {
+
+/// How thrust is read off the six axes, and which way the motor turns.
+struct Mounting {
+  int axis = 2;   ///< 0..2 = Fx, Fy, Fz
+  int sign = +1;  ///< of the axis when the propeller pulls
+  int spin = +1;  ///< +1 counter-clockwise
+};
 
 class LoadWatch {
  public:

@@ -49,23 +49,23 @@ struct Observation : Readings {
   [[nodiscard]] Newtons thrust() const noexcept { return Newtons(thrust_n); }
 };
 
-/// How old the newest sample and the newest reading may be to count as fresh; bench time.
+/// Oldest sample and reading that count as fresh, bench time.
 struct Freshness {
   Duration load_cell{}, motor{};
 };
-/// `newest` as it looks at `now`: with its ages, and unknown where it is no longer fresh.
+/// `newest` at `now`: with its ages; stale values become kUnknown.
 [[nodiscard]] Observation observe(const Readings& newest, Instant now, const Freshness& limit, const Clock& clock);
 
-/// Turns samples and readings into guarded quantities. One thread, but for take_zero.
+/// Turns samples and readings into guarded quantities. One thread, except take_zero.
 class Observer {
  public:
-  /// Called with each quantity that a sample or reading tells. NaN is passed on.
+  /// Called with each quantity of each sample and reading, NaN included.
   using Judge = std::function<void(Watched, double value, results::Nanoseconds at)>;
 
   Observer(const Mounting& mounting, const results::LoadCellScale& scale, const SpeedWatch& speed, Judge judge = {})
       : mounting_(mounting), load_(mounting, scale), speed_(speed), judge_(std::move(judge)) {}
 
-  /// Nothing has come yet: ages count from `now`.
+  /// Ages count from `now` until the first sample and reading.
   void begin(Instant now) noexcept { newest_.load_cell_ns = newest_.motor_ns = now.count(); }
   void take(const results::LoadCellRecord& sample);
   void take(const results::MotorReading& reading);
@@ -75,7 +75,7 @@ class Observer {
   /// Fx Fy Fz in N, Tx Ty Tz in N m. Thrust and torque are judged from then on. Any thread.
   void take_zero(const std::array<double, 6>& mean) noexcept;
 
-  /// The newest; of each judged quantity the one that came closest to its limit since the last call.
+  /// The newest readings; of each guarded quantity the value closest to its limit since the last call.
   [[nodiscard]] Readings readings() noexcept;
   [[nodiscard]] const SpeedError& speed_error() const noexcept { return speed_.error(); }
 
@@ -87,7 +87,7 @@ class Observer {
   SpeedWatch speed_;
   Judge judge_;
   Readings newest_;
-  std::array<bool, kWatchedCount> told_{};  ///< since readings() was called
+  std::array<bool, kWatchedCount> told_{};  ///< updated since readings() was called
   std::atomic<bool> has_zero_{false};
   std::atomic<double> thrust_zero_{0}, torque_zero_{0};
 };

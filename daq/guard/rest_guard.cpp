@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 
-#include "daq/guard/awake.hpp"
-#include "daq/guard/interrupt.hpp"
+#include "daq/guard/interlock.hpp"
+#include "daq/guard/run_stopped.hpp"
 #include "drivers/iq/wire/codes.hpp"
 
 namespace kphi::daq {

@@ -1,9 +1,9 @@
-// Watches the bench between runs, while a person may be working at it: the rotor must stay at rest. It has a thread of
-// its own, as the guard of a run.
+// Watches the bench between runs, in a thread of its own, while a person may be working at it: the rotor must stay at
+// rest.
 //
 // Trips if the rotor turns, if its module drives or brakes it, if a supply that kphi controls has its output on
-// unasked, and if this computer slept; then it coasts the motor and cuts the supply. A module that does not answer, for
-// example because its power was cut by hand, does not trip.
+// unexpectedly, or if this computer slept; then it coasts the motor and cuts the supply. A module that does not answer,
+// for example because its power was cut by hand, does not trip.
 #pragma once
 
 #include <atomic>
@@ -22,7 +22,7 @@ inline constexpr const char* kKeepAway = "keep away; wait until the rotor is at 
 
 class RestGuard {
  public:
-  /// `motor_has_power`: as far as the bench knows. The bench must outlive this, which takes all its readings.
+  /// Takes all readings of the bench, which must outlive this. `motor_has_power`: as far as the bench knows.
   RestGuard(Bench& bench, bool motor_has_power);
   RestGuard(const RestGuard&) = delete;
   RestGuard& operator=(const RestGuard&) = delete;
@@ -47,7 +47,7 @@ class RestGuard {
   Latch latch_;
   std::atomic<bool> resting_{false};       ///< a turning rotor is a trip from now on
   std::atomic<double> speed_rad_s_{0};     ///< unsigned
-  std::atomic<std::int64_t> speed_at_ns_;  ///< of it
+  std::atomic<std::int64_t> speed_at_ns_;  ///< bench time of that speed
   std::unique_ptr<Background> polling_;    ///< last member: destroyed first
 };
 

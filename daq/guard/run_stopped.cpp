@@ -1,22 +1,36 @@
 #include "daq/guard/run_stopped.hpp"
 
 #include <fmt/format.h>
+#include <signal.h>
+
+#include <array>
+#include <atomic>
 
 namespace kphi::daq {
+namespace {
 
-void StopWords::also(const std::string& text) {
-  if (text.empty()) return;
-  const std::size_t time_ends = text.find(" s: ");
-  const bool has_time = time_ends != std::string::npos && text.find_first_not_of("0123456789.") == time_ends;
-  const std::string what = has_time ? text.substr(time_ends + 4) : text;
-  if (cause.find(what) == std::string::npos && what.find(cause) == std::string::npos) add_words(consequences, what);
+std::atomic<int> g_count{0};
+static_assert(std::atomic<int>::is_always_lock_free);
+
+constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP, SIGQUIT};
+std::array<struct sigaction, kSignals.size()> g_previous{};
+
+void count_signal(int) { g_count.fetch_add(1); }
+
+void append(std::string& words, const std::string& text) {
+  if (!text.empty()) words += (words.empty() ? "" : "; ") + text;
 }
+
+}  // namespace
+
+void StopWords::also(const std::string& text) { append(consequences, text); }
+
+void StopWords::leaves(const std::string& text) { append(state, text); }
 
 std::string StopWords::line() const {
   std::string line = cause;
-  for (const std::string* more : {&consequences, &state}) {
-    if (!more->empty()) line += "; " + *more;
-  }
+  append(line, consequences);
+  append(line, state);
   return line;
 }
 
@@ -38,15 +52,24 @@ StopWords words_of(const std::exception_ptr& cause) {
   } catch (const RunStopped& e) {
     return e.words();
   } catch (const std::exception& e) {
-    return {e.what(), {}, {}, {}, {}};
+    return {.cause = e.what()};
   } catch (...) {
-    return {"unknown", {}, {}, {}, {}};
+    return {.cause = "unknown"};
   }
 }
 
-void add_words(std::string& said, const std::string& text) {
-  if (text.empty() || said.find(text) != std::string::npos) return;
-  said += (said.empty() ? "" : "; ") + text;
+SignalWatch::SignalWatch() {
+  g_count = 0;
+  struct sigaction action {};
+  action.sa_handler = count_signal;
+  sigemptyset(&action.sa_mask);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &action, &g_previous[i]);
 }
+
+SignalWatch::~SignalWatch() {
+  for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &g_previous[i], nullptr);
+}
+
+int SignalWatch::count() noexcept { return g_count.load(); }
 
 }  // namespace kphi::daq

@@ -1,6 +1,7 @@
-// A run that ended early, in words for the person at the stand, in the order of their need.
+// How a run ends early: in words for the person at the stand, in the order of their need, and by signals.
 #pragma once
 
+#include <cstdint>
 #include <exception>
 #include <string>
 #include <utility>
@@ -9,15 +10,25 @@
 
 namespace kphi::daq {
 
-struct StopWords {
-  std::string cause;         ///< what stopped the run
-  std::string consequences;  ///< what else the devices reported; may be empty
-  std::string next_move;     ///< what to do; may be empty
-  std::string data;          ///< where the data are, and how to continue; empty if nothing was recorded
-  std::string state;         ///< of motor and supply; empty if neither was switched on
+/// A failing link to the motor reports itself twice: as a failure, and as the motor's first event that ends a run.
+enum class MotorFailure : std::uint8_t {
+  none,           ///< something else stopped the run
+  event_to_come,  ///< the failure stopped the run; the event still has to be skipped
+  reported,       ///< the event stopped the run, or was skipped
+};
 
-  /// Adds a further report, unless the cause says it already. `text` may begin with its time, "3.210 s: ".
+struct StopWords {
+  std::string cause{};         ///< what stopped the run
+  std::string next_move{};     ///< what to do; may be empty
+  std::string consequences{};  ///< what else the devices reported; may be empty
+  std::string data{};          ///< where the data are, and how to continue; empty if nothing was recorded
+  std::string state{};         ///< of motor and supply; empty if neither was switched on
+  MotorFailure motor_failure = MotorFailure::none;
+
+  /// Adds a further report to the consequences; an empty one is ignored.
   void also(const std::string& text);
+  /// Adds to the state of motor and supply.
+  void leaves(const std::string& text);
   /// One line for records: cause, consequences, state.
   [[nodiscard]] std::string line() const;
   /// `headline`: "SAFETY STOP". One line each: cause, next move, data, state.
@@ -34,10 +45,38 @@ class RunStopped : public Error {
   StopWords words_;
 };
 
+/// Thrown by the runner when a person or the system asks it to stop.
+class Interrupted : public RunStopped {
+ public:
+  explicit Interrupted(StopWords words) : RunStopped(std::move(words), ExitCode::interrupted) {}
+  explicit Interrupted(const std::string& cause) : Interrupted(StopWords{.cause = cause}) {}
+};
+
 /// Words of any exception; an exception other than RunStopped has only a cause, its message.
 [[nodiscard]] StopWords words_of(const std::exception_ptr& cause);
 
-/// Adds `text` to `said`, unless it says nothing new.
-void add_words(std::string& said, const std::string& text);
+/// The exception as an `Expected`; nullptr if it has another type. Valid while `cause` lives.
+template <class Expected>
+[[nodiscard]] const Expected* as(const std::exception_ptr& cause) {
+  try {
+    std::rethrow_exception(cause);
+  } catch (const Expected& expected) {
+    return &expected;
+  } catch (...) {
+    return nullptr;
+  }
+}
+
+/// While it lives, SIGINT, SIGTERM, SIGHUP and SIGQUIT are only counted; the runner checks the count on every tick.
+/// Afterwards they act as before.
+class SignalWatch {
+ public:
+  SignalWatch();
+  ~SignalWatch();
+  SignalWatch(const SignalWatch&) = delete;
+  SignalWatch& operator=(const SignalWatch&) = delete;
+  /// How many arrived. Any thread.
+  [[nodiscard]] static int count() noexcept;
+};
 
 }  // namespace kphi::daq

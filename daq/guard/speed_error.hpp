@@ -1,7 +1,6 @@
-// Whether the rotor follows its command. A command opens a band: the speed may be anywhere between that of the slowest
-// accelerating rotor and the command itself. A speed outside the band for longer than closed loop and host need, or the
-// current of a stalled motor at no speed, means a rotor that is blocked, out of step, turning the wrong way or running
-// away.
+// Whether the rotor follows its command. A command opens a band, from the speed of the slowest accelerating rotor to
+// the commanded speed. A speed outside the band for longer than closed loop and host need, or the current of a stalled
+// motor at no speed, means a rotor that is blocked, out of step, turning the wrong way or running away.
 //
 // The bound, with speed read at f Hz: 1/f until the first reading that shows it, then the patience of 40 ms (two time
 // constants of the closed loop, 0.02 s each) and of the host, and 1/f again. 50 Hz on a live bench: 140 ms. Current is
@@ -22,11 +21,11 @@ struct SpeedError {
     none,
     strays,   ///< the speed has left its band
     stalled,  ///< a current beyond what still air may cool, at less than 100 rad/s
-    unseen,   ///< other readings arrive, those of the speed do not
+    unseen,   ///< other readings arrive, but no speed
   };
   Kind kind = Kind::none;
   RadPerSec commanded, measured;  ///< positive in the commanded direction
-  Amperes motor_current;          ///< as the module estimates it
+  Amperes motor_current;          ///< estimated by the module
   Duration lasts{0};              ///< bench time
 };
 
@@ -38,7 +37,7 @@ class SpeedWatch {
  public:
   /// In addition to 15 % of the command, for cogging and the noise of the estimate at low speed; rad/s.
   static constexpr double kFloor = 20;
-  /// A smaller error is no danger; the step is flagged after the run.
+  /// Smaller errors are safe; the step is flagged after the run.
   static constexpr double kShare = 0.15;
   /// rad/s². A 6-inch three-blade with 12 V and 30 A still does 1500 near its top; smaller ones ten times that.
   static constexpr double kSlowestRise = 1000;
@@ -57,7 +56,7 @@ class SpeedWatch {
   SpeedWatch(int direction, Duration host, double share = kShare) noexcept
       : direction_(direction), host_(host), share_(share) {}
 
-  /// Unsigned, from now on. The first one expects a motor at rest.
+  /// Unsigned, from now on. The first command expects a motor at rest.
   void command(Instant at, RadPerSec speed) noexcept;
   /// The command ramps to `speed`: until the next one the rotor may be anywhere between.
   void command_ramp(Instant at, RadPerSec speed) noexcept;
@@ -66,7 +65,7 @@ class SpeedWatch {
   void take(const results::MotorReading& reading) noexcept;
   /// % of the command by which the newest speed leaves its band, beside kFloor; NaN while no speed is commanded.
   [[nodiscard]] double error_percent() const noexcept;
-  /// The first since the last release.
+  /// The first error since the last release.
   [[nodiscard]] const SpeedError& error() const noexcept { return error_; }
 
  private:

@@ -1,5 +1,5 @@
-// Judges the status word of every load-cell sample: for how long has the box itself reported samples that cannot be
-// trusted? The limits on thrust, torque and ranges rest on these samples.
+// Judges the status word of every load-cell sample: how long the box itself has reported samples that cannot be
+// trusted. The limits on thrust, torque and ranges rest on these samples.
 //
 // Time is counted in samples. A sound sample takes one bad sample off the count, so that an error which comes and goes
 // counts as one that lasts as soon as it shows in more than half of the samples.
@@ -33,13 +33,13 @@ class StatusWatch {
   [[nodiscard]] std::string reason() const;
 
  private:
-  /// How many samples were bad, less those that were not; no more than `patience` + 1.
+  /// Bad samples minus sound ones, from 0 to `patience` + 1.
   struct Count {
     std::uint64_t patience = 1, value = 0;
     void add(bool bad) noexcept;
     [[nodiscard]] bool is_over() const noexcept { return value > patience; }
   };
-  /// From a bad sample to as many sound ones.
+  /// From a bad sample until as many sound ones have followed.
   struct Episode {
     std::uint64_t samples = 0, bad = 0;
     results::Nanoseconds sound_since = 0;
@@ -55,7 +55,7 @@ class StatusWatch {
   Count faulty_, bad_;
   Episode episode_;
   std::uint32_t status_ = 0;  ///< of the newest bad sample
-  bool told_ = false;         ///< an error of this run has been told
+  bool told_ = false;         ///< an error of this run was reported
   std::optional<results::StreamEvent> event_;
 };
 

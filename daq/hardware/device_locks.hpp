@@ -1,4 +1,5 @@
-// Two programs never share a device: one lock per box, serial port and supply, for all programs and users of this host.
+// Two programs never share a device: one lock per box, serial port and supply, for all programs and users of this
+// computer.
 #pragma once
 
 #include <string>
@@ -10,11 +11,11 @@
 
 namespace kphi::daq {
 
-/// Names of the locks, by device and not by its name in a bench file: "Net Box 192.168.1.1:49152", "port
-/// /dev/ttyUSB0", "supply 10.0.0.5:502". Nothing for a bench inside the process.
+/// Names of the locks, by device, not by its name in a bench file: "Net Box 192.168.1.1:49152", "port
+/// /dev/ttyUSB0", "supply 10.0.0.5:502". Empty for a bench inside the process.
 [[nodiscard]] std::vector<std::string> lock_names(const profiles::BenchConfig& config);
 
-/// The devices of a bench, taken while this lives.
+/// Locks of a bench's devices, held while this lives.
 class DeviceLocks {
  public:
   /// Throws DeviceError with the program that uses one of them, and the next move.

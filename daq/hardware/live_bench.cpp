@@ -10,10 +10,10 @@
 #include <thread>
 
 #include "base/error.hpp"
-#include "daq/audit/motor_audit.hpp"
-#include "daq/bench/slot_pages.hpp"
-#include "daq/guard/awake.hpp"
-#include "daq/guard/interrupt.hpp"
+#include "daq/audit/bench_audit.hpp"
+#include "daq/bench/box.hpp"
+#include "daq/guard/interlock.hpp"
+#include "daq/guard/run_stopped.hpp"
 #include "daq/hardware/sleep_inhibitor.hpp"
 #include "drivers/netbox/configuration/calinfo.hpp"
 #include "drivers/netbox/configuration/http.hpp"
@@ -51,7 +51,7 @@ netbox::WantedSettings wanted_settings(const profiles::NetBoxConfig& config) {
   return wanted;
 }
 
-/// The journal in which the next program finds settings that a killed one left changed in this box.
+/// The journal of settings that a killed program left changed in this box; the next program restores them.
 std::filesystem::path settings_journal(const profiles::NetBoxConfig& config) {
   const auto variable = [](const char* name) { return std::string(std::getenv(name) ? std::getenv(name) : ""); };
   std::filesystem::path folder = variable("XDG_STATE_HOME");
@@ -120,7 +120,7 @@ void LiveMotor::wake() {
       found = connect();
     } catch (const DeviceError&) {
       if (std::chrono::steady_clock::now() > give_up) throw;
-      std::this_thread::sleep_for(kDrainWall);  // it may still be starting
+      std::this_thread::sleep_for(kDrainWall);  // it may still be booting
       continue;
     }
     if (const std::string now = found->identity().summary(); now != identity_)
@@ -190,7 +190,7 @@ LiveLoadCell::LiveLoadCell(profiles::NetBoxConfig config, const Clock& clock, co
       cell_(std::make_unique<netbox::LoadCell>(rdt_address(config_), clock_)),
       findings_(settings_.notes()) {
   if (auto finding = netbox::cross_check(config_.host, config_.tcp_port, configuration(), kCalinfoTimeout)) {
-    if (finding->severity == netbox::Severity::fault)
+    if (finding->severity == Severity::fault)
       throw DeviceError("Net Box " + config_.host, "compare its scale", finding->what, finding->next_move);
     findings_.push_back(std::move(*finding));
   }
@@ -254,32 +254,13 @@ LiveBench::LiveBench(const profiles::BenchConfig& config, const std::function<bo
       air_(config.ambient, clock_),
       load_cell_(config.netbox, clock_, stop_asked),
       supply_(config.supply ? std::make_unique<LiveSupply>(*config.supply, clock_) : nullptr),
-      powered_(power(stop_asked)),
+      power_(supply_to_switch_on(stop_asked)),
       motor_(config.iq, clock_) {}
 
-std::unique_ptr<OutputEnable> LiveBench::power(const std::function<bool()>& stop_asked) {
+SupplyLink* LiveBench::supply_to_switch_on(const std::function<bool()>& stop_asked) {
   require_no_stop(stop_asked);
   require_awake(clock_);
-  return supply_ ? std::make_unique<OutputEnable>(*supply_) : nullptr;
-}
-
-bool LiveBench::switch_off_power() {
-  if (!supply_) return false;
-  motor_.rest();
-  if (const std::string why = supply_->switch_off(); !why.empty())
-    throw SafetyStop(why, "cut the power of the motor at the switch before you go near");
-  powered_.reset();
-  return true;
-}
-
-void LiveBench::restore_power() {
-  require_awake(clock_);
-  if (supply_) {
-    powered_ = std::make_unique<OutputEnable>(*supply_);
-    motor_.wake();
-  } else if (!motor_.failure().empty()) {
-    motor_.wake();
-  }
+  return supply_.get();
 }
 
 std::shared_ptr<void> LiveBench::keep_awake(std::string& why_not) {

@@ -10,6 +10,7 @@
 #include "daq/bench/air.hpp"
 #include "daq/bench/bench.hpp"
 #include "daq/bench/device_records.hpp"
+#include "daq/guard/interlock.hpp"
 #include "daq/hardware/live_supply.hpp"
 #include "drivers/iq/link/motor.hpp"
 #include "drivers/netbox/configuration/settings.hpp"
@@ -21,10 +22,8 @@ class LiveMotor final : public MotorLink {
  public:
   /// Connects and reads the module's parameters. Throws DeviceError.
   LiveMotor(const profiles::MotorConfig& config, const Clock& clock);
-  /// Coasts and closes the link, before its power is cut. Only wake() and calls from the guard's thread may follow.
-  void rest();
-  /// Connects again, to the same module. Throws DeviceError.
-  void wake();
+  void rest() override;
+  void wake() override;
   void spin_at(RadPerSec signed_speed) override;
   void renew() noexcept override;
   void emergency_stop() noexcept override;
@@ -59,7 +58,7 @@ class LiveLoadCell final : public LoadCellLink {
   /// before each page. Throws DeviceError, Interrupted.
   LiveLoadCell(profiles::NetBoxConfig config, const Clock& clock, const std::function<bool()>& stop_asked);
   [[nodiscard]] const netbox::Configuration& configuration() const override { return cell_->configuration(); }
-  [[nodiscard]] std::vector<netbox::Finding> findings() const override { return findings_; }
+  [[nodiscard]] std::vector<Finding> findings() const override { return findings_; }
   results::LoadCellScale start() override;
   void stop() noexcept override;
   std::size_t take(std::span<results::LoadCellRecord> out) override;
@@ -76,7 +75,7 @@ class LiveLoadCell final : public LoadCellLink {
   netbox::SettingsKeeper settings_;
   std::unique_ptr<netbox::LoadCell> cell_;  ///< of the present or last run
   std::vector<netbox::StampedRecord> records_;
-  std::vector<netbox::Finding> findings_;
+  std::vector<Finding> findings_;
   std::string slots_json_;
 };
 
@@ -95,19 +94,20 @@ class LiveBench final : public Bench {
   [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
   [[nodiscard]] Duration sync_interval() const override;
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
-  [[nodiscard]] bool switch_off_power() override;
-  void restore_power() override;
+  [[nodiscard]] bool switch_off_power() override { return power_.off(motor_); }
+  void restore_power() override { power_.restore(motor_, clock_); }
   [[nodiscard]] std::shared_ptr<void> keep_awake(std::string& why_not) override;
 
  private:
-  [[nodiscard]] std::unique_ptr<OutputEnable> power(const std::function<bool()>& stop_asked);
+  /// The last check before its output comes on. Throws Interrupted, SafetyStop.
+  [[nodiscard]] SupplyLink* supply_to_switch_on(const std::function<bool()>& stop_asked);
 
   profiles::BenchConfig config_;
   SteadyClock clock_;
   AirSource air_;
   LiveLoadCell load_cell_;
   std::unique_ptr<LiveSupply> supply_;
-  std::unique_ptr<OutputEnable> powered_;  ///< before the motor, which needs it to answer; goes after it
+  MotorPower power_;  ///< made before the motor, which needs it to answer; destroyed after it
   LiveMotor motor_;
 };
 

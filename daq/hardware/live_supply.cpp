@@ -6,9 +6,9 @@
 #include <thread>
 
 #include "base/error.hpp"
-#include "drivers/scpi/open.hpp"
-#include "drivers/supply/address.hpp"
+#include "drivers/scpi/scpi_supply.hpp"
 #include "drivers/supply/modbus_supply.hpp"
+#include "drivers/supply/wire.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -88,22 +88,13 @@ std::size_t LiveSupply::take(std::span<results::SupplyReading> out) {
   return n;
 }
 
-std::string LiveSupply::failure() const { return worker_.alive() ? "" : words(); }
-
-/// Why it has failed, beginning with whose failure it is.
-std::string LiveSupply::words() const {
+std::string LiveSupply::failure() const {
+  if (worker_.alive()) return "";
   const std::string why = worker_.failure();
   if (why.empty()) return "supply: its thread has ended";
-  return why.starts_with("supply") ? why : "supply: " + why;
+  return why.starts_with("supply") ? why : "supply: " + why;  // an instrument on USB is named by its address
 }
 
-std::string LiveSupply::switch_off() noexcept {
-  if (worker_.switch_off_and_confirm(kConfirm)) return "";
-  try {
-    return worker_.alive() ? kNotOff : words();
-  } catch (...) {
-    return "supply: output may be ON; cut the 12 V at the switch";
-  }
-}
+std::string LiveSupply::switch_off() noexcept { return worker_.switch_off_and_confirm(kConfirm) ? "" : kNotOff; }
 
 }  // namespace kphi::daq

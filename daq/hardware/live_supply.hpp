@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "daq/bench/supply_link.hpp"
+#include "daq/bench/bench.hpp"
 #include "drivers/supply/worker.hpp"
 #include "profiles/bench_config.hpp"
 
@@ -22,7 +22,6 @@ class LiveSupply final : public SupplyLink {
 
  private:
   void switch_on() override;
-  [[nodiscard]] std::string words() const;
 
   const profiles::SupplyConfig config_;
   supply::Worker worker_;

@@ -5,8 +5,8 @@
 
 namespace kphi::daq {
 
-/// Asks logind on the system bus for a lock against sleep, and releases it at its end; a program that dies releases it,
-/// too. Take one for each run: it costs a few ms, and at most 1.5 s if bus or logind do not answer. Any thread.
+/// Asks logind on the system bus for a lock against sleep; the destructor releases it, and so does the death of the
+/// program. Take one for each run: it costs a few ms, and at most 1.5 s if bus or logind do not answer. Any thread.
 class SleepInhibitor {
  public:
   SleepInhibitor() noexcept;

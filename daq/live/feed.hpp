@@ -5,10 +5,11 @@
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <cstdint>
+#include <deque>
+#include <string>
 
 #include "base/published.hpp"
 #include "daq/live/messages.hpp"
-#include "daq/live/tick.hpp"
 
 namespace kphi::daq::live {
 
@@ -46,6 +47,27 @@ class Feed {
   std::atomic<std::uint64_t> shown_{0}, dropped_{0};
   std::atomic<bool> stop_{false};
   boost::lockfree::spsc_queue<Message> messages_;  // sized at run time: see recorder.hpp
+};
+
+/// What a page that joins late must know. Bounded; one thread.
+class History {
+ public:
+  static constexpr std::size_t kTraceLength = 2000, kMostSteps = 20000, kMostLines = 500;
+
+  /// Keeps a message that was sent to all pages; of limits only the newest.
+  void keep(const Message& message);
+  /// Adds a point to the trace, unless it already has one of this time.
+  void keep(const Tick& tick);
+  /// {"type":"history","trace":[[time_s, thrust_n, commanded_rpm, speed_rpm] …],"messages":[…]}; null if unknown.
+  /// Limits first, then steps, then the others, each oldest first.
+  [[nodiscard]] std::string message() const;
+
+ private:
+  struct Point {
+    double time_s, thrust_n, commanded_rpm, speed_rpm;
+  };
+  std::deque<Point> trace_;
+  std::deque<std::string> limits_, steps_, others_;
 };
 
 }  // namespace kphi::daq::live

@@ -1,4 +1,4 @@
-// The live view that `--live` and `--udp-json` ask for.
+// The live view that `--live` and `--udp-json` ask for, and the progress that feeds it.
 #pragma once
 
 #include <exception>
@@ -7,12 +7,39 @@
 #include <string>
 
 #include "daq/live/feed.hpp"
+#include "daq/live/messages.hpp"
+#include "daq/live/quick_look.hpp"
 #include "daq/live/server.hpp"
-#include "daq/live/subject.hpp"
 #include "daq/live/udp_json.hpp"
 #include "daq/run/progress.hpp"
 
 namespace kphi::daq::live {
+
+class LiveProgress final : public Progress {
+ public:
+  /// All must outlive this. `inner` gets every call first; `plotter` may be nullptr.
+  LiveProgress(Progress& inner, Feed& feed, UdpJson* plotter, const Subject& subject, const Clock& clock)
+      : inner_(inner), feed_(feed), plotter_(plotter), subject_(subject), clock_(clock) {}
+  void guarded(const std::vector<GuardLimit>& limits) override;
+  void tick(const Position& position, const Observation& seen) override;
+  void step_done(const Position& position, const Observation& seen) override;
+  void say(const std::string& line) override;
+
+ private:
+  [[nodiscard]] Tick tick_of(const Position& position, const Observation& seen);
+  void add_to_step(const Position& position, const Observation& seen, Instant now);
+  [[nodiscard]] bool is_settled(Instant now) const;
+
+  Progress& inner_;
+  Feed& feed_;
+  UdpJson* plotter_;
+  const Subject& subject_;
+  const Clock& clock_;
+  QuickLook quick_look_;
+  int step_ = -1;
+  Instant step_began_{};
+  double most_remaining_s_ = 0;
+};
 
 struct LiveOptions {
   std::optional<std::uint16_t> port;  ///< of the page; 0: any that is free
@@ -27,14 +54,14 @@ class LiveSession {
 
   /// Address of the page, with the token; empty without a page.
   [[nodiscard]] std::string url() const { return server_ ? server_->url() : std::string(); }
-  /// Somebody pressed STOP. Any thread.
+  /// STOP was pressed on a page. Thread-safe.
   [[nodiscard]] bool stop_asked() const noexcept { return feed_.stop_asked(); }
-  /// A page is open. Any thread.
+  /// A page is open. Thread-safe.
   [[nodiscard]] bool is_watched() const noexcept { return server_ && server_->counts().clients > 0; }
-  /// A progress for `behind` and the live view; `behind`, `clock` and this must outlive it.
+  /// A progress for `behind` and the live view. `behind`, `clock` and this must outlive it.
   [[nodiscard]] std::unique_ptr<Progress> beside(Progress& behind, const Clock& clock);
 
-  /// Does the work and shows on the pages how it ended.
+  /// Does the work, and shows its end on the pages.
   template <class Work>
   auto tell_the_end(Work&& work) {
     try {

@@ -14,16 +14,76 @@
 //   stop     STOP was pressed on a page: time_s
 //   end      the run is over: time_s, well (bool), text
 //
-// A page sends one word: "stop".
+// A page sends a single message: "stop".
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <string>
+#include <string_view>
+#include <vector>
 
+#include "compensation/units.hpp"
+#include "daq/guard/guard_limits.hpp"
+#include "daq/guard/observation.hpp"
 #include "daq/live/quick_look.hpp"
-#include "daq/live/subject.hpp"
-#include "daq/live/tick.hpp"
+#include "profiles/campaign.hpp"
 
 namespace kphi::daq::live {
+
+struct Subject {
+  bool replay = false;  ///< a recorded run, which cannot be stopped
+  std::string name;     ///< of the campaign, or of the file
+  std::string propeller;
+  double speed_max_rpm = 0;        ///< of the profile: the top of the speed axis
+  Seconds minimum_discard;         ///< at the start of every step, not averaged
+  std::vector<GuardLimit> limits;  ///< until a guard publishes its own
+};
+
+/// `devices`: their reported limits; nullptr: limits of the files only.
+[[nodiscard]] inline Subject subject_of(const profiles::Campaign& campaign, const profiles::BenchConfig& config,
+                                        const DeviceLimits* devices = nullptr) {
+  const double first = to_rpm(campaign.profile.first), last = to_rpm(campaign.profile.last);
+  return {false,
+          campaign.name,
+          campaign.propeller.name,
+          first > last ? first : last,
+          campaign.minimum_discard,
+          combine_limits(campaign, config, devices)};
+}
+
+using daq::kUnknown;
+
+/// Unknown and stale values are kUnknown. Members are eight bytes or multiples: no padding.
+struct Tick {
+  double time_s = 0;              ///< bench time
+  double timestamp_s = 0;         ///< calendar time, seconds since 1970, UTC
+  double progress = 0;            ///< of the campaign, 0 to 1
+  double remaining_s = kUnknown;  ///< of the campaign, wall clock
+  double occlusion_deg = kUnknown;
+  double commanded_rpm = 0;
+  double speed_rpm = kUnknown;
+  double thrust_n = kUnknown;   ///< zero subtracted
+  double torque_nm = kUnknown;  ///< about the thrust axis, zero subtracted
+  double speed_age_s = 0, thrust_age_s = 0;
+  double module_v = kUnknown, module_a = kUnknown;  ///< at the motor module's input
+  double supply_v = kUnknown, supply_a = kUnknown;  ///< at the bench supply's terminals
+  double coil_degc = kUnknown;
+  double derate = kUnknown;  ///< 1: none
+  GuardedValues watched;     ///< as the guard judged them
+  std::uint64_t fault_bits = 0;
+  std::uint64_t received = 0, lost_network = 0, lost_host = 0;  ///< samples of this run
+  std::int64_t repetition = 0, repetitions = 0;                 ///< 1-based
+  std::int64_t step = -1, steps = 0;                            ///< 0-based; -1 outside steps
+  std::array<char, 24> phase{}, propeller{};                    ///< cut off, zero-terminated
+};
+
+/// Copies what fits.
+template <std::size_t N>
+void write(std::array<char, N>& to, std::string_view text) noexcept {
+  to = {};
+  text.copy(to.data(), N - 1);
+}
 
 inline constexpr const char* kStopWord = "stop";
 
@@ -41,7 +101,7 @@ struct Message {
 [[nodiscard]] Message stop_message(double time_s);
 [[nodiscard]] Message end_message(double time_s, bool well, const std::string& text);
 
-/// For plotters (PlotJuggler's UDP server): `timestamp` in seconds since 1970; numbers only, unknown ones are absent;
+/// For plotters (PlotJuggler's UDP server): `timestamp` in seconds since 1970; only numbers, none that is unknown;
 /// limit_share {key: 1 at the limit, …}; fewer than 1400 bytes.
 [[nodiscard]] std::string plot_message(const Tick& tick, const std::vector<GuardLimit>& limits);
 

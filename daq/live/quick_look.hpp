@@ -1,5 +1,4 @@
-// k of a step right after it, for the page; not for the record. Step means come from the raw
-// samples (daq/reduction.hpp).
+// Preliminary k of a step right after it, for the page. The record uses the raw samples (results/reduction).
 #pragma once
 
 #include <cstddef>
@@ -12,7 +11,7 @@ namespace kphi::daq::live {
 class QuickLook {
  public:
   struct Result {
-    std::size_t n = 0;       ///< looks; 0: nothing is known
+    std::size_t n = 0;       ///< number of ticks; 0: no result
     double thrust_n = 0;     ///< mean
     double speed_rad_s = 0;  ///< root of the mean square
     double k = 0;            ///< N/(rad/s)²: mean thrust over mean ω²

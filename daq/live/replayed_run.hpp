@@ -4,13 +4,13 @@
 #include <functional>
 
 #include "base/clock.hpp"
-#include "daq/live/subject.hpp"
+#include "daq/live/messages.hpp"
 #include "daq/run/progress.hpp"
 #include "results/records.hpp"
 
 namespace kphi::daq::live {
 
-/// With the limits of campaign, bench and devices recorded in the run; without limits if its campaign cannot be read.
+/// Has the limits of campaign, bench and devices recorded in the run; no limits if its campaign cannot be read.
 [[nodiscard]] Subject subject_of(const results::RunRecording& recording);
 
 class ReplayedRun {
@@ -21,8 +21,8 @@ class ReplayedRun {
   /// First and last moment, bench time.
   [[nodiscard]] Instant begin() const { return begin_; }
   [[nodiscard]] Instant end() const { return end_; }
-  /// Advances to `when` and reports what a person saw then, and all that ended since the last call. The counts of lost
-  /// samples are those of the whole run. `speed`: bench seconds per wall second.
+  /// Advances to `when`, and reports what a person saw then and which steps ended since the last call. Counts of lost
+  /// samples cover the whole run. `speed`: bench seconds per wall second.
   void show(Instant when, Progress& progress, double speed);
 
  private:

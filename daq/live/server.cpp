@@ -20,7 +20,7 @@
 
 #include "base/error.hpp"
 #include "daq/live/access_control.hpp"
-#include "daq/live/history.hpp"
+#include "daq/live/feed.hpp"
 #include "daq/live/messages.hpp"
 
 namespace kphi::daq::live {
@@ -37,7 +37,6 @@ using Wall = std::chrono::steady_clock;
 
 constexpr int kYielding = 10;  // nice value of this thread
 constexpr int kSendBuffer = 1 << 16;
-constexpr std::size_t kMostRequests = 64;  // under way at once
 constexpr std::chrono::milliseconds kClosingLimit{500};
 constexpr std::chrono::seconds kIdle{20};
 
@@ -51,7 +50,7 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 
 }  // namespace
 
-/// Except draw() and the counts, everything belongs to its thread.
+/// Everything except draw() and the counts belongs to its thread.
 class Server::Impl {
  public:
   Impl(Settings settings, Feed& feed);
@@ -78,7 +77,7 @@ class Server::Impl {
 
   Settings settings_;
   Feed& feed_;
-  std::size_t requests_ = 0;  // before the context: its end ends requests
+  std::size_t requests_ = 0;  // before the context, whose end destroys requests
   asio::io_context io_{1};
   tcp::acceptor acceptor_{io_};
   asio::steady_timer frames_due_{io_}, closing_limit_{io_};
@@ -203,7 +202,7 @@ class Server::Impl::Client : public std::enable_shared_from_this<Client> {
   bool open_ = false, sending_ = false, closing_ = false;
 };
 
-/// One request: answered, or handed on to a Client.
+/// One request: answered, or passed on to a Client.
 class Server::Impl::Request : public std::enable_shared_from_this<Request> {
  public:
   Request(Impl& impl, tcp::socket socket) : impl_(impl), stream_(std::move(socket)) { ++impl_.requests_; }
@@ -332,7 +331,7 @@ void Server::Impl::listen() {
 }
 
 void Server::Impl::run() {
-  // Threads have nice values of their own on Linux: acquisition comes first.
+  // Linux gives each thread its own nice value: acquisition comes first.
   ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), kYielding);
   io_.run();
 }

@@ -11,6 +11,8 @@
 
 namespace kphi::daq::live {
 
+[[nodiscard]] std::string page_text();
+
 class Server {
  public:
   struct Settings {
@@ -18,15 +20,16 @@ class Server {
     std::string token;                    ///< required in every request
     std::string page;                     ///< HTML; every "@NONCE@" in it becomes the nonce of its scripts and styles
     std::string hello;                    ///< hello_message
-    bool can_stop = true;                 ///< false: "stop" does nothing
+    bool can_stop = true;                 ///< false: "stop" is ignored
     std::chrono::milliseconds frame{33};  ///< between ticks; 0: only draw() sends one
     std::chrono::milliseconds patience{2000};       ///< with a client that does not read
     std::chrono::milliseconds request_limit{5000};  ///< for a whole request
     std::size_t most_clients = 16;                  ///< WebSockets
     std::size_t most_waiting = 1024;                ///< messages except ticks, per client
   };
-  static constexpr std::size_t kLongestWord = 64;      ///< of a page, bytes
-  static constexpr std::size_t kLongestHeader = 8192;  ///< of a request, bytes
+  static constexpr std::size_t kLongestWord = 64;      ///< message from a page, bytes
+  static constexpr std::size_t kLongestHeader = 8192;  ///< header of a request, bytes
+  static constexpr std::size_t kMostRequests = 64;     ///< under way at once; further connections are closed unread
 
   struct Counts {
     std::uint64_t clients = 0;  ///< WebSockets open now
@@ -36,7 +39,7 @@ class Server {
     std::uint64_t dropped_clients = 0;
   };
 
-  /// Listens at once. Throws ConfigurationError when the port is taken. `feed` must outlive this.
+  /// Listens at once. Throws ConfigurationError if the port is taken. `feed` must outlive this.
   Server(Settings settings, Feed& feed);
   /// Sends waiting messages for at most half a second, and closes.
   ~Server();
@@ -48,7 +51,7 @@ class Server {
   [[nodiscard]] std::string url() const;
   /// Any thread.
   [[nodiscard]] Counts counts() const noexcept;
-  /// Sends messages and one tick now. Any thread; returns before it is done.
+  /// Sends messages and one tick soon; returns at once. Thread-safe.
   void draw();
 
  private:

@@ -5,19 +5,19 @@
 #include <utility>
 #include <vector>
 
-#include "daq/live/tick.hpp"
+#include "daq/live/messages.hpp"
 
 namespace kphi::daq::live {
 
 class UdpJson {
  public:
-  /// "127.0.0.1:9870", "localhost:9870", "[::1]:9870" or another computer's address: numeric, so that no name is looked
-  /// up, and unicast. Throws ConfigurationError.
+  /// "127.0.0.1:9870", "localhost:9870", "[::1]:9870" or another computer's address: numeric, so that no name is
+  /// resolved, and unicast. Throws ConfigurationError.
   UdpJson(const std::string& address, std::vector<GuardLimit> limits);
   ~UdpJson();
   UdpJson(const UdpJson&) = delete;
   UdpJson& operator=(const UdpJson&) = delete;
-  /// The limits that limit_share refers to, from now on.
+  /// From now on limit_share refers to these limits.
   void hold_to(std::vector<GuardLimit> limits) { limits_ = std::move(limits); }
   /// Never waits; a datagram that the kernel refuses is dropped and counted.
   void send(const Tick& tick) noexcept;

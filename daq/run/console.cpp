@@ -11,10 +11,12 @@
 #include <algorithm>
 #include <cerrno>
 #include <condition_variable>
+#include <iterator>
 #include <list>
 #include <mutex>
 #include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace kphi::daq {
@@ -30,8 +32,8 @@ void refuse_signals() noexcept {
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
 }
 
-/// Of the same terminal, but one whose write() does not block: that of `descriptor` itself is shared with whoever
-/// started the program. Anything else: `descriptor`.
+/// A new descriptor of the same terminal whose write() does not block; `descriptor` itself is shared with the program's
+/// parent. `descriptor` if it is not a terminal.
 int without_blocking(int descriptor) {
   if (::isatty(descriptor) == 0) return descriptor;
   const std::string name = fmt::format("/proc/self/fd/{}", descriptor);
@@ -40,6 +42,63 @@ int without_blocking(int descriptor) {
 }
 
 }  // namespace
+
+std::list<WordQueue::Text>::iterator WordQueue::first_whole() noexcept {
+  return std::next(texts_.begin(), is_begun_ ? 1 : 0);
+}
+
+bool WordQueue::drop_one() noexcept {
+  const auto first = first_whole();
+  if (first == texts_.end()) return false;
+  auto least = std::find_if(first, texts_.end(), [](const Text& text) { return text.worth != Worth::kept; });
+  if (least == texts_.end()) {
+    least = first;
+    ++lost_;
+    ++untold_;
+  }
+  size_ -= least->bytes.size();
+  texts_.erase(least);
+  return true;
+}
+
+void WordQueue::push(std::string text, Worth worth, std::uint64_t order) {
+  if (text.empty()) return;
+  if (worth == Worth::live && first_whole() != texts_.end() && texts_.back().worth == Worth::live) {
+    size_ -= texts_.back().bytes.size();
+    texts_.pop_back();
+  }
+  while (size_ + text.size() > kRoom && drop_one()) {
+  }
+  size_ += text.size();
+  texts_.push_back({std::move(text), worth, order});
+}
+
+std::string_view WordQueue::begin(std::size_t most) {
+  if (!is_begun_ && untold_ > 0) {
+    std::string note = fmt::format("kphi: this output was blocked; messages lost here: {}\n", untold_);
+    size_ += note.size();
+    texts_.push_front({std::move(note), Worth::kept, order()});
+    untold_ = 0;
+  }
+  is_begun_ = true;
+  return std::string_view(texts_.front().bytes).substr(gone_, most);
+}
+
+void WordQueue::taken(std::size_t n) noexcept {
+  gone_ += n;
+  if (gone_ < texts_.front().bytes.size()) return;
+  size_ -= texts_.front().bytes.size();
+  texts_.pop_front();
+  gone_ = 0;
+  is_begun_ = false;
+}
+
+void WordQueue::clear() noexcept {
+  texts_.clear();
+  size_ = gone_ = 0;
+  is_begun_ = false;
+  untold_ = 0;
+}
 
 struct Console::Shared {
   struct Stream {
@@ -73,14 +132,14 @@ struct Console::Shared {
     }
     return streams.emplace_back(name);
   }
-  /// The bell, and each stream for which something waits; false: no more of them.
+  /// The bell, and each stream with waiting texts. False: the thread must end.
   [[nodiscard]] bool list(std::vector<pollfd>& waiting) {
     const std::lock_guard lock(mutex);
     waiting.assign(1, {bell, POLLIN, 0});
     for (const Stream& each : streams) waiting.push_back({each.queue.empty() ? -1 : each.descriptor, POLLOUT, 0});
     return !quit;
   }
-  /// Of the streams that can be written the one that has waited longest; nullptr: none.
+  /// The writable stream whose text has waited longest; nullptr without one.
   [[nodiscard]] Stream* choose(const std::vector<pollfd>& waited) {
     const std::lock_guard lock(mutex);
     Stream* chosen = nullptr;
@@ -135,7 +194,7 @@ void Console::put(int descriptor, std::string text, Worth worth) noexcept {
     }
     shared_->stream(descriptor).queue.push(std::move(text), worth, ++shared_->order);
   } catch (...) {
-    // No memory, or no thread: words are not worth a run.
+    // No memory, or no thread: a run is worth more than its messages.
   }
   shared_->ring();
 }
@@ -167,7 +226,7 @@ void Console::write_on(const std::shared_ptr<Shared>& shared) noexcept {
       if (Shared::Stream* chosen = shared->choose(waiting)) shared->write_some(*chosen);
     }
   } catch (const std::bad_alloc&) {
-    // Nothing is written any more; finish() waits in vain, and no longer than its limit.
+    // Nothing is written any more; finish() ends at its limit.
   }
   const std::lock_guard lock(shared->mutex);
   shared->ended = true;

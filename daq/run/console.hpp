@@ -1,26 +1,68 @@
-// What a run says, written by a thread of its own: a terminal that is stopped (Ctrl-S, a stalled ssh), or a pipe that
-// nobody reads, blocks nobody but itself.
+// Output of a run, written by a thread of its own: a stopped terminal (Ctrl-S, a stalled ssh) or a full pipe blocks
+// only that thread.
 //
-// The thread blocks all signals and writes only where poll() sees room, little at a time. A terminal can have less room
-// than that, hence it is opened a second time, so as not to block; if it cannot be (it belongs to another user), the
-// thread may come to sit in write() until the terminal goes on. Nobody waits for it then, nor at the end of the
-// program.
+// The thread blocks all signals and writes a little at a time, only where poll() sees room. A terminal can have less
+// room than that, so it is opened a second time, non-blocking; if that fails (it belongs to another user), the thread
+// may hang in write() until the terminal continues. Nothing waits for it then, not even the end of the program.
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <list>
 #include <memory>
 #include <string>
-
-#include "daq/run/word_queue.hpp"
+#include <string_view>
 
 namespace kphi::daq {
+
+/// What happens to a text when there is no room for all.
+enum class Worth : std::uint8_t {
+  kept,     ///< dropped last, and counted
+  passing,  ///< dropped first, the oldest before the others
+  live,     ///< as passing; also replaces a live text right before it of which nothing was written yet
+};
+
+class WordQueue {
+ public:
+  static constexpr std::size_t kRoom = 256 * 1024;  ///< bytes
+
+  /// A text longer than kRoom is accepted and drops all others. `order` must grow.
+  void push(std::string text, Worth worth, std::uint64_t order);
+  [[nodiscard]] bool empty() const noexcept { return texts_.empty(); }
+  /// Order of the oldest text. Must not be empty.
+  [[nodiscard]] std::uint64_t order() const noexcept { return texts_.front().order; }
+  /// At most `most` bytes of the oldest text. Must not be empty. Valid until taken() or clear(), also after push().
+  [[nodiscard]] std::string_view begin(std::size_t most);
+  /// `n` of the bytes that begin() returned were written.
+  void taken(std::size_t n) noexcept;
+  /// Drops everything, uncounted.
+  void clear() noexcept;
+  /// Kept texts that were dropped.
+  [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
+
+ private:
+  struct Text {
+    std::string bytes;
+    Worth worth = Worth::kept;
+    std::uint64_t order = 0;
+  };
+  [[nodiscard]] std::list<Text>::iterator first_whole() noexcept;
+  bool drop_one() noexcept;
+
+  std::list<Text> texts_;
+  std::size_t size_ = 0;   ///< bytes of all
+  std::size_t gone_ = 0;   ///< bytes of the oldest that were written
+  bool is_begun_ = false;  ///< the oldest may be partly written
+  std::uint64_t lost_ = 0;
+  std::uint64_t untold_ = 0;  ///< lost texts before the oldest one that the output does not mention yet
+};
 
 class Console {
  public:
   Console();
-  /// Gives up what waits. A write under way is waited for at most kGiveUp, then left behind.
+  /// Drops what waits. Waits at most kGiveUp for a write under way, then leaves it behind.
   ~Console();
   Console(const Console&) = delete;
   Console& operator=(const Console&) = delete;
@@ -28,26 +70,26 @@ class Console {
   /// How long the end of the program waits for a terminal.
   static constexpr std::chrono::milliseconds kGiveUp{1000};
 
-  /// Any thread; returns at once. What `descriptor` refuses (its reader is gone, the disk is full) is lost in silence.
+  /// Thread-safe; returns at once. Text that `descriptor` refuses (its reader is gone, the disk is full) is dropped.
   void put(int descriptor, std::string text, Worth worth) noexcept;
   /// Waits until everything is written; false: not within `limit`.
   bool finish(std::chrono::milliseconds limit) noexcept;
-  /// Something was put.
+  /// put() was called.
   [[nodiscard]] bool is_used() const noexcept;
-  /// Kept texts that were dropped for want of room.
+  /// Kept texts that were dropped for lack of room.
   [[nodiscard]] std::uint64_t lost() const noexcept;
 
  private:
   struct Shared;
   static void write_on(const std::shared_ptr<Shared>& shared) noexcept;
-  std::shared_ptr<Shared> shared_;  ///< with the thread, which may outlive this
+  std::shared_ptr<Shared> shared_;  ///< with the thread, which may live longer
 };
 
-/// That of the program; never destroyed, since its thread may sit in write() when the program ends.
+/// The program's console; never destroyed, since its thread may hang in write() when the program ends.
 [[nodiscard]] Console& console() noexcept;
 
-/// On stdout and stderr by way of console(); on any other stream at once, in the caller's thread. A reader that is gone
-/// or does not read is no reason to stop a run.
+/// Through console() for stdout and stderr; any other stream is written at once, in the caller's thread. A reader that
+/// is gone or does not read never stops a run.
 void put(std::FILE* stream, const std::string& text, Worth worth = Worth::kept) noexcept;
 
 }  // namespace kphi::daq

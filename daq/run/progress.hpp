@@ -33,7 +33,7 @@ class Progress {
   virtual void guarded(const std::vector<GuardLimit>& limits) { static_cast<void>(limits); }
   /// Called on every tick; must return at once.
   virtual void tick(const Position& position, const Observation& seen) = 0;
-  /// A step or phase is over.
+  /// A step or phase has ended.
   virtual void step_done(const Position& position, const Observation& seen) = 0;
   /// A line to keep.
   virtual void say(const std::string& line) = 0;

@@ -69,7 +69,7 @@ void Recorder::note(const results::StreamEvent& event) {
 void Recorder::inspect(std::span<const results::LoadCellRecord> batch) {
   for (const results::LoadCellRecord& record : batch) {
     const netbox::StampedRecord stamped = to_stamped(record);
-    // Whether the load endangers the cell is the guard's to judge.
+    // The guard judges whether the load endangers the cell.
     const netbox::RangeVerdict verdict = std::min(range_.look(stamped.record), netbox::RangeVerdict::beyond);
     if (verdict > worst_) note_range(verdict, record.arrival_ns);
     if (measuring_) estimate_.add(stamped);
@@ -105,7 +105,7 @@ void Recorder::drain_supply() {
 
 void Recorder::mark(const results::PhaseMark& mark) {
   // The queue holds more marks than a run has; it can only be full when nobody drains it.
-  if (!marks_.push(mark)) throw std::runtime_error("recorder: nobody takes the marks of the run");
+  if (!marks_.push(mark)) throw std::runtime_error("recorder: stalled, its queue of marks is full");
 }
 
 std::vector<results::StreamEvent> Recorder::take_events() {

@@ -1,4 +1,4 @@
-// Empties the streams into the run file.
+// Writes the streams into the run file.
 #pragma once
 
 #include <array>
@@ -16,23 +16,23 @@
 
 namespace kphi::daq {
 
-/// Two threads: drain() belongs to one, all else to the runner. Neither waits for the other.
+/// Two threads, neither of which waits for the other: one calls drain(), the runner calls everything else.
 class Recorder {
  public:
   Recorder(Bench& bench, Streams& streams, results::RunWriter& writer, const results::LoadCellScale& scale);
 
-  /// Takes all that waits, appends it, syncs the file when it is time. Keeps the first error for check_failure and does
-  /// nothing after it.
+  /// Appends everything that has arrived, and syncs the file when it is due. Keeps the first error for check_failure()
+  /// and does nothing after it.
   void drain() noexcept;
   /// Begins a phase.
   void mark(const results::PhaseMark& mark);
   /// Events of load cell and motor since the last call, already in the file.
   [[nodiscard]] std::vector<results::StreamEvent> take_events();
-  /// For events that the runner found, once drain() is no longer called.
+  /// Records an event of the runner. Call it only after the last drain().
   void note(const results::StreamEvent& event);
   /// Mean and standard deviation of all axes over the present phase, if it measures a bias or the zero before.
   [[nodiscard]] netbox::ZeroMeasurement measured() const noexcept { return measured_.read(); }
-  /// Rethrows what drain() ran into.
+  /// Rethrows the first error of drain().
   void check_failure();
 
  private:

@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "base/error.hpp"
-#include "daq/audit/load_cell_audit.hpp"
-#include "daq/guard/interrupt.hpp"
-#include "daq/run/box_configuration.hpp"
+#include "daq/audit/bench_audit.hpp"
+#include "daq/bench/box.hpp"
+#include "daq/guard/run_stopped.hpp"
 #include "daq/run/recorder.hpp"
 #include "daq/run/sequence.hpp"
 #include "results/run_writer.hpp"
@@ -82,30 +82,17 @@ void judge_changes(const netbox::Configuration& before, const LoadCellLink& cell
   if (changes == 0) return;
   progress.say("load cell: configuration changed since it was last read: " + netbox::to_words(changes) +
                "; recording this run with the present scale");
-  refuse_unsuitable(cell, order.campaign, order.config);
+  require_suitable(cell, order.campaign, order.config);
 }
 
-bool is_interrupted(const std::exception_ptr& cause) {
-  try {
-    std::rethrow_exception(cause);
-  } catch (const Interrupted&) {
-    return true;
-  } catch (...) {
-    return false;
-  }
-}
+bool is_interrupted(const std::exception_ptr& cause) { return as<Interrupted>(cause) != nullptr; }
 
 bool is_trip(const std::exception_ptr& cause) {
-  try {
-    std::rethrow_exception(cause);
-  } catch (const SafetyStop& stop) {
-    return stop.is_trip();
-  } catch (...) {
-    return false;
-  }
+  const auto* stop = as<SafetyStop>(cause);
+  return stop != nullptr && stop->is_trip();
 }
 
-/// The same cause with all that is known of it. Keeps the type of the exception, but for a DeviceError.
+/// The same exception with more words; a DeviceError becomes a SafetyStop.
 [[noreturn]] void rethrow_with(const std::exception_ptr& cause, const StopWords& words) {
   try {
     std::rethrow_exception(cause);
@@ -116,29 +103,32 @@ bool is_trip(const std::exception_ptr& cause) {
   } catch (const RecordError&) {
     throw RecordError(words.line() + "; recorded so far: " + words.data);
   } catch (const DeviceError&) {
-    throw SafetyStop(words);  // the device was there; what it refuses in the middle of a run stops the run
+    throw SafetyStop(words);  // the device was there: its failure in the middle of a run is a safety stop
   }
 }
 
-/// How a run went, as far as its sequence goes.
+/// How the sequence of a run ended.
 struct Ended {
-  std::exception_ptr cause;  ///< none: it is complete
+  std::exception_ptr cause;  ///< null: it is complete
   StopWords words;
 };
 
-/// The guard's trip comes before whatever the runner met because of it.
+/// A trip of the guard is the cause of any error that the runner met after it.
 void find_cause(Guard& guard, Ended& ended) {
   guard.notice_sleep();
   ended.words = words_of(ended.cause);
   const Trip* trip = guard.latch().trip();
   if (trip == nullptr || is_trip(ended.cause)) return;
   const SafetyStop stop(*trip);
-  const std::string met = std::exchange(ended.words, stop.words()).cause;
-  if (!is_interrupted(ended.cause)) ended.words.also(met);
+  const StopWords met = std::exchange(ended.words, stop.words());
+  if (met.motor_failure != MotorFailure::none && ended.words.motor_failure != MotorFailure::none)
+    ended.words.motor_failure = met.motor_failure;  // the same failure, seen twice
+  else if (!is_interrupted(ended.cause))
+    ended.words.also(met.cause);
   ended.cause = std::make_exception_ptr(stop);
 }
 
-/// Whatever happens, the motor coasts when this returns; the supply is off then, unless the run is complete.
+/// When this returns, the motor coasts, and unless the run is complete the supply is off.
 Ended carry_out(Sequence& sequence, Bench& bench, Guard& guard, Recorder& recorder) {
   Ended ended;
   const auto guarding = bench.run_periodically([&] { guard.poll(); });
@@ -156,8 +146,8 @@ Ended carry_out(Sequence& sequence, Bench& bench, Guard& guard, Recorder& record
   return ended;
 }
 
-/// After the stream has ended.
-void take_last_look(Sequence& sequence, Guard& guard, Recorder& recorder, Ended& ended) {
+/// Call it once the stream has stopped.
+void record_the_rest(Sequence& sequence, Guard& guard, Recorder& recorder, Ended& ended) {
   guard.stand_down();
   for (bool more = true; more; recorder.drain()) more = guard.relay();
   try {
@@ -179,7 +169,7 @@ void take_last_look(Sequence& sequence, Guard& guard, Recorder& recorder, Ended&
   }
   if (ended.cause && ended.words.consequences.empty() && !is_interrupted(ended.cause)) {
     try {
-      sequence.compare_configuration(1);  // units that changed can look like a limit that was passed
+      sequence.compare_configuration(1);  // changed units can look like an exceeded limit
     } catch (const RecordError&) {
     }
   }
@@ -206,7 +196,7 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   Sequence sequence(bench, recorder, guard, order, progress, stop_asked);
   Ended ended = carry_out(sequence, bench, guard, recorder);
   streaming.reset();
-  take_last_look(sequence, guard, recorder, ended);
+  record_the_rest(sequence, guard, recorder, ended);
   const results::SampleAccount account = bench.load_cell().account();
   results::RunEnding ending{results::Outcome::complete, "", account, bench.load_cell().health(), sequence.box_bias()};
   if (!ended.cause) return {order.file, writer.finish(ending), account, sequence.stop()};
@@ -216,7 +206,7 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   try {
     (void)writer.finish(ending);
   } catch (const RecordError&) {
-    // The first cause matters more; the .part file stays as it was secured last.
+    // The first cause matters more; the .part file stays as it was last synced.
   }
   ended.words.data = writer.path().string();
   rethrow_with(ended.cause, ended.words);

@@ -20,12 +20,12 @@ struct RunResult {
   std::filesystem::path file;
   std::string sha256;
   results::SampleAccount account;
-  std::optional<iq::StopReport> stop;  ///< how the motor came to stand
+  std::optional<iq::StopReport> stop;  ///< how the motor came to rest
 };
 
-/// `stop_asked` is asked on every tick. Throws Interrupted, SafetyStop or RecordError after the motor was let go and
-/// the file was closed as aborted; the exception's message names the file that holds what was recorded, and why the
-/// load cell fell silent when that was it. Throws DeviceError when the stream does not start.
+/// `stop_asked` is checked on every tick. Throws Interrupted, SafetyStop or RecordError after the motor coasts and the
+/// file is closed as aborted; the message names that file and, if the load cell fell silent, the reason. Throws
+/// DeviceError if the stream does not start.
 [[nodiscard]] RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress,
                                    const std::function<bool()>& stop_asked);
 

@@ -1,20 +1,31 @@
-// What one run is to do.
+// What one run must do, and the confirmation that unlocks the motor for it.
 #pragma once
 
 #include <filesystem>
 
-#include "daq/run/mount_confirmation.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 #include "profiles/plan.hpp"
 
 namespace kphi::daq {
 
+/// An operator has confirmed that this occlusion is mounted. Only an Operator can make one, and a run cannot be ordered
+/// without it.
+class MountConfirmation {
+ public:
+  [[nodiscard]] double occlusion_deg() const { return occlusion_deg_; }
+
+ private:
+  friend class Operator;
+  explicit MountConfirmation(double occlusion_deg) : occlusion_deg_(occlusion_deg) {}
+  double occlusion_deg_;
+};
+
 struct RunOrder {
   const profiles::Campaign& campaign;
   const profiles::BenchConfig& config;
-  MountConfirmation mounted;     ///< that somebody has confirmed it is what turns the motor's lock
-  profiles::PlannedRun planned;  ///< its steps may be fewer than those of the plan
+  MountConfirmation mounted;     ///< unlocks the motor
+  profiles::PlannedRun planned;  ///< may have fewer steps than in the plan
   double remaining_bench_s = 0;  ///< of the campaign, this run included
   std::filesystem::path file;    ///< final path
 };

@@ -5,13 +5,11 @@
 #include <algorithm>
 
 #include "base/error.hpp"
+#include "daq/bench/box.hpp"
 #include "daq/bench/device_records.hpp"
-#include "daq/guard/interrupt.hpp"
+#include "daq/guard/interlock.hpp"
 #include "daq/guard/rest_guard.hpp"
-#include "daq/guard/supply_interlock.hpp"
-#include "daq/run/box_bias.hpp"
-#include "daq/run/box_configuration.hpp"
-#include "daq/run/slew.hpp"
+#include "daq/guard/run_stopped.hpp"
 #include "daq/run/speed_cap.hpp"
 
 namespace kphi::daq {
@@ -28,7 +26,7 @@ constexpr Duration kLastReadingWall = std::chrono::milliseconds(500);  // of a s
 constexpr int kBiasAttempts = 3;
 constexpr int kEventsShown = 10;
 
-/// The box was asked why it is silent, or is no longer silent.
+/// An answer to the question why the box is silent, or the end of its silence.
 bool explains_silence(results::EventKind kind) {
   using results::EventKind;
   return kind == EventKind::taken_over || kind == EventKind::rdt_disabled || kind == EventKind::unreachable ||
@@ -62,12 +60,12 @@ void Sequence::run() {
 
 void Sequence::add_aftermath(StopWords& words) {
   if (bench_.supply() != nullptr) switch_off(words);
-  // Without power nothing turns, and the module can tell nothing more.
+  // Without power nothing drives the motor, and the module cannot answer.
   if (bench_.supply() == nullptr || !power_is_off_) watch_the_coast(words);
 }
 
 void Sequence::watch_the_coast(StopWords& words) {
-  const auto add = [&](const std::string& what) { add_words(words.state, "motor: " + what); };
+  const auto add = [&](const std::string& what) { words.leaves("motor: " + what); };
   if (!has_spun_) return add("was not turning");
   if (stop_) return add(stop_->summary());
   iq::StopSettings settings;
@@ -76,7 +74,9 @@ void Sequence::watch_the_coast(StopWords& words) {
   const Instant give_up = bench_.clock().now() + 4 * kAftermath;
   while (!stop_ && bench_.clock().now() < give_up) {
     for (const results::StreamEvent& event : recorder_.take_events()) {
-      if (is_of_motor(event.kind) && ends_a_run(event.kind)) words.also(event.text);
+      if (!ends_a_run(event.kind)) continue;
+      if (words.motor_failure != MotorFailure::event_to_come) words.also(event.text);
+      words.motor_failure = MotorFailure::reported;
     }
     stop_ = bench_.motor().stop_report();
     if (!stop_) bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
@@ -88,7 +88,12 @@ void Sequence::switch_off(StopWords& words) {
   const Instant since = bench_.clock().now();
   const std::string why = bench_.supply()->switch_off();
   power_is_off_ = why.empty();
-  if (!power_is_off_) return add_words(words.state, why);
+  if (!power_is_off_) {
+    const Trip* trip = guard_.latch().trip();
+    const bool is_cause = trip != nullptr && trip->source == Source::supply;
+    if (!is_cause) words.also(bench_.supply()->failure());
+    return words.leaves(why);
+  }
   const Instant give_up = bench_.clock().now() + bench_.clock().stretched(kLastReadingWall);
   const auto newest = [this] { return guard_.observe(bench_.clock().now()).supply; };
   while (newest().time_ns < since.count() && bench_.clock().now() < give_up)
@@ -242,10 +247,10 @@ void Sequence::require_rest() {
     throw DeviceError("Net Box", "take the zero", "no valid sample arrived", "check the box's status: `kphi devices`");
   const double deviation = zero.standard_deviation[axis];
   if (deviation <= results::kNoisyZero) return;
-  throw DeviceError(
-      "Net Box", "take the zero",
-      fmt::format("F{} is noisy: standard deviation {:.3g} N, limit {:g} N", "xyz"[axis], deviation, results::kNoisyZero),
-      results::kZeroNextMove);
+  throw DeviceError("Net Box", "take the zero",
+                    fmt::format("F{} is noisy: standard deviation {:.3g} N, limit {:g} N", "xyz"[axis], deviation,
+                                results::kNoisyZero),
+                    results::kZeroNextMove);
 }
 
 void Sequence::wait_for_standstill() {
@@ -291,7 +296,7 @@ void Sequence::show_events() {
     const std::string line = (is_of_motor(event.kind) ? "motor: " : "load cell: ") + event.text;
     if (events_shown_ < kEventsShown) progress_.say(line);
     if (++events_shown_ == kEventsShown) progress_.say("further events of this run go to its file only: `kphi info`");
-    if (ends_a_run(event.kind)) throw SafetyStop(line);
+    if (ends_a_run(event.kind)) throw SafetyStop(StopWords{.cause = line, .motor_failure = MotorFailure::reported});
   }
 }
 

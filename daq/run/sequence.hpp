@@ -1,12 +1,15 @@
 // Steps through the phases of one run: zero, steps, spin-down, zero.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <string>
 
+#include "base/clock.hpp"
+#include "compensation/units.hpp"
 #include "daq/guard/guard.hpp"
-#include "daq/guard/motor_enable.hpp"
 #include "daq/run/progress.hpp"
 #include "daq/run/recorder.hpp"
 #include "daq/run/run_order.hpp"
@@ -14,7 +17,24 @@
 
 namespace kphi::daq {
 
-/// The runner's thread. All that it is given must outlive it.
+class Slew {
+ public:
+  /// `rate_rad_s2` > 0; nullopt: changes at once.
+  Slew(RadPerSec from, RadPerSec to, std::optional<double> rate_rad_s2)
+      : from_(from), to_(to), lasts_s_(rate_rad_s2 ? std::abs((to - from).value()) / *rate_rad_s2 : 0) {}
+  [[nodiscard]] Duration lasts() const { return from_seconds(lasts_s_); }
+  /// Speed to command at `since` after the start.
+  [[nodiscard]] RadPerSec at(Duration since) const {
+    if (!(to_seconds(since) < lasts_s_)) return to_;
+    return from_ + (to_ - from_) * (std::max(0.0, to_seconds(since)) / lasts_s_);
+  }
+
+ private:
+  RadPerSec from_, to_;
+  double lasts_s_;
+};
+
+/// The runner's thread. The arguments must outlive it.
 class Sequence {
  public:
   Sequence(Bench& bench, Recorder& recorder, Guard& guard, const RunOrder& order, Progress& progress,
@@ -26,9 +46,9 @@ class Sequence {
   [[nodiscard]] const std::optional<results::StreamEvent>& supply_event() const { return supply_event_; }
   /// After the motor was coasted: adds to `words` the state of motor and supply, and what else the module reported.
   void add_aftermath(StopWords& words);
-  /// After the stream has ended and the recorder is no longer drained.
+  /// Call it once the stream has stopped and no other thread drains the recorder.
   void compare_configuration(int attempts);
-  /// After a stop: why the load cell fell silent, as far as the box tells; empty if it did not.
+  /// After a stop: why the load cell fell silent, if the box reports a reason; else empty.
   std::string explanation();
 
  private:

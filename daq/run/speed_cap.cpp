@@ -50,7 +50,7 @@ std::optional<CapLesson> SpeedCap::learn(std::span<const StepMean> run) {
 }
 
 int SpeedCap::apply(std::vector<profiles::PlannedStep>& steps) const {
-  constexpr double kSlack = 1e-9;  // levels come through files
+  constexpr double kSlack = 1e-9;  // levels may come from files
   if (!cap_) return 0;
   return static_cast<int>(std::erase_if(
       steps, [&](const profiles::PlannedStep& step) { return step.speed.value() > cap_->value() * (1 + kSlack); }));

@@ -1,4 +1,4 @@
-// The fastest level that a motor can hold with its propeller, learned when its drive comes to its end.
+// The fastest level that a motor can hold with its propeller, learned when it reaches full drive.
 #pragma once
 
 #include <optional>
@@ -6,31 +6,31 @@
 #include <vector>
 
 #include "compensation/units.hpp"
-#include "profiles/order.hpp"
+#include "profiles/plan.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::daq {
 
-/// A level that was commanded and not reached, because no drive was left.
+/// A commanded level that the motor missed at full drive.
 struct CapLesson {
   RadPerSec commanded;
   RadPerSec reached;  ///< mean of that step
   RadPerSec cap;      ///< the highest level below it that was reached with drive to spare (under 98 % of the supply)
 };
 
-/// A step at its end, by the newest readings: the speed falls short of its command, and no drive is left. What a run
-/// then still has at this level or above is left out of it: only the step that was driven gets flags (and no mean a
-/// place in a fit), the coil is spared, and the levels below are measured all the same.
+/// By the newest readings of a step: the speed falls short of its command at full drive. The run then skips its
+/// remaining steps at this level or above: only one step is flagged, the coil stays cooler, and all levels below are
+/// measured.
 [[nodiscard]] bool is_out_of_drive(RadPerSec commanded, RadPerSec reached, double drive_pwm);
 
-/// Of one propeller on one motor. Later runs leave out the levels above: a drive at its end holds no speed, heats the
-/// coil, and would only give flagged steps. A cap falls and never rises.
+/// For one propeller on one motor. Later runs skip the levels above: at full drive the speed is not controlled, the
+/// coil heats, and all steps would be flagged. A cap falls and never rises.
 class SpeedCap {
  public:
-  /// The means of one run. Nothing: all it asked for was reached, or it teaches nothing new, or not one level was held.
+  /// The means of one run. nullopt: every level was reached, nothing new was learned, or no level was held.
   std::optional<CapLesson> learn(std::span<const results::StepMean> run);
   [[nodiscard]] const std::optional<RadPerSec>& speed() const { return cap_; }
-  /// Takes out what is above the cap; how many.
+  /// Removes the steps above the cap; returns how many.
   int apply(std::vector<profiles::PlannedStep>& steps) const;
 
  private:

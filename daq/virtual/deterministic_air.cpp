@@ -4,7 +4,7 @@
 
 #include "base/error.hpp"
 #include "drivers/ambient/ambient_worker.hpp"
-#include "drivers/ambient/bme280_sensor.hpp"
+#include "drivers/ambient/bme280.hpp"
 
 namespace kphi::daq {
 namespace {

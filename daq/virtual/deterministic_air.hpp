@@ -7,24 +7,24 @@
 
 #include "base/clock.hpp"
 #include "drivers/ambient/air.hpp"
-#include "drivers/sim/usb/faults.hpp"
+#include "drivers/sim/usb/function.hpp"
 #include "drivers/sim/usb/mcp2221.hpp"
 
 namespace kphi::daq {
 
 class DeterministicAir {
  public:
-  /// Waits for the first reading, in a time of its own: on a live bench another thread does so. Throws DeviceError:
-  /// none came. `bench` outlives this.
+  /// Waits for the first reading, in its own time: on a live bench another thread does. Throws DeviceError without a
+  /// reading. `bench` outlives this.
   DeterministicAir(const Clock& bench, const sim::TrueAir& air, sim::UsbFaultScript faults);
   ~DeterministicAir();
   DeterministicAir(const DeterministicAir&) = delete;
   DeterministicAir& operator=(const DeterministicAir&) = delete;
 
-  /// To be called when time has passed: measures every five seconds; after a failure it opens the sensor anew, after
+  /// Call it whenever time has passed. Measures every five seconds; after a failure it opens the sensor again, after
   /// longer and longer pauses.
   void look();
-  /// Of the newest reading; nothing when that is older than a minute.
+  /// Of the newest reading; nullopt if that is older than a minute.
   [[nodiscard]] std::optional<ambient::Density> density() const;
 
  private:

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <stdexcept>
+#include <utility>
 
 #include "base/error.hpp"
+#include "daq/bench/box.hpp"
 #include "daq/bench/device_records.hpp"
-#include "daq/bench/slot_pages.hpp"
-#include "daq/guard/interlock.hpp"
 #include "drivers/netbox/configuration/calinfo.hpp"
 #include "drivers/sim/input_files.hpp"
 #include "profiles/strict_yaml.hpp"
@@ -46,16 +46,6 @@ sim::BenchSettings settings_of(const profiles::BenchConfig& config, sim::BenchSe
   return settings;
 }
 
-netbox::StreamSettings stream_settings(const netbox::Configuration& box) {
-  netbox::StreamSettings settings;
-  settings.product = box.kind;
-  settings.buffered = box.records_per_datagram > 1;
-  settings.divisor = box.divisor;
-  settings.records_per_datagram = box.records_per_datagram;
-  settings.reply_timeout = std::chrono::milliseconds(100);
-  return settings;
-}
-
 /// Throws DeviceError, as the true transport would.
 std::string body_of(const std::string& response, const std::string& operation) {
   const std::size_t blank = response.find("\r\n\r\n");
@@ -85,7 +75,7 @@ DeterministicBench::DeterministicBench(const profiles::BenchConfig& config, cons
       air_({.sensor = "", .manual = config.ambient.manual}, clock_),
       sim_(settings_of(config, other)),
       supply_(config.supply ? std::make_unique<DeterministicSupply>(*config.supply, *sim_.supply(), clock_) : nullptr),
-      powered_(supply_ ? std::make_unique<OutputEnable>(*supply_) : nullptr),
+      power_(supply_.get()),
       motor_(config.iq, sim_.motor_line(), clock_, [this] { step_to(clock_.now() + kMotorWait); }) {
   if (config.simulation && config.simulation->durable) files_ = &results::disk();
   if (supply_) {
@@ -120,7 +110,7 @@ void DeterministicBench::cross_check() {
   std::string received(request.begin(), request.end());
   const std::string answer = sim_.wire().tcp(received, clock_.now()).bytes;
   const auto calinfo = netbox::decode_calinfo({reinterpret_cast<const std::uint8_t*>(answer.data()), answer.size()});
-  if (!calinfo) throw DeviceError("Net Box", "read the calibration over TCP", "the answer is none of a Net Box");
+  if (!calinfo) throw DeviceError("Net Box", "read the calibration over TCP", "unexpected reply: not a Net Box");
   if (const auto finding = netbox::compare(*calinfo, configuration_))
     throw DeviceError("Net Box", "compare its scale", finding->what, finding->next_move);
 }
@@ -130,7 +120,8 @@ void DeterministicBench::wait_until(Instant when) {
   while (clock_.now() < when) {
     Instant next = std::min(when, clock_.now() + datagram);
     next = std::min(next, motor_.deadline());
-    if (stream_) next = std::min({next, stream_->deadline(), stream_->release_deadline(), sim_.wire().next_arrival()});
+    if (connection_) next = std::min({next, connection_->deadline(), sim_.wire().next_arrival()});
+    if (answer_) next = std::min(next, answer_due_);
     step_to(std::max(next, clock_.now() + Duration(1)));
     if (clock_.now() >= next_work_) {
       for (const auto* work : work_) (*work)();
@@ -146,10 +137,7 @@ void DeterministicBench::step_to(Instant when) {
   if (measured_air_) measured_air_->look();
   exchange();  // what came is received before anything is found to be late
   motor_.advance(when);
-  if (stream_) {
-    stream_->release(when, records_);
-    stream_->advance(when);
-  }
+  if (connection_) connection_->advance(when);
   exchange();
   if (witness_.stepped) witness_.stepped();
 }
@@ -161,19 +149,35 @@ void DeterministicBench::exchange() {
 
 void DeterministicBench::exchange_load_cell() {
   if (abandoned_) return;
-  if (stream_) {
+  if (connection_) {
+    ask_box();
     std::array<std::uint8_t, 8> request{};
-    while (stream_->next_request(request)) sim_.wire().request(request, kHost, clock_.now());
+    while (connection_->next_request(request)) sim_.wire().request(request, kHost, clock_.now());
   }
   sim::Datagram datagram;
   while (sim_.wire().next_datagram(datagram, clock_.now())) {
-    if (!stream_ || datagram.foreign) continue;  // a connected socket does not see what others send
-    const std::size_t before = records_.size();
-    const std::uint64_t drained = stream_->counters().drained;
-    stream_->receive(datagram.payload(), datagram.at, records_);
-    if (witness_.heard) witness_.heard(datagram, stream_->counters().drained > drained);
-    if (records_.size() > before) meter_->note(records_.back(), records_.size() - before, stream_->counters().reboots);
+    if (!connection_ || datagram.foreign) continue;  // a connected socket does not see what others send
+    const std::uint64_t drained = connection_->counters().drained;
+    connection_->receive(datagram.payload(), datagram.at);
+    if (witness_.heard) witness_.heard(datagram, connection_->counters().drained > drained);
   }
+}
+
+/// Delivers the answer to the last question once it is due, then asks the next one.
+void DeterministicBench::ask_box() {
+  if (answer_ && clock_.now() >= answer_due_)
+    connection_->answered(*std::exchange(answer_, std::nullopt), clock_.now());
+  if (answer_ || !connection_->next_question()) return;
+  Duration wait{0};
+  answer_ = netbox::ask_box([&] {
+    const std::string operation = "GET /netftapi2.xml";
+    if (sim_.wire().http_refused(clock_.now())) throw DeviceError("Net Box", operation, "connection refused");
+    const sim::StreamReply reply = sim_.wire().http(operation + " HTTP/1.0\r\n\r\n", clock_.now());
+    wait = std::min<Duration>(reply.wait, netbox::kAnswerTimeout);
+    if (wait < reply.wait) throw DeviceError("Net Box", operation, "no answer in time");
+    return body_of(reply.bytes, operation);
+  });
+  answer_due_ = clock_.now() + wait;
 }
 
 void DeterministicBench::abandon() noexcept {
@@ -201,23 +205,8 @@ std::unique_ptr<Background> DeterministicBench::run_periodically(std::function<v
 
 Duration DeterministicBench::sync_interval() const { return kSyncEvery; }
 
-bool DeterministicBench::switch_off_power() {
-  if (!supply_) return false;
-  motor_.rest();
-  if (const std::string why = supply_->switch_off(); !why.empty())
-    throw SafetyStop(why, "cut the power of the motor at the switch before you go near");
-  powered_.reset();
-  return true;
-}
-
 void DeterministicBench::restore_power() {
-  if (supply_) {
-    powered_ = std::make_unique<OutputEnable>(*supply_);
-    wait_until(clock_.now() + kSupplyRises);
-    motor_.wake();
-  } else if (!motor_.failure().empty()) {
-    motor_.wake();
-  }
+  power_.restore(motor_, clock_, [this] { wait_until(clock_.now() + kSupplyRises); });
 }
 
 void DeterministicBench::mounted(const std::string& propeller_id, double occlusion_deg) {
@@ -229,84 +218,53 @@ void DeterministicBench::mounted(const std::string& propeller_id, double occlusi
 }
 
 results::LoadCellScale DeterministicBench::start() {
-  stream_.reset();
+  connection_.reset();
+  answer_.reset();
   read_box();
-  stream_.emplace(stream_settings(configuration_));
+  connection_.emplace(configuration_);
   if (witness_.stream_began) witness_.stream_began();
-  meter_.emplace(configuration_.device_rate_hz);
-  meter_->begin();
-  records_.clear();
-  taken_ = 0;
-  stream_->start(clock_.now());
+  connection_->start(clock_.now());
   const Instant give_up = clock_.now() + kHandshake;
-  while (stream_->state() != netbox::State::streaming && clock_.now() < give_up) {
+  while (connection_->state() != netbox::State::streaming && clock_.now() < give_up) {
     step_to(clock_.now() + std::chrono::milliseconds(1));
   }
-  if (stream_->state() != netbox::State::streaming) throw DeviceError("Net Box", "start the stream", "no record came");
+  if (connection_->state() != netbox::State::streaming)
+    throw DeviceError("Net Box", "start the stream", "no record arrived");
   results::LoadCellScale scale = to_scale(configuration_);
   scale.slots_json = slots_json_;
   return scale;
 }
 
 void DeterministicBench::stop() noexcept {
-  stream_->flush(records_);
-  stream_->stop(clock_.now());
+  connection_->stop(clock_.now());
   exchange_load_cell();
 }
 
 std::size_t DeterministicBench::take(std::span<results::LoadCellRecord> out) {
-  const std::size_t n = std::min(out.size(), records_.size() - taken_);
-  for (std::size_t i = 0; i < n; ++i) out[i] = to_record(records_[taken_ + i]);
-  taken_ += n;
-  if (taken_ == records_.size()) {
-    records_.clear();
-    taken_ = 0;
-  }
+  (void)connection_->publish();
+  records_.resize(out.size());
+  const std::size_t n = connection_->take(records_);
+  std::transform(records_.begin(), records_.begin() + static_cast<std::ptrdiff_t>(n), out.begin(), to_record);
   return n;
 }
 
 std::vector<results::StreamEvent> DeterministicBench::take_events() {
   std::vector<results::StreamEvent> events;
-  for (netbox::Event event : stream_->take_events()) {
-    events.push_back(to_event(event));
-    if (event.kind != netbox::EventKind::silent) continue;
-    event = {};
-    event.kind = why_silent();
-    event.at = clock_.now();
-    events.push_back(to_event(event));
-  }
-  events_dropped_ = stream_->events().dropped();
+  for (const netbox::Event& event : connection_->take_events()) events.push_back(to_event(event));
   return events;
 }
 
-/// What netbox::Inquiry asks over HTTP.
-netbox::EventKind DeterministicBench::why_silent() {
-  if (sim_.wire().http_refused(clock_.now())) return netbox::EventKind::unreachable;
-  try {
-    const std::string operation = "GET /netftapi2.xml";
-    const std::string xml = body_of(sim_.wire().http(operation + " HTTP/1.0\r\n\r\n", clock_.now()).bytes, operation);
-    return netbox::parse_configuration(xml).rdt_enabled ? netbox::EventKind::taken_over
-                                                        : netbox::EventKind::rdt_disabled;
-  } catch (const DeviceError&) {
-    return netbox::EventKind::unreachable;
-  }
-}
-
 void DeterministicBench::set_bias() noexcept {
-  stream_->set_bias(clock_.now());
+  connection_->set_bias(clock_.now());
   exchange_load_cell();
 }
 
-results::StreamHealth DeterministicBench::health() const {
-  netbox::Health health = meter_->health();
-  health.events_dropped = events_dropped_;
-  return to_health(health, clock_);
-}
+results::StreamHealth DeterministicBench::health() const { return to_health(connection_->health(), clock_); }
 
-results::SampleAccount DeterministicBench::account() const { return to_account(stream_->counters()); }
+results::SampleAccount DeterministicBench::account() const { return to_account(connection_->counters()); }
 
 std::string DeterministicBench::failure() const {
-  if (stream_ && stream_->state() == netbox::State::silent) return "load cell: the stream fell silent";
+  if (connection_ && connection_->state() == netbox::State::silent) return "load cell: the stream fell silent";
   return "";
 }
 

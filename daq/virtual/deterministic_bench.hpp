@@ -8,12 +8,12 @@
 
 #include "daq/bench/air.hpp"
 #include "daq/bench/bench.hpp"
+#include "daq/guard/interlock.hpp"
 #include "daq/virtual/deterministic_air.hpp"
 #include "daq/virtual/deterministic_motor.hpp"
 #include "daq/virtual/deterministic_supply.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
-#include "drivers/netbox/stream/health.hpp"
-#include "drivers/netbox/stream/session.hpp"
+#include "drivers/netbox/stream/connection.hpp"
 #include "drivers/sim/bench.hpp"
 
 namespace kphi::daq {
@@ -43,7 +43,7 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   [[nodiscard]] results::FileLayer& files() override { return *files_; }
   [[nodiscard]] Duration sync_interval() const override;
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
-  [[nodiscard]] bool switch_off_power() override;
+  [[nodiscard]] bool switch_off_power() override { return power_.off(motor_); }
   void restore_power() override;
 
   /// What a fault test looks at, and where it puts its finger.
@@ -60,7 +60,7 @@ class DeterministicBench final : public Bench, private LoadCellLink {
 
  private:
   [[nodiscard]] const netbox::Configuration& configuration() const override { return configuration_; }
-  [[nodiscard]] std::vector<netbox::Finding> findings() const override { return findings_; }
+  [[nodiscard]] std::vector<Finding> findings() const override { return findings_; }
   results::LoadCellScale start() override;
   void stop() noexcept override;
   std::size_t take(std::span<results::LoadCellRecord> out) override;
@@ -74,7 +74,7 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   [[nodiscard]] std::string page(const std::string& target);
   void read_box();
   void cross_check();
-  [[nodiscard]] netbox::EventKind why_silent();
+  void ask_box();
   void step_to(Instant when);
   void exchange();
   void exchange_load_cell();
@@ -86,16 +86,15 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   results::FileLayer* files_ = &own_files_;
   sim::SimulatedBench sim_;
   std::unique_ptr<DeterministicSupply> supply_;
-  std::unique_ptr<OutputEnable> powered_;
+  MotorPower power_;
   DeterministicMotor motor_;
   netbox::Configuration configuration_;
-  std::vector<netbox::Finding> findings_;
+  std::vector<Finding> findings_;
   std::string slots_json_;
-  std::optional<netbox::Session> stream_;
-  std::optional<netbox::HealthMeter> meter_;
-  std::uint64_t events_dropped_ = 0;
+  std::optional<netbox::Connection> connection_;  ///< of the present or last run
+  std::optional<netbox::Answer> answer_;          ///< of the box, on its way
+  Instant answer_due_{};
   std::vector<netbox::StampedRecord> records_;
-  std::size_t taken_ = 0;
   std::vector<std::function<void()>*> work_;  ///< in the order in which it was given
   Instant next_work_{};
   BenchWitness witness_;

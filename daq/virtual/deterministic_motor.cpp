@@ -4,7 +4,7 @@
 #include <array>
 
 #include "base/error.hpp"
-#include "daq/audit/motor_audit.hpp"
+#include "daq/audit/bench_audit.hpp"
 #include "daq/bench/device_records.hpp"
 
 namespace kphi::daq {
@@ -125,7 +125,7 @@ std::size_t DeterministicMotor::take(std::span<results::MotorReading> out) {
 std::vector<results::StreamEvent> DeterministicMotor::take_events() {
   std::vector<results::StreamEvent> events;
   for (const iq::Event& event : session_.take_events()) {
-    if (iq::spoils_a_run(event.kind)) failure_ = event.words;
+    if (failure_.empty() && iq::spoils_a_run(event.kind)) failure_ = event.words;
     events.push_back(to_event(event));
   }
   return events;

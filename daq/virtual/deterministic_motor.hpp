@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "daq/bench/bench.hpp"
-#include "drivers/iq/session/inquiries.hpp"
+#include "drivers/iq/session/connecting.hpp"
 #include "drivers/iq/session/session.hpp"
 #include "drivers/sim/iq/line.hpp"
 
@@ -19,24 +19,23 @@ class DeterministicMotor final : public MotorLink {
 
   /// Connects and reads the module's parameters. Throws DeviceError.
   void connect();
-  /// Its power is about to go: nothing is said until wake().
-  void rest() noexcept { resting_ = true; }
-  /// Connects again. Throws DeviceError.
-  void wake();
+  /// kphi sends nothing until wake().
+  void rest() noexcept override { resting_ = true; }
+  void wake() override;
   /// Carries bytes both ways, at the clock's time.
   void exchange();
   void advance(Instant now) {
     if (!resting_) session_.advance(now);
   }
-  /// The program is gone: nothing goes over the line any more.
+  /// The program is gone: no byte crosses the line any more.
   void abandon() noexcept { abandoned_ = true; }
-  /// When something is due at either end of the line.
+  /// When the next event is due at either end of the line.
   [[nodiscard]] Instant deadline() const {
     return resting_ ? line_.next_event() : std::min(session_.deadline(), line_.next_event());
   }
 
   void spin_at(RadPerSec signed_speed) override;
-  // One thread: who asks for a speed cannot die apart from who watches it.
+  // One thread: the caller and the watchdog cannot fail separately.
   void renew() noexcept override {}
   void emergency_stop() noexcept override;
   void begin_stop(const iq::StopSettings& settings) override;

@@ -13,7 +13,7 @@ constexpr Duration kLookEvery = std::chrono::milliseconds(125);
 constexpr Duration kAnswer = std::chrono::milliseconds(500), kQuiet = std::chrono::milliseconds(150);
 constexpr int kAttempts = 3;
 
-/// The simulator has its own enum; the file's code is told here.
+/// The simulator's enum as the file's code.
 results::SupplyProtection to_protection(sim::SupplyTrip trip) {
   using results::SupplyProtection;
   switch (trip) {

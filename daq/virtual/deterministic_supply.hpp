@@ -1,12 +1,12 @@
-// The simulated supply without a transport: looked at eight times per second of virtual time, as its driver would, with
-// as much patience for a wire that goes wrong.
+// The simulated supply without a transport: read eight times per second of virtual time, with its driver's patience for
+// a faulty wire.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "base/clock.hpp"
-#include "daq/bench/supply_link.hpp"
+#include "daq/bench/bench.hpp"
 #include "drivers/sim/supply/slave.hpp"
 #include "profiles/bench_config.hpp"
 
@@ -22,9 +22,9 @@ class DeterministicSupply final : public SupplyLink {
   [[nodiscard]] std::string failure() const override { return failure_; }
   void cut() noexcept override { (void)switch_off(); }
   [[nodiscard]] std::string switch_off() noexcept override;
-  /// The program is gone: the supply goes on as it is.
+  /// The program is gone: the supply stays as it is.
   void abandon() noexcept { abandoned_ = true; }
-  /// To be called when time has passed.
+  /// Call it whenever time has passed.
   void look();
 
  private:

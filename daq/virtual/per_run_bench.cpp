@@ -2,16 +2,13 @@
 
 #include <bit>
 
+#include "base/random.hpp"
+
 namespace kphi::daq {
 namespace {
 
-/// SplitMix64's finaliser: neighbouring keys give unrelated streams.
-std::uint64_t mixed(std::uint64_t key) noexcept {
-  key += 0x9e3779b9'7f4a7c15ull;
-  key = (key ^ (key >> 30)) * 0xbf58476d'1ce4e5b9ull;
-  key = (key ^ (key >> 27)) * 0x94d049bb'133111ebull;
-  return key ^ (key >> 31);
-}
+/// Neighbouring keys give unrelated streams.
+std::uint64_t mixed(std::uint64_t key) noexcept { return SplitMix64(key)(); }
 
 profiles::BenchConfig seeded(profiles::BenchConfig config, const RunBeginning& run) {
   const auto angle = std::bit_cast<std::uint64_t>(run.occlusion_deg);

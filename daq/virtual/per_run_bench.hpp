@@ -1,7 +1,6 @@
-// The deterministic bench, made anew for every run: what a run measures depends on the seed, its occlusion, its
-// repetition and the bench time at which it begins, and on nothing that happened before. A campaign that was killed and
-// resumed thus gives the same bytes as one that was not. The price: every run begins with a cold motor and a zero of
-// its own.
+// The deterministic bench, made again for every run: a run depends on the seed, its occlusion, its repetition and the
+// bench time at which it begins, but not on earlier runs. So a campaign that was killed and resumed gives the same
+// bytes as an uninterrupted one. The price: every run begins with a cold motor and its own zero.
 #pragma once
 
 #include <memory>
@@ -19,7 +18,7 @@ class PerRunBench final : public Bench {
   void begin_run(const RunBeginning& run) override;
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
 
-  /// The same object for all runs.
+  /// Valid for all runs.
   [[nodiscard]] const Clock& clock() const override { return clock_; }
   [[nodiscard]] MotorLink& motor() override { return bench_->motor(); }
   [[nodiscard]] LoadCellLink& load_cell() override { return bench_->load_cell(); }
@@ -34,13 +33,13 @@ class PerRunBench final : public Bench {
   [[nodiscard]] results::FileLayer& files() override { return *files_; }
   [[nodiscard]] Duration sync_interval() const override { return bench_->sync_interval(); }
 
-  /// Of the present run; gone with the next one's beginning.
+  /// Of the present run; invalid once the next one begins.
   [[nodiscard]] sim::SimulatedBench& simulation() noexcept { return bench_->simulation(); }
-  /// For all runs to come, too.
+  /// For this and all later runs.
   void use_files(results::FileLayer& files) noexcept;
 
  private:
-  /// Tells the time of whichever bench there is.
+  /// The time of the present bench.
   class PresentClock final : public Clock {
    public:
     explicit PresentClock(const std::unique_ptr<DeterministicBench>& bench) noexcept : bench_(bench) {}

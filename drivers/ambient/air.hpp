@@ -1,6 +1,8 @@
 // The air that the propeller works on: thrust is proportional to its density.
 #pragma once
 
+#include <string>
+
 namespace kphi::ambient {
 
 /// Moist air with the standard uncertainties (k = 1) of what was measured.
@@ -28,5 +30,15 @@ inline constexpr double kLowestPressure = 5e4, kHighestPressure = 1.1e5;  // Pa
 /// within 15..27 °C and 600..1100 hPa. Outside, the terms of the enhancement factor are extrapolated: 1e-4 is taken.
 /// First-order propagation (JCGM 100, eq. 10). Throws std::invalid_argument unless plausible.
 [[nodiscard]] Density density_of(const Air& air);
+
+/// A source of the state of the air.
+class Ambient {
+ public:
+  virtual ~Ambient() = default;
+  /// One measurement. Blocks for some 110 ms, at most about two seconds; throws DeviceError.
+  [[nodiscard]] virtual Air read() = 0;
+  /// "BME280 at 0x76 behind USB device 04d8:00dd, serial 0001".
+  [[nodiscard]] virtual const std::string& identity() const noexcept = 0;
+};
 
 }  // namespace kphi::ambient

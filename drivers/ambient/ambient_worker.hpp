@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "base/clock.hpp"
-#include "drivers/ambient/ambient.hpp"
+#include "drivers/ambient/air.hpp"
 
 namespace kphi::ambient {
 

@@ -1,4 +1,5 @@
-// The registers of a Bosch BME280 and what its raw values mean (data sheet BST-BME280-DS002). Pure bytes.
+// A Bosch BME280 on an I²C bus: its registers and what its raw values mean (data sheet BST-BME280-DS002, pure bytes),
+// and the sensor with one forced measurement per reading, so that it does not heat itself between them.
 #pragma once
 
 #include <array>
@@ -7,7 +8,12 @@
 #include <span>
 #include <string_view>
 
-namespace kphi::ambient::bme280 {
+#include "drivers/ambient/air.hpp"
+#include "drivers/ambient/mcp2221.hpp"
+
+namespace kphi::ambient {
+
+namespace bme280 {
 
 inline constexpr std::uint8_t kAddressLow = 0x76, kAddressHigh = 0x77;  ///< on the I²C bus: SDO to ground, to supply
 inline constexpr std::uint8_t kIdRegister = 0xD0, kId = 0x60;
@@ -37,7 +43,7 @@ struct Calibration {
 [[nodiscard]] Calibration calibration_of(std::span<const std::uint8_t, 24> first, std::uint8_t h1,
                                          std::span<const std::uint8_t, 7> second) noexcept;
 
-/// What no working sensor says (all zeros, all ones, or a divisor of zero); empty: nothing.
+/// Why this calibration cannot come from a working sensor (all zeros, all ones, a divisor of zero); empty: plausible.
 [[nodiscard]] std::string_view refusal_of(const Calibration& calibration) noexcept;
 
 /// ADC values; 20, 20 and 16 bits.
@@ -64,4 +70,34 @@ struct Measured {
 /// Section 4.2.3: temperature and humidity in 32 bits, pressure in 64. Defined for all inputs.
 [[nodiscard]] Measured compensate(const Raw& raw, const Calibration& calibration) noexcept;
 
-}  // namespace kphi::ambient::bme280
+}  // namespace bme280
+
+class Bme280Sensor : public Ambient {
+ public:
+  /// Searches at 0x76, then at 0x77; resets the sensor, waits until it has loaded its calibration, and reads that
+  /// twice, because damage is unlikely to repeat. `bus` must outlive this; `where` names it in messages. Throws
+  /// DeviceError: no answer, another chip, calibration damaged.
+  Bme280Sensor(I2c& bus, const std::string& where, Mcp2221::Pause pause = Mcp2221::sleep);
+
+  /// 16 samples of each quantity, about 110 ms. Throws DeviceError also for implausible values.
+  [[nodiscard]] Air read() override;
+  [[nodiscard]] const std::string& identity() const noexcept override { return identity_; }
+  [[nodiscard]] const bme280::Calibration& calibration() const noexcept { return calibration_; }
+
+ private:
+  void find();
+  void reset();
+  void wait_while(std::uint8_t status_bits, const char* operation);
+  [[nodiscard]] bme280::Calibration read_calibration();
+  [[nodiscard]] std::uint8_t get(std::uint8_t register_number);
+  void set(std::uint8_t register_number, std::uint8_t value);
+  [[noreturn]] void fail(const char* operation, const std::string& cause, const char* next_move) const;
+
+  I2c& bus_;
+  const Mcp2221::Pause pause_;
+  std::string identity_;
+  std::uint8_t address_ = bme280::kAddressLow;
+  bme280::Calibration calibration_;
+};
+
+}  // namespace kphi::ambient

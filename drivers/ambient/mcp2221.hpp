@@ -6,11 +6,21 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <span>
 
-#include "drivers/ambient/i2c.hpp"
 #include "drivers/usb/transport.hpp"
 
 namespace kphi::ambient {
+
+/// An I²C bus as a sensor's driver sees it. Blocking; one thread.
+class I2c {
+ public:
+  virtual ~I2c() = default;
+  /// Writes, then a stop. Throws DeviceError: no acknowledgement, bus stuck, bridge gone.
+  virtual void write(std::uint8_t address, std::span<const std::uint8_t> bytes) = 0;
+  /// Writes one register number, repeats the start and reads. Throws DeviceError.
+  virtual void read(std::uint8_t address, std::uint8_t register_number, std::span<std::uint8_t> into) = 0;
+};
 
 class Mcp2221 final : public I2c {
  public:

@@ -4,26 +4,28 @@
 
 #include <stdexcept>
 
-#include "drivers/ambient/bme280_sensor.hpp"
-#include "drivers/ambient/manual_ambient.hpp"
+#include "drivers/ambient/bme280.hpp"
 #include "drivers/usb/bus.hpp"
 
 namespace kphi::ambient {
+
+ManualAmbient::ManualAmbient(const Air& air) : air_(air) {
+  if (!plausible(air)) throw std::invalid_argument("air: temperature, pressure or humidity out of range");
+}
+
 namespace {
 
-/// Bus, device, bridge and sensor, destroyed in the opposite order.
-class UsbBme280 final : public Ambient {
- public:
-  explicit UsbBme280(const UsbAddress& address)
-      : device_(bus_.open(address)), bridge_(*device_), sensor_(bridge_, device_->name()) {}
-  [[nodiscard]] Air read() override { return sensor_.read(); }
-  [[nodiscard]] const std::string& identity() const noexcept override { return sensor_.identity(); }
+struct OpenBridge {
+  explicit OpenBridge(const UsbAddress& address) : device(bus.open(address)), bridge(*device) {}
+  usb::Bus bus;
+  std::unique_ptr<usb::Transport> device;
+  Mcp2221 bridge;
+};
 
- private:
-  usb::Bus bus_;
-  std::unique_ptr<usb::Transport> device_;
-  Mcp2221 bridge_;
-  Bme280Sensor sensor_;
+/// Owns bus, device and bridge, which outlive the sensor.
+class UsbBme280 final : OpenBridge, public Bme280Sensor {
+ public:
+  explicit UsbBme280(const UsbAddress& address) : OpenBridge(address), Bme280Sensor(bridge, device->name()) {}
 };
 
 struct Opener {

@@ -1,4 +1,4 @@
-// Where a bench file says that the state of the air comes from.
+// Where the state of the air comes from, as a bench file names it.
 #pragma once
 
 #include <memory>
@@ -6,7 +6,7 @@
 #include <variant>
 
 #include "base/uri.hpp"
-#include "drivers/ambient/ambient.hpp"
+#include "drivers/ambient/air.hpp"
 
 namespace kphi::ambient {
 
@@ -25,5 +25,18 @@ using Source = std::variant<Unknown, Air, UsbAddress>;
 /// nullptr for Unknown. Throws DeviceError: not plugged in, no sensor behind it; std::invalid_argument: implausible
 /// values.
 [[nodiscard]] std::unique_ptr<Ambient> open(const Source& source);
+
+/// Values read off a thermometer and a barometer: constant during a campaign.
+class ManualAmbient final : public Ambient {
+ public:
+  /// Throws std::invalid_argument unless plausible.
+  explicit ManualAmbient(const Air& air);
+  [[nodiscard]] Air read() override { return air_; }
+  [[nodiscard]] const std::string& identity() const noexcept override { return identity_; }
+
+ private:
+  Air air_;
+  std::string identity_ = "values written by hand";
+};
 
 }  // namespace kphi::ambient

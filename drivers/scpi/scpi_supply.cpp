@@ -8,7 +8,11 @@
 #include <stdexcept>
 
 #include "base/error.hpp"
+#include "base/uri.hpp"
+#include "drivers/scpi/tcp.hpp"
+#include "drivers/scpi/usbtmc.hpp"
 #include "drivers/scpi/wire.hpp"
+#include "drivers/usb/bus.hpp"
 
 namespace kphi::scpi {
 namespace {
@@ -57,7 +61,7 @@ ScpiSupply::ScpiSupply(std::unique_ptr<Line> line, const Clock& clock) : line_(s
   identity_.device = line_->name();
   const std::string who = line_->query("*IDN?");
   const auto fields = identity_fields(who);
-  if (fields[1].empty()) fail("*IDN?", "\"" + who + "\" names no model", "check that this is a SCPI instrument");
+  if (fields[1].empty()) fail("*IDN?", "\"" + who + "\" does not name a model", "check that this is a SCPI instrument");
   dialect_ = &dialect_of(who);
   identity_ = {fmt::format("supply {} on {}", fields[1], line_->name()), fields[1], fields[2], fields[3]};
   forget_errors();
@@ -197,6 +201,45 @@ supply::Regulation ScpiSupply::regulation() {
 
 void ScpiSupply::fail(std::string_view operation, const std::string& cause, const char* next_move) {
   throw DeviceError(identity_.device, std::string(operation), cause, next_move);
+}
+
+// --- opening
+
+namespace {
+
+constexpr std::string_view kTcp = "scpi-tcp", kUsb = "scpi-usb";
+constexpr std::uint16_t kUsualPort = 5025;
+
+struct OpenDevice {
+  explicit OpenDevice(const UsbAddress& address) : device(bus.open(address)) {}
+  usb::Bus bus;
+  std::unique_ptr<usb::Transport> device;
+};
+
+/// Owns bus and device, which outlive the conversation.
+class UsbLine final : OpenDevice, public Usbtmc {
+ public:
+  explicit UsbLine(const UsbAddress& address) : OpenDevice(address), Usbtmc(*device) {}
+};
+
+}  // namespace
+
+bool is_scpi(std::string_view uri) noexcept {
+  const std::string_view scheme = uri.substr(0, uri.find(':'));
+  return scheme.size() < uri.size() && (scheme == kTcp || scheme == kUsb);
+}
+
+std::unique_ptr<Line> open_line(const std::string& text) {
+  const Uri uri(text, "instrument", "write scpi-tcp:HOST:5025 or scpi-usb:VID:PID");
+  if (!uri.options().empty()) uri.refuse("no options are known");
+  if (uri.scheme() == kUsb) return std::make_unique<UsbLine>(UsbAddress::parse("usb:" + uri.location()));
+  if (uri.scheme() != kTcp) uri.refuse(fmt::format("unknown scheme \"{}:\"", uri.scheme()));
+  const HostPort address = uri.host_and_port(kUsualPort);
+  return std::make_unique<Tcp>(address.host, address.port);
+}
+
+std::unique_ptr<supply::Supply> open_supply(const std::string& uri, const Clock& clock) {
+  return std::make_unique<ScpiSupply>(open_line(uri), clock);
 }
 
 }  // namespace kphi::scpi

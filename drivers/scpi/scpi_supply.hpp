@@ -1,7 +1,12 @@
-// A supply that speaks SCPI, over USB or TCP.
+// A supply that speaks SCPI, over USB or TCP. Its address in a bench file:
+//
+//     scpi-tcp:192.168.1.30:5025
+//     scpi-usb:VVVV:PPPP            then :SERIAL or @PORT if several are alike
 #pragma once
 
 #include <memory>
+#include <string>
+#include <string_view>
 
 #include "base/clock.hpp"
 #include "drivers/scpi/line.hpp"
@@ -11,7 +16,7 @@ namespace kphi::scpi {
 
 class ScpiSupply final : public supply::Supply {
  public:
-  /// Asks who it is and what it can do (*IDN?, VOLT? MAX, CURR? MAX); writes nothing. `clock` must outlive this. Throws
+  /// Queries its identity and maxima (*IDN?, VOLT? MAX, CURR? MAX); writes nothing. `clock` must outlive this. Throws
   /// DeviceError.
   ScpiSupply(std::unique_ptr<Line> line, const Clock& clock);
 
@@ -43,5 +48,13 @@ class ScpiSupply final : public supply::Supply {
   const Dialect* dialect_ = nullptr;
   supply::Counters counters_;
 };
+
+[[nodiscard]] bool is_scpi(std::string_view uri) noexcept;
+
+/// Throws std::invalid_argument with one line that says what to write; DeviceError: not there, or not an instrument.
+[[nodiscard]] std::unique_ptr<Line> open_line(const std::string& uri);
+
+/// Throws as open_line() does. `clock` outlives it.
+[[nodiscard]] std::unique_ptr<supply::Supply> open_supply(const std::string& uri, const Clock& clock);
 
 }  // namespace kphi::scpi

@@ -8,7 +8,7 @@
 
 namespace kphi::scpi {
 
-class Usbtmc final : public Line {
+class Usbtmc : public Line {
  public:
   using Timeout = usb::Transport::Timeout;
 

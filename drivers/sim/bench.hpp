@@ -13,9 +13,9 @@
 #include "drivers/sim/netbox/device.hpp"
 #include "drivers/sim/netbox/fault_injector.hpp"
 #include "drivers/sim/physics/plant.hpp"
+#include "drivers/sim/script/faults.hpp"
 #include "drivers/sim/supply/slave.hpp"
 #include "drivers/sim/usb/bme280.hpp"
-#include "drivers/sim/usb/faults.hpp"
 
 namespace kphi::sim {
 

@@ -2,35 +2,29 @@
 
 #include <fmt/format.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 
 #include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <stdexcept>
 #include <vector>
 
 #include "base/descriptor.hpp"
 #include "base/error.hpp"
 #include "base/number.hpp"
+#include "drivers/sim/transport/conversations.hpp"
 #include "drivers/sim/truth_log.hpp"
 
 namespace kphi::sim {
 namespace {
 
 std::vector<std::string> words_of(std::string_view line) {
-  std::vector<std::string> words;
-  constexpr std::string_view kBlanks = " \t\r";
-  while (true) {
-    const auto begin = line.find_first_not_of(kBlanks);
-    if (begin == std::string_view::npos) return words;
-    line.remove_prefix(begin);
-    const auto word = line.substr(0, line.find_first_of(kBlanks));
-    words.emplace_back(word);
-    line.remove_prefix(word.size());
-  }
+  std::istringstream in{std::string(line)};
+  return {std::istream_iterator<std::string>(in), {}};
 }
 
 std::string mount(SimulatedBench& bench, const std::string& propeller, const std::string& angle) {
@@ -101,14 +95,12 @@ std::string tell(const std::string& path, const std::string& line) {
   const auto refuse = [&](const char* operation, const std::string& cause) -> DeviceError {
     return {"simulated bench " + path, operation, cause, "start it with: kphi sim BENCH"};
   };
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path.size() >= sizeof address.sun_path) throw refuse("connect", "the path is longer than a socket path may be");
-  std::memcpy(address.sun_path, path.data(), path.size());
+  const auto address = unix_address(path);
+  if (!address) throw refuse("connect", "the path is empty or longer than a socket path may be");
   const Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
   const timeval patience{3, 0};
   ::setsockopt(socket.number(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-  if (::connect(socket.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+  if (::connect(socket.number(), reinterpret_cast<const sockaddr*>(&*address), sizeof *address) != 0) {
     throw refuse("connect", std::strerror(errno));
   }
   const std::string question = line + "\n";

@@ -1,4 +1,4 @@
-// The two files that a simulated bench takes besides its bench file, read strictly: every message names file, line and
+// Fault scripts and motor files of a simulated bench, read strictly: every message names file, line and
 // column.
 //
 // A fault script; the beginning of `kind` (motor_, supply_, ambient_; none: the load cell) names the device:

@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kWakeUp{1};  // wall time
 constexpr int kCatchUp = 8;                      // bench time per wake-up, in wake-ups
-constexpr int kQuiet = 1000;                     // wake-ups without a byte: the client is gone
+constexpr int kQuiet = 1000;                     // wake-ups without a byte: the client has left
 constexpr std::size_t kBatch = 64;               // datagrams per system call
 
 [[noreturn]] void refuse(const std::string& where, const std::string& operation, const std::string& cause,
@@ -37,17 +37,6 @@ sockaddr_in address_of(Peer peer) noexcept {
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = static_cast<in_addr_t>(peer >> 16);
   address.sin_port = static_cast<in_port_t>(peer & 0xffff);
-  return address;
-}
-
-sockaddr_un unix_address_of(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path.empty() || path.size() >= sizeof address.sun_path) {
-    refuse("control \"" + path + "\"", "open control line", "the path is empty or longer than a socket path may be",
-           "set simulation.control in the bench file");
-  }
-  std::memcpy(address.sun_path, path.data(), path.size());
   return address;
 }
 
@@ -94,7 +83,12 @@ Server::~Server() { ::unlink(addresses_.control.c_str()); }
 
 Descriptor Server::listen_for_control() const {
   const std::string& path = addresses_.control;
-  const sockaddr_un address = unix_address_of(path);
+  const auto found = unix_address(path);
+  if (!found) {
+    refuse("control \"" + path + "\"", "open control line", "the path is empty or longer than a socket path may be",
+           "set simulation.control in the bench file");
+  }
+  const sockaddr_un& address = *found;
   std::error_code error;
   const auto folder = std::filesystem::path(path).parent_path();
   std::filesystem::create_directories(folder, error);
@@ -166,7 +160,7 @@ void Server::follow_the_address() {
     rdt_ = listen_at(wanted, SOCK_DGRAM, rdt_.port);
     tcp_.listen_at(listen_at(wanted, SOCK_STREAM, coarse_.port).socket);
     present_host_ = wanted;
-  } catch (const DeviceError&) {  // no address of this machine: the box is where nobody reaches it
+  } catch (const DeviceError&) {  // not an address of this machine: the box cannot be reached
   }
 }
 
@@ -256,7 +250,7 @@ void Server::send_batch(std::vector<Datagram>& batch, std::size_t count, bool fo
   for (std::size_t sent = 0; sent < count;) {
     const int accepted = ::sendmmsg(socket, &messages[sent], static_cast<unsigned>(count - sent), MSG_NOSIGNAL);
     if (accepted < 0 && errno == EINTR) continue;
-    if (accepted <= 0) {  // this one will not go; the next may
+    if (accepted <= 0) {  // this one cannot be sent; the next may
       ++unsent_.datagrams;
       ++sent;
     } else {

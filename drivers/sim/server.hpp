@@ -1,5 +1,5 @@
 // The simulated bench on real transports: UDP, HTTP and TCP for the load cell's box, a pseudo-terminal for the
-// motor, a Unix-domain socket for the person who mounts propellers. One thread, poll(), a wake-up per millisecond at
+// motor, a Unix-domain socket for mounting propellers. One thread, poll(), a wake-up per millisecond at
 // least.
 #pragma once
 

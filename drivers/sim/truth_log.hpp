@@ -21,8 +21,8 @@ namespace kphi::sim {
 
 [[nodiscard]] std::string_view name_of(MotorDrive::Mode mode) noexcept;
 
-/// What the motor was told and what its power stage did about it, sampled by look(): tests check
-/// every way out of a program against this.
+/// The commands that the motor received and what its power stage did, sampled by look(). Tests check every way out of a
+/// program against this log.
 class MotionLog {
  public:
   /// Notes what has changed since the last look; of several commands since then, the last one. `speed` in rad/s.

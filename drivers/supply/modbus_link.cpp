@@ -155,7 +155,7 @@ void ModbusLink::fall_silent() {
   modbus_flush(context_.get());
 }
 
-/// Frames are told apart by 3.5 bytes of silence (Modbus over serial line 1.02, 2.5.1.1).
+/// 3.5 bytes of silence separate frames (Modbus over serial line 1.02, 2.5.1.1).
 void ModbusLink::keep_gap() const {
   if (address_.wire == Address::Wire::tcp) return;
   const std::chrono::duration<double> gap(std::max(kSilentBytes * kBitsPerByte / address_.baud, 0.00175));

@@ -12,8 +12,7 @@
 #include <memory>
 #include <string>
 
-#include "drivers/supply/address.hpp"
-#include "drivers/supply/models.hpp"
+#include "drivers/supply/wire.hpp"
 
 namespace kphi::supply {
 

@@ -8,10 +8,9 @@
 #include <functional>
 #include <string>
 
-#include "drivers/supply/address.hpp"
 #include "drivers/supply/modbus_link.hpp"
-#include "drivers/supply/models.hpp"
 #include "drivers/supply/supply.hpp"
+#include "drivers/supply/wire.hpp"
 
 namespace kphi::supply {
 

@@ -7,13 +7,14 @@
 #include <cmath>
 #include <limits>
 
+#include "base/error.hpp"
 #include "base/number.hpp"
+#include "compensation/file/coefficient_file.hpp"
 #include "compensation/file/coefficient_keys.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::fit {
 namespace {
-
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -33,7 +34,7 @@ std::string quoted(const std::string& text) {
   return result + "\"";
 }
 
-/// In RPM to a thousandth, which hides the rounding of π/30 and nothing else.
+/// In RPM to a thousandth, which only hides the rounding of π/30.
 double printed_rpm(double speed_rad_s) { return std::round(to_rpm(RadPerSec(speed_rad_s)) * 1000) / 1000; }
 
 std::string number(double value) { return std::isfinite(value) ? yaml_number(value) : "unknown"; }
@@ -112,7 +113,7 @@ std::string standard_block(const Identification& identification) {
                      yaml_number(standard->standard_error), yaml_number(kStandardDensity));
 }
 
-/// What `provenance.fit` holds besides the model in words: all that is needed to fit the same again.
+/// The options in `provenance.fit`, with which the same can be fitted again.
 std::string fit_options(const Identification& identification, const std::optional<BenchUncertainty>& bench) {
   std::string text = fmt::format("k_by: {}, weights: {}, loss: {}", name_of(identification.estimator),
                                  name_of(identification.weighting), name_of(identification.loss));
@@ -185,7 +186,7 @@ std::string analysis_blocks(const Analysis& analysis) {
   text += fmt::format("  K_T: {}\n", errors(analysis.coefficients.front()));
   text += fmt::format("  intercept: {}\n  slope_per_deg: {}\n", errors(analysis.intercept), errors(analysis.slope));
   text += fmt::format("  covariance: {}  # of K_T, intercept, slope_per_deg\n", matrix(analysis.covariance));
-  text += fmt::format("  not_known: [{}]  # sources that the sums lack\n",
+  text += fmt::format("  not_known: [{}]  # sources missing in the sums\n",
                       fmt::join(not_known(analysis.coefficients.front()), ", "));
   text += "  table:\n";
   for (const Budget& budget : analysis.coefficients)
@@ -210,6 +211,15 @@ std::string analysis_blocks(const Analysis& analysis) {
   return text;
 }
 
+/// The value with this name; the first if the file has none.
+template <class Enum>
+Enum named(const std::string& name, const char* key, const std::string& path, std::initializer_list<Enum> values) {
+  if (name.empty()) return *values.begin();
+  for (const Enum value : values)
+    if (name == name_of(value)) return value;
+  throw ConfigurationError(fmt::format("{}: unknown {} `{}`; fit again with this version of kphi", path, key, name));
+}
+
 }  // namespace
 
 std::string estimator_words(const Identification& identification) {
@@ -232,6 +242,45 @@ std::string format_coefficients(const Identification& identification, const Prov
   for (const OcclusionCoefficient& row : identification.table) text += table_row(row, identification.at_speed_rad_s);
   text += provenance_block(identification, provenance);
   return analysis == nullptr ? text : text + analysis_blocks(*analysis);
+}
+
+RecordedFit read_recorded_fit(const std::string& path) {
+  const auto file = compensation::load_coefficients(path);
+  const auto& fit = file.provenance.fit;
+  RecordedFit record;
+  record.propeller = file.propeller.id;
+  record.diameter_in = file.propeller.diameter_in;
+  record.blades = file.propeller.blades;
+  record.overlap = file.curve.overlap();
+  IdentificationOptions& options = record.options;
+  options.line.anchored = file.anchored;
+  for (const Radians& point : file.points) options.line.points_deg.push_back(to_degrees(point));
+  if (!file.table.empty() && file.table.front().at_speed) options.at_speed_rad_s = file.table.front().at_speed->value();
+  if (fit.speed_range_rpm) {
+    const double slack = 1e-3;  // the file has RPM to a thousandth; with this slack the same steps are taken
+    options.speed_range = {from_rpm(fit.speed_range_rpm->first - slack).value(),
+                           from_rpm(fit.speed_range_rpm->second + slack).value()};
+  }
+  options.estimator =
+      named(fit.k_by, "k_by", path,
+            {Estimator::through_origin, Estimator::with_offset, Estimator::polynomial, Estimator::at_speed});
+  options.weighting =
+      named(fit.weights, "weights", path, {Weighting::equal, Weighting::thrust, Weighting::effective_variance});
+  options.loss = named(fit.loss, "loss", path, {Loss::none, Loss::huber, Loss::cauchy, Loss::tukey});
+  for (const std::string& run : fit.leave_out) options.left_out.push_back(parse_left_out_run(run));
+  if (!fit.bench) return record;
+  record.bench.emplace();
+  for (const auto& [name, value] : *fit.bench) set_uncertainty(*record.bench, name + "=" + shortest(value));
+  return record;
+}
+
+Identification identify_again(std::span<const results::StepMean> steps, const RecordedFit& record) {
+  Identification result = identify(steps, record.options);
+  result.propeller = record.propeller;
+  result.diameter_in = record.diameter_in;
+  result.blades = record.blades;
+  result.overlap = record.overlap;
+  return result;
 }
 
 }  // namespace kphi::fit

@@ -1,5 +1,5 @@
-// Writes coefficients.yaml, what the bench hands to the library that flies. README.md specifies it; the reader is
-// compensation/file/.
+// Writes coefficients.yaml, the file that the bench hands to the library that flies, and fits the same steps again as a
+// file says. README.md specifies the format; compensation/file reads it.
 #pragma once
 
 #include <optional>
@@ -8,6 +8,7 @@
 
 #include "fit/model/identification.hpp"
 #include "fit/uncertainty/analysis.hpp"
+#include "fit/uncertainty/budget.hpp"
 #include "results/records.hpp"
 
 namespace kphi::fit {
@@ -21,20 +22,20 @@ struct RunProvenance {
   std::vector<std::string> events{};  ///< what happened to the stream, the cell or the motor; one line each
 };
 
-/// A run that was begun and not accepted.
+/// A run that was started and not accepted.
 struct RejectedRun {
   std::string file;
   std::string utc;
   std::string reason;
 };
 
-/// The clock of the motor module, by which it measures the speed, against this computer's.
+/// The clock of the motor module, which times its speed, against this computer's.
 struct MotorClock {
   double gain = 1;
   std::optional<double> u_gain;  ///< standard uncertainty; nullopt: unchecked, the gain is taken as 1
 };
 
-/// Where the numbers come from. Nothing here is guessed: what is not known is empty and written as `unknown`.
+/// Where the numbers come from. An unknown entry is empty and written as `unknown`.
 struct Provenance {
   std::string measured_utc;  ///< when the last run ended, ISO 8601, Z; empty: unknown
   std::string tool_version;
@@ -45,15 +46,31 @@ struct Provenance {
   std::optional<double> supply_v;
   std::optional<MotorClock> clock;  ///< of a campaign
   std::vector<RejectedRun> rejected{};
-  std::optional<BenchUncertainty> bench{};  ///< with which the budget was made
+  std::optional<BenchUncertainty> bench{};  ///< of the budget
 };
 
-/// What was minimised, in words; the same in file and report.
+/// The estimator in words; the same in file and report.
 [[nodiscard]] std::string estimator_words(const Identification& identification);
 
 /// The whole file; without an analysis it lacks the keys `uncertainty` and `torque`. The same arguments give the same
 /// bytes.
 [[nodiscard]] std::string format_coefficients(const Identification& identification, const Provenance& provenance,
                                               const Analysis* analysis = nullptr);
+
+/// How a coefficients.yaml was fitted.
+struct RecordedFit {
+  IdentificationOptions options;
+  std::optional<BenchUncertainty> bench;  ///< nullopt: the file does not say
+  std::string propeller;
+  double diameter_in = 0;
+  int blades = 0;
+  compensation::OverlapMeasure overlap = compensation::OverlapMeasure::rim_arc;
+};
+
+/// Throws compensation::CoefficientError for a file that cannot be read, ConfigurationError for an unknown word.
+[[nodiscard]] RecordedFit read_recorded_fit(const std::string& path);
+
+/// Fits `steps` as the record says.
+[[nodiscard]] Identification identify_again(std::span<const results::StepMean> steps, const RecordedFit& record);
 
 }  // namespace kphi::fit

@@ -14,18 +14,18 @@ namespace kphi::fit {
 
 class McapWriter {
  public:
-  /// Writes the file's beginning. `out` outlives the writer and is binary.
+  /// Writes the head of the file. `out` outlives the writer and is binary.
   McapWriter(std::ostream& out, std::string_view library);
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
 
-  /// A topic of JSON messages. `schema` is a JSON Schema, `metadata` says what it cannot (units).
+  /// A topic of JSON messages. `schema` is a JSON Schema, `metadata` adds to it (units).
   std::uint16_t add_channel(std::string_view topic, std::string_view schema_name, std::string_view schema,
                             const std::map<std::string, std::string>& metadata = {});
   /// `time_ns` since 1970, UTC.
   void write(std::uint16_t channel, std::uint64_t time_ns, std::string_view json);
   void add_metadata(std::string_view name, const std::map<std::string, std::string>& values);
-  /// Summary and end. Without it the file is cut short; readers notice.
+  /// Writes summary and end. Without it readers report a truncated file.
   void close();
 
  private:

@@ -92,8 +92,8 @@ std::vector<std::string> run_to_mcap(const results::RunRecording& run, std::ostr
                                    {"calibration", run.header.load_cell.serial},
                                    {"units", "N, N m, rad/s, s"}});
   writer.close();
-  return {"raw counts: messages are in N and N m, to seven digits; the run file keeps the counts",
-          "time between start and first record: stamps are the start, to a second, plus the run's own nanoseconds"};
+  return {"raw counts: messages are in N and N m, to seven digits; the counts are in the run file",
+          "start within its second: stamps are the start, to a second, plus the run's own nanoseconds"};
 }
 
 std::vector<std::string> run_to_csv(const results::RunRecording& run, std::ostream& out) {
@@ -108,7 +108,8 @@ std::vector<std::string> run_to_csv(const results::RunRecording& run, std::ostre
     fmt::format_to(std::back_inserter(row), ",{},{}\n", record.ft_sequence, record.status);
     out << row;
   }
-  return {"the motor's channels: they have other times than the load cell, a table has one; --to mcap holds both"};
+  return {
+      "the motor's channels: their times differ from the load cell's, and a table has one time; --to mcap stores both"};
 }
 
 }  // namespace kphi::fit

@@ -1,4 +1,4 @@
-// The samples of one run for other programs' eyes.
+// The samples of one run as files for other programs. Each function returns the values that its format cannot store.
 #pragma once
 
 #include <iosfwd>
@@ -9,14 +9,13 @@
 
 namespace kphi::fit {
 
-/// Topics /load_cell (N, N m), /motor/<channel> and /phase at the times of their records since 1970. Returns what the
-/// target cannot hold.
+/// Topics /load_cell (N, N m), /motor/<channel> and /phase at the times of their records since 1970.
 std::vector<std::string> run_to_mcap(const results::RunRecording& run, std::ostream& out);
 
-/// time_s,force_x_n,…,torque_z_nm,ft_sequence,status: the load cell alone. Returns what the target cannot hold.
+/// time_s,force_x_n,…,torque_z_nm,ft_sequence,status: the load cell alone.
 std::vector<std::string> run_to_csv(const results::RunRecording& run, std::ostream& out);
 
-/// "2021-05-30T08:00:00Z" in ns since 1970, UTC; 0 for anything else.
+/// "2021-05-30T08:00:00Z" in ns since 1970, UTC; 0 for any other text.
 [[nodiscard]] std::uint64_t nanoseconds_since_1970(const std::string& utc);
 
 }  // namespace kphi::fit

@@ -1,4 +1,4 @@
-// One function per target. A target without φ gets the one coefficient that flies at options.phi_deg.
+// One function per target. A target without φ gets the coefficient that flies at options.phi_deg.
 #include "fit/export/targets.hpp"
 
 #include <fmt/format.h>
@@ -22,17 +22,18 @@ using Json = nlohmann::ordered_json;
 /// K_T k_i(φ), as it flies (ScalingLaw::clamped), N/(rad/s)². Throws ConfigurationError for a φ beyond the file's.
 double coefficient_at(const compensation::Coefficients& file, double phi_deg) {
   if (!(phi_deg >= 0) || phi_deg > to_degrees(file.curve.largest_fitted()) + 1e-9) {
-    throw ConfigurationError(fmt::format("{}: --phi-deg {} lies outside the occlusions that were measured, 0 to {:g}",
-                                         file.path, phi_deg, to_degrees(file.curve.largest_fitted())));
+    throw ConfigurationError(fmt::format("{}: --phi-deg {} is outside the measured occlusions, 0 to {:g}", file.path,
+                                         phi_deg, to_degrees(file.curve.largest_fitted())));
   }
   return file.curve.thrust_coefficient().value() * file.curve.scaling_factor(from_degrees(phi_deg));
 }
 
-/// rad/s at full output: as asked, else the file's. Throws ConfigurationError when neither is known.
+/// rad/s at full output: the option, else the file's. Throws ConfigurationError without both.
 double speed_max_of(const compensation::Coefficients& file, const ExportOptions& options) {
   if (options.speed_max_rpm) return from_rpm(*options.speed_max_rpm).value();
   if (file.fastest_speed) return file.fastest_speed->value();
-  throw ConfigurationError(file.path + ": holds no range of speeds; give the speed at full output, --speed-max-rpm");
+  throw ConfigurationError(file.path +
+                           ": no range of speeds in the file; give the speed at full output with --speed-max-rpm");
 }
 
 /// Control characters become blanks.
@@ -48,9 +49,9 @@ std::vector<std::string> provenance_lines(const compensation::Coefficients& file
   const auto known = [](const std::string& text) { return text.empty() ? std::string("unknown") : one_line(text); };
   std::vector<std::string> lines;
   lines.push_back(fmt::format("propeller {}, {}", known(file.propeller.id), known(file.propeller.name)));
-  lines.push_back(fmt::format(
-      "K_T {} N/(rad/s)^2, standard error {}", yaml_number(file.curve.thrust_coefficient().value()),
-      file.thrust_coefficient_error ? yaml_number(file.thrust_coefficient_error->value()) : "unknown"));
+  lines.push_back(
+      fmt::format("K_T {} N/(rad/s)^2, standard error {}", yaml_number(file.curve.thrust_coefficient().value()),
+                  file.thrust_coefficient_error ? yaml_number(file.thrust_coefficient_error->value()) : "unknown"));
   lines.push_back(fmt::format("phi is meant as the {} of the overlap", compensation::name_of(file.curve.overlap())));
   lines.push_back(fmt::format("measured {}, campaign {}, {} runs, fitted by kphi {}", known(file.measured_utc),
                               known(file.provenance.campaign), file.provenance.runs.size(), known(file.tool_version)));
@@ -72,12 +73,11 @@ std::string json_text(const std::string& text) {
   return Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-/// The reason why a target with one constant loses the line.
+/// Why a target with one constant loses the line.
 std::string no_phi(const char* target, double phi_deg) {
   return fmt::format(
-      "k(phi): {} has one constant per motor and cannot change it in flight; this is phi = {:g} deg, for the others "
-      "fly "
-      "the compensation library",
+      "k(phi): {} has one constant per motor and cannot change it in flight; this one is for phi = {:g} deg, use the "
+      "compensation library for the others",
       target, phi_deg);
 }
 
@@ -191,7 +191,7 @@ Export to_agilicious(const compensation::Coefficients& file, const ExportOptions
     result.text +=
         fmt::format("motor_omega_min: {}  # rad/s, the slowest measured\n", yaml_number(file.slowest_speed->value()));
   result.lost = {no_phi("thrust_map", options.phi_deg),
-                 "standard errors, covariance, air density: the file has no keys for them; they stand in comments"};
+                 "standard errors, covariance, air density: the file has no keys for them; see its comments"};
   return result;
 }
 
@@ -216,8 +216,8 @@ Export to_px4(const compensation::Coefficients& file, const ExportOptions& optio
     result.text += fmt::format("1\t1\tCA_ROTOR{}_CT\t{}\t{}\n", motor, shortest(ct), kReal32);
   result.text += fmt::format("1\t1\tTHR_MDL_FAC\t1.0\t{}\n", kReal32);
   result.lost = {no_phi("CA_ROTORn_CT", options.phi_deg),
-                 "rad/s: PX4 knows a normalised output only; CT holds for the speed at full output named above",
-                 "standard errors: parameters have none"};
+                 "rad/s: PX4 has only a normalised output; CT is for the speed at full output named above",
+                 "standard errors: PX4 has no such parameters"};
   return result;
 }
 
@@ -243,9 +243,10 @@ Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& op
   result.text += "  </model>\n</sdf>\n";
   result.lost = {
       no_phi("MulticopterMotorModel", options.phi_deg),
-      "torque and time constants: the coefficient file does not hold them; momentConstant, timeConstantUp and "
-      "timeConstantDown stay at the plugin's defaults",
-      "names of joints and links, turning directions: rotor_N and the defaults stand in; make them the model's"};
+      "torque and time constants: not in the coefficient file; momentConstant, timeConstantUp and timeConstantDown "
+      "keep "
+      "the plugin's defaults",
+      "names of joints and links, turning directions: rotor_N and the defaults; replace them with the model's"};
   return result;
 }
 
@@ -267,10 +268,10 @@ Export to_ros2(const compensation::Coefficients& file, const ExportOptions&) {
   add_table(file, parameters);
   Export result;
   result.text = comment(file, "# ") + "/**:\n  ros__parameters:\n    kphi:\n" + parameters.text();
-  result.lost = {"hashes of the runs: parameters are for the flight; they stay in the coefficient file",
-                 "the covariance's shape: parameters have no matrices; row by row of (intercept, slope per rad)"};
+  result.lost = {"hashes of the runs: only in the coefficient file",
+                 "the covariance's shape: parameters have no matrices; it is row by row of (intercept, slope per rad)"};
   if (!parameters.unknown().empty())
-    result.lost.push_back("what is not known: parameters have no null; left out: " + parameters.unknown());
+    result.lost.push_back("unknown values: parameters have no null; left out: " + parameters.unknown());
   return result;
 }
 
@@ -292,12 +293,12 @@ Export to_header(const compensation::Coefficients& file, const ExportOptions&) {
   result.text += kHeaderFunctions;
   result.text += fmt::format("\n}}  // namespace {}\n", identifier(file.propeller.id));
   result.lost = {
-      "the table per occlusion, covariance, hashes of the runs: the header is for the flight, the line is all "
-      "it needs"};
+      "the table per occlusion, covariance, hashes of the runs: the header is for the flight, which only needs the "
+      "line"};
   return result;
 }
 
-/// The table per occlusion with the line beside it. phi_deg,k,u_k come first: `kphi fit` takes them again.
+/// The table per occlusion with the line beside it. phi_deg,k,u_k come first: `kphi fit` reads them.
 Export to_csv(const compensation::Coefficients& file, const ExportOptions&) {
   const compensation::ThrustCurve& curve = file.curve;
   Export result;
@@ -308,13 +309,12 @@ Export to_csv(const compensation::Coefficients& file, const ExportOptions&) {
         shortest(row.standard_error.value_or(ThrustCoefficient()).value()), shortest(curve.at(row.occlusion).value()),
         error_at(curve, row.occlusion), shortest(curve.scaling_factor(row.occlusion)));
   }
-  result.lost = {
-      "units: k, u_k and line_k are in N/(rad/s)^2, a header line has no place to say so",
-      "slope, covariance, validity, hashes of the runs: a table has rows only; they stay in the coefficient file"};
+  result.lost = {"units: the header line has none; k, u_k and line_k are in N/(rad/s)^2",
+                 "slope, covariance, validity, hashes of the runs: only in the coefficient file"};
   return result;
 }
 
-/// One message per occlusion, a second apart: Foxglove and PlotJuggler know no other axis than time.
+/// One message per occlusion, a second apart: Foxglove and PlotJuggler plot over time only.
 Export to_mcap(const compensation::Coefficients& file, const ExportOptions&) {
   std::ostringstream bytes;
   McapWriter writer(bytes, "kphi " + file.tool_version);
@@ -331,8 +331,7 @@ Export to_mcap(const compensation::Coefficients& file, const ExportOptions&) {
   }
   writer.add_metadata("kphi-coefficients", provenance(file));
   writer.close();
-  return {std::move(bytes).str(),
-          {"phi as an axis: the format knows time only; the occlusions follow one another a second apart"}};
+  return {std::move(bytes).str(), {"phi as an axis: the format only has time; the occlusions are a second apart"}};
 }
 
 std::span<const Target> targets() {

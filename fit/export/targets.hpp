@@ -1,4 +1,4 @@
-// The coefficients in the words of other programs. Each target says what it cannot hold, and why.
+// The coefficients as files for other programs. Each target lists the values that its format cannot store.
 #pragma once
 
 #include <optional>
@@ -18,16 +18,16 @@ struct ExportOptions {
 
 struct Export {
   std::string text;               ///< bytes, for mcap
-  std::vector<std::string> lost;  ///< what the target cannot hold, with the reason; one line each
+  std::vector<std::string> lost;  ///< values that the format cannot store, with the reason; one line each
 };
 
-/// Throws ConfigurationError for an option that the file cannot answer (φ outside what was measured, no speed known).
+/// Throws ConfigurationError for a φ outside the measured range or an unknown speed at full output.
 [[nodiscard]] Export to_agilicious(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_px4(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_ros2(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_header(const compensation::Coefficients& file, const ExportOptions& options);
-/// phi_deg,k,u_k first: `kphi fit` takes the table again.
+/// phi_deg,k,u_k first: `kphi fit` reads the table.
 [[nodiscard]] Export to_csv(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_mcap(const compensation::Coefficients& file, const ExportOptions& options);
 

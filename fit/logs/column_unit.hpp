@@ -1,4 +1,4 @@
-// Units as headers of foreign tables write them: "Thrust (gf)", "Drehzahl [1/min]", "force_n".
+// Units as the headers of CSV tables write them: "Thrust (gf)", "Drehzahl [1/min]", "force_n".
 #pragma once
 
 #include <optional>
@@ -12,17 +12,17 @@ enum class Measure { time, throttle, speed, thrust, torque, voltage, current, an
 
 struct HeaderName {
   std::string name;
-  std::string unit;  ///< as written; empty: none
+  std::string unit;  ///< as written; empty: no unit
 };
 
-/// "Thrust (gf)" and "Thrust [gf]" → Thrust, gf. Without brackets the whole is the name.
+/// "Thrust (gf)" and "Thrust [gf]" → Thrust, gf. Without brackets all of it is the name.
 [[nodiscard]] HeaderName split_header(std::string_view header);
 
-/// The unit at the end of a header without brackets, behind its last '_' ("thrust_n", "speed_rad_s"), if it is one of
-/// the measure's; else empty.
+/// The unit after a '_' at the end of a header without brackets ("thrust_n", "speed_rad_s"); empty if the measure has
+/// no such unit.
 [[nodiscard]] std::string unit_suffix(std::string_view name, Measure measure);
 
-/// How many units inside one `unit` is; nothing for a unit that the measure does not have. Case counts only where two
+/// Factor from `unit` to the unit inside; nullopt for a unit that the measure does not have. Case counts only where two
 /// units differ by it (mN, MN).
 [[nodiscard]] std::optional<double> unit_factor(Measure measure, std::string_view unit);
 

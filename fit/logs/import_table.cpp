@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.hpp"
-#include "fit/logs/rcbenchmark_csv.hpp"
-#include "fit/report/report.hpp"
-#include "results/sha256.hpp"
+#include "fit/logs/coefficient_table.hpp"
+#include "fit/report/fit_summary.hpp"
+#include "results/file_layer.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 Import import_log(const StandLog& log, const RowSelection& selection) {
   Import import;
   import.findings = audit(log, selection);
-  for (const Finding& finding : import.findings) {
+  for (const LogFinding& finding : import.findings) {
     if (finding.kind == FindingKind::speed_ratio && !selection.speed)
       throw FitError(fmt::format("{}: {}", log.path, finding.text));
   }
@@ -31,20 +31,15 @@ Import import_uiuc(std::string_view text, const std::string& path, const ImportO
   if (options.air_density_kg_m3) uiuc.density_kg_m3 = *options.air_density_kg_m3;
   Import import{read_uiuc(text, path, uiuc), {}};
   for (const TableProblem& problem : import.table.problems)
-    import.findings.push_back({FindingKind::other_fields, 1, problem.line, problem.what, {problem.line}, false});
+    import.findings.push_back({FindingKind::other_fields, 1, problem.line, problem.what, { problem.line }});
   return import;
-}
-
-bool is_uiuc(std::string_view text) {
-  const Table header = read_blank_separated(text.substr(0, text.find('\n')), "");
-  return header.find_column("RPM") && header.find_column("CT");
 }
 
 }  // namespace
 
 Import import_table(std::string_view text, const std::string& path, const ImportOptions& options) {
   Import import = !options.columns.empty()
-                      ? import_log(read_mapped(text, path, options.columns, options.dialect), options.rows)
+                      ? import_log(read_columns(text, path, options.columns, options.dialect), options.rows)
                   : is_uiuc(text) ? import_uiuc(text, path, options)
                                   : import_log(read_rcbenchmark(text, path), options.rows);
   for (results::StepMean& step : import.table.steps) {
@@ -67,7 +62,7 @@ std::string summary_of(const ImportedTable& imported) {
 std::string import_record(const Import& import, std::string_view text, const std::string& path,
                           const ImportOptions& options, const std::string& tool_version) {
   Json findings = Json::array();
-  for (const Finding& finding : import.findings) {
+  for (const LogFinding& finding : import.findings) {
     findings.push_back({{"kind", name_of(finding.kind)},
                         {"rows", finding.rows},
                         {"first_line", finding.first_line},

@@ -1,4 +1,4 @@
-// Any foreign table: picks the reader, judges what it read, and says what it found.
+// `kphi import` of one table: picks the reader, audits what it read, and says what it found.
 #pragma once
 
 #include <optional>
@@ -6,9 +6,6 @@
 #include <string_view>
 
 #include "fit/logs/log_audit.hpp"
-#include "fit/logs/mapped_csv.hpp"
-#include "fit/logs/row_selection.hpp"
-#include "fit/logs/uiuc_table.hpp"
 
 namespace kphi::fit {
 
@@ -19,17 +16,16 @@ struct ImportOptions {
   std::optional<double> diameter_in{};
   std::optional<double> air_density_kg_m3{};  ///< of a UIUC table
   std::string propeller;                      ///< default: the file's name without ending
-  int blades = 0;                             ///< 0: not known
+  int blades = 0;                             ///< 0: unknown
 };
 
 struct Import {
   ImportedTable table;
-  std::vector<Finding> findings;
+  std::vector<LogFinding> findings;
 };
 
-/// As the columns say, or UIUC when the header's columns are RPM and CT, else RCbenchmark. Two speeds at another ratio
-/// than 1 need a decision: without `rows.speed` such a table is a FitError that names it. Throws ConfigurationError
-/// (path:line).
+/// As the columns say, or UIUC when the header's columns are RPM and CT, else RCbenchmark. Two speeds at a ratio other
+/// than 1 need a decision: without `rows.speed` such a table throws FitError. Throws ConfigurationError (path:line).
 [[nodiscard]] Import import_table(std::string_view text, const std::string& path, const ImportOptions& options);
 
 /// "10 of 11 rows, thrust in gf, electrical speed, k = 1.1107e-06 ± 1.0e-08 N/(rad/s)^2, rms 0.0453 N". Throws

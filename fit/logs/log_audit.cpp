@@ -3,55 +3,413 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 #include <set>
 
 #include "base/statistics.hpp"
-#include "fit/logs/series_audit.hpp"
-#include "fit/logs/speed_audit.hpp"
-#include "fit/logs/zero_audit.hpp"
+#include "compensation/units.hpp"
 
 namespace kphi::fit {
 namespace {
 
 using results::QualityFlag;
+using Findings = std::vector<LogFinding>;
+using Rows = std::vector<const StandRow*>;
 
-void append(std::vector<Finding>& all, std::vector<Finding> more) {
-  all.insert(all.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+struct KindRow {
+  const char* name;
+  QualityFlag flag = QualityFlag::none;  ///< of the steps concerned
+};
+
+constexpr std::array<KindRow, 21> kKinds{{{"speed_ratio"},
+                                          {"speed_disagrees", QualityFlag::speed_unsteady},
+                                          {"speed_dead", QualityFlag::speed_unsteady},
+                                          {"speed_spike", QualityFlag::speed_unsteady},
+                                          {"speed_missing"},
+                                          {"barely_turning"},
+                                          {"not_turning"},
+                                          {"coasting"},
+                                          {"current_limit", QualityFlag::supply_out_of_band},
+                                          {"untared"},
+                                          {"zero_missing"},
+                                          {"zero_drifted"},
+                                          {"zero_scatters"},
+                                          {"negative_thrust"},
+                                          {"thrust_frozen", QualityFlag::bad_status},
+                                          {"thrust_drifts"},
+                                          {"correlated_noise"},
+                                          {"time_backward"},
+                                          {"time_repeated"},
+                                          {"other_fields"},
+                                          {"k_unlike_its_group"}}};
+static_assert(kKinds.size() == static_cast<std::size_t>(FindingKind::k_unlike_its_group) + 1);
+
+const KindRow& row_of(FindingKind kind) { return kKinds[static_cast<std::size_t>(kind)]; }
+
+/// Adds a finding about these rows; none if there are none.
+void add(Findings& findings, FindingKind kind, const Rows& rows, std::string text) {
+  if (rows.empty()) return;
+  LogFinding finding{kind, rows.size(), rows.front()->line, std::move(text), {}};
+  for (const StandRow* row : rows) finding.lines.push_back(row->line);
+  findings.push_back(std::move(finding));
 }
 
-Finding other_fields(const StandLog& log) {
-  Finding finding{.kind = FindingKind::other_fields};
-  for (const TableProblem& problem : log.problems) count(finding, {.line = problem.line});
-  if (!log.problems.empty()) finding.text = "lines left out; the first: " + log.problems.front().what;
-  return finding;
+template <class Concerned>
+Rows rows_where(const StandLog& log, Concerned concerned) {
+  Rows rows;
+  for (const StandRow& row : log.rows)
+    if (concerned(row)) rows.push_back(&row);
+  return rows;
 }
 
-QualityFlag flag_of(FindingKind kind) {
-  return kind == FindingKind::thrust_frozen ? QualityFlag::bad_status : QualityFlag::speed_unsteady;
+// ---- speeds ------------------------------------------------------------------------------------------------
+
+constexpr double kTurningRpm = 100;
+constexpr double kThrustThere = from_gram_force(5).value();
+
+bool both_turn(const StandRow& row) {
+  return row.electrical_rpm.value_or(0) > kTurningRpm && row.optical_rpm.value_or(0) > kTurningRpm;
+}
+
+void judge_ratio(double ratio, std::size_t rows, Findings& findings) {
+  if (std::abs(ratio - 1) < 0.01) return;
+  LogFinding finding{FindingKind::speed_ratio, rows, 0, {}, {}};
+  if (const auto poles = pole_ratio(ratio)) {
+    // Electrical speed is the commutation frequency divided by the pole pairs that were set.
+    finding.text = fmt::format(
+        "optical/electrical speed is {:.4f} = {}/{}, as if {} poles were set for a motor of {}; use --speed optical, "
+        "or "
+        "--speed electrical --speed-factor {}/{}",
+        ratio, poles->numerator, poles->denominator, 2 * poles->numerator, 2 * poles->denominator, poles->numerator,
+        poles->denominator);
+  } else {
+    finding.text = fmt::format(
+        "optical/electrical speed is {:.4f}, which is not a ratio of pole counts: one speed is wrong; name the right "
+        "one with --speed",
+        ratio);
+  }
+  findings.push_back(std::move(finding));
+}
+
+void audit_two_speeds(const StandLog& log, Findings& findings) {
+  std::vector<double> ratios, off;
+  for (const StandRow* row : rows_where(log, both_turn)) ratios.push_back(*row->optical_rpm / *row->electrical_rpm);
+  if (ratios.size() < 3) return;
+  const double ratio = upper_median(ratios);
+  judge_ratio(ratio, ratios.size(), findings);
+  for (const double one : ratios) off.push_back(std::abs(one / ratio - 1));
+  // Two counters read one after the other never agree to the last digit.
+  const double tolerance = std::max(3e-3, 6 * 1.4826 * upper_median(off));
+  Rows disagree, dead;
+  double worst = 0;
+  for (const StandRow& row : log.rows) {
+    const double electrical = row.electrical_rpm.value_or(0) * ratio, optical = row.optical_rpm.value_or(0);
+    if (std::max(electrical, optical) <= 10 * kTurningRpm) continue;
+    if (std::min(electrical, optical) / std::max(electrical, optical) < 0.2) {
+      dead.push_back(&row);
+    } else if (std::abs(optical / electrical - 1) > tolerance) {
+      disagree.push_back(&row);
+      if (std::abs(optical / electrical - 1) > std::abs(worst)) worst = optical / electrical - 1;
+    }
+  }
+  add(findings, FindingKind::speed_disagrees, disagree,
+      fmt::format("the two speeds differ by up to {:+.1f} % from their usual ratio; rows flagged", 100 * worst));
+  add(findings, FindingKind::speed_dead, dead, "one speed sensor reads 0 while the other turns; rows flagged");
+}
+
+/// Above twice the target, or half as much again as the rows around it.
+void audit_spikes(const StandLog& log, SpeedSource source, Findings& findings) {
+  constexpr std::size_t kAround = 2;
+  const auto at = [&](std::size_t i) { return rpm_of(log.rows[i], source).value_or(0); };
+  const bool series = log.rows.size() >= 50;
+  double highest = 0;
+  Rows spikes;
+  for (std::size_t i = 0; i < log.rows.size(); ++i) {
+    const double target = log.rows[i].target_rpm.value_or(0);
+    bool spike = target > 0 && at(i) > 2 * target;
+    if (target <= 0 && series && i >= kAround && i + kAround < log.rows.size()) {
+      const double around = upper_median({at(i - 2), at(i - 1), at(i + 1), at(i + 2)});
+      spike = around > kTurningRpm && at(i) > 1.5 * around;
+    }
+    if (!spike) continue;
+    spikes.push_back(&log.rows[i]);
+    highest = std::max(highest, at(i));
+  }
+  add(findings, FindingKind::speed_spike, spikes, fmt::format("speed spikes, up to {:.0f} RPM; rows flagged", highest));
+}
+
+/// `zero_n`: thrust with the motor off.
+void audit_standstill(const StandLog& log, SpeedSource source, double zero_n, Findings& findings) {
+  Rows missing, barely, still, coasting;
+  bool turned = false;
+  for (const StandRow& row : log.rows) {
+    const auto rpm = rpm_of(row, source);
+    if (!rpm) continue;
+    const bool idle = row.throttle_us && *row.throttle_us <= kIdleUs;
+    if (idle && (*rpm >= kTurningRpm || (*rpm > 0 && turned))) {
+      coasting.push_back(&row);
+    } else if (*rpm > 0 && *rpm < kTurningRpm) {
+      barely.push_back(&row);
+    }
+    turned = turned || *rpm >= kTurningRpm;
+    if (!idle && *rpm == 0) (row.thrust_n - zero_n > kThrustThere ? missing : still).push_back(&row);
+  }
+  add(findings, FindingKind::speed_missing, missing,
+      "speed reads 0 while there is thrust: the sensor does not see the propeller; rows skipped");
+  add(findings, FindingKind::barely_turning, barely,
+      "speed below 100 RPM: such rows hardly count in a fit, but their own T/ω² means nothing");
+  add(findings, FindingKind::not_turning, still, "the motor does not turn with the throttle above idle; rows skipped");
+  add(findings, FindingKind::coasting, coasting,
+      "the propeller turns with the throttle idle: such rows cannot give a zero");
+}
+
+/// Two neighbouring rows of a rising command between which speed and voltage fall.
+void audit_current_limit(const StandLog& log, SpeedSource source, Findings& findings) {
+  constexpr double kSpeedFalls = 0.995, kVoltageFalls = 0.97;
+  Rows limited;
+  double current = 0, lowest = 0;
+  for (std::size_t i = 1; i < log.rows.size(); ++i) {
+    const StandRow &before = log.rows[i - 1], &row = log.rows[i];
+    const double speed = rpm_of(row, source).value_or(0), speed_before = rpm_of(before, source).value_or(0);
+    if (!row.throttle_us || !before.throttle_us || !row.voltage_v || !before.voltage_v) continue;
+    if (*row.throttle_us - *before.throttle_us < 20 || speed_before < 10 * kTurningRpm) continue;
+    if (speed > kSpeedFalls * speed_before || *row.voltage_v > kVoltageFalls * *before.voltage_v) continue;
+    lowest = limited.empty() ? *row.voltage_v : std::min(lowest, *row.voltage_v);
+    limited.push_back(&row);
+    current = std::max(current, row.current_a.value_or(0));
+  }
+  add(findings, FindingKind::current_limit, limited,
+      fmt::format(
+          "the supply is at its current limit ({:.2f} A): the command rises, but voltage (down to {:.2f} V) and "
+          "speed fall; the commanded speed was not reached",
+          current, lowest));
+}
+
+// ---- zero --------------------------------------------------------------------------------------------------
+
+/// Rows with the motor off at one end of the log.
+struct LogZero {
+  double mean_n = 0;
+  double sd_n = 0;
+  std::size_t rows = 0;
+
+  [[nodiscard]] std::string words(const char* when) const {
+    return fmt::format("{:.3f} N {} ({} rows, sd {:.3f} N)", mean_n, when, rows, sd_n);
+  }
+};
+
+/// Up to the first row that turns; nullopt with fewer than 10 rows.
+template <class Iterator>
+std::optional<LogZero> leading_zero(Iterator begin, Iterator end, SpeedSource source) {
+  constexpr std::size_t kRowsForAZero = 10;
+  std::vector<double> values;
+  for (; begin != end && !(rpm_of(*begin, source).value_or(0) > 0); ++begin)
+    if (motor_off(*begin, source)) values.push_back(begin->thrust_n);
+  if (values.size() < kRowsForAZero) return std::nullopt;
+  return LogZero{mean(values), std::sqrt(variance(values)), values.size()};
+}
+
+/// `tare_n` is what the import subtracts.
+void audit_zero(const StandLog& log, const std::optional<LogZero>& before, const std::optional<LogZero>& after,
+                double tare_n, Findings& findings) {
+  constexpr std::size_t kRowsOfASeries = 50;  // a table of averaged steps was tared by its program
+  const double largest = largest_thrust(log);
+  const auto of_file = [&](FindingKind kind, std::size_t rows, std::string text) {
+    findings.push_back({kind, rows, 0, std::move(text), {}});
+  };
+  if (before && before->sd_n > kTareScatterMax * largest) {
+    of_file(FindingKind::zero_scatters, before->rows,
+            "with the motor off the stand reads " + before->words("before") + ": too noisy for a zero");
+  } else if (before && tare_n == 0 && std::abs(before->mean_n) > std::max(5e-3 * largest, 3 * before->sd_n)) {
+    of_file(FindingKind::untared, before->rows,
+            fmt::format("with the motor off the stand reads {}, {:.1f} % of the largest thrust: never tared; import "
+                        "with --tare-rows {}",
+                        before->words("before"), 100 * std::abs(before->mean_n) / largest,
+                        std::min<std::size_t>(before->rows, 100)));
+  }
+  const double drift = before && after ? after->mean_n - before->mean_n : 0;
+  if (before && after && std::abs(drift) > std::max(1e-3 * largest, 5 * std::hypot(before->sd_n, after->sd_n))) {
+    of_file(FindingKind::zero_drifted, before->rows + after->rows,
+            fmt::format("the zero moved by {:+.3f} N: {}, {}", drift, before->words("before"), after->words("after")));
+  }
+  if (!before && log.rows.size() >= kRowsOfASeries) {
+    of_file(FindingKind::zero_missing, log.rows.size(),
+            "no rows with the motor off at the beginning: the zero is unknown, and k may be off by a few percent");
+  }
+  double lowest = 0;
+  for (const StandRow& row : log.rows) lowest = std::min(lowest, row.thrust_n);
+  add(findings, FindingKind::negative_thrust, rows_where(log, [](const StandRow& row) { return row.thrust_n < 0; }),
+      fmt::format("thrust below 0, down to {:.4f} N", lowest));
+}
+
+// ---- time series -------------------------------------------------------------------------------------------
+
+constexpr std::size_t kPlateauRows = 100;
+
+double local_k(const StandRow& row, SpeedSource source) {
+  const double speed = from_rpm(*rpm_of(row, source)).value();
+  return row.thrust_n / (speed * speed);
+}
+
+void audit_time(const StandLog& log, Findings& findings) {
+  Rows backward, repeated;
+  double largest = 0;
+  for (std::size_t i = 1; i < log.rows.size(); ++i) {
+    const auto before = log.rows[i - 1].time_s, now = log.rows[i].time_s;
+    if (!before || !now || *now > *before) continue;
+    if (*now == *before) repeated.push_back(&log.rows[i]);
+    if (*now < *before) backward.push_back(&log.rows[i]);
+    largest = std::max(largest, *before - *now);
+  }
+  add(findings, FindingKind::time_backward, backward,
+      fmt::format("time goes back, by up to {:.3f} s; the rows keep the order of the file", largest));
+  add(findings, FindingKind::time_repeated, repeated, "time stamps occur twice");
+}
+
+void audit_frozen(const StandLog& log, Findings& findings) {
+  constexpr std::size_t kFrozenRows = 20;
+  Rows frozen;
+  for (std::size_t begin = 0, end = 0; begin < log.rows.size(); begin = end) {
+    while (end < log.rows.size() && log.rows[end].thrust_n == log.rows[begin].thrust_n) ++end;
+    if (end - begin < kFrozenRows || log.rows[begin].thrust_n == 0) continue;
+    for (std::size_t i = begin; i < end; ++i) frozen.push_back(&log.rows[i]);
+  }
+  add(findings, FindingKind::thrust_frozen, frozen,
+      "the same thrust, bit for bit, row after row: the channel is frozen; rows flagged");
+}
+
+/// The rows within 2 % of the speed at which the log stays longest: indexes into log.rows. Empty with fewer than 100 of
+/// them, or under a tenth of the rows that turn.
+std::vector<std::size_t> plateau(const StandLog& log, SpeedSource source) {
+  std::vector<double> speeds;
+  for (const StandRow& row : log.rows)
+    if (rpm_of(row, source).value_or(0) > 500) speeds.push_back(*rpm_of(row, source));
+  std::sort(speeds.begin(), speeds.end());
+  constexpr double kWide = 1.02 / 0.98;
+  std::size_t most = 0, best = 0;
+  for (std::size_t low = 0, high = 0; low < speeds.size(); ++low) {
+    while (high < speeds.size() && speeds[high] <= kWide * speeds[low]) ++high;
+    if (high - low > most) {
+      most = high - low;
+      best = low;
+    }
+  }
+  std::vector<std::size_t> rows;
+  if (most < kPlateauRows || most * 10 < speeds.size()) return rows;
+  for (std::size_t i = 0; i < log.rows.size(); ++i) {
+    const double rpm = rpm_of(log.rows[i], source).value_or(0);
+    if (rpm >= speeds[best] && rpm <= kWide * speeds[best]) rows.push_back(i);
+  }
+  return rows;
+}
+
+void audit_drift(const StandLog& log, SpeedSource source, const std::vector<std::size_t>& rows, Findings& findings) {
+  constexpr double kDrift = 0.05;
+  std::vector<double> first, last;
+  for (std::size_t i = 0; i < rows.size() / 10; ++i) {
+    first.push_back(local_k(log.rows[rows[i]], source));
+    last.push_back(local_k(log.rows[rows[rows.size() - 1 - i]], source));
+  }
+  const double share = mean(last) / mean(first);
+  if (!(std::abs(share - 1) > kDrift)) return;
+  findings.push_back({FindingKind::thrust_drifts,
+                      rows.size(),
+                      log.rows[rows.front()].line,
+                      fmt::format("at constant speed T/ω² goes from {:.3g} to {:.3g} N/(rad/s)² ({:.2f} times): one k "
+                                  "for the whole log means nothing",
+                                  mean(first), mean(last), share),
+                      {}});
+}
+
+void audit_noise(const StandLog& log, SpeedSource source, const std::vector<std::size_t>& rows, Findings& findings) {
+  std::vector<double> longest, stretch;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (i > 0 && rows[i] != rows[i - 1] + 1) stretch.clear();
+    stretch.push_back(local_k(log.rows[rows[i]], source));
+    if (stretch.size() > longest.size()) longest = stretch;
+  }
+  const double time = longest.size() < kPlateauRows ? 1 : correlation_time(longest);
+  if (time < 2) return;
+  findings.push_back(
+      {FindingKind::correlated_noise,
+       longest.size(),
+       0,
+       fmt::format("{} rows at constant speed count as {:.0f} independent ones: s/√n is {:.1f} times too "
+                   "small",
+                   longest.size(), static_cast<double>(longest.size()) / time, std::sqrt(time)),
+       {}});
 }
 
 }  // namespace
 
-std::vector<Finding> audit(const StandLog& log, const RowSelection& selection) {
+const char* name_of(FindingKind kind) { return row_of(kind).name; }
+
+std::optional<PoleRatio> pole_ratio(double ratio) {
+  constexpr int kMost = 24;
+  constexpr double kTolerance = 2e-3;
+  if (!(ratio > 0) || std::abs(ratio - 1) < 0.01) return std::nullopt;
+  for (int sum = 3; sum <= 2 * kMost; ++sum) {
+    for (int denominator = 1; denominator < sum; ++denominator) {
+      const int numerator = sum - denominator;
+      if (numerator > kMost || denominator > kMost || std::gcd(numerator, denominator) != 1) continue;
+      if (std::abs(ratio * denominator / numerator - 1) < kTolerance) return PoleRatio{numerator, denominator};
+    }
+  }
+  return std::nullopt;
+}
+
+double correlation_time(const std::vector<double>& values) {
+  const std::size_t n = values.size();
+  const double middle = mean(values);
+  double squares = 0, time = 1;
+  for (const double value : values) squares += (value - middle) * (value - middle);
+  if (!(squares > 0)) return 1;
+  for (std::size_t lag = 1; lag < n / 2; ++lag) {
+    double sum = 0;
+    for (std::size_t i = lag; i < n; ++i) sum += (values[i] - middle) * (values[i - lag] - middle);
+    const double correlation = sum / squares;
+    if (correlation < 0.05) break;
+    time += 2 * correlation;
+  }
+  return time;
+}
+
+std::vector<LogFinding> audit(const StandLog& log, const RowSelection& selection) {
   const SpeedSource source = choose_speed(log, selection);
-  const auto zero = zero_before(log, source);
-  std::vector<Finding> findings = compare_speeds(log).findings;
-  append(findings, audit_speed(log, source, zero ? zero->mean_n : 0));
-  append(findings, audit_zero(log, source, selection.tare_rows > 0 ? zero.value_or(LogZero{}).mean_n : 0));
-  append(findings, audit_series(log, source));
-  append_if_any(findings, other_fields(log));
+  const auto before = leading_zero(log.rows.begin(), log.rows.end(), source);
+  const auto after = leading_zero(log.rows.rbegin(), log.rows.rend(), source);
+  const double zero_n = before ? before->mean_n : 0;
+  Findings findings;
+  audit_two_speeds(log, findings);
+  audit_spikes(log, source, findings);
+  audit_standstill(log, source, zero_n, findings);
+  audit_current_limit(log, source, findings);
+  audit_zero(log, before, after, selection.tare_rows > 0 ? zero_n : 0, findings);
+  audit_time(log, findings);
+  audit_frozen(log, findings);
+  if (const std::vector<std::size_t> rows = plateau(log, source); !rows.empty()) {
+    audit_drift(log, source, rows, findings);
+    audit_noise(log, source, rows, findings);
+  }
+  if (log.problems.empty()) return findings;
+  LogFinding skipped{FindingKind::other_fields,
+                     log.problems.size(),
+                     log.problems.front().line,
+                     "lines skipped; the first: " + log.problems.front().what,
+                     {}};
+  for (const TableProblem& problem : log.problems) skipped.lines.push_back(problem.line);
+  findings.push_back(std::move(skipped));
   return findings;
 }
 
-void flag_steps(ImportedTable& table, const std::vector<Finding>& findings) {
-  for (const Finding& finding : findings) {
-    const bool limit = finding.kind == FindingKind::current_limit;
-    if (!finding.spoils && !limit) continue;
-    const auto flag = static_cast<std::uint32_t>(limit ? QualityFlag::supply_out_of_band : flag_of(finding.kind));
+void flag_steps(ImportedTable& table, const std::vector<LogFinding>& findings) {
+  for (const LogFinding& finding : findings) {
     const std::set<std::size_t> lines(finding.lines.begin(), finding.lines.end());
     for (std::size_t i = 0; i < table.steps.size(); ++i)
-      if (lines.contains(table.lines[i])) table.steps[i].quality_flags |= flag;
+      if (lines.contains(table.lines[i]))
+        table.steps[i].quality_flags |= static_cast<std::uint32_t>(row_of(finding.kind).flag);
   }
 }
 

@@ -5,15 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 
 #include "base/error.hpp"
+#include "base/statistics.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::fit {
 namespace {
 
-constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
+using results::kNotMeasured;
 
 [[noreturn]] void refuse(const std::string& path, const std::string& what) {
   throw ConfigurationError(fmt::format("{}:1: {}", path, what));
@@ -26,18 +26,16 @@ double tare_of(const StandLog& log, const RowSelection& selection, SpeedSource s
     if (zeros.size() < selection.tare_rows && motor_off(row, source)) zeros.push_back(row.thrust_n);
   if (zeros.size() < selection.tare_rows) {
     refuse(log.path,
-           fmt::format("{} rows with the motor off, {} are asked for the tare", zeros.size(), selection.tare_rows));
+           fmt::format("{} rows with the motor off, but --tare-rows asks for {}", zeros.size(), selection.tare_rows));
   }
-  double mean = 0, squares = 0;
-  for (const double zero : zeros) mean += zero / static_cast<double>(zeros.size());
-  for (const double zero : zeros) squares += (zero - mean) * (zero - mean);
-  const double sd = zeros.size() > 1 ? std::sqrt(squares / static_cast<double>(zeros.size() - 1)) : 0;
+  const double sd = zeros.size() > 1 ? std::sqrt(variance(zeros)) : 0;
   if (sd > kTareScatterMax * largest_thrust(log)) {
-    refuse(log.path, fmt::format("the rows for the tare scatter by {:.3g} N, {:.1f} % of the largest thrust: no zero; "
-                                 "name fewer rows (--tare-rows) or none",
-                                 sd, 100 * sd / largest_thrust(log)));
+    refuse(log.path,
+           fmt::format("the rows for the tare scatter by {:.3g} N, {:.1f} % of the largest thrust, and cannot "
+                       "give a zero; use fewer rows (--tare-rows) or no tare",
+                       sd, 100 * sd / largest_thrust(log)));
   }
-  return mean;
+  return mean(zeros);
 }
 
 bool is_point(const StandRow& row, const RowSelection& selection, SpeedSource source) {
@@ -51,24 +49,32 @@ bool is_point(const StandRow& row, const RowSelection& selection, SpeedSource so
 
 results::StepMean step_of(const StandRow& row, const RowSelection& selection, SpeedSource source, double tare_n) {
   const double sign = selection.reverse_thrust ? -1 : 1;
-  results::StepMean step;
+  results::StepMean step = step_of_row(*rpm_of(row, source) * selection.speed_factor, sign * (row.thrust_n - tare_n));
   step.occlusion_deg = row.occlusion_deg.value_or(0);
-  step.repetition = row.repetition.value_or(1);
-  step.speed_rad_s = from_rpm(*rpm_of(row, source) * selection.speed_factor).value();
-  step.speed_n = 1;
-  step.thrust_n = sign * (row.thrust_n - tare_n);
-  step.thrust_samples = 1;
-  step.torque_nm = row.torque_nm.value_or(kAbsent);
+  step.repetition = static_cast<int>(row.repetition.value_or(1));
+  step.torque_nm = row.torque_nm.value_or(kNotMeasured);
   step.zero_n = sign * tare_n;
-  step.supply_voltage_v = row.voltage_v.value_or(kAbsent);
-  step.supply_current_a = row.current_a.value_or(kAbsent);
-  step.speed_sd_rad_s = step.thrust_sd_n = step.torque_sd_nm = kAbsent;
-  step.motor_current_a = step.coil_temperature_degc = kAbsent;
+  step.supply_voltage_v = row.voltage_v.value_or(kNotMeasured);
+  step.supply_current_a = row.current_a.value_or(kNotMeasured);
   step.window_begin_s = step.window_end_s = row.time_s.value_or(0);
   return step;
 }
 
 }  // namespace
+
+results::StepMean step_of_row(double speed_rpm, double thrust_n) {
+  results::StepMean step;
+  step.repetition = 1;
+  step.speed_rad_s = from_rpm(speed_rpm).value();
+  step.thrust_n = thrust_n;
+  step.speed_n = step.thrust_samples = 1;
+  for (const auto member :
+       {&results::StepMean::speed_sd_rad_s, &results::StepMean::thrust_sd_n, &results::StepMean::torque_nm,
+        &results::StepMean::torque_sd_nm, &results::StepMean::supply_voltage_v, &results::StepMean::supply_current_a,
+        &results::StepMean::motor_current_a, &results::StepMean::coil_temperature_degc})
+    step.*member = kNotMeasured;
+  return step;
+}
 
 SpeedSource choose_speed(const StandLog& log, const RowSelection& selection) {
   const bool electrical_turns = std::any_of(log.rows.begin(), log.rows.end(),
@@ -76,9 +82,9 @@ SpeedSource choose_speed(const StandLog& log, const RowSelection& selection) {
   const SpeedSource source =
       selection.speed.value_or(electrical_turns || !log.has_optical ? SpeedSource::electrical : SpeedSource::optical);
   if (source == SpeedSource::electrical && !log.has_electrical)
-    refuse(log.path, "no electrical speed in the file; take the optical one (--speed optical)");
+    refuse(log.path, "no electrical speed in the file; use the optical one (--speed optical)");
   if (source == SpeedSource::optical && !log.has_optical)
-    refuse(log.path, "no optical speed in the file; take the electrical one (--speed electrical)");
+    refuse(log.path, "no optical speed in the file; use the electrical one (--speed electrical)");
   return source;
 }
 

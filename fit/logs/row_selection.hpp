@@ -1,4 +1,4 @@
-// Which rows of a foreign log become steps, and how.
+// Which rows of a stand log become steps, and how.
 #pragma once
 
 #include <optional>
@@ -14,18 +14,18 @@ namespace kphi::fit {
 struct RowSelection {
   /// Default: electrical where the file has it above 0 anywhere, else optical.
   std::optional<SpeedSource> speed{};
-  double speed_factor = 1;     ///< on the chosen speed: 7/6 mends an electrical speed taken with 14 instead of 12 poles
-  double speed_above_rpm = 0;  ///< rows at or below are no points (before the factor)
+  double speed_factor = 1;     ///< on the chosen speed: 7/6 corrects an electrical speed taken with 14 poles, not 12
+  double speed_above_rpm = 0;  ///< rows at or below are skipped (before the factor)
   std::optional<double> throttle_above_us{};
-  /// Rows in which optical/electrical is within `ratio_tolerance` of this one only: two sensors that agree.
+  /// Takes only rows whose optical/electrical is within `ratio_tolerance` of this: two sensors that agree.
   std::optional<double> optical_per_electrical{};
   double ratio_tolerance = 0.02;
-  /// Tare with the mean of the first rows that have the motor off (throttle idle, speed 0); 0: none.
+  /// Tare with the mean of the first rows that have the motor off (throttle idle, speed 0); 0: no tare.
   std::size_t tare_rows = 0;
-  bool reverse_thrust = false;  ///< the stand was wired with the other sign
+  bool reverse_thrust = false;  ///< the stand measured thrust with the other sign
 };
 
-/// A zero whose rows scatter by more than this share of the largest thrust is no zero.
+/// Rows that scatter by more than this share of the largest thrust cannot give a zero.
 inline constexpr double kTareScatterMax = 0.02;
 
 struct ImportedTable {
@@ -36,14 +36,17 @@ struct ImportedTable {
   std::string speed_source;
   std::size_t rows_total = 0;
   std::vector<TableProblem> problems;
-  std::vector<std::string> unread;  ///< columns left out, with the reason
+  std::vector<std::string> unread;  ///< columns skipped, with the reason
 };
 
-/// The source that `selection` takes. Throws ConfigurationError when the file does not have it.
+/// A step from one row: what a row cannot give is not measured.
+[[nodiscard]] results::StepMean step_of_row(double speed_rpm, double thrust_n);
+
+/// The source that `selection` takes. Throws ConfigurationError if the file does not have it.
 [[nodiscard]] SpeedSource choose_speed(const StandLog& log, const RowSelection& selection);
 
-/// Throws ConfigurationError (path:line) when the asked channel is not in the file, no row is left, too few rows are
-/// there to tare with or they scatter too much, or thrust falls with speed (reversed sign).
+/// Throws ConfigurationError (path:line) when the chosen channel is missing, no row is left, the rows for the tare are
+/// too few or scatter too much, or thrust falls with speed (reversed sign).
 [[nodiscard]] ImportedTable select_rows(const StandLog& log, const RowSelection& selection = {});
 
 /// Σ T ω² must be positive. Throws ConfigurationError at path:1 otherwise.

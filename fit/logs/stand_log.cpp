@@ -1,10 +1,182 @@
 #include "fit/logs/stand_log.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "base/error.hpp"
+#include "fit/logs/column_unit.hpp"
+
 namespace kphi::fit {
+namespace {
+
+struct RoleRow {
+  Role role;
+  const char* name;
+  Measure measure;
+  std::optional<double> StandRow::*member;  ///< nullptr: the thrust, which every row has
+};
+
+constexpr std::array<RoleRow, 11> kRoles{{
+    {Role::time, "time", Measure::time, &StandRow::time_s},
+    {Role::throttle, "throttle", Measure::throttle, &StandRow::throttle_us},
+    {Role::speed, "speed", Measure::speed, &StandRow::optical_rpm},
+    {Role::electrical_speed, "electrical_speed", Measure::speed, &StandRow::electrical_rpm},
+    {Role::thrust, "thrust", Measure::thrust, nullptr},
+    {Role::torque, "torque", Measure::torque, &StandRow::torque_nm},
+    {Role::voltage, "voltage", Measure::voltage, &StandRow::voltage_v},
+    {Role::current, "current", Measure::current, &StandRow::current_a},
+    {Role::occlusion, "occlusion", Measure::angle, &StandRow::occlusion_deg},
+    {Role::repetition, "repetition", Measure::count, &StandRow::repetition},
+    {Role::target_speed, "target_speed", Measure::speed, &StandRow::target_rpm},
+}};
+
+const RoleRow& row_of(Role role) { return kRoles[static_cast<std::size_t>(role)]; }
+
+/// The channels of an RCbenchmark table by the name before the unit; of two names for one role the first counts.
+struct KnownChannel {
+  const char* name;
+  Role role;
+  const char* unit = "";  ///< empty: the header gives it
+  bool required = false;  ///< an unknown unit refuses the file
+};
+
+constexpr std::array<KnownChannel, 10> kRcbenchmark{{{"Thrust", Role::thrust, "", true},
+                                                     {"Motor Electrical Speed", Role::electrical_speed, "", true},
+                                                     {"Motor Optical Speed", Role::speed, "", true},
+                                                     {"Time", Role::time},
+                                                     {"ESC signal", Role::throttle},
+                                                     {"ESC", Role::throttle},
+                                                     {"Torque", Role::torque},
+                                                     {"Voltage", Role::voltage},
+                                                     {"Current", Role::current},
+                                                     {"TargetRPM", Role::target_speed, "RPM"}}};
+
+/// A column with its role and the factor to the unit inside.
+struct Column {
+  Role role{};
+  std::size_t index = 0;
+  double factor = 1;
+  std::string unit;
+};
+using Columns = std::vector<Column>;
+
+[[noreturn]] void refuse(const Table& table, const std::string& what) {
+  throw ConfigurationError(fmt::format("{}:{}: {}", table.path, std::max<std::size_t>(table.header_line, 1), what));
+}
+
+const Column* find(const Columns& columns, Role role) {
+  const auto found = std::find_if(columns.begin(), columns.end(), [&](const Column& c) { return c.role == role; });
+  return found == columns.end() ? nullptr : &*found;
+}
+
+std::size_t column_named(const Table& table, const std::string& name) {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < table.header.size(); ++i)
+    if (table.header[i] == name) found.push_back(i);
+  for (std::size_t i = 0; found.empty() && i < table.header.size(); ++i)
+    if (split_header(table.header[i]).name == name) found.push_back(i);
+  if (found.size() == 1) return found.front();
+  refuse(table, fmt::format("{} column \"{}\"; the file has \"{}\"", found.empty() ? "no" : "more than one", name,
+                            fmt::join(table.header, "\", \"")));
+}
+
+Column map_column(const Table& table, const ColumnRole& wanted) {
+  const RoleRow& role = row_of(wanted.role);
+  Column column{wanted.role, column_named(table, wanted.header), 1, wanted.unit};
+  const std::string& header = table.header[column.index];
+  std::string by_header = split_header(header).unit;
+  if (by_header.empty()) by_header = unit_suffix(header, role.measure);
+  if (column.unit.empty()) column.unit = by_header;
+  const auto factor = unit_factor(role.measure, column.unit);
+  const std::string known = unit_list(role.measure);
+  if (!factor && column.unit.empty()) {
+    refuse(table, fmt::format("no unit given for column \"{}\"; name it: --column {}={}:UNIT with UNIT one of {}",
+                              header, role.name, wanted.header, known));
+  }
+  if (!factor)
+    refuse(table, fmt::format("unknown unit \"{}\" of column \"{}\"; known are {}", column.unit, header, known));
+  const auto header_factor = unit_factor(role.measure, by_header);
+  if (header_factor && *header_factor != *factor) {
+    refuse(table, fmt::format("unit mismatch: column \"{}\" is in {} by its header and in {} by --column; correct one",
+                              header, by_header, column.unit));
+  }
+  column.factor = *factor;
+  return column;
+}
+
+void map_channel(const Table& table, const KnownChannel& channel, Columns& columns, std::vector<std::string>& unread) {
+  const Measure measure = row_of(channel.role).measure;
+  if (find(columns, channel.role) != nullptr) return;
+  for (std::size_t i = 0; i < table.header.size(); ++i) {
+    const HeaderName header = split_header(table.header[i]);
+    if (header.name != channel.name) continue;
+    const std::string unit = header.unit.empty() ? channel.unit : header.unit;
+    const auto factor = unit_factor(measure, unit);
+    if (!factor) {
+      const auto what =
+          fmt::format("unknown unit \"{}\" of column \"{}\"; known are {}", unit, table.header[i], unit_list(measure));
+      if (channel.required) refuse(table, what);
+      unread.push_back(what);
+    } else if (const Column* twice = find(columns, channel.role)) {
+      refuse(table, table.header[twice->index] == table.header[i]
+                        ? fmt::format("more than one column \"{}\"", table.header[i])
+                        : fmt::format("two {} columns with different units", channel.name));
+    } else {
+      columns.push_back({channel.role, i, *factor, unit});
+    }
+  }
+}
+
+/// Why the value is impossible in its role; empty if it is possible.
+std::string objection(Role role, double value) {
+  if (role == Role::occlusion && !(value >= 0 && value < 360)) return "occlusion outside 0 to 360°";
+  if (role == Role::repetition && !(value >= 1 && value <= 1000 && value == std::floor(value)))
+    return "repetition is not a whole number from 1 to 1000";
+  return {};
+}
+
+/// nullopt, and the reason in the log, if the thrust is not a number or a value is impossible.
+std::optional<StandRow> read_row(const TableRow& fields, const Columns& columns, bool decimal_comma, StandLog& log) {
+  StandRow row{.line = fields.line};
+  for (const Column& column : columns) {
+    std::string field = fields.fields[column.index];
+    if (decimal_comma) std::replace(field.begin(), field.end(), ',', '.');
+    const RoleRow& role = row_of(column.role);
+    const auto value = parse_number(field);
+    const bool needed = column.role == Role::thrust || column.role == Role::occlusion;
+    if (!value && !needed) continue;
+    const std::string why =
+        value ? objection(column.role, *value * column.factor) : fmt::format("{} is not a number", role.name);
+    if (!why.empty()) {
+      log.problems.push_back({fields.line, why + "; line skipped"});
+      return std::nullopt;
+    }
+    if (role.member == nullptr) row.thrust_n = *value * column.factor;
+    if (role.member != nullptr) row.*role.member = *value * column.factor;
+  }
+  return row;
+}
+
+StandLog read_rows(const Table& table, const Columns& columns, bool decimal_comma, std::vector<std::string> unread) {
+  StandLog log{.path = table.path, .thrust_unit = find(columns, Role::thrust)->unit};
+  log.has_optical = find(columns, Role::speed) != nullptr;
+  log.has_electrical = find(columns, Role::electrical_speed) != nullptr;
+  log.problems = table.problems;
+  log.unread = std::move(unread);
+  for (const TableRow& fields : table.rows)
+    if (const auto row = read_row(fields, columns, decimal_comma, log)) log.rows.push_back(*row);
+  return log;
+}
+
+bool has_speed(const Columns& columns) {
+  return find(columns, Role::speed) != nullptr || find(columns, Role::electrical_speed) != nullptr;
+}
+
+}  // namespace
 
 bool motor_off(const StandRow& row, SpeedSource source) {
   return row.throttle_us && *row.throttle_us <= kIdleUs && rpm_of(row, source).value_or(0) == 0;
@@ -16,22 +188,51 @@ double largest_thrust(const StandLog& log) {
   return largest;
 }
 
-const char* name_of(FindingKind kind) {
-  static constexpr std::array kNames{
-      "speed_ratio",   "speed_disagrees", "speed_dead",        "speed_spike",   "speed_missing",    "barely_turning",
-      "not_turning",   "coasting",        "current_limit",     "untared",       "zero_missing",     "zero_drifted",
-      "zero_scatters", "negative_thrust", "thrust_frozen",     "thrust_drifts", "correlated_noise", "time_backward",
-      "time_repeated", "other_fields",    "k_unlike_its_group"};
-  return kNames[static_cast<std::size_t>(kind)];
+ColumnRole parse_column_role(std::string_view text) {
+  const std::size_t equals = text.find('=');
+  std::vector<const char*> names;
+  for (const RoleRow& row : kRoles) {
+    names.push_back(row.name);
+    if (text.substr(0, equals) != row.name || equals == std::string_view::npos || equals + 1 == text.size()) continue;
+    ColumnRole column{row.role, std::string(text.substr(equals + 1)), ""};
+    const std::size_t colon = column.header.rfind(':');
+    if (colon != std::string::npos && unit_factor(row.measure, column.header.substr(colon + 1)) &&
+        row.measure != Measure::count) {
+      column.unit = column.header.substr(colon + 1);
+      column.header.resize(colon);
+    }
+    return column;
+  }
+  throw ConfigurationError(fmt::format("--column {}: expected ROLE=HEADER or ROLE=HEADER:UNIT with ROLE one of {}",
+                                       text, fmt::join(names, ", ")));
 }
 
-void count(Finding& finding, const StandRow& row) {
-  if (finding.rows++ == 0) finding.first_line = row.line;
-  finding.lines.push_back(row.line);
+StandLog read_columns(std::string_view text, std::string path, const std::vector<ColumnRole>& columns,
+                      const CsvDialect& dialect) {
+  const Table table = read_separated(text, std::move(path), dialect.separator);
+  Columns mapped;
+  for (const ColumnRole& column : columns) {
+    if (find(mapped, column.role) != nullptr)
+      refuse(table, fmt::format("--column names {} twice", row_of(column.role).name));
+    mapped.push_back(map_column(table, column));
+  }
+  if (find(mapped, Role::thrust) == nullptr || !has_speed(mapped))
+    refuse(table, "a thrust and a speed are needed: --column thrust=HEADER --column speed=HEADER");
+  return read_rows(table, mapped, dialect.decimal_comma, {});
 }
 
-void append_if_any(std::vector<Finding>& findings, Finding finding) {
-  if (finding.rows > 0) findings.push_back(std::move(finding));
+StandLog read_rcbenchmark(std::string_view text, std::string path) {
+  const Table table = read_csv(text, std::move(path));
+  Columns columns;
+  std::vector<std::string> unread;
+  for (const KnownChannel& channel : kRcbenchmark) map_channel(table, channel, columns, unread);
+  if (find(columns, Role::thrust) == nullptr) {
+    refuse(table,
+           "no column \"Thrust (unit)\", so this is not an RCbenchmark table; name the columns of another table "
+           "with --column");
+  }
+  if (!has_speed(columns)) refuse(table, "no column \"Motor Electrical Speed (RPM)\" or \"Motor Optical Speed (RPM)\"");
+  return read_rows(table, columns, false, std::move(unread));
 }
 
 }  // namespace kphi::fit

@@ -1,19 +1,21 @@
-// What a thrust stand of any make wrote down, row by row, and the findings of the audits about it. Units: s, µs, RPM,
-// N, N m, V, A, degrees.
+// What a thrust stand wrote down, row by row, and the one reader for all its CSV files. Inside: s, µs, RPM, N, N m, V,
+// A, degrees.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/csv.hpp"
 
 namespace kphi::fit {
 
-enum class SpeedSource { electrical, optical };
+enum class SpeedSource : std::uint8_t { electrical, optical };
 
-/// One line of the file. A channel that is absent or empty is nothing.
+/// One line of the file; nullopt for a channel that is absent or empty.
 struct StandRow {
   std::size_t line = 0;
   std::optional<double> time_s{};
@@ -26,7 +28,7 @@ struct StandRow {
   std::optional<double> current_a{};
   std::optional<double> target_rpm{};  ///< what a script asked for
   std::optional<double> occlusion_deg{};
-  std::optional<int> repetition{};
+  std::optional<double> repetition{};  ///< a whole number from 1
 };
 
 struct StandLog {
@@ -35,15 +37,15 @@ struct StandLog {
   bool has_electrical = false;
   bool has_optical = false;
   std::vector<StandRow> rows{};
-  std::vector<TableProblem> problems{};  ///< lines left out
-  std::vector<std::string> unread{};     ///< columns left out, with the reason
+  std::vector<TableProblem> problems{};  ///< lines skipped
+  std::vector<std::string> unread{};     ///< columns skipped, with the reason
 };
 
 [[nodiscard]] inline std::optional<double> rpm_of(const StandRow& row, SpeedSource source) {
   return source == SpeedSource::electrical ? row.electrical_rpm : row.optical_rpm;
 }
 
-/// Throttle at or below this is idle: the motor is told to stand still.
+/// Throttle at or below this is idle: the motor is commanded to stand still.
 inline constexpr double kIdleUs = 1000.5;
 
 /// Throttle idle and no speed.
@@ -52,47 +54,45 @@ inline constexpr double kIdleUs = 1000.5;
 /// |thrust| in N; 0 without rows.
 [[nodiscard]] double largest_thrust(const StandLog& log);
 
-/// What is wrong with a foreign log: a name, a count, where it begins, and one line that says what to do.
-enum class FindingKind {
-  speed_ratio,         ///< two speeds at a fixed ratio other than 1: pole count
-  speed_disagrees,     ///< single rows off that ratio
-  speed_dead,          ///< one of two speeds (almost) still while the other turns
-  speed_spike,         ///< far above the target, or above the rows before and after
-  speed_missing,       ///< 0 while there is thrust
-  barely_turning,      ///< above 0, below 100 RPM
-  not_turning,         ///< throttle above idle, no speed, no thrust
-  coasting,            ///< turning with the throttle idle
-  current_limit,       ///< command up, voltage and speed down
-  untared,             ///< thrust of the still motor is not 0
-  zero_missing,        ///< a time series without rows of a still motor
-  zero_drifted,        ///< before and after differ
-  zero_scatters,       ///< no tare can be taken there
-  negative_thrust,     ///< rows below 0
-  thrust_frozen,       ///< the same bits many times
-  thrust_drifts,       ///< T/ω² changes at constant speed
-  correlated_noise,    ///< rows of a plateau are not independent
-  time_backward,       ///< stamps earlier than the one before
-  time_repeated,       ///< equal stamps
-  other_fields,        ///< lines that do not fit the header
-  k_unlike_its_group,  ///< among files of one propeller
+/// What a column contains.
+enum class Role : std::uint8_t {
+  time,
+  throttle,
+  speed,
+  electrical_speed,
+  thrust,
+  torque,
+  voltage,
+  current,
+  occlusion,
+  repetition,
+  target_speed
 };
 
-struct Finding {
-  FindingKind kind{};
-  std::size_t rows = 0;
-  std::size_t first_line = 0;        ///< 0: of the whole file
-  std::string text{};                ///< what, how large, what to do
-  std::vector<std::size_t> lines{};  ///< of every row concerned
-  bool spoils = false;               ///< the rows' speed or thrust is wrong; their steps become doubtful
+struct ColumnRole {
+  Role role{};
+  std::string header;  ///< the whole header, or its part before the unit
+  std::string unit;    ///< empty: the header gives it
 };
 
-/// "speed_ratio"
-[[nodiscard]] const char* name_of(FindingKind kind);
+/// "thrust=Load [g]", "speed=n:rpm": role, header and, behind the last ':', a unit that the header does not give.
+/// Throws ConfigurationError that lists the roles.
+[[nodiscard]] ColumnRole parse_column_role(std::string_view text);
 
-/// The row's number counts into the finding; its text is set once by the caller.
-void count(Finding& finding, const StandRow& row);
+struct CsvDialect {
+  char separator = 0;          ///< 0: the one of , ; tab that the header line has most of
+  bool decimal_comma = false;  ///< 1,5 is one and a half
+};
 
-/// The finding if it has rows.
-void append_if_any(std::vector<Finding>& findings, Finding finding);
+/// A table of any make with the given columns. Needs a thrust and a speed. Throws ConfigurationError (path:line) when a
+/// column is missing or there twice, its unit is unknown, not given, or another one in header and role. Skips and lists
+/// the lines whose thrust is not a number.
+[[nodiscard]] StandLog read_columns(std::string_view text, std::string path, const std::vector<ColumnRole>& columns,
+                                    const CsvDialect& dialect = {});
+
+/// A table of a Tyto/RCbenchmark stand (Series 1520, 1580/1585, 1780). Its columns have known names; their units differ
+/// between files. The file does not say which speed is right: the electrical one needs the motor's pole count. Throws
+/// as read_columns does; skips and lists a column in an unknown unit, unless it is the thrust or a speed.
+[[nodiscard]] StandLog read_rcbenchmark(std::string_view text, std::string path);
 
 }  // namespace kphi::fit

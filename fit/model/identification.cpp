@@ -83,13 +83,13 @@ OcclusionCoefficient coefficient(double phi_deg, std::vector<StepMean> steps, co
   return row;
 }
 
-/// Of "k at a speed" only the steps there; otherwise all of the fit, by its own weights.
+/// For "k at a speed" only the steps at that speed; otherwise all steps, with the weights of the fit.
 AngleScatter scatter_of(const OcclusionCoefficient& row, Estimator estimator, double at_speed) {
   if (estimator != Estimator::at_speed) {
     auto runs = sums_of_runs(row.phi_deg, row.measured, *row.fit, row.k);
     WithinRuns within = scatter_within_runs(row.measured, *row.fit, row.k, runs);
     if (estimator != Estimator::through_origin) {
-      // The other terms of the map are fitted too, and k takes part in their error.
+      // The other terms of the map are fitted too, and their errors are part of the error of k.
       within.variance = row.standard_error * row.standard_error * static_cast<double>(runs.size());
       within.freedom = static_cast<double>(row.fit->n) - (estimator == Estimator::with_offset ? 2 : 3);
     }
@@ -110,13 +110,13 @@ void require_one_propeller(std::span<const StepMean> steps) {
   if (steps.empty()) throw FitError("no steps: the table is empty");
   for (const StepMean& step : steps) {
     if (step.propeller != steps.front().propeller) {
-      throw FitError(fmt::format("steps of two propellers, '{}' and '{}'; fit each by itself", steps.front().propeller,
-                                 step.propeller));
+      throw FitError(fmt::format("steps of two propellers, \"{}\" and \"{}\"; fit each by itself",
+                                 steps.front().propeller, step.propeller));
     }
   }
 }
 
-/// A run that is not there was meant to be another.
+/// A missing run is probably a typing error.
 void require_runs(std::span<const StepMean> steps, const std::vector<LeftOutRun>& left_out) {
   for (const LeftOutRun& run : left_out) {
     const bool there = std::any_of(steps.begin(), steps.end(), [&](const StepMean& step) {
@@ -137,8 +137,8 @@ StepsByAngle by_angle_or_refuse(const StepSelection& selection) {
   StepsByAngle result = by_angle(selection.used);
   if (result.empty()) {
     throw FitError(
-        fmt::format("no step is left to fit: {} lie outside the speed range, {} are flagged; widen the "
-                    "range or repeat the runs",
+        fmt::format("no step left to fit: {} outside the speed range, {} flagged; widen the range or repeat the "
+                    "runs",
                     selection.outside_range, selection.flagged.size()));
   }
   return result;
@@ -245,7 +245,7 @@ Identification identify(std::span<const StepMean> steps, const IdentificationOpt
                                to_rpm(RadPerSec(*options.at_speed_rad_s))));
   }
   result.line = fit_line(line_points(result.table), options.line);
-  (void)result.curve();  // refuses what cannot fly
+  (void)result.curve();  // throws if it cannot fly
   return result;
 }
 
@@ -265,7 +265,7 @@ Identification identify_table(std::span<const LinePoint> points, const LineFitOp
   result.fitted = speed;
   result.speed_min_rad_s = speed.min_rad_s;
   result.speed_max_rad_s = speed.max_rad_s;
-  (void)result.curve();  // refuses what cannot fly
+  (void)result.curve();  // throws if it cannot fly
   return result;
 }
 

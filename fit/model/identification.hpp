@@ -1,4 +1,4 @@
-// Steps of one propeller → one k per occlusion → the line k(φ).
+// Steps of one propeller → one k per occlusion → the line k(φ). Read this first.
 #pragma once
 
 #include <optional>
@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "compensation/overlap_measure.hpp"
+#include "compensation/convex_polygon.hpp"
 #include "fit/model/line_fit.hpp"
 #include "fit/model/repeatability.hpp"
 #include "fit/model/step_selection.hpp"
@@ -21,7 +21,7 @@ struct AirDensity {
   double u_kg_m3 = 0;  ///< standard uncertainty, shared by all steps
 };
 
-/// Mean over the steps; nullopt if one of them lacks its air: kphi never assumes standard air.
+/// Mean over the steps; nullopt if one of them lacks its density: kphi never assumes standard air.
 [[nodiscard]] std::optional<AirDensity> air_of(std::span<const results::StepMean> steps);
 
 struct StandardCoefficient {
@@ -29,7 +29,7 @@ struct StandardCoefficient {
   double standard_error = 0;
 };
 
-/// k · 1.225/ρ; the error of the density joins that of k (JCGM 100, eq. 12).
+/// k · 1.225/ρ, with the errors of k and density combined (JCGM 100, eq. 12).
 [[nodiscard]] StandardCoefficient at_standard(double k, double standard_error, const AirDensity& air);
 
 /// Which k of an occlusion the line is drawn through.
@@ -50,46 +50,46 @@ struct IdentificationOptions {
   LineFitOptions line;
 };
 
-/// One row of the table: what was measured at one φ.
+/// One row of the table: the measurement at one φ.
 struct OcclusionCoefficient {
   double phi_deg = 0;
   double k = 0;  ///< N/(rad/s)², by the estimator
-  /// N/(rad/s)². Of several repetitions: noise, zero and scatter between runs (Repeatability), without what all k have
-  /// in common; of a single one: of the fit.
+  /// N/(rad/s)². Of several repetitions: noise, zero and scatter between runs (Repeatability), without the errors
+  /// common to all k; of a single one: of the fit.
   double standard_error = 0;
-  std::optional<StandardCoefficient> standard;  ///< none where the air is unknown
+  std::optional<StandardCoefficient> standard;  ///< nullopt if the air is unknown
   std::size_t steps = 0;                        ///< distinct levels
   std::size_t repetitions = 0;
-  std::optional<ThrustFit> fit;              ///< none in a table that came without steps
+  std::optional<ThrustFit> fit;              ///< nullopt in a table without steps
   std::vector<results::StepMean> measured;   ///< behind `fit`, one per point of it
-  std::optional<SpeedCoefficient> at_speed;  ///< none when no good step lies at that speed
+  std::optional<SpeedCoefficient> at_speed;  ///< nullopt without a good step at that speed
 };
 
 struct Identification {
   std::string propeller;
-  double diameter_in = 0;  ///< 0: not known
-  int blades = 0;          ///< 0: not known
-  /// In which measure φ is meant in flight. On the bench's sector plates all of them are the same angle.
+  double diameter_in = 0;  ///< 0: unknown
+  int blades = 0;          ///< 0: unknown
+  /// How φ is measured in flight. On the bench's sector plates all measures are the same angle.
   compensation::OverlapMeasure overlap = compensation::OverlapMeasure::rim_arc;
   std::vector<OcclusionCoefficient> table;  ///< ascending φ, the first is φ = 0
   LineFit line;
-  Repeatability repeatability;  ///< one angle per row of the table; empty in a table that came without steps
+  Repeatability repeatability;  ///< one angle per row of the table; empty in a table without steps
   StepSelection selection;
   std::vector<LeftOutRun> left_out;  ///< by hand
-  std::optional<AirDensity> air;     ///< of the steps used; none: unknown, and so is every k at standard density
+  std::optional<AirDensity> air;     ///< of the steps used; nullopt: unknown, and so is every k at standard density
   Estimator estimator = Estimator::through_origin;
   Weighting weighting = Weighting::equal;
   Loss loss = Loss::none;
   double at_speed_rad_s = 0;   ///< commanded level of "k at speed"; 0: none
   SpeedRange fitted{0, 0};     ///< lowest and highest level used at any φ
-  double speed_min_rad_s = 0;  ///< speeds that were measured at every φ: those the line vouches for
+  double speed_min_rad_s = 0;  ///< speeds measured at every φ: the valid range of the line
   double speed_max_rad_s = 0;
 
-  /// What flies, valid up to the widest occlusion measured.
+  /// The curve that flies, valid up to the widest occlusion measured.
   [[nodiscard]] compensation::ThrustCurve curve() const { return line.curve(table.back().phi_deg, overlap); }
 };
 
-/// Whether a range of speeds is known; it is not in a table that came without.
+/// Whether the range of speeds is known (a table of k may lack it).
 [[nodiscard]] bool speeds_known(const Identification& identification);
 
 /// Whether two speeds are the same level of a profile: they agree to 0.5 %.
@@ -112,7 +112,7 @@ struct Identification {
 [[nodiscard]] Identification identify(std::span<const results::StepMean> steps,
                                       const IdentificationOptions& options = {});
 
-/// The same from coefficients found elsewhere. `speed` is the range they hold for, as the caller says.
+/// The same from given coefficients. `speed` is their valid range.
 [[nodiscard]] Identification identify_table(std::span<const LinePoint> points, const LineFitOptions& options,
                                             const SpeedRange& speed);
 

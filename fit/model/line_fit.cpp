@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/error.hpp"
 #include "fit/numerics/least_squares.hpp"
+#include "fit/numerics/linear_regression.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -32,7 +34,7 @@ std::vector<LinePoint> sorted(std::span<const LinePoint> points) {
   std::sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.phi_deg < b.phi_deg; });
   for (std::size_t i = 0; i < result.size(); ++i) {
     if (!std::isfinite(result[i].phi_deg) || !std::isfinite(result[i].k))
-      throw FitError("line fit: an angle or a coefficient is no number");
+      throw FitError("line fit: an angle or a coefficient is not a number");
     if (i > 0 && result[i].phi_deg - result[i - 1].phi_deg < kSameAngleDeg)
       throw FitError(fmt::format("line fit: phi = {} deg is listed twice", result[i].phi_deg));
   }
@@ -45,7 +47,7 @@ const LinePoint& point_at(const std::vector<LinePoint>& points, double phi_deg) 
   std::vector<double> measured;
   for (const LinePoint& point : points) measured.push_back(point.phi_deg);
   throw FitError(
-      fmt::format("line fit: phi = {} deg was not measured; there are {} deg", phi_deg, fmt::join(measured, ", ")));
+      fmt::format("line fit: phi = {} deg was not measured; measured are {} deg", phi_deg, fmt::join(measured, ", ")));
 }
 
 std::vector<LinePoint> carriers(const std::vector<LinePoint>& points, const LineFitOptions& options) {
@@ -61,7 +63,7 @@ std::vector<LinePoint> carriers(const std::vector<LinePoint>& points, const Line
       std::count_if(used.begin(), used.end(), [](const auto& p) { return p.phi_deg > kSameAngleDeg; });
   if (used.size() < needed || occluded < 1) {
     throw FitError(
-        fmt::format("line fit: {} points carry the line, it needs {} with phi > 0; measure more occlusions{}",
+        fmt::format("line fit: {} points for the line, but it needs {} with phi > 0; measure more occlusions{}",
                     used.size(), needed, options.anchored ? "" : " or anchor the line at K_T"));
   }
   return used;
@@ -83,6 +85,13 @@ double slope_per_intercept(const std::vector<LinePoint>& points, const std::vect
     second += weight * points[i].phi_deg * points[i].phi_deg;
   }
   return -first / second;
+}
+
+/// Akaike's criterion for known variances, corrected for n observations (Hurvich, Tsai 1989).
+double corrected_aic(double chi_squared, double terms, double n) {
+  const double room = n - terms - 1;
+  if (room <= 0) return std::numeric_limits<double>::infinity();
+  return chi_squared + 2 * terms + 2 * terms * (terms + 1) / room;
 }
 
 }  // namespace
@@ -190,6 +199,43 @@ LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& option
                        {c[2] * k_scale * slope_unit * enlarge, c[3] * slope_unit * slope_unit * enlarge}}};
   }
   return fit;
+}
+
+Curvature curvature(std::span<const LinePoint> points, double freedom) {
+  Curvature result;
+  result.lack_of_fit.name = "lack of fit of the line k(phi)";
+  result.lack_of_fit.statistic = "F";
+  result.lack_of_fit.hypothesis = "k(phi) is a line";
+  result.quadratic.name = "third term of a parabola k(phi)";
+  result.quadratic.statistic = "F";
+  result.quadratic.hypothesis = result.lack_of_fit.hypothesis;
+  std::vector<double> phi, k, weights;
+  double scale = 0;
+  for (const LinePoint& point : points) scale = std::max(scale, point.phi_deg);
+  for (const LinePoint& point : points) {
+    if (!(point.standard_error > 0)) return result;
+    phi.push_back(point.phi_deg / scale);
+    k.push_back(point.k);
+    weights.push_back(1 / (point.standard_error * point.standard_error));
+  }
+  const double m = static_cast<double>(points.size());
+  if (m < 3) return result;
+  const double straight = regress_polynomial(phi, k, 0, 1, weights).weighted_squares;
+  const Regression parabola = regress_polynomial(phi, k, 0, 2, weights);
+  const auto finish = [](HypothesisTest& test, const HypothesisTest& found) {
+    test.value = found.value;
+    test.freedom = found.freedom;
+    test.error_freedom = found.error_freedom;
+    test.p = found.p;
+  };
+  finish(result.lack_of_fit, f_test(straight / (m - 2), m - 2, freedom));
+  finish(result.quadratic, f_test(straight - parabola.weighted_squares, 1, freedom));
+  result.second_order = parabola.estimates[2] / (scale * scale);
+  result.second_order_u = std::sqrt(parabola.covariance[2][2]) / (scale * scale);
+  const double observations = m + (std::isfinite(freedom) ? freedom : 0);
+  result.linear_aic = corrected_aic(straight, 2, observations);
+  result.quadratic_aic = corrected_aic(parabola.weighted_squares, 3, observations);
+  return result;
 }
 
 }  // namespace kphi::fit

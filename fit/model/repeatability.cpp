@@ -2,19 +2,35 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+
+#include "results/reduction/repetitions.hpp"
 
 namespace kphi::fit {
 namespace {
 
-double count(const AngleScatter& angle) { return static_cast<double>(angle.runs.size()); }
+double weight_of(const ThrustFit& fit, std::size_t i) { return fit.points[i].weight * fit.robust_weights[i]; }
 
-/// k of one run as a share of that of its φ, with the variance that its noise and its own zero explain.
-struct RunShare {
-  double k = 0, variance = 0;
+double shape(const ThrustFit& fit, double k, std::size_t i) {
+  return thrust(fit.parameters, fit.points[i].speed_rad_s) / k;
+}
+
+double zero_moved(std::span<const results::StepMean> steps, int repetition) {
+  results::ZeroDrift drift;
+  for (const results::StepMean& step : steps)
+    if (step.repetition == repetition) drift.add(step);
+  return drift.moved_n();
+}
+
+/// Residuals of one step index over the runs that have it.
+struct LevelResiduals {
+  double wx = 0, count = 0, sum = 0, squares = 0;
 };
 
-std::vector<RunShare> shares_of(const AngleScatter& angle) {
-  std::vector<RunShare> shares;
+double count(const AngleScatter& angle) { return static_cast<double>(angle.runs.size()); }
+
+std::vector<results::RunShare> shares_of(const AngleScatter& angle) {
+  std::vector<results::RunShare> shares;
   for (const RunSums& run : angle.runs) {
     const double zero = run.zero_moved_n / std::sqrt(12.0) * angle.zero_sensitivity;
     shares.push_back({run.k() / angle.k, (angle.within.variance + zero * zero) / (angle.k * angle.k)});
@@ -22,49 +38,71 @@ std::vector<RunShare> shares_of(const AngleScatter& angle) {
   return shares;
 }
 
-double freedom_of(const std::vector<std::vector<RunShare>>& angles) {
-  double freedom = 0;
-  for (const auto& runs : angles) freedom += runs.empty() ? 0 : static_cast<double>(runs.size() - 1);
-  return freedom;
-}
-
-/// χ² of the runs about the mean of their φ, were the variance from run to run larger by `beyond`.
-double chi_squared(const std::vector<std::vector<RunShare>>& angles, double beyond) {
-  double sum = 0;
-  for (const auto& runs : angles) {
-    const double n = static_cast<double>(runs.size());
-    if (n < 2) continue;
-    double mean = 0, variances = 0;
-    for (const RunShare& run : runs) {
-      mean += run.k / n;
-      variances += run.variance + beyond;
-    }
-    for (const RunShare& run : runs) {
-      const double variance = (run.variance + beyond) * (1 - 2 / n) + variances / (n * n);
-      sum += std::pow(run.k - mean, 2) / variance * (n - 1) / n;
-    }
-  }
-  return sum;
-}
-
-/// The variance from run to run at which χ² is what is to be expected (Mandel, Paule, Anal. Chem. 42 (1970) 1194).
-double scatter_beyond(const std::vector<std::vector<RunShare>>& angles) {
-  const double freedom = freedom_of(angles);
-  double low = 0, high = 1e-12;
-  if (chi_squared(angles, 1e-16) <= freedom) return 0;
-  while (chi_squared(angles, high) > freedom) high *= 4;
-  for (int i = 0; i < 40; ++i) {
-    const double middle = 0.5 * (low + high);
-    (chi_squared(angles, middle) > freedom ? low : high) = middle;
-  }
-  return high;
-}
-
 double between_u(const Repeatability& all, const AngleScatter& angle) {
   return all.between.u * std::abs(angle.k) / std::sqrt(std::max(1.0, count(angle)));
 }
 
 }  // namespace
+
+std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepMean> steps, const ThrustFit& fit,
+                                  double k) {
+  std::map<int, RunSums> runs;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    RunSums& run = runs[steps[i].repetition];
+    const double w = weight_of(fit, i), x = shape(fit, k, i);
+    run.xt += w * x * fit.points[i].thrust_n;
+    run.xx += w * x * x;
+    run.x += w * x;
+    ++run.steps;
+  }
+  std::vector<RunSums> result;
+  for (auto& [repetition, run] : runs) {
+    run.phi_deg = phi_deg;
+    run.repetition = repetition;
+    run.zero_moved_n = zero_moved(steps, repetition);
+    if (run.xx > 0) result.push_back(run);
+  }
+  return result;
+}
+
+WithinRuns scatter_within_runs(std::span<const results::StepMean> steps, const ThrustFit& fit, double k,
+                               std::span<const RunSums> runs) {
+  std::map<int, double> k_of;
+  double xx = 0;
+  for (const RunSums& run : runs) {
+    k_of[run.repetition] = run.k();
+    xx += run.xx / static_cast<double>(runs.size());
+  }
+  const bool repeated = runs.size() > 1;
+  std::map<int, LevelResiduals> levels;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    if (!k_of.contains(steps[i].repetition)) continue;
+    const double x = shape(fit, k, i);
+    const double residual = fit.points[i].thrust_n - k_of[steps[i].repetition] * x;
+    LevelResiduals& level = levels[steps[i].step];
+    level.wx += weight_of(fit, i) * x;
+    level.sum += residual;
+    level.squares += residual * residual;
+    ++level.count;
+  }
+  WithinRuns result;
+  double sum = 0, square_sum = 0, counted = 0;
+  for (const auto& [index, level] : levels) {
+    if (repeated && level.count < 2) continue;
+    const double variance =
+        repeated ? (level.squares - level.sum * level.sum / level.count) / (level.count - 1) : level.squares;
+    const double part = std::pow(level.wx / level.count, 2) * variance;
+    const double freedom = repeated ? level.count - 1 : 1;
+    sum += part;
+    square_sum += std::pow(std::pow(level.wx / level.count, 2), 2) / freedom;
+    counted += std::pow(level.wx / level.count, 2);
+  }
+  const double n = static_cast<double>(levels.size());
+  if (!(counted > 0) || n < 2) return result;
+  result.variance = sum / (xx * xx) * n / (n - 1);  // one k per run was fitted
+  result.freedom = counted * counted / square_sum * (n - 1) / n;
+  return result;
+}
 
 double AngleScatter::within_u() const {
   return runs.empty() ? 0 : std::sqrt(within.variance / static_cast<double>(runs.size()));
@@ -89,41 +127,21 @@ AngleScatter scatter_of_angle(double k, std::vector<RunSums> runs, const WithinR
 
 Repeatability repeatability(std::vector<AngleScatter> angles) {
   Repeatability result;
-  std::vector<std::vector<RunShare>> shares;
+  std::vector<std::vector<results::RunShare>> shares;
   for (const AngleScatter& angle : angles)
     if (angle.k != 0) shares.push_back(shares_of(angle));
-  const double freedom = freedom_of(shares);
+  const double freedom = results::freedom_between(shares);
   result.angles = std::move(angles);
   result.repeated = freedom > 0;
-  if (result.repeated) result.between = {0, std::sqrt(scatter_beyond(shares)), freedom};
+  if (result.repeated) result.between = {0, std::sqrt(results::variance_between(shares)), freedom};
   return result;
 }
 
-std::vector<OutlyingRun> outlying_runs(const Repeatability& all) {
-  std::vector<std::vector<RunShare>> angles;
-  std::size_t runs = 0;
-  for (const AngleScatter& angle : all.angles) {
-    angles.push_back(shares_of(angle));
-    if (angle.runs.size() > 1) runs += angle.runs.size();
-  }
+std::vector<OutlyingRun> outlying_runs(std::span<const results::StepMean> used) {
   std::vector<OutlyingRun> outlying;
-  for (std::size_t i = 0; i < angles.size(); ++i) {
-    for (std::size_t r = 0; r < angles[i].size() && angles[i].size() > 1; ++r) {
-      auto others = angles;
-      others[i].erase(others[i].begin() + static_cast<std::ptrdiff_t>(r));
-      const double freedom = freedom_of(others);
-      if (freedom < 2) continue;
-      const double beyond = scatter_beyond(others), n = static_cast<double>(others[i].size());
-      double mean = 0, variance = angles[i][r].variance + beyond;
-      for (const RunShare& other : others[i]) {
-        mean += other.k / n;
-        variance += (other.variance + beyond) / (n * n);
-      }
-      const HypothesisTest test = student_test({angles[i][r].k, std::sqrt(variance), freedom}, mean);
-      const double p = std::min(1.0, test.p * static_cast<double>(runs));
-      const RunSums& run = all.angles[i].runs[r];
-      if (p < kTestLevel) outlying.push_back({run.phi_deg, run.repetition, angles[i][r].k / mean - 1, p});
-    }
+  for (const results::RepetitionVerdict& verdict : results::judge_repetitions(used)) {
+    for (const results::RepetitionFigure& run : verdict.repetitions)
+      if (run.outlying) outlying.push_back({verdict.occlusion_deg, run.repetition, run.away, run.p});
   }
   return outlying;
 }

@@ -1,21 +1,51 @@
-// How well k repeats: noise within the runs, the zero's wandering, and what changes from run to run beyond the two
-// (mounting, air, bearing), pooled over all occlusions as a share of k, since three repetitions alone say little.
+// How well k repeats: noise within the runs, drift of the zero, and the scatter from run to run beyond the two
+// (mounting, air, bearing), pooled over all occlusions as a share of k, since three repetitions alone are too few.
 #pragma once
 
 #include <span>
 #include <vector>
 
-#include "fit/model/run_sums.hpp"
+#include "fit/model/thrust_fit.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
+#include "results/step_mean.hpp"
 
 namespace kphi::fit {
+
+struct RunSums {
+  double phi_deg = 0;
+  int repetition = 0;
+  double xt = 0;            ///< Σ w x T; x = ω², or the map's term in its place
+  double xx = 0;            ///< Σ w x²
+  double x = 0;             ///< Σ w x
+  double zero_moved_n = 0;  ///< drift of the zero over the run; 0: unknown
+  std::size_t steps = 0;
+
+  [[nodiscard]] double k() const { return xt / xx; }  ///< N/(rad/s)²
+};
+
+/// Scatter of the steps of one φ within their runs.
+struct WithinRuns {
+  double variance = 0;  ///< of the k of one run, (N/(rad/s)²)²
+  double freedom = 0;
+};
+
+/// One per repetition, ascending. `fit` was made of `steps`, one point each in the same order; x is its map divided by
+/// `k`.
+[[nodiscard]] std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepMean> steps,
+                                                const ThrustFit& fit, double k);
+
+/// From the interaction of step and repetition, which contains neither errors of whole runs nor of the map; from the
+/// residuals of a single run. Each step counts by its own scatter (MacKinnon, White 1985), since thrust scatters more
+/// where it is high.
+[[nodiscard]] WithinRuns scatter_within_runs(std::span<const results::StepMean> steps, const ThrustFit& fit, double k,
+                                             std::span<const RunSums> runs);
 
 /// Of one φ; standard uncertainties of the mean over its runs.
 struct AngleScatter {
   double k = 0;
   std::vector<RunSums> runs;
   WithinRuns within;            ///< of one run
-  double zero_u_n = 0;          ///< rectangular, half of how far each zero moved (JCGM 100, 4.3.7)
+  double zero_u_n = 0;          ///< rectangular, half of the drift of each zero (JCGM 100, 4.3.7)
   double zero_sensitivity = 0;  ///< of k per N
 
   [[nodiscard]] double within_u() const;  ///< N/(rad/s)²
@@ -25,27 +55,26 @@ struct AngleScatter {
 struct Repeatability {
   std::vector<AngleScatter> angles;
   Estimate between;       ///< u: standard deviation from run to run as a share of k, beyond noise and zero; value 0
-  bool repeated = false;  ///< at least one φ was measured more than once; otherwise `between` is not known
+  bool repeated = false;  ///< at least one φ was measured more than once; otherwise `between` is unknown
 
-  /// Of k at angle i by everything that is independent from φ to φ, N/(rad/s)².
+  /// Of k at angle i, from all errors that are independent from φ to φ, N/(rad/s)².
   [[nodiscard]] double independent_u(std::size_t i) const;
-  /// Degrees of freedom behind those uncertainties, all of which share `between`.
+  /// Degrees of freedom of those uncertainties, which share `between`.
   [[nodiscard]] double freedom() const;
 };
 
 [[nodiscard]] Repeatability repeatability(std::vector<AngleScatter> angles);
 
-/// A run further from the others of its φ than chance explains. It stays in k, and in what repetitions scatter.
+/// A run further from the others of its φ than chance explains. It stays in k and in the scatter of the repetitions.
 struct OutlyingRun {
   double phi_deg = 0;
   int repetition = 0;
-  double share = 0;  ///< its k / mean of the others − 1
-  double p = 1;      ///< of one of all runs so far off by chance
+  double share = 0;  ///< its k / k of the others − 1
+  double p = 1;      ///< that chance alone puts one of all runs this far off; NaN: too few runs, Hampel's identifier
 };
 
-/// Each run against the mean of the others of its φ, by Student's test with what all other runs scatter (pooled over
-/// φ, each with its own noise and zero), corrected for their number (Bonferroni); level 5 % for the campaign.
-[[nodiscard]] std::vector<OutlyingRun> outlying_runs(const Repeatability& all);
+/// The judge of the campaign, results::judge_repetitions(), on the steps of the fit.
+[[nodiscard]] std::vector<OutlyingRun> outlying_runs(std::span<const results::StepMean> used);
 
 [[nodiscard]] AngleScatter scatter_of_angle(double k, std::vector<RunSums> runs, const WithinRuns& within);
 

@@ -28,13 +28,13 @@ constexpr std::array<FlagWords, 32> kWords{{
     {QualityFlag::derated, "motor derated"},
     {QualityFlag::few_samples, "too few samples"},
     {QualityFlag::bad_status, "load cell reported an error"},
-    {QualityFlag::stream_restarted, "stream began anew"},
-    {QualityFlag::rebooted, "load cell's box started anew since the zero"},
+    {QualityFlag::stream_restarted, "stream restarted"},
+    {QualityFlag::rebooted, "load cell's box rebooted since the zero"},
     {QualityFlag::stalled, "load cell repeated its measurement"},
     {QualityFlag::silent, "load cell fell silent"},
-    {QualityFlag::box_trouble, "load cell's box saw its communication fail"},
+    {QualityFlag::box_trouble, "load cell's box reported failed communication"},
     {QualityFlag::taken_over, "another client took the stream"},
-    {QualityFlag::configuration_changed, "load cell's box was set otherwise"},
+    {QualityFlag::configuration_changed, "load cell's box settings changed"},
     {QualityFlag::zero_drifted, "load cell's zero drifted during the run"},
     {QualityFlag::zero_noisy, "load cell was not at rest at a zero"},
     {QualityFlag::drive_saturated, "motor drive saturated"},
@@ -52,13 +52,13 @@ constexpr std::array<FlagWords, 32> kWords{{
     {QualityFlag::drifted, "thrust drifted within the step"},
     {QualityFlag::lag_unknown, "lag of the thrust unknown"},
     {QualityFlag::frozen, "load cell or speed repeated one value"},
-    {QualityFlag::speed_glitch, "impossible speeds left out"},
+    {QualityFlag::speed_glitch, "impossible speeds skipped"},
 }};
 
 bool has(std::uint32_t flags, QualityFlag flag) { return (flags & static_cast<std::uint32_t>(flag)) != 0; }
 
-/// s/√n. Neighbouring samples are alike, so that this is a lower limit; as a weight only its course over the steps
-/// matters. 0: not known.
+/// s/√n. Neighbouring samples are correlated, so this is a lower limit; for weights only its ratio between steps
+/// matters. 0: unknown.
 double mean_uncertainty(double deviation, std::uint64_t n) {
   return n > 0 && deviation > 0 ? deviation / std::sqrt(static_cast<double>(n)) : 0;
 }
@@ -98,7 +98,7 @@ LeftOutRun parse_left_out_run(const std::string& text) {
 
 StepSelection select_steps(std::span<const results::StepMean> steps, const SpeedRange& range,
                            std::span<const LeftOutRun> left_out_runs) {
-  // Limits are typed in RPM and levels come through files: a level that is the limit must not fall out by rounding.
+  // Limits are typed in RPM and levels come from files: a level at the limit must not drop out by rounding.
   constexpr double kSlack = 1e-9;
   const bool single_repetitions =
       std::any_of(steps.begin(), steps.end(), [](const results::StepMean& step) { return step.repetition > 0; });
@@ -118,7 +118,7 @@ StepSelection select_steps(std::span<const results::StepMean> steps, const Speed
     const bool left_out = chosen || !measured || spoiled(step.quality_flags);
     if (left_out || step.quality_flags != 0) {
       std::string words = flags_in_words(step.quality_flags);
-      if (!measured) words += words.empty() ? "nothing measured" : ", nothing measured";
+      if (!measured) words += words.empty() ? "not measured" : ", not measured";
       if (chosen) words += (words.empty() ? "" : ", ") + ("by hand: " + by_hand->cause);
       selection.flagged.push_back({step, words, left_out});
     }

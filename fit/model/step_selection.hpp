@@ -1,4 +1,4 @@
-// Which steps enter a fit. A flagged step is left out, listed and given its reason; it never vanishes silently.
+// Which steps enter a fit. A flagged step is left out and listed with its reason.
 #pragma once
 
 #include <limits>
@@ -11,8 +11,8 @@
 
 namespace kphi::fit {
 
-/// Thrust below this speed is under the noise of the load cell: 100 RPM on a 5-inch propeller is 0.2 mN. Weighted in ω²
-/// such steps do no harm, but they widen the range for which the file vouches.
+/// Thrust below this speed is under the noise of the load cell: 100 RPM on a 5-inch propeller is 0.2 mN. In a fit on
+/// ω² such steps do no harm, but they would widen the range of speeds that the file states.
 inline constexpr double kSpeedMinRpm = 3000;
 
 struct SpeedRange {
@@ -20,7 +20,7 @@ struct SpeedRange {
   double max_rad_s = std::numeric_limits<double>::infinity();
 };
 
-/// A run that a person leaves out, for a cause.
+/// A run left out by hand, with the cause.
 struct LeftOutRun {
   double phi_deg = 0;
   int repetition = 0;
@@ -44,19 +44,18 @@ struct StepSelection {
 /// The level of a step: what was commanded, or, in imported tables without a command, what was measured. rad/s.
 [[nodiscard]] double level(const results::StepMean& step);
 
-/// The flags of a step in words, joined by ", "; empty when there is none.
+/// The flags of a step in words, joined by ", "; empty without flags.
 [[nodiscard]] std::string flags_in_words(std::uint32_t flags);
 
 /// Averages over repetitions (repetition 0) are dropped where single repetitions exist: they would count twice.
 /// A step is left out for a quality flag (results::kHarmlessFlags are listed only), which names a cause, and never for
-/// being far from the others: what repetitions scatter is their uncertainty (JCGM 100, 3.4.7 and 4.2). means.csv
-/// follows the same rule. Runs that a person leaves out are listed step by step, with the cause.
+/// being far from the others: the scatter of the repetitions is their uncertainty (JCGM 100, 3.4.7 and 4.2). means.csv
+/// follows the same rule. Runs left out by hand are listed step by step, with the cause.
 [[nodiscard]] StepSelection select_steps(std::span<const results::StepMean> steps, const SpeedRange& range,
                                          std::span<const LeftOutRun> left_out = {});
 
-/// The points of one fit. Where every step tells the uncertainty that its correlated samples leave, with the zero's,
-/// that is taken; where one does not, s/√n is taken of all: the two differ by a factor, and must not be mixed. Of the
-/// speed likewise.
+/// The points of one fit. Their uncertainty is the step's own (correlated samples, zero) if every step has it;
+/// otherwise s/√n for all, since the two differ by a factor and must not be mixed. The same for the speed.
 [[nodiscard]] std::vector<Point> points_of(std::span<const results::StepMean> steps);
 
 }  // namespace kphi::fit

@@ -38,7 +38,7 @@ std::vector<Point> points_in_range(std::span<const Point> points, const ThrustFi
     if (!std::isfinite(point.speed_rad_s) || !std::isfinite(point.thrust_n) || !(point.weight > 0) ||
         !std::isfinite(point.weight)) {
       throw FitError(
-          fmt::format("thrust fit: a point is no number or its weight is not positive (speed {} rad/s, "
+          fmt::format("thrust fit: a point is not a number or its weight is not positive (speed {} rad/s, "
                       "thrust {} N, weight {})",
                       point.speed_rad_s, point.thrust_n, point.weight));
     }
@@ -54,7 +54,7 @@ Scale scale_of(const std::vector<Point>& points) {
     scale.speed = std::max(scale.speed, std::abs(point.speed_rad_s));
     scale.thrust = std::max(scale.thrust, std::abs(point.thrust_n));
   }
-  if (scale.speed == 0) throw FitError("thrust fit: every point has speed 0; is the speed column the right one?");
+  if (scale.speed == 0) throw FitError("thrust fit: every point has speed 0; check the speed column");
   if (scale.thrust == 0) scale.thrust = 1;
   return scale;
 }
@@ -75,11 +75,11 @@ void require_distinct_speeds(const std::vector<Point>& points, std::size_t terms
   std::set<double> speeds;
   for (const Point& point : points) speeds.insert(point.speed_rad_s);
   if (speeds.size() >= terms) return;
-  throw FitError(fmt::format("thrust fit: {} distinct speeds cannot tell {} terms apart; measure at more speeds",
+  throw FitError(fmt::format("thrust fit: {} different speeds are too few for {} terms; measure at more speeds",
                              speeds.size(), terms));
 }
 
-/// Weights 1/u², scaled to a mean of 1, so that the rms stays one of thrust. `parameters`: for dT/dω; none: by T ~ ω².
+/// Weights 1/u², scaled to a mean of 1, so that the rms stays in N of thrust. `parameters`: for dT/dω; none: by T ~ ω².
 void weigh(std::vector<Point>& points, Weighting weighting, const ThrustParameters<double>* parameters) {
   double sum = 0;
   for (Point& point : points) {
@@ -89,7 +89,7 @@ void weigh(std::vector<Point>& points, Weighting weighting, const ThrustParamete
     const double variance = point.u_thrust_n * point.u_thrust_n + u_speed * u_speed;
     if (!(variance > 0) || !std::isfinite(variance)) {
       throw FitError(
-          "thrust fit: a step does not know its own uncertainty, so it cannot be weighted by it; fit with equal "
+          "thrust fit: a step without an uncertainty cannot be weighted by it; fit with equal "
           "weights");
     }
     point.weight = 1 / variance;
@@ -118,12 +118,12 @@ std::unique_ptr<ceres::LossFunction> loss_function(Loss loss, double sigma) {
   return nullptr;
 }
 
-/// Thrust and speed scaled to 1 at most; solved again and again, each time from where it stands.
+/// Thrust and speed scaled to at most 1; every solution starts from the last one.
 class Fitter {
  public:
   Fitter(const Scale& scale, std::size_t terms) : scale_(scale), terms_(terms) {}
 
-  /// With weights as they are now.
+  /// With their present weights.
   void take(const std::vector<Point>& points) {
     problem_ = std::make_unique<ceres::Problem>(problem_options());
     for (const Point& point : points) {
@@ -136,7 +136,7 @@ class Fitter {
     if (terms_ < 3) problem_->SetParameterBlockConstant(&linear_);
   }
 
-  /// The points taken last. A `coarse` solution is one to start from, and to take the scale of the next one from.
+  /// Solves for the points taken last. A `coarse` solution only gives the start and the scale of the next one.
   void solve(const std::vector<Point>& points, Loss loss, bool coarse = false) {
     std::vector<double> residuals;
     for (const Point& point : points) residuals.push_back(residual(point));
@@ -249,7 +249,7 @@ ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& opti
   const std::size_t terms = free_terms(options.form);
   if (fit.n < terms + 1) {
     throw FitError(
-        fmt::format("thrust fit: {} of {} points lie in the speed range, {} terms need at least {}; widen "
+        fmt::format("thrust fit: {} of {} points in the speed range, but {} terms need at least {}; widen "
                     "the range or measure more steps",
                     fit.n, points.size(), terms, terms + 1));
   }
@@ -279,7 +279,7 @@ ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& opti
 }
 
 SpeedCoefficient k_at_speed(std::span<const Point> points) {
-  if (points.empty()) throw FitError("k at a speed: no step was measured there; name a speed of the profile");
+  if (points.empty()) throw FitError("k at a speed: no step at that speed; name a speed of the profile");
   SpeedCoefficient result;
   result.repetitions = points.size();
   const double n = static_cast<double>(points.size());

@@ -13,9 +13,8 @@
 
 namespace kphi::fit {
 
-/// T = k ω² + linear ω + offset. The paper's model (equations 2 and 3) is k alone; maps of the flight community also
-/// come with three terms. Residuals, tests and figures all call thrust(). Scalar is double, or a Ceres Jet while
-/// fitting.
+/// T = k ω² + linear ω + offset. The paper's model (equations 2 and 3) is k alone; flight stacks also use all three
+/// terms. Scalar is double, or a Ceres Jet while fitting.
 template <class Scalar>
 struct ThrustParameters {
   Scalar k{};       ///< N/(rad/s)²
@@ -33,7 +32,7 @@ struct Point {
   double speed_rad_s = 0;
   double thrust_n = 0;
   double weight = 1;         ///< of the squared residual, > 0
-  double u_thrust_n = 0;     ///< standard uncertainty of the mean; 0: not known
+  double u_thrust_n = 0;     ///< standard uncertainty of the mean; 0: unknown
   double u_speed_rad_s = 0;  ///< the same
 };
 
@@ -44,20 +43,20 @@ enum class ThrustForm {
   three_terms,     ///< k, linear and offset
 };
 
-/// What the points weigh.
+/// Weights of the points.
 enum class Weighting : std::uint8_t {
   equal,               ///< as given
   thrust,              ///< by their own uncertainty of the thrust
-  effective_variance,  ///< u²(T) + (dT/dω)² u²(ω): errors in the speed count too (Orear 1982)
+  effective_variance,  ///< 1/(u²(T) + (dT/dω)² u²(ω)): with the errors of the speed (Orear 1982)
 };
 
-/// How much a point is believed that lies far off. Tuned to 95 % efficiency under normal errors, scaled by the median
-/// absolute deviation.
+/// Influence of a point far from the fit. Tuned to 95 % efficiency under normal errors, scaled by the median absolute
+/// deviation.
 enum class Loss : std::uint8_t {
   none,
-  huber,   ///< 1.345 σ: beyond, the influence stays
-  cauchy,  ///< 2.385 σ: it falls
-  tukey,   ///< 4.685 σ: beyond, it is nothing
+  huber,   ///< constant beyond 1.345 σ
+  cauchy,  ///< falls beyond 2.385 σ
+  tukey,   ///< zero beyond 4.685 σ
 };
 
 struct ThrustFitOptions {
@@ -70,8 +69,8 @@ struct ThrustFitOptions {
 
 struct ThrustFit {
   ThrustParameters<double> parameters;
-  /// Standard errors from Ceres' covariance times the residual variance Σ w r²/(n − p). They hold what scatters from
-  /// point to point, not what all points have in common (zero, calibration, air density).
+  /// Standard errors from Ceres' covariance times the residual variance Σ w r²/(n − p). They cover the
+  /// scatter from point to point, not errors common to all points (zero, calibration, air density).
   ThrustParameters<double> standard_error;
   /// Of k, linear, offset; 0 for terms that are not free. Of a robust fit: asymptotic (Huber 1981, 7.6).
   std::array<std::array<double, 3>, 3> covariance{};
@@ -81,18 +80,18 @@ struct ThrustFit {
   double speed_min_rad_s = 0;  ///< of the points used
   double speed_max_rad_s = 0;
   std::vector<Point> points;           ///< used, in the order given; weight as it was fitted with
-  std::vector<double> robust_weights;  ///< 1: believed, 0: ignored; one per point used
+  std::vector<double> robust_weights;  ///< 1: full weight, 0: ignored; one per point used
   std::vector<double> residuals_n;     ///< T − thrust(parameters, ω), one per point used
 };
 
-/// Below this robust weight a point is as good as rejected and belongs into a list.
+/// A point with a smaller robust weight counts as rejected and is listed.
 inline constexpr double kRejectedWeight = 0.25;
 
 /// Throws FitError when fewer points than free terms + 1 remain in the speed range, when a number is not finite, a
-/// weight not positive, an uncertainty missing that `weighting` wants, or when the points cannot tell the terms apart.
+/// weight not positive, an uncertainty missing that `weighting` needs, or the points too alike to fit all terms.
 [[nodiscard]] ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& options = {});
 
-/// k at one named speed, next to the k fitted over a range: on real propellers the two differ, k rises with speed.
+/// k at one speed. On real propellers it differs from the k of a range, since k rises with speed.
 struct SpeedCoefficient {
   double k = 0;  ///< mean of T/ω² over the repetitions, N/(rad/s)²
   /// s/√n of the repetitions; quiet NaN from one repetition.
@@ -101,7 +100,7 @@ struct SpeedCoefficient {
   std::size_t repetitions = 0;
 };
 
-/// `points`: one per repetition, all measured at the same commanded speed. Throws FitError when there is none or one
+/// `points`: one per repetition, all measured at the same commanded speed. Throws FitError without points or if one
 /// has no speed.
 [[nodiscard]] SpeedCoefficient k_at_speed(std::span<const Point> points);
 

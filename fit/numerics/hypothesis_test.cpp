@@ -11,7 +11,7 @@ namespace {
 using boost::math::cdf;
 using boost::math::complement;
 
-/// From here on Student's distribution is the normal one to more digits than anybody measures.
+/// From here on Student's distribution is the normal one to all digits that matter.
 constexpr double kManyDegrees = 1e6;
 
 double two_sided(double t, double freedom) {

@@ -6,12 +6,12 @@
 
 namespace kphi::fit {
 
-/// The level at which this folder speaks of evidence.
+/// Level of all tests.
 inline constexpr double kTestLevel = 0.05;
 
 struct HypothesisTest {
   std::string name;        ///< "lack of fit of T = k w^2 at phi = 45 deg"
-  std::string hypothesis;  ///< what would be true if nothing were found
+  std::string hypothesis;  ///< true unless the test rejects it
   std::string statistic;   ///< "F" or "t"
   double value = std::numeric_limits<double>::quiet_NaN();
   double freedom = 0;        ///< of t; of F's numerator
@@ -23,7 +23,7 @@ struct HypothesisTest {
   [[nodiscard]] bool rejected() const { return p < kTestLevel; }
 };
 
-/// A number with what is known of its error.
+/// A number with its uncertainty.
 struct Estimate {
   double value = 0;
   double u = 0;  ///< standard uncertainty

@@ -21,8 +21,8 @@ void solve_exactly(ceres::Problem& problem, const char* what, int iterations) {
   options.linear_solver_type = ceres::DENSE_QR;
   options.logging_type = ceres::SILENT;
   options.num_threads = 1;
-  // The problem is linear: an almost undamped first step lands on the minimum, the next polish the last digits. There
-  // the cost no longer falls, which Ceres would count as failure; so many steps are simply taken.
+  // The problem is linear: an almost undamped first step lands on the minimum, the next ones polish the last digits.
+  // There the cost no longer falls, which Ceres would count as failure, so the number of steps is fixed.
   options.initial_trust_region_radius = 1e16;
   options.max_trust_region_radius = 1e32;
   options.max_num_iterations = iterations;
@@ -58,7 +58,7 @@ std::vector<double> unit_covariance(ceres::Problem& problem, const std::vector<c
   ceres::Covariance covariance(options);
   std::vector<double> matrix(blocks.size() * blocks.size());
   if (!covariance.Compute(blocks, &problem) || !covariance.GetCovarianceMatrix(blocks, matrix.data())) {
-    throw FitError(fmt::format("{}: the points cannot tell the terms apart; measure at more speeds or angles", what));
+    throw FitError(fmt::format("{}: too few different speeds or angles to fit all terms; measure at more", what));
   }
   return matrix;
 }

@@ -25,7 +25,7 @@ Vector equilibrate(Matrix& design) {
   return lengths;
 }
 
-/// Σ a b as if in twice the precision: what a product and a sum round off is carried along (Ogita, Rump, Oishi 2005).
+/// Σ a b as if in twice the precision: the rounding errors are summed beside it (Ogita, Rump, Oishi 2005).
 Long accurate_dot(const Vector& a, const Vector& b) {
   Long sum = 0, lost = 0;
   for (Eigen::Index i = 0; i < a.size(); ++i) {
@@ -38,8 +38,8 @@ Long accurate_dot(const Vector& a, const Vector& b) {
   return sum + lost;
 }
 
-/// Where residuals are large, least squares lose twice the digits that solving an equation would. What is left of Xᵀr
-/// tells how far the minimum was missed.
+/// Where residuals are large, least squares lose twice as many digits as an equation would. Xᵀr shows how far the
+/// solution is from the minimum.
 template <class Upper>
 void refine(const Matrix& design, const Upper& upper, const Vector& y, Vector& beta) {
   for (int step = 0; step < 2; ++step) {
@@ -62,7 +62,8 @@ Regression solve(Matrix design, Vector y, const Vector& root_weights) {
   const auto upper = factor.template triangularView<Eigen::Upper>();
   constexpr Long kSingular = 1e-17L;
   for (Eigen::Index j = 0; j < design.cols(); ++j) {
-    if (std::abs(qr.matrixQR()(j, j)) < kSingular) throw FitError("regression: the rows cannot tell the terms apart");
+    if (std::abs(qr.matrixQR()(j, j)) < kSingular)
+      throw FitError("regression: too few different rows to fit all terms; measure more");
   }
   Vector beta = qr.solve(y);
   refine(design, upper, y, beta);

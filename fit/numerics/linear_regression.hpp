@@ -1,5 +1,5 @@
-// Linear least squares in closed form, to the last digits: QR of the equilibrated design matrix in extended precision,
-// one step of refinement. For whatever needs no iteration; the certified NIST problems are its test.
+// Linear least squares in closed form, to the last digits: QR of the equilibrated design matrix in extended precision
+// with refinement. Tested on the certified NIST problems.
 #pragma once
 
 #include <span>
@@ -18,7 +18,7 @@ struct Regression {
 };
 
 /// y ≈ X β. `rows` of the design, all as long as the first; `weights` of the squared residuals, empty: 1 each. Throws
-/// FitError for no more rows than there are terms less one, or terms that the rows cannot tell apart.
+/// FitError for fewer rows than terms, or rows too alike to fit all terms.
 [[nodiscard]] Regression regress(const std::vector<std::vector<double>>& rows, std::span<const double> y,
                                  std::span<const double> weights = {});
 

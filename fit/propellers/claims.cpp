@@ -1,12 +1,16 @@
 #include "fit/propellers/claims.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
+#include <set>
 
+#include "base/csv.hpp"
+#include "base/error.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::fit {
@@ -88,7 +92,7 @@ Claim judged(std::string id, std::string statement, std::string unit, const std:
   return claim;
 }
 
-/// A test that does not reject only says that nothing was found: the claim then holds as far as these data see.
+/// A test that does not reject is no proof: the claim then holds as far as these data show.
 Claim linear(const FamilyMember& member) {
   const HypothesisTest& test = member.analysis.curvature.lack_of_fit;
   const std::string& propeller = member.identification.propeller;
@@ -97,7 +101,7 @@ Claim linear(const FamilyMember& member) {
                                      propeller, kTestLevel),
                          "1", kTestLevel, 1);
   if (!test.tested()) return claim;
-  claim.value = test.p;  // which has no interval
+  claim.value = test.p;  // without an interval
   claim.verdict = test.rejected() ? Verdict::fails : Verdict::holds;
   return claim;
 }
@@ -106,7 +110,7 @@ std::optional<Estimate> share_of_thrust(const FamilyMember* member, double phi_d
   return ratio(k_of(member, phi_deg, Air::measured), k_of(member, 0, Air::measured));
 }
 
-/// The φ at which three blades keep least more of their thrust than two.
+/// The smallest lead over the φ in the share of thrust that three blades keep more than two.
 std::optional<Estimate> least_lead(const FamilyMember* three, const FamilyMember* two) {
   std::optional<Estimate> least;
   for (const double phi : {90.0, 180.0, 270.0}) {
@@ -145,11 +149,34 @@ std::optional<Estimate> growth_per_inch(Family family, Air air, int blades) {
     ++n;
     if (!mean) mean = Estimate{0, 0, one->freedom};
     mean->value += one->value;
-    mean->u += one->u;  // the bench's part is common: not averaged down
+    mean->u += one->u;  // the bench's errors are common and do not average out
     mean->freedom = std::min(mean->freedom, one->freedom);
   }
   if (mean) mean = Estimate{mean->value / n, mean->u / n, mean->freedom};
   return mean;
+}
+
+std::string between(double lower, double upper) {
+  return std::isfinite(lower) || std::isfinite(upper) ? fmt::format("{:.4g} to {:.4g}", lower, upper) : "-";
+}
+
+std::string claim_line(const Claim& claim) {
+  const bool tested = claim.verdict != Verdict::not_tested;
+  return fmt::format("{:<11} {:>12} {:>24} {:>24}  {:<9} {}\n", name_of(claim.verdict),
+                     tested ? fmt::format("{:.4g}", claim.value) : "-",
+                     tested ? between(claim.lower, claim.upper) : "-",
+                     between(claim.allowed_lower, claim.allowed_upper), claim.unit, claim.statement);
+}
+
+std::string slope_line(const SharedSlope& one) {
+  return fmt::format(
+      "{:g} inch: {:.5e} ± {:.1e} N/(rad/s)^2 per degree (95 %), shared by {}; equal slopes: p = {:.4f}\n",
+      one.diameter_in, one.slope.value, one.expanded(), fmt::join(one.propellers, ", "), one.equal_slopes.p);
+}
+
+std::string prediction_line(const FamilyPrediction& one) {
+  return fmt::format("{:g}x{} at {:g} deg: k = {:.4e} N/(rad/s)^2, 95 %: {:.3e} to {:.3e}\n", one.diameter_in,
+                     one.blades, one.phi_deg, one.k.value, one.lower, one.upper);
 }
 
 }  // namespace
@@ -181,6 +208,51 @@ std::vector<Claim> test_claims(std::span<const FamilyMember> family) {
                             growth, 0.85 * power, 1.15 * power));
   }
   return claims;
+}
+
+PropellerSize parse_propeller_size(const std::string& text) {
+  const std::size_t cross = text.find('x');
+  const auto diameter = parse_number(text.substr(0, cross));
+  const auto blades = cross == std::string::npos ? std::nullopt : parse_number(text.substr(cross + 1));
+  if (!diameter || !blades || !(*diameter > 0) || *blades < 1 || *blades > 12 || *blades != std::floor(*blades))
+    throw ConfigurationError("--predict " + text + ": expected DIAMETERxBLADES, in inches, such as 7x3");
+  return {*diameter, static_cast<int>(*blades)};
+}
+
+FamilyFindings findings_of(std::span<const FamilyMember> family, std::span<const PropellerSize> sizes) {
+  FamilyFindings findings{common_air(family), test_claims(family), shared_slopes(family), {}};
+  std::set<double> phis;
+  for (const FamilyMember& member : family)
+    for (const OcclusionCoefficient& row : member.identification.table) phis.insert(row.phi_deg);
+  for (const FamilyMember& member : family)
+    if (!sizes.empty() && !(member.identification.diameter_in > 0))
+      throw ConfigurationError("--predict: the diameter of " + member.identification.propeller +
+                               " is unknown; `kphi fit --diameter-in` writes it into the file");
+  for (const PropellerSize& size : sizes) {
+    for (const double phi : phis) {
+      const auto prediction = predict(family, size.diameter_in, size.blades, phi);
+      if (!prediction)
+        throw ConfigurationError(
+            "--predict: the rule k = D^4 (a + b blades + c phi) needs at least three propellers, with two blade "
+            "numbers among them");
+      findings.predictions.push_back(*prediction);
+    }
+  }
+  return findings;
+}
+
+std::string family_text(const FamilyFindings& findings) {
+  std::string text = fmt::format("{:<11} {:>12} {:>24} {:>24}  {:<9} {}\n", "verdict", "found", "95 %", "allowed",
+                                 "unit", "the paper's statement");
+  for (const Claim& claim : findings.claims) text += claim_line(claim);
+  text += findings.air == Air::standard
+              ? "\nPropellers are compared in standard air, 1.225 kg/m3.\n"
+              : "\nPropellers are compared in the air of their days: some densities are unknown.\n";
+  if (!findings.slopes.empty()) text += "\nOne slope for each diameter\n";
+  for (const SharedSlope& one : findings.slopes) text += slope_line(one);
+  if (!findings.predictions.empty()) text += "\nPrediction for propellers that were not measured\n";
+  for (const FamilyPrediction& one : findings.predictions) text += prediction_line(one);
+  return text;
 }
 
 }  // namespace kphi::fit

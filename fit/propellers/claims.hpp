@@ -1,4 +1,5 @@
-// The paper's statements across propellers as a table: claim, value found, interval, verdict.
+// Several propellers together: the paper's statements as a table (claim, value found, interval, verdict), slopes in
+// common, and what to expect of a propeller that was not measured.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,7 @@ enum class Verdict : std::uint8_t {
   holds,       ///< the whole 95 % interval lies within what the claim allows
   fails,       ///< the whole interval lies outside
   undecided,   ///< it reaches across the limit
-  not_tested,  ///< the data lack what the claim is about
+  not_tested,  ///< the data do not cover the claim
 };
 [[nodiscard]] const char* name_of(Verdict verdict);
 
@@ -30,9 +31,31 @@ struct Claim {
   Verdict verdict = Verdict::not_tested;
 };
 
-/// Every claim stands in the table, also those that these propellers cannot test. The paper gives no tolerances: those
-/// allowed here stand in the table, chosen so that its claims do not contradict each other (doubling per inch and both
-/// offsets cannot hold exactly together). Propellers are compared in standard air where the air of all is known.
+/// All claims, also those that these propellers cannot test. The paper gives no tolerances; those in the table are
+/// chosen so that its claims do not contradict each other (doubling per inch and both offsets cannot hold exactly
+/// together). Propellers are compared in standard air if the air of all is known.
 [[nodiscard]] std::vector<Claim> test_claims(std::span<const FamilyMember> family);
+
+/// A propeller to be predicted: "7x3" is 7 inches, three blades.
+struct PropellerSize {
+  double diameter_in = 0;
+  int blades = 0;
+};
+/// Throws ConfigurationError.
+[[nodiscard]] PropellerSize parse_propeller_size(const std::string& text);
+
+struct FamilyFindings {
+  Air air = Air::measured;  ///< in which propellers are compared
+  std::vector<Claim> claims;
+  std::vector<SharedSlope> slopes;
+  std::vector<FamilyPrediction> predictions;
+};
+
+/// Predictions of every size at every φ that a member was measured at, ascending. Throws ConfigurationError for sizes
+/// with fewer than three members.
+[[nodiscard]] FamilyFindings findings_of(std::span<const FamilyMember> family, std::span<const PropellerSize> sizes);
+
+/// Claim, value found, 95 % interval, verdict; then slopes and predictions.
+[[nodiscard]] std::string family_text(const FamilyFindings& findings);
 
 }  // namespace kphi::fit

@@ -1,6 +1,7 @@
 #include "fit/propellers/compare.hpp"
 
 #include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
 
 #include <algorithm>
 #include <cmath>
@@ -48,7 +49,7 @@ ComparedResult result_of(const compensation::Coefficients& file, const std::stri
       error_of(file.thrust_coefficient_error));
   for (std::size_t i = 0; i < file.table.size(); ++i) {
     const auto& row = file.table[i];
-    if (row.occlusion.value() <= 0) continue;  // that is K_T
+    if (row.occlusion.value() <= 0) continue;  // K_T
     add(coefficient_name(to_degrees(row.occlusion)), kUnit, row.k.value(),
         i < budgets.table.size() ? budgets.table[i] : std::nullopt, error_of(row.standard_error));
   }
@@ -95,7 +96,7 @@ Difference difference(const ComparedValue& a, const ComparedValue& b) {
   return result;
 }
 
-/// Holm: the smallest p against level/m, the next against level/(m − 1), until one stands.
+/// Holm: the smallest p against level/m, the next against level/(m − 1), until one is not rejected.
 void judge(std::vector<Difference>& differences) {
   std::vector<Difference*> judged;
   for (Difference& entry : differences)
@@ -122,17 +123,18 @@ Agreement verdict_of(const std::vector<Difference>& differences) {
 void remark(Comparison& comparison) {
   const ComparedResult &a = comparison.a, &b = comparison.b;
   const auto say = [&](std::string text) { comparison.remarks.push_back(std::move(text)); };
-  if (a.propeller != b.propeller) say(fmt::format("other propellers: {} and {}", a.propeller, b.propeller));
+  if (a.propeller != b.propeller) say(fmt::format("different propellers: {} and {}", a.propeller, b.propeller));
   const auto apart = [](double x, double y) { return std::abs(x - y) > 0.02 * std::max(x, y); };
   if (apart(a.speed_min_rad_s, b.speed_min_rad_s) || apart(a.speed_max_rad_s, b.speed_max_rad_s)) {
     const auto rpm = [](double speed) { return to_rpm(RadPerSec(speed)); };
-    say(fmt::format("other speeds: {:.0f} to {:.0f} and {:.0f} to {:.0f} RPM; k rises with speed on real propellers",
-                    rpm(a.speed_min_rad_s), rpm(a.speed_max_rad_s), rpm(b.speed_min_rad_s), rpm(b.speed_max_rad_s)));
+    say(fmt::format(
+        "different speeds: {:.0f} to {:.0f} and {:.0f} to {:.0f} RPM; on real propellers k rises with speed",
+        rpm(a.speed_min_rad_s), rpm(a.speed_max_rad_s), rpm(b.speed_min_rad_s), rpm(b.speed_max_rad_s)));
   }
   if (!a.air_density_kg_m3 || !b.air_density_kg_m3) {
-    say("air density unknown: a day's weather changes k by 3 %");
+    say("air density unknown: the weather changes k by up to 3 %");
   } else if (apart(*a.air_density_kg_m3, *b.air_density_kg_m3)) {
-    say(fmt::format("other air: {:.4g} and {:.4g} kg/m³; k scales with it", *a.air_density_kg_m3,
+    say(fmt::format("different air: {:.4g} and {:.4g} kg/m³; k is proportional to it", *a.air_density_kg_m3,
                     *b.air_density_kg_m3));
   }
 }
@@ -164,10 +166,12 @@ ComparedResult load_result(const std::string& path) {
   const fs::path steps = fs::is_directory(place) ? place / "steps.csv" : place;
   if (!fs::is_directory(place) && place.extension() == ".csv") return result_of_steps(path, path);
   if (fs::exists(coefficients)) return result_of(compensation::load_coefficients(coefficients.string()), path);
-  if (!fs::exists(steps)) throw ConfigurationError(path + ": holds neither coefficients.yaml nor steps.csv");
+  if (!fs::exists(steps))
+    throw ConfigurationError(
+        path + ": contains neither coefficients.yaml nor steps.csv; run `kphi fit` or name another folder");
   const auto table = results::read_steps(steps);
   if (std::any_of(table.begin(), table.end(), [](const auto& step) { return step.occlusion_deg > 0; }))
-    throw ConfigurationError(path + ": not fitted yet; `kphi fit " + path + "` comes first");
+    throw ConfigurationError(path + ": not fitted yet; run `kphi fit " + path + "` first");
   return result_of_steps(steps.string(), path);
 }
 
@@ -191,6 +195,35 @@ Comparison compare(ComparedResult a, ComparedResult b) {
   remark(comparison);
   remark_missing(comparison);
   return comparison;
+}
+
+TruthCheck check_against_truth(const ComparedResult& found, const std::string& truth) {
+  struct Limit {
+    const char* name;
+    double share;
+    double value;
+  };
+  std::vector<Limit> limits;
+  try {
+    const YAML::Node propeller = YAML::LoadFile(truth)["propellers"][found.propeller];
+    limits = {{"K_T", 0.005, propeller["K_T"].as<double>()},
+              {"slope", 0.02, propeller["line"]["slope_per_deg"].as<double>()}};
+  } catch (const YAML::Exception& error) {
+    throw ConfigurationError(
+        fmt::format("{}: no true coefficients of propeller \"{}\" ({})", truth, found.propeller, error.what()));
+  }
+  TruthCheck check{{}, true};
+  for (const Limit& limit : limits) {
+    const auto one = std::find_if(found.estimates.begin(), found.estimates.end(),
+                                  [&](const ComparedValue& value) { return value.name == limit.name; });
+    if (one == found.estimates.end())
+      throw ConfigurationError(fmt::format("{}: no {} to compare with the truth", found.name, limit.name));
+    const double share = one->value / limit.value - 1;
+    check.text += fmt::format("{:<6} found {:.6e}  true {:.6e} {:<24} {:+.3f} %\n", limit.name, one->value, limit.value,
+                              one->unit, 100 * share);
+    check.close = check.close && std::abs(share) <= limit.share;
+  }
+  return check;
 }
 
 const char* word(Agreement verdict) {
@@ -227,12 +260,12 @@ std::string comparison_table(const Comparison& comparison) {
   for (const std::string& line : comparison.remarks) text += "note  " + line + "\n";
   switch (comparison.verdict) {
     case Agreement::agree:
-      text += fmt::format(
-          "verdict  agree: chance explains every difference; what the data leave open is at most {:.2f} %\n",
-          100 * comparison.largest_open_share);
+      text +=
+          fmt::format("verdict  agree: chance explains every difference; a difference of up to {:.2f} % is possible\n",
+                      100 * comparison.largest_open_share);
       break;
     case Agreement::differ:
-      text += "verdict  differ: the differences marked * are larger than chance makes them (5 %, Holm)\n";
+      text += "verdict  differ: chance does not explain the differences marked * (5 %, Holm)\n";
       break;
     case Agreement::undecided:
       text += "verdict  undecided: no coefficient has a standard error in both\n";

@@ -1,4 +1,4 @@
-// Two results side by side: what differs, by how much, and whether chance explains it.
+// Two results side by side: their differences, and whether chance explains them.
 #pragma once
 
 #include <limits>
@@ -8,13 +8,13 @@
 
 namespace kphi::fit {
 
-/// One number of a result. Independent of the other result's; a standard error of 0 or NaN is not known.
+/// One number of a result, independent of the other result's; a standard error of 0 or NaN is unknown.
 struct ComparedValue {
   std::string name;  ///< "K_T", "slope", "k(45°)"
   std::string unit;
   double value = 0;
   double standard_error = 0;
-  /// Counts for the verdict. K_T and k(φ) do; the line is made of them and is shown only.
+  /// Counts for the verdict: K_T and k(φ). The line follows from them and is only shown.
   bool judged = true;
   double freedom = std::numeric_limits<double>::infinity();  ///< degrees of freedom behind the standard error
 };
@@ -28,10 +28,9 @@ struct ComparedResult {
   std::vector<ComparedValue> estimates;
 };
 
-/// Standard uncertainties are those of the file's `uncertainty` block where it has one (scatter from run to run and
-/// what the stand adds), else the standard errors of the fit.
-/// A coefficients.yaml, a campaign folder with one, or a folder or steps.csv without occlusions (K_T alone). Throws
-/// ConfigurationError, compensation::CoefficientError or FitError.
+/// A coefficients.yaml, a campaign folder with one, or a folder or steps.csv without occlusions (K_T alone). Standard
+/// uncertainties are those of the file's `uncertainty` block (scatter from run to run, errors of the stand), without it
+/// the standard errors of the fit. Throws ConfigurationError, compensation::CoefficientError or FitError.
 [[nodiscard]] ComparedResult load_result(const std::string& path);
 
 struct Difference {
@@ -39,8 +38,8 @@ struct Difference {
   std::string unit;
   double a = 0, b = 0;
   double difference = 0;                 ///< b − a
-  std::optional<double> standard_error;  ///< of it; none when one of the two is not known
-  std::optional<double> p;               ///< of a difference at least so large by chance (Student, Welch-Satterthwaite)
+  std::optional<double> standard_error;  ///< of it; nullopt if one of the two is unknown
+  std::optional<double> p;               ///< of a difference this large by chance (Student, Welch-Satterthwaite)
   double coverage = 0;                   ///< Student's factor for the 95 % interval
   bool judged = true;
   bool significant = false;  ///< after Holm's correction for the number of judged differences, level 5 %
@@ -51,18 +50,26 @@ enum class Agreement { agree, differ, undecided };
 
 struct Comparison {
   ComparedResult a, b;
-  std::vector<Difference> differences;  ///< of what both have
+  std::vector<Difference> differences;  ///< of the numbers that both have
   Agreement verdict = Agreement::undecided;
-  std::vector<std::string>
-      remarks;  ///< what makes the two unlike besides: other propeller, speeds, air; missing angles
-  /// The largest |difference| / a that a judged quantity leaves open at 95 %: "they agree" to within this.
+  std::vector<std::string> remarks;  ///< other propeller, speeds, air; missing angles
+  /// The largest |difference| / a of a judged quantity that is possible at 95 %: they agree to within this.
   double largest_open_share = 0;
   /// K_T of b over a against (D_b/D_a)⁴, where the diameters differ.
   std::optional<double> diameter_ratio4;
 };
 
-/// Undecided when no judged quantity has both errors known.
+/// Undecided unless a judged quantity has both errors.
 [[nodiscard]] Comparison compare(ComparedResult a, ComparedResult b);
+
+/// A result beside the truth of the simulated bench.
+struct TruthCheck {
+  std::string text;    ///< "K_T    found …  true …  +0.007 %", one line per number
+  bool close = false;  ///< K_T within 0.5 %, the slope within 2 %
+};
+
+/// `truth`: file of `kphi sim --truth`. Throws ConfigurationError for a file without the propeller of `found`.
+[[nodiscard]] TruthCheck check_against_truth(const ComparedResult& found, const std::string& truth);
 
 [[nodiscard]] const char* word(Agreement verdict);
 [[nodiscard]] std::string comparison_table(const Comparison& comparison);

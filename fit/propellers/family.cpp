@@ -16,7 +16,7 @@ struct Row {
   Estimate k;
 };
 
-/// From the air of its day into the common one.
+/// From the air of its day to the common air.
 double scale_of(const Identification& one, Air air) {
   return air == Air::standard && one.air ? kStandardDensity / one.air->kg_m3 : 1;
 }
@@ -40,7 +40,7 @@ double freedom_of(std::span<const FamilyMember* const> members) {
   return sum;
 }
 
-/// Of what is the same in all coefficients of a campaign; the largest of the members.
+/// From the errors common to all coefficients of a campaign; the largest of the members.
 double common_u_of_slope(std::span<const FamilyMember* const> members) {
   double largest = 0;
   for (const FamilyMember* member : members) {
@@ -135,7 +135,7 @@ std::optional<FamilyPrediction> predict(std::span<const FamilyMember> family, do
   const double freedom = static_cast<double>(family.size()) - (by_blades ? 2 : 1);
   if (freedom < 1 || family.size() < 3) return std::nullopt;
   const Regression fit = regress(design, reduced);
-  // Points of one propeller miss the rule together: what counts is how far each propeller does.
+  // Points of one propeller deviate from the rule together, so each propeller counts once.
   std::vector<double> squares(family.size()), counts(family.size());
   for (std::size_t i = 0; i < owner.size(); ++i) {
     squares[owner[i]] += fit.residuals[i] * fit.residuals[i];

@@ -3,33 +3,46 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <map>
 
 #include "base/number.hpp"
+#include "base/statistics.hpp"
 #include "compensation/units.hpp"
-#include "fit/coefficients/coefficients.hpp"
-#include "fit/model/power.hpp"
-#include "fit/report/gnuplot.hpp"
-#include "results/file_layer.hpp"
+#include "fit/model/torque_power.hpp"
 
 namespace kphi::fit {
 namespace {
 
+using Curves = std::vector<std::string>;
 
-constexpr std::array<Mark, 7> kMarks{{{"#0072B2", 7},
-                                      {"#D55E00", 5},
-                                      {"#009E73", 9},
-                                      {"#CC79A7", 13},
-                                      {"#E69F00", 11},
-                                      {"#56B4E9", 15},
-                                      {"#444444", 6}}};
+double rpm(double speed_rad_s) { return to_rpm(RadPerSec(speed_rad_s)); }
 
-double mean(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double value : values) sum += value;
-  return values.empty() ? 0 : sum / static_cast<double>(values.size());
+std::string cell(double value) { return shortest(value); }
+std::string cell(int value) { return fmt::format("{}", value); }
+std::string cell(const std::string& text) { return text; }
+
+template <class... Cells>
+std::string csv_row(const Cells&... cells) {
+  std::string row = (("," + cell(cells)) + ...) + "\n";
+  return row.substr(1);
 }
+
+std::string symmetric_axis(double reach) {
+  return fmt::format("set yrange [{:.6g}:{:.6g}]\nset xzeroaxis lt 1 lc rgb '#999999'\n", -reach, reach);
+}
+
+/// Half of a symmetric axis: the largest |value| without the outliers, rounded up to a tick.
+double axis_reach(std::vector<double> values, double least) {
+  for (double& value : values) value = std::abs(value);
+  std::sort(values.begin(), values.end());
+  const double most = values.empty() ? least : values[values.size() - 1 - values.size() / 50];
+  const double reach = std::max(least, 1.25 * most);
+  const double unit = std::pow(10, std::floor(std::log10(reach)));
+  return unit * std::ceil(reach / unit * 2) / 2;
+}
+
+// ---- the paper's figure ------------------------------------------------------------------------------------
 
 /// Highest share in the figure, with room for its box.
 double share_top(const Identification& identification, const std::vector<ThrustShares>& shares) {
@@ -40,7 +53,7 @@ double share_top(const Identification& identification, const std::vector<ThrustS
   return 10 * std::ceil((top + 3) / 10);
 }
 
-/// 0, or lower where samples are: near no thrust at all their noise reaches below.
+/// 0, or lower where samples are: near zero thrust their noise reaches below.
 double share_bottom(const std::vector<ThrustShares>& shares) {
   double bottom = 0;
   for (const auto& entry : shares)
@@ -59,63 +72,259 @@ std::string curve_rows(const compensation::ThrustCurve& curve, double from_deg, 
   return rows;
 }
 
-std::string coefficient_rows(const Identification& identification) {
-  std::string rows;
-  for (const auto& row : identification.table)
-    rows += fmt::format("{:.6g} {:.8g} {:.8g}\n", row.phi_deg, row.k * 1e6, 2 * row.standard_error * 1e6);
-  return rows;
-}
-
-std::string angle_tics(const Identification& identification) {
+std::string share_axes(const Identification& identification, const std::vector<ThrustShares>& shares) {
+  const auto& table = identification.table;
+  const double bottom = share_bottom(shares), top = share_top(identification, shares), K_T = identification.line.K_T;
+  double gap = 60;  // boxes are as wide as the angles allow without touching
   std::string tics;
-  for (const auto& row : identification.table)
-    tics += fmt::format("{}'{}°' {}", tics.empty() ? "" : ", ", shortest(row.phi_deg), shortest(row.phi_deg));
-  return tics;
-}
-
-/// Boxes as wide as the angles allow without touching.
-double box_width(const Identification& identification) {
-  double gap = 60;
-  for (std::size_t i = 1; i < identification.table.size(); ++i)
-    gap = std::min(gap, identification.table[i].phi_deg - identification.table[i - 1].phi_deg);
-  return 0.4 * gap;
-}
-
-std::string axes(const Identification& identification, double bottom, double top) {
-  const double width = box_width(identification);
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    if (i > 0) gap = std::min(gap, table[i].phi_deg - table[i - 1].phi_deg);
+    tics += fmt::format("{}'{}°' {}", i == 0 ? "" : ", ", cell(table[i].phi_deg), cell(table[i].phi_deg));
+  }
+  const double width = 0.4 * gap;
   return fmt::format(
-      "set xrange [{:.6g}:{:.6g}]\nset yrange [{:.6g}:{:.6g}]\nset y2range [{:.8g}:{:.8g}]\n"
+      "set border 11\nset xrange [{:.6g}:{:.6g}]\nset yrange [{:.6g}:{:.6g}]\nset y2range [{:.8g}:{:.8g}]\n"
       "set xtics ({})\nset ytics 20\nset y2tics\nset boxwidth {:.6g} absolute\n"
       "set xlabel 'angle of the occlusion φ'\nset ylabel 'thrust, % of the thrust at φ = 0'\n"
       "set y2label 'k(φ), 10⁻⁶ N/(rad/s)²'\n"
       "set key top right samplen 2 spacing 1.2\n"
       "set style fill solid 0.45 border lc rgb '#3b6ea5'\n"
       "set style boxplot range 1.5 outliers pointtype 7\nset pointsize 0.3\n",
-      identification.table.front().phi_deg - 1.2 * width, identification.table.back().phi_deg + 1.2 * width, bottom,
-      top, bottom / 100 * identification.line.K_T * 1e6, top / 100 * identification.line.K_T * 1e6,
-      angle_tics(identification), width);
+      table.front().phi_deg - 1.2 * width, table.back().phi_deg + 1.2 * width, bottom, top, bottom / 100 * K_T * 1e6,
+      top / 100 * K_T * 1e6, tics, width);
 }
 
-std::string box_plots(const std::vector<ThrustShares>& shares) {
-  std::string parts;
+Figure share_figure(const Identification& identification, const std::vector<ThrustShares>& shares) {
+  const LineFit& line = identification.line;
+  const compensation::ThrustCurve curve = identification.curve();
+  const bool at = identification.at_speed_rad_s > 0;
+  Figure figure{
+      "thrust_share",
+      fmt::format("Thrust in percent of the thrust without occlusion (boxes, left axis{}) and the coefficient "
+                  "k(φ) over all speeds (right axis, bars and band: two standard errors). The line is solid "
+                  "between the measured occlusions and dashed below them.",
+                  at ? fmt::format(", at {:.0f} RPM", rpm(identification.at_speed_rad_s)) : ""),
+      {},
+      "kind,phi_deg,value,standard_error\n"};
+  Curves curves{
+      "$line using 1:3:4 axes x1y2 with filledcurves fs transparent solid 0.2 noborder lc rgb '#D55E00' notitle"};
+  std::string data, coefficients;
   for (std::size_t i = 0; i < shares.size(); ++i) {
-    if (shares[i].percent.empty()) continue;
-    parts += fmt::format("  $share{} using ({}):1 with boxplot lc rgb '#3b6ea5' fillcolor rgb '#a9c6e6' {}, \\\n", i,
-                         shortest(shares[i].phi_deg), parts.empty() ? "title 'thrust'" : "notitle");
+    std::string rows;
+    for (const double percent : shares[i].percent) {
+      rows += fmt::format("{:.6g}\n", percent);
+      figure.csv += csv_row(std::string("thrust_percent"), shares[i].phi_deg, percent, std::string());
+    }
+    if (rows.empty()) continue;
+    data += data_block(fmt::format("share{}", i), rows);
+    curves.push_back(fmt::format("$share{} using ({}):1 with boxplot lc rgb '#3b6ea5' fillcolor rgb '#a9c6e6' {}", i,
+                                 cell(shares[i].phi_deg), curves.size() == 1 ? "title 'thrust'" : "notitle"));
   }
-  return parts;
+  for (const auto& row : identification.table) {
+    figure.csv += csv_row(std::string("k_n_s2_per_rad2"), row.phi_deg, row.k, row.standard_error);
+    coefficients += fmt::format("{:.6g} {:.8g} {:.8g}\n", row.phi_deg, row.k * 1e6, 2 * row.standard_error * 1e6);
+  }
+  const double first = line.points.front().phi_deg, last = line.points.back().phi_deg;
+  data += data_block("line", curve_rows(curve, first, std::max(last, first + 1e-3))) +
+          data_block("before", curve_rows(curve, 0, first)) + data_block("k", coefficients);
+  curves.insert(
+      curves.end(),
+      {"$before using 1:2 axes x1y2 with lines dt 2 lw 1.5 lc rgb '#D55E00' notitle",
+       "$line using 1:2 axes x1y2 with lines lw 2.5 lc rgb '#D55E00' title 'line k(φ)'",
+       "$k using 1:2:3 axes x1y2 with yerrorbars pt 7 ps 0.6 lw 1.4 lc rgb '#222222' title 'k of each occlusion'"});
+  figure.script = figure_head() + data + share_axes(identification, shares) + plot(curves);
+  return figure;
 }
 
-bool write_and_draw(const Figure& figure, const std::filesystem::path& folder, const std::string& gnuplot,
-                    Figures& figures) {
-  results::MemoryOnlySync files;  // drawn again at any time from steps.csv
-  results::write_text(folder / (figure.name + ".gp"), figure.script, files);
-  results::write_text(folder / (figure.name + ".csv"), figure.csv, files);
-  const std::filesystem::path svg = folder / (figure.name + ".svg");
-  const GnuplotOutcome outcome = draw(folder / (figure.name + ".gp"), svg, gnuplot);
-  if (outcome.drawn) figures.drawn.push_back({figure.caption, svg});
-  if (!outcome.drawn) figures.skipped = outcome.reason;
-  return outcome.drawn;
+// ---- how well the model holds ------------------------------------------------------------------------------
+
+/// Thrust over squared speed at every φ, with the fits, and below it the residuals.
+Figure thrust_figure(const Identification& identification) {
+  Figure figure{"thrust_over_speed",
+                "Thrust over squared speed with the fits T = k ω², one colour per occlusion, and the residuals below. "
+                "Residuals that curve with speed come from the model, not from noise. Steps left out are not shown.",
+                {},
+                "phi_deg,speed_rad_s,thrust_n,fitted_n\n"};
+  std::string data;
+  Curves fits, residual_plots;
+  std::vector<double> residuals;
+  for (std::size_t i = 0; i < identification.table.size(); ++i) {
+    const OcclusionCoefficient& row = identification.table[i];
+    const ThrustFit& fit = *row.fit;
+    std::string points;
+    for (const Point& point : fit.points) {
+      const double fitted = thrust(fit.parameters, point.speed_rad_s);
+      residuals.push_back(1e3 * (point.thrust_n - fitted));
+      points += fmt::format("{:.8g} {:.8g} {:.8g}\n", point.speed_rad_s * point.speed_rad_s * 1e-6, point.thrust_n,
+                            residuals.back());
+      figure.csv += csv_row(row.phi_deg, point.speed_rad_s, point.thrust_n, fitted);
+    }
+    const double end = fit.speed_max_rad_s;
+    const auto [colour, shape] = mark(i);
+    data += data_block(fmt::format("points{}", i), points);
+    data += data_block(fmt::format("fit{}", i), fmt::format("0 {:.8g}\n{:.8g} {:.8g}\n", fit.parameters.offset,
+                                                            end * end * 1e-6, thrust(fit.parameters, end)));
+    fits.push_back(fmt::format("$fit{} using 1:2 with lines lw 1.6 lc rgb '{}' notitle", i, colour));
+    fits.push_back(fmt::format("$points{} using 1:2 with points pt {} ps 0.45 lc rgb '{}' title 'φ = {}°'", i, shape,
+                               colour, cell(row.phi_deg)));
+    residual_plots.push_back(
+        fmt::format("$points{} using 1:3 with points pt {} ps 0.4 lc rgb '{}' notitle", i, shape, colour));
+  }
+  figure.script = figure_head(640) + data +
+                  "set multiplot\nset lmargin at screen 0.1\nset rmargin at screen 0.97\n"
+                  "set tmargin at screen 0.97\nset bmargin at screen 0.40\n"
+                  "set xrange [0:*]\nset yrange [*<0:*]\nset format x ''\nset ylabel 'thrust T, N'\n"
+                  "set key top left samplen 1 spacing 1.2\n" +
+                  plot(fits) +
+                  "set tmargin at screen 0.36\nset bmargin at screen 0.11\nset format x '%g'\n"
+                  "set xlabel 'ω², 10⁶ (rad/s)²'\nset ylabel 'T − k ω², mN'\nunset key\n" +
+                  symmetric_axis(axis_reach(residuals, 1)) + plot(residual_plots) + "unset multiplot\n";
+  return figure;
+}
+
+/// T/ω² of each level against the k of the range, in percent.
+Figure speed_figure(const Identification& identification) {
+  Figure figure{"k_over_speed",
+                "k at each speed relative to the k fitted over all of them (mean and standard error of the "
+                "repetitions). Flat lines support T = k ω²; a slope means that k depends on speed.",
+                {},
+                "phi_deg,speed_rpm,k_n_s2_per_rad2,standard_error,percent_of_fitted\n"};
+  std::string data;
+  Curves curves;
+  std::vector<double> deviations;
+  for (std::size_t i = 0; i < identification.table.size(); ++i) {
+    const OcclusionCoefficient& row = identification.table[i];
+    std::map<double, std::vector<double>> levels;  // by commanded speed
+    for (const results::StepMean& step : identification.selection.used)
+      if (step.occlusion_deg == row.phi_deg && step.speed_rad_s > 0)
+        levels[level(step)].push_back(step.thrust_n / (step.speed_rad_s * step.speed_rad_s));
+    std::string rows;
+    for (const auto& [at, ks] : levels) {
+      const double k = mean(ks);
+      const double error = ks.size() > 1 ? std::sqrt(variance(ks) / static_cast<double>(ks.size())) : 0;
+      deviations.push_back(100 * (k / row.k - 1));
+      rows += fmt::format("{:.6g} {:.6g} {:.6g}\n", rpm(at), deviations.back(), 100 * error / row.k);
+      figure.csv += csv_row(row.phi_deg, rpm(at), k, error, deviations.back());
+    }
+    const auto [colour, shape] = mark(i);
+    data += data_block(fmt::format("k{}", i), rows);
+    curves.push_back(fmt::format("$k{} using 1:2:3 with yerrorbars pt {} ps 0.5 lw 0.8 lc rgb '{}' title 'φ = {}°'", i,
+                                 shape, colour, cell(row.phi_deg)));
+    curves.push_back(fmt::format("$k{} using 1:2 with lines lw 1 lc rgb '{}' notitle", i, colour));
+  }
+  figure.script = figure_head() + data + symmetric_axis(axis_reach(deviations, 1)) +
+                  "set xlabel 'speed, RPM'\nset ylabel 'k at one speed relative to k of the range, %'\n"
+                  "set key bottom right horizontal samplen 1 spacing 1.2\n" +
+                  plot(curves);
+  return figure;
+}
+
+/// k of each repetition against that of its occlusion, in percent, with two standard errors.
+Figure repetition_figure(const Identification& identification) {
+  Figure figure{"repetitions",
+                "k of each repetition relative to the k of its occlusion, with two standard errors of its own steps. "
+                "Repetitions further apart than their bars mean that something changed between the runs.",
+                {},
+                "phi_deg,repetition,k_n_s2_per_rad2,standard_error,percent_of_all\n"};
+  std::map<int, std::string> series;
+  std::string tics, data;
+  for (std::size_t i = 0; i < identification.table.size(); ++i) {
+    const OcclusionCoefficient& row = identification.table[i];
+    tics += fmt::format("{}'{}°' {}", tics.empty() ? "" : ", ", cell(row.phi_deg), i);
+    std::map<int, std::vector<Point>> runs;
+    for (const results::StepMean& step : identification.selection.used)
+      if (step.occlusion_deg == row.phi_deg) runs[step.repetition].push_back({step.speed_rad_s, step.thrust_n, 1});
+    for (const auto& [repetition, points] : runs) {
+      if (points.size() < 2) continue;
+      const ThrustFit fit = fit_thrust(points);
+      const double percent = 100 * (fit.parameters.k / row.k - 1);
+      const double dodge = 0.14 * (repetition - (1.0 + static_cast<double>(runs.rbegin()->first)) / 2);
+      series[repetition] += fmt::format("{:.4g} {:.6g} {:.6g}\n", static_cast<double>(i) + dodge, percent,
+                                        200 * fit.standard_error.k / row.k);
+      figure.csv += csv_row(row.phi_deg, repetition, fit.parameters.k, fit.standard_error.k, percent);
+    }
+  }
+  Curves curves;
+  for (const auto& [repetition, rows] : series) {
+    const auto [colour, shape] = mark(static_cast<std::size_t>(repetition));
+    data += data_block(fmt::format("repetition{}", repetition), rows);
+    curves.push_back(
+        fmt::format("$repetition{} using 1:2:3 with yerrorbars pt {} ps 0.8 lw 1.2 lc rgb '{}' title 'repetition {}'",
+                    repetition, shape, colour, repetition));
+  }
+  figure.script = figure_head(400) + data +
+                  fmt::format("set xrange [-0.6:{}]\nset xtics ({})\nset xzeroaxis lt 1 lc rgb '#999999'\n",
+                              static_cast<double>(identification.table.size()) - 0.4, tics) +
+                  "set offsets 0, 0, graph 0.1, graph 0.1\n"
+                  "set xlabel 'angle of the occlusion φ'\nset ylabel 'k of one run relative to all, %'\n"
+                  "set key outside top center horizontal samplen 1\n" +
+                  plot(curves);
+  return figure;
+}
+
+/// Thrust per electrical power over the thrust, one curve per φ; without steps whose power was not measured.
+Figure power_figure(const Identification& identification) {
+  Figure figure{"power",
+                "Grams of thrust per watt over the thrust, one colour per occlusion, mean of the repetitions.",
+                {},
+                "phi_deg,step,speed_rpm,thrust_n,power_w,gram_per_watt\n"};
+  std::map<double, std::string> by_angle;
+  for (const StepPower& row : power_of(identification.selection.used)) {
+    by_angle[row.phi_deg] += fmt::format("{:.8g} {:.6g}\n", row.thrust_n, row.gram_per_watt());
+    figure.csv +=
+        csv_row(row.phi_deg, row.step + 1, rpm(row.speed_rad_s), row.thrust_n, row.power_w, row.gram_per_watt());
+  }
+  std::string data;
+  Curves curves;
+  for (const auto& [phi_deg, rows] : by_angle) {
+    const std::size_t i = curves.size();
+    data += data_block(fmt::format("power{}", i), rows);
+    curves.push_back(fmt::format("$power{} using 1:2 with linespoints pt {} ps 0.5 lw 1.2 lc rgb '{}' title 'φ = {}°'",
+                                 i, mark(i).shape, mark(i).colour, cell(phi_deg)));
+  }
+  figure.script = figure_head(400) + data +
+                  "set xrange [0:*]\nset yrange [0:*]\nset xlabel 'thrust, N'\nset ylabel 'thrust per power, g/W'\n"
+                  "set key top right samplen 1 spacing 1.2\n" +
+                  plot(curves);
+  return figure;
+}
+
+Figure settling_figure(const Settling& settling) {
+  Figure figure{"settling",
+                fmt::format("Response of {} to one speed command: how the speed reaches {:.0f} RPM and the thrust "
+                            "follows. The grey span was averaged; everything before it was discarded.",
+                            settling.run, rpm(settling.commanded_rad_s)),
+                {},
+                "kind,time_s,value\n"};
+  std::string speed, thrust;
+  for (const Settling::Sample& sample : settling.speed_rad_s) {
+    speed += fmt::format("{:.5g} {:.8g}\n", sample.time_s, rpm(sample.value));
+    figure.csv += csv_row(std::string("speed_rad_s"), sample.time_s, sample.value);
+  }
+  for (const Settling::Sample& sample : settling.thrust_n) {
+    thrust += fmt::format("{:.5g} {:.8g}\n", sample.time_s, sample.value);
+    figure.csv += csv_row(std::string("thrust_n"), sample.time_s, sample.value);
+  }
+  figure.script =
+      figure_head(520) + data_block("speed", speed) + data_block("thrust", thrust) +
+      fmt::format(
+          "set object 1 rectangle from {:.6g}, graph 0 to {:.6g}, graph 1 behind fillcolor rgb '#eef1f4' "
+          "fillstyle solid noborder\nset multiplot\nset lmargin at screen 0.13\nset rmargin at screen 0.97\nunset key\n"
+          "set xrange [-0.15:{:.6g}]\nset arrow 1 from 0, graph 0 to 0, graph 1 nohead dt 2 lc rgb '#777777'\n",
+          settling.window_begin_s, settling.window_end_s, settling.window_end_s + 0.05) +
+      "set tmargin at screen 0.97\nset bmargin at screen 0.57\nset format x ''\nset ylabel 'speed, RPM' offset 1\n" +
+      plot({"$speed using 1:2 with linespoints pt 7 ps 0.35 lw 1.2 lc rgb '#0072B2'"}) +
+      "set tmargin at screen 0.53\nset bmargin at screen 0.13\nset format x '%g'\n"
+      "set xlabel 'time since the command, s'\nset ylabel 'thrust, N'\n" +
+      plot({"$thrust using 1:2 with lines lw 1.2 lc rgb '#D55E00'"}) + "unset multiplot\n";
+  return figure;
+}
+
+/// No quote and no control character: gnuplot would take them for the end of the title.
+std::string title_of(std::string name) {
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return c == '\'' || static_cast<unsigned char>(c) < 0x20; }, ' ');
+  return "title '" + name + "'";
 }
 
 }  // namespace
@@ -125,86 +334,73 @@ std::vector<ThrustShares> shares_of_steps(const Identification& identification) 
   for (const OcclusionCoefficient& row : identification.table) {
     if (!row.at_speed) continue;
     ThrustShares entry{row.phi_deg, {}};
-    for (const results::StepMean& step : identification.selection.used) {
-      const bool there = same_level(level(step), identification.at_speed_rad_s);
-      if (step.occlusion_deg == row.phi_deg && there) entry.percent.push_back(step.thrust_n);
-    }
+    for (const results::StepMean& step : identification.selection.used)
+      if (step.occlusion_deg == row.phi_deg && same_level(level(step), identification.at_speed_rad_s))
+        entry.percent.push_back(step.thrust_n);
     shares.push_back(std::move(entry));
   }
-  if (shares.empty() || shares.front().phi_deg != 0 || !(mean(shares.front().percent) > 0)) return {};
+  if (shares.empty() || shares.front().phi_deg != 0) return {};
   const double nominal = mean(shares.front().percent);
+  if (!(nominal > 0)) return {};
   for (auto& entry : shares)
     for (double& value : entry.percent) value *= 100 / nominal;
   return shares;
 }
 
-Figure share_figure(const Identification& identification, const std::vector<ThrustShares>& shares) {
-  const LineFit& line = identification.line;
-  const compensation::ThrustCurve curve = identification.curve();
-  Figure figure;
-  figure.name = "thrust_share";
-  figure.caption = "Thrust in percent of the thrust without occlusion (boxes, left axis";
-  if (identification.at_speed_rad_s > 0)
-    figure.caption += fmt::format(", at {:.0f} RPM", to_rpm(RadPerSec(identification.at_speed_rad_s)));
-  figure.caption +=
-      ") and the angle-dependent coefficient k(φ) over all speeds (right axis, two standard errors). The line is solid "
-      "where it was measured.";
-  figure.csv = "kind,phi_deg,value,standard_error\n";
+Figure family_figure(std::span<const Identification* const> family) {
+  Figure figure{
+      "family",
+      "Left: k(φ) of every propeller with its line and two standard errors. Right: the same as a share of its "
+      "own K_T; propellers whose lines coincide there lose the same share of thrust.",
+      {},
+      "propeller,phi_deg,k_n_s2_per_rad2,standard_error,share_of_K_T\n"};
   std::string data;
-  for (std::size_t i = 0; i < shares.size(); ++i) {
-    std::string rows;
-    for (const double percent : shares[i].percent) {
-      rows += fmt::format("{:.6g}\n", percent);
-      figure.csv += fmt::format("thrust_percent,{},{},\n", shortest(shares[i].phi_deg), shortest(percent));
+  Curves absolute, relative;
+  for (std::size_t i = 0; i < family.size(); ++i) {
+    const Identification& one = *family[i];
+    const LineFit& line = one.line;
+    const compensation::ThrustCurve curve = one.curve();
+    std::string points, fitted;
+    for (const OcclusionCoefficient& row : one.table) {
+      const double share = row.k / line.K_T;
+      points += fmt::format("{:.6g} {:.8g} {:.8g} {:.8g} {:.8g}\n", row.phi_deg, row.k * 1e6, 2e6 * row.standard_error,
+                            share, 2 * row.standard_error / line.K_T);
+      figure.csv += csv_row(one.propeller, row.phi_deg, row.k, row.standard_error, share);
     }
-    if (!rows.empty()) data += data_block(fmt::format("share{}", i), rows);
+    for (const double phi : {line.points.front().phi_deg, line.points.back().phi_deg})
+      fitted += fmt::format("{:.6g} {:.8g} {:.8g}\n", phi, curve.at(from_degrees(phi)).value() * 1e6,
+                            curve.at(from_degrees(phi)) / curve.thrust_coefficient());
+    data += data_block(fmt::format("points{}", i), points) + data_block(fmt::format("line{}", i), fitted);
+    const auto add = [&](Curves& curves, int value, int error, int column, const std::string& title) {
+      const auto [colour, shape] = mark(i);
+      curves.push_back(fmt::format("$line{} using 1:{} with lines lw 1.8 lc rgb '{}' notitle", i, column, colour));
+      curves.push_back(fmt::format("$points{} using 1:{}:{} with yerrorbars pt {} ps 0.8 lw 1.2 lc rgb '{}' {}", i,
+                                   value, error, shape, colour, title));
+    };
+    add(absolute, 2, 3, 2, title_of(one.propeller));
+    add(relative, 4, 5, 3, "notitle");
   }
-  for (const auto& row : identification.table) {
-    figure.csv +=
-        fmt::format("k_n_s2_per_rad2,{},{},{}\n", shortest(row.phi_deg), shortest(row.k), shortest(row.standard_error));
-  }
-  const double first = line.points.front().phi_deg, last = line.points.back().phi_deg;
-  data += data_block("line", curve_rows(curve, first, std::max(last, first + 1e-3)));
-  data += data_block("before", curve_rows(curve, 0, first));
-  data += data_block("k", coefficient_rows(identification));
-  figure.script =
-      figure_head() + "set border 11\n" + data +
-      axes(identification, share_bottom(shares), share_top(identification, shares)) + "plot \\\n" +
-      "  $line using 1:3:4 axes x1y2 with filledcurves fs transparent solid 0.2 noborder lc rgb '#D55E00' notitle, "
-      "\\\n" +
-      box_plots(shares) +
-      "  $before using 1:2 axes x1y2 with lines dt 2 lw 1.5 lc rgb '#D55E00' notitle, \\\n"
-      "  $line using 1:2 axes x1y2 with lines lw 2.5 lc rgb '#D55E00' title 'line k(φ)', \\\n"
-      "  $k using 1:2:3 axes x1y2 with yerrorbars pt 7 ps 0.6 lw 1.4 lc rgb '#222222' title 'k of each occlusion'\n";
+  figure.script = figure_head(450) + data +
+                  "set multiplot layout 1, 2\nset xrange [-15:*<285]\nset yrange [0:*]\n"
+                  "set xtics 45\nset xlabel 'angle of the occlusion φ, °'\nset key top right samplen 1 spacing 1.2\n"
+                  "set ylabel 'k(φ), 10⁻⁶ N/(rad/s)²'\n" +
+                  plot(absolute) + "set ylabel 'k(φ) / K_T'\nset yrange [0:1.1]\nunset key\n" + plot(relative) +
+                  "unset multiplot\n";
   return figure;
 }
 
-Figures draw(const std::vector<Figure>& wanted, const std::filesystem::path& folder, const std::string& gnuplot) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);  // what failed shows at the first file
-  Figures figures;
-  for (const Figure& figure : wanted)
-    if (!write_and_draw(figure, folder, gnuplot, figures)) break;
-  return figures;
-}
-
-Mark mark(std::size_t i) { return kMarks[i % kMarks.size()]; }
-
-std::string figure_head(int height) {
-  return fmt::format(
-      "set terminal svg size 800,{} noenhanced font 'Helvetica,Arial,sans-serif,14' linewidth 1.2 background "
-      "'#ffffff'\n"
-      "set encoding utf8\nset minussign\n"
-      "set border 3 lc rgb '#777777'\n"
-      "set tics nomirror out scale 0.6 textcolor rgb '#333333'\n"
-      "set grid ytics lc rgb '#e4e4e4' lt 1 lw 0.8\n"
-      "set key opaque fillcolor rgb '#ffffff' noenhanced\n",
-      height);
-}
-
-/// A named block of inline data.
-std::string data_block(const std::string& name, const std::string& rows) {
-  return fmt::format("${} << EOD\n{}EOD\n", name, rows);
+Figures draw_figures(const Identification& identification, const std::vector<ThrustShares>& shares,
+                     const std::filesystem::path& folder, const std::string& gnuplot, const Settling* settling) {
+  std::vector<Figure> wanted{share_figure(identification, shares)};
+  if (std::all_of(identification.table.begin(), identification.table.end(),
+                  [](const OcclusionCoefficient& row) { return row.fit.has_value(); })) {
+    wanted.push_back(thrust_figure(identification));
+    wanted.push_back(speed_figure(identification));
+    wanted.push_back(repetition_figure(identification));
+  }
+  if (!power_of(identification.selection.used).empty()) wanted.push_back(power_figure(identification));
+  if (settling != nullptr && !settling->thrust_n.empty()) wanted.push_back(settling_figure(*settling));
+  return draw(wanted, folder, gnuplot);
 }
 
 }  // namespace kphi::fit

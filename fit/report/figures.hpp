@@ -1,11 +1,13 @@
-// The figures of a fit: gnuplot scripts with their data inside, the same data as CSV beside them, and the drawn SVG.
+// The figures of a fit.
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "fit/model/identification.hpp"
+#include "fit/report/gnuplot.hpp"
 
 namespace kphi::fit {
 
@@ -15,47 +17,32 @@ struct ThrustShares {
   std::vector<double> percent;
 };
 
-/// The step means at the speed of "k at speed", one per repetition: what the box plot shows when the raw samples are
-/// not at hand. Empty when there is none at φ = 0.
+/// The step means at the speed of "k at speed", one per repetition: the box plot shows them when the raw samples are
+/// not available. Empty without a step at φ = 0.
 [[nodiscard]] std::vector<ThrustShares> shares_of_steps(const Identification& identification);
 
-struct Figure {
-  std::string name;     ///< file name without ending
-  std::string caption;  ///< plain text
-  std::string script;   ///< gnuplot, data inside
-  std::string csv;      ///< the data
+/// One step of one run: how speed and thrust settle after the command, and what of it was averaged.
+struct Settling {
+  struct Sample {
+    double time_s = 0;  ///< since the command
+    double value = 0;
+  };
+  std::string run;  ///< file name
+  double commanded_rad_s = 0;
+  double window_begin_s = 0, window_end_s = 0;  ///< averaged, since the command
+  std::vector<Sample> speed_rad_s;
+  std::vector<Sample> thrust_n;  ///< means over bins of 10 ms, zero subtracted
 };
 
-/// The paper's figure: box plots of the thrust shares over φ, and on the second axis, scaled so that K_T stands at 100
-/// %, the coefficients with two standard errors and the line in solid orange (dashed where no occlusion was measured).
-[[nodiscard]] Figure share_figure(const Identification& identification, const std::vector<ThrustShares>& shares);
+/// k(φ) of several propellers, and beside it k(φ)/K_T, which makes their lines comparable.
+[[nodiscard]] Figure family_figure(std::span<const Identification* const> family);
 
-struct DrawnFigure {
-  std::string caption;
-  std::filesystem::path svg;
-};
-
-struct Figures {
-  std::vector<DrawnFigure> drawn;
-  std::string skipped;  ///< why figures are missing; empty when all are drawn
-};
-
-/// Writes name.gp, name.csv and name.svg into `folder` (made if missing) for every figure, up to the first that gnuplot
-/// refuses.
-[[nodiscard]] Figures draw(const std::vector<Figure>& wanted, const std::filesystem::path& folder,
-                           const std::string& gnuplot = "gnuplot");
-
-/// Okabe and Ito's colours: apart for every kind of colour vision. With them a shape, for prints in grey.
-struct Mark {
-  const char* colour;
-  int shape;  ///< gnuplot's point type
-};
-[[nodiscard]] Mark mark(std::size_t i);
-
-/// How every gnuplot script begins.
-[[nodiscard]] std::string figure_head(int height = 470);
-
-/// A named block of inline data.
-[[nodiscard]] std::string data_block(const std::string& name, const std::string& rows);
+/// All figures that the data allow, in the order of the report: the paper's (box plots of the thrust shares over φ; on
+/// the second axis, scaled so that K_T is at 100 %, the coefficients and the line), thrust with residuals, k against
+/// speed, repetitions, power, settling. `settling` may be null. Throws RecordError when the folder cannot be written;
+/// a missing gnuplot only skips the figures.
+[[nodiscard]] Figures draw_figures(const Identification& identification, const std::vector<ThrustShares>& shares,
+                                   const std::filesystem::path& folder, const std::string& gnuplot = "gnuplot",
+                                   const Settling* settling = nullptr);
 
 }  // namespace kphi::fit

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -10,50 +11,39 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
+#include <iterator>
+
+#include "results/file_layer.hpp"
 
 extern char** environ;
 
 namespace kphi::fit {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr const char* kMissing =
-    "gnuplot is not installed; `apt install gnuplot-nox` and `kphi report` draws the figures";
+    "gnuplot is not installed; `apt install gnuplot-nox`, then `kphi report` draws the figures";
 constexpr std::size_t kMessageMax = 400;
 
-struct Pipe {
-  int read_end = -1;
-  int write_end = -1;
-  Pipe() {
-    std::array<int, 2> ends{-1, -1};
-    if (::pipe2(ends.data(), O_CLOEXEC) == 0) {
-      read_end = ends[0];
-      write_end = ends[1];
-    }
-  }
-  ~Pipe() {
-    close_write();
-    if (read_end >= 0) ::close(read_end);
-  }
-  Pipe(const Pipe&) = delete;
-  Pipe& operator=(const Pipe&) = delete;
-  void close_write() {
-    if (write_end >= 0) ::close(write_end);
-    write_end = -1;
-  }
-};
+constexpr std::array<Mark, 7> kMarks{{{"#0072B2", 7},
+                                      {"#D55E00", 5},
+                                      {"#009E73", 9},
+                                      {"#CC79A7", 13},
+                                      {"#E69F00", 11},
+                                      {"#56B4E9", 15},
+                                      {"#444444", 6}}};
 
-struct FileActions {
-  posix_spawn_file_actions_t actions;
-  FileActions() { posix_spawn_file_actions_init(&actions); }
-  ~FileActions() { posix_spawn_file_actions_destroy(&actions); }
-  FileActions(const FileActions&) = delete;
-  FileActions& operator=(const FileActions&) = delete;
-};
-
-/// Signals that this program may ignore, and a child must not.
-struct DefaultSignals {
+/// How the child begins: its three streams, and default actions for signals that this program may ignore.
+struct SpawnSettings {
+  posix_spawn_file_actions_t files;
   posix_spawnattr_t attributes;
-  DefaultSignals() {
+  SpawnSettings(const fs::path& in, const fs::path& out, const fs::path& errors) {
+    posix_spawn_file_actions_init(&files);
+    posix_spawn_file_actions_addopen(&files, STDIN_FILENO, in.c_str(), O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
+    posix_spawn_file_actions_addopen(&files, STDERR_FILENO, errors.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
     sigset_t signals;
     sigemptyset(&signals);
     for (const int signal : {SIGPIPE, SIGXFSZ}) sigaddset(&signals, signal);
@@ -61,21 +51,21 @@ struct DefaultSignals {
     posix_spawnattr_setsigdefault(&attributes, &signals);
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
   }
-  ~DefaultSignals() { posix_spawnattr_destroy(&attributes); }
-  DefaultSignals(const DefaultSignals&) = delete;
-  DefaultSignals& operator=(const DefaultSignals&) = delete;
+  ~SpawnSettings() {
+    posix_spawn_file_actions_destroy(&files);
+    posix_spawnattr_destroy(&attributes);
+  }
+  SpawnSettings(const SpawnSettings&) = delete;
+  SpawnSettings& operator=(const SpawnSettings&) = delete;
 };
 
-/// Everything until the writer closes its end; only the beginning is kept.
-std::string read_all(int descriptor) {
-  std::string text;
-  std::array<char, 512> buffer{};
-  for (;;) {
-    const ssize_t n = ::read(descriptor, buffer.data(), buffer.size());
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return text;
-    if (text.size() < kMessageMax) text.append(buffer.data(), static_cast<std::size_t>(n));
-  }
+/// Reads a short file and removes it.
+std::string take_text(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  std::error_code ignored;
+  fs::remove(path, ignored);
+  return text.substr(0, kMessageMax);
 }
 
 int wait_for(pid_t child) {
@@ -85,33 +75,66 @@ int wait_for(pid_t child) {
   return status;
 }
 
+bool write_and_draw(const Figure& figure, const fs::path& folder, const std::string& gnuplot, Figures& figures) {
+  results::MemoryOnlySync files;  // can be drawn again at any time from steps.csv
+  const fs::path script = folder / (figure.name + ".gp"), svg = folder / (figure.name + ".svg");
+  results::write_text(script, figure.script, files);
+  results::write_text(folder / (figure.name + ".csv"), figure.csv, files);
+  const GnuplotOutcome outcome = draw(script, svg, gnuplot);
+  if (outcome.drawn) figures.drawn.push_back({figure.caption, svg});
+  if (!outcome.drawn) figures.skipped = outcome.reason;
+  return outcome.drawn;
+}
+
 }  // namespace
 
-GnuplotOutcome draw(const std::filesystem::path& script, const std::filesystem::path& svg, const std::string& program) {
-  Pipe complaints;
-  FileActions files;
-  posix_spawn_file_actions_addopen(&files.actions, STDIN_FILENO, script.c_str(), O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&files.actions, STDOUT_FILENO, svg.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644);
-  if (complaints.write_end >= 0) posix_spawn_file_actions_adddup2(&files.actions, complaints.write_end, STDERR_FILENO);
-
-  std::string name = program, settings = "--default-settings", from_stdin = "-";
-  std::array<char*, 4> arguments{name.data(), settings.data(), from_stdin.data(), nullptr};
+GnuplotOutcome draw(const fs::path& script, const fs::path& svg, const std::string& program) {
+  const fs::path errors = fs::path(svg).replace_extension(".err");
+  const SpawnSettings settings(script, svg, errors);
+  std::string name = program, plain = "--default-settings", from_stdin = "-";
+  std::array<char*, 4> arguments{name.data(), plain.data(), from_stdin.data(), nullptr};
   pid_t child = -1;
-  const DefaultSignals signals;
   const int error =
-      ::posix_spawnp(&child, program.c_str(), &files.actions, &signals.attributes, arguments.data(), environ);
+      ::posix_spawnp(&child, program.c_str(), &settings.files, &settings.attributes, arguments.data(), environ);
+  const int status = error == 0 ? wait_for(child) : 0;
+  const std::string message = take_text(errors);
   std::error_code ignored;
-  if (error != 0) {
-    std::filesystem::remove(svg, ignored);
-    if (error == ENOENT) return {false, kMissing};
-    return {false, fmt::format("{} did not start: {}", program, std::strerror(error))};
-  }
-  complaints.close_write();
-  const std::string message = complaints.read_end >= 0 ? read_all(complaints.read_end) : "";
-  const int status = wait_for(child);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0 && std::filesystem::file_size(svg, ignored) > 0) return {true, ""};
-  std::filesystem::remove(svg, ignored);
+  if (error == 0 && WIFEXITED(status) && WEXITSTATUS(status) == 0 && fs::file_size(svg, ignored) > 0) return {true, ""};
+  fs::remove(svg, ignored);
+  if (error == ENOENT) return {false, kMissing};
+  if (error != 0) return {false, fmt::format("cannot start {}: {}", program, std::strerror(error))};
   return {false, fmt::format("{} failed on {}: {}", program, script.string(), message)};
+}
+
+Figures draw(const std::vector<Figure>& wanted, const fs::path& folder, const std::string& gnuplot) {
+  std::error_code error;
+  fs::create_directories(folder, error);  // a failure shows at the first file
+  Figures figures;
+  for (const Figure& figure : wanted)
+    if (!write_and_draw(figure, folder, gnuplot, figures)) break;
+  return figures;
+}
+
+Mark mark(std::size_t i) { return kMarks[i % kMarks.size()]; }
+
+std::string figure_head(int height) {
+  return fmt::format(
+      "set terminal svg size 800,{} noenhanced font 'Helvetica,Arial,sans-serif,14' linewidth 1.2 background "
+      "'#ffffff'\n"
+      "set encoding utf8\nset minussign\n"
+      "set border 3 lc rgb '#777777'\n"
+      "set tics nomirror out scale 0.6 textcolor rgb '#333333'\n"
+      "set grid ytics lc rgb '#e4e4e4' lt 1 lw 0.8\n"
+      "set key opaque fillcolor rgb '#ffffff' noenhanced\n",
+      height);
+}
+
+std::string data_block(const std::string& name, const std::string& rows) {
+  return fmt::format("${} << EOD\n{}EOD\n", name, rows);
+}
+
+std::string plot(const std::vector<std::string>& curves) {
+  return fmt::format("plot \\\n  {}\n", fmt::join(curves, ", \\\n  "));
 }
 
 }  // namespace kphi::fit

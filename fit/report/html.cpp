@@ -54,7 +54,7 @@ std::string_view escape_of(char c) {
 }
 
 void prefix_references(pugi::xml_node node, const std::string& prefix) {
-  // gnuplot numbers the curves of each panel anew, for a mouse that is not there.
+  // gnuplot numbers the curves of each panel from 1 again, for mouse events that this page does not have.
   if (std::string_view(node.attribute("id").value()).starts_with("gnuplot_plot_")) node.remove_attribute("id");
   for (pugi::xml_attribute attribute : node.attributes()) {
     const std::string_view name = attribute.name();
@@ -86,6 +86,39 @@ std::string html_escaped(std::string_view text) {
     text.remove_prefix(length);
   }
   return result;
+}
+
+std::string html_number(double value, const char* format) {
+  if (!std::isfinite(value)) return "–";
+  const std::string text = fmt::format(fmt::runtime(format), value);
+  return text.starts_with('-') ? "−" + text.substr(1) : text;
+}
+
+std::string html_angle(double phi_deg) { return fmt::format("{:g}°", phi_deg); }
+
+std::string html_heading(std::string_view title) { return fmt::format("<h2>{}</h2>\n", title); }
+
+std::string html_note(std::string_view html) { return fmt::format("<p class=\"note\">{}</p>\n", html); }
+
+HtmlTable::HtmlTable(std::vector<Heading> headings, bool is_long) {
+  html_ = fmt::format("<div class=\"scroll{}\"><table><thead><tr>", is_long ? " long" : "");
+  for (Heading& heading : headings) {
+    html_ += fmt::format("<th{}>{}</th>", heading.column == Column::number ? "" : " class=\"text\"", heading.html);
+    columns_.push_back(heading.column);
+  }
+  html_ += "</tr></thead><tbody>\n";
+}
+
+void HtmlTable::row(const std::vector<std::string>& cells, std::optional<std::size_t> bad) {
+  static constexpr std::array<const char*, 3> kClasses{"", "text", "hash"};
+  html_ += "<tr>";
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    std::string name = kClasses[static_cast<std::size_t>(columns_[i])];
+    if (bad == i) name += name.empty() ? "bad" : " bad";
+    html_ += name.empty() ? "<td>" : fmt::format("<td class=\"{}\">", name);
+    html_ += cells.at(i) + "</td>";
+  }
+  html_ += "</tr>\n";
 }
 
 std::string inline_svg(std::string_view svg, const std::string& prefix) {

@@ -1,24 +1,57 @@
-// Text and drawings made safe for a page that is read as XML as well as HTML.
+// Text, tables and drawings for a page that is both HTML and well-formed XML.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace kphi::fit {
 
-/// & < > " ' escaped; control characters and bytes that are no UTF-8 become U+FFFD, so that the page stays well formed
-/// whatever a name holds.
+/// & < > " ' escaped; control characters and invalid UTF-8 become U+FFFD, so that the page stays well formed whatever a
+/// name contains.
 [[nodiscard]] std::string html_escaped(std::string_view text);
 
-/// Escaped, with what plain text writes in ASCII as a page can: K_T and k_i with their index, φ, ω², °, N/RPM².
+/// Escaped, and ASCII forms replaced by signs: K_T and k_i with their index, φ, ω², °, N/RPM².
 [[nodiscard]] std::string typeset(std::string_view text);
 
-/// "1.550197e-06 ± 2.7e-11" as people write it: (1.550197 ± 0.000027) × 10⁻⁶, with a true minus. An error that is not
-/// known is left out.
+/// (1.550197 ± 0.000027) × 10⁻⁶, with a true minus; an unknown error is left out.
 [[nodiscard]] std::string with_power_of_ten(double value, double error);
 
-/// An SVG file as an element to put into a page: without XML declaration and doctype, with `prefix` before every id and
-/// every reference to one, so that two figures on a page do not mix. Empty when the text is no SVG.
+/// A number with a true minus; "–" if it is not finite.
+[[nodiscard]] std::string html_number(double value, const char* format = "{:.3g}");
+
+/// "45°"
+[[nodiscard]] std::string html_angle(double phi_deg);
+
+/// A heading of level 2.
+[[nodiscard]] std::string html_heading(std::string_view title);
+
+/// A paragraph below a table.
+[[nodiscard]] std::string html_note(std::string_view html);
+
+/// A table; headings and cells are HTML.
+class HtmlTable {
+ public:
+  enum class Column : std::uint8_t { number, text, hash };
+  struct Heading {
+    std::string html;
+    Column column = Column::number;
+  };
+  /// A long table may break across pages.
+  explicit HtmlTable(std::vector<Heading> headings, bool is_long = false);
+  /// As many cells as headings. `bad` names the column whose cell is marked as a failure.
+  void row(const std::vector<std::string>& cells, std::optional<std::size_t> bad = {});
+  [[nodiscard]] std::string html() const { return html_ + "</tbody></table></div>\n"; }
+
+ private:
+  std::vector<Column> columns_;
+  std::string html_;
+};
+
+/// An SVG file as an element of a page: without XML declaration and doctype, with `prefix` before every id and every
+/// reference to one, so that two figures on a page do not mix. Empty if the text is not SVG.
 [[nodiscard]] std::string inline_svg(std::string_view svg, const std::string& prefix);
 
 /// The style sheet of the report, on screen and on paper: loads nothing, no script.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "base/statistics.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/run_reader.hpp"
 
@@ -14,12 +15,6 @@ namespace {
 
 constexpr std::size_t kSamplesPerAngle = 2000;
 
-double mean(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double value : values) sum += value;
-  return values.empty() ? 0 : sum / static_cast<double>(values.size());
-}
-
 std::vector<double> every_nth(const std::vector<double>& values, std::size_t most) {
   if (values.size() <= most) return values;
   std::vector<double> kept;
@@ -27,20 +22,12 @@ std::vector<double> every_nth(const std::vector<double>& values, std::size_t mos
   return kept;
 }
 
-bool is_run(const RunProvenance& run, const results::StepMean& step) {
-  return std::filesystem::path(run.file).filename() ==
-         results::run_file_name(step.propeller, step.occlusion_deg, step.repetition);
-}
-
 double seconds(results::Nanoseconds time) { return 1e-9 * static_cast<double>(time); }
 
-/// Newtons per count of the thrust axis.
-double newtons_per_count(const results::RunHeader& header) {
-  return header.thrust_sign / header.load_cell.counts_per_newton;
-}
-
-std::size_t thrust_axis(const results::RunHeader& header) {
-  return static_cast<std::size_t>(std::clamp(header.thrust_axis, 0, 2));
+/// Of the thrust axis, N; zero not subtracted.
+double thrust_of(const results::LoadCellRecord& record, const results::RunHeader& header) {
+  const auto axis = static_cast<std::size_t>(std::clamp(header.thrust_axis, 0, 2));
+  return record.counts[axis] * (header.thrust_sign / header.load_cell.counts_per_newton);
 }
 
 std::vector<std::string> event_lines(const results::RunRecording& run) {
@@ -53,13 +40,16 @@ std::vector<std::string> event_lines(const results::RunRecording& run) {
 
 }  // namespace
 
+bool is_run_of(const RunProvenance& run, const results::StepMean& step) {
+  return std::filesystem::path(run.file).filename() ==
+         results::run_file_name(step.propeller, step.occlusion_deg, step.repetition);
+}
+
 std::vector<double> thrust_samples(const results::RunRecording& run, const results::StepMean& step, std::size_t most) {
-  const double newtons = newtons_per_count(run.header);
-  const std::size_t axis = thrust_axis(run.header);
   std::vector<double> samples;
   for (const results::LoadCellRecord& record : run.load_cell) {
     const double time_s = seconds(record.arrival_ns);
-    if (time_s >= step.window_begin_s && time_s <= step.window_end_s) samples.push_back(record.counts[axis] * newtons);
+    if (time_s >= step.window_begin_s && time_s <= step.window_end_s) samples.push_back(thrust_of(record, run.header));
   }
   const double shift = step.thrust_n - mean(samples);
   for (double& sample : samples) sample += shift;
@@ -83,24 +73,18 @@ std::optional<Settling> settling_of(const results::RunRecording& run, const resu
     if (reading.channel == results::MotorChannel::speed && inside(t))
       settling.speed_rad_s.push_back({t, std::abs(reading.value)});
   }
-  std::map<int, std::pair<double, std::size_t>> bins;
-  double sum = 0;
-  std::size_t n = 0;
+  std::map<int, std::vector<double>> bins;
+  std::vector<double> averaged;
   for (const results::LoadCellRecord& record : run.load_cell) {
     const double t = seconds(record.arrival_ns) - zero_s;
     if (!inside(t)) continue;
-    const double thrust = record.counts[thrust_axis(run.header)] * newtons_per_count(run.header);
-    auto& bin = bins[static_cast<int>(std::floor(t / kBin_s))];
-    bin.first += thrust;
-    ++bin.second;
-    if (t < settling.window_begin_s) continue;
-    sum += thrust;
-    ++n;
+    const double thrust = thrust_of(record, run.header);
+    bins[static_cast<int>(std::floor(t / kBin_s))].push_back(thrust);
+    if (t >= settling.window_begin_s) averaged.push_back(thrust);
   }
-  if (n == 0) return std::nullopt;
-  const double shift = step.thrust_n - sum / static_cast<double>(n);  // the zero
-  for (const auto& [bin, total] : bins)
-    settling.thrust_n.push_back({(bin + 0.5) * kBin_s, total.first / static_cast<double>(total.second) + shift});
+  if (averaged.empty()) return std::nullopt;
+  const double shift = step.thrust_n - mean(averaged);  // the zero
+  for (const auto& [bin, values] : bins) settling.thrust_n.push_back({(bin + 0.5) * kBin_s, mean(values) + shift});
   return settling;
 }
 
@@ -125,7 +109,7 @@ RawSamples read_raw_samples(const Identification& identification, std::vector<Ru
     run.outcome = recording.outcome == results::Outcome::complete ? "complete" : "aborted: " + recording.outcome_reason;
     run.events = event_lines(recording);
     for (const results::StepMean& step : top) {
-      if (!is_run(run, step)) continue;
+      if (!is_run_of(run, step)) continue;
       if (!settling) {
         settling = settling_of(recording, step);
         if (settling) settling->run = path.filename().string();

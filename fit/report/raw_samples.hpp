@@ -1,4 +1,4 @@
-// Raw samples of the top speed, for the box plots: they show how thrust scatters within a step, which means cannot.
+// Raw samples of the top speed for the box plots: they show the scatter of the thrust within a step.
 #pragma once
 
 #include <filesystem>
@@ -6,20 +6,21 @@
 #include <vector>
 
 #include "fit/coefficients/coefficients.hpp"
-#include "fit/report/detail_figures.hpp"
 #include "fit/report/figures.hpp"
 #include "results/records.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::fit {
 
-/// At most `most` samples of the run inside the step's window, evenly taken, in N. They scatter about the step's mean:
-/// the window is cut by arrival stamps here, a little coarser than the reduction did, so their own mean is replaced by
-/// it.
+/// Whether the step was measured in this run, by the name of its file.
+[[nodiscard]] bool is_run_of(const RunProvenance& run, const results::StepMean& step);
+
+/// At most `most` samples of the run inside the step's window, evenly taken, in N. Arrival stamps cut the window less
+/// sharply than the reduction did, so the samples are shifted to the step's own mean.
 [[nodiscard]] std::vector<double> thrust_samples(const results::RunRecording& run, const results::StepMean& step,
                                                  std::size_t most);
 
-/// How `run` came to `step`. Nothing when the run has no mark of it or no sample in its window.
+/// How `run` came to `step`. nullopt if the run has no mark of it or no sample in its window.
 [[nodiscard]] std::optional<Settling> settling_of(const results::RunRecording& run, const results::StepMean& step);
 
 struct RawSamples {

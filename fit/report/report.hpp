@@ -4,9 +4,10 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "fit/coefficients/coefficients.hpp"
-#include "fit/report/figures.hpp"
+#include "fit/report/gnuplot.hpp"
 #include "fit/uncertainty/analysis.hpp"
 
 namespace kphi::fit {
@@ -15,7 +16,7 @@ namespace kphi::fit {
 [[nodiscard]] std::string format_report(const Identification& identification, const Provenance& provenance,
                                         const Figures& figures, const Analysis* analysis = nullptr);
 
-/// One campaign of a page of several.
+/// One campaign on a page of several.
 struct Chapter {
   Identification identification;
   Provenance provenance;
@@ -23,11 +24,8 @@ struct Chapter {
   std::optional<Analysis> analysis{};
 };
 
-/// Several campaigns on one page: what they have in common first, `family` is the figure of all, then each by itself.
-/// With analyses of all, the claims that only several propellers can test.
+/// Several campaigns on one page: first their comparison with the figure `family` (and, if all have an analysis, the
+/// paper's statements about several propellers), then each of them.
 [[nodiscard]] std::string format_reports(const std::vector<Chapter>& chapters, const Figures& family);
-
-/// "1.5500e-06 ± 1.2e-09": the value to the second digit of its standard error; without one, six digits.
-[[nodiscard]] std::string with_error(double value, double standard_error);
 
 }  // namespace kphi::fit

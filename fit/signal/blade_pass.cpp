@@ -6,7 +6,8 @@
 #include <unsupported/Eigen/FFT>
 
 #include "compensation/units.hpp"
-#include "fit/signal/step_clock.hpp"
+#include "results/reduction/cell_stream.hpp"
+#include "results/reduction/motor_series.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -88,26 +89,27 @@ SpectrumPeak find_peak(const std::vector<double>& samples, double expected, doub
   return peak;
 }
 
-std::optional<BladePassLine> line_of(const results::RunRecording& run, const StepSpan& span,
+std::optional<BladePassLine> line_of(const results::RunRecording& run, std::size_t phase,
+                                     const results::CellStream& cell, const results::MotorSeries& motor,
                                      const BladePassOptions& options) {
-  const double settled = std::max(run.header.minimum_discard_s, 0.4 * (span.end_s - span.begin_s));
-  const EvenSamples thrust = thrust_between(run, span.begin_s + settled, span.end_s);
-  const auto speeds = speeds_between(run, span.begin_s + settled, span.end_s);
-  if (thrust.values.size() < 256 || speeds.size() < 3) return std::nullopt;
-  double mean = 0, squares = 0;
-  for (const TimedSample& sample : speeds) mean += sample.value / static_cast<double>(speeds.size());
-  for (const TimedSample& sample : speeds) squares += std::pow(sample.value - mean, 2);
-  const double expected = run.header.blades * mean / (2 * kPi) / thrust.rate_hz;
+  const results::PhaseMark& mark = run.phases[phase];
+  results::Window window{mark.time_ns, run.phases[phase + 1].time_ns};
+  window.begin += std::llround(1e9 * std::max(run.header.minimum_discard_s, 0.4 * window.seconds()));
+  const results::EvenSamples thrust = cell.samples(window);
+  const results::Statistics speed = motor.statistics(results::MotorChannel::speed, window);
+  if (thrust.counts.size() < 256 || speed.n < 3) return std::nullopt;
+  const double reported = std::abs(speed.mean);
+  const double expected = run.header.blades * reported / (2 * kPi) / thrust.rate_hz;
   if (!(expected > 0) || expected * (1 + options.search) > 0.5) return std::nullopt;
-  const SpectrumPeak peak = find_peak(thrust.values, expected, options.search);
+  const SpectrumPeak peak = find_peak(thrust.counts, expected, options.search);
   if (peak.signal_to_noise < options.least_signal_to_noise) return std::nullopt;
   BladePassLine line;
-  line.step = span.step;
+  line.step = mark.step;
   line.frequency_hz = peak.cycles * thrust.rate_hz;
-  line.reported_speed_rad_s = mean;
+  line.reported_speed_rad_s = reported;
   line.gain = peak.cycles / expected;
-  const double readings = static_cast<double>(speeds.size());
-  line.u_gain = std::hypot(peak.u_cycles / expected, std::sqrt(squares / (readings - 1) / readings) / mean);
+  line.u_gain =
+      std::hypot(peak.u_cycles / expected, speed.deviation / std::sqrt(static_cast<double>(speed.n)) / reported);
   line.signal_to_noise = peak.signal_to_noise;
   return line;
 }
@@ -133,8 +135,11 @@ std::optional<BladePassCheck> check_by_blade_pass(std::span<const results::RunRe
                                                   const BladePassOptions& options) {
   BladePassCheck check;
   for (const results::RunRecording& run : runs) {
-    for (const StepSpan& span : step_spans(run)) {
-      if (const auto line = line_of(run, span, options)) check.lines.push_back(*line);
+    const results::CellStream cell(run);
+    const results::MotorSeries motor(run.motor);
+    for (std::size_t i = 0; i + 1 < run.phases.size(); ++i) {
+      if (run.phases[i].phase != results::Phase::step) continue;
+      if (const auto line = line_of(run, i, cell, motor, options)) check.lines.push_back(*line);
     }
   }
   if (check.lines.empty()) return std::nullopt;

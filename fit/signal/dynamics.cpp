@@ -2,16 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "base/error.hpp"
 #include "fit/numerics/least_squares.hpp"
-#include "fit/signal/step_clock.hpp"
+#include "results/reduction/reduction.hpp"
 
 namespace kphi::fit {
 namespace {
 
-constexpr double kBefore = 0.15;  // s before the command whose mean is the old state
-constexpr double kSettled = 0.5;  // share of a step after which its new state is taken
+using results::Transition;
+
+constexpr double kBefore = 0.15;   // s before the command whose mean is the old speed
+constexpr double kSettled = 0.5;   // share of a step after which its readings are the new speed
+constexpr double kStandstill = 5;  // rad/s
 
 struct NormalisedReading {
   double t = 0;  // since the command
@@ -19,38 +24,15 @@ struct NormalisedReading {
   double weight = 0;
 };
 
-double mean_of(const std::vector<TimedSample>& samples, double begin, double end) {
+/// Mean speed of the readings in [begin, end), s since the command; NaN without any.
+double mean_speed(const Transition& step, double begin, double end) {
   double sum = 0, n = 0;
-  for (const TimedSample& sample : samples) {
-    if (sample.t_s < begin || sample.t_s >= end) continue;
-    sum += sample.value;
+  for (const results::SquaredSpeed& reading : step.squared) {
+    if (reading.time_s < begin || reading.time_s >= end) continue;
+    sum += std::sqrt(reading.value);
     ++n;
   }
-  return sum / n;  // NaN when there is none
-}
-
-/// ∫ value dt by trapezoids, held constant beyond the ends. Until `begin` nothing has moved: the trapezoid across it
-/// starts at the sample before, or the rise would be counted from where nobody looked.
-double integral(const std::vector<TimedSample>& samples, double begin, double end) {
-  double sum = 0, t = begin, value = samples.front().value, before = 0;
-  for (const TimedSample& sample : samples) {
-    if (sample.t_s >= end) break;
-    if (sample.t_s > begin) {
-      sum += 0.5 * (value + sample.value) * (sample.t_s - t);
-    } else {
-      before = sample.value * (begin - sample.t_s);
-    }
-    t = sample.t_s;
-    value = sample.value;
-  }
-  return sum - before + value * (end - t);
-}
-
-std::vector<TimedSample> samples_of(const EvenSamples& even) {
-  std::vector<TimedSample> samples;
-  for (std::size_t i = 0; i < even.values.size(); ++i)
-    samples.push_back({even.begin_s + static_cast<double>(i) / even.rate_hz, even.values[i]});
-  return samples;
+  return sum / n;
 }
 
 struct Exponential {
@@ -65,7 +47,7 @@ struct Exponential {
   }
 };
 
-/// The mean residence time, delay and time constant together, is a safe start.
+/// Starts from the mean residence time, the sum of delay and time constant.
 void fit_motor(const std::vector<NormalisedReading>& readings, double residence, Dynamics& dynamics) {
   double time_constant = 0.7 * residence, delay = 0.3 * residence;
   ceres::Problem problem(problem_options());
@@ -86,62 +68,42 @@ void fit_motor(const std::vector<NormalisedReading>& readings, double residence,
 struct Collected {
   std::vector<NormalisedReading> readings;
   double residence = 0, residence_weight = 0;
+  std::size_t steps = 0;
 };
 
-/// Leaves a step out that cannot tell anything.
-void respond(const results::RunRecording& run, const StepSpan& span, double least_change, Dynamics& dynamics,
-             Collected& all) {
-  if (std::abs(span.commanded_rad_s - span.previous_rad_s) < least_change * span.previous_rad_s) return;
-  if (!(span.previous_rad_s > 0)) return;
-  const double begin = span.begin_s, end = span.end_s, settled = begin + kSettled * (end - begin);
-  const auto speeds = speeds_between(run, begin - kBefore, end);
-  const auto thrusts = samples_of(thrust_between(run, begin - kBefore, end));
-  const double old_speed = mean_of(speeds, begin - kBefore, begin), new_speed = mean_of(speeds, settled, end);
-  const double old_thrust = mean_of(thrusts, begin - kBefore, begin), new_thrust = mean_of(thrusts, settled, end);
-  const double change = new_speed - old_speed, thrust_change = new_thrust - old_thrust;
-  if (!std::isfinite(change * thrust_change) || change == 0 || thrust_change == 0) return;
-
-  std::vector<TimedSample> squares = speeds;
-  for (TimedSample& sample : squares) sample.value *= sample.value;
-  const double old_square = mean_of(squares, begin - kBefore, begin), new_square = mean_of(squares, settled, end);
-  const double expected = (integral(squares, begin, end) - old_square * (end - begin)) / (new_square - old_square);
-  const double found = (integral(thrusts, begin, end) - old_thrust * (end - begin)) / thrust_change;
-  dynamics.steps.push_back({span.step, old_speed, new_speed, old_thrust, new_thrust, expected - found});
-
-  for (const TimedSample& sample : speeds) {
-    if (sample.t_s >= begin)
-      all.readings.push_back({sample.t_s - begin, (sample.value - old_speed) / change, std::abs(change)});
+void collect(const Transition& step, double least_change, Collected& all) {
+  const double end = static_cast<double>(step.thrust.size()) * step.bin_s;
+  const double before = mean_speed(step, -kBefore, 0), after = mean_speed(step, kSettled * end, end);
+  const double change = after - before;
+  if (step.ramped || !(before > kStandstill) || !(std::abs(change) >= least_change * before)) return;
+  const double weight = change * change;
+  double passed = 0, missing = 1;
+  for (const auto& [time, squared] : step.squared) {
+    if (time < 0) continue;
+    const double y = (std::sqrt(squared) - before) / change;
+    all.readings.push_back({time, y, std::abs(change)});
+    all.residence += weight * 0.5 * (missing + 1 - y) * (time - passed);
+    passed = time;
+    missing = 1 - y;
   }
-  all.residence +=
-      change * change * (end - begin - (integral(speeds, begin, end) - old_speed * (end - begin)) / change);
-  all.residence_weight += change * change;
-}
-
-Estimate weighted_lag(const std::vector<StepResponse>& steps) {
-  double sum = 0, weights = 0, squares = 0, weight_squares = 0;
-  for (const StepResponse& step : steps) {
-    const double weight = std::pow(step.to_n - step.from_n, 2);
-    sum += weight * step.thrust_lag_s;
-    weights += weight;
-    weight_squares += weight * weight;
-  }
-  const double mean = sum / weights;
-  for (const StepResponse& step : steps)
-    squares += std::pow(std::pow(step.to_n - step.from_n, 2) * (step.thrust_lag_s - mean), 2);
-  const double freedom = std::max(1.0, weights * weights / weight_squares - 1);
-  return {mean, std::sqrt(squares * (freedom + 1) / freedom) / weights, freedom};
+  all.residence_weight += weight;
+  ++all.steps;
 }
 
 }  // namespace
 
 std::optional<Dynamics> identify_dynamics(std::span<const results::RunRecording> runs, double least_change) {
-  Dynamics dynamics;
-  Collected all;
+  std::vector<Transition> transitions;
   for (const results::RunRecording& run : runs) {
-    for (const StepSpan& span : step_spans(run)) respond(run, span, least_change, dynamics, all);
+    for (Transition& step : results::transitions_of(run)) transitions.push_back(std::move(step));
   }
-  if (dynamics.steps.size() < 3 || all.readings.size() < 10) return std::nullopt;
-  dynamics.thrust_lag_s = weighted_lag(dynamics.steps);
+  Collected all;
+  for (const Transition& step : transitions) collect(step, least_change, all);
+  if (all.steps < 3 || all.readings.size() < 10) return std::nullopt;
+  Dynamics dynamics;
+  dynamics.steps = all.steps;
+  const results::Lag lag = results::estimate_lag(transitions);
+  dynamics.thrust_lag_s = {lag.known() ? lag.seconds : std::nan(""), lag.u, lag.freedom};
   try {
     fit_motor(all.readings, std::max(1e-3, all.residence / all.residence_weight), dynamics);
   } catch (const FitError&) {

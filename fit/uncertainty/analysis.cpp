@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fit/uncertainty/error_sources.hpp"
+#include "fit/uncertainty/budget.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -31,13 +31,13 @@ ErrorSources sources_of(const Identification& identification, const Analysis& an
   return error_sources(std::move(k), std::move(errors));
 }
 
-/// What the line misses beyond the errors of its points, once a test has found it to be no line.
+/// Deviation from the line beyond the errors of its points, once a test has rejected the line.
 BudgetRow line_row(const LineFit& line, const Curvature& curvature) {
   BudgetRow row;
   row.source = "line k(phi)";
   row.unit = kUnitOfK;
   row.sensitivity = 1;
-  row.note = "what its points deviate beyond their errors, where a test finds it";
+  row.note = "deviation of its points beyond their errors, where a test finds it";
   if (!curvature.bends()) return row;
   double excess = 0;
   const double terms = line.anchored ? 1 : 2;
@@ -127,24 +127,25 @@ std::vector<std::string> remarks_of(const Identification& identification, const 
   const double share = 100 * line.mismatch() / line.K_T;
   for (const OutlyingRun& run : analysis.outlying)
     remarks.push_back(fmt::format(
-        "repetition {} at {} deg stands out, {:+.2f} % from the others (p = {:.2g}); it is kept, and its scatter is in "
-        "the budget of every k: look for a cause, and run this occlusion again",
-        run.repetition, run.phi_deg, 100 * run.share, run.p));
+        "repetition {} at {} deg stands out, {:+.2f} % from the others ({}); it is kept, and its scatter is in the "
+        "budget of every k; look for a cause and repeat this occlusion",
+        run.repetition, run.phi_deg, 100 * run.share, std::isnan(run.p) ? "Hampel" : fmt::format("p = {:.2g}", run.p)));
   if (!line.anchored) {
     const bool beyond_error = student_test(analysis.shape.mismatch, 0).rejected();
     remarks.push_back(fmt::format("the line's intercept is {:+.2f} % from K_T, {} its error", share,
                                   beyond_error ? "beyond" : "within"));
   }
   if (line.slope_per_deg >= 0) {
-    remarks.push_back("the line does not fall: this occlusion costs no thrust, or the runs were mixed up");
+    remarks.push_back(
+        "the line does not fall with phi: either the occlusion costs no thrust or the runs were mixed up");
     return remarks;
   }
   const double clipping = *line.clipping_deg(), zero = *line.zero_crossing_deg();
   if (clipping > 0)
-    remarks.push_back(fmt::format("up to {:.1f} deg the line lies above K_T: k_i is held at 1 there", clipping));
+    remarks.push_back(fmt::format("up to {:.1f} deg the line is above K_T, so k_i is held at 1", clipping));
   if (clipping < 0)
     remarks.push_back(
-        fmt::format("at first contact the line already lies {:.2f} % below K_T: k_i steps there", -share));
+        fmt::format("at first contact the line is already {:.2f} % below K_T, so k_i steps there", -share));
   if (zero < 360)
     remarks.push_back(fmt::format("the line reaches 0 at {:.1f} deg; it was measured up to {} deg", zero, largest));
   return remarks;
@@ -196,7 +197,7 @@ std::vector<Budget> standard_air(const std::vector<Budget>& coefficients, const 
     density.u = options.bench.air_density.value_or(std::numeric_limits<double>::quiet_NaN());
     density.sensitivity = -budget.value;
     density.common = true;
-    density.note = density.known() ? "" : "not known";
+    density.note = density.known() ? "" : "unknown";
     budget.rows.push_back(density);
     result.push_back(std::move(budget));
   }
@@ -245,7 +246,7 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   analysis.differences = neighbour_tests(analysis.coefficients, sources, identification);
   analysis.between_runs = identification.repeatability.between;
   analysis.shape = shape_of(identification, sources, weights, row);
-  analysis.outlying = outlying_runs(identification.repeatability);
+  analysis.outlying = outlying_runs(identification.selection.used);
   analysis.remarks = remarks_of(identification, analysis);
   analysis.rejected = rejected_points(identification);
   if (!runs.empty()) analysis.bootstrap = bootstrap(runs, weights, options.bootstrap);

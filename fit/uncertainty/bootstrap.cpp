@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "base/random.hpp"
-#include "fit/numerics/tail_percentiles.hpp"
+#include "base/statistics.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -34,7 +37,8 @@ double pooled(std::span<const RunSums> runs) {
   return xt / xx;
 }
 
-/// One resample per entry of `into`. Two 32-bit draws come out of each 64-bit number; n/2³² of bias is nothing here.
+/// One resample per entry of `into`. Two 32-bit draws come out of each 64-bit number; the bias of n/2³² does not matter
+/// here.
 void resample(const Group& group, std::span<double> into, SplitMix64& random) {
   const std::uint64_t n = group.runs.size();
   for (double& k : into) {
@@ -50,11 +54,18 @@ void resample(const Group& group, std::span<double> into, SplitMix64& random) {
   }
 }
 
-BootstrapInterval summary(std::string quantity, double value, std::span<const double> samples, double level,
-                          std::vector<double>& room) {
-  const Scatter scatter = scatter_of(samples);
-  const TailPercentiles tails = tail_percentiles(samples, scatter, level, room);
-  return {std::move(quantity), value, scatter.deviation, tails.lower, tails.upper};
+/// The sample whose rank among n is nearest to `share` of n − 1. Reorders the samples.
+double percentile(std::vector<double>& samples, double share) {
+  const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(samples.size() - 1) + 0.5);
+  std::nth_element(samples.begin(), samples.begin() + rank, samples.end());
+  return samples[static_cast<std::size_t>(rank)];
+}
+
+BootstrapInterval summary(std::string quantity, double value, std::vector<double> samples, double level) {
+  const double deviation = std::sqrt(variance(samples));
+  if (!std::isfinite(deviation)) return {std::move(quantity), value, deviation, deviation, deviation};
+  const double lower = percentile(samples, (1 - level) / 2), upper = percentile(samples, (1 + level) / 2);
+  return {std::move(quantity), value, deviation, lower, upper};
 }
 
 }  // namespace
@@ -65,7 +76,7 @@ std::vector<BootstrapInterval> bootstrap(std::span<const RunSums> runs, const Li
   std::vector<BootstrapInterval> result;
   if (groups.empty() || options.resamples < 2) return result;
   SplitMix64 random(options.seed);
-  std::vector<double> k(options.resamples), intercept(options.resamples), slope(options.resamples), room;
+  std::vector<double> k(options.resamples), intercept(options.resamples), slope(options.resamples);
   double intercept_value = 0, slope_value = 0;
   for (std::size_t i = 0; i < groups.size(); ++i) {
     resample(groups[i], k, random);
@@ -77,10 +88,10 @@ std::vector<BootstrapInterval> bootstrap(std::span<const RunSums> runs, const Li
     intercept_value += line.intercept[i] * value;
     slope_value += line.slope[i] * value;
     const double phi = groups[i].phi_deg;
-    result.push_back(summary(phi == 0 ? "K_T" : fmt::format("k({} deg)", phi), value, k, options.level, room));
+    result.push_back(summary(phi == 0 ? "K_T" : fmt::format("k({} deg)", phi), value, k, options.level));
   }
-  result.push_back(summary("intercept", intercept_value, intercept, options.level, room));
-  result.push_back(summary("slope", slope_value, slope, options.level, room));
+  result.push_back(summary("intercept", intercept_value, intercept, options.level));
+  result.push_back(summary("slope", slope_value, slope, options.level));
   return result;
 }
 

@@ -1,6 +1,6 @@
-// Bootstrap by run: whole runs are drawn with replacement within each φ, because what one run shares (mounting, air)
-// does not average out over its steps. Works on the sums of each run, so a resample costs a few additions.
-// With three runs a percentile interval is narrow by nature (√(2/3)); it is a check of the budget, not its replacement.
+// Bootstrap by run: whole runs are drawn with replacement within each φ, because the errors that the steps of a run
+// share (mounting, air) do not average out. Works on the sums of each run, so a resample costs a few additions. With
+// three runs a percentile interval is too narrow by √(2/3): it checks the budget and does not replace it.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "fit/model/line_fit.hpp"
-#include "fit/model/run_sums.hpp"
+#include "fit/model/repeatability.hpp"
 
 namespace kphi::fit {
 
@@ -21,13 +21,13 @@ struct BootstrapOptions {
 
 struct BootstrapInterval {
   std::string quantity;  ///< "K_T", "k(45 deg)", "intercept", "slope"
-  double value = 0;      ///< of the data themselves
+  double value = 0;      ///< of the data
   double standard_error = 0;
   double lower = 0, upper = 0;  ///< percentiles
 };
 
-/// Of every k, and of the line through them with the weights that it was fitted with, held fixed.
-/// `runs` sorted by φ. The same arguments give the same numbers.
+/// Of every k, and of the line through them with the weights of its fit. `runs` sorted by φ. The same arguments give
+/// the same numbers.
 [[nodiscard]] std::vector<BootstrapInterval> bootstrap(std::span<const RunSums> runs, const LineWeights& line,
                                                        const BootstrapOptions& options = {});
 

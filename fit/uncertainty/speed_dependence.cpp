@@ -9,6 +9,7 @@
 #include "base/error.hpp"
 #include "base/statistics.hpp"
 #include "fit/numerics/linear_regression.hpp"
+#include "results/reduction/repetitions.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -26,16 +27,16 @@ struct Run {
   double zero_u_n = kNan;       ///< of the zero that they share; NaN: not known
 };
 
-/// Of the zero itself, and rectangular over half of what it moved.
+/// Of the zero itself, and rectangular over half of its drift.
 double zero_u(std::span<const results::StepMean> steps, int repetition) {
-  double told = kNan, low = std::numeric_limits<double>::infinity(), high = -low;
+  double of_zero = 0;
+  results::ZeroDrift drift;
   for (const results::StepMean& step : steps) {
     if (step.repetition != repetition) continue;
-    if (std::isfinite(step.zero_u_n)) told = std::max(std::isnan(told) ? 0 : told, step.zero_u_n);
-    if (std::isfinite(step.zero_n)) low = std::min(low, step.zero_n), high = std::max(high, step.zero_n);
+    if (std::isfinite(step.zero_u_n)) of_zero = std::max(of_zero, step.zero_u_n);
+    drift.add(step);
   }
-  const double moved = high > low ? (high - low) / std::sqrt(12.0) : 0;
-  const double u = std::hypot(std::isnan(told) ? 0 : told, moved);
+  const double u = std::hypot(of_zero, drift.u_n());
   return u > 0 ? u : kNan;
 }
 
@@ -65,7 +66,7 @@ struct NoiseModel {
   [[nodiscard]] double at(double x) const { return constant + growing * x * x; }
 };
 
-/// From the variance that the levels show, at x.
+/// From the variances of the levels at x.
 NoiseModel noise_of(const std::vector<double>& x, const std::vector<double>& variances) {
   const double scale = *std::max_element(x.begin(), x.end());
   std::vector<double> squares;
@@ -90,15 +91,15 @@ NoiseModel noise_of(const std::vector<double>& x, const std::vector<double>& var
   return model;
 }
 
-/// What least squares of one run found.
+/// Least squares of one run.
 struct RunFit {
-  std::vector<double> residuals;  ///< N; the last is the zero's own where that is known
+  std::vector<double> residuals;  ///< N; the last is that of the zero if its uncertainty is known
   double trend = 0, trend_u = 0;  ///< of the last term; u as the weights have it
   double freedom = 0;
   double deviation = 0;  ///< of the weighted residuals
 };
 
-/// T of one run on ω², its zero and, with `spread`, k ω² (ω − middle)/spread. The zero as well known as it is.
+/// T of one run on ω², its zero (with its uncertainty) and, with `spread`, k ω² (ω − middle)/spread.
 struct RunModel {
   double middle = 0, spread = 0, k = 0;  ///< spread 0: without a trend
   NoiseModel noise;
@@ -121,8 +122,7 @@ void scale(double by, std::vector<double>& a) {
   for (double& one : a) one *= by;
 }
 
-/// By modified Gram-Schmidt on the weighted columns: what is left of the thrusts are the residuals, and the last column
-/// is the trend's.
+/// Modified Gram-Schmidt on the weighted columns: the thrusts become the residuals; the last column is the trend.
 RunFit RunModel::fit(const std::vector<Sample>& samples, double zero_u_n) const {
   std::vector<std::vector<double>> columns(spread > 0 ? 3 : 2);
   std::vector<double> roots, rest;
@@ -158,7 +158,7 @@ RunFit RunModel::fit(const std::vector<Sample>& samples, double zero_u_n) const 
   return result;
 }
 
-/// The levels that all runs measured, one column each: what tests compare.
+/// The levels that all runs measured, one column each.
 std::vector<Run> complete_levels(std::vector<Run> runs) {
   std::map<int, std::size_t> counts;
   for (const Run& run : runs)
@@ -175,7 +175,7 @@ std::vector<double> column(const std::vector<std::vector<double>>& runs, std::si
   return values;
 }
 
-/// What is measured at one φ, prepared for its tests.
+/// The runs at one φ, prepared for the tests.
 struct Angle {
   std::vector<Run> runs;  ///< as measured
   RunModel model;
@@ -238,7 +238,7 @@ void take_trends(Angle& angle, double slowest, double fastest) {
   angle.trend_u = std::sqrt(squares / static_cast<double>(angle.runs.size()));
 }
 
-/// From how the residuals of neighbouring steps go together, after Box.
+/// From the correlation of the residuals of neighbouring steps, after Box.
 double independent_share(const std::vector<Angle>& angles) {
   std::vector<double> products;
   double n = 0, length = 0;
@@ -331,7 +331,7 @@ Angle prepare(const SpeedDependence& found, std::vector<Run> runs, const std::ve
   return angle;
 }
 
-/// How much more the trends scatter from run to run than the noise has it, as a ratio of variances; its freedom.
+/// Variance of the trends from run to run over the variance that the noise explains; its freedom.
 Estimate scatter_of_trends(const std::vector<Angle>& angles) {
   double squares = 0, freedom = 0;
   for (const Angle& angle : angles) {

@@ -1,12 +1,12 @@
-// Is T = k ω² true? k level by level, its trend with speed, and the lack-of-fit test against what repetitions scatter.
-// On real propellers k rises by up to a fifth over the speeds of a sweep, far above all noise.
+// Tests T = k ω²: k at each speed, its trend with speed, and the lack of fit against the scatter of repetitions. On
+// real propellers k rises by up to a fifth over the speeds of a sweep, far above all noise.
 //
-// All steps of a run share its zero: an error z of it makes T/ω² change by z/ω², which looks like a dependence on the
-// speed. So every run has a zero of its own in these tests, known to within the uncertainty that its steps tell (a
-// pseudo-observation: Theil, Goldberger, Int. Econ. Rev. 2 (1961) 65); where they do not tell, it is free, and what a
-// constant force explains is taken for the zero's. What else neighbouring steps share (slow noise, a zero that wanders)
-// is in how the repetitions differ: the trend is judged by how it scatters from run to run, pooled over all φ, and the
-// lack of fit with degrees of freedom reduced for correlated steps (Box, Ann. Math. Stat. 25 (1954) 484).
+// All steps of a run share its zero: an error z of it changes T/ω² by z/ω², which looks like a dependence on speed.
+// Therefore every run has its own zero in these tests, known to within the uncertainty in its steps (a
+// pseudo-observation: Theil, Goldberger, Int. Econ. Rev. 2 (1961) 65); without that uncertainty the zero is free and
+// absorbs a constant force. Other errors of neighbouring steps (slow noise, a wandering zero) show in the differences
+// between repetitions: the trend is judged by its scatter from run to run, pooled over all φ, and the lack of fit with
+// degrees of freedom reduced for correlated steps (Box, Ann. Math. Stat. 25 (1954) 484).
 #pragma once
 
 #include <optional>
@@ -32,11 +32,11 @@ struct SpeedDependence {
   /// Of k from the lowest to the highest speed, as a share of k, by the straight line through T/ω² weighted in ω⁴ and
   /// by the noise; mean over the runs.
   Estimate change;
-  /// Level means about k ω² and zero against the interaction of level and repetition: an error that a whole run shares
-  /// (mounting, air) is in neither. From one repetition it cannot be tested.
+  /// Level means about k ω² and zero against the interaction of level and repetition; an error of a whole run
+  /// (mounting, air) is in neither. Needs two repetitions.
   HypothesisTest lack_of_fit;
   HypothesisTest trend;  ///< change = 0
-  /// Either test at half the level, so that both together call one straight truth in twenty bent.
+  /// Either test at half the level, so that both together reject a true T = k ω² once in twenty.
   [[nodiscard]] bool depends() const { return lack_of_fit.p < kTestLevel / 2 || trend.p < kTestLevel / 2; }
   /// Rms deviation of the levels' k from the k of the range, weighted in ω⁴, beyond what noise explains, where k
   /// depends on the speed; from one repetition with its noise. N/(rad/s)².

@@ -236,6 +236,23 @@ CellBins CellStream::bins(const Window& window) const {
   return bins;
 }
 
+EvenSamples CellStream::samples(const Window& window) const {
+  EvenSamples found{header_.load_cell.device_rate_hz / stride_of(header_), {}};
+  const auto ft = clock_.ft_sequence();
+  for (const ClockEpoch& epoch : clock_.epochs()) {
+    const std::size_t begin = clock_.first_at(epoch, window.begin), end = clock_.first_at(epoch, window.end);
+    if (begin == end) continue;
+    if (!found.counts.empty()) return {};
+    const LoadCellRows rows = columns_->rows(begin, end);
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t strides = i == begin ? 1 : (ft[i] - ft[i - 1]) / stride_of(header_);
+      for (std::uint32_t k = 1; k < strides; ++k) found.counts.push_back(found.counts.back());
+      found.counts.push_back(rows.counts[i - begin][frame_.axis]);
+    }
+  }
+  return found;
+}
+
 /// Gaps inside the window and across its ends.
 void CellStream::take_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const {
   const std::size_t from = std::max(begin, epoch.begin + 1);

@@ -1,5 +1,5 @@
 // The load cell of one run, with its samples placed in bench time and summed in bins of equal length. The sums are
-// whole numbers: counts about an origin, and their squares. So any order of adding, any number of threads and any cut
+// integers: counts about an origin, and their squares. So any order of adding, any number of threads and any division
 // into bins gives the same sums, and the same bytes in steps.csv.
 #pragma once
 
@@ -27,7 +27,7 @@ struct CountSums {
   }
 };
 
-/// What is summed: the thrust axis, the torque about it, and what both are counted from.
+/// The summed axes, force and torque about it, and the origins of both sums.
 struct CountFrame {
   std::size_t axis = 2;  ///< 0..2
   std::int32_t force_origin = 0;
@@ -57,13 +57,13 @@ struct CellWindow {
   std::uint64_t lost = 0;
   std::uint32_t status = 0;
   bool at_limit = false;
-  bool frozen = false;  ///< it repeated one value for kFrozenSpan
+  bool frozen = false;  ///< one value repeated for kFrozenSpan
 };
 
-/// Bit for bit the same force and torque for so long is no measurement, s.
+/// Bit for bit the same force and torque for this long is not a measurement, s.
 inline constexpr double kFrozenSpan = 0.1;
 
-/// The samples of one window in bins of equal length; the last piece that fills no bin is left out.
+/// The samples of one window in bins of equal length; an incomplete last bin is left out.
 class CellBins {
  public:
   [[nodiscard]] std::size_t size() const { return bins_.size(); }
@@ -71,7 +71,7 @@ class CellBins {
   [[nodiscard]] Nanoseconds width() const { return width_; }
   /// Of bins [first, last).
   [[nodiscard]] Window window(std::size_t first, std::size_t last) const;
-  /// The first bin that begins at `time` or later; size() when none does.
+  /// The first bin that begins at `time` or later; size() if none does.
   [[nodiscard]] std::size_t first_from(Nanoseconds time) const;
   /// Mean counts of the force; NaN of a bin that holds less than half of its samples.
   [[nodiscard]] double force(std::size_t bin) const;
@@ -80,7 +80,7 @@ class CellBins {
 
  private:
   friend class CellStream;
-  /// Records that ft_sequence says are missing between two others: at before + k · period, k = 1…missing.
+  /// Records missing between two others by ft_sequence: at before + k · period, k = 1…missing.
   struct Gap {
     double before_ns = 0;
     double period_ns = 0;
@@ -95,16 +95,23 @@ class CellBins {
   std::vector<Gap> gaps_;
 };
 
+/// Evenly spaced samples of the thrust axis; a missing one repeats the sample before it.
+struct EvenSamples {
+  double rate_hz = 0;          ///< by the clock of the box
+  std::vector<double> counts;  ///< empty: no samples, or the box restarted or stalled within the window
+};
+
 class CellStream {
  public:
-  /// The recording must outlive the stream. Without `columns` its records are taken.
+  /// The recording must outlive the stream. Without `columns` the stream uses its records.
   explicit CellStream(const RunRecording& run, std::unique_ptr<LoadCellColumns> columns = nullptr);
 
-  /// How often the box had started anew before `time`.
+  /// Number of restarts of the box before `time`.
   [[nodiscard]] std::size_t boot_at(Nanoseconds time) const;
   /// The part of a window after the last restart of the box in it.
   [[nodiscard]] Window since_reboot(Window window) const;
   [[nodiscard]] CellBins bins(const Window& window) const;
+  [[nodiscard]] EvenSamples samples(const Window& window) const;
 
  private:
   void take_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const;
@@ -112,7 +119,7 @@ class CellStream {
   const RunHeader& header_;
   std::unique_ptr<LoadCellColumns> columns_;
   ClockMap clock_;
-  std::vector<std::size_t> gaps_;  ///< records before which ft_sequence says that others are missing
+  std::vector<std::size_t> gaps_;  ///< records after a gap of ft_sequence
   std::vector<Nanoseconds> reboots_;
   CountFrame frame_;
 };

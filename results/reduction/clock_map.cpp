@@ -106,7 +106,6 @@ void ClockMap::fit(const LoadCellColumns& columns, ClockEpoch& epoch) const {
     }
   });
 
-  epoch.bins = bins.size();
   double mean_x = 0, mean_y = 0, xx = 0, xy = 0;
   for (const Point& p : bins) {
     mean_x += p.device_ns / static_cast<double>(bins.size());

@@ -1,6 +1,6 @@
-// When the Net Box took its samples, in bench time. The box has no clock but ft_sequence, which counts at its own rate;
-// the arrival stamps tell bench time, late by a delay of which only the smallest is steady. So: per 0.5 s of device
-// time the smallest (arrival - device time), and a least-squares line through these over the whole run.
+// Bench time of the Net Box samples, for the whole program. The only clock of the box is ft_sequence, which counts at
+// its own rate; arrival stamps are bench time plus a delay of which only the smallest is steady. Therefore: the
+// smallest (arrival - device time) per 0.5 s of device time, and a least-squares line through these over the whole run.
 #pragma once
 
 #include <cstddef>
@@ -18,32 +18,27 @@ struct ClockEpoch {
   std::size_t end = 0;    ///< one past the last
   std::uint32_t ft_first = 0;
   double offset_ns = 0;   ///< bench time of the first record
-  double skew = 0;        ///< bench ns gained per device ns
-  bool rebooted = false;  ///< ft_sequence jumped back at its begin: the box started anew
-  std::size_t bins = 0;   ///< points under the line; with fewer than 4 the skew is taken as 0
+  double skew = 0;        ///< bench ns gained per device ns; 0 below 2 s of records
+  bool rebooted = false;  ///< ft_sequence jumped back at the beginning: the box restarted
 };
 
 class ClockMap {
  public:
   /// `device_rate_hz`: rate at which ft_sequence counts. The records must be in order of arrival.
-  /// Constant delays of box, filter and wire cannot be seen one-way: times are late by their smallest sum.
-  /// `breaks`: when the box took up counting after it had stood still; ascending.
+  /// A one-way stream cannot show the constant delays of box, filter and wire: times are late by their smallest sum.
+  /// `breaks`: times at which the box resumed counting after a stall; ascending.
   ClockMap(const LoadCellColumns& columns, double device_rate_hz, std::span<const Nanoseconds> breaks = {});
 
   [[nodiscard]] const std::vector<ClockEpoch>& epochs() const { return epochs_; }
   /// Bench time of the sample in record `index` of `epoch`. Increases with the index.
   [[nodiscard]] Nanoseconds time_ns(const ClockEpoch& epoch, std::size_t index) const;
-  /// First record of `epoch` at or after `time`; epoch.end when there is none.
+  /// First record of `epoch` at or after `time`; epoch.end if there is none.
   [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, Nanoseconds time) const;
   /// The same among records [begin, end) of the epoch, of which all before begin are earlier.
   [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, Nanoseconds time, std::size_t begin,
                                      std::size_t end) const;
   /// Of each record.
   [[nodiscard]] std::span<const std::uint32_t> ft_sequence() const { return ft_; }
-  /// Skew of an epoch in parts per million.
-  [[nodiscard]] static double skew_ppm(const ClockEpoch& epoch) { return 1e6 * epoch.skew; }
-  /// Below 500 ppm; more means that rate or stride are not what the box said.
-  [[nodiscard]] static bool plausible(const ClockEpoch& epoch) { return epoch.skew < 500e-6 && epoch.skew > -500e-6; }
 
  private:
   [[nodiscard]] std::uint32_t count(const ClockEpoch& epoch, std::size_t index) const;
@@ -56,7 +51,7 @@ class ClockMap {
   std::vector<ClockEpoch> epochs_;
 };
 
-/// When the box took up measuring again after it had repeated itself: its clock stood still until then.
+/// Ends of the stalls, in which the box repeats its measurement and its clock stands still.
 [[nodiscard]] std::vector<Nanoseconds> stall_ends(std::span<const StreamEvent> events);
 
 }  // namespace kphi::results

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
+#include <iterator>
 
 namespace kphi::results {
 namespace {
@@ -10,14 +12,14 @@ namespace {
 constexpr double kLongest = 0.6;      // s, of delay and time constant
 constexpr double kEarliest = -0.05;   // s, delay
 constexpr double kGrid = 0.04;        // s
-constexpr double kConcerned = 1.2;    // s after the command: what comes later tells nothing about the lag
-constexpr double kHistory = 0.3;      // s before it, in which the smoothing forgets where it began
+constexpr double kConcerned = 1.2;    // s after the command; later bins hold no information about the lag
+constexpr double kHistory = 0.3;      // s before it, in which the smoothing forgets its initial value
 constexpr double kDerivative = 1e-3;  // s
 constexpr double kConverged = 5e-5;   // s
 constexpr int kIterations = 25;
 constexpr std::size_t kFewSteps = 3;
-constexpr double kFewToldBy = 1.5;  // steps, by what they tell
-constexpr double kTold = 2;         // standard uncertainties from which on a smoothing is one
+constexpr double kFewEffectiveSteps = 1.5;  // weighted by their information about the delay
+constexpr double kSmoothingSeen = 2;        // a smoothing of fewer standard uncertainties is taken as 0
 
 /// One reading of ω², the integral up to it, and the slope to the next one; 0 behind the last.
 struct Knot {
@@ -39,7 +41,7 @@ std::vector<Knot> knots_of(std::span<const SquaredSpeed> readings) {
   return knots;
 }
 
-/// A change of speed as it is looked at again and again.
+/// A change of speed with the integral of its ω², computed once for all trial shapes.
 struct Prepared {
   explicit Prepared(const Transition& t) : transition(t), knots(knots_of(t.squared)) {}
   const Transition& transition;
@@ -93,11 +95,11 @@ class Smoothing {
 /// Mean delay and smoothing, s.
 using Shape = std::array<double, 2>;
 
-/// Least squares of one step: what is left, how it changes with the shape.
+/// Least squares of one step: the remaining squares, and their derivatives by the shape.
 struct Misfit {
   double squares = 0;
   double bins = 0;
-  Shape gradient{};                   ///< half of that of the squares, downhill
+  Shape gradient{};                   ///< half the gradient of the squares, pointing downhill
   std::array<double, 3> curvature{};  ///< dd, ds, ss
 };
 
@@ -128,7 +130,7 @@ std::ptrdiff_t concerned(const Transition& transition) {
                   static_cast<std::ptrdiff_t>(kConcerned / transition.bin_s));
 }
 
-/// Of a bin counted from the command.
+/// Thrust in a bin counted from the command.
 double thrust_in(const Transition& transition, std::ptrdiff_t bin) {
   return bin < 0 ? transition.before[static_cast<std::size_t>(bin + bins_before(transition))]
                  : transition.thrust[static_cast<std::size_t>(bin)];
@@ -162,7 +164,7 @@ void for_each_bin(const Prepared& prepared, const Shape& shape, std::ptrdiff_t b
 Misfit misfit_of(const Prepared& prepared, const Shape& shape) {
   const Transition& transition = prepared.transition;
   Sums sums;
-  // About their levels, or the digits are spent on these.
+  // Relative to the initial levels: sums of squares of the levels themselves would lose the digits.
   const double thrust = transition.thrust.front(), squared = transition.squared.front().value;
   for_each_bin(prepared, shape, concerned(transition),
                [&](std::ptrdiff_t i, double x, double x_delay, double x_smooth) {
@@ -191,7 +193,7 @@ struct Total {
   Misfit sum;
   std::array<double, 3> scatter{};  ///< of the gradients
   double weights = 0, squared_weights = 0;
-  /// Steps, by what they tell about the delay.
+  /// Effective number of steps, weighted by their information about the delay.
   [[nodiscard]] double steps() const { return squared_weights > 0 ? weights * weights / squared_weights : 0; }
 };
 
@@ -229,39 +231,12 @@ Shape step_of(const Misfit& m, const Shape& at, double damping, bool held) {
   return {dd > 0 ? m.gradient[0] / dd : 0, 0};
 }
 
-/// What a delay without smoothing leaves.
-double squares_at(const Prepared& prepared, double delay) {
-  const Transition& transition = prepared.transition;
-  Integral integral(prepared.knots);
-  const double h = transition.bin_s;
-  const double thrust = transition.thrust.front(), squared = transition.squared.front().value;
-  double n = 0, y = 0, x = 0, yy = 0, xx = 0, xy = 0;
-  const std::ptrdiff_t first = -bins_before(transition), last = concerned(transition);
-  auto left = integral.at(static_cast<double>(first) * h - delay);
-  for (std::ptrdiff_t i = first; i < last; ++i) {
-    const auto right = integral.at(static_cast<double>(i + 1) * h - delay);
-    const double q = (right.integral - left.integral) / h - squared;
-    const double t = thrust_in(transition, i) - (std::isnan(thrust) ? 0 : thrust);
-    left = right;
-    if (std::isnan(t)) continue;
-    n += 1;
-    y += t;
-    x += q;
-    yy += t * t;
-    xx += q * q;
-    xy += t * q;
-  }
-  if (n < 4) return 0;
-  const double sxx = xx - x * x / n, sxy = xy - x * y / n;
-  return yy - y * y / n - (sxy > 0 && sxx > 0 ? sxy * sxy / sxx : 0);
-}
-
 double best_of_grid(std::span<const Prepared> transitions) {
   double best = 0;
   double least = std::numeric_limits<double>::infinity();
   for (double delay = kEarliest + kGrid; delay < kLongest; delay += kGrid) {
     double squares = 0;
-    for (const Prepared& transition : transitions) squares += squares_at(transition, delay);
+    for (const Prepared& transition : transitions) squares += misfit_of(transition, {delay, 0}).squares;
     if (squares >= least) continue;
     least = squares;
     best = delay;
@@ -269,14 +244,37 @@ double best_of_grid(std::span<const Prepared> transitions) {
   return best;
 }
 
-/// Standard uncertainties of mean delay and smoothing: from the residuals, and from how the steps disagree (sandwich),
-/// which few steps cannot tell alone. Only of the delay when the smoothing is held.
+/// Standard uncertainty of the delay because the speed may change at any time between two readings, s. It averages out
+/// over steps whose readings fall at any distance from the command; the part that does not is the resultant of these
+/// distances, as angles on a circle of one reading interval (1: all readings keep the same distance, no averaging).
+double u_between_readings(std::span<const Prepared> transitions) {
+  std::complex<double> resultant = 0;
+  double variance = 0, weights = 0;
+  for (const Prepared& prepared : transitions) {
+    const std::vector<Knot>& knots = prepared.knots;
+    const auto later_than = [](double time) { return [time](const Knot& knot) { return knot.time > time; }; };
+    const auto first = std::find_if(std::next(knots.begin()), knots.end(), later_than(0));
+    const auto last = std::find_if(first, knots.end(), later_than(kConcerned));
+    if (first == last) continue;
+    for (auto knot = first; knot != last; ++knot) {
+      const double interval = knot->time - std::prev(knot)->time;
+      variance += std::pow((knot->value - std::prev(knot)->value) * interval, 2) / 12;
+    }
+    const double weight = std::pow(std::prev(last)->value - std::prev(first)->value, 2);
+    resultant += std::polar(weight, 2 * M_PI * first->time / (first->time - std::prev(first)->time));
+    weights += weight;
+  }
+  return weights > 0 ? std::abs(resultant) / weights * std::sqrt(variance / weights) : 0;
+}
+
+/// Standard uncertainties of mean delay and smoothing: from the residuals, and from the scatter between the steps
+/// (sandwich), which a few steps alone underestimate. Only of the delay when the smoothing is held.
 Shape uncertainties(const Total& total, bool held) {
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   const double n = total.steps();
   const auto& h = total.sum.curvature;
   const auto& g = total.scatter;
-  if (n < kFewToldBy || !(h[0] > 0)) return {kUnknown, kUnknown};
+  if (n < kFewEffectiveSteps || !(h[0] > 0)) return {kUnknown, kUnknown};
   const double spare = n / std::max(n - (held ? 1 : 2), 0.5);
   const double noise = total.sum.squares / std::max(total.sum.bins, 1.0);
   if (held) return {std::sqrt(spare * g[0] / (h[0] * h[0]) + noise / h[0]), kUnknown};
@@ -322,16 +320,19 @@ Lag estimate_lag(std::span<const Transition> transitions) {
   if (usable.size() < kFewSteps) return {};
   Fitted best = fitted(usable, {best_of_grid(usable), 0}, true);
   Shape u = uncertainties(best.total, true);
-  // A first guess of half the delay: at none the two look alike.
+  // Start at half the delay: at no smoothing at all its derivative equals that of the delay.
   const Fitted smooth = fitted(usable, {best.shape[0], std::max(0.5 * best.shape[0], 0.0)}, false);
   const Shape u_smooth = uncertainties(smooth.total, false);
-  if (smooth.shape[1] > kTold * u_smooth[1]) {
+  if (smooth.shape[1] > kSmoothingSeen * u_smooth[1]) {
     best = smooth;
     u = u_smooth;
   }
   const double delay = best.shape[0] - best.shape[1];
   const bool at_edge = delay <= kEarliest || delay >= kLongest || best.shape[1] >= kLongest;
-  return {best.shape[0], at_edge ? std::numeric_limits<double>::quiet_NaN() : u[0], best.shape[1]};
+  Lag lag{best.shape[0], std::hypot(u[0], u_between_readings(usable)), best.shape[1],
+          std::max(best.total.steps() - 1, 1.0)};
+  if (at_edge) lag.u = std::numeric_limits<double>::quiet_NaN();
+  return lag;
 }
 
 std::vector<double> delayed(const Transition& transition, const Lag& lag) {

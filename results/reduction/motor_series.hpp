@@ -1,4 +1,4 @@
-// What the motor module reported in one run, by channel and time.
+// Readings of the motor module in one run, by channel and time.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "results/records.hpp"
-#include "results/reduction/mean_error.hpp"
+#include "results/reduction/bin_statistics.hpp"
 
 namespace kphi::results {
 
@@ -20,11 +20,11 @@ struct Statistics {
 };
 
 /// A speed that a rotor cannot have: further than a quarter (at least 50 rad/s) from the median of itself, the two
-/// readings before and the two after. A monotonous change is never one.
+/// readings before and the two after. A monotonous change never is.
 inline constexpr double kGlitchShare = 0.25;
 inline constexpr double kGlitchSpeed = 50;  ///< rad/s
 
-/// So many readings of a turning rotor's speed, bit for bit the same in a row and this long, are one that was repeated.
+/// This many consecutive readings of a turning rotor, bit for bit the same over this span, are a repeated reading.
 inline constexpr std::ptrdiff_t kFrozenReadings = 8;
 inline constexpr double kFrozenSpeedSpan = 0.1;  ///< s
 
@@ -40,7 +40,7 @@ class MotorSeries {
   /// Values times `sign`.
   [[nodiscard]] Statistics statistics(MotorChannel channel, const Window& window, double sign = 1) const;
   [[nodiscard]] std::uint64_t glitches(const Window& window) const;
-  /// Its speed stands still somewhere within the window, other than at 0.
+  /// True if a nonzero speed is repeated (kFrozenReadings) somewhere within the window.
   [[nodiscard]] bool speed_frozen(const Window& window) const;
 
  private:

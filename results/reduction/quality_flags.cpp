@@ -26,8 +26,8 @@ class Bits {
   std::uint32_t bits_ = 0;
 };
 
-/// The speed's window ends a lag earlier than the thrust's: what happens to the rotor between the two is in neither
-/// mean, but already in the thrust.
+/// The window of the speed ends a lag earlier than the one of the thrust. A change of speed in between is not in the
+/// mean speed, but already in the thrust.
 bool leaves_at_the_end(const StepEvidence& step, const MotorSeries& motor) {
   const double steady = 3 * std::max(kSpeedShare * std::abs(step.speed.mean), kSpeedSteady);
   const auto late = motor.over(MotorChannel::speed, {step.motor_window.end, step.window.end});
@@ -37,7 +37,7 @@ bool leaves_at_the_end(const StepEvidence& step, const MotorSeries& motor) {
 }
 
 void judge_speed(const StepEvidence& step, const MotorSeries& motor, Bits& bits) {
-  // Without a single reading nobody knows: that is "not reached", too.
+  // NaN without a reading counts as not reached, too.
   bits.note(QualityFlag::speed_not_reached,
             !(std::abs(step.speed.mean - step.commanded_rad_s) <= speed_tolerance(step.commanded_rad_s)));
   bits.note(QualityFlag::speed_unsteady,
@@ -56,13 +56,13 @@ void judge_cell(const StepEvidence& step, const LoadCellScale& scale, Bits& bits
   bits.note(QualityFlag::saturated, saturated || cell.at_limit);
   bits.note(QualityFlag::lost_samples, cell.lost > 0 || n < kMostSamples * step.window.seconds() * rate_hz);
   bits.note(QualityFlag::few_samples,
-            n < kFewSamples * std::max(step.planned_s, 0.0) * rate_hz || cell.n == 0 || step.speed.n < kFewSpeeds);
+            n < kFewSamples * std::max(step.planned_s, 0.0) * rate_hz || step.speed.n < kFewSpeeds);
   bits.note(QualityFlag::frozen, cell.frozen);
   const std::uint32_t others = cell.status & ~(scale.saturation_bits | kMonitorBit);
   bits.note(QualityFlag::bad_status, (others & ~kSummaryBit) != 0 || (others != 0 && !saturated));
 }
 
-/// Written so that NaN is never good.
+/// Written so that NaN raises the flag.
 void judge_module(const RunHeader& header, const MotorSeries& motor, const Window& window, Bits& bits) {
   const auto note_unless = [&](QualityFlag flag, MotorChannel channel, auto&& good) {
     const auto readings = motor.over(channel, window);
@@ -98,7 +98,7 @@ constexpr Meaning kMeanings[] = {
     {EventKind::silent, QualityFlag::silent, Concerns::until_it_ends, EventKind::resumed},
     {EventKind::box_trouble, QualityFlag::box_trouble, Concerns::instant},
     {EventKind::taken_over, QualityFlag::taken_over, Concerns::until_it_ends, EventKind::resumed},
-    // The box is read at times; nobody knows when between two readings it was set otherwise.
+    // The configuration is read now and then, so the time of the change is unknown.
     {EventKind::unusable, QualityFlag::configuration_changed, Concerns::whole_run},
     {EventKind::configuration_changed, QualityFlag::configuration_changed, Concerns::whole_run},
     {EventKind::motor_reset, QualityFlag::motor_reset, Concerns::instant},

@@ -9,11 +9,10 @@
 #include <utility>
 
 #include "base/error.hpp"
+#include "results/reduction/bin_statistics.hpp"
 #include "results/reduction/cell_stream.hpp"
-#include "results/reduction/lag.hpp"
 #include "results/reduction/motor_series.hpp"
 #include "results/reduction/quality_flags.hpp"
-#include "results/reduction/settling.hpp"
 
 namespace kphi::results {
 namespace {
@@ -45,7 +44,10 @@ class Reduction {
 
   [[nodiscard]] Reduced reduced() {
     const std::vector<HeldStep> held = held_steps();
-    lag_ = lag_of(held);
+    if (zeros_.empty() && !held.empty()) {
+      throw RecordError(fmt::format("run {}: no load-cell samples at standstill; repeat the run", run_.header.uuid));
+    }
+    lag_ = estimate_lag(transitions_of(held));
     Reduced found;
     for (const HeldStep& step : held) found.steps.push_back(mean_of(step));
     if (zeros_.empty()) return found;
@@ -55,6 +57,8 @@ class Reduction {
     for (StepMean& step : found.steps) step.quality_flags |= flags;
     return found;
   }
+
+  [[nodiscard]] std::vector<Transition> transitions() const { return transitions_of(held_steps()); }
 
  private:
   [[nodiscard]] Nanoseconds discard() const { return nanoseconds(run_.header.minimum_discard_s); }
@@ -83,17 +87,15 @@ class Reduction {
     std::vector<HeldStep> held;
     for (std::size_t i = 0; i < run_.phases.size(); ++i) {
       if (!held_to_its_end(i)) continue;
-      if (zeros_.empty()) {
-        throw RecordError(
-            fmt::format("run {}: no load-cell samples while the motor stood; repeat the run", run_.header.uuid));
-      }
       const Window whole{run_.phases[i].time_ns, run_.phases[i + 1].time_ns};
-      // In the order of time: what the cell's stream has just read, it need not read again.
-      const std::vector<double> before = thrust_before(whole);
+      // In the order of time: the stream holds the samples it has just read.
+      Transition transition;
+      transition.before = thrust_before(whole);
       CellBins bins = cell_.bins(whole);
-      const bool ramped = i > 0 && run_.phases[i - 1].phase == Phase::ramp;
-      Transition transition = transition_of(whole, bins, ramped);
-      transition.before = before;
+      transition.bin_s = bins.bin_s();
+      transition.thrust = thrust_in(bins);
+      transition.squared = squared_speeds(whole);
+      transition.ramped = i > 0 && run_.phases[i - 1].phase == Phase::ramp;
       held.push_back({run_.phases[i], whole, std::move(bins), std::move(transition)});
     }
     return held;
@@ -104,7 +106,8 @@ class Reduction {
     std::vector<double> thrust;
     for (std::size_t i = 0; i < bins.size(); ++i) {
       const Window bin = bins.window(i, i + 1);
-      thrust.push_back(newtons_ * (bins.force(i) - zeros_.force_at(bin.centre(), cell_.boot_at(bin.end))));
+      const double zero = zeros_.empty() ? 0 : zeros_.force_at(bin.centre(), cell_.boot_at(bin.end));
+      thrust.push_back(newtons_ * (bins.force(i) - zero));
     }
     return thrust;
   }
@@ -115,26 +118,20 @@ class Reduction {
     return thrust_in(cell_.bins({whole.begin - history_bins * none.width(), whole.begin}));
   }
 
-  [[nodiscard]] Transition transition_of(const Window& whole, const CellBins& bins, bool ramped) const {
-    Transition transition;
-    transition.bin_s = bins.bin_s();
-    transition.thrust = thrust_in(bins);
+  [[nodiscard]] std::vector<SquaredSpeed> squared_speeds(const Window& whole) const {
+    std::vector<SquaredSpeed> squared;
     const Window history{whole.begin - nanoseconds(kSpeedHistory), whole.end};
     for (const auto& r : motor_.over(MotorChannel::speed, history)) {
-      auto& squared = transition.squared;
       const double time_s = seconds(r.time_ns - whole.begin);
-      // Until the command the motor held what it held before, unless it was on its way.
-      if (!ramped && time_s > 0 && !squared.empty() && squared.back().time_s < 0)
-        squared.push_back({0, squared.back().value});
       if (squared.empty() || squared.back().time_s < time_s) squared.push_back({time_s, r.value * r.value});
     }
-    return transition;
+    return squared;
   }
 
-  [[nodiscard]] static Lag lag_of(const std::vector<HeldStep>& held) {
+  [[nodiscard]] static std::vector<Transition> transitions_of(const std::vector<HeldStep>& held) {
     std::vector<Transition> transitions;
     for (const HeldStep& step : held) transitions.push_back(step.transition);
-    return estimate_lag(transitions);
+    return transitions;
   }
 
   /// When the speed first was where it should be, not before the discard; that itself when it never was.
@@ -297,6 +294,11 @@ Reduced reduce_with_zeros(const RunRecording& run) {
 Reduced reduce_with_zeros(RunFile file) {
   require_usable(file.run.header);
   return Reduction(file.run, std::move(file.load_cell)).reduced();
+}
+
+std::vector<Transition> transitions_of(const RunRecording& run) {
+  require_usable(run.header);
+  return Reduction(run).transitions();
 }
 
 std::vector<StepMean> reduce(const RunRecording& run) { return reduce_with_zeros(run).steps; }

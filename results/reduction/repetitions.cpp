@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -11,6 +12,7 @@
 #include <string>
 #include <tuple>
 
+#include "base/statistics.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::results {
@@ -113,39 +115,40 @@ std::vector<Group> groups_of(std::span<const StepMean> steps) {
 
 double square(double x) { return x * x; }
 
+/// Standard uncertainty of the thrust at this speed, N: from the samples and from the uncertainty of the speed.
+double u_within(const StepMean& step) {
+  const double of_speed =
+      std::isnan(step.speed_u_rad_s) ? 0 : 2 * step.thrust_n * step.speed_u_rad_s / step.speed_rad_s;
+  return std::hypot(thrust_u_within(step), of_speed);
+}
+
 using Runs = std::map<int, Group>;  // by repetition
 
 std::set<int> good_levels(const Group& run) {
   std::set<int> levels;
   for (const StepMean* step : run) {
-    if (tells_k(*step)) levels.insert(step->step);
+    if (is_good(*step)) levels.insert(step->step);
   }
   return levels;
 }
 
 RepetitionFigure figure_of(const Group& run, const std::set<int>& levels) {
   double tx = 0, xx = 0, x_sum = 0, variance = 0, zero = 0;
+  ZeroDrift drift;
   for (const StepMean* step : run) {
+    if (is_good(*step)) drift.add(*step);
     if (!levels.contains(step->step)) continue;
     const double x = square(step->speed_rad_s);
-    const double of_speed =
-        std::isnan(step->speed_u_rad_s) ? 0 : 2 * step->thrust_n * step->speed_u_rad_s / step->speed_rad_s;
     tx += step->thrust_n * x;
     xx += x * x;
     x_sum += x;
-    variance += x * x * (square(thrust_u_within(*step)) + square(of_speed));
-    zero = std::isnan(step->zero_u_n) ? 0 : std::max(zero, step->zero_u_n);
+    variance += square(x * u_within(*step));
+    zero = std::fmax(zero, step->zero_u_n);  // ignores an unknown one
   }
   RepetitionFigure figure;
   figure.k = tx / xx;
-  figure.u = std::sqrt(variance + square(zero * x_sum)) / xx;
+  figure.u = std::sqrt(variance + square(std::hypot(zero, drift.u_n()) * x_sum)) / xx;
   return figure;
-}
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
 }
 
 std::vector<RepetitionFigure> figures_of(const Runs& runs) {
@@ -167,21 +170,88 @@ std::vector<RepetitionFigure> figures_of(const Runs& runs) {
   return figures;
 }
 
-/// Marks the outlying ones; the median of all usable ones.
-double identify_outliers(std::vector<RepetitionFigure>& figures, const RepetitionRule& rule) {
-  std::vector<double> k, u, away;
-  for (const RepetitionFigure& figure : figures) {
-    if (std::isnan(figure.k)) continue;
-    k.push_back(figure.k);
-    u.push_back(figure.u);
+std::vector<double> known(const std::vector<RepetitionFigure>& figures, double RepetitionFigure::*member) {
+  std::vector<double> values;
+  for (const RepetitionFigure& figure : figures)
+    if (!std::isnan(figure.k)) values.push_back(figure.*member);
+  return values;
+}
+
+/// χ² of the runs about the mean of their occlusion if the variance between runs were larger by `beyond`.
+double chi_squared(std::span<const std::vector<RunShare>> occlusions, double beyond) {
+  double sum = 0;
+  for (const auto& runs : occlusions) {
+    const double n = static_cast<double>(runs.size());
+    if (n < 2) continue;
+    double mean = 0, variances = 0;
+    for (const RunShare& run : runs) {
+      mean += run.k / n;
+      variances += run.variance + beyond;
+    }
+    for (const RunShare& run : runs) {
+      const double variance = (run.variance + beyond) * (1 - 2 / n) + variances / (n * n);
+      sum += square(run.k - mean) / variance * (n - 1) / n;
+    }
   }
-  if (k.empty()) return kNan;
-  const double middle = median(k);
-  if (k.size() < 3) return middle;
-  for (const double value : k) away.push_back(std::abs(value - middle));
-  const double scale = std::max({1.4826 * median(away), median(u), rule.least_share * std::abs(middle)});
-  for (RepetitionFigure& figure : figures) figure.outlying = std::abs(figure.k - middle) > rule.threshold * scale;
-  return middle;
+  return sum;
+}
+
+/// By Hampel's identifier, among the repetitions of one occlusion.
+void judge_alone(RepetitionVerdict& verdict, const RepetitionRule& rule) {
+  const std::vector<double> k = known(verdict.repetitions, &RepetitionFigure::k);
+  if (k.size() < 3) return;
+  std::vector<double> away;
+  for (const double value : k) away.push_back(std::abs(value - verdict.k));
+  const double scale = std::max({1.4826 * median(away), median(known(verdict.repetitions, &RepetitionFigure::u)),
+                                 rule.least_share * std::abs(verdict.k)});
+  for (RepetitionFigure& figure : verdict.repetitions) {
+    figure.away = figure.k / verdict.k - 1;
+    figure.outlying = std::abs(figure.k - verdict.k) > rule.threshold * scale;
+  }
+}
+
+/// By Student's test: run `r` of occlusion `o` against the others, `all` runs being tested.
+void judge_among_all(RepetitionFigure& figure, std::vector<std::vector<RunShare>> others, std::size_t o, std::size_t r,
+                     double all, const RepetitionRule& rule) {
+  const RunShare run = others[o][r];
+  others[o].erase(others[o].begin() + static_cast<std::ptrdiff_t>(r));
+  const double beyond = variance_between(others), n = static_cast<double>(others[o].size());
+  double mean = 0, variance = run.variance + beyond;
+  for (const RunShare& other : others[o]) {
+    mean += other.k / n;
+    variance += (other.variance + beyond) / (n * n);
+  }
+  const boost::math::students_t student(freedom_between(others));
+  const double chance = 2 * boost::math::cdf(complement(student, std::abs(run.k - mean) / std::sqrt(variance)));
+  figure.p = std::min(1.0, all * chance);
+  figure.away = run.k / mean - 1;
+  figure.outlying = figure.p < rule.level && std::abs(figure.away) > rule.threshold * rule.least_share;
+}
+
+/// Fills `k` of the verdicts and marks the outlying repetitions.
+void judge(std::vector<RepetitionVerdict>& verdicts, const RepetitionRule& rule) {
+  std::vector<std::vector<RunShare>> shares;
+  double all = 0;
+  for (RepetitionVerdict& verdict : verdicts) {
+    const std::vector<double> k = known(verdict.repetitions, &RepetitionFigure::k);
+    if (!k.empty()) verdict.k = median(k);
+    shares.emplace_back();
+    for (const RepetitionFigure& figure : verdict.repetitions) {
+      if (!std::isnan(figure.k)) shares.back().push_back({figure.k / verdict.k, square(figure.u / verdict.k)});
+    }
+    if (k.size() > 1) all += static_cast<double>(k.size());
+  }
+  const double freedom = freedom_between(shares);
+  for (std::size_t o = 0; o < verdicts.size(); ++o) {
+    if (shares[o].size() < 2) continue;
+    if (freedom < 3) {
+      judge_alone(verdicts[o], rule);
+      continue;
+    }
+    std::size_t r = 0;
+    for (RepetitionFigure& figure : verdicts[o].repetitions)
+      if (!std::isnan(figure.k)) judge_among_all(figure, shares, o, r++, all, rule);
+  }
 }
 
 /// One-way analysis of variance: the repetitions are the groups, and how certain each is comes from within it.
@@ -210,23 +280,22 @@ double freedom_within(const Runs& runs) {
   double freedom = 0;
   for (const auto& [repetition, run] : runs) {
     for (const StepMean* step : run) {
-      if (tells_k(*step)) freedom += std::isnan(step->thrust_freedom) ? 1 : std::min(step->thrust_freedom, 1e3);
+      if (is_good(*step)) freedom += std::isnan(step->thrust_freedom) ? 1 : std::min(step->thrust_freedom, 1e3);
     }
   }
   return freedom;
 }
 
 void decide(RepetitionVerdict& verdict, const RepetitionRule& rule) {
-  int standing = 0;
   std::vector<double> k;
   for (const RepetitionFigure& figure : verdict.repetitions) {
     if (!figure.usable) {
-      verdict.reason = fmt::format("repetition {} has too few steps without a flag", figure.repetition);
+      verdict.reason = fmt::format("repetition {} has too few unflagged steps", figure.repetition);
     } else if (figure.outlying) {
-      verdict.reason = fmt::format("repetition {} gives a k that is {:+.2f} % off the median of all (Hampel)",
-                                   figure.repetition, 100 * (figure.k / verdict.k - 1));
+      verdict.reason =
+          fmt::format("repetition {} gives a k that is {:+.2f} % off the others ({})", figure.repetition,
+                      100 * figure.away, std::isnan(figure.p) ? "Hampel" : fmt::format("p = {:.2g}", figure.p));
     } else {
-      ++standing;
       k.push_back(figure.k);
     }
   }
@@ -237,15 +306,8 @@ void decide(RepetitionVerdict& verdict, const RepetitionRule& rule) {
     verdict.reason = fmt::format("the repetitions spread over {:.2f} % of k, and none stands out",
                                  100 * (*high - *low) / std::abs(verdict.k));
   }
-  const bool too_few = standing < rule.wanted || spread;
+  const bool too_few = static_cast<int>(k.size()) < rule.wanted || spread;
   verdict.asks_for_another = runs >= rule.wanted && runs < rule.at_most && too_few;
-}
-
-/// Standard, of the thrust at this speed: from the samples, and from what the speed is uncertain.
-double u_within(const StepMean& step) {
-  const double of_speed =
-      std::isnan(step.speed_u_rad_s) ? 0 : 2 * step.thrust_n * step.speed_u_rad_s / step.speed_rad_s;
-  return std::hypot(thrust_u_within(step), of_speed);
 }
 
 struct Pair {
@@ -265,7 +327,7 @@ bool rises(std::span<const StepMean> run) {
 std::map<double, Pair> pairs_of(std::span<const StepMean> run) {
   std::map<double, std::vector<const StepMean*>> by_level;
   for (const StepMean& step : run) {
-    if (tells_k(step)) by_level[step.commanded_speed_rad_s].push_back(&step);
+    if (is_good(step)) by_level[step.commanded_speed_rad_s].push_back(&step);
   }
   std::map<double, Pair> pairs;
   for (const auto& [level, steps] : by_level) {
@@ -301,7 +363,7 @@ double density_of(std::span<const StepMean> steps, int repetition) {
 
 }  // namespace
 
-bool tells_k(const StepMean& step) {
+bool is_good(const StepMean& step) {
   return (step.quality_flags & ~kHarmlessFlags) == 0 && std::isfinite(step.thrust_n) && step.speed_rad_s > 0;
 }
 
@@ -316,7 +378,7 @@ std::vector<StepMean> means_of(std::span<const StepMean> steps) {
   for (const Group& group : groups_of(steps)) {
     Group good;
     for (const StepMean* step : group)
-      if (tells_k(*step)) good.push_back(step);
+      if (is_good(*step)) good.push_back(step);
     const bool chosen = !good.empty() && good.size() < group.size();
     means.push_back(average(chosen ? good : group));
     if (!chosen) continue;
@@ -326,10 +388,30 @@ std::vector<StepMean> means_of(std::span<const StepMean> steps) {
   return means;
 }
 
-std::vector<StepMean> average_repetitions(std::span<const StepMean> steps) {
-  std::vector<StepMean> means;
-  for (const Group& group : groups_of(steps)) means.push_back(average(group));
-  return means;
+void ZeroDrift::add(const StepMean& step) {
+  if (!std::isfinite(step.zero_n)) return;
+  lowest_ = std::min(lowest_, step.zero_n);
+  highest_ = std::max(highest_, step.zero_n);
+}
+
+double ZeroDrift::u_n() const { return moved_n() / std::sqrt(12.0); }
+
+double freedom_between(std::span<const std::vector<RunShare>> occlusions) {
+  double freedom = 0;
+  for (const auto& runs : occlusions) freedom += runs.empty() ? 0 : static_cast<double>(runs.size() - 1);
+  return freedom;
+}
+
+double variance_between(std::span<const std::vector<RunShare>> occlusions) {
+  const double freedom = freedom_between(occlusions);
+  double low = 0, high = 1e-12;
+  if (chi_squared(occlusions, 1e-16) <= freedom) return 0;
+  while (chi_squared(occlusions, high) > freedom) high *= 4;
+  for (int i = 0; i < 40; ++i) {
+    const double middle = 0.5 * (low + high);
+    (chi_squared(occlusions, middle) > freedom ? low : high) = middle;
+  }
+  return high;
 }
 
 std::vector<RepetitionVerdict> judge_repetitions(std::span<const StepMean> steps, const RepetitionRule& rule) {
@@ -349,7 +431,9 @@ std::vector<RepetitionVerdict> judge_repetitions(std::span<const StepMean> steps
   }
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
     verdicts[i].repetitions = figures_of(runs[i]);
-    verdicts[i].k = identify_outliers(verdicts[i].repetitions, rule);
+  }
+  judge(verdicts, rule);
+  for (std::size_t i = 0; i < verdicts.size(); ++i) {
     analyse(verdicts[i], freedom_within(runs[i]));
     decide(verdicts[i], rule);
   }
@@ -362,11 +446,10 @@ std::string Hysteresis::to_words() const {
   });
   const auto beyond = std::count_if(speeds.begin(), speeds.end(), [](const auto& p) { return p.significant(); });
   return fmt::format(
-      "thrust going up less that going down: {:+.3f} ± {:.3f} % of k{}; at most {:+.4f} ± {:.4f} N, at {:.0f} RPM; {} "
-      "of "
-      "{} speeds beyond twice their uncertainty",
-      100 * share, 100 * u_share, significant() ? "" : ", no hysteresis is seen", largest->up_minus_down_n,
-      largest->u_n, to_rpm(RadPerSec(largest->speed_rad_s)), beyond, speeds.size());
+      "thrust going up minus going down: {:+.3f} ± {:.3f} % of k{}; at most {:+.4f} ± {:.4f} N at {:.0f} RPM; {} of {} "
+      "speeds beyond twice their uncertainty",
+      100 * share, 100 * u_share, significant() ? "" : ", no hysteresis seen", largest->up_minus_down_n, largest->u_n,
+      to_rpm(RadPerSec(largest->speed_rad_s)), beyond, speeds.size());
 }
 
 std::optional<Hysteresis> hysteresis_of(std::span<const StepMean> run) {
@@ -394,9 +477,9 @@ bool ReferenceDrift::drifted() const { return std::abs(share) > std::max(2 * u_s
 
 std::string ReferenceDrift::to_words() const {
   return fmt::format("from the first to the last reference run k changed by {:+.3f} ± {:.3f} %{}{}", 100 * share,
-                     100 * u_share, same_air ? " at equal density of the air" : "",
-                     drifted() ? ": the bench has drifted; look at propeller, mounting and load cell, and take "
-                                 "what lies between with care"
+                     100 * u_share, same_air ? " at equal air density" : "",
+                     drifted() ? ": the bench has drifted; check propeller, mounting and load cell, and doubt the "
+                                 "runs in between"
                                : "");
 }
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kStandstill = 5.0;  // rad/s
 
-/// The time after which no reading says that the motor turns.
+/// The time after the last reading of a turning motor.
 Nanoseconds standstill_in(const MotorSeries& motor, const Window& window) {
   Nanoseconds time = window.begin;
   for (const auto& reading : motor.over(MotorChannel::speed, window)) {
@@ -95,21 +95,21 @@ bool ZeroCheck::noisy() const { return deviation_n > kNoisyZero || u_n > 0.5 * t
 std::vector<std::string> ZeroCheck::reasons() const {
   std::vector<std::string> reasons;
   if (only_one) {
-    reasons.push_back("only one of the two zeros of this run could be taken: all its steps are flagged");
+    reasons.push_back("only one of the two zeros of this run was measured: all its steps are flagged");
   } else if (drifted()) {
     reasons.push_back(
-        fmt::format("its zero moved by {:.3g} N during this run, {:.2g} N are tolerated: all its steps are flagged; "
+        fmt::format("zero moved by {:.3g} N during this run, limit {:.2g} N: all its steps are flagged; "
                     "let the cell warm up, keep draughts off it, see that nothing touches it",
                     moved_n, tolerated_n));
   }
   if (deviation_n > kNoisyZero) {
     reasons.push_back(
-        fmt::format("at a zero of this run the samples scatter by {:.3g} N, {:g} N are tolerated: all its steps are in "
-                    "flag; {}",
+        fmt::format("samples at a zero of this run scatter by {:.3g} N, limit {:g} N: all its steps are "
+                    "flagged; {}",
                     deviation_n, kNoisyZero, kZeroNextMove));
   } else if (noisy()) {
     reasons.push_back(
-        fmt::format("a zero of this run is known to {:.2g} N only, {:.2g} N are tolerated: all its steps are flagged; "
+        fmt::format("a zero of this run is known to {:.2g} N only, limit {:.2g} N: all its steps are flagged; "
                     "take longer zeros, or {}",
                     u_n, 0.5 * tolerated_n, kZeroNextMove));
   }

@@ -1,5 +1,5 @@
-// The zeros of a run: what the load cell said while the motor stood, before and after, and what lies between.
-// Apart from the box's own bias, which is recorded with the run and changes no count that is stored.
+// Zeros of a run: the load cell at standstill before and after it, interpolated in between. The box's own bias is
+// separate: it is recorded with the run and does not change the stored counts.
 #pragma once
 
 #include <algorithm>
@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "results/records.hpp"
+#include "results/reduction/bin_statistics.hpp"
 #include "results/reduction/cell_stream.hpp"
-#include "results/reduction/mean_error.hpp"
 #include "results/reduction/motor_series.hpp"
 
 namespace kphi::results {
@@ -30,17 +30,17 @@ inline constexpr const char* kZeroNextMove = "let the stand come to rest, keep h
   return std::max(0.005 * largest_thrust_n, 0.02);
 }
 
-/// What the zeros of a run say of its thrust, N.
+/// Check of the zeros of a run, N.
 struct ZeroCheck {
-  double moved_n = 0;      ///< from before to after; NaN with one of them only, or when the box started anew between
-  double tolerated_n = 0;  ///< of moved_n
+  double moved_n = 0;      ///< from before to after; NaN if one is missing or the box restarted in between
+  double tolerated_n = 0;  ///< limit of moved_n
   double deviation_n = 0;  ///< of the samples, the larger one
-  bool only_one = false;   ///< of one power-up, in a run that was finished: nobody knows how far it moved
-  double u_n = 0;          ///< standard uncertainty of a zero, the larger one; NaN: too short to tell
+  bool only_one = false;   ///< in a finished run, of one power-up: the movement is unknown
+  double u_n = 0;          ///< standard uncertainty of a zero, the larger one; NaN: zero too short
   [[nodiscard]] bool drifted() const;
-  /// Its samples scatter, or its mean is less certain than half of what it may move.
+  /// The samples scatter too much, or the mean is less certain than half of the limit of movement.
   [[nodiscard]] bool noisy() const;
-  /// Why it is refused and what to do, one line each; empty when it is good.
+  /// Causes and next moves, one line each; empty: the zeros are good.
   [[nodiscard]] std::vector<std::string> reasons() const;
 };
 
@@ -57,32 +57,32 @@ struct Zero {
 struct ZeroThen {
   double force = 0;
   double torque = 0;
-  double u = 0;        ///< of the force, standard; without how far from a line it moved
+  double u = 0;        ///< of the force, standard; excludes deviations from a linear drift
   double freedom = 0;  ///< degrees of freedom of u
 };
 
 class Zeros {
  public:
-  /// Means of zero_before and of zero_after, the latter without its beginning, and only once the motor stands. Their
-  /// uncertainty is about a line: what they drift is subtracted, not unknown.
+  /// Means of zero_before and zero_after, the latter without its beginning and only at standstill. Their uncertainty is
+  /// about a line, since the linear drift is subtracted.
   Zeros(const RunRecording& run, const CellStream& cell, const MotorSeries& motor);
 
   [[nodiscard]] bool empty() const { return !zeros_[0]; }
-  [[nodiscard]] bool both() const { return zeros_[1].has_value(); }
-  /// Power-up of the first zero: the only one without a flag.
+  /// Power-up of the first zero; steps of any other one are flagged.
   [[nodiscard]] std::size_t boot() const { return zeros_[0]->boot; }
-  /// Linear in time between the two; with one of them only, that one. Of another power-up, its own if there is one.
+  /// Linear in time between the two; a single one is constant. After a restart of the box, the zero of that power-up if
+  /// there is one.
   [[nodiscard]] ZeroThen at(double time, std::size_t boot) const;
-  /// Of the same, the force alone.
+  /// Force of at().
   [[nodiscard]] double force_at(double time, std::size_t boot) const;
-  /// Counts from before to after; NaN when nobody can tell.
+  /// Counts from before to after; NaN: unknown.
   [[nodiscard]] double movement() const;
   [[nodiscard]] double largest_deviation() const;
   [[nodiscard]] double largest_u() const;
 
  private:
   void add(const Zero& zero) { (zeros_[0] ? zeros_[1] : zeros_[0]) = zero; }
-  /// The only one that holds for a power-up; nullptr: both do.
+  /// The one zero that applies to a power-up; nullptr: both do.
   [[nodiscard]] const Zero* only(std::size_t boot) const;
   [[nodiscard]] double share(double time) const {
     return (time - zeros_[0]->time) / (zeros_[1]->time - zeros_[0]->time);

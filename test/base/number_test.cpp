@@ -27,6 +27,8 @@ TEST(ParseFinite, RefusesNanAndInfinities) {
 TEST(ParseInteger, HoldsTheRangeOfItsType) {
   EXPECT_EQ(parse_integer<std::uint16_t>("65535"), 65535);
   EXPECT_EQ(parse_integer<int>("-7"), -7);
+  for (const char* text : {"", "-1", "+1", " 1", "1 ", "1.0", "0x1", "99999999999"})
+    EXPECT_FALSE(parse_integer<unsigned>(text)) << text;
   EXPECT_EQ(parse_integer<std::uint16_t>("dd", 16), 0xdd);
   EXPECT_FALSE(parse_integer<std::uint16_t>("65536"));
   EXPECT_FALSE(parse_integer<unsigned>("-1"));

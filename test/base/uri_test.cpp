@@ -50,13 +50,6 @@ TEST(Uri, HasAHostAndAPort) {
     EXPECT_NE(refusal([&] { return uri(text).host_and_port(502); }), "accepted") << text;
 }
 
-TEST(WholeNumber, IsDigitsAlone) {
-  EXPECT_EQ(parse_whole("0"), 0u);
-  EXPECT_EQ(parse_whole("115200"), 115200u);
-  for (const char* text : {"", "-1", "+1", " 1", "1 ", "1.0", "0x1", "99999999999"})
-    EXPECT_FALSE(parse_whole(text)) << text;
-}
-
 TEST(UsbAddress, IsVendorAndProductThenSerialAndPort) {
   EXPECT_EQ(UsbAddress::parse("usb:04d8:00dd"), (UsbAddress{0x04d8, 0x00dd, "", ""}));
   EXPECT_EQ(UsbAddress::parse("usb:04D8:00DD:0001AB"), (UsbAddress{0x04d8, 0x00dd, "0001AB", ""}));

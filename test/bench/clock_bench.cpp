@@ -49,8 +49,8 @@ std::vector<Told> listen(LoadCell& cell, ClockEstimate& estimate, std::chrono::s
     const std::size_t count = cell.take(records);
     for (std::size_t i = 0; i < count; ++i) {
       if (last.arrival.count() > 0 && records[i].arrival != last.arrival) {
-        estimate.add(last.record.ft_sequence, last.arrival);
-        told.push_back({last.record.ft_sequence, estimate.host_time(last.record.ft_sequence)});
+        const Duration late = estimate.add(last.record.ft_sequence, last.arrival);
+        told.push_back({last.record.ft_sequence, last.arrival - late});
       }
       last = records[i];
     }
@@ -70,14 +70,14 @@ Quality against_truth(const std::vector<Told>& told, const sim::WireTruth& truth
   return errors.quality();
 }
 
-void over_real_sockets(Command mode, int busy_loops) {
+void over_real_sockets(int records_per_datagram, int busy_loops) {
   const BusyLoops busy(busy_loops);
   const std::filesystem::path folder = std::filesystem::temp_directory_path() / fmt::format("kphi-clock-{}", getpid());
   std::filesystem::create_directory(folder);
   sim::ServerSettings settings;
   settings.control = folder / "control";
   settings.bench.netbox.rate_hz = 7000;
-  settings.bench.netbox.records_per_datagram = 40;
+  settings.bench.netbox.records_per_datagram = records_per_datagram;
   settings.bench.keep = sim::FaultInjector::Keep::samples;
   sim::Fault skew;
   skew.kind = sim::FaultKind::clock_skew;
@@ -92,13 +92,13 @@ void over_real_sockets(Command mode, int busy_loops) {
   ClockEstimate estimate(7000);
   std::vector<Told> told;
   {
-    LoadCell cell({"127.0.0.1", server.addresses().rdt_port, server.addresses().http_port}, clock, mode);
+    LoadCell cell({"127.0.0.1", server.addresses().rdt_port, server.addresses().http_port}, clock);
     cell.start();
     told = listen(cell, estimate, std::chrono::seconds(45));
   }
   server.request_stop();
   box.join();
-  state(fmt::format("sockets: {}, {} busy loops", mode == Command::buffered ? "buffered" : "single-record", busy_loops),
+  state(fmt::format("sockets: {}, {} busy loops", records_per_datagram > 1 ? "buffered" : "single-record", busy_loops),
         against_truth(told, server.truth()), estimate.skew_ppm());
   std::filesystem::remove_all(folder);
 }
@@ -107,6 +107,6 @@ void over_real_sockets(Command mode, int busy_loops) {
 
 int main() {
   over_the_model();
-  over_real_sockets(Command::buffered, 2);
-  over_real_sockets(Command::real_time, 2);
+  over_real_sockets(40, 2);
+  over_real_sockets(1, 2);
 }

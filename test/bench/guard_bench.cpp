@@ -27,9 +27,7 @@ constexpr double kSeconds = 2;
 /// A load cell on a box, and a motor that says nothing.
 class CellBench final : public daq::Bench, private daq::LoadCellLink {
  public:
-  CellBench(const Ports& ports, bool buffered)
-      : cell_({"127.0.0.1", ports.rdt, ports.http}, clock_,
-              buffered ? netbox::Command::buffered : netbox::Command::real_time) {}
+  explicit CellBench(const Ports& ports) : cell_({"127.0.0.1", ports.rdt, ports.http}, clock_) {}
   [[nodiscard]] const Clock& clock() const override { return clock_; }
   [[nodiscard]] daq::MotorLink& motor() override { return motor_; }
   [[nodiscard]] daq::LoadCellLink& load_cell() override { return *this; }
@@ -48,7 +46,7 @@ class CellBench final : public daq::Bench, private daq::LoadCellLink {
 
  private:
   [[nodiscard]] const netbox::Configuration& configuration() const override { return cell_.configuration(); }
-  [[nodiscard]] std::vector<netbox::Finding> findings() const override { return {}; }
+  [[nodiscard]] std::vector<Finding> findings() const override { return {}; }
   std::size_t take(std::span<results::LoadCellRecord> out) override {
     stamped_.resize(out.size());
     const std::size_t n = cell_.take(stamped_);
@@ -109,9 +107,9 @@ std::vector<GuardLimit> limits() {
   return table;
 }
 
-Shares run(const BoxProcess& box, bool buffered, bool guarded) {
+Shares run(const BoxProcess& box, bool guarded) {
   const kphi::test::TemporaryFolder folder;
-  CellBench bench(box.ports(), buffered);
+  CellBench bench(box.ports());
   const std::set<int> before = threads_of_this_process();
   const results::LoadCellScale scale = bench.load_cell().start();
   int receiver = 0;
@@ -150,10 +148,10 @@ Shares run(const BoxProcess& box, bool buffered, bool guarded) {
   return shares;
 }
 
-void compare(const BoxProcess& box, bool buffered, const std::string& mode) {
+void compare(const BoxProcess& box, const std::string& mode) {
   std::vector<double> of_receiving, work_of_receiving, of_all, guard, receiver, recorder, idle;
   for (int i = 0; i < kPairs; ++i) {
-    const Shares plain = run(box, buffered, false), guarded = run(box, buffered, true);
+    const Shares plain = run(box, false), guarded = run(box, true);
     of_receiving.push_back(guarded.guard / guarded.receiver);
     work_of_receiving.push_back((guarded.guard - guarded.idle) / guarded.receiver);
     of_all.push_back(guarded.all() / plain.all());
@@ -176,6 +174,6 @@ void compare(const BoxProcess& box, bool buffered, const std::string& mode) {
 
 int main() {
   const BoxProcess single({.records_per_datagram = 1}), blocks({});
-  compare(blocks, true, "buffered");
-  compare(single, false, "single-record");
+  compare(blocks, "buffered");
+  compare(single, "single-record");
 }

@@ -29,9 +29,9 @@ void compare(const BoxProcess& box, bool buffered, const std::string& mode) {
   bench::at_most(1.5, median(ratios), mode + ", 200 k/s: CPU time of receive thread / bare recvmmsg loop");
 }
 
-void lose_nothing(const BoxProcess& box, bool buffered, const std::string& mode) {
+void lose_nothing(const BoxProcess& box, const std::string& mode) {
   const SteadyClock clock(kHasteHz / 7000);
-  Driver driver(box.ports(), clock, buffered, HandOver::gathered);
+  Driver driver(box.ports(), clock);
   const Cost cost = driver.run(5, Driver::Consumer::waits);
   fmt::print("{}: {} records at {:.0f}/s, {} lost, {}\n", mode, cost.records, cost.rate_hz(), cost.lost,
              driver.in_order ? "in order" : "OUT OF ORDER");
@@ -46,6 +46,6 @@ int main() {
   const BoxProcess single({.records_per_datagram = 1, .speed = speed}), blocks({.speed = speed});
   compare(blocks, true, "buffered");
   compare(single, false, "single-record");
-  lose_nothing(blocks, true, "buffered");
-  lose_nothing(single, false, "single-record");
+  lose_nothing(blocks, "buffered");
+  lose_nothing(single, "single-record");
 }

@@ -1,5 +1,5 @@
 // A box at its true 7000 records per second, evenly sent: what that costs of one core and how old the records are when
-// the consumer has them, for each way of handing over, against a loop of poll and recvmmsg that wakes up for each
+// the consumer has them, against a loop of poll and recvmmsg that wakes up for each
 // datagram, and against the goals of 2 % of a core and of an age (99 of 100) of 0.2 ms, buffered 1 ms. Then the stall
 // that the receive buffer survives, and a minute beside two busy loops.
 #include "test/bench/figures.hpp"
@@ -18,7 +18,6 @@ constexpr double kSeconds = 3;
 struct Way {
   std::string name;
   bool buffered;
-  HandOver hand_over;
   Consumer consumer;
   bool to_be_cheap;    // 2 % of a core
   double age_goal_us;  // 0: none
@@ -29,7 +28,7 @@ double percent(double cpu_s, const Cost& cost) { return 100 * cpu_s / cost.wall_
 void budget(const BoxProcess& box, const Way& way) {
   const Cost floor = BareReceiver(box.ports(), way.buffered).run(kSeconds, std::chrono::nanoseconds(0));
   const SteadyClock clock;
-  Driver driver(box.ports(), clock, way.buffered, way.hand_over);
+  Driver driver(box.ports(), clock);
   driver.keep_ages = true;
   const Cost cost = driver.run(kSeconds, way.consumer);
   const auto age_us = [&](std::size_t percentile) { return 1e6 * to_seconds(driver.age(percentile)); };
@@ -48,7 +47,7 @@ void budget(const BoxProcess& box, const Way& way) {
 void soak(const BoxProcess& box) {
   const BusyLoops busy(2);
   const SteadyClock clock;
-  Driver driver(box.ports(), clock, true);
+  Driver driver(box.ports(), clock);
   driver.keep_ages = true;
   const Cost cost = driver.run(60, Consumer::waits);
   const auto age_ms = [&](std::size_t percentile) { return 1e3 * to_seconds(driver.age(percentile)); };
@@ -60,9 +59,9 @@ void soak(const BoxProcess& box) {
                  "buffered, 60 s beside 2 busy loops: lost / received");
 }
 
-void stall(const BoxProcess& box, bool buffered, const char* mode) {
+void stall(const BoxProcess& box, const char* mode) {
   const SteadyClock clock;
-  Driver driver(box.ports(), clock, buffered);
+  Driver driver(box.ports(), clock);
   const std::string note = driver.cell().receive_buffer_note();
   fmt::print("{}: receive buffer {}\n", mode, note);
   const double ms = std::stod(note.substr(note.find("tolerates ") + 10));
@@ -73,12 +72,10 @@ void stall(const BoxProcess& box, bool buffered, const char* mode) {
 
 int main() {
   const BoxProcess single({.records_per_datagram = 1}), blocks({});
-  budget(blocks, {"buffered, consumer waits", true, HandOver::as_asked, Consumer::waits, true, 1000});
-  budget(single, {"single-record, as asked, consumer waits", false, HandOver::as_asked, Consumer::waits, true, 200});
-  budget(single, {"single-record, as asked, consumer polls", false, HandOver::as_asked, Consumer::polls, true, 0});
-  budget(single, {"single-record, at once, consumer waits", false, HandOver::at_once, Consumer::waits, false, 200});
-  budget(single, {"single-record, gathered, consumer waits", false, HandOver::gathered, Consumer::waits, true, 3000});
-  stall(single, false, "single-record");
-  stall(blocks, true, "buffered");
+  budget(blocks, {"buffered, consumer waits", true, Consumer::waits, true, 1000});
+  budget(single, {"single-record, consumer polls", false, Consumer::polls, true, 0});
+  budget(single, {"single-record, consumer waits", false, Consumer::waits, true, 3000});
+  stall(single, "single-record");
+  stall(blocks, "buffered");
   soak(blocks);
 }

@@ -162,7 +162,7 @@ try {
   // Meanwhile the first run goes on.
   await it('shows a recorded run again, in which nothing can be stopped', async () => {
     const file = new URL('../../results/reference/runs/5x3_phi090_rep1.h5', import.meta.url).pathname;
-    const replay = new Child(kphi, ['replay', file, '--live', '--speed', '3']);
+    const replay = new Child([kphi, 'replay', file, '--live', '--speed', '3']);
     try {
       const seen = await open(browser, await addressOf(replay), { colorScheme: 'dark' });
       const during = await seen.waitForFunction(() => state.steps.length >= 1 && !state.ended

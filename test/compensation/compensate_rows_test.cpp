@@ -123,7 +123,7 @@ TEST(CompensateRows, SaysWhatIsWrongWithTheHeader) {
 
 TEST(CompensateRows, CountsRowsWithAnArmWhereNoServoGoes) {
   const Result result = compensated(kHeader + "45,45,45,45,1,1,1,1\n45,45,200,-91,1,1,1,1\n45,45,45,180,1,1,1,1\n");
-  EXPECT_EQ(result.counts.written, 3u);
+  EXPECT_EQ(result.counts.written, 3u) << "180° is the end of the range and in it";
   EXPECT_EQ(result.counts.out_of_reach, 1u);
 }
 

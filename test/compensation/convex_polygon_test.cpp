@@ -8,7 +8,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "compensation/rim_arc.hpp"
+#include "compensation/occlusion.hpp"
 #include "test/compensation/geometry_vectors.hpp"
 
 namespace kphi::compensation {

@@ -1,11 +1,10 @@
-#include "compensation/rim_arc.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <random>
 
+#include "compensation/occlusion.hpp"
 #include "test/compensation/geometry_vectors.hpp"
 
 namespace kphi::compensation {

@@ -4,10 +4,13 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <string>
+#include <vector>
 
 #include "daq/campaign/operator.hpp"
 #include "daq/run/run.hpp"
@@ -47,6 +50,35 @@ inline profiles::BenchConfig deterministic_config(int seed, const std::string& f
           "thrust_axis: \"+Fz\"\nsimulation: {{in_process: true, seed: {}{}}}\n",
           seed, faults.empty() ? "" : ", faults: " + faults),
       "bench.yaml");
+}
+
+/// Keeps the lines that a run says, and calls `then` with each.
+class SaidLines final : public daq::Progress {
+ public:
+  void tick(const daq::Position&, const daq::Observation&) override {}
+  void step_done(const daq::Position&, const daq::Observation&) override {}
+  void say(const std::string& line) override {
+    lines.push_back(line);
+    if (then) then(line);
+  }
+  std::vector<std::string> lines;
+  std::function<void(const std::string&)> then;
+};
+
+/// 12 V from the simulated supply.
+inline profiles::BenchConfig with_supply(profiles::BenchConfig config, double current_limit_a = 50) {
+  config.supply =
+      profiles::SupplyConfig{"modbus-rtu:/dev/null", Volts(12), Amperes(current_limit_a), Volts(13.5), Amperes(60)};
+  return config;
+}
+
+/// The simulated motor stands, or slows down during the next second as only a coasting one does.
+template <class Bench>
+bool motor_is_let_go(Bench& bench) {
+  const double before = std::abs(bench.simulation().plant().motor().speed);
+  bench.wait_until(bench.clock().now() + std::chrono::seconds(1));
+  const double after = std::abs(bench.simulation().plant().motor().speed);
+  return after < 1.0 || after < 0.7 * before;
 }
 
 /// The campaign's first run, without occlusion, as if somebody had confirmed that; keeps what it is given.

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "daq/virtual/deterministic_bench.hpp"
+#include "test/daq/wrapped_bench.hpp"
 
 namespace kphi::daq {
 
@@ -69,24 +69,14 @@ class SpoiltMotor final : public MotorLink {
   MotorLink& inner_;
 };
 
-class CoastingBench final : public Bench {
+class CoastingBench final : public WrappedBench {
  public:
   static constexpr double kNothing = 0.1;  ///< A in the winding; a step of a campaign takes 2 to 20
-  explicit CoastingBench(const profiles::BenchConfig& config) : bench(config) {
+  explicit CoastingBench(const profiles::BenchConfig& config) : WrappedBench(config) {
     if (bench.supply() != nullptr) spoilt_supply = std::make_unique<SpoiltSupply>(*bench.supply(), bench.clock());
   }
-  [[nodiscard]] const Clock& clock() const override { return bench.clock(); }
   [[nodiscard]] MotorLink& motor() override { return spoilt_motor; }
-  [[nodiscard]] LoadCellLink& load_cell() override { return bench.load_cell(); }
   [[nodiscard]] SupplyLink* supply() override { return spoilt_supply.get(); }
-  [[nodiscard]] results::FileLayer& files() override { return bench.files(); }
-  [[nodiscard]] Duration sync_interval() const override { return bench.sync_interval(); }
-  [[nodiscard]] bool switch_off_power() override { return bench.switch_off_power(); }
-  void restore_power() override { bench.restore_power(); }
-  void mounted(const std::string& propeller, double occlusion) override { bench.mounted(propeller, occlusion); }
-  [[nodiscard]] std::unique_ptr<Background> run_periodically(std::function<void()> work) override {
-    return bench.run_periodically(std::move(work));
-  }
   void wait_until(Instant when) override {
     while (clock().now() < when) {
       bench.wait_until(std::min(when, clock().now() + std::chrono::milliseconds(1)));
@@ -97,7 +87,6 @@ class CoastingBench final : public Bench {
     }
   }
 
-  DeterministicBench bench;
   SpoiltMotor spoilt_motor{bench.motor()};
   std::unique_ptr<SpoiltSupply> spoilt_supply;
   /// Since then the bridge is open, or (its supply cut, the bus down to what the rotor itself induces) it carries less

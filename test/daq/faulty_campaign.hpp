@@ -12,23 +12,15 @@
 #include "daq/campaign/campaign_run.hpp"
 #include "daq/guard/interlock.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
-#include "results/campaign_verification.hpp"
+#include "results/campaign_state.hpp"
+#include "results/file_layer.hpp"
 #include "results/journal.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
-#include "results/sha256.hpp"
 #include "results/steps_csv.hpp"
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
-
-class SaidLines final : public Progress {
- public:
-  void tick(const Position&, const Observation&) override {}
-  void step_done(const Position&, const Observation&) override {}
-  void say(const std::string& line) override { lines.push_back(line); }
-  std::vector<std::string> lines;
-};
 
 /// Zero at 0.2 s to 0.7 s, then four steps of 0.6 s to 3.1 s; two runs.
 class FaultyCampaign : public testing::Test {
@@ -59,12 +51,7 @@ class FaultyCampaign : public testing::Test {
     return kinds;
   }
   [[nodiscard]] const sim::WireTruth& truth() { return bench_->simulation().wire().truth(); }
-  [[nodiscard]] bool motor_is_let_go() {
-    const double before = std::abs(bench_->simulation().plant().motor().speed);
-    bench_->wait_until(bench_->clock().now() + std::chrono::seconds(1));
-    const double after = std::abs(bench_->simulation().plant().motor().speed);
-    return after < 1.0 || after < 0.7 * before;
-  }
+  [[nodiscard]] bool motor_is_let_go() { return test::motor_is_let_go(*bench_); }
   /// Step means of the whole campaign from the files alone are those that were stored.
   void expect_replay_agrees() const {
     std::vector<results::StepMean> again;
@@ -81,7 +68,7 @@ class FaultyCampaign : public testing::Test {
   profiles::BenchConfig config_;
   std::optional<DeterministicBench> bench_;
   std::optional<results::CampaignFolder> results_;
-  SaidLines said_;
+  test::SaidLines said_;
 };
 
 }  // namespace kphi::daq

@@ -3,11 +3,11 @@
 
 #include "base/error.hpp"
 #include "daq/guard/interlock.hpp"
-#include "results/campaign_verification.hpp"
+#include "results/campaign_state.hpp"
+#include "results/file_layer.hpp"
 #include "results/journal.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
-#include "results/sha256.hpp"
 #include "results/steps_csv.hpp"
 
 namespace kphi::daq {
@@ -78,10 +78,21 @@ TEST_F(FaultyCampaign, FlagsTheStepInWhichTheStreamBeganAnew) {
   (void)run("  - {at_s: 2.44, kind: restart}\n");
   EXPECT_EQ(flags(0), (std::vector<std::string>{"", "", "lost_samples+stream_restarted", ""}));
   EXPECT_EQ(flags(1), (std::vector<std::string>{"", "", "", ""}));
-  EXPECT_THAT(said_.lines, Contains(HasSubstr("the stream began anew")));
+  EXPECT_THAT(said_.lines, Contains(HasSubstr("the stream restarted")));
   EXPECT_THAT(results::read_journal(results_->journal()).entries.at(3).data.at("events").at(0).get<std::string>(),
-              HasSubstr("the stream began anew"));
+              HasSubstr("the stream restarted"));
   expect_replay_agrees();
+}
+
+TEST_F(FaultyCampaign, ShowsTenEventsOfARunAndKeepsTheOthersInItsFile) {
+  std::string faults;
+  for (int i = 0; i < 12; ++i) faults += fmt::format("  - {{at_s: {:.1f}, kind: restart}}\n", 1.0 + 0.1 * i);
+  (void)run(faults);
+  EXPECT_EQ(events(0).size(), 12u);
+  EXPECT_EQ(std::count_if(said_.lines.begin(), said_.lines.end(),
+                          [](const auto& line) { return line.find("the stream restarted") != std::string::npos; }),
+            10);
+  EXPECT_THAT(said_.lines, Contains(HasSubstr("further events of this run go to its file only")));
 }
 
 TEST_F(FaultyCampaign, FlagsAllStepsAfterARestartOfTheBoxUntilTheNextRun) {
@@ -96,7 +107,7 @@ TEST_F(FaultyCampaign, FlagsAllStepsAfterARestartOfTheBoxUntilTheNextRun) {
   EXPECT_EQ(recording(0).account.reboots, 1u);
   const auto& lines = said_.lines;
   EXPECT_EQ(std::count_if(lines.begin(), lines.end(),
-                          [](const auto& line) { return line.find("the box has started anew") != std::string::npos; }),
+                          [](const auto& line) { return line.find("the box has booted") != std::string::npos; }),
             1);
   expect_replay_agrees();
 }
@@ -265,7 +276,7 @@ TEST_F(FaultyCampaign, TellsWhatUnitsHaveToDoWithALimitThatWasPassed) {
 TEST_F(FaultyCampaign, FlagsAllStepsOfARunDuringWhichTheZeroDrifted) {
   EXPECT_EQ(run("  - {at_s: 1.0, kind: zero_drift, amount: 1, tau_s: 1}\n").runs, 2);
   for (const std::string& names : flags(0)) EXPECT_THAT(names, testing::StartsWith("zero_drifted"));
-  EXPECT_THAT(said_.lines, Contains(AllOf(HasSubstr("its zero moved by 0.9"), HasSubstr("0.03 N are tolerated"))));
+  EXPECT_THAT(said_.lines, Contains(AllOf(HasSubstr("zero moved by 0.9"), HasSubstr("limit 0.03 N"))));
   expect_replay_agrees();
 }
 
@@ -289,7 +300,7 @@ TEST_F(FaultyCampaign, StopsWhenTheBoxRepeatsItselfForLongAndSaysSo) {
   } catch (const SafetyStop& stop) {
     // Whoever looks first: the interlock, or with a more patient one the silence.
     EXPECT_THAT(stop.what(), AllOf(AnyOf(HasSubstr("newest load-cell sample"), HasSubstr("the stream fell silent")),
-                                   HasSubstr("the box repeats its measurement")));
+                                   HasSubstr("the box repeats one measurement")));
   }
   EXPECT_TRUE(motor_is_let_go());
 }

@@ -34,7 +34,9 @@ TEST_F(FaultyMotor, StopsWhenTheModuleRestartsAndSaysSo) {
 }
 
 TEST_F(FaultyMotor, StopsWhenTheAdapterIsUnpluggedAndNeverSpinsAgainByItself) {
-  EXPECT_THAT(stop("  - {at_s: 2.0, for_s: 0.3, kind: motor_unplug}\n"), HasSubstr("the serial port is gone"));
+  const std::string why = stop("  - {at_s: 2.0, for_s: 0.3, kind: motor_unplug}\n");
+  EXPECT_THAT(why, HasSubstr("the serial port is gone"));
+  EXPECT_EQ(why.find("the serial port is gone"), why.rfind("the serial port is gone")) << "reported once: " << why;
   EXPECT_THAT(aborted_events(), Contains(EventKind::motor_port_lost));
   EXPECT_TRUE(motor_is_let_go());
   EXPECT_THROW(bench_->motor().spin_at(RadPerSec(500)), DeviceError);

@@ -5,9 +5,9 @@
 
 #include "daq/guard/interlock.hpp"
 #include "daq/run/run.hpp"
-#include "daq/virtual/deterministic_bench.hpp"
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
+#include "test/daq/wrapped_bench.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -16,18 +16,9 @@ using std::chrono::milliseconds;
 using testing::HasSubstr;
 
 /// The deterministic bench under a host whose threads all stand still once.
-class SleepyBench final : public Bench {
+class SleepyBench final : public WrappedBench {
  public:
-  explicit SleepyBench(const profiles::BenchConfig& config) : bench(config) { bench.mounted("5x3", 0); }
-
-  [[nodiscard]] const Clock& clock() const override { return bench.clock(); }
-  [[nodiscard]] MotorLink& motor() override { return bench.motor(); }
-  [[nodiscard]] LoadCellLink& load_cell() override { return bench.load_cell(); }
-  [[nodiscard]] results::FileLayer& files() override { return bench.files(); }
-  [[nodiscard]] Duration sync_interval() const override { return bench.sync_interval(); }
-  [[nodiscard]] bool switch_off_power() override { return bench.switch_off_power(); }
-  void restore_power() override { bench.restore_power(); }
-  void mounted(const std::string& propeller, double occlusion) override { bench.mounted(propeller, occlusion); }
+  explicit SleepyBench(const profiles::BenchConfig& config) : WrappedBench(config) { bench.mounted("5x3", 0); }
 
   void wait_until(Instant when) override {
     if (clock().now() >= sleeps_at && !slept_) {
@@ -49,7 +40,6 @@ class SleepyBench final : public Bench {
     });
   }
 
-  DeterministicBench bench;
   Instant sleeps_at = std::chrono::seconds(2);
   Duration sleeps_for{0};
 

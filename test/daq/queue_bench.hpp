@@ -2,6 +2,7 @@
 #pragma once
 
 #include <deque>
+#include <stdexcept>
 #include <utility>
 
 #include "daq/bench/bench.hpp"
@@ -18,12 +19,37 @@ std::size_t move_out(std::deque<T>& from, std::span<T> out) {
   return n;
 }
 
+/// A supply that shows the readings that a test puts in, and may refuse to confirm that it is off.
+class QueueSupply final : public SupplyLink {
+ public:
+  [[nodiscard]] std::string identity() const override { return "test"; }
+  std::size_t take(std::span<results::SupplyReading> out) override { return move_out(readings, out); }
+  [[nodiscard]] std::string failure() const override { return {}; }
+  void cut() noexcept override { ++cuts; }
+  [[nodiscard]] std::string switch_off() noexcept override {
+    if (unconfirmed.empty()) on = false;
+    return unconfirmed;
+  }
+  std::deque<results::SupplyReading> readings;
+  int cuts = 0;
+  bool on = false, refuses = false;  ///< refuses: fails halfway through switch_on()
+  std::string unconfirmed;
+
+ private:
+  void switch_on() override {
+    on = true;
+    if (refuses) throw std::runtime_error("no");
+  }
+};
+
 /// A motor that says what a test puts in.
 class QueueMotor final : public MotorLink {
  public:
   void spin_at(RadPerSec) override {}
   void renew() noexcept override {}
   void emergency_stop() noexcept override { ++coasted; }
+  void rest() override { ++rests; }
+  void wake() override { ++wakes; }
   void begin_stop(const iq::StopSettings&) override {}
   [[nodiscard]] std::optional<iq::StopReport> stop_report() override { return std::nullopt; }
   [[nodiscard]] const iq::AuditRecord& parameters() const override { return parameters_; }
@@ -36,7 +62,7 @@ class QueueMotor final : public MotorLink {
   std::deque<results::MotorReading> readings;
   std::vector<results::StreamEvent> events;
   std::string lost;
-  int coasted = 0;
+  int coasted = 0, rests = 0, wakes = 0;
 
  private:
   iq::AuditRecord parameters_;
@@ -48,6 +74,7 @@ class QueueBench final : public Bench, private LoadCellLink {
   [[nodiscard]] const Clock& clock() const override { return time; }
   [[nodiscard]] MotorLink& motor() override { return queue_motor; }
   [[nodiscard]] LoadCellLink& load_cell() override { return *this; }
+  [[nodiscard]] SupplyLink* supply() override { return supply_link; }
   void wait_until(Instant when) override { time.set(when); }
   [[nodiscard]] std::unique_ptr<Background> run_periodically(std::function<void()>) override { return nullptr; }
   [[nodiscard]] results::FileLayer& files() override { return *layer; }
@@ -60,13 +87,14 @@ class QueueBench final : public Bench, private LoadCellLink {
   results::FileLayer* layer = &results::disk();
   std::deque<results::LoadCellRecord> records;
   QueueMotor queue_motor;
+  SupplyLink* supply_link = nullptr;
   std::deque<results::MotorReading>& readings = queue_motor.readings;
   std::vector<results::StreamEvent> events;
   netbox::Configuration box;
 
  private:
   [[nodiscard]] const netbox::Configuration& configuration() const override { return box; }
-  [[nodiscard]] std::vector<netbox::Finding> findings() const override { return {}; }
+  [[nodiscard]] std::vector<Finding> findings() const override { return {}; }
   results::LoadCellScale start() override { return {}; }
   void stop() noexcept override {}
   std::size_t take(std::span<results::LoadCellRecord> out) override { return move_out(records, out); }

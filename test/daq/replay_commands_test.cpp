@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "commands/replay.hpp"
+#include "commands/commands.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/steps_csv.hpp"
@@ -23,13 +23,15 @@ struct Said {
 Said say(const std::string& arguments) {
   CLI::App app;
   Said said;
-  add_replay(app, said.code);
+  ExitCode code = ExitCode::failure;
+  commands::add_replay(app, code);
   ::testing::internal::CaptureStdout();
   ::testing::internal::CaptureStderr();
   app.parse("replay " + arguments);
   std::fflush(stdout);
   said.out = ::testing::internal::GetCapturedStdout();
   said.err = ::testing::internal::GetCapturedStderr();
+  said.code = static_cast<int>(code);
   return said;
 }
 

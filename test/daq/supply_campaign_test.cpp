@@ -6,7 +6,7 @@
 
 #include "daq/campaign/campaign_run.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
-#include "results/campaign_verification.hpp"
+#include "results/campaign_state.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
@@ -16,13 +16,6 @@ namespace kphi::daq {
 namespace {
 
 using testing::HasSubstr;
-
-profiles::BenchConfig powered_config(double current_limit_a) {
-  profiles::BenchConfig config = test::deterministic_config(4);
-  config.supply =
-      profiles::SupplyConfig{"modbus-rtu:/dev/null", Volts(12), Amperes(current_limit_a), Volts(13.5), Amperes(60)};
-  return config;
-}
 
 class NoteMotor final : public Progress {
  public:
@@ -37,7 +30,7 @@ class NoteMotor final : public Progress {
 class SupplyCampaign : public testing::Test {
  protected:
   CampaignResult run(double current_limit_a = 50) {
-    config_ = powered_config(current_limit_a);
+    config_ = test::with_supply(test::deterministic_config(4), current_limit_a);
     bench_.emplace(config_);
     results_.emplace(results::CampaignFolder::create(folder_.path(), "u", "c"));
     AutoConfirmOperator person;
@@ -179,6 +172,68 @@ TEST_F(SupplyCampaign, CoastsWithinAFifthOfASecondOfTheReading) {
   ASSERT_NE(first, kept.supply.end());
   // The motor was let go before the stream ended, and the bridge is open soon after (expect_stop).
   EXPECT_LT(kept.load_cell.back().arrival_ns - first->time_ns, 200'000'000);
+}
+
+/// At the prompt: acts, then lets time pass, with or without looking at the guard.
+class MeddlingOperator final : public Operator {
+ public:
+  std::function<void()> act;
+  DeterministicBench* bench = nullptr;
+  bool looks = true;
+
+ protected:
+  void mount(const profiles::Propeller&, double, const std::string&) override {
+    act();
+    for (int i = 0; i < 60; ++i) {
+      bench->wait_until(bench->clock().now() + std::chrono::milliseconds(10));
+      if (looks) poll();
+    }
+  }
+};
+
+class AtTheStand : public SupplyCampaign {
+ protected:
+  AtTheStand() {
+    config_ = test::with_supply(test::deterministic_config(4));
+    bench_.emplace(config_);
+    results_.emplace(results::CampaignFolder::create(folder_.path(), "u", "c"));
+    person_.bench = &*bench_;
+  }
+  void run_with_person() {
+    (void)run_campaign(*bench_, campaign_, config_, *results_, person_, progress_, [] { return false; });
+  }
+  MeddlingOperator person_;
+};
+
+TEST_F(AtTheStand, AnOutputThatComesOnUnaskedIsASafetyStopWhetherOrNotThePromptNotices) {
+  person_.act = [this] { circuit().switch_output(true); };
+  for (const bool looks : {true, false}) {
+    person_.looks = looks;
+    try {
+      run_with_person();
+      ADD_FAILURE() << "went on";
+    } catch (const SafetyStop& stop) {
+      EXPECT_THAT(stop.what(), HasSubstr("output is on while somebody may be near"));
+    }
+    EXPECT_FALSE(circuit().output());
+    if (!looks) break;
+    results_.emplace(results::CampaignFolder::create(folder_.path(), "u", "again"));
+    bench_->restore_power();
+  }
+}
+
+TEST_F(AtTheStand, NobodyIsAskedToComeNearBeforeTheRotorIsAtRestWithoutPower) {
+  campaign_ = test::short_campaign("0", 1, 2);
+  bench_->motor().spin_at(from_rpm(6000));
+  bench_->wait_until(bench_->clock().now() + std::chrono::seconds(1));
+  bench_->motor().emergency_stop();
+  double speed = 1e9;
+  person_.act = [&] {
+    speed = std::abs(bench_->simulation().plant().motor().speed);
+    EXPECT_FALSE(circuit().output());
+  };
+  run_with_person();
+  EXPECT_LT(speed, 10);
 }
 
 }  // namespace

@@ -131,12 +131,13 @@ TEST_F(BadScript, IsRefusedByLineAndColumn) {
 }
 
 TEST_F(BadScript, ThatCannotBeReadIsNamed) {
-  refused({"--faults", (folder_ / "none.yaml").string()}, 2, "none.yaml: cannot be read; name an existing file");
-  refused({"--faults", folder_.path().string()}, 2, "cannot be read; name an existing file");
+  refused({"--faults", (folder_ / "none.yaml").string()}, 2,
+          "none.yaml: cannot be opened: No such file or directory; check the name");
+  refused({"--faults", folder_.path().string()}, 2, "cannot be read: Is a directory; name a file");
 }
 
 TEST_F(BadScript, OrATruthLogThatCannotBeWrittenIsRefusedAtTheBeginning) {
-  refused({"--truth-log", (folder_ / "no/such/log.jsonl").string()}, 3, "name a writable file");
+  refused({"--truth-log", (folder_ / "no/such/log.jsonl").string()}, 1, "no/such/log.jsonl");
 }
 
 }  // namespace

@@ -70,7 +70,7 @@ TEST(Resume, RefusesAChangedCampaignBeforeAnyDeviceIsAsked) {
 
   write(bench.path("other.yaml"), short_campaign_text("0, 90"));
   auto command = resume_command(bench, folder);
-  command.insert(command.begin() + 2, bench.path("other.yaml"));
+  command.push_back(bench.path("other.yaml"));
   Process refused(command);
   EXPECT_EQ(refused.wait(), 2) << refused.err();
   EXPECT_THAT(refused.err(), AllOf(HasSubstr("the campaign file has changed"), HasSubstr("--accept-changes")));

@@ -1,6 +1,7 @@
 // `kphi sim` as another process, for tests of the program.
 #pragma once
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "base/descriptor.hpp"
 #include "test/daq/bench_fixture.hpp"
 #include "test/end_to_end/process.hpp"
 #include "test/temporary_folder.hpp"
@@ -60,6 +62,8 @@ class RunningBench {
                        path("truth.yaml"), "--faults", path("faults.yaml"), "--truth-log", path("wire.jsonl")},
                       kBenchPriority))) {
     process_.wait_for("\"rdt\"");
+    for (const char* line : {"motor", "supply"})
+      lines_.emplace_back(::open(path(line).c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC));
     write(folder_.path() / "short.yaml", short_campaign_text("0, 45, 180"));
   }
   [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
@@ -85,6 +89,8 @@ class RunningBench {
   static constexpr int kBenchPriority = 20;  // above its programs'
   TemporaryFolder folder_;
   Process process_;
+  /// Its pseudo-terminals, kept beyond its death: no other bench gets a number whose lock a program still holds.
+  std::vector<Descriptor> lines_;
 };
 
 }  // namespace kphi::test

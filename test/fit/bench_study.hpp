@@ -2,6 +2,7 @@
 // can be held against the truth.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -130,6 +131,43 @@ inline std::map<std::string, Coverage> coverage_study(const StudyTruth& truth, u
     table["k_i(135 deg)"].add(analysis.predictions.front().scaling_factor, truth.k(135) / truth.k(0));
   }
   return table;
+}
+
+/// How many campaigns of a truth, and of how many occlusions in them, are called bent.
+struct BentCount {
+  int line = 0;  ///< campaigns whose line bends, by both tests
+  int line_lack_of_fit = 0;
+  int everywhere = 0;              ///< campaigns in which k depends on speed at every φ
+  int lack_of_fit = 0, trend = 0;  ///< occlusions, T = k ω² rejected
+  std::map<double, int> speed;     ///< campaigns in which k depends on speed, by φ
+};
+
+inline BentCount count_bent(const StudyTruth& truth, unsigned campaigns) {
+  BentCount count;
+  for (unsigned seed = 1; seed <= campaigns; ++seed) {
+    const StudyCampaign campaign = study_campaign(truth, seed);
+    const Analysis analysis = analyse(identify(campaign.steps), study_options(truth, campaign));
+    count.line += analysis.curvature.bends() ? 1 : 0;
+    count.line_lack_of_fit += analysis.curvature.lack_of_fit.rejected() ? 1 : 0;
+    count.everywhere += std::all_of(analysis.speed.begin(), analysis.speed.end(),
+                                    [](const SpeedDependence& one) { return one.depends(); })
+                            ? 1
+                            : 0;
+    for (const SpeedDependence& one : analysis.speed) {
+      count.lack_of_fit += one.lack_of_fit.rejected() ? 1 : 0;
+      count.trend += one.trend.rejected() ? 1 : 0;
+      count.speed[one.phi_deg] += one.depends() ? 1 : 0;
+    }
+  }
+  return count;
+}
+
+/// Real propellers of 5 inch rise by 11 to 21 %.
+inline StudyTruth bent_truth() {
+  StudyTruth bent;
+  bent.bend = 0.03;
+  bent.rise = 0.15;
+  return bent;
 }
 
 }  // namespace kphi::fit

@@ -8,10 +8,9 @@
 #include "daq/virtual/deterministic_bench.hpp"
 #include "drivers/sim/physics/truth.hpp"
 #include "fit/model/identification.hpp"
-#include "fit/model/torque.hpp"
+#include "fit/model/torque_power.hpp"
 #include "fit/signal/blade_pass.hpp"
 #include "fit/signal/dynamics.hpp"
-#include "fit/signal/step_clock.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
@@ -24,6 +23,11 @@ constexpr double kClockError = 0.005;
 class WillingOperator final : public daq::Operator {
  public:
   void mount(const profiles::Propeller&, double, const std::string&) override {}
+};
+
+struct TimedSample {
+  double t_s = 0;  ///< bench time
+  double value = 0;
 };
 
 /// The deterministic bench, which is looked at every half a millisecond while it runs.
@@ -99,23 +103,25 @@ FirstOrder true_response(const Recorded& recorded) {
   };
   std::vector<Point> points;
   for (const results::RunRecording& run : recorded.runs) {
-    for (const StepSpan& span : step_spans(run)) {
-      if (!(span.previous_rad_s > 0)) continue;
+    for (std::size_t i = 1; i + 1 < run.phases.size(); ++i) {
+      if (run.phases[i].phase != results::Phase::step || run.phases[i - 1].phase != results::Phase::step) continue;
+      const double begin = 1e-9 * static_cast<double>(run.phases[i].time_ns);
+      const double end = 1e-9 * static_cast<double>(run.phases[i + 1].time_ns);
       double before = 0, after = 0, settled = 0;
       std::vector<TimedSample> during;
       const std::vector<TimedSample>& shaft = recorded.shaft;
       const auto earlier = [](const TimedSample& at, double t) { return at.t_s < t; };
-      for (auto it = std::lower_bound(shaft.begin(), shaft.end(), span.begin_s, earlier);
-           it != shaft.end() && it->t_s < span.end_s; ++it) {
+      for (auto it = std::lower_bound(shaft.begin(), shaft.end(), begin, earlier); it != shaft.end() && it->t_s < end;
+           ++it) {
         const TimedSample& at = *it;
-        if (at.t_s <= span.begin_s) before = at.value;
-        if (at.t_s <= span.begin_s) continue;
+        if (at.t_s <= begin) before = at.value;
+        if (at.t_s <= begin) continue;
         during.push_back(at);
-        if (at.t_s > 0.5 * (span.begin_s + span.end_s)) after += at.value, ++settled;
+        if (at.t_s > 0.5 * (begin + end)) after += at.value, ++settled;
       }
       const double change = after / settled - before;
       for (const TimedSample& at : during)
-        points.push_back({at.t_s - span.begin_s, (at.value - before) / change, change * change});
+        points.push_back({at.t_s - begin, (at.value - before) / change, change * change});
     }
   }
   const auto cost = [&](const FirstOrder& guess) {
@@ -164,6 +170,11 @@ TEST(Dynamics, FindTheLagOfTheThrust) {
   const double truth = sim::LoadCellParameters{}.thrust_lag;
   EXPECT_NEAR(found->thrust_lag_s.value / truth, 1, 0.05);
   EXPECT_NEAR(found->thrust_lag_s.value, truth, 3 * found->thrust_lag_s.u);
+  EXPECT_LT(found->thrust_lag_s.u, 0.008) << "the bench reads the speed at one distance from all commands";
+  for (const auto& run : runs()) {
+    const results::StepMean step = results::reduce(run).front();
+    EXPECT_NEAR(step.lag_s, truth, 2.5 * step.lag_u_s) << "the reduction of each run finds the same lag";
+  }
 }
 
 /// A rotor so heavy that the module's own speed filter, 0.3 ms, is small beside its time constant.

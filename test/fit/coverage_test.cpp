@@ -28,32 +28,16 @@ TEST(Coverage, OfTheOtherEstimatorsIsNoLess) {
 }
 
 TEST(Coverage, ABentTruthIsReported) {
-  StudyTruth bent;
-  bent.bend = 0.03;
-  bent.rise = 0.15;  // real ones of 5 inch rise by 11 to 21 %
-  int line = 0, speed = 0, draws = 40;
-  for (unsigned seed = 1; seed <= 40; ++seed) {
-    const StudyCampaign campaign = study_campaign(bent, seed);
-    const Analysis analysis = analyse(identify(campaign.steps), study_options(bent, campaign));
-    line += analysis.curvature.bends() ? 1 : 0;
-    int found = 0;
-    for (const SpeedDependence& one : analysis.speed) found += one.depends() ? 1 : 0;
-    speed += found == 5 ? 1 : 0;
-  }
-  EXPECT_GE(line, 0.95 * draws);
-  EXPECT_GE(speed, 0.95 * draws);
+  const BentCount found = count_bent(bent_truth(), 40);
+  EXPECT_GE(found.line, 0.95 * 40);
+  EXPECT_GE(found.everywhere, 0.95 * 40);
+  EXPECT_EQ(found.speed.size(), 5u);
 }
 
 TEST(Coverage, AStraightTruthIsSeldomCalledBent) {
-  int line = 0, speed = 0;
-  for (unsigned seed = 1; seed <= 60; ++seed) {
-    const StudyCampaign campaign = study_campaign({}, seed);
-    const Analysis analysis = analyse(identify(campaign.steps), study_options({}, campaign));
-    line += analysis.curvature.lack_of_fit.rejected() ? 1 : 0;
-    for (const SpeedDependence& one : analysis.speed) speed += one.lack_of_fit.rejected() ? 1 : 0;
-  }
-  EXPECT_LE(line, 9) << "5 % of 60, and three deviations";
-  EXPECT_LE(speed, 26) << "5 % of 300, and three deviations";
+  const BentCount found = count_bent({}, 60);
+  EXPECT_LE(found.line_lack_of_fit, 9) << "5 % of 60, and three deviations";
+  EXPECT_LE(found.lack_of_fit, 26) << "5 % of 300, and three deviations";
 }
 
 }  // namespace

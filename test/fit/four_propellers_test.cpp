@@ -12,7 +12,7 @@
 #include "daq/campaign/campaign_run.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
 #include "drivers/sim/physics/truth.hpp"
-#include "fit/report/family_table.hpp"
+#include "fit/propellers/claims.hpp"
 #include "results/steps_csv.hpp"
 #include "test/daq/bench_fixture.hpp"
 #include "test/source_dir.hpp"

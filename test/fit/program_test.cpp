@@ -122,7 +122,7 @@ TEST_F(Program, RefusesWhatItCannotFitInOneLineWithTheNextMove) {
   std::filesystem::create_directories(empty);
   const std::string config = steps("5x3");
   expect_refused({"fit", (folder_ / "none").string()}, 2, "does not exist");
-  expect_refused({"fit", empty}, 2, "kphi run or kphi import");
+  expect_refused({"fit", empty}, 2, "`kphi run` or `kphi import`");
   expect_refused({"fit", file("empty.csv", "")}, 2, "empty.csv");
   expect_refused({"fit", file("word.csv", "phi_deg,k\n0,1.5e-6\n45,abc\n")}, 2, "word.csv:3");
   expect_refused({"fit", file("nan.csv", "phi_deg,k\n0,nan\n45,1e-6\n90,1e-6\n")}, 2, "nan.csv:2");
@@ -138,15 +138,15 @@ TEST_F(Program, RefusesWhatItCannotFitInOneLineWithTheNextMove) {
   expect_refused({"fit", config, "--speed-range-rpm", "5000"}, 2, "3000:19100");
   expect_refused({"fit", config, "--speed-range-rpm", "30000:40000"}, 5, "outside the speed range");
   expect_refused({"fit", config, "--at-speed-rpm", "123"}, 5, "name a speed of the profile");
-  expect_refused({"fit", config, "--loss", "soft"}, 2, "\"soft\" is none of cauchy, huber, none, tukey");
+  expect_refused({"fit", config, "--loss", "soft"}, 2, "\"soft\" is not one of cauchy, huber, none, tukey");
   EXPECT_FALSE(std::filesystem::exists(config + "/coefficients.yaml")) << "what is refused leaves nothing behind";
 }
 
 TEST_F(Program, RefusesReportsComparisonsAndExportsOfWhatIsNotThere) {
   const std::string config = steps("5x3");
   expect_refused({"report", config}, 2, "kphi fit " + config);
-  expect_refused({"compare", config, config}, 2, "comes first");
-  expect_refused({"export", config, "--to", "px4"}, 2, "comes first");
+  expect_refused({"compare", config, config}, 2, "not fitted yet; run `kphi fit");
+  expect_refused({"export", config, "--to", "px4"}, 2, "not fitted yet; run `kphi fit");
   ASSERT_EQ(kphi({"fit", config, "--no-report"}).code, 0);
   expect_refused({"export", config, "--to", "ardupilot"}, 2, "agilicious");
   expect_refused({"export", config, "--to", "gazebo", "--phi-deg", "300"}, 2, "0 to 270");

@@ -123,7 +123,6 @@ void mix(const Compensator* compensator, Bytes& bytes) {
   for (const Newtons thrust : mixed.thrusts) require(thrust.value() >= 0.0 && thrust.value() <= 1e9);
   require(std::isfinite(mixed.achieved.thrust.value()) && std::isfinite(mixed.achieved.roll.value()));
   require(std::isfinite(mixed.achieved.pitch.value()) && std::isfinite(mixed.achieved.yaw.value()));
-  for (const double share : mixer->thrust_direction()) require(std::isfinite(share));
 }
 
 /// The plain interface, with codes and counts that may be any.

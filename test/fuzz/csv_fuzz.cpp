@@ -5,9 +5,9 @@
 #include <string_view>
 
 #include "base/error.hpp"
+#include "fit/logs/coefficient_table.hpp"
 #include "fit/logs/import_table.hpp"
-#include "fit/logs/k_table.hpp"
-#include "fit/logs/rcbenchmark_csv.hpp"
+#include "fit/logs/stand_log.hpp"
 #include "results/steps_csv.hpp"
 
 namespace {

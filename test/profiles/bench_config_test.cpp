@@ -307,6 +307,7 @@ TEST(BenchConfig, RefusesASupplyThatWouldTripAtOnce) {
               ElementsAre(testing::HasSubstr("supply.over_voltage_v: 12 V is not above the 12 V of voltage_v")));
   EXPECT_THAT(refused_supply("over_current_a: 18", "over_current_a: 16.9"),
               ElementsAre(testing::HasSubstr("supply.over_current_a: 16.9 A is below the 17 A of current_limit_a")));
+  EXPECT_THAT(refused_supply("over_current_a: 18", "over_current_a: 17"), ElementsAre()) << "equal is enough";
   EXPECT_THAT(refused_supply("modbus-rtu:", "riden:"),
               ElementsAre(testing::HasSubstr("write modbus-rtu:/dev/ttyUSB1")));
   EXPECT_THAT(refused_supply("current_limit_a: 17, ", ""),

@@ -187,7 +187,38 @@ TEST(Campaign, MayLetTheCoilCoolDownBetweenRuns) {
   EXPECT_EQ(cooling->pause_above.value(), 70);
   EXPECT_EQ(cooling->resume_below.value(), 45);
   EXPECT_THROW((void)parse_campaign(with("pause_above_degc: 45, resume_below_degc: 70"), "c.yaml"), ConfigurationError);
+  EXPECT_EQ(
+      refusals([&] { return parse_campaign(with("pause_above_degc: 70, resume_below_degc: 70"), "c.yaml"); }).size(),
+      0u);
   EXPECT_THROW((void)parse_campaign(with("pause_above_degc: 45"), "c.yaml"), ConfigurationError);
+}
+
+TEST(Campaign, ReadsTheOptionalLimitsInTheirUnits) {
+  const auto with = [](const std::string& limits) {
+    return parse_campaign(changed(kCampaignText, "  thrust_max_n", limits + "  thrust_max_n"), "c.yaml").limits;
+  };
+  const Limits none = with("");
+  EXPECT_FALSE(none.torque_max || none.supply_voltage_min || none.supply_voltage_max || none.speed_error_max);
+  const Limits all = with(
+      "  torque_max_nm: 0.3\n  supply_voltage_min_v: 11.9\n  supply_voltage_max_v: 12.1\n"
+      "  speed_error_max_percent: 10\n");
+  EXPECT_EQ(all.torque_max, NewtonMetres(0.3));
+  EXPECT_EQ(all.supply_voltage_min, Volts(11.9));
+  EXPECT_EQ(all.supply_voltage_max, Volts(12.1));
+  EXPECT_DOUBLE_EQ(all.speed_error_max.value(), 0.1) << "a share of the command";
+  const auto refused_limit = [](const std::string& limit) {
+    return refused("  thrust_max_n", "  " + limit + "\n  thrust_max_n");
+  };
+  EXPECT_THAT(
+      refused_limit("supply_voltage_min_v: 12"),
+      ElementsAre(
+          "21:25: limits.supply_voltage_min_v: 12 V is not below the 12 V of supply_v; lower it: the motor would "
+          "never turn"));
+  EXPECT_THAT(
+      refused_limit("supply_voltage_max_v: 12"),
+      ElementsAre(
+          "21:25: limits.supply_voltage_max_v: 12 V is not above the 12 V of supply_v; raise it: the motor would "
+          "never turn"));
 }
 
 TEST(Campaign, SaysWhichValuesAreAllowed) {

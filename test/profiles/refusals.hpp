@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "profiles/refused_file.hpp"
+#include "profiles/yaml_text.hpp"
 #include "test/source_dir.hpp"
 
 namespace kphi::profiles {

@@ -134,21 +134,21 @@ TEST(ShippedFiles, TellWhatTheFoldableDroneIsMadeOfAndHowItIsControlled) {
   ASSERT_TRUE(vehicle.dynamics && vehicle.control);
   EXPECT_EQ(vehicle.dynamics->mass_kg, 0.60);
   EXPECT_EQ(vehicle.dynamics->hub_mass_kg, 0.045);
-  EXPECT_EQ(vehicle.dynamics->body_height, Metres(0.040));
-  EXPECT_EQ(vehicle.dynamics->drag_torque_per_thrust, Metres(0.0133));
-  EXPECT_EQ(vehicle.dynamics->rotor_lag, Seconds(0.033));
+  EXPECT_EQ(vehicle.dynamics->body_height_m, 0.040);
+  EXPECT_EQ(vehicle.dynamics->yaw_arm_m, 0.0133);
+  EXPECT_EQ(vehicle.dynamics->rotor_lag_s, 0.033);
   EXPECT_EQ(vehicle.dynamics->air_drag_per_s, 0.3);
-  EXPECT_EQ(vehicle.dynamics->morph, Seconds(1.5));
-  EXPECT_THAT(vehicle.dynamics->rotor_spins, testing::ElementsAre(1, -1, 1, -1));
-  EXPECT_THAT(vehicle.control->position_gain_per_s2, testing::ElementsAre(6, 6, 15)) << "15: the paper's Table II";
-  EXPECT_THAT(vehicle.control->velocity_gain_per_s, testing::ElementsAre(4, 4, 6)) << "6: the paper's Table II";
-  EXPECT_THAT(vehicle.control->attitude_gain_per_s, testing::ElementsAre(8.5, 8.5, 5));
-  EXPECT_THAT(vehicle.control->rate_gain_per_s, testing::ElementsAre(12.7, 12.7, 5));
-  EXPECT_EQ(vehicle.control->torque_weight, 0.5);
-  EXPECT_THAT(vehicle.control->position_error_max_m, testing::ElementsAre(0.6, 0.6, 0.3));
-  EXPECT_THAT(vehicle.control->velocity_error_max_m_s, testing::ElementsAre(1.0, 1.0, 0.75));
-  EXPECT_EQ(vehicle.control->collective_min_m_s2, 1.0);
-  EXPECT_EQ(vehicle.control->assured_yaw, NewtonMetres(0.02));
+  EXPECT_EQ(vehicle.dynamics->morph_s, 1.5);
+  EXPECT_THAT(vehicle.dynamics->spin, testing::ElementsAre(1, -1, 1, -1));
+  EXPECT_THAT(vehicle.control->gains.position, testing::ElementsAre(6, 6, 15)) << "15: the paper's Table II";
+  EXPECT_THAT(vehicle.control->gains.velocity, testing::ElementsAre(4, 4, 6)) << "6: the paper's Table II";
+  EXPECT_THAT(vehicle.control->gains.attitude, testing::ElementsAre(8.5, 8.5, 5));
+  EXPECT_THAT(vehicle.control->gains.rate, testing::ElementsAre(12.7, 12.7, 5));
+  EXPECT_EQ(vehicle.control->gains.torque_weight, 0.5);
+  EXPECT_THAT(vehicle.control->gains.position_error_max, testing::ElementsAre(0.6, 0.6, 0.3));
+  EXPECT_THAT(vehicle.control->gains.velocity_error_max, testing::ElementsAre(1.0, 1.0, 0.75));
+  EXPECT_EQ(vehicle.control->gains.smallest_collective, 1.0);
+  EXPECT_EQ(vehicle.control->assured_yaw, 0.02);
 }
 
 TEST(Schemas, AreEmbeddedAsTheyLieInTheFolder) {

@@ -167,22 +167,22 @@ TEST(Vehicle, TellsWhatASimulatedFlightNeeds) {
   ASSERT_TRUE(vehicle.dynamics && vehicle.control);
   EXPECT_EQ(vehicle.dynamics->mass_kg, 0.6);
   EXPECT_EQ(vehicle.dynamics->hub_mass_kg, 0.045);
-  EXPECT_EQ(vehicle.dynamics->body_height, Metres(0.04));
-  EXPECT_FALSE(vehicle.dynamics->body_inertia_kg_m2);
-  EXPECT_EQ(vehicle.dynamics->drag_torque_per_thrust, Metres(0.0133));
-  EXPECT_EQ(vehicle.dynamics->rotor_lag, Seconds(0.033));
+  EXPECT_EQ(vehicle.dynamics->body_height_m, 0.04);
+  EXPECT_FALSE(vehicle.dynamics->body_inertia);
+  EXPECT_EQ(vehicle.dynamics->yaw_arm_m, 0.0133);
+  EXPECT_EQ(vehicle.dynamics->rotor_lag_s, 0.033);
   EXPECT_EQ(vehicle.dynamics->air_drag_per_s, 0.3);
-  EXPECT_EQ(vehicle.dynamics->morph, Seconds(1.5));
-  EXPECT_THAT(vehicle.dynamics->rotor_spins, ElementsAre(1, -1, 1, -1));
-  EXPECT_THAT(vehicle.control->position_gain_per_s2, ElementsAre(6, 6, 15));
-  EXPECT_THAT(vehicle.control->velocity_gain_per_s, ElementsAre(4, 4, 6));
-  EXPECT_THAT(vehicle.control->attitude_gain_per_s, ElementsAre(8.5, 8.5, 5));
-  EXPECT_THAT(vehicle.control->rate_gain_per_s, ElementsAre(12.7, 12.7, 5));
-  EXPECT_EQ(vehicle.control->torque_weight, 0.5);
-  EXPECT_THAT(vehicle.control->position_error_max_m, ElementsAre(0.6, 0.6, 0.3));
-  EXPECT_THAT(vehicle.control->velocity_error_max_m_s, ElementsAre(1, 1, 0.75));
-  EXPECT_EQ(vehicle.control->collective_min_m_s2, 1);
-  EXPECT_EQ(vehicle.control->assured_yaw, NewtonMetres(0.02));
+  EXPECT_EQ(vehicle.dynamics->morph_s, 1.5);
+  EXPECT_THAT(vehicle.dynamics->spin, ElementsAre(1, -1, 1, -1));
+  EXPECT_THAT(vehicle.control->gains.position, ElementsAre(6, 6, 15));
+  EXPECT_THAT(vehicle.control->gains.velocity, ElementsAre(4, 4, 6));
+  EXPECT_THAT(vehicle.control->gains.attitude, ElementsAre(8.5, 8.5, 5));
+  EXPECT_THAT(vehicle.control->gains.rate, ElementsAre(12.7, 12.7, 5));
+  EXPECT_EQ(vehicle.control->gains.torque_weight, 0.5);
+  EXPECT_THAT(vehicle.control->gains.position_error_max, ElementsAre(0.6, 0.6, 0.3));
+  EXPECT_THAT(vehicle.control->gains.velocity_error_max, ElementsAre(1, 1, 0.75));
+  EXPECT_EQ(vehicle.control->gains.smallest_collective, 1);
+  EXPECT_EQ(vehicle.control->assured_yaw, 0.02);
 }
 
 TEST(Vehicle, NeedsNoneOfItForAnythingElse) {
@@ -211,7 +211,7 @@ TEST(Vehicle, RefusesMassesAndGainsThatCannotBe) {
 TEST(Vehicle, HasABodyThatIsAPlateOrTellsItsInertia) {
   const std::string plate = "body_height_m: 0.04\n", told = "body_inertia_kg_m2: [1e-3, 1e-3, 1.8e-3]\n";
   const auto text = changed(kVehicleText + kFlightText, plate, told);
-  EXPECT_THAT(*parse_vehicle(text, "v").dynamics->body_inertia_kg_m2, ElementsAre(1e-3, 1e-3, 1.8e-3));
+  EXPECT_THAT(*parse_vehicle(text, "v").dynamics->body_inertia, ElementsAre(1e-3, 1e-3, 1.8e-3));
   EXPECT_THAT(refused_in_flight("  " + plate, ""),
               ElementsAre(StartsWith("15:3: dynamics: neither body_height_m nor body_inertia_kg_m2")));
   EXPECT_THAT(refused_in_flight(plate, plate + "  " + told),

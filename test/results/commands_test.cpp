@@ -1,10 +1,11 @@
+#include "commands/commands.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "commands/info_verify.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/journal.hpp"
 #include "test/results/synthetic_run.hpp"
@@ -22,12 +23,14 @@ struct Said {
 Said say(const std::string& arguments) {
   CLI::App app;
   Said said;
-  add_info(app, said.code);
-  add_verify(app, said.code);
+  ExitCode code = ExitCode::failure;
+  commands::add_info(app, code);
+  commands::add_verify(app, code);
   ::testing::internal::CaptureStdout();
   app.parse(arguments);
   std::fflush(stdout);
   said.out = ::testing::internal::GetCapturedStdout();
+  said.code = static_cast<int>(code);
   return said;
 }
 

@@ -74,7 +74,7 @@ TEST(LoadCellColumns, SayWhereTheFileEndsTooEarly) {
     (void)file.load_cell->rows(0, file.load_cell->size());
     FAIL() << "half of it is gone";
   } catch (const RecordError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("a.h5: read counts: the file ends before it"));
+    EXPECT_THAT(error.what(), HasSubstr("a.h5: read counts: the file ends too early"));
   }
 }
 

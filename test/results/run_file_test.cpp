@@ -11,9 +11,9 @@
 #include <fstream>
 #include <thread>
 
+#include "results/file_layer.hpp"
 #include "results/run_reader.hpp"
 #include "results/run_writer.hpp"
-#include "results/sha256.hpp"
 #include "test/results/recordings.hpp"
 #include "test/results/synthetic_run.hpp"
 #include "test/source_dir.hpp"
@@ -53,7 +53,7 @@ TEST(RunFile, ReadsBackAsWritten) {
   EXPECT_EQ(digest(run), digest(again));
   EXPECT_EQ(again.header.operator_name, "Zoë");
   EXPECT_EQ(again.header.load_cell.configuration_xml.size(), 70000u);
-  EXPECT_EQ(read_header(folder / "a.h5").uuid, run.header.uuid);
+  EXPECT_EQ(read_run(folder / "a.h5").header.uuid, run.header.uuid);
 }
 
 TEST(RunFile, KeepsWhatHappenedToTheStreamItsHealthAndTheBoxesBias) {
@@ -93,7 +93,7 @@ TEST(RunFile, KeepsWhatTheReductionNeedsToKnowOfCampaignAndBench) {
   run.header.clock_gain_u = 2e-5;
   run.header.load_cell.saturation_bits = 1u << 27 | 1u << 30;
   write_run(folder / "a.h5", run);
-  const RunHeader again = read_header(folder / "a.h5");
+  const RunHeader again = read_run(folder / "a.h5").header;
   EXPECT_EQ(again.supply_voltage_v, 16);
   EXPECT_EQ(again.coil_temperature_max_degc, 110);
   EXPECT_EQ(again.clock_gain, 1.004);
@@ -249,6 +249,18 @@ TEST(RunFile, FinishRefusesARunWhoseLossesDoNotAddUp) {
   EXPECT_TRUE(std::filesystem::exists(folder / "a.h5.part"));
 }
 
+TEST(RunFile, WithAnUnknownCodeIsRefused) {
+  const TemporaryFolder folder;
+  RunRecording run = make_run({});
+  run.phases[1].phase = static_cast<Phase>(200);
+  try {
+    write_run(folder / "a.h5", run);
+    FAIL() << "was accepted";
+  } catch (const RecordError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("commands row 1 has the unknown phase 200"));
+  }
+}
+
 TEST(RunFile, WithoutRoomNothingBegins) {
   class Tiny : public FileLayer {
     std::uint64_t free_bytes(const std::filesystem::path&) override { return 1000; }
@@ -272,29 +284,6 @@ TEST(RunFile, BytesNeededAreEnoughButNotFarOff) {
   const std::uint64_t needed = RunWriter::bytes_needed(run.load_cell.size(), run.motor.size());
   EXPECT_GE(needed, std::filesystem::file_size(folder / "a.h5"));
   EXPECT_LE(needed, 4 * std::filesystem::file_size(folder / "a.h5"));
-}
-
-TEST(RunFile, TellsHowFastItIs) {
-  const TemporaryFolder folder;
-  Truth truth;
-  truth.rate_hz = 7000;
-  truth.ft_stride = 1;
-  truth.speeds.assign(83, 500.0);
-  const RunRecording run = make_run(truth);
-  const auto seconds = [](auto&& action) {
-    const auto begin = std::chrono::steady_clock::now();
-    action();
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  };
-  MemoryOnlySync files;
-  const double write = seconds([&] { write_run(folder / "a.h5", run, files); });
-  double read = 1;
-  for (int i = 0; i < 5; ++i) read = std::min(read, seconds([&] { (void)read_run(folder / "a.h5"); }));
-  const double verify = seconds([&] { (void)verify_run(folder / "a.h5"); });
-  RecordProperty("samples", static_cast<int>(run.load_cell.size()));
-  std::printf("%zu samples: write and finish %.0f ms, read %.1f ms, verify %.0f ms\n", run.load_cell.size(),
-              1e3 * write, 1e3 * read, 1e3 * verify);
-  EXPECT_GT(run.load_cell.size(), 1100000u);
 }
 
 }  // namespace

@@ -286,6 +286,7 @@ Mixture draw(std::uint64_t seed) {
   add_ends(mixture, mixture.lasts_s, dice);
   tear_a_write(mixture, dice);
   add_sleep(mixture, dice);
+  mixture.absence = draw_absence(seed);
   return mixture;
 }
 
@@ -300,6 +301,7 @@ Mixture draw_resumed(const Mixture& former) {
   mixture.kill.reset();
   mixture.interrupt.reset();
   mixture.sleep.reset();
+  mixture.absence.reset();
   mixture.faults_are_others = !dice.once_in(3);
   mixture.accepts_changes = mixture.life > 2 || !dice.once_in(10);
   if (mixture.faults_are_others) {
@@ -334,6 +336,7 @@ std::string words(const Mixture& mixture) {
   if (mixture.disk)
     out += fmt::format("# the disk refuses from operation {} on{}\n", mixture.disk->from,
                        mixture.disk->operations == 0 ? "" : fmt::format(", {} of them", mixture.disk->operations));
+  if (mixture.absence) add("afterwards a stream with", mixture.absence->faults);
   if (mixture.interrupt) out += fmt::format("# Ctrl-C at {:.4f} s\n", to_seconds(*mixture.interrupt));
   if (mixture.sleep)
     out += fmt::format("# the computer sleeps at {:.4f} s for {:g} s\n", to_seconds(mixture.sleep->at),

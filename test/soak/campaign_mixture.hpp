@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/clock.hpp"
+#include "test/soak/absent_box.hpp"
 
 namespace kphi::soak {
 
@@ -44,6 +45,7 @@ struct Mixture {
   std::optional<Kill> kill;
   std::optional<Instant> interrupt;  ///< Ctrl-C
   std::optional<HostSleep> sleep;
+  std::optional<Absence> absence;  ///< of the box, in a stream after the first life
   bool faults_are_others = false;  ///< than those of the life before
   bool accepts_changes = false;    ///< --accept-changes
 

@@ -5,9 +5,7 @@
 #include <vector>
 
 #include "base/clock.hpp"
-#include "drivers/sim/iq/faults.hpp"
-#include "drivers/sim/netbox/faults.hpp"
-#include "drivers/sim/supply/faults.hpp"
+#include "drivers/sim/script/faults.hpp"
 
 namespace kphi::soak {
 

@@ -5,10 +5,7 @@
 
 #include <set>
 
-#include "drivers/sim/iq/faults.hpp"
-#include "drivers/sim/netbox/faults.hpp"
-#include "drivers/sim/supply/faults.hpp"
-#include "drivers/sim/usb/faults.hpp"
+#include "drivers/sim/script/faults.hpp"
 #include "test/soak/soak_lives.hpp"
 
 namespace kphi::soak {

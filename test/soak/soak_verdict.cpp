@@ -20,6 +20,7 @@ Verdict judge(const Evidence& evidence) {
   check_record(evidence, verdict.wrong);
   check_inheritance(evidence, verdict.wrong);
   check_status(evidence, reaches, verdict.wrong);
+  check_absence(evidence, verdict.wrong);
   check_end(evidence, reaches, verdict.wrong);
   check_steps_of_runs(evidence, reaches, verdict);
   return verdict;

@@ -9,6 +9,8 @@
 // Status    A box that reports an error in more samples on end than a datagram holds stops the run, with the motor or
 //           without: the power stage is open within 50 ms of the first sample too many, or as above where no order
 //           could reach the module.
+// Absence   A box that reboots, cannot be reached or loses its datagrams for 1 to 3 s streams again within 4 s after it
+//           is back, samples flow, and an event says so. A stream that another client has taken is left alone.
 // Record    The folder verifies; aborted runs are whole and say why; steps.csv is the reduction of the accepted runs.
 //           After a kill or with a refusing disk: all accepted runs are whole, the journal's chain is right, what was
 //           secured can be read (unless the kill fell into a write), and at most one run is finished that the journal

@@ -30,6 +30,7 @@ Mixture clean_mixture() {
     mixture.disk.reset();
     mixture.kill.reset();
     mixture.interrupt.reset();
+    mixture.absence.reset();
     return mixture;
   }
 }
@@ -275,17 +276,17 @@ TEST(SoakVerdict, LetsARunGoOnWhoseBoxReportedLess) {
 TEST(SoakVerdict, NamesWhatIsWrongInTheRecord) {
   expect_each_named({
       {"a bit of an accepted run", Base::clean, [](Evidence& e) { flip_a_byte(e.left->complete_runs()[0], 0.5); },
-       "is not the file whose SHA-256 the journal holds"},
+       "SHA-256 does not match the journal"},
       {"an accepted run is gone", Base::clean, [](Evidence& e) { fs::remove(e.left->complete_runs()[0]); },
-       "is missing, the journal names it"},
+       "missing, but in the journal"},
       {"an unknown run", Base::clean,
        [](Evidence& e) { fs::copy(e.left->complete_runs()[0], e.left->run(e.campaign.propeller.id, 33, 1)); },
-       "the journal holds no SHA-256 of it"},
+       "not in the journal"},
       {"two unknown runs after a kill", Base::killed,
        [](Evidence& e) {
          for (int i = 1; i <= 2; ++i) fs::copy(e.left->complete_runs()[0], e.left->run(e.campaign.propeller.id, 33, i));
        },
-       "the journal holds no SHA-256 of it"},
+       "not in the journal"},
       {"a word of the journal", Base::clean, [](Evidence& e) { replace_in(e.left->journal(), "mounted", "nounted"); },
        "does not match its checksum"},
       {"the journal's last line", Base::clean,
@@ -354,6 +355,34 @@ Sabotage ended_as(const char* what, End end, const char* reason, const char* tol
             e.story.reason = reason;
           },
           told};
+}
+
+/// Of a clean campaign followed by an absence; `as_seen` is right.
+Sabotage after_an_absence(const char* what, const Absence& absence, const Comeback& as_seen, const char* told) {
+  return {what, Base::clean,
+          [absence, as_seen](Evidence& e) {
+            e.mixture.absence = absence;
+            e.story.comeback = as_seen;
+          },
+          told};
+}
+
+TEST(SoakVerdict, NamesAStreamThatDoesNotComeBackOrIsFoughtFor) {
+  using K = results::EventKind;
+  const Absence reboot{"", 8s, true, true}, loss{"", 8s, true, false}, taken{"", 8s, false, false};
+  const auto seen = [](std::vector<K> events, Instant newest, std::uint64_t starts, const char* failure) {
+    return Comeback{std::move(events), newest, 12s, starts, failure};
+  };
+  expect_each_named({
+      after_an_absence("nobody notices", reboot, seen({K::reconnected}, 12s, 2, ""), "nobody noticed"),
+      after_an_absence("no sample since", reboot, seen({K::silent, K::reconnected}, 7s, 2, ""), "the newest sample"),
+      after_an_absence("it counts as failed", reboot, seen({K::silent, K::reconnected}, 12s, 2, "silent"), "as failed"),
+      after_an_absence("no event", reboot, seen({K::silent, K::resumed}, 12s, 2, ""), "that the stream came back"),
+      after_an_absence("another event", loss, seen({K::silent, K::reconnected}, 12s, 1, ""), "the stream came back"),
+      after_an_absence("a fight", taken, seen({K::silent, K::taken_over}, 7s, 2, "silent"), "2 starts of a stream"),
+      after_an_absence("no reason", taken, seen({K::silent}, 7s, 1, "silent"), "was taken over"),
+      after_an_absence("it counts as working", taken, seen({K::silent, K::taken_over}, 7s, 1, ""), "as working"),
+  });
 }
 
 TEST(SoakVerdict, NamesAWrongVerdictOfTheDrivers) {

@@ -143,6 +143,12 @@ void World::look_at_inheritance() {
 }
 
 void World::live() {
+  live_campaign();
+  if (mixture_.absence)
+    story_.comeback = live_through(*mixture_.absence, mixture_.bench, mixture_.seed, folder_.path());
+}
+
+void World::live_campaign() {
   try {
     begin();
     campaign_to_its_end();

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daq/campaign/campaign_run.hpp"
+#include "daq/campaign/resume.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
 #include "test/drivers/netbox_faults/ideal.hpp"
 #include "test/soak/campaign_mixture.hpp"
@@ -55,8 +56,9 @@ struct Story {
   std::vector<Stream> streams;
   std::vector<Prompt> prompts;  ///< somebody is about to reach into the propeller
   std::vector<std::string> said;
-  std::optional<Instant> woke;  ///< of the computer's sleep; nullopt: it did not sleep
-  Instant last_good_tick{0};    ///< when the runner looked at everything last and went on
+  std::optional<Instant> woke;       ///< of the computer's sleep; nullopt: it did not sleep
+  std::optional<Comeback> comeback;  ///< of an absent box
+  Instant last_good_tick{0};         ///< when the runner looked at everything last and went on
   Instant ended{0};
   End end = End::unknown;
   std::string reason;  ///< of the exception
@@ -83,7 +85,7 @@ class World {
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
-  /// The campaign, to whatever end; then the devices by themselves for a second.
+  /// The campaign, to whatever end; then the devices by themselves for a second; then the stream of an absent box.
   void live();
 
   [[nodiscard]] const Mixture& mixture() const noexcept { return mixture_; }
@@ -103,6 +105,7 @@ class World {
   class Watch;
   class Person;
   void look_at_inheritance();
+  void live_campaign();
   void begin();
   void campaign_to_its_end();
   void step();

@@ -18,6 +18,8 @@ void check_record(const Evidence& evidence, Lines& wrong);
 void check_inheritance(const Evidence& evidence, Lines& wrong);
 /// What was done about a box that reported an error.
 void check_status(const Evidence& evidence, const Reaches& reaches, Lines& wrong);
+/// Whether the stream of an absent box came back, and only when it should.
+void check_absence(const Evidence& evidence, Lines& wrong);
 /// Why the campaign ended.
 void check_end(const Evidence& evidence, const Reaches& reaches, Lines& wrong);
 /// What the runs of this life tell of their steps and of the air. Counts the clean ones, too.

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "results/sha256.hpp"
+#include "results/file_layer.hpp"
 #include "test/soak/verdict_checks.hpp"
 
 namespace kphi::soak {

@@ -5,7 +5,7 @@
 #include <map>
 
 #include "profiles/plan.hpp"
-#include "results/campaign_verification.hpp"
+#include "results/campaign_state.hpp"
 #include "results/journal.hpp"
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
@@ -17,9 +17,7 @@ namespace {
 std::string name_of(const std::filesystem::path& path) { return path.filename().string(); }
 
 /// Finished, renamed, and killed or refused before the journal could tell.
-bool is_unannounced(const std::string& problem) {
-  return problem.find("the journal holds no SHA-256 of it") != std::string::npos;
-}
+bool is_unannounced(const std::string& problem) { return problem.find("not in the journal") != std::string::npos; }
 
 /// What was synced once can be read whatever happens, unless the program died while it wrote.
 void check_readable(const Evidence& evidence, Lines& wrong) {

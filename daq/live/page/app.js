@@ -45,7 +45,7 @@ function makeCharts() {
   state.chartsDue = state.stepsDue = true;
 }
 
-/// A dot, and a bar of one standard uncertainty to both sides.
+/// A dot with a bar of plus and minus one standard uncertainty.
 function drawStep(chart, name, ctx, x, y, paint, size, row) {
   const step = state.steps[row];
   ctx.fillStyle = ctx.strokeStyle = paint;
@@ -82,7 +82,7 @@ function drawSteps() {
   const paints = angles.map((_, i) => occlusionColours()[i % 8]);
   const rows = steps.map(step => [step.speed2_rad2_s2 / 1e6,
     ...angles.map(angle => angle === step.occlusion_deg ? 1e6 * step.k_n_s2 : null)]);
-  // Points too uncertain to be seen do not set the scale.
+  // Points with a large uncertainty do not set the scale.
   const sure = steps.filter(step => step.u_k_n_s2 !== null && step.u_k_n_s2 < 0.05 * Math.abs(step.k_n_s2));
   const shown = sure.length ? sure : steps, u = step => step.u_k_n_s2 || 0;
   const low = 1e6 * Math.min(...shown.map(step => step.k_n_s2 - u(step)));
@@ -273,7 +273,7 @@ function addPoint(time_s, thrust_n, commanded_rpm, speed_rpm) {
   state.chartsDue = true;
 }
 
-// ---- frames: numbers with every message, curves as often as they are cheap
+// ---- frames: numbers with every message, curves less often
 function frame(now) {
   requestAnimationFrame(frame);
   if (!state.hello) return;

@@ -108,7 +108,7 @@ std::span<const QueryResult> Exchange::receive(std::span<const std::uint8_t> byt
     bytes = bytes.subspan(n);
   }
   last_chunk_ = now;
-  count_parser();
+  counters_.take(parser_.counters());
   return results_;
 }
 
@@ -118,7 +118,7 @@ std::span<const QueryResult> Exchange::advance(Instant now) {
     ++counters_.resyncs;
     parser_.abandon([&](const Packet& packet, std::uint64_t position) { take_packet(packet, position, now); });
   }
-  count_parser();
+  counters_.take(parser_.counters());
   requests_.expire(understood_until(now), [&](const Request& request) {
     ++counters_.timeouts;
     timeout_.timed_out(request.started, now);
@@ -189,15 +189,6 @@ Duration Exchange::patience() const noexcept {
 // late when the header arrived.
 Instant Exchange::understood_until(Instant now) const noexcept {
   return parser_.partial() ? std::min(now, reading_of(parser_.partial_offset())) : now;
-}
-
-void Exchange::count_parser() noexcept {
-  const Parser::Counters& parsed = parser_.counters();
-  counters_.bytes_in = parsed.bytes;
-  counters_.packets = parsed.packets;
-  counters_.crc_errors = parsed.crc_errors;
-  counters_.refused_lengths = parsed.refused_lengths;
-  counters_.discarded_bytes = parsed.discarded_bytes;
 }
 
 void Exchange::learn(const Request& request, std::size_t reply_bytes, Instant end) noexcept {

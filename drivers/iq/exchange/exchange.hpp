@@ -8,10 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "drivers/iq/exchange/reading.hpp"
 #include "drivers/iq/exchange/requests.hpp"
-#include "drivers/iq/exchange/round_trip.hpp"
-#include "drivers/iq/exchange/settings.hpp"
+#include "drivers/iq/exchange/telemetry.hpp"
 #include "drivers/iq/exchange/tx_queue.hpp"
 #include "drivers/iq/wire/entries.hpp"
 #include "drivers/iq/wire/packet.hpp"
@@ -92,7 +90,6 @@ class Exchange {
     return wire_paces_ ? arrival_of(position) : reading_of(position);
   }
   [[nodiscard]] Instant understood_until(Instant now) const noexcept;
-  void count_parser() noexcept;
   [[nodiscard]] Duration patience() const noexcept;
   void learn(const Request& request, std::size_t reply_bytes, Instant end) noexcept;
   Request on_wire(const Entry* entry, int module_id, std::size_t bytes, Instant now) noexcept;

@@ -1,8 +1,5 @@
-// The requests that the module may still be working on. IQUART has no sequence numbers: a reply belongs to the oldest
-// open request of its type, sub and module that was sent before the reply began to arrive. A request that timed out
-// stays as an expired request and absorbs late replies, so that they do not answer the next request of the same entry;
-// while it stays, that entry is not asked again. It is removed by order: a module answers requests in sequence and a
-// serial line keeps the sequence, so a reply that was overtaken cannot come any more.
+// Requests that the module may still be working on: which reply belongs to which, how long to wait, and how long the
+// module took.
 #pragma once
 
 #include <array>
@@ -14,6 +11,43 @@
 #include "drivers/iq/wire/entries.hpp"
 
 namespace kphi::iq {
+
+/// Durations from 1 µs to 1 s, four buckets per octave; shorter and longer ones are counted in the outermost buckets.
+class RoundTripHistogram {
+ public:
+  static constexpr std::size_t kBuckets = 81;
+  void add(Duration duration) noexcept;
+  [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
+  [[nodiscard]] const std::array<std::uint32_t, kBuckets>& buckets() const noexcept { return buckets_; }
+  /// Where bucket `i` begins.
+  [[nodiscard]] static Duration lower_edge(std::size_t i) noexcept;
+  /// The duration below which this share, 0..1, of all lies, within 10 %. Zero before the first.
+  [[nodiscard]] Duration quantile(double share) const noexcept;
+
+ private:
+  std::array<std::uint32_t, kBuckets> buckets_{};
+  std::uint64_t count_ = 0;
+};
+
+/// The time-out of a request from the measured round trips: smoothed + 4 mean deviations (RFC 6298, equations 2.2 and
+/// 2.3), doubled by each series of time-outs, clamped between two bounds. It starts at the longest.
+class AdaptiveTimeout {
+ public:
+  AdaptiveTimeout(Duration shortest, Duration longest) noexcept
+      : shortest_(shortest), longest_(longest), timeout_(longest) {}
+  void measured(Duration round_trip) noexcept;
+  /// A request that was sent at `sent` timed out. Requests sent before the last doubling do not double it again.
+  void timed_out(Instant sent, Instant now) noexcept;
+  [[nodiscard]] Duration timeout() const noexcept { return timeout_; }
+  /// Zero before the first.
+  [[nodiscard]] Duration smoothed() const noexcept { return smoothed_; }
+
+ private:
+  Duration shortest_, longest_;
+  Duration timeout_;
+  Duration smoothed_{0}, deviation_{0};
+  Instant doubled_at_{Instant::min()};
+};
 
 struct Request {
   const Entry* entry = nullptr;  ///< null: a set, which has no reply and only fills the module's receive buffer
@@ -30,7 +64,11 @@ struct Request {
   int overtaken = 0;  ///< replies that came to later requests
 };
 
-/// Allocates nothing.
+/// IQUART has no sequence numbers: a reply belongs to the oldest open request of its type, sub and module that was sent
+/// before the reply began to arrive. A request that timed out stays as an expired request and absorbs late replies, so
+/// that they do not answer the next request of the same entry; while it stays, that entry is not asked again. It is
+/// removed by order: a module answers requests in sequence and a serial line keeps the sequence, so a reply that was
+/// overtaken cannot come any more. Allocates nothing.
 class Requests {
  public:
   struct Answer {

@@ -1,330 +1,206 @@
 #include "drivers/iq/link/motor.hpp"
 
 #include <fmt/format.h>
-#include <poll.h>
 
-#include <algorithm>
-#include <array>
-#include <atomic>
-#include <thread>
+#include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "base/error.hpp"
-#include "base/thread.hpp"
-#include "drivers/iq/link/capture.hpp"
-#include "drivers/serial/discovery.hpp"
-#include "drivers/serial/port.hpp"
 
 namespace kphi::iq {
 namespace {
 
 using std::chrono::steady_clock;
-constexpr auto kStopLimit = std::chrono::milliseconds(600);
-constexpr auto kConnectLimit = std::chrono::seconds(10);
-constexpr auto kFinalCoastLimit = std::chrono::milliseconds(200);
-constexpr auto kLongestSleep = std::chrono::seconds(1);
-constexpr auto kPublishEvery = std::chrono::milliseconds(5);
-constexpr auto kFirstPause = std::chrono::milliseconds(50);
-constexpr auto kLongestPause = std::chrono::seconds(1);
-
-Settings stretched(Settings settings, const std::string& device, unsigned baud, const Clock& clock) {
-  settings.wire_paces |= serial::adapter_of(device).has_value();
-  if (settings.reply_timeout == Duration{0}) settings.reply_timeout = clock.stretched(std::chrono::milliseconds(100));
-  if (settings.wire_byte_time == Duration{0} && baud > 0) settings.wire_byte_time = from_seconds(10.0 / baud);
-  if (settings.longest_silence == Duration{0})
-    settings.longest_silence = clock.stretched(from_seconds(settings.module_timeout_s));
-  return settings;
-}
-
-/// Counts up from the shortest to the longest pause by doubling.
-class Backoff {
- public:
-  Backoff(Duration shortest, Duration longest) noexcept : shortest_(shortest), longest_(longest), next_(shortest) {}
-  Duration next() noexcept { return std::exchange(next_, std::min(2 * next_, longest_)); }
-  void reset() noexcept { next_ = shortest_; }
-
- private:
-  Duration shortest_, longest_, next_;
-};
+constexpr std::size_t kEvents = 256;
+constexpr auto kAnswerLimit = std::chrono::seconds(20);
+constexpr double kFastest = entry<"propeller_motor_control.ctrl_velocity">.max;
 
 }  // namespace
 
-/// The thread between a module and its port: reads, writes, sleeps until the next deadline, watches the lease, and
-/// finds the line again when it was lost. Nothing in it waits for a caller or for a disk.
-class Link {
- public:
-  /// Opens the device and connects; throws DeviceError. `capture`: file for all bytes; empty: no capture.
-  Link(ModuleHandle& motor, unsigned baud, const Settings& settings, const Clock& clock, const std::string& capture);
-  ~Link();
-  Link(const Link&) = delete;
-  Link& operator=(const Link&) = delete;
-
- private:
-  using WallTime = std::chrono::steady_clock::time_point;
-
-  void wait_until_ready();
-  void end_thread() noexcept;
-
-  // The thread.
-  void run() noexcept;
-  void turn();
-  struct Woken {
-    bool by_command = false, by_port = false;
-  };
-  Woken sleep();
-  [[nodiscard]] WallTime due() const;
-  void receive();
-  void apply(const Commands& commands);
-  void notice_sleep();
-  void keep_lease();
-  void recover();
-  void reopen();
-  void reconnect();
-  void transmit();
-  void publish();
-  void lose(const std::string& why);
-  void send_final_coast() noexcept;
-
-  ModuleHandle& motor_;
-  const unsigned baud_;
-  const Clock& clock_;
-  std::atomic<bool> quit_{false};
-
-  // Only the thread touches these.
-  std::unique_ptr<serial::Port> port_;  ///< null while it is lost
-  Session session_;
-  std::unique_ptr<Capture> capture_;
-  bool congested_ = false;  ///< the port had no room for all
-  WallTime next_attempt_{};
-  Backoff reopening_, reconnecting_;
-  bool was_ready_ = false;
-  WallTime published_{};
-  Duration suspended_;  ///< of the host, as noticed so far
-
-  std::thread thread_;
-};
-
-Link::Link(ModuleHandle& motor, unsigned baud, const Settings& settings, const Clock& clock, const std::string& capture)
-    : motor_(motor),
-      baud_(baud),
-      clock_(clock),
-      port_(std::make_unique<serial::Port>(motor.device(), baud)),
-      session_(stretched(settings, port_->device(), baud, clock)),
-      reopening_(kFirstPause, kLongestPause),
-      reconnecting_(kFirstPause, kLongestPause),
-      suspended_(clock.suspended()) {
-  if (!capture.empty()) capture_ = std::make_unique<Capture>(capture);
-  thread_ = start_thread([this] { run(); });
-  try {
-    wait_until_ready();
-  } catch (...) {
-    end_thread();
-    throw;
+void Motor::spin_at(RadPerSec signed_speed) {
+  if (!(std::abs(signed_speed.value()) <= kFastest)) {
+    throw std::invalid_argument(fmt::format("speed {} rad/s is beyond what the module takes", signed_speed.value()));
   }
-}
-
-Link::~Link() { end_thread(); }
-
-void Link::wait_until_ready() {
-  const auto connected = motor_.await_connection(kConnectLimit);
-  if (connected.value_or(false)) return;
-  throw DeviceError("motor module on " + motor_.device(), fmt::format("connect at {} baud", baud_),
-                    connected ? motor_.failure() : std::string("not connected in time"),
-                    "check its supply, RX and TX, the baud rate and the module id");
-}
-
-void Link::end_thread() noexcept {
-  quit_ = true;
-  motor_.commanded_.raise();
-  if (thread_.joinable()) thread_.join();
-}
-
-void Link::run() noexcept {
-  std::string why = "the link is being closed";
-  try {
-    session_.connect_anew(clock_.now());
-    while (!quit_) turn();
-  } catch (const std::exception& error) {
-    why = error.what();
+  {
+    const std::lock_guard lock(mutex_);
+    if (!alive_) refuse("spin", ended_ ? "connect again" : "find the cause, then rearm it");
+    renew();
+    commands_.speed = signed_speed;
+    commands_.stop.reset();
   }
-  send_final_coast();
-  motor_.end(why);
+  commanded_.raise();
 }
 
-void Link::turn() {
-  try {
-    transmit();
-    publish();
-    const Woken woken = sleep();
-    notice_sleep();
-    if (woken.by_port) receive();
-    session_.advance(clock_.now());
-    if (woken.by_command) apply(motor_.take_commands());
-    keep_lease();
-  } catch (const serial::PortGone& gone) {
-    lose(gone.what());
+void Motor::renew() noexcept {
+  lease_end_ns_ = std::chrono::nanoseconds((steady_clock::now() + kLease).time_since_epoch()).count();
+}
+
+std::uint64_t Motor::order_coast(bool emergency) noexcept {
+  std::uint64_t ticket = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    commands_.speed.reset();
+    commands_.stop.reset();
+    (emergency ? commands_.emergency : commands_.coast) = true;
+    ticket = ++coasts_.asked;
   }
-  recover();
+  commanded_.raise();
+  return ticket;
 }
 
-Link::Woken Link::sleep() {
-  const auto left = std::max(due() - steady_clock::now(), steady_clock::duration{0});
-  const auto ns = std::chrono::nanoseconds(left).count();
-  const timespec limit{static_cast<time_t>(ns / 1'000'000'000), ns % 1'000'000'000};
-  pollfd fds[2] = {{motor_.commanded_.descriptor(), POLLIN, 0}, {-1, 0, 0}};
-  if (port_) fds[1] = {port_->fd(), static_cast<short>(congested_ ? POLLIN | POLLOUT : POLLIN), 0};
-  if (ppoll(fds, 2, &limit, nullptr) <= 0) return {};
-  return {fds[0].revents != 0 && motor_.commanded_.clear(), fds[1].revents != 0};
+bool Motor::await_coast(std::uint64_t ticket, Duration wall) noexcept {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, wall, [&] { return ended_ || !line_ || coasts_.done >= ticket; });
+  return coasts_.done >= ticket;
 }
 
-Link::WallTime Link::due() const {
-  const WallTime now = steady_clock::now();
-  WallTime due = now + kLongestSleep;
-  if (!port_) return std::min(due, next_attempt_);
-  const Instant deadline = session_.deadline();
-  if (deadline != kNever) due = std::min(due, now + clock_.shrunk(std::max(deadline - clock_.now(), Duration{0})));
-  if (session_.spinning()) due = std::min(due, motor_.lease_end());
-  if (session_.state() == Session::State::failed && next_attempt_ > now) due = std::min(due, next_attempt_);
-  return due;
+StopReport Motor::stop(const StopSettings& settings) {
+  Stopping::check(settings);
+  std::unique_lock lock(mutex_);
+  commands_.speed.reset();
+  commands_.stop = settings;
+  const std::uint64_t ticket = ++stops_.asked;
+  commanded_.raise();
+  // A caller that waits here is alive.
+  do {
+    renew();
+  } while (!changed_.wait_for(lock, kLease / 4, [&] { return ended_ || stops_.done >= ticket; }));
+  return stops_.done >= ticket ? stop_report_ : StopReport{};
 }
 
-// Reading also detects that the port is gone.
-void Link::receive() {
-  std::array<std::uint8_t, 4096> buffer;
-  while (const std::size_t n = port_->read(buffer)) {
-    const auto bytes = std::span(buffer).first(n);
-    const Instant now = clock_.now();
-    if (capture_) capture_->add(Capture::Direction::came, bytes, now);
-    session_.receive(bytes, now);
-    if (n < buffer.size()) return;
-  }
+std::vector<Reply> Motor::inquire(std::vector<Inquiry> inquiries) {
+  Inquiries::check(inquiries);
+  const std::lock_guard turn(inquiring_);
+  std::unique_lock lock(mutex_);
+  if (state_ != Session::State::ready || ended_) refuse("ask", "wait until it is connected");
+  commands_.inquiry = std::move(inquiries);
+  const std::uint64_t ticket = ++inquiries_.asked;
+  commanded_.raise();
+  changed_.wait_for(lock, kAnswerLimit, [&] { return ended_ || inquiries_.done >= ticket; });
+  if (inquiries_.done < ticket) refuse("ask", "connect again");
+  return replies_;
 }
 
-void Link::apply(const Commands& commands) {
-  const Instant now = clock_.now();
-  if (commands.emergency) session_.emergency_stop(now);
-  if (commands.coast && !commands.emergency) session_.coast(now);
-  if (commands.stop) session_.stop(*commands.stop, now);
-  if (commands.rearm && session_.state() == Session::State::ready) session_.rearm();
-  if (commands.inquiry && session_.state() == Session::State::ready) session_.inquire(*commands.inquiry, now);
-  if (!commands.speed || !session_.armed()) return;
-  if (steady_clock::now() < motor_.lease_end()) {
-    session_.spin_at(*commands.speed, now);
-  } else {
-    ++motor_.lease_expiries_;
-  }
+void Motor::rearm() {
+  std::unique_lock lock(mutex_);
+  if (alive_) return;
+  if (state_ != Session::State::ready || ended_) refuse("rearm", "wait until it is connected again");
+  commands_.rearm = true;
+  const std::uint64_t ticket = ++rearms_.asked;
+  commanded_.raise();
+  changed_.wait_for(lock, kAnswerLimit, [&] { return ended_ || rearms_.done >= ticket; });
+  if (!alive_) refuse("rearm", "wait until it is connected again");
 }
 
-/// While this computer slept the module stopped driving the motor: earlier orders are void.
-void Link::notice_sleep() {
-  const Duration suspended = clock_.suspended();
-  const Duration slept = suspended - suspended_;
-  if (slept < kShortestSleep) return;
-  suspended_ = suspended;
-  session_.fail(EventKind::host_absent, fmt::format("this computer slept for {:.2g} s", to_seconds(slept)),
-                clock_.now());
+std::optional<bool> Motor::await_connection(Duration wall) {
+  std::unique_lock lock(mutex_);
+  const bool decided = changed_.wait_for(lock, wall, [&] { return lost() || state_ == Session::State::ready; });
+  if (!decided) return std::nullopt;
+  return !lost();
 }
 
-void Link::keep_lease() {
-  if (!session_.spinning() || steady_clock::now() < motor_.lease_end()) return;
-  ++motor_.lease_expiries_;
-  session_.expire_lease(clock_.now());
+std::vector<Event> Motor::take_events() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(events_, {});
 }
 
-void Link::recover() {
-  if (steady_clock::now() < next_attempt_) return;
-  if (!port_) {
-    reopen();
-  } else {
-    reconnect();
-  }
+bool Motor::connected() const {
+  const std::lock_guard lock(mutex_);
+  return !ended_ && state_ == Session::State::ready;
 }
 
-void Link::reopen() {
-  try {
-    port_ = std::make_unique<serial::Port>(motor_.device(), baud_);
-    session_.connect_anew(clock_.now());
-  } catch (const DeviceError&) {
-    next_attempt_ = steady_clock::now() + reopening_.next();
-  }
+std::string Motor::failure() const {
+  const std::lock_guard lock(mutex_);
+  return failure_;
 }
 
-// A module that failed continues coasting until it confirms; then it is connected again from the beginning.
-void Link::reconnect() {
-  const bool ready = session_.state() == Session::State::ready, failed = session_.state() == Session::State::failed;
-  if (ready && !std::exchange(was_ready_, true) && !session_.armed()) ++motor_.reconnections_;
-  if (ready) {
-    reopening_.reset();
-    reconnecting_.reset();
-  }
-  if (!failed) return;
-  was_ready_ = false;
-  if (!session_.coasting() || !session_.was_connected()) return;
-  next_attempt_ = steady_clock::now() + reconnecting_.next();
-  session_.connect(clock_.now());
+Identity Motor::identity() const {
+  const std::lock_guard lock(mutex_);
+  return identity_;
 }
 
-void Link::transmit() {
-  congested_ = false;
-  if (!port_) return;
-  notice_sleep();
-  for (auto bytes = session_.output(); !bytes.empty(); bytes = session_.output()) {
-    const std::size_t n = port_->write(bytes);
-    if (capture_ && n > 0) capture_->add(Capture::Direction::sent, bytes.first(n), clock_.now());
-    session_.sent(n);
-    if (n > 0) continue;
-    congested_ = true;
-    return;
-  }
+Counters Motor::counters() const {
+  const std::lock_guard lock(mutex_);
+  return counters_;
 }
 
-void Link::publish() {
-  const WallTime now = steady_clock::now();
-  const bool all = now - published_ >= kPublishEvery;
-  if (all) published_ = now;
-  motor_.move_readings(session_);
-  motor_.publish(session_, port_ != nullptr, all);
+RoundTripHistogram Motor::round_trips() const {
+  const std::lock_guard lock(mutex_);
+  return round_trips_;
 }
 
-void Link::lose(const std::string& why) {
-  port_.reset();
-  congested_ = false;
-  was_ready_ = false;
-  session_.fail(EventKind::port_lost, why, clock_.now());
-  next_attempt_ = steady_clock::now() + reopening_.next();
+void Motor::refuse(const char* operation, const char* next_move) const {
+  throw DeviceError("motor module on " + device_, operation, failure_.empty() ? "it is not connected" : failure_,
+                    next_move);
 }
 
-// Past the session, so that an error inside it cannot prevent the coast. A frame cut short does no harm: the module
-// rescans after a bad CRC, and there are three.
-void Link::send_final_coast() noexcept {
-  if (!port_) return;
-  const auto end = steady_clock::now() + kFinalCoastLimit;
-  try {
-    std::array<std::uint8_t, kMaxFrame> frame;
-    const Packet coast = set<"propeller_motor_control.ctrl_coast">(session_.settings().module_id);
-    const std::size_t size = encode(coast, frame);
-    for (int i = 0; i < 3; ++i) {
-      std::span<const std::uint8_t> rest = std::span(frame).first(size);
-      while (!rest.empty() && steady_clock::now() < end) {
-        const std::size_t n = port_->write(rest);
-        if (capture_ && n > 0) capture_->add(Capture::Direction::sent, rest.first(n), clock_.now());
-        rest = rest.subspan(n);
-        if (n > 0) continue;
-        pollfd room{port_->fd(), POLLOUT, 0};
-        ::poll(&room, 1, 10);
-      }
+Commands Motor::take_commands() {
+  const std::lock_guard lock(mutex_);
+  for (Ticket* ticket : {&coasts_, &stops_, &rearms_, &inquiries_}) ticket->taken = ticket->asked;
+  return std::exchange(commands_, {});
+}
+
+void Motor::move_readings(Session& session) {
+  std::array<Reading, 64> batch;
+  while (const std::size_t n = session.take(batch)) dropped_readings_ += n - readings_.push(batch.data(), n);
+  newest_reading_ns_ = session.newest_reading().count();
+}
+
+void Motor::publish(Session& session, bool line, bool all) {
+  bool news = false;
+  {
+    const std::lock_guard lock(mutex_);
+    news = note_state(session) || line != std::exchange(line_, line) || all;
+    if (close_tickets(session)) news = true;
+    for (Event& event : session.take_events()) {
+      if (events_.size() == kEvents) events_.erase(events_.begin());
+      events_.push_back(std::move(event));
     }
-  } catch (const std::exception&) {
-    return;  // the port is gone
+    if (news) {
+      counters_ = session.counters();
+      counters_.dropped_readings += dropped_readings_;
+      counters_.lease_expiries = lease_expiries_;
+      counters_.reconnections = reconnections_;
+      round_trips_ = session.round_trips();
+    }
   }
-  // Closing may throw away what has not left yet.
-  port_->drain(end - steady_clock::now());
+  if (news) changed_.notify_all();
 }
 
-Motor::Motor(const std::string& device, unsigned baud, const Settings& settings, const Clock& clock,
-             const std::string& capture)
-    : ModuleHandle(device), link_(std::make_unique<Link>(*this, baud, settings, clock, capture)) {}
+bool Motor::note_state(const Session& session) {
+  if (!session.failure().empty()) failure_ = session.failure();
+  if (session.armed()) failure_.clear();
+  const bool alive = session.armed() || (alive_ && session.state() == Session::State::connecting);
+  const bool news = state_ != session.state() || alive_ != alive;
+  state_ = session.state();
+  alive_ = alive;
+  if (news && state_ == Session::State::ready) identity_ = session.identity();
+  return news;
+}
 
-Motor::~Motor() { (void)await_coast(order_coast(true), kStopLimit); }
+bool Motor::close_tickets(const Session& session) {
+  bool news = false;
+  const auto close = [&](Ticket& ticket, bool done) {
+    if (!ticket.open() || !done) return false;
+    ticket.done = ticket.taken;
+    return news = true;
+  };
+  close(coasts_, session.coasting());
+  if (close(stops_, !session.stopping() && session.stop_report().has_value())) stop_report_ = *session.stop_report();
+  if (close(inquiries_, session.inquiries().done())) replies_ = session.inquiries().replies();
+  close(rearms_, true);
+  return news;
+}
+
+void Motor::end(const std::string& why) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (failure_.empty()) failure_ = why;
+    ended_ = true;
+    alive_ = false;
+  }
+  changed_.notify_all();
+}
 
 }  // namespace kphi::iq

@@ -83,7 +83,7 @@ double least_slack(const std::vector<Point>& points) {
   return enough;
 }
 
-Answer told(Dialogue& module, const Entry& asked) {
+Answer require_answer(Dialogue& module, const Entry& asked) {
   for (int i = 0; i < kSilences; ++i) {
     const auto answer = module.ask(asked);
     if (answer && std::isfinite(answer->value)) return *answer;
@@ -93,9 +93,9 @@ Answer told(Dialogue& module, const Entry& asked) {
 }
 
 void require_standstill(Dialogue& module) {
-  if (told(module, entry<"brushless_drive.drive_mode">).value != static_cast<double>(DriveMode::coast))
+  if (require_answer(module, entry<"brushless_drive.drive_mode">).value != static_cast<double>(DriveMode::coast))
     throw DeviceError("IQ module", kOperation, "the motor does not coast", "coast it first");
-  const double speed = told(module, entry<"brushless_drive.obs_velocity">).value;
+  const double speed = require_answer(module, entry<"brushless_drive.obs_velocity">).value;
   if (std::abs(speed) > kStanding)
     throw DeviceError("IQ module", kOperation, fmt::format("the motor turns at {:.0f} rad/s", speed),
                       "wait until it is at rest");
@@ -127,7 +127,7 @@ ClockGain measure_clock_gain(Dialogue& module, const ClockGainSettings& settings
   std::vector<Answer> times;
   const Duration whole = from_seconds(settings.duration_s);
   while (times.size() < 2 || times.back().time - times.front().time < whole) {
-    const Answer answer = told(module, kTime);
+    const Answer answer = require_answer(module, kTime);
     if (!times.empty() && answer.value < times.back().value)
       throw DeviceError("IQ module", kOperation, "its time went backwards: it has restarted",
                         "check its supply and try again");

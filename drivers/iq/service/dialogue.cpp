@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "base/error.hpp"
-#include "drivers/iq/session/inquiries.hpp"
+#include "drivers/iq/session/connecting.hpp"
 
 namespace kphi::iq {
 namespace {
@@ -147,7 +147,7 @@ std::optional<Answer> SerialDialogue::ask(const Entry& entry) {
       ++counters_.late_replies;
       return false;
     });
-    count_parser();
+    counters_.take(line_.parsed());
   }
   return std::nullopt;
 }
@@ -226,7 +226,7 @@ std::optional<Answer> SerialDialogue::ask_once(const Entry& entry) {
     answer = Answer{number(entry.format, packet.data()), from + (to - from) / 2, (to - from + Duration(1)) / 2};
     return true;
   });
-  count_parser();
+  counters_.take(line_.parsed());
   if (answer) {
     ++counters_.replies;
     if (!std::isfinite(answer->value)) ++counters_.bad_values;
@@ -263,15 +263,6 @@ bool SerialDialogue::answers(const Packet& packet, const Entry& asked) noexcept 
 void SerialDialogue::write(const Packet& packet) {
   if (!line_.tell(packet)) lose("write", "the port accepts no bytes");
   counters_.bytes_out += packet.length + kFrameOverhead;
-}
-
-void SerialDialogue::count_parser() noexcept {
-  const Parser::Counters& parsed = line_.parsed();
-  counters_.bytes_in = parsed.bytes;
-  counters_.packets = parsed.packets;
-  counters_.crc_errors = parsed.crc_errors;
-  counters_.refused_lengths = parsed.refused_lengths;
-  counters_.discarded_bytes = parsed.discarded_bytes;
 }
 
 void SerialDialogue::lose(const char* operation, const std::string& cause) const {

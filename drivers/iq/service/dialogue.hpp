@@ -9,7 +9,7 @@
 
 #include "base/clock.hpp"
 #include "base/finding.hpp"
-#include "drivers/iq/exchange/reading.hpp"
+#include "drivers/iq/exchange/telemetry.hpp"
 #include "drivers/iq/wire/entries.hpp"
 #include "drivers/serial/port.hpp"
 
@@ -135,7 +135,6 @@ class SerialDialogue final : public Dialogue {
   void learn(Duration round_trip);
   [[nodiscard]] Duration patience() const noexcept;
   [[nodiscard]] bool answers(const Packet& packet, const Entry& asked) noexcept;
-  void count_parser() noexcept;
   [[noreturn]] void lose(const char* operation, const std::string& cause) const;
 
   const SerialLine port_;

@@ -2,12 +2,66 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <iterator>
 
 #include "base/error.hpp"
-#include "drivers/iq/service/search.hpp"
+#include "drivers/iq/service/dialogue.hpp"
 
 namespace kphi::iq {
+namespace {
+
+constexpr const Entry& kDriveMode = entry<"brushless_drive.drive_mode">;
+constexpr Duration kReply = std::chrono::milliseconds(60);
+constexpr int kIds = static_cast<int>(ModuleId::last) + 1;
+constexpr Duration kTurn = std::chrono::milliseconds(18);  ///< for each id; a USB adapter may be 16 ms late
+constexpr Duration kLastTurn = std::chrono::milliseconds(100);
+
+/// Two queries, because the module may take the first for the end of a frame.
+bool answers_at(Conversation& line, int module_id, unsigned baud) {
+  line.set_baud(baud);
+  line.coast(module_id);
+  return line.ask(kDriveMode, module_id, kReply) || line.ask(kDriveMode, module_id, kReply);
+}
+
+}  // namespace
+
+const std::vector<unsigned>& bauds_to_try() {
+  static const std::vector<unsigned> bauds{115200, 921600, 1000000, 2000000, 460800, 230400, 57600, 38400, 19200, 9600};
+  return bauds;
+}
+
+std::optional<unsigned> find_baud(const std::string& device, int module_id, unsigned first) {
+  Conversation line(device, first);
+  if (answers_at(line, module_id, first)) return first;
+  for (const unsigned baud : bauds_to_try()) {
+    if (baud != first && answers_at(line, module_id, baud)) return baud;
+  }
+  return std::nullopt;
+}
+
+// One id at a time, because replies share a wire. A late reply still carries its id.
+std::vector<int> find_ids(const std::string& device, unsigned baud) {
+  Conversation line(device, baud);
+  line.set_baud(baud);
+  line.coast(static_cast<int>(ModuleId::broadcast));
+  std::array<bool, kIds> answered{};
+  const auto note = [&](const Packet& packet) {
+    const int id = packet.module_id();
+    if (id < kIds && is_reply_of(packet, kDriveMode, id)) answered[static_cast<std::size_t>(id)] = true;
+    return false;
+  };
+  for (int id = 0; id < kIds; ++id) {
+    line.tell(get<"brushless_drive.drive_mode">(id));
+    line.listen(id + 1 < kIds ? kTurn : kLastTurn, note);
+  }
+  std::vector<int> ids;
+  for (int id = 0; id < kIds; ++id) {
+    if (answered[static_cast<std::size_t>(id)]) ids.push_back(id);
+  }
+  return ids;
+}
+
 namespace {
 
 void append(std::vector<Finding>& all, std::vector<Finding> more) {
@@ -55,16 +109,16 @@ std::optional<Finding> search_for(const SerialLine& line) {
 }
 
 /// "12.5 V", or "?" when unknown.
-std::string told(const std::optional<double>& value, const char* unit) {
+std::string value_text(const std::optional<double>& value, const char* unit) {
   return value ? fmt::format("{:.5g}{}{}", static_cast<float>(*value), *unit == 0 ? "" : " ", unit) : "?";
 }
 
 std::string coil_words(const AuditRecord& module) {
   switch (module.coil_temperature_client()) {
     case 83:
-      return "coil " + told(module.value<"coil_temperature_estimator.t_coil">(), "°C");
+      return "coil " + value_text(module.value<"coil_temperature_estimator.t_coil">(), "°C");
     case 77:
-      return "coil " + told(module.value<"temperature_estimator.temp">(), "°C") + " (old client)";
+      return "coil " + value_text(module.value<"temperature_estimator.temp">(), "°C") + " (old client)";
     default:
       return "no coil temperature";
   }
@@ -76,16 +130,17 @@ void describe(const AuditRecord& module, std::vector<std::string>& text) {
       module.hardware() ? module.hardware()->text() : "?", module.electronics() ? module.electronics()->text() : "?",
       module.uid().empty() ? "?" : module.uid()));
   text.push_back(fmt::format("{} pole pairs, {}, {}, at most {}, redline {} to {}",
-                             told(module.value<"brushless_drive.motor_pole_pairs">(), ""),
-                             told(module.value<"brushless_drive.motor_Kv">(), "RPM/V"),
-                             told(module.value<"brushless_drive.motor_R_ohm">(), "ohm"),
-                             told(module.value<"brushless_drive.motor_I_max">(), "A"),
-                             told(module.value<"brushless_drive.motor_redline_start">(), ""),
-                             told(module.value<"brushless_drive.motor_redline_end">(), "rad/s")));
-  text.push_back(fmt::format(
-      "supply {}, regeneration limited from {} to {}, timeout {}, {}", told(module.value<"power_monitor.volts">(), "V"),
-      told(module.value<"brushless_drive.v_max_start">(), ""), told(module.value<"brushless_drive.volts_limit">(), "V"),
-      told(module.value<"propeller_motor_control.timeout">(), "s"), coil_words(module)));
+                             value_text(module.value<"brushless_drive.motor_pole_pairs">(), ""),
+                             value_text(module.value<"brushless_drive.motor_Kv">(), "RPM/V"),
+                             value_text(module.value<"brushless_drive.motor_R_ohm">(), "ohm"),
+                             value_text(module.value<"brushless_drive.motor_I_max">(), "A"),
+                             value_text(module.value<"brushless_drive.motor_redline_start">(), ""),
+                             value_text(module.value<"brushless_drive.motor_redline_end">(), "rad/s")));
+  text.push_back(fmt::format("supply {}, regeneration limited from {} to {}, timeout {}, {}",
+                             value_text(module.value<"power_monitor.volts">(), "V"),
+                             value_text(module.value<"brushless_drive.v_max_start">(), ""),
+                             value_text(module.value<"brushless_drive.volts_limit">(), "V"),
+                             value_text(module.value<"propeller_motor_control.timeout">(), "s"), coil_words(module)));
 }
 
 }  // namespace

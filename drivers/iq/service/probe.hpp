@@ -1,4 +1,5 @@
-// Who the module is, how well it answers, what is wrong with it; and where it is if it does not answer. At rest.
+// Inspects a module at rest: who it is, how well it answers, what is wrong with it; and finds a silent one at another
+// baud rate or id.
 #pragma once
 
 #include <optional>
@@ -7,13 +8,25 @@
 
 #include "base/clock.hpp"
 #include "base/finding.hpp"
-#include "drivers/iq/exchange/reading.hpp"
+#include "drivers/iq/exchange/telemetry.hpp"
 #include "drivers/iq/service/audit.hpp"
 #include "drivers/iq/service/clock_gain.hpp"
 #include "drivers/iq/service/dialogue.hpp"
 #include "drivers/serial/discovery.hpp"
 
 namespace kphi::iq {
+
+// Search for a silent module. It never writes a rate or an id, and coasts whatever listens first. Blocking; wall time.
+
+/// In the order in which they are tried: the factory's, the usual, then the rest.
+[[nodiscard]] const std::vector<unsigned>& bauds_to_try();
+
+/// The rate at which the module with this id answers; `first` is tried before all others; nullopt: at no rate. About 3
+/// s when nothing answers. Throws DeviceError when the port cannot be opened or is lost.
+[[nodiscard]] std::optional<unsigned> find_baud(const std::string& device, int module_id, unsigned first = 115200);
+
+/// The ids that answer at this rate, ascending. About 1.3 s. Throws as find_baud does.
+[[nodiscard]] std::vector<int> find_ids(const std::string& device, unsigned baud);
 
 struct ProbeSettings {
   Intention intention;                          ///< what the module is audited against

@@ -6,7 +6,7 @@
 // to coast by itself when it receives nothing for `module_timeout_s`; polling prevents that, so the session falls
 // silent when the module does not confirm a coast or stops answering. After any failure the session is disarmed: it
 // spins the motor again only after a new connection and an explicit rearm(). A speed is sent only to a module that is
-// still driving (drive_watch.hpp), so not after a sleep of the host, a break of the line or a timeout.
+// still driving (module_watch.hpp), so not after a sleep of the host, a break of the line or a timeout.
 #pragma once
 
 #include <optional>
@@ -17,15 +17,11 @@
 #include "base/clock.hpp"
 #include "compensation/units.hpp"
 #include "drivers/iq/exchange/exchange.hpp"
-#include "drivers/iq/exchange/reading.hpp"
-#include "drivers/iq/exchange/settings.hpp"
-#include "drivers/iq/session/coasting.hpp"
+#include "drivers/iq/exchange/telemetry.hpp"
 #include "drivers/iq/session/connecting.hpp"
-#include "drivers/iq/session/drive_watch.hpp"
 #include "drivers/iq/session/events.hpp"
-#include "drivers/iq/session/inquiries.hpp"
+#include "drivers/iq/session/module_watch.hpp"
 #include "drivers/iq/session/polling.hpp"
-#include "drivers/iq/session/reset_watch.hpp"
 #include "drivers/iq/session/stopping.hpp"
 #include "drivers/iq/wire/identity.hpp"
 

@@ -1,14 +1,58 @@
-// Stopping a spinning motor, and the report of it. The motor coasts at once, or, on a supply that can sink current fed
-// back by the rotor, ramps down first. The stop ends when the module reports drive mode coast and the propeller is at
-// rest. Speeds in rad/s, times in bench time.
+// Coming to rest: a coast that the module must confirm, and the stop of a spinning motor with its report. Speeds in
+// rad/s, times in bench time.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <string>
 
 #include "base/clock.hpp"
+#include "drivers/iq/exchange/exchange.hpp"
 
 namespace kphi::iq {
+
+/// A coast, repeated until the module reports drive mode coast to a query sent afterwards. If it does not, the session
+/// falls silent so that the module's own communication timeout can end the motion, and then starts again, without end.
+class Coasting {
+ public:
+  /// `settings` are completed.
+  explicit Coasting(const Settings& settings);
+
+  /// Sends it `times` times at once, and asks. Sends nothing during the silence, which leaves the motor to the module's
+  /// own timeout.
+  void begin(Exchange& exchange, int times, Instant now) noexcept;
+  /// Motion was commanded.
+  void end() noexcept { pending_ = confirmed_ = false; }
+  void take(const QueryResult& result, const Exchange& exchange) noexcept;
+  /// Does what is due. True when it has just given up.
+  [[nodiscard]] bool advance(Exchange& exchange, Instant now) noexcept;
+  [[nodiscard]] Instant deadline() const noexcept {
+    if (!pending_) return kNever;
+    return blocked_ ? next_ : std::min(next_, ask_at_);
+  }
+
+  [[nodiscard]] bool pending() const noexcept { return pending_; }
+  [[nodiscard]] bool confirmed() const noexcept { return confirmed_; }
+  /// Given up for now: nothing must be sent.
+  [[nodiscard]] bool silent() const noexcept { return pending_ && attempts_ == 0; }
+  /// The drive mode last reported, to any query; -1 before the first.
+  [[nodiscard]] int last_mode() const noexcept { return last_mode_; }
+  void forget_mode() noexcept { last_mode_ = -1; }
+
+ private:
+  void ask(Exchange& exchange, Instant now) noexcept;
+
+  int module_id_;
+  Duration reply_timeout_, silence_;
+  bool pending_ = false, confirmed_ = false;
+  std::uint64_t order_ = 0;  ///< of the first coast
+  Instant begun_{0};
+  int attempts_ = 0;
+  Instant next_{0};
+  Instant ask_at_{kNever};
+  bool blocked_ = false;  ///< the query is due but had no room: it goes before any poll
+  int last_mode_ = -1;
+};
 
 struct StopSettings {
   /// rad/s², 100..100000. A ramp feeds current back: at 1000 an IQ 2306 raises a 12 V supply that cannot sink current
@@ -40,6 +84,8 @@ struct StopReport {
   [[nodiscard]] std::string summary() const;
 };
 
+/// The motor coasts at once, or, on a supply that can sink current fed back by the rotor, ramps down first. The stop
+/// ends when the module reports drive mode coast and the propeller is at rest.
 class Stopping {
  public:
   /// Throws std::invalid_argument for settings that make no sense.

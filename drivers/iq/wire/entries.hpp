@@ -11,6 +11,7 @@
 #include <limits>
 #include <span>
 #include <string_view>
+#include <utility>
 
 #include "drivers/iq/wire/packet.hpp"
 
@@ -285,38 +286,27 @@ inline constexpr Entry kEntries[] = {
     {Client::iquart_flight_controller_interface, 5, "servo_cvi", Format::u8, "index", kUnknown},
 };
 
+inline constexpr std::pair<Client, std::string_view> kClientNames[] = {
+    {Client::system_control, "system_control"},
+    {Client::persistent_memory, "persistent_memory"},
+    {Client::serial_interface, "serial_interface"},
+    {Client::brushless_drive, "brushless_drive"},
+    {Client::propeller_motor_control, "propeller_motor_control"},
+    {Client::esc_propeller_input_parser, "esc_propeller_input_parser"},
+    {Client::power_monitor, "power_monitor"},
+    {Client::temperature_monitor_uc, "temperature_monitor_uc"},
+    {Client::hobby_input, "hobby_input"},
+    {Client::temperature_estimator, "temperature_estimator"},
+    {Client::coil_temperature_estimator, "coil_temperature_estimator"},
+    {Client::power_safety, "power_safety"},
+    {Client::arming_handler, "arming_handler"},
+    {Client::stopping_handler, "stopping_handler"},
+    {Client::iquart_flight_controller_interface, "iquart_flight_controller_interface"},
+};
+
 [[nodiscard]] constexpr std::string_view name_of(Client client) noexcept {
-  switch (client) {
-    case Client::system_control:
-      return "system_control";
-    case Client::persistent_memory:
-      return "persistent_memory";
-    case Client::serial_interface:
-      return "serial_interface";
-    case Client::brushless_drive:
-      return "brushless_drive";
-    case Client::propeller_motor_control:
-      return "propeller_motor_control";
-    case Client::esc_propeller_input_parser:
-      return "esc_propeller_input_parser";
-    case Client::power_monitor:
-      return "power_monitor";
-    case Client::temperature_monitor_uc:
-      return "temperature_monitor_uc";
-    case Client::hobby_input:
-      return "hobby_input";
-    case Client::temperature_estimator:
-      return "temperature_estimator";
-    case Client::coil_temperature_estimator:
-      return "coil_temperature_estimator";
-    case Client::power_safety:
-      return "power_safety";
-    case Client::arming_handler:
-      return "arming_handler";
-    case Client::stopping_handler:
-      return "stopping_handler";
-    case Client::iquart_flight_controller_interface:
-      return "iquart_flight_controller_interface";
+  for (const auto& [known, name] : kClientNames) {
+    if (known == client) return name;
   }
   return "";
 }

@@ -52,15 +52,15 @@ struct Identity {
   std::uint32_t hardware = 0;     ///< a BoardVersion; 2306-2200Kv: type 1
   std::uint32_t electronics = 0;  ///< a BoardVersion; 2306-2200Kv: type 3
   std::uint32_t uid1 = 0, uid2 = 0, uid3 = 0;
-  int pole_pairs = 0;                 ///< 0: not told; 23-XX: 7
-  double motor_kv_rpm_per_volt = 0;   ///< 0: not told
+  int pole_pairs = 0;                 ///< 0: unknown; 23-XX: 7
+  double motor_kv_rpm_per_volt = 0;   ///< 0: unknown
   int fault_now = 0;                  ///< bits of FaultBit at connection
   double timeout_s = 0;               ///< communication timeout, read back; seconds of the module
   bool timeout_behavior_set = false;  ///< false: old firmware, which always coasts and then plays its song
   int coil_temperature_client = 0;    ///< 83, 77 (old firmware), 0: none answers
   int system_control_id = 0;          ///< where system_control answers: the module's id; on old firmware always 0
-  double uptime_s = -1;               ///< seconds of the module at connection; below 0: not told
-  int fault_ever = -1;                ///< bits of FaultBit at connection; -1: not told
+  double uptime_s = -1;               ///< seconds of the module at connection; below 0: unknown
+  int fault_ever = -1;                ///< bits of FaultBit at connection; -1: unknown
 
   [[nodiscard]] bool same_module(const Identity& other) const noexcept {
     return uid1 == other.uid1 && uid2 == other.uid2 && uid3 == other.uid3;

@@ -42,7 +42,7 @@ struct Packet {
 std::size_t encode(const Packet& packet, std::span<std::uint8_t, kMaxFrame> frame) noexcept;
 
 /// Finds frames in a stream of bytes, in whatever chunks it comes. Nothing intact is lost: after a bad CRC or a LEN
-/// over 59 the search goes on at the byte behind the false 0x55. Whole frames are read where they lie; only what a
+/// over 59 the search continues at the byte after the false 0x55. Whole frames are read where they lie; only what a
 /// chunk cuts off is held. Allocates nothing.
 class Parser {
  public:
@@ -104,7 +104,7 @@ class Parser {
     drop(read(std::span<const std::uint8_t>(held_.data(), size_), sink));
   }
 
-  /// Looks at the beginning: noise, a false header, or a packet. Returns its size; 0: it is incomplete.
+  /// Classifies the beginning: noise, a false header, or a packet. Returns its size; 0: it is incomplete.
   std::size_t scan(std::span<const std::uint8_t> bytes) noexcept;
   std::size_t top_up(std::span<const std::uint8_t> bytes) noexcept;
   std::size_t hold(std::span<const std::uint8_t> rest) noexcept;

@@ -2,67 +2,19 @@
 
 #include <fmt/format.h>
 
-#include <boost/asio/connect.hpp>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/read.hpp>
-#include <boost/asio/write.hpp>
+#include <algorithm>
 #include <boost/endian/conversion.hpp>
 #include <cmath>
 
 #include "base/error.hpp"
+#include "base/tcp.hpp"
 #include "drivers/netbox/wire/units.hpp"
 
 namespace kphi::netbox {
 namespace {
 
-namespace asio = boost::asio;
-using asio::ip::tcp;
-using boost::system::error_code;
-
 constexpr std::uint8_t kReadCalinfo = 1;
 constexpr std::uint16_t kHeader = 0x1234;
-
-/// One request on its way through resolve, connect, write, read.
-class Exchange {
- public:
-  explicit Exchange(asio::io_context& io) : resolver_(io), socket_(io) {}
-
-  void begin(const std::string& host, std::uint16_t port) {
-    resolver_.async_resolve(host, std::to_string(port), [this](error_code error, auto endpoints) {
-      if (!proceed(error)) return;
-      asio::async_connect(socket_, endpoints, [this](error_code failure, const auto&) {
-        if (proceed(failure)) write();
-      });
-    });
-  }
-  [[nodiscard]] bool done() const { return done_; }
-  [[nodiscard]] error_code error() const { return error_; }
-  [[nodiscard]] std::span<const std::uint8_t> answer() const { return answer_; }
-
- private:
-  void write() {
-    asio::async_write(socket_, asio::buffer(request_), [this](error_code error, std::size_t) {
-      if (!proceed(error)) return;
-      asio::async_read(socket_, asio::buffer(answer_), [this](error_code failure, std::size_t) {
-        error_ = failure;
-        done_ = true;
-      });
-    });
-  }
-  bool proceed(error_code error) {
-    error_ = error;
-    done_ = static_cast<bool>(error);
-    return !error;
-  }
-
-  tcp::resolver resolver_;
-  tcp::socket socket_;
-  const std::array<std::uint8_t, 20> request_ = encode_read_calinfo();
-  std::array<std::uint8_t, kCalinfoBytes> answer_{};
-  error_code error_;
-  bool done_ = false;
-};
 
 bool agree(double one, double other) { return std::abs(one - other) <= 1e-6 * std::abs(other); }
 
@@ -85,19 +37,26 @@ std::optional<Calinfo> decode_calinfo(std::span<const std::uint8_t> bytes) noexc
 Calinfo read_calinfo(const std::string& host, std::uint16_t port, std::chrono::nanoseconds wall_timeout) {
   const std::string device = fmt::format("Net Box {}:{}", host, port);
   constexpr const char* kOperation = "read the calibration over TCP";
-  asio::io_context io;
-  Exchange exchange(io);
-  exchange.begin(host, port);
-  io.run_for(wall_timeout);
-  if (!exchange.done()) {
+  TcpClient box(wall_timeout);
+  std::string answer;
+  try {
+    box.connect(host, port);
+    const auto request = encode_read_calinfo();
+    box.send({reinterpret_cast<const char*>(request.data()), request.size()});
+    while (answer.size() < kCalinfoBytes && box.receive(answer)) {
+    }
+  } catch (const TcpError& error) {
+    if (error.cause != TcpError::Cause::timeout)
+      throw DeviceError(device, kOperation, error.what(), "check that this is a Net Box");
     throw DeviceError(device, kOperation,
                       fmt::format("no answer within {:.1f} s", std::chrono::duration<double>(wall_timeout).count()),
-                      "check the address and that no firewall holds back TCP");
+                      "check the address, and that no firewall blocks TCP");
   }
-  if (exchange.error())
-    throw DeviceError(device, kOperation, exchange.error().message(), "check that this is a Net Box");
-  const auto calinfo = decode_calinfo(exchange.answer());
-  if (!calinfo) throw DeviceError(device, kOperation, "the answer is none of a Net Box", "check address and port");
+  if (answer.size() < kCalinfoBytes)
+    throw DeviceError(device, kOperation, "the answer is cut short", "check that this is a Net Box; if it is, power-cycle it");
+  answer.resize(kCalinfoBytes);
+  const auto calinfo = decode_calinfo({reinterpret_cast<const std::uint8_t*>(answer.data()), answer.size()});
+  if (!calinfo) throw DeviceError(device, kOperation, "unexpected reply: not a Net Box", "check the address and port");
   return *calinfo;
 }
 
@@ -107,7 +66,7 @@ std::optional<Finding> compare(const Calinfo& calinfo, const Configuration& conf
   if (!force || !torque) {
     return Finding{
         Severity::fault,
-        fmt::format("over TCP the box names the unknown units {} and {}", calinfo.force_unit, calinfo.torque_unit),
+        fmt::format("the box reports the unknown units {} and {} over TCP", calinfo.force_unit, calinfo.torque_unit),
         "choose N and N-m on the box's Configurations page"};
   }
   const double per_newton = calinfo.counts_per_force / *force, per_metre = calinfo.counts_per_torque / *torque;
@@ -115,10 +74,9 @@ std::optional<Finding> compare(const Calinfo& calinfo, const Configuration& conf
     return std::nullopt;
   return Finding{
       Severity::fault,
-      fmt::format("the scale read over TCP ({:g} counts per N, {:g} per Nm) is not that read over HTTP "
-                  "({:g}, {:g})",
-                  per_newton, per_metre, configuration.counts_per_newton, configuration.counts_per_newton_metre),
-      "power-cycle the box and read again; do not measure before they agree"};
+      fmt::format("scale mismatch: {:g} counts per N and {:g} per N m over TCP, {:g} and {:g} over HTTP", per_newton,
+                  per_metre, configuration.counts_per_newton, configuration.counts_per_newton_metre),
+      "power-cycle the box and read again; do not measure until they agree"};
 }
 
 std::optional<Finding> cross_check(const std::string& host, std::uint16_t port, const Configuration& configuration,
@@ -126,7 +84,7 @@ std::optional<Finding> cross_check(const std::string& host, std::uint16_t port, 
   try {
     return compare(read_calinfo(host, port, wall_timeout), configuration);
   } catch (const DeviceError& error) {
-    return Finding{Severity::note, fmt::format("the scale could not be cross-checked: {}", error.what()), ""};
+    return Finding{Severity::note, fmt::format("could not cross-check the scale: {}", error.what()), ""};
   }
 }
 

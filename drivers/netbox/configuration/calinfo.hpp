@@ -1,5 +1,5 @@
-// READCALINFO over TCP 49151: the box's scale from a second source (manual p.76-77). Only read: READFT would switch the
-// monitor conditions off.
+// READCALINFO over TCP 49151: the box's scale from a second source (manual p.76-77). Nothing else is sent: READFT would
+// switch the monitor conditions off.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 #include <span>
 #include <string>
 
+#include "base/finding.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
-#include "drivers/netbox/configuration/finding.hpp"
 
 namespace kphi::netbox {
 
@@ -24,15 +24,15 @@ struct Calinfo {
 };
 
 [[nodiscard]] std::array<std::uint8_t, 20> encode_read_calinfo() noexcept;
-/// Nothing: wrong header or size.
+/// nullopt: wrong header or size.
 [[nodiscard]] std::optional<Calinfo> decode_calinfo(std::span<const std::uint8_t> bytes) noexcept;
 
-/// Blocks, for `wall_timeout` at most. Throws DeviceError: no connection, no whole answer, an answer that is none.
+/// Blocks for at most `wall_timeout`. Throws DeviceError without a connection or a complete, valid answer.
 [[nodiscard]] Calinfo read_calinfo(const std::string& host, std::uint16_t port, std::chrono::nanoseconds wall_timeout);
 
 /// A fault when the two disagree about counts per newton or newton-metre by more than 1 in 10^6 or a unit is unknown.
 [[nodiscard]] std::optional<Finding> compare(const Calinfo& calinfo, const Configuration& configuration);
-/// read_calinfo and compare; a box that does not answer there is a note.
+/// read_calinfo and compare; a note if the box does not answer there.
 [[nodiscard]] std::optional<Finding> cross_check(const std::string& host, std::uint16_t port,
                                                  const Configuration& configuration,
                                                  std::chrono::nanoseconds wall_timeout);

@@ -12,7 +12,6 @@
 
 #include "base/error.hpp"
 #include "base/number.hpp"
-#include "drivers/netbox/wire/printable.hpp"
 #include "drivers/netbox/wire/units.hpp"
 
 namespace kphi::netbox {
@@ -26,7 +25,7 @@ class Elements {
   Elements(std::string_view xml, std::string device) : device_(std::move(device)) {
     if (xml.find('\0') != std::string_view::npos) {
       refuse(fmt::format("the page holds a NUL byte at {}: it is not in UTF-8", xml.find('\0')),
-             "see that no proxy is between this host and the box, then power-cycle the box");
+             "check that no proxy is between this computer and the box, then power-cycle the box");
     }
     const pugi::xml_parse_result result = document_.load_buffer(xml.data(), xml.size());
     if (!result) {
@@ -34,7 +33,7 @@ class Elements {
              "try again; the box may have broken off");
     }
     root_ = document_.child("netft");
-    if (!root_) refuse("no element <netft>", "is this a Net Box? Open its address in a browser");
+    if (!root_) refuse("no element <netft>", "check that this is a Net Box: open its address in a browser");
   }
 
   [[noreturn]] void refuse(const std::string& cause, const std::string& next_move) const {
@@ -159,9 +158,9 @@ Product kind_of(const Elements& elements, const Configuration& configuration) {
       boost::algorithm::starts_with(firmware, "1.") || boost::algorithm::starts_with(firmware, "2.");
   if (name.empty() && of_net_box) return Product::net_box;
   elements.refuse(fmt::format("\"{}\" with firmware {} is neither a Net Box nor an Ethernet Axia: its commands and "
-                              "status word are not known",
+                              "status word are unknown",
                               configuration.product, firmware),
-                  "use one of these");
+                  "use a Net Box or an Ethernet Axia");
 }
 
 void read_identity(const Elements& elements, Configuration& configuration) {
@@ -240,6 +239,73 @@ void read_monitor(const Elements& elements, Configuration& configuration) {
   configuration.monitor_conditions = std::move(conditions);
 }
 
+constexpr std::string_view kReplacement = "\xEF\xBF\xBD";
+
+struct Form {
+  unsigned char mask, lead;
+  std::size_t size;
+  std::uint32_t least;  ///< smaller codes belong to a shorter form
+};
+constexpr Form kForms[] = {
+    {0x80, 0x00, 1, 0x20}, {0xE0, 0xC0, 2, 0xA0}, {0xF0, 0xE0, 3, 0x800}, {0xF8, 0xF0, 4, 0x10000}};
+
+bool is_character(std::uint32_t code) {
+  return code != 0x7F && code <= 0x10FFFF && !(code >= 0xD800 && code <= 0xDFFF);
+}
+
+/// Size of the printable character at the begin of `text`; 0: there is none.
+std::size_t character_size(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  for (const Form& form : kForms) {
+    if ((byte(0) & form.mask) != form.lead) continue;
+    if (text.size() < form.size) return 0;
+    std::uint32_t code = byte(0) & static_cast<unsigned char>(~form.mask);
+    for (std::size_t i = 1; i < form.size; ++i) {
+      if ((byte(i) & 0xC0) != 0x80) return 0;
+      code = code << 6 | (byte(i) & 0x3Fu);
+    }
+    return code >= form.least && is_character(code) ? form.size : 0;
+  }
+  return 0;
+}
+
+struct Row {
+  Change change;
+  const char* name;
+  bool (*differs)(const Configuration&, const Configuration&);
+};
+
+template <auto Member>
+constexpr bool differ(const Configuration& a, const Configuration& b) {
+  return !(a.*Member == b.*Member);
+}
+
+using C = Configuration;
+constexpr Row kTable[] = {
+    {Change::product, "product",
+     [](const C& a, const C& b) { return a.product != b.product || a.kind != b.kind || a.serial != b.serial; }},
+    {Change::firmware, "firmware", differ<&C::firmware>},
+    {Change::calibration, "calibration", differ<&C::calibration_serial>},
+    {Change::slot, "configuration slot", differ<&C::slot>},
+    {Change::units, "units",
+     [](const C& a, const C& b) { return a.force_unit != b.force_unit || a.torque_unit != b.torque_unit; }},
+    {Change::counts_per_unit, "counts per unit",
+     [](const C& a, const C& b) {
+       return a.counts_per_newton != b.counts_per_newton || a.counts_per_newton_metre != b.counts_per_newton_metre;
+     }},
+    {Change::ranges, "ranges", differ<&C::range>},
+    {Change::rate, "rate",
+     [](const C& a, const C& b) { return a.divisor != b.divisor || a.device_rate_hz != b.device_rate_hz; }},
+    {Change::records_per_datagram, "records per datagram", differ<&C::records_per_datagram>},
+    {Change::filter, "filter", differ<&C::filter_code>},
+    {Change::tool_transform, "tool transform",
+     [](const C& a, const C& b) {
+       return a.tool_transform != b.tool_transform || a.tool_distance_unit != b.tool_distance_unit ||
+              a.tool_angle_unit != b.tool_angle_unit;
+     }},
+    {Change::gage_bias, "gage bias", differ<&C::gage_bias>},
+};
+
 }  // namespace
 
 std::optional<double> filter_cutoff_hz(int filter_code) noexcept {
@@ -267,6 +333,41 @@ Configuration parse_configuration(std::string_view xml, const std::string& devic
   read_monitor(elements, configuration);
   configuration.xml = xml;
   return configuration;
+}
+
+std::string printable(std::string_view text) {
+  std::string out;
+  while (!text.empty()) {
+    const std::size_t size = character_size(text);
+    out += size > 0 ? text.substr(0, size) : kReplacement;
+    text.remove_prefix(size > 0 ? size : 1);
+  }
+  return out;
+}
+
+Changes compare(const Configuration& before, const Configuration& after) {
+  Changes changes = 0;
+  for (const Row& row : kTable) {
+    if (row.differs(before, after)) changes |= static_cast<Changes>(row.change);
+  }
+  return changes;
+}
+
+std::string to_words(Changes changes) {
+  std::string words;
+  for (const Row& row : kTable) {
+    if (has(changes, row.change)) words += (words.empty() ? "" : ", ") + std::string(row.name);
+  }
+  return words;
+}
+
+bool forgot_peaks(const Configuration& before, const Configuration& after) noexcept {
+  if (!before.peaks || !after.peaks) return false;
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    if (after.peaks->high[axis] < before.peaks->high[axis] || after.peaks->low[axis] > before.peaks->low[axis])
+      return true;
+  }
+  return false;
 }
 
 }  // namespace kphi::netbox

@@ -2,22 +2,23 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "drivers/netbox/wire/product.hpp"
+#include "drivers/netbox/wire/codes.hpp"
 
 namespace kphi::netbox {
 
-/// Largest and smallest counts since the box was switched on, or since they were reset.
+/// Largest and smallest counts since the box was switched on or the peaks were reset.
 struct Peaks {
   std::array<double, 6> high{}, low{};
 };
 
-/// A statement that the box judges with each internal sample, whatever rate it sends: once it has been true, bit 16 of
-/// the status stays set until LoadCell::reset_latch().
+/// A condition that the box checks with each internal sample, at any output rate: once it was true, bit 16 of the
+/// status stays set until somebody resets it on the box's web pages.
 struct MonitorCondition {
   int number = 0;        ///< 0..15
   int axis = 0;          ///< 0..5 = Fx..Tz
@@ -25,11 +26,18 @@ struct MonitorCondition {
   double threshold = 0;  ///< N or Nm
 };
 
+/// Where a Net Box answers.
+struct Address {
+  std::string host;
+  std::uint16_t rdt_port = 49152;
+  std::uint16_t http_port = 80;
+};
+
 struct Configuration {
-  std::string product;  ///< prodname; empty when the box does not say
+  std::string product;  ///< prodname; empty if the box reports none
   Product kind = Product::net_box;
   std::string firmware;            ///< mfgdigver
-  std::string serial;              ///< mfgdigsn, of the box; empty when it does not say
+  std::string serial;              ///< mfgdigsn, of the box; empty if it reports none
   std::string calibration_serial;  ///< cfgcalsn
   int slot = 0;                    ///< setcfgsel: zero-based, the box's web pages count from one
   std::string slot_name;
@@ -48,23 +56,61 @@ struct Configuration {
   std::array<double, 6> tool_transform{};
   std::string tool_distance_unit, tool_angle_unit;
   std::array<double, 6> gage_bias{};  ///< setbias, already applied too
-  std::optional<Peaks> peaks;         ///< runpkmx, runpkmn; nothing when the box does not keep them (setpke)
+  std::optional<Peaks> peaks;         ///< runpkmx, runpkmn; nullopt if the box does not keep them (setpke)
 
   bool monitoring = false;  ///< setmce: the box judges its monitor conditions
-  /// Those switched on; nothing when the box does not tell them in a way that is understood.
+  /// The enabled ones; nullopt if the box reports them in an unknown form.
   std::optional<std::vector<MonitorCondition>> monitor_conditions;
 
-  std::string xml;  ///< what was read, verbatim
+  std::string xml;  ///< as read, verbatim
 };
 
-/// Cutoff of a Net Box's filter code in Hz, 0 = no filter; nothing for a code that no manual names.
+/// Cutoff of a Net Box's filter code in Hz, 0 = no filter; nullopt for a code that no manual names.
 [[nodiscard]] std::optional<double> filter_cutoff_hz(int filter_code) noexcept;
-/// That of the box; nothing for an Axia's filter, whose table depends on its rate and is not known.
+/// Cutoff of the box's filter; nullopt for an Axia, whose table depends on its rate and is unknown.
 [[nodiscard]] std::optional<double> filter_cutoff_hz(const Configuration& box) noexcept;
 
-/// Throws DeviceError, naming `device`, for whatever leaves the scale or the rate in doubt: missing, repeated or
+/// Throws DeviceError, naming `device`, if the scale or the rate is not certain: missing, repeated or
 /// unreadable elements, an unknown unit, counts per unit or ranges not above zero, an empty calibration (FT0000), a
-/// product that is neither a Net Box nor an Ethernet Axia, a rate that its product has not. Independent of the locale.
+/// product that is neither a Net Box nor an Ethernet Axia, a rate that its product does not have. Independent of the
+/// locale.
 [[nodiscard]] Configuration parse_configuration(std::string_view xml, const std::string& device = "Net Box");
+
+/// Valid UTF-8 without control characters, fit for a terminal and for JSON: each byte or character that is neither
+/// becomes U+FFFD.
+[[nodiscard]] std::string printable(std::string_view text);
+
+/// Bits of Changes.
+enum class Change : std::uint32_t {
+  product = 1u << 0,
+  firmware = 1u << 1,
+  calibration = 1u << 2,
+  slot = 1u << 3,
+  units = 1u << 4,
+  counts_per_unit = 1u << 5,
+  ranges = 1u << 6,
+  rate = 1u << 7,
+  records_per_datagram = 1u << 8,
+  filter = 1u << 9,
+  tool_transform = 1u << 10,
+  gage_bias = 1u << 11,
+};
+using Changes = std::uint32_t;
+
+[[nodiscard]] constexpr bool has(Changes changes, Change change) noexcept {
+  return (changes & static_cast<Changes>(change)) != 0;
+}
+/// The records must be counted and timed in another way.
+[[nodiscard]] constexpr bool changes_stream(Changes changes) noexcept {
+  return has(changes, Change::product) || has(changes, Change::rate) || has(changes, Change::records_per_datagram);
+}
+
+[[nodiscard]] Changes compare(const Configuration& before, const Configuration& after);
+/// "calibration, filter"; empty without changes.
+[[nodiscard]] std::string to_words(Changes changes);
+
+/// The box's peaks are narrower than before, so the box has booted (or somebody has reset the peaks on its Snapshot
+/// page).
+[[nodiscard]] bool forgot_peaks(const Configuration& before, const Configuration& after) noexcept;
 
 }  // namespace kphi::netbox

@@ -2,136 +2,134 @@
 
 #include <fmt/format.h>
 
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/beast/core.hpp>
-#include <boost/beast/http.hpp>
-#include <utility>
+#include <boost/algorithm/string/predicate.hpp>
+#include <boost/algorithm/string/trim.hpp>
+#include <cctype>
+#include <optional>
+#include <string_view>
 
 #include "base/error.hpp"
+#include "base/number.hpp"
+#include "base/tcp.hpp"
 
 namespace kphi::netbox {
 namespace {
 
-namespace asio = boost::asio;
-namespace beast = boost::beast;
-namespace http = beast::http;
-using boost::system::error_code;
+constexpr std::size_t kHeadLimit = 8192, kBodyLimit = 1 << 20;
 
-constexpr std::uint64_t kBodyLimit = 1 << 20;
+/// An answer that is not one of a Net Box's web server.
+struct Refused {
+  std::string cause, next_move;
+};
+const Refused kNotHttp{"the answer is not HTTP", "not a Net Box: check the address and http_port"};
+const Refused kTooLong{"the answer is longer than 1 MiB", "not a Net Box: check the address"};
+const Refused kCutShort{"the connection ended early", "the box broke off; try again, then power-cycle the box"};
 
-/// One request on its way through resolve, connect, write, read; `step_` says where it is or where it ended.
-class Exchange {
- public:
-  Exchange(asio::io_context& io, const std::string& host, const std::string& target)
-      : resolver_(io), stream_(io), request_(http::verb::get, target, 10) {
-    request_.set(http::field::host, host);
-    parser_.body_limit(kBodyLimit);
-  }
-
-  void begin(const std::string& host, std::uint16_t port) {
-    resolver_.async_resolve(host, std::to_string(port), [this](error_code error, auto endpoints) {
-      if (!proceed(error, "connect")) return;
-      stream_.async_connect(endpoints, [this](error_code failure, const auto&) {
-        if (!proceed(failure, "send the request")) return;
-        write();
-      });
-    });
-  }
-
-  [[nodiscard]] bool done() const { return done_; }
-  [[nodiscard]] error_code error() const { return error_; }
-  [[nodiscard]] const std::string& step() const { return step_; }
-  [[nodiscard]] http::response<http::string_body>& response() { return parser_.get(); }
-
- private:
-  void write() {
-    http::async_write(stream_, request_, [this](error_code error, std::size_t) {
-      if (!proceed(error, "read the answer")) return;
-      // The headers by themselves: with the body behind them, Beast 1.74 forgets that they announce too long a one.
-      http::async_read_header(stream_, buffer_, parser_, [this](error_code failure, std::size_t) {
-        if (proceed(failure, "read the answer")) read_body();
-      });
-    });
-  }
-
-  void read_body() {
-    http::async_read(stream_, buffer_, parser_, [this](error_code error, std::size_t) {
-      error_ = error;
-      done_ = true;
-    });
-  }
-
-  bool proceed(error_code error, const char* next) {
-    error_ = error;
-    if (error) {
-      done_ = true;
-    } else {
-      step_ = next;
-    }
-    return !error;
-  }
-
-  asio::ip::tcp::resolver resolver_;
-  beast::tcp_stream stream_;
-  http::request<http::empty_body> request_;
-  beast::flat_buffer buffer_;
-  http::response_parser<http::string_body> parser_;
-  std::string step_ = "look up the name";
-  error_code error_;
-  bool done_ = false;
+struct Response {
+  int status = 0;
+  std::string body;
 };
 
-std::string advice(const error_code& error, std::uint16_t port) {
-  if (error == asio::error::connection_refused)
-    return fmt::format("something is at this address, but no web server on port {}: check the address and http_port",
-                       port);
-  if (error == http::error::body_limit) return "this is no Net Box: check the address";
-  if (error == http::error::partial_message || error == http::error::end_of_stream)
-    return "the box broke off; try again, then power-cycle the box";
-  if (error.category() == http::make_error_code(http::error::bad_version).category())
-    return "this is no Net Box: check the address and http_port";
-  return "check the address, the cable and the box's power";
+/// "HTTP/1.x NNN …"
+int status_of(std::string_view head) {
+  const bool valid = head.size() >= 12 && head.starts_with("HTTP/1.") && std::isdigit(head[7]) && head[8] == ' ';
+  const auto status = valid ? parse_integer<int>(std::string(head.substr(9, 3))) : std::nullopt;
+  if (!status) throw kNotHttp;
+  return *status;
 }
 
-/// Blocks until the whole answer is there. Throws DeviceError when it does not come or has another status.
-http::response<http::string_body> exchanged(const std::string& host, std::uint16_t port, const std::string& target,
-                                            std::chrono::nanoseconds wall_timeout, http::status demanded) {
+/// Value of the header `name`; nullopt if it is missing.
+std::optional<std::string> header(std::string_view head, std::string_view name) {
+  for (std::size_t at = head.find("\r\n"); at != std::string_view::npos; at = head.find("\r\n", at + 2)) {
+    const std::string_view line = head.substr(at + 2, head.find("\r\n", at + 2) - (at + 2));
+    const std::size_t colon = line.find(':');
+    if (colon == std::string_view::npos || !boost::algorithm::iequals(line.substr(0, colon), name)) continue;
+    return boost::algorithm::trim_copy(std::string(line.substr(colon + 1)));
+  }
+  return std::nullopt;
+}
+
+/// Bytes of the body; nullopt: up to the end of the connection.
+std::optional<std::size_t> body_size(std::string_view head) {
+  if (header(head, "Transfer-Encoding")) throw kNotHttp;
+  const auto text = header(head, "Content-Length");
+  if (!text) return std::nullopt;
+  const auto size = parse_integer<std::uint64_t>(*text);
+  if (!size) throw kNotHttp;
+  if (*size > kBodyLimit) throw kTooLong;
+  return *size;
+}
+
+Response read_response(TcpClient& box) {
+  constexpr std::string_view kScheme = "HTTP/";
+  std::string received;
+  std::size_t end = std::string::npos;
+  while ((end = received.find("\r\n\r\n")) == std::string::npos) {
+    const std::size_t known = std::min(received.size(), kScheme.size());
+    if (received.size() > kHeadLimit || received.substr(0, known) != kScheme.substr(0, known)) throw kNotHttp;
+    if (!box.receive(received)) throw kCutShort;
+  }
+  const std::string head = received.substr(0, end);
+  Response response{status_of(head), received.substr(end + 4)};
+  const auto size = body_size(head);
+  while (!size || response.body.size() < *size) {
+    if (response.body.size() > kBodyLimit) throw kTooLong;
+    if (box.receive(response.body)) continue;
+    if (size) throw kCutShort;
+    break;
+  }
+  if (size) response.body.resize(*size);
+  return response;
+}
+
+std::string advice(const TcpError& error, std::uint16_t port) {
+  switch (error.cause) {
+    case TcpError::Cause::refused:
+      return fmt::format("a device is at this address, but no web server on port {}: check the address and http_port",
+                         port);
+    case TcpError::Cause::timeout:
+      return "check the address, the cable and the box's power; the box serves one connection at a time: close its web "
+             "pages";
+    default:
+      return "check the address, the cable and the box's power";
+  }
+}
+
+/// Blocks until the whole answer is there. Throws DeviceError if it does not come or has another status.
+std::string exchange(const std::string& host, std::uint16_t port, const std::string& target,
+                     std::chrono::nanoseconds wall_timeout, int wanted_status) {
   const std::string device = fmt::format("Net Box {}:{}", host, port);
   const std::string operation = "GET " + target;
-  asio::io_context io;
-  Exchange exchange(io, host, target);
-  exchange.begin(host, port);
-  io.run_for(wall_timeout);
-  if (!exchange.done()) {
-    throw DeviceError(
-        device, operation,
-        fmt::format("no answer within {:.1f} s (could not {})", std::chrono::duration<double>(wall_timeout).count(),
-                    exchange.step()),
-        "check the address, the cable and the box's power; the box serves one connection at a time: close "
-        "its web pages");
+  TcpClient box(wall_timeout);
+  try {
+    box.connect(host, port);
+    box.send(fmt::format("{} HTTP/1.0\r\nHost: {}\r\n\r\n", operation, host));
+    Response response = read_response(box);
+    if (response.status == wanted_status) return std::move(response.body);
+    throw DeviceError(device, operation, fmt::format("HTTP status {}", response.status),
+                      "check that this is a Net Box: open the address in a browser");
+  } catch (const Refused& refused) {
+    throw DeviceError(device, operation, fmt::format("could not {}: {}", box.step(), refused.cause), refused.next_move);
+  } catch (const TcpError& error) {
+    const double seconds = std::chrono::duration<double>(wall_timeout).count();
+    throw DeviceError(device, operation,
+                      error.cause == TcpError::Cause::timeout
+                          ? fmt::format("no answer within {:.1f} s (could not {})", seconds, box.step())
+                          : fmt::format("could not {}: {}", box.step(), error.what()),
+                      advice(error, port));
   }
-  if (exchange.error()) {
-    throw DeviceError(device, operation, fmt::format("could not {}: {}", exchange.step(), exchange.error().message()),
-                      advice(exchange.error(), port));
-  }
-  if (exchange.response().result() != demanded) {
-    throw DeviceError(device, operation, fmt::format("HTTP status {}", exchange.response().result_int()),
-                      "is this a Net Box? Open the address in a browser");
-  }
-  return std::move(exchange.response());
 }
 
 }  // namespace
 
 std::string http_get(const std::string& host, std::uint16_t port, const std::string& target,
                      std::chrono::nanoseconds wall_timeout) {
-  return std::move(exchanged(host, port, target, wall_timeout, http::status::ok).body());
+  return exchange(host, port, target, wall_timeout, 200);
 }
 
 void http_write(const std::string& host, std::uint16_t port, const std::string& target,
                 std::chrono::nanoseconds wall_timeout) {
-  (void)exchanged(host, port, target, wall_timeout, http::status::found);
+  (void)exchange(host, port, target, wall_timeout, 302);
 }
 
 }  // namespace kphi::netbox

@@ -1,28 +1,34 @@
 #include "drivers/netbox/configuration/settings.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <pugixml.hpp>
+#include <sstream>
+#include <system_error>
 #include <thread>
 #include <utility>
 
+#include "base/descriptor.hpp"
 #include "base/error.hpp"
 #include "base/number.hpp"
 #include "drivers/netbox/configuration/http.hpp"
-#include "drivers/netbox/configuration/settings_journal.hpp"
 
 namespace kphi::netbox {
 namespace {
 
 constexpr std::chrono::seconds kTimeout{2};
 constexpr int kSlots = 16;
-// Some boxes serve only the first three writes of a second: what was ignored is asked for again, later each time.
+// Some boxes serve only the first three writes of a second: ignored ones are repeated, later each time.
 constexpr int kAttempts = 4;
 constexpr std::chrono::milliseconds kPause{400};
 
-/// All that can be written, and on which page. The address of the box and its kin are not here: a wrong one is mended
-/// with a screwdriver only.
+/// The settings that can be written, and on which page. Network settings are not here: a wrong address cannot be fixed
+/// over the network.
 struct Setting {
   const char* page;
   const char* key;
@@ -45,7 +51,7 @@ const Setting* setting_of(const std::string& key) noexcept {
 
 std::string device(const Address& address) { return "Net Box " + address.host; }
 
-/// netftapi2.xml as far as it is needed to write: works for a slot that measures nothing, too.
+/// The elements of netftapi2.xml; works for an unusable slot, too.
 class Shown {
  public:
   explicit Shown(const Address& address)
@@ -66,7 +72,7 @@ class Shown {
   pugi::xml_document document_;
 };
 
-/// From what the box shows to what it shall show.
+/// A change: shown before, requested, expected afterwards.
 struct Assignment {
   const Setting* setting;
   int before, asked, expected;
@@ -83,7 +89,7 @@ void write_once(const Address& address, const std::vector<Assignment>& assignmen
   }
 }
 
-/// Again while the box shows what it did before.
+/// Repeats the writes that the box has ignored.
 Shown write_and_read_back(const Address& address, std::vector<Assignment> assignments) {
   for (int attempt = 0;; ++attempt) {
     write_once(address, assignments);
@@ -94,7 +100,7 @@ Shown write_and_read_back(const Address& address, std::vector<Assignment> assign
   }
 }
 
-/// What the box will show for what is asked.
+/// The value that the box will show.
 int expected(const Setting& setting, int asked, const Configuration& box) {
   if (std::string_view(setting.key) != "comrdtrate") return asked;
   const int device_rate = static_cast<int>(box.device_rate_hz);
@@ -110,7 +116,7 @@ void check_ranges(const Address& address, const WantedSettings& wanted) {
   }
 }
 
-/// Its rate is that of its converter, and its filters depend on that: neither is known well enough to write it.
+/// An Axia has the rate of its converter, and its filters depend on it: neither is known well enough to write it.
 void check_product(const Address& address, const Configuration& box, const WantedSettings& wanted) {
   if (box.kind == Product::net_box || (!wanted.rate_hz && !wanted.filter)) return;
   throw DeviceError(device(address), "write its settings",
@@ -148,7 +154,7 @@ std::vector<Finding> set_back(const Address& address, const std::vector<ChangedS
       assignments.push_back({setting, c.applied, c.before, c.before});
     } else {
       findings.push_back({Severity::warning,
-                          fmt::format("{} was set from {} to {}, and somebody has set it to {} since: left so",
+                          fmt::format("{} was set from {} to {}, then changed to {} by somebody else: not restored",
                                       setting->name, c.before, c.applied, present.number(c.key)),
                           "check the box's settings"});
     }
@@ -157,17 +163,102 @@ std::vector<Finding> set_back(const Address& address, const std::vector<ChangedS
   const Shown after = write_and_read_back(address, assignments);
   for (const Assignment& a : assignments) {
     if (after.number(a.setting->key) != a.expected) {
-      throw DeviceError(device(address), "set its settings back",
-                        fmt::format("{} is {} and not {}", a.setting->name, after.number(a.setting->key), a.expected),
+      throw DeviceError(device(address), "restore its settings",
+                        fmt::format("{} is {}, expected {}", a.setting->name, after.number(a.setting->key), a.expected),
                         fmt::format("set {} to {} on the box's web pages", a.setting->key, a.expected));
     }
     findings.push_back(
-        {Severity::note, fmt::format("{} was set back from {} to {}", a.setting->name, a.before, a.expected), ""});
+        {Severity::note, fmt::format("{} was restored from {} to {}", a.setting->name, a.before, a.expected), ""});
   }
   return findings;
 }
 
+constexpr const char* kRoot = "kphi-netbox-settings";
+// Verbatim: line ends and blanks stay.
+constexpr unsigned kParse = pugi::parse_escapes | pugi::parse_ws_pcdata;
+
+[[noreturn]] void refuse(const std::filesystem::path& path, const std::string& cause, const std::string& next_move) {
+  throw DeviceError("Net Box", "keep the settings in " + path.string(), cause, next_move);
+}
+
+[[noreturn]] void refuse_by_errno(const std::filesystem::path& path) {
+  refuse(path, std::strerror(errno), "check the folder and the space on the disk");
+}
+
+Descriptor open_file(const std::filesystem::path& path, int flags) {
+  return Descriptor(open(path.c_str(), flags | O_CLOEXEC, 0644));
+}
+
+bool write_and_sync(const Descriptor& file, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t written = write(file.number(), text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return false;
+    text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return fsync(file.number()) == 0;
+}
+
+std::filesystem::path folder_of(const std::filesystem::path& path) {
+  return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+}
+
+void sync_folder(const std::filesystem::path& path) {
+  if (!write_and_sync(open_file(folder_of(path), O_RDONLY | O_DIRECTORY), {})) refuse_by_errno(path);
+}
+
+std::string document_of(const SettingsJournal& journal) {
+  pugi::xml_document document;
+  pugi::xml_node root = document.append_child(kRoot);
+  root.append_attribute("version") = 1;
+  root.append_attribute("box") = journal.box.c_str();
+  for (const ChangedSetting& changed : journal.changed) {
+    pugi::xml_node node = root.append_child("changed");
+    node.append_attribute("key") = changed.key.c_str();
+    node.append_attribute("before") = changed.before;
+    node.append_attribute("applied") = changed.applied;
+  }
+  for (const std::string& slot : journal.slots) root.append_child("slot").text() = slot.c_str();
+  std::ostringstream out;
+  document.save(out, "", pugi::format_raw);
+  return out.str();
+}
+
 }  // namespace
+
+void write_journal(const std::filesystem::path& path, const SettingsJournal& journal) {
+  std::error_code error;
+  std::filesystem::create_directories(folder_of(path), error);
+  const std::filesystem::path part = path.string() + ".part";
+  if (!write_and_sync(open_file(part, O_WRONLY | O_CREAT | O_TRUNC), document_of(journal))) refuse_by_errno(path);
+  if (std::rename(part.c_str(), path.c_str()) != 0) refuse_by_errno(path);
+  sync_folder(path);
+}
+
+std::optional<SettingsJournal> read_journal(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return std::nullopt;
+  pugi::xml_document document;
+  const pugi::xml_parse_result result = document.load_file(path.c_str(), kParse);
+  const pugi::xml_node root = document.child(kRoot);
+  if (!result || root.attribute("version").as_int() != 1) {
+    refuse(path, "the file is not a journal of the box's settings",
+           "compare the box's settings with what you expect, then remove the file");
+  }
+  SettingsJournal journal;
+  journal.box = root.attribute("box").value();
+  for (const pugi::xml_node& node : root.children("changed")) {
+    journal.changed.push_back(
+        {node.attribute("key").value(), node.attribute("before").as_int(), node.attribute("applied").as_int()});
+  }
+  for (const pugi::xml_node& node : root.children("slot")) journal.slots.emplace_back(node.text().get());
+  return journal;
+}
+
+void remove_journal(const std::filesystem::path& path) {
+  if (unlink(path.c_str()) != 0 && errno != ENOENT) refuse_by_errno(path);
+  sync_folder(path);
+}
 
 SettingsKeeper::SettingsKeeper(Address address, const WantedSettings& wanted, std::filesystem::path journal)
     : address_(std::move(address)), journal_(std::move(journal)) {
@@ -226,9 +317,9 @@ void SettingsKeeper::apply(const WantedSettings& wanted) {
     if (changed_[i].applied == assignments[i].asked) continue;
     const bool quantised = changed_[i].applied == assignments[i].expected;
     notes_.push_back({quantised ? Severity::note : Severity::warning,
-                      fmt::format("{} {} was asked for, the box runs {}", assignments[i].setting->name,
+                      fmt::format("{} {} requested, the box runs {}", assignments[i].setting->name,
                                   assignments[i].asked, changed_[i].applied),
-                      quantised ? "" : "the measurement is made with the box's value"});
+                      quantised ? "" : "kphi measures with the box's value"});
   }
 }
 
@@ -247,10 +338,9 @@ std::vector<Finding> SettingsKeeper::recover(const Address& address, const std::
   if (!left) return {};
   const std::string box = Shown(address).text("mfgdigsn");
   if (box != left->box) {
-    throw DeviceError(device(address), "set its settings back",
-                      fmt::format("{} was left by a program that changed box \"{}\", this one is \"{}\"",
-                                  journal.string(), left->box, box),
-                      "connect that box, or remove the file");
+    throw DeviceError(device(address), "restore its settings",
+                      fmt::format("{} belongs to box \"{}\", this one is \"{}\"", journal.string(), left->box, box),
+                      "connect that box or remove the file");
   }
   std::vector<Finding> findings = set_back(address, left->changed);
   remove_journal(journal);

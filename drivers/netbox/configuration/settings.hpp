@@ -1,5 +1,5 @@
-// Settings of the box that a campaign wants otherwise: written before it, read back, and set back after it, even when
-// the program is killed in between. Nothing else of the box can be written from here; its network settings never.
+// Changes settings of the box for a campaign: writes them, reads them back, and restores them afterwards, even if the
+// program is killed in between. Nothing else of the box can be written from here; its network settings never.
 #pragma once
 
 #include <filesystem>
@@ -7,14 +7,33 @@
 #include <string>
 #include <vector>
 
-#include "drivers/netbox/configuration/address.hpp"
+#include "base/finding.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
-#include "drivers/netbox/configuration/finding.hpp"
-#include "drivers/netbox/configuration/settings_journal.hpp"
 
 namespace kphi::netbox {
 
-/// Nothing = left as the box has it.
+/// A setting to restore.
+struct ChangedSetting {
+  std::string key;  ///< as the box calls it: setcfgsel, setuserfilter, comrdtrate, comrdtbsiz
+  int before = 0;   ///< as the box showed it
+  int applied = 0;  ///< as the box shows it after the change
+  friend bool operator==(const ChangedSetting&, const ChangedSetting&) = default;
+};
+
+struct SettingsJournal {
+  std::string box;  ///< mfgdigsn; empty if the box reports none
+  std::vector<ChangedSetting> changed;
+  std::vector<std::string> slots;  ///< netftapi2.xml of slot 0..15, verbatim
+};
+
+/// On the disk when this returns. Throws DeviceError.
+void write_journal(const std::filesystem::path& path, const SettingsJournal& journal);
+/// nullopt: no such file. Throws DeviceError if the file is not a journal.
+[[nodiscard]] std::optional<SettingsJournal> read_journal(const std::filesystem::path& path);
+/// The removal is on the disk when this returns. Throws DeviceError.
+void remove_journal(const std::filesystem::path& path);
+
+/// nullopt: stays as the box has it.
 struct WantedSettings {
   std::optional<int> rate_hz = std::nullopt;               ///< 1..7000; the box runs 7000/floor(7000/rate)
   std::optional<int> records_per_datagram = std::nullopt;  ///< 1..40
@@ -23,36 +42,36 @@ struct WantedSettings {
   [[nodiscard]] bool empty() const noexcept { return !rate_hz && !records_per_datagram && !filter && !configuration; }
 };
 
-/// Blocks for 2 s at most per request to a box that does not answer; at most 16 + a few requests. One thread. The box
-/// must not be streaming: some stop when the rate is written.
+/// Each request blocks for at most 2 s; there are 16 plus a few. One thread. The box must not stream: some stop when
+/// the rate is written.
 class SettingsKeeper {
  public:
-  /// Recovers what an earlier program has left in `journal`; reads the configuration; when something is to change,
+  /// Restores the settings that a killed program has left in `journal`; reads the configuration; if a setting differs,
   /// keeps before() and the XML of all 16 slots in `journal` (synced to the disk), then writes, one URL per page, and
-  /// reads back. Writes nothing, and no journal, when `wanted` is empty or the box is so already. Throws DeviceError,
-  /// with what was changed set back: out of range, a slot that measures nothing, rate or
-  /// filter of an Ethernet Axia, the box does not answer 302 or does
-  /// not take a setting.
+  /// reads back. Writes nothing, and no journal, if `wanted` is empty or already set. Throws DeviceError, after
+  /// restoring what was changed: out of range, an unusable slot, rate or filter of an Ethernet Axia, the box does not
+  /// answer 302 or refuses a setting.
   SettingsKeeper(Address address, const WantedSettings& wanted, std::filesystem::path journal);
-  /// As restore(). What fails stays in the journal.
+  /// As restore(); settings that cannot be restored stay in the journal.
   ~SettingsKeeper();
   SettingsKeeper(const SettingsKeeper&) = delete;
   SettingsKeeper& operator=(const SettingsKeeper&) = delete;
 
   [[nodiscard]] const Configuration& before() const noexcept { return before_; }
-  /// As read back; equals before() when nothing was written.
+  /// As read back; equals before() if nothing was written.
   [[nodiscard]] const Configuration& after() const noexcept { return after_; }
-  /// What is to be set back; empty when nothing was written.
+  /// The settings to restore; empty if nothing was written.
   [[nodiscard]] const std::vector<ChangedSetting>& changed() const noexcept { return changed_; }
-  /// Where the box took another value than was asked for, and what was recovered.
+  /// Settings for which the box chose another value, and settings restored from the journal.
   [[nodiscard]] const std::vector<Finding>& notes() const noexcept { return notes_; }
 
-  /// Sets back what was changed, reads it back and removes the journal; nothing the second time. What somebody else has
-  /// changed since is left alone. Throws DeviceError; the journal stays then.
+  /// Restores the settings, reads them back and removes the journal; does nothing the second time. Settings changed by
+  /// somebody else since stay. Throws DeviceError and keeps the journal.
   void restore();
 
-  /// Sets back what a killed program has left in `journal` and removes it; what was done, empty without a journal.
-  /// Throws DeviceError: the box does not answer or is another one, or the journal is unreadable; it stays then.
+  /// Restores the settings that a killed program has left in `journal` and removes it; returns what was restored, empty
+  /// without a journal. Throws DeviceError and keeps the journal if the box does not answer or is a different one, or
+  /// if the journal is unreadable.
   static std::vector<Finding> recover(const Address& address, const std::filesystem::path& journal);
 
  private:

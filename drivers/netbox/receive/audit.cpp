@@ -55,8 +55,8 @@ std::optional<Finding> filter_above_half_the_rate(const Configuration& box, cons
   const double cutoff = filter_cutoff_hz(box).value_or(0);
   if (cutoff <= box.rdt_rate_hz / 2) return std::nullopt;
   return Finding{Severity::warning,
-                 fmt::format("the filter's cutoff, {:g} Hz, is above half the rate, {:.4g} Hz: what lies between is "
-                             "folded into the measurement",
+                 fmt::format("the filter's cutoff, {:g} Hz, is above half the rate, {:.4g} Hz: vibration between the "
+                             "two aliases into the measurement",
                              cutoff, box.rdt_rate_hz / 2),
                  "raise the RDT output rate to 7000 Hz, or choose a lower filter on the box's Settings page"};
 }
@@ -65,7 +65,8 @@ std::optional<Finding> unfiltered_low_rate(const Configuration& box, const Inten
   if (box.filter_code != 0 || box.divisor == 1 || !intention.speeds_rpm.empty()) return std::nullopt;
   return Finding{
       Severity::warning,
-      fmt::format("{:.4g} Hz without a filter: the box leaves out samples and folds vibration down", box.rdt_rate_hz),
+      fmt::format("{:.4g} Hz without a filter: the box drops samples, so vibration aliases into the measurement",
+                  box.rdt_rate_hz),
       "set the RDT output rate to 7000 Hz"};
 }
 
@@ -89,17 +90,18 @@ std::optional<Finding> aliased_rotor(const Configuration& box, const Intention& 
 std::optional<Finding> narrow_range(double expected, double range, const char* axis, const char* unit) {
   if (expected <= 0.8 * range) return std::nullopt;
   return Finding{expected >= range ? Severity::fault : Severity::warning,
-                 fmt::format("{:g} {} are expected on {}, whose range is {:g} {}", expected, unit, axis, range, unit),
+                 fmt::format("{:g} {} expected on {}, its range is {:g} {}", expected, unit, axis, range, unit),
                  "choose a calibration with a larger range on the box's Configurations page, or lower the speeds"};
 }
 
-/// As a box set to pounds or kilograms of force counts: whole ones.
+/// A box set to lbf or kgf counts in whole units.
 std::optional<Finding> coarse_counts(const Configuration& box, const Intention& intention) {
   constexpr double kCoarse = 0.001;  // of the largest thrust
   const double count_n = 1 / box.counts_per_newton;
   if (count_n <= kCoarse * intention.largest_thrust_n || intention.largest_thrust_n <= 0) return std::nullopt;
   return Finding{Severity::fault,
-                 fmt::format("one count is {:.3g} N, where {:g} N are expected", count_n, intention.largest_thrust_n),
+                 fmt::format("resolution too coarse: one count is {:.3g} N, the largest thrust {:g} N", count_n,
+                             intention.largest_thrust_n),
                  "choose N as the force unit on the box's Configurations page"};
 }
 
@@ -119,17 +121,17 @@ std::optional<Finding> tool_transform(const Configuration& box, const Intention&
   const auto& transform = box.tool_transform;
   if (std::all_of(transform.begin(), transform.end(), [](double value) { return value == 0; })) return std::nullopt;
   return Finding{Severity::note,
-                 fmt::format("a tool transform is applied in the box ({:g} {:g} {:g} {}, {:g} {:g} {:g} {}): torques "
+                 fmt::format("the box applies a tool transform ({:g} {:g} {:g} {}, {:g} {:g} {:g} {}): torques "
                              "are about that point",
                              transform[0], transform[1], transform[2], box.tool_distance_unit, transform[3],
                              transform[4], transform[5], box.tool_angle_unit),
-                 "never apply the offset a second time"};
+                 "do not apply the offset again"};
 }
 
 std::optional<Finding> gage_bias(const Configuration& box, const Intention&) {
   if (std::all_of(box.gage_bias.begin(), box.gage_bias.end(), [](double value) { return value == 0; }))
     return std::nullopt;
-  return Finding{Severity::note, "a gage bias is set in the box (setbias): absolute forces are relative to it",
+  return Finding{Severity::note, "a gage bias is set in the box (setbias): forces are relative to it",
                  "tare before each run"};
 }
 
@@ -141,29 +143,23 @@ std::optional<Finding> monitor_conditions(const Configuration& box, const Intent
     list += fmt::format("{}{} {} {:g} {}", list.empty() ? "" : ", ", kAxes[c.axis], c.above ? '>' : '<', c.threshold,
                         c.axis < 3 ? "N" : "Nm");
   }
-  return Finding{Severity::note, fmt::format("the box judges these monitor conditions at 7 kHz: {}", list),
-                 "once one was true, the status says \"monitor condition\" until it is reset"};
+  return Finding{Severity::note, fmt::format("the box checks these monitor conditions at 7 kHz: {}", list),
+                 "once one was true, the status shows \"monitor condition\" until it is reset"};
 }
 
 std::optional<Finding> unknown_filter(const Configuration& box, const Intention&) {
   if (filter_cutoff_hz(box)) return std::nullopt;
   return Finding{
       Severity::warning,
-      fmt::format("the cutoff of filter {} of this product is not known: aliasing cannot be judged", box.filter_code),
+      fmt::format("the cutoff of filter {} of this product is unknown: aliasing cannot be checked", box.filter_code),
       "switch the filter off on the sensor's Settings page"};
-}
-
-std::optional<Finding> receive_buffer(const Configuration& box, const Intention& intention) {
-  if (intention.receive_buffer_bytes == 0) return std::nullopt;
-  return small_receive_buffer(intention.receive_buffer_bytes, box.records_per_datagram, box.rdt_rate_hz);
 }
 
 constexpr Check kChecks[] = {rdt_disabled,        empty_calibration, other_rate,
                              aliased_rotor,       coarse_counts,     narrow_force_range,
                              narrow_torque_range, other_buffer,      filter_above_half_the_rate,
                              unfiltered_low_rate, unknown_filter,    slow_datagrams,
-                             receive_buffer,      tool_transform,    gage_bias,
-                             monitor_conditions};
+                             tool_transform,      gage_bias,         monitor_conditions};
 
 }  // namespace
 
@@ -182,19 +178,15 @@ std::vector<AliasedLine> aliased_lines(double rate_hz, std::span<const double> s
   return lines;
 }
 
-double tolerated_standstill_s(std::size_t receive_buffer_bytes, int records_per_datagram, double rate_hz) {
-  const auto records = static_cast<std::size_t>(records_per_datagram);
-  const std::size_t held = datagrams_held(receive_buffer_bytes, kRecordBytes * records) * records;
-  return static_cast<double>(held) / rate_hz;
-}
-
 std::optional<Finding> small_receive_buffer(std::size_t receive_buffer_bytes, int records_per_datagram, double rate_hz,
                                             double time_scale) {
   if (receive_buffer_bytes >= kWantedReceiveBytes) return std::nullopt;
-  const double tolerated_s = tolerated_standstill_s(receive_buffer_bytes, records_per_datagram, rate_hz) / time_scale;
+  const auto records = static_cast<std::size_t>(records_per_datagram);
+  const std::size_t held = datagrams_held(receive_buffer_bytes, kRecordBytes * records) * records;
+  const double tolerated_s = static_cast<double>(held) / rate_hz / time_scale;
   return Finding{tolerated_s < 0.5 ? Severity::warning : Severity::note,
-                 fmt::format("the kernel grants {:.2f} MiB of receive buffer instead of {:.0f}: records are lost when "
-                             "this host stands still for more than {:.0f} ms",
+                 fmt::format("the kernel grants {:.2f} MiB of receive buffer instead of {:.0f}: records are lost if "
+                             "kphi is blocked for more than {:.0f} ms",
                              static_cast<double>(receive_buffer_bytes) / (1 << 20),
                              static_cast<double>(kWantedReceiveBytes) / (1 << 20), 1e3 * tolerated_s),
                  "as root: sysctl -w net.core.rmem_max=4194304"};

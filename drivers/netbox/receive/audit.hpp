@@ -1,4 +1,4 @@
-// A box's configuration against what is to be measured with it. Pure functions.
+// Checks a box's configuration against the campaign. Pure functions.
 #pragma once
 
 #include <cstddef>
@@ -6,25 +6,24 @@
 #include <span>
 #include <vector>
 
+#include "base/finding.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
-#include "drivers/netbox/configuration/finding.hpp"
 
 namespace kphi::netbox {
 
-/// What the campaign will do. Zero or empty: not known, not audited.
+/// The campaign. Zero or empty: unknown, not checked.
 struct Intention {
   std::vector<double> speeds_rpm;  ///< steps of the profile
   int blades = 0;
-  double largest_thrust_n = 0;           ///< expected on `thrust_axis`
-  double largest_torque_nm = 0;          ///< expected about `thrust_axis`
-  int thrust_axis = 2;                   ///< 0..2
-  double rate_hz = 0;                    ///< expected of the box
-  int records_per_datagram = 0;          ///< expected of the box
-  std::size_t receive_buffer_bytes = 0;  ///< granted by the kernel, see LoadCell::receive_buffer_bytes
-  double alias_limit_hz = 2;             ///< lines that appear below are constant over a step: they spoil its mean
+  double largest_thrust_n = 0;   ///< expected on `thrust_axis`
+  double largest_torque_nm = 0;  ///< expected about `thrust_axis`
+  int thrust_axis = 2;           ///< 0..2
+  double rate_hz = 0;            ///< expected of the box
+  int records_per_datagram = 0;  ///< expected of the box
+  double alias_limit_hz = 2;     ///< lines that appear below this are constant over a step and falsify its mean
 };
 
-/// A line of the rotor that the box's rate folds down to nearly constant.
+/// A line of the rotor that aliases to a nearly constant force.
 struct AliasedLine {
   double speed_rpm = 0;
   int per_revolution = 1;  ///< 1: imbalance; number of blades: blade-pass
@@ -36,13 +35,11 @@ struct AliasedLine {
 [[nodiscard]] std::vector<AliasedLine> aliased_lines(double rate_hz, std::span<const double> speeds_rpm, int blades,
                                                      double limit_hz);
 
-/// What the kernel tells when it grants the 4 MiB asked for: it doubles.
+/// The kernel reports twice the 4 MiB requested.
 inline constexpr std::size_t kWantedReceiveBytes = std::size_t{8} << 20;
 
-/// How long this process may stand still before the kernel drops datagrams; s, bench time.
-[[nodiscard]] double tolerated_standstill_s(std::size_t receive_buffer_bytes, int records_per_datagram, double rate_hz);
-/// The kernel has granted less than was asked for: a warning below half a second, else a note. `time_scale`: bench
-/// seconds per second.
+/// The kernel has granted less than requested: a warning below half a second, else a note. `time_scale`: bench seconds
+/// per second.
 [[nodiscard]] std::optional<Finding> small_receive_buffer(std::size_t receive_buffer_bytes, int records_per_datagram,
                                                           double rate_hz, double time_scale = 1);
 

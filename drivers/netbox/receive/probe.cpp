@@ -28,17 +28,17 @@ void judge_stream(Probe& probe, std::uint32_t status, bool known_skew) {
          "connect the box directly, or through a switch of its own");
   if (counters.lost_host > 0)
     find(Severity::warning,
-         fmt::format("{} of {} records were lost in this host", counters.lost_host, counters.expected),
+         fmt::format("{} of {} records were lost in this computer", counters.lost_host, counters.expected),
          "raise net.core.rmem_max to 4194304");
   if (counters.malformed > 0)
     find(Severity::warning, fmt::format("{} datagrams have a wrong size", counters.malformed),
-         "is another device at this address?");
+         "check that no other device uses this address");
   if (!healthy(status))
     find(Severity::fault, "the box reports: " + status_words(status, probe.configuration->kind),
          "power-cycle the box; unload the cell if saturated");
   if (known_skew && std::abs(probe.health.skew_ppm) > ClockEstimate::kBelievableSkewPpm)
     find(Severity::fault,
-         fmt::format("the box's clock deviates by {:.0f} ppm: its rate is another than configured",
+         fmt::format("the box's clock deviates by {:.0f} ppm: its rate is not the configured one",
                      probe.health.skew_ppm),
          "read the RDT output rate on the box's Communications page again");
   for (const Event& event : probe.events) find(Severity::warning, to_string(event), "");
@@ -60,7 +60,7 @@ void look_at_stream(Probe& probe, LoadCell& cell, const Clock& clock, std::chron
   probe.streamed = true;
   probe.counters = cell.counters();
   probe.health = cell.health();
-  // Jitter is this host's and the network's: told as a person's clock runs.
+  // Jitter comes from this computer and the network: wall time.
   probe.health.jitter_p50_ns = clock.shrunk(Duration(probe.health.jitter_p50_ns)).count();
   probe.health.jitter_p99_ns = clock.shrunk(Duration(probe.health.jitter_p99_ns)).count();
   probe.receive_buffer = cell.receive_buffer_note();
@@ -81,7 +81,7 @@ std::vector<std::string> Probe::lines() const {
   if (configuration) {
     const Configuration& box = *configuration;
     text.push_back(fmt::format("{}, serial {}, firmware {}", box.product.empty() ? "Net Box" : box.product,
-                               box.serial.empty() ? "not told" : box.serial, box.firmware));
+                               box.serial.empty() ? "unknown" : box.serial, box.firmware));
     text.push_back(fmt::format("calibration {} in slot {} \"{}\", {:.0f} counts per N, {:.0f} per Nm",
                                box.calibration_serial, box.slot, box.slot_name, box.counts_per_newton,
                                box.counts_per_newton_metre));
@@ -109,7 +109,7 @@ std::vector<std::string> Probe::lines() const {
 Probe probe(const Address& address, const Clock& clock, const ProbeSettings& settings) {
   Probe found;
   try {
-    LoadCell cell(address, clock, Command::buffered, {.reconnect = false});
+    LoadCell cell(address, clock, {.reconnect = false});
     found.configuration = cell.configuration();
     found.findings = audit(*found.configuration, settings.intention);
     if (auto finding = cell.receive_buffer_finding()) found.findings.push_back(std::move(*finding));

@@ -1,4 +1,4 @@
-// Who is there, how well its stream comes, what is wrong with it: a box looked at for a few seconds.
+// Examines a box for a few seconds: identity, quality of the stream, findings.
 #pragma once
 
 #include <optional>
@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "base/clock.hpp"
+#include "base/finding.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
-#include "drivers/netbox/configuration/finding.hpp"
 #include "drivers/netbox/receive/audit.hpp"
 #include "drivers/netbox/receive/load_cell.hpp"
 #include "drivers/netbox/stream/health.hpp"

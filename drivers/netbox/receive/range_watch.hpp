@@ -1,5 +1,4 @@
-// Each sample against the sensing ranges (cfgmr): when to warn, when to doubt, when to stop the motor. Values only: who
-// watches acts on them in its own thread.
+// Compares each sample with the sensing ranges (cfgmr). Values only; one thread.
 #pragma once
 
 #include <array>

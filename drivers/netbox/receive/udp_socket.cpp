@@ -1,6 +1,7 @@
 #include "drivers/netbox/receive/udp_socket.hpp"
 
 #include <fmt/format.h>
+#include <netdb.h>
 #include <sys/socket.h>
 
 #include <algorithm>
@@ -11,12 +12,6 @@
 #include "base/error.hpp"
 
 namespace kphi::netbox {
-namespace {
-
-using boost::asio::ip::udp;
-
-}  // namespace
-
 /// What recvmmsg fills.
 struct UdpSocket::Slots {
   Slots() {
@@ -41,30 +36,33 @@ struct UdpSocket::Slots {
 };
 
 UdpSocket::UdpSocket(const std::string& host, std::uint16_t port, std::size_t buffer_bytes)
-    : socket_(io_), slots_(std::make_unique<Slots>()) {
+    : slots_(std::make_unique<Slots>()) {
   const std::string device = fmt::format("Net Box {}:{}", host, port);
-  boost::system::error_code error;
-  // The box speaks IPv4 only.
-  const auto endpoints = udp::resolver(io_).resolve(udp::v4(), host, std::to_string(port), error);
-  if (error) throw DeviceError(device, "look up the name", error.message(), "check the host in the bench file");
-  socket_.open(udp::v4(), error);
-  if (!error) socket_.connect(*endpoints.begin(), error);
-  if (error) throw DeviceError(device, "open a UDP socket", error.message(), "check this host's network settings");
+  addrinfo wanted{}, *found = nullptr;
+  wanted.ai_family = AF_INET;  // the box speaks IPv4 only
+  wanted.ai_socktype = SOCK_DGRAM;
+  const int unknown = getaddrinfo(host.c_str(), std::to_string(port).c_str(), &wanted, &found);
+  if (unknown != 0)
+    throw DeviceError(device, "look up the name", gai_strerror(unknown), "check the host in the bench file");
+  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> address(found, &freeaddrinfo);
+  socket_ = Descriptor(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  if (connect(descriptor(), address->ai_addr, address->ai_addrlen) != 0)
+    throw DeviceError(device, "open a UDP socket", std::strerror(errno), "check this computer's network settings");
   ask_for_buffer(buffer_bytes);
   const int on = 1;
-  setsockopt(native_handle(), SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
-  setsockopt(native_handle(), SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
+  setsockopt(descriptor(), SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
+  setsockopt(descriptor(), SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
 }
 
 UdpSocket::~UdpSocket() = default;
 
 void UdpSocket::ask_for_buffer(std::size_t bytes) {
   const int wanted = static_cast<int>(bytes);
-  if (setsockopt(native_handle(), SOL_SOCKET, SO_RCVBUFFORCE, &wanted, sizeof wanted) != 0)
-    setsockopt(native_handle(), SOL_SOCKET, SO_RCVBUF, &wanted, sizeof wanted);
+  if (setsockopt(descriptor(), SOL_SOCKET, SO_RCVBUFFORCE, &wanted, sizeof wanted) != 0)
+    setsockopt(descriptor(), SOL_SOCKET, SO_RCVBUF, &wanted, sizeof wanted);
   int granted = 0;
   socklen_t length = sizeof granted;
-  getsockopt(native_handle(), SOL_SOCKET, SO_RCVBUF, &granted, &length);
+  getsockopt(descriptor(), SOL_SOCKET, SO_RCVBUF, &granted, &length);
   receive_buffer_bytes_ = static_cast<std::size_t>(granted);
 }
 
@@ -72,7 +70,7 @@ std::span<const UdpSocket::Datagram> UdpSocket::receive() noexcept {
   slots_->rearm(std::exchange(used_, 0));
   int count = 0;
   do {
-    count = recvmmsg(native_handle(), slots_->headers.data(), kBatch, MSG_DONTWAIT, nullptr);
+    count = recvmmsg(descriptor(), slots_->headers.data(), kBatch, MSG_DONTWAIT, nullptr);
   } while (count < 0 && retry(errno));
   used_ = static_cast<std::size_t>(std::max(count, 0));
   for (std::size_t i = 0; i < used_; ++i) read_control(i);
@@ -82,7 +80,7 @@ std::span<const UdpSocket::Datagram> UdpSocket::receive() noexcept {
 bool UdpSocket::send(std::span<const std::uint8_t> bytes) noexcept {
   // A refusal reported here belongs to an earlier datagram, and this one has not left yet.
   for (int attempt = 0; attempt < 8; ++attempt) {
-    if (::send(native_handle(), bytes.data(), bytes.size(), MSG_NOSIGNAL) >= 0) return true;
+    if (::send(descriptor(), bytes.data(), bytes.size(), MSG_NOSIGNAL) >= 0) return true;
     if (!retry(errno)) return false;
   }
   return false;

@@ -1,16 +1,16 @@
-// The datagrams of one peer, with the kernel's receive stamps and its count of what it dropped. One thread.
+// A UDP socket for the datagrams of one peer, with the kernel's receive stamps and its count of drops. One thread.
 #pragma once
 
 #include <time.h>
 
 #include <array>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/udp.hpp>
 #include <chrono>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
+
+#include "base/descriptor.hpp"
 
 namespace kphi::netbox {
 
@@ -20,7 +20,7 @@ class UdpSocket {
   struct Datagram {
     std::span<const std::uint8_t> bytes;  ///< valid until the next receive()
     timespec stamp{};                     ///< CLOCK_REALTIME; zero when the kernel gave none
-    std::uint64_t dropped = 0;            ///< datagrams dropped for want of buffer, since the socket was opened
+    std::uint64_t dropped = 0;            ///< by a full receive buffer, since the socket was opened
   };
 
   static constexpr std::size_t kWantedBuffer = std::size_t{4} << 20;
@@ -32,11 +32,11 @@ class UdpSocket {
   UdpSocket(const UdpSocket&) = delete;
   UdpSocket& operator=(const UdpSocket&) = delete;
 
-  /// What waits, without blocking, at most kBatch: fewer when no more waits. Allocates nothing.
+  /// The waiting datagrams, at most kBatch; never blocks, allocates nothing.
   [[nodiscard]] std::span<const Datagram> receive() noexcept;
-  /// False: the kernel did not take it.
+  /// False if the kernel refused it.
   bool send(std::span<const std::uint8_t> bytes) noexcept;
-  [[nodiscard]] int native_handle() { return socket_.native_handle(); }
+  [[nodiscard]] int descriptor() const noexcept { return socket_.number(); }
   /// The kernel's receive buffer, as read back.
   [[nodiscard]] std::size_t receive_buffer_bytes() const noexcept { return receive_buffer_bytes_; }
   /// Times the peer's host answered that nobody listens at the port.
@@ -45,15 +45,14 @@ class UdpSocket {
   [[nodiscard]] int last_error() const noexcept { return last_error_; }
 
  private:
-  static constexpr std::size_t kLongest = 1500;  // no multiple of 36: what is cut off is refused by its size
+  static constexpr std::size_t kLongest = 1500;  // not a multiple of 36: a truncated datagram is refused by its size
   struct Slots;
 
   void ask_for_buffer(std::size_t bytes);
   void read_control(std::size_t slot) noexcept;
   bool retry(int error) noexcept;
 
-  boost::asio::io_context io_;
-  boost::asio::ip::udp::socket socket_;
+  Descriptor socket_;
   std::size_t receive_buffer_bytes_ = 0;
   std::uint64_t refusals_ = 0;
   int last_error_ = 0;

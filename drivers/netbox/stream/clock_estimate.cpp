@@ -76,18 +76,8 @@ void ClockEstimate::fit() noexcept {
   has_line_ = true;
 }
 
-double ClockEstimate::device_seconds(std::uint32_t ft_sequence) const noexcept {
-  return static_cast<double>(newest_count_ + static_cast<std::int32_t>(ft_sequence - newest_ft_)) * device_period_s_;
-}
-
 double ClockEstimate::least_delay(double device_s) const noexcept {
   return has_line_ ? offset_ + slope_ * (device_s - centre_) : smallest_delay_;
-}
-
-Instant ClockEstimate::host_time(std::uint32_t ft_sequence) const noexcept {
-  if (!begun_) return Instant{0};
-  const double device = device_seconds(ft_sequence);
-  return first_arrival_ + from_seconds(device + least_delay(device));
 }
 
 Duration ClockEstimate::uncertainty() const noexcept {

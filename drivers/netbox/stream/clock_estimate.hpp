@@ -1,4 +1,4 @@
-// The box's clock seen from this host, while it runs: ft_sequence / device rate against the kernel's receive stamps.
+// The box's clock as seen from this computer: ft_sequence / device rate against the kernel's receive stamps.
 // Per bin of 0.5 s of device time the record with the smallest delay, over the last 60 s of bins a line by least
 // squares: host = device + a + b (device - device0). Causal, one thread, allocates at construction only.
 #pragma once
@@ -10,35 +10,29 @@
 
 namespace kphi::netbox {
 
-/// The constant part of the delay (box, filter, wire) cannot be seen from one end: it stays in every time told here.
+/// The constant part of the delay (box, filter, wire) cannot be seen from one end: every time given here includes it.
 class ClockEstimate {
  public:
   static constexpr double kBinSeconds = 0.5, kWindowSeconds = 60;
   static constexpr std::size_t kLeastBins = 4;
-  /// Beyond this the rate or the divisor is another than configured.
+  /// Beyond this the rate or the divisor is not the configured one.
   static constexpr double kBelievableSkewPpm = 500;
 
   explicit ClockEstimate(double device_rate_hz) noexcept : device_period_s_(1 / device_rate_hz) {}
 
-  /// Each record that was the last of its datagram (only that one is fresh), in the order of delivery. By how much it
-  /// came later than with the smallest delay: as host_time() tells it now.
+  /// The last record of each datagram (only that one is fresh), in the order of delivery. Returns its delay beyond the
+  /// smallest one.
   Duration add(std::uint32_t ft_sequence, Instant arrival) noexcept;
-  /// A new epoch: the box has booted. Everything is forgotten.
+  /// A new epoch, after a boot of the box: forgets everything.
   void restart() noexcept;
 
   /// kLeastBins bins are complete.
   [[nodiscard]] bool ready() const noexcept { return has_line_; }
-  /// Bench time at which the sample would have arrived with the smallest delay. Before ready(): by the nominal rate
-  /// from the record with the smallest delay so far; zero before the first record. Within 2^31 samples of the newest.
-  [[nodiscard]] Instant host_time(std::uint32_t ft_sequence) const noexcept;
-  /// Standard error of host_time at the newest record, without the constant part; before ready(): the largest delay
-  /// seen above the smallest.
+  /// Standard error of the smallest delay at the newest record, without the constant part; before ready(): the largest
+  /// delay beyond the smallest.
   [[nodiscard]] Duration uncertainty() const noexcept;
   /// Device clock slow against the host's: positive. 0 before ready().
   [[nodiscard]] double skew_ppm() const noexcept { return has_line_ ? 1e6 * slope_ : 0; }
-  [[nodiscard]] bool believable() const noexcept {
-    return skew_ppm() < kBelievableSkewPpm && skew_ppm() > -kBelievableSkewPpm;
-  }
   [[nodiscard]] std::uint64_t epochs() const noexcept { return epochs_; }
 
  private:
@@ -50,7 +44,6 @@ class ClockEstimate {
   void close_bin() noexcept;
   void fit() noexcept;
   [[nodiscard]] double least_delay(double device_s) const noexcept;
-  [[nodiscard]] double device_seconds(std::uint32_t ft_sequence) const noexcept;
 
   const double device_period_s_;
   std::uint64_t epochs_ = 0;

@@ -14,37 +14,37 @@ std::string numbers(const Event& event) {
 std::string words(const Event& event) {
   switch (event.kind) {
     case EventKind::restarted:
-      return fmt::format("the stream began anew {}, {} records missing", numbers(event), event.records);
+      return fmt::format("the stream restarted {}, {} records missing", numbers(event), event.records);
     case EventKind::rebooted:
-      return fmt::format("the box has started anew {}: bias and scale are to be doubted", numbers(event));
+      return fmt::format("the box has booted {}: its bias and scale may have changed", numbers(event));
     case EventKind::stalled:
-      return fmt::format("the box repeats its measurement {}", numbers(event));
+      return fmt::format("the box repeats one measurement {}", numbers(event));
     case EventKind::stall_ended:
       return fmt::format("the box measures again after {} repeated records", event.records);
     case EventKind::silent:
       return "the stream fell silent";
     case EventKind::resumed:
-      return fmt::format("the stream goes on (rdt {}, ft {})", event.rdt, event.ft);
+      return fmt::format("the stream continues (rdt {}, ft {})", event.rdt, event.ft);
     case EventKind::box_trouble: {
       std::string bits;
       for (const std::string& name : names(event.status)) bits += (bits.empty() ? "" : ", ") + name;
       return "the box reports: " + bits;
     }
     case EventKind::taken_over:
-      return "the box answers and RDT is enabled: another client has taken the stream, or the box has started anew; "
-             "find the other client, then start again";
+      return "the box answers and RDT is enabled: another client has taken the stream; "
+             "close the other client, then start again";
     case EventKind::rdt_disabled:
-      return "the box answers, but RDT is disabled: enable it on the box's Communications page";
+      return "RDT is disabled: enable it on the box's Communications page";
     case EventKind::unreachable:
       return "the box does not answer over HTTP: check its power and the cable";
     case EventKind::unusable:
-      return "the box answers, but its configuration cannot be measured with: open its web pages";
+      return "the box answers, but its configuration is unusable: check its web pages";
     case EventKind::reconnected:
       return fmt::format("the stream was started again {}", numbers(event));
     case EventKind::configuration_changed:
-      return "the box is configured otherwise than before: " + to_words(event.changes);
+      return "the box's configuration has changed: " + to_words(event.changes);
     case EventKind::given_up:
-      return "the stream could not be started again: check the box, its cable and its power, then start again";
+      return "the stream could not be started again: check the box, its cable and its power";
   }
   return "unknown event";
 }

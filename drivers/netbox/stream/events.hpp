@@ -1,4 +1,4 @@
-// What happened to the stream, by name, with the numbers that showed it. Values only; one thread per log.
+// Events of the stream, with the sequence numbers that showed them. Values only; one thread per log.
 #pragma once
 
 #include <array>
@@ -7,26 +7,25 @@
 #include <vector>
 
 #include "base/clock.hpp"
-#include "drivers/netbox/configuration/changes.hpp"
+#include "drivers/netbox/configuration/configuration.hpp"
 
 namespace kphi::netbox {
 
 enum class EventKind : std::uint8_t {
-  restarted,     ///< rdt_sequence began anew, ft_sequence went on: a start was repeated, or came from another client
-  rebooted,      ///< ft_sequence began anew: bias and scale are to be doubted
+  restarted,     ///< rdt_sequence restarted, ft_sequence continued: a repeated start, or one from another client
+  rebooted,      ///< ft_sequence restarted: bias and scale may have changed
   stalled,       ///< new records repeat one measurement
   stall_ended,   ///< `records` were repeated
   silent,        ///< no record for longer than the silence timeout
-  resumed,       ///< records again after a silence
-  box_trouble,   ///< status bit 20 (RDT) or 22 (network) rose: the box itself saw its communication fail
-  taken_over,    ///< silence, but the box answers and RDT is enabled: another client has the stream, or the box booted
-  rdt_disabled,  ///< silence, and the box says that RDT is disabled
+  resumed,       ///< records arrive again after a silence
+  box_trouble,   ///< status bit 20 (RDT) or 22 (network) was set: the box reports failed communication
+  taken_over,    ///< silence, but the box answers and RDT is enabled: another client has the stream
+  rdt_disabled,  ///< silence, and RDT is disabled on the box
   unreachable,   ///< silence, and the box does not answer over HTTP either
-  unusable,      ///< silence or a boot, and the box's configuration cannot be measured with
+  unusable,      ///< silence or a boot, and the box's configuration is unusable
   reconnected,   ///< the stream was started again after a silence
-  configuration_changed,  ///< `changes`: what arrives from now on, and since the silence or boot before, is another
-                          ///< segment with another meaning
-  given_up,               ///< no reconnection in the time set for it
+  configuration_changed,  ///< `changes` since the silence or boot before: the records may have another meaning
+  given_up,               ///< no reconnection within StreamPolicy::give_up_after
 };
 
 struct Event {
@@ -40,10 +39,10 @@ struct Event {
   friend bool operator==(const Event&, const Event&) = default;
 };
 
-/// One line: "12.345 s: the stream began anew (rdt 1 after 2000, ft 5100 after 5099), 0 records missing".
+/// One line: "12.345 s: the stream restarted (rdt 1 after 2000, ft 5100 after 5099), 0 records missing".
 [[nodiscard]] std::string to_string(const Event& event);
 
-/// Keeps the oldest kCapacity events; those beyond are counted.
+/// Keeps the oldest kCapacity events and counts the rest.
 class EventLog {
  public:
   static constexpr std::size_t kCapacity = 64;
@@ -54,7 +53,7 @@ class EventLog {
       ++dropped_;
     }
   }
-  /// Oldest first; they are gone from here then.
+  /// Removes and returns all, oldest first.
   [[nodiscard]] std::vector<Event> take() {
     std::vector<Event> taken(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(count_));
     count_ = 0;

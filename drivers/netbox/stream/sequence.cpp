@@ -2,18 +2,36 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace kphi::netbox {
 namespace {
 
-// No datagram is on its way for longer: ft_sequence further back than this, or ahead of the time that has passed, was
-// counted by a box that has booted anew.
+// No datagram travels for longer: an ft_sequence further back than this, or ahead of the time that has passed, comes
+// from a box that has booted.
 constexpr double kLongestDelaySeconds = 5.0;
 constexpr std::uint32_t kLargestStride = 7000;
 constexpr double kUsualDelaySeconds = 0.05, kLargestSkew = 0.01;
 
 std::int32_t step(std::uint32_t from, std::uint32_t to) noexcept { return static_cast<std::int32_t>(to - from); }
+
+// A stream begins with this; one box reportedly begins with 0.
+constexpr std::uint32_t kFirstRdt = 1;
+
+/// Order in which the box took and sent them.
+bool before(const Record& a, const Record& b) noexcept {
+  const std::int32_t advance = step(a.ft_sequence, b.ft_sequence);
+  return advance != 0 ? advance > 0 : step(a.rdt_sequence, b.rdt_sequence) > 0;
+}
+
+bool deliver(const StampedRecord& stamped, LossTracker& account, std::vector<StampedRecord>& out) {
+  if (!account.accept(stamped.record, stamped.arrival)) return false;
+  out.push_back(stamped);
+  const auto other = account.take_confirmed();
+  if (other) out.insert(before(other->record, stamped.record) ? out.end() - 1 : out.end(), *other);
+  return true;
+}
 
 }  // namespace
 
@@ -30,7 +48,7 @@ bool LossTracker::accept_unusual(const Record& record, Instant arrival) noexcept
   const std::int32_t ft_step = step(last_ft_, record.ft_sequence);
   if (ft_step == 0) {
     if (rdt_step == 0) return refuse(&Counters::duplicates);
-    // One stream shows the same measurement behind its first record, never before it.
+    // Within one stream a repeated measurement follows its first record, never precedes it.
     began_anew_stalled_ |= step(last_rdt_, record.rdt_sequence) < 0;
     note_stall(record, arrival);
     return refuse(&Counters::stalled);
@@ -47,13 +65,12 @@ bool LossTracker::looks_rebooted(const Record& record, Instant arrival) const no
   if (!has_last_) return false;
   const std::int32_t ft_step = step(last_ft_, record.ft_sequence);
   if (!plausible(ft_step, arrival)) return true;
-  // From shortly before the wrap, or behind it, a boot looks like a step forward; the time that has passed tells them
-  // apart.
+  // Near the wrap a boot looks like a step forward; the time that has passed tells them apart.
   const bool begins_anew = ft_step > 0 && step(last_rdt(), record.rdt_sequence) <= 0;
   if (begins_anew && counted_since_last(record.ft_sequence, arrival) && !in_time(ft_step, arrival)) return true;
-  // A stream that a session before this one has asked for: a copy of it can be on its way still.
+  // A copy from a stream of an earlier session can still arrive.
   if (ft_step < 0 && !sent_since_last(step(last_rdt(), record.rdt_sequence), arrival)) return false;
-  // What is late or doubled lies on the line of this stream or of one before.
+  // A late or duplicated record lies on the line of this stream or of an earlier one.
   return ft_step < 0 && line(record.rdt_sequence, record.ft_sequence) != line(last_rdt_, last_ft_) &&
          !on_former_line(record);
 }
@@ -75,7 +92,7 @@ bool LossTracker::note_stray(const Record& record, Instant arrival, std::int32_t
   return false;
 }
 
-/// A box far from where it was may count by another stride, too.
+/// After a reboot the box may also count by another stride.
 bool LossTracker::confirms(const Record& first, const Record& second, Instant arrival) const noexcept {
   if (second.rdt_sequence != first.rdt_sequence + 1) return false;
   const std::uint32_t advance = second.ft_sequence - first.ft_sequence;
@@ -141,12 +158,6 @@ bool LossTracker::accept_forward(const Record& record, Instant arrival, std::int
 }
 
 void LossTracker::note_restart(const Record& record, Instant arrival, std::uint64_t missing) noexcept {
-  if (renewals_expected_ > 0) {
-    --renewals_expected_;
-    ++counters_.renewals;
-    counters_.lost_at_renewals += missing;
-    return;
-  }
   ++counters_.restarts;
   note_event(EventKind::restarted, record, arrival, missing);
 }
@@ -189,6 +200,86 @@ bool LossTracker::in_recent_gap(std::uint32_t ft) const noexcept {
   const auto known = static_cast<std::ptrdiff_t>(std::min<std::uint64_t>(gap_count_, gaps_.size()));
   return std::any_of(gaps_.begin(), gaps_.begin() + known,
                      [&](const Gap& gap) { return step(gap.after_ft, ft) > 0 && step(ft, gap.before_ft) > 0; });
+}
+
+ReorderWindow::ReorderWindow(std::size_t records, Duration patience, unsigned stride)
+    : records_(records), patience_(patience), stride_(stride) {
+  held_.reserve(records_ + 1);
+}
+
+bool ReorderWindow::receive(const Record& record, Instant arrival, LossTracker& account,
+                            std::vector<StampedRecord>& out) {
+  const StampedRecord stamped{record, arrival};
+  if (held_.empty() && account.is_next(record)) return deliver(stamped, account, out);
+  if (held_.empty() && !account.has_last()) account.forget_host_drops();
+  expire(arrival, account, out);
+  const bool rebooted = account.looks_rebooted(record, arrival);
+  if (!rebooted && may_have_overtaken(record, account)) {
+    if (!hold(stamped, account)) return false;
+    const bool begins = !account.has_last() && held_.front().record.rdt_sequence <= kFirstRdt;
+    if (begins || held_.size() >= records_) release(run_length(0), account, out);
+    return true;
+  }
+  if (rebooted) flush(account, out);
+  const bool delivered = deliver(stamped, account, out);
+  if (!delivered || held_.empty()) return delivered;
+  ++account.counters().reordered;
+  if (follows(account.last_rdt(), account.last_ft(), held_.front().record)) release(run_length(0), account, out);
+  return true;
+}
+
+bool ReorderWindow::may_have_overtaken(const Record& record, const LossTracker& account) const noexcept {
+  const bool behind_held = !held_.empty() && before(held_.front().record, record);
+  if (!account.has_last()) return record.rdt_sequence > kFirstRdt || behind_held;
+  if (step(account.last_ft(), record.ft_sequence) <= 0) return false;
+  return behind_held || !follows(account.last_rdt(), account.last_ft(), record);
+}
+
+bool ReorderWindow::follows(std::uint32_t rdt, std::uint32_t ft, const Record& record) const noexcept {
+  // rdt one further alone: the box itself has left samples out. ft alone: it has begun a stream anew in between.
+  return record.rdt_sequence == rdt + 1 || record.ft_sequence == ft + stride_;
+}
+
+void ReorderWindow::expire(Instant now, LossTracker& account, std::vector<StampedRecord>& out) {
+  if (held_.empty() || now < oldest_arrival_ + patience_) return;
+  // A gap is as old as the oldest record behind it.
+  const auto last = std::find_if(held_.rbegin(), held_.rend(),
+                                 [&](const StampedRecord& held) { return now >= held.arrival + patience_; });
+  const auto through = static_cast<std::size_t>(held_.rend() - last) - 1;
+  release(through + run_length(through), account, out);
+}
+
+void ReorderWindow::flush(LossTracker& account, std::vector<StampedRecord>& out) {
+  if (!held_.empty()) release(held_.size(), account, out);
+}
+
+bool ReorderWindow::hold(const StampedRecord& stamped, LossTracker& account) {
+  const auto behind = std::find_if(held_.rbegin(), held_.rend(), [&](const StampedRecord& held) {
+                        return !before(stamped.record, held.record);
+                      }).base();
+  if (behind != held_.begin() && !before(std::prev(behind)->record, stamped.record)) {
+    ++account.counters().duplicates;
+    return false;
+  }
+  if (behind != held_.end()) ++account.counters().reordered;
+  held_.insert(behind, stamped);
+  oldest_arrival_ = held_.size() == 1 ? stamped.arrival : std::min(oldest_arrival_, stamped.arrival);
+  return true;
+}
+
+void ReorderWindow::release(std::size_t count, LossTracker& account, std::vector<StampedRecord>& out) {
+  const auto end = held_.begin() + static_cast<std::ptrdiff_t>(count);
+  for (auto held = held_.begin(); held != end; ++held) deliver(*held, account, out);
+  held_.erase(held_.begin(), end);
+  oldest_arrival_ = kNever;
+  for (const StampedRecord& held : held_) oldest_arrival_ = std::min(oldest_arrival_, held.arrival);
+}
+
+std::size_t ReorderWindow::run_length(std::size_t from) const noexcept {
+  std::size_t end = from + 1;
+  const auto last = [&]() -> const Record& { return held_[end - 1].record; };
+  while (end < held_.size() && follows(last().rdt_sequence, last().ft_sequence, held_[end].record)) ++end;
+  return end - from;
 }
 
 }  // namespace kphi::netbox

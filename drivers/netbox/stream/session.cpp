@@ -6,40 +6,28 @@
 namespace kphi::netbox {
 namespace {
 
-// A stop that the box did not hear shows as datagrams that do not end: so many settle times are enough.
+// If the stop was lost, datagrams keep arriving: start anyway after this many settle times.
 constexpr int kDrainLimit = 20;
-// A new stream counts from 1. What is further on than so many datagrams, and so many times what the rate gives since
-// the box was asked, belongs to the one before.
+// A new stream counts from 1. A record further on than this many datagrams, plus this many times the rate since the
+// start was sent, belongs to the stream before.
 constexpr double kFirstDatagrams = 4, kLargestRate = 4;
 
-// Of the Net Box; the Axia has no such bits.
+// Net Box only; the Axia has no such bits.
 constexpr std::uint32_t kTroubleBits =
     1u << static_cast<unsigned>(StatusBit::rdt) | 1u << static_cast<unsigned>(StatusBit::network);
-
-// A lease of fewer silences could end before a silence is noticed: whether somebody has taken the stream or it has run
-// out could not be told then.
-constexpr int kLeastLease = 4;
 
 bool same_count(const StreamSettings& a, const StreamSettings& b) noexcept {
   return a.divisor == b.divisor && a.device_rate_hz == b.device_rate_hz;
 }
 
 std::size_t window_records(const StreamSettings& settings) {
-  const auto four_datagrams = static_cast<std::size_t>(settings.buffered ? 4 * settings.records_per_datagram : 4);
-  return std::max(settings.reorder_records, four_datagrams);
+  return std::max(settings.reorder_records, static_cast<std::size_t>(4 * settings.records_per_datagram));
 }
 
 }  // namespace
 
 Duration StreamSettings::datagram_period() const noexcept {
-  return from_seconds((buffered ? records_per_datagram : 1) * (divisor / device_rate_hz));
-}
-
-std::uint32_t StreamSettings::sample_count() const noexcept {
-  if (lease <= Duration{0}) return 0;
-  const Duration period = datagram_period();
-  const std::int64_t datagrams = (std::max(lease, kLeastLease * silence()) + period - Duration{1}) / period;
-  return static_cast<std::uint32_t>(datagrams * (buffered ? records_per_datagram : 1));
+  return from_seconds(records_per_datagram * (divisor / device_rate_hz));
 }
 
 Session::Session(StreamSettings settings) : Session(settings, LossTracker(settings.divisor, settings.device_rate_hz)) {}
@@ -50,17 +38,15 @@ Session::Session(StreamSettings settings, const Session& before)
                             : LossTracker(settings.divisor, settings.device_rate_hz)) {
   account_.counters() = before.account_.counters();
   host_drops_ = before.host_drops_;
-  renewals_seen_ = before.renewals_seen_;
   phase_ = before.phase_;
 }
 
 Session::Session(StreamSettings settings, LossTracker account)
     : settings_(settings),
       silence_(settings.silence()),
-      lease_(from_seconds(settings.sample_count() * (settings.divisor / settings.device_rate_hz))),
       account_(std::move(account)),
       window_(window_records(settings), settings.reorder_patience, settings.divisor),
-      datagram_records_(settings.buffered ? static_cast<std::size_t>(settings.records_per_datagram) : 1) {}
+      datagram_records_(static_cast<std::size_t>(settings.records_per_datagram)) {}
 
 void Session::start(Instant now) {
   if (phase_ == Phase::idle || phase_ == Phase::failed) {
@@ -75,7 +61,7 @@ void Session::start(Instant now) {
   request_count_ = 0;
   send_stop(now);
   phase_ = Phase::draining;
-  bias_due_ = renewal_due_ = kNever;
+  bias_due_ = kNever;
   due_ = now + settings_.settle;
   drain_limit_ = now + kDrainLimit * settings_.settle;
 }
@@ -84,7 +70,7 @@ void Session::stop(Instant now) {
   request_count_ = 0;
   send_stop(now);
   phase_ = Phase::idle;
-  due_ = bias_due_ = renewal_due_ = kNever;
+  due_ = bias_due_ = kNever;
 }
 
 std::size_t Session::receive_in_order(std::span<const std::uint8_t> datagram, Instant arrival,
@@ -143,36 +129,10 @@ void Session::begin_streaming(Instant arrival) noexcept {
   }
   phase_ = Phase::streaming;
   resuming_ = false;
-  if (lease_ == Duration{0}) return;
-  renewal_due_ = arrival + lease_ / 2;
-  lease_end_ = arrival + lease_;
-}
-
-/// Only ever behind a datagram of ours: a renewal of a stream that another client has taken would be a fight for it.
-void Session::tend_lease(Instant now) noexcept {
-  const std::uint64_t renewals = account_.counters().renewals;
-  if (renewals != renewals_seen_) {
-    renewals_seen_ = renewals;
-    renewals_sent_ = 0;
-    account_.expect_renewals(0);
-    renewal_due_ = now + lease_ / 2;
-    lease_end_ = now + lease_;
-  } else if (now >= renewal_due_) {
-    renew_lease(now);
-  }
-}
-
-void Session::renew_lease(Instant now) noexcept {
-  account_.expect_renewals(++renewals_sent_);
-  send(start_command());
-  renewal_due_ = now + 3 * settings_.datagram_period() + settings_.reply_timeout;
 }
 
 Command Session::start_command() const noexcept {
-  if (settings_.product == Product::axia)
-    return settings_.buffered ? Command::axia_multi_block : Command::axia_single_block;
-  if (settings_.buffered) return Command::buffered;
-  return settings_.multi_unit ? Command::multi_unit : Command::real_time;
+  return settings_.product == Product::axia ? Command::axia_multi_block : Command::buffered;
 }
 
 bool Session::take_records(std::size_t count, Instant arrival, std::vector<StampedRecord>& out) {
@@ -190,7 +150,6 @@ void Session::note_arrival(std::size_t count, Instant arrival) noexcept {
   datagram_records_ = count;
   newest_arrival_ = arrival;
   due_ = arrival + silence_;
-  if (lease_ > Duration{0}) tend_lease(arrival);
 }
 
 void Session::note_status(std::uint32_t status, const Record& shown_by, Instant arrival) noexcept {
@@ -242,13 +201,6 @@ void Session::advance(Instant now) {
       if (resuming_ && !silence_told_) note_silence(now);
       return;
     case Phase::streaming:
-      renewal_due_ = kNever;
-      if (now >= lease_end_) {
-        // This host stood still for too long, and the box has stopped by itself: nobody has taken the stream.
-        start(now);
-        account_.expect_renewals(1);
-        return;
-      }
       phase_ = Phase::silent;
       due_ = kNever;
       note_silence(now);
@@ -262,7 +214,7 @@ void Session::advance(Instant now) {
 
 bool Session::next_request(std::array<std::uint8_t, 8>& request) noexcept {
   if (request_count_ == 0) return false;
-  request = encode_request(requests_[0], requests_[0] == start_command() ? settings_.sample_count() : 0);
+  request = encode_request(requests_[0]);
   std::copy(requests_.begin() + 1, requests_.end(), requests_.begin());
   --request_count_;
   return true;
@@ -302,8 +254,8 @@ void Session::discard(Instant arrival) {
 
 bool Session::belongs_to_new_stream(const Record& first, Instant arrival) const noexcept {
   const double datagrams = to_seconds(arrival - first_start_) / to_seconds(settings_.datagram_period());
-  const double records = settings_.buffered ? settings_.records_per_datagram : 1;
-  return first.rdt_sequence <= records * (kFirstDatagrams + kLargestRate * std::max(datagrams, 0.0));
+  return first.rdt_sequence <=
+         settings_.records_per_datagram * (kFirstDatagrams + kLargestRate * std::max(datagrams, 0.0));
 }
 
 void Session::send(Command command) noexcept {

@@ -1,4 +1,4 @@
-// One client's dealings with the box over RDT: start it, take its records, notice silence, stop it. A state machine:
+// The RDT session with a box: starts the stream, takes its records, notices silence, stops it. A state machine:
 // datagrams and the time go in; requests, records and the next deadline come out. One thread.
 #pragma once
 
@@ -9,93 +9,78 @@
 
 #include "base/clock.hpp"
 #include "drivers/netbox/stream/events.hpp"
-#include "drivers/netbox/stream/reorder.hpp"
 #include "drivers/netbox/stream/sequence.hpp"
-#include "drivers/netbox/wire/product.hpp"
 #include "drivers/netbox/wire/rdt.hpp"
 
 namespace kphi::netbox {
 
-/// Durations are bench time (a protocol's wall time goes through Clock::stretched first).
+/// Durations in bench time.
 struct StreamSettings {
-  bool buffered = true;           ///< false: real-time mode, one record per datagram
-  bool multi_unit = false;        ///< real-time mode by the command that keeps several boxes in step; not on an Axia
-  unsigned divisor = 1;           ///< ft_sequence per record
-  int records_per_datagram = 40;  ///< in buffered mode
-  double device_rate_hz = 7000;   ///< ft_sequence per second
+  unsigned divisor = 1;                                       ///< ft_sequence per record
+  int records_per_datagram = 40;                              ///< 1..40
+  double device_rate_hz = 7000;                               ///< ft_sequence per second
   Duration reply_timeout = std::chrono::milliseconds(100);    ///< of the first start; added to two datagram periods
   Duration settle = std::chrono::milliseconds(5);             ///< silence after a stop before the start is sent
   Duration silence_timeout = std::chrono::milliseconds(500);  ///< added to three datagram periods
   Duration bias_patience = std::chrono::milliseconds(50);     ///< added to three datagram periods
-  std::size_t reorder_records = 64;  ///< wait at most for overtaken ones; when buffered at least four datagrams
-  Duration reorder_patience = std::chrono::milliseconds(20);  ///< and for so long
-  Product product = Product::net_box;                         ///< of whose commands
-  Duration lease{0};  ///< see StreamPolicy; 0: until stopped. At least four times silence()
-  int attempts = 6;   ///< starts sent before giving up; the timeout doubles up to four times the first
+  std::size_t reorder_records = 64;                           ///< held back at most; at least four datagrams
+  Duration reorder_patience = std::chrono::milliseconds(20);  ///< and for at most this long
+  Product product = Product::net_box;                         ///< selects the start command
+  int attempts = 6;  ///< starts sent before giving up; the timeout doubles up to four times the first
 
   /// Bench time between two datagrams.
   [[nodiscard]] Duration datagram_period() const noexcept;
-  /// A stream that brings nothing for so long is called silent.
+  /// A stream without a record for this long is silent.
   [[nodiscard]] Duration silence() const noexcept { return silence_timeout + 3 * datagram_period(); }
-  /// Whole datagrams, so that nobody needs to know what a box does with a last one that is not full. 0: no end.
-  [[nodiscard]] std::uint32_t sample_count() const noexcept;
 };
 
 enum class State : std::uint8_t {
   idle,
   starting,  ///< asked, no record yet
   streaming,
-  silent,  ///< was streaming, nothing for long; streams again with the next record, or with start()
+  silent,  ///< was streaming; streams again with the next record, or with start()
   failed,  ///< no record after all attempts of the first start
 };
 
 class Session {
  public:
   explicit Session(StreamSettings settings);
-  /// Goes on where `before` is, with other settings: start() it then. With another stride a new account, its counters
-  /// going on; what is missing in between is not known then.
+  /// Continues `before` with other settings: call start() then. With another stride the counters continue, but records
+  /// missing in between are unknown.
   Session(StreamSettings settings, const Session& before);
 
-  /// Stop, wait for silence, start; repeated until the first record. From `silent` or `streaming` the account goes on,
-  /// so that what is missing in between is counted; from `idle` or `failed` it begins anew behind the old one.
+  /// Stop, wait for silence, start; repeated until the first record. From `silent` or `streaming` the records missing
+  /// in between are counted as lost; from `idle` or `failed` they are not.
   void start(Instant now);
-  /// Tells the box to stop, and again if it keeps sending. What waits for overtaken records is to be flushed before;
-  /// start() from `idle` forgets it.
+  /// Tells the box to stop, and again if it keeps sending. Call flush() before: start() from `idle` drops records held
+  /// back.
   void stop(Instant now);
   /// While streaming: the box takes its present load as zero. Some boxes stop their stream then: it is started again
   /// when no record comes within three datagram periods and bias_patience. Another state: nothing is sent.
   void set_bias(Instant now);
-  /// The box forgets that one of its monitor conditions has been true. Not acknowledged: the status shows it.
-  void reset_latch() noexcept { send(Command::reset_latch); }
-  /// Appends to `out` what can be delivered: ascending in ft_sequence. Records behind a gap wait for those that they
-  /// may have overtaken (StreamSettings::reorder_records and reorder_patience) and come with a later call.
+  /// Appends to `out` the records that can be delivered, ascending in ft_sequence. Records behind a gap are held back
+  /// (StreamSettings::reorder_records and reorder_patience) and come with a later call.
   void receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out);
-  /// The short way for the commonest datagram alone, while streaming and nothing waits: all its records follow each
-  /// other and those before. Decodes them into `out`, which has room for them, and returns their number. 0: nothing has
-  /// been counted, it is one for receive().
+  /// The fast path for the usual datagram: streaming, no record held back, all its records in order. Decodes them into
+  /// `out` and returns their number. 0: nothing was counted, call receive().
   [[nodiscard]] std::size_t receive_in_order(std::span<const std::uint8_t> datagram, Instant arrival,
                                              std::span<StampedRecord> out) noexcept;
   /// To be called at `deadline()`, after everything that came before has been received.
   void advance(Instant now);
-  /// When release() will deliver; kNever when nothing waits. Not part of deadline().
+  /// When release() will deliver; kNever if no record is held back. Not part of deadline().
   [[nodiscard]] Instant release_deadline() const noexcept { return window_.deadline(); }
-  /// Appends what has waited in vain for overtaken records; receive() does so too.
+  /// Appends the records held back for too long; receive() does so too.
   void release(Instant now, std::vector<StampedRecord>& out) { window_.expire(now, account_, out); }
-  /// Appends all that waits: the account is complete then.
+  /// Appends all records held back: the account is complete then.
   void flush(std::vector<StampedRecord>& out) { window_.flush(account_, out); }
-  /// Pops what must be sent to the box next. False: nothing.
+  /// Pops the next request to the box; false if there is none.
   [[nodiscard]] bool next_request(std::array<std::uint8_t, 8>& request) noexcept;
   /// kNever when nothing is due.
   [[nodiscard]] Instant deadline() const noexcept;
   [[nodiscard]] State state() const noexcept;
-  /// Starting again after a silence; `silent` again when no record comes.
+  /// Starting again after a silence; back to `silent` if no record arrives.
   [[nodiscard]] bool resuming() const noexcept {
     return resuming_ && (phase_ == Phase::draining || phase_ == Phase::awaiting);
-  }
-  /// The lease is renewed with a datagram that comes within `span`, or with the next: each moment that this one waits
-  /// costs records then.
-  [[nodiscard]] bool renews_within(Duration span) const noexcept {
-    return renewal_due_ != kNever && newest_arrival_ + span + settings_.datagram_period() >= renewal_due_;
   }
   /// Datagrams that the socket has dropped since it was opened (SO_RXQ_OVFL), as known at the datagram received next.
   void note_host_drops(std::uint64_t total) noexcept;
@@ -103,6 +88,7 @@ class Session {
   /// Oldest first; bounded, see EventLog.
   [[nodiscard]] std::vector<Event> take_events() { return account_.events().take(); }
   [[nodiscard]] EventLog& events() noexcept { return account_.events(); }
+  [[nodiscard]] std::uint64_t dropped_events() const noexcept { return account_.events().dropped(); }
   [[nodiscard]] const StreamSettings& settings() const noexcept { return settings_; }
 
  private:
@@ -119,14 +105,12 @@ class Session {
   bool belongs_to_new_stream(const Record& first, Instant arrival) const noexcept;
   [[nodiscard]] Command start_command() const noexcept;
   void begin_streaming(Instant arrival) noexcept;
-  void tend_lease(Instant now) noexcept;
-  void renew_lease(Instant now) noexcept;
   void send(Command command) noexcept;
   void send_stop(Instant now) noexcept;
   void send_start(Instant now) noexcept;
 
   const StreamSettings settings_;
-  const Duration silence_, lease_;
+  const Duration silence_;
   LossTracker account_;
   ReorderWindow window_;
   std::uint32_t trouble_ = 0;  // status bits that say so, of the last datagram
@@ -135,9 +119,6 @@ class Session {
   Instant newest_arrival_{0};
   int bias_starts_ = 0;
   bool resuming_ = false, silence_told_ = false;
-  Instant renewal_due_ = kNever, lease_end_ = kNever;
-  std::uint64_t renewals_seen_ = 0;
-  int renewals_sent_ = 0;  // since the last one that showed
   Instant drain_limit_{0}, stop_sent_{0}, first_start_{0};
   int attempt_ = 0;
   std::size_t datagram_records_;  // of the last datagram

@@ -1,5 +1,4 @@
-// The Net Box's numbers: commands, status bits, unit codes. Enums only; driver and simulator share them and nothing
-// else. Manual: ATI 9620-05-NET FT.
+// The Net Box's numbers: products, commands, status bits, unit codes. Manual: ATI 9620-05-NET FT.
 #pragma once
 
 #include <cstdint>
@@ -80,5 +79,15 @@ enum class TorqueUnit : std::uint8_t {
   kgf_centimetre = 5,
   kilonewton_metre = 6,
 };
+
+/// The boxes that speak RDT differ in commands, status word and rates.
+enum class Product : std::uint8_t {
+  net_box,
+  axia,  ///< Ethernet Axia (9610-05-Ethernet Axia), Schunk FTN-Axia
+};
+
+[[nodiscard]] constexpr const char* name_of(Product product) noexcept {
+  return product == Product::axia ? "Axia" : "Net Box";
+}
 
 }  // namespace kphi::netbox

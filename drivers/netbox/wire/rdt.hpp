@@ -1,5 +1,4 @@
-// RDT, the wire: requests of 8 bytes, records of 36, big-endian (manual 9620-05-NET FT, section 10). Bytes only: no
-// socket, no time, no judgement.
+// RDT on the wire: requests of 8 bytes, records of 36, big-endian (manual 9620-05-NET FT, section 10).
 #pragma once
 
 #include <array>
@@ -29,7 +28,7 @@ struct Record {
 /// `sample_count` 0 = until stopped.
 [[nodiscard]] std::array<std::uint8_t, 8> encode_request(Command command, std::uint32_t sample_count = 0) noexcept;
 
-/// 1..40; 0 = refused, not a whole number of records or more than 40.
+/// 1..40; 0: refused, not a multiple of 36 bytes or more than 40 records.
 [[nodiscard]] constexpr std::size_t records_in(std::size_t datagram_bytes) noexcept {
   const std::size_t count = datagram_bytes / kRecordBytes;
   return datagram_bytes % kRecordBytes == 0 && count <= kMaxRecords ? count : 0;
@@ -39,7 +38,7 @@ struct Record {
 inline void decode(const std::uint8_t* bytes, Record& out) noexcept {
   static_assert(sizeof(Record) == kRecordBytes && std::is_trivially_copyable_v<Record>);
   auto* to = reinterpret_cast<std::uint8_t*>(&out);
-  // Two words at a time: they change places where the bytes do.
+  // Two words at a time; swapping the bytes of the pair swaps the words, too.
   constexpr int turn = std::endian::native == std::endian::little ? 32 : 0;
   for (std::size_t at = 0; at < 32; at += 8) {
     std::uint64_t pair;

@@ -93,7 +93,7 @@ std::vector<std::string> names(std::uint32_t status, Product product) {
   for (int bit = 30; bit >= 0; --bit) {
     if ((status >> bit & 1u) != 0) set.push_back(name_of(bit, product));
   }
-  // The summary alone says that something is wrong, not what.
+  // The summary alone names no error.
   if (status == 1u << 31) set.push_back("error summary");
   return set;
 }

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "drivers/netbox/wire/codes.hpp"
-#include "drivers/netbox/wire/product.hpp"
 
 namespace kphi::netbox {
 
@@ -17,10 +16,10 @@ namespace kphi::netbox {
   return (status >> static_cast<unsigned>(bit) & 1u) != 0;
 }
 
-/// 0, or nothing but a latched monitor condition (0x80010000).
+/// 0, or only a latched monitor condition (0x80010000).
 [[nodiscard]] constexpr bool healthy(std::uint32_t status) noexcept { return status == 0 || status == 0x80010000u; }
 
-/// The bits of transducer saturation or A/D error: such a sample is worthless, the box is well.
+/// Transducer saturation or A/D error: the sample is worthless, the box works.
 [[nodiscard]] constexpr std::uint32_t saturation_bits(Product product) noexcept {
   if (product == Product::axia) {
     return 1u << static_cast<unsigned>(AxiaStatusBit::out_of_range) |
@@ -32,16 +31,16 @@ namespace kphi::netbox {
   return (status & saturation_bits(product)) != 0;
 }
 
-/// What a status word says about the sample that carries it.
+/// Verdict of the status word on its sample.
 enum class StatusVerdict : std::uint8_t {
   sound,          ///< see healthy()
-  saturated,      ///< the load is beyond what the cell can measure; the box is well
-  communication,  ///< trouble with a network or a field bus only, which no count goes through; Net Box only
-  faulty,         ///< whatever else: the counts may be anything
+  saturated,      ///< the load exceeds the range of the cell; the box works
+  communication,  ///< trouble with a network or field bus only: the counts are valid; Net Box only
+  faulty,         ///< any other error: the counts may be wrong
 };
 [[nodiscard]] StatusVerdict verdict_of(std::uint32_t status, Product product) noexcept;
 
-/// What is set, most significant bit first, without the error summary; a bit the table does not know is "bit N".
+/// Names of the bits set, most significant first, without the error summary; an unknown bit is "bit N".
 [[nodiscard]] std::vector<std::string> names(std::uint32_t status, Product product = Product::net_box);
 
 }  // namespace kphi::netbox

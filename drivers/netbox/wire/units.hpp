@@ -1,5 +1,4 @@
-// The box's units in SI, by the code that its interfaces use for them (ForceUnit, TorqueUnit) and by the names it
-// spells.
+// The box's units in SI, by code (ForceUnit, TorqueUnit) and by name.
 #pragma once
 
 #include <optional>
@@ -15,7 +14,7 @@ struct Unit {
 
 [[nodiscard]] std::span<const Unit> force_units() noexcept;
 [[nodiscard]] std::span<const Unit> torque_units() noexcept;
-/// Nothing for an unknown code.
+/// nullopt for an unknown code.
 [[nodiscard]] std::optional<double> newtons_in(int force_unit_code) noexcept;
 [[nodiscard]] std::optional<double> newton_metres_in(int torque_unit_code) noexcept;
 

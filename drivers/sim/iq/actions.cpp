@@ -1,4 +1,4 @@
-// What the module does when told, and what it does by itself: sets, motion, flash, reboots, timeouts.
+// What the module does on commands, and by itself: sets, motion, flash, reboots, timeouts.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -82,7 +82,7 @@ void IqDevice::flash_action(std::uint8_t sub) noexcept {
   tune();
 }
 
-/// False: the entry is no command of motion.
+/// False: the entry does not command motion.
 bool IqDevice::command_motion(std::uint8_t type, std::uint8_t sub, Instant now) {
   using Mode = MotorDrive::Mode;
   const double value = memory_.value(type, sub);

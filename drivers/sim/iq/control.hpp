@@ -93,7 +93,7 @@ class IqEnding {
 /// power_safety: which limits are crossed, and whether the module is in safe mode.
 class IqSafety {
  public:
-  /// Looks at every limit. True: safe mode has just begun.
+  /// Checks every limit. True: safe mode has just started.
   bool check(const IqMemory& memory, const IqReadings& readings) noexcept;
   /// A write of fault_ever: these bits stay.
   void clear(std::uint8_t keep) noexcept { ever_ &= keep; }

@@ -19,6 +19,34 @@ constexpr double kFix16 = 65536;
 constexpr double kBrownOutVolts = 3.2;  // of the input: the controller holds no longer
 constexpr Duration kBrownOut = std::chrono::milliseconds(50);
 
+/// Entries that are a reading as it is.
+struct LiveReading {
+  std::uint16_t key;
+  double IqReadings::*reading;
+};
+using R = IqReadings;
+constexpr LiveReading kLiveReadings[] = {{iq_key(50, 11), &R::volts},
+                                         {iq_key(50, 12), &R::angle},
+                                         {iq_key(50, 13), &R::speed},
+                                         {iq_key(50, 23), &R::emf},
+                                         {iq_key(50, 36), &R::motor_amps},
+                                         {iq_key(50, 37), &R::motor_torque},
+                                         {iq_key(50, 44), &R::emf},
+                                         {iq_key(69, 0), &R::volts},
+                                         {iq_key(69, 1), &R::amps},
+                                         {iq_key(69, 3), &R::joules},
+                                         {iq_key(69, 7), &R::volts_raw},
+                                         {iq_key(69, 8), &R::amps_raw},
+                                         {iq_key(69, 13), &R::volts_cascaded},
+                                         {iq_key(73, 0), &R::controller_celsius},
+                                         {iq_key(77, 0), &R::coil_celsius},
+                                         {iq_key(83, 0), &R::coil_celsius},
+                                         {iq_key(83, 1), &R::stator_celsius},
+                                         {iq_key(83, 5), &R::forced_convection},
+                                         {iq_key(83, 11), &R::joule_watts},
+                                         {iq_key(83, 12), &R::convection_watts},
+                                         {iq_key(83, 13), &R::conduction_watts}};
+
 }  // namespace
 
 IqDevice::IqDevice(const IqSettings& settings, const MotorState& state)
@@ -180,6 +208,9 @@ int IqDevice::drive_mode() const noexcept {
 }
 
 std::optional<double> IqDevice::live_value(std::uint16_t key, const IqReadings& r, Instant now) const noexcept {
+  for (const LiveReading& row : kLiveReadings) {
+    if (row.key == key) return r.*row.reading;
+  }
   switch (key) {
     case iq_key(5, 15):
       return uptime(now);
@@ -189,59 +220,20 @@ std::optional<double> IqDevice::live_value(std::uint16_t key, const IqReadings& 
       return stage_.mode == PowerStage::Mode::drive ? stage_.duty : 0;
     case iq_key(50, 9):
       return control_.volts();
-    case iq_key(50, 11):
-    case iq_key(69, 0):
-      return r.volts;
-    case iq_key(50, 12):
-      return r.angle;
-    case iq_key(50, 13):
-      return r.speed;
     case iq_key(50, 10):
       return r.speed * memory_.finite(50, 18);
-    case iq_key(50, 23):
-    case iq_key(50, 44):
-      return r.emf;
-    case iq_key(50, 36):
-      return r.motor_amps;
-    case iq_key(50, 37):
-      return r.motor_torque;
     case iq_key(50, 41):
       return std::lround(control_.derate() * kFix16);
     case iq_key(50, 45):
       return r.emf + limits_.amps_max * limits_.resistance;
-    case iq_key(69, 1):
-      return r.amps;
     case iq_key(69, 2):
       return r.amps * r.volts;
-    case iq_key(69, 3):
-      return r.joules;
-    case iq_key(69, 7):
-      return r.volts_raw;
-    case iq_key(69, 8):
-      return r.amps_raw;
-    case iq_key(69, 13):
-      return r.volts_cascaded;
-    case iq_key(73, 0):
-      return r.controller_celsius;
     case iq_key(73, 5):
       return derate_between(memory_.value(73, 3), memory_.value(73, 4), r.controller_celsius);
-    case iq_key(77, 0):
-    case iq_key(83, 0):
-      return r.coil_celsius;
     case iq_key(77, 5):
       return std::lround(kFix16 * derate_between(memory_.value(77, 1), memory_.value(77, 2), r.coil_celsius));
-    case iq_key(83, 1):
-      return r.stator_celsius;
-    case iq_key(83, 5):
-      return r.forced_convection;
     case iq_key(83, 10):
       return derate_between(memory_.value(83, 8), memory_.value(83, 9), r.coil_celsius);
-    case iq_key(83, 11):
-      return r.joule_watts;
-    case iq_key(83, 12):
-      return r.convection_watts;
-    case iq_key(83, 13):
-      return r.conduction_watts;
     case iq_key(84, 0):
       return safety_.now();
     case iq_key(84, 1):

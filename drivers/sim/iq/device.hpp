@@ -24,7 +24,7 @@ namespace kphi::sim {
 struct IqSettings {
   int module_id = 0;               ///< 0..62
   double oscillator_gain = 0.005;  ///< relative error of the module's clock: time and baud run as 1 + gain, a speed
-                                   ///< reads speed / (1 + gain) and is held at what was commanded times 1 + gain
+                                   ///< reads speed / (1 + gain) and is controlled to the command times 1 + gain
   double time_scale = 1;   ///< bench seconds per wall second: the communication timeout and the replies' latency last
                            ///< this many times longer
   unsigned baud = 115200;  ///< saved

@@ -14,8 +14,8 @@ using enum IqPresence;
 constexpr std::uint8_t G = 1, S = 2, GS = 3, GSV = 7;
 
 // type, sub, format, access, value, firmware. Sorted by type and sub. Values: published numbers of the 2306 where there
-// are any, otherwise plausible; velocity_Kp, Ki and ff as somebody tuned them for 5" and 6" propellers. A row that may
-// only be got and follows the physics holds 0 here.
+// are any, otherwise plausible; velocity_Kp, Ki and ff are tuned for 5" and 6" propellers. A
+// read-only row that follows the physics holds 0.
 constexpr std::array kEntries{
     // system_control
     IqEntry{5, 0, none, S},

@@ -22,7 +22,7 @@ struct IqFrame {
 };
 
 /// The module's receiver: skips to 0x55; LEN over 59 restarts at that very byte; after a wrong CRC it rescans from the
-/// byte behind the failed 0x55. A partial frame waits for ever.
+/// byte behind the failed 0x55. A partial frame waits without a time limit.
 class IqScanner {
  public:
   /// `capacity`: bytes that it holds, 64 or more; 0: without limit.

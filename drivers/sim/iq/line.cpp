@@ -26,18 +26,10 @@ bool is_event(const MotorFault& fault) noexcept {
 }  // namespace
 
 IqLine::IqLine(IqDevice& module, const IqLineSettings& settings, MotorFaultScript script, std::uint64_t seed, Keep keep)
-    : module_(module),
-      settings_(settings),
-      script_(std::move(script)),
-      random_(seed),
-      keep_(keep),
-      progress_(script_.size()) {
+    : module_(module), settings_(settings), script_(std::move(script), seed), keep_(keep), stuck_(script_.size()) {
   for (std::size_t i = 0; i < script_.size(); ++i) {
-    if (!is_event(script_[i])) continue;
-    events_.push_back({script_[i].at, i, true});
-    if (script_[i].end() != kNever) events_.push_back({script_[i].end(), i, false});
+    if (is_event(script_[i])) script_.plan(i);
   }
-  std::stable_sort(events_.begin(), events_.end(), [](const Event& a, const Event& b) { return a.at > b.at; });
 }
 
 void IqLine::send(std::span<const std::uint8_t> bytes, Instant now) {
@@ -66,8 +58,7 @@ bool IqLine::next_chunk(IqChunk& out, Instant now) {
 }
 
 Instant IqLine::next_event() const noexcept {
-  Instant next = module_.next_reply_at();
-  if (!events_.empty()) next = std::min(next, events_.back().at);
+  Instant next = std::min(module_.next_reply_at(), script_.next_event());
   if (!to_module_.empty()) next = std::min(next, to_module_.front().due);
   if (!to_host_.empty()) next = std::min(next, arrival_of(to_host_.front()));
   if (!chunks_.empty()) next = std::min(next, chunks_.front().at);
@@ -85,9 +76,11 @@ void IqLine::carry_commands(Instant now) {
     if (deaf_) continue;
     if (!rates_match()) carried.byte = random_byte();
     for (std::size_t i = 0; i < script_.size(); ++i) {
-      if (script_[i].kind != MotorFaultKind::command_flip || !active(i, carried.due) || !chance(script_[i].p)) continue;
-      carried.byte ^= static_cast<std::uint8_t>(1u << (random_.bits() & 7));
-      ++progress_[i].used;
+      if (script_[i].kind != MotorFaultKind::command_flip || !script_.active(i, carried.due) ||
+          !script_.chance(script_[i].p))
+        continue;
+      carried.byte ^= static_cast<std::uint8_t>(1u << (script_.bits() & 7));
+      script_.use(i);
       ++truth_.done[static_cast<std::size_t>(MotorFaultKind::command_flip)];
     }
     ++truth_.bytes_to_module;
@@ -108,8 +101,10 @@ void IqLine::carry(const IqReply& reply) {
   decision.reply = reply;
   decision.passage.ready = reply.at;
   for (std::size_t i = 0; i < script_.size(); ++i) {
-    if (is_event(script_[i]) || !active(i, reply.at) || !concerns(script_[i], reply) || !chance(script_[i].p)) continue;
-    ++progress_[i].used;
+    if (is_event(script_[i]) || !script_.active(i, reply.at) || !concerns(script_[i], reply) ||
+        !script_.chance(script_[i].p))
+      continue;
+    script_.use(i);
     ++truth_.done[static_cast<std::size_t>(script_[i].kind)];
     decision.done |= bit(script_[i].kind);
     act(i, decision);
@@ -151,7 +146,7 @@ void IqLine::act(std::size_t index, FaultDecision& decision) {
       reply.id = static_cast<std::uint8_t>(fault.id);
       break;
     case MotorFaultKind::stuck: {
-      const auto& first = progress_[index].first.try_emplace(iq_key(reply.type, reply.sub), reply).first->second;
+      const auto& first = stuck_[index].try_emplace(iq_key(reply.type, reply.sub), reply).first->second;
       reply.bytes = first.bytes;
       break;
     }
@@ -188,7 +183,7 @@ void IqLine::act_on_bytes(const MotorFault& fault, FaultDecision& decision) {
       decision.passage.stall = fault.delay;
       break;
     case MotorFaultKind::delay:
-      decision.passage.ready += fault.delay + from_seconds(0.5 * (random_.symmetric() + 1) * to_seconds(fault.jitter));
+      decision.passage.ready += fault.delay + from_seconds(script_.uniform() * to_seconds(fault.jitter));
       break;
     default:
       break;
@@ -229,7 +224,7 @@ void IqLine::put(const FaultDecision& decision, std::size_t entry) {
   const std::vector<std::uint8_t> intact = passage.bytes;
   if (decision.bad_crc) passage.bytes.back() ^= 0x5a;
   for (std::uint64_t i = 0; i < decision.flips; ++i) {
-    const std::uint64_t place = random_.bits() % (8 * passage.bytes.size());
+    const std::uint64_t place = script_.bits() % (8 * passage.bytes.size());
     passage.bytes[place / 8] ^= static_cast<std::uint8_t>(1u << (place % 8));
   }
   if (decision.truncated) passage.bytes.resize(std::min(passage.bytes.size(), *decision.truncated));
@@ -304,25 +299,19 @@ void IqLine::finish(const Passage& passage, Instant at) {
 
 // --- the script
 
-bool IqLine::active(std::size_t index, Instant at) const noexcept {
-  return script_[index].active(at, progress_[index].used);
-}
-
 bool IqLine::concerns(const MotorFault& fault, const IqReply& reply) const noexcept {
   if (fault.kind == MotorFaultKind::command_flip) return false;
   return (fault.type < 0 || fault.type == reply.type) && (fault.sub < 0 || fault.sub == reply.sub);
 }
 
 void IqLine::meet_events(Instant now) {
-  while (!events_.empty() && events_.back().at <= now) {
-    const Event event = events_.back();
-    events_.pop_back();
-    carry_commands(event.at);
-    take_replies(event.at);
-    arrive(event.at);
-    const MotorFault& fault = script_[event.fault];
-    event.begins ? begin(fault, event.at) : end(fault, event.at);
-    recompute(event.at);
+  while (const auto event = script_.take_event(now)) {
+    carry_commands(event->at);
+    take_replies(event->at);
+    arrive(event->at);
+    const MotorFault& fault = script_[event->fault];
+    event->begins ? begin(fault, event->at) : end(fault, event->at);
+    recompute(event->at);
   }
 }
 
@@ -349,7 +338,7 @@ void IqLine::recompute(Instant now) {
   plugged_ = true;
   upset_ = {};
   IqUpset module;
-  for (const MotorFault& fault : script_) {
+  for (const MotorFault& fault : script_.faults()) {
     if (!is_event(fault) || !fault.active(now)) continue;
     mute_ = mute_ || fault.kind == MotorFaultKind::mute;
     deaf_ = deaf_ || fault.kind == MotorFaultKind::deaf;
@@ -371,7 +360,7 @@ void IqLine::note(Instant at, const MotorFault& fault, const char* what) {
   truth_.events.push_back({at, std::string(name_of(fault.kind)) + what});
 }
 
-/// What was under way is gone.
+/// Drops all bytes in flight.
 void IqLine::cut() noexcept {
   for (const Passage& passage : to_host_) truth_.spoilt += passage.whole ? 1 : 0;
   to_host_.clear();

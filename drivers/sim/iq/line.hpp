@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "base/clock.hpp"
-#include "base/random.hpp"
 #include "drivers/sim/iq/device.hpp"
-#include "drivers/sim/iq/faults.hpp"
 #include "drivers/sim/physics/motor.hpp"
+#include "drivers/sim/script/faults.hpp"
+#include "drivers/sim/script/script_run.hpp"
 
 namespace kphi::sim {
 
@@ -86,15 +86,6 @@ class IqLine {
   [[nodiscard]] const IqTruth& truth() const noexcept { return truth_; }
 
  private:
-  struct Progress {
-    std::uint64_t used = 0;
-    std::map<std::uint16_t, IqReply> first;  ///< of a stuck value
-  };
-  struct Event {
-    Instant at;
-    std::size_t fault;
-    bool begins;
-  };
   /// A row of bytes on the way to the host.
   struct Passage {
     std::vector<std::uint8_t> bytes;
@@ -143,22 +134,18 @@ class IqLine {
   [[nodiscard]] Instant arrival_of(const Passage& passage) const noexcept;
   void finish(const Passage& passage, Instant at);
   void cut() noexcept;
-  [[nodiscard]] bool active(std::size_t index, Instant at) const noexcept;
   [[nodiscard]] bool concerns(const MotorFault& fault, const IqReply& reply) const noexcept;
   [[nodiscard]] Duration byte_time(double rate) const noexcept;
   [[nodiscard]] bool rates_match() const noexcept;
   [[nodiscard]] Instant handed_over(Instant at) const noexcept;
-  [[nodiscard]] bool chance(double p) noexcept { return 0.5 * (random_.symmetric() + 1) < p; }
-  [[nodiscard]] std::uint8_t random_byte() noexcept { return static_cast<std::uint8_t>(random_.bits() >> 40); }
+  [[nodiscard]] std::uint8_t random_byte() noexcept { return static_cast<std::uint8_t>(script_.bits() >> 40); }
 
   IqDevice& module_;
   const IqLineSettings settings_;
-  const MotorFaultScript script_;
-  Random random_;
+  ScriptRun<MotorFault> script_;
   const Keep keep_;
   double host_rate_ = 0;
-  std::vector<Progress> progress_;
-  std::vector<Event> events_;  ///< latest first
+  std::vector<std::map<std::uint16_t, IqReply>> stuck_;  ///< by fault: the first reply of each entry
   bool plugged_ = true, mute_ = false, deaf_ = false;
   MotorUpset upset_;
 

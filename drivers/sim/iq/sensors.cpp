@@ -15,9 +15,7 @@ constexpr double kWindingOhm = 0.038, kStatorCapacity = 10, kStatorConvection = 
 /// Share of the way that a first-order low-pass goes in one tick.
 double share_of(double hertz) noexcept { return hertz > 0 ? 1 - std::exp(-2 * kPi * hertz * kTick) : 1; }
 
-std::uint16_t converted(double ticks) noexcept {
-  return static_cast<std::uint16_t>(std::lround(std::clamp(ticks, 0.0, kConverterTop)));
-}
+double converted(double ticks) noexcept { return std::round(std::clamp(ticks, 0.0, kConverterTop)); }
 
 }  // namespace
 

@@ -34,7 +34,7 @@ struct IqReadings {
   double speed = 0;  ///< rad/s, by the module's clock: a fast one counts more of its seconds per turn
   double volts = 0, amps = 0, joules = 0;
   double volts_cascaded = 0;
-  std::uint16_t volts_raw = 0, amps_raw = 0;
+  double volts_raw = 0, amps_raw = 0;  ///< whole converter ticks
   double controller_celsius = 0;
   double coil_celsius = 0, stator_celsius = 0;
   double joule_watts = 0, convection_watts = 0, conduction_watts = 0, forced_convection = 0;

@@ -12,7 +12,7 @@
 
 #include "drivers/sim/netbox/settings.hpp"
 #include "drivers/sim/netbox/signal.hpp"
-#include "drivers/sim/physics/load_cell.hpp"
+#include "drivers/sim/physics/plant.hpp"
 
 namespace kphi::sim {
 
@@ -51,7 +51,8 @@ class NetBoxDevice {
   void sample(const LoadCellSample& sample);
   /// Next datagram to send, oldest first; false when there is none.
   bool next_datagram(Datagram& out);
-  /// Complete answer to one complete HTTP request; the box closes the connection after it.
+  /// Complete HTTP/1.0 answer to one complete request; the box closes the connection after it. Pages: netftapi2.xml and
+  /// netftcalapi.xml, with or without ?index=0..15, and the four CGI pages; 404 for anything else.
   [[nodiscard]] std::string http(std::string_view request);
   /// Takes whole commands of 20 bytes off the front of `received` and returns the answers to them.
   [[nodiscard]] std::string tcp(std::string& received);
@@ -135,8 +136,5 @@ class NetBoxDevice {
   std::uint64_t writes_since_ = 0;  ///< tick of the first CGI write of the present second
   int writes_ = 0;                  ///< in that second
 };
-
-/// HTTP/1.0 response to one request. GET of the two XML pages, with or without ?index=0..15; anything else is 404.
-[[nodiscard]] std::string netbox_answer(const NetBoxDevice& box, std::string_view request);
 
 }  // namespace kphi::sim

@@ -17,8 +17,7 @@ std::uint32_t word(const Datagram& datagram, std::size_t offset) noexcept {
 
 FaultInjector::FaultInjector(NetBoxDevice& box, FaultScript script, std::uint64_t seed, Keep keep)
     : box_(box),
-      script_(std::move(script)),
-      random_(seed),
+      script_(std::move(script), seed),
       keep_(keep),
       progress_(script_.size()),
       first_address_(box.settings().address) {
@@ -26,18 +25,10 @@ FaultInjector::FaultInjector(NetBoxDevice& box, FaultScript script, std::uint64_
     const Fault& fault = script_[i];
     direct_ = direct_ && !on_datagrams(fault.kind);
     if (!on_box(fault.kind)) continue;
-    events_.push_back({fault.at, i, true});
-    if (fault.kind == FaultKind::reboot) events_.push_back({fault.at + fault.down, i, false});
-    if (fault.end() != kNever) events_.push_back({fault.end(), i, false});
+    script_.plan(i);
+    if (fault.kind == FaultKind::reboot) script_.plan({fault.at + fault.down, i, false});
   }
-  // A beginning before an end at the same time, or a fault without duration would never end.
-  std::stable_sort(events_.begin(), events_.end(), [](const Event& a, const Event& b) { return a.at < b.at; });
-  std::reverse(events_.begin(), events_.end());
   schedule();
-}
-
-bool FaultInjector::active(std::size_t fault, Instant at) const noexcept {
-  return script_[fault].active(at, progress_[fault].used);
 }
 
 bool FaultInjector::next_datagram(Datagram& out, Instant now) {
@@ -86,12 +77,12 @@ void FaultInjector::carry_all(Instant now) {
 void FaultInjector::shorten(Datagram& datagram) {
   for (std::size_t i = 0; i < script_.size(); ++i) {
     const Fault& fault = script_[i];
-    if (fault.kind != FaultKind::short_block || !active(i, datagram.at) || !chance(fault.p)) continue;
+    if (fault.kind != FaultKind::short_block || !script_.active(i, datagram.at) || !script_.chance(fault.p)) continue;
     const std::size_t records = datagram.size / kRecordBytes;
     const std::size_t left_out = std::min(static_cast<std::size_t>(fault.records), records - 1);
     datagram.size -= left_out * kRecordBytes;
     truth_.records_left_out += left_out;
-    ++progress_[i].used;
+    script_.use(i);
   }
 }
 
@@ -136,44 +127,45 @@ FaultInjector::FaultDecision FaultInjector::decide(Instant at) {
   FaultDecision decision;
   decision.due = at;
   for (std::size_t i = 0; i < script_.size(); ++i) {
-    if (on_datagrams(script_[i].kind) && active(i, at)) act(script_[i], progress_[i], at, decision);
+    if (on_datagrams(script_[i].kind) && script_.active(i, at) && act(script_[i], progress_[i], at, decision))
+      script_.use(i);
   }
   if (decision.due > at) ++truth_.delayed;
   decision.due = std::max(decision.due, last_due_);
   return decision;
 }
 
-void FaultInjector::act(const Fault& fault, Progress& progress, Instant at, FaultDecision& decision) {
+bool FaultInjector::act(const Fault& fault, Progress& progress, Instant at, FaultDecision& decision) {
   switch (fault.kind) {
     case FaultKind::loss:
-      if (progress.burst_left == 0 && chance(fault.p)) progress.burst_left = fault.burst;
-      if (progress.burst_left == 0) return;
+      if (progress.burst_left == 0 && script_.chance(fault.p)) progress.burst_left = fault.burst;
+      if (progress.burst_left == 0) return false;
       --progress.burst_left;
       decision.dropped = true;
       break;
     case FaultKind::gilbert:
-      if (chance(progress.bad ? fault.p_bad_good : fault.p_good_bad)) progress.bad = !progress.bad;
-      if (!progress.bad || !chance(fault.loss)) return;
+      if (script_.chance(progress.bad ? fault.p_bad_good : fault.p_good_bad)) progress.bad = !progress.bad;
+      if (!progress.bad || !script_.chance(fault.loss)) return false;
       decision.dropped = true;
       break;
     case FaultKind::delay:
-      decision.due = std::max(
-          decision.due, at + fault.delay + from_seconds(to_seconds(fault.jitter) * 0.5 * (random_.symmetric() + 1)));
+      decision.due =
+          std::max(decision.due, at + fault.delay + from_seconds(to_seconds(fault.jitter) * script_.uniform()));
       break;
     case FaultKind::jitter: {
-      const double mean_times = -std::log(0.5 * (random_.symmetric() + 1) + 0x1p-54);
-      const double spike = chance(fault.p) ? 0.5 * (random_.symmetric() + 1) : 0;
+      const double mean_times = -std::log(script_.uniform() + 0x1p-54);
+      const double spike = script_.chance(fault.p) ? script_.uniform() : 0;
       decision.due = std::max(
           decision.due, at + from_seconds(mean_times * to_seconds(fault.jitter) + spike * to_seconds(fault.spike)));
       break;
     }
     case FaultKind::short_block:
-      return;
+      return false;
     case FaultKind::hold:
       decision.due = std::max(decision.due, fault.end());
       break;
     default:
-      if (!chance(fault.p)) return;
+      if (!script_.chance(fault.p)) return false;
       if (fault.kind == FaultKind::duplicate) decision.copies.push_back(fault.delay);
       if (fault.kind == FaultKind::foreign_source) ++decision.foreign;
       if (fault.kind == FaultKind::reorder) {
@@ -185,7 +177,7 @@ void FaultInjector::act(const Fault& fault, Progress& progress, Instant at, Faul
         decision.replaced = decision.replaced || fault.replaces;
       }
   }
-  ++progress.used;
+  return true;
 }
 
 void FaultInjector::let_pass(Instant due) {

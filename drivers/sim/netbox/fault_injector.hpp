@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "base/random.hpp"
 #include "drivers/sim/netbox/device.hpp"
-#include "drivers/sim/netbox/faults.hpp"
+#include "drivers/sim/script/faults.hpp"
+#include "drivers/sim/script/script_run.hpp"
 
 namespace kphi::sim {
 
@@ -99,10 +99,13 @@ class DelayQueue {
 struct StreamReply {
   std::string bytes;
   Duration wait{0};         ///< before the first byte
-  std::size_t segment = 0;  ///< at most so many bytes at once; 0: all
+  std::size_t segment = 0;  ///< at most this many bytes at once; 0: all
   Duration pause{0};        ///< between two segments
   bool close = false;       ///< after the last byte
 };
+
+/// What a fault of the web server does to an answer (web.cpp).
+void spoil_page(const Fault& fault, StreamReply& reply);
 
 class FaultInjector {
  public:
@@ -141,14 +144,8 @@ class FaultInjector {
 
  private:
   struct Progress {
-    std::uint64_t used = 0;        ///< of Fault::count
     std::uint64_t burst_left = 0;  ///< of a loss
     bool bad = false;              ///< Gilbert-Elliott
-  };
-  struct Event {
-    Instant at;
-    std::size_t fault;
-    bool begins;
   };
   struct InFlightDatagram {
     Datagram datagram;
@@ -179,7 +176,7 @@ class FaultInjector {
   };
   void meet_events(Instant now);
   void schedule() noexcept;
-  void begin(const Fault& fault, Instant now);
+  void begin(std::size_t index);
   void end(const Fault& fault);
   void note(Instant at, std::string what);
   void sample_disturbed(LoadCellSample sample);
@@ -192,22 +189,19 @@ class FaultInjector {
   void carry(const InFlightDatagram& in_flight);
   void make_up(const InFlightDatagram& after, std::size_t size, bool foreign, Instant due);
   [[nodiscard]] FaultDecision decide(Instant at);
-  void act(const Fault& fault, Progress& progress, Instant at, FaultDecision& decision);
+  /// False: it spared this datagram.
+  bool act(const Fault& fault, Progress& progress, Instant at, FaultDecision& decision);
   void let_pass(Instant due);
   void give_up_holding(Instant now);
   void shorten(Datagram& datagram);
   std::size_t enter(const Datagram& datagram);
   void count_arrival(const InFlightDatagram& in_flight, Instant at);
-  [[nodiscard]] bool active(std::size_t fault, Instant at) const noexcept;
-  [[nodiscard]] bool chance(double p) noexcept { return 0.5 * (random_.symmetric() + 1) < p; }
 
   NetBoxDevice& box_;
-  const FaultScript script_;
-  Random random_;
+  ScriptRun<Fault> script_;
   const Keep keep_;
   bool direct_ = true;  ///< no fault concerns datagrams on their way
   std::vector<Progress> progress_;
-  std::vector<Event> events_;  ///< latest first
   std::vector<LateRequest> late_requests_;
   Instant next_event_ = kNever;
   bool disturbed_ = false;  ///< dead, skewed or drifting

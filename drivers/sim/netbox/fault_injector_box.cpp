@@ -19,97 +19,6 @@ bool is_start(std::span<const std::uint8_t> datagram) noexcept {
   return command >= 1 && command <= 4;
 }
 
-// --- answers
-
-constexpr std::string_view kEndOfHeaders = "\r\n\r\n";
-constexpr std::string_view kXml = "text/xml";
-
-/// What the box would send.
-std::string page(std::string_view status, std::string_view type, std::string_view body) {
-  return fmt::format("HTTP/1.0 {}\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{}", status,
-                     type, body.size(), body);
-}
-
-std::string failed(int code) {
-  const std::string status = fmt::format("{} {}", code, code < 500 ? "Not Found" : "Internal Server Error");
-  return page(status, "text/html", "<html><body>" + status + "</body></html>");
-}
-
-std::string oversized(std::size_t size) {
-  return page("200 OK", kXml, "<?xml version=\"1.0\"?><netft>" + std::string(size, ' '));
-}
-
-std::string body_of(const std::string& answer) {
-  const std::size_t headers = answer.find(kEndOfHeaders);
-  return headers == std::string::npos ? std::string() : answer.substr(headers + kEndOfHeaders.size());
-}
-
-/// From "<tag>" to the end of its line; npos, 0 when there is none.
-std::pair<std::size_t, std::size_t> place_of(const std::string& body, const std::string& tag) {
-  const std::size_t begin = body.find("<" + tag + ">");
-  if (begin == std::string::npos) return {begin, 0};
-  return {begin, body.find('\n', begin) + 1 - begin};
-}
-
-std::string without(const std::string& answer, const std::string& tag) {
-  std::string body = body_of(answer);
-  const auto [begin, size] = place_of(body, tag);
-  if (size > 0) body.erase(begin, size);
-  return page("200 OK", kXml, body);
-}
-
-std::string with_twice(const std::string& answer, const std::string& tag) {
-  std::string body = body_of(answer);
-  const auto [begin, size] = place_of(body, tag);
-  if (size > 0) body.insert(begin, body.substr(begin, size));
-  return page("200 OK", kXml, body);
-}
-
-/// "Prüfstand" in Latin-1, in a page that says UTF-8.
-std::string in_latin_1(const std::string& answer) {
-  std::string body = body_of(answer);
-  const auto [begin, size] = place_of(body, "cfgnam");
-  if (size > 0)
-    body.replace(begin, size,
-                 "<cfgnam>Pr\xfc"
-                 "fstand</cfgnam>\n");
-  return page("200 OK", "text/xml; charset=utf-8", body);
-}
-
-std::string in_utf_16(const std::string& answer) {
-  std::string body = "\xff\xfe";
-  for (const char c : body_of(answer)) (body += c) += '\0';
-  return page("200 OK", "text/xml; charset=utf-16", body);
-}
-
-void spoil_page(const Fault& fault, StreamReply& reply) {
-  switch (fault.kind) {
-    case FaultKind::http_slow:
-      reply.wait = std::max(reply.wait, fault.delay);
-      return;
-    case FaultKind::http_truncated:
-      reply.bytes.resize(std::min(reply.bytes.size(), static_cast<std::size_t>(fault.size)));
-      return;
-    case FaultKind::http_status:
-      reply.bytes = failed(fault.code);
-      return;
-    case FaultKind::http_oversized:
-      reply.bytes = oversized(static_cast<std::size_t>(fault.size));
-      return;
-    case FaultKind::http_charset:
-      reply.bytes = fault.utf16 ? in_utf_16(reply.bytes) : in_latin_1(reply.bytes);
-      return;
-    case FaultKind::http_missing_tag:
-      reply.bytes = without(reply.bytes, fault.tag);
-      return;
-    case FaultKind::http_duplicate_tag:
-      reply.bytes = with_twice(reply.bytes, fault.tag);
-      return;
-    default:
-      return;
-  }
-}
-
 void spoil_answer(const Fault& fault, StreamReply& reply) {
   const auto size = static_cast<std::size_t>(fault.size);
   if (fault.kind == FaultKind::tcp_split) {
@@ -126,18 +35,16 @@ void spoil_answer(const Fault& fault, StreamReply& reply) {
 }  // namespace
 
 void FaultInjector::schedule() noexcept {
-  next_event_ = events_.empty() ? kNever : events_.back().at;
+  next_event_ = script_.next_event();
   for (const LateRequest& request : late_requests_) next_event_ = std::min(next_event_, request.due);
 }
 
 void FaultInjector::meet_events(Instant now) {
   while (next_event_ <= now) {
-    if (!events_.empty() && events_.back().at == next_event_) {
-      const Event event = events_.back();
-      events_.pop_back();
-      const Fault& fault = script_[event.fault];
-      event.begins ? begin(fault, event.at) : end(fault);
-      note(event.at, fmt::format("{} {}", name_of(fault.kind), event.begins ? "begins" : "ends"));
+    if (const auto event = script_.take_event(next_event_)) {
+      const Fault& fault = script_[event->fault];
+      event->begins ? begin(event->fault) : end(fault);
+      note(event->at, fmt::format("{} {}", name_of(fault.kind), event->begins ? "begins" : "ends"));
     } else {
       const auto due = std::find_if(late_requests_.begin(), late_requests_.end(),
                                     [&](const LateRequest& r) { return r.due == next_event_; });
@@ -152,7 +59,7 @@ void FaultInjector::meet_events(Instant now) {
 void FaultInjector::note(Instant at, std::string what) { truth_.events.push_back({at, std::move(what)}); }
 
 void FaultInjector::count_use(std::size_t fault, Instant now, std::uint64_t WireTruth::*counter) {
-  ++progress_[fault].used;
+  script_.use(fault);
   ++(truth_.*counter);
   note(now, std::string(name_of(script_[fault].kind)));
 }
@@ -164,7 +71,8 @@ void FaultInjector::move_to(const std::string& address) {
   box_.configure(settings);
 }
 
-void FaultInjector::begin(const Fault& fault, Instant) {
+void FaultInjector::begin(std::size_t index) {
+  const Fault& fault = script_[index];
   switch (fault.kind) {
     case FaultKind::taken_over: {
       const std::array<std::uint8_t, 8> start{0x12, 0x34, 0, static_cast<std::uint8_t>(fault.buffered ? 3 : 2),
@@ -196,7 +104,7 @@ void FaultInjector::begin(const Fault& fault, Instant) {
       skewed_ = disturbed_ = true;
       return;
     case FaultKind::zero_drift:
-      drifting_.push_back(static_cast<std::size_t>(&fault - script_.data()));
+      drifting_.push_back(index);
       disturbed_ = true;
       return;
     case FaultKind::rate: {
@@ -286,7 +194,7 @@ void FaultInjector::request(std::span<const std::uint8_t> datagram, Peer peer, I
   bool at_once = true;
   for (std::size_t i = 0; i < script_.size(); ++i) {
     const Fault& fault = script_[i];
-    if (!on_starts(fault.kind) || !active(i, now)) continue;
+    if (!on_starts(fault.kind) || !script_.active(i, now)) continue;
     if (fault.kind == FaultKind::lost_start) return count_use(i, now, &WireTruth::starts_lost);
     const bool doubled = fault.kind == FaultKind::doubled_start;
     count_use(i, now, doubled ? &WireTruth::starts_doubled : &WireTruth::starts_delayed);
@@ -305,7 +213,7 @@ StreamReply FaultInjector::http(std::string_view request, Instant now) {
   StreamReply reply;
   reply.bytes = box_.http(request);
   for (std::size_t i = 0; i < script_.size(); ++i) {
-    if (!on_pages(script_[i].kind) || !active(i, now)) continue;
+    if (!on_pages(script_[i].kind) || !script_.active(i, now)) continue;
     count_use(i, now, &WireTruth::http_spoilt);
     spoil_page(script_[i], reply);
   }
@@ -315,7 +223,7 @@ StreamReply FaultInjector::http(std::string_view request, Instant now) {
 bool FaultInjector::http_refused(Instant now) const noexcept {
   if (dead_) return true;
   for (std::size_t i = 0; i < script_.size(); ++i) {
-    if (script_[i].kind == FaultKind::http_refused && active(i, now)) return true;
+    if (script_[i].kind == FaultKind::http_refused && script_.active(i, now)) return true;
   }
   return false;
 }
@@ -324,7 +232,7 @@ StreamReply FaultInjector::tcp(std::string& received, Instant now) {
   StreamReply reply;
   reply.bytes = box_.tcp(received);
   for (std::size_t i = 0; i < script_.size() && !reply.bytes.empty(); ++i) {
-    if (!on_tcp(script_[i].kind) || !active(i, now)) continue;
+    if (!on_tcp(script_[i].kind) || !script_.active(i, now)) continue;
     count_use(i, now, &WireTruth::tcp_spoilt);
     spoil_answer(script_[i], reply);
   }

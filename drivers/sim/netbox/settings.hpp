@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "drivers/sim/physics/load_cell.hpp"
+#include "drivers/sim/physics/plant.hpp"
 
 namespace kphi::sim {
 

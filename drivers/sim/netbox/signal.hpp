@@ -31,7 +31,7 @@ class NetBoxSignal {
   using Counts = std::array<std::int32_t, 6>;
 
   explicit NetBoxSignal(const NetBoxSettings& settings) noexcept { configure(settings); }
-  /// After any change of the settings. Filters start anew when theirs changes.
+  /// After any change of the settings. A filter restarts when its setting changes.
   void configure(const NetBoxSettings& settings) noexcept;
   /// One internal sample, N and N m.
   void measure(const Wrench& wrench) noexcept;

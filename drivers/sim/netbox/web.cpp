@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/number.hpp"
-#include "drivers/sim/netbox/device.hpp"
+#include "drivers/sim/netbox/fault_injector.hpp"
 #include "drivers/sim/physics/motor.hpp"
 
 namespace kphi::sim {
@@ -29,7 +29,15 @@ std::string response(std::string_view status, std::string_view type, std::string
       type, body.size(), body);
 }
 
-std::string not_found() { return response("404 Not Found", "text/html", "<html><body>404 Not Found</body></html>"); }
+std::string xml_response(std::string_view body, std::string_view type = "text/xml") {
+  return response("200 OK", type, body);
+}
+
+std::string refusal(std::string_view status) {
+  return response(status, "text/html", fmt::format("<html><body>{}</body></html>", status));
+}
+
+std::string not_found() { return refusal("404 Not Found"); }
 
 /// One word per monitor condition.
 template <class Word>
@@ -274,41 +282,61 @@ std::string found(std::string_view page) {
          ".htm\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
 }
 
-}  // namespace
+// --- spoilt
 
-std::string netbox_answer(const NetBoxDevice& box, std::string_view request) {
-  constexpr std::string_view kGet = "GET /";
-  if (request.substr(0, kGet.size()) != kGet) return not_found();
-  request.remove_prefix(kGet.size());
-  const std::string_view target = request.substr(0, request.find_first_of(" \r\n"));
-  const std::size_t question = target.find('?');
-  const std::string_view page = target.substr(0, question);
-  const std::string_view query = question == std::string_view::npos ? std::string_view() : target.substr(question + 1);
-  const NetBoxSettings& settings = box.settings();
-  const auto slot = slot_of(query, settings.active_slot);
-  if (!slot) return not_found();
-  if (page == "netftapi2.xml") return response("200 OK", "text/xml", configuration_page(box, *slot));
-  if (page == "netftcalapi.xml") {
-    const bool named = !query.empty();
-    const int calibration = named ? *slot : settings.slots[static_cast<std::size_t>(*slot)].calibration;
-    return response("200 OK", "text/xml", calibration_page(box, calibration));
-  }
-  return not_found();
+std::string body_of(const std::string& answer) {
+  constexpr std::string_view kEndOfHeaders = "\r\n\r\n";
+  const std::size_t headers = answer.find(kEndOfHeaders);
+  return headers == std::string::npos ? std::string() : answer.substr(headers + kEndOfHeaders.size());
 }
+
+/// The page with the line of element `tag`, if it has one, replaced by `edit(line)`.
+template <class Edit>
+std::string with_element(const std::string& answer, const std::string& tag, Edit edit,
+                         std::string_view type = "text/xml") {
+  std::string body = body_of(answer);
+  const std::size_t begin = body.find("<" + tag + ">");
+  if (begin != std::string::npos) {
+    const std::size_t size = body.find('\n', begin) + 1 - begin;
+    body.replace(begin, size, edit(body.substr(begin, size)));
+  }
+  return xml_response(body, type);
+}
+
+/// "Prüfstand" in Latin-1, in a page that says UTF-8.
+std::string in_latin_1(const std::string& answer) {
+  constexpr const char* kName =
+      "<cfgnam>Pr\xfc"
+      "fstand</cfgnam>\n";
+  return with_element(
+      answer, "cfgnam", [](const std::string&) { return kName; }, "text/xml; charset=utf-8");
+}
+
+std::string in_utf_16(const std::string& answer) {
+  std::string body = "\xff\xfe";
+  for (const char c : body_of(answer)) (body += c) += '\0';
+  return xml_response(body, "text/xml; charset=utf-16");
+}
+
+}  // namespace
 
 std::string NetBoxDevice::http(std::string_view request) {
   constexpr std::string_view kGet = "GET /";
-  if (request.substr(0, kGet.size()) == kGet) {
-    const std::string_view target =
-        request.substr(kGet.size(), request.find_first_of(" \r\n", kGet.size()) - kGet.size());
-    const std::size_t question = target.find('?');
-    const std::string_view page = target.substr(0, question);
-    for (const char* writable : {"setting.cgi", "comm.cgi", "config.cgi", "moncon.cgi"}) {
-      if (page != writable) continue;
-      return write(page, question == std::string_view::npos ? std::string_view() : target.substr(question + 1));
-    }
+  if (!request.starts_with(kGet)) return not_found();
+  request.remove_prefix(kGet.size());
+  const std::string_view target = request.substr(0, request.find_first_of(" \r\n"));
+  const std::string_view page = target.substr(0, target.find('?'));
+  const std::string_view query = target.substr(std::min(target.size(), page.size() + 1));
+  for (const char* writable : {"setting.cgi", "comm.cgi", "config.cgi", "moncon.cgi"}) {
+    if (page == writable) return write(page, query);
   }
-  return netbox_answer(*this, request);
+  const auto slot = slot_of(query, settings_.active_slot);
+  if (!slot) return not_found();
+  if (page == "netftapi2.xml") return xml_response(configuration_page(*this, *slot));
+  if (page != "netftcalapi.xml") return not_found();
+  const bool named = !query.empty();
+  return xml_response(
+      calibration_page(*this, named ? *slot : settings_.slots[static_cast<std::size_t>(*slot)].calibration));
 }
 
 void NetBoxDevice::count_write() {
@@ -336,6 +364,34 @@ std::string NetBoxDevice::write(std::string_view page, std::string_view query) {
   }
   configure(wanted);
   return found(page);
+}
+
+void spoil_page(const Fault& fault, StreamReply& reply) {
+  switch (fault.kind) {
+    case FaultKind::http_slow:
+      reply.wait = std::max(reply.wait, fault.delay);
+      return;
+    case FaultKind::http_truncated:
+      reply.bytes.resize(std::min(reply.bytes.size(), static_cast<std::size_t>(fault.size)));
+      return;
+    case FaultKind::http_status:
+      reply.bytes = refusal(fmt::format("{} {}", fault.code, fault.code < 500 ? "Not Found" : "Internal Server Error"));
+      return;
+    case FaultKind::http_oversized:
+      reply.bytes = xml_response("<?xml version=\"1.0\"?><netft>" + std::string(fault.size, ' '));
+      return;
+    case FaultKind::http_charset:
+      reply.bytes = fault.utf16 ? in_utf_16(reply.bytes) : in_latin_1(reply.bytes);
+      return;
+    case FaultKind::http_missing_tag:
+      reply.bytes = with_element(reply.bytes, fault.tag, [](const std::string&) { return ""; });
+      return;
+    case FaultKind::http_duplicate_tag:
+      reply.bytes = with_element(reply.bytes, fault.tag, [](const std::string& line) { return line + line; });
+      return;
+    default:
+      return;
+  }
 }
 
 }  // namespace kphi::sim

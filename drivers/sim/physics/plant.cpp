@@ -1,6 +1,77 @@
 #include "drivers/sim/physics/plant.hpp"
 
+#include <algorithm>
+#include <cmath>
+
+#include "drivers/sim/physics/motor.hpp"
+
 namespace kphi::sim {
+namespace {
+
+constexpr int kTicksPerDrift = 70;  // every 10 ms
+constexpr double kDriftInterval = kTicksPerDrift * kTick;
+
+}  // namespace
+
+LoadCell::LoadCell(const LoadCellParameters& parameters, Random& random) noexcept : parameters_(parameters) {
+  for (std::size_t axis = 0; axis < zero_.size(); ++axis)
+    zero_[axis] = parameters.zero_spread[axis] * random.symmetric();
+}
+
+void LoadCell::load(const AirLoad& air) noexcept {
+  air_ = air;
+  const double half = 2 * std::min(air.occluded_share, 1 - air.occluded_share);
+  blade_amplitude_ = parameters_.blade_pass + parameters_.blade_pass_occluded * half;
+}
+
+void LoadCell::step(double speed, double reaction_torque, Random& random) noexcept {
+  rotate(speed);
+  const double square = speed * std::abs(speed);
+  thrust_ += kTick / parameters_.thrust_lag * (air_.thrust * square - thrust_);
+
+  const double swing = air_.thrust_unoccluded * square;
+  const double double_cosine = cosine_ * cosine_ - sine_ * sine_;
+  const double double_sine = 2 * cosine_ * sine_;
+  const bool three = air_.blades == 3;
+  const double blade_cosine = three ? double_cosine * cosine_ - double_sine * sine_ : double_cosine;
+
+  const double once = parameters_.once_per_turn * swing;
+  const double fz = thrust_ + once * cosine_ + blade_amplitude_ * swing * blade_cosine;
+  const double tz = reaction_torque * (1 + 0.02 * blade_cosine);
+  // Cross-talk of the cell, and a thrust axis that misses the cell's centre by about a millimetre.
+  const double fx = once * cosine_ + 0.004 * fz;
+  const double fy = once * sine_ - 0.003 * fz;
+  const Wrench load{fx, fy, fz + 0.002 * once * sine_, 0.0010 * fz, -0.0008 * fz, tz};
+
+  if (++ticks_to_drift_ == kTicksPerDrift) {
+    ticks_to_drift_ = 0;
+    drift(random);
+  }
+  for (std::size_t axis = 0; axis < load.size(); ++axis) {
+    reading_[axis] = load[axis] + zero_[axis] + parameters_.noise[axis] * random.normal();
+  }
+}
+
+void LoadCell::rotate(double speed) noexcept {
+  const double turn = speed * kTick;  // below 0.5 rad at 3450 rad/s: the short series are good to 1e-8
+  const double square = turn * turn;
+  const double c = 1 - square / 2 * (1 - square / 12 * (1 - square / 30));
+  const double s = turn * (1 - square / 6 * (1 - square / 20 * (1 - square / 42)));
+  const double cosine = cosine_ * c - sine_ * s;
+  const double sine = sine_ * c + cosine_ * s;
+  const double shrink = 1.5 - 0.5 * (cosine * cosine + sine * sine);  // one Newton step back to length 1
+  cosine_ = cosine * shrink;
+  sine_ = sine * shrink;
+}
+
+void LoadCell::drift(Random& random) noexcept {
+  constexpr double kMinutes = kDriftInterval / 60;
+  constexpr double kRootMinutes = 0.012909944487358056;  // sqrt(0.01/60)
+  for (std::size_t axis = 0; axis < zero_.size(); ++axis) {
+    zero_[axis] += parameters_.drift_per_minute[axis] * kMinutes +
+                   parameters_.walk_per_root_minute[axis] * kRootMinutes * random.normal();
+  }
+}
 
 Plant::Plant(const PlantParameters& parameters, std::uint64_t seed) noexcept
     : density_share_(parameters.air_density_kg_m3 / 1.225),

@@ -1,15 +1,69 @@
-// The whole physics of the simulated bench: motor, propeller, occlusion, load cell. Seeded; one thread; no clock.
+// The physics of the simulated bench: motor, propeller, occlusion, load cell. Seeded; one thread; no clock.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <utility>
 
+#include "base/clock.hpp"
 #include "base/random.hpp"
-#include "drivers/sim/physics/load_cell.hpp"
 #include "drivers/sim/physics/motor.hpp"
 #include "drivers/sim/physics/truth.hpp"
 
 namespace kphi::sim {
+
+/// Fx, Fy, Fz in N, Tx, Ty, Tz in N m. A propeller that pulls gives +Fz.
+using Wrench = std::array<double, 6>;
+
+/// One internal sample of the Net Box.
+struct LoadCellSample {
+  Instant at{0};  ///< bench time
+  Wrench wrench{};
+};
+
+struct LoadCellParameters {
+  double thrust_lag = 0.040;                                        ///< s, first order
+  Wrench noise{0.015, 0.015, 0.025, 6e-4, 6e-4, 6e-4};              ///< white, deviation per internal sample
+  Wrench zero_spread{0.3, 0.3, 0.4, 5e-3, 5e-3, 3e-3};              ///< zero offset of a power-up: uniform within ±
+  Wrench drift_per_minute{8e-4, -6e-4, 2e-3, 2e-5, -2e-5, 1e-5};    ///< linear
+  Wrench walk_per_root_minute{2e-4, 2e-4, 4e-4, 6e-6, 6e-6, 6e-6};  ///< random walk: deviation after one minute
+  double once_per_turn = 0.015;       ///< amplitude in Fz, as a share of the unoccluded thrust; Fx, Fy the same
+  double blade_pass = 0.03;           ///< amplitude in Fz, as a share of the unoccluded thrust
+  double blade_pass_occluded = 0.05;  ///< more of it with half the disk occluded
+};
+
+/// The aerodynamic part of one mounting.
+struct AirLoad {
+  double thrust = 0;             ///< k(φ), N/(rad/s)²
+  double thrust_unoccluded = 0;  ///< K_T, N/(rad/s)²
+  int blades = 2;
+  double occluded_share = 0;  ///< 0..1 of the disk
+};
+
+/// The load on the cell under the motor: thrust with its lag, drag torque, vibration, noise, zero and drift.
+class LoadCell {
+ public:
+  LoadCell(const LoadCellParameters& parameters, Random& random) noexcept;
+  void load(const AirLoad& air) noexcept;
+  /// One tick: the cell's reading at this speed (rad/s) and reaction torque (N m).
+  void step(double speed, double reaction_torque, Random& random) noexcept;
+  [[nodiscard]] const Wrench& reading() const noexcept { return reading_; }
+  [[nodiscard]] double thrust() const noexcept { return thrust_; }     ///< N, true, after the lag
+  [[nodiscard]] const Wrench& zero() const noexcept { return zero_; }  ///< offset and drift up to now
+
+ private:
+  void rotate(double speed) noexcept;
+  void drift(Random& random) noexcept;
+
+  LoadCellParameters parameters_;
+  AirLoad air_;
+  Wrench zero_{};
+  Wrench reading_{};
+  double thrust_ = 0;
+  double cosine_ = 1, sine_ = 0;  ///< of the rotor angle
+  double blade_amplitude_ = 0;
+  int ticks_to_drift_ = 0;
+};
 
 struct PlantParameters {
   MotorParameters motor;

@@ -1,13 +1,14 @@
 #include "drivers/sim/supply/port.hpp"
 
+#include <fmt/format.h>
 #include <sys/socket.h>
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
-#include <stdexcept>
 #include <utility>
+
+#include "base/number.hpp"
+#include "base/uri.hpp"
 
 namespace kphi::sim {
 namespace {
@@ -15,43 +16,27 @@ namespace {
 constexpr int kLine = 0;
 constexpr int kQuietSteps = 2000;  // without a client's word, its exclusive opening may have outlived it
 
-int number_in(const std::string& text, const std::string& uri) {
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc() && end == text.data() + text.size() && value >= 0 && value <= 65535) return value;
-  throw std::invalid_argument("supply.uri " + uri + ": \"" + text + "\" is not a number from 0 to 65535");
-}
-
-void read_query(std::string query, SupplyUri& found, const std::string& uri) {
-  while (!query.empty()) {
-    const std::size_t end = std::min(query.find('&'), query.size());
-    const std::string part = query.substr(0, end);
-    query.erase(0, end + 1);
-    if (part.starts_with("model=")) found.model = part.substr(6);
-    if (part.starts_with("slave=")) found.slave = number_in(part.substr(6), uri);
-  }
-}
-
 }  // namespace
 
-SupplyUri parse_supply_uri(const std::string& uri) {
+SupplyUri parse_supply_uri(const std::string& text) {
+  const Uri uri(text, "supply", "write modbus-rtu:/path or modbus-tcp:HOST:PORT for a simulated supply");
   SupplyUri found;
-  const std::size_t question = std::min(uri.find('?'), uri.size());
-  const std::size_t colon = uri.find(':');
-  const std::string scheme = uri.substr(0, colon);
-  const std::string where = colon < question ? uri.substr(colon + 1, question - colon - 1) : "";
-  if (question < uri.size()) read_query(uri.substr(question + 1), found, uri);
-  if (scheme == "modbus-rtu" && where.starts_with('/')) {
-    found.addresses.device = where;
-    return found;
+  for (const auto& [key, value] : uri.options()) {
+    if (key == "model") found.model = value;
+    if (key != "slave") continue;
+    const auto slave = parse_integer<unsigned>(value);
+    if (!slave || *slave > 255) uri.refuse(fmt::format("slave \"{}\" is not a Modbus address", value), "use 1 to 247");
+    found.slave = static_cast<int>(*slave);
   }
-  if (scheme != "modbus-tcp" || where.empty())
-    throw std::invalid_argument("supply.uri " + uri +
-                                ": a simulated supply is at modbus-rtu:/path or modbus-tcp:host:port");
-  const std::size_t last = where.rfind(':');
-  found.addresses.host = where.substr(0, last);
-  found.addresses.port =
-      static_cast<std::uint16_t>(last == std::string::npos ? 502 : number_in(where.substr(last + 1), uri));
+  if (uri.scheme() == "modbus-rtu" && uri.location().starts_with('/')) {
+    found.addresses.device = uri.location();
+  } else if (uri.scheme() == "modbus-tcp") {
+    const HostPort tcp = uri.host_and_port(502);
+    found.addresses.host = tcp.host;
+    found.addresses.port = tcp.port;
+  } else {
+    uri.refuse("not an address of a simulated supply");
+  }
   return found;
 }
 

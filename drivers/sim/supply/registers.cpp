@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 
 namespace kphi::sim {
@@ -23,7 +24,93 @@ std::uint16_t half(std::uint32_t value, bool low) {
   return static_cast<std::uint16_t>(low ? value & 0xFFFFu : value >> 16);
 }
 
-bool within(std::uint16_t at, unsigned first, unsigned last) { return at >= first && at <= last; }
+enum class Access : std::uint8_t { read, write, harmful };
+
+/// Registers with one meaning.
+struct Row {
+  unsigned first, last;
+  SupplyQuantity shows;
+  Access access = Access::read;
+  unsigned of_sixteen = 16;  ///< only the first this many of each sixteen registers exist
+};
+
+// The first row that fits counts.
+using enum SupplyQuantity;
+constexpr Row kRiden[] = {
+    {0, 0, model_id},
+    {1, 1, serial_high},
+    {2, 2, serial_low},
+    {3, 3, firmware},
+    {5, 5, celsius},
+    {7, 7, fahrenheit},
+    {8, 8, set_volts, Access::write},
+    {9, 9, set_amps, Access::write},
+    {10, 10, volts},
+    {11, 11, amps},
+    {12, 12, register_12},
+    {13, 13, power_low},
+    {14, 14, input_volts},
+    {16, 16, trip},
+    {17, 17, limiting},
+    {18, 18, output, Access::write},
+    {19, 19, preset, Access::write},
+    {38, 38, charge_high},
+    {39, 39, charge_low},
+    {40, 40, energy_high},
+    {41, 41, energy_low},
+    {82, 82, over_volts, Access::write},
+    {83, 83, over_amps, Access::write},
+    {20, 20, kept, Access::write},
+    {48, 53, kept, Access::write},
+    {55, 62, kept, Access::harmful},  // calibration
+    {66, 72, kept, Access::write},
+    {80, 119, kept, Access::write},  // presets
+    {256, 256, kept, Access::harmful},
+    {0, 119, kept},  // boot loader
+};
+constexpr Row kDps[] = {{0x00, 0x00, set_volts, Access::write},
+                        {0x50, 0x50, set_volts, Access::write},
+                        {0x01, 0x01, set_amps, Access::write},
+                        {0x51, 0x51, set_amps, Access::write},
+                        {0x02, 0x02, volts},
+                        {0x03, 0x03, amps},
+                        {0x04, 0x04, centiwatts},
+                        {0x05, 0x05, input_volts},
+                        {0x06, 0x06, kept, Access::write},
+                        {0x07, 0x07, trip},
+                        {0x08, 0x08, limiting},
+                        {0x09, 0x09, output, Access::write},
+                        {0x0A, 0x0A, kept, Access::write},
+                        {0x0B, 0x0B, model_id},
+                        {0x0C, 0x0C, firmware},
+                        {0x23, 0x23, kept, Access::write},
+                        {0x52, 0x52, over_volts, Access::write},
+                        {0x53, 0x53, over_amps, Access::write},
+                        {0x50, 0xE7, kept, Access::write, 8}};
+constexpr Row kHanmatek[] = {{0x01, 0x01, output, Access::write},
+                             {0x02, 0x02, trip},
+                             {0x03, 0x03, model_id},
+                             {0x04, 0x04, device_class},
+                             {0x05, 0x05, decimals},
+                             {0x10, 0x10, volts},
+                             {0x11, 0x11, amps},
+                             {0x12, 0x12, power_high},
+                             {0x13, 0x13, power_low},
+                             {0x20, 0x20, over_volts, Access::write},
+                             {0x21, 0x21, over_amps, Access::write},
+                             {0x22, 0x23, kept, Access::write},
+                             {0x30, 0x30, set_volts, Access::write},
+                             {0x31, 0x31, set_amps, Access::write},
+                             {0x9999, 0x9999, kept, Access::write}};
+
+/// nullptr: no such register.
+const Row* find(SupplyModel::Family family, std::uint16_t at) {
+  constexpr std::span<const Row> kFamilies[] = {kRiden, kDps, kHanmatek};
+  for (const Row& row : kFamilies[static_cast<std::size_t>(family)]) {
+    if (at >= row.first && at <= row.last && at % 16u < row.of_sixteen) return &row;
+  }
+  return nullptr;
+}
 
 }  // namespace
 
@@ -52,25 +139,88 @@ SupplyRegisters::SupplyRegisters(const std::string& model, std::uint32_t serial,
 }
 
 std::optional<std::uint16_t> SupplyRegisters::read(std::uint16_t at) const {
-  switch (model_->family) {
-    case SupplyModel::Family::riden:
-      return read_riden(at);
-    case SupplyModel::Family::dps:
-      return read_dps(at);
-    default:
-      return read_hanmatek(at);
-  }
+  const Row* row = find(model_->family, at);
+  return row == nullptr ? std::nullopt : std::optional(value_of(row->shows, at));
 }
 
 bool SupplyRegisters::write(std::uint16_t at, std::uint16_t value) {
-  switch (model_->family) {
-    case SupplyModel::Family::riden:
-      return write_riden(at, value);
-    case SupplyModel::Family::dps:
-      return write_dps(at, value);
-    default:
-      return write_hanmatek(at, value);
+  const Row* row = find(model_->family, at);
+  if (row == nullptr || row->access == Access::read) return false;
+  if (row->access == Access::harmful) ++harmful_writes_;
+  memory_[at] = value;
+  SupplyControls& controls = circuit_.controls();
+  if (row->shows == set_volts) controls.volts = value / per_v();
+  if (row->shows == set_amps) controls.amps = value / per_a();
+  if (row->shows == over_volts) controls.over_volts = value / per_v();
+  if (row->shows == over_amps) controls.over_amps = value / per_over_a();
+  if (row->shows == output) circuit_.switch_output(value != 0);
+  if (row->shows == preset) recall(value);
+  return true;
+}
+
+std::uint16_t SupplyRegisters::value_of(SupplyQuantity shows, std::uint16_t at) const {
+  using Twelve = SupplyDisputes::Twelve;
+  const SupplyControls& controls = circuit_.controls();
+  const double watts = circuit_.shown_volts() * circuit_.shown_amps();
+  const bool hundredths = model_->family == SupplyModel::Family::riden && !disputes_.power_in_milliwatts;
+  const std::uint32_t power = counted32(watts, hundredths ? 100 : 1000);
+  const std::uint32_t charge = counted32(circuit_.coulombs() / 3.6, 1), energy = counted32(circuit_.joules() / 3.6, 1);
+  switch (shows) {
+    case kept:
+      return remembered(at);
+    case model_id:
+      return model_->id;
+    case serial_high:
+    case serial_low:
+      return half(serial_, shows == serial_low);
+    case firmware:
+      return kFirmware;
+    case celsius:
+      return kCelsius;
+    case fahrenheit:
+      return kCelsius * 9 / 5 + 32;
+    case set_volts:
+      return counted(controls.volts, per_v());
+    case set_amps:
+      return counted(controls.amps, per_a());
+    case volts:
+      return counted(circuit_.shown_volts(), per_v());
+    case amps:
+      return counted(circuit_.shown_amps(), per_a());
+    case centiwatts:
+      return counted(watts, 100);
+    case power_high:
+    case power_low:
+      return half(power, shows == power_low);
+    case register_12:
+      if (disputes_.register_12 == Twelve::milliampere_hours) return half(charge, true);
+      return disputes_.register_12 == Twelve::power_high_word ? half(power, false) : std::uint16_t{0};
+    case charge_high:
+    case charge_low:
+      return half(charge, shows == charge_low);
+    case energy_high:
+    case energy_low:
+      return half(energy, shows == energy_low);
+    case input_volts:
+      return counted(kInputVolts, 100);
+    case trip:
+      return trip_code();
+    case limiting:
+      return circuit_.limiting();
+    case output:
+      return circuit_.output();
+    case preset:
+      return disputes_.preset_reads_zero ? std::uint16_t{0} : remembered(at);
+    case over_volts:
+      return memory_.contains(at) ? remembered(at) : counted(controls.over_volts, per_v());
+    case over_amps:
+      return memory_.contains(at) ? remembered(at) : counted(controls.over_amps, per_over_a());
+    case device_class:
+      return 0x4B50;
+    case decimals:
+      return 0x0233;
   }
+  return 0;
 }
 
 std::uint16_t SupplyRegisters::remembered(std::uint16_t at) const {
@@ -93,197 +243,15 @@ std::uint16_t SupplyRegisters::trip_code() const noexcept {
   return static_cast<std::uint16_t>(bits && cause > 0 ? 1u << (cause - 1) : cause);
 }
 
-std::optional<std::uint16_t> SupplyRegisters::read_riden(std::uint16_t at) const {
-  using Twelve = SupplyDisputes::Twelve;
-  const SupplyControls& controls = circuit_.controls();
-  const double watts = circuit_.shown_volts() * circuit_.shown_amps();
-  const std::uint32_t power = counted32(watts, disputes_.power_in_milliwatts ? 1000 : 100);
-  const std::uint32_t charge = counted32(circuit_.coulombs() / 3.6, 1), energy = counted32(circuit_.joules() / 3.6, 1);
-  switch (at) {
-    case 0:
-      return model_->id;
-    case 1:
-    case 2:
-      return half(serial_, at == 2);
-    case 3:
-      return kFirmware;
-    case 5:
-      return kCelsius;
-    case 7:
-      return kCelsius * 9 / 5 + 32;
-    case 8:
-      return counted(controls.volts, per_v());
-    case 9:
-      return counted(controls.amps, per_a());
-    case 10:
-      return counted(circuit_.shown_volts(), per_v());
-    case 11:
-      return counted(circuit_.shown_amps(), per_a());
-    case 12:
-      if (disputes_.register_12 == Twelve::milliampere_hours) return half(charge, true);
-      return disputes_.register_12 == Twelve::power_high_word ? half(power, false) : std::uint16_t{0};
-    case 13:
-      return half(power, true);
-    case 14:
-      return counted(kInputVolts, 100);
-    case 16:
-      return trip_code();
-    case 17:
-      return circuit_.limiting();
-    case 18:
-      return circuit_.output();
-    case 19:
-      return disputes_.preset_reads_zero ? std::uint16_t{0} : remembered(19);
-    case 38:
-    case 39:
-      return half(charge, at == 39);
-    case 40:
-    case 41:
-      return half(energy, at == 41);
-    case 82:
-      return memory_.contains(82) ? remembered(82) : counted(controls.over_volts, per_v());
-    case 83:
-      return memory_.contains(83) ? remembered(83) : counted(controls.over_amps, per_a());
-    default:
-      return within(at, 0, 119) || at == 256 ? std::optional(remembered(at)) : std::nullopt;
-  }
-}
-
-bool SupplyRegisters::write_riden(std::uint16_t at, std::uint16_t value) {
-  SupplyControls& controls = circuit_.controls();
-  if (within(at, 55, 62) || at == 256) ++harmful_writes_;
-  const bool writable = at == 8 || at == 9 || within(at, 18, 20) || within(at, 48, 53) || within(at, 55, 62) ||
-                        within(at, 66, 72) || within(at, 80, 119) || at == 256;
-  if (!writable) return false;
-  memory_[at] = value;
-  if (at == 8) controls.volts = value / per_v();
-  if (at == 9) controls.amps = value / per_a();
-  if (at == 18) circuit_.switch_output(value != 0);
-  if (at == 19) recall(value);
-  if (at == 82) controls.over_volts = value / per_v();
-  if (at == 83) controls.over_amps = value / per_a();
-  return true;
-}
-
 void SupplyRegisters::recall(std::uint16_t preset) {
   if (preset > 9) return;
   const auto first = static_cast<std::uint16_t>(80 + 4 * preset);
   SupplyControls& controls = circuit_.controls();
   controls.volts = remembered(first) / per_v();
   controls.amps = remembered(static_cast<std::uint16_t>(first + 1)) / per_a();
-  // Registers 82 and 83 go on showing the thresholds of M0.
+  // Registers 82 and 83 still show the thresholds of M0.
   controls.over_volts = remembered(static_cast<std::uint16_t>(first + 2)) / per_v();
   controls.over_amps = remembered(static_cast<std::uint16_t>(first + 3)) / per_a();
-}
-
-std::optional<std::uint16_t> SupplyRegisters::read_dps(std::uint16_t at) const {
-  const SupplyControls& controls = circuit_.controls();
-  switch (at) {
-    case 0x00:
-    case 0x50:
-      return counted(controls.volts, per_v());
-    case 0x01:
-    case 0x51:
-      return counted(controls.amps, per_a());
-    case 0x02:
-      return counted(circuit_.shown_volts(), per_v());
-    case 0x03:
-      return counted(circuit_.shown_amps(), per_a());
-    case 0x04:
-      return counted(circuit_.shown_volts() * circuit_.shown_amps(), 100);
-    case 0x05:
-      return counted(kInputVolts, 100);
-    case 0x07:
-      return trip_code();
-    case 0x08:
-      return circuit_.limiting();
-    case 0x09:
-      return circuit_.output();
-    case 0x0B:
-      return model_->id;
-    case 0x0C:
-      return kFirmware;
-    case 0x52:
-      return counted(controls.over_volts, per_v());
-    case 0x53:
-      return counted(controls.over_amps, per_a());
-    default:
-      return at <= 0x0C || at == 0x23 || (within(at, 0x50, 0xE7) && at % 16 < 8) ? std::optional(remembered(at))
-                                                                                 : std::nullopt;
-  }
-}
-
-bool SupplyRegisters::write_dps(std::uint16_t at, std::uint16_t value) {
-  SupplyControls& controls = circuit_.controls();
-  const bool writable =
-      at <= 0x01 || at == 0x06 || at == 0x09 || at == 0x0A || at == 0x23 || (within(at, 0x50, 0xE7) && at % 16 < 8);
-  if (!writable) return false;
-  memory_[at] = value;
-  if (at == 0x00 || at == 0x50) controls.volts = value / per_v();
-  if (at == 0x01 || at == 0x51) controls.amps = value / per_a();
-  if (at == 0x09) circuit_.switch_output(value != 0);
-  if (at == 0x52) controls.over_volts = value / per_v();
-  if (at == 0x53) controls.over_amps = value / per_a();
-  return true;
-}
-
-std::optional<std::uint16_t> SupplyRegisters::read_hanmatek(std::uint16_t at) const {
-  constexpr std::uint16_t kClass = 0x4B50, kDecimals = 0x0233;
-  const SupplyControls& controls = circuit_.controls();
-  const std::uint32_t power = counted32(circuit_.shown_volts() * circuit_.shown_amps(), 1000);
-  switch (at) {
-    case 0x01:
-      return circuit_.output();
-    case 0x02:
-      return trip_code();
-    case 0x03:
-      return model_->id;
-    case 0x04:
-      return kClass;
-    case 0x05:
-      return kDecimals;
-    case 0x10:
-      return counted(circuit_.shown_volts(), per_v());
-    case 0x11:
-      return counted(circuit_.shown_amps(), per_a());
-    case 0x12:
-    case 0x13:
-      return half(power, at == 0x13);
-    case 0x20:
-      return counted(controls.over_volts, per_v());
-    case 0x21:
-      return counted(controls.over_amps, per_over_a());
-    case 0x22:
-    case 0x23:
-    case 0x9999:
-      return remembered(at);
-    case 0x30:
-      return counted(controls.volts, per_v());
-    case 0x31:
-      return counted(controls.amps, per_a());
-    default:
-      return std::nullopt;
-  }
-}
-
-bool SupplyRegisters::write_hanmatek(std::uint16_t at, std::uint16_t value) {
-  SupplyControls& controls = circuit_.controls();
-  if (at == 0x01) {
-    circuit_.switch_output(value != 0);
-  } else if (at == 0x20) {
-    controls.over_volts = value / per_v();
-  } else if (at == 0x21) {
-    controls.over_amps = value / per_over_a();
-  } else if (at == 0x30) {
-    controls.volts = value / per_v();
-  } else if (at == 0x31) {
-    controls.amps = value / per_a();
-  } else if (at == 0x22 || at == 0x23 || at == 0x9999) {
-    memory_[at] = value;
-  } else {
-    return false;
-  }
-  return true;
 }
 
 }  // namespace kphi::sim

@@ -34,6 +34,38 @@ struct SupplyModel {
 
 [[nodiscard]] const std::vector<SupplyModel>& supply_models();
 
+/// The content of a register.
+enum class SupplyQuantity : std::uint8_t {
+  kept,  ///< what was written last; 0 before
+  model_id,
+  serial_high,
+  serial_low,
+  firmware,
+  celsius,
+  fahrenheit,
+  set_volts,
+  set_amps,
+  volts,
+  amps,
+  centiwatts,
+  power_high,
+  power_low,
+  register_12,  ///< Riden: see SupplyDisputes
+  charge_high,
+  charge_low,
+  energy_high,
+  energy_low,
+  input_volts,
+  trip,
+  limiting,
+  output,
+  preset,
+  over_volts,
+  over_amps,
+  device_class,
+  decimals
+};
+
 class SupplyRegisters {
  public:
   /// Throws std::invalid_argument for a model that is not in the table.
@@ -49,12 +81,7 @@ class SupplyRegisters {
   [[nodiscard]] std::uint64_t harmful_writes() const noexcept { return harmful_writes_; }
 
  private:
-  [[nodiscard]] std::optional<std::uint16_t> read_riden(std::uint16_t at) const;
-  [[nodiscard]] std::optional<std::uint16_t> read_dps(std::uint16_t at) const;
-  [[nodiscard]] std::optional<std::uint16_t> read_hanmatek(std::uint16_t at) const;
-  bool write_riden(std::uint16_t at, std::uint16_t value);
-  bool write_dps(std::uint16_t at, std::uint16_t value);
-  bool write_hanmatek(std::uint16_t at, std::uint16_t value);
+  [[nodiscard]] std::uint16_t value_of(SupplyQuantity shows, std::uint16_t at) const;
   void recall(std::uint16_t preset);
   [[nodiscard]] std::uint16_t remembered(std::uint16_t at) const;
   [[nodiscard]] double per_v() const noexcept { return model_->counts_per_v; }

@@ -5,6 +5,100 @@
 namespace kphi::sim {
 namespace {
 
+constexpr Duration kSilence = std::chrono::milliseconds(50);
+constexpr std::size_t kHeader = 7;  // of TCP: transaction, protocol, length, unit
+constexpr std::size_t kLongestPdu = 253;
+
+void append16(std::vector<std::uint8_t>& out, unsigned value) {
+  out.push_back(static_cast<std::uint8_t>(value >> 8));
+  out.push_back(static_cast<std::uint8_t>(value));
+}
+
+unsigned word(const std::vector<std::uint8_t>& bytes, std::size_t at) { return bytes[at] * 256u + bytes[at + 1]; }
+
+/// Bytes of a whole RTU request that begins like this; 0: not known yet.
+std::size_t rtu_length(const std::vector<std::uint8_t>& bytes) {
+  if (bytes.size() < 4) return 0;
+  const unsigned function = bytes[1];
+  if (function >= 1 && function <= 6) return 8;
+  if (function != 15 && function != 16) return bytes.size();
+  return bytes.size() < 7 ? 0 : 9u + bytes[6];
+}
+
+}  // namespace
+
+std::uint16_t modbus_crc(std::span<const std::uint8_t> bytes) noexcept {
+  unsigned crc = 0xFFFF;
+  for (const std::uint8_t byte : bytes) {
+    crc ^= byte;
+    for (int bit = 0; bit < 8; ++bit) crc = (crc & 1u) != 0 ? crc >> 1 ^ 0xA001u : crc >> 1;
+  }
+  return static_cast<std::uint16_t>(crc);
+}
+
+std::vector<std::uint8_t> modbus_frame(ModbusFraming framing, int unit, std::uint16_t transaction,
+                                       std::span<const std::uint8_t> pdu) {
+  std::vector<std::uint8_t> out;
+  if (framing == ModbusFraming::tcp) {
+    append16(out, transaction);
+    append16(out, 0);
+    append16(out, static_cast<unsigned>(pdu.size() + 1));
+  }
+  out.push_back(static_cast<std::uint8_t>(unit));
+  out.insert(out.end(), pdu.begin(), pdu.end());
+  if (framing == ModbusFraming::rtu) {
+    const unsigned crc = modbus_crc(out);
+    append16(out, (crc & 0xFFu) << 8 | crc >> 8);
+  }
+  return out;
+}
+
+void ModbusScanner::feed(std::span<const std::uint8_t> bytes, Instant now) {
+  if (framing_ == ModbusFraming::rtu && !waiting_.empty() && now - last_ > kSilence) {
+    waiting_.clear();
+    ++damaged_;
+  }
+  last_ = now;
+  waiting_.insert(waiting_.end(), bytes.begin(), bytes.end());
+}
+
+std::optional<ModbusRequest> ModbusScanner::next() { return framing_ == ModbusFraming::rtu ? next_rtu() : next_tcp(); }
+
+std::optional<ModbusRequest> ModbusScanner::next_rtu() {
+  const std::size_t length = rtu_length(waiting_);
+  if (length == 0 || waiting_.size() < length) return std::nullopt;
+  const auto end = waiting_.begin() + static_cast<std::ptrdiff_t>(length);
+  const unsigned sent = waiting_[length - 1] * 256u + waiting_[length - 2];
+  if (modbus_crc(std::span(waiting_).first(length - 2)) != sent) {
+    waiting_.clear();
+    ++damaged_;
+    return std::nullopt;
+  }
+  ModbusRequest request{waiting_[0], 0, {waiting_.begin() + 1, end - 2}, {waiting_.begin(), end}};
+  waiting_.erase(waiting_.begin(), end);
+  return request;
+}
+
+std::optional<ModbusRequest> ModbusScanner::next_tcp() {
+  if (broken_ || waiting_.size() < kHeader) return std::nullopt;
+  const std::size_t length = word(waiting_, 4);
+  if (word(waiting_, 2) != 0 || length < 2 || length > kLongestPdu + 1) {
+    broken_ = true;
+    ++damaged_;
+    return std::nullopt;
+  }
+  if (waiting_.size() < kHeader - 1 + length) return std::nullopt;
+  const auto end = waiting_.begin() + static_cast<std::ptrdiff_t>(kHeader - 1 + length);
+  ModbusRequest request{waiting_[6],
+                        static_cast<std::uint16_t>(word(waiting_, 0)),
+                        {waiting_.begin() + static_cast<std::ptrdiff_t>(kHeader), end},
+                        {waiting_.begin(), end}};
+  waiting_.erase(waiting_.begin(), end);
+  return request;
+}
+
+namespace {
+
 enum Function : std::uint8_t { kRead = 0x03, kWriteOne = 0x06, kWriteMany = 0x10 };
 enum Exception : int { kIllegalFunction = 1, kIllegalAddress = 2, kIllegalValue = 3 };
 constexpr std::size_t kFramesKept = 1000;
@@ -12,36 +106,24 @@ constexpr std::uint8_t kGarbage = 0x55;
 constexpr int kLookBytes = 45;        // of an answer with twenty registers
 constexpr double kLongestStep = 1.0;  // s
 
-unsigned word(const std::vector<std::uint8_t>& bytes, std::size_t at) { return bytes[at] * 256u + bytes[at + 1]; }
-
-void append(std::vector<std::uint8_t>& out, unsigned value) {
-  out.push_back(static_cast<std::uint8_t>(value >> 8));
-  out.push_back(static_cast<std::uint8_t>(value));
-}
-
 }  // namespace
 
 SupplySlave::SupplySlave(const SupplySettings& settings)
     : settings_(settings),
       circuit_(settings.circuit),
       registers_(settings.model, settings.serial, settings.disputes, circuit_),
-      random_(settings.seed),
-      used_(settings.faults.size(), 0) {}
-
-void SupplySlave::add_fault(const SupplyFault& fault) {
-  settings_.faults.push_back(fault);
-  used_.push_back(0);
-}
+      script_(settings.faults, settings.seed) {}
 
 double SupplySlave::advance(const SupplyLoad& load, Instant now) {
   double sag = 0;
-  for (std::size_t i = 0; i < used_.size(); ++i) {
-    const SupplyFault& fault = settings_.faults[i];
+  for (std::size_t i = 0; i < script_.size(); ++i) {
+    const SupplyFault& fault = script_[i];
     if (fault.kind == SupplyFaultKind::sag && fault.active(now)) sag += fault.volts;
-    if (used_[i] > 0 || now < fault.at) continue;
+    const bool momentary = fault.kind == SupplyFaultKind::trip || fault.kind == SupplyFaultKind::panel;
+    if (!momentary || now < fault.at || !script_.unused(i)) continue;
+    script_.use(i);
     if (fault.kind == SupplyFaultKind::trip) circuit_.trip(static_cast<SupplyTrip>(fault.code));
     if (fault.kind == SupplyFaultKind::panel) registers_.write(fault.address, fault.value);
-    if (fault.kind == SupplyFaultKind::trip || fault.kind == SupplyFaultKind::panel) ++used_[i];
   }
   circuit_.sag(sag);
   if (now > reached_) circuit_.step(load, std::min(kLongestStep, to_seconds(now - reached_)));
@@ -68,21 +150,13 @@ void SupplySlave::forget(int client) {
 }
 
 bool SupplySlave::closed(Instant now) const noexcept {
-  return std::any_of(settings_.faults.begin(), settings_.faults.end(), [&](const SupplyFault& fault) {
-    return fault.kind == SupplyFaultKind::closed && fault.active(now);
-  });
+  return script_.any_active(now, [](const SupplyFault& fault) { return fault.kind == SupplyFaultKind::closed; });
 }
 
 const SupplyFault* SupplySlave::meet(SupplyFaultKind kind, Instant now) {
-  for (std::size_t i = 0; i < settings_.faults.size(); ++i) {
-    const SupplyFault& fault = settings_.faults[i];
-    if (fault.kind != kind || !fault.active(now, used_[i])) continue;
-    if (fault.p < 1 && 0.5 * (random_.symmetric() + 1) >= fault.p) continue;
-    ++used_[i];
-    ++truth_.faults;
-    return &fault;
-  }
-  return nullptr;
+  const SupplyFault* met = script_.strike(now, [kind](const SupplyFault& fault) { return fault.kind == kind; });
+  if (met != nullptr) ++truth_.faults;
+  return met;
 }
 
 bool SupplySlave::hears(Instant now) { return !closed(now) && meet(SupplyFaultKind::deaf, now) == nullptr; }
@@ -166,7 +240,7 @@ SupplySlave::Pdu SupplySlave::apply(const Pdu& pdu, Instant now) {
 }
 
 std::uint16_t SupplySlave::value_at(std::uint16_t at, std::uint16_t value, Instant now) const {
-  for (const SupplyFault& fault : settings_.faults) {
+  for (const SupplyFault& fault : script_.faults()) {
     if (fault.kind == SupplyFaultKind::reads_as && fault.active(now) && fault.address == at) return fault.value;
   }
   return value;
@@ -179,7 +253,7 @@ SupplySlave::Pdu SupplySlave::read(const Pdu& pdu, Instant now) {
   for (unsigned at = first; at < first + count; ++at) {
     const auto value = at <= 0xFFFF ? registers_.read(static_cast<std::uint16_t>(at)) : std::nullopt;
     if (!value) return refuse(pdu[0], kIllegalAddress);
-    append(out, value_at(static_cast<std::uint16_t>(at), *value, now));
+    append16(out, value_at(static_cast<std::uint16_t>(at), *value, now));
   }
   return out;
 }

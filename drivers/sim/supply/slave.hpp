@@ -1,7 +1,9 @@
-// A simulated bench supply behind Modbus: requests in, replies out, with the faults of a script. Virtual time, seeded,
-// no I/O: the same inputs at the same times give the same bytes.
+// A simulated bench supply behind Modbus: requests in, replies out, with the faults of a script. Frames follow Modbus
+// over serial line 1.02 (RTU) and Modbus messaging on TCP/IP 1.0b, independently of the library that the driver uses.
+// Virtual time, seeded, no I/O: the same inputs at the same times give the same bytes.
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <map>
 #include <optional>
@@ -10,13 +12,50 @@
 #include <utility>
 #include <vector>
 
-#include "base/random.hpp"
+#include "base/clock.hpp"
+#include "drivers/sim/script/faults.hpp"
+#include "drivers/sim/script/script_run.hpp"
 #include "drivers/sim/supply/circuit.hpp"
-#include "drivers/sim/supply/faults.hpp"
-#include "drivers/sim/supply/modbus_frame.hpp"
 #include "drivers/sim/supply/registers.hpp"
 
 namespace kphi::sim {
+
+enum class ModbusFraming : std::uint8_t { rtu, tcp };
+
+/// CRC-16/MODBUS: reflected 0xA001, begins with 0xFFFF; its low byte travels first.
+[[nodiscard]] std::uint16_t modbus_crc(std::span<const std::uint8_t> bytes) noexcept;
+
+struct ModbusRequest {
+  int unit = 0;                   ///< slave address; 0: everybody
+  std::uint16_t transaction = 0;  ///< TCP only
+  std::vector<std::uint8_t> pdu;  ///< function code first; never empty
+  std::vector<std::uint8_t> adu;  ///< the whole frame as it came
+};
+
+[[nodiscard]] std::vector<std::uint8_t> modbus_frame(ModbusFraming framing, int unit, std::uint16_t transaction,
+                                                     std::span<const std::uint8_t> pdu);
+
+class ModbusScanner {
+ public:
+  explicit ModbusScanner(ModbusFraming framing) noexcept : framing_(framing) {}
+  /// RTU: 50 ms of silence end a frame, whole or not.
+  void feed(std::span<const std::uint8_t> bytes, Instant now);
+  [[nodiscard]] std::optional<ModbusRequest> next();
+  /// Frames with a bad CRC, an odd header, or no end.
+  [[nodiscard]] std::uint64_t damaged() const noexcept { return damaged_; }
+  /// TCP: the stream is broken; close it.
+  [[nodiscard]] bool broken() const noexcept { return broken_; }
+
+ private:
+  [[nodiscard]] std::optional<ModbusRequest> next_rtu();
+  [[nodiscard]] std::optional<ModbusRequest> next_tcp();
+
+  ModbusFraming framing_;
+  std::vector<std::uint8_t> waiting_;
+  Instant last_{0};
+  std::uint64_t damaged_ = 0;
+  bool broken_ = false;
+};
 
 struct SupplySettings {
   std::string model = "RD6006";
@@ -36,7 +75,7 @@ struct SupplyReply {
   std::vector<std::uint8_t> bytes;
 };
 
-/// What the slave was told.
+/// Requests and writes that the slave received.
 struct SupplyTruth {
   std::uint64_t requests = 0;  ///< whole, and for this slave
   std::uint64_t exceptions = 0;
@@ -73,7 +112,7 @@ class SupplySlave {
   /// Delay of the whole answer to a request sent now; nullopt: no answer.
   [[nodiscard]] std::optional<Duration> answers(Instant now);
   /// One more fault, from now on.
-  void add_fault(const SupplyFault& fault);
+  void add_fault(const SupplyFault& fault) { script_.add(fault); }
 
   [[nodiscard]] SupplyCircuit& circuit() noexcept { return circuit_; }
   [[nodiscard]] SupplyRegisters& registers() noexcept { return registers_; }
@@ -100,8 +139,7 @@ class SupplySlave {
   SupplySettings settings_;
   SupplyCircuit circuit_;
   SupplyRegisters registers_;
-  Random random_;
-  std::vector<std::uint64_t> used_;  ///< of each fault's count; of an instant: whether it has happened
+  ScriptRun<SupplyFault> script_;
   std::map<int, ModbusScanner> scanners_;
   std::deque<PendingReply> under_way_;
   Instant reached_{0}, last_due_{0}, next_turn_{0};

@@ -58,6 +58,14 @@ Listening listen_at(const std::string& host, int type, std::uint16_t port) {
   return {std::move(socket), ntohs(address.sin_port)};
 }
 
+std::optional<sockaddr_un> unix_address(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.empty() || path.size() >= sizeof address.sun_path) return std::nullopt;
+  std::memcpy(address.sun_path, path.data(), path.size());
+  return address;
+}
+
 Conversations::Conversations(Descriptor listener, const Manners& manners,
                              std::function<Answer(std::string_view)> answer)
     : Conversations(std::move(listener), manners.at_once, [manners, answer = std::move(answer)](std::string& heard) {

@@ -3,12 +3,14 @@
 #pragma once
 
 #include <poll.h>
+#include <sys/un.h>
 
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <list>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,6 +27,9 @@ struct Listening {
 /// Non-blocking; `type`: SOCK_DGRAM (with a large send buffer) or SOCK_STREAM; port 0: any free one. `host`: IPv4 name
 /// or address. Throws DeviceError.
 [[nodiscard]] Listening listen_at(const std::string& host, int type, std::uint16_t port);
+
+/// nullopt: the path is empty or longer than a socket path may be.
+[[nodiscard]] std::optional<sockaddr_un> unix_address(const std::string& path);
 
 class Conversations {
  public:

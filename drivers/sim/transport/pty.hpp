@@ -11,12 +11,12 @@
 
 namespace kphi::sim {
 
-/// Both ends raw. The slave stays open here, so that a client's close is no error on this side.
+/// Both ends raw. The slave stays open here, so that a client may close its end without an error on this one.
 class Pty {
  public:
   /// `device`: a symlink to create (with its folder); replaces an older symlink, nothing else. Empty: none.
   /// Throws DeviceError.
-  /// `baud`: at which the other end stands until its client says otherwise.
+  /// `baud`: rate of the other end until its client sets one.
   explicit Pty(const std::string& device, unsigned baud = 115200);
   ~Pty();  ///< removes the symlink, if it is still ours
   Pty(const Pty&) = delete;
@@ -30,8 +30,8 @@ class Pty {
   [[nodiscard]] std::size_t write(std::span<const std::uint8_t> bytes) noexcept;
   /// Rate at which the client has set its end, bits per second; 0: one without a number.
   [[nodiscard]] unsigned baud() const noexcept;
-  /// Pulls the adapter: the client sees a hang-up, the link is gone. Its number stays taken, so that no other bench gets a
-  /// number whose lock the client still holds.
+  /// Pulls the adapter: the client sees a hang-up, and the link disappears. Its number stays taken, so that no other
+  /// bench gets a number whose lock the client still holds.
   void unplug() noexcept;
   /// Another pseudo-terminal under the same link. Throws DeviceError.
   void plug();

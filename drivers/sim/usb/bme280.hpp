@@ -1,5 +1,5 @@
 // A simulated BME280 on an I²C bus, from the tables of the data sheet (BST-BME280-DS002): registers, modes, and the raw
-// values that a given air would have left in them. No I/O; told the time.
+// values that a given air would have left in them. No I/O; the caller passes the time.
 #pragma once
 
 #include <array>

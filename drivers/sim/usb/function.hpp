@@ -1,11 +1,16 @@
-// A simulated USB device: what it is and how it answers, without a bus.
+// A simulated USB device without a bus: what it is, how it answers, and the faults that strike it.
 #pragma once
 
 #include <cstdint>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
+
+#include "base/clock.hpp"
+#include "drivers/sim/script/faults.hpp"
+#include "drivers/sim/script/script_run.hpp"
 
 namespace kphi::sim {
 
@@ -49,6 +54,28 @@ class UsbFunction {
   /// Asked again and again while it has nothing yet, until the host gives up.
   virtual UsbAnswer in(std::uint8_t endpoint, std::size_t at_most) = 0;
   virtual void halt_cleared(std::uint8_t endpoint) { (void)endpoint; }
+};
+
+/// A script in progress. Thread-safe.
+class UsbFaults {
+ public:
+  /// `clock` must outlive this.
+  explicit UsbFaults(const Clock& clock, UsbFaultScript script = {}) : clock_(clock), script_(std::move(script), 1) {}
+
+  /// The fault of this kind (and of this register) that is active now, if any; counts it.
+  [[nodiscard]] std::optional<UsbFault> strikes(UsbFaultKind kind, int at_register = -1);
+  /// The same without counting it.
+  [[nodiscard]] bool active(UsbFaultKind kind) const;
+  /// Windows during which the device is pulled out, in order.
+  [[nodiscard]] UsbFaultScript unplugged() const;
+  void set(UsbFaultScript script);
+  [[nodiscard]] Instant now() const noexcept { return clock_.now(); }
+  [[nodiscard]] const Clock& clock() const noexcept { return clock_; }
+
+ private:
+  const Clock& clock_;
+  mutable std::mutex mutex_;
+  ScriptRun<UsbFault> script_;
 };
 
 }  // namespace kphi::sim

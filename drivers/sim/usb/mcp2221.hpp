@@ -7,8 +7,8 @@
 #include <mutex>
 #include <vector>
 
+#include "drivers/sim/script/faults.hpp"
 #include "drivers/sim/usb/bme280.hpp"
-#include "drivers/sim/usb/faults.hpp"
 #include "drivers/sim/usb/function.hpp"
 
 namespace kphi::sim {

@@ -218,7 +218,7 @@ TEST(CoefficientFile, IsRefusedWhenTheThrustCoefficientIsNotPositive) {
 }
 
 TEST(CoefficientFile, IsRefusedWhenAKeyIsGivenTwice) {
-  EXPECT_THAT(refusal_of(kGood + "k_unit: N/RPM^2\n"), HasSubstr("second time"));
+  EXPECT_THAT(refusal_of(kGood + "k_unit: N/RPM^2\n"), HasSubstr("`k_unit` is given twice; keep one"));
   EXPECT_THAT(refusal_of(with(kGood, "  intercept:", "  intercept: 1.0\n  intercept:")), StartsWith("c.yaml:11: "));
 }
 
@@ -232,6 +232,18 @@ TEST(CoefficientFile, IsRefusedWhenARangeIsNoRange) {
   for (const char* bad : {"[270.0, 0.0]", "[0.0]", "[0.0, 400.0]", "[-5.0, 270.0]", "270.0", "[]", "[0.0, .nan]"}) {
     EXPECT_THAT(refusal_of(with(kGood, "[0.0, 270.0]", bad)), StartsWith("c.yaml:14: ")) << bad;
   }
+}
+
+TEST(CoefficientFile, HoldsOcclusionsOfOneTurnAtMost) {
+  EXPECT_EQ(parse_coefficients(with(kGood, "[0.0, 270.0]", "[0.0, 360.0]"), "c.yaml").curve.largest_fitted(),
+            from_degrees(360));
+  EXPECT_THAT(refusal_of(with(kGood, "[0.0, 270.0]", "[0.0, 360.1]")), HasSubstr("at most 360"));
+}
+
+TEST(CoefficientFile, HoldsAnAnchoredLineToOnePartInAMillion) {
+  const std::string anchored = with(kGood, "anchored: false", "anchored: true");
+  EXPECT_TRUE(parse_coefficients(with(anchored, "1.6e-06", "1.550001e-06"), "c.yaml").anchored);
+  EXPECT_THAT(refusal_of(with(anchored, "1.6e-06", "1.550003e-06")), HasSubstr("its intercept is not K_T"));
 }
 
 TEST(CoefficientFile, IsRefusedWhenTheCovarianceHasAnotherShape) {

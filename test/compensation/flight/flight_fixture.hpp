@@ -1,7 +1,7 @@
 // The foldable drone and its controller, and a line as a bench finds it: a little off the paper's.
 #pragma once
 
-#include "compensation/flight/draw.hpp"
+#include "compensation/flight/study.hpp"
 #include "test/compensation/example_vehicle.hpp"
 
 namespace kphi::flight {

@@ -1,5 +1,3 @@
-#include "compensation/flight/paper.hpp"
-
 #include <gtest/gtest.h>
 
 #include "compensation/flight/tables.hpp"

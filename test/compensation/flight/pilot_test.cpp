@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "compensation/flight/random.hpp"
+#include "compensation/flight/noise.hpp"
 #include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {

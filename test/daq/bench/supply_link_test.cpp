@@ -1,34 +1,15 @@
-#include "daq/bench/supply_link.hpp"
-
 #include <gtest/gtest.h>
 
 #include <stdexcept>
 
+#include "daq/guard/interlock.hpp"
+#include "test/daq/queue_bench.hpp"
+
 namespace kphi::daq {
 namespace {
 
-class FakeSupply final : public SupplyLink {
- public:
-  [[nodiscard]] std::string identity() const override { return "fake"; }
-  std::size_t take(std::span<results::SupplyReading>) override { return 0; }
-  [[nodiscard]] std::string failure() const override { return ""; }
-  void cut() noexcept override { on = false; }
-  [[nodiscard]] std::string switch_off() noexcept override {
-    on = false;
-    return "";
-  }
-  bool on = false;
-  bool refuses = false;
-
- private:
-  void switch_on() override {
-    on = true;
-    if (refuses) throw std::runtime_error("no");
-  }
-};
-
 TEST(OutputEnable, HoldsThePowerWhileItLives) {
-  FakeSupply supply;
+  QueueSupply supply;
   {
     const OutputEnable powered(supply);
     EXPECT_TRUE(supply.on);
@@ -37,7 +18,7 @@ TEST(OutputEnable, HoldsThePowerWhileItLives) {
 }
 
 TEST(OutputEnable, SwitchesOffOnTheWayOutOfAnException) {
-  FakeSupply supply;
+  QueueSupply supply;
   try {
     const OutputEnable powered(supply);
     throw std::runtime_error("something else");
@@ -47,10 +28,59 @@ TEST(OutputEnable, SwitchesOffOnTheWayOutOfAnException) {
 }
 
 TEST(OutputEnable, SwitchesOffWhenSwitchingOnFailsHalfway) {
-  FakeSupply supply;
+  QueueSupply supply;
   supply.refuses = true;
   EXPECT_THROW(OutputEnable{supply}, std::runtime_error);
   EXPECT_FALSE(supply.on);
+}
+
+/// A motor at a supply that kphi controls.
+struct PoweredMotor {
+  QueueSupply supply;
+  QueueMotor motor;
+  ManualClock clock;
+};
+
+TEST(MotorPower, GoesOffOnlyOnceTheMotorsLinkIsClosedAndComesBackBeforeTheLink) {
+  PoweredMotor bench;
+  MotorPower power(&bench.supply);
+  EXPECT_TRUE(bench.supply.on);
+  EXPECT_TRUE(power.off(bench.motor));
+  EXPECT_EQ(bench.motor.rests, 1);
+  EXPECT_FALSE(bench.supply.on);
+  power.restore(bench.motor, bench.clock, [&] {
+    EXPECT_TRUE(bench.supply.on);
+    EXPECT_EQ(bench.motor.wakes, 0);
+  });
+  EXPECT_EQ(bench.motor.wakes, 1);
+}
+
+TEST(MotorPower, ThatIsNotConfirmedOffIsASafetyStop) {
+  PoweredMotor bench;
+  MotorPower power(&bench.supply);
+  bench.supply.unconfirmed = kNotOff;
+  EXPECT_THROW((void)power.off(bench.motor), SafetyStop);
+}
+
+TEST(MotorPower, ComesBackToNoBenchWhoseComputerSlept) {
+  PoweredMotor bench;
+  MotorPower power(&bench.supply);
+  (void)power.off(bench.motor);
+  bench.clock.suspend(std::chrono::milliseconds(200));
+  EXPECT_THROW(power.restore(bench.motor, bench.clock), SafetyStop);
+  EXPECT_FALSE(bench.supply.on);
+}
+
+TEST(MotorPower, OfAnotherSupplyStaysOnAndOnlyALostModuleIsConnectedAgain) {
+  PoweredMotor bench;
+  MotorPower power(nullptr);
+  EXPECT_FALSE(power.off(bench.motor));
+  EXPECT_EQ(bench.motor.rests, 0);
+  power.restore(bench.motor, bench.clock);
+  EXPECT_EQ(bench.motor.wakes, 0);
+  bench.motor.lost = "its power was cut";
+  power.restore(bench.motor, bench.clock);
+  EXPECT_EQ(bench.motor.wakes, 1);
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 
 #include "daq/campaign/campaign_run.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
-#include "results/campaign_verification.hpp"
+#include "results/campaign_state.hpp"
 #include "results/journal.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/reduction/repetitions.hpp"
@@ -22,19 +22,6 @@ using nlohmann::json;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-/// Keeps what is said, and calls `then` with it.
-class Said final : public Progress {
- public:
-  void tick(const Position&, const Observation&) override {}
-  void step_done(const Position&, const Observation&) override {}
-  void say(const std::string& line) override {
-    lines.push_back(line);
-    if (then) then(line);
-  }
-  std::vector<std::string> lines;
-  std::function<void(const std::string&)> then;
-};
 
 /// Remembers what it was asked to mount; decides as it was told, the last decision again and again.
 class ScriptedOperator final : public Operator {
@@ -120,7 +107,7 @@ class OrderedCampaign : public testing::Test {
   std::unique_ptr<DeterministicBench> bench_ = std::make_unique<DeterministicBench>(config_);
   results::CampaignFolder results_ = results::CampaignFolder::create(folder_.path(), "20210530T000000Z", "ordered");
   ScriptedOperator person_;
-  Said said_;
+  test::SaidLines said_;
 };
 
 std::vector<double> speeds_rpm(const std::filesystem::path& run) {
@@ -187,7 +174,7 @@ TEST_F(OrderedCampaign, UpAndDownTellsTheHysteresisOfEachRun) {
   EXPECT_EQ(told[0].at("run"), "5x3_phi000_rep1.h5");
   EXPECT_EQ(told[0].at("speeds").size(), 3u);
   EXPECT_LT(std::abs(told[0].at("share_of_k").get<double>()), 0.003) << "the simulated propeller has none";
-  EXPECT_THAT(said_.lines, Contains(HasSubstr("5x3_phi000_rep1.h5: thrust going up less that going down: ")));
+  EXPECT_THAT(said_.lines, Contains(HasSubstr("5x3_phi000_rep1.h5: thrust going up minus going down: ")));
   expect_whole_and_replayable(both);
 }
 

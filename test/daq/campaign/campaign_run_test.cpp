@@ -4,7 +4,7 @@
 
 #include "base/error.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
-#include "results/campaign_verification.hpp"
+#include "results/campaign_state.hpp"
 #include "results/journal.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
@@ -125,7 +125,7 @@ TEST_F(ShortCampaign, DoesNotSayThatTheClockIsUncheckedWhenItsGainIsKnown) {
 TEST_F(ShortCampaign, KeepsWhatTheModuleToldOfItselfInEveryRun) {
   (void)run(test::short_campaign("0, 90", 1, 3));
   for (const auto& file : results_.complete_runs()) {
-    EXPECT_THAT(results::read_header(file).motor_parameters,
+    EXPECT_THAT(results::read_run(file).header.motor_parameters,
                 AllOf(HasSubstr("brushless_drive.volts_limit: "), HasSubstr("uid: \"002300064d4b501120343353\"\n")));
   }
 }

@@ -8,7 +8,7 @@
 #include "base/error.hpp"
 #include "daq/campaign/campaign_run.hpp"
 #include "daq/virtual/per_run_bench.hpp"
-#include "results/campaign_verification.hpp"
+#include "results/campaign_state.hpp"
 #include "results/journal.hpp"
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
@@ -31,14 +31,6 @@ class StoppingOperator final : public Operator {
   double refuse_at_deg = -1;
 };
 
-class QueryResult final : public Progress {
- public:
-  void tick(const Position&, const Observation&) override {}
-  void step_done(const Position&, const Observation&) override {}
-  void say(const std::string& line) override { lines.push_back(line); }
-  std::vector<std::string> lines;
-};
-
 /// Run files and tables: name → bytes.
 std::map<std::string, std::string> measured_in(const results::CampaignFolder& folder) {
   std::map<std::string, std::string> files;
@@ -55,7 +47,7 @@ class Resume : public testing::Test {
   }
   CampaignResult resume(bool accept_changes = false) {
     person_ = {};
-    said_ = {};
+    said_.lines.clear();
     return resume_with(inspect(results_, accept_changes));
   }
   CampaignResult resume_with(const Resumption& resumption) {
@@ -96,7 +88,7 @@ class Resume : public testing::Test {
   profiles::Campaign campaign_ = test::short_campaign("0, 90, 180", 2, 2);
   results::CampaignFolder results_ = results::CampaignFolder::create(folder_.path(), "20210530T000000Z", "short");
   StoppingOperator person_;
-  QueryResult said_;
+  test::SaidLines said_;
 };
 
 TEST_F(Resume, GoesOnAtTheFirstUnfinishedRunAndGivesTheBytesOfACampaignThatWasNeverStopped) {
@@ -242,12 +234,14 @@ void retell(const fs::path& path, const char* key, const std::string& value) {
   }
 }
 
-TEST_F(Resume, RefusesAnotherProgramMotorOrLoadCellAndNamesBoth) {
+TEST_F(Resume, RefusesAnotherProgramMotorLoadCellOrSupplyAndNamesBoth) {
+  config_ = test::with_supply(config_);
   stop_before(90);
   const std::string journal = test::bytes_of(results_.journal());
   for (const auto& [key, words] :
        std::map<const char*, std::string>{{"tool_version", "the program is \""},
                                           {"motor", "the motor module is \""},
+                                          {"supply", "the supply is \"simulated supply\""},
                                           {"load_cell", "the load cell is \"calibration "}}) {
     std::ofstream(results_.journal(), std::ios::trunc) << journal;
     retell(results_.journal(), key, "another");
@@ -266,7 +260,7 @@ TEST_F(Resume, NeverAcceptsAChangedOrMissingRun) {
   std::ofstream(run_file(0, 1), std::ios::app) << '\0';
   fs::remove(run_file(0, 2));
   const std::string why = refusal<DataRejected>(true);
-  EXPECT_THAT(why, AllOf(HasSubstr("phi000_rep1.h5: is not the file"), HasSubstr("phi000_rep2.h5: is missing")));
+  EXPECT_THAT(why, AllOf(HasSubstr("phi000_rep1.h5: SHA-256 does not match"), HasSubstr("phi000_rep2.h5: missing")));
 }
 
 TEST_F(Resume, RefusesAChangedJournal) {
@@ -307,7 +301,7 @@ TEST_F(Resume, LeavesFinishedRunsReadOnlyAndVerifyRemarksWhatIsNot) {
   fs::permissions(run_file(90, 1), fs::perms::owner_write, fs::perm_options::add);
   const auto found = results::verify_campaign(results_);
   EXPECT_TRUE(found.whole());
-  EXPECT_THAT(found.remarks, ElementsAre(HasSubstr("5x3_phi090_rep1.h5: is writable")));
+  EXPECT_THAT(found.remarks, ElementsAre(HasSubstr("5x3_phi090_rep1.h5: writable")));
 }
 
 }  // namespace

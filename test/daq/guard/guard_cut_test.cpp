@@ -24,11 +24,6 @@ class GuardsCut : public testing::Test {
     while (clock().now() < milliseconds(3000)) bench_.wait_until(clock().now() + milliseconds(1));
     bench_.spoilt_motor.is_deaf = true;
   }
-  static profiles::BenchConfig powered_config() {
-    profiles::BenchConfig config = test::deterministic_config(4);
-    config.supply = profiles::SupplyConfig{"modbus-rtu:/dev/null", Volts(12), Amperes(50), Volts(13.5), Amperes(60)};
-    return config;
-  }
   [[nodiscard]] const Clock& clock() const { return bench_.clock(); }
   [[nodiscard]] double winding_amps() { return std::abs(bench_.bench.simulation().plant().motor().motor_amps); }
   [[nodiscard]] bool is_on() { return bench_.bench.simulation().supply()->circuit().output(); }
@@ -40,7 +35,7 @@ class GuardsCut : public testing::Test {
     }
   }
 
-  const profiles::BenchConfig config_ = powered_config();
+  const profiles::BenchConfig config_ = test::with_supply(test::deterministic_config(4));
   const profiles::Campaign campaign_ = test::short_campaign();
   CoastingBench bench_{config_};
   results::LoadCellScale scale_;

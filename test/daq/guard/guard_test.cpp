@@ -122,6 +122,44 @@ TEST_F(GuardAlone, TripsAtValuesThatAreNoNumbers) {
   EXPECT_THAT(reason(), StartsWith("speed"));
 }
 
+TEST_F(GuardAlone, TripsAtOverSpeedWhicheverWayTheRotorTurns) {
+  for (const double sign : {+1.0, -1.0}) {
+    Guard guard(bench_, config_, mini40(), combine_limits(campaign_, config_));
+    reading(MotorChannel::speed, sign * 2000);
+    guard.poll();
+    EXPECT_EQ(guard.latch().trip(), nullptr);
+    reading(MotorChannel::speed, sign * 2150);
+    guard.poll();
+    ASSERT_NE(guard.latch().trip(), nullptr) << sign;
+    EXPECT_EQ(guard.latch().trip()->watched, Watched::speed);
+  }
+}
+
+TEST_F(GuardAlone, TripsAtTheLeastDeratingButNotAtOneCountOfTheModule) {
+  reading(MotorChannel::derate, 1 - 1.0 / 65536);
+  guard_.poll();
+  EXPECT_EQ(reason(), "");
+  reading(MotorChannel::derate, 0.999);
+  guard_.poll();
+  EXPECT_THAT(reason(), StartsWith("motor: the module derates to 100 %"));
+}
+
+TEST_F(GuardAlone, JudgesNoSupplyReadingFromBeforeTheRun) {
+  QueueSupply supply;
+  bench_.supply_link = &supply;
+  config_ = test::with_supply(config_);
+  const results::SupplyReading off{1, 0, 0, 0, 12, 50, {}, results::SupplyProtection::over_current, 0};
+  supply.readings.assign(100, off);
+  Guard guard(bench_, config_, mini40(), combine_limits(campaign_, config_));
+  guard.poll();
+  EXPECT_EQ(guard.latch().trip(), nullptr);
+  supply.readings.push_back(off);
+  guard.poll();
+  ASSERT_NE(guard.latch().trip(), nullptr);
+  EXPECT_EQ(guard.latch().trip()->protection, results::SupplyProtection::over_current);
+  EXPECT_EQ(supply.cuts, 1);
+}
+
 TEST_F(GuardAlone, TripsAtAnyFaultThatTheModuleReports) {
   reading(MotorChannel::fault_now, 0);
   guard_.poll();

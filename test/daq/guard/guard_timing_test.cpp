@@ -99,7 +99,7 @@ class GuardTiming : public testing::TestWithParam<Case> {
     std::ofstream(script) << "format: kphi-faults/1\nfaults:" << (*tested.faults ? "\n" : " []\n") << tested.faults;
     profiles::BenchConfig config = test::deterministic_config(4, script.string());
     if (tested.with_supply) {
-      config.supply = profiles::SupplyConfig{"modbus-rtu:/dev/null", Volts(12), Amperes(50), Volts(13.5), Amperes(60)};
+      config = test::with_supply(config);
       campaign_.profile.dwell = Seconds(1.2);
     }
     if (tested.tighten) tested.tighten(campaign_);

@@ -1,10 +1,9 @@
-#include "daq/guard/motor_enable.hpp"
-
 #include <gtest/gtest.h>
 
 #include <stdexcept>
 #include <type_traits>
 
+#include "daq/guard/guard.hpp"
 #include "test/daq/bench_fixture.hpp"
 #include "test/daq/queue_bench.hpp"
 

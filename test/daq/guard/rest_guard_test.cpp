@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daq/guard/interrupt.hpp"
+#include "daq/guard/run_stopped.hpp"
 #include "test/daq/queue_bench.hpp"
 
 namespace kphi::daq {
@@ -42,20 +42,6 @@ class RestingBench final : public Bench {
   SupplyLink* supply_link = nullptr;
   std::function<double()> speed;
   std::function<void()> work;
-};
-
-class ShownSupply final : public SupplyLink {
- public:
-  [[nodiscard]] std::string identity() const override { return "test"; }
-  std::size_t take(std::span<results::SupplyReading> out) override { return move_out(readings, out); }
-  [[nodiscard]] std::string failure() const override { return {}; }
-  void cut() noexcept override { ++cuts; }
-  [[nodiscard]] std::string switch_off() noexcept override { return {}; }
-  std::deque<results::SupplyReading> readings;
-  int cuts = 0;
-
- private:
-  void switch_on() override {}
 };
 
 std::string reason_of(const std::function<void()>& act) {
@@ -127,7 +113,7 @@ class AtAPrompt : public testing::Test {
 
   double speed_ = 0;
   RestingBench bench_;
-  ShownSupply supply_;
+  QueueSupply supply_;
   std::optional<RestGuard> guard_;
 };
 
@@ -171,11 +157,15 @@ TEST_F(AtAPrompt, AModuleWhosePowerAPersonHasCutIsNoTrip) {
   EXPECT_EQ(reason(), "");
 }
 
-TEST_F(AtAPrompt, AnOutputThatComesOnUnaskedTrips) {
+TEST_F(AtAPrompt, AnOutputThatComesOnUnaskedTripsButNoReadingFromBefore) {
   guard_.emplace(bench_, false);
   results::SupplyReading on;
-  on.time_ns = bench_.queues.time.now().count() + 1;
+  on.time_ns = bench_.queues.time.now().count() - 1;
   on.output = 1;
+  supply_.readings.push_back(on);
+  pass();
+  EXPECT_EQ(reason(), "");
+  on.time_ns = bench_.queues.time.now().count() + 1;
   supply_.readings.push_back(on);
   pass();
   EXPECT_THAT(reason(), HasSubstr("output is on while somebody may be near"));

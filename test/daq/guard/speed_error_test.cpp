@@ -184,6 +184,16 @@ TEST(SpeedWatch, FindsAStalledMotorByItsCurrentWhereTheSpeedTellsNothing) {
   EXPECT_THAT(to_words(rotor.watch.error()), HasSubstr("stalled for 0.16 s: 30 A at 0 of 100 RPM"));
 }
 
+TEST(SpeedWatch, FindsAStalledMotorWhicheverWayItsCurrentFlows) {
+  Watched rotor(-1);
+  rotor.command(10.5);
+  for (int i = 0; i < 2; ++i) {
+    rotor.show(0, 8);
+    rotor.show_current(-30);
+  }
+  EXPECT_EQ(rotor.kind(), Kind::stalled);
+}
+
 TEST(SpeedWatch, AllowsTheCurrentOfARotorThatTurns) {
   Watched rotor;
   rotor.command(kTop);

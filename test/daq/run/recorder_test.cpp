@@ -36,6 +36,10 @@ TEST_F(Recording, WritesAllThatCameInTheOrderItCame) {
   recorder_.drain();
   EXPECT_TRUE(bench_.records.empty());
   EXPECT_EQ(writer_.samples(), 20'000u);
+  writer_.sync();
+  const auto written = results::read_run(writer_.path()).load_cell;
+  ASSERT_EQ(written.size(), 20'000u);
+  for (int i = 0; i < 20'000; ++i) ASSERT_EQ(written[static_cast<std::size_t>(i)].counts[2], i);
 }
 
 TEST_F(Recording, WarnsOnceNearARangeAndOnceBeyondIt) {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "daq/guard/interlock.hpp"
-#include "daq/guard/interrupt.hpp"
+#include "daq/guard/run_stopped.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
@@ -35,13 +35,7 @@ class OneRun : public testing::Test {
   [[nodiscard]] std::filesystem::path file() const { return folder_.path() / "5x3_phi000_rep1.h5"; }
   [[nodiscard]] std::filesystem::path aborted_file() const { return folder_.path() / "5x3_phi000_rep1.aborted.h5"; }
 
-  /// True when the simulated motor is neither driven nor driven up again within the next second.
-  bool motor_is_let_go() {
-    const double before = std::abs(bench_.simulation().plant().motor().speed);
-    bench_.wait_until(bench_.clock().now() + std::chrono::seconds(1));
-    const double after = std::abs(bench_.simulation().plant().motor().speed);
-    return after < 1.0 || after < 0.7 * before;
-  }
+  bool motor_is_let_go() { return test::motor_is_let_go(bench_); }
 
   test::TemporaryFolder folder_;
   profiles::Campaign campaign_ = test::short_campaign();

@@ -1,9 +1,8 @@
-#include "drivers/ambient/bme280_sensor.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/error.hpp"
+#include "drivers/ambient/bme280.hpp"
 #include "test/drivers/ambient/fake_bridge.hpp"
 
 namespace kphi::ambient {

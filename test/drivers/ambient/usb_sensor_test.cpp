@@ -7,7 +7,7 @@
 
 #include "base/random.hpp"
 #include "drivers/ambient/ambient_worker.hpp"
-#include "drivers/ambient/bme280_sensor.hpp"
+#include "drivers/ambient/bme280.hpp"
 #include "drivers/ambient/source.hpp"
 #include "drivers/sim/usb/mcp2221.hpp"
 #include "drivers/usb/bus.hpp"

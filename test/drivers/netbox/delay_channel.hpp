@@ -81,9 +81,9 @@ class Errors {
 inline Quality quality_of(Channel& channel, ClockEstimate& estimate, double seconds) {
   Errors errors;
   for (Channel::Sample sample = channel.next(); sample.true_s < seconds; sample = channel.next()) {
-    estimate.add(sample.ft, sample.arrival);
+    const Duration late = estimate.add(sample.ft, sample.arrival);
     if (sample.true_s < 30) continue;
-    const double told = to_seconds(estimate.host_time(sample.ft) - std::chrono::seconds(100));
+    const double told = to_seconds(sample.arrival - late - std::chrono::seconds(100));
     errors.add(1e6 * (told - sample.true_s - Channel::kLeastDelay));
   }
   return errors.quality();

@@ -33,7 +33,7 @@ TEST(Load, BesideTwoBusyLoopsNothingIsLostAndNothingIsOld) {
   const BoxProcess box({});
   const BusyLoops busy(2);
   const SteadyClock clock;
-  Driver driver(box.ports(), clock, true);
+  Driver driver(box.ports(), clock);
   driver.keep_ages = true;
   const Cost cost = driver.run(3, Driver::Consumer::waits);
   EXPECT_EQ(cost.lost, 0u);

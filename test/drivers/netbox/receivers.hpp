@@ -67,8 +67,8 @@ class BareReceiver {
  public:
   BareReceiver(const Ports& ports, bool buffered) : socket_("127.0.0.1", ports.rdt) {
     const int off = 0;
-    setsockopt(socket_.native_handle(), SOL_SOCKET, SO_TIMESTAMPNS, &off, sizeof off);
-    setsockopt(socket_.native_handle(), SOL_SOCKET, SO_RXQ_OVFL, &off, sizeof off);
+    setsockopt(socket_.descriptor(), SOL_SOCKET, SO_TIMESTAMPNS, &off, sizeof off);
+    setsockopt(socket_.descriptor(), SOL_SOCKET, SO_RXQ_OVFL, &off, sizeof off);
     for (unsigned i = 0; i < kBatch; ++i) {
       vectors_[i] = {bytes_[i].data(), bytes_[i].size()};
       headers_[i].msg_hdr.msg_iov = &vectors_[i];
@@ -99,7 +99,7 @@ class BareReceiver {
     socket_.send(bytes);
   }
   std::uint64_t drain(std::chrono::nanoseconds sleep_time) {
-    pollfd readable{socket_.native_handle(), POLLIN, 0};
+    pollfd readable{socket_.descriptor(), POLLIN, 0};
     poll(&readable, 1, 1000);
     if (sleep_time.count() > 0) {
       const timespec time{0, sleep_time.count()};
@@ -107,7 +107,7 @@ class BareReceiver {
     }
     std::uint64_t records = 0;
     for (int count = kBatch; count == kBatch;) {
-      count = recvmmsg(socket_.native_handle(), headers_.data(), kBatch, MSG_DONTWAIT, nullptr);
+      count = recvmmsg(socket_.descriptor(), headers_.data(), kBatch, MSG_DONTWAIT, nullptr);
       for (int i = 0; i < count; ++i) records += swap(static_cast<std::size_t>(i));
     }
     return records;
@@ -133,10 +133,7 @@ class Driver {
  public:
   enum class Consumer { waits, polls };  ///< polls: takes every 5 ms, as a recorder does
 
-  Driver(const Ports& ports, const Clock& clock, bool buffered, HandOver hand_over = HandOver::as_asked)
-      : clock_(clock),
-        cell_({"127.0.0.1", ports.rdt, ports.http}, clock, buffered ? Command::buffered : Command::real_time,
-              {.hand_over = hand_over}) {
+  Driver(const Ports& ports, const Clock& clock) : clock_(clock), cell_({"127.0.0.1", ports.rdt, ports.http}, clock) {
     const std::set<int> before = threads_of_this_process();
     cell_.start();
     for (const int id : threads_of_this_process())
@@ -202,7 +199,7 @@ class Driver {
 };
 
 inline constexpr double kHasteHz = 200'000;
-inline constexpr std::chrono::nanoseconds kBareNap = std::chrono::milliseconds(2);  // HandOver::gathered
+inline constexpr std::chrono::nanoseconds kBareNap = std::chrono::milliseconds(2);  // as the driver gathers
 
 struct Pair {
   Cost bare, driver;
@@ -218,7 +215,7 @@ inline std::optional<Pair> measure_pair(const BoxProcess& box, bool buffered, do
     pair.bare = bare.run(seconds, kBareNap);
   }
   const SteadyClock clock(kHasteHz / 7000);
-  Driver driver(box.ports(), clock, buffered, HandOver::gathered);
+  Driver driver(box.ports(), clock);
   pair.driver = driver.run(seconds, Driver::Consumer::waits);
   const auto kept = [](const Cost& cost) { return std::abs(cost.rate_hz() / kHasteHz - 1) < 0.03; };
   if (!kept(pair.bare) || !kept(pair.driver)) return std::nullopt;

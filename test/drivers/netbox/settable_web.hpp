@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/netbox/configuration/address.hpp"
+#include "drivers/netbox/configuration/configuration.hpp"
 #include "test/drivers/netbox/fake_box.hpp"
 
 namespace kphi::netbox::test {

@@ -34,7 +34,7 @@ void be_the_reader(const Pipe& orders, const Pipe& reports) {
   Ports ports{};
   if (!orders.get(ports)) return;
   const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", ports.rdt, ports.http}, clock, Command::real_time);
+  LoadCell cell({"127.0.0.1", ports.rdt, ports.http}, clock);
   cell.start();
   if (!eventually([&] { return cell.counters().received >= 1000; })) return;
   const std::string note = cell.receive_buffer_note();
@@ -78,7 +78,7 @@ TEST(Standstill, AConsumerThatStandsStillForFiveSecondsLosesNothing) {
   FakeWeb web(FakeWeb::page(streaming_xml(1)));
   FakeBox box({.records_per_datagram = 1});
   const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock, Command::real_time);
+  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
   cell.start();
   ASSERT_TRUE(eventually([&] { return cell.counters().received >= 35'000; }));
   cell.stop();

@@ -1,4 +1,4 @@
-// Commands beyond start and stop: multi-unit mode, and the latch of the monitor conditions.
+// The latch of the monitor conditions, which another client resets.
 #include <gtest/gtest.h>
 
 #include "drivers/netbox/wire/status.hpp"
@@ -8,13 +8,6 @@ namespace kphi::netbox::test {
 namespace {
 
 using namespace std::chrono_literals;
-
-StreamSettings multi_unit() {
-  StreamSettings settings;
-  settings.buffered = false;
-  settings.multi_unit = true;
-  return settings;
-}
 
 /// A session on a simulated box, without faults; one thread, virtual time.
 struct Wired {
@@ -42,33 +35,16 @@ struct Wired {
   std::int64_t tick = 0;
 };
 
-TEST(MultiUnit, StreamsLikeRealTimeMode) {
-  Wired wired({}, multi_unit());
-  wired.run(1000);
-  EXPECT_EQ(wired.session.state(), State::streaming);
-  EXPECT_GT(wired.session.counters().received, 900u);
-  EXPECT_EQ(wired.session.counters().datagrams, wired.session.counters().received);
-  EXPECT_EQ(wired.session.counters().lost_network, 0u);
-}
-
-TEST(MultiUnit, ABoxThatDoesNotKnowItIsAFailureInTime) {
-  sim::NetBoxSettings box;
-  box.quirks.command_four_streams = false;
-  Wired wired(box, multi_unit());
-  wired.run(5 * 7000);
-  EXPECT_EQ(wired.session.state(), State::failed);
-  EXPECT_TRUE(wired.out.empty());
-}
-
 TEST(MonitorConditions, AShortPeakBetweenTwoRecordsStaysKnownUntilTheLatchIsReset) {
   sim::NetBoxSettings box;
   box.rate_hz = 10;
+  box.records_per_datagram = 1;
   box.monitoring = true;
   box.conditions[3].enabled = true;
   box.conditions[3].axis = 2;
   box.conditions[3].counts = 30'000'000;  // Fz > 30 N
   StreamSettings stream;
-  stream.buffered = false;
+  stream.records_per_datagram = 1;
   stream.divisor = 700;
   Wired wired(box, stream);
   wired.run(7000);
@@ -78,7 +54,7 @@ TEST(MonitorConditions, AShortPeakBetweenTwoRecordsStaysKnownUntilTheLatchIsRese
   EXPECT_EQ(wired.newest_status(), 0x80010000u);
   EXPECT_TRUE(has(wired.newest_status(), StatusBit::monitor_condition));
   EXPECT_LT(wired.out.back().record.counts[2], 1'000'000) << "the records themselves have not seen it";
-  wired.session.reset_latch();
+  wired.wire.request(encode_request(Command::reset_latch), 8, Instant(wired.tick * 1'000'000 / 7));
   wired.run(1400);
   EXPECT_EQ(wired.newest_status(), 0u);
 }

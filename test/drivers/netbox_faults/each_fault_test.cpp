@@ -8,7 +8,7 @@
 #include <map>
 #include <optional>
 
-#include "drivers/sim/netbox/faults.hpp"
+#include "drivers/sim/script/faults.hpp"
 #include "test/drivers/netbox_faults/joined.hpp"
 
 namespace kphi::netbox::test {
@@ -320,7 +320,7 @@ TEST_P(EachFault, SaturationIsInTheRecords) {
     ASSERT_EQ(r.record.status == 0x80020000u, r.record.counts[2] == 60'000'000);
 }
 
-/// Of a finite request, as a client with a lease sends it.
+/// Of a finite request, as another client may send it.
 TEST(LastBlock, PartialPaddedOrDroppedIsAccountedFor) {
   using LastBlock = sim::NetBoxQuirks::LastBlock;
   const std::map<LastBlock, std::uint64_t> expected{
@@ -346,15 +346,15 @@ TEST(LastBlock, PartialPaddedOrDroppedIsAccountedFor) {
   }
 }
 
-constexpr Manner real_time(int divisor) { return {false, 1, divisor, 0, true, {}}; }
-constexpr Manner buffered(int records, int divisor, std::uint32_t first_ft = 0) {
-  return {true, records, divisor, first_ft, true, {}};
+constexpr Manner blocks_of(int records, int divisor, std::uint32_t first_ft = 0) {
+  return {records, divisor, first_ft, true, {}};
 }
 
 INSTANTIATE_TEST_SUITE_P(, EachFault,
-                         testing::Values(Mode{"Buffered40At7000", buffered(40, 1)},
-                                         Mode{"Buffered7At7000", buffered(7, 1, 4294960000u)},
-                                         Mode{"RealTimeAt7000", real_time(1)}, Mode{"RealTimeAt1000", real_time(7)}),
+                         testing::Values(Mode{"Buffered40At7000", blocks_of(40, 1)},
+                                         Mode{"Buffered7At7000", blocks_of(7, 1, 4294960000u)},
+                                         Mode{"SinglesAt7000", blocks_of(1, 1)},
+                                         Mode{"SinglesAt1000", blocks_of(1, 7)}),
                          [](const auto& mode) { return std::string(mode.param.name); });
 
 }  // namespace

@@ -21,11 +21,9 @@ sim::NetBoxSettings box_settings(const Manner& manner) {
 
 StreamSettings stream_settings(const Manner& manner) {
   StreamSettings settings;
-  settings.buffered = manner.buffered;
   settings.divisor = static_cast<unsigned>(manner.divisor);
   settings.records_per_datagram = manner.records_per_datagram;
   settings.product = manner.quirks.axia ? Product::axia : Product::net_box;
-  settings.lease = manner.lease;
   return settings;
 }
 
@@ -100,7 +98,7 @@ std::string Joined::disagreement() const {
   compare("duplicates", account.duplicates, truth.duplicates);
   compare("late", account.late, truth.late);
   compare("stalled", account.stalled, truth.stalled);
-  compare("restarts", account.restarts + account.renewals, truth.restarts);
+  compare("restarts", account.restarts, truth.restarts);
   compare("reboots", account.reboots, truth.reboots);
   compare("irregular", account.irregular, truth.irregular);
   compare("malformed", account.malformed, wire_.truth().malformed);

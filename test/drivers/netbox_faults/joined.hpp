@@ -12,13 +12,11 @@
 namespace kphi::netbox::test {
 
 struct Manner {
-  bool buffered = true;
   int records_per_datagram = 40;
   int divisor = 1;
   std::uint32_t first_ft = 0;
   bool start_again_when_silent = true;
   sim::NetBoxQuirks quirks;
-  Duration lease{0};
 };
 
 class Joined {

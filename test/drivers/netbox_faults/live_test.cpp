@@ -118,9 +118,8 @@ TEST_F(Live, UnitsThatChangeWithABootAreNamedAlthoughTheStreamGoesOn) {
   EXPECT_TRUE(seen(EventKind::rebooted));
   const Event& changed = events.back();
   EXPECT_TRUE(has(changed.changes, Change::units));
-  EXPECT_THAT(to_string(changed), HasSubstr("configured otherwise than before: units, counts per unit"));
+  EXPECT_THAT(to_string(changed), HasSubstr("configuration has changed: units, counts per unit"));
   EXPECT_EQ(cell.configuration().force_unit, "N");
-  EXPECT_EQ(cell.latest_configuration().force_unit, "lbf");
   EXPECT_EQ(cell.state(), State::streaming);
 }
 
@@ -142,39 +141,21 @@ TEST_F(Live, AnotherRateAfterABootIsStreamedByItsOwnCount) {
   cell.stop();
   EXPECT_EQ(cell.counters().irregular, before.irregular);
   EXPECT_EQ(cell.counters().lost_network, before.lost_network);
-  EXPECT_EQ(cell.latest_configuration().divisor, 7u);
   expect_closed(cell.counters());
 }
 
-TEST_F(Live, ALeaseIsRenewedOverTheWire) {
-  start({});
-  LoadCell cell(address(), clock, Command::buffered, {.lease = 2s});
-  cell.start();
-  ASSERT_TRUE(follow(cell, [&] { return cell.counters().renewals >= 3; }));
-  cell.stop();
-  expect_closed(cell.counters());
-  EXPECT_EQ(cell.counters().restarts, 0u);
-  EXPECT_EQ(cell.counters().lost_network, cell.counters().lost_at_renewals);
-  EXPECT_EQ(seen(EventKind::restarted), false);
-  std::printf("%d renewals, %d records lost at them\n", static_cast<int>(cell.counters().renewals),
-              static_cast<int>(cell.counters().lost_at_renewals));
-}
-
-TEST_F(Live, AnAxiaStreamsInBothModes) {
+TEST_F(Live, AnAxiaStreams) {
   sim::NetBoxSettings axia;
   axia.quirks.axia = true;
   start({}, axia);
-  for (const Command mode : {Command::buffered, Command::real_time}) {
-    LoadCell cell(address(), clock, mode);
-    EXPECT_EQ(cell.configuration().kind, Product::axia);
-    cell.start();
-    ASSERT_TRUE(follow(cell, [&] { return cell.counters().received >= 2000; }));
-    cell.stop();
-    const Counters c = cell.counters();
-    const double records = mode == Command::buffered ? 40 : 1;
-    EXPECT_NEAR(static_cast<double>(c.received) / static_cast<double>(c.datagrams), records, 0.2 * records);
-    expect_closed(c);
-  }
+  LoadCell cell(address(), clock);
+  EXPECT_EQ(cell.configuration().kind, Product::axia);
+  cell.start();
+  ASSERT_TRUE(follow(cell, [&] { return cell.counters().received >= 2000; }));
+  cell.stop();
+  const Counters c = cell.counters();
+  EXPECT_NEAR(static_cast<double>(c.received) / static_cast<double>(c.datagrams), 40, 8);
+  expect_closed(c);
 }
 
 TEST_F(Live, TheProbeNamesAnAxiasFaultByItsOwnMap) {

@@ -20,9 +20,9 @@ using sim::FaultKind;
 
 Manner random_manner(Dice& dice) {
   Manner manner;
-  manner.buffered = dice.whole(0, 2) > 0;
+  const bool buffered = dice.whole(0, 2) > 0;
   manner.divisor = std::array{1, 1, 1, 2, 7}[static_cast<std::size_t>(dice.whole(0, 4))];
-  manner.records_per_datagram = manner.buffered ? dice.whole(2, 40) : 1;
+  manner.records_per_datagram = buffered ? dice.whole(2, 40) : 1;
   manner.first_ft = dice.whole(0, 3) == 0 ? 4294967295u - static_cast<std::uint32_t>(dice.whole(0, 30000)) : 0;
   return manner;
 }
@@ -122,9 +122,8 @@ void expect_agreement(std::uint64_t seed) {
   Joined joined(manner, script, seed);
   joined.run_until(8s);
   joined.finish();
-  EXPECT_EQ(joined.disagreement(), "") << "seed " << seed << ", " << (manner.buffered ? "buffered " : "real time ")
-                                       << manner.records_per_datagram << ", divisor " << manner.divisor << ", first ft "
-                                       << manner.first_ft << "\n"
+  EXPECT_EQ(joined.disagreement(), "") << "seed " << seed << ", " << manner.records_per_datagram << ", divisor "
+                                       << manner.divisor << ", first ft " << manner.first_ft << "\n"
                                        << description;
   EXPECT_EQ(joined.session().state(), State::streaming) << "seed " << seed;
 }

@@ -1,10 +1,9 @@
-#include "drivers/scpi/open.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <stdexcept>
 
+#include "drivers/scpi/scpi_supply.hpp"
 #include "test/drivers/sim_equipment/scpi_instrument.hpp"
 #include "test/drivers/sim_equipment/scpi_tcp.hpp"
 

@@ -140,7 +140,7 @@ TEST_F(ScpiSupplyTest, RefusesNumbersThatCannotBe) {
   line.answers["MEAS:VOLT?"] = "9.91E37";
   EXPECT_THAT(refusal([](ScpiSupply& supply) { (void)supply.read(); }), HasSubstr("is not a number"));
   line.answers["*IDN?"] = "hello";
-  EXPECT_THAT(refusal([](ScpiSupply&) {}), HasSubstr("names no model"));
+  EXPECT_THAT(refusal([](ScpiSupply&) {}), HasSubstr("does not name a model"));
 }
 
 TEST_F(ScpiSupplyTest, RefusesLimitsBeyondTheDevice) {

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "drivers/sim/transport/conversations.hpp"
-#include "drivers/sim/usb/faults.hpp"
+#include "drivers/sim/usb/function.hpp"
 #include "test/drivers/sim_equipment/scpi_instrument.hpp"
 
 namespace kphi::sim {

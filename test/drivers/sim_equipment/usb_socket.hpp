@@ -5,7 +5,7 @@
 #include <mutex>
 #include <thread>
 
-#include "drivers/sim/usb/faults.hpp"
+#include "drivers/sim/usb/function.hpp"
 #include "test/drivers/sim_equipment/virtual_usb.hpp"
 
 namespace kphi::sim {

@@ -6,7 +6,7 @@
 #include <mutex>
 #include <vector>
 
-#include "drivers/sim/usb/faults.hpp"
+#include "drivers/sim/script/faults.hpp"
 #include "drivers/sim/usb/function.hpp"
 #include "test/drivers/sim_equipment/scpi_instrument.hpp"
 

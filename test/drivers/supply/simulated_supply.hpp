@@ -8,8 +8,8 @@
 #include <string>
 #include <thread>
 
-#include "drivers/supply/address.hpp"
 #include "drivers/supply/modbus_link.hpp"
+#include "drivers/supply/wire.hpp"
 #include "test/drivers/sim_equipment/supply_server.hpp"
 #include "test/temporary_folder.hpp"
 

@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "base/error.hpp"
-#include "drivers/sim/usb/faults.hpp"
+#include "drivers/sim/usb/function.hpp"
 #include "test/drivers/sim_equipment/virtual_usb.hpp"
 
 namespace kphi {

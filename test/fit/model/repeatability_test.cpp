@@ -22,7 +22,7 @@ std::vector<results::StepMean> with_one_run_off(unsigned seed, double share) {
 TEST(OutlyingRuns, AreCalledSoByChanceInOneCampaignOfTwenty) {
   int called = 0;
   for (unsigned seed = 1; seed <= 300; ++seed)
-    called += outlying_runs(identify(study_campaign({}, seed).steps).repeatability).empty() ? 0 : 1;
+    called += outlying_runs(identify(study_campaign({}, seed).steps).selection.used).empty() ? 0 : 1;
   EXPECT_GE(called, 0.015 * 300);
   EXPECT_LE(called, 0.08 * 300);
 }
@@ -32,7 +32,7 @@ TEST(OutlyingRuns, AreNamedAndKeptAndWidenTheBudget) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
     const Identification found = identify(with_one_run_off(seed, 0.03)),
                          whole = identify(study_campaign({}, seed).steps);
-    const auto outlying = outlying_runs(found.repeatability);
+    const auto outlying = outlying_runs(found.selection.used);
     named += outlying.size() == 1 && outlying[0].phi_deg == 90 && outlying[0].repetition == 2 ? 1 : 0;
     EXPECT_EQ(found.selection.used.size(), whole.selection.used.size());
     EXPECT_GT(found.table[0].standard_error, whole.table[0].standard_error) << "repetitions are pooled over phi";
@@ -47,7 +47,7 @@ TEST(OutlyingRuns, AreNotLookedForAmongTwo) {
   std::erase_if(steps, [](const auto& step) { return step.occlusion_deg > 45 || step.repetition > 2; });
   IdentificationOptions anchored;
   anchored.line.anchored = true;
-  EXPECT_TRUE(outlying_runs(identify(steps, anchored).repeatability).empty());
+  EXPECT_TRUE(outlying_runs(identify(steps, anchored).selection.used).empty());
 }
 
 TEST(LeftOutRuns, AreListedWithTheirCauseAndWeighNothing) {

@@ -49,6 +49,24 @@ TEST(Compare, FindsADifferenceLargerThanItsUncertainty) {
       << "agreement is only as good as the data";
 }
 
+TEST(Compare, MeasuresTheDistanceFromTheSimulatedTruth) {
+  const TemporaryFolder folder;
+  const std::string truth = (folder.path() / "truth.yaml").string();
+  std::ofstream(truth) << "format: kphi-truth/1\npropellers:\n  5x3:\n    K_T: 1.5e-06\n    line: {intercept: 1.6e-06, "
+                          "slope_per_deg: -4.0e-09}\n";
+  const auto check = [&](double K_T, double slope) {
+    return check_against_truth(result({{"K_T", "", K_T, 0}, {"slope", "", slope, 0}}), truth);
+  };
+  EXPECT_TRUE(check(1.507e-6, -4.07e-9).close);
+  EXPECT_THAT(check(1.507e-6, -4.07e-9).text, HasSubstr("+0.467 %"));
+  EXPECT_FALSE(check(1.508e-6, -4.0e-9).close) << "0.53 %";
+  EXPECT_FALSE(check(1.5e-6, -4.09e-9).close) << "2.25 %";
+  ComparedResult other = result({{"K_T", "", 1, 0}});
+  other.propeller = "6x3";
+  EXPECT_THROW((void)check_against_truth(other, truth), ConfigurationError);
+  EXPECT_THROW((void)check_against_truth(result({{"K_T", "", 1, 0}}), truth), ConfigurationError);
+}
+
 TEST(Compare, DoesNotDecideWithoutUncertainties) {
   EXPECT_EQ(compare(result({{"K_T", "", 1, 0}}), result({{"K_T", "", 2, 0.1}})).verdict, Agreement::undecided);
   EXPECT_EQ(compare(result({{"K_T", "", 1, 1}}), result({{"k(45°)", "", 2, 0.1}})).verdict, Agreement::undecided);
@@ -137,8 +155,8 @@ TEST(Compare, RemarksWhatMakesResultsUnlike) {
   const Comparison comparison = compare(a, b);
   EXPECT_NEAR(*comparison.diameter_ratio4, 2.0736, 1e-12);
   EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("5x3 and 6x3")));
-  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("other speeds")));
-  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("other air")));
+  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("different speeds")));
+  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("different air")));
   EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("only in made: k(90°)")));
 }
 

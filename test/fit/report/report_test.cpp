@@ -2,8 +2,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 
+#include <cstdint>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <pugixml.hpp>
@@ -11,9 +14,11 @@
 #include <set>
 #include <string>
 
-#include "fit/report/detail_figures.hpp"
+#include "fit/report/figures.hpp"
+#include "fit/report/fit_summary.hpp"
 #include "fit/report/gnuplot.hpp"
 #include "fit/report/html.hpp"
+#include "fit/report/sections.hpp"
 #include "results/file_layer.hpp"
 #include "test/fit/campaign_steps.hpp"
 #include "test/temporary_folder.hpp"
@@ -271,6 +276,82 @@ TEST(ThrustShares, AreInPercentOfTheThrustWithoutOcclusion) {
   for (const ThrustShares& entry : shares) {
     ASSERT_EQ(entry.percent.size(), 3u) << "one per repetition";
     EXPECT_NEAR(entry.percent[0], 100 * truth.k(entry.phi_deg) / truth.K_T, 1);
+  }
+}
+
+bool well_formed(const std::string& html) {
+  pugi::xml_document document;
+  return static_cast<bool>(document.load_string(("<div>" + html + "</div>").c_str()));
+}
+
+Analysis analysis() { return analyse(identify(campaign_steps())); }
+
+TEST(AnalysisSections, ShowEveryRowOfTheBudgetAndWhatNobodyKnows) {
+  const Analysis found = analysis();
+  const std::string html = analysis_sections(found);
+  ASSERT_TRUE(well_formed(html));
+  EXPECT_THAT(html, HasSubstr("Uncertainty budget"));
+  for (const BudgetRow& row : found.coefficients.front().rows)
+    EXPECT_THAT(html, HasSubstr(">" + typeset(row.source) + "<"));
+  EXPECT_THAT(html, HasSubstr("unknown; give it with --u")) << "nobody gave the calibration of the cell";
+  EXPECT_THAT(html, HasSubstr("combined u"));
+}
+
+TEST(AnalysisSections, TellHowSureStandardAirIsWhereTheAirIsKnown) {
+  AnalysisOptions options;
+  EXPECT_THAT(analysis_sections(analyse(identify(campaign_steps()), options)), Not(HasSubstr("in standard air, 95 %")));
+  options.air_density_kg_m3 = 1.18;
+  options.bench.air_density = 0.002;
+  const std::string html = analysis_sections(analyse(identify(campaign_steps()), options));
+  ASSERT_TRUE(well_formed(html));
+  EXPECT_THAT(html, HasSubstr("in standard air, 95 %"));
+}
+
+TEST(AnalysisSections, ShowTestsWithTheirVerdicts) {
+  Analysis found = analysis();
+  EXPECT_THAT(analysis_sections(found), HasSubstr(">not rejected<"));
+  found.curvature.lack_of_fit = {"line <bent>", "k is a line", "F", 99, 2, 10, 1e-7};
+  const std::string html = analysis_sections(found);
+  ASSERT_TRUE(well_formed(html));
+  EXPECT_THAT(html, HasSubstr("line &lt;bent&gt;"));
+  EXPECT_THAT(html, HasSubstr("&lt; 0.0001"));
+  EXPECT_THAT(html, HasSubstr(">rejected<"));
+}
+
+TEST(AnalysisSections, LeaveOutWhatIsNotThere) {
+  EXPECT_THAT(analysis_sections({}), Not(HasSubstr("<h2>")));
+  EXPECT_EQ(claims_section({}), "");
+}
+
+TEST(AnalysisSections, ListClaimsWithIntervalAndVerdict) {
+  const std::vector<Claim> claims{{"a", "slopes <equal>", "1", 1.02, 0.98, 1.06, 0.9, 1.1, Verdict::holds},
+                                  {"b", "not here", "1"}};
+  const std::string html = claims_section(claims);
+  ASSERT_TRUE(well_formed(html));
+  EXPECT_THAT(html, HasSubstr("<td>1.02</td><td>0.98 to 1.06</td><td>0.9 to 1.1</td>"));
+  EXPECT_THAT(html, HasSubstr("slopes &lt;equal&gt;"));
+  EXPECT_THAT(html, HasSubstr("not tested"));
+}
+
+/// The set of signals that a program started as gnuplot is ignores, a bit each from signal 1 on.
+std::uint64_t ignored_by_a_child(const std::filesystem::path& folder) {
+  const auto program = folder / "program.sh";
+  std::ofstream(program) << "#!/bin/sh\nexec grep SigIgn: /proc/self/status\n";
+  std::filesystem::permissions(program, std::filesystem::perms::owner_all);
+  std::ofstream(folder / "script.gp") << "\n";
+  const GnuplotOutcome outcome = draw(folder / "script.gp", folder / "figure.svg", program.string());
+  EXPECT_TRUE(outcome.drawn) << outcome.reason;
+  std::string name, mask = "0";
+  std::ifstream(folder / "figure.svg") >> name >> mask;
+  return std::stoull(mask, nullptr, 16);
+}
+
+TEST(Gnuplot, IgnoresNoSignalThatThisProgramIgnores) {
+  const test::TemporaryFolder folder;
+  for (const int number : {SIGPIPE, SIGXFSZ}) {
+    const auto before = ::signal(number, SIG_IGN);
+    EXPECT_EQ(ignored_by_a_child(folder.path()) >> (number - 1) & 1, 0u) << number;
+    ::signal(number, before);
   }
 }
 

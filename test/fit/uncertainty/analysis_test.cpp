@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "fit/coefficients/coefficients.hpp"
-#include "fit/report/analysis_json.hpp"
+#include "fit/report/fit_summary.hpp"
 #include "test/fit/bench_study.hpp"
 
 namespace kphi::fit {

@@ -86,5 +86,20 @@ TEST(CellBins, TellWhatWasLostToTheSample) {
   EXPECT_EQ(bins.over(60, 100).lost, 0u);
 }
 
+TEST(CellStream, GivesEvenSamplesWithGapsFilledAndNoneAcrossARestart) {
+  Truth truth;
+  truth.lose = [](std::uint64_t n) { return n >= 2500 && n < 2510; };
+  RunRecording run = make_run(truth);
+  const EvenSamples even = CellStream(run).samples(kSecond);
+  EXPECT_DOUBLE_EQ(even.rate_hz, truth.rate_hz);
+  ASSERT_NEAR(static_cast<double>(even.counts.size()), 1000, 1);
+  std::size_t held = 0;
+  for (std::size_t i = 1; i < even.counts.size(); ++i) held += even.counts[i] == even.counts[i - 1];
+  EXPECT_EQ(held, 10u);
+  for (auto& record : run.load_cell)
+    if (record.arrival_ns > 2'300'000'000) record.ft_sequence -= 500000;
+  EXPECT_TRUE(CellStream(run).samples(kSecond).counts.empty()) << "the box restarted at 2.3 s";
+}
+
 }  // namespace
 }  // namespace kphi::results

@@ -77,10 +77,10 @@ TEST(Hysteresis, IsUnknownWithoutAWayBack) {
 TEST(Hysteresis, IsToldInOneLine) {
   EXPECT_THAT(
       hysteresis_of(run(0.01))->to_words(),
-      testing::MatchesRegex("thrust going up less that going down: \\+[01]\\.[0-9]+ ± 0\\.[0-9]+ % of k; at most "
-                            "\\+0\\.[0-9]+ ± 0\\.[0-9]+ N, at [0-9]+ RPM; [0-9]+ of 19 speeds beyond twice their "
+      testing::MatchesRegex("thrust going up minus going down: \\+[01]\\.[0-9]+ ± 0\\.[0-9]+ % of k; at most "
+                            "\\+0\\.[0-9]+ ± 0\\.[0-9]+ N at [0-9]+ RPM; [0-9]+ of 19 speeds beyond twice their "
                             "uncertainty"));
-  EXPECT_THAT(hysteresis_of(run(0, 2))->to_words(), testing::HasSubstr("no hysteresis is seen"));
+  EXPECT_THAT(hysteresis_of(run(0, 2))->to_words(), testing::HasSubstr("no hysteresis seen"));
 }
 
 }  // namespace

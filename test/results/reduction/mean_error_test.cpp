@@ -1,10 +1,10 @@
-#include "results/reduction/mean_error.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 #include <vector>
+
+#include "results/reduction/bin_statistics.hpp"
 
 namespace kphi::results {
 namespace {
@@ -28,7 +28,7 @@ double coverage(std::size_t n, double memory) {
   int inside = 0;
   for (int i = 0; i < kTrials; ++i) {
     const MeanError error = mean_error(noise(random, n, memory));
-    inside += std::abs(error.mean) <= error.half_width_95();
+    inside += std::abs(error.mean) <= student_95(error.freedom) * error.u;
   }
   return static_cast<double>(inside) / kTrials;
 }
@@ -73,7 +73,7 @@ TEST(MeanError, CoversTheTruthInANoiseThatSwings) {
         values[i] += amplitude * std::sin(2 * M_PI * (cycles * static_cast<double>(i) + phase));
       }
       const MeanError error = mean_error(values);
-      inside += std::abs(error.mean) <= error.half_width_95();
+      inside += std::abs(error.mean) <= student_95(error.freedom) * error.u;
     }
     EXPECT_GE(inside, 0.93 * kTrials) << amplitude;
     EXPECT_LE(inside, 0.98 * kTrials) << amplitude;
@@ -103,6 +103,7 @@ TEST(MeanError, KnowsStudentsT) {
 TEST(MeanError, JoinsDegreesOfFreedom) {
   EXPECT_NEAR(joint_freedom(1, 10, 1, 10), 20, 1e-9);
   EXPECT_NEAR(joint_freedom(1, 10, 0, 3), 10, 1e-9);
+  EXPECT_NEAR(joint_freedom(1, 10, 2, 5), 25 / (1 / 10.0 + 16 / 5.0), 1e-9);
 }
 
 }  // namespace

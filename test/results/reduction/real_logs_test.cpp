@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "results/reduction/bin_statistics.hpp"
 #include "results/reduction/motor_series.hpp"
 #include "results/reduction/reduction.hpp"
-#include "results/reduction/settling.hpp"
 #include "results/steps_csv.hpp"
 
 namespace kphi::results {

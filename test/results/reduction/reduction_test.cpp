@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "base/error.hpp"
@@ -41,13 +40,17 @@ TEST(Reduction, FindsTheKnownCoefficientWithoutFlag) {
 }
 
 TEST(Reduction, CorrectsSpeedsByTheGainOfTheModulesClock) {
-  auto run = make_run(Truth{});
+  Truth truth;
+  truth.speed_noise_rad_s = 0.2;
+  auto run = make_run(truth);
   const auto reported = reduce(run);
   run.header.clock_gain = 1.005;
   const auto corrected = reduce(run);
   for (std::size_t i = 0; i < reported.size(); ++i) {
     EXPECT_DOUBLE_EQ(corrected[i].speed_rad_s, 1.005 * reported[i].speed_rad_s);
     EXPECT_DOUBLE_EQ(corrected[i].speed_sd_rad_s, 1.005 * reported[i].speed_sd_rad_s);
+    EXPECT_GT(reported[i].speed_u_rad_s, 0.01);
+    EXPECT_DOUBLE_EQ(corrected[i].speed_u_rad_s, 1.005 * reported[i].speed_u_rad_s);
     EXPECT_EQ(corrected[i].thrust_n, reported[i].thrust_n);
     EXPECT_EQ(corrected[i].window_begin_s, reported[i].window_begin_s);
     EXPECT_EQ(corrected[i].quality_flags, reported[i].quality_flags);
@@ -104,6 +107,39 @@ TEST(Reduction, ADriftingZeroIsInterpolatedInTime) {
     const double centre = 0.5 * (step.window_begin_s + step.window_end_s);
     EXPECT_NEAR(step.zero_n, truth.sign * (truth.zero_force_n + truth.drift_n_per_s * centre), 1e-3);
   }
+}
+
+TEST(Reduction, TheZeroOfTheTorqueIsSubtractedAndInterpolated) {
+  RunRecording run = make_run({});
+  const auto exact = reduce(run);
+  for (auto& r : run.load_cell) r.counts[5] += 50000 + static_cast<std::int32_t>(r.arrival_ns / 1'000'000);  // 1 mN m/s
+  const auto steps = reduce(run);
+  for (std::size_t i = 0; i < steps.size(); ++i) EXPECT_NEAR(steps[i].torque_nm, exact[i].torque_nm, 1e-5) << i;
+}
+
+TEST(Reduction, FlagsAMeanOfUnknownUncertainty) {
+  const auto flags = [](double dwell_s, double reading_s) {
+    Truth truth;
+    truth.noise_n = 0.001;
+    truth.motor_tau_s = 0.02;
+    truth.dwell_s = dwell_s;
+    truth.reading_s = reading_s;
+    return reduce(make_run(truth)).at(1).quality_flags & static_cast<std::uint32_t>(QualityFlag::few_samples);
+  };
+  EXPECT_EQ(flags(1.2, 0.01), 0u);
+  EXPECT_NE(flags(1.05, 0.004), 0u) << "five bins of thrust";
+  EXPECT_NE(flags(1.1, 0.02), 0u) << "five readings of the speed";
+}
+
+TEST(Reduction, FlagsAStepWithoutSamples) {
+  const Truth truth;
+  RunRecording run = make_run(truth);
+  std::erase_if(run.load_cell,
+                [](const auto& r) { return r.arrival_ns > 3'100'000'000 && r.arrival_ns < 5'000'200'000; });
+  const auto steps = reduce(run);
+  EXPECT_TRUE(std::isnan(steps.at(1).thrust_n));
+  EXPECT_NE(steps.at(1).quality_flags & static_cast<std::uint32_t>(QualityFlag::few_samples), 0u);
+  EXPECT_NEAR(k_of(steps.at(2)), truth.k, 5e-3 * truth.k);
 }
 
 TEST(Reduction, ASlowMotorShrinksTheWindowInsteadOfSpoilingTheMean) {
@@ -173,23 +209,6 @@ TEST(Reduction, GivesTheSameBytesFromMemoryAndFromTheFile) {
   const RunRecording run = make_run(truth);
   test::write_run(folder / "a.h5", run);
   EXPECT_EQ(format_steps(reduce(run)), format_steps(reduce(read_run(folder / "a.h5"))));
-}
-
-TEST(Reduction, TellsHowFastItIs) {
-  Truth truth;
-  truth.rate_hz = 7000;
-  truth.ft_stride = 1;
-  truth.speeds.assign(83, 500);
-  const RunRecording run = make_run(truth);
-  double best = 1e9;
-  std::size_t steps = 0;
-  for (int i = 0; i < 5; ++i) {
-    const auto begin = std::chrono::steady_clock::now();
-    steps = reduce(run).size();
-    best = std::min(best, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-  }
-  std::printf("%zu samples reduced in %.1f ms\n", run.load_cell.size(), 1e3 * best);
-  EXPECT_EQ(steps, 83u);
 }
 
 }  // namespace

@@ -45,6 +45,7 @@ TEST(ReferenceDrift, IsNoneWithinHalfAPercentOrItsUncertainty) {
   const auto drift = reference_drift(runs({0, 0.003}));
   ASSERT_TRUE(drift);
   EXPECT_FALSE(drift->drifted());
+  EXPECT_GT(drift->share, 2 * drift->u_share) << "significant, but small";
   EXPECT_THAT(drift->to_words(), testing::EndsWith(" %"));
 }
 

@@ -24,14 +24,14 @@ TEST(Repetitions, AverageSoThatThrustOverSpeedSquaredStaysTheCoefficient) {
     s.speed_rad_s = 900 + 50 * rep;
     s.thrust_n = 1.3e-6 * s.speed_rad_s * s.speed_rad_s;
     s.thrust_samples = 100;
-    s.quality_flags = rep == 2 ? static_cast<std::uint32_t>(QualityFlag::derated) : 0;
+    s.quality_flags = static_cast<std::uint32_t>(rep == 2 ? QualityFlag::coil_hot : QualityFlag::none);
     s.supply_current_a = rep == 1 ? std::nan("") : 2.0 * rep;
     s.thrust_u_n = 0.003;
     s.thrust_freedom = 20;
     s.speed_glitches = 1;
     steps.push_back(s);
   }
-  const auto mean = average_repetitions(steps);
+  const auto mean = means_of(steps);
   ASSERT_EQ(mean.size(), 1u);
   EXPECT_EQ(mean[0].repetition, 0);
   EXPECT_NEAR(k_of(mean[0]), 1.3e-6, 1e-18);
@@ -40,7 +40,9 @@ TEST(Repetitions, AverageSoThatThrustOverSpeedSquaredStaysTheCoefficient) {
   EXPECT_NEAR(mean[0].thrust_u_n, 0.003 / std::sqrt(3.0), 1e-12);
   EXPECT_NEAR(mean[0].thrust_freedom, 60, 1e-9);
   EXPECT_EQ(mean[0].speed_glitches, 3u);
-  EXPECT_EQ(quality_flag_names(mean[0].quality_flags), "derated");
+  EXPECT_EQ(quality_flag_names(mean[0].quality_flags), "coil_hot");
+  steps[0].thrust_u_n = 0.009;
+  EXPECT_NEAR(means_of(steps)[0].thrust_freedom, 20 * 11 * 11 / 83.0, 1e-9) << "Welch-Satterthwaite";
 }
 
 TEST(Repetitions, AreGroupedByPropellerOcclusionAndStep) {
@@ -60,7 +62,7 @@ TEST(Repetitions, AreGroupedByPropellerOcclusionAndStep) {
       }
     }
   }
-  const auto means = average_repetitions(steps);
+  const auto means = means_of(steps);
   ASSERT_EQ(means.size(), 12u);
   EXPECT_EQ(means[0].propeller, "b");
   EXPECT_EQ(means[3].occlusion_deg, 0);
@@ -136,7 +138,9 @@ TEST(JudgeRepetitions, AsksForAnotherWhenOneOfThreeStandsOutAndKeepsIt) {
 TEST(MeansOf, KeepWhatIsFarFromTheOthers) {
   const auto steps = runs({0, 0.03, 0.0005});
   ASSERT_TRUE(judged(steps).repetitions[1].outlying);
-  EXPECT_EQ(format_steps(means_of(steps)), format_steps(average_repetitions(steps))) << "being far is no cause";
+  const StepMean mean = means_of(steps).at(7);
+  EXPECT_NEAR(mean.thrust_n, (steps[7].thrust_n + steps[27].thrust_n + steps[47].thrust_n) / 3, 1e-12);
+  EXPECT_TRUE(std::isnan(mean.repetitions_averaged));
 }
 
 TEST(MeansOf, LeaveOutAFlaggedStepWhenAnotherRepetitionIsGoodAndSaySo) {
@@ -155,14 +159,8 @@ TEST(MeansOf, LeaveOutAFlaggedStepWhenAnotherRepetitionIsGoodAndSaySo) {
   EXPECT_EQ(again.at(3).repetitions_left_out, 1);
   EXPECT_TRUE(std::isnan(again.at(15).repetitions_left_out));
   for (auto& step : steps) step.quality_flags = static_cast<std::uint32_t>(QualityFlag::zero_drifted);
-  EXPECT_EQ(format_steps(means_of(steps)), format_steps(average_repetitions(steps)))
+  EXPECT_NEAR(means_of(steps).at(5).thrust_n, 0.5 * (steps.at(5).thrust_n + steps.at(25).thrust_n), 1e-12)
       << "all are flagged: better that than nothing";
-}
-
-TEST(MeansOf, AreTheAveragesWhereNoneIsFlagged) {
-  const auto steps = runs({0, 0.0002, -0.0002});
-  EXPECT_EQ(format_steps(means_of(steps)), format_steps(average_repetitions(steps)));
-  EXPECT_TRUE(std::isnan(means_of(steps).front().repetitions_averaged));
 }
 
 TEST(JudgeRepetitions, AsksForAnotherWhenNoneAgreesButNotForEver) {
@@ -191,6 +189,94 @@ TEST(JudgeRepetitions, ComparesOnlyLevelsThatAllHave) {
     if (step.repetition == 2 && step.step > 12) step.quality_flags = static_cast<std::uint32_t>(QualityFlag::derated);
   }
   EXPECT_FALSE(judged(steps).repetitions[1].outlying);
+}
+
+/// `off` at occlusion 0, and four occlusions more whose runs scatter by `scatter`.
+std::vector<StepMean> campaign(const std::vector<double>& off, double scatter, unsigned seed = 1) {
+  std::mt19937 random(100 + seed);
+  std::normal_distribution<double> normal(0, scatter);
+  std::vector<StepMean> steps = runs(off, seed);
+  for (const double phi : {45.0, 90.0, 180.0, 270.0}) {
+    for (StepMean step : runs({normal(random), normal(random), normal(random)}, seed + static_cast<unsigned>(phi))) {
+      step.occlusion_deg = phi;
+      steps.push_back(step);
+    }
+  }
+  return steps;
+}
+
+TEST(JudgeRepetitions, LearnsFromTheOtherOcclusionsHowMuchRunsScatter) {
+  EXPECT_TRUE(judged(runs({0, 0.0001, 0.006})).repetitions[2].outlying) << "alone: two that agree make the third odd";
+  for (const auto& verdict : judge_repetitions(campaign({0, 0.0001, 0.006}, 0.003)))
+    for (const RepetitionFigure& run : verdict.repetitions) EXPECT_FALSE(run.outlying) << run.p;
+  const auto verdicts = judge_repetitions(campaign({0, 0.0001, 0.03}, 0.003));
+  EXPECT_TRUE(verdicts.at(0).repetitions[2].outlying);
+  EXPECT_NEAR(verdicts.at(0).repetitions[2].away, 0.03, 0.001);
+  EXPECT_LT(verdicts.at(0).repetitions[2].p, 0.01);
+  EXPECT_THAT(verdicts.at(0).reason, HasSubstr("repetition 3 gives a k that is +3.0"));
+}
+
+/// The zero of each run jumps once, at any step, by `jump_n` standard; the line between the two zeros misses the jump.
+void let_zeros_jump(std::vector<StepMean>& steps, double jump_n, std::mt19937& random) {
+  std::normal_distribution<double> normal(0, jump_n);
+  std::uniform_real_distribution<double> uniform;
+  for (std::size_t first = 0; first < steps.size(); first += 20) {
+    const double moved = normal(random), jump = uniform(random);
+    for (std::size_t i = 0; i < 20; ++i) {
+      const double part = (static_cast<double>(i) + 0.5) / 20;
+      steps[first + i].zero_n = 0.3 + moved * part;
+      steps[first + i].thrust_n += moved * ((part > jump ? 1.0 : 0.0) - part);
+    }
+  }
+}
+
+TEST(JudgeRepetitions, CallsARunOutlyingByChanceInOneCampaignOfTwenty) {
+  for (const double jump_n : {0.0, 0.05}) {
+    int called = 0;
+    for (unsigned seed = 1; seed <= 200; ++seed) {
+      std::mt19937 random(seed);
+      std::normal_distribution<double> normal(0, 0.003);
+      auto steps = campaign({normal(random), normal(random), normal(random)}, 0.003, seed);
+      let_zeros_jump(steps, jump_n, random);
+      bool any = false;
+      for (const auto& verdict : judge_repetitions(steps))
+        for (const RepetitionFigure& run : verdict.repetitions) any = any || run.outlying;
+      called += any;
+    }
+    EXPECT_GE(called, 2) << jump_n;
+    EXPECT_LE(called, 18) << jump_n;
+  }
+}
+
+TEST(JudgeRepetitions, CountsTheDriftOfTheZeroOverGoodSteps) {
+  auto steps = runs({0, 0});
+  const double quiet = judged(steps).repetitions[0].u;
+  for (auto& step : steps) step.zero_n = 0.3 + (step.repetition == 1 ? 0.01 * step.step / 19.0 : 0.0);
+  double x = 0, xx = 0;
+  for (const auto& step : runs({0})) x += std::pow(step.speed_rad_s, 2), xx += std::pow(step.speed_rad_s, 4);
+  EXPECT_NEAR(judged(steps).repetitions[0].u, std::hypot(quiet, 0.01 / std::sqrt(12.0) * x / xx), 1e-15);
+  EXPECT_NEAR(judged(steps).repetitions[1].u, quiet, 1e-15);
+  steps[0].zero_n = 5;
+  steps[0].quality_flags = static_cast<std::uint32_t>(QualityFlag::rebooted);
+  EXPECT_LT(judged(steps).repetitions[0].u, 1.01 * std::hypot(quiet, 0.01 / std::sqrt(12.0) * x / xx));
+}
+
+TEST(JudgeRepetitions, NeverCallsAThousandthOutlying) {
+  for (const auto& verdict : judge_repetitions(campaign({0, 0, 0.002}, 0.00001)))
+    for (const RepetitionFigure& run : verdict.repetitions) EXPECT_FALSE(run.outlying);
+}
+
+TEST(VarianceBetween, IsWhatTheRunsScatterBeyondTheirOwnVariance) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  std::vector<std::vector<RunShare>> occlusions(300);
+  for (auto& occlusion : occlusions)
+    for (int run = 0; run < 3; ++run) occlusion.push_back({1 + 0.005 * normal(random), 0.003 * 0.003});
+  EXPECT_NEAR(std::sqrt(variance_between(occlusions)), 0.004, 0.0003);
+  EXPECT_EQ(freedom_between(occlusions), 600);
+  for (auto& occlusion : occlusions)
+    for (RunShare& run : occlusion) run.variance = 1e-4;
+  EXPECT_EQ(variance_between(occlusions), 0);
 }
 
 TEST(JudgeRepetitions, WaitsUntilTheWantedOnesAreThere) {

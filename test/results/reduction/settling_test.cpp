@@ -1,10 +1,10 @@
-#include "results/reduction/settling.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 #include <vector>
+
+#include "results/reduction/bin_statistics.hpp"
 
 namespace kphi::results {
 namespace {
@@ -132,6 +132,17 @@ TEST(Settling, IsNotToldByASpeedThatCameTooLate) {
   EXPECT_FALSE(settle(step(3, 0, 1), 170, 100, kBin).settled);
   EXPECT_EQ(settle(step(3, 0, 1), 170, 100, kBin).begin, 170u);
   EXPECT_FALSE(settle({}, 0, 0, kBin).settled);
+}
+
+TEST(Drifts, WhatMovesByMoreThanHalfAPercentInTheSecondHalf) {
+  const auto ramp = [](double share_per_half) {
+    std::vector<double> thrust;
+    for (int i = 0; i < 200; ++i) thrust.push_back(3 * (1 + share_per_half * (i - 100) / 100.0));
+    return thrust;
+  };
+  EXPECT_FALSE(drifts(ramp(0.004)));
+  EXPECT_TRUE(drifts(ramp(0.006)));
+  EXPECT_TRUE(drifts(ramp(-0.006)));
 }
 
 TEST(Settling, PassesOverBinsThatHoldNothing) {

@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "results/reduction/mean_error.hpp"
+#include "results/reduction/bin_statistics.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/reduction/zeros.hpp"
 #include "results/steps_csv.hpp"

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "test/results/synthetic_run.hpp"
 
@@ -40,6 +41,28 @@ TEST(Zeros, AreLeastCertainNearEachAndMoreBetweenThem) {
   const double between = built.zeros.at(5e9, 0).u;
   EXPECT_NEAR(at_one, 1e6 * 0.02 / std::sqrt(1000.0), 300);
   EXPECT_NEAR(between, at_one / std::sqrt(2.0), 0.3 * at_one) << "there both count half";
+}
+
+TEST(Zeros, HaveEachItsOwnUncertainty) {
+  RunRecording run = make_run({});
+  std::mt19937 random(1);
+  std::int32_t wander = 0;
+  for (std::size_t i = run.load_cell.size() / 2; i < run.load_cell.size(); ++i) {
+    if (i % 10 == 0) wander = random() % 2 == 0 ? 40000 : -40000;
+    run.load_cell[i].counts[2] += wander;
+  }
+  const CellStream cell(run);
+  const MotorSeries motor(run.motor);
+  const Zeros zeros(run, cell, motor);
+  const double end = 0.5e9 + static_cast<double>(run.phases[run.phases.size() - 2].time_ns);
+  EXPECT_NEAR(zeros.at(0.5e9, 0).u, 1e6 * 0.02 / std::sqrt(1000.0), 300);
+  EXPECT_GT(zeros.at(end, 0).u, 1.5 * zeros.at(0.5e9, 0).u);
+  EXPECT_GT(zeros.largest_u(), 1.5 * zeros.at(0.5e9, 0).u);
+}
+
+TEST(Zeros, MayMoveByHalfAPercentOfTheLargestThrust) {
+  EXPECT_DOUBLE_EQ(tolerated_drift(10), 0.05);
+  EXPECT_DOUBLE_EQ(tolerated_drift(1), 0.02);
 }
 
 TEST(Zeros, AreNoLessCertainForDrifting) {

@@ -302,5 +302,76 @@ TEST(Filter, CutoffsAreNotMonotonicInTheCode) {
   EXPECT_EQ(filter_cutoff_hz(-1), std::nullopt);
 }
 
+struct Edit {
+  const char* element;
+  const char* content;
+  const char* words;
+};
+
+TEST(Changes, NameWhatGivesTheCountsAnotherMeaning) {
+  const Configuration before = parse_configuration(captured_xml());
+  EXPECT_EQ(to_words(compare(before, before)), "");
+  for (const Edit& edit :
+       {Edit{"cfgcalsn", "FT12345", "calibration"}, Edit{"mfgdigver", "2.3.0", "firmware"},
+        Edit{"prodname", "Ethernet Axia", "product"}, Edit{"mfgdigsn", "LOT2", "product"},
+        Edit{"setcfgsel", "1", "configuration slot"}, Edit{"scfgfu", "kN", "units, counts per unit, ranges"},
+        Edit{"cfgcpt", "500000", "counts per unit"}, Edit{"cfgmr", "330;330;990;30;30;60", "ranges"},
+        Edit{"comrdtrate", "1000", "rate"}, Edit{"comrdtbsiz", "40", "records per datagram"},
+        Edit{"setuserfilter", "4", "filter"}, Edit{"cfgtfx", "0;0;0;0;0;0", "tool transform"},
+        Edit{"scfgtdu", "in", "tool transform"}, Edit{"setbias", "0;0;0;0;0;0", "gage bias"}}) {
+    const Configuration after = parse_configuration(with(captured_xml(), edit.element, edit.content));
+    EXPECT_EQ(to_words(compare(before, after)), edit.words) << edit.element;
+  }
+}
+
+TEST(Changes, WhatMovesByItselfIsNoChange) {
+  const Configuration before = parse_configuration(captured_xml());
+  std::string later = with(captured_xml(), "runstat", "0x80010000");
+  later = with(later, "runpkmx", "15186841;15450145;20557075;1367250;2491043;1854244");
+  EXPECT_EQ(compare(before, parse_configuration(later)), 0u);
+}
+
+TEST(Changes, ABoxWithNarrowerPeaksHasForgottenThem) {
+  const auto with_peaks = [](const char* high, const char* low) {
+    return parse_configuration(with(with(captured_xml(), "runpkmx", high), "runpkmn", low));
+  };
+  const Configuration before = with_peaks("9;9;9;9;9;9", "-9;-9;-9;-9;-9;-9");
+  EXPECT_FALSE(forgot_peaks(before, before));
+  EXPECT_FALSE(forgot_peaks(before, with_peaks("9;9;10;9;9;9", "-9;-9;-9;-9;-9;-11")));
+  EXPECT_TRUE(forgot_peaks(before, with_peaks("9;9;8;9;9;9", "-9;-9;-9;-9;-9;-9")));
+  EXPECT_TRUE(forgot_peaks(before, with_peaks("20;20;20;20;20;20", "-9;-9;-9;-9;-9;-8")));
+  Configuration unknown = before;
+  unknown.peaks.reset();
+  EXPECT_FALSE(forgot_peaks(before, unknown));
+  EXPECT_FALSE(forgot_peaks(unknown, before));
+}
+
+TEST(Printable, LeavesTextInUtf8AsItIs) {
+  for (const std::string text : {"", "Mini40 on Net Box", "Prüfstand φ 90°", "\xF0\x9F\x9B\xA9", "\xC2\xA0"})
+    EXPECT_EQ(printable(text), text);
+}
+
+TEST(Printable, ReplacesEachByteThatIsNoUtf8) {
+  EXPECT_EQ(printable("Pr\xFC"
+                      "fstand"),
+            "Pr\uFFFDfstand");
+  EXPECT_EQ(printable("\xFF\xFE"), "\uFFFD\uFFFD");
+  EXPECT_EQ(printable("a\xCF"), "a\uFFFD") << "cut short";
+  EXPECT_EQ(printable("\xC0\xAF"), "\uFFFD\uFFFD") << "longer than need be";
+  EXPECT_EQ(printable("\xE0\x80\xAF"), "\uFFFD\uFFFD\uFFFD");
+  EXPECT_EQ(printable("\xED\xA0\x80"), "\uFFFD\uFFFD\uFFFD") << "half a surrogate pair";
+  EXPECT_EQ(printable("\xF5\x80\x80\x80"), "\uFFFD\uFFFD\uFFFD\uFFFD") << "beyond Unicode";
+}
+
+TEST(Printable, ReplacesWhatWouldSteerATerminal) {
+  EXPECT_EQ(printable("\x1B[2J"), "\uFFFD[2J");
+  EXPECT_EQ(printable("a\nb\x7F"), "a\uFFFDb\uFFFD");
+  EXPECT_EQ(printable("\xC2\x9B"
+                      "2J"),
+            "\uFFFD\uFFFD2J")
+      << "a control character in two bytes";
+  EXPECT_EQ(printable(std::string("a\0b", 3)), "a\uFFFDb");
+}
+
 }  // namespace
 }  // namespace kphi::netbox

@@ -47,7 +47,7 @@ TEST(HttpGet, TakesAnAnswerInPieces) {
 TEST(HttpGet, NamesTheStatusOfARefusal) {
   FakeWeb missing(FakeWeb::page("no", "404 Not Found"));
   EXPECT_THAT(failure(missing.port()), AllOf(HasSubstr("Net Box 127.0.0.1:"), HasSubstr("GET /netftapi2.xml"),
-                                             HasSubstr("HTTP status 404"), HasSubstr("is this a Net Box?")));
+                                             HasSubstr("HTTP status 404"), HasSubstr("check that this is a Net Box")));
   FakeWeb broken(FakeWeb::page("no", "500 Internal Server Error"));
   EXPECT_THAT(failure(broken.port()), HasSubstr("HTTP status 500"));
 }
@@ -79,7 +79,7 @@ TEST(HttpGet, AnAnswerAboveOneMebibyteIsRefused) {
   std::vector<std::string> pieces{"HTTP/1.0 200 OK\r\n\r\n"};
   for (int i = 0; i < 17; ++i) pieces.push_back(page);
   FakeWeb web({pieces});
-  EXPECT_THAT(failure(web.port()), HasSubstr("this is no Net Box"));
+  EXPECT_THAT(failure(web.port()), HasSubstr("not a Net Box"));
 }
 
 TEST(HttpGet, JustUnderOneMebibyteIsTaken) {
@@ -89,7 +89,7 @@ TEST(HttpGet, JustUnderOneMebibyteIsTaken) {
 
 TEST(HttpGet, SomethingElseThanHttpIsRefused) {
   FakeWeb web({{"SSH-2.0-OpenSSH_9.2\r\n\r\n"}});
-  EXPECT_THAT(failure(web.port()), HasSubstr("this is no Net Box"));
+  EXPECT_THAT(failure(web.port()), HasSubstr("not a Net Box"));
 }
 
 TEST(HttpGet, AClosedPortIsNamedAtOnce) {

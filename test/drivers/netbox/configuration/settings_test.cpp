@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "base/error.hpp"
-#include "drivers/netbox/configuration/settings_journal.hpp"
+#include "drivers/netbox/configuration/settings.hpp"
 #include "test/drivers/netbox/box_process.hpp"
 #include "test/drivers/netbox/settable_web.hpp"
 
@@ -230,7 +230,7 @@ TEST_F(SettingsTest, LeavesAloneWhatSomebodyElseHasChangedSince) {
   EXPECT_EQ(web.value("setuserfilter"), "5");
   EXPECT_EQ(web.value("comrdtrate"), "7000");
   ASSERT_THAT(keeper.notes(), SizeIs(1));
-  EXPECT_THAT(keeper.notes()[0].what, HasSubstr("somebody has set it to 5"));
+  EXPECT_THAT(keeper.notes()[0].what, HasSubstr("changed to 5 by somebody else"));
 }
 
 TEST_F(SettingsTest, AKilledProgramIsRecoveredFromAtTheNextStart) {
@@ -250,7 +250,7 @@ TEST_F(SettingsTest, ANewKeeperRecoversFirstSoThatBeforeIsTheTruth) {
     const SettingsKeeper keeper(web.address(), {.rate_hz = 1000}, journal);
     EXPECT_EQ(keeper.before().rdt_rate_hz, 7000);
     ASSERT_THAT(keeper.notes(), SizeIs(1));
-    EXPECT_THAT(keeper.notes()[0].what, HasSubstr("set back from 500 to 7000"));
+    EXPECT_THAT(keeper.notes()[0].what, HasSubstr("restored from 500 to 7000"));
   }
   EXPECT_EQ(web.value("comrdtrate"), "7000");
 }
@@ -264,7 +264,7 @@ TEST_F(SettingsTest, AJournalOfAnotherBoxIsRefusedAndKept) {
 
 TEST_F(SettingsTest, AFileThatIsNoJournalIsRefusedAndKept) {
   std::ofstream(journal) << "rate: 7000\n";
-  EXPECT_THAT(failure({}), HasSubstr("no journal"));
+  EXPECT_THAT(failure({}), HasSubstr("not a journal"));
   EXPECT_TRUE(std::filesystem::exists(journal));
   EXPECT_THAT(web.writes(), IsEmpty());
 }

@@ -8,6 +8,7 @@
 namespace kphi::netbox {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
@@ -43,7 +44,6 @@ TEST(Audit, FindsNothingInAGoodBox) {
   intention.largest_torque_nm = 0.2;
   intention.rate_hz = 7000;
   intention.records_per_datagram = 40;
-  intention.receive_buffer_bytes = kWantedReceiveBytes;
   EXPECT_THAT(audit(good_box(), intention), IsEmpty());
 }
 
@@ -99,13 +99,13 @@ INSTANTIATE_TEST_SUITE_P(
                box.counts_per_newton = 1 / 9.80665;  // kgf
                intention.largest_thrust_n = 20;
              },
-             Severity::fault, "one count is 9.81 N, where 20 N are expected", "force unit"},
+             Severity::fault, "one count is 9.81 N, the largest thrust 20 N", "force unit"},
         Case{"NarrowRange", [](Configuration&, Intention& intention) { intention.largest_thrust_n = 55; },
-             Severity::warning, "55 N are expected on Fz, whose range is 60 N", "larger range"},
+             Severity::warning, "55 N expected on Fz, its range is 60 N", "larger range"},
         Case{"SaturatingRange", [](Configuration&, Intention& intention) { intention.largest_thrust_n = 61; },
-             Severity::fault, "61 N are expected", "larger range"},
+             Severity::fault, "61 N expected", "larger range"},
         Case{"SaturatingTorque", [](Configuration&, Intention& intention) { intention.largest_torque_nm = 1; },
-             Severity::fault, "1 Nm are expected on Tz", "larger range"},
+             Severity::fault, "1 Nm expected on Tz", "larger range"},
         Case{"SlowDatagrams",
              [](Configuration& box, Intention&) {
                set_divisor(box, 1400);
@@ -119,20 +119,8 @@ INSTANTIATE_TEST_SUITE_P(
                box.filter_code = 3;
              },
              Severity::warning, "filter 3", "switch the filter off"},
-        Case{
-            "ReceiveBufferTooSmall",
-            [](Configuration& box, Intention& intention) {
-              box.records_per_datagram = 1;
-              intention.receive_buffer_bytes = 212'992;
-            },
-            Severity::warning,
-            "0.20 MiB of receive buffer instead of 8: records are lost when this host stands still for more than 37 ms",
-            "sysctl -w net.core.rmem_max=4194304"},
-        Case{"ReceiveBufferSmallButBuffered",
-             [](Configuration&, Intention& intention) { intention.receive_buffer_bytes = 212'992; }, Severity::note,
-             "more than 526 ms", "sysctl"},
         Case{"ToolTransform", [](Configuration& box, Intention&) { box.tool_transform[2] = 5; }, Severity::note,
-             "tool transform is applied", "second time"},
+             "applies a tool transform", "do not apply the offset again"},
         Case{"MonitorConditions",
              [](Configuration& box, Intention&) {
                box.monitoring = true;
@@ -163,6 +151,20 @@ TEST(Audit, AFilterBelowTheRotorsLineKeepsItOut) {
   intention.speeds_rpm = paper_speeds();
   intention.blades = 3;
   EXPECT_THAT(audit(box, intention), IsEmpty());
+}
+
+TEST(SmallReceiveBuffer, IsAWarningBelowHalfASecondAndElseANote) {
+  EXPECT_FALSE(small_receive_buffer(kWantedReceiveBytes, 1, 7000));
+  const auto single = small_receive_buffer(212'992, 1, 7000), buffered = small_receive_buffer(212'992, 40, 7000);
+  ASSERT_TRUE(single && buffered);
+  EXPECT_EQ(single->severity, Severity::warning);
+  EXPECT_THAT(single->line(),
+              AllOf(HasSubstr("0.20 MiB of receive buffer instead of 8: records are lost if kphi is blocked for more "
+                              "than 37 ms"),
+                    HasSubstr("sysctl -w net.core.rmem_max=4194304")));
+  EXPECT_EQ(buffered->severity, Severity::note);
+  EXPECT_THAT(buffered->line(), HasSubstr("more than 526 ms"));
+  EXPECT_EQ(small_receive_buffer(212'992, 40, 7000, 4)->severity, Severity::warning) << "time runs four times as fast";
 }
 
 TEST(AliasedLines, AreThoseOfThePaperAtAHundredHertz) {

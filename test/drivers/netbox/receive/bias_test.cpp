@@ -1,22 +1,11 @@
 #include "drivers/netbox/receive/bias.hpp"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.hpp"
-#include "test/drivers/netbox/fake_box.hpp"
+#include <cmath>
 
 namespace kphi::netbox {
 namespace {
-
-using namespace std::chrono_literals;
-using test::captured_xml;
-using test::FakeBox;
-using test::FakeWeb;
-using test::with;
-using testing::HasSubstr;
-
-std::string xml() { return with(with(captured_xml(), "comrdtrate", "7000"), "comrdtbsiz", "40"); }
 
 StampedRecord of(std::int32_t fz, std::int32_t tz, std::uint32_t status = 0) {
   StampedRecord stamped;
@@ -51,50 +40,6 @@ TEST(ZeroEstimate, LeavesSaturatedAndFaultyRecordsOut) {
   EXPECT_EQ(zero.mean[2], 15);
   EXPECT_EQ(zero.records, 2u);
   EXPECT_EQ(zero.refused, 1u);
-}
-
-void take_bias_from(FakeBox::Manner manner, bool expect_restart) {
-  manner.load = 3'000'000;
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box(manner);
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  cell.start();
-  const BiasStep step = take_bias(cell, clock, 1000, {}, 5s);
-  EXPECT_EQ(step.before.mean[2], 3.0);
-  EXPECT_EQ(step.before.records, 1000u);
-  EXPECT_EQ(step.after.mean[2], 0.0);
-  EXPECT_EQ(step.after.standard_deviation[2], 0.0) << "no record of the old zero among them";
-  EXPECT_GT(step.after.first, step.before.last);
-  EXPECT_EQ(step.stream_restarted, expect_restart);
-  EXPECT_EQ(box.biases(), 1);
-  cell.stop();
-  const Counters counters = cell.counters();
-  EXPECT_EQ(counters.expected, counters.received + counters.lost_network + counters.lost_host);
-}
-
-TEST(Bias, WorksOnABoxThatKeepsStreaming) { take_bias_from({}, false); }
-TEST(Bias, WorksOnABoxThatStopsItsStream) { take_bias_from({.bias_stops = true}, true); }
-
-TEST(Bias, ThatDidNotWorkIsAnErrorWithItsNumbers) {
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box({.load = 3'000'000, .bias_works = false});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  cell.start();
-  try {
-    static_cast<void>(take_bias(cell, clock, 200, {}, 5s));
-    FAIL();
-  } catch (const DeviceError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("Fz is 3 N afterwards, 0.05 N are tolerated"));
-  }
-}
-
-TEST(Bias, WithoutAStreamIsAnErrorInTime) {
-  FakeWeb web(FakeWeb::page(xml()));
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", 1, web.port()}, clock);
-  EXPECT_THROW(static_cast<void>(measure_zero(cell, 10, 20ms)), DeviceError);
 }
 
 }  // namespace

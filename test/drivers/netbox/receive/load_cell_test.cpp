@@ -84,11 +84,11 @@ TEST(LoadCell, ConstructionReadsTheConfigurationAndLeavesTheStreamAlone) {
   EXPECT_EQ(box.starts() + box.stops(), 0);
 }
 
-void stream_without_loss(Command mode, unsigned records_per_datagram) {
+void stream_without_loss(unsigned records_per_datagram) {
   FakeWeb web(FakeWeb::page(xml(1, records_per_datagram)));
   FakeBox box({.records_per_datagram = records_per_datagram});
   const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock, mode);
+  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
   cell.start();
   EXPECT_EQ(cell.state(), State::streaming);
   EXPECT_GE(consume(cell, 7000), 7000u);
@@ -104,8 +104,8 @@ void stream_without_loss(Command mode, unsigned records_per_datagram) {
   EXPECT_EQ(cell.state(), State::idle);
 }
 
-TEST(LoadCell, TakesSevenThousandRecordsPerSecondBuffered) { stream_without_loss(Command::buffered, 40); }
-TEST(LoadCell, TakesSevenThousandRecordsPerSecondOneByOne) { stream_without_loss(Command::real_time, 1); }
+TEST(LoadCell, TakesSevenThousandRecordsPerSecondBuffered) { stream_without_loss(40); }
+TEST(LoadCell, TakesSevenThousandRecordsPerSecondOneByOne) { stream_without_loss(1); }
 
 TEST(LoadCell, TakesTwentyTimesTheRateOnAClockTwentyTimesAsFast) {
   FakeWeb web(FakeWeb::page(xml()));
@@ -229,8 +229,7 @@ TEST(LoadCell, GivesUpABoxThatDoesNotComeBack) {
   std::optional<FakeWeb> web(std::in_place, FakeWeb::page(xml()));
   FakeBox box({.mute_after_1000 = true});
   const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web->port()}, clock, Command::buffered,
-                {.first_pause = 20ms, .give_up_after = 200ms});
+  LoadCell cell({"127.0.0.1", box.port(), web->port()}, clock, {.first_pause = 20ms, .give_up_after = 200ms});
   web.reset();
   cell.start();
   EXPECT_THAT(kinds_until(cell, 3),
@@ -308,22 +307,6 @@ TEST(LoadCell, TellsHowLongTheProcessMayStandStill) {
   const SteadyClock clock;
   LoadCell cell({"127.0.0.1", 1, web.port()}, clock);
   EXPECT_THAT(cell.receive_buffer_note(), testing::ContainsRegex("^[0-9.]+ MiB, tolerates [0-9]+ ms"));
-}
-
-TEST(LoadCell, HandsOverAtOnceToWhoWaits) {
-  FakeWeb web(FakeWeb::page(xml(1, 1)));
-  FakeBox box({.records_per_datagram = 1});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock, Command::real_time);
-  cell.start();
-  std::vector<StampedRecord> batch(512);
-  std::uint64_t waits = 0, taken = 0;
-  while (taken < 7000 && cell.wait(1s)) {
-    ++waits;
-    taken += cell.take(batch);
-  }
-  EXPECT_GE(taken, 7000u);
-  EXPECT_LT(static_cast<double>(taken) / static_cast<double>(waits), 8) << "records per wake-up";
 }
 
 TEST(LoadCell, SaysWhatToDoAboutABufferSmallerThanAskedFor) {

@@ -16,7 +16,7 @@ class UdpSocketTest : public testing::Test {
  protected:
   UdpSocketTest() {
     socklen_t length = sizeof own;
-    getsockname(socket.native_handle(), reinterpret_cast<sockaddr*>(&own), &length);
+    getsockname(socket.descriptor(), reinterpret_cast<sockaddr*>(&own), &length);
   }
   void send_from(const LoopbackSocket& sender, std::size_t size) {
     const std::string bytes(size, 'x');
@@ -83,7 +83,7 @@ TEST_F(UdpSocketTest, ASmallBufferToleratesTheStallThatItTellsAndNoMore) {
       tolerated_stall(small.receive_buffer_bytes(), 36, std::chrono::nanoseconds(1'000'000'000 / 7000));
   EXPECT_EQ(note, "0.1 MiB, tolerates 22 ms; for longer set net.core.rmem_max to 4194304");
   socklen_t length = sizeof own;
-  getsockname(small.native_handle(), reinterpret_cast<sockaddr*>(&own), &length);
+  getsockname(small.descriptor(), reinterpret_cast<sockaddr*>(&own), &length);
   const auto received_of = [&](std::size_t sent) {
     for (std::size_t i = 0; i < sent; ++i) send_from(box, 36);
     std::size_t received = 0;
@@ -123,7 +123,7 @@ TEST(UdpSocket, AsksForFourMebibytesAndReadsBackWhatItGot) {
   UdpSocket socket("127.0.0.1", 9);
   int granted = 0;
   socklen_t length = sizeof granted;
-  getsockopt(socket.native_handle(), SOL_SOCKET, SO_RCVBUF, &granted, &length);
+  getsockopt(socket.descriptor(), SOL_SOCKET, SO_RCVBUF, &granted, &length);
   EXPECT_EQ(socket.receive_buffer_bytes(), static_cast<std::size_t>(granted));
   EXPECT_GT(granted, 0);
 }

@@ -21,7 +21,7 @@ TEST(ClockEstimate, StaysWithinFiveMicrosecondsOnALoadedHost) {
     const Quality quality = quality_of(channel, estimate, 240);
     EXPECT_LT(quality.rms_us, 5) << "seed " << seed;
     EXPECT_NEAR(estimate.skew_ppm(), 60, 2) << seed;
-    EXPECT_TRUE(estimate.believable());
+    EXPECT_LT(std::abs(estimate.skew_ppm()), ClockEstimate::kBelievableSkewPpm);
     EXPECT_LT(to_seconds(estimate.uncertainty()), 10e-6) << seed;
   }
 }
@@ -53,13 +53,13 @@ TEST(ClockEstimate, DoesNotNoticeTheWrap) {
 TEST(ClockEstimate, IsNotReadyBeforeFourBinsAndSaysHowLittleItKnows) {
   Channel channel({}, 4);
   ClockEstimate estimate(kRate);
-  EXPECT_EQ(estimate.host_time(5), Instant{0});
   Channel::Sample sample = channel.next();
   for (; sample.true_s < 1.9; sample = channel.next()) estimate.add(sample.ft, sample.arrival);
   EXPECT_FALSE(estimate.ready());
   EXPECT_EQ(estimate.skew_ppm(), 0);
   EXPECT_GT(to_seconds(estimate.uncertainty()), 1e-3);
-  EXPECT_NEAR(to_seconds(estimate.host_time(sample.ft) - 100s), sample.true_s, 1e-3);
+  const Duration late = estimate.add(sample.ft, sample.arrival);
+  EXPECT_NEAR(to_seconds(sample.arrival - late - 100s), sample.true_s, 1e-3);
   for (; sample.true_s < 2.1; sample = channel.next()) estimate.add(sample.ft, sample.arrival);
   EXPECT_TRUE(estimate.ready());
 }
@@ -80,16 +80,7 @@ TEST(ClockEstimate, DoubtsARateThatIsAnotherThanConfigured) {
   ClockEstimate estimate(kRate);
   Channel channel({.skew_ppm = 3000}, 7);
   static_cast<void>(quality_of(channel, estimate, 31));
-  EXPECT_FALSE(estimate.believable());
-}
-
-TEST(ClockEstimate, TellsTheTimeOfOlderRecordsOfTheSameDatagram) {
-  Channel channel({.skew_ppm = 0, .wander_ppm = 0, .stride = 40, .usual_delay_s = 1e-9, .rare_share = 0}, 8);
-  ClockEstimate estimate(kRate);
-  static_cast<void>(quality_of(channel, estimate, 31));
-  const Channel::Sample sample = channel.next();
-  estimate.add(sample.ft, sample.arrival);
-  EXPECT_NEAR(to_seconds(estimate.host_time(sample.ft) - estimate.host_time(sample.ft - 39)), 39 / kRate, 1e-8);
+  EXPECT_GT(estimate.skew_ppm(), ClockEstimate::kBelievableSkewPpm);
 }
 
 }  // namespace

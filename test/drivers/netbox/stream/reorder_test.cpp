@@ -1,9 +1,9 @@
-#include "drivers/netbox/stream/reorder.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
+
+#include "drivers/netbox/stream/sequence.hpp"
 
 namespace kphi::netbox {
 namespace {

@@ -36,38 +36,6 @@ TEST_F(SessionTest, StopsWaitsForSilenceAndStarts) {
   EXPECT_EQ(session.counters().received, 40u);
 }
 
-TEST_F(SessionTest, AsksForRealTimeModeWhenTold) {
-  settings.buffered = false;
-  Session real_time(settings);
-  real_time.start(now);
-  real_time.advance(now + settings.settle);
-  std::array<std::uint8_t, 8> request;
-  ASSERT_TRUE(real_time.next_request(request));
-  ASSERT_TRUE(real_time.next_request(request));
-  EXPECT_EQ(request, encode_request(Command::real_time));
-}
-
-TEST_F(SessionTest, AsksForMultiUnitModeWhenTold) {
-  settings.buffered = false;
-  settings.multi_unit = true;
-  Session several(settings);
-  several.start(now);
-  several.advance(now + settings.settle);
-  std::array<std::uint8_t, 8> request;
-  ASSERT_TRUE(several.next_request(request));
-  ASSERT_TRUE(several.next_request(request));
-  EXPECT_EQ(request, encode_request(Command::multi_unit));
-}
-
-TEST_F(SessionTest, ResetsTheLatchWithoutTouchingTheStream) {
-  start_streaming();
-  const Instant due = session.deadline();
-  session.reset_latch();
-  EXPECT_THAT(told(), ElementsAre(0x41));
-  EXPECT_EQ(session.deadline(), due);
-  EXPECT_EQ(session.state(), State::streaming);
-}
-
 TEST_F(SessionTest, StampsEachRecordWithItsDatagramsArrival) {
   start_streaming();
   out.clear();

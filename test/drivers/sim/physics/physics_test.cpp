@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "drivers/sim/iq/control.hpp"
-#include "drivers/sim/physics/load_cell.hpp"
 #include "drivers/sim/physics/motor.hpp"
 #include "drivers/sim/physics/plant.hpp"
 

@@ -1,0 +1,47 @@
+// The verbs of the program, and what they have in common.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+
+#include "base/error.hpp"
+
+namespace kphi::commands {
+
+using Json = nlohmann::ordered_json;
+
+/// Adds a verb to the program. If the verb was given, parsing the command line runs it and sets `exit_code`.
+using AddVerb = void(CLI::App& program, ExitCode& exit_code);
+AddVerb add_check, add_sim, add_devices, add_run, add_replay, add_info, add_verify, add_import, add_fit, add_report,
+    add_compare, add_export, add_compensate, add_fly;
+
+/// In the order of `kphi --help`.
+inline constexpr AddVerb* kVerbs[] = {add_check,   add_sim,    add_devices,    add_run, add_replay,
+                                      add_info,    add_verify, add_import,     add_fit, add_report,
+                                      add_compare, add_export, add_compensate, add_fly};
+
+/// A verb that calls `run` with its options, which live as long as the program.
+template <class Options>
+std::pair<CLI::App&, Options&> add_verb(CLI::App& program, ExitCode& exit_code, const char* name, const char* what,
+                                        ExitCode (*run)(const Options&)) {
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = program.add_subcommand(name, what);
+  command->callback([options, run, &exit_code] { exit_code = run(*options); });
+  return {*command, *options};
+}
+
+/// CLI11's checks of a path, without their words in --help.
+inline const CLI::Validator kExistingFile = CLI::ExistingFile.description("");
+inline const CLI::Validator kExistingFolder = CLI::ExistingDirectory.description("");
+inline const CLI::Validator kExistingPath = CLI::ExistingPath.description("");
+
+inline void print_json(const Json& json, int indent = 2) {
+  fmt::print("{}\n", json.dump(indent, ' ', false, Json::error_handler_t::replace));
+}
+
+}  // namespace kphi::commands

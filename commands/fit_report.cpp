@@ -1,0 +1,328 @@
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <optional>
+
+#include "base/csv.hpp"
+#include "commands/commands.hpp"
+#include "commands/inputs.hpp"
+#include "compensation/units.hpp"
+#include "fit/coefficients/coefficients.hpp"
+#include "fit/propellers/claims.hpp"
+#include "fit/report/figures.hpp"
+#include "fit/report/fit_summary.hpp"
+#include "fit/report/raw_samples.hpp"
+#include "fit/report/report.hpp"
+#include "fit/signal/blade_pass.hpp"
+#include "fit/signal/dynamics.hpp"
+#include "fit/uncertainty/analysis.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/run_reader.hpp"
+
+namespace kphi::commands {
+namespace {
+
+using namespace fit;
+
+namespace fs = std::filesystem;
+
+/// Fills the runs of `input` from their files and draws.
+Figures draw_all(const Identification& identification, FitInput& input, const fs::path& figures) {
+  RawSamples raw;
+  if (input.campaign) {
+    raw = read_raw_samples(identification, std::move(input.provenance.runs), input.folder);
+    input.provenance.runs = std::move(raw.runs);
+  }
+  if (raw.shares.empty()) raw.shares = shares_of_steps(identification);
+  Figures drawn = draw_figures(identification, raw.shares, figures, "gnuplot", raw.settling ? &*raw.settling : nullptr);
+  if (!drawn.skipped.empty()) fmt::print(stderr, "kphi: figures skipped: {}\n", drawn.skipped);
+  return drawn;
+}
+
+void write_page(const fs::path& page, const std::string& html) {
+  if (page.has_parent_path()) fs::create_directories(page.parent_path());
+  write_output(page, html);
+  fmt::print(stderr, "report        {}\n", page.string());
+}
+
+void write_report(const Identification& identification, const Analysis& analysis, FitInput& input,
+                  const fs::path& page) {
+  const Figures figures = draw_all(identification, input, page.parent_path() / "figures");
+  write_page(page, format_report(identification, input.provenance, figures, &analysis));
+}
+
+struct FitRequest {
+  std::string path;
+  bool anchored = false;
+  std::vector<double> points_deg;
+  std::string speed_range_rpm;
+  std::optional<double> at_speed_rpm;
+  std::string out;
+  std::string propeller;
+  double diameter_in = 0;
+  int blades = 0;
+  Estimator estimator = Estimator::through_origin;
+  Weighting weighting = Weighting::equal;
+  Loss loss = Loss::none;
+  compensation::OverlapMeasure overlap = compensation::OverlapMeasure::rim_arc;
+  std::vector<std::string> uncertainties;
+  std::vector<std::string> left_out;
+  std::vector<std::string> family;
+  bool raw = false;
+  bool no_report = false;
+  bool json = false;
+};
+
+/// "A:B" in RPM; either end may be left out.
+SpeedRange parse_speed_range(const std::string& text, SpeedRange range) {
+  if (text.empty()) return range;
+  const std::size_t colon = text.find(':');
+  const auto end = [&](const std::string& part, double& speed) {
+    if (part.empty()) return true;
+    const auto rpm = parse_number(part);
+    if (rpm) speed = from_rpm(*rpm).value();
+    return rpm.has_value();
+  };
+  if (colon == std::string::npos || !end(text.substr(0, colon), range.min_rad_s) ||
+      !end(text.substr(colon + 1), range.max_rad_s) || !(range.max_rad_s > range.min_rad_s)) {
+    throw ConfigurationError(
+        fmt::format("--speed-range-rpm {}: expected A:B with A below B, such as 3000:19100", text));
+  }
+  return range;
+}
+
+IdentificationOptions options_of(const FitRequest& request) {
+  IdentificationOptions options;
+  options.speed_range = parse_speed_range(request.speed_range_rpm, options.speed_range);
+  if (request.at_speed_rpm) options.at_speed_rad_s = from_rpm(*request.at_speed_rpm).value();
+  options.line.anchored = request.anchored;
+  options.line.points_deg = request.points_deg;
+  options.estimator = request.estimator;
+  options.weighting = request.weighting;
+  options.loss = request.loss;
+  for (const std::string& text : request.left_out) options.left_out.push_back(parse_left_out_run(text));
+  return options;
+}
+
+/// A table of given k is fitted by a line alone: what would be ignored is refused.
+void refuse_for_table(const FitRequest& request) {
+  const auto refuse = [&](bool given, const char* option) {
+    if (given) throw ConfigurationError(fmt::format("{}: a table of given k; {} needs steps", request.path, option));
+  };
+  refuse(request.estimator != Estimator::through_origin, "--estimator");
+  refuse(request.weighting != Weighting::equal, "--weights");
+  refuse(request.loss != Loss::none, "--loss");
+  refuse(request.at_speed_rpm.has_value(), "--at-speed-rpm");
+  refuse(!request.uncertainties.empty(), "--u");
+  refuse(!request.left_out.empty(), "--leave-out");
+}
+
+Identification identify_input(const FitInput& input, const FitRequest& request) {
+  const IdentificationOptions options = options_of(request);
+  if (!input.table.empty()) refuse_for_table(request);
+  Identification result =
+      input.table.empty() ? identify(input.steps, options)
+                          : identify_table(input.table, options.line, parse_speed_range(request.speed_range_rpm, {}));
+  if (!request.propeller.empty()) result.propeller = request.propeller;
+  if (result.propeller.empty()) result.propeller = input.provenance.campaign;
+  if (request.diameter_in > 0) result.diameter_in = request.diameter_in;
+  if (request.blades > 0) result.blades = request.blades;
+  result.overlap = request.overlap;
+  return result;
+}
+
+/// What the campaign's files know of errors; --u overrides it.
+AnalysisOptions analysis_options(const FitRequest& request, const FitInput& input,
+                                 const Identification& identification) {
+  AnalysisOptions options = commands::analysis_options(input, identification);
+  for (const std::string& text : request.uncertainties) set_uncertainty(options.bench, text);
+  const bool is_unused = request.no_report && !request.json;
+  if (is_unused) options.bootstrap.resamples = 0;
+  return options;
+}
+
+/// From the first run without occlusion: a whole one lies in memory, 30 MB for the paper's 80 s.
+Json raw_json(const FitInput& input) {
+  const auto files = results::CampaignFolder::open(input.folder).complete_runs();
+  if (files.empty()) throw FitError("no complete run in the folder; --raw needs one");
+  const std::vector<results::RunRecording> runs{results::read_run(files.front())};
+  const auto check = check_by_blade_pass(runs);
+  Json json = raw_to_json(identify_dynamics(runs), check);
+  const auto& clock = input.provenance.clock;
+  if (!check || !clock || !clock->u_gain) return json;
+  HypothesisTest agreement = check->against({clock->gain, *clock->u_gain});
+  agreement.name = "blade-pass line against the clock gain of the bench file";
+  agreement.hypothesis = "both are the same";
+  json["blade_pass"]["against_clock_gain"] = to_json(agreement);
+  return json;
+}
+
+/// This propeller and the others of its family, all fitted alike.
+FamilyFindings family_findings(const FitRequest& request, const Identification& identification,
+                               const Analysis& analysis) {
+  std::vector<FamilyMember> family{{identification, analysis}};
+  for (const std::string& path : request.family) {
+    const FitInput input = load_input(path);
+    FitRequest same = request;
+    same.propeller.clear();
+    same.diameter_in = same.blades = 0;
+    same.left_out.clear();
+    Identification other = identify_input(input, same);
+    Analysis its = analyse(other, analysis_options(request, input, other));
+    family.push_back({std::move(other), std::move(its)});
+  }
+  return findings_of(family, {});
+}
+
+void print_findings(const FitRequest& request, const FitInput& input, const Identification& identification,
+                    const Analysis& analysis, const fs::path& file) {
+  const Json raw = request.raw ? raw_json(input) : Json();
+  std::optional<FamilyFindings> family;
+  if (!request.family.empty()) family = family_findings(request, identification, analysis);
+  if (!request.json) {
+    fmt::print("{}", headline_text(identification));
+    if (family) fmt::print("\n{}", family_text(*family));
+    if (!raw.is_null()) fmt::print("{}\n", raw.dump(2));
+    return;
+  }
+  Json json = to_json(identification, analysis, file);
+  if (family) json.update(to_json(*family));
+  if (!raw.is_null()) json["raw"] = raw;
+  print_json(json);
+}
+
+ExitCode run_fit(const FitRequest& request) {
+  FitInput input = load_input(request.path);
+  if (request.raw && !input.campaign)
+    throw ConfigurationError(request.path + ": --raw needs the runs of a campaign folder");
+  const Identification identification = identify_input(input, request);
+  const fs::path file = request.out.empty() ? input.folder / "coefficients.yaml" : fs::path(request.out);
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  const AnalysisOptions options = analysis_options(request, input, identification);
+  if (input.table.empty()) input.provenance.bench = options.bench;
+  const Analysis analysis = analyse(identification, options);
+  fs::create_directories(folder);
+  write_output(file, format_coefficients(identification, input.provenance, &analysis));
+  print_findings(request, input, identification, analysis, file);
+  fmt::print(stderr, "{}coefficients  {}\n", caution_text(identification, analysis), file.string());
+  if (!request.no_report) write_report(identification, analysis, input, folder / "report.html");
+  return ExitCode::ok;
+}
+
+/// An option that takes the name of one of `values`; `into` must outlive the command.
+template <class Enum>
+void add_choice(CLI::App& command, const std::string& option, Enum& into, const std::string& what,
+                std::initializer_list<Enum> values) {
+  std::map<std::string, Enum> known;
+  for (const Enum value : values) known.emplace(name_of(value), value);
+  std::string all;
+  for (const auto& [name, value] : known) all += (all.empty() ? "" : ", ") + name;
+  const auto take = [&into, option, known, all](const std::string& word) {
+    const auto found = known.find(word);
+    if (found == known.end()) throw CLI::ValidationError(option, fmt::format("\"{}\" is not one of {}", word, all));
+    into = found->second;
+  };
+  command.add_option_function<std::string>(option, take, fmt::format("{}: {} (default: {})", what, all, name_of(into)))
+      ->type_name("WORD");
+}
+
+struct ReportRequest {
+  std::vector<std::string> folders;
+  std::string out;
+};
+
+/// One page of several campaigns; their figures go beside it, a folder each.
+ExitCode report_several(const ReportRequest& request) {
+  const fs::path page = request.out.empty() ? fs::path("report.html") : fs::path(request.out);
+  const fs::path figures = page.parent_path() / "figures";
+  std::vector<Chapter> chapters;
+  std::vector<const Identification*> family;
+  for (const std::string& path : request.folders) {
+    FittedFolder fitted = fitted_again(path);
+    Chapter chapter{std::move(fitted.identification), {}, {}, std::move(fitted.analysis)};
+    chapter.figures = draw_all(chapter.identification, fitted.input, figures / fmt::format("{}", chapters.size() + 1));
+    chapter.provenance = std::move(fitted.input.provenance);
+    chapters.push_back(std::move(chapter));
+  }
+  for (const Chapter& chapter : chapters) family.push_back(&chapter.identification);
+  write_page(page, format_reports(chapters, draw({family_figure(family)}, figures)));
+  return ExitCode::ok;
+}
+
+ExitCode run_report(const ReportRequest& request) {
+  if (request.folders.size() > 1) return report_several(request);
+  const std::string& path = request.folders.front();
+  FittedFolder fitted = fitted_again(path);
+  write_report(fitted.identification, fitted.analysis, fitted.input,
+               request.out.empty() ? fs::path(path) / "report.html" : fs::path(request.out));
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_fit(CLI::App& program, ExitCode& exit_code) {
+  const auto [command, request] = add_verb<FitRequest>(
+      program, exit_code, "fit", "fit k to the steps of each occlusion, then the line k(φ); write a report", run_fit);
+  command.add_option("INPUT", request.path, "campaign folder, steps.csv, or K.csv with phi_deg,k[,u_k]")
+      ->required()
+      ->type_name("")
+      ->check(kExistingPath);
+  command.add_flag("--anchored", request.anchored, "start the line at K_T (default: free, through the occlusions)");
+  command.add_option("--points", request.points_deg, "angles that carry the line, in degrees (default: all above 0)")
+      ->type_name("DEG,DEG,…")
+      ->delimiter(',');
+  command
+      .add_option("--speed-range-rpm", request.speed_range_rpm,
+                  "speeds to fit (default 3000: and up; below, noise of the load cell hides the thrust)")
+      ->type_name("A:B");
+  command.add_option("--at-speed-rpm", request.at_speed_rpm,
+                     "speed of \"k at speed\" (default: the highest one that every occlusion reached)");
+  add_choice(command, "--estimator", request.estimator, "how k is estimated",
+             {Estimator::through_origin, Estimator::with_offset, Estimator::polynomial, Estimator::at_speed});
+  add_choice(command, "--weights", request.weighting, "how steps are weighted",
+             {Weighting::equal, Weighting::thrust, Weighting::effective_variance});
+  add_choice(command, "--loss", request.loss, "robust loss", {Loss::none, Loss::huber, Loss::cauchy, Loss::tukey});
+  using compensation::OverlapMeasure;
+  add_choice(command, "--overlap", request.overlap, "how φ is measured in flight, to be the same in the vehicle file",
+             {OverlapMeasure::rim_arc, OverlapMeasure::area_share, OverlapMeasure::load_share});
+  command
+      .add_option(
+          "--u", request.uncertainties,
+          "standard uncertainty of calibration, cross-axis, clock, density (all relative) or alignment-deg; may "
+          "be repeated")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false);
+  command
+      .add_option("--leave-out", request.left_out,
+                  "leave out a run for a known cause, which the report names; may be repeated")
+      ->type_name("PHI:REPETITION:CAUSE")
+      ->allow_extra_args(false);
+  command.add_option("--family", request.family, "fit other propellers the same way and check the paper's claims")
+      ->type_name("PATH")
+      ->check(kExistingPath);
+  command.add_flag("--raw", request.raw,
+                   "add time constants, and a check of the motor's clock by blade pass, from the first run");
+  command.add_option("--out", request.out, "coefficient file; report and figures go beside it")->type_name("FILE");
+  command.add_option("--propeller", request.propeller, "id of the propeller (default: from the steps)")
+      ->type_name("ID");
+  command.add_option("--diameter-in", request.diameter_in, "diameter in inches (default: from the steps)");
+  command.add_option("--blades", request.blades, "number of blades (default: from the steps)");
+  command.add_flag("--no-report", request.no_report, "write coefficients only");
+  command.add_flag("--json", request.json, "print the result as JSON");
+  command.footer("kphi fit results/<folder>\nkphi fit K.csv --anchored --points 45,90 --out k.yaml");
+}
+
+void add_report(CLI::App& program, ExitCode& exit_code) {
+  const auto [command, request] = add_verb<ReportRequest>(
+      program, exit_code, "report", "draw report.html of fitted campaigns again, several on one page", run_report);
+  command.add_option("DIR", request.folders, "campaign folders with steps.csv and coefficients.yaml")
+      ->required()
+      ->type_name("")
+      ->check(kExistingFolder);
+  command
+      .add_option("--out", request.out, "page (default: report.html in DIR; for several DIRs: in the working folder)")
+      ->type_name("FILE");
+  command.footer("kphi report results/<5x2> results/<5x3> results/<6x2> results/<6x3> --out four.html");
+}
+
+}  // namespace kphi::commands

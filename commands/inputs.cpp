@@ -1,0 +1,159 @@
+#include "commands/inputs.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "base/error.hpp"
+#include "compensation/file/coefficient_file.hpp"
+#include "fit/coefficients/coefficients.hpp"
+#include "fit/logs/coefficient_table.hpp"
+#include "profiles/bench_config.hpp"
+#include "profiles/campaign.hpp"
+#include "results/campaign_folder.hpp"
+#include "results/file_layer.hpp"
+#include "results/journal.hpp"
+#include "results/steps_csv.hpp"
+#include "results/version.hpp"
+
+namespace kphi::commands {
+namespace {
+
+using namespace fit;
+
+namespace fs = std::filesystem;
+
+void take_rejected(const results::CampaignFolder& folder, Provenance& provenance) {
+  const auto text = [](const nlohmann::json& data, const char* key) {
+    return data.contains(key) && data[key].is_string() ? data[key].get<std::string>() : std::string("unknown");
+  };
+  for (const results::JournalEntry& entry : results::read_journal(folder.journal()).entries)
+    if (entry.event == results::kRunAborted)
+      provenance.rejected.push_back({text(entry.data, "run"), entry.utc, text(entry.data, "reason")});
+}
+
+/// Accepted runs with the checksums the journal holds, and when the last of them ended; without a journal the files
+/// as they lie there.
+void take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
+  if (fs::exists(folder.journal())) {
+    for (const results::JournalEntry& entry : results::read_journal(folder.journal()).entries) {
+      if (entry.event != results::kRunAccepted || !entry.data.contains("file") || !entry.data.contains("sha256"))
+        continue;
+      provenance.runs.push_back({entry.data["file"], entry.data["sha256"], "", std::nullopt});
+      provenance.measured_utc = entry.utc;
+    }
+    take_rejected(folder, provenance);
+    return;
+  }
+  for (const fs::path& run : folder.complete_runs())
+    provenance.runs.push_back(
+        {fs::relative(run, folder.path()).string(), results::sha256_of_file(run), "", std::nullopt});
+}
+
+MotorClock clock_of(const fs::path& bench_file) {
+  const auto gain = profiles::load_bench(bench_file.string()).iq.clock_gain;
+  return gain ? MotorClock{gain->factor, gain->u_factor} : MotorClock{};
+}
+
+FitInput campaign_input(const fs::path& path) {
+  const auto folder = results::CampaignFolder::open(path);
+  if (!fs::exists(folder.steps())) {
+    throw ConfigurationError(
+        fmt::format("{}: no steps.csv; `kphi replay {}` makes it from the runs", path.string(), path.string()));
+  }
+  FitInput input;
+  input.folder = path;
+  input.campaign = true;
+  input.steps = results::read_steps(folder.steps());
+  input.provenance.source = "steps.csv of the campaign folder";
+  take_runs(folder, input.provenance);
+  if (fs::exists(folder.bench_file())) input.provenance.clock = clock_of(folder.bench_file());
+  if (fs::exists(folder.campaign_file())) {
+    const profiles::Campaign campaign = profiles::load_campaign(folder.campaign_file().string());
+    input.provenance.campaign = campaign.name;
+    input.provenance.propeller_name = campaign.propeller.name;
+    input.provenance.supply_v = campaign.supply.value();
+  }
+  return input;
+}
+
+FitInput file_input(const fs::path& path) {
+  FitInput input;
+  input.folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  input.provenance.campaign = path.stem().string();
+  input.provenance.source = path.filename().string();
+  const std::string text = results::read_text(path);
+  if (is_k_table(text)) {
+    input.table = read_k_table(text, path.string());
+  } else {
+    input.steps = results::parse_steps(text, path.string());
+  }
+  return input;
+}
+
+}  // namespace
+
+FitInput load_input(const std::string& path) {
+  const bool campaign = fs::exists(fs::path(path) / "journal.jsonl") || fs::exists(fs::path(path) / "runs");
+  if (fs::is_directory(path) && !campaign && !fs::exists(fs::path(path) / "steps.csv")) {
+    throw ConfigurationError(path +
+                             ": no campaign and no steps.csv in it; name a folder made by `kphi run` or `kphi import`");
+  }
+  FitInput input = campaign                 ? campaign_input(path)
+                   : fs::is_directory(path) ? file_input(fs::path(path) / "steps.csv")
+                                            : file_input(path);
+  input.provenance.tool_version = kVersion;
+  return input;
+}
+
+AnalysisOptions analysis_options(const FitInput& input, const Identification& identification) {
+  AnalysisOptions options;
+  if (const auto& air = identification.air) {
+    options.air_density_kg_m3 = air->kg_m3;
+    options.bench.air_density = air->u_kg_m3 / air->kg_m3;
+  }
+  if (const auto& clock = input.provenance.clock) options.bench.motor_clock = clock->u_gain;
+  return options;
+}
+
+fs::path coefficient_file_of(const std::string& path) {
+  const fs::path file = fs::is_directory(path) ? fs::path(path) / "coefficients.yaml" : fs::path(path);
+  if (!fs::exists(file))
+    throw ConfigurationError(fmt::format("{}: not fitted yet; run `kphi fit {}` first", path, path));
+  return file;
+}
+
+FittedFolder fitted_again(const std::string& folder) {
+  FitInput input = load_input(folder);
+  const fs::path file = coefficient_file_of(folder);
+  if (!input.table.empty())
+    throw ConfigurationError(folder + ": steps.csv is a table of k without steps; use the report of `kphi fit`");
+  const RecordedFit record = read_recorded_fit(file.string());
+  Identification identification = identify_again(input.steps, record);
+  AnalysisOptions options = analysis_options(input, identification);
+  if (record.bench) options.bench = *record.bench;
+  input.provenance.bench = options.bench;
+  Analysis analysis = analyse(identification, options);
+  return {std::move(input), std::move(identification), std::move(analysis)};
+}
+
+void add_flight_files(CLI::App& command, std::string& coefficients, std::string& vehicle) {
+  command.add_option("--coefficients", coefficients, "coefficients.yaml of `kphi fit`")->required()->type_name("FILE");
+  command.add_option("--vehicle", vehicle, "vehicle file, such as profiles/foldable_drone.yaml")
+      ->required()
+      ->type_name("FILE");
+}
+
+compensation::ThrustCurve load_curve_for(const std::string& coefficients, const profiles::Vehicle& vehicle) {
+  const compensation::ThrustCurve curve = compensation::load_coefficients(coefficients).curve;
+  const auto mismatch = compensation::overlap_mismatch(curve.overlap(), coefficients, vehicle.overlap, vehicle.path);
+  if (mismatch) throw ConfigurationError(*mismatch);
+  return curve;
+}
+
+void write_output(const fs::path& path, const std::string& text) {
+  results::MemoryOnlySync files;
+  results::write_text(path, text, files);
+}
+
+}  // namespace kphi::commands

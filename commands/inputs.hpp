@@ -1,0 +1,54 @@
+// What several verbs read and write: a fit's input, a fitted folder, the files of a flight, outputs.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "compensation/thrust_curve.hpp"
+#include "fit/coefficients/coefficients.hpp"
+#include "fit/model/line_fit.hpp"
+#include "fit/uncertainty/analysis.hpp"
+#include "profiles/vehicle.hpp"
+#include "results/step_mean.hpp"
+
+namespace kphi::commands {
+
+/// What is fitted, and what is known about where it comes from.
+struct FitInput {
+  std::vector<results::StepMean> steps;
+  std::vector<fit::LinePoint> table;  ///< instead of steps
+  fit::Provenance provenance;
+  std::filesystem::path folder;  ///< where the outputs go
+  bool campaign = false;         ///< `folder` is a campaign folder
+};
+
+/// From a campaign folder, a folder with a steps.csv, a steps.csv or a table of k. Throws ConfigurationError, naming
+/// the next move, if there are neither steps nor coefficients.
+[[nodiscard]] FitInput load_input(const std::string& path);
+
+/// What the campaign's own files know of errors: the clock's from the bench file, the air's from its instruments.
+[[nodiscard]] fit::AnalysisOptions analysis_options(const FitInput& input, const fit::Identification& identification);
+
+/// A folder with steps and coefficients, fitted and judged again as its coefficients.yaml says.
+struct FittedFolder {
+  FitInput input;
+  fit::Identification identification;
+  fit::Analysis analysis;
+};
+[[nodiscard]] FittedFolder fitted_again(const std::string& folder);
+
+/// The coefficient file of a folder, or the file itself. Throws ConfigurationError if it does not exist.
+[[nodiscard]] std::filesystem::path coefficient_file_of(const std::string& path);
+
+/// `--coefficients` and `--vehicle`, both required.
+void add_flight_files(CLI::App& command, std::string& coefficients, std::string& vehicle);
+/// The curve of a coefficient file. Throws ConfigurationError if file and vehicle measure φ differently.
+[[nodiscard]] compensation::ThrustCurve load_curve_for(const std::string& coefficients,
+                                                       const profiles::Vehicle& vehicle);
+
+/// Writes a file that can be made again at any time: without waiting for the disk.
+void write_output(const std::filesystem::path& path, const std::string& text);
+
+}  // namespace kphi::commands

@@ -1,0 +1,103 @@
+// What telemetry asks for, how often, and what it brings.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "base/clock.hpp"
+#include "drivers/iq/wire/packet.hpp"
+
+namespace kphi::iq {
+
+enum class Quantity : std::uint8_t {
+  speed,             ///< rad/s, + = counter-clockwise
+  supply_voltage,    ///< V, power_monitor.volts
+  supply_current,    ///< A, power_monitor.amps
+  motor_current,     ///< A, the module's model-based estimate
+  coil_temperature,  ///< °C, estimated by the module
+  derate,            ///< 1 = none; below 1 the module holds its voltage back and a speed is not to be trusted
+  drive_mode,        ///< a DriveMode; 5 = coast
+  drive_pwm,         ///< share of the supply voltage after all limits, -1..1
+  fault_now,         ///< bits, see fault_words(); 0 = nothing
+};
+inline constexpr int kQuantities = 9;
+
+[[nodiscard]] constexpr std::string_view name_of(Quantity quantity) noexcept {
+  constexpr std::string_view names[kQuantities] = {"speed",         "supply_voltage",   "supply_current",
+                                                   "motor_current", "coil_temperature", "derate",
+                                                   "drive_mode",    "drive_pwm",        "fault_now"};
+  return names[static_cast<int>(quantity)];
+}
+
+/// When a question and its reply passed this host, bench time.
+struct Stamps {
+  Instant sent{0};        ///< the question was handed to the wire
+  Instant first_byte{0};  ///< of the reply came
+  Instant parsed{0};      ///< the reply was whole
+};
+
+struct Reading {
+  Quantity quantity = Quantity::speed;
+  double value = 0;         ///< in the unit named above; always finite
+  Instant time{0};          ///< bench time: midpoint of request and reply, less the time of their bytes on the wire
+  Duration uncertainty{0};  ///< half of what is left between the two: the true moment is time ± uncertainty
+  Stamps stamps;
+};
+
+/// What happened on the wire. Malformed input is counted, never an error.
+struct Counters {
+  std::uint64_t bytes_in = 0, bytes_out = 0;
+  std::uint64_t packets = 0;          ///< received whole, with a good CRC
+  std::uint64_t crc_errors = 0;       ///< candidates with a bad CRC
+  std::uint64_t refused_lengths = 0;  ///< candidates with LEN over 59
+  std::uint64_t discarded_bytes = 0;  ///< received bytes that belong to no packet
+  std::uint64_t resyncs = 0;          ///< frames given up because the rest did not come in time
+  std::uint64_t requests = 0, replies = 0;
+  std::uint64_t timeouts = 0;
+  std::uint64_t unknown_entries = 0;     ///< replies of a type or sub that no table knows
+  std::uint64_t late_replies = 0;        ///< came after their request had timed out; never used
+  std::uint64_t unasked = 0;             ///< replies without a request, and packets that are not replies
+  std::uint64_t wrong_module = 0;        ///< replies of another module id
+  std::uint64_t wrong_length = 0;        ///< replies whose data has another length than the entry's format
+  std::uint64_t bad_values = 0;          ///< NaN and infinity
+  std::uint64_t skipped_polls = 0;       ///< due while the same question was still open
+  std::uint64_t dropped_readings = 0;    ///< not taken in time
+  std::uint64_t coasts = 0;              ///< coast commands given to the wire
+  std::uint64_t unconfirmed_coasts = 0;  ///< times the module did not report coast after several commands
+  std::uint64_t module_resets = 0;       ///< times it was seen to have restarted by itself
+  std::uint64_t lease_expiries = 0;      ///< times the host's watchdog coasted the motor (Motor)
+  std::uint64_t reconnections = 0;       ///< times the link was lost and found again (Motor)
+
+  /// Takes over what the parser has counted.
+  void take(const Parser::Counters& parsed) noexcept {
+    bytes_in = parsed.bytes;
+    packets = parsed.packets;
+    crc_errors = parsed.crc_errors;
+    refused_lengths = parsed.refused_lengths;
+    discarded_bytes = parsed.discarded_bytes;
+  }
+};
+
+/// How one module is polled. Times are bench time.
+struct Settings {
+  int module_id = 0;         ///< 0..62
+  double telemetry_hz = 50;  ///< cycles per second of bench time; each asks for all of `every_cycle`
+  std::vector<Quantity> every_cycle{Quantity::speed};
+  double slow_hz = 0;            ///< queries per second for the other quantities, in turn; 0: telemetry_hz, up to 50
+  Duration reply_timeout{0};     ///< the first and the longest time-out of a request; 0: 100 ms, and Motor stretches
+                                 ///< these as wall time
+  Duration shortest_timeout{0};  ///< lower bound of the time-out after fast round trips; 0: 2/5 of reply_timeout
+  Duration slow_round_trip{0};   ///< a median above this becomes an event; 0: 1/25 of reply_timeout (4 ms)
+  Duration wire_byte_time{0};    ///< 10 bits of one byte; 0: Motor takes 10/baud
+  bool wire_paces = false;       ///< bytes really take that long, so a reply that arrives sooner is a duplicate; Motor:
+                                 ///< on an adapter, not on a pseudo-terminal
+  double module_timeout_s = 0.5;  ///< the module coasts by itself after this silence; in its own seconds
+  Duration longest_silence{0};    ///< the same as bench time; 0: module_timeout_s, and Motor stretches it as wall time
+  std::size_t credit_bytes = 63;  ///< most bytes of unanswered frames, 18 or more: the module's receive buffer has 64
+};
+
+/// With every 0 replaced as above. Throws std::invalid_argument for settings that make no sense.
+[[nodiscard]] Settings completed(Settings settings);
+
+}  // namespace kphi::iq

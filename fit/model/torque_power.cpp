@@ -1,0 +1,85 @@
+#include "fit/model/torque_power.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "base/error.hpp"
+#include "fit/model/identification.hpp"
+
+namespace kphi::fit {
+namespace {
+
+/// Steps with the torque in place of the thrust, positive: its sign is only the direction of rotation.
+std::vector<results::StepMean> torque_steps(std::span<const results::StepMean> steps) {
+  double sum = 0;
+  for (const results::StepMean& step : steps) sum += step.torque_nm;
+  std::vector<results::StepMean> result;
+  if (!std::isfinite(sum) || sum == 0) return result;
+  for (results::StepMean step : steps) {
+    step.thrust_n = std::copysign(1.0, sum) * step.torque_nm;
+    step.thrust_sd_n = step.torque_sd_nm;
+    step.zero_n = std::numeric_limits<double>::quiet_NaN();
+    result.push_back(std::move(step));
+  }
+  return result;
+}
+
+double relative(const Estimate& estimate) { return estimate.value != 0 ? estimate.u / std::abs(estimate.value) : 0; }
+
+}  // namespace
+
+std::vector<TorqueCoefficient> identify_torque(std::span<const results::StepMean> steps,
+                                               std::span<const double> phis_deg, std::span<const Estimate> k) {
+  std::vector<TorqueCoefficient> result;
+  const std::vector<results::StepMean> torques = torque_steps(steps);
+  if (torques.empty()) return result;
+  Repeatability repeatability;
+  std::vector<OcclusionCoefficient> table;
+  try {
+    table = coefficients_of(torques, {}, 0, repeatability);
+  } catch (const FitError&) {
+    return result;
+  }
+  if (table.size() != phis_deg.size() || table.front().k == 0) return result;
+  const double freedom = repeatability.repeated ? repeatability.freedom() : 0;
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    TorqueCoefficient row;
+    row.phi_deg = table[i].phi_deg;
+    row.k_q = {table[i].k, table[i].standard_error,
+               repeatability.repeated ? freedom : static_cast<double>(table[i].fit->n - 1)};
+    row.share = table[i].k / table.front().k;
+    row.share_u = i == 0 ? 0 : std::abs(row.share) * std::hypot(relative(row.k_q), relative(result.front().k_q));
+    row.drag_per_thrust_m = {row.k_q.value / k[i].value, 0, std::min(row.k_q.freedom, k[i].freedom)};
+    row.drag_per_thrust_m.u = std::abs(row.drag_per_thrust_m.value) * std::hypot(relative(row.k_q), relative(k[i]));
+    result.push_back(row);
+  }
+  return result;
+}
+
+std::vector<StepPower> power_of(std::span<const results::StepMean> steps) {
+  std::map<std::pair<double, int>, std::vector<StepPower>> groups;
+  for (const results::StepMean& step : steps) {
+    const bool by_supply = !std::isnan(step.supply_w);
+    const double watts = by_supply ? step.supply_w : step.supply_voltage_v * step.supply_current_a;
+    if (!(watts > 0)) continue;
+    groups[{step.occlusion_deg, step.step}].push_back(
+        {step.occlusion_deg, step.step, step.speed_rad_s, step.thrust_n, watts, by_supply});
+  }
+  std::vector<StepPower> rows;
+  for (const auto& [key, group] : groups) {
+    StepPower mean{key.first, key.second, 0, 0, 0, true};
+    const double n = static_cast<double>(group.size());
+    for (const StepPower& one : group) {
+      mean.speed_rad_s += one.speed_rad_s / n;
+      mean.thrust_n += one.thrust_n / n;
+      mean.power_w += one.power_w / n;
+      mean.by_supply = mean.by_supply && one.by_supply;
+    }
+    rows.push_back(mean);
+  }
+  return rows;
+}
+
+}  // namespace kphi::fit

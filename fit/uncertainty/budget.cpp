@@ -1,0 +1,238 @@
+#include "fit/uncertainty/budget.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+#include "base/csv.hpp"
+#include "base/error.hpp"
+#include "compensation/units.hpp"
+
+namespace kphi::fit {
+namespace {
+
+struct Entry {
+  const char* name;
+  std::optional<double> BenchUncertainty::*member;
+  double unit;
+};
+
+constexpr std::array<Entry, 5> kEntries{{
+    {"calibration", &BenchUncertainty::cell_calibration, 1},
+    {"cross-axis", &BenchUncertainty::cross_axis, 1},
+    {"alignment-deg", &BenchUncertainty::alignment_rad, kPi / 180},
+    {"clock", &BenchUncertainty::motor_clock, 1},
+    {"density", &BenchUncertainty::air_density, 1},
+}};
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr double kEndless = std::numeric_limits<double>::infinity();
+constexpr const char* kUnitOfK = "N/(rad/s)^2";
+
+struct Part {
+  double contribution = 0;  // signed where common
+  double freedom = kEndless;
+};
+
+Part part_of(const ErrorSource& source, std::span<const double> weights) {
+  double sum = 0, squares = 0, spread = 0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    if (weights[i] == 0) continue;
+    const double one = weights[i] * source.sensitivity[i] * source.u[i];
+    sum += one;
+    squares += one * one;
+    spread += std::pow(one, 4) / source.freedom[i];
+  }
+  if (source.common) return {sum, source.freedom.front()};
+  const double freedom = source.shared_freedom > 0 ? source.shared_freedom
+                         : spread > 0              ? squares * squares / spread
+                                                   : kEndless;
+  return {std::sqrt(squares), freedom};
+}
+
+/// Root mean square over the φ with a weight: the column "u" in a budget of several k.
+double typical_u(const ErrorSource& source, std::span<const double> weights) {
+  double squares = 0, n = 0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    if (weights[i] == 0) continue;
+    squares += source.u[i] * source.u[i];
+    ++n;
+  }
+  return n > 0 ? std::sqrt(squares / n) : 0;
+}
+
+ErrorSource source_of(const char* name, Evaluation evaluation, const char* unit, std::size_t n) {
+  ErrorSource source;
+  source.name = name;
+  source.evaluation = evaluation;
+  source.unit = unit;
+  source.u.assign(n, kUnknown);
+  source.sensitivity.assign(n, 0);
+  source.freedom.assign(n, kEndless);
+  return source;
+}
+
+/// A relative error common to all measurements of the bench. k follows it to the power `power`; the user gives it with
+/// --u `option`.
+void add_common(ErrorSources& sources, const char* name, const char* option, const std::optional<double>& u,
+                double power, const char* unit = "1", const char* note = "") {
+  ErrorSource source = source_of(name, Evaluation::type_b, unit, sources.k().size());
+  source.common = true;
+  source.note = u ? note : fmt::format("unknown; give it with --u {}=VALUE", option);
+  for (std::size_t i = 0; i < sources.k().size(); ++i) {
+    source.u[i] = u.value_or(kUnknown);
+    source.sensitivity[i] = power * sources.k()[i];
+  }
+  sources.add(std::move(source));
+}
+
+void add_bench(ErrorSources& sources, const BenchUncertainty& bench) {
+  add_common(sources, "cell calibration", "calibration", bench.cell_calibration, 1);
+  add_common(sources, "cross-axis", "cross-axis", bench.cross_axis, 1);
+  // cos α = 1 − α²/2: no first order. The standard deviation of α²/2 is u²/√2.
+  add_common(sources, "alignment", "alignment-deg", bench.alignment_rad,
+             bench.alignment_rad.value_or(0) / std::numbers::sqrt2, "rad", "second order");
+  add_common(sources, "motor clock", "clock", bench.motor_clock, -2);
+}
+
+void add_repeatability(ErrorSources& sources, const Repeatability& all) {
+  const std::size_t n = all.angles.size();
+  ErrorSource noise = source_of("noise within runs", Evaluation::type_a, kUnitOfK, n);
+  ErrorSource between = source_of("repetitions", Evaluation::type_a, "1", n);
+  ErrorSource zero = source_of("zero drift", Evaluation::type_b, "N", n);
+  between.shared_freedom = all.between.freedom;
+  between.note = all.repeated ? "beyond noise and zero, pooled over phi" : "unknown: one run each";
+  zero.note = "rectangular, half of the drift of each zero";
+  for (std::size_t i = 0; i < n; ++i) {
+    const AngleScatter& angle = all.angles[i];
+    noise.u[i] = angle.within_u();
+    noise.sensitivity[i] = 1;
+    if (angle.within.freedom > 0) noise.freedom[i] = angle.within.freedom;
+    if (all.repeated) between.u[i] = all.between.u / std::sqrt(static_cast<double>(angle.runs.size()));
+    between.sensitivity[i] = angle.k;
+    zero.u[i] = angle.zero_u_n;
+    zero.sensitivity[i] = angle.zero_sensitivity;
+  }
+  sources.add(std::move(noise));
+  sources.add(std::move(between));
+  sources.add(std::move(zero));
+}
+
+void add_inadequacy(ErrorSources& sources, std::span<const SpeedDependence> speed) {
+  ErrorSource source = source_of("model T = k w^2", Evaluation::type_a, kUnitOfK, sources.k().size());
+  source.note = "deviation of k between speeds beyond noise, where the test finds it";
+  for (std::size_t i = 0; i < speed.size(); ++i) {
+    source.u[i] = speed[i].inadequacy;
+    source.sensitivity[i] = 1;
+  }
+  if (!speed.empty()) sources.add(std::move(source));
+}
+
+}  // namespace
+
+double BudgetRow::contribution() const { return known() ? std::abs(sensitivity) * u : 0; }
+
+double Budget::combined() const {
+  double squares = 0;
+  for (const BudgetRow& row : rows) squares += std::pow(row.contribution(), 2);
+  return std::sqrt(squares);
+}
+
+double Budget::freedom() const {
+  double spread = 0;
+  for (const BudgetRow& row : rows) spread += std::pow(row.contribution(), 4) / row.freedom;
+  return spread > 0 ? std::pow(combined(), 4) / spread : std::numeric_limits<double>::infinity();
+}
+
+double Budget::coverage(double level) const { return coverage_factor(freedom(), level); }
+
+double Budget::expanded(double level) const { return coverage(level) * combined(); }
+
+double Budget::share(const BudgetRow& row) const {
+  const double whole = combined();
+  return whole > 0 ? std::pow(row.contribution() / whole, 2) : 0;
+}
+
+void set_uncertainty(BenchUncertainty& bench, const std::string& text) {
+  const std::size_t equals = text.find('=');
+  const double value = equals == std::string::npos ? -1 : parse_number(text.substr(equals + 1)).value_or(-1);
+  for (const Entry& entry : kEntries) {
+    if (text.substr(0, equals) != entry.name || !(value >= 0)) continue;
+    bench.*entry.member = value * entry.unit;
+    return;
+  }
+  throw ConfigurationError(fmt::format(
+      "--u {}: expected NAME=VALUE, NAME one of calibration, cross-axis, clock, density (relative: 0.002 is 0.2 %) or "
+      "alignment-deg, VALUE a standard uncertainty, 0 or above",
+      text));
+}
+
+std::vector<std::pair<std::string, double>> known_uncertainties(const BenchUncertainty& bench) {
+  std::vector<std::pair<std::string, double>> known;
+  for (const Entry& entry : kEntries)
+    if (const auto& value = bench.*entry.member) known.emplace_back(entry.name, *value / entry.unit);
+  return known;
+}
+
+Budget ErrorSources::budget(std::string quantity, std::string unit, double value,
+                            std::span<const double> weights) const {
+  Budget result{std::move(quantity), std::move(unit), value, {}};
+  for (const ErrorSource& source : sources_) {
+    const Part part = part_of(source, weights);
+    const double u = typical_u(source, weights);
+    BudgetRow row;
+    row.source = source.name;
+    row.evaluation = source.evaluation;
+    row.u = u;
+    row.unit = source.unit;
+    row.sensitivity = u > 0 ? part.contribution / u : 0;
+    row.freedom = part.freedom;
+    row.common = source.common;
+    row.note = source.note;
+    result.rows.push_back(std::move(row));
+  }
+  return result;
+}
+
+double ErrorSources::covariance(std::span<const double> a, std::span<const double> b) const {
+  double result = 0;
+  for (const ErrorSource& source : sources_) {
+    double sum_a = 0, sum_b = 0, products = 0;
+    for (std::size_t i = 0; i < k_.size(); ++i) {
+      const double effect = std::isnan(source.u[i]) ? 0 : source.sensitivity[i] * source.u[i];
+      sum_a += a[i] * effect;
+      sum_b += b[i] * effect;
+      products += a[i] * b[i] * effect * effect;
+    }
+    result += source.common ? sum_a * sum_b : products;
+  }
+  return result;
+}
+
+ErrorSources error_sources(const Repeatability& repeatability, std::span<const SpeedDependence> speed,
+                           const BenchUncertainty& bench) {
+  std::vector<double> k;
+  for (const AngleScatter& angle : repeatability.angles) k.push_back(angle.k);
+  ErrorSources sources(std::move(k));
+  add_repeatability(sources, repeatability);
+  add_inadequacy(sources, speed);
+  add_bench(sources, bench);
+  return sources;
+}
+
+ErrorSources error_sources(std::vector<double> k, std::vector<double> standard_errors) {
+  ErrorSource source = source_of("given standard error", Evaluation::type_b, kUnitOfK, k.size());
+  for (std::size_t i = 0; i < k.size(); ++i) {
+    if (standard_errors[i] > 0) source.u[i] = standard_errors[i];
+    source.sensitivity[i] = 1;
+  }
+  ErrorSources sources(std::move(k));
+  sources.add(std::move(source));
+  return sources;
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,104 @@
+// Uncertainty budget by the GUM (JCGM 100:2008): what the stand's errors are, what each does to every k(φ), and the
+// budget of any linear function of the k: independent errors add by squares, common ones by their sum.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "fit/model/repeatability.hpp"
+#include "fit/numerics/hypothesis_test.hpp"
+#include "fit/uncertainty/speed_dependence.hpp"
+
+namespace kphi::fit {
+
+enum class Evaluation : std::uint8_t {
+  type_a,  ///< from the scatter of what was measured here
+  type_b,  ///< from anything else: data sheet, check weight, judgement
+};
+
+struct BudgetRow {
+  std::string source;  ///< "repetitions", "motor clock", …
+  Evaluation evaluation = Evaluation::type_a;
+  double u = 0;            ///< standard uncertainty of the input, in `unit`; NaN: unknown, missing in the sum
+  std::string unit;        ///< "N", "1" (relative), …
+  double sensitivity = 0;  ///< change of the result per `unit`
+  double freedom = std::numeric_limits<double>::infinity();
+  bool common = false;  ///< the same error in every coefficient of the campaign: it cancels in ratios
+  std::string note;     ///< where the number comes from; may be empty
+
+  [[nodiscard]] bool known() const { return u == u; }
+  [[nodiscard]] double contribution() const;  ///< |sensitivity| u, unit of the result; 0 if unknown
+};
+
+struct Budget {
+  std::string quantity;  ///< "K_T", "k(45 deg)", "slope", "k_i(90 deg)", …
+  std::string unit;      ///< of the value
+  double value = 0;
+  std::vector<BudgetRow> rows;
+
+  [[nodiscard]] double combined() const;                     ///< standard uncertainty (eq. 10; rows are independent)
+  [[nodiscard]] double freedom() const;                      ///< Welch-Satterthwaite (G.2b)
+  [[nodiscard]] double coverage(double level = 0.95) const;  ///< Student's factor for freedom()
+  [[nodiscard]] double expanded(double level = 0.95) const;  ///< half the interval
+  [[nodiscard]] double share(const BudgetRow& row) const;    ///< of the variance, 0..1
+  [[nodiscard]] Estimate estimate() const { return {value, combined(), freedom()}; }
+};
+
+/// Standard uncertainties of the stand, which its steps do not show; from its calibration. nullopt: unknown, listed in
+/// the budget without a value and not taken as zero.
+struct BenchUncertainty {
+  std::optional<double> cell_calibration;  ///< relative, of the load cell's sensitivity
+  std::optional<double> cross_axis;        ///< relative to the thrust, what other loads make the cell read
+  std::optional<double> alignment_rad;     ///< between thrust and the cell's axis
+  std::optional<double> motor_clock;       ///< relative, of the clock behind the speed of the motor module
+  std::optional<double> air_density;       ///< relative; enters k in standard air only
+};
+
+/// "NAME=VALUE" with NAME one of calibration, cross-axis, alignment-deg, clock, density. Throws ConfigurationError.
+void set_uncertainty(BenchUncertainty& bench, const std::string& text);
+
+/// NAME and VALUE of those that are known, as set_uncertainty reads them.
+[[nodiscard]] std::vector<std::pair<std::string, double>> known_uncertainties(const BenchUncertainty& bench);
+
+struct ErrorSource {
+  std::string name;
+  Evaluation evaluation = Evaluation::type_a;
+  std::string unit;
+  std::string note;
+  bool common = false;              ///< the same error at every φ
+  double shared_freedom = 0;        ///< one estimate behind all φ; 0: each its own
+  std::vector<double> u;            ///< per φ, in `unit`; NaN: unknown
+  std::vector<double> sensitivity;  ///< of k per `unit`
+  std::vector<double> freedom;
+};
+
+class ErrorSources {
+ public:
+  explicit ErrorSources(std::vector<double> k) : k_(std::move(k)) {}
+  void add(ErrorSource source) { sources_.push_back(std::move(source)); }
+
+  /// Of Σ weights · k.
+  [[nodiscard]] Budget budget(std::string quantity, std::string unit, double value,
+                              std::span<const double> weights) const;
+  /// Of two linear functions.
+  [[nodiscard]] double covariance(std::span<const double> a, std::span<const double> b) const;
+  [[nodiscard]] const std::vector<double>& k() const { return k_; }
+
+ private:
+  std::vector<double> k_;
+  std::vector<ErrorSource> sources_;
+};
+
+/// Of a bench and its steps. `speed` gives the model's inadequacy; one per φ, or empty.
+[[nodiscard]] ErrorSources error_sources(const Repeatability& repeatability, std::span<const SpeedDependence> speed,
+                                         const BenchUncertainty& bench);
+
+/// Of a table of coefficients found elsewhere: its own standard errors.
+[[nodiscard]] ErrorSources error_sources(std::vector<double> k, std::vector<double> standard_errors);
+
+}  // namespace kphi::fit

@@ -1,0 +1,109 @@
+#include "fit/logs/coefficient_table.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <string>
+
+#include "base/error.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(UiucTable, TakesTheDiameterFromTheName) {
+  EXPECT_EQ(diameter_from_name("apcff_4.2x4_static_0615rd.txt"), 4.2);
+  EXPECT_EQ(diameter_from_name("apcsf_10x7_static_kt0827.txt"), 10);
+  EXPECT_FALSE(diameter_from_name("static.txt"));
+  EXPECT_FALSE(diameter_from_name("xx"));
+  EXPECT_FALSE(diameter_from_name(""));
+  EXPECT_FALSE(diameter_from_name("a_0x3.txt"));
+}
+
+TEST(UiucTable, TurnsTheCoefficientIntoThrust) {
+  const auto imported = read_uiuc("RPM CT CP\r\n6000 0.1 0.05\r\n", "apc_10x7_s.txt");
+  EXPECT_NEAR(imported.steps[0].thrust_n, 0.1 * 1.225 * 100 * 100 * std::pow(0.254, 4), 1e-12);
+  EXPECT_NEAR(imported.steps[0].speed_rad_s, 628.3185307, 1e-6);
+  EXPECT_THROW((void)read_uiuc("RPM CT\n6000 0.1\n", "table.txt"), ConfigurationError) << "no diameter";
+  EXPECT_NO_THROW((void)read_uiuc("RPM CT\n6000 0.1\n", "table.txt", {.diameter_in = 10}));
+  EXPECT_THROW((void)read_uiuc("RPM CP\n6000 0.1\n", "a_10x7.txt"), ConfigurationError);
+}
+
+TEST(KTable, ReadsCoefficientsInBothUnits) {
+  const auto si = read_k_table("phi_deg,k,u_k\n0,1.55e-6,1e-9\n45,1.4e-6,2e-9\n", "K.csv");
+  ASSERT_EQ(si.size(), 2u);
+  EXPECT_EQ(si[1].k, 1.4e-6);
+  EXPECT_EQ(si[1].standard_error, 2e-9);
+  const auto rpm = read_k_table("phi_deg,k_n_per_rpm2\n0,1.7e-8\n", "K.csv");
+  EXPECT_NEAR(rpm[0].k, 1.7e-8 * 91.189065, 1e-12);
+  EXPECT_EQ(rpm[0].standard_error, 0);
+}
+
+TEST(KTable, NamesTheLineThatIsWrong) {
+  for (const char* bad : {"phi_deg\n0\n", "k\n1\n", "phi_deg,k\n0\n", "phi_deg,k\n0,x\n", "phi_deg,k\n400,1e-6\n",
+                          "phi_deg,k\n0,-1e-6\n", ""}) {
+    EXPECT_THROW((void)read_k_table(bad, "K.csv"), ConfigurationError) << bad;
+  }
+  try {
+    (void)read_k_table("phi_deg,k\n0,1e-6\n45,abc\n", "K.csv");
+    FAIL();
+  } catch (const ConfigurationError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("K.csv:3"));
+  }
+  EXPECT_TRUE(is_k_table("phi_deg,k\n"));
+  EXPECT_FALSE(is_k_table("propeller,blades\n"));
+}
+
+TEST(Tables, NoMutationOfATableCrashesAReader) {
+  const std::string seeds[] = {
+      "\xEF\xBB\xBFTime (s),ESC (µs),Thrust (gf),Motor Electrical Speed (RPM),Motor Optical Speed (RPM),App message,\n"
+      "0,1050,6.07,0,0,,\n2.2,1145,14.6,3853,0,\"a,b\",\n3.9,1240,29.2,5196,0,,\n",
+      "RPM CT CP\r\n1490.0 0.11 0.05\r\n3000 0.12 0.06\r\n", "phi_deg,k,u_k\n0,1.55e-6,1e-9\n45,1.4e-6,2e-9\n"};
+  std::mt19937 random(42);
+  std::size_t accepted = 0, refused = 0;
+  for (int trial = 0; trial < 30000; ++trial) {
+    std::string text = seeds[trial % 3];
+    const int edits = 1 + static_cast<int>(random() % 6);
+    for (int i = 0; i < edits && !text.empty(); ++i) {
+      const std::size_t at = random() % text.size();
+      const char bytes[] = {',', '"', '\n', '\r', ' ', '\0', '-', 'e', '9', static_cast<char>(random())};
+      switch (random() % 4) {
+        case 0:
+          text[at] = bytes[random() % 10];
+          break;
+        case 1:
+          text.insert(at, 1, bytes[random() % 10]);
+          break;
+        case 2:
+          text.erase(at, 1 + random() % 4);
+          break;
+        default:
+          text.insert(at, text.substr(random() % text.size(), random() % 40));
+          break;
+      }
+    }
+    try {
+      switch (trial % 3) {
+        case 0:
+          accepted += select_rows(read_rcbenchmark(text, "x.csv")).steps.size();
+          break;
+        case 1:
+          accepted += read_uiuc(text, "apc_5x4_x.txt").steps.size();
+          break;
+        default:
+          accepted += read_k_table(text, "K.csv").size();
+          break;
+      }
+    } catch (const ConfigurationError&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(accepted, 0u);
+  EXPECT_GT(refused, 0u);
+}
+
+}  // namespace
+}  // namespace kphi::fit

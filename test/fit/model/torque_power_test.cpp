@@ -1,0 +1,65 @@
+#include "fit/model/torque_power.hpp"
+
+#include <gtest/gtest.h>
+
+#include "fit/model/identification.hpp"
+#include "fit/report/report.hpp"
+#include "test/fit/campaign_steps.hpp"
+
+namespace kphi::fit {
+namespace {
+
+results::StepMean step(double phi, int number, double thrust_n) {
+  results::StepMean one;
+  one.occlusion_deg = phi;
+  one.repetition = 1;
+  one.step = number;
+  one.thrust_n = thrust_n;
+  return one;
+}
+
+TEST(Power, IsThatOfTheSupplyWhereItWasMeasured) {
+  results::StepMean one = step(0, 3, 9.80665);
+  one.supply_voltage_v = 11.5;
+  one.supply_current_a = 10;
+  one.supply_w = 200;
+  const auto rows = power_of({&one, 1});
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_TRUE(rows[0].by_supply);
+  EXPECT_DOUBLE_EQ(rows[0].power_w, 200);
+  EXPECT_DOUBLE_EQ(rows[0].gram_per_watt(), 5);
+  EXPECT_DOUBLE_EQ(rows[0].newton_per_watt(), 9.80665 / 200);
+}
+
+TEST(Power, ElseItIsThatOfTheModule) {
+  results::StepMean one = step(0, 3, 2);
+  one.supply_voltage_v = 11.5;
+  one.supply_current_a = 10;
+  const auto rows = power_of({&one, 1});
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_FALSE(rows[0].by_supply);
+  EXPECT_DOUBLE_EQ(rows[0].power_w, 115);
+}
+
+TEST(Power, IsTheMeanOfTheRepetitionsOfAStep) {
+  std::vector<results::StepMean> steps{step(90, 1, 1), step(90, 1, 3), step(45, 1, 1), step(90, 0, 1)};
+  for (auto& one : steps) one.supply_w = 10 * one.thrust_n;
+  const auto rows = power_of(steps);
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_EQ(rows[0].phi_deg, 45);
+  EXPECT_EQ(rows[1].step, 0);
+  EXPECT_DOUBLE_EQ(rows[2].thrust_n, 2);
+  EXPECT_DOUBLE_EQ(rows[2].power_w, 20);
+}
+
+TEST(Power, StandsInTheReportOnlyWhereSomebodyMeasuredIt) {
+  auto steps = campaign_steps();
+  EXPECT_EQ(format_report(identify(steps), {}, {}).find("g/W"), std::string::npos);
+  for (auto& one : steps) one.supply_w = 100 * one.thrust_n / 9.80665e-3 / 500;
+  const std::string report = format_report(identify(steps), {}, {});
+  EXPECT_NE(report.find("<th>g/W</th><th>N/W</th>"), std::string::npos);
+  EXPECT_NE(report.find("<td>5.000</td><td>0.04903</td><td class=\"text\">supply</td>"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace kphi::fit
