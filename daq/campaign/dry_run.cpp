@@ -336,16 +336,15 @@ std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles:
   const double slew_s = ramp_time(campaign.profile, dry.plan.runs.front()).value();
   return fmt::format(
       "{}\n\norder: {}\n{}\ntime: {} spinning{}, {} on the bench with the zeros; plus mounting (waits for you), "
-      "spinning "
-      "down{}, and at most {} extra runs per occlusion if repetitions disagree\n\nchecks: {}\n{}\nthe motor coasts "
-      "when "
-      "the guard sees:\n  {}\n",
+      "spinning down{}, and at most {} more per occlusion if repetitions disagree\n\nchecks: {}\n{}\n"
+      "the motor coasts when the guard sees:\n  {}\n",
       plan_text(campaign, config, dry.plan), profiles::to_words(campaign.order), runs_text(dry.plan, campaign),
       minutes(dry.plan.spinning.value()),
       slew_s > 0 ? fmt::format(" ({} of ramps in the first run)", minutes(slew_s)) : "",
       minutes(dry.plan.bench.value()), campaign.limits.cooling ? ", pauses for cooling (of unknown length)" : "",
-      campaign.repetitions_extra_max, refused == 0 ? "nothing refused" : fmt::format("{} refused", refused),
-      checks_text(dry.checks), fmt::join(to_lines(dry.limits), "\n  "));
+      campaign.repetitions_extra_max == 1 ? "1 run" : fmt::format("{} runs", campaign.repetitions_extra_max),
+      refused == 0 ? "nothing refused" : fmt::format("{} refused", refused), checks_text(dry.checks),
+      fmt::join(to_lines(dry.limits), "\n  "));
 }
 
 json to_json(const DryRun& dry, const Campaign& campaign, const profiles::BenchConfig& config) {
