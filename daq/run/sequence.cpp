@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "base/error.hpp"
 #include "daq/bench/box.hpp"
@@ -166,15 +167,19 @@ netbox::ZeroMeasurement Sequence::measure(Phase phase) {
 
 void Sequence::ramp_to(RadPerSec level, MotorEnable& spin) {
   const Slew slew(position_.commanded, level, order_.campaign.profile.slew_rad_s2);
-  const Instant begun = bench_.clock().now();
   if (slew.lasts() == Duration(0)) return;
   position_.phase = "ramp";
   mark(Phase::ramp, -1, level);
-  for (Instant now = begun; now - begun < slew.lasts(); now = bench_.clock().now()) {
-    position_.commanded = slew.at(now - begun);
+  const Duration tick = bench_.clock().stretched(kTickWall);
+  Instant last = bench_.clock().now();
+  for (Duration into(0); into < slew.lasts();) {
+    position_.commanded = slew.at(into);
     change_speed();
     spin.at(position_.commanded);
-    hold(std::min(bench_.clock().stretched(kTickWall), begun + slew.lasts() - now), &spin);
+    hold(std::min(tick, slew.lasts() - into), &spin);
+    // A late tick delays the ramp: a jump to where it should be by now would feed current back into the supply.
+    const Instant now = bench_.clock().now();
+    into += std::min(now - std::exchange(last, now), 2 * tick);
   }
 }
 

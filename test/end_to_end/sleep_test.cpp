@@ -45,7 +45,7 @@ const char* name_of(Moment moment) {
 std::string name_of(const Row& row) {
   const Sleep& sleep = row.sleep;
   return fmt::format("{}_{:.0f}ms{}{}{}", name_of(sleep.moment), 1e3 * sleep.seconds, sleep.supply ? "_Supply" : "",
-                     sleep.real_time ? "_RealTime" : "", sleep.sockets_kept ? "_SocketsKept" : "");
+                     sleep.real_time ? "" : "_AnyPriority", sleep.sockets_kept ? "_SocketsKept" : "");
 }
 
 std::ostream& operator<<(std::ostream& out, const Row& row) { return out << name_of(row); }
@@ -54,7 +54,7 @@ constexpr Moment kMoments[]{Moment::connecting, Moment::prompt, Moment::zero,   
                             Moment::ramp_down,  Moment::step,   Moment::spin_down};
 
 /// By night all, each resumed. By day a fifth of a second only with a supply, no minute, and resumed only after a
-/// second with a supply; at a real-time priority or with what the sockets kept, the ramp up.
+/// second with a supply; at any priority or with what the sockets kept, the ramp up.
 std::vector<Row> rows(bool all) {
   std::vector<Row> rows;
   for (const Moment moment : kMoments) {
@@ -64,8 +64,8 @@ std::vector<Row> rows(bool all) {
         if (all || by_day) rows.push_back({{moment, seconds, supply}, all || (supply && seconds == 1)});
         const bool varied = seconds == 1 || seconds == 5;
         if (!varied || (!all && (moment != Moment::ramp_up || !supply))) continue;
-        rows.push_back({{moment, seconds, supply, true, false}, all});
-        rows.push_back({{moment, seconds, supply, false, true}, all});
+        rows.push_back({{moment, seconds, supply, false, false}, all});
+        rows.push_back({{moment, seconds, supply, true, true}, all});
       }
     }
   }

@@ -1,6 +1,7 @@
 #include "test/end_to_end/sleeping_host.hpp"
 
 #include <poll.h>
+#include <sched.h>
 #include <signal.h>
 
 #include <algorithm>
@@ -21,6 +22,7 @@ using SteadyTime = std::chrono::steady_clock;
 constexpr double kFirstRpm = 6000, kLastRpm = 12000;
 constexpr double kRadPerSec = 2 * 3.14159265358979 / 60;  // of 1 RPM
 constexpr int kRealTimePriority = 10;
+constexpr int kWatchPriority = 15;  // of who looks for the moment
 constexpr int kLookEveryMs = 2;
 constexpr auto kPatience = std::chrono::seconds(40);
 const std::string kQuestion = "Enter, or q to stop:";
@@ -32,7 +34,7 @@ std::string campaign_text() {
       "format: kphi-campaign/1\nname: short\n"
       "propeller: {{id: 5x3, name: 5-inch three-blade, diameter_in: 5, blades: 3}}\n"
       "occlusions_deg: [0]\nrepetitions: 1\nrepetitions_extra_max: 0\norder: {{steps: up_and_down}}\n"
-      "profile: {{steps: 2, dwell_s: 0.6, first_rpm: {}, last_rpm: {}, slew_rpm_s: 4000}}\n"
+      "profile: {{steps: 2, dwell_s: 0.6, first_rpm: {}, last_rpm: {}, slew_rpm_s: 2500}}\n"
       "zero_s: 0.6\nminimum_discard_s: 0.3\nsupply_v: 12.0\n"
       "limits: {{speed_max_rpm: 19100, thrust_max_n: 20, supply_current_max_a: 35, coil_temperature_max_degc: 110}}\n",
       kFirstRpm, kLastRpm);
@@ -43,6 +45,12 @@ bool has(const std::string& text, const std::string& part) { return text.find(pa
 /// Share of the way from one speed to the other.
 double share(double rad_s, double from_rpm, double to_rpm) {
   return (std::abs(rad_s) / kRadPerSec - from_rpm) / (to_rpm - from_rpm);
+}
+
+/// This thread's, not its children's.
+void watch_in_real_time() {
+  const sched_param priority{kWatchPriority};
+  (void)sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &priority);
 }
 
 bool is_midway(double share) { return share > 0.3 && share < 0.7; }
@@ -61,6 +69,7 @@ SleepingHost::SleepingHost(const Sleep& sleep)
 }
 
 std::optional<Awakening> SleepingHost::sleep_once() {
+  watch_in_real_time();
   Process run(first_command(), {}, surroundings());
   if (!await_the_moment(run) || !run.freeze()) return std::nullopt;
   Awakening awakening;

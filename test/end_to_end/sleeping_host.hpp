@@ -23,10 +23,10 @@ enum class Moment { connecting, prompt, zero, ramp_up, ramp_down, step, spin_dow
 struct Sleep {
   Moment moment = Moment::step;
   double seconds = 1;
-  bool supply = false;     ///< the bench has one of its own
-  bool real_time = false;  ///< the program has a real-time priority, where that is granted
-  bool sockets_kept =
-      false;  ///< what the box sent meanwhile waits for the program, as in a virtual machine that paused
+  bool supply = false;    ///< the bench has one of its own
+  bool real_time = true;  ///< the program has a real-time priority, where that is granted
+  /// What the box sent meanwhile waits for the program, as in a virtual machine that paused.
+  bool sockets_kept = false;
 };
 
 /// What became of it.

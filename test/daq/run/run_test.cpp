@@ -116,6 +116,30 @@ TEST_F(OneRun, RampsDownOnASupplyThatSinksCurrent) {
   }
 }
 
+TEST_F(OneRun, DelaysARampThatItServesLateInsteadOfJumping) {
+  constexpr double kRate = 200;  // rad/s²
+  constexpr int kLateEvery = 7;  // ticks
+  campaign_.profile.slew_rad_s2 = kRate;
+  int tick = 0;
+  const auto late_now_and_then = [&] {
+    if (++tick % kLateEvery == 0) bench_.wait_until(bench_.clock().now() + std::chrono::milliseconds(120));
+    return false;
+  };
+  const results::RunRecording run = results::read_run(record(late_now_and_then).file);
+  const auto last_ramp =
+      std::find_if(run.phases.rbegin(), run.phases.rend(), [](const auto& mark) { return mark.phase == Phase::ramp; });
+  ASSERT_NE(last_ramp, run.phases.rend());
+  const results::MotorReading* before = nullptr;
+  for (const auto& reading : run.motor) {
+    if (reading.channel != results::MotorChannel::speed || reading.time_ns > last_ramp->time_ns) continue;
+    if (before && before->value > 600) {
+      const double lasts = 1e-9 * static_cast<double>(reading.time_ns - before->time_ns);
+      ASSERT_LT(reading.value - before->value, kRate * (lasts + 0.02) + 3) << 1e-9 * reading.time_ns;
+    }
+    before = &reading;
+  }
+}
+
 TEST_F(OneRun, LetsGoAtOnceAtATripAndSaysWhatBecameOfTheMotor) {
   campaign_.limits.thrust_max = Newtons(2.0);
   try {
