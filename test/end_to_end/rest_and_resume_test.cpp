@@ -43,7 +43,9 @@ class Stand {
     return true;
   }
   [[nodiscard]] std::string folder() const {
-    return std::filesystem::directory_iterator(bench.path("results"))->path().string();
+    for (const auto& campaign : std::filesystem::directory_iterator(bench.path("results")))
+      return campaign.path().string();
+    throw std::runtime_error("no campaign was begun: " + words);
   }
   [[nodiscard]] std::vector<std::string> command(const std::vector<std::string>& more) const {
     std::vector<std::string> all{kphi(), "run", "--bench", bench.path("bench.yaml")};
