@@ -123,26 +123,19 @@ char likely_separator(std::string_view text) {
 }  // namespace
 
 std::optional<std::size_t> Table::find_column(std::string_view name) const {
-  for (std::size_t i = 0; i < header.size(); ++i)
-    if (header[i] == name) return i;
-  return std::nullopt;
+  const auto found = std::find(header.begin(), header.end(), name);
+  if (found == header.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - header.begin());
 }
 
 std::size_t Table::column(std::string_view name) const {
-  std::size_t found = 0, times = 0;
-  for (std::size_t i = 0; i < header.size(); ++i) {
-    if (header[i] != name) continue;
-    found = i;
-    ++times;
-  }
-  if (times == 1) return found;
+  const auto times = std::count(header.begin(), header.end(), name);
+  if (times == 1) return *find_column(name);
   throw ConfigurationError(fmt::format("{}:{}: {} column \"{}\"", path, std::max<std::size_t>(header_line, 1),
                                        times == 0 ? "no" : "more than one", name));
 }
 
-Table read_csv(std::string_view text, std::string path) { return read_separated(text, std::move(path), ','); }
-
-Table read_separated(std::string_view text, std::string path, char separator) {
+Table read_csv(std::string_view text, std::string path, char separator) {
   if (separator == 0) separator = likely_separator(text);
   return read_table(text, std::move(path), [separator](std::string_view line) { return split_at(separator, line); });
 }

@@ -32,12 +32,9 @@ struct Table {
   [[nodiscard]] std::optional<std::size_t> find_column(std::string_view name) const;
 };
 
-/// Comma separated: a byte order mark, CRLF and a trailing empty field on each line are accepted; a field may be
-/// in double quotes, a quote in it doubled. Empty lines are skipped.
-[[nodiscard]] Table read_csv(std::string_view text, std::string path);
-
-/// As read_csv, separated by `separator`; 0: by the one of , ; tab that the header line has most of.
-[[nodiscard]] Table read_separated(std::string_view text, std::string path, char separator);
+/// A byte order mark, CRLF and a trailing empty field on each line are accepted; a field may be in double quotes, a
+/// quote in it doubled. Empty lines are skipped. Separator 0: the one of , ; tab that the header line has most of.
+[[nodiscard]] Table read_csv(std::string_view text, std::string path, char separator = ',');
 
 /// Separated by blanks or tabs.
 [[nodiscard]] Table read_blank_separated(std::string_view text, std::string path);

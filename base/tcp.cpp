@@ -1,93 +1,57 @@
 #include "base/tcp.hpp"
 
-#include <netdb.h>
-#include <poll.h>
-#include <sys/socket.h>
-
-#include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
-#include <memory>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core/error.hpp>
 
 namespace kphi {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-using Addresses = std::unique_ptr<addrinfo, decltype(&freeaddrinfo)>;
-
-[[noreturn]] void fail(int error) {
-  throw TcpError(error == ECONNREFUSED ? TcpError::Cause::refused : TcpError::Cause::other, std::strerror(error));
-}
-
-Addresses look_up(const std::string& host, std::uint16_t port) {
-  addrinfo wanted{}, *found = nullptr;
-  wanted.ai_socktype = SOCK_STREAM;
-  const int error = getaddrinfo(host.c_str(), std::to_string(port).c_str(), &wanted, &found);
-  if (error != 0) throw TcpError(TcpError::Cause::unknown_name, gai_strerror(error));
-  return {found, &freeaddrinfo};
-}
-
-bool again(int error) noexcept { return error == EAGAIN || error == EINTR; }
+namespace asio = boost::asio;
+using boost::system::error_code;
+using Cause = TcpError::Cause;
 
 }  // namespace
 
-TcpClient::TcpClient(std::chrono::nanoseconds wall_timeout) noexcept : deadline_(Clock::now() + wall_timeout) {}
+template <class Start>
+std::size_t TcpClient::carry_out(const char* step, Start&& start) {
+  step_ = step;
+  error_code error;
+  std::size_t count = 0;
+  start([&](error_code result, std::size_t size) {
+    error = result;
+    count = size;
+  });
+  io_.restart();
+  io_.run();
+  if (error == boost::beast::error::timeout) throw TcpError(Cause::timeout, "no answer in time");
+  if (error && error != asio::error::eof)
+    throw TcpError(error == asio::error::connection_refused ? Cause::refused : Cause::other, error.message());
+  return count;
+}
 
 void TcpClient::connect(const std::string& host, std::uint16_t port) {
-  const Addresses addresses = look_up(host, port);
-  step_ = "connect";
-  int error = 0;
-  for (const addrinfo* at = addresses.get(); at != nullptr; at = at->ai_next) {
-    socket_ = Descriptor(::socket(at->ai_family, at->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, at->ai_protocol));
-    if (::connect(socket_.number(), at->ai_addr, at->ai_addrlen) == 0) return;
-    error = errno;
-    if (error == EINPROGRESS) {
-      wait_for(POLLOUT);
-      socklen_t size = sizeof error;
-      getsockopt(socket_.number(), SOL_SOCKET, SO_ERROR, &error, &size);
-      if (error == 0) return;
-    }
-  }
-  fail(error);
+  error_code unknown;
+  const auto addresses = asio::ip::tcp::resolver(io_).resolve(host, std::to_string(port), unknown);
+  if (unknown) throw TcpError(Cause::unknown_name, unknown.message());
+  carry_out("connect", [&](auto done) {
+    stream_.async_connect(addresses, [done](error_code error, const auto&) mutable { done(error, 0); });
+  });
 }
 
 void TcpClient::send(std::string_view bytes) {
-  step_ = "send the request";
-  while (!bytes.empty()) {
-    const ssize_t sent = ::send(socket_.number(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
-    if (sent >= 0) {
-      bytes.remove_prefix(static_cast<std::size_t>(sent));
-    } else if (again(errno)) {
-      wait_for(POLLOUT);
-    } else {
-      fail(errno);
-    }
-  }
+  carry_out("send the request",
+            [&](auto done) { asio::async_write(stream_, asio::buffer(bytes.data(), bytes.size()), done); });
 }
 
 bool TcpClient::receive(std::string& to) {
-  step_ = "read the answer";
   std::array<char, 4096> bytes;
-  for (;;) {
-    wait_for(POLLIN);
-    const ssize_t received = ::recv(socket_.number(), bytes.data(), bytes.size(), 0);
-    if (received >= 0) {
-      to.append(bytes.data(), static_cast<std::size_t>(received));
-      return received > 0;
-    }
-    if (!again(errno)) fail(errno);
-  }
-}
-
-void TcpClient::wait_for(short events) const {
-  pollfd socket{socket_.number(), events, 0};
-  for (;;) {
-    const auto left = deadline_ - Clock::now();
-    if (left <= Clock::duration::zero()) throw TcpError(TcpError::Cause::timeout, "no answer in time");
-    const auto ms = std::min(std::chrono::ceil<std::chrono::milliseconds>(left).count(), std::int64_t{60'000});
-    if (::poll(&socket, 1, static_cast<int>(ms)) > 0) return;
-  }
+  const std::size_t received =
+      carry_out("read the answer", [&](auto done) { stream_.async_read_some(asio::buffer(bytes), done); });
+  to.append(bytes.data(), received);
+  return received > 0;
 }
 
 }  // namespace kphi

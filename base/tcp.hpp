@@ -1,13 +1,13 @@
-// A TCP connection with one time limit for all of it: name, connection, sending, receiving.
+// A TCP connection with one time limit for all of it: connection, sending, receiving; or one for each step.
 #pragma once
 
+#include <boost/asio/io_context.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
 #include <chrono>
 #include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <string_view>
-
-#include "base/descriptor.hpp"
 
 namespace kphi {
 
@@ -22,7 +22,9 @@ class TcpClient {
  public:
   /// `wall_timeout` runs from here to the last receive(). The step under way: "look up the name", "connect", "send the
   /// request", "read the answer".
-  explicit TcpClient(std::chrono::nanoseconds wall_timeout) noexcept;
+  explicit TcpClient(std::chrono::nanoseconds wall_timeout) { allow(wall_timeout); }
+  /// A new limit from here on.
+  void allow(std::chrono::nanoseconds wall_timeout) { stream_.expires_after(wall_timeout); }
   /// Throws TcpError, as the others do.
   void connect(const std::string& host, std::uint16_t port);
   void send(std::string_view bytes);
@@ -31,11 +33,13 @@ class TcpClient {
   [[nodiscard]] const char* step() const noexcept { return step_; }
 
  private:
-  void wait_for(short events) const;
+  /// Runs an operation to its end; returns the number of bytes, 0 if the peer has closed the connection.
+  template <class Start>
+  std::size_t carry_out(const char* step, Start&& start);
 
-  const std::chrono::steady_clock::time_point deadline_;
+  boost::asio::io_context io_{1};
+  boost::beast::tcp_stream stream_{io_};
   const char* step_ = "look up the name";
-  Descriptor socket_;
 };
 
 }  // namespace kphi

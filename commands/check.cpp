@@ -97,10 +97,8 @@ void add_check(CLI::App& program, ExitCode& exit_code) {
   const auto [command, options] = add_verb<CheckOptions>(
       program, exit_code, "check",
       "check campaign, bench, vehicle, answers and coefficient files, fault scripts and simulated motors", check);
-  command
-      .add_option("FILE", options.paths, "files; campaigns are also checked against the benches and answers among them")
-      ->type_name("")
-      ->required();
+  add_argument(command, "FILE", options.paths,
+               "files; campaigns are also checked against the benches and answers among them");
   command.add_flag("--json", options.json, "print one JSON object per file on a line of its own");
 }
 

@@ -35,6 +35,18 @@ std::pair<CLI::App&, Options&> add_verb(CLI::App& program, ExitCode& exit_code, 
   return {*command, *options};
 }
 
+/// A required value that stands by itself; --help shows its `name` only.
+template <class Value>
+CLI::Option* add_argument(CLI::App& command, const char* name, Value& into, const std::string& what) {
+  return command.add_option(name, into, what)->required()->type_name("");
+}
+
+/// An option whose value --help shows as `word`.
+template <class Value>
+CLI::Option* add_value(CLI::App& command, const char* name, const char* word, Value& into, const std::string& what) {
+  return command.add_option(name, into, what)->type_name(word);
+}
+
 /// CLI11's checks of a path, without their words in --help.
 inline const CLI::Validator kExistingFile = CLI::ExistingFile.description("");
 inline const CLI::Validator kExistingFolder = CLI::ExistingDirectory.description("");

@@ -45,7 +45,7 @@ ExitCode compare_family(const CompareRequest& request) {
     family.push_back({std::move(fitted.identification), std::move(fitted.analysis)});
   }
   const FamilyFindings findings = findings_of(family, sizes);
-  fmt::print("{}", request.json ? to_json(findings).dump(2) + "\n" : family_text(findings));
+  fmt::print("{}", request.json ? Json(findings).dump(2) + "\n" : family_text(findings));
   return ExitCode::ok;
 }
 
@@ -120,13 +120,10 @@ void add_compare(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<CompareRequest>(
       program, exit_code, "compare",
       "compare two results (differences, uncertainties, verdict) or the propellers of a family", run_compare);
-  command
-      .add_option("RESULT", request.results,
-                  "two of: coefficients.yaml, campaign folder, steps.csv without occlusions; or the fitted folders of "
-                  "several propellers")
-      ->required()
+  add_argument(command, "RESULT", request.results,
+               "two of: coefficients.yaml, campaign folder, steps.csv without occlusions; or the fitted folders of "
+               "several propellers")
       ->expected(1, 100)
-      ->type_name("")
       ->check(kExistingPath);
   command.add_option("--expect", request.expect, "exit with 5 unless this is the verdict")
       ->check(CLI::IsMember({"agree", "differ"}));
@@ -137,10 +134,8 @@ void add_compare(CLI::App& program, ExitCode& exit_code) {
       ->check(CLI::ExistingFile);
   command.add_flag("--claims", request.claims,
                    "check the paper's statements on two propellers (always done for three)");
-  command
-      .add_option("--predict", request.predict,
-                  "predict k of a propeller that nobody measured, from three others; may be repeated")
-      ->type_name("DIAMETERxBLADES")
+  add_value(command, "--predict", "DIAMETERxBLADES", request.predict,
+            "predict k of a propeller that nobody measured, from three others; may be repeated")
       ->allow_extra_args(false);
   command.footer(
       "kphi compare results/<monday> results/<tuesday> --expect agree\n"
@@ -150,9 +145,7 @@ void add_compare(CLI::App& program, ExitCode& exit_code) {
 void add_export(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<ExportRequest>(
       program, exit_code, "export", "write coefficients for a flight stack, or samples for a viewer", run_export);
-  command.add_option("FILE", request.file, "coefficients.yaml, campaign folder, or a run (RUN.h5, to csv or mcap)")
-      ->required()
-      ->type_name("")
+  add_argument(command, "FILE", request.file, "coefficients.yaml, campaign folder, or a run (RUN.h5, to csv or mcap)")
       ->check(kExistingPath);
   std::vector<std::string> names;
   std::string footer;
@@ -161,7 +154,7 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
     footer += fmt::format("  {:<11} {}\n", target.name, target.what);
   }
   command.add_option("--to", request.to, "target, see below")->required()->check(CLI::IsMember(names));
-  command.add_option("--out", request.out, "output file (default: stdout)")->type_name("FILE");
+  add_value(command, "--out", "FILE", request.out, "output file (default: stdout)");
   command.add_option("--phi-deg", request.options.phi_deg,
                      "occlusion for targets with one constant per motor (default 0)");
   command.add_option("--speed-max-rpm", request.options.speed_max_rpm, "speed at full output (default: the file's)")

@@ -1,10 +1,9 @@
 #include <optional>
 #include <vector>
 
-#include "base/finding.hpp"
 #include "commands/commands.hpp"
 #include "daq/audit/bench_audit.hpp"
-#include "daq/bench/air.hpp"
+#include "daq/bench/air_source.hpp"
 #include "daq/hardware/device_locks.hpp"
 #include "daq/hardware/probe.hpp"
 #include "daq/run/run.hpp"
@@ -25,14 +24,6 @@ struct Asked {
   std::string campaign;
   bool json = false;
   std::optional<double> clock_gain_s;
-};
-
-struct Answer {
-  std::string device;
-  bool answers = false;
-  std::vector<std::string> lines;
-  Json details;
-  bool wanted = true;  ///< named in the bench file
 };
 
 Json to_json(const netbox::Configuration& box) {
@@ -66,14 +57,6 @@ Json to_json(const netbox::Counters& counters, const netbox::Health& health) {
           {"queue_high_water", health.queue_high_water}};
 }
 
-Json to_json(const std::vector<Finding>& findings) {
-  auto all = Json::array();
-  for (const Finding& finding : findings) {
-    all.push_back({{"severity", name_of(finding.severity)}, {"what", finding.what}, {"next_move", finding.next_move}});
-  }
-  return all;
-}
-
 netbox::ProbeSettings probe_settings(const Asked& asked, const std::optional<profiles::BenchConfig>& bench) {
   netbox::ProbeSettings settings;
   if (!bench) return settings;
@@ -84,12 +67,13 @@ netbox::ProbeSettings probe_settings(const Asked& asked, const std::optional<pro
   return settings;
 }
 
-Answer ask_load_cell(const profiles::NetBoxConfig& config, const Clock& clock, const netbox::ProbeSettings& settings) {
+DeviceAnswer ask_load_cell(const profiles::NetBoxConfig& config, const Clock& clock,
+                           const netbox::ProbeSettings& settings) {
   const netbox::Probe probe = netbox::probe({config.host, config.rdt_port, config.http_port}, clock, settings);
-  Answer answer{"Net Box " + config.host, probe.answers(), probe.lines(), {}};
+  DeviceAnswer answer{"Net Box " + config.host, probe.answers(), probe.lines(), {}};
   if (probe.configuration) answer.details["configuration"] = to_json(*probe.configuration);
   if (probe.streamed) answer.details["stream"] = to_json(probe.counters, probe.health);
-  answer.details["findings"] = to_json(probe.findings);
+  answer.details["findings"] = probe.findings;
   return answer;
 }
 
@@ -99,10 +83,7 @@ Json to_json(const iq::AuditRecord& module) {
               {"hardware", module.hardware() ? module.hardware()->text() : ""},
               {"electronics", module.electronics() ? module.electronics()->text() : ""}};
   auto& parameters = all["parameters"] = Json::object();
-  for (std::size_t i = 0; i < iq::kAuditedCount; ++i) {
-    const iq::Entry& entry = *iq::kAudited[i];
-    if (module.values[i]) parameters[fmt::format("{}.{}", name_of(entry.type), entry.name)] = *module.values[i];
-  }
+  for (const auto& [entry, value] : module.values) parameters[std::string(entry->path)] = value;
   return all;
 }
 
@@ -146,13 +127,13 @@ iq::ProbeSettings probe_settings(const profiles::MotorConfig& config, std::optio
   return settings;
 }
 
-Answer ask_motor(const profiles::MotorConfig& config, const Clock& clock, std::optional<double> clock_gain_s,
-                 bool powered) {
+DeviceAnswer ask_motor(const profiles::MotorConfig& config, const Clock& clock, std::optional<double> clock_gain_s,
+                       bool powered) {
   iq::ProbeSettings settings = probe_settings(config, clock_gain_s);
   settings.search = powered;
   iq::Probe probe = iq::probe({config.device, config.baud, config.module_id}, clock, settings);
   if (probe.clock_gain) probe.clock_gain->measured_utc = utc_text(clock, clock.now());
-  Answer answer{"IQ module " + config.device, probe.answers(), probe.lines(), {}};
+  DeviceAnswer answer{"IQ module " + config.device, probe.answers(), probe.lines(), {}};
   if (probe.record) {
     answer.details = to_json(*probe.record);
     answer.details["round_trip_ns"] = probe.round_trip.count();
@@ -160,61 +141,32 @@ Answer ask_motor(const profiles::MotorConfig& config, const Clock& clock, std::o
   }
   if (probe.adapter) answer.details["adapter"] = to_json(*probe.adapter);
   if (probe.clock_gain) answer.details["clock_gain"] = to_json(*probe.clock_gain);
-  answer.details["findings"] = to_json(probe.findings);
+  answer.details["findings"] = probe.findings;
   return answer;
 }
 
-Answer ask_supply(const profiles::SupplyConfig& config, const Clock& clock) {
-  const SupplyProbe probe = probe_supply(config, clock);
-  Answer answer{"supply " + config.uri, probe.answers(), probe.lines(), {}};
-  if (probe.identity) {
-    answer.details["model"] = probe.identity->model;
-    answer.details["serial"] = probe.identity->serial;
-    answer.details["firmware"] = probe.identity->firmware;
-  }
-  if (probe.reading) {
-    answer.details["voltage_v"] = probe.reading->voltage_v;
-    answer.details["current_a"] = probe.reading->current_a;
-    answer.details["set_voltage_v"] = probe.reading->set_voltage_v;
-    answer.details["current_limit_a"] = probe.reading->current_limit_a;
-    answer.details["output"] = probe.reading->output;
-  }
-  answer.details["findings"] = to_json(probe.findings);
-  return answer;
-}
-
-Answer answer_of(const UsbProbe& probe, bool wanted) {
-  Answer answer{probe.device, probe.answers, probe.lines(), {}, wanted};
-  answer.details["words"] = probe.words;
-  answer.details["findings"] = to_json(probe.findings);
-  return answer;
-}
-
-void ask_usb(const std::optional<profiles::BenchConfig>& bench, std::vector<Answer>& answers) {
-  if (bench && !bench->ambient.sensor.empty()) answers.push_back(answer_of(probe_sensor(bench->ambient.sensor), true));
-  if (bench && bench->ambient.manual) {
-    const auto air = AirSource(bench->ambient, SteadyClock()).density();
+void ask_about_air(const profiles::BenchConfig& bench, std::vector<DeviceAnswer>& answers) {
+  if (!bench.ambient.sensor.empty()) answers.push_back(ask_sensor(bench.ambient.sensor));
+  if (bench.ambient.manual) {
+    const auto air = AirSource(bench.ambient, SteadyClock()).density();
     answers.push_back(
         {"air, read off by hand", true, {words_of(*air)}, {{"kg_m3", air->kg_m3}, {"u_kg_m3", air->u_kg_m3}}});
   }
-  if (bench && !bench->ambient.known())
+  if (!bench.ambient.known())
     fmt::print(stderr, "kphi: {}: air density unknown, so k of different days is not comparable; add ambient:\n",
-               bench->path);
-  std::vector<std::string> known;
-  for (const Answer& answer : answers) known.push_back(answer.device);
-  for (const UsbProbe& probe : probe_usb(known)) answers.push_back(answer_of(probe, false));
+               bench.path);
 }
 
-void print(const std::vector<Answer>& answers, bool json) {
+void print(const std::vector<DeviceAnswer>& answers, bool json) {
   if (json) {
     auto all = Json::array();
-    for (const Answer& answer : answers) {
+    for (const DeviceAnswer& answer : answers) {
       all.push_back({{"device", answer.device}, {"answers", answer.answers}});
       all.back().update(answer.details);
     }
     return print_json(all);
   }
-  for (const Answer& answer : answers) {
+  for (const DeviceAnswer& answer : answers) {
     fmt::print("{}: {}\n", answer.device, answer.answers ? "answers" : "does not answer");
     for (const std::string& line : answer.lines) fmt::print("  {}\n", line);
   }
@@ -228,12 +180,12 @@ ExitCode devices(const Asked& asked) {
     return ExitCode::ok;
   }
   // Asking starts a stream and resets a module, which would disturb a running measurement.
-  const DeviceLocks locks(bench ? lock_names(*bench)
-                                : std::vector<std::string>{fmt::format("Net Box {}:49152", kFactoryAddress)});
+  const auto locks = lock_devices(bench ? lock_names(*bench)
+                                        : std::vector<std::string>{fmt::format("Net Box {}:49152", kFactoryAddress)});
   const SteadyClock clock(bench && bench->simulation ? bench->simulation->time_scale : 1.0);
   profiles::NetBoxConfig factory;
   factory.host = kFactoryAddress;
-  std::vector<Answer> answers;
+  std::vector<DeviceAnswer> answers;
   answers.push_back(ask_load_cell(bench ? bench->netbox : factory, clock, probe_settings(asked, bench)));
   if (bench && bench->supply) answers.push_back(ask_supply(*bench->supply, clock));
   const bool unpowered = bench && bench->supply && answers.back().details.value("output", true) == false;
@@ -242,10 +194,11 @@ ExitCode devices(const Asked& asked) {
     answers.back().wanted = false;
     answers.back().lines = {"note: cannot answer while the supply's output is off; kphi run switches it on"};
   }
-  ask_usb(bench, answers);
+  if (bench) ask_about_air(*bench, answers);
+  for (DeviceAnswer& answer : ask_usb(answers)) answers.push_back(std::move(answer));
   print(answers, asked.json);
   if (!bench) fmt::print(stderr, "kphi: no bench file, so only the Net Box's factory address was tried; use --bench\n");
-  for (const Answer& answer : answers) {
+  for (const DeviceAnswer& answer : answers) {
     if (answer.wanted && !answer.answers) return ExitCode::no_device;
   }
   return ExitCode::ok;
@@ -257,21 +210,17 @@ void add_devices(CLI::App& program, ExitCode& exit_code) {
   const auto [command, asked] = add_verb<Asked>(program, exit_code, "devices",
                                                 "find and identify the devices, list what is wrong with them", devices);
   CLI::Option* bench =
-      command.add_option("--bench", asked.bench, "bench file (default: try only the Net Box's factory address)")
-          ->type_name("FILE")
+      add_value(command, "--bench", "FILE", asked.bench, "bench file (default: try only the Net Box's factory address)")
           ->check(kExistingFile);
-  command
-      .add_option("--clock-gain", asked.clock_gain_s,
-                  "compare the motor module's clock with this computer's, for SECONDS of bench time")
+  add_value(command, "--clock-gain", "SECONDS", asked.clock_gain_s,
+            "compare the motor module's clock with this computer's, for SECONDS of bench time")
       ->expected(0, 1)
       ->default_str("60")
-      ->type_name("SECONDS")
       ->check(CLI::Range(1.0, 1e5))
       ->needs(bench);
-  command
-      .add_option("--campaign", asked.campaign, "campaign file: check that the box's rate and ranges suit its speeds")
+  add_value(command, "--campaign", "FILE", asked.campaign,
+            "campaign file: check that the box's rate and ranges suit its speeds")
       ->needs(bench)
-      ->type_name("FILE")
       ->check(kExistingFile);
   command.add_flag("--json", asked.json, "print one JSON array");
 }

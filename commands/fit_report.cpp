@@ -53,18 +53,10 @@ void write_report(const Identification& identification, const Analysis& analysis
 
 struct FitRequest {
   std::string path;
-  bool anchored = false;
-  std::vector<double> points_deg;
+  IdentificationOptions options;  ///< as far as they are not below
   std::string speed_range_rpm;
   std::optional<double> at_speed_rpm;
   std::string out;
-  std::string propeller;
-  double diameter_in = 0;
-  int blades = 0;
-  Estimator estimator = Estimator::through_origin;
-  Weighting weighting = Weighting::equal;
-  Loss loss = Loss::none;
-  compensation::OverlapMeasure overlap = compensation::OverlapMeasure::rim_arc;
   std::vector<std::string> uncertainties;
   std::vector<std::string> left_out;
   std::vector<std::string> family;
@@ -92,14 +84,9 @@ SpeedRange parse_speed_range(const std::string& text, SpeedRange range) {
 }
 
 IdentificationOptions options_of(const FitRequest& request) {
-  IdentificationOptions options;
+  IdentificationOptions options = request.options;
   options.speed_range = parse_speed_range(request.speed_range_rpm, options.speed_range);
   if (request.at_speed_rpm) options.at_speed_rad_s = from_rpm(*request.at_speed_rpm).value();
-  options.line.anchored = request.anchored;
-  options.line.points_deg = request.points_deg;
-  options.estimator = request.estimator;
-  options.weighting = request.weighting;
-  options.loss = request.loss;
   for (const std::string& text : request.left_out) options.left_out.push_back(parse_left_out_run(text));
   return options;
 }
@@ -109,26 +96,25 @@ void refuse_for_table(const FitRequest& request) {
   const auto refuse = [&](bool given, const char* option) {
     if (given) throw ConfigurationError(fmt::format("{}: a table of given k; {} needs steps", request.path, option));
   };
-  refuse(request.estimator != Estimator::through_origin, "--estimator");
-  refuse(request.weighting != Weighting::equal, "--weights");
-  refuse(request.loss != Loss::none, "--loss");
+  refuse(request.options.estimator != Estimator::through_origin, "--estimator");
+  refuse(request.options.weighting != Weighting::equal, "--weights");
+  refuse(request.options.loss != Loss::none, "--loss");
   refuse(request.at_speed_rpm.has_value(), "--at-speed-rpm");
   refuse(!request.uncertainties.empty(), "--u");
   refuse(!request.left_out.empty(), "--leave-out");
 }
 
 Identification identify_input(const FitInput& input, const FitRequest& request) {
-  const IdentificationOptions options = options_of(request);
-  if (!input.table.empty()) refuse_for_table(request);
-  Identification result =
-      input.table.empty() ? identify(input.steps, options)
-                          : identify_table(input.table, options.line, parse_speed_range(request.speed_range_rpm, {}));
-  if (!request.propeller.empty()) result.propeller = request.propeller;
-  if (result.propeller.empty()) result.propeller = input.provenance.campaign;
-  if (request.diameter_in > 0) result.diameter_in = request.diameter_in;
-  if (request.blades > 0) result.blades = request.blades;
-  result.overlap = request.overlap;
-  return result;
+  IdentificationOptions options = options_of(request);
+  if (input.table.empty()) {
+    Identification result = identify(input.steps, options);
+    if (result.propeller.empty()) result.propeller = input.provenance.campaign;
+    return result;
+  }
+  refuse_for_table(request);
+  options.speed_range = parse_speed_range(request.speed_range_rpm, {});
+  if (options.propeller.empty()) options.propeller = input.provenance.campaign;
+  return identify_table(input.table, options);
 }
 
 /// What the campaign's files know of errors; --u overrides it.
@@ -147,13 +133,14 @@ Json raw_json(const FitInput& input) {
   if (files.empty()) throw FitError("no complete run in the folder; --raw needs one");
   const std::vector<results::RunRecording> runs{results::read_run(files.front())};
   const auto check = check_by_blade_pass(runs);
-  Json json = raw_to_json(identify_dynamics(runs), check);
+  const auto dynamics = identify_dynamics(runs);
+  Json json{{"dynamics", dynamics ? Json(*dynamics) : Json()}, {"blade_pass", check ? Json(*check) : Json()}};
   const auto& clock = input.provenance.clock;
   if (!check || !clock || !clock->u_gain) return json;
   HypothesisTest agreement = check->against({clock->gain, *clock->u_gain});
   agreement.name = "blade-pass line against the clock gain of the bench file";
   agreement.hypothesis = "both are the same";
-  json["blade_pass"]["against_clock_gain"] = to_json(agreement);
+  json["blade_pass"]["against_clock_gain"] = agreement;
   return json;
 }
 
@@ -164,8 +151,8 @@ FamilyFindings family_findings(const FitRequest& request, const Identification& 
   for (const std::string& path : request.family) {
     const FitInput input = load_input(path);
     FitRequest same = request;
-    same.propeller.clear();
-    same.diameter_in = same.blades = 0;
+    same.options.propeller.clear();
+    same.options.diameter_in = same.options.blades = 0;
     same.left_out.clear();
     Identification other = identify_input(input, same);
     Analysis its = analyse(other, analysis_options(request, input, other));
@@ -185,8 +172,8 @@ void print_findings(const FitRequest& request, const FitInput& input, const Iden
     if (!raw.is_null()) fmt::print("{}\n", raw.dump(2));
     return;
   }
-  Json json = to_json(identification, analysis, file);
-  if (family) json.update(to_json(*family));
+  Json json = fit_json(identification, analysis, file);
+  if (family) json.update(Json(*family));
   if (!raw.is_null()) json["raw"] = raw;
   print_json(json);
 }
@@ -263,50 +250,43 @@ ExitCode run_report(const ReportRequest& request) {
 void add_fit(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<FitRequest>(
       program, exit_code, "fit", "fit k to the steps of each occlusion, then the line k(φ); write a report", run_fit);
-  command.add_option("INPUT", request.path, "campaign folder, steps.csv, or K.csv with phi_deg,k[,u_k]")
-      ->required()
-      ->type_name("")
+  add_argument(command, "INPUT", request.path, "campaign folder, steps.csv, or K.csv with phi_deg,k[,u_k]")
       ->check(kExistingPath);
-  command.add_flag("--anchored", request.anchored, "start the line at K_T (default: free, through the occlusions)");
-  command.add_option("--points", request.points_deg, "angles that carry the line, in degrees (default: all above 0)")
-      ->type_name("DEG,DEG,…")
+  command.add_flag("--anchored", request.options.line.anchored,
+                   "start the line at K_T (default: free, through the occlusions)");
+  add_value(command, "--points", "DEG,DEG,…", request.options.line.points_deg,
+            "angles that carry the line, in degrees (default: all above 0)")
       ->delimiter(',');
-  command
-      .add_option("--speed-range-rpm", request.speed_range_rpm,
-                  "speeds to fit (default 3000: and up; below, noise of the load cell hides the thrust)")
-      ->type_name("A:B");
+  add_value(command, "--speed-range-rpm", "A:B", request.speed_range_rpm,
+            "speeds to fit (default 3000: and up; below, noise of the load cell hides the thrust)");
   command.add_option("--at-speed-rpm", request.at_speed_rpm,
                      "speed of \"k at speed\" (default: the highest one that every occlusion reached)");
-  add_choice(command, "--estimator", request.estimator, "how k is estimated",
+  add_choice(command, "--estimator", request.options.estimator, "how k is estimated",
              {Estimator::through_origin, Estimator::with_offset, Estimator::polynomial, Estimator::at_speed});
-  add_choice(command, "--weights", request.weighting, "how steps are weighted",
+  add_choice(command, "--weights", request.options.weighting, "how steps are weighted",
              {Weighting::equal, Weighting::thrust, Weighting::effective_variance});
-  add_choice(command, "--loss", request.loss, "robust loss", {Loss::none, Loss::huber, Loss::cauchy, Loss::tukey});
+  add_choice(command, "--loss", request.options.loss, "robust loss",
+             {Loss::none, Loss::huber, Loss::cauchy, Loss::tukey});
   using compensation::OverlapMeasure;
-  add_choice(command, "--overlap", request.overlap, "how φ is measured in flight, to be the same in the vehicle file",
+  add_choice(command, "--overlap", request.options.overlap,
+             "how φ is measured in flight, to be the same in the vehicle file",
              {OverlapMeasure::rim_arc, OverlapMeasure::area_share, OverlapMeasure::load_share});
-  command
-      .add_option(
-          "--u", request.uncertainties,
-          "standard uncertainty of calibration, cross-axis, clock, density (all relative) or alignment-deg; may "
-          "be repeated")
-      ->type_name("NAME=VALUE")
+  add_value(command, "--u", "NAME=VALUE", request.uncertainties,
+            "standard uncertainty of calibration, cross-axis, clock, density (all relative) or alignment-deg; may "
+            "be repeated")
       ->allow_extra_args(false);
-  command
-      .add_option("--leave-out", request.left_out,
-                  "leave out a run for a known cause, which the report names; may be repeated")
-      ->type_name("PHI:REPETITION:CAUSE")
+  add_value(command, "--leave-out", "PHI:REPETITION:CAUSE", request.left_out,
+            "leave out a run for a known cause, which the report names; may be repeated")
       ->allow_extra_args(false);
-  command.add_option("--family", request.family, "fit other propellers the same way and check the paper's claims")
-      ->type_name("PATH")
+  add_value(command, "--family", "PATH", request.family,
+            "fit other propellers the same way and check the paper's claims")
       ->check(kExistingPath);
   command.add_flag("--raw", request.raw,
                    "add time constants, and a check of the motor's clock by blade pass, from the first run");
-  command.add_option("--out", request.out, "coefficient file; report and figures go beside it")->type_name("FILE");
-  command.add_option("--propeller", request.propeller, "id of the propeller (default: from the steps)")
-      ->type_name("ID");
-  command.add_option("--diameter-in", request.diameter_in, "diameter in inches (default: from the steps)");
-  command.add_option("--blades", request.blades, "number of blades (default: from the steps)");
+  add_value(command, "--out", "FILE", request.out, "coefficient file; report and figures go beside it");
+  add_value(command, "--propeller", "ID", request.options.propeller, "id of the propeller (default: from the steps)");
+  command.add_option("--diameter-in", request.options.diameter_in, "diameter in inches (default: from the steps)");
+  command.add_option("--blades", request.options.blades, "number of blades (default: from the steps)");
   command.add_flag("--no-report", request.no_report, "write coefficients only");
   command.add_flag("--json", request.json, "print the result as JSON");
   command.footer("kphi fit results/<folder>\nkphi fit K.csv --anchored --points 45,90 --out k.yaml");
@@ -315,13 +295,10 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
 void add_report(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<ReportRequest>(
       program, exit_code, "report", "draw report.html of fitted campaigns again, several on one page", run_report);
-  command.add_option("DIR", request.folders, "campaign folders with steps.csv and coefficients.yaml")
-      ->required()
-      ->type_name("")
+  add_argument(command, "DIR", request.folders, "campaign folders with steps.csv and coefficients.yaml")
       ->check(kExistingFolder);
-  command
-      .add_option("--out", request.out, "page (default: report.html in DIR; for several DIRs: in the working folder)")
-      ->type_name("FILE");
+  add_value(command, "--out", "FILE", request.out,
+            "page (default: report.html in DIR; for several DIRs: in the working folder)");
   command.footer("kphi report results/<5x2> results/<5x3> results/<6x2> results/<6x3> --out four.html");
 }
 

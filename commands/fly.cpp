@@ -6,7 +6,6 @@
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "compensation/compensator.hpp"
-#include "compensation/flight/records.hpp"
 #include "compensation/flight/tables.hpp"
 #include "fit/report/gnuplot.hpp"
 
@@ -93,7 +92,7 @@ void make_folder(const std::string& path) {
 /// Why it could not be drawn; empty if it was.
 std::string write_figure(const fs::path& folder, const std::string& name, const std::string& script) {
   write_output(folder / (name + ".gp"), script);
-  return fit::draw(folder / (name + ".gp"), folder / (name + ".svg")).reason;
+  return fit::draw(folder / (name + ".gp"), folder / (name + ".svg"));
 }
 
 void write_out(const Request& request, const Flown& flown, const std::array<std::vector<TraceRow>, 9>& traces) {
@@ -224,10 +223,8 @@ void add_fly(CLI::App& program, ExitCode& exit_code) {
       "Without --draws: one set of circumstances. With --draws N: N more sets, drawn from the seed, and percentiles.");
   add_flight_files(command, request.coefficients, request.vehicle);
   const auto names = experiment_names();
-  command
-      .add_option("--experiment", request.experiment,
-                  fmt::format("one of the nine (default: all): {}", fmt::join(names, ", ")))
-      ->type_name("NAME")
+  add_value(command, "--experiment", "NAME", request.experiment,
+            fmt::format("one of the nine (default: all): {}", fmt::join(names, ", ")))
       ->check(CLI::IsMember(names).description(""));
   command.add_option("--draws", request.draws, "sets of circumstances to draw, such as 400 (default 0)")
       ->check(CLI::Range(0, 10000));
@@ -236,7 +233,7 @@ void add_fly(CLI::App& program, ExitCode& exit_code) {
       .add_option("--threads", request.threads,
                   "number of threads (default 0: one per core); the result does not depend on it")
       ->check(CLI::Range(0, 256));
-  command.add_option("--out", request.out, "folder for traces and draws (CSV) and figures (SVG)")->type_name("DIR");
+  add_value(command, "--out", "DIR", request.out, "folder for traces and draws (CSV) and figures (SVG)");
   command.add_flag("--json", request.json, "print the result as JSON");
 }
 

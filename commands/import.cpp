@@ -24,7 +24,6 @@ struct ImportRequest {
   std::string speed_factor;
   std::vector<std::string> columns;
   std::string separator;
-  std::optional<double> diameter_in, density;
   bool same_propeller = false;
   bool json = false;
   ImportOptions options;
@@ -42,8 +41,6 @@ double parse_factor(const std::string& text) {
 
 ImportOptions options_of(const ImportRequest& request) {
   ImportOptions options = request.options;
-  options.diameter_in = request.diameter_in;
-  options.air_density_kg_m3 = request.density;
   if (!request.speed.empty())
     options.rows.speed = request.speed == "optical" ? SpeedSource::optical : SpeedSource::electrical;
   if (!request.speed_factor.empty()) options.rows.speed_factor = parse_factor(request.speed_factor);
@@ -125,19 +122,12 @@ void add_import(CLI::App& program, ExitCode& exit_code) {
       program, exit_code, "import", "turn RCbenchmark CSV, UIUC static tables and any other CSV into step tables",
       run_import);
   RowSelection& rows = request.options.rows;
-  command.add_option("FILE", request.files, "tables; units come from their headers")
-      ->required()
-      ->type_name("")
-      ->check(kExistingFile);
-  command.add_option("--out", request.out, "output folder; every table becomes <name>/steps.csv in it")
-      ->required()
-      ->type_name("DIR");
-  command
-      .add_option(
-          "--column", request.columns,
-          "meaning of one column of any table, repeat for each; roles: thrust, speed, electrical_speed, torque, "
-          "time, throttle, voltage, current, occlusion, repetition")
-      ->type_name("ROLE=HEADER[:UNIT]");
+  add_argument(command, "FILE", request.files, "tables; units come from their headers")->check(kExistingFile);
+  add_value(command, "--out", "DIR", request.out, "output folder; every table becomes <name>/steps.csv in it")
+      ->required();
+  add_value(command, "--column", "ROLE=HEADER[:UNIT]", request.columns,
+            "meaning of one column of any table, repeat for each; roles: thrust, speed, electrical_speed, torque, "
+            "time, throttle, voltage, current, occlusion, repetition");
   command
       .add_option("--separator", request.separator,
                   "separator of such a table (default: the most frequent one of the header line)")
@@ -146,23 +136,21 @@ void add_import(CLI::App& program, ExitCode& exit_code) {
                    "read numbers such as 1,5 in such a table");
   command.add_option("--speed", request.speed, "which speed to take (default: electrical where it turns)")
       ->check(CLI::IsMember({"electrical", "optical"}));
-  command
-      .add_option("--speed-factor", request.speed_factor,
-                  "multiply the speed by a number or P/Q = assumed / true pole count, such as 7/6")
-      ->type_name("NUMBER");
+  add_value(command, "--speed-factor", "NUMBER", request.speed_factor,
+            "multiply the speed by a number or P/Q = assumed / true pole count, such as 7/6");
   command.add_option("--speed-above-rpm", rows.speed_above_rpm, "leave out rows at or below this speed (default 0)");
   command.add_option("--throttle-above-us", rows.throttle_above_us, "leave out rows at or below this throttle");
-  command.add_option("--tare-rows", rows.tare_rows, "tare on the first N rows, with the motor off (default 0)")
-      ->type_name("N");
+  add_value(command, "--tare-rows", "N", rows.tare_rows, "tare on the first N rows, with the motor off (default 0)");
   command.add_flag("--reverse-thrust", rows.reverse_thrust, "reverse the sign of the thrust");
-  command.add_option("--diameter-in", request.diameter_in, "diameter in inches (UIUC default: from the file's name)")
+  command
+      .add_option("--diameter-in", request.options.diameter_in,
+                  "diameter in inches (UIUC default: from the file's name)")
       ->check(CLI::PositiveNumber);
   command
-      .add_option("--air-density-kg-m3", request.density,
+      .add_option("--air-density-kg-m3", request.options.air_density_kg_m3,
                   "air density that turns UIUC coefficients into thrust (default 1.225)")
       ->check(CLI::PositiveNumber);
-  command.add_option("--propeller", request.options.propeller, "id of the propeller (default: the file's name)")
-      ->type_name("ID");
+  add_value(command, "--propeller", "ID", request.options.propeller, "id of the propeller (default: the file's name)");
   command.add_option("--blades", request.options.blades, "number of blades");
   command.add_flag("--same-propeller", request.same_propeller,
                    "all FILEs are of one propeller: name those whose k differs from the others");

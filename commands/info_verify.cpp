@@ -173,10 +173,7 @@ ExitCode verify(const Asked& asked) {
 
 void add(CLI::App& program, ExitCode& exit_code, const char* name, const char* what, ExitCode (*run)(const Asked&)) {
   const auto [command, asked] = add_verb<Asked>(program, exit_code, name, what, run);
-  command.add_option("PATH", asked.path, "run file or campaign folder")
-      ->required()
-      ->type_name("")
-      ->check(kExistingPath);
+  add_argument(command, "PATH", asked.path, "run file or campaign folder")->check(kExistingPath);
   command.add_flag("--json", asked.json, "print one JSON object");
 }
 

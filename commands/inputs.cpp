@@ -4,10 +4,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/error.hpp"
+#include "base/number.hpp"
+#include "commands/commands.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "fit/coefficients/coefficients.hpp"
-#include "fit/logs/coefficient_table.hpp"
+#include "fit/logs/import_table.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 #include "results/campaign_folder.hpp"
@@ -23,31 +24,26 @@ using namespace fit;
 
 namespace fs = std::filesystem;
 
-void take_rejected(const results::CampaignFolder& folder, Provenance& provenance) {
-  const auto text = [](const nlohmann::json& data, const char* key) {
-    return data.contains(key) && data[key].is_string() ? data[key].get<std::string>() : std::string("unknown");
-  };
-  for (const results::JournalEntry& entry : results::read_journal(folder.journal()).entries)
-    if (entry.event == results::kRunAborted)
-      provenance.rejected.push_back({text(entry.data, "run"), entry.utc, text(entry.data, "reason")});
-}
-
-/// Accepted runs with the checksums the journal holds, and when the last of them ended; without a journal the files
-/// as they lie there.
+/// Rejected runs, accepted ones with the checksums the journal holds, and when the last of them ended; without a
+/// journal the files as they lie there.
 void take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
-  if (fs::exists(folder.journal())) {
-    for (const results::JournalEntry& entry : results::read_journal(folder.journal()).entries) {
-      if (entry.event != results::kRunAccepted || !entry.data.contains("file") || !entry.data.contains("sha256"))
-        continue;
-      provenance.runs.push_back({entry.data["file"], entry.data["sha256"], "", std::nullopt});
-      provenance.measured_utc = entry.utc;
-    }
-    take_rejected(folder, provenance);
+  if (!fs::exists(folder.journal())) {
+    for (const fs::path& run : folder.complete_runs())
+      provenance.runs.push_back(
+          {fs::relative(run, folder.path()).string(), results::sha256_of_file(run), "", std::nullopt});
     return;
   }
-  for (const fs::path& run : folder.complete_runs())
-    provenance.runs.push_back(
-        {fs::relative(run, folder.path()).string(), results::sha256_of_file(run), "", std::nullopt});
+  for (const results::JournalEntry& entry : results::read_journal(folder.journal()).entries) {
+    const auto text = [&](const char* key) {
+      const bool is_text = entry.data.contains(key) && entry.data[key].is_string();
+      return is_text ? entry.data[key].get<std::string>() : std::string("unknown");
+    };
+    if (entry.event == results::kRunAborted) provenance.rejected.push_back({text("run"), entry.utc, text("reason")});
+    if (entry.event != results::kRunAccepted || !entry.data.contains("file") || !entry.data.contains("sha256"))
+      continue;
+    provenance.runs.push_back({entry.data["file"], entry.data["sha256"], "", std::nullopt});
+    provenance.measured_utc = entry.utc;
+  }
 }
 
 MotorClock clock_of(const fs::path& bench_file) {
@@ -109,8 +105,8 @@ FitInput load_input(const std::string& path) {
 AnalysisOptions analysis_options(const FitInput& input, const Identification& identification) {
   AnalysisOptions options;
   if (const auto& air = identification.air) {
-    options.air_density_kg_m3 = air->kg_m3;
-    options.bench.air_density = air->u_kg_m3 / air->kg_m3;
+    options.air_density_kg_m3 = air->value;
+    options.bench.air_density = air->u / air->value;
   }
   if (const auto& clock = input.provenance.clock) options.bench.motor_clock = clock->u_gain;
   return options;
@@ -129,7 +125,7 @@ FittedFolder fitted_again(const std::string& folder) {
   if (!input.table.empty())
     throw ConfigurationError(folder + ": steps.csv is a table of k without steps; use the report of `kphi fit`");
   const RecordedFit record = read_recorded_fit(file.string());
-  Identification identification = identify_again(input.steps, record);
+  Identification identification = identify(input.steps, record.options);
   AnalysisOptions options = analysis_options(input, identification);
   if (record.bench) options.bench = *record.bench;
   input.provenance.bench = options.bench;
@@ -138,10 +134,8 @@ FittedFolder fitted_again(const std::string& folder) {
 }
 
 void add_flight_files(CLI::App& command, std::string& coefficients, std::string& vehicle) {
-  command.add_option("--coefficients", coefficients, "coefficients.yaml of `kphi fit`")->required()->type_name("FILE");
-  command.add_option("--vehicle", vehicle, "vehicle file, such as profiles/foldable_drone.yaml")
-      ->required()
-      ->type_name("FILE");
+  add_value(command, "--coefficients", "FILE", coefficients, "coefficients.yaml of `kphi fit`")->required();
+  add_value(command, "--vehicle", "FILE", vehicle, "vehicle file, such as profiles/foldable_drone.yaml")->required();
 }
 
 compensation::ThrustCurve load_curve_for(const std::string& coefficients, const profiles::Vehicle& vehicle) {
@@ -149,6 +143,33 @@ compensation::ThrustCurve load_curve_for(const std::string& coefficients, const 
   const auto mismatch = compensation::overlap_mismatch(curve.overlap(), coefficients, vehicle.overlap, vehicle.path);
   if (mismatch) throw ConfigurationError(*mismatch);
   return curve;
+}
+
+void add_live_options(CLI::App& command, daq::live::LiveOptions& options) {
+  // CLI11 passes "true" for an option without its value.
+  const auto take_port = [&options](const std::string& text) {
+    if (text.empty() || text == "true") {
+      options.port = 0;
+      return;
+    }
+    options.port = parse_integer<std::uint16_t>(text);
+    if (!options.port) {
+      throw CLI::ValidationError(
+          "--live", fmt::format("\"{}\" is not a port (0 to 65535); without a port, put --live last", text));
+    }
+  };
+  command
+      .add_option_function<std::string>("--live", take_port,
+                                        "serve a live page on 127.0.0.1 (default PORT: any free one)")
+      ->expected(0, 1)
+      ->type_name("[PORT]");
+  add_value(command, "--udp-json", "HOST:PORT", options.udp_json,
+            "send every tick as a JSON datagram (PlotJuggler: 127.0.0.1:9870)");
+}
+
+std::string live_greeting(const daq::live::LiveSession& view) {
+  const std::string url = view.url();
+  return url.empty() ? url : fmt::format("live: {}\n", url);
 }
 
 void write_output(const fs::path& path, const std::string& text) {

@@ -1,4 +1,4 @@
-// What several verbs read and write: a fit's input, a fitted folder, the files of a flight, outputs.
+// What several verbs read and write: a fit's input, a fitted folder, the files of a flight, the live page, outputs.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "compensation/thrust_curve.hpp"
+#include "daq/live/live_session.hpp"
 #include "fit/coefficients/coefficients.hpp"
 #include "fit/model/line_fit.hpp"
 #include "fit/uncertainty/analysis.hpp"
@@ -47,6 +48,11 @@ void add_flight_files(CLI::App& command, std::string& coefficients, std::string&
 /// The curve of a coefficient file. Throws ConfigurationError if file and vehicle measure φ differently.
 [[nodiscard]] compensation::ThrustCurve load_curve_for(const std::string& coefficients,
                                                        const profiles::Vehicle& vehicle);
+
+/// Adds `--live [PORT]` and `--udp-json HOST:PORT`; `options` must outlive the command.
+void add_live_options(CLI::App& command, daq::live::LiveOptions& options);
+/// "live: http://…" as a line; empty without one.
+[[nodiscard]] std::string live_greeting(const daq::live::LiveSession& view);
 
 /// Writes a file that can be made again at any time: without waiting for the disk.
 void write_output(const std::filesystem::path& path, const std::string& text);

@@ -1,8 +1,7 @@
 #include <algorithm>
 #include <atomic>
-#include <cmath>
-#include <exception>
 #include <filesystem>
+#include <future>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -11,7 +10,7 @@
 #include <vector>
 
 #include "commands/commands.hpp"
-#include "commands/live_options.hpp"
+#include "commands/inputs.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/live/replayed_run.hpp"
 #include "profiles/campaign.hpp"
@@ -50,41 +49,29 @@ std::vector<std::filesystem::path> runs_of(const CampaignFolder& folder) {
   return folder.complete_runs(profiles::load_campaign(folder.campaign_file().string()).occlusions_deg);
 }
 
-/// One run of several that are reduced at once.
-struct Work {
-  std::vector<StepMean> steps;
-  std::exception_ptr failure;
-};
-
-/// Takes runs until none is left. HDF5 is asked by one thread at a time; the samples are read without it.
-void reduce_some(std::span<const std::filesystem::path> runs, std::span<Work> work, std::atomic<std::size_t>& next,
-                 std::mutex& opening) {
-  for (std::size_t i = next++; i < runs.size(); i = next++) {
-    try {
-      std::unique_lock one_at_a_time(opening);
-      results::RunFile file = results::open_run(runs[i]);
-      one_at_a_time.unlock();
-      work[i].steps = reduce_with_zeros(std::move(file)).steps;
-    } catch (...) {
-      work[i].failure = std::current_exception();
-    }
-  }
-}
-
-/// Steps in the order of the files; a thread per processor.
+/// Steps in the order of the files; a thread per processor. HDF5 is asked by one thread at a time; the samples are read
+/// without it.
 std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
-  std::vector<Work> work(runs.size());
-  std::atomic<std::size_t> next = 0;
   std::mutex opening;
-  std::vector<std::thread> others;
-  const std::size_t threads = std::min<std::size_t>(std::max(1u, std::thread::hardware_concurrency()), runs.size());
-  for (std::size_t i = 1; i < threads; ++i) others.emplace_back([&] { reduce_some(runs, work, next, opening); });
-  reduce_some(runs, work, next, opening);
-  for (std::thread& other : others) other.join();
+  std::vector<std::packaged_task<std::vector<StepMean>()>> tasks;
+  for (const auto& run : runs) {
+    tasks.emplace_back([&opening, &run] {
+      std::unique_lock one_at_a_time(opening);
+      results::RunFile file = results::open_run(run);
+      one_at_a_time.unlock();
+      return reduce_with_zeros(std::move(file)).steps;
+    });
+  }
+  std::atomic<std::size_t> next = 0;
+  std::vector<std::jthread> threads;
+  for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
+    threads.emplace_back([&] {
+      for (std::size_t task = next++; task < tasks.size(); task = next++) tasks[task]();
+    });
   std::vector<StepMean> steps;
-  for (Work& of_run : work) {
-    if (of_run.failure) std::rethrow_exception(of_run.failure);
-    steps.insert(steps.end(), of_run.steps.begin(), of_run.steps.end());
+  for (auto& task : tasks) {
+    const std::vector<StepMean> of_run = task.get_future().get();
+    steps.insert(steps.end(), of_run.begin(), of_run.end());
   }
   return steps;
 }
@@ -147,23 +134,22 @@ std::optional<std::string> difference(const Replay& replay, const std::string& s
   return std::string("the line ends differ");
 }
 
-Json number(double value) { return std::isnan(value) ? Json() : Json(value); }
-
+/// NaN becomes null.
 Json to_json(const StepMean& step) {
   return {{"propeller", step.propeller},
           {"occlusion_deg", step.occlusion_deg},
           {"repetition", step.repetition},
           {"step", step.step},
           {"commanded_speed_rad_s", step.commanded_speed_rad_s},
-          {"speed_rad_s", number(step.speed_rad_s)},
-          {"thrust_n", number(step.thrust_n)},
+          {"speed_rad_s", step.speed_rad_s},
+          {"thrust_n", step.thrust_n},
           {"thrust_sd_n", step.thrust_sd_n},
-          {"torque_nm", number(step.torque_nm)},
+          {"torque_nm", step.torque_nm},
           {"zero_n", step.zero_n},
           {"thrust_samples", step.thrust_samples},
-          {"thrust_u_n", number(step.thrust_u_n)},
-          {"thrust_n_eff", number(step.thrust_n_eff)},
-          {"lag_s", number(step.lag_s)},
+          {"thrust_u_n", step.thrust_u_n},
+          {"thrust_n_eff", step.thrust_n_eff},
+          {"lag_s", step.lag_s},
           {"quality_flags", results::quality_flag_names(step.quality_flags)}};
 }
 
@@ -211,7 +197,7 @@ ExitCode show_replay(const Asked& asked) {
   while (asked.live.port && !view.is_watched() && !stop_asked())
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   ManualClock clock;
-  NoProgress nobody;
+  Progress nobody;
   const auto progress = view.beside(nobody, clock);
   const bool whole =
       view.tell_the_end([&] { return live::play(recording, clock, *progress, asked.speed, stop_asked); });
@@ -227,10 +213,7 @@ void add_replay(CLI::App& program, ExitCode& exit_code) {
   const auto [command, asked] = add_verb<Asked>(
       program, exit_code, "replay", "compute the step means again from the raw samples and compare them with steps.csv",
       replay_as_asked);
-  command.add_option("PATH", asked.path, "run file or campaign folder")
-      ->required()
-      ->type_name("")
-      ->check(kExistingPath);
+  add_argument(command, "PATH", asked.path, "run file or campaign folder")->check(kExistingPath);
   command.add_flag("--json", asked.json, "print one JSON object");
   add_live_options(command, asked.live);
   command.add_option("--speed", asked.speed, "with --live or --udp-json: recorded seconds per second")

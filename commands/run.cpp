@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "commands/commands.hpp"
-#include "commands/live_options.hpp"
+#include "commands/inputs.hpp"
 #include "daq/audit/bench_audit.hpp"
 #include "daq/campaign/campaign_run.hpp"
 #include "daq/campaign/dry_run.hpp"
@@ -185,7 +185,7 @@ void announce(const Request& request, const DryRun& dry) {
 CampaignResult execute(const Request& request, const profiles::Plan& plan, Destination& destination, Operator& person,
                        live::LiveSession& view, const std::function<bool()>& stop_asked) {
   const auto& [options, campaign, config, answers] = request;
-  const DeviceLocks devices(lock_names(config));
+  const auto devices = lock_devices(lock_names(config));
   if (!destination.folder) std::filesystem::create_directories(options.out);
   const auto bench = connect_awake(config, stop_asked);
   const std::vector<BenchFinding> findings =
@@ -233,19 +233,17 @@ void add_run(CLI::App& program, ExitCode& exit_code) {
   command
       .add_option("CAMPAIGN", options.campaign, "campaign file (optional with --resume: default is the folder's copy)")
       ->type_name("");
-  command.add_option("--bench", options.bench, "bench file")->required()->type_name("FILE");
-  command.add_option("--out", options.out, "parent folder of the campaign's folder")
-      ->capture_default_str()
-      ->type_name("DIR");
-  command.add_option("--resume", options.resume, "resume the campaign of this folder at its first unfinished run")
-      ->type_name("DIR")
+  add_value(command, "--bench", "FILE", options.bench, "bench file")->required();
+  add_value(command, "--out", "DIR", options.out, "parent folder of the campaign's folder")->capture_default_str();
+  add_value(command, "--resume", "DIR", options.resume,
+            "resume the campaign of this folder at its first unfinished run")
       ->check(kExistingFolder);
   command.add_flag("--accept-changes", options.accept_changes, "resume although files, program or devices changed")
       ->needs("--resume");
   command.add_flag("--dry-run", options.dry_run, "check and print the plan and every limit; touch no device");
   auto* yes = command.add_flag("--yes", options.yes, "take every mounting as done (for a simulated bench)");
-  command.add_option("--answers", options.answers, "file with the operator's answers, for a run without a terminal")
-      ->type_name("FILE")
+  add_value(command, "--answers", "FILE", options.answers,
+            "file with the operator's answers, for a run without a terminal")
       ->excludes(yes);
   command.add_flag("--json", options.json, "print the result as one JSON object");
   add_live_options(command, options.live);

@@ -8,10 +8,10 @@
 
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
+#include "drivers/sim/bench_server.hpp"
 #include "drivers/sim/control_line.hpp"
-#include "drivers/sim/input_files.hpp"
 #include "drivers/sim/physics/truth.hpp"
-#include "drivers/sim/server.hpp"
 #include "drivers/sim/truth_log.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/strict_yaml.hpp"
@@ -45,16 +45,17 @@ void stop_running(int) {
   if (Server* server = running.load()) server->request_stop();
 }
 
-[[noreturn]] void refuse(const profiles::BenchConfig& bench, const std::string& what) {
-  throw ConfigurationError(bench.path + ": " + what);
+[[noreturn]] void refuse(const std::string& path, const std::string& what) {
+  throw ConfigurationError(path + ": " + what);
 }
 
 profiles::BenchConfig load_simulated(const Options& options) {
   profiles::BenchConfig bench = profiles::load_bench(options.bench);
-  if (!bench.simulation) refuse(bench, "a real bench cannot be simulated; add a `simulation` section");
-  if (bench.simulation->in_process) refuse(bench, "`simulation.in_process` needs no server; start `kphi run` directly");
+  if (!bench.simulation) refuse(bench.path, "a real bench cannot be simulated; add a `simulation` section");
+  if (bench.simulation->in_process)
+    refuse(bench.path, "`simulation.in_process` needs no server; start `kphi run` directly");
   if (bench.thrust_axis != 2 || bench.thrust_sign != 1 || bench.iq.spin != 1) {
-    refuse(bench,
+    refuse(bench.path,
            "the simulated propellers pull along +Fz and spin counter-clockwise; set `thrust_axis: +Fz` and "
            "`iq.spin: +1`");
   }
@@ -64,22 +65,10 @@ profiles::BenchConfig load_simulated(const Options& options) {
   return bench;
 }
 
-void load_faults(const std::string& path, BenchSettings& bench) {
-  sim::load_faults(profiles::read_text(path), path, bench);
-  if (!bench.air_faults.empty())
-    throw ConfigurationError(path + ": faults of the air sensor need a bench with `simulation.in_process`");
-}
-
-void load_motor(const std::string& path, BenchSettings& bench) {
-  const MotorProfile profile = parse_motor_profile(profiles::read_text(path), path);
-  bench.plant.motor = profile.motor;
-  bench.module.sensors = profile.sensors;
-}
-
 void load_supply(const profiles::BenchConfig& bench, const Options& options, ServerSettings& settings) {
   try {
     const SupplyUri uri = parse_supply_uri(bench.supply->uri);
-    auto& supply = settings.bench.supply.emplace();
+    auto& supply = *settings.bench.supply;
     supply.model = uri.model;
     supply.slave = uri.slave;
     supply.seed = bench.simulation->seed;
@@ -87,36 +76,31 @@ void load_supply(const profiles::BenchConfig& bench, const Options& options, Ser
     settings.supply = uri.addresses;
     if (options.free_ports) settings.supply->port = 0;
   } catch (const std::invalid_argument& error) {
-    refuse(bench, error.what());
+    refuse(bench.path, error.what());
   }
 }
 
 ServerSettings settings_of(const profiles::BenchConfig& bench, const Options& options) {
   ServerSettings settings;
-  settings.bench.seed = bench.simulation->seed;
+  settings.bench = daq::simulated_devices(bench);
+  if (!settings.bench.air_faults.empty())
+    refuse(bench.simulation->faults, "faults of the air sensor need a bench with `simulation.in_process`");
   settings.bench.time_scale = bench.simulation->time_scale;
-  settings.bench.module_id = bench.iq.module_id;
-  settings.bench.module.baud = bench.iq.baud;
   settings.bench.oscillator_gain = options.clock_gain;
   settings.bench.module.quirks = options.legacy ? kLegacyFirmware : IqQuirks{};
   settings.bench.module.reply_latency = from_seconds(1e-6 * options.reply_latency_us);
   settings.bench.motor_line_paced = options.paced;
   settings.bench.motor_usb_tick = from_seconds(1e-3 * options.usb_tick_ms);
-  settings.bench.netbox.rate_hz = bench.netbox.rate_hz;
-  settings.bench.netbox.records_per_datagram = bench.netbox.records_per_datagram;
   settings.bench.netbox.address = bench.netbox.host;
   settings.host = bench.netbox.host;
   settings.rdt_port = options.free_ports ? 0 : bench.netbox.rdt_port;
   settings.http_port = options.free_ports ? 0 : bench.netbox.http_port;
   settings.tcp_port = options.free_ports ? 0 : bench.netbox.tcp_port;
   if (bench.supply) load_supply(bench, options, settings);
-  if (!bench.simulation->faults.empty()) load_faults(bench.simulation->faults, settings.bench);
-  if (!bench.simulation->motor.empty()) load_motor(bench.simulation->motor, settings.bench);
   if (!options.truth_log.empty()) {
     settings.bench.keep = FaultInjector::Keep::datagrams;
     settings.bench.motor_keep = IqLine::Keep::replies;
   }
-  settings.bench.plant.air_density_kg_m3 = bench.simulation->air_density_kg_m3;
   settings.device = bench.iq.device;
   settings.control = bench.simulation->control;
   return settings;
@@ -128,11 +112,10 @@ std::string resolved_text(const profiles::BenchConfig& bench, const Addresses& a
   file["netbox"]["http_port"] = addresses.http_port;
   file["netbox"]["tcp_port"] = addresses.tcp_port;
   file["iq"]["device"] = addresses.device;
-  if (bench.supply && addresses.supply_port != 0) {
+  if (addresses.supply && addresses.supply->host) {
     const std::size_t query = bench.supply->uri.find('?');
-    file["supply"]["uri"] =
-        fmt::format("modbus-tcp:{}:{}{}", parse_supply_uri(bench.supply->uri).addresses.host.value_or(""),
-                    addresses.supply_port, query == std::string::npos ? "" : bench.supply->uri.substr(query));
+    file["supply"]["uri"] = fmt::format("modbus-tcp:{}:{}{}", *addresses.supply->host, addresses.supply->port,
+                                        query == std::string::npos ? "" : bench.supply->uri.substr(query));
   }
   file["simulation"]["control"] = addresses.control;
   file["simulation"]["time_scale"] = fmt::format("{}", bench.simulation->time_scale);
@@ -152,8 +135,8 @@ std::string ready_line(const profiles::BenchConfig& bench, const Addresses& addr
             {"control", addresses.control},
             {"time_scale", bench.simulation->time_scale},
             {"seed", bench.simulation->seed}};
-  if (!addresses.supply_device.empty()) json["supply"] = addresses.supply_device;
-  if (addresses.supply_port != 0) json["supply"] = fmt::format("{}:{}", addresses.host, addresses.supply_port);
+  if (const auto& supply = addresses.supply)
+    json["supply"] = supply->device ? *supply->device : fmt::format("{}:{}", addresses.host, supply->port);
   return json.dump();
 }
 
@@ -204,19 +187,18 @@ ExitCode run(const Options& options) {
 void add_sim(CLI::App& program, ExitCode& exit_code) {
   const auto [sim, options] = add_verb<Options>(
       program, exit_code, "sim", "run the simulated bench of a bench file, or control a running one", run);
-  sim.add_option("BENCH", options.bench, "bench file with a `simulation` section")->required()->type_name("");
-  sim.add_option("--truth", options.truth, "write the true coefficients of the simulated propellers to FILE (YAML)")
-      ->type_name("FILE");
-  sim.add_option("--faults", options.faults, "fault script of wires and devices (YAML; default: the bench file's)")
-      ->type_name("FILE");
-  sim.add_option("--truth-log", options.truth_log,
-                 "write at exit what became of every datagram, reply and motor command to FILE (JSON lines)")
-      ->type_name("FILE");
+  add_argument(sim, "BENCH", options.bench, "bench file with a `simulation` section");
+  add_value(sim, "--truth", "FILE", options.truth,
+            "write the true coefficients of the simulated propellers to FILE (YAML)");
+  add_value(sim, "--faults", "FILE", options.faults,
+            "fault script of wires and devices (YAML; default: the bench file's)");
+  add_value(sim, "--truth-log", "FILE", options.truth_log,
+            "write at exit what became of every datagram, reply and motor command to FILE (JSON lines)");
   sim.add_option("--time-scale", options.time_scale, "bench seconds per second (default: the bench file's)")
       ->check(CLI::Range(0.1, 1000.0));
   sim.add_option("--seed", options.seed, "seed of the noise (default: the bench file's)");
-  sim.add_option("--resolved", options.resolved, "write a copy of the bench file with the actual addresses to FILE")
-      ->type_name("FILE");
+  add_value(sim, "--resolved", "FILE", options.resolved,
+            "write a copy of the bench file with the actual addresses to FILE");
   sim.add_flag("--free-ports", options.free_ports,
                "listen on any free ports instead of the bench file's; see --resolved");
   sim.add_option("--clock-gain", options.clock_gain,

@@ -111,57 +111,37 @@ void append(std::string& text, double value) {
   text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
 }
 
-template <class Value>
-void append_four(std::string& text, const Value& value_of) {
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (i != 0) text += ',';
-    append(text, value_of(i));
-  }
-}
+struct RowStyle {
+  const char* before[4];  ///< the four φ, the four k_i, the four speeds, the flags
+  const char* quote;      ///< around a flag
+  const char* between;    ///< two flags
+  const char* end;
+};
+constexpr RowStyle kCsv{{"", ",", ",", ","}, "", " ", "\n"};
+constexpr RowStyle kJson{{"{\"phi_deg\":[", "],\"k\":[", "],\"speed_rpm\":[", "],\"flags\":["}, "\"", ",", "]}\n"};
 
-/// Calls told("2:at_floor") and the like, for every flag of every rotor.
-template <class Told>
-void for_each_flag(const SpeedCommand& command, const Told& told) {
+void append_row(std::string& text, const RowStyle& style, const Compensator& compensator, const SpeedCommand& command) {
+  const auto four = [&](std::size_t group, const auto& value_of) {
+    text += style.before[group];
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (i != 0) text += ',';
+      append(text, value_of(i));
+    }
+  };
+  four(0, [&](std::size_t i) { return to_degrees(compensator.occlusion_angles()[i]); });
+  four(1, [&](std::size_t i) { return compensator.scaling_factors()[i]; });
+  four(2, [&](std::size_t i) { return to_rpm(command.speeds[i]); });
+  text += style.before[3];
+  const char* separator = "";
   for (std::size_t i = 0; i < 4; ++i) {
     if (!command.flags[i].any()) continue;
     for (const FlagName& entry : kFlagNames) {
-      if (command.flags[i].has(entry.flag)) told(std::to_string(i + 1) + ":" + std::string(entry.name));
+      if (!command.flags[i].has(entry.flag)) continue;
+      text += separator + (style.quote + std::to_string(i + 1)) + ":" + std::string(entry.name) + style.quote;
+      separator = style.between;
     }
   }
-}
-
-void append_csv(std::string& text, const Compensator& compensator, const SpeedCommand& command) {
-  append_four(text, [&](std::size_t i) { return to_degrees(compensator.occlusion_angles()[i]); });
-  text += ',';
-  append_four(text, [&](std::size_t i) { return compensator.scaling_factors()[i]; });
-  text += ',';
-  append_four(text, [&](std::size_t i) { return to_rpm(command.speeds[i]); });
-  char separator = ',';
-  for_each_flag(command, [&](const std::string& flag) {
-    text += separator;
-    text += flag;
-    separator = ' ';
-  });
-  if (separator == ',') text += ',';
-  text += '\n';
-}
-
-void append_json(std::string& text, const Compensator& compensator, const SpeedCommand& command) {
-  text += "{\"phi_deg\":[";
-  append_four(text, [&](std::size_t i) { return to_degrees(compensator.occlusion_angles()[i]); });
-  text += "],\"k\":[";
-  append_four(text, [&](std::size_t i) { return compensator.scaling_factors()[i]; });
-  text += "],\"speed_rpm\":[";
-  append_four(text, [&](std::size_t i) { return to_rpm(command.speeds[i]); });
-  text += "],\"flags\":[";
-  const char* separator = "\"";
-  for_each_flag(command, [&](const std::string& flag) {
-    text += separator;
-    text += flag;
-    text += '"';
-    separator = ",\"";
-  });
-  text += "]}\n";
+  text += style.end;
 }
 
 void hand_on(std::string& buffer, std::ostream& out) {
@@ -205,11 +185,7 @@ RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& wor
     compensator.set_arms(arm_angles);
     const SpeedCommand command = compensator.speeds_for(thrusts);
     ++counts.written;
-    if (format == RowFormat::csv) {
-      append_csv(buffer, compensator, command);
-    } else {
-      append_json(buffer, compensator, command);
-    }
+    append_row(buffer, format == RowFormat::csv ? kCsv : kJson, compensator, command);
     if (buffer.size() >= kFlushAt || in.rdbuf()->in_avail() <= 0) hand_on(buffer, out);
   }
   hand_on(buffer, out);

@@ -62,25 +62,17 @@ LineDoubts doubts_about(const ThrustCurve& line, ScalingLaw law) noexcept {
 }  // namespace
 
 const char* describe(Refusal refusal) noexcept {
-  switch (refusal) {
-    case Refusal::none:
-      return "nothing was refused";
-    case Refusal::sizes:
-      return "half side, arm length and propeller radius must be positive and finite; check the vehicle's sizes [m]";
-    case Refusal::arm_length:
-      return "the arm is not longer than the propeller radius, so its own corner is always covered; "
-             "check arm length and propeller radius [m]";
-    case Refusal::speeds:
-      return "speed limits must satisfy 0 <= slowest < fastest; check the vehicle's speed limits";
-    case Refusal::hinge_turns:
-      return "each arm needs a corner of its own; give the hinge turns 0, 1, 2, 3 (times 90 degrees) in some order";
-    case Refusal::hinges:
-      return "a hinge of the polygon body is not finite; check its place [m] and turn [rad]";
-    case Refusal::overlap:
-      return "a line was fitted with another overlap measure than the airframe flies with; fly the measure of the fit, "
-             "or fit again";
-  }
-  return "unknown refusal";
+  static constexpr const char* kSentences[] = {
+      "nothing was refused",
+      "half side, arm length and propeller radius must be positive and finite; check the vehicle's sizes [m]",
+      "the arm is not longer than the propeller radius, so its own corner is always covered; "
+      "check arm length and propeller radius [m]",
+      "speed limits must satisfy 0 <= slowest < fastest; check the vehicle's speed limits",
+      "each arm needs a corner of its own; give the hinge turns 0, 1, 2, 3 (times 90 degrees) in some order",
+      "a hinge of the polygon body is not finite; check its place [m] and turn [rad]",
+      "a line was fitted with another overlap measure than the airframe flies with; fly the measure of the fit, "
+      "or fit again"};
+  return refusal <= Refusal::overlap ? kSentences[static_cast<std::size_t>(refusal)] : "unknown refusal";
 }
 
 BuildOutcome Compensator::build(const std::array<ThrustCurve, 4>& lines, const Airframe& airframe,

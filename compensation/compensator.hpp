@@ -12,6 +12,7 @@
 #include <type_traits>
 
 #include "compensation/airframe.hpp"
+#include "compensation/flag_set.hpp"
 #include "compensation/occlusion.hpp"
 #include "compensation/thrust_curve.hpp"
 #include "compensation/units.hpp"
@@ -31,30 +32,8 @@ enum class Flag : std::uint8_t {
   at_ceiling = 128,        ///< covered, yet the line lies above K_T there: k_i is held at 1 (clamped law)
 };
 
-/// Any number of them: one rotor's.
-class Flags {
- public:
-  constexpr Flags() noexcept = default;
-  [[nodiscard]] constexpr bool any() const noexcept { return bits_ != 0; }
-  [[nodiscard]] constexpr bool has(Flag flag) const noexcept { return (bits_ & static_cast<unsigned>(flag)) != 0; }
-  /// The sum of the enumerators, as the C interface tells it.
-  [[nodiscard]] constexpr std::uint8_t bits() const noexcept { return bits_; }
-  /// These flags, and `flag` if `raised`.
-  [[nodiscard]] constexpr Flags with(Flag flag, bool raised) const noexcept {
-    Flags result;
-    result.bits_ = static_cast<std::uint8_t>(bits_ | (raised ? static_cast<unsigned>(flag) : 0u));
-    return result;
-  }
-  /// These flags, and those of `bits`.
-  [[nodiscard]] constexpr Flags with(std::uint8_t bits) const noexcept {
-    Flags result;
-    result.bits_ = static_cast<std::uint8_t>(bits_ | bits);
-    return result;
-  }
-
- private:
-  std::uint8_t bits_ = 0;
-};
+/// One rotor's.
+using Flags = FlagSet<Flag>;
 
 struct SpeedCommand {
   std::array<RadPerSec, 4> speeds;  ///< rad/s, never NaN, within the airframe's speed limits

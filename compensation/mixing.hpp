@@ -17,6 +17,7 @@
 #include <type_traits>
 
 #include "compensation/airframe.hpp"
+#include "compensation/flag_set.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::compensation {
@@ -58,23 +59,7 @@ enum class Concession : std::uint8_t {
   demand_nan = 8,  ///< a demand was NaN and counted as 0, or a rotor's limits were NaN or crossed and counted as closed
 };
 
-/// Any number of them.
-class Concessions {
- public:
-  constexpr Concessions() noexcept = default;
-  [[nodiscard]] constexpr bool any() const noexcept { return bits_ != 0; }
-  [[nodiscard]] constexpr bool has(Concession c) const noexcept { return (bits_ & static_cast<unsigned>(c)) != 0; }
-  [[nodiscard]] constexpr std::uint8_t bits() const noexcept { return bits_; }
-  /// These, and `made` if `raised`.
-  [[nodiscard]] constexpr Concessions with(Concession made, bool raised) const noexcept {
-    Concessions result;
-    result.bits_ = static_cast<std::uint8_t>(bits_ | (raised ? static_cast<unsigned>(made) : 0u));
-    return result;
-  }
-
- private:
-  std::uint8_t bits_ = 0;
-};
+using Concessions = FlagSet<Concession>;
 
 struct MixedThrusts {
   std::array<Newtons, 4> thrusts;  ///< within the limits; goes to Compensator::speeds_for

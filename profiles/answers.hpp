@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "profiles/yaml_text.hpp"
+#include "profiles/strict_yaml.hpp"
 
 namespace kphi::profiles {
 

@@ -142,13 +142,13 @@ std::string format_of(const std::string& text, const std::string& path) {
 }
 
 std::optional<FileKind> kind_by_keys(const SourceDocument& document) {
-  static constexpr std::array<std::pair<const char*, FileKind>, 7> kTelltales{{{"occlusions_deg", FileKind::campaign},
-                                                                               {"profile", FileKind::campaign},
-                                                                               {"netbox", FileKind::bench},
-                                                                               {"iq", FileKind::bench},
-                                                                               {"shapes_deg", FileKind::vehicle},
-                                                                               {"half_side_m", FileKind::vehicle},
-                                                                               {"mountings", FileKind::answers}}};
+  static constexpr std::pair<const char*, FileKind> kTelltales[] = {{"occlusions_deg", FileKind::campaign},
+                                                                    {"profile", FileKind::campaign},
+                                                                    {"netbox", FileKind::bench},
+                                                                    {"iq", FileKind::bench},
+                                                                    {"shapes_deg", FileKind::vehicle},
+                                                                    {"half_side_m", FileKind::vehicle},
+                                                                    {"mountings", FileKind::answers}};
   if (!document.value.is_object()) return std::nullopt;
   for (const auto& [key, kind] : kTelltales) {
     if (document.value.contains(key)) return kind;
@@ -156,17 +156,11 @@ std::optional<FileKind> kind_by_keys(const SourceDocument& document) {
   return std::nullopt;
 }
 
-std::optional<FileKind> kind_of(const std::string& format) {
-  for (const FileKindInfo& candidate : kFileKinds) {
-    if (format == candidate.format) return candidate.kind;
-  }
-  return std::nullopt;
-}
-
 /// By its format; without a known one by its keys, so that all findings come at once.
 FileKind recognise(const std::string& text, const std::string& path, const std::string& format,
                    const std::vector<ForeignKind>& foreign) {
-  if (const auto kind = kind_of(format)) return *kind;
+  const auto known = std::ranges::find(kFileKinds, format, &FileKindInfo::format);
+  if (known != kFileKinds.end()) return known->kind;
   const SourceDocument document = parse_strict_yaml(text, path);
   if (const auto kind = kind_by_keys(document)) return *kind;
   std::vector<std::string> formats;
@@ -236,27 +230,13 @@ CheckedFile check_file(const std::string& path, std::size_t number, const std::v
   return file;
 }
 
-void check_against_benches(std::vector<CheckedFile>& files, const Loaded& loaded) {
-  for (const auto& [number, campaign] : loaded.campaigns) {
-    for (const BenchConfig& bench : loaded.benches) {
-      try {
-        require_within(campaign, bench);
-      } catch (const ConfigurationError& refused) {
-        refuse(files[number], refused.what());
-      }
-    }
-  }
-}
-
-void check_answers(std::vector<CheckedFile>& files, const Loaded& loaded) {
-  for (const auto& [number, answers] : loaded.answers) {
-    for (const auto& [unused, campaign] : loaded.campaigns) {
-      try {
-        require_mountings(answers, make_plan(campaign, BenchConfig{}).mounting_angles());
-      } catch (const ConfigurationError& refused) {
-        refuse(files[number], refused.what());
-      }
-    }
+/// Adds to the file what `check` refuses.
+template <class Check>
+void attempt(CheckedFile& file, Check&& check) {
+  try {
+    check();
+  } catch (const ConfigurationError& refused) {
+    refuse(file, refused.what());
   }
 }
 
@@ -266,8 +246,15 @@ std::vector<CheckedFile> check_files(const std::vector<std::string>& paths, cons
   std::vector<CheckedFile> files;
   Loaded loaded;
   for (const std::string& path : paths) files.push_back(check_file(path, files.size(), foreign, loaded));
-  check_against_benches(files, loaded);
-  check_answers(files, loaded);
+  for (const auto& [number, campaign] : loaded.campaigns) {
+    for (const BenchConfig& bench : loaded.benches) attempt(files[number], [&] { require_within(campaign, bench); });
+  }
+  for (const auto& [number, answers] : loaded.answers) {
+    for (const auto& [of_campaign, campaign] : loaded.campaigns) {
+      const auto angles = make_plan(campaign, BenchConfig{}).mounting_angles();
+      attempt(files[number], [&] { require_mountings(answers, angles); });
+    }
+  }
   for (CheckedFile& file : files) {
     if (!file.kind.empty()) file.report["kind"] = file.kind;
     file.report["ok"] = file.ok();

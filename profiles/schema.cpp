@@ -13,8 +13,6 @@
 #include <string_view>
 #include <utility>
 
-#include "profiles/yaml_text.hpp"
-
 namespace kphi::profiles {
 namespace {
 
@@ -24,46 +22,15 @@ struct UnitSuffix {
 };
 
 /// Also units that we do not use and others do.
-constexpr std::array<UnitSuffix, 38> kUnits{{
-    {"_rad_s", "rad/s"},
-    {"_rpm", "RPM"},
-    {"_rpm_s", "RPM/s"},
-    {"_rad", "rad"},
-    {"_degc", "°C"},
-    {"_deg", "degrees"},
-    {"_hz", "Hz"},
-    {"_nm", "N m"},
-    {"_in", "inches"},
-    {"_n", "N"},
-    {"_s", "s"},
-    {"_v", "V"},
-    {"_a", "A"},
-    {"_m", "m"},
-    {"_ms", "ms"},
-    {"_us", "µs"},
-    {"_ns", "ns"},
-    {"_min", "minutes"},
-    {"_sec", "s"},
-    {"_h", "h"},
-    {"_khz", "kHz"},
-    {"_rps", "1/s"},
-    {"_deg_s", "degrees/s"},
-    {"_degf", "°F"},
-    {"_c", "°C"},
-    {"_k", "K"},
-    {"_kn", "kN"},
-    {"_mn", "mN"},
-    {"_gf", "gf"},
-    {"_kgf", "kgf"},
-    {"_g", "g"},
-    {"_kg", "kg"},
-    {"_mv", "mV"},
-    {"_ma", "mA"},
-    {"_mm", "mm"},
-    {"_cm", "cm"},
-    {"_pa", "Pa"},
-    {"_hpa", "hPa"},
-}};
+constexpr UnitSuffix kUnits[] = {
+    {"_deg_s", "degrees/s"}, {"_degc", "°C"}, {"_ms", "ms"}, {"_mv", "mV"}, {"_v", "V"},
+    {"_rad_s", "rad/s"},     {"_khz", "kHz"}, {"_us", "µs"}, {"_ma", "mA"}, {"_a", "A"},
+    {"_rpm_s", "RPM/s"},     {"_rps", "1/s"}, {"_ns", "ns"}, {"_mm", "mm"}, {"_m", "m"},
+    {"_deg", "degrees"},     {"_degf", "°F"}, {"_sec", "s"}, {"_cm", "cm"}, {"_h", "h"},
+    {"_min", "minutes"},     {"_kgf", "kgf"}, {"_kn", "kN"}, {"_pa", "Pa"}, {"_k", "K"},
+    {"_in", "inches"},       {"_hpa", "hPa"}, {"_mn", "mN"}, {"_c", "°C"},  {"_g", "g"},
+    {"_rpm", "RPM"},         {"_nm", "N m"},  {"_gf", "gf"}, {"_n", "N"},   {"_rad", "rad"},
+    {"_hz", "Hz"},           {"_kg", "kg"},   {"_s", "s"}};
 
 /// Edit distance with swapped neighbours (optimal string alignment).
 std::size_t slips(const std::string& a, const std::string& b) {
@@ -85,14 +52,12 @@ std::size_t slips(const std::string& a, const std::string& b) {
 }  // namespace
 
 KeyParts split_unit(const std::string& key) {
-  const UnitSuffix* longest = nullptr;
+  UnitSuffix longest{};
   for (const UnitSuffix& unit : kUnits) {
-    const bool ends = key.size() > unit.suffix.size() &&
-                      key.compare(key.size() - unit.suffix.size(), unit.suffix.size(), unit.suffix) == 0;
-    if (ends && (longest == nullptr || unit.suffix.size() > longest->suffix.size())) longest = &unit;
+    const bool ends = key.size() > unit.suffix.size() && key.ends_with(unit.suffix);
+    if (ends && unit.suffix.size() > longest.suffix.size()) longest = unit;
   }
-  if (longest == nullptr) return {key, ""};
-  return {key.substr(0, key.size() - longest->suffix.size()), std::string(longest->unit)};
+  return {key.substr(0, key.size() - longest.suffix.size()), std::string(longest.unit)};
 }
 
 std::optional<std::string> nearest_name(const std::string& name, const std::vector<std::string>& names) {
@@ -188,7 +153,7 @@ std::vector<std::string> keys_of(const json& object) {
 std::vector<std::string> known_keys(const json& schema) { return keys_of(schema.value("properties", json::object())); }
 
 bool contains(const std::vector<std::string>& words, const std::string& word) {
-  return std::find(words.begin(), words.end(), word) != words.end();
+  return std::ranges::find(words, word) != words.end();
 }
 
 void check_type(const Spot& s, const json& type, Findings& findings) {
@@ -269,20 +234,18 @@ void check_shortest(const Spot& s, const json& least, Findings& findings) {
                                 "write " + s.purpose("what it is")));
 }
 
-void check_most_items(const Spot& s, const json& most, Findings& findings) {
-  if (!s.value.is_array() || s.value.size() <= most.get<std::size_t>()) return;
-  findings.push_back(s.at_value(fmt::format("{} values", s.value.size()), "write at most " + most.dump()));
+void refuse_number(const Spot& s, std::string_view noun, const std::string& next_move, Findings& findings) {
+  const std::string found = noun == "keys" && s.value.empty() ? "no keys" : fmt::format("{} {}", s.value.size(), noun);
+  findings.push_back(s.at_value(found, "write at " + next_move));
 }
-
-void check_fewest_items(const Spot& s, const json& least, Findings& findings) {
-  if (!s.value.is_array() || s.value.size() >= least.get<std::size_t>()) return;
-  findings.push_back(s.at_value(fmt::format("{} values", s.value.size()), "write at least " + least.dump()));
+void check_most_items(const Spot& s, const json& most, Findings& f) {
+  if (s.value.is_array() && s.value.size() > most) refuse_number(s, "values", "most " + most.dump(), f);
 }
-
-void check_fewest_keys(const Spot& s, const json& least, Findings& findings) {
-  if (!s.value.is_object() || s.value.size() >= least.get<std::size_t>()) return;
-  findings.push_back(s.at_value(s.value.empty() ? "no keys" : fmt::format("{} keys", s.value.size()),
-                                "write at least " + least.dump()));
+void check_fewest_items(const Spot& s, const json& least, Findings& f) {
+  if (s.value.is_array() && s.value.size() < least) refuse_number(s, "values", "least " + least.dump(), f);
+}
+void check_fewest_keys(const Spot& s, const json& least, Findings& f) {
+  if (s.value.is_object() && s.value.size() < least) refuse_number(s, "keys", "least " + least.dump(), f);
 }
 
 /// Dotted names of the objects, other than the one at hand, that know `key`.
@@ -398,7 +361,7 @@ void check(const Spot& spot, Findings& findings) {
 void require_known_keywords(const json& schema) {
   for (const auto& [keyword, argument] : schema.items()) {
     const std::string& name = keyword;
-    if (std::none_of(kKeywords.begin(), kKeywords.end(), [&](const Keyword& k) { return k.name == name; }))
+    if (std::ranges::find(kKeywords, name, &Keyword::name) == kKeywords.end())
       throw std::invalid_argument(fmt::format("schema: unknown keyword \"{}\"", name));
     if (name == "items" && !argument.is_object())
       throw std::invalid_argument("schema: items must be one schema for all of them");

@@ -7,16 +7,184 @@
 #include <yaml-cpp/parser.h>
 
 #include <algorithm>
+#include <array>
+#include <boost/locale/utf.hpp>
 #include <cerrno>
+#include <charconv>
+#include <cstdint>
 #include <cstring>
 #include <fstream>
+#include <iterator>
+#include <optional>
 #include <sstream>
+#include <string_view>
+#include <tuple>
 #include <utility>
-
-#include "profiles/yaml_text.hpp"
 
 namespace kphi::profiles {
 namespace {
+
+/// Turns bytes of a text into places.
+class Lines {
+ public:
+  explicit Lines(const std::string& text) : text_(text) {
+    for (std::size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at + 1))
+      begins_.push_back(at + 1);
+  }
+  [[nodiscard]] Mark mark(std::size_t offset) const {
+    const auto line = std::prev(std::ranges::upper_bound(begins_, std::min(offset, text_.size())));
+    const auto before = std::string_view(text_).substr(*line, std::min(offset, text_.size()) - *line);
+    const auto continued = std::ranges::count_if(before, is_continuation);
+    return {static_cast<int>(line - begins_.begin()) + 1,
+            static_cast<int>(before.size()) - static_cast<int>(continued) + 1};
+  }
+
+ private:
+  const std::string& text_;
+  std::vector<std::size_t> begins_{0};
+};
+
+struct BadCharacter {
+  std::size_t offset = 0;
+  std::string what;
+};
+
+/// First control character or broken UTF-8 sequence; tabs and line ends are allowed.
+std::optional<BadCharacter> first_bad_character(const std::string& text) {
+  namespace utf = boost::locale::utf;
+  for (auto at = text.begin(); at != text.end();) {
+    const auto begin = at;
+    const utf::code_point c = utf::utf_traits<char>::decode(at, text.end());
+    const auto offset = static_cast<std::size_t>(begin - text.begin());
+    if (c == utf::illegal || c == utf::incomplete) return BadCharacter{offset, "a byte sequence that is not UTF-8"};
+    const bool is_line_end = c == '\n' || (c == '\r' && at != text.end() && *at == '\n');
+    if ((c < 0x20 && c != '\t' && !is_line_end) || c == 0x7F)
+      return BadCharacter{offset, fmt::format("a control character (0x{:02x})", c)};
+  }
+  return std::nullopt;
+}
+
+std::optional<std::size_t> first_tab_in_indentation(const std::string& text) {
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::size_t word = std::min(text.find_first_not_of(" \t\r", begin), end);
+    const std::size_t tab = text.find('\t', begin);
+    if (word < end && text[word] != '#' && tab < word) return tab;
+    begin = end + 1;
+  }
+  return std::nullopt;
+}
+
+struct Scalar {
+  nlohmann::json value;  ///< null if refused
+  std::string what;      ///< why it is refused; empty if it is not
+  std::string next_move;
+};
+
+std::string lower(std::string_view text) {
+  std::string result(text);
+  for (char& c : result) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return result;
+}
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+bool only(std::string_view text, std::string_view allowed) {
+  return text.find_first_not_of(allowed) == std::string_view::npos;
+}
+
+bool contains(std::string_view text, char c) { return text.find(c) != std::string_view::npos; }
+
+bool is_boolean_elsewhere(const std::string& word) {
+  static constexpr std::array<std::string_view, 8> kWords{"yes", "no", "on", "off", "y", "n", "true", "false"};
+  return std::find(kWords.begin(), kWords.end(), word) != kWords.end();
+}
+
+bool is_not_finite(std::string_view word) {
+  if (!word.empty() && (word[0] == '+' || word[0] == '-')) word.remove_prefix(1);
+  return word == ".inf" || word == ".nan" || word == "inf" || word == "infinity" || word == "nan";
+}
+
+/// `digits` has no sign. Why other readers, or the reader of this page, may see another number in it.
+std::optional<std::string> doubtful_number(std::string_view digits) {
+  if (digits.empty() || !is_digit(digits[0])) return std::nullopt;
+  const bool leading_zero = digits.size() > 1 && digits[0] == '0' && is_digit(digits[1]);
+  if (leading_zero && only(digits, "0123456789.eE+-_")) return "looks octal";
+  const std::string prefix = lower(digits.substr(0, 2));
+  if ((prefix == "0x" && only(digits.substr(2), "0123456789abcdefABCDEF_")) ||
+      (prefix == "0o" && only(digits.substr(2), "01234567_")) || (prefix == "0b" && only(digits.substr(2), "01_"))) {
+    return "is not decimal";
+  }
+  if (contains(digits, '_') && only(digits, "0123456789_.")) return "has separators";
+  if (contains(digits, ',') && only(digits, "0123456789,.")) return "has separators";
+  if (contains(digits, ':') && only(digits, "0123456789:")) return "is base 60 to some readers";
+  return std::nullopt;
+}
+
+bool looks_decimal(std::string_view digits) {
+  if (digits.empty() || !only(digits, "0123456789.eE+-")) return false;
+  return is_digit(digits[0]) || (digits[0] == '.' && digits.size() > 1 && is_digit(digits[1]));
+}
+
+/// null: not a number after all ("1.2.3").
+nlohmann::json decimal(std::string_view digits, bool negative, bool& out_of_range) {
+  const char* end = digits.data() + digits.size();
+  std::int64_t whole = 0;
+  if (const auto [stop, error] = std::from_chars(digits.data(), end, whole); error == std::errc{} && stop == end) {
+    return negative ? -whole : whole;
+  }
+  double number = 0;
+  const auto [stop, error] = std::from_chars(digits.data(), end, number);
+  if (stop != end) return nullptr;
+  out_of_range = error != std::errc{};
+  return negative ? -number : number;
+}
+
+/// An unquoted scalar.
+Scalar read_plain_scalar(const std::string& text) {
+  if (text == "true" || text == "false") return {text == "true", "", ""};
+  const std::string word = lower(text);
+  if (is_boolean_elsewhere(word)) {
+    return {nullptr, fmt::format("{} is a boolean to some YAML readers and text to others", text),
+            fmt::format("write true or false, or quote it: \"{}\"", text)};
+  }
+  if (is_not_finite(word)) return {nullptr, fmt::format("{} is not a finite number", text), "write a finite number"};
+
+  const bool has_sign = text[0] == '+' || text[0] == '-';
+  const std::string_view digits = std::string_view(text).substr(has_sign ? 1 : 0);
+  if (const auto doubt = doubtful_number(digits)) {
+    return {nullptr, fmt::format("{} {}", text, *doubt), "write a plain decimal number, or quote it if it is text"};
+  }
+  if (looks_decimal(digits)) {
+    bool out_of_range = false;
+    auto number = decimal(digits, text[0] == '-', out_of_range);
+    if (out_of_range) return {nullptr, fmt::format("{} is not a finite number", text), "write a finite number"};
+    if (!number.is_null()) return {std::move(number), "", ""};
+  }
+  return {text, "", ""};
+}
+
+std::vector<FileFinding> in_file_order(std::vector<FileFinding> findings) {
+  std::stable_sort(findings.begin(), findings.end(), [](const FileFinding& a, const FileFinding& b) {
+    return std::tie(a.mark.line, a.mark.column) < std::tie(b.mark.line, b.mark.column);
+  });
+  return findings;
+}
+
+std::string describe_all(const std::string& path, const std::vector<FileFinding>& unordered) {
+  const auto findings = in_file_order(unordered);
+  std::string lines;
+  for (std::size_t i = 0; i < std::min(findings.size(), RefusedFile::kShownFindings); ++i) {
+    lines += (i == 0 ? "" : "\n") + describe(path, findings[i]);
+  }
+  if (findings.size() > RefusedFile::kShownFindings) {
+    lines +=
+        fmt::format("\n{}: {} more problems; fix these first", path, findings.size() - RefusedFile::kShownFindings);
+  }
+  return lines;
+}
 
 bool lies_in(const std::string& pointer, const std::string& root) {
   return pointer.compare(0, root.size(), root) == 0 && (pointer.size() == root.size() || pointer[root.size()] == '/');
@@ -33,7 +201,7 @@ void copy_marks(std::map<std::string, Mark>& marks, const std::string& from, con
 /// Builds the JSON from yaml-cpp's events. Not from its nodes: those expand aliases and drop duplicate keys.
 class Builder final : public YAML::EventHandler {
  public:
-  Builder(const std::string& text, const std::string& path) : lines_(text) { document_.path = path; }
+  Builder(const Lines& lines, const std::string& path) : lines_(lines) { document_.path = path; }
 
   SourceDocument take() { return std::move(document_); }
 
@@ -116,7 +284,7 @@ class Builder final : public YAML::EventHandler {
   }
 
   void add(const YAML::Mark& mark, const std::string& pointer, const std::string& what, const std::string& next_move) {
-    document_.findings.push_back({lines_.mark(mark.line, mark.column), pointer, what, next_move});
+    document_.findings.push_back({lines_.mark(static_cast<std::size_t>(mark.pos)), pointer, what, next_move});
   }
 
   bool awaits_key() const { return !stack_.empty() && stack_.back().value.is_object() && !stack_.back().has_key; }
@@ -144,7 +312,7 @@ class Builder final : public YAML::EventHandler {
           "keep one of the two");
       return;
     }
-    document_.key_marks.emplace(pointer, lines_.mark(mark.line, mark.column));
+    document_.key_marks.emplace(pointer, lines_.mark(static_cast<std::size_t>(mark.pos)));
   }
 
   std::string next_pointer() const {
@@ -161,7 +329,7 @@ class Builder final : public YAML::EventHandler {
   std::string begin(const YAML::Mark& mark) {
     count(mark, 1);
     std::string pointer = next_pointer();
-    document_.value_marks.emplace(pointer, lines_.mark(mark.line, mark.column));
+    document_.value_marks.emplace(pointer, lines_.mark(static_cast<std::size_t>(mark.pos)));
     return pointer;
   }
 
@@ -199,7 +367,7 @@ class Builder final : public YAML::EventHandler {
     end(std::move(frame.value), frame.pointer, frame.anchor, frame.values);
   }
 
-  Lines lines_;
+  const Lines& lines_;
   SourceDocument document_;
   std::vector<Frame> stack_;
   std::map<YAML::anchor_t, Anchored> anchors_;
@@ -233,9 +401,13 @@ Mark SourceDocument::key_mark(const std::string& pointer) const {
 SourceDocument parse_strict_yaml(const std::string& whole_text, const std::string& path) {
   const std::string text = without_byte_order_mark(whole_text);
   if (text.size() > kMaxTextBytes) refuse(path, {}, "larger than 1 MiB", "check that this is the right file");
-  if (const auto fault = first_fault_of_characters(text)) refuse(path, fault->mark, fault->what, fault->next_move);
+  const Lines lines(text);
+  if (const auto bad = first_bad_character(text))
+    refuse(path, lines.mark(bad->offset), bad->what, "save the file as UTF-8 text");
+  if (const auto tab = first_tab_in_indentation(text))
+    refuse(path, lines.mark(*tab), "a tab in the indentation", "indent with spaces");
 
-  Builder builder(text, path);
+  Builder builder(lines, path);
   std::istringstream stream(text);
   try {
     YAML::Parser parser(stream);
@@ -244,8 +416,7 @@ SourceDocument parse_strict_yaml(const std::string& whole_text, const std::strin
     }
     parser.HandleNextDocument(builder);
   } catch (const YAML::Exception& fault) {
-    const Lines lines(text);
-    refuse(path, fault.mark.is_null() ? Mark{} : lines.mark(fault.mark.line, fault.mark.column),
+    refuse(path, fault.mark.is_null() ? Mark{} : lines.mark(static_cast<std::size_t>(fault.mark.pos)),
            fmt::format("not readable as YAML: {}", fault.msg), "check colons, brackets and indentation here and above");
   }
   return builder.take();
@@ -269,35 +440,25 @@ std::string read_text(const std::string& path) {
 }
 
 std::string child_pointer(const std::string& pointer, const std::string& key) {
-  std::string result = pointer + '/';
-  for (const char c : key) {
-    if (c == '~') {
-      result += "~0";
-    } else if (c == '/') {
-      result += "~1";
-    } else {
-      result += c;
-    }
-  }
-  return result;
+  return (nlohmann::json::json_pointer(pointer) / key).to_string();
 }
 
 std::string dotted(const std::string& pointer) {
   std::string result;
-  std::size_t begin = 1;
-  while (begin <= pointer.size() && !pointer.empty()) {
-    const std::size_t end = std::min(pointer.find('/', begin), pointer.size());
-    std::string token = pointer.substr(begin, end - begin);
+  for (nlohmann::json::json_pointer at(pointer); !at.empty(); at.pop_back()) {
+    const std::string& token = at.back();
     const bool is_index = !token.empty() && token.find_first_not_of("0123456789") == std::string::npos;
-    for (const auto& [escaped, plain] : {std::pair{"~1", "/"}, std::pair{"~0", "~"}}) {
-      for (auto at = token.find(escaped); at != std::string::npos; at = token.find(escaped, at + 1)) {
-        token.replace(at, 2, plain);
-      }
-    }
-    result += is_index ? "[" + token + "]" : (result.empty() ? "" : ".") + token;
-    begin = end + 1;
+    const bool is_first = at.parent_pointer().empty();
+    result.insert(0, is_index ? "[" + token + "]" : (is_first ? "" : ".") + token);
   }
   return result;
 }
+
+std::string describe(const std::string& path, const FileFinding& finding) {
+  return fmt::format("{}:{}:{}: {}", path, finding.mark.line, finding.mark.column, finding.words());
+}
+
+RefusedFile::RefusedFile(const std::string& path, std::vector<FileFinding> findings)
+    : ConfigurationError(describe_all(path, findings)), findings_(in_file_order(std::move(findings))) {}
 
 }  // namespace kphi::profiles

@@ -4,13 +4,11 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cstdlib>
+#include <map>
 #include <optional>
-#include <system_error>
 #include <tuple>
 
-#include "base/error.hpp"
 #include "base/number.hpp"
 
 namespace kphi::results {
@@ -49,6 +47,22 @@ std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder)
   return files;
 }
 
+/// By place of the occlusion in `occlusions_deg`, occlusion, number and propeller.
+std::vector<std::filesystem::path> complete_files(const std::filesystem::path& folder, bool references,
+                                                  std::span<const double> occlusions_deg) {
+  using Key = std::tuple<std::ptrdiff_t, double, int, std::string>;
+  std::multimap<Key, std::filesystem::path> found;
+  for (const auto& file : files_in(folder)) {
+    const auto name = parse_run_name(file.filename().string());
+    if (!name || (name->repetition < 0) != references) continue;
+    const auto place = std::ranges::find(occlusions_deg, name->occlusion_deg) - occlusions_deg.begin();
+    found.emplace(Key{place, name->occlusion_deg, std::abs(name->repetition), name->propeller}, file);
+  }
+  std::vector<std::filesystem::path> paths;
+  for (auto& [key, file] : found) paths.push_back(std::move(file));
+  return paths;
+}
+
 }  // namespace
 
 std::string run_file_name(const std::string& propeller_id, double occlusion_deg, int repetition) {
@@ -62,7 +76,7 @@ std::string run_file_name(const std::string& propeller_id, double occlusion_deg,
 CampaignFolder CampaignFolder::create(const std::filesystem::path& parent, const std::string& utc,
                                       const std::string& name, FileLayer& files) {
   const std::string base = (parent / file_name_safe(utc + "_" + name)).string();
-  try {
+  return on_disk(base, [&] {
     std::filesystem::create_directories(parent);
     std::filesystem::path path = base;
     for (int i = 2; !std::filesystem::create_directory(path); ++i) path = fmt::format("{}-{}", base, i);
@@ -72,9 +86,7 @@ CampaignFolder CampaignFolder::create(const std::filesystem::path& parent, const
     files.sync_folder(folder.path());
     files.sync_folder(parent);
     return folder;
-  } catch (const std::system_error& error) {
-    throw RecordError(failure_text(base, error.code().value()));
-  }
+  });
 }
 
 CampaignFolder CampaignFolder::open(const std::filesystem::path& path) {
@@ -85,32 +97,10 @@ CampaignFolder CampaignFolder::open(const std::filesystem::path& path) {
 }
 
 std::vector<std::filesystem::path> CampaignFolder::complete_runs(std::span<const double> occlusions_deg) const {
-  using Key = std::tuple<std::ptrdiff_t, double, int, std::string>;
-  std::vector<std::pair<Key, std::filesystem::path>> found;
-  for (const auto& file : files_in(runs())) {
-    const auto name = parse_run_name(file.filename().string());
-    if (!name || name->repetition < 0) continue;
-    const auto place =
-        std::find(occlusions_deg.begin(), occlusions_deg.end(), name->occlusion_deg) - occlusions_deg.begin();
-    found.push_back({Key{place, name->occlusion_deg, name->repetition, name->propeller}, file});
-  }
-  std::sort(found.begin(), found.end());
-  std::vector<std::filesystem::path> paths;
-  for (auto& [key, file] : found) paths.push_back(std::move(file));
-  return paths;
+  return complete_files(runs(), false, occlusions_deg);
 }
 
-std::vector<std::filesystem::path> CampaignFolder::reference_runs() const {
-  std::vector<std::pair<int, std::filesystem::path>> found;
-  for (const auto& file : files_in(runs())) {
-    const auto name = parse_run_name(file.filename().string());
-    if (name && name->repetition < 0) found.emplace_back(-name->repetition, file);
-  }
-  std::sort(found.begin(), found.end());
-  std::vector<std::filesystem::path> paths;
-  for (auto& [number, file] : found) paths.push_back(std::move(file));
-  return paths;
-}
+std::vector<std::filesystem::path> CampaignFolder::reference_runs() const { return complete_files(runs(), true, {}); }
 
 std::vector<std::filesystem::path> CampaignFolder::other_runs() const {
   std::vector<std::filesystem::path> paths = files_in(runs());

@@ -5,7 +5,6 @@
 #include <system_error>
 #include <utility>
 
-#include "base/error.hpp"
 #include "results/run_reader.hpp"
 
 namespace kphi::results {
@@ -18,14 +17,12 @@ std::string set_aside(const CampaignFolder& folder, const std::filesystem::path&
                       const std::string& becomes, FileLayer& files) {
   std::string stem = file.string();
   stem.resize(stem.size() - ending.size());
-  try {
+  return on_disk(file.string(), [&] {
     const std::filesystem::path to = free_name(stem + becomes, std::string(ending));
     files.rename(file, to);
     files.sync_folder(folder.runs());
     return "runs/" + to.filename().string();
-  } catch (const std::system_error& error) {
-    throw RecordError(failure_text(file.string(), error.code().value()));
-  }
+  });
 }
 
 /// File (relative to the folder) → SHA-256, as last written down.

@@ -11,11 +11,9 @@
 #include <cstdio>
 #include <fstream>
 #include <memory>
-#include <system_error>
 #include <vector>
 
 #include "base/descriptor.hpp"
-#include "base/error.hpp"
 
 namespace kphi::results {
 namespace {
@@ -106,12 +104,7 @@ FileLayer& disk() {
 }
 
 void require_room(const std::filesystem::path& folder, std::uint64_t bytes, FileLayer& files) {
-  std::uint64_t free = 0;
-  try {
-    free = files.free_bytes(folder);
-  } catch (const std::system_error& error) {
-    throw RecordError(failure_text(folder.string(), error.code().value()));
-  }
+  const std::uint64_t free = on_disk(folder.string(), [&] { return files.free_bytes(folder); });
   if (free >= bytes) return;
   throw RecordError(fmt::format("disk full: {}: {:.1f} MB needed, {:.1f} MB free; make room or choose another folder",
                                 folder.string(), 1e-6 * static_cast<double>(bytes), 1e-6 * static_cast<double>(free)));
@@ -129,16 +122,14 @@ void sync_file(const std::filesystem::path& path, FileLayer& files) {
 
 void write_text(const std::filesystem::path& path, const std::string& text, FileLayer& files) {
   const std::filesystem::path part = path.string() + ".part";
-  try {
+  on_disk(path.string(), [&] {
     files.before_write(text.size());
     const Descriptor fd = opened(part, O_WRONLY | O_CREAT | O_TRUNC, "open");
     write_all(fd.number(), text);
     files.sync_data(fd.number());
     files.replace(part, path);
     files.sync_folder(path.parent_path());
-  } catch (const std::system_error& error) {
-    throw RecordError(failure_text(path.string(), error.code().value()));
-  }
+  });
 }
 
 std::string read_text(const std::filesystem::path& path) {

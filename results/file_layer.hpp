@@ -6,6 +6,9 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <system_error>
+
+#include "base/error.hpp"
 
 namespace kphi::results {
 
@@ -39,6 +42,19 @@ class MemoryOnlySync final : public FileLayer {
 /// The one FileLayer of the process.
 [[nodiscard]] FileLayer& disk();
 
+/// "disk full: <where>: …" for an errno that means no room, "<where>: …" else.
+[[nodiscard]] std::string failure_text(const std::string& where, int error);
+
+/// Runs `action`; what the system refuses becomes a RecordError.
+template <class Action>
+auto on_disk(const std::string& where, Action&& action) {
+  try {
+    return action();
+  } catch (const std::system_error& error) {
+    throw RecordError(failure_text(where, error.code().value()));
+  }
+}
+
 /// Throws RecordError unless `folder` has room for `bytes`; the message names both and the folder.
 void require_room(const std::filesystem::path& folder, std::uint64_t bytes, FileLayer& files = disk());
 
@@ -61,8 +77,5 @@ void write_text(const std::filesystem::path& path, const std::string& text, File
 [[nodiscard]] std::string sha256(std::string_view bytes);
 /// Throws RecordError if the file cannot be read to its end.
 [[nodiscard]] std::string sha256_of_file(const std::filesystem::path& path);
-
-/// "disk full: <where>: …" for an errno that means no room, "<where>: …" else.
-[[nodiscard]] std::string failure_text(const std::string& where, int error);
 
 }  // namespace kphi::results

@@ -7,9 +7,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <system_error>
-#include <type_traits>
-#include <utility>
 
 #include "base/error.hpp"
 
@@ -103,18 +100,6 @@ void put_fixed_text(const Handle& object, const char* name, const std::string& v
   put(object, name, type.get(), type.get(), scalar_space(), value.c_str());
 }
 
-template <class Value>
-constexpr bool is_row = std::is_same_v<Value, std::array<double, 6>>;
-
-/// In the file and, on this little-endian machine, in memory.
-template <class Value>
-hid_t number_type() {
-  if constexpr (std::is_same_v<Value, std::int32_t>) return H5T_STD_I32LE;
-  if constexpr (std::is_same_v<Value, std::uint32_t>) return H5T_STD_U32LE;
-  if constexpr (std::is_same_v<Value, std::uint64_t>) return H5T_STD_U64LE;
-  return H5T_IEEE_F64LE;
-}
-
 hobj_ref_t reference_to(const Handle& object) {
   hobj_ref_t reference{};
   check(H5Rcreate(&reference, object.get(), ".", H5R_OBJECT, -1), "reference");
@@ -123,44 +108,28 @@ hobj_ref_t reference_to(const Handle& object) {
 
 /// Of one value: in the file little-endian, and in memory the same, for this machine is.
 Handle type_of(Stored stored) {
-  switch (stored) {
-    case Stored::u8:
-      return own(H5Tcopy(H5T_STD_U8LE), "type");
-    case Stored::i32:
-    case Stored::counts:
-      return own(H5Tcopy(H5T_STD_I32LE), "type");
-    case Stored::u32:
-      return own(H5Tcopy(H5T_STD_U32LE), "type");
-    case Stored::i64:
-      return own(H5Tcopy(H5T_STD_I64LE), "type");
-    case Stored::u64:
-      return own(H5Tcopy(H5T_STD_U64LE), "type");
-    case Stored::f64:
-      return own(H5Tcopy(H5T_IEEE_F64LE), "type");
-    case Stored::text:
-      break;
-  }
+  const std::array numbers{H5T_STD_U8LE,  H5T_STD_I32LE,  H5T_STD_U32LE, H5T_STD_I64LE,
+                           H5T_STD_U64LE, H5T_IEEE_F64LE, H5T_STD_I32LE};
+  static_assert(static_cast<std::size_t>(Stored::text) == numbers.size(), "in the order of Stored");
+  if (stored != Stored::text) return own(H5Tcopy(numbers[static_cast<std::size_t>(stored)]), "type");
   Handle type = fixed_text(kEventTextBytes);
   check(H5Tset_cset(type.get(), H5T_CSET_UTF8), "text type");
   check(H5Tset_strpad(type.get(), H5T_STR_NULLPAD), "text type");
   return type;
 }
 
-}  // namespace
-
-Handle::Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)) {}
-
-Handle& Handle::operator=(Handle&& other) noexcept {
-  if (this != &other) {
-    drop();
-    id_ = std::exchange(other.id_, H5I_INVALID_HID);
-  }
-  return *this;
+/// The long name of a column; for a code "0 zero before, 1 step, …".
+std::string described(const ColumnLayout& column) {
+  std::string list;
+  for (std::size_t code = 0; code < column.codes.size(); ++code)
+    list += fmt::format("{}{} {}", code == 0 ? "" : ", ", code, column.codes[code]);
+  return list.empty() ? column.long_name : list;
 }
 
-void Handle::drop() noexcept {
+}  // namespace
+
+Handle::~Handle() {
   if (id_ >= 0 && H5Idec_ref(id_) < 0) H5Eclear2(H5E_DEFAULT);
-  id_ = H5I_INVALID_HID;
 }
 
 void check(herr_t status, const std::string& doing) {
@@ -232,10 +201,10 @@ void write_attribute(const Handle& object, const char* name, const std::string& 
   const char* text = value.c_str();
   put(object, name, type.get(), type.get(), scalar_space(), &text);
 }
-template <class Value>
-void write_attribute(const Handle& object, const char* name, const Value& value) {
-  const hid_t type = number_type<Value>();
-  put(object, name, type, type, is_row<Value> ? row_space(sizeof value / sizeof(double)) : scalar_space(), &value);
+
+void write_numbers(const Handle& object, const char* name, Stored stored, std::size_t n, const void* numbers) {
+  const Handle type = type_of(stored);
+  put(object, name, type.get(), type.get(), n == 1 ? scalar_space() : row_space(n), numbers);
 }
 
 bool has_attribute(const Handle& object, const char* name) {
@@ -251,56 +220,46 @@ void read_attribute(const Handle& object, const char* name, std::string& value) 
   value = text == nullptr ? "" : text;
   H5free_memory(text);
 }
-template <class Value>
-void read_attribute(const Handle& object, const char* name, Value& value) {
-  get(object, name, number_type<Value>(), is_row<Value> ? sizeof value / sizeof(double) : 1, &value);
+
+void read_numbers(const Handle& object, const char* name, Stored stored, std::size_t n, void* numbers) {
+  get(object, name, type_of(stored).get(), static_cast<hssize_t>(n), numbers);
 }
 
-template void write_attribute(const Handle&, const char*, const double&);
-template void read_attribute(const Handle&, const char*, double&);
-template void write_attribute(const Handle&, const char*, const std::int32_t&);
-template void read_attribute(const Handle&, const char*, std::int32_t&);
-template void write_attribute(const Handle&, const char*, const std::uint32_t&);
-template void read_attribute(const Handle&, const char*, std::uint32_t&);
-template void write_attribute(const Handle&, const char*, const std::uint64_t&);
-template void read_attribute(const Handle&, const char*, std::uint64_t&);
-template void write_attribute(const Handle&, const char*, const std::array<double, 6>&);
-template void read_attribute(const Handle&, const char*, std::array<double, 6>&);
-
-Column::Column(const Handle& group, const ColumnShape& shape, FileLayer& files, std::string file_name)
-    : shape_(shape),
-      row_bytes_(bytes_of(shape.stored)),
+Column::Column(const Handle& group, const ColumnLayout& layout, std::size_t chunk_rows, FileLayer& files,
+               const std::string& file_name)
+    : chunk_rows_(chunk_rows),
+      row_bytes_(bytes_of(layout.stored)),
       files_(&files),
-      doing_(fmt::format("{}: write {}", file_name, shape.name)) {
-  const int rank = shape.stored == Stored::counts ? 2 : 1;
+      doing_(fmt::format("{}: write {}", file_name, layout.name)),
+      chunk_(chunk_rows * row_bytes_) {
+  const int rank = layout.stored == Stored::counts ? 2 : 1;
   const std::array<hsize_t, 2> none{0, kComponents};
   const std::array<hsize_t, 2> most{H5S_UNLIMITED, kComponents};
-  const std::array<hsize_t, 2> chunk{shape.chunk_rows, kComponents};
-  const Handle type = type_of(shape.stored);
+  const std::array<hsize_t, 2> chunk{chunk_rows, kComponents};
+  const Handle type = type_of(layout.stored);
   const Handle space = own(H5Screate_simple(rank, none.data(), most.data()), doing_);
   const Handle list = creation_list(H5P_DATASET_CREATE, [&](hid_t id) {
     check(H5Pset_chunk(id, rank, chunk.data()), doing_);
     check(H5Pset_fill_time(id, H5D_FILL_TIME_NEVER), doing_);
   });
   dataset_ =
-      own(H5Dcreate2(group.get(), shape.name, type.get(), space.get(), H5P_DEFAULT, list.get(), H5P_DEFAULT), doing_);
-  write_attribute(dataset_, "units", std::string(shape.units));
-  write_attribute(dataset_, "long_name", shape.long_name);
+      own(H5Dcreate2(group.get(), layout.name, type.get(), space.get(), H5P_DEFAULT, list.get(), H5P_DEFAULT), doing_);
+  write_attribute(dataset_, "units", std::string(layout.unit));
+  write_attribute(dataset_, "long_name", described(layout));
   write_attribute(dataset_, "crc32", std::uint32_t{0});
-  chunk_.resize(shape.chunk_rows * row_bytes_);
 }
 
 void Column::append(const void* rows, std::size_t count) {
   const auto* from = static_cast<const std::byte*>(rows);
   while (count > 0) {
-    const std::size_t filled = rows_ % shape_.chunk_rows;
-    const std::size_t n = std::min<std::size_t>(count, shape_.chunk_rows - filled);
+    const std::size_t filled = rows_ % chunk_rows_;
+    const std::size_t n = std::min<std::size_t>(count, chunk_rows_ - filled);
     std::memcpy(chunk_.data() + filled * row_bytes_, from, n * row_bytes_);
     crc_.process_bytes(from, n * row_bytes_);
     rows_ += n;
     from += n * row_bytes_;
     count -= n;
-    if (rows_ % shape_.chunk_rows == 0) write_chunk();
+    if (rows_ % chunk_rows_ == 0) write_chunk();
   }
 }
 
@@ -310,16 +269,12 @@ void Column::flush() {
 
 void Column::write_chunk() {
   const std::array<hsize_t, 2> extent{rows_, kComponents};
-  const std::array<hsize_t, 2> offset{(rows_ - 1) / shape_.chunk_rows * shape_.chunk_rows, 0};
-  try {
-    files_->before_write(chunk_.size());
-  } catch (const std::system_error& error) {
-    throw RecordError(failure_text(doing_, error.code().value()));
-  }
+  const std::array<hsize_t, 2> offset{(rows_ - 1) / chunk_rows_ * chunk_rows_, 0};
+  on_disk(doing_, [&] { files_->before_write(chunk_.size()); });
   check(H5Dset_extent(dataset_.get(), extent.data()), doing_);
   check(H5Dwrite_chunk(dataset_.get(), H5P_DEFAULT, 0, offset.data(), chunk_.size(), chunk_.data()), doing_);
   written_ = rows_;
-  if (rows_ % shape_.chunk_rows == 0) std::fill(chunk_.begin(), chunk_.end(), std::byte{0});
+  if (rows_ % chunk_rows_ == 0) std::fill(chunk_.begin(), chunk_.end(), std::byte{0});
 }
 
 void Column::write_crc() { write_attribute(dataset_, "crc32", crc()); }
@@ -355,34 +310,12 @@ void ColumnReader::read(std::uint64_t first, std::uint64_t count, void* rows) {
   check(H5Dread(dataset_.get(), type_.get(), memory.get(), space_.get(), H5P_DEFAULT, rows), doing_);
 }
 
-std::optional<RawColumn> ColumnReader::raw() const {
-  const Handle list = own(H5Dget_create_plist(dataset_.get()), doing_);
-  const Handle type = own(H5Dget_type(dataset_.get()), doing_);
-  std::array<hsize_t, 2> chunk{};
-  const bool plain = H5Pget_layout(list.get()) == H5D_CHUNKED && H5Pget_nfilters(list.get()) == 0 &&
-                     H5Tequal(type.get(), type_.get()) > 0 &&
-                     H5Pget_chunk(list.get(), 2, chunk.data()) == static_cast<int>(dims_.size()) &&
-                     (dims_.size() == 1 || chunk[1] == dims_[1]);
-  if (!plain) return std::nullopt;
-  RawColumn column{doing_, row_bytes_, chunk[0], {}};
-  for (hsize_t at = 0; at < rows_; at += chunk[0]) {
-    const std::array<hsize_t, 2> offset{at, 0};
-    unsigned filters = 0;
-    haddr_t address = HADDR_UNDEF;
-    hsize_t bytes = 0;
-    check(H5Dget_chunk_info_by_coord(dataset_.get(), offset.data(), &filters, &address, &bytes), doing_);
-    if (address == HADDR_UNDEF) return std::nullopt;
-    column.chunks.push_back(address);
-  }
-  return column;
-}
-
-std::uint32_t ColumnReader::crc(std::uint64_t count) {
+std::uint32_t ColumnReader::crc() {
   constexpr std::uint64_t kBlock = 65536;
   std::vector<std::byte> rows(kBlock * row_bytes_);
   boost::crc_32_type crc;
-  for (std::uint64_t at = 0; at < count; at += kBlock) {
-    const std::uint64_t n = std::min(kBlock, count - at);
+  for (std::uint64_t at = 0; at < rows_; at += kBlock) {
+    const std::uint64_t n = std::min(kBlock, rows_ - at);
     read(at, n, rows.data());
     crc.process_bytes(rows.data(), n * row_bytes_);
   }

@@ -10,12 +10,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "results/file_layer.hpp"
-#include "results/load_cell_columns.hpp"
 #include "results/run_layout.hpp"
 
 namespace kphi::results::hdf5 {
@@ -25,13 +24,14 @@ class Handle {
  public:
   Handle() = default;
   explicit Handle(hid_t id) : id_(id) {}
-  Handle(Handle&& other) noexcept;
-  Handle& operator=(Handle&& other) noexcept;
-  ~Handle() { drop(); }
-  [[nodiscard]] hid_t get() const { return id_; }
-  [[nodiscard]] explicit operator bool() const { return id_ >= 0; }
+  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)) {}
+  Handle& operator=(Handle&& other) noexcept {
+    std::swap(id_, other.id_);
+    return *this;
+  }
   /// Releases it; ignores failures.
-  void drop() noexcept;
+  ~Handle();
+  [[nodiscard]] hid_t get() const { return id_; }
 
  private:
   hid_t id_ = H5I_INVALID_HID;
@@ -57,27 +57,27 @@ void sever(const Handle& file) noexcept;
 // Attributes: std::string (UTF-8), double, std::int32_t, std::uint32_t, std::uint64_t, std::array<double, 6>. Writing
 // an existing one of the same type replaces its value in place.
 void write_attribute(const Handle& object, const char* name, const std::string& value);
+void write_numbers(const Handle& object, const char* name, Stored stored, std::size_t n, const void* numbers);
 template <class Value>
-void write_attribute(const Handle& object, const char* name, const Value& value);
+void write_attribute(const Handle& object, const char* name, const Value& value) {
+  constexpr Stored kStored = layout::stored_as<Value>();
+  write_numbers(object, name, kStored, sizeof value / bytes_of(kStored), &value);
+}
 [[nodiscard]] bool has_attribute(const Handle& object, const char* name);
 void read_attribute(const Handle& object, const char* name, std::string& value);
+void read_numbers(const Handle& object, const char* name, Stored stored, std::size_t n, void* numbers);
 template <class Value>
-void read_attribute(const Handle& object, const char* name, Value& value);
+void read_attribute(const Handle& object, const char* name, Value& value) {
+  constexpr Stored kStored = layout::stored_as<Value>();
+  read_numbers(object, name, kStored, sizeof value / bytes_of(kStored), &value);
+}
 
-/// What a column holds. Counts have a second dimension of six.
-struct ColumnShape {
-  const char* name;
-  Stored stored;
-  std::size_t chunk_rows;
-  const char* units;  ///< UDUNITS spelling
-  std::string long_name;
-};
-
-/// A growing dataset, written chunk by chunk with H5Dwrite_chunk and never filled beforehand. A partly filled chunk is
-/// written as it stands and later written again in its place.
+/// A growing dataset; counts have a second dimension of six. Written chunk by chunk with H5Dwrite_chunk and never
+/// filled beforehand. A partly filled chunk is written as it stands and later written again in its place.
 class Column {
  public:
-  Column(const Handle& group, const ColumnShape& shape, FileLayer& files, std::string file_name);
+  Column(const Handle& group, const ColumnLayout& layout, std::size_t chunk_rows, FileLayer& files,
+         const std::string& file_name);
   /// `rows` holds `count` rows in this machine's order (little-endian).
   void append(const void* rows, std::size_t count);
   /// Puts the partly filled chunk on disk.
@@ -92,7 +92,7 @@ class Column {
 
  private:
   void write_chunk();
-  ColumnShape shape_;
+  std::size_t chunk_rows_;
   std::size_t row_bytes_;
   FileLayer* files_;
   std::string doing_;
@@ -109,10 +109,8 @@ class ColumnReader {
   ColumnReader(const Handle& group, const char* name, Stored stored, const std::string& file);
   [[nodiscard]] std::uint64_t rows() const { return rows_; }
   void read(std::uint64_t first, std::uint64_t count, void* rows);
-  /// CRC-32 of the first `count` rows.
-  [[nodiscard]] std::uint32_t crc(std::uint64_t count);
-  /// Where its bytes lie; nothing when they are compressed, converted or laid out in another way than ours.
-  [[nodiscard]] std::optional<RawColumn> raw() const;
+  /// CRC-32 of all rows.
+  [[nodiscard]] std::uint32_t crc();
   [[nodiscard]] const Handle& dataset() const { return dataset_; }
 
  private:

@@ -35,6 +35,8 @@ struct JournalReading {
   /// The last line has no end, or zeros in it: the writer died, or the power was cut. It was never reported as written.
   bool torn_last_line = false;
   std::vector<std::string> problems;  ///< "journal.jsonl:3: …"
+  std::string check;                  ///< of the last of the entries
+  std::size_t whole_bytes = 0;        ///< of the file, up to the end of that line
 };
 
 /// Throws RecordError when the file cannot be read.
@@ -51,17 +53,15 @@ class Journal {
   /// that fails too, every later call fails.
   void append(const std::string& event, const nlohmann::json& data, Nanoseconds time_ns, const std::string& utc);
 
-  /// The content of the file when it was opened.
+  /// The entries that the file had when it was opened.
   [[nodiscard]] const JournalReading& found() const { return found_; }
 
  private:
   std::filesystem::path path_;
   FileLayer& files_;
-  JournalReading found_;
+  JournalReading found_;  ///< its check and its bytes follow what is appended
   std::uint64_t next_ = 1;
-  std::string check_;              ///< of the last line
-  std::uint64_t whole_bytes_ = 0;  ///< of the file, up to the end of the last line
-  bool spoilt_ = false;            ///< part of a line follows
+  bool spoilt_ = false;  ///< part of a line follows
   Descriptor file_;
 };
 

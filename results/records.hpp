@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,23 @@ struct LoadCellRecord {
   std::uint32_t ft_sequence = 0;
   std::uint32_t status = 0;
   Nanoseconds arrival_ns = 0;
+};
+
+/// The same, column by column, as they lie in the run file; without the RDT sequence.
+struct LoadCellColumns {
+  LoadCellColumns() = default;
+  explicit LoadCellColumns(std::span<const LoadCellRecord> records)
+      : counts(records.size()), ft_sequence(records.size()), status(records.size()), arrival_ns(records.size()) {
+    for (std::size_t i = 0; i < records.size(); ++i) {
+      counts[i] = records[i].counts;
+      ft_sequence[i] = records[i].ft_sequence;
+      status[i] = records[i].status;
+      arrival_ns[i] = records[i].arrival_ns;
+    }
+  }
+  std::vector<std::array<std::int32_t, 6>> counts;
+  std::vector<std::uint32_t> ft_sequence, status;
+  std::vector<Nanoseconds> arrival_ns;
 };
 
 /// What the motor module reports. One time series each in the run file, named as in kMotorChannels.
@@ -225,38 +243,16 @@ enum class EventKind : std::uint8_t {
   motor_host_absent,      ///< this computer slept, or did not run kphi; the motor was let go
   motor_let_go,           ///< the module stopped driving by itself
 };
-inline constexpr std::array<const char*, 32> kEventNames{"restarted",
-                                                         "rebooted",
-                                                         "stalled",
-                                                         "stall_ended",
-                                                         "silent",
-                                                         "resumed",
-                                                         "box_trouble",
-                                                         "taken_over",
-                                                         "rdt_disabled",
-                                                         "unreachable",
-                                                         "near_range",
-                                                         "beyond_range",
-                                                         "range_trip",
-                                                         "unusable",
-                                                         "reconnected",
-                                                         "configuration_changed",
-                                                         "given_up",
-                                                         "motor_connected",
-                                                         "motor_no_answer",
-                                                         "motor_reset",
-                                                         "motor_silent",
-                                                         "motor_coast_denied",
-                                                         "motor_lease_expired",
-                                                         "motor_port_lost",
-                                                         "motor_another_module",
-                                                         "motor_slow_round_trip",
-                                                         "supply_stop",
-                                                         "guard_trip",
-                                                         "box_error",
-                                                         "box_error_ended",
-                                                         "motor_host_absent",
-                                                         "motor_let_go"};
+inline constexpr std::array<const char*, 32> kEventNames{
+    // the load cell and its stream
+    "restarted", "rebooted", "stalled", "stall_ended", "silent", "resumed", "box_trouble", "taken_over", "rdt_disabled",
+    "unreachable", "near_range", "beyond_range", "range_trip", "unusable", "reconnected", "configuration_changed",
+    "given_up",
+    // the motor module
+    "motor_connected", "motor_no_answer", "motor_reset", "motor_silent", "motor_coast_denied", "motor_lease_expired",
+    "motor_port_lost", "motor_another_module", "motor_slow_round_trip",
+    // supply and guard; then what came later
+    "supply_stop", "guard_trip", "box_error", "box_error_ended", "motor_host_absent", "motor_let_go"};
 [[nodiscard]] constexpr const char* name_of(EventKind kind) { return kEventNames[static_cast<std::size_t>(kind)]; }
 
 /// Of the motor module; else of the load cell, or of the supply.

@@ -26,13 +26,16 @@ using StoredText = std::array<char, kEventTextBytes>;
   return kBytes[static_cast<std::size_t>(stored)];
 }
 
-template <class Row>
-struct RunColumn {
+struct ColumnLayout {
   const char* name;
-  const char* unit;  ///< UDUNITS spelling; nullptr: that of the group
+  const char* unit;  ///< UDUNITS spelling; nullptr: unit and long name are those of the group
   const char* long_name;
   Stored stored;
-  std::span<const char* const> codes;  ///< what each code means; empty: the value is no code
+  std::span<const char* const> codes{};  ///< what each code means; empty: the value is no code
+};
+
+template <class Row>
+struct RunColumn : ColumnLayout {
   void (*pack)(std::span<const Row> rows, std::byte* out);
   void (*unpack)(const std::byte* in, std::span<Row> rows);
 };
@@ -66,7 +69,7 @@ template <class File>
   if constexpr (std::is_same_v<File, std::uint32_t>) return Stored::u32;
   if constexpr (std::is_same_v<File, std::int64_t>) return Stored::i64;
   if constexpr (std::is_same_v<File, std::uint64_t>) return Stored::u64;
-  if constexpr (std::is_same_v<File, double>) return Stored::f64;
+  if constexpr (std::is_same_v<File, double> || std::is_same_v<File, std::array<double, 6>>) return Stored::f64;
   if constexpr (std::is_same_v<File, std::array<std::int32_t, 6>>) return Stored::counts;
   if constexpr (std::is_same_v<File, StoredText>) return Stored::text;
 }
@@ -101,7 +104,7 @@ template <auto member, class File = AsStored<decltype(value_type(member))>>
       }
     }
   };
-  return RunColumn<Row>{name, unit, long_name, stored_as<File>(), codes, pack, unpack};
+  return RunColumn<Row>{{name, unit, long_name, stored_as<File>(), codes}, pack, unpack};
 }
 
 inline constexpr std::array kLoadCell{

@@ -3,12 +3,10 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "base/error.hpp"
-#include "results/load_cell_columns.hpp"
 #include "results/records.hpp"
 
 namespace kphi::results {
@@ -16,10 +14,10 @@ namespace kphi::results {
 /// The whole run; of a .part the rows valid at its last sync, as aborted. Does not check checksums; see verify_run().
 [[nodiscard]] RunRecording read_run(const std::filesystem::path& path);
 
-/// A run whose load-cell records stay in its file, for a single pass over them.
+/// A run with its load-cell records column by column: faster to read, and enough for the reduction.
 struct RunFile {
   RunRecording run;  ///< without load_cell; of a .part without the account, which needs the records
-  std::unique_ptr<LoadCellColumns> load_cell;
+  LoadCellColumns load_cell;
 };
 [[nodiscard]] RunFile open_run(const std::filesystem::path& path);
 

@@ -7,11 +7,10 @@
 #include <deque>
 #include <optional>
 #include <string_view>
-#include <system_error>
+#include <tuple>
 #include <utility>
 #include <vector>
 
-#include "results/file_layer.hpp"
 #include "results/hdf5.hpp"
 #include "results/run_layout.hpp"
 #include "results/run_reader.hpp"
@@ -22,15 +21,6 @@ namespace {
 using hdf5::Column;
 using hdf5::Handle;
 
-/// The long_name of a column; for a code "0 zero before, 1 step, …".
-template <class Row>
-std::string described(const RunColumn<Row>& column) {
-  std::string list;
-  for (std::size_t code = 0; code < column.codes.size(); ++code)
-    list += fmt::format("{}{} {}", code == 0 ? "" : ", ", code, column.codes[code]);
-  return list.empty() ? column.long_name : list;
-}
-
 /// A group of columns that grow together; `n_valid` says how many rows were complete at the last sync.
 template <class Row>
 class Series {
@@ -39,11 +29,9 @@ class Series {
       : layout_(layout), group_(hdf5::create_group(parent, layout.name)) {
     hdf5::write_attribute(group_, "long_name", std::string(layout.long_name));
     hdf5::write_attribute(group_, "n_valid", std::uint64_t{0});
-    for (const RunColumn<Row>& column : layout.columns) {
-      const char* unit = column.unit == nullptr ? layout.unit : column.unit;
-      const std::string words = column.unit == nullptr ? layout.long_name : described(column);
-      columns_.emplace_back(group_, hdf5::ColumnShape{column.name, column.stored, layout.chunk_rows, unit, words},
-                            files, file);
+    for (ColumnLayout column : layout.columns) {
+      if (column.unit == nullptr) std::tie(column.unit, column.long_name) = std::tie(layout.unit, layout.long_name);
+      columns_.emplace_back(group_, column, layout.chunk_rows, files, file);
       if (column.stored == Stored::counts) add_components(files, file);
     }
     add_scales();
@@ -70,9 +58,8 @@ class Series {
   /// Names the second dimension of counts.
   void add_components(FileLayer& files, const std::string& file) {
     constexpr std::array<std::int32_t, 6> kComponents{0, 1, 2, 3, 4, 5};
-    components_.emplace(
-        group_, hdf5::ColumnShape{"component", Stored::i32, kComponents.size(), "1", "0 to 5: Fx Fy Fz Tx Ty Tz"},
-        files, file);
+    const ColumnLayout layout{"component", "1", "0 to 5: Fx Fy Fz Tx Ty Tz", Stored::i32};
+    components_.emplace(group_, layout, kComponents.size(), files, file);
     components_->append(kComponents.data(), kComponents.size());
     components_->write_crc();
   }
@@ -103,23 +90,14 @@ class Series {
 
 std::string without_ending(const std::filesystem::path& path) { return (path.parent_path() / path.stem()).string(); }
 
-/// Runs `action`; what the file layer refuses becomes a RecordError.
-template <class Action>
-void on_disk(const std::filesystem::path& path, Action&& action) {
-  try {
-    action();
-  } catch (const std::system_error& error) {
-    throw RecordError(failure_text(path.string(), error.code().value()));
-  }
-}
-
 std::filesystem::path prepared_part(const std::filesystem::path& final_path, FileLayer& files) {
   if (std::filesystem::exists(final_path)) {
     throw RecordError(final_path.string() + ": exists already; choose another name");
   }
   const std::filesystem::path part = final_path.string() + ".part";
   if (std::filesystem::exists(part)) {
-    on_disk(part, [&] { files.rename(part, free_name(without_ending(final_path) + ".interrupted", ".h5.part")); });
+    on_disk(part.string(),
+            [&] { files.rename(part, free_name(without_ending(final_path) + ".interrupted", ".h5.part")); });
   }
   return part;
 }
@@ -165,7 +143,7 @@ void RunWriter::guarded(Action&& action) {
   if (!file_) throw RecordError(path_.string() + ": closed, the recording has ended; see the first error");
   hdf5::be_quiet();
   try {
-    on_disk(path_, action);
+    on_disk(path_.string(), action);
   } catch (...) {
     hdf5::sever(file_->root);
     file_.reset();
@@ -177,7 +155,7 @@ RunWriter::RunWriter(std::filesystem::path final_path, const RunHeader& header, 
     : final_path_(std::move(final_path)), path_(prepared_part(final_path_, files)), header_(header), files_(files) {
   file_ = std::make_unique<File>(path_, header_, files);
   sync();
-  on_disk(path_, [&] { files_.sync_folder(path_.parent_path()); });
+  on_disk(path_.string(), [&] { files_.sync_folder(path_.parent_path()); });
 }
 
 RunWriter::~RunWriter() = default;
@@ -247,7 +225,7 @@ std::string RunWriter::finish(const RunEnding& ending) {
     secure();
   });
   close();
-  on_disk(path_, [&] { sync_file(path_, files_); });  // what closing wrote
+  on_disk(path_.string(), [&] { sync_file(path_, files_); });  // what closing wrote
 
   const Verification verification = verify_run(path_);
   if (outcome == Outcome::complete && !verification.whole()) {
@@ -257,7 +235,7 @@ std::string RunWriter::finish(const RunEnding& ending) {
   const std::string digest = sha256_of_file(path_);
   const std::filesystem::path target =
       outcome == Outcome::complete ? final_path_ : free_name(without_ending(final_path_) + ".aborted", ".h5");
-  on_disk(target, [&] {
+  on_disk(target.string(), [&] {
     using std::filesystem::perms;
     std::filesystem::permissions(path_, perms::owner_write | perms::group_write | perms::others_write,
                                  std::filesystem::perm_options::remove);

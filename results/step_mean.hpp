@@ -34,15 +34,15 @@ enum class QualityFlag : std::uint32_t {
   motor_reset = 1u << 20,         ///< the module restarted by itself within the step
   motor_lost = 1u << 21,          ///< the module was lost, or did not do as it was told, within the step
   slow_round_trip = 1u << 22,     ///< the module's readings are blurred in time since then in this run
-  unsettled = 1u << 23,       ///< the thrust still changed at the end of the step, or its speed came too late to tell
-  supply_limited = 1u << 24,  ///< the bench supply limited the current within the step
-  supply_off = 1u << 25,      ///< its output was off within the step, or its protection had switched it off
-  supply_sag = 1u << 26,      ///< more than 5 % of its set voltage was missing at its terminals
-  supply_rise = 1u << 27,     ///< its terminals were more than 3 % above the set voltage: the motor fed back
-  drifted = 1u << 28,         ///< thrust over speed² went on changing all through the step
-  lag_unknown = 1u << 29,     ///< the steps do not tell how much later than the speed the thrust shows
-  frozen = 1u << 30,          ///< load cell or motor speed repeated one value for 0.1 s or longer
-  speed_glitch = 1u << 31,    ///< speeds that no rotor can have were left out
+  supply_limited = 1u << 23,      ///< the bench supply limited the current within the step
+  supply_off = 1u << 24,          ///< its output was off within the step, or its protection had switched it off
+  supply_sag = 1u << 25,          ///< more than 5 % of its set voltage was missing at its terminals
+  supply_rise = 1u << 26,         ///< its terminals were more than 3 % above the set voltage: the motor fed back
+  unsettled = 1u << 27,     ///< the thrust still changed at the end of the step, or its speed came too late to tell
+  drifted = 1u << 28,       ///< thrust over speed² went on changing all through the step
+  lag_unknown = 1u << 29,   ///< the steps do not tell how much later than the speed the thrust shows
+  frozen = 1u << 30,        ///< load cell or motor speed repeated one value for 0.1 s or longer
+  speed_glitch = 1u << 31,  ///< speeds that no rotor can have were left out
 };
 
 /// Flags that leave thrust over speed² as good as it is; all others keep a step out of averages and fits.

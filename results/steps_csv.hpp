@@ -1,6 +1,6 @@
 // steps.csv: one row per step of every run. UTF-8, LF, a header line with the units in the names, shortest round trip
-// numbers; an unmeasured number is an empty field (NaN in memory). Optional columns (bench supply, air density,
-// uncertainties) follow in groups, each present if one of the steps has it.
+// numbers; an unmeasured number is an empty field (NaN in memory), a text is one line. Optional columns (bench supply,
+// air density, uncertainties) follow in groups, each present if one of the steps has it.
 #pragma once
 
 #include <cstdint>
@@ -20,8 +20,6 @@ namespace kphi::results {
 /// Inverse of quality_flag_names(). Throws std::invalid_argument naming the unknown word.
 [[nodiscard]] std::uint32_t quality_flags_from_names(std::string_view names);
 
-/// The header line without further columns, without a line feed.
-[[nodiscard]] std::string steps_header();
 /// The whole file: the same bytes live and in replay.
 [[nodiscard]] std::string format_steps(std::span<const StepMean> steps);
 

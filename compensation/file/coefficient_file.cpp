@@ -28,322 +28,311 @@ bool is_unknown(const YAML::Node& node) {
   return !node.IsDefined() || node.IsNull() || (node.IsScalar() && node.Scalar() == "unknown" && node.Tag() != "!");
 }
 
-/// Values of a YAML map. Every member throws CoefficientError, with file and line, if the value is not what the
-/// member's name says. `unknown` and null count as not given.
-class YamlReader {
+/// "path:line: what; next_move"; `line` from 0.
+[[noreturn]] void refuse(const std::string& path, int line, const std::string& what, const std::string& next_move) {
+  throw CoefficientError(path + ":" + std::to_string(line + 1) + ": " + what + "; " + next_move);
+}
+
+void refuse_repeated_keys(const YAML::Node& node, const std::string& path) {
+  std::set<std::string> seen;
+  for (const auto& entry : node) {
+    if (node.IsMap() && entry.first.IsScalar() && !seen.insert(entry.first.Scalar()).second)
+      refuse(path, entry.first.Mark().line, "`" + entry.first.Scalar() + "` is given twice", "keep one of the two");
+    refuse_repeated_keys(node.IsMap() ? entry.second : entry, path);
+  }
+}
+
+/// A value of the file, and where it stands. Every member throws CoefficientError, with file and line, if the value is
+/// not what the member's name says. `unknown` and null count as not given.
+class Value {
  public:
-  /// The top of `text` must be a map without a key given twice anywhere below it.
-  YamlReader(const std::string& text, std::string path) : path_(std::move(path)) {
-    try {
-      top_ = YAML::Load(text);
-    } catch (const YAML::Exception& error) {
-      refuse_line(error.mark.line, "not YAML: " + error.msg, "restore the file as `kphi fit` wrote it");
-    }
-    if (!top_.IsMap()) refuse_line(0, "not a coefficient file", "give the coefficients.yaml that `kphi fit` wrote");
-    refuse_repeated_keys(top_);
-  }
+  Value(const YAML::Node& node, std::string name, const std::string& path)
+      : node_(node), name_(std::move(name)), path_(&path) {}
 
-  [[nodiscard]] const YAML::Node& top() const { return top_; }
-
-  /// Undefined if the key is not given.
-  [[nodiscard]] YAML::Node optional(const YAML::Node& map, const std::string& key) const {
-    const YAML::Node value = map[key];
-    return is_unknown(value) ? YAML::Node(YAML::NodeType::Undefined) : value;
+  /// nullopt if the key is not given.
+  [[nodiscard]] std::optional<Value> find(const std::string& key) const {
+    const YAML::Node value = node_[key];
+    return is_unknown(value) ? std::nullopt : std::optional(Value(value, key, *path_));
   }
-  [[nodiscard]] YAML::Node required(const YAML::Node& map, const std::string& key) const {
-    const YAML::Node value = optional(map, key);
-    if (!value.IsDefined()) refuse(map, "`" + key + "` is missing here", kFitAgain);
+  [[nodiscard]] Value at(const std::string& key) const {
+    if (const auto value = find(key)) return *value;
+    refuse("`" + key + "` is missing here", kFitAgain);
+  }
+  [[nodiscard]] Value map_at(const std::string& key) const {
+    const Value value = at(key);
+    if (!value.node().IsMap()) value.refuse("`" + key + "` must hold keys of its own", kFitAgain);
     return value;
   }
-  [[nodiscard]] YAML::Node required_map(const YAML::Node& map, const std::string& key) const {
-    const YAML::Node value = required(map, key);
-    if (!value.IsMap()) refuse(value, "`" + key + "` must hold keys of its own", kFitAgain);
-    return value;
+  [[nodiscard]] const YAML::Node& node() const { return node_; }
+  /// Key and value of each entry.
+  [[nodiscard]] std::vector<std::pair<std::string, Value>> entries() const {
+    std::vector<std::pair<std::string, Value>> all;
+    for (const auto& entry : node_)
+      all.emplace_back(entry.first.Scalar(), Value(entry.second, entry.first.Scalar(), *path_));
+    return all;
   }
   /// Empty if the key is not given.
-  [[nodiscard]] std::vector<YAML::Node> list(const YAML::Node& map, const std::string& key) const {
-    const YAML::Node value = optional(map, key);
-    if (!value.IsDefined()) return {};
-    if (!value.IsSequence()) refuse(value, "`" + key + "` must be a list", "write it as [ … ]");
-    return {value.begin(), value.end()};
+  [[nodiscard]] std::vector<Value> list(const std::string& key) const {
+    const auto value = find(key);
+    return value ? value->items() : std::vector<Value>();
   }
-  [[nodiscard]] double number(const YAML::Node& node, const std::string& name) const {
-    const std::string text = node.IsScalar() ? node.Scalar() : std::string();
+  [[nodiscard]] std::vector<Value> items() const {
+    if (!node_.IsSequence()) refuse("`" + name_ + "` must be a list", "write it as [ … ]");
+    std::vector<Value> all;
+    for (const auto& item : node_) all.emplace_back(item, name_, *path_);
+    return all;
+  }
+  /// Maps; `what` says what is wrong with an entry that is not one. Empty if the key is not given.
+  [[nodiscard]] std::vector<Value> rows(const std::string& key, const std::string& what) const {
+    std::vector<Value> all = list(key);
+    for (const Value& row : all)
+      if (!row.node().IsMap()) row.refuse(what, kFitAgain);
+    return all;
+  }
+  [[nodiscard]] double number() const {
+    const std::string text = node_.IsScalar() ? node_.Scalar() : std::string();
     double value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) return value;
-    refuse(node, "`" + name + "` is " + (node.IsScalar() ? "`" + text + "`, " : "") + "not a finite number",
+    refuse("`" + name_ + "` is " + (node_.IsScalar() ? "`" + text + "`, " : "") + "not a finite number",
            "write one finite number");
   }
-  [[nodiscard]] double number_at(const YAML::Node& map, const std::string& key) const {
-    return number(required(map, key), key);
+  [[nodiscard]] std::optional<double> number_at(const std::string& key) const {
+    const auto value = find(key);
+    return value ? std::optional(value->number()) : std::nullopt;
   }
-  [[nodiscard]] std::optional<double> optional_number_at(const YAML::Node& map, const std::string& key) const {
-    const YAML::Node value = optional(map, key);
-    return value.IsDefined() ? std::optional<double>(number(value, key)) : std::nullopt;
-  }
-  [[nodiscard]] std::optional<int> optional_count_at(const YAML::Node& map, const std::string& key) const {
-    const std::optional<double> value = optional_number_at(map, key);
+  [[nodiscard]] std::optional<int> count_at(const std::string& key) const {
+    const auto value = number_at(key);
     if (!value) return std::nullopt;
     if (*value < 0 || *value > 1e9 || *value != std::floor(*value))
-      refuse(optional(map, key), "`" + key + "` is not a count", "write a whole number, 0 or more");
+      at(key).refuse("`" + key + "` is not a count", "write a whole number, 0 or more");
     return static_cast<int>(*value);
   }
-  [[nodiscard]] bool truth_at(const YAML::Node& map, const std::string& key) const {
-    const YAML::Node value = required(map, key);
-    if (value.IsScalar() && (value.Scalar() == "true" || value.Scalar() == "false")) return value.Scalar() == "true";
-    refuse(value, "`" + key + "` is neither true nor false", "write true or false");
+  [[nodiscard]] bool truth() const {
+    if (node_.IsScalar() && (node_.Scalar() == "true" || node_.Scalar() == "false")) return node_.Scalar() == "true";
+    refuse("`" + name_ + "` is neither true nor false", "write true or false");
   }
-  [[nodiscard]] std::string text_at(const YAML::Node& map, const std::string& key) const {
-    const YAML::Node value = required(map, key);
-    if (!value.IsScalar()) refuse(value, "`" + key + "` must be one word or text", kFitAgain);
-    return value.Scalar();
+  [[nodiscard]] std::string text() const {
+    if (!node_.IsScalar()) refuse("`" + name_ + "` must be one word or text", kFitAgain);
+    return node_.Scalar();
   }
-  [[nodiscard]] std::string optional_text_at(const YAML::Node& map, const std::string& key) const {
-    return optional(map, key).IsDefined() ? text_at(map, key) : std::string();
+  /// Empty if the key is not given.
+  [[nodiscard]] std::string text_at(const std::string& key) const {
+    const auto value = find(key);
+    return value ? value->text() : std::string();
   }
 
   /// "path:line: what; next_move".
-  [[noreturn]] void refuse(const YAML::Node& at, const std::string& what, const std::string& next_move) const {
-    refuse_line(at.Mark().line, what, next_move);
+  [[noreturn]] void refuse(const std::string& what, const std::string& next_move) const {
+    kphi::compensation::refuse(*path_, node_.Mark().line, what, next_move);
   }
 
  private:
-  void refuse_repeated_keys(const YAML::Node& node) const {
-    std::set<std::string> seen;
-    for (const auto& entry : node) {
-      if (node.IsMap() && entry.first.IsScalar() && !seen.insert(entry.first.Scalar()).second)
-        refuse(entry.first, "`" + entry.first.Scalar() + "` is given twice", "keep one of the two");
-      refuse_repeated_keys(node.IsMap() ? entry.second : entry);
-    }
-  }
-  [[noreturn]] void refuse_line(int line, const std::string& what, const std::string& next_move) const {
-    throw CoefficientError(path_ + ":" + std::to_string(line + 1) + ": " + what + "; " + next_move);
-  }
-
-  std::string path_;
-  YAML::Node top_;
+  YAML::Node node_;
+  std::string name_;
+  const std::string* path_;
 };
 
+/// The top of `text`: a map without a key given twice anywhere below it.
+Value top_of(const std::string& text, const std::string& path) {
+  YAML::Node node;
+  try {
+    node = YAML::Load(text);
+  } catch (const YAML::Exception& error) {
+    refuse(path, error.mark.line, "not YAML: " + error.msg, "restore the file as `kphi fit` wrote it");
+  }
+  if (!node.IsMap()) refuse(path, 0, "not a coefficient file", "give the coefficients.yaml that `kphi fit` wrote");
+  refuse_repeated_keys(node, path);
+  return {node, "", path};
+}
+
+void refuse_other_format(const Value& top) {
+  const auto format = top.find("format");
+  if (!format) {
+    top.refuse("no `format`, so this is not a coefficient file", "give the coefficients.yaml that `kphi fit` wrote");
+  }
+  if (format->text() == kCoefficientFormat) return;
+  format->refuse("format `" + format->text() + "` is not " + kCoefficientFormat,
+                 "fit again with this version of kphi, or update it");
+}
+
 /// N/(rad/s)² per unit of the file.
-double scale_of_unit(const YamlReader& reader) {
-  const YAML::Node node = reader.optional(reader.top(), "k_unit");
-  if (!node.IsDefined()) {
-    reader.refuse(reader.top(), "the file does not say the unit of its coefficients",
-                  "add `k_unit: N/(rad/s)^2` or `k_unit: N/RPM^2`, whichever the numbers are in");
+double scale_of_unit(const Value& top) {
+  const auto unit = top.find("k_unit");
+  if (!unit) {
+    top.refuse("the file does not say the unit of its coefficients",
+               "add `k_unit: N/(rad/s)^2` or `k_unit: N/RPM^2`, whichever the numbers are in");
   }
-  const std::string unit = reader.text_at(reader.top(), "k_unit");
-  if (unit == "N/(rad/s)^2") return 1.0;
-  if (unit == "N/RPM^2") return from_newtons_per_rpm2(1.0).value();
-  reader.refuse(node, "k_unit `" + unit + "` is not known", "use N/(rad/s)^2 or N/RPM^2");
+  if (unit->text() == "N/(rad/s)^2") return 1.0;
+  if (unit->text() == "N/RPM^2") return from_newtons_per_rpm2(1.0).value();
+  unit->refuse("k_unit `" + unit->text() + "` is not known", "use N/(rad/s)^2 or N/RPM^2");
 }
 
-OverlapMeasure overlap_of(const YamlReader& reader) {
-  const YAML::Node node = reader.optional(reader.top(), "overlap");
-  if (!node.IsDefined()) {
-    reader.refuse(reader.top(), "the file does not say how its occlusion angles are defined",
-                  "add `overlap: rim_arc` if they are rim arcs");
+OverlapMeasure overlap_of(const Value& top) {
+  const auto overlap = top.find("overlap");
+  if (!overlap) {
+    top.refuse("the file does not say how its occlusion angles are defined",
+               "add `overlap: rim_arc` if they are rim arcs");
   }
-  const std::string overlap = reader.text_at(reader.top(), "overlap");
-  if (const auto measure = overlap_measure_named(overlap)) return *measure;
-  reader.refuse(node, "overlap `" + overlap + "` is not known", "use rim_arc, area_share or load_share");
+  if (const auto measure = overlap_measure_named(overlap->text())) return *measure;
+  overlap->refuse("overlap `" + overlap->text() + "` is not known", "use rim_arc, area_share or load_share");
 }
 
-std::optional<ThrustCoefficient> optional_coefficient(const YamlReader& reader, const YAML::Node& map,
-                                                      const std::string& key, double scale) {
-  const auto value = reader.optional_number_at(map, key);
+std::optional<ThrustCoefficient> coefficient_at(const Value& map, const std::string& key, double scale) {
+  const auto value = map.number_at(key);
   return value ? std::optional(ThrustCoefficient(*value * scale)) : std::nullopt;
 }
 
-std::optional<LineUncertainty> read_uncertainty(const YamlReader& reader, const YAML::Node& map, double scale,
+std::optional<LineUncertainty> read_uncertainty(const Value& line, double scale,
                                                 const std::optional<ThrustCoefficient>& error) {
-  const std::vector<YAML::Node> rows = reader.list(map, "covariance");
+  const std::vector<Value> rows = line.list("covariance");
   if (rows.empty()) return std::nullopt;
   const double units[2] = {scale, scale * kPerDegreeToPerRad};
   double covariance[2][2] = {};
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (rows.size() != 2 || !rows[i].IsSequence() || rows[i].size() != 2)
-      reader.refuse(rows[i], "covariance is not two rows of two numbers", kFitAgain);
-    for (std::size_t j = 0; j < 2; ++j)
-      covariance[i][j] = reader.number(rows[i][j], "covariance") * units[i] * units[j];
-    if (covariance[i][i] < 0.0) reader.refuse(rows[i], "a variance is below 0", kFitAgain);
+    if (rows.size() != 2 || !rows[i].node().IsSequence() || rows[i].items().size() != 2)
+      rows[i].refuse("covariance is not two rows of two numbers", kFitAgain);
+    for (std::size_t j = 0; j < 2; ++j) covariance[i][j] = rows[i].items()[j].number() * units[i] * units[j];
+    if (covariance[i][i] < 0.0) rows[i].refuse("a variance is below 0", kFitAgain);
   }
   if (!error) return std::nullopt;
   return LineUncertainty{error->value(), covariance[0][0], covariance[0][1], covariance[1][1]};
 }
 
-ThrustCoefficient read_thrust_coefficient(const YamlReader& reader, const YAML::Node& map, double scale) {
-  const ThrustCoefficient k(reader.number_at(map, "value") * scale);
+ThrustCoefficient read_thrust_coefficient(const Value& map, double scale) {
+  const ThrustCoefficient k(map.at("value").number() * scale);
   constexpr const char* kMeasureAtZero = "fit again from a campaign with a run at 0 degrees";
-  if (!(k.value() > 0.0)) reader.refuse(reader.required(map, "value"), "K_T must be positive", kMeasureAtZero);
-  if (reader.optional_number_at(map, "phi_deg").value_or(0.0) != 0.0) {
-    reader.refuse(reader.required(map, "phi_deg"), "K_T is the coefficient without occlusion, but phi_deg is not 0",
-                  kMeasureAtZero);
-  }
+  if (!(k.value() > 0.0)) map.at("value").refuse("K_T must be positive", kMeasureAtZero);
+  if (map.number_at("phi_deg").value_or(0.0) != 0.0)
+    map.at("phi_deg").refuse("K_T is the coefficient without occlusion, but phi_deg is not 0", kMeasureAtZero);
   return k;
 }
 
-std::optional<ThrustCoefficient> read_error(const YamlReader& reader, const YAML::Node& map, double scale) {
-  const auto error = optional_coefficient(reader, map, "standard_error", scale);
-  if (error && error->value() < 0.0)
-    reader.refuse(reader.required(map, "standard_error"), "a standard error is below 0", kFitAgain);
+std::optional<ThrustCoefficient> read_error(const Value& map, double scale) {
+  const auto error = coefficient_at(map, "standard_error", scale);
+  if (error && error->value() < 0.0) map.at("standard_error").refuse("a standard error is below 0", kFitAgain);
   return error;
 }
 
-ThrustCurve read_curve(const YamlReader& reader, double scale, Radians largest) {
-  const OverlapMeasure overlap = overlap_of(reader);
-  const YAML::Node reference = reader.required_map(reader.top(), "K_T");
-  const ThrustCoefficient k_t = read_thrust_coefficient(reader, reference, scale);
-  const YAML::Node map = reader.required_map(reader.top(), "line");
-  const ThrustCoefficient intercept(reader.number_at(map, "intercept") * scale);
-  const double slope = reader.number_at(map, "slope_per_deg") * scale * kPerDegreeToPerRad;
-  const auto uncertainty = read_uncertainty(reader, map, scale, read_error(reader, reference, scale));
-  if (!(intercept.value() > 0.0)) {
-    reader.refuse(reader.required(map, "intercept"), "the intercept must be positive",
-                  "check sign and unit of the fit");
-  }
-  if (reader.truth_at(map, "anchored") && std::fabs(intercept / k_t - 1.0) > kAnchorTolerance) {
-    reader.refuse(reader.required(map, "intercept"), "the line is called anchored, but its intercept is not K_T",
-                  kFitAgain);
-  }
+ThrustCurve read_curve(const Value& top, double scale, Radians largest) {
+  const OverlapMeasure overlap = overlap_of(top);
+  const Value reference = top.map_at("K_T");
+  const ThrustCoefficient k_t = read_thrust_coefficient(reference, scale);
+  const Value line = top.map_at("line");
+  const ThrustCoefficient intercept(line.at("intercept").number() * scale);
+  const double slope = line.at("slope_per_deg").number() * scale * kPerDegreeToPerRad;
+  const auto uncertainty = read_uncertainty(line, scale, read_error(reference, scale));
+  if (!(intercept.value() > 0.0))
+    line.at("intercept").refuse("the intercept must be positive", "check sign and unit of the fit");
+  if (line.at("anchored").truth() && std::fabs(intercept / k_t - 1.0) > kAnchorTolerance)
+    line.at("intercept").refuse("the line is called anchored, but its intercept is not K_T", kFitAgain);
   const auto curve = ThrustCurve::from_line(k_t, intercept, slope, largest, overlap, uncertainty);
-  if (!curve) reader.refuse(map, "the numbers of K_T, line and valid are too large to fly", kFitAgain);
+  if (!curve) line.refuse("the numbers of K_T, line and valid are too large to fly", kFitAgain);
   return *curve;
 }
 
-std::optional<std::pair<double, double>> read_range(const YamlReader& reader, const YAML::Node& map,
-                                                    const std::string& key) {
-  const std::vector<YAML::Node> ends = reader.list(map, key);
+std::optional<std::pair<double, double>> read_range(const Value& map, const std::string& key) {
+  const std::vector<Value> ends = map.list(key);
   if (ends.empty()) return std::nullopt;
   if (ends.size() == 2) {
-    const std::pair<double, double> range(reader.number(ends[0], key), reader.number(ends[1], key));
+    const std::pair<double, double> range(ends[0].number(), ends[1].number());
     if (range.first >= 0.0 && range.second > range.first) return range;
   }
-  reader.refuse(reader.required(map, key), "`" + key + "` is not a range", "write [smallest, largest]");
+  map.at(key).refuse("`" + key + "` is not a range", "write [smallest, largest]");
 }
 
-std::pair<double, double> read_occlusions(const YamlReader& reader) {
-  const YAML::Node map = reader.required_map(reader.top(), "valid");
-  const YAML::Node node = reader.required(map, "phi_deg");
-  const auto range = read_range(reader, map, "phi_deg");
-  if (!range || range->second > 360.0)
-    reader.refuse(node, "`phi_deg` is not a range of occlusions", "write [smallest, largest], at most 360");
-  return *range;
+std::pair<double, double> read_occlusions(const Value& top) {
+  const Value map = top.map_at("valid"), node = map.at("phi_deg");
+  const auto range = read_range(map, "phi_deg");
+  if (range && range->second <= 360.0) return *range;
+  node.refuse("`phi_deg` is not a range of occlusions", "write [smallest, largest], at most 360");
 }
 
-void read_table(const YamlReader& reader, double scale, Coefficients& into) {
-  for (const YAML::Node& node : reader.list(reader.top(), "table")) {
-    if (!node.IsMap()) reader.refuse(node, "a row of the table has no keys", kFitAgain);
-    Coefficients::Row row;
-    row.occlusion = from_degrees(reader.number_at(node, "phi_deg"));
-    row.k = ThrustCoefficient(reader.number_at(node, "k") * scale);
-    row.standard_error = optional_coefficient(reader, node, "standard_error", scale);
-    row.k_at_speed = optional_coefficient(reader, node, "k_at_speed", scale);
-    if (const auto rpm = reader.optional_number_at(node, "at_speed_rpm")) row.at_speed = from_rpm(*rpm);
-    row.steps = reader.optional_count_at(node, "steps");
-    row.repetitions = reader.optional_count_at(node, "repetitions");
-    into.table.push_back(row);
+Coefficients::Row read_row(const Value& map, double scale) {
+  Coefficients::Row row;
+  row.occlusion = from_degrees(map.at("phi_deg").number());
+  row.k = ThrustCoefficient(map.at("k").number() * scale);
+  row.standard_error = coefficient_at(map, "standard_error", scale);
+  row.k_at_speed = coefficient_at(map, "k_at_speed", scale);
+  if (const auto rpm = map.number_at("at_speed_rpm")) row.at_speed = from_rpm(*rpm);
+  row.steps = map.count_at("steps");
+  row.repetitions = map.count_at("repetitions");
+  return row;
+}
+
+void read_propeller(const Value& map, Coefficients::Propeller& into) {
+  into.id = map.at("id").text();
+  into.name = map.text_at("name");
+  into.diameter_in = map.number_at("diameter_in").value_or(0.0);
+  into.blades = map.count_at("blades").value_or(0);
+}
+
+void read_fit(const Value& map, Coefficients::Fit& into) {
+  into.model = map.text_at("model");
+  into.estimator = map.text_at("estimator");
+  into.k_by = map.text_at("k_by");
+  into.weights = map.text_at("weights");
+  into.loss = map.text_at("loss");
+  into.speed_range_rpm = read_range(map, "speed_range_rpm");
+  for (const Value& run : map.list("leave_out")) {
+    if (!run.node().IsScalar()) run.refuse("a run in `leave_out` is not a text", kFitAgain);
+    into.leave_out.push_back(run.text());
   }
-}
-
-void read_propeller(const YamlReader& reader, Coefficients& into) {
-  const YAML::Node map = reader.required_map(reader.top(), "propeller");
-  into.propeller.id = reader.text_at(map, "id");
-  into.propeller.name = reader.optional_text_at(map, "name");
-  into.propeller.diameter_in = reader.optional_number_at(map, "diameter_in").value_or(0.0);
-  into.propeller.blades = reader.optional_count_at(map, "blades").value_or(0);
-}
-
-void read_fit(const YamlReader& reader, const YAML::Node& map, Coefficients::Fit& into) {
-  into.model = reader.optional_text_at(map, "model");
-  into.estimator = reader.optional_text_at(map, "estimator");
-  into.k_by = reader.optional_text_at(map, "k_by");
-  into.weights = reader.optional_text_at(map, "weights");
-  into.loss = reader.optional_text_at(map, "loss");
-  into.speed_range_rpm = read_range(reader, map, "speed_range_rpm");
-  for (const YAML::Node& run : reader.list(map, "leave_out")) {
-    if (!run.IsScalar()) reader.refuse(run, "a run in `leave_out` is not a text", kFitAgain);
-    into.leave_out.push_back(run.Scalar());
-  }
-  if (!reader.optional(map, "u").IsDefined()) return;
+  if (!map.find("u")) return;
   into.bench.emplace();
-  for (const auto& entry : reader.required_map(map, "u"))
-    into.bench->emplace_back(entry.first.Scalar(), reader.number(entry.second, entry.first.Scalar()));
+  for (const auto& [name, value] : map.map_at("u").entries()) into.bench->emplace_back(name, value.number());
 }
 
-void read_provenance(const YamlReader& reader, Coefficients& into) {
-  const YAML::Node map = reader.optional(reader.top(), "provenance");
-  if (!map.IsDefined() || !map.IsMap()) return;
-  into.provenance.campaign = reader.optional_text_at(map, "campaign");
-  const YAML::Node fit = reader.optional(map, "fit");
-  if (fit.IsDefined() && fit.IsMap()) read_fit(reader, fit, into.provenance.fit);
-  for (const YAML::Node& run : reader.list(map, "runs")) {
-    if (!run.IsMap()) reader.refuse(run, "a run has no keys", kFitAgain);
-    into.provenance.runs.push_back({reader.text_at(run, "file"), reader.optional_text_at(run, "sha256")});
-  }
+void read_provenance(const Value& map, Coefficients::Provenance& into) {
+  into.campaign = map.text_at("campaign");
+  if (const auto fit = map.find("fit"); fit && fit->node().IsMap()) read_fit(*fit, into.fit);
+  for (const Value& run : map.rows("runs", "a run has no keys"))
+    into.runs.push_back({run.at("file").text(), run.text_at("sha256")});
 }
 
-void read_budgets(const YamlReader& reader, double scale, Coefficients& into) {
-  if (!reader.optional(reader.top(), "uncertainty").IsDefined()) return;
-  const YAML::Node map = reader.required_map(reader.top(), "uncertainty");
-  const auto u_of = [&](const YAML::Node& budget) {
-    const auto u = reader.optional_number_at(budget, "u");
-    return u ? std::optional<double>(*u * scale) : std::nullopt;
+Coefficients::Uncertainty read_budgets(const Value& map, double scale) {
+  const auto u_of = [&](const Value& budget) {
+    const auto u = budget.number_at("u");
+    return u ? std::optional(*u * scale) : std::nullopt;
   };
-  into.uncertainty = Coefficients::Uncertainty{};
-  Coefficients::Uncertainty& budgets = *into.uncertainty;
-  const YAML::Node k_t = reader.required_map(map, "K_T");
+  Coefficients::Uncertainty budgets;
+  const Value k_t = map.map_at("K_T");
   budgets.thrust_coefficient = u_of(k_t);
-  budgets.intercept = u_of(reader.required_map(map, "intercept"));
-  budgets.slope_per_deg = u_of(reader.required_map(map, "slope_per_deg"));
-  if (reader.optional_text_at(k_t, "freedom") != ".inf")
-    budgets.freedom = reader.optional_number_at(k_t, "freedom").value_or(budgets.freedom);
-  for (const YAML::Node& row : reader.list(map, "table")) {
-    if (!row.IsMap()) reader.refuse(row, "a row of the budgets has no keys", kFitAgain);
-    budgets.table.push_back(u_of(row));
-  }
-}
-
-void refuse_other_format(const YamlReader& reader) {
-  const YAML::Node node = reader.optional(reader.top(), "format");
-  if (!node.IsDefined()) {
-    reader.refuse(reader.top(), "no `format`, so this is not a coefficient file",
-                  "give the coefficients.yaml that `kphi fit` wrote");
-  }
-  const std::string format = reader.text_at(reader.top(), "format");
-  if (format != kCoefficientFormat) {
-    reader.refuse(node, "format `" + format + "` is not " + kCoefficientFormat,
-                  "fit again with this version of kphi, or update it");
-  }
+  budgets.intercept = u_of(map.map_at("intercept"));
+  budgets.slope_per_deg = u_of(map.map_at("slope_per_deg"));
+  if (k_t.text_at("freedom") != ".inf") budgets.freedom = k_t.number_at("freedom").value_or(budgets.freedom);
+  for (const Value& row : map.rows("table", "a row of the budgets has no keys")) budgets.table.push_back(u_of(row));
+  return budgets;
 }
 
 }  // namespace
 
 Coefficients parse_coefficients(const std::string& text, const std::string& path) {
-  const YamlReader reader(text, path);
-  refuse_other_format(reader);
-  const double scale = scale_of_unit(reader);
-  const auto [smallest, largest] = read_occlusions(reader);
-  Coefficients coefficients(read_curve(reader, scale, from_degrees(largest)));
+  const Value top = top_of(text, path);
+  refuse_other_format(top);
+  const double scale = scale_of_unit(top);
+  const auto [smallest, largest] = read_occlusions(top);
+  Coefficients coefficients(read_curve(top, scale, from_degrees(largest)));
   coefficients.path = path;
   coefficients.smallest_occlusion = from_degrees(smallest);
-  coefficients.thrust_coefficient_error = read_error(reader, reader.required_map(reader.top(), "K_T"), scale);
-  const YAML::Node line = reader.required_map(reader.top(), "line");
-  coefficients.anchored = reader.truth_at(line, "anchored");
-  for (const YAML::Node& point : reader.list(line, "points_deg"))
-    coefficients.points.push_back(from_degrees(reader.number(point, "points_deg")));
-  if (const auto speed = read_range(reader, reader.required_map(reader.top(), "valid"), "speed_rpm")) {
+  coefficients.thrust_coefficient_error = read_error(top.at("K_T"), scale);
+  coefficients.anchored = top.at("line").at("anchored").truth();
+  for (const Value& point : top.at("line").list("points_deg"))
+    coefficients.points.push_back(from_degrees(point.number()));
+  if (const auto speed = read_range(top.at("valid"), "speed_rpm")) {
     coefficients.slowest_speed = from_rpm(speed->first);
     coefficients.fastest_speed = from_rpm(speed->second);
   }
-  coefficients.measured_utc = reader.optional_text_at(reader.top(), "measured_utc");
-  coefficients.tool_version = reader.optional_text_at(reader.top(), "tool_version");
-  read_propeller(reader, coefficients);
-  read_table(reader, scale, coefficients);
-  coefficients.air_density_kg_m3 = reader.optional_number_at(reader.top(), "air_density_kg_m3");
-  if (const auto volts = reader.optional_number_at(reader.top(), "supply_v")) coefficients.supply = Volts(*volts);
-  read_provenance(reader, coefficients);
-  read_budgets(reader, scale, coefficients);
+  coefficients.measured_utc = top.text_at("measured_utc");
+  coefficients.tool_version = top.text_at("tool_version");
+  read_propeller(top.map_at("propeller"), coefficients.propeller);
+  for (const Value& row : top.rows("table", "a row of the table has no keys"))
+    coefficients.table.push_back(read_row(row, scale));
+  coefficients.air_density_kg_m3 = top.number_at("air_density_kg_m3");
+  if (const auto volts = top.number_at("supply_v")) coefficients.supply = Volts(*volts);
+  if (const auto map = top.find("provenance"); map && map->node().IsMap())
+    read_provenance(*map, coefficients.provenance);
+  if (top.find("uncertainty")) coefficients.uncertainty = read_budgets(top.map_at("uncertainty"), scale);
   return coefficients;
 }
 

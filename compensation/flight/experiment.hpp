@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "compensation/flight/vehicle.hpp"
+#include "compensation/flight/simulated_vehicle.hpp"
 
 namespace kphi::flight {
 

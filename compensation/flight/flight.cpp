@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "compensation/flight/vehicle.hpp"
+#include "compensation/flight/simulated_vehicle.hpp"
 
 namespace kphi::flight {
 namespace {
@@ -14,7 +14,7 @@ constexpr double kLostMetres = 1.0;
 /// Sums over the part of a leg that counts.
 class LegSums {
  public:
-  void add(const Reference& reference, const BodyMotion& estimate, const PlantState& state) noexcept {
+  void add(const Reference& reference, const BodyMotion& estimate, const AircraftState& state) noexcept {
     const Eigen::Vector3d error = reference.position - estimate.position;
     const double distance = error.norm();
     const auto rotors = state.rotors();
@@ -157,12 +157,12 @@ class Flight {
 
   const Experiment& experiment_;
   const Scene& scene_;
-  Plant plant_;
+  Aircraft plant_;
   Pilot pilot_;
   Estimator estimator_;
   ArmMotion motion_;
   Configuration now_;
-  PlantState state_;
+  AircraftState state_;
   Reference reference_;
   BodyMotion estimate_;
   long step_ = 0;

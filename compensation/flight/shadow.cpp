@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "compensation/flight/vehicle.hpp"
+#include "compensation/flight/simulated_vehicle.hpp"
 
 namespace kphi::flight {
 namespace {

@@ -1,10 +1,12 @@
-// What `kphi fly` prints: the paper's three tables with ours beside them, and the percentiles of a study.
+// What `kphi fly` prints: the paper's three tables with ours beside them, and the percentiles of a study. And what it
+// leaves for other programs: traces and draws as CSV, figures as gnuplot scripts with their data inside.
 #pragma once
 
 #include <array>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "compensation/flight/study.hpp"
 
@@ -42,12 +44,9 @@ inline constexpr std::array<HeightRow, 2> kHeightRows{{
 }};
 
 /// Table III: mean and standard deviation of the distance to the reference [m].
-struct Spread {
-  double mean, deviation;
-};
 struct ForwardCell {
   std::size_t leg;
-  Spread paper;
+  double mean, deviation;
 };
 struct ForwardRow {
   std::string_view title;
@@ -55,27 +54,24 @@ struct ForwardRow {
   std::optional<ForwardCell> x, o_plain, o_compensated;
 };
 inline constexpr std::array<ForwardRow, 6> kForwardRows{{
-    {"level  X - O n.c.", kLevelPlain, ForwardCell{0, {0.0772, 0.0414}}, ForwardCell{1, {0.2172, 0.0787}}, {}},
-    {"level  O n.c. - O c.", kLevelSwitched, {}, ForwardCell{0, {0.2339, 0.050}}, ForwardCell{1, {0.1210, 0.045}}},
-    {"level  X - O c.", kLevelCompensated, ForwardCell{0, {0.0898, 0.0452}}, {}, ForwardCell{1, {0.1389, 0.0482}}},
-    {"rising X - O n.c.", kRisingPlain, ForwardCell{0, {0.1211, 0.0426}}, ForwardCell{1, {0.2690, 0.0681}}, {}},
-    {"rising O n.c. - O c.", kRisingSwitched, {}, ForwardCell{0, {0.2134, 0.0452}}, ForwardCell{1, {0.1318, 0.0611}}},
-    {"rising X - O c.", kRisingCompensated, ForwardCell{0, {0.0975, 0.0363}}, {}, ForwardCell{1, {0.1038, 0.0439}}},
+    {"level  X - O n.c.", kLevelPlain, ForwardCell{0, 0.0772, 0.0414}, ForwardCell{1, 0.2172, 0.0787}, {}},
+    {"level  O n.c. - O c.", kLevelSwitched, {}, ForwardCell{0, 0.2339, 0.050}, ForwardCell{1, 0.1210, 0.045}},
+    {"level  X - O c.", kLevelCompensated, ForwardCell{0, 0.0898, 0.0452}, {}, ForwardCell{1, 0.1389, 0.0482}},
+    {"rising X - O n.c.", kRisingPlain, ForwardCell{0, 0.1211, 0.0426}, ForwardCell{1, 0.2690, 0.0681}, {}},
+    {"rising O n.c. - O c.", kRisingSwitched, {}, ForwardCell{0, 0.2134, 0.0452}, ForwardCell{1, 0.1318, 0.0611}},
+    {"rising X - O c.", kRisingCompensated, ForwardCell{0, 0.0975, 0.0363}, {}, ForwardCell{1, 0.1038, 0.0439}},
 }};
 
 /// What the simulation does not show, whatever is drawn, and why.
 inline constexpr std::array<std::string_view, 4> kNotReproduced{{
     "the errors in X of Tables I and III: they come from the estimator, latency and trim of the real drone, which are "
-    "not "
-    "modelled and not tuned in",
+    "not modelled and not tuned in",
     "the velocity term of Table II (-0.505 m/s): e = z_ref - z_est makes it a climb at half a metre per second, which "
-    "no "
-    "hover is; its identity kP e + kD e' holds as arithmetic",
+    "no hover is; its identity kP e + kD e' holds as arithmetic",
     "the sign of the height in row 2 of Table II: the paper's compensated drone is above its reference, this one "
     "mostly below, because more is lost in flight than on the bench",
     "x and y of Table I: they hang on the centre of gravity, the attitude stiffness and kpxy, which nobody published; "
-    "the "
-    "draws show how far",
+    "the draws show how far",
 }};
 
 /// Flights with no legs were not flown; their rows are left out, and a table without rows is empty.
@@ -90,5 +86,17 @@ inline constexpr std::array<std::string_view, 4> kNotReproduced{{
 [[nodiscard]] inline double height_demand(const Gains& gains, double error, double error_rate) noexcept {
   return gains.position.z() * error + gains.velocity.z() * error_rate;
 }
+
+/// One row per 10 ms, units in the column names.
+[[nodiscard]] std::string trace_csv(const std::vector<TraceRow>& trace);
+
+/// One row per draw: what was drawn, and how it flew.
+[[nodiscard]] std::string draws_csv(const std::vector<Draw>& draws);
+
+/// The position error of one flight over time, one axis below the other, as in the paper's figures.
+[[nodiscard]] std::string error_figure(const Experiment& experiment, const std::vector<TraceRow>& trace);
+
+/// One dot per draw: hover z and forward distance, compensated over not.
+[[nodiscard]] std::string draws_figure(const std::vector<Draw>& draws);
 
 }  // namespace kphi::flight

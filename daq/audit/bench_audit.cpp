@@ -104,13 +104,14 @@ netbox::Intention intention_of(const profiles::Campaign& campaign, const profile
 
 iq::AuditRecord read_parameters(const iq::Identity& module, const AskModule& ask) {
   std::vector<iq::Inquiry> asked;
-  for (const iq::Entry* entry : iq::kAudited) {
-    if (answers(*entry, module)) asked.push_back({entry, std::nullopt});
+  for (const iq::Entry& entry : iq::kEntries) {
+    if (entry.audited && answers(entry, module)) asked.push_back({&entry, std::nullopt});
   }
   const std::vector<iq::Reply> replies = ask(asked);
   iq::AuditRecord record;
-  for (std::size_t i = 0; i < asked.size() && i < replies.size(); ++i)
-    record.values[iq::audited_index(*asked[i].entry)] = replies[i].value;
+  for (std::size_t i = 0; i < asked.size() && i < replies.size(); ++i) {
+    if (replies[i].value) record.values[asked[i].entry] = *replies[i].value;
+  }
   return record;
 }
 

@@ -21,6 +21,16 @@
 #include "results/records.hpp"
 #include "results/run_writer.hpp"
 
+namespace kphi {
+
+/// For nlohmann::json.
+template <class Json>
+void to_json(Json& json, const Finding& finding) {
+  json = {{"severity", name_of(finding.severity)}, {"what", finding.what}, {"next_move", finding.next_move}};
+}
+
+}  // namespace kphi
+
 namespace kphi::daq {
 
 class OutputEnable;
@@ -66,12 +76,6 @@ class [[nodiscard]] OutputEnable {
 
  private:
   SupplyLink& supply_;
-};
-
-/// Work that runs periodically while this lives.
-class Background {
- public:
-  virtual ~Background() = default;
 };
 
 /// The motor. Turn it only through MotorEnable (guard/guard.hpp), whose destructor coasts it.
@@ -151,7 +155,7 @@ class Bench {
   /// Returns at bench time `when`, or a little later on a live bench.
   virtual void wait_until(Instant when) = 0;
   /// Calls `work` while the handle lives: from a thread of its own, or from within wait_until.
-  [[nodiscard]] virtual std::unique_ptr<Background> run_periodically(std::function<void()> work) = 0;
+  [[nodiscard]] virtual std::shared_ptr<void> run_periodically(std::function<void()> work) = 0;
   /// Writes the run files.
   [[nodiscard]] virtual results::FileLayer& files() = 0;
   /// How often the recorder syncs the run file, bench time.

@@ -73,15 +73,17 @@ std::optional<results::StreamEvent> configuration_event(const netbox::Configurat
   return failure;
 }
 
+std::optional<std::string> noise(const netbox::ZeroMeasurement& zero, std::size_t axis, double limit) {
+  const double deviation = zero.standard_deviation[axis];
+  if (deviation <= limit) return std::nullopt;  // written so that NaN is refused
+  return fmt::format("{} is noisy: standard deviation {:.3g} {unit}, limit {:g} {unit}", kAxes[axis], deviation, limit,
+                     fmt::arg("unit", unit_of(axis)));
+}
+
 std::optional<std::string> unrest(const netbox::ZeroMeasurement& before) {
   if (before.records < 2) return "no valid sample arrived";
-  for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
-    const double allowed = axis < 3 ? kNoisyForce : kNoisyTorque;
-    const double deviation = before.standard_deviation[axis];
-    if (deviation <= allowed) continue;  // written so that NaN is refused
-    return fmt::format("{} is noisy: standard deviation {:.3g} {unit}, limit {:g} {unit}", kAxes[axis], deviation,
-                       allowed, fmt::arg("unit", unit_of(axis)));
-  }
+  for (std::size_t axis = 0; axis < kAxes.size(); ++axis)
+    if (auto why = noise(before, axis, axis < 3 ? kNoisyForce : kNoisyTorque)) return why;
   return std::nullopt;
 }
 

@@ -9,7 +9,7 @@
 #include "base/clock.hpp"
 #include "base/finding.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
-#include "drivers/netbox/receive/bias.hpp"
+#include "drivers/netbox/receive/load.hpp"
 #include "results/records.hpp"
 #include "results/reduction/zeros.hpp"
 
@@ -42,6 +42,8 @@ struct SlotPages {
 inline constexpr double kNoisyForce = 10 * results::kRestForce;    ///< N
 inline constexpr double kNoisyTorque = 10 * results::kRestTorque;  ///< N m
 
+/// Why this axis (0..5 = Fx..Tz) is not at rest: its standard deviation is not below `limit`, or not a number.
+[[nodiscard]] std::optional<std::string> noise(const netbox::ZeroMeasurement& zero, std::size_t axis, double limit);
 /// Why no bias may be taken: an axis is noisier than that, or no sound sample arrived. nullopt: it may be taken.
 [[nodiscard]] std::optional<std::string> unrest(const netbox::ZeroMeasurement& before);
 /// Which axis is not within `tolerance` of zero; nullopt if all are.

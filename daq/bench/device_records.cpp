@@ -10,66 +10,40 @@
 namespace kphi::daq {
 namespace {
 
-template <class From, class To>
-struct Pair {
-  From from;
-  To to;
-};
-
-/// The table's entry for `from`; `unknown` without one.
-template <class From, class To, std::size_t N>
-To found_in(const std::array<Pair<From, To>, N>& table, From from, To unknown) noexcept {
-  for (const auto& entry : table) {
-    if (entry.from == from) return entry.to;
-  }
-  return unknown;
-}
-
-using Channel = results::MotorChannel;
 using Kind = results::EventKind;
 
-constexpr std::array<Pair<iq::Quantity, Channel>, 9> kChannels{{
-    {iq::Quantity::speed, Channel::speed},
-    {iq::Quantity::supply_voltage, Channel::supply_voltage},
-    {iq::Quantity::supply_current, Channel::supply_current},
-    {iq::Quantity::motor_current, Channel::motor_current},
-    {iq::Quantity::coil_temperature, Channel::coil_temperature},
-    {iq::Quantity::derate, Channel::derate},
-    {iq::Quantity::drive_mode, Channel::drive_mode},
-    {iq::Quantity::drive_pwm, Channel::drive_pwm},
-    {iq::Quantity::fault_now, Channel::fault_now},
-}};
+/// In the order of netbox::EventKind.
+constexpr std::array kLoadCellEvents{Kind::restarted,
+                                     Kind::rebooted,
+                                     Kind::stalled,
+                                     Kind::stall_ended,
+                                     Kind::silent,
+                                     Kind::resumed,
+                                     Kind::box_trouble,
+                                     Kind::taken_over,
+                                     Kind::rdt_disabled,
+                                     Kind::unreachable,
+                                     Kind::unusable,
+                                     Kind::reconnected,
+                                     Kind::configuration_changed,
+                                     Kind::given_up};
+static_assert(kLoadCellEvents.size() == 1 + static_cast<std::size_t>(netbox::EventKind::given_up));
 
-constexpr std::array<Pair<netbox::EventKind, Kind>, 14> kLoadCellEvents{{
-    {netbox::EventKind::restarted, Kind::restarted},
-    {netbox::EventKind::rebooted, Kind::rebooted},
-    {netbox::EventKind::stalled, Kind::stalled},
-    {netbox::EventKind::stall_ended, Kind::stall_ended},
-    {netbox::EventKind::silent, Kind::silent},
-    {netbox::EventKind::resumed, Kind::resumed},
-    {netbox::EventKind::box_trouble, Kind::box_trouble},
-    {netbox::EventKind::taken_over, Kind::taken_over},
-    {netbox::EventKind::rdt_disabled, Kind::rdt_disabled},
-    {netbox::EventKind::unreachable, Kind::unreachable},
-    {netbox::EventKind::unusable, Kind::unusable},
-    {netbox::EventKind::reconnected, Kind::reconnected},
-    {netbox::EventKind::configuration_changed, Kind::configuration_changed},
-    {netbox::EventKind::given_up, Kind::given_up},
-}};
+/// In the order of iq::EventKind.
+constexpr std::array kMotorEvents{Kind::motor_connected,   Kind::motor_no_answer,      Kind::motor_reset,
+                                  Kind::motor_silent,      Kind::motor_coast_denied,   Kind::motor_lease_expired,
+                                  Kind::motor_port_lost,   Kind::motor_another_module, Kind::motor_slow_round_trip,
+                                  Kind::motor_host_absent, Kind::motor_let_go};
+static_assert(kMotorEvents.size() == 1 + static_cast<std::size_t>(iq::EventKind::let_go));
 
-constexpr std::array<Pair<iq::EventKind, Kind>, 11> kMotorEvents{{
-    {iq::EventKind::connected, Kind::motor_connected},
-    {iq::EventKind::no_answer, Kind::motor_no_answer},
-    {iq::EventKind::module_reset, Kind::motor_reset},
-    {iq::EventKind::module_silent, Kind::motor_silent},
-    {iq::EventKind::coast_denied, Kind::motor_coast_denied},
-    {iq::EventKind::lease_expired, Kind::motor_lease_expired},
-    {iq::EventKind::port_lost, Kind::motor_port_lost},
-    {iq::EventKind::another_module, Kind::motor_another_module},
-    {iq::EventKind::slow_round_trip, Kind::motor_slow_round_trip},
-    {iq::EventKind::host_absent, Kind::motor_host_absent},
-    {iq::EventKind::let_go, Kind::motor_let_go},
-}};
+static_assert(
+    [] {
+      for (std::size_t i = 0; i < results::kMotorChannels.size(); ++i) {
+        if (iq::name_of(static_cast<iq::Quantity>(i)) != results::kMotorChannels[i].name) return false;
+      }
+      return true;
+    }(),
+    "iq::Quantity and results::MotorChannel are the same, in the same order");
 
 }  // namespace
 
@@ -79,29 +53,24 @@ results::LoadCellRecord to_record(const netbox::StampedRecord& stamped) noexcept
 }
 
 results::MotorReading to_reading(const iq::Reading& reading) noexcept {
-  return {found_in(kChannels, reading.quantity, Channel::speed), reading.time.count(), reading.uncertainty.count(),
+  return {static_cast<results::MotorChannel>(reading.quantity), reading.time.count(), reading.uncertainty.count(),
           reading.value};
-}
-
-netbox::StampedRecord to_stamped(const results::LoadCellRecord& record) noexcept {
-  return {{record.rdt_sequence, record.ft_sequence, record.status, record.counts}, Instant(record.arrival_ns)};
 }
 
 results::StreamEvent to_event(const netbox::Event& event) {
   std::string text = netbox::to_string(event);
   if (event.kind == netbox::EventKind::rebooted) text += "; the steps that follow in this run are flagged";
-  return {found_in(kLoadCellEvents, event.kind, Kind::box_trouble), event.at.count(), event.records, std::move(text)};
+  return {kLoadCellEvents[static_cast<std::size_t>(event.kind)], event.at.count(), event.records, std::move(text)};
 }
 
 results::StreamEvent to_event(const iq::Event& event) {
-  // An unknown kind is treated as the worst.
-  const Kind kind = found_in(kMotorEvents, event.kind, Kind::motor_silent);
-  return {kind, event.time.count(), 0, fmt::format("{:.3f} s: {}", to_seconds(event.time), event.words)};
+  return {kMotorEvents[static_cast<std::size_t>(event.kind)], event.time.count(), 0,
+          fmt::format("{:.3f} s: {}", to_seconds(event.time), event.words)};
 }
 
-bool ends_a_run(results::EventKind kind) noexcept {
-  return std::any_of(kMotorEvents.begin(), kMotorEvents.end(),
-                     [&](const auto& each) { return each.to == kind && iq::spoils_a_run(each.from); });
+bool ends_a_run(Kind kind) noexcept {
+  const auto found = std::find(kMotorEvents.begin(), kMotorEvents.end(), kind);
+  return found != kMotorEvents.end() && iq::spoils_a_run(static_cast<iq::EventKind>(found - kMotorEvents.begin()));
 }
 
 results::StreamHealth to_health(const netbox::Health& health, const Clock& clock) noexcept {
@@ -115,14 +84,6 @@ results::StreamHealth to_health(const netbox::Health& health, const Clock& clock
   out.queue_high_water = health.queue_high_water;
   out.events_dropped = health.events_dropped;
   return out;
-}
-
-netbox::Configuration to_configuration(const results::LoadCellScale& scale) {
-  netbox::Configuration configuration;
-  configuration.counts_per_newton = scale.counts_per_newton;
-  configuration.counts_per_newton_metre = scale.counts_per_newton_metre;
-  configuration.range = scale.range;
-  return configuration;
 }
 
 results::LoadCellScale to_scale(const netbox::Configuration& configuration) {

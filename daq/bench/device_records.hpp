@@ -2,7 +2,6 @@
 #pragma once
 
 #include "drivers/iq/exchange/telemetry.hpp"
-#include "drivers/iq/session/events.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
 #include "drivers/netbox/stream/events.hpp"
 #include "drivers/netbox/stream/health.hpp"
@@ -12,11 +11,8 @@
 namespace kphi::daq {
 
 [[nodiscard]] results::LoadCellRecord to_record(const netbox::StampedRecord& stamped) noexcept;
-[[nodiscard]] netbox::StampedRecord to_stamped(const results::LoadCellRecord& record) noexcept;
 [[nodiscard]] results::MotorReading to_reading(const iq::Reading& reading) noexcept;
 [[nodiscard]] results::LoadCellScale to_scale(const netbox::Configuration& configuration);
-/// Counts per unit and ranges only.
-[[nodiscard]] netbox::Configuration to_configuration(const results::LoadCellScale& scale);
 [[nodiscard]] results::StreamEvent to_event(const netbox::Event& event);
 [[nodiscard]] results::StreamEvent to_event(const iq::Event& event);
 /// A motor event that spoils the run: the motor coasts already.

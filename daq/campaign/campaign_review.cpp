@@ -16,25 +16,24 @@ namespace {
 using nlohmann::json;
 using results::StepMean;
 
-json number(double value) { return std::isnan(value) ? json() : json(value); }
-
+/// NaN becomes null.
 json to_json(const results::RepetitionVerdict& verdict) {
   json list = json::array();
   for (const results::RepetitionFigure& figure : verdict.repetitions) {
     list.push_back({{"repetition", figure.repetition},
-                    {"k_n_s2_per_rad2", number(figure.k)},
-                    {"u_k", number(figure.u)},
+                    {"k_n_s2_per_rad2", figure.k},
+                    {"u_k", figure.u},
                     {"usable", figure.usable},
                     {"outlying", figure.outlying},
-                    {"p", number(figure.p)}});
+                    {"p", figure.p}});
   }
   return {{"occlusion_deg", verdict.occlusion_deg},
           {"repetitions", list},
-          {"k_n_s2_per_rad2", number(verdict.k)},
-          {"between_sd", number(verdict.between_sd)},
-          {"within_u", number(verdict.within_u)},
-          {"f", number(verdict.f)},
-          {"p", number(verdict.p)},
+          {"k_n_s2_per_rad2", verdict.k},
+          {"between_sd", verdict.between_sd},
+          {"within_u", verdict.within_u},
+          {"f", verdict.f},
+          {"p", verdict.p},
           {"reason", verdict.reason}};
 }
 

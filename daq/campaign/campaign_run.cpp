@@ -227,10 +227,8 @@ class CampaignRun {
 
   void note_findings(const std::vector<BenchFinding>& findings) {
     for (const BenchFinding& found : findings) {
-      const Finding& finding = found.finding;
-      if (finding.severity != Severity::note) progress_.say(found.line());
-      note(found.device == Source::motor ? "motor_finding" : "load_cell_finding",
-           {{"severity", name_of(finding.severity)}, {"what", finding.what}, {"next_move", finding.next_move}});
+      if (found.finding.severity != Severity::note) progress_.say(found.line());
+      note(found.device == Source::motor ? "motor_finding" : "load_cell_finding", found.finding);
     }
     if (!config_.iq.clock_gain) note("clock_unchecked", {{"uid", bench_.motor().parameters().uid()}});
   }

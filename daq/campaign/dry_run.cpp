@@ -84,15 +84,7 @@ class Checks {
     const double high = ThrustPrior::at(prior->high, top_speed(campaign_)).value();
     const std::string words = fmt::format("about {:.1f} to {:.1f} N expected at top speed ({}), limit {:g} N", low,
                                           high, prior->source, limit);
-    if (high > limit)
-      return add(Severity::warning, "thrust", words,
-                 low > limit ? "the limit will stop the run" : "the limit may stop the run");
-    add(Severity::note, "thrust", words);
-  }
-
-  void range() {
-    tell("load cell range",
-         "read from the box: `kphi devices --bench BENCH --campaign CAMPAIGN`, or when the run starts");
+    warn_if(high > limit, "thrust", words, low > limit ? "the limit will stop the run" : "the limit may stop the run");
   }
 
   void sampling() {
@@ -115,10 +107,8 @@ class Checks {
     const double left = campaign_.profile.dwell.value() - campaign_.minimum_discard.value();
     const std::string words = fmt::format("{:g} s of each step averaged after minimum_discard_s, zeros of {:g} s", left,
                                           campaign_.zero.value());
-    if (left < results::kLeastWindow)
-      return add(Severity::warning, "averages", words,
-                 fmt::format("at least {:g} s needed to see the thrust settle", results::kLeastWindow));
-    add(Severity::note, "averages", words);
+    warn_if(left < results::kLeastWindow, "averages", words,
+            fmt::format("at least {:g} s needed to see the thrust settle", results::kLeastWindow));
   }
 
   void supply() {
@@ -131,10 +121,8 @@ class Checks {
     const std::string words = fmt::format(
         "set to {:g} V, at most {:g} A; the campaign expects {:g} V and coasts above {:g} A", set.voltage.value(),
         set.current_limit.value(), campaign_.supply.value(), limits.supply_current_max.value());
-    const bool beside = std::abs(set.voltage / campaign_.supply - 1) > results::kSupplyBand;
-    if (beside)
-      return add(Severity::warning, "supply", words, "every step would be flagged; make the two voltages agree");
-    add(Severity::note, "supply", words);
+    warn_if(std::abs(set.voltage / campaign_.supply - 1) > results::kSupplyBand, "supply", words,
+            "every step would be flagged; make the two voltages agree");
   }
 
   /// A supply that cannot sink current has nowhere to put what a decelerating rotor feeds back.
@@ -144,8 +132,7 @@ class Checks {
                              [](const auto& a, const auto& b) { return a.speed < b.speed; });
     });
     if (!slows_down) return;
-    const auto& slew = campaign_.profile.slew_rad_s2;
-    if (slew)
+    if (const auto& slew = campaign_.profile.slew_rad_s2)
       return add(Severity::note, "braking",
                  fmt::format("the speed falls by {:.0f} RPM/s at most", to_rpm(RadPerSec(*slew))));
     if (!config_.supply) return tell("braking", "no ramp: the power supply must absorb what the rotor feeds back");
@@ -163,10 +150,8 @@ class Checks {
     const std::string words =
         fmt::format("runs start below {:g} °C, otherwise kphi waits for {:g} °C; the motor coasts above {:g} °C",
                     limits.cooling->pause_above.value(), limits.cooling->resume_below.value(), most);
-    if (limits.cooling->pause_above.value() >= most)
-      return add(Severity::warning, "coil", words,
-                 "set cooling.pause_above_degc below the limit, or runs start that cannot finish");
-    add(Severity::note, "coil", words);
+    warn_if(limits.cooling->pause_above.value() >= most, "coil", words,
+            "set cooling.pause_above_degc below the limit, or runs start that cannot finish");
   }
 
   void disk(std::uint64_t needed, std::uint64_t free, const std::filesystem::path& folder) {
@@ -192,11 +177,16 @@ class Checks {
     }
   }
 
+  /// Not judged.
+  void tell(std::string subject, std::string what) {
+    checks_.push_back({std::move(subject), {Severity::note, std::move(what), {}}, false});
+  }
   [[nodiscard]] std::vector<PlanCheck> take() { return std::move(checks_); }
 
  private:
-  void tell(std::string subject, std::string what) {
-    checks_.push_back({std::move(subject), {Severity::note, std::move(what), {}}, false});
+  void warn_if(bool is_doubtful, std::string subject, std::string what, std::string next_move) {
+    if (is_doubtful) return add(Severity::warning, std::move(subject), std::move(what), std::move(next_move));
+    add(Severity::note, std::move(subject), std::move(what));
   }
   void add(Severity severity, std::string subject, std::string what, std::string next_move = {}) {
     checks_.push_back({std::move(subject), {severity, std::move(what), std::move(next_move)}, true});
@@ -247,11 +237,8 @@ const char* mark_of(const PlanCheck& check) {
 
 std::string checks_text(const std::vector<PlanCheck>& checks) {
   std::string text;
-  for (const PlanCheck& check : checks) {
-    const Finding& finding = check.finding;
-    text += fmt::format("  {:11}  {:<15}  {}{}{}\n", mark_of(check), check.subject, finding.what,
-                        finding.next_move.empty() ? "" : "; ", finding.next_move);
-  }
+  for (const PlanCheck& check : checks)
+    text += fmt::format("  {:11}  {:<15}  {}\n", mark_of(check), check.subject, check.finding.words());
   return text;
 }
 
@@ -281,9 +268,9 @@ std::optional<ThrustPrior> thrust_prior(const profiles::Propeller& propeller) {
   return std::nullopt;
 }
 
-bool DryRun::ok() const {
-  return std::none_of(checks.begin(), checks.end(),
-                      [](const PlanCheck& check) { return check.finding.severity == Severity::fault; });
+std::ptrdiff_t DryRun::refused() const {
+  return std::count_if(checks.begin(), checks.end(),
+                       [](const PlanCheck& check) { return check.finding.severity == Severity::fault; });
 }
 
 std::uint64_t bytes_needed(const profiles::Plan& plan, const profiles::BenchConfig& config) {
@@ -301,7 +288,8 @@ DryRun dry_run(const Campaign& campaign, const profiles::BenchConfig& config, co
   Checks checks(campaign, config);
   checks.speed();
   checks.thrust();
-  checks.range();
+  checks.tell("load cell range",
+              "read from the box: `kphi devices --bench BENCH --campaign CAMPAIGN`, or when the run starts");
   checks.sampling();
   checks.window();
   checks.supply();
@@ -331,8 +319,6 @@ std::string plan_text(const Campaign& campaign, const profiles::BenchConfig& con
 }
 
 std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles::BenchConfig& config) {
-  const auto refused = std::count_if(dry.checks.begin(), dry.checks.end(),
-                                     [](const PlanCheck& c) { return c.finding.severity == Severity::fault; });
   const double slew_s = ramp_time(campaign.profile, dry.plan.runs.front()).value();
   return fmt::format(
       "{}\n\norder: {}\n{}\ntime: {} spinning{}, {} on the bench with the zeros; plus mounting (waits for you), "
@@ -343,27 +329,16 @@ std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles:
       slew_s > 0 ? fmt::format(" ({} of ramps in the first run)", minutes(slew_s)) : "",
       minutes(dry.plan.bench.value()), campaign.limits.cooling ? ", pauses for cooling (of unknown length)" : "",
       campaign.repetitions_extra_max == 1 ? "1 run" : fmt::format("{} runs", campaign.repetitions_extra_max),
-      refused == 0 ? "nothing refused" : fmt::format("{} refused", refused), checks_text(dry.checks),
+      dry.ok() ? "nothing refused" : fmt::format("{} refused", dry.refused()), checks_text(dry.checks),
       fmt::join(to_lines(dry.limits), "\n  "));
 }
 
 json to_json(const DryRun& dry, const Campaign& campaign, const profiles::BenchConfig& config) {
-  json runs = json::array(), checks = json::array(), limits = json::array();
+  json runs = json::array(), checks = json::array();
   for (const auto& run : dry.plan.runs) runs.push_back(to_json(run, campaign));
-  for (const auto& [subject, finding, judged] : dry.checks) {
-    checks.push_back({{"subject", subject},
-                      {"judged", judged},
-                      {"severity", name_of(finding.severity)},
-                      {"what", finding.what},
-                      {"next_move", finding.next_move}});
-  }
-  for (const GuardLimit& limit : dry.limits) {
-    limits.push_back({{"key", row_of(limit.watched).key},
-                      {"name", limit.name},
-                      {"unit", limit.unit},
-                      {"limit", limit.value},
-                      {"lower", limit.lower},
-                      {"source", limit.source}});
+  for (const PlanCheck& check : dry.checks) {
+    checks.push_back(check.finding);
+    checks.back().update({{"subject", check.subject}, {"judged", check.judged}});
   }
   const profiles::Plan& plan = dry.plan;
   return {{"campaign", campaign.name},
@@ -380,7 +355,7 @@ json to_json(const DryRun& dry, const Campaign& campaign, const profiles::BenchC
           {"bytes_free", dry.bytes_free},
           {"order", runs},
           {"checks", checks},
-          {"guard_limits", limits},
+          {"guard_limits", dry.limits},
           {"ok", dry.ok()}};
 }
 

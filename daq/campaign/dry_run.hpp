@@ -44,7 +44,8 @@ struct DryRun {
   std::vector<GuardLimit> limits;  ///< the guard's, without those of the devices
   std::uint64_t bytes_needed = 0;
   std::uint64_t bytes_free = 0;
-  [[nodiscard]] bool ok() const;
+  [[nodiscard]] std::ptrdiff_t refused() const;  ///< faults
+  [[nodiscard]] bool ok() const { return refused() == 0; }
 };
 
 /// Bytes on disk that the runs of a plan take, with a margin.

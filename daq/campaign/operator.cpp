@@ -15,8 +15,6 @@ namespace {
 
 constexpr int kPollMs = 20;
 
-bool is_angle(const std::string& text, double expected_deg) { return parse_double(text) == expected_deg; }
-
 [[noreturn]] void refuse(const profiles::Answers& answers, const profiles::Mark& mark, const std::string& what) {
   throw ConfigurationError(answers.place(mark) + ": " + what);
 }
@@ -40,12 +38,17 @@ std::optional<std::string> TerminalOperator::read_line() {
   }
 }
 
-std::string TerminalOperator::answer_to(const std::string& about, const std::string& question) {
-  put(words_, (about.empty() ? "" : fmt::format("\n{}\n", about)) + question + " ");
-  asked(about.empty() ? question : about + " " + question);
-  const std::optional<std::string> answer = read_line();
-  answered(answer.value_or("(no more input)"));
-  return answer.value_or("q");
+void TerminalOperator::ask(std::string about, const std::string& question, const std::string& retort,
+                           const std::function<bool(const std::string& answer)>& accept) {
+  for (;; about.clear()) {
+    put(words_, (about.empty() ? "" : fmt::format("\n{}\n", about)) + question + " ");
+    asked(about.empty() ? question : about + " " + question);
+    const std::optional<std::string> line = read_line();
+    answered(line.value_or("(no more input)"));
+    const std::string answer = line.value_or("q");
+    if (accept(answer)) return;
+    put(words_, fmt::format(fmt::runtime(retort), answer));
+  }
 }
 
 void Operator::clear_safety_stop(const std::string& reason) {
@@ -60,41 +63,36 @@ void AutoConfirmOperator::clear_safety_stop(const std::string& reason) {
 }
 
 void TerminalOperator::clear_safety_stop(const std::string& reason) {
-  std::string about = fmt::format("A safety stop ended this campaign: {}.\nLook at the stand.", reason);
-  for (;; about.clear()) {
-    const std::string answer = answer_to(about, "Type continue and press Enter, or q to stop:");
-    if (answer == "continue") return;
-    if (answer == "q") throw NotMounted("not continued after the safety stop");
-    put(words_, fmt::format("You typed \"{}\".\n", answer));
-  }
+  ask(fmt::format("A safety stop ended this campaign: {}.\nLook at the stand.", reason),
+      "Type continue and press Enter, or q to stop:", "You typed \"{}\".\n", [](const std::string& answer) {
+        if (answer == "q") throw NotMounted("not continued after the safety stop");
+        return answer == "continue";
+      });
 }
 
 void TerminalOperator::mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string& condition) {
   const std::string what =
       occlusion_deg == 0 ? std::string("no occlusion") : fmt::format("the {:g}° occlusion", occlusion_deg);
-  std::string about = fmt::format("{}{}Mount {} under propeller {} ({}). Step back.", condition,
-                                  condition.empty() ? "" : "\n", what, propeller.id, propeller.name);
-  for (;; about.clear()) {
-    const std::string answer = answer_to(
-        about, fmt::format("Type the mounted angle in degrees ({:g}) and press Enter, or q to stop:", occlusion_deg));
-    if (is_angle(answer, occlusion_deg)) return;
-    if (answer == "q") throw NotMounted(fmt::format("mounting of {:g}° not confirmed", occlusion_deg));
-    put(words_, fmt::format("You typed \"{}\"; this run needs {:g} degrees.\n", answer, occlusion_deg));
-  }
+  ask(fmt::format("{}{}Mount {} under propeller {} ({}). Step back.", condition, condition.empty() ? "" : "\n", what,
+                  propeller.id, propeller.name),
+      fmt::format("Type the mounted angle in degrees ({:g}) and press Enter, or q to stop:", occlusion_deg),
+      fmt::format("You typed \"{{}}\"; this run needs {:g} degrees.\n", occlusion_deg), [&](const std::string& answer) {
+        if (answer == "q") throw NotMounted(fmt::format("mounting of {:g}° not confirmed", occlusion_deg));
+        return parse_double(answer) == occlusion_deg;
+      });
 }
 
 bool TerminalOperator::run_again(const AnotherRun& question) {
-  std::string about =
-      fmt::format("{:g}°: {}. All runs are kept, whatever you answer.", question.occlusion_deg, question.reason);
-  for (;; about.clear()) {
-    const std::string answer =
-        answer_to(about, fmt::format("Run {:g}° again (extra run {} of {})? [Y/n, q to stop]", question.occlusion_deg,
-                                     question.extra, question.extra_max));
-    if (answer.empty() || answer == "y" || answer == "yes") return true;
-    if (answer == "n" || answer == "no") return false;
-    if (answer == "q") throw Interrupted("stopped at the question for another run");
-    put(words_, fmt::format("You typed \"{}\"; type y, n or q.\n", answer));
-  }
+  bool yes = false;
+  ask(fmt::format("{:g}°: {}. All runs are kept, whatever you answer.", question.occlusion_deg, question.reason),
+      fmt::format("Run {:g}° again (extra run {} of {})? [Y/n, q to stop]", question.occlusion_deg, question.extra,
+                  question.extra_max),
+      "You typed \"{}\"; type y, n or q.\n", [&](const std::string& answer) {
+        if (answer == "q") throw Interrupted("stopped at the question for another run");
+        yes = answer.empty() || answer == "y" || answer == "yes";
+        return yes || answer == "n" || answer == "no";
+      });
+  return yes;
 }
 
 void AnsweringOperator::clear_safety_stop(const std::string& reason) {

@@ -104,8 +104,10 @@ class TerminalOperator final : public Operator {
   void mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string& condition) override;
 
  private:
-  /// `about` explains the question and is printed first; empty when it is asked again.
-  std::string answer_to(const std::string& about, const std::string& question);
+  /// Asks until `accept` takes the answer; "q" at the end of the input. `about` explains the question and is printed
+  /// the first time, `retort` ("You typed "{}"…") before it is asked again.
+  void ask(std::string about, const std::string& question, const std::string& retort,
+           const std::function<bool(const std::string& answer)>& accept);
   /// nullopt at end of file.
   std::optional<std::string> read_line();
   int input_;

@@ -58,7 +58,7 @@ Guard::Guard(Bench& bench, const profiles::BenchConfig& config, const results::L
       table_(limits),
       observer_(mounting_of(config), scale,
                 SpeedWatch(config.iq.spin, bench.clock().stretched(host_delay(config)), speed_share(limits)),
-                [this](Watched watched, double value, results::Nanoseconds at) { hold(watched, value, at); }),
+                [this](Watched watched, double value) { hold(watched, value); }),
       status_watch_(bench.load_cell().configuration().kind, bench.load_cell().configuration().records_per_datagram,
                     scale.sample_rate_hz),
       device_rate_hz_(scale.device_rate_hz),
@@ -95,7 +95,7 @@ void Guard::poll() noexcept {
     polled_ns_ = now.count();
   } catch (...) {
     bench_.motor().emergency_stop();  // first: there may be no memory for the message
-    trip_state(Source::guard, "the guard failed");
+    trip({"the guard failed"});
   }
 }
 
@@ -129,30 +129,11 @@ void Guard::trip(Trip trip) noexcept {
   if (bench_.supply() != nullptr) bench_.supply()->cut();
 }
 
-void Guard::trip_state(Source source, const std::string& reason, Instant sample) noexcept {
-  Trip state;
-  state.reason = reason;
-  state.source = source;
-  state.sample = sample;
-  trip(std::move(state));
-}
-
-Trip Guard::of_speed(const SpeedError& error, Instant sample) const {
-  Trip strays;
-  strays.reason = to_words(error);
-  strays.source = Source::motor;
-  strays.watched = Watched::speed_error;
-  strays.value = 100 * std::abs((error.measured - error.commanded) / error.commanded);
-  if (const GuardLimit* limit = limit_of(Watched::speed_error)) strays.limit = *limit;
-  strays.sample = sample;
-  return strays;
-}
-
 /// Written so that NaN trips: a value that cannot be compared is no proof of safety.
-void Guard::hold(Watched watched, double value, results::Nanoseconds at) {
+void Guard::hold(Watched watched, double value) {
   const GuardLimit* limit = limit_of(watched);
   if (limit == nullptr || (limit->lower ? value >= limit->value : value <= limit->value)) return;
-  trip(passed(*limit, value, Instant(at)));
+  trip(passed(*limit, value));
 }
 
 void Guard::take_marks() {
@@ -173,34 +154,28 @@ void Guard::judge_status(const results::LoadCellRecord& sample) {
   const StatusWatch::State state = status_watch_.take(sample);
   if (auto event = status_watch_.take_event()) pending_events_.push_back(std::move(*event));
   const bool untrusted = state == StatusWatch::State::untrusted || (state == StatusWatch::State::lasting && spinning_);
-  if (untrusted && latch_.trip() == nullptr)
-    trip_state(Source::load_cell, status_watch_.reason(), Instant(sample.arrival_ns));
+  if (untrusted && latch_.trip() == nullptr) trip({status_watch_.reason(), Source::load_cell});
 }
 
 void Guard::judge(const results::MotorReading& reading) {
   using results::MotorChannel;
-  const Instant at(reading.time_ns);
-  motor_stream_.newest = at;
+  motor_stream_.newest = Instant(reading.time_ns);
   observer_.take(reading);
   if (reading.channel == MotorChannel::fault_now && reading.value != 0)
-    trip_state(Source::motor,
-               fmt::format("motor: the module reports a fault (power_safety.fault_now 0x{:02X})",
-                           static_cast<unsigned>(reading.value)),
-               at);
+    trip({fmt::format("motor: the module reports a fault (power_safety.fault_now 0x{:02X})",
+                      static_cast<unsigned>(reading.value)),
+          Source::motor});
   if (reading.channel == MotorChannel::derate && !(reading.value >= kNoDerate))
-    trip_state(Source::motor, fmt::format("motor: the module derates to {:.0f} % of its drive", 100 * reading.value),
-               at);
+    trip({fmt::format("motor: the module derates to {:.0f} % of its drive", 100 * reading.value), Source::motor});
   // Last: fault and derating are why the rotor does not follow.
-  if (observer_.speed_error().kind != SpeedError::Kind::none) trip(of_speed(observer_.speed_error(), at));
+  if (const SpeedError& error = observer_.speed_error(); error.kind != SpeedError::Kind::none)
+    trip({to_words(error), Source::motor, Watched::speed_error});
 }
 
 void Guard::judge(const results::SupplyReading& reading) {
   supply_stream_.newest = Instant(reading.time_ns);
   if (!supply_) return;
-  if (auto trouble = daq::check(reading, *supply_, reading.time_ns >= settled_from_)) {
-    trouble->sample = Instant(reading.time_ns);
-    trip(std::move(*trouble));
-  }
+  if (auto trouble = daq::check(reading, *supply_, reading.time_ns >= settled_from_)) trip(std::move(*trouble));
   observer_.take(reading);
 }
 
@@ -214,17 +189,12 @@ void Guard::judge_gap(const results::LoadCellRecord& sample) {
   if (missing_s <= patience->value) return;
   const GuardLimit limit{Watched::samples_missing, "gap in the load cell's samples", patience->value, "s",
                          patience->source};
-  trip(passed(limit, missing_s, Instant(sample.arrival_ns)));
+  trip(passed(limit, missing_s));
 }
 
 void Guard::judge_links() {
   const auto judge = [this](Source source, const std::string& failure) {
-    if (failure.empty()) return;
-    Trip failed;
-    failed.reason = failure;
-    failed.source = source;
-    failed.link_failed = true;
-    trip(std::move(failed));
+    if (!failure.empty()) trip({failure, source, Watched::state, true});
   };
   judge(Source::motor, bench_.motor().failure());
   judge(Source::load_cell, bench_.load_cell().failure());
@@ -244,16 +214,15 @@ void Guard::judge_silence(Stream& stream, Instant now, bool spinning) {
     return;
   }
   stream.stale_since = std::min(stream.stale_since, now);
-  if (now - stream.stale_since >= clock.stretched(kSecondCheckWall)) trip(passed(*stream.limit, age, stream.newest));
+  if (now - stream.stale_since >= clock.stretched(kSecondCheckWall)) trip(passed(*stream.limit, age));
 }
 
 void Guard::judge_pause(Instant now) {
   const GuardLimit* limit = limit_of(Watched::pause);
   if (!spinning_ || limit == nullptr) return;
-  const Instant beat(beat_ns_);
-  const double pause = wall_seconds_since(beat.count(), now);
+  const double pause = wall_seconds_since(beat_ns_, now);
   if (pause <= limit->value) return;
-  Trip found = passed(*limit, pause, beat);
+  Trip found = passed(*limit, pause);
   const double unwatched = wall_seconds_since(polled_ns_, now);
   if (unwatched > limit->value) {
     found.source = Source::computer;
@@ -277,7 +246,7 @@ void Guard::check(bool spinning) {
   judge_pause(now);
   const double unwatched = wall_seconds_since(polled_ns_, now);
   if (const GuardLimit* limit = limit_of(Watched::pause); spinning && limit != nullptr && unwatched > limit->value)
-    trip_state(Source::guard, fmt::format("the guard was blocked for {:.2g} s while the motor was turning", unwatched));
+    trip({fmt::format("the guard was blocked for {:.2g} s while the motor was turning", unwatched)});
   pause_s_ = spinning ? wall_seconds_since(beat_ns_, now) : kUnknown;
   beat_ns_ = now.count();
   spinning_ = spinning;

@@ -2,7 +2,7 @@
 //
 // Every sample and reading passes through it before it is recorded: neither a runner that hangs nor a disk that does
 // not answer keeps it from seeing one. What it judges:
-//   load cell   every sample against the ranges, 5 ms means of thrust and shaft torque (load_watch.hpp tells why);
+//   load cell   every sample against the ranges, 5 ms means of thrust and shaft torque (see LoadWatch);
 //               the box's status word (status_watch.hpp), also at rest: zeros are taken then
 //   motor       every reading by itself: a checksum protects it, and the module has filtered it
 //   supply      every reading: its state, its settings, its meters
@@ -81,9 +81,7 @@ class Guard final : public Streams {
     return limits_[static_cast<std::size_t>(watched)];
   }
   void trip(Trip trip) noexcept;
-  void trip_state(Source source, const std::string& reason, Instant sample = Instant(0)) noexcept;
-  [[nodiscard]] Trip of_speed(const SpeedError& error, Instant sample) const;
-  void hold(Watched watched, double value, results::Nanoseconds at);
+  void hold(Watched watched, double value);
   void take_marks();
   void judge(const results::LoadCellRecord& sample);
   void judge(const results::MotorReading& reading);

@@ -157,6 +157,17 @@ struct GuardLimit {
   friend bool operator==(const GuardLimit&, const GuardLimit&) = default;
 };
 
+/// For nlohmann::json.
+template <class Json>
+void to_json(Json& json, const GuardLimit& limit) {
+  json = {{"key", row_of(limit.watched).key},
+          {"name", limit.name},
+          {"unit", limit.unit},
+          {"limit", limit.value},
+          {"lower", limit.lower},
+          {"source", limit.source}};
+}
+
 /// Limits that the devices reported when they were connected.
 struct DeviceLimits {
   std::array<double, 6> load_cell_range{};  ///< N and N m; 0: unknown

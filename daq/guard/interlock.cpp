@@ -22,30 +22,18 @@ std::string words(const GuardLimit& limit, double value) {
 
 constexpr double kSetting = 0.011;  // V and A: the coarsest step of a supply, and rounding
 
-Trip supply_trip(std::string reason) {
-  Trip trip;
-  trip.reason = "supply: " + std::move(reason);
-  trip.source = Source::supply;
-  return trip;
-}
-
 std::optional<Trip> moved(const char* what, double now, double wanted, const char* unit) {
   if (std::abs(now - wanted) <= kSetting) return std::nullopt;
-  return supply_trip(
-      fmt::format("{} is {:g} {}, kphi set {:g} {}: changed on the front panel", what, now, unit, wanted, unit));
+  return Trip{
+      fmt::format("supply: {} is {:g} {}, kphi set {:g} {}: changed on the front panel", what, now, unit, wanted, unit),
+      Source::supply};
 }
 
 }  // namespace
 
-Trip passed(const GuardLimit& limit, double value, Instant sample) {
-  Trip trip;
-  trip.watched = limit.watched;
-  trip.source = limit.watched < Watched::samples_missing ? row_of(limit.watched).source : Source::load_cell;
-  trip.reason = words(limit, value);
-  trip.value = value;
-  trip.limit = limit;
-  trip.sample = sample;
-  return trip;
+Trip passed(const GuardLimit& limit, double value) {
+  const bool has_row = limit.watched < Watched::samples_missing;
+  return {words(limit, value), has_row ? row_of(limit.watched).source : Source::load_cell, limit.watched};
 }
 
 std::string next_move(const Trip& trip) {
@@ -80,12 +68,8 @@ void Latch::check() const {
 }
 
 Trip slept(const Clock& clock) {
-  Trip trip;
-  trip.watched = Watched::sleep;
-  trip.source = Source::computer;
-  trip.value = to_seconds(clock.suspended());
-  trip.reason = fmt::format("this computer slept for {:.2g} s", trip.value);
-  return trip;
+  return {fmt::format("this computer slept for {:.2g} s", to_seconds(clock.suspended())), Source::computer,
+          Watched::sleep};
 }
 
 void require_awake(const Clock& clock) {
@@ -98,27 +82,23 @@ std::string tripped_words(const results::SupplyReading& seen) {
 
 std::optional<Trip> check(const results::SupplyReading& seen, const profiles::SupplyConfig& wanted, bool settled) {
   const double volts = wanted.voltage.value();
+  const auto trouble = [](const std::string& what) { return Trip{"supply: " + what, Source::supply}; };
   const bool limits = seen.regulation == results::SupplyRegulation::constant_current;
-  if (seen.protection != results::SupplyProtection::none) {
-    Trip trip = supply_trip("");
-    trip.reason = tripped_words(seen);
-    trip.protection = seen.protection;
-    return trip;
-  }
-  if (seen.output == 0) return supply_trip("output is off");
+  if (seen.protection != results::SupplyProtection::none)
+    return Trip{tripped_words(seen), Source::supply, Watched::state, false, seen.protection};
+  if (seen.output == 0) return trouble("output is off");
   if (limits && settled)
-    return supply_trip(fmt::format("current limit reached: {:.3g} A at {:.4g} V", seen.current_a, seen.voltage_v));
+    return trouble(fmt::format("current limit reached: {:.3g} A at {:.4g} V", seen.current_a, seen.voltage_v));
   if (auto trip = moved("set voltage", seen.set_voltage_v, volts, "V")) return trip;
   if (auto trip = moved("current limit", seen.current_limit_a, wanted.current_limit.value(), "A")) return trip;
   if (!settled) return std::nullopt;
   // Written so that NaN trips.
   if (!(seen.voltage_v >= (1 - results::kSupplySag) * volts))
-    return supply_trip(fmt::format("{:.4g} V at the terminals, more than {:g} % below the {:g} V set", seen.voltage_v,
-                                   100 * results::kSupplySag, volts));
+    return trouble(fmt::format("{:.4g} V at the terminals, more than {:g} % below the {:g} V set", seen.voltage_v,
+                               100 * results::kSupplySag, volts));
   if (seen.voltage_v > (1 + results::kSupplyRise) * volts)
-    return supply_trip(
-        fmt::format("{:.4g} V at the terminals, more than {:g} % above the {:g} V set: the motor feeds back",
-                    seen.voltage_v, 100 * results::kSupplyRise, volts));
+    return trouble(fmt::format("{:.4g} V at the terminals, more than {:g} % above the {:g} V set: the motor feeds back",
+                               seen.voltage_v, 100 * results::kSupplyRise, volts));
   return std::nullopt;
 }
 

@@ -18,20 +18,17 @@ namespace kphi::daq {
 
 /// Why the motor was coasted.
 struct Trip {
-  std::string reason;                ///< one line: "thrust 21.3 N is above 20 N (campaign limits.thrust_max_n)"
+  std::string reason{};              ///< one line: "thrust 21.3 N is above 20 N (campaign limits.thrust_max_n)"
   Source source = Source::guard;     ///< what reported it, or failed
   Watched watched = Watched::state;  ///< state: no limit; a device reported trouble
   bool link_failed = false;          ///< no reading, but the link to the source reported it
   results::SupplyProtection protection = results::SupplyProtection::none;  ///< that switched the supply's output off
-  double value = 0;                                                        ///< unit of the limit
-  GuardLimit limit{};                                                      ///< the limit that was passed
-  Instant sample{0};   ///< bench time of the sample or reading; after a silence, of the last one
-  Instant noticed{0};  ///< bench time
-  int step = -1;       ///< 0-based, -1 outside steps
+  Instant noticed{0};                                                      ///< bench time
+  int step = -1;                                                           ///< 0-based, -1 outside steps
 };
 
 /// `value` has passed `limit`.
-[[nodiscard]] Trip passed(const GuardLimit& limit, double value, Instant sample);
+[[nodiscard]] Trip passed(const GuardLimit& limit, double value);
 
 /// Holds the first trip. Thread-safe, without waiting.
 class Latch {

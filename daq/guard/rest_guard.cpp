@@ -53,7 +53,7 @@ void RestGuard::poll() noexcept {
     take_supply();
   } catch (...) {
     bench_.motor().emergency_stop();
-    trip_state(Source::guard, "the guard failed");
+    trip({"the guard failed"});
   }
 }
 
@@ -71,12 +71,12 @@ void RestGuard::judge(const results::MotorReading& reading) {
     speed_at_ns_ = reading.time_ns;
     // Written so that NaN trips.
     if (resting_ && !(speed_rad_s_ < kStandstill.value()))
-      trip_state(Source::motor, fmt::format("motor: turning at {:.0f} RPM while somebody may be near",
-                                            to_rpm(RadPerSec(speed_rad_s_))));
+      trip({fmt::format("motor: turning at {:.0f} RPM while somebody may be near", to_rpm(RadPerSec(speed_rad_s_))),
+            Source::motor});
   }
   if (resting_ && reading.channel == results::MotorChannel::drive_mode &&
       reading.value != static_cast<double>(iq::DriveMode::coast))
-    trip_state(Source::motor, "motor: its module does not coast while somebody may be near");
+    trip({"motor: its module does not coast while somebody may be near", Source::motor});
 }
 
 void RestGuard::take_supply() {
@@ -86,16 +86,9 @@ void RestGuard::take_supply() {
     for (std::size_t i = 0; i < n; ++i) {
       const bool late = Instant(readings[i].time_ns) >= begun_;
       if (!motor_has_power_ && late && readings[i].output != 0)
-        trip_state(Source::supply, "supply: output is on while somebody may be near");
+        trip({"supply: output is on while somebody may be near", Source::supply});
     }
   }
-}
-
-void RestGuard::trip_state(Source source, const std::string& reason) noexcept {
-  Trip found;
-  found.reason = reason;
-  found.source = source;
-  trip(std::move(found));
 }
 
 void RestGuard::trip(Trip found) noexcept {

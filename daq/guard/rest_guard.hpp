@@ -39,7 +39,6 @@ class RestGuard {
   void judge(const results::MotorReading& reading);
   void take_supply();
   void trip(Trip found) noexcept;
-  void trip_state(Source source, const std::string& reason) noexcept;
 
   Bench& bench_;
   const bool motor_has_power_;
@@ -48,7 +47,7 @@ class RestGuard {
   std::atomic<bool> resting_{false};       ///< a turning rotor is a trip from now on
   std::atomic<double> speed_rad_s_{0};     ///< unsigned
   std::atomic<std::int64_t> speed_at_ns_;  ///< bench time of that speed
-  std::unique_ptr<Background> polling_;    ///< last member: destroyed first
+  std::shared_ptr<void> polling_;          ///< last member: destroyed first
 };
 
 }  // namespace kphi::daq

@@ -12,10 +12,7 @@ namespace {
 using netbox::StatusVerdict;
 using results::EventKind;
 
-constexpr std::uint32_t kOfSession = 1u << static_cast<unsigned>(netbox::StatusBit::error_summary) |
-                                     1u << static_cast<unsigned>(netbox::StatusBit::monitor_condition) |
-                                     1u << static_cast<unsigned>(netbox::StatusBit::rdt) |
-                                     1u << static_cast<unsigned>(netbox::StatusBit::network);
+constexpr std::uint32_t kOfSession = netbox::kErrorSummary | netbox::kMonitorCondition | netbox::kStreamTrouble;
 
 bool is_reported_elsewhere(StatusVerdict verdict, std::uint32_t status) {
   return verdict == StatusVerdict::saturated ||

@@ -9,7 +9,7 @@
 #include <system_error>
 
 #include "base/error.hpp"
-#include "drivers/serial/discovery.hpp"
+#include "drivers/serial/port.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -87,8 +87,10 @@ std::vector<std::string> lock_names(const profiles::BenchConfig& config) {
   return names;
 }
 
-DeviceLocks::DeviceLocks(const std::vector<std::string>& names) {
-  for (const std::string& name : names) locks_.push_back(take(name));
+std::vector<results::FileLock> lock_devices(const std::vector<std::string>& names) {
+  std::vector<results::FileLock> locks;
+  for (const std::string& name : names) locks.push_back(take(name));
+  return locks;
 }
 
 results::FileLock lock_folder(const results::CampaignFolder& folder) {

@@ -15,15 +15,9 @@ namespace kphi::daq {
 /// /dev/ttyUSB0", "supply 10.0.0.5:502". Empty for a bench inside the process.
 [[nodiscard]] std::vector<std::string> lock_names(const profiles::BenchConfig& config);
 
-/// Locks of a bench's devices, held while this lives.
-class DeviceLocks {
- public:
-  /// Throws DeviceError with the program that uses one of them, and the next move.
-  explicit DeviceLocks(const std::vector<std::string>& names);
-
- private:
-  std::vector<results::FileLock> locks_;
-};
+/// Locks a bench's devices, while the result lives. Throws DeviceError with the program that uses one of them, and the
+/// next move.
+[[nodiscard]] std::vector<results::FileLock> lock_devices(const std::vector<std::string>& names);
 
 /// Locks a campaign's folder. Throws ConfigurationError with the program that uses it.
 [[nodiscard]] results::FileLock lock_folder(const results::CampaignFolder& folder);

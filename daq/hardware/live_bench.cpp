@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -71,25 +70,6 @@ std::string page_of(const profiles::NetBoxConfig& config, const std::string& tar
 void require_no_stop(const std::function<bool()>& stop_asked) {
   if (stop_asked()) throw Interrupted("stopped by request before anything was switched on");
 }
-
-class Thread final : public Background {
- public:
-  explicit Thread(std::function<void()> work)
-      : thread_([this, work = std::move(work)] {
-          while (!stop_) {
-            work();
-            std::this_thread::sleep_for(kDrainWall);
-          }
-        }) {}
-  ~Thread() override {
-    stop_ = true;
-    thread_.join();
-  }
-
- private:
-  std::atomic<bool> stop_{false};
-  std::thread thread_;
-};
 
 }  // namespace
 
@@ -274,8 +254,13 @@ void LiveBench::wait_until(Instant when) {
   if (left > Duration(0)) std::this_thread::sleep_for(left);
 }
 
-std::unique_ptr<Background> LiveBench::run_periodically(std::function<void()> work) {
-  return std::make_unique<Thread>(std::move(work));
+std::shared_ptr<void> LiveBench::run_periodically(std::function<void()> work) {
+  return std::make_shared<std::jthread>([work = std::move(work)](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      work();
+      std::this_thread::sleep_for(kDrainWall);
+    }
+  });
 }
 
 Duration LiveBench::sync_interval() const { return clock_.stretched(kSyncWall); }

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "daq/bench/air.hpp"
+#include "daq/bench/air_source.hpp"
 #include "daq/bench/bench.hpp"
 #include "daq/bench/device_records.hpp"
 #include "daq/guard/interlock.hpp"
@@ -90,7 +90,7 @@ class LiveBench final : public Bench {
   [[nodiscard]] SupplyLink* supply() override { return supply_.get(); }
   [[nodiscard]] std::optional<ambient::Density> air() const override { return air_.density(); }
   void wait_until(Instant when) override;
-  [[nodiscard]] std::unique_ptr<Background> run_periodically(std::function<void()> work) override;
+  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()> work) override;
   [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
   [[nodiscard]] Duration sync_interval() const override;
   void mounted(const std::string& propeller_id, double occlusion_deg) override;

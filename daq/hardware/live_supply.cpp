@@ -29,10 +29,6 @@ std::unique_ptr<supply::Supply> open_supply(const profiles::SupplyConfig& config
   }
 }
 
-supply::Limits limits_of(const profiles::SupplyConfig& config) {
-  return {config.voltage, config.current_limit, config.over_voltage, config.over_current};
-}
-
 results::SupplyReading to_reading(const supply::Reading& reading) {
   // The drivers' enums have the codes of the file: see the assertions.
   static_assert(static_cast<int>(supply::Protection::unknown) == static_cast<int>(results::SupplyProtection::unknown));
@@ -62,7 +58,7 @@ std::string LiveSupply::identity() const { return summary(worker_.identity()); }
 
 void LiveSupply::switch_on() {
   try {
-    worker_.apply(limits_of(config_));
+    worker_.apply({config_.voltage, config_.current_limit, config_.over_voltage, config_.over_current});
   } catch (const std::invalid_argument& error) {
     throw ConfigurationError(std::string("supply: ") + error.what());
   }

@@ -30,7 +30,6 @@ class LiveSupply final : public SupplyLink {
 
 /// Over Modbus or SCPI, as its URI says. Throws ConfigurationError, DeviceError.
 [[nodiscard]] std::unique_ptr<supply::Supply> open_supply(const profiles::SupplyConfig& config, const Clock& clock);
-[[nodiscard]] supply::Limits limits_of(const profiles::SupplyConfig& config);
 [[nodiscard]] results::SupplyReading to_reading(const supply::Reading& reading);
 /// "RD6018, serial 4711, firmware 1.28".
 [[nodiscard]] std::string summary(const supply::Identity& identity);

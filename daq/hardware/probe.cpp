@@ -6,9 +6,9 @@
 #include <stdexcept>
 
 #include "base/error.hpp"
-#include "daq/bench/air.hpp"
+#include "daq/bench/air_source.hpp"
 #include "daq/hardware/live_supply.hpp"
-#include "drivers/ambient/source.hpp"
+#include "drivers/ambient/bme280.hpp"
 #include "drivers/scpi/scpi_supply.hpp"
 #include "drivers/usb/bus.hpp"
 
@@ -18,31 +18,35 @@ namespace {
 constexpr const char* kSensorRemedy = "check its plug and the four wires to the sensor, or write `ambient: unknown`";
 
 /// An exception becomes a finding.
-template <class Work>
-UsbProbe probed(std::string device, Work&& work) {
-  UsbProbe probe;
-  probe.device = std::move(device);
+template <class Ask>
+DeviceAnswer answer_of(const std::string& device, Ask&& ask) {
+  DeviceAnswer answer{device};
+  std::vector<Finding> findings;
+  std::string words;
   try {
-    probe.words = work();
-    probe.answers = true;
+    words = ask();
+    answer.answers = true;
+    answer.lines.push_back(words);
   } catch (const DeviceError& error) {
-    probe.findings.push_back({Severity::fault, error.what(), ""});
+    findings.push_back({Severity::fault, error.what(), ""});
   } catch (const std::invalid_argument& error) {
-    probe.findings.push_back({Severity::fault, error.what(), kSensorRemedy});
+    findings.push_back({Severity::fault, error.what(), kSensorRemedy});
   }
-  return probe;
+  answer.details["words"] = words;
+  answer.add(findings);
+  return answer;
 }
 
 std::string air_of(const std::string& address) {
-  const auto sensor = ambient::open(ambient::source_of(address));
+  const auto sensor = ambient::open(ambient::sensor_address(address));
   const ambient::Air air = sensor->read();
   return fmt::format("{}: {:.2f} °C, {:.1f} hPa, {:.1f} % humidity: {}", sensor->identity(), air.temperature_c,
                      air.pressure_pa / 100, 100 * air.relative_humidity, words_of(ambient::density_of(air)));
 }
 
-UsbProbe probe_instrument(const std::string& address) {
+DeviceAnswer ask_instrument(const std::string& address) {
   const std::string uri = "scpi-" + address;
-  return probed("SCPI " + uri, [&] { return scpi::open_line(uri)->query("*IDN?"); });
+  return answer_of("SCPI " + uri, [&] { return scpi::open_line(uri)->query("*IDN?"); });
 }
 
 /// As it must be written to mean this one.
@@ -55,8 +59,7 @@ std::string address_of(const usb::Listing& found, const std::vector<usb::Listing
 
 bool is_bridge(const usb::Listing& found) { return found.vendor == 0x04d8 && found.product == 0x00dd; }
 
-}  // namespace
-
+/// Checks a reading against the bench file.
 std::vector<Finding> findings_of(const supply::Identity& identity, const supply::Reading& reading,
                                  const profiles::SupplyConfig& wanted) {
   std::vector<Finding> findings;
@@ -80,60 +83,62 @@ std::vector<Finding> findings_of(const supply::Identity& identity, const supply:
   return findings;
 }
 
-SupplyProbe probe_supply(const profiles::SupplyConfig& config, const Clock& clock) {
-  SupplyProbe probe;
+}  // namespace
+
+void DeviceAnswer::add(const std::vector<Finding>& findings) {
+  for (const Finding& finding : findings) lines.push_back(finding.line());
+  details["findings"] = findings;
+}
+
+DeviceAnswer ask_supply(const profiles::SupplyConfig& config, const Clock& clock) {
+  DeviceAnswer answer{"supply " + config.uri};
+  std::vector<Finding> findings;
   try {
     const auto supply = open_supply(config, clock);
-    probe.identity = supply->identity();
-    probe.reading = supply->read();
-    probe.findings = findings_of(*probe.identity, *probe.reading, config);
+    const supply::Identity& identity = supply->identity();
+    answer.answers = true;
+    answer.lines = {summary(identity)};
+    answer.details = {{"model", identity.model}, {"serial", identity.serial}, {"firmware", identity.firmware}};
+    const supply::Reading seen = supply->read();
+    answer.lines.push_back(fmt::format("set to {:g} V, limit {:g} A; measures {:.4g} V, {:.3g} A, {:.3g} W; output {}",
+                                       seen.set_voltage_v, seen.current_limit_a, seen.voltage_v, seen.current_a,
+                                       seen.power_w(), seen.output ? "on" : "off"));
+    answer.details.update({{"voltage_v", seen.voltage_v},
+                           {"current_a", seen.current_a},
+                           {"set_voltage_v", seen.set_voltage_v},
+                           {"current_limit_a", seen.current_limit_a},
+                           {"output", seen.output}});
+    findings = findings_of(identity, seen, config);
   } catch (const DeviceError& error) {
-    probe.findings.push_back({Severity::fault, error.what(), ""});
+    findings.push_back({Severity::fault, error.what(), ""});
   }
-  return probe;
+  answer.add(findings);
+  return answer;
 }
 
-std::vector<std::string> SupplyProbe::lines() const {
-  std::vector<std::string> lines;
-  if (identity) lines.push_back(summary(*identity));
-  if (reading) {
-    lines.push_back(fmt::format("set to {:g} V, limit {:g} A; measures {:.4g} V, {:.3g} A, {:.3g} W; output {}",
-                                reading->set_voltage_v, reading->current_limit_a, reading->voltage_v,
-                                reading->current_a, reading->power_w(), reading->output ? "on" : "off"));
-  }
-  for (const Finding& finding : findings) lines.push_back(finding.line());
-  return lines;
+DeviceAnswer ask_sensor(const std::string& address) {
+  return answer_of("ambient " + address, [&] { return air_of(address); });
 }
 
-std::vector<std::string> UsbProbe::lines() const {
-  std::vector<std::string> all;
-  if (!words.empty()) all.push_back(words);
-  for (const Finding& finding : findings) all.push_back(finding.line());
-  return all;
-}
-
-UsbProbe probe_sensor(const std::string& address) {
-  return probed("ambient " + address, [&] { return air_of(address); });
-}
-
-std::vector<UsbProbe> probe_usb(const std::vector<std::string>& known) {
+std::vector<DeviceAnswer> ask_usb(const std::vector<DeviceAnswer>& known) {
   std::vector<usb::Listing> all;
   try {
     all = usb::Bus().list();
   } catch (const DeviceError&) {
     return {};
   }
-  std::vector<UsbProbe> probes;
+  std::vector<DeviceAnswer> answers;
   for (const usb::Listing& found : all) {
     if (!is_bridge(found) && !found.instrument) continue;
+    const std::string name = fmt::format("usb:{:04x}:{:04x}", found.vendor, found.product);
+    if (std::any_of(known.begin(), known.end(),
+                    [&](const auto& each) { return each.device.find(name) != each.device.npos; }))
+      continue;
     const std::string address = address_of(found, all);
-    const auto is_known = [&](const std::string& name) {
-      return name.find(fmt::format("usb:{:04x}:{:04x}", found.vendor, found.product)) != std::string::npos;
-    };
-    if (std::any_of(known.begin(), known.end(), is_known)) continue;
-    probes.push_back(is_bridge(found) ? probe_sensor(address) : probe_instrument(address));
+    answers.push_back(is_bridge(found) ? ask_sensor(address) : ask_instrument(address));
+    answers.back().wanted = false;
   }
-  return probes;
+  return answers;
 }
 
 }  // namespace kphi::daq

@@ -1,43 +1,33 @@
-// Probes for `kphi devices`: identity, readings, findings. They switch and set nothing.
+// What a device says when `kphi devices` asks it: identity, readings, findings. Switches and sets nothing.
 #pragma once
 
-#include <optional>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "base/finding.hpp"
-#include "drivers/supply/supply.hpp"
+#include "daq/bench/bench.hpp"
 #include "profiles/bench_config.hpp"
 
 namespace kphi::daq {
 
-struct SupplyProbe {
-  std::optional<supply::Identity> identity;  ///< nullopt: no answer
-  std::optional<supply::Reading> reading;
-  std::vector<Finding> findings;
-  [[nodiscard]] bool answers() const { return identity.has_value(); }
-  [[nodiscard]] std::vector<std::string> lines() const;
+struct DeviceAnswer {
+  std::string device;  ///< as a bench file names it: "ambient usb:04d8:00dd:0001", "SCPI scpi-usb:1ab1:0e11"
+  bool answers = false;
+  std::vector<std::string> lines{};  ///< for a person
+  nlohmann::ordered_json details{};
+  bool wanted = true;  ///< named in the bench file
+
+  void add(const std::vector<Finding>& findings);
 };
 
 /// Throws ConfigurationError for an invalid URI.
-[[nodiscard]] SupplyProbe probe_supply(const profiles::SupplyConfig& config, const Clock& clock);
-
-/// Checks a reading against the bench file.
-[[nodiscard]] std::vector<Finding> findings_of(const supply::Identity& identity, const supply::Reading& reading,
-                                               const profiles::SupplyConfig& wanted);
-
-struct UsbProbe {
-  std::string device;  ///< as a bench file names it: "ambient usb:04d8:00dd:0001", "SCPI scpi-usb:1ab1:0e11"
-  bool answers = false;
-  std::string words;  ///< identity, with the air of a sensor
-  std::vector<Finding> findings;
-  [[nodiscard]] std::vector<std::string> lines() const;
-};
+[[nodiscard]] DeviceAnswer ask_supply(const profiles::SupplyConfig& config, const Clock& clock);
 
 /// The sensor of a bench file, "usb:04d8:00dd…".
-[[nodiscard]] UsbProbe probe_sensor(const std::string& address);
+[[nodiscard]] DeviceAnswer ask_sensor(const std::string& address);
 
-/// All that are plugged in, except those of `known` device names. Never throws; empty without USB.
-[[nodiscard]] std::vector<UsbProbe> probe_usb(const std::vector<std::string>& known);
+/// All that are plugged in, except those of `known` device names; none of them is wanted. Never throws; empty without
+/// USB.
+[[nodiscard]] std::vector<DeviceAnswer> ask_usb(const std::vector<DeviceAnswer>& known);
 
 }  // namespace kphi::daq

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <systemd/sd-bus.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -109,7 +108,7 @@ SleepInhibitor::SleepInhibitor() noexcept {
     std::string cause;
     const int answer = inhibit(bus.get(), what, end, cause);
     if (answer >= 0) {
-      descriptor_ = answer;
+      lock_ = Descriptor(answer);
       what_ = what;
       why_not_.clear();
       return;
@@ -117,10 +116,6 @@ SleepInhibitor::SleepInhibitor() noexcept {
     why_not_ = line_without_lock(-answer, cause);
     if (!refused(-answer)) return;
   }
-}
-
-SleepInhibitor::~SleepInhibitor() {
-  if (held()) ::close(descriptor_);
 }
 
 }  // namespace kphi::daq

@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include "base/descriptor.hpp"
+
 namespace kphi::daq {
 
 /// Asks logind on the system bus for a lock against sleep; the destructor releases it, and so does the death of the
@@ -10,18 +12,15 @@ namespace kphi::daq {
 class SleepInhibitor {
  public:
   SleepInhibitor() noexcept;
-  ~SleepInhibitor();
-  SleepInhibitor(const SleepInhibitor&) = delete;
-  SleepInhibitor& operator=(const SleepInhibitor&) = delete;
 
-  [[nodiscard]] bool held() const noexcept { return descriptor_ >= 0; }
+  [[nodiscard]] bool held() const noexcept { return lock_.number() >= 0; }
   /// What logind blocks meanwhile, in its own words: "sleep:idle:handle-lid-switch", or less; empty if not held.
   [[nodiscard]] const std::string& what() const noexcept { return what_; }
   /// One line for the operator with consequence, cause and next move; empty if held.
   [[nodiscard]] const std::string& why_not() const noexcept { return why_not_; }
 
  private:
-  int descriptor_ = -1;
+  Descriptor lock_;
   std::string what_;
   std::string why_not_;
 };

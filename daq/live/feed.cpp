@@ -17,7 +17,7 @@ void History::keep(const Message& message) {
 
 void History::keep(const Tick& tick) {
   if (!trace_.empty() && trace_.back().time_s == tick.time_s) return;
-  trace_.push_back({tick.time_s, tick.thrust_n, tick.commanded_rpm, tick.speed_rpm});
+  trace_.push_back({tick.time_s, tick.thrust_n(), to_rpm(tick.position.commanded), tick.speed_rpm()});
   if (trace_.size() > kTraceLength) trace_.pop_front();
 }
 

@@ -1,6 +1,7 @@
 #include "daq/live/live_session.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "daq/live/access_control.hpp"
 #include "daq/live/messages.hpp"
@@ -14,53 +15,40 @@ double calendar_seconds(const Clock& clock, Instant now) {
   return epoch.count() + to_seconds(clock.shrunk(now));
 }
 
-void add_motor(Tick& tick, const Observation& seen) {
-  tick.speed_age_s = to_seconds(seen.motor_age);
-  if (!seen.motor_is_fresh) return;
-  tick.speed_rpm = to_rpm(seen.speed());
-  tick.module_v = seen.judged[Watched::supply_voltage_low];
-  tick.module_a = seen.judged[Watched::supply_current];
-  tick.coil_degc = seen.judged[Watched::coil_temperature];
-  tick.derate = seen.derate;
-  tick.fault_bits = seen.fault_bits;
-}
-
-void add_load_cell(Tick& tick, const Observation& seen) {
-  tick.thrust_age_s = to_seconds(seen.load_cell_age);
-  tick.received = seen.account.received;
-  tick.lost_network = seen.account.lost_network;
-  tick.lost_host = seen.account.lost_host;
-  if (!seen.load_cell_is_fresh) return;
-  tick.thrust_n = seen.thrust_n;
-  tick.torque_nm = seen.torque_nm;
-}
-
 }  // namespace
+
+QuickLook::Look QuickLook::mean(std::size_t begin, std::size_t end) const {
+  Look sum{0, 0};
+  for (std::size_t i = begin; i < end; ++i) {
+    sum.thrust_n += looks_[i].thrust_n;
+    sum.speed_squared += looks_[i].speed_squared;
+  }
+  const auto n = static_cast<double>(end - begin);
+  return {sum.thrust_n / n, sum.speed_squared / n};
+}
+
+StepFigures QuickLook::result() const {
+  const std::size_t n = looks_.size();
+  if (n == 0) return {};
+  const Look whole = mean(0, n);
+  StepFigures result{n, whole.thrust_n, std::sqrt(whole.speed_squared), whole.thrust_n / whole.speed_squared, kUnknown};
+  if (n < 2 * kBlocks) return result;
+  // Means of successive blocks: what is correlated within a block counts once.
+  double sum = 0;
+  for (std::size_t block = 0; block < kBlocks; ++block) {
+    const Look part = mean(block * n / kBlocks, (block + 1) * n / kBlocks);
+    const double off = part.thrust_n / part.speed_squared - result.k;
+    sum += off * off;
+  }
+  result.u_k = std::sqrt(sum / (kBlocks * (kBlocks - 1)));
+  return result;
+}
 
 Tick LiveProgress::tick_of(const Position& position, const Observation& seen) {
   const Instant now = clock_.now();
-  Tick tick;
-  tick.time_s = to_seconds(now);
-  tick.timestamp_s = calendar_seconds(clock_, now);
   most_remaining_s_ = std::max(most_remaining_s_, position.remaining_s);
-  tick.remaining_s = position.remaining_s;
-  tick.progress = most_remaining_s_ > 0 ? 1 - position.remaining_s / most_remaining_s_ : 0;
-  tick.occlusion_deg = position.occlusion_deg;
-  tick.repetition = position.repetition;
-  tick.repetitions = position.repetitions;
-  tick.step = position.step;
-  tick.steps = position.steps;
-  tick.commanded_rpm = to_rpm(position.commanded);
-  write(tick.phase, position.step < 0 ? position.phase : "");
-  write(tick.propeller, position.propeller);
-  add_motor(tick, seen);
-  add_load_cell(tick, seen);
-  if (seen.supply.time_ns != 0) {
-    tick.supply_v = seen.supply.voltage_v;
-    tick.supply_a = seen.supply.current_a;
-  }
-  tick.watched = seen.judged;
-  return tick;
+  return {to_seconds(now), calendar_seconds(clock_, now),
+          most_remaining_s_ > 0 ? 1 - position.remaining_s / most_remaining_s_ : 0, position, seen};
 }
 
 bool LiveProgress::is_settled(Instant now) const {
@@ -73,7 +61,8 @@ void LiveProgress::add_to_step(const Position& position, const Observation& seen
     step_began_ = now;
     quick_look_.begin();
   }
-  if (is_settled(now) && seen.motor_is_fresh && seen.load_cell_is_fresh) quick_look_.add(seen.thrust(), seen.speed());
+  if (is_settled(now) && seen.motor_is_fresh() && seen.load_cell_is_fresh())
+    quick_look_.add(seen.thrust(), seen.speed());
 }
 
 void LiveProgress::guarded(const std::vector<GuardLimit>& limits) {
@@ -93,8 +82,8 @@ void LiveProgress::tick(const Position& position, const Observation& seen) {
 void LiveProgress::step_done(const Position& position, const Observation& seen) {
   inner_.step_done(position, seen);
   if (position.step < 0) return;
-  const QuickLook::Result result = quick_look_.result();
-  if (result.n > 0) feed_.tell(step_message(tick_of(position, seen), result));
+  const StepFigures result = quick_look_.result();
+  if (result.n > 0) feed_.tell(step_message(position, result));
 }
 
 void LiveProgress::say(const std::string& line) {

@@ -8,12 +8,28 @@
 
 #include "daq/live/feed.hpp"
 #include "daq/live/messages.hpp"
-#include "daq/live/quick_look.hpp"
 #include "daq/live/server.hpp"
 #include "daq/live/udp_json.hpp"
 #include "daq/run/progress.hpp"
 
 namespace kphi::daq::live {
+
+/// Preliminary k of a step, for the page.
+class QuickLook {
+ public:
+  static constexpr std::size_t kBlocks = 5;
+
+  void begin() { looks_.clear(); }
+  void add(Newtons thrust, RadPerSec speed) { looks_.push_back({thrust.value(), speed.value() * speed.value()}); }
+  [[nodiscard]] StepFigures result() const;
+
+ private:
+  struct Look {
+    double thrust_n, speed_squared;
+  };
+  [[nodiscard]] Look mean(std::size_t begin, std::size_t end) const;
+  std::vector<Look> looks_;
+};
 
 class LiveProgress final : public Progress {
  public:

@@ -21,34 +21,33 @@ double rounded(double value, int digits = 9) {
 }
 
 void add_readings(ordered_json& to, const Tick& tick) {
-  const auto add = [&](const char* key, double value) { to[key] = rounded(value); };
-  add("commanded_rpm", tick.commanded_rpm);
-  add("speed_rpm", tick.speed_rpm);
-  add("speed_age_s", tick.speed_age_s);
-  add("thrust_n", tick.thrust_n);
-  add("thrust_age_s", tick.thrust_age_s);
-  add("torque_nm", tick.torque_nm);
-  add("module_v", tick.module_v);
-  add("module_a", tick.module_a);
-  add("supply_v", tick.supply_v);
-  add("supply_a", tick.supply_a);
-  add("coil_degc", tick.coil_degc);
-  add("derate", tick.derate);
-  to["fault_bits"] = tick.fault_bits;
-  to["received"] = tick.received;
-  to["lost_network"] = tick.lost_network;
-  to["lost_host"] = tick.lost_host;
+  const Observation& seen = tick.seen;
+  const bool has_supply = seen.supply.time_ns != 0;
+  const auto add = [&](const char* key, double value, bool known = true) {
+    to[key] = known ? rounded(value) : kUnknown;
+  };
+  add("commanded_rpm", to_rpm(tick.position.commanded));
+  add("speed_rpm", tick.speed_rpm());
+  add("speed_age_s", to_seconds(seen.motor_age));
+  add("thrust_n", tick.thrust_n());
+  add("thrust_age_s", to_seconds(seen.load_cell_age));
+  add("torque_nm", seen.torque_nm, seen.load_cell_is_fresh());
+  add("module_v", seen.judged[Watched::supply_voltage_low]);
+  add("module_a", seen.judged[Watched::supply_current]);
+  add("supply_v", seen.supply.voltage_v, has_supply);
+  add("supply_a", seen.supply.current_a, has_supply);
+  add("coil_degc", seen.judged[Watched::coil_temperature]);
+  add("derate", seen.derate, seen.motor_is_fresh());
+  to["fault_bits"] = seen.motor_is_fresh() ? seen.fault_bits : 0;
+  to["received"] = seen.account.received;
+  to["lost_network"] = seen.account.lost_network;
+  to["lost_host"] = seen.account.lost_host;
 }
 
-ordered_json to_json(const std::vector<GuardLimit>& limits) {
-  ordered_json bars = ordered_json::array();
-  for (const GuardLimit& limit : limits)
-    bars.push_back({{"key", row_of(limit.watched).key},
-                    {"name", row_of(limit.watched).label},
-                    {"unit", limit.unit},
-                    {"limit", rounded(limit.value)},
-                    {"lower", limit.lower},
-                    {"source", limit.source}});
+ordered_json bars_of(const std::vector<GuardLimit>& limits) {
+  ordered_json bars = limits;
+  for (std::size_t i = 0; i < limits.size(); ++i)
+    bars[i].update({{"name", row_of(limits[i].watched).label}, {"limit", rounded(limits[i].value)}});
   return bars;
 }
 
@@ -61,33 +60,35 @@ std::string hello_message(const Subject& subject) {
                   {"name", subject.name},
                   {"propeller", subject.propeller},
                   {"speed_max_rpm", subject.speed_max_rpm},
-                  {"limits", to_json(subject.limits)}});
+                  {"limits", bars_of(subject.limits)}});
 }
 
 Message limits_message(const std::vector<GuardLimit>& limits) {
-  return {Message::Kind::limits, text_of({{"type", "limits"}, {"limits", to_json(limits)}})};
+  return {Message::Kind::limits, text_of({{"type", "limits"}, {"limits", bars_of(limits)}})};
 }
 
 std::string tick_message(const Tick& tick, double silent_s, std::uint64_t dropped) {
+  const Position& at = tick.position;
   ordered_json message{{"type", "tick"},
                        {"time_s", tick.time_s},
                        {"progress", rounded(tick.progress)},
-                       {"remaining_s", rounded(tick.remaining_s)},
-                       {"propeller", tick.propeller.data()},
-                       {"phase", tick.phase.data()},
-                       {"step", tick.step},
-                       {"steps", tick.steps},
-                       {"occlusion_deg", tick.occlusion_deg},
-                       {"repetition", tick.repetition},
-                       {"repetitions", tick.repetitions}};
+                       {"remaining_s", rounded(at.remaining_s)},
+                       {"propeller", at.propeller.data()},
+                       {"phase", at.step < 0 ? at.phase : std::string_view()},
+                       {"step", at.step},
+                       {"steps", at.steps},
+                       {"occlusion_deg", at.occlusion_deg},
+                       {"repetition", at.repetition},
+                       {"repetitions", at.repetitions}};
   add_readings(message, tick);
-  for (const GuardedQuantity& row : kQuantities) message["watched"][row.key] = rounded(tick.watched[row.watched], 4);
+  for (const GuardedQuantity& row : kQuantities)
+    message["watched"][row.key] = rounded(tick.seen.judged[row.watched], 4);
   message["silent_s"] = rounded(silent_s);
   message["dropped"] = dropped;
   return text_of(message);
 }
 
-Message step_message(const Tick& at, const QuickLook::Result& seen) {
+Message step_message(const Position& at, const StepFigures& seen) {
   return {Message::Kind::step, text_of({{"type", "step"},
                                         {"occlusion_deg", at.occlusion_deg},
                                         {"repetition", at.repetition},
@@ -113,12 +114,12 @@ Message end_message(double time_s, bool well, const std::string& text) {
 std::string plot_message(const Tick& tick, const std::vector<GuardLimit>& limits) {
   ordered_json message{{"timestamp", tick.timestamp_s},
                        {"time_s", tick.time_s},
-                       {"occlusion_deg", tick.occlusion_deg},
-                       {"repetition", tick.repetition},
-                       {"step", tick.step}};
+                       {"occlusion_deg", tick.position.occlusion_deg},
+                       {"repetition", tick.position.repetition},
+                       {"step", tick.position.step}};
   add_readings(message, tick);
   for (const GuardLimit& limit : limits)
-    message["limit_share"][row_of(limit.watched).key] = rounded(share_of(limit, tick.watched[limit.watched]), 4);
+    message["limit_share"][row_of(limit.watched).key] = rounded(share_of(limit, tick.seen.judged[limit.watched]), 4);
   const auto drop_unknown = [](ordered_json& object) {
     for (auto item = object.begin(); item != object.end();) {
       const bool unknown = item->is_number_float() && !std::isfinite(item->get<double>());

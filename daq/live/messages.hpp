@@ -17,16 +17,14 @@
 // A page sends a single message: "stop".
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "compensation/units.hpp"
 #include "daq/guard/guard_limits.hpp"
 #include "daq/guard/observation.hpp"
-#include "daq/live/quick_look.hpp"
+#include "daq/run/progress.hpp"
 #include "profiles/campaign.hpp"
 
 namespace kphi::daq::live {
@@ -52,40 +50,29 @@ struct Subject {
           combine_limits(campaign, config, devices)};
 }
 
-using daq::kUnknown;
-
-/// Unknown and stale values are kUnknown. Members are eight bytes or multiples: no padding.
+/// Members are eight bytes or multiples: no padding.
 struct Tick {
-  double time_s = 0;              ///< bench time
-  double timestamp_s = 0;         ///< calendar time, seconds since 1970, UTC
-  double progress = 0;            ///< of the campaign, 0 to 1
-  double remaining_s = kUnknown;  ///< of the campaign, wall clock
-  double occlusion_deg = kUnknown;
-  double commanded_rpm = 0;
-  double speed_rpm = kUnknown;
-  double thrust_n = kUnknown;   ///< zero subtracted
-  double torque_nm = kUnknown;  ///< about the thrust axis, zero subtracted
-  double speed_age_s = 0, thrust_age_s = 0;
-  double module_v = kUnknown, module_a = kUnknown;  ///< at the motor module's input
-  double supply_v = kUnknown, supply_a = kUnknown;  ///< at the bench supply's terminals
-  double coil_degc = kUnknown;
-  double derate = kUnknown;  ///< 1: none
-  GuardedValues watched;     ///< as the guard judged them
-  std::uint64_t fault_bits = 0;
-  std::uint64_t received = 0, lost_network = 0, lost_host = 0;  ///< samples of this run
-  std::int64_t repetition = 0, repetitions = 0;                 ///< 1-based
-  std::int64_t step = -1, steps = 0;                            ///< 0-based; -1 outside steps
-  std::array<char, 24> phase{}, propeller{};                    ///< cut off, zero-terminated
+  double time_s = 0;       ///< bench time
+  double timestamp_s = 0;  ///< calendar time, seconds since 1970, UTC
+  double progress = 0;     ///< of the campaign, 0 to 1
+  Position position;
+  Observation seen;
+
+  /// kUnknown if stale.
+  [[nodiscard]] double speed_rpm() const { return seen.motor_is_fresh() ? to_rpm(seen.speed()) : kUnknown; }
+  [[nodiscard]] double thrust_n() const { return seen.load_cell_is_fresh() ? seen.thrust_n : kUnknown; }
 };
 
-/// Copies what fits.
-template <std::size_t N>
-void write(std::array<char, N>& to, std::string_view text) noexcept {
-  to = {};
-  text.copy(to.data(), N - 1);
-}
-
 inline constexpr const char* kStopWord = "stop";
+
+/// Preliminary k of a step, right after it. The record uses the raw samples (results/reduction).
+struct StepFigures {
+  std::size_t n = 0;       ///< number of ticks; 0: no result
+  double thrust_n = 0;     ///< mean
+  double speed_rad_s = 0;  ///< root of the mean square
+  double k = 0;            ///< N/(rad/s)²: mean thrust over mean ω²
+  double u_k = 0;          ///< standard uncertainty, from the scatter of successive means; not finite: unknown
+};
 
 /// A message for all pages, and how long a page that joins late needs it.
 struct Message {
@@ -96,7 +83,7 @@ struct Message {
 [[nodiscard]] std::string hello_message(const Subject& subject);
 [[nodiscard]] Message limits_message(const std::vector<GuardLimit>& limits);
 [[nodiscard]] std::string tick_message(const Tick& tick, double silent_s, std::uint64_t dropped);
-[[nodiscard]] Message step_message(const Tick& at, const QuickLook::Result& seen);
+[[nodiscard]] Message step_message(const Position& at, const StepFigures& seen);
 [[nodiscard]] Message line_message(double time_s, const std::string& text);
 [[nodiscard]] Message stop_message(double time_s);
 [[nodiscard]] Message end_message(double time_s, bool well, const std::string& text);

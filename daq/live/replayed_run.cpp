@@ -15,26 +15,6 @@ using Wall = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kTickWall{10};
 constexpr Duration kFresh = std::chrono::milliseconds(200);
 
-const char* words_of(Phase phase) {
-  switch (phase) {
-    case Phase::zero_before:
-    case Phase::zero_after:
-      return "zero";
-    case Phase::spin_down:
-      return "spin down";
-    case Phase::bias_before:
-    case Phase::bias_settling:
-    case Phase::bias_after:
-      return "bias";
-    case Phase::ramp:
-      return "ramp";
-    case Phase::step:
-    case Phase::end:
-      break;
-  }
-  return "";
-}
-
 /// Without limits if it cannot be read.
 profiles::BenchConfig bench_of(const results::RunHeader& header) {
   try {
@@ -99,7 +79,7 @@ ReplayedRun::ReplayedRun(const results::RunRecording& recording, ManualClock& cl
   }
   observer_.begin(begin_);
   observer_.take_zero(zero_of(recording));
-  position_.propeller = recording.header.propeller_id;
+  position_.name(recording.header.propeller_id);
   position_.occlusion_deg = recording.header.occlusion_deg;
   position_.repetition = position_.repetitions = recording.header.repetition;
   for (const auto& mark : recording.phases) position_.steps = std::max(position_.steps, mark.step + 1);
@@ -125,7 +105,7 @@ void ReplayedRun::report_phases(Instant when, Progress& progress) {
     const auto& mark = recording_.phases[phase_];
     observer_.take(mark);
     position_.step = mark.step;
-    position_.phase = words_of(mark.phase);
+    position_.phase = kPhaseWords[static_cast<std::size_t>(mark.phase)];
     position_.commanded = RadPerSec(mark.speed_rad_s);
   }
   for (; event_ < recording_.events.size() && recording_.events[event_].time_ns <= when.count(); ++event_) {

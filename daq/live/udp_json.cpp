@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/udp.hpp>
@@ -44,20 +43,15 @@ udp::endpoint endpoint_of(const std::string& text) {
 
 UdpJson::UdpJson(const std::string& address, std::vector<GuardLimit> limits) : limits_(std::move(limits)) {
   const udp::endpoint to = endpoint_of(address);
-  socket_ = ::socket(to.protocol().family(), SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  if (socket_ < 0 || ::connect(socket_, to.data(), static_cast<socklen_t>(to.size())) != 0) {
-    const std::string why = std::strerror(errno);
-    if (socket_ >= 0) ::close(socket_);
-    refuse(address, why);
-  }
+  socket_ = Descriptor(::socket(to.protocol().family(), SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  if (socket_.number() < 0 || ::connect(socket_.number(), to.data(), static_cast<socklen_t>(to.size())) != 0)
+    refuse(address, std::strerror(errno));
 }
-
-UdpJson::~UdpJson() { ::close(socket_); }
 
 void UdpJson::send(const Tick& tick) noexcept {
   try {
     const std::string message = plot_message(tick, limits_);
-    if (::send(socket_, message.data(), message.size(), MSG_DONTWAIT | MSG_NOSIGNAL) < 0) ++dropped_;
+    if (::send(socket_.number(), message.data(), message.size(), MSG_DONTWAIT | MSG_NOSIGNAL) < 0) ++dropped_;
   } catch (const std::exception&) {
     ++dropped_;
   }

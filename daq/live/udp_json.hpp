@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/descriptor.hpp"
 #include "daq/live/messages.hpp"
 
 namespace kphi::daq::live {
@@ -14,9 +15,6 @@ class UdpJson {
   /// "127.0.0.1:9870", "localhost:9870", "[::1]:9870" or another computer's address: numeric, so that no name is
   /// resolved, and unicast. Throws ConfigurationError.
   UdpJson(const std::string& address, std::vector<GuardLimit> limits);
-  ~UdpJson();
-  UdpJson(const UdpJson&) = delete;
-  UdpJson& operator=(const UdpJson&) = delete;
   /// From now on limit_share refers to these limits.
   void hold_to(std::vector<GuardLimit> limits) { limits_ = std::move(limits); }
   /// Never waits; a datagram that the kernel refuses is dropped and counted.
@@ -25,7 +23,7 @@ class UdpJson {
 
  private:
   std::vector<GuardLimit> limits_;
-  int socket_ = -1;
+  Descriptor socket_;
   std::uint64_t dropped_ = 0;
 };
 

@@ -3,9 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
-#include <pthread.h>
-#include <signal.h>
-#include <sys/eventfd.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -14,10 +11,11 @@
 #include <iterator>
 #include <list>
 #include <mutex>
-#include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
+
+#include "base/thread.hpp"
+#include "base/wakeup.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -25,20 +23,12 @@ namespace {
 constexpr std::size_t kAtOnce = 512;  // bytes; a pipe with room has room for that many (POSIX's least PIPE_BUF)
 constexpr int kPauseMs = 10;  // a terminal whose room is one byte, and that byte would be a new line, which takes two
 
-/// Signals belong to the program's main thread; blocked, SIGTTOU does not stop a program in the background either.
-void refuse_signals() noexcept {
-  sigset_t all;
-  sigfillset(&all);
-  pthread_sigmask(SIG_BLOCK, &all, nullptr);
-}
-
 /// A new descriptor of the same terminal whose write() does not block; `descriptor` itself is shared with the program's
-/// parent. `descriptor` if it is not a terminal.
-int without_blocking(int descriptor) {
-  if (::isatty(descriptor) == 0) return descriptor;
+/// parent. None if it is not a terminal.
+Descriptor without_blocking(int descriptor) {
+  if (::isatty(descriptor) == 0) return {};
   const std::string name = fmt::format("/proc/self/fd/{}", descriptor);
-  const int own = ::open(name.c_str(), O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
-  return own < 0 ? descriptor : own;
+  return Descriptor(::open(name.c_str(), O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));
 }
 
 }  // namespace
@@ -102,27 +92,13 @@ void WordQueue::clear() noexcept {
 
 struct Console::Shared {
   struct Stream {
-    explicit Stream(int named) : name(named), descriptor(without_blocking(named)) {}
-    ~Stream() {
-      if (descriptor != name) ::close(descriptor);
-    }
-    Stream(const Stream&) = delete;
-    Stream& operator=(const Stream&) = delete;
-    const int name, descriptor;
+    explicit Stream(int named) : name(named), own(without_blocking(named)) {}
+    [[nodiscard]] int descriptor() const noexcept { return own.number() < 0 ? name : own.number(); }
+    const int name;
+    const Descriptor own;
     WordQueue queue;
   };
 
-  Shared() : bell(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
-    if (bell < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
-  }
-  ~Shared() { ::close(bell); }
-  Shared(const Shared&) = delete;
-  Shared& operator=(const Shared&) = delete;
-
-  void ring() const noexcept {
-    const std::uint64_t one = 1;
-    [[maybe_unused]] const auto written = ::write(bell, &one, sizeof one);
-  }
   [[nodiscard]] bool is_idle() const noexcept {
     return std::all_of(streams.begin(), streams.end(), [](const Stream& stream) { return stream.queue.empty(); });
   }
@@ -135,8 +111,8 @@ struct Console::Shared {
   /// The bell, and each stream with waiting texts. False: the thread must end.
   [[nodiscard]] bool list(std::vector<pollfd>& waiting) {
     const std::lock_guard lock(mutex);
-    waiting.assign(1, {bell, POLLIN, 0});
-    for (const Stream& each : streams) waiting.push_back({each.queue.empty() ? -1 : each.descriptor, POLLOUT, 0});
+    waiting.assign(1, {bell.descriptor(), POLLIN, 0});
+    for (const Stream& each : streams) waiting.push_back({each.queue.empty() ? -1 : each.descriptor(), POLLOUT, 0});
     return !quit;
   }
   /// The writable stream whose text has waited longest; nullptr without one.
@@ -156,7 +132,7 @@ struct Console::Shared {
       const std::lock_guard lock(mutex);
       bytes = to.queue.begin(kAtOnce);
     }
-    const ssize_t n = ::write(to.descriptor, bytes.data(), bytes.size());
+    const ssize_t n = ::write(to.descriptor(), bytes.data(), bytes.size());
     const bool has_no_room = n < 0 && errno == EAGAIN;
     {
       const std::lock_guard lock(mutex);
@@ -167,7 +143,7 @@ struct Console::Shared {
     if (has_no_room) ::poll(nullptr, 0, kPauseMs);
   }
 
-  const int bell;
+  Wakeup bell;
   mutable std::mutex mutex;
   std::condition_variable changed;
   std::list<Stream> streams;
@@ -181,7 +157,7 @@ Console::~Console() {
   std::unique_lock lock(shared_->mutex);
   if (!shared_->has_thread) return;
   shared_->quit = true;
-  shared_->ring();
+  shared_->bell.raise();
   shared_->changed.wait_for(lock, kGiveUp, [this] { return shared_->ended; });
 }
 
@@ -189,14 +165,15 @@ void Console::put(int descriptor, std::string text, Worth worth) noexcept {
   try {
     const std::lock_guard lock(shared_->mutex);
     if (!shared_->has_thread) {
-      std::thread(write_on, shared_).detach();
+      // Without signals, SIGTTOU does not stop a program in the background either.
+      start_thread([shared = shared_] { write_on(shared); }).detach();
       shared_->has_thread = true;
     }
     shared_->stream(descriptor).queue.push(std::move(text), worth, ++shared_->order);
   } catch (...) {
     // No memory, or no thread: a run is worth more than its messages.
   }
-  shared_->ring();
+  shared_->bell.raise();
 }
 
 bool Console::finish(std::chrono::milliseconds limit) noexcept {
@@ -217,12 +194,10 @@ std::uint64_t Console::lost() const noexcept {
 }
 
 void Console::write_on(const std::shared_ptr<Shared>& shared) noexcept {
-  refuse_signals();
   try {
     for (std::vector<pollfd> waiting; shared->list(waiting);) {
       if (::poll(waiting.data(), waiting.size(), -1) <= 0) continue;
-      std::uint64_t rings = 0;
-      [[maybe_unused]] const auto heard = ::read(shared->bell, &rings, sizeof rings);
+      shared->bell.clear();
       if (Shared::Stream* chosen = shared->choose(waiting)) shared->write_some(*chosen);
     }
   } catch (const std::bad_alloc&) {

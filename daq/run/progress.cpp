@@ -33,8 +33,8 @@ std::string cut(const std::string& line, std::size_t columns) {
 /// Which values are stale, and for how long.
 std::string silence(const Observation& seen) {
   std::string words;
-  if (!seen.motor_is_fresh) words += fmt::format("  no speed for {:.1f} s", to_seconds(seen.motor_age));
-  if (!seen.load_cell_is_fresh) words += fmt::format("  no thrust for {:.1f} s", to_seconds(seen.load_cell_age));
+  if (!seen.motor_is_fresh()) words += fmt::format("  no speed for {:.1f} s", to_seconds(seen.motor_age));
+  if (!seen.load_cell_is_fresh()) words += fmt::format("  no thrust for {:.1f} s", to_seconds(seen.load_cell_age));
   return words;
 }
 
@@ -44,13 +44,13 @@ std::string describe(const Position& position, const Observation& seen) {
   const std::string which = position.repetition < 0
                                 ? fmt::format("ref {}", -position.repetition)
                                 : fmt::format("rep {}/{}", position.repetition, position.repetitions);
-  const std::string where = fmt::format("{}  φ {:3g}°  {}", position.propeller, position.occlusion_deg, which);
+  const std::string where = fmt::format("{}  φ {:3g}°  {}", position.propeller.data(), position.occlusion_deg, which);
   const std::string what = position.step < 0 ? fmt::format("{:<10}", position.phase)
                                              : fmt::format("step {:2}/{}", position.step + 1, position.steps);
   return fmt::format("{}  {}  speed {} of {:5.0f} RPM  thrust {} N  left {}", where, what,
-                     seen.motor_is_fresh ? fmt::format("{:5.0f}", to_rpm(seen.speed())) : "    ?",
+                     seen.motor_is_fresh() ? fmt::format("{:5.0f}", to_rpm(seen.speed())) : "    ?",
                      to_rpm(position.commanded),
-                     seen.load_cell_is_fresh ? fmt::format("{:6.3f}", seen.thrust_n) : "     ?",
+                     seen.load_cell_is_fresh() ? fmt::format("{:6.3f}", seen.thrust_n) : "     ?",
                      minutes_and_seconds(position.remaining_s)) +
          silence(seen);
 }
@@ -66,8 +66,6 @@ void TerminalProgress::tick(const Position& position, const Observation& seen) {
   put(stream_, fmt::format("\r{}\x1b[K", cut(describe(position, seen), width_of(stream_) - 1)), Worth::live);
   drawn_ = true;
 }
-
-void TerminalProgress::step_done(const Position&, const Observation&) {}
 
 void TerminalProgress::say(const std::string& line) { put(stream_, fmt::format("{}{}\n", clearing(), line)); }
 

@@ -1,9 +1,11 @@
 // Progress for the person at the stand: one live line on a terminal, one plain line per step elsewhere.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daq/guard/observation.hpp"
@@ -12,39 +14,37 @@
 
 namespace kphi::daq {
 
-/// How far the campaign is.
+/// What a person reads during a phase, in the order of results::Phase.
+inline constexpr std::array<const char*, results::kPhaseNames.size()> kPhaseWords{
+    "zero", "", "spin down", "zero", "", "bias", "bias", "bias", "ramp"};
+
+/// How far the campaign is. Members fill multiples of eight bytes: the live page publishes it as a whole.
 struct Position {
-  std::string propeller;
+  std::array<char, 64> propeller{};  ///< cut off, zero-terminated
   double occlusion_deg = 0;
   int repetition = 0;  ///< 1-based; negative: a reference run
   int repetitions = 0;
   int step = -1;  ///< 0-based; -1 outside steps
   int steps = 0;
-  std::string phase;       ///< "zero", "spin down"; empty in a step
+  std::string_view phase;  ///< of kPhaseWords; empty in a step
   RadPerSec commanded;     ///< unsigned
   double remaining_s = 0;  ///< of the campaign, wall clock
+
+  void name(std::string_view id) noexcept { id.copy(propeller.data(), propeller.size() - 1); }
 };
 
-/// Implementations are called from the runner's thread only.
+/// Called from the runner's thread only. By itself it shows nothing.
 class Progress {
  public:
   virtual ~Progress() = default;
   /// A run begins, under these limits of its guard.
-  virtual void guarded(const std::vector<GuardLimit>& limits) { static_cast<void>(limits); }
+  virtual void guarded(const std::vector<GuardLimit>&) {}
   /// Called on every tick; must return at once.
-  virtual void tick(const Position& position, const Observation& seen) = 0;
+  virtual void tick(const Position&, const Observation&) {}
   /// A step or phase has ended.
-  virtual void step_done(const Position& position, const Observation& seen) = 0;
+  virtual void step_done(const Position&, const Observation&) {}
   /// A line to keep.
-  virtual void say(const std::string& line) = 0;
-};
-
-/// Silent, for tests.
-class NoProgress final : public Progress {
- public:
-  void tick(const Position&, const Observation&) override {}
-  void step_done(const Position&, const Observation&) override {}
-  void say(const std::string&) override {}
+  virtual void say(const std::string&) {}
 };
 
 /// One line rewritten in place, at most ten times a second.
@@ -53,7 +53,6 @@ class TerminalProgress final : public Progress {
   explicit TerminalProgress(std::FILE* stream) : stream_(stream) {}
   ~TerminalProgress() override;
   void tick(const Position& position, const Observation& seen) override;
-  void step_done(const Position& position, const Observation& seen) override;
   void say(const std::string& line) override;
 
  private:
@@ -68,7 +67,6 @@ class TerminalProgress final : public Progress {
 class PlainProgress final : public Progress {
  public:
   explicit PlainProgress(std::FILE* stream) : stream_(stream) {}
-  void tick(const Position&, const Observation&) override {}
   void step_done(const Position& position, const Observation& seen) override;
   void say(const std::string& line) override;
 

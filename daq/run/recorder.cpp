@@ -5,38 +5,36 @@
 #include <cmath>
 
 #include "daq/bench/device_records.hpp"
+#include "daq/guard/guard_limits.hpp"
 
 namespace kphi::daq {
 namespace {
 
 constexpr std::size_t kRecordsAtOnce = 7000;
 constexpr std::size_t kReadingsAtOnce = 512;
-constexpr std::array kAxes{"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
-
-results::EventKind kind_of(netbox::RangeVerdict verdict) {
-  return verdict == netbox::RangeVerdict::near ? results::EventKind::near_range : results::EventKind::beyond_range;
-}
+constexpr std::size_t kSupplyReadingsAtOnce = 16;
 
 }  // namespace
 
-Recorder::Recorder(Bench& bench, Streams& streams, results::RunWriter& writer, const results::LoadCellScale& scale)
+Recorder::Recorder(Bench& bench, Streams& streams, results::RunWriter& writer)
     : bench_(bench),
       streams_(streams),
       writer_(writer),
-      scale_(to_configuration(scale)),
+      scale_(bench.load_cell().configuration()),
       range_(scale_),
       next_sync_(bench.clock().now() + bench.sync_interval()),
       records_(kRecordsAtOnce),
-      readings_(kReadingsAtOnce) {}
+      readings_(kReadingsAtOnce),
+      supply_readings_(kSupplyReadingsAtOnce) {}
 
 void Recorder::drain() noexcept {
   if (failed_.load(std::memory_order_relaxed)) return;
   try {
     drain_marks();
-    drain_load_cell();
-    drain_events();
-    drain_motor();
-    drain_supply();
+    drain(records_);
+    for (const results::StreamEvent& event : streams_.take_events()) note(event);
+    drain(readings_);
+    drain(supply_readings_);
     if (const Instant now = bench_.clock().now(); now >= next_sync_) {
       writer_.sync();
       next_sync_ = now + bench_.sync_interval();
@@ -57,10 +55,6 @@ void Recorder::drain_marks() {
   }
 }
 
-void Recorder::drain_events() {
-  for (const results::StreamEvent& event : streams_.take_events()) note(event);
-}
-
 void Recorder::note(const results::StreamEvent& event) {
   writer_.note(event);
   events_.push(event);  // when the queue is full, the file still has it
@@ -68,11 +62,10 @@ void Recorder::note(const results::StreamEvent& event) {
 
 void Recorder::inspect(std::span<const results::LoadCellRecord> batch) {
   for (const results::LoadCellRecord& record : batch) {
-    const netbox::StampedRecord stamped = to_stamped(record);
     // The guard judges whether the load endangers the cell.
-    const netbox::RangeVerdict verdict = std::min(range_.look(stamped.record), netbox::RangeVerdict::beyond);
+    const netbox::RangeVerdict verdict = range_.look(record.counts);
     if (verdict > worst_) note_range(verdict, record.arrival_ns);
-    if (measuring_) estimate_.add(stamped);
+    if (measuring_) estimate_.add(record.counts, record.status);
   }
   if (measuring_) measured_.publish(estimate_.result(scale_));
 }
@@ -80,27 +73,20 @@ void Recorder::inspect(std::span<const results::LoadCellRecord> batch) {
 void Recorder::note_range(netbox::RangeVerdict verdict, results::Nanoseconds at) {
   worst_ = verdict;
   const auto axis = static_cast<std::size_t>(range_.worst_axis());
-  const std::string load = fmt::format("{} carries {:.0f} % of its range of {:g} {}", kAxes[axis],
-                                       100 * range_.largest_load(), scale_.range[axis], axis < 3 ? "N" : "N m");
-  note({kind_of(verdict), at, 0, fmt::format("{:.3f} s: {}", 1e-9 * static_cast<double>(at), load)});
+  const GuardedQuantity& row = row_of(static_cast<Watched>(axis));
+  note({verdict == netbox::RangeVerdict::near ? results::EventKind::near_range : results::EventKind::beyond_range, at,
+        0,
+        fmt::format("{:.3f} s: {} carries {:.0f} % of its range of {:g} {}", 1e-9 * static_cast<double>(at), row.name,
+                    100 * range_.largest_load(), scale_.range[axis], row.unit)});
 }
 
-void Recorder::drain_load_cell() {
-  while (const std::size_t n = streams_.take(records_)) {
-    const std::span<const results::LoadCellRecord> batch(records_.data(), n);
+template <class T>
+void Recorder::drain(std::vector<T>& buffer) {
+  while (const std::size_t n = streams_.take(buffer)) {
+    const auto batch = std::span<const T>(buffer).first(n);
     writer_.append(batch);
-    inspect(batch);
+    if constexpr (std::is_same_v<T, results::LoadCellRecord>) inspect(batch);
   }
-}
-
-void Recorder::drain_motor() {
-  while (const std::size_t n = streams_.take(readings_))
-    writer_.append(std::span<const results::MotorReading>(readings_.data(), n));
-}
-
-void Recorder::drain_supply() {
-  while (const std::size_t n = streams_.take(supply_readings_))
-    writer_.append(std::span<const results::SupplyReading>(supply_readings_.data(), n));
 }
 
 void Recorder::mark(const results::PhaseMark& mark) {

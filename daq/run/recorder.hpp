@@ -1,7 +1,6 @@
 // Writes the streams into the run file.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <exception>
@@ -11,15 +10,14 @@
 #include "base/published.hpp"
 #include "daq/bench/bench.hpp"
 #include "daq/bench/streams.hpp"
-#include "drivers/netbox/receive/bias.hpp"
-#include "drivers/netbox/receive/range_watch.hpp"
+#include "drivers/netbox/receive/load.hpp"
 
 namespace kphi::daq {
 
 /// Two threads, neither of which waits for the other: one calls drain(), the runner calls everything else.
 class Recorder {
  public:
-  Recorder(Bench& bench, Streams& streams, results::RunWriter& writer, const results::LoadCellScale& scale);
+  Recorder(Bench& bench, Streams& streams, results::RunWriter& writer);
 
   /// Appends everything that has arrived, and syncs the file when it is due. Keeps the first error for check_failure()
   /// and does nothing after it.
@@ -36,11 +34,9 @@ class Recorder {
   void check_failure();
 
  private:
-  void drain_load_cell();
-  void drain_motor();
-  void drain_supply();
+  template <class T>
+  void drain(std::vector<T>& buffer);
   void drain_marks();
-  void drain_events();
   void inspect(std::span<const results::LoadCellRecord> batch);
   void note_range(netbox::RangeVerdict verdict, results::Nanoseconds at);
 
@@ -55,7 +51,7 @@ class Recorder {
   Instant next_sync_;
   std::vector<results::LoadCellRecord> records_;
   std::vector<results::MotorReading> readings_;
-  std::array<results::SupplyReading, 16> supply_readings_;
+  std::vector<results::SupplyReading> supply_readings_;
   boost::lockfree::spsc_queue<results::PhaseMark, boost::lockfree::capacity<1024>> marks_;
   // To the runner. Sized at run time: Boost 1.74's queue of fixed capacity never destroys what is left in it.
   boost::lockfree::spsc_queue<results::StreamEvent> events_{256};

@@ -192,7 +192,7 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   const std::vector<GuardLimit> limits = combine_limits(order.campaign, order.config, &devices);
   progress.guarded(limits);
   Guard guard(bench, order.config, streaming->scale(), limits);
-  Recorder recorder(bench, guard, writer, streaming->scale());
+  Recorder recorder(bench, guard, writer);
   Sequence sequence(bench, recorder, guard, order, progress, stop_asked);
   Ended ended = carry_out(sequence, bench, guard, recorder);
   streaming.reset();

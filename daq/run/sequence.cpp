@@ -39,7 +39,7 @@ bool explains_silence(results::EventKind kind) {
 Sequence::Sequence(Bench& bench, Recorder& recorder, Guard& guard, const RunOrder& order, Progress& progress,
                    const std::function<bool()>& stop_asked)
     : bench_(bench), recorder_(recorder), guard_(guard), order_(order), progress_(progress), stop_asked_(stop_asked) {
-  position_.propeller = order.campaign.propeller.id;
+  position_.name(order.campaign.propeller.id);
   position_.occlusion_deg = order.mounted.occlusion_deg();
   position_.repetition = order.planned.repetition;
   position_.repetitions = std::max(order.campaign.repetitions, order.planned.repetition);
@@ -56,7 +56,7 @@ void Sequence::run() {
   spin_through_the_steps();
   wait_for_standstill();
   hold_zero(Phase::zero_after);
-  mark(Phase::end, -1, RadPerSec(0));
+  mark(Phase::end);
 }
 
 void Sequence::add_aftermath(StopWords& words) {
@@ -150,25 +150,20 @@ void Sequence::take_box_bias() {
 }
 
 void Sequence::set_box_bias() {
-  mark(Phase::bias_settling, -1, RadPerSec(0));
+  mark(Phase::bias_settling);
   bench_.load_cell().set_bias();
   const netbox::Configuration& box = bench_.load_cell().configuration();
-  hold(bench_.clock().stretched(kBiasWorksWall) + from_seconds(3 * box.records_per_datagram / box.rdt_rate_hz),
-       nullptr);
+  hold(bench_.clock().stretched(kBiasWorksWall) + from_seconds(3 * box.records_per_datagram / box.rdt_rate_hz));
 }
 
 netbox::ZeroMeasurement Sequence::measure(Phase phase) {
-  position_.phase = "bias";
-  mark(phase, -1, RadPerSec(0));
-  hold(from_seconds(order_.campaign.zero.value()), nullptr);
-  progress_.step_done(position_, seen_);
+  hold_zero(phase);
   return recorder_.measured();
 }
 
 void Sequence::ramp_to(RadPerSec level, MotorEnable& spin) {
   const Slew slew(position_.commanded, level, order_.campaign.profile.slew_rad_s2);
   if (slew.lasts() == Duration(0)) return;
-  position_.phase = "ramp";
   mark(Phase::ramp, -1, level);
   const Duration tick = bench_.clock().stretched(kTickWall);
   Instant last = bench_.clock().now();
@@ -193,8 +188,7 @@ void Sequence::spin_through_the_steps() {
   }
   position_.step = -1;
   position_.commanded = RadPerSec(0);
-  position_.phase = "spin down";
-  mark(Phase::spin_down, -1, RadPerSec(0));
+  mark(Phase::spin_down);
   change_speed();
   iq::StopSettings stop;
   if (order_.config.supply_sinks_current) stop.deceleration = kEndRamp;
@@ -215,7 +209,7 @@ void Sequence::hold_step(const profiles::PlannedStep& step, MotorEnable& spin) {
 }
 
 void Sequence::learn_from(const profiles::PlannedStep& step) {
-  if (!seen_.motor_is_fresh || !is_out_of_drive(step.speed, seen_.speed(), seen_.drive_pwm)) return;
+  if (!seen_.motor_is_fresh() || !is_out_of_drive(step.speed, seen_.speed(), seen_.drive_pwm)) return;
   out_of_reach_ = step.speed;
   const auto& steps = order_.planned.steps;
   const auto left_out = std::count_if(steps.begin() + position_.step + 1, steps.end(),
@@ -228,6 +222,7 @@ void Sequence::learn_from(const profiles::PlannedStep& step) {
 }
 
 void Sequence::mark(Phase phase, int step, RadPerSec commanded) {
+  position_.phase = kPhaseWords[static_cast<std::size_t>(phase)];
   const results::PhaseMark mark{phase, step, bench_.clock().now().count(), commanded.value()};
   recorder_.mark(mark);
   guard_.mark(mark);
@@ -238,31 +233,26 @@ void Sequence::change_speed() {
 }
 
 void Sequence::hold_zero(Phase phase) {
-  position_.phase = "zero";
-  mark(phase, -1, RadPerSec(0));
-  hold(from_seconds(order_.campaign.zero.value()), nullptr);
+  mark(phase);
+  hold(from_seconds(order_.campaign.zero.value()));
   progress_.step_done(position_, seen_);
 }
 
 void Sequence::require_rest() {
-  while (!seen_.load_cell_is_fresh) hold(bench_.clock().stretched(kTickWall), nullptr);  // check() ends this
+  while (!seen_.load_cell_is_fresh()) hold(bench_.clock().stretched(kTickWall));  // check() ends this
   const auto axis = static_cast<std::size_t>(order_.config.thrust_axis);
   const netbox::ZeroMeasurement zero = recorder_.measured();
   if (zero.records < 2)
     throw DeviceError("Net Box", "take the zero", "no valid sample arrived", "check the box's status: `kphi devices`");
-  const double deviation = zero.standard_deviation[axis];
-  if (deviation <= results::kNoisyZero) return;
-  throw DeviceError("Net Box", "take the zero",
-                    fmt::format("F{} is noisy: standard deviation {:.3g} N, limit {:g} N", "xyz"[axis], deviation,
-                                results::kNoisyZero),
-                    results::kZeroNextMove);
+  if (const auto why = noise(zero, axis, results::kNoisyZero))
+    throw DeviceError("Net Box", "take the zero", *why, results::kZeroNextMove);
 }
 
 void Sequence::wait_for_standstill() {
-  position_.phase = "spin down";
+  position_.phase = kPhaseWords[static_cast<std::size_t>(Phase::spin_down)];
   const Instant give_up = bench_.clock().now() + from_seconds(kSpinDownLimitSeconds);
   // Wait for a speed reading taken after the coast.
-  hold(bench_.clock().stretched(20 * kTickWall), nullptr);
+  hold(bench_.clock().stretched(20 * kTickWall));
   // Written so that NaN is not at rest.
   for (RadPerSec speed; !((speed = guard_.observe(bench_.clock().now()).speed()) <= kStandstill);) {
     if (bench_.clock().now() > give_up) {
@@ -270,7 +260,7 @@ void Sequence::wait_for_standstill() {
                                    kSpinDownLimitSeconds),
                        kKeepAway);
     }
-    hold(bench_.clock().stretched(kTickWall), nullptr);
+    hold(bench_.clock().stretched(kTickWall));
   }
 }
 

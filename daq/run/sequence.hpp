@@ -63,7 +63,7 @@ class Sequence {
   void hold_step(const profiles::PlannedStep& step, MotorEnable& spin);
   /// If the motor missed a speed at full drive, the run skips the remaining steps at or above it.
   void learn_from(const profiles::PlannedStep& step);
-  void mark(results::Phase phase, int step, RadPerSec commanded);
+  void mark(results::Phase phase, int step = -1, RadPerSec commanded = RadPerSec(0));
   /// Takes no time if the campaign sets no ramp.
   void ramp_to(RadPerSec level, MotorEnable& spin);
   void change_speed();
@@ -71,7 +71,7 @@ class Sequence {
   /// Refuses a noisy zero before anything turns: all thrusts would inherit its error.
   void require_rest();
   void wait_for_standstill();
-  void hold(Duration duration, MotorEnable* spin);
+  void hold(Duration duration, MotorEnable* spin = nullptr);
   void tick(MotorEnable* spin);
   void show_events();
 

@@ -38,13 +38,10 @@ class DirectUsb final : public usb::Transport {
     if (gone()) return {usb::Outcome::gone};
     return put(function_.control(to_sim(setup, data.size()), {}), data);
   }
-  usb::Transfer control_out(const usb::Setup& setup, std::span<const std::uint8_t> data, Timeout) noexcept override {
-    if (gone()) return {usb::Outcome::gone};
-    return told(function_.control(to_sim(setup, data.size()), data), data.size());
-  }
   usb::Transfer write(const usb::Endpoint& endpoint, std::span<const std::uint8_t> data, Timeout) noexcept override {
     if (gone()) return {usb::Outcome::gone};
-    return told(function_.out(endpoint.address, data), data.size());
+    const bool stalled = function_.out(endpoint.address, data).kind == sim::UsbAnswer::Kind::stall;
+    return stalled ? usb::Transfer{usb::Outcome::stalled} : usb::Transfer{usb::Outcome::done, data.size()};
   }
   usb::Transfer read(const usb::Endpoint& endpoint, std::span<std::uint8_t> data, Timeout timeout) noexcept override {
     for (const Instant give_up = time_.now() + timeout; time_.now() <= give_up; time_.advance(kAskAgain)) {
@@ -58,7 +55,6 @@ class DirectUsb final : public usb::Transport {
     function_.halt_cleared(endpoint.address);
     return usb::Outcome::done;
   }
-  void cancel() noexcept override {}
 
  private:
   static usb::EndpointKind kind_of(const sim::UsbEndpointShape& end) {
@@ -72,10 +68,6 @@ class DirectUsb final : public usb::Transport {
     const std::size_t n = std::min(answer.bytes.size(), data.size());
     std::copy_n(answer.bytes.begin(), n, data.begin());
     return {usb::Outcome::done, n};
-  }
-  static usb::Transfer told(const sim::UsbAnswer& answer, std::size_t bytes) {
-    if (answer.kind == sim::UsbAnswer::Kind::stall) return {usb::Outcome::stalled};
-    return {usb::Outcome::done, bytes};
   }
   [[nodiscard]] bool gone() const { return faults_.active(sim::UsbFaultKind::unplug); }
 

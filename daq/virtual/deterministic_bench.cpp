@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <stdexcept>
 #include <utility>
 
 #include "base/error.hpp"
+#include "base/random.hpp"
 #include "daq/bench/box.hpp"
 #include "daq/bench/device_records.hpp"
 #include "drivers/netbox/configuration/calinfo.hpp"
@@ -23,28 +25,8 @@ constexpr Duration kHttpTimeout = std::chrono::seconds(5);
 constexpr Duration kMotorWait = std::chrono::milliseconds(1);
 constexpr sim::Peer kHost = 1;
 
-void load_motor(const std::string& path, sim::BenchSettings& settings) {
-  if (path.empty()) return;
-  const sim::MotorProfile profile = sim::parse_motor_profile(profiles::read_text(path), path);
-  settings.plant.motor = profile.motor;
-  settings.module.sensors = profile.sensors;
-}
-
-sim::BenchSettings settings_of(const profiles::BenchConfig& config, sim::BenchSettings settings) {
-  settings.seed = config.simulation ? config.simulation->seed : 1;
-  settings.netbox.rate_hz = config.netbox.rate_hz;
-  settings.netbox.records_per_datagram = config.netbox.records_per_datagram;
-  settings.module_id = config.iq.module_id;
-  if (config.supply) settings.supply.emplace();
-  if (config.simulation) settings.plant.air_density_kg_m3 = config.simulation->air_density_kg_m3;
-  settings.module.baud = config.iq.baud;
-  if (config.simulation) {
-    if (const std::string& faults = config.simulation->faults; !faults.empty())
-      sim::load_faults(profiles::read_text(faults), faults, settings);
-    load_motor(config.simulation->motor, settings);
-  }
-  return settings;
-}
+/// Neighbouring keys give unrelated streams.
+std::uint64_t mixed(std::uint64_t key) noexcept { return SplitMix64(key)(); }
 
 /// Throws DeviceError, as the true transport would.
 std::string body_of(const std::string& response, const std::string& operation) {
@@ -55,49 +37,73 @@ std::string body_of(const std::string& response, const std::string& operation) {
   return response.substr(blank + 4);
 }
 
-class WithinWaits final : public Background {
- public:
-  WithinWaits(std::function<void()> work, std::vector<std::function<void()>*>& all)
-      : work_(std::move(work)), all_(all) {
-    all_.push_back(&work_);
-  }
-  ~WithinWaits() override { std::erase(all_, &work_); }
-
- private:
-  std::function<void()> work_;
-  std::vector<std::function<void()>*>& all_;
-};
-
 }  // namespace
 
-DeterministicBench::DeterministicBench(const profiles::BenchConfig& config, const sim::BenchSettings& other)
-    : clock_(other.begin),
-      air_({.sensor = "", .manual = config.ambient.manual}, clock_),
-      sim_(settings_of(config, other)),
-      supply_(config.supply ? std::make_unique<DeterministicSupply>(*config.supply, *sim_.supply(), clock_) : nullptr),
-      power_(supply_.get()),
-      motor_(config.iq, sim_.motor_line(), clock_, [this] { step_to(clock_.now() + kMotorWait); }) {
+sim::BenchSettings simulated_devices(const profiles::BenchConfig& config, sim::BenchSettings settings) {
+  settings.netbox.rate_hz = config.netbox.rate_hz;
+  settings.netbox.records_per_datagram = config.netbox.records_per_datagram;
+  settings.module_id = config.iq.module_id;
+  settings.module.baud = config.iq.baud;
+  if (config.supply) settings.supply.emplace();
+  if (!config.simulation) return settings;
+  settings.seed = config.simulation->seed;
+  settings.plant.air_density_kg_m3 = config.simulation->air_density_kg_m3;
+  const std::string &faults = config.simulation->faults, &motor = config.simulation->motor;
+  if (!faults.empty()) sim::load_faults(profiles::read_text(faults), faults, settings);
+  if (!motor.empty()) {
+    const sim::MotorProfile profile = sim::parse_motor_profile(profiles::read_text(motor), motor);
+    settings.plant.motor = profile.motor;
+    settings.module.sensors = profile.sensors;
+  }
+  return settings;
+}
+
+DeterministicBench::DeterministicBench(const profiles::BenchConfig& config, const sim::BenchSettings& other,
+                                       Lives lives)
+    : config_(config), other_(other), lives_(lives), air_({.sensor = "", .manual = config.ambient.manual}, clock_) {
   if (config.simulation && config.simulation->durable) files_ = &results::disk();
+  make_devices(simulated_devices(config_, other_));
+}
+
+void DeterministicBench::make_devices(const sim::BenchSettings& settings) {
+  connection_.reset();
+  answer_.reset();
+  motor_.reset();
+  power_.reset();
+  supply_.reset();
+  clock_.set(settings.begin);
+  next_work_ = {};
+  sim_.emplace(settings);
+  if (config_.supply) supply_.emplace(*config_.supply, *sim_->supply(), clock_);
+  power_.emplace(supply());
+  motor_.emplace(config_.iq, sim_->motor_line(), clock_, [this] { step_to(clock_.now() + kMotorWait); });
   if (supply_) {
     clock_.set(clock_.now() + kSupplyRises);
-    sim_.advance(clock_.now());
+    sim_->advance(clock_.now());
   }
-  if (!config.ambient.sensor.empty()) {
-    const sim::BenchSettings settings = settings_of(config, other);
-    measured_air_.emplace(clock_, settings.air, settings.air_faults);
-  }
-  motor_.connect();
+  if (!config_.ambient.sensor.empty()) measured_air_.emplace(clock_, settings.air, settings.air_faults);
+  motor_->connect();
   read_box();
   cross_check();
   SlotPages slots = read_slot_pages([this](const std::string& target) { return page(target); });
   slots_json_ = std::move(slots.json);
-  findings_.insert(findings_.end(), slots.findings.begin(), slots.findings.end());
+  findings_ = std::move(slots.findings);
+}
+
+void DeterministicBench::begin_run(const RunBeginning& run) {
+  if (lives_ == Lives::whole_campaign) return;
+  sim::BenchSettings settings = simulated_devices(config_, other_);
+  settings.begin = run.after;
+  settings.seed = mixed(mixed(mixed(settings.seed) ^ std::bit_cast<std::uint64_t>(run.occlusion_deg)) ^
+                        static_cast<std::uint64_t>(run.repetition));
+  make_devices(settings);
+  if (mounted_) sim_->mount(mounted_->first, mounted_->second);
 }
 
 std::string DeterministicBench::page(const std::string& target) {
   const std::string operation = "GET " + target;
-  if (sim_.wire().http_refused(clock_.now())) throw DeviceError("Net Box", operation, "connection refused");
-  const sim::StreamReply reply = sim_.wire().http(operation + " HTTP/1.0\r\n\r\n", clock_.now());
+  if (sim_->wire().http_refused(clock_.now())) throw DeviceError("Net Box", operation, "connection refused");
+  const sim::StreamReply reply = sim_->wire().http(operation + " HTTP/1.0\r\n\r\n", clock_.now());
   if (reply.wait > kHttpTimeout) throw DeviceError("Net Box", operation, "no answer in time");
   wait_until(clock_.now() + reply.wait);
   return body_of(reply.bytes, operation);
@@ -108,7 +114,7 @@ void DeterministicBench::read_box() { configuration_ = netbox::parse_configurati
 void DeterministicBench::cross_check() {
   const auto request = netbox::encode_read_calinfo();
   std::string received(request.begin(), request.end());
-  const std::string answer = sim_.wire().tcp(received, clock_.now()).bytes;
+  const std::string answer = sim_->wire().tcp(received, clock_.now()).bytes;
   const auto calinfo = netbox::decode_calinfo({reinterpret_cast<const std::uint8_t*>(answer.data()), answer.size()});
   if (!calinfo) throw DeviceError("Net Box", "read the calibration over TCP", "unexpected reply: not a Net Box");
   if (const auto finding = netbox::compare(*calinfo, configuration_))
@@ -119,12 +125,12 @@ void DeterministicBench::wait_until(Instant when) {
   const Duration datagram = from_seconds(40.0 / 7000.0);
   while (clock_.now() < when) {
     Instant next = std::min(when, clock_.now() + datagram);
-    next = std::min(next, motor_.deadline());
-    if (connection_) next = std::min({next, connection_->deadline(), sim_.wire().next_arrival()});
+    next = std::min(next, motor_->deadline());
+    if (connection_) next = std::min({next, connection_->deadline(), sim_->wire().next_arrival()});
     if (answer_) next = std::min(next, answer_due_);
     step_to(std::max(next, clock_.now() + Duration(1)));
     if (clock_.now() >= next_work_) {
-      for (const auto* work : work_) (*work)();
+      for (const auto& work : work_) work();
       next_work_ = clock_.now() + kWorkEvery;
     }
   }
@@ -132,18 +138,18 @@ void DeterministicBench::wait_until(Instant when) {
 
 void DeterministicBench::step_to(Instant when) {
   clock_.set(when);
-  sim_.advance(when);
+  sim_->advance(when);
   if (supply_) supply_->look();
   if (measured_air_) measured_air_->look();
   exchange();  // what came is received before anything is found to be late
-  motor_.advance(when);
+  motor_->advance(when);
   if (connection_) connection_->advance(when);
   exchange();
   if (witness_.stepped) witness_.stepped();
 }
 
 void DeterministicBench::exchange() {
-  motor_.exchange();
+  motor_->exchange();
   exchange_load_cell();
 }
 
@@ -152,10 +158,10 @@ void DeterministicBench::exchange_load_cell() {
   if (connection_) {
     ask_box();
     std::array<std::uint8_t, 8> request{};
-    while (connection_->next_request(request)) sim_.wire().request(request, kHost, clock_.now());
+    while (connection_->next_request(request)) sim_->wire().request(request, kHost, clock_.now());
   }
   sim::Datagram datagram;
-  while (sim_.wire().next_datagram(datagram, clock_.now())) {
+  while (sim_->wire().next_datagram(datagram, clock_.now())) {
     if (!connection_ || datagram.foreign) continue;  // a connected socket does not see what others send
     const std::uint64_t drained = connection_->counters().drained;
     connection_->receive(datagram.payload(), datagram.at);
@@ -171,8 +177,8 @@ void DeterministicBench::ask_box() {
   Duration wait{0};
   answer_ = netbox::ask_box([&] {
     const std::string operation = "GET /netftapi2.xml";
-    if (sim_.wire().http_refused(clock_.now())) throw DeviceError("Net Box", operation, "connection refused");
-    const sim::StreamReply reply = sim_.wire().http(operation + " HTTP/1.0\r\n\r\n", clock_.now());
+    if (sim_->wire().http_refused(clock_.now())) throw DeviceError("Net Box", operation, "connection refused");
+    const sim::StreamReply reply = sim_->wire().http(operation + " HTTP/1.0\r\n\r\n", clock_.now());
     wait = std::min<Duration>(reply.wait, netbox::kAnswerTimeout);
     if (wait < reply.wait) throw DeviceError("Net Box", operation, "no answer in time");
     return body_of(reply.bytes, operation);
@@ -182,7 +188,7 @@ void DeterministicBench::ask_box() {
 
 void DeterministicBench::abandon() noexcept {
   abandoned_ = true;
-  motor_.abandon();
+  motor_->abandon();
   if (supply_) supply_->abandon();
 }
 
@@ -196,22 +202,24 @@ void DeterministicBench::sleep(Duration lasts, const std::function<void()>& each
 
 void DeterministicBench::outlive(Instant when) {
   clock_.set(when);
-  sim_.advance(when);
+  sim_->advance(when);
 }
 
-std::unique_ptr<Background> DeterministicBench::run_periodically(std::function<void()> work) {
-  return std::make_unique<WithinWaits>(std::move(work), work_);
+std::shared_ptr<void> DeterministicBench::run_periodically(std::function<void()> work) {
+  const auto entry = work_.insert(work_.end(), std::move(work));
+  return {nullptr, [this, entry](void*) { work_.erase(entry); }};
 }
 
 Duration DeterministicBench::sync_interval() const { return kSyncEvery; }
 
 void DeterministicBench::restore_power() {
-  power_.restore(motor_, clock_, [this] { wait_until(clock_.now() + kSupplyRises); });
+  power_->restore(*motor_, clock_, [this] { wait_until(clock_.now() + kSupplyRises); });
 }
 
 void DeterministicBench::mounted(const std::string& propeller_id, double occlusion_deg) {
   try {
-    sim_.mount(propeller_id, occlusion_deg);
+    sim_->mount(propeller_id, occlusion_deg);
+    mounted_ = {propeller_id, occlusion_deg};
   } catch (const std::invalid_argument& e) {
     throw DeviceError("simulated bench", "mount", e.what());
   }

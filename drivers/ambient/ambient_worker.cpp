@@ -33,16 +33,6 @@ std::string AmbientWorker::failure() const {
   return failure_;
 }
 
-std::string AmbientWorker::identity() const {
-  const std::lock_guard lock(mutex_);
-  return identity_;
-}
-
-AmbientWorker::Counters AmbientWorker::counters() const {
-  const std::lock_guard lock(mutex_);
-  return counters_;
-}
-
 bool AmbientWorker::wait_for_first(Duration wall) const {
   std::unique_lock lock(mutex_);
   return changed_.wait_for(lock, wall, [&] { return newest_.has_value(); });
@@ -53,48 +43,28 @@ void AmbientWorker::run() noexcept {
   Duration pause = rhythm_.first_pause;
   Duration rest{0};
   while (!stopped_within(rest)) {
-    if (look(sensor)) {
+    std::optional<Air> air;
+    std::string why;
+    try {
+      if (!sensor) sensor = open_();
+      if (!sensor) throw DeviceError("ambient", "open", "there is no sensor");
+      air = sensor->read();
       rest = rhythm_.between_readings;
       pause = rhythm_.first_pause;
-    } else {
+    } catch (const std::exception& error) {
+      why = error.what();
+    } catch (...) {
+      why = "an unknown failure";
+    }
+    if (!air) {
+      sensor.reset();
       rest = std::exchange(pause, std::min(2 * pause, rhythm_.longest_pause));
     }
-  }
-}
-
-/// False: the sensor failed and is closed.
-bool AmbientWorker::look(std::unique_ptr<Ambient>& sensor) noexcept {
-  std::string why;
-  try {
-    look_once(sensor);
-    return true;
-  } catch (const std::exception& error) {
-    why = error.what();
-  } catch (...) {
-    why = "an unknown failure";
-  }
-  sensor.reset();
-  const std::lock_guard lock(mutex_);
-  failure_ = std::move(why);
-  ++counters_.failures;
-  changed_.notify_all();
-  return false;
-}
-
-void AmbientWorker::look_once(std::unique_ptr<Ambient>& sensor) {
-  if (!sensor) {
-    sensor = open_();
-    if (!sensor) throw DeviceError("ambient", "open", "there is no sensor");
     const std::lock_guard lock(mutex_);
-    identity_ = sensor->identity();
-    ++counters_.openings;
+    if (air) newest_ = AirReading{*air, clock_.now(), Duration{0}};
+    failure_ = std::move(why);
+    changed_.notify_all();
   }
-  const Air air = sensor->read();
-  const std::lock_guard lock(mutex_);
-  newest_ = AirReading{air, clock_.now(), Duration{0}};
-  failure_.clear();
-  ++counters_.readings;
-  changed_.notify_all();
 }
 
 bool AmbientWorker::stopped_within(Duration wall) {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <condition_variable>
-#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -46,20 +45,11 @@ class AmbientWorker {
   [[nodiscard]] std::optional<AirReading> newest() const;
   /// Why there is no newer reading; empty while the sensor works.
   [[nodiscard]] std::string failure() const;
-  /// The last sensor that was open; empty before.
-  [[nodiscard]] std::string identity() const;
-  struct Counters {
-    std::uint64_t readings = 0, failures = 0, openings = 0;
-  };
-  [[nodiscard]] Counters counters() const;
-
   /// Waits at most `wall` for the first reading; false: no reading yet, see failure(). For the check before a run.
   [[nodiscard]] bool wait_for_first(Duration wall) const;
 
  private:
   void run() noexcept;
-  [[nodiscard]] bool look(std::unique_ptr<Ambient>& sensor) noexcept;
-  void look_once(std::unique_ptr<Ambient>& sensor);
   [[nodiscard]] bool stopped_within(Duration wall);
 
   const Open open_;
@@ -71,8 +61,7 @@ class AmbientWorker {
   mutable std::condition_variable changed_;
   bool stop_asked_ = false;
   std::optional<AirReading> newest_;
-  std::string failure_ = "not measured yet", identity_;
-  Counters counters_;
+  std::string failure_ = "not measured yet";
 
   std::thread thread_;
 };

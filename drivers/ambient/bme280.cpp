@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <stdexcept>
 
 #include "base/error.hpp"
 
@@ -114,7 +115,7 @@ constexpr int kPolls = 200;  // one second: a measurement takes 113 ms at most (
 
 }  // namespace
 
-Bme280Sensor::Bme280Sensor(I2c& bus, const std::string& where, Mcp2221::Pause pause)
+Bme280Sensor::Bme280Sensor(Mcp2221& bus, const std::string& where, Mcp2221::Pause pause)
     : bus_(bus), pause_(std::move(pause)), identity_("BME280 behind " + where) {
   find();
   identity_ = fmt::format("BME280 at 0x{:02X} behind {}", address_, where);
@@ -209,5 +210,33 @@ void Bme280Sensor::set(std::uint8_t register_number, std::uint8_t value) {
 void Bme280Sensor::fail(const char* operation, const std::string& cause, const char* next_move) const {
   throw DeviceError(identity_, operation, cause, next_move);
 }
+
+namespace {
+
+struct OpenBridge {
+  explicit OpenBridge(const UsbAddress& address) : device(bus.open(address)), bridge(*device) {}
+  usb::Bus bus;
+  std::unique_ptr<usb::Transport> device;
+  Mcp2221 bridge;
+};
+
+/// Owns bus, device and bridge, which outlive the sensor.
+class UsbBme280 final : OpenBridge, public Bme280Sensor {
+ public:
+  explicit UsbBme280(const UsbAddress& address) : OpenBridge(address), Bme280Sensor(bridge, device->name()) {}
+};
+
+}  // namespace
+
+UsbAddress sensor_address(std::string_view text) {
+  const UsbAddress address = UsbAddress::parse(text);
+  if (address.vendor == Mcp2221::kVendor && address.product == Mcp2221::kProduct) return address;
+  throw std::invalid_argument(fmt::format(
+      "\"{}\" is not a known sensor of the air; write usb:04d8:00dd (a BME280 behind an MCP2221A), manual: and the "
+      "values, or unknown",
+      text));
+}
+
+std::unique_ptr<Ambient> open(const UsbAddress& address) { return std::make_unique<UsbBme280>(address); }
 
 }  // namespace kphi::ambient

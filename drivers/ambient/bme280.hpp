@@ -4,7 +4,7 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
+#include <memory>
 #include <span>
 #include <string_view>
 
@@ -77,12 +77,11 @@ class Bme280Sensor : public Ambient {
   /// Searches at 0x76, then at 0x77; resets the sensor, waits until it has loaded its calibration, and reads that
   /// twice, because damage is unlikely to repeat. `bus` must outlive this; `where` names it in messages. Throws
   /// DeviceError: no answer, another chip, calibration damaged.
-  Bme280Sensor(I2c& bus, const std::string& where, Mcp2221::Pause pause = Mcp2221::sleep);
+  Bme280Sensor(Mcp2221& bus, const std::string& where, Mcp2221::Pause pause = Mcp2221::sleep);
 
   /// 16 samples of each quantity, about 110 ms. Throws DeviceError also for implausible values.
   [[nodiscard]] Air read() override;
   [[nodiscard]] const std::string& identity() const noexcept override { return identity_; }
-  [[nodiscard]] const bme280::Calibration& calibration() const noexcept { return calibration_; }
 
  private:
   void find();
@@ -93,11 +92,18 @@ class Bme280Sensor : public Ambient {
   void set(std::uint8_t register_number, std::uint8_t value);
   [[noreturn]] void fail(const char* operation, const std::string& cause, const char* next_move) const;
 
-  I2c& bus_;
+  Mcp2221& bus_;
   const Mcp2221::Pause pause_;
   std::string identity_;
   std::uint8_t address_ = bme280::kAddressLow;
   bme280::Calibration calibration_;
 };
+
+/// The address in a bench file of a BME280 behind an MCP2221A: "usb:04d8:00dd", with :SERIAL or @PORT behind it if
+/// there are several. Throws std::invalid_argument with one line that says what to write.
+[[nodiscard]] UsbAddress sensor_address(std::string_view text);
+
+/// Throws DeviceError: not plugged in, no sensor behind it.
+[[nodiscard]] std::unique_ptr<Ambient> open(const UsbAddress& address);
 
 }  // namespace kphi::ambient

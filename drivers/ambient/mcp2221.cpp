@@ -91,9 +91,7 @@ void Mcp2221::read(std::uint8_t address, std::uint8_t register_number, std::span
   send(read_restart, address, into.size(), {}, "read");
   std::size_t have = 0;
   for (int attempt = 0; attempt < kAttempts && have < into.size(); ++attempt) {
-    Report command{};
-    command[0] = get_data;
-    const Report reply = exchange(command, "read");
+    const Report reply = exchange({get_data}, "read");
     const std::uint8_t state = reply[2], count = reply[3];
     if (state == kAddressNack) fail("read", state);
     const bool data =
@@ -109,31 +107,20 @@ void Mcp2221::read(std::uint8_t address, std::uint8_t register_number, std::span
 }
 
 Mcp2221::Report Mcp2221::exchange(const Report& command, const char* operation) {
-  if (!in_step_) synchronise();
-  pause_(kBetweenCommands);
+  // Answers come in the order of the commands: those before the answer to a command that is used only here are old.
+  if (!in_step_) converse({get_settings}, "synchronise");
   in_step_ = false;
-  const usb::Transfer sent = transport_.write(out_, command, kReply);
-  if (sent.outcome != usb::Outcome::done)
-    fail(operation, usb::name_of(sent.outcome), "check that the bridge is plugged in");
-  const Report reply = fetch(command[0], operation);
+  const Report reply = converse(command, operation);
   in_step_ = true;
   return reply;
 }
 
-/// Answers come in the order of the commands: those before the answer to a command that is used only here are old.
-void Mcp2221::synchronise() {
-  Report command{};
-  command[0] = get_settings;
+/// Only the echoed command code tells which command an answer belongs to.
+Mcp2221::Report Mcp2221::converse(const Report& command, const char* operation) {
+  constexpr const char* kPlugged = "check that the bridge is plugged in";
   pause_(kBetweenCommands);
   const usb::Transfer sent = transport_.write(out_, command, kReply);
-  if (sent.outcome != usb::Outcome::done)
-    fail("synchronise", usb::name_of(sent.outcome), "check that the bridge is plugged in");
-  fetch(get_settings, "synchronise");
-  in_step_ = true;
-}
-
-/// Only the echoed command code tells which command an answer belongs to.
-Mcp2221::Report Mcp2221::fetch(std::uint8_t command_code, const char* operation) {
+  if (sent.outcome != usb::Outcome::done) fail(operation, usb::name_of(sent.outcome), kPlugged);
   Report reply{};
   for (int i = 0; i < kStaleReplies; ++i) {
     const usb::Transfer got = transport_.read(in_, reply, kReply);
@@ -141,20 +128,15 @@ Mcp2221::Report Mcp2221::fetch(std::uint8_t command_code, const char* operation)
       (void)transport_.clear_halt(in_);
       continue;
     }
-    if (got.outcome != usb::Outcome::done)
-      fail(operation, usb::name_of(got.outcome), "check that the bridge is plugged in");
-    if (got.bytes == reply.size() && reply[0] == command_code) return reply;
+    if (got.outcome != usb::Outcome::done) fail(operation, usb::name_of(got.outcome), kPlugged);
+    if (got.bytes == reply.size() && reply[0] == command[0]) return reply;
   }
   fail(operation, "received answers to other commands", "close other programs that use the bridge");
 }
 
 void Mcp2221::set_speed() {
-  Report command{};
-  command[0] = status;
-  command[3] = kSetSpeed;
-  command[4] = kDivider100kHz;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    const Report reply = exchange(command, "set the bus speed");
+    const Report reply = exchange({status, 0, 0, kSetSpeed, kDivider100kHz}, "set the bus speed");
     if (reply[3] == kSetSpeed) return;
     if (reply[3] != kSpeedBusy) break;
     cancel();
@@ -162,20 +144,12 @@ void Mcp2221::set_speed() {
   fail("set the bus speed", kBusy);
 }
 
-void Mcp2221::cancel() {
-  Report command{};
-  command[0] = status;
-  command[2] = kCancelTransfer;
-  exchange(command, "free the bus");
-}
+void Mcp2221::cancel() { exchange({status, 0, kCancelTransfer}, "free the bus"); }
 
 void Mcp2221::send(std::uint8_t command_code, std::uint8_t address, std::size_t total,
                    std::span<const std::uint8_t> data, const char* operation) {
-  Report command{};
-  command[0] = command_code;
-  command[1] = static_cast<std::uint8_t>(total);
-  command[2] = static_cast<std::uint8_t>(total >> 8);
-  command[3] = static_cast<std::uint8_t>(address << 1);
+  Report command{command_code, static_cast<std::uint8_t>(total), static_cast<std::uint8_t>(total >> 8),
+                 static_cast<std::uint8_t>(address << 1)};
   if (data.size() > kPayload) fail(operation, "more than 60 bytes at once", "");
   std::copy(data.begin(), data.end(), command.begin() + 4);
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
@@ -187,10 +161,8 @@ void Mcp2221::send(std::uint8_t command_code, std::uint8_t address, std::size_t 
 }
 
 void Mcp2221::wait_until_idle(const char* operation) {
-  Report command{};
-  command[0] = status;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    const Report reply = exchange(command, operation);
+    const Report reply = exchange({status}, operation);
     const std::uint8_t state = reply[8];
     if (state == kAddressNack || (reply[20] & 0x40) != 0) fail(operation, kAddressNack);
     if (state == kIdle || state == kWritingNoStop) return;

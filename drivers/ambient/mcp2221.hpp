@@ -8,21 +8,12 @@
 #include <functional>
 #include <span>
 
-#include "drivers/usb/transport.hpp"
+#include "drivers/usb/bus.hpp"
 
 namespace kphi::ambient {
 
-/// An I²C bus as a sensor's driver sees it. Blocking; one thread.
-class I2c {
- public:
-  virtual ~I2c() = default;
-  /// Writes, then a stop. Throws DeviceError: no acknowledgement, bus stuck, bridge gone.
-  virtual void write(std::uint8_t address, std::span<const std::uint8_t> bytes) = 0;
-  /// Writes one register number, repeats the start and reads. Throws DeviceError.
-  virtual void read(std::uint8_t address, std::uint8_t register_number, std::span<std::uint8_t> into) = 0;
-};
-
-class Mcp2221 final : public I2c {
+/// Blocking; one thread.
+class Mcp2221 {
  public:
   static constexpr std::uint16_t kVendor = 0x04d8, kProduct = 0x00dd;
   using Report = std::array<std::uint8_t, 64>;
@@ -34,16 +25,17 @@ class Mcp2221 final : public I2c {
   /// answer, bus stuck.
   explicit Mcp2221(usb::Transport& transport, Pause pause = sleep);
 
-  void write(std::uint8_t address, std::span<const std::uint8_t> bytes) override;
-  void read(std::uint8_t address, std::uint8_t register_number, std::span<std::uint8_t> into) override;
+  /// Writes, then a stop. Throws DeviceError: no acknowledgement, bus stuck, bridge gone.
+  void write(std::uint8_t address, std::span<const std::uint8_t> bytes);
+  /// Writes one register number, repeats the start and reads. Throws DeviceError.
+  void read(std::uint8_t address, std::uint8_t register_number, std::span<std::uint8_t> into);
 
   /// Sleeps.
   static void sleep(std::chrono::microseconds wall);
 
  private:
   Report exchange(const Report& command, const char* operation);
-  void synchronise();
-  Report fetch(std::uint8_t command_code, const char* operation);
+  Report converse(const Report& command, const char* operation);
   void set_speed();
   void cancel();
   void send(std::uint8_t command, std::uint8_t address, std::size_t total, std::span<const std::uint8_t> data,

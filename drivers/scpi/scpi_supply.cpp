@@ -8,17 +8,14 @@
 #include <stdexcept>
 
 #include "base/error.hpp"
-#include "base/uri.hpp"
-#include "drivers/scpi/tcp.hpp"
-#include "drivers/scpi/usbtmc.hpp"
 #include "drivers/scpi/wire.hpp"
-#include "drivers/usb/bus.hpp"
 
 namespace kphi::scpi {
 namespace {
 
 constexpr double kMarginOfReading = 1.1;  // a supply shows a little more than it can be set to
 constexpr int kLongestQueue = 64;         // of errors; real ones hold 10 to 32
+constexpr double kStep = 0.001;           // V and A
 
 void demand_range(const char* what, double value, double most) {
   if (std::isfinite(value) && value >= 0 && value <= most * kMarginOfReading) return;
@@ -27,11 +24,11 @@ void demand_range(const char* what, double value, double most) {
 
 }  // namespace
 
-/// The commands of one maker's family of supplies, without their argument; empty: this family has none.
+/// The commands of one maker's family of supplies, without their argument.
 struct ScpiSupply::Dialect {
   std::string_view identity;         ///< part of *IDN?; empty: any
   std::string_view over_voltage;     ///< threshold
-  std::string_view over_voltage_on;  ///< whole command that arms it; empty: always armed
+  std::string_view over_voltage_on;  ///< whole command that arms it
   std::string_view over_current;
   std::string_view over_current_on;
   std::string_view over_voltage_tripped;  ///< query; answers 1 or YES
@@ -40,7 +37,6 @@ struct ScpiSupply::Dialect {
   /// True: `regulation` answers CV, CC or UR. False: bits of the questionable status (SCPI-99, 20.3): bit 1 = current
   /// is what is held.
   bool regulation_by_name = false;
-  double voltage_step_v = 0.001, current_step_a = 0.001;
 };
 
 /// The first whose pattern is part of the answer to *IDN?.
@@ -48,9 +44,9 @@ const ScpiSupply::Dialect& ScpiSupply::dialect_of(std::string_view identity) noe
   // SCPI-99 volume 2 for the last row; the makers' programming guides for the others.
   static constexpr Dialect kDialects[] = {
       {"RIGOL TECHNOLOGIES,DP8", "OUTP:OVP:VAL", "OUTP:OVP ON", "OUTP:OCP:VAL", "OUTP:OCP ON", "OUTP:OVP:QUES?",
-       "OUTP:OCP:QUES?", "OUTP:MODE?", true, 0.001, 0.001},
+       "OUTP:OCP:QUES?", "OUTP:MODE?", true},
       {"", "VOLT:PROT", "VOLT:PROT:STAT ON", "CURR:PROT", "CURR:PROT:STAT ON", "VOLT:PROT:TRIP?", "CURR:PROT:TRIP?",
-       "STAT:QUES:COND?", false, 0.001, 0.001},
+       "STAT:QUES:COND?", false},
   };
   return *std::find_if(std::begin(kDialects), std::end(kDialects) - 1, [&](const Dialect& dialect) {
     return identity.find(dialect.identity) != std::string_view::npos;
@@ -65,8 +61,7 @@ ScpiSupply::ScpiSupply(std::unique_ptr<Line> line, const Clock& clock) : line_(s
   dialect_ = &dialect_of(who);
   identity_ = {fmt::format("supply {} on {}", fields[1], line_->name()), fields[1], fields[2], fields[3]};
   forget_errors();
-  identity_.voltage_step_v = dialect_->voltage_step_v;
-  identity_.current_step_a = dialect_->current_step_a;
+  identity_.voltage_step_v = identity_.current_step_a = kStep;
   identity_.voltage_max_v = ask("VOLT? MAX");
   identity_.current_max_a = ask("CURR? MAX");
   if (identity_.voltage_max_v <= 0 || identity_.current_max_a <= 0)
@@ -78,13 +73,12 @@ supply::Limits ScpiSupply::apply(const supply::Limits& limits) {
   demand_range("current", limits.current.value(), identity_.current_max_a);
   demand_range("over-voltage threshold", limits.over_voltage.value(), identity_.voltage_max_v);
   demand_range("over-current threshold", limits.over_current.value(), identity_.current_max_a);
-  const double v = identity_.voltage_step_v, a = identity_.current_step_a;
-  set(dialect_->over_voltage, limits.over_voltage.value(), v);
+  set(dialect_->over_voltage, limits.over_voltage.value());
   tell(std::string(dialect_->over_voltage_on));
-  set(dialect_->over_current, limits.over_current.value(), a);
+  set(dialect_->over_current, limits.over_current.value());
   tell(std::string(dialect_->over_current_on));
-  set("CURR", limits.current.value(), a);
-  set("VOLT", limits.voltage.value(), v);
+  set("CURR", limits.current.value());
+  set("VOLT", limits.voltage.value());
   return {Volts(ask("VOLT?")), Amperes(ask("CURR?")), Volts(ask(std::string(dialect_->over_voltage) + "?")),
           Amperes(ask(std::string(dialect_->over_current) + "?"))};
 }
@@ -106,9 +100,6 @@ supply::Reading ScpiSupply::read() {
   return reading;
 }
 
-void ScpiSupply::switch_on() { switch_output(true); }
-void ScpiSupply::switch_off() { switch_output(false); }
-
 void ScpiSupply::switch_output(bool on) {
   tell(on ? "OUTP ON" : "OUTP OFF");
   if ((ask("OUTP?") != 0) != on) fail("OUTP", on ? "the output stays off" : "the output stays on", "switch it by hand");
@@ -116,10 +107,10 @@ void ScpiSupply::switch_output(bool on) {
 
 supply::Counters ScpiSupply::counters() const noexcept {
   supply::Counters counters = counters_;
-  const LineCounters line = line_->counters();
-  counters.timeouts = line.timeouts;
-  counters.damaged += line.damaged;
-  counters.flushes = line.recoveries;
+  const auto [timeouts, damaged, recoveries] = line_->counters();
+  counters.timeouts = timeouts;
+  counters.damaged += damaged;
+  counters.flushes = recoveries;
   return counters;
 }
 
@@ -143,7 +134,6 @@ void ScpiSupply::forget_errors() {
 }
 
 void ScpiSupply::tell(const std::string& command) {
-  if (command.empty()) return;
   ++counters_.requests;
   line_->write(command);
   const std::string error = next_error();
@@ -153,89 +143,53 @@ void ScpiSupply::tell(const std::string& command) {
   fail(command, "the instrument answers " + error, "check the ranges of the instrument");
 }
 
-void ScpiSupply::set(std::string_view command, double value, double step) {
-  tell(fmt::format("{} {}", command, number_text(value, step)));
+void ScpiSupply::set(std::string_view command, double value) {
+  tell(fmt::format("{} {}", command, number_text(value, kStep)));
 }
 
-double ScpiSupply::ask(std::string_view query) {
+std::string ScpiSupply::query(std::string_view command) {
   ++counters_.requests;
-  const std::string answer = line_->query(query);
+  std::string answer = line_->query(command);
   ++counters_.replies;
+  return answer;
+}
+
+double ScpiSupply::ask(std::string_view command) {
+  const std::string answer = query(command);
   // OUTP? answers 0 and 1, or ON and OFF.
   if (answer == "ON") return 1;
   if (answer == "OFF") return 0;
   if (const auto number = number_of(answer)) return *number;
   ++counters_.damaged;
-  fail(query, "\"" + answer + "\" is not a number");
+  fail(command, "\"" + answer + "\" is not a number");
 }
 
-double ScpiSupply::ask_within(std::string_view query, double most) {
-  const double value = ask(query);
+double ScpiSupply::ask_within(std::string_view command, double most) {
+  const double value = ask(command);
   // Converters show a few counts below zero.
   if (value >= -0.01 * most && value <= most * kMarginOfReading) return value;
   ++counters_.implausible;
-  fail(query, fmt::format("reading {:g} is impossible: its maximum is {:g}", value, most));
+  fail(command, fmt::format("reading {:g} is impossible: its maximum is {:g}", value, most));
 }
 
-bool ScpiSupply::tripped(std::string_view query) {
-  if (query.empty()) return false;
-  ++counters_.requests;
-  const std::string answer = line_->query(query);
-  ++counters_.replies;
+bool ScpiSupply::tripped(std::string_view command) {
+  const std::string answer = query(command);
   return answer == "1" || answer == "YES";
 }
 
 supply::Regulation ScpiSupply::regulation() {
   using supply::Regulation;
-  if (dialect_->regulation.empty()) return Regulation::unknown;
   if (!dialect_->regulation_by_name) {
     const auto bits = static_cast<unsigned>(ask_within(dialect_->regulation, 32767 / kMarginOfReading));
     return (bits & 2u) != 0 ? Regulation::constant_current : Regulation::constant_voltage;
   }
-  ++counters_.requests;
-  const std::string answer = line_->query(dialect_->regulation);
-  ++counters_.replies;
+  const std::string answer = query(dialect_->regulation);
   if (answer == "CV") return Regulation::constant_voltage;
   return answer == "CC" ? Regulation::constant_current : Regulation::unknown;
 }
 
 void ScpiSupply::fail(std::string_view operation, const std::string& cause, const char* next_move) {
   throw DeviceError(identity_.device, std::string(operation), cause, next_move);
-}
-
-// --- opening
-
-namespace {
-
-constexpr std::string_view kTcp = "scpi-tcp", kUsb = "scpi-usb";
-constexpr std::uint16_t kUsualPort = 5025;
-
-struct OpenDevice {
-  explicit OpenDevice(const UsbAddress& address) : device(bus.open(address)) {}
-  usb::Bus bus;
-  std::unique_ptr<usb::Transport> device;
-};
-
-/// Owns bus and device, which outlive the conversation.
-class UsbLine final : OpenDevice, public Usbtmc {
- public:
-  explicit UsbLine(const UsbAddress& address) : OpenDevice(address), Usbtmc(*device) {}
-};
-
-}  // namespace
-
-bool is_scpi(std::string_view uri) noexcept {
-  const std::string_view scheme = uri.substr(0, uri.find(':'));
-  return scheme.size() < uri.size() && (scheme == kTcp || scheme == kUsb);
-}
-
-std::unique_ptr<Line> open_line(const std::string& text) {
-  const Uri uri(text, "instrument", "write scpi-tcp:HOST:5025 or scpi-usb:VID:PID");
-  if (!uri.options().empty()) uri.refuse("no options are known");
-  if (uri.scheme() == kUsb) return std::make_unique<UsbLine>(UsbAddress::parse("usb:" + uri.location()));
-  if (uri.scheme() != kTcp) uri.refuse(fmt::format("unknown scheme \"{}:\"", uri.scheme()));
-  const HostPort address = uri.host_and_port(kUsualPort);
-  return std::make_unique<Tcp>(address.host, address.port);
 }
 
 std::unique_ptr<supply::Supply> open_supply(const std::string& uri, const Clock& clock) {

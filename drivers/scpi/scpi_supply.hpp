@@ -1,7 +1,4 @@
-// A supply that speaks SCPI, over USB or TCP. Its address in a bench file:
-//
-//     scpi-tcp:192.168.1.30:5025
-//     scpi-usb:VVVV:PPPP            then :SERIAL or @PORT if several are alike
+// A supply that speaks SCPI.
 #pragma once
 
 #include <memory>
@@ -24,21 +21,22 @@ class ScpiSupply final : public supply::Supply {
   /// After each command the instrument's error queue is asked (SYST:ERR?).
   supply::Limits apply(const supply::Limits& limits) override;
   [[nodiscard]] supply::Reading read() override;
-  void switch_off() override;
+  void switch_off() override { switch_output(false); }
   [[nodiscard]] supply::Counters counters() const noexcept override;
 
  private:
   struct Dialect;
   [[nodiscard]] static const Dialect& dialect_of(std::string_view identity) noexcept;
-  void switch_on() override;
+  void switch_on() override { switch_output(true); }
   void switch_output(bool on);
   [[nodiscard]] std::string next_error();
   void forget_errors();
   void tell(const std::string& command);
-  void set(std::string_view command, double value, double step);
-  [[nodiscard]] double ask(std::string_view query);
-  [[nodiscard]] double ask_within(std::string_view query, double most);
-  [[nodiscard]] bool tripped(std::string_view query);
+  void set(std::string_view command, double value);
+  [[nodiscard]] std::string query(std::string_view command);
+  [[nodiscard]] double ask(std::string_view command);
+  [[nodiscard]] double ask_within(std::string_view command, double most);
+  [[nodiscard]] bool tripped(std::string_view command);
   [[nodiscard]] supply::Regulation regulation();
   [[noreturn]] void fail(std::string_view operation, const std::string& cause, const char* next_move = "");
 
@@ -48,11 +46,6 @@ class ScpiSupply final : public supply::Supply {
   const Dialect* dialect_ = nullptr;
   supply::Counters counters_;
 };
-
-[[nodiscard]] bool is_scpi(std::string_view uri) noexcept;
-
-/// Throws std::invalid_argument with one line that says what to write; DeviceError: not there, or not an instrument.
-[[nodiscard]] std::unique_ptr<Line> open_line(const std::string& uri);
 
 /// Throws as open_line() does. `clock` outlives it.
 [[nodiscard]] std::unique_ptr<supply::Supply> open_supply(const std::string& uri, const Clock& clock);

@@ -1,11 +1,10 @@
-#include "drivers/scpi/usbtmc.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 
 #include "base/error.hpp"
+#include "drivers/scpi/line.hpp"
 #include "drivers/scpi/wire.hpp"
 
 namespace kphi::scpi {
@@ -16,10 +15,8 @@ using namespace std::chrono_literals;
 constexpr std::uint8_t kClass = 0xFE, kSubclass = 0x03;
 constexpr std::uint8_t kFromInterface = 0xA1, kFromEndpoint = 0xA2;
 enum Request : std::uint8_t {
-  initiate_abort_out = 1,
-  check_abort_out = 2,
+  initiate_abort_out = 1,  // one more: check it
   initiate_abort_in = 3,
-  check_abort_in = 4,
   initiate_clear = 5,
   check_clear = 6,
   get_capabilities = 7,
@@ -111,17 +108,12 @@ void Usbtmc::write(std::string_view command) {
   const auto message = usbtmc::message_out(tag_, std::string(command) + "\n");
   const usb::Transfer sent = transport_.write(out_, message, timeout_);
   if (sent.outcome == usb::Outcome::done && sent.bytes == message.size()) return;
-  recover_out(sent.outcome);
+  recover(out_, sent.outcome);
   fail(command, usb::name_of(sent.outcome));
 }
 
 std::string Usbtmc::query(std::string_view command) {
-  ++counters_.queries;
   write(command);
-  return receive(command);
-}
-
-std::string Usbtmc::receive(std::string_view command) {
   std::string answer;
   bool first = true;
   while (!receive_part(answer, first)) {
@@ -141,21 +133,21 @@ bool Usbtmc::receive_part(std::string& answer, bool may_be_empty) {
   const auto request = usbtmc::request_in(tag_, kPart);
   const usb::Transfer asked = transport_.write(out_, request, timeout_);
   if (asked.outcome != usb::Outcome::done) {
-    recover_out(asked.outcome);
+    recover(out_, asked.outcome);
     fail("ask for the answer", usb::name_of(asked.outcome));
   }
   std::array<std::uint8_t, kRoom> buffer;
   usb::Transfer got = transport_.read(in_, buffer, timeout_);
   if (got.outcome == usb::Outcome::done && got.bytes == 0 && may_be_empty) got = transport_.read(in_, buffer, timeout_);
   if (got.outcome != usb::Outcome::done) {
-    recover_in(got.outcome);
+    recover(in_, got.outcome);
     fail("read the answer", usb::name_of(got.outcome), "check that the instrument knows this command");
   }
   const auto header = usbtmc::answer_header(std::span(buffer).first(got.bytes), tag_);
   const bool goes_nowhere = header && header->bytes == 0 && !header->end_of_message;
   if (!header || header->bytes > kPart || goes_nowhere) {
     ++counters_.damaged;
-    recover_in(got.outcome);
+    recover(in_, got.outcome);
     fail("read the answer",
          goes_nowhere ? "the answer is empty and does not end" : "the reply belongs to another request");
   }
@@ -164,7 +156,7 @@ bool Usbtmc::receive_part(std::string& answer, bool may_be_empty) {
   while (have < header->bytes) {
     got = transport_.read(in_, buffer, timeout_);
     if (got.outcome != usb::Outcome::done || got.bytes == 0) {
-      recover_in(got.outcome);
+      recover(in_, got.outcome);
       fail("read the answer", got.bytes == 0 ? "the answer breaks off" : usb::name_of(got.outcome));
     }
     const std::size_t more = std::min<std::size_t>(got.bytes, header->bytes - have);
@@ -174,35 +166,27 @@ bool Usbtmc::receive_part(std::string& answer, bool may_be_empty) {
   return header->end_of_message;
 }
 
-void Usbtmc::recover_out(usb::Outcome outcome) noexcept {
+void Usbtmc::recover(const usb::Endpoint& endpoint, usb::Outcome outcome) noexcept {
   out_of_order_ = true;
-  if (outcome == usb::Outcome::timed_out) {
-    ++counters_.timeouts;
-    (void)abort(initiate_abort_out, check_abort_out, out_);
-  }
-  if (outcome != usb::Outcome::gone && outcome != usb::Outcome::cancelled) (void)transport_.clear_halt(out_);
+  if (outcome == usb::Outcome::gone) return;
+  const bool late = outcome == usb::Outcome::timed_out;
+  if (late) ++counters_.timeouts;
+  if (late || endpoint.in()) abort(endpoint);
+  (void)transport_.clear_halt(endpoint);
 }
 
-void Usbtmc::recover_in(usb::Outcome outcome) noexcept {
-  out_of_order_ = true;
-  if (outcome == usb::Outcome::gone || outcome == usb::Outcome::cancelled) return;
-  if (outcome == usb::Outcome::timed_out) ++counters_.timeouts;
-  (void)abort(initiate_abort_in, check_abort_in, in_);
-  (void)transport_.clear_halt(in_);
-}
-
-bool Usbtmc::abort(std::uint8_t initiate, std::uint8_t check, const usb::Endpoint& endpoint) noexcept {
+void Usbtmc::abort(const usb::Endpoint& endpoint) noexcept {
+  const std::uint8_t initiate = endpoint.in() ? initiate_abort_in : initiate_abort_out;
   std::array<std::uint8_t, 8> answer{};
   usb::Transfer got = transport_.control_in({kFromEndpoint, initiate, tag_, endpoint.address},
                                             std::span(answer).first(2), kControlTimeout);
-  if (got.outcome != usb::Outcome::done || answer[0] != kSuccess) return false;
+  if (got.outcome != usb::Outcome::done || answer[0] != kSuccess) return;
+  const auto check = static_cast<std::uint8_t>(initiate + 1);
   for (int i = 0; i < kChecks; ++i) {
     if (endpoint.in()) drain();
     got = transport_.control_in({kFromEndpoint, check, 0, endpoint.address}, answer, kControlTimeout);
-    if (got.outcome != usb::Outcome::done) return false;
-    if (answer[0] != kPending) return answer[0] == kSuccess;
+    if (got.outcome != usb::Outcome::done || answer[0] != kPending) return;
   }
-  return false;
 }
 
 void Usbtmc::drain() noexcept {

@@ -3,23 +3,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <boost/endian/conversion.hpp>
 #include <cmath>
+
+#include "base/number.hpp"
 
 namespace kphi::scpi {
 
 std::optional<double> number_of(std::string_view text) noexcept {
-  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; };
-  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
-  if (!text.empty() && text.front() == '+') {
-    text.remove_prefix(1);
-    if (!text.empty() && text.front() == '-') return std::nullopt;
-  }
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !(std::abs(value) < 9.8e37)) return std::nullopt;
-  return value;
+  constexpr std::string_view kBlanks = " \t\r\n";
+  text.remove_prefix(std::min(text.find_first_not_of(kBlanks), text.size()));
+  text = text.substr(0, text.find_last_not_of(kBlanks) + 1);
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
+  const auto value = parse_finite(text);
+  return value && std::abs(*value) < 9.8e37 ? value : std::nullopt;
 }
 
 std::string number_text(double value, double step) {
@@ -46,8 +43,10 @@ constexpr std::uint8_t kMessageOut = 1, kMessageIn = 2, kEndOfMessage = 1;
 
 std::array<std::uint8_t, kHeaderBytes> header(std::uint8_t id, std::uint8_t tag, std::uint32_t bytes,
                                               std::uint8_t attributes) noexcept {
-  const auto byte = [&](int i) { return static_cast<std::uint8_t>(bytes >> (8 * i)); };
-  return {id, tag, static_cast<std::uint8_t>(~tag), 0, byte(0), byte(1), byte(2), byte(3), attributes, 0, 0, 0};
+  std::array<std::uint8_t, kHeaderBytes> all{id, tag, static_cast<std::uint8_t>(~tag)};
+  boost::endian::store_little_u32(&all[4], bytes);
+  all[8] = attributes;
+  return all;
 }
 
 }  // namespace
@@ -66,9 +65,7 @@ std::array<std::uint8_t, kHeaderBytes> request_in(std::uint8_t tag, std::uint32_
 std::optional<AnswerHeader> answer_header(std::span<const std::uint8_t> b, std::uint8_t tag) noexcept {
   if (b.size() < kHeaderBytes || b[0] != kMessageIn || b[1] != tag || b[2] != static_cast<std::uint8_t>(~tag))
     return std::nullopt;
-  const std::uint32_t bytes = b[4] | static_cast<std::uint32_t>(b[5]) << 8 | static_cast<std::uint32_t>(b[6]) << 16 |
-                              static_cast<std::uint32_t>(b[7]) << 24;
-  return AnswerHeader{bytes, (b[8] & kEndOfMessage) != 0};
+  return AnswerHeader{boost::endian::load_little_u32(&b[4]), (b[8] & kEndOfMessage) != 0};
 }
 
 }  // namespace usbtmc

@@ -50,7 +50,7 @@ std::string status(SimulatedBench& bench) {
                               {"motor_timeouts", bench.motor().timeouts()},
                               {"drive", {{"mode", name_of(drive.mode)}, {"target", drive.target}}},
                               {"last_motion_command_s", nullptr}};
-  const Instant last = bench.motor().last_motion_command();
+  const Instant last = bench.motor().last_motion().at;
   if (last >= Instant{0}) json["last_motion_command_s"] = to_seconds(last);
   if (SupplySlave* supply = bench.supply()) {
     const SupplyCircuit& circuit = supply->circuit();

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "drivers/sim/bench.hpp"
+#include "drivers/sim/simulated_bench.hpp"
 
 namespace kphi::sim {
 

@@ -19,7 +19,7 @@
 #include <string>
 
 #include "base/error.hpp"
-#include "drivers/sim/bench.hpp"
+#include "drivers/sim/simulated_bench.hpp"
 
 namespace kphi::sim {
 

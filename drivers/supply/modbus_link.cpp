@@ -21,36 +21,22 @@ using std::chrono::steady_clock;
 constexpr auto kLongestQuiet = std::chrono::seconds(2);
 constexpr double kBitsPerByte = 10, kSilentBytes = 3.5;
 
-Failure failure_of(int error) noexcept {
+Outcome outcome_of(int error) {
   switch (error) {
     case ETIMEDOUT:
-      return Failure::timeout;
+      return {Failure::timeout, "no answer"};
     case EMBBADCRC:
     case EMBBADDATA:
     case EMBBADSLAVE:
     case EMBBADEXC:
     case EMBUNKEXC:
-      return Failure::damaged;
-    case EMBXSBUSY:
-    case EMBXACK:
-      return Failure::busy;
+      return {Failure::damaged, fmt::format("damaged answer ({})", modbus_strerror(error))};
     default:
-      return error > MODBUS_ENOBASE ? Failure::refused : Failure::lost;
+      break;
   }
-}
-
-std::string words_for(int error) {
-  switch (failure_of(error)) {
-    case Failure::timeout:
-      return "no answer";
-    case Failure::damaged:
-      return fmt::format("damaged answer ({})", modbus_strerror(error));
-    case Failure::refused:
-    case Failure::busy:
-      return fmt::format("the device answers \"{}\"", modbus_strerror(error));
-    default:
-      return fmt::format("the line is lost ({})", std::strerror(error));
-  }
+  if (error <= MODBUS_ENOBASE) return {Failure::lost, fmt::format("the line is lost ({})", std::strerror(error))};
+  return {error == EMBXSBUSY || error == EMBXACK ? Failure::busy : Failure::refused,
+          fmt::format("the device answers \"{}\"", modbus_strerror(error))};
 }
 
 modbus_t* make_context(const Address& address) {
@@ -139,7 +125,7 @@ Outcome ModbusLink::outcome(int result, int expected) {
   last_ = steady_clock::now();
   if (result == expected) return {};
   if (result >= 0) return {Failure::damaged, "answer of the wrong length"};
-  return {failure_of(error), words_for(error)};
+  return outcome_of(error);
 }
 
 void ModbusLink::fall_silent() {

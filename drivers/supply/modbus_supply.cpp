@@ -118,10 +118,6 @@ const CurrentRange& ModbusSupply::range() const noexcept {
   return model_->ranges[second ? 1 : 0];
 }
 
-double ModbusSupply::over_current_counts_per_a() const noexcept {
-  return model_->over_current_counts_per_a > 0 ? model_->over_current_counts_per_a : range().counts_per_a;
-}
-
 /// Fills the reading from the registers. Returns what is impossible; empty: plausible.
 std::string ModbusSupply::implausible(Reading& reading) const {
   const RegisterMap& map = *model_->map;
@@ -156,54 +152,46 @@ std::string ModbusSupply::implausible(Reading& reading) const {
   return {};
 }
 
-void ModbusSupply::check(const Limits& limits) const {
-  const CurrentRange& amps = range();
-  const auto refuse = [&](const char* what, double value, double max, const char* unit) {
-    throw std::invalid_argument(
-        fmt::format("{}: {} of {} {} is outside 0 to {} {}", identity_.device, what, value, unit, max, unit));
-  };
-  for (const auto& [what, value] : {std::pair("a voltage", limits.voltage), {"an over-voltage", limits.over_voltage}}) {
-    if (!fits(value.value(), model_->counts_per_v, model_->max_v)) refuse(what, value.value(), model_->max_v, "V");
-  }
-  if (!fits(limits.current.value(), amps.counts_per_a, amps.max_a))
-    refuse("a current limit", limits.current.value(), amps.max_a, "A");
-  if (!fits(limits.over_current.value(), over_current_counts_per_a(), amps.max_a))
-    refuse("an over-current", limits.over_current.value(), amps.max_a, "A");
-}
-
 Limits ModbusSupply::apply(const Limits& limits) {
   (void)read();  // the current range may have been changed by hand
-  check(limits);
   const RegisterMap& map = *model_->map;
-  const double per_v = model_->counts_per_v, per_a = range().counts_per_a, per_over_a = over_current_counts_per_a();
-  const std::uint16_t over_voltage = to_counts(limits.over_voltage.value(), per_v);
-  const std::uint16_t over_current = to_counts(limits.over_current.value(), per_over_a);
-  const std::uint16_t current = to_counts(limits.current.value(), per_a);
-  const std::uint16_t voltage = to_counts(limits.voltage.value(), per_v);
-  put("set over-voltage", map.over_voltage, over_voltage);
-  put("set over-current", map.over_current, over_current);
-  put("set current limit", map.current_limit, current);
-  put("set voltage", map.set_voltage, voltage);
+  const CurrentRange& amps = range();
+  struct Setting {
+    const char* name;
+    const char* unit;
+    Writable at;
+    double value, counts_per_unit, max;
+    std::uint16_t counts = 0;
+  };
+  const double per_v = model_->counts_per_v, max_v = model_->max_v;
+  const double per_over_a =
+      model_->over_current_counts_per_a > 0 ? model_->over_current_counts_per_a : amps.counts_per_a;
+  Setting over_voltage{"over-voltage threshold", "V", map.over_voltage, limits.over_voltage.value(), per_v, max_v};
+  Setting over_current{"over-current threshold",    "A",        map.over_current,
+                       limits.over_current.value(), per_over_a, amps.max_a};
+  Setting current{"current limit", "A", map.current_limit, limits.current.value(), amps.counts_per_a, amps.max_a};
+  Setting voltage{"voltage", "V", map.set_voltage, limits.voltage.value(), per_v, max_v};
+  const auto settings = {&over_voltage, &over_current, &current, &voltage};
+  for (Setting* s : settings) {
+    if (!fits(s->value, s->counts_per_unit, s->max))
+      throw std::invalid_argument(fmt::format("{}: {} of {} {unit} is outside 0 to {} {unit}", identity_.device,
+                                              s->name, s->value, s->max, fmt::arg("unit", s->unit)));
+    s->counts = to_counts(s->value, s->counts_per_unit);
+  }
+  for (const Setting* s : settings)
+    persist(fmt::format("set {}", s->name), [&] { return write_once(s->at, s->counts, map.write_multiple); });
   persist("read thresholds", [&] { return read_block(map.thresholds); });
   (void)read();
-  confirm("over-voltage threshold", map.over_voltage, over_voltage, per_v);
-  confirm("over-current threshold", map.over_current, over_current, per_over_a);
-  confirm("current limit", map.current_limit, current, per_a);
-  confirm("voltage", map.set_voltage, voltage, per_v);
+  for (const Setting* s : settings) {
+    if (registers_[s->at] == s->counts) continue;
+    throw DeviceError(
+        identity_.device, fmt::format("set {}", s->name),
+        fmt::format("set to {}, reads back {}", s->counts / s->counts_per_unit, registers_[s->at] / s->counts_per_unit),
+        "unlock its panel, recall preset M0, and do not touch its front panel");
+  }
   limits_applied_ = true;
-  return {Volts(voltage / per_v), Amperes(current / per_a), Volts(over_voltage / per_v),
-          Amperes(over_current / per_over_a)};
-}
-
-void ModbusSupply::put(const char* operation, Writable at, std::uint16_t value) {
-  persist(operation, [&] { return write_once(at, value, model_->map->write_multiple); });
-}
-
-void ModbusSupply::confirm(const char* what, std::uint16_t at, std::uint16_t value, double counts_per_unit) {
-  if (registers_[at] == value) return;
-  throw DeviceError(identity_.device, fmt::format("set {}", what),
-                    fmt::format("set to {}, reads back {}", value / counts_per_unit, registers_[at] / counts_per_unit),
-                    "unlock its panel, recall preset M0, and do not touch its front panel");
+  return {Volts(voltage.counts / per_v), Amperes(current.counts / amps.counts_per_a),
+          Volts(over_voltage.counts / per_v), Amperes(over_current.counts / per_over_a)};
 }
 
 void ModbusSupply::switch_on() {
@@ -233,39 +221,25 @@ void ModbusSupply::switch_off() {
                     "switch it off by hand");
 }
 
-Outcome ModbusSupply::read_block(const Block& block) {
-  ++counters_.requests;
-  return count(link_.read(block, registers_));
-}
+Outcome ModbusSupply::read_block(const Block& block) { return count(link_.read(block, registers_)); }
 
 Outcome ModbusSupply::write_once(Writable at, std::uint16_t value, bool multiple) {
-  ++counters_.requests;
   return count(link_.write(at, value, multiple));
 }
 
 Outcome ModbusSupply::count(Outcome outcome) {
-  switch (outcome.failure) {
-    case Failure::none:
-      ++counters_.replies;
-      break;
-    case Failure::timeout:
-      ++counters_.timeouts;
-      break;
-    case Failure::damaged:
-      ++counters_.damaged;
-      break;
-    case Failure::busy:
-    case Failure::refused:
-      ++counters_.refused;
-      break;
-    case Failure::lost:
-      lost_ = true;
-      break;
+  constexpr std::uint64_t Counters::*kAs[] = {&Counters::replies, &Counters::timeouts, &Counters::damaged,
+                                              &Counters::refused, &Counters::refused};  // by Failure
+  ++counters_.requests;
+  if (outcome.failure == Failure::lost) {
+    lost_ = true;
+  } else {
+    ++(counters_.*kAs[static_cast<std::size_t>(outcome.failure)]);
   }
   return outcome;
 }
 
-void ModbusSupply::persist(const char* operation, const std::function<Outcome()>& attempt) {
+void ModbusSupply::persist(const std::string& operation, const std::function<Outcome()>& attempt) {
   Outcome outcome;
   for (int i = 0; i < kAttempts; ++i) {
     if (i > 0) ++counters_.retries;

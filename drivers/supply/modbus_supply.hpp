@@ -38,13 +38,9 @@ class ModbusSupply final : public Supply {
   [[nodiscard]] Outcome look(Reading& reading);
   [[nodiscard]] std::string implausible(Reading& reading) const;
   [[nodiscard]] const CurrentRange& range() const noexcept;
-  [[nodiscard]] double over_current_counts_per_a() const noexcept;
-  void check(const Limits& limits) const;
-  void put(const char* operation, Writable at, std::uint16_t value);
-  void confirm(const char* what, std::uint16_t at, std::uint16_t value, double counts_per_unit);
 
   // Bounded retries around single requests.
-  void persist(const char* operation, const std::function<Outcome()>& attempt);
+  void persist(const std::string& operation, const std::function<Outcome()>& attempt);
   [[nodiscard]] Outcome settle();
   [[nodiscard]] Outcome count(Outcome outcome);
   [[nodiscard]] Outcome read_block(const Block& block);

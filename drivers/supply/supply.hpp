@@ -5,7 +5,9 @@
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <string>
+#include <utility>
 
 #include "base/clock.hpp"
 #include "compensation/units.hpp"
@@ -75,6 +77,18 @@ struct Counters {
 
 class PoweredOutput;
 
+/// Empty, or why `act` has failed.
+[[nodiscard]] std::string why_failed(const auto& act) noexcept {
+  try {
+    act();
+    return {};
+  } catch (const std::exception& error) {
+    return error.what();
+  } catch (...) {
+    return "an unknown failure";
+  }
+}
+
 /// All members throw DeviceError when the device does not answer after bounded retries, refuses, or acknowledges
 /// without obeying. Retries end after a few seconds.
 class Supply {
@@ -104,14 +118,24 @@ class Supply {
 class [[nodiscard]] PoweredOutput {
  public:
   /// If this throws, it has already tried to switch off.
-  explicit PoweredOutput(Supply& supply);
+  explicit PoweredOutput(Supply& supply) : supply_(&supply) {
+    try {
+      supply.switch_on();
+    } catch (...) {
+      (void)off();
+      throw;
+    }
+  }
   /// Tries to switch off; a failure is not reported: call off() for that.
-  ~PoweredOutput();
+  ~PoweredOutput() { (void)off(); }
   PoweredOutput(const PoweredOutput&) = delete;
   PoweredOutput& operator=(const PoweredOutput&) = delete;
 
   /// Switches off; empty, or why that could not be confirmed. Once.
-  [[nodiscard]] std::string off() noexcept;
+  [[nodiscard]] std::string off() noexcept {
+    Supply* const supply = std::exchange(supply_, nullptr);
+    return supply == nullptr ? std::string() : why_failed([&] { supply->switch_off(); });
+  }
 
  private:
   Supply* supply_;

@@ -72,20 +72,16 @@ namespace {
 constexpr RegisterMap kRiden{
     .family = "RD60xx",
     .usual_baud = 115200,
-    .most_registers = 125,
-    .write_multiple = true,
     .identity = {0, 4},
     .model = 0,
     .serial = 1,
     .firmware = 3,
-    .decimals = kAbsent,
     .look = {Block{8, 13}},
     .set_voltage = 8,
     .current_limit = 9,
     .voltage = 10,
     .current = 11,
     .protection = 16,
-    .protection_bits = false,
     .regulation = 17,
     .output = 18,
     .current_range = 20,
@@ -98,23 +94,17 @@ constexpr RegisterMap kRiden{
 constexpr RegisterMap kDps{
     .family = "DPS/DPH",
     .usual_baud = 9600,
-    .most_registers = 32,
-    .write_multiple = true,
     .identity = {0x0B, 2},
     .model = 0x0B,
-    .serial = kAbsent,
     .firmware = 0x0C,
-    .decimals = kAbsent,
     .look = {Block{0, 10}},
     .set_voltage = 0,
     .current_limit = 1,
     .voltage = 2,
     .current = 3,
     .protection = 7,
-    .protection_bits = false,
     .regulation = 8,
     .output = 9,
-    .current_range = kAbsent,
     .thresholds = {0x50, 4},
     .over_voltage = 0x52,
     .over_current = 0x53,
@@ -124,12 +114,9 @@ constexpr RegisterMap kDps{
 constexpr RegisterMap kHanmatek{
     .family = "HM3xx",
     .usual_baud = 9600,
-    .most_registers = 32,
     .write_multiple = false,
     .identity = {0x01, 5},
     .model = 0x03,
-    .serial = kAbsent,
-    .firmware = kAbsent,
     .decimals = 0x05,
     .look = {Block{0x01, 2}, Block{0x10, 2}, Block{0x30, 2}},
     .set_voltage = 0x30,
@@ -138,15 +125,19 @@ constexpr RegisterMap kHanmatek{
     .current = 0x11,
     .protection = 0x02,
     .protection_bits = true,
-    .regulation = kAbsent,
     .output = 0x01,
-    .current_range = kAbsent,
     .thresholds = {0x20, 2},
     .over_voltage = 0x20,
     .over_current = 0x21,
 };
 
 constexpr CurrentRange kNone{};
+
+/// nullptr when there is none.
+const Model* first_model(auto&& fits) {
+  const auto found = std::find_if(models().begin(), models().end(), fits);
+  return found == models().end() ? nullptr : &*found;
+}
 
 }  // namespace
 
@@ -181,14 +172,11 @@ std::vector<std::string_view> model_names() {
 std::vector<const RegisterMap*> families() { return {&kRiden, &kDps, &kHanmatek}; }
 
 const Model* find_model(std::string_view name) {
-  const auto found = std::find_if(models().begin(), models().end(), [&](const Model& m) { return m.name == name; });
-  return found == models().end() ? nullptr : &*found;
+  return first_model([&](const Model& m) { return m.name == name; });
 }
 
 const Model* find_model(const RegisterMap& map, std::uint16_t id) {
-  const auto found = std::find_if(models().begin(), models().end(),
-                                  [&](const Model& m) { return m.map == &map && m.first_id <= id && id <= m.last_id; });
-  return found == models().end() ? nullptr : &*found;
+  return first_model([&](const Model& m) { return m.map == &map && m.first_id <= id && id <= m.last_id; });
 }
 
 Protection protection_of(const RegisterMap& map, std::uint16_t code) noexcept {

@@ -64,20 +64,19 @@ inline constexpr int kAbsent = -1;
 struct RegisterMap {
   std::string_view family;
   unsigned usual_baud;
-  std::uint16_t most_registers;  ///< in one request
-  bool write_multiple;           ///< settings are written with function 0x10, else 0x06
+  bool write_multiple = true;  ///< settings are written with function 0x10, else 0x06
   /// No other block has its number of registers, so an answer to it proves that no older answer can follow.
   Block identity;
   std::uint16_t model;
-  int serial, firmware, decimals;  ///< kAbsent where there is none; serial: high word
-  std::array<Block, 3> look;       ///< what a reading needs; count 0: unused
+  int serial = kAbsent, firmware = kAbsent, decimals = kAbsent;  ///< serial: high word
+  std::array<Block, 3> look;                                     ///< what a reading needs; count 0: unused
   Writable set_voltage, current_limit;
   std::uint16_t voltage, current;
   std::uint16_t protection;
-  bool protection_bits;  ///< one bit per cause, else a number
-  int regulation;
+  bool protection_bits = false;  ///< one bit per cause, else a number
+  int regulation = kAbsent;
   Writable output;
-  int current_range;
+  int current_range = kAbsent;
   Block thresholds;
   Writable over_voltage, over_current;
 };

@@ -5,6 +5,7 @@
 // whatever reason; and when the object is destroyed. If that could not be confirmed, failure() says so.
 #pragma once
 
+#include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <condition_variable>
 #include <cstdint>
@@ -18,6 +19,7 @@
 #include <string>
 #include <thread>
 
+#include "base/error.hpp"
 #include "drivers/supply/supply.hpp"
 
 namespace kphi::supply {
@@ -44,39 +46,41 @@ class Worker {
   /// failed: the output may be on.
   [[nodiscard]] bool switch_off_and_confirm(Duration wall) noexcept;
 
-  /// Oldest readings first; one consumer thread. Holds 4096, 17 minutes at 4 Hz; further ones are dropped and counted.
+  /// Oldest readings first; one consumer thread. Holds 4096, 17 minutes at 4 Hz; further ones are dropped.
   std::size_t take(std::span<Reading> out);
   /// Any thread.
-  [[nodiscard]] std::optional<Reading> newest() const;
-  [[nodiscard]] Counters counters() const;
-  [[nodiscard]] std::uint64_t dropped_readings() const;
+  [[nodiscard]] std::optional<Reading> newest() const { return copy_of(newest_); }
   /// Read at construction.
   [[nodiscard]] const Identity& identity() const noexcept { return identity_; }
   /// False once the supply has failed; stays false.
-  [[nodiscard]] bool alive() const;
+  [[nodiscard]] bool alive() const { return !copy_of(ended_); }
   /// Why it is not alive, and whether the output may still be on.
-  [[nodiscard]] std::string failure() const;
+  [[nodiscard]] std::string failure() const { return copy_of(failure_); }
 
  private:
   /// Text instead of an exception, which cannot leave its thread.
   struct Answer {
-    enum class Kind : std::uint8_t { done, unfit, failed };
-    Kind kind = Kind::done;
-    std::string words;
+    std::string failure;  ///< empty: done
+    bool unfit = false;   ///< by an invalid argument
   };
   struct Order {
     std::function<void()> act;
     std::promise<Answer> answer;
   };
 
+  template <class T>
+  [[nodiscard]] T copy_of(const T& shared) const {
+    const std::lock_guard lock(mutex_);
+    return shared;
+  }
   void ask(std::function<void()> act);
+  [[nodiscard]] DeviceError gone() const;
   std::uint64_t ask_off() noexcept;
 
   // The thread.
   void run() noexcept;
   [[nodiscard]] static Answer answer_to(const std::function<void()>& act);
   [[nodiscard]] bool serve();
-  void apply_off();
   [[nodiscard]] std::string turn_off() noexcept;
   void look();
   void finish(std::string why) noexcept;
@@ -94,13 +98,12 @@ class Worker {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Order> orders_;
-  std::uint64_t offs_asked_ = 0, offs_done_ = 0;
+  std::atomic<std::uint64_t> offs_asked_{0};  // changed under the lock, too, so that the thread wakes up
+  std::uint64_t offs_done_ = 0;
   bool stop_asked_ = false;
   bool ended_ = false;
   std::string failure_;
   std::optional<Reading> newest_;
-  Counters counters_;
-  std::uint64_t dropped_readings_ = 0;
 
   boost::lockfree::spsc_queue<Reading, boost::lockfree::capacity<4096>> queue_;
   std::thread thread_;

@@ -5,23 +5,19 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 
 #include "base/error.hpp"
-#include "base/thread.hpp"
 
 namespace kphi::usb {
 namespace {
 
+constexpr const char* kRule = "install drivers/udev/60-kphi.rules, or run as a member of the device's group";
+constexpr std::uint8_t kApplication = 0xFE, kTestAndMeasurement = 0x03;
+
 EndpointKind kind_of(std::uint8_t attributes) noexcept {
-  switch (attributes & LIBUSB_TRANSFER_TYPE_MASK) {
-    case LIBUSB_TRANSFER_TYPE_BULK:
-      return EndpointKind::bulk;
-    case LIBUSB_TRANSFER_TYPE_INTERRUPT:
-      return EndpointKind::interrupt;
-    default:
-      return EndpointKind::other;
-  }
+  const int type = attributes & LIBUSB_TRANSFER_TYPE_MASK;
+  if (type == LIBUSB_TRANSFER_TYPE_BULK) return EndpointKind::bulk;
+  return type == LIBUSB_TRANSFER_TYPE_INTERRUPT ? EndpointKind::interrupt : EndpointKind::other;
 }
 
 /// The interfaces of the active configuration, in their first setting.
@@ -44,24 +40,7 @@ std::vector<Interface> interfaces_of(libusb_device* device) {
   return interfaces;
 }
 
-Outcome outcome_of(libusb_transfer_status status) noexcept {
-  switch (status) {
-    case LIBUSB_TRANSFER_COMPLETED:
-      return Outcome::done;
-    case LIBUSB_TRANSFER_TIMED_OUT:
-      return Outcome::timed_out;
-    case LIBUSB_TRANSFER_STALL:
-      return Outcome::stalled;
-    case LIBUSB_TRANSFER_NO_DEVICE:
-      return Outcome::gone;
-    case LIBUSB_TRANSFER_CANCELLED:
-      return Outcome::cancelled;
-    default:
-      return Outcome::failed;
-  }
-}
-
-Outcome outcome_of_error(int error) noexcept {
+Outcome outcome_of(int error) noexcept {
   switch (error) {
     case 0:
       return Outcome::done;
@@ -76,122 +55,67 @@ Outcome outcome_of_error(int error) noexcept {
   }
 }
 
-struct Waiting {
-  Device* device;
-  bool ended = false;
-};
-
-}  // namespace
-
-Device::Device(libusb_device_handle* handle, const Listing& listing)
-    : handle_(handle),
-      listing_(listing),
-      name_("USB device " + to_string(listing)),
-      interfaces_(interfaces_of(libusb_get_device(handle))) {
-  libusb_set_auto_detach_kernel_driver(handle_, 1);
-}
-
-Device::~Device() {
-  cancel();
-  for (const std::uint8_t number : claimed_) libusb_release_interface(handle_, number);
-  libusb_close(handle_);
-}
-
-void Device::claim(std::uint8_t interface_number) {
-  if (const int error = libusb_claim_interface(handle_, interface_number); error != 0) {
-    throw DeviceError(name_, "claim its interface",
-                      error == LIBUSB_ERROR_BUSY ? "another program uses it" : libusb_error_name(error),
-                      "close the other program, or plug the device in again");
+class Device final : public Transport {
+ public:
+  /// Takes over an open handle, reads the descriptors.
+  Device(libusb_device_handle* handle, const Listing& listing)
+      : handle_(handle),
+        listing_(listing),
+        name_("USB device " + to_string(listing)),
+        interfaces_(interfaces_of(libusb_get_device(handle))) {
+    libusb_set_auto_detach_kernel_driver(handle_, 1);
   }
-  claimed_.push_back(interface_number);
-}
-
-Transfer Device::control_in(const Setup& setup, std::span<std::uint8_t> data, Timeout timeout) noexcept {
-  return control(setup, data, true, timeout);
-}
-
-Transfer Device::control_out(const Setup& setup, std::span<const std::uint8_t> data, Timeout timeout) noexcept {
-  return control(setup, {const_cast<std::uint8_t*>(data.data()), data.size()}, false, timeout);
-}
-
-Transfer Device::control(Setup setup, std::span<std::uint8_t> data, bool in, Timeout timeout) noexcept {
-  std::vector<std::uint8_t> buffer(LIBUSB_CONTROL_SETUP_SIZE + data.size());
-  if (!in) std::copy(data.begin(), data.end(), buffer.begin() + LIBUSB_CONTROL_SETUP_SIZE);
-  libusb_fill_control_setup(buffer.data(), setup.request_type, setup.request, setup.value, setup.index,
-                            static_cast<std::uint16_t>(data.size()));
-  libusb_transfer* transfer = libusb_alloc_transfer(0);
-  if (transfer == nullptr) return {Outcome::failed};
-  libusb_fill_control_transfer(transfer, handle_, buffer.data(), nullptr, nullptr,
-                               static_cast<unsigned>(timeout.count()));
-  const Transfer result = carry_out(transfer);
-  if (in) std::copy_n(buffer.begin() + LIBUSB_CONTROL_SETUP_SIZE, std::min(result.bytes, data.size()), data.begin());
-  return result;
-}
-
-Transfer Device::read(const Endpoint& endpoint, std::span<std::uint8_t> data, Timeout timeout) noexcept {
-  return move(endpoint, data, timeout);
-}
-
-Transfer Device::write(const Endpoint& endpoint, std::span<const std::uint8_t> data, Timeout timeout) noexcept {
-  return move(endpoint, {const_cast<std::uint8_t*>(data.data()), data.size()}, timeout);
-}
-
-Transfer Device::move(const Endpoint& endpoint, std::span<std::uint8_t> data, Timeout timeout) noexcept {
-  libusb_transfer* transfer = libusb_alloc_transfer(0);
-  if (transfer == nullptr) return {Outcome::failed};
-  const auto milliseconds = static_cast<unsigned>(timeout.count());
-  const int size = static_cast<int>(data.size());
-  if (endpoint.kind == EndpointKind::interrupt) {
-    libusb_fill_interrupt_transfer(transfer, handle_, endpoint.address, data.data(), size, nullptr, nullptr,
-                                   milliseconds);
-  } else {
-    libusb_fill_bulk_transfer(transfer, handle_, endpoint.address, data.data(), size, nullptr, nullptr, milliseconds);
+  /// Releases the interfaces, to the kernel's driver too.
+  ~Device() override {
+    for (const std::uint8_t number : claimed_) libusb_release_interface(handle_, number);
+    libusb_close(handle_);
   }
-  return carry_out(transfer);
-}
 
-Transfer Device::carry_out(libusb_transfer* transfer) noexcept {
-  Waiting waiting{this};
-  transfer->user_data = &waiting;
-  transfer->callback = [](libusb_transfer* ended) { on_end(ended); };
-  std::unique_lock lock(mutex_);
-  Transfer result{Outcome::cancelled};
-  if (!cancelled_) {
-    if (const int error = libusb_submit_transfer(transfer); error != 0) {
-      result.outcome = outcome_of_error(error);
-    } else {
-      under_way_ = transfer;
-      ended_.wait(lock, [&] { return waiting.ended; });
-      under_way_ = nullptr;
-      result = {outcome_of(transfer->status), static_cast<std::size_t>(transfer->actual_length)};
+  const std::string& name() const noexcept override { return name_; }
+  std::uint16_t vendor() const noexcept override { return listing_.vendor; }
+  std::uint16_t product() const noexcept override { return listing_.product; }
+  const std::vector<Interface>& interfaces() const noexcept override { return interfaces_; }
+
+  void claim(std::uint8_t interface_number) override {
+    if (const int error = libusb_claim_interface(handle_, interface_number); error != 0) {
+      throw DeviceError(name_, "claim its interface",
+                        error == LIBUSB_ERROR_BUSY ? "another program uses it" : libusb_error_name(error),
+                        "close the other program, or plug the device in again");
     }
+    claimed_.push_back(interface_number);
   }
-  lock.unlock();
-  libusb_free_transfer(transfer);
-  return result;
-}
 
-void Device::on_end(libusb_transfer* transfer) noexcept {
-  auto& waiting = *static_cast<Waiting*>(transfer->user_data);
-  Device& device = *waiting.device;
-  const std::lock_guard lock(device.mutex_);
-  waiting.ended = true;
-  device.ended_.notify_all();
-}
+  Transfer control_in(const Setup& setup, std::span<std::uint8_t> data, Timeout timeout) noexcept override {
+    const int n =
+        libusb_control_transfer(handle_, setup.request_type, setup.request, setup.value, setup.index, data.data(),
+                                static_cast<std::uint16_t>(data.size()), static_cast<unsigned>(timeout.count()));
+    return n < 0 ? Transfer{outcome_of(n)} : Transfer{Outcome::done, static_cast<std::size_t>(n)};
+  }
+  Transfer read(const Endpoint& endpoint, std::span<std::uint8_t> data, Timeout timeout) noexcept override {
+    return move(endpoint, data.data(), data.size(), timeout);
+  }
+  Transfer write(const Endpoint& endpoint, std::span<const std::uint8_t> data, Timeout timeout) noexcept override {
+    return move(endpoint, const_cast<std::uint8_t*>(data.data()), data.size(), timeout);
+  }
+  Outcome clear_halt(const Endpoint& endpoint) noexcept override {
+    return outcome_of(libusb_clear_halt(handle_, endpoint.address));
+  }
 
-Outcome Device::clear_halt(const Endpoint& endpoint) noexcept {
-  return outcome_of_error(libusb_clear_halt(handle_, endpoint.address));
-}
+ private:
+  Transfer move(const Endpoint& endpoint, std::uint8_t* data, std::size_t size, Timeout timeout) noexcept {
+    const auto transfer = endpoint.kind == EndpointKind::interrupt ? libusb_interrupt_transfer : libusb_bulk_transfer;
+    int bytes = 0;
+    const int error = transfer(handle_, endpoint.address, data, static_cast<int>(size), &bytes,
+                               static_cast<unsigned>(timeout.count()));
+    return {outcome_of(error), static_cast<std::size_t>(bytes)};
+  }
 
-void Device::cancel() noexcept {
-  const std::lock_guard lock(mutex_);
-  cancelled_ = true;
-  if (under_way_ != nullptr) libusb_cancel_transfer(under_way_);
-}
-
-namespace {
-
-constexpr const char* kRule = "install drivers/udev/60-kphi.rules, or run as a member of the device's group";
+  libusb_device_handle* handle_;
+  const Listing listing_;
+  const std::string name_;
+  const std::vector<Interface> interfaces_;
+  std::vector<std::uint8_t> claimed_;
+};
 
 std::string port_path(libusb_device* device) {
   std::array<std::uint8_t, 7> ports{};  // USB 3.0: seven tiers at most
@@ -201,34 +125,19 @@ std::string port_path(libusb_device* device) {
   return path;
 }
 
-bool is_instrument(libusb_device* device) {
-  constexpr std::uint8_t kApplication = 0xFE, kTestAndMeasurement = 0x03;
-  libusb_config_descriptor* found = nullptr;
-  if (libusb_get_active_config_descriptor(device, &found) != 0) return false;
-  const std::unique_ptr<libusb_config_descriptor, decltype(&libusb_free_config_descriptor)> all(
-      found, &libusb_free_config_descriptor);
-  for (int i = 0; i < all->bNumInterfaces; ++i) {
-    const libusb_interface& one = all->interface[i];
-    if (one.num_altsetting > 0 && one.altsetting[0].bInterfaceClass == kApplication &&
-        one.altsetting[0].bInterfaceSubClass == kTestAndMeasurement)
-      return true;
-  }
-  return false;
+libusb_device_descriptor descriptor_of(libusb_device* device) {
+  libusb_device_descriptor descriptor{};
+  libusb_get_device_descriptor(device, &descriptor);
+  return descriptor;
 }
 
 Listing listing_without_serial(libusb_device* device) {
-  libusb_device_descriptor descriptor{};
-  libusb_get_device_descriptor(device, &descriptor);
-  return {descriptor.idVendor, descriptor.idProduct, "", port_path(device), true, is_instrument(device)};
-}
-
-std::string serial_of(libusb_device* device, libusb_device_handle* handle) {
-  libusb_device_descriptor descriptor{};
-  libusb_get_device_descriptor(device, &descriptor);
-  if (descriptor.iSerialNumber == 0) return "";
-  std::array<unsigned char, 256> text{};
-  const int n = libusb_get_string_descriptor_ascii(handle, descriptor.iSerialNumber, text.data(), text.size());
-  return n > 0 ? std::string(text.begin(), text.begin() + n) : "";
+  const libusb_device_descriptor descriptor = descriptor_of(device);
+  const std::vector<Interface> all = interfaces_of(device);
+  const bool instrument = std::any_of(all.begin(), all.end(), [](const Interface& one) {
+    return one.class_code == kApplication && one.subclass == kTestAndMeasurement;
+  });
+  return {descriptor.idVendor, descriptor.idProduct, "", port_path(device), true, instrument};
 }
 
 /// The serial number can be asked only of an open device.
@@ -237,7 +146,10 @@ Listing listing_of(libusb_device* device) {
   libusb_device_handle* handle = nullptr;
   listing.readable = libusb_open(device, &handle) == 0;
   if (!listing.readable) return listing;
-  listing.serial = serial_of(device, handle);
+  std::array<unsigned char, 256> text{};
+  const std::uint8_t index = descriptor_of(device).iSerialNumber;
+  const int n = index == 0 ? 0 : libusb_get_string_descriptor_ascii(handle, index, text.data(), text.size());
+  listing.serial.assign(text.begin(), text.begin() + std::max(n, 0));
   libusb_close(handle);
   return listing;
 }
@@ -261,18 +173,28 @@ class Snapshot {
 
 }  // namespace
 
+const char* name_of(Outcome outcome) noexcept {
+  constexpr const char* names[] = {"done", "no answer in time", "the endpoint stalled", "the device was unplugged",
+                                   "the transfer failed"};
+  return names[static_cast<int>(outcome)];
+}
+
+bool fits(const UsbAddress& wanted, const Listing& found) noexcept {
+  return wanted.fits(found.vendor, found.product, found.serial) &&
+         (wanted.port_path.empty() || wanted.port_path == found.port_path);
+}
+
+std::string to_string(const Listing& l) {
+  return fmt::format("{:04x}:{:04x}{}{}, port {}{}", l.vendor, l.product, l.serial.empty() ? "" : ", serial ", l.serial,
+                     l.port_path, l.readable ? "" : " (not readable by this user)");
+}
+
 Bus::Bus() {
   if (const int error = libusb_init(&context_); error != 0)
     throw DeviceError("USB", "start", libusb_error_name(error), "check that /dev/bus/usb is mounted");
-  thread_ = start_thread([this] { handle_events(); });
 }
 
-Bus::~Bus() {
-  stopping_ = true;
-  libusb_interrupt_event_handler(context_);
-  thread_.join();
-  libusb_exit(context_);
-}
+Bus::~Bus() { libusb_exit(context_); }
 
 std::vector<Listing> Bus::list() const {
   std::vector<Listing> listings;
@@ -307,13 +229,6 @@ std::unique_ptr<Transport> Bus::open(const UsbAddress& address) const {
   if (const int error = libusb_open(chosen, &handle); error != 0)
     throw DeviceError(device_name, "open", libusb_error_name(error), error == LIBUSB_ERROR_ACCESS ? kRule : "");
   return std::make_unique<Device>(handle, listing);
-}
-
-void Bus::handle_events() noexcept {
-  while (!stopping_) {
-    timeval patience{1, 0};
-    libusb_handle_events_timeout_completed(context_, &patience, nullptr);
-  }
 }
 
 }  // namespace kphi::usb

@@ -1,58 +1,97 @@
-// The USB of this host through libusb: its devices, and one opened device. One thread handles libusb's events; all
-// others wait for it.
+// The USB of this host through libusb: the devices as listed, and an opened one, which may also be one of a test. Its
+// calls block until done or timed out, and belong to one thread at a time.
 #pragma once
 
-#include <atomic>
-#include <condition_variable>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
-#include <mutex>
+#include <span>
 #include <string>
-#include <thread>
 #include <vector>
 
-#include "drivers/usb/transport.hpp"
+#include "base/uri.hpp"
 
-struct libusb_device_handle;
-struct libusb_transfer;
 struct libusb_context;
 
 namespace kphi::usb {
 
-class Device final : public Transport {
+/// How a transfer ended.
+enum class Outcome : std::uint8_t {
+  done,
+  timed_out,
+  stalled,  ///< the endpoint halts until clear_halt()
+  gone,     ///< unplugged
+  failed,   ///< anything else the bus reports
+};
+
+[[nodiscard]] const char* name_of(Outcome outcome) noexcept;
+
+struct Transfer {
+  Outcome outcome = Outcome::done;
+  std::size_t bytes = 0;  ///< transferred, also when it ended early
+};
+
+enum class EndpointKind : std::uint8_t { bulk, interrupt, other };
+
+struct Endpoint {
+  std::uint8_t address = 0;  ///< bit 7: IN
+  EndpointKind kind = EndpointKind::other;
+  std::uint16_t packet_bytes = 0;  ///< largest packet
+  [[nodiscard]] bool in() const noexcept { return (address & 0x80) != 0; }
+};
+
+struct Interface {
+  std::uint8_t number = 0;
+  std::uint8_t class_code = 0, subclass = 0, protocol = 0;
+  std::vector<Endpoint> endpoints;
+};
+
+/// The eight bytes of a control request (USB 2.0, 9.3) that brings data; the length is that of the data.
+struct Setup {
+  std::uint8_t request_type = 0;  ///< bmRequestType
+  std::uint8_t request = 0;       ///< bRequest
+  std::uint16_t value = 0;        ///< wValue
+  std::uint16_t index = 0;        ///< wIndex
+};
+
+/// One device as it is on the bus.
+struct Listing {
+  std::uint16_t vendor = 0, product = 0;
+  std::string serial;       ///< empty: it has none, or this user has no access to it
+  std::string port_path;    ///< "1-1.4"
+  bool readable = true;     ///< false: this user may not open it
+  bool instrument = false;  ///< has an interface of the Test and Measurement Class
+  friend bool operator==(const Listing&, const Listing&) = default;
+};
+
+[[nodiscard]] bool fits(const UsbAddress& wanted, const Listing& found) noexcept;
+/// "04d8:00dd, serial 0001AB, port 1-1.4".
+[[nodiscard]] std::string to_string(const Listing& listing);
+
+class Transport {
  public:
-  /// Takes over an open handle, reads the descriptors.
-  Device(libusb_device_handle* handle, const Listing& listing);
-  /// Releases the interfaces, to the kernel's driver too.
-  ~Device() override;
+  using Timeout = std::chrono::milliseconds;
 
-  const std::string& name() const noexcept override { return name_; }
-  std::uint16_t vendor() const noexcept override { return listing_.vendor; }
-  std::uint16_t product() const noexcept override { return listing_.product; }
-  const std::vector<Interface>& interfaces() const noexcept override { return interfaces_; }
-  void claim(std::uint8_t interface_number) override;
-  Transfer control_in(const Setup& setup, std::span<std::uint8_t> data, Timeout timeout) noexcept override;
-  Transfer control_out(const Setup& setup, std::span<const std::uint8_t> data, Timeout timeout) noexcept override;
-  Transfer read(const Endpoint& endpoint, std::span<std::uint8_t> data, Timeout timeout) noexcept override;
-  Transfer write(const Endpoint& endpoint, std::span<const std::uint8_t> data, Timeout timeout) noexcept override;
-  Outcome clear_halt(const Endpoint& endpoint) noexcept override;
-  void cancel() noexcept override;
+  Transport() = default;
+  virtual ~Transport() = default;
+  Transport(const Transport&) = delete;
+  Transport& operator=(const Transport&) = delete;
 
- private:
-  static void on_end(libusb_transfer* transfer) noexcept;
-  Transfer control(Setup setup, std::span<std::uint8_t> data, bool in, Timeout timeout) noexcept;
-  Transfer move(const Endpoint& endpoint, std::span<std::uint8_t> data, Timeout timeout) noexcept;
-  Transfer carry_out(libusb_transfer* transfer) noexcept;
+  /// For messages: "USB device 04d8:00dd, serial 0001, port 1-2".
+  [[nodiscard]] virtual const std::string& name() const noexcept = 0;
+  [[nodiscard]] virtual std::uint16_t vendor() const noexcept = 0;
+  [[nodiscard]] virtual std::uint16_t product() const noexcept = 0;
+  [[nodiscard]] virtual const std::vector<Interface>& interfaces() const noexcept = 0;
+  /// Claims the interface exclusively, from the kernel's driver too, until the transport is destroyed. Throws
+  /// DeviceError.
+  virtual void claim(std::uint8_t interface_number) = 0;
 
-  libusb_device_handle* handle_;
-  const Listing listing_;
-  const std::string name_;
-  std::vector<Interface> interfaces_;
-  std::vector<std::uint8_t> claimed_;
-
-  std::mutex mutex_;
-  std::condition_variable ended_;
-  libusb_transfer* under_way_ = nullptr;
-  bool cancelled_ = false;
+  virtual Transfer control_in(const Setup& setup, std::span<std::uint8_t> data, Timeout timeout) noexcept = 0;
+  /// Bulk or interrupt, as the endpoint is.
+  virtual Transfer read(const Endpoint& endpoint, std::span<std::uint8_t> data, Timeout timeout) noexcept = 0;
+  virtual Transfer write(const Endpoint& endpoint, std::span<const std::uint8_t> data, Timeout timeout) noexcept = 0;
+  virtual Outcome clear_halt(const Endpoint& endpoint) noexcept = 0;
 };
 
 /// Outlives the devices opened on it. Any thread.
@@ -69,11 +108,7 @@ class Bus {
   [[nodiscard]] std::unique_ptr<Transport> open(const UsbAddress& address) const;
 
  private:
-  void handle_events() noexcept;
-
   libusb_context* context_ = nullptr;
-  std::atomic<bool> stopping_{false};
-  std::thread thread_;
 };
 
 }  // namespace kphi::usb

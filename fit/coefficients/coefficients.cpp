@@ -42,9 +42,15 @@ std::string number(double value) { return std::isfinite(value) ? yaml_number(val
 std::string known_if_positive(double value) { return value > 0 ? yaml_number(value) : "unknown"; }
 
 std::string list(const std::vector<double>& values) {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "" : ", ") + yaml_number(value);
-  return "[" + text + "]";
+  std::vector<std::string> numbers;
+  for (const double value : values) numbers.push_back(number(value));
+  return fmt::format("[{}]", fmt::join(numbers, ", "));
+}
+
+std::string matrix(const std::vector<std::vector<double>>& rows) {
+  std::vector<std::string> lines;
+  for (const auto& row : rows) lines.push_back(list(row));
+  return fmt::format("[{}]", fmt::join(lines, ", "));
 }
 
 std::string speed_range(double min_rad_s, double max_rad_s) {
@@ -65,7 +71,7 @@ std::string head(const Identification& identification, const Provenance& provena
       compensation::kCoefficientFormat, provenance.measured_utc.empty() ? "unknown" : quoted(provenance.measured_utc),
       quoted(provenance.tool_version), quoted(identification.propeller),
       quoted(provenance.propeller_name.empty() ? identification.propeller : provenance.propeller_name),
-      known_if_positive(identification.diameter_in), blades, compensation::name_of(identification.overlap));
+      known_if_positive(identification.diameter_in), blades, compensation::name_of(identification.options.overlap));
 }
 
 std::string line_block(const LineFit& line) {
@@ -78,11 +84,11 @@ std::string line_block(const LineFit& line) {
       "  anchored: {}\n"
       "  intercept: {}  # {}\n"
       "  slope_per_deg: {}  # {}\n"
-      "  covariance: [{}, {}]  # of intercept, slope_per_deg\n"
+      "  covariance: {}  # of intercept, slope_per_deg\n"
       "  points_deg: {}\n",
       yaml_number(line.K_T), yaml_number(line.K_T_standard_error), per_rpm2(line.K_T), line.anchored,
       yaml_number(line.intercept), per_rpm2(line.intercept), yaml_number(line.slope_per_deg),
-      per_rpm2(line.slope_per_deg) + " per degree", list({c[0][0], c[0][1]}), list({c[1][0], c[1][1]}), list(points));
+      per_rpm2(line.slope_per_deg) + " per degree", matrix({{c[0][0], c[0][1]}, {c[1][0], c[1][1]}}), list(points));
 }
 
 std::string valid_block(const Identification& identification) {
@@ -100,8 +106,8 @@ std::string table_row(const OcclusionCoefficient& row, double at_speed_rad_s) {
                         yaml_number(printed_rpm(at_speed_rad_s)));
   }
   if (row.standard)
-    text += fmt::format(", k_standard: {}, k_standard_error: {}", yaml_number(row.standard->k),
-                        yaml_number(row.standard->standard_error));
+    text += fmt::format(", k_standard: {}, k_standard_error: {}", yaml_number(row.standard->value),
+                        yaml_number(row.standard->u));
   if (row.fit) text += fmt::format(", steps: {}, repetitions: {}", row.steps, row.repetitions);
   return text + "}\n";
 }
@@ -109,28 +115,24 @@ std::string table_row(const OcclusionCoefficient& row, double at_speed_rad_s) {
 std::string standard_block(const Identification& identification) {
   const auto& standard = identification.table.front().standard;
   if (!identification.air || !standard) return "unknown";
-  return fmt::format("{{value: {}, standard_error: {}, air_density_kg_m3: {}}}", yaml_number(standard->k),
-                     yaml_number(standard->standard_error), yaml_number(kStandardDensity));
+  return fmt::format("{{value: {}, standard_error: {}, air_density_kg_m3: {}}}", yaml_number(standard->value),
+                     yaml_number(standard->u), yaml_number(kStandardDensity));
 }
 
 /// The options in `provenance.fit`, with which the same can be fitted again.
 std::string fit_options(const Identification& identification, const std::optional<BenchUncertainty>& bench) {
-  std::string text = fmt::format("k_by: {}, weights: {}, loss: {}", name_of(identification.estimator),
-                                 name_of(identification.weighting), name_of(identification.loss));
+  std::string text = fmt::format("k_by: {}, weights: {}, loss: {}", name_of(identification.options.estimator),
+                                 name_of(identification.options.weighting), name_of(identification.options.loss));
   if (speeds_known(identification)) {
-    text += fmt::format(", speed_range_rpm: [{}, {}]", yaml_number(printed_rpm(identification.fitted.min_rad_s)),
-                        yaml_number(printed_rpm(identification.fitted.max_rad_s)));
+    text += ", speed_range_rpm: " + speed_range(identification.fitted.min_rad_s, identification.fitted.max_rad_s);
   }
-  std::string left_out;
-  for (const LeftOutRun& run : identification.left_out)
-    left_out += fmt::format("{}{}", left_out.empty() ? "" : ", ",
-                            quoted(fmt::format("{}:{}:{}", shortest(run.phi_deg), run.repetition, run.cause)));
-  if (!left_out.empty()) text += ", leave_out: [" + left_out + "]";
+  std::vector<std::string> left_out, known;
+  for (const LeftOutRun& run : identification.options.left_out)
+    left_out.push_back(quoted(fmt::format("{}:{}:{}", shortest(run.phi_deg), run.repetition, run.cause)));
+  if (!left_out.empty()) text += fmt::format(", leave_out: [{}]", fmt::join(left_out, ", "));
   if (!bench) return text;
-  std::string known;
-  for (const auto& [name, value] : known_uncertainties(*bench))
-    known += fmt::format("{}{}: {}", known.empty() ? "" : ", ", name, yaml_number(value));
-  return text + ", u: {" + known + "}";
+  for (const auto& [name, value] : known_uncertainties(*bench)) known.push_back(name + ": " + yaml_number(value));
+  return text + fmt::format(", u: {{{}}}", fmt::join(known, ", "));
 }
 
 std::string provenance_block(const Identification& identification, const Provenance& provenance) {
@@ -143,8 +145,8 @@ std::string provenance_block(const Identification& identification, const Provena
       "provenance:\n"
       "  campaign: {}\n"
       "  fit: {{model: \"T = k w^2\", estimator: {}, {}}}\n",
-      air ? yaml_number(air->kg_m3) : "unknown", air ? yaml_number(air->u_kg_m3) : "unknown",
-      standard_block(identification), number(provenance.supply_v.value_or(kUnknown)), quoted(provenance.campaign),
+      air ? yaml_number(air->value) : "unknown", air ? yaml_number(air->u) : "unknown", standard_block(identification),
+      number(provenance.supply_v.value_or(kUnknown)), quoted(provenance.campaign),
       quoted(estimator_words(identification)), fit_options(identification, provenance.bench));
   if (const auto& clock = provenance.clock) {
     text += clock->u_gain ? fmt::format("  motor_clock: {{gain: {}, u: {}}}\n", clock->gain, *clock->u_gain)
@@ -162,16 +164,6 @@ std::string number_or_none(const std::optional<double>& value) { return value ? 
 std::string errors(const Budget& budget) {
   return fmt::format("{{u: {}, freedom: {}, expanded_95: {}}}", number(budget.combined()),
                      std::isfinite(budget.freedom()) ? number(budget.freedom()) : ".inf", number(budget.expanded()));
-}
-
-std::string matrix(const std::vector<std::vector<double>>& rows) {
-  std::vector<std::string> lines;
-  for (const auto& row : rows) {
-    std::vector<std::string> numbers;
-    for (const double value : row) numbers.push_back(number(value));
-    lines.push_back(fmt::format("[{}]", fmt::join(numbers, ", ")));
-  }
-  return fmt::format("[{}]", fmt::join(lines, ", "));
 }
 
 std::vector<std::string> not_known(const Budget& budget) {
@@ -228,10 +220,11 @@ std::string estimator_words(const Identification& identification) {
   constexpr std::array<const char*, 4> words{
       "least squares of T on w^2 through the origin", "least squares of T on w^2 with an offset",
       "T/w^2 at the reference speed, by least squares of T on w^2, w and 1", "mean T/w^2 at the reference speed"};
-  std::string text = words[static_cast<std::size_t>(identification.estimator)];
-  if (identification.weighting != Weighting::equal)
-    text += fmt::format(", weighted by {}", identification.weighting == Weighting::thrust ? "u(T)" : "u(T) and u(w)");
-  if (identification.loss != Loss::none) text += fmt::format(", {} loss", name_of(identification.loss));
+  std::string text = words[static_cast<std::size_t>(identification.options.estimator)];
+  if (identification.options.weighting != Weighting::equal)
+    text += fmt::format(", weighted by {}",
+                        identification.options.weighting == Weighting::thrust ? "u(T)" : "u(T) and u(w)");
+  if (identification.options.loss != Loss::none) text += fmt::format(", {} loss", name_of(identification.options.loss));
   return text + ", then a weighted line through k(phi)";
 }
 
@@ -248,11 +241,11 @@ RecordedFit read_recorded_fit(const std::string& path) {
   const auto file = compensation::load_coefficients(path);
   const auto& fit = file.provenance.fit;
   RecordedFit record;
-  record.propeller = file.propeller.id;
-  record.diameter_in = file.propeller.diameter_in;
-  record.blades = file.propeller.blades;
-  record.overlap = file.curve.overlap();
   IdentificationOptions& options = record.options;
+  options.propeller = file.propeller.id;
+  options.diameter_in = file.propeller.diameter_in;
+  options.blades = file.propeller.blades;
+  options.overlap = file.curve.overlap();
   options.line.anchored = file.anchored;
   for (const Radians& point : file.points) options.line.points_deg.push_back(to_degrees(point));
   if (!file.table.empty() && file.table.front().at_speed) options.at_speed_rad_s = file.table.front().at_speed->value();
@@ -272,15 +265,6 @@ RecordedFit read_recorded_fit(const std::string& path) {
   record.bench.emplace();
   for (const auto& [name, value] : *fit.bench) set_uncertainty(*record.bench, name + "=" + shortest(value));
   return record;
-}
-
-Identification identify_again(std::span<const results::StepMean> steps, const RecordedFit& record) {
-  Identification result = identify(steps, record.options);
-  result.propeller = record.propeller;
-  result.diameter_in = record.diameter_in;
-  result.blades = record.blades;
-  result.overlap = record.overlap;
-  return result;
 }
 
 }  // namespace kphi::fit

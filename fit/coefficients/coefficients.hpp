@@ -61,16 +61,9 @@ struct Provenance {
 struct RecordedFit {
   IdentificationOptions options;
   std::optional<BenchUncertainty> bench;  ///< nullopt: the file does not say
-  std::string propeller;
-  double diameter_in = 0;
-  int blades = 0;
-  compensation::OverlapMeasure overlap = compensation::OverlapMeasure::rim_arc;
 };
 
 /// Throws compensation::CoefficientError for a file that cannot be read, ConfigurationError for an unknown word.
 [[nodiscard]] RecordedFit read_recorded_fit(const std::string& path);
-
-/// Fits `steps` as the record says.
-[[nodiscard]] Identification identify_again(std::span<const results::StepMean> steps, const RecordedFit& record);
 
 }  // namespace kphi::fit

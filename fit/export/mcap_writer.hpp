@@ -43,9 +43,8 @@ class McapWriter {
     }
   };
 
-  void put(std::string_view bytes);
+  void write_out(std::string_view bytes);
   void finish_chunk();
-  void summarise();
 
   std::ostream& out_;
   std::uint64_t position_ = 0;

@@ -244,8 +244,7 @@ Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& op
   result.lost = {
       no_phi("MulticopterMotorModel", options.phi_deg),
       "torque and time constants: not in the coefficient file; momentConstant, timeConstantUp and timeConstantDown "
-      "keep "
-      "the plugin's defaults",
+      "keep the plugin's defaults",
       "names of joints and links, turning directions: rotor_N and the defaults; replace them with the model's"};
   return result;
 }

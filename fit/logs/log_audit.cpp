@@ -18,42 +18,31 @@ using results::QualityFlag;
 using Findings = std::vector<LogFinding>;
 using Rows = std::vector<const StandRow*>;
 
-struct KindRow {
-  const char* name;
-  QualityFlag flag = QualityFlag::none;  ///< of the steps concerned
-};
+constexpr std::array kNames{
+    "speed_ratio",   "speed_disagrees", "speed_dead",        "speed_spike",   "speed_missing",    "barely_turning",
+    "not_turning",   "coasting",        "current_limit",     "untared",       "zero_missing",     "zero_drifted",
+    "zero_scatters", "negative_thrust", "thrust_frozen",     "thrust_drifts", "correlated_noise", "time_backward",
+    "time_repeated", "other_fields",    "k_unlike_its_group"};
+static_assert(kNames.size() == static_cast<std::size_t>(FindingKind::k_unlike_its_group) + 1);
 
-constexpr std::array<KindRow, 21> kKinds{{{"speed_ratio"},
-                                          {"speed_disagrees", QualityFlag::speed_unsteady},
-                                          {"speed_dead", QualityFlag::speed_unsteady},
-                                          {"speed_spike", QualityFlag::speed_unsteady},
-                                          {"speed_missing"},
-                                          {"barely_turning"},
-                                          {"not_turning"},
-                                          {"coasting"},
-                                          {"current_limit", QualityFlag::supply_out_of_band},
-                                          {"untared"},
-                                          {"zero_missing"},
-                                          {"zero_drifted"},
-                                          {"zero_scatters"},
-                                          {"negative_thrust"},
-                                          {"thrust_frozen", QualityFlag::bad_status},
-                                          {"thrust_drifts"},
-                                          {"correlated_noise"},
-                                          {"time_backward"},
-                                          {"time_repeated"},
-                                          {"other_fields"},
-                                          {"k_unlike_its_group"}}};
-static_assert(kKinds.size() == static_cast<std::size_t>(FindingKind::k_unlike_its_group) + 1);
+/// Of the steps concerned.
+QualityFlag flag_of(FindingKind kind) {
+  using enum FindingKind;
+  if (kind == speed_disagrees || kind == speed_dead || kind == speed_spike) return QualityFlag::speed_unsteady;
+  if (kind == current_limit) return QualityFlag::supply_out_of_band;
+  return kind == thrust_frozen ? QualityFlag::bad_status : QualityFlag::none;
+}
 
-const KindRow& row_of(FindingKind kind) { return kKinds[static_cast<std::size_t>(kind)]; }
+/// Adds a finding about the whole log or one stretch of it.
+void add(Findings& findings, FindingKind kind, std::size_t rows, std::size_t first_line, std::string text) {
+  findings.push_back({kind, rows, first_line, std::move(text), {}});
+}
 
 /// Adds a finding about these rows; none if there are none.
 void add(Findings& findings, FindingKind kind, const Rows& rows, std::string text) {
   if (rows.empty()) return;
-  LogFinding finding{kind, rows.size(), rows.front()->line, std::move(text), {}};
-  for (const StandRow* row : rows) finding.lines.push_back(row->line);
-  findings.push_back(std::move(finding));
+  add(findings, kind, rows.size(), rows.front()->line, std::move(text));
+  for (const StandRow* row : rows) findings.back().lines.push_back(row->line);
 }
 
 template <class Concerned>
@@ -75,22 +64,18 @@ bool both_turn(const StandRow& row) {
 
 void judge_ratio(double ratio, std::size_t rows, Findings& findings) {
   if (std::abs(ratio - 1) < 0.01) return;
-  LogFinding finding{FindingKind::speed_ratio, rows, 0, {}, {}};
+  std::string text = fmt::format(
+      "optical/electrical speed is {:.4f}, which is not a ratio of pole counts: one speed is wrong; name "
+      "the right one with --speed",
+      ratio);
   if (const auto poles = pole_ratio(ratio)) {
     // Electrical speed is the commutation frequency divided by the pole pairs that were set.
-    finding.text = fmt::format(
-        "optical/electrical speed is {:.4f} = {}/{}, as if {} poles were set for a motor of {}; use --speed optical, "
-        "or "
-        "--speed electrical --speed-factor {}/{}",
-        ratio, poles->numerator, poles->denominator, 2 * poles->numerator, 2 * poles->denominator, poles->numerator,
-        poles->denominator);
-  } else {
-    finding.text = fmt::format(
-        "optical/electrical speed is {:.4f}, which is not a ratio of pole counts: one speed is wrong; name the right "
-        "one with --speed",
-        ratio);
+    text = fmt::format(
+        "optical/electrical speed is {0:.4f} = {1}/{2}, as if {3} poles were set for a motor of {4}; use --speed "
+        "optical, or --speed electrical --speed-factor {1}/{2}",
+        ratio, poles->numerator, poles->denominator, 2 * poles->numerator, 2 * poles->denominator);
   }
-  findings.push_back(std::move(finding));
+  add(findings, FindingKind::speed_ratio, rows, 0, std::move(text));
 }
 
 void audit_two_speeds(const StandLog& log, Findings& findings) {
@@ -216,27 +201,24 @@ void audit_zero(const StandLog& log, const std::optional<LogZero>& before, const
                 double tare_n, Findings& findings) {
   constexpr std::size_t kRowsOfASeries = 50;  // a table of averaged steps was tared by its program
   const double largest = largest_thrust(log);
-  const auto of_file = [&](FindingKind kind, std::size_t rows, std::string text) {
-    findings.push_back({kind, rows, 0, std::move(text), {}});
-  };
   if (before && before->sd_n > kTareScatterMax * largest) {
-    of_file(FindingKind::zero_scatters, before->rows,
-            "with the motor off the stand reads " + before->words("before") + ": too noisy for a zero");
+    add(findings, FindingKind::zero_scatters, before->rows, 0,
+        "with the motor off the stand reads " + before->words("before") + ": too noisy for a zero");
   } else if (before && tare_n == 0 && std::abs(before->mean_n) > std::max(5e-3 * largest, 3 * before->sd_n)) {
-    of_file(FindingKind::untared, before->rows,
-            fmt::format("with the motor off the stand reads {}, {:.1f} % of the largest thrust: never tared; import "
-                        "with --tare-rows {}",
-                        before->words("before"), 100 * std::abs(before->mean_n) / largest,
-                        std::min<std::size_t>(before->rows, 100)));
+    add(findings, FindingKind::untared, before->rows, 0,
+        fmt::format("with the motor off the stand reads {}, {:.1f} % of the largest thrust: never tared; import "
+                    "with --tare-rows {}",
+                    before->words("before"), 100 * std::abs(before->mean_n) / largest,
+                    std::min<std::size_t>(before->rows, 100)));
   }
   const double drift = before && after ? after->mean_n - before->mean_n : 0;
   if (before && after && std::abs(drift) > std::max(1e-3 * largest, 5 * std::hypot(before->sd_n, after->sd_n))) {
-    of_file(FindingKind::zero_drifted, before->rows + after->rows,
-            fmt::format("the zero moved by {:+.3f} N: {}, {}", drift, before->words("before"), after->words("after")));
+    add(findings, FindingKind::zero_drifted, before->rows + after->rows, 0,
+        fmt::format("the zero moved by {:+.3f} N: {}, {}", drift, before->words("before"), after->words("after")));
   }
   if (!before && log.rows.size() >= kRowsOfASeries) {
-    of_file(FindingKind::zero_missing, log.rows.size(),
-            "no rows with the motor off at the beginning: the zero is unknown, and k may be off by a few percent");
+    add(findings, FindingKind::zero_missing, log.rows.size(), 0,
+        "no rows with the motor off at the beginning: the zero is unknown, and k may be off by a few percent");
   }
   double lowest = 0;
   for (const StandRow& row : log.rows) lowest = std::min(lowest, row.thrust_n);
@@ -314,13 +296,10 @@ void audit_drift(const StandLog& log, SpeedSource source, const std::vector<std:
   }
   const double share = mean(last) / mean(first);
   if (!(std::abs(share - 1) > kDrift)) return;
-  findings.push_back({FindingKind::thrust_drifts,
-                      rows.size(),
-                      log.rows[rows.front()].line,
-                      fmt::format("at constant speed T/ω² goes from {:.3g} to {:.3g} N/(rad/s)² ({:.2f} times): one k "
-                                  "for the whole log means nothing",
-                                  mean(first), mean(last), share),
-                      {}});
+  add(findings, FindingKind::thrust_drifts, rows.size(), log.rows[rows.front()].line,
+      fmt::format("at constant speed T/ω² goes from {:.3g} to {:.3g} N/(rad/s)² ({:.2f} times): one k for the whole "
+                  "log means nothing",
+                  mean(first), mean(last), share));
 }
 
 void audit_noise(const StandLog& log, SpeedSource source, const std::vector<std::size_t>& rows, Findings& findings) {
@@ -332,19 +311,14 @@ void audit_noise(const StandLog& log, SpeedSource source, const std::vector<std:
   }
   const double time = longest.size() < kPlateauRows ? 1 : correlation_time(longest);
   if (time < 2) return;
-  findings.push_back(
-      {FindingKind::correlated_noise,
-       longest.size(),
-       0,
-       fmt::format("{} rows at constant speed count as {:.0f} independent ones: s/√n is {:.1f} times too "
-                   "small",
-                   longest.size(), static_cast<double>(longest.size()) / time, std::sqrt(time)),
-       {}});
+  add(findings, FindingKind::correlated_noise, longest.size(), 0,
+      fmt::format("{} rows at constant speed count as {:.0f} independent ones: s/√n is {:.1f} times too small",
+                  longest.size(), static_cast<double>(longest.size()) / time, std::sqrt(time)));
 }
 
 }  // namespace
 
-const char* name_of(FindingKind kind) { return row_of(kind).name; }
+const char* name_of(FindingKind kind) { return kNames[static_cast<std::size_t>(kind)]; }
 
 std::optional<PoleRatio> pole_ratio(double ratio) {
   constexpr int kMost = 24;
@@ -394,13 +368,9 @@ std::vector<LogFinding> audit(const StandLog& log, const RowSelection& selection
     audit_noise(log, source, rows, findings);
   }
   if (log.problems.empty()) return findings;
-  LogFinding skipped{FindingKind::other_fields,
-                     log.problems.size(),
-                     log.problems.front().line,
-                     "lines skipped; the first: " + log.problems.front().what,
-                     {}};
-  for (const TableProblem& problem : log.problems) skipped.lines.push_back(problem.line);
-  findings.push_back(std::move(skipped));
+  add(findings, FindingKind::other_fields, log.problems.size(), log.problems.front().line,
+      "lines skipped; the first: " + log.problems.front().what);
+  for (const TableProblem& problem : log.problems) findings.back().lines.push_back(problem.line);
   return findings;
 }
 
@@ -409,7 +379,7 @@ void flag_steps(ImportedTable& table, const std::vector<LogFinding>& findings) {
     const std::set<std::size_t> lines(finding.lines.begin(), finding.lines.end());
     for (std::size_t i = 0; i < table.steps.size(); ++i)
       if (lines.contains(table.lines[i]))
-        table.steps[i].quality_flags |= static_cast<std::uint32_t>(row_of(finding.kind).flag);
+        table.steps[i].quality_flags |= static_cast<std::uint32_t>(flag_of(finding.kind));
   }
 }
 

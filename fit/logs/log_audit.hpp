@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "fit/logs/row_selection.hpp"
 #include "fit/logs/stand_log.hpp"
 
 namespace kphi::fit {

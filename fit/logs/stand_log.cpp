@@ -6,12 +6,67 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 
 #include "base/error.hpp"
-#include "fit/logs/column_unit.hpp"
+#include "base/statistics.hpp"
+#include "compensation/units.hpp"
 
 namespace kphi::fit {
 namespace {
+
+using results::kNotMeasured;
+
+struct UnitRow {
+  Measure measure;
+  double factor;
+  std::array<const char*, 5> names{};  ///< messages list the first
+};
+
+constexpr double kPoundForce = 4.4482216152605;  // N, exactly (0.45359237 kg × 9.80665 m/s²)
+constexpr double kInch = 0.0254;                 // m, exactly
+constexpr double kGramForce = from_gram_force(1).value();
+
+constexpr std::array kUnits{
+    UnitRow{Measure::time, 1, {"s"}},
+    UnitRow{Measure::time, 1e-3, {"ms"}},
+    UnitRow{Measure::time, 1e-6, {"µs", "us"}},
+    UnitRow{Measure::time, 60, {"min"}},
+    UnitRow{Measure::throttle, 1, {"µs", "us"}},
+    UnitRow{Measure::throttle, 1e3, {"ms"}},
+    UnitRow{Measure::speed, 1, {"RPM", "rpm", "1/min"}},
+    UnitRow{Measure::speed, 1 / kRadPerSecPerRpm, {"rad/s", "rad_s"}},
+    UnitRow{Measure::speed, 60, {"Hz", "hz", "1/s", "rev/s"}},
+    UnitRow{Measure::speed, 1000, {"krpm"}},
+    UnitRow{Measure::thrust, 1, {"N", "n"}},
+    UnitRow{Measure::thrust, 1e-3, {"mN"}},
+    UnitRow{Measure::thrust, 1e3, {"kN"}},
+    UnitRow{Measure::thrust, kGramForce, {"gf", "g"}},
+    UnitRow{Measure::thrust, 1000 * kGramForce, {"kgf", "kg"}},
+    UnitRow{Measure::thrust, kPoundForce, {"lbf", "lb"}},
+    UnitRow{Measure::thrust, kPoundForce / 16, {"ozf", "oz"}},
+    UnitRow{Measure::torque, 1, {"N·m", "Nm", "nm", "N m"}},
+    UnitRow{Measure::torque, 1e-3, {"mN·m", "mNm"}},
+    UnitRow{Measure::torque, 1e-3, {"N·mm", "Nmm"}},
+    UnitRow{Measure::torque, kPoundForce / 16 * kInch, {"ozf·in", "ozf-in"}},
+    UnitRow{Measure::torque, kPoundForce* kInch, {"lbf·in"}},
+    UnitRow{Measure::torque, kPoundForce * 12 * kInch, {"lbf·ft"}},
+    UnitRow{Measure::torque, kGramForce * 1e-2, {"gf·cm"}},
+    UnitRow{Measure::voltage, 1, {"V", "v"}},
+    UnitRow{Measure::voltage, 1e-3, {"mV"}},
+    UnitRow{Measure::current, 1, {"A", "a"}},
+    UnitRow{Measure::current, 1e-3, {"mA"}},
+    UnitRow{Measure::angle, 1, {"deg", "°"}},
+    UnitRow{Measure::angle, 180 / kPi, {"rad"}},
+};
+
+/// The units of the measure, for messages: "N, mN, kN, gf, …".
+std::string unit_list(Measure measure) {
+  std::string list;
+  for (const UnitRow& row : kUnits)
+    if (row.measure == measure) list += (list.empty() ? "" : ", ") + std::string(row.names.front());
+  return list;
+}
 
 struct RoleRow {
   Role role;
@@ -176,7 +231,79 @@ bool has_speed(const Columns& columns) {
   return find(columns, Role::speed) != nullptr || find(columns, Role::electrical_speed) != nullptr;
 }
 
+// ---- which rows become steps
+// -------------------------------------------------------------------------------------------
+
+[[noreturn]] void refuse(const std::string& path, const std::string& what) {
+  throw ConfigurationError(fmt::format("{}:1: {}", path, what));
+}
+
+double tare_of(const StandLog& log, const RowSelection& selection, SpeedSource source) {
+  if (selection.tare_rows == 0) return 0;
+  std::vector<double> zeros;
+  for (const StandRow& row : log.rows)
+    if (zeros.size() < selection.tare_rows && motor_off(row, source)) zeros.push_back(row.thrust_n);
+  if (zeros.size() < selection.tare_rows) {
+    refuse(log.path,
+           fmt::format("{} rows with the motor off, but --tare-rows asks for {}", zeros.size(), selection.tare_rows));
+  }
+  const double sd = zeros.size() > 1 ? std::sqrt(variance(zeros)) : 0;
+  if (sd > kTareScatterMax * largest_thrust(log)) {
+    refuse(log.path,
+           fmt::format("the rows for the tare scatter by {:.3g} N, {:.1f} % of the largest thrust, and cannot "
+                       "give a zero; use fewer rows (--tare-rows) or no tare",
+                       sd, 100 * sd / largest_thrust(log)));
+  }
+  return mean(zeros);
+}
+
+bool is_point(const StandRow& row, const RowSelection& selection, SpeedSource source) {
+  if (!(rpm_of(row, source).value_or(0) > selection.speed_above_rpm)) return false;
+  return !selection.throttle_above_us || row.throttle_us.value_or(0) > *selection.throttle_above_us;
+}
+
+results::StepMean step_of(const StandRow& row, const RowSelection& selection, SpeedSource source, double tare_n) {
+  const double sign = selection.reverse_thrust ? -1 : 1;
+  results::StepMean step = step_of_row(*rpm_of(row, source) * selection.speed_factor, sign * (row.thrust_n - tare_n));
+  step.occlusion_deg = row.occlusion_deg.value_or(0);
+  step.repetition = static_cast<int>(row.repetition.value_or(1));
+  step.torque_nm = row.torque_nm.value_or(kNotMeasured);
+  step.zero_n = sign * tare_n;
+  step.supply_voltage_v = row.voltage_v.value_or(kNotMeasured);
+  step.supply_current_a = row.current_a.value_or(kNotMeasured);
+  step.window_begin_s = step.window_end_s = row.time_s.value_or(0);
+  return step;
+}
+
 }  // namespace
+
+HeaderName split_header(std::string_view header) {
+  for (const auto& [open, close] : {std::pair('(', ')'), std::pair('[', ']')}) {
+    if (header.empty() || header.back() != close) continue;
+    const std::size_t begin = header.rfind(open);
+    if (begin == std::string_view::npos) continue;
+    std::string_view name = header.substr(0, begin);
+    while (!name.empty() && name.back() == ' ') name.remove_suffix(1);
+    return {std::string(name), std::string(header.substr(begin + 1, header.size() - begin - 2))};
+  }
+  return {std::string(header), ""};
+}
+
+std::string unit_suffix(std::string_view name, Measure measure) {
+  for (std::size_t bar = name.find('_'); bar != std::string_view::npos; bar = name.find('_', bar + 1)) {
+    const std::string_view end = name.substr(bar + 1);
+    if (unit_factor(measure, end)) return std::string(end);
+  }
+  return {};
+}
+
+std::optional<double> unit_factor(Measure measure, std::string_view unit) {
+  if (measure == Measure::count) return 1.0;
+  for (const UnitRow& row : kUnits)
+    for (const char* name : row.names)
+      if (row.measure == measure && name != nullptr && unit == name) return row.factor;
+  return std::nullopt;
+}
 
 bool motor_off(const StandRow& row, SpeedSource source) {
   return row.throttle_us && *row.throttle_us <= kIdleUs && rpm_of(row, source).value_or(0) == 0;
@@ -209,7 +336,7 @@ ColumnRole parse_column_role(std::string_view text) {
 
 StandLog read_columns(std::string_view text, std::string path, const std::vector<ColumnRole>& columns,
                       const CsvDialect& dialect) {
-  const Table table = read_separated(text, std::move(path), dialect.separator);
+  const Table table = read_csv(text, std::move(path), dialect.separator);
   Columns mapped;
   for (const ColumnRole& column : columns) {
     if (find(mapped, column.role) != nullptr)
@@ -233,6 +360,63 @@ StandLog read_rcbenchmark(std::string_view text, std::string path) {
   }
   if (!has_speed(columns)) refuse(table, "no column \"Motor Electrical Speed (RPM)\" or \"Motor Optical Speed (RPM)\"");
   return read_rows(table, columns, false, std::move(unread));
+}
+
+results::StepMean step_of_row(double speed_rpm, double thrust_n) {
+  results::StepMean step;
+  step.repetition = 1;
+  step.speed_rad_s = from_rpm(speed_rpm).value();
+  step.thrust_n = thrust_n;
+  step.speed_n = step.thrust_samples = 1;
+  for (const auto member :
+       {&results::StepMean::speed_sd_rad_s, &results::StepMean::thrust_sd_n, &results::StepMean::torque_nm,
+        &results::StepMean::torque_sd_nm, &results::StepMean::supply_voltage_v, &results::StepMean::supply_current_a,
+        &results::StepMean::motor_current_a, &results::StepMean::coil_temperature_degc})
+    step.*member = kNotMeasured;
+  return step;
+}
+
+SpeedSource choose_speed(const StandLog& log, const RowSelection& selection) {
+  const bool electrical_turns = std::any_of(log.rows.begin(), log.rows.end(),
+                                            [](const StandRow& row) { return row.electrical_rpm.value_or(0) > 0; });
+  const SpeedSource source =
+      selection.speed.value_or(electrical_turns || !log.has_optical ? SpeedSource::electrical : SpeedSource::optical);
+  if (source == SpeedSource::electrical && !log.has_electrical)
+    refuse(log.path, "no electrical speed in the file; use the optical one (--speed optical)");
+  if (source == SpeedSource::optical && !log.has_optical)
+    refuse(log.path, "no optical speed in the file; use the electrical one (--speed electrical)");
+  return source;
+}
+
+ImportedTable select_rows(const StandLog& log, const RowSelection& selection) {
+  const SpeedSource source = choose_speed(log, selection);
+  ImportedTable imported;
+  imported.tare_n = tare_of(log, selection, source);
+  imported.unit = log.thrust_unit;
+  imported.speed_source = source == SpeedSource::electrical ? "electrical" : "optical";
+  imported.rows_total = log.rows.size() + log.problems.size();
+  imported.problems = log.problems;
+  imported.unread = log.unread;
+  for (const StandRow& row : log.rows) {
+    if (!is_point(row, selection, source)) continue;
+    results::StepMean step = step_of(row, selection, source, imported.tare_n);
+    step.propeller = std::filesystem::path(log.path).stem().string();
+    step.step = static_cast<int>(imported.steps.size());
+    imported.steps.push_back(std::move(step));
+    imported.lines.push_back(row.line);
+  }
+  if (imported.steps.empty()) {
+    refuse(log.path, fmt::format("no row with {} speed above {} RPM{}", imported.speed_source,
+                                 selection.speed_above_rpm, selection.speed ? "; try the other speed" : ""));
+  }
+  refuse_reversed_thrust(imported.steps, log.path);
+  return imported;
+}
+
+void refuse_reversed_thrust(const std::vector<results::StepMean>& steps, const std::string& path) {
+  double sum = 0;
+  for (const results::StepMean& step : steps) sum += step.thrust_n * step.speed_rad_s * step.speed_rad_s;
+  if (sum < 0) refuse(path, "thrust falls with speed: its sign is reversed; import with --reverse-thrust");
 }
 
 }  // namespace kphi::fit

@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "base/csv.hpp"
+#include "fit/model/step_selection.hpp"
+#include "results/step_mean.hpp"
 
 namespace kphi::fit {
 
@@ -54,6 +56,25 @@ inline constexpr double kIdleUs = 1000.5;
 /// |thrust| in N; 0 without rows.
 [[nodiscard]] double largest_thrust(const StandLog& log);
 
+/// What a column measures, and the unit inside: s, µs, RPM, N, N m, V, A, degree, 1.
+enum class Measure { time, throttle, speed, thrust, torque, voltage, current, angle, count };
+
+struct HeaderName {
+  std::string name;
+  std::string unit;  ///< as written; empty: no unit
+};
+
+/// "Thrust (gf)" and "Thrust [gf]" → Thrust, gf. Without brackets all of it is the name.
+[[nodiscard]] HeaderName split_header(std::string_view header);
+
+/// The unit after a '_' at the end of a header without brackets ("thrust_n", "speed_rad_s"); empty if the measure has
+/// no such unit.
+[[nodiscard]] std::string unit_suffix(std::string_view name, Measure measure);
+
+/// Factor from `unit` to the unit inside; nullopt for a unit that the measure does not have. Case counts only where two
+/// units differ by it (mN, MN).
+[[nodiscard]] std::optional<double> unit_factor(Measure measure, std::string_view unit);
+
 /// What a column contains.
 enum class Role : std::uint8_t {
   time,
@@ -94,5 +115,44 @@ struct CsvDialect {
 /// between files. The file does not say which speed is right: the electrical one needs the motor's pole count. Throws
 /// as read_columns does; skips and lists a column in an unknown unit, unless it is the thrust or a speed.
 [[nodiscard]] StandLog read_rcbenchmark(std::string_view text, std::string path);
+
+/// Which rows become steps, and how.
+struct RowSelection {
+  /// Default: electrical where the file has it above 0 anywhere, else optical.
+  std::optional<SpeedSource> speed{};
+  double speed_factor = 1;     ///< on the chosen speed: 7/6 corrects an electrical speed taken with 14 poles, not 12
+  double speed_above_rpm = 0;  ///< rows at or below are skipped (before the factor)
+  std::optional<double> throttle_above_us{};
+  /// Tare with the mean of the first rows that have the motor off (throttle idle, speed 0); 0: no tare.
+  std::size_t tare_rows = 0;
+  bool reverse_thrust = false;  ///< the stand measured thrust with the other sign
+};
+
+/// Rows that scatter by more than this share of the largest thrust cannot give a zero.
+inline constexpr double kTareScatterMax = 0.02;
+
+struct ImportedTable {
+  std::vector<results::StepMean> steps;  ///< repetition 1, φ = 0 unless the file says; `step` counts the rows used
+  std::vector<std::size_t> lines;        ///< of each step, in the file
+  double tare_n = 0;                     ///< subtracted from every thrust
+  std::string unit;                      ///< of thrust in the file, or what it was computed from
+  std::string speed_source;
+  std::size_t rows_total = 0;
+  std::vector<TableProblem> problems;
+  std::vector<std::string> unread;  ///< columns skipped, with the reason
+};
+
+/// A step from one row: what a row cannot give is not measured.
+[[nodiscard]] results::StepMean step_of_row(double speed_rpm, double thrust_n);
+
+/// The source that `selection` takes. Throws ConfigurationError if the file does not have it.
+[[nodiscard]] SpeedSource choose_speed(const StandLog& log, const RowSelection& selection);
+
+/// Throws ConfigurationError (path:line) when the chosen channel is missing, no row is left, the rows for the tare are
+/// too few or scatter too much, or thrust falls with speed (reversed sign).
+[[nodiscard]] ImportedTable select_rows(const StandLog& log, const RowSelection& selection = {});
+
+/// Σ T ω² must be positive. Throws ConfigurationError at path:1 otherwise.
+void refuse_reversed_thrust(const std::vector<results::StepMean>& steps, const std::string& path);
 
 }  // namespace kphi::fit

@@ -60,11 +60,7 @@ OcclusionCoefficient coefficient(double phi_deg, std::vector<StepMean> steps, co
   }
   OcclusionCoefficient row;
   row.phi_deg = phi_deg;
-  ThrustFitOptions fit_options;
-  fit_options.form = form_of(options.estimator);
-  fit_options.weighting = options.weighting;
-  fit_options.loss = options.loss;
-  row.fit = fit_thrust(points, fit_options);
+  row.fit = fit_thrust(points, {form_of(options.estimator), options.weighting, options.loss});
   row.k = row.fit->parameters.k;
   row.standard_error = row.fit->standard_error.k;
   row.steps = levels.size();
@@ -152,21 +148,21 @@ std::vector<LinePoint> line_points(const std::vector<OcclusionCoefficient>& tabl
 
 }  // namespace
 
-std::optional<AirDensity> air_of(std::span<const results::StepMean> steps) {
+std::optional<Estimate> air_of(std::span<const results::StepMean> steps) {
   if (steps.empty()) return std::nullopt;
-  AirDensity mean;
+  Estimate mean;
   const double n = static_cast<double>(steps.size());
   for (const results::StepMean& step : steps) {
     if (!(step.air_density_kg_m3 > 0)) return std::nullopt;
-    mean.kg_m3 += step.air_density_kg_m3 / n;
-    mean.u_kg_m3 += (std::isnan(step.air_density_u_kg_m3) ? 0.0 : step.air_density_u_kg_m3) / n;
+    mean.value += step.air_density_kg_m3 / n;
+    mean.u += (std::isnan(step.air_density_u_kg_m3) ? 0.0 : step.air_density_u_kg_m3) / n;
   }
   return mean;
 }
 
-StandardCoefficient at_standard(double k, double standard_error, const AirDensity& air) {
-  const double scaled = k * (kStandardDensity / air.kg_m3);
-  return {scaled, std::hypot(scaled * standard_error / k, scaled * air.u_kg_m3 / air.kg_m3)};
+Estimate at_standard(double k, double standard_error, const Estimate& air) {
+  const double scaled = k * (kStandardDensity / air.value);
+  return {scaled, std::hypot(scaled * standard_error / k, scaled * air.u / air.value)};
 }
 
 bool speeds_known(const Identification& identification) {
@@ -216,11 +212,11 @@ std::vector<OcclusionCoefficient> coefficients_of(std::span<const StepMean> step
 Identification identify(std::span<const StepMean> steps, const IdentificationOptions& options) {
   require_one_propeller(steps);
   Identification result;
-  result.propeller = steps.front().propeller;
-  result.diameter_in = steps.front().diameter_in;
-  result.blades = steps.front().blades;
+  result.options = options;
+  result.propeller = options.propeller.empty() ? steps.front().propeller : options.propeller;
+  result.diameter_in = options.diameter_in > 0 ? options.diameter_in : steps.front().diameter_in;
+  result.blades = options.blades > 0 ? options.blades : steps.front().blades;
   require_runs(steps, options.left_out);
-  result.left_out = options.left_out;
   result.selection = select_steps(steps, options.speed_range, options.left_out);
   result.air = air_of(result.selection.used);
   const StepsByAngle angles = by_angle_or_refuse(result.selection);
@@ -237,9 +233,6 @@ Identification identify(std::span<const StepMean> steps, const IdentificationOpt
     result.speed_max_rad_s = std::min(result.speed_max_rad_s, level(*high));
   }
   result.table = coefficients_of(result.selection.used, options, result.at_speed_rad_s, result.repeatability);
-  result.estimator = options.estimator;
-  result.weighting = options.weighting;
-  result.loss = options.loss;
   if (options.at_speed_rad_s && !result.table.front().at_speed) {
     throw FitError(fmt::format("no good step at {:.0f} RPM; name a speed of the profile",
                                to_rpm(RadPerSec(*options.at_speed_rad_s))));
@@ -249,10 +242,13 @@ Identification identify(std::span<const StepMean> steps, const IdentificationOpt
   return result;
 }
 
-Identification identify_table(std::span<const LinePoint> points, const LineFitOptions& options,
-                              const SpeedRange& speed) {
+Identification identify_table(std::span<const LinePoint> points, const IdentificationOptions& options) {
   Identification result;
-  result.line = fit_line(points, options);
+  result.options = options;
+  result.propeller = options.propeller;
+  result.diameter_in = options.diameter_in;
+  result.blades = options.blades;
+  result.line = fit_line(points, options.line);
   for (const LinePoint& point : points) {
     OcclusionCoefficient row;
     row.phi_deg = point.phi_deg;
@@ -262,9 +258,9 @@ Identification identify_table(std::span<const LinePoint> points, const LineFitOp
   }
   std::sort(result.table.begin(), result.table.end(),
             [](const auto& a, const auto& b) { return a.phi_deg < b.phi_deg; });
-  result.fitted = speed;
-  result.speed_min_rad_s = speed.min_rad_s;
-  result.speed_max_rad_s = speed.max_rad_s;
+  result.fitted = options.speed_range;
+  result.speed_min_rad_s = options.speed_range.min_rad_s;
+  result.speed_max_rad_s = options.speed_range.max_rad_s;
   (void)result.curve();  // throws if it cannot fly
   return result;
 }

@@ -16,21 +16,12 @@ namespace kphi::fit {
 
 inline constexpr double kStandardDensity = 1.225;  ///< kg/m³: ISA at sea level
 
-struct AirDensity {
-  double kg_m3 = 0;
-  double u_kg_m3 = 0;  ///< standard uncertainty, shared by all steps
-};
+/// Air density, kg/m³: mean over the steps with the standard uncertainty that they share; nullopt if one of them lacks
+/// its density: kphi never assumes standard air.
+[[nodiscard]] std::optional<Estimate> air_of(std::span<const results::StepMean> steps);
 
-/// Mean over the steps; nullopt if one of them lacks its density: kphi never assumes standard air.
-[[nodiscard]] std::optional<AirDensity> air_of(std::span<const results::StepMean> steps);
-
-struct StandardCoefficient {
-  double k = 0;  ///< N/(rad/s)² at kStandardDensity
-  double standard_error = 0;
-};
-
-/// k · 1.225/ρ, with the errors of k and density combined (JCGM 100, eq. 12).
-[[nodiscard]] StandardCoefficient at_standard(double k, double standard_error, const AirDensity& air);
+/// k · 1.225/ρ in N/(rad/s)², with the errors of k and density combined (JCGM 100, eq. 12).
+[[nodiscard]] Estimate at_standard(double k, double standard_error, const Estimate& air);
 
 /// Which k of an occlusion the line is drawn through.
 enum class Estimator : std::uint8_t {
@@ -46,8 +37,13 @@ struct IdentificationOptions {
   Loss loss = Loss::none;
   SpeedRange speed_range{.min_rad_s = kSpeedMinRpm * 3.14159265358979323846 / 30};
   std::vector<LeftOutRun> left_out{};
-  std::optional<double> at_speed_rad_s;  ///< for "k at speed"; default: the highest level measured at every φ
-  LineFitOptions line;
+  std::optional<double> at_speed_rad_s{};  ///< for "k at speed"; default: the highest level measured at every φ
+  LineFitOptions line{};
+  std::string propeller{};  ///< empty: as the steps say
+  double diameter_in = 0;   ///< 0: as the steps say
+  int blades = 0;
+  /// How φ is measured in flight. On the bench's sector plates all measures are the same angle.
+  compensation::OverlapMeasure overlap = compensation::OverlapMeasure::rim_arc;
 };
 
 /// One row of the table: the measurement at one φ.
@@ -57,8 +53,8 @@ struct OcclusionCoefficient {
   /// N/(rad/s)². Of several repetitions: noise, zero and scatter between runs (Repeatability), without the errors
   /// common to all k; of a single one: of the fit.
   double standard_error = 0;
-  std::optional<StandardCoefficient> standard;  ///< nullopt if the air is unknown
-  std::size_t steps = 0;                        ///< distinct levels
+  std::optional<Estimate> standard;  ///< k in standard air; nullopt if the air is unknown
+  std::size_t steps = 0;             ///< distinct levels
   std::size_t repetitions = 0;
   std::optional<ThrustFit> fit;              ///< nullopt in a table without steps
   std::vector<results::StepMean> measured;   ///< behind `fit`, one per point of it
@@ -67,26 +63,21 @@ struct OcclusionCoefficient {
 
 struct Identification {
   std::string propeller;
-  double diameter_in = 0;  ///< 0: unknown
-  int blades = 0;          ///< 0: unknown
-  /// How φ is measured in flight. On the bench's sector plates all measures are the same angle.
-  compensation::OverlapMeasure overlap = compensation::OverlapMeasure::rim_arc;
+  double diameter_in = 0;                   ///< 0: unknown
+  int blades = 0;                           ///< 0: unknown
+  IdentificationOptions options;            ///< by which it was fitted
   std::vector<OcclusionCoefficient> table;  ///< ascending φ, the first is φ = 0
   LineFit line;
   Repeatability repeatability;  ///< one angle per row of the table; empty in a table without steps
   StepSelection selection;
-  std::vector<LeftOutRun> left_out;  ///< by hand
-  std::optional<AirDensity> air;     ///< of the steps used; nullopt: unknown, and so is every k at standard density
-  Estimator estimator = Estimator::through_origin;
-  Weighting weighting = Weighting::equal;
-  Loss loss = Loss::none;
-  double at_speed_rad_s = 0;   ///< commanded level of "k at speed"; 0: none
-  SpeedRange fitted{0, 0};     ///< lowest and highest level used at any φ
-  double speed_min_rad_s = 0;  ///< speeds measured at every φ: the valid range of the line
+  std::optional<Estimate> air;  ///< kg/m³, of the steps used; nullopt: unknown, and so is every k at standard density
+  double at_speed_rad_s = 0;    ///< commanded level of "k at speed"; 0: none
+  SpeedRange fitted{0, 0};      ///< lowest and highest level used at any φ
+  double speed_min_rad_s = 0;   ///< speeds measured at every φ: the valid range of the line
   double speed_max_rad_s = 0;
 
   /// The curve that flies, valid up to the widest occlusion measured.
-  [[nodiscard]] compensation::ThrustCurve curve() const { return line.curve(table.back().phi_deg, overlap); }
+  [[nodiscard]] compensation::ThrustCurve curve() const { return line.curve(table.back().phi_deg, options.overlap); }
 };
 
 /// Whether the range of speeds is known (a table of k may lack it).
@@ -112,8 +103,7 @@ struct Identification {
 [[nodiscard]] Identification identify(std::span<const results::StepMean> steps,
                                       const IdentificationOptions& options = {});
 
-/// The same from given coefficients. `speed` is their valid range.
-[[nodiscard]] Identification identify_table(std::span<const LinePoint> points, const LineFitOptions& options,
-                                            const SpeedRange& speed);
+/// The same from given coefficients: the line alone. The range of speeds in the options is their valid range.
+[[nodiscard]] Identification identify_table(std::span<const LinePoint> points, const IdentificationOptions& options);
 
 }  // namespace kphi::fit

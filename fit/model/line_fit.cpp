@@ -17,6 +17,10 @@ namespace {
 /// Angles travel through files and options as decimal degrees; two of them closer than this are the same.
 constexpr double kSameAngleDeg = 1e-6;
 
+/// No k is weighted as if known better than this share of the largest |k|: mounting and air change it by at least as
+/// much between two runs. Also used where a standard error is unknown.
+constexpr double kErrorFloor = 1e-3;
+
 struct LineResidual {
   double phi;
   double k;
@@ -156,7 +160,7 @@ LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& option
   fit.anchored = options.anchored;
   fit.K_T = all.front().k;
   const double k_scale = largest_k(all);
-  const double floor = options.error_floor * k_scale;
+  const double floor = kErrorFloor * k_scale;
   const auto known_error = [&](const LinePoint& point) {
     return point.standard_error > 0 ? point.standard_error : floor;
   };
@@ -203,38 +207,30 @@ LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& option
 
 Curvature curvature(std::span<const LinePoint> points, double freedom) {
   Curvature result;
-  result.lack_of_fit.name = "lack of fit of the line k(phi)";
-  result.lack_of_fit.statistic = "F";
-  result.lack_of_fit.hypothesis = "k(phi) is a line";
-  result.quadratic.name = "third term of a parabola k(phi)";
-  result.quadratic.statistic = "F";
-  result.quadratic.hypothesis = result.lack_of_fit.hypothesis;
-  std::vector<double> phi, k, weights;
-  double scale = 0;
-  for (const LinePoint& point : points) scale = std::max(scale, point.phi_deg);
-  for (const LinePoint& point : points) {
-    if (!(point.standard_error > 0)) return result;
-    phi.push_back(point.phi_deg / scale);
-    k.push_back(point.k);
-    weights.push_back(1 / (point.standard_error * point.standard_error));
-  }
   const double m = static_cast<double>(points.size());
-  if (m < 3) return result;
-  const double straight = regress_polynomial(phi, k, 0, 1, weights).weighted_squares;
-  const Regression parabola = regress_polynomial(phi, k, 0, 2, weights);
-  const auto finish = [](HypothesisTest& test, const HypothesisTest& found) {
-    test.value = found.value;
-    test.freedom = found.freedom;
-    test.error_freedom = found.error_freedom;
-    test.p = found.p;
-  };
-  finish(result.lack_of_fit, f_test(straight / (m - 2), m - 2, freedom));
-  finish(result.quadratic, f_test(straight - parabola.weighted_squares, 1, freedom));
-  result.second_order = parabola.estimates[2] / (scale * scale);
-  result.second_order_u = std::sqrt(parabola.covariance[2][2]) / (scale * scale);
-  const double observations = m + (std::isfinite(freedom) ? freedom : 0);
-  result.linear_aic = corrected_aic(straight, 2, observations);
-  result.quadratic_aic = corrected_aic(parabola.weighted_squares, 3, observations);
+  if (m >= 3 && std::all_of(points.begin(), points.end(), [](const auto& point) { return point.standard_error > 0; })) {
+    std::vector<double> phi, k, weights;
+    double scale = 0;
+    for (const LinePoint& point : points) scale = std::max(scale, point.phi_deg);
+    for (const LinePoint& point : points) {
+      phi.push_back(point.phi_deg / scale);
+      k.push_back(point.k);
+      weights.push_back(1 / (point.standard_error * point.standard_error));
+    }
+    const double straight = regress_polynomial(phi, k, 0, 1, weights).weighted_squares;
+    const Regression parabola = regress_polynomial(phi, k, 0, 2, weights);
+    result.lack_of_fit = f_test(straight / (m - 2), m - 2, freedom);
+    result.quadratic = f_test(straight - parabola.weighted_squares, 1, freedom);
+    result.second_order = parabola.estimates[2] / (scale * scale);
+    result.second_order_u = std::sqrt(parabola.covariance[2][2]) / (scale * scale);
+    const double observations = m + (std::isfinite(freedom) ? freedom : 0);
+    result.linear_aic = corrected_aic(straight, 2, observations);
+    result.quadratic_aic = corrected_aic(parabola.weighted_squares, 3, observations);
+  }
+  result.lack_of_fit.name = "lack of fit of the line k(phi)";
+  result.quadratic.name = "third term of a parabola k(phi)";
+  result.lack_of_fit.hypothesis = result.quadratic.hypothesis = "k(phi) is a line";
+  result.lack_of_fit.statistic = result.quadratic.statistic = "F";
   return result;
 }
 

@@ -26,9 +26,6 @@ struct LinePoint {
 struct LineFitOptions {
   bool anchored = false;             ///< the intercept is K_T
   std::vector<double> points_deg{};  ///< which points carry the line; empty: all with φ > 0
-  /// No k is weighted as if known better than this share of the largest |k| (0.1 %: mounting and air change it by at
-  /// least as much between two runs). Also used where a standard error is unknown.
-  double error_floor = 1e-3;
 };
 
 struct LineWeights {

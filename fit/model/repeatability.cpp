@@ -53,7 +53,6 @@ std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepM
     run.xt += w * x * fit.points[i].thrust_n;
     run.xx += w * x * x;
     run.x += w * x;
-    ++run.steps;
   }
   std::vector<RunSums> result;
   for (auto& [repetition, run] : runs) {

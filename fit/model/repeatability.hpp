@@ -18,7 +18,6 @@ struct RunSums {
   double xx = 0;            ///< Σ w x²
   double x = 0;             ///< Σ w x
   double zero_moved_n = 0;  ///< drift of the zero over the run; 0: unknown
-  std::size_t steps = 0;
 
   [[nodiscard]] double k() const { return xt / xx; }  ///< N/(rad/s)²
 };

@@ -32,8 +32,7 @@ struct ThrustResidual {
   }
 };
 
-std::vector<Point> points_in_range(std::span<const Point> points, const ThrustFitOptions& options) {
-  std::vector<Point> used;
+void require_numbers(std::span<const Point> points) {
   for (const Point& point : points) {
     if (!std::isfinite(point.speed_rad_s) || !std::isfinite(point.thrust_n) || !(point.weight > 0) ||
         !std::isfinite(point.weight)) {
@@ -42,10 +41,7 @@ std::vector<Point> points_in_range(std::span<const Point> points, const ThrustFi
                       "thrust {} N, weight {})",
                       point.speed_rad_s, point.thrust_n, point.weight));
     }
-    if (point.speed_rad_s >= options.speed_min_rad_s && point.speed_rad_s <= options.speed_max_rad_s)
-      used.push_back(point);
   }
-  return used;
 }
 
 Scale scale_of(const std::vector<Point>& points) {
@@ -87,11 +83,8 @@ void weigh(std::vector<Point>& points, Weighting weighting, const ThrustParamete
     if (parameters != nullptr) slope = 2 * parameters->k * point.speed_rad_s + parameters->linear;
     const double u_speed = weighting == Weighting::effective_variance ? slope * point.u_speed_rad_s : 0.0;
     const double variance = point.u_thrust_n * point.u_thrust_n + u_speed * u_speed;
-    if (!(variance > 0) || !std::isfinite(variance)) {
-      throw FitError(
-          "thrust fit: a step without an uncertainty cannot be weighted by it; fit with equal "
-          "weights");
-    }
+    if (!(variance > 0) || !std::isfinite(variance))
+      throw FitError("thrust fit: a step without an uncertainty cannot be weighted by it; fit with equal weights");
     point.weight = 1 / variance;
     sum += point.weight;
   }
@@ -244,14 +237,15 @@ void judge(ThrustFit& fit, std::size_t terms) {
 
 ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& options) {
   ThrustFit fit;
-  fit.points = points_in_range(points, options);
+  require_numbers(points);
+  fit.points.assign(points.begin(), points.end());
   fit.n = fit.points.size();
   const std::size_t terms = free_terms(options.form);
   if (fit.n < terms + 1) {
     throw FitError(
-        fmt::format("thrust fit: {} of {} points in the speed range, but {} terms need at least {}; widen "
-                    "the range or measure more steps",
-                    fit.n, points.size(), terms, terms + 1));
+        fmt::format("thrust fit: {} points, but {} terms need at least {}; widen the range of speeds or "
+                    "measure more steps",
+                    fit.n, terms, terms + 1));
   }
   require_distinct_speeds(fit.points, terms);
   if (options.weighting != Weighting::equal) weigh(fit.points, options.weighting, nullptr);
@@ -283,17 +277,14 @@ SpeedCoefficient k_at_speed(std::span<const Point> points) {
   SpeedCoefficient result;
   result.repetitions = points.size();
   const double n = static_cast<double>(points.size());
-  const auto local_k = [](const Point& point) { return point.thrust_n / (point.speed_rad_s * point.speed_rad_s); };
+  std::vector<double> k;
   for (const Point& point : points) {
     if (!(point.speed_rad_s > 0)) throw FitError("k at a speed: a step has no measured speed");
-    result.k += local_k(point) / n;
+    k.push_back(point.thrust_n / (point.speed_rad_s * point.speed_rad_s));
     result.speed_rad_s += point.speed_rad_s / n;
   }
-  if (points.size() > 1) {
-    double squares = 0;
-    for (const Point& point : points) squares += std::pow(local_k(point) - result.k, 2);
-    result.standard_error = std::sqrt(squares / (n - 1) / n);
-  }
+  result.k = mean(k);
+  result.standard_error = std::sqrt(variance(k) / n);
   return result;
 }
 

@@ -63,8 +63,6 @@ struct ThrustFitOptions {
   ThrustForm form = ThrustForm::through_origin;
   Weighting weighting = Weighting::equal;
   Loss loss = Loss::none;
-  double speed_min_rad_s = 0;  ///< points below are left out
-  double speed_max_rad_s = std::numeric_limits<double>::infinity();
 };
 
 struct ThrustFit {
@@ -87,7 +85,7 @@ struct ThrustFit {
 /// A point with a smaller robust weight counts as rejected and is listed.
 inline constexpr double kRejectedWeight = 0.25;
 
-/// Throws FitError when fewer points than free terms + 1 remain in the speed range, when a number is not finite, a
+/// Throws FitError when there are fewer points than free terms + 1, when a number is not finite, a
 /// weight not positive, an uncertainty missing that `weighting` needs, or the points too alike to fit all terms.
 [[nodiscard]] ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& options = {});
 

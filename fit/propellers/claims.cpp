@@ -67,19 +67,13 @@ std::optional<Estimate> minus(const std::optional<Estimate>& a, const std::optio
   return difference(*a, *b);
 }
 
-Claim claim_of(std::string id, std::string statement, std::string unit, double allowed_lower, double allowed_upper) {
-  Claim claim;
-  claim.id = std::move(id);
-  claim.statement = std::move(statement);
-  claim.unit = std::move(unit);
-  claim.allowed_lower = allowed_lower;
-  claim.allowed_upper = allowed_upper;
-  return claim;
-}
-
 Claim judged(std::string id, std::string statement, std::string unit, const std::optional<Estimate>& found,
              double allowed_lower, double allowed_upper) {
-  Claim claim = claim_of(std::move(id), std::move(statement), std::move(unit), allowed_lower, allowed_upper);
+  Claim claim{.id = std::move(id),
+              .statement = std::move(statement),
+              .unit = std::move(unit),
+              .allowed_lower = allowed_lower,
+              .allowed_upper = allowed_upper};
   if (!found) return claim;
   const double half = coverage_factor(found->freedom) * found->u;
   claim.value = found->value;
@@ -96,10 +90,10 @@ Claim judged(std::string id, std::string statement, std::string unit, const std:
 Claim linear(const FamilyMember& member) {
   const HypothesisTest& test = member.analysis.curvature.lack_of_fit;
   const std::string& propeller = member.identification.propeller;
-  Claim claim = claim_of(fmt::format("linear_{}", propeller),
-                         fmt::format("thrust falls linearly with the occlusion ({}); p of the lack of fit, {} or above",
-                                     propeller, kTestLevel),
-                         "1", kTestLevel, 1);
+  Claim claim = judged(fmt::format("linear_{}", propeller),
+                       fmt::format("thrust falls linearly with the occlusion ({}); p of the lack of fit, {} or above",
+                                   propeller, kTestLevel),
+                       "1", {}, kTestLevel, 1);
   if (!test.tested()) return claim;
   claim.value = test.p;  // without an interval
   claim.verdict = test.rejected() ? Verdict::fails : Verdict::holds;

@@ -4,6 +4,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -80,13 +81,12 @@ ComparedResult result_of_steps(const std::string& file, const std::string& name)
 }
 
 Difference difference(const ComparedValue& a, const ComparedValue& b) {
-  Difference result;
-  result.name = a.name;
-  result.unit = a.unit;
-  result.a = a.value;
-  result.b = b.value;
-  result.difference = b.value - a.value;
-  result.judged = a.judged && b.judged;
+  Difference result{.name = a.name,
+                    .unit = a.unit,
+                    .a = a.value,
+                    .b = b.value,
+                    .difference = b.value - a.value,
+                    .judged = a.judged && b.judged};
   if (!(a.standard_error > 0) || !(b.standard_error > 0)) return result;
   const Estimate apart =
       difference(Estimate{b.value, b.standard_error, b.freedom}, Estimate{a.value, a.standard_error, a.freedom});
@@ -227,15 +227,8 @@ TruthCheck check_against_truth(const ComparedResult& found, const std::string& t
 }
 
 const char* word(Agreement verdict) {
-  switch (verdict) {
-    case Agreement::agree:
-      return "agree";
-    case Agreement::differ:
-      return "differ";
-    case Agreement::undecided:
-      return "undecided";
-  }
-  return "undecided";
+  constexpr std::array<const char*, 3> words{"agree", "differ", "undecided"};
+  return words[static_cast<std::size_t>(verdict)];
 }
 
 std::string comparison_table(const Comparison& comparison) {
@@ -249,29 +242,19 @@ std::string comparison_table(const Comparison& comparison) {
                     100 * entry.share(), probability(entry.p), entry.significant ? " *" : "");
   }
   text += "\n";
-  if (comparison.diameter_ratio4) {
-    for (const Difference& entry : comparison.differences) {
-      if (entry.name == "K_T") {
-        text += fmt::format("K_T  B/A = {:.3f}; (diameter B/A)^4 = {:.3f}\n", entry.b / entry.a,
-                            *comparison.diameter_ratio4);
-      }
-    }
+  for (const Difference& entry : comparison.differences) {
+    if (comparison.diameter_ratio4 && entry.name == "K_T")
+      text +=
+          fmt::format("K_T  B/A = {:.3f}; (diameter B/A)^4 = {:.3f}\n", entry.b / entry.a, *comparison.diameter_ratio4);
   }
   for (const std::string& line : comparison.remarks) text += "note  " + line + "\n";
-  switch (comparison.verdict) {
-    case Agreement::agree:
-      text +=
-          fmt::format("verdict  agree: chance explains every difference; a difference of up to {:.2f} % is possible\n",
-                      100 * comparison.largest_open_share);
-      break;
-    case Agreement::differ:
-      text += "verdict  differ: chance does not explain the differences marked * (5 %, Holm)\n";
-      break;
-    case Agreement::undecided:
-      text += "verdict  undecided: no coefficient has a standard error in both\n";
-      break;
-  }
-  return text;
+  if (comparison.verdict == Agreement::differ)
+    return text + "verdict  differ: chance does not explain the differences marked * (5 %, Holm)\n";
+  if (comparison.verdict == Agreement::undecided)
+    return text + "verdict  undecided: no coefficient has a standard error in both\n";
+  return text +
+         fmt::format("verdict  agree: chance explains every difference; a difference of up to {:.2f} % is possible\n",
+                     100 * comparison.largest_open_share);
 }
 
 std::string comparison_json(const Comparison& comparison) {

@@ -37,10 +37,10 @@ struct Difference {
   std::string name;
   std::string unit;
   double a = 0, b = 0;
-  double difference = 0;                 ///< b − a
-  std::optional<double> standard_error;  ///< of it; nullopt if one of the two is unknown
-  std::optional<double> p;               ///< of a difference this large by chance (Student, Welch-Satterthwaite)
-  double coverage = 0;                   ///< Student's factor for the 95 % interval
+  double difference = 0;                   ///< b − a
+  std::optional<double> standard_error{};  ///< of it; nullopt if one of the two is unknown
+  std::optional<double> p{};               ///< of a difference this large by chance (Student, Welch-Satterthwaite)
+  double coverage = 0;                     ///< Student's factor for the 95 % interval
   bool judged = true;
   bool significant = false;  ///< after Holm's correction for the number of judged differences, level 5 %
   [[nodiscard]] double share() const { return difference / a; }

@@ -18,7 +18,7 @@ struct Row {
 
 /// From the air of its day to the common air.
 double scale_of(const Identification& one, Air air) {
-  return air == Air::standard && one.air ? kStandardDensity / one.air->kg_m3 : 1;
+  return air == Air::standard && one.air ? kStandardDensity / one.air->value : 1;
 }
 
 std::vector<Row> occluded_rows(std::span<const FamilyMember* const> members, Air air) {
@@ -90,14 +90,8 @@ std::vector<SharedSlope> shared_slopes(std::span<const FamilyMember> family) {
     const double freedom = freedom_of(members);
     SharedSlope one;
     one.diameter_in = diameter;
-    const auto estimate = [&](std::size_t i) {
-      return Estimate{shared.estimates[i], std::sqrt(shared.covariance[i][i]), freedom};
-    };
-    for (std::size_t i = 0; i < n; ++i) {
-      one.intercepts.push_back(estimate(i));
-      one.propellers.push_back(members[i]->identification.propeller);
-    }
-    one.slope = estimate(n);
+    for (const FamilyMember* member : members) one.propellers.push_back(member->identification.propeller);
+    one.slope = {shared.estimates[n], std::sqrt(shared.covariance[n][n]), freedom};
     one.common_u = common_u_of_slope(members);
     const double extra = static_cast<double>(n - 1);
     one.equal_slopes = f_test(std::max(0.0, shared.weighted_squares - own.weighted_squares) / extra, extra, freedom);
@@ -151,15 +145,9 @@ std::optional<FamilyPrediction> predict(std::span<const FamilyMember> family, do
     for (std::size_t j = 0; j < at.size(); ++j) leverage += at[i] * at[j] * fit.covariance[i][j] * points_each;
   }
   const double scale = std::pow(diameter_in, 4);
-  FamilyPrediction result;
-  result.diameter_in = diameter_in;
-  result.blades = blades;
-  result.phi_deg = phi_deg;
-  result.k = {value * scale, scale * std::sqrt(variance * (1 + leverage)), freedom};
-  const double half = coverage_factor(freedom) * result.k.u;
-  result.lower = result.k.value - half;
-  result.upper = result.k.value + half;
-  return result;
+  const Estimate k{value * scale, scale * std::sqrt(variance * (1 + leverage)), freedom};
+  const double half = coverage_factor(freedom) * k.u;
+  return FamilyPrediction{diameter_in, blades, phi_deg, k, k.value - half, k.value + half};
 }
 
 }  // namespace kphi::fit

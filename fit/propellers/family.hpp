@@ -24,9 +24,8 @@ enum class Air : std::uint8_t { measured, standard };
 /// Lines of one diameter with a common slope.
 struct SharedSlope {
   double diameter_in = 0;
-  Estimate slope;                    ///< N/(rad/s)²/deg, in the common air; u from the scatter of runs and steps
-  double common_u = 0;               ///< of the errors that all share: cell, clock, density
-  std::vector<Estimate> intercepts;  ///< one per member of that diameter, in their order
+  Estimate slope;       ///< N/(rad/s)²/deg, in the common air; u from the scatter of runs and steps
+  double common_u = 0;  ///< of the errors that all share: cell, clock, density
   std::vector<std::string> propellers;
   HypothesisTest equal_slopes;
 

@@ -194,14 +194,14 @@ Figure speed_figure(const Identification& identification) {
   std::vector<double> deviations;
   for (std::size_t i = 0; i < identification.table.size(); ++i) {
     const OcclusionCoefficient& row = identification.table[i];
-    std::map<double, std::vector<double>> levels;  // by commanded speed
+    std::map<double, std::vector<Point>> levels;  // by commanded speed
     for (const results::StepMean& step : identification.selection.used)
       if (step.occlusion_deg == row.phi_deg && step.speed_rad_s > 0)
-        levels[level(step)].push_back(step.thrust_n / (step.speed_rad_s * step.speed_rad_s));
+        levels[level(step)].push_back({step.speed_rad_s, step.thrust_n, 1});
     std::string rows;
-    for (const auto& [at, ks] : levels) {
-      const double k = mean(ks);
-      const double error = ks.size() > 1 ? std::sqrt(variance(ks) / static_cast<double>(ks.size())) : 0;
+    for (const auto& [at, points] : levels) {
+      const auto [k, u, mean_speed, repetitions] = k_at_speed(points);
+      const double error = repetitions > 1 ? u : 0;
       deviations.push_back(100 * (k / row.k - 1));
       rows += fmt::format("{:.6g} {:.6g} {:.6g}\n", rpm(at), deviations.back(), 100 * error / row.k);
       figure.csv += csv_row(row.phi_deg, rpm(at), k, error, deviations.back());

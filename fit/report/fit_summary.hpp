@@ -4,7 +4,6 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 
 #include "fit/model/identification.hpp"
@@ -26,14 +25,12 @@ namespace kphi::fit {
 [[nodiscard]] std::string caution_text(const Identification& identification, const Analysis& analysis);
 
 /// Headline, table, options and the whole analysis; `coefficients` is the file written.
-[[nodiscard]] nlohmann::ordered_json to_json(const Identification& identification, const Analysis& analysis,
-                                             const std::filesystem::path& coefficients);
-[[nodiscard]] nlohmann::ordered_json to_json(const Analysis& analysis);
-[[nodiscard]] nlohmann::ordered_json to_json(const Budget& budget);
-[[nodiscard]] nlohmann::ordered_json to_json(const HypothesisTest& test);
-[[nodiscard]] nlohmann::ordered_json to_json(const FamilyFindings& findings);
-/// What the raw samples show; null where they cannot.
-[[nodiscard]] nlohmann::ordered_json raw_to_json(const std::optional<Dynamics>& dynamics,
-                                                 const std::optional<BladePassCheck>& blade_pass);
+[[nodiscard]] nlohmann::ordered_json fit_json(const Identification& identification, const Analysis& analysis,
+                                              const std::filesystem::path& coefficients);
+void to_json(nlohmann::ordered_json& json, const Analysis& analysis);
+void to_json(nlohmann::ordered_json& json, const HypothesisTest& test);
+void to_json(nlohmann::ordered_json& json, const FamilyFindings& findings);
+void to_json(nlohmann::ordered_json& json, const Dynamics& dynamics);
+void to_json(nlohmann::ordered_json& json, const BladePassCheck& check);
 
 }  // namespace kphi::fit

@@ -75,20 +75,9 @@ int wait_for(pid_t child) {
   return status;
 }
 
-bool write_and_draw(const Figure& figure, const fs::path& folder, const std::string& gnuplot, Figures& figures) {
-  results::MemoryOnlySync files;  // can be drawn again at any time from steps.csv
-  const fs::path script = folder / (figure.name + ".gp"), svg = folder / (figure.name + ".svg");
-  results::write_text(script, figure.script, files);
-  results::write_text(folder / (figure.name + ".csv"), figure.csv, files);
-  const GnuplotOutcome outcome = draw(script, svg, gnuplot);
-  if (outcome.drawn) figures.drawn.push_back({figure.caption, svg});
-  if (!outcome.drawn) figures.skipped = outcome.reason;
-  return outcome.drawn;
-}
-
 }  // namespace
 
-GnuplotOutcome draw(const fs::path& script, const fs::path& svg, const std::string& program) {
+std::string draw(const fs::path& script, const fs::path& svg, const std::string& program) {
   const fs::path errors = fs::path(svg).replace_extension(".err");
   const SpawnSettings settings(script, svg, errors);
   std::string name = program, plain = "--default-settings", from_stdin = "-";
@@ -99,19 +88,26 @@ GnuplotOutcome draw(const fs::path& script, const fs::path& svg, const std::stri
   const int status = error == 0 ? wait_for(child) : 0;
   const std::string message = take_text(errors);
   std::error_code ignored;
-  if (error == 0 && WIFEXITED(status) && WEXITSTATUS(status) == 0 && fs::file_size(svg, ignored) > 0) return {true, ""};
+  if (error == 0 && WIFEXITED(status) && WEXITSTATUS(status) == 0 && fs::file_size(svg, ignored) > 0) return {};
   fs::remove(svg, ignored);
-  if (error == ENOENT) return {false, kMissing};
-  if (error != 0) return {false, fmt::format("cannot start {}: {}", program, std::strerror(error))};
-  return {false, fmt::format("{} failed on {}: {}", program, script.string(), message)};
+  if (error == ENOENT) return kMissing;
+  if (error != 0) return fmt::format("cannot start {}: {}", program, std::strerror(error));
+  return fmt::format("{} failed on {}: {}", program, script.string(), message);
 }
 
 Figures draw(const std::vector<Figure>& wanted, const fs::path& folder, const std::string& gnuplot) {
   std::error_code error;
   fs::create_directories(folder, error);  // a failure shows at the first file
   Figures figures;
-  for (const Figure& figure : wanted)
-    if (!write_and_draw(figure, folder, gnuplot, figures)) break;
+  results::MemoryOnlySync files;  // can be drawn again at any time from steps.csv
+  for (const Figure& figure : wanted) {
+    const fs::path script = folder / (figure.name + ".gp"), svg = folder / (figure.name + ".svg");
+    results::write_text(script, figure.script, files);
+    results::write_text(folder / (figure.name + ".csv"), figure.csv, files);
+    figures.skipped = draw(script, svg, gnuplot);
+    if (!figures.skipped.empty()) break;
+    figures.drawn.push_back({figure.caption, svg});
+  }
   return figures;
 }
 

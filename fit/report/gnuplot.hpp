@@ -30,15 +30,11 @@ struct Figures {
 [[nodiscard]] Figures draw(const std::vector<Figure>& wanted, const std::filesystem::path& folder,
                            const std::string& gnuplot = "gnuplot");
 
-struct GnuplotOutcome {
-  bool drawn = false;
-  std::string reason;  ///< why not, and what to do about it
-};
-
 /// Runs `program` with `script` as its stdin and writes its stdout to `svg`, without a shell. User settings
-/// (~/.gnuplot) are not read, so that the same script gives the same bytes. A failure leaves no `svg` behind.
-[[nodiscard]] GnuplotOutcome draw(const std::filesystem::path& script, const std::filesystem::path& svg,
-                                  const std::string& program = "gnuplot");
+/// (~/.gnuplot) are not read, so that the same script gives the same bytes. Returns why it could not be drawn and what
+/// to do about it; empty if it was. A failure leaves no `svg` behind.
+[[nodiscard]] std::string draw(const std::filesystem::path& script, const std::filesystem::path& svg,
+                               const std::string& program = "gnuplot");
 
 /// Okabe and Ito's colours, which differ for every kind of colour vision, each with a shape for prints in grey.
 struct Mark {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/locale/utf.hpp>
 #include <cctype>
 #include <cmath>
 #include <cstdint>
@@ -15,42 +16,21 @@ namespace {
 
 constexpr std::string_view kReplacement = "\xEF\xBF\xBD";
 
-/// Length of the UTF-8 character at the front, 0 if there is none (overlong forms, surrogates and above U+10FFFF
-/// included) or XML 1.0 does not allow it.
+/// Length of the UTF-8 character at the front; 0 if it is broken or XML 1.0 does not allow it.
 std::size_t character_length(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<std::uint8_t>(text[i]) : 0u; };
-  const auto follows = [&](std::size_t i) { return (byte(i) & 0xC0u) == 0x80u; };
-  const std::uint32_t first = byte(0);
-  if (first < 0x80) return first >= 0x20 || first == '\t' || first == '\n' || first == '\r' ? 1 : 0;
-  if (first >= 0xC2 && first <= 0xDF) return follows(1) ? 2 : 0;
-  if (first >= 0xE0 && first <= 0xEF) {
-    if (!follows(1) || !follows(2)) return 0;
-    const std::uint32_t code = ((first & 0x0Fu) << 12) | ((byte(1) & 0x3Fu) << 6) | (byte(2) & 0x3Fu);
-    return code >= 0x800 && !(code >= 0xD800 && code <= 0xDFFF) && code < 0xFFFE ? 3 : 0;
-  }
-  if (first >= 0xF0 && first <= 0xF4) {
-    if (!follows(1) || !follows(2) || !follows(3)) return 0;
-    const std::uint32_t code = ((first & 0x07u) << 18) | ((byte(1) & 0x3Fu) << 12);
-    return code >= 0x10000 && code <= 0x10FFFF ? 4 : 0;
-  }
-  return 0;
+  const char* end = text.data();
+  const auto code = boost::locale::utf::utf_traits<char>::decode(end, text.data() + text.size());
+  const bool allowed = code >= 0x20 || code == '\t' || code == '\n' || code == '\r';
+  const bool valid = boost::locale::utf::is_valid_codepoint(code) && code != 0xFFFE && code != 0xFFFF;
+  return allowed && valid ? static_cast<std::size_t>(end - text.data()) : 0;
 }
 
 std::string_view escape_of(char c) {
-  switch (c) {
-    case '&':
-      return "&amp;";
-    case '<':
-      return "&lt;";
-    case '>':
-      return "&gt;";
-    case '"':
-      return "&quot;";
-    case '\'':
-      return "&#39;";
-    default:
-      return {};
-  }
+  if (c == '&') return "&amp;";
+  if (c == '<') return "&lt;";
+  if (c == '>') return "&gt;";
+  if (c == '"') return "&quot;";
+  return c == '\'' ? "&#39;" : "";
 }
 
 void prefix_references(pugi::xml_node node, const std::string& prefix) {
@@ -76,14 +56,9 @@ std::string html_escaped(std::string_view text) {
   std::string result;
   while (!text.empty()) {
     const std::size_t length = character_length(text);
-    if (length == 0) {
-      result += kReplacement;
-      text.remove_prefix(1);
-      continue;
-    }
-    const std::string_view escape = escape_of(text.front());
+    const std::string_view escape = length == 0 ? kReplacement : escape_of(text.front());
     result += escape.empty() ? text.substr(0, length) : escape;
-    text.remove_prefix(length);
+    text.remove_prefix(std::max<std::size_t>(length, 1));
   }
   return result;
 }

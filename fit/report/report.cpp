@@ -1,17 +1,431 @@
 #include "fit/report/report.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <map>
 
 #include "compensation/units.hpp"
+#include "fit/model/torque_power.hpp"
 #include "fit/report/html.hpp"
-#include "fit/report/sections.hpp"
+#include "fit/report/raw_samples.hpp"
 
 namespace kphi::fit {
 namespace {
+
+using enum HtmlTable::Column;
+using Cells = std::vector<std::string>;
+
+/// N/(rad/s)² → N/RPM², for numbers on the page.
+double per_rpm2(double k) { return to_newtons_per_rpm2(ThrustCoefficient(k)); }
+
+/// "19100"
+std::string rpm_text(double speed_rad_s) { return fmt::format("{:.0f}", to_rpm(RadPerSec(speed_rad_s))); }
+
+/// Thrust at the φ of `row` over the thrust at φ = 0, at the reference speed if there is one.
+double share_of_thrust(const Identification& identification, const OcclusionCoefficient& row) {
+  const auto& nominal = identification.table.front().at_speed;
+  return row.at_speed && nominal ? row.at_speed->k / nominal->k : row.k / identification.line.K_T;
+}
+
+std::string section(std::string_view title, const HtmlTable& table, std::string_view note = {}) {
+  return html_heading(title) + table.html() + (note.empty() ? "" : html_note(note));
+}
+
+std::string percent(double share) { return fmt::format("{:.3f}", 100 * share); }
+
+std::string whole(std::size_t n) { return fmt::format("{}", n); }
+
+/// N/(rad/s)², and below it N/RPM².
+std::string both_units(double k, double error) {
+  return with_power_of_ten(k, error) + "<br/><span class=\"soft\">" + with_power_of_ten(per_rpm2(k), per_rpm2(error)) +
+         "</span>";
+}
+
+// ---- analysis ----------------------------------------------------------------------------------------------
+
+/// Above some hundreds the number does not matter.
+std::string freedom_words(double freedom) {
+  if (!std::isfinite(freedom)) return "∞";
+  return freedom > 999 ? "&gt; 999" : fmt::format("{:.0f}", freedom);
+}
+
+/// The contribution of one source to one budget, as a share of the value.
+std::string budget_cell(const Budget& budget, const std::string& source) {
+  for (const BudgetRow& row : budget.rows) {
+    if (row.source != source) continue;
+    return row.known() ? percent(row.contribution() / std::abs(budget.value)) : "?";
+  }
+  return "–";
+}
+
+template <class Cell>
+void sum_row(HtmlTable& table, const std::vector<Budget>& budgets, const char* name, const Cell& cell) {
+  Cells cells{fmt::format("<b>{}</b>", name), "", ""};
+  for (const Budget& budget : budgets) cells.push_back("<b>" + cell(budget) + "</b>");
+  cells.emplace_back();
+  table.row(cells);
+}
+
+/// `standard`: of the same coefficients in standard air; may be empty.
+std::string budget_section(const std::vector<Budget>& budgets, const std::vector<Budget>& standard) {
+  if (budgets.empty() || budgets.front().rows.empty()) return {};
+  std::vector<HtmlTable::Heading> headings{{"source", text}, {"type"}, {"shared by"}};
+  for (const Budget& budget : budgets) headings.push_back({typeset(budget.quantity) + ", %"});
+  headings.push_back({"from", text});
+  HtmlTable table(headings);
+  for (const BudgetRow& row : budgets.front().rows) {
+    Cells cells{typeset(row.source), row.evaluation == Evaluation::type_a ? "A" : "B", row.common ? "all φ" : "one φ"};
+    for (const Budget& budget : budgets) cells.push_back(budget_cell(budget, row.source));
+    cells.push_back(typeset(row.note));
+    table.row(cells);
+  }
+  const auto expanded = [](const Budget& b) { return percent(b.expanded() / std::abs(b.value)); };
+  sum_row(table, budgets, "combined u", [](const Budget& b) { return percent(b.combined() / std::abs(b.value)); });
+  sum_row(table, budgets, "degrees of freedom", [](const Budget& b) { return freedom_words(b.freedom()); });
+  sum_row(table, budgets, "95 %: ±", expanded);
+  if (standard.size() == budgets.size()) sum_row(table, standard, "in standard air, 95 %: ±", expanded);
+  return section("Uncertainty budget", table,
+                 "By the GUM (JCGM 100): standard uncertainties in percent of each k. Type A comes from the scatter of "
+                 "these measurements, type B from elsewhere. An error that all coefficients share cancels in their "
+                 "ratios. An unknown source (?) is missing in the sum.");
+}
+
+std::string probability(const HypothesisTest& test) {
+  if (!test.tested()) return "–";
+  return test.p < 0.0001 ? "&lt; 0.0001" : fmt::format("{:.4f}", test.p);
+}
+
+std::string test_section(const Analysis& analysis) {
+  std::vector<const HypothesisTest*> tests;
+  for (const SpeedDependence& one : analysis.speed) tests.insert(tests.end(), {&one.lack_of_fit, &one.trend});
+  tests.insert(tests.end(), {&analysis.curvature.lack_of_fit, &analysis.curvature.quadratic});
+  for (const HypothesisTest& test : analysis.differences) tests.push_back(&test);
+  std::erase_if(tests, [](const HypothesisTest* test) { return test->name.empty(); });
+  if (tests.empty()) return {};
+  HtmlTable table(
+      {{"test", text}, {"hypothesis", text}, {"statistic"}, {"degrees of freedom"}, {"p"}, {"verdict (5 %)", text}});
+  for (const HypothesisTest* test : tests) {
+    const bool f = test->error_freedom > 0;
+    table.row(
+        {typeset(test->name), typeset(test->hypothesis),
+         html_escaped(test->statistic) + " = " +
+             html_number(test->value, std::abs(test->value) < 1000 ? "{:.3g}" : "{:.0f}"),
+         (f ? fmt::format("{:.0f}, ", test->freedom) : "") + freedom_words(f ? test->error_freedom : test->freedom),
+         probability(*test),
+         !test->tested()    ? "not tested"
+         : test->rejected() ? "rejected"
+                            : "not rejected"},
+        test->rejected() ? std::optional<std::size_t>(5) : std::nullopt);
+  }
+  return section("Tests", table);
+}
+
+std::string speed_section(const std::vector<SpeedDependence>& speed) {
+  if (speed.empty()) return {};
+  HtmlTable table({{"φ"}, {"change of k over the range, %"}, {"±, %"}, {"beyond noise, %"}});
+  for (const SpeedDependence& one : speed) {
+    const double k = one.levels.empty() ? 0 : one.levels.back().k;
+    table.row({html_angle(one.phi_deg), html_number(100 * one.change.value, "{:+.3f}"),
+               html_number(100 * one.change.u, "{:.3f}"),
+               k > 0 ? html_number(100 * one.inadequacy / k, "{:.3f}") : "–"});
+  }
+  return section("k against speed", table);
+}
+
+std::string torque_section(const std::vector<TorqueCoefficient>& torque) {
+  if (torque.empty()) return {};
+  HtmlTable table({{"φ"},
+                   {"k<sub>Q</sub>, N m/(rad/s)²"},
+                   {"share of k<sub>Q</sub>(0)"},
+                   {"±"},
+                   {"κ = k<sub>Q</sub>/k, mm"},
+                   {"±"}});
+  for (const TorqueCoefficient& one : torque)
+    table.row({html_angle(one.phi_deg), with_power_of_ten(one.k_q.value, one.k_q.u), html_number(one.share, "{:.4f}"),
+               one.phi_deg == 0 ? "–" : html_number(one.share_u, "{:.4f}"),
+               html_number(1e3 * one.drag_per_thrust_m.value, "{:.4f}"),
+               html_number(1e3 * one.drag_per_thrust_m.u, "{:.4f}")});
+  return section("Torque", table);
+}
+
+std::string prediction_section(const std::vector<LinePrediction>& predictions) {
+  if (predictions.empty()) return {};
+  HtmlTable table({{"φ"},
+                   {"k on the line, 10⁻⁶ N/(rad/s)²"},
+                   {"95 %: ±"},
+                   {"k<sub>i</sub>"},
+                   {"95 %: ±"},
+                   {"u of the speed ω̂, %"},
+                   {"remark", text}});
+  for (const LinePrediction& one : predictions)
+    table.row({html_angle(one.phi_deg), html_number(1e6 * one.k.value, "{:.5f}"),
+               html_number(1e6 * one.k.expanded(), "{:.5f}"), html_number(one.scaling_factor.value, "{:.4f}"),
+               html_number(one.scaling_factor.expanded(), "{:.4f}"), html_number(100 * one.speed_u_share, "{:.3f}"),
+               one.clipped        ? "above K<sub>T</sub>, held at 1"
+               : one.extrapolated ? "extrapolated"
+                                  : ""});
+  return section("The line in flight", table);
+}
+
+std::string rejected_section(const std::vector<RejectedPoint>& rejected) {
+  if (rejected.empty()) return {};
+  HtmlTable table({{"φ"}, {"repetition"}, {"step"}, {"speed, RPM"}, {"thrust, N"}, {"residual, N"}, {"robust weight"}});
+  for (const RejectedPoint& point : rejected)
+    table.row({html_angle(point.phi_deg), fmt::format("{}", point.repetition), fmt::format("{}", point.step + 1),
+               rpm_text(point.speed_rad_s), fmt::format("{:.4f}", point.thrust_n),
+               html_number(point.residual_n, "{:+.4f}"), html_number(point.robust_weight, "{:.3f}")});
+  return section("Points rejected by the robust fit", table);
+}
+
+// ---- runs --------------------------------------------------------------------------------------------------
+
+Cells run_row(const RunProvenance& run, const StepSelection& selection) {
+  std::size_t used = 0, left_out = 0;
+  std::string flags;  // each once, in the order of their first step
+  for (const results::StepMean& step : selection.used) used += is_run_of(run, step) ? 1 : 0;
+  for (const FlaggedStep& flagged : selection.flagged) {
+    if (!is_run_of(run, flagged.step)) continue;
+    left_out += flagged.left_out ? 1 : 0;
+    if (flags.find(flagged.reason) == std::string::npos) flags += (flags.empty() ? "" : "; ") + flagged.reason;
+  }
+  flags = html_escaped(flags);
+  for (const std::string& event : run.events) flags += (flags.empty() ? "" : "<br/>") + html_escaped(event);
+  Cells cells{html_escaped(run.file), run.outcome.empty() ? "–" : html_escaped(run.outcome), whole(used),
+              whole(left_out)};
+  if (const auto& account = run.account) {
+    cells.insert(cells.end(), {whole(account->expected), whole(account->received),
+                               whole(account->lost_network + account->lost_host)});
+  } else {
+    cells.insert(cells.end(), 3, "–");
+  }
+  cells.push_back(flags.empty() ? "none" : flags);
+  return cells;
+}
+
+std::string entry(const char* term, const std::string& description) {
+  return fmt::format("<dt>{}</dt><dd>{}</dd>\n", term, html_escaped(description));
+}
+
+std::string clock_words(const MotorClock& clock) {
+  if (!clock.u_gain)
+    return "unchecked: all speeds may be off together by a few tenths of a percent, and k by twice that; measure it "
+           "with kphi devices --bench FILE --clock-gain";
+  return fmt::format("gain {:.7g} ± {:.1e}, speeds are corrected; shared by all steps: {:.1e} of k", clock.gain,
+                     *clock.u_gain, 2 * *clock.u_gain / clock.gain);
+}
+
+std::string hash_section(const std::vector<RunProvenance>& runs) {
+  if (runs.empty()) return {};
+  HtmlTable table({{"file", text}, {"SHA-256", hash}}, true);
+  for (const RunProvenance& run : runs) table.row({html_escaped(run.file), html_escaped(run.sha256)});
+  return section("Hashes of the runs", table);
+}
+
+std::string interval(double lower, double upper) {
+  if (!std::isfinite(lower) && !std::isfinite(upper)) return "–";
+  return html_number(lower, "{:.4g}") + " to " + html_number(upper, "{:.4g}");
+}
+
+/// Two decimals with a true minus, and no sign before zero.
+std::string signed_percent(double percent) {
+  const std::string digits = fmt::format("{:.2f}", std::abs(percent));
+  if (digits == "0.00") return "0.00 %";
+  return (percent < 0 ? "−" : "+") + digits + " %";
+}
+
+std::string remark_section(std::span<const std::string> remarks) {
+  if (remarks.empty()) return {};
+  std::string html = "<div class=\"remarks\"><h3>Before you fly this</h3>\n<ul>\n";
+  for (const std::string& remark : remarks) html += "<li>" + typeset(remark) + "</li>\n";
+  return html + "</ul></div>\n";
+}
+
+std::string coefficient_section(const Identification& identification) {
+  const std::string at =
+      identification.at_speed_rad_s > 0 ? " at " + rpm_text(identification.at_speed_rad_s) + " RPM" : "";
+  const std::string units = ", N/(rad/s)²<br/><span class=\"soft\">N/RPM²</span>";
+  HtmlTable table({{"φ"},
+                   {"k" + units},
+                   {"k" + at + units},
+                   {"thrust share<br/>" + at},
+                   {"line − k"},
+                   {"residual<br/>rms, mN"},
+                   {"R²"},
+                   {"steps"}});
+  for (const OcclusionCoefficient& row : identification.table) {
+    const double miss = identification.curve().at(from_degrees(row.phi_deg)).value() - row.k;
+    table.row({html_angle(row.phi_deg), both_units(row.k, row.standard_error),
+               row.at_speed ? both_units(row.at_speed->k, row.at_speed->standard_error) : "–",
+               fmt::format("{:.1f} %", 100 * share_of_thrust(identification, row)),
+               signed_percent(100 * miss / identification.line.K_T),
+               row.fit ? fmt::format("{:.2f}", 1e3 * row.fit->rms_n) : "–",
+               row.fit ? fmt::format("{:.5f}", row.fit->r_squared) : "–", row.fit ? whole(row.fit->n) : "–"});
+  }
+  return section(
+      "Coefficients", table,
+      "± is one standard error: for k from noise, zero and scatter between the runs, for k at one speed from "
+      "the repetitions. It leaves out the errors that all steps share (calibration of the load cell, air "
+      "density, mounting); the budget below includes them. Line − k is in percent of K<sub>T</sub>; the "
+      "thrust share is k over k(0) at the same speed.");
+}
+
+std::string standard_section(const Identification& identification) {
+  const char* const title = "In standard air, 1.225 kg/m³";
+  if (!identification.air) {
+    return html_heading(title) +
+           "<p class=\"warning\">Air density unknown: k holds for the air of that day only, and k at standard density "
+           "is not given. 10 K or 30 hPa change the density by 3 %. Add `ambient:` to the bench file.</p>\n";
+  }
+  HtmlTable table({{"φ"}, {"k · 1.225/ρ, N/(rad/s)²"}, {"N/RPM²"}});
+  for (const OcclusionCoefficient& row : identification.table)
+    if (const auto& standard = row.standard)
+      table.row({html_angle(row.phi_deg), with_power_of_ten(standard->value, standard->u),
+                 with_power_of_ten(per_rpm2(standard->value), per_rpm2(standard->u))});
+  return html_heading(title) +
+         fmt::format("<p>Measured in air of {:.4f} ± {:.4f} kg/m³.</p>\n", identification.air->value,
+                     identification.air->u) +
+         table.html() + html_note("± includes the standard uncertainty of the density.");
+}
+
+std::string power_section(const Identification& identification) {
+  constexpr std::size_t kRows = 5;
+  std::map<double, std::vector<StepPower>> by_angle;
+  for (const StepPower& row : power_of(identification.selection.used)) by_angle[row.phi_deg].push_back(row);
+  if (by_angle.empty()) return {};
+  HtmlTable table(
+      {{"φ"}, {"step"}, {"speed, RPM"}, {"thrust, N"}, {"power, W"}, {"g/W"}, {"N/W"}, {"measured by", text}});
+  for (const auto& [phi, rows] : by_angle) {
+    const std::size_t n = std::min(kRows, rows.size());
+    for (std::size_t i = 1; i <= n; ++i) {
+      const StepPower& row = rows[i * rows.size() / n - 1];
+      table.row({html_angle(phi), fmt::format("{}", row.step + 1), rpm_text(row.speed_rad_s),
+                 fmt::format("{:.4f}", row.thrust_n), fmt::format("{:.2f}", row.power_w),
+                 fmt::format("{:.3f}", row.gram_per_watt()), fmt::format("{:.5f}", row.newton_per_watt()),
+                 row.by_supply ? "supply" : "module"});
+    }
+  }
+  return section("Power", table);
+}
+
+std::string step_section(const StepSelection& selection) {
+  const auto left_out = std::count_if(selection.flagged.begin(), selection.flagged.end(),
+                                      [](const FlaggedStep& flagged) { return flagged.left_out; });
+  const std::string html =
+      html_heading("Steps left out") +
+      fmt::format("<p>{} steps were fitted; {} left out for a quality flag, {} outside the speed range.</p>\n",
+                  selection.used.size(), left_out, selection.outside_range) +
+      html_note(
+          "A step is left out for a quality flag or by hand, both with a stated cause, never for being far from "
+          "the others: the scatter of the repetitions is part of their uncertainty (JCGM 100, 3.4.7 and 4.2) and "
+          "of the budget.");
+  if (selection.flagged.empty()) return html;
+  HtmlTable table({{"φ"},
+                   {"repetition"},
+                   {"step"},
+                   {"commanded, RPM"},
+                   {"measured, RPM"},
+                   {"thrust, N"},
+                   {"flag", text},
+                   {"verdict", text}},
+                  true);
+  for (const FlaggedStep& flagged : selection.flagged) {
+    const results::StepMean& step = flagged.step;
+    table.row({html_angle(step.occlusion_deg), fmt::format("{}", step.repetition), fmt::format("{}", step.step + 1),
+               rpm_text(step.commanded_speed_rad_s), rpm_text(step.speed_rad_s), fmt::format("{:.4f}", step.thrust_n),
+               html_escaped(flagged.reason), flagged.left_out ? "left out" : "kept"});
+  }
+  return html + table.html();
+}
+
+std::string run_section(const Provenance& provenance, const StepSelection& selection) {
+  if (provenance.runs.empty() && provenance.rejected.empty()) return {};
+  HtmlTable table({{"file", text},
+                   {"outcome", text},
+                   {"steps fitted"},
+                   {"left out"},
+                   {"samples expected"},
+                   {"received"},
+                   {"lost"},
+                   {"flags and events", text}},
+                  true);
+  const auto bad = [](bool is_bad) { return is_bad ? std::optional<std::size_t>(1) : std::nullopt; };
+  for (const RunProvenance& run : provenance.runs)
+    table.row(run_row(run, selection), bad(!run.outcome.empty() && run.outcome != "complete"));
+  for (const RejectedRun& run : provenance.rejected) {
+    table.row({html_escaped(run.file), "not accepted", "0", "–", "–", "–", "–",
+               html_escaped(run.utc) + ": " + html_escaped(run.reason)},
+              bad(true));
+  }
+  return section("Runs", table);
+}
+
+std::string provenance_section(const Identification& identification, const Provenance& provenance) {
+  const auto known = [](const std::string& words) { return words.empty() ? "unknown" : words; };
+  const LineFit& line = identification.line;
+  const auto& air = identification.air;
+  std::string points;
+  for (const LinePoint& point : line.points) points += (points.empty() ? "" : ", ") + html_angle(point.phi_deg);
+  std::string html = html_heading("Provenance") + "<dl>\n";
+  html += entry("Campaign", known(provenance.campaign));
+  html += entry("Fitted from", provenance.source);
+  html += entry("Model", "T = k ω²: " + estimator_words(identification));
+  html += entry("Line", (line.anchored ? "anchored at K_T, points " : "free, points ") + points);
+  if (speeds_known(identification))
+    html += entry("Speeds", rpm_text(identification.speed_min_rad_s) + " to " +
+                                rpm_text(identification.speed_max_rad_s) + " RPM");
+  html += entry("Overlap", std::string(compensation::name_of(identification.options.overlap)) +
+                               ": measure φ in this way in flight; on the bench's sector plates all measures are the "
+                               "same angle");
+  html += entry("Air density", air ? fmt::format("{:.4f} ± {:.4f} kg/m³", air->value, air->u) : "unknown");
+  const auto& supply = provenance.supply_v;
+  html += entry("Supply", supply && std::isfinite(*supply) ? fmt::format("{:g} V", *supply) : "unknown");
+  if (provenance.clock) html += entry("Motor's clock", clock_words(*provenance.clock));
+  html += entry("Measured", known(provenance.measured_utc));
+  html += entry("Fitted by", "kphi " + provenance.tool_version);
+  return html + "</dl>\n" + hash_section(provenance.runs);
+}
+
+std::string family_section(std::span<const Identification* const> family) {
+  HtmlTable table({{"propeller", text},
+                   {"diameter, in"},
+                   {"blades"},
+                   {"K<sub>T</sub>, N/(rad/s)²"},
+                   {"K<sub>T</sub>/D⁴, N/((rad/s)² m⁴)"},
+                   {"slope, N/(rad/s)² per degree"},
+                   {"slope, % of K<sub>T</sub> per degree"}});
+  for (const Identification* one : family) {
+    const LineFit& line = one->line;
+    const double diameter_m = 0.0254 * one->diameter_in;
+    table.row({html_escaped(one->propeller), one->diameter_in > 0 ? fmt::format("{:g}", one->diameter_in) : "–",
+               one->blades > 0 ? fmt::format("{}", one->blades) : "–",
+               with_power_of_ten(line.K_T, line.K_T_standard_error),
+               diameter_m > 0 ? fmt::format("{:.5f}", line.K_T / std::pow(diameter_m, 4)) : "–",
+               with_power_of_ten(line.slope_per_deg, std::sqrt(line.covariance[1][1])),
+               html_number(100 * line.slope_per_deg / line.K_T, "{:+.4f}")});
+  }
+  return section("The propellers side by side", table);
+}
+
+std::string slopes_section(std::span<const SharedSlope> slopes) {
+  if (slopes.empty()) return {};
+  HtmlTable table(
+      {{"diameter, in"}, {"propellers", text}, {"slope, N/(rad/s)² per degree"}, {"95 %, ±"}, {"equal slopes, p"}});
+  for (const SharedSlope& one : slopes)
+    table.row({fmt::format("{:g}", one.diameter_in), html_escaped(fmt::format("{}", fmt::join(one.propellers, ", "))),
+               with_power_of_ten(one.slope.value, std::hypot(one.slope.u, one.common_u)),
+               fmt::format("{:.1e}", one.expanded()), fmt::format("{:.4f}", one.equal_slopes.p)});
+  return section("One slope for each diameter", table,
+                 "± comes from the scatter of runs and steps, the zero, and the errors that all share. The line of a "
+                 "single propeller never takes a point as known better than 0.1 % of K<sub>T</sub>.");
+}
+
+// ---- the page
+// ----------------------------------------------------------------------------------------------------------
 
 std::string card(const std::string& title, double value, double error, const std::string& per,
                  const std::string& more) {
@@ -24,10 +438,9 @@ std::string card(const std::string& title, double value, double error, const std
 std::string headline(const LineFit& line) {
   std::string crossings;
   if (line.clipping_deg() && !line.anchored)
-    crossings += fmt::format(
-        "<p>meets K<sub>T</sub> at {:.1f}°; below that angle compensation holds k<sub>i</sub> at "
-        "1</p>",
-        *line.clipping_deg());
+    crossings +=
+        fmt::format("<p>meets K<sub>T</sub> at {:.1f}°; below that angle compensation holds k<sub>i</sub> at 1</p>",
+                    *line.clipping_deg());
   if (line.zero_crossing_deg()) crossings += fmt::format("<p>reaches zero at {:.1f}°</p>", *line.zero_crossing_deg());
   const std::string mismatch =
       line.anchored ? "<p>anchored at K<sub>T</sub></p>"
@@ -114,6 +527,22 @@ std::string statements_of(const std::vector<Chapter>& chapters) {
 }
 
 }  // namespace
+
+std::string analysis_sections(const Analysis& analysis) {
+  return rejected_section(analysis.rejected) + budget_section(analysis.coefficients, analysis.standard) +
+         prediction_section(analysis.predictions) + speed_section(analysis.speed) + test_section(analysis) +
+         torque_section(analysis.torque);
+}
+
+std::string claims_section(std::span<const Claim> claims) {
+  if (claims.empty()) return {};
+  HtmlTable table({{"statement", text}, {"found"}, {"95 %"}, {"allowed"}, {"unit", text}, {"verdict", text}});
+  for (const Claim& claim : claims)
+    table.row({typeset(claim.statement), html_number(claim.value, "{:.4g}"), interval(claim.lower, claim.upper),
+               interval(claim.allowed_lower, claim.allowed_upper), typeset(claim.unit), name_of(claim.verdict)},
+              claim.verdict == Verdict::fails ? std::optional<std::size_t>(5) : std::nullopt);
+  return section("The paper's statements", table);
+}
 
 std::string format_report(const Identification& identification, const Provenance& provenance, const Figures& figures,
                           const Analysis* analysis) {

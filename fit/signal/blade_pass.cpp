@@ -12,6 +12,10 @@
 namespace kphi::fit {
 namespace {
 
+constexpr double kBoxClock = 30e-6;        // relative standard uncertainty of the box's sample clock, a quartz
+constexpr double kSearch = 0.02;           // about the reported speed, relative
+constexpr double kLeastSignalToNoise = 8;  // of the line over the noise of one bin
+
 /// Hann's window, after the mean is taken away: the once-per-turn line must not leak into the blades'.
 std::vector<double> windowed(std::vector<double> values) {
   const double n = static_cast<double>(values.size());
@@ -60,16 +64,16 @@ struct SpectrumPeak {
   double u_cycles = 0;
 };
 
-/// The highest line within `search` of `expected` (cycles per sample).
-SpectrumPeak find_peak(const std::vector<double>& samples, double expected, double search) {
+/// The highest line near `expected` (cycles per sample).
+SpectrumPeak find_peak(const std::vector<double>& samples, double expected) {
   const std::vector<double> values = windowed(samples);
   const double n = static_cast<double>(values.size());
   Eigen::FFT<double> fft;
   fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
   std::vector<std::complex<double>> spectrum;
   fft.fwd(spectrum, values);
-  const auto low = static_cast<std::size_t>(std::max(1.0, std::floor(expected * (1 - search) * n)));
-  const auto high = std::min(spectrum.size() - 2, static_cast<std::size_t>(std::ceil(expected * (1 + search) * n)));
+  const auto low = static_cast<std::size_t>(std::max(1.0, std::floor(expected * (1 - kSearch) * n)));
+  const auto high = std::min(spectrum.size() - 2, static_cast<std::size_t>(std::ceil(expected * (1 + kSearch) * n)));
   if (high <= low + 8) return {};
   std::size_t top = low;
   for (std::size_t i = low; i <= high; ++i)
@@ -89,61 +93,53 @@ SpectrumPeak find_peak(const std::vector<double>& samples, double expected, doub
   return peak;
 }
 
-std::optional<BladePassLine> line_of(const results::RunRecording& run, std::size_t phase,
-                                     const results::CellStream& cell, const results::MotorSeries& motor,
-                                     const BladePassOptions& options) {
-  const results::PhaseMark& mark = run.phases[phase];
-  results::Window window{mark.time_ns, run.phases[phase + 1].time_ns};
+/// Gain of the clock by the line of one step, with the noise about it and the scatter of the speed.
+std::optional<Estimate> line_of(const results::RunRecording& run, std::size_t phase, const results::CellStream& cell,
+                                const results::MotorSeries& motor) {
+  results::Window window{run.phases[phase].time_ns, run.phases[phase + 1].time_ns};
   window.begin += std::llround(1e9 * std::max(run.header.minimum_discard_s, 0.4 * window.seconds()));
   const results::EvenSamples thrust = cell.samples(window);
   const results::Statistics speed = motor.statistics(results::MotorChannel::speed, window);
   if (thrust.counts.size() < 256 || speed.n < 3) return std::nullopt;
   const double reported = std::abs(speed.mean);
   const double expected = run.header.blades * reported / (2 * kPi) / thrust.rate_hz;
-  if (!(expected > 0) || expected * (1 + options.search) > 0.5) return std::nullopt;
-  const SpectrumPeak peak = find_peak(thrust.counts, expected, options.search);
-  if (peak.signal_to_noise < options.least_signal_to_noise) return std::nullopt;
-  BladePassLine line;
-  line.step = mark.step;
-  line.frequency_hz = peak.cycles * thrust.rate_hz;
-  line.reported_speed_rad_s = reported;
-  line.gain = peak.cycles / expected;
-  line.u_gain =
-      std::hypot(peak.u_cycles / expected, speed.deviation / std::sqrt(static_cast<double>(speed.n)) / reported);
-  line.signal_to_noise = peak.signal_to_noise;
-  return line;
+  if (!(expected > 0) || expected * (1 + kSearch) > 0.5) return std::nullopt;
+  const SpectrumPeak peak = find_peak(thrust.counts, expected);
+  if (peak.signal_to_noise < kLeastSignalToNoise) return std::nullopt;
+  return Estimate{
+      peak.cycles / expected,
+      std::hypot(peak.u_cycles / expected, speed.deviation / std::sqrt(static_cast<double>(speed.n)) / reported)};
 }
 
 /// Weighted mean; enlarged where the lines scatter more than they claim (Birge's ratio).
-Estimate mean_gain(const std::vector<BladePassLine>& lines, double u_box) {
+Estimate mean_gain(const std::vector<Estimate>& lines) {
   double sum = 0, weights = 0, chi_squared = 0;
-  for (const BladePassLine& line : lines) {
-    sum += line.gain / (line.u_gain * line.u_gain);
-    weights += 1 / (line.u_gain * line.u_gain);
+  for (const Estimate& line : lines) {
+    sum += line.value / (line.u * line.u);
+    weights += 1 / (line.u * line.u);
   }
   const double gain = sum / weights, n = static_cast<double>(lines.size());
-  for (const BladePassLine& line : lines) chi_squared += std::pow((line.gain - gain) / line.u_gain, 2);
+  for (const Estimate& line : lines) chi_squared += std::pow((line.value - gain) / line.u, 2);
   const double enlarge = n > 1 ? std::max(1.0, chi_squared / (n - 1)) : 1.0;
   const double u = std::sqrt(enlarge / weights);
-  const double whole = std::hypot(u, gain * u_box);
+  const double whole = std::hypot(u, gain * kBoxClock);
   return {gain, whole, std::max(1.0, n - 1) * std::pow(whole / u, 4)};
 }
 
 }  // namespace
 
-std::optional<BladePassCheck> check_by_blade_pass(std::span<const results::RunRecording> runs,
-                                                  const BladePassOptions& options) {
+std::optional<BladePassCheck> check_by_blade_pass(std::span<const results::RunRecording> runs) {
   BladePassCheck check;
   for (const results::RunRecording& run : runs) {
     const results::CellStream cell(run);
     const results::MotorSeries motor(run.motor);
     for (std::size_t i = 0; i + 1 < run.phases.size(); ++i) {
       if (run.phases[i].phase != results::Phase::step) continue;
-      if (const auto line = line_of(run, i, cell, motor, options)) check.lines.push_back(*line);
+      if (const auto line = line_of(run, i, cell, motor)) check.lines.push_back(*line);
     }
   }
   if (check.lines.empty()) return std::nullopt;
-  check.gain = mean_gain(check.lines, options.u_box);
+  check.gain = mean_gain(check.lines);
   const double half = coverage_factor(check.gain.freedom) * check.gain.u;
   check.lower = check.gain.value - half;
   check.upper = check.gain.value + half;

@@ -17,6 +17,7 @@ using results::Transition;
 constexpr double kBefore = 0.15;   // s before the command whose mean is the old speed
 constexpr double kSettled = 0.5;   // share of a step after which its readings are the new speed
 constexpr double kStandstill = 5;  // rad/s
+constexpr double kLeastChange = 0.01;
 
 struct NormalisedReading {
   double t = 0;  // since the command
@@ -71,11 +72,11 @@ struct Collected {
   std::size_t steps = 0;
 };
 
-void collect(const Transition& step, double least_change, Collected& all) {
+void collect(const Transition& step, Collected& all) {
   const double end = static_cast<double>(step.thrust.size()) * step.bin_s;
   const double before = mean_speed(step, -kBefore, 0), after = mean_speed(step, kSettled * end, end);
   const double change = after - before;
-  if (step.ramped || !(before > kStandstill) || !(std::abs(change) >= least_change * before)) return;
+  if (step.ramped || !(before > kStandstill) || !(std::abs(change) >= kLeastChange * before)) return;
   const double weight = change * change;
   double passed = 0, missing = 1;
   for (const auto& [time, squared] : step.squared) {
@@ -92,13 +93,13 @@ void collect(const Transition& step, double least_change, Collected& all) {
 
 }  // namespace
 
-std::optional<Dynamics> identify_dynamics(std::span<const results::RunRecording> runs, double least_change) {
+std::optional<Dynamics> identify_dynamics(std::span<const results::RunRecording> runs) {
   std::vector<Transition> transitions;
   for (const results::RunRecording& run : runs) {
     for (Transition& step : results::transitions_of(run)) transitions.push_back(std::move(step));
   }
   Collected all;
-  for (const Transition& step : transitions) collect(step, least_change, all);
+  for (const Transition& step : transitions) collect(step, all);
   if (all.steps < 3 || all.readings.size() < 10) return std::nullopt;
   Dynamics dynamics;
   dynamics.steps = all.steps;

@@ -18,9 +18,7 @@ struct Dynamics {
   Estimate thrust_lag_s;   ///< mean delay of the thrust behind ω² (results/reduction/lag.hpp); NaN: unknown
 };
 
-/// Uses the steps that change the speed before them by `least_change` or more, without a ramp; nullopt for fewer
-/// than 3.
-[[nodiscard]] std::optional<Dynamics> identify_dynamics(std::span<const results::RunRecording> runs,
-                                                        double least_change = 0.01);
+/// Uses the steps that change the speed before them by 1 % or more, without a ramp; nullopt for fewer than 3.
+[[nodiscard]] std::optional<Dynamics> identify_dynamics(std::span<const results::RunRecording> runs);
 
 }  // namespace kphi::fit

@@ -33,11 +33,10 @@ ErrorSources sources_of(const Identification& identification, const Analysis& an
 
 /// Deviation from the line beyond the errors of its points, once a test has rejected the line.
 BudgetRow line_row(const LineFit& line, const Curvature& curvature) {
-  BudgetRow row;
-  row.source = "line k(phi)";
-  row.unit = kUnitOfK;
-  row.sensitivity = 1;
-  row.note = "deviation of its points beyond their errors, where a test finds it";
+  BudgetRow row{.source = "line k(phi)",
+                .unit = kUnitOfK,
+                .sensitivity = 1,
+                .note = "deviation of its points beyond their errors, where a test finds it"};
   if (!curvature.bends()) return row;
   double excess = 0;
   const double terms = line.anchored ? 1 : 2;
@@ -190,15 +189,14 @@ std::vector<Budget> standard_air(const std::vector<Budget>& coefficients, const 
     budget.quantity += " in standard air";
     budget.value *= scale;
     for (BudgetRow& row : budget.rows) row.sensitivity *= scale;
-    BudgetRow density;
-    density.source = "air density";
-    density.evaluation = Evaluation::type_b;
-    density.unit = "1";
-    density.u = options.bench.air_density.value_or(std::numeric_limits<double>::quiet_NaN());
-    density.sensitivity = -budget.value;
-    density.common = true;
-    density.note = density.known() ? "" : "unknown";
-    budget.rows.push_back(density);
+    const auto& u = options.bench.air_density;
+    budget.rows.push_back({.source = "air density",
+                           .evaluation = Evaluation::type_b,
+                           .u = u.value_or(std::numeric_limits<double>::quiet_NaN()),
+                           .unit = "1",
+                           .sensitivity = -budget.value,
+                           .common = true,
+                           .note = u ? "" : "unknown"});
     result.push_back(std::move(budget));
   }
   return result;

@@ -61,10 +61,10 @@ double percentile(std::vector<double>& samples, double share) {
   return samples[static_cast<std::size_t>(rank)];
 }
 
-BootstrapInterval summary(std::string quantity, double value, std::vector<double> samples, double level) {
+BootstrapInterval summary(std::string quantity, double value, std::vector<double> samples) {
   const double deviation = std::sqrt(variance(samples));
   if (!std::isfinite(deviation)) return {std::move(quantity), value, deviation, deviation, deviation};
-  const double lower = percentile(samples, (1 - level) / 2), upper = percentile(samples, (1 + level) / 2);
+  const double lower = percentile(samples, 0.025), upper = percentile(samples, 0.975);
   return {std::move(quantity), value, deviation, lower, upper};
 }
 
@@ -88,10 +88,10 @@ std::vector<BootstrapInterval> bootstrap(std::span<const RunSums> runs, const Li
     intercept_value += line.intercept[i] * value;
     slope_value += line.slope[i] * value;
     const double phi = groups[i].phi_deg;
-    result.push_back(summary(phi == 0 ? "K_T" : fmt::format("k({} deg)", phi), value, k, options.level));
+    result.push_back(summary(phi == 0 ? "K_T" : fmt::format("k({} deg)", phi), value, k));
   }
-  result.push_back(summary("intercept", intercept_value, intercept, options.level));
-  result.push_back(summary("slope", slope_value, slope, options.level));
+  result.push_back(summary("intercept", intercept_value, intercept));
+  result.push_back(summary("slope", slope_value, slope));
   return result;
 }
 

@@ -16,14 +16,13 @@ namespace kphi::fit {
 struct BootstrapOptions {
   std::size_t resamples = 10000;
   std::uint64_t seed = 1;
-  double level = 0.95;
 };
 
 struct BootstrapInterval {
   std::string quantity;  ///< "K_T", "k(45 deg)", "intercept", "slope"
   double value = 0;      ///< of the data
   double standard_error = 0;
-  double lower = 0, upper = 0;  ///< percentiles
+  double lower = 0, upper = 0;  ///< percentiles of 95 %
 };
 
 /// Of every k, and of the line through them with the weights of its fit. `runs` sorted by φ. The same arguments give

@@ -33,36 +33,27 @@ constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr double kEndless = std::numeric_limits<double>::infinity();
 constexpr const char* kUnitOfK = "N/(rad/s)^2";
 
-struct Part {
-  double contribution = 0;  // signed where common
-  double freedom = kEndless;
-};
-
-Part part_of(const ErrorSource& source, std::span<const double> weights) {
-  double sum = 0, squares = 0, spread = 0;
+/// Of Σ weights · k. Its u is the root mean square over the φ with a weight, the column "u" in a budget of several k.
+BudgetRow row_of(const ErrorSource& source, std::span<const double> weights) {
+  double sum = 0, squares = 0, spread = 0, u_squares = 0, n = 0;
   for (std::size_t i = 0; i < weights.size(); ++i) {
     if (weights[i] == 0) continue;
     const double one = weights[i] * source.sensitivity[i] * source.u[i];
-    sum += one;
+    sum += one;  // signed: common errors add before they are squared
     squares += one * one;
     spread += std::pow(one, 4) / source.freedom[i];
-  }
-  if (source.common) return {sum, source.freedom.front()};
-  const double freedom = source.shared_freedom > 0 ? source.shared_freedom
-                         : spread > 0              ? squares * squares / spread
-                                                   : kEndless;
-  return {std::sqrt(squares), freedom};
-}
-
-/// Root mean square over the φ with a weight: the column "u" in a budget of several k.
-double typical_u(const ErrorSource& source, std::span<const double> weights) {
-  double squares = 0, n = 0;
-  for (std::size_t i = 0; i < weights.size(); ++i) {
-    if (weights[i] == 0) continue;
-    squares += source.u[i] * source.u[i];
+    u_squares += source.u[i] * source.u[i];
     ++n;
   }
-  return n > 0 ? std::sqrt(squares / n) : 0;
+  BudgetRow row{source.name, source.evaluation, n > 0 ? std::sqrt(u_squares / n) : 0, source.unit};
+  if (row.u > 0) row.sensitivity = (source.common ? sum : std::sqrt(squares)) / row.u;
+  row.freedom = source.common               ? source.freedom.front()
+                : source.shared_freedom > 0 ? source.shared_freedom
+                : spread > 0                ? squares * squares / spread
+                                            : kEndless;
+  row.common = source.common;
+  row.note = source.note;
+  return row;
 }
 
 ErrorSource source_of(const char* name, Evaluation evaluation, const char* unit, std::size_t n) {
@@ -80,14 +71,14 @@ ErrorSource source_of(const char* name, Evaluation evaluation, const char* unit,
 /// --u `option`.
 void add_common(ErrorSources& sources, const char* name, const char* option, const std::optional<double>& u,
                 double power, const char* unit = "1", const char* note = "") {
-  ErrorSource source = source_of(name, Evaluation::type_b, unit, sources.k().size());
+  ErrorSource source = source_of(name, Evaluation::type_b, unit, sources.k.size());
   source.common = true;
   source.note = u ? note : fmt::format("unknown; give it with --u {}=VALUE", option);
-  for (std::size_t i = 0; i < sources.k().size(); ++i) {
+  for (std::size_t i = 0; i < sources.k.size(); ++i) {
     source.u[i] = u.value_or(kUnknown);
-    source.sensitivity[i] = power * sources.k()[i];
+    source.sensitivity[i] = power * sources.k[i];
   }
-  sources.add(std::move(source));
+  sources.sources.push_back(std::move(source));
 }
 
 void add_bench(ErrorSources& sources, const BenchUncertainty& bench) {
@@ -117,19 +108,17 @@ void add_repeatability(ErrorSources& sources, const Repeatability& all) {
     zero.u[i] = angle.zero_u_n;
     zero.sensitivity[i] = angle.zero_sensitivity;
   }
-  sources.add(std::move(noise));
-  sources.add(std::move(between));
-  sources.add(std::move(zero));
+  sources.sources.insert(sources.sources.end(), {noise, between, zero});
 }
 
 void add_inadequacy(ErrorSources& sources, std::span<const SpeedDependence> speed) {
-  ErrorSource source = source_of("model T = k w^2", Evaluation::type_a, kUnitOfK, sources.k().size());
+  ErrorSource source = source_of("model T = k w^2", Evaluation::type_a, kUnitOfK, sources.k.size());
   source.note = "deviation of k between speeds beyond noise, where the test finds it";
   for (std::size_t i = 0; i < speed.size(); ++i) {
     source.u[i] = speed[i].inadequacy;
     source.sensitivity[i] = 1;
   }
-  if (!speed.empty()) sources.add(std::move(source));
+  if (!speed.empty()) sources.sources.push_back(std::move(source));
 }
 
 }  // namespace
@@ -181,28 +170,15 @@ std::vector<std::pair<std::string, double>> known_uncertainties(const BenchUncer
 Budget ErrorSources::budget(std::string quantity, std::string unit, double value,
                             std::span<const double> weights) const {
   Budget result{std::move(quantity), std::move(unit), value, {}};
-  for (const ErrorSource& source : sources_) {
-    const Part part = part_of(source, weights);
-    const double u = typical_u(source, weights);
-    BudgetRow row;
-    row.source = source.name;
-    row.evaluation = source.evaluation;
-    row.u = u;
-    row.unit = source.unit;
-    row.sensitivity = u > 0 ? part.contribution / u : 0;
-    row.freedom = part.freedom;
-    row.common = source.common;
-    row.note = source.note;
-    result.rows.push_back(std::move(row));
-  }
+  for (const ErrorSource& source : sources) result.rows.push_back(row_of(source, weights));
   return result;
 }
 
 double ErrorSources::covariance(std::span<const double> a, std::span<const double> b) const {
   double result = 0;
-  for (const ErrorSource& source : sources_) {
+  for (const ErrorSource& source : sources) {
     double sum_a = 0, sum_b = 0, products = 0;
-    for (std::size_t i = 0; i < k_.size(); ++i) {
+    for (std::size_t i = 0; i < k.size(); ++i) {
       const double effect = std::isnan(source.u[i]) ? 0 : source.sensitivity[i] * source.u[i];
       sum_a += a[i] * effect;
       sum_b += b[i] * effect;
@@ -215,9 +191,8 @@ double ErrorSources::covariance(std::span<const double> a, std::span<const doubl
 
 ErrorSources error_sources(const Repeatability& repeatability, std::span<const SpeedDependence> speed,
                            const BenchUncertainty& bench) {
-  std::vector<double> k;
-  for (const AngleScatter& angle : repeatability.angles) k.push_back(angle.k);
-  ErrorSources sources(std::move(k));
+  ErrorSources sources;
+  for (const AngleScatter& angle : repeatability.angles) sources.k.push_back(angle.k);
   add_repeatability(sources, repeatability);
   add_inadequacy(sources, speed);
   add_bench(sources, bench);
@@ -230,9 +205,7 @@ ErrorSources error_sources(std::vector<double> k, std::vector<double> standard_e
     if (standard_errors[i] > 0) source.u[i] = standard_errors[i];
     source.sensitivity[i] = 1;
   }
-  ErrorSources sources(std::move(k));
-  sources.add(std::move(source));
-  return sources;
+  return {std::move(k), {std::move(source)}};
 }
 
 }  // namespace kphi::fit

@@ -29,7 +29,7 @@ struct BudgetRow {
   double sensitivity = 0;  ///< change of the result per `unit`
   double freedom = std::numeric_limits<double>::infinity();
   bool common = false;  ///< the same error in every coefficient of the campaign: it cancels in ratios
-  std::string note;     ///< where the number comes from; may be empty
+  std::string note{};   ///< where the number comes from; may be empty
 
   [[nodiscard]] bool known() const { return u == u; }
   [[nodiscard]] double contribution() const;  ///< |sensitivity| u, unit of the result; 0 if unknown
@@ -77,21 +77,15 @@ struct ErrorSource {
   std::vector<double> freedom;
 };
 
-class ErrorSources {
- public:
-  explicit ErrorSources(std::vector<double> k) : k_(std::move(k)) {}
-  void add(ErrorSource source) { sources_.push_back(std::move(source)); }
+struct ErrorSources {
+  std::vector<double> k;  ///< per φ
+  std::vector<ErrorSource> sources;
 
   /// Of Σ weights · k.
   [[nodiscard]] Budget budget(std::string quantity, std::string unit, double value,
                               std::span<const double> weights) const;
   /// Of two linear functions.
   [[nodiscard]] double covariance(std::span<const double> a, std::span<const double> b) const;
-  [[nodiscard]] const std::vector<double>& k() const { return k_; }
-
- private:
-  std::vector<double> k_;
-  std::vector<ErrorSource> sources_;
 };
 
 /// Of a bench and its steps. `speed` gives the model's inadequacy; one per φ, or empty.

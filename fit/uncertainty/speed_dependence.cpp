@@ -91,72 +91,29 @@ NoiseModel noise_of(const std::vector<double>& x, const std::vector<double>& var
   return model;
 }
 
-/// Least squares of one run.
-struct RunFit {
-  std::vector<double> residuals;  ///< N; the last is that of the zero if its uncertainty is known
-  double trend = 0, trend_u = 0;  ///< of the last term; u as the weights have it
-  double freedom = 0;
-  double deviation = 0;  ///< of the weighted residuals
-};
-
 /// T of one run on ω², its zero (with its uncertainty) and, with `spread`, k ω² (ω − middle)/spread.
 struct RunModel {
   double middle = 0, spread = 0, k = 0;  ///< spread 0: without a trend
   NoiseModel noise;
   bool zero_is_free = false;
 
-  [[nodiscard]] RunFit fit(const std::vector<Sample>& samples, double zero_u_n) const;
+  /// The trend is the last term. The last residual is that of the zero if its uncertainty is known.
+  [[nodiscard]] Regression fit(const std::vector<Sample>& samples, double zero_u_n) const {
+    std::vector<std::vector<double>> rows;
+    std::vector<double> thrusts, weights;
+    const auto add = [&](std::vector<double> row, double thrust, double variance) {
+      row.resize(spread > 0 ? 3 : 2);
+      rows.push_back(std::move(row));
+      thrusts.push_back(thrust);
+      weights.push_back(1 / variance);
+    };
+    for (const Sample& sample : samples)
+      add({sample.x, 1, k * sample.x * (sample.speed - middle) / spread}, sample.thrust, noise.at(sample.x));
+    if (!zero_is_free) add({0, 1, 0}, 0, zero_u_n * zero_u_n);
+    if (rows.size() <= (spread > 0 ? 3 : 2)) throw FitError("k against speed: too few steps in a run");
+    return regress(rows, thrusts, weights);
+  }
 };
-
-double dot(const std::vector<double>& a, const std::vector<double>& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
-  return sum;
-}
-
-void subtract(double times, const std::vector<double>& a, std::vector<double>& from) {
-  for (std::size_t i = 0; i < a.size(); ++i) from[i] -= times * a[i];
-}
-
-void scale(double by, std::vector<double>& a) {
-  for (double& one : a) one *= by;
-}
-
-/// Modified Gram-Schmidt on the weighted columns: the thrusts become the residuals; the last column is the trend.
-RunFit RunModel::fit(const std::vector<Sample>& samples, double zero_u_n) const {
-  std::vector<std::vector<double>> columns(spread > 0 ? 3 : 2);
-  std::vector<double> roots, rest;
-  for (const Sample& sample : samples) {
-    const double root = 1 / std::sqrt(noise.at(sample.x));
-    roots.push_back(root);
-    rest.push_back(root * sample.thrust);
-    columns[0].push_back(root * sample.x);
-    columns[1].push_back(root);
-    if (spread > 0) columns[2].push_back(root * k * sample.x * (sample.speed - middle) / spread);
-  }
-  if (!zero_is_free) {
-    roots.push_back(1 / zero_u_n);
-    rest.push_back(0);
-    for (std::size_t j = 0; j < columns.size(); ++j) columns[j].push_back(j == 1 ? roots.back() : 0);
-  }
-  if (rest.size() <= columns.size()) throw FitError("k against speed: too few steps in a run");
-  RunFit result;
-  for (std::size_t j = 0; j < columns.size(); ++j) {
-    const double whole = std::sqrt(dot(columns[j], columns[j]));
-    for (std::size_t i = 0; i < j; ++i) subtract(dot(columns[i], columns[j]), columns[i], columns[j]);
-    const double size = std::sqrt(dot(columns[j], columns[j]));
-    if (!(size > 1e-9 * whole)) throw FitError("k against speed: too few different speeds in a run");
-    scale(1 / size, columns[j]);
-    const double part = dot(columns[j], rest);
-    subtract(part, columns[j], rest);
-    result.trend = part / size;
-    result.trend_u = 1 / size;
-  }
-  result.freedom = static_cast<double>(rest.size() - columns.size());
-  result.deviation = std::sqrt(dot(rest, rest) / result.freedom);
-  for (std::size_t i = 0; i < rest.size(); ++i) result.residuals.push_back(rest[i] / roots[i]);
-  return result;
-}
 
 /// The levels that all runs measured, one column each.
 std::vector<Run> complete_levels(std::vector<Run> runs) {
@@ -227,13 +184,13 @@ void take_trends(Angle& angle, double slowest, double fastest) {
     if (angle.runs.size() == 1) {  // its own residuals tell the noise
       RunModel free = model;
       free.zero_is_free = true;
-      model.noise.constant = std::pow(free.fit(run.samples, kNan).deviation, 2);
+      model.noise.constant = std::pow(free.fit(run.samples, kNan).residual_deviation, 2);
     }
     if (!(model.noise.at(run.samples.front().x) > 0)) return;
-    const RunFit found = model.fit(run.samples, run.zero_u_n);
-    angle.trends.push_back(found.trend);
-    squares += found.trend_u * found.trend_u;
-    angle.alone_freedom = found.freedom;
+    const Regression found = model.fit(run.samples, run.zero_u_n);
+    angle.trends.push_back(found.estimates.back());
+    squares += found.covariance.back().back();
+    angle.alone_freedom = static_cast<double>(found.freedom);
   }
   angle.trend_u = std::sqrt(squares / static_cast<double>(angle.runs.size()));
 }
@@ -293,23 +250,12 @@ double inadequacy_of(const std::vector<Run>& complete) {
   return std::sqrt(std::max(0.0, excess / xx * (complete.size() > 1 ? 1 : n / (n - 1))));
 }
 
-std::vector<LevelCoefficient> level_coefficients(const std::vector<Run>& runs) {
-  std::map<int, std::vector<Sample>> levels;
+std::vector<SpeedCoefficient> level_coefficients(const std::vector<Run>& runs) {
+  std::map<int, std::vector<Point>> levels;
   for (const Run& run : runs)
-    for (const Sample& sample : run.samples) levels[sample.level].push_back(sample);
-  std::vector<LevelCoefficient> rows;
-  for (const auto& [index, samples] : levels) {
-    LevelCoefficient row;
-    std::vector<double> k;
-    row.repetitions = samples.size();
-    for (const Sample& sample : samples) {
-      k.push_back(sample.thrust / sample.x);
-      row.speed_rad_s += sample.speed / static_cast<double>(samples.size());
-    }
-    row.k = mean(k);
-    if (k.size() > 1) row.standard_error = std::sqrt(variance(k) / static_cast<double>(k.size()));
-    rows.push_back(row);
-  }
+    for (const Sample& sample : run.samples) levels[sample.level].push_back({sample.speed, sample.thrust, 1});
+  std::vector<SpeedCoefficient> rows;
+  for (const auto& [index, points] : levels) rows.push_back(k_at_speed(points));
   std::sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.speed_rad_s < b.speed_rad_s; });
   return rows;
 }

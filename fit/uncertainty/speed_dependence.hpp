@@ -13,22 +13,15 @@
 #include <span>
 #include <vector>
 
+#include "fit/model/thrust_fit.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::fit {
 
-/// k at one commanded speed.
-struct LevelCoefficient {
-  double speed_rad_s = 0;  ///< mean measured
-  double k = 0;            ///< N/(rad/s)², mean of T/ω² over the repetitions
-  double standard_error = std::numeric_limits<double>::quiet_NaN();  ///< s/√n; NaN from one repetition
-  std::size_t repetitions = 0;
-};
-
 struct SpeedDependence {
   double phi_deg = 0;
-  std::vector<LevelCoefficient> levels;  ///< ascending speed
+  std::vector<SpeedCoefficient> levels;  ///< at each commanded speed, ascending
   /// Of k from the lowest to the highest speed, as a share of k, by the straight line through T/ω² weighted in ω⁴ and
   /// by the noise; mean over the runs.
   Estimate change;

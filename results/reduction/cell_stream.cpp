@@ -12,10 +12,7 @@ namespace {
 
 using Counts = std::array<std::int32_t, 6>;
 
-constexpr std::uint32_t kMonitorBit = 1u << 16;  // a condition the user set; raises the summary bit, too
-constexpr std::uint32_t kSummaryBit = 1u << 31;
-
-CountSums wide_sums(std::span<const Counts> counts, std::size_t axis, std::int32_t origin) {
+CountSums sums_of(std::span<const Counts> counts, std::size_t axis, std::int32_t origin) {
   CountSums sums;
   for (const Counts& c : counts) {
     const std::int64_t difference = static_cast<std::int64_t>(c[axis]) - origin;
@@ -23,23 +20,6 @@ CountSums wide_sums(std::span<const Counts> counts, std::size_t axis, std::int32
     sums.squares += static_cast<Wide>(difference) * difference;
   }
   return sums;
-}
-
-/// Of so few or so small differences that their squares fit into 64 bits together.
-CountSums sums_of(std::span<const Counts> counts, std::size_t axis, std::int32_t origin) {
-  std::int64_t sum = 0, squares = 0;
-  for (const Counts& c : counts) {
-    const std::int64_t difference = static_cast<std::int64_t>(c[axis]) - origin;
-    sum += difference;
-    squares += difference * difference;
-  }
-  return {sum, squares};
-}
-
-/// Whether the squares of `n` differences between counts inside their limit and an origin fit into 64 bits together.
-bool fit(std::size_t n, std::int32_t limit, std::int32_t origin) {
-  const Wide farthest = static_cast<Wide>(limit) + std::abs(static_cast<std::int64_t>(origin));
-  return farthest * farthest * static_cast<Wide>(n) <= std::numeric_limits<std::int64_t>::max();
 }
 
 bool reach(std::span<const Counts> counts, const Counts& limits) {
@@ -74,7 +54,6 @@ std::uint32_t bits_of(std::span<const std::uint32_t> status) {
 
 constexpr Nanoseconds kBin = 10'000'000;
 constexpr double kLeastSamplesPerBin = 2;
-constexpr std::size_t kBlock = 1024;  // records looked at together
 
 CountMean mean_of(const CountSums& sums, std::int32_t origin, std::uint64_t samples) {
   if (samples == 0) return {std::numeric_limits<double>::quiet_NaN(), 0};
@@ -90,13 +69,8 @@ std::uint32_t stride_of(const RunHeader& header) { return std::max(header.load_c
 /// Where ft_sequence advances by `least` or more.
 std::vector<std::size_t> advances(std::span<const std::uint32_t> ft, std::uint32_t least) {
   std::vector<std::size_t> found;
-  for (std::size_t begin = 1; begin < ft.size(); begin += kBlock) {
-    const std::size_t end = std::min(begin + kBlock, ft.size());
-    int any = 0;
-    for (std::size_t i = begin; i < end; ++i) any |= static_cast<int>(ft[i] - ft[i - 1] >= least);
-    for (std::size_t i = begin; any != 0 && i < end; ++i) {
-      if (ft[i] - ft[i - 1] >= least) found.push_back(i);
-    }
+  for (std::size_t i = 1; i < ft.size(); ++i) {
+    if (ft[i] - ft[i - 1] >= least) found.push_back(i);
   }
   return found;
 }
@@ -115,17 +89,12 @@ CountFrame frame_of(const RunHeader& header) {
 
 }  // namespace
 
-void CellBin::add(const LoadCellRows& rows, const CountFrame& frame) {
-  const bool reached = reach(rows.counts, frame.limits);
-  const auto take = [&](std::size_t axis, std::int32_t origin) {
-    const bool near = !reached && fit(rows.counts.size(), frame.limits[axis], origin);
-    return near ? sums_of(rows.counts, axis, origin) : wide_sums(rows.counts, axis, origin);
-  };
-  force.add(take(frame.axis, frame.force_origin));
-  torque.add(take(frame.axis + 3, frame.torque_origin));
-  n += static_cast<std::uint32_t>(rows.counts.size());
-  status |= bits_of(rows.status);
-  at_limit |= reached;
+void CellBin::add(std::span<const Counts> counts, std::span<const std::uint32_t> words, const CountFrame& frame) {
+  force.add(sums_of(counts, frame.axis, frame.force_origin));
+  torque.add(sums_of(counts, frame.axis + 3, frame.torque_origin));
+  n += static_cast<std::uint32_t>(counts.size());
+  status |= bits_of(words);
+  at_limit |= reach(counts, frame.limits);
 }
 
 bool CellBin::frozen() const { return n > 1 && force.squares * n == static_cast<Wide>(force.sum) * force.sum; }
@@ -147,12 +116,6 @@ double CellBins::force(std::size_t bin) const {
   const CellBin& b = bins_[bin];
   if (2.0 * b.n < expected_ || b.n == 0) return std::numeric_limits<double>::quiet_NaN();
   return frame_.force_origin + static_cast<double>(b.force.sum) / b.n;
-}
-
-double CellBins::torque(std::size_t bin) const {
-  const CellBin& b = bins_[bin];
-  if (2.0 * b.n < expected_ || b.n == 0) return std::numeric_limits<double>::quiet_NaN();
-  return frame_.torque_origin + static_cast<double>(b.torque.sum) / b.n;
 }
 
 CellWindow CellBins::over(std::size_t first, std::size_t last) const {
@@ -181,11 +144,11 @@ CellWindow CellBins::over(std::size_t first, std::size_t last) const {
   return found;
 }
 
-CellStream::CellStream(const RunRecording& run, std::unique_ptr<LoadCellColumns> columns)
+CellStream::CellStream(const RunRecording& run, LoadCellColumns columns)
     : header_(run.header),
-      columns_(columns ? std::move(columns) : std::make_unique<RecordedColumns>(run.load_cell)),
-      clock_(*columns_, run.header.load_cell.device_rate_hz, stall_ends(run.events)),
-      gaps_(advances(clock_.ft_sequence(), 2 * stride_of(run.header))),
+      columns_(std::move(columns)),
+      clock_(columns_, run.header.load_cell.device_rate_hz, stall_ends(run.events)),
+      gaps_(advances(columns_.ft_sequence, 2 * stride_of(run.header))),
       frame_(frame_of(run.header)) {
   for (const ClockEpoch& epoch : clock_.epochs()) {
     if (epoch.rebooted) reboots_.push_back(clock_.time_ns(epoch, epoch.begin));
@@ -221,15 +184,16 @@ CellBins CellStream::bins(const Window& window) const {
     take_gaps(epoch, begin, end, bins);
     if (begin == end) continue;
     if (first) {
-      const auto& counts = columns_->rows(begin, begin + 1).counts[0];
+      const Counts& counts = columns_.counts[begin];
       bins.frame_.force_origin = counts[frame_.axis];
       bins.frame_.torque_origin = counts[frame_.axis + 3];
       first = false;
     }
     std::size_t from = begin;
     for (std::size_t i = 0; i < bins.size() && from < end; ++i) {
-      const std::size_t to = clock_.first_at(epoch, bins.window(i, i + 1).end, from, end);
-      bins.bins_[i].add(columns_->rows(from, to), bins.frame_);
+      const std::size_t to = clock_.first_at(epoch, bins.window(i, i + 1).end);
+      bins.bins_[i].add(std::span(columns_.counts).subspan(from, to - from),
+                        std::span(columns_.status).subspan(from, to - from), bins.frame_);
       from = to;
     }
   }
@@ -238,16 +202,15 @@ CellBins CellStream::bins(const Window& window) const {
 
 EvenSamples CellStream::samples(const Window& window) const {
   EvenSamples found{header_.load_cell.device_rate_hz / stride_of(header_), {}};
-  const auto ft = clock_.ft_sequence();
+  const auto& ft = columns_.ft_sequence;
   for (const ClockEpoch& epoch : clock_.epochs()) {
     const std::size_t begin = clock_.first_at(epoch, window.begin), end = clock_.first_at(epoch, window.end);
     if (begin == end) continue;
     if (!found.counts.empty()) return {};
-    const LoadCellRows rows = columns_->rows(begin, end);
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t strides = i == begin ? 1 : (ft[i] - ft[i - 1]) / stride_of(header_);
       for (std::uint32_t k = 1; k < strides; ++k) found.counts.push_back(found.counts.back());
-      found.counts.push_back(rows.counts[i - begin][frame_.axis]);
+      found.counts.push_back(columns_.counts[i][frame_.axis]);
     }
   }
   return found;
@@ -259,7 +222,7 @@ void CellStream::take_gaps(const ClockEpoch& epoch, std::size_t begin, std::size
   const std::size_t to = std::min(end + 1, epoch.end);
   for (auto gap = std::lower_bound(gaps_.begin(), gaps_.end(), from); gap != gaps_.end() && *gap < to; ++gap) {
     const std::size_t i = *gap;
-    const std::uint32_t missing = (clock_.ft_sequence()[i] - clock_.ft_sequence()[i - 1]) / stride_of(header_) - 1;
+    const std::uint32_t missing = (columns_.ft_sequence[i] - columns_.ft_sequence[i - 1]) / stride_of(header_) - 1;
     const Nanoseconds before = clock_.time_ns(epoch, i - 1);
     const double period = static_cast<double>(clock_.time_ns(epoch, i) - before) / (missing + 1.0);
     bins.gaps_.push_back({static_cast<double>(before), period, missing});

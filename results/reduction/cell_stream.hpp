@@ -6,16 +6,19 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <span>
 #include <vector>
 
-#include "results/load_cell_columns.hpp"
 #include "results/records.hpp"
 #include "results/reduction/clock_map.hpp"
 
 namespace kphi::results {
 
 __extension__ using Wide = __int128;
+
+// Bits of the status word of every product.
+inline constexpr std::uint32_t kMonitorBit = 1u << 16;  ///< a condition the user set; raises the summary bit, too
+inline constexpr std::uint32_t kSummaryBit = 1u << 31;
 
 /// Of one axis, about `origin`.
 struct CountSums {
@@ -40,7 +43,8 @@ struct CellBin {
   std::uint32_t n = 0;
   std::uint32_t status = 0;  ///< all set bits, without healthy monitor words
   bool at_limit = false;     ///< a count of some axis at the end of its range
-  void add(const LoadCellRows& rows, const CountFrame& frame);
+  void add(std::span<const std::array<std::int32_t, 6>> counts, std::span<const std::uint32_t> words,
+           const CountFrame& frame);
   [[nodiscard]] bool frozen() const;  ///< more than one sample, and no force differs
 };
 
@@ -75,7 +79,6 @@ class CellBins {
   [[nodiscard]] std::size_t first_from(Nanoseconds time) const;
   /// Mean counts of the force; NaN of a bin that holds less than half of its samples.
   [[nodiscard]] double force(std::size_t bin) const;
-  [[nodiscard]] double torque(std::size_t bin) const;
   [[nodiscard]] CellWindow over(std::size_t first, std::size_t last) const;
 
  private:
@@ -103,8 +106,10 @@ struct EvenSamples {
 
 class CellStream {
  public:
-  /// The recording must outlive the stream. Without `columns` the stream uses its records.
-  explicit CellStream(const RunRecording& run, std::unique_ptr<LoadCellColumns> columns = nullptr);
+  /// The recording must outlive the stream.
+  explicit CellStream(const RunRecording& run) : CellStream(run, LoadCellColumns(run.load_cell)) {}
+  /// Takes the samples from `columns`.
+  CellStream(const RunRecording& run, LoadCellColumns columns);
 
   /// Number of restarts of the box before `time`.
   [[nodiscard]] std::size_t boot_at(Nanoseconds time) const;
@@ -117,7 +122,7 @@ class CellStream {
   void take_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const;
 
   const RunHeader& header_;
-  std::unique_ptr<LoadCellColumns> columns_;
+  LoadCellColumns columns_;
   ClockMap clock_;
   std::vector<std::size_t> gaps_;  ///< records after a gap of ft_sequence
   std::vector<Nanoseconds> reboots_;

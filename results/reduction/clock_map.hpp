@@ -7,7 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "results/load_cell_columns.hpp"
 #include "results/records.hpp"
 
 namespace kphi::results {
@@ -31,21 +30,19 @@ class ClockMap {
 
   [[nodiscard]] const std::vector<ClockEpoch>& epochs() const { return epochs_; }
   /// Bench time of the sample in record `index` of `epoch`. Increases with the index.
-  [[nodiscard]] Nanoseconds time_ns(const ClockEpoch& epoch, std::size_t index) const;
+  [[nodiscard]] Nanoseconds time_ns(const ClockEpoch& epoch, std::size_t index) const {
+    return time_of(epoch, ft_[index]);
+  }
   /// First record of `epoch` at or after `time`; epoch.end if there is none.
   [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, Nanoseconds time) const;
-  /// The same among records [begin, end) of the epoch, of which all before begin are earlier.
-  [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, Nanoseconds time, std::size_t begin,
-                                     std::size_t end) const;
-  /// Of each record.
-  [[nodiscard]] std::span<const std::uint32_t> ft_sequence() const { return ft_; }
 
  private:
-  [[nodiscard]] std::uint32_t count(const ClockEpoch& epoch, std::size_t index) const;
-  [[nodiscard]] Nanoseconds time_of_count(const ClockEpoch& epoch, std::uint64_t count) const;
-  [[nodiscard]] std::uint64_t count_at(const ClockEpoch& epoch, Nanoseconds time) const;
-  [[nodiscard]] std::size_t counting_until(std::size_t begin, std::size_t next_break) const;
-  void fit(const LoadCellColumns& columns, ClockEpoch& epoch) const;
+  /// Since the begin of the epoch.
+  [[nodiscard]] double device_ns(const ClockEpoch& epoch, std::uint32_t ft) const {
+    return static_cast<double>(ft - epoch.ft_first) * tick_ns_;
+  }
+  [[nodiscard]] Nanoseconds time_of(const ClockEpoch& epoch, std::uint32_t ft) const;
+  void fit(std::span<const Nanoseconds> arrival_ns, ClockEpoch& epoch) const;
   std::vector<std::uint32_t> ft_;
   double tick_ns_;
   std::vector<ClockEpoch> epochs_;

@@ -7,8 +7,6 @@
 namespace kphi::results {
 namespace {
 
-constexpr std::uint32_t kMonitorBit = 1u << 16;  // a condition the user set; raises the summary bit, too
-constexpr std::uint32_t kSummaryBit = 1u << 31;
 constexpr double kSpeedShare = 0.01;   // of the command
 constexpr double kSpeedReached = 2.0;  // rad/s
 constexpr double kSpeedSteady = 5.0;   // rad/s
@@ -16,15 +14,6 @@ constexpr double kFewSamples = 0.1;    // of those expected
 // Of the window's: a restart of the box leaves a gap that ft_sequence does not show.
 constexpr double kMostSamples = 0.9;
 constexpr std::uint64_t kFewSpeeds = 3;
-
-class Bits {
- public:
-  void note(QualityFlag flag, bool applies) { bits_ |= applies ? static_cast<std::uint32_t>(flag) : 0u; }
-  [[nodiscard]] std::uint32_t all() const { return bits_; }
-
- private:
-  std::uint32_t bits_ = 0;
-};
 
 /// The window of the speed ends a lag earlier than the one of the thrust. A change of speed in between is not in the
 /// mean speed, but already in the thrust.
@@ -36,48 +25,48 @@ bool leaves_at_the_end(const StepEvidence& step, const MotorSeries& motor) {
   });
 }
 
-void judge_speed(const StepEvidence& step, const MotorSeries& motor, Bits& bits) {
+std::uint32_t speed_flags(const StepEvidence& step, const MotorSeries& motor) {
   // NaN without a reading counts as not reached, too.
-  bits.note(QualityFlag::speed_not_reached,
-            !(std::abs(step.speed.mean - step.commanded_rad_s) <= speed_tolerance(step.commanded_rad_s)));
-  bits.note(QualityFlag::speed_unsteady,
-            step.speed.deviation > std::max(kSpeedShare * std::abs(step.speed.mean), kSpeedSteady) ||
-                leaves_at_the_end(step, motor));
-  bits.note(QualityFlag::speed_glitch, motor.glitches(step.motor_window) > 0);
-  bits.note(QualityFlag::frozen, motor.speed_frozen(step.motor_window));
-  bits.note(QualityFlag::derated, motor.statistics(MotorChannel::derate, step.motor_window).least < 1);
+  return flag_if(QualityFlag::speed_not_reached,
+                 !(std::abs(step.speed.mean - step.commanded_rad_s) <= speed_tolerance(step.commanded_rad_s))) |
+         flag_if(QualityFlag::speed_unsteady,
+                 step.speed.deviation > std::max(kSpeedShare * std::abs(step.speed.mean), kSpeedSteady) ||
+                     leaves_at_the_end(step, motor)) |
+         flag_if(QualityFlag::speed_glitch, motor.glitches(step.motor_window) > 0) |
+         flag_if(QualityFlag::frozen, motor.speed_frozen(step.motor_window)) |
+         flag_if(QualityFlag::derated, motor.statistics(MotorChannel::derate, step.motor_window).least < 1);
 }
 
-void judge_cell(const StepEvidence& step, const LoadCellScale& scale, Bits& bits) {
+std::uint32_t cell_flags(const StepEvidence& step, const LoadCellScale& scale) {
   const CellWindow& cell = step.cell;
   const double n = static_cast<double>(cell.n);
   const double rate_hz = scale.sample_rate_hz;
   const bool saturated = (cell.status & scale.saturation_bits) != 0;
-  bits.note(QualityFlag::saturated, saturated || cell.at_limit);
-  bits.note(QualityFlag::lost_samples, cell.lost > 0 || n < kMostSamples * step.window.seconds() * rate_hz);
-  bits.note(QualityFlag::few_samples,
-            n < kFewSamples * std::max(step.planned_s, 0.0) * rate_hz || step.speed.n < kFewSpeeds);
-  bits.note(QualityFlag::frozen, cell.frozen);
   const std::uint32_t others = cell.status & ~(scale.saturation_bits | kMonitorBit);
-  bits.note(QualityFlag::bad_status, (others & ~kSummaryBit) != 0 || (others != 0 && !saturated));
+  return flag_if(QualityFlag::saturated, saturated || cell.at_limit) |
+         flag_if(QualityFlag::lost_samples, cell.lost > 0 || n < kMostSamples * step.window.seconds() * rate_hz) |
+         flag_if(QualityFlag::few_samples,
+                 n < kFewSamples * std::max(step.planned_s, 0.0) * rate_hz || step.speed.n < kFewSpeeds) |
+         flag_if(QualityFlag::frozen, cell.frozen) |
+         flag_if(QualityFlag::bad_status, (others & ~kSummaryBit) != 0 || (others != 0 && !saturated));
 }
 
 /// Written so that NaN raises the flag.
-void judge_module(const RunHeader& header, const MotorSeries& motor, const Window& window, Bits& bits) {
-  const auto note_unless = [&](QualityFlag flag, MotorChannel channel, auto&& good) {
+std::uint32_t module_flags(const RunHeader& header, const MotorSeries& motor, const Window& window) {
+  const auto flag_unless = [&](QualityFlag flag, MotorChannel channel, auto&& good) {
     const auto readings = motor.over(channel, window);
-    bits.note(flag, !std::all_of(readings.begin(), readings.end(), [&](const auto& r) { return good(r.value); }));
+    return flag_if(flag, !std::ranges::all_of(readings, good, &MotorReading::value));
   };
-  note_unless(QualityFlag::drive_saturated, MotorChannel::drive_pwm,
-              [](double pwm) { return std::abs(pwm) < kFullDrive; });
-  note_unless(QualityFlag::motor_fault, MotorChannel::fault_now, [](double fault) { return fault == 0; });
-  if (const double volts = header.supply_voltage_v; volts > 0) {
-    note_unless(QualityFlag::supply_out_of_band, MotorChannel::supply_voltage,
-                [&](double v) { return v >= (1 - kSupplyBand) * volts && v <= (1 + kSupplyBand) * volts; });
-  }
-  if (const double limit = header.coil_temperature_max_degc; limit > 0) {
-    note_unless(QualityFlag::coil_hot, MotorChannel::coil_temperature, [&](double degc) { return degc < limit; });
-  }
+  const double volts = header.supply_voltage_v, hottest = header.coil_temperature_max_degc;
+  return flag_unless(QualityFlag::drive_saturated, MotorChannel::drive_pwm,
+                     [](double pwm) { return std::abs(pwm) < kFullDrive; }) |
+         flag_unless(QualityFlag::motor_fault, MotorChannel::fault_now, [](double fault) { return fault == 0; }) |
+         flag_unless(QualityFlag::supply_out_of_band, MotorChannel::supply_voltage,
+                     [&](double v) {
+                       return !(volts > 0) || (v >= (1 - kSupplyBand) * volts && v <= (1 + kSupplyBand) * volts);
+                     }) |
+         flag_unless(QualityFlag::coil_hot, MotorChannel::coil_temperature,
+                     [&](double degc) { return !(hottest > 0) || degc < hottest; });
 }
 
 constexpr Nanoseconds kSinceEver = std::numeric_limits<Nanoseconds>::min();
@@ -129,11 +118,7 @@ Nanoseconds end_of(const Meaning& meaning, std::span<const StreamEvent> later, N
 double speed_tolerance(double commanded_rad_s) { return std::max(kSpeedShare * commanded_rad_s, kSpeedReached); }
 
 std::uint32_t step_flags(const RunHeader& header, const MotorSeries& motor, const StepEvidence& step) {
-  Bits bits;
-  judge_speed(step, motor, bits);
-  judge_cell(step, header.load_cell, bits);
-  judge_module(header, motor, step.motor_window, bits);
-  return bits.all();
+  return speed_flags(step, motor) | cell_flags(step, header.load_cell) | module_flags(header, motor, step.motor_window);
 }
 
 std::span<const SupplyReading> within(std::span<const SupplyReading> readings, const Window& window) {
@@ -145,15 +130,15 @@ std::span<const SupplyReading> within(std::span<const SupplyReading> readings, c
 }
 
 std::uint32_t supply_flags(std::span<const SupplyReading> readings, bool settled) {
-  Bits bits;
+  std::uint32_t flags = 0;
   for (const SupplyReading& seen : readings) {
-    bits.note(QualityFlag::supply_off, seen.output == 0 || seen.protection != SupplyProtection::none);
+    flags |= flag_if(QualityFlag::supply_off, seen.output == 0 || seen.protection != SupplyProtection::none);
     if (!settled) continue;
-    bits.note(QualityFlag::supply_limited, seen.regulation == SupplyRegulation::constant_current);
-    bits.note(QualityFlag::supply_sag, !(seen.voltage_v >= (1 - kSupplySag) * seen.set_voltage_v));
-    bits.note(QualityFlag::supply_rise, seen.voltage_v > (1 + kSupplyRise) * seen.set_voltage_v);
+    flags |= flag_if(QualityFlag::supply_limited, seen.regulation == SupplyRegulation::constant_current) |
+             flag_if(QualityFlag::supply_sag, !(seen.voltage_v >= (1 - kSupplySag) * seen.set_voltage_v)) |
+             flag_if(QualityFlag::supply_rise, seen.voltage_v > (1 + kSupplyRise) * seen.set_voltage_v);
   }
-  return bits.all();
+  return flags;
 }
 
 std::vector<FlagSpan> flag_spans(std::span<const StreamEvent> events) {
@@ -170,11 +155,9 @@ std::vector<FlagSpan> flag_spans(std::span<const StreamEvent> events) {
 }
 
 std::uint32_t flags_within(std::span<const FlagSpan> spans, Nanoseconds begin, Nanoseconds end) {
-  std::uint32_t bits = 0;
-  for (const FlagSpan& span : spans) {
-    if (span.begin < end && span.end >= begin) bits |= static_cast<std::uint32_t>(span.flag);
-  }
-  return bits;
+  std::uint32_t flags = 0;
+  for (const FlagSpan& span : spans) flags |= flag_if(span.flag, span.begin < end && span.end >= begin);
+  return flags;
 }
 
 }  // namespace kphi::results

@@ -17,6 +17,10 @@ inline constexpr double kSupplyBand = 0.1;
 /// Share of the supply voltage at which the motor runs at full drive.
 inline constexpr double kFullDrive = 0.98;
 
+[[nodiscard]] constexpr std::uint32_t flag_if(QualityFlag flag, bool applies) {
+  return applies ? static_cast<std::uint32_t>(flag) : 0u;
+}
+
 /// Permitted deviation of the mean speed from the command, rad/s.
 [[nodiscard]] double speed_tolerance(double commanded_rad_s);
 

@@ -21,7 +21,6 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 double seconds(Nanoseconds time) { return 1e-9 * static_cast<double>(time); }
 Nanoseconds nanoseconds(double time_s) { return std::llround(1e9 * time_s); }
-std::uint32_t bit(QualityFlag flag, bool applies) { return applies ? static_cast<std::uint32_t>(flag) : 0u; }
 
 /// One step that was held to its end: its samples in bins from the command on, and the change of speed that it is.
 struct HeldStep {
@@ -33,7 +32,7 @@ struct HeldStep {
 
 class Reduction {
  public:
-  explicit Reduction(const RunRecording& run, std::unique_ptr<LoadCellColumns> load_cell = nullptr)
+  Reduction(const RunRecording& run, LoadCellColumns load_cell)
       : run_(run),
         newtons_(run.header.thrust_sign / run.header.load_cell.counts_per_newton),
         newton_metres_(run.header.thrust_sign / run.header.load_cell.counts_per_newton_metre),
@@ -53,7 +52,7 @@ class Reduction {
     if (zeros_.empty()) return found;
     found.zero = check_zeros(found.steps);
     const std::uint32_t flags =
-        bit(QualityFlag::zero_drifted, found.zero.drifted()) | bit(QualityFlag::zero_noisy, found.zero.noisy());
+        flag_if(QualityFlag::zero_drifted, found.zero.drifted()) | flag_if(QualityFlag::zero_noisy, found.zero.noisy());
     for (StepMean& step : found.steps) step.quality_flags |= flags;
     return found;
   }
@@ -194,10 +193,10 @@ class Reduction {
     mean.quality_flags =
         flags_within(spans_, step.whole.begin, step.whole.end) | step_flags(run_.header, motor_, evidence) |
         supply_flags(within(run_.supply, {step.whole.begin, evidence.window.begin}), false) |
-        supply_flags(supply, true) | bit(QualityFlag::rebooted, cell_.boot_at(step.whole.end) != zeros_.boot()) |
-        bit(QualityFlag::unsettled, !settling.settled) | bit(QualityFlag::lag_unknown, !lag_.known()) |
-        bit(QualityFlag::few_samples, std::isnan(mean.thrust_u_n) || std::isnan(mean.speed_u_rad_s)) |
-        bit(QualityFlag::drifted, drifts(at_constant_speed(step, discarded)));
+        supply_flags(supply, true) | flag_if(QualityFlag::rebooted, cell_.boot_at(step.whole.end) != zeros_.boot()) |
+        flag_if(QualityFlag::unsettled, !settling.settled) | flag_if(QualityFlag::lag_unknown, !lag_.known()) |
+        flag_if(QualityFlag::few_samples, std::isnan(mean.thrust_u_n) || std::isnan(mean.speed_u_rad_s)) |
+        flag_if(QualityFlag::drifted, drifts(at_constant_speed(step, discarded)));
     return mean;
   }
 
@@ -288,7 +287,7 @@ void require_usable(const RunHeader& header) {
 
 Reduced reduce_with_zeros(const RunRecording& run) {
   require_usable(run.header);
-  return Reduction(run).reduced();
+  return Reduction(run, LoadCellColumns(run.load_cell)).reduced();
 }
 
 Reduced reduce_with_zeros(RunFile file) {
@@ -298,7 +297,7 @@ Reduced reduce_with_zeros(RunFile file) {
 
 std::vector<Transition> transitions_of(const RunRecording& run) {
   require_usable(run.header);
-  return Reduction(run).transitions();
+  return Reduction(run, LoadCellColumns(run.load_cell)).transitions();
 }
 
 std::vector<StepMean> reduce(const RunRecording& run) { return reduce_with_zeros(run).steps; }

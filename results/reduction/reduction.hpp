@@ -46,7 +46,7 @@ struct Reduced {
 /// its offset.
 [[nodiscard]] std::vector<Transition> transitions_of(const RunRecording& run);
 
-/// The same bits, reading the samples from the file window by window.
+/// The same bits.
 [[nodiscard]] Reduced reduce_with_zeros(RunFile run);
 
 }  // namespace kphi::results

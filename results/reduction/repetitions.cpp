@@ -6,6 +6,7 @@
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <set>
@@ -22,27 +23,16 @@ using Group = std::vector<const StepMean*>;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 constexpr double StepMean::*kMeans[] = {
-    &StepMean::commanded_speed_rad_s,
-    &StepMean::thrust_n,
-    &StepMean::torque_nm,
-    &StepMean::zero_n,
-    &StepMean::supply_voltage_v,
-    &StepMean::supply_current_a,
-    &StepMean::motor_current_a,
-    &StepMean::window_begin_s,
-    &StepMean::coil_temperature_degc,
-    &StepMean::window_end_s,
-    &StepMean::supply_v,
-    &StepMean::supply_a,
-    &StepMean::supply_w,
-    &StepMean::air_density_kg_m3,
-    &StepMean::air_density_u_kg_m3,
-    &StepMean::discarded_s,
-    &StepMean::zero_moved_n,
-    &StepMean::lag_s,
-};
+    // of every run
+    &StepMean::commanded_speed_rad_s, &StepMean::thrust_n, &StepMean::torque_nm, &StepMean::zero_n,
+    &StepMean::supply_voltage_v, &StepMean::supply_current_a, &StepMean::motor_current_a, &StepMean::window_begin_s,
+    &StepMean::coil_temperature_degc, &StepMean::window_end_s,
+    // of some
+    &StepMean::supply_v, &StepMean::supply_a, &StepMean::supply_w, &StepMean::air_density_kg_m3,
+    &StepMean::air_density_u_kg_m3, &StepMean::discarded_s, &StepMean::zero_moved_n, &StepMean::lag_s};
 constexpr double StepMean::*kRootMeanSquares[] = {&StepMean::speed_rad_s, &StepMean::speed_sd_rad_s,
                                                   &StepMean::thrust_sd_n, &StepMean::torque_sd_nm};
+constexpr std::uint64_t StepMean::*kSums[] = {&StepMean::speed_n, &StepMean::thrust_samples, &StepMean::speed_glitches};
 constexpr double StepMean::*kUncertainties[] = {&StepMean::thrust_u_n, &StepMean::speed_u_rad_s, &StepMean::zero_u_n,
                                                 &StepMean::lag_u_s};
 
@@ -89,15 +79,11 @@ StepMean average(const Group& group) {
   }
   mean.thrust_n_eff = sum_over(group, &StepMean::thrust_n_eff);
   mean.thrust_freedom = freedom_of(group);
-  mean.speed_n = 0;
-  mean.thrust_samples = 0;
-  mean.speed_glitches = 0;
-  for (const StepMean* step : group) {
-    mean.speed_n += step->speed_n;
-    mean.thrust_samples += step->thrust_samples;
-    mean.speed_glitches += step->speed_glitches;
-    mean.quality_flags |= step->quality_flags;
+  for (const auto member : kSums) {
+    mean.*member = 0;
+    for (const StepMean* step : group) mean.*member += step->*member;
   }
+  for (const StepMean* step : group) mean.quality_flags |= step->quality_flags;
   return mean;
 }
 
@@ -132,7 +118,8 @@ std::set<int> good_levels(const Group& run) {
   return levels;
 }
 
-RepetitionFigure figure_of(const Group& run, const std::set<int>& levels) {
+/// k and its uncertainty, over these levels.
+void fit_k(const Group& run, const std::set<int>& levels, RepetitionFigure& figure) {
   double tx = 0, xx = 0, x_sum = 0, variance = 0, zero = 0;
   ZeroDrift drift;
   for (const StepMean* step : run) {
@@ -145,10 +132,8 @@ RepetitionFigure figure_of(const Group& run, const std::set<int>& levels) {
     variance += square(x * u_within(*step));
     zero = std::fmax(zero, step->zero_u_n);  // ignores an unknown one
   }
-  RepetitionFigure figure;
   figure.k = tx / xx;
   figure.u = std::sqrt(variance + square(std::hypot(zero, drift.u_n()) * x_sum)) / xx;
-  return figure;
 }
 
 std::vector<RepetitionFigure> figures_of(const Runs& runs) {
@@ -162,10 +147,7 @@ std::vector<RepetitionFigure> figures_of(const Runs& runs) {
     std::erase_if(*common, [&](int level) { return !levels.contains(level); });
   }
   for (RepetitionFigure& figure : figures) {
-    if (!figure.usable || common->empty()) continue;
-    const RepetitionFigure found = figure_of(runs.at(figure.repetition), *common);
-    figure.k = found.k;
-    figure.u = found.u;
+    if (figure.usable && !common->empty()) fit_k(runs.at(figure.repetition), *common, figure);
   }
   return figures;
 }
@@ -377,8 +359,7 @@ std::vector<StepMean> means_of(std::span<const StepMean> steps) {
   std::vector<StepMean> means;
   for (const Group& group : groups_of(steps)) {
     Group good;
-    for (const StepMean* step : group)
-      if (is_good(*step)) good.push_back(step);
+    std::ranges::copy_if(group, std::back_inserter(good), [](const StepMean* step) { return is_good(*step); });
     const bool chosen = !good.empty() && good.size() < group.size();
     means.push_back(average(chosen ? good : group));
     if (!chosen) continue;

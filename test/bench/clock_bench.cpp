@@ -7,7 +7,7 @@
 #include <unordered_map>
 
 #include "drivers/netbox/receive/load_cell.hpp"
-#include "drivers/sim/server.hpp"
+#include "drivers/sim/bench_server.hpp"
 #include "test/bench/figures.hpp"
 #include "test/drivers/netbox/busy_loops.hpp"
 #include "test/drivers/netbox/delay_channel.hpp"

@@ -58,7 +58,7 @@ double bootstrap_ms() {
   double best = 1e9;
   for (int i = 0; i < 15; ++i) {
     const auto begin = std::chrono::steady_clock::now();
-    const auto intervals = kphi::fit::bootstrap(runs, weights, {10000, static_cast<std::uint64_t>(i), 0.95});
+    const auto intervals = kphi::fit::bootstrap(runs, weights, {10000, static_cast<std::uint64_t>(i)});
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
     best = std::min(best, intervals.empty() ? 1e9 : took.count());
   }

@@ -32,7 +32,7 @@ class CellBench final : public daq::Bench, private daq::LoadCellLink {
   [[nodiscard]] daq::MotorLink& motor() override { return motor_; }
   [[nodiscard]] daq::LoadCellLink& load_cell() override { return *this; }
   void wait_until(Instant) override {}
-  [[nodiscard]] std::unique_ptr<daq::Background> run_periodically(std::function<void()>) override { return nullptr; }
+  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()>) override { return nullptr; }
   [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
   [[nodiscard]] Duration sync_interval() const override { return std::chrono::milliseconds(500); }
   void mounted(const std::string&, double) override {}
@@ -120,7 +120,7 @@ Shares run(const BoxProcess& box, bool guarded) {
   results::RunWriter writer(folder.path() / "run.h5", header);
   daq::Guard guard(bench, {}, scale, limits());
   daq::BenchStreams plain(bench);
-  daq::Recorder recorder(bench, guarded ? static_cast<daq::Streams&>(guard) : plain, writer, scale);
+  daq::Recorder recorder(bench, guarded ? static_cast<daq::Streams&>(guard) : plain, writer);
   guard.take_zero({});
   Shares shares;
   {

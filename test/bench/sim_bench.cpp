@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "drivers/sim/bench.hpp"
+#include "drivers/sim/simulated_bench.hpp"
 
 namespace {
 
@@ -17,9 +17,6 @@ NetBoxSettings settings_of(bool all_on) {
   NetBoxSettings settings;
   if (!all_on) return settings;
   settings.filter = 4;
-  settings.monitoring = true;
-  for (int i = 0; i < 4; ++i) settings.conditions[static_cast<std::size_t>(i)] = {true, i, 1, 50'000'000, 1};
-  settings.slots[0].tool_transform = {1, 2, 3, 10, 20, 30};
   settings.bias_vector = {5, 5, 5, 5, 5, 5};
   return settings;
 }

@@ -62,9 +62,9 @@ void soak(const BoxProcess& box) {
 void stall(const BoxProcess& box, const char* mode) {
   const SteadyClock clock;
   Driver driver(box.ports(), clock);
-  const std::string note = driver.cell().receive_buffer_note();
-  fmt::print("{}: receive buffer {}\n", mode, note);
-  const double ms = std::stod(note.substr(note.find("tolerates ") + 10));
+  const netbox::ReceiveBuffer buffer = driver.cell().receive_buffer();
+  fmt::print("{}: receive buffer {}\n", mode, buffer.note());
+  const double ms = buffer.tolerated_ms();
   bench::at_least(30, ms / 30, fmt::format("{}: stall tolerated / netft-cpp's 30 ms", mode));
 }
 

@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -16,6 +18,7 @@
 #include "daq/run/run.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
+#include "results/campaign_folder.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::test {
@@ -23,6 +26,17 @@ namespace kphi::test {
 inline std::string bytes_of(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// Name → bytes.
+using Files = std::map<std::string, std::string>;
+
+/// Run files and tables.
+inline Files measured_in(const results::CampaignFolder& folder) {
+  Files files;
+  for (const auto& run : folder.complete_runs()) files[run.filename().string()] = bytes_of(run);
+  for (const auto& table : {folder.steps(), folder.means()}) files[table.filename().string()] = bytes_of(table);
+  return files;
 }
 
 inline std::string short_campaign_text(const std::string& occlusions = "0, 90", int repetitions = 1, int steps = 4) {
@@ -55,14 +69,38 @@ inline profiles::BenchConfig deterministic_config(int seed, const std::string& f
 /// Keeps the lines that a run says, and calls `then` with each.
 class SaidLines final : public daq::Progress {
  public:
-  void tick(const daq::Position&, const daq::Observation&) override {}
-  void step_done(const daq::Position&, const daq::Observation&) override {}
   void say(const std::string& line) override {
     lines.push_back(line);
     if (then) then(line);
   }
+  /// Lines with these words.
+  [[nodiscard]] std::ptrdiff_t count(const std::string& words) const {
+    return std::count_if(lines.begin(), lines.end(),
+                         [&](const std::string& line) { return line.find(words) != std::string::npos; });
+  }
   std::vector<std::string> lines;
   std::function<void(const std::string&)> then;
+};
+
+/// Remembers what it was asked, refuses to mount `refuse_at_deg`, and decides as it is told.
+class ScriptedOperator final : public daq::Operator {
+ public:
+  [[nodiscard]] bool run_again(const daq::AnotherRun& question) override {
+    questions.push_back(question);
+    return decision;
+  }
+  std::string propeller;
+  std::vector<double> mounted_deg;
+  std::vector<daq::AnotherRun> questions;
+  double refuse_at_deg = -1;
+  bool decision = true;
+
+ protected:
+  void mount(const profiles::Propeller& under, double occlusion_deg, const std::string&) override {
+    propeller = under.id;
+    mounted_deg.push_back(occlusion_deg);
+    if (occlusion_deg == refuse_at_deg) throw daq::NotMounted("no");
+  }
 };
 
 /// 12 V from the simulated supply.

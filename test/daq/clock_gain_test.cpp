@@ -19,8 +19,6 @@ class TrueSpeed final : public Progress {
   void tick(const Position&, const Observation&) override {
     seen_.push_back({to_seconds(bench_.clock().now()), bench_.simulation().plant().motor().speed});
   }
-  void step_done(const Position&, const Observation&) override {}
-  void say(const std::string&) override {}
   [[nodiscard]] double mean(double begin_s, double end_s) const {
     double sum = 0;
     int n = 0;

@@ -18,6 +18,7 @@ using testing::AllOf;
 using testing::AnyOf;
 using testing::Contains;
 using testing::HasSubstr;
+using testing::ThrowsMessage;
 
 constexpr const char* kManyFaults =
     "  - {at_s: 1.0, for_s: 0.5, kind: loss, p: 0.05, burst: 2}\n"
@@ -89,9 +90,7 @@ TEST_F(FaultyCampaign, ShowsTenEventsOfARunAndKeepsTheOthersInItsFile) {
   for (int i = 0; i < 12; ++i) faults += fmt::format("  - {{at_s: {:.1f}, kind: restart}}\n", 1.0 + 0.1 * i);
   (void)run(faults);
   EXPECT_EQ(events(0).size(), 12u);
-  EXPECT_EQ(std::count_if(said_.lines.begin(), said_.lines.end(),
-                          [](const auto& line) { return line.find("the stream restarted") != std::string::npos; }),
-            10);
+  EXPECT_EQ(said_.count("the stream restarted"), 10);
   EXPECT_THAT(said_.lines, Contains(HasSubstr("further events of this run go to its file only")));
 }
 
@@ -105,10 +104,7 @@ TEST_F(FaultyCampaign, FlagsAllStepsAfterARestartOfTheBoxUntilTheNextRun) {
   EXPECT_EQ(found[3], "rebooted+zero_drifted");
   EXPECT_EQ(flags(1), (std::vector<std::string>{"", "", "", ""}));
   EXPECT_EQ(recording(0).account.reboots, 1u);
-  const auto& lines = said_.lines;
-  EXPECT_EQ(std::count_if(lines.begin(), lines.end(),
-                          [](const auto& line) { return line.find("the box has booted") != std::string::npos; }),
-            1);
+  EXPECT_EQ(said_.count("the box has booted"), 1);
   expect_replay_agrees();
 }
 
@@ -135,12 +131,10 @@ TEST_F(FaultyCampaign, FlagsTheStepInWhichTheBoxSawItsCommunicationFail) {
 }
 
 TEST_F(FaultyCampaign, StopsTheMotorWhenTheBoxReportsAnErrorForGood) {
-  try {
-    (void)run("  - {at_s: 2.0, kind: status, bits: 0x88000000}\n");
-    FAIL() << "the motor turned on samples that the box does not answer for";
-  } catch (const SafetyStop& stop) {
-    EXPECT_THAT(stop.what(), HasSubstr("the Net Box reports \"serial link communication error\" (status 0x88000000)"));
-  }
+  EXPECT_THAT([&] { (void)run("  - {at_s: 2.0, kind: status, bits: 0x88000000}\n"); },
+              ThrowsMessage<SafetyStop>(
+                  HasSubstr("the Net Box reports \"serial link communication error\" (status 0x88000000)")))
+      << "the motor turned on samples that the box does not answer for";
   EXPECT_TRUE(motor_is_let_go());
   const results::RunRecording run = results::read_run(results_->other_runs().at(0));
   ASSERT_EQ(run.events.size(), 2u);
@@ -163,10 +157,7 @@ TEST_F(FaultyCampaign, BearsAnErrorOfOneDatagramFlaggedAndTellsIt) {
   EXPECT_EQ(flags(0)[2], "");
   ASSERT_THAT(events(0), testing::ElementsAre(EventKind::box_error, EventKind::box_error_ended));
   EXPECT_EQ(recording(0).events[1].records, 35u) << "5 ms at 7 kHz";
-  EXPECT_EQ(std::count_if(said_.lines.begin(), said_.lines.end(),
-                          [](const auto& line) { return line.find("the Net Box ") != std::string::npos; }),
-            2)
-      << "its beginning and its end";
+  EXPECT_EQ(said_.count("the Net Box "), 2) << "its beginning and its end";
   const auto journal = results::read_journal(results_->journal());
   const auto accepted = std::find_if(journal.entries.begin(), journal.entries.end(),
                                      [](const auto& entry) { return entry.event == results::kRunAccepted; });
@@ -196,12 +187,9 @@ TEST_F(FaultyCampaign, BearsALatchedMonitorConditionWithoutAFlag) {
 }
 
 TEST_F(FaultyCampaign, NamesTheErrorsOfAnAxiaByItsOwnBits) {
-  try {
-    (void)run("  - {at_s: 2.0, kind: status, bits: 0x80000004}\nquirks: {axia: true}\n");
-    FAIL() << "the motor turned on the samples of a broken gage";
-  } catch (const SafetyStop& stop) {
-    EXPECT_THAT(stop.what(), HasSubstr("the Axia reports \"broken gage\" (status 0x80000004)"));
-  }
+  EXPECT_THAT([&] { (void)run("  - {at_s: 2.0, kind: status, bits: 0x80000004}\nquirks: {axia: true}\n"); },
+              ThrowsMessage<SafetyStop>(HasSubstr("the Axia reports \"broken gage\" (status 0x80000004)")))
+      << "the motor turned on the samples of a broken gage";
   EXPECT_TRUE(motor_is_let_go());
 }
 
@@ -218,12 +206,8 @@ TEST_F(FaultyCampaign, FlagsAllStepsOfARunInWhichTheBoxWasGivenOtherUnits) {
   for (const std::string& names : flags(0)) EXPECT_THAT(names, HasSubstr("configuration_changed"));
   EXPECT_EQ(flags(1), (std::vector<std::string>{"", "", "", ""})) << "read with its own scale";
   EXPECT_THAT(events(0), testing::ElementsAre(EventKind::configuration_changed));
-  const auto& lines = said_.lines;
-  const auto with = [&](const std::string& words) {
-    return std::count_if(lines.begin(), lines.end(), [&](const auto& l) { return l.find(words) != std::string::npos; });
-  };
-  EXPECT_EQ(with("configuration changed since the run began: units, counts per unit; all steps"), 1);
-  EXPECT_EQ(with("configuration changed since it was last read: units, counts per unit; recording this run"), 1);
+  EXPECT_EQ(said_.count("configuration changed since the run began: units, counts per unit; all steps"), 1);
+  EXPECT_EQ(said_.count("configuration changed since it was last read: units, counts per unit; recording this run"), 1);
   constexpr double kTrueK5x3 = 1.7e-8 / (kRadPerSecPerRpm * kRadPerSecPerRpm);
   const auto steps = reduce(recording(0));
   EXPECT_LT(steps[3].thrust_n, 0.5 * kTrueK5x3 * steps[3].speed_rad_s * steps[3].speed_rad_s) << "a wrong number";
@@ -231,12 +215,12 @@ TEST_F(FaultyCampaign, FlagsAllStepsOfARunInWhichTheBoxWasGivenOtherUnits) {
 }
 
 TEST_F(FaultyCampaign, RefusesTheNextRunOfABoxThatNoLongerSuitsTheCampaign) {
-  try {
-    (void)run("  - {at_s: 1.5, kind: units, force_unit: 5}\n");  // whole kilograms of force
-    FAIL() << "a thrust of 0 N without a flag";
-  } catch (const ConfigurationError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("one count is 9.81 N"));
-  }
+  EXPECT_THAT(
+      [&] {
+        (void)run("  - {at_s: 1.5, kind: units, force_unit: 5}\n");  // whole kilograms of force
+      },
+      ThrowsMessage<ConfigurationError>(HasSubstr("one count is 9.81 N")))
+      << "a thrust of 0 N without a flag";
   for (const std::string& names : flags(0)) EXPECT_THAT(names, HasSubstr("configuration_changed"));
   EXPECT_EQ(results_->complete_runs().size(), 1u);
 }
@@ -294,24 +278,19 @@ TEST_F(FaultyCampaign, RefusesANoisyZeroBeforeAnythingTurns) {
 }
 
 TEST_F(FaultyCampaign, StopsWhenTheBoxRepeatsItselfForLongAndSaysSo) {
-  try {
-    (void)run("  - {at_s: 1.5, for_s: 1.5, kind: stall}\n");
-    FAIL() << "the motor went on turning without a measurement";
-  } catch (const SafetyStop& stop) {
-    // Whoever looks first: the interlock, or with a more patient one the silence.
-    EXPECT_THAT(stop.what(), AllOf(AnyOf(HasSubstr("newest load-cell sample"), HasSubstr("the stream fell silent")),
-                                   HasSubstr("the box repeats one measurement")));
-  }
+  // Whoever looks first: the interlock, or with a more patient one the silence.
+  EXPECT_THAT(
+      [&] { (void)run("  - {at_s: 1.5, for_s: 1.5, kind: stall}\n"); },
+      ThrowsMessage<SafetyStop>(AllOf(AnyOf(HasSubstr("newest load-cell sample"), HasSubstr("the stream fell silent")),
+                                      HasSubstr("the box repeats one measurement"))))
+      << "the motor went on turning without a measurement";
   EXPECT_TRUE(motor_is_let_go());
 }
 
 TEST_F(FaultyCampaign, RefusesAPageInUtf16) {
-  try {
-    (void)run("  - {at_s: 0, for_s: 10, kind: http_charset, utf16: true}\n");
-    FAIL() << "a page with NUL bytes was taken";
-  } catch (const DeviceError& error) {
-    EXPECT_THAT(error.what(), AllOf(HasSubstr("NUL byte"), HasSubstr("power-cycle")));
-  }
+  EXPECT_THAT([&] { (void)run("  - {at_s: 0, for_s: 10, kind: http_charset, utf16: true}\n"); },
+              ThrowsMessage<DeviceError>(AllOf(HasSubstr("NUL byte"), HasSubstr("power-cycle"))))
+      << "a page with NUL bytes was taken";
 }
 
 TEST_F(FaultyCampaign, KeepsTheScriptBesideTheBenchFile) {
@@ -332,14 +311,13 @@ class ShownSteps final : public Progress {
  public:
   void tick(const Position&, const Observation& seen) override { check(seen); }
   void step_done(const Position&, const Observation& seen) override { check(seen); }
-  void say(const std::string&) override {}
   Duration oldest_shown{0};
   int stale = 0;
 
  private:
   void check(const Observation& seen) {
-    if (seen.load_cell_is_fresh) oldest_shown = std::max(oldest_shown, seen.load_cell_age);
-    stale += !seen.load_cell_is_fresh;
+    if (seen.load_cell_is_fresh()) oldest_shown = std::max(oldest_shown, seen.load_cell_age);
+    stale += !seen.load_cell_is_fresh();
   }
 };
 
@@ -357,22 +335,16 @@ TEST_F(FaultyCampaign, ShowsNoOldThrustAsFreshWhenTheStreamIsTakenOver) {
 }
 
 TEST_F(FaultyCampaign, StopsWhenTheStreamIsTakenOverAndSaysSo) {
-  try {
-    (void)run("  - {at_s: 2.0, kind: taken_over}\n");
-    FAIL() << "a stream taken over went unnoticed";
-  } catch (const SafetyStop& stop) {
-    EXPECT_THAT(stop.what(), HasSubstr("another client has taken the stream"));
-  }
+  EXPECT_THAT([&] { (void)run("  - {at_s: 2.0, kind: taken_over}\n"); },
+              ThrowsMessage<SafetyStop>(HasSubstr("another client has taken the stream")))
+      << "a stream taken over went unnoticed";
   EXPECT_TRUE(motor_is_let_go());
 }
 
 TEST_F(FaultyCampaign, StopsWhenTheBoxGoesAndSaysThatItDoesNotAnswer) {
-  try {
-    (void)run("  - {at_s: 2.0, kind: reboot, down_s: 100}\n");
-    FAIL() << "a dead box went unnoticed";
-  } catch (const SafetyStop& stop) {
-    EXPECT_THAT(stop.what(), HasSubstr("does not answer over HTTP"));
-  }
+  EXPECT_THAT([&] { (void)run("  - {at_s: 2.0, kind: reboot, down_s: 100}\n"); },
+              ThrowsMessage<SafetyStop>(HasSubstr("does not answer over HTTP")))
+      << "a dead box went unnoticed";
   EXPECT_TRUE(motor_is_let_go());
 }
 
@@ -406,12 +378,9 @@ class ShiftedCell : public FaultyCampaign {
 };
 
 TEST_F(ShiftedCell, LetsTheMotorGoAboveATenthBeyondARange) {
-  try {
-    (void)run("  - {at_s: 2.0, for_s: 1, kind: saturation, axes: 1}\n");
-    FAIL() << "the cell was loaded with 120 % of its range";
-  } catch (const SafetyStop& stop) {
-    EXPECT_THAT(stop.what(), HasSubstr("load cell: Fx carries 120 % of its range of 20 N"));
-  }
+  EXPECT_THAT([&] { (void)run("  - {at_s: 2.0, for_s: 1, kind: saturation, axes: 1}\n"); },
+              ThrowsMessage<SafetyStop>(HasSubstr("load cell: Fx carries 120 % of its range of 20 N")))
+      << "the cell was loaded with 120 % of its range";
   EXPECT_TRUE(motor_is_let_go());
   const auto aborted = results_->other_runs();
   ASSERT_EQ(aborted.size(), 1u);
@@ -443,12 +412,9 @@ TEST_F(FaultyCampaign, TakesTheBoxesBiasAsAMeasuredStepWhenTheCampaignSaysSo) {
 
 TEST_F(FaultyCampaign, TakesNoBiasFromSamplesThatAreNotSound) {
   campaign_ = profiles::parse_campaign(test::short_campaign_text() + "box_bias: true\n", "short.yaml");
-  try {
-    (void)run("  - {at_s: 0, for_s: 20, kind: saturation, axes: 1}\n");
-    FAIL() << "a saturated cell was biased";
-  } catch (const SafetyStop& error) {
-    EXPECT_THAT(error.what(), AllOf(HasSubstr("take the bias"), HasSubstr("no valid sample arrived")));
-  }
+  EXPECT_THAT([&] { (void)run("  - {at_s: 0, for_s: 20, kind: saturation, axes: 1}\n"); },
+              ThrowsMessage<SafetyStop>(AllOf(HasSubstr("take the bias"), HasSubstr("no valid sample arrived"))))
+      << "a saturated cell was biased";
   EXPECT_EQ(results::read_run(results_->other_runs().at(0)).outcome, results::Outcome::aborted);
 }
 

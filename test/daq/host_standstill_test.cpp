@@ -33,7 +33,7 @@ class SleepyBench final : public WrappedBench {
     }
     bench.wait_until(when);
   }
-  [[nodiscard]] std::unique_ptr<Background> run_periodically(std::function<void()> work) override {
+  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()> work) override {
     work_.push_back(std::make_shared<std::function<void()>>(std::move(work)));
     return bench.run_periodically([this, work = work_.back()] {
       if (!asleep_) (*work)();
@@ -68,7 +68,7 @@ class HostStandstill : public testing::Test {
   profiles::Campaign campaign_ = test::short_campaign();
   profiles::BenchConfig config_ = test::deterministic_config(1);
   SleepyBench bench_{config_};
-  NoProgress progress_;
+  Progress progress_;
 };
 
 TEST_F(HostStandstill, OfAQuarterOfASecondIsSeenTwiceAndBorneSinceAllOfItWaits) {

@@ -8,7 +8,7 @@
 #include "base/error.hpp"
 #include "daq/campaign/campaign_run.hpp"
 #include "daq/campaign/resume.hpp"
-#include "daq/virtual/per_run_bench.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
 #include "results/campaign_state.hpp"
 #include "results/journal.hpp"
 #include "test/daq/model_disk.hpp"
@@ -24,26 +24,18 @@ constexpr int kRefusals = 6;
 
 class Counting final : public Progress {
  public:
-  void tick(const Position&, const Observation&) override {}
-  void step_done(const Position&, const Observation&) override {}
   void say(const std::string& line) override { accepted += line.starts_with("run "); }
   int accepted = 0;  ///< runs of which the program has said that they are
 };
 
-using Files = std::map<std::string, std::string>;
-
-Files measured_in(const results::CampaignFolder& folder) {
-  Files files;
-  for (const auto& run : folder.complete_runs()) files[run.filename().string()] = test::bytes_of(run);
-  for (const auto& table : {folder.steps(), folder.means()}) files[table.filename().string()] = test::bytes_of(table);
-  return files;
-}
+using test::Files;
+using test::measured_in;
 
 /// Two occlusions, two steps.
 class AnyOperation : public testing::Test {
  protected:
   void run(results::FileLayer& files, Progress& progress, const results::CampaignFolder& folder) {
-    PerRunBench bench(config_);
+    DeterministicBench bench(config_, {}, DeterministicBench::Lives::one_run);
     bench.use_files(files);
     AutoConfirmOperator person;
     (void)run_campaign(bench, campaign_, config_, folder, person, progress, [] { return false; });
@@ -51,7 +43,7 @@ class AnyOperation : public testing::Test {
   /// The same campaign on another disk, and nothing happens.
   int count_operations() {
     test::ModelDisk disk([](int) {});
-    NoProgress progress;
+    Progress progress;
     const auto folder = results::CampaignFolder::create(folder_.path(), "whole", "c", disk);
     run(disk, progress, folder);
     whole_ = measured_in(folder);
@@ -80,9 +72,9 @@ class AnyOperation : public testing::Test {
     SCOPED_TRACE(when);
     const auto folder = results::CampaignFolder::open(path);
     const Resumption resumption = inspect(folder, false);
-    NoProgress progress;
+    Progress progress;
     AutoConfirmOperator person;
-    PerRunBench bench(config_);
+    DeterministicBench bench(config_, {}, DeterministicBench::Lives::one_run);
     (void)run_campaign(
         bench, campaign_, config_, folder, person, progress, [] { return false; }, &resumption);
     const auto found = results::verify_campaign(folder);
@@ -163,7 +155,7 @@ TEST_F(AnyOperation, RefusedStopsTheMotorSaysWhyAndCanBeResumed) {
     });
     const auto folder = results::CampaignFolder::create(folder_.path(), fmt::format("full-{}", moment), "c", disk);
     armed = true;
-    PerRunBench bench(config_);
+    DeterministicBench bench(config_, {}, DeterministicBench::Lives::one_run);
     bench.use_files(disk);
     AutoConfirmOperator person;
     try {

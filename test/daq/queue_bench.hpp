@@ -68,15 +68,27 @@ class QueueMotor final : public MotorLink {
   iq::AuditRecord parameters_;
 };
 
-/// A bench of queues that a test fills.
-class QueueBench final : public Bench, private LoadCellLink {
+/// 20 N, 60 N along Fz, 1 N m.
+inline results::LoadCellScale mini40() {
+  results::LoadCellScale scale;
+  scale.range = {20, 20, 60, 1, 1, 1};
+  return scale;
+}
+
+/// A bench of queues that a test fills, with a mini40().
+class QueueBench : public Bench, private LoadCellLink {
  public:
+  QueueBench() {
+    box.counts_per_newton = mini40().counts_per_newton;
+    box.counts_per_newton_metre = mini40().counts_per_newton_metre;
+    box.range = mini40().range;
+  }
   [[nodiscard]] const Clock& clock() const override { return time; }
   [[nodiscard]] MotorLink& motor() override { return queue_motor; }
   [[nodiscard]] LoadCellLink& load_cell() override { return *this; }
   [[nodiscard]] SupplyLink* supply() override { return supply_link; }
   void wait_until(Instant when) override { time.set(when); }
-  [[nodiscard]] std::unique_ptr<Background> run_periodically(std::function<void()>) override { return nullptr; }
+  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()>) override { return nullptr; }
   [[nodiscard]] results::FileLayer& files() override { return *layer; }
   [[nodiscard]] Duration sync_interval() const override { return std::chrono::milliseconds(500); }
   void mounted(const std::string&, double) override {}
@@ -105,12 +117,5 @@ class QueueBench final : public Bench, private LoadCellLink {
   [[nodiscard]] results::StreamHealth health() const override { return {}; }
   [[nodiscard]] std::string failure() const override { return {}; }
 };
-
-/// 20 N, 60 N along Fz, 1 N m.
-inline results::LoadCellScale mini40() {
-  results::LoadCellScale scale;
-  scale.range = {20, 20, 60, 1, 1, 1};
-  return scale;
-}
 
 }  // namespace kphi::daq

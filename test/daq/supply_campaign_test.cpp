@@ -16,14 +16,13 @@ namespace kphi::daq {
 namespace {
 
 using testing::HasSubstr;
+using testing::ThrowsMessage;
 
 class NoteMotor final : public Progress {
  public:
   void tick(const Position& position, const Observation&) override {
     if (act) act(position);
   }
-  void step_done(const Position&, const Observation&) override {}
-  void say(const std::string&) override {}
   std::function<void(const Position&)> act;
 };
 
@@ -60,12 +59,7 @@ class SupplyCampaign : public testing::Test {
     progress_.act = [&](const Position& position) {
       if (position.step == 2 && ++ticks == 30) act();
     };
-    try {
-      (void)run(limit_a);
-      FAIL() << "nothing stopped the run";
-    } catch (const SafetyStop& stop) {
-      EXPECT_THAT(stop.what(), HasSubstr(reason));
-    }
+    EXPECT_THAT([&] { (void)run(limit_a); }, ThrowsMessage<SafetyStop>(HasSubstr(reason))) << "nothing stopped the run";
     EXPECT_FALSE(circuit().output());
     bench_->wait_until(bench_->clock().now() + std::chrono::milliseconds(200));
     EXPECT_EQ(bench_->simulation().motor().stage().mode, sim::PowerStage::Mode::coast);
@@ -138,12 +132,9 @@ TEST_F(SupplyCampaign, StopsWhenTheSupplyNoLongerAnswersAndSaysThatItMayBeOn) {
   progress_.act = [&](const Position& position) {
     if (position.step == 0 && !std::exchange(closed, true)) spoil(sim::SupplyFaultKind::closed, 0);
   };
-  try {
-    (void)run();
-    FAIL() << "nobody missed the supply";
-  } catch (const SafetyStop& stop) {
-    EXPECT_THAT(stop.what(), testing::AllOf(testing::StartsWith("supply:"), HasSubstr("it may be ON")));
-  }
+  EXPECT_THAT([&] { (void)run(); },
+              ThrowsMessage<SafetyStop>(testing::AllOf(testing::StartsWith("supply:"), HasSubstr("it may be ON"))))
+      << "nobody missed the supply";
   bench_->wait_until(bench_->clock().now() + std::chrono::milliseconds(200));
   EXPECT_EQ(bench_->simulation().motor().stage().mode, sim::PowerStage::Mode::coast);
 }

@@ -10,7 +10,8 @@ namespace kphi::daq {
 
 class WrappedBench : public Bench {
  public:
-  explicit WrappedBench(const profiles::BenchConfig& config) : bench(config) {}
+  explicit WrappedBench(const profiles::BenchConfig& config, const sim::BenchSettings& other = {})
+      : bench(config, other) {}
   [[nodiscard]] const Clock& clock() const override { return bench.clock(); }
   [[nodiscard]] MotorLink& motor() override { return bench.motor(); }
   [[nodiscard]] LoadCellLink& load_cell() override { return bench.load_cell(); }
@@ -20,7 +21,7 @@ class WrappedBench : public Bench {
   [[nodiscard]] bool switch_off_power() override { return bench.switch_off_power(); }
   void restore_power() override { bench.restore_power(); }
   void mounted(const std::string& propeller, double occlusion) override { bench.mounted(propeller, occlusion); }
-  [[nodiscard]] std::unique_ptr<Background> run_periodically(std::function<void()> work) override {
+  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()> work) override {
     return bench.run_periodically(std::move(work));
   }
   void wait_until(Instant when) override { bench.wait_until(when); }

@@ -46,7 +46,7 @@ class HangingRunner : public testing::Test {
   /// Records a run whose runner hangs once the motor turns, until release().
   void record() {
     run_ = std::async(std::launch::async, [this]() -> std::string {
-      daq::NoProgress progress;
+      daq::Progress progress;
       try {
         (void)daq::record_run(*bench_, test::first_run(campaign_, place_, simulation_.path("run.h5")), progress,
                               [this] {

@@ -13,13 +13,6 @@
 namespace kphi::test {
 namespace {
 
-class Silence final : public daq::Progress {
- public:
-  void tick(const daq::Position&, const daq::Observation&) override {}
-  void step_done(const daq::Position&, const daq::Observation&) override {}
-  void say(const std::string&) override {}
-};
-
 /// Pa, at 20 °C and half the humidity that the air can hold.
 double pressure_of(double kg_m3) {
   double low = ambient::kLowestPressure, high = ambient::kHighestPressure;
@@ -70,7 +63,7 @@ fit::Identification identified_in(double kg_m3) {
   daq::DeterministicBench bench(config, quiet());
   const auto results = results::CampaignFolder::create(folder.path(), "u", "c");
   daq::AutoConfirmOperator person;
-  Silence silence;
+  daq::Progress silence;
   (void)daq::run_campaign(bench, campaign, config, results, person, silence, [] { return false; });
   return fit::identify(results::read_steps(results.steps()));
 }
@@ -78,13 +71,14 @@ fit::Identification identified_in(double kg_m3) {
 TEST(StandardAir, GivesTheSamePropellerTheSameCoefficientsInAnyAir) {
   const fit::Identification thin = identified_in(1.10), dense = identified_in(1.25);
   ASSERT_TRUE(thin.air && dense.air);
-  EXPECT_NEAR(thin.air->kg_m3, 1.10, 1e-9);
-  EXPECT_NEAR(dense.air->kg_m3, 1.25, 1e-9);
+  EXPECT_NEAR(thin.air->value, 1.10, 1e-9);
+  EXPECT_NEAR(dense.air->value, 1.25, 1e-9);
   ASSERT_EQ(thin.table.size(), 3u);
   for (std::size_t i = 0; i < thin.table.size(); ++i) {
     EXPECT_NEAR(dense.table[i].k / thin.table[i].k, 1.25 / 1.10, 1e-6);
     ASSERT_TRUE(thin.table[i].standard && dense.table[i].standard);
-    EXPECT_NEAR(dense.table[i].standard->k / thin.table[i].standard->k, 1, 1e-6) << thin.table[i].phi_deg << "°";
+    EXPECT_NEAR(dense.table[i].standard->value / thin.table[i].standard->value, 1, 1e-6)
+        << thin.table[i].phi_deg << "°";
   }
 }
 

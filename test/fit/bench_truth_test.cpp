@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "daq/campaign/campaign_run.hpp"
-#include "daq/virtual/deterministic_bench.hpp"
 #include "drivers/sim/physics/truth.hpp"
 #include "fit/model/identification.hpp"
 #include "fit/model/torque_power.hpp"
@@ -14,16 +13,12 @@
 #include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
+#include "test/daq/wrapped_bench.hpp"
 
 namespace kphi::fit {
 namespace {
 
 constexpr double kClockError = 0.005;
-
-class WillingOperator final : public daq::Operator {
- public:
-  void mount(const profiles::Propeller&, double, const std::string&) override {}
-};
 
 struct TimedSample {
   double t_s = 0;  ///< bench time
@@ -31,33 +26,17 @@ struct TimedSample {
 };
 
 /// The deterministic bench, which is looked at every half a millisecond while it runs.
-class WatchedBench final : public daq::Bench {
+class WatchedBench final : public daq::WrappedBench {
  public:
-  explicit WatchedBench(daq::DeterministicBench& bench) : bench_(bench) {}
-  const Clock& clock() const override { return bench_.clock(); }
-  daq::MotorLink& motor() override { return bench_.motor(); }
-  daq::LoadCellLink& load_cell() override { return bench_.load_cell(); }
+  using WrappedBench::WrappedBench;
   void wait_until(Instant when) override {
     constexpr Duration kLook = std::chrono::microseconds(500);
     for (Instant next = clock().now() + kLook; clock().now() < when; next += kLook) {
-      bench_.wait_until(std::min(next, when));
-      shaft.push_back({to_seconds(clock().now()), bench_.simulation().plant().motor().speed});
+      bench.wait_until(std::min(next, when));
+      shaft.push_back({to_seconds(clock().now()), bench.simulation().plant().motor().speed});
     }
   }
-  std::unique_ptr<daq::Background> run_periodically(std::function<void()> work) override {
-    return bench_.run_periodically(std::move(work));
-  }
-  results::FileLayer& files() override { return bench_.files(); }
-  Duration sync_interval() const override { return bench_.sync_interval(); }
-  [[nodiscard]] bool switch_off_power() override { return bench_.switch_off_power(); }
-  void restore_power() override { bench_.restore_power(); }
-  void mounted(const std::string& propeller_id, double occlusion_deg) override {
-    bench_.mounted(propeller_id, occlusion_deg);
-  }
   std::vector<TimedSample> shaft;  ///< true speeds, rad/s
-
- private:
-  daq::DeterministicBench& bench_;
 };
 
 struct Recorded {
@@ -72,13 +51,12 @@ Recorded record(const std::string& occlusions, int repetitions, const sim::Plant
   sim::BenchSettings settings;
   settings.oscillator_gain = kClockError;
   settings.plant = plant;
-  daq::DeterministicBench simulated(config, settings);
-  WatchedBench bench(simulated);
+  WatchedBench bench(config, settings);
   auto text = test::short_campaign_text(occlusions, repetitions, 12);
   text.replace(text.find("dwell_s: 0.6"), 12, "dwell_s: 0.8");
   auto results = results::CampaignFolder::create(folder.path(), "20210530T000000Z", "short");
-  WillingOperator person;
-  daq::NoProgress progress;
+  daq::AutoConfirmOperator person;
+  daq::Progress progress;
   (void)daq::run_campaign(bench, profiles::parse_campaign(text, "short.yaml"), config, results, person, progress,
                           [] { return false; });
   Recorded recorded{{}, std::move(bench.shaft)};

@@ -22,18 +22,6 @@ namespace {
 
 using ::testing::HasSubstr;
 
-class Silence final : public daq::Progress {
- public:
-  void tick(const daq::Position&, const daq::Observation&) override {}
-  void step_done(const daq::Position&, const daq::Observation&) override {}
-  void say(const std::string&) override {}
-};
-
-class WillingOperator final : public daq::Operator {
- public:
-  void mount(const profiles::Propeller&, double, const std::string&) override {}
-};
-
 void replace(std::string& text, const std::string& from, const std::string& to) {
   ASSERT_NE(text.find(from), std::string::npos) << from;
   text.replace(text.find(from), from.size(), to);
@@ -58,8 +46,8 @@ FamilyMember measured(const std::string& name, int seed) {
   const profiles::BenchConfig config = test::deterministic_config(seed);
   daq::DeterministicBench bench(config, sim::BenchSettings{});
   const auto results = results::CampaignFolder::create(folder.path(), "20210530T000000Z", name);
-  WillingOperator person;
-  Silence silence;
+  daq::AutoConfirmOperator person;
+  daq::Progress silence;
   (void)daq::run_campaign(bench, shortened(name), config, results, person, silence, [] { return false; });
   FamilyMember member;
   member.identification = identify(results::read_steps(results.steps()));

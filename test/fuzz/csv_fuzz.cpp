@@ -5,7 +5,6 @@
 #include <string_view>
 
 #include "base/error.hpp"
-#include "fit/logs/coefficient_table.hpp"
 #include "fit/logs/import_table.hpp"
 #include "fit/logs/stand_log.hpp"
 #include "results/steps_csv.hpp"

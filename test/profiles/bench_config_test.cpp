@@ -71,17 +71,28 @@ TEST(BenchConfig, KnowsSixThrustAxes) {
                           "one of +Fx, -Fx, +Fy, -Fy, +Fz, -Fz"));
 }
 
-TEST(BenchConfig, HoldsPortsAndIdentifiers) {
-  EXPECT_THAT(refused("50000", "0"), ElementsAre("5:13: netbox.rdt_port: 0 is below 1; write a value from 1 to 65535"));
-  EXPECT_THAT(refused("8080", "65536"),
-              ElementsAre("6:14: netbox.http_port: 65536 is above 65535; write a value from 1 to 65535"));
-  EXPECT_THAT(refused("module_id: 7", "module_id: 63"),
-              ElementsAre("12:14: iq.module_id: 63 is above 62; write a value from 0 to 62"));
-  EXPECT_THAT(refused("module_id: 7", "module_id: -1"), ElementsAre(StartsWith("12:14: iq.module_id: -1 is below 0")));
-  EXPECT_THAT(refused("datagram: 20", "datagram: 41"),
-              ElementsAre(StartsWith("8:25: netbox.records_per_datagram: 41 is above 40")));
-  EXPECT_THAT(refused("3500", "7001"),
-              ElementsAre("7:12: netbox.rate_hz: 7001 is above 7000 Hz; write a value from 1 to 7000 Hz"));
+TEST(BenchConfig, EachMistakeEarnsItsRefusal) {
+  expect_refusals(refused,
+                  {// Holds ports and identifiers
+                   {"50000", "0", "5:13: netbox.rdt_port: 0 is below 1; write a value from 1 to 65535"},
+                   {"8080", "65536", "6:14: netbox.http_port: 65536 is above 65535; write a value from 1 to 65535"},
+                   {"module_id: 7", "module_id: 63", "12:14: iq.module_id: 63 is above 62; write a value from 0 to 62"},
+                   {"module_id: 7", "module_id: -1", "12:14: iq.module_id: -1 is below 0…"},
+                   {"datagram: 20", "datagram: 41", "8:25: netbox.records_per_datagram: 41 is above 40…"},
+                   {"3500", "7001", "7:12: netbox.rate_hz: 7001 is above 7000 Hz; write a value from 1 to 7000 Hz"},
+                   // Simulates in process without a control line only
+                   {"  control: /tmp/control\n", "",
+                    "18:3: simulation: control is missing; add control: a path for the socket, or in_process: true"},
+                   {"  control: /tmp/control\n", "  in_process: true\n", ""},
+                   {"seed: 5", "seed: -5", "19:9: simulation.seed: -5 is below 0…"},
+                   {"time_scale: 20", "time_scale: 0", "18:15: simulation.time_scale: 0 is below 0.1…"},
+                   {"  seed: 5\n", "  in_process: yes\n", "19:15: yes is a boolean to some…"},
+                   // Names the key that was meant
+                   {"  baud:", "  baud_rate:", "11:3: baud_rate is not a key of iq; known here: baud,…"},
+                   {"rdt_port", "rtd_port", "5:3: rtd_port is not a key of netbox; did you mean rdt_port?"},
+                   {"speed_max_rpm", "speed_max_rad_s",
+                    "15:3: speed_max_rad_s is not a key of iq; the unit is part of the key: write speed_max_rpm and "
+                    "the value in RPM"}});
 }
 
 TEST(BenchConfig, KnowsWhereTheBoxSpeaksTcp) {
@@ -183,18 +194,6 @@ TEST(BenchConfig, PutsTheCaptureOfTheMotorsLineBesideItself) {
             "folder/line.iq");
 }
 
-TEST(BenchConfig, SimulatesInProcessWithoutAControlLineOnly) {
-  EXPECT_THAT(
-      refused("  control: /tmp/control\n", ""),
-      ElementsAre("18:3: simulation: control is missing; add control: a path for the socket, or in_process: true"));
-  EXPECT_THAT(refused("  control: /tmp/control\n", "  in_process: true\n"), IsEmpty());
-  EXPECT_THAT(refused("seed: 5", "seed: -5"), ElementsAre(StartsWith("19:9: simulation.seed: -5 is below 0")));
-  EXPECT_THAT(refused("time_scale: 20", "time_scale: 0"),
-              ElementsAre(StartsWith("18:15: simulation.time_scale: 0 is below 0.1")));
-  EXPECT_THAT(refused("  seed: 5\n", "  in_process: yes\n"),
-              ElementsAre(StartsWith("19:15: yes is a boolean to some")));
-}
-
 std::vector<std::string> refused_air(const std::string& ambient) {
   return refusals([&] { return parse_bench(kBenchText + ambient, "b.yaml"); });
 }
@@ -242,35 +241,21 @@ TEST(BenchConfig, WantsAirByHandWholeWithUncertaintiesAndInItsUnits) {
   const auto changed_air = [](const std::string& from, const std::string& to) {
     return refused_air(changed(kManualAir, from, to));
   };
-  EXPECT_THAT(
-      changed_air("    u_pressure_pa: 100\n", ""),
-      ElementsAre("22:3: ambient.manual.u_pressure_pa is missing; add the key u_pressure_pa (standard uncertainty "
-                  "of pressure_pa)"));
-  EXPECT_THAT(changed_air("pressure_pa: 98700", "pressure_hpa: 987"),
-              ElementsAre("24:5: pressure_hpa is not a key of ambient.manual; the unit is part of the key: write "
-                          "pressure_pa and the value in Pa"));
-  EXPECT_THAT(
-      changed_air("98700", "987"),
-      ElementsAre("24:18: ambient.manual.pressure_pa: 987 is below 50000 Pa; write a value from 50000 to 110000 "
-                  "Pa"));
-  EXPECT_THAT(changed_air("0.45", "45"),
-              ElementsAre(StartsWith("25:24: ambient.manual.relative_humidity: 45 is above 1")));
-  EXPECT_THAT(changed_air("temperature_c: 21.5", "temperature_c: 294.6"),
-              ElementsAre(StartsWith("23:20: ambient.manual.temperature_c: 294.6 is above 60 °C")));
-  EXPECT_THAT(changed_air("u_temperature_c: 0.5", "u_temperature_c: 0"),
-              ElementsAre(StartsWith("26:22: ambient.manual.u_temperature_c: 0 is not above 0")));
+  expect_refusals(
+      changed_air,
+      {{"    u_pressure_pa: 100\n", "",
+        "22:3: ambient.manual.u_pressure_pa is missing; add the key u_pressure_pa (standard uncertainty "
+        "of pressure_pa)"},
+       {"pressure_pa: 98700", "pressure_hpa: 987",
+        "24:5: pressure_hpa is not a key of ambient.manual; the unit is part of the key: write "
+        "pressure_pa and the value in Pa"},
+       {"98700", "987",
+        "24:18: ambient.manual.pressure_pa: 987 is below 50000 Pa; write a value from 50000 to 110000 "
+        "Pa"},
+       {"0.45", "45", "25:24: ambient.manual.relative_humidity: 45 is above 1…"},
+       {"temperature_c: 21.5", "temperature_c: 294.6", "23:20: ambient.manual.temperature_c: 294.6 is above 60 °C…"},
+       {"u_temperature_c: 0.5", "u_temperature_c: 0", "26:22: ambient.manual.u_temperature_c: 0 is not above 0…"}});
   EXPECT_EQ(refused_air("ambient: {}\n").size(), 1u);
-}
-
-TEST(BenchConfig, NamesTheKeyThatWasMeant) {
-  EXPECT_THAT(refused("  baud:", "  baud_rate:"),
-              ElementsAre(StartsWith("11:3: baud_rate is not a key of iq; known here: baud,")));
-  EXPECT_THAT(refused("rdt_port", "rtd_port"),
-              ElementsAre("5:3: rtd_port is not a key of netbox; did you mean rdt_port?"));
-  EXPECT_THAT(
-      refused("speed_max_rpm", "speed_max_rad_s"),
-      ElementsAre("15:3: speed_max_rad_s is not a key of iq; the unit is part of the key: write speed_max_rpm and "
-                  "the value in RPM"));
 }
 
 std::string with_power(const std::string& more) {

@@ -112,27 +112,46 @@ TEST(StepProfile, EndsExactlyForEveryNumberOfSteps) {
   }
 }
 
-TEST(Campaign, RefusesSpeedsAboveItsOwnLimit) {
-  EXPECT_THAT(
-      refused("last_rpm: 19100", "last_rpm: 25000"),
-      ElementsAre("15:13: profile.last_rpm: 25000 is above 19100 RPM (limits.speed_max_rpm); lower it, or raise "
-                  "the limit if propeller and motor tolerate it"));
-  EXPECT_THAT(refused("first_rpm: 100", "first_rpm: 19101"),
-              ElementsAre(StartsWith("14:14: profile.first_rpm: 19101 is above")));
-}
-
-TEST(Campaign, RefusesDwellsThatLeaveNothingToAverage) {
-  EXPECT_THAT(
-      refused("dwell_s: 2.0", "dwell_s: 0.5"),
-      ElementsAre("13:12: profile.dwell_s: 0.5 is not above 0.5 s (minimum_discard_s); dwell longer, or nothing "
-                  "is left to average"));
-  EXPECT_THAT(refused("dwell_s: 2.0", "dwell_s: 0.51"), IsEmpty());
-}
-
-TEST(Campaign, RefusesAnOcclusionListedTwice) {
-  EXPECT_THAT(refused("[0, 45, 90]", "[0, 45, 45.0]"),
-              ElementsAre("9:25: occlusions_deg[2]: 45° is already listed at [1]; list each occlusion once; "
-                          "repetitions sets how often it is run"));
+TEST(Campaign, EachMistakeEarnsItsRefusal) {
+  expect_refusals(
+      refused,
+      {// Refuses speeds above its own limit
+       {"last_rpm: 19100", "last_rpm: 25000",
+        "15:13: profile.last_rpm: 25000 is above 19100 RPM (limits.speed_max_rpm); lower it, or raise "
+        "the limit if propeller and motor tolerate it"},
+       {"first_rpm: 100", "first_rpm: 19101", "14:14: profile.first_rpm: 19101 is above…"},
+       // Refuses dwells that leave nothing to average
+       {"dwell_s: 2.0", "dwell_s: 0.5",
+        "13:12: profile.dwell_s: 0.5 is not above 0.5 s (minimum_discard_s); dwell longer, or nothing "
+        "is left to average"},
+       {"dwell_s: 2.0", "dwell_s: 0.51", ""},
+       // Refuses an occlusion listed twice
+       {"[0, 45, 90]", "[0, 45, 45.0]",
+        "9:25: occlusions_deg[2]: 45° is already listed at [1]; list each occlusion once; "
+        "repetitions sets how often it is run"},
+       // Says which values are allowed
+       {"steps: 4", "steps: 2000", "12:10: profile.steps: 2000 is above 1000; write a value from 2 to 1000"},
+       {"dwell_s: 2.0", "dwell_s: 0",
+        "13:12: profile.dwell_s: 0 is not above 0 s; write a value from above 0 to 600 s"},
+       {"blades: 3", "blades: 1", "8:11: propeller.blades: 1 is below 2; write a value from 2 to 8"},
+       // Names the key that was meant
+       {"steps: 4", "stesp: 4", "12:3: stesp is not a key of profile; did you mean steps?"},
+       {"repetitions", "repetitons", "10:1: repetitons is not a key; did you mean repetitions?"},
+       // Says that the unit is part of the key
+       {"dwell_s: 2.0", "dwell_ms: 2000",
+        "13:3: dwell_ms is not a key of profile; the unit is part of the key: write dwell_s and the "
+        "value in s"},
+       {"last_rpm", "last",
+        "15:3: last is not a key of profile; the unit is part of the key: write last_rpm and the value "
+        "in RPM"},
+       {"dwell_s: 2.0", "dwell_s: 2 s",
+        "13:12: profile.dwell_s: expected a number, found text \"2 s\"; write the number alone, in s"},
+       // Says where a key belongs
+       {"zero_s: 3.0\n", "zero_s: 3.0\nthrust_max_n: 3\n", "17:1: thrust_max_n is not a key; it belongs to limits"},
+       {"  steps: 4\n", "  steps: 4\n  zero_s: 3\n",
+        "13:3: zero_s is not a key of profile; it belongs to the top of the file"},
+       {"  steps: 4\n", "  steps: 4\n  colour: red\n",
+        "13:3: colour is not a key of profile; known here: dwell_s, first_rpm, last_rpm, slew_rpm_s, steps"}});
 }
 
 TEST(Campaign, RefusesOcclusionsOutsideTheCircle) {
@@ -219,44 +238,6 @@ TEST(Campaign, ReadsTheOptionalLimitsInTheirUnits) {
       ElementsAre(
           "21:25: limits.supply_voltage_max_v: 12 V is not above the 12 V of supply_v; raise it: the motor would "
           "never turn"));
-}
-
-TEST(Campaign, SaysWhichValuesAreAllowed) {
-  EXPECT_THAT(refused("steps: 4", "steps: 2000"),
-              ElementsAre("12:10: profile.steps: 2000 is above 1000; write a value from 2 to 1000"));
-  EXPECT_THAT(refused("dwell_s: 2.0", "dwell_s: 0"),
-              ElementsAre("13:12: profile.dwell_s: 0 is not above 0 s; write a value from above 0 to 600 s"));
-  EXPECT_THAT(refused("blades: 3", "blades: 1"),
-              ElementsAre("8:11: propeller.blades: 1 is below 2; write a value from 2 to 8"));
-}
-
-TEST(Campaign, NamesTheKeyThatWasMeant) {
-  EXPECT_THAT(refused("steps: 4", "stesp: 4"), ElementsAre("12:3: stesp is not a key of profile; did you mean steps?"));
-  EXPECT_THAT(refused("repetitions", "repetitons"),
-              ElementsAre("10:1: repetitons is not a key; did you mean repetitions?"));
-}
-
-TEST(Campaign, SaysThatTheUnitIsPartOfTheKey) {
-  EXPECT_THAT(refused("dwell_s: 2.0", "dwell_ms: 2000"),
-              ElementsAre("13:3: dwell_ms is not a key of profile; the unit is part of the key: write dwell_s and the "
-                          "value in s"));
-  EXPECT_THAT(
-      refused("last_rpm", "last"),
-      ElementsAre("15:3: last is not a key of profile; the unit is part of the key: write last_rpm and the value "
-                  "in RPM"));
-  EXPECT_THAT(
-      refused("dwell_s: 2.0", "dwell_s: 2 s"),
-      ElementsAre("13:12: profile.dwell_s: expected a number, found text \"2 s\"; write the number alone, in s"));
-}
-
-TEST(Campaign, SaysWhereAKeyBelongs) {
-  EXPECT_THAT(refused("zero_s: 3.0\n", "zero_s: 3.0\nthrust_max_n: 3\n"),
-              ElementsAre("17:1: thrust_max_n is not a key; it belongs to limits"));
-  EXPECT_THAT(refused("  steps: 4\n", "  steps: 4\n  zero_s: 3\n"),
-              ElementsAre("13:3: zero_s is not a key of profile; it belongs to the top of the file"));
-  EXPECT_THAT(
-      refused("  steps: 4\n", "  steps: 4\n  colour: red\n"),
-      ElementsAre("13:3: colour is not a key of profile; known here: dwell_s, first_rpm, last_rpm, slew_rpm_s, steps"));
 }
 
 TEST(Campaign, RefusesMissingKeysAtTheObjectThatLacksThem) {

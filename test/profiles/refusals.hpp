@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "profiles/yaml_text.hpp"
+#include "profiles/strict_yaml.hpp"
 #include "test/source_dir.hpp"
 
 namespace kphi::profiles {
@@ -28,6 +28,21 @@ inline std::string changed(std::string text, const std::string& from, const std:
   const auto at = text.find(from);
   EXPECT_NE(at, std::string::npos) << "the text has no \"" << from << '"';
   return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+/// A change, and the one refusal that it earns; "…" at the end: whatever follows; empty: none.
+struct Earned {
+  std::string from, to, refusal;
+};
+
+template <class Refused>
+void expect_refusals(const Refused& refused, const std::vector<Earned>& changes) {
+  for (const auto& [from, to, refusal] : changes) {
+    const std::vector<std::string> found = refused(from, to);
+    const std::size_t open = refusal.find("…");
+    ASSERT_EQ(found.size(), refusal.empty() ? 0u : 1u) << from << " -> " << to;
+    EXPECT_EQ(refusal.empty() ? "" : found[0].substr(0, open), refusal.substr(0, open)) << from << " -> " << to;
+  }
 }
 
 inline std::string shipped(const std::string& name) { return kphi::test::source_dir() + "/profiles/" + name; }

@@ -173,24 +173,12 @@ TEST(Schemas, DescribeEveryKey) {
 
 /// One small act of vandalism. Pieces of YAML hurt more than random bytes do.
 std::string damaged(std::string text, std::mt19937_64& random) {
-  static const std::vector<std::string> kPieces{"[",        "]",
-                                                "{",        "}",
-                                                ":",        ": ",
-                                                "- ",       "\n",
-                                                "  ",       "\t",
-                                                "&a ",      "*a",
-                                                "!!x ",     "#",
-                                                "'",        "\"",
-                                                "|\n",      ">",
-                                                "? ",       "---\n",
-                                                "...\n",    "%YAML 9\n",
-                                                "010",      "no",
-                                                ".nan",     "1e999",
-                                                "~",        "\xC3\xA9",
-                                                "\xFF",     "<<: ",
-                                                "\r",       "\\",
-                                                "-",        "9999999999999999999999",
-                                                "format: ", "\x00"};
+  static const std::vector<std::string> kPieces{// structure
+                                                "[", "]", "{", "}", ":", ": ", "- ", "\n", "  ", "\t", "&a ", "*a",
+                                                "!!x ", "#", "'", "\"", "|\n", ">", "? ", "---\n", "...\n", "%YAML 9\n",
+                                                // values
+                                                "010", "no", ".nan", "1e999", "~", "\xC3\xA9", "\xFF", "<<: ", "\r",
+                                                "\\", "-", "9999999999999999999999", "format: ", "\x00"};
   const auto below = [&](std::size_t n) { return std::uniform_int_distribution<std::size_t>(0, n - 1)(random); };
   const std::size_t at = below(text.size());
   switch (below(5)) {

@@ -44,19 +44,29 @@ TEST(Vehicle, HasOneArmPerCornerInOrderUnlessItSaysOtherwise) {
               ElementsAre("6:30: hinge_turn_deg[3]: 271 is not allowed; write one of 0, 90, 180, 270"));
 }
 
-TEST(Vehicle, RefusesShapesThatTheServosCannotReach) {
-  EXPECT_THAT(refused("165.676, 180]", "180.5, 180]"),
-              ElementsAre("9:17: shapes_deg.O[2]: 180.5 is outside -90 to 180 degrees (arm_angle_min_deg, "
-                          "arm_angle_max_deg); the servo cannot go there; fix the angle or the range"));
-}
-
-TEST(Vehicle, RefusesShapesWithoutFourArms) {
-  EXPECT_THAT(refused("[45, 45, 45, 45]", "[45, 45, 45]"),
-              ElementsAre("8:6: shapes_deg.X: 3 values; write at least 4"));
-  EXPECT_THAT(refused("[45, 45, 45, 45]", "[45, 45, 45, 45, 45]"),
-              ElementsAre("8:6: shapes_deg.X: 5 values; write at most 4"));
-  EXPECT_THAT(refused("  X: [45, 45, 45, 45]\n  O: [180, 180, 165.676, 180]\n", "  {}\n"),
-              ElementsAre(StartsWith("8:3: shapes_deg: no keys; write at least 1")));
+TEST(Vehicle, EachMistakeEarnsItsRefusal) {
+  expect_refusals(
+      refused, {// Refuses shapes that the servos cannot reach
+                {"165.676, 180]", "180.5, 180]",
+                 "9:17: shapes_deg.O[2]: 180.5 is outside -90 to 180 degrees (arm_angle_min_deg, "
+                 "arm_angle_max_deg); the servo cannot go there; fix the angle or the range"},
+                // Refuses shapes without four arms
+                {"[45, 45, 45, 45]", "[45, 45, 45]", "8:6: shapes_deg.X: 3 values; write at least 4"},
+                {"[45, 45, 45, 45]", "[45, 45, 45, 45, 45]", "8:6: shapes_deg.X: 5 values; write at most 4"},
+                {"  X: [45, 45, 45, 45]\n  O: [180, 180, 165.676, 180]\n", "  {}\n",
+                 "8:3: shapes_deg: no keys; write at least 1…"},
+                // Refuses arms shorter than the propeller
+                {"0.117", "0.0635", "4:15: arm_length_m: 0.0635 is not above 0.0635 m (propeller_radius_m)…"},
+                // Wants metres in the key
+                {"half_side_m: 0.045", "half_side_mm: 45",
+                 "3:1: half_side_mm is not a key; the unit is part of the key: write half_side_m and the value in m"},
+                {"half_side_m: 0.045", "half_side_m: 45",
+                 "3:14: half_side_m: 45 is above 10 m; write a value from above 0 to 10 m"},
+                // Refuses a file of another kind with one line
+                {"kphi-vehicle/1", "kphi-coefficients/1",
+                 "1:9: this is a coefficients file, expected a vehicle file; name a file that begins with "
+                 "format: kphi-vehicle/1"},
+                {"kphi-vehicle/1", "kphi-vehicel/1", "1:9: format: text \"kphi-vehicel/1\" is not allowed…"}});
 }
 
 TEST(Vehicle, RefusesRangesThatAreEmpty) {
@@ -64,19 +74,6 @@ TEST(Vehicle, RefusesRangesThatAreEmpty) {
               ElementsAre("13:16: speed_max_rpm: 19100 is not above 19100 (speed_min_rpm); swap or fix the two"));
   EXPECT_THAT(refused("arm_angle_max_deg: 180", "arm_angle_max_deg: -91"),
               testing::Contains(StartsWith("11:20: arm_angle_max_deg: -91 is not above -90")));
-}
-
-TEST(Vehicle, RefusesArmsShorterThanThePropeller) {
-  EXPECT_THAT(refused("0.117", "0.0635"),
-              ElementsAre(StartsWith("4:15: arm_length_m: 0.0635 is not above 0.0635 m (propeller_radius_m)")));
-}
-
-TEST(Vehicle, WantsMetresInTheKey) {
-  EXPECT_THAT(
-      refused("half_side_m: 0.045", "half_side_mm: 45"),
-      ElementsAre("3:1: half_side_mm is not a key; the unit is part of the key: write half_side_m and the value in m"));
-  EXPECT_THAT(refused("half_side_m: 0.045", "half_side_m: 45"),
-              ElementsAre("3:14: half_side_m: 45 is above 10 m; write a value from above 0 to 10 m"));
 }
 
 const std::string kBodyText =
@@ -129,12 +126,12 @@ TEST(Vehicle, RefusesABodyThatIsNotConvexOrGoesClockwise) {
   const auto refusals_of = [](const std::string& from, const std::string& to) {
     return refusals([&] { return parse_vehicle(changed(vehicle_with_body(), from, to), "v"); });
   };
-  EXPECT_THAT(refusals_of("[-0.1, 0.03], [-0.1, -0.03]", "[-0.1, -0.03], [-0.1, 0.03]"),
-              ElementsAre(StartsWith("4:14: body.corners_m: not the corners of a convex body")));
-  EXPECT_THAT(refusals_of(", [-0.1, 0.03], [-0.1, -0.03], [0.1, -0.03]", ", [-0.1, 0.03]"),
-              ElementsAre(StartsWith("4:14: body.corners_m: 2 values; write at least 3")));
-  EXPECT_THAT(refusals_of("    - {x_m: -0.1, y_m: -0.03, turn_deg: 180}\n", ""),
-              ElementsAre(StartsWith("6:5: body.hinges: 3 values; write at least 4")));
+  expect_refusals(refusals_of, {{"[-0.1, 0.03], [-0.1, -0.03]", "[-0.1, -0.03], [-0.1, 0.03]",
+                                 "4:14: body.corners_m: not the corners of a convex body…"},
+                                {", [-0.1, 0.03], [-0.1, -0.03], [0.1, -0.03]", ", [-0.1, 0.03]",
+                                 "4:14: body.corners_m: 2 values; write at least 3…"},
+                                {"    - {x_m: -0.1, y_m: -0.03, turn_deg: 180}\n", "",
+                                 "6:5: body.hinges: 3 values; write at least 4…"}});
 }
 
 const std::string kFlightText =
@@ -192,40 +189,28 @@ TEST(Vehicle, NeedsNoneOfItForAnythingElse) {
 }
 
 TEST(Vehicle, RefusesMassesAndGainsThatCannotBe) {
-  EXPECT_THAT(refused_in_flight("mass_kg: 0.6\n", "mass_kg: 0.18\n"),
-              ElementsAre("16:16: dynamics.hub_mass_kg: four times 0.045 kg leave nothing of 0.18 kg (mass_kg) for the "
-                          "body; mass_kg is the mass of the whole vehicle, hub_mass_kg of one arm's end"));
-  EXPECT_THAT(
-      refused_in_flight("  mass_kg: 0.6\n", "  mass_g: 600\n"),
-      ElementsAre(StartsWith("15:3: mass_g is not a key of dynamics; the unit is part of the key: write mass_kg")));
-  EXPECT_THAT(refused_in_flight("[1, -1, 1, -1]", "[1, -1, 2, -1]"),
-              ElementsAre(StartsWith("22:24: dynamics.rotor_spins[2]: 2 is not allowed")));
-  EXPECT_THAT(refused_in_flight("[6, 6, 15]", "[6, 6]"),
-              ElementsAre(StartsWith("24:25: control.position_gain_per_s2: 2 values; write at least 3")));
-  EXPECT_THAT(refused_in_flight("[6, 6, 15]", "[6, 6, 0]"),
-              ElementsAre(StartsWith("24:32: control.position_gain_per_s2[2]: 0 is not above 0")));
-  EXPECT_THAT(refused_in_flight("  rotor_lag_s: 0.033\n", ""),
-              ElementsAre(StartsWith("14:1: dynamics.rotor_lag_s is missing")));
+  expect_refusals(refused_in_flight,
+                  {{"mass_kg: 0.6\n", "mass_kg: 0.18\n",
+                    "16:16: dynamics.hub_mass_kg: four times 0.045 kg leave nothing of 0.18 kg (mass_kg) for the "
+                    "body; mass_kg is the mass of the whole vehicle, hub_mass_kg of one arm's end"},
+                   {"  mass_kg: 0.6\n", "  mass_g: 600\n",
+                    "15:3: mass_g is not a key of dynamics; the unit is part of the key: write mass_kg…"},
+                   {"[1, -1, 1, -1]", "[1, -1, 2, -1]", "22:24: dynamics.rotor_spins[2]: 2 is not allowed…"},
+                   {"[6, 6, 15]", "[6, 6]", "24:25: control.position_gain_per_s2: 2 values; write at least 3…"},
+                   {"[6, 6, 15]", "[6, 6, 0]", "24:32: control.position_gain_per_s2[2]: 0 is not above 0…"},
+                   {"  rotor_lag_s: 0.033\n", "", "14:1: dynamics.rotor_lag_s is missing…"}});
 }
 
 TEST(Vehicle, HasABodyThatIsAPlateOrTellsItsInertia) {
   const std::string plate = "body_height_m: 0.04\n", told = "body_inertia_kg_m2: [1e-3, 1e-3, 1.8e-3]\n";
   const auto text = changed(kVehicleText + kFlightText, plate, told);
   EXPECT_THAT(*parse_vehicle(text, "v").dynamics->body_inertia, ElementsAre(1e-3, 1e-3, 1.8e-3));
-  EXPECT_THAT(refused_in_flight("  " + plate, ""),
-              ElementsAre(StartsWith("15:3: dynamics: neither body_height_m nor body_inertia_kg_m2")));
-  EXPECT_THAT(refused_in_flight(plate, plate + "  " + told),
-              ElementsAre(StartsWith("18:23: dynamics.body_inertia_kg_m2: given together with body_height_m")));
-  EXPECT_THAT(refused_in_flight(plate, "body_inertia_kg_m2: [1e-3, 1e-3, 2.1e-3]\n"),
-              ElementsAre(StartsWith("17:36: dynamics.body_inertia_kg_m2[2]: 0.0021 is more than the other two")));
-}
-
-TEST(Vehicle, RefusesAFileOfAnotherKindWithOneLine) {
-  EXPECT_THAT(refused("kphi-vehicle/1", "kphi-coefficients/1"),
-              ElementsAre("1:9: this is a coefficients file, expected a vehicle file; name a file that begins with "
-                          "format: kphi-vehicle/1"));
-  EXPECT_THAT(refused("kphi-vehicle/1", "kphi-vehicel/1"),
-              ElementsAre(StartsWith("1:9: format: text \"kphi-vehicel/1\" is not allowed")));
+  expect_refusals(
+      refused_in_flight,
+      {{"  " + plate, "", "15:3: dynamics: neither body_height_m nor body_inertia_kg_m2…"},
+       {plate, plate + "  " + told, "18:23: dynamics.body_inertia_kg_m2: given together with body_height_m…"},
+       {plate, "body_inertia_kg_m2: [1e-3, 1e-3, 2.1e-3]\n",
+        "17:36: dynamics.body_inertia_kg_m2[2]: 0.0021 is more than the other two…"}});
 }
 
 TEST(Vehicle, HasOneBody) {

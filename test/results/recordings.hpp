@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <exception>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -27,6 +28,17 @@ inline bool same(const PhaseMark& a, const PhaseMark& b) {
 template <class Row>
 bool same_rows(const std::vector<Row>& a, const std::vector<Row>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Row& x, const Row& y) { return same(x, y); });
+}
+
+/// What the error that `action` throws says; other errors pass.
+template <class Expected = std::exception, class Action>
+std::string error_of(Action&& action) {
+  try {
+    action();
+  } catch (const Expected& error) {
+    return error.what();
+  }
+  return "no error";
 }
 
 /// Of all that a run file says in attributes.

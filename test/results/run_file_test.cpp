@@ -22,6 +22,7 @@ namespace kphi::results {
 namespace {
 
 using test::digest;
+using test::error_of;
 using test::make_run;
 using test::same_rows;
 using test::TemporaryFolder;
@@ -32,14 +33,16 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-template <class Action>
-std::string error_of(Action&& action) {
-  try {
-    action();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "no error";
+/// The columns of a run file hold what its records hold.
+void expect_same_columns(const std::filesystem::path& path) {
+  const RunFile file = open_run(path);
+  const LoadCellColumns recorded(read_run(path).load_cell);
+  EXPECT_TRUE(file.run.load_cell.empty());
+  EXPECT_FALSE(file.run.phases.empty() || file.run.motor.empty());
+  EXPECT_EQ(file.load_cell.counts, recorded.counts);
+  EXPECT_EQ(file.load_cell.ft_sequence, recorded.ft_sequence);
+  EXPECT_EQ(file.load_cell.status, recorded.status);
+  EXPECT_EQ(file.load_cell.arrival_ns, recorded.arrival_ns);
 }
 
 TEST(RunFile, ReadsBackAsWritten) {
@@ -53,7 +56,8 @@ TEST(RunFile, ReadsBackAsWritten) {
   EXPECT_EQ(digest(run), digest(again));
   EXPECT_EQ(again.header.operator_name, "Zoë");
   EXPECT_EQ(again.header.load_cell.configuration_xml.size(), 70000u);
-  EXPECT_EQ(read_run(folder / "a.h5").header.uuid, run.header.uuid);
+  EXPECT_EQ(again.header.uuid, run.header.uuid);
+  expect_same_columns(folder / "a.h5");
 }
 
 TEST(RunFile, KeepsWhatHappenedToTheStreamItsHealthAndTheBoxesBias) {
@@ -173,12 +177,8 @@ TEST(RunFile, NeverOverwritesAFinalFile) {
   const TemporaryFolder folder;
   const RunRecording run = make_run({});
   const std::string sha = write_run(folder / "a.h5", run);
-  try {
-    RunWriter writer(folder / "a.h5", run.header);
-    FAIL() << "was accepted";
-  } catch (const RecordError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("exists already"));
-  }
+  EXPECT_THAT(error_of<RecordError>([&] { RunWriter writer(folder / "a.h5", run.header); }),
+              HasSubstr("exists already"));
   EXPECT_EQ(sha, sha256_of_file(folder / "a.h5"));
 }
 
@@ -229,6 +229,7 @@ TEST(RunFile, DestructorLeavesAReadablePart) {
   }
   const RunRecording again = read_run(folder / "a.h5.part");
   EXPECT_TRUE(same_rows(run.load_cell, again.load_cell));
+  expect_same_columns(folder / "a.h5.part");
   EXPECT_EQ(again.outcome, Outcome::aborted);
   EXPECT_THAT(verify_run(folder / "a.h5.part").problems, Contains(HasSubstr("stopped before the end")));
 }
@@ -239,12 +240,8 @@ TEST(RunFile, FinishRefusesARunWhoseLossesDoNotAddUp) {
   run.load_cell.erase(run.load_cell.begin() + 1000);
   run.account.received -= 1;
   run.account.expected -= 1;
-  try {
-    write_run(folder / "a.h5", run);
-    FAIL() << "was accepted";
-  } catch (const RecordError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("1 missing samples where 0 were counted"));
-  }
+  EXPECT_THAT(error_of<RecordError>([&] { write_run(folder / "a.h5", run); }),
+              HasSubstr("1 missing samples where 0 were counted"));
   EXPECT_FALSE(std::filesystem::exists(folder / "a.h5"));
   EXPECT_TRUE(std::filesystem::exists(folder / "a.h5.part"));
 }
@@ -253,12 +250,8 @@ TEST(RunFile, WithAnUnknownCodeIsRefused) {
   const TemporaryFolder folder;
   RunRecording run = make_run({});
   run.phases[1].phase = static_cast<Phase>(200);
-  try {
-    write_run(folder / "a.h5", run);
-    FAIL() << "was accepted";
-  } catch (const RecordError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("commands row 1 has the unknown phase 200"));
-  }
+  EXPECT_THAT(error_of<RecordError>([&] { write_run(folder / "a.h5", run); }),
+              HasSubstr("commands row 1 has the unknown phase 200"));
 }
 
 TEST(RunFile, WithoutRoomNothingBegins) {
@@ -266,12 +259,8 @@ TEST(RunFile, WithoutRoomNothingBegins) {
     std::uint64_t free_bytes(const std::filesystem::path&) override { return 1000; }
   } tiny;
   EXPECT_NO_THROW(require_room("/somewhere", 1000, tiny));
-  try {
-    require_room("/somewhere", RunWriter::bytes_needed(560000, 20000), tiny);
-    FAIL() << "was accepted";
-  } catch (const RecordError& error) {
-    EXPECT_THAT(error.what(), StartsWith("disk full: /somewhere: "));
-  }
+  EXPECT_THAT(error_of<RecordError>([&] { require_room("/somewhere", RunWriter::bytes_needed(560000, 20000), tiny); }),
+              StartsWith("disk full: /somewhere: "));
 }
 
 TEST(RunFile, BytesNeededAreEnoughButNotFarOff) {

@@ -16,27 +16,19 @@
 #include "results/file_layer.hpp"
 #include "results/journal.hpp"
 #include "results/steps_csv.hpp"
+#include "test/results/recordings.hpp"
 #include "test/results/synthetic_run.hpp"
 
 namespace kphi::results {
 namespace {
 
+using test::error_of;
 using test::TemporaryFolder;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
-
-template <class Action>
-std::string error_of(Action&& action) {
-  try {
-    action();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 /// Any bit pattern, so that all magnitudes occur.
 double double_of_bits(std::uint64_t bits) { return std::bit_cast<double>(bits); }
@@ -87,8 +79,7 @@ std::vector<StepMean> arbitrary_steps() {
     };
     StepMean s;
     s.propeller = *rc::gen::string<std::string>();
-    std::erase(s.propeller, '\0');
-    std::erase(s.propeller, '\r');
+    std::erase_if(s.propeller, [](char c) { return c == '\0' || c == '\r' || c == '\n'; });
     s.blades = *rc::gen::arbitrary<int>();
     s.step = *rc::gen::arbitrary<int>();
     s.repetition = *rc::gen::arbitrary<int>();

@@ -19,6 +19,7 @@
 namespace kphi::results {
 namespace {
 
+using test::error_of;
 using test::make_run;
 using test::same;
 using test::TemporaryFolder;
@@ -166,12 +167,7 @@ TEST(DiskFull, CanBeToldToTheWriterByTheFileLayer) {
   const TemporaryFolder folder;
   const RunRecording run = make_run({});
   FullAfter files(600000);
-  try {
-    write_run(folder / "a.h5", run, files);
-    FAIL() << "was accepted";
-  } catch (const RecordError& error) {
-    EXPECT_THAT(error.what(), StartsWith("disk full: "));
-  }
+  EXPECT_THAT(error_of<RecordError>([&] { write_run(folder / "a.h5", run, files); }), StartsWith("disk full: "));
   const RunRecording rescued = read_run(folder / "a.h5.part");
   EXPECT_GT(rescued.load_cell.size(), 0u);
   EXPECT_LT(rescued.load_cell.size(), run.load_cell.size());
@@ -188,12 +184,7 @@ TEST(DiskFull, ARefusedSyncIsAnError) {
   const TemporaryFolder folder;
   RunWriter writer(folder / "a.h5", make_run({}).header, files);
   files.armed = true;
-  try {
-    writer.sync();
-    FAIL() << "was accepted";
-  } catch (const RecordError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("Input/output error"));
-  }
+  EXPECT_THAT(error_of<RecordError>([&] { writer.sync(); }), HasSubstr("Input/output error"));
 }
 
 }  // namespace

@@ -83,7 +83,6 @@ class World::Watch final : public daq::Progress {
   void tick(const daq::Position&, const daq::Observation&) override {
     world_.story_.last_good_tick = world_.bench_->clock().now();
   }
-  void step_done(const daq::Position&, const daq::Observation&) override {}
   void say(const std::string& line) override { world_.story_.said.push_back(line); }
 
  private:

@@ -41,7 +41,7 @@ Exchange::Exchange(const Settings& settings)
       wire_paces_(settings.wire_paces),
       credit_bytes_(settings.credit_bytes),
       requests_(settings.reply_timeout),
-      timeout_(settings.shortest_timeout, settings.reply_timeout) {
+      timeout_(settings.reply_timeout * 2 / 5, settings.reply_timeout) {
   results_.reserve(64);
 }
 
@@ -122,7 +122,7 @@ std::span<const QueryResult> Exchange::advance(Instant now) {
   requests_.expire(understood_until(now), [&](const Request& request) {
     ++counters_.timeouts;
     timeout_.timed_out(request.started, now);
-    results_.push_back({QueryResult::Kind::timeout, request, {}, {}, now});
+    results_.push_back({QueryResult::Kind::timeout, request, {}, {}, now, now, {}});
   });
   return results_;
 }
@@ -150,25 +150,30 @@ void Exchange::take_packet(const Packet& packet, std::uint64_t end, Instant now)
     return;
   }
   const std::size_t size = packet.length + kFrameOverhead;
-  const auto answer = requests_.answer(packet.type, packet.sub(), packet.module_id(), begun(end - size));
-  if (!answer) {
+  const auto request = requests_.answer(packet.type, packet.sub(), packet.module_id(), begun(end - size));
+  if (!request) {
     ++(find(packet.type, packet.sub()) == nullptr ? counters_.unknown_entries : counters_.unasked);
     return;
   }
-  if (answer->late) {
+  if (request->expired) {
     ++counters_.late_replies;
     return;
   }
   ++counters_.replies;
   const Instant last_byte = arrival_of(end - 1);
-  learn(answer->request, size, last_byte);
-  const bool whole = packet.data().size() == size_of(answer->request.entry->format);
+  learn(*request, size, last_byte);
+  const bool whole = packet.data().size() == size_of(request->entry->format);
   if (!whole) ++counters_.wrong_length;
-  results_.push_back({whole ? QueryResult::Kind::answer : QueryResult::Kind::wrong_length,
-                      answer->request,
-                      packet,
-                      {answer->request.queued, arrival_of(end - size), now},
-                      last_byte});
+  Instant from = request->started + byte_time_ * static_cast<std::int64_t>(request->bytes);
+  Instant to = last_byte - byte_time_ * static_cast<std::int64_t>(size);
+  // A link without real wire time (a pseudo-terminal) can answer faster than the bytes would take.
+  if (to < from) {
+    from = std::min(request->queued, last_byte);
+    to = last_byte;
+  }
+  const Stamps stamps{request->queued, arrival_of(end - size), now};
+  results_.push_back({whole ? QueryResult::Kind::answer : QueryResult::Kind::wrong_length, *request, packet, stamps,
+                      last_byte, from + (to - from) / 2, (to - from) / 2});
 }
 
 // The bytes of a chunk arrived one after the other, before it was read and after the previous chunk was.

@@ -24,6 +24,10 @@ struct QueryResult {
   Packet packet;  ///< empty after a timeout
   Stamps stamps;
   Instant end{0};  ///< its last byte arrived; after a timeout: now
+  /// When the module read the value: the middle of the span from the end of the query to the beginning of the reply,
+  /// and half of that span.
+  Instant time{0};
+  Duration uncertainty{0};
 
   [[nodiscard]] const Entry& entry() const noexcept { return *request.entry; }
   [[nodiscard]] bool answers(const Entry& asked) const noexcept {

@@ -7,6 +7,7 @@ namespace kphi::iq {
 namespace {
 
 constexpr double kPerOctave = 4;
+constexpr int kOvertaken = 2;
 
 }  // namespace
 
@@ -48,48 +49,37 @@ void AdaptiveTimeout::timed_out(Instant sent, Instant now) noexcept {
 }
 
 bool Requests::busy(const Entry& entry, int module_id) const noexcept {
-  return std::any_of(requests_.begin(), requests_.begin() + count_,
-                     [&](const Request& request) { return request.entry == &entry && request.module_id == module_id; });
+  return std::ranges::any_of(requests_,
+                             [&](const Request& one) { return one.entry == &entry && one.module_id == module_id; });
 }
 
 bool Requests::none_open() const noexcept {
-  return std::none_of(requests_.begin(), requests_.begin() + count_,
-                      [](const Request& request) { return request.entry != nullptr && !request.expired; });
+  return std::ranges::none_of(requests_, [](const Request& one) { return one.entry != nullptr && !one.expired; });
 }
 
-bool Requests::has_expired() const noexcept {
-  return std::any_of(requests_.begin(), requests_.begin() + count_,
-                     [](const Request& request) { return request.expired; });
-}
+bool Requests::has_expired() const noexcept { return std::ranges::any_of(requests_, &Request::expired); }
 
 std::size_t Requests::outstanding_bytes() const noexcept {
   std::size_t bytes = 0;
-  for (std::size_t i = 0; i < count_; ++i) bytes += requests_[i].expired ? 0 : requests_[i].bytes;
+  for (const Request& request : requests_) bytes += request.expired ? 0 : request.bytes;
   return bytes;
 }
 
-void Requests::add(const Request& request) noexcept {
-  if (count_ < kRequests) requests_[count_++] = request;
-}
-
-std::optional<Requests::Answer> Requests::answer(std::uint8_t type, std::uint8_t sub, int module_id,
-                                                 Instant begun) noexcept {
-  for (std::size_t i = 0; i < count_; ++i) {
-    const Request request = requests_[i];
-    if (request.entry == nullptr || request.module_id != module_id || request.entry->sub != sub ||
-        static_cast<std::uint8_t>(request.entry->type) != type || begun < request.earliest) {
-      continue;
-    }
-    if (!request.expired) erase(i);
-    overtake(request.order);
-    return Answer{request, request.expired};
-  }
-  return std::nullopt;
+std::optional<Request> Requests::answer(std::uint8_t type, std::uint8_t sub, int module_id, Instant begun) noexcept {
+  const auto at = std::ranges::find_if(requests_, [&](const Request& one) {
+    return one.entry != nullptr && one.module_id == module_id && one.entry->sub == sub &&
+           static_cast<std::uint8_t>(one.entry->type) == type && begun >= one.earliest;
+  });
+  if (at == requests_.end()) return std::nullopt;
+  const Request request = *at;
+  if (!request.expired) requests_.erase(at);
+  overtake(request.order);
+  return request;
 }
 
 Instant Requests::deadline() const noexcept {
   Instant earliest = kNever;
-  for (std::size_t i = 0; i < count_; ++i) earliest = std::min(earliest, due(requests_[i]));
+  for (const Request& request : requests_) earliest = std::min(earliest, due(request));
   return earliest;
 }
 
@@ -98,24 +88,12 @@ Instant Requests::due(const Request& request) const noexcept {
   return std::max(request.started + 10 * quarantine_, request.expired_at + quarantine_);
 }
 
-void Requests::erase(std::size_t at) noexcept {
-  std::move(requests_.begin() + at + 1, requests_.begin() + count_, requests_.begin() + at);
-  --count_;
-}
-
 // The module answers in order: a reply to a later frame proves that it has read the sets before it.
 void Requests::overtake(std::uint64_t order) noexcept {
-  for (std::size_t i = 0; i < count_;) {
-    Request& request = requests_[i];
-    if (request.order < order) ++request.overtaken;
-    const bool gone =
-        request.entry == nullptr ? request.overtaken > 0 : request.expired && request.overtaken >= kOvertaken;
-    if (gone) {
-      erase(i);
-    } else {
-      ++i;
-    }
-  }
+  for (Request& request : requests_) request.overtaken += request.order < order ? 1 : 0;
+  erase_if([](const Request& one) {
+    return one.entry == nullptr ? one.overtaken > 0 : one.expired && one.overtaken >= kOvertaken;
+  });
 }
 
 }  // namespace kphi::iq

@@ -2,10 +2,13 @@
 // module took.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <boost/container/static_vector.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "base/clock.hpp"
 #include "drivers/iq/wire/entries.hpp"
@@ -71,11 +74,6 @@ struct Request {
 /// overtaken cannot come any more. Allocates nothing.
 class Requests {
  public:
-  struct Answer {
-    Request request;
-    bool late = false;
-  };
-
   /// `quarantine`: longer than any reply may be late.
   explicit Requests(Duration quarantine) noexcept : quarantine_(quarantine) {}
 
@@ -87,15 +85,19 @@ class Requests {
   [[nodiscard]] bool has_expired() const noexcept;
   /// Bytes that may still lie in the module's receive buffer.
   [[nodiscard]] std::size_t outstanding_bytes() const noexcept;
-  [[nodiscard]] bool full() const noexcept { return count_ == kRequests; }
-  void add(const Request& request) noexcept;
+  [[nodiscard]] bool full() const noexcept { return requests_.size() == kRequests; }
+  /// Unless full.
+  void add(const Request& request) noexcept {
+    if (!full()) requests_.push_back(request);
+  }
 
-  /// The request that this reply answers, removed unless it is expired. nullopt: the module cannot have received it by
-  /// `begun`, when the reply's first byte arrived, so this is a second copy of the previous reply.
-  [[nodiscard]] std::optional<Answer> answer(std::uint8_t type, std::uint8_t sub, int module_id,
-                                             Instant begun) noexcept;
+  /// The request that this reply answers, removed unless it is expired: then the reply is late. nullopt: the module
+  /// cannot have received it by `begun`, when the reply's first byte arrived, so this is a second copy of the previous
+  /// reply.
+  [[nodiscard]] std::optional<Request> answer(std::uint8_t type, std::uint8_t sub, int module_id,
+                                              Instant begun) noexcept;
   /// The line is a new one: no reply to an earlier request can come.
-  void clear() noexcept { count_ = 0; }
+  void clear() noexcept { requests_.clear(); }
 
   /// Expires requests that have waited too long. An expired request is removed when two later requests have been
   /// answered (one more than a line that swaps neighbours needs); otherwise ten quarantines after it was sent, but at
@@ -103,19 +105,13 @@ class Requests {
   /// Request&)`.
   template <class TimedOut>
   void expire(Instant now, TimedOut&& timed_out) {
-    for (std::size_t i = 0; i < count_;) {
-      Request& request = requests_[i];
-      if (now < due(request)) {
-        ++i;
-      } else if (request.entry != nullptr && !request.expired) {
-        request.expired = true;
-        request.expired_at = now;
-        const Request copy = request;
-        timed_out(copy);
-      } else {
-        erase(i);
-      }
+    for (Request& request : requests_) {
+      if (request.entry == nullptr || request.expired || now < due(request)) continue;
+      request.expired = true;
+      request.expired_at = now;
+      timed_out(std::as_const(request));
     }
+    erase_if([&](const Request& request) { return now >= due(request); });
   }
 
   /// When the next one expires or is removed.
@@ -123,14 +119,15 @@ class Requests {
 
  private:
   static constexpr std::size_t kRequests = 32;
-  static constexpr int kOvertaken = 2;
   [[nodiscard]] Instant due(const Request& request) const noexcept;
-  void erase(std::size_t at) noexcept;
   void overtake(std::uint64_t order) noexcept;
+  template <class Gone>
+  void erase_if(Gone&& gone) noexcept {
+    requests_.erase(std::remove_if(requests_.begin(), requests_.end(), gone), requests_.end());
+  }
 
   Duration quarantine_;
-  std::array<Request, kRequests> requests_;
-  std::size_t count_ = 0;
+  boost::container::static_vector<Request, kRequests> requests_;
 };
 
 }  // namespace kphi::iq

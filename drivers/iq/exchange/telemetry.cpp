@@ -39,10 +39,7 @@ Settings completed(Settings settings) {
     if (value <= Duration{0}) value = usual;
   };
   otherwise(settings.reply_timeout, std::chrono::milliseconds(100));
-  otherwise(settings.shortest_timeout, settings.reply_timeout * 2 / 5);
-  otherwise(settings.slow_round_trip, settings.reply_timeout / 25);
   otherwise(settings.longest_silence, from_seconds(settings.module_timeout_s));
-  settings.shortest_timeout = std::min(settings.shortest_timeout, settings.reply_timeout);
   if (settings.slow_hz == 0) settings.slow_hz = std::min(settings.telemetry_hz, kUsualSlowHz);
   return settings;
 }

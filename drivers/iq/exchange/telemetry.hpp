@@ -1,7 +1,9 @@
-// What telemetry asks for, how often, and what it brings.
+// What telemetry asks for, how often, and what it brings; and the events of a module and its link, which decide whether
+// a run is valid.
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -79,19 +81,49 @@ struct Counters {
   }
 };
 
+enum class EventKind : std::uint8_t {
+  connected,        ///< identity read, communication timeout set; coasting
+  no_answer,        ///< it could not be connected
+  module_reset,     ///< it restarted by itself: its volatile settings are lost
+  module_silent,    ///< it stopped answering
+  coast_denied,     ///< it did not confirm a coast
+  lease_expired,    ///< no caller renewed the command in time
+  port_lost,        ///< unplugged
+  another_module,   ///< a different module answers now
+  slow_round_trip,  ///< the median is so long that the times of readings are uncertain
+  host_absent,      ///< this computer slept, or did not run kphi for so long that the module may have stopped driving
+  let_go,           ///< the module has stopped driving by itself
+};
+
+[[nodiscard]] constexpr std::string_view name_of(EventKind kind) noexcept {
+  constexpr std::string_view names[] = {"connected",       "no_answer",     "module_reset", "module_silent",
+                                        "coast_denied",    "lease_expired", "port_lost",    "another_module",
+                                        "slow_round_trip", "host_absent",   "let_go"};
+  return names[static_cast<int>(kind)];
+}
+
+/// A measurement across this event is invalid.
+[[nodiscard]] constexpr bool spoils_a_run(EventKind kind) noexcept {
+  return kind != EventKind::connected && kind != EventKind::slow_round_trip;
+}
+
+struct Event {
+  EventKind kind = EventKind::connected;
+  Instant time{0};    ///< bench time at which it was noticed
+  std::string words;  ///< for the log
+};
+
 /// How one module is polled. Times are bench time.
 struct Settings {
   int module_id = 0;         ///< 0..62
   double telemetry_hz = 50;  ///< cycles per second of bench time; each asks for all of `every_cycle`
   std::vector<Quantity> every_cycle{Quantity::speed};
-  double slow_hz = 0;            ///< queries per second for the other quantities, in turn; 0: telemetry_hz, up to 50
-  Duration reply_timeout{0};     ///< the first and the longest time-out of a request; 0: 100 ms, and Motor stretches
-                                 ///< these as wall time
-  Duration shortest_timeout{0};  ///< lower bound of the time-out after fast round trips; 0: 2/5 of reply_timeout
-  Duration slow_round_trip{0};   ///< a median above this becomes an event; 0: 1/25 of reply_timeout (4 ms)
-  Duration wire_byte_time{0};    ///< 10 bits of one byte; 0: Motor takes 10/baud
-  bool wire_paces = false;       ///< bytes really take that long, so a reply that arrives sooner is a duplicate; Motor:
-                                 ///< on an adapter, not on a pseudo-terminal
+  double slow_hz = 0;          ///< queries per second for the other quantities, in turn; 0: telemetry_hz, up to 50
+  Duration reply_timeout{0};   ///< the first and the longest time-out of a request; 0: 100 ms, and Motor stretches
+                               ///< it as wall time
+  Duration wire_byte_time{0};  ///< 10 bits of one byte; 0: Motor takes 10/baud
+  bool wire_paces = false;     ///< bytes really take that long, so a reply that arrives sooner is a duplicate; Motor:
+                               ///< on an adapter, not on a pseudo-terminal
   double module_timeout_s = 0.5;  ///< the module coasts by itself after this silence; in its own seconds
   Duration longest_silence{0};    ///< the same as bench time; 0: module_timeout_s, and Motor stretches it as wall time
   std::size_t credit_bytes = 63;  ///< most bytes of unanswered frames, 18 or more: the module's receive buffer has 64

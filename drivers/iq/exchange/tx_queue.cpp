@@ -1,81 +1,71 @@
 #include "drivers/iq/exchange/tx_queue.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace kphi::iq {
+namespace {
+
+constexpr std::ptrdiff_t kWaitingCoasts = 3;
+
+}  // namespace
 
 bool TxQueue::push(Kind kind, const Packet& packet) noexcept {
-  if (count_ == kFrames) return false;
-  insert(count_, kind, packet);
-  const Frame& frame = frames_[count_ - 1];
-  const std::size_t skipped = count_ == 1 ? begun_ : 0;
-  std::copy_n(frame.bytes.begin() + skipped, frame.size - skipped, wire_.begin() + wire_size_);
-  wire_size_ += frame.size - skipped;
+  if (frames_.size() == kFrames) return false;
+  insert(frames_.size(), kind, packet);
   return true;
 }
 
 bool TxQueue::push_coast(const Packet& packet, bool padded) noexcept {
-  std::size_t waiting = 0;
-  for (std::size_t i = first_whole(); i < count_;) {
-    if (frames_[i].kind == Kind::motion) {
-      erase(i);
-    } else {
-      waiting += frames_[i].kind == Kind::coast ? 1 : 0;
-      ++i;
-    }
+  for (std::size_t i = frames_.size(); i > first_whole(); --i) {
+    if (frames_[i - 1].kind == Kind::motion) erase(i - 1);
   }
-  const bool has_room = waiting < kWaitingCoasts;
-  if (has_room) {
-    if (count_ == kFrames) erase(count_ - 1);
-    insert(first_whole(), Kind::coast, packet, padded ? kPadding : 0);
-  }
-  lay_out();
-  return has_room;
+  const auto waits = [](const Frame& frame) { return frame.kind == Kind::coast; };
+  if (std::count_if(frames_.begin() + first_whole(), frames_.end(), waits) >= kWaitingCoasts) return false;
+  if (frames_.size() == kFrames) erase(kFrames - 1);
+  insert(first_whole(), Kind::coast, packet, padded ? kPadding : 0);
+  return true;
 }
 
 std::size_t TxQueue::withdraw() noexcept {
-  const std::size_t before = wire_size_;
-  for (std::size_t i = count_; i > first_whole(); --i) {
+  const std::size_t before = bytes_.size();
+  for (std::size_t i = frames_.size(); i > first_whole(); --i) {
     if (frames_[i - 1].kind != Kind::coast) erase(i - 1);
   }
-  lay_out();
-  return before - wire_size_;
+  return before - bytes_.size();
 }
 
-void TxQueue::clear() noexcept { count_ = begun_ = wire_size_ = 0; }
-
 void TxQueue::sent(std::size_t n) noexcept {
-  n += begun_;
-  while (count_ > 0 && n >= frames_[0].size) {
-    n -= frames_[0].size;
-    erase(0);
+  n = std::min(n, bytes_.size());
+  bytes_.erase(bytes_.begin(), bytes_.begin() + static_cast<std::ptrdiff_t>(n));
+  while (n > 0) {
+    Frame& first = frames_.front();
+    const std::size_t left = std::min(n, first.size);
+    n -= left;
+    first.size -= left;
+    begun_ = first.size > 0;
+    if (!begun_) frames_.erase(frames_.begin());
   }
-  begun_ = count_ > 0 ? n : 0;
-  lay_out();
 }
 
 void TxQueue::insert(std::size_t at, Kind kind, const Packet& packet, std::size_t padding) noexcept {
-  std::move_backward(frames_.begin() + at, frames_.begin() + count_, frames_.begin() + count_ + 1);
-  Frame& frame = frames_[at];
-  frame.kind = kind;
-  std::fill_n(frame.bytes.begin(), padding, std::uint8_t{0});
-  frame.size = padding + encode(packet, std::span(frame.bytes).subspan(padding).first<kMaxFrame>());
-  ++count_;
+  std::array<std::uint8_t, kMaxFrame> frame;
+  const std::size_t size = encode(packet, frame);
+  const auto place = bytes_.insert(bytes_.begin() + offset(at), frame.begin(), frame.begin() + size);
+  bytes_.insert(place, padding, std::uint8_t{0});
+  frames_.insert(frames_.begin() + at, Frame{kind, padding + size});
 }
 
 void TxQueue::erase(std::size_t at) noexcept {
-  std::move(frames_.begin() + at + 1, frames_.begin() + count_, frames_.begin() + at);
-  --count_;
+  const auto place = bytes_.begin() + offset(at);
+  bytes_.erase(place, place + static_cast<std::ptrdiff_t>(frames_[at].size));
+  frames_.erase(frames_.begin() + at);
 }
 
-void TxQueue::lay_out() noexcept {
-  wire_size_ = 0;
-  for (std::size_t i = 0; i < count_; ++i) {
-    const std::size_t skipped = i == 0 ? begun_ : 0;
-    std::copy(frames_[i].bytes.begin() + skipped, frames_[i].bytes.begin() + frames_[i].size,
-              wire_.begin() + wire_size_);
-    wire_size_ += frames_[i].size - skipped;
-  }
+std::ptrdiff_t TxQueue::offset(std::size_t at) const noexcept {
+  std::size_t bytes = 0;
+  for (std::size_t i = 0; i < at; ++i) bytes += frames_[i].size;
+  return static_cast<std::ptrdiff_t>(bytes);
 }
 
 }  // namespace kphi::iq

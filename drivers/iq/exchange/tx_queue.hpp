@@ -1,7 +1,7 @@
 // Frames waiting for the wire, in order, except that a coast goes before every frame that has not begun to leave.
 #pragma once
 
-#include <array>
+#include <boost/container/static_vector.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -10,6 +10,7 @@
 
 namespace kphi::iq {
 
+/// Allocates nothing.
 class TxQueue {
  public:
   enum class Kind : std::uint8_t { request, setting, motion, coast };
@@ -25,33 +26,29 @@ class TxQueue {
   /// Drops all frames that have not begun to leave, except coasts. Returns the number of bytes dropped.
   std::size_t withdraw() noexcept;
   /// Drops everything.
-  void clear() noexcept;
+  void clear() noexcept { *this = {}; }
 
   /// All waiting bytes, contiguous; valid until the next call of another member.
-  [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return {wire_.data(), wire_size_}; }
+  [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return {bytes_.data(), bytes_.size()}; }
   /// The first `n` of them have left.
   void sent(std::size_t n) noexcept;
 
  private:
   static constexpr std::size_t kFrames = 24;
-  static constexpr std::size_t kWaitingCoasts = 3;
-  static constexpr std::size_t kRoom = kPadding + kMaxFrame;
   struct Frame {
     Kind kind = Kind::request;
-    std::size_t size = 0;
-    std::array<std::uint8_t, kRoom> bytes{};
+    std::size_t size = 0;  ///< in `bytes_`: what has not left yet
   };
 
   void insert(std::size_t at, Kind kind, const Packet& packet, std::size_t padding = 0) noexcept;
   void erase(std::size_t at) noexcept;
-  void lay_out() noexcept;
-  [[nodiscard]] std::size_t first_whole() const noexcept { return begun_ > 0 ? 1 : 0; }
+  /// Where this frame begins in `bytes_`.
+  [[nodiscard]] std::ptrdiff_t offset(std::size_t at) const noexcept;
+  [[nodiscard]] std::size_t first_whole() const noexcept { return begun_ ? 1 : 0; }
 
-  std::array<Frame, kFrames> frames_;
-  std::size_t count_ = 0;
-  std::size_t begun_ = 0;  ///< bytes of the first frame that have left
-  std::array<std::uint8_t, kFrames * kRoom> wire_{};
-  std::size_t wire_size_ = 0;
+  boost::container::static_vector<Frame, kFrames> frames_;
+  boost::container::static_vector<std::uint8_t, kFrames*(kPadding + kMaxFrame)> bytes_;  ///< of all frames
+  bool begun_ = false;                                                                   ///< the first is leaving
 };
 
 }  // namespace kphi::iq

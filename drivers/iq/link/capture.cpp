@@ -14,13 +14,8 @@ namespace kphi::iq {
 namespace {
 
 constexpr char kTitle[] = "kphi iq capture 1\n";
-constexpr std::size_t kTitleSize = sizeof kTitle - 1;
 constexpr std::size_t kRecordHead = 13;
 constexpr auto kBatch = std::chrono::milliseconds(50);
-
-[[noreturn]] void refuse(const std::string& path, const char* operation, const std::string& why) {
-  throw DeviceError("capture " + path, operation, why, "choose another file");
-}
 
 void append(std::vector<std::uint8_t>& to, std::uint64_t value, int bytes) {
   for (int i = 0; i < bytes; ++i) to.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
@@ -40,8 +35,8 @@ bool write_all(int fd, std::span<const std::uint8_t> bytes) noexcept {
 
 Capture::Capture(const std::string& path)
     : file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)) {
-  if (file_.number() < 0) refuse(path, "create", std::strerror(errno));
-  waiting_.assign(kTitle, kTitle + kTitleSize);
+  if (file_.number() < 0) throw DeviceError("capture " + path, "create", std::strerror(errno), "choose another file");
+  waiting_.assign(kTitle, kTitle + sizeof kTitle - 1);
   writer_ = start_thread([this] { run(); });
 }
 

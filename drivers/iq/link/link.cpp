@@ -11,7 +11,6 @@
 #include "base/thread.hpp"
 #include "drivers/iq/link/capture.hpp"
 #include "drivers/iq/link/motor.hpp"
-#include "drivers/serial/discovery.hpp"
 #include "drivers/serial/port.hpp"
 
 namespace kphi::iq {
@@ -26,6 +25,13 @@ constexpr auto kPublishEvery = std::chrono::milliseconds(5);
 constexpr auto kFirstPause = std::chrono::milliseconds(50);
 constexpr auto kLongestPause = std::chrono::seconds(1);
 
+/// Returns the pause and doubles it.
+Duration lengthen(Duration& pause) noexcept {
+  return std::exchange(pause, std::min<Duration>(2 * pause, kLongestPause));
+}
+
+}  // namespace
+
 Settings stretched(Settings settings, const std::string& device, unsigned baud, const Clock& clock) {
   settings.wire_paces |= serial::adapter_of(device).has_value();
   if (settings.reply_timeout == Duration{0}) settings.reply_timeout = clock.stretched(std::chrono::milliseconds(100));
@@ -35,54 +41,223 @@ Settings stretched(Settings settings, const std::string& device, unsigned baud, 
   return settings;
 }
 
-/// Counts up from the shortest to the longest pause by doubling.
-class Backoff {
- public:
-  Backoff(Duration shortest, Duration longest) noexcept : shortest_(shortest), longest_(longest), next_(shortest) {}
-  Duration next() noexcept { return std::exchange(next_, std::min(2 * next_, longest_)); }
-  void reset() noexcept { next_ = shortest_; }
-
- private:
-  Duration shortest_, longest_, next_;
-};
-
-}  // namespace
+// A frame cut short does no harm: the module rescans after a bad CRC, and there are three.
+void send_final_coast(serial::Port& port, int module_id,
+                      const std::function<void(std::span<const std::uint8_t>)>& sent) noexcept {
+  const auto end = steady_clock::now() + kFinalCoastLimit;
+  try {
+    std::array<std::uint8_t, kMaxFrame> frame;
+    const std::size_t size = encode(set<"propeller_motor_control.ctrl_coast">(module_id), frame);
+    for (int i = 0; i < 3; ++i) {
+      std::span<const std::uint8_t> rest = std::span(frame).first(size);
+      while (!rest.empty() && steady_clock::now() < end) {
+        const std::size_t n = port.write(rest);
+        sent(rest.first(n));
+        rest = rest.subspan(n);
+        if (n > 0) continue;
+        pollfd room{port.fd(), POLLOUT, 0};
+        ::poll(&room, 1, 10);
+      }
+    }
+  } catch (const std::exception&) {
+    return;  // the port is gone
+  }
+  // Closing may throw away what has not left yet.
+  port.drain(end - steady_clock::now());
+}
 
 /// The thread between a module and its port: reads, writes, sleeps until the next deadline, watches the lease, and
 /// finds the line again when it was lost. Nothing in it waits for a caller or for a disk.
 class Link {
  public:
   /// Opens the device and connects; throws DeviceError. `capture`: file for all bytes; empty: no capture.
-  Link(Motor& motor, unsigned baud, const Settings& settings, const Clock& clock, const std::string& capture);
-  ~Link();
+  Link(Motor& motor, unsigned baud, const Settings& settings, const Clock& clock, const std::string& capture)
+      : motor_(motor),
+        baud_(baud),
+        clock_(clock),
+        port_(std::make_unique<serial::Port>(motor.device(), baud)),
+        session_(stretched(settings, port_->device(), baud, clock)),
+        suspended_(clock.suspended()) {
+    if (!capture.empty()) capture_ = std::make_unique<Capture>(capture);
+    thread_ = start_thread([this] { run(); });
+    try {
+      wait_until_ready();
+    } catch (...) {
+      end_thread();
+      throw;
+    }
+  }
+  ~Link() { end_thread(); }
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
 
  private:
-  using WallTime = std::chrono::steady_clock::time_point;
+  void wait_until_ready() {
+    std::unique_lock lock(motor_.mutex_);
+    const bool decided = motor_.changed_.wait_for(
+        lock, kConnectLimit, [&] { return motor_.lost() || motor_.state_ == Session::State::ready; });
+    if (decided && !motor_.lost()) return;
+    throw DeviceError("motor module on " + motor_.device(), fmt::format("connect at {} baud", baud_),
+                      decided ? motor_.failure_ : std::string("not connected in time"),
+                      "check its supply, RX and TX, the baud rate and the module id");
+  }
 
-  void wait_until_ready();
-  void end_thread() noexcept;
+  void end_thread() noexcept {
+    quit_ = true;
+    motor_.commanded_.raise();
+    if (thread_.joinable()) thread_.join();
+  }
 
   // The thread.
-  void run() noexcept;
-  void turn();
+
+  void run() noexcept {
+    std::string why = "the link is being closed";
+    try {
+      session_.connect_anew(clock_.now());
+      while (!quit_) turn();
+    } catch (const std::exception& error) {
+      why = error.what();
+    }
+    // Past the session, so that an error inside it cannot prevent the coast.
+    if (port_) send_final_coast(*port_, session_.settings().module_id, [this](auto bytes) { capture_sent(bytes); });
+    motor_.end(why);
+  }
+
+  void turn() {
+    try {
+      transmit();
+      publish();
+      const auto [by_command, by_port] = sleep();
+      notice_sleep();
+      if (by_port) receive();
+      session_.advance(clock_.now());
+      if (by_command) apply(motor_.take_commands());
+      keep_lease();
+    } catch (const serial::PortGone& gone) {
+      lose(gone.what());
+    }
+    if (steady_clock::now() >= next_attempt_) port_ ? reconnect() : reopen();
+  }
+
   struct Woken {
     bool by_command = false, by_port = false;
   };
-  Woken sleep();
-  [[nodiscard]] WallTime due() const;
-  void receive();
-  void apply(const Commands& commands);
-  void notice_sleep();
-  void keep_lease();
-  void recover();
-  void reopen();
-  void reconnect();
-  void transmit();
-  void publish();
-  void lose(const std::string& why);
-  void send_final_coast() noexcept;
+  Woken sleep() {
+    const auto left = std::max(due() - steady_clock::now(), steady_clock::duration{0});
+    const auto ns = std::chrono::nanoseconds(left).count();
+    const timespec limit{static_cast<time_t>(ns / 1'000'000'000), ns % 1'000'000'000};
+    pollfd fds[2] = {{motor_.commanded_.descriptor(), POLLIN, 0}, {-1, 0, 0}};
+    if (port_) fds[1] = {port_->fd(), static_cast<short>(congested_ ? POLLIN | POLLOUT : POLLIN), 0};
+    if (ppoll(fds, 2, &limit, nullptr) <= 0) return {};
+    return {fds[0].revents != 0 && motor_.commanded_.clear(), fds[1].revents != 0};
+  }
+
+  [[nodiscard]] steady_clock::time_point due() const {
+    const auto now = steady_clock::now();
+    auto due = now + kLongestSleep;
+    if (!port_) return std::min(due, next_attempt_);
+    const Instant deadline = session_.deadline();
+    if (deadline != kNever) due = std::min(due, now + clock_.shrunk(std::max(deadline - clock_.now(), Duration{0})));
+    if (session_.spinning()) due = std::min(due, motor_.lease_end());
+    if (session_.state() == Session::State::failed && next_attempt_ > now) due = std::min(due, next_attempt_);
+    return due;
+  }
+
+  // Reading also detects that the port is gone.
+  void receive() {
+    std::array<std::uint8_t, 4096> buffer;
+    while (const std::size_t n = port_->read(buffer)) {
+      const auto bytes = std::span(buffer).first(n);
+      const Instant now = clock_.now();
+      if (capture_) capture_->add(Capture::Direction::came, bytes, now);
+      session_.receive(bytes, now);
+      if (n < buffer.size()) return;
+    }
+  }
+
+  void apply(const Commands& commands) {
+    const Instant now = clock_.now();
+    if (commands.coast) session_.emergency_stop(now);
+    if (commands.stop) session_.stop(*commands.stop, now);
+    if (commands.inquiry && session_.state() == Session::State::ready) session_.inquire(*commands.inquiry, now);
+    if (!commands.speed || !session_.armed()) return;
+    if (steady_clock::now() < motor_.lease_end()) {
+      session_.spin_at(*commands.speed, now);
+    } else {
+      ++motor_.lease_expiries_;
+    }
+  }
+
+  /// While this computer slept the module stopped driving the motor: earlier orders are void.
+  void notice_sleep() {
+    const Duration suspended = clock_.suspended();
+    const Duration slept = suspended - suspended_;
+    if (slept < kShortestSleep) return;
+    suspended_ = suspended;
+    session_.fail(EventKind::host_absent, fmt::format("this computer slept for {:.2g} s", to_seconds(slept)),
+                  clock_.now());
+  }
+
+  void keep_lease() {
+    if (!session_.spinning() || steady_clock::now() < motor_.lease_end()) return;
+    ++motor_.lease_expiries_;
+    session_.expire_lease(clock_.now());
+  }
+
+  void reopen() {
+    try {
+      port_ = std::make_unique<serial::Port>(motor_.device(), baud_);
+      session_.connect_anew(clock_.now());
+    } catch (const DeviceError&) {
+      next_attempt_ = steady_clock::now() + lengthen(reopening_);
+    }
+  }
+
+  // A module that failed continues coasting until it confirms; then it is connected again from the beginning.
+  void reconnect() {
+    if (session_.state() == Session::State::ready) {
+      if (!std::exchange(was_ready_, true) && !session_.armed()) ++motor_.reconnections_;
+      reopening_ = reconnecting_ = kFirstPause;
+    }
+    if (session_.state() != Session::State::failed) return;
+    was_ready_ = false;
+    if (!session_.coasting() || !session_.was_connected()) return;
+    next_attempt_ = steady_clock::now() + lengthen(reconnecting_);
+    session_.connect(clock_.now());
+  }
+
+  void transmit() {
+    congested_ = false;
+    if (!port_) return;
+    notice_sleep();
+    for (auto bytes = session_.output(); !bytes.empty(); bytes = session_.output()) {
+      const std::size_t n = port_->write(bytes);
+      capture_sent(bytes.first(n));
+      session_.sent(n);
+      if (n > 0) continue;
+      congested_ = true;
+      return;
+    }
+  }
+
+  void capture_sent(std::span<const std::uint8_t> bytes) {
+    if (capture_ && !bytes.empty()) capture_->add(Capture::Direction::sent, bytes, clock_.now());
+  }
+
+  void publish() {
+    const auto now = steady_clock::now();
+    const bool all = now - published_ >= kPublishEvery;
+    if (all) published_ = now;
+    motor_.move_readings(session_);
+    motor_.publish(session_, port_ != nullptr, all);
+  }
+
+  void lose(const std::string& why) {
+    port_.reset();
+    congested_ = was_ready_ = false;
+    session_.fail(EventKind::port_lost, why, clock_.now());
+    next_attempt_ = steady_clock::now() + lengthen(reopening_);
+  }
 
   Motor& motor_;
   const unsigned baud_;
@@ -94,236 +269,18 @@ class Link {
   Session session_;
   std::unique_ptr<Capture> capture_;
   bool congested_ = false;  ///< the port had no room for all
-  WallTime next_attempt_{};
-  Backoff reopening_, reconnecting_;
+  steady_clock::time_point next_attempt_{}, published_{};
+  Duration reopening_ = kFirstPause, reconnecting_ = kFirstPause;  ///< the next pauses
   bool was_ready_ = false;
-  WallTime published_{};
   Duration suspended_;  ///< of the host, as noticed so far
 
   std::thread thread_;
 };
 
-Link::Link(Motor& motor, unsigned baud, const Settings& settings, const Clock& clock, const std::string& capture)
-    : motor_(motor),
-      baud_(baud),
-      clock_(clock),
-      port_(std::make_unique<serial::Port>(motor.device(), baud)),
-      session_(stretched(settings, port_->device(), baud, clock)),
-      reopening_(kFirstPause, kLongestPause),
-      reconnecting_(kFirstPause, kLongestPause),
-      suspended_(clock.suspended()) {
-  if (!capture.empty()) capture_ = std::make_unique<Capture>(capture);
-  thread_ = start_thread([this] { run(); });
-  try {
-    wait_until_ready();
-  } catch (...) {
-    end_thread();
-    throw;
-  }
-}
-
-Link::~Link() { end_thread(); }
-
-void Link::wait_until_ready() {
-  const auto connected = motor_.await_connection(kConnectLimit);
-  if (connected.value_or(false)) return;
-  throw DeviceError("motor module on " + motor_.device(), fmt::format("connect at {} baud", baud_),
-                    connected ? motor_.failure() : std::string("not connected in time"),
-                    "check its supply, RX and TX, the baud rate and the module id");
-}
-
-void Link::end_thread() noexcept {
-  quit_ = true;
-  motor_.commanded_.raise();
-  if (thread_.joinable()) thread_.join();
-}
-
-void Link::run() noexcept {
-  std::string why = "the link is being closed";
-  try {
-    session_.connect_anew(clock_.now());
-    while (!quit_) turn();
-  } catch (const std::exception& error) {
-    why = error.what();
-  }
-  send_final_coast();
-  motor_.end(why);
-}
-
-void Link::turn() {
-  try {
-    transmit();
-    publish();
-    const Woken woken = sleep();
-    notice_sleep();
-    if (woken.by_port) receive();
-    session_.advance(clock_.now());
-    if (woken.by_command) apply(motor_.take_commands());
-    keep_lease();
-  } catch (const serial::PortGone& gone) {
-    lose(gone.what());
-  }
-  recover();
-}
-
-Link::Woken Link::sleep() {
-  const auto left = std::max(due() - steady_clock::now(), steady_clock::duration{0});
-  const auto ns = std::chrono::nanoseconds(left).count();
-  const timespec limit{static_cast<time_t>(ns / 1'000'000'000), ns % 1'000'000'000};
-  pollfd fds[2] = {{motor_.commanded_.descriptor(), POLLIN, 0}, {-1, 0, 0}};
-  if (port_) fds[1] = {port_->fd(), static_cast<short>(congested_ ? POLLIN | POLLOUT : POLLIN), 0};
-  if (ppoll(fds, 2, &limit, nullptr) <= 0) return {};
-  return {fds[0].revents != 0 && motor_.commanded_.clear(), fds[1].revents != 0};
-}
-
-Link::WallTime Link::due() const {
-  const WallTime now = steady_clock::now();
-  WallTime due = now + kLongestSleep;
-  if (!port_) return std::min(due, next_attempt_);
-  const Instant deadline = session_.deadline();
-  if (deadline != kNever) due = std::min(due, now + clock_.shrunk(std::max(deadline - clock_.now(), Duration{0})));
-  if (session_.spinning()) due = std::min(due, motor_.lease_end());
-  if (session_.state() == Session::State::failed && next_attempt_ > now) due = std::min(due, next_attempt_);
-  return due;
-}
-
-// Reading also detects that the port is gone.
-void Link::receive() {
-  std::array<std::uint8_t, 4096> buffer;
-  while (const std::size_t n = port_->read(buffer)) {
-    const auto bytes = std::span(buffer).first(n);
-    const Instant now = clock_.now();
-    if (capture_) capture_->add(Capture::Direction::came, bytes, now);
-    session_.receive(bytes, now);
-    if (n < buffer.size()) return;
-  }
-}
-
-void Link::apply(const Commands& commands) {
-  const Instant now = clock_.now();
-  if (commands.emergency) session_.emergency_stop(now);
-  if (commands.coast && !commands.emergency) session_.coast(now);
-  if (commands.stop) session_.stop(*commands.stop, now);
-  if (commands.rearm && session_.state() == Session::State::ready) session_.rearm();
-  if (commands.inquiry && session_.state() == Session::State::ready) session_.inquire(*commands.inquiry, now);
-  if (!commands.speed || !session_.armed()) return;
-  if (steady_clock::now() < motor_.lease_end()) {
-    session_.spin_at(*commands.speed, now);
-  } else {
-    ++motor_.lease_expiries_;
-  }
-}
-
-/// While this computer slept the module stopped driving the motor: earlier orders are void.
-void Link::notice_sleep() {
-  const Duration suspended = clock_.suspended();
-  const Duration slept = suspended - suspended_;
-  if (slept < kShortestSleep) return;
-  suspended_ = suspended;
-  session_.fail(EventKind::host_absent, fmt::format("this computer slept for {:.2g} s", to_seconds(slept)),
-                clock_.now());
-}
-
-void Link::keep_lease() {
-  if (!session_.spinning() || steady_clock::now() < motor_.lease_end()) return;
-  ++motor_.lease_expiries_;
-  session_.expire_lease(clock_.now());
-}
-
-void Link::recover() {
-  if (steady_clock::now() < next_attempt_) return;
-  if (!port_) {
-    reopen();
-  } else {
-    reconnect();
-  }
-}
-
-void Link::reopen() {
-  try {
-    port_ = std::make_unique<serial::Port>(motor_.device(), baud_);
-    session_.connect_anew(clock_.now());
-  } catch (const DeviceError&) {
-    next_attempt_ = steady_clock::now() + reopening_.next();
-  }
-}
-
-// A module that failed continues coasting until it confirms; then it is connected again from the beginning.
-void Link::reconnect() {
-  const bool ready = session_.state() == Session::State::ready, failed = session_.state() == Session::State::failed;
-  if (ready && !std::exchange(was_ready_, true) && !session_.armed()) ++motor_.reconnections_;
-  if (ready) {
-    reopening_.reset();
-    reconnecting_.reset();
-  }
-  if (!failed) return;
-  was_ready_ = false;
-  if (!session_.coasting() || !session_.was_connected()) return;
-  next_attempt_ = steady_clock::now() + reconnecting_.next();
-  session_.connect(clock_.now());
-}
-
-void Link::transmit() {
-  congested_ = false;
-  if (!port_) return;
-  notice_sleep();
-  for (auto bytes = session_.output(); !bytes.empty(); bytes = session_.output()) {
-    const std::size_t n = port_->write(bytes);
-    if (capture_ && n > 0) capture_->add(Capture::Direction::sent, bytes.first(n), clock_.now());
-    session_.sent(n);
-    if (n > 0) continue;
-    congested_ = true;
-    return;
-  }
-}
-
-void Link::publish() {
-  const WallTime now = steady_clock::now();
-  const bool all = now - published_ >= kPublishEvery;
-  if (all) published_ = now;
-  motor_.move_readings(session_);
-  motor_.publish(session_, port_ != nullptr, all);
-}
-
-void Link::lose(const std::string& why) {
-  port_.reset();
-  congested_ = false;
-  was_ready_ = false;
-  session_.fail(EventKind::port_lost, why, clock_.now());
-  next_attempt_ = steady_clock::now() + reopening_.next();
-}
-
-// Past the session, so that an error inside it cannot prevent the coast. A frame cut short does no harm: the module
-// rescans after a bad CRC, and there are three.
-void Link::send_final_coast() noexcept {
-  if (!port_) return;
-  const auto end = steady_clock::now() + kFinalCoastLimit;
-  try {
-    std::array<std::uint8_t, kMaxFrame> frame;
-    const Packet coast = set<"propeller_motor_control.ctrl_coast">(session_.settings().module_id);
-    const std::size_t size = encode(coast, frame);
-    for (int i = 0; i < 3; ++i) {
-      std::span<const std::uint8_t> rest = std::span(frame).first(size);
-      while (!rest.empty() && steady_clock::now() < end) {
-        const std::size_t n = port_->write(rest);
-        if (capture_ && n > 0) capture_->add(Capture::Direction::sent, rest.first(n), clock_.now());
-        rest = rest.subspan(n);
-        if (n > 0) continue;
-        pollfd room{port_->fd(), POLLOUT, 0};
-        ::poll(&room, 1, 10);
-      }
-    }
-  } catch (const std::exception&) {
-    return;  // the port is gone
-  }
-  // Closing may throw away what has not left yet.
-  port_->drain(end - steady_clock::now());
-}
-
 Motor::Motor(const std::string& device, unsigned baud, const Settings& settings, const Clock& clock,
              const std::string& capture)
     : device_(device), link_(std::make_unique<Link>(*this, baud, settings, clock, capture)) {}
 
-Motor::~Motor() { (void)await_coast(order_coast(true), kStopLimit); }
+Motor::~Motor() { (void)await_coast(order_coast(), kStopLimit); }
 
 }  // namespace kphi::iq

@@ -14,7 +14,6 @@ namespace {
 using std::chrono::steady_clock;
 constexpr std::size_t kEvents = 256;
 constexpr auto kAnswerLimit = std::chrono::seconds(20);
-constexpr double kFastest = entry<"propeller_motor_control.ctrl_velocity">.max;
 
 }  // namespace
 
@@ -24,7 +23,7 @@ void Motor::spin_at(RadPerSec signed_speed) {
   }
   {
     const std::lock_guard lock(mutex_);
-    if (!alive_) refuse("spin", ended_ ? "connect again" : "find the cause, then rearm it");
+    if (!alive_) refuse("spin", ended_ ? "connect again" : "find the cause, then connect again");
     renew();
     commands_.speed = signed_speed;
     commands_.stop.reset();
@@ -36,13 +35,13 @@ void Motor::renew() noexcept {
   lease_end_ns_ = std::chrono::nanoseconds((steady_clock::now() + kLease).time_since_epoch()).count();
 }
 
-std::uint64_t Motor::order_coast(bool emergency) noexcept {
+std::uint64_t Motor::order_coast() noexcept {
   std::uint64_t ticket = 0;
   {
     const std::lock_guard lock(mutex_);
     commands_.speed.reset();
     commands_.stop.reset();
-    (emergency ? commands_.emergency : commands_.coast) = true;
+    commands_.coast = true;
     ticket = ++coasts_.asked;
   }
   commanded_.raise();
@@ -82,52 +81,9 @@ std::vector<Reply> Motor::inquire(std::vector<Inquiry> inquiries) {
   return replies_;
 }
 
-void Motor::rearm() {
-  std::unique_lock lock(mutex_);
-  if (alive_) return;
-  if (state_ != Session::State::ready || ended_) refuse("rearm", "wait until it is connected again");
-  commands_.rearm = true;
-  const std::uint64_t ticket = ++rearms_.asked;
-  commanded_.raise();
-  changed_.wait_for(lock, kAnswerLimit, [&] { return ended_ || rearms_.done >= ticket; });
-  if (!alive_) refuse("rearm", "wait until it is connected again");
-}
-
-std::optional<bool> Motor::await_connection(Duration wall) {
-  std::unique_lock lock(mutex_);
-  const bool decided = changed_.wait_for(lock, wall, [&] { return lost() || state_ == Session::State::ready; });
-  if (!decided) return std::nullopt;
-  return !lost();
-}
-
 std::vector<Event> Motor::take_events() {
   const std::lock_guard lock(mutex_);
   return std::exchange(events_, {});
-}
-
-bool Motor::connected() const {
-  const std::lock_guard lock(mutex_);
-  return !ended_ && state_ == Session::State::ready;
-}
-
-std::string Motor::failure() const {
-  const std::lock_guard lock(mutex_);
-  return failure_;
-}
-
-Identity Motor::identity() const {
-  const std::lock_guard lock(mutex_);
-  return identity_;
-}
-
-Counters Motor::counters() const {
-  const std::lock_guard lock(mutex_);
-  return counters_;
-}
-
-RoundTripHistogram Motor::round_trips() const {
-  const std::lock_guard lock(mutex_);
-  return round_trips_;
 }
 
 void Motor::refuse(const char* operation, const char* next_move) const {
@@ -137,14 +93,13 @@ void Motor::refuse(const char* operation, const char* next_move) const {
 
 Commands Motor::take_commands() {
   const std::lock_guard lock(mutex_);
-  for (Ticket* ticket : {&coasts_, &stops_, &rearms_, &inquiries_}) ticket->taken = ticket->asked;
+  for (Ticket* ticket : {&coasts_, &stops_, &inquiries_}) ticket->taken = ticket->asked;
   return std::exchange(commands_, {});
 }
 
 void Motor::move_readings(Session& session) {
   std::array<Reading, 64> batch;
   while (const std::size_t n = session.take(batch)) dropped_readings_ += n - readings_.push(batch.data(), n);
-  newest_reading_ns_ = session.newest_reading().count();
 }
 
 void Motor::publish(Session& session, bool line, bool all) {
@@ -170,7 +125,6 @@ void Motor::publish(Session& session, bool line, bool all) {
 
 bool Motor::note_state(const Session& session) {
   if (!session.failure().empty()) failure_ = session.failure();
-  if (session.armed()) failure_.clear();
   const bool alive = session.armed() || (alive_ && session.state() == Session::State::connecting);
   const bool news = state_ != session.state() || alive_ != alive;
   state_ = session.state();
@@ -189,7 +143,6 @@ bool Motor::close_tickets(const Session& session) {
   close(coasts_, session.coasting());
   if (close(stops_, !session.stopping() && session.stop_report().has_value())) stop_report_ = *session.stop_report();
   if (close(inquiries_, session.inquiries().done())) replies_ = session.inquiries().replies();
-  close(rearms_, true);
   return news;
 }
 

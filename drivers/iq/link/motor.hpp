@@ -5,13 +5,14 @@
 // when the thread ends for whatever reason; and when the object is destroyed. If this process is killed, the module's
 // own communication timeout coasts it.
 //
-// After a failure the link looks for the port and the module by itself and coasts what it finds. The motor spins again
-// only when its owner has seen the failure and calls rearm().
+// After a failure the link looks for the port and the module by itself and coasts what it finds. It does not spin
+// again: its owner, who has seen the failure, connects another one.
 #pragma once
 
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -21,6 +22,7 @@
 
 #include "base/wakeup.hpp"
 #include "drivers/iq/session/session.hpp"
+#include "drivers/serial/port.hpp"
 
 namespace kphi::iq {
 
@@ -29,10 +31,18 @@ class Link;
 /// Time that a caller may stay silent while the motor spins, wall time.
 inline constexpr Duration kLease = std::chrono::milliseconds(500);
 
+/// Completed for this port, as Motor does.
+[[nodiscard]] Settings stretched(Settings settings, const std::string& device, unsigned baud, const Clock& clock);
+
+/// Three coasts, within 0.2 s, straight to the port. `sent` gets the bytes that it took.
+void send_final_coast(
+    serial::Port& port, int module_id,
+    const std::function<void(std::span<const std::uint8_t>)>& sent = [](auto) {}) noexcept;
+
 /// The commands of callers to the link's thread.
 struct Commands {
   std::optional<RadPerSec> speed;
-  bool coast = false, emergency = false, rearm = false;
+  bool coast = false;
   std::optional<StopSettings> stop;
   std::optional<std::vector<Inquiry>> inquiry;
 };
@@ -60,13 +70,8 @@ class Motor {
   void spin_at(RadPerSec signed_speed);
   /// The caller is alive. Never restarts a motor that has been coasted.
   void renew() noexcept;
-  /// Overrules a spin_at that returned before.
-  void coast() noexcept { order_coast(false); }
-  /// As coast, three times at once.
-  void emergency_stop() noexcept { order_coast(true); }
-  /// Coasts, and waits for the module to report drive mode coast. False after `wall` or when the link is gone: the
-  /// motor may still be turning.
-  [[nodiscard]] bool coast_and_confirm(Duration wall) noexcept { return await_coast(order_coast(false), wall); }
+  /// Coasts, three times at once. Overrules a spin_at that returned before.
+  void emergency_stop() noexcept { order_coast(); }
   /// Ramps down, coasts, and waits until the motor is at rest or the settings' limit is over; keeps the lease
   /// meanwhile. Throws std::invalid_argument for settings that make no sense. Always ends coasting.
   [[nodiscard]] StopReport stop(const StopSettings& settings = {});
@@ -81,21 +86,14 @@ class Motor {
   std::size_t take(std::span<Reading> out) { return readings_.pop(out.data(), out.size()); }
   /// What happened, oldest first. 256 are kept.
   [[nodiscard]] std::vector<Event> take_events();
-  /// False once the port is gone, the module stopped answering or restarted, or a coast stayed unconfirmed; true again
-  /// only after rearm().
+  /// False once the port is gone, the module stopped answering or restarted, or a coast stayed unconfirmed.
   [[nodiscard]] bool alive() const noexcept { return alive_; }
-  /// The module answers: rearm() would succeed.
-  [[nodiscard]] bool connected() const;
-  /// The owner has seen the failure: the motor may spin again. Throws DeviceError unless connected.
-  void rearm();
-  /// Why it is not alive: the newest failure since the last rearm().
-  [[nodiscard]] std::string failure() const;
+  /// Why it is not alive: the newest failure.
+  [[nodiscard]] std::string failure() const { return copy_of(failure_); }
   [[nodiscard]] const std::string& device() const noexcept { return device_; }
-  [[nodiscard]] Identity identity() const;
-  [[nodiscard]] Counters counters() const;
-  [[nodiscard]] RoundTripHistogram round_trips() const;
-  /// Bench time of the newest reading.
-  [[nodiscard]] Instant newest_reading() const noexcept { return Instant(newest_reading_ns_); }
+  [[nodiscard]] Identity identity() const { return copy_of(identity_); }
+  [[nodiscard]] Counters counters() const { return copy_of(counters_); }
+  [[nodiscard]] RoundTripHistogram round_trips() const { return copy_of(round_trips_); }
 
  private:
   friend class Link;
@@ -105,11 +103,15 @@ class Motor {
     [[nodiscard]] bool open() const noexcept { return taken != done; }
   };
 
+  template <class T>
+  [[nodiscard]] T copy_of(const T& member) const {
+    const std::lock_guard lock(mutex_);
+    return member;
+  }
   /// Returns a ticket for await_coast.
-  std::uint64_t order_coast(bool emergency) noexcept;
-  [[nodiscard]] bool await_coast(std::uint64_t ticket, Duration wall) noexcept;
-  /// True: connected; false: failed; nullopt: neither within `wall`.
-  [[nodiscard]] std::optional<bool> await_connection(Duration wall);
+  std::uint64_t order_coast() noexcept;
+  /// False after `wall` or when the link is gone: the motor may still be turning.
+  bool await_coast(std::uint64_t ticket, Duration wall) noexcept;
   [[noreturn]] void refuse(const char* operation, const char* next_move) const;
   [[nodiscard]] bool lost() const noexcept { return ended_ || state_ == Session::State::failed; }
 
@@ -131,12 +133,12 @@ class Motor {
   mutable std::mutex mutex_;  ///< callers and the link's thread: everything down to the atomics
   std::condition_variable changed_;
   Commands commands_;
-  Ticket coasts_, stops_, rearms_, inquiries_;
+  Ticket coasts_, stops_, inquiries_;
   StopReport stop_report_;
   std::vector<Reply> replies_;
   Session::State state_ = Session::State::idle;
   bool line_ = true, ended_ = false;
-  std::string failure_;  ///< the last one that was not acknowledged
+  std::string failure_;  ///< the newest
   Identity identity_;
   Counters counters_;
   RoundTripHistogram round_trips_;
@@ -144,7 +146,6 @@ class Motor {
 
   std::uint64_t dropped_readings_ = 0, lease_expiries_ = 0, reconnections_ = 0;  ///< the link's thread
   std::atomic<std::int64_t> lease_end_ns_{0};                                    ///< steady_clock
-  std::atomic<std::int64_t> newest_reading_ns_{0};
   std::atomic<bool> alive_{true};
   boost::lockfree::spsc_queue<Reading> readings_{16384};
   std::unique_ptr<Link> link_;  ///< last: its thread uses the members above

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <utility>
 
 #include "compensation/units.hpp"
 
@@ -41,14 +42,11 @@ class Checks {
     firmware();
     hardware();
     faults();
-    supply();
-    regeneration();
+    voltages();
     communication_timeout();
     disarming();
     other_inputs();
     motor();
-    temperatures();
-    speed_range();
     controller();
     slewing();
     put_worst_first(findings_);
@@ -57,7 +55,7 @@ class Checks {
 
  private:
   template <Path path>
-  [[nodiscard]] const std::optional<double>& value() const {
+  [[nodiscard]] std::optional<double> value() const {
     return module_.value<path>();
   }
   void fault(std::string what, std::string next_move) {
@@ -118,7 +116,7 @@ class Checks {
 
   void faults() {
     const int now = bits(value<"power_safety.fault_now">()), ever = bits(value<"power_safety.fault_ever">());
-    const auto& latching = value<"power_safety.fault_latching">();
+    const auto latching = value<"power_safety.fault_latching">();
     if (now != 0)
       fault("the module reports a fault: " + fault_words(now), "remove the cause; see the limits in power_safety");
     if (ever != 0 && bits(latching) != 0)
@@ -132,9 +130,9 @@ class Checks {
            "set power_safety.fault_latching to 1 with the vendor's control program");
   }
 
-  void supply() {
-    const auto& limit = value<"brushless_drive.volts_limit">();
-    const auto& high = value<"power_safety.volt_input_high">();
+  void voltages() {
+    const auto limit = value<"brushless_drive.volts_limit">();
+    const auto high = value<"power_safety.volt_input_high">();
     if (limit && !(*limit > supply_volts_))
       fault(
           fmt::format("volts_limit {:.4g} V is not above the supply's {:.4g} V: the motor may run away to its maximum "
@@ -144,11 +142,7 @@ class Checks {
     if (high && !(*high > supply_volts_))
       warn(fmt::format("the module trips at {:.4g} V, the supply may reach {:.4g} V", *high, supply_volts_),
            "lower the supply's voltage");
-  }
-
-  void regeneration() {
-    const auto& start = value<"brushless_drive.v_max_start">();
-    const auto& limit = value<"brushless_drive.volts_limit">();
+    const auto start = value<"brushless_drive.v_max_start">();
     if (start && limit && !(*start <= *limit))
       warn(fmt::format("v_max_start {:.4g} V is above volts_limit {:.4g} V: regeneration is not limited gradually",
                        *start, *limit),
@@ -156,7 +150,7 @@ class Checks {
   }
 
   void communication_timeout() {
-    const auto& timeout = value<"propeller_motor_control.timeout">();
+    const auto timeout = value<"propeller_motor_control.timeout">();
     if (timeout && !(*timeout > 0 && *timeout <= intention_.timeout_max_s))
       fault(fmt::format("the communication timeout is {:.4g} s, the limit {:.4g} s: after a dead line the motor would "
                         "keep turning",
@@ -177,14 +171,14 @@ class Checks {
 
   void disarming() {
     if (!is(value<"propeller_motor_control.timeout_meaning">(), TimeoutMeaning::disarm_behavior)) return;
-    const auto& behavior = value<"arming_handler.disarm_behavior">();
+    const auto behavior = value<"arming_handler.disarm_behavior">();
     if (behavior && is(behavior, TimeoutBehavior::coast)) return;
     fault("at its communication timeout the module runs its disarm behaviour, which does not coast",
           "set propeller_motor_control.timeout_meaning to 0, or arming_handler.disarm_behavior to 0");
   }
 
   void other_inputs() {
-    const auto& allowed = value<"hobby_input.allowed_protocols">();
+    const auto allowed = value<"hobby_input.allowed_protocols">();
     if (!allowed || *allowed == kHobbyDisabled) return;
     fault(
         fmt::format("the hobby input is enabled (allowed_protocols {:g}): noise on it can command the motor", *allowed),
@@ -193,9 +187,9 @@ class Checks {
   }
 
   void motor() {
-    const auto& pairs = value<"brushless_drive.motor_pole_pairs">();
-    const auto& kv = value<"brushless_drive.motor_Kv">();
-    const auto& amps = value<"brushless_drive.motor_I_max">();
+    const auto pairs = value<"brushless_drive.motor_pole_pairs">();
+    const auto kv = value<"brushless_drive.motor_Kv">();
+    const auto amps = value<"brushless_drive.motor_I_max">();
     if (pairs && *pairs != kPolePairs)
       warn(fmt::format("motor_pole_pairs is {:g}, a 2306 has {:g}: reported speeds would be wrong by their ratio",
                        *pairs, kPolePairs),
@@ -207,9 +201,6 @@ class Checks {
     if (amps && !(*amps <= kMotorAmps))
       warn(fmt::format("motor_I_max is {:.4g} A; above {:g} A the motor overheats", *amps, kMotorAmps),
            "lower brushless_drive.motor_I_max");
-  }
-
-  void temperatures() {
     if (module_.coil_temperature_client() == 0)
       warn("no coil temperature from the module: nothing guards the coil", "update the firmware");
     if (module_.coil_temperature_client() == static_cast<int>(Client::temperature_estimator))
@@ -219,7 +210,7 @@ class Checks {
         derates(value<"temperature_estimator.derate">(), kNoDerate) ||
         derates(value<"brushless_drive.derate">(), kNoDerate))
       warn("the module already derates, with the motor at rest", "let it cool down");
-    const auto& warm = value<"coil_temperature_estimator.otw">();
+    const auto warm = value<"coil_temperature_estimator.otw">();
     const double limit = intention_.coil_temperature_max_degc;
     if (warm && limit > 0 && !(*warm >= limit))
       warn(
@@ -227,8 +218,8 @@ class Checks {
           "lower the coil temperature limit to that value");
   }
 
-  void speed_range() {
-    const auto& start = value<"brushless_drive.motor_redline_start">();
+  void controller() {
+    const auto start = value<"brushless_drive.motor_redline_start">();
     const double fastest = intention_.speed_max_rad_s;
     if (start && fastest > 0 && !(*start > fastest))
       warn(fmt::format("the module derates above {:.4g} rad/s (redline), the fastest step needs {:.4g} rad/s", *start,
@@ -237,11 +228,8 @@ class Checks {
     if (intention_.clock_unchecked)
       note("the module's clock is unchecked: its speeds may be off by some tenths of a percent",
            "kphi devices --bench FILE --clock-gain measures it");
-  }
-
-  void controller() {
-    const auto& kp = value<"propeller_motor_control.velocity_Kp">();
-    const auto& ki = value<"propeller_motor_control.velocity_Ki">();
+    const auto kp = value<"propeller_motor_control.velocity_Kp">();
+    const auto ki = value<"propeller_motor_control.velocity_Ki">();
     if (kp && ki && !(*kp > 0) && !(*ki > 0))
       warn("velocity_Kp and velocity_Ki are 0: the speed is not controlled", "tune the controller");
     std::vector<const char*> unset;
@@ -253,7 +241,7 @@ class Checks {
     if (!unset.empty())
       warn(fmt::format("{} is unset: steps settle late or never", fmt::join(unset, " and ")),
            "identify it for this propeller: V = ff1 w + ff2 w^2, ff2 is near 3e-7 for 5 inches");
-    const auto& hertz = value<"propeller_motor_control.input_filter_fc">();
+    const auto hertz = value<"propeller_motor_control.input_filter_fc">();
     if (hertz && !(*hertz >= kSlowFilter))
       warn(fmt::format("input_filter_fc is {:g} Hz: a new speed reaches the controller only after {:.2g} s", *hertz,
                        1 / (2 * kPi * *hertz)),
@@ -261,7 +249,7 @@ class Checks {
   }
 
   void slewing() {
-    const auto& slew = value<"brushless_drive.slew_volts_per_second">();
+    const auto slew = value<"brushless_drive.slew_volts_per_second">();
     if (bits(value<"brushless_drive.slew_enable">()) == 0 || !slew) return;
     std::string what = fmt::format("the drive voltage is limited to {:.4g} V/s: steps settle later", *slew);
     if (*slew >= kSlowSlew) return note(std::move(what));
@@ -278,33 +266,33 @@ std::string value_text(const Entry& entry, double value) {
   return entry.format == Format::f32 ? fmt::format("{}", static_cast<float>(value)) : fmt::format("{:.0f}", value);
 }
 
+template <class Version>
+std::optional<Version> version_of(const std::optional<double>& word) {
+  return word ? std::optional(Version(static_cast<std::uint32_t>(*word))) : std::nullopt;
+}
+
 }  // namespace
 
-std::optional<FirmwareVersion> AuditRecord::firmware() const noexcept {
-  const auto& word = value<"system_control.firmware_version">();
-  return word ? std::optional(FirmwareVersion(static_cast<std::uint32_t>(*word))) : std::nullopt;
+std::optional<FirmwareVersion> AuditRecord::firmware() const {
+  return version_of<FirmwareVersion>(value<"system_control.firmware_version">());
 }
 
-std::optional<BoardVersion> AuditRecord::hardware() const noexcept {
-  const auto& word = value<"system_control.hardware_version">();
-  return word ? std::optional(BoardVersion(static_cast<std::uint32_t>(*word))) : std::nullopt;
+std::optional<BoardVersion> AuditRecord::hardware() const {
+  return version_of<BoardVersion>(value<"system_control.hardware_version">());
 }
 
-std::optional<BoardVersion> AuditRecord::electronics() const noexcept {
-  const auto& word = value<"system_control.electronics_version">();
-  return word ? std::optional(BoardVersion(static_cast<std::uint32_t>(*word))) : std::nullopt;
+std::optional<BoardVersion> AuditRecord::electronics() const {
+  return version_of<BoardVersion>(value<"system_control.electronics_version">());
 }
 
 std::string AuditRecord::uid() const {
-  const auto& a = value<"system_control.uid1">();
-  const auto& b = value<"system_control.uid2">();
-  const auto& c = value<"system_control.uid3">();
+  const auto a = value<"system_control.uid1">(), b = value<"system_control.uid2">(), c = value<"system_control.uid3">();
   if (!a || !b || !c) return "";
   return fmt::format("{:08x}{:08x}{:08x}", static_cast<std::uint32_t>(*a), static_cast<std::uint32_t>(*b),
                      static_cast<std::uint32_t>(*c));
 }
 
-int AuditRecord::coil_temperature_client() const noexcept {
+int AuditRecord::coil_temperature_client() const {
   if (value<"coil_temperature_estimator.t_coil">()) return static_cast<int>(Client::coil_temperature_estimator);
   return value<"temperature_estimator.temp">() ? static_cast<int>(Client::temperature_estimator) : 0;
 }
@@ -318,11 +306,9 @@ std::string AuditRecord::text() const {
   decoded("firmware", firmware() ? firmware()->text() : "");
   decoded("hardware", hardware() ? hardware()->text() : "");
   decoded("electronics", electronics() ? electronics()->text() : "");
-  for (std::size_t i = 0; i < kAuditedCount; ++i) {
-    if (!values[i]) continue;
-    const Entry& told = *kAudited[i];
-    text += fmt::format("{}.{}: {}{}{}\n", name_of(told.type), told.name, value_text(told, *values[i]),
-                        told.unit.empty() ? "" : "  # ", told.unit);
+  for (const auto& [told, value] : values) {
+    text +=
+        fmt::format("{}: {}{}{}\n", told->path, value_text(*told, value), told->unit.empty() ? "" : "  # ", told->unit);
   }
   return text;
 }
@@ -333,28 +319,25 @@ AuditRecord AuditRecord::of(std::string_view text) {
     const std::string_view line = text.substr(0, text.find('\n'));
     text.remove_prefix(std::min(text.size(), line.size() + 1));
     const std::size_t colon = line.find(": ");
-    if (colon == std::string_view::npos) continue;
+    const Entry* told = colon == std::string_view::npos ? nullptr : find(line.substr(0, colon));
     double value = 0;
-    if (std::from_chars(line.data() + colon + 2, line.data() + line.size(), value).ec != std::errc()) continue;
-    for (std::size_t i = 0; i < kAuditedCount; ++i) {
-      if (line.substr(0, colon) == fmt::format("{}.{}", name_of(kAudited[i]->type), kAudited[i]->name))
-        record.values[i] = value;
-    }
+    if (told == nullptr || !told->audited) continue;
+    if (std::from_chars(line.data() + colon + 2, line.data() + line.size(), value).ec == std::errc())
+      record.values[told] = value;
   }
   return record;
 }
 
 AuditRecord read_audit(Dialogue& module) {
   AuditRecord record;
-  std::optional<Client> absent;
-  for (std::size_t i = 0; i < kAuditedCount; ++i) {
-    const Entry& asked = *kAudited[i];
-    const bool first = i == 0 || kAudited[i - 1]->type != asked.type;
+  std::optional<Client> last, absent;
+  for (const Entry& asked : kEntries) {
+    const bool first = std::exchange(last, asked.type) != asked.type;
     const bool succeeded =
-        asked.type == Client::temperature_estimator && record.value<"coil_temperature_estimator.t_coil">().has_value();
-    if (succeeded || asked.type == absent) continue;
-    if (const auto answer = module.ask(asked)) {
-      record.values[i] = answer->value;
+        asked.type == Client::temperature_estimator && record.value<"coil_temperature_estimator.t_coil">();
+    if (!asked.audited || succeeded || asked.type == absent) continue;
+    if (const auto value = module.inquire({&asked, std::nullopt}).value) {
+      record.values[&asked] = *value;
     } else if (first) {
       absent = asked.type;
     }

@@ -85,10 +85,10 @@ double least_slack(const std::vector<Point>& points) {
 
 Answer require_answer(Dialogue& module, const Entry& asked) {
   for (int i = 0; i < kSilences; ++i) {
-    const auto answer = module.ask(asked);
-    if (answer && std::isfinite(answer->value)) return *answer;
+    const Reply reply = module.inquire({&asked, std::nullopt});
+    if (reply.value && std::isfinite(*reply.value)) return {*reply.value, reply.time, reply.uncertainty};
   }
-  throw DeviceError("IQ module", kOperation, fmt::format("no reply to get {}", asked.name),
+  throw DeviceError("IQ module", kOperation, fmt::format("no reply to get {}", asked.name()),
                     "check the line; update old firmware");
 }
 
@@ -123,7 +123,7 @@ ClockGain clock_gain(std::span<const Answer> times) {
 
 ClockGain measure_clock_gain(Dialogue& module, const ClockGainSettings& settings) {
   require_standstill(module);
-  module.tell(kTime, 0);
+  (void)module.inquire({&kTime, 0.0});  // its clock runs: what it reads back is later
   std::vector<Answer> times;
   const Duration whole = from_seconds(settings.duration_s);
   while (times.size() < 2 || times.back().time - times.front().time < whole) {

@@ -24,6 +24,13 @@
 
 namespace kphi::iq {
 
+/// A reading of system_control.time.
+struct Answer {
+  double value = 0;         ///< s
+  Instant time{0};          ///< bench time: the middle of the span in which the module read the value
+  Duration uncertainty{0};  ///< half of that span: from the end of the question to the beginning of the reply
+};
+
 struct ClockGain {
   double factor = 1;               ///< module seconds per host second
   double u_factor = 0;             ///< standard uncertainty, with that of the host's clock (a quartz: 30e-6)

@@ -4,6 +4,8 @@
 
 #include <array>
 #include <iterator>
+#include <set>
+#include <thread>
 
 #include "base/error.hpp"
 #include "drivers/iq/service/dialogue.hpp"
@@ -11,17 +13,78 @@
 namespace kphi::iq {
 namespace {
 
+using std::chrono::steady_clock;
 constexpr const Entry& kDriveMode = entry<"brushless_drive.drive_mode">;
+constexpr Duration kWriteLimit = std::chrono::milliseconds(500);
+constexpr Duration kAdapter = std::chrono::milliseconds(50);  ///< bytes that only an adapter knows of may still leave
 constexpr Duration kReply = std::chrono::milliseconds(60);
-constexpr int kIds = static_cast<int>(ModuleId::last) + 1;
+constexpr int kLastId = static_cast<int>(ModuleId::last);
 constexpr Duration kTurn = std::chrono::milliseconds(18);  ///< for each id; a USB adapter may be 16 ms late
 constexpr Duration kLastTurn = std::chrono::milliseconds(100);
 
+Duration on_wire(std::size_t bytes, unsigned baud) { return from_seconds(10.0 * static_cast<double>(bytes) / baud); }
+
+/// A serial line searched by hand, blocking. Wall time.
+class Search {
+ public:
+  Search(const std::string& device, unsigned baud) : port_(device, baud) {}
+
+  /// Of this host's port only. Waits until all has left; then both directions are emptied, and the module's parser too,
+  /// which may wait for the end of a false frame. Coasts whatever listens, this id and all.
+  void begin(unsigned baud, int module_id) {
+    port_.drain(kWriteLimit);
+    std::this_thread::sleep_for(kAdapter);
+    port_.set_baud(baud);
+    parser_.reset();
+    write(std::array<std::uint8_t, kMaxFrame>{});
+    for (int i = 0; i < 3; ++i) {
+      send(set<"propeller_motor_control.ctrl_coast">(module_id));
+      send(set<"propeller_motor_control.ctrl_coast">(static_cast<int>(ModuleId::broadcast)));
+    }
+  }
+  /// Asks this id, and gives each id that answers within `wall` of the last byte sent to `heard`.
+  template <class Heard>
+  void ask(int module_id, Duration wall, Heard&& heard) {
+    send(get<"brushless_drive.drive_mode">(module_id));
+    const auto end = steady_clock::now() + wall + on_wire(port_.unsent(), port_.baud());
+    for (bool enough = false; !enough && port_.wait(end - steady_clock::now());) {
+      std::array<std::uint8_t, 512> buffer;
+      const std::size_t n = port_.read(buffer);
+      parser_.push(std::span(buffer).first(n), [&](const Packet& packet, std::uint64_t) {
+        const bool reply = packet.standard() && packet.access() == Access::reply &&
+                           packet.type == static_cast<std::uint8_t>(kDriveMode.type) && packet.sub() == kDriveMode.sub;
+        enough = (reply && heard(packet)) || enough;
+      });
+    }
+  }
+
+ private:
+  void send(const Packet& packet) {
+    std::array<std::uint8_t, kMaxFrame> frame;
+    write(std::span(frame).first(encode(packet, frame)));
+  }
+  void write(std::span<const std::uint8_t> bytes) {
+    for (const auto end = steady_clock::now() + kWriteLimit; !bytes.empty() && steady_clock::now() < end;) {
+      bytes = bytes.subspan(port_.write(bytes));
+      if (!bytes.empty()) port_.drain(std::chrono::milliseconds(2));
+    }
+  }
+
+  serial::Port port_;
+  Parser parser_;
+};
+
 /// Two queries, because the module may take the first for the end of a frame.
-bool answers_at(Conversation& line, int module_id, unsigned baud) {
-  line.set_baud(baud);
-  line.coast(module_id);
-  return line.ask(kDriveMode, module_id, kReply) || line.ask(kDriveMode, module_id, kReply);
+bool answers_at(Search& line, int module_id, unsigned baud) {
+  line.begin(baud, module_id);
+  bool answers = false;
+  for (int i = 0; i < 2 && !answers; ++i) {
+    line.ask(module_id, kReply + on_wire(kMaxFrame, baud), [&](const Packet& packet) {
+      answers |= packet.module_id() == module_id && packet.data().size() == size_of(kDriveMode.format);
+      return answers;
+    });
+  }
+  return answers;
 }
 
 }  // namespace
@@ -32,7 +95,7 @@ const std::vector<unsigned>& bauds_to_try() {
 }
 
 std::optional<unsigned> find_baud(const std::string& device, int module_id, unsigned first) {
-  Conversation line(device, first);
+  Search line(device, first);
   if (answers_at(line, module_id, first)) return first;
   for (const unsigned baud : bauds_to_try()) {
     if (baud != first && answers_at(line, module_id, baud)) return baud;
@@ -42,24 +105,16 @@ std::optional<unsigned> find_baud(const std::string& device, int module_id, unsi
 
 // One id at a time, because replies share a wire. A late reply still carries its id.
 std::vector<int> find_ids(const std::string& device, unsigned baud) {
-  Conversation line(device, baud);
-  line.set_baud(baud);
-  line.coast(static_cast<int>(ModuleId::broadcast));
-  std::array<bool, kIds> answered{};
-  const auto note = [&](const Packet& packet) {
-    const int id = packet.module_id();
-    if (id < kIds && is_reply_of(packet, kDriveMode, id)) answered[static_cast<std::size_t>(id)] = true;
-    return false;
-  };
-  for (int id = 0; id < kIds; ++id) {
-    line.tell(get<"brushless_drive.drive_mode">(id));
-    line.listen(id + 1 < kIds ? kTurn : kLastTurn, note);
+  Search line(device, baud);
+  line.begin(baud, static_cast<int>(ModuleId::broadcast));
+  std::set<int> ids;
+  for (int id = 0; id <= kLastId; ++id) {
+    line.ask(id, id < kLastId ? kTurn : kLastTurn, [&](const Packet& packet) {
+      if (packet.module_id() <= kLastId) ids.insert(packet.module_id());
+      return false;
+    });
   }
-  std::vector<int> ids;
-  for (int id = 0; id < kIds; ++id) {
-    if (answered[static_cast<std::size_t>(id)]) ids.push_back(id);
-  }
-  return ids;
+  return {ids.begin(), ids.end()};
 }
 
 namespace {

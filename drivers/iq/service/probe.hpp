@@ -12,7 +12,7 @@
 #include "drivers/iq/service/audit.hpp"
 #include "drivers/iq/service/clock_gain.hpp"
 #include "drivers/iq/service/dialogue.hpp"
-#include "drivers/serial/discovery.hpp"
+#include "drivers/serial/port.hpp"
 
 namespace kphi::iq {
 

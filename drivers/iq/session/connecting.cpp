@@ -7,61 +7,65 @@
 
 namespace kphi::iq {
 
+void OpenInquiry::advance(Exchange& exchange, int module_id, Instant now) {
+  if (asked_ || done()) return;
+  const auto& [wanted, set_to] = inquiry_;
+  asked_ = set_to ? exchange.tell_and_ask(*wanted, *set_to, module_id, now) : exchange.ask(*wanted, module_id, now);
+}
+
+bool OpenInquiry::take(const QueryResult& result) noexcept {
+  if (!asked_ || &result.entry() != inquiry_.entry) return false;
+  asked_ = false;
+  reply_.time = result.time;
+  reply_.uncertainty = result.uncertainty;
+  take(result.kind == QueryResult::Kind::answer ? std::optional(result.value()) : std::nullopt);
+  return true;
+}
+
+void OpenInquiry::take(std::optional<double> answer) noexcept {
+  --attempts_;
+  if (!answer) return;
+  reply_.value = answer;
+  reply_.accepted = inquiry_.set_to && is_as_set(*inquiry_.entry, *inquiry_.set_to, *answer);
+  if (!inquiry_.set_to || reply_.accepted) attempts_ = 0;
+}
+
 void Inquiries::check(const std::vector<Inquiry>& inquiries) {
   for (const Inquiry& inquiry : inquiries) {
     const Entry& wanted = *inquiry.entry;
-    if (!wanted.allows(Access::get) || size_of(wanted.format) > 4) {
-      throw std::invalid_argument(fmt::format("{}.{} cannot be read as a number", name_of(wanted.type), wanted.name));
-    }
-    if (inquiry.set_to && !is_volatile_setting(wanted)) {
-      throw std::invalid_argument(fmt::format("{}.{} must not be set in passing", name_of(wanted.type), wanted.name));
-    }
+    if (!wanted.allows(Access::get) || size_of(wanted.format) > 4)
+      throw std::invalid_argument(fmt::format("{} cannot be read as a number", wanted.path));
+    if (inquiry.set_to && !is_volatile_setting(wanted))
+      throw std::invalid_argument(fmt::format("{} must not be set in passing", wanted.path));
   }
 }
 
-void Inquiries::begin(const std::vector<Inquiry>& inquiries) {
-  items_.clear();
-  for (const Inquiry& inquiry : inquiries) items_.push_back({OpenInquiry(inquiry)});
-}
-
 void Inquiries::advance(Exchange& exchange, int system_control_id, Instant now) {
-  for (Item& item : items_) {
-    if (item.asked || item.open.done()) continue;
-    const auto& [wanted, set_to] = item.open.inquiry();
-    const int id = wanted->type == Client::system_control ? system_control_id : module_id_;
-    item.asked = set_to ? exchange.tell_and_ask(*wanted, *set_to, id, now) : exchange.ask(*wanted, id, now);
+  for (OpenInquiry& one : open_) {
+    const bool of_system = one.inquiry().entry->type == Client::system_control;
+    one.advance(exchange, of_system ? system_control_id : module_id_, now);
   }
 }
 
 void Inquiries::take(const QueryResult& result) {
-  for (Item& item : items_) {
-    if (!item.asked || item.open.inquiry().entry != &result.entry()) continue;
-    item.asked = false;
-    return item.open.take(result.kind == QueryResult::Kind::answer ? std::optional(result.value()) : std::nullopt);
-  }
+  (void)std::ranges::any_of(open_, [&](OpenInquiry& one) { return one.take(result); });
 }
 
-bool Inquiries::done() const noexcept {
-  return std::all_of(items_.begin(), items_.end(), [](const Item& item) { return item.open.done(); });
-}
+bool Inquiries::done() const noexcept { return std::ranges::all_of(open_, &OpenInquiry::done); }
 
 bool Inquiries::sets(const Entry& wanted) const noexcept {
-  return std::any_of(items_.begin(), items_.end(), [&](const Item& item) {
-    const Inquiry& inquiry = item.open.inquiry();
-    return !item.open.done() && inquiry.entry == &wanted && inquiry.set_to;
+  return std::ranges::any_of(open_, [&](const OpenInquiry& one) {
+    return !one.done() && one.inquiry().entry == &wanted && one.inquiry().set_to;
   });
 }
 
 void Inquiries::abandon() noexcept {
-  for (Item& item : items_) {
-    item.open.give_up();
-    item.asked = false;
-  }
+  for (OpenInquiry& one : open_) one.give_up();
 }
 
 std::vector<Reply> Inquiries::replies() const {
   std::vector<Reply> all;
-  for (const Item& item : items_) all.push_back(item.open.reply());
+  for (const OpenInquiry& one : open_) all.push_back(one.reply());
   return all;
 }
 
@@ -136,29 +140,26 @@ void Connecting::begin(const std::optional<Identity>& known) {
   identity_.system_control_id = module_id_;
   step_ = 0;
   open_.reset();
-  asked_ = false;
   failure_.clear();
   another_module_ = false;
 }
 
+void Connecting::skip() noexcept { step_ = std::size(kScript); }
+
 bool Connecting::done() const noexcept { return step_ == std::size(kScript); }
 
 void Connecting::advance(Exchange& exchange, Instant now) {
-  if (asked_ || !failure_.empty()) return;
+  if (!failure_.empty()) return;
   while (!done() && kScript[step_].kind == Step::Kind::legacy_coil && identity_.coil_temperature_client != 0) next();
   if (done()) return;
   if (!open_) open_ = inquiry();
-  const auto& [wanted, set_to] = open_->inquiry();
-  const int id = id_of(*wanted);
-  asked_ = set_to ? exchange.tell_and_ask(*wanted, *set_to, id, now) : exchange.ask(*wanted, id, now);
+  const bool of_system = kScript[step_].entry->type == Client::system_control;
+  open_->advance(exchange, of_system ? identity_.system_control_id : module_id_, now);
 }
 
 void Connecting::take(const QueryResult& result) {
-  if (!asked_ || done() || &result.entry() != kScript[step_].entry) return;
-  asked_ = false;
-  open_->take(result.kind == QueryResult::Kind::answer ? std::optional(result.value()) : std::nullopt);
-  if (open_->done())
-    conclude(result.kind == QueryResult::Kind::wrong_length ? "a reply of the wrong length" : "no reply");
+  if (!open_ || !open_->take(result) || !open_->done()) return;
+  conclude(result.kind == QueryResult::Kind::wrong_length ? "a reply of the wrong length" : "no reply");
 }
 
 void Connecting::conclude(const char* why_silent) {
@@ -169,7 +170,7 @@ void Connecting::conclude(const char* why_silent) {
     failure_ = fmt::format(
         "the module did not accept its communication timeout ({} reads {} instead of {}): the motor would keep "
         "turning if this host died",
-        step.entry->name, *reply.value, *wanted());
+        step.entry->name(), *reply.value, *wanted());
     return;
   }
   step.store(identity_, *reply.value);
@@ -181,7 +182,7 @@ void Connecting::conclude(const char* why_silent) {
 void Connecting::take_silence(const char* why) {
   const Step& step = kScript[step_];
   if (step.must_answer()) {
-    failure_ = fmt::format("{} to get {}.{}", why, name_of(step.entry->type), step.entry->name);
+    failure_ = fmt::format("{} to get {}", why, step.entry->path);
   } else if (step.kind == Step::Kind::own_id && identity_.system_control_id != 0) {
     identity_.system_control_id = 0;
     open_.reset();
@@ -205,10 +206,6 @@ void Connecting::compare_uid() {
 void Connecting::next() noexcept {
   ++step_;
   open_.reset();
-}
-
-int Connecting::id_of(const Entry& asked) const noexcept {
-  return asked.type == Client::system_control ? identity_.system_control_id : module_id_;
 }
 
 std::optional<double> Connecting::wanted() const noexcept {

@@ -18,10 +18,11 @@ struct Inquiry {
 struct Reply {
   std::optional<double> value;  ///< in the entry's own unit; nullopt: no answer
   bool accepted = false;        ///< the module reads back what was set, bit by bit
+  Instant time{0};              ///< bench time at which the module read the value
+  Duration uncertainty{0};      ///< the true moment is time ± uncertainty
 };
 
-/// One inquiry under way: when to ask again, and when it is finished. The caller sends it and decides how long an
-/// answer may take.
+/// One inquiry under way: when to ask again, and when it is finished.
 class OpenInquiry {
  public:
   static constexpr int kAttempts = 3;
@@ -30,15 +31,16 @@ class OpenInquiry {
       : inquiry_(inquiry), attempts_(attempts) {}
 
   [[nodiscard]] const Inquiry& inquiry() const noexcept { return inquiry_; }
+  /// Sends the next attempt when there is room for it.
+  void advance(Exchange& exchange, int module_id, Instant now);
+  /// Whether the result is that of the attempt under way.
+  bool take(const QueryResult& result) noexcept;
   /// The result of one attempt; nullopt: no usable answer.
-  void take(std::optional<double> answer) noexcept {
-    --attempts_;
-    if (!answer) return;
-    reply_.value = answer;
-    reply_.accepted = inquiry_.set_to && is_as_set(*inquiry_.entry, *inquiry_.set_to, *answer);
-    if (!inquiry_.set_to || reply_.accepted) attempts_ = 0;
+  void take(std::optional<double> answer) noexcept;
+  void give_up() noexcept {
+    attempts_ = 0;
+    asked_ = false;
   }
-  void give_up() noexcept { attempts_ = 0; }
   /// Answered, accepted or given up: no further attempt.
   [[nodiscard]] bool done() const noexcept { return attempts_ <= 0; }
   [[nodiscard]] const Reply& reply() const noexcept { return reply_; }
@@ -46,6 +48,7 @@ class OpenInquiry {
  private:
   Inquiry inquiry_;
   int attempts_;
+  bool asked_ = false;  ///< waiting for the answer
   Reply reply_;
 };
 
@@ -57,7 +60,7 @@ class Inquiries {
   /// Throws std::invalid_argument for an entry that is not readable as a number, or must not be set in passing.
   static void check(const std::vector<Inquiry>& inquiries);
   /// Starts over with these, which are checked.
-  void begin(const std::vector<Inquiry>& inquiries);
+  void begin(const std::vector<Inquiry>& inquiries) { open_ = {inquiries.begin(), inquiries.end()}; }
   void take(const QueryResult& result);
   void advance(Exchange& exchange, int system_control_id, Instant now);
   /// Gives up the open ones: the link is lost.
@@ -69,13 +72,8 @@ class Inquiries {
   [[nodiscard]] std::vector<Reply> replies() const;
 
  private:
-  struct Item {
-    OpenInquiry open;
-    bool asked = false;  ///< waiting for the answer
-  };
-
   int module_id_;
-  std::vector<Item> items_;
+  std::vector<OpenInquiry> open_;
 };
 
 /// What is asked and set at connection, one question at a time.
@@ -86,6 +84,8 @@ class Connecting {
 
   /// Starts from the first step. `known`: the only module that is accepted.
   void begin(const std::optional<Identity>& known);
+  /// Done without a step.
+  void skip() noexcept;
   void take(const QueryResult& result);
   /// Sends the next query when there is room for it.
   void advance(Exchange& exchange, Instant now);
@@ -99,7 +99,6 @@ class Connecting {
   [[nodiscard]] const Identity& identity() const noexcept { return identity_; }
 
  private:
-  [[nodiscard]] int id_of(const Entry& entry) const noexcept;
   [[nodiscard]] std::optional<double> wanted() const noexcept;
   [[nodiscard]] OpenInquiry inquiry() const noexcept;
   void conclude(const char* why_silent);
@@ -114,7 +113,6 @@ class Connecting {
   Identity identity_;
   std::size_t step_ = 0;
   std::optional<OpenInquiry> open_;  ///< of this step
-  bool asked_ = false;               ///< waiting for the answer
   std::string failure_;
   bool another_module_ = false;
 };

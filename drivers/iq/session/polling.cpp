@@ -10,37 +10,26 @@ constexpr std::size_t kReadings = 4096;
 constexpr Duration kWatchPeriod = std::chrono::milliseconds(250);
 constexpr std::size_t kUptime = kQuantities, kFaultEver = kQuantities + 1;
 
-const Entry* entry_of(Quantity quantity, const Identity& identity) noexcept {
-  switch (quantity) {
-    case Quantity::speed:
-      return &entry<"brushless_drive.obs_velocity">;
-    case Quantity::supply_voltage:
-      return &entry<"power_monitor.volts">;
-    case Quantity::supply_current:
-      return &entry<"power_monitor.amps">;
-    case Quantity::motor_current:
-      return &entry<"brushless_drive.est_motor_amps">;
-    case Quantity::coil_temperature:
-      if (identity.coil_temperature_client == 83) return &entry<"coil_temperature_estimator.t_coil">;
-      if (identity.coil_temperature_client == 77) return &entry<"temperature_estimator.temp">;
-      return nullptr;
-    case Quantity::derate:
-      return &entry<"brushless_drive.derate">;
-    case Quantity::drive_mode:
-      return &entry<"brushless_drive.drive_mode">;
-    case Quantity::drive_pwm:
-      return &entry<"brushless_drive.drive_pwm">;
-    case Quantity::fault_now:
-      return identity.fault_ever >= 0 ? &entry<"power_safety.fault_now"> : nullptr;
-  }
-  return nullptr;
+/// In the order of Quantity; null: depends on the module.
+constexpr std::array<const Entry*, kQuantities> kEntryOf{&entry<"brushless_drive.obs_velocity">,
+                                                         &entry<"power_monitor.volts">,
+                                                         &entry<"power_monitor.amps">,
+                                                         &entry<"brushless_drive.est_motor_amps">,
+                                                         nullptr,
+                                                         &entry<"brushless_drive.derate">,
+                                                         &entry<"brushless_drive.drive_mode">,
+                                                         &entry<"brushless_drive.drive_pwm">,
+                                                         nullptr};
+
+const Entry* coil_temperature_of(const Identity& identity) noexcept {
+  if (identity.coil_temperature_client == 83) return &entry<"coil_temperature_estimator.t_coil">;
+  return identity.coil_temperature_client == 77 ? &entry<"temperature_estimator.temp"> : nullptr;
 }
 
 }  // namespace
 
 Polling::Polling(const Settings& settings)
     : module_id_(settings.module_id),
-      byte_time_(settings.wire_byte_time),
       cycle_{from_seconds(1 / settings.telemetry_hz)},
       slow_{from_seconds(1 / settings.slow_hz)},
       watch_{kWatchPeriod},
@@ -53,11 +42,13 @@ void Polling::begin(const Identity& identity, Instant now) {
   on_ = true;
   wanted_.fill(false);
   cycle_.next = slow_.next = watch_.next = now;
-  for (std::size_t i = 0; i < kQuantities; ++i) {
-    questions_[i] = {entry_of(static_cast<Quantity>(i), identity), module_id_};
-  }
+  for (std::size_t i = 0; i < kQuantities; ++i) questions_[i] = {kEntryOf[i], module_id_};
+  questions_[static_cast<std::size_t>(Quantity::coil_temperature)].entry = coil_temperature_of(identity);
   questions_[kUptime] = {identity.uptime_s >= 0 ? &entry<"system_control.time"> : nullptr, identity.system_control_id};
-  questions_[kFaultEver] = {identity.fault_ever >= 0 ? &entry<"power_safety.fault_ever"> : nullptr, module_id_};
+  const bool tells_faults = identity.fault_ever >= 0;
+  questions_[static_cast<std::size_t>(Quantity::fault_now)].entry =
+      tells_faults ? &entry<"power_safety.fault_now"> : nullptr;
+  questions_[kFaultEver] = {tells_faults ? &entry<"power_safety.fault_ever"> : nullptr, module_id_};
 }
 
 bool Polling::Beat::strike(Instant now) noexcept {
@@ -109,27 +100,14 @@ void Polling::take(const QueryResult& result, Counters& counters) {
   const auto end = questions_.begin() + kQuantities;
   const auto at = std::find_if(questions_.begin(), end, [&](const Question& q) { return q.entry == &result.entry(); });
   if (at == end) return;
-  const Reading reading = reading_of(result, static_cast<Quantity>(at - questions_.begin()));
+  const auto quantity = static_cast<Quantity>(at - questions_.begin());
   if (readings_.full()) ++counters.dropped_readings;
-  readings_.push_back(reading);
-  newest_ = std::max(newest_, reading.time);
-  if (reading.quantity != Quantity::speed) return;
-  speed_ = reading.value;
-  speed_time_ = reading.time;
-}
-
-Reading Polling::reading_of(const QueryResult& result, Quantity quantity) const noexcept {
-  const std::size_t reply_bytes = result.packet.length + kFrameOverhead;
-  Instant from = result.request.started + byte_time_ * static_cast<std::int64_t>(result.request.bytes);
-  Instant to = result.end - byte_time_ * static_cast<std::int64_t>(reply_bytes);
-  // A link without real wire time (a pseudo-terminal) can answer faster than the bytes would take.
-  if (to < from) {
-    from = std::min(result.request.queued, result.end);
-    to = result.end;
-  }
   // fix16: 65536 means no derating.
-  const double value = quantity == Quantity::derate ? result.value() / 65536 : result.value();
-  return {quantity, value, from + (to - from) / 2, (to - from) / 2, result.stamps};
+  readings_.push_back(
+      {quantity, quantity == Quantity::derate ? value / 65536 : value, result.time, result.uncertainty, result.stamps});
+  if (quantity != Quantity::speed) return;
+  speed_ = value;
+  speed_time_ = result.time;
 }
 
 std::size_t Polling::take_readings(std::span<Reading> out) {

@@ -26,8 +26,6 @@ class Polling {
 
   /// Moves the oldest readings out, returns how many. 4096 are kept; older ones are dropped and counted.
   std::size_t take_readings(std::span<Reading> out);
-  /// Zero before the first.
-  [[nodiscard]] Instant newest_reading() const noexcept { return newest_; }
   /// The newest speed, rad/s; NaN before the first.
   [[nodiscard]] double speed() const noexcept { return speed_; }
   [[nodiscard]] Instant speed_time() const noexcept { return speed_time_; }
@@ -47,10 +45,8 @@ class Polling {
 
   void want(std::size_t question, Counters& counters) noexcept;
   void want_slow(Counters& counters) noexcept;
-  [[nodiscard]] Reading reading_of(const QueryResult& result, Quantity quantity) const noexcept;
 
   int module_id_;
-  Duration byte_time_;
   std::array<bool, kQuantities> every_cycle_{};
   bool on_ = false;
   std::array<Question, kQuestions> questions_{};
@@ -58,7 +54,6 @@ class Polling {
   Beat cycle_, slow_, watch_;
   std::size_t turn_ = 0;
   boost::circular_buffer<Reading> readings_;
-  Instant newest_{0};
   double speed_;
   Instant speed_time_{0};
 };

@@ -14,6 +14,7 @@ constexpr std::size_t kEvents = 256;
 constexpr int kSilentTimeouts = 10;  ///< longest reply time-outs without any reply after which the module is gone
 constexpr int kRestartTimeouts = 3;  ///< within which a restart explains why the module stopped driving
 constexpr std::uint64_t kRoundTrips = 100;  ///< enough to judge their median
+constexpr int kSlowShare = 25;              ///< of the reply time-out: a longer median, 4 ms, is slow
 constexpr const Entry& kVelocity = entry<"propeller_motor_control.ctrl_velocity">;
 
 }  // namespace
@@ -42,6 +43,7 @@ void Session::restart(Instant now) {
   state_ = State::connecting;
   failure_.clear();
   connecting_.begin(known_);
+  if (inspecting_) connecting_.skip();
   inquiries_.abandon();
   polling_.end();
   last_reply_ = now;
@@ -68,8 +70,8 @@ void Session::fail(EventKind kind, const std::string& why, Instant now) {
 
 void Session::spin_at(RadPerSec signed_speed, Instant now) {
   const double speed = signed_speed.value();
-  if (!(std::abs(speed) <= kVelocity.max)) {
-    throw std::invalid_argument(fmt::format("speed {} rad/s is not within ±{} rad/s", speed, kVelocity.max));
+  if (!(std::abs(speed) <= kFastest)) {
+    throw std::invalid_argument(fmt::format("speed {} rad/s is not within ±{} rad/s", speed, kFastest));
   }
   if (!armed()) throw std::logic_error("cannot spin: the module is not ready and armed");
   if (speed == 0) return coast(now);
@@ -135,8 +137,7 @@ void Session::advance(Instant now) {
 Instant Session::deadline() const noexcept {
   Instant earliest = std::min({exchange_.deadline(), coasting_.deadline(), polling_.deadline(), stopping_.deadline()});
   if (!let_go_.empty()) earliest = std::min(earliest, let_go_at_ + settings_.reply_timeout * kRestartTimeouts);
-  if (state_ == State::ready) earliest = std::min(earliest, last_reply_ + settings_.reply_timeout * kSilentTimeouts);
-  return earliest;
+  return std::min(earliest, silence_limit());
 }
 
 void Session::take_results(std::span<const QueryResult> all, Instant now) {
@@ -155,7 +156,7 @@ void Session::take_results(std::span<const QueryResult> all, Instant now) {
 }
 
 void Session::take_restart(const QueryResult& result, Instant now) {
-  if (state_ != State::ready) return;
+  if (state_ != State::ready || inspecting_) return;
   if (inquiries_.sets(result.entry())) return reset_watch_.expect_new_time();
   const auto sign = reset_watch_.take(result);
   if (!sign) return;
@@ -202,9 +203,10 @@ void Session::continue_connecting(Instant now) {
   }
   if (!connecting_.done()) return;
   state_ = State::ready;
+  last_reply_ = now;
+  if (inspecting_) return;
   if (!known_) armed_ = true;
   known_ = identity();
-  last_reply_ = now;
   reset_watch_.begin(identity());
   polling_.begin(identity(), now);
   note(EventKind::connected, identity().summary(), now);
@@ -218,8 +220,12 @@ void Session::flush_speed(Instant now) {
   drive_.told(exchange_.order(), now);
 }
 
+Instant Session::silence_limit() const noexcept {
+  return state_ == State::ready && !inspecting_ ? last_reply_ + settings_.reply_timeout * kSilentTimeouts : kNever;
+}
+
 void Session::check_silence(Instant now) {
-  if (state_ != State::ready || now - last_reply_ < settings_.reply_timeout * kSilentTimeouts) return;
+  if (now < silence_limit()) return;
   fail(EventKind::module_silent,
        fmt::format("the module stopped answering: no reply for {:.2f} s", to_seconds(now - last_reply_)), now);
 }
@@ -254,7 +260,7 @@ void Session::judge_round_trip(Instant now) {
   if (round_trip_judged_ || exchange_.round_trips().count() < kRoundTrips) return;
   round_trip_judged_ = true;
   const Duration median = exchange_.round_trips().quantile(0.5);
-  if (median <= settings_.slow_round_trip) return;
+  if (median <= settings_.reply_timeout / kSlowShare) return;
   note(
       EventKind::slow_round_trip,
       fmt::format("slow line: median reply time {:.1f} ms, without wire time; set the adapter's latency timer to 1 ms, "

@@ -6,7 +6,7 @@
 // to coast by itself when it receives nothing for `module_timeout_s`; polling prevents that, so the session falls
 // silent when the module does not confirm a coast or stops answering. After any failure the session is disarmed: it
 // spins the motor again only after a new connection and an explicit rearm(). A speed is sent only to a module that is
-// still driving (module_watch.hpp), so not after a sleep of the host, a break of the line or a timeout.
+// still driving (DriveWatch), so not after a sleep of the host, a break of the line or a timeout.
 #pragma once
 
 #include <optional>
@@ -19,8 +19,6 @@
 #include "drivers/iq/exchange/exchange.hpp"
 #include "drivers/iq/exchange/telemetry.hpp"
 #include "drivers/iq/session/connecting.hpp"
-#include "drivers/iq/session/events.hpp"
-#include "drivers/iq/session/module_watch.hpp"
 #include "drivers/iq/session/polling.hpp"
 #include "drivers/iq/session/stopping.hpp"
 #include "drivers/iq/wire/identity.hpp"
@@ -40,6 +38,12 @@ class Session {
   void connect(Instant now);
   /// As connect, over a new line: earlier frames must not be sent, earlier replies not used.
   void connect_anew(Instant now);
+  /// As connect_anew, but only coasts, now and at every later connection: reads and sets nothing, polls nothing, does
+  /// not expect the module to speak, and is never armed. For inquiries to a module that may not be fit to spin.
+  void inspect(Instant now) {
+    inspecting_ = true;
+    connect_anew(now);
+  }
   [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
   [[nodiscard]] State state() const noexcept { return state_; }
   /// Why it failed; empty otherwise.
@@ -100,11 +104,10 @@ class Session {
   [[nodiscard]] const RoundTripHistogram& round_trips() const noexcept { return exchange_.round_trips(); }
   /// The time-out that a query would get now, from the measured round trips.
   [[nodiscard]] Duration reply_timeout() const noexcept { return exchange_.timeout(); }
-  /// Time of the newest reading; zero before the first.
-  [[nodiscard]] Instant newest_reading() const noexcept { return polling_.newest_reading(); }
 
  private:
   void restart(Instant now);
+  [[nodiscard]] Instant silence_limit() const noexcept;
   void coast(int times, Instant now) noexcept;
   void take_results(std::span<const QueryResult> result, Instant now);
   void take_restart(const QueryResult& result, Instant now);
@@ -125,7 +128,7 @@ class Session {
   State state_ = State::idle;
   std::string failure_;
   std::vector<Event> events_;
-  bool armed_ = false;
+  bool armed_ = false, inspecting_ = false;
   std::optional<Identity> known_;  ///< of the first connection
   Exchange exchange_;
   Coasting coasting_;

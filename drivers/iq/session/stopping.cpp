@@ -6,12 +6,18 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
 namespace kphi::iq {
 namespace {
 
 constexpr int kFewestAttempts = 5;
 constexpr const Entry& kDriveMode = entry<"brushless_drive.drive_mode">;
+constexpr int kUnderVoltage = 1 << static_cast<int>(FaultBit::under_voltage);
+constexpr Duration kRampStep = std::chrono::milliseconds(20);
+constexpr double kFalling = 0.95;  ///< of the speed at the coast
+
+std::string rpm(double rad_s) { return fmt::format("{:.0f} RPM", std::abs(rad_s) * 30 / std::numbers::pi); }
 
 }  // namespace
 
@@ -73,15 +79,6 @@ void Coasting::ask(Exchange& exchange, Instant now) noexcept {
   blocked_ = !exchange.ask(kDriveMode, module_id_, now);
   ask_at_ = blocked_ ? now : kNever;
 }
-
-namespace {
-
-constexpr Duration kRampStep = std::chrono::milliseconds(20);
-constexpr double kFalling = 0.95;  ///< of the speed at the coast
-
-std::string rpm(double rad_s) { return fmt::format("{:.0f} RPM", std::abs(rad_s) * 30 / std::numbers::pi); }
-
-}  // namespace
 
 std::string StopReport::summary() const {
   const std::string coast = time_to_coast ? fmt::format("coast confirmed after {:.2f} s", to_seconds(*time_to_coast))
@@ -146,7 +143,6 @@ void Stopping::measured(double speed, Instant time) noexcept {
   if (phase_ != Phase::coasting || time < coasted_) return;
   if (!measured_after_coast_) speed_at_coast_ = speed;
   measured_after_coast_ = true;
-  speed_time_ = time;
   if (std::abs(speed) < settings_.standing_below && !open_.time_to_standing) open_.time_to_standing = time - asked_;
 }
 
@@ -171,6 +167,63 @@ void Stopping::end(StopReport::Outcome outcome) noexcept {
 Instant Stopping::deadline() const noexcept {
   if (phase_ == Phase::ramping) return next_;
   return phase_ == Phase::coasting ? coasted_ + settings_.limit : kNever;
+}
+
+void DriveWatch::begin(Instant now) noexcept {
+  if (watching_) return;
+  watching_ = true;
+  order_.reset();
+  served_ = now;
+}
+
+void DriveWatch::told(std::uint64_t order, Instant now) noexcept {
+  if (!order_) told_at_ = now;
+  order_ = order;
+  drives_at_.reset();
+}
+
+bool DriveWatch::may_tell(Exchange& exchange, Instant now) noexcept {
+  if (!order_ || (drives_at_ && now - *drives_at_ <= fresh_)) return true;
+  (void)exchange.ask(kDriveMode, module_id_, now);
+  return false;
+}
+
+std::optional<DriveMode> DriveWatch::take(const QueryResult& result) noexcept {
+  if (!watching_ || !order_ || !result.answers(kDriveMode) || result.request.order < *order_) return std::nullopt;
+  const auto mode = static_cast<DriveMode>(static_cast<int>(result.value()));
+  if (mode == DriveMode::spin_pwm || mode == DriveMode::spin_volts) {
+    drives_at_ = result.end;
+    return std::nullopt;
+  }
+  if (result.request.started < told_at_ + settles_) return std::nullopt;
+  return mode;
+}
+
+std::optional<DriveWatch::Lapse> DriveWatch::lapsed(Instant last_reply, Instant now) noexcept {
+  const Instant before = std::exchange(served_, now);
+  if (!watching_) return std::nullopt;
+  if (now - before > longest_) return Lapse{true, now - before};
+  const Duration unheard = now - std::max(last_reply, told_at_);
+  return unheard > longest_ ? std::optional(Lapse{false, unheard}) : std::nullopt;
+}
+
+void ResetWatch::begin(const Identity& identity) noexcept {
+  uptime_ = identity.uptime_s;
+  faults_ = identity.fault_ever < 0 ? 0 : identity.fault_ever;
+}
+
+std::optional<std::string> ResetWatch::take(const QueryResult& result) {
+  if (result.answers(entry<"system_control.time">) && std::isfinite(result.value())) {
+    const auto before = std::exchange(uptime_, result.value());
+    if (before && result.value() < *before) {
+      return fmt::format("its uptime went from {:.3f} s back to {:.3f} s", *before, result.value());
+    }
+  }
+  if (result.answers(entry<"power_safety.fault_ever">)) {
+    const int before = std::exchange(faults_, static_cast<int>(result.value()));
+    if ((faults_ & ~before & kUnderVoltage) != 0) return "it reports an under-voltage (fault bit 0)";
+  }
+  return std::nullopt;
 }
 
 }  // namespace kphi::iq

@@ -2,66 +2,36 @@
 
 #include <bit>
 #include <cmath>
+#include <utility>
 
 namespace kphi::iq {
 namespace {
 
-std::uint32_t read_little_endian(std::span<const std::uint8_t> data) noexcept {
-  std::uint32_t bits = 0;
-  for (std::size_t i = 0; i < data.size(); ++i) bits |= static_cast<std::uint32_t>(data[i]) << (8 * i);
-  return bits;
-}
-
-template <class Integer>
-std::uint32_t bits_of_nearest(double value) noexcept {
-  constexpr double lowest = std::numeric_limits<Integer>::min();
-  constexpr double highest = std::numeric_limits<Integer>::max();
-  if (!(value > lowest)) return static_cast<std::uint32_t>(std::numeric_limits<Integer>::min());
-  if (value >= highest) return static_cast<std::uint32_t>(std::numeric_limits<Integer>::max());
-  return static_cast<std::uint32_t>(static_cast<Integer>(std::nearbyint(value)));
+/// Smallest and largest number of an integer format.
+std::pair<double, double> range_of(Format format) noexcept {
+  const bool is_signed = format == Format::i8 || format == Format::i32;
+  const double codes = std::exp2(8 * size_of(format));
+  return is_signed ? std::pair(-codes / 2, codes / 2 - 1) : std::pair(0.0, codes - 1);
 }
 
 std::uint32_t bits_of(Format format, double value) noexcept {
-  switch (format) {
-    case Format::i8:
-      return bits_of_nearest<std::int8_t>(value);
-    case Format::u8:
-      return bits_of_nearest<std::uint8_t>(value);
-    case Format::u16:
-      return bits_of_nearest<std::uint16_t>(value);
-    case Format::u32:
-      return bits_of_nearest<std::uint32_t>(value);
-    case Format::i32:
-      return bits_of_nearest<std::int32_t>(value);
-    case Format::f32:
-      return std::bit_cast<std::uint32_t>(static_cast<float>(value));
-    case Format::none:
-    case Format::bytes16:
-      break;
-  }
-  return 0;
+  if (format == Format::f32) return std::bit_cast<std::uint32_t>(static_cast<float>(value));
+  const auto [lowest, highest] = range_of(format);
+  const double held = value > lowest ? std::min(value, highest) : lowest;  // NaN: the lowest
+  return static_cast<std::uint32_t>(static_cast<std::int64_t>(std::nearbyint(held)));
 }
+
+bool is_number(Format format) noexcept { return format != Format::none && format != Format::bytes16; }
 
 }  // namespace
 
 double number(Format format, std::span<const std::uint8_t> data) noexcept {
-  if (data.size() != size_of(format)) return std::nan("");
-  switch (format) {
-    case Format::i8:
-      return static_cast<std::int8_t>(data[0]);
-    case Format::u8:
-    case Format::u16:
-    case Format::u32:
-      return read_little_endian(data);
-    case Format::i32:
-      return static_cast<std::int32_t>(read_little_endian(data));
-    case Format::f32:
-      return std::bit_cast<float>(read_little_endian(data));
-    case Format::none:
-    case Format::bytes16:
-      break;
-  }
-  return std::nan("");
+  if (!is_number(format) || data.size() != size_of(format)) return std::nan("");
+  std::uint32_t bits = 0;
+  for (std::size_t i = 0; i < data.size(); ++i) bits |= static_cast<std::uint32_t>(data[i]) << (8 * i);
+  if (format == Format::f32) return std::bit_cast<float>(bits);
+  if (format == Format::i8) return static_cast<std::int8_t>(bits);
+  return format == Format::i32 ? static_cast<std::int32_t>(bits) : static_cast<double>(bits);
 }
 
 Packet make(const Entry& entry, Access access, int module_id, double value) {
@@ -71,7 +41,7 @@ Packet make(const Entry& entry, Access access, int module_id, double value) {
   packet.payload[1] = static_cast<std::uint8_t>(module_id << 2 | static_cast<int>(access));
   packet.length = 2;
   if (access != Access::set && access != Access::reply) return packet;
-  const std::uint32_t bits = bits_of(entry.format, value);
+  const std::uint32_t bits = is_number(entry.format) ? bits_of(entry.format, value) : 0;
   const std::size_t size = size_of(entry.format);
   for (std::size_t i = 0; i < size && i < 4; ++i) packet.payload[2 + i] = static_cast<std::uint8_t>(bits >> (8 * i));
   packet.length = static_cast<std::uint8_t>(2 + size);

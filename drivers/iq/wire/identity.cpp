@@ -2,24 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <iterator>
+
 namespace kphi::iq {
 namespace {
 
 std::string style_text(int style) {
-  switch (style) {
-    case FirmwareVersion::kSpeed:
-      return "speed";
-    case 2:
-      return "servo";
-    case 3:
-      return "pulsing";
-    case 4:
-      return "step/dir";
-    case 6:
-      return "pulsing velocity";
-    default:
-      return fmt::format("style {}", style);
-  }
+  constexpr const char* names[] = {"", "speed", "servo", "pulsing", "step/dir", "", "pulsing velocity"};
+  const bool known = style >= 0 && style < static_cast<int>(std::size(names)) && *names[style] != 0;
+  return known ? names[style] : fmt::format("style {}", style);
 }
 
 }  // namespace

@@ -6,15 +6,22 @@
 #include <boost/endian/conversion.hpp>
 #include <cmath>
 
+#include "base/clock.hpp"
 #include "base/error.hpp"
 #include "base/tcp.hpp"
-#include "drivers/netbox/wire/units.hpp"
+#include "drivers/netbox/wire/unit.hpp"
 
 namespace kphi::netbox {
 namespace {
 
 constexpr std::uint8_t kReadCalinfo = 1;
 constexpr std::uint16_t kHeader = 0x1234;
+
+/// 0 for an unknown code.
+double si_of(std::span<const Unit> units, int code) {
+  const auto known = std::find_if(units.begin(), units.end(), [&](const Unit& unit) { return unit.code == code; });
+  return known == units.end() ? 0 : known->si;
+}
 
 bool agree(double one, double other) { return std::abs(one - other) <= 1e-6 * std::abs(other); }
 
@@ -29,14 +36,13 @@ std::optional<Calinfo> decode_calinfo(std::span<const std::uint8_t> bytes) noexc
   calinfo.torque_unit = bytes[3];
   calinfo.counts_per_force = boost::endian::load_big_u32(&bytes[4]);
   calinfo.counts_per_torque = boost::endian::load_big_u32(&bytes[8]);
-  for (std::size_t axis = 0; axis < 6; ++axis)
-    calinfo.scale_factors[axis] = boost::endian::load_big_u16(&bytes[12 + 2 * axis]);
   return calinfo;
 }
 
 Calinfo read_calinfo(const std::string& host, std::uint16_t port, std::chrono::nanoseconds wall_timeout) {
-  const std::string device = fmt::format("Net Box {}:{}", host, port);
-  constexpr const char* kOperation = "read the calibration over TCP";
+  const auto fail = [&](const std::string& cause, const char* next_move) {
+    throw DeviceError(fmt::format("Net Box {}:{}", host, port), "read the calibration over TCP", cause, next_move);
+  };
   TcpClient box(wall_timeout);
   std::string answer;
   try {
@@ -46,30 +52,26 @@ Calinfo read_calinfo(const std::string& host, std::uint16_t port, std::chrono::n
     while (answer.size() < kCalinfoBytes && box.receive(answer)) {
     }
   } catch (const TcpError& error) {
-    if (error.cause != TcpError::Cause::timeout)
-      throw DeviceError(device, kOperation, error.what(), "check that this is a Net Box");
-    throw DeviceError(device, kOperation,
-                      fmt::format("no answer within {:.1f} s", std::chrono::duration<double>(wall_timeout).count()),
-                      "check the address, and that no firewall blocks TCP");
+    if (error.cause != TcpError::Cause::timeout) fail(error.what(), "check that this is a Net Box");
+    fail(fmt::format("no answer within {:.1f} s", to_seconds(wall_timeout)),
+         "check the address, and that no firewall blocks TCP");
   }
   if (answer.size() < kCalinfoBytes)
-    throw DeviceError(device, kOperation, "the answer is cut short", "check that this is a Net Box; if it is, power-cycle it");
-  answer.resize(kCalinfoBytes);
-  const auto calinfo = decode_calinfo({reinterpret_cast<const std::uint8_t*>(answer.data()), answer.size()});
-  if (!calinfo) throw DeviceError(device, kOperation, "unexpected reply: not a Net Box", "check the address and port");
+    fail("the answer is cut short", "check that this is a Net Box; if it is, power-cycle it");
+  const auto calinfo = decode_calinfo({reinterpret_cast<const std::uint8_t*>(answer.data()), kCalinfoBytes});
+  if (!calinfo) fail("unexpected reply: not a Net Box", "check the address and port");
   return *calinfo;
 }
 
 std::optional<Finding> compare(const Calinfo& calinfo, const Configuration& configuration) {
-  const auto force = newtons_in(calinfo.force_unit);
-  const auto torque = newton_metres_in(calinfo.torque_unit);
-  if (!force || !torque) {
+  const double force = si_of(kForceUnits, calinfo.force_unit), torque = si_of(kTorqueUnits, calinfo.torque_unit);
+  if (force == 0 || torque == 0) {
     return Finding{
         Severity::fault,
         fmt::format("the box reports the unknown units {} and {} over TCP", calinfo.force_unit, calinfo.torque_unit),
         "choose N and N-m on the box's Configurations page"};
   }
-  const double per_newton = calinfo.counts_per_force / *force, per_metre = calinfo.counts_per_torque / *torque;
+  const double per_newton = calinfo.counts_per_force / force, per_metre = calinfo.counts_per_torque / torque;
   if (agree(per_newton, configuration.counts_per_newton) && agree(per_metre, configuration.counts_per_newton_metre))
     return std::nullopt;
   return Finding{

@@ -17,9 +17,8 @@ namespace kphi::netbox {
 inline constexpr std::size_t kCalinfoBytes = 24;
 
 struct Calinfo {
-  std::uint8_t force_unit = 0, torque_unit = 0;  ///< ForceUnit, TorqueUnit
+  std::uint8_t force_unit = 0, torque_unit = 0;  ///< codes of units.hpp
   std::uint32_t counts_per_force = 0, counts_per_torque = 0;
-  std::array<std::uint16_t, 6> scale_factors{};  ///< of the 16-bit values of this interface
   friend bool operator==(const Calinfo&, const Calinfo&) = default;
 };
 

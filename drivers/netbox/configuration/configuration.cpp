@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <boost/algorithm/string.hpp>
+#include <boost/locale/utf.hpp>
 #include <cmath>
 #include <iterator>
 #include <pugixml.hpp>
@@ -12,7 +13,7 @@
 
 #include "base/error.hpp"
 #include "base/number.hpp"
-#include "drivers/netbox/wire/units.hpp"
+#include "drivers/netbox/wire/unit.hpp"
 
 namespace kphi::netbox {
 namespace {
@@ -178,8 +179,8 @@ void read_identity(const Elements& elements, Configuration& configuration) {
 }
 
 void read_scale(const Elements& elements, Configuration& configuration) {
-  const Unit force = elements.unit("scfgfu", "cfgfu", force_units());
-  const Unit torque = elements.unit("scfgtu", "cfgtu", torque_units());
+  const Unit force = elements.unit("scfgfu", "cfgfu", kForceUnits);
+  const Unit torque = elements.unit("scfgtu", "cfgtu", kTorqueUnits);
   const double counts_per_force = elements.number("cfgcpf");
   const double counts_per_torque = elements.number("cfgcpt");
   if (!(counts_per_force > 0) || !(counts_per_torque > 0)) {
@@ -233,41 +234,13 @@ void read_monitor(const Elements& elements, Configuration& configuration) {
   std::vector<MonitorCondition> conditions;
   for (std::size_t i = 0; i < on->size(); ++i) {
     if ((*on)[i] != 1 || (*axis)[i] < 0 || (*axis)[i] > 5) continue;
-    const double per_unit = (*axis)[i] < 3 ? configuration.counts_per_newton : configuration.counts_per_newton_metre;
-    conditions.push_back({static_cast<int>(i), (*axis)[i], (*sign)[i] > 0, (*counts)[i] / per_unit});
+    const double per_unit = configuration.counts_per_unit(static_cast<std::size_t>((*axis)[i]));
+    conditions.push_back({(*axis)[i], (*sign)[i] > 0, (*counts)[i] / per_unit});
   }
   configuration.monitor_conditions = std::move(conditions);
 }
 
 constexpr std::string_view kReplacement = "\xEF\xBF\xBD";
-
-struct Form {
-  unsigned char mask, lead;
-  std::size_t size;
-  std::uint32_t least;  ///< smaller codes belong to a shorter form
-};
-constexpr Form kForms[] = {
-    {0x80, 0x00, 1, 0x20}, {0xE0, 0xC0, 2, 0xA0}, {0xF0, 0xE0, 3, 0x800}, {0xF8, 0xF0, 4, 0x10000}};
-
-bool is_character(std::uint32_t code) {
-  return code != 0x7F && code <= 0x10FFFF && !(code >= 0xD800 && code <= 0xDFFF);
-}
-
-/// Size of the printable character at the begin of `text`; 0: there is none.
-std::size_t character_size(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  for (const Form& form : kForms) {
-    if ((byte(0) & form.mask) != form.lead) continue;
-    if (text.size() < form.size) return 0;
-    std::uint32_t code = byte(0) & static_cast<unsigned char>(~form.mask);
-    for (std::size_t i = 1; i < form.size; ++i) {
-      if ((byte(i) & 0xC0) != 0x80) return 0;
-      code = code << 6 | (byte(i) & 0x3Fu);
-    }
-    return code >= form.least && is_character(code) ? form.size : 0;
-  }
-  return 0;
-}
 
 struct Row {
   Change change;
@@ -275,34 +248,24 @@ struct Row {
   bool (*differs)(const Configuration&, const Configuration&);
 };
 
-template <auto Member>
+template <auto... Members>
 constexpr bool differ(const Configuration& a, const Configuration& b) {
-  return !(a.*Member == b.*Member);
+  return ((a.*Members != b.*Members) || ...);
 }
 
 using C = Configuration;
 constexpr Row kTable[] = {
-    {Change::product, "product",
-     [](const C& a, const C& b) { return a.product != b.product || a.kind != b.kind || a.serial != b.serial; }},
+    {Change::product, "product", differ<&C::product, &C::kind, &C::serial>},
     {Change::firmware, "firmware", differ<&C::firmware>},
     {Change::calibration, "calibration", differ<&C::calibration_serial>},
     {Change::slot, "configuration slot", differ<&C::slot>},
-    {Change::units, "units",
-     [](const C& a, const C& b) { return a.force_unit != b.force_unit || a.torque_unit != b.torque_unit; }},
-    {Change::counts_per_unit, "counts per unit",
-     [](const C& a, const C& b) {
-       return a.counts_per_newton != b.counts_per_newton || a.counts_per_newton_metre != b.counts_per_newton_metre;
-     }},
+    {Change::units, "units", differ<&C::force_unit, &C::torque_unit>},
+    {Change::counts_per_unit, "counts per unit", differ<&C::counts_per_newton, &C::counts_per_newton_metre>},
     {Change::ranges, "ranges", differ<&C::range>},
-    {Change::rate, "rate",
-     [](const C& a, const C& b) { return a.divisor != b.divisor || a.device_rate_hz != b.device_rate_hz; }},
+    {Change::rate, "rate", differ<&C::divisor, &C::device_rate_hz>},
     {Change::records_per_datagram, "records per datagram", differ<&C::records_per_datagram>},
     {Change::filter, "filter", differ<&C::filter_code>},
-    {Change::tool_transform, "tool transform",
-     [](const C& a, const C& b) {
-       return a.tool_transform != b.tool_transform || a.tool_distance_unit != b.tool_distance_unit ||
-              a.tool_angle_unit != b.tool_angle_unit;
-     }},
+    {Change::tool_transform, "tool transform", differ<&C::tool_transform, &C::tool_distance_unit, &C::tool_angle_unit>},
     {Change::gage_bias, "gage bias", differ<&C::gage_bias>},
 };
 
@@ -336,11 +299,19 @@ Configuration parse_configuration(std::string_view xml, const std::string& devic
 }
 
 std::string printable(std::string_view text) {
+  using Utf8 = boost::locale::utf::utf_traits<char>;
   std::string out;
-  while (!text.empty()) {
-    const std::size_t size = character_size(text);
-    out += size > 0 ? text.substr(0, size) : kReplacement;
-    text.remove_prefix(size > 0 ? size : 1);
+  for (auto at = text.begin(); at != text.end();) {
+    auto end = at;
+    const auto code = Utf8::decode(end, text.end());
+    const bool control = code < 0x20 || (code >= 0x7F && code < 0xA0);
+    if (control || !boost::locale::utf::is_valid_codepoint(code)) {
+      out += kReplacement;
+      ++at;
+    } else {
+      out.append(at, end);
+      at = end;
+    }
   }
   return out;
 }

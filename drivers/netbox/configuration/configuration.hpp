@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "drivers/netbox/wire/codes.hpp"
+#include "drivers/netbox/wire/status.hpp"
 
 namespace kphi::netbox {
 
@@ -20,7 +20,6 @@ struct Peaks {
 /// A condition that the box checks with each internal sample, at any output rate: once it was true, bit 16 of the
 /// status stays set until somebody resets it on the box's web pages.
 struct MonitorCondition {
-  int number = 0;        ///< 0..15
   int axis = 0;          ///< 0..5 = Fx..Tz
   bool above = true;     ///< true of a load above the threshold; else below
   double threshold = 0;  ///< N or Nm
@@ -63,6 +62,11 @@ struct Configuration {
   std::optional<std::vector<MonitorCondition>> monitor_conditions;
 
   std::string xml;  ///< as read, verbatim
+
+  /// `axis`: 0..5 = Fx..Tz.
+  [[nodiscard]] double counts_per_unit(std::size_t axis) const noexcept {
+    return axis < 3 ? counts_per_newton : counts_per_newton_metre;
+  }
 };
 
 /// Cutoff of a Net Box's filter code in Hz, 0 = no filter; nullopt for a code that no manual names.

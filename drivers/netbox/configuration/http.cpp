@@ -95,8 +95,9 @@ std::string advice(const TcpError& error, std::uint16_t port) {
   }
 }
 
-/// Blocks until the whole answer is there. Throws DeviceError if it does not come or has another status.
-std::string exchange(const std::string& host, std::uint16_t port, const std::string& target,
+}  // namespace
+
+std::string http_get(const std::string& host, std::uint16_t port, const std::string& target,
                      std::chrono::nanoseconds wall_timeout, int wanted_status) {
   const std::string device = fmt::format("Net Box {}:{}", host, port);
   const std::string operation = "GET " + target;
@@ -118,18 +119,6 @@ std::string exchange(const std::string& host, std::uint16_t port, const std::str
                           : fmt::format("could not {}: {}", box.step(), error.what()),
                       advice(error, port));
   }
-}
-
-}  // namespace
-
-std::string http_get(const std::string& host, std::uint16_t port, const std::string& target,
-                     std::chrono::nanoseconds wall_timeout) {
-  return exchange(host, port, target, wall_timeout, 200);
-}
-
-void http_write(const std::string& host, std::uint16_t port, const std::string& target,
-                std::chrono::nanoseconds wall_timeout) {
-  (void)exchange(host, port, target, wall_timeout, 302);
 }
 
 }  // namespace kphi::netbox

@@ -7,14 +7,14 @@
 
 namespace kphi::netbox {
 
-/// Body of `http://host:port<target>`; HTTP/1.0, one request per connection, at most 1 MiB. Blocks for at most
-/// `wall_timeout`. Throws DeviceError without a connection or a complete answer in time, or if the status is not 200.
-[[nodiscard]] std::string http_get(const std::string& host, std::uint16_t port, const std::string& target,
-                                   std::chrono::nanoseconds wall_timeout);
+/// The box answers this to written settings, even if it ignores them.
+inline constexpr int kFound = 302;
 
-/// Writes settings: `target` is one of the box's CGI pages with all its variables, "/comm.cgi?comrdtrate=1000". The box
-/// answers HTTP/1.0 302 Found even if it ignores them: read them back. As http_get; throws for any other answer.
-void http_write(const std::string& host, std::uint16_t port, const std::string& target,
-                std::chrono::nanoseconds wall_timeout);
+/// Body of `http://host:port<target>`; HTTP/1.0, one request per connection, at most 1 MiB. Blocks for at most
+/// `wall_timeout`. Throws DeviceError without a connection or a complete answer in time, or for another status.
+/// To write settings `target` is one of the box's CGI pages with all its variables, "/comm.cgi?comrdtrate=1000", and
+/// `wanted_status` is kFound: read them back.
+[[nodiscard]] std::string http_get(const std::string& host, std::uint16_t port, const std::string& target,
+                                   std::chrono::nanoseconds wall_timeout, int wanted_status = 200);
 
 }  // namespace kphi::netbox

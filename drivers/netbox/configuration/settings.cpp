@@ -8,7 +8,6 @@
 #include <cerrno>
 #include <cstring>
 #include <pugixml.hpp>
-#include <sstream>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -72,10 +71,10 @@ class Shown {
   pugi::xml_document document_;
 };
 
-/// A change: shown before, requested, expected afterwards.
+/// A change: shown before, requested.
 struct Assignment {
   const Setting* setting;
-  int before, asked, expected;
+  int before, asked;
 };
 
 void write_once(const Address& address, const std::vector<Assignment>& assignments) {
@@ -85,7 +84,8 @@ void write_once(const Address& address, const std::vector<Assignment>& assignmen
       if (std::string_view(a.setting->page) == page)
         query += fmt::format("{}{}={}", query.empty() ? '?' : '&', a.setting->key, a.asked);
     }
-    if (!query.empty()) http_write(address.host, address.http_port, fmt::format("/{}{}", page, query), kTimeout);
+    if (!query.empty())
+      (void)http_get(address.host, address.http_port, fmt::format("/{}{}", page, query), kTimeout, kFound);
   }
 }
 
@@ -102,7 +102,7 @@ Shown write_and_read_back(const Address& address, std::vector<Assignment> assign
 
 /// The value that the box will show.
 int expected(const Setting& setting, int asked, const Configuration& box) {
-  if (std::string_view(setting.key) != "comrdtrate") return asked;
+  if (setting.wanted != &WantedSettings::rate_hz) return asked;
   const int device_rate = static_cast<int>(box.device_rate_hz);
   return device_rate / std::max(1, device_rate / asked);
 }
@@ -129,8 +129,8 @@ std::vector<Assignment> differences(const Shown& shown, const Configuration& box
   for (const Setting& s : kSettings) {
     const auto& asked = wanted.*s.wanted;
     if (!asked) continue;
-    const Assignment a{&s, shown.number(s.key), *asked, expected(s, *asked, box)};
-    if (a.before != a.expected) found.push_back(a);
+    const int before = shown.number(s.key);
+    if (before != expected(s, *asked, box)) found.push_back({&s, before, *asked});
   }
   return found;
 }
@@ -151,7 +151,7 @@ std::vector<Finding> set_back(const Address& address, const std::vector<ChangedS
     const Setting* setting = setting_of(c.key);
     if (setting == nullptr || present.number(c.key) == c.before) continue;
     if (present.number(c.key) == c.applied) {
-      assignments.push_back({setting, c.applied, c.before, c.before});
+      assignments.push_back({setting, c.applied, c.before});
     } else {
       findings.push_back({Severity::warning,
                           fmt::format("{} was set from {} to {}, then changed to {} by somebody else: not restored",
@@ -162,13 +162,13 @@ std::vector<Finding> set_back(const Address& address, const std::vector<ChangedS
   if (assignments.empty()) return findings;
   const Shown after = write_and_read_back(address, assignments);
   for (const Assignment& a : assignments) {
-    if (after.number(a.setting->key) != a.expected) {
+    if (after.number(a.setting->key) != a.asked) {
       throw DeviceError(device(address), "restore its settings",
-                        fmt::format("{} is {}, expected {}", a.setting->name, after.number(a.setting->key), a.expected),
-                        fmt::format("set {} to {} on the box's web pages", a.setting->key, a.expected));
+                        fmt::format("{} is {}, expected {}", a.setting->name, after.number(a.setting->key), a.asked),
+                        fmt::format("set {} to {} on the box's web pages", a.setting->key, a.asked));
     }
     findings.push_back(
-        {Severity::note, fmt::format("{} was restored from {} to {}", a.setting->name, a.before, a.expected), ""});
+        {Severity::note, fmt::format("{} was restored from {} to {}", a.setting->name, a.before, a.asked), ""});
   }
   return findings;
 }
@@ -185,29 +185,19 @@ constexpr unsigned kParse = pugi::parse_escapes | pugi::parse_ws_pcdata;
   refuse(path, std::strerror(errno), "check the folder and the space on the disk");
 }
 
-Descriptor open_file(const std::filesystem::path& path, int flags) {
-  return Descriptor(open(path.c_str(), flags | O_CLOEXEC, 0644));
-}
-
-bool write_and_sync(const Descriptor& file, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t written = write(file.number(), text.data(), text.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return false;
-    text.remove_prefix(static_cast<std::size_t>(written));
-  }
-  return fsync(file.number()) == 0;
+/// Forces a file or folder to the disk.
+void sync(const std::filesystem::path& path) {
+  const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.number() < 0 || fsync(file.number()) != 0) refuse_by_errno(path);
 }
 
 std::filesystem::path folder_of(const std::filesystem::path& path) {
   return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
 
-void sync_folder(const std::filesystem::path& path) {
-  if (!write_and_sync(open_file(folder_of(path), O_RDONLY | O_DIRECTORY), {})) refuse_by_errno(path);
-}
+}  // namespace
 
-std::string document_of(const SettingsJournal& journal) {
+void write_journal(const std::filesystem::path& path, const SettingsJournal& journal) {
   pugi::xml_document document;
   pugi::xml_node root = document.append_child(kRoot);
   root.append_attribute("version") = 1;
@@ -219,20 +209,13 @@ std::string document_of(const SettingsJournal& journal) {
     node.append_attribute("applied") = changed.applied;
   }
   for (const std::string& slot : journal.slots) root.append_child("slot").text() = slot.c_str();
-  std::ostringstream out;
-  document.save(out, "", pugi::format_raw);
-  return out.str();
-}
-
-}  // namespace
-
-void write_journal(const std::filesystem::path& path, const SettingsJournal& journal) {
   std::error_code error;
   std::filesystem::create_directories(folder_of(path), error);
   const std::filesystem::path part = path.string() + ".part";
-  if (!write_and_sync(open_file(part, O_WRONLY | O_CREAT | O_TRUNC), document_of(journal))) refuse_by_errno(path);
+  if (!document.save_file(part.c_str(), "", pugi::format_raw)) refuse_by_errno(path);
+  sync(part);
   if (std::rename(part.c_str(), path.c_str()) != 0) refuse_by_errno(path);
-  sync_folder(path);
+  sync(folder_of(path));
 }
 
 std::optional<SettingsJournal> read_journal(const std::filesystem::path& path) {
@@ -257,7 +240,7 @@ std::optional<SettingsJournal> read_journal(const std::filesystem::path& path) {
 
 void remove_journal(const std::filesystem::path& path) {
   if (unlink(path.c_str()) != 0 && errno != ENOENT) refuse_by_errno(path);
-  sync_folder(path);
+  sync(folder_of(path));
 }
 
 SettingsKeeper::SettingsKeeper(Address address, const WantedSettings& wanted, std::filesystem::path journal)
@@ -286,41 +269,37 @@ SettingsKeeper::~SettingsKeeper() {
 
 void SettingsKeeper::apply(const WantedSettings& wanted) {
   const Shown shown(address_);
-  before_ = after_ = parse_configuration(shown.xml(), device(address_));
-  check_product(address_, before_, wanted);
-  const std::vector<Assignment> assignments = differences(shown, before_, wanted);
+  const Configuration box = parse_configuration(shown.xml(), device(address_));
+  check_product(address_, box, wanted);
+  const std::vector<Assignment> assignments = differences(shown, box, wanted);
   if (assignments.empty()) return;
   SettingsJournal journal{shown.text("mfgdigsn"), {}, read_slots(address_)};
   if (wanted.configuration) {
     (void)parse_configuration(journal.slots[static_cast<std::size_t>(*wanted.configuration)],
                               fmt::format("{}, slot {}", device(address_), *wanted.configuration));
   }
-  for (const Assignment& a : assignments) journal.changed.push_back({a.setting->key, a.before, a.expected});
+  for (const Assignment& a : assignments)
+    journal.changed.push_back({a.setting->key, a.before, expected(*a.setting, a.asked, box)});
   write_journal(journal_, journal);
   changed_ = journal.changed;
   const Shown after = write_and_read_back(address_, assignments);
   for (std::size_t i = 0; i < assignments.size(); ++i) {
     const Assignment& a = assignments[i];
-    changed_[i].applied = after.number(a.setting->key);
-    if (changed_[i].applied == a.before) {
+    const int applied = changed_[i].applied = after.number(a.setting->key);
+    if (applied == a.before) {
       throw DeviceError(device(address_), "write its settings",
                         fmt::format("the box keeps {} at {} and does not take {}", a.setting->name, a.before, a.asked),
                         "close the box's web pages and other programs that write to it");
     }
-  }
-  if (changed_ != journal.changed) {
-    journal.changed = changed_;
-    write_journal(journal_, journal);
-  }
-  after_ = parse_configuration(after.xml(), device(address_));
-  for (std::size_t i = 0; i < assignments.size(); ++i) {
-    if (changed_[i].applied == assignments[i].asked) continue;
-    const bool quantised = changed_[i].applied == assignments[i].expected;
+    if (applied == a.asked) continue;
+    const bool quantised = applied == journal.changed[i].applied;
     notes_.push_back({quantised ? Severity::note : Severity::warning,
-                      fmt::format("{} {} requested, the box runs {}", assignments[i].setting->name,
-                                  assignments[i].asked, changed_[i].applied),
+                      fmt::format("{} {} requested, the box runs {}", a.setting->name, a.asked, applied),
                       quantised ? "" : "kphi measures with the box's value"});
   }
+  if (changed_ == journal.changed) return;
+  journal.changed = changed_;
+  write_journal(journal_, journal);
 }
 
 void SettingsKeeper::restore() {

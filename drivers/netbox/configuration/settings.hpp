@@ -39,7 +39,6 @@ struct WantedSettings {
   std::optional<int> records_per_datagram = std::nullopt;  ///< 1..40
   std::optional<int> filter = std::nullopt;                ///< code 0..12, see filter_cutoff_hz
   std::optional<int> configuration = std::nullopt;         ///< slot 0..15; the box's web pages count from one
-  [[nodiscard]] bool empty() const noexcept { return !rate_hz && !records_per_datagram && !filter && !configuration; }
 };
 
 /// Each request blocks for at most 2 s; there are 16 plus a few. One thread. The box must not stream: some stop when
@@ -47,8 +46,8 @@ struct WantedSettings {
 class SettingsKeeper {
  public:
   /// Restores the settings that a killed program has left in `journal`; reads the configuration; if a setting differs,
-  /// keeps before() and the XML of all 16 slots in `journal` (synced to the disk), then writes, one URL per page, and
-  /// reads back. Writes nothing, and no journal, if `wanted` is empty or already set. Throws DeviceError, after
+  /// keeps their values and the XML of all 16 slots in `journal` (synced to the disk), then writes, one URL per page,
+  /// and reads back. Writes nothing, and no journal, if `wanted` is empty or already set. Throws DeviceError, after
   /// restoring what was changed: out of range, an unusable slot, rate or filter of an Ethernet Axia, the box does not
   /// answer 302 or refuses a setting.
   SettingsKeeper(Address address, const WantedSettings& wanted, std::filesystem::path journal);
@@ -57,11 +56,6 @@ class SettingsKeeper {
   SettingsKeeper(const SettingsKeeper&) = delete;
   SettingsKeeper& operator=(const SettingsKeeper&) = delete;
 
-  [[nodiscard]] const Configuration& before() const noexcept { return before_; }
-  /// As read back; equals before() if nothing was written.
-  [[nodiscard]] const Configuration& after() const noexcept { return after_; }
-  /// The settings to restore; empty if nothing was written.
-  [[nodiscard]] const std::vector<ChangedSetting>& changed() const noexcept { return changed_; }
   /// Settings for which the box chose another value, and settings restored from the journal.
   [[nodiscard]] const std::vector<Finding>& notes() const noexcept { return notes_; }
 
@@ -79,8 +73,7 @@ class SettingsKeeper {
 
   const Address address_;
   const std::filesystem::path journal_;
-  Configuration before_, after_;
-  std::vector<ChangedSetting> changed_;
+  std::vector<ChangedSetting> changed_;  // to be restored
   std::vector<Finding> notes_;
 };
 

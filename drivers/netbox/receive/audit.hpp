@@ -1,8 +1,6 @@
 // Checks a box's configuration against the campaign. Pure functions.
 #pragma once
 
-#include <cstddef>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -34,14 +32,6 @@ struct AliasedLine {
 /// 1/rev and blade-pass lines above half of `rate_hz` that appear below `limit_hz`, in the order of `speeds_rpm`.
 [[nodiscard]] std::vector<AliasedLine> aliased_lines(double rate_hz, std::span<const double> speeds_rpm, int blades,
                                                      double limit_hz);
-
-/// The kernel reports twice the 4 MiB requested.
-inline constexpr std::size_t kWantedReceiveBytes = std::size_t{8} << 20;
-
-/// The kernel has granted less than requested: a warning below half a second, else a note. `time_scale`: bench seconds
-/// per second.
-[[nodiscard]] std::optional<Finding> small_receive_buffer(std::size_t receive_buffer_bytes, int records_per_datagram,
-                                                          double rate_hz, double time_scale = 1);
 
 /// Worst first.
 [[nodiscard]] std::vector<Finding> audit(const Configuration& box, const Intention& intention = {});

@@ -6,15 +6,12 @@
 
 #include <algorithm>
 #include <array>
-#include <condition_variable>
 #include <cstring>
-#include <mutex>
 #include <utility>
 
 #include "base/error.hpp"
 #include "base/thread.hpp"
 #include "drivers/netbox/configuration/http.hpp"
-#include "drivers/netbox/receive/audit.hpp"
 
 namespace kphi::netbox {
 namespace {
@@ -30,8 +27,6 @@ std::string fetch_configuration(const Address& address, std::chrono::nanoseconds
   return http_get(address.host, address.http_port, "/netftapi2.xml", wall_timeout);
 }
 
-double bench_speed(const Clock& clock) noexcept { return to_seconds(clock.stretched(1s)); }
-
 Duration between(const timespec& from, const timespec& to) noexcept {
   return Duration((to.tv_sec - from.tv_sec) * 1'000'000'000 + to.tv_nsec - from.tv_nsec);
 }
@@ -45,69 +40,20 @@ bool poll_for(std::span<pollfd> descriptors, std::chrono::nanoseconds wall) noex
 
 }  // namespace
 
-/// Asks the box over HTTP on a thread of its own, so that the receive thread never waits for an answer.
-class LoadCell::Inquiry {
- public:
-  /// Raises `bell` with each answer.
-  Inquiry(Address address, Wakeup& bell)
-      : address_(std::move(address)), bell_(bell), thread_(start_thread([this] { run(); })) {}
-  /// Waits for a request under way, at most kAnswerTimeout.
-  ~Inquiry() {
-    change([this] { ending_ = true; });
-    thread_.join();
-  }
-  Inquiry(const Inquiry&) = delete;
-  Inquiry& operator=(const Inquiry&) = delete;
-  /// Returns at once. Asks once more if a request is under way.
-  void ask() {
-    change([this] { asked_ = true; });
-  }
-  [[nodiscard]] std::optional<Answer> take() {
-    const std::lock_guard lock(mutex_);
-    return std::exchange(answer_, std::nullopt);
-  }
-
- private:
-  template <class Change>
-  void change(Change&& change) {
-    {
-      const std::lock_guard lock(mutex_);
-      change();
-    }
-    changed_.notify_one();
-  }
-  void run() noexcept {
-    std::unique_lock lock(mutex_);
-    for (;;) {
-      changed_.wait(lock, [this] { return asked_ || ending_; });
-      if (ending_) return;
-      asked_ = false;
-      lock.unlock();
-      Answer answer = ask_box([this] { return fetch_configuration(address_, kAnswerTimeout); });
-      lock.lock();
-      answer_ = std::move(answer);
-      bell_.raise();
-    }
-  }
-
-  const Address address_;
-  Wakeup& bell_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool asked_ = false, ending_ = false;  // under mutex_, as the next
-  std::optional<Answer> answer_;
-  std::thread thread_;
-};
-
 LoadCell::LoadCell(const Address& address, const Clock& clock, const StreamPolicy& policy)
     : address_(address),
       clock_(clock),
       configuration_(parse_configuration(fetch_configuration(address, kHttpTimeout), "Net Box " + address.host)),
       socket_(address.host, address.rdt_port),
-      connection_(configuration_, policy, bench_speed(clock)),
-      inquiry_(std::make_unique<Inquiry>(address, order_wakeup_)) {}
+      connection_(configuration_, policy, to_seconds(clock.stretched(1s))),
+      inquirer_(start_thread([this] { answer_questions(); })) {}
 
-LoadCell::~LoadCell() { stop(); }
+LoadCell::~LoadCell() {
+  stop();
+  inquiry_ = Inquiry::ending;
+  inquiry_.notify_one();
+  inquirer_.join();
+}
 
 void LoadCell::start() {
   stop();
@@ -123,7 +69,16 @@ void LoadCell::start() {
   state_.wait(State::starting);
   if (state_ != State::failed) return;
   stop();
-  throw_unanswered();
+  const auto fail = [&](const std::string& cause, const char* next_move) {
+    throw DeviceError(fmt::format("Net Box {}:{}", address_.host, address_.rdt_port), "start the stream", cause,
+                      next_move);
+  };
+  if (socket_.refusals() > 0)
+    fail("the box is reachable but refuses the RDT port",
+         "check rdt_port, and that RDT is enabled on the box's Communications page");
+  if (socket_.last_error() != 0) fail(std::strerror(socket_.last_error()), "check this computer's network settings");
+  fail(fmt::format("no record after {} requests", connection_.settings().attempts),
+       "check that no firewall blocks UDP and that no other program uses the box");
 }
 
 void LoadCell::stop() noexcept {
@@ -151,15 +106,10 @@ bool LoadCell::wait(std::chrono::nanoseconds wall) noexcept {
   return !connection_.empty();
 }
 
-std::string LoadCell::receive_buffer_note() const {
-  const auto payload = kRecordBytes * static_cast<std::size_t>(configuration_.records_per_datagram);
-  const Duration period = from_seconds(configuration_.records_per_datagram / configuration_.rdt_rate_hz);
-  return tolerated_stall(socket_.receive_buffer_bytes(), payload, clock_.shrunk(period));
-}
-
-std::optional<Finding> LoadCell::receive_buffer_finding() const {
-  return small_receive_buffer(socket_.receive_buffer_bytes(), configuration_.records_per_datagram,
-                              configuration_.rdt_rate_hz, bench_speed(clock_));
+ReceiveBuffer LoadCell::receive_buffer() const {
+  const double records = configuration_.records_per_datagram;
+  return {socket_.receive_buffer_bytes(), kRecordBytes * static_cast<std::size_t>(records),
+          clock_.shrunk(from_seconds(records / configuration_.rdt_rate_hz))};
 }
 
 void LoadCell::run() noexcept {
@@ -235,8 +185,26 @@ void LoadCell::send_requests() noexcept {
 }
 
 void LoadCell::exchange_answers() noexcept {
-  if (connection_.next_question()) inquiry_->ask();
-  if (auto answer = inquiry_->take()) connection_.answered(std::move(*answer), clock_.now());
+  if (inquiry_ == Inquiry::answered) {
+    connection_.answered(std::move(answer_), clock_.now());
+    inquiry_ = Inquiry::none;
+  }
+  if (inquiry_ != Inquiry::none || !connection_.next_question()) return;
+  inquiry_ = Inquiry::asked;
+  inquiry_.notify_one();
+}
+
+/// A thread of its own asks over HTTP, so that the receive thread never waits for an answer.
+void LoadCell::answer_questions() noexcept {
+  for (Inquiry present = inquiry_; present != Inquiry::ending; present = inquiry_) {
+    if (present != Inquiry::asked) {
+      inquiry_.wait(present);
+      continue;
+    }
+    answer_ = ask_box([this] { return fetch_configuration(address_, kAnswerTimeout); });
+    inquiry_.compare_exchange_strong(present, Inquiry::answered);  // unless it is `ending` by now
+    order_wakeup_.raise();
+  }
 }
 
 /// Repeats the stop if the box continues to send.
@@ -256,21 +224,6 @@ void LoadCell::publish(bool with_health) noexcept {
   if (state_ == state) return;
   state_ = state;
   state_.notify_all();
-}
-
-void LoadCell::throw_unanswered() const {
-  const std::string device = fmt::format("Net Box {}:{}", address_.host, address_.rdt_port);
-  if (socket_.refusals() > 0) {
-    throw DeviceError(device, "start the stream", "the box is reachable but refuses the RDT port",
-                      "check rdt_port, and that RDT is enabled on the box's Communications page");
-  }
-  if (socket_.last_error() != 0) {
-    throw DeviceError(device, "start the stream", std::strerror(socket_.last_error()),
-                      "check this computer's network settings");
-  }
-  throw DeviceError(device, "start the stream",
-                    fmt::format("no record after {} requests", connection_.settings().attempts),
-                    "check that no firewall blocks UDP and that no other program uses the box");
 }
 
 }  // namespace kphi::netbox

@@ -5,15 +5,12 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "base/clock.hpp"
-#include "base/finding.hpp"
 #include "base/published.hpp"
 #include "base/wakeup.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
@@ -30,7 +27,7 @@ class LoadCell {
  public:
   /// Reads the configuration over HTTP; sends nothing to the RDT port. `clock` must outlive this. Throws DeviceError.
   LoadCell(const Address& address, const Clock& clock, const StreamPolicy& policy = {});
-  /// Stops.
+  /// Stops, and waits for a question under way, at most kAnswerTimeout.
   ~LoadCell();
   LoadCell(const LoadCell&) = delete;
   LoadCell& operator=(const LoadCell&) = delete;
@@ -60,15 +57,10 @@ class LoadCell {
   /// Arrival of the newest accepted record; 0 before the first.
   [[nodiscard]] Instant newest_arrival() const noexcept { return Instant(newest_arrival_ns_.load()); }
   [[nodiscard]] State state() const noexcept { return state_.load(); }
-  /// "8.0 MiB, tolerates 1440 ms": how long this process may be blocked before the kernel drops datagrams.
-  [[nodiscard]] std::string receive_buffer_note() const;
-  /// The kernel has granted a smaller buffer than requested: the consequence and what to do.
-  [[nodiscard]] std::optional<Finding> receive_buffer_finding() const;
-  /// As the kernel reports it.
-  [[nodiscard]] std::size_t receive_buffer_bytes() const noexcept { return socket_.receive_buffer_bytes(); }
+  [[nodiscard]] ReceiveBuffer receive_buffer() const;
 
  private:
-  class Inquiry;
+  enum class Inquiry : std::uint8_t { none, asked, answered, ending };
 
   void run() noexcept;
   void pump() noexcept;
@@ -77,9 +69,9 @@ class LoadCell {
   void hand_over() noexcept;
   void send_requests() noexcept;
   void exchange_answers() noexcept;
+  void answer_questions() noexcept;
   void linger() noexcept;
   void publish(bool with_health) noexcept;
-  [[noreturn]] void throw_unanswered() const;
 
   const Address address_;
   const Clock& clock_;
@@ -87,7 +79,6 @@ class LoadCell {
   UdpSocket socket_;
   Connection connection_;  // the receive thread's while it runs, except what belongs to the consumer
   Wakeup order_wakeup_, record_wakeup_;
-  std::unique_ptr<Inquiry> inquiry_;
   std::thread thread_;
   std::atomic<bool> stopping_{false}, bias_requested_{false}, consumer_waits_{false};
   std::size_t drained_ = 0;  // datagrams, last time
@@ -98,6 +89,10 @@ class LoadCell {
   std::atomic<std::int64_t> newest_arrival_ns_{0};
   Published<Counters> counters_;
   Published<Health> health_;
+
+  std::atomic<Inquiry> inquiry_{Inquiry::none};
+  Answer answer_;  // the inquirer's while `asked`, the receive thread's while `answered`
+  std::thread inquirer_;
 };
 
 }  // namespace kphi::netbox

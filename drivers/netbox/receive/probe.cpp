@@ -11,12 +11,6 @@
 namespace kphi::netbox {
 namespace {
 
-std::string status_words(std::uint32_t status, Product product) {
-  std::string words;
-  for (const std::string& name : names(status, product)) words += (words.empty() ? "" : ", ") + name;
-  return words;
-}
-
 void judge_stream(Probe& probe, std::uint32_t status, bool known_skew) {
   const Counters& counters = probe.counters;
   const auto find = [&](Severity severity, std::string what, std::string next_move) {
@@ -34,7 +28,7 @@ void judge_stream(Probe& probe, std::uint32_t status, bool known_skew) {
     find(Severity::warning, fmt::format("{} datagrams have a wrong size", counters.malformed),
          "check that no other device uses this address");
   if (!healthy(status))
-    find(Severity::fault, "the box reports: " + status_words(status, probe.configuration->kind),
+    find(Severity::fault, fmt::format("the box reports: {}", fmt::join(names(status, probe.configuration->kind), ", ")),
          "power-cycle the box; unload the cell if saturated");
   if (known_skew && std::abs(probe.health.skew_ppm) > ClockEstimate::kBelievableSkewPpm)
     find(Severity::fault,
@@ -63,7 +57,7 @@ void look_at_stream(Probe& probe, LoadCell& cell, const Clock& clock, std::chron
   // Jitter comes from this computer and the network: wall time.
   probe.health.jitter_p50_ns = clock.shrunk(Duration(probe.health.jitter_p50_ns)).count();
   probe.health.jitter_p99_ns = clock.shrunk(Duration(probe.health.jitter_p99_ns)).count();
-  probe.receive_buffer = cell.receive_buffer_note();
+  probe.receive_buffer = cell.receive_buffer().note();
   probe.events = cell.take_events();
   judge_stream(probe, status, clock.shrunk(std::chrono::seconds(1)) == std::chrono::seconds(1));
 }
@@ -85,13 +79,13 @@ std::vector<std::string> Probe::lines() const {
     text.push_back(fmt::format("calibration {} in slot {} \"{}\", {:.0f} counts per N, {:.0f} per Nm",
                                box.calibration_serial, box.slot, box.slot_name, box.counts_per_newton,
                                box.counts_per_newton_metre));
-    text.push_back(fmt::format("ranges {:g} {:g} {:g} N, {:g} {:g} {:g} Nm", box.range[0], box.range[1], box.range[2],
-                               box.range[3], box.range[4], box.range[5]));
+    const std::span range(box.range);
+    text.push_back(
+        fmt::format("ranges {:g} N, {:g} Nm", fmt::join(range.first(3), " "), fmt::join(range.last(3), " ")));
     text.push_back(fmt::format("RDT {}, {:.4g} Hz, {} records per datagram, {}",
                                box.rdt_enabled ? "enabled" : "disabled", box.rdt_rate_hz, box.records_per_datagram,
                                filter_words(box)));
-    text.push_back(fmt::format("gage bias {:g} {:g} {:g} {:g} {:g} {:g}", box.gage_bias[0], box.gage_bias[1],
-                               box.gage_bias[2], box.gage_bias[3], box.gage_bias[4], box.gage_bias[5]));
+    text.push_back(fmt::format("gage bias {:g}", fmt::join(box.gage_bias, " ")));
   }
   if (streamed) {
     text.push_back(fmt::format("{} records, {:.1f} per second, {} lost, {} late, {} duplicates, {} overtaken",
@@ -112,7 +106,7 @@ Probe probe(const Address& address, const Clock& clock, const ProbeSettings& set
     LoadCell cell(address, clock, {.reconnect = false});
     found.configuration = cell.configuration();
     found.findings = audit(*found.configuration, settings.intention);
-    if (auto finding = cell.receive_buffer_finding()) found.findings.push_back(std::move(*finding));
+    if (auto finding = cell.receive_buffer().finding()) found.findings.push_back(std::move(*finding));
     if (auto finding = cross_check(address.host, settings.tcp_port, *found.configuration, settings.tcp_timeout))
       found.findings.push_back(std::move(*finding));
     look_at_stream(found, cell, clock, settings.stream);

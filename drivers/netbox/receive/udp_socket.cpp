@@ -12,6 +12,14 @@
 #include "base/error.hpp"
 
 namespace kphi::netbox {
+namespace {
+
+constexpr double kMebibyte = 1 << 20;
+// The kernel doubles what is asked for.
+constexpr std::size_t kWanted = 2 * UdpSocket::kWantedBuffer;
+
+}  // namespace
+
 /// What recvmmsg fills.
 struct UdpSocket::Slots {
   Slots() {
@@ -115,22 +123,27 @@ void UdpSocket::read_control(std::size_t slot) noexcept {
   datagram.dropped = dropped_;
 }
 
-std::size_t datagrams_held(std::size_t receive_buffer_bytes, std::size_t payload_bytes) noexcept {
+std::size_t ReceiveBuffer::datagrams() const noexcept {
   // Measured on Linux 5 and 6 for 36 and 1440 bytes; in between the allocator's next size.
-  const std::size_t charged = payload_bytes <= 100 ? 832 : payload_bytes <= 600 ? 1344 : 2315;
-  return receive_buffer_bytes / charged;
+  return bytes / (payload_bytes <= 100 ? 832 : payload_bytes <= 600 ? 1344 : 2315);
 }
 
-std::string tolerated_stall(std::size_t receive_buffer_bytes, std::size_t payload_bytes,
-                            std::chrono::nanoseconds period) {
-  const double held = static_cast<double>(datagrams_held(receive_buffer_bytes, payload_bytes));
-  std::string note =
-      fmt::format("{:.1f} MiB, tolerates {:.0f} ms", static_cast<double>(receive_buffer_bytes) / (1 << 20),
-                  held * 1e-6 * static_cast<double>(period.count()));
-  // The kernel doubles what is asked for.
-  if (receive_buffer_bytes < 2 * UdpSocket::kWantedBuffer)
-    note += fmt::format("; for longer set net.core.rmem_max to {}", UdpSocket::kWantedBuffer);
-  return note;
+double ReceiveBuffer::tolerated_ms() const noexcept {
+  return static_cast<double>(datagrams()) * 1e-6 * static_cast<double>(period.count());
+}
+
+std::string ReceiveBuffer::note() const {
+  return fmt::format("{:.1f} MiB, tolerates {:.0f} ms{}", static_cast<double>(bytes) / kMebibyte, tolerated_ms(),
+                     bytes < kWanted ? fmt::format("; for longer set net.core.rmem_max to {}", kWanted / 2) : "");
+}
+
+std::optional<Finding> ReceiveBuffer::finding() const {
+  if (bytes >= kWanted) return std::nullopt;
+  return Finding{tolerated_ms() < 500 ? Severity::warning : Severity::note,
+                 fmt::format("the kernel grants {:.2f} MiB of receive buffer instead of {:.0f}: records are lost if "
+                             "kphi is blocked for more than {:.0f} ms",
+                             static_cast<double>(bytes) / kMebibyte, kWanted / kMebibyte, tolerated_ms()),
+                 fmt::format("as root: sysctl -w net.core.rmem_max={}", kWanted / 2)};
 }
 
 }  // namespace kphi::netbox

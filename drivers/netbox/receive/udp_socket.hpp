@@ -7,10 +7,12 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
 #include "base/descriptor.hpp"
+#include "base/finding.hpp"
 
 namespace kphi::netbox {
 
@@ -63,12 +65,19 @@ class UdpSocket {
   std::array<Datagram, kBatch> datagrams_{};
 };
 
-/// Datagrams of `payload_bytes` that a receive buffer holds: the kernel charges each with its bookkeeping.
-[[nodiscard]] std::size_t datagrams_held(std::size_t receive_buffer_bytes, std::size_t payload_bytes) noexcept;
+/// The kernel's receive buffer, and how long this process may be blocked before datagrams are dropped.
+struct ReceiveBuffer {
+  std::size_t bytes = 0;            ///< as the kernel reports it: twice what was asked for
+  std::size_t payload_bytes = 0;    ///< of one datagram
+  std::chrono::nanoseconds period;  ///< between two datagrams, wall time
 
-/// "8.0 MiB, tolerates 1440 ms": how long the receiver may stand still before the kernel drops datagrams of
-/// `payload_bytes` that come every `period` (wall time); and the next move where less was granted than is wanted.
-[[nodiscard]] std::string tolerated_stall(std::size_t receive_buffer_bytes, std::size_t payload_bytes,
-                                          std::chrono::nanoseconds period);
+  /// Datagrams that fit: the kernel charges each with its bookkeeping.
+  [[nodiscard]] std::size_t datagrams() const noexcept;
+  [[nodiscard]] double tolerated_ms() const noexcept;
+  /// "8.0 MiB, tolerates 1440 ms"; and the next move if less was granted than requested.
+  [[nodiscard]] std::string note() const;
+  /// Less was granted than requested: a warning if less than half a second is tolerated, else a note.
+  [[nodiscard]] std::optional<Finding> finding() const;
+};
 
 }  // namespace kphi::netbox

@@ -46,70 +46,13 @@ Answer ask_box(const std::function<std::string()>& fetch) noexcept {
   return answer;
 }
 
-void Reconnect::silent(Instant now) noexcept {
-  phase_ = Phase::to_ask;
-  pause_ = policy_.first_pause;
-  give_up_at_ = now + policy_.give_up_after;
-  away_ = false;
-  answer_.reset();
-}
-
-bool Reconnect::answered(Answer::Kind answer, bool booted, Instant now) noexcept {
-  if (phase_ != Phase::asking) return false;
-  const bool news = answer_ != answer;
-  answer_ = answer;
-  away_ = away_ || booted || answer != Answer::Kind::ready;
-  if (!policy_.reconnect || !away_) {
-    phase_ = Phase::resting;
-  } else if (answer == Answer::Kind::ready) {
-    phase_ = Phase::to_start;
-  } else {
-    pause(now);
-  }
-  return news;
-}
-
-void Reconnect::start_failed(Instant now) noexcept { pause(now); }
-
-void Reconnect::pause(Instant now) noexcept {
-  phase_ = Phase::pausing;
-  due_ = now + pause_;
-  pause_ = std::min(2 * pause_, policy_.longest_pause);
-}
-
-Reconnect::Move Reconnect::next(Instant now) noexcept {
-  switch (phase_) {
-    case Phase::to_ask:
-      phase_ = Phase::asking;
-      return Move::ask;
-    case Phase::to_start:
-      phase_ = Phase::starting;
-      return Move::start;
-    case Phase::pausing:
-      if (now >= give_up_at_) {
-        phase_ = Phase::resting;
-        return Move::give_up;
-      }
-      if (now < due_) return Move::none;
-      phase_ = Phase::asking;
-      return Move::ask;
-    case Phase::resting:
-    case Phase::asking:
-    case Phase::starting:
-      break;
-  }
-  return Move::none;
-}
-
-Instant Reconnect::deadline() const noexcept { return phase_ == Phase::pausing ? std::min(due_, give_up_at_) : kNever; }
-
 Connection::Connection(const Configuration& box, const StreamPolicy& policy, double bench_speed)
     : bench_speed_(bench_speed),
       latest_(box),
       streamed_(box),
       session_(stream_settings(box)),
       meter_(box.device_rate_hz),
-      reconnect_(in_bench_time(policy, bench_speed)),
+      policy_(in_bench_time(policy, bench_speed)),
       ring_(queue_capacity(box, bench_speed)) {}
 
 StreamSettings Connection::stream_settings(const Configuration& box) const {
@@ -127,7 +70,7 @@ StreamSettings Connection::stream_settings(const Configuration& box) const {
 void Connection::start(Instant now) {
   adopt_latest();
   meter_->begin();
-  reconnect_.streaming();
+  plan_ = Plan::none;
   session_->start(now);
 }
 
@@ -177,7 +120,8 @@ void Connection::advance(Instant now) {
 }
 
 Instant Connection::deadline() const noexcept {
-  return std::min({session_->deadline(), session_->release_deadline(), reconnect_.deadline()});
+  const Instant next_move = plan_ == Plan::pause ? std::min(due_, give_up_at_) : kNever;
+  return std::min({session_->deadline(), session_->release_deadline(), next_move});
 }
 
 Duration Connection::gathering_time(Instant now) const noexcept {
@@ -194,31 +138,39 @@ void Connection::note_event(EventKind kind, Instant at, Changes changes) noexcep
 }
 
 void Connection::collect_events() noexcept {
-  session_->events().drain([this](const Event& event) {
+  for (const Event& event : session_->take_events()) {
     if (!events_.push(event)) ++events_dropped_;
-    if (event.kind == EventKind::silent) reconnect_.silent(event.at);
+    if (event.kind == EventKind::silent) ask_about_silence(event.at);
     if (event.kind == EventKind::rebooted) question_ = true;
-  });
+  }
+}
+
+void Connection::ask_about_silence(Instant silent_at) noexcept {
+  plan_ = Plan::await_answer;
+  question_ = true;
+  pause_ = policy_.first_pause;
+  give_up_at_ = silent_at + policy_.give_up_after;
+  away_ = false;
+  last_answer_.reset();
+}
+
+void Connection::pause(Instant now) noexcept {
+  plan_ = Plan::pause;
+  due_ = now + pause_;
+  pause_ = std::min(2 * pause_, policy_.longest_pause);
 }
 
 void Connection::supervise(Instant now) {
-  if (session_->state() == State::streaming) {
-    reconnect_.streaming();
-  } else if (reconnect_.starting() && session_->state() == State::silent) {
-    reconnect_.start_failed(now);
-  }
-  switch (reconnect_.next(now)) {
-    case Reconnect::Move::ask:
-      question_ = true;
-      return;
-    case Reconnect::Move::start:
-      adopt_latest();
-      return session_->start(now);
-    case Reconnect::Move::give_up:
-      note_event(EventKind::given_up, now);
-      return;
-    case Reconnect::Move::none:
-      return;
+  const State state = session_->state();
+  if (state == State::streaming) plan_ = Plan::none;
+  if (plan_ == Plan::await_record && state == State::silent) pause(now);
+  if (plan_ != Plan::pause) return;
+  if (now >= give_up_at_) {
+    plan_ = Plan::none;
+    note_event(EventKind::given_up, now);
+  } else if (now >= due_) {
+    plan_ = Plan::await_answer;
+    question_ = true;
   }
 }
 
@@ -237,9 +189,17 @@ void Connection::answered(Answer answer, Instant at) {
     adopt_latest();
     return session_->start(at);
   }
-  if (!reconnect_.answered(answer.kind, booted, at)) return;
-  const bool starts = answer.kind == Answer::Kind::ready && reconnect_.will_start();
-  if (!starts) note_event(event_of(answer.kind), at);
+  if (plan_ != Plan::await_answer) return;
+  away_ = away_ || booted || answer.kind != Answer::Kind::ready;
+  const bool returns = policy_.reconnect && away_, news = std::exchange(last_answer_, answer.kind) != answer.kind;
+  if (returns && answer.kind == Answer::Kind::ready) {
+    plan_ = Plan::await_record;
+    adopt_latest();
+    return session_->start(at);
+  }
+  plan_ = Plan::none;
+  if (returns) pause(at);
+  if (news) note_event(event_of(answer.kind), at);
 }
 
 /// The box may stream at another rate than the session was made for. Where its sample count continues, so do the

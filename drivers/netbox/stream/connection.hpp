@@ -42,43 +42,6 @@ inline constexpr std::chrono::seconds kAnswerTimeout{2};
 /// `fetch` returns netftapi2.xml or throws.
 [[nodiscard]] Answer ask_box(const std::function<std::string()>& fetch) noexcept;
 
-/// When to ask a silent box, when to start its stream again, when to give up. One thread.
-class Reconnect {
- public:
-  enum class Move : std::uint8_t { none, ask, start, give_up };
-
-  /// `policy` in bench time.
-  explicit Reconnect(const StreamPolicy& policy) noexcept : policy_(policy) {}
-
-  /// The stream has fallen silent.
-  void silent(Instant now) noexcept;
-  /// `booted`: the box has booted since it streamed. True if the answer differs from the one before.
-  bool answered(Answer::Kind answer, bool booted, Instant now) noexcept;
-  /// The start requested last brought no record.
-  void start_failed(Instant now) noexcept;
-  /// Records arrive.
-  void streaming() noexcept { phase_ = Phase::resting; }
-  /// Returns each move once.
-  [[nodiscard]] Move next(Instant now) noexcept;
-  /// When next() will have a move; kNever if it waits for something else.
-  [[nodiscard]] Instant deadline() const noexcept;
-  /// The next move is a start.
-  [[nodiscard]] bool will_start() const noexcept { return phase_ == Phase::to_start; }
-  /// A start is under way: neither start_failed() nor streaming() since.
-  [[nodiscard]] bool starting() const noexcept { return phase_ == Phase::starting; }
-
- private:
-  enum class Phase : std::uint8_t { resting, to_ask, asking, pausing, to_start, starting };
-  void pause(Instant now) noexcept;
-
-  const StreamPolicy policy_;
-  Phase phase_ = Phase::resting;
-  Instant give_up_at_ = kNever, due_ = kNever;
-  Duration pause_{0};
-  bool away_ = false;  // not ready at some time of this silence: no other client can have had its stream
-  std::optional<Answer::Kind> answer_;
-};
-
 /// One thread; take(), empty() and take_events() may belong to another. Times are bench time.
 class Connection {
  public:
@@ -135,6 +98,8 @@ class Connection {
   [[nodiscard]] StreamSettings stream_settings(const Configuration& box) const;
   void store_accepted() noexcept;
   void collect_events() noexcept;
+  void ask_about_silence(Instant silent_at) noexcept;
+  void pause(Instant now) noexcept;
   void supervise(Instant now);
   void note_event(EventKind kind, Instant at, Changes changes = 0) noexcept;
   void adopt_latest();
@@ -143,13 +108,22 @@ class Connection {
   Configuration latest_, streamed_;  // as answered last; what session_ is made for
   std::optional<Session> session_;
   std::optional<HealthMeter> meter_;
-  Reconnect reconnect_;
+
+  /// About a silence: nothing; its question is under way; the next question or the end is due; a start is under way.
+  enum class Plan : std::uint8_t { none, await_answer, pause, await_record };
+  const StreamPolicy policy_;  // in bench time
+  Plan plan_ = Plan::none;
+  Instant due_ = kNever, give_up_at_ = kNever;
+  Duration pause_{0};
+  bool away_ = false;  // not ready at some time of this silence: no other client can have had its stream
+  std::optional<Answer::Kind> last_answer_;  // of this silence
+  bool question_ = false;
+
   RecordRing ring_;
   boost::lockfree::spsc_queue<Event, boost::lockfree::capacity<256>> events_;
   std::vector<StampedRecord> accepted_;
   Instant newest_arrival_{0}, newest_datagram_{0};
   std::uint64_t queue_overflows_ = 0, events_dropped_ = 0;
-  bool question_ = false;
 };
 
 }  // namespace kphi::netbox

@@ -1,9 +1,9 @@
 // Events of the stream, with the sequence numbers that showed them. Values only; one thread per log.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/clock.hpp"
@@ -46,30 +46,19 @@ struct Event {
 class EventLog {
  public:
   static constexpr std::size_t kCapacity = 64;
-  void note(const Event& event) noexcept {
-    if (count_ < kCapacity) {
-      events_[count_++] = event;
+  void note(const Event& event) {
+    if (events_.size() < kCapacity) {
+      events_.push_back(event);
     } else {
       ++dropped_;
     }
   }
   /// Removes and returns all, oldest first.
-  [[nodiscard]] std::vector<Event> take() {
-    std::vector<Event> taken(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(count_));
-    count_ = 0;
-    return taken;
-  }
-  /// As take(), without allocation.
-  template <class Sink>
-  void drain(Sink&& sink) noexcept {
-    for (std::size_t i = 0; i < count_; ++i) sink(events_[i]);
-    count_ = 0;
-  }
+  [[nodiscard]] std::vector<Event> take() { return std::exchange(events_, {}); }
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
 
  private:
-  std::array<Event, kCapacity> events_{};
-  std::size_t count_ = 0;
+  std::vector<Event> events_;
   std::uint64_t dropped_ = 0;
 };
 

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "drivers/netbox/stream/sequence.hpp"
+#include "drivers/netbox/stream/reorder_window.hpp"
 
 namespace kphi::netbox {
 

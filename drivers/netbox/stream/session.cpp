@@ -12,10 +12,6 @@ constexpr int kDrainLimit = 20;
 // start was sent, belongs to the stream before.
 constexpr double kFirstDatagrams = 4, kLargestRate = 4;
 
-// Net Box only; the Axia has no such bits.
-constexpr std::uint32_t kTroubleBits =
-    1u << static_cast<unsigned>(StatusBit::rdt) | 1u << static_cast<unsigned>(StatusBit::network);
-
 bool same_count(const StreamSettings& a, const StreamSettings& b) noexcept {
   return a.divisor == b.divisor && a.device_rate_hz == b.device_rate_hz;
 }
@@ -25,10 +21,6 @@ std::size_t window_records(const StreamSettings& settings) {
 }
 
 }  // namespace
-
-Duration StreamSettings::datagram_period() const noexcept {
-  return from_seconds(records_per_datagram * (divisor / device_rate_hz));
-}
 
 Session::Session(StreamSettings settings) : Session(settings, LossTracker(settings.divisor, settings.device_rate_hz)) {}
 
@@ -58,7 +50,7 @@ void Session::start(Instant now) {
     silence_told_ = phase_ == Phase::silent;
   }
   attempt_ = 0;
-  request_count_ = 0;
+  requests_.clear();
   send_stop(now);
   phase_ = Phase::draining;
   bias_due_ = kNever;
@@ -67,7 +59,7 @@ void Session::start(Instant now) {
 }
 
 void Session::stop(Instant now) {
-  request_count_ = 0;
+  requests_.clear();
   send_stop(now);
   phase_ = Phase::idle;
   due_ = bias_due_ = kNever;
@@ -153,7 +145,7 @@ void Session::note_arrival(std::size_t count, Instant arrival) noexcept {
 }
 
 void Session::note_status(std::uint32_t status, const Record& shown_by, Instant arrival) noexcept {
-  const std::uint32_t trouble = settings_.product == Product::net_box ? status & kTroubleBits : 0;
+  const std::uint32_t trouble = settings_.product == Product::net_box ? status & kStreamTrouble : 0;
   if ((trouble & ~trouble_) != 0) note_event(EventKind::box_trouble, arrival, shown_by, trouble);
   trouble_ = trouble;
 }
@@ -213,30 +205,18 @@ void Session::advance(Instant now) {
 }
 
 bool Session::next_request(std::array<std::uint8_t, 8>& request) noexcept {
-  if (request_count_ == 0) return false;
-  request = encode_request(requests_[0]);
-  std::copy(requests_.begin() + 1, requests_.end(), requests_.begin());
-  --request_count_;
+  if (requests_.empty()) return false;
+  request = encode_request(requests_.front());
+  requests_.erase(requests_.begin());
   return true;
 }
 
 Instant Session::deadline() const noexcept { return std::min(due_, bias_due_); }
 
 State Session::state() const noexcept {
-  switch (phase_) {
-    case Phase::draining:
-    case Phase::awaiting:
-      return State::starting;
-    case Phase::streaming:
-      return State::streaming;
-    case Phase::silent:
-      return State::silent;
-    case Phase::failed:
-      return State::failed;
-    case Phase::idle:
-      break;
-  }
-  return State::idle;
+  constexpr State kStates[] = {State::idle,      State::starting, State::starting,
+                               State::streaming, State::silent,   State::failed};  // by Phase
+  return kStates[static_cast<std::size_t>(phase_)];
 }
 
 void Session::note_host_drops(std::uint64_t total) noexcept {
@@ -259,7 +239,7 @@ bool Session::belongs_to_new_stream(const Record& first, Instant arrival) const 
 }
 
 void Session::send(Command command) noexcept {
-  if (request_count_ < requests_.size()) requests_[request_count_++] = command;
+  if (requests_.size() < requests_.capacity()) requests_.push_back(command);
 }
 
 void Session::send_stop(Instant now) noexcept {

@@ -3,13 +3,14 @@
 #pragma once
 
 #include <array>
+#include <boost/container/static_vector.hpp>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "base/clock.hpp"
 #include "drivers/netbox/stream/events.hpp"
-#include "drivers/netbox/stream/sequence.hpp"
+#include "drivers/netbox/stream/reorder_window.hpp"
 #include "drivers/netbox/wire/rdt.hpp"
 
 namespace kphi::netbox {
@@ -29,7 +30,9 @@ struct StreamSettings {
   int attempts = 6;  ///< starts sent before giving up; the timeout doubles up to four times the first
 
   /// Bench time between two datagrams.
-  [[nodiscard]] Duration datagram_period() const noexcept;
+  [[nodiscard]] Duration datagram_period() const noexcept {
+    return from_seconds(records_per_datagram * (divisor / device_rate_hz));
+  }
   /// A stream without a record for this long is silent.
   [[nodiscard]] Duration silence() const noexcept { return silence_timeout + 3 * datagram_period(); }
 };
@@ -87,7 +90,6 @@ class Session {
   [[nodiscard]] const Counters& counters() const noexcept { return account_.counters(); }
   /// Oldest first; bounded, see EventLog.
   [[nodiscard]] std::vector<Event> take_events() { return account_.events().take(); }
-  [[nodiscard]] EventLog& events() noexcept { return account_.events(); }
   [[nodiscard]] std::uint64_t dropped_events() const noexcept { return account_.events().dropped(); }
   [[nodiscard]] const StreamSettings& settings() const noexcept { return settings_; }
 
@@ -124,8 +126,7 @@ class Session {
   std::size_t datagram_records_;  // of the last datagram
   std::uint64_t host_drops_ = 0;
   std::array<Record, kMaxRecords> decoded_{};
-  std::array<Command, 4> requests_{};
-  std::size_t request_count_ = 0;
+  boost::container::static_vector<Command, 4> requests_;
 };
 
 }  // namespace kphi::netbox

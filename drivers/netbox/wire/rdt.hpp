@@ -10,9 +10,16 @@
 #include <span>
 #include <type_traits>
 
-#include "drivers/netbox/wire/codes.hpp"
-
 namespace kphi::netbox {
+
+/// Commands (Table 10.1). None is acknowledged; the newest wins, whoever sent it.
+enum class Command : std::uint16_t {
+  stop = 0,
+  real_time = 2,         ///< one record per datagram
+  axia_multi_block = 2,  ///< Ethernet Axia: "RDT Buffer Size" records per datagram
+  buffered = 3,          ///< "RDT Buffer Size" records per datagram
+  set_bias = 0x42,
+};
 
 inline constexpr std::size_t kRecordBytes = 36, kMaxRecords = 40;
 
@@ -26,7 +33,14 @@ struct Record {
 };
 
 /// `sample_count` 0 = until stopped.
-[[nodiscard]] std::array<std::uint8_t, 8> encode_request(Command command, std::uint32_t sample_count = 0) noexcept;
+[[nodiscard]] inline std::array<std::uint8_t, 8> encode_request(Command command,
+                                                                std::uint32_t sample_count = 0) noexcept {
+  std::array<std::uint8_t, 8> request{};
+  boost::endian::store_big_u16(&request[0], 0x1234);
+  boost::endian::store_big_u16(&request[2], static_cast<std::uint16_t>(command));
+  boost::endian::store_big_u32(&request[4], sample_count);
+  return request;
+}
 
 /// 1..40; 0: refused, not a multiple of 36 bytes or more than 40 records.
 [[nodiscard]] constexpr std::size_t records_in(std::size_t datagram_bytes) noexcept {
@@ -51,6 +65,11 @@ inline void decode(const std::uint8_t* bytes, Record& out) noexcept {
 }
 
 /// Number of records written to `out`: records_in().
-[[nodiscard]] std::size_t decode(std::span<const std::uint8_t> datagram, std::span<Record, kMaxRecords> out) noexcept;
+[[nodiscard]] inline std::size_t decode(std::span<const std::uint8_t> datagram,
+                                        std::span<Record, kMaxRecords> out) noexcept {
+  const std::size_t count = records_in(datagram.size());
+  for (std::size_t i = 0; i < count; ++i) decode(datagram.data() + i * kRecordBytes, out[i]);
+  return count;
+}
 
 }  // namespace kphi::netbox

@@ -6,74 +6,62 @@
 namespace kphi::netbox {
 namespace {
 
-struct Entry {
-  constexpr Entry(StatusBit b, const char* n) : bit(static_cast<int>(b)), name(n) {}
-  constexpr Entry(AxiaStatusBit b, const char* n) : bit(static_cast<int>(b)), name(n) {}
-  int bit;
+struct Bit {
+  int number;
   const char* name;
 };
 
-constexpr Entry kNetBox[] = {
-    {StatusBit::cpu_or_ram, "CPU or RAM error"},
-    {StatusBit::digital_board, "digital board error"},
-    {StatusBit::analog_board, "analog board error"},
-    {StatusBit::serial_link, "serial link communication error"},
-    {StatusBit::program_memory, "program memory verification error"},
-    {StatusBit::halted, "halted: configuration errors"},
-    {StatusBit::settings_validation, "settings validation error"},
-    {StatusBit::calibration_mismatch, "configuration incompatible with calibration"},
-    {StatusBit::network, "network communication failure"},
-    {StatusBit::can, "CAN communication error"},
-    {StatusBit::rdt, "RDT communication error"},
-    {StatusBit::ethernet_ip, "EtherNet/IP failure"},
-    {StatusBit::device_net, "DeviceNet failure"},
-    {StatusBit::saturation, "transducer saturation or A/D error"},
-    {StatusBit::monitor_condition, "monitor condition latched"},
-    {StatusBit::watchdog, "watchdog timeout"},
-    {StatusBit::stack_check, "stack check error"},
-    {StatusBit::serial_eeprom, "serial EEPROM (I2C) failure"},
-    {StatusBit::serial_flash, "serial flash (SPI) failure"},
-    {StatusBit::analog_watchdog, "analog board watchdog timeout"},
-    {StatusBit::excitation_high, "excessive strain gage excitation current"},
-    {StatusBit::excitation_low, "insufficient strain gage excitation current"},
-    {StatusBit::analog_ground, "artificial analog ground out of range"},
-    {StatusBit::analog_supply_high, "analog supply too high"},
-    {StatusBit::analog_supply_low, "analog supply too low"},
-    {StatusBit::serial_link_unavailable, "serial link data unavailable"},
-    {StatusBit::reference_voltage, "reference voltage or power monitor error"},
-    {StatusBit::temperature, "internal temperature error"},
-    {StatusBit::http_failure, "HTTP protocol failure"},
+constexpr Bit kNetBox[] = {
+    {1, "HTTP protocol failure"},
+    {2, "internal temperature error"},
+    {3, "reference voltage or power monitor error"},
+    {4, "serial link data unavailable"},
+    {5, "analog supply too low"},
+    {6, "analog supply too high"},
+    {7, "artificial analog ground out of range"},
+    {8, "insufficient strain gage excitation current"},
+    {9, "excessive strain gage excitation current"},
+    {10, "analog board watchdog timeout"},
+    {11, "serial flash (SPI) failure"},
+    {12, "serial EEPROM (I2C) failure"},
+    {13, "stack check error"},
+    {14, "watchdog timeout"},
+    {16, "monitor condition latched"},
+    {17, "transducer saturation or A/D error"},
+    {18, "DeviceNet failure"},
+    {19, "EtherNet/IP failure"},
+    {20, "RDT communication error"},
+    {21, "CAN communication error"},
+    {22, "network communication failure"},
+    {23, "configuration incompatible with calibration"},
+    {24, "settings validation error"},
+    {25, "halted: configuration errors"},
+    {26, "program memory verification error"},
+    {27, "serial link communication error"},
+    {28, "analog board error"},
+    {29, "digital board error"},
+    {30, "CPU or RAM error"},
 };
+/// HTTP, DeviceNet, EtherNet/IP, RDT, CAN, network.
+constexpr std::uint32_t kCommunication = 1u << 1 | 1u << 18 | 1u << 19 | 1u << 20 | 1u << 21 | 1u << 22;
 
-constexpr Entry kAxia[] = {
-    {AxiaStatusBit::out_of_range, "force or torque out of range"},
-    {AxiaStatusBit::calibration_checksum, "calibration checksum error"},
-    {AxiaStatusBit::simulated_error, "simulated error"},
-    {AxiaStatusBit::gage_out_of_range, "gage out of range"},
-    {AxiaStatusBit::monitor_condition, "monitor condition latched"},
-    {AxiaStatusBit::calibration_not_accessible, "calibration not accessible"},
-    {AxiaStatusBit::common_error, "common error"},
-    {AxiaStatusBit::busy, "busy with its memory, filter or calibration"},
-    {AxiaStatusBit::broken_gage, "broken gage"},
-    {AxiaStatusBit::supply_voltage, "supply voltage error"},
-    {AxiaStatusBit::temperature, "temperature error"},
+constexpr Bit kAxia[] = {
+    {0, "temperature error"},
+    {1, "supply voltage error"},
+    {2, "broken gage"},
+    {3, "busy with its memory, filter or calibration"},
+    {5, "common error"},
+    {7, "calibration not accessible"},
+    {16, "monitor condition latched"},
+    {27, "gage out of range"},
+    {28, "simulated error"},
+    {29, "calibration checksum error"},
+    {30, "force or torque out of range"},
 };
-
-constexpr std::uint32_t mask(auto... bits) noexcept { return (0u | ... | (1u << static_cast<unsigned>(bits))); }
-
-constexpr std::uint32_t kNoError = mask(StatusBit::error_summary, StatusBit::monitor_condition);
-constexpr std::uint32_t kSaturation = mask(StatusBit::saturation);
-constexpr std::uint32_t kAxiaSaturation = mask(AxiaStatusBit::out_of_range, AxiaStatusBit::gage_out_of_range);
-constexpr std::uint32_t kCommunication = mask(StatusBit::network, StatusBit::can, StatusBit::rdt,
-                                              StatusBit::ethernet_ip, StatusBit::device_net, StatusBit::http_failure);
-
-std::span<const Entry> table_of(Product product) noexcept {
-  return product == Product::axia ? std::span<const Entry>(kAxia) : std::span<const Entry>(kNetBox);
-}
 
 std::string name_of(int bit, Product product) {
-  const auto table = table_of(product);
-  const auto entry = std::find_if(table.begin(), table.end(), [&](const Entry& e) { return e.bit == bit; });
+  const auto table = product == Product::axia ? std::span<const Bit>(kAxia) : std::span<const Bit>(kNetBox);
+  const auto entry = std::find_if(table.begin(), table.end(), [&](const Bit& known) { return known.number == bit; });
   return entry == table.end() ? "bit " + std::to_string(bit) : entry->name;
 }
 
@@ -81,10 +69,9 @@ std::string name_of(int bit, Product product) {
 
 StatusVerdict verdict_of(std::uint32_t status, Product product) noexcept {
   if (healthy(status)) return StatusVerdict::sound;
-  const std::uint32_t errors = status & ~kNoError;
+  const std::uint32_t errors = status & ~(kErrorSummary | kMonitorCondition);
   const std::uint32_t communication = product == Product::axia ? 0 : kCommunication;
-  const std::uint32_t saturation = product == Product::axia ? kAxiaSaturation : kSaturation;
-  if (errors == 0 || (errors & ~(communication | saturation)) != 0) return StatusVerdict::faulty;
+  if (errors == 0 || (errors & ~(communication | saturation_bits(product))) != 0) return StatusVerdict::faulty;
   return saturated(status, product) ? StatusVerdict::saturated : StatusVerdict::communication;
 }
 
@@ -94,7 +81,7 @@ std::vector<std::string> names(std::uint32_t status, Product product) {
     if ((status >> bit & 1u) != 0) set.push_back(name_of(bit, product));
   }
   // The summary alone names no error.
-  if (status == 1u << 31) set.push_back("error summary");
+  if (status == kErrorSummary) set.push_back("error summary");
   return set;
 }
 

@@ -1,31 +1,37 @@
-// The status word of each record: Net Box (manual 9620-05-NET FT, Table 17.1) and Ethernet Axia, which differ.
+// The boxes that speak RDT, and the status word of each record: Net Box (manual 9620-05-NET FT, Table 17.1) and
+// Ethernet Axia, which differ.
 #pragma once
 
 #include <cstdint>
 #include <string>
 #include <vector>
 
-#include "drivers/netbox/wire/codes.hpp"
-
 namespace kphi::netbox {
 
-[[nodiscard]] constexpr bool has(std::uint32_t status, StatusBit bit) noexcept {
-  return (status >> static_cast<unsigned>(bit) & 1u) != 0;
-}
-[[nodiscard]] constexpr bool has(std::uint32_t status, AxiaStatusBit bit) noexcept {
-  return (status >> static_cast<unsigned>(bit) & 1u) != 0;
+/// They differ in commands, status word and rates.
+enum class Product : std::uint8_t {
+  net_box,
+  axia,  ///< Ethernet Axia (9610-05-Ethernet Axia), Schunk FTN-Axia
+};
+
+[[nodiscard]] constexpr const char* name_of(Product product) noexcept {
+  return product == Product::axia ? "Axia" : "Net Box";
 }
 
-/// 0, or only a latched monitor condition (0x80010000).
-[[nodiscard]] constexpr bool healthy(std::uint32_t status) noexcept { return status == 0 || status == 0x80010000u; }
+inline constexpr std::uint32_t kMonitorCondition = 1u << 16;  ///< latched; no error
+inline constexpr std::uint32_t kErrorSummary = 1u << 31;      ///< also set together with kMonitorCondition
+/// RDT and network: the Net Box reports failed communication. The Axia has no such bits.
+inline constexpr std::uint32_t kStreamTrouble = 1u << 20 | 1u << 22;
 
-/// Transducer saturation or A/D error: the sample is worthless, the box works.
+/// 0, or only a latched monitor condition.
+[[nodiscard]] constexpr bool healthy(std::uint32_t status) noexcept {
+  return status == 0 || status == (kErrorSummary | kMonitorCondition);
+}
+
+/// Transducer saturation or A/D error; of an Axia: out of range, gage out of range. The sample is worthless, the box
+/// works.
 [[nodiscard]] constexpr std::uint32_t saturation_bits(Product product) noexcept {
-  if (product == Product::axia) {
-    return 1u << static_cast<unsigned>(AxiaStatusBit::out_of_range) |
-           1u << static_cast<unsigned>(AxiaStatusBit::gage_out_of_range);
-  }
-  return 1u << static_cast<unsigned>(StatusBit::saturation);
+  return product == Product::axia ? 1u << 30 | 1u << 27 : 1u << 17;
 }
 [[nodiscard]] constexpr bool saturated(std::uint32_t status, Product product = Product::net_box) noexcept {
   return (status & saturation_bits(product)) != 0;

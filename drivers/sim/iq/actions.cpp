@@ -1,7 +1,6 @@
-// What the module does on commands, and by itself: sets, motion, flash, reboots, timeouts.
+// What the module does on commands, and by itself: sets, motion, reboots, timeouts.
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "compensation/units.hpp"
 #include "drivers/iq/wire/codes.hpp"
@@ -11,10 +10,8 @@
 namespace kphi::sim {
 namespace {
 
-constexpr std::uint32_t kFormatKey1 = 12345678, kFormatKey2 = 11223344;
 constexpr double kYear = 3e7;
 constexpr Duration kBootTime = std::chrono::milliseconds(150);  // not published
-constexpr double kSlowestBaud = 300;
 
 }  // namespace
 
@@ -22,7 +19,17 @@ void IqDevice::set(std::uint8_t type, std::uint8_t sub, std::span<const std::uin
   IqMemory::Cell* cell = memory_.find(type, sub);
   if (cell == nullptr || !cell->entry.set() || data.size() != iq_size(cell->entry.format)) return;
   cell->bits = little(data);
-  act(type, sub, now);
+  using Mode = MotorDrive::Mode;
+  const double value = cell->value();
+  const auto is = [&](std::uint8_t client, std::uint8_t entry) { return type == client && sub == entry; };
+  if (is(5, 0)) return brown_out(now, kBootTime);
+  if (is(52, 1) || is(50, 5)) return command(Mode::brake, value, now);
+  if (is(52, 2) || is(50, 6)) return command(Mode::coast, value, now);
+  if (is(52, 3) || is(50, 3)) return command(Mode::pwm, value, now);
+  if (is(52, 4) || is(50, 4)) return command(Mode::volts, value, now);
+  if (is(52, 5)) return command(Mode::velocity, value, now);
+  if (is(84, 1)) return safety_.clear(static_cast<std::uint8_t>(value));
+  tune();
 }
 
 void IqDevice::save(std::uint8_t type, std::uint8_t sub) noexcept {
@@ -30,97 +37,15 @@ void IqDevice::save(std::uint8_t type, std::uint8_t sub) noexcept {
   if (cell != nullptr && cell->entry.save()) cell->save();
 }
 
-void IqDevice::act(std::uint8_t type, std::uint8_t sub, Instant now) {
-  if (command_motion(type, sub, now)) return;
-  const double value = memory_.value(type, sub);
-  switch (type) {
-    case 5:
-      return system_action(sub, now);
-    case 11:
-      return flash_action(sub);
-    case 16: {
-      IqMemory::Cell* cell = memory_.find(16, 0);
-      cell->save();
-      baud_ = static_cast<unsigned>(std::max(value, kSlowestBaud));
-      return;
-    }
-    case 69:
-      if (sub == 4) sensors_.reset_joules(*state_);
-      break;
-    case 84:
-      if (sub == 1) safety_.clear(static_cast<std::uint8_t>(value));
-      return;
-    case 86:
-      if (sub == 12) arm(value != 0, now);
-      return;
-    default:
-      break;
-  }
-  tune();
-}
-
-void IqDevice::system_action(std::uint8_t sub, Instant now) {
-  if (sub == 0) return brown_out(now, kBootTime);
-  if (sub == 1) {
-    in_boot_loader_ = true;
-    replies_.clear();
-    rest(MotorDrive::Mode::coast, now);
-    stage_ = {};
-  }
-  if (sub == 15) time_offset_ = memory_.finite(5, 15) - to_seconds(now - booted_) * (1 + settings_.oscillator_gain);
-}
-
-void IqDevice::flash_action(std::uint8_t sub) noexcept {
-  if (sub > 1) return;
-  const bool allowed = static_cast<std::uint32_t>(memory_.value(11, 2)) == kFormatKey1 &&
-                       static_cast<std::uint32_t>(memory_.value(11, 3)) == kFormatKey2;
-  if (!allowed) return;
-  if (sub == 0) memory_.erase();
-  if (sub == 1) memory_.revert();
-  memory_.store(11, 2, 0);
-  memory_.store(11, 3, 0);
-  tune();
-}
-
-/// False: the entry does not command motion.
-bool IqDevice::command_motion(std::uint8_t type, std::uint8_t sub, Instant now) {
-  using Mode = MotorDrive::Mode;
-  const double value = memory_.value(type, sub);
-  switch (iq_key(type, sub)) {
-    case iq_key(52, 1):
-    case iq_key(50, 5):
-      rest(Mode::brake, now);
-      break;
-    case iq_key(52, 2):
-    case iq_key(50, 6):
-      rest(Mode::coast, now);
-      break;
-    case iq_key(52, 3):
-    case iq_key(50, 3):
-      spin(Mode::pwm, value, now);
-      break;
-    case iq_key(52, 4):
-    case iq_key(50, 4):
-      spin(Mode::volts, value, now);
-      break;
-    case iq_key(50, 1):
-    case iq_key(50, 2):
-      spin(Mode::volts, 0, now);  // one phase, open loop: it heats and holds
-      break;
-    case iq_key(52, 5):
-      spin(Mode::velocity, value, now);
-      break;
-    default:
-      return false;
-  }
+void IqDevice::command(MotorDrive::Mode mode, double target, Instant now) noexcept {
+  mode == MotorDrive::Mode::brake || mode == MotorDrive::Mode::coast ? rest(mode) : spin(mode, target, now);
   last_motion_ = {now, drive_.mode, drive_.target};
-  return true;
 }
 
 void IqDevice::spin(MotorDrive::Mode mode, double target, Instant now) noexcept {
-  if (!std::isfinite(target)) return rest(MotorDrive::Mode::coast, now);
+  if (!std::isfinite(target)) return rest(MotorDrive::Mode::coast);
   ending_.cancel();
-  drive_.addition = memory_.finite(50, 21);
+  drive_.addition = 0;
   drive_.mode = mode;
   drive_.target = target;
   memory_.store(52, 0, mode == MotorDrive::Mode::pwm ? 2 : mode == MotorDrive::Mode::volts ? 3 : 4);
@@ -128,7 +53,7 @@ void IqDevice::spin(MotorDrive::Mode mode, double target, Instant now) noexcept 
   restart_timeout(now);
 }
 
-void IqDevice::rest(MotorDrive::Mode mode, Instant) noexcept {
+void IqDevice::rest(MotorDrive::Mode mode) noexcept {
   timeout_at_ = kNever;
   memory_.store(52, 0, mode == MotorDrive::Mode::brake ? 0 : 1);
   if (ending_.endless()) return;
@@ -136,16 +61,6 @@ void IqDevice::rest(MotorDrive::Mode mode, Instant) noexcept {
   drive_.addition = 0;
   drive_.mode = mode;
   drive_.target = 0;
-}
-
-/// A velocity, a voltage and a PWM need no arming; it ends an endless song.
-void IqDevice::arm(bool armed, Instant now) noexcept {
-  if (armed == std::exchange(armed_, armed)) return;
-  if (armed && ending_.endless()) {
-    ending_.cancel();
-    rest(MotorDrive::Mode::coast, now);
-  }
-  if (!armed) end_motion(static_cast<int>(memory_.value(86, 9)), static_cast<int>(memory_.value(86, 10)), now);
 }
 
 void IqDevice::tune() noexcept {
@@ -167,6 +82,7 @@ void IqDevice::tune() noexcept {
   limits_.redline_start = upset_.redline.value_or(memory_.finite(50, 38));
   limits_.redline_end = upset_.redline ? 1.03 * *upset_.redline : memory_.finite(50, 39);
   limits_.slew = memory_.value(50, 47) != 0 ? memory_.finite(50, 46) : 0;
+  line_rate_ = memory_.value(16, 0) * (1 + settings_.oscillator_gain);
   sensors_.tune(memory_);
 }
 
@@ -182,7 +98,7 @@ void IqDevice::replace(const std::array<std::uint32_t, 3>& uid) noexcept {
 
 void IqDevice::set_baud(unsigned baud) noexcept {
   memory_.provide(16, 0, baud);
-  baud_ = baud;
+  tune();
 }
 
 void IqDevice::brown_out(Instant now, Duration down) {
@@ -195,18 +111,14 @@ void IqDevice::brown_out(Instant now, Duration down) {
 void IqDevice::boot(Instant now) {
   ++boots_;
   memory_.reboot();
-  baud_ = static_cast<unsigned>(std::max(memory_.value(16, 0), kSlowestBaud));
   scanner_.clear();
   replies_.clear();
   busy_until_ = now;
   booted_ = now;
-  time_offset_ = 0;
-  in_boot_loader_ = false;
   ending_ = {};
   control_ = {};
   drive_ = {};
   safety_.power_up();
-  armed_ = memory_.value(86, 1) != 0;  // always_armed
   timeout_at_ = kNever;
   memory_.store(52, 0, 1);
   tune();
@@ -222,7 +134,6 @@ void IqDevice::restart_timeout(Instant now) noexcept {
 void IqDevice::expire(Instant now) noexcept {
   ++timeouts_;
   const int meaning = static_cast<int>(memory_.value(52, 17));
-  if (meaning != static_cast<int>(iq::TimeoutMeaning::error_stay_armed)) armed_ = false;
   const bool as_disarming = meaning == static_cast<int>(iq::TimeoutMeaning::disarm_behavior);
   const int behavior = static_cast<int>(as_disarming ? memory_.value(86, 9) : memory_.value(52, 18));
   const int song = static_cast<int>(as_disarming ? memory_.value(86, 10) : memory_.value(52, 19));
@@ -230,7 +141,7 @@ void IqDevice::expire(Instant now) noexcept {
 }
 
 void IqDevice::end_motion(int behavior, int song, Instant now) noexcept {
-  rest(MotorDrive::Mode::coast, now);
+  rest(MotorDrive::Mode::coast);
   ending_.begin({behavior, song, memory_.finite(87, 0), memory_.finite(87, 1)}, now);
   ending_.step(state_->speed, now, drive_);
 }

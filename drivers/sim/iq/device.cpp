@@ -19,33 +19,11 @@ constexpr double kFix16 = 65536;
 constexpr double kBrownOutVolts = 3.2;  // of the input: the controller holds no longer
 constexpr Duration kBrownOut = std::chrono::milliseconds(50);
 
-/// Entries that are a reading as it is.
-struct LiveReading {
-  std::uint16_t key;
-  double IqReadings::*reading;
-};
-using R = IqReadings;
-constexpr LiveReading kLiveReadings[] = {{iq_key(50, 11), &R::volts},
-                                         {iq_key(50, 12), &R::angle},
-                                         {iq_key(50, 13), &R::speed},
-                                         {iq_key(50, 23), &R::emf},
-                                         {iq_key(50, 36), &R::motor_amps},
-                                         {iq_key(50, 37), &R::motor_torque},
-                                         {iq_key(50, 44), &R::emf},
-                                         {iq_key(69, 0), &R::volts},
-                                         {iq_key(69, 1), &R::amps},
-                                         {iq_key(69, 3), &R::joules},
-                                         {iq_key(69, 7), &R::volts_raw},
-                                         {iq_key(69, 8), &R::amps_raw},
-                                         {iq_key(69, 13), &R::volts_cascaded},
-                                         {iq_key(73, 0), &R::controller_celsius},
-                                         {iq_key(77, 0), &R::coil_celsius},
-                                         {iq_key(83, 0), &R::coil_celsius},
-                                         {iq_key(83, 1), &R::stator_celsius},
-                                         {iq_key(83, 5), &R::forced_convection},
-                                         {iq_key(83, 11), &R::joule_watts},
-                                         {iq_key(83, 12), &R::convection_watts},
-                                         {iq_key(83, 13), &R::conduction_watts}};
+/// By two entries of a client: where the derate starts, and then where it ends.
+double derate(const IqMemory& memory, std::uint8_t client, std::uint8_t start, double celsius) noexcept {
+  const auto end = static_cast<std::uint8_t>(start + 1);
+  return derate_between(memory.value(client, start), memory.value(client, end), celsius);
+}
 
 }  // namespace
 
@@ -55,8 +33,7 @@ IqDevice::IqDevice(const IqSettings& settings, const MotorState& state)
       memory_(settings.quirks),
       scanner_(kReceiveBuffer),
       sensors_(settings.sensors, settings.oscillator_gain, settings.seed),
-      random_(~settings.seed),
-      baud_(settings.baud) {
+      random_(~settings.seed) {
   memory_.provide(5, 14, settings.module_id);
   memory_.provide(16, 0, settings.baud);
   memory_.provide(52, 15, settings.timeout_s);
@@ -66,22 +43,20 @@ IqDevice::IqDevice(const IqSettings& settings, const MotorState& state)
 
 void IqDevice::receive(std::span<const std::uint8_t> bytes, Instant now) {
   heard_ = std::max(heard_, now);
-  if (now < off_until_ || in_boot_loader_) return;
+  if (now < off_until_) return;
   attend(now);
   while (!bytes.empty()) {
     const std::size_t taken = scanner_.feed(bytes);
+    if (taken == 0) return;
     bytes = bytes.subspan(taken);
-    const std::uint64_t before = frames_ + scanner_.crc_errors();
     attend(now);
-    if (now < off_until_ || in_boot_loader_) return;
-    if (taken == 0 && before == frames_ + scanner_.crc_errors()) break;
+    if (now < off_until_) return;
   }
-  overflowed_ += bytes.size();
 }
 
 void IqDevice::advance(Instant now) noexcept {
   heard_ = std::max(heard_, now);
-  if (now < off_until_ || in_boot_loader_) {
+  if (now < off_until_) {
     stage_ = {};
     return;
   }
@@ -98,18 +73,17 @@ void IqDevice::advance(Instant now) noexcept {
   if (++ticks_to_safety_ >= kTicksPerSafety) {
     ticks_to_safety_ = 0;
     const IqReadings readings = sensors_.readings(*state_);
-    if (safety_.check(memory_, readings) && memory_.value(84, 2) != 0) rest(MotorDrive::Mode::coast, now);
-    const bool legacy = settings_.quirks.legacy;
-    const double coil = derate_between(memory_.value(legacy ? 77 : 83, legacy ? 1 : 8),
-                                       memory_.value(legacy ? 77 : 83, legacy ? 2 : 9), readings.coil_celsius);
-    limits_.thermal = coil * derate_between(memory_.value(73, 3), memory_.value(73, 4), readings.controller_celsius);
+    if (safety_.check(memory_, readings) && memory_.value(84, 2) != 0) rest(MotorDrive::Mode::coast);
+    const double coil = settings_.quirks.legacy ? derate(memory_, 77, 1, readings.coil_celsius)
+                                                : derate(memory_, 83, 8, readings.coil_celsius);
+    limits_.thermal = coil * derate(memory_, 73, 3, readings.controller_celsius);
   }
   const IqSensed sensed{state_->speed / (1 + settings_.oscillator_gain), state_->supply_volts};
   stage_ = control_.step(safety_.safe_mode() ? MotorDrive{} : drive_, limits_, sensed);
 }
 
 bool IqDevice::next_reply(IqReply& out, Instant now) {
-  if (now >= off_until_ && !in_boot_loader_) attend(now);
+  if (now >= off_until_) attend(now);
   if (replies_.empty() || replies_.front().at > now) return false;
   out = replies_.front();
   replies_.pop_front();
@@ -129,7 +103,7 @@ void IqDevice::attend(Instant now) {
     const auto frame = scanner_.next();
     if (!frame) return;
     apply(*frame, std::max(busy_until_, std::min(now, heard_)));
-    if (now < off_until_ || in_boot_loader_) return;
+    if (now < off_until_) return;
   }
 }
 
@@ -161,7 +135,7 @@ void IqDevice::answer(std::uint8_t type, std::uint8_t sub, Instant now) {
   double truth = std::numeric_limits<double>::quiet_NaN();
   if (const auto value = live_value(iq_key(type, sub), sensors_.readings(*state_), now)) {
     bits = iq_bits(cell->entry.format, *value);
-    truth = live_value(iq_key(type, sub), true_readings(), now).value_or(truth);
+    truth = live_value(iq_key(type, sub), sensors_.perfect(*state_), now).value_or(truth);
   }
   std::array<std::uint8_t, 4> data{};
   put_little(data.data(), bits, 4);
@@ -185,18 +159,6 @@ void IqDevice::reply(std::uint8_t type, std::uint8_t sub, std::span<const std::u
   replies_.push_back(reply);
 }
 
-IqReadings IqDevice::true_readings() const noexcept {
-  IqReadings r = sensors_.readings(*state_);
-  r.speed = state_->speed;
-  r.volts = r.volts_cascaded = state_->supply_volts;
-  r.amps = state_->supply_amps;
-  r.controller_celsius = state_->controller_celsius;
-  r.coil_celsius = state_->coil_celsius;
-  r.stator_celsius = state_->stator_celsius;
-  r.motor_amps = state_->motor_amps;
-  return r;
-}
-
 int IqDevice::drive_mode() const noexcept {
   using Mode = MotorDrive::Mode;
   using iq::DriveMode;
@@ -208,47 +170,33 @@ int IqDevice::drive_mode() const noexcept {
 }
 
 std::optional<double> IqDevice::live_value(std::uint16_t key, const IqReadings& r, Instant now) const noexcept {
-  for (const LiveReading& row : kLiveReadings) {
-    if (row.key == key) return r.*row.reading;
-  }
-  switch (key) {
-    case iq_key(5, 15):
-      return uptime(now);
-    case iq_key(50, 0):
-      return drive_mode();
-    case iq_key(50, 8):
-      return stage_.mode == PowerStage::Mode::drive ? stage_.duty : 0;
-    case iq_key(50, 9):
-      return control_.volts();
-    case iq_key(50, 10):
-      return r.speed * memory_.finite(50, 18);
-    case iq_key(50, 41):
-      return std::lround(control_.derate() * kFix16);
-    case iq_key(50, 45):
-      return r.emf + limits_.amps_max * limits_.resistance;
-    case iq_key(69, 2):
-      return r.amps * r.volts;
-    case iq_key(73, 5):
-      return derate_between(memory_.value(73, 3), memory_.value(73, 4), r.controller_celsius);
-    case iq_key(77, 5):
-      return std::lround(kFix16 * derate_between(memory_.value(77, 1), memory_.value(77, 2), r.coil_celsius));
-    case iq_key(83, 10):
-      return derate_between(memory_.value(83, 8), memory_.value(83, 9), r.coil_celsius);
-    case iq_key(84, 0):
-      return safety_.now();
-    case iq_key(84, 1):
-      return safety_.ever();
-    case iq_key(86, 12):
-      return armed_ ? 1 : 0;
-    default:
-      return std::nullopt;
-  }
+  const auto is = [key](std::uint8_t type, std::uint8_t sub) { return key == iq_key(type, sub); };
+  const auto fix16 = [](double share) { return std::lround(share * kFix16); };
+  if (is(5, 15)) return uptime(now);
+  if (is(50, 0)) return drive_mode();
+  if (is(50, 8)) return stage_.mode == PowerStage::Mode::drive ? stage_.duty : 0;
+  if (is(50, 9)) return control_.volts();
+  if (is(50, 11) || is(69, 0)) return r.volts;
+  if (is(50, 12)) return r.angle;
+  if (is(50, 13)) return r.speed;
+  if (is(50, 36)) return r.motor_amps;
+  if (is(50, 41)) return fix16(control_.derate());
+  if (is(69, 1)) return r.amps;
+  if (is(69, 2)) return r.amps * r.volts;
+  if (is(69, 3)) return r.joules;
+  if (is(73, 0)) return r.controller_celsius;
+  if (is(73, 5)) return derate(memory_, 73, 3, r.controller_celsius);
+  if (is(77, 0) || is(83, 0)) return r.coil_celsius;
+  if (is(83, 1)) return r.stator_celsius;
+  if (is(77, 5)) return fix16(derate(memory_, 77, 1, r.coil_celsius));
+  if (is(83, 10)) return derate(memory_, 83, 8, r.coil_celsius);
+  if (is(84, 0)) return safety_.now();
+  if (is(84, 1)) return safety_.ever();
+  return std::nullopt;
 }
 
-double IqDevice::line_rate() const noexcept { return baud_ * (1 + settings_.oscillator_gain); }
-
 double IqDevice::uptime(Instant now) const noexcept {
-  return to_seconds(now - booted_) * (1 + settings_.oscillator_gain) + time_offset_;
+  return to_seconds(now - booted_) * (1 + settings_.oscillator_gain);
 }
 
 }  // namespace kphi::sim

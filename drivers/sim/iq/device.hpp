@@ -88,21 +88,15 @@ class IqDevice {
   void set_baud(unsigned baud) noexcept;
   void upset(const IqUpset& upset) noexcept;
 
-  /// Bits per second on the wire, as a perfect clock would count them; 0 while it is off.
-  [[nodiscard]] double line_rate() const noexcept;
+  /// Bits per second on the wire, as a perfect clock would count them.
+  [[nodiscard]] double line_rate() const noexcept { return line_rate_; }
   [[nodiscard]] const MotorDrive& drive() const noexcept { return drive_; }
   [[nodiscard]] const PowerStage& stage() const noexcept { return stage_; }
-  [[nodiscard]] const IqMemory& memory() const noexcept { return memory_; }
-  [[nodiscard]] const IqSafety& safety() const noexcept { return safety_; }
-  [[nodiscard]] bool armed() const noexcept { return armed_; }
   [[nodiscard]] bool singing() const noexcept { return ending_.singing(); }
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
-  [[nodiscard]] std::uint64_t crc_errors() const noexcept { return scanner_.crc_errors(); }
-  [[nodiscard]] std::uint64_t overflowed_bytes() const noexcept { return overflowed_; }
   [[nodiscard]] std::uint64_t timeouts() const noexcept { return timeouts_; }
   [[nodiscard]] std::uint64_t boots() const noexcept { return boots_; }
-  /// Bench time of the last command that spins, brakes or coasts; -1 ns before the first.
-  [[nodiscard]] Instant last_motion_command() const noexcept { return last_motion_.at; }
+  /// Bench time -1 ns before the first.
   [[nodiscard]] const IqMotion& last_motion() const noexcept { return last_motion_; }
 
  private:
@@ -118,17 +112,12 @@ class IqDevice {
   [[nodiscard]] std::optional<double> live_value(std::uint16_t key, const IqReadings& readings,
                                                  Instant now) const noexcept;
   [[nodiscard]] int drive_mode() const noexcept;
-  [[nodiscard]] IqReadings true_readings() const noexcept;
 
   // Actions.
-  void act(std::uint8_t type, std::uint8_t sub, Instant now);
-  bool command_motion(std::uint8_t type, std::uint8_t sub, Instant now);
+  void command(MotorDrive::Mode mode, double target, Instant now) noexcept;
   void spin(MotorDrive::Mode mode, double target, Instant now) noexcept;
-  void rest(MotorDrive::Mode mode, Instant now) noexcept;
-  void arm(bool armed, Instant now) noexcept;
+  void rest(MotorDrive::Mode mode) noexcept;
   void tune() noexcept;
-  void system_action(std::uint8_t sub, Instant now);
-  void flash_action(std::uint8_t sub) noexcept;
   void boot(Instant now);
 
   // Time.
@@ -157,16 +146,12 @@ class IqDevice {
   Instant busy_until_{0};  ///< with a question
   Instant off_until_{0};
   bool asleep_ = false;  // since its power went
-  bool in_boot_loader_ = false;
-  bool armed_ = false;
-  unsigned baud_;
-  double time_offset_ = 0;
+  double line_rate_ = 0;
   Instant booted_{0};
   Instant timeout_at_ = kNever;
   IqMotion last_motion_{Instant{-1}, MotorDrive::Mode::coast, 0};
   std::uint64_t frames_ = 0;
   std::uint64_t timeouts_ = 0;
-  std::uint64_t overflowed_ = 0;
   std::uint64_t boots_ = 0;
   int ticks_to_safety_ = 0;
 };

@@ -79,8 +79,6 @@ class IqMemory {
   void provide(std::uint8_t type, std::uint8_t sub, double value) noexcept;
 
   void reboot() noexcept;  ///< volatile = saved
-  void revert() noexcept;  ///< both = factory; identity stays
-  void erase() noexcept;   ///< what was saved is blank flash; identity stays
 
  private:
   std::vector<Cell> cells_;

@@ -56,13 +56,8 @@ std::optional<IqFrame> IqScanner::next() noexcept {
     }
     if (rest.size() < 2) return std::nullopt;
     const std::size_t length = rest[1];
-    if (length > kPayloadMax) {
-      ++position_;
-      continue;
-    }
-    if (rest.size() < length + kOverhead) return std::nullopt;
-    if (iq_crc(rest.subspan(1, length + 2)) != little(rest.subspan(length + 3, 2))) {
-      ++crc_errors_;
+    if (length <= kPayloadMax && rest.size() < length + kOverhead) return std::nullopt;
+    if (length > kPayloadMax || iq_crc(rest.subspan(1, length + 2)) != little(rest.subspan(length + 3, 2))) {
       ++position_;
       continue;
     }

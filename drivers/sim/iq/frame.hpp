@@ -32,13 +32,11 @@ class IqScanner {
   /// Next whole frame, or none until more bytes come.
   [[nodiscard]] std::optional<IqFrame> next() noexcept;
   void clear() noexcept;
-  [[nodiscard]] std::uint64_t crc_errors() const noexcept { return crc_errors_; }
 
  private:
   std::size_t capacity_;
   std::vector<std::uint8_t> bytes_;
   std::size_t position_ = 0;
-  std::uint64_t crc_errors_ = 0;
 };
 
 }  // namespace kphi::sim

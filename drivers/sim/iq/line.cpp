@@ -16,8 +16,6 @@ constexpr double kRateTolerance = 0.045;  // beyond it the stop bit is missed
 constexpr std::uint8_t kReply = 3;
 constexpr std::array<std::uint32_t, 3> kOtherUid{0x00410018, 0x4d4b5022, 0x20343354};
 
-constexpr std::uint32_t bit(MotorFaultKind kind) noexcept { return 1u << static_cast<unsigned>(kind); }
-
 /// Faults of a moment or a span; all others wait for replies or bytes.
 bool is_event(const MotorFault& fault) noexcept {
   return fault.kind >= MotorFaultKind::mute && fault.kind != MotorFaultKind::command_flip;
@@ -98,7 +96,7 @@ void IqLine::take_replies(Instant now) {
 void IqLine::carry(const IqReply& reply) {
   ++truth_.replies;
   FaultDecision decision;
-  decision.reply = reply;
+  decision.reply = {reply};
   decision.passage.ready = reply.at;
   for (std::size_t i = 0; i < script_.size(); ++i) {
     if (is_event(script_[i]) || !script_.active(i, reply.at) || !concerns(script_[i], reply) ||
@@ -106,11 +104,11 @@ void IqLine::carry(const IqReply& reply) {
       continue;
     script_.use(i);
     ++truth_.done[static_cast<std::size_t>(script_[i].kind)];
-    decision.done |= bit(script_[i].kind);
+    decision.reply.done |= 1u << static_cast<unsigned>(script_[i].kind);
     act(i, decision);
   }
-  if (decision.overtaken && !decision.dropped && !held_) {
-    hold_until_ = reply.at + decision.overtaken_for;
+  if (decision.overtaken_for && !decision.dropped && !held_) {
+    hold_until_ = reply.at + *decision.overtaken_for;
     held_ = std::move(decision);
     return;
   }
@@ -124,84 +122,40 @@ void IqLine::carry(const IqReply& reply) {
 void IqLine::act(std::size_t index, FaultDecision& decision) {
   const MotorFault& fault = script_[index];
   IqReply& reply = decision.reply;
-  switch (fault.kind) {
-    case MotorFaultKind::drop:
-      decision.dropped = true;
-      break;
-    case MotorFaultKind::duplicate:
-      ++decision.copies;
-      break;
-    case MotorFaultKind::reorder:
-      decision.overtaken = true;
-      decision.overtaken_for = fault.delay;
-      break;
-    case MotorFaultKind::value:
-      if (reply.size == 4)
-        put_little(reply.bytes.data(), std::bit_cast<std::uint32_t>(static_cast<float>(fault.value)), 4);
-      break;
-    case MotorFaultKind::wrong_length:
-      reply.size = static_cast<std::uint8_t>(fault.size);
-      break;
-    case MotorFaultKind::wrong_id:
-      reply.id = static_cast<std::uint8_t>(fault.id);
-      break;
-    case MotorFaultKind::stuck: {
-      const auto& first = stuck_[index].try_emplace(iq_key(reply.type, reply.sub), reply).first->second;
-      reply.bytes = first.bytes;
-      break;
-    }
-    default:
-      act_on_bytes(fault, decision);
+  Passage& passage = decision.passage;
+  using K = MotorFaultKind;
+  const auto is = [&fault](K kind) { return fault.kind == kind; };
+  // The reply itself.
+  if (is(K::drop)) decision.dropped = true;
+  if (is(K::duplicate)) ++decision.copies;
+  if (is(K::reorder)) decision.overtaken_for = fault.delay;
+  if (is(K::value) && reply.size == 4)
+    put_little(reply.bytes.data(), std::bit_cast<std::uint32_t>(static_cast<float>(fault.value)), 4);
+  if (is(K::wrong_length)) reply.size = static_cast<std::uint8_t>(fault.size);
+  if (is(K::wrong_id)) reply.id = static_cast<std::uint8_t>(fault.id);
+  if (is(K::stuck)) reply.bytes = stuck_[index].try_emplace(iq_key(reply.type, reply.sub), reply).first->second.bytes;
+  // Its bytes.
+  if (is(K::flip)) decision.flips += fault.bits;
+  if (is(K::bad_crc)) decision.bad_crc = true;
+  if (is(K::truncate)) decision.truncated = static_cast<std::size_t>(fault.size);
+  if (is(K::garbage)) {
+    for (std::size_t i = 0; fault.bytes.empty() && i < fault.size; ++i) decision.before.push_back(random_byte());
+    decision.before.insert(decision.before.end(), fault.bytes.begin(), fault.bytes.end());
   }
-}
-
-void IqLine::act_on_bytes(const MotorFault& fault, FaultDecision& decision) {
-  switch (fault.kind) {
-    case MotorFaultKind::flip:
-      decision.flips += fault.bits;
-      break;
-    case MotorFaultKind::bad_crc:
-      decision.bad_crc = true;
-      break;
-    case MotorFaultKind::truncate:
-      decision.truncated = static_cast<std::size_t>(fault.size);
-      break;
-    case MotorFaultKind::garbage:
-      for (std::size_t i = 0; fault.bytes.empty() && i < fault.size; ++i) decision.before.push_back(random_byte());
-      decision.before.insert(decision.before.end(), fault.bytes.begin(), fault.bytes.end());
-      break;
-    case MotorFaultKind::merge: {
-      const auto period = std::max<std::int64_t>(1, fault.delay.count());
-      decision.passage.together = Instant((decision.reply.at.count() / period + 1) * period);
-      break;
-    }
-    case MotorFaultKind::split:
-      decision.passage.between = fault.delay;
-      break;
-    case MotorFaultKind::stall:
-      decision.passage.stall_after = static_cast<std::size_t>(fault.size);
-      decision.passage.stall = fault.delay;
-      break;
-    case MotorFaultKind::delay:
-      decision.passage.ready += fault.delay + from_seconds(script_.uniform() * to_seconds(fault.jitter));
-      break;
-    default:
-      break;
+  // When they come.
+  const std::int64_t period = std::max<std::int64_t>(1, fault.delay.count());
+  if (is(K::merge)) passage.together = Instant((reply.at.count() / period + 1) * period);
+  if (is(K::split)) passage.between = fault.delay;
+  if (is(K::stall)) {
+    passage.stall_after = static_cast<std::size_t>(fault.size);
+    passage.stall = fault.delay;
   }
+  if (is(K::delay)) passage.ready += fault.delay + from_seconds(script_.uniform() * to_seconds(fault.jitter));
 }
 
 void IqLine::emit(FaultDecision decision) {
-  SentIqReply sent;
-  sent.asked = decision.reply.asked;
-  sent.type = decision.reply.type;
-  sent.sub = decision.reply.sub;
-  sent.id = decision.reply.id;
-  sent.size = decision.reply.size;
-  sent.bytes = decision.reply.bytes;
-  sent.truth = decision.reply.truth;
-  sent.done = decision.done;
   const std::size_t entry = truth_.log.size();
-  if (keep_ == Keep::replies) truth_.log.push_back(sent);
+  if (keep_ == Keep::replies) truth_.log.push_back(decision.reply);
   if (decision.dropped) {
     ++truth_.spoilt;
     return;

@@ -28,17 +28,11 @@ struct IqLineSettings {
 };
 
 /// One reply, as it was put on the wire.
-struct SentIqReply {
-  Instant asked{0};    ///< when the module read the question: the moment that the value is of
-  Instant begun{0};    ///< when its first byte left
-  Instant arrived{0};  ///< last byte of the first whole copy at the host
-  std::uint8_t type = 0, sub = 0, id = 0, size = 0;
-  std::array<std::uint8_t, 16> bytes{};
-  double truth = std::numeric_limits<double>::quiet_NaN();  ///< reading of a perfect sensor
-  std::uint32_t done = 0;                                   ///< bit per MotorFaultKind that affected it
-  std::uint32_t arrivals = 0;                               ///< copies that arrived byte for byte with a good checksum
-
-  [[nodiscard]] std::span<const std::uint8_t> data() const noexcept { return std::span(bytes).first(size); }
+struct SentIqReply : IqReply {
+  Instant begun{0};            ///< when its first byte left
+  Instant arrived{0};          ///< last byte of the first whole copy at the host
+  std::uint32_t done = 0;      ///< bit per MotorFaultKind that affected it
+  std::uint32_t arrivals = 0;  ///< copies that arrived byte for byte with a good checksum
 };
 
 /// What truly happened on the motor's line: a driver's own counts are checked against it.
@@ -101,15 +95,14 @@ class IqLine {
   };
   /// What the script does to one reply.
   struct FaultDecision {
-    IqReply reply;
-    bool dropped = false, bad_crc = false, overtaken = false;
+    SentIqReply reply;
+    bool dropped = false, bad_crc = false;
     int copies = 1;
     std::uint64_t flips = 0;
     std::optional<std::size_t> truncated;
     std::vector<std::uint8_t> before;
-    Duration overtaken_for{0};
+    std::optional<Duration> overtaken_for;
     Passage passage;
-    std::uint32_t done = 0;
   };
   struct Byte {
     Instant due;
@@ -125,7 +118,6 @@ class IqLine {
   void take_replies(Instant now);
   void carry(const IqReply& reply);
   void act(std::size_t index, FaultDecision& decision);
-  void act_on_bytes(const MotorFault& fault, FaultDecision& decision);
   void emit(FaultDecision decision);
   void put(const FaultDecision& decision, std::size_t entry);
   void schedule(Passage passage);

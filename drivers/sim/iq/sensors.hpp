@@ -33,12 +33,9 @@ struct IqHeat {
 struct IqReadings {
   double speed = 0;  ///< rad/s, by the module's clock: a fast one counts more of its seconds per turn
   double volts = 0, amps = 0, joules = 0;
-  double volts_cascaded = 0;
-  double volts_raw = 0, amps_raw = 0;  ///< whole converter ticks
   double controller_celsius = 0;
   double coil_celsius = 0, stator_celsius = 0;
-  double joule_watts = 0, convection_watts = 0, conduction_watts = 0, forced_convection = 0;
-  double motor_amps = 0, motor_torque = 0, emf = 0;
+  double motor_amps = 0;
   double angle = 0;
 };
 
@@ -54,9 +51,10 @@ class IqSensors {
   void tune(const IqMemory& memory) noexcept;
   void step(const MotorState& truth) noexcept;
   void heat(const IqHeat& heat) noexcept { heat_ = heat; }
-  void reset_joules(const MotorState& truth) noexcept;
-  /// With perfect sensors `truth` itself.
+  /// With perfect sensors `truth` itself, but by the module's clock.
   [[nodiscard]] IqReadings readings(const MotorState& truth) const noexcept;
+  /// What sensors and a clock without errors would find.
+  [[nodiscard]] IqReadings perfect(const MotorState& truth) const noexcept;
 
  private:
   void convert(const MotorState& truth) noexcept;
@@ -65,7 +63,7 @@ class IqSensors {
 
   struct Model {
     double volts_gain = 0.009, amps_gain = 0.03, amps_bias = 2048;
-    double power_filter = 1, cascade_filter = 1, controller_filter = 1, speed_filter = 1;
+    double power_filter = 1, controller_filter = 1, speed_filter = 1;
     double resistance = 0.045, torque_constant = 0.0043;
     double ambient = 25, free = 0.05, forced = 0.006, to_stator = 0.25, coil_capacity = 6;
   };

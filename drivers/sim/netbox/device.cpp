@@ -13,7 +13,6 @@ constexpr std::uint32_t kHeader = 0x1234;
 constexpr std::uint32_t kErrorSummary = 1u << 31;
 constexpr std::uint32_t kSaturated = 1u << 17;
 constexpr std::uint32_t kSaturatedAxia = 1u << 30;
-constexpr std::uint32_t kConditionLatched = 1u << 16;
 constexpr int kPauseTicks = 350;  // of RateWrite::pauses
 
 enum Command : std::uint32_t {
@@ -22,7 +21,6 @@ enum Command : std::uint32_t {
   kStartRealTime = 0x0002,
   kStartBuffered = 0x0003,
   kStartMultiUnit = 0x0004,
-  kResetLatch = 0x0041,
   kSetBias = 0x0042,
 };
 
@@ -41,22 +39,7 @@ NetBoxSettings within_limits(NetBoxSettings settings) {
 constexpr std::size_t kCommandBytes = 20;  // on TCP
 constexpr double kFullScale = 32767;
 
-enum TcpCommand : std::uint8_t { kReadForces = 0, kReadCalibration = 1 };
-
-void append16(std::string& out, std::uint32_t value) {
-  out += static_cast<char>(value >> 8 & 0xff);
-  out += static_cast<char>(value & 0xff);
-}
-void append32(std::string& out, std::uint32_t value) {
-  append16(out, value >> 16);
-  append16(out, value & 0xffff);
-}
-
-/// Counts per TCP count: the full range fills 16 bits.
-std::int32_t scale_factor(const NetBoxDevice& box, std::size_t axis) {
-  const double counts = box.settings().range[axis] * box.signal().counts_per_si(axis);
-  return static_cast<std::int32_t>(std::clamp(std::round(counts / kFullScale), 1.0, 65535.0));
-}
+constexpr char kReadCalibration = 1;
 
 }  // namespace
 
@@ -79,39 +62,16 @@ NetBoxDevice::NetBoxDevice(const NetBoxSettings& settings)
       ft_sequence_(settings.first_ft_sequence - 1) {}
 
 void NetBoxDevice::receive(std::span<const std::uint8_t> datagram, Peer peer) {
-  if (datagram.size() != 8 || big(datagram.first(2)) != kHeader || !settings_.rdt_enabled) {
-    ++requests_ignored_;
-    return;
-  }
-  apply(big(datagram.subspan(2, 2)), big(datagram.subspan(4, 4)), peer);
-}
-
-void NetBoxDevice::apply(std::uint32_t command, std::uint32_t sample_count, Peer peer) {
+  if (datagram.size() != 8 || big(datagram.first(2)) != kHeader) return;
+  const std::uint32_t command = big(datagram.subspan(2, 2)), samples = big(datagram.subspan(4, 4));
   const bool axia = settings_.quirks.axia;
   const int block = settings_.records_per_datagram;
-  switch (command) {
-    case kStop:
-      return stop();
-    case kStartSingle:
-      if (axia) return start(peer, 1, sample_count);
-      break;
-    case kStartRealTime:
-      return start(peer, axia ? block : 1, sample_count);
-    case kStartBuffered:
-      if (!axia) return start(peer, block, sample_count);
-      break;
-    case kStartMultiUnit:
-      if (!axia && settings_.quirks.command_four_streams) return start(peer, 1, sample_count);
-      break;
-    case kResetLatch:
-      if (!axia) return signal_.reset_latch();
-      break;
-    case kSetBias:
-      return bias();
-    default:
-      break;
-  }
-  ++requests_ignored_;
+  if (command == kStop) stop();
+  if (command == kStartSingle && axia) start(peer, 1, samples);
+  if (command == kStartRealTime) start(peer, axia ? block : 1, samples);
+  if (command == kStartBuffered && !axia) start(peer, block, samples);
+  if (command == kStartMultiUnit && !axia) start(peer, 1, samples);
+  if (command == kSetBias) bias();
 }
 
 void NetBoxDevice::start(Peer peer, int records_per_datagram, std::uint32_t sample_count) noexcept {
@@ -160,7 +120,6 @@ void NetBoxDevice::configure(const NetBoxSettings& settings) {
   settings_ = within_limits(settings);
   divisor_ = divisor_of(settings_.rate_hz);
   signal_.configure(settings_);
-  if (!settings_.rdt_enabled) stop();
   if (divisor_ == before || !streaming_) return;
   using RateWrite = NetBoxQuirks::RateWrite;
   if (settings_.quirks.rate_write == RateWrite::stops) stop();
@@ -185,8 +144,6 @@ void NetBoxDevice::measure(const Wrench& wrench) noexcept {
   signal_.measure(wrench);
   status_ = forced_status_;
   if (signal_.saturated()) status_ |= kErrorSummary | (settings_.quirks.axia ? kSaturatedAxia : kSaturated);
-  if (signal_.latched()) status_ |= kErrorSummary | kConditionLatched;
-  if (!settings_.peaks) return;
   const auto& counts = signal_.counts();
   for (std::size_t axis = 0; axis < counts.size(); ++axis) {
     peaks_high_[axis] = std::max(peaks_high_[axis], counts[axis]);
@@ -211,76 +168,42 @@ void NetBoxDevice::append_record(Instant at) {
   const bool full = open_.size == records_per_datagram_ * kRecordBytes;
   if (finite_ && remaining_ > 0) --remaining_;
   const bool last = finite_ && remaining_ == 0;
-  if (full || (last && settings_.quirks.last_block == LastBlock::partial)) close_datagram();
+  if (full || (last && settings_.quirks.last_block == LastBlock::partial)) {
+    open_.boot = boots_;
+    open_.stream = streams_;
+    waiting_.add(open_, open_.at);
+    open_.size = 0;
+  }
   if (last && (full || settings_.quirks.last_block != LastBlock::padded)) stop();
 }
 
-void NetBoxDevice::close_datagram() {
-  const auto payload = open_.payload();
-  waiting_.push_back(
-      {open_.peer, open_.at, boots_, streams_, waiting_bytes_.size(), payload.size(), waiting_instants_.size()});
-  waiting_bytes_.insert(waiting_bytes_.end(), payload.begin(), payload.end());
-  waiting_instants_.insert(waiting_instants_.end(), open_.sampled.begin(),
-                           open_.sampled.begin() + static_cast<std::ptrdiff_t>(payload.size() / kRecordBytes));
-  open_.size = 0;
-}
-
 bool NetBoxDevice::next_datagram(Datagram& out) {
-  if (next_ == waiting_.size()) return false;
-  const Waiting& waiting = waiting_[next_++];
-  out.peer = waiting.peer;
-  out.at = waiting.at;
-  out.boot = waiting.boot;
-  out.stream = waiting.stream;
-  out.foreign = false;
-  out.size = waiting.size;
-  std::copy_n(waiting_bytes_.data() + waiting.offset, waiting.size, out.bytes.data());
-  std::copy_n(waiting_instants_.data() + waiting.first_instant, waiting.size / kRecordBytes, out.sampled.data());
-  if (next_ == waiting_.size()) {
-    waiting_.clear();
-    waiting_bytes_.clear();
-    waiting_instants_.clear();
-    next_ = 0;
-  }
+  if (waiting_.next() == kNever) return false;
+  out = waiting_.first();
+  waiting_.drop_first();
   return true;
 }
 
-// --- TCP 49151: commands of 20 bytes, 16 bits per axis (manual, TCP interface)
+// --- TCP 49151: commands of 20 bytes (manual, TCP interface)
 
-std::string NetBoxDevice::tcp(std::string& received) {
+std::string NetBoxDevice::tcp(std::string& received) const {
   std::string answers;
-  while (received.size() >= kCommandBytes) {
-    std::array<std::uint8_t, kCommandBytes> command{};
-    std::copy_n(received.begin(), kCommandBytes, command.begin());
-    received.erase(0, kCommandBytes);
-    answer_tcp(command, answers);
-  }
+  for (; received.size() >= kCommandBytes; received.erase(0, kCommandBytes))
+    if (received[0] == kReadCalibration) append_calibration(answers);
   return answers;
 }
 
-void NetBoxDevice::answer_tcp(std::span<const std::uint8_t> command, std::string& out) {
-  if (command[0] == kReadForces) {
-    const std::uint32_t enabled = big(command.subspan(16, 2));
-    const std::uint32_t orders = big(command.subspan(18, 2));
-    for (std::size_t i = 0; i < settings_.conditions.size(); ++i)
-      settings_.conditions[i].enabled = (enabled >> i & 1u) != 0;
-    signal_.configure(settings_);
-    if ((orders & 1u) != 0) bias();
-    if ((orders & 2u) != 0) signal_.reset_latch();
-    append16(out, kHeader);
-    append16(out, status_ >> 16);
-    for (std::size_t axis = 0; axis < 6; ++axis) {
-      const double coarse = std::round(static_cast<double>(signal_.counts()[axis]) / scale_factor(*this, axis));
-      append16(out, static_cast<std::uint32_t>(static_cast<std::int32_t>(std::clamp(coarse, -32768.0, 32767.0))));
-    }
-  } else if (command[0] == kReadCalibration) {
-    const Slot& slot = settings_.slots[static_cast<std::size_t>(settings_.active_slot)];
-    append16(out, kHeader);
-    out += static_cast<char>(slot.force_unit);
-    out += static_cast<char>(slot.torque_unit);
-    append32(out, static_cast<std::uint32_t>(counts_per_force(settings_, settings_.active_slot)));
-    append32(out, static_cast<std::uint32_t>(counts_per_torque(settings_, settings_.active_slot)));
-    for (std::size_t axis = 0; axis < 6; ++axis) append16(out, static_cast<std::uint32_t>(scale_factor(*this, axis)));
+void NetBoxDevice::append_calibration(std::string& out) const {
+  const Slot& slot = settings_.slots[static_cast<std::size_t>(settings_.active_slot)];
+  append_big(out, kHeader, 2);
+  out += static_cast<char>(slot.force_unit);
+  out += static_cast<char>(slot.torque_unit);
+  append_big(out, static_cast<std::uint32_t>(counts_per_force(settings_, settings_.active_slot)), 4);
+  append_big(out, static_cast<std::uint32_t>(counts_per_torque(settings_, settings_.active_slot)), 4);
+  // Counts per TCP count: the full range fills 16 bits.
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    const double counts = settings_.range[axis] * signal_.counts_per_si(axis);
+    append_big(out, static_cast<std::uint32_t>(std::clamp(std::round(counts / kFullScale), 1.0, 65535.0)), 2);
   }
 }
 

@@ -5,9 +5,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <iterator>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "drivers/sim/netbox/settings.hpp"
@@ -41,6 +44,38 @@ struct Datagram {
   [[nodiscard]] std::span<const std::uint8_t> payload() const noexcept { return {bytes.data(), size}; }
 };
 
+/// Things with a time of arrival, in that order; those of the same time in the order of add(). Slots are
+/// reused: nothing is allocated once there are enough.
+template <class Thing>
+class DelayQueue {
+ public:
+  void add(const Thing& thing, Instant due) {
+    if (free_.empty()) {
+      free_.push_back(static_cast<std::uint32_t>(things_.size()));
+      things_.emplace_back();
+    }
+    const std::uint32_t slot = free_.back();
+    free_.pop_back();
+    things_[slot] = thing;
+    auto behind = order_.end();
+    while (behind != order_.begin() && std::prev(behind)->first > due) --behind;
+    order_.insert(behind, {due, slot});
+  }
+  /// kNever when empty.
+  [[nodiscard]] Instant next() const noexcept { return order_.empty() ? kNever : order_.front().first; }
+  /// Requires one; valid until the next add().
+  [[nodiscard]] const Thing& first() const noexcept { return things_[order_.front().second]; }
+  void drop_first() {
+    free_.push_back(order_.front().second);
+    order_.pop_front();
+  }
+
+ private:
+  std::deque<std::pair<Instant, std::uint32_t>> order_;
+  std::vector<Thing> things_;
+  std::vector<std::uint32_t> free_;
+};
+
 class NetBoxDevice {
  public:
   explicit NetBoxDevice(const NetBoxSettings& settings);
@@ -52,10 +87,10 @@ class NetBoxDevice {
   /// Next datagram to send, oldest first; false when there is none.
   bool next_datagram(Datagram& out);
   /// Complete HTTP/1.0 answer to one complete request; the box closes the connection after it. Pages: netftapi2.xml and
-  /// netftcalapi.xml, with or without ?index=0..15, and the four CGI pages; 404 for anything else.
+  /// netftcalapi.xml, with or without ?index=0..15, setting.cgi and comm.cgi; 404 for anything else.
   [[nodiscard]] std::string http(std::string_view request);
   /// Takes whole commands of 20 bytes off the front of `received` and returns the answers to them.
-  [[nodiscard]] std::string tcp(std::string& received);
+  [[nodiscard]] std::string tcp(std::string& received) const;
 
   // What happens to a box.
   /// Off and on: counts from 0 again; settings that live in its memory only are gone. `resume`: it streams again.
@@ -77,9 +112,6 @@ class NetBoxDevice {
   [[nodiscard]] int divisor() const noexcept { return divisor_; }
   [[nodiscard]] std::uint32_t status() const noexcept { return status_; }
   [[nodiscard]] std::uint64_t records_sent() const noexcept { return records_sent_; }
-  [[nodiscard]] std::uint64_t requests_ignored() const noexcept { return requests_ignored_; }
-  [[nodiscard]] std::uint32_t boots() const noexcept { return boots_; }
-  [[nodiscard]] std::uint32_t streams() const noexcept { return streams_; }
   [[nodiscard]] const NetBoxSettings& settings() const noexcept { return settings_; }
   [[nodiscard]] const NetBoxSignal& signal() const noexcept { return signal_; }
   /// Largest and smallest counts since power-up.
@@ -87,16 +119,13 @@ class NetBoxDevice {
   [[nodiscard]] const std::array<std::int32_t, 6>& peaks_low() const noexcept { return peaks_low_; }
 
  private:
-  void apply(std::uint32_t command, std::uint32_t sample_count, Peer peer);
   void start(Peer peer, int records_per_datagram, std::uint32_t sample_count) noexcept;
   void stop() noexcept;
   void bias() noexcept;
   void measure(const Wrench& wrench) noexcept;
   void append_record(Instant at);
-  void close_datagram();
-  void count_write();
   std::string write(std::string_view page, std::string_view query);
-  void answer_tcp(std::span<const std::uint8_t> command, std::string& out);
+  void append_calibration(std::string& out) const;
 
   NetBoxSettings settings_;
   NetBoxSignal signal_;
@@ -118,20 +147,8 @@ class NetBoxDevice {
   int ticks_to_record_ = 0;
   Datagram open_;
 
-  struct Waiting {
-    Peer peer;
-    Instant at;
-    std::uint32_t boot, stream;
-    std::size_t offset;  ///< into waiting_bytes_
-    std::size_t size;
-    std::size_t first_instant;  ///< into waiting_instants_
-  };
-  std::vector<Waiting> waiting_;
-  std::vector<std::uint8_t> waiting_bytes_;
-  std::vector<Instant> waiting_instants_;
-  std::size_t next_ = 0;
+  DelayQueue<Datagram> waiting_;
   std::uint64_t records_sent_ = 0;
-  std::uint64_t requests_ignored_ = 0;
   std::uint64_t ticks_ = 0;         ///< since it was made
   std::uint64_t writes_since_ = 0;  ///< tick of the first CGI write of the present second
   int writes_ = 0;                  ///< in that second

@@ -136,71 +136,58 @@ FaultInjector::FaultDecision FaultInjector::decide(Instant at) {
 }
 
 bool FaultInjector::act(const Fault& fault, Progress& progress, Instant at, FaultDecision& decision) {
-  switch (fault.kind) {
-    case FaultKind::loss:
-      if (progress.burst_left == 0 && script_.chance(fault.p)) progress.burst_left = fault.burst;
-      if (progress.burst_left == 0) return false;
-      --progress.burst_left;
-      decision.dropped = true;
-      break;
-    case FaultKind::gilbert:
-      if (script_.chance(progress.bad ? fault.p_bad_good : fault.p_good_bad)) progress.bad = !progress.bad;
-      if (!progress.bad || !script_.chance(fault.loss)) return false;
-      decision.dropped = true;
-      break;
-    case FaultKind::delay:
-      decision.due =
-          std::max(decision.due, at + fault.delay + from_seconds(to_seconds(fault.jitter) * script_.uniform()));
-      break;
-    case FaultKind::jitter: {
-      const double mean_times = -std::log(script_.uniform() + 0x1p-54);
-      const double spike = script_.chance(fault.p) ? script_.uniform() : 0;
-      decision.due = std::max(
-          decision.due, at + from_seconds(mean_times * to_seconds(fault.jitter) + spike * to_seconds(fault.spike)));
-      break;
+  using K = FaultKind;
+  const auto is = [&fault](K kind) { return fault.kind == kind; };
+  const auto late = [&](Instant due) { decision.due = std::max(decision.due, due); };
+  if (is(K::short_block)) return false;
+  if (is(K::loss)) {
+    if (progress.burst_left == 0 && script_.chance(fault.p)) progress.burst_left = fault.burst;
+    if (progress.burst_left == 0) return false;
+    --progress.burst_left;
+    decision.dropped = true;
+  } else if (is(K::gilbert)) {
+    if (script_.chance(progress.bad ? fault.p_bad_good : fault.p_good_bad)) progress.bad = !progress.bad;
+    if (!progress.bad || !script_.chance(fault.loss)) return false;
+    decision.dropped = true;
+  } else if (is(K::delay)) {
+    late(at + fault.delay + from_seconds(to_seconds(fault.jitter) * script_.uniform()));
+  } else if (is(K::jitter)) {
+    const double mean_times = -std::log(script_.uniform() + 0x1p-54);
+    const double spike = script_.chance(fault.p) ? script_.uniform() : 0;
+    late(at + from_seconds(mean_times * to_seconds(fault.jitter) + spike * to_seconds(fault.spike)));
+  } else if (is(K::hold)) {
+    late(fault.end());
+  } else {
+    if (!script_.chance(fault.p)) return false;
+    if (is(K::duplicate)) decision.copies.push_back(fault.delay);
+    if (is(K::foreign_source)) ++decision.foreign;
+    if (is(K::reorder)) {
+      decision.depth = std::max(decision.depth, fault.depth);
+      decision.overtaken_for = std::max(decision.overtaken_for, fault.delay);
     }
-    case FaultKind::short_block:
-      return false;
-    case FaultKind::hold:
-      decision.due = std::max(decision.due, fault.end());
-      break;
-    default:
-      if (!script_.chance(fault.p)) return false;
-      if (fault.kind == FaultKind::duplicate) decision.copies.push_back(fault.delay);
-      if (fault.kind == FaultKind::foreign_source) ++decision.foreign;
-      if (fault.kind == FaultKind::reorder) {
-        decision.depth = std::max(decision.depth, fault.depth);
-        decision.overtaken_for = std::max(decision.overtaken_for, fault.delay);
-      }
-      if (fault.kind == FaultKind::wrong_size) {
-        decision.sizes.push_back(fault.size);
-        decision.replaced = decision.replaced || fault.replaces;
-      }
+    if (is(K::wrong_size)) {
+      decision.sizes.push_back(fault.size);
+      decision.replaced = decision.replaced || fault.replaces;
+    }
   }
   return true;
 }
 
 void FaultInjector::let_pass(Instant due) {
-  for (std::size_t i = 0; i < held_.size();) {
-    if (--held_[i].to_pass > 0) {
-      ++i;
-      continue;
-    }
+  std::erase_if(held_, [&](Held& held) {
+    if (--held.to_pass > 0) return false;
     ++truth_.overtaken;
-    under_way_.add(held_[i].in_flight, due);
-    held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(i));
-  }
+    under_way_.add(held.in_flight, due);
+    return true;
+  });
 }
 
 void FaultInjector::give_up_holding(Instant now) {
-  for (std::size_t i = 0; i < held_.size();) {
-    if (held_[i].give_up > now) {
-      ++i;
-      continue;
-    }
-    under_way_.add(held_[i].in_flight, held_[i].give_up);
-    held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(i));
-  }
+  std::erase_if(held_, [&](const Held& held) {
+    if (held.give_up > now) return false;
+    under_way_.add(held.in_flight, held.give_up);
+    return true;
+  });
 }
 
 std::size_t FaultInjector::enter(const Datagram& datagram) {
@@ -243,10 +230,7 @@ void FaultInjector::count_arrival(const InFlightDatagram& in_flight, Instant at)
   const std::uint64_t records = in_flight.datagram.size / kRecordBytes;
   if (keep_ != Keep::totals) {
     SentDatagram& entry = truth_.log[in_flight.entry];
-    if (entry.arrivals++ == 0) {
-      entry.first_arrival = at;
-      entry.arrival_place = truth_.arrived;
-    }
+    if (entry.arrivals++ == 0) entry.first_arrival = at;
   }
   ++truth_.arrived;
   truth_.records_arrived += records;

@@ -4,16 +4,15 @@
 
 #include <array>
 #include <deque>
-#include <iterator>
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "drivers/sim/netbox/device.hpp"
 #include "drivers/sim/script/faults.hpp"
 #include "drivers/sim/script/script_run.hpp"
+#include "drivers/sim/transport/conversations.hpp"
 
 namespace kphi::sim {
 
@@ -29,8 +28,7 @@ struct SentDatagram {
   Instant sent{0};
   std::uint32_t arrivals = 0;  ///< 0: lost
   Instant first_arrival{0};
-  std::uint64_t arrival_place = 0;  ///< of the first: how many datagrams had arrived before
-  std::size_t first_sample = 0;     ///< into WireTruth::sampled
+  std::size_t first_sample = 0;  ///< into WireTruth::sampled
 };
 
 /// What truly happened on the load cell's wire: a driver's own counts are checked against it.
@@ -63,47 +61,6 @@ struct WireTruth {
   std::vector<std::uint32_t> ft;  ///< ft_sequence as sent
 };
 
-/// Things with a time of arrival, in that order; those of the same time in the order of add(). Slots are
-/// reused: nothing is allocated once there are enough.
-template <class Thing>
-class DelayQueue {
- public:
-  void add(const Thing& thing, Instant due) {
-    if (free_.empty()) {
-      free_.push_back(static_cast<std::uint32_t>(things_.size()));
-      things_.emplace_back();
-    }
-    const std::uint32_t slot = free_.back();
-    free_.pop_back();
-    things_[slot] = thing;
-    auto behind = order_.end();
-    while (behind != order_.begin() && std::prev(behind)->first > due) --behind;
-    order_.insert(behind, {due, slot});
-  }
-  /// kNever when empty.
-  [[nodiscard]] Instant next() const noexcept { return order_.empty() ? kNever : order_.front().first; }
-  /// Requires one; valid until the next add().
-  [[nodiscard]] const Thing& first() const noexcept { return things_[order_.front().second]; }
-  void drop_first() {
-    free_.push_back(order_.front().second);
-    order_.pop_front();
-  }
-
- private:
-  std::deque<std::pair<Instant, std::uint32_t>> order_;
-  std::vector<Thing> things_;
-  std::vector<std::uint32_t> free_;
-};
-
-/// An answer of the box over a stream socket. Bench times.
-struct StreamReply {
-  std::string bytes;
-  Duration wait{0};         ///< before the first byte
-  std::size_t segment = 0;  ///< at most this many bytes at once; 0: all
-  Duration pause{0};        ///< between two segments
-  bool close = false;       ///< after the last byte
-};
-
 /// What a fault of the web server does to an answer (web.cpp).
 void spoil_page(const Fault& fault, StreamReply& reply);
 
@@ -131,7 +88,7 @@ class FaultInjector {
   /// Earliest arrival of a datagram in flight; kNever: none.
   [[nodiscard]] Instant next_arrival() const noexcept;
 
-  /// Answer to one complete request.
+  /// Answer to one complete request; bench times.
   [[nodiscard]] StreamReply http(std::string_view request, Instant now);
   /// The web server's port is closed now.
   [[nodiscard]] bool http_refused(Instant now) const noexcept;
@@ -184,6 +141,8 @@ class FaultInjector {
   void move_to(const std::string& address);
   void count_use(std::size_t fault, Instant now, std::uint64_t WireTruth::*counter);
   void hand_over(std::span<const std::uint8_t> datagram, Peer peer);
+  StreamReply spoilt(std::string answer, Instant now, bool (*concerns)(FaultKind), std::uint64_t WireTruth::*counter,
+                     void (*spoil)(const Fault&, StreamReply&));
 
   void carry_all(Instant now);
   void carry(const InFlightDatagram& in_flight);
@@ -206,11 +165,10 @@ class FaultInjector {
   Instant next_event_ = kNever;
   bool disturbed_ = false;  ///< dead, skewed or drifting
   bool dead_ = false;
-  bool skewed_ = false;
   std::vector<std::size_t> drifting_;
   std::string moved_to_, first_address_;
-  const Fault* skew_ = nullptr;
-  double phase_ = 0;  ///< of the box's clock, in its samples
+  const Fault* skew_ = nullptr;  ///< nullptr: its clock is right
+  double phase_ = 0;             ///< of the box's clock, in its samples
   DelayQueue<InFlightDatagram> under_way_;
   std::vector<Held> held_;
   Instant last_due_{0};

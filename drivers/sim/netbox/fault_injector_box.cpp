@@ -52,6 +52,7 @@ void FaultInjector::meet_events(Instant now) {
       late_requests_.erase(due);
       hand_over(request.bytes, request.peer);
     }
+    disturbed_ = dead_ || skew_ != nullptr || !drifting_.empty();
     schedule();
   }
 }
@@ -73,87 +74,51 @@ void FaultInjector::move_to(const std::string& address) {
 
 void FaultInjector::begin(std::size_t index) {
   const Fault& fault = script_[index];
-  switch (fault.kind) {
-    case FaultKind::taken_over: {
-      const std::array<std::uint8_t, 8> start{0x12, 0x34, 0, static_cast<std::uint8_t>(fault.buffered ? 3 : 2),
-                                              0,    0,    0, 0};
-      ++truth_.takeovers;
-      return hand_over(start, kHijacker);
-    }
-    case FaultKind::restart:
-      if (!box_.streaming()) return;
-      ++truth_.restarts;
-      return box_.restart_stream();
-    case FaultKind::reboot:
-      ++truth_.reboots;
-      dead_ = disturbed_ = true;
-      return;
-    case FaultKind::stall:
-      ++truth_.stalls;
-      return box_.stall(true);
-    case FaultKind::ft_jump_back:
-      ++truth_.jumps;
-      return box_.set_ft_sequence(box_.ft_sequence() + 1 - static_cast<std::uint32_t>(fault.samples));
-    case FaultKind::overrun:
-      ++truth_.overruns;
-      return box_.set_ft_sequence(box_.ft_sequence() + 1 + static_cast<std::uint32_t>(fault.samples));
-    case FaultKind::wrap:
-      return box_.set_ft_sequence(0u - static_cast<std::uint32_t>(fault.samples));
-    case FaultKind::clock_skew:
-      skew_ = &fault;
-      skewed_ = disturbed_ = true;
-      return;
-    case FaultKind::zero_drift:
-      drifting_.push_back(index);
-      disturbed_ = true;
-      return;
-    case FaultKind::rate: {
-      ++truth_.rate_changes;
-      NetBoxSettings settings = box_.settings();
-      settings.rate_hz = fault.rate_hz;
-      return box_.configure(settings);
-    }
-    case FaultKind::address:
-      ++truth_.moves;
-      return move_to(fault.address);
-    case FaultKind::status:
-      return box_.set_status(fault.bits);
-    case FaultKind::saturation:
-      return box_.force_saturation(fault.axes);
-    case FaultKind::units: {
-      NetBoxSettings settings = box_.settings();
-      Slot& slot = settings.slots[static_cast<std::size_t>(settings.active_slot)];
-      slot.force_unit = fault.force_unit;
-      slot.torque_unit = fault.torque_unit;
-      return box_.configure(settings);
-    }
-    default:
-      return;
+  using K = FaultKind;
+  const auto is = [&fault](K kind) { return fault.kind == kind; };
+  const auto samples = static_cast<std::uint32_t>(fault.samples);
+  truth_.takeovers += is(K::taken_over);
+  truth_.restarts += is(K::restart) && box_.streaming();
+  truth_.reboots += is(K::reboot);
+  truth_.stalls += is(K::stall);
+  truth_.jumps += is(K::ft_jump_back);
+  truth_.overruns += is(K::overrun);
+  truth_.rate_changes += is(K::rate);
+  truth_.moves += is(K::address);
+  if (is(K::taken_over)) {
+    const std::uint8_t command = fault.buffered ? 3 : 2;
+    hand_over(std::array<std::uint8_t, 8>{0x12, 0x34, 0, command, 0, 0, 0, 0}, kHijacker);
   }
+  if (is(K::restart) && box_.streaming()) box_.restart_stream();
+  if (is(K::reboot)) dead_ = true;
+  if (is(K::stall)) box_.stall(true);
+  if (is(K::ft_jump_back)) box_.set_ft_sequence(box_.ft_sequence() + 1 - samples);
+  if (is(K::overrun)) box_.set_ft_sequence(box_.ft_sequence() + 1 + samples);
+  if (is(K::wrap)) box_.set_ft_sequence(0u - samples);
+  if (is(K::clock_skew)) skew_ = &fault;
+  if (is(K::zero_drift)) drifting_.push_back(index);
+  if (is(K::status)) box_.set_status(fault.bits);
+  if (is(K::saturation)) box_.force_saturation(fault.axes);
+  if (is(K::address)) move_to(fault.address);
+  NetBoxSettings settings = box_.settings();
+  if (is(K::rate)) settings.rate_hz = fault.rate_hz;
+  if (is(K::units))
+    settings.slots[static_cast<std::size_t>(settings.active_slot)] = {fault.force_unit, fault.torque_unit};
+  if (is(K::rate) || is(K::units)) box_.configure(settings);
 }
 
 void FaultInjector::end(const Fault& fault) {
-  switch (fault.kind) {
-    case FaultKind::reboot:
-      dead_ = false;
-      disturbed_ = skewed_ || !drifting_.empty();
-      return box_.power_cycle(fault.resume);
-    case FaultKind::address:
-      return move_to({});
-    case FaultKind::stall:
-      return box_.stall(false);
-    case FaultKind::clock_skew:
-      skewed_ = false;
-      disturbed_ = dead_ || !drifting_.empty();
-      return;
-    case FaultKind::status:
-      if (!fault.latched) box_.clear_status(fault.bits);
-      return;
-    case FaultKind::saturation:
-      return box_.force_saturation(0);
-    default:
-      return;
+  using K = FaultKind;
+  const auto is = [&fault](K kind) { return fault.kind == kind; };
+  if (is(K::reboot)) {
+    dead_ = false;
+    box_.power_cycle(fault.resume);
   }
+  if (is(K::address)) move_to({});
+  if (is(K::stall)) box_.stall(false);
+  if (is(K::clock_skew)) skew_ = nullptr;
+  if (is(K::status) && !fault.latched) box_.clear_status(fault.bits);
+  if (is(K::saturation)) box_.force_saturation(0);
 }
 
 void FaultInjector::sample_disturbed(LoadCellSample sample) {
@@ -163,7 +128,7 @@ void FaultInjector::sample_disturbed(LoadCellSample sample) {
     const double since = to_seconds(sample.at - fault.at);
     sample.wrench[fault.axis] += fault.amount * -std::expm1(-since / to_seconds(fault.tau));
   }
-  skewed_ ? sample_skewed(sample) : box_.sample(sample);
+  skew_ != nullptr ? sample_skewed(sample) : box_.sample(sample);
 }
 
 void FaultInjector::sample_skewed(const LoadCellSample& sample) {
@@ -210,33 +175,27 @@ void FaultInjector::request(std::span<const std::uint8_t> datagram, Peer peer, I
 // --- answers over stream sockets
 
 StreamReply FaultInjector::http(std::string_view request, Instant now) {
-  StreamReply reply;
-  reply.bytes = box_.http(request);
+  return spoilt(box_.http(request), now, on_pages, &WireTruth::http_spoilt, spoil_page);
+}
+
+StreamReply FaultInjector::tcp(std::string& received, Instant now) {
+  return spoilt(box_.tcp(received), now, on_tcp, &WireTruth::tcp_spoilt, spoil_answer);
+}
+
+StreamReply FaultInjector::spoilt(std::string answer, Instant now, bool (*concerns)(FaultKind),
+                                  std::uint64_t WireTruth::*counter, void (*spoil)(const Fault&, StreamReply&)) {
+  StreamReply reply{std::move(answer)};
+  if (reply.bytes.empty()) return reply;
   for (std::size_t i = 0; i < script_.size(); ++i) {
-    if (!on_pages(script_[i].kind) || !script_.active(i, now)) continue;
-    count_use(i, now, &WireTruth::http_spoilt);
-    spoil_page(script_[i], reply);
+    if (!concerns(script_[i].kind) || !script_.active(i, now)) continue;
+    count_use(i, now, counter);
+    spoil(script_[i], reply);
   }
   return reply;
 }
 
 bool FaultInjector::http_refused(Instant now) const noexcept {
-  if (dead_) return true;
-  for (std::size_t i = 0; i < script_.size(); ++i) {
-    if (script_[i].kind == FaultKind::http_refused && script_.active(i, now)) return true;
-  }
-  return false;
-}
-
-StreamReply FaultInjector::tcp(std::string& received, Instant now) {
-  StreamReply reply;
-  reply.bytes = box_.tcp(received);
-  for (std::size_t i = 0; i < script_.size() && !reply.bytes.empty(); ++i) {
-    if (!on_tcp(script_[i].kind) || !script_.active(i, now)) continue;
-    count_use(i, now, &WireTruth::tcp_spoilt);
-    spoil_answer(script_[i], reply);
-  }
-  return reply;
+  return dead_ || script_.any_active(now, [](const Fault& fault) { return fault.kind == FaultKind::http_refused; });
 }
 
 }  // namespace kphi::sim

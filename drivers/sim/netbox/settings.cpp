@@ -22,11 +22,10 @@ constexpr QuirkRow flag(std::string_view name) {
   return {name, [](Q& quirks, int index) { quirks.*Flag = index == 1; }};
 }
 
-constexpr std::array<QuirkRow, 9> kQuirks{{
+constexpr std::array<QuirkRow, 8> kQuirks{{
     flag<&Q::bias_stops_stream>("bias_stops_stream"),
     {"rate_write", [](Q& q, int i) { q.rate_write = static_cast<Q::RateWrite>(i); }, {"stops", "continues", "pauses"}},
     {"last_block", [](Q& q, int i) { q.last_block = static_cast<Q::LastBlock>(i); }, {"partial", "padded", "dropped"}},
-    flag<&Q::command_four_streams>("command_four_streams"),
     flag<&Q::torque_text_with_hyphen>("torque_text_with_hyphen"),
     flag<&Q::flags_as_digits>("flags_as_digits"),
     {"array_separator", [](Q& q, int i) { q.array_separator = ";, "[i]; }, {"semicolon", "comma", "blank"}},
@@ -50,25 +49,6 @@ void set_quirk(NetBoxQuirks& quirks, const std::string& name, const std::string&
   if (word == words.end())
     throw FaultEntryError(name, fmt::format("\"{}\" is not one of {}", value, fmt::join(words, ", ")));
   quirk->set(quirks, static_cast<int>(word - words.begin()));
-}
-
-std::array<Slot, kSlots> NetBoxSettings::numbered_slots() {
-  std::array<Slot, kSlots> slots;
-  for (int i = 0; i < kSlots; ++i) slots[static_cast<std::size_t>(i)].calibration = i;
-  slots[0].name = "thrust stand";
-  return slots;
-}
-
-std::int32_t counts_per_force(const NetBoxSettings& settings, int slot) noexcept {
-  const Slot& s = settings.slots[static_cast<std::size_t>(slot)];
-  if (s.calibration != 0) return 0;
-  return s.force_unit == 2 ? settings.counts_per_force : unit(kForceUnits, s.force_unit).counts;
-}
-
-std::int32_t counts_per_torque(const NetBoxSettings& settings, int slot) noexcept {
-  const Slot& s = settings.slots[static_cast<std::size_t>(slot)];
-  if (s.calibration != 0) return 0;
-  return s.torque_unit == 3 ? settings.counts_per_torque : unit(kTorqueUnits, s.torque_unit).counts;
 }
 
 }  // namespace kphi::sim

@@ -19,50 +19,32 @@ struct Unit {
   double si;   ///< SI units in one of these
   int counts;  ///< per unit
 };
+using Units = std::array<Unit, 6>;
 
-inline constexpr std::array<Unit, 6> kForceUnits{{{"lbf", 4.4482216152605, 1},
-                                                  {"N", 1, 1'000'000},
-                                                  {"klbf", 4448.2216152605, 1},
-                                                  {"kN", 1000, 1'000'000},
-                                                  {"kgf", 9.80665, 1},
-                                                  {"gf", 0.00980665, 1}}};
-inline constexpr std::array<Unit, 6> kTorqueUnits{{{"lbf-in", 0.1129848290276167, 1},
-                                                   {"lbf-ft", 1.3558179483314004, 1},
-                                                   {"Nm", 1, 1'000'000},
-                                                   {"Nmm", 0.001, 1000},
-                                                   {"kgf-cm", 0.0980665, 1},
-                                                   {"kNm", 1000, 1'000'000}}};
-inline constexpr std::array<Unit, 5> kDistanceUnits{
-    {{"in", 0.0254, 0}, {"ft", 0.3048, 0}, {"mm", 0.001, 0}, {"cm", 0.01, 0}, {"m", 1, 0}}};
-inline constexpr std::array<Unit, 2> kAngleUnits{{{"degrees", 0.017453292519943295, 0}, {"radians", 1, 0}}};
+inline constexpr Units kForceUnits{{{"lbf", 4.4482216152605, 1},
+                                    {"N", 1, 1'000'000},
+                                    {"klbf", 4448.2216152605, 1},
+                                    {"kN", 1000, 1'000'000},
+                                    {"kgf", 9.80665, 1},
+                                    {"gf", 0.00980665, 1}}};
+inline constexpr Units kTorqueUnits{{{"lbf-in", 0.1129848290276167, 1},
+                                     {"lbf-ft", 1.3558179483314004, 1},
+                                     {"Nm", 1, 1'000'000},
+                                     {"Nmm", 0.001, 1000},
+                                     {"kgf-cm", 0.0980665, 1},
+                                     {"kNm", 1000, 1'000'000}}};
 
 /// Codes count from 1.
-template <std::size_t N>
-[[nodiscard]] constexpr const Unit& unit(const std::array<Unit, N>& units, int code) noexcept {
+[[nodiscard]] constexpr const Unit& unit(const Units& units, int code) noexcept {
   return units[static_cast<std::size_t>(code - 1)];
 }
 
 inline constexpr int kSlots = 16;  ///< configurations, calibrations and monitor conditions: sixteen of each
 
-/// One configuration. Units are codes of the tables above.
+/// One configuration: codes of the tables above. Slot n uses calibration n; only the first has one.
 struct Slot {
-  std::string name = "empty";
-  int calibration = 0;      ///< 0..15
-  int force_unit = 2;       ///< N
-  int torque_unit = 3;      ///< N m
-  int distance_unit = 3;    ///< mm
-  int angle_unit = 1;       ///< degrees
-  Wrench tool_transform{};  ///< Dx Dy Dz Rx Ry Rz in the two units above
-  std::string user_a = "empty", user_b = "empty";
-};
-
-/// One statement that the box judges 7000 times a second.
-struct MonitorCondition {
-  bool enabled = false;
-  int axis = -1;            ///< 0..5 = Fx..Tz, -1: none
-  int comparison = 1;       ///< 1: '>', -1: '<'
-  std::int32_t counts = 0;  ///< threshold
-  int output = 0;           ///< code, 0..255
+  int force_unit = 2;   ///< N
+  int torque_unit = 3;  ///< N m
 };
 
 /// Open questions of the box; the first value is the likeliest. A fault script sets them by these names.
@@ -72,7 +54,6 @@ struct NetBoxQuirks {
   bool bias_stops_stream = false;  ///< 0x0042
   RateWrite rate_write = RateWrite::stops;
   LastBlock last_block = LastBlock::partial;  ///< of a finite buffered request
-  bool command_four_streams = true;           ///< 0x0004 as real-time mode
   bool torque_text_with_hyphen = false;       ///< N-m instead of Nm
   bool flags_as_digits = false;               ///< 1 and 0 instead of Enabled and Disabled
   char array_separator = ';';                 ///< of arrays in the XML: semicolon, comma or blank
@@ -84,31 +65,24 @@ struct NetBoxQuirks {
 void set_quirk(NetBoxQuirks& quirks, const std::string& name, const std::string& value);
 
 struct NetBoxSettings {
-  double rate_hz = 7000;                       ///< comrdtrate as asked for; the box rounds up to 7000/n
-  int records_per_datagram = 40;               ///< comrdtbsiz, 1..40
-  std::uint32_t first_ft_sequence = 0;         ///< of the first sample after power-up
-  Wrench range{20, 20, 60, 1, 1, 1};           ///< N and N m, of calibration 0: Mini40 SI-20-1
-  std::int32_t counts_per_force = 1'000'000;   ///< per N, of slots in N
-  std::int32_t counts_per_torque = 1'000'000;  ///< per N m, of slots in N m
-  std::string serial = "FT21001";              ///< of calibration 0; the others are empty
-  std::string address = "127.0.0.1";           ///< as the box reports it
-  bool rdt_enabled = true;                     ///< comrdte
-  bool ethernet_ip = false;                    ///< comeipe
-  int active_slot = 0;                         ///< setcfgsel
-  int filter = 0;                              ///< setuserfilter, 0..12
-  bool peaks = true;                           ///< setpke
-  std::array<int, 6> bias_vector{};            ///< setbias, gage counts; see NetBoxSignal
-  bool monitoring = false;                     ///< setmce
-  std::array<MonitorCondition, kSlots> conditions{};
-  std::array<Slot, kSlots> slots = numbered_slots();
+  double rate_hz = 7000;                ///< comrdtrate as asked for; the box rounds up to 7000/n
+  int records_per_datagram = 40;        ///< comrdtbsiz, 1..40
+  std::uint32_t first_ft_sequence = 0;  ///< of the first sample after power-up
+  Wrench range{20, 20, 60, 1, 1, 1};    ///< N and N m, of calibration 0: Mini40 SI-20-1
+  std::string address = "127.0.0.1";    ///< as the box reports it
+  int active_slot = 0;                  ///< setcfgsel
+  int filter = 0;                       ///< setuserfilter, 0..12
+  std::array<int, 6> bias_vector{};     ///< setbias, gage counts; see NetBoxSignal
+  std::array<Slot, kSlots> slots{};
   NetBoxQuirks quirks;
-
-  /// Slot n uses calibration n; only the first has one.
-  [[nodiscard]] static std::array<Slot, kSlots> numbered_slots();
 };
 
 /// Counts per configured unit of a slot; 0 without a calibration.
-[[nodiscard]] std::int32_t counts_per_force(const NetBoxSettings& settings, int slot) noexcept;
-[[nodiscard]] std::int32_t counts_per_torque(const NetBoxSettings& settings, int slot) noexcept;
+[[nodiscard]] inline int counts_per_force(const NetBoxSettings& settings, int slot) noexcept {
+  return slot == 0 ? unit(kForceUnits, settings.slots[0].force_unit).counts : 0;
+}
+[[nodiscard]] inline int counts_per_torque(const NetBoxSettings& settings, int slot) noexcept {
+  return slot == 0 ? unit(kTorqueUnits, settings.slots[0].torque_unit).counts : 0;
+}
 
 }  // namespace kphi::sim

@@ -1,5 +1,5 @@
-// From force to counts, 7000 times a second, in the order of the box: saturation, gage bias, filter, tool transform,
-// units, software bias, monitor conditions.
+// From force to counts, 7000 times a second, in the order of the box: saturation, gage bias, filter, units,
+// software bias.
 #pragma once
 
 #include <array>
@@ -36,39 +36,25 @@ class NetBoxSignal {
   /// One internal sample, N and N m.
   void measure(const Wrench& wrench) noexcept;
   void take_software_bias() noexcept;
-  void reset_latch() noexcept { latched_ = false; }
   /// These axes (bits 0..5) read their full range and are flagged, whatever the load.
   void force_saturation(unsigned axes) noexcept { forced_axes_ = axes; }
 
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
   [[nodiscard]] bool saturated() const noexcept { return saturation_left_ > 0; }
-  [[nodiscard]] bool latched() const noexcept { return latched_; }
-  [[nodiscard]] std::uint32_t breached() const noexcept { return breached_; }  ///< bit per condition, now or latched
-  [[nodiscard]] int output_code() const noexcept { return output_; }
   /// Counts per SI unit and axis; 0 without a calibration.
   [[nodiscard]] double counts_per_si(std::size_t axis) const noexcept { return scale_[axis]; }
 
  private:
-  void transform(Wrench& wrench) const noexcept;
-  void judge() noexcept;
-
   bool axia_ = false;
-  bool monitoring_ = false;
-  std::array<MonitorCondition, kSlots> conditions_{};
   Wrench range_{};      // N, N m; 0 without a calibration
   Wrench gage_bias_{};  // N, N m
   std::array<double, 6> scale_{};
-  bool moved_ = false;                           // there is a tool transform
-  std::array<double, 3> lever_{};                // m
-  std::array<std::array<double, 3>, 3> turn_{};  // from the cell's axes to the tool's
   int filter_ = 0;
   std::array<LowPass, 6> filters_{};
   std::array<std::int64_t, 6> software_bias_{};  // counts
   Counts counts_{};
   unsigned forced_axes_ = 0;
   int saturation_left_ = 0;  // samples for which the bit stays set
-  bool latched_ = false;
-  std::uint32_t breached_ = 0;
-  int output_ = 0;
 };
+
 }  // namespace kphi::sim

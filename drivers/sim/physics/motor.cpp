@@ -108,30 +108,9 @@ double Motor::bus_volts(double conductance, double amps) const noexcept {
 
 void Motor::account(const Circuit& circuit, const Shaft& shaft, double next) noexcept {
   const double mean = 0.5 * (shaft.speed + next);
-  const double torque = parameters_.torque_constant * circuit.amps;
-  const bool open = circuit.amps == 0;
-  const double volts = open ? parameters_.torque_constant * mean
-                            : circuit.amps * circuit.resistance + parameters_.torque_constant * mean;
-  const double motor_watts = volts * circuit.amps;
-  const double bus = std::max(circuit.volts, 1e-3);
-  const double module_amps = motor_watts / bus + parameters_.idle_current;
-  const double rise = circuit.volts - state_.supply_volts;
-  const double source_amps = source_ ? module_amps : module_amps + parameters_.bus_capacitance * rise * kTicksPerSecond;
-
-  if (source_) {
-    energy_.source += circuit.volts * source_amps * kTick;
-  } else {
-    energy_.source += (parameters_.supply_volts + upset_.supply_volts) * source_amps * kTick;
-    energy_.source_loss += (parameters_.supply_volts + upset_.supply_volts - circuit.volts) * source_amps * kTick;
-    energy_.bus += 0.5 * parameters_.bus_capacitance * rise * (circuit.volts + state_.supply_volts);
-    energy_.bus_loss += 0.5 * parameters_.bus_capacitance * rise * rise;
-  }
-  energy_.electronics += circuit.volts * parameters_.idle_current * kTick;
-  energy_.copper += circuit.amps * circuit.amps * circuit.resistance * kTick;
-  energy_.drag += shaft.locked ? 0 : shaft.drag * mean * kTick;
-  energy_.kinetic += shaft.inertia * (next - shaft.speed) * mean;
-  energy_.friction +=
-      (torque - (shaft.locked ? 0 : shaft.drag)) * mean * kTick - shaft.inertia * (next - shaft.speed) * mean;
+  const double volts = circuit.amps * circuit.resistance + parameters_.torque_constant * mean;
+  const double module_amps = volts * circuit.amps / std::max(circuit.volts, 1e-3) + parameters_.idle_current;
+  const double charging = parameters_.bus_capacitance * (circuit.volts - state_.supply_volts) * kTicksPerSecond;
 
   heat_ += circuit.amps * circuit.amps * kTick;
   state_.turning_speed = mean;
@@ -139,7 +118,7 @@ void Motor::account(const Circuit& circuit, const Shaft& shaft, double next) noe
   state_.motor_amps = circuit.amps;
   state_.supply_volts = circuit.volts;
   state_.supply_amps = module_amps;
-  state_.source_amps = source_amps;
+  state_.source_amps = source_ ? module_amps : module_amps + charging;
   state_.supply_joules += circuit.volts * module_amps * kTick;
 }
 

@@ -42,19 +42,6 @@ struct MotorState {
   double controller_celsius = 30;
 };
 
-/// Where the energy went since power-up, J.
-struct MotorEnergy {
-  double source = 0;       ///< delivered by the ideal source behind its resistance
-  double source_loss = 0;  ///< in the source: resistance, current limit
-  double bus = 0;          ///< change of what the capacitance holds
-  double bus_loss = 0;     ///< of charging it through the leads within a tick
-  double electronics = 0;
-  double copper = 0;
-  double drag = 0;  ///< given to the propeller's air and the bearings' viscosity
-  double friction = 0;
-  double kinetic = 0;  ///< change of what turns
-};
-
 /// IQ2306 2200Kv: data sheet values (facts of the 2306) where there are any, otherwise assumed.
 struct MotorParameters {
   double torque_constant = 0.0043;     ///< Kt = Ke, N m/A
@@ -112,10 +99,8 @@ class Motor {
   void upset(const MotorUpset& upset) noexcept { upset_ = upset; }
   void step(const PowerStage& stage, Random& random) noexcept;
   [[nodiscard]] const MotorState& state() const noexcept { return state_; }
-  [[nodiscard]] const MotorEnergy& energy() const noexcept { return energy_; }
   /// Torque on the mount about +z, N m: the reaction, negative while a positive speed is driven or dragged.
   [[nodiscard]] double reaction_torque() const noexcept { return reaction_torque_; }
-  [[nodiscard]] const MotorParameters& parameters() const noexcept { return parameters_; }
   [[nodiscard]] double resistance() const noexcept { return resistance_; }  ///< ohm, as warm as it is
 
  private:
@@ -135,7 +120,6 @@ class Motor {
   MotorUpset upset_;
   BusSource source_;  ///< empty: the supply of the parameters
   MotorState state_;
-  MotorEnergy energy_;
   double resistance_;          ///< whole loop, now
   double winding_resistance_;  ///< now
   double reaction_torque_ = 0;

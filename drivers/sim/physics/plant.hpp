@@ -84,12 +84,9 @@ class Plant {
   void upset(const MotorUpset& upset) noexcept { motor_.upset(upset); }
 
   [[nodiscard]] const MotorState& motor() const noexcept { return motor_.state(); }
-  [[nodiscard]] const MotorEnergy& energy() const noexcept { return motor_.energy(); }
-  [[nodiscard]] const MotorParameters& motor_parameters() const noexcept { return motor_.parameters(); }
   [[nodiscard]] const Wrench& reading() const noexcept { return load_cell_.reading(); }
   [[nodiscard]] double thrust() const noexcept { return load_cell_.thrust(); }      ///< N, without noise and zero
   [[nodiscard]] const Wrench& zero() const noexcept { return load_cell_.zero(); }   ///< of the load cell, now
-  [[nodiscard]] double thrust_coefficient() const noexcept { return air_.thrust; }  ///< N/(rad/s)², as mounted
   [[nodiscard]] double torque_coefficient() const noexcept { return shaft_.drag; }  ///< N m/(rad/s)², as mounted
 
  private:

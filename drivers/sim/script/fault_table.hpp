@@ -4,7 +4,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -29,14 +31,12 @@ class FaultEntryError : public std::runtime_error {
 
 /// Closed.
 struct FaultRange {
-  double low = 0, high = 0;
+  double low = -std::numeric_limits<double>::max(), high = std::numeric_limits<double>::max();
   bool whole = false;
 };
 
-/// Finite; "true" and "false" are 1 and 0, "0x1F" is 31. Throws FaultEntryError.
-[[nodiscard]] double fault_number(std::string_view key, const std::string& text);
-/// Throws FaultEntryError outside `range`.
-[[nodiscard]] double fault_number(std::string_view key, const std::string& text, const FaultRange& range);
+/// Finite; "true" and "false" are 1 and 0, "0x1F" is 31. Throws FaultEntryError, also outside `range`.
+[[nodiscard]] double fault_number(std::string_view key, const std::string& text, const FaultRange& range = {});
 
 /// When a fault acts, bench time, and how often.
 template <class KindOfDevice>
@@ -71,6 +71,7 @@ struct FaultParameter {
   void (*set)(Fault& fault, const FaultParameter& parameter, const std::string& text);
   double low = 0, high = 0;
   bool required = false;
+  const char* usual = nullptr;  ///< when an entry does not say; nullptr: as the member is
 
   /// A member that is a number (an integer takes whole numbers only) or a Duration (the script has seconds).
   template <auto Member>
@@ -95,9 +96,10 @@ struct FaultMember<Member> {
 
 /// An optional key for a member, see FaultParameter::into.
 template <auto Member>
-[[nodiscard]] constexpr auto key(std::string_view name, double low = 0, double high = FaultMember<Member>::kUsualMax) {
+[[nodiscard]] constexpr auto key(std::string_view name, double low = 0, double high = FaultMember<Member>::kUsualMax,
+                                 const char* usual = nullptr) {
   using Parameter = FaultParameter<typename FaultMember<Member>::Fault>;
-  return Parameter{name, Parameter::template into<Member>, low, high};
+  return Parameter{name, Parameter::template into<Member>, low, high, false, usual};
 }
 /// The same for a key that an entry must have.
 template <auto Member>
@@ -119,7 +121,6 @@ class FaultTable {
     std::string_view name;
     FaultExtent extent;
     std::vector<Parameter> parameters;
-    Fault usual{};  ///< what an entry does not say
   };
 
   FaultTable(std::string device, std::vector<Row> rows) : device_(std::move(device)), rows_(std::move(rows)) {}
@@ -136,14 +137,23 @@ class FaultTable {
   [[nodiscard]] Fault read(const FaultEntry& entry) const {
     const Row& row = row_of(entry);
     const std::vector<Parameter> parameters = parameters_of(row);
-    refuse_unknown_keys(row, parameters, entry);
-    refuse_endlessness(row, entry);
-    Fault fault = row.usual;
+    for (const auto& [key, unused] : entry) {
+      const bool known = std::any_of(parameters.begin(), parameters.end(),
+                                     [&name = key](const Parameter& parameter) { return parameter.name == name; });
+      if (!known && key != "kind") refuse(key, fmt::format("{} has no key \"{}\"", row.name, key));
+    }
+    const bool ends = entry.contains("for_s"), counts = entry.contains("count");
+    if (row.extent == FaultExtent::window && !ends) refuse("", fmt::format("{} needs for_s", row.name));
+    if (row.extent == FaultExtent::window_or_count && !ends && !counts)
+      refuse("", fmt::format("{} needs for_s or count", row.name));
+    Fault fault;
     fault.kind = row.kind;
     for (const Parameter& parameter : parameters) {
       const auto found = entry.find(std::string(parameter.name));
       if (found != entry.end()) {
         parameter.set(fault, parameter, found->second);
+      } else if (parameter.usual != nullptr) {
+        parameter.set(fault, parameter, parameter.usual);
       } else if (parameter.required) {
         refuse("", fmt::format("{} needs {}", row.name, parameter.name));
       }
@@ -175,21 +185,6 @@ class FaultTable {
     if (row.extent == FaultExtent::window_or_count)
       all.push_back({"count", Parameter::template into<&Fault::count>, 1, 1e9});
     return all;
-  }
-
-  static void refuse_unknown_keys(const Row& row, const std::vector<Parameter>& known, const FaultEntry& entry) {
-    for (const auto& [key, unused] : entry) {
-      bool found = key == "kind";
-      for (const Parameter& parameter : known) found = found || parameter.name == key;
-      if (!found) refuse(key, fmt::format("{} has no key \"{}\"", row.name, key));
-    }
-  }
-
-  static void refuse_endlessness(const Row& row, const FaultEntry& entry) {
-    const bool ends = entry.contains("for_s"), counts = entry.contains("count");
-    if (row.extent == FaultExtent::window && !ends) refuse("", fmt::format("{} needs for_s", row.name));
-    if (row.extent == FaultExtent::window_or_count && !ends && !counts)
-      refuse("", fmt::format("{} needs for_s or count", row.name));
   }
 
   std::string device_;

@@ -6,14 +6,15 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <optional>
+
+#include "base/number.hpp"
 
 namespace kphi::sim {
 namespace {
 
 constexpr FaultExtent kOnce = FaultExtent::instant, kWindow = FaultExtent::window, kSome = FaultExtent::window_or_count,
                       kOpen = FaultExtent::window_or_forever;
-constexpr Duration kOvertaken = std::chrono::milliseconds(10);
-constexpr Duration kBetweenSegments = std::chrono::milliseconds(2);
 constexpr double kMany = 4294967295.0;
 
 void as_tag(Fault& fault, const FaultParameter<Fault>& parameter, const std::string& word) {
@@ -34,20 +35,6 @@ void as_wrong_size(Fault& fault, const FaultParameter<Fault>& parameter, const s
   FaultParameter<Fault>::into<&Fault::size>(fault, parameter, text);
   if (fault.size > 0 && fault.size % 36 == 0 && fault.size <= 1440)
     throw FaultEntryError("size", "whole records are the right size: 36 to 1440 in steps of 36");
-}
-
-// What an entry may leave out.
-
-Fault delayed_by(Duration delay) {
-  Fault fault;
-  fault.delay = delay;
-  return fault;
-}
-MotorFault usually(Duration delay, std::uint64_t size) {
-  MotorFault fault;
-  fault.delay = delay;
-  fault.size = size;
-  return fault;
 }
 
 void as_value(MotorFault& fault, const FaultParameter<MotorFault>&, const std::string& text) {
@@ -76,9 +63,6 @@ void as_bytes(MotorFault& fault, const FaultParameter<MotorFault>&, const std::s
     fault.bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(i, 2), nullptr, 16)));
 }
 
-constexpr auto kAnyDelay = required<&MotorFault::delay>("delay_s");
-constexpr auto kVolts = required<&MotorFault::volts>("volts", 0, 100);
-
 /// A fault of replies may concern all entries or one.
 std::vector<FaultParameter<MotorFault>> of_replies(std::vector<FaultParameter<MotorFault>> parameters = {}) {
   using F = MotorFault;
@@ -88,42 +72,58 @@ std::vector<FaultParameter<MotorFault>> of_replies(std::vector<FaultParameter<Mo
 
 }  // namespace
 
+double fault_number(std::string_view key, const std::string& text, const FaultRange& range) {
+  std::optional<double> value = parse_finite(text);
+  if (text == "true" || text == "false") value = text == "true" ? 1 : 0;
+  if (text.starts_with("0x")) value = parse_integer<std::uint32_t>(text.substr(2), 16);
+  if (!value) throw FaultEntryError(std::string(key), fmt::format("\"{}\" is not a number", text));
+  if (!(*value >= range.low && *value <= range.high))
+    throw FaultEntryError(std::string(key), fmt::format("{} is outside {} to {}", *value, range.low, range.high));
+  if (range.whole && *value != std::floor(*value))
+    throw FaultEntryError(std::string(key), fmt::format("{} is not a whole number", *value));
+  return *value;
+}
+
 const FaultTable<Fault>& load_cell_faults() {
   using F = Fault;
   using K = FaultKind;
-  static const FaultTable<Fault> all(
+  constexpr auto p = key<&F::p>("p"), delay = key<&F::delay>("delay_s"), jitter = key<&F::jitter>("jitter_s");
+  constexpr auto any_delay = required<&F::delay>("delay_s");
+  constexpr FaultParameter<F> tag{"tag", as_tag, 0, 0, true}, address{"address", as_address, 0, 0, true};
+  const auto size = [](double low, double high) { return required<&F::size>("size", low, high); };
+  const auto samples = [](double high) { return required<&F::samples>("samples", 1, high); };
+  static const FaultTable<F> all{
       "the load cell",
       {
-          {K::loss, "loss", kSome, {key<&F::p>("p"), key<&F::burst>("burst", 1, 1e6)}},
+          {K::loss, "loss", kSome, {p, key<&F::burst>("burst", 1, 1e6)}},
           {K::gilbert,
            "gilbert",
            kSome,
            {required<&F::p_good_bad>("p_good_bad"), required<&F::p_bad_good>("p_bad_good"), key<&F::loss>("loss")}},
-          {K::duplicate, "duplicate", kSome, {key<&F::p>("p"), key<&F::delay>("delay_s")}},
+          {K::duplicate, "duplicate", kSome, {p, delay}},
           {K::reorder,
            "reorder",
            kSome,
-           {key<&F::p>("p"), key<&F::depth>("depth", 1, 1000), key<&F::delay>("delay_s")},
-           delayed_by(kOvertaken)},
-          {K::delay, "delay", kSome, {required<&F::delay>("delay_s"), key<&F::jitter>("jitter_s")}},
-          {K::jitter, "jitter", kSome, {required<&F::jitter>("mean_s"), key<&F::p>("p"), key<&F::spike>("spike_s")}},
+           {p, key<&F::depth>("depth", 1, 1000), key<&F::delay>("delay_s", 0, 3600, "0.01")}},
+          {K::delay, "delay", kSome, {any_delay, jitter}},
+          {K::jitter, "jitter", kSome, {required<&F::jitter>("mean_s"), p, key<&F::spike>("spike_s")}},
           {K::hold, "hold", kWindow, {}},
           {K::wrong_size,
            "wrong_size",
            kSome,
-           {key<&F::p>("p"), {"size", as_wrong_size, 0, 1476, true}, key<&F::replaces>("replaces")}},
-          {K::short_block, "short_block", kSome, {key<&F::p>("p"), key<&F::records>("records", 1, 39)}},
-          {K::foreign_source, "foreign_source", kSome, {key<&F::p>("p")}},
+           {p, {"size", as_wrong_size, 0, 1476, true}, key<&F::replaces>("replaces")}},
+          {K::short_block, "short_block", kSome, {p, key<&F::records>("records", 1, 39)}},
+          {K::foreign_source, "foreign_source", kSome, {p}},
           {K::lost_start, "lost_start", kSome, {}},
-          {K::doubled_start, "doubled_start", kSome, {key<&F::delay>("delay_s")}},
-          {K::delayed_start, "delayed_start", kSome, {required<&F::delay>("delay_s")}},
+          {K::doubled_start, "doubled_start", kSome, {delay}},
+          {K::delayed_start, "delayed_start", kSome, {any_delay}},
           {K::taken_over, "taken_over", kOnce, {key<&F::buffered>("buffered")}},
           {K::restart, "restart", kOnce, {}},
           {K::reboot, "reboot", kOnce, {key<&F::down>("down_s"), key<&F::resume>("resume")}},
           {K::stall, "stall", kWindow, {}},
-          {K::ft_jump_back, "ft_jump_back", kOnce, {required<&F::samples>("samples", 1, kMany)}},
-          {K::overrun, "overrun", kOnce, {required<&F::samples>("samples", 1, 1e6)}},
-          {K::wrap, "wrap", kOnce, {required<&F::samples>("samples", 1, kMany)}},
+          {K::ft_jump_back, "ft_jump_back", kOnce, {samples(kMany)}},
+          {K::overrun, "overrun", kOnce, {samples(1e6)}},
+          {K::wrap, "wrap", kOnce, {samples(kMany)}},
           {K::clock_skew,
            "clock_skew",
            kOpen,
@@ -141,46 +141,45 @@ const FaultTable<Fault>& load_cell_faults() {
            kOnce,
            {key<&F::axis>("axis", 0, 5), required<&F::amount>("amount", -1000, 1000),
             key<&F::tau>("tau_s", 1e-3, 1e6)}},
-          {K::address, "address", kOpen, {{"address", as_address, 0, 0, true}}},
-          {K::http_slow, "http_slow", kSome, {required<&F::delay>("delay_s")}},
-          {K::http_truncated, "http_truncated", kSome, {required<&F::size>("size", 0, 1e6)}},
+          {K::address, "address", kOpen, {address}},
+          {K::http_slow, "http_slow", kSome, {any_delay}},
+          {K::http_truncated, "http_truncated", kSome, {size(0, 1e6)}},
           {K::http_status, "http_status", kSome, {required<&F::code>("code", 400, 599)}},
-          {K::http_oversized, "http_oversized", kSome, {required<&F::size>("size", 1, 1e8)}},
+          {K::http_oversized, "http_oversized", kSome, {size(1, 1e8)}},
           {K::http_charset, "http_charset", kSome, {key<&F::utf16>("utf16")}},
-          {K::http_missing_tag, "http_missing_tag", kSome, {{"tag", as_tag, 0, 0, true}}},
-          {K::http_duplicate_tag, "http_duplicate_tag", kSome, {{"tag", as_tag, 0, 0, true}}},
+          {K::http_missing_tag, "http_missing_tag", kSome, {tag}},
+          {K::http_duplicate_tag, "http_duplicate_tag", kSome, {tag}},
           {K::http_refused, "http_refused", kWindow, {}},
-          {K::tcp_split,
-           "tcp_split",
-           kSome,
-           {required<&F::size>("size", 1, 23), key<&F::delay>("delay_s")},
-           delayed_by(kBetweenSegments)},
-          {K::tcp_merged, "tcp_merged", kSome, {required<&F::delay>("delay_s")}},
-          {K::tcp_short, "tcp_short", kSome, {required<&F::size>("size", 0, 23)}},
-      });
+          {K::tcp_split, "tcp_split", kSome, {size(1, 23), key<&F::delay>("delay_s", 0, 3600, "0.002")}},
+          {K::tcp_merged, "tcp_merged", kSome, {any_delay}},
+          {K::tcp_short, "tcp_short", kSome, {size(0, 23)}},
+      }};
   return all;
 }
 
 const FaultTable<MotorFault>& motor_faults() {
   using F = MotorFault;
   using K = MotorFaultKind;
-  static const FaultTable<MotorFault> all(
+  constexpr auto delay = required<&F::delay>("delay_s");
+  constexpr auto volts = required<&F::volts>("volts", 0, 100);
+  constexpr FaultParameter<F> value{"value", as_value, 0, 0, true};
+  const auto size = [](double low, double high) { return required<&F::size>("size", low, high); };
+  static const FaultTable<F> all{
       "the motor",
       {
           {K::flip, "motor_flip", kSome, of_replies({key<&F::bits>("bits", 1, 64)})},
           {K::bad_crc, "motor_bad_crc", kSome, of_replies()},
           {K::drop, "motor_drop", kSome, of_replies()},
           {K::duplicate, "motor_duplicate", kSome, of_replies()},
-          {K::reorder, "motor_reorder", kSome, of_replies({key<&F::delay>("delay_s")}), usually(kOvertaken, 0)},
-          {K::truncate, "motor_truncate", kSome, of_replies({required<&F::size>("size", 0, 22)})},
-          {K::garbage, "motor_garbage", kSome, of_replies({{"bytes", as_bytes}, key<&F::size>("size", 1, 200)}),
-           usually(Duration{0}, 8)},
-          {K::merge, "motor_merge", kSome, of_replies({kAnyDelay})},
-          {K::split, "motor_split", kSome, of_replies({kAnyDelay})},
-          {K::stall, "motor_stall", kSome, of_replies({required<&F::size>("size", 1, 22), kAnyDelay})},
-          {K::delay, "motor_delay", kSome, of_replies({kAnyDelay, key<&F::jitter>("jitter_s")})},
-          {K::value, "motor_value", kSome, of_replies({{"value", as_value, 0, 0, true}})},
-          {K::wrong_length, "motor_wrong_length", kSome, of_replies({required<&F::size>("size", 0, 16)})},
+          {K::reorder, "motor_reorder", kSome, of_replies({key<&F::delay>("delay_s", 0, 3600, "0.01")})},
+          {K::truncate, "motor_truncate", kSome, of_replies({size(0, 22)})},
+          {K::garbage, "motor_garbage", kSome, of_replies({{"bytes", as_bytes}, key<&F::size>("size", 1, 200, "8")})},
+          {K::merge, "motor_merge", kSome, of_replies({delay})},
+          {K::split, "motor_split", kSome, of_replies({delay})},
+          {K::stall, "motor_stall", kSome, of_replies({size(1, 22), delay})},
+          {K::delay, "motor_delay", kSome, of_replies({delay, key<&F::jitter>("jitter_s")})},
+          {K::value, "motor_value", kSome, of_replies({value})},
+          {K::wrong_length, "motor_wrong_length", kSome, of_replies({size(0, 16)})},
           {K::wrong_id, "motor_wrong_id", kSome, of_replies({required<&F::id>("id", 0, 63)})},
           {K::stuck, "motor_stuck", kSome, of_replies()},
           {K::mute, "motor_mute", kWindow, {}},
@@ -195,58 +194,57 @@ const FaultTable<MotorFault>& motor_faults() {
            "motor_hot",
            kWindow,
            {key<&F::coil>("coil_celsius", -300, 300), key<&F::controller>("controller_celsius", -300, 300)}},
-          {K::over_voltage, "motor_over_voltage", kWindow, {kVolts}},
-          {K::sag, "motor_sag", kWindow, {kVolts}},
+          {K::over_voltage, "motor_over_voltage", kWindow, {volts}},
+          {K::sag, "motor_sag", kWindow, {volts}},
           {K::locked, "motor_locked", kWindow, {}},
-      });
+      }};
   return all;
 }
 
 const FaultTable<SupplyFault>& supply_faults() {
   using F = SupplyFault;
   using K = SupplyFaultKind;
-  static constexpr auto kP = key<&F::p>("p");
-  static constexpr auto kSize = key<&F::size>("size", 0, 260);
-  static constexpr auto kRegister = required<&F::address>("register", 0, 65535);
-  static constexpr auto kValue = required<&F::value>("value", 0, 65535);
-  static const FaultTable<SupplyFault> all(
-      "the supply", {
-                        {K::bad_crc, "supply_bad_crc", kSome, {kP}},
-                        {K::no_reply, "supply_no_reply", kSome, {kP}},
-                        {K::deaf, "supply_deaf", kSome, {kP}},
-                        {K::truncated, "supply_truncated", kSome, {kP, kSize}},
-                        {K::dribble, "supply_dribble", kSome, {kP, required<&F::delay>("gap_s", 0, 10)}},
-                        {K::garbage, "supply_garbage", kSome, {kP, kSize}},
-                        {K::wrong_slave, "supply_wrong_slave", kSome, {kP, key<&F::slave>("slave", 0, 255)}},
-                        {K::wrong_transaction, "supply_wrong_transaction", kSome, {kP}},
-                        {K::echo, "supply_echo", kSome, {kP}},
-                        {K::late, "supply_late", kSome, {kP, required<&F::delay>("delay_s")}},
-                        {K::exception, "supply_exception", kSome, {kP, key<&F::code>("code", 1, 11)}},
-                        {K::ignored_writes, "supply_ignored_writes", kSome, {kP}},
-                        {K::reads_as, "supply_reads_as", kWindow, {kRegister, kValue}},
-                        {K::closed, "supply_closed", kWindow, {}},
-                        {K::trip, "supply_trip", kOnce, {required<&F::code>("code", 1, 5)}},
-                        {K::panel, "supply_panel", kOnce, {kRegister, kValue}},
-                        {K::sag, "supply_sag", kWindow, {required<&F::volts>("volts", 0, 100)}},
-                    });
+  constexpr auto p = key<&F::p>("p"), size = key<&F::size>("size", 0, 260);
+  constexpr auto address = required<&F::address>("register", 0, 65535), value = required<&F::value>("value", 0, 65535);
+  static const FaultTable<F> all{
+      "the supply",
+      {
+          {K::bad_crc, "supply_bad_crc", kSome, {p}},
+          {K::no_reply, "supply_no_reply", kSome, {p}},
+          {K::deaf, "supply_deaf", kSome, {p}},
+          {K::truncated, "supply_truncated", kSome, {p, size}},
+          {K::dribble, "supply_dribble", kSome, {p, required<&F::delay>("gap_s", 0, 10)}},
+          {K::garbage, "supply_garbage", kSome, {p, size}},
+          {K::wrong_slave, "supply_wrong_slave", kSome, {p, key<&F::slave>("slave", 0, 255)}},
+          {K::wrong_transaction, "supply_wrong_transaction", kSome, {p}},
+          {K::echo, "supply_echo", kSome, {p}},
+          {K::late, "supply_late", kSome, {p, required<&F::delay>("delay_s")}},
+          {K::exception, "supply_exception", kSome, {p, key<&F::code>("code", 1, 11)}},
+          {K::ignored_writes, "supply_ignored_writes", kSome, {p}},
+          {K::reads_as, "supply_reads_as", kWindow, {address, value}},
+          {K::closed, "supply_closed", kWindow, {}},
+          {K::trip, "supply_trip", kOnce, {required<&F::code>("code", 1, 5)}},
+          {K::panel, "supply_panel", kOnce, {address, value}},
+          {K::sag, "supply_sag", kWindow, {required<&F::volts>("volts", 0, 100)}},
+      }};
   return all;
 }
 
 const FaultTable<UsbFault>& ambient_faults() {
   using F = UsbFault;
   using K = UsbFaultKind;
-  static const FaultTable<UsbFault> all(
-      "the air sensor", {{K::unplug, "ambient_unplug", kWindow, {}},
-                         {K::no_reply, "ambient_no_reply", kSome, {}},
-                         {K::late, "ambient_late", kSome, {required<&F::delay>("delay_s")}},
-                         {K::stall, "ambient_stall", kSome, {}},
-                         {K::nack, "ambient_nack", kSome, {}},
-                         {K::busy, "ambient_busy", kSome, {}},
-                         {K::stuck_bus, "ambient_stuck_bus", kSome, {}},
-                         {K::reads_as,
-                          "ambient_reads_as",
-                          kSome,
-                          {required<&F::address>("register", 0, 255), required<&F::value>("value", 0, 255)}}});
+  constexpr auto address = required<&F::address>("register", 0, 255), value = required<&F::value>("value", 0, 255);
+  static const FaultTable<F> all{"the air sensor",
+                                 {
+                                     {K::unplug, "ambient_unplug", kWindow, {}},
+                                     {K::no_reply, "ambient_no_reply", kSome, {}},
+                                     {K::late, "ambient_late", kSome, {required<&F::delay>("delay_s")}},
+                                     {K::stall, "ambient_stall", kSome, {}},
+                                     {K::nack, "ambient_nack", kSome, {}},
+                                     {K::busy, "ambient_busy", kSome, {}},
+                                     {K::stuck_bus, "ambient_stuck_bus", kSome, {}},
+                                     {K::reads_as, "ambient_reads_as", kSome, {address, value}},
+                                 }};
   return all;
 }
 

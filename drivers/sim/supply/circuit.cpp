@@ -36,8 +36,6 @@ double SupplyCircuit::step(const SupplyLoad& load, double seconds) noexcept {
     }
   }
   volts_ = std::max(0.0, next);
-  coulombs_ += amps_ * seconds;
-  joules_ += amps_ * volts_ * seconds;
   const double blend = 1 - std::exp(-seconds / parameters_.meter_s);
   shown_volts_ += blend * (volts_ - shown_volts_);
   shown_amps_ += blend * (amps_ - shown_amps_);

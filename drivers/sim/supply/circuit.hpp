@@ -51,8 +51,6 @@ class SupplyCircuit {
   [[nodiscard]] double amps() const noexcept { return amps_; }    ///< out of the supply, now; never negative
   [[nodiscard]] double shown_volts() const noexcept { return shown_volts_; }  ///< by its meter
   [[nodiscard]] double shown_amps() const noexcept { return shown_amps_; }    ///< by its meter
-  [[nodiscard]] double coulombs() const noexcept { return coulombs_; }        ///< delivered
-  [[nodiscard]] double joules() const noexcept { return joules_; }            ///< delivered
 
  private:
   void protect(double seconds) noexcept;
@@ -63,7 +61,7 @@ class SupplyCircuit {
   SupplyTrip tripped_ = SupplyTrip::none;
   double volts_ = 0, amps_ = 0, shown_volts_ = 0, shown_amps_ = 0;
   double sag_volts_ = 0;
-  double over_current_s_ = 0, coulombs_ = 0, joules_ = 0;
+  double over_current_s_ = 0;
 };
 
 }  // namespace kphi::sim

@@ -14,7 +14,6 @@ namespace kphi::sim {
 namespace {
 
 constexpr int kLine = 0;
-constexpr int kQuietSteps = 2000;  // without a client's word, its exclusive opening may have outlived it
 
 }  // namespace
 
@@ -85,11 +84,9 @@ void SupplyPort::open_or_close(SupplySlave& slave, Instant now) {
 
 void SupplyPort::hear_line(SupplySlave& slave, Instant now) {
   std::array<std::uint8_t, 512> buffer{};
-  if (++quiet_steps_ == kQuietSteps && pty_) pty_->unlock();
   while (pty_ && pty_->plugged()) {
     const std::size_t count = pty_->read(buffer);
     if (count == 0) break;
-    quiet_steps_ = 0;
     slave.receive(kLine, ModbusFraming::rtu, std::span(buffer).first(count), now);
   }
 }

@@ -51,7 +51,6 @@ class SupplyPort {
   std::string device_;
   std::map<int, Descriptor> clients_;  ///< by number; 0 is the serial line's
   int last_client_ = 0;
-  int quiet_steps_ = 0;  ///< of the serial line
 };
 
 /// The supply.uri of a bench file: "modbus-rtu:/tmp/supply?model=RD6018" or "modbus-tcp:127.0.0.1:1502?slave=1".

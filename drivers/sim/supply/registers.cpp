@@ -10,14 +10,9 @@ namespace {
 
 constexpr double kInputVolts = 24.05;
 constexpr std::uint16_t kFirmware = 128;
-constexpr int kCelsius = 31;
 
 std::uint16_t counted(double value, double counts_per_unit) {
   return static_cast<std::uint16_t>(std::clamp(std::round(value * counts_per_unit), 0.0, 65535.0));
-}
-
-std::uint32_t counted32(double value, double counts_per_unit) {
-  return static_cast<std::uint32_t>(std::clamp(std::round(value * counts_per_unit), 0.0, 4294967295.0));
 }
 
 std::uint16_t half(std::uint32_t value, bool low) {
@@ -41,32 +36,24 @@ constexpr Row kRiden[] = {
     {1, 1, serial_high},
     {2, 2, serial_low},
     {3, 3, firmware},
-    {5, 5, celsius},
-    {7, 7, fahrenheit},
     {8, 8, set_volts, Access::write},
     {9, 9, set_amps, Access::write},
     {10, 10, volts},
     {11, 11, amps},
-    {12, 12, register_12},
-    {13, 13, power_low},
     {14, 14, input_volts},
     {16, 16, trip},
     {17, 17, limiting},
     {18, 18, output, Access::write},
     {19, 19, preset, Access::write},
-    {38, 38, charge_high},
-    {39, 39, charge_low},
-    {40, 40, energy_high},
-    {41, 41, energy_low},
     {82, 82, over_volts, Access::write},
     {83, 83, over_amps, Access::write},
     {20, 20, kept, Access::write},
     {48, 53, kept, Access::write},
     {55, 62, kept, Access::harmful},  // calibration
     {66, 72, kept, Access::write},
-    {80, 119, kept, Access::write},  // presets
-    {256, 256, kept, Access::harmful},
-    {0, 119, kept},  // boot loader
+    {80, 119, kept, Access::write},     // presets
+    {256, 256, kept, Access::harmful},  // boot loader
+    {0, 119, kept},
 };
 constexpr Row kDps[] = {{0x00, 0x00, set_volts, Access::write},
                         {0x50, 0x50, set_volts, Access::write},
@@ -74,7 +61,7 @@ constexpr Row kDps[] = {{0x00, 0x00, set_volts, Access::write},
                         {0x51, 0x51, set_amps, Access::write},
                         {0x02, 0x02, volts},
                         {0x03, 0x03, amps},
-                        {0x04, 0x04, centiwatts},
+                        {0x04, 0x04, kept},
                         {0x05, 0x05, input_volts},
                         {0x06, 0x06, kept, Access::write},
                         {0x07, 0x07, trip},
@@ -94,8 +81,7 @@ constexpr Row kHanmatek[] = {{0x01, 0x01, output, Access::write},
                              {0x05, 0x05, decimals},
                              {0x10, 0x10, volts},
                              {0x11, 0x11, amps},
-                             {0x12, 0x12, power_high},
-                             {0x13, 0x13, power_low},
+                             {0x12, 0x13, kept},
                              {0x20, 0x20, over_volts, Access::write},
                              {0x21, 0x21, over_amps, Access::write},
                              {0x22, 0x23, kept, Access::write},
@@ -128,9 +114,9 @@ const std::vector<SupplyModel>& supply_models() {
   return kModels;
 }
 
-SupplyRegisters::SupplyRegisters(const std::string& model, std::uint32_t serial, const SupplyDisputes& disputes,
+SupplyRegisters::SupplyRegisters(const std::string& model, std::uint32_t serial, bool over_current_in_milliamps,
                                  SupplyCircuit& circuit)
-    : model_(nullptr), serial_(serial), disputes_(disputes), circuit_(circuit) {
+    : model_(nullptr), serial_(serial), over_current_in_milliamps_(over_current_in_milliamps), circuit_(circuit) {
   for (const SupplyModel& known : supply_models()) {
     if (known.name == model) model_ = &known;
   }
@@ -159,68 +145,25 @@ bool SupplyRegisters::write(std::uint16_t at, std::uint16_t value) {
 }
 
 std::uint16_t SupplyRegisters::value_of(SupplyQuantity shows, std::uint16_t at) const {
-  using Twelve = SupplyDisputes::Twelve;
   const SupplyControls& controls = circuit_.controls();
-  const double watts = circuit_.shown_volts() * circuit_.shown_amps();
-  const bool hundredths = model_->family == SupplyModel::Family::riden && !disputes_.power_in_milliwatts;
-  const std::uint32_t power = counted32(watts, hundredths ? 100 : 1000);
-  const std::uint32_t charge = counted32(circuit_.coulombs() / 3.6, 1), energy = counted32(circuit_.joules() / 3.6, 1);
-  switch (shows) {
-    case kept:
-      return remembered(at);
-    case model_id:
-      return model_->id;
-    case serial_high:
-    case serial_low:
-      return half(serial_, shows == serial_low);
-    case firmware:
-      return kFirmware;
-    case celsius:
-      return kCelsius;
-    case fahrenheit:
-      return kCelsius * 9 / 5 + 32;
-    case set_volts:
-      return counted(controls.volts, per_v());
-    case set_amps:
-      return counted(controls.amps, per_a());
-    case volts:
-      return counted(circuit_.shown_volts(), per_v());
-    case amps:
-      return counted(circuit_.shown_amps(), per_a());
-    case centiwatts:
-      return counted(watts, 100);
-    case power_high:
-    case power_low:
-      return half(power, shows == power_low);
-    case register_12:
-      if (disputes_.register_12 == Twelve::milliampere_hours) return half(charge, true);
-      return disputes_.register_12 == Twelve::power_high_word ? half(power, false) : std::uint16_t{0};
-    case charge_high:
-    case charge_low:
-      return half(charge, shows == charge_low);
-    case energy_high:
-    case energy_low:
-      return half(energy, shows == energy_low);
-    case input_volts:
-      return counted(kInputVolts, 100);
-    case trip:
-      return trip_code();
-    case limiting:
-      return circuit_.limiting();
-    case output:
-      return circuit_.output();
-    case preset:
-      return disputes_.preset_reads_zero ? std::uint16_t{0} : remembered(at);
-    case over_volts:
-      return memory_.contains(at) ? remembered(at) : counted(controls.over_volts, per_v());
-    case over_amps:
-      return memory_.contains(at) ? remembered(at) : counted(controls.over_amps, per_over_a());
-    case device_class:
-      return 0x4B50;
-    case decimals:
-      return 0x0233;
-  }
-  return 0;
+  if (shows == kept) return remembered(at);
+  if (shows == model_id) return model_->id;
+  if (shows == serial_high || shows == serial_low) return half(serial_, shows == serial_low);
+  if (shows == firmware) return kFirmware;
+  if (shows == set_volts) return counted(controls.volts, per_v());
+  if (shows == set_amps) return counted(controls.amps, per_a());
+  if (shows == volts) return counted(circuit_.shown_volts(), per_v());
+  if (shows == amps) return counted(circuit_.shown_amps(), per_a());
+  if (shows == input_volts) return counted(kInputVolts, 100);
+  if (shows == trip) return trip_code();
+  if (shows == limiting) return circuit_.limiting();
+  if (shows == output) return circuit_.output();
+  const bool written = memory_.contains(at);
+  if (shows == over_volts) return written ? remembered(at) : counted(controls.over_volts, per_v());
+  if (shows == over_amps) return written ? remembered(at) : counted(controls.over_amps, per_over_a());
+  if (shows == device_class) return 0x4B50;
+  if (shows == decimals) return 0x0233;
+  return 0;  // the preset
 }
 
 std::uint16_t SupplyRegisters::remembered(std::uint16_t at) const {
@@ -234,7 +177,7 @@ double SupplyRegisters::per_a() const noexcept {
 
 double SupplyRegisters::per_over_a() const noexcept {
   if (model_->family != SupplyModel::Family::hanmatek) return per_a();
-  return disputes_.over_current_in_milliamps ? 1000 : 100;
+  return over_current_in_milliamps_ ? 1000 : 100;
 }
 
 std::uint16_t SupplyRegisters::trip_code() const noexcept {

@@ -1,5 +1,5 @@
-// The registers of simulated supplies: Riden RD60xx, RuiDeng DPS/DPH, Hanmatek HM3xx. Where sources disagree,
-// SupplyDisputes chooses.
+// The registers of simulated supplies: Riden RD60xx, RuiDeng DPS/DPH, Hanmatek HM3xx. Those that no driver evaluates,
+// such as power, charge and energy, read 0.
 #pragma once
 
 #include <cstdint>
@@ -12,15 +12,6 @@
 #include "drivers/sim/supply/circuit.hpp"
 
 namespace kphi::sim {
-
-/// Registers on which sources disagree.
-struct SupplyDisputes {
-  enum class Twelve : std::uint8_t { zero, milliampere_hours, power_high_word };
-  Twelve register_12 = Twelve::zero;       ///< Riden
-  bool power_in_milliwatts = false;        ///< Riden 13 on P models: /1000, else /100
-  bool preset_reads_zero = true;           ///< Riden 19, else the preset that was recalled
-  bool over_current_in_milliamps = false;  ///< Hanmatek 0x21: three decimals, else two
-};
 
 struct SupplyModel {
   enum class Family : std::uint8_t { riden, dps, hanmatek };
@@ -41,25 +32,15 @@ enum class SupplyQuantity : std::uint8_t {
   serial_high,
   serial_low,
   firmware,
-  celsius,
-  fahrenheit,
   set_volts,
   set_amps,
   volts,
   amps,
-  centiwatts,
-  power_high,
-  power_low,
-  register_12,  ///< Riden: see SupplyDisputes
-  charge_high,
-  charge_low,
-  energy_high,
-  energy_low,
   input_volts,
   trip,
   limiting,
   output,
-  preset,
+  preset,  ///< reads 0, whatever was recalled
   over_volts,
   over_amps,
   device_class,
@@ -68,8 +49,9 @@ enum class SupplyQuantity : std::uint8_t {
 
 class SupplyRegisters {
  public:
-  /// Throws std::invalid_argument for a model that is not in the table.
-  SupplyRegisters(const std::string& model, std::uint32_t serial, const SupplyDisputes& disputes,
+  /// Throws std::invalid_argument for a model that is not in the table. `over_current_in_milliamps`: on a Hanmatek,
+  /// where sources disagree.
+  SupplyRegisters(const std::string& model, std::uint32_t serial, bool over_current_in_milliamps,
                   SupplyCircuit& circuit);
 
   /// nullopt: no such register.
@@ -91,7 +73,7 @@ class SupplyRegisters {
 
   const SupplyModel* model_;
   std::uint32_t serial_;
-  SupplyDisputes disputes_;
+  bool over_current_in_milliamps_;
   SupplyCircuit& circuit_;
   std::map<std::uint16_t, std::uint16_t> memory_;  ///< what is only kept
   std::uint64_t harmful_writes_ = 0;

@@ -2,17 +2,14 @@
 
 #include <algorithm>
 
+#include "drivers/sim/transport/bytes.hpp"
+
 namespace kphi::sim {
 namespace {
 
 constexpr Duration kSilence = std::chrono::milliseconds(50);
 constexpr std::size_t kHeader = 7;  // of TCP: transaction, protocol, length, unit
 constexpr std::size_t kLongestPdu = 253;
-
-void append16(std::vector<std::uint8_t>& out, unsigned value) {
-  out.push_back(static_cast<std::uint8_t>(value >> 8));
-  out.push_back(static_cast<std::uint8_t>(value));
-}
 
 unsigned word(const std::vector<std::uint8_t>& bytes, std::size_t at) { return bytes[at] * 256u + bytes[at + 1]; }
 
@@ -40,15 +37,15 @@ std::vector<std::uint8_t> modbus_frame(ModbusFraming framing, int unit, std::uin
                                        std::span<const std::uint8_t> pdu) {
   std::vector<std::uint8_t> out;
   if (framing == ModbusFraming::tcp) {
-    append16(out, transaction);
-    append16(out, 0);
-    append16(out, static_cast<unsigned>(pdu.size() + 1));
+    append_big(out, transaction, 2);
+    append_big(out, 0, 2);
+    append_big(out, static_cast<unsigned>(pdu.size() + 1), 2);
   }
   out.push_back(static_cast<std::uint8_t>(unit));
   out.insert(out.end(), pdu.begin(), pdu.end());
   if (framing == ModbusFraming::rtu) {
     const unsigned crc = modbus_crc(out);
-    append16(out, (crc & 0xFFu) << 8 | crc >> 8);
+    append_big(out, (crc & 0xFFu) << 8 | crc >> 8, 2);
   }
   return out;
 }
@@ -111,7 +108,7 @@ constexpr double kLongestStep = 1.0;  // s
 SupplySlave::SupplySlave(const SupplySettings& settings)
     : settings_(settings),
       circuit_(settings.circuit),
-      registers_(settings.model, settings.serial, settings.disputes, circuit_),
+      registers_(settings.model, settings.serial, settings.over_current_in_milliamps, circuit_),
       script_(settings.faults, settings.seed) {}
 
 double SupplySlave::advance(const SupplyLoad& load, Instant now) {
@@ -253,7 +250,7 @@ SupplySlave::Pdu SupplySlave::read(const Pdu& pdu, Instant now) {
   for (unsigned at = first; at < first + count; ++at) {
     const auto value = at <= 0xFFFF ? registers_.read(static_cast<std::uint16_t>(at)) : std::nullopt;
     if (!value) return refuse(pdu[0], kIllegalAddress);
-    append16(out, value_at(static_cast<std::uint16_t>(at), *value, now));
+    append_big(out, value_at(static_cast<std::uint16_t>(at), *value, now), 2);
   }
   return out;
 }

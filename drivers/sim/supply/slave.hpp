@@ -64,7 +64,7 @@ struct SupplySettings {
   double replies_per_s = 10;  ///< stock Riden firmware; about 65 with another; 0: as fast as asked
   Duration turnaround = std::chrono::milliseconds(1);
   SupplyParameters circuit;
-  SupplyDisputes disputes;
+  bool over_current_in_milliamps = false;  ///< Hanmatek 0x21: three decimals, else two; sources disagree
   SupplyFaultScript faults;
   std::uint64_t seed = 1;  ///< of the faults' probabilities
 };

@@ -15,6 +15,12 @@ inline void put_big(std::uint8_t* to, std::uint32_t value) noexcept {
   to[3] = static_cast<std::uint8_t>(value);
 }
 
+/// The lowest `size` bytes of it, at the end of a string or a vector of bytes.
+template <class Bytes>
+void append_big(Bytes& out, std::uint32_t value, int size) {
+  while (size-- > 0) out.push_back(static_cast<typename Bytes::value_type>(value >> (8 * size)));
+}
+
 [[nodiscard]] inline std::uint32_t big(std::span<const std::uint8_t> bytes) noexcept {
   std::uint32_t value = 0;
   for (const std::uint8_t byte : bytes) value = value << 8 | byte;

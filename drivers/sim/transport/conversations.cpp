@@ -67,12 +67,12 @@ std::optional<sockaddr_un> unix_address(const std::string& path) {
 }
 
 Conversations::Conversations(Descriptor listener, const Manners& manners,
-                             std::function<Answer(std::string_view)> answer)
+                             std::function<StreamReply(std::string_view)> answer)
     : Conversations(std::move(listener), manners.at_once, [manners, answer = std::move(answer)](std::string& heard) {
-        Answer all;
+        StreamReply all;
         for (auto end = heard.find(manners.terminator); end != std::string::npos && !all.close;
              end = heard.find(manners.terminator)) {
-          Answer one = answer(std::string_view(heard).substr(0, end));
+          StreamReply one = answer(std::string_view(heard).substr(0, end));
           heard.erase(0, end + manners.terminator.size());
           all.bytes += one.bytes;
           all.wait = one.wait;
@@ -132,7 +132,7 @@ void Conversations::hear(Connection& connection) {
     }
     connection.heard_at = std::chrono::steady_clock::now();
     connection.heard.append(bytes.data(), static_cast<std::size_t>(count));
-    Answer answer = answerer_(connection.heard);
+    const StreamReply answer = answerer_(connection.heard);
     connection.to_say += answer.bytes;
     if (!answer.bytes.empty()) {
       connection.segment = answer.segment;

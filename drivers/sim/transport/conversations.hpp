@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/clock.hpp"
 #include "base/descriptor.hpp"
 
 namespace kphi::sim {
@@ -31,24 +32,27 @@ struct Listening {
 /// nullopt: the path is empty or longer than a socket path may be.
 [[nodiscard]] std::optional<sockaddr_un> unix_address(const std::string& path);
 
+/// What to send over a stream socket.
+struct StreamReply {
+  std::string bytes;
+  Duration wait{0};         ///< before the first byte
+  std::size_t segment = 0;  ///< at most this many bytes at once; 0: all
+  Duration pause{0};        ///< between two segments
+  bool close = false;       ///< after the last byte
+};
+
+/// Its times are wall time.
 class Conversations {
  public:
-  struct Answer {
-    std::string bytes;
-    std::chrono::nanoseconds wait{0};   ///< wall time before the first byte
-    bool close = false;                 ///< after the last one
-    std::size_t segment = 0;            ///< at most this many bytes at once; 0: all
-    std::chrono::nanoseconds pause{0};  ///< wall time between two segments
-  };
   /// Takes whole questions off the front of `heard` and returns what to send.
-  using Answerer = std::function<Answer(std::string& heard)>;
+  using Answerer = std::function<StreamReply(std::string& heard)>;
   struct Manners {
     std::string terminator;   ///< ends a question
     bool one_answer = false;  ///< close after the first
     std::size_t at_once = 1;  ///< connections served at the same time; others wait in the queue
   };
   /// `listener`: non-blocking and listening. `answer`: question without its terminator -> what to send.
-  Conversations(Descriptor listener, const Manners& manners, std::function<Answer(std::string_view)> answer);
+  Conversations(Descriptor listener, const Manners& manners, std::function<StreamReply(std::string_view)> answer);
   /// For questions without a terminator.
   Conversations(Descriptor listener, std::size_t at_once, Answerer answerer);
 
@@ -66,7 +70,7 @@ class Conversations {
     std::string to_say;
     bool closing = false;
     std::size_t segment = 0;
-    std::chrono::nanoseconds pause{0};
+    Duration pause{0};
     std::chrono::steady_clock::time_point speak_at{};
     std::chrono::steady_clock::time_point heard_at = std::chrono::steady_clock::now();
   };

@@ -18,6 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int kQuietReads = 1000;  // a second of them, one per millisecond
+
 [[noreturn]] void refuse(const std::string& path, const std::string& operation, const std::string& cause,
                          const std::string& next_move = {}) {
   throw DeviceError("simulated motor " + path, operation, cause, next_move);
@@ -99,6 +101,9 @@ unsigned Pty::baud() const noexcept {
 
 std::size_t Pty::read(std::span<std::uint8_t> into) noexcept {
   const ssize_t count = ::read(master_.number(), into.data(), into.size());
+  quiet_reads_ = count > 0 ? 0 : quiet_reads_ + 1;
+  // The client has left; an exclusive opening (TIOCEXCL) outlives one that vanished.
+  if (quiet_reads_ == kQuietReads) ::ioctl(slave_.number(), TIOCNXCL);
   return count > 0 ? static_cast<std::size_t>(count) : 0;
 }
 
@@ -111,7 +116,5 @@ std::size_t Pty::write(std::span<const std::uint8_t> bytes) noexcept {
   }
   return written;
 }
-
-void Pty::unlock() noexcept { ::ioctl(slave_.number(), TIOCNXCL); }
 
 }  // namespace kphi::sim

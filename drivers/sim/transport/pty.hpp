@@ -24,7 +24,8 @@ class Pty {
 
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
   [[nodiscard]] int number() const noexcept { return master_.number(); }
-  /// Never blocks; 0 when nothing waits.
+  /// Never blocks; 0 when nothing waits. Call it every millisecond: after a second without a byte it takes back an
+  /// exclusive opening that a vanished client left behind.
   [[nodiscard]] std::size_t read(std::span<std::uint8_t> into) noexcept;
   /// Never blocks; bytes taken, fewer than given when the client does not read.
   [[nodiscard]] std::size_t write(std::span<const std::uint8_t> bytes) noexcept;
@@ -36,8 +37,6 @@ class Pty {
   /// Another pseudo-terminal under the same link. Throws DeviceError.
   void plug();
   [[nodiscard]] bool plugged() const noexcept { return master_.number() >= 0; }
-  /// Takes back an exclusive opening (TIOCEXCL) that a vanished client left behind.
-  void unlock() noexcept;
 
  private:
   std::string device_;
@@ -46,6 +45,7 @@ class Pty {
   std::string slave_path_;
   Descriptor master_;
   Descriptor slave_;
+  int quiet_reads_ = 0;
   std::vector<Descriptor> gone_;  ///< slaves of pulled adapters
 };
 

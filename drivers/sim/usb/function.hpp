@@ -63,12 +63,26 @@ class UsbFaults {
   explicit UsbFaults(const Clock& clock, UsbFaultScript script = {}) : clock_(clock), script_(std::move(script), 1) {}
 
   /// The fault of this kind (and of this register) that is active now, if any; counts it.
-  [[nodiscard]] std::optional<UsbFault> strikes(UsbFaultKind kind, int at_register = -1);
+  [[nodiscard]] std::optional<UsbFault> strikes(UsbFaultKind kind, int at_register = -1) {
+    const std::lock_guard lock(mutex_);
+    const UsbFault* fault = script_.strike(clock_.now(), [&](const UsbFault& f) {
+      return f.kind == kind && (at_register < 0 || f.address == at_register);
+    });
+    return fault == nullptr ? std::nullopt : std::optional(*fault);
+  }
   /// The same without counting it.
-  [[nodiscard]] bool active(UsbFaultKind kind) const;
-  /// Windows during which the device is pulled out, in order.
-  [[nodiscard]] UsbFaultScript unplugged() const;
-  void set(UsbFaultScript script);
+  [[nodiscard]] bool active(UsbFaultKind kind) const {
+    const std::lock_guard lock(mutex_);
+    return script_.any_active(clock_.now(), [kind](const UsbFault& f) { return f.kind == kind; });
+  }
+  [[nodiscard]] UsbFaultScript script() const {
+    const std::lock_guard lock(mutex_);
+    return script_.faults();
+  }
+  void set(UsbFaultScript script) {
+    const std::lock_guard lock(mutex_);
+    script_ = ScriptRun<UsbFault>(std::move(script), 1);
+  }
   [[nodiscard]] Instant now() const noexcept { return clock_.now(); }
   [[nodiscard]] const Clock& clock() const noexcept { return clock_; }
 

@@ -12,13 +12,15 @@ constexpr std::size_t kChunk = 60;
 constexpr Duration kBreath = 900us;
 
 // Command codes (data sheet DS20005565, table 3-1).
-constexpr std::uint8_t kStatus = 0x10, kGetData = 0x40, kGetSettings = 0x61, kWrite = 0x90, kRead = 0x91,
-                       kWriteRestart = 0x92, kReadRestart = 0x93, kWriteNoStop = 0x94;
+constexpr std::uint8_t kStatus = 0x10, kGetData = 0x40, kGetSettings = 0x61, kWrite = 0x90, kReadRestart = 0x93,
+                       kWriteNoStop = 0x94;
 // Of the answers.
 constexpr std::uint8_t kNotNow = 0x01, kNoSuchCommand = 0x02, kNoData = 127;
 // States of the I²C engine.
 constexpr std::uint8_t kIdle = 0x00, kOccupied = 0x01, kNoStart = 0x12, kNobody = 0x25, kOpenWrite = 0x45,
-                       kSomeRead = 0x54, kAllRead = 0x55;
+                       kAllRead = 0x55;
+
+std::size_t length_in(std::span<const std::uint8_t> command) noexcept { return command[1] + 256u * command[2]; }
 
 UsbShape shape_with(std::string serial) {
   return {0x04d8,
@@ -98,27 +100,17 @@ Mcp2221::Report Mcp2221::apply(const Report& command) {
   Report answer{};
   answer[0] = command[0];
   busy_ = faults_.strikes(UsbFaultKind::busy).has_value();
-  switch (command[0]) {
-    case kStatus:
-      status(command, answer);
-      break;
-    case kWrite:
-    case kWriteRestart:
-    case kWriteNoStop:
-      write(command, answer);
-      break;
-    case kRead:
-    case kReadRestart:
-      begin_read(command, answer);
-      break;
-    case kGetData:
-      get_data(answer);
-      break;
-    case kGetSettings:
-      break;
-    default:
-      answer[1] = kNoSuchCommand;
-  }
+  const std::uint8_t code = command[0];
+  if (code == kStatus)
+    status(command, answer);
+  else if (code == kWrite || code == kWriteNoStop)
+    write(command, answer);
+  else if (code == kReadRestart)
+    begin_read(command, answer);
+  else if (code == kGetData)
+    get_data(answer);
+  else if (code != kGetSettings)
+    answer[1] = kNoSuchCommand;
   return answer;
 }
 
@@ -135,66 +127,34 @@ void Mcp2221::status(const Report& command, Report& answer) {
     if (settable) divider_ = command[4];
   }
   answer[8] = engine();
-  answer[9] = static_cast<std::uint8_t>(requested_);
-  answer[10] = static_cast<std::uint8_t>(requested_ >> 8);
-  answer[11] = static_cast<std::uint8_t>(transferred_);
-  answer[12] = static_cast<std::uint8_t>(transferred_ >> 8);
-  answer[14] = divider_;
-  answer[16] = address_byte_;
   answer[20] = nack_ ? 0x40 : 0x00;
-  const bool stuck = faults_.active(UsbFaultKind::stuck_bus);
-  answer[22] = 1;
-  answer[23] = stuck ? 0 : 1;
-  std::copy_n(
-      "A6"
-      "11",
-      4, answer.begin() + 46);
 }
 
+/// Up to 60 bytes: one report.
 void Mcp2221::write(const Report& command, Report& answer) {
-  const std::size_t total = static_cast<std::size_t>(command[1]) | static_cast<std::size_t>(command[2]) << 8;
-  const bool goes_on = !written_.empty() && total == requested_;
-  if (!goes_on && !takes_transfer(answer)) return;
-  if (!goes_on) {
-    written_.clear();
-    requested_ = total;
-    transferred_ = 0;
-    if (!addressed(command[3])) return;
-  }
-  const std::size_t more = std::min(kChunk, total - written_.size());
-  written_.insert(written_.end(), command.begin() + 4, command.begin() + 4 + static_cast<std::ptrdiff_t>(more));
-  occupy(more + (goes_on ? 0 : 1));
-  if (written_.size() == total) finish_write(command[0] != kWriteNoStop);
-}
-
-void Mcp2221::finish_write(bool stop) {
-  sensor_.write(written_, faults_.now());
-  transferred_ = written_.size();
-  written_.clear();
-  state_ = stop ? kIdle : kOpenWrite;
+  if (!takes_transfer(answer) || !addressed(command[3])) return;
+  const std::size_t count = std::min(kChunk, length_in(command));
+  occupy(count + 1);
+  sensor_.write(std::span(command).subspan(4, count), faults_.now());
+  state_ = command[0] == kWriteNoStop ? kOpenWrite : kIdle;
 }
 
 void Mcp2221::begin_read(const Report& command, Report& answer) {
   if (!takes_transfer(answer)) return;
-  requested_ = static_cast<std::size_t>(command[1]) | static_cast<std::size_t>(command[2]) << 8;
-  transferred_ = still_to_read_ = 0;
-  if (requested_ == 0) ++truth_.malformed;
+  to_read_ = std::min(kChunk, length_in(command));
+  if (to_read_ == 0) ++truth_.malformed;
   if (!addressed(command[3])) return;
-  still_to_read_ = requested_;
-  state_ = requested_ > kChunk ? kSomeRead : kAllRead;
-  occupy(1 + requested_);
+  state_ = kAllRead;
+  occupy(1 + to_read_);
 }
 
 void Mcp2221::get_data(Report& answer) {
   answer[2] = engine();
   answer[3] = kNoData;
-  if (answer[2] != kSomeRead && answer[2] != kAllRead) return;
-  const std::size_t count = std::min(kChunk, still_to_read_);
-  for (std::size_t i = 0; i < count; ++i) answer[4 + i] = sensor_byte();
-  answer[3] = static_cast<std::uint8_t>(count);
-  still_to_read_ -= count;
-  transferred_ += count;
-  state_ = still_to_read_ == 0 ? kIdle : still_to_read_ > kChunk ? kSomeRead : kAllRead;
+  if (answer[2] != kAllRead) return;
+  for (std::size_t i = 0; i < to_read_; ++i) answer[4 + i] = sensor_byte();
+  answer[3] = static_cast<std::uint8_t>(to_read_);
+  state_ = kIdle;
 }
 
 /// A transfer may begin when the engine is idle, or holds the bus after a write without a stop.
@@ -208,7 +168,6 @@ bool Mcp2221::takes_transfer(Report& answer) {
 
 /// Seven bits of address; the lowest bit of a read's may be either. An absent acknowledgement shows later only.
 bool Mcp2221::addressed(std::uint8_t address_byte) {
-  address_byte_ = address_byte;
   if (faults_.strikes(UsbFaultKind::stuck_bus)) {
     state_ = kNoStart;
     return false;
@@ -240,8 +199,6 @@ void Mcp2221::cancel() {
   state_ = kIdle;
   free_at_ = faults_.now();
   nack_ = false;
-  written_.clear();
-  still_to_read_ = 0;
 }
 
 }  // namespace kphi::sim

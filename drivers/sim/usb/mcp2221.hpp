@@ -5,7 +5,6 @@
 #include <array>
 #include <deque>
 #include <mutex>
-#include <vector>
 
 #include "drivers/sim/script/faults.hpp"
 #include "drivers/sim/usb/bme280.hpp"
@@ -51,7 +50,6 @@ class Mcp2221 final : public UsbFunction {
   void get_data(Report& answer);
   [[nodiscard]] bool takes_transfer(Report& answer);
   [[nodiscard]] bool addressed(std::uint8_t address_byte);
-  void finish_write(bool stop);
   void occupy(std::size_t bytes);
   [[nodiscard]] std::uint8_t engine() const;
   [[nodiscard]] std::uint8_t sensor_byte();
@@ -71,10 +69,7 @@ class Mcp2221 final : public UsbFunction {
   Instant free_at_{0};      ///< the bytes on the bus take their time
   bool nack_ = false;
   std::uint8_t divider_ = 117;
-  std::size_t requested_ = 0, transferred_ = 0;
-  std::uint8_t address_byte_ = 0;
-  std::vector<std::uint8_t> written_;  ///< gathered until all announced bytes are there
-  std::size_t still_to_read_ = 0;
+  std::size_t to_read_ = 0;
   BridgeTruth truth_;
 };
 

@@ -1,6 +1,6 @@
-#include "compensation/flight/noise.hpp"
-
 #include <gtest/gtest.h>
+
+#include "compensation/flight/flight.hpp"
 
 namespace kphi::flight {
 namespace {

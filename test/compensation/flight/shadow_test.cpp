@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <array>
 
-#include "compensation/flight/noise.hpp"
+#include "compensation/flight/flight.hpp"
 #include "compensation/occlusion.hpp"
 #include "test/compensation/flight/flight_fixture.hpp"
 

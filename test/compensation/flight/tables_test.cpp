@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <sstream>
+
 #include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {
@@ -82,6 +85,49 @@ TEST(FindingsTable, HasNoNumbersWhereEveryDrawLostAFlight) {
 TEST(NotReproduced, NamesTheXBaselineAndTheVelocityTerm) {
   EXPECT_THAT(not_reproduced(), HasSubstr("the errors in X of Tables I and III"));
   EXPECT_THAT(not_reproduced(), HasSubstr("the velocity term of Table II"));
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+long commas(const std::string& line) { return std::count(line.begin(), line.end(), ','); }
+
+const std::vector<TraceRow>& example_trace() {
+  static const std::vector<TraceRow> kTrace = [] {
+    std::vector<TraceRow> trace;
+    (void)fly(kExperiments[kHoverPlain], example_scene(), example_shadow(), &trace);
+    return trace;
+  }();
+  return kTrace;
+}
+
+TEST(TraceCsv, HasAFieldForEveryColumnAndARowForEveryTick) {
+  const std::vector<std::string> lines = lines_of(trace_csv(example_trace()));
+  ASSERT_EQ(lines.size(), example_trace().size() + 1);
+  for (const std::string& line : lines) ASSERT_EQ(commas(line), commas(lines[0])) << line;
+  EXPECT_THAT(lines[0], HasSubstr("time_s,leg,reference_x_m"));
+  EXPECT_THAT(lines[0], HasSubstr("speed4_rad_s"));
+  EXPECT_THAT(lines[1], testing::StartsWith("0,1,0,0,1.5,"));
+}
+
+TEST(DrawsCsv, HasAFieldForEveryColumnAndARowForEveryDraw) {
+  const auto draws = fly_draws(example_scene(), example_shadow(), 2, 2);
+  const std::vector<std::string> lines = lines_of(draws_csv(draws));
+  ASSERT_EQ(lines.size(), 3u);
+  for (const std::string& line : lines) EXPECT_EQ(commas(line), commas(lines[0])) << line;
+  EXPECT_THAT(lines[1], testing::StartsWith("0,quadratic,1."));
+  EXPECT_THAT(lines[2], testing::StartsWith("1,quadratic_by_load,1."));
+}
+
+TEST(ErrorFigure, NamesTheFlightAndItsLegs) {
+  const std::string script = error_figure(kExperiments[kHoverPlain], example_trace());
+  EXPECT_THAT(script, HasSubstr("title 'hover: X, O n.c., X   (reference - estimate"));
+  EXPECT_THAT(script, HasSubstr("set label 'O n.c.' at 10"));
+  EXPECT_THAT(script, HasSubstr("set ylabel 'z error [m]'"));
 }
 
 }  // namespace

@@ -23,23 +23,6 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// Remembers what it was asked to mount; decides as it was told, the last decision again and again.
-class ScriptedOperator final : public Operator {
- public:
-  [[nodiscard]] bool run_again(const AnotherRun& question) override {
-    questions.push_back(question);
-    return decision;
-  }
-  std::vector<double> mounted_deg;
-  std::vector<AnotherRun> questions;
-  bool decision = true;
-
- protected:
-  void mount(const profiles::Propeller&, double occlusion_deg, const std::string&) override {
-    mounted_deg.push_back(occlusion_deg);
-  }
-};
-
 class OrderedCampaign : public testing::Test {
  protected:
   /// Steps long enough to settle. `more`: further lines of the campaign file.
@@ -106,7 +89,7 @@ class OrderedCampaign : public testing::Test {
   profiles::BenchConfig config_ = test::deterministic_config(2);
   std::unique_ptr<DeterministicBench> bench_ = std::make_unique<DeterministicBench>(config_);
   results::CampaignFolder results_ = results::CampaignFolder::create(folder_.path(), "20210530T000000Z", "ordered");
-  ScriptedOperator person_;
+  test::ScriptedOperator person_;
   test::SaidLines said_;
 };
 

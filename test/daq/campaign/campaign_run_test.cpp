@@ -17,17 +17,6 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// Writes down what was asked; refuses at `refuse_at_deg`.
-class RememberingOperator final : public Operator {
- public:
-  void mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string&) override {
-    asked.push_back(fmt::format("{} {:g}", propeller.id, occlusion_deg));
-    if (occlusion_deg == refuse_at_deg) throw NotMounted("no");
-  }
-  std::vector<std::string> asked;
-  double refuse_at_deg = -1;
-};
-
 class ShortCampaign : public testing::Test {
  protected:
   CampaignResult run(const profiles::Campaign& campaign) {
@@ -43,13 +32,14 @@ class ShortCampaign : public testing::Test {
   profiles::BenchConfig config_ = test::deterministic_config(2);
   DeterministicBench bench_{config_};
   results::CampaignFolder results_ = results::CampaignFolder::create(folder_.path(), "20210530T000000Z", "short");
-  RememberingOperator person_;
-  NoProgress progress_;
+  test::ScriptedOperator person_;
+  Progress progress_;
 };
 
 TEST_F(ShortCampaign, AsksForEachMountingOnceAndRunsAllItsRepetitions) {
   const CampaignResult result = run(test::short_campaign("0, 90", 2, 3));
-  EXPECT_THAT(person_.asked, ElementsAre("5x3 0", "5x3 90"));
+  EXPECT_THAT(person_.mounted_deg, ElementsAre(0, 90));
+  EXPECT_EQ(person_.propeller, "5x3");
   EXPECT_EQ(result.runs, 4);
   EXPECT_EQ(result.steps, 12);
   EXPECT_EQ(result.lost, 0u);
@@ -142,7 +132,7 @@ TEST(SimulatedMotor, OfAFileTakesTheBuiltInsPlaceAndIsKeptBesideTheBenchFile) {
   EXPECT_NEAR(bench.simulation().plant().motor().supply_volts, 13.5, 0.01);
   const auto results = results::CampaignFolder::create(folder.path(), "u", "c");
   AutoConfirmOperator person;
-  NoProgress progress;
+  Progress progress;
   const auto campaign = test::short_campaign("0", 1, 2);
   (void)run_campaign(bench, campaign, config, results, person, progress, [] { return false; });
   EXPECT_EQ(test::bytes_of(results.motor_file()), motor);

@@ -7,7 +7,7 @@
 
 #include "base/error.hpp"
 #include "daq/campaign/campaign_run.hpp"
-#include "daq/virtual/per_run_bench.hpp"
+#include "daq/virtual/deterministic_bench.hpp"
 #include "results/campaign_state.hpp"
 #include "results/journal.hpp"
 #include "results/run_reader.hpp"
@@ -16,33 +16,16 @@
 namespace kphi::daq {
 namespace {
 
+using test::measured_in;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 namespace fs = std::filesystem;
 
-class StoppingOperator final : public Operator {
- public:
-  void mount(const profiles::Propeller&, double occlusion_deg, const std::string&) override {
-    asked.push_back(occlusion_deg);
-    if (occlusion_deg == refuse_at_deg) throw NotMounted("no");
-  }
-  std::vector<double> asked;
-  double refuse_at_deg = -1;
-};
-
-/// Run files and tables: name → bytes.
-std::map<std::string, std::string> measured_in(const results::CampaignFolder& folder) {
-  std::map<std::string, std::string> files;
-  for (const auto& run : folder.complete_runs()) files[run.filename().string()] = test::bytes_of(run);
-  for (const auto& table : {folder.steps(), folder.means()}) files[table.filename().string()] = test::bytes_of(table);
-  return files;
-}
-
 class Resume : public testing::Test {
  protected:
   CampaignResult begin(const results::CampaignFolder& folder) {
-    PerRunBench bench(config_);
+    DeterministicBench bench(config_, {}, DeterministicBench::Lives::one_run);
     return run_campaign(bench, campaign_, config_, folder, person_, said_, [] { return false; });
   }
   CampaignResult resume(bool accept_changes = false) {
@@ -51,7 +34,7 @@ class Resume : public testing::Test {
     return resume_with(inspect(results_, accept_changes));
   }
   CampaignResult resume_with(const Resumption& resumption) {
-    PerRunBench bench(config_);
+    DeterministicBench bench(config_, {}, DeterministicBench::Lives::one_run);
     return run_campaign(
         bench, campaign_, config_, results_, person_, said_, [] { return false; }, &resumption);
   }
@@ -87,7 +70,7 @@ class Resume : public testing::Test {
   profiles::BenchConfig config_ = test::deterministic_config(2);
   profiles::Campaign campaign_ = test::short_campaign("0, 90, 180", 2, 2);
   results::CampaignFolder results_ = results::CampaignFolder::create(folder_.path(), "20210530T000000Z", "short");
-  StoppingOperator person_;
+  test::ScriptedOperator person_;
   test::SaidLines said_;
 };
 
@@ -98,7 +81,7 @@ TEST_F(Resume, GoesOnAtTheFirstUnfinishedRunAndGivesTheBytesOfACampaignThatWasNe
   const CampaignResult result = resume();
   EXPECT_EQ(result.runs, 6);
   EXPECT_EQ(result.steps, 12);
-  EXPECT_THAT(person_.asked, ElementsAre(90, 180)) << "what was mounted then may not be now";
+  EXPECT_THAT(person_.mounted_deg, ElementsAre(90, 180)) << "what was mounted then may not be now";
   EXPECT_TRUE(results::verify_campaign(results_).whole());
   const auto after = measured_in(results_);
   EXPECT_TRUE(after.at("5x3_phi000_rep2.h5") == before.at("5x3_phi000_rep2.h5"));
@@ -124,7 +107,7 @@ TEST_F(Resume, MountsAgainInTheMiddleOfAnOcclusion) {
   std::ofstream(results_.journal(), std::ios::trunc) << lines;
   const auto whole = measured_in(results_);
   (void)resume();
-  EXPECT_THAT(person_.asked, ElementsAre(180));
+  EXPECT_THAT(person_.mounted_deg, ElementsAre(180));
   EXPECT_TRUE(measured_in(results_) == whole);
 }
 
@@ -181,7 +164,7 @@ TEST_F(Resume, AgainAndAgainLeavesOneAcceptanceOfEachRun) {
   for (const double at : {90.0, 180.0}) {
     person_.refuse_at_deg = at;
     const Resumption resumption = inspect(results_, false);
-    PerRunBench bench(config_);
+    DeterministicBench bench(config_, {}, DeterministicBench::Lives::one_run);
     EXPECT_THROW((void)run_campaign(
                      bench, campaign_, config_, results_, person_, said_, [] { return false; }, &resumption),
                  NotMounted);

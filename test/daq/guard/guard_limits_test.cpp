@@ -29,7 +29,7 @@ class CombinedLimits : public testing::Test {
   }
   void told(const iq::Entry& entry, double value) {
     if (!devices_) devices_.emplace();
-    devices_->motor.values[iq::audited_index(entry)] = value;
+    devices_->motor.values[&entry] = value;
   }
 
   profiles::Campaign campaign_ = test::short_campaign();

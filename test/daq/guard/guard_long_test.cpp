@@ -24,7 +24,7 @@ void run_clean(double first_rpm, double last_rpm, bool supply) {
   campaign.limits.supply_voltage_max = Volts(14);
   DeterministicBench bench(config);
   bench.mounted("5x3", 0);
-  NoProgress progress;
+  Progress progress;
   const RunResult result =
       record_run(bench, test::first_run(campaign, config, folder.path() / "run.h5"), progress, [] { return false; });
   EXPECT_EQ(result.account.lost_network + result.account.lost_host, 0u);

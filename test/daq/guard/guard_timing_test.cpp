@@ -106,7 +106,7 @@ class GuardTiming : public testing::TestWithParam<Case> {
     bench_.emplace(config);
     bench_->mounted("5x3", 0);
     if (tested.watched <= Watched::torque_z) shift(static_cast<std::size_t>(tested.watched));
-    NoProgress progress;
+    Progress progress;
     const Instant due =
         milliseconds(tested.with_supply ? 1500 : 1000) + 2 * from_seconds(campaign_.profile.dwell.value());
     const auto act = [&] {

@@ -1,4 +1,4 @@
-#include "daq/guard/load_watch.hpp"
+#include "daq/guard/observation.hpp"
 
 #include <gtest/gtest.h>
 

@@ -48,11 +48,9 @@ class Observed : public testing::Test {
   ManualClock clock_;
   std::vector<std::pair<Watched, double>> judged_;
   /// The axis points against the thrust.
-  Observer observer_{
-      {2, -1, +1},
-      mini40(),
-      SpeedWatch(+1, milliseconds(60)),
-      [this](Watched watched, double value, results::Nanoseconds) { judged_.emplace_back(watched, value); }};
+  Observer observer_{{2, -1, +1}, mini40(), SpeedWatch(+1, milliseconds(60)), [this](Watched watched, double value) {
+                       judged_.emplace_back(watched, value);
+                     }};
 };
 
 TEST_F(Observed, ShowsTheNewestOfEverythingWithItsAge) {
@@ -94,8 +92,8 @@ TEST_F(Observed, MakesWhatIsTooOldUnknownAndLetsItsAgeGrow) {
   samples(-1, 100);
   reading(MotorChannel::speed, 100);
   Observation shown = seen(now_ + milliseconds(100));
-  EXPECT_FALSE(shown.load_cell_is_fresh);
-  EXPECT_TRUE(shown.motor_is_fresh);
+  EXPECT_FALSE(shown.load_cell_is_fresh());
+  EXPECT_TRUE(shown.motor_is_fresh());
   EXPECT_TRUE(std::isnan(shown.judged[Watched::thrust]));
   EXPECT_TRUE(std::isnan(shown.judged[Watched::force_z]));
   EXPECT_DOUBLE_EQ(shown.judged[Watched::load_cell_age], 0.1);

@@ -13,33 +13,20 @@ using results::MotorChannel;
 using testing::HasSubstr;
 
 /// A bench whose rotor shows what a test lets it show, read every 10 ms of its time.
-class RestingBench final : public Bench {
+class RestingBench final : public QueueBench {
  public:
-  [[nodiscard]] const Clock& clock() const override { return queues.time; }
-  [[nodiscard]] MotorLink& motor() override { return queues.queue_motor; }
-  [[nodiscard]] LoadCellLink& load_cell() override { return static_cast<Bench&>(queues).load_cell(); }
-  [[nodiscard]] SupplyLink* supply() override { return supply_link; }
   void wait_until(Instant when) override {
-    queues.time.set(when);
+    time.set(when);
     if (speed) show(MotorChannel::speed, speed());
     if (work) work();
   }
-  [[nodiscard]] std::unique_ptr<Background> run_periodically(std::function<void()> called) override {
+  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()> called) override {
     work = std::move(called);
     return nullptr;
   }
-  [[nodiscard]] results::FileLayer& files() override { return queues.files(); }
-  [[nodiscard]] Duration sync_interval() const override { return queues.sync_interval(); }
-  [[nodiscard]] bool switch_off_power() override { return false; }
-  void restore_power() override {}
-  void mounted(const std::string&, double) override {}
-  void show(MotorChannel channel, double value) {
-    queues.readings.push_back({channel, queues.time.now().count(), 0, value});
-  }
-  [[nodiscard]] double seconds() const { return to_seconds(queues.time.now()); }
+  void show(MotorChannel channel, double value) { readings.push_back({channel, time.now().count(), 0, value}); }
+  [[nodiscard]] double seconds() const { return to_seconds(time.now()); }
 
-  QueueBench queues;
-  SupplyLink* supply_link = nullptr;
   std::function<double()> speed;
   std::function<void()> work;
 };
@@ -61,13 +48,13 @@ TEST(RestGuard, WaitsUntilARotorThatCoastsIsSeenAtRest) {
   RestGuard guard(bench, true);
   guard.await_rest(kNoStop);
   EXPECT_NEAR(bench.seconds(), 3.36, 0.03);
-  EXPECT_EQ(bench.queues.queue_motor.coasted, 0);
+  EXPECT_EQ(bench.queue_motor.coasted, 0);
 }
 
 TEST(RestGuard, BelievesNoReadingFromBefore) {
   RestingBench bench;
   for (int i = 0; i < 10; ++i) bench.show(MotorChannel::speed, 0);
-  bench.queues.time.advance(std::chrono::seconds(1));
+  bench.time.advance(std::chrono::seconds(1));
   bench.speed = [&] { return bench.seconds() < 3 ? 341.0 : 0.0; };
   RestGuard(bench, true).await_rest(kNoStop);
   EXPECT_GE(bench.seconds(), 3);
@@ -102,12 +89,12 @@ class AtAPrompt : public testing::Test {
     guard_.emplace(bench_, true);
     guard_->await_rest(kNoStop);
   }
-  void pass() { bench_.wait_until(bench_.queues.time.now() + std::chrono::milliseconds(20)); }
+  void pass() { bench_.wait_until(bench_.time.now() + std::chrono::milliseconds(20)); }
   std::string reason() {
     return reason_of([&] { guard_->check(); });
   }
   void expect_safe() {
-    EXPECT_EQ(bench_.queues.queue_motor.coasted, 1);
+    EXPECT_EQ(bench_.queue_motor.coasted, 1);
     EXPECT_EQ(supply_.cuts, 1);
   }
 
@@ -144,7 +131,7 @@ TEST_F(AtAPrompt, AModuleThatDrivesTrips) {
 }
 
 TEST_F(AtAPrompt, ASleepOfTheComputerTrips) {
-  bench_.queues.time.suspend(std::chrono::seconds(5));
+  bench_.time.suspend(std::chrono::seconds(5));
   pass();
   EXPECT_THAT(reason(), HasSubstr("this computer slept for 5 s"));
   expect_safe();
@@ -152,7 +139,7 @@ TEST_F(AtAPrompt, ASleepOfTheComputerTrips) {
 
 TEST_F(AtAPrompt, AModuleWhosePowerAPersonHasCutIsNoTrip) {
   bench_.speed = nullptr;
-  bench_.queues.queue_motor.lost = "the module stopped answering";
+  bench_.queue_motor.lost = "the module stopped answering";
   for (int i = 0; i < 100; ++i) pass();
   EXPECT_EQ(reason(), "");
 }
@@ -160,12 +147,12 @@ TEST_F(AtAPrompt, AModuleWhosePowerAPersonHasCutIsNoTrip) {
 TEST_F(AtAPrompt, AnOutputThatComesOnUnaskedTripsButNoReadingFromBefore) {
   guard_.emplace(bench_, false);
   results::SupplyReading on;
-  on.time_ns = bench_.queues.time.now().count() - 1;
+  on.time_ns = bench_.time.now().count() - 1;
   on.output = 1;
   supply_.readings.push_back(on);
   pass();
   EXPECT_EQ(reason(), "");
-  on.time_ns = bench_.queues.time.now().count() + 1;
+  on.time_ns = bench_.time.now().count() + 1;
   supply_.readings.push_back(on);
   pass();
   EXPECT_THAT(reason(), HasSubstr("output is on while somebody may be near"));

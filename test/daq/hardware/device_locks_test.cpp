@@ -46,15 +46,15 @@ TEST(LockNames, OfABenchInsideTheProcessAreNone) { EXPECT_TRUE(lock_names(test::
 std::string own_name(const char* what) { return fmt::format("test {} {}", ::getpid(), what); }
 
 TEST(DeviceLocks, RefuseTheSecondAndSayWhoHasIt) {
-  const DeviceLocks first({own_name("a"), own_name("b")});
+  const auto first = lock_devices({own_name("a"), own_name("b")});
   try {
-    const DeviceLocks second({own_name("c"), own_name("b")});
+    const auto second = lock_devices({own_name("c"), own_name("b")});
     FAIL();
   } catch (const DeviceError& error) {
     EXPECT_THAT(error.what(), AllOf(HasSubstr(own_name("b")), HasSubstr(fmt::format("process {} (", ::getpid())),
                                     HasSubstr("kill -INT")));
   }
-  EXPECT_NO_THROW(DeviceLocks({own_name("c")})) << "what the refused one had taken is free again";
+  EXPECT_NO_THROW((void)lock_devices({own_name("c")})) << "what the refused one had taken is free again";
 }
 
 TEST(FolderLock, RefusesTheSecondWriter) {

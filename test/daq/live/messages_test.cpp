@@ -26,29 +26,19 @@ Tick full_tick() {
   Tick tick;
   tick.time_s = 12.34;
   tick.timestamp_s = 1622332812.34;
-  tick.remaining_s = 372.4;
   tick.progress = 0.25;
-  tick.occlusion_deg = 90;
-  tick.repetition = 2;
-  tick.repetitions = 3;
-  tick.step = 16;
-  tick.steps = 40;
-  tick.commanded_rpm = 7895;
-  tick.speed_rpm = 7893.6;
-  tick.thrust_n = 1.1621;
-  tick.torque_nm = 0.0123;
-  tick.module_v = 11.9;
-  tick.module_a = 3.2;
-  tick.supply_v = 12;
-  tick.supply_a = 3.3;
-  tick.coil_degc = 41;
-  tick.derate = 1;
-  tick.received = 123456;
-  tick.watched.values.fill(kUnknown);
-  tick.watched[Watched::thrust] = 1.1621;
-  tick.watched[Watched::supply_voltage_low] = 11.9;
-  write(tick.phase, "");
-  write(tick.propeller, "5x3");
+  tick.position = {{"5x3"}, 90, 2, 3, 16, 40, "ramp", from_rpm(7895), 372.4};
+  tick.seen.speed_rad_s = from_rpm(7893.6).value();
+  tick.seen.thrust_n = 1.1621;
+  tick.seen.torque_nm = 0.0123;
+  tick.seen.supply.time_ns = 1;
+  tick.seen.supply.voltage_v = 12;
+  tick.seen.supply.current_a = 3.3;
+  tick.seen.account.received = 123456;
+  tick.seen.judged[Watched::thrust] = 1.1621;
+  tick.seen.judged[Watched::supply_voltage_low] = 11.9;
+  tick.seen.judged[Watched::supply_current] = 3.2;
+  tick.seen.judged[Watched::coil_temperature] = 41;
   return tick;
 }
 
@@ -58,8 +48,13 @@ TEST(LiveMessages, OfATickCarryEveryNumberWithItsUnitInTheKey) {
   EXPECT_EQ(tick["thrust_n"], 1.1621);
   EXPECT_EQ(tick["speed_rpm"], 7893.6);
   EXPECT_EQ(tick["commanded_rpm"], 7895);
+  EXPECT_EQ(tick["module_v"], 11.9);
+  EXPECT_EQ(tick["module_a"], 3.2);
+  EXPECT_EQ(tick["supply_v"], 12);
+  EXPECT_EQ(tick["coil_degc"], 41);
   EXPECT_EQ(tick["step"], 16);
   EXPECT_EQ(tick["propeller"], "5x3");
+  EXPECT_EQ(tick["phase"], "") << "in a step";
   EXPECT_EQ(tick["watched"].size(), kWatchedCount);
   EXPECT_EQ(tick["watched"]["thrust_n"], 1.162) << "four digits";
   EXPECT_TRUE(tick["watched"]["fx_n"].is_null());
@@ -67,8 +62,10 @@ TEST(LiveMessages, OfATickCarryEveryNumberWithItsUnitInTheKey) {
 }
 
 TEST(LiveMessages, SayNullForWhatIsUnknown) {
-  const json tick = json::parse(tick_message(Tick{}, 0, 0));
-  for (const char* key : {"thrust_n", "speed_rpm", "torque_nm", "supply_v", "coil_degc"}) {
+  Tick stale;
+  stale.seen.load_cell_age = stale.seen.motor_age = std::chrono::seconds(1);
+  const json tick = json::parse(tick_message(stale, 0, 0));
+  for (const char* key : {"thrust_n", "speed_rpm", "torque_nm", "supply_v", "supply_a", "coil_degc", "derate"}) {
     EXPECT_TRUE(tick.at(key).is_null()) << key;
   }
 }
@@ -101,7 +98,8 @@ TEST(PlotMessages, HaveATimestampAndNumbersOnly) {
 
 TEST(PlotMessages, LeaveOutWhatIsUnknown) {
   Tick tick;
-  tick.watched[Watched::thrust] = 1;
+  tick.seen.load_cell_age = std::chrono::seconds(1);
+  tick.seen.judged[Watched::thrust] = 1;
   const json plot = json::parse(plot_message(tick, subject().limits));
   EXPECT_FALSE(plot.contains("thrust_n"));
   EXPECT_FALSE(plot["limit_share"].contains("speed_rpm"));
@@ -110,11 +108,14 @@ TEST(PlotMessages, LeaveOutWhatIsUnknown) {
 
 TEST(PlotMessages, FitIntoOneDatagramOfPlotJuggler) {
   Tick tick = full_tick();
-  tick.time_s = tick.thrust_n = tick.torque_nm = tick.speed_rpm = tick.commanded_rpm = -1.23456789e-301;
-  tick.fault_bits = tick.received = tick.lost_network = tick.lost_host = ~std::uint64_t{0};
+  results::SampleAccount& account = tick.seen.account;
+  tick.time_s = tick.seen.thrust_n = tick.seen.torque_nm = -1.23456789e-301;
+  tick.seen.speed_rad_s = -1.23456789e-301;
+  tick.position.commanded = RadPerSec(-1.23456789e-301);
+  tick.seen.fault_bits = account.received = account.lost_network = account.lost_host = ~std::uint64_t{0};
   std::vector<GuardLimit> limits;
   for (std::size_t i = 0; i < kWatchedCount; ++i) limits.push_back({static_cast<Watched>(i), "", 3, "", ""});
-  tick.watched.values.fill(-1.23456789e-301);
+  tick.seen.judged.values.fill(-1.23456789e-301);
   EXPECT_LT(plot_message(tick, limits).size(), 1400u);
 }
 

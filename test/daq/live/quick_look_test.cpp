@@ -1,9 +1,9 @@
-#include "daq/live/quick_look.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
+
+#include "daq/live/live_session.hpp"
 
 namespace kphi::daq::live {
 namespace {

@@ -19,7 +19,6 @@ const results::RunRecording& recording() {
 struct Seen final : Progress {
   void tick(const Position& position, const Observation& seen) override { ticks.emplace_back(position, seen); }
   void step_done(const Position& position, const Observation& seen) override { steps.emplace_back(position, seen); }
-  void say(const std::string&) override {}
   std::vector<std::pair<Position, Observation>> ticks, steps;
 };
 
@@ -86,7 +85,7 @@ TEST(ReplayedRun, HasTheLimitsOfItsCampaignAndCannotBeStopped) {
 
 TEST(ReplayedRun, IsPlayedToItsEndOrUntilAsked) {
   ManualClock clock;
-  NoProgress nobody;
+  Progress nobody;
   EXPECT_TRUE(play(recording(), clock, nobody, 1000, [] { return false; }));
   EXPECT_EQ(clock.now().count(), recording().load_cell.back().arrival_ns);
   EXPECT_FALSE(play(recording(), clock, nobody, 1, [] { return true; }));

@@ -30,6 +30,7 @@ using nlohmann::json;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
+using testing::ThrowsMessage;
 using namespace std::chrono_literals;
 
 static_assert(Server::Settings{}.frame.count() > 0 && 20 * Server::Settings{}.frame <= 1s, "20 frames a second");
@@ -251,7 +252,7 @@ TEST_F(LiveServer, TellsWhoComesLateWhatWas) {
   const auto first = onlooker();
   (void)first->hear("history");
   feed_.tell(line_message(1, "the first line"));
-  feed_.tell(step_message(Tick{}, {}));
+  feed_.tell(step_message({}, {}));
   for (const double limit : {3.0, 2.0})
     feed_.tell(limits_message({{Watched::thrust, "thrust", limit, "N", "campaign"}}));
   for (int i = 1; i <= 2; ++i) {
@@ -393,12 +394,9 @@ TEST_F(LiveServer, SaysThatAPortIsTaken) {
   Feed feed;
   Server::Settings settings;
   settings.port = server_->port();
-  try {
-    const Server other(settings, feed);
-    FAIL() << "two servers on one port";
-  } catch (const ConfigurationError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("give another port"));
-  }
+  EXPECT_THAT([&] { const Server other(settings, feed); },
+              ThrowsMessage<ConfigurationError>(HasSubstr("give another port")))
+      << "two servers on one port";
 }
 
 TEST(LivePage, IsOneTextThatNamesNoOtherPlace) {

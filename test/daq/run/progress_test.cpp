@@ -10,7 +10,7 @@ namespace {
 
 Position in_a_step() {
   Position position;
-  position.propeller = "5x3";
+  position.name("5x3");
   position.occlusion_deg = 90;
   position.repetition = 2;
   position.repetitions = 3;
@@ -58,12 +58,10 @@ TEST(Progress, NamesPropellerOcclusionRepetitionStepSpeedsThrustAndTimeLeft) {
 
 TEST(Progress, ShowsNoNumberForWhatNoLongerComes) {
   Observation observation = seen();
-  observation.load_cell_is_fresh = false;
   observation.load_cell_age = std::chrono::milliseconds(840);
   EXPECT_EQ(
       describe(in_a_step(), observation),
       "5x3  φ  90°  rep 2/3  step 17/40  speed  7894 of  7895 RPM  thrust      ? N  left 06:12  no thrust for 0.8 s");
-  observation.motor_is_fresh = false;
   observation.motor_age = std::chrono::seconds(2);
   EXPECT_EQ(
       describe(in_a_step(), observation),

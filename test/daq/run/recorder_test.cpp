@@ -13,8 +13,7 @@ namespace {
 
 class Recording : public testing::Test {
  protected:
-  Recording()
-      : writer_(folder_.path() / "run.h5", {}, bench_.files()), recorder_(bench_, streams_, writer_, mini40()) {}
+  Recording() : writer_(folder_.path() / "run.h5", {}, bench_.files()), recorder_(bench_, streams_, writer_) {}
 
   void mark(results::Phase phase) { recorder_.mark({phase, -1, bench_.time.now().count(), 0}); }
 
@@ -95,7 +94,7 @@ TEST(RecordingOntoABrokenDisk, KeepsTheFirstErrorForTheRunnerAndThrowsNothingIts
   QueueBench bench;
   results::RunWriter writer(folder.path() / "run.h5", {}, disk);
   BenchStreams streams(bench);
-  Recorder recorder(bench, streams, writer, mini40());
+  Recorder recorder(bench, streams, writer);
   EXPECT_NO_THROW(recorder.check_failure());
   disk.broken = true;
   bench.time.set(std::chrono::seconds(1));

@@ -18,6 +18,7 @@ namespace {
 using results::Outcome;
 using results::Phase;
 using testing::HasSubstr;
+using testing::ThrowsMessage;
 
 double to_rad_per_sec(double rpm) { return from_rpm(rpm).value(); }
 
@@ -41,7 +42,7 @@ class OneRun : public testing::Test {
   profiles::Campaign campaign_ = test::short_campaign();
   profiles::BenchConfig config_;
   DeterministicBench bench_;
-  NoProgress progress_;
+  Progress progress_;
 };
 
 TEST_F(OneRun, RecordsZeroStepsSpinDownAndZeroInThisOrder) {
@@ -204,12 +205,8 @@ class FullDisk final : public results::FileLayer {
 TEST_F(OneRun, StopsWhenTheDiskIsFullAndLosesNothingWritten) {
   FullDisk disk(600'000);
   bench_.use_files(disk);
-  try {
-    (void)record();
-    FAIL() << "a full disk went unnoticed";
-  } catch (const RecordError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("disk full"));
-  }
+  EXPECT_THAT([&] { (void)record(); }, ThrowsMessage<RecordError>(HasSubstr("disk full")))
+      << "a full disk went unnoticed";
   EXPECT_TRUE(motor_is_let_go());
   std::filesystem::path left;
   for (const auto& entry : std::filesystem::directory_iterator(folder_.path())) left = entry.path();
@@ -224,8 +221,6 @@ TEST_F(OneRun, StopsWhenAnExceptionComesFromTheProgressDisplay) {
     void tick(const Position& position, const Observation&) override {
       if (position.step == 2) throw std::runtime_error("the terminal went away");
     }
-    void step_done(const Position&, const Observation&) override {}
-    void say(const std::string&) override {}
   } broken;
   EXPECT_THROW((void)record_run(bench_, test::first_run(campaign_, config_, file()), broken, [] { return false; }),
                std::runtime_error);
@@ -239,7 +234,7 @@ TEST(RunFromASeed, GivesTheSameBytesTwiceAndOthersFromAnotherSeed) {
     const profiles::Campaign campaign = test::short_campaign();
     DeterministicBench bench(config);
     bench.mounted("5x3", 0);
-    NoProgress progress;
+    Progress progress;
     const auto file = folder.path() / "run.h5";
     (void)record_run(bench, test::first_run(campaign, config, file), progress, [] { return false; });
     return test::bytes_of(file);

@@ -1,9 +1,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.hpp"
+#include <stdexcept>
+
 #include "drivers/ambient/bme280.hpp"
 #include "test/drivers/ambient/fake_bridge.hpp"
+#include "test/refusal.hpp"
 
 namespace kphi::ambient {
 namespace {
@@ -17,12 +19,7 @@ class Bme280SensorTest : public testing::Test {
 
   Bme280Sensor sensor() { return Bme280Sensor(bridge, usb.name(), no_pause); }
   std::string refusal() {
-    try {
-      (void)sensor().read();
-    } catch (const DeviceError& error) {
-      return error.what();
-    }
-    return "";
+    return kphi::refusal([&] { return sensor().read(); });
   }
 };
 
@@ -84,23 +81,24 @@ TEST_F(Bme280SensorTest, RefusesAirThatCannotBe) {
     if (answer[0] == 0x40 && answer[3] == 8) answer[7] = 0xFF;
     return false;
   };
-  try {
-    (void)measured.read();
-    FAIL();
-  } catch (const DeviceError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("implausible for air"));
-  }
+  EXPECT_THAT(kphi::refusal([&] { return measured.read(); }), HasSubstr("implausible for air"));
 }
 
 TEST_F(Bme280SensorTest, GivesUpAMeasurementThatDoesNotEnd) {
   Bme280Sensor measured = sensor();
   usb.registers[0xF3] = 0x08;
-  try {
-    (void)measured.read();
-    FAIL();
-  } catch (const DeviceError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("not finished in time"));
-  }
+  EXPECT_THAT(kphi::refusal([&] { return measured.read(); }), HasSubstr("not finished in time"));
+}
+
+TEST(SensorAddress, IsThatOfTheBridge) {
+  EXPECT_EQ(sensor_address("usb:04d8:00dd"), (UsbAddress{0x04d8, 0x00dd, "", ""}));
+  EXPECT_EQ(sensor_address("usb:04D8:00DD:0001AB").serial, "0001AB");
+  EXPECT_EQ(sensor_address("usb:04d8:00dd@1-1.4").port_path, "1-1.4");
+}
+
+TEST(SensorAddress, RefusesWhatIsNoSensorOfTheAir) {
+  for (const char* text : {"", "Unknown", "unknown", "usb:04d8", "usb:0403:6001", "tcp:host:1", "usb:04d8:00de"})
+    EXPECT_THROW((void)sensor_address(text), std::invalid_argument) << text;
 }
 
 }  // namespace

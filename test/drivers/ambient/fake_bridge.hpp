@@ -6,7 +6,7 @@
 #include <functional>
 #include <map>
 
-#include "drivers/usb/transport.hpp"
+#include "drivers/usb/bus.hpp"
 
 namespace kphi::ambient {
 
@@ -43,11 +43,7 @@ class FakeBridge final : public usb::Transport {
   usb::Transfer control_in(const usb::Setup&, std::span<std::uint8_t>, Timeout) noexcept override {
     return {usb::Outcome::stalled};
   }
-  usb::Transfer control_out(const usb::Setup&, std::span<const std::uint8_t>, Timeout) noexcept override {
-    return {usb::Outcome::stalled};
-  }
   usb::Outcome clear_halt(const usb::Endpoint&) noexcept override { return usb::Outcome::done; }
-  void cancel() noexcept override {}
 
   usb::Transfer write(const usb::Endpoint& endpoint, std::span<const std::uint8_t> data, Timeout) noexcept override {
     if (next_write != usb::Outcome::done) return {next_write};

@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.hpp"
 #include "test/drivers/ambient/fake_bridge.hpp"
+#include "test/refusal.hpp"
 
 namespace kphi::ambient {
 namespace {
@@ -12,16 +12,6 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-template <class Call>
-std::string refusal(Call&& call) {
-  try {
-    call();
-  } catch (const DeviceError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 TEST(Mcp2221, FreesTheBusAndSetsTheSpeedWhenItOpens) {
   FakeBridge usb;

@@ -190,7 +190,7 @@ TEST(CoastFirst, OfALinkWhoseLineTakesNoBytes) {
     motor.emergency_stop();
     ASSERT_TRUE(test::soon([&] { return motor.counters().coasts >= before.coasts + kCoasts; }));
   });
-  ASSERT_TRUE(motor.coast_and_confirm(2s));
+  ASSERT_TRUE(motor.stop().safe());
   line.with([&](Module& module) {
     const std::size_t first = FullLine::ahead(module.heard);
     ASSERT_GT(first, 0u);

@@ -66,7 +66,6 @@ class FakeDialogue final : public Dialogue {
   std::map<const Entry*, double> values = good_values();
   std::vector<const Entry*> asked;
   bool ignores_sets = false;
-  int loses_sets = 0;  ///< so many of the next
 
   ManualClock clock{std::chrono::hours(5)};
   double gain = 1;         ///< of the module's clock
@@ -74,22 +73,24 @@ class FakeDialogue final : public Dialogue {
   double tick_s = 0;       ///< the module's time moves in such steps
   std::function<Duration()> way = [] { return Duration(std::chrono::microseconds(300)); };  ///< there, or back
 
-  std::optional<Answer> ask(const Entry& entry) override {
+  Reply inquire(const Inquiry& inquiry) override {
+    Inquiries::check({inquiry});
+    const Entry& entry = *inquiry.entry;
+    if (inquiry.set_to && !ignores_sets) set(entry, *inquiry.set_to);
     asked.push_back(&entry);
     const Instant sent = clock.now();
     clock.advance(way());
-    std::optional<Answer> answer;
+    Reply reply;
     if (&entry == &kTime) {
-      answer = Answer{module_time(), {}, {}};
+      reply.value = module_time();
     } else if (const auto found = values.find(&entry); found != values.end()) {
-      answer = Answer{on_the_wire(entry, found->second), {}, {}};
+      reply.value = on_the_wire(entry, found->second);
     }
     clock.advance(way());
-    if (answer) {
-      answer->time = sent + (clock.now() - sent) / 2;
-      answer->uncertainty = (clock.now() - sent + Duration(1)) / 2;
-    }
-    return answer;
+    reply.accepted = inquiry.set_to && reply.value && is_as_set(entry, *inquiry.set_to, *reply.value);
+    reply.time = sent + (clock.now() - sent) / 2;
+    reply.uncertainty = (clock.now() - sent + Duration(1)) / 2;
+    return reply;
   }
   void pause(Duration bench) override { clock.advance(bench); }
 
@@ -103,8 +104,7 @@ class FakeDialogue final : public Dialogue {
     const double exact = gain * to_seconds(clock.now()) + offset_s;
     return static_cast<float>(tick_s > 0 ? tick_s * std::floor(exact / tick_s) : exact);
   }
-  void send(const Entry& entry, double value) override {
-    if (ignores_sets || loses_sets-- > 0) return;
+  void set(const Entry& entry, double value) {
     if (&entry == &kTime) {
       offset_s = value - gain * to_seconds(clock.now());
     } else if (values.count(&entry) != 0) {

@@ -12,7 +12,7 @@
 #include "base/error.hpp"
 #include "drivers/iq/link/motor.hpp"
 #include "drivers/iq/service/probe.hpp"
-#include "drivers/sim/server.hpp"
+#include "drivers/sim/bench_server.hpp"
 #include "test/soon.hpp"
 #include "test/temporary_folder.hpp"
 

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "drivers/netbox/stream/clock_estimate.hpp"
+#include "drivers/netbox/stream/health.hpp"
 
 namespace kphi::netbox::test {
 

@@ -46,6 +46,8 @@ class LoopbackSocket {
   std::uint16_t port_ = 0;
 };
 
+inline std::uint16_t closed_port(int type) { return LoopbackSocket(type).port(); }
+
 /// Serves one fixed answer per connection, in pieces, and closes.
 class FakeWeb {
  public:

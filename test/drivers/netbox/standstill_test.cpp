@@ -37,9 +37,7 @@ void be_the_reader(const Pipe& orders, const Pipe& reports) {
   LoadCell cell({"127.0.0.1", ports.rdt, ports.http}, clock);
   cell.start();
   if (!eventually([&] { return cell.counters().received >= 1000; })) return;
-  const std::string note = cell.receive_buffer_note();
-  const int tolerated_ms = std::stoi(note.substr(note.find("tolerates ") + 10));
-  reports.put(tolerated_ms);
+  reports.put(static_cast<int>(cell.receive_buffer().tolerated_ms()));
   if (!eventually([&] { return cell.counters().received + cell.counters().lost_host >= 15'000; })) return;
   cell.stop();
   reports.put(cell.counters());

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "drivers/netbox/receive/load_cell.hpp"
-#include "drivers/sim/server.hpp"
+#include "drivers/sim/bench_server.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::netbox::test {

@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "drivers/usb/transport.hpp"
+#include "drivers/usb/bus.hpp"
 
 namespace kphi::scpi {
 
@@ -35,7 +35,6 @@ class FakeInstrument final : public usb::Transport {
   std::uint16_t product() const noexcept override { return product_id; }
   const std::vector<usb::Interface>& interfaces() const noexcept override { return interfaces_; }
   void claim(std::uint8_t) override {}
-  void cancel() noexcept override {}
   usb::Outcome clear_halt(const usb::Endpoint&) noexcept override { return usb::Outcome::done; }
 
   usb::Transfer control_in(const usb::Setup& setup, std::span<std::uint8_t> data, Timeout) noexcept override {
@@ -67,9 +66,6 @@ class FakeInstrument final : public usb::Transport {
         break;
     }
     return {usb::Outcome::done, data.size()};
-  }
-  usb::Transfer control_out(const usb::Setup&, std::span<const std::uint8_t>, Timeout) noexcept override {
-    return {usb::Outcome::stalled};
   }
 
   usb::Transfer write(const usb::Endpoint&, std::span<const std::uint8_t> b, Timeout) noexcept override {

@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <map>
 #include <vector>
 
 #include "base/error.hpp"
 #include "test/drivers/scpi/lent_line.hpp"
+#include "test/refusal.hpp"
 
 namespace kphi::scpi {
 namespace {
@@ -60,13 +62,10 @@ class ScpiSupplyTest : public testing::Test {
   FakeLine line;
   ManualClock clock;
   std::string refusal(const std::function<void(ScpiSupply&)>& call) {
-    try {
+    return kphi::refusal([&] {
       ScpiSupply supply(lend(line), clock);
       call(supply);
-    } catch (const DeviceError& error) {
-      return error.what();
-    }
-    return "";
+    });
   }
 };
 

@@ -1,5 +1,3 @@
-#include "drivers/scpi/tcp.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -12,12 +10,19 @@
 #include <thread>
 
 #include "base/error.hpp"
+#include "base/random.hpp"
+#include "drivers/scpi/line.hpp"
+#include "drivers/scpi/scpi_supply.hpp"
+#include "test/drivers/scpi/lent_line.hpp"
+#include "test/drivers/sim_equipment/scpi_tcp.hpp"
+#include "test/refusal.hpp"
 
 namespace kphi::scpi {
 namespace {
 
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
+using sim::UsbFaultKind;
 using testing::HasSubstr;
 
 /// Answers each line by what `answer` gives; nothing for an empty string. One connection at a time.
@@ -64,11 +69,7 @@ class Server {
 };
 
 std::string refusal(Tcp& line, const char* query) {
-  try {
-    return "answered " + line.query(query);
-  } catch (const DeviceError& error) {
-    return error.what();
-  }
+  return kphi::refusal([&] { return line.query(query); });
 }
 
 TEST(ScpiOverTcp, AsksAndAnswers) {
@@ -122,7 +123,76 @@ TEST(ScpiOverTcp, ConnectsAgainAfterTheInstrumentHasClosed) {
   Tcp line("127.0.0.1", port, 500ms);
   EXPECT_EQ(line.query("A?"), "1");
   server.reset();
-  EXPECT_THAT(refusal(line, "A?"), testing::Not(HasSubstr("answered")));
+  EXPECT_NE(refusal(line, "A?"), "");
+}
+
+/// The driver of a supply over TCP, against a simulated instrument that shares no line with them.
+class TcpInstrumentTest : public testing::Test {
+ protected:
+  SteadyClock clock;
+  sim::UsbFaults faults{clock};
+  sim::ScpiInstrument instrument;
+  sim::ScpiTcp server{instrument, faults};
+  Tcp line{"127.0.0.1", server.port(), 200ms};
+};
+
+TEST_F(TcpInstrumentTest, IsASupply) {
+  ScpiSupply supply(lend(line), clock);
+  instrument.connect_load(6);
+  const supply::Limits limits{Volts(12), Amperes(5), Volts(13.2), Amperes(6)};
+  EXPECT_EQ(supply.apply(limits), limits);
+  const supply::PoweredOutput output(supply);
+  EXPECT_DOUBLE_EQ(supply.read().power_w(), 24);
+}
+
+TEST_F(TcpInstrumentTest, SpeaksTheDialectOfRigol) {
+  sim::ScpiInstrument rigol({"RIGOL TECHNOLOGIES,DP832,DP8A1,1.0", sim::ScpiKind::supply, sim::ScpiFamily::rigol});
+  const sim::ScpiTcp other(rigol, faults);
+  Tcp there("127.0.0.1", other.port(), 200ms);
+  ScpiSupply supply(lend(there), clock);
+  rigol.connect_load(1);
+  const supply::Limits limits{Volts(12), Amperes(5), Volts(13.2), Amperes(6)};
+  EXPECT_EQ(supply.apply(limits), limits);
+  const supply::PoweredOutput output(supply);
+  EXPECT_EQ(supply.read().regulation, supply::Regulation::constant_current);
+  (void)rigol.apply("OUTP:OCP:VAL 4");
+  EXPECT_EQ(supply.read().protection, supply::Protection::over_current);
+}
+
+TEST_F(TcpInstrumentTest, GivesALateAnswerToNobody) {
+  faults.set({{UsbFaultKind::late, {}, {}, 1, 400ms}});
+  EXPECT_THAT(kphi::refusal([&] { (void)line.query("VOLT? MAX"); }), HasSubstr("no answer in time"));
+  EXPECT_EQ(line.query("CURR? MAX"), "10.000");
+}
+
+TEST_F(TcpInstrumentTest, ConnectsAgainAfterSilenceAndAfterAnEnd) {
+  for (const UsbFaultKind kind : {UsbFaultKind::no_reply, UsbFaultKind::closed}) {
+    faults.set({{kind, {}, {}, 1}});
+    EXPECT_NE(kphi::refusal([&] { (void)line.query("*IDN?"); }), "");
+    EXPECT_EQ(line.query("*IDN?"), "KPHI,SIM3010,SN0001,1.00");
+  }
+  EXPECT_EQ(line.counters().recoveries, 2u);
+}
+
+TEST_F(TcpInstrumentTest, AnswersTrulyOrNotAtAllUnderAnyMixtureOfFaults) {
+  Tcp fast("127.0.0.1", server.port(), 20ms);
+  Random random(1);
+  int answered = 0, failed = 0;
+  for (int i = 0; i < 200; ++i) {
+    constexpr UsbFaultKind kKinds[] = {UsbFaultKind::no_reply, UsbFaultKind::late, UsbFaultKind::closed};
+    sim::UsbFault fault{kKinds[random.bits() % 3], {}, {}, 1};
+    fault.delay = Duration(static_cast<std::int64_t>(random.bits() % 40'000'000));
+    if (i % 3 == 0) faults.set({fault});
+    const bool volts = random.bits() % 2 == 0;
+    try {
+      ASSERT_EQ(fast.query(volts ? "VOLT? MAX" : "CURR? MAX"), volts ? "30.000" : "10.000") << i;
+      ++answered;
+    } catch (const DeviceError&) {
+      ++failed;
+    }
+  }
+  EXPECT_GT(answered, 100);
+  EXPECT_GT(failed, 20);
 }
 
 }  // namespace

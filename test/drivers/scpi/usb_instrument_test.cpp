@@ -7,7 +7,7 @@
 
 #include "base/random.hpp"
 #include "drivers/scpi/scpi_supply.hpp"
-#include "drivers/scpi/usbtmc.hpp"
+#include "drivers/scpi/line.hpp"
 #include "drivers/usb/bus.hpp"
 #include "test/drivers/scpi/lent_line.hpp"
 #include "test/drivers/sim_equipment/usbtmc.hpp"

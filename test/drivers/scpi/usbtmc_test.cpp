@@ -1,10 +1,9 @@
-#include "drivers/scpi/usbtmc.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.hpp"
+#include "drivers/scpi/line.hpp"
 #include "test/drivers/scpi/fake_instrument.hpp"
+#include "test/refusal.hpp"
 
 namespace kphi::scpi {
 namespace {
@@ -19,11 +18,7 @@ class UsbtmcTest : public testing::Test {
   FakeInstrument usb;
 
   std::string refusal(Usbtmc& line, const char* query) {
-    try {
-      return "answered " + line.query(query);
-    } catch (const DeviceError& error) {
-      return error.what();
-    }
+    return kphi::refusal([&] { return line.query(query); });
   }
 };
 

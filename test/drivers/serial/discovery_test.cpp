@@ -1,4 +1,4 @@
-#include "drivers/serial/discovery.hpp"
+#include "drivers/serial/port.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

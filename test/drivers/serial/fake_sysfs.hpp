@@ -4,7 +4,7 @@
 #include <fstream>
 #include <string>
 
-#include "drivers/serial/discovery.hpp"
+#include "drivers/serial/port.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::serial::fake {

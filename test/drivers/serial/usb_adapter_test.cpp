@@ -9,7 +9,6 @@
 #include <memory>
 
 #include "base/error.hpp"
-#include "drivers/serial/discovery.hpp"
 #include "drivers/serial/port.hpp"
 
 namespace kphi::serial {

@@ -1,5 +1,3 @@
-#include "drivers/sim/bench.hpp"
-
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -8,6 +6,7 @@
 #include <stdexcept>
 
 #include "drivers/sim/control_line.hpp"
+#include "drivers/sim/simulated_bench.hpp"
 #include "test/drivers/sim/hex.hpp"
 
 namespace kphi::sim {

@@ -1,6 +1,4 @@
 // Raw sockets against the running simulator: a client of its own, not the drivers.
-#include "drivers/sim/server.hpp"
-
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -17,6 +15,7 @@
 #include <thread>
 
 #include "base/error.hpp"
+#include "drivers/sim/bench_server.hpp"
 #include "drivers/sim/control_line.hpp"
 #include "drivers/sim/transport/pty.hpp"
 #include "test/drivers/sim/hex.hpp"

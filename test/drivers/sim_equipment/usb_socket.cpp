@@ -21,7 +21,10 @@ UsbSocket::~UsbSocket() {
 }
 
 void UsbSocket::run() noexcept {
-  for (const UsbFault& window : faults_.unplugged()) {
+  UsbFaultScript windows = faults_.script();
+  std::erase_if(windows, [](const UsbFault& fault) { return fault.kind != UsbFaultKind::unplug; });
+  std::sort(windows.begin(), windows.end(), [](const UsbFault& a, const UsbFault& b) { return a.at < b.at; });
+  for (const UsbFault& window : windows) {
     if (!wait_until(window.at)) return;
     bus_.unplug(port_);
     if (!wait_until(window.end())) return;

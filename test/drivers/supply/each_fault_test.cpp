@@ -14,6 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 using sim::SupplyFaultKind;
 using test::kShort;
+using test::lasting;
 using test::Over;
 using test::SimulatedSupply;
 using testing::HasSubstr;
@@ -106,10 +107,7 @@ TEST(SupplyMeetsAnException, AndDoesNotAskAgain) {
   SteadyClock clock;
   SimulatedSupply simulated;
   ModbusSupply supply(simulated.address(), clock, kShort);
-  sim::SupplyFault refusal;
-  refusal.kind = SupplyFaultKind::exception;
-  refusal.lasts = 1h;
-  simulated.spoil(refusal);
+  simulated.spoil(lasting(SupplyFaultKind::exception));
   const std::uint64_t before = simulated.truth().requests;
   EXPECT_THROW((void)supply.read(), DeviceError);
   EXPECT_EQ(simulated.truth().requests - before, 1u);

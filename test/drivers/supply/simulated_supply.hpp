@@ -31,6 +31,16 @@ inline bool eventually(const std::function<bool()>& holds) {
 
 enum class Over { rtu, tcp };
 
+/// From now on, for an hour; of reads_as: the register and its value.
+inline sim::SupplyFault lasting(sim::SupplyFaultKind kind, std::uint16_t address = 0, std::uint16_t value = 0) {
+  sim::SupplyFault fault;
+  fault.kind = kind;
+  fault.lasts = std::chrono::hours(1);
+  fault.address = address;
+  fault.value = value;
+  return fault;
+}
+
 class SimulatedSupply {
  public:
   explicit SimulatedSupply(const std::string& model = "RD6006", double replies_per_s = 0)

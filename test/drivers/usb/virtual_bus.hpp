@@ -7,9 +7,10 @@
 #include <memory>
 #include <thread>
 
-#include "base/error.hpp"
+#include "base/clock.hpp"
 #include "drivers/sim/usb/function.hpp"
 #include "test/drivers/sim_equipment/virtual_usb.hpp"
+#include "test/refusal.hpp"
 
 namespace kphi {
 
@@ -34,17 +35,6 @@ class OnVirtualBus : public testing::Test {
   sim::UsbFaults faults{clock};
   std::unique_ptr<sim::VirtualUsb> wire;
 };
-
-/// The words of the DeviceError that the call throws; empty: none.
-template <class Call>
-std::string refusal(Call&& call) {
-  try {
-    call();
-  } catch (const DeviceError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 /// Polls; false after ten seconds.
 template <class Condition>

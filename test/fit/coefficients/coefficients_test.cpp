@@ -82,8 +82,7 @@ TEST(Coefficients, AreReadByTheLibraryThatFlies) {
 
 TEST(Coefficients, OfABareTableAreReadToo) {
   const std::vector<LinePoint> points{{0, 1.55e-6, 0}, {45, 1.4e-6, 0}, {270, 0.4e-6, 0}};
-  Identification fit = identify_table(points, {}, {});
-  fit.propeller = "5e3";
+  const Identification fit = identify_table(points, {.propeller = "5e3"});
   const std::string text = format_coefficients(fit, {});
   const auto file = compensation::parse_coefficients(text, "k.yaml");
   EXPECT_FALSE(file.fastest_speed) << "a range nobody gave is not invented";
@@ -188,21 +187,21 @@ TEST_F(RecordedFitTest, FitsAndBudgetsTheSameAgain) {
   options.left_out = {{90, 2, "plate \"slipped\": seen"}};
   auto steps = campaign.steps;
   for (auto& step : steps) step.speed_sd_rad_s = 1;
-  Identification found = identify(steps, options);
-  found.overlap = compensation::OverlapMeasure::area_share;
+  options.overlap = compensation::OverlapMeasure::area_share;
+  const Identification found = identify(steps, options);
   AnalysisOptions how;
   how.bench.cell_calibration = 0.0031;
   how.bench.alignment_rad = 0.011;
   how.bench.motor_clock = 1.7e-5;
 
   const RecordedFit record = written(found, how.bench);
-  const Identification again = identify_again(steps, record);
+  const Identification again = identify(steps, record.options);
   EXPECT_EQ(again.line.intercept, found.line.intercept);
   EXPECT_EQ(again.line.slope_per_deg, found.line.slope_per_deg);
-  EXPECT_EQ(again.overlap, found.overlap);
+  EXPECT_EQ(again.options.overlap, found.options.overlap);
   EXPECT_EQ(again.selection.used.size(), found.selection.used.size());
-  ASSERT_EQ(again.left_out.size(), 1u);
-  EXPECT_EQ(again.left_out[0].cause, "plate \"slipped\": seen");
+  ASSERT_EQ(again.options.left_out.size(), 1u);
+  EXPECT_EQ(again.options.left_out[0].cause, "plate \"slipped\": seen");
   AnalysisOptions as_recorded;
   as_recorded.bench = record.bench.value();
   EXPECT_FALSE(as_recorded.bench.cross_axis) << "what nobody knew stays unknown";
@@ -212,11 +211,8 @@ TEST_F(RecordedFitTest, FitsAndBudgetsTheSameAgain) {
 }
 
 TEST_F(RecordedFitTest, KeepsThePropellerThatSomebodyNamed) {
-  Identification found = identify(campaign_steps());
-  found.propeller = "mine";
-  found.diameter_in = 5.1;
-  found.blades = 4;
-  const Identification again = identify_again(campaign_steps(), written(found, std::nullopt));
+  const Identification found = identify(campaign_steps(), {.propeller = "mine", .diameter_in = 5.1, .blades = 4});
+  const Identification again = identify(campaign_steps(), written(found, std::nullopt).options);
   EXPECT_EQ(again.propeller, "mine");
   EXPECT_EQ(again.diameter_in, 5.1);
   EXPECT_EQ(again.blades, 4);

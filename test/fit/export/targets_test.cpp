@@ -11,7 +11,7 @@
 
 #include "base/error.hpp"
 #include "fit/coefficients/coefficients.hpp"
-#include "fit/logs/coefficient_table.hpp"
+#include "fit/logs/import_table.hpp"
 #include "test/fit/campaign_steps.hpp"
 #include "test/fit/export/outside_reader.hpp"
 #include "test/temporary_folder.hpp"

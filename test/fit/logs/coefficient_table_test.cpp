@@ -1,5 +1,3 @@
-#include "fit/logs/coefficient_table.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 #include <string>
 
 #include "base/error.hpp"
+#include "fit/logs/import_table.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -28,7 +27,7 @@ TEST(UiucTable, TurnsTheCoefficientIntoThrust) {
   EXPECT_NEAR(imported.steps[0].thrust_n, 0.1 * 1.225 * 100 * 100 * std::pow(0.254, 4), 1e-12);
   EXPECT_NEAR(imported.steps[0].speed_rad_s, 628.3185307, 1e-6);
   EXPECT_THROW((void)read_uiuc("RPM CT\n6000 0.1\n", "table.txt"), ConfigurationError) << "no diameter";
-  EXPECT_NO_THROW((void)read_uiuc("RPM CT\n6000 0.1\n", "table.txt", {.diameter_in = 10}));
+  EXPECT_NO_THROW((void)read_uiuc("RPM CT\n6000 0.1\n", "table.txt", 10));
   EXPECT_THROW((void)read_uiuc("RPM CP\n6000 0.1\n", "a_10x7.txt"), ConfigurationError);
 }
 

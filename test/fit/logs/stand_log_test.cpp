@@ -6,7 +6,6 @@
 
 #include "base/error.hpp"
 #include "compensation/units.hpp"
-#include "fit/logs/column_unit.hpp"
 #include "fit/logs/import_table.hpp"
 
 namespace kphi::fit {

@@ -81,7 +81,7 @@ inline KnownLog two_speeds(double k, RowSelection selection, int wrong = -1) {
     log.text += fmt::format("{},{},-0.01,{},{},{},{},{},0.06,,\n", 2.0 * i, 1000 + 60 * i, kilogram, 16 - 0.02 * i,
                             0.2 * i, electrical, optical);
     const bool optical_used = selection.speed == SpeedSource::optical;
-    if (i == 0 || (selection.optical_per_electrical && i == wrong)) continue;
+    if (i == 0) continue;
     log.used.push_back(
         {from_rpm(optical_used ? optical : electrical * selection.speed_factor).value(), kilogram * kKilogramForce, 1});
   }
@@ -171,8 +171,6 @@ inline KnownLog drifting_plateau(double k, std::uint64_t seed) {
 inline std::vector<KnownLog> known_logs() {
   const RowSelection electrical{.speed = SpeedSource::electrical, .speed_factor = 7.0 / 6, .speed_above_rpm = 1000};
   const RowSelection optical{.speed = SpeedSource::optical, .speed_above_rpm = 1000};
-  RowSelection agreeing = electrical;
-  agreeing.optical_per_electrical = 7.0 / 6;
   return {averaged_sweep(1.13e-6),
           averaged_sweep(1.11e-6, {.speed_missing = true}),
           averaged_sweep(1.20e-6, {.current_limit = true}),
@@ -181,7 +179,6 @@ inline std::vector<KnownLog> known_logs() {
           two_speeds(9.0e-6, electrical),
           two_speeds(9.0e-6, optical, 7),
           two_speeds(9.0e-6, electrical, 7),
-          two_speeds(9.0e-6, agreeing, 7),
           untared_ramp(8.0e-5, 1),
           drifting_plateau(1.4e-4, 2)};
 }

@@ -27,15 +27,15 @@ TEST(Air, TheSamePropellerInAnotherAirHasTheSameStandardCoefficients) {
   EXPECT_NEAR(dense.line.K_T / thin.line.K_T, 1.25 / 1.10, 1e-9);
   ASSERT_EQ(thin.table.size(), dense.table.size());
   for (std::size_t i = 0; i < thin.table.size(); ++i) {
-    EXPECT_NEAR(thin.table[i].standard->k / dense.table[i].standard->k, 1, 1e-6);
-    EXPECT_NEAR(thin.table[i].standard->k / identify(campaign_steps()).table[i].k, 1, 1e-6);
+    EXPECT_NEAR(thin.table[i].standard->value / dense.table[i].standard->value, 1, 1e-6);
+    EXPECT_NEAR(thin.table[i].standard->value / identify(campaign_steps()).table[i].k, 1, 1e-6);
   }
 }
 
 TEST(Air, ItsUncertaintyJoinsThatOfTheFit) {
   const auto standard = at_standard(2e-6, 2e-8, {1.225, 0.03 * 1.225});
-  EXPECT_DOUBLE_EQ(standard.k, 2e-6);
-  EXPECT_NEAR(standard.standard_error / standard.k, std::hypot(0.01, 0.03), 1e-12);
+  EXPECT_DOUBLE_EQ(standard.value, 2e-6);
+  EXPECT_NEAR(standard.u / standard.value, std::hypot(0.01, 0.03), 1e-12);
 }
 
 TEST(Air, OneStepWithoutItIsEnoughToKnowNothing) {
@@ -59,8 +59,8 @@ TEST(Air, StandsInFileAndReport) {
   const YAML::Node file = YAML::Load(format_coefficients(fit, {}));
   EXPECT_NEAR(file["air_density_kg_m3"].as<double>(), 1.10, 1e-12);
   EXPECT_NEAR(file["air_density_u_kg_m3"].as<double>(), 0.011, 1e-12);
-  EXPECT_EQ(file["k_standard"]["value"].as<double>(), fit.table[0].standard->k);
-  EXPECT_EQ(file["table"][4]["k_standard"].as<double>(), fit.table[4].standard->k);
+  EXPECT_EQ(file["k_standard"]["value"].as<double>(), fit.table[0].standard->value);
+  EXPECT_EQ(file["table"][4]["k_standard"].as<double>(), fit.table[4].standard->value);
   const std::string report = format_report(fit, {}, {});
   EXPECT_NE(report.find("1.1000 ± 0.0110 kg/m³"), std::string::npos);
   EXPECT_EQ(report.find("Air density unknown"), std::string::npos);

@@ -141,7 +141,7 @@ TEST(Identification, NamesTheAngleThatCannotBeFitted) {
 
 TEST(Identification, OfATableKeepsTheRangeItWasGiven) {
   const std::vector<LinePoint> points{{90, 1.2e-6, 1e-8}, {0, 1.5e-6, 1e-8}, {270, 0.4e-6, 1e-8}};
-  const Identification result = identify_table(points, {}, {300, 2000});
+  const Identification result = identify_table(points, {.speed_range = {300, 2000}});
   EXPECT_EQ(result.table.front().phi_deg, 0);
   EXPECT_FALSE(result.table.front().fit);
   EXPECT_EQ(result.speed_max_rad_s, 2000);

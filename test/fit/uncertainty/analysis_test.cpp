@@ -124,7 +124,7 @@ TEST(Analysis, OneRunEachLeavesTheRepetitionsUnknown) {
 
 TEST(Analysis, OfATableUsesItsOwnErrors) {
   const std::vector<LinePoint> points{{0, 1.5e-6, 1e-8}, {90, 1.2e-6, 1e-8}, {180, 0.8e-6, 2e-8}, {270, 0.4e-6, 1e-8}};
-  const Analysis analysis = analyse(identify_table(points, {}, {300, 2000}));
+  const Analysis analysis = analyse(identify_table(points, {.speed_range = {300, 2000}}));
   EXPECT_NEAR(analysis.coefficients[2].combined(), 2e-8, 1e-20);
   EXPECT_TRUE(analysis.speed.empty());
   EXPECT_TRUE(analysis.torque.empty());
@@ -198,7 +198,7 @@ TEST(Analysis, EveryEstimatorFindsTheTruth) {
 TEST(Analysis, IsWrittenWithoutWhatJsonCannotHold) {
   Study study;
   const Analysis analysis = analyse(study.found, study.options);
-  const std::string text = to_json(analysis).dump();
+  const std::string text = nlohmann::ordered_json(analysis).dump();
   EXPECT_EQ(text.find("nan"), std::string::npos);
   EXPECT_EQ(text.find("inf"), std::string::npos);
   EXPECT_THAT(text, HasSubstr("\"source\":\"zero drift\""));

@@ -26,7 +26,7 @@ std::vector<RunSums> runs_of(double phi, std::initializer_list<double> k) {
 
 // Three runs drawn with replacement: the mean has the variance Σ(k − mean)²/n², and 1/27 for each end.
 TEST(Bootstrap, OfThreeRunsHasTheVarianceThatCombinatoricsGives) {
-  const auto result = bootstrap(runs_of(0, {1, 2, 3}), {{1}, {0}}, {20000, 7, 0.95});
+  const auto result = bootstrap(runs_of(0, {1, 2, 3}), {{1}, {0}}, {20000, 7});
   ASSERT_EQ(result.size(), 3u);
   EXPECT_EQ(result[0].quantity, "K_T");
   EXPECT_DOUBLE_EQ(result[0].value, 2);
@@ -38,7 +38,7 @@ TEST(Bootstrap, OfThreeRunsHasTheVarianceThatCombinatoricsGives) {
 TEST(Bootstrap, CarriesTheLineAlong) {
   std::vector<RunSums> runs = runs_of(0, {10, 10});
   for (const auto& run : runs_of(100, {5, 7})) runs.push_back(run);
-  const auto result = bootstrap(runs, {{1, 0}, {-0.01, 0.01}}, {5000, 1, 0.95});
+  const auto result = bootstrap(runs, {{1, 0}, {-0.01, 0.01}}, {5000, 1});
   ASSERT_EQ(result.size(), 4u);
   EXPECT_EQ(result[3].quantity, "slope");
   EXPECT_NEAR(result[3].value, -0.04, 1e-15);
@@ -48,11 +48,11 @@ TEST(Bootstrap, CarriesTheLineAlong) {
 
 TEST(Bootstrap, IsTheSameForTheSameSeedAndNothingForNothing) {
   const auto runs = runs_of(0, {1, 2, 4});
-  const BootstrapOptions options{1000, 3, 0.9};
+  const BootstrapOptions options{1000, 3};
   EXPECT_EQ(bootstrap(runs, {{1}, {0}}, options)[0].standard_error,
             bootstrap(runs, {{1}, {0}}, options)[0].standard_error);
   EXPECT_TRUE(bootstrap({}, {}, options).empty());
-  EXPECT_TRUE(bootstrap(runs, {{1}, {0}}, {0, 1, 0.95}).empty());
+  EXPECT_TRUE(bootstrap(runs, {{1}, {0}}, {0, 1}).empty());
 }
 
 TEST(Bootstrap, AgreesWithTheBudgetUpToItsNarrowness) {

@@ -103,7 +103,7 @@ TEST(Capture, OfAMotorGoesThroughTheParserBitByBit) {
     Motor motor(line.device(), 115200, {}, clock, path);
     motor.spin_at(RadPerSec(1234.5));
     ASSERT_TRUE(line.heard_a_speed(1234.5));
-    ASSERT_TRUE(motor.coast_and_confirm(1s));
+    ASSERT_TRUE(motor.stop().safe());
     counters = motor.counters();
   }
   const auto records = read_capture(path);

@@ -9,6 +9,7 @@
 
 #include "base/error.hpp"
 #include "test/drivers/iq/module_on_a_line.hpp"
+#include "test/refusal.hpp"
 #include "test/soon.hpp"
 
 namespace kphi::iq {
@@ -33,12 +34,7 @@ struct Stand {
 
 std::string refusal(const std::string& device, unsigned baud = 115200) {
   const SteadyClock clock;
-  try {
-    Motor motor(device, baud, Settings{}, clock);
-  } catch (const DeviceError& error) {
-    return error.what();
-  }
-  return "";
+  return kphi::refusal([&] { Motor motor(device, baud, Settings{}, clock); });
 }
 
 TEST(Motor, ConnectsCoastingAndKnowsItsModule) {
@@ -65,8 +61,8 @@ TEST(Motor, SpinsAndBringsTelemetry) {
         return speed.value == 1234.5;
       },
       2000ms));
-  EXPECT_GT(stand.motor->newest_reading(), Instant{0});
-  EXPECT_LE(stand.motor->newest_reading(), stand.clock.now());
+  EXPECT_GT(speed.time, Instant{0});
+  EXPECT_LE(speed.time, stand.clock.now());
   EXPECT_LT(speed.uncertainty, 50ms);
   EXPECT_GT(stand.motor->counters().replies, 10u);
 }
@@ -74,7 +70,7 @@ TEST(Motor, SpinsAndBringsTelemetry) {
 TEST(Motor, ConfirmsThatItCoasts) {
   Stand stand;
   stand.spin(700);
-  EXPECT_TRUE(stand.motor->coast_and_confirm(1s));
+  EXPECT_EQ(stand.motor->stop().outcome, StopReport::Outcome::standing);
   EXPECT_TRUE(stand.line.left_coasting());
   EXPECT_EQ(stand.line.with([](Module& m) { return m.values.at({50, 0}); }), fake::u8(5));
 }
@@ -83,7 +79,7 @@ TEST(Motor, DoesNotClaimACoastThatTheModuleDenies) {
   Stand stand;
   stand.spin(700);
   stand.line.with([](Module& m) { m.ignore_sets = true; });
-  EXPECT_FALSE(stand.motor->coast_and_confirm(150ms));
+  EXPECT_EQ(stand.motor->stop().outcome, StopReport::Outcome::unconfirmed);
 }
 
 TEST(Motor, TakesOnlyTheLastOfManyCommandsWhenItCannotKeepUp) {
@@ -98,17 +94,16 @@ TEST(Motor, ObeysManyThreads) {
   for (int i = 0; i < 4; ++i) {
     callers.push_back(std::async(std::launch::async, [&, i] {
       for (int n = 0; n < 200; ++n) {
-        if (i == 0) stand.motor->coast();
+        if (i == 0) stand.motor->emergency_stop();
         if (i == 1) stand.motor->renew();
         if (i >= 2) stand.motor->spin_at(RadPerSec(100 * i + n % 7));
         (void)stand.motor->counters();
         (void)stand.motor->identity();
-        (void)stand.motor->newest_reading();
       }
     }));
   }
   for (auto& caller : callers) caller.get();
-  EXPECT_TRUE(stand.motor->coast_and_confirm(1s));
+  EXPECT_TRUE(stand.motor->stop().safe());
   EXPECT_TRUE(stand.line.left_coasting());
 }
 
@@ -124,7 +119,6 @@ TEST(Motor, NoticesAPulledPlugAtOnce) {
   EXPECT_TRUE(soon([&] { return !stand.motor->alive(); }, 100ms));
   EXPECT_NE(stand.motor->failure().find("unplugged"), std::string::npos) << stand.motor->failure();
   EXPECT_THROW(stand.motor->spin_at(RadPerSec(100)), DeviceError);
-  EXPECT_FALSE(stand.motor->coast_and_confirm(10s)) << "without waiting for it";
 }
 
 TEST(Motor, RefusesASecondOwner) {
@@ -197,7 +191,7 @@ TEST(Lease, IsKeptByACallerThatIsAlive) {
 TEST(Lease, IsNotNeededToStayCoasting) {
   Stand stand;
   stand.spin(900);
-  ASSERT_TRUE(stand.motor->coast_and_confirm(1s));
+  ASSERT_TRUE(stand.motor->stop().safe());
   stand.motor->renew();
   EXPECT_FALSE(soon([&] { return !stand.line.left_coasting(); }, 100ms));
 }
@@ -230,15 +224,14 @@ INSTANTIATE_TEST_SUITE_P(
                              } catch (const std::runtime_error&) {
                              }
                            }},
-                    WayOut{"Coast", [](Stand& s) { s.motor->coast(); }},
-                    WayOut{"ConfirmedCoast", [](Stand& s) { (void)s.motor->coast_and_confirm(1s); }},
+                    WayOut{"Stop", [](Stand& s) { EXPECT_TRUE(s.motor->stop().safe()); }},
                     WayOut{"EmergencyStop", [](Stand& s) { s.motor->emergency_stop(); }},
                     WayOut{"SlowStop", [](Stand& s) { EXPECT_TRUE(s.motor->stop({.deceleration = 1000}).safe()); }},
                     WayOut{"SlowStopThatIsAbandoned",
                            [](Stand& s) {
                              auto stop =
                                  std::async(std::launch::async, [&] { (void)s.motor->stop({.deceleration = 1000}); });
-                             s.motor->coast();
+                             s.motor->emergency_stop();
                              stop.get();
                            }},
                     WayOut{"ModuleThatRestarts",

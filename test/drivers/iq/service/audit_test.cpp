@@ -71,7 +71,7 @@ TEST(IqAudit, AsksAnAbsentClientOnlyOnce) {
 TEST(IqAudit, AsksNothingThatCannotBeRead) {
   FakeDialogue module;
   (void)read_audit(module);
-  for (const Entry* asked : module.asked) EXPECT_TRUE(asked->allows(Access::get)) << asked->name;
+  for (const Entry* asked : module.asked) EXPECT_TRUE(asked->allows(Access::get)) << asked->path;
 }
 
 void become_old(std::map<const Entry*, double>& values) {

@@ -9,6 +9,7 @@
 #include "drivers/iq/service/audit.hpp"
 #include "test/drivers/iq/fake_dialogue.hpp"
 #include "test/drivers/iq/module_on_a_line.hpp"
+#include "test/refusal.hpp"
 
 namespace kphi::iq {
 namespace {
@@ -22,12 +23,7 @@ using testing::IsEmpty;
 const SteadyClock kClock;
 
 std::string refusal(const std::string& device, int module_id = 0) {
-  try {
-    SerialDialogue dialogue({device, 115200, module_id}, kClock);
-  } catch (const DeviceError& error) {
-    return error.what();
-  }
-  return "";
+  return kphi::refusal([&] { SerialDialogue dialogue({device, 115200, module_id}, kClock); });
 }
 
 TEST(SerialDialogue, CoastsBeforeItAsksAnythingElse) {
@@ -50,14 +46,19 @@ TEST(SerialDialogue, LeavesTheMotorCoasting) {
   EXPECT_TRUE(line.left_coasting()) << "told again at the end";
 }
 
+template <Path path>
+std::optional<double> ask(Dialogue& dialogue) {
+  return dialogue.inquire({&entry<path>, std::nullopt}).value;
+}
+
 TEST(SerialDialogue, CarriesQuestionsAndSettings) {
   ModuleOnALine line;
   SerialDialogue dialogue({line.device(), 115200, 0}, kClock);
-  EXPECT_EQ(dialogue.ask(entry<"power_monitor.volts">)->value, 12.5);
-  EXPECT_EQ(dialogue.ask(entry<"brushless_drive.motor_pole_pairs">)->value, 7);
-  EXPECT_FALSE(dialogue.ask(entry<"temperature_estimator.temp">)) << "silent in this firmware";
+  EXPECT_EQ(ask<"power_monitor.volts">(dialogue), 12.5);
+  EXPECT_EQ(ask<"brushless_drive.motor_pole_pairs">(dialogue), 7);
+  EXPECT_FALSE(ask<"temperature_estimator.temp">(dialogue)) << "silent in this firmware";
   EXPECT_THAT(set_and_read_back(dialogue, connection_settings(0.5)), IsEmpty());
-  EXPECT_EQ(dialogue.counters().timeouts, 2u);
+  EXPECT_EQ(dialogue.counters().timeouts, 3u);
   EXPECT_GT(dialogue.median_round_trip(), Duration(0));
 }
 
@@ -65,18 +66,20 @@ TEST(SerialDialogue, StampsAnAnswerBetweenQuestionAndReply) {
   ModuleOnALine line;
   SerialDialogue dialogue({line.device(), 2000000, 0}, kClock);
   const Instant before = kClock.now();
-  const auto answer = dialogue.ask(entry<"power_monitor.volts">);
+  const Reply reply = dialogue.inquire({&entry<"power_monitor.volts">, std::nullopt});
   const Instant after = kClock.now();
-  ASSERT_TRUE(answer);
-  EXPECT_GE(answer->time - answer->uncertainty, before - Duration(1));
-  EXPECT_LE(answer->time + answer->uncertainty, after + Duration(1));
+  ASSERT_TRUE(reply.value);
+  EXPECT_GE(reply.time - reply.uncertainty, before - Duration(1));
+  EXPECT_LE(reply.time + reply.uncertainty, after + Duration(1));
 }
 
 TEST(SerialDialogue, ReadsAWholeAudit) {
   ModuleOnALine line;
   line.with([](Module& m) {
-    for (const Entry* audited : kAudited)
-      m.values.insert({{static_cast<int>(audited->type), audited->sub}, fake::Bytes(size_of(audited->format))});
+    for (const Entry& entry : kEntries) {
+      if (entry.audited)
+        m.values.insert({{static_cast<int>(entry.type), entry.sub}, fake::Bytes(size_of(entry.format))});
+    }
   });
   SerialDialogue dialogue({line.device(), 115200, 0}, kClock);
   const AuditRecord record = read_audit(dialogue);
@@ -97,7 +100,7 @@ TEST(SerialDialogue, SaysWhyNobodyAnswers) {
     m.silent.insert({52, 2});
     m.ignore_sets = true;
   });
-  EXPECT_THAT(refusal(stubborn.device()), HasSubstr("coast not confirmed (its drive mode last read 3)"));
+  EXPECT_THAT(refusal(stubborn.device()), HasSubstr("coast not confirmed: the drive mode last read 3"));
   EXPECT_TRUE(stubborn.left_coasting()) << "the last thing it heard is a coast";
 }
 
@@ -105,16 +108,17 @@ TEST(SerialDialogue, NoticesThatTheLineIsGone) {
   ModuleOnALine line;
   SerialDialogue dialogue({line.device(), 115200, 0}, kClock);
   line.unplug();
-  EXPECT_THROW((void)dialogue.ask(entry<"power_monitor.volts">), DeviceError);
+  EXPECT_THROW((void)ask<"power_monitor.volts">(dialogue), DeviceError);
 }
 
 TEST(SerialDialogue, IgnoresAReplyThatComesTooLate) {
   ModuleOnALine line;
   SerialDialogue dialogue({line.device(), 115200, 0}, kClock);
   line.with([](Module& m) { m.silent.insert({69, 0}); });
-  EXPECT_FALSE(dialogue.ask(entry<"power_monitor.volts">));
+  EXPECT_FALSE(ask<"power_monitor.volts">(dialogue));
   line.with([](Module& m) { m.silent.erase({69, 0}); });
-  EXPECT_EQ(dialogue.ask(entry<"power_monitor.amps">)->value, 3.25);
+  EXPECT_EQ(ask<"power_monitor.amps">(dialogue), 3.25);
+  EXPECT_EQ(ask<"power_monitor.volts">(dialogue), 12.5);
 }
 
 constexpr const Entry& kTimeout = entry<"propeller_motor_control.timeout">;
@@ -136,16 +140,6 @@ TEST(SettingReadBack, FindsWhatDidNotArrive) {
   EXPECT_THAT(findings[0].what, HasSubstr("timeout was set to 0.25 s and reads back 10"));
 }
 
-TEST(SettingReadBack, SetsAgainWhatWasLost) {
-  FakeDialogue module;
-  module.values[&kTimeout] = 10;
-  module.loses_sets = 2;
-  EXPECT_THAT(set_and_read_back(module, connection_settings(0.25)), IsEmpty());
-  module.values[&kTimeout] = 10;
-  module.loses_sets = 3;
-  EXPECT_EQ(set_and_read_back(module, connection_settings(0.25)).size(), 1u);
-}
-
 TEST(SettingReadBack, AcceptsOldFirmwareWhereTheEntryIsNotRequired) {
   FakeDialogue module;
   module.values.erase(&entry<"propeller_motor_control.timeout_behavior">);
@@ -155,7 +149,6 @@ TEST(SettingReadBack, AcceptsOldFirmwareWhereTheEntryIsNotRequired) {
 }
 
 TEST(Dialogue, CannotCommandMotionOrDamage) {
-  FakeDialogue module;
   for (const Entry* forbidden : {&entry<"propeller_motor_control.ctrl_velocity">,
                                  &entry<"propeller_motor_control.ctrl_volts">,
                                  &entry<"propeller_motor_control.ctrl_pwm">,
@@ -178,9 +171,9 @@ TEST(Dialogue, CannotCommandMotionOrDamage) {
                                  &entry<"persistent_memory.format_key_1">,
                                  &entry<"serial_interface.baud_rate">,
                                  &entry<"power_monitor.volts">}) {
-    EXPECT_THROW(module.tell(*forbidden, 1), std::logic_error) << forbidden->name;
+    EXPECT_THROW(Inquiries::check({{forbidden, 1.0}}), std::invalid_argument) << forbidden->path;
   }
-  EXPECT_NO_THROW(module.tell(entry<"coil_temperature_estimator.t_amb">, 21));
+  EXPECT_NO_THROW(Inquiries::check({{&entry<"coil_temperature_estimator.t_amb">, 21.0}}));
 }
 
 }  // namespace

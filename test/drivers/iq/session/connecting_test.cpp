@@ -245,8 +245,8 @@ TEST(Inquiries, NeverMoveSaveEraseOrRename) {
     EXPECT_THROW(wire.session.inquire({{entry, 1.0}}, wire.now), std::invalid_argument) << path;
   }
   for (const Entry& entry : kEntries) {
-    const bool moves = entry.name.substr(0, 5) == "ctrl_" || entry.type == Client::persistent_memory;
-    EXPECT_FALSE(moves && is_volatile_setting(entry)) << entry.name;
+    const bool moves = entry.name().starts_with("ctrl_") || entry.type == Client::persistent_memory;
+    EXPECT_FALSE(moves && is_volatile_setting(entry)) << entry.path;
   }
   EXPECT_THROW(wire.session.inquire({{find("propeller_motor_control.ctrl_coast"), {}}}, wire.now),
                std::invalid_argument);

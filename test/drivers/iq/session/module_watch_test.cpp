@@ -1,4 +1,4 @@
-#include "drivers/iq/session/module_watch.hpp"
+#include "drivers/iq/session/stopping.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -132,7 +132,7 @@ class SleepingClock final : public Clock {
   SteadyClock steady_;
 };
 
-TEST(Link, CoastsAfterTheComputerSleptAndTakesNoSpeedUntilItIsRearmed) {
+TEST(Link, CoastsAfterTheComputerSleptAndTakesNoSpeedAnyMore) {
   SleepingClock clock;
   fake::ModuleOnALine line;
   Motor motor(line.device(), 115200, Settings{}, clock);

@@ -60,6 +60,19 @@ bool eventually(Condition condition) {
   return true;
 }
 
+/// A load cell on a box of its own.
+struct Bench {
+  explicit Bench(const FakeBox::Manner& manner = {})
+      : Bench(manner, FakeWeb::page(xml(1, manner.records_per_datagram))) {}
+  Bench(const FakeBox::Manner& manner, const FakeWeb::Manner& page, const StreamPolicy& policy = {})
+      : web(page), box(manner), clock(manner.speed), cell({"127.0.0.1", box.port(), web->port()}, clock, policy) {}
+
+  std::optional<FakeWeb> web;
+  FakeBox box;
+  const SteadyClock clock;
+  LoadCell cell;
+};
+
 std::string start_failure(LoadCell& cell) {
   try {
     cell.start();
@@ -85,77 +98,62 @@ TEST(LoadCell, ConstructionReadsTheConfigurationAndLeavesTheStreamAlone) {
 }
 
 void stream_without_loss(unsigned records_per_datagram) {
-  FakeWeb web(FakeWeb::page(xml(1, records_per_datagram)));
-  FakeBox box({.records_per_datagram = records_per_datagram});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  cell.start();
-  EXPECT_EQ(cell.state(), State::streaming);
-  EXPECT_GE(consume(cell, 7000), 7000u);
-  EXPECT_LT(clock.now() - cell.newest_arrival(), 5s);
-  cell.stop();
-  const Counters counters = cell.counters();
+  Bench bench({.records_per_datagram = records_per_datagram});
+  bench.cell.start();
+  EXPECT_EQ(bench.cell.state(), State::streaming);
+  EXPECT_GE(consume(bench.cell, 7000), 7000u);
+  EXPECT_LT(bench.clock.now() - bench.cell.newest_arrival(), 5s);
+  bench.cell.stop();
+  const Counters counters = bench.cell.counters();
   EXPECT_GE(counters.received, 7000u);
   EXPECT_EQ(counters.expected, counters.received);
   EXPECT_EQ(counters.lost_network + counters.lost_host + counters.malformed + counters.queue_overflows, 0u);
-  EXPECT_TRUE(eventually([&] { return !box.streaming(); }));
-  EXPECT_EQ(box.starts(), 1);
-  EXPECT_EQ(box.settings_written(), 0);
-  EXPECT_EQ(cell.state(), State::idle);
+  EXPECT_TRUE(eventually([&] { return !bench.box.streaming(); }));
+  EXPECT_EQ(bench.box.starts(), 1);
+  EXPECT_EQ(bench.box.settings_written(), 0);
+  EXPECT_EQ(bench.cell.state(), State::idle);
 }
 
 TEST(LoadCell, TakesSevenThousandRecordsPerSecondBuffered) { stream_without_loss(40); }
 TEST(LoadCell, TakesSevenThousandRecordsPerSecondOneByOne) { stream_without_loss(1); }
 
 TEST(LoadCell, TakesTwentyTimesTheRateOnAClockTwentyTimesAsFast) {
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box({.speed = 20});
-  const SteadyClock clock(20);
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  cell.start();
-  EXPECT_GE(consume(cell, 70'000), 70'000u);
-  cell.stop();
-  EXPECT_EQ(cell.counters().expected, cell.counters().received);
+  Bench bench({.speed = 20});
+  bench.cell.start();
+  EXPECT_GE(consume(bench.cell, 70'000), 70'000u);
+  bench.cell.stop();
+  EXPECT_EQ(bench.cell.counters().expected, bench.cell.counters().received);
 }
 
 TEST(LoadCell, ASleepingConsumerLosesNothing) {
-  FakeWeb web(FakeWeb::page(xml(1, 1)));
-  FakeBox box({.records_per_datagram = 1});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  cell.start();
-  ASSERT_TRUE(eventually([&] { return cell.counters().received >= 7000; }));  // nobody takes for a second
-  cell.stop();
-  const Counters counters = cell.counters();
+  Bench bench({.records_per_datagram = 1});
+  bench.cell.start();
+  ASSERT_TRUE(eventually([&] { return bench.cell.counters().received >= 7000; }));  // nobody takes for a second
+  bench.cell.stop();
+  const Counters counters = bench.cell.counters();
   EXPECT_EQ(counters.queue_overflows, 0u);
   EXPECT_EQ(counters.lost_network + counters.lost_host, 0u);
-  EXPECT_EQ(consume(cell, counters.received), counters.received);
+  EXPECT_EQ(consume(bench.cell, counters.received), counters.received);
 }
 
 TEST(LoadCell, CountsExactlyWhatTheNetworkLost) {
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box({.skip_every = 10});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  cell.start();
-  EXPECT_GE(consume(cell, 4000, true), 4000u);
-  cell.stop();
-  const Counters counters = cell.counters();
+  Bench bench({.skip_every = 10});
+  bench.cell.start();
+  EXPECT_GE(consume(bench.cell, 4000, true), 4000u);
+  bench.cell.stop();
+  const Counters counters = bench.cell.counters();
   EXPECT_EQ(counters.expected, counters.received + counters.lost_network);
   EXPECT_EQ(counters.lost_host, 0u);
   EXPECT_GE(counters.lost_network, 400u);
-  EXPECT_LE(counters.lost_network, box.skipped());
+  EXPECT_LE(counters.lost_network, bench.box.skipped());
   EXPECT_EQ(counters.irregular, 0u);
 }
 
 TEST(LoadCell, RepeatsAStartThatWasLost) {
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box({.starts_ignored = 2});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  cell.start();
-  EXPECT_EQ(box.starts(), 3);
-  EXPECT_GE(consume(cell, 100), 100u);
+  Bench bench({.starts_ignored = 2});
+  bench.cell.start();
+  EXPECT_EQ(bench.box.starts(), 3);
+  EXPECT_GE(consume(bench.cell, 100), 100u);
 }
 
 TEST(LoadCell, RepeatsAStopThatWasLost) {
@@ -172,29 +170,23 @@ TEST(LoadCell, RepeatsAStopThatWasLost) {
 }
 
 TEST(LoadCell, StartsAgainAfterAStopWithItsCountersGoingOn) {
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box({});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  cell.start();
-  EXPECT_GE(consume(cell, 400), 400u);
-  cell.stop();
-  const std::uint64_t first = cell.counters().received;
-  cell.start();
-  ASSERT_TRUE(eventually([&] { return cell.counters().received >= first + 400; }));
-  EXPECT_EQ(cell.counters().lost_network, 0u);
-  EXPECT_EQ(cell.counters().expected, cell.counters().received);
+  Bench bench;
+  bench.cell.start();
+  EXPECT_GE(consume(bench.cell, 400), 400u);
+  bench.cell.stop();
+  const std::uint64_t first = bench.cell.counters().received;
+  bench.cell.start();
+  ASSERT_TRUE(eventually([&] { return bench.cell.counters().received >= first + 400; }));
+  EXPECT_EQ(bench.cell.counters().lost_network, 0u);
+  EXPECT_EQ(bench.cell.counters().expected, bench.cell.counters().received);
 }
 
 TEST(LoadCell, SaysThatAStreamHasFallenSilent) {
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box({.mute_after_1000 = true});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  cell.start();
-  EXPECT_TRUE(eventually([&] { return cell.state() == State::silent; }));
-  EXPECT_EQ(cell.counters().received, 1000u);
-  EXPECT_EQ(box.starts(), 1) << "it must not fight for a stream that another client has taken";
+  Bench bench({.mute_after_1000 = true});
+  bench.cell.start();
+  EXPECT_TRUE(eventually([&] { return bench.cell.state() == State::silent; }));
+  EXPECT_EQ(bench.cell.counters().received, 1000u);
+  EXPECT_EQ(bench.box.starts(), 1) << "it must not fight for a stream that another client has taken";
 }
 
 std::vector<EventKind> kinds_until(LoadCell& cell, std::size_t wanted) {
@@ -207,63 +199,48 @@ std::vector<EventKind> kinds_until(LoadCell& cell, std::size_t wanted) {
 }
 
 TEST(LoadCell, ASilentStreamOfABoxThatAnswersIsCalledTakenOver) {
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box({.mute_after_1000 = true});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  cell.start();
-  EXPECT_THAT(kinds_until(cell, 2), testing::ElementsAre(EventKind::silent, EventKind::taken_over));
+  Bench bench({.mute_after_1000 = true});
+  bench.cell.start();
+  EXPECT_THAT(kinds_until(bench.cell, 2), testing::ElementsAre(EventKind::silent, EventKind::taken_over));
 }
 
 TEST(LoadCell, ASilentStreamOfABoxThatIsGoneIsCalledUnreachable) {
-  std::optional<FakeWeb> web(std::in_place, FakeWeb::page(xml()));
-  FakeBox box({.mute_after_1000 = true});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web->port()}, clock);
-  web.reset();
-  cell.start();
-  EXPECT_THAT(kinds_until(cell, 2), testing::ElementsAre(EventKind::silent, EventKind::unreachable));
+  Bench bench({.mute_after_1000 = true});
+  bench.web.reset();
+  bench.cell.start();
+  EXPECT_THAT(kinds_until(bench.cell, 2), testing::ElementsAre(EventKind::silent, EventKind::unreachable));
 }
 
 TEST(LoadCell, GivesUpABoxThatDoesNotComeBack) {
-  std::optional<FakeWeb> web(std::in_place, FakeWeb::page(xml()));
-  FakeBox box({.mute_after_1000 = true});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web->port()}, clock, {.first_pause = 20ms, .give_up_after = 200ms});
-  web.reset();
-  cell.start();
-  EXPECT_THAT(kinds_until(cell, 3),
+  Bench bench({.mute_after_1000 = true}, FakeWeb::page(xml()), {.first_pause = 20ms, .give_up_after = 200ms});
+  bench.web.reset();
+  bench.cell.start();
+  EXPECT_THAT(kinds_until(bench.cell, 3),
               testing::ElementsAre(EventKind::silent, EventKind::unreachable, EventKind::given_up));
-  EXPECT_EQ(cell.state(), State::silent);
-  EXPECT_EQ(box.starts(), 1);
+  EXPECT_EQ(bench.cell.state(), State::silent);
+  EXPECT_EQ(bench.box.starts(), 1);
 }
 
 TEST(LoadCell, StartsABoxAgainThatHasForgottenItsPeaks) {
   std::atomic<bool> booted{false};
-  FakeWeb web({{}, {}, false, [&](const std::string&) {
+  Bench bench({.mute_after_1000 = true},
+              {{}, {}, false, [&](const std::string&) {
                  return FakeWeb::page(booted ? with(xml(), "runpkmx", "0;0;0;0;0;0") : xml()).pieces[0];
                }});
-  FakeBox box({.mute_after_1000 = true});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  cell.start();
+  bench.cell.start();
   booted = true;
-  EXPECT_THAT(kinds_until(cell, 3),
+  EXPECT_THAT(kinds_until(bench.cell, 3),
               testing::ElementsAre(EventKind::silent, EventKind::rebooted, EventKind::reconnected));
-  EXPECT_EQ(box.starts(), 2);
+  EXPECT_EQ(bench.box.starts(), 2);
   // Silent again, and nothing tells of another boot: this time it is left alone.
-  EXPECT_THAT(kinds_until(cell, 2), testing::ElementsAre(EventKind::silent, EventKind::taken_over));
-  EXPECT_EQ(box.starts(), 2);
-  EXPECT_EQ(cell.counters().received, 2000u);
+  EXPECT_THAT(kinds_until(bench.cell, 2), testing::ElementsAre(EventKind::silent, EventKind::taken_over));
+  EXPECT_EQ(bench.box.starts(), 2);
+  EXPECT_EQ(bench.cell.counters().received, 2000u);
 }
 
 TEST(LoadCell, AClosedRdtPortIsAClearErrorWithinSeconds) {
   FakeWeb web(FakeWeb::page(xml()));
-  std::uint16_t closed = 0;
-  {
-    const test::LoopbackSocket gone(SOCK_DGRAM);
-    closed = gone.port();
-  }
+  const std::uint16_t closed = test::closed_port(SOCK_DGRAM);
   const SteadyClock clock;
   LoadCell cell({"127.0.0.1", closed, web.port()}, clock);
   const auto begun = std::chrono::steady_clock::now();
@@ -274,21 +251,15 @@ TEST(LoadCell, AClosedRdtPortIsAClearErrorWithinSeconds) {
 }
 
 TEST(LoadCell, AMuteBoxIsAClearErrorWithinSeconds) {
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box({.starts_ignored = 1000});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  EXPECT_THAT(start_failure(cell), AllOf(HasSubstr("no record after 6 requests"), HasSubstr("firewall")));
-  EXPECT_EQ(box.starts(), 6);
+  Bench bench({.starts_ignored = 1000});
+  EXPECT_THAT(start_failure(bench.cell), AllOf(HasSubstr("no record after 6 requests"), HasSubstr("firewall")));
+  EXPECT_EQ(bench.box.starts(), 6);
 }
 
 TEST(LoadCell, ADisabledStreamIsNamedWithoutTrying) {
-  FakeWeb web(FakeWeb::page(with(xml(), "comrdte", "Disabled")));
-  FakeBox box({});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  EXPECT_THAT(start_failure(cell), AllOf(HasSubstr("RDT is disabled"), HasSubstr("Communications page")));
-  EXPECT_EQ(box.starts(), 0);
+  Bench bench({}, FakeWeb::page(with(xml(), "comrdte", "Disabled")));
+  EXPECT_THAT(start_failure(bench.cell), AllOf(HasSubstr("RDT is disabled"), HasSubstr("Communications page")));
+  EXPECT_EQ(bench.box.starts(), 0);
 }
 
 TEST(LoadCell, AWrongConfigurationNamesTheBox) {
@@ -304,26 +275,11 @@ TEST(LoadCell, AWrongConfigurationNamesTheBox) {
 
 TEST(LoadCell, TellsHowLongTheProcessMayStandStill) {
   FakeWeb web(FakeWeb::page(xml()));
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", 1, web.port()}, clock);
-  EXPECT_THAT(cell.receive_buffer_note(), testing::ContainsRegex("^[0-9.]+ MiB, tolerates [0-9]+ ms"));
-}
-
-TEST(LoadCell, SaysWhatToDoAboutABufferSmallerThanAskedFor) {
-  FakeWeb web(FakeWeb::page(xml()));
-  const SteadyClock clock;
-  const LoadCell cell({"127.0.0.1", 1, web.port()}, clock);
-  const std::optional<Finding> finding = cell.receive_buffer_finding();
-  EXPECT_EQ(finding.has_value(), cell.receive_buffer_bytes() < std::size_t{8} << 20);
-  if (finding) {
-    EXPECT_THAT(finding->next_move, HasSubstr("net.core.rmem_max"));
-  }
-}
-
-TEST(ReceiveBuffer, HoldsWhatWasMeasured) {
-  EXPECT_NEAR(static_cast<double>(datagrams_held(8'388'608, 36)), 10'082, 10);
-  EXPECT_NEAR(static_cast<double>(datagrams_held(212'992, 36)), 256, 1);
-  EXPECT_NEAR(static_cast<double>(datagrams_held(212'992, 1440)), 92, 1);
+  const SteadyClock clock(4);
+  const ReceiveBuffer buffer = LoadCell({"127.0.0.1", 1, web.port()}, clock).receive_buffer();
+  EXPECT_GT(buffer.bytes, 0u);
+  EXPECT_EQ(buffer.payload_bytes, 1440u);
+  EXPECT_NEAR(static_cast<double>(buffer.period.count()), 1e9 * 40 / 7000 / 4, 1) << "time runs four times as fast";
 }
 
 }  // namespace

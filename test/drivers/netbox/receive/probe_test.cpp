@@ -66,11 +66,7 @@ TEST(Probe, CountsWhatTheNetworkLoses) {
 }
 
 TEST(Probe, ABoxThatDoesNotAnswerIsAFindingAndNoException) {
-  std::uint16_t closed = 0;
-  {
-    const test::LoopbackSocket gone(SOCK_STREAM);
-    closed = gone.port();
-  }
+  const std::uint16_t closed = test::closed_port(SOCK_STREAM);
   const SteadyClock clock;
   const Probe found = probe({"127.0.0.1", 1, closed}, clock, quick());
   EXPECT_FALSE(found.answers());

@@ -12,6 +12,8 @@ namespace {
 using namespace std::chrono_literals;
 using test::LoopbackSocket;
 
+constexpr std::chrono::nanoseconds kSingle(1'000'000'000 / 7000), kForty = 40 * kSingle;
+
 class UdpSocketTest : public testing::Test {
  protected:
   UdpSocketTest() {
@@ -65,7 +67,7 @@ TEST_F(UdpSocketTest, HearsNobodyButItsPeer) {
 }
 
 TEST_F(UdpSocketTest, CountsWhatItsBufferCouldNotHold) {
-  const std::size_t held = datagrams_held(socket.receive_buffer_bytes(), 36);
+  const std::size_t held = ReceiveBuffer{socket.receive_buffer_bytes(), 36, 1ms}.datagrams();
   const std::size_t sent = 2 * held + 1000;
   for (std::size_t i = 0; i < sent; ++i) send_from(box, 36);
   std::size_t received = 0;
@@ -79,9 +81,8 @@ TEST_F(UdpSocketTest, CountsWhatItsBufferCouldNotHold) {
 
 TEST_F(UdpSocketTest, ASmallBufferToleratesTheStallThatItTellsAndNoMore) {
   UdpSocket small("127.0.0.1", box.port(), 64 << 10);
-  const std::string note =
-      tolerated_stall(small.receive_buffer_bytes(), 36, std::chrono::nanoseconds(1'000'000'000 / 7000));
-  EXPECT_EQ(note, "0.1 MiB, tolerates 22 ms; for longer set net.core.rmem_max to 4194304");
+  const ReceiveBuffer buffer{small.receive_buffer_bytes(), 36, kSingle};
+  EXPECT_EQ(buffer.note(), "0.1 MiB, tolerates 22 ms; for longer set net.core.rmem_max to 4194304");
   socklen_t length = sizeof own;
   getsockname(small.descriptor(), reinterpret_cast<sockaddr*>(&own), &length);
   const auto received_of = [&](std::size_t sent) {
@@ -104,11 +105,7 @@ TEST_F(UdpSocketTest, SendsToItsPeer) {
 }
 
 TEST(UdpSocket, CountsRefusalsAndGoesOn) {
-  std::uint16_t closed = 0;
-  {
-    const LoopbackSocket gone(SOCK_DGRAM);
-    closed = gone.port();
-  }
+  const std::uint16_t closed = test::closed_port(SOCK_DGRAM);
   UdpSocket socket("127.0.0.1", closed);
   const std::array<std::uint8_t, 8> request{};
   for (int i = 0; i < 5; ++i) {
@@ -129,6 +126,25 @@ TEST(UdpSocket, AsksForFourMebibytesAndReadsBackWhatItGot) {
 }
 
 TEST(UdpSocket, AnUnknownNameIsAnError) { EXPECT_THROW(UdpSocket("no such host", 1), DeviceError); }
+
+TEST(ReceiveBuffer, HoldsWhatWasMeasured) {
+  EXPECT_NEAR(static_cast<double>(ReceiveBuffer{8'388'608, 36, kSingle}.datagrams()), 10'082, 10);
+  EXPECT_NEAR(static_cast<double>(ReceiveBuffer{212'992, 36, kSingle}.datagrams()), 256, 1);
+  EXPECT_NEAR(static_cast<double>(ReceiveBuffer{212'992, 1440, kForty}.datagrams()), 92, 1);
+}
+
+TEST(ReceiveBuffer, IsAWarningBelowHalfASecondAndElseANote) {
+  EXPECT_FALSE((ReceiveBuffer{std::size_t{8} << 20, 36, kSingle}.finding()));
+  const auto single = ReceiveBuffer{212'992, 36, kSingle}.finding(),
+             forty = ReceiveBuffer{212'992, 1440, kForty}.finding();
+  ASSERT_TRUE(single && forty);
+  EXPECT_EQ(
+      single->line(),
+      "warning: the kernel grants 0.20 MiB of receive buffer instead of 8: records are lost if kphi is blocked for "
+      "more than 37 ms; as root: sysctl -w net.core.rmem_max=4194304");
+  EXPECT_EQ(forty->severity, Severity::note);
+  EXPECT_NE(forty->what.find("more than 526 ms"), std::string::npos);
+}
 
 }  // namespace
 }  // namespace kphi::netbox

@@ -17,113 +17,6 @@ using test::records;
 using test::with;
 using testing::ElementsAre;
 using testing::IsEmpty;
-using Move = Reconnect::Move;
-
-TEST(Reconnect, ASilenceIsAskedAboutAtOnceAndOnce) {
-  Reconnect reconnect({});
-  EXPECT_EQ(reconnect.next(1s), Move::none);
-  reconnect.silent(1s);
-  EXPECT_EQ(reconnect.next(1s), Move::ask);
-  EXPECT_EQ(reconnect.next(1s), Move::none);
-  EXPECT_EQ(reconnect.deadline(), kNever);
-}
-
-TEST(Reconnect, AStreamThatAnotherClientHasTakenIsNeverFoughtFor) {
-  Reconnect reconnect({});
-  reconnect.silent(1s);
-  EXPECT_EQ(reconnect.next(1s), Move::ask);
-  EXPECT_TRUE(reconnect.answered(Answer::Kind::ready, false, 1s));
-  EXPECT_EQ(reconnect.deadline(), kNever);
-  for (Instant now = 1s; now < 200s; now += 1s) ASSERT_EQ(reconnect.next(now), Move::none);
-}
-
-TEST(Reconnect, ABoxThatWasAwayIsStartedWhenItIsBack) {
-  for (const Answer::Kind away : {Answer::Kind::unreachable, Answer::Kind::rdt_disabled, Answer::Kind::unusable}) {
-    Reconnect reconnect({});
-    reconnect.silent(1s);
-    EXPECT_EQ(reconnect.next(1s), Move::ask);
-    EXPECT_TRUE(reconnect.answered(away, false, 1s));
-    EXPECT_EQ(reconnect.next(1s), Move::none);
-    EXPECT_EQ(reconnect.next(reconnect.deadline()), Move::ask);
-    EXPECT_TRUE(reconnect.answered(Answer::Kind::ready, false, 3s));
-    EXPECT_EQ(reconnect.next(3s), Move::start);
-    EXPECT_TRUE(reconnect.starting());
-    reconnect.streaming();
-    EXPECT_EQ(reconnect.next(4s), Move::none);
-  }
-}
-
-TEST(Reconnect, ABoxThatHasBootedIsStartedAtOnce) {
-  Reconnect reconnect({});
-  reconnect.silent(1s);
-  EXPECT_EQ(reconnect.next(1s), Move::ask);
-  EXPECT_TRUE(reconnect.answered(Answer::Kind::ready, true, 1s));
-  EXPECT_EQ(reconnect.next(1s), Move::start);
-}
-
-TEST(Reconnect, WhatWasAwayOnceIsNoExcuseForTheNextSilence) {
-  Reconnect reconnect({});
-  reconnect.silent(1s);
-  (void)reconnect.next(1s);
-  (void)reconnect.answered(Answer::Kind::ready, true, 1s);
-  (void)reconnect.next(1s);
-  reconnect.streaming();
-  reconnect.silent(5s);
-  EXPECT_EQ(reconnect.next(5s), Move::ask);
-  (void)reconnect.answered(Answer::Kind::ready, false, 5s);
-  EXPECT_EQ(reconnect.next(5s), Move::none);
-}
-
-TEST(Reconnect, ThePausesDoubleUpToTheirCapUntilItGivesUp) {
-  Reconnect reconnect({});
-  reconnect.silent(0s);
-  (void)reconnect.next(0s);
-  Instant now = 0s;
-  for (const Duration pause : {250ms, 500ms, 1000ms, 2000ms, 4000ms, 8000ms, 8000ms, 8000ms}) {
-    EXPECT_EQ(reconnect.answered(Answer::Kind::unreachable, false, now), now == 0s) << "told once, not each time";
-    EXPECT_EQ(reconnect.deadline(), now + pause);
-    now = reconnect.deadline();
-    EXPECT_EQ(reconnect.next(now - 1ns), Move::none);
-    ASSERT_EQ(reconnect.next(now), Move::ask);
-  }
-  (void)reconnect.answered(Answer::Kind::unreachable, false, 59s);
-  EXPECT_EQ(reconnect.deadline(), 60s);
-  EXPECT_EQ(reconnect.next(60s), Move::give_up);
-  EXPECT_EQ(reconnect.next(61s), Move::none);
-  EXPECT_EQ(reconnect.deadline(), kNever);
-}
-
-TEST(Reconnect, AStartWithoutARecordIsTriedAgainLater) {
-  Reconnect reconnect({});
-  reconnect.silent(0s);
-  (void)reconnect.next(0s);
-  (void)reconnect.answered(Answer::Kind::ready, true, 0s);
-  EXPECT_EQ(reconnect.next(0s), Move::start);
-  reconnect.start_failed(2s);
-  EXPECT_FALSE(reconnect.starting());
-  EXPECT_EQ(reconnect.deadline(), 2s + 250ms);
-  EXPECT_EQ(reconnect.next(reconnect.deadline()), Move::ask);
-  (void)reconnect.answered(Answer::Kind::ready, false, 3s);
-  EXPECT_EQ(reconnect.next(3s), Move::start);
-}
-
-TEST(Reconnect, SwitchedOffItOnlyAsks) {
-  Reconnect reconnect({.reconnect = false});
-  reconnect.silent(1s);
-  EXPECT_EQ(reconnect.next(1s), Move::ask);
-  EXPECT_TRUE(reconnect.answered(Answer::Kind::unreachable, false, 1s));
-  EXPECT_EQ(reconnect.next(100s), Move::none);
-  EXPECT_EQ(reconnect.deadline(), kNever);
-}
-
-TEST(Reconnect, AnAnswerThatComesAfterTheStreamIsNoNews) {
-  Reconnect reconnect({});
-  reconnect.silent(1s);
-  (void)reconnect.next(1s);
-  reconnect.streaming();
-  EXPECT_FALSE(reconnect.answered(Answer::Kind::unreachable, false, 2s));
-  EXPECT_EQ(reconnect.next(100s), Move::none);
-}
 
 std::string page(const char* element = "comrdtrate", const char* content = "7000") {
   return with(with(with(captured_xml(), "comrdtrate", "7000"), "comrdtbsiz", "40"), element, content);
@@ -138,6 +31,7 @@ const std::string kForgottenPeaks = page("runpkmx", "0;0;0;0;0;0");
 
 class ConnectionTest : public testing::Test {
  protected:
+  explicit ConnectionTest(const StreamPolicy& policy = {}) : connection(parse_configuration(page()), policy) {}
   /// Commands to the box's RDT port.
   std::vector<int> requested() {
     std::vector<int> commands;
@@ -177,13 +71,24 @@ class ConnectionTest : public testing::Test {
     ASSERT_TRUE(connection.next_question());
     EXPECT_FALSE(connection.next_question()) << "each question once";
   }
+  /// Answers each question so, until there is none or `end`; returns the times between the questions.
+  std::vector<Duration> pauses_until(Instant end, const Answer& given) {
+    std::vector<Duration> pauses;
+    for (Instant before = now; connection.deadline() != kNever && connection.deadline() <= end; before = now) {
+      advance_to_deadline();
+      if (!connection.next_question()) continue;
+      pauses.push_back(now - before);
+      connection.answered(given, now);
+    }
+    return pauses;
+  }
   void answer(Answer given) {
     connection.answered(std::move(given), now += 1ms);
     connection.advance(now);
   }
 
   Instant now = 1s;
-  Connection connection{parse_configuration(page())};
+  Connection connection;
   std::vector<StampedRecord> out = std::vector<StampedRecord>(4096);
 };
 
@@ -223,12 +128,58 @@ TEST_F(ConnectionTest, ABoxThatWasAwayStreamsAgainWhenItAnswers) {
   EXPECT_THAT(events(), testing::Contains(EventKind::reconnected));
 }
 
-TEST_F(ConnectionTest, ABoxThatHasBootedStreamsAgainAtOnce) {
+TEST_F(ConnectionTest, ABoxThatWasAwayInAnyWayIsStartedWhenItIsBack) {
+  for (const Answer& away : {no_answer(), answer_of("<html/>"), answer_of(page("comrdte", "Disabled"))}) {
+    connection.stop(now);
+    (void)requested();
+    stream();
+    fall_silent();
+    answer(away);
+    EXPECT_THAT(requested(), IsEmpty());
+    advance_to_deadline();
+    ASSERT_TRUE(connection.next_question());
+    answer(answer_of(page()));
+    EXPECT_THAT(requested(), ElementsAre(0));
+  }
+}
+
+TEST_F(ConnectionTest, ABoxThatHasBootedStreamsAgainAtOnceAndAfterTheNextSilenceItIsLeftAlone) {
   stream();
   fall_silent();
   answer(answer_of(kForgottenPeaks));
   EXPECT_THAT(requested(), ElementsAre(0));
   EXPECT_THAT(events(), ElementsAre(EventKind::silent));
+  advance_to_deadline();
+  receive(1, 40, 5000);
+  ASSERT_EQ(connection.state(), State::streaming);
+  (void)requested();
+  connection.advance(now += 20ms);  // the records held back
+  fall_silent();
+  answer(answer_of(kForgottenPeaks));
+  EXPECT_THAT(requested(), IsEmpty());
+}
+
+class ConnectionThatOnlyAsks : public ConnectionTest {
+ protected:
+  ConnectionThatOnlyAsks() : ConnectionTest({.reconnect = false}) {}
+};
+
+TEST_F(ConnectionThatOnlyAsks, ABoxThatIsAway) {
+  stream();
+  fall_silent();
+  answer(no_answer());
+  EXPECT_THAT(events(), ElementsAre(EventKind::silent, EventKind::unreachable));
+  EXPECT_EQ(connection.deadline(), kNever);
+}
+
+TEST_F(ConnectionTest, AnAnswerThatComesAfterTheStreamIsNoNews) {
+  stream();
+  fall_silent();
+  receive(41);
+  answer(no_answer());
+  EXPECT_THAT(events(), ElementsAre(EventKind::silent, EventKind::resumed));
+  connection.advance(now += 100ms);
+  EXPECT_FALSE(connection.next_question());
 }
 
 TEST_F(ConnectionTest, AStreamThatAnotherClientHasTakenIsLeftAlone) {
@@ -242,16 +193,16 @@ TEST_F(ConnectionTest, AStreamThatAnotherClientHasTakenIsLeftAlone) {
   EXPECT_THAT(requested(), IsEmpty());
 }
 
-TEST_F(ConnectionTest, GivesUpABoxThatStaysAway) {
+TEST_F(ConnectionTest, AsksLessAndLessOftenUntilItGivesUpABoxThatStaysAway) {
   stream();
   fall_silent();
   const Instant silent = now;
-  do {
-    answer(no_answer());
-    advance_to_deadline();
-  } while (connection.next_question());
+  connection.answered(no_answer(), now);
+  EXPECT_THAT(pauses_until(silent + 59s, no_answer()),
+              ElementsAre(250ms, 500ms, 1000ms, 2000ms, 4000ms, 8000ms, 8000ms, 8000ms, 8000ms, 8000ms, 8000ms));
+  EXPECT_EQ(connection.deadline(), silent + 60s);
+  EXPECT_THAT(pauses_until(silent + 1000s, no_answer()), IsEmpty());
   EXPECT_THAT(events(), ElementsAre(EventKind::silent, EventKind::unreachable, EventKind::given_up));
-  EXPECT_NEAR(to_seconds(now - silent), 60, 0.1);
   EXPECT_EQ(connection.state(), State::silent);
 }
 

@@ -1,38 +1,49 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 
-#include "drivers/netbox/stream/sequence.hpp"
+#include "drivers/netbox/stream/reorder_window.hpp"
+#include "test/drivers/netbox/stream/feed.hpp"
 
 namespace kphi::netbox {
 namespace {
 
 using namespace std::chrono_literals;
+using test::Step;
+using test::steps_of;
+using test::words_of;
 
-class ReorderTest : public testing::Test {
- protected:
-  bool receive(std::uint32_t rdt, std::uint32_t ft) {
-    Record record;
-    record.rdt_sequence = rdt;
-    record.ft_sequence = ft;
-    return window.receive(record, now, account, out);
+/// A window of 64 records and 20 ms.
+class Reordered {
+ public:
+  void feed(const std::string& text) {
+    for (const Step& step : steps_of(text)) {
+      if (step.kind == Step::Kind::wait_ms) now += step.number * 1ms;
+      if (step.kind == Step::Kind::drops) account.add_host_drops(step.number, 1);
+      if (step.kind == Step::Kind::expire) window.expire(now, account, out);
+      if (step.kind == Step::Kind::flush) window.flush(account, out);
+      if (step.kind != Step::Kind::record) continue;
+      EXPECT_EQ(window.receive(step.record(), now, account, out), step.taken) << step.number << " at " << step.ft;
+    }
   }
-  /// Record `i` of an undisturbed stream.
-  bool receive(std::uint32_t i) { return receive(i, 1000 + i); }
-  std::vector<std::uint32_t> delivered() const {
-    std::vector<std::uint32_t> numbers;
-    for (const StampedRecord& stamped : out) numbers.push_back(stamped.record.ft_sequence - 1000);
+  /// ft of the records, less 1000.
+  std::vector<std::int32_t> delivered() const {
+    std::vector<std::int32_t> numbers;
+    for (const StampedRecord& stamped : out)
+      numbers.push_back(static_cast<std::int32_t>(stamped.record.ft_sequence - 1000));
     return numbers;
   }
-  void expect_delivered_from_one_to(std::uint32_t last) const {
-    ASSERT_EQ(out.size(), last);
-    for (std::uint32_t i = 0; i < last; ++i) EXPECT_EQ(delivered()[i], i + 1);
-  }
-  const Counters& counters() const { return account.counters(); }
-  void expect_closed() const {
-    EXPECT_EQ(counters().expected, counters().received + counters().lost_network + counters().lost_host);
-    EXPECT_EQ(counters().received, out.size());
+  void expect(const std::string& what, const std::string& counts) const {
+    std::vector<std::int32_t> numbers;
+    for (const Step& step : steps_of(what)) numbers.push_back(static_cast<std::int32_t>(step.number));
+    EXPECT_EQ(delivered(), numbers);
+    const Counters& c = account.counters();
+    EXPECT_EQ(words_of(c), counts);
+    EXPECT_EQ(c.expected, c.received + c.lost_network + c.lost_host);
+    EXPECT_EQ(c.received, out.size());
+    EXPECT_EQ(window.deadline() == kNever, window.empty());
   }
 
   Instant now = 1s;
@@ -41,235 +52,86 @@ class ReorderTest : public testing::Test {
   std::vector<StampedRecord> out;
 };
 
-TEST_F(ReorderTest, WhatComesInOrderIsNeverDelayed) {
+struct Case {
+  const char* name;
+  const char* feed;
+  const char* delivered;
+  const char* counts;  ///< what is not zero
+};
+
+TEST(Reorder, DeliversInOrderWhatComesInTime) {
+  for (const Case& c : std::vector<Case>{
+           {"a gap waits", "1 3 +19 4", "1", ""},
+           {"is given up after the patience, and stays lost", "1 3 +19 4 +1 expire 2!", "1 3 4", "lost 1, late 1"},
+           {"the time also runs with the records themselves", "1 3 +20 4", "1 3 4", "lost 1"},
+           {"a younger gap waits for its own time", "1 3 +10 5 +10 expire", "1 3", "lost 1"},
+           {"and may be filled until then", "1 3 +10 5 +10 expire 4", "1 3 4 5", "lost 1, reordered 1"},
+           {"a window not full waits", "1 3..65", "1", ""},
+           {"a full window gives up its first gap", "1 3..66", "1 3..66", "lost 1"},
+           {"a gap wider than the window waits like any other", "1 1000", "1", ""},
+           {"and is given up like any other", "1 1000 +20 expire", "1 1000", "lost 998"},
+           {"what is overtaken right behind a wide gap is delivered", "1 1002 1000 1001 1003 +20 expire",
+            "1 1000..1003", "lost 998, reordered 2"},
+           {"behind a wide gap the window waits", "1 1000..1062", "1", ""},
+           {"and fills like behind any other", "1 1000..1063", "1 1000..1063", "lost 998"},
+           {"the first records of a stream may be overtaken, too", "3 2 1 4", "1..4", "reordered 2"},
+           {"a stream whose first records are lost waits", "41 42", "", ""},
+           {"and begins after the patience: nothing is missing before the first", "41 42 +20 expire", "41 42", ""},
+           {"drops before the first record explain nothing", "drop100 1 3 flush", "1 3", "lost 1"},
+           {"drops behind a waiting first record explain what is missing there", "3 drop1 5 flush", "3 5", "host 1"},
+           {"what is left of a former stream is delivered before the new one", "500 501 1@1502 2@1503 +20 expire",
+            "500..503", "restarts 1"},
+           {"repetitions of a waiting measurement are a stall and no duplicates",
+            "1 5 6@1005 7@1005 7@1005! 8@1005 9 flush", "1 5 9", "lost 6, duplicates 1, stalled 3, irregular 1"},
+           {"a duplicate of a waiting record is counted", "1 3 3! 2", "1..3", "duplicates 1, reordered 1"},
+           {"a restart without a gap drops nothing", "1..2000 1..2998@3001", "1..4998", "restarts 1"},
+           {"a reorder across a restart is sorted, too", "98 flush 100 1@1101 99 2@1102", "98..102",
+            "reordered 1, restarts 1"},
+           {"a flush gives up all gaps and closes the account", "1 3 5 8 flush", "1 3 5 8", "lost 4"},
+           {"a rate that the box has changed delays nothing", "1@1001 2..4@1003/2", "1 3 5 7",
+            "lost 3, irregular 3"}}) {
+    SCOPED_TRACE(c.name);
+    Reordered stream;
+    stream.feed(c.feed);
+    stream.expect(c.delivered, c.counts);
+  }
+}
+
+TEST(Reorder, WhatComesInOrderIsNeverDelayed) {
+  Reordered stream;
   for (std::uint32_t i = 1; i <= 1000; ++i) {
-    EXPECT_TRUE(receive(i));
-    EXPECT_EQ(out.size(), i);
-    EXPECT_TRUE(window.empty());
+    stream.feed(std::to_string(i));
+    EXPECT_EQ(stream.out.size(), i);
+    EXPECT_TRUE(stream.window.empty());
   }
-  EXPECT_EQ(counters().reordered, 0u);
+  stream.expect("1..1000", "");
 }
 
-TEST_F(ReorderTest, AdjacentSwapsLoseNothing) {
-  for (std::uint32_t i = 1; i <= 1000; i += 100) {
-    for (std::uint32_t j = i; j < i + 98; ++j) receive(j);
-    receive(i + 99);
-    receive(i + 98);
-    EXPECT_EQ(counters().lost_network, 0u);
-  }
-  expect_delivered_from_one_to(1000);
-  EXPECT_EQ(counters().reordered, 10u);
-  EXPECT_EQ(counters().late + counters().duplicates, 0u);
-  expect_closed();
+TEST(Reorder, AGapIsDueAfterThePatience) {
+  Reordered stream;
+  stream.feed("1 3");
+  EXPECT_EQ(stream.window.deadline(), stream.now + 20ms);
 }
 
-TEST_F(ReorderTest, FiveDeepReorderLosesNothing) {
-  for (std::uint32_t i = 1; i <= 600; i += 6) {
-    receive(i);
-    for (std::uint32_t j = i + 5; j > i; --j) receive(j);
-  }
-  expect_delivered_from_one_to(600);
-  EXPECT_EQ(counters().lost_network + counters().late, 0u);
-  EXPECT_EQ(counters().reordered, 400u);
-  expect_closed();
+TEST(Reorder, AdjacentSwapsAndFiveDeepReorderLoseNothing) {
+  std::string swaps, deep;
+  for (int i = 1; i <= 1000; i += 100) swaps += fmt::format("{}..{} {} {} ", i, i + 97, i + 99, i + 98);
+  for (int i = 1; i <= 600; i += 6) deep += fmt::format("{} {} {} {} {} {} ", i, i + 5, i + 4, i + 3, i + 2, i + 1);
+  Reordered swapped, reversed;
+  swapped.feed(swaps);
+  swapped.expect("1..1000", "reordered 10");
+  reversed.feed(deep);
+  reversed.expect("1..600", "reordered 400");
 }
 
-TEST_F(ReorderTest, AGapIsGivenUpAfterThePatience) {
-  receive(1);
-  receive(3);
-  EXPECT_EQ(window.deadline(), now + 20ms);
-  now += 19ms;
-  receive(4);
-  EXPECT_EQ(out.size(), 1u);
-  expect_closed();
-  now += 1ms;
-  window.expire(now, account, out);
-  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{1, 3, 4}));
-  EXPECT_EQ(counters().lost_network, 1u);
-  EXPECT_FALSE(receive(2));
-  EXPECT_EQ(counters().late, 1u);
-  EXPECT_EQ(counters().lost_network, 1u) << "it stays undelivered";
-  expect_closed();
-}
-
-TEST_F(ReorderTest, TheTimeAlsoRunsWithTheRecordsThemselves) {
-  receive(1);
-  receive(3);
-  now += 20ms;
-  receive(4);
-  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{1, 3, 4}));
-}
-
-TEST_F(ReorderTest, AYoungerGapWaitsForItsOwnTime) {
-  receive(1);
-  receive(3);
-  now += 10ms;
-  receive(5);
-  now += 10ms;
-  window.expire(now, account, out);
-  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{1, 3}));
-  receive(4);
-  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{1, 3, 4, 5}));
-  EXPECT_EQ(counters().lost_network, 1u);
-}
-
-TEST_F(ReorderTest, AFullWindowGivesUpItsFirstGap) {
-  receive(1);
-  for (std::uint32_t i = 3; i < 3 + 63; ++i) receive(i);
-  EXPECT_EQ(out.size(), 1u);
-  receive(66);
-  EXPECT_EQ(out.size(), 65u);
-  EXPECT_TRUE(window.empty());
-  EXPECT_EQ(counters().lost_network, 1u);
-  expect_closed();
-}
-
-TEST_F(ReorderTest, AGapWiderThanTheWindowWaitsLikeAnyOther) {
-  receive(1);
-  receive(1000);
-  EXPECT_EQ(out.size(), 1u);
-  now += 20ms;
-  window.expire(now, account, out);
-  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{1, 1000}));
-  EXPECT_EQ(counters().lost_network, 998u);
-  expect_closed();
-}
-
-TEST_F(ReorderTest, WhatIsOvertakenRightBehindAWideGapIsDelivered) {
-  receive(1);
-  for (const std::uint32_t i : {1002u, 1000u, 1001u, 1003u}) receive(i);
-  now += 20ms;
-  window.expire(now, account, out);
-  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{1, 1000, 1001, 1002, 1003}));
-  EXPECT_EQ(counters().lost_network, 998u);
-  EXPECT_EQ(counters().late, 0u);
-  expect_closed();
-}
-
-TEST_F(ReorderTest, BehindAWideGapTheWindowFillsLikeBehindAnyOther) {
-  receive(1);
-  for (std::uint32_t i = 1000; i < 1063; ++i) receive(i);
-  EXPECT_EQ(out.size(), 1u);
-  receive(1063);
-  EXPECT_EQ(out.size(), 65u);
-  EXPECT_TRUE(window.empty());
-  EXPECT_EQ(counters().lost_network, 998u);
-}
-
-TEST_F(ReorderTest, TheFirstRecordsOfAStreamMayBeOvertakenToo) {
-  for (const std::uint32_t i : {3u, 2u, 1u, 4u}) EXPECT_TRUE(receive(i));
-  expect_delivered_from_one_to(4);
-  EXPECT_EQ(counters().duplicates + counters().late, 0u);
-  expect_closed();
-}
-
-TEST_F(ReorderTest, AStreamWhoseFirstRecordsAreLostBeginsAfterThePatience) {
-  for (const std::uint32_t i : {41u, 42u}) receive(i);
-  EXPECT_TRUE(out.empty());
-  now += 20ms;
-  window.expire(now, account, out);
-  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{41, 42}));
-  EXPECT_EQ(counters().expected, 2u) << "nothing is missing before the first";
-}
-
-TEST_F(ReorderTest, DropsBeforeTheFirstRecordExplainNothing) {
-  account.add_host_drops(100, 1);
-  for (const std::uint32_t i : {1u, 3u}) receive(i);
-  window.flush(account, out);
-  EXPECT_EQ(counters().lost_host, 0u);
-  EXPECT_EQ(counters().lost_network, 1u);
-}
-
-TEST_F(ReorderTest, DropsBehindAWaitingFirstRecordExplainWhatIsMissingThere) {
-  receive(3);
-  account.add_host_drops(1, 1);
-  receive(5);
-  window.flush(account, out);
-  EXPECT_EQ(counters().lost_host, 1u);
-  EXPECT_EQ(counters().lost_network, 0u);
-}
-
-TEST_F(ReorderTest, WhatIsLeftOfAFormerStreamIsDeliveredBeforeTheNewOne) {
-  for (const std::uint32_t i : {500u, 501u}) receive(i, 1000 + i);
-  for (const std::uint32_t i : {1u, 2u}) receive(i, 1501 + i);
-  now += 20ms;
-  window.expire(now, account, out);
-  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{500, 501, 502, 503}));
-  EXPECT_EQ(counters().restarts, 1u);
-  EXPECT_EQ(counters().reboots, 0u);
-  expect_closed();
-}
-
-TEST_F(ReorderTest, RepetitionsOfAWaitingMeasurementAreAStallAndNoDuplicates) {
-  receive(1);
-  receive(5);
-  for (const std::uint32_t rdt : {6u, 7u, 7u, 8u}) receive(rdt, 1005);
-  receive(9, 1009);
-  window.flush(account, out);
-  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{1, 5, 9}));
-  EXPECT_EQ(counters().stalled, 3u);
-  EXPECT_EQ(counters().duplicates, 1u);
-}
-
-TEST_F(ReorderTest, ADuplicateOfAWaitingRecordIsCounted) {
-  receive(1);
-  EXPECT_TRUE(receive(3));
-  EXPECT_FALSE(receive(3));
-  receive(2);
-  expect_delivered_from_one_to(3);
-  EXPECT_EQ(counters().duplicates, 1u);
-}
-
-TEST_F(ReorderTest, ARateThatTheBoxHasChangedDelaysNothing) {
-  receive(1, 1001);
-  for (std::uint32_t i = 2; i < 200; ++i) receive(i, 999 + 2 * i);
-  EXPECT_EQ(out.size(), 199u);
-  EXPECT_EQ(counters().irregular, 198u);
-}
-
-TEST_F(ReorderTest, ARestartWithoutAGapDropsNothing) {
-  for (std::uint32_t i = 1; i <= 2000; ++i) receive(i, 1000 + i);
-  for (std::uint32_t i = 1; i <= 2998; ++i) EXPECT_TRUE(receive(i, 3000 + i));
-  EXPECT_EQ(out.size(), 4998u);
-  EXPECT_EQ(counters().restarts, 1u);
-}
-
-TEST_F(ReorderTest, AReorderAcrossARestartIsSortedToo) {
-  receive(98, 1098);
-  window.flush(account, out);
-  receive(100, 1100);
-  receive(1, 1101);
-  receive(99, 1099);
-  receive(2, 1102);
-  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{98, 99, 100, 101, 102}));
-  EXPECT_EQ(counters().lost_network + counters().late, 0u);
-  EXPECT_EQ(counters().restarts, 1u);
-  expect_closed();
-}
-
-TEST_F(ReorderTest, ARebootDeliversBothOfItsFirstRecordsAndWhatWaited) {
-  for (std::uint32_t i = 1; i <= 100; ++i) receive(i, 500'000 + i);
-  receive(102, 500'102);
-  now += 10ms;
-  receive(1, 70);
-  receive(2, 71);
-  receive(3, 72);
-  ASSERT_EQ(out.size(), 104u);
-  EXPECT_EQ(out[100].record.ft_sequence, 500'102u);
-  EXPECT_EQ(out[101].record.ft_sequence, 70u);
-  EXPECT_EQ(out[102].record.ft_sequence, 71u);
-  EXPECT_EQ(counters().reboots, 1u);
-  EXPECT_EQ(counters().lost_network, 1u);
-  expect_closed();
-}
-
-TEST_F(ReorderTest, FlushGivesUpAllGapsAndClosesTheAccount) {
-  for (const std::uint32_t i : {1u, 3u, 5u, 8u}) receive(i);
-  window.flush(account, out);
-  EXPECT_EQ(delivered(), (std::vector<std::uint32_t>{1, 3, 5, 8}));
-  EXPECT_EQ(counters().lost_network, 4u);
-  EXPECT_EQ(window.deadline(), kNever);
-  expect_closed();
+TEST(Reorder, ARebootDeliversBothOfItsFirstRecordsAndWhatWaited) {
+  Reordered stream;
+  stream.feed("1..100@500001 102@500102 +10 1@70! 2@71 3@72");
+  const std::vector<std::int32_t> delivered = stream.delivered();
+  ASSERT_EQ(delivered.size(), 104u);
+  EXPECT_EQ(std::vector(delivered.begin() + 100, delivered.end()),
+            (std::vector<std::int32_t>{499'102, -930, -929, -928}));
+  EXPECT_EQ(words_of(stream.account.counters()), "lost 1, reboots 1");
 }
 
 // The channel loses, doubles and delays by up to 30 records; the truth is known by construction.

@@ -64,8 +64,6 @@ TEST(RdtRequest, CodesAreTheManuals) {
   EXPECT_EQ(static_cast<int>(Command::stop), 0);
   EXPECT_EQ(static_cast<int>(Command::real_time), 2);
   EXPECT_EQ(static_cast<int>(Command::buffered), 3);
-  EXPECT_EQ(static_cast<int>(Command::multi_unit), 4);
-  EXPECT_EQ(static_cast<int>(Command::reset_latch), 0x41);
   EXPECT_EQ(static_cast<int>(Command::set_bias), 0x42);
 }
 

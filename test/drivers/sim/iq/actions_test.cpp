@@ -57,66 +57,6 @@ TEST_F(Action, PlainSavesOfTheBaudAndOfTheUnsaveableDoNothing) {
   EXPECT_EQ(get(16, 0), hex("00 c2 01 00"));
 }
 
-TEST_F(Action, RevertingNeedsBothKeysAndUsesThemUp) {
-  set_float(52, 7, 0.5f);
-  send(52, 7, 2);
-  send(11, 1, 1);
-  tell("55 06 0B 02 01 4E 61 BC 00 36 E0");
-  send(11, 1, 1);
-  EXPECT_FLOAT_EQ(number(52, 7), 0.5f);
-  tell("55 06 0B 03 01 30 41 AB 00 9B 59");
-  send(11, 1, 1);
-  EXPECT_FLOAT_EQ(number(52, 7), 0.02f);
-  EXPECT_EQ(get(5, 4), hex("06 00 23 00")) << "who it is stays";
-  set_float(52, 7, 0.5f);
-  send(11, 1, 1);
-  EXPECT_FLOAT_EQ(number(52, 7), 0.5f) << "the keys are used up";
-}
-
-TEST_F(Action, ErasingLeavesBlankFlashBehind) {
-  tell("55 06 0B 02 01 4E 61 BC 00 36 E0 55 06 0B 03 01 30 41 AB 00 9B 59");
-  send(11, 0, 1);
-  send(5, 0, 1, "", 1s);
-  EXPECT_EQ(send(50, 17, 0xff & (255 << 2), "", 2s), "") << "its id is blank too";
-}
-
-TEST_F(Action, InTheBootLoaderItIsSilent) {
-  set_float(52, 5, 100);
-  send(5, 1, 1);
-  EXPECT_EQ(get(5, 14, 1s), "");
-  EXPECT_EQ(device.stage().mode, PowerStage::Mode::coast);
-}
-
-TEST_F(Action, DisarmingEndsTheMotionOfAnArmedModule) {
-  set_float(52, 5, 100);
-  tell("55 03 56 0C 01 00 2C EB");
-  EXPECT_EQ(device.drive().mode, Mode::velocity) << "it was not armed";
-  tell("55 03 56 0C 01 01 0D FB");
-  EXPECT_TRUE(device.armed());
-  EXPECT_EQ(get(86, 12), hex("01"));
-  tell("55 03 56 0C 01 00 2C EB");
-  EXPECT_EQ(device.drive().mode, Mode::coast);
-  EXPECT_EQ(get(86, 12), hex("00"));
-}
-
-TEST_F(Action, AVelocityNeedsNoArming) {
-  set_float(52, 5, 100);
-  EXPECT_EQ(device.drive().mode, Mode::velocity);
-  EXPECT_FALSE(device.armed());
-}
-
-TEST_F(Action, ATimeoutDisarmsUnlessToldNotTo) {
-  for (const auto& [meaning, stays] : {std::pair{"00", false}, {"01", false}, {"02", true}}) {
-    restart();
-    send(52, 17, 1, meaning);
-    tell("55 03 56 0C 01 01 0D FB");
-    set_float(52, 5, 100);
-    run(0s, 600ms);
-    EXPECT_EQ(device.armed(), stays);
-    EXPECT_EQ(device.timeouts(), 1u);
-  }
-}
-
 TEST_F(Action, ATimeoutMayMeanTheDisarmBehaviour) {
   send(52, 17, 1, "01");
   send(86, 9, 1, "01");  // 0 V, then coast
@@ -142,15 +82,15 @@ TEST_F(Action, TheSongRipplesTheDriveOnceAndEnds) {
   EXPECT_EQ(device.stage().mode, PowerStage::Mode::coast);
 }
 
-TEST_F(Action, AnEndlessSongLastsUntilASpinOrAnArming) {
+TEST_F(Action, AnEndlessSongLastsUntilASpin) {
   send(52, 19, 1, "02");
   set_float(52, 5, 100);
   run(0s, 60s);
   tell("55 02 34 02 01 8E 06", 60s);  // coast
   run(60s, 61s);
   EXPECT_TRUE(device.singing());
-  tell("55 03 56 0C 01 01 0D FB", 61s);
-  run(61s, 62s);
+  set_float(52, 5, 100, 61s);
+  run(61s, 61400ms);
   EXPECT_FALSE(device.singing());
 }
 

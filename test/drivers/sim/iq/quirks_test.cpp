@@ -49,21 +49,6 @@ TEST_F(Quirk, TheSongFollowsItsOptionOrPlaysForEver) {
   }
 }
 
-TEST_F(Quirk, ABaudIsTakenAtOnceAndSaved) {
-  send(16, 0, 1, "00 10 0e 00");
-  EXPECT_EQ(get(16, 0), hex("00 10 0e 00"));
-  EXPECT_EQ(device.line_rate(), 921600);
-  send(5, 0, 1);
-  EXPECT_EQ(device.line_rate(), 921600);
-}
-
-TEST_F(Quirk, ABroadcastGetIsNotAnsweredABroadcastSetIsObeyed) {
-  EXPECT_EQ(send(5, 14, 0xfc), "");
-  set_float(52, 5, 100);
-  send(52, 2, 0xfd);
-  EXPECT_EQ(device.drive().mode, Mode::coast);
-}
-
 TEST_F(Quirk, TheClocksErrorReachesVelocityTimeAndBaud) {
   settings.oscillator_gain = 0.005;
   state.speed = 1005;
@@ -113,7 +98,6 @@ TEST_F(Quirk, TheReceiveBufferHoldsSixtyFourBytes) {
   IqReply reply;
   for (Instant at{0}; at < 1s; at += 1ms) heard += device.next_reply(reply, at) ? 1 : 0;
   EXPECT_EQ(heard, 10) << "the first, and nine whole questions of 63 bytes";
-  EXPECT_EQ(device.overflowed_bytes(), 20u * 7 - 7 - 64);
 }
 
 TEST_F(Quirk, SafeModeReadsCoastAndEndsWithoutLatching) {

@@ -57,19 +57,6 @@ TEST(NetBoxQuirks, LastBlockIsPartialPaddedOrDropped) {
   EXPECT_EQ(records_of_fifty(LastBlock::dropped), 40u);
 }
 
-TEST(NetBoxQuirks, CommandFourMayOrMayNotStream) {
-  for (const bool streams : {true, false}) {
-    NetBoxSettings settings;
-    settings.quirks.command_four_streams = streams;
-    NetBoxDevice box(settings);
-    box.receive(bytes("12 34 00 04 00 00 00 00"), 1);
-    EXPECT_EQ(box.streaming(), streams);
-    box.receive(bytes("12 34 00 00 00 00 00 00"), 1);
-    box.receive(bytes("12 34 00 01 00 00 00 00"), 1);
-    EXPECT_FALSE(box.streaming());
-  }
-}
-
 TEST(NetBoxQuirks, AnAxiaHasOtherCommandsAndBits) {
   NetBoxDevice box = box_that([](NetBoxSettings& s) { s.quirks.axia = true; });
   box.receive(bytes("12 34 00 03 00 00 00 00"), 1);

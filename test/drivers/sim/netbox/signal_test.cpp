@@ -59,26 +59,6 @@ TEST(LowPass, TakesNoiseAwayWhichTheRateDoesNot) {
   EXPECT_LT(std::sqrt(with / 70000), 0.0127);
 }
 
-TEST(NetBoxSignal, MovesTheTorqueToTheToolsOrigin) {
-  NetBoxSettings settings;
-  settings.slots[0].tool_transform = {0, 0, 100, 0, 0, 0};  // mm
-  NetBoxSignal signal(settings);
-  signal.measure({2, 0, 0, 0, 0, 0});
-  EXPECT_EQ(signal.counts(), (NetBoxSignal::Counts{2'000'000, 0, 0, 0, -200'000, 0}));
-  settings.slots[0].distance_unit = 1;  // inches: the same digits mean another place
-  signal.configure(settings);
-  signal.measure({0.1, 0, 0, 0, 0, 0});
-  EXPECT_EQ(signal.counts()[4], -254'000);
-}
-
-TEST(NetBoxSignal, TurnsForceAndTorqueIntoTheToolsAxes) {
-  NetBoxSettings settings;
-  settings.slots[0].tool_transform = {0, 0, 0, 0, 0, 90};
-  NetBoxSignal signal(settings);
-  signal.measure({1, 2, 3, 0.1, 0.2, 0.3});
-  EXPECT_EQ(signal.counts(), (NetBoxSignal::Counts{2'000'000, -1'000'000, 3'000'000, 200'000, -100'000, 300'000}));
-}
-
 TEST(NetBoxSignal, GageBiasShiftsByItsShareOfTheRange) {
   NetBoxSettings settings;
   settings.bias_vector[2] = 16384;

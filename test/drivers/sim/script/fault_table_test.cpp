@@ -19,15 +19,14 @@ struct Trouble {
 using E = FaultExtent;
 
 const FaultTable<Trouble>& table() {
-  static const FaultTable<Trouble> all("a lamp",
-                                       {{Trouble::Kind::blink, "blink", E::window_or_count, {}},
-                                        {Trouble::Kind::dark, "dark", E::window, {}},
-                                        {Trouble::Kind::dim,
-                                         "dim",
-                                         E::window_or_forever,
-                                         {required<&Trouble::level>("level"), key<&Trouble::fade>("fade_s", 0, 10)},
-                                         {.fade = 2s}},
-                                        {Trouble::Kind::off, "off", E::instant, {}}});
+  static const FaultTable<Trouble> all(
+      "a lamp", {{Trouble::Kind::blink, "blink", E::window_or_count, {}},
+                 {Trouble::Kind::dark, "dark", E::window, {}},
+                 {Trouble::Kind::dim,
+                  "dim",
+                  E::window_or_forever,
+                  {required<&Trouble::level>("level"), key<&Trouble::fade>("fade_s", 0, 10, "2")}},
+                 {Trouble::Kind::off, "off", E::instant, {}}});
   return all;
 }
 

@@ -247,7 +247,7 @@ TEST(FaultFile, ChoosesTheQuirksOfTheBox) {
   EXPECT_EQ(quirks.last_block, NetBoxQuirks::LastBlock::padded);
   EXPECT_EQ(quirks.rate_write, NetBoxQuirks::RateWrite::pauses);
   EXPECT_EQ(quirks.array_separator, ' ');
-  EXPECT_TRUE(quirks.command_four_streams) << "as it was";
+  EXPECT_FALSE(quirks.axia) << "as it was";
 }
 
 TEST(FaultFile, RefusesQuirksThatABoxCannotHave) {

@@ -102,14 +102,6 @@ TEST(SupplyCircuit, IsStableForAnyStep) {
   }
 }
 
-TEST(SupplyCircuit, CountsChargeAndEnergy) {
-  SupplyCircuit circuit = at_twelve_volts();
-  const double coulombs = circuit.coulombs(), joules = circuit.joules();
-  run(circuit, {2, 0}, 1);
-  EXPECT_NEAR(circuit.coulombs() - coulombs, 2, 0.03);
-  EXPECT_NEAR(circuit.joules() - joules, 24, 0.4);
-}
-
 TEST(SupplyCircuit, ShowsItsMeterWithTheLagOfAMeter) {
   SupplyCircuit circuit = at_twelve_volts();
   run(circuit, {2, 0}, 0.010);

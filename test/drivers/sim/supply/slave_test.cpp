@@ -132,9 +132,6 @@ class Asked {
     }
     return hex(all);
   }
-  void run(const SupplyLoad& load, Duration time) {
-    for (const Instant end = now + time; now < end; now += 1ms) slave.advance(load, now);
-  }
   void spoil(SupplyFaultKind kind, std::uint16_t address = 0, std::uint16_t value = 0) {
     SupplyFault fault;
     fault.kind = kind;
@@ -225,41 +222,15 @@ TEST(SimulatedRiden, ChangesItsScaleWithTheRange) {
   EXPECT_EQ(supply.slave.registers().read(9), 5000);
 }
 
-TEST(SimulatedRiden, DoesDisputedRegistersEitherWay) {
-  const auto registers = [](const SupplyDisputes& disputes) {
-    SupplySettings settings = of_model("RD6006P");
-    settings.disputes = disputes;
-    Asked supply(settings);
-    supply.slave.circuit().controls() = {50, 5, 60, 6};
-    supply.slave.circuit().switch_output(true);
-    supply.run({0, 0.05}, 2s);
-    supply.slave.registers().write(19, 0);
-    return std::array{*supply.slave.registers().read(12), *supply.slave.registers().read(13)};
-  };
-  EXPECT_NEAR(registers({})[1], 12724, 10);  // 50 V, 0.020 ohm, 0.050 S and the bleeder of 0.001 S
-  EXPECT_EQ(registers({})[0], 0);
-  SupplyDisputes other;
-  other.power_in_milliwatts = true;
-  other.register_12 = SupplyDisputes::Twelve::power_high_word;
-  EXPECT_EQ(registers(other)[0], 1);  // 127240 mW = 65536 + 61704
-  EXPECT_NEAR(registers(other)[1], 61704, 100);
-  other.register_12 = SupplyDisputes::Twelve::milliampere_hours;
-  EXPECT_EQ(registers(other)[0], 1);  // 2.5 A for 2 s
-}
-
 TEST(SimulatedRiden, HidesTheLiveThresholdsAfterAPreset) {
-  for (const bool reads_zero : {true, false}) {
-    SupplySettings settings;
-    settings.disputes.preset_reads_zero = reads_zero;
-    Asked supply(settings);
-    supply.slave.registers().write(82, 1300);
-    supply.slave.registers().write(83, 3000);
-    supply.slave.registers().write(84 + 2, 2000);  // M1: OVP
-    supply.slave.registers().write(19, 1);
-    EXPECT_EQ(supply.slave.circuit().controls().over_volts, 20);
-    EXPECT_EQ(supply.slave.registers().read(82), 1300);
-    EXPECT_EQ(supply.slave.registers().read(19), reads_zero ? 0 : 1);
-  }
+  Asked supply;
+  supply.slave.registers().write(82, 1300);
+  supply.slave.registers().write(83, 3000);
+  supply.slave.registers().write(84 + 2, 2000);  // M1: OVP
+  supply.slave.registers().write(19, 1);
+  EXPECT_EQ(supply.slave.circuit().controls().over_volts, 20);
+  EXPECT_EQ(supply.slave.registers().read(82), 1300);
+  EXPECT_EQ(supply.slave.registers().read(19), 0);
 }
 
 TEST(SimulatedDps, TakesNoMoreThan32Registers) {

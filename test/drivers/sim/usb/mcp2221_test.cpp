@@ -62,22 +62,6 @@ TEST_F(SimulatedMcp2221Test, TakesItsTimeOnTheBus) {
   EXPECT_EQ(told({0x40}, 5ms)[3], 60);
 }
 
-TEST_F(SimulatedMcp2221Test, GivesALongReadingInParts) {
-  told({0x94, 1, 0, 0xEC, 0x00});
-  told({0x91, 100, 0, 0xEC});
-  EXPECT_EQ(beginning(told({0x40}, 20ms), 4), (Bytes{0x40, 0, 0x54, 60}));
-  EXPECT_EQ(beginning(told({0x40}, 20ms), 4), (Bytes{0x40, 0, 0x55, 40}));
-}
-
-TEST_F(SimulatedMcp2221Test, GathersALongWriteFromSeveralReports) {
-  Bytes first{0x90, 70, 0, 0xEC};
-  for (int i = 0; i < 60; ++i) first.push_back(i % 2 == 0 ? 0xF2 : 0x01);
-  told(first);
-  EXPECT_EQ(told({0x10}, 20ms)[11], 0) << "not all there yet";
-  told({0x90, 70, 0, 0xEC, 0xF2, 3, 0xF2, 3, 0xF2, 3, 0xF2, 3, 0xF2, 3});
-  EXPECT_EQ(told({0x10}, 20ms)[11], 70);
-}
-
 TEST_F(SimulatedMcp2221Test, ShowsAMissingAcknowledgementOnlyAfterwards) {
   EXPECT_EQ(beginning(told({0x90, 1, 0, 0x80, 0xD0}), 2), (Bytes{0x90, 0})) << "the write itself seems to succeed";
   const Bytes status = told({0x10});
@@ -158,8 +142,8 @@ TEST_F(SimulatedMcp2221Test, AnswersAnyReportWithItsOwnCommandAndNeverMoreThanIt
   for (int i = 0; i < 200'000; ++i) {
     Bytes command(64);
     for (std::uint8_t& byte : command) byte = static_cast<std::uint8_t>(random.bits() & random.bits());
-    constexpr std::uint8_t kKnown[] = {0x10, 0x40, 0x61, 0x90, 0x91, 0x92, 0x93, 0x94};
-    if (random.bits() % 4 != 0) command[0] = kKnown[random.bits() % 8];
+    constexpr std::uint8_t kKnown[] = {0x10, 0x40, 0x61, 0x90, 0x93, 0x94};
+    if (random.bits() % 4 != 0) command[0] = kKnown[random.bits() % std::size(kKnown)];
     if (random.bits() % 2 != 0) command[3] = 0xEC;
     const Bytes answer = told(command, Duration(static_cast<std::int64_t>(random.bits() % 30'000'000)));
     ASSERT_EQ(answer.size(), 64u);

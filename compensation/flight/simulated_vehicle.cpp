@@ -1,0 +1,95 @@
+#include "compensation/flight/simulated_vehicle.hpp"
+
+#include <Eigen/LU>
+#include <cmath>
+
+namespace kphi::flight {
+namespace {
+
+/// Of a point mass at (x, y, 0), about the origin.
+Eigen::Matrix3d point_inertia(double mass, const Eigen::Vector2d& at) noexcept {
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  inertia(0, 0) = mass * at.y() * at.y();
+  inertia(1, 1) = mass * at.x() * at.x();
+  inertia(2, 2) = mass * at.squaredNorm();
+  inertia(0, 1) = inertia(1, 0) = -mass * at.x() * at.y();
+  return inertia;
+}
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) noexcept { return a.x() * b.y() - a.y() * b.x(); }
+
+/// Of the area within an outline: its middle [m], and the means of x², y² and xy about it [m²].
+struct AreaMoments {
+  Eigen::Vector2d middle;
+  double xx = 0, yy = 0, xy = 0;
+};
+
+/// By Green's theorem: the triangles between the origin and each edge.
+AreaMoments area_moments(const compensation::ConvexPolygon& outline) noexcept {
+  const auto corner = [&](std::size_t i) {
+    const compensation::Position& at = outline.corner(i % outline.size());
+    return Eigen::Vector2d(at.x.value(), at.y.value());
+  };
+  double area = 0, xx = 0, yy = 0, xy = 0;
+  Eigen::Vector2d first = Eigen::Vector2d::Zero();
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Eigen::Vector2d a = corner(i), b = corner(i + 1), sum = a + b;
+    const double triangle = cross(a, b) / 2;
+    area += triangle;
+    first += triangle / 3 * sum;
+    xx += triangle / 6 * (a.x() * sum.x() + b.x() * b.x());
+    yy += triangle / 6 * (a.y() * sum.y() + b.y() * b.y());
+    xy += triangle / 12 * (a.x() * (a.y() + sum.y()) + b.x() * (b.y() + sum.y()));
+  }
+  const Eigen::Vector2d middle = first / area;
+  return {middle, xx / area - middle.x() * middle.x(), yy / area - middle.y() * middle.y(),
+          xy / area - middle.x() * middle.y()};
+}
+
+/// Of the body without its hubs, about its own middle.
+Eigen::Matrix3d body_inertia(const Build& build, double mass, const AreaMoments& area) noexcept {
+  if (build.body_inertia) return build.body_inertia->asDiagonal();
+  const double tall = build.body_height_m * build.body_height_m / 12;
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  inertia.diagonal() = mass * Eigen::Vector3d(area.yy + tall, area.xx + tall, area.xx + area.yy);
+  inertia(0, 1) = inertia(1, 0) = -mass * area.xy;
+  return inertia;
+}
+
+}  // namespace
+
+MassProperties mass_properties(const Vehicle& vehicle, const Angles& arms, const std::array<double, 4>& rates,
+                               const Eigen::Vector2d& plate_offset) noexcept {
+  const Build& build = vehicle.build;
+  const double plate = build.mass_kg - 4 * build.hub_mass_kg;
+  const AreaMoments area = area_moments(outline_of(vehicle.airframe));
+  const Eigen::Vector2d middle = area.middle + plate_offset;
+  MassProperties found;
+  found.mass_kg = build.mass_kg;
+  // About the origin first, then about the common centre of gravity c (Steiner's theorem): J = Σ (J_own + m r²) − M c².
+  // So the body's distance from c counts as the hubs' do: in T of the foldable drone 17.55 mm, 0.129e-3 kg m² of J_xx
+  // and J_zz.
+  found.inertia = body_inertia(build, plate, area) + point_inertia(plate, middle);
+  found.cog = plate * middle;
+  for (std::size_t i = 0; i < arms.size(); ++i) {
+    const compensation::HubPosition at = hub_in_body(vehicle.airframe, i, arms[i]);
+    const compensation::HubPosition quarter_on = hub_in_body(vehicle.airframe, i, arms[i] + Radians(kPi / 2));
+    const compensation::HubPosition hinge_twice = hub_in_body(vehicle.airframe, i, arms[i] + Radians(kPi));
+    const Eigen::Vector2d hub(at.x.value(), at.y.value());
+    const Eigen::Vector2d hinge = (hub + Eigen::Vector2d(hinge_twice.x.value(), hinge_twice.y.value())) / 2;
+    const Eigen::Vector2d speed = rates[i] * (Eigen::Vector2d(quarter_on.x.value(), quarter_on.y.value()) - hinge);
+    found.hubs[i] = hub;
+    found.cog += build.hub_mass_kg * hub;
+    found.cog_rate += build.hub_mass_kg * speed;
+    found.inertia += point_inertia(build.hub_mass_kg, hub);
+    found.arm_momentum += build.hub_mass_kg * cross(hub, speed);
+  }
+  found.cog /= build.mass_kg;
+  found.cog_rate /= build.mass_kg;
+  found.arm_momentum -= build.mass_kg * cross(found.cog, found.cog_rate);
+  found.inertia -= point_inertia(build.mass_kg, found.cog);
+  found.inverse_inertia = found.inertia.inverse();
+  return found;
+}
+
+}  // namespace kphi::flight

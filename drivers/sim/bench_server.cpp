@@ -1,0 +1,231 @@
+#include "drivers/sim/bench_server.hpp"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "base/error.hpp"
+#include "drivers/sim/control_line.hpp"
+
+namespace kphi::sim {
+namespace {
+
+constexpr std::chrono::milliseconds kWakeUp{1};  // wall time
+constexpr int kCatchUp = 8;                      // bench time per wake-up, in wake-ups
+
+[[noreturn]] void refuse(const std::string& where, const std::string& operation, const std::string& cause,
+                         const std::string& next_move) {
+  throw DeviceError("simulated bench " + where, operation, cause, next_move);
+}
+
+Peer peer_of(const sockaddr_in& address) noexcept {
+  return static_cast<Peer>(address.sin_addr.s_addr) << 16 | address.sin_port;
+}
+
+sockaddr_in address_of(Peer peer) noexcept {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = static_cast<in_addr_t>(peer >> 16);
+  address.sin_port = static_cast<in_port_t>(peer & 0xffff);
+  return address;
+}
+
+bool answers(const sockaddr_un& address) {
+  const Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  return ::connect(probe.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+}
+
+Descriptor listen_for_control(const std::string& path) {
+  const auto found = unix_address(path);
+  if (!found) {
+    refuse("control \"" + path + "\"", "open control line", "the path is empty or longer than a socket path may be",
+           "set simulation.control in the bench file");
+  }
+  const sockaddr_un& address = *found;
+  std::error_code error;
+  const auto folder = std::filesystem::path(path).parent_path();
+  std::filesystem::create_directories(folder, error);
+  if (std::filesystem::is_socket(path, error)) {
+    if (answers(address)) refuse(path, "open control line", "another simulator answers there", "stop it first");
+    ::unlink(path.c_str());
+  }
+  Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
+  if (::bind(socket.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+      ::listen(socket.number(), 16) != 0) {
+    refuse(path, "open control line", std::strerror(errno), "set simulation.control in the bench file to a free path");
+  }
+  return socket;
+}
+
+}  // namespace
+
+Server::Server(const ServerSettings& settings)
+    : time_scale_(settings.bench.time_scale),
+      addresses_(settings),
+      bench_(settings.bench),
+      keep_motion_(settings.bench.motor_keep == IqLine::Keep::replies),
+      stop_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
+      rdt_(listen_at(settings.host, SOCK_DGRAM, settings.rdt_port)),
+      foreign_(listen_at(settings.host, SOCK_DGRAM, 0)),
+      web_(listen_at(settings.host, SOCK_STREAM, settings.http_port)),
+      coarse_(listen_at(settings.host, SOCK_STREAM, settings.tcp_port)),
+      pty_(settings.device, settings.bench.module.baud),
+      http_(std::move(web_.socket), {"\r\n\r\n", true, 1},
+            [this](std::string_view request) { return in_wall_time(bench_.wire().http(request, reached_)); }),
+      tcp_(std::move(coarse_.socket), 4,
+           [this](std::string& heard) { return in_wall_time(bench_.wire().tcp(heard, reached_)); }),
+      control_(listen_for_control(control_path(settings.control)), {"\n", false, 16},
+               [this](std::string_view line) { return StreamReply{control_answer(bench_, line) + "\n"}; }),
+      present_host_(settings.host),
+      last_wanted_(settings.host) {
+  addresses_.rdt_port = rdt_.port;
+  addresses_.http_port = web_.port;
+  addresses_.tcp_port = coarse_.port;
+  addresses_.device = pty_.path();
+  addresses_.control = control_path(settings.control);
+  if (bench_.supply() == nullptr) addresses_.supply.reset();
+  if (addresses_.supply) {
+    supply_.emplace(*addresses_.supply);
+    if (addresses_.supply->device) addresses_.supply->device = supply_->device();
+    addresses_.supply->port = supply_->port();
+  }
+  open_or_close_web();
+}
+
+Server::~Server() { ::unlink(addresses_.control.c_str()); }
+
+void Server::request_stop() noexcept {
+  const std::uint64_t one = 1;
+  [[maybe_unused]] const ssize_t written = ::write(stop_.number(), &one, sizeof one);
+}
+
+std::vector<pollfd> Server::polls() const {
+  std::vector<pollfd> all{{stop_.number(), POLLIN, 0}, {rdt_.socket.number(), POLLIN, 0}, {pty_.number(), POLLIN, 0}};
+  http_.append_polls(all);
+  tcp_.append_polls(all);
+  control_.append_polls(all);
+  if (supply_) supply_->append_polls(all);
+  return all;
+}
+
+void Server::run() {
+  const SteadyClock clock(time_scale_);
+  const Duration step_size = clock.stretched(kWakeUp);
+  bool behind = false;
+  while (true) {
+    auto waiting = polls();
+    ::poll(waiting.data(), waiting.size(), behind ? 0 : static_cast<int>(kWakeUp.count()));
+    if (waiting.front().revents != 0) return;
+    const Instant now = clock.now();
+    const Instant goal = std::min(now, reached_ + kCatchUp * step_size);
+    behind = goal < now;
+    while (reached_ < goal) {
+      reached_ = std::min(goal, reached_ + step_size);
+      step(reached_);
+    }
+    follow_the_address();
+    open_or_close_web();
+    http_.serve();
+    tcp_.serve();
+    control_.serve();
+  }
+}
+
+void Server::open_or_close_web() {
+  const bool open = !bench_.wire().http_refused(reached_) && !present_host_.empty();
+  if (open != http_.listening())
+    http_.listen_at(open ? listen_at(present_host_, SOCK_STREAM, web_.port).socket : Descriptor());
+}
+
+void Server::follow_the_address() {
+  const std::string& moved = bench_.wire().moved_to();
+  const std::string& wanted = moved.empty() ? addresses_.host : moved;
+  if (wanted == last_wanted_) return;
+  last_wanted_ = wanted;
+  http_.listen_at(Descriptor());
+  tcp_.listen_at(Descriptor());
+  rdt_.socket = Descriptor();
+  present_host_.clear();
+  try {
+    rdt_ = listen_at(wanted, SOCK_DGRAM, rdt_.port);
+    tcp_.listen_at(listen_at(wanted, SOCK_STREAM, coarse_.port).socket);
+    present_host_ = wanted;
+  } catch (const DeviceError&) {  // not an address of this machine: the box cannot be reached
+  }
+}
+
+StreamReply Server::in_wall_time(StreamReply reply) const {
+  for (Duration* time : {&reply.wait, &reply.pause})
+    *time = Duration(static_cast<std::int64_t>(static_cast<double>(time->count()) / time_scale_));
+  return reply;
+}
+
+void Server::step(Instant now) {
+  bench_.advance(now);
+  log_motion(now);
+  hear_requests();
+  hear_motor(now);
+  log_motion(now);
+  send_datagrams();
+  send_motor();
+  if (!supply_) return;
+  supply_->receive(*bench_.supply(), now);
+  supply_->send(*bench_.supply(), now);
+}
+
+void Server::hear_requests() {
+  std::array<std::uint8_t, 64> bytes{};
+  while (true) {
+    sockaddr_in from{};
+    socklen_t size = sizeof from;
+    const ssize_t count = ::recvfrom(rdt_.socket.number(), bytes.data(), bytes.size(), MSG_TRUNC,
+                                     reinterpret_cast<sockaddr*>(&from), &size);
+    if (count < 0) return;
+    const auto length = std::min(static_cast<std::size_t>(count), bytes.size());
+    bench_.wire().request(std::span(bytes).first(length), peer_of(from), reached_);
+  }
+}
+
+void Server::hear_motor(Instant now) {
+  std::array<std::uint8_t, 512> bytes{};
+  const std::size_t count = pty_.read(bytes);
+  IqLine& line = bench_.motor_line();
+  if (count > 0) {
+    line.host_rate(pty_.baud());
+    line.send(std::span(bytes).first(count), now);
+    line.advance(now);
+  }
+}
+
+void Server::log_motion(Instant now) {
+  if (!keep_motion_) return;
+  motion_.look(bench_.motor(), bench_.plant().motor().speed, now);
+  if (SupplySlave* supply = bench_.supply()) motion_.look(supply->circuit(), now);
+}
+
+void Server::send_datagrams() {
+  while (bench_.wire().next_datagram(datagram_, reached_)) {
+    const sockaddr_in to = address_of(datagram_.peer);
+    const int socket = (datagram_.foreign ? foreign_ : rdt_).socket.number();
+    if (::sendto(socket, datagram_.bytes.data(), datagram_.size, MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&to),
+                 sizeof to) < 0)
+      ++unsent_.datagrams;
+  }
+}
+
+void Server::send_motor() {
+  IqLine& line = bench_.motor_line();
+  if (line.plugged() != pty_.plugged()) line.plugged() ? pty_.plug() : pty_.unplug();
+  IqChunk chunk;
+  while (line.next_chunk(chunk, reached_)) unsent_.motor_bytes += chunk.bytes.size() - pty_.write(chunk.bytes);
+}
+
+}  // namespace kphi::sim
