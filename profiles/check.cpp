@@ -247,12 +247,13 @@ std::vector<CheckedFile> check_files(const std::vector<std::string>& paths, cons
   Loaded loaded;
   for (const std::string& path : paths) files.push_back(check_file(path, files.size(), foreign, loaded));
   for (const auto& [number, campaign] : loaded.campaigns) {
-    for (const BenchConfig& bench : loaded.benches) attempt(files[number], [&] { require_within(campaign, bench); });
+    for (const BenchConfig& bench : loaded.benches)
+      attempt(files[number], [&, &asked = campaign] { require_within(asked, bench); });
   }
   for (const auto& [number, answers] : loaded.answers) {
     for (const auto& [of_campaign, campaign] : loaded.campaigns) {
       const auto angles = make_plan(campaign, BenchConfig{}).mounting_angles();
-      attempt(files[number], [&] { require_mountings(answers, angles); });
+      attempt(files[number], [&, &given = answers] { require_mountings(given, angles); });
     }
   }
   for (CheckedFile& file : files) {
