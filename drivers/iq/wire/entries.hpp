@@ -167,10 +167,14 @@ inline constexpr auto kEntries = [] {
   });
 }();
 
+/// Of kEntries; its size when there is no such entry.
+[[nodiscard]] constexpr std::size_t index_of(std::string_view path) noexcept {
+  return static_cast<std::size_t>(std::ranges::find(kEntries, path, &Entry::path) - kEntries.begin());
+}
 /// Null when there is no such entry.
 [[nodiscard]] constexpr const Entry* find(std::string_view path) noexcept {
-  const auto found = std::ranges::find(kEntries, path, &Entry::path);
-  return found == kEntries.end() ? nullptr : &*found;
+  const std::size_t index = index_of(path);
+  return index == kEntries.size() ? nullptr : &kEntries[index];
 }
 [[nodiscard]] constexpr const Entry* find(std::uint8_t type, std::uint8_t sub) noexcept {
   const auto found = std::ranges::find_if(
@@ -187,16 +191,16 @@ struct Path {
 };
 
 template <Path path>
-concept Known = (find(path.view()) != nullptr);
+concept Known = (index_of(path.view()) < kEntries.size());
 template <Path path>
-concept Readable = (Known<path>)&&(find(path.view())->allows(Access::get));
+concept Readable = (Known<path>)&&(kEntries[index_of(path.view())].allows(Access::get));
 template <Path path>
-concept Writable = (Known<path>)&&(find(path.view())->allows(Access::set));
+concept Writable = (Known<path>)&&(kEntries[index_of(path.view())].allows(Access::set));
 
 /// entry<"power_monitor.volts">: unknown names do not compile.
 template <Path path>
 requires Known<path>
-inline constexpr const Entry& entry = *find(path.view());
+inline constexpr const Entry& entry = kEntries[index_of(path.view())];
 
 /// The packet of one access. Data goes with set and reply; a value is rounded to the format and held to its range.
 /// Formats none and bytes16 carry no number.
