@@ -53,7 +53,7 @@ void write_report(const Identification& identification, const Analysis& analysis
 
 struct FitRequest {
   std::string path;
-  IdentificationOptions options;  ///< as far as they are not below
+  IdentificationOptions options;  ///< of the fit; the rest of the request completes them
   std::string speed_range_rpm;
   std::optional<double> at_speed_rpm;
   std::string out;

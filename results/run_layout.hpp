@@ -31,7 +31,7 @@ struct ColumnLayout {
   const char* unit;  ///< UDUNITS spelling; nullptr: unit and long name are those of the group
   const char* long_name;
   Stored stored;
-  std::span<const char* const> codes{};  ///< what each code means; empty: the value is no code
+  std::span<const char* const> codes{};  ///< what each code means; empty: a plain number
 };
 
 template <class Row>

@@ -47,7 +47,7 @@ void AmbientWorker::run() noexcept {
     std::string why;
     try {
       if (!sensor) sensor = open_();
-      if (!sensor) throw DeviceError("ambient", "open", "there is no sensor");
+      if (!sensor) throw DeviceError("ambient", "open", "no sensor found");
       air = sensor->read();
       rest = rhythm_.between_readings;
       pause = rhythm_.first_pause;

@@ -5,8 +5,8 @@
 // when the thread ends for whatever reason; and when the object is destroyed. If this process is killed, the module's
 // own communication timeout coasts it.
 //
-// After a failure the link looks for the port and the module by itself and coasts what it finds. It does not spin
-// again: its owner, who has seen the failure, connects another one.
+// After a failure the link looks for the port and the module by itself and coasts the module that it finds. It never
+// spins it again: for that its owner makes a new Motor.
 #pragma once
 
 #include <atomic>

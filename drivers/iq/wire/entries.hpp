@@ -167,7 +167,7 @@ inline constexpr auto kEntries = [] {
   });
 }();
 
-/// Of kEntries; its size when there is no such entry.
+/// Index in kEntries; kEntries.size() for an unknown path.
 [[nodiscard]] constexpr std::size_t index_of(std::string_view path) noexcept {
   return static_cast<std::size_t>(std::ranges::find(kEntries, path, &Entry::path) - kEntries.begin());
 }
