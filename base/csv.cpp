@@ -44,24 +44,6 @@ std::optional<std::string> take_quoted(std::string_view& rest) {
   return std::nullopt;
 }
 
-/// nullopt if the quotes of the line do not close, or if text follows a closing quote.
-std::optional<std::vector<std::string>> split_at(char separator, std::string_view line) {
-  std::vector<std::string> fields;
-  for (;;) {
-    if (!line.empty() && line.front() == '"') {
-      auto field = take_quoted(line);
-      if (!field || (!line.empty() && line.front() != separator)) return std::nullopt;
-      fields.push_back(std::move(*field));
-    } else {
-      const std::size_t end = std::min(line.find(separator), line.size());
-      fields.emplace_back(trimmed(line.substr(0, end)));
-      line.remove_prefix(end);
-    }
-    if (line.empty()) return fields;
-    line.remove_prefix(1);
-  }
-}
-
 std::optional<std::vector<std::string>> split_blanks(std::string_view line) {
   std::vector<std::string> fields;
   while (!(line = trimmed(line)).empty()) {
@@ -135,9 +117,27 @@ std::size_t Table::column(std::string_view name) const {
                                        times == 0 ? "no" : "more than one", name));
 }
 
+std::optional<std::vector<std::string>> split_csv_line(std::string_view line, char separator) {
+  std::vector<std::string> fields;
+  for (;;) {
+    if (!line.empty() && line.front() == '"') {
+      auto field = take_quoted(line);
+      if (!field || (!line.empty() && line.front() != separator)) return std::nullopt;
+      fields.push_back(std::move(*field));
+    } else {
+      const std::size_t end = std::min(line.find(separator), line.size());
+      fields.emplace_back(trimmed(line.substr(0, end)));
+      line.remove_prefix(end);
+    }
+    if (line.empty()) return fields;
+    line.remove_prefix(1);
+  }
+}
+
 Table read_csv(std::string_view text, std::string path, char separator) {
   if (separator == 0) separator = likely_separator(text);
-  return read_table(text, std::move(path), [separator](std::string_view line) { return split_at(separator, line); });
+  return read_table(text, std::move(path),
+                    [separator](std::string_view line) { return split_csv_line(line, separator); });
 }
 
 Table read_blank_separated(std::string_view text, std::string path) {

@@ -36,6 +36,8 @@ struct Table {
 /// quote in it doubled. Empty lines are skipped. Separator 0: the one of , ; tab that the header line has most of.
 [[nodiscard]] Table read_csv(std::string_view text, std::string path, char separator = ',');
 
+/// The fields of one line of such a table; nullopt if its quotes do not close, or text follows a closing quote.
+[[nodiscard]] std::optional<std::vector<std::string>> split_csv_line(std::string_view line, char separator = ',');
 /// Separated by blanks or tabs.
 [[nodiscard]] Table read_blank_separated(std::string_view text, std::string path);
 

@@ -1,13 +1,21 @@
-#include "profiles/check.hpp"
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdio>
+#include <optional>
+#include <string_view>
 #include <vector>
 
 #include "commands/commands.hpp"
 #include "compensation/file/coefficient_file.hpp"
-#include "compensation/file/coefficient_keys.hpp"
+#include "compensation/occlusion.hpp"
+#include "daq/campaign/dry_run.hpp"
 #include "drivers/sim/input_files.hpp"
-#include "profiles/strict_yaml.hpp"
+#include "profiles/answers.hpp"
+#include "profiles/plan.hpp"
+#include "profiles/schema.hpp"
+#include "profiles/vehicle.hpp"
 
 namespace kphi::commands {
 namespace {
@@ -19,6 +27,89 @@ struct CheckOptions {
   bool json = false;
 };
 
+struct CheckedFile {
+  std::string path;
+  std::string kind;             ///< empty: unknown
+  std::string summary;          ///< a few lines; empty if refused
+  Json errors = Json::array();  ///< message; of a finding also line, column, what, next_move
+  // For the checks of one file against another.
+  std::optional<Campaign> campaign;
+  std::optional<BenchConfig> bench;
+  std::optional<Answers> answers;
+};
+
+/// On a bench with the usual rate.
+Plan plan_of(const Campaign& campaign) { return make_plan(campaign, BenchConfig{}); }
+
+std::string summary_of(const Campaign& campaign) {
+  return fmt::format("  {}\n  order {}\n", daq::plan_text(campaign, {}, plan_of(campaign)), to_words(campaign.order));
+}
+
+std::string summary_of(const BenchConfig& bench) {
+  const std::string simulated =
+      !bench.simulation ? "no"
+      : bench.simulation->in_process
+          ? fmt::format("in process, seed {}", bench.simulation->seed)
+          : fmt::format("{:g} times faster, seed {}", bench.simulation->time_scale, bench.simulation->seed);
+  return fmt::format(
+      "  net box    {}, RDT port {}, HTTP port {}, {:g} Hz, {} records per datagram\n"
+      "  motor      {} at {} baud, module {}, spin {:+}, at most {:.6g} RPM\n"
+      "  thrust     along {}F{}\n"
+      "  simulated  {}\n",
+      bench.netbox.host, bench.netbox.rdt_port, bench.netbox.http_port, bench.netbox.rate_hz,
+      bench.netbox.records_per_datagram, bench.iq.device, bench.iq.baud, bench.iq.module_id, bench.iq.spin,
+      to_rpm(bench.iq.speed_max), bench.thrust_sign > 0 ? '+' : '-', "xyz"[bench.thrust_axis], simulated);
+}
+
+std::string summary_of(const Answers& answers) {
+  std::string mountings;
+  for (const auto& [angle, mark] : answers.mountings) mountings += fmt::format(" {:g}", angle);
+  return fmt::format("  mountings {}°\n  run again  {} decisions\n", mountings, answers.run_again.size());
+}
+
+std::string in_words(const Vehicle& vehicle) {
+  if (!vehicle.body) return fmt::format("half side {:g} m", vehicle.half_side.value());
+  return fmt::format("{} corners", vehicle.body->outline.size());
+}
+
+/// A shape with the occlusion of each arm.
+std::string summary_of_shape(const std::string& name, const std::array<Radians, 4>& angles,
+                             const compensation::Airframe& airframe) {
+  std::string arms, occlusions;
+  for (std::size_t i = 0; i < angles.size(); ++i) {
+    arms += fmt::format(" {:.6g}", to_degrees(angles[i]));
+    occlusions += fmt::format(" {:.4g}", to_degrees(compensation::occlusion_of_arm(airframe, i, angles[i])));
+  }
+  return fmt::format("  shape {:<4} arms at{}°, occluded by{}°\n", name, arms, occlusions);
+}
+
+std::string summary_of(const flight::Build& build, const flight::Gains& gains) {
+  return fmt::format(
+      "  dynamics   {:g} kg, of which {:g} kg at each hub; {:.3g} N per rotor carry it\n"
+      "  control    position {:g} 1/s2, velocity {:g} 1/s, attitude {:g} 1/s, rates {:g} 1/s\n",
+      build.mass_kg, build.hub_mass_kg, flight::kGravity * build.mass_kg / 4, fmt::join(gains.position, " "),
+      fmt::join(gains.velocity, " "), fmt::join(gains.attitude, " "), fmt::join(gains.rate, " "));
+}
+
+std::string what_flies(const Vehicle& vehicle) {
+  if (vehicle.dynamics && vehicle.control) return summary_of(*vehicle.dynamics, vehicle.control->gains);
+  return fmt::format("  kphi fly   cannot fly it without {}\n", vehicle.dynamics  ? "control"
+                                                                : vehicle.control ? "dynamics"
+                                                                                  : "dynamics and control");
+}
+
+std::string summary_of(const Vehicle& vehicle) {
+  std::string shapes;
+  const compensation::Airframe airframe = airframe_of(vehicle);
+  for (const auto& [name, angles] : vehicle.shapes) shapes += summary_of_shape(name, angles, airframe);
+  return fmt::format(
+      "  body       {}, arms {:g} m, propeller radius {:g} m\n"
+      "  speeds     {:.6g} to {:.6g} RPM\n"
+      "  overlap    {}\n{}{}",
+      in_words(vehicle), vehicle.arm_length.value(), vehicle.propeller_radius.value(), to_rpm(vehicle.speed_min),
+      to_rpm(vehicle.speed_max), compensation::name_of(vehicle.overlap), shapes, what_flies(vehicle));
+}
+
 /// What the curve's uncertainty does to the speed of a rotor, at the ends of the valid range.
 std::string uncertainty_of(const compensation::ThrustCurve& curve) {
   if (!curve.uncertainty())
@@ -28,8 +119,7 @@ std::string uncertainty_of(const compensation::ThrustCurve& curve) {
                      percent(curve.largest_fitted()), to_degrees(curve.largest_fitted()));
 }
 
-std::string judge_coefficients(const std::string& path) {
-  const compensation::Coefficients c = compensation::load_coefficients(path);
+std::string summary_of(const compensation::Coefficients& c) {
   return fmt::format(
       "  propeller  {} ({})\n"
       "  K_T        {:.6g} N/(rad/s)^2 = {:.6g} N/RPM^2\n"
@@ -42,11 +132,10 @@ std::string judge_coefficients(const std::string& path) {
       uncertainty_of(c.curve));
 }
 
-template <class Fault>
-std::string in_words(const std::vector<Fault>& script, const sim::FaultTable<Fault>& table) {
+std::string summary_of(const sim::FaultFile& file) {
   std::string words;
-  for (const Fault& fault : script) {
-    words += fmt::format("  at {:g} s  {}", to_seconds(fault.at), table.name_of(fault.kind));
+  for (const sim::Fault& fault : file.faults) {
+    words += fmt::format("  at {:g} s  {}", to_seconds(fault.at), sim::name_of(fault.kind));
     if (fault.lasts > Duration{0}) words += fmt::format(" for {:g} s", to_seconds(fault.lasts));
     if (fault.count > 0) words += fmt::format(", at most {} times", fault.count);
     words += "\n";
@@ -54,14 +143,7 @@ std::string in_words(const std::vector<Fault>& script, const sim::FaultTable<Fau
   return words;
 }
 
-std::string judge_faults(const std::string& path) {
-  const sim::FaultFile file = sim::parse_faults(profiles::read_text(path), path);
-  return in_words(file.load_cell, sim::load_cell_faults()) + in_words(file.motor, sim::motor_faults()) +
-         in_words(file.supply, sim::supply_faults()) + in_words(file.air, sim::ambient_faults());
-}
-
-std::string judge_motor(const std::string& path) {
-  const sim::MotorParameters motor = sim::parse_motor_profile(profiles::read_text(path), path).motor;
+std::string summary_of(const sim::MotorParameters& motor) {
   return fmt::format(
       "  motor      {:.4g} RPM/V, {:g} ohm, {:g} kg m^2 without propeller\n"
       "  supply     {:g} V behind {:g} ohm, at most {:g} A\n",
@@ -69,26 +151,138 @@ std::string judge_motor(const std::string& path) {
       motor.source_resistance, motor.supply_current_max);
 }
 
-const std::vector<ForeignKind>& foreign_kinds() {
-  static const std::vector<ForeignKind> kinds{{compensation::kCoefficientFormat, "coefficients", judge_coefficients},
-                                              {"kphi-faults/1", "fault script", judge_faults},
-                                              {"kphi-sim-motor/1", "simulated motor", judge_motor}};
-  return kinds;
+/// How a kind of file is known: by its line `format: …`, or else by one of its keys.
+struct Kind {
+  const char* word;
+  const char* format;
+  std::string (*judge)(const std::string& text, CheckedFile& file);  ///< returns the summary, or throws
+  std::vector<const char*> keys{};
+};
+
+Kind ours(FileKind kind, decltype(Kind::judge) judge, std::vector<const char*> keys) {
+  return {info(kind).word, info(kind).format, judge, std::move(keys)};
 }
 
-void print(const CheckedFile& file, bool json) {
-  if (json) return print_json(file.report, -1);
-  if (file.ok()) fmt::print("{}: valid {}\n{}", file.path, file.kind, file.summary);
-  for (const std::string& error : file.errors) fmt::print(stderr, "{}\n", error);
+const std::vector<Kind>& kinds() {
+  using Text = const std::string&;
+  using File = CheckedFile&;
+  static const std::vector<Kind> all{
+      ours(FileKind::campaign,
+           [](Text text, File file) { return summary_of(file.campaign.emplace(parse_campaign(text, file.path))); },
+           {"occlusions_deg", "profile"}),
+      ours(FileKind::bench,
+           [](Text text, File file) { return summary_of(file.bench.emplace(parse_bench(text, file.path))); },
+           {"netbox", "iq"}),
+      ours(FileKind::vehicle, [](Text text, File file) { return summary_of(parse_vehicle(text, file.path)); },
+           {"shapes_deg", "half_side_m"}),
+      ours(FileKind::answers,
+           [](Text text, File file) { return summary_of(file.answers.emplace(parse_answers(text, file.path))); },
+           {"mountings"}),
+      {"coefficients", compensation::kCoefficientFormat,
+       [](Text, File file) { return summary_of(compensation::load_coefficients(file.path)); }},
+      {"fault script", "kphi-faults/1",
+       [](Text text, File file) { return summary_of(sim::parse_faults(text, file.path)); }},
+      {"simulated motor", "kphi-sim-motor/1",
+       [](Text text, File file) { return summary_of(sim::parse_motor_profile(text, file.path).motor); }},
+  };
+  return all;
+}
+
+/// Value of the first line `format: …`: enough for a file that is not YAML.
+std::string format_line(const std::string& text) {
+  constexpr std::string_view kKey = "format:";
+  std::size_t begin = text.compare(0, kKey.size(), kKey) == 0 ? 0 : text.find("\nformat:");
+  if (begin == std::string::npos) return "";
+  begin = text.find(':', begin) + 1;
+  begin = std::min(text.find_first_not_of(" \"'", begin), text.size());
+  return text.substr(begin, text.find_first_of(" \"'\r\n#", begin) - begin);
+}
+
+/// Without a known format by its keys, so that all findings come at once.
+const Kind& kind_of(const std::string& text, const std::string& path) {
+  const auto named = [](const std::string& format) { return std::ranges::find(kinds(), format, &Kind::format); };
+  if (const auto known = named(format_line(text)); known != kinds().end()) return *known;
+  const SourceDocument document = parse_strict_yaml(text, path);
+  std::string format;
+  if (document.value.is_object() && document.value.contains("format") && document.value["format"].is_string())
+    format = document.value["format"];
+  if (const auto known = named(format); known != kinds().end()) return *known;
+  std::vector<std::string> formats;
+  for (const Kind& kind : kinds()) {
+    formats.emplace_back(kind.format);
+    for (const char* key : kind.keys)
+      if (document.value.is_object() && document.value.contains(key)) return kind;
+  }
+  const auto near = nearest_name(format, formats);
+  throw RefusedFile(path, {{document.value_mark("/format"), "/format",
+                            format.empty() ? "unknown kind of file: no format given" : "unknown format " + format,
+                            near ? fmt::format("did you mean format: {}?", *near)
+                                 : fmt::format("begin it with format: and one of {}", fmt::join(formats, ", "))}});
+}
+
+/// Adds to the file what `check` refuses.
+template <class Check>
+void attempt(CheckedFile& file, Check&& check) {
+  const std::size_t before = file.errors.size();
+  try {
+    check();
+  } catch (const RefusedFile& refused) {
+    for (const FileFinding& finding : refused.findings())
+      file.errors.push_back({{"line", finding.mark.line},
+                             {"column", finding.mark.column},
+                             {"what", finding.what},
+                             {"next_move", finding.next_move},
+                             {"message", describe(file.path, finding)}});
+  } catch (const std::runtime_error& refused) {
+    file.errors.push_back({{"message", refused.what()}});
+  }
+  if (file.errors.size() > before) file.summary.clear();
+}
+
+CheckedFile check_alone(const std::string& path) {
+  CheckedFile file;
+  file.path = path;
+  attempt(file, [&] {
+    const std::string text = read_text(path);
+    const Kind& kind = kind_of(text, path);
+    file.kind = kind.word;
+    file.summary = kind.judge(text, file);
+  });
+  return file;
+}
+
+/// Every campaign against every bench, and all answers against every campaign.
+void check_together(std::vector<CheckedFile>& files) {
+  for (CheckedFile& file : files) {
+    for (const CheckedFile& other : files) {
+      if (file.campaign && other.bench) attempt(file, [&] { require_within(*file.campaign, *other.bench); });
+      if (file.answers && other.campaign)
+        attempt(file, [&] { require_mountings(*file.answers, plan_of(*other.campaign).mounting_angles()); });
+    }
+  }
+}
+
+void print_report(const CheckedFile& file) {
+  Json report{{"file", file.path},
+              {"kind", file.kind.empty() ? Json() : Json(file.kind)},
+              {"ok", file.errors.empty()},
+              {"errors", file.errors}};
+  if (file.campaign) report["plan"] = daq::to_json(plan_of(*file.campaign), {});
+  print_json(report, -1);
+}
+
+void print(const CheckedFile& file) {
+  if (file.errors.empty()) fmt::print("{}: valid {}\n{}", file.path, file.kind, file.summary);
+  for (const Json& error : file.errors) fmt::print(stderr, "{}\n", error["message"].get<std::string>());
 }
 
 ExitCode check(const CheckOptions& options) {
-  ExitCode exit_code = ExitCode::ok;
-  for (const CheckedFile& file : check_files(options.paths, foreign_kinds())) {
-    print(file, options.json);
-    if (!file.ok()) exit_code = ExitCode::usage;
-  }
-  return exit_code;
+  std::vector<CheckedFile> files;
+  for (const std::string& path : options.paths) files.push_back(check_alone(path));
+  check_together(files);
+  for (const CheckedFile& file : files) options.json ? print_report(file) : print(file);
+  const bool ok = std::ranges::all_of(files, [](const CheckedFile& file) { return file.errors.empty(); });
+  return ok ? ExitCode::ok : ExitCode::usage;
 }
 
 }  // namespace

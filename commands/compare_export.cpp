@@ -36,13 +36,12 @@ ExitCode compare_family(const CompareRequest& request) {
   if (!request.expect.empty()) throw ConfigurationError("--expect needs exactly two results: it is their verdict");
   std::vector<PropellerSize> sizes;
   for (const std::string& text : request.predict) sizes.push_back(parse_propeller_size(text));
-  std::vector<FamilyMember> family;
+  std::vector<Fitted> family;
   for (const std::string& path : request.results) {
     if (!fs::is_directory(path))
       throw ConfigurationError(
           path + ": not a folder; several propellers are compared from their folders, with steps.csv in them");
-    FittedFolder fitted = fitted_again(path);
-    family.push_back({std::move(fitted.identification), std::move(fitted.analysis)});
+    family.push_back(fitted_again(path).fitted);
   }
   const FamilyFindings findings = findings_of(family, sizes);
   fmt::print("{}", request.json ? Json(findings).dump(2) + "\n" : family_text(findings));

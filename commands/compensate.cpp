@@ -4,8 +4,8 @@
 #include <iostream>
 
 #include "commands/commands.hpp"
+#include "commands/compensate_rows.hpp"
 #include "commands/inputs.hpp"
-#include "compensation/compensate_rows.hpp"
 #include "compensation/compensator.hpp"
 
 namespace kphi::commands {
@@ -55,17 +55,13 @@ ExitCode verdict(const RowCounts& counts, const profiles::Vehicle& vehicle) {
 ExitCode compensate(const Request& request) {
   std::ios::sync_with_stdio(false);
   std::cin.tie(nullptr);
-  try {
-    const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
-    Compensator compensator = compensator_of(request, vehicle);
-    if (isatty(STDIN_FILENO) != 0) std::cerr << "reading CSV from the keyboard; Ctrl-D ends the input\n";
-    const RowCounts counts =
-        compensate_rows(std::cin, std::cout, std::cerr, compensator, {vehicle.arm_angle_min, vehicle.arm_angle_max},
-                        request.json ? RowFormat::json_lines : RowFormat::csv);
-    return verdict(counts, vehicle);
-  } catch (const RowHeaderError& error) {
-    throw ConfigurationError(error.what());
-  }
+  const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
+  Compensator compensator = compensator_of(request, vehicle);
+  if (isatty(STDIN_FILENO) != 0) std::cerr << "reading CSV from the keyboard; Ctrl-D ends the input\n";
+  const RowCounts counts =
+      compensate_rows(std::cin, std::cout, std::cerr, compensator, {vehicle.arm_angle_min, vehicle.arm_angle_max},
+                      request.json ? RowFormat::json_lines : RowFormat::csv);
+  return verdict(counts, vehicle);
 }
 
 }  // namespace

@@ -45,10 +45,9 @@ void write_page(const fs::path& page, const std::string& html) {
   fmt::print(stderr, "report        {}\n", page.string());
 }
 
-void write_report(const Identification& identification, const Analysis& analysis, FitInput& input,
-                  const fs::path& page) {
-  const Figures figures = draw_all(identification, input, page.parent_path() / "figures");
-  write_page(page, format_report(identification, input.provenance, figures, &analysis));
+void write_report(const Fitted& fitted, FitInput& input, const fs::path& page) {
+  const Figures figures = draw_all(fitted.identification, input, page.parent_path() / "figures");
+  write_page(page, format_report(fitted, {input.provenance, figures}));
 }
 
 struct FitRequest {
@@ -145,9 +144,8 @@ Json raw_json(const FitInput& input) {
 }
 
 /// This propeller and the others of its family, all fitted alike.
-FamilyFindings family_findings(const FitRequest& request, const Identification& identification,
-                               const Analysis& analysis) {
-  std::vector<FamilyMember> family{{identification, analysis}};
+FamilyFindings family_findings(const FitRequest& request, const Fitted& fitted) {
+  std::vector<Fitted> family{fitted};
   for (const std::string& path : request.family) {
     const FitInput input = load_input(path);
     FitRequest same = request;
@@ -161,18 +159,17 @@ FamilyFindings family_findings(const FitRequest& request, const Identification& 
   return findings_of(family, {});
 }
 
-void print_findings(const FitRequest& request, const FitInput& input, const Identification& identification,
-                    const Analysis& analysis, const fs::path& file) {
+void print_findings(const FitRequest& request, const FitInput& input, const Fitted& fitted, const fs::path& file) {
   const Json raw = request.raw ? raw_json(input) : Json();
   std::optional<FamilyFindings> family;
-  if (!request.family.empty()) family = family_findings(request, identification, analysis);
+  if (!request.family.empty()) family = family_findings(request, fitted);
   if (!request.json) {
-    fmt::print("{}", headline_text(identification));
+    fmt::print("{}", headline_text(fitted.identification));
     if (family) fmt::print("\n{}", family_text(*family));
     if (!raw.is_null()) fmt::print("{}\n", raw.dump(2));
     return;
   }
-  Json json = fit_json(identification, analysis, file);
+  Json json = fit_json(fitted.identification, fitted.analysis, file);
   if (family) json.update(Json(*family));
   if (!raw.is_null()) json["raw"] = raw;
   print_json(json);
@@ -182,17 +179,18 @@ ExitCode run_fit(const FitRequest& request) {
   FitInput input = load_input(request.path);
   if (request.raw && !input.campaign)
     throw ConfigurationError(request.path + ": --raw needs the runs of a campaign folder");
-  const Identification identification = identify_input(input, request);
+  Fitted fitted{identify_input(input, request), {}};
+  const Identification& identification = fitted.identification;
   const fs::path file = request.out.empty() ? input.folder / "coefficients.yaml" : fs::path(request.out);
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   const AnalysisOptions options = analysis_options(request, input, identification);
   if (input.table.empty()) input.provenance.bench = options.bench;
-  const Analysis analysis = analyse(identification, options);
+  fitted.analysis = analyse(identification, options);
   fs::create_directories(folder);
-  write_output(file, format_coefficients(identification, input.provenance, &analysis));
-  print_findings(request, input, identification, analysis, file);
-  fmt::print(stderr, "{}coefficients  {}\n", caution_text(identification, analysis), file.string());
-  if (!request.no_report) write_report(identification, analysis, input, folder / "report.html");
+  write_output(file, format_coefficients(identification, input.provenance, &fitted.analysis));
+  print_findings(request, input, fitted, file);
+  fmt::print(stderr, "{}coefficients  {}\n", caution_text(identification, fitted.analysis), file.string());
+  if (!request.no_report) write_report(fitted, input, folder / "report.html");
   return ExitCode::ok;
 }
 
@@ -222,26 +220,23 @@ struct ReportRequest {
 ExitCode report_several(const ReportRequest& request) {
   const fs::path page = request.out.empty() ? fs::path("report.html") : fs::path(request.out);
   const fs::path figures = page.parent_path() / "figures";
+  std::vector<Fitted> family;
   std::vector<Chapter> chapters;
-  std::vector<const Identification*> family;
   for (const std::string& path : request.folders) {
-    FittedFolder fitted = fitted_again(path);
-    Chapter chapter{std::move(fitted.identification), {}, {}, std::move(fitted.analysis)};
-    chapter.figures = draw_all(chapter.identification, fitted.input, figures / fmt::format("{}", chapters.size() + 1));
-    chapter.provenance = std::move(fitted.input.provenance);
-    chapters.push_back(std::move(chapter));
+    auto [input, fitted] = fitted_again(path);
+    const Figures drawn = draw_all(fitted.identification, input, figures / fmt::format("{}", chapters.size() + 1));
+    family.push_back(std::move(fitted));
+    chapters.push_back({std::move(input.provenance), drawn});
   }
-  for (const Chapter& chapter : chapters) family.push_back(&chapter.identification);
-  write_page(page, format_reports(chapters, draw({family_figure(family)}, figures)));
+  write_page(page, format_reports(family, chapters, draw({family_figure(family)}, figures)));
   return ExitCode::ok;
 }
 
 ExitCode run_report(const ReportRequest& request) {
   if (request.folders.size() > 1) return report_several(request);
   const std::string& path = request.folders.front();
-  FittedFolder fitted = fitted_again(path);
-  write_report(fitted.identification, fitted.analysis, fitted.input,
-               request.out.empty() ? fs::path(path) / "report.html" : fs::path(request.out));
+  auto [input, fitted] = fitted_again(path);
+  write_report(fitted, input, request.out.empty() ? fs::path(path) / "report.html" : fs::path(request.out));
   return ExitCode::ok;
 }
 

@@ -130,7 +130,7 @@ FittedFolder fitted_again(const std::string& folder) {
   if (record.bench) options.bench = *record.bench;
   input.provenance.bench = options.bench;
   Analysis analysis = analyse(identification, options);
-  return {std::move(input), std::move(identification), std::move(analysis)};
+  return {std::move(input), {std::move(identification), std::move(analysis)}};
 }
 
 void add_flight_files(CLI::App& command, std::string& coefficients, std::string& vehicle) {

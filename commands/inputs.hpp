@@ -35,8 +35,7 @@ struct FitInput {
 /// A folder with steps and coefficients, fitted and judged again as its coefficients.yaml says.
 struct FittedFolder {
   FitInput input;
-  fit::Identification identification;
-  fit::Analysis analysis;
+  fit::Fitted fitted;
 };
 [[nodiscard]] FittedFolder fitted_again(const std::string& folder);
 

@@ -15,6 +15,7 @@
 #include "compensation/file/coefficient_file.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/run/console.hpp"
+#include "profiles/schema.hpp"
 #include "results/version.hpp"
 
 namespace {
@@ -62,27 +63,18 @@ ExitCode complain(const kphi::daq::RunStopped& stop) {
   return stop.exit_code();
 }
 
-/// CLI11 reports a misspelt command only as "A subcommand is required".
-std::string nearest_command(const CLI::App& program, const std::string& word) {
-  for (const CLI::App* command : program.get_subcommands({})) {
-    const std::string& name = command->get_name();
-    if (name.starts_with(word.substr(0, 3)) ||
-        name.ends_with(word.substr(word.size() - std::min<std::size_t>(3, word.size())))) {
-      return name;
-    }
-  }
-  return {};
-}
-
 ExitCode usage_error(const CLI::App& program, const CLI::ParseError& error, int argc, char** argv) {
   if (error.get_exit_code() == 0) {  // --help, --version
     program.exit(error);
     return ExitCode::ok;
   }
   if (argc > 1 && argv[1][0] != '-' && program.get_subcommands().empty()) {
-    const std::string nearest = nearest_command(program, argv[1]);
+    // CLI11 would only say that a subcommand is required.
+    std::vector<std::string> names;
+    for (const CLI::App* command : program.get_subcommands({})) names.push_back(command->get_name());
+    const auto nearest = kphi::profiles::nearest_name(argv[1], names);
     print_message(fmt::format("kphi: unknown command \"{}\"{}\n", argv[1],
-                              nearest.empty() ? "" : "; did you mean \"" + nearest + "\"?"));
+                              nearest ? "; did you mean \"" + *nearest + "\"?" : ""));
   } else {
     print_message(fmt::format("kphi: {}\n", error.what()));
   }

@@ -37,11 +37,8 @@ struct Asked {
 
 struct Replay {
   std::vector<StepMean> steps;
-  std::optional<std::filesystem::path> stored;      ///< steps.csv of the campaign folder, when there is one
-  std::optional<std::filesystem::path> means;       ///< means.csv likewise; of a whole campaign only
-  std::optional<std::filesystem::path> references;  ///< references.csv likewise
-  std::vector<StepMean> reference_steps;
-  bool whole_campaign = false;
+  std::optional<std::filesystem::path> stored;  ///< the campaign's table that should hold them, if there is one
+  std::optional<std::string> difference;        ///< of that table, or of another one of the campaign
 };
 
 std::vector<std::filesystem::path> runs_of(const CampaignFolder& folder) {
@@ -57,9 +54,9 @@ std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
   for (const auto& run : runs) {
     tasks.emplace_back([&opening, &run] {
       std::unique_lock one_at_a_time(opening);
-      results::RunFile file = results::open_run(run);
+      const results::RunRecording recording = results::read_run(run);
       one_at_a_time.unlock();
-      return reduce_with_zeros(std::move(file)).steps;
+      return reduce(recording);
     });
   }
   std::atomic<std::size_t> next = 0;
@@ -76,62 +73,65 @@ std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
   return steps;
 }
 
-Replay replay(const std::filesystem::path& path) {
-  Replay result;
-  result.whole_campaign = std::filesystem::is_directory(path);
-  std::filesystem::path steps;
-  if (result.whole_campaign) {
-    const CampaignFolder folder = CampaignFolder::open(path);
-    result.steps = reduced(runs_of(folder));
-    steps = folder.steps();
-    if (std::filesystem::exists(folder.means())) result.means = folder.means();
-    if (std::filesystem::exists(folder.references())) {
-      result.references = folder.references();
-      result.reference_steps = reduced(folder.reference_runs());
-    }
-  } else {
-    result.steps = reduced(std::span(&path, 1));
-    const auto runs = std::filesystem::absolute(path).parent_path();
-    const bool is_reference = !result.steps.empty() && result.steps.front().repetition < 0;
-    if (runs.filename() == "runs") steps = runs.parent_path() / (is_reference ? "references.csv" : "steps.csv");
-  }
-  if (!steps.empty() && std::filesystem::exists(steps)) result.stored = steps;
-  return result;
-}
+using Lines = std::vector<std::pair<std::size_t, std::string>>;  // with their numbers
 
-std::vector<std::string> lines_of(const std::string& text) {
-  std::vector<std::string> lines;
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find('\n', at), text.size());
-    lines.push_back(text.substr(at, end - at));
-    at = end + 1;
-  }
+Lines lines_of(const std::string& text, const std::string& opening) {
+  Lines lines;
+  std::istringstream in(text);
+  std::string line;
+  for (std::size_t number = 1; std::getline(in, line); ++number)
+    if (line.starts_with(opening)) lines.emplace_back(number, line);
   return lines;
 }
 
-/// Of the whole campaign every byte counts; of one run its block of lines must be in the file as it is.
-std::optional<std::string> difference(const Replay& replay, const std::string& stored) {
-  const std::string again = results::format_steps(replay.steps);
+/// The first of the lines with this opening that differs; without an opening every byte counts.
+std::optional<std::string> difference(const std::string& again, const std::string& stored,
+                                      const std::string& opening = {}) {
   if (again == stored) return std::nullopt;
-  const std::vector<std::string> old_lines = lines_of(stored);
-  std::vector<std::string> new_lines = lines_of(again);
-  std::size_t at = 0;
-  if (!replay.whole_campaign) {
-    new_lines.erase(new_lines.begin());
-    if (new_lines.empty()) return std::nullopt;
-    // Propeller, blades, diameter, occlusion and repetition open each line of the run.
-    std::size_t comma = 0;
-    for (int i = 0; i < 5; ++i) comma = new_lines.front().find(',', comma) + 1;
-    const std::string opening = new_lines.front().substr(0, comma);
-    while (at < old_lines.size() && !old_lines[at].starts_with(opening)) ++at;
+  const Lines was = lines_of(stored, opening), is = lines_of(again, opening);
+  for (std::size_t i = 0; i < std::max(was.size(), is.size()); ++i) {
+    const auto [number, before] =
+        i < was.size() ? was[i] : std::pair(was.empty() ? 1 : was.back().first + 1, "(no line)");
+    const std::string now = i < is.size() ? is[i].second : "(no line)";
+    if (before != now) return fmt::format("line {} differs\n  stored: {}\n  again:  {}", number, before, now);
   }
-  for (std::size_t i = 0; i < new_lines.size() || (replay.whole_campaign && at + i < old_lines.size()); ++i) {
-    const std::string was = at + i < old_lines.size() ? old_lines[at + i] : "(no line)";
-    const std::string is = i < new_lines.size() ? new_lines[i] : "(no line)";
-    if (was != is) return fmt::format("line {} differs\n  stored: {}\n  again:  {}", at + i + 1, was, is);
-  }
-  if (!replay.whole_campaign) return std::nullopt;
-  return std::string("the line ends differ");
+  return opening.empty() ? std::optional<std::string>("the line ends differ") : std::nullopt;
+}
+
+/// Propeller, blades, diameter, occlusion and repetition, which open each line of a run.
+std::string opening_of(const std::string& table) {
+  const std::size_t begin = table.find('\n') + 1;
+  std::size_t end = begin;
+  for (int i = 0; i < 5; ++i) end = table.find(',', end) + 1;
+  return table.substr(begin, end - begin);
+}
+
+bool is_unlike(const std::filesystem::path& table, const std::vector<StepMean>& steps) {
+  return std::filesystem::exists(table) && results::read_text(table) != results::format_steps(steps);
+}
+
+Replay replay_campaign(const CampaignFolder& folder) {
+  Replay replay{reduced(runs_of(folder)), std::nullopt, std::nullopt};
+  if (!std::filesystem::exists(folder.steps())) return replay;
+  replay.stored = folder.steps();
+  replay.difference = difference(results::format_steps(replay.steps), results::read_text(folder.steps()));
+  if (!replay.difference && is_unlike(folder.means(), means_of(replay.steps)))
+    replay.difference = "agrees, but means.csv beside it is not its average over the repetitions";
+  if (!replay.difference && is_unlike(folder.references(), reduced(folder.reference_runs())))
+    replay.difference = "agrees, but references.csv beside it differs from what its runs give";
+  return replay;
+}
+
+Replay replay_run(const std::filesystem::path& path) {
+  Replay replay{reduced(std::span(&path, 1)), std::nullopt, std::nullopt};
+  const auto runs = std::filesystem::absolute(path).parent_path();
+  if (replay.steps.empty() || runs.filename() != "runs") return replay;
+  const auto table = runs.parent_path() / (replay.steps.front().repetition < 0 ? "references.csv" : "steps.csv");
+  if (!std::filesystem::exists(table)) return replay;
+  replay.stored = table;
+  const std::string again = results::format_steps(replay.steps);
+  replay.difference = difference(again, results::read_text(table), opening_of(again));
+  return replay;
 }
 
 /// NaN becomes null.
@@ -153,7 +153,7 @@ Json to_json(const StepMean& step) {
           {"quality_flags", results::quality_flag_names(step.quality_flags)}};
 }
 
-void print(const Replay& replay, const std::optional<std::string>& differs, bool json) {
+void print(const Replay& replay, bool json) {
   if (!json) {
     fmt::print("{}", results::format_steps(replay.steps));
     return;
@@ -162,25 +162,18 @@ void print(const Replay& replay, const std::optional<std::string>& differs, bool
   out["steps"] = Json::array();
   for (const StepMean& step : replay.steps) out["steps"].push_back(to_json(step));
   out["compared_with"] = replay.stored ? Json(replay.stored->string()) : Json();
-  out["same"] = replay.stored ? Json(!differs) : Json();
-  out["difference"] = differs ? Json(*differs) : Json();
+  out["same"] = replay.stored ? Json(!replay.difference) : Json();
+  out["difference"] = replay.difference ? Json(*replay.difference) : Json();
   print_json(out);
 }
 
 ExitCode run_replay(const Asked& asked) {
-  const Replay result = replay(asked.path);
-  std::optional<std::string> differs;
-  if (result.stored) differs = difference(result, results::read_text(*result.stored));
-  if (!differs && result.means && results::read_text(*result.means) != results::format_steps(means_of(result.steps))) {
-    differs = "agrees, but means.csv beside it is not its average over the repetitions";
-  }
-  if (!differs && result.references &&
-      results::read_text(*result.references) != results::format_steps(result.reference_steps)) {
-    differs = "agrees, but references.csv beside it differs from what its runs give";
-  }
-  print(result, differs, asked.json);
-  if (!differs) return ExitCode::ok;
-  fmt::print(stderr, "{}: {}; the raw files are the truth, see kphi verify\n", result.stored->string(), *differs);
+  const bool is_campaign = std::filesystem::is_directory(asked.path);
+  const Replay result = is_campaign ? replay_campaign(CampaignFolder::open(asked.path)) : replay_run(asked.path);
+  print(result, asked.json);
+  if (!result.difference) return ExitCode::ok;
+  fmt::print(stderr, "{}: {}; the raw files are the truth, see kphi verify\n", result.stored->string(),
+             *result.difference);
   return ExitCode::data_rejected;
 }
 

@@ -49,11 +49,9 @@ std::unique_ptr<Operator> person(const RunOptions& options, const std::optional<
   return std::make_unique<TerminalOperator>(STDIN_FILENO, stderr, stop_asked);
 }
 
-std::unique_ptr<Progress> display() {
+bool has_terminal() {
   const char* term = std::getenv("TERM");
-  const bool dumb = term && std::string(term) == "dumb";
-  if (isatty(STDERR_FILENO) && !dumb) return std::make_unique<TerminalProgress>(stderr);
-  return std::make_unique<PlainProgress>(stderr);
+  return isatty(STDERR_FILENO) && !(term && std::string(term) == "dumb");
 }
 
 void summarise(const CampaignResult& result, const results::CampaignFolder& folder, bool json) {
@@ -194,8 +192,8 @@ CampaignResult execute(const Request& request, const profiles::Plan& plan, Desti
       static_cast<std::uint64_t>(destination.share_left(plan) * static_cast<double>(bytes_needed(plan, config)));
   results::require_room(destination.folder ? destination.folder->path().string() : options.out, bytes, bench->files());
   if (!destination.folder) destination.create(options, campaign, *bench);
-  const auto terminal = display();
-  const auto progress = view.beside(*terminal, bench->clock());
+  PrintedProgress printed(stderr, has_terminal());
+  const auto progress = view.beside(printed, bench->clock());
   return view.tell_the_end([&] {
     return run_campaign(*bench, campaign, config, *destination.folder, person, *progress, stop_asked,
                         destination.resumption ? &*destination.resumption : nullptr, &findings);

@@ -1,5 +1,6 @@
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -83,7 +84,7 @@ void load_supply(const profiles::BenchConfig& bench, const Options& options, Ser
 ServerSettings settings_of(const profiles::BenchConfig& bench, const Options& options) {
   ServerSettings settings;
   settings.bench = daq::simulated_devices(bench);
-  if (!settings.bench.air_faults.empty())
+  if (std::ranges::any_of(settings.bench.faults, [](const Fault& f) { return on_air_sensor(f.kind); }))
     refuse(bench.simulation->faults, "faults of the air sensor need a bench with `simulation.in_process`");
   settings.bench.time_scale = bench.simulation->time_scale;
   settings.bench.oscillator_gain = options.clock_gain;

@@ -42,13 +42,11 @@ void check_window(ProfileReader& file) {
 
 void check_occlusions(ProfileReader& file, const std::vector<double>& occlusions_deg) {
   for (std::size_t i = 1; i < occlusions_deg.size(); ++i) {
-    for (std::size_t j = 0; j < i; ++j) {
-      if (occlusions_deg[i] != occlusions_deg[j]) continue;
+    const auto first = std::ranges::find(occlusions_deg, occlusions_deg[i]) - occlusions_deg.begin();
+    if (static_cast<std::size_t>(first) < i)
       file.refuse(fmt::format("/occlusions_deg/{}", i),
-                  fmt::format("{}° is already listed at [{}]", occlusions_deg[i], j),
+                  fmt::format("{}° is already listed at [{}]", occlusions_deg[i], first),
                   "list each occlusion once; repetitions sets how often it is run");
-      break;
-    }
   }
 }
 

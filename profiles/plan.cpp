@@ -11,10 +11,6 @@
 namespace kphi::profiles {
 namespace {
 
-std::uint64_t samples_in(Seconds time, double rate_hz) {
-  return static_cast<std::uint64_t>(std::llround(time.value() * rate_hz));
-}
-
 /// "path:line:column"; the path alone if there is no text to look in.
 std::string place(const std::string& path, const std::string& text, const std::string& pointer) {
   if (text.empty()) return path;
@@ -85,14 +81,11 @@ Plan make_plan(const Campaign& campaign, const BenchConfig& bench) {
     plan.steps += static_cast<int>(run.steps.size());
     ramps = ramps + ramp_time(campaign.profile, run);
   }
-  const Seconds held = campaign.profile.dwell * plan.steps;
   const auto runs = static_cast<int>(plan.runs.size());
   plan.mountings = static_cast<int>(plan.mounting_angles().size());
-  plan.spinning = held + ramps;
+  plan.spinning = campaign.profile.dwell * plan.steps + ramps;
   plan.bench = plan.spinning + campaign.zero * ((campaign.box_bias ? 4.0 : 2.0) * runs);
-  plan.samples_in_steps = samples_in(held, bench.netbox.rate_hz);
-  plan.samples = samples_in(plan.bench, bench.netbox.rate_hz);
-  plan.bytes = plan.samples * kBytesPerSample;
+  plan.samples = static_cast<std::uint64_t>(std::llround(plan.bench.value() * bench.netbox.rate_hz));
   return plan;
 }
 

@@ -21,9 +21,6 @@ struct PlannedStep {
 [[nodiscard]] std::vector<PlannedStep> steps_in_order(const std::vector<RadPerSec>& levels, StepOrderKind kind,
                                                       std::uint64_t run_seed);
 
-/// One Net Box sample on disk: six int32 counts, three uint32 (two sequences, status), one int64 stamp.
-inline constexpr std::uint64_t kBytesPerSample = 44;
-
 struct PlannedRun {
   double occlusion_deg = 0;
   int repetition = 1;                ///< 1-based; negative: a reference run, -1 the session's first, -2 its last
@@ -34,14 +31,12 @@ struct PlannedRun {
 };
 
 struct Plan {
-  std::vector<PlannedRun> runs;        ///< in the order in which they are run
-  int mountings = 0;                   ///< how often a person mounts an occlusion, the first one included
-  int steps = 0;                       ///< in all runs
-  Seconds spinning;                    ///< motor on: steps, and ramps between them
-  Seconds bench;                       ///< spinning, zeros and biases; without mounting, cooling, spinning down
-  std::uint64_t samples_in_steps = 0;  ///< Net Box samples at the bench's rate
-  std::uint64_t samples = 0;           ///< zeros included
-  std::uint64_t bytes = 0;             ///< of the samples
+  std::vector<PlannedRun> runs;  ///< in the order in which they are run
+  int mountings = 0;             ///< how often a person mounts an occlusion, the first one included
+  int steps = 0;                 ///< in all runs
+  Seconds spinning;              ///< motor on: steps, and ramps between them
+  Seconds bench;                 ///< spinning, zeros and biases; without mounting, cooling, spinning down
+  std::uint64_t samples = 0;     ///< of the Net Box at the bench's rate, zeros included
 
   /// The occlusions that a person is asked to mount, in order, degrees.
   [[nodiscard]] std::vector<double> mounting_angles() const;

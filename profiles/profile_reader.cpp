@@ -34,7 +34,8 @@ void refuse_other_kind(const SourceDocument& document, FileKind kind) {
 ProfileReader::ProfileReader(const std::string& text, const std::string& path, FileKind kind)
     : document_(parse_strict_yaml(text, path)) {
   refuse_other_kind(document_, kind);
-  for (FileFinding& finding : check_schema(document_, kind)) document_.findings.push_back(std::move(finding));
+  for (FileFinding& finding : check_schema(document_, schema_of(kind)))
+    document_.findings.push_back(std::move(finding));
   finish();
 }
 

@@ -124,11 +124,7 @@ constexpr std::array<Type, 6> kTypes{{{"integer", "a whole number", &json::is_nu
                                       {"array", "a list", &json::is_array},
                                       {"object", "keys", &json::is_object}}};
 
-const Type& type_named(const std::string& name) {
-  const auto* found = std::find_if(kTypes.begin(), kTypes.end(), [&](const Type& type) { return type.name == name; });
-  if (found == kTypes.end()) throw std::invalid_argument("schema: unknown type " + name);
-  return *found;
-}
+const Type& type_named(const std::string& name) { return *std::ranges::find(kTypes, name, &Type::name); }
 
 std::string shown(const json& value) {
   constexpr std::size_t kShownBytes = 60;
@@ -326,11 +322,11 @@ void check_items(const Spot& s, const json& schema, Findings& findings) {
 
 struct Keyword {
   std::string_view name;
-  void (*check)(const Spot&, const json& argument, Findings&);  ///< nullptr: an annotation
+  void (*check)(const Spot&, const json& argument, Findings&);
 };
 
-/// All that a schema may say. The type first: of the findings at one value the first is shown.
-constexpr std::array<Keyword, 20> kKeywords{{{"type", check_type},
+/// What a schema may say beside annotations. The type first: of the findings at one value the first is shown.
+constexpr std::array<Keyword, 16> kKeywords{{{"type", check_type},
                                              {"enum", check_enum},
                                              {"pattern", check_pattern},
                                              {"maximum", check_maximum},
@@ -345,62 +341,34 @@ constexpr std::array<Keyword, 20> kKeywords{{{"type", check_type},
                                              {"properties", check_properties},
                                              {"additionalProperties", check_other_keys},
                                              {"required", check_required},
-                                             {"items", check_items},
-                                             {"$schema", nullptr},
-                                             {"title", nullptr},
-                                             {"description", nullptr},
-                                             {"x_expected", nullptr}}};
+                                             {"items", check_items}}};
 
 void check(const Spot& spot, Findings& findings) {
   for (const Keyword& keyword : kKeywords) {
     const auto argument = spot.schema.find(keyword.name);
-    if (keyword.check != nullptr && argument != spot.schema.end()) keyword.check(spot, *argument, findings);
+    if (argument != spot.schema.end()) keyword.check(spot, *argument, findings);
   }
-}
-
-void require_known_keywords(const json& schema) {
-  for (const auto& [keyword, argument] : schema.items()) {
-    const std::string& name = keyword;
-    if (std::ranges::find(kKeywords, name, &Keyword::name) == kKeywords.end())
-      throw std::invalid_argument(fmt::format("schema: unknown keyword \"{}\"", name));
-    if (name == "items" && !argument.is_object())
-      throw std::invalid_argument("schema: items must be one schema for all of them");
-    if (name == "properties") {
-      for (const auto& [key, child] : argument.items()) require_known_keywords(child);
-    } else if (argument.is_object()) {
-      require_known_keywords(argument);
-    } else if (name == "type" && argument.is_string()) {
-      (void)type_named(argument);
-    }
-  }
-}
-
-Findings checked(const SourceDocument& document, const json& schema) {
-  Findings all;
-  check({document, schema, schema, document.value, ""}, all);
-  std::set<std::string> judged;
-  for (const FileFinding& finding : document.findings) judged.insert(finding.pointer);
-  Findings first;
-  for (FileFinding& finding : all)
-    if (judged.insert(finding.pointer).second) first.push_back(std::move(finding));
-  return first;
 }
 
 }  // namespace
 
 std::vector<FileFinding> check_schema(const SourceDocument& document, const json& schema) {
-  require_known_keywords(schema);
-  return checked(document, schema);
+  Findings all;
+  check({document, schema, schema, document.value, ""}, all);
+  std::set<std::string> judged;
+  for (const FileFinding& finding : document.findings) judged.insert(finding.pointer);
+  std::erase_if(all, [&](const FileFinding& finding) { return !judged.insert(finding.pointer).second; });
+  return all;
 }
 
-std::vector<FileFinding> check_schema(const SourceDocument& document, FileKind kind) {
+const json& schema_of(FileKind kind) {
   static const auto kSchemas = [] {
     std::array<json, kFileKinds.size()> schemas;
     for (const FileKindInfo& one : kFileKinds)
-      require_known_keywords(schemas[static_cast<std::size_t>(one.kind)] = json::parse(schema_text(one.kind)));
+      schemas[static_cast<std::size_t>(one.kind)] = json::parse(schema_text(one.kind));
     return schemas;
   }();
-  return checked(document, kSchemas[static_cast<std::size_t>(kind)]);
+  return kSchemas[static_cast<std::size_t>(kind)];
 }
 
 }  // namespace kphi::profiles

@@ -29,13 +29,11 @@ inline constexpr std::array<FileKindInfo, 4> kFileKinds{{
 
 /// The schema, verbatim from profiles/schema/, embedded in the program.
 [[nodiscard]] const char* schema_text(FileKind kind);
+[[nodiscard]] const nlohmann::json& schema_of(FileKind kind);
 
 /// One finding per fault (the innermost value or key, never the objects around it); empty if the document fits.
 /// Values that `document.findings` already names are not judged again.
-[[nodiscard]] std::vector<FileFinding> check_schema(const SourceDocument& document, FileKind kind);
-
-/// As above, with any schema of the keywords in schema.cpp (JSON Schema draft 7). Throws std::invalid_argument for a
-/// schema with another keyword: it would be ignored in silence.
+/// `schema`: of the keywords in schema.cpp (JSON Schema draft 7); any other is ignored.
 [[nodiscard]] std::vector<FileFinding> check_schema(const SourceDocument& document, const nlohmann::json& schema);
 
 /// A key without its unit and the unit in words: dwell_s → {"dwell", "s"}, steps → {"steps", ""}.

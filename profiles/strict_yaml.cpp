@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/algorithm/string/case_conv.hpp>
 #include <boost/locale/utf.hpp>
 #include <cerrno>
 #include <charconv>
@@ -16,6 +17,7 @@
 #include <fstream>
 #include <iterator>
 #include <optional>
+#include <regex>
 #include <sstream>
 #include <string_view>
 #include <tuple>
@@ -81,21 +83,11 @@ struct Scalar {
   std::string next_move;
 };
 
-std::string lower(std::string_view text) {
-  std::string result(text);
-  for (char& c : result) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return result;
-}
-
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 bool only(std::string_view text, std::string_view allowed) {
   return text.find_first_not_of(allowed) == std::string_view::npos;
 }
-
-bool contains(std::string_view text, char c) { return text.find(c) != std::string_view::npos; }
 
 bool is_boolean_elsewhere(const std::string& word) {
   static constexpr std::array<std::string_view, 8> kWords{"yes", "no", "on", "off", "y", "n", "true", "false"};
@@ -108,18 +100,14 @@ bool is_not_finite(std::string_view word) {
 }
 
 /// `digits` has no sign. Why other readers, or the reader of this page, may see another number in it.
-std::optional<std::string> doubtful_number(std::string_view digits) {
-  if (digits.empty() || !is_digit(digits[0])) return std::nullopt;
-  const bool leading_zero = digits.size() > 1 && digits[0] == '0' && is_digit(digits[1]);
-  if (leading_zero && only(digits, "0123456789.eE+-_")) return "looks octal";
-  const std::string prefix = lower(digits.substr(0, 2));
-  if ((prefix == "0x" && only(digits.substr(2), "0123456789abcdefABCDEF_")) ||
-      (prefix == "0o" && only(digits.substr(2), "01234567_")) || (prefix == "0b" && only(digits.substr(2), "01_"))) {
-    return "is not decimal";
-  }
-  if (contains(digits, '_') && only(digits, "0123456789_.")) return "has separators";
-  if (contains(digits, ',') && only(digits, "0123456789,.")) return "has separators";
-  if (contains(digits, ':') && only(digits, "0123456789:")) return "is base 60 to some readers";
+std::optional<std::string> doubtful_number(const std::string& digits) {
+  static const std::pair<std::regex, const char*> kDoubts[] = {
+      {std::regex("0[0-9][0-9.eE+_-]*"), "looks octal"},
+      {std::regex("0[xX][0-9a-fA-F_]*|0[oO][0-7_]*|0[bB][01_]*"), "is not decimal"},
+      {std::regex("[0-9][0-9.]*(_[0-9_.]*|,[0-9,.]*)"), "has separators"},
+      {std::regex("[0-9]+:[0-9:]*"), "is base 60 to some readers"}};
+  for (const auto& [form, words] : kDoubts)
+    if (std::regex_match(digits, form)) return words;
   return std::nullopt;
 }
 
@@ -145,7 +133,7 @@ nlohmann::json decimal(std::string_view digits, bool negative, bool& out_of_rang
 /// An unquoted scalar.
 Scalar read_plain_scalar(const std::string& text) {
   if (text == "true" || text == "false") return {text == "true", "", ""};
-  const std::string word = lower(text);
+  const std::string word = boost::algorithm::to_lower_copy(text);
   if (is_boolean_elsewhere(word)) {
     return {nullptr, fmt::format("{} is a boolean to some YAML readers and text to others", text),
             fmt::format("write true or false, or quote it: \"{}\"", text)};
@@ -153,7 +141,7 @@ Scalar read_plain_scalar(const std::string& text) {
   if (is_not_finite(word)) return {nullptr, fmt::format("{} is not a finite number", text), "write a finite number"};
 
   const bool has_sign = text[0] == '+' || text[0] == '-';
-  const std::string_view digits = std::string_view(text).substr(has_sign ? 1 : 0);
+  const std::string digits = text.substr(has_sign ? 1 : 0);
   if (const auto doubt = doubtful_number(digits)) {
     return {nullptr, fmt::format("{} {}", text, *doubt), "write a plain decimal number, or quote it if it is text"};
   }
@@ -166,23 +154,16 @@ Scalar read_plain_scalar(const std::string& text) {
   return {text, "", ""};
 }
 
-std::vector<FileFinding> in_file_order(std::vector<FileFinding> findings) {
-  std::stable_sort(findings.begin(), findings.end(), [](const FileFinding& a, const FileFinding& b) {
-    return std::tie(a.mark.line, a.mark.column) < std::tie(b.mark.line, b.mark.column);
-  });
-  return findings;
-}
-
-std::string describe_all(const std::string& path, const std::vector<FileFinding>& unordered) {
-  const auto findings = in_file_order(unordered);
+/// Puts the findings in the order of the file.
+std::string sort_and_describe(const std::string& path, std::vector<FileFinding>& findings) {
+  std::ranges::stable_sort(findings, {},
+                           [](const FileFinding& one) { return std::pair(one.mark.line, one.mark.column); });
   std::string lines;
-  for (std::size_t i = 0; i < std::min(findings.size(), RefusedFile::kShownFindings); ++i) {
+  for (std::size_t i = 0; i < std::min(findings.size(), RefusedFile::kShownFindings); ++i)
     lines += (i == 0 ? "" : "\n") + describe(path, findings[i]);
-  }
-  if (findings.size() > RefusedFile::kShownFindings) {
+  if (findings.size() > RefusedFile::kShownFindings)
     lines +=
         fmt::format("\n{}: {} more problems; fix these first", path, findings.size() - RefusedFile::kShownFindings);
-  }
   return lines;
 }
 
@@ -459,6 +440,6 @@ std::string describe(const std::string& path, const FileFinding& finding) {
 }
 
 RefusedFile::RefusedFile(const std::string& path, std::vector<FileFinding> findings)
-    : ConfigurationError(describe_all(path, findings)), findings_(in_file_order(std::move(findings))) {}
+    : ConfigurationError(sort_and_describe(path, findings)), findings_(std::move(findings)) {}
 
 }  // namespace kphi::profiles

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "profiles/profile_reader.hpp"
@@ -61,11 +62,9 @@ std::optional<compensation::PolygonBody> read_body(ProfileReader& file) {
 
 void check_hinges(ProfileReader& file, const std::array<double, 4>& turns_deg) {
   for (std::size_t i = 1; i < turns_deg.size(); ++i) {
-    for (std::size_t j = 0; j < i; ++j) {
-      if (turns_deg[i] != turns_deg[j]) continue;
+    if (std::ranges::find(turns_deg, turns_deg[i]) != turns_deg.begin() + i)
       file.refuse(fmt::format("/hinge_turn_deg/{}", i), fmt::format("corner {} has an arm already", turns_deg[i]),
                   "give each corner one arm");
-    }
   }
 }
 

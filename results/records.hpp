@@ -31,23 +31,6 @@ struct LoadCellRecord {
   Nanoseconds arrival_ns = 0;
 };
 
-/// The same, column by column, as they lie in the run file; without the RDT sequence.
-struct LoadCellColumns {
-  LoadCellColumns() = default;
-  explicit LoadCellColumns(std::span<const LoadCellRecord> records)
-      : counts(records.size()), ft_sequence(records.size()), status(records.size()), arrival_ns(records.size()) {
-    for (std::size_t i = 0; i < records.size(); ++i) {
-      counts[i] = records[i].counts;
-      ft_sequence[i] = records[i].ft_sequence;
-      status[i] = records[i].status;
-      arrival_ns[i] = records[i].arrival_ns;
-    }
-  }
-  std::vector<std::array<std::int32_t, 6>> counts;
-  std::vector<std::uint32_t> ft_sequence, status;
-  std::vector<Nanoseconds> arrival_ns;
-};
-
 /// What the motor module reports. One time series each in the run file, named as in kMotorChannels.
 enum class MotorChannel : std::uint8_t {
   speed,             ///< rad/s, positive counter-clockwise
@@ -281,6 +264,20 @@ struct StreamHealth {
   std::uint64_t events_dropped = 0;    ///< beyond what the lists hold
 };
 
+/// What became of the questions to the motor module during the run: names as in the run file.
+inline constexpr std::array<const char*, 9> kMotorCounts{
+    "motor_requests",          // sent
+    "motor_replies",           // used
+    "motor_timeouts",          // no reply in time
+    "motor_late_replies",      // after that; not used
+    "motor_unasked",           // replies without a request
+    "motor_crc_errors",        // frames with a bad CRC
+    "motor_discarded_bytes",   // that belong to no frame
+    "motor_skipped_polls",     // due while the same question was still open
+    "motor_dropped_readings",  // not taken in time by this computer
+};
+using MotorCounts = std::array<std::uint64_t, kMotorCounts.size()>;
+
 /// The box's own bias (0x42), measured without load before and after it was taken. Apart from the zeros of the run,
 /// which are subtracted by software. Fx Fy Fz in N, Tx Ty Tz in N m.
 struct BoxBias {
@@ -297,6 +294,7 @@ struct RunEnding {
   std::string outcome_reason;
   SampleAccount account;
   StreamHealth health;
+  MotorCounts motor_counts{};
   BoxBias box_bias;
 };
 

@@ -228,6 +228,7 @@ void for_each_figure(Ending& ending, Visit&& visit) {
   visit("health_clock_uncertainty_s", health.clock_uncertainty_s);
   visit("health_queue_high_water", health.queue_high_water);
   visit("health_events_dropped", health.events_dropped);
+  for (std::size_t i = 0; i < kMotorCounts.size(); ++i) visit(kMotorCounts[i], ending.motor_counts[i]);
   auto& bias = ending.box_bias;
   visit("box_bias_records", bias.records);
   visit("box_bias_before", bias.before);

@@ -70,7 +70,8 @@ void check_codes(const RunGroup<Row>& layout, const RunColumn<Row>& column, std:
 }
 
 template <class Row>
-std::vector<Row> rows_of(GroupReader<Row>& group, const std::string& file) {
+std::vector<Row> rows_of(const Handle& parent, const RunGroup<Row>& layout, const std::string& file) {
+  GroupReader<Row> group(parent, layout, file);
   std::vector<Row> rows(group.rows);
   std::vector<std::byte> bytes;
   for (std::uint64_t at = 0; at < group.rows; at += kBlock) {
@@ -84,27 +85,6 @@ std::vector<Row> rows_of(GroupReader<Row>& group, const std::string& file) {
     }
   }
   return rows;
-}
-
-template <class Row>
-std::vector<Row> rows_of(const Handle& parent, const RunGroup<Row>& layout, const std::string& file) {
-  GroupReader<Row> group(parent, layout, file);
-  return rows_of(group, file);
-}
-
-LoadCellColumns columns_of(const Handle& root, const std::string& file) {
-  GroupReader<LoadCellRecord> cell(root, kLoadCellGroup, file);
-  const auto take = [&](std::string_view name, auto& values) {
-    const auto column = std::ranges::find(cell.layout.columns, name, &RunColumn<LoadCellRecord>::name);
-    values.resize(cell.rows);
-    cell.columns[static_cast<std::size_t>(column - cell.layout.columns.begin())].read(0, cell.rows, values.data());
-  };
-  LoadCellColumns columns;
-  take("counts", columns.counts);
-  take("ft_sequence", columns.ft_sequence);
-  take("status", columns.status);
-  take("t_arrival_ns", columns.arrival_ns);
-  return columns;
 }
 
 std::vector<MotorReading> motor_of(const Handle& root, const std::string& file) {
@@ -143,18 +123,6 @@ auto naming(const std::filesystem::path& path, Read&& read) {
     const std::string text = error.what();
     throw RecordError(text.find(path.string()) != std::string::npos ? text : path.string() + ": " + text);
   }
-}
-
-RunRecording without_load_cell(const Handle& root, const std::filesystem::path& path) {
-  const std::string file = path.string();
-  RunRecording run;
-  run.header = header_of(root, path);
-  run.motor = motor_of(root, file);
-  run.phases = rows_of(root, kCommandGroup, file);
-  run.events = rows_of(root, kEventGroup, file);
-  run.supply = rows_of(root, kSupplyGroup, file);
-  read_outcome(root, run);
-  return run;
 }
 
 using Problems = std::vector<std::string>;
@@ -261,20 +229,20 @@ void check_scale(const RunHeader& header, Problems& problems) {
 RunRecording read_run(const std::filesystem::path& path) {
   return naming(path, [&] {
     const Handle root = hdf5::open_file(path);
-    RunRecording run = without_load_cell(root, path);
-    run.load_cell = rows_of(root, kLoadCellGroup, path.string());
+    const std::string file = path.string();
+    RunRecording run;
+    run.header = header_of(root, path);
+    run.load_cell = rows_of(root, kLoadCellGroup, file);
+    run.motor = motor_of(root, file);
+    run.phases = rows_of(root, kCommandGroup, file);
+    run.events = rows_of(root, kEventGroup, file);
+    run.supply = rows_of(root, kSupplyGroup, file);
+    read_outcome(root, run);
     if (has_ending(root)) return run;
     run.account.received = run.load_cell.size();
     run.account.lost_network = check_sequence(run.load_cell, run.header.load_cell.ft_stride).lost;
     run.account.expected = run.account.received + run.account.lost_network;
     return run;
-  });
-}
-
-RunFile open_run(const std::filesystem::path& path) {
-  return naming(path, [&] {
-    const Handle root = hdf5::open_file(path);
-    return RunFile{without_load_cell(root, path), columns_of(root, path.string())};
   });
 }
 

@@ -14,13 +14,6 @@ namespace kphi::results {
 /// The whole run; of a .part the rows valid at its last sync, as aborted. Does not check checksums; see verify_run().
 [[nodiscard]] RunRecording read_run(const std::filesystem::path& path);
 
-/// A run with its load-cell records column by column: faster to read, and enough for the reduction.
-struct RunFile {
-  RunRecording run;  ///< without load_cell; of a .part without the account, which needs the records
-  LoadCellColumns load_cell;
-};
-[[nodiscard]] RunFile open_run(const std::filesystem::path& path);
-
 /// Gaps and restarts in a stream of records, by its sequence numbers.
 struct SequenceCheck {
   std::uint64_t lost = 0;        ///< records missing between the first and the last

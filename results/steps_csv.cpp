@@ -80,18 +80,52 @@ std::string header_of(const Columns& columns) {
   return line;
 }
 
-/// In the order of the bits.
-constexpr std::string_view kFlagNames[] = {
-    // of speed, load cell and its stream
-    "speed_not_reached", "speed_unsteady", "saturated", "lost_samples", "derated", "few_samples", "bad_status",
-    "stream_restarted", "rebooted", "stalled", "silent", "box_trouble", "taken_over", "configuration_changed",
-    "zero_drifted", "zero_noisy",
-    // of motor module and supply
-    "drive_saturated", "motor_fault", "supply_out_of_band", "coil_hot", "motor_reset", "motor_lost", "slow_round_trip",
-    "supply_limited", "supply_off", "supply_sag", "supply_rise",
-    // of the step
-    "unsettled", "drifted", "lag_unknown", "frozen", "speed_glitch"};
-static_assert(std::size(kFlagNames) == 32);
+/// A flag in a file and for a person.
+struct FlagText {
+  std::string_view name, words;
+};
+constexpr std::array<FlagText, 32> kFlagTexts{{
+    // in the order of the bits
+    {"speed_not_reached", "commanded speed not reached"},
+    {"speed_unsteady", "speed never settled"},
+    {"saturated", "load cell saturated"},
+    {"lost_samples", "samples lost"},
+    {"derated", "motor derated"},
+    {"few_samples", "too few samples"},
+    {"bad_status", "load cell reported an error"},
+    {"stream_restarted", "stream restarted"},
+    {"rebooted", "load cell's box rebooted since the zero"},
+    {"stalled", "load cell repeated its measurement"},
+    {"silent", "load cell fell silent"},
+    {"box_trouble", "load cell's box reported failed communication"},
+    {"taken_over", "another client took the stream"},
+    {"configuration_changed", "load cell's box settings changed"},
+    {"zero_drifted", "load cell's zero drifted during the run"},
+    {"zero_noisy", "load cell was not at rest at a zero"},
+    {"drive_saturated", "motor drive saturated"},
+    {"motor_fault", "motor module reported a fault"},
+    {"supply_out_of_band", "supply voltage off"},
+    {"coil_hot", "motor coil hot"},
+    {"motor_reset", "motor module restarted"},
+    {"motor_lost", "motor module lost"},
+    {"slow_round_trip", "motor readings blurred in time"},
+    {"supply_limited", "supply limited the current"},
+    {"supply_off", "supply was off"},
+    {"supply_sag", "supply sagged"},
+    {"supply_rise", "motor fed back into the supply"},
+    {"unsettled", "thrust never settled"},
+    {"drifted", "thrust drifted within the step"},
+    {"lag_unknown", "lag of the thrust unknown"},
+    {"frozen", "load cell or speed repeated one value"},
+    {"speed_glitch", "impossible speeds skipped"},
+}};
+
+std::string joined(std::uint32_t flags, std::string_view FlagText::*text, const char* separator) {
+  std::string all;
+  for (std::size_t bit = 0; bit < kFlagTexts.size(); ++bit)
+    if ((flags >> bit & 1u) != 0) all.append(all.empty() ? "" : separator).append(kFlagTexts[bit].*text);
+  return all;
+}
 
 std::string quoted(const std::string& text) {
   if (text.find_first_of(",\" \t") == std::string::npos) return text;
@@ -169,20 +203,16 @@ StepMean step_from(const std::vector<std::string>& fields, const Columns& column
 
 }  // namespace
 
-std::string quality_flag_names(std::uint32_t flags) {
-  std::string names;
-  for (std::size_t bit = 0; bit < std::size(kFlagNames); ++bit) {
-    if ((flags >> bit & 1u) != 0) names += (names.empty() ? "" : "+") + std::string(kFlagNames[bit]);
-  }
-  return names;
-}
+std::string quality_flag_names(std::uint32_t flags) { return joined(flags, &FlagText::name, "+"); }
+
+std::string quality_flags_in_words(std::uint32_t flags) { return joined(flags, &FlagText::words, ", "); }
 
 std::uint32_t quality_flags_from_names(std::string_view names) {
   std::uint32_t flags = 0;
   while (!names.empty()) {
     const std::string_view word = names.substr(0, names.find('+'));
-    const auto bit = std::ranges::find(kFlagNames, word) - std::begin(kFlagNames);
-    if (bit == std::ssize(kFlagNames)) throw std::invalid_argument(fmt::format("unknown quality flag \"{}\"", word));
+    const auto bit = std::ranges::find(kFlagTexts, word, &FlagText::name) - kFlagTexts.begin();
+    if (bit == std::ssize(kFlagTexts)) throw std::invalid_argument(fmt::format("unknown quality flag \"{}\"", word));
     flags |= 1u << bit;
     names.remove_prefix(std::min(word.size() + 1, names.size()));
   }

@@ -17,6 +17,8 @@ namespace kphi::results {
 
 /// Names of the set bits of QualityFlag joined by '+'; empty for none.
 [[nodiscard]] std::string quality_flag_names(std::uint32_t flags);
+/// The same for a person: "commanded speed not reached, motor derated".
+[[nodiscard]] std::string quality_flags_in_words(std::uint32_t flags);
 /// Inverse of quality_flag_names(). Throws std::invalid_argument naming the unknown word.
 [[nodiscard]] std::uint32_t quality_flags_from_names(std::string_view names);
 

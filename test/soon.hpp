@@ -8,7 +8,7 @@ namespace kphi::test {
 
 /// Polls with a deadline; whether it came true.
 template <class What>
-[[nodiscard]] bool soon(What&& what, std::chrono::milliseconds limit = std::chrono::milliseconds(5000)) {
+[[nodiscard]] bool soon(What&& what, std::chrono::milliseconds limit = std::chrono::seconds(20)) {
   const auto end = std::chrono::steady_clock::now() + limit;
   while (std::chrono::steady_clock::now() < end) {
     if (what()) return true;

@@ -12,8 +12,6 @@
 #include <sstream>
 #include <utility>
 
-#include "compensation/file/coefficient_keys.hpp"
-
 namespace kphi::compensation {
 namespace {
 
@@ -253,10 +251,7 @@ Coefficients::Row read_row(const Value& map, double scale) {
   row.occlusion = from_degrees(map.at("phi_deg").number());
   row.k = ThrustCoefficient(map.at("k").number() * scale);
   row.standard_error = coefficient_at(map, "standard_error", scale);
-  row.k_at_speed = coefficient_at(map, "k_at_speed", scale);
   if (const auto rpm = map.number_at("at_speed_rpm")) row.at_speed = from_rpm(*rpm);
-  row.steps = map.count_at("steps");
-  row.repetitions = map.count_at("repetitions");
   return row;
 }
 
@@ -268,8 +263,6 @@ void read_propeller(const Value& map, Coefficients::Propeller& into) {
 }
 
 void read_fit(const Value& map, Coefficients::Fit& into) {
-  into.model = map.text_at("model");
-  into.estimator = map.text_at("estimator");
   into.k_by = map.text_at("k_by");
   into.weights = map.text_at("weights");
   into.loss = map.text_at("loss");
@@ -329,7 +322,6 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   for (const Value& row : top.rows("table", "a row of the table has no keys"))
     coefficients.table.push_back(read_row(row, scale));
   coefficients.air_density_kg_m3 = top.number_at("air_density_kg_m3");
-  if (const auto volts = top.number_at("supply_v")) coefficients.supply = Volts(*volts);
   if (const auto map = top.find("provenance"); map && map->node().IsMap())
     read_provenance(*map, coefficients.provenance);
   if (top.find("uncertainty")) coefficients.uncertainty = read_budgets(top.map_at("uncertainty"), scale);

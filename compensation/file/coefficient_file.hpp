@@ -14,14 +14,16 @@
 
 namespace kphi::compensation {
 
+inline constexpr const char* kCoefficientFormat = "kphi-coefficients/1";
+
 /// A coefficient file that cannot be used. The message is "file:line: what is wrong; the next step".
 class CoefficientError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// One coefficient file in SI units, whatever its k_unit. What the file leaves out or calls `unknown` is empty. Its
-/// keys are listed in coefficient_keys.hpp.
+/// One coefficient file in SI units, whatever its k_unit. What the file leaves out or calls `unknown` is empty.
+/// fit/coefficients/README.md lists its keys.
 struct Coefficients {
   explicit Coefficients(const ThrustCurve& fitted) : curve(fitted) {}
 
@@ -35,10 +37,7 @@ struct Coefficients {
     Radians occlusion;
     ThrustCoefficient k;
     std::optional<ThrustCoefficient> standard_error;
-    std::optional<ThrustCoefficient> k_at_speed;  ///< T/ω² at the single speed at_speed
-    std::optional<RadPerSec> at_speed;
-    std::optional<int> steps;
-    std::optional<int> repetitions;
+    std::optional<RadPerSec> at_speed;  ///< the single speed of the file's k_at_speed
   };
   struct Run {
     std::string file;
@@ -46,8 +45,6 @@ struct Coefficients {
   };
   /// How the coefficients were fitted, in the words of `kphi fit`; empty in a file that does not say.
   struct Fit {
-    std::string model;
-    std::string estimator;
     std::string k_by, weights, loss;
     std::optional<std::pair<double, double>> speed_range_rpm;          ///< lowest and highest level fitted
     std::vector<std::string> leave_out;                                ///< "PHI:REPETITION:CAUSE"
@@ -80,7 +77,6 @@ struct Coefficients {
   std::optional<RadPerSec> fastest_speed;
   std::vector<Row> table;
   std::optional<double> air_density_kg_m3;
-  std::optional<Volts> supply;
   Provenance provenance;
   std::optional<Uncertainty> uncertainty;
 };

@@ -10,12 +10,6 @@
 namespace kphi::daq {
 namespace {
 
-bool answers(const iq::Entry& asked, const iq::Identity& module) {
-  const bool newer = module.coil_temperature_client == static_cast<int>(iq::Client::coil_temperature_estimator);
-  if (asked.type == iq::Client::temperature_estimator) return !newer;
-  return asked.type != iq::Client::coil_temperature_estimator || newer;
-}
-
 /// Settings of the bench file that the box does not have, except rate and buffer, which netbox::audit checks.
 std::vector<Finding> unset(const netbox::Configuration& box, const profiles::NetBoxSettings& wanted) {
   std::vector<Finding> findings;
@@ -102,20 +96,7 @@ netbox::Intention intention_of(const profiles::Campaign& campaign, const profile
   return intention;
 }
 
-iq::AuditRecord read_parameters(const iq::Identity& module, const AskModule& ask) {
-  std::vector<iq::Inquiry> asked;
-  for (const iq::Entry& entry : iq::kEntries) {
-    if (entry.audited && answers(entry, module)) asked.push_back({&entry, std::nullopt});
-  }
-  const std::vector<iq::Reply> replies = ask(asked);
-  iq::AuditRecord record;
-  for (std::size_t i = 0; i < asked.size() && i < replies.size(); ++i) {
-    if (replies[i].value) record.values[asked[i].entry] = *replies[i].value;
-  }
-  return record;
-}
-
-std::optional<Celsius> ask_coil_temperature(const iq::AuditRecord& parameters, const AskModule& ask) {
+std::optional<Celsius> ask_coil_temperature(const iq::AuditRecord& parameters, const iq::Ask& ask) {
   const int client = parameters.coil_temperature_client();
   if (client == 0) return std::nullopt;
   const bool newer = client == static_cast<int>(iq::Client::coil_temperature_estimator);

@@ -1,7 +1,6 @@
 // Checks the devices of a bench against the campaign, before a folder is made and anything turns.
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,7 +10,6 @@
 #include "daq/guard/guard_limits.hpp"
 #include "drivers/iq/service/audit.hpp"
 #include "drivers/iq/session/connecting.hpp"
-#include "drivers/iq/wire/identity.hpp"
 #include "drivers/netbox/receive/audit.hpp"
 #include "profiles/campaign.hpp"
 
@@ -39,13 +37,7 @@ void require_suitable(const LoadCellLink& cell, const profiles::Campaign& campai
 /// Speeds, blades and thrust limit of the campaign, rate and buffer of the bench file.
 [[nodiscard]] netbox::Intention intention_of(const profiles::Campaign& campaign, const profiles::BenchConfig& config);
 
-/// Asks a connected module, between its polls. Throws DeviceError.
-using AskModule = std::function<std::vector<iq::Reply>(std::vector<iq::Inquiry>)>;
-
-/// All audited parameters in one inquiry, without the coil temperature client that the module lacks.
-[[nodiscard]] iq::AuditRecord read_parameters(const iq::Identity& module, const AskModule& ask);
-
-/// From the client that `parameters` shows; nullopt without one or without an answer.
-[[nodiscard]] std::optional<Celsius> ask_coil_temperature(const iq::AuditRecord& parameters, const AskModule& ask);
+/// From the client that `parameters` shows; nullopt without one or without an answer. Throws DeviceError.
+[[nodiscard]] std::optional<Celsius> ask_coil_temperature(const iq::AuditRecord& parameters, const iq::Ask& ask);
 
 }  // namespace kphi::daq

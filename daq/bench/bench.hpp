@@ -106,6 +106,8 @@ class MotorLink {
   [[nodiscard]] virtual std::vector<results::StreamEvent> take_events() = 0;
   /// Why the link failed; empty while it works. Thread-safe.
   [[nodiscard]] virtual std::string failure() const = 0;
+  /// Since the link was made. Thread-safe.
+  [[nodiscard]] virtual results::MotorCounts counts() const = 0;
   /// One line: firmware, hardware, uid.
   [[nodiscard]] virtual std::string identity() const = 0;
 };

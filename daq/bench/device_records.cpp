@@ -10,30 +10,18 @@
 namespace kphi::daq {
 namespace {
 
-using Kind = results::EventKind;
+using enum results::EventKind;
 
 /// In the order of netbox::EventKind.
-constexpr std::array kLoadCellEvents{Kind::restarted,
-                                     Kind::rebooted,
-                                     Kind::stalled,
-                                     Kind::stall_ended,
-                                     Kind::silent,
-                                     Kind::resumed,
-                                     Kind::box_trouble,
-                                     Kind::taken_over,
-                                     Kind::rdt_disabled,
-                                     Kind::unreachable,
-                                     Kind::unusable,
-                                     Kind::reconnected,
-                                     Kind::configuration_changed,
-                                     Kind::given_up};
+constexpr std::array kLoadCellEvents{
+    restarted,   rebooted, stalled,     stall_ended,           silent,  resumed, box_trouble, taken_over, rdt_disabled,
+    unreachable, unusable, reconnected, configuration_changed, given_up};
 static_assert(kLoadCellEvents.size() == 1 + static_cast<std::size_t>(netbox::EventKind::given_up));
 
 /// In the order of iq::EventKind.
-constexpr std::array kMotorEvents{Kind::motor_connected,   Kind::motor_no_answer,      Kind::motor_reset,
-                                  Kind::motor_silent,      Kind::motor_coast_denied,   Kind::motor_lease_expired,
-                                  Kind::motor_port_lost,   Kind::motor_another_module, Kind::motor_slow_round_trip,
-                                  Kind::motor_host_absent, Kind::motor_let_go};
+constexpr std::array kMotorEvents{motor_connected,       motor_no_answer,     motor_reset,     motor_silent,
+                                  motor_coast_denied,    motor_lease_expired, motor_port_lost, motor_another_module,
+                                  motor_slow_round_trip, motor_host_absent,   motor_let_go};
 static_assert(kMotorEvents.size() == 1 + static_cast<std::size_t>(iq::EventKind::let_go));
 
 static_assert(
@@ -52,9 +40,24 @@ results::LoadCellRecord to_record(const netbox::StampedRecord& stamped) noexcept
   return {record.counts, record.rdt_sequence, record.ft_sequence, record.status, stamped.arrival.count()};
 }
 
-results::MotorReading to_reading(const iq::Reading& reading) noexcept {
+results::MotorReading to_record(const iq::Reading& reading) noexcept {
   return {static_cast<results::MotorChannel>(reading.quantity), reading.time.count(), reading.uncertainty.count(),
           reading.value};
+}
+
+results::SupplyReading to_record(const supply::Reading& reading) noexcept {
+  // The drivers' enums have the codes of the file: see the assertions.
+  static_assert(static_cast<int>(supply::Protection::unknown) == static_cast<int>(results::SupplyProtection::unknown));
+  static_assert(static_cast<int>(supply::Regulation::unknown) == static_cast<int>(results::SupplyRegulation::unknown));
+  return {reading.at.count(),
+          reading.uncertainty.count(),
+          reading.voltage_v,
+          reading.current_a,
+          reading.set_voltage_v,
+          reading.current_limit_a,
+          static_cast<results::SupplyRegulation>(reading.regulation),
+          static_cast<results::SupplyProtection>(reading.protection),
+          reading.output ? 1u : 0u};
 }
 
 results::StreamEvent to_event(const netbox::Event& event) {
@@ -68,7 +71,7 @@ results::StreamEvent to_event(const iq::Event& event) {
           fmt::format("{:.3f} s: {}", to_seconds(event.time), event.words)};
 }
 
-bool ends_a_run(Kind kind) noexcept {
+bool ends_a_run(results::EventKind kind) noexcept {
   const auto found = std::find(kMotorEvents.begin(), kMotorEvents.end(), kind);
   return found != kMotorEvents.end() && iq::spoils_a_run(static_cast<iq::EventKind>(found - kMotorEvents.begin()));
 }
@@ -84,6 +87,12 @@ results::StreamHealth to_health(const netbox::Health& health, const Clock& clock
   out.queue_high_water = health.queue_high_water;
   out.events_dropped = health.events_dropped;
   return out;
+}
+
+results::MotorCounts to_counts(const iq::Counters& counters) noexcept {
+  return {counters.requests,        counters.replies,       counters.timeouts,
+          counters.late_replies,    counters.unasked,       counters.crc_errors,
+          counters.discarded_bytes, counters.skipped_polls, counters.dropped_readings};
 }
 
 results::LoadCellScale to_scale(const netbox::Configuration& configuration) {

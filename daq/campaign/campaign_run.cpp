@@ -185,7 +185,7 @@ class CampaignRun {
     const double per_run_s = plan_.bench.value() / static_cast<double>(plan_.runs.size());
     const double remaining_s = per_run_s * (planned_ - result_.runs);
     profiles::PlannedRun capped = planned;
-    (void)review_.cap().apply(capped.steps);
+    review_.cap().apply(capped.steps);
     try {
       cool_down();
       if (config_.ambient.known() && !bench_.air())

@@ -200,19 +200,15 @@ class Checks {
 std::string steps_text(const Campaign& campaign, const profiles::PlannedRun& run) {
   const auto rpm = [](const profiles::PlannedStep& step) { return to_rpm(step.speed); };
   const std::string number = fmt::format("{} steps, ", run.steps.size());
-  switch (campaign.order.steps) {
-    case profiles::StepOrderKind::up:
-    case profiles::StepOrderKind::down:
-      return number + fmt::format("{:.0f} to {:.0f} RPM", rpm(run.steps.front()), rpm(run.steps.back()));
-    case profiles::StepOrderKind::up_and_down:
-      return number + fmt::format("{:.0f} to {:.0f} to {:.0f} RPM", rpm(run.steps.front()),
-                                  to_rpm(campaign.profile.last), rpm(run.steps.back()));
-    case profiles::StepOrderKind::shuffled:
-      break;
+  if (campaign.order.steps == profiles::StepOrderKind::shuffled) {
+    std::string levels;
+    for (const auto& step : run.steps) levels += fmt::format(" {:.0f}", rpm(step));
+    return number + "RPM:" + levels;
   }
-  std::string levels;
-  for (const auto& step : run.steps) levels += fmt::format(" {:.0f}", rpm(step));
-  return number + "RPM:" + levels;
+  const bool turns = campaign.order.steps == profiles::StepOrderKind::up_and_down;
+  return number + fmt::format("{:.0f}{} to {:.0f} RPM", rpm(run.steps.front()),
+                              turns ? fmt::format(" to {:.0f}", to_rpm(campaign.profile.last)) : "",
+                              rpm(run.steps.back()));
 }
 
 std::string runs_text(const profiles::Plan& plan, const Campaign& campaign) {
@@ -333,17 +329,8 @@ std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles:
       fmt::join(to_lines(dry.limits), "\n  "));
 }
 
-json to_json(const DryRun& dry, const Campaign& campaign, const profiles::BenchConfig& config) {
-  json runs = json::array(), checks = json::array();
-  for (const auto& run : dry.plan.runs) runs.push_back(to_json(run, campaign));
-  for (const PlanCheck& check : dry.checks) {
-    checks.push_back(check.finding);
-    checks.back().update({{"subject", check.subject}, {"judged", check.judged}});
-  }
-  const profiles::Plan& plan = dry.plan;
-  return {{"campaign", campaign.name},
-          {"propeller", campaign.propeller.id},
-          {"runs", plan.runs.size()},
+json to_json(const profiles::Plan& plan, const profiles::BenchConfig& config) {
+  return {{"runs", plan.runs.size()},
           {"mountings", plan.mountings},
           {"mounting_angles_deg", plan.mounting_angles()},
           {"steps", plan.steps},
@@ -351,12 +338,25 @@ json to_json(const DryRun& dry, const Campaign& campaign, const profiles::BenchC
           {"bench_s", plan.bench.value()},
           {"time_scale", time_scale(config)},
           {"samples", plan.samples},
-          {"bytes", dry.bytes_needed},
-          {"bytes_free", dry.bytes_free},
-          {"order", runs},
-          {"checks", checks},
-          {"guard_limits", dry.limits},
-          {"ok", dry.ok()}};
+          {"bytes", bytes_needed(plan, config)}};
+}
+
+json to_json(const DryRun& dry, const Campaign& campaign, const profiles::BenchConfig& config) {
+  json runs = json::array(), checks = json::array();
+  for (const auto& run : dry.plan.runs) runs.push_back(to_json(run, campaign));
+  for (const PlanCheck& check : dry.checks) {
+    checks.push_back(check.finding);
+    checks.back().update({{"subject", check.subject}, {"judged", check.judged}});
+  }
+  json all = to_json(dry.plan, config);
+  all.update({{"campaign", campaign.name},
+              {"propeller", campaign.propeller.id},
+              {"bytes_free", dry.bytes_free},
+              {"order", runs},
+              {"checks", checks},
+              {"guard_limits", dry.limits},
+              {"ok", dry.ok()}});
+  return all;
 }
 
 }  // namespace kphi::daq

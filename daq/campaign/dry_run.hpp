@@ -62,6 +62,7 @@ struct DryRun {
 /// Everything: the plan, each run in its order, time, disk, every check, and the guard's limits.
 [[nodiscard]] std::string to_text(const DryRun& dry, const profiles::Campaign& campaign,
                                   const profiles::BenchConfig& config);
+[[nodiscard]] nlohmann::json to_json(const profiles::Plan& plan, const profiles::BenchConfig& config);
 [[nodiscard]] nlohmann::json to_json(const DryRun& dry, const profiles::Campaign& campaign,
                                      const profiles::BenchConfig& config);
 

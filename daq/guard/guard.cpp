@@ -34,10 +34,10 @@ std::size_t samples_relayed(const results::LoadCellScale& scale) {
 }
 
 /// Readings from before this run, for example from a pause for a mounting.
-template <class Reading>
-void discard(BenchStreams& devices) {
+template <class Reading, class Link>
+void discard(Link& link) {
   std::array<Reading, 64> before_this_run;
-  while (devices.take(before_this_run) > 0) {
+  while (link.take(before_this_run) > 0) {
   }
 }
 
@@ -53,7 +53,6 @@ double speed_share(const std::vector<GuardLimit>& limits) {
 Guard::Guard(Bench& bench, const profiles::BenchConfig& config, const results::LoadCellScale& scale,
              const std::vector<GuardLimit>& limits)
     : bench_(bench),
-      devices_(bench),
       supply_(config.supply),
       table_(limits),
       observer_(mounting_of(config), scale,
@@ -77,8 +76,8 @@ Guard::Guard(Bench& bench, const profiles::BenchConfig& config, const results::L
   supply_stream_ = {bench.supply() != nullptr ? limit_of(Watched::supply_age) : nullptr, now};
   observer_.begin(now);
   shown_.publish(observer_.readings());
-  discard<results::SupplyReading>(devices_);
-  discard<results::MotorReading>(devices_);
+  if (bench.supply() != nullptr) discard<results::SupplyReading>(*bench.supply());
+  discard<results::MotorReading>(bench.motor());
 }
 
 void Guard::poll() noexcept {
@@ -100,18 +99,16 @@ void Guard::poll() noexcept {
 }
 
 bool Guard::relay() {
-  const auto take = [this](auto out) { return devices_.take(out); };
-  const auto inspect = [this](auto batch) {
-    for (const auto& each : batch) judge(each);
-  };
-  bool moved = samples_.move(take, inspect);
-  for (auto& event : devices_.take_events()) pending_events_.push_back(std::move(event));
+  const auto inspect = [this](const auto& each) { judge(each); };
+  bool moved = samples_.move(bench_.load_cell(), inspect);
+  for (auto& event : bench_.load_cell().take_events()) pending_events_.push_back(std::move(event));
+  for (auto& event : bench_.motor().take_events()) pending_events_.push_back(std::move(event));
   while (!pending_events_.empty() && events_.push(pending_events_.front())) {
     pending_events_.pop_front();
     moved = true;
   }
-  moved = readings_.move(take, inspect) || moved;
-  return supply_readings_.move(take, inspect) || moved;
+  moved = readings_.move(bench_.motor(), inspect) || moved;
+  return (bench_.supply() != nullptr && supply_readings_.move(*bench_.supply(), inspect)) || moved;
 }
 
 std::vector<results::StreamEvent> Guard::take_events() {

@@ -23,14 +23,14 @@
 
 #include "base/published.hpp"
 #include "daq/bench/bench.hpp"
-#include "daq/bench/streams.hpp"
 #include "daq/guard/interlock.hpp"
 #include "daq/guard/observation.hpp"
+#include "daq/guard/relay.hpp"
 #include "daq/guard/status_watch.hpp"
 
 namespace kphi::daq {
 
-class Guard final : public Streams {
+class Guard final {
  public:
   /// Discards readings from before this run. The devices stream already.
   Guard(Bench& bench, const profiles::BenchConfig& config, const results::LoadCellScale& scale,
@@ -44,10 +44,11 @@ class Guard final : public Streams {
   bool relay();
 
   // The recorder's thread.
-  std::size_t take(std::span<results::LoadCellRecord> out) override { return samples_.take(out); }
-  std::size_t take(std::span<results::MotorReading> out) override { return readings_.take(out); }
-  std::size_t take(std::span<results::SupplyReading> out) override { return supply_readings_.take(out); }
-  [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+  std::size_t take(std::span<results::LoadCellRecord> out) { return samples_.take(out); }
+  std::size_t take(std::span<results::MotorReading> out) { return readings_.take(out); }
+  std::size_t take(std::span<results::SupplyReading> out) { return supply_readings_.take(out); }
+  /// Events of load cell and motor.
+  [[nodiscard]] std::vector<results::StreamEvent> take_events();
 
   // The runner's thread.
   /// A step or another phase begins. Throws SafetyStop when the guard has stalled and takes no more marks.
@@ -94,7 +95,6 @@ class Guard final : public Streams {
   [[nodiscard]] double wall_seconds_since(std::int64_t at_ns, Instant now) const;
 
   Bench& bench_;
-  BenchStreams devices_;
   const std::optional<profiles::SupplyConfig> supply_;
   const std::vector<GuardLimit> table_;
   std::array<const GuardLimit*, kWatchedCount> limits_{};

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "daq/guard/speed_error.hpp"
 
@@ -14,76 +15,65 @@ constexpr double kSupplyPatience = 2;    // s; the supply is read eight times pe
 constexpr double kLongestPause = 0.4;    // s; the driver coasts the motor after 0.5 s
 constexpr double kMeterOfSupply = 1.02;  // a supply that limits its current shows a little more than its limit
 
-/// One limit per quantity, the tightest that was offered.
-class Table {
- public:
-  /// Ignores a value that is missing or not a positive, finite number.
-  void offer(Watched watched, const std::optional<double>& value, const std::string& source) {
-    if (!value || !std::isfinite(*value) || *value <= 0) return;
-    const GuardedQuantity& row = row_of(watched);
-    const bool lower = row.sense == Sense::lower;
-    auto& have = limits_[static_cast<std::size_t>(watched)];
-    if (!have || (lower ? *value > have->value : *value < have->value))
-      have = GuardLimit{watched, row.name, *value, row.unit, source, lower};
-  }
-  [[nodiscard]] std::vector<GuardLimit> limits() const {
-    std::vector<GuardLimit> limits;
-    for (const auto& limit : limits_) {
-      if (limit) limits.push_back(*limit);
-    }
-    return limits;
-  }
+/// The tightest limit that was offered for each quantity.
+using Table = std::map<Watched, GuardLimit>;
 
- private:
-  std::array<std::optional<GuardLimit>, kWatchedCount> limits_;
-};
-
-std::optional<double> scaled(const std::optional<double>& value, double factor) {
-  return value ? std::optional(factor * *value) : std::nullopt;
+/// Ignores a value that is missing or not a positive, finite number.
+void offer(Table& table, Watched watched, const std::optional<double>& value, const std::string& source) {
+  if (!value || !std::isfinite(*value) || *value <= 0) return;
+  const GuardedQuantity& row = row_of(watched);
+  const bool lower = row.sense == Sense::lower;
+  const auto have = table.find(watched);
+  if (have == table.end() || (lower ? *value > have->second.value : *value < have->second.value))
+    table[watched] = {watched, row.name, *value, row.unit, source, lower};
 }
 
 void offer_campaign(Table& table, const profiles::Limits& limits) {
   for (const GuardedQuantity& row : kQuantities) {
     if (row.campaign_limit == nullptr) continue;
-    table.offer(row.watched, row.campaign_limit(limits), std::string("campaign limits.") + row.campaign_key + row.note);
+    offer(table, row.watched, row.campaign_limit(limits),
+          std::string("campaign limits.") + row.campaign_key + row.note);
   }
 }
 
 void offer_bench(Table& table, const profiles::BenchConfig& config) {
-  table.offer(Watched::speed, kOvershoot * to_rpm(config.iq.speed_max),
-              "bench iq.speed_max_rpm, 5 % overshoot allowed");
+  offer(table, Watched::speed, kOvershoot * to_rpm(config.iq.speed_max),
+        "bench iq.speed_max_rpm, 5 % overshoot allowed");
   if (!config.supply) return;
-  table.offer(Watched::supply_voltage_high, config.supply->over_voltage.value(), "bench supply.over_voltage_v");
-  table.offer(Watched::output_current, kMeterOfSupply * config.supply->over_current.value(),
-              "bench supply.over_current_a, 2 % for its meter");
+  offer(table, Watched::supply_voltage_high, config.supply->over_voltage.value(), "bench supply.over_voltage_v");
+  offer(table, Watched::output_current, kMeterOfSupply * config.supply->over_current.value(),
+        "bench supply.over_current_a, 2 % for its meter");
 }
 
 void offer_devices(Table& table, const DeviceLimits& devices) {
   for (std::size_t axis = 0; axis < 6; ++axis)
-    table.offer(static_cast<Watched>(axis), kRangeBorne * devices.load_cell_range[axis],
-                "device load cell, 110 % of its range");
+    offer(table, static_cast<Watched>(axis), kRangeBorne * devices.load_cell_range[axis],
+          "device load cell, 110 % of its range");
   const iq::AuditRecord& motor = devices.motor;
-  const auto offer = [&](Watched watched, const std::optional<double>& value, const char* entry) {
-    table.offer(watched, value, std::string("device motor ") + entry);
+  const auto of_motor = [&](Watched watched, const std::optional<double>& value, const char* entry) {
+    offer(table, watched, value, std::string("device motor ") + entry);
   };
-  offer(Watched::speed, scaled(motor.value<"brushless_drive.motor_redline_start">(), 1 / kRadPerSecPerRpm),
-        "brushless_drive.motor_redline_start");
-  offer(Watched::supply_current, motor.value<"power_safety.current_input_high">(), "power_safety.current_input_high");
-  offer(Watched::motor_current, motor.value<"power_safety.motor_current_high">(), "power_safety.motor_current_high");
-  offer(Watched::supply_voltage_low, motor.value<"power_safety.volt_input_low">(), "power_safety.volt_input_low");
-  offer(Watched::supply_voltage_high, motor.value<"power_safety.volt_input_high">(), "power_safety.volt_input_high");
-  offer(Watched::coil_temperature, motor.value<"power_safety.temperature_coil_high">(),
-        "power_safety.temperature_coil_high");
-  offer(Watched::coil_temperature, motor.value<"coil_temperature_estimator.otw">(), "coil_temperature_estimator.otw");
+  auto redline_rpm = motor.value<"brushless_drive.motor_redline_start">();
+  if (redline_rpm) *redline_rpm /= kRadPerSecPerRpm;
+  of_motor(Watched::speed, redline_rpm, "brushless_drive.motor_redline_start");
+  of_motor(Watched::supply_current, motor.value<"power_safety.current_input_high">(),
+           "power_safety.current_input_high");
+  of_motor(Watched::motor_current, motor.value<"power_safety.motor_current_high">(), "power_safety.motor_current_high");
+  of_motor(Watched::supply_voltage_low, motor.value<"power_safety.volt_input_low">(), "power_safety.volt_input_low");
+  of_motor(Watched::supply_voltage_high, motor.value<"power_safety.volt_input_high">(), "power_safety.volt_input_high");
+  of_motor(Watched::coil_temperature, motor.value<"power_safety.temperature_coil_high">(),
+           "power_safety.temperature_coil_high");
+  of_motor(Watched::coil_temperature, motor.value<"coil_temperature_estimator.otw">(),
+           "coil_temperature_estimator.otw");
 }
 
 /// Limits that neither a file nor a device sets.
 void offer_own(Table& table, const profiles::BenchConfig& config) {
-  table.offer(Watched::speed_error, 100 * SpeedWatch::kShare, "kphi");
-  table.offer(Watched::load_cell_age, to_seconds(spin_patience(config)), "kphi, while the motor turns");
-  table.offer(Watched::motor_age, to_seconds(spin_patience(config)), "kphi, while the motor turns");
-  if (config.supply) table.offer(Watched::supply_age, kSupplyPatience, "kphi");
-  table.offer(Watched::pause, kLongestPause, "kphi, while the motor turns");
+  offer(table, Watched::speed_error, 100 * SpeedWatch::kShare, "kphi");
+  offer(table, Watched::load_cell_age, to_seconds(spin_patience(config)), "kphi, while the motor turns");
+  offer(table, Watched::motor_age, to_seconds(spin_patience(config)), "kphi, while the motor turns");
+  if (config.supply) offer(table, Watched::supply_age, kSupplyPatience, "kphi");
+  offer(table, Watched::pause, kLongestPause, "kphi, while the motor turns");
 }
 
 }  // namespace
@@ -103,9 +93,9 @@ std::vector<GuardLimit> combine_limits(const profiles::Campaign& campaign, const
   offer_bench(table, config);
   if (devices != nullptr) offer_devices(table, *devices);
   offer_own(table, config);
-  auto limits = table.limits();
-  if (!config.supply)
-    std::erase_if(limits, [](const auto& limit) { return row_of(limit.watched).source == Source::supply; });
+  std::vector<GuardLimit> limits;
+  for (const auto& [watched, limit] : table)
+    if (config.supply || row_of(watched).source != Source::supply) limits.push_back(limit);
   return limits;
 }
 

@@ -17,6 +17,12 @@ constexpr Duration kUnseenWall = std::chrono::seconds(3);  // a module that answ
 
 }  // namespace
 
+SafetyStop still_turning(RadPerSec speed) {
+  return SafetyStop(fmt::format("motor: coasting but still turning at {:.0f} RPM after {:.0f} s", to_rpm(speed),
+                                kSpinDownLimitSeconds),
+                    kKeepAway);
+}
+
 RestGuard::RestGuard(Bench& bench, bool motor_has_power)
     : bench_(bench),
       motor_has_power_(motor_has_power),
@@ -36,10 +42,7 @@ void RestGuard::await_rest(const std::function<bool()>& stop_asked) {
     const bool seen = speed_at_ns_ >= from.count();
     if (seen && speed_rad_s_ < kStandstill.value()) break;
     if (!seen && clock.now() > unseen) throw SafetyStop("motor: no speed reading; it may be turning", kKeepAway);
-    if (clock.now() > give_up)
-      throw SafetyStop(fmt::format("motor: coasting but still turning at {:.0f} RPM after {:.0f} s",
-                                   to_rpm(RadPerSec(speed_rad_s_)), kSpinDownLimitSeconds),
-                       kKeepAway);
+    if (clock.now() > give_up) throw still_turning(RadPerSec(speed_rad_s_));
   }
   resting_ = true;
 }

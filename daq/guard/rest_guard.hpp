@@ -19,6 +19,8 @@ namespace kphi::daq {
 inline constexpr RadPerSec kStandstill{5.0};         ///< slower: at rest
 inline constexpr double kSpinDownLimitSeconds = 30;  ///< a coasting rotor is at rest by then
 inline constexpr const char* kKeepAway = "keep away; wait until the rotor is at rest, or cut its power at the switch";
+/// The rotor coasts, but did not come to rest within that time.
+[[nodiscard]] SafetyStop still_turning(RadPerSec speed);
 
 class RestGuard {
  public:

@@ -20,15 +20,8 @@ bool is_reported_elsewhere(StatusVerdict verdict, std::uint32_t status) {
 }
 
 const char* next_move(StatusVerdict verdict) {
-  switch (verdict) {
-    case StatusVerdict::saturated:
-      return "take the load off the cell, then run: kphi devices";
-    case StatusVerdict::communication:
-      return "check the box's network and field bus, then run: kphi devices";
-    case StatusVerdict::sound:
-    case StatusVerdict::faulty:
-      break;
-  }
+  if (verdict == StatusVerdict::saturated) return "take the load off the cell, then run: kphi devices";
+  if (verdict == StatusVerdict::communication) return "check the box's network and field bus, then run: kphi devices";
   return "check the cell's cable and the box's supply, switch the box off and on, then run: kphi devices";
 }
 

@@ -75,7 +75,8 @@ void require_no_stop(const std::function<bool()>& stop_asked) {
 
 LiveMotor::LiveMotor(const profiles::MotorConfig& config, const Clock& clock)
     : config_(config), clock_(clock), motor_(connect()), identity_(motor_->identity().summary()) {
-  parameters_ = read_parameters(motor_->identity(), [this](auto asked) { return motor_->inquire(std::move(asked)); });
+  const bool newer = motor_->identity().value<"coil_temperature_estimator.t_coil">().has_value();
+  parameters_ = iq::read_audit([this](auto asked) { return motor_->inquire(std::move(asked)); }, newer);
 }
 
 std::shared_ptr<iq::Motor> LiveMotor::connect() const {
@@ -137,21 +138,19 @@ std::optional<Celsius> LiveMotor::coil_temperature() {
   return ask_coil_temperature(parameters_, [this](auto asked) { return connected()->inquire(std::move(asked)); });
 }
 
+results::MotorCounts LiveMotor::counts() const {
+  const auto connected = motor();
+  return connected ? to_counts(connected->counters()) : results::MotorCounts{};
+}
+
 std::vector<results::StreamEvent> LiveMotor::take_events() {
-  std::vector<results::StreamEvent> events;
   const auto motor = this->motor();
-  if (!motor) return events;
-  for (const iq::Event& event : motor->take_events()) events.push_back(to_event(event));
-  return events;
+  return motor ? to_events(motor->take_events()) : std::vector<results::StreamEvent>();
 }
 
 std::size_t LiveMotor::take(std::span<results::MotorReading> out) {
   const auto motor = this->motor();
-  if (!motor) return 0;
-  readings_.resize(out.size());
-  const std::size_t n = motor->take(readings_);
-  for (std::size_t i = 0; i < n; ++i) out[i] = to_reading(readings_[i]);
-  return n;
+  return motor ? take_records(*motor, readings_, out) : 0;
 }
 
 std::string LiveMotor::failure() const {
@@ -198,35 +197,13 @@ results::LoadCellScale LiveLoadCell::start() {
   return scale;
 }
 
-std::vector<results::StreamEvent> LiveLoadCell::take_events() {
-  std::vector<results::StreamEvent> events;
-  for (const netbox::Event& event : cell_->take_events()) events.push_back(to_event(event));
-  return events;
-}
-
 std::string LiveLoadCell::page() { return page_of(config_, "/netftapi2.xml"); }
 
-void LiveLoadCell::stop() noexcept { cell_->stop(); }
-
-std::size_t LiveLoadCell::take(std::span<results::LoadCellRecord> out) {
-  records_.resize(out.size());
-  const std::size_t n = cell_->take(records_);
-  for (std::size_t i = 0; i < n; ++i) out[i] = to_record(records_[i]);
-  return n;
-}
-
 std::string LiveLoadCell::failure() const {
-  switch (cell_->state()) {
-    case netbox::State::silent:
-      return "load cell: the stream fell silent";
-    case netbox::State::failed:
-      return "load cell: the stream could not be started again";
-    default:
-      return "";
-  }
+  const netbox::State state = cell_->state();
+  if (state == netbox::State::silent) return "load cell: the stream fell silent";
+  return state == netbox::State::failed ? "load cell: the stream could not be started again" : "";
 }
-
-results::SampleAccount LiveLoadCell::account() const { return to_account(cell_->counters()); }
 
 LiveBench::LiveBench(const profiles::BenchConfig& config, const std::function<bool()>& stop_asked)
     : config_(config),

@@ -34,6 +34,7 @@ class LiveMotor final : public MotorLink {
   std::size_t take(std::span<results::MotorReading> out) override;
   [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
   [[nodiscard]] std::string failure() const override;
+  [[nodiscard]] results::MotorCounts counts() const override;
   [[nodiscard]] std::string identity() const override { return identity_; }
 
  private:
@@ -60,13 +61,13 @@ class LiveLoadCell final : public LoadCellLink {
   [[nodiscard]] const netbox::Configuration& configuration() const override { return cell_->configuration(); }
   [[nodiscard]] std::vector<Finding> findings() const override { return findings_; }
   results::LoadCellScale start() override;
-  void stop() noexcept override;
-  std::size_t take(std::span<results::LoadCellRecord> out) override;
-  [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+  void stop() noexcept override { cell_->stop(); }
+  std::size_t take(std::span<results::LoadCellRecord> out) override { return take_records(*cell_, records_, out); }
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return to_events(cell_->take_events()); }
   [[nodiscard]] std::string page() override;
   void set_bias() noexcept override { cell_->set_bias(); }
   [[nodiscard]] std::string failure() const override;
-  [[nodiscard]] results::SampleAccount account() const override;
+  [[nodiscard]] results::SampleAccount account() const override { return to_account(cell_->counters()); }
   [[nodiscard]] results::StreamHealth health() const override { return to_health(cell_->health(), clock_); }
 
  private:

@@ -29,21 +29,6 @@ std::unique_ptr<supply::Supply> open_supply(const profiles::SupplyConfig& config
   }
 }
 
-results::SupplyReading to_reading(const supply::Reading& reading) {
-  // The drivers' enums have the codes of the file: see the assertions.
-  static_assert(static_cast<int>(supply::Protection::unknown) == static_cast<int>(results::SupplyProtection::unknown));
-  static_assert(static_cast<int>(supply::Regulation::unknown) == static_cast<int>(results::SupplyRegulation::unknown));
-  return {reading.at.count(),
-          reading.uncertainty.count(),
-          reading.voltage_v,
-          reading.current_a,
-          reading.set_voltage_v,
-          reading.current_limit_a,
-          static_cast<results::SupplyRegulation>(reading.regulation),
-          static_cast<results::SupplyProtection>(reading.protection),
-          reading.output ? 1u : 0u};
-}
-
 std::string summary(const supply::Identity& identity) {
   std::string text = identity.model;
   if (!identity.serial.empty()) text += ", serial " + identity.serial;
@@ -75,13 +60,6 @@ void LiveSupply::switch_on() {
         fmt::format("{:.4g} V at the terminals, {:g} V set", seen ? seen->voltage_v : 0.0, config_.voltage.value()),
         "check for a short circuit, or a current limit that is too low");
   }
-}
-
-std::size_t LiveSupply::take(std::span<results::SupplyReading> out) {
-  readings_.resize(out.size());
-  const std::size_t n = worker_.take(readings_);
-  for (std::size_t i = 0; i < n; ++i) out[i] = to_reading(readings_[i]);
-  return n;
 }
 
 std::string LiveSupply::failure() const {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "daq/bench/bench.hpp"
+#include "daq/bench/device_records.hpp"
 #include "drivers/supply/worker.hpp"
 #include "profiles/bench_config.hpp"
 
@@ -15,7 +16,7 @@ class LiveSupply final : public SupplyLink {
   /// Finds it; its output is as it was. Throws DeviceError. `clock` outlives this.
   LiveSupply(const profiles::SupplyConfig& config, const Clock& clock);
   [[nodiscard]] std::string identity() const override;
-  std::size_t take(std::span<results::SupplyReading> out) override;
+  std::size_t take(std::span<results::SupplyReading> out) override { return take_records(worker_, readings_, out); }
   [[nodiscard]] std::string failure() const override;
   void cut() noexcept override { worker_.switch_off(); }
   [[nodiscard]] std::string switch_off() noexcept override;
@@ -30,7 +31,6 @@ class LiveSupply final : public SupplyLink {
 
 /// Over Modbus or SCPI, as its URI says. Throws ConfigurationError, DeviceError.
 [[nodiscard]] std::unique_ptr<supply::Supply> open_supply(const profiles::SupplyConfig& config, const Clock& clock);
-[[nodiscard]] results::SupplyReading to_reading(const supply::Reading& reading);
 /// "RD6018, serial 4711, firmware 1.28".
 [[nodiscard]] std::string summary(const supply::Identity& identity);
 

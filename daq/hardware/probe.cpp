@@ -71,8 +71,7 @@ std::vector<Finding> findings_of(const supply::Identity& identity, const supply:
                         "lower voltage_v and current_limit_a, or use a larger supply"});
   }
   if (reading.protection != supply::Protection::none) {
-    findings.push_back({Severity::warning,
-                        fmt::format("{} protection tripped", name_of(to_reading(reading).protection)),
+    findings.push_back({Severity::warning, fmt::format("{} protection tripped", name_of(to_record(reading).protection)),
                         "find the cause; switching the output on clears it"});
   }
   if (reading.output) {

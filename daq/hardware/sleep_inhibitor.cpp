@@ -109,7 +109,6 @@ SleepInhibitor::SleepInhibitor() noexcept {
     const int answer = inhibit(bus.get(), what, end, cause);
     if (answer >= 0) {
       lock_ = Descriptor(answer);
-      what_ = what;
       why_not_.clear();
       return;
     }

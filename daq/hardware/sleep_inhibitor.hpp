@@ -13,15 +13,11 @@ class SleepInhibitor {
  public:
   SleepInhibitor() noexcept;
 
-  [[nodiscard]] bool held() const noexcept { return lock_.number() >= 0; }
-  /// What logind blocks meanwhile, in its own words: "sleep:idle:handle-lid-switch", or less; empty if not held.
-  [[nodiscard]] const std::string& what() const noexcept { return what_; }
-  /// One line for the operator with consequence, cause and next move; empty if held.
+  /// One line for the operator with consequence, cause and next move; empty if it is held.
   [[nodiscard]] const std::string& why_not() const noexcept { return why_not_; }
 
  private:
   Descriptor lock_;
-  std::string what_;
   std::string why_not_;
 };
 

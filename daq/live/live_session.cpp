@@ -44,25 +44,14 @@ StepFigures QuickLook::result() const {
   return result;
 }
 
-Tick LiveProgress::tick_of(const Position& position, const Observation& seen) {
-  const Instant now = clock_.now();
-  most_remaining_s_ = std::max(most_remaining_s_, position.remaining_s);
-  return {to_seconds(now), calendar_seconds(clock_, now),
-          most_remaining_s_ > 0 ? 1 - position.remaining_s / most_remaining_s_ : 0, position, seen};
-}
-
-bool LiveProgress::is_settled(Instant now) const {
-  return step_ >= 0 && now - step_began_ >= from_seconds(subject_.minimum_discard.value());
-}
-
 void LiveProgress::add_to_step(const Position& position, const Observation& seen, Instant now) {
   if (position.step != step_) {
     step_ = position.step;
     step_began_ = now;
     quick_look_.begin();
   }
-  if (is_settled(now) && seen.motor_is_fresh() && seen.load_cell_is_fresh())
-    quick_look_.add(seen.thrust(), seen.speed());
+  const bool is_settled = step_ >= 0 && now - step_began_ >= from_seconds(subject_.minimum_discard.value());
+  if (is_settled && seen.motor_is_fresh() && seen.load_cell_is_fresh()) quick_look_.add(seen.thrust(), seen.speed());
 }
 
 void LiveProgress::guarded(const std::vector<GuardLimit>& limits) {
@@ -73,8 +62,11 @@ void LiveProgress::guarded(const std::vector<GuardLimit>& limits) {
 
 void LiveProgress::tick(const Position& position, const Observation& seen) {
   inner_.tick(position, seen);
-  add_to_step(position, seen, clock_.now());
-  const Tick tick = tick_of(position, seen);
+  const Instant now = clock_.now();
+  add_to_step(position, seen, now);
+  most_remaining_s_ = std::max(most_remaining_s_, position.remaining_s);
+  const double progress = most_remaining_s_ > 0 ? 1 - position.remaining_s / most_remaining_s_ : 0;
+  const Tick tick{to_seconds(now), calendar_seconds(clock_, now), progress, position, seen};
   feed_.show(tick);
   if (plotter_ != nullptr) plotter_->send(tick);
 }

@@ -42,9 +42,7 @@ class LiveProgress final : public Progress {
   void say(const std::string& line) override;
 
  private:
-  [[nodiscard]] Tick tick_of(const Position& position, const Observation& seen);
   void add_to_step(const Position& position, const Observation& seen, Instant now);
-  [[nodiscard]] bool is_settled(Instant now) const;
 
   Progress& inner_;
   Feed& feed_;
@@ -73,7 +71,7 @@ class LiveSession {
   /// STOP was pressed on a page. Thread-safe.
   [[nodiscard]] bool stop_asked() const noexcept { return feed_.stop_asked(); }
   /// A page is open. Thread-safe.
-  [[nodiscard]] bool is_watched() const noexcept { return server_ && server_->counts().clients > 0; }
+  [[nodiscard]] bool is_watched() const noexcept { return server_ && server_->clients() > 0; }
   /// A progress for `behind` and the live view. `behind`, `clock` and this must outlive it.
   [[nodiscard]] std::unique_ptr<Progress> beside(Progress& behind, const Clock& clock);
 

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <boost/algorithm/string/replace.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
@@ -42,15 +43,9 @@ constexpr std::chrono::seconds kIdle{20};
 
 std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
 
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size())
-    text.replace(at, what.size(), by);
-  return text;
-}
-
 }  // namespace
 
-/// Everything except draw() and the counts belongs to its thread.
+/// Everything except draw() and clients() belongs to its thread.
 class Server::Impl {
  public:
   Impl(Settings settings, Feed& feed);
@@ -60,7 +55,7 @@ class Server::Impl {
   void draw() {
     asio::post(io_, [this] { frame(); });
   }
-  [[nodiscard]] Counts counts() const noexcept { return {clients_now_, refused_, frames_, skipped_, dropped_clients_}; }
+  [[nodiscard]] std::size_t clients() const noexcept { return clients_now_; }
 
  private:
   class Request;
@@ -87,7 +82,7 @@ class Server::Impl {
   std::uint64_t last_shown_ = 0;
   Wall::time_point shown_at_ = Wall::now();
   bool closing_ = false;
-  std::atomic<std::uint64_t> clients_now_{0}, refused_{0}, frames_{0}, skipped_{0}, dropped_clients_{0};
+  std::atomic<std::size_t> clients_now_{0};
   std::thread thread_;
 };
 
@@ -118,7 +113,7 @@ class Server::Impl::Client : public std::enable_shared_from_this<Client> {
   }
   void send_tick(Text tick) {
     if (!open_ || closing_) return;
-    if (newest_) ++skipped_, ++impl_.skipped_;
+    if (newest_) ++skipped_;
     newest_ = std::move(tick);
     pump();
   }
@@ -162,7 +157,6 @@ class Server::Impl::Client : public std::enable_shared_from_this<Client> {
     } else if (newest_) {
       under_way_ = std::move(newest_);
       newest_.reset();
-      ++impl_.frames_;
     } else {
       return;
     }
@@ -177,7 +171,6 @@ class Server::Impl::Client : public std::enable_shared_from_this<Client> {
   }
 
   void drop() {
-    ++impl_.dropped_clients_;
     Error ignored;
     beast::get_lowest_layer(stream_).socket().close(ignored);
     leave();
@@ -246,7 +239,6 @@ class Server::Impl::Request : public std::enable_shared_from_this<Request> {
   }
 
   void answer(unsigned status, const std::string& words) {
-    ++impl_.refused_;
     begin(status, "text/plain; charset=utf-8");
     answer_.body() = "kphi: " + words + "\n";
     send();
@@ -261,7 +253,7 @@ class Server::Impl::Request : public std::enable_shared_from_this<Request> {
                             "style-src-attr 'unsafe-inline'; img-src data:; "
                             "connect-src ws://{1}; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
                             nonce, host));
-    answer_.body() = replaced(impl_.settings_.page, "@NONCE@", nonce);
+    answer_.body() = boost::algorithm::replace_all_copy(impl_.settings_.page, "@NONCE@", nonce);
     send();
   }
 
@@ -409,7 +401,7 @@ std::uint16_t Server::port() const noexcept { return impl_->port(); }
 std::string Server::url() const {
   return fmt::format("http://127.0.0.1:{}/?token={}", impl_->port(), impl_->settings().token);
 }
-Server::Counts Server::counts() const noexcept { return impl_->counts(); }
+std::size_t Server::clients() const noexcept { return impl_->clients(); }
 void Server::draw() { impl_->draw(); }
 
 }  // namespace kphi::daq::live

@@ -31,14 +31,6 @@ class Server {
   static constexpr std::size_t kLongestHeader = 8192;  ///< header of a request, bytes
   static constexpr std::size_t kMostRequests = 64;     ///< under way at once; further connections are closed unread
 
-  struct Counts {
-    std::uint64_t clients = 0;  ///< WebSockets open now
-    std::uint64_t refused = 0;  ///< requests answered with 4xx or 5xx
-    std::uint64_t frames = 0;   ///< ticks handed to clients
-    std::uint64_t skipped = 0;  ///< ticks that a client was too slow for
-    std::uint64_t dropped_clients = 0;
-  };
-
   /// Listens at once. Throws ConfigurationError if the port is taken. `feed` must outlive this.
   Server(Settings settings, Feed& feed);
   /// Sends waiting messages for at most half a second, and closes.
@@ -49,8 +41,8 @@ class Server {
   [[nodiscard]] std::uint16_t port() const noexcept;
   /// With the token.
   [[nodiscard]] std::string url() const;
-  /// Any thread.
-  [[nodiscard]] Counts counts() const noexcept;
+  /// WebSockets that are open now. Any thread.
+  [[nodiscard]] std::size_t clients() const noexcept;
   /// Sends messages and one tick soon; returns at once. Thread-safe.
   void draw();
 

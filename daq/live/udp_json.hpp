@@ -17,14 +17,12 @@ class UdpJson {
   UdpJson(const std::string& address, std::vector<GuardLimit> limits);
   /// From now on limit_share refers to these limits.
   void hold_to(std::vector<GuardLimit> limits) { limits_ = std::move(limits); }
-  /// Never waits; a datagram that the kernel refuses is dropped and counted.
+  /// Never waits; a datagram that the kernel refuses is dropped.
   void send(const Tick& tick) noexcept;
-  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
 
  private:
   std::vector<GuardLimit> limits_;
   Descriptor socket_;
-  std::uint64_t dropped_ = 0;
 };
 
 }  // namespace kphi::daq::live

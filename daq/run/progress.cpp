@@ -55,24 +55,22 @@ std::string describe(const Position& position, const Observation& seen) {
          silence(seen);
 }
 
-TerminalProgress::~TerminalProgress() { put(stream_, clearing(), Worth::live); }
+PrintedProgress::~PrintedProgress() { put(stream_, clearing(), Worth::live); }
 
-std::string TerminalProgress::clearing() { return std::exchange(drawn_, false) ? "\r\x1b[K" : ""; }
+std::string PrintedProgress::clearing() { return std::exchange(drawn_, false) ? "\r\x1b[K" : ""; }
 
-void TerminalProgress::tick(const Position& position, const Observation& seen) {
+void PrintedProgress::tick(const Position& position, const Observation& seen) {
   const auto now = std::chrono::steady_clock::now();
-  if (now < next_) return;
+  if (!on_terminal_ || now < next_) return;
   next_ = now + std::chrono::milliseconds(100);
   put(stream_, fmt::format("\r{}\x1b[K", cut(describe(position, seen), width_of(stream_) - 1)), Worth::live);
   drawn_ = true;
 }
 
-void TerminalProgress::say(const std::string& line) { put(stream_, fmt::format("{}{}\n", clearing(), line)); }
-
-void PlainProgress::step_done(const Position& position, const Observation& seen) {
-  put(stream_, fmt::format("{}\n", describe(position, seen)), Worth::passing);
+void PrintedProgress::step_done(const Position& position, const Observation& seen) {
+  if (!on_terminal_) put(stream_, fmt::format("{}\n", describe(position, seen)), Worth::passing);
 }
 
-void PlainProgress::say(const std::string& line) { put(stream_, fmt::format("{}\n", line)); }
+void PrintedProgress::say(const std::string& line) { put(stream_, fmt::format("{}{}\n", clearing(), line)); }
 
 }  // namespace kphi::daq

@@ -47,31 +47,22 @@ class Progress {
   virtual void say(const std::string&) {}
 };
 
-/// One line rewritten in place, at most ten times a second.
-class TerminalProgress final : public Progress {
+/// On a terminal one line rewritten in place, at most ten times a second; elsewhere one line per step.
+class PrintedProgress final : public Progress {
  public:
-  explicit TerminalProgress(std::FILE* stream) : stream_(stream) {}
-  ~TerminalProgress() override;
+  PrintedProgress(std::FILE* stream, bool on_terminal) : stream_(stream), on_terminal_(on_terminal) {}
+  ~PrintedProgress() override;
   void tick(const Position& position, const Observation& seen) override;
+  void step_done(const Position& position, const Observation& seen) override;
   void say(const std::string& line) override;
 
  private:
   /// The text that clears the live line; empty if none is drawn.
   [[nodiscard]] std::string clearing();
   std::FILE* stream_;
+  const bool on_terminal_;
   bool drawn_ = false;
   std::chrono::steady_clock::time_point next_{};
-};
-
-/// One line per step.
-class PlainProgress final : public Progress {
- public:
-  explicit PlainProgress(std::FILE* stream) : stream_(stream) {}
-  void step_done(const Position& position, const Observation& seen) override;
-  void say(const std::string& line) override;
-
- private:
-  std::FILE* stream_;
 };
 
 /// "5x3  φ  90°  rep 2/3  step 17/40  speed  7894 of  7895 RPM  thrust  1.162 N  left 06:12"; stale values are shown as

@@ -16,9 +16,9 @@ constexpr std::size_t kSupplyReadingsAtOnce = 16;
 
 }  // namespace
 
-Recorder::Recorder(Bench& bench, Streams& streams, results::RunWriter& writer)
+Recorder::Recorder(Bench& bench, Guard& guard, results::RunWriter& writer)
     : bench_(bench),
-      streams_(streams),
+      guard_(guard),
       writer_(writer),
       scale_(bench.load_cell().configuration()),
       range_(scale_),
@@ -32,7 +32,7 @@ void Recorder::drain() noexcept {
   try {
     drain_marks();
     drain(records_);
-    for (const results::StreamEvent& event : streams_.take_events()) note(event);
+    for (const results::StreamEvent& event : guard_.take_events()) note(event);
     drain(readings_);
     drain(supply_readings_);
     if (const Instant now = bench_.clock().now(); now >= next_sync_) {
@@ -82,7 +82,7 @@ void Recorder::note_range(netbox::RangeVerdict verdict, results::Nanoseconds at)
 
 template <class T>
 void Recorder::drain(std::vector<T>& buffer) {
-  while (const std::size_t n = streams_.take(buffer)) {
+  while (const std::size_t n = guard_.take(buffer)) {
     const auto batch = std::span<const T>(buffer).first(n);
     writer_.append(batch);
     if constexpr (std::is_same_v<T, results::LoadCellRecord>) inspect(batch);

@@ -9,7 +9,7 @@
 
 #include "base/published.hpp"
 #include "daq/bench/bench.hpp"
-#include "daq/bench/streams.hpp"
+#include "daq/guard/guard.hpp"
 #include "drivers/netbox/receive/load.hpp"
 
 namespace kphi::daq {
@@ -17,7 +17,7 @@ namespace kphi::daq {
 /// Two threads, neither of which waits for the other: one calls drain(), the runner calls everything else.
 class Recorder {
  public:
-  Recorder(Bench& bench, Streams& streams, results::RunWriter& writer);
+  Recorder(Bench& bench, Guard& guard, results::RunWriter& writer);
 
   /// Appends everything that has arrived, and syncs the file when it is due. Keeps the first error for check_failure()
   /// and does nothing after it.
@@ -41,7 +41,7 @@ class Recorder {
   void note_range(netbox::RangeVerdict verdict, results::Nanoseconds at);
 
   Bench& bench_;
-  Streams& streams_;
+  Guard& guard_;
   results::RunWriter& writer_;
   const netbox::Configuration scale_;
   netbox::RangeWatch range_;

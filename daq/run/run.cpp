@@ -107,6 +107,11 @@ bool is_trip(const std::exception_ptr& cause) {
   }
 }
 
+results::MotorCounts operator-(results::MotorCounts now, const results::MotorCounts& before) {
+  for (std::size_t i = 0; i < now.size(); ++i) now[i] -= std::min(now[i], before[i]);
+  return now;
+}
+
 /// How the sequence of a run ended.
 struct Ended {
   std::exception_ptr cause;  ///< null: it is complete
@@ -185,6 +190,7 @@ std::string utc_text(const Clock& clock, Instant when) {
 
 RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, const std::function<bool()>& stop_asked) {
   const netbox::Configuration before = bench.load_cell().configuration();
+  const results::MotorCounts counts_before = bench.motor().counts();
   std::optional<Streaming> streaming(std::in_place, bench.load_cell());
   judge_changes(before, bench.load_cell(), order, progress);
   results::RunWriter writer(order.file, header_of(order, bench, streaming->scale()), bench.files());
@@ -198,7 +204,9 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   streaming.reset();
   record_the_rest(sequence, guard, recorder, ended);
   const results::SampleAccount account = bench.load_cell().account();
-  results::RunEnding ending{results::Outcome::complete, "", account, bench.load_cell().health(), sequence.box_bias()};
+  results::RunEnding ending{
+      results::Outcome::complete, "", account, bench.load_cell().health(), bench.motor().counts() - counts_before,
+      sequence.box_bias()};
   if (!ended.cause) return {order.file, writer.finish(ending), account, sequence.stop()};
 
   ending.outcome = results::Outcome::aborted;

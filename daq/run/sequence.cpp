@@ -255,11 +255,7 @@ void Sequence::wait_for_standstill() {
   hold(bench_.clock().stretched(20 * kTickWall));
   // Written so that NaN is not at rest.
   for (RadPerSec speed; !((speed = guard_.observe(bench_.clock().now()).speed()) <= kStandstill);) {
-    if (bench_.clock().now() > give_up) {
-      throw SafetyStop(fmt::format("motor: coasting but still turning at {:.0f} RPM after {:.0f} s", to_rpm(speed),
-                                   kSpinDownLimitSeconds),
-                       kKeepAway);
-    }
+    if (bench_.clock().now() > give_up) throw still_turning(speed);
     hold(bench_.clock().stretched(kTickWall));
   }
 }

@@ -49,11 +49,9 @@ std::optional<CapLesson> SpeedCap::learn(std::span<const StepMean> run) {
   return CapLesson{RadPerSec(lowest->commanded_speed_rad_s), RadPerSec(lowest->speed_rad_s), *cap_};
 }
 
-int SpeedCap::apply(std::vector<profiles::PlannedStep>& steps) const {
+void SpeedCap::apply(std::vector<profiles::PlannedStep>& steps) const {
   constexpr double kSlack = 1e-9;  // levels may come from files
-  if (!cap_) return 0;
-  return static_cast<int>(std::erase_if(
-      steps, [&](const profiles::PlannedStep& step) { return step.speed.value() > cap_->value() * (1 + kSlack); }));
+  if (cap_) std::erase_if(steps, [&](const auto& step) { return step.speed.value() > cap_->value() * (1 + kSlack); });
 }
 
 }  // namespace kphi::daq

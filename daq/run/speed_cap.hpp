@@ -30,8 +30,8 @@ class SpeedCap {
   /// The means of one run. nullopt: every level was reached, nothing new was learned, or no level was held.
   std::optional<CapLesson> learn(std::span<const results::StepMean> run);
   [[nodiscard]] const std::optional<RadPerSec>& speed() const { return cap_; }
-  /// Removes the steps above the cap; returns how many.
-  int apply(std::vector<profiles::PlannedStep>& steps) const;
+  /// Removes the steps above the cap.
+  void apply(std::vector<profiles::PlannedStep>& steps) const;
 
  private:
   std::optional<RadPerSec> cap_;

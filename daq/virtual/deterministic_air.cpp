@@ -69,7 +69,7 @@ class DirectUsb final : public usb::Transport {
     std::copy_n(answer.bytes.begin(), n, data.begin());
     return {usb::Outcome::done, n};
   }
-  [[nodiscard]] bool gone() const { return faults_.active(sim::UsbFaultKind::unplug); }
+  [[nodiscard]] bool gone() const { return faults_.active(sim::FaultKind::ambient_unplug); }
 
   sim::UsbFunction& function_;
   const sim::UsbFaults& faults_;
@@ -95,7 +95,7 @@ class DeterministicAir::Sensor {
   ambient::Bme280Sensor sensor_;
 };
 
-DeterministicAir::DeterministicAir(const Clock& bench, const sim::TrueAir& air, sim::UsbFaultScript faults)
+DeterministicAir::DeterministicAir(const Clock& bench, const sim::TrueAir& air, sim::FaultScript faults)
     : bench_(bench),
       time_(bench.now()),
       faults_(time_, std::move(faults)),

@@ -16,7 +16,7 @@ class DeterministicAir {
  public:
   /// Waits for the first reading, in its own time: on a live bench another thread does. Throws DeviceError without a
   /// reading. `bench` outlives this.
-  DeterministicAir(const Clock& bench, const sim::TrueAir& air, sim::UsbFaultScript faults);
+  DeterministicAir(const Clock& bench, const sim::TrueAir& air, sim::FaultScript faults);
   ~DeterministicAir();
   DeterministicAir(const DeterministicAir&) = delete;
   DeterministicAir& operator=(const DeterministicAir&) = delete;

@@ -9,7 +9,6 @@
 #include "base/error.hpp"
 #include "base/random.hpp"
 #include "daq/bench/box.hpp"
-#include "daq/bench/device_records.hpp"
 #include "drivers/netbox/configuration/calinfo.hpp"
 #include "drivers/sim/input_files.hpp"
 #include "profiles/strict_yaml.hpp"
@@ -20,7 +19,6 @@ namespace {
 constexpr Duration kHandshake = std::chrono::seconds(5);
 constexpr Duration kSupplyRises = std::chrono::milliseconds(500);
 constexpr Duration kWorkEvery = std::chrono::milliseconds(5);
-constexpr Duration kSyncEvery = std::chrono::seconds(1);
 constexpr Duration kHttpTimeout = std::chrono::seconds(5);
 constexpr Duration kMotorWait = std::chrono::milliseconds(1);
 constexpr sim::Peer kHost = 1;
@@ -42,7 +40,7 @@ std::string body_of(const std::string& response, const std::string& operation) {
 sim::BenchSettings simulated_devices(const profiles::BenchConfig& config, sim::BenchSettings settings) {
   settings.netbox.rate_hz = config.netbox.rate_hz;
   settings.netbox.records_per_datagram = config.netbox.records_per_datagram;
-  settings.module_id = config.iq.module_id;
+  settings.module.module_id = config.iq.module_id;
   settings.module.baud = config.iq.baud;
   if (config.supply) settings.supply.emplace();
   if (!config.simulation) return settings;
@@ -81,7 +79,7 @@ void DeterministicBench::make_devices(const sim::BenchSettings& settings) {
     clock_.set(clock_.now() + kSupplyRises);
     sim_->advance(clock_.now());
   }
-  if (!config_.ambient.sensor.empty()) measured_air_.emplace(clock_, settings.air, settings.air_faults);
+  if (!config_.ambient.sensor.empty()) measured_air_.emplace(clock_, settings.air, settings.faults);
   motor_->connect();
   read_box();
   cross_check();
@@ -108,8 +106,6 @@ std::string DeterministicBench::page(const std::string& target) {
   wait_until(clock_.now() + reply.wait);
   return body_of(reply.bytes, operation);
 }
-
-void DeterministicBench::read_box() { configuration_ = netbox::parse_configuration(page()); }
 
 void DeterministicBench::cross_check() {
   const auto request = netbox::encode_read_calinfo();
@@ -210,8 +206,6 @@ std::shared_ptr<void> DeterministicBench::run_periodically(std::function<void()>
   return {nullptr, [this, entry](void*) { work_.erase(entry); }};
 }
 
-Duration DeterministicBench::sync_interval() const { return kSyncEvery; }
-
 void DeterministicBench::restore_power() {
   power_->restore(*motor_, clock_, [this] { wait_until(clock_.now() + kSupplyRises); });
 }
@@ -249,27 +243,13 @@ void DeterministicBench::stop() noexcept {
 }
 
 std::size_t DeterministicBench::take(std::span<results::LoadCellRecord> out) {
-  (void)connection_->publish();
-  records_.resize(out.size());
-  const std::size_t n = connection_->take(records_);
-  std::transform(records_.begin(), records_.begin() + static_cast<std::ptrdiff_t>(n), out.begin(), to_record);
-  return n;
-}
-
-std::vector<results::StreamEvent> DeterministicBench::take_events() {
-  std::vector<results::StreamEvent> events;
-  for (const netbox::Event& event : connection_->take_events()) events.push_back(to_event(event));
-  return events;
+  return take_records(*connection_, records_, out);
 }
 
 void DeterministicBench::set_bias() noexcept {
   connection_->set_bias(clock_.now());
   exchange_load_cell();
 }
-
-results::StreamHealth DeterministicBench::health() const { return to_health(connection_->health(), clock_); }
-
-results::SampleAccount DeterministicBench::account() const { return to_account(connection_->counters()); }
 
 std::string DeterministicBench::failure() const {
   if (connection_ && connection_->state() == netbox::State::silent) return "load cell: the stream fell silent";

@@ -15,6 +15,7 @@
 
 #include "daq/bench/air_source.hpp"
 #include "daq/bench/bench.hpp"
+#include "daq/bench/device_records.hpp"
 #include "daq/guard/interlock.hpp"
 #include "daq/virtual/deterministic_air.hpp"
 #include "daq/virtual/deterministic_motor.hpp"
@@ -55,7 +56,7 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   void wait_until(Instant when) override;
   [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()> work) override;
   [[nodiscard]] results::FileLayer& files() override { return *files_; }
-  [[nodiscard]] Duration sync_interval() const override;
+  [[nodiscard]] Duration sync_interval() const override { return std::chrono::seconds(1); }
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
   [[nodiscard]] bool switch_off_power() override { return power_->off(*motor_); }
   void restore_power() override;
@@ -78,17 +79,19 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   results::LoadCellScale start() override;
   void stop() noexcept override;
   std::size_t take(std::span<results::LoadCellRecord> out) override;
-  [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+  [[nodiscard]] std::vector<results::StreamEvent> take_events() override {
+    return to_events(connection_->take_events());
+  }
   [[nodiscard]] std::string page() override { return page("/netftapi2.xml"); }
   void set_bias() noexcept override;
-  [[nodiscard]] results::SampleAccount account() const override;
-  [[nodiscard]] results::StreamHealth health() const override;
+  [[nodiscard]] results::SampleAccount account() const override { return to_account(connection_->counters()); }
+  [[nodiscard]] results::StreamHealth health() const override { return to_health(connection_->health(), clock_); }
   [[nodiscard]] std::string failure() const override;
 
   [[nodiscard]] std::string page(const std::string& target);
   /// Replaces them.
   void make_devices(const sim::BenchSettings& settings);
-  void read_box();
+  void read_box() { configuration_ = netbox::parse_configuration(page()); }
   void cross_check();
   void ask_box();
   void step_to(Instant when);

@@ -1,11 +1,7 @@
 #include "daq/virtual/deterministic_motor.hpp"
 
-#include <algorithm>
-#include <array>
-
 #include "base/error.hpp"
 #include "daq/audit/bench_audit.hpp"
-#include "daq/bench/device_records.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -33,7 +29,8 @@ void DeterministicMotor::connect() {
   session_.connect(clock_.now());
   while (session_.state() == iq::Session::State::connecting) step_();
   if (session_.state() != iq::Session::State::ready) throw DeviceError("IQ module", "connect", session_.failure());
-  parameters_ = read_parameters(session_.identity(), [this](auto asked) { return ask(std::move(asked)); });
+  const bool newer = session_.identity().value<"coil_temperature_estimator.t_coil">().has_value();
+  parameters_ = iq::read_audit([this](auto asked) { return ask(std::move(asked)); }, newer);
   (void)session_.take_events();  // that it is connected
 }
 
@@ -115,20 +112,11 @@ std::optional<Celsius> DeterministicMotor::coil_temperature() {
   return ask_coil_temperature(parameters_, [this](auto asked) { return ask(std::move(asked)); });
 }
 
-std::size_t DeterministicMotor::take(std::span<results::MotorReading> out) {
-  std::array<iq::Reading, 64> readings;
-  const std::size_t n = session_.take(std::span(readings).first(std::min(out.size(), readings.size())));
-  for (std::size_t i = 0; i < n; ++i) out[i] = to_reading(readings[i]);
-  return n;
-}
-
 std::vector<results::StreamEvent> DeterministicMotor::take_events() {
-  std::vector<results::StreamEvent> events;
-  for (const iq::Event& event : session_.take_events()) {
+  const std::vector<iq::Event> events = session_.take_events();
+  for (const iq::Event& event : events)
     if (failure_.empty() && iq::spoils_a_run(event.kind)) failure_ = event.words;
-    events.push_back(to_event(event));
-  }
-  return events;
+  return to_events(events);
 }
 
 std::string DeterministicMotor::failure() const {

@@ -13,26 +13,6 @@ constexpr Duration kLookEvery = std::chrono::milliseconds(125);
 constexpr Duration kAnswer = std::chrono::milliseconds(500), kQuiet = std::chrono::milliseconds(150);
 constexpr int kAttempts = 3;
 
-/// The simulator's enum as the file's code.
-results::SupplyProtection to_protection(sim::SupplyTrip trip) {
-  using results::SupplyProtection;
-  switch (trip) {
-    case sim::SupplyTrip::none:
-      return SupplyProtection::none;
-    case sim::SupplyTrip::over_voltage:
-      return SupplyProtection::over_voltage;
-    case sim::SupplyTrip::over_current:
-      return SupplyProtection::over_current;
-    case sim::SupplyTrip::over_power:
-      return SupplyProtection::over_power;
-    case sim::SupplyTrip::over_temperature:
-      return SupplyProtection::over_temperature;
-    case sim::SupplyTrip::short_circuit:
-      return SupplyProtection::short_circuit;
-  }
-  return SupplyProtection::unknown;
-}
-
 }  // namespace
 
 void DeterministicSupply::switch_on() {
@@ -75,6 +55,9 @@ void DeterministicSupply::miss() {
 }
 
 results::SupplyReading DeterministicSupply::shown(Duration wait) const {
+  // The simulator's enum has the codes of the file.
+  static_assert(static_cast<int>(sim::SupplyTrip::short_circuit) ==
+                static_cast<int>(results::SupplyProtection::short_circuit));
   return {
       (clock_.now() + wait / 2).count(),
       (wait / 2).count(),
@@ -83,7 +66,7 @@ results::SupplyReading DeterministicSupply::shown(Duration wait) const {
       circuit_.controls().volts,
       circuit_.controls().amps,
       circuit_.limiting() ? results::SupplyRegulation::constant_current : results::SupplyRegulation::constant_voltage,
-      to_protection(circuit_.tripped()),
+      static_cast<results::SupplyProtection>(circuit_.tripped()),
       circuit_.output() ? 1u : 0u};
 }
 

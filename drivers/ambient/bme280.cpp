@@ -96,7 +96,6 @@ bool complete(const Raw& raw) noexcept {
 Measured compensate(const Raw& raw, const Calibration& calibration) noexcept {
   const Wide t_fine = fine_temperature(raw.temperature, calibration);
   Measured measured;
-  measured.t_fine = static_cast<std::int32_t>(t_fine);
   measured.temperature_centi_c = static_cast<std::int32_t>((t_fine * 5 + 128) >> 8);
   measured.pressure_256th_pa = pressure(raw.pressure, t_fine, calibration);
   measured.humidity_1024th_rh = humidity(raw.humidity, t_fine, calibration);

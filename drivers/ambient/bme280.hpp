@@ -61,7 +61,6 @@ struct Measured {
   std::int32_t temperature_centi_c = 0;  ///< 0.01 °C
   std::uint32_t pressure_256th_pa = 0;   ///< Pa/256; 0: the calibration allows none
   std::uint32_t humidity_1024th_rh = 0;  ///< %RH/1024
-  std::int32_t t_fine = 0;
   [[nodiscard]] double temperature_c() const noexcept { return temperature_centi_c * 0.01; }
   [[nodiscard]] double pressure_pa() const noexcept { return pressure_256th_pa / 256.0; }
   [[nodiscard]] double relative_humidity() const noexcept { return humidity_1024th_rh / 102400.0; }

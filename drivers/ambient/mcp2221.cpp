@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <thread>
+#include <utility>
 
 #include "base/error.hpp"
 
@@ -33,27 +34,21 @@ constexpr std::uint8_t kDivider100kHz = 12'000'000 / 100'000 - 3;
 constexpr std::uint8_t kIdle = 0x00, kBusy = 0x01, kAddressNack = 0x25, kPartialData = 0x41, kWritingNoStop = 0x45,
                        kReadPartial = 0x54, kReadComplete = 0x55, kReadError = 127;
 
+/// By state of the engine.
+constexpr std::pair<std::uint8_t, const char*> kMeanings[] = {{0x12, "no start condition: the bus is held low"},
+                                                              {0x17, "no start condition: the bus is held low"},
+                                                              {0x21, "no device answers at this address"},
+                                                              {kAddressNack, "no device answers at this address"},
+                                                              {0x23, "the address took too long"},
+                                                              {0x44, "the write took too long"},
+                                                              {0x52, "the read took too long"},
+                                                              {0x62, "no stop condition: the bus is held low"},
+                                                              {kBusy, "the bridge stays busy"}};
+
 const char* meaning(std::uint8_t engine_state) noexcept {
-  switch (engine_state) {
-    case 0x12:
-    case 0x17:
-      return "no start condition: the bus is held low";
-    case 0x21:
-    case kAddressNack:
-      return "no device answers at this address";
-    case 0x23:
-      return "the address took too long";
-    case 0x44:
-      return "the write took too long";
-    case 0x52:
-      return "the read took too long";
-    case 0x62:
-      return "no stop condition: the bus is held low";
-    case kBusy:
-      return "the bridge stays busy";
-    default:
-      return "the bridge reports an error";
-  }
+  for (const auto& [state, words] : kMeanings)
+    if (state == engine_state) return words;
+  return "the bridge reports an error";
 }
 
 }  // namespace

@@ -8,7 +8,6 @@
 namespace kphi::scpi {
 namespace {
 
-constexpr std::size_t kLongestAnswer = 65536;
 constexpr std::string_view kTcp = "scpi-tcp", kUsb = "scpi-usb";
 constexpr std::uint16_t kUsualPort = 5025;
 
@@ -38,19 +37,13 @@ void Tcp::connect() {
 }
 
 void Tcp::write(std::string_view command) {
-  if (!connection_) {
-    ++counters_.recoveries;
-    connect();
-  }
+  if (!connection_) connect();
   carry_out(command, [&] { connection_->send(std::string(command) + "\n"); });
 }
 
 std::string Tcp::query(std::string_view command) {
-  if (!received_.empty()) {
-    // Unrequested bytes: they are not the answer to this query.
-    ++counters_.damaged;
-    connection_.reset();
-  }
+  // Unrequested bytes are not the answer to this query.
+  if (!received_.empty()) connection_.reset();
   write(command);
   std::size_t end = std::string::npos;
   carry_out(command, [&] {
@@ -58,10 +51,7 @@ std::string Tcp::query(std::string_view command) {
       if (!connection_->receive(received_)) throw TcpError(TcpError::Cause::other, "it has closed the connection");
     }
   });
-  if (end == std::string::npos) {
-    ++counters_.damaged;
-    fail(command, "the answer does not end", "");
-  }
+  if (end == std::string::npos) fail(command, "the answer does not end", "");
   std::string answer = received_.substr(0, end);
   received_.erase(0, end + 1);
   while (!answer.empty() && answer.back() == '\r') answer.pop_back();
@@ -74,10 +64,9 @@ void Tcp::carry_out(std::string_view operation, Work&& work) {
     connection_->allow(timeout_);
     work();
   } catch (const TcpError& error) {
-    if (error.cause != TcpError::Cause::timeout)
-      fail(operation, error.what(), "check its power and its network address");
-    ++counters_.timeouts;
-    fail(operation, error.what(), "check that the instrument knows this command");
+    fail(operation, error.what(),
+         error.cause == TcpError::Cause::timeout ? "check that the instrument knows this command"
+                                                 : "check its power and its network address");
   }
 }
 

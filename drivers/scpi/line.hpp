@@ -17,12 +17,7 @@
 
 namespace kphi::scpi {
 
-/// None of these reaches the caller as an answer.
-struct LineCounters {
-  std::uint64_t timeouts = 0;
-  std::uint64_t damaged = 0;     ///< wrong tag, wrong header, too long
-  std::uint64_t recoveries = 0;  ///< the line was restored: abort, clear, or a new connection
-};
+inline constexpr std::size_t kLongestAnswer = 65536;  ///< bytes; none that kphi asks for is longer
 
 class Line {
  public:
@@ -33,7 +28,6 @@ class Line {
   /// The answer without its end of line.
   [[nodiscard]] virtual std::string query(std::string_view command) = 0;
   [[nodiscard]] virtual const std::string& name() const noexcept = 0;
-  [[nodiscard]] virtual LineCounters counters() const noexcept = 0;
 };
 
 /// A plain TCP connection, port 5025 by custom.
@@ -46,7 +40,6 @@ class Tcp final : public Line {
   void write(std::string_view command) override;
   [[nodiscard]] std::string query(std::string_view command) override;
   [[nodiscard]] const std::string& name() const noexcept override { return name_; }
-  [[nodiscard]] LineCounters counters() const noexcept override { return counters_; }
 
  private:
   void connect();
@@ -60,7 +53,6 @@ class Tcp final : public Line {
   const std::string name_;
   std::optional<TcpClient> connection_;
   std::string received_;
-  LineCounters counters_;
 };
 
 /// The Test and Measurement Class of USB with its USB488 subclass.
@@ -75,7 +67,6 @@ class Usbtmc : public Line {
   void write(std::string_view command) override;
   [[nodiscard]] std::string query(std::string_view command) override;
   [[nodiscard]] const std::string& name() const noexcept override { return transport_.name(); }
-  [[nodiscard]] LineCounters counters() const noexcept override { return counters_; }
 
  private:
   void find_endpoints();
@@ -95,7 +86,6 @@ class Usbtmc : public Line {
   bool remote_local_ = false;  ///< RL1 of GET_CAPABILITIES (USBTMC 4.2.1.8, USB488 4.2.2): REN, go to local
   std::uint8_t tag_ = 0;
   bool out_of_order_ = false;  ///< clear before the next command
-  LineCounters counters_;
 };
 
 [[nodiscard]] bool is_scpi(std::string_view uri) noexcept;

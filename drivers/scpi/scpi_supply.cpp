@@ -61,7 +61,6 @@ ScpiSupply::ScpiSupply(std::unique_ptr<Line> line, const Clock& clock) : line_(s
   dialect_ = &dialect_of(who);
   identity_ = {fmt::format("supply {} on {}", fields[1], line_->name()), fields[1], fields[2], fields[3]};
   forget_errors();
-  identity_.voltage_step_v = identity_.current_step_a = kStep;
   identity_.voltage_max_v = ask("VOLT? MAX");
   identity_.current_max_a = ask("CURR? MAX");
   if (identity_.voltage_max_v <= 0 || identity_.current_max_a <= 0)
@@ -105,15 +104,6 @@ void ScpiSupply::switch_output(bool on) {
   if ((ask("OUTP?") != 0) != on) fail("OUTP", on ? "the output stays off" : "the output stays on", "switch it by hand");
 }
 
-supply::Counters ScpiSupply::counters() const noexcept {
-  supply::Counters counters = counters_;
-  const auto [timeouts, damaged, recoveries] = line_->counters();
-  counters.timeouts = timeouts;
-  counters.damaged += damaged;
-  counters.flushes = recoveries;
-  return counters;
-}
-
 /// The oldest error in the instrument's queue, taken out of it; empty: none. Errors of the conversation (-400 to -499:
 /// a query interrupted or not fetched) blame no command and are skipped.
 std::string ScpiSupply::next_error() {
@@ -134,11 +124,9 @@ void ScpiSupply::forget_errors() {
 }
 
 void ScpiSupply::tell(const std::string& command) {
-  ++counters_.requests;
   line_->write(command);
   const std::string error = next_error();
   if (error.empty()) return;
-  ++counters_.refused;
   forget_errors();
   fail(command, "the instrument answers " + error, "check the ranges of the instrument");
 }
@@ -147,20 +135,12 @@ void ScpiSupply::set(std::string_view command, double value) {
   tell(fmt::format("{} {}", command, number_text(value, kStep)));
 }
 
-std::string ScpiSupply::query(std::string_view command) {
-  ++counters_.requests;
-  std::string answer = line_->query(command);
-  ++counters_.replies;
-  return answer;
-}
-
 double ScpiSupply::ask(std::string_view command) {
-  const std::string answer = query(command);
+  const std::string answer = line_->query(command);
   // OUTP? answers 0 and 1, or ON and OFF.
   if (answer == "ON") return 1;
   if (answer == "OFF") return 0;
   if (const auto number = number_of(answer)) return *number;
-  ++counters_.damaged;
   fail(command, "\"" + answer + "\" is not a number");
 }
 
@@ -168,12 +148,11 @@ double ScpiSupply::ask_within(std::string_view command, double most) {
   const double value = ask(command);
   // Converters show a few counts below zero.
   if (value >= -0.01 * most && value <= most * kMarginOfReading) return value;
-  ++counters_.implausible;
   fail(command, fmt::format("reading {:g} is impossible: its maximum is {:g}", value, most));
 }
 
 bool ScpiSupply::tripped(std::string_view command) {
-  const std::string answer = query(command);
+  const std::string answer = line_->query(command);
   return answer == "1" || answer == "YES";
 }
 
@@ -183,7 +162,7 @@ supply::Regulation ScpiSupply::regulation() {
     const auto bits = static_cast<unsigned>(ask_within(dialect_->regulation, 32767 / kMarginOfReading));
     return (bits & 2u) != 0 ? Regulation::constant_current : Regulation::constant_voltage;
   }
-  const std::string answer = query(dialect_->regulation);
+  const std::string answer = line_->query(dialect_->regulation);
   if (answer == "CV") return Regulation::constant_voltage;
   return answer == "CC" ? Regulation::constant_current : Regulation::unknown;
 }

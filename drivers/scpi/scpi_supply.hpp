@@ -22,7 +22,6 @@ class ScpiSupply final : public supply::Supply {
   supply::Limits apply(const supply::Limits& limits) override;
   [[nodiscard]] supply::Reading read() override;
   void switch_off() override { switch_output(false); }
-  [[nodiscard]] supply::Counters counters() const noexcept override;
 
  private:
   struct Dialect;
@@ -33,7 +32,6 @@ class ScpiSupply final : public supply::Supply {
   void forget_errors();
   void tell(const std::string& command);
   void set(std::string_view command, double value);
-  [[nodiscard]] std::string query(std::string_view command);
   [[nodiscard]] double ask(std::string_view command);
   [[nodiscard]] double ask_within(std::string_view command, double most);
   [[nodiscard]] bool tripped(std::string_view command);
@@ -44,7 +42,6 @@ class ScpiSupply final : public supply::Supply {
   const Clock& clock_;
   supply::Identity identity_;
   const Dialect* dialect_ = nullptr;
-  supply::Counters counters_;
 };
 
 /// Throws as open_line() does. `clock` outlives it.

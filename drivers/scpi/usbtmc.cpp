@@ -28,7 +28,6 @@ constexpr usb::Transport::Timeout kControlTimeout = 500ms, kDrainTimeout = 20ms;
 // A host must have room for complete packets, of 64, 512 or 1024 bytes: header and data fill four of the largest.
 constexpr std::size_t kRoom = 4096;
 constexpr std::uint32_t kPart = kRoom - usbtmc::kHeaderBytes;  // bytes asked for at once
-constexpr std::size_t kLongestAnswer = 65536;                  // no answer used here is longer
 
 /// They claim remote/local but hang on REN.
 struct Choker {
@@ -100,10 +99,7 @@ void Usbtmc::clear() {
 }
 
 void Usbtmc::write(std::string_view command) {
-  if (out_of_order_) {
-    ++counters_.recoveries;
-    clear();
-  }
+  if (out_of_order_) clear();
   tag_ = usbtmc::next_tag(tag_);
   const auto message = usbtmc::message_out(tag_, std::string(command) + "\n");
   const usb::Transfer sent = transport_.write(out_, message, timeout_);
@@ -119,7 +115,6 @@ std::string Usbtmc::query(std::string_view command) {
   while (!receive_part(answer, first)) {
     first = false;
     if (answer.size() <= kLongestAnswer) continue;
-    ++counters_.damaged;
     out_of_order_ = true;
     fail(command, "the answer does not end");
   }
@@ -146,7 +141,6 @@ bool Usbtmc::receive_part(std::string& answer, bool may_be_empty) {
   const auto header = usbtmc::answer_header(std::span(buffer).first(got.bytes), tag_);
   const bool goes_nowhere = header && header->bytes == 0 && !header->end_of_message;
   if (!header || header->bytes > kPart || goes_nowhere) {
-    ++counters_.damaged;
     recover(in_, got.outcome);
     fail("read the answer",
          goes_nowhere ? "the answer is empty and does not end" : "the reply belongs to another request");
@@ -169,9 +163,7 @@ bool Usbtmc::receive_part(std::string& answer, bool may_be_empty) {
 void Usbtmc::recover(const usb::Endpoint& endpoint, usb::Outcome outcome) noexcept {
   out_of_order_ = true;
   if (outcome == usb::Outcome::gone) return;
-  const bool late = outcome == usb::Outcome::timed_out;
-  if (late) ++counters_.timeouts;
-  if (late || endpoint.in()) abort(endpoint);
+  if (outcome == usb::Outcome::timed_out || endpoint.in()) abort(endpoint);
   (void)transport_.clear_halt(endpoint);
 }
 

@@ -55,20 +55,12 @@ std::string advice_for_missing() {
 }
 
 std::string advice_for(int error, const std::string& device) {
-  switch (error) {
-    case ENOENT:
-    case ENODEV:
-    case ENXIO:
-      return advice_for_missing();
-    case EACCES:
-    case EPERM:
-      return "join the group dialout (usermod -aG dialout $USER as root) and log in again";
-    case EBUSY:
-    case EWOULDBLOCK:
-      return fmt::format("close the other program; 'fuser -v {}' names it", device);
-    default:
-      return "check the device and its cable";
-  }
+  if (error == ENOENT || error == ENODEV || error == ENXIO) return advice_for_missing();
+  if (error == EACCES || error == EPERM)
+    return "join the group dialout (usermod -aG dialout $USER as root) and log in again";
+  if (error == EBUSY || error == EWOULDBLOCK)
+    return fmt::format("close the other program; 'fuser -v {}' names it", device);
+  return "check the device and its cable";
 }
 
 std::string words_for(int error) {
@@ -246,13 +238,6 @@ Adapter* follow(fs::path path, std::vector<Adapter>& adapters) {
   return nullptr;
 }
 
-void name_by_id(std::vector<Adapter>& adapters, const Roots& roots) {
-  std::error_code none;
-  for (const auto& link : fs::directory_iterator(roots.dev / "serial/by-id", none)) {
-    if (Adapter* adapter = follow(link.path(), adapters)) adapter->by_id = link.path();
-  }
-}
-
 std::string list(const std::vector<Adapter>& adapters) {
   std::string text;
   for (const Adapter& adapter : adapters) text += (text.empty() ? "" : ", ") + adapter.line();
@@ -288,7 +273,6 @@ std::vector<Adapter> adapters(const Roots& roots) {
     if (auto adapter = look_up_from(folder, roots)) found.push_back(std::move(*adapter));
   }
   std::sort(found.begin(), found.end(), [](const Adapter& a, const Adapter& b) { return a.device < b.device; });
-  name_by_id(found, roots);
   return found;
 }
 

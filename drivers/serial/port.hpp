@@ -85,7 +85,6 @@ struct Roots {
 /// A serial port behind USB.
 struct Adapter {
   std::filesystem::path device;  ///< /dev/ttyUSB0
-  std::filesystem::path by_id;   ///< a name that does not depend on the socket; empty: udev made none
   std::uint16_t vendor = 0, product = 0;
   std::string serial;                   ///< empty: the adapter has none (CH340)
   std::string words;                    ///< maker and product, from the adapter

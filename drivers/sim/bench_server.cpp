@@ -2,12 +2,12 @@
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
-#include <sys/eventfd.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 
 #include <algorithm>
 #include <array>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -21,11 +21,6 @@ namespace {
 constexpr std::chrono::milliseconds kWakeUp{1};  // wall time
 constexpr int kCatchUp = 8;                      // bench time per wake-up, in wake-ups
 
-[[noreturn]] void refuse(const std::string& where, const std::string& operation, const std::string& cause,
-                         const std::string& next_move) {
-  throw DeviceError("simulated bench " + where, operation, cause, next_move);
-}
-
 Peer peer_of(const sockaddr_in& address) noexcept {
   return static_cast<Peer>(address.sin_addr.s_addr) << 16 | address.sin_port;
 }
@@ -38,31 +33,27 @@ sockaddr_in address_of(Peer peer) noexcept {
   return address;
 }
 
-bool answers(const sockaddr_un& address) {
-  const Descriptor probe(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  return ::connect(probe.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
-}
-
 Descriptor listen_for_control(const std::string& path) {
-  const auto found = unix_address(path);
-  if (!found) {
-    refuse("control \"" + path + "\"", "open control line", "the path is empty or longer than a socket path may be",
-           "set simulation.control in the bench file");
+  using boost::asio::local::stream_protocol;
+  const auto refused = [&](const std::string& cause, const char* next_move) {
+    return DeviceError("simulated bench " + path, "open control line", cause, next_move);
+  };
+  boost::asio::io_context io;
+  boost::system::error_code error;
+  try {
+    std::error_code none;
+    std::filesystem::create_directories(std::filesystem::path(path).parent_path(), none);
+    if (std::filesystem::is_socket(path, none)) {
+      if (!stream_protocol::socket(io).connect(path, error))
+        throw refused("another simulator answers there", "stop it first");
+      ::unlink(path.c_str());
+    }
+    stream_protocol::acceptor acceptor(io, path);
+    acceptor.native_non_blocking(true);
+    return Descriptor(acceptor.release());
+  } catch (const boost::system::system_error& failure) {
+    throw refused(failure.code().message(), "set simulation.control in the bench file to a free path");
   }
-  const sockaddr_un& address = *found;
-  std::error_code error;
-  const auto folder = std::filesystem::path(path).parent_path();
-  std::filesystem::create_directories(folder, error);
-  if (std::filesystem::is_socket(path, error)) {
-    if (answers(address)) refuse(path, "open control line", "another simulator answers there", "stop it first");
-    ::unlink(path.c_str());
-  }
-  Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-  if (::bind(socket.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-      ::listen(socket.number(), 16) != 0) {
-    refuse(path, "open control line", std::strerror(errno), "set simulation.control in the bench file to a free path");
-  }
-  return socket;
 }
 
 }  // namespace
@@ -72,18 +63,23 @@ Server::Server(const ServerSettings& settings)
       addresses_(settings),
       bench_(settings.bench),
       keep_motion_(settings.bench.motor_keep == IqLine::Keep::replies),
-      stop_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
       rdt_(listen_at(settings.host, SOCK_DGRAM, settings.rdt_port)),
       foreign_(listen_at(settings.host, SOCK_DGRAM, 0)),
       web_(listen_at(settings.host, SOCK_STREAM, settings.http_port)),
       coarse_(listen_at(settings.host, SOCK_STREAM, settings.tcp_port)),
       pty_(settings.device, settings.bench.module.baud),
-      http_(std::move(web_.socket), {"\r\n\r\n", true, 1},
-            [this](std::string_view request) { return in_wall_time(bench_.wire().http(request, reached_)); }),
+      http_(std::move(web_.socket), 1,
+            each_question("\r\n\r\n",
+                          [this](std::string_view request) {
+                            StreamReply page = in_wall_time(bench_.wire().http(request, reached_));
+                            page.close = true;
+                            return page;
+                          })),
       tcp_(std::move(coarse_.socket), 4,
            [this](std::string& heard) { return in_wall_time(bench_.wire().tcp(heard, reached_)); }),
-      control_(listen_for_control(control_path(settings.control)), {"\n", false, 16},
-               [this](std::string_view line) { return StreamReply{control_answer(bench_, line) + "\n"}; }),
+      control_(listen_for_control(control_path(settings.control)), 16,
+               each_question(
+                   "\n", [this](std::string_view line) { return StreamReply{control_answer(bench_, line) + "\n"}; })),
       present_host_(settings.host),
       last_wanted_(settings.host) {
   addresses_.rdt_port = rdt_.port;
@@ -102,13 +98,9 @@ Server::Server(const ServerSettings& settings)
 
 Server::~Server() { ::unlink(addresses_.control.c_str()); }
 
-void Server::request_stop() noexcept {
-  const std::uint64_t one = 1;
-  [[maybe_unused]] const ssize_t written = ::write(stop_.number(), &one, sizeof one);
-}
-
 std::vector<pollfd> Server::polls() const {
-  std::vector<pollfd> all{{stop_.number(), POLLIN, 0}, {rdt_.socket.number(), POLLIN, 0}, {pty_.number(), POLLIN, 0}};
+  std::vector<pollfd> all{
+      {stop_.descriptor(), POLLIN, 0}, {rdt_.socket.number(), POLLIN, 0}, {pty_.number(), POLLIN, 0}};
   http_.append_polls(all);
   tcp_.append_polls(all);
   control_.append_polls(all);

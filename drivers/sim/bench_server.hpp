@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/clock.hpp"
-#include "base/descriptor.hpp"
+#include "base/wakeup.hpp"
 #include "drivers/sim/simulated_bench.hpp"
 #include "drivers/sim/supply/port.hpp"
 #include "drivers/sim/transport/conversations.hpp"
@@ -54,7 +54,7 @@ class Server {
   /// Runs the bench until request_stop(). After a stall it catches up at most eight times as fast as time passes.
   void run();
   /// Thread-safe and signal-safe.
-  void request_stop() noexcept;
+  void request_stop() noexcept { stop_.raise(); }
   /// What the fault script did; after run().
   [[nodiscard]] const WireTruth& truth() noexcept { return bench_.wire().truth(); }
   [[nodiscard]] const IqTruth& motor_truth() noexcept { return bench_.motor_line().truth(); }
@@ -80,7 +80,7 @@ class Server {
   SimulatedBench bench_;
   const bool keep_motion_;
   MotionLog motion_;
-  Descriptor stop_;
+  Wakeup stop_;
   Listening rdt_;
   Listening foreign_;  ///< sends datagrams that a script makes come from another address
   Listening web_;

@@ -1,11 +1,9 @@
 #include "drivers/sim/control_line.hpp"
 
 #include <fmt/format.h>
-#include <sys/socket.h>
 
-#include <array>
-#include <cerrno>
-#include <cstring>
+#include <boost/asio/local/stream_protocol.hpp>
+#include <chrono>
 #include <filesystem>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -13,10 +11,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "base/descriptor.hpp"
 #include "base/error.hpp"
 #include "base/number.hpp"
-#include "drivers/sim/transport/conversations.hpp"
 #include "drivers/sim/truth_log.hpp"
 
 namespace kphi::sim {
@@ -69,7 +65,9 @@ std::string fail(SimulatedBench& bench, std::vector<std::string> words) {
     entry[words[i].substr(0, equals)] = words[i].substr(equals + 1);
   }
   try {
-    bench.supply()->add_fault(supply_faults().read(entry));
+    const Fault fault = fault_of(entry);
+    if (!on_supply(fault.kind)) return "error only faults of the supply can be added";
+    bench.supply()->add_fault(fault);
   } catch (const FaultEntryError& error) {
     return std::string("error ") + error.what();
   }
@@ -92,32 +90,20 @@ std::string control_path(const std::string& configured) {
 }
 
 std::string tell(const std::string& path, const std::string& line) {
-  const auto refuse = [&](const char* operation, const std::string& cause) -> DeviceError {
-    return {"simulated bench " + path, operation, cause, "start it with: kphi sim BENCH"};
-  };
-  const auto address = unix_address(path);
-  if (!address) throw refuse("connect", "the path is empty or longer than a socket path may be");
-  const Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  const timeval patience{3, 0};
-  ::setsockopt(socket.number(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-  if (::connect(socket.number(), reinterpret_cast<const sockaddr*>(&*address), sizeof *address) != 0) {
-    throw refuse("connect", std::strerror(errno));
+  using boost::asio::local::stream_protocol;
+  stream_protocol::iostream simulator;
+  simulator.expires_after(std::chrono::seconds(3));
+  const char* step = "connect";
+  try {
+    simulator.connect(stream_protocol::endpoint(path));
+    if (simulator) step = "wait for an answer";
+    simulator << line << std::endl;
+    std::string answer;
+    if (std::getline(simulator, answer) && !simulator.eof()) return answer;
+    throw boost::system::system_error(simulator.error());
+  } catch (const boost::system::system_error& error) {
+    throw DeviceError("simulated bench " + path, step, error.code().message(), "start it with: kphi sim BENCH");
   }
-  const std::string question = line + "\n";
-  if (::send(socket.number(), question.data(), question.size(), MSG_NOSIGNAL) !=
-      static_cast<ssize_t>(question.size())) {
-    throw refuse("send", std::strerror(errno));
-  }
-  std::string answer;
-  std::array<char, 512> bytes{};
-  while (answer.find('\n') == std::string::npos) {
-    const ssize_t count = ::recv(socket.number(), bytes.data(), bytes.size(), 0);
-    if (count < 0 && errno == EINTR) continue;
-    if (count == 0) throw refuse("wait for an answer", "the connection was closed");
-    if (count < 0) throw refuse("wait for an answer", std::strerror(errno));
-    answer.append(bytes.data(), static_cast<std::size_t>(count));
-  }
-  return answer.substr(0, answer.find('\n'));
 }
 
 }  // namespace kphi::sim

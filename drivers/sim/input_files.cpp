@@ -69,26 +69,12 @@ NetBoxQuirks read_quirks(const YAML::Node& node, const std::string& path) {
   return quirks;
 }
 
-void add_fault(const FaultEntry& entry, FaultFile& file) {
-  const auto found = entry.find("kind");
-  const std::string kind = found == entry.end() ? "" : found->second;
-  if (kind.starts_with("motor_")) {
-    file.motor.push_back(motor_faults().read(entry));
-  } else if (kind.starts_with("supply_")) {
-    file.supply.push_back(supply_faults().read(entry));
-  } else if (kind.starts_with("ambient_")) {
-    file.air.push_back(ambient_faults().read(entry));
-  } else {
-    file.load_cell.push_back(load_cell_faults().read(entry));
-  }
-}
-
-void read_fault(const YAML::Node& node, const std::string& path, FaultFile& file) {
+Fault read_fault(const YAML::Node& node, const std::string& path) {
   FaultEntry entry;
   const Members all = members(node, path);
   for (const auto& [key, value] : all) entry[key] = scalar(key, value, path);
   try {
-    add_fault(entry, file);
+    return fault_of(entry);
   } catch (const FaultEntryError& error) {
     const auto at = all.find(error.key);
     refuse(path, at == all.end() ? node.Mark() : at->second.Mark(), error.what(), "fix this entry");
@@ -113,7 +99,7 @@ constexpr MotorRow row(std::string_view section, std::string_view name, double l
 }
 
 using M = MotorParameters;
-using S = IqSensorErrors;
+using E = IqSensorErrors;
 constexpr std::array kRows{
     row<&M::torque_constant>("motor", "torque_constant_nm_a", 1e-4, 1),
     row<&M::resistance>("motor", "resistance_ohm", 1e-3, 10),
@@ -140,13 +126,13 @@ constexpr std::array kRows{
     row<&M::controller_seconds>("heat", "controller_time_constant_s", 0.1, 1e5),
     row<&M::controller_own_warmth>("heat", "controller_own_warmth_degc", 0, 100),
     row<&M::ambient_celsius>("heat", "ambient_degc", -40, 80),
-    row<&S::volts_gain>("sensors", "voltage_gain_error_relative", -0.5, 0.5),
-    row<&S::amps_gain>("sensors", "current_gain_error_relative", -0.5, 0.5),
-    row<&S::amps_bias>("sensors", "current_bias_ticks", -1000, 1000),
-    row<&S::converter_noise>("sensors", "converter_noise_ticks", 0, 1000),
-    row<&S::speed_noise>("sensors", "speed_noise_rad_s", 0, 1000),
-    row<&S::speed_filter_hz>("sensors", "speed_filter_hz", 0, 1e5),
-    row<&S::controller_noise>("sensors", "controller_noise_degc", 0, 50),
+    row<&E::volts_gain>("sensors", "voltage_gain_error_relative", -0.5, 0.5),
+    row<&E::amps_gain>("sensors", "current_gain_error_relative", -0.5, 0.5),
+    row<&E::amps_bias>("sensors", "current_bias_ticks", -1000, 1000),
+    row<&E::converter_noise>("sensors", "converter_noise_ticks", 0, 1000),
+    row<&E::speed_noise>("sensors", "speed_noise_rad_s", 0, 1000),
+    row<&E::speed_filter_hz>("sensors", "speed_filter_hz", 0, 1e5),
+    row<&E::controller_noise>("sensors", "controller_noise_degc", 0, 50),
 };
 
 void read_section(const std::string& section, const YAML::Node& node, const std::string& path, MotorProfile& profile) {
@@ -157,7 +143,7 @@ void read_section(const std::string& section, const YAML::Node& node, const std:
     if (found == kRows.end())
       refuse(path, value.Mark(), fmt::format("{} has no key \"{}\"", section, key), "see profiles/motor_iq2306.yaml");
     try {
-      found->of(profile) = fault_number(key, scalar(key, value, path), {found->low, found->high});
+      found->of(profile) = fault_number(key, scalar(key, value, path), found->low, found->high);
     } catch (const FaultEntryError& error) {
       refuse(path, value.Mark(), fmt::format("{}: {}", key, error.what()), "fix this value");
     }
@@ -176,20 +162,17 @@ FaultFile parse_faults(const std::string& text, const std::string& path) {
   const auto faults = all.find("faults");
   if (faults == all.end() || !faults->second.IsSequence())
     refuse(path, {}, "there is no list of faults", "write faults: and a list of entries, or []");
-  for (const auto& entry : faults->second) read_fault(entry, path, file);
+  for (const auto& entry : faults->second) file.faults.push_back(read_fault(entry, path));
   if (const auto quirks = all.find("quirks"); quirks != all.end()) file.quirks = read_quirks(quirks->second, path);
   return file;
 }
 
 void load_faults(const std::string& text, const std::string& path, BenchSettings& bench) {
   FaultFile file = parse_faults(text, path);
-  if (!bench.supply && !file.supply.empty())
+  if (!bench.supply && std::ranges::any_of(file.faults, [](const Fault& f) { return on_supply(f.kind); }))
     throw ConfigurationError(path + ": faults of the supply, but the bench file has no supply:; remove them");
-  bench.faults = std::move(file.load_cell);
+  bench.faults = std::move(file.faults);
   bench.netbox.quirks = file.quirks;
-  bench.motor_faults = std::move(file.motor);
-  bench.air_faults = std::move(file.air);
-  if (bench.supply) bench.supply->faults = std::move(file.supply);
 }
 
 MotorProfile parse_motor_profile(const std::string& text, const std::string& path) {

@@ -24,10 +24,7 @@
 namespace kphi::sim {
 
 struct FaultFile {
-  FaultScript load_cell;
-  MotorFaultScript motor;
-  SupplyFaultScript supply;
-  UsbFaultScript air;
+  FaultScript faults;
   NetBoxQuirks quirks;
 };
 

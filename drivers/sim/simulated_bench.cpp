@@ -16,7 +16,6 @@ constexpr std::uint64_t kModuleStream = 0x2545f491'4f6cdd1dull;
 
 IqSettings module_of(const BenchSettings& settings) {
   IqSettings module = settings.module;
-  module.module_id = settings.module_id;
   module.oscillator_gain = settings.oscillator_gain;
   module.time_scale = settings.time_scale;
   module.seed = settings.seed ^ kModuleStream;
@@ -41,12 +40,14 @@ SimulatedBench::SimulatedBench(const BenchSettings& settings)
       netbox_(settings.netbox),
       wire_(netbox_, settings.faults, settings.seed ^ kWireStream, settings.keep),
       motor_(module_of(settings), plant_.motor()),
-      motor_line_(motor_, {settings.motor_line_paced, settings.time_scale, settings.motor_usb_tick},
-                  settings.motor_faults, settings.seed ^ kLineStream, settings.motor_keep),
+      motor_line_(motor_, {settings.motor_line_paced, settings.time_scale, settings.motor_usb_tick}, settings.faults,
+                  settings.seed ^ kLineStream, settings.motor_keep),
       ticks_(ticks_before(settings.begin)),
       tick_at_(time_of_tick(ticks_)) {
   if (!settings.supply) return;
-  supply_.emplace(*settings.supply);
+  SupplySettings supply = *settings.supply;
+  supply.faults = settings.faults;
+  supply_.emplace(supply);
   plant_.power([this](double amps, double siemens) { return supply_->advance({amps, siemens}, tick_at_); });
 }
 

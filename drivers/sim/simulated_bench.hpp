@@ -24,19 +24,16 @@ struct BenchSettings {
   Instant begin{0};       ///< bench time at which it is switched on
   double time_scale = 1;  ///< stretches the module's communication timeout, nothing else: it is a deadline of wall time
   NetBoxSettings netbox;
-  int module_id = 0;
   double oscillator_gain = 0;  ///< see IqSettings; 0 unless asked for
-  IqSettings module;           ///< its module_id, oscillator_gain, time_scale and seed are replaced by those above
+  IqSettings module;           ///< its oscillator_gain, time_scale and seed are replaced by those above
   PlantParameters plant;
   std::optional<SupplySettings> supply;  ///< powers the motor, off at first; nullopt: the supply of plant.motor
-  FaultScript faults;                    ///< of the load cell's wire and box; drawn from `seed`
+  FaultScript faults;                    ///< of all devices; drawn from `seed`
   FaultInjector::Keep keep = FaultInjector::Keep::totals;
   bool motor_line_paced = false;  ///< see IqLineSettings
   Duration motor_usb_tick{0};     ///< see IqLineSettings
-  MotorFaultScript motor_faults;  ///< of the motor's line, module and supply; drawn from `seed`
   IqLine::Keep motor_keep = IqLine::Keep::totals;
-  TrueAir air{18, 102689, 0.45};  ///< around its sensor; 1.225 kg/m³
-  UsbFaultScript air_faults;      ///< of that sensor, its bridge and their USB
+  TrueAir air{18, 102689, 0.45};  ///< around its sensor, which the bench itself does not have; 1.225 kg/m³
 };
 
 class SimulatedBench {

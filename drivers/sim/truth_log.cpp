@@ -36,21 +36,21 @@ constexpr Total kTotals[] = {
     {"to_others", &T::to_others},
     {"records_to_others", &T::records_to_others},
     {"starts", &T::starts},
-    {"starts_lost", &T::starts_lost},
-    {"starts_doubled", &T::starts_doubled},
-    {"starts_delayed", &T::starts_delayed},
     {"unheard", &T::unheard},
-    {"takeovers", &T::takeovers},
     {"restarts", &T::restarts},
     {"reboots", &T::reboots},
-    {"stalls", &T::stalls},
-    {"jumps", &T::jumps},
-    {"overruns", &T::overruns},
-    {"rate_changes", &T::rate_changes},
-    {"moves", &T::moves},
-    {"http_spoilt", &T::http_spoilt},
-    {"tcp_spoilt", &T::tcp_spoilt},
 };
+
+void add_done(ordered_json& totals, const std::map<FaultKind, std::uint64_t>& done) {
+  for (const auto& [kind, count] : done) totals[std::string(name_of(kind))] = count;
+}
+
+ordered_json totals_of(const WireTruth& truth) {
+  ordered_json totals;
+  for (const Total& total : kTotals) totals[total.name] = truth.*total.member;
+  add_done(totals, truth.done);
+  return totals;
+}
 
 std::string_view name_of(PowerStage::Mode mode) noexcept {
   constexpr std::array<std::string_view, 3> kNames{"coast", "brake", "drive"};
@@ -70,17 +70,15 @@ std::string json_lines(const WireTruth& truth) {
     if (d.first_sample < truth.sampled.size()) line["first_sampled_ns"] = truth.sampled[d.first_sample].count();
     add(lines, line);
   }
-  ordered_json totals;
-  for (const Total& total : kTotals) totals[total.name] = truth.*total.member;
-  add(lines, {{"totals", totals}});
+  add(lines, {{"totals", totals_of(truth)}});
   return lines;
 }
 
 std::string summary(const WireTruth& truth) {
   std::string out;
-  for (const Total& total : kTotals) {
-    if (truth.*total.member > 0)
-      out += fmt::format("{}{} {}", out.empty() ? "" : ", ", total.name, truth.*total.member);
+  const ordered_json totals = totals_of(truth);
+  for (const auto& [name, count] : totals.items()) {
+    if (count != 0) out += fmt::format("{}{} {}", out.empty() ? "" : ", ", name, count.get<std::uint64_t>());
   }
   return out.empty() ? "nothing was sent" : out;
 }
@@ -100,9 +98,7 @@ std::string json_lines(const IqTruth& truth) {
                       {"arrivals", r.arrivals}};
     if (r.arrivals > 0) line["arrived_ns"] = r.arrived.count();
     if (std::isfinite(r.truth)) line["truth"] = r.truth;
-    for (int kind = 0; kind < kMotorFaultKinds; ++kind) {
-      if ((r.done >> kind & 1u) != 0) line["faults"].push_back(name_of(static_cast<MotorFaultKind>(kind)));
-    }
+    for (const FaultKind kind : r.done) line["faults"].push_back(name_of(kind));
     add(lines, line);
   }
   ordered_json totals{{"bytes_from_host", truth.bytes_from_host},
@@ -112,10 +108,7 @@ std::string json_lines(const IqTruth& truth) {
                       {"replies", truth.replies},
                       {"frames_arrived", truth.frames_arrived},
                       {"spoilt", truth.spoilt}};
-  for (int kind = 0; kind < kMotorFaultKinds; ++kind) {
-    const auto count = truth.done[static_cast<std::size_t>(kind)];
-    if (count > 0) totals[std::string(name_of(static_cast<MotorFaultKind>(kind)))] = count;
-  }
+  add_done(totals, truth.done);
   add(lines, {{"motor_totals", totals}});
   return lines;
 }
@@ -127,28 +120,19 @@ std::string_view name_of(MotorDrive::Mode mode) noexcept {
 
 void MotionLog::look(const IqDevice& motor, double speed, Instant now) {
   const IqMotion& motion = motor.last_motion();
-  const bool commanded =
-      motion.at >= Instant{0} && (commands_.empty() || commands_.back().at != motion.at ||
-                                  commands_.back().mode != motion.mode || commands_.back().target != motion.target);
-  if (commanded) commands_.push_back(motion);
+  if (motion.at != command_.at || motion.mode != command_.mode || motion.target != command_.target) {
+    command_ = motion;
+    const char* target = motion.mode == MotorDrive::Mode::velocity ? "target_rad_s" : "target";
+    add(lines_, {{"at_ns", motion.at.count()}, {"motion_command", name_of(motion.mode)}, {target, motion.target}});
+  }
   const PowerStage::Mode mode = motor.stage().mode;
-  if (stages_.empty() || stages_.back().mode != mode) stages_.push_back({now, mode, speed});
+  if (stage_ != mode) add(lines_, {{"at_ns", now.count()}, {"stage", name_of(mode)}, {"speed_rad_s", speed}});
+  stage_ = mode;
 }
 
 void MotionLog::look(const SupplyCircuit& supply, Instant now) {
-  if (outputs_.empty() || outputs_.back().second != supply.output()) outputs_.emplace_back(now, supply.output());
-}
-
-std::string MotionLog::json_lines() const {
-  std::string lines;
-  for (const IqMotion& command : commands_) {
-    const char* target = command.mode == MotorDrive::Mode::velocity ? "target_rad_s" : "target";
-    add(lines, {{"at_ns", command.at.count()}, {"motion_command", name_of(command.mode)}, {target, command.target}});
-  }
-  for (const Stage& stage : stages_)
-    add(lines, {{"at_ns", stage.at.count()}, {"stage", name_of(stage.mode)}, {"speed_rad_s", stage.speed}});
-  for (const auto& [at, on] : outputs_) add(lines, {{"at_ns", at.count()}, {"supply_output", on}});
-  return lines;
+  if (output_ != supply.output()) add(lines_, {{"at_ns", now.count()}, {"supply_output", supply.output()}});
+  output_ = supply.output();
 }
 
 }  // namespace kphi::sim

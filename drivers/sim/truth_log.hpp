@@ -1,10 +1,9 @@
 // What truly happened on a simulated bench, as text: `kphi sim --truth-log`. One JSON object per line, bench time.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
-#include <vector>
 
 #include "drivers/sim/iq/line.hpp"
 #include "drivers/sim/netbox/fault_injector.hpp"
@@ -29,20 +28,17 @@ class MotionLog {
   void look(const IqDevice& motor, double speed, Instant now);
   /// The same for the output of the supply.
   void look(const SupplyCircuit& supply, Instant now);
-  /// {"at_ns", "motion_command": "velocity", "target_rad_s"}, other modes with
-  /// their plain "target"; {"at_ns", "stage": "drive", "speed_rad_s"}, the stage is what the physics obeys;
-  /// {"at_ns", "supply_output": true}.
-  [[nodiscard]] std::string json_lines() const;
+  /// In the order of the looks: {"at_ns", "motion_command": "velocity", "target_rad_s"}, other modes with their plain
+  /// "target"; {"at_ns", "stage": "drive", "speed_rad_s"}, the stage is what the physics obeys; {"at_ns",
+  /// "supply_output": true}.
+  [[nodiscard]] const std::string& json_lines() const noexcept { return lines_; }
 
  private:
-  struct Stage {
-    Instant at;
-    PowerStage::Mode mode;
-    double speed;
-  };
-  std::vector<IqMotion> commands_;
-  std::vector<Stage> stages_;
-  std::vector<std::pair<Instant, bool>> outputs_;
+  std::string lines_;
+  // As last seen.
+  IqMotion command_{Instant{-1}};
+  std::optional<PowerStage::Mode> stage_;
+  std::optional<bool> output_;
 };
 
 }  // namespace kphi::sim

@@ -22,32 +22,17 @@ constexpr auto kLongestQuiet = std::chrono::seconds(2);
 constexpr double kBitsPerByte = 10, kSilentBytes = 3.5;
 
 Outcome outcome_of(int error) {
-  switch (error) {
-    case ETIMEDOUT:
-      return {Failure::timeout, "no answer"};
-    case EMBBADCRC:
-    case EMBBADDATA:
-    case EMBBADSLAVE:
-    case EMBBADEXC:
-    case EMBUNKEXC:
-      return {Failure::damaged, fmt::format("damaged answer ({})", modbus_strerror(error))};
-    default:
-      break;
-  }
+  if (error == ETIMEDOUT) return {Failure::timeout, "no answer"};
+  for (const int damage : {EMBBADCRC, EMBBADDATA, EMBBADSLAVE, EMBBADEXC, EMBUNKEXC})
+    if (error == damage) return {Failure::damaged, fmt::format("damaged answer ({})", modbus_strerror(error))};
   if (error <= MODBUS_ENOBASE) return {Failure::lost, fmt::format("the line is lost ({})", std::strerror(error))};
   return {error == EMBXSBUSY || error == EMBXACK ? Failure::busy : Failure::refused,
           fmt::format("the device answers \"{}\"", modbus_strerror(error))};
 }
 
 modbus_t* make_context(const Address& address) {
-  if (address.slave < 1 || (address.slave > 247 && address.slave != 255)) {
-    throw std::invalid_argument(fmt::format("{} is not a Modbus address; use 1 to 247", address.slave));
-  }
   if (address.wire == Address::Wire::tcp) {
     return modbus_new_tcp_pi(address.tcp.host.c_str(), std::to_string(address.tcp.port).c_str());
-  }
-  if (!known_baud(address.baud)) {
-    throw std::invalid_argument(fmt::format("{} baud is not a rate that can be set; use 9600 or 115200", address.baud));
   }
   return modbus_new_rtu(address.device.c_str(), static_cast<int>(address.baud), 'N', 8, 1);
 }
@@ -125,7 +110,9 @@ Outcome ModbusLink::outcome(int result, int expected) {
   last_ = steady_clock::now();
   if (result == expected) return {};
   if (result >= 0) return {Failure::damaged, "answer of the wrong length"};
-  return outcome_of(error);
+  Outcome failed = outcome_of(error);
+  if (failed.failure == Failure::lost) close();
+  return failed;
 }
 
 void ModbusLink::fall_silent() {

@@ -43,7 +43,7 @@ struct Outcome {
 
 class ModbusLink {
  public:
-  /// Opens nothing yet. Throws std::invalid_argument for a baud rate or slave that libmodbus must not get.
+  /// Opens nothing yet. `address`: of parse_address().
   ModbusLink(const Address& address, const Timing& timing);
   ~ModbusLink();
   ModbusLink(const ModbusLink&) = delete;
@@ -51,6 +51,8 @@ class ModbusLink {
 
   /// Opens, or reopens. A serial port is opened exclusively.
   [[nodiscard]] Outcome open();
+  /// False also once it was lost.
+  [[nodiscard]] bool is_open() const noexcept { return open_; }
   /// One request, one answer. `block` lies within the image.
   [[nodiscard]] Outcome read(const Block& block, RegisterImage& into);
   /// One register, by function 0x10 if `multiple`, else 0x06.

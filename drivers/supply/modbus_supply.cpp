@@ -60,7 +60,7 @@ const Model* ModbusSupply::ask_model(const RegisterMap& map, std::string& answer
   const char* const join = answers.empty() ? "" : ", ";
   bool refused = false;
   persist("identify", [&] {
-    Outcome outcome = read_block(map.identity);
+    Outcome outcome = link_.read(map.identity, registers_);
     refused = outcome.failure == Failure::refused;
     return refused ? Outcome{} : outcome;
   });
@@ -86,9 +86,7 @@ void ModbusSupply::describe() {
   }
   (void)read();
   identity_.voltage_max_v = model_->max_v;
-  identity_.voltage_step_v = 1 / model_->counts_per_v;
   identity_.current_max_a = range().max_a;
-  identity_.current_step_a = 1 / range().counts_per_a;
 }
 
 Reading ModbusSupply::read() {
@@ -101,15 +99,13 @@ Outcome ModbusSupply::look(Reading& reading) {
   const Instant before = clock_.now();
   for (const Block& block : model_->map->look) {
     if (block.count == 0) continue;
-    if (Outcome outcome = read_block(block); !outcome.ok()) return outcome;
+    if (Outcome outcome = link_.read(block, registers_); !outcome.ok()) return outcome;
   }
   const Instant after = clock_.now();
   reading.at = before + (after - before) / 2;
   reading.uncertainty = (after - before + Duration(1)) / 2;
   const std::string doubt = implausible(reading);
-  if (doubt.empty()) return {};
-  ++counters_.implausible;
-  return {Failure::damaged, doubt};
+  return doubt.empty() ? Outcome{} : Outcome{Failure::damaged, doubt};
 }
 
 const CurrentRange& ModbusSupply::range() const noexcept {
@@ -179,8 +175,8 @@ Limits ModbusSupply::apply(const Limits& limits) {
     s->counts = to_counts(s->value, s->counts_per_unit);
   }
   for (const Setting* s : settings)
-    persist(fmt::format("set {}", s->name), [&] { return write_once(s->at, s->counts, map.write_multiple); });
-  persist("read thresholds", [&] { return read_block(map.thresholds); });
+    persist(fmt::format("set {}", s->name), [&] { return link_.write(s->at, s->counts, map.write_multiple); });
+  persist("read thresholds", [&] { return link_.read(map.thresholds, registers_); });
   (void)read();
   for (const Setting* s : settings) {
     if (registers_[s->at] == s->counts) continue;
@@ -198,7 +194,7 @@ void ModbusSupply::switch_on() {
   if (!limits_applied_) {
     throw DeviceError(identity_.device, "switch on", "its limits are not set", "apply limits first");
   }
-  persist("switch on", [&] { return write_once(model_->map->output, 1, false); });
+  persist("switch on", [&] { return link_.write(model_->map->output, 1, false); });
   const Reading reading = read();
   if (reading.output && reading.protection == Protection::none) return;
   throw DeviceError(identity_.device, "switch on",
@@ -210,41 +206,22 @@ void ModbusSupply::switch_on() {
 
 void ModbusSupply::switch_off() {
   const Writable output = model_->map->output;
-  bool sent = false;
-  if (!lost_) sent = write_once(output, 0, false).ok();
-  if (!sent) unsettled_ = true;
-  if (!sent) persist("switch off", [&] { return write_once(output, 0, false); });
+  if (!link_.write(output, 0, false).ok()) {
+    unsettled_ = true;
+    persist("switch off", [&] { return link_.write(output, 0, false); });
+  }
   if (!read().output) return;
-  persist("switch off", [&] { return write_once(output, 0, false); });
+  persist("switch off", [&] { return link_.write(output, 0, false); });
   if (!read().output) return;
   throw DeviceError(identity_.device, "switch off", "acknowledged, but the output is still ON",
                     "switch it off by hand");
 }
 
-Outcome ModbusSupply::read_block(const Block& block) { return count(link_.read(block, registers_)); }
-
-Outcome ModbusSupply::write_once(Writable at, std::uint16_t value, bool multiple) {
-  return count(link_.write(at, value, multiple));
-}
-
-Outcome ModbusSupply::count(Outcome outcome) {
-  constexpr std::uint64_t Counters::*kAs[] = {&Counters::replies, &Counters::timeouts, &Counters::damaged,
-                                              &Counters::refused, &Counters::refused};  // by Failure
-  ++counters_.requests;
-  if (outcome.failure == Failure::lost) {
-    lost_ = true;
-  } else {
-    ++(counters_.*kAs[static_cast<std::size_t>(outcome.failure)]);
-  }
-  return outcome;
-}
-
 void ModbusSupply::persist(const std::string& operation, const std::function<Outcome()>& attempt) {
   Outcome outcome;
   for (int i = 0; i < kAttempts; ++i) {
-    if (i > 0) ++counters_.retries;
-    if (unsettled_ || lost_) outcome = settle();
-    if (unsettled_ || lost_) continue;
+    if (unsettled_) outcome = settle();
+    if (unsettled_) continue;
     outcome = attempt();
     if (outcome.ok()) return;
     unsettled_ = outcome.failure != Failure::busy && outcome.failure != Failure::refused;
@@ -255,22 +232,18 @@ void ModbusSupply::persist(const std::string& operation, const std::function<Out
 
 /// After success no answer to an earlier request can arrive.
 Outcome ModbusSupply::settle() {
-  if (lost_) {
+  if (!link_.is_open()) {
     if (Outcome opened = link_.open(); !opened.ok()) return opened;
-    lost_ = false;
   }
-  ++counters_.flushes;
   link_.fall_silent();
   if (model_ != nullptr) {
     const RegisterMap& map = *model_->map;
-    if (Outcome asked = read_block(map.identity); !asked.ok()) return asked;
+    if (Outcome asked = link_.read(map.identity, registers_); !asked.ok()) return asked;
     const auto same = [&](int at) {
       return at == kAbsent || registers_[static_cast<std::size_t>(at)] == known_[static_cast<std::size_t>(at)];
     };
-    if (!same(map.model) || !same(map.serial) || (map.serial != kAbsent && !same(map.serial + 1))) {
-      ++counters_.implausible;
+    if (!same(map.model) || !same(map.serial) || (map.serial != kAbsent && !same(map.serial + 1)))
       return {Failure::damaged, "another device answers"};
-    }
   }
   unsettled_ = false;
   return {};
@@ -278,21 +251,14 @@ Outcome ModbusSupply::settle() {
 
 std::string ModbusSupply::remedy(Failure failure) const {
   const bool rtu = address_.wire == Address::Wire::rtu;
-  switch (failure) {
-    case Failure::timeout:
-      return rtu ? fmt::format(
-                       "check its power, that its interface is enabled, its baud rate ({} here; Riden 115200, DPS "
-                       "and HM 9600) and its address ({} here)",
-                       address_.baud, address_.slave)
-                 : std::string("check its power, and that it supports Modbus TCP");
-    case Failure::damaged:
-      return "check cable and ground, and that no other program uses this line";
-    case Failure::busy:
-    case Failure::refused:
-      return "check its model, firmware and panel lock";
-    default:
-      break;
-  }
+  if (failure == Failure::damaged) return "check cable and ground, and that no other program uses this line";
+  if (failure == Failure::busy || failure == Failure::refused) return "check its model, firmware and panel lock";
+  if (failure == Failure::timeout)
+    return rtu ? fmt::format(
+                     "check its power, that its interface is enabled, its baud rate ({} here; Riden 115200, DPS "
+                     "and HM 9600) and its address ({} here)",
+                     address_.baud, address_.slave)
+               : "check its power, and that it supports Modbus TCP";
   if (!rtu) return "check host, port and network";
   const char* const device = address_.device.c_str();
   if (::access(device, F_OK) == 0 && ::access(device, R_OK | W_OK) != 0)

@@ -26,7 +26,6 @@ class ModbusSupply final : public Supply {
   [[nodiscard]] Reading read() override;
   /// Sends the command at least once, even if the device does not answer.
   void switch_off() override;
-  [[nodiscard]] Counters counters() const noexcept override { return counters_; }
 
  private:
   /// Throws DeviceError unless limits have been applied before.
@@ -42,9 +41,6 @@ class ModbusSupply final : public Supply {
   // Bounded retries around single requests.
   void persist(const std::string& operation, const std::function<Outcome()>& attempt);
   [[nodiscard]] Outcome settle();
-  [[nodiscard]] Outcome count(Outcome outcome);
-  [[nodiscard]] Outcome read_block(const Block& block);
-  [[nodiscard]] Outcome write_once(Writable at, std::uint16_t value, bool multiple);
   [[nodiscard]] std::string remedy(Failure failure) const;
 
   const Address address_;
@@ -54,8 +50,6 @@ class ModbusSupply final : public Supply {
   RegisterImage registers_{};
   RegisterImage known_{};  ///< at identification
   Identity identity_;
-  Counters counters_;
-  bool lost_ = true;       ///< to be opened
   bool unsettled_ = true;  ///< old answers may still arrive
   bool limits_applied_ = false;
 };

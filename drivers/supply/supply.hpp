@@ -28,7 +28,7 @@ enum class Protection : std::uint8_t {
 /// The quantity that the supply regulates.
 enum class Regulation : std::uint8_t { constant_voltage, constant_current, unknown };
 
-/// The settings of the supply. Steps of the device: see Identity.
+/// The settings of the supply.
 struct Limits {
   Volts voltage{0};
   Amperes current{0};       ///< beyond this the supply goes from constant voltage to constant current
@@ -39,12 +39,11 @@ struct Limits {
 
 /// The device and its capabilities.
 struct Identity {
-  std::string device;                             ///< for messages: "supply RD6006 on /dev/ttyUSB1"
-  std::string model;                              ///< "RD6006P"
-  std::string serial;                             ///< empty: unknown
-  std::string firmware;                           ///< "1.28"; empty: unknown
-  double voltage_max_v = 0, current_max_a = 0;    ///< largest settings
-  double voltage_step_v = 0, current_step_a = 0;  ///< one count of settings and readings
+  std::string device;                           ///< for messages: "supply RD6006 on /dev/ttyUSB1"
+  std::string model;                            ///< "RD6006P"
+  std::string serial;                           ///< empty: unknown
+  std::string firmware;                         ///< "1.28"; empty: unknown
+  double voltage_max_v = 0, current_max_a = 0;  ///< largest settings
 };
 
 /// One reading of the supply. A trip or a period of constant current between two readings is not seen.
@@ -61,18 +60,6 @@ struct Reading {
 
   /// The product of what was measured; the supplies' own power registers have disputed scales.
   [[nodiscard]] double power_w() const noexcept { return voltage_v * current_a; }
-};
-
-/// Events on the wire. Malformed input is counted; it becomes an error only if all retries fail.
-struct Counters {
-  std::uint64_t requests = 0;     ///< sent, retries included
-  std::uint64_t replies = 0;      ///< used
-  std::uint64_t timeouts = 0;     ///< no answer, or only its beginning
-  std::uint64_t damaged = 0;      ///< bad CRC or framing, foreign sender, wrong shape
-  std::uint64_t refused = 0;      ///< refused by the device
-  std::uint64_t implausible = 0;  ///< complete, with impossible values
-  std::uint64_t retries = 0;
-  std::uint64_t flushes = 0;  ///< times the line was left to fall silent and flushed
 };
 
 class PoweredOutput;
@@ -106,7 +93,6 @@ class Supply {
   [[nodiscard]] virtual Reading read() = 0;
   /// Returns when the device has reported that its output is off; also when it was off before.
   virtual void switch_off() = 0;
-  [[nodiscard]] virtual Counters counters() const noexcept = 0;
 
  private:
   friend class PoweredOutput;

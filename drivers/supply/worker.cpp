@@ -7,21 +7,11 @@
 #include "base/thread.hpp"
 
 namespace kphi::supply {
-namespace {
-
-Duration period_of(double looks_per_second) {
-  if (!(looks_per_second >= 0.1 && looks_per_second <= 100)) {
-    throw std::invalid_argument("a supply can be read 0.1 to 100 times per second");
-  }
-  return from_seconds(1 / looks_per_second);
-}
-
-}  // namespace
 
 Worker::Worker(std::unique_ptr<Supply> supply, const Clock& clock, double looks_per_second)
     : supply_(std::move(supply)),
       clock_(clock),
-      period_(period_of(looks_per_second)),
+      period_(from_seconds(1 / looks_per_second)),
       identity_(supply_->identity()),
       thread_(start_thread([this] { run(); })) {}
 
@@ -32,12 +22,6 @@ Worker::~Worker() {
   }
   changed_.notify_all();
   thread_.join();
-}
-
-Limits Worker::apply(const Limits& limits) {
-  Limits applied;
-  ask([&] { applied = supply_->apply(limits); });
-  return applied;
 }
 
 void Worker::switch_on() {
@@ -67,7 +51,7 @@ void Worker::ask(std::function<void()> act) {
   if (!answer.failure.empty()) throw DeviceError(answer.failure);
 }
 
-std::uint64_t Worker::ask_off() noexcept {
+std::uint64_t Worker::switch_off() noexcept {
   std::uint64_t mine = 0;
   {
     const std::lock_guard lock(mutex_);
@@ -77,10 +61,8 @@ std::uint64_t Worker::ask_off() noexcept {
   return mine;
 }
 
-void Worker::switch_off() noexcept { ask_off(); }
-
 bool Worker::switch_off_and_confirm(Duration wall) noexcept {
-  const std::uint64_t mine = ask_off();
+  const std::uint64_t mine = switch_off();
   std::unique_lock lock(mutex_);
   changed_.wait_for(lock, wall, [&] { return offs_done_ >= mine || ended_; });
   return offs_done_ >= mine;

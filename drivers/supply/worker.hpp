@@ -29,7 +29,7 @@ class Worker {
   /// Readings per second of bench time; real supplies tolerate 2 to 5.
   static constexpr double kUsualRate = 4;
 
-  /// `clock` outlives the worker. Throws std::invalid_argument for a rate outside 0.1 to 100.
+  /// `clock` outlives the worker.
   Worker(std::unique_ptr<Supply> supply, const Clock& clock, double looks_per_second = kUsualRate);
   /// Switches off and closes; takes as long as the supply, a few seconds when it does not answer.
   ~Worker();
@@ -37,11 +37,13 @@ class Worker {
   Worker& operator=(const Worker&) = delete;
 
   /// Any thread; wait for the device. Throw what Supply throws, and DeviceError when the worker is not alive.
-  Limits apply(const Limits& limits);
+  void apply(const Limits& limits) {
+    ask([&] { supply_->apply(limits); });
+  }
   /// Returns with the output on. A switch_off() after this call overrules it, with DeviceError.
   void switch_on();
-  /// Any thread; does not wait.
-  void switch_off() noexcept;
+  /// Any thread; does not wait. Returns the number of this request.
+  std::uint64_t switch_off() noexcept;
   /// Any thread: as switch_off, then waits for the device to report it. False after `wall` or when the supply has
   /// failed: the output may be on.
   [[nodiscard]] bool switch_off_and_confirm(Duration wall) noexcept;
@@ -75,7 +77,6 @@ class Worker {
   }
   void ask(std::function<void()> act);
   [[nodiscard]] DeviceError gone() const;
-  std::uint64_t ask_off() noexcept;
 
   // The thread.
   void run() noexcept;

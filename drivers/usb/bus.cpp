@@ -41,18 +41,10 @@ std::vector<Interface> interfaces_of(libusb_device* device) {
 }
 
 Outcome outcome_of(int error) noexcept {
-  switch (error) {
-    case 0:
-      return Outcome::done;
-    case LIBUSB_ERROR_NO_DEVICE:
-      return Outcome::gone;
-    case LIBUSB_ERROR_PIPE:
-      return Outcome::stalled;
-    case LIBUSB_ERROR_TIMEOUT:
-      return Outcome::timed_out;
-    default:
-      return Outcome::failed;
-  }
+  if (error == 0) return Outcome::done;
+  if (error == LIBUSB_ERROR_NO_DEVICE) return Outcome::gone;
+  if (error == LIBUSB_ERROR_PIPE) return Outcome::stalled;
+  return error == LIBUSB_ERROR_TIMEOUT ? Outcome::timed_out : Outcome::failed;
 }
 
 class Device final : public Transport {

@@ -10,7 +10,6 @@
 #include "base/error.hpp"
 #include "base/number.hpp"
 #include "compensation/file/coefficient_file.hpp"
-#include "compensation/file/coefficient_keys.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::fit {

@@ -80,16 +80,18 @@ double largest_k(const std::vector<LinePoint>& points) {
   return largest;
 }
 
-/// d(slope)/d(intercept) of the anchored line: what an error of K_T does to the slope.
-double slope_per_intercept(const std::vector<LinePoint>& points, const std::vector<double>& sigmas) {
-  double first = 0, second = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const double weight = 1 / (sigmas[i] * sigmas[i]);
-    first += weight * points[i].phi_deg;
-    second += weight * points[i].phi_deg * points[i].phi_deg;
+/// Σ w, Σ w φ, Σ w φ² with the weights of a fit.
+struct WeightSums {
+  WeightSums(const std::vector<LinePoint>& points, const std::vector<double>& sigmas) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double weight = 1 / (sigmas[i] * sigmas[i]);
+      sum += weight;
+      first += weight * points[i].phi_deg;
+      second += weight * points[i].phi_deg * points[i].phi_deg;
+    }
   }
-  return -first / second;
-}
+  double sum = 0, first = 0, second = 0;
+};
 
 /// Akaike's criterion for known variances, corrected for n observations (Hurvich, Tsai 1989).
 double corrected_aic(double chi_squared, double terms, double n) {
@@ -126,13 +128,7 @@ compensation::ThrustCurve LineFit::curve(std::optional<double> largest_deg,
 }
 
 LineWeights LineFit::weights(std::span<const double> phis_deg) const {
-  double sum = 0, first = 0, second = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const double weight = 1 / (sigmas[i] * sigmas[i]);
-    sum += weight;
-    first += weight * points[i].phi_deg;
-    second += weight * points[i].phi_deg * points[i].phi_deg;
-  }
+  const auto [sum, first, second] = WeightSums(points, sigmas);
   const double determinant = sum * second - first * first;
   LineWeights result{std::vector<double>(phis_deg.size()), std::vector<double>(phis_deg.size())};
   for (std::size_t j = 0; j < phis_deg.size(); ++j) {
@@ -194,7 +190,8 @@ LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& option
   if (options.anchored) {
     const double slope_variance = unit_covariance(problem, {&slope}, "line fit")[0] * slope_unit * slope_unit * enlarge;
     const double anchor_variance = fit.K_T_standard_error * fit.K_T_standard_error;
-    const double gradient = slope_per_intercept(fit.points, sigmas);
+    const WeightSums sums(fit.points, sigmas);
+    const double gradient = -sums.first / sums.second;  // what an error of K_T does to the slope
     fit.covariance = {{{anchor_variance, gradient * anchor_variance},
                        {gradient * anchor_variance, slope_variance + gradient * gradient * anchor_variance}}};
   } else {

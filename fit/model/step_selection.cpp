@@ -3,59 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "base/csv.hpp"
 #include "base/error.hpp"
-#include "results/step_mean.hpp"
+#include "results/steps_csv.hpp"
 
 namespace kphi::fit {
 namespace {
-
-using results::QualityFlag;
-
-struct FlagWords {
-  QualityFlag flag;
-  const char* words;
-};
-
-constexpr std::array<FlagWords, 32> kWords{{
-    {QualityFlag::speed_not_reached, "commanded speed not reached"},
-    {QualityFlag::speed_unsteady, "speed never settled"},
-    {QualityFlag::saturated, "load cell saturated"},
-    {QualityFlag::lost_samples, "samples lost"},
-    {QualityFlag::derated, "motor derated"},
-    {QualityFlag::few_samples, "too few samples"},
-    {QualityFlag::bad_status, "load cell reported an error"},
-    {QualityFlag::stream_restarted, "stream restarted"},
-    {QualityFlag::rebooted, "load cell's box rebooted since the zero"},
-    {QualityFlag::stalled, "load cell repeated its measurement"},
-    {QualityFlag::silent, "load cell fell silent"},
-    {QualityFlag::box_trouble, "load cell's box reported failed communication"},
-    {QualityFlag::taken_over, "another client took the stream"},
-    {QualityFlag::configuration_changed, "load cell's box settings changed"},
-    {QualityFlag::zero_drifted, "load cell's zero drifted during the run"},
-    {QualityFlag::zero_noisy, "load cell was not at rest at a zero"},
-    {QualityFlag::drive_saturated, "motor drive saturated"},
-    {QualityFlag::motor_fault, "motor module reported a fault"},
-    {QualityFlag::supply_out_of_band, "supply voltage off"},
-    {QualityFlag::coil_hot, "motor coil hot"},
-    {QualityFlag::motor_reset, "motor module restarted"},
-    {QualityFlag::motor_lost, "motor module lost"},
-    {QualityFlag::slow_round_trip, "motor readings blurred in time"},
-    {QualityFlag::supply_limited, "supply limited the current"},
-    {QualityFlag::supply_off, "supply was off"},
-    {QualityFlag::supply_sag, "supply sagged"},
-    {QualityFlag::supply_rise, "motor fed back into the supply"},
-    {QualityFlag::unsettled, "thrust never settled"},
-    {QualityFlag::drifted, "thrust drifted within the step"},
-    {QualityFlag::lag_unknown, "lag of the thrust unknown"},
-    {QualityFlag::frozen, "load cell or speed repeated one value"},
-    {QualityFlag::speed_glitch, "impossible speeds skipped"},
-}};
-
-bool has(std::uint32_t flags, QualityFlag flag) { return (flags & static_cast<std::uint32_t>(flag)) != 0; }
 
 /// s/√n. Neighbouring samples are correlated, so this is a lower limit; for weights only its ratio between steps
 /// matters. 0: unknown.
@@ -63,22 +18,10 @@ double mean_uncertainty(double deviation, std::uint64_t n) {
   return n > 0 && deviation > 0 ? deviation / std::sqrt(static_cast<double>(n)) : 0;
 }
 
-bool spoiled(std::uint32_t flags) { return (flags & ~results::kHarmlessFlags) != 0; }
-
 }  // namespace
 
 double level(const results::StepMean& step) {
   return step.commanded_speed_rad_s > 0 ? step.commanded_speed_rad_s : step.speed_rad_s;
-}
-
-std::string flags_in_words(std::uint32_t flags) {
-  std::string words;
-  for (const FlagWords& one : kWords) {
-    if (!has(flags, one.flag)) continue;
-    if (!words.empty()) words += ", ";
-    words += one.words;
-  }
-  return words;
 }
 
 LeftOutRun parse_left_out_run(const std::string& text) {
@@ -115,9 +58,9 @@ StepSelection select_steps(std::span<const results::StepMean> steps, const Speed
       return run.phi_deg == step.occlusion_deg && run.repetition == step.repetition;
     });
     const bool chosen = by_hand != left_out_runs.end();
-    const bool left_out = chosen || !measured || spoiled(step.quality_flags);
+    const bool left_out = chosen || !measured || (step.quality_flags & ~results::kHarmlessFlags) != 0;
     if (left_out || step.quality_flags != 0) {
-      std::string words = flags_in_words(step.quality_flags);
+      std::string words = results::quality_flags_in_words(step.quality_flags);
       if (!measured) words += words.empty() ? "not measured" : ", not measured";
       if (chosen) words += (words.empty() ? "" : ", ") + ("by hand: " + by_hand->cause);
       selection.flagged.push_back({step, words, left_out});

@@ -44,9 +44,6 @@ struct StepSelection {
 /// The level of a step: what was commanded, or, in imported tables without a command, what was measured. rad/s.
 [[nodiscard]] double level(const results::StepMean& step);
 
-/// The flags of a step in words, joined by ", "; empty without flags.
-[[nodiscard]] std::string flags_in_words(std::uint32_t flags);
-
 /// Averages over repetitions (repetition 0) are dropped where single repetitions exist: they would count twice.
 /// A step is left out for a quality flag (results::kHarmlessFlags are listed only), which names a cause, and never for
 /// being far from the others: the scatter of the repetitions is their uncertainty (JCGM 100, 3.4.7 and 4.2). means.csv

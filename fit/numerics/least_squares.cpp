@@ -7,6 +7,18 @@
 #include "base/error.hpp"
 
 namespace kphi::fit {
+namespace {
+
+void solve(ceres::Problem& problem, const char* what, ceres::Solver::Options& options) {
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.logging_type = ceres::SILENT;
+  options.num_threads = 1;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  if (!summary.IsSolutionUsable()) throw FitError(fmt::format("{}: no solution ({})", what, summary.message));
+}
+
+}  // namespace
 
 ceres::Problem::Options problem_options() {
   static const std::unique_ptr<ceres::Context> context(ceres::Context::Create());
@@ -18,9 +30,6 @@ ceres::Problem::Options problem_options() {
 
 void solve_exactly(ceres::Problem& problem, const char* what, int iterations) {
   ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_QR;
-  options.logging_type = ceres::SILENT;
-  options.num_threads = 1;
   // The problem is linear: an almost undamped first step lands on the minimum, the next ones polish the last digits.
   // There the cost no longer falls, which Ceres would count as failure, so the number of steps is fixed.
   options.initial_trust_region_radius = 1e16;
@@ -30,23 +39,16 @@ void solve_exactly(ceres::Problem& problem, const char* what, int iterations) {
   options.function_tolerance = 0;
   options.gradient_tolerance = 0;
   options.parameter_tolerance = 0;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-  if (!summary.IsSolutionUsable()) throw FitError(fmt::format("{}: no solution ({})", what, summary.message));
+  solve(problem, what, options);
 }
 
 void solve_robustly(ceres::Problem& problem, const char* what, double tolerance) {
   ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_QR;
-  options.logging_type = ceres::SILENT;
-  options.num_threads = 1;
   options.max_num_iterations = 200;
   options.function_tolerance = tolerance;
   options.gradient_tolerance = 1e-14;
   options.parameter_tolerance = 1e-11;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
-  if (!summary.IsSolutionUsable()) throw FitError(fmt::format("{}: no solution ({})", what, summary.message));
+  solve(problem, what, options);
 }
 
 std::vector<double> unit_covariance(ceres::Problem& problem, const std::vector<const double*>& blocks,

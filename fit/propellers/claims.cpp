@@ -16,17 +16,17 @@
 namespace kphi::fit {
 namespace {
 
-using Family = std::span<const FamilyMember>;
+using Family = std::span<const Fitted>;
 
-const FamilyMember* find(Family family, double diameter_in, int blades) {
-  for (const FamilyMember& member : family) {
+const Fitted* find(Family family, double diameter_in, int blades) {
+  for (const Fitted& member : family) {
     const Identification& one = member.identification;
     if (std::abs(one.diameter_in - diameter_in) < 0.01 && one.blades == blades) return &member;
   }
   return nullptr;
 }
 
-std::optional<Estimate> k_of(const FamilyMember* member, double phi_deg, Air air) {
+std::optional<Estimate> k_of(const Fitted* member, double phi_deg, Air air) {
   if (member == nullptr) return std::nullopt;
   const auto& table = member->identification.table;
   const auto& budgets = air == Air::standard ? member->analysis.standard : member->analysis.coefficients;
@@ -35,7 +35,7 @@ std::optional<Estimate> k_of(const FamilyMember* member, double phi_deg, Air air
   return std::nullopt;
 }
 
-std::optional<Estimate> slope_of(const FamilyMember* member, Air air) {
+std::optional<Estimate> slope_of(const Fitted* member, Air air) {
   if (member == nullptr) return std::nullopt;
   Estimate slope = member->analysis.slope.estimate();
   if (air == Air::measured) return slope;
@@ -87,7 +87,7 @@ Claim judged(std::string id, std::string statement, std::string unit, const std:
 }
 
 /// A test that does not reject is no proof: the claim then holds as far as these data show.
-Claim linear(const FamilyMember& member) {
+Claim linear(const Fitted& member) {
   const HypothesisTest& test = member.analysis.curvature.lack_of_fit;
   const std::string& propeller = member.identification.propeller;
   Claim claim = judged(fmt::format("linear_{}", propeller),
@@ -100,12 +100,12 @@ Claim linear(const FamilyMember& member) {
   return claim;
 }
 
-std::optional<Estimate> share_of_thrust(const FamilyMember* member, double phi_deg) {
+std::optional<Estimate> share_of_thrust(const Fitted* member, double phi_deg) {
   return ratio(k_of(member, phi_deg, Air::measured), k_of(member, 0, Air::measured));
 }
 
 /// The smallest lead over the φ in the share of thrust that three blades keep more than two.
-std::optional<Estimate> least_lead(const FamilyMember* three, const FamilyMember* two) {
+std::optional<Estimate> least_lead(const Fitted* three, const Fitted* two) {
   std::optional<Estimate> least;
   for (const double phi : {90.0, 180.0, 270.0}) {
     const auto lead = minus(share_of_thrust(three, phi), share_of_thrust(two, phi));
@@ -115,8 +115,8 @@ std::optional<Estimate> least_lead(const FamilyMember* three, const FamilyMember
 }
 
 void claims_of_diameter(Family family, Air air, double diameter, double offset, std::vector<Claim>& claims) {
-  const FamilyMember* two = find(family, diameter, 2);
-  const FamilyMember* three = find(family, diameter, 3);
+  const Fitted* two = find(family, diameter, 2);
+  const Fitted* three = find(family, diameter, 3);
   claims.push_back(
       judged(fmt::format("slopes_{}in", diameter),
              fmt::format("{}-inch propellers of 2 and 3 blades have the same slope: ratio, 15 % allowed", diameter),
@@ -133,8 +133,8 @@ void claims_of_diameter(Family family, Air air, double diameter, double offset, 
 
 /// Mean over the φ at which k is far from 0.
 std::optional<Estimate> growth_per_inch(Family family, Air air, int blades) {
-  const FamilyMember* five = find(family, 5, blades);
-  const FamilyMember* six = find(family, 6, blades);
+  const Fitted* five = find(family, 5, blades);
+  const Fitted* six = find(family, 6, blades);
   std::optional<Estimate> mean;
   double n = 0;
   for (const double phi : {0.0, 45.0, 90.0, 180.0}) {
@@ -180,11 +180,11 @@ const char* name_of(Verdict verdict) {
   return names[static_cast<std::size_t>(verdict)];
 }
 
-std::vector<Claim> test_claims(std::span<const FamilyMember> family) {
+std::vector<Claim> test_claims(std::span<const Fitted> family) {
   std::vector<Claim> claims;
-  for (const FamilyMember& member : family) claims.push_back(linear(member));
+  for (const Fitted& member : family) claims.push_back(linear(member));
   const Air air = common_air(family);
-  const FamilyMember* drone = find(family, 5, 3);
+  const Fitted* drone = find(family, 5, 3);
   claims.push_back(judged("share_45", "5-inch 3-blade at 45 deg: almost 90 % of its thrust, 0.87 to 0.91", "1",
                           share_of_thrust(drone, 45), 0.87, 0.91));
   claims.push_back(judged("share_270", "5-inch 3-blade at 270 deg: 25 % of its thrust, 0.22 to 0.28", "1",
@@ -213,12 +213,12 @@ PropellerSize parse_propeller_size(const std::string& text) {
   return {*diameter, static_cast<int>(*blades)};
 }
 
-FamilyFindings findings_of(std::span<const FamilyMember> family, std::span<const PropellerSize> sizes) {
+FamilyFindings findings_of(std::span<const Fitted> family, std::span<const PropellerSize> sizes) {
   FamilyFindings findings{common_air(family), test_claims(family), shared_slopes(family), {}};
   std::set<double> phis;
-  for (const FamilyMember& member : family)
+  for (const Fitted& member : family)
     for (const OcclusionCoefficient& row : member.identification.table) phis.insert(row.phi_deg);
-  for (const FamilyMember& member : family)
+  for (const Fitted& member : family)
     if (!sizes.empty() && !(member.identification.diameter_in > 0))
       throw ConfigurationError("--predict: the diameter of " + member.identification.propeller +
                                " is unknown; `kphi fit --diameter-in` writes it into the file");

@@ -34,7 +34,7 @@ struct Claim {
 /// All claims, also those that these propellers cannot test. The paper gives no tolerances; those in the table are
 /// chosen so that its claims do not contradict each other (doubling per inch and both offsets cannot hold exactly
 /// together). Propellers are compared in standard air if the air of all is known.
-[[nodiscard]] std::vector<Claim> test_claims(std::span<const FamilyMember> family);
+[[nodiscard]] std::vector<Claim> test_claims(std::span<const Fitted> family);
 
 /// A propeller to be predicted: "7x3" is 7 inches, three blades.
 struct PropellerSize {
@@ -53,7 +53,7 @@ struct FamilyFindings {
 
 /// Predictions of every size at every φ that a member was measured at, ascending. Throws ConfigurationError for sizes
 /// with fewer than three members.
-[[nodiscard]] FamilyFindings findings_of(std::span<const FamilyMember> family, std::span<const PropellerSize> sizes);
+[[nodiscard]] FamilyFindings findings_of(std::span<const Fitted> family, std::span<const PropellerSize> sizes);
 
 /// Claim, value found, 95 % interval, verdict; then slopes and predictions.
 [[nodiscard]] std::string family_text(const FamilyFindings& findings);

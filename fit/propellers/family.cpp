@@ -21,7 +21,7 @@ double scale_of(const Identification& one, Air air) {
   return air == Air::standard && one.air ? kStandardDensity / one.air->value : 1;
 }
 
-std::vector<Row> occluded_rows(std::span<const FamilyMember* const> members, Air air) {
+std::vector<Row> occluded_rows(std::span<const Fitted* const> members, Air air) {
   std::vector<Row> rows;
   for (std::size_t j = 0; j < members.size(); ++j) {
     const Identification& one = members[j]->identification;
@@ -34,16 +34,16 @@ std::vector<Row> occluded_rows(std::span<const FamilyMember* const> members, Air
   return rows;
 }
 
-double freedom_of(std::span<const FamilyMember* const> members) {
+double freedom_of(std::span<const Fitted* const> members) {
   double sum = 0;
-  for (const FamilyMember* member : members) sum += member->identification.repeatability.freedom();
+  for (const Fitted* member : members) sum += member->identification.repeatability.freedom();
   return sum;
 }
 
 /// From the errors common to all coefficients of a campaign; the largest of the members.
-double common_u_of_slope(std::span<const FamilyMember* const> members) {
+double common_u_of_slope(std::span<const Fitted* const> members) {
   double largest = 0;
-  for (const FamilyMember* member : members) {
+  for (const Fitted* member : members) {
     double squares = 0;
     for (const BudgetRow& row : member->analysis.slope.rows)
       squares += row.common ? row.contribution() * row.contribution() : 0;
@@ -70,17 +70,17 @@ Regression fit_lines(const std::vector<Row>& rows, std::size_t members, bool sha
 
 double SharedSlope::expanded() const { return coverage_factor(slope.freedom) * std::hypot(slope.u, common_u); }
 
-Air common_air(std::span<const FamilyMember> family) {
-  const bool known = std::all_of(family.begin(), family.end(), [](const FamilyMember& member) {
+Air common_air(std::span<const Fitted> family) {
+  const bool known = std::all_of(family.begin(), family.end(), [](const Fitted& member) {
     return member.identification.air && !member.analysis.standard.empty();
   });
   return known ? Air::standard : Air::measured;
 }
 
-std::vector<SharedSlope> shared_slopes(std::span<const FamilyMember> family) {
+std::vector<SharedSlope> shared_slopes(std::span<const Fitted> family) {
   const Air air = common_air(family);
-  std::map<double, std::vector<const FamilyMember*>> by_diameter;
-  for (const FamilyMember& member : family) by_diameter[member.identification.diameter_in].push_back(&member);
+  std::map<double, std::vector<const Fitted*>> by_diameter;
+  for (const Fitted& member : family) by_diameter[member.identification.diameter_in].push_back(&member);
   std::vector<SharedSlope> result;
   for (const auto& [diameter, members] : by_diameter) {
     const std::vector<Row> rows = occluded_rows(members, air);
@@ -90,7 +90,7 @@ std::vector<SharedSlope> shared_slopes(std::span<const FamilyMember> family) {
     const double freedom = freedom_of(members);
     SharedSlope one;
     one.diameter_in = diameter;
-    for (const FamilyMember* member : members) one.propellers.push_back(member->identification.propeller);
+    for (const Fitted* member : members) one.propellers.push_back(member->identification.propeller);
     one.slope = {shared.estimates[n], std::sqrt(shared.covariance[n][n]), freedom};
     one.common_u = common_u_of_slope(members);
     const double extra = static_cast<double>(n - 1);
@@ -102,10 +102,10 @@ std::vector<SharedSlope> shared_slopes(std::span<const FamilyMember> family) {
   return result;
 }
 
-std::optional<FamilyPrediction> predict(std::span<const FamilyMember> family, double diameter_in, int blades,
+std::optional<FamilyPrediction> predict(std::span<const Fitted> family, double diameter_in, int blades,
                                         double phi_deg) {
   std::set<int> blade_numbers;
-  for (const FamilyMember& member : family) blade_numbers.insert(member.identification.blades);
+  for (const Fitted& member : family) blade_numbers.insert(member.identification.blades);
   const bool by_blades = blade_numbers.size() > 1;
   const Air air = common_air(family);
   const auto terms_at = [&](int b, double phi) {

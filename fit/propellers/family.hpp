@@ -10,16 +10,10 @@
 
 namespace kphi::fit {
 
-/// One fitted propeller.
-struct FamilyMember {
-  Identification identification;
-  Analysis analysis;
-};
-
 /// The air in which propellers are compared: standard air if the density of all is known, since days differ by a few
 /// percent.
 enum class Air : std::uint8_t { measured, standard };
-[[nodiscard]] Air common_air(std::span<const FamilyMember> family);
+[[nodiscard]] Air common_air(std::span<const Fitted> family);
 
 /// Lines of one diameter with a common slope.
 struct SharedSlope {
@@ -34,7 +28,7 @@ struct SharedSlope {
 };
 
 /// For every diameter with two or more members.
-[[nodiscard]] std::vector<SharedSlope> shared_slopes(std::span<const FamilyMember> family);
+[[nodiscard]] std::vector<SharedSlope> shared_slopes(std::span<const Fitted> family);
 
 struct FamilyPrediction {
   double diameter_in = 0;
@@ -47,7 +41,7 @@ struct FamilyPrediction {
 /// k of a propeller that was not measured, by the rule k = D⁴ (a + b·blades + c φ) through the occluded points of all
 /// members (K_T by its own rule). Its degrees of freedom are the number of propellers less the terms of the rule: the
 /// interval becomes useful with two propellers more than terms. nullopt with fewer than three members.
-[[nodiscard]] std::optional<FamilyPrediction> predict(std::span<const FamilyMember> family, double diameter_in,
-                                                      int blades, double phi_deg);
+[[nodiscard]] std::optional<FamilyPrediction> predict(std::span<const Fitted> family, double diameter_in, int blades,
+                                                      double phi_deg);
 
 }  // namespace kphi::fit

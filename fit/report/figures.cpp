@@ -195,9 +195,8 @@ Figure speed_figure(const Identification& identification) {
   for (std::size_t i = 0; i < identification.table.size(); ++i) {
     const OcclusionCoefficient& row = identification.table[i];
     std::map<double, std::vector<Point>> levels;  // by commanded speed
-    for (const results::StepMean& step : identification.selection.used)
-      if (step.occlusion_deg == row.phi_deg && step.speed_rad_s > 0)
-        levels[level(step)].push_back({step.speed_rad_s, step.thrust_n, 1});
+    for (const results::StepMean& step : row.measured)
+      if (step.speed_rad_s > 0) levels[level(step)].push_back({step.speed_rad_s, step.thrust_n, 1});
     std::string rows;
     for (const auto& [at, points] : levels) {
       const auto [k, u, mean_speed, repetitions] = k_at_speed(points);
@@ -232,8 +231,8 @@ Figure repetition_figure(const Identification& identification) {
     const OcclusionCoefficient& row = identification.table[i];
     tics += fmt::format("{}'{}°' {}", tics.empty() ? "" : ", ", cell(row.phi_deg), i);
     std::map<int, std::vector<Point>> runs;
-    for (const results::StepMean& step : identification.selection.used)
-      if (step.occlusion_deg == row.phi_deg) runs[step.repetition].push_back({step.speed_rad_s, step.thrust_n, 1});
+    for (const results::StepMean& step : row.measured)
+      runs[step.repetition].push_back({step.speed_rad_s, step.thrust_n, 1});
     for (const auto& [repetition, points] : runs) {
       if (points.size() < 2) continue;
       const ThrustFit fit = fit_thrust(points);
@@ -334,9 +333,8 @@ std::vector<ThrustShares> shares_of_steps(const Identification& identification) 
   for (const OcclusionCoefficient& row : identification.table) {
     if (!row.at_speed) continue;
     ThrustShares entry{row.phi_deg, {}};
-    for (const results::StepMean& step : identification.selection.used)
-      if (step.occlusion_deg == row.phi_deg && same_level(level(step), identification.at_speed_rad_s))
-        entry.percent.push_back(step.thrust_n);
+    for (const results::StepMean& step : row.measured)
+      if (same_level(level(step), identification.at_speed_rad_s)) entry.percent.push_back(step.thrust_n);
     shares.push_back(std::move(entry));
   }
   if (shares.empty() || shares.front().phi_deg != 0) return {};
@@ -347,7 +345,7 @@ std::vector<ThrustShares> shares_of_steps(const Identification& identification) 
   return shares;
 }
 
-Figure family_figure(std::span<const Identification* const> family) {
+Figure family_figure(std::span<const Fitted> family) {
   Figure figure{
       "family",
       "Left: k(φ) of every propeller with its line and two standard errors. Right: the same as a share of its "
@@ -357,7 +355,7 @@ Figure family_figure(std::span<const Identification* const> family) {
   std::string data;
   Curves absolute, relative;
   for (std::size_t i = 0; i < family.size(); ++i) {
-    const Identification& one = *family[i];
+    const Identification& one = family[i].identification;
     const LineFit& line = one.line;
     const compensation::ThrustCurve curve = one.curve();
     std::string points, fitted;

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "fit/model/identification.hpp"
 #include "fit/report/gnuplot.hpp"
+#include "fit/uncertainty/analysis.hpp"
 
 namespace kphi::fit {
 
@@ -35,7 +35,7 @@ struct Settling {
 };
 
 /// k(φ) of several propellers, and beside it k(φ)/K_T, which makes their lines comparable.
-[[nodiscard]] Figure family_figure(std::span<const Identification* const> family);
+[[nodiscard]] Figure family_figure(std::span<const Fitted> family);
 
 /// All figures that the data allow, in the order of the report: the paper's (box plots of the thrust shares over φ; on
 /// the second axis, scaled so that K_T is at 100 %, the coefficients and the line), thrust with residuals, k against

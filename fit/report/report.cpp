@@ -390,7 +390,7 @@ std::string provenance_section(const Identification& identification, const Prove
   return html + "</dl>\n" + hash_section(provenance.runs);
 }
 
-std::string family_section(std::span<const Identification* const> family) {
+std::string family_section(std::span<const Fitted> family) {
   HtmlTable table({{"propeller", text},
                    {"diameter, in"},
                    {"blades"},
@@ -398,11 +398,12 @@ std::string family_section(std::span<const Identification* const> family) {
                    {"K<sub>T</sub>/D⁴, N/((rad/s)² m⁴)"},
                    {"slope, N/(rad/s)² per degree"},
                    {"slope, % of K<sub>T</sub> per degree"}});
-  for (const Identification* one : family) {
-    const LineFit& line = one->line;
-    const double diameter_m = 0.0254 * one->diameter_in;
-    table.row({html_escaped(one->propeller), one->diameter_in > 0 ? fmt::format("{:g}", one->diameter_in) : "–",
-               one->blades > 0 ? fmt::format("{}", one->blades) : "–",
+  for (const Fitted& fitted : family) {
+    const Identification& one = fitted.identification;
+    const LineFit& line = one.line;
+    const double diameter_m = 0.0254 * one.diameter_in;
+    table.row({html_escaped(one.propeller), one.diameter_in > 0 ? fmt::format("{:g}", one.diameter_in) : "–",
+               one.blades > 0 ? fmt::format("{}", one.blades) : "–",
                with_power_of_ten(line.K_T, line.K_T_standard_error),
                diameter_m > 0 ? fmt::format("{:.5f}", line.K_T / std::pow(diameter_m, 4)) : "–",
                with_power_of_ten(line.slope_per_deg, std::sqrt(line.covariance[1][1])),
@@ -504,26 +505,16 @@ std::string page_head(const std::string& title, const std::string& heading, cons
 }
 
 /// The first figure belongs to the headline, the others follow the table.
-std::string body(const Identification& identification, const Provenance& provenance, const Figures& figures,
-                 const Analysis* analysis, int& number) {
-  std::string html = lead(identification) + headline(identification.line) + figure_blocks(figures, 0, 1, number) +
-                     skipped_note(figures);
-  if (analysis != nullptr) html += remark_section(analysis->remarks);
-  html += coefficient_section(identification) + standard_section(identification);
+std::string body(const Fitted& fitted, const Chapter& chapter, int& number) {
+  const auto& [identification, analysis] = fitted;
+  const auto& [provenance, figures] = chapter;
+  const std::string first = figure_blocks(figures, 0, 1, number);
   const std::string details = figure_blocks(figures, 1, figures.drawn.size(), number);
-  if (!details.empty()) html += html_heading("How well the model holds") + details;
-  if (analysis != nullptr) html += analysis_sections(*analysis);
-  return html + power_section(identification) + step_section(identification.selection) +
+  return lead(identification) + headline(identification.line) + first + skipped_note(figures) +
+         remark_section(analysis.remarks) + coefficient_section(identification) + standard_section(identification) +
+         (details.empty() ? "" : html_heading("How well the model holds") + details) + analysis_sections(analysis) +
+         power_section(identification) + step_section(identification.selection) +
          run_section(provenance, identification.selection) + provenance_section(identification, provenance);
-}
-
-/// The statements that need several propellers.
-std::string statements_of(const std::vector<Chapter>& chapters) {
-  std::vector<FamilyMember> family;
-  for (const Chapter& chapter : chapters)
-    if (chapter.analysis) family.push_back({chapter.identification, *chapter.analysis});
-  if (family.size() < chapters.size()) return {};
-  return slopes_section(shared_slopes(family)) + claims_section(test_claims(family));
 }
 
 }  // namespace
@@ -544,32 +535,29 @@ std::string claims_section(std::span<const Claim> claims) {
   return section("The paper's statements", table);
 }
 
-std::string format_report(const Identification& identification, const Provenance& provenance, const Figures& figures,
-                          const Analysis* analysis) {
+std::string format_report(const Fitted& fitted, const Chapter& chapter) {
   int number = 0;
-  return page_head("k(φ) of " + html_escaped(identification.propeller), "How an occlusion costs thrust: k(φ)",
-                   propeller_line(identification, provenance)) +
-         body(identification, provenance, figures, analysis, number) + kPageEnd;
+  return page_head("k(φ) of " + html_escaped(fitted.identification.propeller), "How an occlusion costs thrust: k(φ)",
+                   propeller_line(fitted.identification, chapter.provenance)) +
+         body(fitted, chapter, number) + kPageEnd;
 }
 
-std::string format_reports(const std::vector<Chapter>& chapters, const Figures& family) {
+std::string format_reports(std::span<const Fitted> family, std::span<const Chapter> chapters, const Figures& together) {
   std::string names, contents, bodies;
-  std::vector<const Identification*> identifications;
   int number = 0;
-  const std::string together = figure_blocks(family, 0, family.drawn.size(), number) + skipped_note(family);
-  for (const Chapter& chapter : chapters) {
-    identifications.push_back(&chapter.identification);
-    const std::string name = html_escaped(chapter.identification.propeller);
+  const std::string figure = figure_blocks(together, 0, together.drawn.size(), number) + skipped_note(together);
+  for (std::size_t i = 0; i < family.size(); ++i) {
+    const Identification& one = family[i].identification;
+    const std::string name = html_escaped(one.propeller);
     names += (names.empty() ? "" : ", ") + name;
-    contents += fmt::format("<a href=\"#chapter{}\">{}</a>", identifications.size(), name);
-    bodies += fmt::format("<h2 class=\"chapter\" id=\"chapter{}\">{}</h2>\n", identifications.size(),
-                          propeller_line(chapter.identification, chapter.provenance)) +
-              body(chapter.identification, chapter.provenance, chapter.figures,
-                   chapter.analysis ? &*chapter.analysis : nullptr, number);
+    contents += fmt::format("<a href=\"#chapter{}\">{}</a>", i + 1, name);
+    bodies += fmt::format("<h2 class=\"chapter\" id=\"chapter{}\">{}</h2>\n", i + 1,
+                          propeller_line(one, chapters[i].provenance)) +
+              body(family[i], chapters[i], number);
   }
   return page_head("k(φ) of " + names, "How an occlusion costs thrust: k(φ) of several propellers", names) + "<nav>" +
-         contents + "</nav>\n" + family_section(identifications) + together + statements_of(chapters) + bodies +
-         kPageEnd;
+         contents + "</nav>\n" + family_section(family) + figure + slopes_section(shared_slopes(family)) +
+         claims_section(test_claims(family)) + bodies + kPageEnd;
 }
 
 }  // namespace kphi::fit

@@ -2,7 +2,6 @@
 // elsewhere; figures are inline SVG.
 #pragma once
 
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -19,20 +18,18 @@ namespace kphi::fit {
 [[nodiscard]] std::string analysis_sections(const Analysis& analysis);
 [[nodiscard]] std::string claims_section(std::span<const Claim> claims);
 
-/// The same arguments (and SVG files) give the same bytes.
-[[nodiscard]] std::string format_report(const Identification& identification, const Provenance& provenance,
-                                        const Figures& figures, const Analysis* analysis = nullptr);
-
-/// One campaign on a page of several.
+/// What the page shows of one campaign beside the numbers.
 struct Chapter {
-  Identification identification;
   Provenance provenance;
   Figures figures;
-  std::optional<Analysis> analysis{};
 };
 
-/// Several campaigns on one page: first their comparison with the figure `family` (and, if all have an analysis, the
-/// paper's statements about several propellers), then each of them.
-[[nodiscard]] std::string format_reports(const std::vector<Chapter>& chapters, const Figures& family);
+/// The same arguments (and SVG files) give the same bytes.
+[[nodiscard]] std::string format_report(const Fitted& fitted, const Chapter& chapter);
+
+/// Several campaigns on one page, a chapter each: first their comparison with the figure `together` and the paper's
+/// statements about several propellers, then each of them.
+[[nodiscard]] std::string format_reports(std::span<const Fitted> family, std::span<const Chapter> chapters,
+                                         const Figures& together);
 
 }  // namespace kphi::fit

@@ -5,6 +5,7 @@
 #include <complex>
 #include <unsupported/Eigen/FFT>
 
+#include "base/statistics.hpp"
 #include "compensation/units.hpp"
 #include "results/reduction/cell_stream.hpp"
 #include "results/reduction/motor_series.hpp"
@@ -18,11 +19,9 @@ constexpr double kLeastSignalToNoise = 8;  // of the line over the noise of one 
 
 /// Hann's window, after the mean is taken away: the once-per-turn line must not leak into the blades'.
 std::vector<double> windowed(std::vector<double> values) {
-  const double n = static_cast<double>(values.size());
-  double mean = 0;
-  for (const double value : values) mean += value / n;
+  const double n = static_cast<double>(values.size()), middle = mean(values);
   for (std::size_t i = 0; i < values.size(); ++i)
-    values[i] = (values[i] - mean) * (0.5 - 0.5 * std::cos(2 * kPi * (static_cast<double>(i) + 0.5) / n));
+    values[i] = (values[i] - middle) * (0.5 - 0.5 * std::cos(2 * kPi * (static_cast<double>(i) + 0.5) / n));
   return values;
 }
 

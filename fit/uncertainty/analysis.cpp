@@ -10,8 +10,6 @@
 namespace kphi::fit {
 namespace {
 
-constexpr const char* kUnitOfK = "N/(rad/s)^2";
-
 std::vector<double> unit_vector(std::size_t n, std::size_t i) {
   std::vector<double> weights(n);
   weights[i] = 1;
@@ -215,22 +213,15 @@ std::vector<LinePoint> with_errors(const Identification& identification) {
 Analysis analyse(const Identification& identification, const AnalysisOptions& options) {
   Analysis analysis;
   std::vector<double> phis;
-  std::vector<RunSums> runs;
-  std::vector<StepsOfAngle> measured;
-  for (const OcclusionCoefficient& row : identification.table) {
-    phis.push_back(row.phi_deg);
-    if (row.fit) measured.push_back({row.phi_deg, row.measured});
-  }
-  analysis.speed = speed_dependence(measured);
-  for (const AngleScatter& angle : identification.repeatability.angles)
-    runs.insert(runs.end(), angle.runs.begin(), angle.runs.end());
+  for (const OcclusionCoefficient& row : identification.table) phis.push_back(row.phi_deg);
+  const bool from_steps = !identification.repeatability.angles.empty();
+  if (from_steps) analysis.speed = speed_dependence(identification.table);
   const ErrorSources sources = sources_of(identification, analysis, options.bench);
   for (std::size_t i = 0; i < phis.size(); ++i)
     analysis.coefficients.push_back(
         sources.budget(name_of_k(phis[i]), kUnitOfK, identification.table[i].k, unit_vector(phis.size(), i)));
 
-  const double freedom =
-      runs.empty() ? std::numeric_limits<double>::infinity() : identification.repeatability.freedom();
+  const double freedom = from_steps ? identification.repeatability.freedom() : std::numeric_limits<double>::infinity();
   analysis.curvature = curvature(with_errors(identification), freedom);
   const LineFit& line = identification.line;
   const LineWeights weights = line.weights(phis);
@@ -247,10 +238,10 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   analysis.outlying = outlying_runs(identification.selection.used);
   analysis.remarks = remarks_of(identification, analysis);
   analysis.rejected = rejected_points(identification);
-  if (!runs.empty()) analysis.bootstrap = bootstrap(runs, weights, options.bootstrap);
+  analysis.bootstrap = bootstrap(identification.repeatability.angles, weights, options.bootstrap);
   std::vector<Estimate> k;
   for (const Budget& budget : analysis.coefficients) k.push_back(budget.estimate());
-  if (!runs.empty()) analysis.torque = identify_torque(identification.selection.used, phis, k);
+  if (from_steps) analysis.torque = identify_torque(identification.selection.used, phis, k);
   return analysis;
 }
 

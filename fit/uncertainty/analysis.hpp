@@ -69,6 +69,12 @@ struct Analysis {
   std::vector<std::string> remarks;  ///< sentences on the line: clipping, zero, extrapolation, mismatch
 };
 
+/// One fitted propeller.
+struct Fitted {
+  Identification identification;
+  Analysis analysis;
+};
+
 /// From a table of coefficients without steps: what the table allows.
 [[nodiscard]] Analysis analyse(const Identification& identification, const AnalysisOptions& options = {});
 

@@ -11,23 +11,6 @@
 namespace kphi::fit {
 namespace {
 
-/// The runs of one φ.
-struct Group {
-  double phi_deg;
-  std::span<const RunSums> runs;
-};
-
-std::vector<Group> groups_of(std::span<const RunSums> runs) {
-  std::vector<Group> groups;
-  for (std::size_t begin = 0; begin < runs.size();) {
-    std::size_t end = begin;
-    while (end < runs.size() && runs[end].phi_deg == runs[begin].phi_deg) ++end;
-    groups.push_back({runs[begin].phi_deg, runs.subspan(begin, end - begin)});
-    begin = end;
-  }
-  return groups;
-}
-
 double pooled(std::span<const RunSums> runs) {
   double xt = 0, xx = 0;
   for (const RunSums& run : runs) {
@@ -39,14 +22,14 @@ double pooled(std::span<const RunSums> runs) {
 
 /// One resample per entry of `into`. Two 32-bit draws come out of each 64-bit number; the bias of n/2³² does not matter
 /// here.
-void resample(const Group& group, std::span<double> into, SplitMix64& random) {
-  const std::uint64_t n = group.runs.size();
+void resample(std::span<const RunSums> runs, std::span<double> into, SplitMix64& random) {
+  const std::uint64_t n = runs.size();
   for (double& k : into) {
     double xt = 0, xx = 0;
     std::uint64_t bits = 0;
     for (std::uint64_t i = 0; i < n; ++i) {
       bits = i % 2 == 0 ? random() : bits >> 32;
-      const RunSums& run = group.runs[((bits & 0xffffffffu) * n) >> 32];
+      const RunSums& run = runs[((bits & 0xffffffffu) * n) >> 32];
       xt += run.xt;
       xx += run.xx;
     }
@@ -70,24 +53,25 @@ BootstrapInterval summary(std::string quantity, double value, std::vector<double
 
 }  // namespace
 
-std::vector<BootstrapInterval> bootstrap(std::span<const RunSums> runs, const LineWeights& line,
+std::vector<BootstrapInterval> bootstrap(std::span<const AngleScatter> angles, const LineWeights& line,
                                          const BootstrapOptions& options) {
-  const std::vector<Group> groups = groups_of(runs);
   std::vector<BootstrapInterval> result;
-  if (groups.empty() || options.resamples < 2) return result;
+  if (angles.empty() || options.resamples < 2) return result;
   SplitMix64 random(options.seed);
   std::vector<double> k(options.resamples), intercept(options.resamples), slope(options.resamples);
   double intercept_value = 0, slope_value = 0;
-  for (std::size_t i = 0; i < groups.size(); ++i) {
-    resample(groups[i], k, random);
+  for (std::size_t i = 0; i < angles.size(); ++i) {
+    const std::vector<RunSums>& runs = angles[i].runs;
+    if (runs.empty()) continue;
+    resample(runs, k, random);
     for (std::size_t j = 0; j < k.size(); ++j) {
       intercept[j] += line.intercept[i] * k[j];
       slope[j] += line.slope[i] * k[j];
     }
-    const double value = pooled(groups[i].runs);
+    const double value = pooled(runs);
     intercept_value += line.intercept[i] * value;
     slope_value += line.slope[i] * value;
-    const double phi = groups[i].phi_deg;
+    const double phi = runs.front().phi_deg;
     result.push_back(summary(phi == 0 ? "K_T" : fmt::format("k({} deg)", phi), value, k));
   }
   result.push_back(summary("intercept", intercept_value, intercept));

@@ -25,9 +25,9 @@ struct BootstrapInterval {
   double lower = 0, upper = 0;  ///< percentiles of 95 %
 };
 
-/// Of every k, and of the line through them with the weights of its fit. `runs` sorted by φ. The same arguments give
-/// the same numbers.
-[[nodiscard]] std::vector<BootstrapInterval> bootstrap(std::span<const RunSums> runs, const LineWeights& line,
+/// Of every k, and of the line through them with the weights of its fit. `angles` ascending, as `line`. The same
+/// arguments give the same numbers.
+[[nodiscard]] std::vector<BootstrapInterval> bootstrap(std::span<const AngleScatter> angles, const LineWeights& line,
                                                        const BootstrapOptions& options = {});
 
 }  // namespace kphi::fit

@@ -31,7 +31,6 @@ constexpr std::array<Entry, 5> kEntries{{
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr double kEndless = std::numeric_limits<double>::infinity();
-constexpr const char* kUnitOfK = "N/(rad/s)^2";
 
 /// Of Σ weights · k. Its u is the root mean square over the φ with a weight, the column "u" in a budget of several k.
 BudgetRow row_of(const ErrorSource& source, std::span<const double> weights) {

@@ -16,6 +16,8 @@
 
 namespace kphi::fit {
 
+inline constexpr const char* kUnitOfK = "N/(rad/s)^2";
+
 enum class Evaluation : std::uint8_t {
   type_a,  ///< from the scatter of what was measured here
   type_b,  ///< from anything else: data sheet, check weight, judgement

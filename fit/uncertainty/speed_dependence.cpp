@@ -302,12 +302,12 @@ void judge(const Angle& angle, const Estimate& scatter, double share, SpeedDepen
 
 }  // namespace
 
-std::vector<SpeedDependence> speed_dependence(std::span<const StepsOfAngle> measured) {
+std::vector<SpeedDependence> speed_dependence(std::span<const OcclusionCoefficient> table) {
   std::vector<SpeedDependence> result;
   std::vector<Angle> angles;
   std::vector<std::vector<Run>> complete;
-  for (const StepsOfAngle& one : measured) {
-    std::vector<Run> runs = runs_of(one.steps);
+  for (const OcclusionCoefficient& one : table) {
+    std::vector<Run> runs = runs_of(one.measured);
     result.push_back({});
     result.back().phi_deg = one.phi_deg;
     result.back().levels = level_coefficients(runs);

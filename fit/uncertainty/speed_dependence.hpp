@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-#include "fit/model/thrust_fit.hpp"
+#include "fit/model/identification.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
 #include "results/step_mean.hpp"
 
@@ -36,12 +36,7 @@ struct SpeedDependence {
   double inadequacy = 0;
 };
 
-struct StepsOfAngle {
-  double phi_deg = 0;
-  std::span<const results::StepMean> steps;
-};
-
 /// One per φ, in their order. Levels that not every repetition of a φ measured are left out of its lack-of-fit test.
-[[nodiscard]] std::vector<SpeedDependence> speed_dependence(std::span<const StepsOfAngle> angles);
+[[nodiscard]] std::vector<SpeedDependence> speed_dependence(std::span<const OcclusionCoefficient> table);
 
 }  // namespace kphi::fit

@@ -12,44 +12,11 @@ namespace {
 
 using Counts = std::array<std::int32_t, 6>;
 
-CountSums sums_of(std::span<const Counts> counts, std::size_t axis, std::int32_t origin) {
-  CountSums sums;
-  for (const Counts& c : counts) {
-    const std::int64_t difference = static_cast<std::int64_t>(c[axis]) - origin;
-    sums.sum += difference;
-    sums.squares += static_cast<Wide>(difference) * difference;
-  }
-  return sums;
-}
-
-bool reach(std::span<const Counts> counts, const Counts& limits) {
-  // Two records at a time: twelve numbers side by side, in whole vector registers.
-  std::array<std::int32_t, 12> found{}, high{}, low{};
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    high[i] = limits[i % 6] - 1;
-    low[i] = 1 - limits[i % 6];
-  }
-  const std::int32_t* at = counts.empty() ? nullptr : counts.front().data();
-  for (std::size_t pair = 0; pair < counts.size() / 2; ++pair, at += found.size()) {
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      found[i] |= -static_cast<std::int32_t>(at[i] > high[i]) | -static_cast<std::int32_t>(at[i] < low[i]);
-    }
-  }
-  std::int32_t any = 0;
-  for (const std::int32_t one : found) any |= one;
-  if (counts.size() % 2 == 1) {
-    for (std::size_t i = 0; i < 6; ++i) {
-      any |=
-          static_cast<std::int32_t>(counts.back()[i] > high[i]) | static_cast<std::int32_t>(counts.back()[i] < low[i]);
-    }
-  }
+bool reach(const Counts& counts, const Counts& limits) {
+  std::int32_t any = 0;  // without a branch: six numbers side by side
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    any |= static_cast<std::int32_t>(counts[i] >= limits[i]) | static_cast<std::int32_t>(counts[i] <= -limits[i]);
   return any != 0;
-}
-
-std::uint32_t bits_of(std::span<const std::uint32_t> status) {
-  std::uint32_t bits = 0;
-  for (const std::uint32_t word : status) bits |= word == (kSummaryBit | kMonitorBit) ? 0u : word;
-  return bits;
 }
 
 constexpr Nanoseconds kBin = 10'000'000;
@@ -66,15 +33,6 @@ CountMean mean_of(const CountSums& sums, std::int32_t origin, std::uint64_t samp
 
 std::uint32_t stride_of(const RunHeader& header) { return std::max(header.load_cell.ft_stride, 1u); }
 
-/// Where ft_sequence advances by `least` or more.
-std::vector<std::size_t> advances(std::span<const std::uint32_t> ft, std::uint32_t least) {
-  std::vector<std::size_t> found;
-  for (std::size_t i = 1; i < ft.size(); ++i) {
-    if (ft[i] - ft[i - 1] >= least) found.push_back(i);
-  }
-  return found;
-}
-
 CountFrame frame_of(const RunHeader& header) {
   CountFrame frame;
   frame.axis = static_cast<std::size_t>(header.thrust_axis);
@@ -89,12 +47,22 @@ CountFrame frame_of(const RunHeader& header) {
 
 }  // namespace
 
-void CellBin::add(std::span<const Counts> counts, std::span<const std::uint32_t> words, const CountFrame& frame) {
-  force.add(sums_of(counts, frame.axis, frame.force_origin));
-  torque.add(sums_of(counts, frame.axis + 3, frame.torque_origin));
-  n += static_cast<std::uint32_t>(counts.size());
-  status |= bits_of(words);
-  at_limit |= reach(counts, frame.limits);
+void CountSums::add(std::int64_t difference) {
+  sum += difference;
+  squares += static_cast<Wide>(difference) * difference;
+}
+
+void CellBin::add(std::span<const LoadCellRecord> records, const CountFrame& frame) {
+  CellBin sums = *this;  // in registers
+  const CountFrame f = frame;
+  for (const LoadCellRecord& record : records) {
+    sums.force.add(std::int64_t{record.counts[f.axis]} - f.force_origin);
+    sums.torque.add(std::int64_t{record.counts[f.axis + 3]} - f.torque_origin);
+    sums.status |= record.status == (kSummaryBit | kMonitorBit) ? 0u : record.status;
+    sums.at_limit |= reach(record.counts, f.limits);
+  }
+  sums.n += static_cast<std::uint32_t>(records.size());
+  *this = sums;
 }
 
 bool CellBin::frozen() const { return n > 1 && force.squares * n == static_cast<Wide>(force.sum) * force.sum; }
@@ -144,11 +112,10 @@ CellWindow CellBins::over(std::size_t first, std::size_t last) const {
   return found;
 }
 
-CellStream::CellStream(const RunRecording& run, LoadCellColumns columns)
+CellStream::CellStream(const RunRecording& run)
     : header_(run.header),
-      columns_(std::move(columns)),
-      clock_(columns_, run.header.load_cell.device_rate_hz, stall_ends(run.events)),
-      gaps_(advances(columns_.ft_sequence, 2 * stride_of(run.header))),
+      records_(run.load_cell),
+      clock_(records_, run.header.load_cell.device_rate_hz, run.events),
       frame_(frame_of(run.header)) {
   for (const ClockEpoch& epoch : clock_.epochs()) {
     if (epoch.rebooted) reboots_.push_back(clock_.time_ns(epoch, epoch.begin));
@@ -184,16 +151,15 @@ CellBins CellStream::bins(const Window& window) const {
     take_gaps(epoch, begin, end, bins);
     if (begin == end) continue;
     if (first) {
-      const Counts& counts = columns_.counts[begin];
+      const Counts& counts = records_[begin].counts;
       bins.frame_.force_origin = counts[frame_.axis];
       bins.frame_.torque_origin = counts[frame_.axis + 3];
       first = false;
     }
     std::size_t from = begin;
     for (std::size_t i = 0; i < bins.size() && from < end; ++i) {
-      const std::size_t to = clock_.first_at(epoch, bins.window(i, i + 1).end);
-      bins.bins_[i].add(std::span(columns_.counts).subspan(from, to - from),
-                        std::span(columns_.status).subspan(from, to - from), bins.frame_);
+      const std::size_t to = clock_.first_at(epoch, bins.window(i, i + 1).end, from);
+      bins.bins_[i].add(records_.subspan(from, to - from), bins.frame_);
       from = to;
     }
   }
@@ -202,15 +168,14 @@ CellBins CellStream::bins(const Window& window) const {
 
 EvenSamples CellStream::samples(const Window& window) const {
   EvenSamples found{header_.load_cell.device_rate_hz / stride_of(header_), {}};
-  const auto& ft = columns_.ft_sequence;
   for (const ClockEpoch& epoch : clock_.epochs()) {
     const std::size_t begin = clock_.first_at(epoch, window.begin), end = clock_.first_at(epoch, window.end);
     if (begin == end) continue;
     if (!found.counts.empty()) return {};
     for (std::size_t i = begin; i < end; ++i) {
-      const std::uint32_t strides = i == begin ? 1 : (ft[i] - ft[i - 1]) / stride_of(header_);
+      const std::uint32_t strides = i == begin ? 1 : advance_to(i) / stride_of(header_);
       for (std::uint32_t k = 1; k < strides; ++k) found.counts.push_back(found.counts.back());
-      found.counts.push_back(columns_.counts[i][frame_.axis]);
+      found.counts.push_back(records_[i].counts[frame_.axis]);
     }
   }
   return found;
@@ -220,9 +185,9 @@ EvenSamples CellStream::samples(const Window& window) const {
 void CellStream::take_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const {
   const std::size_t from = std::max(begin, epoch.begin + 1);
   const std::size_t to = std::min(end + 1, epoch.end);
-  for (auto gap = std::lower_bound(gaps_.begin(), gaps_.end(), from); gap != gaps_.end() && *gap < to; ++gap) {
-    const std::size_t i = *gap;
-    const std::uint32_t missing = (columns_.ft_sequence[i] - columns_.ft_sequence[i - 1]) / stride_of(header_) - 1;
+  for (std::size_t i = from; i < to; ++i) {
+    if (advance_to(i) < 2 * stride_of(header_)) continue;
+    const std::uint32_t missing = advance_to(i) / stride_of(header_) - 1;
     const Nanoseconds before = clock_.time_ns(epoch, i - 1);
     const double period = static_cast<double>(clock_.time_ns(epoch, i) - before) / (missing + 1.0);
     bins.gaps_.push_back({static_cast<double>(before), period, missing});

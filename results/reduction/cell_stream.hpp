@@ -24,6 +24,7 @@ inline constexpr std::uint32_t kSummaryBit = 1u << 31;
 struct CountSums {
   std::int64_t sum = 0;
   Wide squares = 0;
+  void add(std::int64_t difference);
   void add(const CountSums& other) {
     sum += other.sum;
     squares += other.squares;
@@ -43,8 +44,7 @@ struct CellBin {
   std::uint32_t n = 0;
   std::uint32_t status = 0;  ///< all set bits, without healthy monitor words
   bool at_limit = false;     ///< a count of some axis at the end of its range
-  void add(std::span<const std::array<std::int32_t, 6>> counts, std::span<const std::uint32_t> words,
-           const CountFrame& frame);
+  void add(std::span<const LoadCellRecord> records, const CountFrame& frame);
   [[nodiscard]] bool frozen() const;  ///< more than one sample, and no force differs
 };
 
@@ -107,9 +107,7 @@ struct EvenSamples {
 class CellStream {
  public:
   /// The recording must outlive the stream.
-  explicit CellStream(const RunRecording& run) : CellStream(run, LoadCellColumns(run.load_cell)) {}
-  /// Takes the samples from `columns`.
-  CellStream(const RunRecording& run, LoadCellColumns columns);
+  explicit CellStream(const RunRecording& run);
 
   /// Number of restarts of the box before `time`.
   [[nodiscard]] std::size_t boot_at(Nanoseconds time) const;
@@ -119,12 +117,14 @@ class CellStream {
   [[nodiscard]] EvenSamples samples(const Window& window) const;
 
  private:
+  [[nodiscard]] std::uint32_t advance_to(std::size_t i) const {
+    return records_[i].ft_sequence - records_[i - 1].ft_sequence;
+  }
   void take_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const;
 
   const RunHeader& header_;
-  LoadCellColumns columns_;
+  std::span<const LoadCellRecord> records_;
   ClockMap clock_;
-  std::vector<std::size_t> gaps_;  ///< records after a gap of ft_sequence
   std::vector<Nanoseconds> reboots_;
   CountFrame frame_;
 };

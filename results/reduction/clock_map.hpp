@@ -25,16 +25,20 @@ class ClockMap {
  public:
   /// `device_rate_hz`: rate at which ft_sequence counts. The records must be in order of arrival.
   /// A one-way stream cannot show the constant delays of box, filter and wire: times are late by their smallest sum.
-  /// `breaks`: times at which the box resumed counting after a stall; ascending.
-  ClockMap(const LoadCellColumns& columns, double device_rate_hz, std::span<const Nanoseconds> breaks = {});
+  /// `events`: in a stall the box repeats its measurement and its clock stands still; behind it begins another epoch.
+  /// The records must outlive the map.
+  ClockMap(std::span<const LoadCellRecord> records, double device_rate_hz, std::span<const StreamEvent> events = {});
 
   [[nodiscard]] const std::vector<ClockEpoch>& epochs() const { return epochs_; }
   /// Bench time of the sample in record `index` of `epoch`. Increases with the index.
   [[nodiscard]] Nanoseconds time_ns(const ClockEpoch& epoch, std::size_t index) const {
-    return time_of(epoch, ft_[index]);
+    return time_of(epoch, records_[index].ft_sequence);
   }
-  /// First record of `epoch` at or after `time`; epoch.end if there is none.
-  [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, Nanoseconds time) const;
+  /// First record of `epoch` at or after `time`, not before `from`; epoch.end if there is none. Quick near `from`.
+  [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, Nanoseconds time, std::size_t from) const;
+  [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, Nanoseconds time) const {
+    return first_at(epoch, time, epoch.begin);
+  }
 
  private:
   /// Since the begin of the epoch.
@@ -42,13 +46,9 @@ class ClockMap {
     return static_cast<double>(ft - epoch.ft_first) * tick_ns_;
   }
   [[nodiscard]] Nanoseconds time_of(const ClockEpoch& epoch, std::uint32_t ft) const;
-  void fit(std::span<const Nanoseconds> arrival_ns, ClockEpoch& epoch) const;
-  std::vector<std::uint32_t> ft_;
+  std::span<const LoadCellRecord> records_;
   double tick_ns_;
   std::vector<ClockEpoch> epochs_;
 };
-
-/// Ends of the stalls, in which the box repeats its measurement and its clock stands still.
-[[nodiscard]] std::vector<Nanoseconds> stall_ends(std::span<const StreamEvent> events);
 
 }  // namespace kphi::results

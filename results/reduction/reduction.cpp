@@ -17,8 +17,6 @@
 namespace kphi::results {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 double seconds(Nanoseconds time) { return 1e-9 * static_cast<double>(time); }
 Nanoseconds nanoseconds(double time_s) { return std::llround(1e9 * time_s); }
 
@@ -30,13 +28,23 @@ struct HeldStep {
   Transition transition;  ///< thrust in N, zero subtracted
 };
 
+const RunRecording& usable(const RunRecording& run) {
+  const RunHeader& header = run.header;
+  const auto& scale = header.load_cell;
+  const bool usable = scale.counts_per_newton > 0 && scale.counts_per_newton_metre > 0 && scale.device_rate_hz > 0 &&
+                      header.thrust_axis >= 0 && header.thrust_axis <= 2 && header.clock_gain > 0;
+  if (usable) return run;
+  throw RecordError(
+      fmt::format("run {}: scale, rate, thrust axis or clock gain is invalid; see kphi verify", header.uuid));
+}
+
 class Reduction {
  public:
-  Reduction(const RunRecording& run, LoadCellColumns load_cell)
-      : run_(run),
+  explicit Reduction(const RunRecording& run)
+      : run_(usable(run)),
         newtons_(run.header.thrust_sign / run.header.load_cell.counts_per_newton),
         newton_metres_(run.header.thrust_sign / run.header.load_cell.counts_per_newton_metre),
-        cell_(run, std::move(load_cell)),
+        cell_(run),
         motor_(run.motor),
         zeros_(run, cell_, motor_),
         spans_(flag_spans(run.events)) {}
@@ -158,7 +166,7 @@ class Reduction {
     if (!(mean > 0)) return values;
     for (std::size_t i = 0; i < values.size(); ++i) {
       // A motor that stops shows nothing about the coefficient.
-      values[i] *= expected[first + i] > 0.25 * mean ? mean / expected[first + i] : kNan;
+      values[i] *= expected[first + i] > 0.25 * mean ? mean / expected[first + i] : kNotMeasured;
     }
     return values;
   }
@@ -188,8 +196,8 @@ class Reduction {
     mean.window_begin_s = seconds(evidence.window.begin);
     mean.window_end_s = seconds(evidence.window.end);
     mean.discarded_s = seconds(evidence.window.begin - step.whole.begin);
-    mean.lag_s = lag_.known() ? lag_.seconds : kNan;
-    mean.lag_u_s = lag_.known() ? lag_.u : kNan;
+    mean.lag_s = lag_.known() ? lag_.seconds : kNotMeasured;
+    mean.lag_u_s = lag_.known() ? lag_.u : kNotMeasured;
     mean.quality_flags =
         flags_within(spans_, step.whole.begin, step.whole.end) | step_flags(run_.header, motor_, evidence) |
         supply_flags(within(run_.supply, {step.whole.begin, evidence.window.begin}), false) |
@@ -229,7 +237,7 @@ class Reduction {
     mean.zero_n = newtons_ * zero.force;
     mean.zero_u_n = std::abs(newtons_) * zero.u;
     mean.zero_moved_n = newtons_ * zeros_.movement();
-    mean.thrust_n_eff = error.u > 0 ? mean.thrust_sd_n * mean.thrust_sd_n / (error.u * error.u) : kNan;
+    mean.thrust_n_eff = error.u > 0 ? mean.thrust_sd_n * mean.thrust_sd_n / (error.u * error.u) : kNotMeasured;
     mean.thrust_u_n = std::hypot(error.u, mean.zero_u_n);
     mean.thrust_freedom = joint_freedom(error.u, error.freedom, mean.zero_u_n, zero.freedom);
   }
@@ -274,31 +282,11 @@ class Reduction {
   Lag lag_;
 };
 
-void require_usable(const RunHeader& header) {
-  const auto& scale = header.load_cell;
-  const bool usable = scale.counts_per_newton > 0 && scale.counts_per_newton_metre > 0 && scale.device_rate_hz > 0 &&
-                      header.thrust_axis >= 0 && header.thrust_axis <= 2 && header.clock_gain > 0;
-  if (usable) return;
-  throw RecordError(
-      fmt::format("run {}: scale, rate, thrust axis or clock gain is invalid; see kphi verify", header.uuid));
-}
-
 }  // namespace
 
-Reduced reduce_with_zeros(const RunRecording& run) {
-  require_usable(run.header);
-  return Reduction(run, LoadCellColumns(run.load_cell)).reduced();
-}
+Reduced reduce_with_zeros(const RunRecording& run) { return Reduction(run).reduced(); }
 
-Reduced reduce_with_zeros(RunFile file) {
-  require_usable(file.run.header);
-  return Reduction(file.run, std::move(file.load_cell)).reduced();
-}
-
-std::vector<Transition> transitions_of(const RunRecording& run) {
-  require_usable(run.header);
-  return Reduction(run, LoadCellColumns(run.load_cell)).transitions();
-}
+std::vector<Transition> transitions_of(const RunRecording& run) { return Reduction(run).transitions(); }
 
 std::vector<StepMean> reduce(const RunRecording& run) { return reduce_with_zeros(run).steps; }
 

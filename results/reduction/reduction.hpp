@@ -6,7 +6,6 @@
 #include "results/records.hpp"
 #include "results/reduction/lag.hpp"
 #include "results/reduction/zeros.hpp"
-#include "results/run_reader.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::results {
@@ -45,8 +44,5 @@ struct Reduced {
 /// The changes of speed of the steps that were held to their end, for estimate_lag(). Without a zero the thrust keeps
 /// its offset.
 [[nodiscard]] std::vector<Transition> transitions_of(const RunRecording& run);
-
-/// The same bits.
-[[nodiscard]] Reduced reduce_with_zeros(RunFile run);
 
 }  // namespace kphi::results

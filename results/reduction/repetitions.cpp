@@ -20,8 +20,6 @@ namespace kphi::results {
 namespace {
 using Group = std::vector<const StepMean*>;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 constexpr double StepMean::*kMeans[] = {
     // of every run
     &StepMean::commanded_speed_rad_s, &StepMean::thrust_n, &StepMean::torque_nm, &StepMean::zero_n,
@@ -46,13 +44,7 @@ double mean_over(const Group& group, double StepMean::*member, Function f) {
     sum += f(step->*member);
     ++n;
   }
-  return n == 0 ? kNan : sum / n;
-}
-
-double sum_over(const Group& group, double StepMean::*member) {
-  double sum = 0;
-  for (const StepMean* step : group) sum += step->*member;
-  return sum;
+  return n == 0 ? kNotMeasured : sum / n;
 }
 
 /// Welch-Satterthwaite, of the mean of the repetitions.
@@ -77,13 +69,14 @@ StepMean average(const Group& group) {
   for (const auto member : kUncertainties) {
     mean.*member = std::sqrt(mean_over(group, member, [](double x) { return x * x; }) / n);
   }
-  mean.thrust_n_eff = sum_over(group, &StepMean::thrust_n_eff);
   mean.thrust_freedom = freedom_of(group);
-  for (const auto member : kSums) {
-    mean.*member = 0;
-    for (const StepMean* step : group) mean.*member += step->*member;
+  mean.thrust_n_eff = 0;
+  for (const auto member : kSums) mean.*member = 0;
+  for (const StepMean* step : group) {
+    mean.thrust_n_eff += step->thrust_n_eff;
+    for (const auto member : kSums) mean.*member += step->*member;
+    mean.quality_flags |= step->quality_flags;
   }
-  for (const StepMean* step : group) mean.quality_flags |= step->quality_flags;
   return mean;
 }
 
@@ -141,7 +134,8 @@ std::vector<RepetitionFigure> figures_of(const Runs& runs) {
   std::optional<std::set<int>> common;
   for (const auto& [repetition, run] : runs) {
     const std::set<int> levels = good_levels(run);
-    figures.push_back({repetition, kNan, kNan, !levels.empty() && 2 * levels.size() >= run.size(), false});
+    figures.push_back(
+        {repetition, kNotMeasured, kNotMeasured, !levels.empty() && 2 * levels.size() >= run.size(), false});
     if (!figures.back().usable) continue;
     if (!common) common = levels;
     std::erase_if(*common, [&](int level) { return !levels.contains(level); });

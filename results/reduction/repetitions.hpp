@@ -57,27 +57,26 @@ struct RunShare {
 /// k of one repetition, N/(rad/s)²: least squares of T = k ω² over the levels that all repetitions have.
 struct RepetitionFigure {
   int repetition = 0;
-  double k = std::numeric_limits<double>::quiet_NaN();
-  double u = std::numeric_limits<double>::quiet_NaN();  ///< standard, from within the steps, the zeros and their drift
-  bool usable = false;                                  ///< at least half of its steps are good
+  double k = kNotMeasured;
+  double u = kNotMeasured;  ///< standard, from within the steps, the zeros and their drift
+  bool usable = false;      ///< at least half of its steps are good
   bool outlying = false;
-  double away =
-      std::numeric_limits<double>::quiet_NaN();  ///< k over the median of all (Student: mean of others), less 1
+  double away = kNotMeasured;  ///< k over the median of all (Student: mean of others), less 1
   /// Probability that chance alone puts one of all runs this far off; NaN: judged by Hampel's identifier, or not at
   /// all.
-  double p = std::numeric_limits<double>::quiet_NaN();
+  double p = kNotMeasured;
 };
 
 /// The repetitions of one propeller and occlusion, compared.
 struct RepetitionVerdict {
   std::string propeller;
   double occlusion_deg = 0;
-  std::vector<RepetitionFigure> repetitions;                     ///< all of them, outlying ones included
-  double k = std::numeric_limits<double>::quiet_NaN();           ///< median
-  double between_sd = std::numeric_limits<double>::quiet_NaN();  ///< of k from repetition to repetition
-  double within_u = std::numeric_limits<double>::quiet_NaN();    ///< root mean square of u
-  double f = std::numeric_limits<double>::quiet_NaN();  ///< between² over within² (one-way analysis of variance)
-  double p = std::numeric_limits<double>::quiet_NaN();  ///< probability of an f this large if only the noise differs
+  std::vector<RepetitionFigure> repetitions;  ///< all of them, outlying ones included
+  double k = kNotMeasured;                    ///< median
+  double between_sd = kNotMeasured;           ///< of k from repetition to repetition
+  double within_u = kNotMeasured;             ///< root mean square of u
+  double f = kNotMeasured;                    ///< between² over within² (one-way analysis of variance)
+  double p = kNotMeasured;                    ///< probability of an f this large if only the noise differs
   bool asks_for_another = false;
   std::string reason;  ///< one line; empty if the repetitions agree
 };

@@ -48,17 +48,14 @@ double fastest(const std::string& command, int times) {
 
 double bootstrap_ms() {
   const kphi::fit::Identification found = kphi::fit::identify(kphi::fit::campaign_steps());
-  std::vector<kphi::fit::RunSums> runs;
   std::vector<double> phis;
-  for (const auto& angle : found.repeatability.angles) {
-    runs.insert(runs.end(), angle.runs.begin(), angle.runs.end());
-    phis.push_back(angle.runs.front().phi_deg);
-  }
+  for (const auto& angle : found.repeatability.angles) phis.push_back(angle.runs.front().phi_deg);
   const auto weights = found.line.weights(phis);
   double best = 1e9;
   for (int i = 0; i < 15; ++i) {
     const auto begin = std::chrono::steady_clock::now();
-    const auto intervals = kphi::fit::bootstrap(runs, weights, {10000, static_cast<std::uint64_t>(i)});
+    const auto intervals =
+        kphi::fit::bootstrap(found.repeatability.angles, weights, {10000, static_cast<std::uint64_t>(i)});
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
     best = std::min(best, intervals.empty() ? 1e9 : took.count());
   }

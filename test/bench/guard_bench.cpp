@@ -1,7 +1,7 @@
 // What the guard costs between driver and recorder at the box's true 7000 records per second: CPU time of its thread
-// against that of the receiving thread, and of all threads against the same path without it, interleaved. Both drain
-// every 5 ms, as on a live bench, and the recorder writes a run file. A third thread does nothing every 5 ms: what
-// waking up costs on this host, which the guard pays for its promptness, is told apart from what the relay and its
+// against that of the receiving thread, and of all threads against its work in the recorder's thread, interleaved. Both
+// drain every 5 ms, as on a live bench, and the recorder writes a run file. A third thread does nothing every 5 ms:
+// what waking up costs on this host, which the guard pays for its promptness, is told apart from what the relay and its
 // judging cost. Goals: relay and judging half of what receiving costs; guard and receiving 2 % of a core.
 #include <atomic>
 #include <thread>
@@ -119,13 +119,15 @@ Shares run(const BoxProcess& box, bool guarded) {
   header.load_cell = scale;
   results::RunWriter writer(folder.path() / "run.h5", header);
   daq::Guard guard(bench, {}, scale, limits());
-  daq::BenchStreams plain(bench);
-  daq::Recorder recorder(bench, guarded ? static_cast<daq::Streams&>(guard) : plain, writer);
+  daq::Recorder recorder(bench, guard, writer);
   guard.take_zero({});
   Shares shares;
   {
     const Working idling([] {});
-    const Working recording([&] { recorder.drain(); });
+    const Working recording([&] {
+      if (!guarded) (void)guard.relay();
+      recorder.drain();
+    });
     std::optional<Working> guarding;
     if (guarded) guarding.emplace([&] { guard.poll(); });
     std::this_thread::sleep_for(std::chrono::milliseconds(200));

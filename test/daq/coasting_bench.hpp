@@ -36,11 +36,14 @@ class SpoiltSupply final : public SupplyLink {
   const Clock& clock_;
 };
 
-/// A motor whose readings are spoilt, or that obeys no order to stop.
+/// A motor whose readings are spoilt, whose link fails, or that obeys no order to stop.
 class SpoiltMotor final : public MotorLink {
  public:
   explicit SpoiltMotor(MotorLink& inner) : inner_(inner) {}
-  void spin_at(RadPerSec signed_speed) override { inner_.spin_at(signed_speed); }
+  void spin_at(RadPerSec signed_speed) override {
+    if (before_speed) before_speed();
+    inner_.spin_at(signed_speed);
+  }
   void renew() noexcept override { inner_.renew(); }
   void emergency_stop() noexcept override {
     if (is_deaf) {
@@ -54,14 +57,17 @@ class SpoiltMotor final : public MotorLink {
   [[nodiscard]] const iq::AuditRecord& parameters() const override { return inner_.parameters(); }
   [[nodiscard]] std::optional<Celsius> coil_temperature() override { return inner_.coil_temperature(); }
   [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return inner_.take_events(); }
-  [[nodiscard]] std::string failure() const override { return inner_.failure(); }
+  [[nodiscard]] std::string failure() const override { return lost.empty() ? inner_.failure() : lost; }
+  [[nodiscard]] results::MotorCounts counts() const override { return inner_.counts(); }
   [[nodiscard]] std::string identity() const override { return inner_.identity(); }
   std::size_t take(std::span<results::MotorReading> out) override {
     const std::size_t n = inner_.take(out);
     for (std::size_t i = 0; spoil && i < n; ++i) spoil(out[i]);
     return n;
   }
+  std::function<void()> before_speed;  ///< each
   std::function<void(results::MotorReading&)> spoil;
+  std::string lost;  ///< why the link is dead
   bool is_deaf = false;
   int ignored = 0;  ///< orders
 

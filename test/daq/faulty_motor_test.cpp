@@ -97,7 +97,17 @@ TEST_F(FaultyMotor, BearsLostDoubledAndDamagedRepliesWithoutAFlag) {
       "  - {at_s: 1.0, for_s: 2, kind: motor_flip, p: 0.05}\n"
       "  - {at_s: 1.0, for_s: 2, kind: motor_duplicate, p: 0.2}\n");
   EXPECT_EQ(flags(0), (std::vector<std::string>{"", "", "", ""}));
-  EXPECT_GT(bench_->simulation().motor_line().truth().done[static_cast<std::size_t>(sim::MotorFaultKind::drop)], 0u);
+  const auto done = [&](sim::FaultKind kind) { return bench_->simulation().motor_line().truth().done.at(kind); };
+  ASSERT_GT(done(sim::FaultKind::motor_drop), 0u);
+  const auto& [requests, replies, timeouts, late, unasked, crc_errors, discarded, skipped, dropped] =
+      recording(0).motor_counts;
+  EXPECT_GE(requests, replies + timeouts);
+  EXPECT_LE(requests, replies + timeouts + 16) << "still open, before and after";
+  EXPECT_NEAR(timeouts, done(sim::FaultKind::motor_drop) + done(sim::FaultKind::motor_flip), 5);
+  EXPECT_NEAR(unasked + late, done(sim::FaultKind::motor_duplicate), 10);
+  EXPECT_NEAR(crc_errors, done(sim::FaultKind::motor_flip), 5);
+  EXPECT_GT(discarded, 0u);
+  EXPECT_EQ(dropped, 0u);
   expect_replay_agrees();
 }
 

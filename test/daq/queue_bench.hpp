@@ -58,6 +58,7 @@ class QueueMotor final : public MotorLink {
   [[nodiscard]] std::string identity() const override { return "test"; }
   [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return std::exchange(events, {}); }
   [[nodiscard]] std::string failure() const override { return lost; }
+  [[nodiscard]] results::MotorCounts counts() const override { return {}; }
 
   std::deque<results::MotorReading> readings;
   std::vector<results::StreamEvent> events;

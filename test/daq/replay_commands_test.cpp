@@ -3,37 +3,19 @@
 
 #include <nlohmann/json.hpp>
 
-#include "commands/commands.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/steps_csv.hpp"
 #include "test/results/synthetic_run.hpp"
+#include "test/verb.hpp"
 
 namespace kphi::daq {
 namespace {
 
+using kphi::test::Said;
 using ::testing::HasSubstr;
 
-struct Said {
-  int code = -1;
-  std::string out;
-  std::string err;
-};
-
-Said say(const std::string& arguments) {
-  CLI::App app;
-  Said said;
-  ExitCode code = ExitCode::failure;
-  commands::add_replay(app, code);
-  ::testing::internal::CaptureStdout();
-  ::testing::internal::CaptureStderr();
-  app.parse("replay " + arguments);
-  std::fflush(stdout);
-  said.out = ::testing::internal::GetCapturedStdout();
-  said.err = ::testing::internal::GetCapturedStderr();
-  said.code = static_cast<int>(code);
-  return said;
-}
+Said say(const std::string& arguments) { return kphi::test::say("replay " + arguments); }
 
 class Replay : public ::testing::Test {
  protected:

@@ -36,8 +36,8 @@ class SupplyCampaign : public testing::Test {
     return run_campaign(*bench_, campaign_, config_, *results_, person, progress_, [] { return false; });
   }
   /// From now on; `count` answers, or 0: all of a minute.
-  void spoil(sim::SupplyFaultKind kind, std::uint64_t count) {
-    sim::SupplyFault fault;
+  void spoil(sim::FaultKind kind, std::uint64_t count) {
+    sim::Fault fault;
     fault.kind = kind;
     fault.at = bench_->clock().now();
     fault.lasts = std::chrono::minutes(1);
@@ -130,7 +130,7 @@ TEST_F(SupplyCampaign, StopsWhenSomebodyTurnsTheKnob) {
 TEST_F(SupplyCampaign, StopsWhenTheSupplyNoLongerAnswersAndSaysThatItMayBeOn) {
   bool closed = false;
   progress_.act = [&](const Position& position) {
-    if (position.step == 0 && !std::exchange(closed, true)) spoil(sim::SupplyFaultKind::closed, 0);
+    if (position.step == 0 && !std::exchange(closed, true)) spoil(sim::FaultKind::supply_closed, 0);
   };
   EXPECT_THAT([&] { (void)run(); },
               ThrowsMessage<SafetyStop>(testing::AllOf(testing::StartsWith("supply:"), HasSubstr("it may be ON"))))
@@ -142,7 +142,7 @@ TEST_F(SupplyCampaign, StopsWhenTheSupplyNoLongerAnswersAndSaysThatItMayBeOn) {
 TEST_F(SupplyCampaign, BearsAnAnswerThatIsLost) {
   bool lost = false;
   progress_.act = [&](const Position& position) {
-    if (position.step == 1 && !std::exchange(lost, true)) spoil(sim::SupplyFaultKind::bad_crc, 2);
+    if (position.step == 1 && !std::exchange(lost, true)) spoil(sim::FaultKind::supply_bad_crc, 2);
   };
   EXPECT_EQ(run().flagged_steps, 0);
 }

@@ -2,7 +2,6 @@
 // go.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <poll.h>
 #include <signal.h>
 
 #include <atomic>
@@ -15,6 +14,7 @@
 #include "test/daq/bench_fixture.hpp"
 #include "test/end_to_end/account.hpp"
 #include "test/end_to_end/running_bench.hpp"
+#include "test/soon.hpp"
 
 namespace kphi::test {
 namespace {
@@ -33,16 +33,6 @@ class HangingRunner : public testing::Test {
   ~HangingRunner() override { release(); }
 
   [[nodiscard]] json status() const { return json::parse(sim::tell(simulation_.path("control"), "status")); }
-  /// Polls; false when it never comes true.
-  template <class Predicate>
-  [[nodiscard]] static bool soon(Predicate&& predicate) {
-    const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-    while (!predicate()) {
-      if (std::chrono::steady_clock::now() > give_up) return false;
-      ::poll(nullptr, 0, 2);
-    }
-    return true;
-  }
   /// Records a run whose runner hangs once the motor turns, until release().
   void record() {
     run_ = std::async(std::launch::async, [this]() -> std::string {

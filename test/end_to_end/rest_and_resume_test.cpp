@@ -2,13 +2,13 @@
 // safety stop: the program beside the simulated bench, over the real transports.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <poll.h>
 #include <signal.h>
 
 #include "drivers/sim/control_line.hpp"
 #include "test/end_to_end/account.hpp"
 #include "test/end_to_end/running_bench.hpp"
 #include "test/end_to_end/terminal.hpp"
+#include "test/soon.hpp"
 
 namespace kphi::test {
 namespace {
@@ -33,15 +33,6 @@ class Stand {
     return nlohmann::json::parse(sim::tell(bench.path("control"), "status"));
   }
   [[nodiscard]] double speed() const { return std::abs(status()["speed_rad_s"].get<double>()); }
-  template <class Predicate>
-  [[nodiscard]] static bool soon(Predicate&& predicate) {
-    const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-    while (!predicate()) {
-      if (std::chrono::steady_clock::now() > give_up) return false;
-      ::poll(nullptr, 0, 2);
-    }
-    return true;
-  }
   [[nodiscard]] std::string folder() const {
     for (const auto& campaign : std::filesystem::directory_iterator(bench.path("results")))
       return campaign.path().string();
@@ -81,7 +72,7 @@ class AfterAKill : public testing::TestWithParam<bool> {
   /// At full speed.
   void kill_the_program() {
     Process run(stand_.first({"--yes"}));
-    ASSERT_TRUE(Stand::soon([&] { return !run.hear() || stand_.speed() * kRpm > 14500; })) << run.err();
+    ASSERT_TRUE(soon([&] { return !run.hear() || stand_.speed() * kRpm > 14500; })) << run.err();
     ASSERT_GT(stand_.speed() * kRpm, 13000) << run.err();
     run.signal(SIGKILL);
     EXPECT_EQ(run.wait(), 128 + SIGKILL);

@@ -41,7 +41,7 @@ profiles::Campaign shortened(const std::string& name) {
   return profiles::parse_campaign(text, name);
 }
 
-FamilyMember measured(const std::string& name, int seed) {
+Fitted measured(const std::string& name, int seed) {
   const test::TemporaryFolder folder;
   const profiles::BenchConfig config = test::deterministic_config(seed);
   daq::DeterministicBench bench(config, sim::BenchSettings{});
@@ -49,7 +49,7 @@ FamilyMember measured(const std::string& name, int seed) {
   daq::AutoConfirmOperator person;
   daq::Progress silence;
   (void)daq::run_campaign(bench, shortened(name), config, results, person, silence, [] { return false; });
-  FamilyMember member;
+  Fitted member;
   member.identification = identify(results::read_steps(results.steps()));
   AnalysisOptions options;
   options.bench.motor_clock = 2e-4;
@@ -58,10 +58,9 @@ FamilyMember measured(const std::string& name, int seed) {
   return member;
 }
 
-const std::vector<FamilyMember>& four() {
-  static const std::vector<FamilyMember> members{
-      measured("icra2021_5in_2blade", 21), measured("icra2021_5in_3blade", 22), measured("icra2021_6in_2blade", 23),
-      measured("icra2021_6in_3blade", 24)};
+const std::vector<Fitted>& four() {
+  static const std::vector<Fitted> members{measured("icra2021_5in_2blade", 21), measured("icra2021_5in_3blade", 22),
+                                           measured("icra2021_6in_2blade", 23), measured("icra2021_6in_3blade", 24)};
   return members;
 }
 

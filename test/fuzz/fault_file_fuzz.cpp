@@ -45,7 +45,7 @@ void stream_through(const std::string& text) {
   const sim::FaultFile file = sim::parse_faults(text, "faults.yaml");
   settings.quirks = file.quirks;
   sim::NetBoxDevice box(settings);
-  sim::FaultInjector wire(box, file.load_cell, 1);
+  sim::FaultInjector wire(box, file.faults, 1);
   wire.request(std::array<std::uint8_t, 8>{0x12, 0x34, 0, 3, 0, 0, 0, 0}, 7, Instant{0});
   sim::Datagram datagram;
   std::uint64_t taken = 0;

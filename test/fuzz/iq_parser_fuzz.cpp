@@ -22,7 +22,7 @@ void parse(std::span<const std::uint8_t> bytes, std::size_t chunk) {
     parser.push(bytes.subspan(at, std::min(chunk, bytes.size() - at)), sink);
   }
   while (parser.partial()) parser.abandon(sink);
-  require(parser.counters().bytes == bytes.size());
+  require(parser.counters().bytes_in == bytes.size());
   require(parser.counters().discarded_bytes + in_packets == bytes.size());
 }
 

@@ -1,5 +1,3 @@
-#include "commands/commands.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,30 +7,14 @@
 #include "results/campaign_folder.hpp"
 #include "results/journal.hpp"
 #include "test/results/synthetic_run.hpp"
+#include "test/verb.hpp"
 
 namespace kphi::results {
 namespace {
 
+using kphi::test::Said;
+using kphi::test::say;
 using ::testing::HasSubstr;
-
-struct Said {
-  int code = -1;
-  std::string out;
-};
-
-Said say(const std::string& arguments) {
-  CLI::App app;
-  Said said;
-  ExitCode code = ExitCode::failure;
-  commands::add_info(app, code);
-  commands::add_verify(app, code);
-  ::testing::internal::CaptureStdout();
-  app.parse(arguments);
-  std::fflush(stdout);
-  said.out = ::testing::internal::GetCapturedStdout();
-  said.code = static_cast<int>(code);
-  return said;
-}
 
 class Commands : public ::testing::Test {
  protected:
@@ -60,6 +42,7 @@ TEST_F(Commands, InfoTellsWhatHappenedToTheStreamAndHowItDid) {
   RunRecording run = test::make_run({});
   run.events.push_back({EventKind::restarted, 3'000'000'000, 12, "3.000 s: the stream began anew"});
   run.health.skew_ppm = 17.25;
+  run.motor_counts[2] = 4;
   const auto file = folder_.run("5x3", 180, 1);
   (void)test::write_run(file, run);
   const Said said = say("info " + file.string());
@@ -68,6 +51,7 @@ TEST_F(Commands, InfoTellsWhatHappenedToTheStreamAndHowItDid) {
   const auto json = nlohmann::json::parse(say("info --json " + file.string()).out);
   EXPECT_EQ(json.at("events").at(0).at("kind"), "restarted");
   EXPECT_EQ(json.at("health").at("skew_ppm"), 17.25);
+  EXPECT_EQ(json.at("motor_timeouts"), 4);
   EXPECT_TRUE(json.at("box_bias").is_null()) << "none was taken";
 }
 

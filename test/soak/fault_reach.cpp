@@ -1,6 +1,7 @@
 #include "test/soak/fault_reach.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "drivers/sim/input_files.hpp"
 
@@ -14,18 +15,22 @@ constexpr Duration kEcho = 1s;
 
 bool goes_on(sim::FaultKind kind) {
   using K = sim::FaultKind;
-  return kind == K::zero_drift || kind == K::clock_skew || kind == K::taken_over || kind == K::reboot ||
-         kind == K::rate || kind == K::units || kind == K::ft_jump_back || kind == K::overrun || kind == K::wrap;
+  constexpr std::array kOn{K::zero_drift,   K::clock_skew, K::taken_over,      K::reboot,      K::rate,
+                           K::units,        K::overrun,    K::ft_jump_back,    K::wrap,        K::motor_baud,
+                           K::motor_unplug, K::motor_hot,  K::motor_brown_out, K::supply_trip, K::supply_panel};
+  return std::find(kOn.begin(), kOn.end(), kind) != kOn.end();
 }
 
-bool goes_on(sim::MotorFaultKind kind) {
-  using K = sim::MotorFaultKind;
-  return kind == K::brown_out || kind == K::baud || kind == K::unplug || kind == K::hot;
+bool silences(sim::FaultKind kind) {
+  using K = sim::FaultKind;
+  return kind == K::motor_deaf || kind == K::motor_command_flip || kind == K::motor_unplug ||
+         kind == K::motor_ignore_sets || kind == K::motor_baud;
 }
 
-bool silences(sim::MotorFaultKind kind) {
-  using K = sim::MotorFaultKind;
-  return kind == K::deaf || kind == K::command_flip || kind == K::unplug || kind == K::ignore_sets || kind == K::baud;
+Device device_of(sim::FaultKind kind) {
+  if (sim::on_motor(kind)) return Device::motor;
+  if (sim::on_supply(kind)) return Device::supply;
+  return sim::on_air_sensor(kind) ? Device::air : Device::load_cell;
 }
 
 /// A latched monitor condition is no error.
@@ -39,25 +44,12 @@ bool goes_on(const sim::Fault& fault) {
 }  // namespace
 
 Reaches::Reaches(const std::string& faults) {
-  const sim::FaultFile file = sim::parse_faults(faults, "faults");
-  cell_ = file.load_cell;
-  std::erase_if(cell_, is_harmless);
-  const auto end_of = [](const auto& fault, bool for_ever) {
-    if (for_ever) return kNever;
-    return fault.lasts > Duration{0} ? fault.at + fault.lasts + fault.delay + kEcho : fault.at + kEcho;
-  };
-  for (const auto& f : cell_) {
-    all_.push_back({Device::load_cell, std::string(sim::name_of(f.kind)), f.at, end_of(f, goes_on(f))});
-  }
-  for (const auto& f : file.motor) {
-    all_.push_back(
-        {Device::motor, std::string(sim::name_of(f.kind)), f.at, end_of(f, goes_on(f.kind)), silences(f.kind)});
-  }
-  for (const auto& f : file.air)
-    all_.push_back({Device::air, std::string(sim::ambient_faults().name_of(f.kind)), f.at, end_of(f, false)});
-  for (const auto& f : file.supply) {
-    const bool instant = f.kind == sim::SupplyFaultKind::trip || f.kind == sim::SupplyFaultKind::panel;
-    all_.push_back({Device::supply, std::string(sim::supply_faults().name_of(f.kind)), f.at, end_of(f, instant)});
+  for (const sim::Fault& f : sim::parse_faults(faults, "faults").faults) {
+    if (is_harmless(f)) continue;
+    const Device device = device_of(f.kind);
+    if (device == Device::load_cell) cell_.push_back(f);
+    const Instant end = goes_on(f) ? kNever : f.at + (f.lasts > Duration{0} ? f.lasts + f.delay : f.lasts) + kEcho;
+    all_.push_back({device, std::string(sim::name_of(f.kind)), f.at, end, silences(f.kind)});
   }
 }
 

@@ -103,12 +103,11 @@ std::span<const QueryResult> Exchange::receive(std::span<const std::uint8_t> byt
     const std::size_t n = std::min(bytes.size(), kMaxFrame);
     const Instant end = now - byte_time_ * static_cast<std::int64_t>(bytes.size() - n);
     stamp_arrivals(n, end, now);
-    parser_.push(bytes.first(n),
-                 [&](const Packet& packet, std::uint64_t position) { take_packet(packet, position, now); });
+    parser_.push(bytes.first(n), [&](const Packet& packet, std::uint64_t last) { take_packet(packet, last); });
     bytes = bytes.subspan(n);
   }
   last_chunk_ = now;
-  counters_.take(parser_.counters());
+  static_cast<Parser::Counters&>(counters_) = parser_.counters();
   return results_;
 }
 
@@ -116,13 +115,13 @@ std::span<const QueryResult> Exchange::advance(Instant now) {
   results_.clear();
   while (parser_.partial() && now - reading_of(parser_.partial_offset()) >= patience()) {
     ++counters_.resyncs;
-    parser_.abandon([&](const Packet& packet, std::uint64_t position) { take_packet(packet, position, now); });
+    parser_.abandon([&](const Packet& packet, std::uint64_t end) { take_packet(packet, end); });
   }
-  counters_.take(parser_.counters());
+  static_cast<Parser::Counters&>(counters_) = parser_.counters();
   requests_.expire(understood_until(now), [&](const Request& request) {
     ++counters_.timeouts;
     timeout_.timed_out(request.started, now);
-    results_.push_back({QueryResult::Kind::timeout, request, {}, {}, now, now, {}});
+    results_.push_back({QueryResult::Kind::timeout, request, {}, now, now, {}});
   });
   return results_;
 }
@@ -139,7 +138,7 @@ void Exchange::sent(std::size_t n) noexcept {
   tx_queue_.sent(n);
 }
 
-void Exchange::take_packet(const Packet& packet, std::uint64_t end, Instant now) {
+void Exchange::take_packet(const Packet& packet, std::uint64_t end) {
   if (!packet.standard() || packet.access() != Access::reply) {
     ++counters_.unasked;
     return;
@@ -152,7 +151,7 @@ void Exchange::take_packet(const Packet& packet, std::uint64_t end, Instant now)
   const std::size_t size = packet.length + kFrameOverhead;
   const auto request = requests_.answer(packet.type, packet.sub(), packet.module_id(), begun(end - size));
   if (!request) {
-    ++(find(packet.type, packet.sub()) == nullptr ? counters_.unknown_entries : counters_.unasked);
+    ++counters_.unasked;
     return;
   }
   if (request->expired) {
@@ -171,14 +170,13 @@ void Exchange::take_packet(const Packet& packet, std::uint64_t end, Instant now)
     from = std::min(request->queued, last_byte);
     to = last_byte;
   }
-  const Stamps stamps{request->queued, arrival_of(end - size), now};
-  results_.push_back({whole ? QueryResult::Kind::answer : QueryResult::Kind::wrong_length, *request, packet, stamps,
-                      last_byte, from + (to - from) / 2, (to - from) / 2});
+  results_.push_back({whole ? QueryResult::Kind::answer : QueryResult::Kind::wrong_length, *request, packet, last_byte,
+                      from + (to - from) / 2, (to - from) / 2});
 }
 
 // The bytes of a chunk arrived one after the other, before it was read and after the previous chunk was.
 void Exchange::stamp_arrivals(std::size_t n, Instant end, Instant now) noexcept {
-  const std::uint64_t first = parser_.counters().bytes;
+  const std::uint64_t first = parser_.counters().bytes_in;
   for (std::size_t i = 0; i < n; ++i) {
     const Instant on_wire = end - byte_time_ * static_cast<std::int64_t>(n - 1 - i);
     arrivals_[(first + i) % kArrivals] = {std::max(on_wire, last_chunk_), now};

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "base/histogram.hpp"
 #include "drivers/iq/exchange/requests.hpp"
 #include "drivers/iq/exchange/telemetry.hpp"
 #include "drivers/iq/exchange/tx_queue.hpp"
@@ -21,8 +22,7 @@ struct QueryResult {
   enum class Kind { answer, wrong_length, timeout };
   Kind kind = Kind::timeout;
   Request request;
-  Packet packet;  ///< empty after a timeout
-  Stamps stamps;
+  Packet packet;   ///< empty after a timeout
   Instant end{0};  ///< its last byte arrived; after a timeout: now
   /// When the module read the value: the middle of the span from the end of the query to the beginning of the reply,
   /// and half of that span.
@@ -76,12 +76,12 @@ class Exchange {
   /// The time-out that a query would get now.
   [[nodiscard]] Duration timeout() const noexcept { return timeout_.timeout(); }
   /// Round trips less wire time, of queries that had the line to themselves.
-  [[nodiscard]] const RoundTripHistogram& round_trips() const noexcept { return round_trips_; }
+  [[nodiscard]] const DelayHistogram& round_trips() const noexcept { return round_trips_; }
   [[nodiscard]] Counters& counters() noexcept { return counters_; }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 
  private:
-  void take_packet(const Packet& packet, std::uint64_t end, Instant now);
+  void take_packet(const Packet& packet, std::uint64_t end);
   void stamp_arrivals(std::size_t n, Instant end, Instant now) noexcept;
   [[nodiscard]] Instant arrival_of(std::uint64_t position) const noexcept {
     return arrivals_[position % kArrivals].on_wire;
@@ -115,7 +115,7 @@ class Exchange {
   std::uint64_t order_ = 0;
   Instant wire_free_{0};  ///< when the last byte handed over will have left
   AdaptiveTimeout timeout_;
-  RoundTripHistogram round_trips_;
+  DelayHistogram round_trips_;
   Counters counters_;
   std::vector<QueryResult> results_;
 };

@@ -6,30 +6,9 @@
 namespace kphi::iq {
 namespace {
 
-constexpr double kPerOctave = 4;
 constexpr int kOvertaken = 2;
 
 }  // namespace
-
-void RoundTripHistogram::add(Duration duration) noexcept {
-  const double microseconds = std::max(1e-3 * static_cast<double>(duration.count()), 1.0);
-  const auto bucket = static_cast<std::size_t>(kPerOctave * std::log2(microseconds));
-  ++buckets_[std::min(bucket, kBuckets - 1)];
-  ++count_;
-}
-
-Duration RoundTripHistogram::lower_edge(std::size_t i) noexcept {
-  return from_seconds(1e-6 * std::exp2(static_cast<double>(i) / kPerOctave));
-}
-
-Duration RoundTripHistogram::quantile(double share) const noexcept {
-  if (count_ == 0) return Duration{0};
-  const double wanted = std::max(share * static_cast<double>(count_), 1.0);
-  std::uint64_t passed = 0;
-  std::size_t bucket = 0;
-  while (bucket + 1 < kBuckets && static_cast<double>(passed += buckets_[bucket]) < wanted) ++bucket;
-  return lower_edge(bucket) + (lower_edge(bucket + 1) - lower_edge(bucket)) / 2;
-}
 
 void AdaptiveTimeout::measured(Duration round_trip) noexcept {
   if (smoothed_ == Duration{0}) {

@@ -32,32 +32,19 @@ inline constexpr int kQuantities = 9;
   return names[static_cast<int>(quantity)];
 }
 
-/// When a question and its reply passed this host, bench time.
-struct Stamps {
-  Instant sent{0};        ///< the question was handed to the wire
-  Instant first_byte{0};  ///< of the reply came
-  Instant parsed{0};      ///< the reply was whole
-};
-
 struct Reading {
   Quantity quantity = Quantity::speed;
   double value = 0;         ///< in the unit named above; always finite
   Instant time{0};          ///< bench time: midpoint of request and reply, less the time of their bytes on the wire
   Duration uncertainty{0};  ///< half of what is left between the two: the true moment is time ± uncertainty
-  Stamps stamps;
 };
 
 /// What happened on the wire. Malformed input is counted, never an error.
-struct Counters {
-  std::uint64_t bytes_in = 0, bytes_out = 0;
-  std::uint64_t packets = 0;          ///< received whole, with a good CRC
-  std::uint64_t crc_errors = 0;       ///< candidates with a bad CRC
-  std::uint64_t refused_lengths = 0;  ///< candidates with LEN over 59
-  std::uint64_t discarded_bytes = 0;  ///< received bytes that belong to no packet
-  std::uint64_t resyncs = 0;          ///< frames given up because the rest did not come in time
+struct Counters : Parser::Counters {
+  std::uint64_t bytes_out = 0;
+  std::uint64_t resyncs = 0;  ///< frames given up because the rest did not come in time
   std::uint64_t requests = 0, replies = 0;
   std::uint64_t timeouts = 0;
-  std::uint64_t unknown_entries = 0;     ///< replies of a type or sub that no table knows
   std::uint64_t late_replies = 0;        ///< came after their request had timed out; never used
   std::uint64_t unasked = 0;             ///< replies without a request, and packets that are not replies
   std::uint64_t wrong_module = 0;        ///< replies of another module id
@@ -70,15 +57,6 @@ struct Counters {
   std::uint64_t module_resets = 0;       ///< times it was seen to have restarted by itself
   std::uint64_t lease_expiries = 0;      ///< times the host's watchdog coasted the motor (Motor)
   std::uint64_t reconnections = 0;       ///< times the link was lost and found again (Motor)
-
-  /// Takes over what the parser has counted.
-  void take(const Parser::Counters& parsed) noexcept {
-    bytes_in = parsed.bytes;
-    packets = parsed.packets;
-    crc_errors = parsed.crc_errors;
-    refused_lengths = parsed.refused_lengths;
-    discarded_bytes = parsed.discarded_bytes;
-  }
 };
 
 enum class EventKind : std::uint8_t {
@@ -94,13 +72,6 @@ enum class EventKind : std::uint8_t {
   host_absent,      ///< this computer slept, or did not run kphi for so long that the module may have stopped driving
   let_go,           ///< the module has stopped driving by itself
 };
-
-[[nodiscard]] constexpr std::string_view name_of(EventKind kind) noexcept {
-  constexpr std::string_view names[] = {"connected",       "no_answer",     "module_reset", "module_silent",
-                                        "coast_denied",    "lease_expired", "port_lost",    "another_module",
-                                        "slow_round_trip", "host_absent",   "let_go"};
-  return names[static_cast<int>(kind)];
-}
 
 /// A measurement across this event is invalid.
 [[nodiscard]] constexpr bool spoils_a_run(EventKind kind) noexcept {
@@ -126,6 +97,8 @@ struct Settings {
                                ///< on an adapter, not on a pseudo-terminal
   double module_timeout_s = 0.5;  ///< the module coasts by itself after this silence; in its own seconds
   Duration longest_silence{0};    ///< the same as bench time; 0: module_timeout_s, and Motor stretches it as wall time
+  bool inspects = false;  ///< only coasts and answers inquiries: sets nothing, polls nothing, does not expect the
+                          ///< module to speak, is never armed. For a module that may not be fit to spin
   std::size_t credit_bytes = 63;  ///< most bytes of unanswered frames, 18 or more: the module's receive buffer has 64
 };
 

@@ -21,14 +21,14 @@ void append(std::vector<std::uint8_t>& to, std::uint64_t value, int bytes) {
   for (int i = 0; i < bytes; ++i) to.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
 }
 
-bool write_all(int fd, std::span<const std::uint8_t> bytes) noexcept {
+/// What a full disk does not take is lost; the line goes on.
+void write_all(int fd, std::span<const std::uint8_t> bytes) noexcept {
   while (!bytes.empty()) {
     const auto n = ::write(fd, bytes.data(), bytes.size());
     if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
+    if (n <= 0) return;
     bytes = bytes.subspan(static_cast<std::size_t>(n));
   }
-  return true;
 }
 
 }  // namespace
@@ -53,7 +53,6 @@ void Capture::add(Direction direction, std::span<const std::uint8_t> bytes, Inst
   {
     const std::lock_guard lock(mutex_);
     if (waiting_.size() + bytes.size() + 2 * kRecordHead > kMostWaiting) {
-      missing_bytes_ += bytes.size();
       gap_ = true;
       return;
     }
@@ -81,7 +80,7 @@ void Capture::run() noexcept {
       batch.clear();
       batch.swap(waiting_);
     }
-    if (!write_all(file_.number(), batch)) missing_bytes_ += batch.size();
+    write_all(file_.number(), batch);
   }
 }
 

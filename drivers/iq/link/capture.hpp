@@ -4,7 +4,6 @@
 // (something is missing here), the bench time in ns (int64), the number of bytes (uint32), the bytes; little-endian.
 #pragma once
 
-#include <atomic>
 #include <condition_variable>
 #include <cstdint>
 #include <mutex>
@@ -31,7 +30,6 @@ class Capture {
 
   /// From one thread; never waits for the disk.
   void add(Direction direction, std::span<const std::uint8_t> bytes, Instant time);
-  [[nodiscard]] std::uint64_t missing_bytes() const noexcept { return missing_bytes_; }
 
  private:
   static constexpr std::size_t kMostWaiting = 4 << 20;
@@ -44,7 +42,6 @@ class Capture {
   std::vector<std::uint8_t> waiting_;
   bool ended_ = false;
   bool gap_ = false;
-  std::atomic<std::uint64_t> missing_bytes_{0};
   std::thread writer_;
 };
 

@@ -21,7 +21,6 @@ constexpr auto kStopLimit = std::chrono::milliseconds(600);
 constexpr auto kConnectLimit = std::chrono::seconds(10);
 constexpr auto kFinalCoastLimit = std::chrono::milliseconds(200);
 constexpr auto kLongestSleep = std::chrono::seconds(1);
-constexpr auto kPublishEvery = std::chrono::milliseconds(5);
 constexpr auto kFirstPause = std::chrono::milliseconds(50);
 constexpr auto kLongestPause = std::chrono::seconds(1);
 
@@ -30,8 +29,7 @@ Duration lengthen(Duration& pause) noexcept {
   return std::exchange(pause, std::min<Duration>(2 * pause, kLongestPause));
 }
 
-}  // namespace
-
+/// Completed for this port.
 Settings stretched(Settings settings, const std::string& device, unsigned baud, const Clock& clock) {
   settings.wire_paces |= serial::adapter_of(device).has_value();
   if (settings.reply_timeout == Duration{0}) settings.reply_timeout = clock.stretched(std::chrono::milliseconds(100));
@@ -41,30 +39,7 @@ Settings stretched(Settings settings, const std::string& device, unsigned baud, 
   return settings;
 }
 
-// A frame cut short does no harm: the module rescans after a bad CRC, and there are three.
-void send_final_coast(serial::Port& port, int module_id,
-                      const std::function<void(std::span<const std::uint8_t>)>& sent) noexcept {
-  const auto end = steady_clock::now() + kFinalCoastLimit;
-  try {
-    std::array<std::uint8_t, kMaxFrame> frame;
-    const std::size_t size = encode(set<"propeller_motor_control.ctrl_coast">(module_id), frame);
-    for (int i = 0; i < 3; ++i) {
-      std::span<const std::uint8_t> rest = std::span(frame).first(size);
-      while (!rest.empty() && steady_clock::now() < end) {
-        const std::size_t n = port.write(rest);
-        sent(rest.first(n));
-        rest = rest.subspan(n);
-        if (n > 0) continue;
-        pollfd room{port.fd(), POLLOUT, 0};
-        ::poll(&room, 1, 10);
-      }
-    }
-  } catch (const std::exception&) {
-    return;  // the port is gone
-  }
-  // Closing may throw away what has not left yet.
-  port.drain(end - steady_clock::now());
-}
+}  // namespace
 
 /// The thread between a module and its port: reads, writes, sleeps until the next deadline, watches the lease, and
 /// finds the line again when it was lost. Nothing in it waits for a caller or for a disk.
@@ -119,14 +94,42 @@ class Link {
       why = error.what();
     }
     // Past the session, so that an error inside it cannot prevent the coast.
-    if (port_) send_final_coast(*port_, session_.settings().module_id, [this](auto bytes) { capture_sent(bytes); });
+    if (port_) send_final_coast();
     motor_.end(why);
+  }
+
+  /// Three coasts straight to the port. A frame cut short does no harm: the module rescans after a bad CRC, and there
+  /// are three.
+  void send_final_coast() noexcept {
+    const auto end = steady_clock::now() + kFinalCoastLimit;
+    try {
+      std::array<std::uint8_t, kMaxFrame> frame;
+      const Packet coast =
+          make(entry<"propeller_motor_control.ctrl_coast">, Access::set, session_.settings().module_id);
+      const std::size_t size = encode(coast, frame);
+      for (int i = 0; i < 3; ++i) {
+        std::span<const std::uint8_t> rest = std::span(frame).first(size);
+        while (!rest.empty() && steady_clock::now() < end) {
+          const std::size_t n = port_->write(rest);
+          capture_sent(rest.first(n));
+          rest = rest.subspan(n);
+          if (n > 0) continue;
+          pollfd room{port_->fd(), POLLOUT, 0};
+          ::poll(&room, 1, 10);
+        }
+      }
+    } catch (const std::exception&) {
+      return;  // the port is gone
+    }
+    // Closing may throw away what has not left yet.
+    port_->drain(end - steady_clock::now());
   }
 
   void turn() {
     try {
       transmit();
-      publish();
+      motor_.move_readings(session_);
+      motor_.publish(session_, port_ != nullptr);
       const auto [by_command, by_port] = sleep();
       notice_sleep();
       if (by_port) receive();
@@ -244,14 +247,6 @@ class Link {
     if (capture_ && !bytes.empty()) capture_->add(Capture::Direction::sent, bytes, clock_.now());
   }
 
-  void publish() {
-    const auto now = steady_clock::now();
-    const bool all = now - published_ >= kPublishEvery;
-    if (all) published_ = now;
-    motor_.move_readings(session_);
-    motor_.publish(session_, port_ != nullptr, all);
-  }
-
   void lose(const std::string& why) {
     port_.reset();
     congested_ = was_ready_ = false;
@@ -269,7 +264,7 @@ class Link {
   Session session_;
   std::unique_ptr<Capture> capture_;
   bool congested_ = false;  ///< the port had no room for all
-  steady_clock::time_point next_attempt_{}, published_{};
+  steady_clock::time_point next_attempt_{};
   Duration reopening_ = kFirstPause, reconnecting_ = kFirstPause;  ///< the next pauses
   bool was_ready_ = false;
   Duration suspended_;  ///< of the host, as noticed so far

@@ -102,23 +102,22 @@ void Motor::move_readings(Session& session) {
   while (const std::size_t n = session.take(batch)) dropped_readings_ += n - readings_.push(batch.data(), n);
 }
 
-void Motor::publish(Session& session, bool line, bool all) {
+void Motor::publish(Session& session, bool line) {
   bool news = false;
   {
     const std::lock_guard lock(mutex_);
-    news = note_state(session) || line != std::exchange(line_, line) || all;
+    news = note_state(session);
+    if (line != std::exchange(line_, line)) news = true;
     if (close_tickets(session)) news = true;
     for (Event& event : session.take_events()) {
       if (events_.size() == kEvents) events_.erase(events_.begin());
       events_.push_back(std::move(event));
     }
-    if (news) {
-      counters_ = session.counters();
-      counters_.dropped_readings += dropped_readings_;
-      counters_.lease_expiries = lease_expiries_;
-      counters_.reconnections = reconnections_;
-      round_trips_ = session.round_trips();
-    }
+    counters_ = session.counters();
+    counters_.dropped_readings += dropped_readings_;
+    counters_.lease_expiries = lease_expiries_;
+    counters_.reconnections = reconnections_;
+    round_trips_ = session.round_trips();
   }
   if (news) changed_.notify_all();
 }

@@ -12,7 +12,6 @@
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <condition_variable>
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -22,7 +21,6 @@
 
 #include "base/wakeup.hpp"
 #include "drivers/iq/session/session.hpp"
-#include "drivers/serial/port.hpp"
 
 namespace kphi::iq {
 
@@ -30,14 +28,6 @@ class Link;
 
 /// Time that a caller may stay silent while the motor spins, wall time.
 inline constexpr Duration kLease = std::chrono::milliseconds(500);
-
-/// Completed for this port, as Motor does.
-[[nodiscard]] Settings stretched(Settings settings, const std::string& device, unsigned baud, const Clock& clock);
-
-/// Three coasts, within 0.2 s, straight to the port. `sent` gets the bytes that it took.
-void send_final_coast(
-    serial::Port& port, int module_id,
-    const std::function<void(std::span<const std::uint8_t>)>& sent = [](auto) {}) noexcept;
 
 /// The commands of callers to the link's thread.
 struct Commands {
@@ -55,7 +45,8 @@ class Motor {
   /// becomes 10/baud. module_timeout_s goes to the module as it is, in the module's own seconds. Throws DeviceError:
   /// port missing, forbidden or in use, no module answers, the module refused its communication timeout. Prefer a
   /// `device` name that stays (/dev/serial/by-id/…): it is opened again after the port was lost. `clock` must outlive
-  /// the motor. `capture`: file for all bytes of the line (capture.hpp); empty: no capture.
+  /// the motor. `capture`: file for all bytes of the line (capture.hpp); empty: no capture. One that only inspects
+  /// (Settings) is never alive.
   Motor(const std::string& device, unsigned baud, const Settings& settings, const Clock& clock,
         const std::string& capture = {});
   /// Coasts three times, waits at most 0.6 s for drive mode coast, closes.
@@ -91,9 +82,9 @@ class Motor {
   /// Why it is not alive: the newest failure.
   [[nodiscard]] std::string failure() const { return copy_of(failure_); }
   [[nodiscard]] const std::string& device() const noexcept { return device_; }
-  [[nodiscard]] Identity identity() const { return copy_of(identity_); }
+  [[nodiscard]] AuditRecord identity() const { return copy_of(identity_); }
   [[nodiscard]] Counters counters() const { return copy_of(counters_); }
-  [[nodiscard]] RoundTripHistogram round_trips() const { return copy_of(round_trips_); }
+  [[nodiscard]] DelayHistogram round_trips() const { return copy_of(round_trips_); }
 
  private:
   friend class Link;
@@ -118,8 +109,8 @@ class Motor {
   // The link's thread.
   [[nodiscard]] Commands take_commands();
   void move_readings(Session& session);
-  /// Shows callers the state of the session; its counters only when `all`. `line`: there is a port.
-  void publish(Session& session, bool line, bool all);
+  /// Shows callers the state of the session. `line`: there is a port.
+  void publish(Session& session, bool line);
   /// No thread serves this motor any more.
   void end(const std::string& why);
   [[nodiscard]] WallTime lease_end() const noexcept { return WallTime(std::chrono::nanoseconds(lease_end_ns_)); }
@@ -139,9 +130,9 @@ class Motor {
   Session::State state_ = Session::State::idle;
   bool line_ = true, ended_ = false;
   std::string failure_;  ///< the newest
-  Identity identity_;
+  AuditRecord identity_;
   Counters counters_;
-  RoundTripHistogram round_trips_;
+  DelayHistogram round_trips_;
   std::vector<Event> events_;
 
   std::uint64_t dropped_readings_ = 0, lease_expiries_ = 0, reconnections_ = 0;  ///< the link's thread

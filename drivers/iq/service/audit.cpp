@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <utility>
 
@@ -13,6 +12,7 @@ namespace kphi::iq {
 namespace {
 
 constexpr int kHobbyDisabled = 254;
+constexpr double kLongestTimeout = 1;  // s
 constexpr double kNoDerate = 65536;
 constexpr double kPolePairs = 7, kMotorKv = 2200, kMotorAmps = 30;  // 2306-2200Kv
 constexpr double kSlowFilter = 8;                                   // Hz: a time constant as long as the loop's, 0.02 s
@@ -151,10 +151,10 @@ class Checks {
 
   void communication_timeout() {
     const auto timeout = value<"propeller_motor_control.timeout">();
-    if (timeout && !(*timeout > 0 && *timeout <= intention_.timeout_max_s))
+    if (timeout && !(*timeout > 0 && *timeout <= kLongestTimeout))
       fault(fmt::format("the communication timeout is {:.4g} s, the limit {:.4g} s: after a dead line the motor would "
                         "keep turning",
-                        *timeout, intention_.timeout_max_s),
+                        *timeout, kLongestTimeout),
             "set propeller_motor_control.timeout to 0.5");
     if (!is(value<"propeller_motor_control.timeout_behavior">(), TimeoutBehavior::coast))
       fault(
@@ -183,7 +183,6 @@ class Checks {
     fault(
         fmt::format("the hobby input is enabled (allowed_protocols {:g}): noise on it can command the motor", *allowed),
         "set hobby_input.allowed_protocols to 254 with the vendor's control program");
-    if (intention_.hobby_input_allowed) findings_.back().severity = Severity::warning;
   }
 
   void motor() {
@@ -262,85 +261,18 @@ class Checks {
   std::vector<Finding> findings_;
 };
 
-std::string value_text(const Entry& entry, double value) {
-  return entry.format == Format::f32 ? fmt::format("{}", static_cast<float>(value)) : fmt::format("{:.0f}", value);
-}
-
-template <class Version>
-std::optional<Version> version_of(const std::optional<double>& word) {
-  return word ? std::optional(Version(static_cast<std::uint32_t>(*word))) : std::nullopt;
-}
-
 }  // namespace
 
-std::optional<FirmwareVersion> AuditRecord::firmware() const {
-  return version_of<FirmwareVersion>(value<"system_control.firmware_version">());
-}
-
-std::optional<BoardVersion> AuditRecord::hardware() const {
-  return version_of<BoardVersion>(value<"system_control.hardware_version">());
-}
-
-std::optional<BoardVersion> AuditRecord::electronics() const {
-  return version_of<BoardVersion>(value<"system_control.electronics_version">());
-}
-
-std::string AuditRecord::uid() const {
-  const auto a = value<"system_control.uid1">(), b = value<"system_control.uid2">(), c = value<"system_control.uid3">();
-  if (!a || !b || !c) return "";
-  return fmt::format("{:08x}{:08x}{:08x}", static_cast<std::uint32_t>(*a), static_cast<std::uint32_t>(*b),
-                     static_cast<std::uint32_t>(*c));
-}
-
-int AuditRecord::coil_temperature_client() const {
-  if (value<"coil_temperature_estimator.t_coil">()) return static_cast<int>(Client::coil_temperature_estimator);
-  return value<"temperature_estimator.temp">() ? static_cast<int>(Client::temperature_estimator) : 0;
-}
-
-std::string AuditRecord::text() const {
-  std::string text;
-  const auto decoded = [&](const char* name, const std::string& words) {
-    if (!words.empty()) text += fmt::format("{}: {}\n", name, words);
-  };
-  decoded("uid", uid().empty() ? "" : '"' + uid() + '"');
-  decoded("firmware", firmware() ? firmware()->text() : "");
-  decoded("hardware", hardware() ? hardware()->text() : "");
-  decoded("electronics", electronics() ? electronics()->text() : "");
-  for (const auto& [told, value] : values) {
-    text +=
-        fmt::format("{}: {}{}{}\n", told->path, value_text(*told, value), told->unit.empty() ? "" : "  # ", told->unit);
+AuditRecord read_audit(const Ask& ask, bool newer_coil_client) {
+  const Client absent = newer_coil_client ? Client::temperature_estimator : Client::coil_temperature_estimator;
+  std::vector<Inquiry> asked;
+  for (const Entry& entry : kEntries) {
+    if (entry.audited && entry.type != absent) asked.push_back({&entry, std::nullopt});
   }
-  return text;
-}
-
-AuditRecord AuditRecord::of(std::string_view text) {
+  const std::vector<Reply> replies = ask(asked);
   AuditRecord record;
-  while (!text.empty()) {
-    const std::string_view line = text.substr(0, text.find('\n'));
-    text.remove_prefix(std::min(text.size(), line.size() + 1));
-    const std::size_t colon = line.find(": ");
-    const Entry* told = colon == std::string_view::npos ? nullptr : find(line.substr(0, colon));
-    double value = 0;
-    if (told == nullptr || !told->audited) continue;
-    if (std::from_chars(line.data() + colon + 2, line.data() + line.size(), value).ec == std::errc())
-      record.values[told] = value;
-  }
-  return record;
-}
-
-AuditRecord read_audit(Dialogue& module) {
-  AuditRecord record;
-  std::optional<Client> last, absent;
-  for (const Entry& asked : kEntries) {
-    const bool first = std::exchange(last, asked.type) != asked.type;
-    const bool succeeded =
-        asked.type == Client::temperature_estimator && record.value<"coil_temperature_estimator.t_coil">();
-    if (!asked.audited || succeeded || asked.type == absent) continue;
-    if (const auto value = module.inquire({&asked, std::nullopt}).value) {
-      record.values[&asked] = *value;
-    } else if (first) {
-      absent = asked.type;
-    }
+  for (std::size_t i = 0; i < asked.size() && i < replies.size(); ++i) {
+    if (replies[i].value) record.values[asked[i].entry] = *replies[i].value;
   }
   return record;
 }

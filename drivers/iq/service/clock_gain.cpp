@@ -83,19 +83,19 @@ double least_slack(const std::vector<Point>& points) {
   return enough;
 }
 
-Answer require_answer(Dialogue& module, const Entry& asked) {
+Answer require_answer(const Ask& ask, const Entry& asked) {
   for (int i = 0; i < kSilences; ++i) {
-    const Reply reply = module.inquire({&asked, std::nullopt});
+    const Reply reply = ask({{&asked, std::nullopt}}).at(0);
     if (reply.value && std::isfinite(*reply.value)) return {*reply.value, reply.time, reply.uncertainty};
   }
   throw DeviceError("IQ module", kOperation, fmt::format("no reply to get {}", asked.name()),
                     "check the line; update old firmware");
 }
 
-void require_standstill(Dialogue& module) {
-  if (require_answer(module, entry<"brushless_drive.drive_mode">).value != static_cast<double>(DriveMode::coast))
+void require_standstill(const Ask& ask) {
+  if (require_answer(ask, entry<"brushless_drive.drive_mode">).value != static_cast<double>(DriveMode::coast))
     throw DeviceError("IQ module", kOperation, "the motor does not coast", "coast it first");
-  const double speed = require_answer(module, entry<"brushless_drive.obs_velocity">).value;
+  const double speed = require_answer(ask, entry<"brushless_drive.obs_velocity">).value;
   if (std::abs(speed) > kStanding)
     throw DeviceError("IQ module", kOperation, fmt::format("the motor turns at {:.0f} rad/s", speed),
                       "wait until it is at rest");
@@ -121,20 +121,21 @@ ClockGain clock_gain(std::span<const Answer> times) {
   return gain;
 }
 
-ClockGain measure_clock_gain(Dialogue& module, const ClockGainSettings& settings) {
-  require_standstill(module);
-  (void)module.inquire({&kTime, 0.0});  // its clock runs: what it reads back is later
+ClockGain measure_clock_gain(const Ask& ask, const std::function<void(Duration)>& pause,
+                             const ClockGainSettings& settings) {
+  require_standstill(ask);
+  (void)ask({{&kTime, 0.0}});  // its clock runs: what it reads back is later
   std::vector<Answer> times;
   const Duration whole = from_seconds(settings.duration_s);
   while (times.size() < 2 || times.back().time - times.front().time < whole) {
-    const Answer answer = require_answer(module, kTime);
+    const Answer answer = require_answer(ask, kTime);
     if (!times.empty() && answer.value < times.back().value)
       throw DeviceError("IQ module", kOperation, "its time went backwards: it has restarted",
                         "check its supply and try again");
     times.push_back(answer);
-    module.pause(settings.interval);
+    pause(settings.interval);
   }
-  require_standstill(module);
+  require_standstill(ask);
   return clock_gain(times);
 }
 

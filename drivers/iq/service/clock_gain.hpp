@@ -14,13 +14,14 @@
 // In a bench file: iq: {clock_gain: {factor: 1.00503, u: 1.2e-5, uid: "…", measured_utc: "…", duration_s: 60}}
 #pragma once
 
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "base/clock.hpp"
 #include "base/finding.hpp"
-#include "drivers/iq/service/dialogue.hpp"
+#include "drivers/iq/session/connecting.hpp"
 
 namespace kphi::iq {
 
@@ -59,8 +60,9 @@ struct ClockGainSettings {
 };
 
 /// Sets the module's time to 0 (float32 is finest there) and reads it for duration_s. Needs a motor at rest: throws
-/// DeviceError when it does not coast or turns, when the module does not answer, or when it restarts meanwhile. The
-/// caller fills in `uid` and `measured_utc`.
-[[nodiscard]] ClockGain measure_clock_gain(Dialogue& module, const ClockGainSettings& settings = {});
+/// DeviceError when it does not coast or turns, when the module does not answer, or when it restarts meanwhile. `pause`
+/// returns after so much bench time. The caller fills in `uid` and `measured_utc`.
+[[nodiscard]] ClockGain measure_clock_gain(const Ask& ask, const std::function<void(Duration)>& pause,
+                                           const ClockGainSettings& settings = {});
 
 }  // namespace kphi::iq

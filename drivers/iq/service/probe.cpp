@@ -8,18 +8,21 @@
 #include <thread>
 
 #include "base/error.hpp"
-#include "drivers/iq/service/dialogue.hpp"
+#include "drivers/iq/link/motor.hpp"
 
 namespace kphi::iq {
 namespace {
 
 using std::chrono::steady_clock;
-constexpr const Entry& kDriveMode = entry<"brushless_drive.drive_mode">;
+constexpr const Entry& kAsked = entry<"brushless_drive.drive_mode">;
+/// In the order in which they are tried: the factory's, the usual, then the rest.
+constexpr unsigned kBauds[] = {115200, 921600, 1000000, 2000000, 460800, 230400, 57600, 38400, 19200, 9600};
 constexpr Duration kWriteLimit = std::chrono::milliseconds(500);
 constexpr Duration kAdapter = std::chrono::milliseconds(50);  ///< bytes that only an adapter knows of may still leave
 constexpr Duration kReply = std::chrono::milliseconds(60);
 constexpr int kLastId = static_cast<int>(ModuleId::last);
 constexpr Duration kTurn = std::chrono::milliseconds(18);  ///< for each id; a USB adapter may be 16 ms late
+constexpr Duration kSlowRoundTrip = std::chrono::milliseconds(4);
 constexpr Duration kLastTurn = std::chrono::milliseconds(100);
 
 Duration on_wire(std::size_t bytes, unsigned baud) { return from_seconds(10.0 * static_cast<double>(bytes) / baud); }
@@ -38,21 +41,21 @@ class Search {
     parser_.reset();
     write(std::array<std::uint8_t, kMaxFrame>{});
     for (int i = 0; i < 3; ++i) {
-      send(set<"propeller_motor_control.ctrl_coast">(module_id));
-      send(set<"propeller_motor_control.ctrl_coast">(static_cast<int>(ModuleId::broadcast)));
+      for (const int id : {module_id, static_cast<int>(ModuleId::broadcast)})
+        send(make(entry<"propeller_motor_control.ctrl_coast">, Access::set, id));
     }
   }
   /// Asks this id, and gives each id that answers within `wall` of the last byte sent to `heard`.
   template <class Heard>
   void ask(int module_id, Duration wall, Heard&& heard) {
-    send(get<"brushless_drive.drive_mode">(module_id));
+    send(make(kAsked, Access::get, module_id));
     const auto end = steady_clock::now() + wall + on_wire(port_.unsent(), port_.baud());
     for (bool enough = false; !enough && port_.wait(end - steady_clock::now());) {
       std::array<std::uint8_t, 512> buffer;
       const std::size_t n = port_.read(buffer);
       parser_.push(std::span(buffer).first(n), [&](const Packet& packet, std::uint64_t) {
         const bool reply = packet.standard() && packet.access() == Access::reply &&
-                           packet.type == static_cast<std::uint8_t>(kDriveMode.type) && packet.sub() == kDriveMode.sub;
+                           packet.type == static_cast<std::uint8_t>(kAsked.type) && packet.sub() == kAsked.sub;
         enough = (reply && heard(packet)) || enough;
       });
     }
@@ -80,7 +83,7 @@ bool answers_at(Search& line, int module_id, unsigned baud) {
   bool answers = false;
   for (int i = 0; i < 2 && !answers; ++i) {
     line.ask(module_id, kReply + on_wire(kMaxFrame, baud), [&](const Packet& packet) {
-      answers |= packet.module_id() == module_id && packet.data().size() == size_of(kDriveMode.format);
+      answers |= packet.module_id() == module_id && packet.data().size() == size_of(kAsked.format);
       return answers;
     });
   }
@@ -89,15 +92,10 @@ bool answers_at(Search& line, int module_id, unsigned baud) {
 
 }  // namespace
 
-const std::vector<unsigned>& bauds_to_try() {
-  static const std::vector<unsigned> bauds{115200, 921600, 1000000, 2000000, 460800, 230400, 57600, 38400, 19200, 9600};
-  return bauds;
-}
-
 std::optional<unsigned> find_baud(const std::string& device, int module_id, unsigned first) {
   Search line(device, first);
   if (answers_at(line, module_id, first)) return first;
-  for (const unsigned baud : bauds_to_try()) {
+  for (const unsigned baud : kBauds) {
     if (baud != first && answers_at(line, module_id, baud)) return baud;
   }
   return std::nullopt;
@@ -123,17 +121,39 @@ void append(std::vector<Finding>& all, std::vector<Finding> more) {
   all.insert(all.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
 }
 
-void look_at(SerialDialogue& module, const ProbeSettings& settings, Probe& found) {
-  found.device = module.device();
-  found.adapter = serial::adapter_of(module.device());
-  append(found.findings, set_and_read_back(module, connection_settings(settings.module_timeout_s)));
-  found.record = read_audit(module);
+void judge_line(const Counters& counters, Probe& found) {
+  if (found.round_trip > kSlowRoundTrip)
+    found.findings.push_back(
+        {Severity::warning,
+         fmt::format("slow line: a query and its reply take {:.1f} ms", 1e3 * to_seconds(found.round_trip)),
+         "shorten the adapter's latency timer, or raise the baud rate"});
+  const std::uint64_t damaged = counters.crc_errors + counters.wrong_length;
+  if (damaged > 0)
+    found.findings.push_back(
+        {Severity::warning, fmt::format("{} damaged frames received", damaged), "check cable, ground and baud rate"});
+  if (!found.adapter) return;
+  if (auto slow = serial::judge_latency_timer(*found.adapter)) found.findings.push_back(std::move(*slow));
+}
+
+void look_at(Motor& module, const Clock& clock, const ProbeSettings& settings, Probe& found) {
+  // One question at a time: only a query that has the line to itself tells the round trip.
+  const Ask ask = [&](const std::vector<Inquiry>& inquiries) {
+    std::vector<Reply> replies;
+    for (const Inquiry& inquiry : inquiries) replies.push_back(module.inquire({inquiry}).at(0));
+    return replies;
+  };
+  found.adapter = serial::adapter_of(serial::path_of(module.device()));
+  append(found.findings, set_timeout(ask));
+  const bool newer = ask({{&entry<"coil_temperature_estimator.t_coil">, {}}})[0].value.has_value();
+  found.record = read_audit(ask, newer);
   append(found.findings, audit(*found.record, settings.intention));
-  append(found.findings, module.findings());
-  if (found.adapter) {
-    if (auto slow = serial::judge_latency_timer(*found.adapter)) found.findings.push_back(std::move(*slow));
-  }
-  found.round_trip = module.median_round_trip();
+  found.round_trip = clock.shrunk(module.round_trips().quantile(0.5));
+  judge_line(module.counters(), found);
+  if (!settings.clock_gain) return;
+  const auto pause = [&](Duration bench) { std::this_thread::sleep_for(clock.shrunk(bench)); };
+  found.clock_gain = measure_clock_gain(ask, pause, *settings.clock_gain);
+  found.clock_gain->uid = found.record->uid();
+  append(found.findings, found.clock_gain->findings());
 }
 
 /// Where a module is that does not answer at its place. nullopt: it does answer, or the port cannot be used; another
@@ -159,7 +179,7 @@ std::optional<Finding> search_for(const SerialLine& line) {
   }
   return Finding{Severity::note,
                  fmt::format("searched for it at {} baud, and for any id at {} baud: no answer",
-                             fmt::join(bauds_to_try(), ", "), line.baud),
+                             fmt::join(kBauds, ", "), line.baud),
                  "check its supply, RX and TX"};
 }
 
@@ -223,27 +243,42 @@ std::vector<std::string> Probe::lines() const {
   return text;
 }
 
+std::vector<Finding> set_timeout(const Ask& ask) {
+  const std::vector<Inquiry> settings = {
+      {&entry<"propeller_motor_control.timeout">, Settings().module_timeout_s},
+      {&entry<"propeller_motor_control.timeout_behavior">, static_cast<double>(TimeoutBehavior::coast)},
+      {&entry<"propeller_motor_control.timeout_song_option">, static_cast<double>(SongOption::never)}};
+  const std::vector<Reply> replies = ask(settings);
+  std::vector<Finding> findings;
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    const auto& [set, value] = settings[i];
+    const bool may_lack_it = i > 0;
+    if (replies[i].accepted || (!replies[i].value && may_lack_it)) continue;
+    findings.push_back(
+        {Severity::fault,
+         fmt::format("{} was set to {:.9g} {} and {}", set->path, *value, set->unit,
+                     replies[i].value ? fmt::format("reads back {:.9g}", *replies[i].value) : "does not answer"),
+         "check the firmware version and the line to the module, then connect again"});
+  }
+  return findings;
+}
+
 Probe probe(const SerialLine& line, const Clock& clock, const ProbeSettings& settings) {
   Probe found;
+  std::optional<Motor> module;
   try {
-    SerialDialogue module(line, clock);
-    try {
-      look_at(module, settings, found);
-      if (settings.clock_gain) {
-        found.clock_gain = measure_clock_gain(module, *settings.clock_gain);
-        found.clock_gain->uid = found.record->uid();
-        append(found.findings, found.clock_gain->findings());
-      }
-    } catch (const DeviceError& error) {
-      found.findings.push_back({Severity::fault, error.what(), ""});
-    }
-    found.counters = module.counters();
+    Settings inspecting;
+    inspecting.module_id = line.module_id;
+    inspecting.inspects = true;
+    module.emplace(line.device, line.baud, inspecting, clock);
+    look_at(*module, clock, settings, found);
   } catch (const DeviceError& error) {
     found.findings.push_back({Severity::fault, error.what(), ""});
-    if (settings.search) {
+    if (!module && settings.search) {
       if (auto elsewhere = search_for(line)) found.findings.push_back(std::move(*elsewhere));
     }
   }
+  if (module) found.counters = module->counters();
   put_worst_first(found.findings);
   return found;
 }

@@ -11,15 +11,11 @@
 #include "drivers/iq/exchange/telemetry.hpp"
 #include "drivers/iq/service/audit.hpp"
 #include "drivers/iq/service/clock_gain.hpp"
-#include "drivers/iq/service/dialogue.hpp"
 #include "drivers/serial/port.hpp"
 
 namespace kphi::iq {
 
 // Search for a silent module. It never writes a rate or an id, and coasts whatever listens first. Blocking; wall time.
-
-/// In the order in which they are tried: the factory's, the usual, then the rest.
-[[nodiscard]] const std::vector<unsigned>& bauds_to_try();
 
 /// The rate at which the module with this id answers; `first` is tried before all others; nullopt: at no rate. About 3
 /// s when nothing answers. Throws DeviceError when the port cannot be opened or is lost.
@@ -28,16 +24,24 @@ namespace kphi::iq {
 /// The ids that answer at this rate, ascending. About 1.3 s. Throws as find_baud does.
 [[nodiscard]] std::vector<int> find_ids(const std::string& device, unsigned baud);
 
+struct SerialLine {
+  std::string device;  ///< as serial::Port takes it
+  unsigned baud = 115200;
+  int module_id = 0;  ///< 0..62
+};
+
+/// Sets what every connection sets, the communication timeout, coast at its end and no song, and reads it back; saves
+/// nothing. A fault for each that is not as set; old firmware may lack the last two.
+[[nodiscard]] std::vector<Finding> set_timeout(const Ask& ask);
+
 struct ProbeSettings {
   Intention intention;                          ///< what the module is audited against
-  double module_timeout_s = 0.5;                ///< set in the module as every connection does; not saved
   std::optional<ClockGainSettings> clock_gain;  ///< measure it, which takes as long as it says
   bool search = true;                           ///< a silent module: try other baud rates and ids, 5 s more
 };
 
 struct Probe {
   std::optional<AuditRecord> record;  ///< nullopt: the module does not answer
-  std::string device;                 ///< the path that was opened
   std::optional<serial::Adapter> adapter;
   Duration round_trip{0};  ///< median, wall time
   Counters counters;

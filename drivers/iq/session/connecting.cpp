@@ -33,7 +33,7 @@ void OpenInquiry::take(std::optional<double> answer) noexcept {
 void Inquiries::check(const std::vector<Inquiry>& inquiries) {
   for (const Inquiry& inquiry : inquiries) {
     const Entry& wanted = *inquiry.entry;
-    if (!wanted.allows(Access::get) || size_of(wanted.format) > 4)
+    if (!wanted.allows(Access::get))
       throw std::invalid_argument(fmt::format("{} cannot be read as a number", wanted.path));
     if (inquiry.set_to && !is_volatile_setting(wanted))
       throw std::invalid_argument(fmt::format("{} must not be set in passing", wanted.path));
@@ -86,7 +86,6 @@ struct Step {
   };
   const Entry* entry;
   Kind kind;
-  void (*store)(Identity&, double);
 
   [[nodiscard]] constexpr bool sets() const noexcept { return kind == Kind::set_timeout || kind == Kind::set_zero; }
   [[nodiscard]] constexpr bool must_answer() const noexcept {
@@ -95,49 +94,37 @@ struct Step {
 };
 
 constexpr Step kScript[] = {
-    {&entry<"system_control.module_id">, Step::Kind::own_id, [](Identity&, double) {}},
-    {&entry<"system_control.uid1">, Step::Kind::required,
-     [](Identity& i, double v) { i.uid1 = static_cast<std::uint32_t>(v); }},
-    {&entry<"system_control.uid2">, Step::Kind::required,
-     [](Identity& i, double v) { i.uid2 = static_cast<std::uint32_t>(v); }},
-    {&entry<"system_control.uid3">, Step::Kind::last_of_uid,
-     [](Identity& i, double v) { i.uid3 = static_cast<std::uint32_t>(v); }},
+    {&entry<"system_control.module_id">, Step::Kind::own_id},
+    {&entry<"system_control.uid1">, Step::Kind::required},
+    {&entry<"system_control.uid2">, Step::Kind::required},
+    {&entry<"system_control.uid3">, Step::Kind::last_of_uid},
     // Before anything is set: a restart from here on is noticed by the first poll.
-    {&entry<"system_control.time">, Step::Kind::optional, [](Identity& i, double v) { i.uptime_s = v; }},
-    {&entry<"propeller_motor_control.timeout">, Step::Kind::set_timeout,
-     [](Identity& i, double v) { i.timeout_s = v; }},
-    {&entry<"propeller_motor_control.timeout_behavior">, Step::Kind::set_zero,
-     [](Identity& i, double) { i.timeout_behavior_set = true; }},
-    {&entry<"propeller_motor_control.timeout_song_option">, Step::Kind::set_zero, [](Identity&, double) {}},
-    {&entry<"system_control.firmware_version">, Step::Kind::required,
-     [](Identity& i, double v) { i.firmware = static_cast<std::uint32_t>(v); }},
-    {&entry<"system_control.hardware_version">, Step::Kind::required,
-     [](Identity& i, double v) { i.hardware = static_cast<std::uint32_t>(v); }},
-    {&entry<"system_control.electronics_version">, Step::Kind::required,
-     [](Identity& i, double v) { i.electronics = static_cast<std::uint32_t>(v); }},
-    {&entry<"brushless_drive.motor_pole_pairs">, Step::Kind::optional,
-     [](Identity& i, double v) { i.pole_pairs = static_cast<int>(v); }},
-    {&entry<"brushless_drive.motor_Kv">, Step::Kind::optional,
-     [](Identity& i, double v) { i.motor_kv_rpm_per_volt = v; }},
-    {&entry<"power_safety.fault_now">, Step::Kind::optional,
-     [](Identity& i, double v) { i.fault_now = static_cast<int>(v); }},
-    {&entry<"power_safety.fault_ever">, Step::Kind::optional,
-     [](Identity& i, double v) { i.fault_ever = static_cast<int>(v); }},
-    {&entry<"coil_temperature_estimator.t_coil">, Step::Kind::optional,
-     [](Identity& i, double) { i.coil_temperature_client = 83; }},
-    {&entry<"temperature_estimator.temp">, Step::Kind::legacy_coil,
-     [](Identity& i, double) { i.coil_temperature_client = 77; }},
+    {&entry<"system_control.time">, Step::Kind::optional},
+    {&entry<"propeller_motor_control.timeout">, Step::Kind::set_timeout},
+    {&entry<"propeller_motor_control.timeout_behavior">, Step::Kind::set_zero},
+    {&entry<"propeller_motor_control.timeout_song_option">, Step::Kind::set_zero},
+    {&entry<"system_control.firmware_version">, Step::Kind::required},
+    {&entry<"system_control.hardware_version">, Step::Kind::required},
+    {&entry<"system_control.electronics_version">, Step::Kind::required},
+    {&entry<"brushless_drive.motor_pole_pairs">, Step::Kind::optional},
+    {&entry<"brushless_drive.motor_Kv">, Step::Kind::optional},
+    {&entry<"power_safety.fault_now">, Step::Kind::optional},
+    {&entry<"power_safety.fault_ever">, Step::Kind::optional},
+    {&entry<"coil_temperature_estimator.t_coil">, Step::Kind::optional},
+    {&entry<"temperature_estimator.temp">, Step::Kind::legacy_coil},
 };
 
 }  // namespace
 
 Connecting::Connecting(const Settings& settings)
-    : module_id_(settings.module_id), module_timeout_s_(settings.module_timeout_s) {}
+    : module_id_(settings.module_id),
+      module_timeout_s_(settings.module_timeout_s),
+      system_control_id_(settings.module_id) {}
 
-void Connecting::begin(const std::optional<Identity>& known) {
+void Connecting::begin(const std::optional<AuditRecord>& known) {
   known_ = known;
   identity_ = {};
-  identity_.system_control_id = module_id_;
+  system_control_id_ = module_id_;
   step_ = 0;
   open_.reset();
   failure_.clear();
@@ -150,11 +137,11 @@ bool Connecting::done() const noexcept { return step_ == std::size(kScript); }
 
 void Connecting::advance(Exchange& exchange, Instant now) {
   if (!failure_.empty()) return;
-  while (!done() && kScript[step_].kind == Step::Kind::legacy_coil && identity_.coil_temperature_client != 0) next();
+  while (!done() && kScript[step_].kind == Step::Kind::legacy_coil && identity_.coil_temperature_client() != 0) next();
   if (done()) return;
   if (!open_) open_ = inquiry();
   const bool of_system = kScript[step_].entry->type == Client::system_control;
-  open_->advance(exchange, of_system ? identity_.system_control_id : module_id_, now);
+  open_->advance(exchange, of_system ? system_control_id_ : module_id_, now);
 }
 
 void Connecting::take(const QueryResult& result) {
@@ -173,7 +160,7 @@ void Connecting::conclude(const char* why_silent) {
         step.entry->name(), *reply.value, *wanted());
     return;
   }
-  step.store(identity_, *reply.value);
+  identity_.values[step.entry] = *reply.value;
   if (step.kind == Step::Kind::own_id) take_own_id(*reply.value);
   if (step.kind == Step::Kind::last_of_uid) compare_uid();
   next();
@@ -183,8 +170,8 @@ void Connecting::take_silence(const char* why) {
   const Step& step = kScript[step_];
   if (step.must_answer()) {
     failure_ = fmt::format("{} to get {}", why, step.entry->path);
-  } else if (step.kind == Step::Kind::own_id && identity_.system_control_id != 0) {
-    identity_.system_control_id = 0;
+  } else if (step.kind == Step::Kind::own_id && system_control_id_ != 0) {
+    system_control_id_ = 0;
     open_.reset();
   } else {
     next();
@@ -194,13 +181,13 @@ void Connecting::take_silence(const char* why) {
 void Connecting::take_own_id(double id) {
   if (id == module_id_) return;
   failure_ = fmt::format("module {} answers on id {}: its other clients have that id; set module_id to {}", id,
-                         identity_.system_control_id, id);
+                         system_control_id_, id);
 }
 
 void Connecting::compare_uid() {
-  if (!known_ || known_->same_module(identity_)) return;
+  if (!known_ || known_->uid() == identity_.uid()) return;
   another_module_ = true;
-  failure_ = fmt::format("another module answers, uid {} instead of {}", identity_.uid_text(), known_->uid_text());
+  failure_ = fmt::format("another module answers, uid {} instead of {}", identity_.uid(), known_->uid());
 }
 
 void Connecting::next() noexcept {

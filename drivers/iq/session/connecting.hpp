@@ -1,6 +1,7 @@
 // Queries and settings other than telemetry: from callers, such as an audit, and for every connection.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,6 +22,9 @@ struct Reply {
   Instant time{0};              ///< bench time at which the module read the value
   Duration uncertainty{0};      ///< the true moment is time ± uncertainty
 };
+
+/// Asks a module that does not turn for it: one reply each, in order. Throws DeviceError when the module is lost.
+using Ask = std::function<std::vector<Reply>(std::vector<Inquiry>)>;
 
 /// One inquiry under way: when to ask again, and when it is finished.
 class OpenInquiry {
@@ -83,7 +87,7 @@ class Connecting {
   explicit Connecting(const Settings& settings);
 
   /// Starts from the first step. `known`: the only module that is accepted.
-  void begin(const std::optional<Identity>& known);
+  void begin(const std::optional<AuditRecord>& known);
   /// Done without a step.
   void skip() noexcept;
   void take(const QueryResult& result);
@@ -96,7 +100,9 @@ class Connecting {
   /// The failure is that another module answers.
   [[nodiscard]] bool another_module() const noexcept { return another_module_; }
   /// Complete once done.
-  [[nodiscard]] const Identity& identity() const noexcept { return identity_; }
+  [[nodiscard]] const AuditRecord& identity() const noexcept { return identity_; }
+  /// The id at which system_control answers: the module's; with old firmware always 0.
+  [[nodiscard]] int system_control_id() const noexcept { return system_control_id_; }
 
  private:
   [[nodiscard]] std::optional<double> wanted() const noexcept;
@@ -109,8 +115,9 @@ class Connecting {
 
   int module_id_;
   double module_timeout_s_;
-  std::optional<Identity> known_;
-  Identity identity_;
+  std::optional<AuditRecord> known_;
+  AuditRecord identity_;
+  int system_control_id_;
   std::size_t step_ = 0;
   std::optional<OpenInquiry> open_;  ///< of this step
   std::string failure_;

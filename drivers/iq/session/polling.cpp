@@ -21,9 +21,9 @@ constexpr std::array<const Entry*, kQuantities> kEntryOf{&entry<"brushless_drive
                                                          &entry<"brushless_drive.drive_pwm">,
                                                          nullptr};
 
-const Entry* coil_temperature_of(const Identity& identity) noexcept {
-  if (identity.coil_temperature_client == 83) return &entry<"coil_temperature_estimator.t_coil">;
-  return identity.coil_temperature_client == 77 ? &entry<"temperature_estimator.temp"> : nullptr;
+const Entry* coil_temperature_of(const AuditRecord& identity) {
+  if (identity.value<"coil_temperature_estimator.t_coil">()) return &entry<"coil_temperature_estimator.t_coil">;
+  return identity.value<"temperature_estimator.temp">() ? &entry<"temperature_estimator.temp"> : nullptr;
 }
 
 }  // namespace
@@ -38,14 +38,15 @@ Polling::Polling(const Settings& settings)
   for (const Quantity quantity : settings.every_cycle) every_cycle_[static_cast<std::size_t>(quantity)] = true;
 }
 
-void Polling::begin(const Identity& identity, Instant now) {
+void Polling::begin(const AuditRecord& identity, int system_control_id, Instant now) {
   on_ = true;
   wanted_.fill(false);
   cycle_.next = slow_.next = watch_.next = now;
   for (std::size_t i = 0; i < kQuantities; ++i) questions_[i] = {kEntryOf[i], module_id_};
   questions_[static_cast<std::size_t>(Quantity::coil_temperature)].entry = coil_temperature_of(identity);
-  questions_[kUptime] = {identity.uptime_s >= 0 ? &entry<"system_control.time"> : nullptr, identity.system_control_id};
-  const bool tells_faults = identity.fault_ever >= 0;
+  const bool tells_time = identity.value<"system_control.time">().has_value();
+  questions_[kUptime] = {tells_time ? &entry<"system_control.time"> : nullptr, system_control_id};
+  const bool tells_faults = identity.value<"power_safety.fault_ever">().has_value();
   questions_[static_cast<std::size_t>(Quantity::fault_now)].entry =
       tells_faults ? &entry<"power_safety.fault_now"> : nullptr;
   questions_[kFaultEver] = {tells_faults ? &entry<"power_safety.fault_ever"> : nullptr, module_id_};
@@ -104,7 +105,7 @@ void Polling::take(const QueryResult& result, Counters& counters) {
   if (readings_.full()) ++counters.dropped_readings;
   // fix16: 65536 means no derating.
   readings_.push_back(
-      {quantity, quantity == Quantity::derate ? value / 65536 : value, result.time, result.uncertainty, result.stamps});
+      {quantity, quantity == Quantity::derate ? value / 65536 : value, result.time, result.uncertainty});
   if (quantity != Quantity::speed) return;
   speed_ = value;
   speed_time_ = result.time;

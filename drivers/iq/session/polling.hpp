@@ -16,7 +16,8 @@ class Polling {
   /// `settings` are completed.
   explicit Polling(const Settings& settings);
 
-  void begin(const Identity& identity, Instant now);
+  /// `system_control_id`: where that client answers.
+  void begin(const AuditRecord& identity, int system_control_id, Instant now);
   void end() noexcept { on_ = false; }
   /// Queries the entries that reveal a restart at once.
   void look_for_restart(Instant now) noexcept { watch_.next = now; }

@@ -10,7 +10,6 @@
 namespace kphi::iq {
 namespace {
 
-constexpr std::size_t kEvents = 256;
 constexpr int kSilentTimeouts = 10;  ///< longest reply time-outs without any reply after which the module is gone
 constexpr int kRestartTimeouts = 3;  ///< within which a restart explains why the module stopped driving
 constexpr std::uint64_t kRoundTrips = 100;  ///< enough to judge their median
@@ -43,7 +42,7 @@ void Session::restart(Instant now) {
   state_ = State::connecting;
   failure_.clear();
   connecting_.begin(known_);
-  if (inspecting_) connecting_.skip();
+  if (settings_.inspects) connecting_.skip();
   inquiries_.abandon();
   polling_.end();
   last_reply_ = now;
@@ -156,7 +155,7 @@ void Session::take_results(std::span<const QueryResult> all, Instant now) {
 }
 
 void Session::take_restart(const QueryResult& result, Instant now) {
-  if (state_ != State::ready || inspecting_) return;
+  if (state_ != State::ready || settings_.inspects) return;
   if (inquiries_.sets(result.entry())) return reset_watch_.expect_new_time();
   const auto sign = reset_watch_.take(result);
   if (!sign) return;
@@ -170,7 +169,7 @@ void Session::service(Instant now) {
   continue_connecting(now);
   flush_speed(now);
   polling_.advance(exchange_, now);
-  if (state_ == State::ready) inquiries_.advance(exchange_, identity().system_control_id, now);
+  if (state_ == State::ready) inquiries_.advance(exchange_, connecting_.system_control_id(), now);
   if (!coasting_.silent()) exchange_.ask_barrier(settings_.module_id, now);
   check_silence(now);
   conclude_let_go(now);
@@ -204,11 +203,11 @@ void Session::continue_connecting(Instant now) {
   if (!connecting_.done()) return;
   state_ = State::ready;
   last_reply_ = now;
-  if (inspecting_) return;
+  if (settings_.inspects) return;
   if (!known_) armed_ = true;
   known_ = identity();
   reset_watch_.begin(identity());
-  polling_.begin(identity(), now);
+  polling_.begin(identity(), connecting_.system_control_id(), now);
   note(EventKind::connected, identity().summary(), now);
 }
 
@@ -221,7 +220,8 @@ void Session::flush_speed(Instant now) {
 }
 
 Instant Session::silence_limit() const noexcept {
-  return state_ == State::ready && !inspecting_ ? last_reply_ + settings_.reply_timeout * kSilentTimeouts : kNever;
+  return state_ == State::ready && !settings_.inspects ? last_reply_ + settings_.reply_timeout * kSilentTimeouts
+                                                       : kNever;
 }
 
 void Session::check_silence(Instant now) {
@@ -257,7 +257,7 @@ void Session::conclude_let_go(Instant now) {
 }
 
 void Session::judge_round_trip(Instant now) {
-  if (round_trip_judged_ || exchange_.round_trips().count() < kRoundTrips) return;
+  if (round_trip_judged_ || exchange_.round_trips().total() < kRoundTrips) return;
   round_trip_judged_ = true;
   const Duration median = exchange_.round_trips().quantile(0.5);
   if (median <= settings_.reply_timeout / kSlowShare) return;
@@ -270,7 +270,6 @@ void Session::judge_round_trip(Instant now) {
 }
 
 void Session::note(EventKind kind, const std::string& words, Instant now) {
-  if (events_.size() == kEvents) events_.erase(events_.begin());
   events_.push_back({kind, now, words});
 }
 

@@ -38,18 +38,12 @@ class Session {
   void connect(Instant now);
   /// As connect, over a new line: earlier frames must not be sent, earlier replies not used.
   void connect_anew(Instant now);
-  /// As connect_anew, but only coasts, now and at every later connection: reads and sets nothing, polls nothing, does
-  /// not expect the module to speak, and is never armed. For inquiries to a module that may not be fit to spin.
-  void inspect(Instant now) {
-    inspecting_ = true;
-    connect_anew(now);
-  }
   [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
   [[nodiscard]] State state() const noexcept { return state_; }
   /// Why it failed; empty otherwise.
   [[nodiscard]] const std::string& failure() const noexcept { return failure_; }
   /// Complete once `ready`.
-  [[nodiscard]] const Identity& identity() const noexcept { return connecting_.identity(); }
+  [[nodiscard]] const AuditRecord& identity() const noexcept { return connecting_.identity(); }
   /// Moves the events out, oldest first.
   [[nodiscard]] std::vector<Event> take_events() { return std::exchange(events_, {}); }
 
@@ -101,7 +95,7 @@ class Session {
   /// Moves the oldest readings out, returns how many. 4096 are kept; older ones are dropped and counted.
   std::size_t take(std::span<Reading> out) { return polling_.take_readings(out); }
   [[nodiscard]] const Counters& counters() const noexcept { return exchange_.counters(); }
-  [[nodiscard]] const RoundTripHistogram& round_trips() const noexcept { return exchange_.round_trips(); }
+  [[nodiscard]] const DelayHistogram& round_trips() const noexcept { return exchange_.round_trips(); }
   /// The time-out that a query would get now, from the measured round trips.
   [[nodiscard]] Duration reply_timeout() const noexcept { return exchange_.timeout(); }
 
@@ -128,8 +122,8 @@ class Session {
   State state_ = State::idle;
   std::string failure_;
   std::vector<Event> events_;
-  bool armed_ = false, inspecting_ = false;
-  std::optional<Identity> known_;  ///< of the first connection
+  bool armed_ = false;
+  std::optional<AuditRecord> known_;  ///< of the first connection
   Exchange exchange_;
   Coasting coasting_;
   DriveWatch drive_;

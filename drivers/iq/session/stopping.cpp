@@ -207,9 +207,9 @@ std::optional<DriveWatch::Lapse> DriveWatch::lapsed(Instant last_reply, Instant 
   return unheard > longest_ ? std::optional(Lapse{false, unheard}) : std::nullopt;
 }
 
-void ResetWatch::begin(const Identity& identity) noexcept {
-  uptime_ = identity.uptime_s;
-  faults_ = identity.fault_ever < 0 ? 0 : identity.fault_ever;
+void ResetWatch::begin(const AuditRecord& identity) {
+  uptime_ = identity.value<"system_control.time">();
+  faults_ = static_cast<int>(identity.value<"power_safety.fault_ever">().value_or(0));
 }
 
 std::optional<std::string> ResetWatch::take(const QueryResult& result) {

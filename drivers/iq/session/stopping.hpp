@@ -168,7 +168,7 @@ class DriveWatch {
 /// every volatile setting, the communication timeout first of all.
 class ResetWatch {
  public:
-  void begin(const Identity& identity) noexcept;
+  void begin(const AuditRecord& identity);
   /// One of the two entries is being set: accepts any next value.
   void expect_new_time() noexcept { uptime_.reset(); }
   /// The evidence of a restart; nullopt: no restart.

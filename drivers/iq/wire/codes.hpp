@@ -12,11 +12,8 @@ enum class Access : std::uint8_t { get = 0, set = 1, save = 2, reply = 3 };
 /// The TYPE byte: which client (part of the firmware) a packet speaks to.
 enum class Client : std::uint8_t {
   system_control = 5,
-  persistent_memory = 11,
-  serial_interface = 16,
   brushless_drive = 50,
   propeller_motor_control = 52,
-  esc_propeller_input_parser = 60,
   power_monitor = 69,
   temperature_monitor_uc = 73,
   hobby_input = 76,
@@ -25,7 +22,6 @@ enum class Client : std::uint8_t {
   power_safety = 84,
   arming_handler = 86,
   stopping_handler = 87,
-  iquart_flight_controller_interface = 88,
 };
 
 /// Module ids: 0..62 are a module's own.
@@ -39,17 +35,6 @@ enum class DriveMode : std::uint8_t {
   spin_volts = 3,
   brake = 4,
   coast = 5,
-};
-
-/// propeller_motor_control.ctrl_mode: what was last asked; it changes before the motion does.
-enum class ControlMode : std::int8_t {
-  no_change = -1,
-  brake = 0,
-  coast = 1,
-  pwm = 2,
-  volts = 3,
-  velocity = 4,
-  thrust = 5,
 };
 
 /// propeller_motor_control.timeout_behavior

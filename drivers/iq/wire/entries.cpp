@@ -21,12 +21,10 @@ std::uint32_t bits_of(Format format, double value) noexcept {
   return static_cast<std::uint32_t>(static_cast<std::int64_t>(std::nearbyint(held)));
 }
 
-bool is_number(Format format) noexcept { return format != Format::none && format != Format::bytes16; }
-
 }  // namespace
 
 double number(Format format, std::span<const std::uint8_t> data) noexcept {
-  if (!is_number(format) || data.size() != size_of(format)) return std::nan("");
+  if (format == Format::none || data.size() != size_of(format)) return std::nan("");
   std::uint32_t bits = 0;
   for (std::size_t i = 0; i < data.size(); ++i) bits |= static_cast<std::uint32_t>(data[i]) << (8 * i);
   if (format == Format::f32) return std::bit_cast<float>(bits);
@@ -41,9 +39,9 @@ Packet make(const Entry& entry, Access access, int module_id, double value) {
   packet.payload[1] = static_cast<std::uint8_t>(module_id << 2 | static_cast<int>(access));
   packet.length = 2;
   if (access != Access::set && access != Access::reply) return packet;
-  const std::uint32_t bits = is_number(entry.format) ? bits_of(entry.format, value) : 0;
+  const std::uint32_t bits = bits_of(entry.format, value);
   const std::size_t size = size_of(entry.format);
-  for (std::size_t i = 0; i < size && i < 4; ++i) packet.payload[2 + i] = static_cast<std::uint8_t>(bits >> (8 * i));
+  for (std::size_t i = 0; i < size; ++i) packet.payload[2 + i] = static_cast<std::uint8_t>(bits >> (8 * i));
   packet.length = static_cast<std::uint8_t>(2 + size);
   return packet;
 }
@@ -51,8 +49,7 @@ Packet make(const Entry& entry, Access access, int module_id, double value) {
 bool is_volatile_setting(const Entry& wanted) noexcept {
   if (&wanted == &entry<"system_control.time"> || &wanted == &entry<"power_safety.fault_ever">) return true;
   if (wanted.type == Client::system_control) return false;
-  const bool calibrated = wanted.type == Client::brushless_drive && wanted.sub >= 14 && wanted.sub <= 18;
-  return wanted.permitted == kGetSetSave && !calibrated;
+  return wanted.permitted == kGetSetSave && &wanted != &entry<"brushless_drive.motor_pole_pairs">;
 }
 
 bool is_as_set(const Entry& asked, double wanted, double read) noexcept {

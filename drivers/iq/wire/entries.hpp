@@ -1,7 +1,6 @@
-// The entries of the speed firmware that kphi knows, in one table: type, sub, path, format, unit, access.
+// The entries of the speed firmware that kphi uses, in one table: type, sub, path, format, unit, access.
 // Formats and units follow the vendor's client files (its C++ headers and documents disagree in places: fault_now is
-// one byte, ctrl_mode signed, the hobby ticks 32 bits). Requests are built from a path known at compile time; a set on
-// what can only be read does not compile.
+// one byte, ctrl_mode signed). A path that is not in the table does not compile.
 #pragma once
 
 #include <algorithm>
@@ -16,16 +15,16 @@
 namespace kphi::iq {
 
 /// How an entry's data is laid out; little-endian.
-enum class Format : std::uint8_t { none, i8, u8, u16, u32, i32, f32, bytes16 };
+enum class Format : std::uint8_t { none, i8, u8, u16, u32, i32, f32 };
 
 /// Bytes of data in a set or a reply.
 [[nodiscard]] constexpr std::size_t size_of(Format format) noexcept {
-  constexpr std::array<std::size_t, 8> sizes{0, 1, 1, 2, 4, 4, 4, 16};
+  constexpr std::array<std::size_t, 7> sizes{0, 1, 1, 2, 4, 4, 4};
   return sizes[static_cast<std::size_t>(format)];
 }
 
-/// One bit per Access. kUnknown: the vendor publishes no access; nothing may be asked.
-inline constexpr std::uint8_t kUnknown = 0, kGet = 1, kSet = 2, kGetSet = 3, kGetSetSave = 7;
+/// One bit per Access.
+inline constexpr std::uint8_t kGet = 1, kSet = 2, kGetSet = 3, kGetSetSave = 7;
 
 /// Read by every audit (service/audit.hpp).
 inline constexpr bool kAudit = true;
@@ -64,10 +63,7 @@ inline constexpr auto kEntries = [] {
       {system_control, 17, "system_control.hardware_version", u32, "version", kGetSetSave, kAudit},
       {system_control, 18, "system_control.electronics_version", u32, "version", kGetSetSave, kAudit},
       {system_control, 15, "system_control.time", f32, "s", kGetSet, kAudit},
-      {system_control, 0, "system_control.reboot_program", none, "", kSet},
-      {system_control, 1, "system_control.reboot_boot_loader", none, "", kSet},
       {system_control, 14, "system_control.module_id", u8, "ID", kGetSetSave},
-      {system_control, 21, "system_control.bootloader_version", u32, "version", kGet},
       {brushless_drive, 14, "brushless_drive.motor_pole_pairs", u16, "PP", kGetSetSave, kAudit},
       {brushless_drive, 32, "brushless_drive.motor_Kv", f32, "RPM/V", kGetSetSave, kAudit},
       {brushless_drive, 33, "brushless_drive.motor_R_ohm", f32, "ohm", kGetSetSave, kAudit},
@@ -82,20 +78,12 @@ inline constexpr auto kEntries = [] {
       {brushless_drive, 47, "brushless_drive.slew_enable", u8, "bool", kGetSetSave, kAudit},
       {brushless_drive, 46, "brushless_drive.slew_volts_per_second", f32, "V/s", kGetSetSave, kAudit},
       {brushless_drive, 0, "brushless_drive.drive_mode", u8, "enum", kGet},
-      {brushless_drive, 1, "brushless_drive.drive_phase_pwm", f32, "PU", kSet},
-      {brushless_drive, 2, "brushless_drive.drive_phase_volts", f32, "V", kSet},
-      {brushless_drive, 3, "brushless_drive.drive_spin_pwm", f32, "PU", kSet},
-      {brushless_drive, 4, "brushless_drive.drive_spin_volts", f32, "V", kSet},
       {brushless_drive, 8, "brushless_drive.drive_pwm", f32, "PU", kGet},
       {brushless_drive, 9, "brushless_drive.drive_volts", f32, "V", kGet},
       {brushless_drive, 11, "brushless_drive.obs_supply_volts", f32, "V", kGet},
       {brushless_drive, 12, "brushless_drive.obs_angle", f32, "rad", kGet},
       {brushless_drive, 13, "brushless_drive.obs_velocity", f32, "rad/s", kGet},
-      {brushless_drive, 17, "brushless_drive.calibration_angle", f32, "rad", kGetSetSave},
-      {brushless_drive, 20, "brushless_drive.phase_angle", f32, "rad", kGetSet},
-      {brushless_drive, 21, "brushless_drive.drive_volts_addition", f32, "V", kGetSet},
       {brushless_drive, 36, "brushless_drive.est_motor_amps", f32, "A", kGet},
-      {brushless_drive, 37, "brushless_drive.est_motor_torque", f32, "Nm", kGet},
       {propeller_motor_control, 15, "propeller_motor_control.timeout", f32, "s", kGetSetSave, kAudit},
       {propeller_motor_control, 17, "propeller_motor_control.timeout_meaning", u8, "enum", kGetSetSave, kAudit},
       {propeller_motor_control, 18, "propeller_motor_control.timeout_behavior", u8, "enum", kGetSetSave, kAudit},
@@ -108,19 +96,13 @@ inline constexpr auto kEntries = [] {
       {propeller_motor_control, 12, "propeller_motor_control.velocity_ff2", f32, "V/(rad/s)^2", kGetSetSave, kAudit},
       {propeller_motor_control, 16, "propeller_motor_control.input_filter_fc", u32, "Hz", kGetSetSave, kAudit},
       {propeller_motor_control, 0, "propeller_motor_control.ctrl_mode", i8, "enum", kGet},
-      {propeller_motor_control, 1, "propeller_motor_control.ctrl_brake", none, "", kSet},
       {propeller_motor_control, 2, "propeller_motor_control.ctrl_coast", none, "", kSet},
-      {propeller_motor_control, 3, "propeller_motor_control.ctrl_pwm", f32, "PU", kGetSet},
-      {propeller_motor_control, 4, "propeller_motor_control.ctrl_volts", f32, "V", kGetSet},
       {propeller_motor_control, 5, "propeller_motor_control.ctrl_velocity", f32, "rad/s", kGetSet},
-      {propeller_motor_control, 6, "propeller_motor_control.ctrl_thrust", f32, "", kGetSet},
-      {propeller_motor_control, 21, "propeller_motor_control.ctrl_torque", f32, "Nm", kUnknown},
       {power_monitor, 0, "power_monitor.volts", f32, "V", kGet, kAudit},
       {power_monitor, 6, "power_monitor.filter_fc", u32, "Hz", kGetSetSave, kAudit},
       {power_monitor, 1, "power_monitor.amps", f32, "A", kGet},
       {power_monitor, 2, "power_monitor.watts", f32, "W", kGet},
       {power_monitor, 3, "power_monitor.joules", f32, "J", kGet},
-      {power_monitor, 4, "power_monitor.reset_joules", none, "", kSet},
       {temperature_monitor_uc, 0, "temperature_monitor_uc.uc_temp", f32, "°C", kGet, kAudit},
       {temperature_monitor_uc, 3, "temperature_monitor_uc.otw", f32, "°C", kGetSetSave, kAudit},
       {temperature_monitor_uc, 4, "temperature_monitor_uc.otlo", f32, "°C", kGetSetSave, kAudit},
@@ -152,18 +134,10 @@ inline constexpr auto kEntries = [] {
       {power_safety, 14, "power_safety.temperature_coil_high", f32, "°C", kGetSetSave, kAudit},
       {hobby_input, 0, "hobby_input.allowed_protocols", u8, "enum", kGetSetSave, kAudit},
       {hobby_input, 1, "hobby_input.protocol", u8, "enum", kGetSet, kAudit},
-      {hobby_input, 3, "hobby_input.calibrated_high_ticks_us", u32, "us", kGetSetSave},
       {arming_handler, 12, "arming_handler.motor_armed", u8, "bool", kGetSet, kAudit},
       {arming_handler, 9, "arming_handler.disarm_behavior", u8, "enum", kGetSetSave, kAudit},
       {stopping_handler, 0, "stopping_handler.stopped_speed", f32, "rad/s", kGetSetSave, kAudit},
       {stopping_handler, 1, "stopping_handler.stopped_time", f32, "s", kGetSetSave, kAudit},
-      {serial_interface, 0, "serial_interface.baud_rate", u32, "bps", kGetSet},
-      {persistent_memory, 0, "persistent_memory.erase", none, "", kSet},
-      {persistent_memory, 1, "persistent_memory.revert_to_default", none, "", kSet},
-      {persistent_memory, 2, "persistent_memory.format_key_1", u32, "key", kSet},
-      {persistent_memory, 3, "persistent_memory.format_key_2", u32, "key", kSet},
-      {esc_propeller_input_parser, 1, "esc_propeller_input_parser.raw_value", f32, "PU", kGetSet},
-      {iquart_flight_controller_interface, 1, "iquart_flight_controller_interface.telemetry", bytes16, "", kGet},
   });
 }();
 
@@ -176,11 +150,6 @@ inline constexpr auto kEntries = [] {
   const std::size_t index = index_of(path);
   return index == kEntries.size() ? nullptr : &kEntries[index];
 }
-[[nodiscard]] constexpr const Entry* find(std::uint8_t type, std::uint8_t sub) noexcept {
-  const auto found = std::ranges::find_if(
-      kEntries, [&](const Entry& entry) { return static_cast<std::uint8_t>(entry.type) == type && entry.sub == sub; });
-  return found == kEntries.end() ? nullptr : &*found;
-}
 
 /// A path as a template argument.
 template <std::size_t N>
@@ -192,10 +161,6 @@ struct Path {
 
 template <Path path>
 concept Known = (index_of(path.view()) < kEntries.size());
-template <Path path>
-concept Readable = (Known<path>)&&(kEntries[index_of(path.view())].allows(Access::get));
-template <Path path>
-concept Writable = (Known<path>)&&(kEntries[index_of(path.view())].allows(Access::set));
 
 /// entry<"power_monitor.volts">: unknown names do not compile.
 template <Path path>
@@ -203,19 +168,11 @@ requires Known<path>
 inline constexpr const Entry& entry = kEntries[index_of(path.view())];
 
 /// The packet of one access. Data goes with set and reply; a value is rounded to the format and held to its range.
-/// Formats none and bytes16 carry no number.
+/// Format none carries no number.
 [[nodiscard]] Packet make(const Entry& entry, Access access, int module_id, double value = 0);
 
-/// The number in a set or a reply; NaN for none and bytes16. `data` must have size_of(format) bytes.
+/// The number in a set or a reply; NaN for none. `data` must have size_of(format) bytes.
 [[nodiscard]] double number(Format format, std::span<const std::uint8_t> data) noexcept;
-
-template <Path path>
-requires Readable<path>
-[[nodiscard]] Packet get(int module_id) { return make(entry<path>, Access::get, module_id); }
-
-template <Path path>
-requires Writable<path>
-[[nodiscard]] Packet set(int module_id, double value = 0) { return make(entry<path>, Access::set, module_id, value); }
 
 /// Whether a program may set it in passing: a parameter that a restart brings back, or what an operator resets, the
 /// clock and the memory of faults. Not so: what moves the motor, what the factory calibrated, the id, the baud rate, a

@@ -1,10 +1,13 @@
-// Who the module is, as read at connection, and its version words taken apart.
+// Who the module is and how it is set: the values read from it, and its version words taken apart.
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <string>
+#include <string_view>
 
-#include "drivers/iq/wire/codes.hpp"
+#include "drivers/iq/wire/entries.hpp"
 
 namespace kphi::iq {
 
@@ -47,31 +50,38 @@ struct BoardVersion {
   [[nodiscard]] std::string text() const;
 };
 
-struct Identity {
-  std::uint32_t firmware = 0;     ///< a FirmwareVersion
-  std::uint32_t hardware = 0;     ///< a BoardVersion; 2306-2200Kv: type 1
-  std::uint32_t electronics = 0;  ///< a BoardVersion; 2306-2200Kv: type 3
-  std::uint32_t uid1 = 0, uid2 = 0, uid3 = 0;
-  int pole_pairs = 0;                 ///< 0: unknown; 23-XX: 7
-  double motor_kv_rpm_per_volt = 0;   ///< 0: unknown
-  int fault_now = 0;                  ///< bits of FaultBit at connection
-  double timeout_s = 0;               ///< communication timeout, read back; seconds of the module
-  bool timeout_behavior_set = false;  ///< false: old firmware, which always coasts and then plays its song
-  int coil_temperature_client = 0;    ///< 83, 77 (old firmware), 0: none answers
-  int system_control_id = 0;          ///< where system_control answers: the module's id; on old firmware always 0
-  double uptime_s = -1;               ///< seconds of the module at connection; below 0: unknown
-  int fault_ever = -1;                ///< bits of FaultBit at connection; -1: unknown
+template <Path path>
+concept Audited = Known<path> && entry<path>
+.audited;
 
-  [[nodiscard]] bool same_module(const Identity& other) const noexcept {
-    return uid1 == other.uid1 && uid2 == other.uid2 && uid3 == other.uid3;
+/// Values of audited entries as a module has told them, at connection or for an audit.
+struct AuditRecord {
+  std::map<const Entry*, double> values;  ///< in the order of their table
+
+  /// value<"brushless_drive.volts_limit">(); nullopt: no answer, or not asked. An entry that is not audited does not
+  /// compile.
+  template <Path path>
+  requires Audited<path>
+  [[nodiscard]] std::optional<double> value() const {
+    const auto found = values.find(&entry<path>);
+    return found == values.end() ? std::nullopt : std::optional(found->second);
   }
 
-  /// One line for a person.
+  [[nodiscard]] std::optional<FirmwareVersion> firmware() const;
+  [[nodiscard]] std::optional<BoardVersion> hardware() const;
+  [[nodiscard]] std::optional<BoardVersion> electronics() const;
+  /// 24 hexadecimal digits; empty if unknown.
+  [[nodiscard]] std::string uid() const;
+  /// 83 or, with old firmware, 77; 0: no answer.
+  [[nodiscard]] int coil_temperature_client() const;
+  /// What was read at connection, in one line for a person.
   [[nodiscard]] std::string summary() const;
-  /// "speed 0.0.32"
-  [[nodiscard]] std::string firmware_text() const;
-  /// 24 hexadecimal digits.
-  [[nodiscard]] std::string uid_text() const;
+
+  /// For the run's header: YAML, one line per known value ("brushless_drive.volts_limit: 27  # V"), starting with the
+  /// decoded versions. Unknown values are left out.
+  [[nodiscard]] std::string text() const;
+  /// Reads text() back; other lines are skipped.
+  [[nodiscard]] static AuditRecord of(std::string_view text);
 };
 
 }  // namespace kphi::iq

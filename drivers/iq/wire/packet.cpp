@@ -50,33 +50,7 @@ std::size_t Parser::scan(std::span<const std::uint8_t> bytes) noexcept {
   std::copy_n(bytes.begin() + 3, length, packet_.payload.begin());
   found_ = true;
   ++counters_.packets;
-  position_ += length + kFrameOverhead;
   return length + kFrameOverhead;
 }
-
-// No further than the end of the frame that is waited for: what follows is read where it lies.
-std::size_t Parser::top_up(std::span<const std::uint8_t> bytes) noexcept {
-  const std::size_t wanted = size_ < 2 ? 2 : held_[1] + kFrameOverhead;
-  return hold(bytes.first(std::min(bytes.size(), wanted - size_)));
-}
-
-std::size_t Parser::hold(std::span<const std::uint8_t> rest) noexcept {
-  std::copy(rest.begin(), rest.end(), held_.begin() + size_);
-  size_ += rest.size();
-  return rest.size();
-}
-
-std::size_t Parser::discard(std::size_t n) noexcept {
-  counters_.discarded_bytes += n;
-  position_ += n;
-  return n;
-}
-
-void Parser::drop(std::size_t n) noexcept {
-  size_ -= n;
-  std::memmove(held_.data(), held_.data() + n, size_);
-}
-
-void Parser::reset() noexcept { drop(discard(size_)); }
 
 }  // namespace kphi::iq

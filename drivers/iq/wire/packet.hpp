@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "drivers/iq/wire/codes.hpp"
 
@@ -42,12 +43,11 @@ struct Packet {
 std::size_t encode(const Packet& packet, std::span<std::uint8_t, kMaxFrame> frame) noexcept;
 
 /// Finds frames in a stream of bytes, in whatever chunks it comes. Nothing intact is lost: after a bad CRC or a LEN
-/// over 59 the search continues at the byte after the false 0x55. Whole frames are read where they lie; only what a
-/// chunk cuts off is held. Allocates nothing.
+/// over 59 the search continues at the byte after the false 0x55.
 class Parser {
  public:
   struct Counters {
-    std::uint64_t bytes = 0;            ///< all that was pushed
+    std::uint64_t bytes_in = 0;         ///< all that was pushed
     std::uint64_t packets = 0;          ///< whole, with a good CRC
     std::uint64_t crc_errors = 0;       ///< candidates with a bad CRC
     std::uint64_t refused_lengths = 0;  ///< candidates with LEN over 59
@@ -57,63 +57,53 @@ class Parser {
   /// Calls `sink(const Packet&, std::uint64_t end)` for each packet; `end` = bytes of the stream up to its last one.
   template <class Sink>
   void push(std::span<const std::uint8_t> bytes, Sink&& sink) {
-    counters_.bytes += bytes.size();
-    while (!bytes.empty()) {
-      if (size_ > 0) {
-        bytes = bytes.subspan(top_up(bytes));
-        read_held(sink);
-      } else {
-        bytes = bytes.subspan(read(bytes, sink));
-        bytes = bytes.subspan(hold(bytes));
-      }
-    }
+    counters_.bytes_in += bytes.size();
+    held_.insert(held_.end(), bytes.begin(), bytes.end());
+    read(sink);
   }
 
   /// Gives up the frame being waited for: its 0x55 was noise. Packets hidden behind it come out. The session calls
   /// this when a frame has been incomplete for too long.
   template <class Sink>
   void abandon(Sink&& sink) {
-    if (size_ == 0) return;
+    if (held_.empty()) return;
     discard(1);
-    drop(1);
-    read_held(sink);
+    held_.erase(held_.begin());
+    read(sink);
   }
 
   /// Forgets the frame being waited for.
-  void reset() noexcept;
+  void reset() noexcept {
+    discard(held_.size());
+    held_.clear();
+  }
 
   /// A frame has begun and is not complete.
-  [[nodiscard]] bool partial() const noexcept { return size_ > 0; }
+  [[nodiscard]] bool partial() const noexcept { return !held_.empty(); }
   /// Position of its first byte in all bytes pushed so far: tells one partial frame from the next.
-  [[nodiscard]] std::uint64_t partial_offset() const noexcept { return counters_.bytes - size_; }
+  [[nodiscard]] std::uint64_t partial_offset() const noexcept { return counters_.bytes_in - held_.size(); }
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
 
  private:
-  /// Reads all that is complete, returns how many bytes are done with.
+  /// Reads all that is complete.
   template <class Sink>
-  std::size_t read(std::span<const std::uint8_t> bytes, Sink& sink) {
+  void read(Sink& sink) {
+    const std::span<const std::uint8_t> held(held_);
     std::size_t done = 0;
-    while (const std::size_t n = scan(bytes.subspan(done))) {
+    while (const std::size_t n = scan(held.subspan(done))) {
       done += n;
-      if (std::exchange(found_, false)) sink(std::as_const(packet_), position_);
+      if (std::exchange(found_, false)) sink(std::as_const(packet_), partial_offset() + done);
     }
-    return done;
+    held_.erase(held_.begin(), held_.begin() + static_cast<std::ptrdiff_t>(done));
   }
-  template <class Sink>
-  void read_held(Sink& sink) {
-    drop(read(std::span<const std::uint8_t>(held_.data(), size_), sink));
-  }
-
   /// Classifies the beginning: noise, a false header, or a packet. Returns its size; 0: it is incomplete.
   std::size_t scan(std::span<const std::uint8_t> bytes) noexcept;
-  std::size_t top_up(std::span<const std::uint8_t> bytes) noexcept;
-  std::size_t hold(std::span<const std::uint8_t> rest) noexcept;
-  std::size_t discard(std::size_t n) noexcept;
-  void drop(std::size_t n) noexcept;
+  std::size_t discard(std::size_t n) noexcept {
+    counters_.discarded_bytes += n;
+    return n;
+  }
 
-  std::array<std::uint8_t, kMaxFrame> held_{};
-  std::size_t size_ = 0;
-  std::uint64_t position_ = 0;  ///< bytes of the stream done with
+  std::vector<std::uint8_t> held_;  ///< from the first byte that is not understood yet
   bool found_ = false;
   Packet packet_;
   Counters counters_;

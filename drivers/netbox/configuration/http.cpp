@@ -2,18 +2,18 @@
 
 #include <fmt/format.h>
 
-#include <boost/algorithm/string/predicate.hpp>
-#include <boost/algorithm/string/trim.hpp>
-#include <cctype>
-#include <optional>
+#include <boost/asio/buffer.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/string_body.hpp>
 #include <string_view>
 
 #include "base/error.hpp"
-#include "base/number.hpp"
 #include "base/tcp.hpp"
 
 namespace kphi::netbox {
 namespace {
+
+namespace http = boost::beast::http;
 
 constexpr std::size_t kHeadLimit = 8192, kBodyLimit = 1 << 20;
 
@@ -25,61 +25,33 @@ const Refused kNotHttp{"the answer is not HTTP", "not a Net Box: check the addre
 const Refused kTooLong{"the answer is longer than 1 MiB", "not a Net Box: check the address"};
 const Refused kCutShort{"the connection ended early", "the box broke off; try again, then power-cycle the box"};
 
-struct Response {
-  int status = 0;
-  std::string body;
-};
-
-/// "HTTP/1.x NNN …"
-int status_of(std::string_view head) {
-  const bool valid = head.size() >= 12 && head.starts_with("HTTP/1.") && std::isdigit(head[7]) && head[8] == ' ';
-  const auto status = valid ? parse_integer<int>(std::string(head.substr(9, 3))) : std::nullopt;
-  if (!status) throw kNotHttp;
-  return *status;
+void refuse_if_wrong(const boost::system::error_code& error) {
+  if (!error || error == http::error::need_more) return;
+  if (error == http::error::partial_message) throw kCutShort;
+  throw error == http::error::body_limit ? kTooLong : kNotHttp;
 }
 
-/// Value of the header `name`; nullopt if it is missing.
-std::optional<std::string> header(std::string_view head, std::string_view name) {
-  for (std::size_t at = head.find("\r\n"); at != std::string_view::npos; at = head.find("\r\n", at + 2)) {
-    const std::string_view line = head.substr(at + 2, head.find("\r\n", at + 2) - (at + 2));
-    const std::size_t colon = line.find(':');
-    if (colon == std::string_view::npos || !boost::algorithm::iequals(line.substr(0, colon), name)) continue;
-    return boost::algorithm::trim_copy(std::string(line.substr(colon + 1)));
-  }
-  return std::nullopt;
-}
-
-/// Bytes of the body; nullopt: up to the end of the connection.
-std::optional<std::size_t> body_size(std::string_view head) {
-  if (header(head, "Transfer-Encoding")) throw kNotHttp;
-  const auto text = header(head, "Content-Length");
-  if (!text) return std::nullopt;
-  const auto size = parse_integer<std::uint64_t>(*text);
-  if (!size) throw kNotHttp;
-  if (*size > kBodyLimit) throw kTooLong;
-  return *size;
-}
-
-Response read_response(TcpClient& box) {
+http::response<http::string_body> read_response(TcpClient& box) {
   constexpr std::string_view kScheme = "HTTP/";
+  http::response_parser<http::string_body> parser;
+  parser.header_limit(kHeadLimit);
+  parser.body_limit(kBodyLimit);
+  parser.eager(true);
   std::string received;
-  std::size_t end = std::string::npos;
-  while ((end = received.find("\r\n\r\n")) == std::string::npos) {
-    const std::size_t known = std::min(received.size(), kScheme.size());
-    if (received.size() > kHeadLimit || received.substr(0, known) != kScheme.substr(0, known)) throw kNotHttp;
-    if (!box.receive(received)) throw kCutShort;
+  while (!parser.is_done()) {
+    boost::system::error_code error;
+    if (box.receive(received)) {
+      // The parser would wait for the end of whatever this is.
+      if (!parser.got_some() && !kScheme.starts_with(received.substr(0, kScheme.size()))) throw kNotHttp;
+      received.erase(0, parser.put(boost::asio::buffer(received), error));
+    } else {
+      if (!parser.got_some()) throw kCutShort;
+      parser.put_eof(error);
+    }
+    refuse_if_wrong(error);
+    if (parser.get().body().size() > kBodyLimit) throw kTooLong;
   }
-  const std::string head = received.substr(0, end);
-  Response response{status_of(head), received.substr(end + 4)};
-  const auto size = body_size(head);
-  while (!size || response.body.size() < *size) {
-    if (response.body.size() > kBodyLimit) throw kTooLong;
-    if (box.receive(response.body)) continue;
-    if (size) throw kCutShort;
-    break;
-  }
-  if (size) response.body.resize(*size);
-  return response;
+  return parser.release();
 }
 
 std::string advice(const TcpError& error, std::uint16_t port) {
@@ -105,9 +77,9 @@ std::string http_get(const std::string& host, std::uint16_t port, const std::str
   try {
     box.connect(host, port);
     box.send(fmt::format("{} HTTP/1.0\r\nHost: {}\r\n\r\n", operation, host));
-    Response response = read_response(box);
-    if (response.status == wanted_status) return std::move(response.body);
-    throw DeviceError(device, operation, fmt::format("HTTP status {}", response.status),
+    http::response<http::string_body> response = read_response(box);
+    if (static_cast<int>(response.result_int()) == wanted_status) return std::move(response.body());
+    throw DeviceError(device, operation, fmt::format("HTTP status {}", response.result_int()),
                       "check that this is a Net Box: open the address in a browser");
   } catch (const Refused& refused) {
     throw DeviceError(device, operation, fmt::format("could not {}: {}", box.step(), refused.cause), refused.next_move);

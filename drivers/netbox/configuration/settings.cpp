@@ -280,36 +280,31 @@ void SettingsKeeper::apply(const WantedSettings& wanted) {
   }
   for (const Assignment& a : assignments)
     journal.changed.push_back({a.setting->key, a.before, expected(*a.setting, a.asked, box)});
+  const std::vector<ChangedSetting> planned = journal.changed;
   write_journal(journal_, journal);
-  changed_ = journal.changed;
   const Shown after = write_and_read_back(address_, assignments);
+  for (ChangedSetting& changed : journal.changed) changed.applied = after.number(changed.key);
+  if (journal.changed != planned) write_journal(journal_, journal);
   for (std::size_t i = 0; i < assignments.size(); ++i) {
     const Assignment& a = assignments[i];
-    const int applied = changed_[i].applied = after.number(a.setting->key);
+    const int applied = journal.changed[i].applied;
     if (applied == a.before) {
       throw DeviceError(device(address_), "write its settings",
                         fmt::format("the box keeps {} at {} and does not take {}", a.setting->name, a.before, a.asked),
                         "close the box's web pages and other programs that write to it");
     }
     if (applied == a.asked) continue;
-    const bool quantised = applied == journal.changed[i].applied;
+    const bool quantised = applied == planned[i].applied;
     notes_.push_back({quantised ? Severity::note : Severity::warning,
                       fmt::format("{} {} requested, the box runs {}", a.setting->name, a.asked, applied),
                       quantised ? "" : "kphi measures with the box's value"});
   }
-  if (changed_ == journal.changed) return;
-  journal.changed = changed_;
-  write_journal(journal_, journal);
 }
 
 void SettingsKeeper::restore() {
-  if (changed_.empty()) return;
-  const std::vector<Finding> findings = set_back(address_, changed_);
-  for (const Finding& finding : findings) {
+  for (const Finding& finding : recover(address_, journal_)) {
     if (finding.severity != Severity::note) notes_.push_back(finding);
   }
-  changed_.clear();
-  remove_journal(journal_);
 }
 
 std::vector<Finding> SettingsKeeper::recover(const Address& address, const std::filesystem::path& journal) {

@@ -73,7 +73,6 @@ class SettingsKeeper {
 
   const Address address_;
   const std::filesystem::path journal_;
-  std::vector<ChangedSetting> changed_;  // to be restored
   std::vector<Finding> notes_;
 };
 

@@ -46,15 +46,12 @@ void check_scale(const Configuration& box, const Intention& intention, Findings&
                      fmt::format("resolution too coarse: one count is {:.3g} N, the largest thrust {:g} N", count_n,
                                  intention.largest_thrust_n),
                      "choose N as the force unit on the box's Configurations page"});
-  const auto thrust = static_cast<std::size_t>(std::clamp(intention.thrust_axis, 0, 2));
-  for (const std::size_t axis : {thrust, thrust + 3}) {
-    const double expected = axis < 3 ? intention.largest_thrust_n : intention.largest_torque_nm;
-    if (expected <= 0.8 * box.range[axis]) continue;
-    found.push_back({expected >= box.range[axis] ? Severity::fault : Severity::warning,
-                     fmt::format("{:g} {unit} expected on {}, its range is {:g} {unit}", expected, kAxes[axis],
-                                 box.range[axis], fmt::arg("unit", unit_of(axis))),
+  const auto axis = static_cast<std::size_t>(std::clamp(intention.thrust_axis, 0, 2));
+  const double expected = intention.largest_thrust_n, range = box.range[axis];
+  if (expected > 0.8 * range)
+    found.push_back({expected >= range ? Severity::fault : Severity::warning,
+                     fmt::format("{:g} N expected on {}, its range is {:g} N", expected, kAxes[axis], range),
                      "choose a calibration with a larger range on the box's Configurations page, or lower the speeds"});
-  }
 }
 
 void check_sampling(const Configuration& box, const Intention& intention, Findings& found) {

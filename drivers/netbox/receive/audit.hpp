@@ -14,7 +14,6 @@ struct Intention {
   std::vector<double> speeds_rpm;  ///< steps of the profile
   int blades = 0;
   double largest_thrust_n = 0;   ///< expected on `thrust_axis`
-  double largest_torque_nm = 0;  ///< expected about `thrust_axis`
   int thrust_axis = 2;           ///< 0..2
   double rate_hz = 0;            ///< expected of the box
   int records_per_datagram = 0;  ///< expected of the box

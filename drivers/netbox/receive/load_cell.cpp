@@ -40,12 +40,12 @@ bool poll_for(std::span<pollfd> descriptors, std::chrono::nanoseconds wall) noex
 
 }  // namespace
 
-LoadCell::LoadCell(const Address& address, const Clock& clock, const StreamPolicy& policy)
+LoadCell::LoadCell(const Address& address, const Clock& clock)
     : address_(address),
       clock_(clock),
       configuration_(parse_configuration(fetch_configuration(address, kHttpTimeout), "Net Box " + address.host)),
       socket_(address.host, address.rdt_port),
-      connection_(configuration_, policy, to_seconds(clock.stretched(1s))),
+      connection_(configuration_, to_seconds(clock.stretched(1s))),
       inquirer_(start_thread([this] { answer_questions(); })) {}
 
 LoadCell::~LoadCell() {
@@ -173,8 +173,7 @@ void LoadCell::drain() noexcept {
 }
 
 void LoadCell::hand_over() noexcept {
-  newest_arrival_ns_.store(connection_.newest_arrival().count(), std::memory_order_release);
-  if (!connection_.publish()) return;
+  if (!connection_.queued_records()) return;
   std::atomic_thread_fence(std::memory_order_seq_cst);
   if (consumer_waits_.load(std::memory_order_relaxed) && consumer_waits_.exchange(false)) record_wakeup_.raise();
 }

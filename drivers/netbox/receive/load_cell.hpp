@@ -26,7 +26,7 @@ namespace kphi::netbox {
 class LoadCell {
  public:
   /// Reads the configuration over HTTP; sends nothing to the RDT port. `clock` must outlive this. Throws DeviceError.
-  LoadCell(const Address& address, const Clock& clock, const StreamPolicy& policy = {});
+  LoadCell(const Address& address, const Clock& clock);
   /// Stops, and waits for a question under way, at most kAnswerTimeout.
   ~LoadCell();
   LoadCell(const LoadCell&) = delete;
@@ -54,8 +54,6 @@ class LoadCell {
   [[nodiscard]] Counters counters() const noexcept { return counters_.read(); }
   /// At most 20 ms older than counters().
   [[nodiscard]] Health health() const noexcept { return health_.read(); }
-  /// Arrival of the newest accepted record; 0 before the first.
-  [[nodiscard]] Instant newest_arrival() const noexcept { return Instant(newest_arrival_ns_.load()); }
   [[nodiscard]] State state() const noexcept { return state_.load(); }
   [[nodiscard]] ReceiveBuffer receive_buffer() const;
 
@@ -86,7 +84,6 @@ class LoadCell {
 
   // Published by the receive thread.
   std::atomic<State> state_{State::idle};
-  std::atomic<std::int64_t> newest_arrival_ns_{0};
   Published<Counters> counters_;
   Published<Health> health_;
 

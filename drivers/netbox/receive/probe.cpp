@@ -103,7 +103,7 @@ std::vector<std::string> Probe::lines() const {
 Probe probe(const Address& address, const Clock& clock, const ProbeSettings& settings) {
   Probe found;
   try {
-    LoadCell cell(address, clock, {.reconnect = false});
+    LoadCell cell(address, clock);
     found.configuration = cell.configuration();
     found.findings = audit(*found.configuration, settings.intention);
     if (auto finding = cell.receive_buffer().finding()) found.findings.push_back(std::move(*finding));

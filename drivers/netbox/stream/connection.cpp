@@ -10,15 +10,13 @@ namespace {
 
 constexpr double kQueueSeconds = 10;
 constexpr double kQueueLimit = 1 << 23;
+// Wall time. Between two questions to a box that does not stream, twice as long each time; and from the silence on.
+constexpr Duration kFirstPause = std::chrono::milliseconds(250), kLongestPause = std::chrono::seconds(8);
+constexpr Duration kGiveUpAfter = std::chrono::seconds(60);
 // The last datagram may be a little late and is worth waiting for.
 constexpr Duration kGathered = std::chrono::milliseconds(2), kMargin = std::chrono::microseconds(10);
 
 Duration stretched(Duration wall, double bench_speed) noexcept { return from_seconds(to_seconds(wall) * bench_speed); }
-
-StreamPolicy in_bench_time(const StreamPolicy& policy, double bench_speed) noexcept {
-  return {policy.reconnect, stretched(policy.first_pause, bench_speed), stretched(policy.longest_pause, bench_speed),
-          stretched(policy.give_up_after, bench_speed)};
-}
 
 std::size_t queue_capacity(const Configuration& box, double bench_speed) {
   const double records = std::ceil(kQueueSeconds * box.rdt_rate_hz * bench_speed);
@@ -46,14 +44,14 @@ Answer ask_box(const std::function<std::string()>& fetch) noexcept {
   return answer;
 }
 
-Connection::Connection(const Configuration& box, const StreamPolicy& policy, double bench_speed)
+Connection::Connection(const Configuration& box, double bench_speed)
     : bench_speed_(bench_speed),
       latest_(box),
       streamed_(box),
       session_(stream_settings(box)),
       meter_(box.device_rate_hz),
-      policy_(in_bench_time(policy, bench_speed)),
-      ring_(queue_capacity(box, bench_speed)) {}
+      queue_records_(queue_capacity(box, bench_speed)),
+      queue_(queue_records_) {}
 
 StreamSettings Connection::stream_settings(const Configuration& box) const {
   StreamSettings settings;
@@ -71,61 +69,49 @@ void Connection::start(Instant now) {
   adopt_latest();
   meter_->begin();
   plan_ = Plan::none;
-  session_->start(now);
+  session_.start(now);
 }
 
 void Connection::stop(Instant now) {
-  session_->flush(accepted_);
+  session_.flush(accepted_);
   store_accepted();
-  if (session_->state() != State::failed) session_->stop(now);
+  if (session_.state() != State::failed) session_.stop(now);
   collect_events();
 }
 
 void Connection::receive(std::span<const std::uint8_t> datagram, Instant arrival) {
   newest_datagram_ = arrival;
-  const std::span<StampedRecord> room = ring_.room(records_in(datagram.size()));
-  const std::size_t count = session_->receive_in_order(datagram, arrival, room);
-  if (count > 0) {
-    meter_->note(room[count - 1], count, session_->counters().reboots);
-    ring_.fill(count);
-    newest_arrival_ = arrival;
-    return;
-  }
-  session_->receive(datagram, arrival, accepted_);
-  if (!accepted_.empty()) meter_->note(accepted_.back(), accepted_.size(), session_->counters().reboots);
+  session_.receive(datagram, arrival, accepted_);
+  if (!accepted_.empty()) meter_->note(accepted_.back(), accepted_.size(), session_.counters().reboots);
   store_accepted();
 }
 
 void Connection::store_accepted() noexcept {
   if (accepted_.empty()) return;
-  queue_overflows_ += accepted_.size() - ring_.push(accepted_);
-  newest_arrival_ = accepted_.back().arrival;
+  const std::size_t queued = queue_.push(accepted_.data(), accepted_.size());
+  queue_overflows_ += accepted_.size() - queued;
+  meter_->note_queue(queue_records_ - queue_.write_available());
+  queued_ |= queued > 0;
   accepted_.clear();
 }
 
-bool Connection::publish() noexcept {
-  if (!ring_.publish()) return false;
-  meter_->note_queue(ring_.waiting());
-  return true;
-}
-
 void Connection::advance(Instant now) {
-  if (session_->release_deadline() <= now) {
-    session_->release(now, accepted_);
+  if (session_.release_deadline() <= now) {
+    session_.release(now, accepted_);
     store_accepted();
   }
-  session_->advance(now);
+  session_.advance(now);
   collect_events();
   supervise(now);
 }
 
 Instant Connection::deadline() const noexcept {
   const Instant next_move = plan_ == Plan::pause ? std::min(due_, give_up_at_) : kNever;
-  return std::min({session_->deadline(), session_->release_deadline(), next_move});
+  return std::min({session_.deadline(), session_.release_deadline(), next_move});
 }
 
 Duration Connection::gathering_time(Instant now) const noexcept {
-  const Duration period = std::max(session_->settings().datagram_period(), Duration{1});
+  const Duration period = std::max(session_.settings().datagram_period(), Duration{1});
   const std::int64_t datagrams = 1 + stretched(kGathered, bench_speed_) / period;
   if (datagrams < 2) return Duration{0};
   // Counted from the newest datagram, not from now: otherwise the sleeps would drift against the stream.
@@ -138,7 +124,7 @@ void Connection::note_event(EventKind kind, Instant at, Changes changes) noexcep
 }
 
 void Connection::collect_events() noexcept {
-  for (const Event& event : session_->take_events()) {
+  for (const Event& event : session_.take_events()) {
     if (!events_.push(event)) ++events_dropped_;
     if (event.kind == EventKind::silent) ask_about_silence(event.at);
     if (event.kind == EventKind::rebooted) question_ = true;
@@ -148,8 +134,8 @@ void Connection::collect_events() noexcept {
 void Connection::ask_about_silence(Instant silent_at) noexcept {
   plan_ = Plan::await_answer;
   question_ = true;
-  pause_ = policy_.first_pause;
-  give_up_at_ = silent_at + policy_.give_up_after;
+  pause_ = stretched(kFirstPause, bench_speed_);
+  give_up_at_ = silent_at + stretched(kGiveUpAfter, bench_speed_);
   away_ = false;
   last_answer_.reset();
 }
@@ -157,11 +143,11 @@ void Connection::ask_about_silence(Instant silent_at) noexcept {
 void Connection::pause(Instant now) noexcept {
   plan_ = Plan::pause;
   due_ = now + pause_;
-  pause_ = std::min(2 * pause_, policy_.longest_pause);
+  pause_ = std::min(2 * pause_, stretched(kLongestPause, bench_speed_));
 }
 
 void Connection::supervise(Instant now) {
-  const State state = session_->state();
+  const State state = session_.state();
   if (state == State::streaming) plan_ = Plan::none;
   if (plan_ == Plan::await_record && state == State::silent) pause(now);
   if (plan_ != Plan::pause) return;
@@ -183,22 +169,22 @@ void Connection::answered(Answer answer, Instant at) {
     latest_ = std::move(*answer.configuration);
   }
   if (changes != 0) note_event(EventKind::configuration_changed, at, changes);
-  if (session_->state() == State::streaming) {
+  if (session_.state() == State::streaming) {
     if (answer.kind == Answer::Kind::unusable) note_event(EventKind::unusable, at);
     if (!changes_stream(changes)) return;
     adopt_latest();
-    return session_->start(at);
+    return session_.start(at);
   }
   if (plan_ != Plan::await_answer) return;
   away_ = away_ || booted || answer.kind != Answer::Kind::ready;
-  const bool returns = policy_.reconnect && away_, news = std::exchange(last_answer_, answer.kind) != answer.kind;
-  if (returns && answer.kind == Answer::Kind::ready) {
+  const bool news = std::exchange(last_answer_, answer.kind) != answer.kind;
+  if (away_ && answer.kind == Answer::Kind::ready) {
     plan_ = Plan::await_record;
     adopt_latest();
-    return session_->start(at);
+    return session_.start(at);
   }
   plan_ = Plan::none;
-  if (returns) pause(at);
+  if (away_) pause(at);
   if (news) note_event(event_of(answer.kind), at);
 }
 
@@ -206,11 +192,10 @@ void Connection::answered(Answer answer, Instant at) {
 /// counters.
 void Connection::adopt_latest() {
   if (!changes_stream(compare(streamed_, latest_))) return;
-  session_->flush(accepted_);
+  session_.flush(accepted_);
   store_accepted();
   collect_events();
-  Session fresh(stream_settings(latest_), *session_);
-  session_.emplace(std::move(fresh));
+  session_.adopt(stream_settings(latest_));
   meter_.emplace(latest_.device_rate_hz);
   streamed_ = latest_;
 }
@@ -222,17 +207,17 @@ std::vector<Event> Connection::take_events() {
   return events;
 }
 
-State Connection::state() const noexcept { return session_->resuming() ? State::silent : session_->state(); }
+State Connection::state() const noexcept { return session_.resuming() ? State::silent : session_.state(); }
 
 Counters Connection::counters() const noexcept {
-  Counters counters = session_->counters();
+  Counters counters = session_.counters();
   counters.queue_overflows = queue_overflows_;
   return counters;
 }
 
 Health Connection::health() const noexcept {
   Health health = meter_->health();
-  health.events_dropped = session_->dropped_events() + events_dropped_;
+  health.events_dropped = events_dropped_;
   return health;
 }
 

@@ -16,18 +16,9 @@
 #include "base/clock.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
 #include "drivers/netbox/stream/health.hpp"
-#include "drivers/netbox/stream/record_ring.hpp"
 #include "drivers/netbox/stream/session.hpp"
 
 namespace kphi::netbox {
-
-/// Wall time. The pauses lie between two questions to a box that does not stream.
-struct StreamPolicy {
-  bool reconnect = true;  ///< start the stream again automatically, unless another client may have taken it
-  Duration first_pause = std::chrono::milliseconds(250);  ///< doubles with each question
-  Duration longest_pause = std::chrono::seconds(8);
-  Duration give_up_after = std::chrono::seconds(60);  ///< counted from the silence
-};
 
 /// The box's answer when it is asked for its configuration over HTTP.
 struct Answer {
@@ -46,18 +37,18 @@ inline constexpr std::chrono::seconds kAnswerTimeout{2};
 class Connection {
  public:
   /// `bench_speed`: bench seconds per second. The queue holds 10 s of wall time.
-  explicit Connection(const Configuration& box, const StreamPolicy& policy = {}, double bench_speed = 1);
+  explicit Connection(const Configuration& box, double bench_speed = 1);
 
   /// Starts the stream; counters continue, health starts again. state() tells whether it works.
   void start(Instant now);
   /// Sends the stop and delivers the records held back.
   void stop(Instant now);
   /// The box takes its present load as zero; see Session::set_bias.
-  void set_bias(Instant now) { session_->set_bias(now); }
+  void set_bias(Instant now) { session_.set_bias(now); }
 
   void receive(std::span<const std::uint8_t> datagram, Instant arrival);
   /// Datagrams dropped by the socket since it was opened, as known with the next datagram.
-  void note_host_drops(std::uint64_t total) noexcept { session_->note_host_drops(total); }
+  void note_host_drops(std::uint64_t total) noexcept { session_.note_host_drops(total); }
   /// The box's answer to the last question.
   void answered(Answer answer, Instant at);
   /// To be called at deadline(), after receive() of everything that came before.
@@ -65,7 +56,7 @@ class Connection {
 
   /// Pops the next request to the box's RDT port; false if there is none.
   [[nodiscard]] bool next_request(std::array<std::uint8_t, 8>& request) noexcept {
-    return session_->next_request(request);
+    return session_.next_request(request);
   }
   /// True once per question: ask the box over HTTP within kAnswerTimeout, then call answered(). While one question is
   /// under way, the next one waits.
@@ -75,13 +66,13 @@ class Connection {
   /// How long the receiving thread may sleep so that single records of 2 ms wall time share one wake-up; 0: wake up
   /// with the next datagram. At 7 kHz a wake-up is most of what a single record costs.
   [[nodiscard]] Duration gathering_time(Instant now) const noexcept;
-  /// Makes the received records visible to the consumer; false if there are no new ones.
-  bool publish() noexcept;
+  /// Records have been queued since the last call.
+  [[nodiscard]] bool queued_records() noexcept { return std::exchange(queued_, false); }
 
   /// Consumer: oldest first; returns how many.
-  std::size_t take(std::span<StampedRecord> out) noexcept { return ring_.take(out); }
+  std::size_t take(std::span<StampedRecord> out) noexcept { return queue_.pop(out.data(), out.size()); }
   /// Consumer: no record is waiting.
-  [[nodiscard]] bool empty() const noexcept { return ring_.empty(); }
+  [[nodiscard]] bool empty() const noexcept { return queue_.read_available() == 0; }
   /// Consumer: events since the last call, oldest first.
   [[nodiscard]] std::vector<Event> take_events();
 
@@ -89,10 +80,9 @@ class Connection {
   [[nodiscard]] State state() const noexcept;
   [[nodiscard]] Counters counters() const noexcept;
   [[nodiscard]] Health health() const noexcept;
-  [[nodiscard]] Instant newest_arrival() const noexcept { return newest_arrival_; }
   /// As answered last.
   [[nodiscard]] const Configuration& configuration() const noexcept { return latest_; }
-  [[nodiscard]] const StreamSettings& settings() const noexcept { return session_->settings(); }
+  [[nodiscard]] const StreamSettings& settings() const noexcept { return session_.settings(); }
 
  private:
   [[nodiscard]] StreamSettings stream_settings(const Configuration& box) const;
@@ -106,12 +96,11 @@ class Connection {
 
   const double bench_speed_;
   Configuration latest_, streamed_;  // as answered last; what session_ is made for
-  std::optional<Session> session_;
+  Session session_;
   std::optional<HealthMeter> meter_;
 
   /// About a silence: nothing; its question is under way; the next question or the end is due; a start is under way.
   enum class Plan : std::uint8_t { none, await_answer, pause, await_record };
-  const StreamPolicy policy_;  // in bench time
   Plan plan_ = Plan::none;
   Instant due_ = kNever, give_up_at_ = kNever;
   Duration pause_{0};
@@ -119,10 +108,12 @@ class Connection {
   std::optional<Answer::Kind> last_answer_;  // of this silence
   bool question_ = false;
 
-  RecordRing ring_;
+  const std::size_t queue_records_;  // that it holds at most
+  boost::lockfree::spsc_queue<StampedRecord> queue_;
+  bool queued_ = false;
   boost::lockfree::spsc_queue<Event, boost::lockfree::capacity<256>> events_;
   std::vector<StampedRecord> accepted_;
-  Instant newest_arrival_{0}, newest_datagram_{0};
+  Instant newest_datagram_{0};
   std::uint64_t queue_overflows_ = 0, events_dropped_ = 0;
 };
 

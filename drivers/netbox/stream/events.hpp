@@ -3,8 +3,6 @@
 
 #include <cstdint>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "base/clock.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
@@ -25,7 +23,7 @@ enum class EventKind : std::uint8_t {
   unusable,      ///< silence or a boot, and the box's configuration is unusable
   reconnected,   ///< the stream was started again after a silence
   configuration_changed,  ///< `changes` since the silence or boot before: the records may have another meaning
-  given_up,               ///< no reconnection within StreamPolicy::give_up_after
+  given_up,               ///< no reconnection within a minute
 };
 
 struct Event {
@@ -41,25 +39,5 @@ struct Event {
 
 /// One line: "12.345 s: the stream restarted (rdt 1 after 2000, ft 5100 after 5099), 0 records missing".
 [[nodiscard]] std::string to_string(const Event& event);
-
-/// Keeps the oldest kCapacity events and counts the rest.
-class EventLog {
- public:
-  static constexpr std::size_t kCapacity = 64;
-  void note(const Event& event) {
-    if (events_.size() < kCapacity) {
-      events_.push_back(event);
-    } else {
-      ++dropped_;
-    }
-  }
-  /// Removes and returns all, oldest first.
-  [[nodiscard]] std::vector<Event> take() { return std::exchange(events_, {}); }
-  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
-
- private:
-  std::vector<Event> events_;
-  std::uint64_t dropped_ = 0;
-};
 
 }  // namespace kphi::netbox

@@ -76,7 +76,7 @@ Duration ClockEstimate::uncertainty() const noexcept {
 
 void HealthMeter::begin() noexcept {
   clock_.restart();
-  jitter_.clear();
+  jitter_ = {};
   records_ = datagrams_ = high_water_ = 0;
 }
 

@@ -44,7 +44,7 @@ void LossTracker::begin_segment() noexcept {
 bool LossTracker::accept_unusual(const Record& record, Instant arrival) noexcept {
   if (!has_last_) {
     has_last_ = true;
-    accept_run(record, 1, arrival);
+    accept_sound(record, arrival);
     return true;
   }
   const std::int32_t rdt_step = step(last_rdt(), record.rdt_sequence);
@@ -122,14 +122,14 @@ bool LossTracker::accept_reboot(const Record& record, Instant arrival) noexcept 
   stall_run_ = 0;
   began_anew_stalled_ = false;
   forget_host_drops();
-  accept_run(first.record, 1, first.arrival);
+  accept_sound(first.record, first.arrival);
   return accept_forward(second.record, second.arrival, 1, step(first.record.ft_sequence, second.record.ft_sequence));
 }
 
 std::optional<StampedRecord> LossTracker::take_confirmed() noexcept { return std::exchange(confirmed_, std::nullopt); }
 
 void LossTracker::note_event(EventKind kind, const Record& record, Instant at, std::uint64_t records) noexcept {
-  events_.note({kind, at, record.rdt_sequence, record.ft_sequence, last_rdt_, last_ft_, records, record.status});
+  events_.push_back({kind, at, record.rdt_sequence, record.ft_sequence, last_rdt_, last_ft_, records, record.status});
 }
 
 bool LossTracker::accept_forward(const Record& record, Instant arrival, std::int32_t rdt_step,

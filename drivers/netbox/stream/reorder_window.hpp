@@ -49,7 +49,7 @@ class LossTracker {
   /// True: deliver it. False: counted and to be discarded.
   [[nodiscard]] bool accept(const Record& record, Instant arrival) noexcept {
     if (is_next(record)) [[likely]] {
-      accept_run(record, 1, arrival);
+      accept_sound(record, arrival);
       return true;
     }
     return accept_unusual(record, arrival);
@@ -57,12 +57,6 @@ class LossTracker {
   /// Follows the last accepted one in both numbers.
   [[nodiscard]] bool is_next(const Record& record) const noexcept {
     return has_last_ && record.rdt_sequence == last_rdt_ + 1 && record.ft_sequence == last_ft_ + stride_;
-  }
-  /// `count` records that follow each other, the first is_next(); `last` is the last of them.
-  void accept_run(const Record& last, std::size_t count, Instant arrival) noexcept {
-    remember(last, arrival);
-    counters_.received += count;
-    counters_.expected += count;
   }
   /// The first record of a stream has arrived: earlier drops explain no later gap.
   void forget_host_drops() noexcept { host_credit_ = 0; }
@@ -80,8 +74,7 @@ class LossTracker {
   [[nodiscard]] const Counters& counters() const noexcept { return counters_; }
   [[nodiscard]] Counters& counters() noexcept { return counters_; }
   /// Restarts, reboots and stalls.
-  [[nodiscard]] EventLog& events() noexcept { return events_; }
-  [[nodiscard]] const EventLog& events() const noexcept { return events_; }
+  [[nodiscard]] std::vector<Event>& events() noexcept { return events_; }
 
  private:
   struct Gap {
@@ -93,6 +86,12 @@ class LossTracker {
     last_ft_ = record.ft_sequence;
     last_arrival_ = arrival;
     has_stray_ = false;
+  }
+  /// No record is missing before it.
+  void accept_sound(const Record& record, Instant arrival) noexcept {
+    remember(record, arrival);
+    ++counters_.received;
+    ++counters_.expected;
   }
   bool accept_unusual(const Record& record, Instant arrival) noexcept;
   bool accept_forward(const Record& record, Instant arrival, std::int32_t rdt_step, std::int32_t ft_step) noexcept;
@@ -112,8 +111,8 @@ class LossTracker {
   void count_lost(std::uint64_t records, const Gap& gap) noexcept;
   bool in_recent_gap(std::uint32_t ft) const noexcept;
 
-  const std::uint32_t stride_;
-  const double device_rate_hz_;
+  std::uint32_t stride_;
+  double device_rate_hz_;
   bool has_last_ = false;
   std::uint32_t last_rdt_ = 0, last_ft_ = 0;
   Instant last_arrival_{0};
@@ -128,7 +127,7 @@ class LossTracker {
   std::uint64_t Counters::*stray_counted_ = nullptr;  // as what it was discarded
   std::optional<StampedRecord> confirmed_;
   Counters counters_;
-  EventLog events_;
+  std::vector<Event> events_;
 };
 
 /// Holds records that overtook others until those arrive or are given up, also at the start of a stream. Records in
@@ -159,9 +158,9 @@ class ReorderWindow {
   void release(std::size_t count, LossTracker& account, std::vector<StampedRecord>& out);
   [[nodiscard]] std::size_t run_length(std::size_t from) const noexcept;
 
-  const std::size_t records_;
-  const Duration patience_;
-  const std::uint32_t stride_;
+  std::size_t records_;
+  Duration patience_;
+  std::uint32_t stride_;
   std::vector<StampedRecord> held_;  // ascending in ft_sequence, then rdt_sequence
   Instant oldest_arrival_ = kNever;
 };

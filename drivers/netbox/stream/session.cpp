@@ -1,7 +1,6 @@
 #include "drivers/netbox/stream/session.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace kphi::netbox {
 namespace {
@@ -12,33 +11,29 @@ constexpr int kDrainLimit = 20;
 // start was sent, belongs to the stream before.
 constexpr double kFirstDatagrams = 4, kLargestRate = 4;
 
-bool same_count(const StreamSettings& a, const StreamSettings& b) noexcept {
-  return a.divisor == b.divisor && a.device_rate_hz == b.device_rate_hz;
-}
-
 std::size_t window_records(const StreamSettings& settings) {
   return std::max(settings.reorder_records, static_cast<std::size_t>(4 * settings.records_per_datagram));
 }
 
 }  // namespace
 
-Session::Session(StreamSettings settings) : Session(settings, LossTracker(settings.divisor, settings.device_rate_hz)) {}
-
-Session::Session(StreamSettings settings, const Session& before)
-    : Session(settings, same_count(settings, before.settings_)
-                            ? before.account_
-                            : LossTracker(settings.divisor, settings.device_rate_hz)) {
-  account_.counters() = before.account_.counters();
-  host_drops_ = before.host_drops_;
-  phase_ = before.phase_;
-}
-
-Session::Session(StreamSettings settings, LossTracker account)
+Session::Session(const StreamSettings& settings)
     : settings_(settings),
-      silence_(settings.silence()),
-      account_(std::move(account)),
+      account_(settings.divisor, settings.device_rate_hz),
       window_(window_records(settings), settings.reorder_patience, settings.divisor),
       datagram_records_(static_cast<std::size_t>(settings.records_per_datagram)) {}
+
+void Session::adopt(const StreamSettings& settings) {
+  if (settings.divisor != settings_.divisor || settings.device_rate_hz != settings_.device_rate_hz) {
+    const Counters counters = account_.counters();
+    account_ = LossTracker(settings.divisor, settings.device_rate_hz);
+    account_.counters() = counters;
+  }
+  settings_ = settings;
+  window_ = ReorderWindow(window_records(settings), settings.reorder_patience, settings.divisor);
+  datagram_records_ = static_cast<std::size_t>(settings.records_per_datagram);
+  trouble_ = 0;
+}
 
 void Session::start(Instant now) {
   if (phase_ == Phase::idle || phase_ == Phase::failed) {
@@ -65,36 +60,7 @@ void Session::stop(Instant now) {
   due_ = bias_due_ = kNever;
 }
 
-std::size_t Session::receive_in_order(std::span<const std::uint8_t> datagram, Instant arrival,
-                                      std::span<StampedRecord> out) noexcept {
-  const std::size_t count = records_in(datagram.size());
-  if (phase_ != Phase::streaming || !window_.empty() || count == 0 || count > out.size()) return 0;
-  decode(datagram.data(), out[0].record);
-  if (!account_.is_next(out[0].record)) return 0;
-  std::uint32_t rdt = out[0].record.rdt_sequence, ft = out[0].record.ft_sequence;
-  std::uint32_t deviation = 0, status = out[0].record.status;
-  out[0].arrival = arrival;
-  for (std::size_t i = 1; i < count; ++i) {
-    Record& record = out[i].record;
-    decode(datagram.data() + i * kRecordBytes, record);
-    out[i].arrival = arrival;
-    deviation |= (record.rdt_sequence ^ ++rdt) | (record.ft_sequence ^ (ft += settings_.divisor));
-    status |= record.status;
-  }
-  if (deviation != 0) return 0;
-  ++account_.counters().datagrams;
-  account_.accept_run(out[count - 1].record, count, arrival);
-  if (status != trouble_) note_status(status, out[0].record, arrival);
-  note_arrival(count, arrival);
-  return count;
-}
-
 void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out) {
-  const std::size_t before = out.size();
-  out.resize(before + records_in(datagram.size()));
-  const std::size_t in_order = receive_in_order(datagram, arrival, std::span(out).subspan(before));
-  out.resize(before + in_order);
-  if (in_order > 0) return;
   Counters& counters = account_.counters();
   ++counters.datagrams;
   const std::size_t count = decode(datagram, decoded_);
@@ -110,7 +76,8 @@ void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, s
   datagram_records_ = count;
   if (!take_records(count, arrival, out)) return;
   if (phase_ != Phase::streaming) begin_streaming(arrival);
-  note_arrival(count, arrival);
+  newest_arrival_ = arrival;
+  due_ = arrival + settings_.silence();
 }
 
 void Session::begin_streaming(Instant arrival) noexcept {
@@ -138,12 +105,6 @@ bool Session::take_records(std::size_t count, Instant arrival, std::vector<Stamp
   return any_new;
 }
 
-void Session::note_arrival(std::size_t count, Instant arrival) noexcept {
-  datagram_records_ = count;
-  newest_arrival_ = arrival;
-  due_ = arrival + silence_;
-}
-
 void Session::note_status(std::uint32_t status, const Record& shown_by, Instant arrival) noexcept {
   const std::uint32_t trouble = settings_.product == Product::net_box ? status & kStreamTrouble : 0;
   if ((trouble & ~trouble_) != 0) note_event(EventKind::box_trouble, arrival, shown_by, trouble);
@@ -158,7 +119,7 @@ void Session::note_silence(Instant now) noexcept {
 }
 
 void Session::note_event(EventKind kind, Instant at, const Record& shown_by, std::uint32_t status) noexcept {
-  account_.events().note(
+  account_.events().push_back(
       {kind, at, shown_by.rdt_sequence, shown_by.ft_sequence, account_.last_rdt(), account_.last_ft(), 0, status});
 }
 
@@ -167,12 +128,18 @@ void Session::set_bias(Instant now) {
   send(Command::set_bias);
   bias_starts_ = 0;
   bias_due_ = now + 3 * settings_.datagram_period() + settings_.bias_patience;
+  bias_watched_until_ = now + settings_.silence();
 }
 
 void Session::check_bias(Instant now) noexcept {
   const bool flows = newest_arrival_ + 2 * settings_.datagram_period() + settings_.bias_patience / 2 > now;
-  if (flows || bias_starts_ == settings_.attempts) {
+  if (flows ? now >= bias_watched_until_ : bias_starts_ == settings_.attempts) {
     bias_due_ = kNever;
+    return;
+  }
+  // The request may still be on its way, or the box busy.
+  if (flows) {
+    bias_due_ = newest_arrival_ + 3 * settings_.datagram_period() + settings_.bias_patience;
     return;
   }
   send(start_command());

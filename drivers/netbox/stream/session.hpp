@@ -6,6 +6,7 @@
 #include <boost/container/static_vector.hpp>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/clock.hpp"
@@ -47,10 +48,10 @@ enum class State : std::uint8_t {
 
 class Session {
  public:
-  explicit Session(StreamSettings settings);
-  /// Continues `before` with other settings: call start() then. With another stride the counters continue, but records
-  /// missing in between are unknown.
-  Session(StreamSettings settings, const Session& before);
+  explicit Session(const StreamSettings& settings);
+  /// Continues with other settings: call flush() before and start() then. With another stride the counters continue,
+  /// but records missing in between are unknown.
+  void adopt(const StreamSettings& settings);
 
   /// Stop, wait for silence, start; repeated until the first record. From `silent` or `streaming` the records missing
   /// in between are counted as lost; from `idle` or `failed` they are not.
@@ -58,16 +59,13 @@ class Session {
   /// Tells the box to stop, and again if it keeps sending. Call flush() before: start() from `idle` drops records held
   /// back.
   void stop(Instant now);
-  /// While streaming: the box takes its present load as zero. Some boxes stop their stream then: it is started again
-  /// when no record comes within three datagram periods and bias_patience. Another state: nothing is sent.
+  /// While streaming: the box takes its present load as zero. Some boxes stop their stream then, also some time later:
+  /// until silence() has passed, it is started again when no record comes within three datagram periods and
+  /// bias_patience. Another state: nothing is sent.
   void set_bias(Instant now);
   /// Appends to `out` the records that can be delivered, ascending in ft_sequence. Records behind a gap are held back
   /// (StreamSettings::reorder_records and reorder_patience) and come with a later call.
   void receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out);
-  /// The fast path for the usual datagram: streaming, no record held back, all its records in order. Decodes them into
-  /// `out` and returns their number. 0: nothing was counted, call receive().
-  [[nodiscard]] std::size_t receive_in_order(std::span<const std::uint8_t> datagram, Instant arrival,
-                                             std::span<StampedRecord> out) noexcept;
   /// To be called at `deadline()`, after everything that came before has been received.
   void advance(Instant now);
   /// When release() will deliver; kNever if no record is held back. Not part of deadline().
@@ -88,19 +86,16 @@ class Session {
   /// Datagrams that the socket has dropped since it was opened (SO_RXQ_OVFL), as known at the datagram received next.
   void note_host_drops(std::uint64_t total) noexcept;
   [[nodiscard]] const Counters& counters() const noexcept { return account_.counters(); }
-  /// Oldest first; bounded, see EventLog.
-  [[nodiscard]] std::vector<Event> take_events() { return account_.events().take(); }
-  [[nodiscard]] std::uint64_t dropped_events() const noexcept { return account_.events().dropped(); }
+  /// Oldest first.
+  [[nodiscard]] std::vector<Event> take_events() { return std::exchange(account_.events(), {}); }
   [[nodiscard]] const StreamSettings& settings() const noexcept { return settings_; }
 
  private:
   enum class Phase : std::uint8_t { idle, draining, awaiting, streaming, silent, failed };
 
-  Session(StreamSettings settings, LossTracker account);
   void discard(Instant arrival);
   void check_bias(Instant now) noexcept;
   bool take_records(std::size_t count, Instant arrival, std::vector<StampedRecord>& out);
-  void note_arrival(std::size_t count, Instant arrival) noexcept;
   void note_status(std::uint32_t status, const Record& shown_by, Instant arrival) noexcept;
   void note_silence(Instant now) noexcept;
   void note_event(EventKind kind, Instant at, const Record& shown_by, std::uint32_t status = 0) noexcept;
@@ -111,13 +106,12 @@ class Session {
   void send_stop(Instant now) noexcept;
   void send_start(Instant now) noexcept;
 
-  const StreamSettings settings_;
-  const Duration silence_;
+  StreamSettings settings_;
   LossTracker account_;
   ReorderWindow window_;
   std::uint32_t trouble_ = 0;  // status bits that say so, of the last datagram
   Phase phase_ = Phase::idle;
-  Instant due_ = kNever, bias_due_ = kNever;
+  Instant due_ = kNever, bias_due_ = kNever, bias_watched_until_{0};
   Instant newest_arrival_{0};
   int bias_starts_ = 0;
   bool resuming_ = false, silence_told_ = false;

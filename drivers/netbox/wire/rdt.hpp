@@ -2,13 +2,10 @@
 #pragma once
 
 #include <array>
-#include <bit>
 #include <boost/endian/conversion.hpp>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <span>
-#include <type_traits>
 
 namespace kphi::netbox {
 
@@ -50,18 +47,10 @@ struct Record {
 
 /// One record from its kRecordBytes.
 inline void decode(const std::uint8_t* bytes, Record& out) noexcept {
-  static_assert(sizeof(Record) == kRecordBytes && std::is_trivially_copyable_v<Record>);
-  auto* to = reinterpret_cast<std::uint8_t*>(&out);
-  // Two words at a time; swapping the bytes of the pair swaps the words, too.
-  constexpr int turn = std::endian::native == std::endian::little ? 32 : 0;
-  for (std::size_t at = 0; at < 32; at += 8) {
-    std::uint64_t pair;
-    std::memcpy(&pair, bytes + at, sizeof pair);
-    pair = std::rotr(boost::endian::big_to_native(pair), turn);
-    std::memcpy(to + at, &pair, sizeof pair);
-  }
-  const std::uint32_t last = boost::endian::load_big_u32(bytes + 32);
-  std::memcpy(to + 32, &last, sizeof last);
+  out.rdt_sequence = boost::endian::load_big_u32(bytes);
+  out.ft_sequence = boost::endian::load_big_u32(bytes + 4);
+  out.status = boost::endian::load_big_u32(bytes + 8);
+  for (std::size_t axis = 0; axis < 6; ++axis) out.counts[axis] = boost::endian::load_big_s32(bytes + 12 + 4 * axis);
 }
 
 /// Number of records written to `out`: records_in().

@@ -1,6 +1,7 @@
 #include "drivers/sim/iq/line.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <utility>
@@ -16,14 +17,15 @@ constexpr double kRateTolerance = 0.045;  // beyond it the stop bit is missed
 constexpr std::uint8_t kReply = 3;
 constexpr std::array<std::uint32_t, 3> kOtherUid{0x00410018, 0x4d4b5022, 0x20343354};
 
-/// Faults of a moment or a span; all others wait for replies or bytes.
-bool is_event(const MotorFault& fault) noexcept {
-  return fault.kind >= MotorFaultKind::mute && fault.kind != MotorFaultKind::command_flip;
+/// Faults of a moment or a span; all others of the motor wait for replies or bytes.
+bool is_event(const Fault& fault) noexcept {
+  return within(fault.kind, FaultKind::motor_mute, FaultKind::motor_locked) &&
+         fault.kind != FaultKind::motor_command_flip;
 }
 
 }  // namespace
 
-IqLine::IqLine(IqDevice& module, const IqLineSettings& settings, MotorFaultScript script, std::uint64_t seed, Keep keep)
+IqLine::IqLine(IqDevice& module, const IqLineSettings& settings, FaultScript script, std::uint64_t seed, Keep keep)
     : module_(module), settings_(settings), script_(std::move(script), seed), keep_(keep), stuck_(script_.size()) {
   for (std::size_t i = 0; i < script_.size(); ++i) {
     if (is_event(script_[i])) script_.plan(i);
@@ -74,12 +76,12 @@ void IqLine::carry_commands(Instant now) {
     if (deaf_) continue;
     if (!rates_match()) carried.byte = random_byte();
     for (std::size_t i = 0; i < script_.size(); ++i) {
-      if (script_[i].kind != MotorFaultKind::command_flip || !script_.active(i, carried.due) ||
+      if (script_[i].kind != FaultKind::motor_command_flip || !script_.active(i, carried.due) ||
           !script_.chance(script_[i].p))
         continue;
       carried.byte ^= static_cast<std::uint8_t>(1u << (script_.bits() & 7));
       script_.use(i);
-      ++truth_.done[static_cast<std::size_t>(MotorFaultKind::command_flip)];
+      ++truth_.done[FaultKind::motor_command_flip];
     }
     ++truth_.bytes_to_module;
     module_.receive({&carried.byte, 1}, carried.due);
@@ -99,12 +101,10 @@ void IqLine::carry(const IqReply& reply) {
   decision.reply = {reply};
   decision.passage.ready = reply.at;
   for (std::size_t i = 0; i < script_.size(); ++i) {
-    if (is_event(script_[i]) || !script_.active(i, reply.at) || !concerns(script_[i], reply) ||
-        !script_.chance(script_[i].p))
-      continue;
+    if (!script_.active(i, reply.at) || !concerns(script_[i], reply) || !script_.chance(script_[i].p)) continue;
     script_.use(i);
-    ++truth_.done[static_cast<std::size_t>(script_[i].kind)];
-    decision.reply.done |= 1u << static_cast<unsigned>(script_[i].kind);
+    ++truth_.done[script_[i].kind];
+    decision.reply.done.insert(script_[i].kind);
     act(i, decision);
   }
   if (decision.overtaken_for && !decision.dropped && !held_) {
@@ -120,37 +120,38 @@ void IqLine::carry(const IqReply& reply) {
 }
 
 void IqLine::act(std::size_t index, FaultDecision& decision) {
-  const MotorFault& fault = script_[index];
+  const Fault& fault = script_[index];
   IqReply& reply = decision.reply;
   Passage& passage = decision.passage;
-  using K = MotorFaultKind;
+  using K = FaultKind;
   const auto is = [&fault](K kind) { return fault.kind == kind; };
   // The reply itself.
-  if (is(K::drop)) decision.dropped = true;
-  if (is(K::duplicate)) ++decision.copies;
-  if (is(K::reorder)) decision.overtaken_for = fault.delay;
-  if (is(K::value) && reply.size == 4)
-    put_little(reply.bytes.data(), std::bit_cast<std::uint32_t>(static_cast<float>(fault.value)), 4);
-  if (is(K::wrong_length)) reply.size = static_cast<std::uint8_t>(fault.size);
-  if (is(K::wrong_id)) reply.id = static_cast<std::uint8_t>(fault.id);
-  if (is(K::stuck)) reply.bytes = stuck_[index].try_emplace(iq_key(reply.type, reply.sub), reply).first->second.bytes;
+  if (is(K::motor_drop)) decision.dropped = true;
+  if (is(K::motor_duplicate)) ++decision.copies;
+  if (is(K::motor_reorder)) decision.overtaken_for = fault.delay;
+  if (is(K::motor_value) && reply.size == 4)
+    put_little(reply.bytes.data(), std::bit_cast<std::uint32_t>(static_cast<float>(fault.reading)), 4);
+  if (is(K::motor_wrong_length)) reply.size = static_cast<std::uint8_t>(fault.size);
+  if (is(K::motor_wrong_id)) reply.id = static_cast<std::uint8_t>(fault.id);
+  if (is(K::motor_stuck))
+    reply.bytes = stuck_[index].try_emplace(iq_key(reply.type, reply.sub), reply).first->second.bytes;
   // Its bytes.
-  if (is(K::flip)) decision.flips += fault.bits;
-  if (is(K::bad_crc)) decision.bad_crc = true;
-  if (is(K::truncate)) decision.truncated = static_cast<std::size_t>(fault.size);
-  if (is(K::garbage)) {
+  if (is(K::motor_flip)) decision.flips += fault.bits;
+  if (is(K::motor_bad_crc)) decision.bad_crc = true;
+  if (is(K::motor_truncate)) decision.truncated = static_cast<std::size_t>(fault.size);
+  if (is(K::motor_garbage)) {
     for (std::size_t i = 0; fault.bytes.empty() && i < fault.size; ++i) decision.before.push_back(random_byte());
     decision.before.insert(decision.before.end(), fault.bytes.begin(), fault.bytes.end());
   }
   // When they come.
   const std::int64_t period = std::max<std::int64_t>(1, fault.delay.count());
-  if (is(K::merge)) passage.together = Instant((reply.at.count() / period + 1) * period);
-  if (is(K::split)) passage.between = fault.delay;
-  if (is(K::stall)) {
+  if (is(K::motor_merge)) passage.together = Instant((reply.at.count() / period + 1) * period);
+  if (is(K::motor_split)) passage.between = fault.delay;
+  if (is(K::motor_stall)) {
     passage.stall_after = static_cast<std::size_t>(fault.size);
     passage.stall = fault.delay;
   }
-  if (is(K::delay)) passage.ready += fault.delay + from_seconds(script_.uniform() * to_seconds(fault.jitter));
+  if (is(K::motor_delay)) passage.ready += fault.delay + from_seconds(script_.uniform() * to_seconds(fault.jitter));
 }
 
 void IqLine::emit(FaultDecision decision) {
@@ -253,8 +254,8 @@ void IqLine::finish(const Passage& passage, Instant at) {
 
 // --- the script
 
-bool IqLine::concerns(const MotorFault& fault, const IqReply& reply) const noexcept {
-  if (fault.kind == MotorFaultKind::command_flip) return false;
+bool IqLine::concerns(const Fault& fault, const IqReply& reply) const noexcept {
+  if (!within(fault.kind, FaultKind::motor_flip, FaultKind::motor_stuck)) return false;
   return (fault.type < 0 || fault.type == reply.type) && (fault.sub < 0 || fault.sub == reply.sub);
 }
 
@@ -263,26 +264,26 @@ void IqLine::meet_events(Instant now) {
     carry_commands(event->at);
     take_replies(event->at);
     arrive(event->at);
-    const MotorFault& fault = script_[event->fault];
+    const Fault& fault = script_[event->fault];
     event->begins ? begin(fault, event->at) : end(fault, event->at);
     recompute(event->at);
   }
 }
 
-void IqLine::begin(const MotorFault& fault, Instant now) {
-  ++truth_.done[static_cast<std::size_t>(fault.kind)];
+void IqLine::begin(const Fault& fault, Instant now) {
+  ++truth_.done[fault.kind];
   note(now, fault, fault.lasts > Duration{0} ? " begins" : "");
-  if (fault.kind == MotorFaultKind::brown_out) {
+  if (fault.kind == FaultKind::motor_brown_out) {
     module_.brown_out(now, fault.down);
     cut();
   }
-  if (fault.kind == MotorFaultKind::baud) module_.set_baud(static_cast<unsigned>(fault.baud));
-  if (fault.kind == MotorFaultKind::unplug) cut();
+  if (fault.kind == FaultKind::motor_baud) module_.set_baud(static_cast<unsigned>(fault.baud));
+  if (fault.kind == FaultKind::motor_unplug) cut();
 }
 
-void IqLine::end(const MotorFault& fault, Instant now) {
+void IqLine::end(const Fault& fault, Instant now) {
   note(now, fault, " ends");
-  if (fault.kind != MotorFaultKind::unplug || !fault.other) return;
+  if (fault.kind != FaultKind::motor_unplug || !fault.other) return;
   module_.replace(kOtherUid);
   module_.brown_out(now, Duration{0});
 }
@@ -292,25 +293,25 @@ void IqLine::recompute(Instant now) {
   plugged_ = true;
   upset_ = {};
   IqUpset module;
-  for (const MotorFault& fault : script_.faults()) {
+  for (const Fault& fault : script_.faults()) {
     if (!is_event(fault) || !fault.active(now)) continue;
-    mute_ = mute_ || fault.kind == MotorFaultKind::mute;
-    deaf_ = deaf_ || fault.kind == MotorFaultKind::deaf;
-    plugged_ = plugged_ && fault.kind != MotorFaultKind::unplug;
-    module.deaf_to_sets = module.deaf_to_sets || fault.kind == MotorFaultKind::ignore_sets;
-    if (fault.kind == MotorFaultKind::redline) module.redline = fault.speed;
-    if (fault.kind == MotorFaultKind::hot) {
+    mute_ = mute_ || fault.kind == FaultKind::motor_mute;
+    deaf_ = deaf_ || fault.kind == FaultKind::motor_deaf;
+    plugged_ = plugged_ && fault.kind != FaultKind::motor_unplug;
+    module.deaf_to_sets = module.deaf_to_sets || fault.kind == FaultKind::motor_ignore_sets;
+    if (fault.kind == FaultKind::motor_redline) module.redline = fault.speed;
+    if (fault.kind == FaultKind::motor_hot) {
       module.heat.coil += fault.coil;
       module.heat.controller += fault.controller;
     }
-    if (fault.kind == MotorFaultKind::over_voltage) upset_.supply_volts += fault.volts;
-    if (fault.kind == MotorFaultKind::sag) upset_.supply_volts -= fault.volts;
-    upset_.locked = upset_.locked || fault.kind == MotorFaultKind::locked;
+    if (fault.kind == FaultKind::motor_over_voltage) upset_.supply_volts += fault.volts;
+    if (fault.kind == FaultKind::motor_sag) upset_.supply_volts -= fault.volts;
+    upset_.locked = upset_.locked || fault.kind == FaultKind::motor_locked;
   }
   module_.upset(module);
 }
 
-void IqLine::note(Instant at, const MotorFault& fault, const char* what) {
+void IqLine::note(Instant at, const Fault& fault, const char* what) {
   truth_.events.push_back({at, std::string(name_of(fault.kind)) + what});
 }
 

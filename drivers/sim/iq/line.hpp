@@ -2,12 +2,12 @@
 // Virtual time, seeded, no I/O. With the same seed, script and inputs the same bytes arrive at the same times.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <deque>
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -31,7 +31,7 @@ struct IqLineSettings {
 struct SentIqReply : IqReply {
   Instant begun{0};            ///< when its first byte left
   Instant arrived{0};          ///< last byte of the first whole copy at the host
-  std::uint32_t done = 0;      ///< bit per MotorFaultKind that affected it
+  std::set<FaultKind> done{};  ///< those that affected it
   std::uint32_t arrivals = 0;  ///< copies that arrived byte for byte with a good checksum
 };
 
@@ -39,10 +39,10 @@ struct SentIqReply : IqReply {
 struct IqTruth {
   std::uint64_t bytes_from_host = 0, bytes_to_module = 0;  ///< given to the line; heard by the module
   std::uint64_t bytes_from_module = 0, bytes_to_host = 0;
-  std::uint64_t replies = 0;                           ///< that the module meant to send
-  std::uint64_t frames_arrived = 0;                    ///< whole, with a good checksum, at the host; copies included
-  std::uint64_t spoilt = 0;                            ///< copies of replies that do not arrive whole
-  std::array<std::uint64_t, kMotorFaultKinds> done{};  ///< replies, bytes or events, by kind of fault
+  std::uint64_t replies = 0;                ///< that the module meant to send
+  std::uint64_t frames_arrived = 0;         ///< whole, with a good checksum, at the host; copies included
+  std::uint64_t spoilt = 0;                 ///< copies of replies that do not arrive whole
+  std::map<FaultKind, std::uint64_t> done;  ///< replies, bytes or events, by kind of fault
   std::vector<FaultEvent> events;
   std::vector<SentIqReply> log;  ///< in the order of sending; only if asked for
 };
@@ -57,7 +57,7 @@ class IqLine {
  public:
   enum class Keep : std::uint8_t { totals, replies };
   /// `module` outlives the line. Faults act in the order of the script.
-  IqLine(IqDevice& module, const IqLineSettings& settings, MotorFaultScript script, std::uint64_t seed,
+  IqLine(IqDevice& module, const IqLineSettings& settings, FaultScript script, std::uint64_t seed,
          Keep keep = Keep::totals);
   IqLine(const IqLine&) = delete;
   IqLine& operator=(const IqLine&) = delete;
@@ -110,10 +110,10 @@ class IqLine {
   };
 
   void meet_events(Instant now);
-  void begin(const MotorFault& fault, Instant now);
-  void end(const MotorFault& fault, Instant now);
+  void begin(const Fault& fault, Instant now);
+  void end(const Fault& fault, Instant now);
   void recompute(Instant now);
-  void note(Instant at, const MotorFault& fault, const char* what);
+  void note(Instant at, const Fault& fault, const char* what);
   void carry_commands(Instant now);
   void take_replies(Instant now);
   void carry(const IqReply& reply);
@@ -126,7 +126,7 @@ class IqLine {
   [[nodiscard]] Instant arrival_of(const Passage& passage) const noexcept;
   void finish(const Passage& passage, Instant at);
   void cut() noexcept;
-  [[nodiscard]] bool concerns(const MotorFault& fault, const IqReply& reply) const noexcept;
+  [[nodiscard]] bool concerns(const Fault& fault, const IqReply& reply) const noexcept;
   [[nodiscard]] Duration byte_time(double rate) const noexcept;
   [[nodiscard]] bool rates_match() const noexcept;
   [[nodiscard]] Instant handed_over(Instant at) const noexcept;
@@ -134,7 +134,7 @@ class IqLine {
 
   IqDevice& module_;
   const IqLineSettings settings_;
-  ScriptRun<MotorFault> script_;
+  ScriptRun script_;
   const Keep keep_;
   double host_rate_ = 0;
   std::vector<std::map<std::uint16_t, IqReply>> stuck_;  ///< by fault: the first reply of each entry

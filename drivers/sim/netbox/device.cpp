@@ -43,18 +43,6 @@ constexpr char kReadCalibration = 1;
 
 }  // namespace
 
-Datagram& Datagram::operator=(const Datagram& other) noexcept {
-  peer = other.peer;
-  at = other.at;
-  boot = other.boot;
-  stream = other.stream;
-  foreign = other.foreign;
-  size = other.size;
-  std::copy_n(other.bytes.begin(), size, bytes.begin());
-  std::copy_n(other.sampled.begin(), std::min(size / kRecordBytes, sampled.size()), sampled.begin());
-  return *this;
-}
-
 NetBoxDevice::NetBoxDevice(const NetBoxSettings& settings)
     : settings_(within_limits(settings)),
       signal_(settings_),
@@ -171,16 +159,16 @@ void NetBoxDevice::append_record(Instant at) {
   if (full || (last && settings_.quirks.last_block == LastBlock::partial)) {
     open_.boot = boots_;
     open_.stream = streams_;
-    waiting_.add(open_, open_.at);
+    waiting_.push_back(open_);
     open_.size = 0;
   }
   if (last && (full || settings_.quirks.last_block != LastBlock::padded)) stop();
 }
 
 bool NetBoxDevice::next_datagram(Datagram& out) {
-  if (waiting_.next() == kNever) return false;
-  out = waiting_.first();
-  waiting_.drop_first();
+  if (waiting_.empty()) return false;
+  out = waiting_.front();
+  waiting_.pop_front();
   return true;
 }
 

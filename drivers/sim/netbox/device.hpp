@@ -6,12 +6,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <iterator>
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
-#include <vector>
 
 #include "drivers/sim/netbox/settings.hpp"
 #include "drivers/sim/netbox/signal.hpp"
@@ -28,11 +25,6 @@ inline constexpr std::size_t kRecordsPerDatagramMax = 40;
 inline constexpr std::size_t kDatagramBytesMax = kRecordBytes * (kRecordsPerDatagramMax + 1);
 
 struct Datagram {
-  Datagram() = default;
-  Datagram(const Datagram& other) noexcept { *this = other; }
-  /// Only what is in use.
-  Datagram& operator=(const Datagram& other) noexcept;
-
   Peer peer = 0;
   Instant at{0};             ///< bench time of its last record; from a FaultInjector: of its arrival
   std::uint32_t boot = 0;    ///< power-ups of the box before it was written
@@ -42,38 +34,6 @@ struct Datagram {
   std::array<std::uint8_t, kDatagramBytesMax> bytes{};
   std::array<Instant, kRecordsPerDatagramMax> sampled{};  ///< bench time of each record
   [[nodiscard]] std::span<const std::uint8_t> payload() const noexcept { return {bytes.data(), size}; }
-};
-
-/// Things with a time of arrival, in that order; those of the same time in the order of add(). Slots are
-/// reused: nothing is allocated once there are enough.
-template <class Thing>
-class DelayQueue {
- public:
-  void add(const Thing& thing, Instant due) {
-    if (free_.empty()) {
-      free_.push_back(static_cast<std::uint32_t>(things_.size()));
-      things_.emplace_back();
-    }
-    const std::uint32_t slot = free_.back();
-    free_.pop_back();
-    things_[slot] = thing;
-    auto behind = order_.end();
-    while (behind != order_.begin() && std::prev(behind)->first > due) --behind;
-    order_.insert(behind, {due, slot});
-  }
-  /// kNever when empty.
-  [[nodiscard]] Instant next() const noexcept { return order_.empty() ? kNever : order_.front().first; }
-  /// Requires one; valid until the next add().
-  [[nodiscard]] const Thing& first() const noexcept { return things_[order_.front().second]; }
-  void drop_first() {
-    free_.push_back(order_.front().second);
-    order_.pop_front();
-  }
-
- private:
-  std::deque<std::pair<Instant, std::uint32_t>> order_;
-  std::vector<Thing> things_;
-  std::vector<std::uint32_t> free_;
 };
 
 class NetBoxDevice {
@@ -147,7 +107,7 @@ class NetBoxDevice {
   int ticks_to_record_ = 0;
   Datagram open_;
 
-  DelayQueue<Datagram> waiting_;
+  std::deque<Datagram> waiting_;
   std::uint64_t records_sent_ = 0;
   std::uint64_t ticks_ = 0;         ///< since it was made
   std::uint64_t writes_since_ = 0;  ///< tick of the first CGI write of the present second

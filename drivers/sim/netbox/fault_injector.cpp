@@ -9,6 +9,9 @@
 namespace kphi::sim {
 namespace {
 
+bool on_datagrams(FaultKind kind) noexcept { return within(kind, FaultKind::loss, FaultKind::foreign_source); }
+bool on_box(FaultKind kind) noexcept { return within(kind, FaultKind::taken_over, FaultKind::address); }
+
 std::uint32_t word(const Datagram& datagram, std::size_t offset) noexcept {
   return big(datagram.payload().subspan(offset, 4));
 }
@@ -23,7 +26,6 @@ FaultInjector::FaultInjector(NetBoxDevice& box, FaultScript script, std::uint64_
       first_address_(box.settings().address) {
   for (std::size_t i = 0; i < script_.size(); ++i) {
     const Fault& fault = script_[i];
-    direct_ = direct_ && !on_datagrams(fault.kind);
     if (!on_box(fault.kind)) continue;
     script_.plan(i);
     if (fault.kind == FaultKind::reboot) script_.plan({fault.at + fault.down, i, false});
@@ -32,44 +34,27 @@ FaultInjector::FaultInjector(NetBoxDevice& box, FaultScript script, std::uint64_
 }
 
 bool FaultInjector::next_datagram(Datagram& out, Instant now) {
-  if (direct_) {
-    while (box_.next_datagram(out)) {
-      const std::size_t entry = enter(out);
-      if (out.peer == kHijacker) continue;
-      if (keep_ == Keep::totals) {
-        ++truth_.arrived;
-        truth_.records_arrived += out.size / kRecordBytes;
-      } else {
-        passing_.entry = entry;
-        passing_.datagram.size = out.size;
-        count_arrival(passing_, out.at);
-      }
-      return true;
-    }
-    return false;
-  }
   carry_all(now);
-  const Instant due = under_way_.next();
-  if (due > now || due == kNever) return false;
-  const InFlightDatagram& first = under_way_.first();
+  if (under_way_.empty() || under_way_.begin()->first > now) return false;
+  const auto& [due, first] = *under_way_.begin();
   out = first.datagram;
   out.at = due;
   count_arrival(first, due);
-  under_way_.drop_first();
+  under_way_.erase(under_way_.begin());
   return true;
 }
 
 Instant FaultInjector::next_arrival() const noexcept {
-  Instant next = under_way_.next();
+  Instant next = under_way_.empty() ? kNever : under_way_.begin()->first;
   for (const Held& held : held_) next = std::min(next, held.give_up);
   return next;
 }
 
 void FaultInjector::carry_all(Instant now) {
-  while (box_.next_datagram(passing_.datagram)) {
-    if (passing_.datagram.peer != kHijacker) shorten(passing_.datagram);
-    passing_.entry = enter(passing_.datagram);
-    if (passing_.datagram.peer != kHijacker) carry(passing_);
+  for (InFlightDatagram sent; box_.next_datagram(sent.datagram);) {
+    if (sent.datagram.peer != kHijacker) shorten(sent.datagram);
+    sent.entry = enter(sent.datagram);
+    if (sent.datagram.peer != kHijacker) carry(sent);
   }
   give_up_holding(now);
 }
@@ -94,7 +79,7 @@ void FaultInjector::make_up(const InFlightDatagram& after, std::size_t size, boo
   datagram.size = size;
   datagram.foreign = foreign;
   if (foreign) put_big(datagram.bytes.data(), word(datagram, 0) + 1000);
-  under_way_.add(made, due);
+  under_way_.emplace(due, made);
 }
 
 void FaultInjector::carry(const InFlightDatagram& in_flight) {
@@ -113,13 +98,13 @@ void FaultInjector::carry(const InFlightDatagram& in_flight) {
   for (const Duration after : decision.copies) {
     InFlightDatagram copy = in_flight;
     copy.copy = true;
-    under_way_.add(copy, decision.due + after);
+    under_way_.emplace(decision.due + after, copy);
   }
   if (decision.depth > 0) {
     held_.push_back({in_flight, decision.depth, std::max(decision.due, sent + decision.overtaken_for)});
     return;
   }
-  under_way_.add(in_flight, decision.due);
+  under_way_.emplace(decision.due, in_flight);
   let_pass(decision.due);
 }
 
@@ -177,7 +162,7 @@ void FaultInjector::let_pass(Instant due) {
   std::erase_if(held_, [&](Held& held) {
     if (--held.to_pass > 0) return false;
     ++truth_.overtaken;
-    under_way_.add(held.in_flight, due);
+    under_way_.emplace(due, held.in_flight);
     return true;
   });
 }
@@ -185,7 +170,7 @@ void FaultInjector::let_pass(Instant due) {
 void FaultInjector::give_up_holding(Instant now) {
   std::erase_if(held_, [&](const Held& held) {
     if (held.give_up > now) return false;
-    under_way_.add(held.in_flight, held.give_up);
+    under_way_.emplace(held.give_up, held.in_flight);
     return true;
   });
 }

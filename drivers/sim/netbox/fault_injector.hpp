@@ -3,7 +3,7 @@
 #pragma once
 
 #include <array>
-#include <deque>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -45,15 +45,12 @@ struct WireTruth {
   std::uint64_t records_left_out = 0;  ///< of short blocks; never sent
   std::uint64_t to_others = 0, records_to_others = 0;
   // Requests.
-  std::uint64_t starts = 0;  ///< that the host sent
-  std::uint64_t starts_lost = 0, starts_doubled = 0, starts_delayed = 0;
-  std::uint64_t unheard = 0;  ///< requests of any kind while the box was dead
-  // The box.
-  std::uint64_t takeovers = 0, restarts = 0, reboots = 0, stalls = 0, jumps = 0, overruns = 0, rate_changes = 0,
-                moves = 0;
-  // Answers over stream sockets that a fault spoilt.
-  std::uint64_t http_spoilt = 0, tcp_spoilt = 0;
+  std::uint64_t starts = 0;                 ///< that the host sent
+  std::uint64_t unheard = 0;                ///< requests of any kind while the box was dead
+  std::uint64_t restarts = 0, reboots = 0;  ///< of the box
 
+  /// By kind, but for those of datagrams: how often it has begun, or met a request or an answer.
+  std::map<FaultKind, std::uint64_t> done;
   std::vector<FaultEvent> events;
   std::vector<SentDatagram> log;  ///< in the order of sending; only if asked for
   // Of each record in `log`; only if asked for.
@@ -139,9 +136,9 @@ class FaultInjector {
   void sample_disturbed(LoadCellSample sample);
   void sample_skewed(const LoadCellSample& sample);
   void move_to(const std::string& address);
-  void count_use(std::size_t fault, Instant now, std::uint64_t WireTruth::*counter);
+  void count_use(std::size_t fault, Instant now);
   void hand_over(std::span<const std::uint8_t> datagram, Peer peer);
-  StreamReply spoilt(std::string answer, Instant now, bool (*concerns)(FaultKind), std::uint64_t WireTruth::*counter,
+  StreamReply spoilt(std::string answer, Instant now, bool (*concerns)(FaultKind),
                      void (*spoil)(const Fault&, StreamReply&));
 
   void carry_all(Instant now);
@@ -157,9 +154,8 @@ class FaultInjector {
   void count_arrival(const InFlightDatagram& in_flight, Instant at);
 
   NetBoxDevice& box_;
-  ScriptRun<Fault> script_;
+  ScriptRun script_;
   const Keep keep_;
-  bool direct_ = true;  ///< no fault concerns datagrams on their way
   std::vector<Progress> progress_;
   std::vector<LateRequest> late_requests_;
   Instant next_event_ = kNever;
@@ -167,12 +163,11 @@ class FaultInjector {
   bool dead_ = false;
   std::vector<std::size_t> drifting_;
   std::string moved_to_, first_address_;
-  const Fault* skew_ = nullptr;  ///< nullptr: its clock is right
-  double phase_ = 0;             ///< of the box's clock, in its samples
-  DelayQueue<InFlightDatagram> under_way_;
+  const Fault* skew_ = nullptr;                         ///< nullptr: its clock is right
+  double phase_ = 0;                                    ///< of the box's clock, in its samples
+  std::multimap<Instant, InFlightDatagram> under_way_;  ///< by their arrival
   std::vector<Held> held_;
   Instant last_due_{0};
-  InFlightDatagram passing_;
   WireTruth truth_;
 };
 

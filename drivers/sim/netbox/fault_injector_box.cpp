@@ -13,6 +13,10 @@ namespace {
 
 constexpr double kTurn = 6.28318530717958647692;
 
+bool on_starts(FaultKind kind) noexcept { return within(kind, FaultKind::lost_start, FaultKind::delayed_start); }
+bool on_pages(FaultKind kind) noexcept { return within(kind, FaultKind::http_slow, FaultKind::http_duplicate_tag); }
+bool on_tcp(FaultKind kind) noexcept { return within(kind, FaultKind::tcp_split, FaultKind::tcp_short); }
+
 bool is_start(std::span<const std::uint8_t> datagram) noexcept {
   if (datagram.size() != 8 || big(datagram.first(2)) != 0x1234) return false;
   const std::uint32_t command = big(datagram.subspan(2, 2));
@@ -59,9 +63,9 @@ void FaultInjector::meet_events(Instant now) {
 
 void FaultInjector::note(Instant at, std::string what) { truth_.events.push_back({at, std::move(what)}); }
 
-void FaultInjector::count_use(std::size_t fault, Instant now, std::uint64_t WireTruth::*counter) {
+void FaultInjector::count_use(std::size_t fault, Instant now) {
   script_.use(fault);
-  ++(truth_.*counter);
+  ++truth_.done[script_[fault].kind];
   note(now, std::string(name_of(script_[fault].kind)));
 }
 
@@ -77,14 +81,9 @@ void FaultInjector::begin(std::size_t index) {
   using K = FaultKind;
   const auto is = [&fault](K kind) { return fault.kind == kind; };
   const auto samples = static_cast<std::uint32_t>(fault.samples);
-  truth_.takeovers += is(K::taken_over);
+  ++truth_.done[fault.kind];
   truth_.restarts += is(K::restart) && box_.streaming();
   truth_.reboots += is(K::reboot);
-  truth_.stalls += is(K::stall);
-  truth_.jumps += is(K::ft_jump_back);
-  truth_.overruns += is(K::overrun);
-  truth_.rate_changes += is(K::rate);
-  truth_.moves += is(K::address);
   if (is(K::taken_over)) {
     const std::uint8_t command = fault.buffered ? 3 : 2;
     hand_over(std::array<std::uint8_t, 8>{0x12, 0x34, 0, command, 0, 0, 0, 0}, kHijacker);
@@ -97,9 +96,9 @@ void FaultInjector::begin(std::size_t index) {
   if (is(K::wrap)) box_.set_ft_sequence(0u - samples);
   if (is(K::clock_skew)) skew_ = &fault;
   if (is(K::zero_drift)) drifting_.push_back(index);
-  if (is(K::status)) box_.set_status(fault.bits);
+  if (is(K::status)) box_.set_status(static_cast<std::uint32_t>(fault.bits));
   if (is(K::saturation)) box_.force_saturation(fault.axes);
-  if (is(K::address)) move_to(fault.address);
+  if (is(K::address)) move_to(fault.ip);
   NetBoxSettings settings = box_.settings();
   if (is(K::rate)) settings.rate_hz = fault.rate_hz;
   if (is(K::units))
@@ -117,7 +116,7 @@ void FaultInjector::end(const Fault& fault) {
   if (is(K::address)) move_to({});
   if (is(K::stall)) box_.stall(false);
   if (is(K::clock_skew)) skew_ = nullptr;
-  if (is(K::status) && !fault.latched) box_.clear_status(fault.bits);
+  if (is(K::status) && !fault.latched) box_.clear_status(static_cast<std::uint32_t>(fault.bits));
   if (is(K::saturation)) box_.force_saturation(0);
 }
 
@@ -160,11 +159,10 @@ void FaultInjector::request(std::span<const std::uint8_t> datagram, Peer peer, I
   for (std::size_t i = 0; i < script_.size(); ++i) {
     const Fault& fault = script_[i];
     if (!on_starts(fault.kind) || !script_.active(i, now)) continue;
-    if (fault.kind == FaultKind::lost_start) return count_use(i, now, &WireTruth::starts_lost);
-    const bool doubled = fault.kind == FaultKind::doubled_start;
-    count_use(i, now, doubled ? &WireTruth::starts_doubled : &WireTruth::starts_delayed);
+    count_use(i, now);
+    if (fault.kind == FaultKind::lost_start) return;
     later = std::max(later, fault.delay);
-    at_once = at_once && doubled;
+    at_once = at_once && fault.kind == FaultKind::doubled_start;
   }
   if (at_once) hand_over(datagram, peer);
   if (later < Duration{0}) return;
@@ -175,20 +173,20 @@ void FaultInjector::request(std::span<const std::uint8_t> datagram, Peer peer, I
 // --- answers over stream sockets
 
 StreamReply FaultInjector::http(std::string_view request, Instant now) {
-  return spoilt(box_.http(request), now, on_pages, &WireTruth::http_spoilt, spoil_page);
+  return spoilt(box_.http(request), now, on_pages, spoil_page);
 }
 
 StreamReply FaultInjector::tcp(std::string& received, Instant now) {
-  return spoilt(box_.tcp(received), now, on_tcp, &WireTruth::tcp_spoilt, spoil_answer);
+  return spoilt(box_.tcp(received), now, on_tcp, spoil_answer);
 }
 
 StreamReply FaultInjector::spoilt(std::string answer, Instant now, bool (*concerns)(FaultKind),
-                                  std::uint64_t WireTruth::*counter, void (*spoil)(const Fault&, StreamReply&)) {
+                                  void (*spoil)(const Fault&, StreamReply&)) {
   StreamReply reply{std::move(answer)};
   if (reply.bytes.empty()) return reply;
   for (std::size_t i = 0; i < script_.size(); ++i) {
     if (!concerns(script_[i].kind) || !script_.active(i, now)) continue;
-    count_use(i, now, counter);
+    count_use(i, now);
     spoil(script_[i], reply);
   }
   return reply;

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "drivers/sim/script/fault_table.hpp"
+#include "drivers/sim/script/faults.hpp"
 
 namespace kphi::sim {
 namespace {

@@ -95,7 +95,7 @@ double Motor::bus_volts(double conductance, double amps) const noexcept {
   if (source_) return source_(amps + parameters_.idle_current, conductance);
   const double capacitance = parameters_.bus_capacitance * kTicksPerSecond;
   const double source = parameters_.supply_volts + upset_.supply_volts;
-  const double resistance = parameters_.source_resistance + upset_.source_resistance;
+  const double resistance = parameters_.source_resistance;
   const double left = capacitance + conductance;
   const double given = capacitance * state_.supply_volts - amps - parameters_.idle_current;
   const double conducting = (given + source / resistance) / (left + 1 / resistance);

@@ -81,9 +81,8 @@ struct ShaftLoad {
 
 /// Faults outside the module.
 struct MotorUpset {
-  double supply_volts = 0;       ///< added to the source
-  double source_resistance = 0;  ///< added, ohm
-  bool locked = false;           ///< the rotor is held
+  double supply_volts = 0;  ///< added to the source
+  bool locked = false;      ///< the rotor is held
 };
 
 /// Another source on the bus: its voltage at the end of a tick in which the module draws `amps` + `siemens` times that

@@ -10,11 +10,11 @@
 
 #include "base/clock.hpp"
 #include "base/random.hpp"
+#include "drivers/sim/script/faults.hpp"
 
 namespace kphi::sim {
 
-/// `Fault`: as ScriptedFault. One thread.
-template <class Fault>
+/// One thread.
 class ScriptRun {
  public:
   struct Event {
@@ -23,12 +23,12 @@ class ScriptRun {
     bool begins;
   };
 
-  ScriptRun(std::vector<Fault> faults, std::uint64_t seed)
+  ScriptRun(FaultScript faults, std::uint64_t seed)
       : faults_(std::move(faults)), used_(faults_.size(), 0), random_(seed) {}
 
   [[nodiscard]] std::size_t size() const noexcept { return faults_.size(); }
   [[nodiscard]] const Fault& operator[](std::size_t i) const noexcept { return faults_[i]; }
-  [[nodiscard]] const std::vector<Fault>& faults() const noexcept { return faults_; }
+  [[nodiscard]] const FaultScript& faults() const noexcept { return faults_; }
   /// One more fault, without events.
   void add(const Fault& fault) {
     faults_.push_back(fault);
@@ -43,7 +43,7 @@ class ScriptRun {
   template <class Fits>
   const Fault* strike(Instant at, Fits&& fits) {
     for (std::size_t i = 0; i < faults_.size(); ++i) {
-      if (!active(i, at) || !fits(faults_[i]) || !draw(faults_[i])) continue;
+      if (!active(i, at) || !fits(faults_[i]) || !draws(i)) continue;
       use(i);
       return &faults_[i];
     }
@@ -81,12 +81,9 @@ class ScriptRun {
   }
 
  private:
-  [[nodiscard]] bool draw(const Fault& fault) noexcept {
-    if constexpr (requires { fault.p; }) return fault.p >= 1 || chance(fault.p);
-    return true;
-  }
+  [[nodiscard]] bool draws(std::size_t i) noexcept { return faults_[i].p >= 1 || chance(faults_[i].p); }
 
-  std::vector<Fault> faults_;
+  FaultScript faults_;
   std::vector<std::uint64_t> used_;
   std::vector<Event> events_;  ///< latest first
   Random random_;

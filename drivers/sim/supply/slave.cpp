@@ -51,10 +51,7 @@ std::vector<std::uint8_t> modbus_frame(ModbusFraming framing, int unit, std::uin
 }
 
 void ModbusScanner::feed(std::span<const std::uint8_t> bytes, Instant now) {
-  if (framing_ == ModbusFraming::rtu && !waiting_.empty() && now - last_ > kSilence) {
-    waiting_.clear();
-    ++damaged_;
-  }
+  if (framing_ == ModbusFraming::rtu && now - last_ > kSilence) waiting_.clear();
   last_ = now;
   waiting_.insert(waiting_.end(), bytes.begin(), bytes.end());
 }
@@ -68,7 +65,6 @@ std::optional<ModbusRequest> ModbusScanner::next_rtu() {
   const unsigned sent = waiting_[length - 1] * 256u + waiting_[length - 2];
   if (modbus_crc(std::span(waiting_).first(length - 2)) != sent) {
     waiting_.clear();
-    ++damaged_;
     return std::nullopt;
   }
   ModbusRequest request{waiting_[0], 0, {waiting_.begin() + 1, end - 2}, {waiting_.begin(), end}};
@@ -81,7 +77,6 @@ std::optional<ModbusRequest> ModbusScanner::next_tcp() {
   const std::size_t length = word(waiting_, 4);
   if (word(waiting_, 2) != 0 || length < 2 || length > kLongestPdu + 1) {
     broken_ = true;
-    ++damaged_;
     return std::nullopt;
   }
   if (waiting_.size() < kHeader - 1 + length) return std::nullopt;
@@ -103,6 +98,10 @@ constexpr std::uint8_t kGarbage = 0x55;
 constexpr int kLookBytes = 45;        // of an answer with twenty registers
 constexpr double kLongestStep = 1.0;  // s
 
+std::vector<std::uint8_t> refuse(std::uint8_t function, int code) {
+  return {static_cast<std::uint8_t>(function | 0x80u), static_cast<std::uint8_t>(code)};
+}
+
 }  // namespace
 
 SupplySlave::SupplySlave(const SupplySettings& settings)
@@ -114,13 +113,13 @@ SupplySlave::SupplySlave(const SupplySettings& settings)
 double SupplySlave::advance(const SupplyLoad& load, Instant now) {
   double sag = 0;
   for (std::size_t i = 0; i < script_.size(); ++i) {
-    const SupplyFault& fault = script_[i];
-    if (fault.kind == SupplyFaultKind::sag && fault.active(now)) sag += fault.volts;
-    const bool momentary = fault.kind == SupplyFaultKind::trip || fault.kind == SupplyFaultKind::panel;
+    const Fault& fault = script_[i];
+    if (fault.kind == FaultKind::supply_sag && fault.active(now)) sag += fault.volts;
+    const bool momentary = fault.kind == FaultKind::supply_trip || fault.kind == FaultKind::supply_panel;
     if (!momentary || now < fault.at || !script_.unused(i)) continue;
     script_.use(i);
-    if (fault.kind == SupplyFaultKind::trip) circuit_.trip(static_cast<SupplyTrip>(fault.code));
-    if (fault.kind == SupplyFaultKind::panel) registers_.write(fault.address, fault.value);
+    if (fault.kind == FaultKind::supply_trip) circuit_.trip(static_cast<SupplyTrip>(fault.code));
+    if (fault.kind == FaultKind::supply_panel) registers_.write(fault.address, fault.value);
   }
   circuit_.sag(sag);
   if (now > reached_) circuit_.step(load, std::min(kLongestStep, to_seconds(now - reached_)));
@@ -130,10 +129,8 @@ double SupplySlave::advance(const SupplyLoad& load, Instant now) {
 
 void SupplySlave::receive(int client, ModbusFraming framing, std::span<const std::uint8_t> bytes, Instant now) {
   ModbusScanner& scanner = scanners_.try_emplace(client, framing).first->second;
-  const std::uint64_t before = scanner.damaged();
   scanner.feed(bytes, now);
   while (const auto request = scanner.next()) answer(client, framing, *request, now);
-  truth_.damaged += scanner.damaged() - before;
 }
 
 bool SupplySlave::makes_sense(int client) const {
@@ -147,51 +144,51 @@ void SupplySlave::forget(int client) {
 }
 
 bool SupplySlave::closed(Instant now) const noexcept {
-  return script_.any_active(now, [](const SupplyFault& fault) { return fault.kind == SupplyFaultKind::closed; });
+  return script_.any_active(now, [](const Fault& fault) { return fault.kind == FaultKind::supply_closed; });
 }
 
-const SupplyFault* SupplySlave::meet(SupplyFaultKind kind, Instant now) {
-  const SupplyFault* met = script_.strike(now, [kind](const SupplyFault& fault) { return fault.kind == kind; });
+const Fault* SupplySlave::meet(FaultKind kind, Instant now) {
+  const Fault* met = script_.strike(now, [kind](const Fault& fault) { return fault.kind == kind; });
   if (met != nullptr) ++truth_.faults;
   return met;
 }
 
-bool SupplySlave::hears(Instant now) { return !closed(now) && meet(SupplyFaultKind::deaf, now) == nullptr; }
+bool SupplySlave::hears(Instant now) { return !closed(now) && meet(FaultKind::supply_deaf, now) == nullptr; }
 
 std::optional<Duration> SupplySlave::answers(Instant now) {
-  using K = SupplyFaultKind;
+  using K = FaultKind;
   if (!hears(now)) return std::nullopt;
-  for (const K spoils : {K::exception, K::no_reply, K::wrong_slave, K::wrong_transaction, K::bad_crc, K::truncated,
-                         K::garbage, K::echo}) {
+  for (const K spoils : {K::supply_exception, K::supply_no_reply, K::supply_wrong_slave, K::supply_wrong_transaction,
+                         K::supply_bad_crc, K::supply_truncated, K::supply_garbage, K::supply_echo}) {
     if (meet(spoils, now) != nullptr) return std::nullopt;
   }
   Duration wait{0};
-  if (const SupplyFault* late = meet(K::late, now)) wait += late->delay;
-  if (const SupplyFault* dribble = meet(K::dribble, now)) wait += kLookBytes * dribble->delay;
+  if (const Fault* late = meet(K::supply_late, now)) wait += late->delay;
+  if (const Fault* dribble = meet(K::supply_dribble, now)) wait += kLookBytes * dribble->delay;
   return wait;
 }
 
 void SupplySlave::answer(int client, ModbusFraming framing, const ModbusRequest& request, Instant now) {
-  using K = SupplyFaultKind;
+  using K = FaultKind;
   const bool everybody = framing == ModbusFraming::rtu && request.unit == 0;
   if (framing == ModbusFraming::rtu && !everybody && request.unit != settings_.slave) return;
   ++truth_.requests;
   if (truth_.frames.size() < kFramesKept) truth_.frames.push_back(request.adu);
-  if (meet(K::deaf, now) != nullptr) return;
-  const SupplyFault* exception = meet(K::exception, now);
+  if (meet(K::supply_deaf, now) != nullptr) return;
+  const Fault* exception = meet(K::supply_exception, now);
   const Pdu pdu = exception != nullptr ? refuse(request.pdu[0], exception->code) : apply(request.pdu, now);
-  if (everybody || meet(K::no_reply, now) != nullptr) return;
+  if (everybody || meet(K::supply_no_reply, now) != nullptr) return;
 
-  const SupplyFault* stranger = meet(K::wrong_slave, now);
+  const Fault* stranger = meet(K::supply_wrong_slave, now);
   const auto transaction =
-      static_cast<std::uint16_t>(request.transaction + (meet(K::wrong_transaction, now) != nullptr ? 1 : 0));
+      static_cast<std::uint16_t>(request.transaction + (meet(K::supply_wrong_transaction, now) != nullptr ? 1 : 0));
   auto bytes = modbus_frame(framing, stranger != nullptr ? stranger->slave : request.unit, transaction, pdu);
-  if (framing == ModbusFraming::rtu && meet(K::bad_crc, now) != nullptr) bytes.back() ^= 0xFFu;
-  if (const SupplyFault* cut = meet(K::truncated, now)) bytes.resize(std::min<std::size_t>(bytes.size(), cut->size));
-  if (const SupplyFault* noise = meet(K::garbage, now)) bytes.insert(bytes.begin(), noise->size, kGarbage);
-  if (meet(K::echo, now) != nullptr) bytes.insert(bytes.begin(), request.adu.begin(), request.adu.end());
-  const SupplyFault* late = meet(K::late, now);
-  const SupplyFault* dribble = meet(K::dribble, now);
+  if (framing == ModbusFraming::rtu && meet(K::supply_bad_crc, now) != nullptr) bytes.back() ^= 0xFFu;
+  if (const Fault* cut = meet(K::supply_truncated, now)) bytes.resize(std::min<std::size_t>(bytes.size(), cut->size));
+  if (const Fault* noise = meet(K::supply_garbage, now)) bytes.insert(bytes.begin(), noise->size, kGarbage);
+  if (meet(K::supply_echo, now) != nullptr) bytes.insert(bytes.begin(), request.adu.begin(), request.adu.end());
+  const Fault* late = meet(K::supply_late, now);
+  const Fault* dribble = meet(K::supply_dribble, now);
   Instant due = std::max(now + settings_.turnaround, next_turn_);
   if (settings_.replies_per_s > 0) next_turn_ = due + from_seconds(1 / settings_.replies_per_s);
   if (late != nullptr) due += late->delay;
@@ -218,27 +215,17 @@ bool SupplySlave::next_reply(SupplyReply& out, Instant now) {
   return true;
 }
 
-SupplySlave::Pdu SupplySlave::refuse(std::uint8_t function, int code) {
-  ++truth_.exceptions;
-  return {static_cast<std::uint8_t>(function | 0x80u), static_cast<std::uint8_t>(code)};
-}
-
 SupplySlave::Pdu SupplySlave::apply(const Pdu& pdu, Instant now) {
-  switch (pdu[0]) {
-    case kRead:
-      return pdu.size() == 5 ? read(pdu, now) : refuse(pdu[0], kIllegalValue);
-    case kWriteOne:
-      return pdu.size() == 5 ? write_one(pdu, now) : refuse(pdu[0], kIllegalValue);
-    case kWriteMany:
-      return pdu.size() >= 6 ? write_many(pdu, now) : refuse(pdu[0], kIllegalValue);
-    default:
-      return refuse(pdu[0], kIllegalFunction);
-  }
+  const std::uint8_t function = pdu[0];
+  if (function != kRead && function != kWriteOne && function != kWriteMany) return refuse(function, kIllegalFunction);
+  if (function == kWriteMany && pdu.size() >= 6) return write_many(pdu, now);
+  if (function == kWriteMany || pdu.size() != 5) return refuse(function, kIllegalValue);
+  return function == kRead ? read(pdu, now) : write_one(pdu, now);
 }
 
 std::uint16_t SupplySlave::value_at(std::uint16_t at, std::uint16_t value, Instant now) const {
-  for (const SupplyFault& fault : script_.faults()) {
-    if (fault.kind == SupplyFaultKind::reads_as && fault.active(now) && fault.address == at) return fault.value;
+  for (const Fault& fault : script_.faults()) {
+    if (fault.kind == FaultKind::supply_reads_as && fault.active(now) && fault.address == at) return fault.value;
   }
   return value;
 }
@@ -259,7 +246,7 @@ SupplySlave::Pdu SupplySlave::write_one(const Pdu& pdu, Instant now) {
   const auto at = static_cast<std::uint16_t>(word(pdu, 1)), value = static_cast<std::uint16_t>(word(pdu, 3));
   if (!registers_.read(at)) return refuse(pdu[0], kIllegalAddress);
   truth_.writes.emplace_back(at, value);
-  if (meet(SupplyFaultKind::ignored_writes, now) != nullptr) return pdu;
+  if (meet(FaultKind::supply_ignored_writes, now) != nullptr) return pdu;
   return registers_.write(at, value) ? pdu : refuse(pdu[0], kIllegalAddress);
 }
 
@@ -268,7 +255,7 @@ SupplySlave::Pdu SupplySlave::write_many(const Pdu& pdu, Instant now) {
   if (count < 1 || count > registers_.model().most_registers || pdu[5] != 2 * count || pdu.size() != 6 + 2 * count) {
     return refuse(pdu[0], kIllegalValue);
   }
-  const bool ignored = meet(SupplyFaultKind::ignored_writes, now) != nullptr;
+  const bool ignored = meet(FaultKind::supply_ignored_writes, now) != nullptr;
   for (unsigned i = 0; i < count; ++i) {
     const auto at = static_cast<std::uint16_t>(first + i), value = static_cast<std::uint16_t>(word(pdu, 6 + 2 * i));
     if (first + i > 0xFFFF || !registers_.read(at)) return refuse(pdu[0], kIllegalAddress);

@@ -41,8 +41,6 @@ class ModbusScanner {
   /// RTU: 50 ms of silence end a frame, whole or not.
   void feed(std::span<const std::uint8_t> bytes, Instant now);
   [[nodiscard]] std::optional<ModbusRequest> next();
-  /// Frames with a bad CRC, an odd header, or no end.
-  [[nodiscard]] std::uint64_t damaged() const noexcept { return damaged_; }
   /// TCP: the stream is broken; close it.
   [[nodiscard]] bool broken() const noexcept { return broken_; }
 
@@ -53,7 +51,6 @@ class ModbusScanner {
   ModbusFraming framing_;
   std::vector<std::uint8_t> waiting_;
   Instant last_{0};
-  std::uint64_t damaged_ = 0;
   bool broken_ = false;
 };
 
@@ -65,7 +62,7 @@ struct SupplySettings {
   Duration turnaround = std::chrono::milliseconds(1);
   SupplyParameters circuit;
   bool over_current_in_milliamps = false;  ///< Hanmatek 0x21: three decimals, else two; sources disagree
-  SupplyFaultScript faults;
+  FaultScript faults;
   std::uint64_t seed = 1;  ///< of the faults' probabilities
 };
 
@@ -77,9 +74,7 @@ struct SupplyReply {
 
 /// Requests and writes that the slave received.
 struct SupplyTruth {
-  std::uint64_t requests = 0;  ///< whole, and for this slave
-  std::uint64_t exceptions = 0;
-  std::uint64_t damaged = 0;                                    ///< requests with a bad CRC or header
+  std::uint64_t requests = 0;                                   ///< whole, and for this slave
   std::uint64_t faults = 0;                                     ///< times that a fault met a reply
   std::vector<std::pair<std::uint16_t, std::uint16_t>> writes;  ///< register and value, in order
   std::vector<std::vector<std::uint8_t>> frames;                ///< requests as they came; the first 1000
@@ -112,7 +107,7 @@ class SupplySlave {
   /// Delay of the whole answer to a request sent now; nullopt: no answer.
   [[nodiscard]] std::optional<Duration> answers(Instant now);
   /// One more fault, from now on.
-  void add_fault(const SupplyFault& fault) { script_.add(fault); }
+  void add_fault(const Fault& fault) { script_.add(fault); }
 
   [[nodiscard]] SupplyCircuit& circuit() noexcept { return circuit_; }
   [[nodiscard]] SupplyRegisters& registers() noexcept { return registers_; }
@@ -130,16 +125,15 @@ class SupplySlave {
   [[nodiscard]] Pdu read(const Pdu& pdu, Instant now);
   [[nodiscard]] Pdu write_one(const Pdu& pdu, Instant now);
   [[nodiscard]] Pdu write_many(const Pdu& pdu, Instant now);
-  [[nodiscard]] Pdu refuse(std::uint8_t function, int code);
   [[nodiscard]] std::uint16_t value_at(std::uint16_t at, std::uint16_t value, Instant now) const;
   void send(int client, std::vector<std::uint8_t> bytes, Instant due, Duration gap);
   /// The first active fault of this kind that meets this reply; nullptr.
-  [[nodiscard]] const SupplyFault* meet(SupplyFaultKind kind, Instant now);
+  [[nodiscard]] const Fault* meet(FaultKind kind, Instant now);
 
   SupplySettings settings_;
   SupplyCircuit circuit_;
   SupplyRegisters registers_;
-  ScriptRun<SupplyFault> script_;
+  ScriptRun script_;
   std::map<int, ModbusScanner> scanners_;
   std::deque<PendingReply> under_way_;
   Instant reached_{0}, last_due_{0}, next_turn_{0};

@@ -1,14 +1,15 @@
 #include "drivers/sim/transport/conversations.hpp"
 
-#include <netdb.h>
-#include <netinet/in.h>
+#include <fmt/format.h>
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ip/udp.hpp>
 #include <cerrno>
-#include <cstring>
 
 #include "base/error.hpp"
 
@@ -18,71 +19,48 @@ namespace {
 constexpr std::size_t kQuestionMax = 8192;
 constexpr std::chrono::seconds kPatience{3};
 
-[[noreturn]] void refuse(const std::string& where, const std::string& operation, const std::string& cause,
-                         const std::string& next_move) {
-  throw DeviceError("simulated bench " + where, operation, cause, next_move);
-}
-
-sockaddr_in address_of(const std::string& host, std::uint16_t port) {
-  addrinfo hints{};
-  hints.ai_family = AF_INET;
-  addrinfo* found = nullptr;
-  if (const int error = ::getaddrinfo(host.c_str(), nullptr, &hints, &found); error != 0) {
-    refuse(host, "resolve", ::gai_strerror(error), "name an address of this machine in netbox.host");
-  }
-  sockaddr_in address{};
-  std::memcpy(&address, found->ai_addr, sizeof address);
-  ::freeaddrinfo(found);
-  address.sin_port = htons(port);
-  return address;
+/// Takes the descriptor of an open socket or acceptor.
+Listening taken_over(auto socket) {
+  socket.native_non_blocking(true);
+  const std::uint16_t port = socket.local_endpoint().port();
+  return {Descriptor(socket.release()), port};
 }
 
 }  // namespace
 
 Listening listen_at(const std::string& host, int type, std::uint16_t port) {
-  sockaddr_in address = address_of(host, port);
-  Descriptor socket(::socket(AF_INET, type | SOCK_NONBLOCK | SOCK_CLOEXEC, 0));
-  const int yes = 1;
-  if (type == SOCK_STREAM) ::setsockopt(socket.number(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  const int buffer = 4 << 20;
-  if (type == SOCK_DGRAM) ::setsockopt(socket.number(), SOL_SOCKET, SO_SNDBUF, &buffer, sizeof buffer);
-  socklen_t size = sizeof address;
-  auto* generic = reinterpret_cast<sockaddr*>(&address);
-  const bool open = ::bind(socket.number(), generic, size) == 0 &&
-                    (type == SOCK_DGRAM || ::listen(socket.number(), 16) == 0) &&
-                    ::getsockname(socket.number(), generic, &size) == 0;
-  if (!open) {
-    refuse(host + ":" + std::to_string(port), "listen", std::strerror(errno),
-           "is another simulator running? Else choose other ports in the bench file");
+  using boost::asio::ip::tcp, boost::asio::ip::udp;
+  const std::string where = "simulated bench " + host;
+  boost::asio::io_context io;
+  boost::system::error_code unknown;
+  const auto found = tcp::resolver(io).resolve(tcp::v4(), host, std::to_string(port), unknown);
+  if (unknown) throw DeviceError(where, "resolve", unknown.message(), "name an address of this machine in netbox.host");
+  const tcp::endpoint at = *found.begin();
+  try {
+    if (type == SOCK_STREAM) return taken_over(tcp::acceptor(io, at));
+    udp::socket socket(io, udp::endpoint(at.address(), at.port()));
+    socket.set_option(udp::socket::send_buffer_size(4 << 20));
+    return taken_over(std::move(socket));
+  } catch (const boost::system::system_error& error) {
+    throw DeviceError(fmt::format("{}:{}", where, port), "listen", error.code().message(),
+                      "is another simulator running? Else choose other ports in the bench file");
   }
-  return {std::move(socket), ntohs(address.sin_port)};
 }
 
-std::optional<sockaddr_un> unix_address(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path.empty() || path.size() >= sizeof address.sun_path) return std::nullopt;
-  std::memcpy(address.sun_path, path.data(), path.size());
-  return address;
+std::function<StreamReply(std::string& heard)> each_question(std::string terminator,
+                                                             std::function<StreamReply(std::string_view)> answer) {
+  return [terminator = std::move(terminator), answer = std::move(answer)](std::string& heard) {
+    StreamReply all;
+    for (std::size_t end = 0; !all.close && (end = heard.find(terminator)) != std::string::npos;) {
+      StreamReply one = answer(std::string_view(heard).substr(0, end));
+      heard.erase(0, end + terminator.size());
+      all.bytes += one.bytes;
+      all.wait = one.wait;
+      all.close = one.close;
+    }
+    return all;
+  };
 }
-
-Conversations::Conversations(Descriptor listener, const Manners& manners,
-                             std::function<StreamReply(std::string_view)> answer)
-    : Conversations(std::move(listener), manners.at_once, [manners, answer = std::move(answer)](std::string& heard) {
-        StreamReply all;
-        for (auto end = heard.find(manners.terminator); end != std::string::npos && !all.close;
-             end = heard.find(manners.terminator)) {
-          StreamReply one = answer(std::string_view(heard).substr(0, end));
-          heard.erase(0, end + manners.terminator.size());
-          all.bytes += one.bytes;
-          all.wait = one.wait;
-          all.close = one.close || manners.one_answer;
-        }
-        return all;
-      }) {}
-
-Conversations::Conversations(Descriptor listener, std::size_t at_once, Answerer answerer)
-    : listener_(std::move(listener)), at_once_(at_once), answerer_(std::move(answerer)) {}
 
 void Conversations::listen_at(Descriptor listener) {
   listener_ = std::move(listener);

@@ -3,16 +3,15 @@
 #pragma once
 
 #include <poll.h>
-#include <sys/un.h>
 
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <list>
-#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/clock.hpp"
@@ -29,9 +28,6 @@ struct Listening {
 /// or address. Throws DeviceError.
 [[nodiscard]] Listening listen_at(const std::string& host, int type, std::uint16_t port);
 
-/// nullopt: the path is empty or longer than a socket path may be.
-[[nodiscard]] std::optional<sockaddr_un> unix_address(const std::string& path);
-
 /// What to send over a stream socket.
 struct StreamReply {
   std::string bytes;
@@ -41,20 +37,18 @@ struct StreamReply {
   bool close = false;       ///< after the last byte
 };
 
+/// Of questions that end with `terminator`; `answer` gets them without it.
+[[nodiscard]] std::function<StreamReply(std::string& heard)> each_question(
+    std::string terminator, std::function<StreamReply(std::string_view)> answer);
+
 /// Its times are wall time.
 class Conversations {
  public:
   /// Takes whole questions off the front of `heard` and returns what to send.
   using Answerer = std::function<StreamReply(std::string& heard)>;
-  struct Manners {
-    std::string terminator;   ///< ends a question
-    bool one_answer = false;  ///< close after the first
-    std::size_t at_once = 1;  ///< connections served at the same time; others wait in the queue
-  };
-  /// `listener`: non-blocking and listening. `answer`: question without its terminator -> what to send.
-  Conversations(Descriptor listener, const Manners& manners, std::function<StreamReply(std::string_view)> answer);
-  /// For questions without a terminator.
-  Conversations(Descriptor listener, std::size_t at_once, Answerer answerer);
+  /// `listener`: non-blocking and listening. `at_once`: connections served at the same time; others wait in the queue.
+  Conversations(Descriptor listener, std::size_t at_once, Answerer answerer)
+      : listener_(std::move(listener)), at_once_(at_once), answerer_(std::move(answerer)) {}
 
   void append_polls(std::vector<pollfd>& polls) const;
   /// Replaces the listener; an empty one refuses connections and ends the open ones.

@@ -60,28 +60,27 @@ class UsbFunction {
 class UsbFaults {
  public:
   /// `clock` must outlive this.
-  explicit UsbFaults(const Clock& clock, UsbFaultScript script = {}) : clock_(clock), script_(std::move(script), 1) {}
+  explicit UsbFaults(const Clock& clock, FaultScript script = {}) : clock_(clock), script_(std::move(script), 1) {}
 
   /// The fault of this kind (and of this register) that is active now, if any; counts it.
-  [[nodiscard]] std::optional<UsbFault> strikes(UsbFaultKind kind, int at_register = -1) {
+  [[nodiscard]] std::optional<Fault> strikes(FaultKind kind, int at_register = -1) {
     const std::lock_guard lock(mutex_);
-    const UsbFault* fault = script_.strike(clock_.now(), [&](const UsbFault& f) {
-      return f.kind == kind && (at_register < 0 || f.address == at_register);
-    });
+    const Fault* fault = script_.strike(
+        clock_.now(), [&](const Fault& f) { return f.kind == kind && (at_register < 0 || f.address == at_register); });
     return fault == nullptr ? std::nullopt : std::optional(*fault);
   }
   /// The same without counting it.
-  [[nodiscard]] bool active(UsbFaultKind kind) const {
+  [[nodiscard]] bool active(FaultKind kind) const {
     const std::lock_guard lock(mutex_);
-    return script_.any_active(clock_.now(), [kind](const UsbFault& f) { return f.kind == kind; });
+    return script_.any_active(clock_.now(), [kind](const Fault& f) { return f.kind == kind; });
   }
-  [[nodiscard]] UsbFaultScript script() const {
+  [[nodiscard]] FaultScript script() const {
     const std::lock_guard lock(mutex_);
     return script_.faults();
   }
-  void set(UsbFaultScript script) {
+  void set(FaultScript script) {
     const std::lock_guard lock(mutex_);
-    script_ = ScriptRun<UsbFault>(std::move(script), 1);
+    script_ = ScriptRun(std::move(script), 1);
   }
   [[nodiscard]] Instant now() const noexcept { return clock_.now(); }
   [[nodiscard]] const Clock& clock() const noexcept { return clock_; }
@@ -89,7 +88,7 @@ class UsbFaults {
  private:
   const Clock& clock_;
   mutable std::mutex mutex_;
-  ScriptRun<UsbFault> script_;
+  ScriptRun script_;
 };
 
 }  // namespace kphi::sim

@@ -12,7 +12,7 @@ constexpr std::size_t kChunk = 60;
 constexpr Duration kBreath = 900us;
 
 // Command codes (data sheet DS20005565, table 3-1).
-constexpr std::uint8_t kStatus = 0x10, kGetData = 0x40, kGetSettings = 0x61, kWrite = 0x90, kReadRestart = 0x93,
+constexpr std::uint8_t kStatusAndSet = 0x10, kGetData = 0x40, kGetSettings = 0x61, kWrite = 0x90, kReadRestart = 0x93,
                        kWriteNoStop = 0x94;
 // Of the answers.
 constexpr std::uint8_t kNotNow = 0x01, kNoSuchCommand = 0x02, kNoData = 127;
@@ -68,9 +68,9 @@ UsbAnswer Mcp2221::out(std::uint8_t endpoint, std::span<const std::uint8_t> byte
   }
   if (faults_.now() - fetched_ < kBreath) ++truth_.hasty;
   const Report answer = apply(command);
-  if (faults_.strikes(UsbFaultKind::stall)) halted_ = true;
-  if (faults_.strikes(UsbFaultKind::no_reply)) return {};
-  const auto late = faults_.strikes(UsbFaultKind::late);
+  if (faults_.strikes(FaultKind::ambient_stall)) halted_ = true;
+  if (faults_.strikes(FaultKind::ambient_no_reply)) return {};
+  const auto late = faults_.strikes(FaultKind::ambient_late);
   answers_.push_back({answer, faults_.now() + (late ? late->delay : Duration{0})});
   return {};
 }
@@ -99,9 +99,9 @@ void Mcp2221::halt_cleared(std::uint8_t) {
 Mcp2221::Report Mcp2221::apply(const Report& command) {
   Report answer{};
   answer[0] = command[0];
-  busy_ = faults_.strikes(UsbFaultKind::busy).has_value();
+  busy_ = faults_.strikes(FaultKind::ambient_busy).has_value();
   const std::uint8_t code = command[0];
-  if (code == kStatus)
+  if (code == kStatusAndSet)
     status(command, answer);
   else if (code == kWrite || code == kWriteNoStop)
     write(command, answer);
@@ -168,11 +168,11 @@ bool Mcp2221::takes_transfer(Report& answer) {
 
 /// Seven bits of address; the lowest bit of a read's may be either. An absent acknowledgement shows later only.
 bool Mcp2221::addressed(std::uint8_t address_byte) {
-  if (faults_.strikes(UsbFaultKind::stuck_bus)) {
+  if (faults_.strikes(FaultKind::ambient_stuck_bus)) {
     state_ = kNoStart;
     return false;
   }
-  if (address_byte >> 1 == sensor_.address() && !faults_.strikes(UsbFaultKind::nack)) return true;
+  if (address_byte >> 1 == sensor_.address() && !faults_.strikes(FaultKind::ambient_nack)) return true;
   ++truth_.nacks;
   nack_ = true;
   state_ = kNobody;
@@ -191,7 +191,7 @@ std::uint8_t Mcp2221::engine() const { return busy_ || faults_.now() < free_at_ 
 std::uint8_t Mcp2221::sensor_byte() {
   const std::uint8_t at = sensor_.pointer();
   const std::uint8_t value = sensor_.read(faults_.now());
-  const auto fault = faults_.strikes(UsbFaultKind::reads_as, at);
+  const auto fault = faults_.strikes(FaultKind::ambient_reads_as, at);
   return fault ? fault->value : value;
 }
 

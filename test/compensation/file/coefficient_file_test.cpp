@@ -76,11 +76,8 @@ TEST(CoefficientFile, GivesWhatTheFileSaysInSiUnits) {
   ASSERT_EQ(c.table.size(), 2u);
   EXPECT_EQ(c.table[1].k.value(), 1.4e-6);
   EXPECT_EQ(c.table[1].at_speed, from_rpm(19100));
-  EXPECT_EQ(c.table[1].steps, 37);
   EXPECT_EQ(c.air_density_kg_m3, 1.2);
-  EXPECT_EQ(c.supply->value(), 12.0);
   EXPECT_EQ(c.provenance.campaign, "icra2021_5in_3blade");
-  EXPECT_EQ(c.provenance.fit.estimator, "huber");
   ASSERT_EQ(c.provenance.runs.size(), 1u);
   EXPECT_EQ(c.provenance.runs[0].sha256, "00ff");
 }
@@ -96,7 +93,6 @@ TEST(CoefficientFile, ConvertsEveryCoefficientFromNewtonsPerRpmSquared) {
   EXPECT_DOUBLE_EQ(rpm.curve.uncertainty()->covariance / si.curve.uncertainty()->covariance, scale * scale);
   EXPECT_DOUBLE_EQ(rpm.table[0].k / si.table[0].k, scale);
   EXPECT_DOUBLE_EQ(*rpm.table[0].standard_error / *si.table[0].standard_error, scale);
-  EXPECT_DOUBLE_EQ(*rpm.table[0].k_at_speed / *si.table[0].k_at_speed, scale);
 }
 
 TEST(CoefficientFile, GivesTheLineThatFlies) {
@@ -144,7 +140,6 @@ TEST(CoefficientFile, LeavesEmptyWhatIsUnknown) {
   EXPECT_EQ(imported.propeller.blades, 0);
   const Coefficients bare = parse_coefficients(kGood.substr(0, kGood.find("table:")), "c");
   EXPECT_TRUE(bare.table.empty());
-  EXPECT_FALSE(bare.supply);
   EXPECT_TRUE(bare.provenance.runs.empty());
 }
 

@@ -25,6 +25,7 @@ class ToldMotor : public MotorLink {
   [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return {}; }
   std::size_t take(std::span<results::MotorReading>) override { return 0; }
   [[nodiscard]] std::string failure() const override { return {}; }
+  [[nodiscard]] results::MotorCounts counts() const override { return {}; }
   [[nodiscard]] std::string identity() const override { return {}; }
 
   std::vector<std::string> told;

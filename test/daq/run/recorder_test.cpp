@@ -13,7 +13,12 @@ namespace {
 
 class Recording : public testing::Test {
  protected:
-  Recording() : writer_(folder_.path() / "run.h5", {}, bench_.files()), recorder_(bench_, streams_, writer_) {}
+  Recording() : writer_(folder_.path() / "run.h5", {}, bench_.files()), recorder_(bench_, guard_, writer_) {}
+
+  void drain() {
+    (void)guard_.relay();
+    recorder_.drain();
+  }
 
   void mark(results::Phase phase) { recorder_.mark({phase, -1, bench_.time.now().count(), 0}); }
 
@@ -24,7 +29,7 @@ class Recording : public testing::Test {
 
   test::TemporaryFolder folder_;
   QueueBench bench_;
-  BenchStreams streams_{bench_};
+  Guard guard_{bench_, {}, mini40(), {}};
   results::RunWriter writer_;
   Recorder recorder_;
   std::uint32_t sequence_ = 0;
@@ -32,7 +37,7 @@ class Recording : public testing::Test {
 
 TEST_F(Recording, WritesAllThatCameInTheOrderItCame) {
   for (int i = 0; i < 20'000; ++i) sample(i, i);
-  recorder_.drain();
+  drain();
   EXPECT_TRUE(bench_.records.empty());
   EXPECT_EQ(writer_.samples(), 20'000u);
   writer_.sync();
@@ -45,7 +50,7 @@ TEST_F(Recording, WarnsOnceNearARangeAndOnceBeyondIt) {
   for (const std::int32_t counts : {47'000'000, 49'000'000, -50'000'000, 60'000'000, -61'000'000, 65'999'999}) {
     sample(counts, 1'500'000'000);
   }
-  recorder_.drain();
+  drain();
   const auto events = recorder_.take_events();
   ASSERT_EQ(events.size(), 2u);
   EXPECT_EQ(events[0].kind, results::EventKind::near_range);
@@ -56,7 +61,7 @@ TEST_F(Recording, WarnsOnceNearARangeAndOnceBeyondIt) {
 
 TEST_F(Recording, WritesWhatHappenedToTheStreamAndTellsTheRunner) {
   bench_.events.push_back({results::EventKind::restarted, 5, 0, "the stream began anew"});
-  recorder_.drain();
+  drain();
   EXPECT_EQ(recorder_.take_events().at(0).text, "the stream began anew");
   writer_.sync();
   EXPECT_EQ(results::read_run(writer_.path()).events.at(0).kind, results::EventKind::restarted);
@@ -64,17 +69,17 @@ TEST_F(Recording, WritesWhatHappenedToTheStreamAndTellsTheRunner) {
 
 TEST_F(Recording, MeasuresAPhaseThatBelongsToABias) {
   mark(results::Phase::bias_before);
-  recorder_.drain();
+  drain();
   sample(1'000'000, 1);
   sample(3'000'000, 2);
-  recorder_.drain();
+  drain();
   EXPECT_EQ(recorder_.measured().records, 2u);
   EXPECT_DOUBLE_EQ(recorder_.measured().mean[2], 2.0);
   EXPECT_NEAR(recorder_.measured().standard_deviation[2], std::sqrt(2.0), 1e-12);
   mark(results::Phase::bias_after);
-  recorder_.drain();
+  drain();
   sample(500'000, 3);
-  recorder_.drain();
+  drain();
   EXPECT_DOUBLE_EQ(recorder_.measured().mean[2], 0.5) << "each phase by itself";
 }
 
@@ -93,8 +98,8 @@ TEST(RecordingOntoABrokenDisk, KeepsTheFirstErrorForTheRunnerAndThrowsNothingIts
   test::TemporaryFolder folder;
   QueueBench bench;
   results::RunWriter writer(folder.path() / "run.h5", {}, disk);
-  BenchStreams streams(bench);
-  Recorder recorder(bench, streams, writer);
+  Guard guard(bench, {}, mini40(), {});
+  Recorder recorder(bench, guard, writer);
   EXPECT_NO_THROW(recorder.check_failure());
   disk.broken = true;
   bench.time.set(std::chrono::seconds(1));

@@ -11,6 +11,7 @@
 #include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
+#include "test/daq/coasting_bench.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -225,6 +226,56 @@ TEST_F(OneRun, StopsWhenAnExceptionComesFromTheProgressDisplay) {
   EXPECT_THROW((void)record_run(bench_, test::first_run(campaign_, config_, file()), broken, [] { return false; }),
                std::runtime_error);
   EXPECT_TRUE(motor_is_let_go());
+}
+
+/// The link hangs at the second speed while the guard looks, and fails then.
+class FailingLink : public testing::Test {
+ protected:
+  FailingLink() { bench_.mounted("5x3", 0); }
+
+  StopWords record_until_it_fails(const std::function<void()>& trouble) {
+    int speeds = 0;
+    bench_.spoilt_motor.before_speed = [&] {
+      if (++speeds != 2) return;
+      trouble();
+      bench_.wait_until(bench_.clock().now() + std::chrono::milliseconds(50));
+      throw DeviceError("motor", "set the speed", "the port is gone", "plug it in");
+    };
+    Progress progress;
+    try {
+      (void)record_run(bench_, test::first_run(test::short_campaign(), config_, folder_.path() / "5x3_phi000_rep1.h5"),
+                       progress, [] { return false; });
+    } catch (const SafetyStop& stop) {
+      return stop.words();
+    }
+    ADD_FAILURE() << "it went on";
+    return {};
+  }
+
+  test::TemporaryFolder folder_;
+  profiles::BenchConfig config_ = test::deterministic_config(1);
+  CoastingBench bench_{config_};
+};
+
+TEST_F(FailingLink, IsAConsequenceOfWhatTheGuardHadSeenBefore) {
+  const StopWords words = record_until_it_fails([&] {
+    bench_.spoilt_motor.spoil = [](results::MotorReading& reading) {
+      if (reading.channel == results::MotorChannel::speed) reading.value = to_rad_per_sec(25000);
+    };
+  });
+  EXPECT_THAT(words.cause, HasSubstr("speed 25000 RPM is above"));
+  EXPECT_THAT(words.consequences, HasSubstr("the port is gone"));
+}
+
+TEST_F(FailingLink, IsToldOnceWhenTheGuardSawItToo) {
+  const StopWords words = record_until_it_fails([&] { bench_.spoilt_motor.lost = "unplugged"; });
+  EXPECT_THAT(words.cause, HasSubstr("unplugged"));
+  EXPECT_THAT(words.line(), testing::Not(HasSubstr("the port is gone")));
+}
+
+TEST_F(FailingLink, IsTheCauseWhenTheGuardSawNothing) {
+  const StopWords words = record_until_it_fails([] {});
+  EXPECT_THAT(words.cause, HasSubstr("the port is gone"));
 }
 
 TEST(RunFromASeed, GivesTheSameBytesTwiceAndOthersFromAnotherSeed) {

@@ -12,9 +12,9 @@ using namespace std::chrono_literals;
 
 constexpr sim::TrueAir kAir{18, 102689, 0.45};
 
-sim::UsbFault unplugged(Instant at, Duration lasts) {
-  sim::UsbFault fault;
-  fault.kind = sim::UsbFaultKind::unplug;
+sim::Fault unplugged(Instant at, Duration lasts) {
+  sim::Fault fault;
+  fault.kind = sim::FaultKind::ambient_unplug;
   fault.at = at;
   fault.lasts = lasts;
   return fault;

@@ -20,7 +20,6 @@ Calibration data_sheet() {
 
 TEST(Bme280, CompensatesTheDataSheetsExample) {
   const Measured measured = compensate({415148, 519888, 0x8000}, data_sheet());
-  EXPECT_EQ(measured.t_fine, 128422);
   EXPECT_EQ(measured.temperature_centi_c, 2508);
   EXPECT_EQ(measured.pressure_256th_pa, 25767233u) << "what the published formula yields; the sheet prints 25767236";
   EXPECT_DOUBLE_EQ(measured.temperature_c(), 25.08);

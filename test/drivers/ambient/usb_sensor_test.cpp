@@ -16,7 +16,7 @@ namespace kphi::ambient {
 namespace {
 
 using namespace std::chrono_literals;
-using sim::UsbFaultKind;
+using sim::FaultKind;
 using testing::HasSubstr;
 
 constexpr const char* kAddress = "usb:04d8:00dd:0001";
@@ -93,7 +93,7 @@ TEST_F(UsbSensorTest, IsFoundAtItsOtherAddress) {
 }
 
 TEST_F(UsbSensorTest, SaysWhenNobodyIsBehindTheBridge) {
-  break_with(UsbFaultKind::nack, 1000);
+  break_with(FaultKind::ambient_nack, 1000);
   wire->plug(1, bridge);
   EXPECT_THAT(refusal([&] { (void)sensor(); }), HasSubstr("no device answers at this address"));
   EXPECT_THAT(refusal([&] { (void)open(sensor_address("usb:04d8:00dd:0002")); }), HasSubstr("not plugged in"));
@@ -102,24 +102,24 @@ TEST_F(UsbSensorTest, SaysWhenNobodyIsBehindTheBridge) {
 TEST_F(UsbSensorTest, SaysWhenAnAcknowledgementIsMissingAndGoesOn) {
   wire->plug(1, bridge);
   const auto air = sensor();
-  break_with(UsbFaultKind::nack);
+  break_with(FaultKind::ambient_nack);
   EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("no device answers at this address"));
   expect_true_air(*air);
 }
 
 TEST_F(UsbSensorTest, WaitsForABusyBridge) {
-  break_with(UsbFaultKind::busy, 3);
+  break_with(FaultKind::ambient_busy, 3);
   wire->plug(1, bridge);
   const auto air = sensor();
   expect_true_air(*air);
-  break_with(UsbFaultKind::busy, 10);
+  break_with(FaultKind::ambient_busy, 10);
   expect_true_air(*air);
 }
 
 TEST_F(UsbSensorTest, GivesUpABridgeThatStaysBusy) {
   wire->plug(1, bridge);
   const auto air = sensor();
-  break_with(UsbFaultKind::busy, 100'000);
+  break_with(FaultKind::ambient_busy, 100'000);
   EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("stays busy"));
   faults.set({});
   expect_true_air(*air);
@@ -128,7 +128,7 @@ TEST_F(UsbSensorTest, GivesUpABridgeThatStaysBusy) {
 TEST_F(UsbSensorTest, NamesABusThatIsHeldLow) {
   wire->plug(1, bridge);
   const auto air = sensor();
-  break_with(UsbFaultKind::stuck_bus);
+  break_with(FaultKind::ambient_stuck_bus);
   EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("held low"));
   expect_true_air(*air);
 }
@@ -136,7 +136,7 @@ TEST_F(UsbSensorTest, NamesABusThatIsHeldLow) {
 TEST_F(UsbSensorTest, GivesUpASilentBridgeAndGoesOn) {
   wire->plug(1, bridge);
   const auto air = sensor();
-  break_with(UsbFaultKind::no_reply);
+  break_with(FaultKind::ambient_no_reply);
   EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("no answer in time"));
   expect_true_air(*air);
 }
@@ -144,7 +144,7 @@ TEST_F(UsbSensorTest, GivesUpASilentBridgeAndGoesOn) {
 TEST_F(UsbSensorTest, NeverTakesALateAnswerForThatToTheSameCommand) {
   wire->plug(1, bridge);
   const auto air = sensor();
-  break_with(UsbFaultKind::late, 1, 700ms);
+  break_with(FaultKind::ambient_late, 1, 700ms);
   EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("no answer in time"));
   expect_true_air(*air);
   const std::uint64_t overlapped = bridge.truth().overlapped;
@@ -164,14 +164,14 @@ TEST_F(UsbSensorTest, TakesUpABridgeThatAPredecessorLeftInTheMiddle) {
 TEST_F(UsbSensorTest, ClearsAHaltedEndpoint) {
   wire->plug(1, bridge);
   const auto air = sensor();
-  break_with(UsbFaultKind::stall, 2);
+  break_with(FaultKind::ambient_stall, 2);
   expect_true_air(*air);
 }
 
 TEST_F(UsbSensorTest, RefusesACalibrationOfWhichOneByteWasDamaged) {
   wire->plug(1, bridge);
   for (const auto& [at, value] : {std::pair{0x89, 0x6A}, std::pair{0x8E, 0x00}, std::pair{0xE5, 0xFF}}) {
-    sim::UsbFault fault{UsbFaultKind::reads_as, {}, {}, 1};
+    sim::Fault fault{FaultKind::ambient_reads_as, {}, {}, 1};
     fault.address = static_cast<std::uint8_t>(at);
     fault.value = static_cast<std::uint8_t>(value);
     faults.set({fault});
@@ -181,7 +181,7 @@ TEST_F(UsbSensorTest, RefusesACalibrationOfWhichOneByteWasDamaged) {
 }
 
 TEST_F(UsbSensorTest, RefusesAnotherChip) {
-  sim::UsbFault bmp280{UsbFaultKind::reads_as};
+  sim::Fault bmp280{FaultKind::ambient_reads_as};
   bmp280.address = 0xD0, bmp280.value = 0x58;
   faults.set({bmp280});
   wire->plug(1, bridge);
@@ -191,7 +191,7 @@ TEST_F(UsbSensorTest, RefusesAnotherChip) {
 TEST_F(UsbSensorTest, EndsAtOnceWhenItIsUnpluggedInTheMiddle) {
   wire->plug(1, bridge);
   auto air = sensor();
-  break_with(UsbFaultKind::no_reply);
+  break_with(FaultKind::ambient_no_reply);
   const std::uint64_t before = bridge.truth().commands;
   auto failure = std::async(std::launch::async, [&] { return refusal([&] { (void)air->read(); }); });
   ASSERT_TRUE(eventually([&] { return bridge.truth().commands > before; })) << "it waits for the answer";
@@ -216,7 +216,7 @@ TEST_F(UsbSensorTest, ComesBackByItselfAfterAReplug) {
 }
 
 TEST_F(UsbSensorTest, IsPulledOutAndPluggedInAsAScriptSays) {
-  faults.set({sim::UsbFault{{UsbFaultKind::unplug, clock.now() + 100ms, 50ms}}});
+  faults.set({sim::Fault{FaultKind::ambient_unplug, clock.now() + 100ms, 50ms}});
   const usb::Bus bus;
   const sim::UsbSocket socket(*wire, 1, bridge, faults);
   ASSERT_TRUE(eventually([&] { return bus.list().size() == 1; }));

@@ -6,7 +6,7 @@
 #include <map>
 #include <vector>
 
-#include "drivers/iq/service/dialogue.hpp"
+#include "drivers/iq/session/connecting.hpp"
 
 namespace kphi::iq::fake {
 
@@ -61,7 +61,7 @@ inline std::map<const Entry*, double> good_values() {
   };
 }
 
-class FakeDialogue final : public Dialogue {
+class FakeDialogue {
  public:
   std::map<const Entry*, double> values = good_values();
   std::vector<const Entry*> asked;
@@ -73,7 +73,21 @@ class FakeDialogue final : public Dialogue {
   double tick_s = 0;       ///< the module's time moves in such steps
   std::function<Duration()> way = [] { return Duration(std::chrono::microseconds(300)); };  ///< there, or back
 
-  Reply inquire(const Inquiry& inquiry) override {
+  Ask ask() {
+    return [this](const std::vector<Inquiry>& inquiries) {
+      std::vector<Reply> replies;
+      for (const Inquiry& inquiry : inquiries) replies.push_back(reply_to(inquiry));
+      return replies;
+    };
+  }
+  std::function<void(Duration)> pause() {
+    return [this](Duration bench) { clock.advance(bench); };
+  }
+
+ private:
+  static constexpr const Entry& kTime = entry<"system_control.time">;
+
+  Reply reply_to(const Inquiry& inquiry) {
     Inquiries::check({inquiry});
     const Entry& entry = *inquiry.entry;
     if (inquiry.set_to && !ignores_sets) set(entry, *inquiry.set_to);
@@ -92,11 +106,6 @@ class FakeDialogue final : public Dialogue {
     reply.uncertainty = (clock.now() - sent + Duration(1)) / 2;
     return reply;
   }
-  void pause(Duration bench) override { clock.advance(bench); }
-
- private:
-  static constexpr const Entry& kTime = entry<"system_control.time">;
-
   static double on_the_wire(const Entry& entry, double value) {
     return entry.format == Format::f32 ? static_cast<double>(static_cast<float>(value)) : value;
   }

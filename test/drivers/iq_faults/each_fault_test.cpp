@@ -28,7 +28,7 @@ void PrintTo(const Mode& mode, std::ostream* out) { *out << mode.name; }
 
 class EachFault : public testing::TestWithParam<Mode> {
  protected:
-  Joined& run(sim::MotorFaultScript faults, Instant end = kEnd) {
+  Joined& run(sim::FaultScript faults, Instant end = kEnd) {
     joined.emplace(GetParam().manner, std::move(faults), 42);
     joined->run_until(end);
     joined->finish();
@@ -46,12 +46,10 @@ class EachFault : public testing::TestWithParam<Mode> {
     EXPECT_LE(j.silence_after(4s), recovery()) << "recovers";
     return j;
   }
-  [[nodiscard]] std::uint64_t done(sim::MotorFaultKind kind) const {
-    return joined->truth().done[static_cast<std::size_t>(kind)];
-  }
+  [[nodiscard]] std::uint64_t done(sim::FaultKind kind) const { return joined->truth().done.at(kind); }
   /// Requests that timed out, but for those that old firmware has no answer to.
   [[nodiscard]] static std::uint64_t lost(const Joined& j) {
-    const bool old = j.session().identity().coil_temperature_client == 77;
+    const bool old = j.session().identity().coil_temperature_client() == 77;
     return j.counters().timeouts - (old ? kUnknownToOldFirmware : 0);
   }
   /// One request timeout and until the next poll is answered.
@@ -76,18 +74,18 @@ TEST_P(EachFault, FlippedBits) { EXPECT_GT(run_one({{"kind", "motor_flip"}, {"bi
 
 TEST_P(EachFault, BadChecksums) {
   const Counters& c = run_one({{"kind", "motor_bad_crc"}}).counters();
-  EXPECT_GE(c.crc_errors, done(sim::MotorFaultKind::bad_crc));
-  EXPECT_EQ(lost(*joined), done(sim::MotorFaultKind::bad_crc));
+  EXPECT_GE(c.crc_errors, done(sim::FaultKind::motor_bad_crc));
+  EXPECT_EQ(lost(*joined), done(sim::FaultKind::motor_bad_crc));
 }
 
 TEST_P(EachFault, DroppedReplies) {
   run_one({{"kind", "motor_drop"}});
-  EXPECT_EQ(lost(*joined), done(sim::MotorFaultKind::drop));
+  EXPECT_EQ(lost(*joined), done(sim::FaultKind::motor_drop));
 }
 
 TEST_P(EachFault, DuplicatedReplies) {
   const Counters& c = run_one({{"kind", "motor_duplicate"}}).counters();
-  EXPECT_EQ(c.unasked, done(sim::MotorFaultKind::duplicate));
+  EXPECT_EQ(c.unasked, done(sim::FaultKind::motor_duplicate));
   EXPECT_EQ(lost(*joined), 0u);
 }
 
@@ -148,7 +146,7 @@ TEST_P(EachFault, LatencyAboveTheTimeoutIsNoStaleAnswer) {
 TEST_P(EachFault, ImpossibleNumbers) {
   for (const char* value : {"nan", "inf", "-inf"}) {
     Joined& j = run_one({{"kind", "motor_value"}, {"value", value}, {"type", "50"}, {"sub", "13"}});
-    EXPECT_EQ(j.counters().bad_values, done(sim::MotorFaultKind::value));
+    EXPECT_EQ(j.counters().bad_values, done(sim::FaultKind::motor_value));
     EXPECT_TRUE(
         std::all_of(j.readings().begin(), j.readings().end(), [](const Reading& r) { return std::isfinite(r.value); }));
   }
@@ -159,14 +157,14 @@ TEST_P(EachFault, WrongLengths) {
   for (const char* size : {"0", "2", "5", "16"}) {
     const Counters& c =
         run_one({{"kind", "motor_wrong_length"}, {"size", size}, {"type", "50"}, {"sub", "13"}}).counters();
-    EXPECT_EQ(c.wrong_length, done(sim::MotorFaultKind::wrong_length)) << size;
+    EXPECT_EQ(c.wrong_length, done(sim::FaultKind::motor_wrong_length)) << size;
   }
 }
 
 TEST_P(EachFault, WrongIds) {
   for (const char* id : {"7", "63"}) {
     const Counters& c = run_one({{"kind", "motor_wrong_id"}, {"id", id}}).counters();
-    EXPECT_EQ(c.wrong_module, done(sim::MotorFaultKind::wrong_id)) << id;
+    EXPECT_EQ(c.wrong_module, done(sim::FaultKind::motor_wrong_id)) << id;
   }
 }
 
@@ -267,7 +265,7 @@ TEST_P(EachFault, ADumbModuleThatIgnoresTheCoastIsLeftToItsTimeout) {
 TEST_P(EachFault, ASpeedTakenBackNeverReachesThePort) {
   Manner manner = GetParam().manner;
   manner.port_takes = 2;  // frames wait in the driver
-  joined.emplace(manner, sim::MotorFaultScript{}, 42);
+  joined.emplace(manner, sim::FaultScript{}, 42);
   joined->run_until(4s);
   joined->finish();
   const Instant before = joined->module().last_motion().at;

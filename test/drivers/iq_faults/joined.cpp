@@ -94,7 +94,7 @@ bool is_coast(const sim::IqFrame& frame) {
 
 }  // namespace
 
-Joined::Joined(const Manner& manner, sim::MotorFaultScript script, std::uint64_t seed)
+Joined::Joined(const Manner& manner, sim::FaultScript script, std::uint64_t seed)
     : manner_(manner),
       plant_({}, seed),
       module_(module_settings(manner, seed), plant_.motor()),
@@ -280,9 +280,9 @@ std::string Joined::wrong_readings() const {
   return out;
 }
 
-sim::MotorFaultScript script(std::initializer_list<sim::FaultEntry> entries) {
-  sim::MotorFaultScript faults;
-  for (const sim::FaultEntry& entry : entries) faults.push_back(sim::motor_fault_of(entry));
+sim::FaultScript script(std::initializer_list<sim::FaultEntry> entries) {
+  sim::FaultScript faults;
+  for (const sim::FaultEntry& entry : entries) faults.push_back(sim::fault_of(entry));
   return faults;
 }
 

@@ -27,7 +27,7 @@ struct Manner {
 
 class Joined {
  public:
-  Joined(const Manner& manner, sim::MotorFaultScript script, std::uint64_t seed);
+  Joined(const Manner& manner, sim::FaultScript script, std::uint64_t seed);
 
   /// Seven thousand ticks a second. Speeds are commanded from the first `ready` on, another one every 0.4 s; after a
   /// failure the session is connected again as soon as it coasts, and nobody rearms it.
@@ -85,6 +85,6 @@ class Joined {
 };
 
 /// A script out of entries as a person writes them.
-[[nodiscard]] sim::MotorFaultScript script(std::initializer_list<sim::FaultEntry> entries);
+[[nodiscard]] sim::FaultScript script(std::initializer_list<sim::FaultEntry> entries);
 
 }  // namespace kphi::iq::test

@@ -15,8 +15,8 @@ namespace {
 
 using namespace std::chrono_literals;
 using kphi::test::Dice;
-using sim::MotorFault;
-using K = sim::MotorFaultKind;
+using sim::Fault;
+using K = sim::FaultKind;
 
 Manner random_manner(Dice& dice) {
   Manner manner;
@@ -31,39 +31,40 @@ Manner random_manner(Dice& dice) {
 }
 
 /// Of replies and bytes: between 0.1 and 3.5 s.
-MotorFault random_fault(Dice& dice) {
-  MotorFault fault;
+Fault random_fault(Dice& dice) {
+  Fault fault;
   fault.at = from_seconds(dice.real(0.1, 2.5));
   fault.lasts = from_seconds(dice.real(0.05, 1));
   fault.p = dice.real(0.005, 0.3);
-  fault.kind = static_cast<K>(dice.whole(0, static_cast<int>(K::command_flip)));
+  fault.kind = static_cast<K>(dice.whole(static_cast<int>(K::motor_flip), static_cast<int>(K::motor_command_flip)));
   fault.bits = static_cast<std::uint64_t>(dice.whole(1, 3));
   fault.size = static_cast<std::uint64_t>(dice.whole(0, 9));
   fault.id = static_cast<std::uint64_t>(dice.whole(18, 63));
   fault.delay = from_seconds(dice.real(0.0001, 0.02));
   fault.jitter = from_seconds(dice.real(0, 0.01));
-  if (fault.kind == K::garbage && dice.whole(0, 1) == 0)
+  if (fault.kind == K::motor_garbage && dice.whole(0, 1) == 0)
     fault.bytes = std::array<std::vector<std::uint8_t>, 3>{
         {{0x55}, {0x55, 0x3b}, {0x55, 0xff}}}[static_cast<std::size_t>(dice.whole(0, 2))];
-  if (fault.kind == K::value)
-    fault.value = std::array{std::nan(""), 1e-42, HUGE_VAL}[static_cast<std::size_t>(dice.whole(0, 2))];
-  if (fault.kind == K::wrong_length && fault.size == 4) fault.size = 3;
-  if (fault.kind == K::delay && dice.whole(0, 1) == 0) {
+  if (fault.kind == K::motor_value)
+    fault.reading = std::array{std::nan(""), 1e-42, HUGE_VAL}[static_cast<std::size_t>(dice.whole(0, 2))];
+  if (fault.kind == K::motor_wrong_length && fault.size == 4) fault.size = 3;
+  if (fault.kind == K::motor_delay && dice.whole(0, 1) == 0) {
     fault.delay = from_seconds(dice.real(0.05, 0.3));
     fault.count = 1;
   }
-  if (fault.kind == K::split) fault.delay /= 20;
-  if (fault.kind == K::command_flip) fault.p *= 0.05;
-  if (fault.kind == K::mute || fault.kind == K::deaf) fault.lasts = from_seconds(dice.real(0.01, 0.4));
+  if (fault.kind == K::motor_split) fault.delay /= 20;
+  if (fault.kind == K::motor_command_flip) fault.p *= 0.05;
+  if (fault.kind == K::motor_mute || fault.kind == K::motor_deaf) fault.lasts = from_seconds(dice.real(0.01, 0.4));
   return fault;
 }
 
 /// At most one of the great ones, at any time.
-void add_upheaval(Dice& dice, sim::MotorFaultScript& script) {
-  constexpr std::array kGreat{K::unplug, K::brown_out, K::ignore_sets, K::redline,     K::hot,
-                              K::sag,    K::locked,    K::mute,        K::over_voltage};
+void add_upheaval(Dice& dice, sim::FaultScript& script) {
+  constexpr std::array kGreat{K::motor_unplug,  K::motor_brown_out, K::motor_ignore_sets,
+                              K::motor_redline, K::motor_hot,       K::motor_sag,
+                              K::motor_locked,  K::motor_mute,      K::motor_over_voltage};
   if (dice.whole(0, 2) > 0) return;
-  MotorFault fault;
+  Fault fault;
   fault.kind = kGreat[static_cast<std::size_t>(dice.whole(0, kGreat.size() - 1))];
   fault.at = from_seconds(dice.real(0.5, 3));
   fault.lasts = from_seconds(dice.real(0.3, 1.5));
@@ -72,7 +73,7 @@ void add_upheaval(Dice& dice, sim::MotorFaultScript& script) {
   fault.speed = 200;
   fault.coil = dice.real(50, 150);
   fault.volts = dice.real(1, 20);
-  if (fault.kind == K::brown_out) fault.lasts = Duration{0};
+  if (fault.kind == K::motor_brown_out) fault.lasts = Duration{0};
   script.push_back(fault);
 }
 
@@ -86,12 +87,12 @@ TEST_P(Mixtures, NothingWrongIsDeliveredAndNothingSpinsOn) {
     const auto seed = static_cast<std::uint64_t>(GetParam() * 10 + i);
     Dice dice(seed);
     const Manner manner = random_manner(dice);
-    sim::MotorFaultScript faults;
+    sim::FaultScript faults;
     for (int n = dice.whole(1, 5); n > 0; --n) faults.push_back(random_fault(dice));
     add_upheaval(dice, faults);
     std::string description;
     Instant over{0};
-    for (const MotorFault& fault : faults) {
+    for (const Fault& fault : faults) {
       description += std::string(name_of(fault.kind)) + " at " + std::to_string(to_seconds(fault.at)) + " for " +
                      std::to_string(to_seconds(fault.lasts)) + ", p " + std::to_string(fault.p) + "\n";
       over = std::max(over, fault.at + fault.lasts + fault.down);
@@ -104,7 +105,7 @@ TEST_P(Mixtures, NothingWrongIsDeliveredAndNothingSpinsOn) {
     EXPECT_EQ(joined.disagreement(), "");
     EXPECT_EQ(joined.danger(), "");
     const bool exchanged =
-        std::any_of(faults.begin(), faults.end(), [](const MotorFault& f) { return f.kind == K::unplug && f.other; });
+        std::any_of(faults.begin(), faults.end(), [](const Fault& f) { return f.kind == K::motor_unplug && f.other; });
     if (exchanged) {
       EXPECT_TRUE(joined.saw(EventKind::another_module));
       EXPECT_GT(joined.silence_after(over), 1h) << "nothing of another module is delivered";

@@ -188,12 +188,19 @@ void bias(bool stops_stream) {
   LoadCell cell(box.address(), clock);
   cell.start();
   EXPECT_GT(std::abs(mean_thrust(cell, 2000)), 0.05) << "there was something to take away";
-  cell.set_bias();
-  ASSERT_TRUE(eventually([&] { return std::abs(mean_thrust(cell, 2000)) < 0.05; }));
+  // The box takes one noisy sample as its zero: what remains is its noise, and after a bad one kphi asks again.
+  std::uint64_t asked = 0;
+  ASSERT_TRUE(eventually([&] {
+    const std::uint64_t starts = cell.counters().restarts;
+    cell.set_bias();
+    ++asked;
+    if (stops_stream && !eventually([&] { return cell.counters().restarts > starts; })) return true;
+    return std::abs(mean_thrust(cell, 2000)) < 0.05;
+  }));
   cell.stop();
   EXPECT_EQ(cell.counters().lost_network + cell.counters().lost_host == 0, !stops_stream);
-  EXPECT_EQ(cell.counters().restarts, stops_stream ? 1u : 0u);
-  EXPECT_EQ(box.stop().starts, stops_stream ? 2u : 1u);
+  EXPECT_EQ(cell.counters().restarts, stops_stream ? asked : 0u);
+  EXPECT_EQ(box.stop().starts, 1 + (stops_stream ? asked : 0u));
 }
 
 TEST(CasesOthersFail, ABiasOnABoxThatKeepsStreaming) { bias(false); }

@@ -227,7 +227,7 @@ TEST_P(EachFault, AChangedRateIsIrregular) {
   j.finish();
   EXPECT_EQ(j.disagreement(), "");
   EXPECT_NEAR(static_cast<double>(j.counters().irregular), 750, 40);
-  EXPECT_EQ(j.wire().truth().rate_changes, 1u);
+  EXPECT_EQ(j.wire().truth().done.at(sim::FaultKind::rate), 1u);
 }
 
 TEST_P(EachFault, ARateWrittenStopsMostBoxes) {
@@ -263,7 +263,7 @@ TEST_P(EachFault, AnAddressGivenAnewLeavesSilence) {
   j.finish();
   EXPECT_EQ(j.session().state(), State::silent);
   EXPECT_EQ(j.disagreement(), "");
-  EXPECT_EQ(j.wire().truth().moves, 1u);
+  EXPECT_EQ(j.wire().truth().done.at(sim::FaultKind::address), 1u);
 }
 
 TEST_P(EachFault, AnAddressGivenBackIsALongGap) {

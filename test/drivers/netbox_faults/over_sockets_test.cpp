@@ -46,7 +46,7 @@ TEST(PagesOverSockets, ASlowAnswerIsWaitedForAndATooSlowOneIsNamed) {
       error_of([&] { static_cast<void>(get(50ms)); }),
       AllOf(HasSubstr("no answer within 0.1 s (could not read the answer)"), HasSubstr("one connection at a time")));
   EXPECT_THAT(get(5s), HasSubstr("</netft>"));
-  EXPECT_GE(box.stop().http_spoilt, 2u);
+  EXPECT_GE(box.stop().done.at(sim::FaultKind::http_slow), 2u);
 }
 
 TEST(PagesOverSockets, ATruncatedPageIsNamed) {
@@ -79,7 +79,7 @@ TEST(PagesOverSockets, ALatin1LetterSpoilsNoNumber) {
   EXPECT_EQ(cell.configuration().counts_per_newton, 1e6);
   EXPECT_EQ(cell.configuration().records_per_datagram, 40);
   EXPECT_EQ(cell.configuration().slot_name, "Pr\uFFFDfstand");
-  EXPECT_EQ(box.stop().http_spoilt, 1u);
+  EXPECT_EQ(box.stop().done.at(sim::FaultKind::http_charset), 1u);
 }
 
 TEST(PagesOverSockets, APageInUtf16IsRefusedBecauseNoRunFileCouldKeepItVerbatim) {
@@ -147,7 +147,7 @@ TEST(TcpOverSockets, AShortReplyIsAnErrorAndInACrossCheckANote) {
     const auto finding = cross_check("127.0.0.1", box.addresses().tcp_port, cell.configuration(), 5s);
     ASSERT_TRUE(finding);
     EXPECT_EQ(finding->severity, Severity::note);
-    EXPECT_EQ(box.stop().tcp_spoilt, 2u);
+    EXPECT_EQ(box.stop().done.at(sim::FaultKind::tcp_short), 2u);
   }
 }
 

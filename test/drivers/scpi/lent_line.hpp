@@ -13,7 +13,6 @@ class LentLine final : public Line {
   void write(std::string_view command) override { line_.write(command); }
   std::string query(std::string_view command) override { return line_.query(command); }
   const std::string& name() const noexcept override { return line_.name(); }
-  LineCounters counters() const noexcept override { return line_.counters(); }
 
  private:
   Line& line_;

@@ -49,7 +49,6 @@ class FakeLine final : public Line {
     return found->second;
   }
   const std::string& name() const noexcept override { return name_; }
-  LineCounters counters() const noexcept override { return {}; }
 
  private:
   std::string name_ = "instrument 10.0.0.9:5025";

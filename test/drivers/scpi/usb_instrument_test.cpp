@@ -6,8 +6,8 @@
 #include <future>
 
 #include "base/random.hpp"
-#include "drivers/scpi/scpi_supply.hpp"
 #include "drivers/scpi/line.hpp"
+#include "drivers/scpi/scpi_supply.hpp"
 #include "drivers/usb/bus.hpp"
 #include "test/drivers/scpi/lent_line.hpp"
 #include "test/drivers/sim_equipment/usbtmc.hpp"
@@ -17,7 +17,7 @@ namespace kphi::scpi {
 namespace {
 
 using namespace std::chrono_literals;
-using sim::UsbFaultKind;
+using sim::FaultKind;
 using testing::HasSubstr;
 
 class UsbInstrumentTest : public OnVirtualBus {
@@ -88,58 +88,54 @@ TEST_F(UsbInstrumentTest, BlamesACommandOnlyForItsOwnErrors) {
 
 TEST_F(UsbInstrumentTest, SurvivesAnEmptyFirstPacket) {
   Usbtmc line(*device, 500ms);
-  break_with(UsbFaultKind::empty_first);
+  break_with(FaultKind::usb_empty_first);
   EXPECT_EQ(idn(line), kIdentity);
-  EXPECT_EQ(line.counters().timeouts, 0u);
 }
 
 TEST_F(UsbInstrumentTest, GathersPacketsAndParts) {
   Usbtmc line(*device, 500ms);
   for (const std::uint64_t size : {std::uint64_t{16}, std::uint64_t{64}}) {
-    break_with(UsbFaultKind::packets, 1, {}, size);
+    break_with(FaultKind::usb_packets, 1, {}, size);
     EXPECT_EQ(idn(line), kIdentity) << size;
   }
   for (const std::uint64_t size : {std::uint64_t{1}, std::uint64_t{7}, std::uint64_t{24}, std::uint64_t{25}}) {
-    break_with(UsbFaultKind::parts, 1000, {}, size);
+    break_with(FaultKind::usb_parts, 1000, {}, size);
     EXPECT_EQ(idn(line), kIdentity) << size;
   }
 }
 
 TEST_F(UsbInstrumentTest, NeverTakesTheAnswerToAnotherRequest) {
   Usbtmc line(*device, 500ms);
-  break_with(UsbFaultKind::wrong_tag);
+  break_with(FaultKind::usb_wrong_tag);
   EXPECT_THAT(refusal([&] { (void)idn(line); }), HasSubstr("another request"));
   EXPECT_EQ(idn(line), kIdentity);
-  EXPECT_EQ(line.counters().damaged, 1u);
 }
 
 TEST_F(UsbInstrumentTest, RecoversFromAStall) {
   Usbtmc line(*device, 500ms);
-  break_with(UsbFaultKind::stall);
+  break_with(FaultKind::ambient_stall);
   EXPECT_THAT(refusal([&] { (void)idn(line); }), HasSubstr("stalled"));
   EXPECT_EQ(idn(line), kIdentity);
 }
 
 TEST_F(UsbInstrumentTest, AbortsAfterSilence) {
   Usbtmc line(*device, 100ms);
-  break_with(UsbFaultKind::no_reply);
+  break_with(FaultKind::ambient_no_reply);
   EXPECT_THAT(refusal([&] { (void)idn(line); }), HasSubstr("no answer in time"));
   EXPECT_EQ(function.truth().aborts, 1u);
   EXPECT_EQ(idn(line), kIdentity);
-  EXPECT_EQ(line.counters().timeouts, 1u);
-  EXPECT_EQ(line.counters().recoveries, 1u);
 }
 
 TEST_F(UsbInstrumentTest, GivesALateAnswerToNobody) {
   Usbtmc line(*device, 100ms);
-  break_with(UsbFaultKind::late, 1, 400ms);
+  break_with(FaultKind::ambient_late, 1, 400ms);
   EXPECT_THAT(refusal([&] { (void)line.query("VOLT? MAX"); }), HasSubstr("no answer in time"));
   EXPECT_EQ(line.query("CURR? MAX"), "10.000");
 }
 
 TEST_F(UsbInstrumentTest, GivesALateAnswerToNobodyEvenIfTheInstrumentIgnoresAborts) {
   Usbtmc line(*device, 100ms);
-  faults.set({{UsbFaultKind::late, {}, {}, 1, 400ms}, {UsbFaultKind::deaf_to_abort, {}, {}, 4}});
+  faults.set({{FaultKind::ambient_late, {}, {}, 1, 400ms}, {FaultKind::usb_deaf_to_abort, {}, {}, 4}});
   EXPECT_NE(refusal([&] { (void)line.query("VOLT? MAX"); }), "");
   std::string answer;
   ASSERT_TRUE(eventually([&] { return refusal([&] { answer = line.query("CURR? MAX"); }).empty(); }));
@@ -164,7 +160,7 @@ TEST_F(UsbInstrumentTest, SendsNoRemoteControlToWhomItChokes) {
 TEST_F(UsbInstrumentTest, EndsAtOnceWhenItIsUnpluggedInTheMiddleAndComesBack) {
   {
     Usbtmc line(*device, 60'000ms);
-    break_with(UsbFaultKind::no_reply);
+    break_with(FaultKind::ambient_no_reply);
     auto failure = std::async(std::launch::async, [&] { return refusal([&] { (void)idn(line); }); });
     ASSERT_TRUE(eventually([&] { return function.truth().requests > 0; }));
     wire->unplug(1);
@@ -180,16 +176,16 @@ TEST_F(UsbInstrumentTest, EndsAtOnceWhenItIsUnpluggedInTheMiddleAndComesBack) {
 
 TEST_F(UsbInstrumentTest, AnswersTrulyOrNotAtAllUnderAnyMixtureOfFaults) {
   Usbtmc line(*device, 25ms);
-  constexpr UsbFaultKind kKinds[] = {UsbFaultKind::no_reply,    UsbFaultKind::late,         UsbFaultKind::stall,
-                                     UsbFaultKind::wrong_tag,   UsbFaultKind::packets,      UsbFaultKind::parts,
-                                     UsbFaultKind::empty_first, UsbFaultKind::deaf_to_abort};
+  constexpr FaultKind kKinds[] = {FaultKind::ambient_no_reply, FaultKind::ambient_late,     FaultKind::ambient_stall,
+                                  FaultKind::usb_wrong_tag,    FaultKind::usb_packets,      FaultKind::usb_parts,
+                                  FaultKind::usb_empty_first,  FaultKind::usb_deaf_to_abort};
   Random random(1);
   int answered = 0, failed = 0;
   for (int i = 0; i < 150; ++i) {
     if (i % 3 == 0) {
-      sim::UsbFaultScript script;
+      sim::FaultScript script;
       for (std::uint64_t n = random.bits() % 3; n > 0; --n) {
-        sim::UsbFault fault{kKinds[random.bits() % std::size(kKinds)], {}, {}, 1 + random.bits() % 2};
+        sim::Fault fault{kKinds[random.bits() % std::size(kKinds)], {}, {}, 1 + random.bits() % 2};
         fault.delay = Duration(static_cast<std::int64_t>(random.bits() % 60'000'000));
         fault.size = 4 * (1 + random.bits() % 8);
         script.push_back(fault);

@@ -373,8 +373,8 @@ TEST_F(FaultyServer, UnpluggedTheLinkIsGoneAndComesBackAsAnotherTerminal) {
   ServerSettings settings;
   settings.control = (folder / "control").string();
   settings.device = (folder / "dev" / "motor").string();
-  settings.bench.motor_faults.push_back(
-      motor_fault_of({{"kind", "motor_unplug"}, {"at_s", "0.3"}, {"for_s", "0.3"}, {"other", "true"}}));
+  settings.bench.faults.push_back(
+      fault_of({{"kind", "motor_unplug"}, {"at_s", "0.3"}, {"for_s", "0.3"}, {"other", "true"}}));
   server.emplace(settings);
   const std::string link = server->addresses().device;
   const fs::path first = fs::read_symlink(link);

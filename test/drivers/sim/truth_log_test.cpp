@@ -43,10 +43,10 @@ TEST_F(MotionLogTest, TellsEachCommandOnceAndEveryTurnOfTheStage) {
   tell(2, {});
   look_after(std::chrono::milliseconds(1));
   EXPECT_EQ(log_.json_lines(),
-            "{\"at_ns\":0,\"motion_command\":\"velocity\",\"target_rad_s\":100.0}\n"
-            "{\"at_ns\":3000000,\"motion_command\":\"coast\",\"target\":0.0}\n"
             "{\"at_ns\":0,\"stage\":\"coast\",\"speed_rad_s\":0.0}\n"
+            "{\"at_ns\":0,\"motion_command\":\"velocity\",\"target_rad_s\":100.0}\n"
             "{\"at_ns\":1000000,\"stage\":\"drive\",\"speed_rad_s\":0.0}\n"
+            "{\"at_ns\":3000000,\"motion_command\":\"coast\",\"target\":0.0}\n"
             "{\"at_ns\":4000000,\"stage\":\"coast\",\"speed_rad_s\":0.0}\n");
 }
 

@@ -67,9 +67,9 @@ bool ScpiTcp::hear(Client& client) {
 bool ScpiTcp::apply(Client& client, const std::string& line) {
   const std::string said = instrument_.apply(line);
   if (said.empty()) return true;
-  if (faults_.strikes(UsbFaultKind::closed)) return false;
-  if (faults_.strikes(UsbFaultKind::no_reply)) return true;
-  const auto late = faults_.strikes(UsbFaultKind::late);
+  if (faults_.strikes(FaultKind::usb_closed)) return false;
+  if (faults_.strikes(FaultKind::ambient_no_reply)) return true;
+  const auto late = faults_.strikes(FaultKind::ambient_late);
   client.answers.emplace_back(faults_.now() + (late ? late->delay : Duration{0}), said + "\n");
   return true;
 }

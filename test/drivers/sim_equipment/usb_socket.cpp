@@ -21,10 +21,10 @@ UsbSocket::~UsbSocket() {
 }
 
 void UsbSocket::run() noexcept {
-  UsbFaultScript windows = faults_.script();
-  std::erase_if(windows, [](const UsbFault& fault) { return fault.kind != UsbFaultKind::unplug; });
-  std::sort(windows.begin(), windows.end(), [](const UsbFault& a, const UsbFault& b) { return a.at < b.at; });
-  for (const UsbFault& window : windows) {
+  FaultScript windows = faults_.script();
+  std::erase_if(windows, [](const Fault& fault) { return fault.kind != FaultKind::ambient_unplug; });
+  std::sort(windows.begin(), windows.end(), [](const Fault& a, const Fault& b) { return a.at < b.at; });
+  for (const Fault& window : windows) {
     if (!wait_until(window.at)) return;
     bus_.unplug(port_);
     if (!wait_until(window.end())) return;

@@ -107,7 +107,7 @@ UsbAnswer Usbtmc::check_clear() {
 
 void Usbtmc::drop_answers() {
   asked_ = false;
-  if (faults_.strikes(UsbFaultKind::deaf_to_abort)) return;
+  if (faults_.strikes(FaultKind::usb_deaf_to_abort)) return;
   packets_.clear();
 }
 
@@ -153,10 +153,10 @@ void Usbtmc::answer_request(std::uint8_t tag, std::size_t at_most) {
   last_in_tag_ = tag;
   asked_ = true;
   if (answer_.empty() || at_most == 0) return;
-  const auto part = faults_.strikes(UsbFaultKind::parts);
+  const auto part = faults_.strikes(FaultKind::usb_parts);
   const std::size_t count = std::min({answer_.size(), at_most, part ? part->size : answer_.size()});
   const bool end = count == answer_.size();
-  if (faults_.strikes(UsbFaultKind::wrong_tag)) tag = tag == 1 ? 255 : static_cast<std::uint8_t>(tag - 1);
+  if (faults_.strikes(FaultKind::usb_wrong_tag)) tag = tag == 1 ? 255 : static_cast<std::uint8_t>(tag - 1);
   std::vector<std::uint8_t> all(kHead, 0);
   all[0] = kRequest;
   all[1] = tag;
@@ -166,12 +166,12 @@ void Usbtmc::answer_request(std::uint8_t tag, std::size_t at_most) {
   all.insert(all.end(), answer_.begin(), answer_.begin() + static_cast<std::ptrdiff_t>(count));
   all.resize((all.size() + 3) / 4 * 4, 0);
   answer_.erase(0, count);
-  if (choked_ || faults_.strikes(UsbFaultKind::no_reply)) return;
-  if (faults_.strikes(UsbFaultKind::stall)) in_halted_ = true;
-  const auto late = faults_.strikes(UsbFaultKind::late);
+  if (choked_ || faults_.strikes(FaultKind::ambient_no_reply)) return;
+  if (faults_.strikes(FaultKind::ambient_stall)) in_halted_ = true;
+  const auto late = faults_.strikes(FaultKind::ambient_late);
   const Instant due = faults_.now() + (late ? late->delay : Duration{0});
-  if (faults_.strikes(UsbFaultKind::empty_first)) packets_.push_back({{}, due});
-  const auto small = faults_.strikes(UsbFaultKind::packets);
+  if (faults_.strikes(FaultKind::usb_empty_first)) packets_.push_back({{}, due});
+  const auto small = faults_.strikes(FaultKind::usb_packets);
   const std::size_t packet = small ? small->size : all.size();
   for (std::size_t at = 0; at < all.size(); at += packet) {
     const auto from = all.begin() + static_cast<std::ptrdiff_t>(at);

@@ -114,25 +114,25 @@ TEST_F(SimulatedUsbtmcTest, ChokesOnRemoteControlIfItIsOfThatKind) {
 }
 
 TEST_F(SimulatedUsbtmcTest, MisbehavesAsItIsTold) {
-  const auto ask_with = [&](UsbFault fault) {
+  const auto ask_with = [&](Fault fault) {
     clear();
     faults.set({fault});
     (void)usb.out(0x01, kIdn);
     (void)usb.out(0x01, kAsk);
     return usb.in(0x82, 512);
   };
-  EXPECT_EQ(ask_with({UsbFaultKind::wrong_tag, {}, {}, 1}).bytes.at(1), 1);
-  EXPECT_EQ(ask_with({UsbFaultKind::no_reply, {}, {}, 1}).kind, Kind::nothing_yet);
-  EXPECT_EQ(ask_with({UsbFaultKind::stall, {}, {}, 1}).kind, Kind::stall);
+  EXPECT_EQ(ask_with({FaultKind::usb_wrong_tag, {}, {}, 1}).bytes.at(1), 1);
+  EXPECT_EQ(ask_with({FaultKind::ambient_no_reply, {}, {}, 1}).kind, Kind::nothing_yet);
+  EXPECT_EQ(ask_with({FaultKind::ambient_stall, {}, {}, 1}).kind, Kind::stall);
   usb.halt_cleared(0x82);
-  EXPECT_TRUE(ask_with({UsbFaultKind::empty_first, {}, {}, 1}).bytes.empty());
+  EXPECT_TRUE(ask_with({FaultKind::usb_empty_first, {}, {}, 1}).bytes.empty());
   EXPECT_EQ(usb.in(0x82, 512).bytes.size(), 40u);
-  UsbFault fault{UsbFaultKind::packets, {}, {}, 1};
+  Fault fault{FaultKind::usb_packets, {}, {}, 1};
   fault.size = 16;
   EXPECT_EQ(ask_with(fault).bytes.size(), 16u);
-  fault.kind = UsbFaultKind::parts;
+  fault.kind = FaultKind::usb_parts;
   EXPECT_EQ(ask_with(fault).bytes.at(4), 16);
-  fault.kind = UsbFaultKind::late;
+  fault.kind = FaultKind::ambient_late;
   fault.delay = 100ms;
   EXPECT_EQ(ask_with(fault).kind, Kind::nothing_yet);
   clock.advance(100ms);

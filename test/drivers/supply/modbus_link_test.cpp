@@ -1,5 +1,6 @@
 #include "drivers/supply/modbus_link.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <modbus/modbus.h>
 #include <termios.h>
@@ -16,13 +17,13 @@ namespace kphi::supply {
 namespace {
 
 using namespace std::chrono_literals;
-using sim::SupplyFaultKind;
+using sim::FaultKind;
 using test::kShort;
 
 Address on(const std::string& device) { return parse_address("modbus-rtu:" + device); }
 
-sim::SupplyFault once(SupplyFaultKind kind) {
-  sim::SupplyFault fault;
+sim::Fault once(FaultKind kind) {
+  sim::Fault fault;
   fault.kind = kind;
   fault.count = 1;
   return fault;
@@ -75,17 +76,12 @@ TEST(ModbusLink, LibmodbusRunsAt9600WhenItDoesNotKnowTheRate) {
   modbus_free(context);
 }
 
-TEST(ModbusLink, LetsNoUnknownRateAndNoOddSlaveReachLibmodbus) {
+TEST(ModbusLink, DoesNotTalkAtThatRate) {
   serial::fake::PseudoTerminal line;
   Address address = on(line.name());
-  for (const unsigned baud : {0u, 12345u, 250000u, 2000000u}) {
+  for (const unsigned baud : {12345u, 250000u, 2000000u}) {
     address.baud = baud;
-    EXPECT_THROW(ModbusLink(address, {}), std::invalid_argument) << baud;
-  }
-  address.baud = 9600;
-  for (const int slave : {-1, 0, 248, 256}) {
-    address.slave = slave;
-    EXPECT_THROW(ModbusLink(address, {}), std::invalid_argument) << slave;
+    EXPECT_EQ(ModbusLink(address, {}).open().words, fmt::format("the port does not accept {} baud", baud));
   }
 }
 
@@ -130,7 +126,7 @@ TEST(ModbusLink, WouldTakeALateAnswerForTheAnswerToTheNextRequest) {
   });
   ModbusLink link(supply.address(), kShort);
   ASSERT_TRUE(link.open().ok());
-  auto late = once(SupplyFaultKind::late);
+  auto late = once(FaultKind::supply_late);
   late.delay = kShort.answer + 50ms;
   supply.spoil(late);
   RegisterImage image{};
@@ -148,10 +144,10 @@ TEST(ModbusLink, WaitsForTheEndOfALateAnswer) {
   test::SimulatedSupply supply;
   ModbusLink link(supply.address(), kShort);
   ASSERT_TRUE(link.open().ok());
-  auto late = once(SupplyFaultKind::late);
+  auto late = once(FaultKind::supply_late);
   late.delay = kShort.answer + 30ms;
   supply.spoil(late);
-  auto dribble = once(SupplyFaultKind::dribble);
+  auto dribble = once(FaultKind::supply_dribble);
   dribble.delay = 5ms;
   supply.spoil(dribble);
   RegisterImage image{};
@@ -163,7 +159,7 @@ TEST(ModbusLink, WaitsForTheEndOfALateAnswer) {
 
 struct Row {
   const char* name;
-  sim::SupplyFault fault;
+  sim::Fault fault;
   Failure expected;
   bool next_succeeds;  ///< the following request, without a flush between
 };
@@ -189,21 +185,22 @@ TEST_P(ModbusLinkMeets, AsLibmodbusReportsIt) {
   EXPECT_TRUE(settled.ok()) << settled.words;
 }
 
-sim::SupplyFault once(SupplyFaultKind kind, Duration delay) {
+sim::Fault once(FaultKind kind, Duration delay) {
   auto fault = once(kind);
   fault.delay = delay;
   return fault;
 }
 
 INSTANTIATE_TEST_SUITE_P(Faults, ModbusLinkMeets,
-                         testing::Values(Row{"bad_crc", once(SupplyFaultKind::bad_crc), Failure::damaged, true},
-                                         Row{"no_reply", once(SupplyFaultKind::no_reply), Failure::timeout, true},
-                                         Row{"truncated", once(SupplyFaultKind::truncated), Failure::timeout, true},
-                                         Row{"dribble", once(SupplyFaultKind::dribble, 300us), Failure::none, true},
-                                         Row{"garbage", once(SupplyFaultKind::garbage), Failure::damaged, false},
-                                         Row{"wrong_slave", once(SupplyFaultKind::wrong_slave), Failure::damaged, true},
-                                         Row{"echo", once(SupplyFaultKind::echo), Failure::damaged, false},
-                                         Row{"exception", once(SupplyFaultKind::exception), Failure::refused, true}),
+                         testing::Values(Row{"bad_crc", once(FaultKind::supply_bad_crc), Failure::damaged, true},
+                                         Row{"no_reply", once(FaultKind::supply_no_reply), Failure::timeout, true},
+                                         Row{"truncated", once(FaultKind::supply_truncated), Failure::timeout, true},
+                                         Row{"dribble", once(FaultKind::supply_dribble, 300us), Failure::none, true},
+                                         Row{"garbage", once(FaultKind::supply_garbage), Failure::damaged, false},
+                                         Row{"wrong_slave", once(FaultKind::supply_wrong_slave), Failure::damaged,
+                                             true},
+                                         Row{"echo", once(FaultKind::supply_echo), Failure::damaged, false},
+                                         Row{"exception", once(FaultKind::supply_exception), Failure::refused, true}),
                          [](const auto& row) { return row.param.name; });
 
 TEST(ModbusLink, NeverSendsARequestForTooMany) {
@@ -222,8 +219,8 @@ TEST(ModbusLink, NoticesTheClosedPortAtOnce) {
   ASSERT_TRUE(link.open().ok());
   RegisterImage image{};
   ASSERT_TRUE(link.read({8, 13}, image).ok());
-  sim::SupplyFault closed;
-  closed.kind = SupplyFaultKind::closed;
+  sim::Fault closed;
+  closed.kind = FaultKind::supply_closed;
   closed.lasts = 1h;
   supply.spoil(closed);
   EXPECT_TRUE(test::eventually([&] { return link.read({8, 13}, image).failure == Failure::lost; }));

@@ -32,8 +32,8 @@ inline bool eventually(const std::function<bool()>& holds) {
 enum class Over { rtu, tcp };
 
 /// From now on, for an hour; of reads_as: the register and its value.
-inline sim::SupplyFault lasting(sim::SupplyFaultKind kind, std::uint16_t address = 0, std::uint16_t value = 0) {
-  sim::SupplyFault fault;
+inline sim::Fault lasting(sim::FaultKind kind, std::uint16_t address = 0, std::uint16_t value = 0) {
+  sim::Fault fault;
   fault.kind = kind;
   fault.lasts = std::chrono::hours(1);
   fault.address = address;
@@ -69,7 +69,7 @@ class SimulatedSupply {
     server_.inspect([&](sim::SupplySlave&, sim::SupplyLoad& now, Instant) { now = load; });
   }
   /// `fault.at` counts from now.
-  void spoil(sim::SupplyFault fault) {
+  void spoil(sim::Fault fault) {
     server_.inspect([&](sim::SupplySlave& slave, sim::SupplyLoad&, Instant now) {
       fault.at += now;
       slave.add_fault(fault);

@@ -22,8 +22,8 @@ class OnVirtualBus : public testing::Test {
   }
 
   /// From now on, so many times.
-  void break_with(sim::UsbFaultKind kind, std::uint64_t count = 1, Duration delay = {}, std::uint64_t size = 16) {
-    sim::UsbFault fault;
+  void break_with(sim::FaultKind kind, std::uint64_t count = 1, Duration delay = {}, std::uint64_t size = 16) {
+    sim::Fault fault;
     fault.kind = kind;
     fault.count = count;
     fault.delay = delay;

@@ -51,7 +51,7 @@ TEST(Air, UnknownIsWrittenAndNeverStandard) {
   EXPECT_EQ(file["air_density_kg_m3"].as<std::string>(), "unknown");
   EXPECT_EQ(file["k_standard"].as<std::string>(), "unknown");
   EXPECT_FALSE(file["table"][0]["k_standard"].IsDefined());
-  EXPECT_NE(format_report(fit, {}, {}).find("Air density unknown"), std::string::npos);
+  EXPECT_NE(format_report({fit, {}}, {}).find("Air density unknown"), std::string::npos);
 }
 
 TEST(Air, StandsInFileAndReport) {
@@ -61,7 +61,7 @@ TEST(Air, StandsInFileAndReport) {
   EXPECT_NEAR(file["air_density_u_kg_m3"].as<double>(), 0.011, 1e-12);
   EXPECT_EQ(file["k_standard"]["value"].as<double>(), fit.table[0].standard->value);
   EXPECT_EQ(file["table"][4]["k_standard"].as<double>(), fit.table[4].standard->value);
-  const std::string report = format_report(fit, {}, {});
+  const std::string report = format_report({fit, {}}, {});
   EXPECT_NE(report.find("1.1000 ± 0.0110 kg/m³"), std::string::npos);
   EXPECT_EQ(report.find("Air density unknown"), std::string::npos);
 }

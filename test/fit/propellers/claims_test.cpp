@@ -25,7 +25,7 @@ constexpr PaperPropeller kPaper[] = {{5, 2, 1.3e-8, 1.351e-8, kSlope5},
                                      {6, 2, 2.6e-8, 2.683e-8, -9.35e-11},
                                      {6, 3, 3.1e-8, 3.183e-8, -9.35e-11}};
 
-FamilyMember member(const PaperPropeller& propeller, unsigned seed, double slope_factor = 1, bool air_known = false) {
+Fitted member(const PaperPropeller& propeller, unsigned seed, double slope_factor = 1, bool air_known = false) {
   StudyTruth truth;
   truth.line.K_T = from_newtons_per_rpm2(propeller.K_T).value();
   truth.line.intercept = from_newtons_per_rpm2(propeller.intercept).value();
@@ -37,7 +37,7 @@ FamilyMember member(const PaperPropeller& propeller, unsigned seed, double slope
     step.blades = propeller.blades;
     if (!air_known) step.thrust_n *= kStandardDensity / campaign.density;  // all four in the same air
   }
-  FamilyMember result;
+  Fitted result;
   result.identification = identify(campaign.steps);
   AnalysisOptions options = study_options(truth, campaign);
   if (air_known) {
@@ -49,8 +49,8 @@ FamilyMember member(const PaperPropeller& propeller, unsigned seed, double slope
   return result;
 }
 
-std::vector<FamilyMember> family(unsigned seed = 20) {
-  std::vector<FamilyMember> members;
+std::vector<Fitted> family(unsigned seed = 20) {
+  std::vector<Fitted> members;
   for (const PaperPropeller& propeller : kPaper) members.push_back(member(propeller, ++seed));
   return members;
 }
@@ -76,7 +76,7 @@ TEST(Claims, OfThePaperHoldForFourSimulatedPropellers) {
 }
 
 TEST(Claims, OfSeveralPropellersAreMadeInStandardAir) {
-  std::vector<FamilyMember> members;
+  std::vector<Fitted> members;
   for (const PaperPropeller& propeller : kPaper) members.push_back(member(propeller, 30 + members.size(), 1, true));
   const auto claims = by_id(test_claims(members));  // days from 1.10 to 1.25 kg/m³
   EXPECT_NEAR(claims.at("inch_2b").value, 2.042, 0.02) << "mean over the occlusions";
@@ -94,7 +94,7 @@ TEST(Claims, ThatAreFalseFail) {
 }
 
 TEST(Claims, ThatCannotBeTestedSaySo) {
-  const std::vector<FamilyMember> one{member(kPaper[1], 22)};
+  const std::vector<Fitted> one{member(kPaper[1], 22)};
   const auto claims = by_id(test_claims(one));
   EXPECT_EQ(claims.at("slopes_5in").verdict, Verdict::not_tested);
   EXPECT_EQ(claims.at("inch_2b").verdict, Verdict::not_tested);

@@ -57,7 +57,7 @@ std::vector<results::StepMean> steps_with_flags() {
 }
 
 std::string page(const Figures& figures = {}) {
-  return format_report(identify(steps_with_flags()), provenance(), figures);
+  return format_report({identify(steps_with_flags()), {}}, {provenance(), figures});
 }
 
 /// Every attribute that makes a browser load something.
@@ -161,7 +161,7 @@ TEST(Report, ListsEveryFlagEventAndRejectionWithItsRun) {
   Provenance told = provenance();
   told.runs[0].events = {"3.20 s: restarted, the stream <began> anew"};
   told.rejected = {{"5x3_phi090_rep2.h5", "2021-05-30T00:10:00Z", "speed error & more"}};
-  const std::string html = format_report(identify(steps_with_flags()), told, {});
+  const std::string html = format_report({identify(steps_with_flags()), {}}, {told, {}});
   EXPECT_THAT(html, HasSubstr("3.20 s: restarted, the stream &lt;began&gt; anew"));
   EXPECT_THAT(html, HasSubstr("not accepted"));
   EXPECT_THAT(html, HasSubstr("2021-05-30T00:10:00Z: speed error &amp; more"));
@@ -175,15 +175,15 @@ TEST(Report, OfSeveralCampaignsIsOnePage) {
   larger.K_T *= 2;
   larger.intercept *= 2;
   larger.slope_per_deg *= 2;
-  std::vector<Chapter> chapters{{identify(campaign_steps()), provenance(), {}},
-                                {identify(campaign_steps(larger)), provenance(), {}}};
-  chapters[1].identification.propeller = "6x3 <b>";
-  for (Chapter& chapter : chapters) {
-    chapter.figures = draw_figures(chapter.identification, shares_of_steps(chapter.identification),
-                                   folder.path() / chapter.identification.propeller);
+  std::vector<Fitted> family{{identify(campaign_steps()), {}}, {identify(campaign_steps(larger)), {}}};
+  family[1].identification.propeller = "6x3 <b>";
+  std::vector<Chapter> chapters;
+  for (auto& [identification, analysis] : family) {
+    analysis = analyse(identification);
+    chapters.push_back({provenance(), draw_figures(identification, shares_of_steps(identification),
+                                                   folder.path() / identification.propeller)});
   }
-  const Identification* const family[]{&chapters[0].identification, &chapters[1].identification};
-  const std::string html = format_reports(chapters, draw({family_figure(family)}, folder.path()));
+  const std::string html = format_reports(family, chapters, draw({family_figure(family)}, folder.path()));
   pugi::xml_document document;
   ASSERT_TRUE(document.load_buffer(html.data(), html.size()));
   EXPECT_EQ(document.select_nodes("//svg").size(), 9u);

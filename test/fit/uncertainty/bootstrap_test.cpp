@@ -11,22 +11,17 @@
 namespace kphi::fit {
 namespace {
 
-std::vector<RunSums> runs_of(double phi, std::initializer_list<double> k) {
-  std::vector<RunSums> runs;
-  for (const double one : k) {
-    RunSums run;
-    run.phi_deg = phi;
-    run.repetition = static_cast<int>(runs.size()) + 1;
-    run.xx = 2;
-    run.xt = 2 * one;
-    runs.push_back(run);
-  }
-  return runs;
+AngleScatter runs_of(double phi, std::initializer_list<double> k) {
+  AngleScatter angle;
+  for (const double one : k)
+    angle.runs.push_back(
+        {.phi_deg = phi, .repetition = static_cast<int>(angle.runs.size()) + 1, .xt = 2 * one, .xx = 2});
+  return angle;
 }
 
 // Three runs drawn with replacement: the mean has the variance Σ(k − mean)²/n², and 1/27 for each end.
 TEST(Bootstrap, OfThreeRunsHasTheVarianceThatCombinatoricsGives) {
-  const auto result = bootstrap(runs_of(0, {1, 2, 3}), {{1}, {0}}, {20000, 7});
+  const auto result = bootstrap(std::vector{runs_of(0, {1, 2, 3})}, {{1}, {0}}, {20000, 7});
   ASSERT_EQ(result.size(), 3u);
   EXPECT_EQ(result[0].quantity, "K_T");
   EXPECT_DOUBLE_EQ(result[0].value, 2);
@@ -36,9 +31,8 @@ TEST(Bootstrap, OfThreeRunsHasTheVarianceThatCombinatoricsGives) {
 }
 
 TEST(Bootstrap, CarriesTheLineAlong) {
-  std::vector<RunSums> runs = runs_of(0, {10, 10});
-  for (const auto& run : runs_of(100, {5, 7})) runs.push_back(run);
-  const auto result = bootstrap(runs, {{1, 0}, {-0.01, 0.01}}, {5000, 1});
+  const std::vector angles{runs_of(0, {10, 10}), runs_of(100, {5, 7})};
+  const auto result = bootstrap(angles, {{1, 0}, {-0.01, 0.01}}, {5000, 1});
   ASSERT_EQ(result.size(), 4u);
   EXPECT_EQ(result[3].quantity, "slope");
   EXPECT_NEAR(result[3].value, -0.04, 1e-15);
@@ -47,12 +41,12 @@ TEST(Bootstrap, CarriesTheLineAlong) {
 }
 
 TEST(Bootstrap, IsTheSameForTheSameSeedAndNothingForNothing) {
-  const auto runs = runs_of(0, {1, 2, 4});
+  const std::vector angles{runs_of(0, {1, 2, 4})};
   const BootstrapOptions options{1000, 3};
-  EXPECT_EQ(bootstrap(runs, {{1}, {0}}, options)[0].standard_error,
-            bootstrap(runs, {{1}, {0}}, options)[0].standard_error);
+  EXPECT_EQ(bootstrap(angles, {{1}, {0}}, options)[0].standard_error,
+            bootstrap(angles, {{1}, {0}}, options)[0].standard_error);
   EXPECT_TRUE(bootstrap({}, {}, options).empty());
-  EXPECT_TRUE(bootstrap(runs, {{1}, {0}}, {0, 1}).empty());
+  EXPECT_TRUE(bootstrap(angles, {{1}, {0}}, {0, 1}).empty());
 }
 
 TEST(Bootstrap, AgreesWithTheBudgetUpToItsNarrowness) {

@@ -17,9 +17,9 @@ std::vector<SpeedDependence> all_of(const Steps& steps) {
   std::map<double, Steps> by_angle;
   for (const auto& step : steps)
     if (step.step >= 7) by_angle[step.occlusion_deg].push_back(step);
-  std::vector<StepsOfAngle> angles;
-  for (const auto& [phi, of_angle] : by_angle) angles.push_back({phi, of_angle});
-  return speed_dependence(angles);
+  std::vector<OcclusionCoefficient> table;
+  for (const auto& [phi, of_angle] : by_angle) table.push_back({.phi_deg = phi, .measured = of_angle});
+  return speed_dependence(table);
 }
 
 Steps risen(Steps steps, double rise) {

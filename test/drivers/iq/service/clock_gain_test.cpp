@@ -29,7 +29,7 @@ struct Line {
 ClockGain measured(FakeDialogue& module, std::uint64_t seed, double seconds = 60) {
   Line line{std::mt19937_64(seed)};
   module.way = [&line] { return line(); };
-  return measure_clock_gain(module, {seconds, std::chrono::milliseconds(20)});
+  return measure_clock_gain(module.ask(), module.pause(), {seconds, std::chrono::milliseconds(20)});
 }
 
 TEST(ClockGain, TheIntervalHoldsTheTruthWhateverTheDelays) {
@@ -87,7 +87,7 @@ TEST(ClockGain, LateStampsDoNotMoveIt) {
     const bool back = count++ % 2 == 1;
     return std::chrono::microseconds(back && random() % 10 != 0 ? 5000 + random() % 50000 : 200);
   };
-  const ClockGain gain = measure_clock_gain(late, {60, std::chrono::milliseconds(20)});
+  const ClockGain gain = measure_clock_gain(late.ask(), late.pause(), {60, std::chrono::milliseconds(20)});
   EXPECT_NEAR(gain.factor, 0.9962, 10e-6);
   EXPECT_NEAR(gain.factor, good.factor, 20e-6);
 }
@@ -144,10 +144,10 @@ TEST(ClockGain, IsNotBelievedWhenNoOscillatorHasIt) {
 TEST(ClockGain, IsOnlyMeasuredWhileTheMotorStands) {
   FakeDialogue turning;
   turning.values[&entry<"brushless_drive.obs_velocity">] = -20;
-  EXPECT_THROW((void)measure_clock_gain(turning), DeviceError);
+  EXPECT_THROW((void)measure_clock_gain(turning.ask(), turning.pause()), DeviceError);
   FakeDialogue driven;
   driven.values[&entry<"brushless_drive.drive_mode">] = 3;
-  EXPECT_THROW((void)measure_clock_gain(driven), DeviceError);
+  EXPECT_THROW((void)measure_clock_gain(driven.ask(), driven.pause()), DeviceError);
   EXPECT_EQ(driven.offset_s, 1000) << "the module's time is untouched";
 }
 
@@ -158,13 +158,13 @@ TEST(ClockGain, NoticesARestart) {
     if (++questions == 100) module.offset_s -= 5;
     return Duration(std::chrono::microseconds(300));
   };
-  EXPECT_THAT(refusal([&] { return measure_clock_gain(module); }), HasSubstr("restarted"));
+  EXPECT_THAT(refusal([&] { return measure_clock_gain(module.ask(), module.pause()); }), HasSubstr("restarted"));
 }
 
 TEST(ClockGain, GivesUpOnAModuleThatFallsSilent) {
   FakeDialogue module;
   module.values.erase(&entry<"brushless_drive.obs_velocity">);
-  EXPECT_THROW((void)measure_clock_gain(module), DeviceError);
+  EXPECT_THROW((void)measure_clock_gain(module.ask(), module.pause()), DeviceError);
 }
 
 TEST(ClockGain, NeedsReadingsAtTwoTimes) {

@@ -4,14 +4,17 @@
 #include <gtest/gtest.h>
 
 #include "base/error.hpp"
+#include "test/drivers/iq/fake_dialogue.hpp"
 #include "test/drivers/iq/module_on_a_line.hpp"
 
 namespace kphi::iq {
 namespace {
 
+using fake::FakeDialogue;
 using fake::Module;
 using fake::ModuleOnALine;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
 const SteadyClock kClock;
 
@@ -24,11 +27,6 @@ void give_id(Module& module, int id) {
 bool only_coasted(ModuleOnALine& line) {
   return line.with(
       [](Module& m) { return m.count([](const auto& h) { return h.access != 0 && !h.is_coast(); }) == 0; });
-}
-
-TEST(Search, TriesTheRatesInTheirOrder) {
-  EXPECT_EQ(bauds_to_try(),
-            (std::vector<unsigned>{115200, 921600, 1000000, 2000000, 460800, 230400, 57600, 38400, 19200, 9600}));
 }
 
 TEST(Search, FindsAModuleAtAnyRateAndLeavesItCoasting) {
@@ -103,6 +101,77 @@ TEST(Probe, SearchesOnlyWhenAskedAndOnlyForASilentModule) {
   EXPECT_EQ(findings_of({stubborn.device(), 115200, 0}).size(), 1u) << "it answers, and does not coast";
   EXPECT_TRUE(stubborn.left_coasting());
   EXPECT_EQ(findings_of({"/dev/no_such_tty", 115200, 0}).size(), 1u);
+}
+
+TEST(Probe, CoastsBeforeItAsksAnythingElseAndLeavesTheMotorCoasting) {
+  ModuleOnALine line;
+  line.with([](Module& m) { m.values[{50, 0}] = fake::u8(3); });  // left spinning by a program that died
+  EXPECT_TRUE(probe({line.device(), 115200, 0}, kClock).answers());
+  line.with([](Module& m) {
+    ASSERT_GE(m.heard.size(), 2u);
+    EXPECT_TRUE(m.heard[0].is_coast());
+    EXPECT_EQ(m.values[(fake::Key{50, 0})], fake::u8(5));
+  });
+  EXPECT_TRUE(line.left_coasting());
+}
+
+TEST(Probe, ReadsAWholeAudit) {
+  ModuleOnALine line;
+  line.with([](Module& m) {
+    for (const Entry& entry : kEntries) {
+      if (entry.audited)
+        m.values.insert({{static_cast<int>(entry.type), entry.sub}, fake::Bytes(size_of(entry.format))});
+    }
+  });
+  const Probe found = probe({line.device(), 115200, 0}, kClock);
+  ASSERT_TRUE(found.answers());
+  EXPECT_EQ(found.counters.timeouts, 0u);
+  EXPECT_EQ(found.record->uid(), "111111112222222233333333");
+  EXPECT_EQ(found.record->firmware()->text(), "speed 0.0.32");
+  EXPECT_EQ(found.record->coil_temperature_client(), 83);
+}
+
+TEST(Probe, SaysWhyNobodyAnswers) {
+  ProbeSettings no_search;
+  no_search.search = false;
+  ModuleOnALine mute, stubborn;
+  mute.with([](Module& m) { m.mute = true; });
+  EXPECT_THAT(findings_of({mute.device(), 115200, 0}, no_search).at(0), HasSubstr("nothing was received"));
+  stubborn.with([](Module& m) {
+    m.values[{50, 0}] = fake::u8(3);
+    m.silent.insert({52, 2});
+    m.ignore_sets = true;
+  });
+  EXPECT_THAT(findings_of({stubborn.device(), 115200, 0}, no_search).at(0),
+              HasSubstr("coast not confirmed: the drive mode last read 3"));
+  EXPECT_TRUE(stubborn.left_coasting()) << "the last thing it heard is a coast";
+}
+
+constexpr const Entry& kTimeout = entry<"propeller_motor_control.timeout">;
+
+TEST(SettingReadBack, FindsNothingWhenAllArrived) {
+  FakeDialogue module;
+  module.values[&kTimeout] = 10;
+  EXPECT_THAT(set_timeout(module.ask()), IsEmpty());
+  EXPECT_EQ(module.values[&kTimeout], 0.5);
+}
+
+TEST(SettingReadBack, FindsWhatDidNotArrive) {
+  FakeDialogue module;
+  module.values[&kTimeout] = 10;
+  module.ignores_sets = true;
+  const auto findings = set_timeout(module.ask());
+  ASSERT_EQ(findings.size(), 1u);
+  EXPECT_EQ(findings[0].severity, Severity::fault);
+  EXPECT_THAT(findings[0].what, HasSubstr("timeout was set to 0.5 s and reads back 10"));
+}
+
+TEST(SettingReadBack, AcceptsOldFirmwareWhereTheEntryIsNotRequired) {
+  FakeDialogue module;
+  module.values.erase(&entry<"propeller_motor_control.timeout_behavior">);
+  EXPECT_THAT(set_timeout(module.ask()), IsEmpty());
+  module.values.erase(&kTimeout);
+  EXPECT_EQ(set_timeout(module.ask()).size(), 1u);
 }
 
 }  // namespace

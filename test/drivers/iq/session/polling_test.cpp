@@ -141,27 +141,6 @@ TEST(Telemetry, KeepsABoundedNumberOfReadings) {
   EXPECT_GT(wire.session.counters().dropped_readings, 0u);
 }
 
-TEST(Telemetry, CarriesItsThreeStamps) {
-  Settings settings;
-  settings.wire_byte_time = 100us;
-  Wire wire(settings);
-  wire.latency = 5ms;
-  wire.connect();
-  wire.run_for(1s);
-  wire.readings();
-  wire.batches.clear();
-  while (wire.batches.empty()) wire.run_for(1ms);
-  wire.run_for(6ms);
-  bool seen = false;
-  for (const Reading& reading : wire.readings()) {
-    if (reading.quantity != Quantity::speed || reading.stamps.sent != wire.batches[0].first) continue;
-    seen = true;
-    EXPECT_EQ(reading.stamps.parsed, wire.batches[0].first + 5ms);
-    EXPECT_EQ(reading.stamps.first_byte, reading.stamps.parsed - 10 * 100us) << "11 bytes, the last one just now";
-  }
-  EXPECT_TRUE(seen);
-}
-
 TEST(Telemetry, AsksForAllThatIsWantedInEveryCycle) {
   Settings settings;
   settings.telemetry_hz = 100;

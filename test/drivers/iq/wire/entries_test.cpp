@@ -18,17 +18,9 @@ namespace {
 
 using fake::Bytes;
 
-static_assert(Readable<"brushless_drive.obs_velocity">);
-static_assert(!Writable<"brushless_drive.obs_velocity">, "what can only be read must not compile as a set");
-static_assert(!Writable<"power_monitor.amps">);
-static_assert(Writable<"propeller_motor_control.ctrl_coast">);
-static_assert(!Readable<"propeller_motor_control.ctrl_coast">);
-static_assert(!Readable<"propeller_motor_control.ctrl_torque">, "its access is not published");
 static_assert(!Known<"brushless_drive.obs_supply_amps">, "there is no such entry");
 static_assert(entry<"power_safety.fault_now">.format == Format::u8, "one byte; the vendor's C++ says float");
 static_assert(entry<"propeller_motor_control.ctrl_mode">.format == Format::i8);
-static_assert(entry<"hobby_input.calibrated_high_ticks_us">.format == Format::u32);
-static_assert(entry<"system_control.bootloader_version">.sub == 21);
 
 struct Vector {
   std::string op, type, sub, id, name, format, value;
@@ -68,7 +60,6 @@ Access access_of(const std::string& op) {
 }
 
 Format format_of(const std::string& text) {
-  if (text == "16B") return Format::bytes16;
   switch (text.at(0)) {
     case 'f':
       return Format::f32;
@@ -109,15 +100,13 @@ TEST(GoldenFrames, AreSeventyTwo) { EXPECT_EQ(golden().size(), 72u); }
 
 TEST(GoldenFrames, EncodeByteForByte) {
   for (const Vector& vector : golden()) {
-    if (vector.op == "raw") {
+    const Entry* found = find(vector.name);
+    if (found == nullptr) {  // no payload of an entry that kphi uses
       const Packet packet = decoded(vector.frame);
       EXPECT_EQ(encoded(packet), vector.frame);
       continue;
     }
-    const Entry* found = find(vector.name);
-    ASSERT_NE(found, nullptr) << vector.name;
     EXPECT_TRUE(found->allows(access_of(vector.op))) << vector.name << ' ' << vector.op;
-    if (found->format == Format::bytes16 && vector.op == "reply") continue;
     const double value = vector.value == "-" ? 0 : std::stod(vector.value);
     EXPECT_EQ(fake::hex(encoded(make(*found, access_of(vector.op), std::stoi(vector.id), value))),
               fake::hex(vector.frame))
@@ -134,11 +123,12 @@ TEST(GoldenFrames, DecodeToTheirFields) {
     EXPECT_EQ(packet.sub(), std::stoi(vector.sub));
     EXPECT_EQ(packet.module_id(), std::stoi(vector.id));
     EXPECT_EQ(packet.access(), access_of(vector.op));
-    const Entry* found = find(packet.type, packet.sub());
-    ASSERT_NE(found, nullptr);
-    EXPECT_EQ(found, find(vector.name));
+    const Entry* found = find(vector.name);
+    if (found == nullptr) continue;
+    EXPECT_EQ(static_cast<int>(found->type), packet.type);
+    EXPECT_EQ(found->sub, packet.sub());
     EXPECT_EQ(found->format, format_of(vector.format)) << vector.name;
-    if (vector.value == "-" || found->format == Format::bytes16) continue;
+    if (vector.value == "-") continue;
     ASSERT_EQ(packet.data().size(), size_of(found->format));
     const double value = number(found->format, packet.data());
     if (vector.value.substr(0, 3) == "nan") {
@@ -154,20 +144,19 @@ TEST(GoldenFrames, DecodeToTheirFields) {
 TEST(GoldenFrames, FurtherOnesFollowTheSameRules) {
   const auto hex = [](const Packet& packet) { return fake::hex(encoded(packet)); };
   constexpr int kAll = 63;
-  EXPECT_EQ(hex(set<"propeller_motor_control.ctrl_coast">(kAll)), "55 02 34 02 FD 1D 28");
-  EXPECT_EQ(hex(get<"system_control.module_id">(kAll)), "55 02 05 0E FC C4 8F");
+  EXPECT_EQ(hex(make(entry<"propeller_motor_control.ctrl_coast">, Access::set, kAll)), "55 02 34 02 FD 1D 28");
+  EXPECT_EQ(hex(make(entry<"system_control.module_id">, Access::get, kAll)), "55 02 05 0E FC C4 8F");
   EXPECT_EQ(hex(make(entry<"system_control.firmware_version">, Access::reply, 0, 0x00100020)),
             "55 06 05 10 03 20 00 10 00 39 08");
   EXPECT_EQ(hex(make(entry<"system_control.hardware_version">, Access::reply, 0, 0x00010100)),
             "55 06 05 11 03 00 01 01 00 A5 7D");
   EXPECT_EQ(hex(make(entry<"system_control.electronics_version">, Access::reply, 0, 0x00030000)),
             "55 06 05 12 03 00 00 03 00 17 E2");
-  EXPECT_EQ(hex(get<"coil_temperature_estimator.derate">(0)), "55 02 53 0A 00 FD 81");
-  EXPECT_EQ(hex(get<"power_safety.fault_ever">(0)), "55 02 54 01 00 97 D8");
-  EXPECT_EQ(hex(set<"power_safety.fault_ever">(0, 0)), "55 03 54 01 01 00 15 44");
-  EXPECT_EQ(hex(set<"propeller_motor_control.timeout_behavior">(0, 0)), "55 03 34 12 01 00 F4 07");
-  EXPECT_EQ(hex(set<"propeller_motor_control.timeout_song_option">(0, 0)), "55 03 34 13 01 00 C4 30");
-  EXPECT_EQ(hex(set<"persistent_memory.format_key_2">(0, 11223344)), "55 06 0B 03 01 30 41 AB 00 9B 59");
+  EXPECT_EQ(hex(make(entry<"coil_temperature_estimator.derate">, Access::get, 0)), "55 02 53 0A 00 FD 81");
+  EXPECT_EQ(hex(make(entry<"power_safety.fault_ever">, Access::get, 0)), "55 02 54 01 00 97 D8");
+  EXPECT_EQ(hex(make(entry<"power_safety.fault_ever">, Access::set, 0)), "55 03 54 01 01 00 15 44");
+  EXPECT_EQ(hex(make(entry<"propeller_motor_control.timeout_behavior">, Access::set, 0)), "55 03 34 12 01 00 F4 07");
+  EXPECT_EQ(hex(make(entry<"propeller_motor_control.timeout_song_option">, Access::set, 0)), "55 03 34 13 01 00 C4 30");
   EXPECT_EQ(fake::hex(encoded(decoded(bytes_of("55 05 58 00 FD 00 00 00 74 53")))), "55 05 58 00 FD 00 00 00 74 53");
   EXPECT_EQ(decoded(bytes_of("55 0B 58 00 FD 00 00 90 65 00 80 FF FF 05 5F 6F")).module_id(), kAll);
 }
@@ -182,9 +171,8 @@ TEST(EntryTable, NamesEveryEntryOnce) {
     const std::string_view client = row.path.substr(0, row.path.find('.'));
     EXPECT_EQ(clients.emplace(row.type, client).first->second, client) << row.path;
     EXPECT_EQ(find(row.path), &row);
-    EXPECT_EQ(find(static_cast<std::uint8_t>(row.type), row.sub), &row);
   }
-  EXPECT_EQ(std::size(kEntries), 105u);
+  EXPECT_EQ(std::size(kEntries), 80u);
 }
 
 TEST(EntryTable, CommandsWithoutDataCanOnlyBeSet) {
@@ -202,7 +190,7 @@ TEST(Numbers, SurviveTheirFormatWithTheirBits) {
     EXPECT_EQ(std::bit_cast<std::uint32_t>(static_cast<float>(number(Format::f32, packet.data()))), bits);
   }
   for (const double value : {0.0, 1.0, 255.0, 921600.0, 4294967295.0}) {
-    EXPECT_EQ(number(Format::u32, make(entry<"serial_interface.baud_rate">, Access::set, 0, value).data()), value);
+    EXPECT_EQ(number(Format::u32, make(entry<"power_monitor.filter_fc">, Access::set, 0, value).data()), value);
   }
 }
 

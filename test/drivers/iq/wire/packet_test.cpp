@@ -206,7 +206,7 @@ TEST(Parser, AccountsForEveryByte) {
   std::size_t in_packets = 0;
   for (const Bytes& frame : reception.frames) in_packets += frame.size();
   const Parser::Counters& counters = reception.parser.counters();
-  EXPECT_EQ(counters.bytes, stream.size());
+  EXPECT_EQ(counters.bytes_in, stream.size());
   EXPECT_EQ(counters.packets, reception.frames.size());
   EXPECT_EQ(counters.discarded_bytes, stream.size() - in_packets);
 }

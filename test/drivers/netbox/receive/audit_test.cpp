@@ -40,7 +40,6 @@ TEST(Audit, FindsNothingInAGoodBox) {
   intention.speeds_rpm = paper_speeds();
   intention.blades = 3;
   intention.largest_thrust_n = 10;
-  intention.largest_torque_nm = 0.2;
   intention.rate_hz = 7000;
   intention.records_per_datagram = 40;
   EXPECT_THAT(audit(good_box(), intention), IsEmpty());
@@ -101,8 +100,6 @@ INSTANTIATE_TEST_SUITE_P(
              Severity::warning, "55 N expected on Fz, its range is 60 N", "larger range"},
         Case{"SaturatingRange", [](Configuration&, Intention& intention) { intention.largest_thrust_n = 61; },
              Severity::fault, "61 N expected", "larger range"},
-        Case{"SaturatingTorque", [](Configuration&, Intention& intention) { intention.largest_torque_nm = 1; },
-             Severity::fault, "1 Nm expected on Tz", "larger range"},
         Case{"SlowDatagrams",
              [](Configuration& box, Intention&) {
                set_divisor(box, 1400);

@@ -31,7 +31,6 @@ const std::string kForgottenPeaks = page("runpkmx", "0;0;0;0;0;0");
 
 class ConnectionTest : public testing::Test {
  protected:
-  explicit ConnectionTest(const StreamPolicy& policy = {}) : connection(parse_configuration(page()), policy) {}
   /// Commands to the box's RDT port.
   std::vector<int> requested() {
     std::vector<int> commands;
@@ -44,10 +43,7 @@ class ConnectionTest : public testing::Test {
     for (const Event& event : connection.take_events()) kinds.push_back(event.kind);
     return kinds;
   }
-  std::size_t taken() {
-    (void)connection.publish();
-    return connection.take(out);
-  }
+  std::size_t taken() { return connection.take(out); }
   void advance_to_deadline() {
     ASSERT_NE(connection.deadline(), kNever);
     connection.advance(now = connection.deadline());
@@ -88,7 +84,7 @@ class ConnectionTest : public testing::Test {
   }
 
   Instant now = 1s;
-  Connection connection;
+  Connection connection{parse_configuration(page())};
   std::vector<StampedRecord> out = std::vector<StampedRecord>(4096);
 };
 
@@ -157,19 +153,6 @@ TEST_F(ConnectionTest, ABoxThatHasBootedStreamsAgainAtOnceAndAfterTheNextSilence
   fall_silent();
   answer(answer_of(kForgottenPeaks));
   EXPECT_THAT(requested(), IsEmpty());
-}
-
-class ConnectionThatOnlyAsks : public ConnectionTest {
- protected:
-  ConnectionThatOnlyAsks() : ConnectionTest({.reconnect = false}) {}
-};
-
-TEST_F(ConnectionThatOnlyAsks, ABoxThatIsAway) {
-  stream();
-  fall_silent();
-  answer(no_answer());
-  EXPECT_THAT(events(), ElementsAre(EventKind::silent, EventKind::unreachable));
-  EXPECT_EQ(connection.deadline(), kNever);
 }
 
 TEST_F(ConnectionTest, AnAnswerThatComesAfterTheStreamIsNoNews) {
@@ -259,7 +242,6 @@ TEST_F(ConnectionTest, AStopDeliversTheRecordsHeldBack) {
 TEST_F(ConnectionTest, CountsTheRecordsThatNobodyTook) {
   stream();
   for (std::uint32_t rdt = 41; rdt < 200'000; rdt += 40) receive(rdt);
-  (void)connection.publish();
   const Counters counters = connection.counters();
   EXPECT_GT(counters.queue_overflows, 0u);
   std::uint64_t all = 40;
@@ -271,7 +253,7 @@ TEST_F(ConnectionTest, CountsTheRecordsThatNobodyTook) {
 
 /// Datagrams that arrive while the receive thread sleeps.
 double gathered(const char* records_per_datagram, double speed = 1) {
-  const Connection connection(parse_configuration(page("comrdtbsiz", records_per_datagram)), {}, speed);
+  const Connection connection(parse_configuration(page("comrdtbsiz", records_per_datagram)), speed);
   const Duration period = connection.settings().datagram_period();
   return std::floor(to_seconds(connection.gathering_time(Instant{0})) / to_seconds(period));
 }

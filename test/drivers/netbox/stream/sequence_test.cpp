@@ -146,7 +146,7 @@ TEST(Sequence, NamesRestartRebootAndStallWithTheirNumbers) {
             ": the box measures again after 29 repeated records"}}) {
     Stream stream;
     stream.feed(c.feed);
-    const std::vector<Event> events = stream.account().events().take();
+    const std::vector<Event> events = stream.account().events();
     ASSERT_EQ(events.size(), c.kinds.size()) << c.feed;
     for (std::size_t i = 0; i < events.size(); ++i) EXPECT_EQ(events[i].kind, c.kinds[i]) << c.feed;
     EXPECT_TRUE(to_string(events.back()).ends_with(c.words)) << to_string(events.back());
@@ -160,14 +160,6 @@ TEST(Sequence, TheFirstRecordOfARebootIsATrueMeasurementToo) {
     stream.feed(feed);
     EXPECT_EQ(stream.confirmed_ft, other_ft);
   }
-}
-
-TEST(Sequence, KeepsTheOldestEventsAndCountsTheOthers) {
-  Stream stream;
-  for (std::uint32_t i = 0; i < 100; ++i) stream.accept(1, 100 + i);
-  EXPECT_EQ(stream.counters().restarts, 99u);
-  EXPECT_EQ(stream.account().events().dropped(), 99 - EventLog::kCapacity);
-  EXPECT_EQ(stream.account().events().take().size(), EventLog::kCapacity);
 }
 
 // The channel loses, repeats, swaps, and the stream begins anew; the truth is known here by construction.

@@ -105,55 +105,6 @@ TEST_F(SessionTest, StreamsAcrossBothWraps) {
   EXPECT_EQ(session.counters().expected, 401u);
 }
 
-TEST_F(SessionTest, TheShortWayCountsAsTheLongOne) {
-  start_streaming();
-  std::vector<StampedRecord> room(40);
-  for (std::uint32_t i = 1; i <= 50; ++i) {
-    const Bytes datagram = records(1 + 40 * i, 1000 + 40 * i, 40);
-    ASSERT_EQ(session.receive_in_order(datagram, now += 5ms, room), 40u);
-    for (std::uint32_t j = 0; j < 40; ++j) {
-      EXPECT_EQ(room[j].record.rdt_sequence, 1 + 40 * i + j);
-      EXPECT_EQ(room[j].arrival, now);
-    }
-  }
-  EXPECT_EQ(session.counters().datagrams, 51u);
-  EXPECT_EQ(session.counters().received, 2040u);
-  EXPECT_EQ(session.counters().expected, 2040u);
-  EXPECT_GT(session.deadline(), now + 500ms);
-}
-
-TEST_F(SessionTest, TheShortWayTakesNothingOutOfOrder) {
-  std::vector<StampedRecord> room(40);
-  EXPECT_EQ(session.receive_in_order(records(1, 1000, 40), now, room), 0u) << "it does not stream";
-  start_streaming();
-  Bytes broken = records(41, 1040, 40);
-  broken[36 * 20 + 3] ^= 1;  // rdt of one in the middle
-  Bytes jumping = records(41, 1040, 40);
-  jumping[36 * 20 + 7] ^= 1;  // ft
-  for (const Bytes& datagram : {records(42, 1041, 40), records(41, 1041, 40), records(1, 1000, 40), broken, jumping,
-                                Bytes(35, 0), Bytes(1476, 0), Bytes{}})
-    EXPECT_EQ(session.receive_in_order(datagram, now, room), 0u);
-  EXPECT_EQ(session.receive_in_order(records(41, 1040, 40), now, std::span(room).first(39)), 0u) << "no room";
-  EXPECT_EQ(session.counters().datagrams, 1u);
-  receive(records(81, 1080, 40));
-  EXPECT_EQ(session.receive_in_order(records(41, 1040, 40), now, room), 0u) << "others wait for it";
-  receive(records(41, 1040, 40));
-  EXPECT_EQ(session.counters().received, 120u);
-}
-
-TEST_F(SessionTest, TheShortWayHearsOfTroubleToo) {
-  start_streaming();
-  std::vector<StampedRecord> room(2);
-  Bytes datagram;
-  test::put_record(datagram, 41, 1040);
-  test::put_record(datagram, 42, 1041, 0x80400000);
-  EXPECT_EQ(session.receive_in_order(datagram, now, room), 2u);
-  const std::vector<Event> events = session.take_events();
-  ASSERT_EQ(events.size(), 1u);
-  EXPECT_EQ(events[0].kind, EventKind::box_trouble);
-  EXPECT_EQ(events[0].ft, 1040u);
-}
-
 TEST_F(SessionTest, NeverAllocatesInTheCallersVectorOnceItIsLargeEnough) {
   start_streaming();
   out.clear();

@@ -289,6 +289,24 @@ TEST_F(SessionTest, ABiasOnABoxThatStopsIsFollowedByAStart) {
   EXPECT_EQ(session.counters().restarts, 1u);
 }
 
+TEST_F(SessionTest, ABiasThatABusyBoxTakesLateIsFollowedByAStart) {
+  start_streaming();
+  told();
+  session.set_bias(now);
+  EXPECT_THAT(told(), ElementsAre(0x42));
+  const Instant taken = now + 300ms;
+  for (std::uint32_t i = 1; now < taken; ++i) {
+    now += settings.datagram_period();
+    receive(records(1 + 40 * i, 1000 + 40 * i, 40));
+    session.advance(now);
+  }
+  EXPECT_THAT(told(), IsEmpty()) << "the stream goes on";
+  advance_to_deadline();
+  EXPECT_THAT(told(), ElementsAre(3));
+  EXPECT_EQ(session.state(), State::streaming) << "long before it would count as silent";
+  EXPECT_LT(now - taken, settings.silence_timeout / 2);
+}
+
 TEST_F(SessionTest, ABiasWithoutAStreamIsNotSent) {
   session.set_bias(now);
   EXPECT_THAT(told(), IsEmpty());

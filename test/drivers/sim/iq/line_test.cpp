@@ -27,8 +27,8 @@ class Line : public ::testing::Test {
     module.sensors.perfect = true;
   }
   void make(std::vector<FaultEntry> entries = {}) {
-    MotorFaultScript script;
-    for (const FaultEntry& entry : entries) script.push_back(motor_fault_of(entry));
+    FaultScript script;
+    for (const FaultEntry& entry : entries) script.push_back(fault_of(entry));
     device.emplace(module, state);
     line.emplace(*device, settings, script, 7, IqLine::Keep::replies);
   }
@@ -246,7 +246,7 @@ TEST_F(Line, BreaksInOneDirection) {
 TEST_F(Line, FlipsBitsOfCommands) {
   make({{{"kind", "motor_command_flip"}, {"at_s", "0"}, {"count", "1"}}});
   EXPECT_EQ(ask(kGetSpeed), "");
-  EXPECT_EQ(line->truth().done[static_cast<std::size_t>(MotorFaultKind::command_flip)], 1u);
+  EXPECT_EQ(line->truth().done.at(FaultKind::motor_command_flip), 1u);
 }
 
 TEST_F(Line, UnpluggedNothingPassesAndAnotherModuleMayCome) {

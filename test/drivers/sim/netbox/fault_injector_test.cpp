@@ -176,7 +176,7 @@ TEST(FaultInjector, OverrunsAndChangesItsRate) {
   const auto arrived = overrun.run(700);
   EXPECT_EQ(ft(arrived[50]), ft(arrived[49]) + 7 + 3);
   EXPECT_EQ(rdt(arrived[50]), rdt(arrived[49]) + 1);
-  EXPECT_EQ(overrun.wire.truth().overruns, 1u);
+  EXPECT_EQ(overrun.wire.truth().done.at(FaultKind::overrun), 1u);
   Bench rate(Entries{{{"kind", "rate"}, {"at_s", "0.05"}, {"rate_hz", "500"}}});
   EXPECT_EQ(rate.run(700).size(), 50u) << "a box whose stream stops with the write";
   EXPECT_EQ(rate.box.divisor(), 14);
@@ -244,7 +244,7 @@ TEST(FaultInjector, SplitsMergesAndShortensAnswersOverTcp) {
   EXPECT_TRUE(cut.close);
   std::string half(10, '\0');
   EXPECT_EQ(bench.wire.tcp(half, 50ms).bytes, "");
-  EXPECT_EQ(bench.wire.truth().tcp_spoilt, 3u);
+  EXPECT_EQ(bench.wire.truth().done.at(FaultKind::tcp_short), 1u);
 }
 
 TEST(FaultInjector, HoldsThenBursts) {
@@ -279,7 +279,7 @@ TEST(FaultInjector, LosesDoublesAndDelaysStarts) {
   EXPECT_EQ(rdt(arrived[5]), 1u);
   Bench delayed(Entries{{{"kind", "delayed_start"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "0.005"}}});
   EXPECT_EQ(delayed.run(70).size(), 5u + 1u);
-  EXPECT_EQ(delayed.wire.truth().starts_delayed, 1u);
+  EXPECT_EQ(delayed.wire.truth().done.at(FaultKind::delayed_start), 1u);
 }
 
 TEST(FaultInjector, AStreamTakenOverLeavesOnlySilence) {
@@ -364,7 +364,7 @@ TEST(FaultInjector, SpoilsThePages) {
   EXPECT_EQ(get(55ms).wait, 2s);
   EXPECT_TRUE(bench.wire.http_refused(75ms));
   EXPECT_FALSE(bench.wire.http_refused(85ms));
-  EXPECT_EQ(bench.wire.truth().http_spoilt, 4u);
+  EXPECT_EQ(bench.wire.truth().done.at(FaultKind::http_slow), 1u);
 }
 
 std::vector<std::uint8_t> everything(std::uint64_t seed, int step) {

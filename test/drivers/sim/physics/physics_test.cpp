@@ -195,7 +195,7 @@ TEST(Physics, InputFilterSlowsTheCommandDown) {
 TEST(Physics, ALockedRotorDrawsItsCurrentAndDoesNotTurn) {
   Stand plant({}, 2);
   plant.mount(find_propeller("5x2"), 0);
-  plant.upset({0, 0, true});
+  plant.upset({0, true});
   run(plant, at_speed(1000), 0.2);
   EXPECT_EQ(plant.motor().speed, 0);
   EXPECT_NEAR(plant.motor().motor_amps, 30, 1);
@@ -203,7 +203,7 @@ TEST(Physics, ALockedRotorDrawsItsCurrentAndDoesNotTurn) {
 
 TEST(Physics, ASagOfTheSupplyIsSeenAtTheModule) {
   Stand plant({}, 2);
-  plant.upset({-4, 0, false});
+  plant.upset({-4, false});
   run(plant, kCoast, 0.1);
   EXPECT_NEAR(plant.motor().supply_volts, 8, 0.01);
 }

@@ -24,7 +24,7 @@ class SimulatedMcp2221Test : public testing::Test {
   Bytes beginning(const Bytes& answer, std::size_t count) {
     return {answer.begin(), answer.begin() + static_cast<std::ptrdiff_t>(count)};
   }
-  void break_with(UsbFault fault) { faults.set({fault}); }
+  void break_with(Fault fault) { faults.set({fault}); }
 
   ManualClock clock;
   UsbFaults faults{clock};
@@ -100,38 +100,38 @@ TEST_F(SimulatedMcp2221Test, RefusesWhatItDoesNotKnow) {
 }
 
 TEST_F(SimulatedMcp2221Test, MisbehavesAsItIsTold) {
-  break_with({UsbFaultKind::nack, {}, {}, 1});
+  break_with({FaultKind::ambient_nack, {}, {}, 1});
   told({0x90, 1, 0, 0xEC, 0xD0});
   EXPECT_EQ(told({0x10})[8], 0x25);
   told({0x10, 0, 0x10});
 
-  break_with({UsbFaultKind::busy, {}, {}, 1});
+  break_with({FaultKind::ambient_busy, {}, {}, 1});
   EXPECT_EQ(told({0x10, 0, 0, 0x20, 0x75})[3], 0x21);
   EXPECT_EQ(told({0x10, 0, 0, 0x20, 0x75})[3], 0x20);
 
-  break_with({UsbFaultKind::stuck_bus, {}, {}, 1});
+  break_with({FaultKind::ambient_stuck_bus, {}, {}, 1});
   told({0x90, 1, 0, 0xEC, 0xD0});
   EXPECT_EQ(told({0x10})[8], 0x12);
   told({0x10, 0, 0x10});
 
-  UsbFault damage{UsbFaultKind::reads_as, {}, {}, 1};
+  Fault damage{FaultKind::ambient_reads_as, {}, {}, 1};
   damage.address = 0x89, damage.value = 0x6A;
   break_with(damage);
   told({0x94, 1, 0, 0xEC, 0x88});
   told({0x93, 2, 0, 0xEC});
   EXPECT_EQ(beginning(told({0x40}), 6), (Bytes{0x40, 0, 0x55, 2, 0x70, 0x6A})) << "T1 = 27504 = 6b70";
 
-  break_with({UsbFaultKind::no_reply, {}, {}, 1});
+  break_with({FaultKind::ambient_no_reply, {}, {}, 1});
   EXPECT_TRUE(told({0x10}).empty());
 
-  UsbFault late{UsbFaultKind::late, {}, {}, 1};
+  Fault late{FaultKind::ambient_late, {}, {}, 1};
   late.delay = 600ms;
   break_with(late);
   EXPECT_TRUE(told({0x10}).empty());
   clock.advance(600ms);
   EXPECT_EQ(bridge.in(0x83, 64).bytes[0], 0x10);
 
-  break_with({UsbFaultKind::stall, {}, {}, 1});
+  break_with({FaultKind::ambient_stall, {}, {}, 1});
   EXPECT_TRUE(told({0x10}).empty());
   bridge.halt_cleared(0x83);
   EXPECT_EQ(bridge.in(0x83, 64).bytes[0], 0x10);

@@ -3,11 +3,10 @@
 
 #include <cstdint>
 #include <iosfwd>
-#include <stdexcept>
 
 #include "compensation/compensator.hpp"
 
-namespace kphi::compensation {
+namespace kphi::commands {
 
 enum class RowFormat { csv, json_lines };
 
@@ -23,18 +22,13 @@ struct ArmRange {
   Radians to;
 };
 
-/// The input has no header that names all eight columns.
-class RowHeaderError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
 /// Reads CSV with a header naming theta1_deg..theta4_deg and thrust1_n..thrust4_n, in any order; other columns are
 /// ignored. Writes phi1_deg.., k1.., speed1_rpm.., flags as CSV, or one JSON object per line, numbers in shortest round
 /// trip. A flag reads "rotor:what", several are separated by a blank. A row that cannot be used is left out, counted,
 /// and told on `words` with its line number. A row with an arm angle out of `reach` is computed and counted. Output is
-/// handed on whenever no further input waits, so that it can stand in a pipe. Throws RowHeaderError.
+/// handed on whenever no further input waits, so that it can stand in a pipe. Throws ConfigurationError for
+/// a header that does not name all eight columns.
 [[nodiscard]] RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& words,
-                                        Compensator& compensator, ArmRange reach, RowFormat format);
+                                        compensation::Compensator& compensator, ArmRange reach, RowFormat format);
 
-}  // namespace kphi::compensation
+}  // namespace kphi::commands

@@ -1,4 +1,4 @@
-#include "compensation/compensate_rows.hpp"
+#include "commands/compensate_rows.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,10 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "base/error.hpp"
 #include "test/compensation/example_vehicle.hpp"
 
-namespace kphi::compensation {
+namespace kphi::commands {
 namespace {
+
+using namespace compensation;
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -100,7 +103,7 @@ TEST(CompensateRows, LeavesOutBadRowsAndNamesThemByLine) {
 TEST(CompensateRows, RefusesAHeaderWithoutAllColumns) {
   for (const std::string& bad :
        {std::string(), std::string("1,2,3,4,5,6,7,8\n"), kHeader.substr(11), "theta1_deg," + kHeader}) {
-    EXPECT_THROW(compensated(bad), RowHeaderError) << bad;
+    EXPECT_THROW(compensated(bad), ConfigurationError) << bad;
   }
 }
 
@@ -108,7 +111,7 @@ TEST(CompensateRows, SaysWhatIsWrongWithTheHeader) {
   const auto complaint = [](const std::string& header) -> std::string {
     try {
       (void)compensated(header + "\n1,2,3,4,5,6,7,8\n");
-    } catch (const RowHeaderError& error) {
+    } catch (const ConfigurationError& error) {
       return error.what();
     }
     return "";
@@ -162,4 +165,4 @@ TEST(CompensateRows, HandsARowOnBeforeWaitingForTheNext) {
 }
 
 }  // namespace
-}  // namespace kphi::compensation
+}  // namespace kphi::commands

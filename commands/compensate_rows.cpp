@@ -1,16 +1,23 @@
-#include "compensation/compensate_rows.hpp"
+#include "commands/compensate_rows.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <array>
-#include <charconv>
-#include <cmath>
 #include <istream>
 #include <ostream>
 #include <string>
 #include <string_view>
 #include <vector>
 
-namespace kphi::compensation {
+#include "base/csv.hpp"
+#include "base/error.hpp"
+#include "base/number.hpp"
+
+namespace kphi::commands {
 namespace {
+
+using namespace compensation;
 
 constexpr std::size_t kFlushAt = 1 << 16;
 constexpr std::size_t kColumns = 8;
@@ -32,83 +39,55 @@ constexpr FlagName kFlagNames[] = {{Flag::thrust_nan, "thrust_nan"},
                                    {Flag::at_floor, "at_floor"},
                                    {Flag::at_ceiling, "at_ceiling"}};
 
-std::string_view trimmed(std::string_view text) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
-  return text;
+using Fields = std::vector<std::string>;
+
+/// Empty if the quotes of the line do not close.
+Fields fields_of(std::string_view line) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (line.starts_with(kByteOrderMark)) line.remove_prefix(kByteOrderMark.size());
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  return split_csv_line(line).value_or(Fields());
 }
 
-void split(std::string_view line, std::vector<std::string_view>& fields) {
-  fields.clear();
-  for (;;) {
-    const std::size_t comma = line.find(',');
-    fields.push_back(trimmed(line.substr(0, comma)));
-    if (comma == std::string_view::npos) return;
-    line.remove_prefix(comma + 1);
-  }
-}
-
-struct Columns {
-  std::array<std::size_t, kColumns> place{};
-  std::size_t count = 0;
-};
+bool is_blank(const Fields& fields) { return fields == Fields{""}; }
 
 constexpr const char* kNextMove =
     "; the first line must name theta1_deg..theta4_deg and thrust1_n..thrust4_n once each, separated by commas";
 
 /// What is wrong with a column that stands there `found` times; `names` may hold it in another unit.
-std::string complaint_about(std::string_view wanted, std::size_t found, const std::vector<std::string_view>& names) {
-  const std::string column = "stdin:1: column `" + std::string(wanted) + "` ";
-  if (found > 1) return column + "stands " + std::to_string(found) + " times" + kNextMove;
+std::string complaint_about(std::string_view wanted, std::ptrdiff_t found, const Fields& names) {
+  if (found > 1) return fmt::format("column `{}` stands {} times{}", wanted, found, kNextMove);
   const std::string_view stem = wanted.substr(0, wanted.find('_') + 1);
-  for (const std::string_view name : names) {
-    if (name.substr(0, stem.size()) != stem) continue;
-    return column + "is missing, but there is `" + std::string(name) +
-           "`; the unit is part of the name, degrees and N are read";
-  }
-  return column + "is missing" + kNextMove;
+  const auto like = std::ranges::find_if(names, [&](const std::string& name) { return name.starts_with(stem); });
+  if (like == names.end()) return fmt::format("column `{}` is missing{}", wanted, kNextMove);
+  return fmt::format("column `{}` is missing, but there is `{}`; the unit is part of the name, degrees and N are read",
+                     wanted, *like);
 }
 
-Columns read_header(std::string_view line) {
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-  if (line.substr(0, kByteOrderMark.size()) == kByteOrderMark) line.remove_prefix(kByteOrderMark.size());
-  if (trimmed(line).empty()) throw RowHeaderError(std::string("stdin:1: no header") + kNextMove);
-  std::vector<std::string_view> names;
-  split(line, names);
-  Columns columns;
-  columns.count = names.size();
-  for (std::size_t wanted = 0; wanted < kColumns; ++wanted) {
-    std::size_t found = 0;
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      if (names[i] != kColumnNames[wanted]) continue;
-      columns.place[wanted] = i;
-      ++found;
-    }
-    if (found != 1) throw RowHeaderError(complaint_about(kColumnNames[wanted], found, names));
+/// The places of the columns.
+std::array<std::size_t, kColumns> read_header(const Fields& names) {
+  const auto refuse = [](const std::string& what) { throw ConfigurationError("stdin:1: " + what); };
+  if (is_blank(names)) refuse(fmt::format("no header{}", kNextMove));
+  std::array<std::size_t, kColumns> places{};
+  for (std::size_t i = 0; i < kColumns; ++i) {
+    const auto found = std::ranges::count(names, kColumnNames[i]);
+    if (found != 1) refuse(complaint_about(kColumnNames[i], found, names));
+    places[i] = static_cast<std::size_t>(std::ranges::find(names, kColumnNames[i]) - names.begin());
   }
-  return columns;
+  return places;
 }
 
 /// Empty when the row can be used, else why not.
-std::string read_row(const std::vector<std::string_view>& fields, const Columns& columns,
+std::string read_row(const Fields& fields, std::size_t expected, const std::array<std::size_t, kColumns>& places,
                      std::array<double, kColumns>& values) {
-  if (fields.size() != columns.count) {
-    return "has " + std::to_string(fields.size()) + " fields where the header has " + std::to_string(columns.count);
-  }
+  if (fields.empty()) return "has a quote that is not closed";
+  if (fields.size() != expected) return fmt::format("has {} fields where the header has {}", fields.size(), expected);
   for (std::size_t i = 0; i < kColumns; ++i) {
-    const std::string_view text = fields[columns.place[i]];
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), values[i]);
-    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(values[i])) {
-      return std::string(kColumnNames[i]) + " is `" + std::string(text) + "`, not a finite number";
-    }
+    const auto value = parse_finite(fields[places[i]]);
+    if (!value) return fmt::format("{} is `{}`, not a finite number", kColumnNames[i], fields[places[i]]);
+    values[i] = *value;
   }
   return {};
-}
-
-void append(std::string& text, double value) {
-  char digits[32];
-  text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
 }
 
 struct RowStyle {
@@ -125,7 +104,7 @@ void append_row(std::string& text, const RowStyle& style, const Compensator& com
     text += style.before[group];
     for (std::size_t i = 0; i < 4; ++i) {
       if (i != 0) text += ',';
-      append(text, value_of(i));
+      text += shortest(value_of(i));
     }
   };
   four(0, [&](std::size_t i) { return to_degrees(compensator.occlusion_angles()[i]); });
@@ -152,22 +131,22 @@ void hand_on(std::string& buffer, std::ostream& out) {
 
 }  // namespace
 
-RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& words, Compensator& compensator,
-                          ArmRange reach, RowFormat format) {
+RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& words,
+                          compensation::Compensator& compensator, ArmRange reach, RowFormat format) {
   std::string line;
   std::getline(in, line);
-  const Columns columns = read_header(line);
+  const Fields header = fields_of(line);
+  const auto places = read_header(header);
 
   RowCounts counts;
   std::string buffer(format == RowFormat::csv ? kCsvHeader : std::string_view());
-  std::vector<std::string_view> fields;
   std::array<double, kColumns> values{};
   std::array<Radians, 4> arm_angles;
   std::array<Newtons, 4> thrusts;
   for (std::uint64_t line_number = 2; out && std::getline(in, line); ++line_number) {
-    if (trimmed(line).empty()) continue;
-    split(line, fields);
-    const std::string complaint = read_row(fields, columns, values);
+    const Fields fields = fields_of(line);
+    if (is_blank(fields)) continue;
+    const std::string complaint = read_row(fields, header.size(), places, values);
     if (!complaint.empty()) {
       ++counts.rejected;
       words << "stdin:" << line_number << ": " << complaint << "; row left out\n";
@@ -177,11 +156,8 @@ RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& wor
       arm_angles[i] = from_degrees(values[i]);
       thrusts[i] = Newtons(values[i + 4]);
     }
-    for (const Radians angle : arm_angles) {
-      if (angle >= reach.from && angle <= reach.to) continue;
-      ++counts.out_of_reach;
-      break;
-    }
+    const auto beyond = [&](Radians angle) { return !(angle >= reach.from && angle <= reach.to); };
+    if (std::ranges::any_of(arm_angles, beyond)) ++counts.out_of_reach;
     compensator.set_arms(arm_angles);
     const SpeedCommand command = compensator.speeds_for(thrusts);
     ++counts.written;
@@ -192,4 +168,4 @@ RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& wor
   return counts;
 }
 
-}  // namespace kphi::compensation
+}  // namespace kphi::commands
