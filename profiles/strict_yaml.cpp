@@ -7,11 +7,9 @@
 #include <yaml-cpp/parser.h>
 
 #include <algorithm>
-#include <array>
 #include <boost/algorithm/string/case_conv.hpp>
 #include <boost/locale/utf.hpp>
 #include <cerrno>
-#include <charconv>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
@@ -20,8 +18,9 @@
 #include <regex>
 #include <sstream>
 #include <string_view>
-#include <tuple>
 #include <utility>
+
+#include "base/number.hpp"
 
 namespace kphi::profiles {
 namespace {
@@ -83,20 +82,14 @@ struct Scalar {
   std::string next_move;
 };
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
-bool only(std::string_view text, std::string_view allowed) {
-  return text.find_first_not_of(allowed) == std::string_view::npos;
-}
-
 bool is_boolean_elsewhere(const std::string& word) {
-  static constexpr std::array<std::string_view, 8> kWords{"yes", "no", "on", "off", "y", "n", "true", "false"};
-  return std::find(kWords.begin(), kWords.end(), word) != kWords.end();
+  static const std::regex kWords("yes|no|on|off|y|n|true|false");
+  return std::regex_match(word, kWords);
 }
 
-bool is_not_finite(std::string_view word) {
-  if (!word.empty() && (word[0] == '+' || word[0] == '-')) word.remove_prefix(1);
-  return word == ".inf" || word == ".nan" || word == "inf" || word == "infinity" || word == "nan";
+bool is_not_finite(const std::string& word) {
+  static const std::regex kWords("[+-]?([.]?(inf|nan)|infinity)");
+  return std::regex_match(word, kWords);
 }
 
 /// `digits` has no sign. Why other readers, or the reader of this page, may see another number in it.
@@ -111,23 +104,10 @@ std::optional<std::string> doubtful_number(const std::string& digits) {
   return std::nullopt;
 }
 
-bool looks_decimal(std::string_view digits) {
-  if (digits.empty() || !only(digits, "0123456789.eE+-")) return false;
-  return is_digit(digits[0]) || (digits[0] == '.' && digits.size() > 1 && is_digit(digits[1]));
-}
-
-/// null: not a number after all ("1.2.3").
-nlohmann::json decimal(std::string_view digits, bool negative, bool& out_of_range) {
-  const char* end = digits.data() + digits.size();
-  std::int64_t whole = 0;
-  if (const auto [stop, error] = std::from_chars(digits.data(), end, whole); error == std::errc{} && stop == end) {
-    return negative ? -whole : whole;
-  }
-  double number = 0;
-  const auto [stop, error] = std::from_chars(digits.data(), end, number);
-  if (stop != end) return nullptr;
-  out_of_range = error != std::errc{};
-  return negative ? -number : number;
+/// `digits` has no sign.
+bool is_decimal(const std::string& digits) {
+  static const std::regex kDecimal("([0-9]+[.]?[0-9]*|[.][0-9]+)([eE][+-]?[0-9]+)?");
+  return std::regex_match(digits, kDecimal);
 }
 
 /// An unquoted scalar.
@@ -138,20 +118,19 @@ Scalar read_plain_scalar(const std::string& text) {
     return {nullptr, fmt::format("{} is a boolean to some YAML readers and text to others", text),
             fmt::format("write true or false, or quote it: \"{}\"", text)};
   }
-  if (is_not_finite(word)) return {nullptr, fmt::format("{} is not a finite number", text), "write a finite number"};
+  const Scalar not_finite{nullptr, fmt::format("{} is not a finite number", text), "write a finite number"};
+  if (is_not_finite(word)) return not_finite;
 
   const bool has_sign = text[0] == '+' || text[0] == '-';
   const std::string digits = text.substr(has_sign ? 1 : 0);
   if (const auto doubt = doubtful_number(digits)) {
     return {nullptr, fmt::format("{} {}", text, *doubt), "write a plain decimal number, or quote it if it is text"};
   }
-  if (looks_decimal(digits)) {
-    bool out_of_range = false;
-    auto number = decimal(digits, text[0] == '-', out_of_range);
-    if (out_of_range) return {nullptr, fmt::format("{} is not a finite number", text), "write a finite number"};
-    if (!number.is_null()) return {std::move(number), "", ""};
-  }
-  return {text, "", ""};
+  if (!is_decimal(digits)) return {text, "", ""};
+  const int sign = text[0] == '-' ? -1 : 1;
+  if (const auto whole = parse_integer<std::int64_t>(digits)) return {sign * *whole, "", ""};
+  if (const auto number = parse_double(digits)) return {sign * *number, "", ""};
+  return not_finite;
 }
 
 /// Puts the findings in the order of the file.
@@ -167,16 +146,13 @@ std::string sort_and_describe(const std::string& path, std::vector<FileFinding>&
   return lines;
 }
 
-bool lies_in(const std::string& pointer, const std::string& root) {
-  return pointer.compare(0, root.size(), root) == 0 && (pointer.size() == root.size() || pointer[root.size()] == '/');
-}
-
+/// Marks of a value, and of all in it, also for a second place.
 void copy_marks(std::map<std::string, Mark>& marks, const std::string& from, const std::string& to) {
-  std::vector<std::pair<std::string, Mark>> copies;
-  for (auto it = marks.lower_bound(from); it != marks.end() && it->first.compare(0, from.size(), from) == 0; ++it) {
-    if (lies_in(it->first, from)) copies.emplace_back(to + it->first.substr(from.size()), it->second);
+  const std::map copies(marks.lower_bound(from), marks.lower_bound(from + "0"));  // '0' follows '/'
+  for (const auto& [pointer, mark] : copies) {
+    const std::string below = pointer.substr(from.size());
+    if (below.empty() || below[0] == '/') marks.emplace(to + below, mark);
   }
-  for (auto& [pointer, mark] : copies) marks.emplace(std::move(pointer), mark);
 }
 
 /// Builds the JSON from yaml-cpp's events. Not from its nodes: those expand aliases and drop duplicate keys.
@@ -248,7 +224,7 @@ class Builder final : public YAML::EventHandler {
     nlohmann::json value;
     std::string pointer;
     YAML::anchor_t anchor = 0;
-    std::string key;
+    std::string key{};
     bool has_key = false;
     bool is_duplicate = false;
     int values = 1;
@@ -335,11 +311,7 @@ class Builder final : public YAML::EventHandler {
     const std::string pointer = begin(mark);
     refuse_tag(mark, tag, pointer);
     if (stack_.size() >= kMaxDepth) stop(mark, fmt::format("nested deeper than {}", kMaxDepth), "make it flatter");
-    Frame frame;
-    frame.value = std::move(empty);
-    frame.pointer = pointer;
-    frame.anchor = anchor;
-    stack_.push_back(std::move(frame));
+    stack_.push_back({std::move(empty), pointer, anchor});
   }
 
   void close() {

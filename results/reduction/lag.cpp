@@ -1,7 +1,7 @@
 #include "results/reduction/lag.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <complex>
 #include <iterator>
@@ -93,32 +93,27 @@ class Smoothing {
 };
 
 /// Mean delay and smoothing, s.
-using Shape = std::array<double, 2>;
+using Shape = Eigen::Vector2d;
 
 /// Least squares of one step: the remaining squares, and their derivatives by the shape.
 struct Misfit {
   double squares = 0;
   double bins = 0;
-  Shape gradient{};                   ///< half the gradient of the squares, pointing downhill
-  std::array<double, 3> curvature{};  ///< dd, ds, ss
+  Shape gradient = Shape::Zero();  ///< half the gradient of the squares, pointing downhill
+  Eigen::Matrix2d curvature = Eigen::Matrix2d::Zero();
 };
 
+/// Of y, x, and x by delay and smoothing.
 struct Sums {
   double n = 0;
-  std::array<double, 4> sum{};       ///< y, x, xd, xs
-  std::array<double, 10> product{};  ///< upper triangle
-  void add(const std::array<double, 4>& v) {
+  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+  Eigen::Matrix4d product = Eigen::Matrix4d::Zero();
+  void add(const Eigen::Vector4d& v) {
     n += 1;
-    std::size_t k = 0;
-    for (std::size_t i = 0; i < 4; ++i) {
-      sum[i] += v[i];
-      for (std::size_t j = i; j < 4; ++j) product[k++] += v[i] * v[j];
-    }
+    sum += v;
+    product += v * v.transpose();
   }
-  [[nodiscard]] double centred(std::size_t i, std::size_t j) const {
-    const std::size_t k = i * 4 - i * (i + 1) / 2 + j;
-    return product[k] - sum[i] * sum[j] / n;
-  }
+  [[nodiscard]] Eigen::Matrix4d centred() const { return product - sum * sum.transpose() / n; }
 };
 
 std::ptrdiff_t bins_before(const Transition& transition) {
@@ -172,8 +167,9 @@ Misfit misfit_of(const Prepared& prepared, const Shape& shape) {
                  if (!std::isnan(y)) sums.add({y - (std::isnan(thrust) ? 0 : thrust), x - squared, x_delay, x_smooth});
                });
   Misfit misfit;
-  const double yy = sums.centred(0, 0), xx = sums.centred(1, 1), xy = sums.centred(0, 1);
   if (sums.n < 4) return misfit;
+  const Eigen::Matrix4d c = sums.centred();
+  const double yy = c(0, 0), xx = c(1, 1), xy = c(0, 1);
   misfit.bins = sums.n - 2;
   const double b = xx > 0 ? xy / xx : 0;
   if (!(b > 0)) {
@@ -181,17 +177,15 @@ Misfit misfit_of(const Prepared& prepared, const Shape& shape) {
     return misfit;
   }
   misfit.squares = yy - b * xy;
-  const auto projected = [&](std::size_t i, std::size_t j) {
-    return sums.centred(i, j) - sums.centred(1, i) * sums.centred(1, j) / xx;
-  };
-  for (std::size_t i = 0; i < 2; ++i) misfit.gradient[i] = b * (sums.centred(0, i + 2) - b * sums.centred(1, i + 2));
-  misfit.curvature = {b * b * projected(2, 2), b * b * projected(2, 3), b * b * projected(3, 3)};
+  const Eigen::Vector2d by_y = c.col(0).tail<2>(), by_x = c.col(1).tail<2>();
+  misfit.gradient = b * (by_y - b * by_x);
+  misfit.curvature = b * b * (c.bottomRightCorner<2, 2>() - by_x * by_x.transpose() / xx);
   return misfit;
 }
 
 struct Total {
   Misfit sum;
-  std::array<double, 3> scatter{};  ///< of the gradients
+  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();  ///< of the gradients
   double weights = 0, squared_weights = 0;
   /// Effective number of steps, weighted by their information about the delay.
   [[nodiscard]] double steps() const { return squared_weights > 0 ? weights * weights / squared_weights : 0; }
@@ -203,13 +197,11 @@ Total misfits(std::span<const Prepared> transitions, const Shape& shape) {
     const Misfit one = misfit_of(transition, shape);
     total.sum.squares += one.squares;
     total.sum.bins += one.bins;
-    for (std::size_t i = 0; i < 2; ++i) total.sum.gradient[i] += one.gradient[i];
-    for (std::size_t i = 0; i < 3; ++i) total.sum.curvature[i] += one.curvature[i];
-    total.scatter[0] += one.gradient[0] * one.gradient[0];
-    total.scatter[1] += one.gradient[0] * one.gradient[1];
-    total.scatter[2] += one.gradient[1] * one.gradient[1];
-    total.weights += one.curvature[0];
-    total.squared_weights += one.curvature[0] * one.curvature[0];
+    total.sum.gradient += one.gradient;
+    total.sum.curvature += one.curvature;
+    total.scatter += one.gradient * one.gradient.transpose();
+    total.weights += one.curvature(0, 0);
+    total.squared_weights += one.curvature(0, 0) * one.curvature(0, 0);
   }
   return total;
 }
@@ -221,14 +213,12 @@ Shape clamped(const Shape& shape) {
 
 /// Gauss-Newton step with Marquardt's damping; at the edge of no smoothing only the delay moves.
 Shape step_of(const Misfit& m, const Shape& at, double damping, bool held) {
-  const double dd = m.curvature[0] * (1 + damping), ds = m.curvature[1], ss = m.curvature[2] * (1 + damping);
+  const double dd = m.curvature(0, 0) * (1 + damping), ds = m.curvature(0, 1), ss = m.curvature(1, 1) * (1 + damping);
   const double det = dd * ss - ds * ds;
-  if (!held && det > 1e-9 * dd * ss) {
-    const Shape step{(ss * m.gradient[0] - ds * m.gradient[1]) / det, (dd * m.gradient[1] - ds * m.gradient[0]) / det};
-    if (at[1] + step[1] >= 0) return step;
-    return {(m.gradient[0] + ds * at[1]) / dd, -at[1]};
-  }
-  return {dd > 0 ? m.gradient[0] / dd : 0, 0};
+  if (held || !(det > 1e-9 * dd * ss)) return {dd > 0 ? m.gradient[0] / dd : 0.0, 0.0};
+  const Shape step{(ss * m.gradient[0] - ds * m.gradient[1]) / det, (dd * m.gradient[1] - ds * m.gradient[0]) / det};
+  if (at[1] + step[1] >= 0) return step;
+  return {(m.gradient[0] + ds * at[1]) / dd, -at[1]};
 }
 
 double best_of_grid(std::span<const Prepared> transitions) {
@@ -236,7 +226,7 @@ double best_of_grid(std::span<const Prepared> transitions) {
   double least = std::numeric_limits<double>::infinity();
   for (double delay = kEarliest + kGrid; delay < kLongest; delay += kGrid) {
     double squares = 0;
-    for (const Prepared& transition : transitions) squares += misfit_of(transition, {delay, 0}).squares;
+    for (const Prepared& transition : transitions) squares += misfit_of(transition, {delay, 0.0}).squares;
     if (squares >= least) continue;
     least = squares;
     best = delay;
@@ -272,16 +262,15 @@ double u_between_readings(std::span<const Prepared> transitions) {
 Shape uncertainties(const Total& total, bool held) {
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   const double n = total.steps();
-  const auto& h = total.sum.curvature;
-  const auto& g = total.scatter;
-  if (n < kFewEffectiveSteps || !(h[0] > 0)) return {kUnknown, kUnknown};
+  const Eigen::Matrix2d &h = total.sum.curvature, &g = total.scatter;
+  if (n < kFewEffectiveSteps || !(h(0, 0) > 0)) return {kUnknown, kUnknown};
   const double spare = n / std::max(n - (held ? 1 : 2), 0.5);
   const double noise = total.sum.squares / std::max(total.sum.bins, 1.0);
-  if (held) return {std::sqrt(spare * g[0] / (h[0] * h[0]) + noise / h[0]), kUnknown};
-  const double det = h[0] * h[2] - h[1] * h[1];
-  const double a = h[2] / det, b = -h[1] / det, c = h[0] / det;
-  return {std::sqrt(spare * (a * a * g[0] + 2 * a * b * g[1] + b * b * g[2]) + noise * a),
-          std::sqrt(spare * (b * b * g[0] + 2 * b * c * g[1] + c * c * g[2]) + noise * c)};
+  if (held) return {std::sqrt(spare * g(0, 0) / (h(0, 0) * h(0, 0)) + noise / h(0, 0)), kUnknown};
+  const double det = h.determinant();
+  const double a = h(1, 1) / det, b = -h(0, 1) / det, c = h(0, 0) / det;
+  return {std::sqrt(spare * (a * a * g(0, 0) + 2 * a * b * g(0, 1) + b * b * g(1, 1)) + noise * a),
+          std::sqrt(spare * (b * b * g(0, 0) + 2 * b * c * g(0, 1) + c * c * g(1, 1)) + noise * c)};
 }
 
 struct Fitted {
@@ -294,9 +283,8 @@ Fitted fitted(std::span<const Prepared> transitions, Shape shape, bool held) {
   Total now = misfits(transitions, shape);
   double damping = 1e-3;
   for (int i = 0; i < kIterations; ++i) {
-    const Shape step = step_of(now.sum, shape, damping, held);
-    const Shape next = clamped({shape[0] + step[0], shape[1] + step[1]});
-    const double moved = std::max(std::abs(next[0] - shape[0]), std::abs(next[1] - shape[1]));
+    const Shape next = clamped(shape + step_of(now.sum, shape, damping, held));
+    const double moved = (next - shape).cwiseAbs().maxCoeff();
     const Total then = misfits(transitions, next);
     if (then.sum.squares <= now.sum.squares) {
       shape = next;
@@ -318,7 +306,7 @@ Lag estimate_lag(std::span<const Transition> transitions) {
     if (transition.squared.size() > 2 && !transition.thrust.empty()) usable.emplace_back(transition);
   }
   if (usable.size() < kFewSteps) return {};
-  Fitted best = fitted(usable, {best_of_grid(usable), 0}, true);
+  Fitted best = fitted(usable, {best_of_grid(usable), 0.0}, true);
   Shape u = uncertainties(best.total, true);
   // Start at half the delay: at no smoothing at all its derivative equals that of the delay.
   const Fitted smooth = fitted(usable, {best.shape[0], std::max(0.5 * best.shape[0], 0.0)}, false);

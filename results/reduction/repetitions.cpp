@@ -12,6 +12,8 @@
 #include <set>
 #include <string>
 #include <tuple>
+#include <type_traits>
+#include <utility>
 
 #include "base/statistics.hpp"
 #include "compensation/units.hpp"
@@ -80,12 +82,13 @@ StepMean average(const Group& group) {
   return mean;
 }
 
-/// By propeller, occlusion and step, in the order of first appearance.
-std::vector<Group> groups_of(std::span<const StepMean> steps) {
+/// Steps of the same key, in the order of first appearance.
+template <class Key>
+std::vector<Group> groups_of(std::span<const StepMean> steps, Key key_of) {
   std::vector<Group> groups;
-  std::map<std::tuple<std::string, double, int>, std::size_t> places;
+  std::map<std::invoke_result_t<Key, const StepMean&>, std::size_t> places;
   for (const StepMean& step : steps) {
-    const auto [place, is_new] = places.try_emplace({step.propeller, step.occlusion_deg, step.step}, groups.size());
+    const auto [place, is_new] = places.try_emplace(key_of(step), groups.size());
     if (is_new) groups.emplace_back();
     groups[place->second].push_back(&step);
   }
@@ -232,19 +235,12 @@ void judge(std::vector<RepetitionVerdict>& verdicts, const RepetitionRule& rule)
 
 /// One-way analysis of variance: the repetitions are the groups, and how certain each is comes from within it.
 void analyse(RepetitionVerdict& verdict, double freedom_within) {
-  double n = 0, mean = 0, squares = 0, u_squares = 0;
-  for (const RepetitionFigure& figure : verdict.repetitions) {
-    if (std::isnan(figure.k)) continue;
-    n += 1;
-    mean += figure.k;
-    u_squares += square(figure.u);
-  }
-  if (n < 2) return;
-  mean /= n;
-  for (const RepetitionFigure& figure : verdict.repetitions) {
-    if (!std::isnan(figure.k)) squares += square(figure.k - mean);
-  }
-  verdict.between_sd = std::sqrt(squares / (n - 1));
+  const std::vector<double> k = known(verdict.repetitions, &RepetitionFigure::k);
+  const double n = static_cast<double>(k.size());
+  if (k.size() < 2) return;
+  double u_squares = 0;
+  for (const double u : known(verdict.repetitions, &RepetitionFigure::u)) u_squares += square(u);
+  verdict.between_sd = std::sqrt(variance(k));
   verdict.within_u = std::sqrt(u_squares / n);
   if (!(verdict.within_u > 0)) return;
   verdict.f = square(verdict.between_sd / verdict.within_u);
@@ -252,13 +248,10 @@ void analyse(RepetitionVerdict& verdict, double freedom_within) {
   verdict.p = boost::math::cdf(boost::math::complement(distribution, verdict.f));
 }
 
-double freedom_within(const Runs& runs) {
+double freedom_within(const Group& steps) {
   double freedom = 0;
-  for (const auto& [repetition, run] : runs) {
-    for (const StepMean* step : run) {
-      if (is_good(*step)) freedom += std::isnan(step->thrust_freedom) ? 1 : std::min(step->thrust_freedom, 1e3);
-    }
-  }
+  for (const StepMean* step : steps)
+    if (is_good(*step)) freedom += std::isnan(step->thrust_freedom) ? 1 : std::min(step->thrust_freedom, 1e3);
   return freedom;
 }
 
@@ -351,7 +344,8 @@ double thrust_u_within(const StepMean& step) {
 
 std::vector<StepMean> means_of(std::span<const StepMean> steps) {
   std::vector<StepMean> means;
-  for (const Group& group : groups_of(steps)) {
+  const auto key = [](const StepMean& step) { return std::tuple(step.propeller, step.occlusion_deg, step.step); };
+  for (const Group& group : groups_of(steps, key)) {
     Group good;
     std::ranges::copy_if(group, std::back_inserter(good), [](const StepMean* step) { return is_good(*step); });
     const bool chosen = !good.empty() && good.size() < group.size();
@@ -390,26 +384,19 @@ double variance_between(std::span<const std::vector<RunShare>> occlusions) {
 }
 
 std::vector<RepetitionVerdict> judge_repetitions(std::span<const StepMean> steps, const RepetitionRule& rule) {
+  const auto key = [](const StepMean& step) { return std::pair(step.propeller, step.occlusion_deg); };
+  std::vector<StepMean> measured;
+  std::ranges::copy_if(steps, std::back_inserter(measured), [](const StepMean& step) { return step.repetition != 0; });
+  const std::vector<Group> groups = groups_of(measured, key);
   std::vector<RepetitionVerdict> verdicts;
-  std::vector<Runs> runs;
-  std::map<std::pair<std::string, double>, std::size_t> places;
-  for (const StepMean& step : steps) {
-    if (step.repetition == 0) continue;
-    const auto [place, is_new] = places.try_emplace({step.propeller, step.occlusion_deg}, runs.size());
-    if (is_new) {
-      runs.emplace_back();
-      verdicts.emplace_back();
-      verdicts.back().propeller = step.propeller;
-      verdicts.back().occlusion_deg = step.occlusion_deg;
-    }
-    runs[place->second][step.repetition].push_back(&step);
-  }
-  for (std::size_t i = 0; i < verdicts.size(); ++i) {
-    verdicts[i].repetitions = figures_of(runs[i]);
+  for (const Group& group : groups) {
+    Runs runs;
+    for (const StepMean* step : group) runs[step->repetition].push_back(step);
+    verdicts.push_back({group.front()->propeller, group.front()->occlusion_deg, figures_of(runs)});
   }
   judge(verdicts, rule);
   for (std::size_t i = 0; i < verdicts.size(); ++i) {
-    analyse(verdicts[i], freedom_within(runs[i]));
+    analyse(verdicts[i], freedom_within(groups[i]));
     decide(verdicts[i], rule);
   }
   return verdicts;

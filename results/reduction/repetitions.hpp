@@ -78,7 +78,7 @@ struct RepetitionVerdict {
   double f = kNotMeasured;                    ///< between² over within² (one-way analysis of variance)
   double p = kNotMeasured;                    ///< probability of an f this large if only the noise differs
   bool asks_for_another = false;
-  std::string reason;  ///< one line; empty if the repetitions agree
+  std::string reason{};  ///< one line; empty if the repetitions agree
 };
 
 struct RepetitionRule {
