@@ -72,24 +72,23 @@ struct RoleRow {
   Role role;
   const char* name;
   Measure measure;
-  std::optional<double> StandRow::*member;  ///< nullptr: the thrust, which every row has
 };
 
 constexpr std::array<RoleRow, 11> kRoles{{
-    {Role::time, "time", Measure::time, &StandRow::time_s},
-    {Role::throttle, "throttle", Measure::throttle, &StandRow::throttle_us},
-    {Role::speed, "speed", Measure::speed, &StandRow::optical_rpm},
-    {Role::electrical_speed, "electrical_speed", Measure::speed, &StandRow::electrical_rpm},
-    {Role::thrust, "thrust", Measure::thrust, nullptr},
-    {Role::torque, "torque", Measure::torque, &StandRow::torque_nm},
-    {Role::voltage, "voltage", Measure::voltage, &StandRow::voltage_v},
-    {Role::current, "current", Measure::current, &StandRow::current_a},
-    {Role::occlusion, "occlusion", Measure::angle, &StandRow::occlusion_deg},
-    {Role::repetition, "repetition", Measure::count, &StandRow::repetition},
-    {Role::target_speed, "target_speed", Measure::speed, &StandRow::target_rpm},
+    {&StandRow::time_s, "time", Measure::time},
+    {&StandRow::throttle_us, "throttle", Measure::throttle},
+    {&StandRow::optical_rpm, "speed", Measure::speed},
+    {&StandRow::electrical_rpm, "electrical_speed", Measure::speed},
+    {kThrust, "thrust", Measure::thrust},
+    {&StandRow::torque_nm, "torque", Measure::torque},
+    {&StandRow::voltage_v, "voltage", Measure::voltage},
+    {&StandRow::current_a, "current", Measure::current},
+    {&StandRow::occlusion_deg, "occlusion", Measure::angle},
+    {&StandRow::repetition, "repetition", Measure::count},
+    {&StandRow::target_rpm, "target_speed", Measure::speed},
 }};
 
-const RoleRow& row_of(Role role) { return kRoles[static_cast<std::size_t>(role)]; }
+const RoleRow& row_of(Role role) { return *std::ranges::find(kRoles, role, &RoleRow::role); }
 
 /// The channels of an RCbenchmark table by the name before the unit; of two names for one role the first counts.
 struct KnownChannel {
@@ -99,16 +98,16 @@ struct KnownChannel {
   bool required = false;  ///< an unknown unit refuses the file
 };
 
-constexpr std::array<KnownChannel, 10> kRcbenchmark{{{"Thrust", Role::thrust, "", true},
-                                                     {"Motor Electrical Speed", Role::electrical_speed, "", true},
-                                                     {"Motor Optical Speed", Role::speed, "", true},
-                                                     {"Time", Role::time},
-                                                     {"ESC signal", Role::throttle},
-                                                     {"ESC", Role::throttle},
-                                                     {"Torque", Role::torque},
-                                                     {"Voltage", Role::voltage},
-                                                     {"Current", Role::current},
-                                                     {"TargetRPM", Role::target_speed, "RPM"}}};
+constexpr KnownChannel kRcbenchmark[] = {{"Thrust", kThrust, "", true},
+                                         {"Motor Electrical Speed", &StandRow::electrical_rpm, "", true},
+                                         {"Motor Optical Speed", &StandRow::optical_rpm, "", true},
+                                         {"Time", &StandRow::time_s},
+                                         {"ESC signal", &StandRow::throttle_us},
+                                         {"ESC", &StandRow::throttle_us},
+                                         {"Torque", &StandRow::torque_nm},
+                                         {"Voltage", &StandRow::voltage_v},
+                                         {"Current", &StandRow::current_a},
+                                         {"TargetRPM", &StandRow::target_rpm, "RPM"}};
 
 /// A column with its role and the factor to the unit inside.
 struct Column {
@@ -124,7 +123,7 @@ using Columns = std::vector<Column>;
 }
 
 const Column* find(const Columns& columns, Role role) {
-  const auto found = std::find_if(columns.begin(), columns.end(), [&](const Column& c) { return c.role == role; });
+  const auto found = std::ranges::find(columns, role, &Column::role);
   return found == columns.end() ? nullptr : &*found;
 }
 
@@ -188,8 +187,8 @@ void map_channel(const Table& table, const KnownChannel& channel, Columns& colum
 
 /// Why the value is impossible in its role; empty if it is possible.
 std::string objection(Role role, double value) {
-  if (role == Role::occlusion && !(value >= 0 && value < 360)) return "occlusion outside 0 to 360°";
-  if (role == Role::repetition && !(value >= 1 && value <= 1000 && value == std::floor(value)))
+  if (role == &StandRow::occlusion_deg && !(value >= 0 && value < 360)) return "occlusion outside 0 to 360°";
+  if (role == &StandRow::repetition && !(value >= 1 && value <= 1000 && value == std::floor(value)))
     return "repetition is not a whole number from 1 to 1000";
   return {};
 }
@@ -200,35 +199,34 @@ std::optional<StandRow> read_row(const TableRow& fields, const Columns& columns,
   for (const Column& column : columns) {
     std::string field = fields.fields[column.index];
     if (decimal_comma) std::replace(field.begin(), field.end(), ',', '.');
-    const RoleRow& role = row_of(column.role);
     const auto value = parse_number(field);
-    const bool needed = column.role == Role::thrust || column.role == Role::occlusion;
+    const bool needed = column.role == kThrust || column.role == &StandRow::occlusion_deg;
     if (!value && !needed) continue;
-    const std::string why =
-        value ? objection(column.role, *value * column.factor) : fmt::format("{} is not a number", role.name);
+    const std::string why = value ? objection(column.role, *value * column.factor)
+                                  : fmt::format("{} is not a number", row_of(column.role).name);
     if (!why.empty()) {
       log.problems.push_back({fields.line, why + "; line skipped"});
       return std::nullopt;
     }
-    if (role.member == nullptr) row.thrust_n = *value * column.factor;
-    if (role.member != nullptr) row.*role.member = *value * column.factor;
+    (column.role == kThrust ? row.thrust_n : (row.*column.role).emplace()) = *value * column.factor;
   }
   return row;
 }
 
 StandLog read_rows(const Table& table, const Columns& columns, bool decimal_comma, std::vector<std::string> unread) {
-  StandLog log{.path = table.path, .thrust_unit = find(columns, Role::thrust)->unit};
-  log.has_optical = find(columns, Role::speed) != nullptr;
-  log.has_electrical = find(columns, Role::electrical_speed) != nullptr;
-  log.problems = table.problems;
-  log.unread = std::move(unread);
+  StandLog log{.path = table.path,
+               .thrust_unit = find(columns, kThrust)->unit,
+               .has_electrical = find(columns, &StandRow::electrical_rpm) != nullptr,
+               .has_optical = find(columns, &StandRow::optical_rpm) != nullptr,
+               .problems = table.problems,
+               .unread = std::move(unread)};
   for (const TableRow& fields : table.rows)
     if (const auto row = read_row(fields, columns, decimal_comma, log)) log.rows.push_back(*row);
   return log;
 }
 
 bool has_speed(const Columns& columns) {
-  return find(columns, Role::speed) != nullptr || find(columns, Role::electrical_speed) != nullptr;
+  return find(columns, &StandRow::optical_rpm) != nullptr || find(columns, &StandRow::electrical_rpm) != nullptr;
 }
 
 // ---- which rows become steps
@@ -343,7 +341,7 @@ StandLog read_columns(std::string_view text, std::string path, const std::vector
       refuse(table, fmt::format("--column names {} twice", row_of(column.role).name));
     mapped.push_back(map_column(table, column));
   }
-  if (find(mapped, Role::thrust) == nullptr || !has_speed(mapped))
+  if (find(mapped, kThrust) == nullptr || !has_speed(mapped))
     refuse(table, "a thrust and a speed are needed: --column thrust=HEADER --column speed=HEADER");
   return read_rows(table, mapped, dialect.decimal_comma, {});
 }
@@ -353,7 +351,7 @@ StandLog read_rcbenchmark(std::string_view text, std::string path) {
   Columns columns;
   std::vector<std::string> unread;
   for (const KnownChannel& channel : kRcbenchmark) map_channel(table, channel, columns, unread);
-  if (find(columns, Role::thrust) == nullptr) {
+  if (find(columns, kThrust) == nullptr) {
     refuse(table,
            "no column \"Thrust (unit)\", so this is not an RCbenchmark table; name the columns of another table "
            "with --column");

@@ -75,20 +75,9 @@ struct HeaderName {
 /// units differ by it (mN, MN).
 [[nodiscard]] std::optional<double> unit_factor(Measure measure, std::string_view unit);
 
-/// What a column contains.
-enum class Role : std::uint8_t {
-  time,
-  throttle,
-  speed,
-  electrical_speed,
-  thrust,
-  torque,
-  voltage,
-  current,
-  occlusion,
-  repetition,
-  target_speed
-};
+/// What a column contains, by the member of a row; kThrust: the thrust, which every row has.
+using Role = std::optional<double> StandRow::*;
+inline constexpr Role kThrust = nullptr;
 
 struct ColumnRole {
   Role role{};

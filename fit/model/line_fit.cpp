@@ -8,7 +8,6 @@
 #include <limits>
 
 #include "base/error.hpp"
-#include "fit/numerics/least_squares.hpp"
 #include "fit/numerics/linear_regression.hpp"
 
 namespace kphi::fit {
@@ -20,18 +19,6 @@ constexpr double kSameAngleDeg = 1e-6;
 /// No k is weighted as if known better than this share of the largest |k|: mounting and air change it by at least as
 /// much between two runs. Also used where a standard error is unknown.
 constexpr double kErrorFloor = 1e-3;
-
-struct LineResidual {
-  double phi;
-  double k;
-  double sigma;
-
-  template <class Scalar>
-  bool operator()(const Scalar* intercept, const Scalar* slope, Scalar* residual) const {
-    residual[0] = (k - (*intercept + *slope * phi)) / sigma;
-    return true;
-  }
-};
 
 std::vector<LinePoint> sorted(std::span<const LinePoint> points) {
   std::vector<LinePoint> result(points.begin(), points.end());
@@ -155,8 +142,7 @@ LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& option
   LineFit fit;
   fit.anchored = options.anchored;
   fit.K_T = all.front().k;
-  const double k_scale = largest_k(all);
-  const double floor = kErrorFloor * k_scale;
+  const double floor = kErrorFloor * largest_k(all);
   const auto known_error = [&](const LinePoint& point) {
     return point.standard_error > 0 ? point.standard_error : floor;
   };
@@ -165,39 +151,29 @@ LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& option
   std::vector<double>& sigmas = fit.sigmas;
   for (const LinePoint& point : fit.points) sigmas.push_back(std::max(known_error(point), floor));
 
-  const double phi_scale = fit.points.back().phi_deg;
-  double intercept = fit.K_T / k_scale, slope = 0;
-  ceres::Problem problem(problem_options());
+  std::vector<std::vector<double>> rows;
+  std::vector<double> k, weights;
   for (std::size_t i = 0; i < fit.points.size(); ++i) {
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<LineResidual, 1, 1, 1>(new LineResidual{
-                                 fit.points[i].phi_deg / phi_scale, fit.points[i].k / k_scale, sigmas[i] / k_scale}),
-                             nullptr, &intercept, &slope);
+    const double phi = fit.points[i].phi_deg;
+    rows.push_back(fit.anchored ? std::vector{phi} : std::vector{1.0, phi});
+    k.push_back(fit.points[i].k - (fit.anchored ? fit.K_T : 0));
+    weights.push_back(1 / (sigmas[i] * sigmas[i]));
   }
-  if (options.anchored) problem.SetParameterBlockConstant(&intercept);
-  solve_exactly(problem, "line fit");
-  const double slope_unit = k_scale / phi_scale;
-  fit.intercept = options.anchored ? fit.K_T : intercept * k_scale;
-  fit.slope_per_deg = slope * slope_unit;
-
-  double chi_squared = 0;
-  for (std::size_t i = 0; i < fit.points.size(); ++i) {
-    fit.residuals.push_back(fit.points[i].k - (fit.intercept + fit.slope_per_deg * fit.points[i].phi_deg));
-    chi_squared += std::pow(fit.residuals.back() / sigmas[i], 2);
-  }
-  const std::size_t terms = options.anchored ? 1 : 2;
-  const std::size_t freedom = fit.points.size() - terms;
-  const double enlarge = freedom > 0 ? std::max(1.0, chi_squared / static_cast<double>(freedom)) : 1.0;
-  if (options.anchored) {
-    const double slope_variance = unit_covariance(problem, {&slope}, "line fit")[0] * slope_unit * slope_unit * enlarge;
+  const Regression line = regress(rows, k, weights);
+  fit.intercept = fit.anchored ? fit.K_T : line.estimates.front();
+  fit.slope_per_deg = line.estimates.back();
+  fit.residuals = line.residuals;
+  const double freedom = static_cast<double>(line.freedom);
+  const double enlarge = freedom > 0 ? std::max(1.0, line.weighted_squares / freedom) : 1.0;
+  const auto& c = line.covariance;
+  if (fit.anchored) {
     const double anchor_variance = fit.K_T_standard_error * fit.K_T_standard_error;
     const WeightSums sums(fit.points, sigmas);
     const double gradient = -sums.first / sums.second;  // what an error of K_T does to the slope
     fit.covariance = {{{anchor_variance, gradient * anchor_variance},
-                       {gradient * anchor_variance, slope_variance + gradient * gradient * anchor_variance}}};
+                       {gradient * anchor_variance, c[0][0] * enlarge + gradient * gradient * anchor_variance}}};
   } else {
-    const auto c = unit_covariance(problem, {&intercept, &slope}, "line fit");
-    fit.covariance = {{{c[0] * k_scale * k_scale * enlarge, c[1] * k_scale * slope_unit * enlarge},
-                       {c[2] * k_scale * slope_unit * enlarge, c[3] * slope_unit * slope_unit * enlarge}}};
+    fit.covariance = {{{c[0][0] * enlarge, c[0][1] * enlarge}, {c[1][0] * enlarge, c[1][1] * enlarge}}};
   }
   return fit;
 }

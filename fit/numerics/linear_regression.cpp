@@ -50,54 +50,48 @@ void refine(const Matrix& design, const Upper& upper, const Vector& y, Vector& b
   }
 }
 
-Regression solve(Matrix design, Vector y, const Vector& root_weights) {
+Vector vector_of(std::span<const double> values) {
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size())).cast<Long>();
+}
+
+std::vector<double> rounded(const Vector& values) {
+  std::vector<double> result(static_cast<std::size_t>(values.size()));
+  Eigen::Map<Eigen::VectorXd>(result.data(), values.size()) = values.cast<double>();
+  return result;
+}
+
+Regression solve(Matrix design, const Vector& values, std::span<const double> weights) {
   if (design.rows() < design.cols()) throw FitError("regression: fewer rows than terms; measure more");
   const Matrix plain = design;
-  const Vector values = y;
+  const Vector root_weights =
+      weights.empty() ? Vector(Vector::Ones(values.size())) : Vector(vector_of(weights).cwiseSqrt());
   for (Eigen::Index i = 0; i < design.rows(); ++i) design.row(i) *= root_weights[i];
-  y = y.cwiseProduct(root_weights);
+  const Vector y = values.cwiseProduct(root_weights);
   const Vector lengths = equilibrate(design);
   const Eigen::HouseholderQR<Matrix> qr(design);
   const Matrix factor = qr.matrixQR().topRows(design.cols());
   const auto upper = factor.template triangularView<Eigen::Upper>();
   constexpr Long kSingular = 1e-17L;
-  for (Eigen::Index j = 0; j < design.cols(); ++j) {
-    if (std::abs(qr.matrixQR()(j, j)) < kSingular)
-      throw FitError("regression: too few different rows to fit all terms; measure more");
-  }
+  if ((factor.diagonal().array().abs() < kSingular).any())
+    throw FitError("regression: too few different rows to fit all terms; measure more");
   Vector beta = qr.solve(y);
   refine(design, upper, y, beta);
-  const Matrix inverse = upper.solve(Matrix::Identity(design.cols(), design.cols()));
+  beta = beta.cwiseQuotient(lengths);
+  const Matrix inverse =
+      lengths.asDiagonal().inverse() * Matrix(upper.solve(Matrix::Identity(design.cols(), design.cols())));
   const Matrix covariance = inverse * inverse.transpose();
 
   Regression result;
-  for (Eigen::Index j = 0; j < beta.size(); ++j) result.estimates.push_back(static_cast<double>(beta[j] / lengths[j]));
-  const Vector residuals = values - plain * beta.cwiseQuotient(lengths);
+  result.estimates = rounded(beta);
+  const Vector residuals = values - plain * beta;
+  result.residuals = rounded(residuals);
   const Long squares = residuals.cwiseProduct(root_weights).squaredNorm();
   result.weighted_squares = static_cast<double>(squares);
   result.freedom = static_cast<std::size_t>(design.rows() - design.cols());
   const Long variance = result.freedom > 0 ? squares / static_cast<Long>(result.freedom) : 0;
   result.residual_deviation = static_cast<double>(std::sqrt(variance));
-  for (Eigen::Index i = 0; i < beta.size(); ++i) {
-    result.standard_errors.push_back(static_cast<double>(std::sqrt(variance * covariance(i, i)) / lengths[i]));
-    result.covariance.emplace_back();
-    for (Eigen::Index j = 0; j < beta.size(); ++j)
-      result.covariance.back().push_back(static_cast<double>(covariance(i, j) / lengths[i] / lengths[j]));
-  }
-  for (const Long residual : residuals) result.residuals.push_back(static_cast<double>(residual));
-  return result;
-}
-
-Vector roots(std::span<const double> weights, Eigen::Index n) {
-  Vector result = Vector::Ones(n);
-  for (std::size_t i = 0; i < weights.size(); ++i)
-    result[static_cast<Eigen::Index>(i)] = std::sqrt(static_cast<Long>(weights[i]));
-  return result;
-}
-
-Vector vector_of(std::span<const double> values) {
-  Vector result(static_cast<Eigen::Index>(values.size()));
-  for (std::size_t i = 0; i < values.size(); ++i) result[static_cast<Eigen::Index>(i)] = values[i];
+  result.standard_errors = rounded((variance * covariance.diagonal()).cwiseSqrt());
+  for (const auto column : covariance.colwise()) result.covariance.push_back(rounded(column));
   return result;
 }
 
@@ -109,7 +103,7 @@ Regression regress(const std::vector<std::vector<double>>& rows, std::span<const
   const auto n = static_cast<Eigen::Index>(rows.size());
   Matrix design(n, static_cast<Eigen::Index>(rows.front().size()));
   for (Eigen::Index i = 0; i < n; ++i) design.row(i) = vector_of(rows[static_cast<std::size_t>(i)]).transpose();
-  return solve(std::move(design), vector_of(y), roots(weights, n));
+  return solve(std::move(design), vector_of(y), weights);
 }
 
 Regression regress_polynomial(std::span<const double> x, std::span<const double> y, int lowest, int highest,
@@ -120,7 +114,7 @@ Regression regress_polynomial(std::span<const double> x, std::span<const double>
     for (int power = lowest; power <= highest; ++power)
       design(i, power - lowest) = std::pow(static_cast<Long>(x[static_cast<std::size_t>(i)]), power);
   }
-  return solve(std::move(design), vector_of(y), roots(weights, n));
+  return solve(std::move(design), vector_of(y), weights);
 }
 
 }  // namespace kphi::fit

@@ -94,6 +94,7 @@ void HtmlTable::row(const std::vector<std::string>& cells, std::optional<std::si
     html_ += cells.at(i) + "</td>";
   }
   html_ += "</tr>\n";
+  has_rows_ = true;
 }
 
 std::string inline_svg(std::string_view svg, const std::string& prefix) {

@@ -43,11 +43,13 @@ class HtmlTable {
   explicit HtmlTable(std::vector<Heading> headings, bool is_long = false);
   /// As many cells as headings. `bad` names the column whose cell is marked as a failure.
   void row(const std::vector<std::string>& cells, std::optional<std::size_t> bad = {});
-  [[nodiscard]] std::string html() const { return html_ + "</tbody></table></div>\n"; }
+  /// Empty without a row.
+  [[nodiscard]] std::string html() const { return has_rows_ ? html_ + "</tbody></table></div>\n" : ""; }
 
  private:
   std::vector<Column> columns_;
   std::string html_;
+  bool has_rows_ = false;
 };
 
 /// An SVG file as an element of a page: without XML declaration and doctype, with `prefix` before every id and every

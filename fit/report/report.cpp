@@ -32,8 +32,10 @@ double share_of_thrust(const Identification& identification, const OcclusionCoef
   return row.at_speed && nominal ? row.at_speed->k / nominal->k : row.k / identification.line.K_T;
 }
 
+/// Empty if the table is.
 std::string section(std::string_view title, const HtmlTable& table, std::string_view note = {}) {
-  return html_heading(title) + table.html() + (note.empty() ? "" : html_note(note));
+  const std::string html = table.html();
+  return html.empty() ? html : html_heading(title) + html + (note.empty() ? "" : html_note(note));
 }
 
 std::string percent(double share) { return fmt::format("{:.3f}", 100 * share); }
@@ -106,7 +108,6 @@ std::string test_section(const Analysis& analysis) {
   tests.insert(tests.end(), {&analysis.curvature.lack_of_fit, &analysis.curvature.quadratic});
   for (const HypothesisTest& test : analysis.differences) tests.push_back(&test);
   std::erase_if(tests, [](const HypothesisTest* test) { return test->name.empty(); });
-  if (tests.empty()) return {};
   HtmlTable table(
       {{"test", text}, {"hypothesis", text}, {"statistic"}, {"degrees of freedom"}, {"p"}, {"verdict (5 %)", text}});
   for (const HypothesisTest* test : tests) {
@@ -126,7 +127,6 @@ std::string test_section(const Analysis& analysis) {
 }
 
 std::string speed_section(const std::vector<SpeedDependence>& speed) {
-  if (speed.empty()) return {};
   HtmlTable table({{"φ"}, {"change of k over the range, %"}, {"±, %"}, {"beyond noise, %"}});
   for (const SpeedDependence& one : speed) {
     const double k = one.levels.empty() ? 0 : one.levels.back().k;
@@ -138,7 +138,6 @@ std::string speed_section(const std::vector<SpeedDependence>& speed) {
 }
 
 std::string torque_section(const std::vector<TorqueCoefficient>& torque) {
-  if (torque.empty()) return {};
   HtmlTable table({{"φ"},
                    {"k<sub>Q</sub>, N m/(rad/s)²"},
                    {"share of k<sub>Q</sub>(0)"},
@@ -154,7 +153,6 @@ std::string torque_section(const std::vector<TorqueCoefficient>& torque) {
 }
 
 std::string prediction_section(const std::vector<LinePrediction>& predictions) {
-  if (predictions.empty()) return {};
   HtmlTable table({{"φ"},
                    {"k on the line, 10⁻⁶ N/(rad/s)²"},
                    {"95 %: ±"},
@@ -173,7 +171,6 @@ std::string prediction_section(const std::vector<LinePrediction>& predictions) {
 }
 
 std::string rejected_section(const std::vector<RejectedPoint>& rejected) {
-  if (rejected.empty()) return {};
   HtmlTable table({{"φ"}, {"repetition"}, {"step"}, {"speed, RPM"}, {"thrust, N"}, {"residual, N"}, {"robust weight"}});
   for (const RejectedPoint& point : rejected)
     table.row({html_angle(point.phi_deg), fmt::format("{}", point.repetition), fmt::format("{}", point.step + 1),
@@ -220,7 +217,6 @@ std::string clock_words(const MotorClock& clock) {
 }
 
 std::string hash_section(const std::vector<RunProvenance>& runs) {
-  if (runs.empty()) return {};
   HtmlTable table({{"file", text}, {"SHA-256", hash}}, true);
   for (const RunProvenance& run : runs) table.row({html_escaped(run.file), html_escaped(run.sha256)});
   return section("Hashes of the runs", table);
@@ -296,7 +292,6 @@ std::string power_section(const Identification& identification) {
   constexpr std::size_t kRows = 5;
   std::map<double, std::vector<StepPower>> by_angle;
   for (const StepPower& row : power_of(identification.selection.used)) by_angle[row.phi_deg].push_back(row);
-  if (by_angle.empty()) return {};
   HtmlTable table(
       {{"φ"}, {"step"}, {"speed, RPM"}, {"thrust, N"}, {"power, W"}, {"g/W"}, {"N/W"}, {"measured by", text}});
   for (const auto& [phi, rows] : by_angle) {
@@ -323,7 +318,6 @@ std::string step_section(const StepSelection& selection) {
           "A step is left out for a quality flag or by hand, both with a stated cause, never for being far from "
           "the others: the scatter of the repetitions is part of their uncertainty (JCGM 100, 3.4.7 and 4.2) and "
           "of the budget.");
-  if (selection.flagged.empty()) return html;
   HtmlTable table({{"φ"},
                    {"repetition"},
                    {"step"},
@@ -343,7 +337,6 @@ std::string step_section(const StepSelection& selection) {
 }
 
 std::string run_section(const Provenance& provenance, const StepSelection& selection) {
-  if (provenance.runs.empty() && provenance.rejected.empty()) return {};
   HtmlTable table({{"file", text},
                    {"outcome", text},
                    {"steps fitted"},
@@ -413,7 +406,6 @@ std::string family_section(std::span<const Fitted> family) {
 }
 
 std::string slopes_section(std::span<const SharedSlope> slopes) {
-  if (slopes.empty()) return {};
   HtmlTable table(
       {{"diameter, in"}, {"propellers", text}, {"slope, N/(rad/s)² per degree"}, {"95 %, ±"}, {"equal slopes, p"}});
   for (const SharedSlope& one : slopes)
@@ -526,7 +518,6 @@ std::string analysis_sections(const Analysis& analysis) {
 }
 
 std::string claims_section(std::span<const Claim> claims) {
-  if (claims.empty()) return {};
   HtmlTable table({{"statement", text}, {"found"}, {"95 %"}, {"allowed"}, {"unit", text}, {"verdict", text}});
   for (const Claim& claim : claims)
     table.row({typeset(claim.statement), html_number(claim.value, "{:.4g}"), interval(claim.lower, claim.upper),

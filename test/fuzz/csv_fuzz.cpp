@@ -31,7 +31,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   accept_or_refuse([&] { return import_table(text, "apc_5x4_static.txt", {}); });
   accept_or_refuse([&] {
     ImportOptions options;
-    options.columns = {{Role::thrust, "T", "N"}, {Role::speed, "n", "RPM"}, {Role::electrical_speed, "e", "RPM"}};
+    options.columns = {
+        {kThrust, "T", "N"}, {&StandRow::optical_rpm, "n", "RPM"}, {&StandRow::electrical_rpm, "e", "RPM"}};
     options.dialect = dialect;
     return summary_of(import_table(text, "own.csv", options).table);
   });

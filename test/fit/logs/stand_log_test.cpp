@@ -43,7 +43,7 @@ TEST(NamedColumns, TakesTheUnitFromBracketsSuffixOrMapping) {
   for (const char* header : {"f (mN),n_rpm\n", "f [mN],n_rpm\n", "f_mN,n_rpm\n"}) {
     const std::string name = std::string(header).substr(0, std::string(header).find(','));
     const auto log = read_columns(std::string(header) + "500,60\n", "own.csv",
-                                  {{Role::thrust, name, ""}, {Role::speed, "n_rpm", ""}});
+                                  {{kThrust, name, ""}, {&StandRow::optical_rpm, "n_rpm", ""}});
     EXPECT_NEAR(log.rows.at(0).thrust_n, 0.5, 1e-15) << header;
   }
   const auto log = read_columns("f,n\n2,10\n", "own.csv", roles({"thrust=f:lbf", "speed=n:Hz"}));
