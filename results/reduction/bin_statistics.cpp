@@ -6,6 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include "base/statistics.hpp"
+
 namespace kphi::results {
 namespace {
 
@@ -68,33 +70,29 @@ constexpr double kSearches = 20;  // begins that are tried within what was plann
 constexpr std::size_t kBlocks = 8;
 constexpr int kOneWay = 20;
 
-/// Least-squares line through the bins, x in bins from the first.
-class Line {
- public:
-  void add(double x, double y) {
-    n_ += 1;
-    x_ += x;
-    y_ += y;
-    xx_ += x * x;
-    xy_ += x * y;
+/// Least-squares line through the values that are not NaN, x in places from the first.
+struct Line {
+  explicit Line(std::span<const double> values) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (std::isnan(values[i])) continue;
+      x.push_back(static_cast<double>(i));
+      y.push_back(values[i]);
+    }
+    middle = kphi::mean(x);
+    mean = kphi::mean(y);
+    double product = 0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      product += (x[i] - middle) * y[i];
+      spread += (x[i] - middle) * (x[i] - middle);
+    }
+    if (spread > 0) slope = product / spread;
   }
-  [[nodiscard]] double spread() const { return xx_ - x_ * x_ / n_; }
-  [[nodiscard]] double slope() const { return spread() > 0 ? (xy_ - x_ * y_ / n_) / spread() : 0; }
-  [[nodiscard]] bool empty() const { return n_ == 0; }
-  [[nodiscard]] double mean() const { return y_ / n_; }
-  [[nodiscard]] double at(double x) const { return mean() + slope() * (x - x_ / n_); }
+  [[nodiscard]] double at(double place) const { return mean + slope * (place - middle); }
 
- private:
-  double n_ = 0, x_ = 0, y_ = 0, xx_ = 0, xy_ = 0;
+  std::vector<double> x, y;
+  double middle = 0, mean = 0;  ///< NaN without values
+  double spread = 0, slope = 0;
 };
-
-Line line_through(std::span<const double> values) {
-  Line line;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!std::isnan(values[i])) line.add(static_cast<double>(i), values[i]);
-  }
-  return line;
-}
 
 /// Variance that one bin contributes to the variance of a long mean.
 struct Noise {
@@ -107,7 +105,7 @@ Noise noise_of(std::span<const double> values, std::size_t parts) {
   std::vector<double> residuals;
   for (std::size_t part = 0; part < parts; ++part) {
     const auto piece = values.subspan(part * (values.size() / parts), values.size() / parts);
-    const Line line = line_through(piece);
+    const Line line(piece);
     for (std::size_t i = 0; i < piece.size(); ++i) {
       if (!std::isnan(piece[i])) residuals.push_back(piece[i] - line.at(static_cast<double>(i)));
     }
@@ -122,8 +120,8 @@ int rising_pairs(std::span<const double> values) {
   std::vector<double> means;
   for (std::size_t part = 0; part < kBlocks; ++part) {
     const std::size_t begin = values.size() * part / kBlocks, end = values.size() * (part + 1) / kBlocks;
-    const Line line = line_through(values.subspan(begin, end - begin));
-    if (!line.empty()) means.push_back(line.mean());
+    const Line line(values.subspan(begin, end - begin));
+    if (!line.y.empty()) means.push_back(line.mean);
   }
   int pairs = 0;
   for (std::size_t i = 0; i < means.size(); ++i) {
@@ -136,11 +134,11 @@ int rising_pairs(std::span<const double> values) {
 
 /// Whether the slope is inside its own uncertainty, `t` standard ones, or too small to matter.
 bool steady(std::span<const double> values, const Noise& noise, double t) {
-  const Line line = line_through(values);
+  const Line line(values);
   const double bins = static_cast<double>(values.size());
-  const double change = std::abs(line.slope()) * bins;
-  const double certain = t * std::sqrt(noise.variance / line.spread()) * bins;
-  return change <= std::max(certain, kSteadyShare * std::abs(line.mean()));
+  const double change = std::abs(line.slope) * bins;
+  const double certain = t * std::sqrt(noise.variance / line.spread) * bins;
+  return change <= std::max(certain, kSteadyShare * std::abs(line.mean));
 }
 
 }  // namespace
@@ -180,19 +178,9 @@ MeanError mean_error(std::span<const double> values, int fitted) {
 }
 
 std::vector<double> without_trend(std::span<const double> values) {
-  const double n = static_cast<double>(values.size());
-  const double middle = 0.5 * (n - 1);
-  double sum = 0, slope = 0, spread = 0;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const double x = static_cast<double>(i) - middle;
-    sum += values[i];
-    slope += x * values[i];
-    spread += x * x;
-  }
+  const Line line(values);
   std::vector<double> rest(values.begin(), values.end());
-  for (std::size_t i = 0; i < rest.size(); ++i) {
-    rest[i] -= sum / n + (spread > 0 ? slope / spread * (static_cast<double>(i) - middle) : 0);
-  }
+  for (std::size_t i = 0; i < rest.size(); ++i) rest[i] -= line.at(static_cast<double>(i));
   return rest;
 }
 
@@ -232,8 +220,8 @@ bool drifts(std::span<const double> thrust) {
   if (std::min(std::abs(pairs_early), std::abs(pairs_late)) < kOneWay || (pairs_early > 0) != (pairs_late > 0)) {
     return false;
   }
-  const double change = line_through(late).slope() * static_cast<double>(half);
-  return (change > 0) == (pairs_late > 0) && std::abs(change) > kDriftShare * std::abs(line_through(thrust).mean());
+  const double change = Line(late).slope * static_cast<double>(half);
+  return (change > 0) == (pairs_late > 0) && std::abs(change) > kDriftShare * std::abs(Line(thrust).mean);
 }
 
 }  // namespace kphi::results

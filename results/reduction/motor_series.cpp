@@ -1,18 +1,18 @@
 #include "results/reduction/motor_series.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+
+#include "base/statistics.hpp"
 
 namespace kphi::results {
 namespace {
 
 bool is_glitch(std::span<const MotorReading> speeds, std::size_t i) {
   if (i < 2 || i + 2 >= speeds.size()) return false;
-  std::array<double, 5> near{};
-  for (std::size_t k = 0; k < near.size(); ++k) near[k] = speeds[i + k - 2].value;
-  std::nth_element(near.begin(), near.begin() + 2, near.end());
-  return std::abs(speeds[i].value - near[2]) > std::max(kGlitchShare * std::abs(near[2]), kGlitchSpeed);
+  const auto value = [&](std::size_t k) { return speeds[k].value; };
+  const double middle = upper_median({value(i - 2), value(i - 1), value(i), value(i + 1), value(i + 2)});
+  return std::abs(value(i) - middle) > std::max(kGlitchShare * std::abs(middle), kGlitchSpeed);
 }
 
 MotorSeries::Readings within(MotorSeries::Readings readings, MotorChannel channel, const Window& window) {
@@ -56,9 +56,7 @@ Statistics MotorSeries::statistics(MotorChannel channel, const Window& window, d
   s.n = values.size();
   s.error = mean_error(values);
   s.mean = s.error.mean;
-  double squares = 0;
-  for (const double value : values) squares += (value - s.mean) * (value - s.mean);
-  if (s.n > 1) s.deviation = std::sqrt(squares / static_cast<double>(s.n - 1));
+  if (s.n > 1) s.deviation = std::sqrt(variance(values));
   return s;
 }
 

@@ -137,8 +137,7 @@ std::vector<RepetitionFigure> figures_of(const Runs& runs) {
   std::optional<std::set<int>> common;
   for (const auto& [repetition, run] : runs) {
     const std::set<int> levels = good_levels(run);
-    figures.push_back(
-        {repetition, kNotMeasured, kNotMeasured, !levels.empty() && 2 * levels.size() >= run.size(), false});
+    figures.push_back({.repetition = repetition, .usable = !levels.empty() && 2 * levels.size() >= run.size()});
     if (!figures.back().usable) continue;
     if (!common) common = levels;
     std::erase_if(*common, [&](int level) { return !levels.contains(level); });
@@ -286,8 +285,7 @@ struct Pair {
 
 /// The profile's own way comes first, and it rises when its first step is not its fastest.
 bool rises(std::span<const StepMean> run) {
-  const auto first =
-      std::min_element(run.begin(), run.end(), [](const StepMean& a, const StepMean& b) { return a.step < b.step; });
+  const auto first = std::ranges::min_element(run, {}, &StepMean::step);
   return std::any_of(run.begin(), run.end(),
                      [&](const StepMean& step) { return step.commanded_speed_rad_s > first->commanded_speed_rad_s; });
 }
@@ -305,21 +303,6 @@ std::map<double, Pair> pairs_of(std::span<const StepMean> run) {
     pairs[level] = in_order ? Pair{steps[0], steps[1]} : Pair{steps[1], steps[0]};
   }
   return pairs;
-}
-
-constexpr int kBegin = 1, kEnd = 2;
-
-/// Of the first and the last reference run, as repetitions of each other.
-std::vector<StepMean> two_runs(std::span<const StepMean> steps) {
-  int first = -1, last = -1;
-  for (const StepMean& step : steps) last = std::min(last, step.repetition);
-  std::vector<StepMean> chosen;
-  for (const StepMean& step : steps) {
-    if (step.repetition != first && step.repetition != last) continue;
-    chosen.push_back(step);
-    chosen.back().repetition = step.repetition == first ? kBegin : kEnd;
-  }
-  return chosen;
 }
 
 /// Of the air during a run, kg/m³; NaN: unknown.
@@ -403,9 +386,7 @@ std::vector<RepetitionVerdict> judge_repetitions(std::span<const StepMean> steps
 }
 
 std::string Hysteresis::to_words() const {
-  const auto largest = std::max_element(speeds.begin(), speeds.end(), [](const auto& a, const auto& b) {
-    return std::abs(a.up_minus_down_n) < std::abs(b.up_minus_down_n);
-  });
+  const auto largest = std::ranges::max_element(speeds, {}, [](const auto& p) { return std::abs(p.up_minus_down_n); });
   const auto beyond = std::count_if(speeds.begin(), speeds.end(), [](const auto& p) { return p.significant(); });
   return fmt::format(
       "thrust going up minus going down: {:+.3f} ± {:.3f} % of k{}; at most {:+.4f} ± {:.4f} N at {:.0f} RPM; {} of {} "
@@ -446,15 +427,19 @@ std::string ReferenceDrift::to_words() const {
 }
 
 std::optional<ReferenceDrift> reference_drift(std::span<const StepMean> steps) {
-  const std::vector<StepMean> runs = two_runs(steps);
+  if (steps.empty()) return std::nullopt;
+  const int first = -1, last = std::ranges::min(steps, {}, &StepMean::repetition).repetition;
+  std::vector<StepMean> runs;
+  std::ranges::copy_if(steps, std::back_inserter(runs),
+                       [&](const StepMean& step) { return step.repetition == first || step.repetition == last; });
   const auto verdicts = judge_repetitions(runs);
   if (verdicts.size() != 1 || verdicts[0].repetitions.size() != 2) return std::nullopt;
-  const RepetitionFigure &begin = verdicts[0].repetitions[0], &end = verdicts[0].repetitions[1];
+  const RepetitionFigure &end = verdicts[0].repetitions[0], &begin = verdicts[0].repetitions[1];
   if (std::isnan(begin.k) || std::isnan(end.k) || !(begin.k > 0)) return std::nullopt;
   ReferenceDrift drift;
   drift.k_begin = begin.k;
   drift.k_end = end.k;
-  const double thinning = density_of(runs, kBegin) / density_of(runs, kEnd);
+  const double thinning = density_of(runs, first) / density_of(runs, last);
   drift.same_air = std::isfinite(thinning);
   drift.share = end.k / begin.k * (drift.same_air ? thinning : 1) - 1;
   drift.u_share = std::hypot(begin.u / begin.k, end.u / end.k);
