@@ -9,11 +9,6 @@
 namespace kphi::profiles {
 namespace {
 
-template <class T>
-std::optional<T> optional(const ProfileReader& file, const std::string& pointer) {
-  return file.has(pointer) ? std::optional<T>(file.get<T>(pointer)) : std::nullopt;
-}
-
 /// A value to be set is also the one expected; another one beside it is a contradiction.
 template <class T>
 void agree(ProfileReader& file, const std::string& key, const std::optional<T>& set, T& expected) {
@@ -33,9 +28,9 @@ NetBoxConfig read_netbox(ProfileReader& file) {
   config.tcp_port = file.get_or("/netbox/tcp_port", static_cast<std::uint16_t>(config.rdt_port - 1));
   config.rate_hz = file.get_or("/netbox/rate_hz", config.rate_hz);
   config.records_per_datagram = file.get_or("/netbox/records_per_datagram", config.records_per_datagram);
-  config.settings = {
-      optional<double>(file, "/netbox/settings/rate_hz"), optional<int>(file, "/netbox/settings/records_per_datagram"),
-      optional<int>(file, "/netbox/settings/filter_hz"), optional<int>(file, "/netbox/settings/configuration")};
+  config.settings = {file.find<double>("/netbox/settings/rate_hz"),
+                     file.find<int>("/netbox/settings/records_per_datagram"),
+                     file.find<int>("/netbox/settings/filter_hz"), file.find<int>("/netbox/settings/configuration")};
   agree(file, "rate_hz", config.settings.rate_hz, config.rate_hz);
   agree(file, "records_per_datagram", config.settings.records_per_datagram, config.records_per_datagram);
   return config;

@@ -3,25 +3,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <string_view>
 #include <tuple>
 
 #include "profiles/profile_reader.hpp"
 
 namespace kphi::profiles {
+
+// The schema lists the same words.
+NLOHMANN_JSON_SERIALIZE_ENUM(RunOrderKind, {{RunOrderKind::listed, "listed"}, {RunOrderKind::shuffled, "shuffled"}})
+NLOHMANN_JSON_SERIALIZE_ENUM(StepOrderKind, {{StepOrderKind::up, "up"},
+                                             {StepOrderKind::down, "down"},
+                                             {StepOrderKind::shuffled, "shuffled"},
+                                             {StepOrderKind::up_and_down, "up_and_down"}})
+
 namespace {
-
-// In the order of the enumerators; the schema lists the same words.
-constexpr std::array<const char*, 2> kRunOrders{"listed", "shuffled"};
-constexpr std::array<const char*, 4> kStepOrders{"up", "down", "shuffled", "up_and_down"};
-
-template <class Kind, std::size_t n>
-Kind kind_of(const std::array<const char*, n>& names, const std::string& name) {
-  const auto found = std::find(names.begin(), names.end(), std::string_view(name));
-  return static_cast<Kind>(found == names.end() ? 0 : found - names.begin());
-}
 
 void check_speeds(ProfileReader& file) {
   const double most = file.number("/limits/speed_max_rpm");
@@ -88,8 +84,8 @@ Limits read_limits(ProfileReader& file) {
 
 Order read_order(ProfileReader& file) {
   Order order;
-  order.runs = kind_of<RunOrderKind>(kRunOrders, file.get_or<std::string>("/order/runs", name_of(order.runs)));
-  order.steps = kind_of<StepOrderKind>(kStepOrders, file.get_or<std::string>("/order/steps", name_of(order.steps)));
+  order.runs = file.get_or("/order/runs", order.runs);
+  order.steps = file.get_or("/order/steps", order.steps);
   order.seed = file.get_or<std::uint64_t>("/order/seed", order.seed);
   order.remount_each_repetition = file.get_or("/order/remount_each_repetition", order.remount_each_repetition);
   order.reference = file.get_or("/order/reference", order.reference);
@@ -99,11 +95,6 @@ Order read_order(ProfileReader& file) {
                 "add seed: and any whole number; the same seed gives the same order");
   }
   return order;
-}
-
-std::optional<double> read_slew(ProfileReader& file) {
-  if (!file.has("/profile/slew_rpm_s")) return std::nullopt;
-  return from_rpm(file.number("/profile/slew_rpm_s")).value();
 }
 
 }  // namespace
@@ -129,8 +120,9 @@ Campaign parse_campaign(const std::string& text, const std::string& path) {
   campaign.repetitions_extra_max = file.get_or<int>("/repetitions_extra_max", campaign.repetitions_extra_max);
   campaign.order = read_order(file);
   campaign.profile = {file.get<int>("/profile/steps"), Seconds(file.number("/profile/dwell_s")),
-                      from_rpm(file.number("/profile/first_rpm")), from_rpm(file.number("/profile/last_rpm")),
-                      read_slew(file)};
+                      from_rpm(file.number("/profile/first_rpm")), from_rpm(file.number("/profile/last_rpm"))};
+  if (const auto rpm_s = file.find<double>("/profile/slew_rpm_s"))
+    campaign.profile.slew_rad_s2 = from_rpm(*rpm_s).value();
   campaign.zero = Seconds(file.number("/zero_s"));
   campaign.box_bias = file.get_or("/box_bias", campaign.box_bias);
   campaign.minimum_discard = Seconds(file.number("/minimum_discard_s"));
@@ -147,12 +139,10 @@ Campaign parse_campaign(const std::string& text, const std::string& path) {
 
 Campaign load_campaign(const std::string& path) { return parse_campaign(read_text(path), path); }
 
-const char* name_of(RunOrderKind kind) { return kRunOrders[static_cast<std::size_t>(kind)]; }
-const char* name_of(StepOrderKind kind) { return kStepOrders[static_cast<std::size_t>(kind)]; }
-
 std::string to_words(const Order& order) {
   const bool seeded = order.runs == RunOrderKind::shuffled || order.steps == StepOrderKind::shuffled;
-  return fmt::format("runs {}, steps {}{}{}{}", name_of(order.runs), name_of(order.steps),
+  const auto word = [](const nlohmann::json& kind) { return kind.get<std::string>(); };
+  return fmt::format("runs {}, steps {}{}{}{}", word(order.runs), word(order.steps),
                      seeded ? fmt::format(" (seed {})", order.seed) : "",
                      order.remount_each_repetition ? ", remounted for each repetition" : "",
                      order.reference ? ", reference runs first and last" : "");

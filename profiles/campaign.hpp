@@ -23,8 +23,6 @@ struct Order {
   bool reference = false;                ///< the session begins and ends with a run without occlusion
 };
 
-[[nodiscard]] const char* name_of(RunOrderKind kind);
-[[nodiscard]] const char* name_of(StepOrderKind kind);
 /// "runs shuffled (seed 7), steps up_and_down, remounted for each repetition, reference runs first and last".
 [[nodiscard]] std::string to_words(const Order& order);
 

@@ -1,6 +1,7 @@
 // From a file's text to typed values: strict YAML, then the schema, then the checks of the kind at hand.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "profiles/schema.hpp"
@@ -23,8 +24,12 @@ class ProfileReader {
     return value(pointer).get<T>();
   }
   template <class T>
+  [[nodiscard]] std::optional<T> find(const std::string& pointer) const {
+    return has(pointer) ? std::optional<T>(get<T>(pointer)) : std::nullopt;
+  }
+  template <class T>
   [[nodiscard]] T get_or(const std::string& pointer, T otherwise) const {
-    return has(pointer) ? get<T>(pointer) : otherwise;
+    return find<T>(pointer).value_or(otherwise);
   }
   /// The keys of an object.
   [[nodiscard]] std::vector<std::string> keys(const std::string& pointer) const;
