@@ -1,6 +1,7 @@
 #include "fit/export/run_export.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <array>
 #include <chrono>
@@ -21,10 +22,8 @@ double physical(const results::LoadCellRecord& record, const results::LoadCellSc
 }
 
 std::string schema_of(const std::vector<const char*>& names) {
-  std::string properties;
-  for (const char* name : names)
-    properties += fmt::format("{}\"{}\":{{\"type\":\"number\"}}", properties.empty() ? "" : ",", name);
-  return "{\"type\":\"object\",\"properties\":{" + properties + "}}";
+  return fmt::format(R"({{"type":"object","properties":{{"{}":{{"type":"number"}}}}}})",
+                     fmt::join(names, R"(":{"type":"number"},")"));
 }
 
 void write_load_cell(const results::RunRecording& run, std::uint64_t epoch, McapWriter& writer) {

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cmath>
@@ -37,28 +38,23 @@ double speed_max_of(const compensation::Coefficients& file, const ExportOptions&
 }
 
 /// Control characters become blanks.
-std::string one_line(const std::string& text) {
-  std::string result = text;
-  for (char& c : result)
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
-  return result;
+std::string one_line(std::string text) {
+  std::ranges::replace_if(
+      text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, ' ');
+  return text;
 }
 
 /// "5x3, Cyclone T5040C; 1.23e-06 N/(rad/s)^2 at phi = 0 deg; measured …, fitted by kphi …; 15 runs", one line each.
 std::vector<std::string> provenance_lines(const compensation::Coefficients& file) {
   const auto known = [](const std::string& text) { return text.empty() ? std::string("unknown") : one_line(text); };
-  std::vector<std::string> lines;
-  lines.push_back(fmt::format("propeller {}, {}", known(file.propeller.id), known(file.propeller.name)));
-  lines.push_back(
-      fmt::format("K_T {} N/(rad/s)^2, standard error {}", yaml_number(file.curve.thrust_coefficient().value()),
-                  file.thrust_coefficient_error ? yaml_number(file.thrust_coefficient_error->value()) : "unknown"));
-  lines.push_back(fmt::format("phi is meant as the {} of the overlap", compensation::name_of(file.curve.overlap())));
-  lines.push_back(fmt::format("measured {}, campaign {}, {} runs, fitted by kphi {}", known(file.measured_utc),
-                              known(file.provenance.campaign), file.provenance.runs.size(), known(file.tool_version)));
-  lines.push_back(file.air_density_kg_m3
-                      ? fmt::format("in air of {:.4g} kg/m3; k scales with density", *file.air_density_kg_m3)
-                      : std::string("air density unknown; k holds for the air of that day"));
-  return lines;
+  return {fmt::format("propeller {}, {}", known(file.propeller.id), known(file.propeller.name)),
+          fmt::format("K_T {} N/(rad/s)^2, standard error {}", yaml_number(file.curve.thrust_coefficient().value()),
+                      file.thrust_coefficient_error ? yaml_number(file.thrust_coefficient_error->value()) : "unknown"),
+          fmt::format("phi is meant as the {} of the overlap", compensation::name_of(file.curve.overlap())),
+          fmt::format("measured {}, campaign {}, {} runs, fitted by kphi {}", known(file.measured_utc),
+                      known(file.provenance.campaign), file.provenance.runs.size(), known(file.tool_version)),
+          file.air_density_kg_m3 ? fmt::format("in air of {:.4g} kg/m3; k scales with density", *file.air_density_kg_m3)
+                                 : "air density unknown; k holds for the air of that day"};
 }
 
 /// Those lines, each behind `mark`.
@@ -133,8 +129,7 @@ std::string identifier(const std::string& id) {
 
 /// A backslash at the end of a comment's line would take in the next.
 std::string cpp_comment_safe(std::string text) {
-  for (char& c : text)
-    if (c == '\\') c = '/';
+  std::ranges::replace(text, '\\', '/');
   return text;
 }
 

@@ -129,17 +129,6 @@ StepsByAngle by_angle(std::span<const StepMean> steps) {
   return result;
 }
 
-StepsByAngle by_angle_or_refuse(const StepSelection& selection) {
-  StepsByAngle result = by_angle(selection.used);
-  if (result.empty()) {
-    throw FitError(
-        fmt::format("no step left to fit: {} outside the speed range, {} flagged; widen the range or repeat the "
-                    "runs",
-                    selection.outside_range, selection.flagged.size()));
-  }
-  return result;
-}
-
 std::vector<LinePoint> line_points(const std::vector<OcclusionCoefficient>& table) {
   std::vector<LinePoint> points;
   for (const OcclusionCoefficient& row : table) points.push_back({row.phi_deg, row.k, row.standard_error});
@@ -219,15 +208,19 @@ Identification identify(std::span<const StepMean> steps, const IdentificationOpt
   require_runs(steps, options.left_out);
   result.selection = select_steps(steps, options.speed_range, options.left_out);
   result.air = air_of(result.selection.used);
-  const StepsByAngle angles = by_angle_or_refuse(result.selection);
+  const StepsByAngle angles = by_angle(result.selection.used);
+  if (angles.empty()) {
+    throw FitError(
+        fmt::format("no step left to fit: {} outside the speed range, {} flagged; widen the range or repeat the runs",
+                    result.selection.outside_range, result.selection.flagged.size()));
+  }
   result.at_speed_rad_s = options.at_speed_rad_s.value_or(highest_common_level(angles));
 
   result.speed_max_rad_s = std::numeric_limits<double>::infinity();
+  result.fitted = {std::numeric_limits<double>::infinity(), 0};
   for (const auto& [phi_deg, used] : angles) {
-    const auto [low, high] = std::minmax_element(
-        used.begin(), used.end(), [](const StepMean& a, const StepMean& b) { return level(a) < level(b); });
-    const bool first = result.fitted.max_rad_s == 0;
-    result.fitted.min_rad_s = first ? level(*low) : std::min(result.fitted.min_rad_s, level(*low));
+    const auto [low, high] = std::ranges::minmax_element(used, {}, level);
+    result.fitted.min_rad_s = std::min(result.fitted.min_rad_s, level(*low));
     result.fitted.max_rad_s = std::max(result.fitted.max_rad_s, level(*high));
     result.speed_min_rad_s = std::max(result.speed_min_rad_s, level(*low));
     result.speed_max_rad_s = std::min(result.speed_max_rad_s, level(*high));
@@ -249,15 +242,9 @@ Identification identify_table(std::span<const LinePoint> points, const Identific
   result.diameter_in = options.diameter_in;
   result.blades = options.blades;
   result.line = fit_line(points, options.line);
-  for (const LinePoint& point : points) {
-    OcclusionCoefficient row;
-    row.phi_deg = point.phi_deg;
-    row.k = point.k;
-    row.standard_error = point.standard_error;
-    result.table.push_back(row);
-  }
-  std::sort(result.table.begin(), result.table.end(),
-            [](const auto& a, const auto& b) { return a.phi_deg < b.phi_deg; });
+  for (const LinePoint& point : points)
+    result.table.push_back({.phi_deg = point.phi_deg, .k = point.k, .standard_error = point.standard_error});
+  std::ranges::sort(result.table, {}, &OcclusionCoefficient::phi_deg);
   result.fitted = options.speed_range;
   result.speed_min_rad_s = options.speed_range.min_rad_s;
   result.speed_max_rad_s = options.speed_range.max_rad_s;

@@ -53,12 +53,12 @@ struct OcclusionCoefficient {
   /// N/(rad/s)². Of several repetitions: noise, zero and scatter between runs (Repeatability), without the errors
   /// common to all k; of a single one: of the fit.
   double standard_error = 0;
-  std::optional<Estimate> standard;  ///< k in standard air; nullopt if the air is unknown
-  std::size_t steps = 0;             ///< distinct levels
+  std::optional<Estimate> standard{};  ///< k in standard air; nullopt if the air is unknown
+  std::size_t steps = 0;               ///< distinct levels
   std::size_t repetitions = 0;
-  std::optional<ThrustFit> fit;              ///< nullopt in a table without steps
-  std::vector<results::StepMean> measured;   ///< behind `fit`, one per point of it
-  std::optional<SpeedCoefficient> at_speed;  ///< nullopt without a good step at that speed
+  std::optional<ThrustFit> fit{};              ///< nullopt in a table without steps
+  std::vector<results::StepMean> measured{};   ///< behind `fit`, one per point of it
+  std::optional<SpeedCoefficient> at_speed{};  ///< nullopt without a good step at that speed
 };
 
 struct Identification {

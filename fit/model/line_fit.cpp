@@ -22,7 +22,7 @@ constexpr double kErrorFloor = 1e-3;
 
 std::vector<LinePoint> sorted(std::span<const LinePoint> points) {
   std::vector<LinePoint> result(points.begin(), points.end());
-  std::sort(result.begin(), result.end(), [](const auto& a, const auto& b) { return a.phi_deg < b.phi_deg; });
+  std::ranges::sort(result, {}, &LinePoint::phi_deg);
   for (std::size_t i = 0; i < result.size(); ++i) {
     if (!std::isfinite(result[i].phi_deg) || !std::isfinite(result[i].k))
       throw FitError("line fit: an angle or a coefficient is not a number");

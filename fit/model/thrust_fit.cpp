@@ -55,18 +55,6 @@ Scale scale_of(const std::vector<Point>& points) {
   return scale;
 }
 
-std::size_t free_terms(ThrustForm form) {
-  switch (form) {
-    case ThrustForm::through_origin:
-      return 1;
-    case ThrustForm::with_offset:
-      return 2;
-    case ThrustForm::three_terms:
-      return 3;
-  }
-  return 3;
-}
-
 void require_distinct_speeds(const std::vector<Point>& points, std::size_t terms) {
   std::set<double> speeds;
   for (const Point& point : points) speeds.insert(point.speed_rad_s);
@@ -227,8 +215,7 @@ void judge(ThrustFit& fit, std::size_t terms) {
   }
   fit.rms_n = std::sqrt(residual_sum / static_cast<double>(fit.n - terms));
   fit.r_squared = total_sum > 0 ? 1 - residual_sum / total_sum : 0;
-  const auto [low, high] = std::minmax_element(
-      fit.points.begin(), fit.points.end(), [](const auto& a, const auto& b) { return a.speed_rad_s < b.speed_rad_s; });
+  const auto [low, high] = std::ranges::minmax_element(fit.points, {}, &Point::speed_rad_s);
   fit.speed_min_rad_s = low->speed_rad_s;
   fit.speed_max_rad_s = high->speed_rad_s;
 }
@@ -240,7 +227,7 @@ ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& opti
   require_numbers(points);
   fit.points.assign(points.begin(), points.end());
   fit.n = fit.points.size();
-  const std::size_t terms = free_terms(options.form);
+  const auto terms = static_cast<std::size_t>(options.form);
   if (fit.n < terms + 1) {
     throw FitError(
         fmt::format("thrust fit: {} points, but {} terms need at least {}; widen the range of speeds or "

@@ -36,11 +36,11 @@ struct Point {
   double u_speed_rad_s = 0;  ///< the same
 };
 
-/// Which terms of thrust() are free; the others are zero.
-enum class ThrustForm {
-  through_origin,  ///< k
-  with_offset,     ///< k and offset
-  three_terms,     ///< k, linear and offset
+/// Which terms of thrust() are free, and how many; the others are zero.
+enum class ThrustForm : std::uint8_t {
+  through_origin = 1,  ///< k
+  with_offset = 2,     ///< k and offset
+  three_terms = 3,     ///< k, linear and offset
 };
 
 /// Weights of the points.

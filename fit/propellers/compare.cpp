@@ -143,8 +143,7 @@ void remark_missing(Comparison& comparison) {
   const auto only = [&](const ComparedResult& has, const ComparedResult& lacks) {
     std::string names;
     for (const ComparedValue& estimate : has.estimates) {
-      const bool there = std::any_of(lacks.estimates.begin(), lacks.estimates.end(),
-                                     [&](const ComparedValue& other) { return other.name == estimate.name; });
+      const bool there = std::ranges::count(lacks.estimates, estimate.name, &ComparedValue::name) > 0;
       if (!there) names += (names.empty() ? "" : ", ") + estimate.name;
     }
     if (!names.empty()) comparison.remarks.push_back("only in " + has.name + ": " + names);
@@ -214,8 +213,7 @@ TruthCheck check_against_truth(const ComparedResult& found, const std::string& t
   }
   TruthCheck check{{}, true};
   for (const Limit& limit : limits) {
-    const auto one = std::find_if(found.estimates.begin(), found.estimates.end(),
-                                  [&](const ComparedValue& value) { return value.name == limit.name; });
+    const auto one = std::ranges::find(found.estimates, limit.name, &ComparedValue::name);
     if (one == found.estimates.end())
       throw ConfigurationError(fmt::format("{}: no {} to compare with the truth", found.name, limit.name));
     const double share = one->value / limit.value - 1;

@@ -390,8 +390,7 @@ Figure family_figure(std::span<const Fitted> family) {
 Figures draw_figures(const Identification& identification, const std::vector<ThrustShares>& shares,
                      const std::filesystem::path& folder, const std::string& gnuplot, const Settling* settling) {
   std::vector<Figure> wanted{share_figure(identification, shares)};
-  if (std::all_of(identification.table.begin(), identification.table.end(),
-                  [](const OcclusionCoefficient& row) { return row.fit.has_value(); })) {
+  if (std::ranges::all_of(identification.table, [](const auto& row) { return row.fit.has_value(); })) {
     wanted.push_back(thrust_figure(identification));
     wanted.push_back(speed_figure(identification));
     wanted.push_back(repetition_figure(identification));

@@ -308,8 +308,7 @@ std::string power_section(const Identification& identification) {
 }
 
 std::string step_section(const StepSelection& selection) {
-  const auto left_out = std::count_if(selection.flagged.begin(), selection.flagged.end(),
-                                      [](const FlaggedStep& flagged) { return flagged.left_out; });
+  const auto left_out = std::ranges::count(selection.flagged, true, &FlaggedStep::left_out);
   const std::string html =
       html_heading("Steps left out") +
       fmt::format("<p>{} steps were fitted; {} left out for a quality flag, {} outside the speed range.</p>\n",

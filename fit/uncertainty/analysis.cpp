@@ -101,9 +101,7 @@ LinePrediction predict(const Identification& identification, const ErrorSources&
   prediction.scaling_factor =
       sources.budget(fmt::format("k_i({} deg)", phi_deg), "1", curve.scaling_factor(from_degrees(phi_deg)), ratio);
   prediction.scaling_factor.rows.push_back(scaled(row, std::sqrt(1 + std::pow(norm(at), 2)) / line.K_T));
-  const auto [low, high] = std::minmax_element(line.points.begin(), line.points.end(),
-                                               [](const auto& a, const auto& b) { return a.phi_deg < b.phi_deg; });
-  prediction.extrapolated = phi_deg < low->phi_deg || phi_deg > high->phi_deg;
+  prediction.extrapolated = phi_deg < line.points.front().phi_deg || phi_deg > line.points.back().phi_deg;
   return prediction;
 }
 

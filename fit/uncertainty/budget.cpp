@@ -37,16 +37,17 @@ BudgetRow row_of(const ErrorSource& source, std::span<const double> weights) {
   double sum = 0, squares = 0, spread = 0, u_squares = 0, n = 0;
   for (std::size_t i = 0; i < weights.size(); ++i) {
     if (weights[i] == 0) continue;
-    const double one = weights[i] * source.sensitivity[i] * source.u[i];
+    const auto& [u, sensitivity, freedom] = source.effects[i];
+    const double one = weights[i] * sensitivity * u;
     sum += one;  // signed: common errors add before they are squared
     squares += one * one;
-    spread += std::pow(one, 4) / source.freedom[i];
-    u_squares += source.u[i] * source.u[i];
+    spread += std::pow(one, 4) / freedom;
+    u_squares += u * u;
     ++n;
   }
   BudgetRow row{source.name, source.evaluation, n > 0 ? std::sqrt(u_squares / n) : 0, source.unit};
   if (row.u > 0) row.sensitivity = (source.common ? sum : std::sqrt(squares)) / row.u;
-  row.freedom = source.common               ? source.freedom.front()
+  row.freedom = source.common               ? source.effects.front().freedom
                 : source.shared_freedom > 0 ? source.shared_freedom
                 : spread > 0                ? squares * squares / spread
                                             : kEndless;
@@ -55,28 +56,13 @@ BudgetRow row_of(const ErrorSource& source, std::span<const double> weights) {
   return row;
 }
 
-ErrorSource source_of(const char* name, Evaluation evaluation, const char* unit, std::size_t n) {
-  ErrorSource source;
-  source.name = name;
-  source.evaluation = evaluation;
-  source.unit = unit;
-  source.u.assign(n, kUnknown);
-  source.sensitivity.assign(n, 0);
-  source.freedom.assign(n, kEndless);
-  return source;
-}
-
 /// A relative error common to all measurements of the bench. k follows it to the power `power`; the user gives it with
 /// --u `option`.
 void add_common(ErrorSources& sources, const char* name, const char* option, const std::optional<double>& u,
                 double power, const char* unit = "1", const char* note = "") {
-  ErrorSource source = source_of(name, Evaluation::type_b, unit, sources.k.size());
-  source.common = true;
-  source.note = u ? note : fmt::format("unknown; give it with --u {}=VALUE", option);
-  for (std::size_t i = 0; i < sources.k.size(); ++i) {
-    source.u[i] = u.value_or(kUnknown);
-    source.sensitivity[i] = power * sources.k[i];
-  }
+  const std::string words = u ? note : fmt::format("unknown; give it with --u {}=VALUE", option);
+  ErrorSource source{name, Evaluation::type_b, unit, words, true};
+  for (const double k : sources.k) source.effects.push_back({u.value_or(kUnknown), power * k});
   sources.sources.push_back(std::move(source));
 }
 
@@ -90,33 +76,24 @@ void add_bench(ErrorSources& sources, const BenchUncertainty& bench) {
 }
 
 void add_repeatability(ErrorSources& sources, const Repeatability& all) {
-  const std::size_t n = all.angles.size();
-  ErrorSource noise = source_of("noise within runs", Evaluation::type_a, kUnitOfK, n);
-  ErrorSource between = source_of("repetitions", Evaluation::type_a, "1", n);
-  ErrorSource zero = source_of("zero drift", Evaluation::type_b, "N", n);
+  ErrorSource noise{"noise within runs", Evaluation::type_a, kUnitOfK};
+  ErrorSource between{"repetitions", Evaluation::type_a, "1"};
+  ErrorSource zero{"zero drift", Evaluation::type_b, "N", "rectangular, half of the drift of each zero"};
   between.shared_freedom = all.between.freedom;
   between.note = all.repeated ? "beyond noise and zero, pooled over phi" : "unknown: one run each";
-  zero.note = "rectangular, half of the drift of each zero";
-  for (std::size_t i = 0; i < n; ++i) {
-    const AngleScatter& angle = all.angles[i];
-    noise.u[i] = angle.within_u();
-    noise.sensitivity[i] = 1;
-    if (angle.within.freedom > 0) noise.freedom[i] = angle.within.freedom;
-    if (all.repeated) between.u[i] = all.between.u / std::sqrt(static_cast<double>(angle.runs.size()));
-    between.sensitivity[i] = angle.k;
-    zero.u[i] = angle.zero_u_n;
-    zero.sensitivity[i] = angle.zero_sensitivity;
+  for (const AngleScatter& angle : all.angles) {
+    const double runs = static_cast<double>(angle.runs.size());
+    noise.effects.push_back({angle.within_u(), 1, angle.within.freedom > 0 ? angle.within.freedom : kEndless});
+    between.effects.push_back({all.repeated ? all.between.u / std::sqrt(runs) : kUnknown, angle.k});
+    zero.effects.push_back({angle.zero_u_n, angle.zero_sensitivity});
   }
   sources.sources.insert(sources.sources.end(), {noise, between, zero});
 }
 
 void add_inadequacy(ErrorSources& sources, std::span<const SpeedDependence> speed) {
-  ErrorSource source = source_of("model T = k w^2", Evaluation::type_a, kUnitOfK, sources.k.size());
-  source.note = "deviation of k between speeds beyond noise, where the test finds it";
-  for (std::size_t i = 0; i < speed.size(); ++i) {
-    source.u[i] = speed[i].inadequacy;
-    source.sensitivity[i] = 1;
-  }
+  ErrorSource source{"model T = k w^2", Evaluation::type_a, kUnitOfK,
+                     "deviation of k between speeds beyond noise, where the test finds it"};
+  for (const SpeedDependence& one : speed) source.effects.push_back({one.inadequacy, 1});
   if (!speed.empty()) sources.sources.push_back(std::move(source));
 }
 
@@ -178,7 +155,8 @@ double ErrorSources::covariance(std::span<const double> a, std::span<const doubl
   for (const ErrorSource& source : sources) {
     double sum_a = 0, sum_b = 0, products = 0;
     for (std::size_t i = 0; i < k.size(); ++i) {
-      const double effect = std::isnan(source.u[i]) ? 0 : source.sensitivity[i] * source.u[i];
+      const auto& [u, sensitivity, freedom] = source.effects[i];
+      const double effect = std::isnan(u) ? 0 : sensitivity * u;
       sum_a += a[i] * effect;
       sum_b += b[i] * effect;
       products += a[i] * b[i] * effect * effect;
@@ -199,11 +177,8 @@ ErrorSources error_sources(const Repeatability& repeatability, std::span<const S
 }
 
 ErrorSources error_sources(std::vector<double> k, std::vector<double> standard_errors) {
-  ErrorSource source = source_of("given standard error", Evaluation::type_b, kUnitOfK, k.size());
-  for (std::size_t i = 0; i < k.size(); ++i) {
-    if (standard_errors[i] > 0) source.u[i] = standard_errors[i];
-    source.sensitivity[i] = 1;
-  }
+  ErrorSource source{"given standard error", Evaluation::type_b, kUnitOfK};
+  for (const double error : standard_errors) source.effects.push_back({error > 0 ? error : kUnknown, 1});
   return {std::move(k), {std::move(source)}};
 }
 

@@ -71,12 +71,15 @@ struct ErrorSource {
   std::string name;
   Evaluation evaluation = Evaluation::type_a;
   std::string unit;
-  std::string note;
-  bool common = false;              ///< the same error at every φ
-  double shared_freedom = 0;        ///< one estimate behind all φ; 0: each its own
-  std::vector<double> u;            ///< per φ, in `unit`; NaN: unknown
-  std::vector<double> sensitivity;  ///< of k per `unit`
-  std::vector<double> freedom;
+  std::string note{};
+  bool common = false;        ///< the same error at every φ
+  double shared_freedom = 0;  ///< one estimate behind all φ; 0: each its own
+  struct Effect {
+    double u = 0;            ///< in `unit`; NaN: unknown
+    double sensitivity = 0;  ///< of k per `unit`
+    double freedom = std::numeric_limits<double>::infinity();
+  };
+  std::vector<Effect> effects{};  ///< one per φ
 };
 
 struct ErrorSources {

@@ -53,8 +53,7 @@ std::vector<Run> runs_of(std::span<const results::StepMean> steps) {
     for (const Sample& sample : run.samples) xt += sample.x * sample.thrust, xx += sample.x * sample.x;
     run.k = xt / xx;
     run.zero_u_n = zero_u(steps, repetition);
-    std::sort(run.samples.begin(), run.samples.end(),
-              [](const Sample& a, const Sample& b) { return a.level < b.level; });
+    std::ranges::sort(run.samples, {}, &Sample::level);
     result.push_back(std::move(run));
   }
   return result;
@@ -256,14 +255,14 @@ std::vector<SpeedCoefficient> level_coefficients(const std::vector<Run>& runs) {
     for (const Sample& sample : run.samples) levels[sample.level].push_back({sample.speed, sample.thrust, 1});
   std::vector<SpeedCoefficient> rows;
   for (const auto& [index, points] : levels) rows.push_back(k_at_speed(points));
-  std::sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.speed_rad_s < b.speed_rad_s; });
+  std::ranges::sort(rows, {}, &SpeedCoefficient::speed_rad_s);
   return rows;
 }
 
 Angle prepare(const SpeedDependence& found, std::vector<Run> runs, const std::vector<Run>& complete) {
   Angle angle;
-  angle.model.zero_is_free =
-      std::any_of(runs.begin(), runs.end(), [](const Run& run) { return std::isnan(run.zero_u_n); });
+  angle.model.zero_is_free = std::ranges::any_of(
+      runs, [](double u) { return std::isnan(u); }, &Run::zero_u_n);
   angle.runs = std::move(runs);
   try {
     if (complete.size() > 1 && complete.front().samples.size() > 3) {
