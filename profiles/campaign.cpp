@@ -28,14 +28,6 @@ void check_speeds(ProfileReader& file) {
   }
 }
 
-void check_window(ProfileReader& file) {
-  const double dwell = file.number("/profile/dwell_s");
-  const double discard = file.number("/minimum_discard_s");
-  if (dwell > discard) return;
-  file.refuse("/profile/dwell_s", fmt::format("{} is not above {} s (minimum_discard_s)", dwell, discard),
-              "dwell longer, or nothing is left to average");
-}
-
 void check_occlusions(ProfileReader& file, const std::vector<double>& occlusions_deg) {
   for (std::size_t i = 1; i < occlusions_deg.size(); ++i) {
     const auto first = std::ranges::find(occlusions_deg, occlusions_deg[i]) - occlusions_deg.begin();
@@ -131,7 +123,7 @@ Campaign parse_campaign(const std::string& text, const std::string& path) {
   campaign.text = text;
   campaign.path = path;
   check_speeds(file);
-  check_window(file);
+  file.require_above("/profile/dwell_s", "/minimum_discard_s", " s", "dwell longer, or nothing is left to average");
   check_occlusions(file, campaign.occlusions_deg);
   file.finish();
   return campaign;

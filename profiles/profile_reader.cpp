@@ -62,6 +62,12 @@ void ProfileReader::refuse(const std::string& pointer, const std::string& what, 
       {document_.value_mark(pointer), pointer, fmt::format("{}: {}", dotted(pointer), what), next_move});
 }
 
+void ProfileReader::require_above(const std::string& high, const std::string& low, const char* unit,
+                                  const std::string& next_move) {
+  if (number(high) > number(low)) return;
+  refuse(high, fmt::format("{} is not above {}{} ({})", number(high), number(low), unit, dotted(low)), next_move);
+}
+
 void ProfileReader::finish() const {
   if (!document_.findings.empty()) throw RefusedFile(document_.path, document_.findings);
 }

@@ -39,6 +39,8 @@ class ProfileReader {
 
   /// Adds a finding at the value; `what` follows "name: ".
   void refuse(const std::string& pointer, const std::string& what, const std::string& next_move);
+  /// Adds one unless the number at `high` is above that at `low`; `unit` follows the latter: " m" or nothing.
+  void require_above(const std::string& high, const std::string& low, const char* unit, const std::string& next_move);
   /// Throws RefusedFile if anything was refused.
   void finish() const;
 

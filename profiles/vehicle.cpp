@@ -10,21 +10,6 @@
 namespace kphi::profiles {
 namespace {
 
-void check_order(ProfileReader& file, const char* low, const char* high) {
-  if (file.number(low) < file.number(high)) return;
-  file.refuse(high, fmt::format("{} is not above {} ({})", file.number(high), file.number(low), dotted(low)),
-              "swap or fix the two");
-}
-
-/// Closer in, an arm's own corner would be covered at every angle, and the closed forms do not hold.
-void check_arm_length(ProfileReader& file) {
-  const double arm = file.number("/arm_length_m");
-  const double radius = file.number("/propeller_radius_m");
-  if (arm > radius) return;
-  file.refuse("/arm_length_m", fmt::format("{} is not above {} m (propeller_radius_m)", arm, radius),
-              "check both; the propeller must clear the hinge of its arm");
-}
-
 /// The keys of the square and the key of any other body exclude each other.
 void check_one_body(ProfileReader& file) {
   if (!file.has("/body")) {
@@ -162,9 +147,11 @@ Vehicle parse_vehicle(const std::string& text, const std::string& path) {
   if (file.has("/control")) vehicle.control = read_control(file);
   vehicle.text = text;
   vehicle.path = path;
-  check_order(file, "/arm_angle_min_deg", "/arm_angle_max_deg");
-  check_order(file, "/speed_min_rpm", "/speed_max_rpm");
-  check_arm_length(file);
+  file.require_above("/arm_angle_max_deg", "/arm_angle_min_deg", "", "swap or fix the two");
+  file.require_above("/speed_max_rpm", "/speed_min_rpm", "", "swap or fix the two");
+  // Closer in, an arm's own corner would be covered at every angle, and the closed forms do not hold.
+  file.require_above("/arm_length_m", "/propeller_radius_m", " m",
+                     "check both; the propeller must clear the hinge of its arm");
   check_hinges(file, vehicle.hinge_turn_deg);
   file.finish();
   return vehicle;
