@@ -107,10 +107,8 @@ constexpr Meaning kMeanings[] = {
 Nanoseconds end_of(const Meaning& meaning, std::span<const StreamEvent> later, Nanoseconds begin) {
   if (meaning.concerns == Concerns::instant) return begin;
   if (meaning.concerns == Concerns::whole_run) return kForEver;
-  for (const StreamEvent& event : later) {
-    if (event.kind == meaning.end) return event.time_ns;
-  }
-  return kForEver;
+  const auto end = std::ranges::find(later, meaning.end, &StreamEvent::kind);
+  return end == later.end() ? kForEver : end->time_ns;
 }
 
 }  // namespace
@@ -122,11 +120,8 @@ std::uint32_t step_flags(const RunHeader& header, const MotorSeries& motor, cons
 }
 
 std::span<const SupplyReading> within(std::span<const SupplyReading> readings, const Window& window) {
-  const auto at = [&](Nanoseconds time) {
-    return std::partition_point(readings.begin(), readings.end(), [&](const auto& r) { return r.time_ns < time; });
-  };
-  const auto first = at(window.begin);
-  return {first, std::max(first, at(window.end))};
+  const auto first = std::ranges::lower_bound(readings, window.begin, {}, &SupplyReading::time_ns);
+  return {first, std::max(first, std::ranges::lower_bound(readings, window.end, {}, &SupplyReading::time_ns))};
 }
 
 std::uint32_t supply_flags(std::span<const SupplyReading> readings, bool settled) {
