@@ -19,28 +19,26 @@ class LegSums {
     const double distance = error.norm();
     const auto rotors = state.rotors();
     ++count_;
-    error_ += error;
-    error_rate_ += reference.velocity - estimate.velocity;
-    distance_ += distance;
+    sums_.mean_error += error;
+    sums_.mean_error_rate += reference.velocity - estimate.velocity;
+    sums_.mean_distance += distance;
     square_distance_ += distance * distance;
-    square_speed_ += rotors.squaredNorm() / 4;
-    fastest_ = std::max(fastest_, rotors.maxCoeff());
+    sums_.mean_square_speed += rotors.squaredNorm() / 4;
+    sums_.fastest = std::max(sums_.fastest, rotors.maxCoeff());
   }
   [[nodiscard]] LegResult result() const noexcept {
-    LegResult found;
-    found.mean_error = error_ / count_;
-    found.mean_error_rate = error_rate_ / count_;
-    found.mean_distance = distance_ / count_;
+    LegResult found = sums_;
+    found.mean_error /= count_;
+    found.mean_error_rate /= count_;
+    found.mean_distance /= count_;
+    found.mean_square_speed /= count_;
     found.deviation = std::sqrt(std::max(0.0, square_distance_ / count_ - found.mean_distance * found.mean_distance));
-    found.mean_square_speed = square_speed_ / count_;
-    found.fastest = fastest_;
     return found;
   }
 
  private:
-  double count_ = 0;
-  Eigen::Vector3d error_{0, 0, 0}, error_rate_{0, 0, 0};
-  double distance_ = 0, square_distance_ = 0, square_speed_ = 0, fastest_ = 0;
+  double count_ = 0, square_distance_ = 0;
+  LegResult sums_;  ///< of what it will hold the means
 };
 
 Eigen::Vector3d roll_pitch_yaw(const Eigen::Quaterniond& q) noexcept {
