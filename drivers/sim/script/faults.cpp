@@ -4,7 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
+#include <boost/algorithm/hex.hpp>
+#include <boost/algorithm/string/erase.hpp>
 #include <cmath>
 #include <optional>
 #include <type_traits>
@@ -72,10 +73,8 @@ constexpr FaultKey required(std::string_view name, double low = 0, double high =
 
 void as_tag(Fault& fault, const FaultKey& key, const std::string& word) {
   fault.tag = word;
-  const bool good = !word.empty() && std::all_of(word.begin(), word.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
-  });
-  if (!good) refuse(key.name, fmt::format("\"{}\" is not the name of an element", word));
+  if (word.empty() || word.find_first_not_of("0123456789abcdefghijklmnopqrstuvwxyz") != std::string::npos)
+    refuse(key.name, fmt::format("\"{}\" is not the name of an element", word));
 }
 void as_ip(Fault& fault, const FaultKey& key, const std::string& word) {
   fault.ip = word;
@@ -102,17 +101,13 @@ void as_reading(Fault& fault, const FaultKey&, const std::string& text) {
 }
 
 void as_bytes(Fault& fault, const FaultKey&, const std::string& text) {
-  std::string digits;
-  for (const char c : text) {
-    if (c == ' ') continue;
-    if (std::isxdigit(static_cast<unsigned char>(c)) == 0)
-      refuse("bytes", fmt::format("\"{}\" is not bytes like 55 3B", text));
-    digits += c;
+  try {
+    boost::algorithm::unhex(boost::algorithm::erase_all_copy(text, " "), std::back_inserter(fault.bytes));
+  } catch (const boost::algorithm::hex_decode_error&) {
+    refuse("bytes", fmt::format("\"{}\" is not bytes like 55 3B", text));
   }
-  if (digits.empty() || digits.size() % 2 != 0 || digits.size() > 256)
+  if (fault.bytes.empty() || fault.bytes.size() > 128)
     refuse("bytes", "give 1 to 128 bytes of two hexadecimal digits each");
-  for (std::size_t i = 0; i < digits.size(); i += 2)
-    fault.bytes.push_back(static_cast<std::uint8_t>(std::stoi(digits.substr(i, 2), nullptr, 16)));
 }
 
 const std::vector<FaultRow>& fault_rows() {

@@ -151,6 +151,7 @@ struct Fault {
   std::string tag{}, ip{};
   std::vector<std::uint8_t> bytes{};
 
+  [[nodiscard]] bool is(FaultKind what) const noexcept { return kind == what; }
   [[nodiscard]] Instant end() const noexcept { return lasts > Duration{0} ? at + lasts : kNever; }
   /// `used`: how many it has concerned so far.
   [[nodiscard]] bool active(Instant now, std::uint64_t used = 0) const noexcept {
