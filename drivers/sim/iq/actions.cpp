@@ -1,5 +1,4 @@
 // What the module does on commands, and by itself: sets, motion, reboots, timeouts.
-#include <algorithm>
 #include <cmath>
 
 #include "compensation/units.hpp"
@@ -137,12 +136,9 @@ void IqDevice::expire(Instant now) noexcept {
   const bool as_disarming = meaning == static_cast<int>(iq::TimeoutMeaning::disarm_behavior);
   const int behavior = static_cast<int>(as_disarming ? memory_.value(86, 9) : memory_.value(52, 18));
   const int song = static_cast<int>(as_disarming ? memory_.value(86, 10) : memory_.value(52, 19));
-  end_motion(behavior, settings_.quirks.legacy ? static_cast<int>(iq::SongOption::continuously) : song, now);
-}
-
-void IqDevice::end_motion(int behavior, int song, Instant now) noexcept {
+  const int played = settings_.quirks.legacy ? static_cast<int>(iq::SongOption::continuously) : song;
   rest(MotorDrive::Mode::coast);
-  ending_.begin({behavior, song, memory_.finite(87, 0), memory_.finite(87, 1)}, now);
+  ending_.begin({behavior, played, memory_.finite(87, 0), memory_.finite(87, 1)}, now);
   ending_.step(state_->speed, now, drive_);
 }
 

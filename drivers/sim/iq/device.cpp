@@ -70,8 +70,7 @@ void IqDevice::advance(Instant now) noexcept {
     ending_.step(state_->speed, now, drive_);
     if (!ending_.going_on()) memory_.store(52, 0, drive_.mode == MotorDrive::Mode::brake ? 0 : 1);
   }
-  if (++ticks_to_safety_ >= kTicksPerSafety) {
-    ticks_to_safety_ = 0;
+  if (++ticks_ % kTicksPerSafety == 0) {
     const IqReadings readings = sensors_.readings(*state_);
     if (safety_.check(memory_, readings) && memory_.value(84, 2) != 0) rest(MotorDrive::Mode::coast);
     const double coil = settings_.quirks.legacy ? derate(memory_, 77, 1, readings.coil_celsius)
@@ -132,29 +131,20 @@ void IqDevice::answer(std::uint8_t type, std::uint8_t sub, Instant now) {
   const IqMemory::Cell* cell = memory_.find(type, sub);
   if (cell == nullptr || !cell->entry.get()) return;
   std::uint32_t bits = cell->bits;
-  double truth = std::numeric_limits<double>::quiet_NaN();
+  IqReply reply;
   if (const auto value = live_value(iq_key(type, sub), sensors_.readings(*state_), now)) {
     bits = iq_bits(cell->entry.format, *value);
-    truth = live_value(iq_key(type, sub), sensors_.perfect(*state_), now).value_or(truth);
+    reply.truth = live_value(iq_key(type, sub), sensors_.perfect(*state_), now).value_or(reply.truth);
   }
-  std::array<std::uint8_t, 4> data{};
-  put_little(data.data(), bits, 4);
-  reply(type, sub, std::span(data).first(iq_size(cell->entry.format)), truth, now);
-}
-
-void IqDevice::reply(std::uint8_t type, std::uint8_t sub, std::span<const std::uint8_t> data, double truth,
-                     Instant now) {
   const bool on_zero = settings_.quirks.system_control_on_id_zero && type == kSystemControl;
-  IqReply reply;
   reply.asked = now;
   const double jitter = 0.5 * (random_.symmetric() + 1) * to_seconds(settings_.reply_jitter);
   reply.at = now + from_seconds((to_seconds(settings_.reply_latency) + jitter) * settings_.time_scale);
   reply.type = type;
   reply.sub = sub;
   reply.id = on_zero ? 0 : static_cast<std::uint8_t>(memory_.value(5, 14));
-  reply.size = static_cast<std::uint8_t>(data.size());
-  std::copy(data.begin(), data.end(), reply.bytes.begin());
-  reply.truth = truth;
+  reply.size = static_cast<std::uint8_t>(iq_size(cell->entry.format));
+  put_little(reply.bytes.data(), bits, reply.size);
   busy_until_ = reply.at;
   replies_.push_back(reply);
 }
@@ -172,7 +162,7 @@ int IqDevice::drive_mode() const noexcept {
 std::optional<double> IqDevice::live_value(std::uint16_t key, const IqReadings& r, Instant now) const noexcept {
   const auto is = [key](std::uint8_t type, std::uint8_t sub) { return key == iq_key(type, sub); };
   const auto fix16 = [](double share) { return std::lround(share * kFix16); };
-  if (is(5, 15)) return uptime(now);
+  if (is(5, 15)) return to_seconds(now - booted_) * (1 + settings_.oscillator_gain);
   if (is(50, 0)) return drive_mode();
   if (is(50, 8)) return stage_.mode == PowerStage::Mode::drive ? stage_.duty : 0;
   if (is(50, 9)) return control_.volts();
@@ -193,10 +183,6 @@ std::optional<double> IqDevice::live_value(std::uint16_t key, const IqReadings& 
   if (is(84, 0)) return safety_.now();
   if (is(84, 1)) return safety_.ever();
   return std::nullopt;
-}
-
-double IqDevice::uptime(Instant now) const noexcept {
-  return to_seconds(now - booted_) * (1 + settings_.oscillator_gain);
 }
 
 }  // namespace kphi::sim

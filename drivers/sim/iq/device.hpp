@@ -4,7 +4,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <limits>
@@ -107,7 +106,6 @@ class IqDevice {
   void answer(std::uint8_t type, std::uint8_t sub, Instant now);
   void set(std::uint8_t type, std::uint8_t sub, std::span<const std::uint8_t> data, Instant now);
   void save(std::uint8_t type, std::uint8_t sub) noexcept;
-  void reply(std::uint8_t type, std::uint8_t sub, std::span<const std::uint8_t> data, double truth, Instant now);
   /// The value of an entry that follows the physics, by these readings.
   [[nodiscard]] std::optional<double> live_value(std::uint16_t key, const IqReadings& readings,
                                                  Instant now) const noexcept;
@@ -122,9 +120,7 @@ class IqDevice {
 
   // Time.
   void expire(Instant now) noexcept;
-  void end_motion(int behavior, int song, Instant now) noexcept;
   void restart_timeout(Instant now) noexcept;
-  [[nodiscard]] double uptime(Instant now) const noexcept;
 
   IqSettings settings_;
   const MotorState* state_;
@@ -153,7 +149,7 @@ class IqDevice {
   std::uint64_t frames_ = 0;
   std::uint64_t timeouts_ = 0;
   std::uint64_t boots_ = 0;
-  int ticks_to_safety_ = 0;
+  std::uint64_t ticks_ = 0;
 };
 
 }  // namespace kphi::sim

@@ -1,6 +1,5 @@
 #include "drivers/sim/iq/entries.hpp"
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -13,9 +12,9 @@ using enum IqPresence;
 
 constexpr std::uint8_t G = 1, S = 2, GS = 3, GSV = 7;
 
-// Type, sub, format, access, value, firmware: all that the vendor's clients may ask. Sorted by type and sub. Values:
-// published numbers of the 2306 where there are any, otherwise plausible; velocity_Kp, Ki and ff are tuned for 5" and
-// 6" propellers. A read-only row that follows the physics holds 0.
+// Type, sub, format, access, value, firmware, count: all that the vendor's clients may ask. Values: published numbers
+// of the 2306 where there are any, otherwise plausible; velocity_Kp, Ki and ff are tuned for 5" and 6" propellers. A
+// read-only row that follows the physics holds 0.
 constexpr auto kEntries = std::to_array<IqEntry>({
     // system_control
     {5, 0, none, S},
@@ -29,8 +28,7 @@ constexpr auto kEntries = std::to_array<IqEntry>({
     {5, 9, u8, G, 3},
     {5, 10, u8, G, 1},
     {5, 11, u8, G, 12},
-    {5, 12, u8, G},
-    {5, 13, u8, G},
+    {5, 12, u8, G, 0, always, 2},
     {5, 14, u8, GSV, 0},
     {5, 15, f32, G},
     {5, 16, u32, G, 0x00100020},    // firmware: speed 0.0.32
@@ -47,30 +45,17 @@ constexpr auto kEntries = std::to_array<IqEntry>({
     {16, 0, u32, G, 115200},
     // brushless_drive
     {50, 0, u8, G},
-    {50, 1, f32, S},
-    {50, 2, f32, S},
-    {50, 3, f32, S},
-    {50, 4, f32, S},
-    {50, 5, none, S},
-    {50, 6, none, S},
-    {50, 7, f32, G},
-    {50, 8, f32, G},
-    {50, 9, f32, G},
-    {50, 10, f32, G},
-    {50, 11, f32, G},
-    {50, 12, f32, G},
-    {50, 13, f32, G},
+    {50, 1, f32, S, 0, always, 4},
+    {50, 5, none, S, 0, always, 2},
+    {50, 7, f32, G, 0, always, 7},
     {50, 14, u16, GSV, 7},
-    {50, 15, u8, GSV, 0},
-    {50, 16, u8, GSV, 0},
+    {50, 15, u8, GSV, 0, always, 2},
     {50, 17, f32, GSV, 1.25},
     {50, 18, f32, GSV, 2.5e-5},
     {50, 19, u32, GSV, 48000},
-    {50, 20, f32, GS},
-    {50, 21, f32, GS},
+    {50, 20, f32, GS, 0, always, 2},
     {50, 22, u8, GSV, 1},
-    {50, 23, f32, G},
-    {50, 24, f32, G},
+    {50, 23, f32, G, 0, always, 2},
     {50, 25, f32, GSV, 0.5},
     {50, 26, f32, GSV, 0.1},
     {50, 27, f32, GSV, 10},
@@ -79,27 +64,22 @@ constexpr auto kEntries = std::to_array<IqEntry>({
     {50, 33, f32, GSV, 0.045},  // motor and controller
     {50, 34, f32, GSV, 30},
     {50, 35, f32, GSV, 27},
-    {50, 36, f32, G},
-    {50, 37, f32, G},
+    {50, 36, f32, G, 0, always, 2},
     {50, 38, f32, GSV, 3400},
     {50, 39, f32, GSV, 3500},
     {50, 40, f32, GSV, 1.5e-5},
     {50, 41, i32, G, 65536},
     {50, 42, f32, GSV, 28},
     {50, 43, f32, GSV, 30},
-    {50, 44, f32, G},
-    {50, 45, f32, G},
+    {50, 44, f32, G, 0, always, 2},
     {50, 46, f32, GSV, 500},
     {50, 47, u8, GSV, 0},
     {50, 61, u32, GSV, 100},
     {50, 62, u32, GSV, 1000},
     // propeller_motor_control
     {52, 0, i8, G, 1},
-    {52, 1, none, S},
-    {52, 2, none, S},
-    {52, 3, f32, GS, 0},
-    {52, 4, f32, GS, 0},
-    {52, 5, f32, GS, 0},
+    {52, 1, none, S, 0, always, 2},
+    {52, 3, f32, GS, 0, always, 3},
     {52, 7, f32, GSV, 0.02},
     {52, 8, f32, GSV, 0.9},
     {52, 9, f32, GSV, 0},
@@ -108,8 +88,7 @@ constexpr auto kEntries = std::to_array<IqEntry>({
     {52, 12, f32, GSV, 2.0e-7},
     {52, 15, f32, GSV, 0.5},
     {52, 16, u32, GSV, 100},
-    {52, 17, u8, GSV, 0, current},
-    {52, 18, u8, GSV, 0, current},
+    {52, 17, u8, GSV, 0, current, 2},
     {52, 19, u8, GSV, 1, current},
     // esc_propeller_input_parser
     {60, 0, u8, GSV, 0},
@@ -124,14 +103,10 @@ constexpr auto kEntries = std::to_array<IqEntry>({
     {60, 10, f32, GSV, 0.04},
     {60, 11, u8, GSV, 0},
     // power_monitor
-    {69, 0, f32, G},
-    {69, 1, f32, G},
-    {69, 2, f32, G},
-    {69, 3, f32, G},
+    {69, 0, f32, G, 0, always, 4},
     {69, 5, u32, G, 40000},
     {69, 6, u32, GSV, 100},
-    {69, 7, u16, G},
-    {69, 8, u16, G},
+    {69, 7, u16, G, 0, always, 2},
     {69, 9, f32, GSV, 0.009},
     {69, 10, f32, GSV, 0.03},
     {69, 11, f32, GSV, 2048},
@@ -152,8 +127,7 @@ constexpr auto kEntries = std::to_array<IqEntry>({
     {76, 4, u32, GSV, 1000},
     {76, 5, none, S},
     {76, 6, u16, GSV, 0},
-    {76, 7, u8, GSV, 0},
-    {76, 8, u8, GSV, 0},
+    {76, 7, u8, GSV, 0, always, 2},
     // temperature_estimator
     {77, 0, f32, G, 0, legacy},
     {77, 1, f32, GSV, 140, legacy},
@@ -162,8 +136,7 @@ constexpr auto kEntries = std::to_array<IqEntry>({
     {77, 4, f32, GSV, 6, legacy},
     {77, 5, i32, G, 65536, legacy},
     // coil_temperature_estimator
-    {83, 0, f32, G, 0, current},
-    {83, 1, f32, G, 0, current},
+    {83, 0, f32, G, 0, current, 2},
     {83, 2, f32, GSV, 25, current},
     {83, 3, f32, GSV, 0.05, current},
     {83, 4, f32, GSV, 0.25, current},
@@ -173,9 +146,7 @@ constexpr auto kEntries = std::to_array<IqEntry>({
     {83, 8, f32, GSV, 140, current},
     {83, 9, f32, GSV, 150, current},
     {83, 10, f32, G, 1, current},
-    {83, 11, f32, G, 0, current},
-    {83, 12, f32, G, 0, current},
-    {83, 13, f32, G, 0, current},
+    {83, 11, f32, G, 0, current, 3},
     // power_safety
     {84, 0, u8, G},
     {84, 1, u8, GS},
@@ -198,12 +169,9 @@ constexpr auto kEntries = std::to_array<IqEntry>({
     {86, 3, f32, GSV, 0.075},
     {86, 4, f32, GSV, 0},
     {86, 5, u8, GSV, 0},
-    {86, 6, f32, GSV, 0},
-    {86, 7, f32, GSV, 0},
+    {86, 6, f32, GSV, 0, always, 2},
     {86, 8, u32, GSV, 10},
-    {86, 9, u8, GSV, 0},
-    {86, 10, u8, GSV, 0},
-    {86, 11, u8, GSV, 0},
+    {86, 9, u8, GSV, 0, always, 3},
     {86, 12, u8, G, 0},
     {86, 13, u32, GSV, 10},
     {86, 14, u8, GSV, 0},
@@ -211,22 +179,8 @@ constexpr auto kEntries = std::to_array<IqEntry>({
     {87, 0, f32, GSV, 5},
     {87, 1, f32, GSV, 1},
     // iquart_flight_controller_interface
-    {88, 2, u8, GSV, 255},
-    {88, 3, u8, GSV, 255},
-    {88, 4, u8, GSV, 255},
+    {88, 2, u8, GSV, 255, always, 3},
 });
-
-constexpr std::uint16_t key_of(const IqEntry& entry) noexcept { return iq_key(entry.type, entry.sub); }
-static_assert(std::is_sorted(kEntries.begin(), kEntries.end(),
-                             [](const IqEntry& a, const IqEntry& b) { return key_of(a) < key_of(b); }),
-              "the table is searched by bisection");
-
-double value_of(IqFormat format, std::uint32_t bits) noexcept {
-  if (format == f32) return static_cast<double>(std::bit_cast<float>(bits));
-  if (format == i8) return static_cast<std::int8_t>(bits);
-  if (format == i32) return static_cast<std::int32_t>(bits);
-  return bits;
-}
 
 }  // namespace
 
@@ -235,32 +189,38 @@ std::uint32_t iq_bits(IqFormat format, double value) noexcept {
   return static_cast<std::uint32_t>(static_cast<std::int64_t>(value));
 }
 
-std::span<const IqEntry> iq_entries() noexcept { return kEntries; }
+std::vector<IqEntry> iq_entries() {
+  std::vector<IqEntry> all;
+  for (IqEntry entry : kEntries) {
+    for (int left = entry.count; left > 0; --left, ++entry.sub) all.push_back(entry);
+  }
+  return all;
+}
 
 bool iq_present(const IqEntry& entry, const IqQuirks& quirks) noexcept {
   return entry.presence == always || (entry.presence == legacy) == quirks.legacy;
 }
 
 IqMemory::IqMemory(const IqQuirks& quirks) {
-  cells_.reserve(kEntries.size());
-  for (const auto& entry : kEntries) {
+  for (const IqEntry& entry : iq_entries()) {
     const std::uint32_t bits = iq_bits(entry.format, entry.value);
-    if (iq_present(entry, quirks)) cells_.push_back({entry, bits, bits});
+    if (iq_present(entry, quirks)) cells_.insert({iq_key(entry.type, entry.sub), {entry, bits, bits}});
   }
   if (quirks.legacy) provide(5, 16, 0x0010000a);  // speed 0.0.10
 }
 
-double IqMemory::Cell::value() const noexcept { return value_of(entry.format, bits); }
+double IqMemory::Cell::value() const noexcept {
+  if (entry.format == f32) return static_cast<double>(std::bit_cast<float>(bits));
+  if (entry.format == i8) return static_cast<std::int8_t>(bits);
+  if (entry.format == i32) return static_cast<std::int32_t>(bits);
+  return bits;
+}
 
 void IqMemory::Cell::store(double value) noexcept { bits = iq_bits(entry.format, value); }
 
 IqMemory::Cell* IqMemory::find(std::uint8_t type, std::uint8_t sub) noexcept {
-  const auto key = iq_key(type, sub);
-  const auto found = std::lower_bound(cells_.begin(), cells_.end(), key, [](const Cell& cell, std::uint16_t wanted) {
-    return key_of(cell.entry) < wanted;
-  });
-  if (found == cells_.end() || key_of(found->entry) != key) return nullptr;
-  return &*found;
+  const auto found = cells_.find(iq_key(type, sub));
+  return found == cells_.end() ? nullptr : &found->second;
 }
 
 const IqMemory::Cell* IqMemory::find(std::uint8_t type, std::uint8_t sub) const noexcept {
@@ -289,7 +249,7 @@ void IqMemory::provide(std::uint8_t type, std::uint8_t sub, double value) noexce
 }
 
 void IqMemory::reboot() noexcept {
-  for (Cell& cell : cells_) cell.bits = cell.saved;
+  for (auto& [key, cell] : cells_) cell.bits = cell.saved;
 }
 
 }  // namespace kphi::sim

@@ -4,7 +4,7 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
+#include <map>
 #include <vector>
 
 namespace kphi::sim {
@@ -44,14 +44,15 @@ struct IqEntry {
   std::uint8_t access;  ///< bits 0, 1, 2: get, set, save
   double value = 0;     ///< at the factory
   IqPresence presence = IqPresence::always;
+  std::uint8_t count = 1;  ///< rows of the table: entries that are alike, from `sub` on
 
   [[nodiscard]] constexpr bool get() const noexcept { return (access & 1) != 0; }
   [[nodiscard]] constexpr bool set() const noexcept { return (access & 2) != 0; }
   [[nodiscard]] constexpr bool save() const noexcept { return (access & 4) != 0; }
 };
 
-/// Every row of both firmwares, sorted by type and sub.
-[[nodiscard]] std::span<const IqEntry> iq_entries() noexcept;
+/// Every entry of both firmwares.
+[[nodiscard]] std::vector<IqEntry> iq_entries();
 [[nodiscard]] bool iq_present(const IqEntry& entry, const IqQuirks& quirks) noexcept;
 
 /// The module's memory: the bits of every entry, so that a NaN, too, comes back as it was sent.
@@ -81,7 +82,7 @@ class IqMemory {
   void reboot() noexcept;  ///< volatile = saved
 
  private:
-  std::vector<Cell> cells_;
+  std::map<std::uint16_t, Cell> cells_;  ///< by iq_key()
 };
 
 }  // namespace kphi::sim

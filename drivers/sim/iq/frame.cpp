@@ -1,6 +1,7 @@
 #include "drivers/sim/iq/frame.hpp"
 
 #include <algorithm>
+#include <boost/crc.hpp>
 
 #include "drivers/sim/transport/bytes.hpp"
 
@@ -14,13 +15,9 @@ constexpr std::size_t kOverhead = 5;  // start, LEN, TYPE, CRC
 }  // namespace
 
 std::uint16_t iq_crc(std::span<const std::uint8_t> bytes) noexcept {
-  std::uint32_t crc = 0xffff;
-  for (const std::uint8_t byte : bytes) {
-    crc ^= static_cast<std::uint32_t>(byte) << 8;
-    for (int bit = 0; bit < 8; ++bit) crc = (crc & 0x8000) != 0 ? (crc << 1) ^ 0x1021 : crc << 1;
-    crc &= 0xffff;
-  }
-  return static_cast<std::uint16_t>(crc);
+  boost::crc_optimal<16, 0x1021, 0xffff, 0, false, false> crc;
+  crc.process_bytes(bytes.data(), bytes.size());
+  return static_cast<std::uint16_t>(crc.checksum());
 }
 
 void append_iq_frame(std::vector<std::uint8_t>& out, std::uint8_t type, std::uint8_t sub, std::uint8_t access,
@@ -48,19 +45,13 @@ void IqScanner::clear() noexcept {
 }
 
 std::optional<IqFrame> IqScanner::next() noexcept {
-  while (position_ < bytes_.size()) {
+  for (; position_ < bytes_.size(); ++position_) {
     const auto rest = std::span<const std::uint8_t>(bytes_).subspan(position_);
-    if (rest[0] != kStart) {
-      ++position_;
-      continue;
-    }
+    if (rest[0] != kStart) continue;
     if (rest.size() < 2) return std::nullopt;
     const std::size_t length = rest[1];
     if (length <= kPayloadMax && rest.size() < length + kOverhead) return std::nullopt;
-    if (length > kPayloadMax || iq_crc(rest.subspan(1, length + 2)) != little(rest.subspan(length + 3, 2))) {
-      ++position_;
-      continue;
-    }
+    if (length > kPayloadMax || iq_crc(rest.subspan(1, length + 2)) != little(rest.subspan(length + 3, 2))) continue;
     position_ += length + kOverhead;
     return IqFrame{rest[2], rest.subspan(3, length)};
   }

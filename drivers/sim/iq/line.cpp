@@ -46,7 +46,7 @@ void IqLine::advance(Instant now) {
   meet_events(now);
   carry_commands(now);
   take_replies(now);
-  let_pass(now);
+  if (hold_until_ <= now) release(hold_until_);
   arrive(now);
 }
 
@@ -112,11 +112,8 @@ void IqLine::carry(const IqReply& reply) {
     held_ = std::move(decision);
     return;
   }
-  const Instant at = reply.at;
   emit(std::move(decision));
-  if (!held_) return;
-  held_->passage.ready = std::max(held_->passage.ready, at);
-  emit(*std::exchange(held_, std::nullopt));
+  release(reply.at);
 }
 
 void IqLine::act(std::size_t index, FaultDecision& decision) {
@@ -124,34 +121,34 @@ void IqLine::act(std::size_t index, FaultDecision& decision) {
   IqReply& reply = decision.reply;
   Passage& passage = decision.passage;
   using K = FaultKind;
-  const auto is = [&fault](K kind) { return fault.kind == kind; };
   // The reply itself.
-  if (is(K::motor_drop)) decision.dropped = true;
-  if (is(K::motor_duplicate)) ++decision.copies;
-  if (is(K::motor_reorder)) decision.overtaken_for = fault.delay;
-  if (is(K::motor_value) && reply.size == 4)
+  if (fault.is(K::motor_drop)) decision.dropped = true;
+  if (fault.is(K::motor_duplicate)) ++decision.copies;
+  if (fault.is(K::motor_reorder)) decision.overtaken_for = fault.delay;
+  if (fault.is(K::motor_value) && reply.size == 4)
     put_little(reply.bytes.data(), std::bit_cast<std::uint32_t>(static_cast<float>(fault.reading)), 4);
-  if (is(K::motor_wrong_length)) reply.size = static_cast<std::uint8_t>(fault.size);
-  if (is(K::motor_wrong_id)) reply.id = static_cast<std::uint8_t>(fault.id);
-  if (is(K::motor_stuck))
+  if (fault.is(K::motor_wrong_length)) reply.size = static_cast<std::uint8_t>(fault.size);
+  if (fault.is(K::motor_wrong_id)) reply.id = static_cast<std::uint8_t>(fault.id);
+  if (fault.is(K::motor_stuck))
     reply.bytes = stuck_[index].try_emplace(iq_key(reply.type, reply.sub), reply).first->second.bytes;
   // Its bytes.
-  if (is(K::motor_flip)) decision.flips += fault.bits;
-  if (is(K::motor_bad_crc)) decision.bad_crc = true;
-  if (is(K::motor_truncate)) decision.truncated = static_cast<std::size_t>(fault.size);
-  if (is(K::motor_garbage)) {
+  if (fault.is(K::motor_flip)) decision.flips += fault.bits;
+  if (fault.is(K::motor_bad_crc)) decision.bad_crc = true;
+  if (fault.is(K::motor_truncate)) decision.truncated = static_cast<std::size_t>(fault.size);
+  if (fault.is(K::motor_garbage)) {
     for (std::size_t i = 0; fault.bytes.empty() && i < fault.size; ++i) decision.before.push_back(random_byte());
     decision.before.insert(decision.before.end(), fault.bytes.begin(), fault.bytes.end());
   }
   // When they come.
   const std::int64_t period = std::max<std::int64_t>(1, fault.delay.count());
-  if (is(K::motor_merge)) passage.together = Instant((reply.at.count() / period + 1) * period);
-  if (is(K::motor_split)) passage.between = fault.delay;
-  if (is(K::motor_stall)) {
+  if (fault.is(K::motor_merge)) passage.together = Instant((reply.at.count() / period + 1) * period);
+  if (fault.is(K::motor_split)) passage.between = fault.delay;
+  if (fault.is(K::motor_stall)) {
     passage.stall_after = static_cast<std::size_t>(fault.size);
     passage.stall = fault.delay;
   }
-  if (is(K::motor_delay)) passage.ready += fault.delay + from_seconds(script_.uniform() * to_seconds(fault.jitter));
+  if (fault.is(K::motor_delay))
+    passage.ready += fault.delay + from_seconds(script_.uniform() * to_seconds(fault.jitter));
 }
 
 void IqLine::emit(FaultDecision decision) {
@@ -194,11 +191,11 @@ void IqLine::schedule(Passage passage) {
   to_host_.push_back(std::move(passage));
 }
 
-void IqLine::let_pass(Instant now) {
-  if (held_ && hold_until_ <= now) {
-    held_->passage.ready = std::max(held_->passage.ready, hold_until_);
-    emit(*std::exchange(held_, std::nullopt));
-  }
+/// Sends what was held back.
+void IqLine::release(Instant at) {
+  if (!held_) return;
+  held_->passage.ready = std::max(held_->passage.ready, at);
+  emit(*std::exchange(held_, std::nullopt));
 }
 
 /// When the next byte of what is first in the line reaches the host's port.

@@ -4,12 +4,10 @@
 
 #include <cstdint>
 #include <deque>
-#include <limits>
 #include <map>
 #include <optional>
 #include <set>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "base/clock.hpp"
@@ -121,7 +119,7 @@ class IqLine {
   void emit(FaultDecision decision);
   void put(const FaultDecision& decision, std::size_t entry);
   void schedule(Passage passage);
-  void let_pass(Instant now);
+  void release(Instant at);
   void arrive(Instant now);
   [[nodiscard]] Instant arrival_of(const Passage& passage) const noexcept;
   void finish(const Passage& passage, Instant at);

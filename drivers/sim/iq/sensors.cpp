@@ -52,10 +52,7 @@ void IqSensors::step(const MotorState& truth) noexcept {
   convert(truth);
   model(truth);
   heat_square_ += readings_.motor_amps * readings_.motor_amps;
-  if (++ticks_to_estimate_ == kTicksPerEstimate) {
-    ticks_to_estimate_ = 0;
-    estimate_coil();
-  }
+  if (++ticks_ % kTicksPerEstimate == 0) estimate_coil();
 }
 
 IqReadings IqSensors::readings(const MotorState& truth) const noexcept {

@@ -75,7 +75,7 @@ class IqSensors {
   IqReadings readings_;
   double joules_at_reset_ = 0;
   double heat_square_ = 0;
-  int ticks_to_estimate_ = 0;
+  std::uint64_t ticks_ = 0;
 };
 
 }  // namespace kphi::sim
