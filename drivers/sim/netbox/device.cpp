@@ -1,6 +1,7 @@
 #include "drivers/sim/netbox/device.hpp"
 
 #include <algorithm>
+#include <boost/endian/conversion.hpp>
 #include <cmath>
 
 #include "drivers/sim/physics/motor.hpp"
@@ -8,6 +9,8 @@
 
 namespace kphi::sim {
 namespace {
+
+using namespace boost::endian;
 
 constexpr std::uint32_t kHeader = 0x1234;
 constexpr std::uint32_t kErrorSummary = 1u << 31;
@@ -50,8 +53,8 @@ NetBoxDevice::NetBoxDevice(const NetBoxSettings& settings)
       ft_sequence_(settings.first_ft_sequence - 1) {}
 
 void NetBoxDevice::receive(std::span<const std::uint8_t> datagram, Peer peer) {
-  if (datagram.size() != 8 || big(datagram.first(2)) != kHeader) return;
-  const std::uint32_t command = big(datagram.subspan(2, 2)), samples = big(datagram.subspan(4, 4));
+  if (datagram.size() != 8 || load_big_u16(datagram.data()) != kHeader) return;
+  const std::uint32_t command = load_big_u16(datagram.data() + 2), samples = load_big_u32(datagram.data() + 4);
   const bool axia = settings_.quirks.axia;
   const int block = settings_.records_per_datagram;
   if (command == kStop) stop();
@@ -59,7 +62,9 @@ void NetBoxDevice::receive(std::span<const std::uint8_t> datagram, Peer peer) {
   if (command == kStartRealTime) start(peer, axia ? block : 1, samples);
   if (command == kStartBuffered && !axia) start(peer, block, samples);
   if (command == kStartMultiUnit && !axia) start(peer, 1, samples);
-  if (command == kSetBias) bias();
+  if (command != kSetBias) return;
+  signal_.take_software_bias();
+  if (settings_.quirks.bias_stops_stream) stop();
 }
 
 void NetBoxDevice::start(Peer peer, int records_per_datagram, std::uint32_t sample_count) noexcept {
@@ -81,11 +86,6 @@ void NetBoxDevice::restart_stream() noexcept {
 void NetBoxDevice::stop() noexcept {
   streaming_ = false;
   open_.size = 0;
-}
-
-void NetBoxDevice::bias() noexcept {
-  signal_.take_software_bias();
-  if (settings_.quirks.bias_stops_stream) stop();
 }
 
 void NetBoxDevice::power_cycle(bool resume) {
@@ -141,12 +141,12 @@ void NetBoxDevice::measure(const Wrench& wrench) noexcept {
 
 void NetBoxDevice::append_record(Instant at) {
   std::uint8_t* to = open_.bytes.data() + open_.size;
-  put_big(to, ++rdt_sequence_);
-  put_big(to + 4, ft_sequence_);
-  put_big(to + 8, status_);
+  store_big_u32(to, ++rdt_sequence_);
+  store_big_u32(to + 4, ft_sequence_);
+  store_big_u32(to + 8, status_);
   const auto& counts = signal_.counts();
   for (std::size_t axis = 0; axis < counts.size(); ++axis) {
-    put_big(to + 12 + 4 * axis, static_cast<std::uint32_t>(counts[axis]));
+    store_big_u32(to + 12 + 4 * axis, static_cast<std::uint32_t>(counts[axis]));
   }
   open_.sampled[open_.size / kRecordBytes] = at;
   open_.size += kRecordBytes;

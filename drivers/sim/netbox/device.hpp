@@ -81,7 +81,6 @@ class NetBoxDevice {
  private:
   void start(Peer peer, int records_per_datagram, std::uint32_t sample_count) noexcept;
   void stop() noexcept;
-  void bias() noexcept;
   void measure(const Wrench& wrench) noexcept;
   void append_record(Instant at);
   std::string write(std::string_view page, std::string_view query);

@@ -2,9 +2,8 @@
 #include "drivers/sim/netbox/fault_injector.hpp"
 
 #include <algorithm>
+#include <boost/endian/conversion.hpp>
 #include <cmath>
-
-#include "drivers/sim/transport/bytes.hpp"
 
 namespace kphi::sim {
 namespace {
@@ -13,7 +12,7 @@ bool on_datagrams(FaultKind kind) noexcept { return within(kind, FaultKind::loss
 bool on_box(FaultKind kind) noexcept { return within(kind, FaultKind::taken_over, FaultKind::address); }
 
 std::uint32_t word(const Datagram& datagram, std::size_t offset) noexcept {
-  return big(datagram.payload().subspan(offset, 4));
+  return boost::endian::load_big_u32(datagram.bytes.data() + offset);
 }
 
 }  // namespace
@@ -78,7 +77,7 @@ void FaultInjector::make_up(const InFlightDatagram& after, std::size_t size, boo
   if (size > datagram.size) std::fill_n(datagram.bytes.data() + datagram.size, size - datagram.size, std::uint8_t{0});
   datagram.size = size;
   datagram.foreign = foreign;
-  if (foreign) put_big(datagram.bytes.data(), word(datagram, 0) + 1000);
+  if (foreign) boost::endian::store_big_u32(datagram.bytes.data(), word(datagram, 0) + 1000);
   under_way_.emplace(due, made);
 }
 
@@ -122,35 +121,34 @@ FaultInjector::FaultDecision FaultInjector::decide(Instant at) {
 
 bool FaultInjector::act(const Fault& fault, Progress& progress, Instant at, FaultDecision& decision) {
   using K = FaultKind;
-  const auto is = [&fault](K kind) { return fault.kind == kind; };
   const auto late = [&](Instant due) { decision.due = std::max(decision.due, due); };
-  if (is(K::short_block)) return false;
-  if (is(K::loss)) {
+  if (fault.is(K::short_block)) return false;
+  if (fault.is(K::loss)) {
     if (progress.burst_left == 0 && script_.chance(fault.p)) progress.burst_left = fault.burst;
     if (progress.burst_left == 0) return false;
     --progress.burst_left;
     decision.dropped = true;
-  } else if (is(K::gilbert)) {
+  } else if (fault.is(K::gilbert)) {
     if (script_.chance(progress.bad ? fault.p_bad_good : fault.p_good_bad)) progress.bad = !progress.bad;
     if (!progress.bad || !script_.chance(fault.loss)) return false;
     decision.dropped = true;
-  } else if (is(K::delay)) {
+  } else if (fault.is(K::delay)) {
     late(at + fault.delay + from_seconds(to_seconds(fault.jitter) * script_.uniform()));
-  } else if (is(K::jitter)) {
+  } else if (fault.is(K::jitter)) {
     const double mean_times = -std::log(script_.uniform() + 0x1p-54);
     const double spike = script_.chance(fault.p) ? script_.uniform() : 0;
     late(at + from_seconds(mean_times * to_seconds(fault.jitter) + spike * to_seconds(fault.spike)));
-  } else if (is(K::hold)) {
+  } else if (fault.is(K::hold)) {
     late(fault.end());
   } else {
     if (!script_.chance(fault.p)) return false;
-    if (is(K::duplicate)) decision.copies.push_back(fault.delay);
-    if (is(K::foreign_source)) ++decision.foreign;
-    if (is(K::reorder)) {
+    if (fault.is(K::duplicate)) decision.copies.push_back(fault.delay);
+    if (fault.is(K::foreign_source)) ++decision.foreign;
+    if (fault.is(K::reorder)) {
       decision.depth = std::max(decision.depth, fault.depth);
       decision.overtaken_for = std::max(decision.overtaken_for, fault.delay);
     }
-    if (is(K::wrong_size)) {
+    if (fault.is(K::wrong_size)) {
       decision.sizes.push_back(fault.size);
       decision.replaced = decision.replaced || fault.replaces;
     }

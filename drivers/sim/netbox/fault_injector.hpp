@@ -2,7 +2,6 @@
 // the same seed, script and inputs the same bytes arrive at the same times, however often it is asked.
 #pragma once
 
-#include <array>
 #include <map>
 #include <span>
 #include <string>
@@ -58,7 +57,7 @@ struct WireTruth {
   std::vector<std::uint32_t> ft;  ///< ft_sequence as sent
 };
 
-/// What a fault of the web server does to an answer (web.cpp).
+/// What a fault of the web server, and no other, does to an answer (web.cpp).
 void spoil_page(const Fault& fault, StreamReply& reply);
 
 class FaultInjector {
@@ -91,7 +90,6 @@ class FaultInjector {
   [[nodiscard]] bool http_refused(Instant now) const noexcept;
   /// As NetBoxDevice::tcp; an empty reply when `received` holds no whole command.
   [[nodiscard]] StreamReply tcp(std::string& received, Instant now);
-  [[nodiscard]] bool dead() const noexcept { return dead_; }
   /// Address that a fault gave the box, and from which it sends; empty: its own.
   [[nodiscard]] const std::string& moved_to() const noexcept { return moved_to_; }
   [[nodiscard]] const WireTruth& truth() const noexcept { return truth_; }
@@ -113,7 +111,6 @@ class FaultInjector {
     Instant give_up;
   };
   struct LateRequest {
-    Instant due;
     std::vector<std::uint8_t> bytes;
     Peer peer;
   };
@@ -132,14 +129,12 @@ class FaultInjector {
   void schedule() noexcept;
   void begin(std::size_t index);
   void end(const Fault& fault);
-  void note(Instant at, std::string what);
   void sample_disturbed(LoadCellSample sample);
   void sample_skewed(const LoadCellSample& sample);
   void move_to(const std::string& address);
   void count_use(std::size_t fault, Instant now);
   void hand_over(std::span<const std::uint8_t> datagram, Peer peer);
-  StreamReply spoilt(std::string answer, Instant now, bool (*concerns)(FaultKind),
-                     void (*spoil)(const Fault&, StreamReply&));
+  StreamReply spoilt(std::string answer, Instant now, FaultKind first, FaultKind last);
 
   void carry_all(Instant now);
   void carry(const InFlightDatagram& in_flight);
@@ -157,7 +152,7 @@ class FaultInjector {
   ScriptRun script_;
   const Keep keep_;
   std::vector<Progress> progress_;
-  std::vector<LateRequest> late_requests_;
+  std::multimap<Instant, LateRequest> late_requests_;  ///< by their arrival
   Instant next_event_ = kNever;
   bool disturbed_ = false;  ///< dead, skewed or drifting
   bool dead_ = false;

@@ -2,11 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/endian/conversion.hpp>
 #include <cmath>
 
 #include "drivers/sim/netbox/fault_injector.hpp"
 #include "drivers/sim/physics/motor.hpp"
-#include "drivers/sim/transport/bytes.hpp"
 
 namespace kphi::sim {
 namespace {
@@ -14,23 +14,22 @@ namespace {
 constexpr double kTurn = 6.28318530717958647692;
 
 bool on_starts(FaultKind kind) noexcept { return within(kind, FaultKind::lost_start, FaultKind::delayed_start); }
-bool on_pages(FaultKind kind) noexcept { return within(kind, FaultKind::http_slow, FaultKind::http_duplicate_tag); }
-bool on_tcp(FaultKind kind) noexcept { return within(kind, FaultKind::tcp_split, FaultKind::tcp_short); }
 
 bool is_start(std::span<const std::uint8_t> datagram) noexcept {
-  if (datagram.size() != 8 || big(datagram.first(2)) != 0x1234) return false;
-  const std::uint32_t command = big(datagram.subspan(2, 2));
+  if (datagram.size() != 8 || boost::endian::load_big_u16(datagram.data()) != 0x1234) return false;
+  const std::uint32_t command = boost::endian::load_big_u16(datagram.data() + 2);
   return command >= 1 && command <= 4;
 }
 
+/// As spoil_page, of the 16-bit interface.
 void spoil_answer(const Fault& fault, StreamReply& reply) {
   const auto size = static_cast<std::size_t>(fault.size);
-  if (fault.kind == FaultKind::tcp_split) {
+  if (fault.is(FaultKind::tcp_split)) {
     reply.segment = size;
     reply.pause = fault.delay;
-  } else if (fault.kind == FaultKind::tcp_merged) {
+  } else if (fault.is(FaultKind::tcp_merged)) {
     reply.wait = std::max(reply.wait, fault.delay);
-  } else {
+  } else if (fault.is(FaultKind::tcp_short)) {
     reply.bytes.resize(std::min(reply.bytes.size(), size));
     reply.close = true;
   }
@@ -40,7 +39,7 @@ void spoil_answer(const Fault& fault, StreamReply& reply) {
 
 void FaultInjector::schedule() noexcept {
   next_event_ = script_.next_event();
-  for (const LateRequest& request : late_requests_) next_event_ = std::min(next_event_, request.due);
+  if (!late_requests_.empty()) next_event_ = std::min(next_event_, late_requests_.begin()->first);
 }
 
 void FaultInjector::meet_events(Instant now) {
@@ -48,25 +47,21 @@ void FaultInjector::meet_events(Instant now) {
     if (const auto event = script_.take_event(next_event_)) {
       const Fault& fault = script_[event->fault];
       event->begins ? begin(event->fault) : end(fault);
-      note(event->at, fmt::format("{} {}", name_of(fault.kind), event->begins ? "begins" : "ends"));
+      truth_.events.push_back(
+          {event->at, fmt::format("{} {}", name_of(fault.kind), event->begins ? "begins" : "ends")});
     } else {
-      const auto due = std::find_if(late_requests_.begin(), late_requests_.end(),
-                                    [&](const LateRequest& r) { return r.due == next_event_; });
-      const LateRequest request = std::move(*due);
-      late_requests_.erase(due);
-      hand_over(request.bytes, request.peer);
+      const auto late = late_requests_.extract(late_requests_.begin());
+      hand_over(late.mapped().bytes, late.mapped().peer);
     }
     disturbed_ = dead_ || skew_ != nullptr || !drifting_.empty();
     schedule();
   }
 }
 
-void FaultInjector::note(Instant at, std::string what) { truth_.events.push_back({at, std::move(what)}); }
-
 void FaultInjector::count_use(std::size_t fault, Instant now) {
   script_.use(fault);
   ++truth_.done[script_[fault].kind];
-  note(now, std::string(name_of(script_[fault].kind)));
+  truth_.events.push_back({now, std::string(name_of(script_[fault].kind))});
 }
 
 void FaultInjector::move_to(const std::string& address) {
@@ -79,45 +74,43 @@ void FaultInjector::move_to(const std::string& address) {
 void FaultInjector::begin(std::size_t index) {
   const Fault& fault = script_[index];
   using K = FaultKind;
-  const auto is = [&fault](K kind) { return fault.kind == kind; };
   const auto samples = static_cast<std::uint32_t>(fault.samples);
   ++truth_.done[fault.kind];
-  truth_.restarts += is(K::restart) && box_.streaming();
-  truth_.reboots += is(K::reboot);
-  if (is(K::taken_over)) {
+  truth_.restarts += fault.is(K::restart) && box_.streaming();
+  truth_.reboots += fault.is(K::reboot);
+  if (fault.is(K::taken_over)) {
     const std::uint8_t command = fault.buffered ? 3 : 2;
     hand_over(std::array<std::uint8_t, 8>{0x12, 0x34, 0, command, 0, 0, 0, 0}, kHijacker);
   }
-  if (is(K::restart) && box_.streaming()) box_.restart_stream();
-  if (is(K::reboot)) dead_ = true;
-  if (is(K::stall)) box_.stall(true);
-  if (is(K::ft_jump_back)) box_.set_ft_sequence(box_.ft_sequence() + 1 - samples);
-  if (is(K::overrun)) box_.set_ft_sequence(box_.ft_sequence() + 1 + samples);
-  if (is(K::wrap)) box_.set_ft_sequence(0u - samples);
-  if (is(K::clock_skew)) skew_ = &fault;
-  if (is(K::zero_drift)) drifting_.push_back(index);
-  if (is(K::status)) box_.set_status(static_cast<std::uint32_t>(fault.bits));
-  if (is(K::saturation)) box_.force_saturation(fault.axes);
-  if (is(K::address)) move_to(fault.ip);
+  if (fault.is(K::restart) && box_.streaming()) box_.restart_stream();
+  if (fault.is(K::reboot)) dead_ = true;
+  if (fault.is(K::stall)) box_.stall(true);
+  if (fault.is(K::ft_jump_back)) box_.set_ft_sequence(box_.ft_sequence() + 1 - samples);
+  if (fault.is(K::overrun)) box_.set_ft_sequence(box_.ft_sequence() + 1 + samples);
+  if (fault.is(K::wrap)) box_.set_ft_sequence(0u - samples);
+  if (fault.is(K::clock_skew)) skew_ = &fault;
+  if (fault.is(K::zero_drift)) drifting_.push_back(index);
+  if (fault.is(K::status)) box_.set_status(static_cast<std::uint32_t>(fault.bits));
+  if (fault.is(K::saturation)) box_.force_saturation(fault.axes);
+  if (fault.is(K::address)) move_to(fault.ip);
   NetBoxSettings settings = box_.settings();
-  if (is(K::rate)) settings.rate_hz = fault.rate_hz;
-  if (is(K::units))
+  if (fault.is(K::rate)) settings.rate_hz = fault.rate_hz;
+  if (fault.is(K::units))
     settings.slots[static_cast<std::size_t>(settings.active_slot)] = {fault.force_unit, fault.torque_unit};
-  if (is(K::rate) || is(K::units)) box_.configure(settings);
+  if (fault.is(K::rate) || fault.is(K::units)) box_.configure(settings);
 }
 
 void FaultInjector::end(const Fault& fault) {
   using K = FaultKind;
-  const auto is = [&fault](K kind) { return fault.kind == kind; };
-  if (is(K::reboot)) {
+  if (fault.is(K::reboot)) {
     dead_ = false;
     box_.power_cycle(fault.resume);
   }
-  if (is(K::address)) move_to({});
-  if (is(K::stall)) box_.stall(false);
-  if (is(K::clock_skew)) skew_ = nullptr;
-  if (is(K::status) && !fault.latched) box_.clear_status(static_cast<std::uint32_t>(fault.bits));
-  if (is(K::saturation)) box_.force_saturation(0);
+  if (fault.is(K::address)) move_to({});
+  if (fault.is(K::stall)) box_.stall(false);
+  if (fault.is(K::clock_skew)) skew_ = nullptr;
+  if (fault.is(K::status) && !fault.latched) box_.clear_status(static_cast<std::uint32_t>(fault.bits));
+  if (fault.is(K::saturation)) box_.force_saturation(0);
 }
 
 void FaultInjector::sample_disturbed(LoadCellSample sample) {
@@ -166,28 +159,28 @@ void FaultInjector::request(std::span<const std::uint8_t> datagram, Peer peer, I
   }
   if (at_once) hand_over(datagram, peer);
   if (later < Duration{0}) return;
-  late_requests_.push_back({now + later, {datagram.begin(), datagram.end()}, peer});
+  late_requests_.emplace(now + later, LateRequest{{datagram.begin(), datagram.end()}, peer});
   schedule();
 }
 
 // --- answers over stream sockets
 
 StreamReply FaultInjector::http(std::string_view request, Instant now) {
-  return spoilt(box_.http(request), now, on_pages, spoil_page);
+  return spoilt(box_.http(request), now, FaultKind::http_slow, FaultKind::http_duplicate_tag);
 }
 
 StreamReply FaultInjector::tcp(std::string& received, Instant now) {
-  return spoilt(box_.tcp(received), now, on_tcp, spoil_answer);
+  return spoilt(box_.tcp(received), now, FaultKind::tcp_split, FaultKind::tcp_short);
 }
 
-StreamReply FaultInjector::spoilt(std::string answer, Instant now, bool (*concerns)(FaultKind),
-                                  void (*spoil)(const Fault&, StreamReply&)) {
+StreamReply FaultInjector::spoilt(std::string answer, Instant now, FaultKind first, FaultKind last) {
   StreamReply reply{std::move(answer)};
   if (reply.bytes.empty()) return reply;
   for (std::size_t i = 0; i < script_.size(); ++i) {
-    if (!concerns(script_[i].kind) || !script_.active(i, now)) continue;
+    if (!within(script_[i].kind, first, last) || !script_.active(i, now)) continue;
     count_use(i, now);
-    spoil(script_[i], reply);
+    spoil_page(script_[i], reply);
+    spoil_answer(script_[i], reply);
   }
   return reply;
 }

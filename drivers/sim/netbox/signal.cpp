@@ -55,23 +55,18 @@ void NetBoxSignal::configure(const NetBoxSettings& settings) noexcept {
 }
 
 void NetBoxSignal::measure(const Wrench& wrench) noexcept {
-  Wrench value = wrench;
   bool beyond = false;
   for (std::size_t axis = 0; axis < 6; ++axis) {
     const bool forced = (forced_axes_ >> axis & 1u) != 0;
-    value[axis] = forced ? range_[axis] : std::clamp(wrench[axis], -range_[axis], range_[axis]);
-    beyond = beyond || forced || value[axis] != wrench[axis];
+    double value = forced ? range_[axis] : std::clamp(wrench[axis], -range_[axis], range_[axis]);
+    beyond = beyond || forced || value != wrench[axis];
+    value -= gage_bias_[axis];
+    if (filter_ != 0) value = filters_[axis].step(value);
+    const double counts = value * scale_[axis];
+    counts_[axis] = clamped(static_cast<std::int64_t>(counts + (counts < 0 ? -0.5 : 0.5)) - software_bias_[axis]);
   }
   if (saturation_left_ > 0) --saturation_left_;
   if (beyond) saturation_left_ = axia_ ? kAxiaHold : 1;
-  for (std::size_t axis = 0; axis < 6; ++axis) value[axis] -= gage_bias_[axis];
-  if (filter_ != 0) {
-    for (std::size_t axis = 0; axis < 6; ++axis) value[axis] = filters_[axis].step(value[axis]);
-  }
-  for (std::size_t axis = 0; axis < 6; ++axis) {
-    const double counts = value[axis] * scale_[axis];
-    counts_[axis] = clamped(static_cast<std::int64_t>(counts + (counts < 0 ? -0.5 : 0.5)) - software_bias_[axis]);
-  }
 }
 
 void NetBoxSignal::take_software_bias() noexcept {

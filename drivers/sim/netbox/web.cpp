@@ -4,8 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <iterator>
 #include <optional>
 #include <vector>
@@ -222,15 +220,14 @@ std::string NetBoxDevice::write(std::string_view page, std::string_view query) {
 void spoil_page(const Fault& fault, StreamReply& reply) {
   using K = FaultKind;
   std::string& page = reply.bytes;
-  const auto is = [&fault](K kind) { return fault.kind == kind; };
-  if (is(K::http_slow)) reply.wait = std::max(reply.wait, fault.delay);
-  if (is(K::http_truncated)) page.resize(std::min(page.size(), static_cast<std::size_t>(fault.size)));
-  if (is(K::http_status))
+  if (fault.is(K::http_slow)) reply.wait = std::max(reply.wait, fault.delay);
+  if (fault.is(K::http_truncated)) page.resize(std::min(page.size(), static_cast<std::size_t>(fault.size)));
+  if (fault.is(K::http_status))
     page = refusal(fmt::format("{} {}", fault.code, fault.code < 500 ? "Not Found" : "Internal Server Error"));
-  if (is(K::http_oversized)) page = xml_response("<?xml version=\"1.0\"?><netft>" + std::string(fault.size, ' '));
-  if (is(K::http_charset)) page = fault.utf16 ? in_utf_16(page) : in_latin_1(page);
-  if (is(K::http_missing_tag)) page = with_element(page, fault.tag, [](const std::string&) { return ""; });
-  if (is(K::http_duplicate_tag))
+  if (fault.is(K::http_oversized)) page = xml_response("<?xml version=\"1.0\"?><netft>" + std::string(fault.size, ' '));
+  if (fault.is(K::http_charset)) page = fault.utf16 ? in_utf_16(page) : in_latin_1(page);
+  if (fault.is(K::http_missing_tag)) page = with_element(page, fault.tag, [](const std::string&) { return ""; });
+  if (fault.is(K::http_duplicate_tag))
     page = with_element(page, fault.tag, [](const std::string& line) { return line + line; });
 }
 

@@ -65,10 +65,7 @@ void Motor::step(const PowerStage& stage, Random& random) noexcept {
   state_.angle += state_.turning_speed * kTick;
   if (state_.angle >= 2 * kPi) state_.angle -= 2 * kPi;
   if (state_.angle < 0) state_.angle += 2 * kPi;
-  if (++ticks_to_warming_ == kTicksPerWarming) {
-    ticks_to_warming_ = 0;
-    warm();
-  }
+  if (++ticks_ % kTicksPerWarming == 0) warm();
 }
 
 // With the mean speed u = u0 + y Kt I of the tick: R I = V - Ke u. V is 0 when braking, d times the bus otherwise, and

@@ -100,7 +100,6 @@ class Motor {
   [[nodiscard]] const MotorState& state() const noexcept { return state_; }
   /// Torque on the mount about +z, N m: the reaction, negative while a positive speed is driven or dragged.
   [[nodiscard]] double reaction_torque() const noexcept { return reaction_torque_; }
-  [[nodiscard]] double resistance() const noexcept { return resistance_; }  ///< ohm, as warm as it is
 
  private:
   struct Shaft;
@@ -123,7 +122,7 @@ class Motor {
   double winding_resistance_;  ///< now
   double reaction_torque_ = 0;
   double heat_ = 0;  ///< amps² seconds since the last warming
-  std::uint32_t ticks_to_warming_ = 0;
+  std::uint64_t ticks_ = 0;
 };
 
 }  // namespace kphi::sim

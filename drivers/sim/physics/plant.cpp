@@ -43,10 +43,7 @@ void LoadCell::step(double speed, double reaction_torque, Random& random) noexce
   const double fy = once * sine_ - 0.003 * fz;
   const Wrench load{fx, fy, fz + 0.002 * once * sine_, 0.0010 * fz, -0.0008 * fz, tz};
 
-  if (++ticks_to_drift_ == kTicksPerDrift) {
-    ticks_to_drift_ = 0;
-    drift(random);
-  }
+  if (++ticks_ % kTicksPerDrift == 0) drift(random);
   for (std::size_t axis = 0; axis < load.size(); ++axis) {
     reading_[axis] = load[axis] + zero_[axis] + parameters_.noise[axis] * random.normal();
   }

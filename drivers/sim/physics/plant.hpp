@@ -62,7 +62,7 @@ class LoadCell {
   double thrust_ = 0;
   double cosine_ = 1, sine_ = 0;  ///< of the rotor angle
   double blade_amplitude_ = 0;
-  int ticks_to_drift_ = 0;
+  std::uint64_t ticks_ = 0;
 };
 
 struct PlantParameters {

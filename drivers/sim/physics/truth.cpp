@@ -14,12 +14,10 @@ double in_si(double n_rpm2) noexcept { return from_newtons_per_rpm2(n_rpm2).valu
 
 void append_propeller(std::string& out, const PropellerTruth& propeller) {
   auto to = std::back_inserter(out);
-  fmt::format_to(to, "  {}:\n    diameter_in: {}\n    blades: {}\n", propeller.id, propeller.diameter_in,
-                 propeller.blades);
-  fmt::format_to(to, "    K_T: {}\n", in_si(propeller.thrust_n_rpm2));
-  fmt::format_to(to, "    line: {{intercept: {}, slope_per_deg: {}}}\n", in_si(propeller.line_intercept_n_rpm2),
+  fmt::format_to(to, "  {}:\n    diameter_in: {}\n    blades: {}\n    K_T: {}\n", propeller.id, propeller.diameter_in,
+                 propeller.blades, in_si(propeller.thrust_n_rpm2));
+  fmt::format_to(to, "    line: {{intercept: {}, slope_per_deg: {}}}\n    k:\n", in_si(propeller.line_intercept_n_rpm2),
                  in_si(propeller.line_slope_n_rpm2_deg));
-  fmt::format_to(to, "    k:\n");
   for (const double phi : kOcclusionsDeg) {
     fmt::format_to(to, "      - {{phi_deg: {}, k: {}}}\n", phi, thrust_coefficient(propeller, phi));
   }

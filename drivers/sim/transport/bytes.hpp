@@ -8,23 +8,10 @@
 
 namespace kphi::sim {
 
-inline void put_big(std::uint8_t* to, std::uint32_t value) noexcept {
-  to[0] = static_cast<std::uint8_t>(value >> 24);
-  to[1] = static_cast<std::uint8_t>(value >> 16);
-  to[2] = static_cast<std::uint8_t>(value >> 8);
-  to[3] = static_cast<std::uint8_t>(value);
-}
-
 /// The lowest `size` bytes of it, at the end of a string or a vector of bytes.
 template <class Bytes>
 void append_big(Bytes& out, std::uint32_t value, int size) {
   while (size-- > 0) out.push_back(static_cast<typename Bytes::value_type>(value >> (8 * size)));
-}
-
-[[nodiscard]] inline std::uint32_t big(std::span<const std::uint8_t> bytes) noexcept {
-  std::uint32_t value = 0;
-  for (const std::uint8_t byte : bytes) value = value << 8 | byte;
-  return value;
 }
 
 inline void put_little(std::uint8_t* to, std::uint32_t value, std::size_t size) noexcept {
