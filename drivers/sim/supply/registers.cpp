@@ -8,15 +8,11 @@
 namespace kphi::sim {
 namespace {
 
-constexpr double kInputVolts = 24.05;
+constexpr std::uint16_t kInputVolts = 2405;  // of 10 mV
 constexpr std::uint16_t kFirmware = 128;
 
 std::uint16_t counted(double value, double counts_per_unit) {
   return static_cast<std::uint16_t>(std::clamp(std::round(value * counts_per_unit), 0.0, 65535.0));
-}
-
-std::uint16_t half(std::uint32_t value, bool low) {
-  return static_cast<std::uint16_t>(low ? value & 0xFFFFu : value >> 16);
 }
 
 enum class Access : std::uint8_t { read, write, harmful };
@@ -27,6 +23,7 @@ struct Row {
   SupplyQuantity shows;
   Access access = Access::read;
   unsigned of_sixteen = 16;  ///< only the first this many of each sixteen registers exist
+  std::uint16_t value = 0;   ///< of a constant
 };
 
 // The first row that fits counts.
@@ -35,12 +32,12 @@ constexpr Row kRiden[] = {
     {0, 0, model_id},
     {1, 1, serial_high},
     {2, 2, serial_low},
-    {3, 3, firmware},
+    {3, 3, constant, Access::read, 16, kFirmware},
     {8, 8, set_volts, Access::write},
     {9, 9, set_amps, Access::write},
     {10, 10, volts},
     {11, 11, amps},
-    {14, 14, input_volts},
+    {14, 14, constant, Access::read, 16, kInputVolts},
     {16, 16, trip},
     {17, 17, limiting},
     {18, 18, output, Access::write},
@@ -62,14 +59,14 @@ constexpr Row kDps[] = {{0x00, 0x00, set_volts, Access::write},
                         {0x02, 0x02, volts},
                         {0x03, 0x03, amps},
                         {0x04, 0x04, kept},
-                        {0x05, 0x05, input_volts},
+                        {0x05, 0x05, constant, Access::read, 16, kInputVolts},
                         {0x06, 0x06, kept, Access::write},
                         {0x07, 0x07, trip},
                         {0x08, 0x08, limiting},
                         {0x09, 0x09, output, Access::write},
                         {0x0A, 0x0A, kept, Access::write},
                         {0x0B, 0x0B, model_id},
-                        {0x0C, 0x0C, firmware},
+                        {0x0C, 0x0C, constant, Access::read, 16, kFirmware},
                         {0x23, 0x23, kept, Access::write},
                         {0x52, 0x52, over_volts, Access::write},
                         {0x53, 0x53, over_amps, Access::write},
@@ -77,8 +74,8 @@ constexpr Row kDps[] = {{0x00, 0x00, set_volts, Access::write},
 constexpr Row kHanmatek[] = {{0x01, 0x01, output, Access::write},
                              {0x02, 0x02, trip},
                              {0x03, 0x03, model_id},
-                             {0x04, 0x04, device_class},
-                             {0x05, 0x05, decimals},
+                             {0x04, 0x04, constant, Access::read, 16, 0x4B50},
+                             {0x05, 0x05, constant, Access::read, 16, 0x0233},
                              {0x10, 0x10, volts},
                              {0x11, 0x11, amps},
                              {0x12, 0x13, kept},
@@ -126,7 +123,8 @@ SupplyRegisters::SupplyRegisters(const std::string& model, std::uint32_t serial,
 
 std::optional<std::uint16_t> SupplyRegisters::read(std::uint16_t at) const {
   const Row* row = find(model_->family, at);
-  return row == nullptr ? std::nullopt : std::optional(value_of(row->shows, at));
+  if (row == nullptr) return std::nullopt;
+  return row->shows == constant ? row->value : value_of(row->shows, at);
 }
 
 bool SupplyRegisters::write(std::uint16_t at, std::uint16_t value) {
@@ -148,21 +146,18 @@ std::uint16_t SupplyRegisters::value_of(SupplyQuantity shows, std::uint16_t at) 
   const SupplyControls& controls = circuit_.controls();
   if (shows == kept) return remembered(at);
   if (shows == model_id) return model_->id;
-  if (shows == serial_high || shows == serial_low) return half(serial_, shows == serial_low);
-  if (shows == firmware) return kFirmware;
+  if (shows == serial_high) return static_cast<std::uint16_t>(serial_ >> 16);
+  if (shows == serial_low) return static_cast<std::uint16_t>(serial_);
   if (shows == set_volts) return counted(controls.volts, per_v());
   if (shows == set_amps) return counted(controls.amps, per_a());
   if (shows == volts) return counted(circuit_.shown_volts(), per_v());
   if (shows == amps) return counted(circuit_.shown_amps(), per_a());
-  if (shows == input_volts) return counted(kInputVolts, 100);
   if (shows == trip) return trip_code();
   if (shows == limiting) return circuit_.limiting();
   if (shows == output) return circuit_.output();
   const bool written = memory_.contains(at);
   if (shows == over_volts) return written ? remembered(at) : counted(controls.over_volts, per_v());
   if (shows == over_amps) return written ? remembered(at) : counted(controls.over_amps, per_over_a());
-  if (shows == device_class) return 0x4B50;
-  if (shows == decimals) return 0x0233;
   return 0;  // the preset
 }
 

@@ -27,24 +27,21 @@ struct SupplyModel {
 
 /// The content of a register.
 enum class SupplyQuantity : std::uint8_t {
-  kept,  ///< what was written last; 0 before
+  kept,      ///< what was written last; 0 before
+  constant,  ///< of the row
   model_id,
   serial_high,
   serial_low,
-  firmware,
   set_volts,
   set_amps,
   volts,
   amps,
-  input_volts,
   trip,
   limiting,
   output,
   preset,  ///< reads 0, whatever was recalled
   over_volts,
-  over_amps,
-  device_class,
-  decimals
+  over_amps
 };
 
 class SupplyRegisters {

@@ -1,6 +1,7 @@
 #include "drivers/sim/supply/slave.hpp"
 
 #include <algorithm>
+#include <boost/crc.hpp>
 
 #include "drivers/sim/transport/bytes.hpp"
 
@@ -10,6 +11,12 @@ namespace {
 constexpr Duration kSilence = std::chrono::milliseconds(50);
 constexpr std::size_t kHeader = 7;  // of TCP: transaction, protocol, length, unit
 constexpr std::size_t kLongestPdu = 253;
+enum Function : std::uint8_t { kRead = 0x03, kWriteOne = 0x06, kWriteMany = 0x10 };
+enum Exception : int { kIllegalFunction = 1, kIllegalAddress = 2, kIllegalValue = 3 };
+constexpr std::size_t kFramesKept = 1000;
+constexpr std::uint8_t kGarbage = 0x55;
+constexpr int kLookBytes = 45;        // of an answer with twenty registers
+constexpr double kLongestStep = 1.0;  // s
 
 unsigned word(const std::vector<std::uint8_t>& bytes, std::size_t at) { return bytes[at] * 256u + bytes[at + 1]; }
 
@@ -22,15 +29,16 @@ std::size_t rtu_length(const std::vector<std::uint8_t>& bytes) {
   return bytes.size() < 7 ? 0 : 9u + bytes[6];
 }
 
+std::vector<std::uint8_t> refuse(std::uint8_t function, int code) {
+  return {static_cast<std::uint8_t>(function | 0x80u), static_cast<std::uint8_t>(code)};
+}
+
 }  // namespace
 
 std::uint16_t modbus_crc(std::span<const std::uint8_t> bytes) noexcept {
-  unsigned crc = 0xFFFF;
-  for (const std::uint8_t byte : bytes) {
-    crc ^= byte;
-    for (int bit = 0; bit < 8; ++bit) crc = (crc & 1u) != 0 ? crc >> 1 ^ 0xA001u : crc >> 1;
-  }
-  return static_cast<std::uint16_t>(crc);
+  boost::crc_optimal<16, 0x8005, 0xFFFF, 0, true, true> crc;
+  crc.process_bytes(bytes.data(), bytes.size());
+  return static_cast<std::uint16_t>(crc.checksum());
 }
 
 std::vector<std::uint8_t> modbus_frame(ModbusFraming framing, int unit, std::uint16_t transaction,
@@ -61,15 +69,12 @@ std::optional<ModbusRequest> ModbusScanner::next() { return framing_ == ModbusFr
 std::optional<ModbusRequest> ModbusScanner::next_rtu() {
   const std::size_t length = rtu_length(waiting_);
   if (length == 0 || waiting_.size() < length) return std::nullopt;
-  const auto end = waiting_.begin() + static_cast<std::ptrdiff_t>(length);
   const unsigned sent = waiting_[length - 1] * 256u + waiting_[length - 2];
   if (modbus_crc(std::span(waiting_).first(length - 2)) != sent) {
     waiting_.clear();
     return std::nullopt;
   }
-  ModbusRequest request{waiting_[0], 0, {waiting_.begin() + 1, end - 2}, {waiting_.begin(), end}};
-  waiting_.erase(waiting_.begin(), end);
-  return request;
+  return take(length, 1, 2, 0);
 }
 
 std::optional<ModbusRequest> ModbusScanner::next_tcp() {
@@ -80,29 +85,19 @@ std::optional<ModbusRequest> ModbusScanner::next_tcp() {
     return std::nullopt;
   }
   if (waiting_.size() < kHeader - 1 + length) return std::nullopt;
-  const auto end = waiting_.begin() + static_cast<std::ptrdiff_t>(kHeader - 1 + length);
-  ModbusRequest request{waiting_[6],
-                        static_cast<std::uint16_t>(word(waiting_, 0)),
-                        {waiting_.begin() + static_cast<std::ptrdiff_t>(kHeader), end},
-                        {waiting_.begin(), end}};
-  waiting_.erase(waiting_.begin(), end);
+  return take(kHeader - 1 + length, kHeader, 0, word(waiting_, 0));
+}
+
+/// Takes a frame of this length off the front: its header, which ends with the unit, the PDU, a trailer.
+ModbusRequest ModbusScanner::take(std::size_t length, std::size_t header, std::size_t trailer, unsigned transaction) {
+  const auto frame = std::span(waiting_).first(length), pdu = frame.subspan(header, length - header - trailer);
+  ModbusRequest request{frame[header - 1],
+                        static_cast<std::uint16_t>(transaction),
+                        {pdu.begin(), pdu.end()},
+                        {frame.begin(), frame.end()}};
+  waiting_.erase(waiting_.begin(), waiting_.begin() + static_cast<std::ptrdiff_t>(length));
   return request;
 }
-
-namespace {
-
-enum Function : std::uint8_t { kRead = 0x03, kWriteOne = 0x06, kWriteMany = 0x10 };
-enum Exception : int { kIllegalFunction = 1, kIllegalAddress = 2, kIllegalValue = 3 };
-constexpr std::size_t kFramesKept = 1000;
-constexpr std::uint8_t kGarbage = 0x55;
-constexpr int kLookBytes = 45;        // of an answer with twenty registers
-constexpr double kLongestStep = 1.0;  // s
-
-std::vector<std::uint8_t> refuse(std::uint8_t function, int code) {
-  return {static_cast<std::uint8_t>(function | 0x80u), static_cast<std::uint8_t>(code)};
-}
-
-}  // namespace
 
 SupplySlave::SupplySlave(const SupplySettings& settings)
     : settings_(settings),
@@ -218,9 +213,8 @@ bool SupplySlave::next_reply(SupplyReply& out, Instant now) {
 SupplySlave::Pdu SupplySlave::apply(const Pdu& pdu, Instant now) {
   const std::uint8_t function = pdu[0];
   if (function != kRead && function != kWriteOne && function != kWriteMany) return refuse(function, kIllegalFunction);
-  if (function == kWriteMany && pdu.size() >= 6) return write_many(pdu, now);
-  if (function == kWriteMany || pdu.size() != 5) return refuse(function, kIllegalValue);
-  return function == kRead ? read(pdu, now) : write_one(pdu, now);
+  if (function == kWriteMany ? pdu.size() < 6 : pdu.size() != 5) return refuse(function, kIllegalValue);
+  return function == kRead ? read(pdu, now) : write(pdu, now);
 }
 
 std::uint16_t SupplySlave::value_at(std::uint16_t at, std::uint16_t value, Instant now) const {
@@ -242,22 +236,17 @@ SupplySlave::Pdu SupplySlave::read(const Pdu& pdu, Instant now) {
   return out;
 }
 
-SupplySlave::Pdu SupplySlave::write_one(const Pdu& pdu, Instant now) {
-  const auto at = static_cast<std::uint16_t>(word(pdu, 1)), value = static_cast<std::uint16_t>(word(pdu, 3));
-  if (!registers_.read(at)) return refuse(pdu[0], kIllegalAddress);
-  truth_.writes.emplace_back(at, value);
-  if (meet(FaultKind::supply_ignored_writes, now) != nullptr) return pdu;
-  return registers_.write(at, value) ? pdu : refuse(pdu[0], kIllegalAddress);
-}
-
-SupplySlave::Pdu SupplySlave::write_many(const Pdu& pdu, Instant now) {
-  const unsigned first = word(pdu, 1), count = word(pdu, 3);
-  if (count < 1 || count > registers_.model().most_registers || pdu[5] != 2 * count || pdu.size() != 6 + 2 * count) {
-    return refuse(pdu[0], kIllegalValue);
-  }
-  const bool ignored = meet(FaultKind::supply_ignored_writes, now) != nullptr;
+SupplySlave::Pdu SupplySlave::write(const Pdu& pdu, Instant now) {
+  const bool many = pdu[0] == kWriteMany;
+  const unsigned first = word(pdu, 1), count = many ? word(pdu, 3) : 1;
+  const std::size_t values = many ? 6 : 3;
+  const bool sized = pdu.size() == values + 2 * count && (!many || pdu[5] == 2 * count);
+  if (count < 1 || count > registers_.model().most_registers || !sized) return refuse(pdu[0], kIllegalValue);
+  const bool heeded = many || registers_.read(static_cast<std::uint16_t>(first));
+  const bool ignored = heeded && meet(FaultKind::supply_ignored_writes, now) != nullptr;
   for (unsigned i = 0; i < count; ++i) {
-    const auto at = static_cast<std::uint16_t>(first + i), value = static_cast<std::uint16_t>(word(pdu, 6 + 2 * i));
+    const auto at = static_cast<std::uint16_t>(first + i);
+    const auto value = static_cast<std::uint16_t>(word(pdu, values + 2 * i));
     if (first + i > 0xFFFF || !registers_.read(at)) return refuse(pdu[0], kIllegalAddress);
     truth_.writes.emplace_back(at, value);
     if (!ignored && !registers_.write(at, value)) return refuse(pdu[0], kIllegalAddress);

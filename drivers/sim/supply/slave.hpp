@@ -47,6 +47,7 @@ class ModbusScanner {
  private:
   [[nodiscard]] std::optional<ModbusRequest> next_rtu();
   [[nodiscard]] std::optional<ModbusRequest> next_tcp();
+  ModbusRequest take(std::size_t length, std::size_t header, std::size_t trailer, unsigned transaction);
 
   ModbusFraming framing_;
   std::vector<std::uint8_t> waiting_;
@@ -123,8 +124,7 @@ class SupplySlave {
   void answer(int client, ModbusFraming framing, const ModbusRequest& request, Instant now);
   [[nodiscard]] Pdu apply(const Pdu& pdu, Instant now);
   [[nodiscard]] Pdu read(const Pdu& pdu, Instant now);
-  [[nodiscard]] Pdu write_one(const Pdu& pdu, Instant now);
-  [[nodiscard]] Pdu write_many(const Pdu& pdu, Instant now);
+  [[nodiscard]] Pdu write(const Pdu& pdu, Instant now);
   [[nodiscard]] std::uint16_t value_at(std::uint16_t at, std::uint16_t value, Instant now) const;
   void send(int client, std::vector<std::uint8_t> bytes, Instant due, Duration gap);
   /// The first active fault of this kind that meets this reply; nullptr.
