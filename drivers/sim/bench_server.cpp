@@ -2,13 +2,13 @@
 
 #include <arpa/inet.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 
 #include <algorithm>
 #include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
-#include <cerrno>
 #include <cstring>
 #include <filesystem>
 
@@ -98,22 +98,13 @@ Server::Server(const ServerSettings& settings)
 
 Server::~Server() { ::unlink(addresses_.control.c_str()); }
 
-std::vector<pollfd> Server::polls() const {
-  std::vector<pollfd> all{
-      {stop_.descriptor(), POLLIN, 0}, {rdt_.socket.number(), POLLIN, 0}, {pty_.number(), POLLIN, 0}};
-  http_.append_polls(all);
-  tcp_.append_polls(all);
-  control_.append_polls(all);
-  if (supply_) supply_->append_polls(all);
-  return all;
-}
-
 void Server::run() {
   const SteadyClock clock(time_scale_);
   const Duration step_size = clock.stretched(kWakeUp);
   bool behind = false;
   while (true) {
-    auto waiting = polls();
+    std::array<pollfd, 3> waiting{
+        {{stop_.descriptor(), POLLIN, 0}, {rdt_.socket.number(), POLLIN, 0}, {pty_.number(), POLLIN, 0}}};
     ::poll(waiting.data(), waiting.size(), behind ? 0 : static_cast<int>(kWakeUp.count()));
     if (waiting.front().revents != 0) return;
     const Instant now = clock.now();
@@ -189,12 +180,11 @@ void Server::hear_requests() {
 void Server::hear_motor(Instant now) {
   std::array<std::uint8_t, 512> bytes{};
   const std::size_t count = pty_.read(bytes);
+  if (count == 0) return;
   IqLine& line = bench_.motor_line();
-  if (count > 0) {
-    line.host_rate(pty_.baud());
-    line.send(std::span(bytes).first(count), now);
-    line.advance(now);
-  }
+  line.host_rate(pty_.baud());
+  line.send(std::span(bytes).first(count), now);
+  line.advance(now);
 }
 
 void Server::log_motion(Instant now) {

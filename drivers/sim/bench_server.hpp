@@ -1,14 +1,11 @@
 // The simulated bench on real transports: UDP, HTTP and TCP for the load cell's box, a pseudo-terminal for the
-// motor, a Unix-domain socket for mounting propellers. One thread, poll(), a wake-up per millisecond at
-// least.
+// motor, a Unix-domain socket for mounting propellers. One thread; poll() wakes it at once for motor and datagrams,
+// and every millisecond for all else.
 #pragma once
-
-#include <poll.h>
 
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "base/clock.hpp"
 #include "base/wakeup.hpp"
@@ -64,7 +61,6 @@ class Server {
   [[nodiscard]] const Unsent& unsent() const noexcept { return unsent_; }
 
  private:
-  [[nodiscard]] std::vector<pollfd> polls() const;
   void step(Instant now);
   void hear_requests();
   void hear_motor(Instant now);

@@ -55,12 +55,6 @@ void SupplyPort::open() {
   open_ = true;
 }
 
-void SupplyPort::append_polls(std::vector<pollfd>& all) const {
-  if (pty_) all.push_back({pty_->number(), POLLIN, 0});
-  if (listening_) all.push_back({listening_->socket.number(), POLLIN, 0});
-  for (const auto& [number, socket] : clients_) all.push_back({socket.number(), POLLIN, 0});
-}
-
 void SupplyPort::receive(SupplySlave& slave, Instant now) {
   open_or_close(slave, now);
   hear_line(slave, now);

@@ -1,13 +1,10 @@
 // Where clients reach a simulated supply: a pseudo-terminal, a TCP port, or both. No thread, no clock.
 #pragma once
 
-#include <poll.h>
-
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "base/descriptor.hpp"
 #include "drivers/sim/supply/slave.hpp"
@@ -31,7 +28,6 @@ class SupplyPort {
   [[nodiscard]] const std::string& device() const noexcept { return device_; }
   /// 0: none.
   [[nodiscard]] std::uint16_t port() const noexcept { return addresses_.port; }
-  void append_polls(std::vector<pollfd>& all) const;
   /// Gives the slave what clients have sent; closes and opens as its faults require.
   void receive(SupplySlave& slave, Instant now);
   /// Sends the replies that have left the slave by `now`.

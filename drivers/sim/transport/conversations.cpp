@@ -67,15 +67,6 @@ void Conversations::listen_at(Descriptor listener) {
   if (!listening()) connections_.clear();
 }
 
-void Conversations::append_polls(std::vector<pollfd>& polls) const {
-  if (listening() && connections_.size() < at_once_) polls.push_back({listener_.number(), POLLIN, 0});
-  for (const auto& connection : connections_) {
-    const bool waiting = connection.speak_at > std::chrono::steady_clock::now();
-    const short writing = connection.to_say.empty() || waiting ? 0 : POLLOUT;
-    polls.push_back({connection.socket.number(), static_cast<short>(POLLIN | writing), 0});
-  }
-}
-
 void Conversations::serve() {
   welcome();
   const auto now = std::chrono::steady_clock::now();

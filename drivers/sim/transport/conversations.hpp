@@ -2,8 +2,6 @@
 // and the control line.
 #pragma once
 
-#include <poll.h>
-
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -12,7 +10,6 @@
 #include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "base/clock.hpp"
 #include "base/descriptor.hpp"
@@ -50,7 +47,6 @@ class Conversations {
   Conversations(Descriptor listener, std::size_t at_once, Answerer answerer)
       : listener_(std::move(listener)), at_once_(at_once), answerer_(std::move(answerer)) {}
 
-  void append_polls(std::vector<pollfd>& polls) const;
   /// Replaces the listener; an empty one refuses connections and ends the open ones.
   void listen_at(Descriptor listener);
   [[nodiscard]] bool listening() const noexcept { return listener_.number() >= 0; }

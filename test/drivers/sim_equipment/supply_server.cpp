@@ -1,5 +1,6 @@
 #include "test/drivers/sim_equipment/supply_server.hpp"
 
+#include <poll.h>
 #include <sys/eventfd.h>
 
 namespace kphi::sim {
@@ -27,18 +28,11 @@ void SupplyServer::inspect(const std::function<void(SupplySlave&, SupplyLoad&, I
 
 void SupplyServer::run() {
   while (true) {
-    std::vector<pollfd> all = polls();
-    ::poll(all.data(), all.size(), patience());
-    if ((all.front().revents & POLLIN) != 0) return;
+    pollfd stop{stop_.number(), POLLIN, 0};
+    if (::poll(&stop, 1, patience()) > 0) return;
     const std::lock_guard lock(mutex_);
     step();
   }
-}
-
-std::vector<pollfd> SupplyServer::polls() const {
-  std::vector<pollfd> all{{stop_.number(), POLLIN, 0}};
-  port_.append_polls(all);
-  return all;
 }
 
 /// In ms: at least one tick of the physics per ms; 0 when a reply is due.

@@ -1,13 +1,10 @@
 // A simulated supply on its true transports: a pseudo-terminal and a TCP port. One thread, poll().
 #pragma once
 
-#include <poll.h>
-
 #include <cstdint>
 #include <functional>
 #include <mutex>
 #include <string>
-#include <vector>
 
 #include "base/clock.hpp"
 #include "base/descriptor.hpp"
@@ -42,7 +39,6 @@ class SupplyServer {
   void inspect(const std::function<void(SupplySlave& slave, SupplyLoad& load, Instant now)>& look);
 
  private:
-  [[nodiscard]] std::vector<pollfd> polls() const;
   [[nodiscard]] int patience();
   void step();
 
