@@ -34,9 +34,21 @@ Members members(const YAML::Node& map, const std::string& path) {
   return all;
 }
 
-const std::string& scalar(const std::string& key, const YAML::Node& value, const std::string& path) {
-  if (!value.IsScalar()) refuse(path, value.Mark(), fmt::format("{} must be a single value", key), "write one");
-  return value.Scalar();
+/// Gives a map of single values to `take`, and says where in it what `take` refuses is.
+template <class Take>
+void read_entry(const YAML::Node& node, const std::string& path, const char* next_move, Take&& take) {
+  const Members all = members(node, path);
+  FaultEntry entry;
+  for (const auto& [key, value] : all) {
+    if (!value.IsScalar()) refuse(path, value.Mark(), fmt::format("{} must be a single value", key), "write one");
+    entry[key] = value.Scalar();
+  }
+  try {
+    take(entry);
+  } catch (const FaultEntryError& error) {
+    const auto at = all.find(error.key);
+    refuse(path, at == all.end() ? node.Mark() : at->second.Mark(), error.what(), next_move);
+  }
 }
 
 /// The members of a file, without its format.
@@ -54,34 +66,6 @@ Members file_of(const std::string& text, const std::string& path, const char* fo
     refuse(path, error.mark, error.msg, "fix the YAML");
   }
 }
-
-// --- faults
-
-NetBoxQuirks read_quirks(const YAML::Node& node, const std::string& path) {
-  NetBoxQuirks quirks;
-  for (const auto& [key, value] : members(node, path)) {
-    try {
-      set_quirk(quirks, key, scalar(key, value, path));
-    } catch (const FaultEntryError& error) {
-      refuse(path, value.Mark(), error.what(), "fix this quirk");
-    }
-  }
-  return quirks;
-}
-
-Fault read_fault(const YAML::Node& node, const std::string& path) {
-  FaultEntry entry;
-  const Members all = members(node, path);
-  for (const auto& [key, value] : all) entry[key] = scalar(key, value, path);
-  try {
-    return fault_of(entry);
-  } catch (const FaultEntryError& error) {
-    const auto at = all.find(error.key);
-    refuse(path, at == all.end() ? node.Mark() : at->second.Mark(), error.what(), "fix this entry");
-  }
-}
-
-// --- motor
 
 struct MotorRow {
   std::string_view section, name;
@@ -135,19 +119,12 @@ constexpr std::array kRows{
     row<&E::controller_noise>("sensors", "controller_noise_degc", 0, 50),
 };
 
-void read_section(const std::string& section, const YAML::Node& node, const std::string& path, MotorProfile& profile) {
-  for (const auto& [key, value] : members(node, path)) {
-    const auto found = std::find_if(kRows.begin(), kRows.end(), [&name = key, &section](const MotorRow& row) {
-      return row.section == section && row.name == name;
-    });
-    if (found == kRows.end())
-      refuse(path, value.Mark(), fmt::format("{} has no key \"{}\"", section, key), "see profiles/motor_iq2306.yaml");
-    try {
-      found->of(profile) = fault_number(key, scalar(key, value, path), found->low, found->high);
-    } catch (const FaultEntryError& error) {
-      refuse(path, value.Mark(), fmt::format("{}: {}", key, error.what()), "fix this value");
-    }
-  }
+void set(MotorProfile& profile, const std::string& section, const std::string& key, const std::string& text) {
+  const auto found = std::find_if(kRows.begin(), kRows.end(),
+                                  [&](const MotorRow& row) { return row.section == section && row.name == key; });
+  if (found == kRows.end())
+    throw FaultEntryError(key, fmt::format("{} has no key \"{}\", see profiles/motor_iq2306.yaml", section, key));
+  found->of(profile) = fault_number(key, text, found->low, found->high);
 }
 
 }  // namespace
@@ -162,8 +139,14 @@ FaultFile parse_faults(const std::string& text, const std::string& path) {
   const auto faults = all.find("faults");
   if (faults == all.end() || !faults->second.IsSequence())
     refuse(path, {}, "there is no list of faults", "write faults: and a list of entries, or []");
-  for (const auto& entry : faults->second) file.faults.push_back(read_fault(entry, path));
-  if (const auto quirks = all.find("quirks"); quirks != all.end()) file.quirks = read_quirks(quirks->second, path);
+  for (const auto& entry : faults->second) {
+    read_entry(entry, path, "fix this entry", [&](const FaultEntry& e) { file.faults.push_back(fault_of(e)); });
+  }
+  const auto quirks = all.find("quirks");
+  if (quirks == all.end()) return file;
+  read_entry(quirks->second, path, "fix this quirk", [&](const FaultEntry& entry) {
+    for (const auto& [name, value] : entry) set_quirk(file.quirks, name, value);
+  });
   return file;
 }
 
@@ -181,7 +164,9 @@ MotorProfile parse_motor_profile(const std::string& text, const std::string& pat
     const bool known =
         std::any_of(kRows.begin(), kRows.end(), [&name = section](const MotorRow& row) { return row.section == name; });
     if (!known) refuse(path, node.Mark(), fmt::format("unknown key \"{}\"", section), "remove it");
-    read_section(section, node, path, profile);
+    read_entry(node, path, "fix this value", [&profile, &name = section](const FaultEntry& entry) {
+      for (const auto& [key, value] : entry) set(profile, name, key, value);
+    });
   }
   return profile;
 }
