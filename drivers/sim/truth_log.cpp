@@ -13,41 +13,30 @@ using nlohmann::ordered_json;
 
 void add(std::string& lines, const ordered_json& line) { lines += line.dump() + "\n"; }
 
-struct Total {
-  const char* name;
-  std::uint64_t WireTruth::*member;
-};
-
-using T = WireTruth;
-constexpr Total kTotals[] = {
-    {"sent", &T::sent},
-    {"records_sent", &T::records_sent},
-    {"arrived", &T::arrived},
-    {"records_arrived", &T::records_arrived},
-    {"dropped", &T::dropped},
-    {"records_dropped", &T::records_dropped},
-    {"duplicated", &T::duplicated},
-    {"records_duplicated", &T::records_duplicated},
-    {"overtaken", &T::overtaken},
-    {"delayed", &T::delayed},
-    {"malformed", &T::malformed},
-    {"foreign", &T::foreign},
-    {"records_left_out", &T::records_left_out},
-    {"to_others", &T::to_others},
-    {"records_to_others", &T::records_to_others},
-    {"starts", &T::starts},
-    {"unheard", &T::unheard},
-    {"restarts", &T::restarts},
-    {"reboots", &T::reboots},
-};
-
 void add_done(ordered_json& totals, const std::map<FaultKind, std::uint64_t>& done) {
   for (const auto& [kind, count] : done) totals[std::string(name_of(kind))] = count;
 }
 
 ordered_json totals_of(const WireTruth& truth) {
-  ordered_json totals;
-  for (const Total& total : kTotals) totals[total.name] = truth.*total.member;
+  ordered_json totals{{"sent", truth.sent},
+                      {"records_sent", truth.records_sent},
+                      {"arrived", truth.arrived},
+                      {"records_arrived", truth.records_arrived},
+                      {"dropped", truth.dropped},
+                      {"records_dropped", truth.records_dropped},
+                      {"duplicated", truth.duplicated},
+                      {"records_duplicated", truth.records_duplicated},
+                      {"overtaken", truth.overtaken},
+                      {"delayed", truth.delayed},
+                      {"malformed", truth.malformed},
+                      {"foreign", truth.foreign},
+                      {"records_left_out", truth.records_left_out},
+                      {"to_others", truth.to_others},
+                      {"records_to_others", truth.records_to_others},
+                      {"starts", truth.starts},
+                      {"unheard", truth.unheard},
+                      {"restarts", truth.restarts},
+                      {"reboots", truth.reboots}};
   add_done(totals, truth.done);
   return totals;
 }
@@ -87,14 +76,12 @@ std::string json_lines(const IqTruth& truth) {
   std::string lines;
   for (const FaultEvent& event : truth.events) add(lines, {{"at_ns", event.at.count()}, {"motor_event", event.what}});
   for (const SentIqReply& r : truth.log) {
-    std::string data;
-    for (const std::uint8_t byte : r.data()) data += fmt::format("{:02x}", byte);
     ordered_json line{{"asked_ns", r.asked.count()},
                       {"begun_ns", r.begun.count()},
                       {"type", r.type},
                       {"sub", r.sub},
                       {"id", r.id},
-                      {"data", data},
+                      {"data", fmt::format("{:02x}", fmt::join(r.data(), ""))},
                       {"arrivals", r.arrivals}};
     if (r.arrivals > 0) line["arrived_ns"] = r.arrived.count();
     if (std::isfinite(r.truth)) line["truth"] = r.truth;

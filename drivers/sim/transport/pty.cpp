@@ -25,23 +25,14 @@ constexpr int kQuietReads = 1000;  // a second of them, one per millisecond
   throw DeviceError("simulated motor " + path, operation, cause, next_move);
 }
 
-struct Rate {
-  unsigned baud;
-  speed_t code;
-};
-constexpr Rate kRates[] = {{9600, B9600},       {19200, B19200},     {38400, B38400},     {57600, B57600},
-                           {115200, B115200},   {230400, B230400},   {460800, B460800},   {500000, B500000},
-                           {576000, B576000},   {921600, B921600},   {1000000, B1000000}, {1152000, B1152000},
-                           {1500000, B1500000}, {2000000, B2000000}, {2500000, B2500000}, {3000000, B3000000},
-                           {3500000, B3500000}, {4000000, B4000000}};
+constexpr unsigned kRates[] = {9600,   19200,   38400,   57600,   115200,  230400,  460800,  500000,  576000,
+                               921600, 1000000, 1152000, 1500000, 2000000, 2500000, 3000000, 3500000, 4000000};
 
 void make_raw(int descriptor, unsigned baud) noexcept {
   termios line{};
   if (tcgetattr(descriptor, &line) != 0) return;
   cfmakeraw(&line);
-  for (const Rate& rate : kRates) {
-    if (rate.baud == baud) cfsetspeed(&line, rate.code);
-  }
+  cfsetspeed(&line, baud);
   tcsetattr(descriptor, TCSANOW, &line);
 }
 
@@ -92,9 +83,9 @@ void Pty::unplug() noexcept {
 unsigned Pty::baud() const noexcept {
   termios line{};
   if (tcgetattr(slave_.number(), &line) != 0) return 0;
-  const speed_t code = cfgetospeed(&line);
-  for (const Rate& rate : kRates) {
-    if (rate.code == code) return rate.baud;
+  for (const unsigned rate : kRates) {
+    termios known{};
+    if (cfsetspeed(&known, rate) == 0 && cfgetospeed(&known) == cfgetospeed(&line)) return rate;
   }
   return 0;
 }

@@ -118,7 +118,9 @@ Mcp2221::Report Mcp2221::apply(const Report& command) {
 void Mcp2221::status(const Report& command, Report& answer) {
   if (command[2] == 0x10) {
     answer[2] = engine() == kIdle ? 0x11 : 0x10;
-    cancel();
+    state_ = kIdle;
+    free_at_ = faults_.now();
+    nack_ = false;
   }
   if (command[3] == 0x20) {
     const bool settable = engine() == kIdle;
@@ -193,12 +195,6 @@ std::uint8_t Mcp2221::sensor_byte() {
   const std::uint8_t value = sensor_.read(faults_.now());
   const auto fault = faults_.strikes(FaultKind::ambient_reads_as, at);
   return fault ? fault->value : value;
-}
-
-void Mcp2221::cancel() {
-  state_ = kIdle;
-  free_at_ = faults_.now();
-  nack_ = false;
 }
 
 }  // namespace kphi::sim

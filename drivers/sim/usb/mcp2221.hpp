@@ -53,7 +53,6 @@ class Mcp2221 final : public UsbFunction {
   void occupy(std::size_t bytes);
   [[nodiscard]] std::uint8_t engine() const;
   [[nodiscard]] std::uint8_t sensor_byte();
-  void cancel();
 
   const UsbShape shape_;
   UsbFaults& faults_;
