@@ -164,7 +164,7 @@ MotorProfile parse_motor_profile(const std::string& text, const std::string& pat
     const bool known =
         std::any_of(kRows.begin(), kRows.end(), [&name = section](const MotorRow& row) { return row.section == name; });
     if (!known) refuse(path, node.Mark(), fmt::format("unknown key \"{}\"", section), "remove it");
-    read_entry(node, path, "fix this value", [&profile, &name = section](const FaultEntry& entry) {
+    read_entry(node, path, "fix this entry", [&profile, &name = section](const FaultEntry& entry) {
       for (const auto& [key, value] : entry) set(profile, name, key, value);
     });
   }
