@@ -23,29 +23,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Rate {
-  unsigned baud;
-  speed_t code;
-};
-constexpr Rate kRates[] = {{1200, B1200},       {2400, B2400},       {4800, B4800},       {9600, B9600},
-                           {19200, B19200},     {38400, B38400},     {57600, B57600},     {115200, B115200},
-                           {230400, B230400},   {460800, B460800},   {500000, B500000},   {576000, B576000},
-                           {921600, B921600},   {1000000, B1000000}, {1152000, B1152000}, {1500000, B1500000},
-                           {2000000, B2000000}, {2500000, B2500000}, {3000000, B3000000}, {3500000, B3500000},
-                           {4000000, B4000000}};
+constexpr unsigned kRates[] = {1200,    2400,    4800,    9600,    19200,   38400,   57600,
+                               115200,  230400,  460800,  500000,  576000,  921600,  1000000,
+                               1152000, 1500000, 2000000, 2500000, 3000000, 3500000, 4000000};
 
-const Rate* rate_of(unsigned baud) noexcept {
-  const auto found =
-      std::find_if(std::begin(kRates), std::end(kRates), [&](const Rate& rate) { return rate.baud == baud; });
-  return found == std::end(kRates) ? nullptr : found;
-}
-
-const Rate& known_rate(const std::string& device, unsigned baud) {
-  if (const Rate* rate = rate_of(baud)) return *rate;
-  std::vector<unsigned> known;
-  for (const Rate& rate : kRates) known.push_back(rate.baud);
+void require_known(const std::string& device, unsigned baud) {
+  if (std::ranges::find(kRates, baud) != std::end(kRates)) return;
   throw DeviceError("serial port " + device, "open", fmt::format("unknown baud rate {}", baud),
-                    fmt::format("use one of {}", fmt::join(known, ", ")));
+                    fmt::format("use one of {}", fmt::join(kRates, ", ")));
 }
 
 std::string advice_for_missing() {
@@ -73,7 +58,7 @@ std::string words_for(int error) {
   throw DeviceError("serial port " + device, operation, words_for(error), advice_for(error, device));
 }
 
-void make_raw(int fd, const std::string& device, const Rate& rate) {
+void make_raw(int fd, const std::string& device, unsigned baud) {
   termios line{};
   if (tcgetattr(fd, &line) != 0) refuse(device, "read line settings", errno);
   cfmakeraw(&line);
@@ -81,13 +66,11 @@ void make_raw(int fd, const std::string& device, const Rate& rate) {
   line.c_cflag &= ~static_cast<tcflag_t>(CRTSCTS | CSTOPB | PARENB);
   line.c_cc[VMIN] = 1;
   line.c_cc[VTIME] = 0;
-  cfsetispeed(&line, rate.code);
-  cfsetospeed(&line, rate.code);
+  cfsetspeed(&line, baud);
   if (tcsetattr(fd, TCSANOW, &line) != 0) refuse(device, "set line raw", errno);
   // tcsetattr reports success even if it has applied only a part.
-  termios now{};
-  if (tcgetattr(fd, &now) != 0 || cfgetospeed(&now) != rate.code) {
-    throw DeviceError("serial port " + device, fmt::format("set {} baud 8N1", rate.baud), "the port keeps another rate",
+  if (!runs_at(fd, baud)) {
+    throw DeviceError("serial port " + device, fmt::format("set {} baud 8N1", baud), "the port keeps another rate",
                       "check that the adapter supports this rate");
   }
 }
@@ -111,9 +94,10 @@ Descriptor open_exclusively(const std::string& device) {
 
 }  // namespace
 
-unsigned speed_code(unsigned baud) noexcept {
-  const Rate* rate = rate_of(baud);
-  return rate == nullptr ? B0 : rate->code;
+bool runs_at(int descriptor, unsigned baud) noexcept {
+  termios wanted{}, line{};
+  return cfsetspeed(&wanted, baud) == 0 && tcgetattr(descriptor, &line) == 0 &&
+         cfgetospeed(&line) == cfgetospeed(&wanted);
 }
 
 std::vector<std::string> stable_names() {
@@ -127,7 +111,7 @@ std::vector<std::string> stable_names() {
 }
 
 Port::Port(const std::string& specification, unsigned baud) : device_(specification) {
-  (void)known_rate(specification, baud);
+  require_known(specification, baud);
   device_ = path_of(specification);
   port_ = open_exclusively(device_);
   apply(baud);
@@ -175,7 +159,8 @@ void Port::set_baud(unsigned baud) {
 }
 
 void Port::apply(unsigned baud) {
-  make_raw(fd(), device_, known_rate(device_, baud));
+  require_known(device_, baud);
+  make_raw(fd(), device_, baud);
   baud_ = baud;
 }
 

@@ -26,8 +26,8 @@
 
 namespace kphi::serial {
 
-/// Its code in termios, B115200 for 115200; 0: unknown.
-[[nodiscard]] unsigned speed_code(unsigned baud) noexcept;
+/// Whether this terminal sends at `baud`.
+[[nodiscard]] bool runs_at(int descriptor, unsigned baud) noexcept;
 
 /// Names under /dev/serial/by-id: they do not depend on the socket.
 [[nodiscard]] std::vector<std::string> stable_names();

@@ -4,7 +4,7 @@
 #include <poll.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
-#include <termios.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -76,11 +76,9 @@ Outcome ModbusLink::open() {
 
 Outcome ModbusLink::take_port() {
   const int port = modbus_get_socket(context_.get());
-  termios line{};
-  if (tcgetattr(port, &line) != 0) return {Failure::lost, "not a serial port"};
-  if (cfgetospeed(&line) != serial::speed_code(address_.baud)) {
+  if (isatty(port) == 0) return {Failure::lost, "not a serial port"};
+  if (!serial::runs_at(port, address_.baud))
     return {Failure::lost, fmt::format("the port does not accept {} baud", address_.baud)};
-  }
   if (flock(port, LOCK_EX | LOCK_NB) != 0) return {Failure::lost, "in use by another program"};
   ioctl(port, TIOCEXCL);
   return {};
