@@ -97,21 +97,20 @@ char likely_separator(std::string_view text) {
   const std::string_view header = next_line(text);
   char likely = ',';
   for (const char candidate : {';', '\t'})
-    if (std::count(header.begin(), header.end(), candidate) > std::count(header.begin(), header.end(), likely))
-      likely = candidate;
+    if (std::ranges::count(header, candidate) > std::ranges::count(header, likely)) likely = candidate;
   return likely;
 }
 
 }  // namespace
 
 std::optional<std::size_t> Table::find_column(std::string_view name) const {
-  const auto found = std::find(header.begin(), header.end(), name);
+  const auto found = std::ranges::find(header, name);
   if (found == header.end()) return std::nullopt;
   return static_cast<std::size_t>(found - header.begin());
 }
 
 std::size_t Table::column(std::string_view name) const {
-  const auto times = std::count(header.begin(), header.end(), name);
+  const auto times = std::ranges::count(header, name);
   if (times == 1) return *find_column(name);
   throw ConfigurationError(fmt::format("{}:{}: {} column \"{}\"", path, std::max<std::size_t>(header_line, 1),
                                        times == 0 ? "no" : "more than one", name));

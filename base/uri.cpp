@@ -36,7 +36,7 @@ std::string HostPort::text() const {
 
 Uri::Uri(std::string text, std::string device, std::string forms)
     : text_(std::move(text)), device_(std::move(device)), forms_(std::move(forms)) {
-  if (!std::all_of(text_.begin(), text_.end(), [](char c) { return c > ' ' && c < 0x7f; }))
+  if (!std::ranges::all_of(text_, [](char c) { return c > ' ' && c < 0x7f; }))
     refuse("contains a blank or an unprintable character");
   const auto colon = text_.find(':'), question = text_.find('?');
   if (colon == std::string::npos || colon == 0 || question < colon) refuse("no scheme");
@@ -48,7 +48,7 @@ Uri::Uri(std::string text, std::string device, std::string forms)
     const auto equals = option.find('=');
     if (equals == std::string::npos) refuse(fmt::format("\"{}\" is not key=value", option));
     const std::string key = option.substr(0, equals);
-    if (std::any_of(options_.begin(), options_.end(), [&](const auto& other) { return other.first == key; }))
+    if (std::ranges::any_of(options_, [&](const auto& other) { return other.first == key; }))
       refuse(fmt::format("\"{}\" is given twice", key), "keep one");
     options_.emplace_back(key, option.substr(equals + 1));
     at = next;

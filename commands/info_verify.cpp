@@ -50,8 +50,7 @@ Json describe(const std::filesystem::path& path) {
   const RunHeader& header = run.header;
   const double seconds =
       run.phases.empty() ? 0 : 1e-9 * static_cast<double>(run.phases.back().time_ns - run.phases.front().time_ns);
-  const auto steps =
-      std::count_if(run.phases.begin(), run.phases.end(), [](const PhaseMark& m) { return m.phase == Phase::step; });
+  const auto steps = std::ranges::count_if(run.phases, [](const PhaseMark& m) { return m.phase == Phase::step; });
   Json told{{"file", path.string()},
             {"outcome", run.outcome == Outcome::complete ? "complete" : "aborted"},
             {"outcome_reason", run.outcome_reason},

@@ -155,7 +155,7 @@ bool contains(const std::vector<std::string>& words, const std::string& word) {
 void check_type(const Spot& s, const json& type, Findings& findings) {
   const auto fits = [&](const json& name) { return (s.value.*type_named(name).is)(); };
   if (type.is_array()) {
-    if (std::none_of(type.begin(), type.end(), fits))
+    if (std::ranges::none_of(type, fits))
       findings.push_back(s.at_value(shown(s.value) + " does not fit", "write " + s.schema.value("x_expected", "")));
     return;
   }
@@ -170,7 +170,7 @@ void check_type(const Spot& s, const json& type, Findings& findings) {
 }
 
 void check_enum(const Spot& s, const json& values, Findings& findings) {
-  if (std::find(values.begin(), values.end(), s.value) != values.end()) return;
+  if (std::ranges::find(values, s.value) != values.end()) return;
   std::vector<std::string> allowed;
   for (const json& value : values) allowed.push_back(value.is_string() ? value.get<std::string>() : value.dump());
   std::string next_move =
@@ -216,7 +216,7 @@ void check_above(const Spot& s, const json& end, Findings& f) { check_bound<std:
 
 std::size_t characters(const json& text) {
   const auto& bytes = text.get_ref<const std::string&>();
-  return bytes.size() - static_cast<std::size_t>(std::count_if(bytes.begin(), bytes.end(), is_continuation));
+  return bytes.size() - static_cast<std::size_t>(std::ranges::count_if(bytes, is_continuation));
 }
 
 void check_longest(const Spot& s, const json& most, Findings& findings) {

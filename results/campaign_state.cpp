@@ -91,8 +91,7 @@ std::vector<std::string> set_leftovers_aside(const CampaignFolder& folder, const
   std::vector<std::string> names;
   for (const auto& file : folder.complete_runs()) {
     const std::string name = "runs/" + file.filename().string();
-    const bool accepted = std::any_of(state.accepted.begin(), state.accepted.end(),
-                                      [&](const AcceptedRun& run) { return run.file == name; });
+    const bool accepted = std::ranges::any_of(state.accepted, [&](const AcceptedRun& run) { return run.file == name; });
     if (!accepted) names.push_back(set_aside(folder, file, kRun, ".unaccepted", files));
   }
   for (const auto& file : folder.other_runs()) {

@@ -93,7 +93,7 @@ std::vector<MotorReading> motor_of(const Handle& root, const std::string& file) 
   for (const MotorChannelInfo& info : kMotorChannels) {
     auto rows = rows_of(motor, motor_group(info), file);
     const auto earlier = [](const MotorReading& a, const MotorReading& b) { return a.time_ns < b.time_ns; };
-    if (!std::is_sorted(rows.begin(), rows.end(), earlier)) std::stable_sort(rows.begin(), rows.end(), earlier);
+    if (!std::ranges::is_sorted(rows, earlier)) std::ranges::stable_sort(rows, earlier);
     for (MotorReading& row : rows) row.channel = info.channel;
     readings.insert(readings.end(), rows.begin(), rows.end());
   }

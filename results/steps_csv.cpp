@@ -67,7 +67,7 @@ Columns columns_of(std::span<const StepMean> steps) {
   for (const Column& column : kColumns) {
     if (column.group != std::exchange(group, column.group)) {
       const auto first = std::get<double StepMean::*>(column.field);
-      present = std::any_of(steps.begin(), steps.end(), [&](const StepMean& s) { return !std::isnan(s.*first); });
+      present = std::ranges::any_of(steps, [&](const StepMean& s) { return !std::isnan(s.*first); });
     }
     if (present) columns.push_back(column);
   }

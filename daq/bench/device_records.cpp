@@ -72,7 +72,7 @@ results::StreamEvent to_event(const iq::Event& event) {
 }
 
 bool ends_a_run(results::EventKind kind) noexcept {
-  const auto found = std::find(kMotorEvents.begin(), kMotorEvents.end(), kind);
+  const auto found = std::ranges::find(kMotorEvents, kind);
   return found != kMotorEvents.end() && iq::spoils_a_run(static_cast<iq::EventKind>(found - kMotorEvents.begin()));
 }
 

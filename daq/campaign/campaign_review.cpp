@@ -49,8 +49,8 @@ std::string to_words(const results::RepetitionVerdict& verdict) {
   std::string words = fmt::format("{:g}°: ", verdict.occlusion_deg);
   words += verdict.reason.empty() ? "repetitions agree: " : verdict.reason + "; ";
   if (std::isnan(verdict.between_sd)) return words + "nothing to compare it with";
-  const auto known = std::count_if(verdict.repetitions.begin(), verdict.repetitions.end(),
-                                   [](const results::RepetitionFigure& figure) { return !std::isnan(figure.k); });
+  const auto known = std::ranges::count_if(
+      verdict.repetitions, [](const results::RepetitionFigure& figure) { return !std::isnan(figure.k); });
   return words + fmt::format("spread {:.3f} %, expected up to {:.3f} % ({} repetitions)",
                              100 * verdict.between_sd / std::abs(verdict.k),
                              100 * verdict.within_u / std::abs(verdict.k), known);
@@ -96,12 +96,12 @@ void CampaignReview::report_hysteresis(const std::string& run, const std::vector
 void CampaignReview::sort() {
   const auto& listed = campaign_.occlusions_deg;
   const auto key = [&](const StepMean& step) {
-    const auto place = std::find(listed.begin(), listed.end(), step.occlusion_deg) - listed.begin();
+    const auto place = std::ranges::find(listed, step.occlusion_deg) - listed.begin();
     return std::tuple(place, step.occlusion_deg, std::abs(step.repetition));
   };
   const auto by_key = [&](const StepMean& a, const StepMean& b) { return key(a) < key(b); };
-  std::stable_sort(steps_.begin(), steps_.end(), by_key);
-  std::stable_sort(references_.begin(), references_.end(), by_key);
+  std::ranges::stable_sort(steps_, by_key);
+  std::ranges::stable_sort(references_, by_key);
 }
 
 void CampaignReview::write(const results::CampaignFolder& folder, results::FileLayer& files) const {
@@ -122,8 +122,8 @@ std::optional<AnotherRun> CampaignReview::another(double occlusion_deg) {
   rule.wanted = campaign_.repetitions;
   rule.at_most = campaign_.repetitions + campaign_.repetitions_extra_max;
   const auto verdicts = judge_repetitions(steps_, rule);
-  const results::RepetitionVerdict verdict = *std::find_if(
-      verdicts.begin(), verdicts.end(), [&](const auto& one) { return one.occlusion_deg == occlusion_deg; });
+  const results::RepetitionVerdict verdict =
+      *std::ranges::find_if(verdicts, [&](const auto& one) { return one.occlusion_deg == occlusion_deg; });
   if (made > 1 || !verdict.reason.empty()) {
     progress_.say(to_words(verdict));
     note_("repetitions_judged", to_json(verdict));

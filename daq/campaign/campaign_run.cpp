@@ -164,8 +164,8 @@ class CampaignRun {
       accepted_at_ = Instant(run.time_ns);
     }
     if (result_.runs > 0) review_.write(folder_, bench_.files());
-    const auto open = std::count_if(plan_.runs.begin(), plan_.runs.end(),
-                                    [this](const profiles::PlannedRun& planned) { return !is_accepted(planned); });
+    const auto open = std::ranges::count_if(
+        plan_.runs, [this](const profiles::PlannedRun& planned) { return !is_accepted(planned); });
     planned_ = result_.runs + static_cast<int>(open);
     progress_.say(fmt::format("resumed: {} of {} runs accepted", result_.runs, planned_));
   }
@@ -311,8 +311,8 @@ class CampaignRun {
                      {"sha256", run.sha256},
                      {"samples", run.account.received},
                      {"lost", lost}};
-    const auto driven = std::count_if(recording.phases.begin(), recording.phases.end(),
-                                      [](const auto& mark) { return mark.phase == results::Phase::step; });
+    const auto driven =
+        std::ranges::count_if(recording.phases, [](const auto& mark) { return mark.phase == results::Phase::step; });
     // Skipped at full drive, learned in earlier runs or in this one.
     if (const auto left_out = static_cast<std::ptrdiff_t>(planned.steps.size()) - driven; left_out > 0)
       accepted["steps_left_out"] = left_out;

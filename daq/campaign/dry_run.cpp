@@ -127,9 +127,8 @@ class Checks {
 
   /// A supply that cannot sink current has nowhere to put what a decelerating rotor feeds back.
   void braking(const profiles::Plan& plan) {
-    const bool slows_down = std::any_of(plan.runs.begin(), plan.runs.end(), [](const profiles::PlannedRun& run) {
-      return !std::is_sorted(run.steps.begin(), run.steps.end(),
-                             [](const auto& a, const auto& b) { return a.speed < b.speed; });
+    const bool slows_down = std::ranges::any_of(plan.runs, [](const profiles::PlannedRun& run) {
+      return !std::ranges::is_sorted(run.steps, {}, &profiles::PlannedStep::speed);
     });
     if (!slows_down) return;
     if (const auto& slew = campaign_.profile.slew_rad_s2)
@@ -265,8 +264,8 @@ std::optional<ThrustPrior> thrust_prior(const profiles::Propeller& propeller) {
 }
 
 std::ptrdiff_t DryRun::refused() const {
-  return std::count_if(checks.begin(), checks.end(),
-                       [](const PlanCheck& check) { return check.finding.severity == Severity::fault; });
+  return std::ranges::count_if(checks,
+                               [](const PlanCheck& check) { return check.finding.severity == Severity::fault; });
 }
 
 std::uint64_t bytes_needed(const profiles::Plan& plan, const profiles::BenchConfig& config) {

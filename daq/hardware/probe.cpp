@@ -52,7 +52,7 @@ DeviceAnswer ask_instrument(const std::string& address) {
 /// As it must be written to mean this one.
 std::string address_of(const usb::Listing& found, const std::vector<usb::Listing>& all) {
   UsbAddress address{found.vendor, found.product, found.serial, ""};
-  const auto like = std::count_if(all.begin(), all.end(), [&](const auto& other) { return fits(address, other); });
+  const auto like = std::ranges::count_if(all, [&](const auto& other) { return fits(address, other); });
   if (like > 1) address.port_path = found.port_path;
   return address.text();
 }
@@ -130,8 +130,7 @@ std::vector<DeviceAnswer> ask_usb(const std::vector<DeviceAnswer>& known) {
   for (const usb::Listing& found : all) {
     if (!is_bridge(found) && !found.instrument) continue;
     const std::string name = fmt::format("usb:{:04x}:{:04x}", found.vendor, found.product);
-    if (std::any_of(known.begin(), known.end(),
-                    [&](const auto& each) { return each.device.find(name) != each.device.npos; }))
+    if (std::ranges::any_of(known, [&](const auto& each) { return each.device.find(name) != each.device.npos; }))
       continue;
     const std::string address = address_of(found, all);
     answers.push_back(is_bridge(found) ? ask_sensor(address) : ask_instrument(address));

@@ -71,7 +71,7 @@ ReplayedRun::ReplayedRun(const results::RunRecording& recording, ManualClock& cl
       motor_(recording.motor),
       observer_({recording.header.thrust_axis, recording.header.thrust_sign, recording.header.spin},
                 recording.header.load_cell, SpeedWatch(recording.header.spin, Duration(0))) {
-  std::stable_sort(motor_.begin(), motor_.end(), [](const auto& a, const auto& b) { return a.time_ns < b.time_ns; });
+  std::ranges::stable_sort(motor_, {}, &results::MotorReading::time_ns);
   const auto& cell = recording.load_cell;
   if (!cell.empty()) {
     begin_ = Instant(cell.front().arrival_ns);

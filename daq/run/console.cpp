@@ -100,7 +100,7 @@ struct Console::Shared {
   };
 
   [[nodiscard]] bool is_idle() const noexcept {
-    return std::all_of(streams.begin(), streams.end(), [](const Stream& stream) { return stream.queue.empty(); });
+    return std::ranges::all_of(streams, [](const Stream& stream) { return stream.queue.empty(); });
   }
   [[nodiscard]] Stream& stream(int name) {
     for (Stream& known : streams) {

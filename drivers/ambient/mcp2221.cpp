@@ -55,9 +55,9 @@ const char* meaning(std::uint8_t engine_state) noexcept {
 
 Mcp2221::Mcp2221(usb::Transport& transport, Pause pause) : transport_(transport), pause_(std::move(pause)) {
   const auto& all = transport.interfaces();
-  const auto hid = std::find_if(all.begin(), all.end(), [](const usb::Interface& i) { return i.class_code == kHid; });
+  const auto hid = std::ranges::find_if(all, [](const usb::Interface& i) { return i.class_code == kHid; });
   const auto endpoint = [&](bool in) {
-    const auto found = std::find_if(hid->endpoints.begin(), hid->endpoints.end(), [in](const usb::Endpoint& e) {
+    const auto found = std::ranges::find_if(hid->endpoints, [in](const usb::Endpoint& e) {
       return e.kind == usb::EndpointKind::interrupt && e.in() == in;
     });
     return found == hid->endpoints.end() ? usb::Endpoint{} : *found;

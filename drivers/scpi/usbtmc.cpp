@@ -37,7 +37,7 @@ constexpr Choker kChokeOnRemoteControl[] = {{0x1ab1, 0x0588}, {0x1ab1, 0x04b0}, 
                                             {0x1ab1, 0x0515}, {0xf4ec, 0},      {0x0b21, 0}};
 
 bool chokes(const usb::Transport& device) noexcept {
-  return std::any_of(std::begin(kChokeOnRemoteControl), std::end(kChokeOnRemoteControl), [&](const Choker& c) {
+  return std::ranges::any_of(kChokeOnRemoteControl, [&](const Choker& c) {
     return c.vendor == device.vendor() && (c.product == 0 || c.product == device.product());
   });
 }

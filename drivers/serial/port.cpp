@@ -106,7 +106,7 @@ std::vector<std::string> stable_names() {
   for (const auto& entry : fs::directory_iterator("/dev/serial/by-id", none)) {
     names.push_back(entry.path().string());
   }
-  std::sort(names.begin(), names.end());
+  std::ranges::sort(names);
   return names;
 }
 
@@ -257,7 +257,7 @@ std::vector<Adapter> adapters(const Roots& roots) {
     if (none) continue;
     if (auto adapter = look_up_from(folder, roots)) found.push_back(std::move(*adapter));
   }
-  std::sort(found.begin(), found.end(), [](const Adapter& a, const Adapter& b) { return a.device < b.device; });
+  std::ranges::sort(found, {}, &Adapter::device);
   return found;
 }
 

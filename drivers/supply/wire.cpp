@@ -43,9 +43,7 @@ void set_option(Address& address, const Uri& uri, const std::string& key, const 
 
 std::string Address::where() const { return wire == Wire::rtu ? device : tcp.text(); }
 
-bool known_baud(unsigned baud) noexcept {
-  return std::find(std::begin(kBauds), std::end(kBauds), baud) != std::end(kBauds);
-}
+bool known_baud(unsigned baud) noexcept { return std::ranges::find(kBauds, baud) != std::end(kBauds); }
 
 Address parse_address(const std::string& text) {
   const Uri uri(text, "supply", kForms);
@@ -135,7 +133,7 @@ constexpr CurrentRange kNone{};
 
 /// nullptr when there is none.
 const Model* first_model(auto&& fits) {
-  const auto found = std::find_if(models().begin(), models().end(), fits);
+  const auto found = std::ranges::find_if(models(), fits);
   return found == models().end() ? nullptr : &*found;
 }
 

@@ -126,9 +126,8 @@ libusb_device_descriptor descriptor_of(libusb_device* device) {
 Listing listing_without_serial(libusb_device* device) {
   const libusb_device_descriptor descriptor = descriptor_of(device);
   const std::vector<Interface> all = interfaces_of(device);
-  const bool instrument = std::any_of(all.begin(), all.end(), [](const Interface& one) {
-    return one.class_code == kApplication && one.subclass == kTestAndMeasurement;
-  });
+  const bool instrument = std::ranges::any_of(
+      all, [](const Interface& one) { return one.class_code == kApplication && one.subclass == kTestAndMeasurement; });
   return {descriptor.idVendor, descriptor.idProduct, "", port_path(device), true, instrument};
 }
 

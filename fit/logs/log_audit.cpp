@@ -268,7 +268,7 @@ std::vector<std::size_t> plateau(const StandLog& log, SpeedSource source) {
   std::vector<double> speeds;
   for (const StandRow& row : log.rows)
     if (rpm_of(row, source).value_or(0) > 500) speeds.push_back(*rpm_of(row, source));
-  std::sort(speeds.begin(), speeds.end());
+  std::ranges::sort(speeds);
   constexpr double kWide = 1.02 / 0.98;
   std::size_t most = 0, best = 0;
   for (std::size_t low = 0, high = 0; low < speeds.size(); ++low) {

@@ -375,8 +375,8 @@ results::StepMean step_of_row(double speed_rpm, double thrust_n) {
 }
 
 SpeedSource choose_speed(const StandLog& log, const RowSelection& selection) {
-  const bool electrical_turns = std::any_of(log.rows.begin(), log.rows.end(),
-                                            [](const StandRow& row) { return row.electrical_rpm.value_or(0) > 0; });
+  const bool electrical_turns =
+      std::ranges::any_of(log.rows, [](const StandRow& row) { return row.electrical_rpm.value_or(0) > 0; });
   const SpeedSource source =
       selection.speed.value_or(electrical_turns || !log.has_optical ? SpeedSource::electrical : SpeedSource::optical);
   if (source == SpeedSource::electrical && !log.has_electrical)

@@ -19,14 +19,14 @@ using results::StepMean;
 using StepsByAngle = std::map<double, std::vector<StepMean>>;
 
 bool measured_at(const std::vector<StepMean>& steps, double speed) {
-  return std::any_of(steps.begin(), steps.end(), [&](const StepMean& step) { return same_level(level(step), speed); });
+  return std::ranges::any_of(steps, [&](const StepMean& step) { return same_level(level(step), speed); });
 }
 
 double highest_common_level(const StepsByAngle& by_angle) {
   double highest = 0;
   for (const StepMean& step : by_angle.begin()->second) {
-    const bool everywhere = std::all_of(by_angle.begin(), by_angle.end(),
-                                        [&](const auto& entry) { return measured_at(entry.second, level(step)); });
+    const bool everywhere =
+        std::ranges::all_of(by_angle, [&](const auto& entry) { return measured_at(entry.second, level(step)); });
     if (everywhere) highest = std::max(highest, level(step));
   }
   return highest;
@@ -115,7 +115,7 @@ void require_one_propeller(std::span<const StepMean> steps) {
 /// A missing run is probably a typing error.
 void require_runs(std::span<const StepMean> steps, const std::vector<LeftOutRun>& left_out) {
   for (const LeftOutRun& run : left_out) {
-    const bool there = std::any_of(steps.begin(), steps.end(), [&](const StepMean& step) {
+    const bool there = std::ranges::any_of(steps, [&](const StepMean& step) {
       return step.occlusion_deg == run.phi_deg && step.repetition == run.repetition;
     });
     if (!there)

@@ -50,8 +50,7 @@ std::vector<LinePoint> carriers(const std::vector<LinePoint>& points, const Line
   for (const double phi : options.points_deg) used.push_back(point_at(points, phi));
   used = sorted(used);
   const std::size_t needed = options.anchored ? 1 : 2;
-  const auto occluded =
-      std::count_if(used.begin(), used.end(), [](const auto& p) { return p.phi_deg > kSameAngleDeg; });
+  const auto occluded = std::ranges::count_if(used, [](const auto& p) { return p.phi_deg > kSameAngleDeg; });
   if (used.size() < needed || occluded < 1) {
     throw FitError(
         fmt::format("line fit: {} points for the line, but it needs {} with phi > 0; measure more occlusions{}",
@@ -181,7 +180,7 @@ LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& option
 Curvature curvature(std::span<const LinePoint> points, double freedom) {
   Curvature result;
   const double m = static_cast<double>(points.size());
-  if (m >= 3 && std::all_of(points.begin(), points.end(), [](const auto& point) { return point.standard_error > 0; })) {
+  if (m >= 3 && std::ranges::all_of(points, [](const auto& point) { return point.standard_error > 0; })) {
     std::vector<double> phi, k, weights;
     double scale = 0;
     for (const LinePoint& point : points) scale = std::max(scale, point.phi_deg);

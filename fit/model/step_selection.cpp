@@ -44,7 +44,7 @@ StepSelection select_steps(std::span<const results::StepMean> steps, const Speed
   // Limits are typed in RPM and levels come from files: a level at the limit must not drop out by rounding.
   constexpr double kSlack = 1e-9;
   const bool single_repetitions =
-      std::any_of(steps.begin(), steps.end(), [](const results::StepMean& step) { return step.repetition > 0; });
+      std::ranges::any_of(steps, [](const results::StepMean& step) { return step.repetition > 0; });
   StepSelection selection;
   for (const results::StepMean& step : steps) {
     if (single_repetitions && step.repetition == 0) continue;
@@ -54,7 +54,7 @@ StepSelection select_steps(std::span<const results::StepMean> steps, const Speed
       continue;
     }
     const bool measured = std::isfinite(step.thrust_n) && std::isfinite(step.speed_rad_s);
-    const auto by_hand = std::find_if(left_out_runs.begin(), left_out_runs.end(), [&](const LeftOutRun& run) {
+    const auto by_hand = std::ranges::find_if(left_out_runs, [&](const LeftOutRun& run) {
       return run.phi_deg == step.occlusion_deg && run.repetition == step.repetition;
     });
     const bool chosen = by_hand != left_out_runs.end();
@@ -72,8 +72,7 @@ StepSelection select_steps(std::span<const results::StepMean> steps, const Speed
 
 std::vector<Point> points_of(std::span<const results::StepMean> steps) {
   const auto all_tell = [&](double results::StepMean::*u) {
-    return std::all_of(steps.begin(), steps.end(),
-                       [&](const auto& step) { return std::isfinite(step.*u) && step.*u > 0; });
+    return std::ranges::all_of(steps, [&](const auto& step) { return std::isfinite(step.*u) && step.*u > 0; });
   };
   const bool thrust_told = all_tell(&results::StepMean::thrust_u_n);
   const bool speed_told = all_tell(&results::StepMean::speed_u_rad_s);

@@ -101,7 +101,7 @@ void judge(std::vector<Difference>& differences) {
   std::vector<Difference*> judged;
   for (Difference& entry : differences)
     if (entry.judged && entry.p) judged.push_back(&entry);
-  std::sort(judged.begin(), judged.end(), [](const Difference* a, const Difference* b) { return *a->p < *b->p; });
+  std::ranges::sort(judged, [](const Difference* a, const Difference* b) { return *a->p < *b->p; });
   for (std::size_t i = 0; i < judged.size(); ++i) {
     if (!(*judged[i]->p < kLevel / static_cast<double>(judged.size() - i))) break;
     judged[i]->significant = true;
@@ -169,7 +169,7 @@ ComparedResult load_result(const std::string& path) {
     throw ConfigurationError(
         path + ": contains neither coefficients.yaml nor steps.csv; run `kphi fit` or name another folder");
   const auto table = results::read_steps(steps);
-  if (std::any_of(table.begin(), table.end(), [](const auto& step) { return step.occlusion_deg > 0; }))
+  if (std::ranges::any_of(table, [](const auto& step) { return step.occlusion_deg > 0; }))
     throw ConfigurationError(path + ": not fitted yet; run `kphi fit " + path + "` first");
   return result_of_steps(steps.string(), path);
 }

@@ -71,9 +71,8 @@ Regression fit_lines(const std::vector<Row>& rows, std::size_t members, bool sha
 double SharedSlope::expanded() const { return coverage_factor(slope.freedom) * std::hypot(slope.u, common_u); }
 
 Air common_air(std::span<const Fitted> family) {
-  const bool known = std::all_of(family.begin(), family.end(), [](const Fitted& member) {
-    return member.identification.air && !member.analysis.standard.empty();
-  });
+  const bool known = std::ranges::all_of(
+      family, [](const Fitted& member) { return member.identification.air && !member.analysis.standard.empty(); });
   return known ? Air::standard : Air::measured;
 }
 

@@ -35,7 +35,7 @@ std::string symmetric_axis(double reach) {
 /// Half of a symmetric axis: the largest |value| without the outliers, rounded up to a tick.
 double axis_reach(std::vector<double> values, double least) {
   for (double& value : values) value = std::abs(value);
-  std::sort(values.begin(), values.end());
+  std::ranges::sort(values);
   const double most = values.empty() ? least : values[values.size() - 1 - values.size() / 50];
   const double reach = std::max(least, 1.25 * most);
   const double unit = std::pow(10, std::floor(std::log10(reach)));

@@ -58,7 +58,7 @@ std::vector<double> thrust_samples(const results::RunRecording& run, const resul
 
 std::optional<Settling> settling_of(const results::RunRecording& run, const results::StepMean& step) {
   constexpr double kBefore_s = 0.15, kBin_s = 0.01;
-  const auto command = std::find_if(run.phases.begin(), run.phases.end(), [&](const results::PhaseMark& mark) {
+  const auto command = std::ranges::find_if(run.phases, [&](const results::PhaseMark& mark) {
     return mark.phase == results::Phase::step && mark.step == step.step;
   });
   if (command == run.phases.end()) return std::nullopt;

@@ -67,7 +67,7 @@ struct NoiseModel {
 
 /// From the variances of the levels at x.
 NoiseModel noise_of(const std::vector<double>& x, const std::vector<double>& variances) {
-  const double scale = *std::max_element(x.begin(), x.end());
+  const double scale = *std::ranges::max_element(x);
   std::vector<double> squares;
   double mean = 0, share = 0, square_sum = 0;
   for (std::size_t i = 0; i < x.size(); ++i) {

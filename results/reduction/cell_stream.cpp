@@ -123,7 +123,7 @@ CellStream::CellStream(const RunRecording& run)
 }
 
 std::size_t CellStream::boot_at(Nanoseconds time) const {
-  return static_cast<std::size_t>(std::count_if(reboots_.begin(), reboots_.end(), [&](auto t) { return t < time; }));
+  return static_cast<std::size_t>(std::ranges::count_if(reboots_, [&](auto t) { return t < time; }));
 }
 
 Window CellStream::since_reboot(Window window) const {

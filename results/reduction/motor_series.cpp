@@ -61,8 +61,8 @@ Statistics MotorSeries::statistics(MotorChannel channel, const Window& window, d
 }
 
 std::uint64_t MotorSeries::glitches(const Window& window) const {
-  return static_cast<std::uint64_t>(std::count_if(
-      glitches_.begin(), glitches_.end(), [&](auto time) { return time >= window.begin && time < window.end; }));
+  return static_cast<std::uint64_t>(
+      std::ranges::count_if(glitches_, [&](auto time) { return time >= window.begin && time < window.end; }));
 }
 
 bool MotorSeries::speed_frozen(const Window& window) const {

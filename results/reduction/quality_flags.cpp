@@ -20,7 +20,7 @@ constexpr std::uint64_t kFewSpeeds = 3;
 bool leaves_at_the_end(const StepEvidence& step, const MotorSeries& motor) {
   const double steady = 3 * std::max(kSpeedShare * std::abs(step.speed.mean), kSpeedSteady);
   const auto late = motor.over(MotorChannel::speed, {step.motor_window.end, step.window.end});
-  return std::any_of(late.begin(), late.end(), [&](const MotorReading& reading) {
+  return std::ranges::any_of(late, [&](const MotorReading& reading) {
     return !(std::abs(std::abs(reading.value) - std::abs(step.speed.mean)) <= steady);
   });
 }

@@ -151,7 +151,7 @@ class Reduction {
     const auto before = motor_.over(MotorChannel::speed, {step.whole.begin, earliest});
     if (!before.empty() && near(before.back())) return earliest;
     const auto after = motor_.over(MotorChannel::speed, {earliest, step.whole.end});
-    const auto arrived = std::find_if(after.begin(), after.end(), near);
+    const auto arrived = std::ranges::find_if(after, near);
     return arrived == after.end() ? earliest : arrived->time_ns;
   }
 

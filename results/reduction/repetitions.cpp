@@ -268,7 +268,7 @@ void decide(RepetitionVerdict& verdict, const RepetitionRule& rule) {
     }
   }
   const auto runs = static_cast<int>(verdict.repetitions.size());
-  const auto [low, high] = std::minmax_element(k.begin(), k.end());
+  const auto [low, high] = std::ranges::minmax_element(k);
   const bool spread = k.size() > 1 && verdict.p < 0.05 && *high - *low > rule.spread_share * std::abs(verdict.k);
   if (spread && verdict.reason.empty()) {
     verdict.reason = fmt::format("the repetitions spread over {:.2f} % of k, and none stands out",
@@ -286,8 +286,8 @@ struct Pair {
 /// The profile's own way comes first, and it rises when its first step is not its fastest.
 bool rises(std::span<const StepMean> run) {
   const auto first = std::ranges::min_element(run, {}, &StepMean::step);
-  return std::any_of(run.begin(), run.end(),
-                     [&](const StepMean& step) { return step.commanded_speed_rad_s > first->commanded_speed_rad_s; });
+  return std::ranges::any_of(
+      run, [&](const StepMean& step) { return step.commanded_speed_rad_s > first->commanded_speed_rad_s; });
 }
 
 /// By commanded speed, of those that were held twice.
@@ -387,7 +387,7 @@ std::vector<RepetitionVerdict> judge_repetitions(std::span<const StepMean> steps
 
 std::string Hysteresis::to_words() const {
   const auto largest = std::ranges::max_element(speeds, {}, [](const auto& p) { return std::abs(p.up_minus_down_n); });
-  const auto beyond = std::count_if(speeds.begin(), speeds.end(), [](const auto& p) { return p.significant(); });
+  const auto beyond = std::ranges::count_if(speeds, [](const auto& p) { return p.significant(); });
   return fmt::format(
       "thrust going up minus going down: {:+.3f} ± {:.3f} % of k{}; at most {:+.4f} ± {:.4f} N at {:.0f} RPM; {} of {} "
       "speeds beyond twice their uncertainty",

@@ -19,7 +19,7 @@ constexpr std::uint16_t kHeader = 0x1234;
 
 /// 0 for an unknown code.
 double si_of(std::span<const Unit> units, int code) {
-  const auto known = std::find_if(units.begin(), units.end(), [&](const Unit& unit) { return unit.code == code; });
+  const auto known = std::ranges::find_if(units, [&](const Unit& unit) { return unit.code == code; });
   return known == units.end() ? 0 : known->si;
 }
 

@@ -98,9 +98,8 @@ class Elements {
   [[nodiscard]] Unit unit(const char* name_element, const char* code_element, std::span<const Unit> units) const {
     const std::string name = optional_text(name_element);
     const int code = name.empty() ? whole_number(code_element, 0, 255) : 0;
-    const auto known = std::find_if(units.begin(), units.end(), [&](const Unit& candidate) {
-      return name.empty() ? candidate.code == code : candidate.name == name;
-    });
+    const auto known = std::ranges::find_if(
+        units, [&](const Unit& candidate) { return name.empty() ? candidate.code == code : candidate.name == name; });
     if (known == units.end()) {
       refuse(fmt::format("<{}> is the unknown unit \"{}\"", name.empty() ? code_element : name_element,
                          name.empty() ? std::to_string(code) : name),

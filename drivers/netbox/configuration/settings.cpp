@@ -43,8 +43,7 @@ constexpr Setting kSettings[] = {
 };
 
 const Setting* setting_of(const std::string& key) noexcept {
-  const auto found =
-      std::find_if(std::begin(kSettings), std::end(kSettings), [&](const Setting& s) { return key == s.key; });
+  const auto found = std::ranges::find_if(kSettings, [&](const Setting& s) { return key == s.key; });
   return found == std::end(kSettings) ? nullptr : found;
 }
 

@@ -84,7 +84,7 @@ void check_sampling(const Configuration& box, const Intention& intention, Findin
 
 void check_extras(const Configuration& box, Findings& found) {
   const auto any = [](const std::array<double, 6>& values) {
-    return std::any_of(values.begin(), values.end(), [](double value) { return value != 0; });
+    return std::ranges::any_of(values, [](double value) { return value != 0; });
   };
   const std::span transform(box.tool_transform);
   if (any(box.tool_transform))

@@ -203,7 +203,7 @@ void Connection::adopt_latest() {
 std::vector<Event> Connection::take_events() {
   std::vector<Event> events;
   events_.consume_all([&](const Event& event) { events.push_back(event); });
-  std::stable_sort(events.begin(), events.end(), [](const Event& a, const Event& b) { return a.at < b.at; });
+  std::ranges::stable_sort(events, {}, &Event::at);
   return events;
 }
 

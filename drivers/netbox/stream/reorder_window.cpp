@@ -86,8 +86,7 @@ bool LossTracker::looks_rebooted(const Record& record, Instant arrival) const no
 
 bool LossTracker::on_former_line(const Record& record) const noexcept {
   const std::uint32_t its_line = line(record.rdt_sequence, record.ft_sequence);
-  return its_line != line(last_rdt_, last_ft_) &&
-         std::find(former_lines_.begin(), former_lines_.end(), its_line) != former_lines_.end();
+  return its_line != line(last_rdt_, last_ft_) && std::ranges::find(former_lines_, its_line) != former_lines_.end();
 }
 
 bool LossTracker::note_stray(const Record& record, Instant arrival, std::int32_t ft_step) noexcept {
@@ -173,8 +172,8 @@ void LossTracker::count_lost(std::uint64_t records, const Gap& gap) noexcept {
 }
 
 bool LossTracker::in_recent_gap(std::uint32_t ft) const noexcept {
-  return std::any_of(gaps_.begin(), gaps_.end(),
-                     [&](const Gap& gap) { return step(gap.after_ft, ft) > 0 && step(ft, gap.before_ft) > 0; });
+  return std::ranges::any_of(gaps_,
+                             [&](const Gap& gap) { return step(gap.after_ft, ft) > 0 && step(ft, gap.before_ft) > 0; });
 }
 
 ReorderWindow::ReorderWindow(std::size_t records, Duration patience, unsigned stride)

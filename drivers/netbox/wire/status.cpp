@@ -61,7 +61,7 @@ constexpr Bit kAxia[] = {
 
 std::string name_of(int bit, Product product) {
   const auto table = product == Product::axia ? std::span<const Bit>(kAxia) : std::span<const Bit>(kNetBox);
-  const auto entry = std::find_if(table.begin(), table.end(), [&](const Bit& known) { return known.number == bit; });
+  const auto entry = std::ranges::find_if(table, [&](const Bit& known) { return known.number == bit; });
   return entry == table.end() ? "bit " + std::to_string(bit) : entry->name;
 }
 
