@@ -124,7 +124,11 @@ void set(MotorProfile& profile, const std::string& section, const std::string& k
                                   [&](const MotorRow& row) { return row.section == section && row.name == key; });
   if (found == kRows.end())
     throw FaultEntryError(key, fmt::format("{} has no key \"{}\", see profiles/motor_iq2306.yaml", section, key));
-  found->of(profile) = fault_number(key, text, found->low, found->high);
+  try {
+    found->of(profile) = fault_number(key, text, found->low, found->high);
+  } catch (const FaultEntryError& error) {
+    throw FaultEntryError(key, fmt::format("{}: {}", key, error.what()));
+  }
 }
 
 }  // namespace

@@ -91,7 +91,8 @@ TEST(MotorFile, MakesAnotherMotor) {
 }
 
 TEST(MotorFile, IsStrictAndSaysWhere) {
-  EXPECT_EQ(refusal(kHead + "motor: {resistance_ohm: -1}\n"), "m.yaml:2:25: -1 is outside 0.001 to 10; fix this entry");
+  EXPECT_EQ(refusal(kHead + "motor: {resistance_ohm: -1}\n"),
+            "m.yaml:2:25: resistance_ohm: -1 is outside 0.001 to 10; fix this entry");
   EXPECT_THAT(refusal(kHead + "motor: {resistance: 1}\n"), HasSubstr("m.yaml:2:21: motor has no key \"resistance\""));
   EXPECT_THAT(refusal(kHead + "supply: {resistance_ohm: 1}\n"), HasSubstr("supply has no key \"resistance_ohm\""));
   EXPECT_THAT(refusal(kHead + "rotor: {}\n"), HasSubstr("unknown key \"rotor\""));
