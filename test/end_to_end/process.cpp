@@ -114,20 +114,17 @@ void Process::close_pipes() {
 bool Process::read_some(std::chrono::milliseconds limit) {
   std::array<pollfd, 2> waiting{{{out_descriptor_, POLLIN, 0}, {err_descriptor_, POLLIN, 0}}};
   if (poll(waiting.data(), waiting.size(), static_cast<int>(limit.count())) <= 0) return true;
-  bool open = false;
-  for (std::size_t i = 0; i < waiting.size(); ++i) {
-    if (!waiting[i].revents) {
-      open = true;
-      continue;
-    }
+  const auto take = [](const pollfd& ready, int& descriptor, std::string& printed) {
+    if (!ready.revents) return;
     std::array<char, 4096> buffer;
-    const ssize_t n = read(waiting[i].fd, buffer.data(), buffer.size());
-    if (n > 0) {
-      (i == 0 ? out_ : err_).append(buffer.data(), static_cast<std::size_t>(n));
-      open = true;
-    }
-  }
-  return open;
+    const ssize_t n = read(descriptor, buffer.data(), buffer.size());
+    if (n > 0) printed.append(buffer.data(), static_cast<std::size_t>(n));
+    // A closed end would be ready for ever.
+    if (n <= 0) close(std::exchange(descriptor, -1));
+  };
+  take(waiting[0], out_descriptor_, out_);
+  take(waiting[1], err_descriptor_, err_);
+  return out_descriptor_ >= 0 || err_descriptor_ >= 0;
 }
 
 std::string Process::everything() const { return "\n-- stdout\n" + out_ + "\n-- stderr\n" + err_; }

@@ -53,19 +53,21 @@ std::ostream& operator<<(std::ostream& out, const Row& row) { return out << name
 constexpr Moment kMoments[]{Moment::connecting, Moment::prompt, Moment::zero,     Moment::ramp_up,
                             Moment::ramp_down,  Moment::step,   Moment::spin_down};
 
-/// By night all, each resumed. By day a fifth of a second only with a supply, no minute, and resumed only after a
-/// second with a supply; at any priority or with what the sockets kept, the ramp up.
+/// By night all, each resumed. By day five seconds with a supply, and one second of a step, which is resumed; at any
+/// priority or with what the sockets kept, the ramp up.
 std::vector<Row> rows(bool all) {
   std::vector<Row> rows;
   for (const Moment moment : kMoments) {
     for (const double seconds : {0.2, 1.0, 5.0, 60.0}) {
       for (const bool supply : {false, true}) {
-        const bool by_day = seconds < 60 && (supply || seconds >= 1);
-        if (all || by_day) rows.push_back({{moment, seconds, supply}, all || (supply && seconds == 1)});
-        const bool varied = seconds == 1 || seconds == 5;
-        if (!varied || (!all && (moment != Moment::ramp_up || !supply))) continue;
-        rows.push_back({{moment, seconds, supply, false, false}, all});
-        rows.push_back({{moment, seconds, supply, true, true}, all});
+        const bool resumed = all || seconds == 1;
+        const bool by_day = supply && (seconds == 5 || (seconds == 1 && moment == Moment::step));
+        if (all || by_day) rows.push_back({{moment, seconds, supply}, resumed});
+        const bool varied_by_day = by_day && moment == Moment::ramp_up;
+        const bool varied_by_night = all && (seconds == 1 || seconds == 5);
+        if (!varied_by_day && !varied_by_night) continue;
+        rows.push_back({{moment, seconds, supply, false, false}, resumed});
+        rows.push_back({{moment, seconds, supply, true, true}, resumed});
       }
     }
   }
