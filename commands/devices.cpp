@@ -41,7 +41,7 @@ Json to_json(const netbox::Configuration& box) {
           {"gage_bias", box.gage_bias}};
 }
 
-Json to_json(const netbox::Counters& counters, const netbox::Health& health) {
+Json to_json(const netbox::Counters& counters, const StreamHealth& health) {
   return {{"expected", counters.expected},
           {"received", counters.received},
           {"lost_network", counters.lost_network},
@@ -51,8 +51,8 @@ Json to_json(const netbox::Counters& counters, const netbox::Health& health) {
           {"reordered", counters.reordered},
           {"malformed", counters.malformed},
           {"records_per_second", health.records_per_second},
-          {"jitter_p50_ns", health.jitter_p50_ns},
-          {"jitter_p99_ns", health.jitter_p99_ns},
+          {"jitter_p50_ns", std::llround(1e9 * health.jitter_p50_s)},
+          {"jitter_p99_ns", std::llround(1e9 * health.jitter_p99_s)},
           {"skew_ppm", health.skew_ppm},
           {"queue_high_water", health.queue_high_water}};
 }

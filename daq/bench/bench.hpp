@@ -45,7 +45,7 @@ class SupplyLink {
   /// One line: model, serial, firmware, and where.
   [[nodiscard]] virtual std::string identity() const = 0;
   /// Takes its readings since the last call. The guard's thread.
-  virtual std::size_t take(std::span<results::SupplyReading> out) = 0;
+  virtual std::size_t take(std::span<SupplyReading> out) = 0;
   /// Why the link failed; empty while it works. Thread-safe.
   [[nodiscard]] virtual std::string failure() const = 0;
   /// Output off. Thread-safe; does not wait.
@@ -101,9 +101,9 @@ class MotorLink {
   /// Reads it now; nullopt if the module reports none. Throws DeviceError. The runner's thread.
   [[nodiscard]] virtual std::optional<Celsius> coil_temperature() = 0;
   /// Takes the readings since the last call. The guard's thread.
-  virtual std::size_t take(std::span<results::MotorReading> out) = 0;
+  virtual std::size_t take(std::span<MotorReading> out) = 0;
   /// Events of the module and its line since the last call, oldest first. The guard's thread.
-  [[nodiscard]] virtual std::vector<results::StreamEvent> take_events() = 0;
+  [[nodiscard]] virtual std::vector<StreamEvent> take_events() = 0;
   /// Why the link failed; empty while it works. Thread-safe.
   [[nodiscard]] virtual std::string failure() const = 0;
   /// Since the link was made. Thread-safe.
@@ -124,17 +124,17 @@ class LoadCellLink {
   virtual results::LoadCellScale start() = 0;
   virtual void stop() noexcept = 0;
   /// Takes the samples since the last call. The guard's thread.
-  virtual std::size_t take(std::span<results::LoadCellRecord> out) = 0;
+  virtual std::size_t take(std::span<LoadCellRecord> out) = 0;
   /// Events of the stream since the last call, oldest first. The guard's thread.
-  [[nodiscard]] virtual std::vector<results::StreamEvent> take_events() = 0;
+  [[nodiscard]] virtual std::vector<StreamEvent> take_events() = 0;
   /// The box's present netftapi2.xml. The runner's thread. Throws DeviceError.
   [[nodiscard]] virtual std::string page() = 0;
   /// Sets the box's bias: its present load becomes zero; the stream continues. The runner's thread.
   virtual void set_bias() noexcept = 0;
   /// Why the stream failed; empty while it works. Thread-safe.
   [[nodiscard]] virtual std::string failure() const = 0;
-  [[nodiscard]] virtual results::SampleAccount account() const = 0;
-  [[nodiscard]] virtual results::StreamHealth health() const = 0;
+  [[nodiscard]] virtual SampleAccount account() const = 0;
+  [[nodiscard]] virtual StreamHealth health() const = 0;
 };
 
 /// One run, before it begins.

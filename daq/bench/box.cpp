@@ -14,9 +14,7 @@ namespace {
 
 constexpr int kSlots = 16;
 
-using results::EventKind;
-
-results::StreamEvent event_of(EventKind kind, Instant at, const std::string& what) {
+StreamEvent event_of(EventKind kind, Instant at, const std::string& what) {
   return {kind, at.count(), 0, fmt::format("{:.3f} s: {}", to_seconds(at), what)};
 }
 
@@ -52,10 +50,10 @@ netbox::Changes changes_since(const netbox::Configuration& before, const netbox:
   return biased ? changes & ~static_cast<netbox::Changes>(netbox::Change::gage_bias) : changes;
 }
 
-std::optional<results::StreamEvent> configuration_event(const netbox::Configuration& before, bool biased,
-                                                        const std::function<std::string()>& page,
-                                                        const std::function<Instant()>& now, int attempts) {
-  results::StreamEvent failure;
+std::optional<StreamEvent> configuration_event(const netbox::Configuration& before, bool biased,
+                                               const std::function<std::string()>& page,
+                                               const std::function<Instant()>& now, int attempts) {
+  StreamEvent failure;
   for (int attempt = 0; attempt < attempts; ++attempt) {
     EventKind kind = EventKind::unreachable;
     try {

@@ -33,10 +33,9 @@ struct SlotPages {
 /// Reads the box's page and compares it with `before`. nullopt: equal. Otherwise configuration_changed; unusable if the
 /// page cannot be parsed; unreachable if `attempts` gave no page, so that changes are unknown. `page` throws
 /// DeviceError.
-[[nodiscard]] std::optional<results::StreamEvent> configuration_event(const netbox::Configuration& before, bool biased,
-                                                                      const std::function<std::string()>& page,
-                                                                      const std::function<Instant()>& now,
-                                                                      int attempts);
+[[nodiscard]] std::optional<StreamEvent> configuration_event(const netbox::Configuration& before, bool biased,
+                                                             const std::function<std::string()>& page,
+                                                             const std::function<Instant()>& now, int attempts);
 
 /// Standard deviation of one sample above which the stand is not at rest: a bias taken then is worthless.
 inline constexpr double kNoisyForce = 10 * results::kRestForce;    ///< N

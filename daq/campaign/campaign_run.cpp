@@ -317,7 +317,7 @@ class CampaignRun {
     if (const auto left_out = static_cast<std::ptrdiff_t>(planned.steps.size()) - driven; left_out > 0)
       accepted["steps_left_out"] = left_out;
     if (run.stop) accepted["stop"] = to_json(*run.stop);
-    for (const results::StreamEvent& event : recording.events) accepted["events"].push_back(event.text);
+    for (const StreamEvent& event : recording.events) accepted["events"].push_back(event.text);
     accepted_at_ = bench_.clock().now();
     note(results::kRunAccepted, accepted);
     const auto [means, zero] = reduce_with_zeros(recording);

@@ -76,8 +76,8 @@ Guard::Guard(Bench& bench, const profiles::BenchConfig& config, const results::L
   supply_stream_ = {bench.supply() != nullptr ? limit_of(Watched::supply_age) : nullptr, now};
   observer_.begin(now);
   shown_.publish(observer_.readings());
-  if (bench.supply() != nullptr) discard<results::SupplyReading>(*bench.supply());
-  discard<results::MotorReading>(bench.motor());
+  if (bench.supply() != nullptr) discard<SupplyReading>(*bench.supply());
+  discard<MotorReading>(bench.motor());
 }
 
 void Guard::poll() noexcept {
@@ -111,9 +111,9 @@ bool Guard::relay() {
   return (bench_.supply() != nullptr && supply_readings_.move(*bench_.supply(), inspect)) || moved;
 }
 
-std::vector<results::StreamEvent> Guard::take_events() {
-  std::vector<results::StreamEvent> taken;
-  events_.consume_all([&](const results::StreamEvent& event) { taken.push_back(event); });
+std::vector<StreamEvent> Guard::take_events() {
+  std::vector<StreamEvent> taken;
+  events_.consume_all([&](const StreamEvent& event) { taken.push_back(event); });
   return taken;
 }
 
@@ -138,7 +138,7 @@ void Guard::take_marks() {
   while (marks_.pop(mark)) observer_.take(mark);
 }
 
-void Guard::judge(const results::LoadCellRecord& sample) {
+void Guard::judge(const LoadCellRecord& sample) {
   load_cell_stream_.newest = Instant(sample.arrival_ns);
   judge_gap(sample);
   judge_status(sample);
@@ -147,15 +147,14 @@ void Guard::judge(const results::LoadCellRecord& sample) {
 
 /// A faulty box stops the run also at rest, since the zeros are taken from these samples; saturation and network
 /// trouble stop it only while the motor turns.
-void Guard::judge_status(const results::LoadCellRecord& sample) {
+void Guard::judge_status(const LoadCellRecord& sample) {
   const StatusWatch::State state = status_watch_.take(sample);
   if (auto event = status_watch_.take_event()) pending_events_.push_back(std::move(*event));
   const bool untrusted = state == StatusWatch::State::untrusted || (state == StatusWatch::State::lasting && spinning_);
   if (untrusted && latch_.trip() == nullptr) trip({status_watch_.reason(), Source::load_cell});
 }
 
-void Guard::judge(const results::MotorReading& reading) {
-  using results::MotorChannel;
+void Guard::judge(const MotorReading& reading) {
   motor_stream_.newest = Instant(reading.time_ns);
   observer_.take(reading);
   if (reading.channel == MotorChannel::fault_now && reading.value != 0)
@@ -169,7 +168,7 @@ void Guard::judge(const results::MotorReading& reading) {
     trip({to_words(error), Source::motor, Watched::speed_error});
 }
 
-void Guard::judge(const results::SupplyReading& reading) {
+void Guard::judge(const SupplyReading& reading) {
   supply_stream_.newest = Instant(reading.time_ns);
   if (!supply_) return;
   if (auto trouble = daq::check(reading, *supply_, reading.time_ns >= settled_from_)) trip(std::move(*trouble));
@@ -177,7 +176,7 @@ void Guard::judge(const results::SupplyReading& reading) {
 }
 
 /// Also when the newest sample is fresh: nothing was judged during a break of the network or of this computer.
-void Guard::judge_gap(const results::LoadCellRecord& sample) {
+void Guard::judge_gap(const LoadCellRecord& sample) {
   const std::optional<std::uint32_t> before = std::exchange(last_sequence_, sample.ft_sequence);
   const GuardLimit* patience = limit_of(Watched::load_cell_age);
   if (!before || !spinning_ || patience == nullptr) return;
@@ -257,17 +256,16 @@ Observation Guard::observe(Instant now) const {
   return seen;
 }
 
-std::optional<results::StreamEvent> Guard::event() const {
-  using results::EventKind;
+std::optional<StreamEvent> Guard::event() const {
   const Trip* trip = latch_.trip();
   if (trip == nullptr) return std::nullopt;
   const bool of_supply = trip->watched == Watched::state && trip->source == Source::supply;
   const std::string where = trip->step < 0 ? "" : fmt::format("step {}: ", trip->step + 1);
-  return results::StreamEvent{is_load_cell_axis(trip->watched) ? EventKind::range_trip
-                              : of_supply                      ? EventKind::supply_stop
-                                                               : EventKind::guard_trip,
-                              trip->noticed.count(), 0,
-                              fmt::format("{:.3f} s: {}{}", to_seconds(trip->noticed), where, trip->reason)};
+  return StreamEvent{is_load_cell_axis(trip->watched) ? EventKind::range_trip
+                     : of_supply                      ? EventKind::supply_stop
+                                                      : EventKind::guard_trip,
+                     trip->noticed.count(), 0,
+                     fmt::format("{:.3f} s: {}{}", to_seconds(trip->noticed), where, trip->reason)};
 }
 
 }  // namespace kphi::daq

@@ -44,11 +44,11 @@ class Guard final {
   bool relay();
 
   // The recorder's thread.
-  std::size_t take(std::span<results::LoadCellRecord> out) { return samples_.take(out); }
-  std::size_t take(std::span<results::MotorReading> out) { return readings_.take(out); }
-  std::size_t take(std::span<results::SupplyReading> out) { return supply_readings_.take(out); }
+  std::size_t take(std::span<LoadCellRecord> out) { return samples_.take(out); }
+  std::size_t take(std::span<MotorReading> out) { return readings_.take(out); }
+  std::size_t take(std::span<SupplyReading> out) { return supply_readings_.take(out); }
   /// Events of load cell and motor.
-  [[nodiscard]] std::vector<results::StreamEvent> take_events();
+  [[nodiscard]] std::vector<StreamEvent> take_events();
 
   // The runner's thread.
   /// A step or another phase begins. Throws SafetyStop when the guard has stalled and takes no more marks.
@@ -70,7 +70,7 @@ class Guard final {
 
   [[nodiscard]] const Latch& latch() const noexcept { return latch_; }
   /// The trip for the run file; nullopt without one.
-  [[nodiscard]] std::optional<results::StreamEvent> event() const;
+  [[nodiscard]] std::optional<StreamEvent> event() const;
 
  private:
   struct Stream {
@@ -84,14 +84,14 @@ class Guard final {
   void trip(Trip trip) noexcept;
   void hold(Watched watched, double value);
   void take_marks();
-  void judge(const results::LoadCellRecord& sample);
-  void judge(const results::MotorReading& reading);
-  void judge(const results::SupplyReading& reading);
+  void judge(const LoadCellRecord& sample);
+  void judge(const MotorReading& reading);
+  void judge(const SupplyReading& reading);
   void judge_silence(Stream& stream, Instant now, bool spinning);
-  void judge_status(const results::LoadCellRecord& sample);
+  void judge_status(const LoadCellRecord& sample);
   void judge_links();
   void judge_pause(Instant now);
-  void judge_gap(const results::LoadCellRecord& sample);
+  void judge_gap(const LoadCellRecord& sample);
   [[nodiscard]] double wall_seconds_since(std::int64_t at_ns, Instant now) const;
 
   Bench& bench_;
@@ -104,11 +104,11 @@ class Guard final {
   const Freshness fresh_;
   std::optional<std::uint32_t> last_sequence_;  ///< of the load cell
   Stream load_cell_stream_, motor_stream_, supply_stream_;
-  Relay<results::LoadCellRecord> samples_;
-  Relay<results::MotorReading> readings_;
-  Relay<results::SupplyReading> supply_readings_;
-  boost::lockfree::spsc_queue<results::StreamEvent> events_{1024};
-  std::deque<results::StreamEvent> pending_events_;  ///< for which there is no room yet
+  Relay<LoadCellRecord> samples_;
+  Relay<MotorReading> readings_;
+  Relay<SupplyReading> supply_readings_;
+  boost::lockfree::spsc_queue<StreamEvent> events_{1024};
+  std::deque<StreamEvent> pending_events_;  ///< for which there is no room yet
   boost::lockfree::spsc_queue<results::PhaseMark, boost::lockfree::capacity<1024>> marks_;
 
   Latch latch_;

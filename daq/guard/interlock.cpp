@@ -76,15 +76,15 @@ void require_awake(const Clock& clock) {
   if (has_slept(clock)) throw SafetyStop(slept(clock));
 }
 
-std::string tripped_words(const results::SupplyReading& seen) {
+std::string tripped_words(const SupplyReading& seen) {
   return fmt::format("supply: {} protection switched the output off", name_of(seen.protection));
 }
 
-std::optional<Trip> check(const results::SupplyReading& seen, const profiles::SupplyConfig& wanted, bool settled) {
+std::optional<Trip> check(const SupplyReading& seen, const profiles::SupplyConfig& wanted, bool settled) {
   const double volts = wanted.voltage.value();
   const auto trouble = [](const std::string& what) { return Trip{"supply: " + what, Source::supply}; };
-  const bool limits = seen.regulation == results::SupplyRegulation::constant_current;
-  if (seen.protection != results::SupplyProtection::none)
+  const bool limits = seen.regulation == SupplyRegulation::constant_current;
+  if (seen.protection != SupplyProtection::none)
     return Trip{tripped_words(seen), Source::supply, Watched::state, false, seen.protection};
   if (seen.output == 0) return trouble("output is off");
   if (limits && settled)

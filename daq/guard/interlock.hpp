@@ -22,9 +22,9 @@ struct Trip {
   Source source = Source::guard;     ///< what reported it, or failed
   Watched watched = Watched::state;  ///< state: no limit; a device reported trouble
   bool link_failed = false;          ///< no reading, but the link to the source reported it
-  results::SupplyProtection protection = results::SupplyProtection::none;  ///< that switched the supply's output off
-  Instant noticed{0};                                                      ///< bench time
-  int step = -1;                                                           ///< 0-based, -1 outside steps
+  SupplyProtection protection = SupplyProtection::none;  ///< that switched the supply's output off
+  Instant noticed{0};                                    ///< bench time
+  int step = -1;                                         ///< 0-based, -1 outside steps
 };
 
 /// `value` has passed `limit`.
@@ -71,12 +71,11 @@ class SafetyStop final : public RunStopped {
 void require_awake(const Clock& clock);
 
 /// "supply: over-current protection switched the output off".
-[[nodiscard]] std::string tripped_words(const results::SupplyReading& seen);
+[[nodiscard]] std::string tripped_words(const SupplyReading& seen);
 
 /// Checks one reading while the motor may turn: protection, output, settings changed on the front panel; and, once the
 /// speed has `settled`, constant current, sag and rise, which a change of speed may bring. nullopt: no trip.
-[[nodiscard]] std::optional<Trip> check(const results::SupplyReading& seen, const profiles::SupplyConfig& wanted,
-                                        bool settled);
+[[nodiscard]] std::optional<Trip> check(const SupplyReading& seen, const profiles::SupplyConfig& wanted, bool settled);
 
 /// Power of a bench's motor: on when this is made and until it is destroyed, except from off() to restore(). One
 /// thread.

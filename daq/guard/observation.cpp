@@ -12,7 +12,7 @@ LoadWatch::LoadWatch(const Mounting& mounting, const results::LoadCellScale& sca
       counts_per_newton_metre_(scale.counts_per_newton_metre),
       sums_(static_cast<std::size_t>(std::max(1.0, std::round(kWindow * scale.sample_rate_hz)))) {}
 
-void LoadWatch::add(const results::LoadCellRecord& record) noexcept {
+void LoadWatch::add(const LoadCellRecord& record) noexcept {
   last_[samples_++ % last_.size()] = record.counts;
   if (samples_ < last_.size()) return;
   for (std::size_t axis = 0; axis < 6; ++axis) {
@@ -40,7 +40,7 @@ double LoadWatch::shaft_torque() const noexcept {
 
 Observation observe(const Readings& newest, Instant now, const Freshness& limit, const Clock& clock) {
   Observation seen{newest, limit};
-  const auto seconds_since = [&](results::Nanoseconds at) { return to_seconds(clock.shrunk(now - Instant(at))); };
+  const auto seconds_since = [&](Nanoseconds at) { return to_seconds(clock.shrunk(now - Instant(at))); };
   seen.load_cell_age = now - Instant(newest.load_cell_ns);
   seen.motor_age = now - Instant(newest.motor_ns);
   for (const GuardedQuantity& row : kQuantities) {
@@ -66,7 +66,7 @@ void Observer::tell(Watched watched, double value) {
   if (judge_) judge_(watched, value);
 }
 
-void Observer::take(const results::LoadCellRecord& sample) {
+void Observer::take(const LoadCellRecord& sample) {
   newest_.load_cell_ns = sample.arrival_ns;
   load_.add(sample);
   for (std::size_t axis = 0; axis < 6; ++axis) tell(static_cast<Watched>(axis), load_.load(axis));
@@ -78,8 +78,7 @@ void Observer::take(const results::LoadCellRecord& sample) {
   tell(Watched::shaft_torque, std::abs(newest_.torque_nm));
 }
 
-void Observer::take(const results::MotorReading& reading) {
-  using results::MotorChannel;
+void Observer::take(const MotorReading& reading) {
   newest_.motor_ns = reading.time_ns;
   const double value = reading.value;
   switch (reading.channel) {
@@ -116,7 +115,7 @@ void Observer::take(const results::MotorReading& reading) {
   newest_.judged[Watched::speed_error] = speed_.error_percent();
 }
 
-void Observer::take(const results::SupplyReading& reading) {
+void Observer::take(const SupplyReading& reading) {
   newest_.supply = reading;
   tell(Watched::supply_voltage_high, reading.voltage_v);
   tell(Watched::output_current, reading.current_a);

@@ -29,14 +29,14 @@ struct GuardedValues {
 /// The newest of everything. Members are eight bytes or multiples: the guard publishes it as a whole.
 struct Readings {
   GuardedValues judged;
-  double thrust_n = 0;                                  ///< zero subtracted, signed; mean of 5 ms
-  double torque_nm = 0;                                 ///< likewise, about the thrust axis
-  double speed_rad_s = 0;                               ///< unsigned
-  double drive_pwm = 0;                                 ///< share of the supply voltage that drives the motor, -1..1
-  double derate = 1;                                    ///< share of its drive that the module allows itself; 1: all
-  std::uint64_t fault_bits = 0;                         ///< of power_safety.fault_now
-  results::Nanoseconds load_cell_ns = 0, motor_ns = 0;  ///< bench time of the newest
-  results::SupplyReading supply{};                      ///< time 0: none yet, or there is no supply
+  double thrust_n = 0;                         ///< zero subtracted, signed; mean of 5 ms
+  double torque_nm = 0;                        ///< likewise, about the thrust axis
+  double speed_rad_s = 0;                      ///< unsigned
+  double drive_pwm = 0;                        ///< share of the supply voltage that drives the motor, -1..1
+  double derate = 1;                           ///< share of its drive that the module allows itself; 1: all
+  std::uint64_t fault_bits = 0;                ///< of power_safety.fault_now
+  Nanoseconds load_cell_ns = 0, motor_ns = 0;  ///< bench time of the newest
+  SupplyReading supply{};                      ///< time 0: none yet, or there is no supply
 };
 
 /// Oldest sample and reading that count as fresh, bench time: the stream's and this computer's delay.
@@ -47,7 +47,7 @@ struct Freshness {
 struct Observation : Readings {
   Freshness fresh{};
   Duration load_cell_age{}, motor_age{};  ///< bench time
-  results::SampleAccount account{};       ///< of this run so far
+  SampleAccount account{};                ///< of this run so far
 
   [[nodiscard]] bool load_cell_is_fresh() const noexcept { return load_cell_age <= fresh.load_cell; }
   [[nodiscard]] bool motor_is_fresh() const noexcept { return motor_age <= fresh.motor; }
@@ -76,7 +76,7 @@ class LoadWatch {
 
   LoadWatch(const Mounting& mounting, const results::LoadCellScale& scale);
 
-  void add(const results::LoadCellRecord& record) noexcept;
+  void add(const LoadCellRecord& record) noexcept;
   /// Axis 0..5 = Fx..Tz, N or N m, unsigned, as the box shows it; 0 before the third sample.
   [[nodiscard]] double load(std::size_t axis) const noexcept;
   /// The means are known: a window has passed.
@@ -110,9 +110,9 @@ class Observer {
 
   /// Ages count from `now` until the first sample and reading.
   void begin(Instant now) noexcept { newest_.load_cell_ns = newest_.motor_ns = now.count(); }
-  void take(const results::LoadCellRecord& sample);
-  void take(const results::MotorReading& reading);
-  void take(const results::SupplyReading& reading);
+  void take(const LoadCellRecord& sample);
+  void take(const MotorReading& reading);
+  void take(const SupplyReading& reading);
   /// A step, a ramp or another phase begins.
   void take(const results::PhaseMark& mark) noexcept;
   /// Fx Fy Fz in N, Tx Ty Tz in N m. Thrust and torque are judged from then on. Any thread.

@@ -62,14 +62,14 @@ void RestGuard::poll() noexcept {
 
 void RestGuard::take_readings() {
   (void)bench_.motor().take_events();  // of a closed link, or of a module whose power a person has cut
-  std::array<results::MotorReading, 64> readings;
+  std::array<MotorReading, 64> readings;
   while (const std::size_t n = bench_.motor().take(readings))
     for (std::size_t i = 0; i < n; ++i) judge(readings[i]);
 }
 
-void RestGuard::judge(const results::MotorReading& reading) {
+void RestGuard::judge(const MotorReading& reading) {
   if (Instant(reading.time_ns) < begun_) return;
-  if (reading.channel == results::MotorChannel::speed) {
+  if (reading.channel == MotorChannel::speed) {
     speed_rad_s_ = std::abs(reading.value);
     speed_at_ns_ = reading.time_ns;
     // Written so that NaN trips.
@@ -77,14 +77,14 @@ void RestGuard::judge(const results::MotorReading& reading) {
       trip({fmt::format("motor: turning at {:.0f} RPM while somebody may be near", to_rpm(RadPerSec(speed_rad_s_))),
             Source::motor});
   }
-  if (resting_ && reading.channel == results::MotorChannel::drive_mode &&
+  if (resting_ && reading.channel == MotorChannel::drive_mode &&
       reading.value != static_cast<double>(iq::DriveMode::coast))
     trip({"motor: its module does not coast while somebody may be near", Source::motor});
 }
 
 void RestGuard::take_supply() {
   if (bench_.supply() == nullptr) return;
-  std::array<results::SupplyReading, 16> readings;
+  std::array<SupplyReading, 16> readings;
   while (const std::size_t n = bench_.supply()->take(readings)) {
     for (std::size_t i = 0; i < n; ++i) {
       const bool late = Instant(readings[i].time_ns) >= begun_;

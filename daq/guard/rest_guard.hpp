@@ -38,7 +38,7 @@ class RestGuard {
  private:
   void poll() noexcept;
   void take_readings();
-  void judge(const results::MotorReading& reading);
+  void judge(const MotorReading& reading);
   void take_supply();
   void trip(Trip found) noexcept;
 

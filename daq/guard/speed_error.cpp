@@ -48,8 +48,7 @@ void SpeedWatch::command_ramp(Instant at, RadPerSec speed) noexcept {
 
 void SpeedWatch::release() noexcept { *this = SpeedWatch(direction_, host_, share_); }
 
-void SpeedWatch::take(const results::MotorReading& reading) noexcept {
-  using results::MotorChannel;
+void SpeedWatch::take(const MotorReading& reading) noexcept {
   if (!watching_ || error_.kind != SpeedError::Kind::none) return;
   const Instant at(reading.time_ns);
   if (reading.channel == MotorChannel::speed) {

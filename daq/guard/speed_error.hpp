@@ -62,7 +62,7 @@ class SpeedWatch {
   void command_ramp(Instant at, RadPerSec speed) noexcept;
   /// The speed is no longer commanded. Clears the error.
   void release() noexcept;
-  void take(const results::MotorReading& reading) noexcept;
+  void take(const MotorReading& reading) noexcept;
   /// % of the command by which the newest speed leaves its band, beside kFloor; NaN while no speed is commanded.
   [[nodiscard]] double error_percent() const noexcept;
   /// The first error since the last release.

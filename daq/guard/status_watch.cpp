@@ -10,7 +10,6 @@ namespace kphi::daq {
 namespace {
 
 using netbox::StatusVerdict;
-using results::EventKind;
 
 constexpr std::uint32_t kOfSession = netbox::kErrorSummary | netbox::kMonitorCondition | netbox::kStreamTrouble;
 
@@ -25,7 +24,7 @@ const char* next_move(StatusVerdict verdict) {
   return "check the cell's cable and the box's supply, switch the box off and on, then run: kphi devices";
 }
 
-double seconds(results::Nanoseconds at) { return 1e-9 * static_cast<double>(at); }
+double seconds(Nanoseconds at) { return 1e-9 * static_cast<double>(at); }
 
 }  // namespace
 
@@ -43,7 +42,7 @@ void StatusWatch::Count::add(bool bad) noexcept {
   }
 }
 
-StatusWatch::State StatusWatch::take(const results::LoadCellRecord& sample) {
+StatusWatch::State StatusWatch::take(const LoadCellRecord& sample) {
   const StatusVerdict verdict = netbox::verdict_of(sample.status, product_);
   const bool sound = verdict == StatusVerdict::sound;
   if (bad_.value == 0) {
@@ -66,7 +65,7 @@ StatusWatch::State StatusWatch::take(const results::LoadCellRecord& sample) {
   return bad_.is_over() ? State::lasting : State::trusted;
 }
 
-std::optional<results::StreamEvent> StatusWatch::take_event() { return std::exchange(event_, std::nullopt); }
+std::optional<StreamEvent> StatusWatch::take_event() { return std::exchange(event_, std::nullopt); }
 
 std::string StatusWatch::error() const {
   return fmt::format("the {} reports \"{}\" (status 0x{:08X})", netbox::name_of(product_),
@@ -79,7 +78,7 @@ std::string StatusWatch::reason() const {
                      next_move(netbox::verdict_of(status_, product_)));
 }
 
-void StatusWatch::note_error(const results::LoadCellRecord& sample) {
+void StatusWatch::note_error(const LoadCellRecord& sample) {
   told_ = episode_.told = true;
   event_ = {EventKind::box_error, sample.arrival_ns, 0,
             fmt::format("{:.3f} s: {}", seconds(sample.arrival_ns), error())};

@@ -25,10 +25,10 @@ class StatusWatch {
 
   StatusWatch(netbox::Product product, int records_per_datagram, double sample_rate_hz);
 
-  State take(const results::LoadCellRecord& sample);
+  State take(const LoadCellRecord& sample);
   /// The first error of the run and its end, once each; else nullopt. Errors that other events report are left out:
   /// saturation (near_range, beyond_range) and a Net Box's trouble with RDT or its network (box_trouble).
-  [[nodiscard]] std::optional<results::StreamEvent> take_event();
+  [[nodiscard]] std::optional<StreamEvent> take_event();
   /// Why the samples cannot be trusted, one line; after take() has given `lasting` or `untrusted`.
   [[nodiscard]] std::string reason() const;
 
@@ -42,11 +42,11 @@ class StatusWatch {
   /// From a bad sample until as many sound ones have followed.
   struct Episode {
     std::uint64_t samples = 0, bad = 0;
-    results::Nanoseconds sound_since = 0;
+    Nanoseconds sound_since = 0;
     bool told = false;
   };
 
-  void note_error(const results::LoadCellRecord& sample);
+  void note_error(const LoadCellRecord& sample);
   void note_end();
   [[nodiscard]] std::string error() const;
 
@@ -56,7 +56,7 @@ class StatusWatch {
   Episode episode_;
   std::uint32_t status_ = 0;  ///< of the newest bad sample
   bool told_ = false;         ///< an error of this run was reported
-  std::optional<results::StreamEvent> event_;
+  std::optional<StreamEvent> event_;
 };
 
 }  // namespace kphi::daq

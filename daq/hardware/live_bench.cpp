@@ -143,14 +143,14 @@ results::MotorCounts LiveMotor::counts() const {
   return connected ? to_counts(connected->counters()) : results::MotorCounts{};
 }
 
-std::vector<results::StreamEvent> LiveMotor::take_events() {
+std::vector<StreamEvent> LiveMotor::take_events() {
   const auto motor = this->motor();
-  return motor ? to_events(motor->take_events()) : std::vector<results::StreamEvent>();
+  return motor ? to_events(motor->take_events()) : std::vector<StreamEvent>();
 }
 
-std::size_t LiveMotor::take(std::span<results::MotorReading> out) {
+std::size_t LiveMotor::take(std::span<MotorReading> out) {
   const auto motor = this->motor();
-  return motor ? take_records(*motor, readings_, out) : 0;
+  return motor ? motor->take(out) : 0;
 }
 
 std::string LiveMotor::failure() const {

@@ -31,8 +31,8 @@ class LiveMotor final : public MotorLink {
   [[nodiscard]] std::optional<iq::StopReport> stop_report() override;
   [[nodiscard]] const iq::AuditRecord& parameters() const override { return parameters_; }
   [[nodiscard]] std::optional<Celsius> coil_temperature() override;
-  std::size_t take(std::span<results::MotorReading> out) override;
-  [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+  std::size_t take(std::span<MotorReading> out) override;
+  [[nodiscard]] std::vector<StreamEvent> take_events() override;
   [[nodiscard]] std::string failure() const override;
   [[nodiscard]] results::MotorCounts counts() const override;
   [[nodiscard]] std::string identity() const override { return identity_; }
@@ -47,7 +47,6 @@ class LiveMotor final : public MotorLink {
   std::shared_ptr<iq::Motor> motor_;  ///< null while it rests; read by any thread
   std::string identity_;
   iq::AuditRecord parameters_;
-  std::vector<iq::Reading> readings_;
   std::optional<iq::StopReport> stop_report_;
   std::future<iq::StopReport> stop_;  ///< last member: its destructor waits for the stop under way
 };
@@ -62,20 +61,19 @@ class LiveLoadCell final : public LoadCellLink {
   [[nodiscard]] std::vector<Finding> findings() const override { return findings_; }
   results::LoadCellScale start() override;
   void stop() noexcept override { cell_->stop(); }
-  std::size_t take(std::span<results::LoadCellRecord> out) override { return take_records(*cell_, records_, out); }
-  [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return to_events(cell_->take_events()); }
+  std::size_t take(std::span<LoadCellRecord> out) override { return cell_->take(out); }
+  [[nodiscard]] std::vector<StreamEvent> take_events() override { return to_events(cell_->take_events()); }
   [[nodiscard]] std::string page() override;
   void set_bias() noexcept override { cell_->set_bias(); }
   [[nodiscard]] std::string failure() const override;
-  [[nodiscard]] results::SampleAccount account() const override { return to_account(cell_->counters()); }
-  [[nodiscard]] results::StreamHealth health() const override { return to_health(cell_->health(), clock_); }
+  [[nodiscard]] SampleAccount account() const override { return cell_->counters().account(); }
+  [[nodiscard]] StreamHealth health() const override { return cell_->health(); }
 
  private:
   profiles::NetBoxConfig config_;
   const Clock& clock_;
   netbox::SettingsKeeper settings_;
   std::unique_ptr<netbox::LoadCell> cell_;  ///< of the present or last run
-  std::vector<netbox::StampedRecord> records_;
   std::vector<Finding> findings_;
   std::string slots_json_;
 };

@@ -50,7 +50,7 @@ void LiveSupply::switch_on() {
   worker_.switch_on();
   const auto give_up = std::chrono::steady_clock::now() + kRise;
   const double enough = (1 - results::kSupplySag) * config_.voltage.value();
-  for (std::optional<supply::Reading> seen;; std::this_thread::sleep_for(kAsk)) {
+  for (std::optional<SupplyReading> seen;; std::this_thread::sleep_for(kAsk)) {
     seen = worker_.newest();
     if (seen && seen->output && seen->voltage_v >= enough) return;
     if (!worker_.alive()) throw DeviceError(worker_.identity().device, "switch on", worker_.failure());

@@ -2,10 +2,8 @@
 #pragma once
 
 #include <memory>
-#include <vector>
 
 #include "daq/bench/bench.hpp"
-#include "daq/bench/device_records.hpp"
 #include "drivers/supply/worker.hpp"
 #include "profiles/bench_config.hpp"
 
@@ -16,7 +14,7 @@ class LiveSupply final : public SupplyLink {
   /// Finds it; its output is as it was. Throws DeviceError. `clock` outlives this.
   LiveSupply(const profiles::SupplyConfig& config, const Clock& clock);
   [[nodiscard]] std::string identity() const override;
-  std::size_t take(std::span<results::SupplyReading> out) override { return take_records(worker_, readings_, out); }
+  std::size_t take(std::span<SupplyReading> out) override { return worker_.take(out); }
   [[nodiscard]] std::string failure() const override;
   void cut() noexcept override { worker_.switch_off(); }
   [[nodiscard]] std::string switch_off() noexcept override;
@@ -26,7 +24,6 @@ class LiveSupply final : public SupplyLink {
 
   const profiles::SupplyConfig config_;
   supply::Worker worker_;
-  std::vector<supply::Reading> readings_;
 };
 
 /// Over Modbus or SCPI, as its URI says. Throws ConfigurationError, DeviceError.

@@ -60,7 +60,7 @@ std::string address_of(const usb::Listing& found, const std::vector<usb::Listing
 bool is_bridge(const usb::Listing& found) { return found.vendor == 0x04d8 && found.product == 0x00dd; }
 
 /// Checks a reading against the bench file.
-std::vector<Finding> findings_of(const supply::Identity& identity, const supply::Reading& reading,
+std::vector<Finding> findings_of(const supply::Identity& identity, const SupplyReading& reading,
                                  const profiles::SupplyConfig& wanted) {
   std::vector<Finding> findings;
   const double volts = wanted.voltage.value(), amps = wanted.current_limit.value();
@@ -70,8 +70,8 @@ std::vector<Finding> findings_of(const supply::Identity& identity, const supply:
                                     identity.voltage_max_v, identity.current_max_a, volts, amps),
                         "lower voltage_v and current_limit_a, or use a larger supply"});
   }
-  if (reading.protection != supply::Protection::none) {
-    findings.push_back({Severity::warning, fmt::format("{} protection tripped", name_of(to_record(reading).protection)),
+  if (reading.protection != SupplyProtection::none) {
+    findings.push_back({Severity::warning, fmt::format("{} protection tripped", name_of(reading.protection)),
                         "find the cause; switching the output on clears it"});
   }
   if (reading.output) {
@@ -98,7 +98,7 @@ DeviceAnswer ask_supply(const profiles::SupplyConfig& config, const Clock& clock
     answer.answers = true;
     answer.lines = {summary(identity)};
     answer.details = {{"model", identity.model}, {"serial", identity.serial}, {"firmware", identity.firmware}};
-    const supply::Reading seen = supply->read();
+    const SupplyReading seen = supply->read();
     answer.lines.push_back(fmt::format("set to {:g} V, limit {:g} A; measures {:.4g} V, {:.3g} A, {:.3g} W; output {}",
                                        seen.set_voltage_v, seen.current_limit_a, seen.voltage_v, seen.current_a,
                                        seen.power_w(), seen.output ? "on" : "off"));

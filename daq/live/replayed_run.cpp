@@ -30,7 +30,7 @@ std::array<double, 6> zero_of(const results::RunRecording& recording) {
   std::size_t n = 0;
   for (std::size_t i = 0; i + 1 < recording.phases.size(); ++i) {
     if (recording.phases[i].phase != Phase::zero_before) continue;
-    for (const results::LoadCellRecord& sample : recording.load_cell) {
+    for (const LoadCellRecord& sample : recording.load_cell) {
       if (sample.arrival_ns < recording.phases[i].time_ns || sample.arrival_ns >= recording.phases[i + 1].time_ns)
         continue;
       for (std::size_t axis = 0; axis < sum.size(); ++axis) sum[axis] += sample.counts[axis];
@@ -71,7 +71,7 @@ ReplayedRun::ReplayedRun(const results::RunRecording& recording, ManualClock& cl
       motor_(recording.motor),
       observer_({recording.header.thrust_axis, recording.header.thrust_sign, recording.header.spin},
                 recording.header.load_cell, SpeedWatch(recording.header.spin, Duration(0))) {
-  std::ranges::stable_sort(motor_, {}, &results::MotorReading::time_ns);
+  std::ranges::stable_sort(motor_, {}, &MotorReading::time_ns);
   const auto& cell = recording.load_cell;
   if (!cell.empty()) {
     begin_ = Instant(cell.front().arrival_ns);
@@ -93,7 +93,7 @@ void ReplayedRun::observe(Instant when) {
     observer_.take(motor_[reading_]);
   const auto& supply = recording_.supply;
   for (; supply_ < supply.size() && supply[supply_].time_ns <= when.count(); ++supply_) observer_.take(supply[supply_]);
-  const results::SampleAccount account = seen_.account;
+  const SampleAccount account = seen_.account;
   seen_ = daq::observe(observer_.readings(), when, {kFresh, kFresh}, clock_);
   seen_.account = account;
   seen_.account.received = sample_;

@@ -31,7 +31,7 @@ class ReplayedRun {
 
   const results::RunRecording& recording_;
   ManualClock& clock_;
-  std::vector<results::MotorReading> motor_;  ///< by time
+  std::vector<MotorReading> motor_;  ///< by time
   Instant begin_{}, end_{};
   std::size_t sample_ = 0, reading_ = 0, supply_ = 0, phase_ = 0, event_ = 0;
   Position position_;

@@ -32,7 +32,7 @@ void Recorder::drain() noexcept {
   try {
     drain_marks();
     drain(records_);
-    for (const results::StreamEvent& event : guard_.take_events()) note(event);
+    for (const StreamEvent& event : guard_.take_events()) note(event);
     drain(readings_);
     drain(supply_readings_);
     if (const Instant now = bench_.clock().now(); now >= next_sync_) {
@@ -55,13 +55,13 @@ void Recorder::drain_marks() {
   }
 }
 
-void Recorder::note(const results::StreamEvent& event) {
+void Recorder::note(const StreamEvent& event) {
   writer_.note(event);
   events_.push(event);  // when the queue is full, the file still has it
 }
 
-void Recorder::inspect(std::span<const results::LoadCellRecord> batch) {
-  for (const results::LoadCellRecord& record : batch) {
+void Recorder::inspect(std::span<const LoadCellRecord> batch) {
+  for (const LoadCellRecord& record : batch) {
     // The guard judges whether the load endangers the cell.
     const netbox::RangeVerdict verdict = range_.look(record.counts);
     if (verdict > worst_) note_range(verdict, record.arrival_ns);
@@ -70,12 +70,11 @@ void Recorder::inspect(std::span<const results::LoadCellRecord> batch) {
   if (measuring_) measured_.publish(estimate_.result(scale_));
 }
 
-void Recorder::note_range(netbox::RangeVerdict verdict, results::Nanoseconds at) {
+void Recorder::note_range(netbox::RangeVerdict verdict, Nanoseconds at) {
   worst_ = verdict;
   const auto axis = static_cast<std::size_t>(range_.worst_axis());
   const GuardedQuantity& row = row_of(static_cast<Watched>(axis));
-  note({verdict == netbox::RangeVerdict::near ? results::EventKind::near_range : results::EventKind::beyond_range, at,
-        0,
+  note({verdict == netbox::RangeVerdict::near ? EventKind::near_range : EventKind::beyond_range, at, 0,
         fmt::format("{:.3f} s: {} carries {:.0f} % of its range of {:g} {}", 1e-9 * static_cast<double>(at), row.name,
                     100 * range_.largest_load(), scale_.range[axis], row.unit)});
 }
@@ -85,7 +84,7 @@ void Recorder::drain(std::vector<T>& buffer) {
   while (const std::size_t n = guard_.take(buffer)) {
     const auto batch = std::span<const T>(buffer).first(n);
     writer_.append(batch);
-    if constexpr (std::is_same_v<T, results::LoadCellRecord>) inspect(batch);
+    if constexpr (std::is_same_v<T, LoadCellRecord>) inspect(batch);
   }
 }
 
@@ -94,9 +93,9 @@ void Recorder::mark(const results::PhaseMark& mark) {
   if (!marks_.push(mark)) throw std::runtime_error("recorder: stalled, its queue of marks is full");
 }
 
-std::vector<results::StreamEvent> Recorder::take_events() {
-  std::vector<results::StreamEvent> taken;
-  events_.consume_all([&](const results::StreamEvent& event) { taken.push_back(event); });
+std::vector<StreamEvent> Recorder::take_events() {
+  std::vector<StreamEvent> taken;
+  events_.consume_all([&](const StreamEvent& event) { taken.push_back(event); });
   return taken;
 }
 

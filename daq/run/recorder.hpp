@@ -25,9 +25,9 @@ class Recorder {
   /// Begins a phase.
   void mark(const results::PhaseMark& mark);
   /// Events of load cell and motor since the last call, already in the file.
-  [[nodiscard]] std::vector<results::StreamEvent> take_events();
+  [[nodiscard]] std::vector<StreamEvent> take_events();
   /// Records an event of the runner. Call it only after the last drain().
-  void note(const results::StreamEvent& event);
+  void note(const StreamEvent& event);
   /// Mean and standard deviation of all axes over the present phase, if it measures a bias or the zero before.
   [[nodiscard]] netbox::ZeroMeasurement measured() const noexcept { return measured_.read(); }
   /// Rethrows the first error of drain().
@@ -37,8 +37,8 @@ class Recorder {
   template <class T>
   void drain(std::vector<T>& buffer);
   void drain_marks();
-  void inspect(std::span<const results::LoadCellRecord> batch);
-  void note_range(netbox::RangeVerdict verdict, results::Nanoseconds at);
+  void inspect(std::span<const LoadCellRecord> batch);
+  void note_range(netbox::RangeVerdict verdict, Nanoseconds at);
 
   Bench& bench_;
   Guard& guard_;
@@ -49,12 +49,12 @@ class Recorder {
   bool measuring_ = false;
   netbox::ZeroEstimate estimate_;
   Instant next_sync_;
-  std::vector<results::LoadCellRecord> records_;
-  std::vector<results::MotorReading> readings_;
-  std::vector<results::SupplyReading> supply_readings_;
+  std::vector<LoadCellRecord> records_;
+  std::vector<MotorReading> readings_;
+  std::vector<SupplyReading> supply_readings_;
   boost::lockfree::spsc_queue<results::PhaseMark, boost::lockfree::capacity<1024>> marks_;
   // To the runner. Sized at run time: Boost 1.74's queue of fixed capacity never destroys what is left in it.
-  boost::lockfree::spsc_queue<results::StreamEvent> events_{256};
+  boost::lockfree::spsc_queue<StreamEvent> events_{256};
   Published<netbox::ZeroMeasurement> measured_;
   std::atomic<bool> failed_{false};
   std::exception_ptr failure_;  // written before failed_, read after it

@@ -203,7 +203,7 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   Ended ended = carry_out(sequence, bench, guard, recorder);
   streaming.reset();
   record_the_rest(sequence, guard, recorder, ended);
-  const results::SampleAccount account = bench.load_cell().account();
+  const SampleAccount account = bench.load_cell().account();
   results::RunEnding ending{
       results::Outcome::complete, "", account, bench.load_cell().health(), bench.motor().counts() - counts_before,
       sequence.box_bias()};

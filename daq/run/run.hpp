@@ -19,7 +19,7 @@ namespace kphi::daq {
 struct RunResult {
   std::filesystem::path file;
   std::string sha256;
-  results::SampleAccount account;
+  SampleAccount account;
   std::optional<iq::StopReport> stop;  ///< how the motor came to rest
 };
 

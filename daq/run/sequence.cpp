@@ -7,7 +7,6 @@
 
 #include "base/error.hpp"
 #include "daq/bench/box.hpp"
-#include "daq/bench/device_records.hpp"
 #include "daq/guard/interlock.hpp"
 #include "daq/guard/rest_guard.hpp"
 #include "daq/guard/run_stopped.hpp"
@@ -28,8 +27,7 @@ constexpr int kBiasAttempts = 3;
 constexpr int kEventsShown = 10;
 
 /// An answer to the question why the box is silent, or the end of its silence.
-bool explains_silence(results::EventKind kind) {
-  using results::EventKind;
+bool explains_silence(EventKind kind) {
   return kind == EventKind::taken_over || kind == EventKind::rdt_disabled || kind == EventKind::unreachable ||
          kind == EventKind::unusable || kind == EventKind::resumed;
 }
@@ -74,7 +72,7 @@ void Sequence::watch_the_coast(StopWords& words) {
   bench_.motor().begin_stop(settings);
   const Instant give_up = bench_.clock().now() + 4 * kAftermath;
   while (!stop_ && bench_.clock().now() < give_up) {
-    for (const results::StreamEvent& event : recorder_.take_events()) {
+    for (const StreamEvent& event : recorder_.take_events()) {
       if (!ends_a_run(event.kind)) continue;
       if (words.motor_failure != MotorFailure::event_to_come) words.also(event.text);
       words.motor_failure = MotorFailure::reported;
@@ -101,14 +99,13 @@ void Sequence::switch_off(StopWords& words) {
     bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
   words.state = has_spun_ ? "motor: ordered to coast, now without power; supply: output off"
                           : "motor: was not turning; supply: output off";
-  const results::SupplyReading seen = newest();
-  if (seen.protection == results::SupplyProtection::none) return;
+  const SupplyReading seen = newest();
+  if (seen.protection == SupplyProtection::none) return;
   const Trip* trip = guard_.latch().trip();
   if (trip != nullptr && trip->protection == seen.protection) return;
   const std::string tripped = tripped_words(seen);
   const std::int64_t at = bench_.clock().now().count();
-  supply_event_ = {results::EventKind::supply_stop, at, 0,
-                   fmt::format("{:.3f} s: {}", 1e-9 * static_cast<double>(at), tripped)};
+  supply_event_ = {EventKind::supply_stop, at, 0, fmt::format("{:.3f} s: {}", 1e-9 * static_cast<double>(at), tripped)};
   words.also(tripped);
 }
 
@@ -127,7 +124,7 @@ std::string Sequence::explanation() {
   if (guard_.observe(since).load_cell_age < stretched(spin_patience(order_.config)) / 2) return {};
   if (!stalled_.empty()) return stalled_;
   while (bench_.clock().now() < since + stretched(kExplanationWall) && !stop_asked_()) {
-    for (const results::StreamEvent& event : recorder_.take_events()) {
+    for (const StreamEvent& event : recorder_.take_events()) {
       if (explains_silence(event.kind)) return event.text;
     }
     bench_.wait_until(bench_.clock().now() + stretched(kTickWall));
@@ -281,9 +278,9 @@ void Sequence::tick(MotorEnable* spin) {
 }
 
 void Sequence::show_events() {
-  for (const results::StreamEvent& event : recorder_.take_events()) {
-    if (event.kind == results::EventKind::stalled) stalled_ = event.text;
-    if (event.kind == results::EventKind::stall_ended) stalled_.clear();
+  for (const StreamEvent& event : recorder_.take_events()) {
+    if (event.kind == EventKind::stalled) stalled_ = event.text;
+    if (event.kind == EventKind::stall_ended) stalled_.clear();
     const std::string line = (is_of_motor(event.kind) ? "motor: " : "load cell: ") + event.text;
     if (events_shown_ < kEventsShown) progress_.say(line);
     if (++events_shown_ == kEventsShown) progress_.say("further events of this run go to its file only: `kphi info`");

@@ -43,7 +43,7 @@ class Sequence {
   [[nodiscard]] const results::BoxBias& box_bias() const { return box_bias_; }
   [[nodiscard]] const std::optional<iq::StopReport>& stop() const { return stop_; }
   /// The supply switched itself off, but another cause was seen first.
-  [[nodiscard]] const std::optional<results::StreamEvent>& supply_event() const { return supply_event_; }
+  [[nodiscard]] const std::optional<StreamEvent>& supply_event() const { return supply_event_; }
   /// After the motor was coasted: adds to `words` the state of motor and supply, and what else the module reported.
   void add_aftermath(StopWords& words);
   /// Call it once the stream has stopped and no other thread drains the recorder.
@@ -91,7 +91,7 @@ class Sequence {
   bool power_is_off_ = false;              ///< confirmed by the supply
   std::optional<RadPerSec> out_of_reach_;  ///< the lowest speed missed at full drive
   std::optional<iq::StopReport> stop_;
-  std::optional<results::StreamEvent> supply_event_;
+  std::optional<StreamEvent> supply_event_;
 };
 
 }  // namespace kphi::daq

@@ -242,10 +242,6 @@ void DeterministicBench::stop() noexcept {
   exchange_load_cell();
 }
 
-std::size_t DeterministicBench::take(std::span<results::LoadCellRecord> out) {
-  return take_records(*connection_, records_, out);
-}
-
 void DeterministicBench::set_bias() noexcept {
   connection_->set_bias(clock_.now());
   exchange_load_cell();

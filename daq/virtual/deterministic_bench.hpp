@@ -78,14 +78,12 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   [[nodiscard]] std::vector<Finding> findings() const override { return findings_; }
   results::LoadCellScale start() override;
   void stop() noexcept override;
-  std::size_t take(std::span<results::LoadCellRecord> out) override;
-  [[nodiscard]] std::vector<results::StreamEvent> take_events() override {
-    return to_events(connection_->take_events());
-  }
+  std::size_t take(std::span<LoadCellRecord> out) override { return connection_->take(out); }
+  [[nodiscard]] std::vector<StreamEvent> take_events() override { return to_events(connection_->take_events()); }
   [[nodiscard]] std::string page() override { return page("/netftapi2.xml"); }
   void set_bias() noexcept override;
-  [[nodiscard]] results::SampleAccount account() const override { return to_account(connection_->counters()); }
-  [[nodiscard]] results::StreamHealth health() const override { return to_health(connection_->health(), clock_); }
+  [[nodiscard]] SampleAccount account() const override { return connection_->counters().account(); }
+  [[nodiscard]] StreamHealth health() const override { return connection_->health(); }
   [[nodiscard]] std::string failure() const override;
 
   [[nodiscard]] std::string page(const std::string& target);
@@ -117,7 +115,6 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   std::optional<netbox::Connection> connection_;  ///< of the present or last run
   std::optional<netbox::Answer> answer_;          ///< of the box, on its way
   Instant answer_due_{};
-  std::vector<netbox::StampedRecord> records_;
   std::list<std::function<void()>> work_;  ///< in the order in which it was given
   Instant next_work_{};
   BenchWitness witness_;

@@ -83,7 +83,7 @@ void DeterministicMotor::watch_plug() {
   if (plugged_ == line_.plugged()) return;
   plugged_ = line_.plugged();
   if (plugged_) return session_.connect_anew(clock_.now());
-  session_.fail(iq::EventKind::port_lost, "the serial port is gone", clock_.now());
+  session_.fail(EventKind::motor_port_lost, "the serial port is gone", clock_.now());
 }
 
 void DeterministicMotor::spin_at(RadPerSec signed_speed) {
@@ -112,11 +112,11 @@ std::optional<Celsius> DeterministicMotor::coil_temperature() {
   return ask_coil_temperature(parameters_, [this](auto asked) { return ask(std::move(asked)); });
 }
 
-std::vector<results::StreamEvent> DeterministicMotor::take_events() {
-  const std::vector<iq::Event> events = session_.take_events();
-  for (const iq::Event& event : events)
-    if (failure_.empty() && iq::spoils_a_run(event.kind)) failure_ = event.words;
-  return to_events(events);
+std::vector<StreamEvent> DeterministicMotor::take_events() {
+  std::vector<StreamEvent> events = session_.take_events();
+  for (const StreamEvent& event : events)
+    if (failure_.empty() && ends_a_run(event.kind)) failure_ = event.text;
+  return to_events(std::move(events));
 }
 
 std::string DeterministicMotor::failure() const {

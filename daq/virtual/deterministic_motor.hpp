@@ -43,8 +43,8 @@ class DeterministicMotor final : public MotorLink {
   [[nodiscard]] std::optional<iq::StopReport> stop_report() override;
   [[nodiscard]] const iq::AuditRecord& parameters() const override { return parameters_; }
   [[nodiscard]] std::optional<Celsius> coil_temperature() override;
-  std::size_t take(std::span<results::MotorReading> out) override { return take_records(session_, readings_, out); }
-  [[nodiscard]] std::vector<results::StreamEvent> take_events() override;
+  std::size_t take(std::span<MotorReading> out) override { return session_.take(out); }
+  [[nodiscard]] std::vector<StreamEvent> take_events() override;
   [[nodiscard]] std::string failure() const override;
   [[nodiscard]] results::MotorCounts counts() const override { return to_counts(session_.counters()); }
   [[nodiscard]] std::string identity() const override { return session_.identity().summary(); }
@@ -59,7 +59,6 @@ class DeterministicMotor final : public MotorLink {
   std::function<void()> step_;
   iq::Session session_;
   iq::AuditRecord parameters_;
-  std::vector<iq::Reading> readings_;
   bool plugged_ = true;
   bool abandoned_ = false;
   bool resting_ = false;

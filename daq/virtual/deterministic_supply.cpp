@@ -54,23 +54,19 @@ void DeterministicSupply::miss() {
   if (const std::string why = switch_off(); !why.empty()) failure_ += "; " + why;
 }
 
-results::SupplyReading DeterministicSupply::shown(Duration wait) const {
-  // The simulator's enum has the codes of the file.
-  static_assert(static_cast<int>(sim::SupplyTrip::short_circuit) ==
-                static_cast<int>(results::SupplyProtection::short_circuit));
-  return {
-      (clock_.now() + wait / 2).count(),
-      (wait / 2).count(),
-      circuit_.shown_volts(),
-      circuit_.shown_amps(),
-      circuit_.controls().volts,
-      circuit_.controls().amps,
-      circuit_.limiting() ? results::SupplyRegulation::constant_current : results::SupplyRegulation::constant_voltage,
-      static_cast<results::SupplyProtection>(circuit_.tripped()),
-      circuit_.output() ? 1u : 0u};
+SupplyReading DeterministicSupply::shown(Duration wait) const {
+  return {(clock_.now() + wait / 2).count(),
+          (wait / 2).count(),
+          circuit_.shown_volts(),
+          circuit_.shown_amps(),
+          circuit_.controls().volts,
+          circuit_.controls().amps,
+          circuit_.limiting() ? SupplyRegulation::constant_current : SupplyRegulation::constant_voltage,
+          circuit_.tripped(),
+          circuit_.output() ? 1u : 0u};
 }
 
-std::size_t DeterministicSupply::take(std::span<results::SupplyReading> out) {
+std::size_t DeterministicSupply::take(std::span<SupplyReading> out) {
   const std::size_t n = std::min(out.size(), readings_.size());
   std::copy_n(readings_.begin(), n, out.begin());
   readings_.erase(readings_.begin(), readings_.begin() + static_cast<std::ptrdiff_t>(n));

@@ -18,7 +18,7 @@ class DeterministicSupply final : public SupplyLink {
   DeterministicSupply(const profiles::SupplyConfig& config, sim::SupplySlave& slave, const Clock& clock)
       : config_(config), slave_(slave), circuit_(slave.circuit()), clock_(clock) {}
   [[nodiscard]] std::string identity() const override { return "simulated supply"; }
-  std::size_t take(std::span<results::SupplyReading> out) override;
+  std::size_t take(std::span<SupplyReading> out) override;
   [[nodiscard]] std::string failure() const override { return failure_; }
   void cut() noexcept override { (void)switch_off(); }
   [[nodiscard]] std::string switch_off() noexcept override;
@@ -29,7 +29,7 @@ class DeterministicSupply final : public SupplyLink {
 
  private:
   void switch_on() override;
-  [[nodiscard]] results::SupplyReading shown(Duration wait) const;
+  [[nodiscard]] SupplyReading shown(Duration wait) const;
   void miss();
 
   const profiles::SupplyConfig config_;
@@ -40,7 +40,7 @@ class DeterministicSupply final : public SupplyLink {
   Instant next_look_{0};
   int missed_ = 0;  ///< answers in a row
   std::string failure_;
-  std::vector<results::SupplyReading> under_way_, readings_;
+  std::vector<SupplyReading> under_way_, readings_;
   Instant due_{0};  ///< of what is under way
 };
 

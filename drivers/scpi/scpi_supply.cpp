@@ -82,19 +82,19 @@ supply::Limits ScpiSupply::apply(const supply::Limits& limits) {
           Amperes(ask(std::string(dialect_->over_current) + "?"))};
 }
 
-supply::Reading ScpiSupply::read() {
+SupplyReading ScpiSupply::read() {
   const Instant before = clock_.now();
-  supply::Reading reading;
+  SupplyReading reading;
   reading.voltage_v = ask_within("MEAS:VOLT?", identity_.voltage_max_v);
   reading.current_a = ask_within("MEAS:CURR?", identity_.current_max_a);
   const Instant after = clock_.now();
-  reading.at = before + (after - before) / 2;
-  reading.uncertainty = (after - before) / 2;
+  reading.time_ns = (before + (after - before) / 2).count();
+  reading.uncertainty_ns = ((after - before) / 2).count();
   reading.set_voltage_v = ask_within("VOLT?", identity_.voltage_max_v);
   reading.current_limit_a = ask_within("CURR?", identity_.current_max_a);
   reading.output = ask("OUTP?") != 0;
-  if (tripped(dialect_->over_voltage_tripped)) reading.protection = supply::Protection::over_voltage;
-  if (tripped(dialect_->over_current_tripped)) reading.protection = supply::Protection::over_current;
+  if (tripped(dialect_->over_voltage_tripped)) reading.protection = SupplyProtection::over_voltage;
+  if (tripped(dialect_->over_current_tripped)) reading.protection = SupplyProtection::over_current;
   reading.regulation = regulation();
   return reading;
 }
@@ -156,15 +156,14 @@ bool ScpiSupply::tripped(std::string_view command) {
   return answer == "1" || answer == "YES";
 }
 
-supply::Regulation ScpiSupply::regulation() {
-  using supply::Regulation;
+SupplyRegulation ScpiSupply::regulation() {
   if (!dialect_->regulation_by_name) {
     const auto bits = static_cast<unsigned>(ask_within(dialect_->regulation, 32767 / kMarginOfReading));
-    return (bits & 2u) != 0 ? Regulation::constant_current : Regulation::constant_voltage;
+    return (bits & 2u) != 0 ? SupplyRegulation::constant_current : SupplyRegulation::constant_voltage;
   }
   const std::string answer = line_->query(dialect_->regulation);
-  if (answer == "CV") return Regulation::constant_voltage;
-  return answer == "CC" ? Regulation::constant_current : Regulation::unknown;
+  if (answer == "CV") return SupplyRegulation::constant_voltage;
+  return answer == "CC" ? SupplyRegulation::constant_current : SupplyRegulation::unknown;
 }
 
 void ScpiSupply::fail(std::string_view operation, const std::string& cause, const char* next_move) {

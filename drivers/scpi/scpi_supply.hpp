@@ -20,7 +20,7 @@ class ScpiSupply final : public supply::Supply {
   [[nodiscard]] const supply::Identity& identity() const noexcept override { return identity_; }
   /// After each command the instrument's error queue is asked (SYST:ERR?).
   supply::Limits apply(const supply::Limits& limits) override;
-  [[nodiscard]] supply::Reading read() override;
+  [[nodiscard]] SupplyReading read() override;
   void switch_off() override { switch_output(false); }
 
  private:
@@ -35,7 +35,7 @@ class ScpiSupply final : public supply::Supply {
   [[nodiscard]] double ask(std::string_view command);
   [[nodiscard]] double ask_within(std::string_view command, double most);
   [[nodiscard]] bool tripped(std::string_view command);
-  [[nodiscard]] supply::Regulation regulation();
+  [[nodiscard]] SupplyRegulation regulation();
   [[noreturn]] void fail(std::string_view operation, const std::string& cause, const char* next_move = "");
 
   const std::unique_ptr<Line> line_;

@@ -16,12 +16,6 @@ constexpr int kAttempts = 3;
 constexpr double kMargin = 1.1;              // measured values may exceed the largest setting by this
 constexpr std::uint16_t kDecimals = 0x0233;  // Hanmatek: voltage 2, current 3, power 3
 
-std::string name_of(Protection protection) {
-  constexpr const char* kNames[] = {"none",        "over-voltage",  "over-current",    "over-power",
-                                    "over-heated", "short circuit", "an unknown cause"};
-  return kNames[static_cast<int>(protection)];
-}
-
 }  // namespace
 
 ModbusSupply::ModbusSupply(const Address& address, const Clock& clock, const Timing& timing)
@@ -89,21 +83,21 @@ void ModbusSupply::describe() {
   identity_.current_max_a = range().max_a;
 }
 
-Reading ModbusSupply::read() {
-  Reading reading;
+SupplyReading ModbusSupply::read() {
+  SupplyReading reading;
   persist("read", [&] { return look(reading); });
   return reading;
 }
 
-Outcome ModbusSupply::look(Reading& reading) {
+Outcome ModbusSupply::look(SupplyReading& reading) {
   const Instant before = clock_.now();
   for (const Block& block : model_->map->look) {
     if (block.count == 0) continue;
     if (Outcome outcome = link_.read(block, registers_); !outcome.ok()) return outcome;
   }
   const Instant after = clock_.now();
-  reading.at = before + (after - before) / 2;
-  reading.uncertainty = (after - before + Duration(1)) / 2;
+  reading.time_ns = (before + (after - before) / 2).count();
+  reading.uncertainty_ns = ((after - before + Duration(1)) / 2).count();
   const std::string doubt = implausible(reading);
   return doubt.empty() ? Outcome{} : Outcome{Failure::damaged, doubt};
 }
@@ -115,7 +109,7 @@ const CurrentRange& ModbusSupply::range() const noexcept {
 }
 
 /// Fills the reading from the registers. Returns what is impossible; empty: plausible.
-std::string ModbusSupply::implausible(Reading& reading) const {
+std::string ModbusSupply::implausible(SupplyReading& reading) const {
   const RegisterMap& map = *model_->map;
   const auto at = [&](int address) { return registers_[static_cast<std::size_t>(address)]; };
   const CurrentRange& amps = range();
@@ -126,12 +120,13 @@ std::string ModbusSupply::implausible(Reading& reading) const {
   reading.protection = protection_of(map, at(map.protection));
   reading.output = at(map.output) != 0;
   if (map.regulation != kAbsent) {
-    reading.regulation = at(map.regulation) != 0 ? Regulation::constant_current : Regulation::constant_voltage;
+    reading.regulation =
+        at(map.regulation) != 0 ? SupplyRegulation::constant_current : SupplyRegulation::constant_voltage;
   } else {
     // There is no register for it: constant current if at the limit with a reduced voltage.
     const bool limited = reading.output && at(map.current) + 1 >= at(map.current_limit);
     const bool gave_way = at(map.voltage) + 5 < at(map.set_voltage);
-    reading.regulation = limited && gave_way ? Regulation::constant_current : Regulation::constant_voltage;
+    reading.regulation = limited && gave_way ? SupplyRegulation::constant_current : SupplyRegulation::constant_voltage;
   }
   const auto beyond = [](const char* what, double value, double max) {
     return value > kMargin * max ? fmt::format("{} of {}", what, value) : std::string();
@@ -195,12 +190,12 @@ void ModbusSupply::switch_on() {
     throw DeviceError(identity_.device, "switch on", "its limits are not set", "apply limits first");
   }
   persist("switch on", [&] { return link_.write(model_->map->output, 1, false); });
-  const Reading reading = read();
-  if (reading.output && reading.protection == Protection::none) return;
+  const SupplyReading reading = read();
+  if (reading.output && reading.protection == SupplyProtection::none) return;
   throw DeviceError(identity_.device, "switch on",
-                    reading.protection == Protection::none
+                    reading.protection == SupplyProtection::none
                         ? std::string("acknowledged, but the output stays off")
-                        : fmt::format("switched off by itself: {}", name_of(reading.protection)),
+                        : fmt::format("switched off by itself: {} protection", name_of(reading.protection)),
                     "check the load, the thresholds and the panel");
 }
 

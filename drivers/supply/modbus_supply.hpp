@@ -23,7 +23,7 @@ class ModbusSupply final : public Supply {
 
   [[nodiscard]] const Identity& identity() const noexcept override { return identity_; }
   Limits apply(const Limits& limits) override;
-  [[nodiscard]] Reading read() override;
+  [[nodiscard]] SupplyReading read() override;
   /// Sends the command at least once, even if the device does not answer.
   void switch_off() override;
 
@@ -34,8 +34,8 @@ class ModbusSupply final : public Supply {
   void identify();
   [[nodiscard]] const Model* ask_model(const RegisterMap& map, std::string& answers);
   void describe();
-  [[nodiscard]] Outcome look(Reading& reading);
-  [[nodiscard]] std::string implausible(Reading& reading) const;
+  [[nodiscard]] Outcome look(SupplyReading& reading);
+  [[nodiscard]] std::string implausible(SupplyReading& reading) const;
   [[nodiscard]] const CurrentRange& range() const noexcept;
 
   // Bounded retries around single requests.

@@ -4,29 +4,14 @@
 // Safety. Only a PoweredOutput can switch the output on; its destructor switches it off.
 #pragma once
 
-#include <cstdint>
 #include <exception>
 #include <string>
 #include <utility>
 
-#include "base/clock.hpp"
+#include "base/device_data.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::supply {
-
-/// Why the supply has switched its output off by itself.
-enum class Protection : std::uint8_t {
-  none,
-  over_voltage,
-  over_current,
-  over_power,
-  over_temperature,
-  short_circuit,
-  unknown,  ///< tripped, with a code that is not documented
-};
-
-/// The quantity that the supply regulates.
-enum class Regulation : std::uint8_t { constant_voltage, constant_current, unknown };
 
 /// The settings of the supply.
 struct Limits {
@@ -44,22 +29,6 @@ struct Identity {
   std::string serial;                           ///< empty: unknown
   std::string firmware;                         ///< "1.28"; empty: unknown
   double voltage_max_v = 0, current_max_a = 0;  ///< largest settings
-};
-
-/// One reading of the supply. A trip or a period of constant current between two readings is not seen.
-struct Reading {
-  Instant at{0};            ///< bench time: midpoint of request and answer
-  Duration uncertainty{0};  ///< half of the time between the two: the true moment is at ± uncertainty
-  double voltage_v = 0;     ///< at the terminals
-  double current_a = 0;
-  double set_voltage_v = 0;    ///< as the supply has it now: it may have been changed on the front panel
-  double current_limit_a = 0;  ///< likewise
-  Protection protection = Protection::none;
-  Regulation regulation = Regulation::unknown;
-  bool output = false;
-
-  /// The product of what was measured; the supplies' own power registers have disputed scales.
-  [[nodiscard]] double power_w() const noexcept { return voltage_v * current_a; }
 };
 
 class PoweredOutput;
@@ -90,7 +59,7 @@ class Supply {
   /// Sets all four, thresholds first, reads back every readable one, and returns the settings as sent, rounded to the
   /// device's steps. Throws std::invalid_argument for a value that is negative, not finite, or beyond the maximum.
   virtual Limits apply(const Limits& limits) = 0;
-  [[nodiscard]] virtual Reading read() = 0;
+  [[nodiscard]] virtual SupplyReading read() = 0;
   /// Returns when the device has reported that its output is off; also when it was off before.
   virtual void switch_off() = 0;
 

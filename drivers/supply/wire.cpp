@@ -177,17 +177,18 @@ const Model* find_model(const RegisterMap& map, std::uint16_t id) {
   return first_model([&](const Model& m) { return m.map == &map && m.first_id <= id && id <= m.last_id; });
 }
 
-Protection protection_of(const RegisterMap& map, std::uint16_t code) noexcept {
-  constexpr std::array kCauses{Protection::over_voltage, Protection::over_current, Protection::over_power,
-                               Protection::over_temperature, Protection::short_circuit};
-  if (code == 0) return Protection::none;
+SupplyProtection protection_of(const RegisterMap& map, std::uint16_t code) noexcept {
+  constexpr std::array kCauses{SupplyProtection::over_voltage, SupplyProtection::over_current,
+                               SupplyProtection::over_power, SupplyProtection::over_temperature,
+                               SupplyProtection::short_circuit};
+  if (code == 0) return SupplyProtection::none;
   if (map.protection_bits) {
     for (std::size_t bit = 0; bit < kCauses.size(); ++bit) {
       if ((code >> bit & 1) != 0) return kCauses[bit];
     }
-    return Protection::unknown;
+    return SupplyProtection::unknown;
   }
-  return code <= 3 ? kCauses[code - 1u] : Protection::unknown;
+  return code <= 3 ? kCauses[code - 1u] : SupplyProtection::unknown;
 }
 
 std::uint16_t to_counts(double value, double counts_per_unit) noexcept {

@@ -104,7 +104,7 @@ struct Model {
 [[nodiscard]] const Model* find_model(const RegisterMap& map, std::uint16_t id);
 
 /// The device's word for why it has switched off.
-[[nodiscard]] Protection protection_of(const RegisterMap& map, std::uint16_t code) noexcept;
+[[nodiscard]] SupplyProtection protection_of(const RegisterMap& map, std::uint16_t code) noexcept;
 
 /// To the nearest count. `value` is finite and not negative, and the result fits: see fits().
 [[nodiscard]] std::uint16_t to_counts(double value, double counts_per_unit) noexcept;

@@ -68,7 +68,7 @@ bool Worker::switch_off_and_confirm(Duration wall) noexcept {
   return offs_done_ >= mine;
 }
 
-std::size_t Worker::take(std::span<Reading> out) { return queue_.pop(out.data(), out.size()); }
+std::size_t Worker::take(std::span<SupplyReading> out) { return queue_.pop(out.data(), out.size()); }
 
 void Worker::run() noexcept {
   finish(why_failed([this] {
@@ -127,7 +127,7 @@ std::string Worker::turn_off() noexcept {
 }
 
 void Worker::look() {
-  const Reading reading = supply_->read();
+  const SupplyReading reading = supply_->read();
   queue_.push(reading);
   const std::lock_guard lock(mutex_);
   newest_ = reading;

@@ -49,9 +49,9 @@ class Worker {
   [[nodiscard]] bool switch_off_and_confirm(Duration wall) noexcept;
 
   /// Oldest readings first; one consumer thread. Holds 4096, 17 minutes at 4 Hz; further ones are dropped.
-  std::size_t take(std::span<Reading> out);
+  std::size_t take(std::span<SupplyReading> out);
   /// Any thread.
-  [[nodiscard]] std::optional<Reading> newest() const { return copy_of(newest_); }
+  [[nodiscard]] std::optional<SupplyReading> newest() const { return copy_of(newest_); }
   /// Read at construction.
   [[nodiscard]] const Identity& identity() const noexcept { return identity_; }
   /// False once the supply has failed; stays false.
@@ -104,9 +104,9 @@ class Worker {
   bool stop_asked_ = false;
   bool ended_ = false;
   std::string failure_;
-  std::optional<Reading> newest_;
+  std::optional<SupplyReading> newest_;
 
-  boost::lockfree::spsc_queue<Reading, boost::lockfree::capacity<4096>> queue_;
+  boost::lockfree::spsc_queue<SupplyReading, boost::lockfree::capacity<4096>> queue_;
   std::thread thread_;
 };
 

@@ -18,7 +18,7 @@ struct RunProvenance {
   std::string file;    ///< as seen from the campaign folder
   std::string sha256;  ///< 64 hex digits
   std::string outcome;
-  std::optional<results::SampleAccount> account;
+  std::optional<SampleAccount> account;
   std::vector<std::string> events{};  ///< what happened to the stream, the cell or the motor; one line each
 };
 

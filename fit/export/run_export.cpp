@@ -17,7 +17,7 @@ namespace {
 constexpr std::array<const char*, 6> kAxes{"force_x_n",   "force_y_n",   "force_z_n",
                                            "torque_x_nm", "torque_y_nm", "torque_z_nm"};
 
-double physical(const results::LoadCellRecord& record, const results::LoadCellScale& scale, std::size_t axis) {
+double physical(const LoadCellRecord& record, const results::LoadCellScale& scale, std::size_t axis) {
   return record.counts[axis] / (axis < 3 ? scale.counts_per_newton : scale.counts_per_newton_metre);
 }
 
@@ -31,7 +31,7 @@ void write_load_cell(const results::RunRecording& run, std::uint64_t epoch, Mcap
   names.insert(names.end(), {"ft_sequence", "status"});
   const auto channel = writer.add_channel("/load_cell", "kphi.LoadCell", schema_of(names));
   std::string json;
-  for (const results::LoadCellRecord& record : run.load_cell) {
+  for (const LoadCellRecord& record : run.load_cell) {
     json.assign(1, '{');
     for (std::size_t axis = 0; axis < kAxes.size(); ++axis)
       fmt::format_to(std::back_inserter(json), "\"{}\":{:.7g},", kAxes[axis],
@@ -42,9 +42,9 @@ void write_load_cell(const results::RunRecording& run, std::uint64_t epoch, Mcap
 }
 
 void write_motor(const results::RunRecording& run, std::uint64_t epoch, McapWriter& writer) {
-  std::map<results::MotorChannel, std::uint16_t> channels;
-  for (const results::MotorReading& reading : run.motor) {
-    const auto& info = results::kMotorChannels[static_cast<std::size_t>(reading.channel)];
+  std::map<MotorChannel, std::uint16_t> channels;
+  for (const MotorReading& reading : run.motor) {
+    const auto& info = kMotorChannels[static_cast<std::size_t>(reading.channel)];
     if (!channels.contains(reading.channel)) {
       channels[reading.channel] = writer.add_channel(std::string("/motor/") + info.name, "kphi.Reading",
                                                      schema_of({"value"}), {{"unit", info.unit}});
@@ -100,7 +100,7 @@ std::vector<std::string> run_to_csv(const results::RunRecording& run, std::ostre
   for (const char* axis : kAxes) out << ',' << axis;
   out << ",ft_sequence,status\n";
   std::string row;
-  for (const results::LoadCellRecord& record : run.load_cell) {
+  for (const LoadCellRecord& record : run.load_cell) {
     row = fmt::format("{:.9f}", 1e-9 * static_cast<double>(record.arrival_ns));
     for (std::size_t axis = 0; axis < kAxes.size(); ++axis)
       fmt::format_to(std::back_inserter(row), ",{:.7g}", physical(record, run.header.load_cell, axis));

@@ -22,18 +22,18 @@ std::vector<double> every_nth(const std::vector<double>& values, std::size_t mos
   return kept;
 }
 
-double seconds(results::Nanoseconds time) { return 1e-9 * static_cast<double>(time); }
+double seconds(Nanoseconds time) { return 1e-9 * static_cast<double>(time); }
 
 /// Of the thrust axis, N; zero not subtracted.
-double thrust_of(const results::LoadCellRecord& record, const results::RunHeader& header) {
+double thrust_of(const LoadCellRecord& record, const results::RunHeader& header) {
   const auto axis = static_cast<std::size_t>(std::clamp(header.thrust_axis, 0, 2));
   return record.counts[axis] * (header.thrust_sign / header.load_cell.counts_per_newton);
 }
 
 std::vector<std::string> event_lines(const results::RunRecording& run) {
   std::vector<std::string> lines;
-  for (const results::StreamEvent& event : run.events)
-    lines.push_back(fmt::format("{:.2f} s: {}{}", seconds(event.time_ns), results::name_of(event.kind),
+  for (const StreamEvent& event : run.events)
+    lines.push_back(fmt::format("{:.2f} s: {}{}", seconds(event.time_ns), name_of(event.kind),
                                 event.text.empty() ? "" : ", " + event.text));
   return lines;
 }
@@ -47,7 +47,7 @@ bool is_run_of(const RunProvenance& run, const results::StepMean& step) {
 
 std::vector<double> thrust_samples(const results::RunRecording& run, const results::StepMean& step, std::size_t most) {
   std::vector<double> samples;
-  for (const results::LoadCellRecord& record : run.load_cell) {
+  for (const LoadCellRecord& record : run.load_cell) {
     const double time_s = seconds(record.arrival_ns);
     if (time_s >= step.window_begin_s && time_s <= step.window_end_s) samples.push_back(thrust_of(record, run.header));
   }
@@ -68,14 +68,14 @@ std::optional<Settling> settling_of(const results::RunRecording& run, const resu
   settling.window_begin_s = step.window_begin_s - zero_s;
   settling.window_end_s = step.window_end_s - zero_s;
   const auto inside = [&](double t) { return t >= -kBefore_s && t <= settling.window_end_s; };
-  for (const results::MotorReading& reading : run.motor) {
+  for (const MotorReading& reading : run.motor) {
     const double t = seconds(reading.time_ns) - zero_s;
-    if (reading.channel == results::MotorChannel::speed && inside(t))
+    if (reading.channel == MotorChannel::speed && inside(t))
       settling.speed_rad_s.push_back({t, std::abs(reading.value)});
   }
   std::map<int, std::vector<double>> bins;
   std::vector<double> averaged;
-  for (const results::LoadCellRecord& record : run.load_cell) {
+  for (const LoadCellRecord& record : run.load_cell) {
     const double t = seconds(record.arrival_ns) - zero_s;
     if (!inside(t)) continue;
     const double thrust = thrust_of(record, run.header);

@@ -98,7 +98,7 @@ std::optional<Estimate> line_of(const results::RunRecording& run, std::size_t ph
   results::Window window{run.phases[phase].time_ns, run.phases[phase + 1].time_ns};
   window.begin += std::llround(1e9 * std::max(run.header.minimum_discard_s, 0.4 * window.seconds()));
   const results::EvenSamples thrust = cell.samples(window);
-  const results::Statistics speed = motor.statistics(results::MotorChannel::speed, window);
+  const results::Statistics speed = motor.statistics(MotorChannel::speed, window);
   if (thrust.counts.size() < 256 || speed.n < 3) return std::nullopt;
   const double reported = std::abs(speed.mean);
   const double expected = run.header.blades * reported / (2 * kPi) / thrust.rate_hz;

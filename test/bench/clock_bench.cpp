@@ -41,16 +41,16 @@ struct Told {
 /// What the estimate said of each datagram's last record when it had come.
 std::vector<Told> listen(LoadCell& cell, ClockEstimate& estimate, std::chrono::seconds duration) {
   std::vector<Told> told;
-  std::vector<StampedRecord> records(4096);
-  StampedRecord last;
+  std::vector<LoadCellRecord> records(4096);
+  LoadCellRecord last;
   const auto end = std::chrono::steady_clock::now() + duration;
   while (std::chrono::steady_clock::now() < end) {
     if (!cell.wait(std::chrono::milliseconds(100))) continue;
     const std::size_t count = cell.take(records);
     for (std::size_t i = 0; i < count; ++i) {
-      if (last.arrival.count() > 0 && records[i].arrival != last.arrival) {
-        const Duration late = estimate.add(last.record.ft_sequence, last.arrival);
-        told.push_back({last.record.ft_sequence, last.arrival - late});
+      if (last.arrival_ns > 0 && records[i].arrival_ns != last.arrival_ns) {
+        const Duration late = estimate.add(last.ft_sequence, last.arrival());
+        told.push_back({last.ft_sequence, last.arrival() - late});
       }
       last = records[i];
     }

@@ -47,23 +47,17 @@ class CellBench final : public daq::Bench, private daq::LoadCellLink {
  private:
   [[nodiscard]] const netbox::Configuration& configuration() const override { return cell_.configuration(); }
   [[nodiscard]] std::vector<Finding> findings() const override { return {}; }
-  std::size_t take(std::span<results::LoadCellRecord> out) override {
-    stamped_.resize(out.size());
-    const std::size_t n = cell_.take(stamped_);
-    for (std::size_t i = 0; i < n; ++i) out[i] = daq::to_record(stamped_[i]);
-    return n;
-  }
-  [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return {}; }
+  std::size_t take(std::span<LoadCellRecord> out) override { return cell_.take(out); }
+  [[nodiscard]] std::vector<StreamEvent> take_events() override { return {}; }
   std::string page() override { return {}; }
   void set_bias() noexcept override {}
   [[nodiscard]] std::string failure() const override { return {}; }
-  [[nodiscard]] results::SampleAccount account() const override { return daq::to_account(cell_.counters()); }
-  [[nodiscard]] results::StreamHealth health() const override { return {}; }
+  [[nodiscard]] SampleAccount account() const override { return cell_.counters().account(); }
+  [[nodiscard]] StreamHealth health() const override { return {}; }
 
   SteadyClock clock_;
   netbox::LoadCell cell_;
   daq::QueueMotor motor_;
-  std::vector<netbox::StampedRecord> stamped_;
 };
 
 /// A thread that works every 5 ms and knows what that costs.
@@ -143,7 +137,7 @@ Shares run(const BoxProcess& box, bool guarded) {
     shares = {(ended.receiver - begun.receiver) / lasted, (ended.guard - begun.guard) / lasted,
               (ended.recorder - begun.recorder) / lasted, (ended.idle - begun.idle) / lasted};
   }
-  const results::SampleAccount account = bench.load_cell().account();
+  const SampleAccount account = bench.load_cell().account();
   shares.received = writer.samples();
   shares.lost = account.lost_network + account.lost_host;
   bench.stop();

@@ -15,8 +15,8 @@ namespace kphi::iq {
 namespace {
 
 using namespace std::chrono_literals;
-constexpr Quantity kFour[] = {Quantity::speed, Quantity::motor_current, Quantity::supply_voltage,
-                              Quantity::supply_current};
+constexpr MotorChannel kFour[] = {MotorChannel::speed, MotorChannel::motor_current, MotorChannel::supply_voltage,
+                                  MotorChannel::supply_current};
 
 double cpu_seconds() {
   rusage usage{};
@@ -39,22 +39,22 @@ void poll(benchmark::State& state) {
     const SteadyClock clock;
     Motor motor(module.device(), baud, settings, clock);
     std::this_thread::sleep_for(200ms);
-    std::array<Reading, 1024> readings;
+    std::array<MotorReading, 1024> readings;
     while (motor.take(readings) > 0) {
     }
-    std::array<int, kQuantities> count{};
+    std::array<int, kMotorChannels.size()> count{};
     const double cpu = cpu_seconds() - module.cpu_seconds();
     const Instant begin = clock.now();
     while (clock.now() - begin < 3s) {
       std::this_thread::sleep_for(50ms);
       while (const std::size_t n = motor.take(readings)) {
-        for (std::size_t i = 0; i < n; ++i) ++count[static_cast<std::size_t>(readings[i].quantity)];
+        for (std::size_t i = 0; i < n; ++i) ++count[static_cast<std::size_t>(readings[i].channel)];
       }
     }
     const double seconds = to_seconds(clock.now() - begin);
-    const auto rate_of = [&](Quantity q) { return count[static_cast<std::size_t>(q)] / seconds; };
+    const auto rate_of = [&](MotorChannel q) { return count[static_cast<std::size_t>(q)] / seconds; };
     double rate = 1e9;
-    for (const Quantity quantity : settings.every_cycle) rate = std::min(rate, rate_of(quantity));
+    for (const MotorChannel quantity : settings.every_cycle) rate = std::min(rate, rate_of(quantity));
     state.counters["cycles/s"] = rate;
     state.counters["cpu_percent"] = 100 * (cpu_seconds() - module.cpu_seconds() - cpu) / seconds;
     state.counters["median_latency_us"] = 1e6 * to_seconds(motor.round_trips().quantile(0.5));

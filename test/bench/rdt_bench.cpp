@@ -33,7 +33,7 @@ void swap_words(const std::vector<Bytes>& datagrams) {
 }
 
 void decode_all(const std::vector<Bytes>& datagrams) {
-  static std::array<Record, kMaxRecords> out;
+  static std::array<LoadCellRecord, kMaxRecords> out;
   for (const Bytes& datagram : datagrams) {
     if (decode(datagram, out) == 0) return;
     use(out.data());
@@ -41,7 +41,7 @@ void decode_all(const std::vector<Bytes>& datagrams) {
 }
 
 void receive_all(const std::vector<Bytes>& datagrams) {
-  static std::vector<StampedRecord> out;
+  static std::vector<LoadCellRecord> out;
   Session session{StreamSettings{}};
   session.start(Instant{0});
   session.advance(session.deadline());

@@ -18,7 +18,7 @@ class SpoiltSupply final : public SupplyLink {
  public:
   SpoiltSupply(SupplyLink& inner, const Clock& clock) : inner_(inner), clock_(clock) {}
   [[nodiscard]] std::string identity() const override { return inner_.identity(); }
-  std::size_t take(std::span<results::SupplyReading> out) override {
+  std::size_t take(std::span<SupplyReading> out) override {
     const std::size_t n = inner_.take(out);
     for (std::size_t i = 0; spoil && i < n; ++i) spoil(out[i]);
     return clock_.now() < silent_from ? n : 0;
@@ -27,7 +27,7 @@ class SpoiltSupply final : public SupplyLink {
   void cut() noexcept override { inner_.cut(); }
   [[nodiscard]] std::string switch_off() noexcept override { return inner_.switch_off(); }
   Instant silent_from = kNever;
-  std::function<void(results::SupplyReading&)> spoil;
+  std::function<void(SupplyReading&)> spoil;
   std::string lost;  ///< why the link is dead
 
  private:
@@ -56,17 +56,17 @@ class SpoiltMotor final : public MotorLink {
   [[nodiscard]] std::optional<iq::StopReport> stop_report() override { return inner_.stop_report(); }
   [[nodiscard]] const iq::AuditRecord& parameters() const override { return inner_.parameters(); }
   [[nodiscard]] std::optional<Celsius> coil_temperature() override { return inner_.coil_temperature(); }
-  [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return inner_.take_events(); }
+  [[nodiscard]] std::vector<StreamEvent> take_events() override { return inner_.take_events(); }
   [[nodiscard]] std::string failure() const override { return lost.empty() ? inner_.failure() : lost; }
   [[nodiscard]] results::MotorCounts counts() const override { return inner_.counts(); }
   [[nodiscard]] std::string identity() const override { return inner_.identity(); }
-  std::size_t take(std::span<results::MotorReading> out) override {
+  std::size_t take(std::span<MotorReading> out) override {
     const std::size_t n = inner_.take(out);
     for (std::size_t i = 0; spoil && i < n; ++i) spoil(out[i]);
     return n;
   }
   std::function<void()> before_speed;  ///< each
-  std::function<void(results::MotorReading&)> spoil;
+  std::function<void(MotorReading&)> spoil;
   std::string lost;  ///< why the link is dead
   bool is_deaf = false;
   int ignored = 0;  ///< orders

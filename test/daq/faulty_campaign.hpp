@@ -45,8 +45,8 @@ class FaultyCampaign : public testing::Test {
     for (const auto& step : reduce(recording(run))) names.push_back(results::quality_flag_names(step.quality_flags));
     return names;
   }
-  [[nodiscard]] std::vector<results::EventKind> events(std::size_t run) const {
-    std::vector<results::EventKind> kinds;
+  [[nodiscard]] std::vector<EventKind> events(std::size_t run) const {
+    std::vector<EventKind> kinds;
     for (const auto& event : recording(run).events) kinds.push_back(event.kind);
     return kinds;
   }

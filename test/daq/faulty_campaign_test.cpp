@@ -13,7 +13,6 @@
 namespace kphi::daq {
 namespace {
 
-using results::EventKind;
 using testing::AllOf;
 using testing::AnyOf;
 using testing::Contains;
@@ -33,9 +32,9 @@ constexpr const char* kManyFaults =
 TEST_F(FaultyCampaign, AccountsForEverySampleAsTheTruthSays) {
   const CampaignResult result = run(kManyFaults);
   EXPECT_EQ(result.runs, 2);
-  results::SampleAccount sum;
+  SampleAccount sum;
   for (std::size_t i = 0; i < 2; ++i) {
-    const results::SampleAccount account = recording(i).account;
+    const SampleAccount account = recording(i).account;
     EXPECT_EQ(account.received + account.lost_network + account.lost_host, account.expected);
     sum.lost_network += account.lost_network;
     sum.duplicates += account.duplicates;
@@ -273,7 +272,7 @@ TEST_F(FaultyCampaign, RefusesANoisyZeroBeforeAnythingTurns) {
                                    HasSubstr("come to rest")));
   }
   for (const auto& reading : results::read_run(results_->other_runs().at(0)).motor) {
-    EXPECT_TRUE(reading.channel != results::MotorChannel::speed || std::abs(reading.value) < 1.0) << reading.value;
+    EXPECT_TRUE(reading.channel != MotorChannel::speed || std::abs(reading.value) < 1.0) << reading.value;
   }
 }
 

@@ -4,7 +4,6 @@
 namespace kphi::daq {
 namespace {
 
-using results::EventKind;
 using testing::Contains;
 using testing::HasSubstr;
 

@@ -23,14 +23,14 @@ std::size_t move_out(std::deque<T>& from, std::span<T> out) {
 class QueueSupply final : public SupplyLink {
  public:
   [[nodiscard]] std::string identity() const override { return "test"; }
-  std::size_t take(std::span<results::SupplyReading> out) override { return move_out(readings, out); }
+  std::size_t take(std::span<SupplyReading> out) override { return move_out(readings, out); }
   [[nodiscard]] std::string failure() const override { return {}; }
   void cut() noexcept override { ++cuts; }
   [[nodiscard]] std::string switch_off() noexcept override {
     if (unconfirmed.empty()) on = false;
     return unconfirmed;
   }
-  std::deque<results::SupplyReading> readings;
+  std::deque<SupplyReading> readings;
   int cuts = 0;
   bool on = false, refuses = false;  ///< refuses: fails halfway through switch_on()
   std::string unconfirmed;
@@ -54,14 +54,14 @@ class QueueMotor final : public MotorLink {
   [[nodiscard]] std::optional<iq::StopReport> stop_report() override { return std::nullopt; }
   [[nodiscard]] const iq::AuditRecord& parameters() const override { return parameters_; }
   [[nodiscard]] std::optional<Celsius> coil_temperature() override { return std::nullopt; }
-  std::size_t take(std::span<results::MotorReading> out) override { return move_out(readings, out); }
+  std::size_t take(std::span<MotorReading> out) override { return move_out(readings, out); }
   [[nodiscard]] std::string identity() const override { return "test"; }
-  [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return std::exchange(events, {}); }
+  [[nodiscard]] std::vector<StreamEvent> take_events() override { return std::exchange(events, {}); }
   [[nodiscard]] std::string failure() const override { return lost; }
   [[nodiscard]] results::MotorCounts counts() const override { return {}; }
 
-  std::deque<results::MotorReading> readings;
-  std::vector<results::StreamEvent> events;
+  std::deque<MotorReading> readings;
+  std::vector<StreamEvent> events;
   std::string lost;
   int coasted = 0, rests = 0, wakes = 0;
 
@@ -98,11 +98,11 @@ class QueueBench : public Bench, private LoadCellLink {
 
   ManualClock time;
   results::FileLayer* layer = &results::disk();
-  std::deque<results::LoadCellRecord> records;
+  std::deque<LoadCellRecord> records;
   QueueMotor queue_motor;
   SupplyLink* supply_link = nullptr;
-  std::deque<results::MotorReading>& readings = queue_motor.readings;
-  std::vector<results::StreamEvent> events;
+  std::deque<MotorReading>& readings = queue_motor.readings;
+  std::vector<StreamEvent> events;
   netbox::Configuration box;
 
  private:
@@ -110,12 +110,12 @@ class QueueBench : public Bench, private LoadCellLink {
   [[nodiscard]] std::vector<Finding> findings() const override { return {}; }
   results::LoadCellScale start() override { return {}; }
   void stop() noexcept override {}
-  std::size_t take(std::span<results::LoadCellRecord> out) override { return move_out(records, out); }
-  [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return std::exchange(events, {}); }
+  std::size_t take(std::span<LoadCellRecord> out) override { return move_out(records, out); }
+  [[nodiscard]] std::vector<StreamEvent> take_events() override { return std::exchange(events, {}); }
   std::string page() override { return {}; }
   void set_bias() noexcept override {}
-  [[nodiscard]] results::SampleAccount account() const override { return {}; }
-  [[nodiscard]] results::StreamHealth health() const override { return {}; }
+  [[nodiscard]] SampleAccount account() const override { return {}; }
+  [[nodiscard]] StreamHealth health() const override { return {}; }
   [[nodiscard]] std::string failure() const override { return {}; }
 };
 

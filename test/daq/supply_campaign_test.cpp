@@ -119,7 +119,7 @@ TEST_F(SupplyCampaign, StopsWhenTheSupplyLimitsTheCurrent) {
 
 TEST_F(SupplyCampaign, StopsWhenItsProtectionTrips) {
   expect_stop(
-      50, [&] { circuit().trip(sim::SupplyTrip::over_voltage); }, "over-voltage protection switched the output off");
+      50, [&] { circuit().trip(SupplyProtection::over_voltage); }, "over-voltage protection switched the output off");
 }
 
 TEST_F(SupplyCampaign, StopsWhenSomebodyTurnsTheKnob) {
@@ -157,7 +157,7 @@ TEST_F(SupplyCampaign, IsTheSameForTheSameSeed) {
 
 TEST_F(SupplyCampaign, CoastsWithinAFifthOfASecondOfTheReading) {
   expect_stop(
-      50, [&] { circuit().trip(sim::SupplyTrip::over_current); }, "over-current");
+      50, [&] { circuit().trip(SupplyProtection::over_current); }, "over-current");
   const results::RunRecording kept = aborted();
   const auto first = std::find_if(kept.supply.begin(), kept.supply.end(), [](const auto& r) { return r.output == 0; });
   ASSERT_NE(first, kept.supply.end());

@@ -118,7 +118,7 @@ TEST_F(UsbBench, CoastsWithinAFifthOfASecondWhenTheSupplyIsPulledOut) {
   EXPECT_GT(kept.load_cell.size(), 3000u);
   EXPECT_THAT(kept.outcome_reason, HasSubstr("supply"));
   ASSERT_FALSE(kept.events.empty());
-  EXPECT_EQ(kept.events.back().kind, results::EventKind::supply_stop);
+  EXPECT_EQ(kept.events.back().kind, EventKind::supply_stop);
   EXPECT_THAT(kept.events.back().text, HasSubstr("step 2"));
 }
 

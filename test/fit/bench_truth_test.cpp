@@ -206,24 +206,24 @@ results::RunRecording known_motor(double time_constant, double delay, double lag
     if (t >= next_command && step < 19) {
       old = commanded;
       commanded += 60;
-      run.phases.push_back({results::Phase::step, ++step, static_cast<results::Nanoseconds>(1e9 * t), commanded});
+      run.phases.push_back({results::Phase::step, ++step, static_cast<Nanoseconds>(1e9 * t), commanded});
       since = t;
       next_command += 1.0;
     }
     const double after = t - since - delay;
     speed = after > 0 ? commanded + (old - commanded) * std::exp(-after / time_constant) : old;
     thrust += tick / lag * (k * speed * speed - thrust);
-    results::LoadCellRecord record;
+    LoadCellRecord record;
     record.counts[2] = static_cast<std::int32_t>(1e6 * thrust);
     record.rdt_sequence = record.ft_sequence = i;
-    record.arrival_ns = static_cast<results::Nanoseconds>(1e9 * t);
+    record.arrival_ns = static_cast<Nanoseconds>(1e9 * t);
     run.load_cell.push_back(record);
     if (t >= next_reading) {
-      run.motor.push_back({results::MotorChannel::speed, static_cast<results::Nanoseconds>(1e9 * t), 0, speed});
+      run.motor.push_back({MotorChannel::speed, static_cast<Nanoseconds>(1e9 * t), 0, speed});
       next_reading += 0.0197 + 0.0006 * ((i * 2654435761u >> 16) % 100) / 100.0;
     }
   }
-  run.phases.push_back({results::Phase::end, -1, static_cast<results::Nanoseconds>(21e9), 0});
+  run.phases.push_back({results::Phase::end, -1, static_cast<Nanoseconds>(21e9), 0});
   return run;
 }
 

@@ -11,7 +11,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace kphi::netbox;
   std::span<const std::uint8_t> input(data, size);
   Session session{StreamSettings{}};
-  std::vector<StampedRecord> accepted;
+  std::vector<LoadCellRecord> accepted;
   Instant now{0};
   session.start(now);
   session.advance(now = session.deadline());

@@ -52,7 +52,7 @@ Comeback live_through(const Absence& absence, const std::string& bench, std::uin
     daq::DeterministicBench stand(profiles::parse_bench(text, (folder / "absence_bench.yaml").string()));
     daq::LoadCellLink& cell = stand.load_cell();
     (void)cell.start();
-    std::vector<results::LoadCellRecord> records(4096);
+    std::vector<LoadCellRecord> records(4096);
     while (stand.clock().now() < absence.ends + kPatience) {
       stand.wait_until(stand.clock().now() + 50ms);
       while (const std::size_t count = cell.take(records)) seen.newest = Instant(records[count - 1].arrival_ns);

@@ -22,7 +22,7 @@ struct Absence {
 
 /// The stream as kphi saw it.
 struct Comeback {
-  std::vector<results::EventKind> events;
+  std::vector<EventKind> events;
   Instant newest{0}, ended{0};  ///< arrival of the newest sample; end of the stream
   std::uint64_t starts = 0;     ///< requested by kphi
   std::string failure;          ///< LoadCellLink::failure() at the end, or the exception

@@ -184,12 +184,12 @@ void withdraw(Evidence& evidence, std::uint32_t flags) {
     for (auto& step : file.steps) step.quality_flags &= ~flags;
 }
 
-Sabotage counted_once_more(const char* what, std::uint64_t results::SampleAccount::*count, const char* told) {
+Sabotage counted_once_more(const char* what, std::uint64_t SampleAccount::*count, const char* told) {
   return {what, Base::clean, [count](Evidence& e) { ++(e.files[0].run.account.*count); }, told};
 }
 
 TEST(SoakVerdict, NamesWhatIsWrongInTheAccount) {
-  using A = results::SampleAccount;
+  using A = SampleAccount;
   expect_each_named({
       {"a record is left out of the file", Base::clean,
        [](Evidence& e) { e.files[0].run.load_cell.erase(e.files[0].run.load_cell.begin() + 500); },
@@ -368,7 +368,7 @@ Sabotage after_an_absence(const char* what, const Absence& absence, const Comeba
 }
 
 TEST(SoakVerdict, NamesAStreamThatDoesNotComeBackOrIsFoughtFor) {
-  using K = results::EventKind;
+  using K = EventKind;
   const Absence reboot{"", 8s, true, true}, loss{"", 8s, true, false}, taken{"", 8s, false, false};
   const auto seen = [](std::vector<K> events, Instant newest, std::uint64_t starts, const char* failure) {
     return Comeback{std::move(events), newest, 12s, starts, failure};

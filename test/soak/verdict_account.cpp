@@ -17,7 +17,7 @@ const Story::Stream* stream_of(const Story& story, const results::RunRecording& 
   return found;
 }
 
-bool same(const results::LoadCellRecord& record, const netbox::test::Ideal::Delivered& true_one) {
+bool same(const LoadCellRecord& record, const netbox::test::Ideal::Delivered& true_one) {
   return record.rdt_sequence == true_one.rdt && record.ft_sequence == true_one.ft &&
          record.arrival_ns == true_one.arrival.count();
 }
@@ -34,7 +34,7 @@ void check_records(const FileOfRun& file, const netbox::test::Ideal& truth, Line
 }
 
 void check_numbers(const FileOfRun& file, const Story::Stream& stream, const netbox::test::Ideal& truth, Lines& wrong) {
-  const results::SampleAccount& account = file.run.account;
+  const SampleAccount& account = file.run.account;
   const auto compare = [&](const char* what, std::uint64_t counted, std::uint64_t is) {
     if (counted != is)
       wrong.push_back(fmt::format("account: {}: {}: counted {}, in truth {}", file.name(), what, counted, is));

@@ -1,43 +1,13 @@
-// What telemetry asks for, how often, and what it brings; and the events of a module and its link, which decide whether
-// a run is valid.
+// How a module is polled, and what is counted on its wire.
 #pragma once
 
 #include <cstdint>
-#include <string>
-#include <string_view>
 #include <vector>
 
-#include "base/clock.hpp"
+#include "base/device_data.hpp"
 #include "drivers/iq/wire/packet.hpp"
 
 namespace kphi::iq {
-
-enum class Quantity : std::uint8_t {
-  speed,             ///< rad/s, + = counter-clockwise
-  supply_voltage,    ///< V, power_monitor.volts
-  supply_current,    ///< A, power_monitor.amps
-  motor_current,     ///< A, the module's model-based estimate
-  coil_temperature,  ///< °C, estimated by the module
-  derate,            ///< 1 = none; below 1 the module holds its voltage back and a speed is not to be trusted
-  drive_mode,        ///< a DriveMode; 5 = coast
-  drive_pwm,         ///< share of the supply voltage after all limits, -1..1
-  fault_now,         ///< bits, see fault_words(); 0 = nothing
-};
-inline constexpr int kQuantities = 9;
-
-[[nodiscard]] constexpr std::string_view name_of(Quantity quantity) noexcept {
-  constexpr std::string_view names[kQuantities] = {"speed",         "supply_voltage",   "supply_current",
-                                                   "motor_current", "coil_temperature", "derate",
-                                                   "drive_mode",    "drive_pwm",        "fault_now"};
-  return names[static_cast<int>(quantity)];
-}
-
-struct Reading {
-  Quantity quantity = Quantity::speed;
-  double value = 0;         ///< in the unit named above; always finite
-  Instant time{0};          ///< bench time: midpoint of request and reply, less the time of their bytes on the wire
-  Duration uncertainty{0};  ///< half of what is left between the two: the true moment is time ± uncertainty
-};
 
 /// What happened on the wire. Malformed input is counted, never an error.
 struct Counters : Parser::Counters {
@@ -59,37 +29,12 @@ struct Counters : Parser::Counters {
   std::uint64_t reconnections = 0;       ///< times the link was lost and found again (Motor)
 };
 
-enum class EventKind : std::uint8_t {
-  connected,        ///< identity read, communication timeout set; coasting
-  no_answer,        ///< it could not be connected
-  module_reset,     ///< it restarted by itself: its volatile settings are lost
-  module_silent,    ///< it stopped answering
-  coast_denied,     ///< it did not confirm a coast
-  lease_expired,    ///< no caller renewed the command in time
-  port_lost,        ///< unplugged
-  another_module,   ///< a different module answers now
-  slow_round_trip,  ///< the median is so long that the times of readings are uncertain
-  host_absent,      ///< this computer slept, or did not run kphi for so long that the module may have stopped driving
-  let_go,           ///< the module has stopped driving by itself
-};
-
-/// A measurement across this event is invalid.
-[[nodiscard]] constexpr bool spoils_a_run(EventKind kind) noexcept {
-  return kind != EventKind::connected && kind != EventKind::slow_round_trip;
-}
-
-struct Event {
-  EventKind kind = EventKind::connected;
-  Instant time{0};    ///< bench time at which it was noticed
-  std::string words;  ///< for the log
-};
-
 /// How one module is polled. Times are bench time.
 struct Settings {
   int module_id = 0;         ///< 0..62
   double telemetry_hz = 50;  ///< cycles per second of bench time; each asks for all of `every_cycle`
-  std::vector<Quantity> every_cycle{Quantity::speed};
-  double slow_hz = 0;          ///< queries per second for the other quantities, in turn; 0: telemetry_hz, up to 50
+  std::vector<MotorChannel> every_cycle{MotorChannel::speed};
+  double slow_hz = 0;          ///< queries per second for the other channels, in turn; 0: telemetry_hz, up to 50
   Duration reply_timeout{0};   ///< the first and the longest time-out of a request; 0: 100 ms, and Motor stretches
                                ///< it as wall time
   Duration wire_byte_time{0};  ///< 10 bits of one byte; 0: Motor takes 10/baud

@@ -197,7 +197,7 @@ class Link {
     const Duration slept = suspended - suspended_;
     if (slept < kShortestSleep) return;
     suspended_ = suspended;
-    session_.fail(EventKind::host_absent, fmt::format("this computer slept for {:.2g} s", to_seconds(slept)),
+    session_.fail(EventKind::motor_host_absent, fmt::format("this computer slept for {:.2g} s", to_seconds(slept)),
                   clock_.now());
   }
 
@@ -250,7 +250,7 @@ class Link {
   void lose(const std::string& why) {
     port_.reset();
     congested_ = was_ready_ = false;
-    session_.fail(EventKind::port_lost, why, clock_.now());
+    session_.fail(EventKind::motor_port_lost, why, clock_.now());
     next_attempt_ = steady_clock::now() + lengthen(reopening_);
   }
 

@@ -81,7 +81,7 @@ std::vector<Reply> Motor::inquire(std::vector<Inquiry> inquiries) {
   return replies_;
 }
 
-std::vector<Event> Motor::take_events() {
+std::vector<StreamEvent> Motor::take_events() {
   const std::lock_guard lock(mutex_);
   return std::exchange(events_, {});
 }
@@ -98,7 +98,7 @@ Commands Motor::take_commands() {
 }
 
 void Motor::move_readings(Session& session) {
-  std::array<Reading, 64> batch;
+  std::array<MotorReading, 64> batch;
   while (const std::size_t n = session.take(batch)) dropped_readings_ += n - readings_.push(batch.data(), n);
 }
 
@@ -109,7 +109,7 @@ void Motor::publish(Session& session, bool line) {
     news = note_state(session);
     if (line != std::exchange(line_, line)) news = true;
     if (close_tickets(session)) news = true;
-    for (Event& event : session.take_events()) {
+    for (StreamEvent& event : session.take_events()) {
       if (events_.size() == kEvents) events_.erase(events_.begin());
       events_.push_back(std::move(event));
     }

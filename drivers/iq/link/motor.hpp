@@ -74,9 +74,9 @@ class Motor {
 
   /// Oldest readings first; one consumer thread. Holds 16384, about 160 s at 50 Hz; further ones are dropped and
   /// counted.
-  std::size_t take(std::span<Reading> out) { return readings_.pop(out.data(), out.size()); }
+  std::size_t take(std::span<MotorReading> out) { return readings_.pop(out.data(), out.size()); }
   /// What happened, oldest first. 256 are kept.
-  [[nodiscard]] std::vector<Event> take_events();
+  [[nodiscard]] std::vector<StreamEvent> take_events();
   /// False once the port is gone, the module stopped answering or restarted, or a coast stayed unconfirmed.
   [[nodiscard]] bool alive() const noexcept { return alive_; }
   /// Why it is not alive: the newest failure.
@@ -133,12 +133,12 @@ class Motor {
   AuditRecord identity_;
   Counters counters_;
   DelayHistogram round_trips_;
-  std::vector<Event> events_;
+  std::vector<StreamEvent> events_;
 
   std::uint64_t dropped_readings_ = 0, lease_expiries_ = 0, reconnections_ = 0;  ///< the link's thread
   std::atomic<std::int64_t> lease_end_ns_{0};                                    ///< steady_clock
   std::atomic<bool> alive_{true};
-  boost::lockfree::spsc_queue<Reading> readings_{16384};
+  boost::lockfree::spsc_queue<MotorReading> readings_{16384};
   std::unique_ptr<Link> link_;  ///< last: its thread uses the members above
 };
 

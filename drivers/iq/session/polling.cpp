@@ -8,18 +8,18 @@ namespace {
 
 constexpr std::size_t kReadings = 4096;
 constexpr Duration kWatchPeriod = std::chrono::milliseconds(250);
-constexpr std::size_t kUptime = kQuantities, kFaultEver = kQuantities + 1;
+constexpr std::size_t kUptime = kMotorChannels.size(), kFaultEver = kUptime + 1;
 
-/// In the order of Quantity; null: depends on the module.
-constexpr std::array<const Entry*, kQuantities> kEntryOf{&entry<"brushless_drive.obs_velocity">,
-                                                         &entry<"power_monitor.volts">,
-                                                         &entry<"power_monitor.amps">,
-                                                         &entry<"brushless_drive.est_motor_amps">,
-                                                         nullptr,
-                                                         &entry<"brushless_drive.derate">,
-                                                         &entry<"brushless_drive.drive_mode">,
-                                                         &entry<"brushless_drive.drive_pwm">,
-                                                         nullptr};
+/// In the order of MotorChannel; null: depends on the module.
+constexpr std::array<const Entry*, kMotorChannels.size()> kEntryOf{&entry<"brushless_drive.obs_velocity">,
+                                                                   &entry<"power_monitor.volts">,
+                                                                   &entry<"power_monitor.amps">,
+                                                                   &entry<"brushless_drive.est_motor_amps">,
+                                                                   nullptr,
+                                                                   &entry<"brushless_drive.derate">,
+                                                                   &entry<"brushless_drive.drive_mode">,
+                                                                   &entry<"brushless_drive.drive_pwm">,
+                                                                   nullptr};
 
 const Entry* coil_temperature_of(const AuditRecord& identity) {
   if (identity.value<"coil_temperature_estimator.t_coil">()) return &entry<"coil_temperature_estimator.t_coil">;
@@ -35,19 +35,19 @@ Polling::Polling(const Settings& settings)
       watch_{kWatchPeriod},
       readings_(kReadings),
       speed_(std::nan("")) {
-  for (const Quantity quantity : settings.every_cycle) every_cycle_[static_cast<std::size_t>(quantity)] = true;
+  for (const MotorChannel channel : settings.every_cycle) every_cycle_[static_cast<std::size_t>(channel)] = true;
 }
 
 void Polling::begin(const AuditRecord& identity, int system_control_id, Instant now) {
   on_ = true;
   wanted_.fill(false);
   cycle_.next = slow_.next = watch_.next = now;
-  for (std::size_t i = 0; i < kQuantities; ++i) questions_[i] = {kEntryOf[i], module_id_};
-  questions_[static_cast<std::size_t>(Quantity::coil_temperature)].entry = coil_temperature_of(identity);
+  for (std::size_t i = 0; i < kChannels; ++i) questions_[i] = {kEntryOf[i], module_id_};
+  questions_[static_cast<std::size_t>(MotorChannel::coil_temperature)].entry = coil_temperature_of(identity);
   const bool tells_time = identity.value<"system_control.time">().has_value();
   questions_[kUptime] = {tells_time ? &entry<"system_control.time"> : nullptr, system_control_id};
   const bool tells_faults = identity.value<"power_safety.fault_ever">().has_value();
-  questions_[static_cast<std::size_t>(Quantity::fault_now)].entry =
+  questions_[static_cast<std::size_t>(MotorChannel::fault_now)].entry =
       tells_faults ? &entry<"power_safety.fault_now"> : nullptr;
   questions_[kFaultEver] = {tells_faults ? &entry<"power_safety.fault_ever"> : nullptr, module_id_};
 }
@@ -61,7 +61,7 @@ bool Polling::Beat::strike(Instant now) noexcept {
 void Polling::advance(Exchange& exchange, Instant now) {
   if (!on_) return;
   if (cycle_.strike(now)) {
-    for (std::size_t i = 0; i < kQuantities; ++i) {
+    for (std::size_t i = 0; i < kChannels; ++i) {
       if (every_cycle_[i]) want(i, exchange.counters());
     }
   }
@@ -82,8 +82,8 @@ void Polling::want(std::size_t question, Counters& counters) noexcept {
 }
 
 void Polling::want_slow(Counters& counters) noexcept {
-  for (std::size_t tries = 0; tries < kQuantities; ++tries) {
-    turn_ = (turn_ + 1) % kQuantities;
+  for (std::size_t tries = 0; tries < kChannels; ++tries) {
+    turn_ = (turn_ + 1) % kChannels;
     if (every_cycle_[turn_] || questions_[turn_].entry == nullptr) continue;
     return want(turn_, counters);
   }
@@ -98,20 +98,20 @@ void Polling::take(const QueryResult& result, Counters& counters) {
     ++counters.bad_values;
     return;
   }
-  const auto end = questions_.begin() + kQuantities;
+  const auto end = questions_.begin() + kChannels;
   const auto at = std::find_if(questions_.begin(), end, [&](const Question& q) { return q.entry == &result.entry(); });
   if (at == end) return;
-  const auto quantity = static_cast<Quantity>(at - questions_.begin());
+  const auto channel = static_cast<MotorChannel>(at - questions_.begin());
   if (readings_.full()) ++counters.dropped_readings;
   // fix16: 65536 means no derating.
-  readings_.push_back(
-      {quantity, quantity == Quantity::derate ? value / 65536 : value, result.time, result.uncertainty});
-  if (quantity != Quantity::speed) return;
+  readings_.push_back({channel, result.time.count(), result.uncertainty.count(),
+                       channel == MotorChannel::derate ? value / 65536 : value});
+  if (channel != MotorChannel::speed) return;
   speed_ = value;
   speed_time_ = result.time;
 }
 
-std::size_t Polling::take_readings(std::span<Reading> out) {
+std::size_t Polling::take_readings(std::span<MotorReading> out) {
   const std::size_t n = std::min(out.size(), readings_.size());
   std::copy_n(readings_.begin(), n, out.begin());
   readings_.erase_begin(n);

@@ -1,4 +1,4 @@
-// Telemetry: when each entry is queried, and the resulting readings. Three periods: the quantities of every cycle, the
+// Telemetry: when each entry is queried, and the resulting readings. Three periods: the channels of every cycle, the
 // others in turn, and the two entries that reveal a restart of the module. A query that is due waits for credit; if it
 // still waits one period later, it is skipped and counted.
 #pragma once
@@ -26,13 +26,13 @@ class Polling {
   [[nodiscard]] Instant deadline() const noexcept;
 
   /// Moves the oldest readings out, returns how many. 4096 are kept; older ones are dropped and counted.
-  std::size_t take_readings(std::span<Reading> out);
+  std::size_t take_readings(std::span<MotorReading> out);
   /// The newest speed, rad/s; NaN before the first.
   [[nodiscard]] double speed() const noexcept { return speed_; }
   [[nodiscard]] Instant speed_time() const noexcept { return speed_time_; }
 
  private:
-  static constexpr std::size_t kQuestions = kQuantities + 2;
+  static constexpr std::size_t kChannels = kMotorChannels.size(), kQuestions = kChannels + 2;
   struct Question {
     const Entry* entry = nullptr;  ///< nullptr: the module has no such entry
     int module_id = 0;
@@ -48,13 +48,13 @@ class Polling {
   void want_slow(Counters& counters) noexcept;
 
   int module_id_;
-  std::array<bool, kQuantities> every_cycle_{};
+  std::array<bool, kChannels> every_cycle_{};
   bool on_ = false;
   std::array<Question, kQuestions> questions_{};
   std::array<bool, kQuestions> wanted_{};
   Beat cycle_, slow_, watch_;
   std::size_t turn_ = 0;
-  boost::circular_buffer<Reading> readings_;
+  boost::circular_buffer<MotorReading> readings_;
   double speed_;
   Instant speed_time_{0};
 };

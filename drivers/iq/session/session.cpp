@@ -109,7 +109,7 @@ void Session::stop(const StopSettings& settings, Instant now) {
 }
 
 void Session::expire_lease(Instant now) {
-  note(EventKind::lease_expired, "no caller renewed the command in time", now);
+  note(EventKind::motor_lease_expired, "no caller renewed the command in time", now);
   emergency_stop(now);
 }
 
@@ -160,7 +160,7 @@ void Session::take_restart(const QueryResult& result, Instant now) {
   const auto sign = reset_watch_.take(result);
   if (!sign) return;
   ++exchange_.counters().module_resets;
-  fail(EventKind::module_reset, "the module restarted by itself: " + *sign + "; its settings are lost", now);
+  fail(EventKind::motor_reset, "the module restarted by itself: " + *sign + "; its settings are lost", now);
 }
 
 void Session::service(Instant now) {
@@ -189,7 +189,8 @@ void Session::continue_coasting(Instant now) {
   ++exchange_.counters().unconfirmed_coasts;
   stopping_.end(StopReport::Outcome::unconfirmed);
   if (state_ != State::failed) {
-    fail(state_ == State::connecting ? EventKind::no_answer : EventKind::coast_denied, why_no_answer(), now);
+    fail(state_ == State::connecting ? EventKind::motor_no_answer : EventKind::motor_coast_denied, why_no_answer(),
+         now);
   }
 }
 
@@ -197,8 +198,8 @@ void Session::continue_connecting(Instant now) {
   if (state_ != State::connecting || coasting_.pending()) return;
   connecting_.advance(exchange_, now);
   if (!connecting_.failure().empty()) {
-    return fail(connecting_.another_module() ? EventKind::another_module : EventKind::no_answer, connecting_.failure(),
-                now);
+    return fail(connecting_.another_module() ? EventKind::motor_another_module : EventKind::motor_no_answer,
+                connecting_.failure(), now);
   }
   if (!connecting_.done()) return;
   state_ = State::ready;
@@ -208,7 +209,7 @@ void Session::continue_connecting(Instant now) {
   known_ = identity();
   reset_watch_.begin(identity());
   polling_.begin(identity(), connecting_.system_control_id(), now);
-  note(EventKind::connected, identity().summary(), now);
+  note(EventKind::motor_connected, identity().summary(), now);
 }
 
 void Session::flush_speed(Instant now) {
@@ -226,7 +227,7 @@ Instant Session::silence_limit() const noexcept {
 
 void Session::check_silence(Instant now) {
   if (now < silence_limit()) return;
-  fail(EventKind::module_silent,
+  fail(EventKind::motor_silent,
        fmt::format("the module stopped answering: no reply for {:.2f} s", to_seconds(now - last_reply_)), now);
 }
 
@@ -235,8 +236,8 @@ void Session::check_drive(Instant now) {
   if (!lapse) return;
   const double lasts = to_seconds(lapse->lasts);
   if (lapse->of_host)
-    return fail(EventKind::host_absent, fmt::format("this computer did not run kphi for {:.2g} s", lasts), now);
-  fail(EventKind::module_silent, fmt::format("the module stopped answering: no reply for {:.2g} s", lasts), now);
+    return fail(EventKind::motor_host_absent, fmt::format("this computer did not run kphi for {:.2g} s", lasts), now);
+  fail(EventKind::motor_silent, fmt::format("the module stopped answering: no reply for {:.2g} s", lasts), now);
 }
 
 void Session::check_mode(const QueryResult& result, Instant now) {
@@ -253,7 +254,7 @@ void Session::check_mode(const QueryResult& result, Instant now) {
 
 void Session::conclude_let_go(Instant now) {
   if (let_go_.empty() || now < let_go_at_ + settings_.reply_timeout * kRestartTimeouts) return;
-  fail(EventKind::let_go, std::exchange(let_go_, {}), now);
+  fail(EventKind::motor_let_go, std::exchange(let_go_, {}), now);
 }
 
 void Session::judge_round_trip(Instant now) {
@@ -262,7 +263,7 @@ void Session::judge_round_trip(Instant now) {
   const Duration median = exchange_.round_trips().quantile(0.5);
   if (median <= settings_.reply_timeout / kSlowShare) return;
   note(
-      EventKind::slow_round_trip,
+      EventKind::motor_slow_round_trip,
       fmt::format("slow line: median reply time {:.1f} ms, without wire time; set the adapter's latency timer to 1 ms, "
                   "or plug it into its own USB port",
                   1e3 * to_seconds(median)),
@@ -270,7 +271,7 @@ void Session::judge_round_trip(Instant now) {
 }
 
 void Session::note(EventKind kind, const std::string& words, Instant now) {
-  events_.push_back({kind, now, words});
+  events_.push_back({kind, now.count(), 0, words});
 }
 
 std::string Session::why_no_answer() const {

@@ -45,7 +45,7 @@ class Session {
   /// Complete once `ready`.
   [[nodiscard]] const AuditRecord& identity() const noexcept { return connecting_.identity(); }
   /// Moves the events out, oldest first.
-  [[nodiscard]] std::vector<Event> take_events() { return std::exchange(events_, {}); }
+  [[nodiscard]] std::vector<StreamEvent> take_events() { return std::exchange(events_, {}); }
 
   /// It has been ready at least once.
   [[nodiscard]] bool was_connected() const noexcept { return known_.has_value(); }
@@ -93,7 +93,7 @@ class Session {
   [[nodiscard]] Instant deadline() const noexcept;
 
   /// Moves the oldest readings out, returns how many. 4096 are kept; older ones are dropped and counted.
-  std::size_t take(std::span<Reading> out) { return polling_.take_readings(out); }
+  std::size_t take(std::span<MotorReading> out) { return polling_.take_readings(out); }
   [[nodiscard]] const Counters& counters() const noexcept { return exchange_.counters(); }
   [[nodiscard]] const DelayHistogram& round_trips() const noexcept { return exchange_.round_trips(); }
   /// The time-out that a query would get now, from the measured round trips.
@@ -121,7 +121,7 @@ class Session {
   Settings settings_;
   State state_ = State::idle;
   std::string failure_;
-  std::vector<Event> events_;
+  std::vector<StreamEvent> events_;
   bool armed_ = false;
   std::optional<AuditRecord> known_;  ///< of the first connection
   Exchange exchange_;

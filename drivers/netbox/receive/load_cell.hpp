@@ -43,7 +43,7 @@ class LoadCell {
   void set_bias() noexcept;
 
   /// Oldest first; returns how many.
-  [[nodiscard]] std::size_t take(std::span<StampedRecord> out) noexcept { return connection_.take(out); }
+  [[nodiscard]] std::size_t take(std::span<LoadCellRecord> out) noexcept { return connection_.take(out); }
   /// True once records wait; false after `wall`.
   [[nodiscard]] bool wait(std::chrono::nanoseconds wall) noexcept;
   /// Events since the last call, oldest first. After a silence the box is asked over HTTP; its answer (taken_over,
@@ -53,7 +53,7 @@ class LoadCell {
   /// A consistent set, a few milliseconds old at most while records arrive.
   [[nodiscard]] Counters counters() const noexcept { return counters_.read(); }
   /// At most 20 ms older than counters().
-  [[nodiscard]] Health health() const noexcept { return health_.read(); }
+  [[nodiscard]] StreamHealth health() const noexcept { return health_.read(); }
   [[nodiscard]] State state() const noexcept { return state_.load(); }
   [[nodiscard]] ReceiveBuffer receive_buffer() const;
 
@@ -85,7 +85,7 @@ class LoadCell {
   // Published by the receive thread.
   std::atomic<State> state_{State::idle};
   Published<Counters> counters_;
-  Published<Health> health_;
+  Published<StreamHealth> health_;
 
   std::atomic<Inquiry> inquiry_{Inquiry::none};
   Answer answer_;  // the inquirer's while `asked`, the receive thread's while `answered`

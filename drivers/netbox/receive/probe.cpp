@@ -41,22 +41,19 @@ void judge_stream(Probe& probe, std::uint32_t status, bool known_skew) {
 void look_at_stream(Probe& probe, LoadCell& cell, const Clock& clock, std::chrono::nanoseconds duration) {
   cell.start();
   const auto end = std::chrono::steady_clock::now() + duration;
-  std::vector<StampedRecord> batch(4096);
+  std::vector<LoadCellRecord> batch(4096);
   std::uint32_t status = 0;
   for (auto now = std::chrono::steady_clock::now(); now < end; now = std::chrono::steady_clock::now()) {
     if (!cell.wait(end - now)) break;
     const std::size_t count = cell.take(batch);
     for (std::size_t i = 0; i < count; ++i) {
-      if (!healthy(batch[i].record.status)) status |= batch[i].record.status;
+      if (!healthy(batch[i].status)) status |= batch[i].status;
     }
   }
   cell.stop();
   probe.streamed = true;
   probe.counters = cell.counters();
   probe.health = cell.health();
-  // Jitter comes from this computer and the network: wall time.
-  probe.health.jitter_p50_ns = clock.shrunk(Duration(probe.health.jitter_p50_ns)).count();
-  probe.health.jitter_p99_ns = clock.shrunk(Duration(probe.health.jitter_p99_ns)).count();
   probe.receive_buffer = cell.receive_buffer().note();
   probe.events = cell.take_events();
   judge_stream(probe, status, clock.shrunk(std::chrono::seconds(1)) == std::chrono::seconds(1));
@@ -92,8 +89,7 @@ std::vector<std::string> Probe::lines() const {
                                counters.received, health.records_per_second, counters.lost_network + counters.lost_host,
                                counters.late, counters.duplicates, counters.reordered));
     text.push_back(fmt::format("clock {:+.1f} ppm, jitter p50 {:.0f} us, p99 {:.0f} us", health.skew_ppm,
-                               1e-3 * static_cast<double>(health.jitter_p50_ns),
-                               1e-3 * static_cast<double>(health.jitter_p99_ns)));
+                               1e6 * health.jitter_p50_s, 1e6 * health.jitter_p99_s));
     text.push_back("receive buffer " + receive_buffer);
   }
   for (const Finding& finding : findings) text.push_back(finding.line());

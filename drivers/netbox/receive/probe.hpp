@@ -25,7 +25,7 @@ struct Probe {
   std::optional<Configuration> configuration;  ///< nothing: the box does not answer
   bool streamed = false;
   Counters counters;
-  Health health;
+  StreamHealth health;
   std::string receive_buffer;
   std::vector<Event> events;
   std::vector<Finding> findings;  ///< worst first

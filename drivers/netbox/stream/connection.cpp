@@ -49,7 +49,7 @@ Connection::Connection(const Configuration& box, double bench_speed)
       latest_(box),
       streamed_(box),
       session_(stream_settings(box)),
-      meter_(box.device_rate_hz),
+      meter_(std::in_place, box.device_rate_hz, bench_speed),
       queue_records_(queue_capacity(box, bench_speed)),
       queue_(queue_records_) {}
 
@@ -196,7 +196,7 @@ void Connection::adopt_latest() {
   store_accepted();
   collect_events();
   session_.adopt(stream_settings(latest_));
-  meter_.emplace(latest_.device_rate_hz);
+  meter_.emplace(latest_.device_rate_hz, bench_speed_);
   streamed_ = latest_;
 }
 
@@ -215,8 +215,8 @@ Counters Connection::counters() const noexcept {
   return counters;
 }
 
-Health Connection::health() const noexcept {
-  Health health = meter_->health();
+StreamHealth Connection::health() const noexcept {
+  StreamHealth health = meter_->health();
   health.events_dropped = events_dropped_;
   return health;
 }

@@ -70,7 +70,7 @@ class Connection {
   [[nodiscard]] bool queued_records() noexcept { return std::exchange(queued_, false); }
 
   /// Consumer: oldest first; returns how many.
-  std::size_t take(std::span<StampedRecord> out) noexcept { return queue_.pop(out.data(), out.size()); }
+  std::size_t take(std::span<LoadCellRecord> out) noexcept { return queue_.pop(out.data(), out.size()); }
   /// Consumer: no record is waiting.
   [[nodiscard]] bool empty() const noexcept { return queue_.read_available() == 0; }
   /// Consumer: events since the last call, oldest first.
@@ -79,7 +79,7 @@ class Connection {
   /// `silent` until records arrive again, also while the stream is being started again.
   [[nodiscard]] State state() const noexcept;
   [[nodiscard]] Counters counters() const noexcept;
-  [[nodiscard]] Health health() const noexcept;
+  [[nodiscard]] StreamHealth health() const noexcept;
   /// As answered last.
   [[nodiscard]] const Configuration& configuration() const noexcept { return latest_; }
   [[nodiscard]] const StreamSettings& settings() const noexcept { return session_.settings(); }
@@ -109,10 +109,10 @@ class Connection {
   bool question_ = false;
 
   const std::size_t queue_records_;  // that it holds at most
-  boost::lockfree::spsc_queue<StampedRecord> queue_;
+  boost::lockfree::spsc_queue<LoadCellRecord> queue_;
   bool queued_ = false;
   boost::lockfree::spsc_queue<Event, boost::lockfree::capacity<256>> events_;
-  std::vector<StampedRecord> accepted_;
+  std::vector<LoadCellRecord> accepted_;
   Instant newest_datagram_{0};
   std::uint64_t queue_overflows_ = 0, events_dropped_ = 0;
 };

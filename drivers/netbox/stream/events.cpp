@@ -18,6 +18,9 @@ constexpr const char* kWords[] = {
     "the box answers and RDT is enabled: another client has taken the stream; close the other client, then start again",
     "RDT is disabled: enable it on the box's Communications page",
     "the box does not answer over HTTP: check its power and the cable",
+    "",
+    "",
+    "",  // of the ranges: the recorder's and the guard's
     "the box answers, but its configuration is unusable: check its web pages",
     "the stream was started again {numbers}",
     "the box's configuration has changed: {changes}",

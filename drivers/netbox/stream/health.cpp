@@ -80,29 +80,30 @@ void HealthMeter::begin() noexcept {
   records_ = datagrams_ = high_water_ = 0;
 }
 
-void HealthMeter::note(const StampedRecord& newest, std::uint64_t records, std::uint64_t reboots) noexcept {
+void HealthMeter::note(const LoadCellRecord& newest, std::uint64_t records, std::uint64_t reboots) noexcept {
   if (reboots != reboots_) clock_.restart();
   reboots_ = reboots;
-  jitter_.add(clock_.add(newest.record.ft_sequence, newest.arrival));
+  jitter_.add(clock_.add(newest.ft_sequence, newest.arrival()));
   if (datagrams_++ == 0) {
-    first_ = newest.arrival;
+    first_ = newest.arrival();
   } else {
     records_ += records;
   }
-  newest_ = newest.arrival;
+  newest_ = newest.arrival();
 }
 
-Health HealthMeter::health() const noexcept {
-  Health health;
+StreamHealth HealthMeter::health() const noexcept {
+  StreamHealth health;
   const double seconds = to_seconds(newest_ - first_);
   if (datagrams_ > 1 && seconds > 0) {
     health.records_per_second = static_cast<double>(records_) / seconds;
     health.datagrams_per_second = static_cast<double>(datagrams_ - 1) / seconds;
   }
-  health.jitter_p50_ns = jitter_.quantile(0.5).count();
-  health.jitter_p99_ns = jitter_.quantile(0.99).count();
+  // Jitter comes from this computer and the network: wall time.
+  health.jitter_p50_s = to_seconds(jitter_.quantile(0.5)) / bench_speed_;
+  health.jitter_p99_s = to_seconds(jitter_.quantile(0.99)) / bench_speed_;
   health.skew_ppm = clock_.skew_ppm();
-  health.clock_uncertainty_ns = clock_.uncertainty().count();
+  health.clock_uncertainty_s = to_seconds(clock_.uncertainty());
   health.queue_high_water = high_water_;
   return health;
 }

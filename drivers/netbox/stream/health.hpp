@@ -5,8 +5,8 @@
 #include <cstdint>
 
 #include "base/clock.hpp"
+#include "base/device_data.hpp"
 #include "base/histogram.hpp"
-#include "drivers/netbox/stream/reorder_window.hpp"
 
 namespace kphi::netbox {
 
@@ -57,30 +57,21 @@ class ClockEstimate {
   double offset_ = 0, slope_ = 0, centre_ = 0, line_error_ = 0;
 };
 
-/// Bench time and bench rates. Since the last start().
-struct Health {
-  double records_per_second = 0;
-  double datagrams_per_second = 0;
-  std::int64_t jitter_p50_ns = 0;  ///< arrival after that of the least delayed datagram: device clock, mapped
-  std::int64_t jitter_p99_ns = 0;
-  double skew_ppm = 0;                    ///< device clock slow against this host's: positive; 0 before it is known
-  std::int64_t clock_uncertainty_ns = 0;  ///< without the constant part of the delay
-  std::uint64_t queue_high_water = 0;     ///< most records that waited for the consumer
-  std::uint64_t events_dropped = 0;       ///< beyond what the lists hold
-};
-
-/// One thread.
+/// Since begin(). One thread.
 class HealthMeter {
  public:
-  explicit HealthMeter(double device_rate_hz) noexcept : clock_(device_rate_hz) {}
+  /// `bench_speed`: bench seconds per second.
+  explicit HealthMeter(double device_rate_hz, double bench_speed = 1) noexcept
+      : clock_(device_rate_hz), bench_speed_(bench_speed) {}
   void begin() noexcept;
   /// `newest`: the last record delivered from a datagram.
-  void note(const StampedRecord& newest, std::uint64_t records, std::uint64_t reboots) noexcept;
+  void note(const LoadCellRecord& newest, std::uint64_t records, std::uint64_t reboots) noexcept;
   void note_queue(std::uint64_t waiting) noexcept { high_water_ = waiting > high_water_ ? waiting : high_water_; }
-  [[nodiscard]] Health health() const noexcept;
+  [[nodiscard]] StreamHealth health() const noexcept;
 
  private:
   ClockEstimate clock_;
+  double bench_speed_;
   DelayHistogram jitter_;
   std::uint64_t reboots_ = 0, records_ = 0, datagrams_ = 0, high_water_ = 0;
   Instant first_{0}, newest_{0};

@@ -8,35 +8,26 @@
 #include <vector>
 
 #include "base/clock.hpp"
+#include "base/device_data.hpp"
 #include "drivers/netbox/stream/events.hpp"
-#include "drivers/netbox/wire/rdt.hpp"
 
 namespace kphi::netbox {
 
-struct StampedRecord {
-  Record record;
-  Instant arrival{0};  ///< of its datagram at this computer, bench time
-};
-
-/// Records unless said otherwise. expected = received + lost_network + lost_host, always.
-struct Counters {
-  std::uint64_t received = 0;      ///< accepted
-  std::uint64_t expected = 0;      ///< that the box took from the first to the last accepted one (ft_sequence / stride)
-  std::uint64_t lost_network = 0;  ///< never reached this computer; late ones stay counted here
-  std::uint64_t lost_host = 0;     ///< reached this computer while the socket's buffer was full
-  std::uint64_t duplicates = 0;    ///< arrived a second time; discarded
-  std::uint64_t late = 0;          ///< arrived after a younger one had been delivered; discarded
-  std::uint64_t reordered = 0;     ///< arrived after a younger one, but in time to be put in order
-  std::uint64_t stalled = 0;       ///< repeated an old measurement under a new rdt_sequence; discarded
-  std::uint64_t irregular = 0;     ///< accepted, but rdt and ft disagree about the gap before them (rate changed?)
-  std::uint64_t restarts = 0;      ///< times rdt_sequence restarted while ft_sequence continued
-  std::uint64_t reboots = 0;       ///< times ft_sequence restarted: bias and scale may have changed
-  std::uint64_t datagrams = 0;     ///< of any kind
-  std::uint64_t malformed = 0;     ///< datagrams of wrong size
-  std::uint64_t drained = 0;       ///< datagrams that arrived while no stream was requested
-  std::uint64_t host_drops = 0;    ///< datagrams that the socket dropped (SO_RXQ_OVFL)
-  std::uint64_t reconnects = 0;    ///< times the stream was started again after it had ended
+/// Accepted records and those missing before them. expected = received + lost_network + lost_host, always.
+struct Counters : SampleAccount {
+  std::uint64_t datagrams = 0;        ///< of any kind
+  std::uint64_t drained = 0;          ///< datagrams that arrived while no stream was requested
+  std::uint64_t host_drops = 0;       ///< datagrams that the socket dropped (SO_RXQ_OVFL)
+  std::uint64_t reconnects = 0;       ///< times the stream was started again after it had ended
   std::uint64_t queue_overflows = 0;  ///< accepted, then lost because the consumer did not take them in time
+
+  /// Of the records that reached the consumer: those lost by a full queue count as lost in this computer.
+  [[nodiscard]] SampleAccount account() const noexcept {
+    SampleAccount account = *this;
+    account.received -= queue_overflows;
+    account.lost_host += queue_overflows;
+    return account;
+  }
 };
 
 class LossTracker {
@@ -47,24 +38,24 @@ class LossTracker {
   /// The next record is the first of a requested stream: no record is missing before it.
   void begin_segment() noexcept;
   /// True: deliver it. False: counted and to be discarded.
-  [[nodiscard]] bool accept(const Record& record, Instant arrival) noexcept {
+  [[nodiscard]] bool accept(const LoadCellRecord& record) noexcept {
     if (is_next(record)) [[likely]] {
-      accept_sound(record, arrival);
+      accept_sound(record);
       return true;
     }
-    return accept_unusual(record, arrival);
+    return accept_unusual(record);
   }
   /// Follows the last accepted one in both numbers.
-  [[nodiscard]] bool is_next(const Record& record) const noexcept {
+  [[nodiscard]] bool is_next(const LoadCellRecord& record) const noexcept {
     return has_last_ && record.rdt_sequence == last_rdt_ + 1 && record.ft_sequence == last_ft_ + stride_;
   }
   /// The first record of a stream has arrived: earlier drops explain no later gap.
   void forget_host_drops() noexcept { host_credit_ = 0; }
   /// The first of the two records that proved a reboot, after accept() has taken the second: deliver both, in the order
   /// of their numbers.
-  [[nodiscard]] std::optional<StampedRecord> take_confirmed() noexcept;
+  [[nodiscard]] std::optional<LoadCellRecord> take_confirmed() noexcept;
   /// Judging by this record alone, the box has booted.
-  [[nodiscard]] bool looks_rebooted(const Record& record, Instant arrival) const noexcept;
+  [[nodiscard]] bool looks_rebooted(const LoadCellRecord& record) const noexcept;
   [[nodiscard]] bool has_last() const noexcept { return has_last_; }
   [[nodiscard]] std::uint32_t last_ft() const noexcept { return last_ft_; }
   [[nodiscard]] std::uint32_t last_rdt() const noexcept { return stall_run_ > 0 ? stall_rdt_ : last_rdt_; }
@@ -81,32 +72,32 @@ class LossTracker {
     std::uint32_t after_ft = 0, before_ft = 0;  // both were received
   };
 
-  void remember(const Record& record, Instant arrival) noexcept {
+  void remember(const LoadCellRecord& record) noexcept {
     last_rdt_ = record.rdt_sequence;
     last_ft_ = record.ft_sequence;
-    last_arrival_ = arrival;
+    last_arrival_ = record.arrival();
     has_stray_ = false;
   }
   /// No record is missing before it.
-  void accept_sound(const Record& record, Instant arrival) noexcept {
-    remember(record, arrival);
+  void accept_sound(const LoadCellRecord& record) noexcept {
+    remember(record);
     ++counters_.received;
     ++counters_.expected;
   }
-  bool accept_unusual(const Record& record, Instant arrival) noexcept;
-  bool accept_forward(const Record& record, Instant arrival, std::int32_t rdt_step, std::int32_t ft_step) noexcept;
+  bool accept_unusual(const LoadCellRecord& record) noexcept;
+  bool accept_forward(const LoadCellRecord& record, std::int32_t rdt_step, std::int32_t ft_step) noexcept;
   bool refuse(std::uint64_t Counters::*as) noexcept {
     ++(counters_.*as);
     return false;
   }
   bool plausible(std::int32_t ft_step, Instant arrival) const noexcept;
-  bool accept_reboot(const Record& record, Instant arrival) noexcept;
-  bool note_stray(const Record& record, Instant arrival, std::int32_t ft_step) noexcept;
-  bool confirms(const Record& first, const Record& second, Instant arrival) const noexcept;
-  void note_event(EventKind kind, const Record& record, Instant at, std::uint64_t records) noexcept;
+  bool accept_reboot(const LoadCellRecord& record) noexcept;
+  bool note_stray(const LoadCellRecord& record, std::int32_t ft_step) noexcept;
+  bool confirms(const LoadCellRecord& first, const LoadCellRecord& second) const noexcept;
+  void note_event(EventKind kind, const LoadCellRecord& record, std::uint64_t records) noexcept;
   /// The same for all records of one stream: they lie on one line of rdt over ft.
   std::uint32_t line(std::uint32_t rdt, std::uint32_t ft) const noexcept { return rdt * stride_ - ft; }
-  bool on_former_line(const Record& record) const noexcept;
+  bool on_former_line(const LoadCellRecord& record) const noexcept;
   void leave_line() noexcept { former_lines_.push_back(line(last_rdt_, last_ft_)); }
   void count_lost(std::uint64_t records, const Gap& gap) noexcept;
   bool in_recent_gap(std::uint32_t ft) const noexcept;
@@ -123,9 +114,9 @@ class LossTracker {
   std::uint32_t stall_rdt_ = 0;
   bool began_anew_stalled_ = false;  // the stream did, while the measurement stood still
   bool has_stray_ = false;           // the last record was one that only a rebooted box can have sent
-  StampedRecord candidate_reboot_;
+  LoadCellRecord candidate_reboot_;
   std::uint64_t Counters::*stray_counted_ = nullptr;  // as what it was discarded
-  std::optional<StampedRecord> confirmed_;
+  std::optional<LoadCellRecord> confirmed_;
   Counters counters_;
   std::vector<Event> events_;
 };
@@ -141,27 +132,27 @@ class ReorderWindow {
   [[nodiscard]] bool empty() const noexcept { return held_.empty(); }
   /// Appends to `out` the records that can be delivered now, ascending in ft_sequence, counted by `account`. False if
   /// the record was refused and counted (duplicate, late, stalled).
-  bool receive(const Record& record, Instant arrival, LossTracker& account, std::vector<StampedRecord>& out);
+  bool receive(const LoadCellRecord& record, LossTracker& account, std::vector<LoadCellRecord>& out);
   /// Gives up the gaps older than the patience.
-  void expire(Instant now, LossTracker& account, std::vector<StampedRecord>& out);
+  void expire(Instant now, LossTracker& account, std::vector<LoadCellRecord>& out);
   /// Gives up all gaps.
-  void flush(LossTracker& account, std::vector<StampedRecord>& out);
+  void flush(LossTracker& account, std::vector<LoadCellRecord>& out);
   void forget() noexcept { held_.clear(); }
   /// When expire() will deliver; kNever if no record is held.
   [[nodiscard]] Instant deadline() const noexcept { return held_.empty() ? kNever : oldest_arrival_ + patience_; }
 
  private:
-  [[nodiscard]] bool may_have_overtaken(const Record& record, const LossTracker& account) const noexcept;
+  [[nodiscard]] bool may_have_overtaken(const LoadCellRecord& record, const LossTracker& account) const noexcept;
   /// No record can be missing between (rdt, ft) and `record`.
-  [[nodiscard]] bool follows(std::uint32_t rdt, std::uint32_t ft, const Record& record) const noexcept;
-  bool hold(const StampedRecord& stamped, LossTracker& account);
-  void release(std::size_t count, LossTracker& account, std::vector<StampedRecord>& out);
+  [[nodiscard]] bool follows(std::uint32_t rdt, std::uint32_t ft, const LoadCellRecord& record) const noexcept;
+  bool hold(const LoadCellRecord& record, LossTracker& account);
+  void release(std::size_t count, LossTracker& account, std::vector<LoadCellRecord>& out);
   [[nodiscard]] std::size_t run_length(std::size_t from) const noexcept;
 
   std::size_t records_;
   Duration patience_;
   std::uint32_t stride_;
-  std::vector<StampedRecord> held_;  // ascending in ft_sequence, then rdt_sequence
+  std::vector<LoadCellRecord> held_;  // ascending in ft_sequence, then rdt_sequence
   Instant oldest_arrival_ = kNever;
 };
 

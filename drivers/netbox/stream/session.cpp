@@ -60,31 +60,31 @@ void Session::stop(Instant now) {
   due_ = bias_due_ = kNever;
 }
 
-void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out) {
+void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<LoadCellRecord>& out) {
   Counters& counters = account_.counters();
   ++counters.datagrams;
   const std::size_t count = decode(datagram, decoded_);
+  for (LoadCellRecord& record : std::span(decoded_).first(count)) record.arrival_ns = arrival.count();
   if (count == 0) {
     ++counters.malformed;
     return;
   }
   if (phase_ != Phase::streaming) {
-    const bool expected =
-        phase_ == Phase::silent || (phase_ == Phase::awaiting && belongs_to_new_stream(decoded_[0], arrival));
+    const bool expected = phase_ == Phase::silent || (phase_ == Phase::awaiting && belongs_to_new_stream(decoded_[0]));
     if (!expected) return discard(arrival);
   }
   datagram_records_ = count;
-  if (!take_records(count, arrival, out)) return;
-  if (phase_ != Phase::streaming) begin_streaming(arrival);
+  if (!take_records(count, out)) return;
+  if (phase_ != Phase::streaming) begin_streaming();
   newest_arrival_ = arrival;
   due_ = arrival + settings_.silence();
 }
 
-void Session::begin_streaming(Instant arrival) noexcept {
-  if (phase_ == Phase::silent) note_event(EventKind::resumed, arrival, decoded_[0]);
+void Session::begin_streaming() noexcept {
+  if (phase_ == Phase::silent) note_event(EventKind::resumed, decoded_[0]);
   if (resuming_ && phase_ == Phase::awaiting) {
     ++account_.counters().reconnects;
-    note_event(EventKind::reconnected, arrival, decoded_[0]);
+    note_event(EventKind::reconnected, decoded_[0]);
   }
   phase_ = Phase::streaming;
   resuming_ = false;
@@ -94,33 +94,34 @@ Command Session::start_command() const noexcept {
   return settings_.product == Product::axia ? Command::axia_multi_block : Command::buffered;
 }
 
-bool Session::take_records(std::size_t count, Instant arrival, std::vector<StampedRecord>& out) {
+bool Session::take_records(std::size_t count, std::vector<LoadCellRecord>& out) {
   bool any_new = false;
   std::uint32_t status = 0;
   for (std::size_t i = 0; i < count; ++i) {
     status |= decoded_[i].status;
-    any_new |= window_.receive(decoded_[i], arrival, account_, out);
+    any_new |= window_.receive(decoded_[i], account_, out);
   }
-  note_status(status, decoded_[0], arrival);
+  note_status(status, decoded_[0]);
   return any_new;
 }
 
-void Session::note_status(std::uint32_t status, const Record& shown_by, Instant arrival) noexcept {
+void Session::note_status(std::uint32_t status, const LoadCellRecord& shown_by) noexcept {
   const std::uint32_t trouble = settings_.product == Product::net_box ? status & kStreamTrouble : 0;
-  if ((trouble & ~trouble_) != 0) note_event(EventKind::box_trouble, arrival, shown_by, trouble);
+  if ((trouble & ~trouble_) != 0) note_event(EventKind::box_trouble, shown_by, trouble);
   trouble_ = trouble;
 }
 
 void Session::note_silence(Instant now) noexcept {
-  Record last;
+  LoadCellRecord last;
   last.rdt_sequence = account_.last_rdt();
   last.ft_sequence = account_.last_ft();
-  note_event(EventKind::silent, now, last);
+  last.arrival_ns = now.count();
+  note_event(EventKind::silent, last);
 }
 
-void Session::note_event(EventKind kind, Instant at, const Record& shown_by, std::uint32_t status) noexcept {
-  account_.events().push_back(
-      {kind, at, shown_by.rdt_sequence, shown_by.ft_sequence, account_.last_rdt(), account_.last_ft(), 0, status});
+void Session::note_event(EventKind kind, const LoadCellRecord& shown_by, std::uint32_t status) noexcept {
+  account_.events().push_back({kind, shown_by.arrival(), shown_by.rdt_sequence, shown_by.ft_sequence,
+                               account_.last_rdt(), account_.last_ft(), 0, status});
 }
 
 void Session::set_bias(Instant now) {
@@ -199,8 +200,8 @@ void Session::discard(Instant arrival) {
   if (phase_ == Phase::draining) due_ = std::min(arrival + settings_.settle, drain_limit_);
 }
 
-bool Session::belongs_to_new_stream(const Record& first, Instant arrival) const noexcept {
-  const double datagrams = to_seconds(arrival - first_start_) / to_seconds(settings_.datagram_period());
+bool Session::belongs_to_new_stream(const LoadCellRecord& first) const noexcept {
+  const double datagrams = to_seconds(first.arrival() - first_start_) / to_seconds(settings_.datagram_period());
   return first.rdt_sequence <=
          settings_.records_per_datagram * (kFirstDatagrams + kLargestRate * std::max(datagrams, 0.0));
 }

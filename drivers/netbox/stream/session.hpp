@@ -65,15 +65,15 @@ class Session {
   void set_bias(Instant now);
   /// Appends to `out` the records that can be delivered, ascending in ft_sequence. Records behind a gap are held back
   /// (StreamSettings::reorder_records and reorder_patience) and come with a later call.
-  void receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<StampedRecord>& out);
+  void receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<LoadCellRecord>& out);
   /// To be called at `deadline()`, after everything that came before has been received.
   void advance(Instant now);
   /// When release() will deliver; kNever if no record is held back. Not part of deadline().
   [[nodiscard]] Instant release_deadline() const noexcept { return window_.deadline(); }
   /// Appends the records held back for too long; receive() does so too.
-  void release(Instant now, std::vector<StampedRecord>& out) { window_.expire(now, account_, out); }
+  void release(Instant now, std::vector<LoadCellRecord>& out) { window_.expire(now, account_, out); }
   /// Appends all records held back: the account is complete then.
-  void flush(std::vector<StampedRecord>& out) { window_.flush(account_, out); }
+  void flush(std::vector<LoadCellRecord>& out) { window_.flush(account_, out); }
   /// Pops the next request to the box; false if there is none.
   [[nodiscard]] bool next_request(std::array<std::uint8_t, 8>& request) noexcept;
   /// kNever when nothing is due.
@@ -95,13 +95,13 @@ class Session {
 
   void discard(Instant arrival);
   void check_bias(Instant now) noexcept;
-  bool take_records(std::size_t count, Instant arrival, std::vector<StampedRecord>& out);
-  void note_status(std::uint32_t status, const Record& shown_by, Instant arrival) noexcept;
+  bool take_records(std::size_t count, std::vector<LoadCellRecord>& out);
+  void note_status(std::uint32_t status, const LoadCellRecord& shown_by) noexcept;
   void note_silence(Instant now) noexcept;
-  void note_event(EventKind kind, Instant at, const Record& shown_by, std::uint32_t status = 0) noexcept;
-  bool belongs_to_new_stream(const Record& first, Instant arrival) const noexcept;
+  void note_event(EventKind kind, const LoadCellRecord& shown_by, std::uint32_t status = 0) noexcept;
+  bool belongs_to_new_stream(const LoadCellRecord& first) const noexcept;
   [[nodiscard]] Command start_command() const noexcept;
-  void begin_streaming(Instant arrival) noexcept;
+  void begin_streaming() noexcept;
   void send(Command command) noexcept;
   void send_stop(Instant now) noexcept;
   void send_start(Instant now) noexcept;
@@ -119,7 +119,7 @@ class Session {
   int attempt_ = 0;
   std::size_t datagram_records_;  // of the last datagram
   std::uint64_t host_drops_ = 0;
-  std::array<Record, kMaxRecords> decoded_{};
+  std::array<LoadCellRecord, kMaxRecords> decoded_{};
   boost::container::static_vector<Command, 4> requests_;
 };
 

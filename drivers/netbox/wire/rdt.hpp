@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <span>
 
+#include "base/device_data.hpp"
+
 namespace kphi::netbox {
 
 /// Commands (Table 10.1). None is acknowledged; the newest wins, whoever sent it.
@@ -19,15 +21,6 @@ enum class Command : std::uint16_t {
 };
 
 inline constexpr std::size_t kRecordBytes = 36, kMaxRecords = 40;
-
-/// One sample. Force and torque in counts of the configured unit (Configuration has the scale).
-struct Record {
-  std::uint32_t rdt_sequence = 0;        ///< place in this stream, 1 at each start, wraps
-  std::uint32_t ft_sequence = 0;         ///< internal sample number since power-up, wraps
-  std::uint32_t status = 0;              ///< see status.hpp
-  std::array<std::int32_t, 6> counts{};  ///< Fx Fy Fz Tx Ty Tz
-  friend bool operator==(const Record&, const Record&) = default;
-};
 
 /// `sample_count` 0 = until stopped.
 [[nodiscard]] inline std::array<std::uint8_t, 8> encode_request(Command command,
@@ -45,8 +38,8 @@ struct Record {
   return datagram_bytes % kRecordBytes == 0 && count <= kMaxRecords ? count : 0;
 }
 
-/// One record from its kRecordBytes.
-inline void decode(const std::uint8_t* bytes, Record& out) noexcept {
+/// One record from its kRecordBytes, all but its arrival.
+inline void decode(const std::uint8_t* bytes, LoadCellRecord& out) noexcept {
   out.rdt_sequence = boost::endian::load_big_u32(bytes);
   out.ft_sequence = boost::endian::load_big_u32(bytes + 4);
   out.status = boost::endian::load_big_u32(bytes + 8);
@@ -55,7 +48,7 @@ inline void decode(const std::uint8_t* bytes, Record& out) noexcept {
 
 /// Number of records written to `out`: records_in().
 [[nodiscard]] inline std::size_t decode(std::span<const std::uint8_t> datagram,
-                                        std::span<Record, kMaxRecords> out) noexcept {
+                                        std::span<LoadCellRecord, kMaxRecords> out) noexcept {
   const std::size_t count = records_in(datagram.size());
   for (std::size_t i = 0; i < count; ++i) decode(datagram.data() + i * kRecordBytes, out[i]);
   return count;

@@ -8,10 +8,10 @@ namespace kphi::sim {
 void SupplyCircuit::switch_output(bool on) noexcept {
   output_ = on;
   over_current_s_ = 0;
-  if (on) tripped_ = SupplyTrip::none;
+  if (on) tripped_ = SupplyProtection::none;
 }
 
-void SupplyCircuit::trip(SupplyTrip why) noexcept {
+void SupplyCircuit::trip(SupplyProtection why) noexcept {
   tripped_ = why;
   output_ = false;
 }
@@ -46,8 +46,8 @@ double SupplyCircuit::step(const SupplyLoad& load, double seconds) noexcept {
 void SupplyCircuit::protect(double seconds) noexcept {
   if (!output_) return;
   over_current_s_ = amps_ > controls_.over_amps ? over_current_s_ + seconds : 0;
-  if (volts_ > controls_.over_volts) trip(SupplyTrip::over_voltage);
-  if (over_current_s_ > parameters_.over_current_delay_s) trip(SupplyTrip::over_current);
+  if (volts_ > controls_.over_volts) trip(SupplyProtection::over_voltage);
+  if (over_current_s_ > parameters_.over_current_delay_s) trip(SupplyProtection::over_current);
 }
 
 }  // namespace kphi::sim

@@ -4,7 +4,7 @@
 // Coupling to a motor, once per tick: terminal voltage = circuit.step({the motor's supply current}, tick).
 #pragma once
 
-#include <cstdint>
+#include "base/device_data.hpp"
 
 namespace kphi::sim {
 
@@ -27,8 +27,6 @@ struct SupplyControls {
   double over_volts = 62, over_amps = 6.2;  ///< thresholds
 };
 
-enum class SupplyTrip : std::uint8_t { none, over_voltage, over_current, over_power, over_temperature, short_circuit };
-
 class SupplyCircuit {
  public:
   explicit SupplyCircuit(const SupplyParameters& parameters = {}) noexcept : parameters_(parameters) {}
@@ -37,7 +35,7 @@ class SupplyCircuit {
   [[nodiscard]] const SupplyControls& controls() const noexcept { return controls_; }
   /// Switching on clears the trip.
   void switch_output(bool on) noexcept;
-  void trip(SupplyTrip why) noexcept;
+  void trip(SupplyProtection why) noexcept;
   /// From now on the source stays this far below its set voltage.
   void sag(double volts) noexcept { sag_volts_ = volts; }
 
@@ -46,7 +44,7 @@ class SupplyCircuit {
 
   [[nodiscard]] bool output() const noexcept { return output_; }
   [[nodiscard]] bool limiting() const noexcept { return limiting_; }  ///< constant current
-  [[nodiscard]] SupplyTrip tripped() const noexcept { return tripped_; }
+  [[nodiscard]] SupplyProtection tripped() const noexcept { return tripped_; }
   [[nodiscard]] double volts() const noexcept { return volts_; }  ///< at the terminals, now
   [[nodiscard]] double amps() const noexcept { return amps_; }    ///< out of the supply, now; never negative
   [[nodiscard]] double shown_volts() const noexcept { return shown_volts_; }  ///< by its meter
@@ -58,7 +56,7 @@ class SupplyCircuit {
   SupplyParameters parameters_;
   SupplyControls controls_;
   bool output_ = false, limiting_ = false;
-  SupplyTrip tripped_ = SupplyTrip::none;
+  SupplyProtection tripped_ = SupplyProtection::none;
   double volts_ = 0, amps_ = 0, shown_volts_ = 0, shown_amps_ = 0;
   double sag_volts_ = 0;
   double over_current_s_ = 0;

@@ -113,7 +113,7 @@ double SupplySlave::advance(const SupplyLoad& load, Instant now) {
     const bool momentary = fault.kind == FaultKind::supply_trip || fault.kind == FaultKind::supply_panel;
     if (!momentary || now < fault.at || !script_.unused(i)) continue;
     script_.use(i);
-    if (fault.kind == FaultKind::supply_trip) circuit_.trip(static_cast<SupplyTrip>(fault.code));
+    if (fault.kind == FaultKind::supply_trip) circuit_.trip(static_cast<SupplyProtection>(fault.code));
     if (fault.kind == FaultKind::supply_panel) registers_.write(fault.address, fault.value);
   }
   circuit_.sag(sag);

@@ -242,7 +242,7 @@ TEST_F(OrderedCampaign, ChangesTheSpeedNoFasterThanItsSlewAndAveragesNoRamp) {
   EXPECT_NEAR(ramps_s, 9000 / 4000.0 + 6 * 2000 / 4000.0, 0.1);
   double last_s = 0, last = 0;
   for (const auto& reading : recording.motor) {
-    if (reading.channel != results::MotorChannel::speed) continue;
+    if (reading.channel != MotorChannel::speed) continue;
     if (reading.time_ns > recording.phases.back().time_ns) break;
     const double now_s = 1e-9 * static_cast<double>(reading.time_ns);
     const double rpm = to_rpm(RadPerSec(std::abs(reading.value)));
@@ -325,8 +325,7 @@ TEST_F(OrderedCampaign, WaitsBetweenRunsUntilTheCoilHasCooledDown) {
   const auto coil_degc = [](const results::RunRecording& run) {
     std::vector<double> all;
     for (const auto& reading : run.motor)
-      if (reading.channel == results::MotorChannel::coil_temperature &&
-          reading.time_ns >= run.load_cell.front().arrival_ns)
+      if (reading.channel == MotorChannel::coil_temperature && reading.time_ns >= run.load_cell.front().arrival_ns)
         all.push_back(reading.value);
     return all;
   };

@@ -12,8 +12,6 @@
 namespace kphi::daq {
 namespace {
 
-using results::EventKind;
-using results::MotorChannel;
 using std::chrono::milliseconds;
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -22,7 +20,7 @@ using testing::StartsWith;
 class GuardAlone : public testing::Test {
  protected:
   void sample(double fz_n, Instant at) {
-    results::LoadCellRecord record;
+    LoadCellRecord record;
     record.counts[2] = static_cast<std::int32_t>(1e6 * fz_n);
     record.status = status_;
     record.arrival_ns = at.count();
@@ -95,11 +93,11 @@ TEST_F(GuardAlone, PassesEverythingOnInOrderAlsoAfterATrip) {
   reading(MotorChannel::speed, 100);
   bench_.events.push_back({EventKind::restarted, 5, 0, "the stream began anew"});
   guard_.poll();
-  std::vector<results::LoadCellRecord> records(5000);
+  std::vector<LoadCellRecord> records(5000);
   ASSERT_EQ(guard_.take(std::span(records)), 3000u);
   EXPECT_TRUE(std::is_sorted(records.begin(), records.begin() + 3000,
                              [](const auto& a, const auto& b) { return a.arrival_ns < b.arrival_ns; }));
-  std::vector<results::MotorReading> readings(10);
+  std::vector<MotorReading> readings(10);
   EXPECT_EQ(guard_.take(std::span(readings)), 2u);
   EXPECT_EQ(guard_.take_events().at(0).text, "the stream began anew");
   EXPECT_EQ(bench_.queue_motor.coasted, 1) << "once";
@@ -109,7 +107,7 @@ TEST_F(GuardAlone, LeavesWithTheDevicesWhatARecorderThatIsStuckCannotTake) {
   for (int i = 0; i < 80'000; ++i) sample(6, bench_.time.now());
   guard_.poll();
   EXPECT_EQ(bench_.records.size(), 10'000u) << "10 s of 7 kHz are on their way";
-  std::vector<results::LoadCellRecord> records(100'000);
+  std::vector<LoadCellRecord> records(100'000);
   EXPECT_EQ(guard_.take(std::span(records)), 70'000u);
   guard_.poll();
   EXPECT_EQ(guard_.take(std::span(records)), 10'000u);
@@ -147,7 +145,7 @@ TEST_F(GuardAlone, JudgesNoSupplyReadingFromBeforeTheRun) {
   QueueSupply supply;
   bench_.supply_link = &supply;
   config_ = test::with_supply(config_);
-  const results::SupplyReading off{1, 0, 0, 0, 12, 50, {}, results::SupplyProtection::over_current, 0};
+  const SupplyReading off{1, 0, 0, 0, 12, 50, {}, SupplyProtection::over_current, 0};
   supply.readings.assign(100, off);
   Guard guard(bench_, config_, mini40(), combine_limits(campaign_, config_));
   guard.poll();
@@ -155,7 +153,7 @@ TEST_F(GuardAlone, JudgesNoSupplyReadingFromBeforeTheRun) {
   supply.readings.push_back(off);
   guard.poll();
   ASSERT_NE(guard.latch().trip(), nullptr);
-  EXPECT_EQ(guard.latch().trip()->protection, results::SupplyProtection::over_current);
+  EXPECT_EQ(guard.latch().trip()->protection, SupplyProtection::over_current);
   EXPECT_EQ(supply.cuts, 1);
 }
 

@@ -23,8 +23,6 @@
 namespace kphi::daq {
 namespace {
 
-using results::EventKind;
-using results::MotorChannel;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 using testing::HasSubstr;
@@ -45,8 +43,7 @@ Found first_reading(const results::RunRecording& run, MotorChannel channel, cons
   return std::nullopt;
 }
 
-Found first_reading(const results::RunRecording& run,
-                    const std::function<bool(const results::SupplyReading&)>& beyond) {
+Found first_reading(const results::RunRecording& run, const std::function<bool(const SupplyReading&)>& beyond) {
   const auto found = std::find_if(run.supply.begin(), run.supply.end(), beyond);
   return found == run.supply.end() ? std::nullopt : Found(Instant(found->time_ns));
 }
@@ -151,7 +148,7 @@ TEST_P(GuardTiming, CoastsTheMotorSoonAfterTheDataExceedTheLimit) {
 
   ASSERT_FALSE(run.events.empty());
   const auto stop = std::find_if(run.events.begin(), run.events.end(),
-                                 [&](const results::StreamEvent& event) { return event.kind == tested.event; });
+                                 [&](const StreamEvent& event) { return event.kind == tested.event; });
   ASSERT_NE(stop, run.events.end());
   EXPECT_THAT(stop->text, HasSubstr("step 3: "));
   EXPECT_THAT(run.outcome_reason, testing::ContainsRegex("^" + std::string(tested.words)));
@@ -229,11 +226,11 @@ const Case kCases[] = {
      "supply current 36 A is above 35 A .campaign limits.supply_current_max_a"},
     {"OutputCurrent", Watched::output_current, "", nullptr,
      [](const auto& run, Instant) {
-       return first_reading(run, [](const results::SupplyReading& shown) { return shown.current_a > 35; });
+       return first_reading(run, [](const SupplyReading& shown) { return shown.current_a > 35; });
      },
      "output current of the supply 36 A is above 35 A .campaign limits.supply_current_max_a", EventKind::guard_trip,
      [](CoastingBench& bench, Instant) {
-       bench.spoilt_supply->spoil = [](results::SupplyReading& shown) { shown.current_a = 36; };
+       bench.spoilt_supply->spoil = [](SupplyReading& shown) { shown.current_a = 36; };
      },
      true},
     {"MotorCurrent", Watched::motor_current,
@@ -294,11 +291,11 @@ const Case kCases[] = {
      [](CoastingBench& bench, Instant) { bench.spoilt_supply->lost = "supply: the serial port is gone"; }, true},
     {"SupplyTripped", Watched::state, "", nullptr,
      [](const auto& run, Instant) {
-       return first_reading(run, [](const auto& shown) { return shown.protection != results::SupplyProtection::none; });
+       return first_reading(run, [](const auto& shown) { return shown.protection != SupplyProtection::none; });
      },
      "supply: over-current protection switched the output off", EventKind::supply_stop,
      [](CoastingBench& bench, Instant) {
-       bench.spoilt_supply->spoil = [](auto& shown) { shown.protection = results::SupplyProtection::over_current; };
+       bench.spoilt_supply->spoil = [](auto& shown) { shown.protection = SupplyProtection::over_current; };
      },
      true},
     {"SupplyKnob", Watched::state, "", nullptr,

@@ -10,10 +10,6 @@
 namespace kphi::daq {
 namespace {
 
-using results::SupplyProtection;
-using results::SupplyReading;
-using results::SupplyRegulation;
-
 const GuardLimit kThrust{Watched::thrust, "thrust", 20, "N", "campaign limits.thrust_max_n"};
 
 TEST(Trip, SaysValueLimitAndSource) {

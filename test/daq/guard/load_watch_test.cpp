@@ -1,17 +1,16 @@
-#include "daq/guard/observation.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
+#include "daq/guard/observation.hpp"
 #include "test/daq/queue_bench.hpp"
 
 namespace kphi::daq {
 namespace {
 
-results::LoadCellRecord sample(double fz_n, double tz_nm = 0) {
-  results::LoadCellRecord record;
+LoadCellRecord sample(double fz_n, double tz_nm = 0) {
+  LoadCellRecord record;
   record.counts[2] = static_cast<std::int32_t>(std::lround(1e6 * fz_n));
   record.counts[5] = static_cast<std::int32_t>(std::lround(1e6 * tz_nm));
   return record;

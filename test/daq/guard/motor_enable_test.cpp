@@ -22,8 +22,8 @@ class ToldMotor : public MotorLink {
   [[nodiscard]] std::optional<iq::StopReport> stop_report() override { return report; }
   [[nodiscard]] const iq::AuditRecord& parameters() const override { return record; }
   [[nodiscard]] std::optional<Celsius> coil_temperature() override { return std::nullopt; }
-  [[nodiscard]] std::vector<results::StreamEvent> take_events() override { return {}; }
-  std::size_t take(std::span<results::MotorReading>) override { return 0; }
+  [[nodiscard]] std::vector<StreamEvent> take_events() override { return {}; }
+  std::size_t take(std::span<MotorReading>) override { return 0; }
   [[nodiscard]] std::string failure() const override { return {}; }
   [[nodiscard]] results::MotorCounts counts() const override { return {}; }
   [[nodiscard]] std::string identity() const override { return {}; }

@@ -12,7 +12,6 @@
 namespace kphi::daq {
 namespace {
 
-using results::MotorChannel;
 using std::chrono::milliseconds;
 
 TEST(GuardedQuantities, HaveAKeyOfTheirOwn) {
@@ -30,16 +29,14 @@ class Observed : public testing::Test {
  protected:
   void samples(double fz_n, int n, double tz_nm = 0) {
     for (int i = 0; i < n; ++i) {
-      results::LoadCellRecord record;
+      LoadCellRecord record;
       record.counts[2] = static_cast<std::int32_t>(1e6 * fz_n);
       record.counts[5] = static_cast<std::int32_t>(1e6 * tz_nm);
       record.arrival_ns = now_.count();
       observer_.take(record);
     }
   }
-  void reading(MotorChannel channel, double value) {
-    observer_.take(results::MotorReading{channel, now_.count(), 0, value});
-  }
+  void reading(MotorChannel channel, double value) { observer_.take(MotorReading{channel, now_.count(), 0, value}); }
   [[nodiscard]] Observation seen(Instant at) {
     return observe(observer_.readings(), at, {milliseconds(60), milliseconds(160)}, clock_);
   }
@@ -135,7 +132,7 @@ TEST_F(Observed, ShowsTheErrorOfSpeedBesideItsBandWhileASpeedIsCommanded) {
 
 TEST_F(Observed, ShowsTheHigherVoltageOfModuleAndSupply) {
   reading(MotorChannel::supply_voltage, 11.8);
-  results::SupplyReading supply;
+  SupplyReading supply;
   supply.time_ns = now_.count();
   supply.voltage_v = 12.1;
   supply.current_a = 3;

@@ -9,7 +9,6 @@
 namespace kphi::daq {
 namespace {
 
-using results::MotorChannel;
 using testing::HasSubstr;
 
 /// A bench whose rotor shows what a test lets it show, read every 10 ms of its time.
@@ -146,7 +145,7 @@ TEST_F(AtAPrompt, AModuleWhosePowerAPersonHasCutIsNoTrip) {
 
 TEST_F(AtAPrompt, AnOutputThatComesOnUnaskedTripsButNoReadingFromBefore) {
   guard_.emplace(bench_, false);
-  results::SupplyReading on;
+  SupplyReading on;
   on.time_ns = bench_.time.now().count() - 1;
   on.output = 1;
   supply_.readings.push_back(on);

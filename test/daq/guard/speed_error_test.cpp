@@ -14,7 +14,6 @@
 namespace kphi::daq {
 namespace {
 
-using results::MotorChannel;
 using std::chrono::milliseconds;
 using testing::HasSubstr;
 using Kind = SpeedError::Kind;
@@ -249,7 +248,7 @@ TEST_P(CleanMotor, IsNeverFoundGuilty) {
   SpeedWatch watch(GetParam().spin, kHost);
   std::mt19937 random(GetParam().seed);
   std::uniform_real_distribution<double> rpm(100, GetParam().top_rpm), dwell(0.1, 3);
-  std::array<results::MotorReading, 512> readings;
+  std::array<MotorReading, 512> readings;
   std::size_t judged = 0;
   for (const Instant end = bench.clock().now() + std::chrono::seconds(kBenchSeconds); bench.clock().now() < end;) {
     const RadPerSec speed = from_rpm(rpm(random));

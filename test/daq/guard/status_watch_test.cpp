@@ -7,7 +7,6 @@ namespace kphi::daq {
 namespace {
 
 using netbox::Product;
-using results::EventKind;
 using testing::HasSubstr;
 using State = StatusWatch::State;
 
@@ -19,7 +18,7 @@ class StatusWatching : public testing::Test {
   State take(std::uint32_t status, int n = 1, StatusWatch* watch = nullptr) {
     State state = State::trusted;
     for (int i = 0; i < n; ++i) {
-      results::LoadCellRecord sample;
+      LoadCellRecord sample;
       sample.status = status;
       sample.arrival_ns = now_ns_ += 142'857;
       state = (watch != nullptr ? *watch : watch_).take(sample);
@@ -27,9 +26,9 @@ class StatusWatching : public testing::Test {
     }
     return state;
   }
-  results::Nanoseconds now_ns_ = 0;
+  Nanoseconds now_ns_ = 0;
   StatusWatch watch_{Product::net_box, 40, 7000}, axia_{Product::axia, 40, 7000};
-  std::vector<results::StreamEvent> events_;
+  std::vector<StreamEvent> events_;
 };
 
 TEST_F(StatusWatching, HasThePatienceOfOneDatagram) {

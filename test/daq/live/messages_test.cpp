@@ -108,7 +108,7 @@ TEST(PlotMessages, LeaveOutWhatIsUnknown) {
 
 TEST(PlotMessages, FitIntoOneDatagramOfPlotJuggler) {
   Tick tick = full_tick();
-  results::SampleAccount& account = tick.seen.account;
+  SampleAccount& account = tick.seen.account;
   tick.time_s = tick.seen.thrust_n = tick.seen.torque_nm = -1.23456789e-301;
   tick.seen.speed_rad_s = -1.23456789e-301;
   tick.position.commanded = RadPerSec(-1.23456789e-301);

@@ -53,18 +53,18 @@ TEST_F(Recording, WarnsOnceNearARangeAndOnceBeyondIt) {
   drain();
   const auto events = recorder_.take_events();
   ASSERT_EQ(events.size(), 2u);
-  EXPECT_EQ(events[0].kind, results::EventKind::near_range);
+  EXPECT_EQ(events[0].kind, EventKind::near_range);
   EXPECT_EQ(events[0].text, "1.500 s: Fz carries 82 % of its range of 60 N");
-  EXPECT_EQ(events[1].kind, results::EventKind::beyond_range);
+  EXPECT_EQ(events[1].kind, EventKind::beyond_range);
   EXPECT_TRUE(recorder_.take_events().empty()) << "told once";
 }
 
 TEST_F(Recording, WritesWhatHappenedToTheStreamAndTellsTheRunner) {
-  bench_.events.push_back({results::EventKind::restarted, 5, 0, "the stream began anew"});
+  bench_.events.push_back({EventKind::restarted, 5, 0, "the stream began anew"});
   drain();
   EXPECT_EQ(recorder_.take_events().at(0).text, "the stream began anew");
   writer_.sync();
-  EXPECT_EQ(results::read_run(writer_.path()).events.at(0).kind, results::EventKind::restarted);
+  EXPECT_EQ(results::read_run(writer_.path()).events.at(0).kind, EventKind::restarted);
 }
 
 TEST_F(Recording, MeasuresAPhaseThatBelongsToABias) {

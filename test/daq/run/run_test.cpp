@@ -113,7 +113,7 @@ TEST_F(OneRun, RampsDownOnASupplyThatSinksCurrent) {
                                       [](const auto& mark) { return mark.phase == Phase::spin_down; });
   for (const auto& reading : run.motor) {
     const double since = 1e-9 * static_cast<double>(reading.time_ns - spin_down->time_ns);
-    if (reading.channel != results::MotorChannel::speed || since < 0.1 || since > 1.3) continue;
+    if (reading.channel != MotorChannel::speed || since < 0.1 || since > 1.3) continue;
     EXPECT_NEAR(reading.value, to_rad_per_sec(18000) - 1000 * since, 60) << since;
   }
 }
@@ -131,9 +131,9 @@ TEST_F(OneRun, DelaysARampThatItServesLateInsteadOfJumping) {
   const auto last_ramp =
       std::find_if(run.phases.rbegin(), run.phases.rend(), [](const auto& mark) { return mark.phase == Phase::ramp; });
   ASSERT_NE(last_ramp, run.phases.rend());
-  const results::MotorReading* before = nullptr;
+  const MotorReading* before = nullptr;
   for (const auto& reading : run.motor) {
-    if (reading.channel != results::MotorChannel::speed || reading.time_ns > last_ramp->time_ns) continue;
+    if (reading.channel != MotorChannel::speed || reading.time_ns > last_ramp->time_ns) continue;
     if (before && before->value > 600) {
       const double lasts = 1e-9 * static_cast<double>(reading.time_ns - before->time_ns);
       ASSERT_LT(reading.value - before->value, kRate * (lasts + 0.02) + 3) << 1e-9 * reading.time_ns;
@@ -259,8 +259,8 @@ class FailingLink : public testing::Test {
 
 TEST_F(FailingLink, IsAConsequenceOfWhatTheGuardHadSeenBefore) {
   const StopWords words = record_until_it_fails([&] {
-    bench_.spoilt_motor.spoil = [](results::MotorReading& reading) {
-      if (reading.channel == results::MotorChannel::speed) reading.value = to_rad_per_sec(25000);
+    bench_.spoilt_motor.spoil = [](MotorReading& reading) {
+      if (reading.channel == MotorChannel::speed) reading.value = to_rad_per_sec(25000);
     };
   });
   EXPECT_THAT(words.cause, HasSubstr("speed 25000 RPM is above"));

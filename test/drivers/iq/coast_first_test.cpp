@@ -104,7 +104,7 @@ TEST(CoastFirst, OfASessionWhosePollsSettingsAndSpeedsWait) {
     Random random(seed);
     Settings settings;
     settings.telemetry_hz = 200;
-    settings.every_cycle = {Quantity::speed, Quantity::motor_current, Quantity::supply_voltage};
+    settings.every_cycle = {MotorChannel::speed, MotorChannel::motor_current, MotorChannel::supply_voltage};
     settings.credit_bytes = 18 + below(random, 250);
     Wire wire(settings);
     wire.connect();

@@ -58,7 +58,7 @@ struct Bench {
     return soon([&] { return motor->counters().reconnections == times; });
   }
   bool noted(EventKind kind) {
-    for (const Event& event : motor->take_events()) seen |= 1u << static_cast<int>(event.kind);
+    for (const StreamEvent& event : motor->take_events()) seen |= 1u << static_cast<int>(event.kind);
     return (seen & 1u << static_cast<int>(kind)) != 0;
   }
   unsigned seen = 0;
@@ -69,7 +69,7 @@ TEST(Unplugging, IsNoticedWithinATenthOfASecond) {
   bench.spin(1000);
   bench.pull();
   EXPECT_TRUE(soon([&] { return !bench.motor->alive(); }, 100ms));
-  EXPECT_TRUE(soon([&] { return bench.noted(EventKind::port_lost); }));
+  EXPECT_TRUE(soon([&] { return bench.noted(EventKind::motor_port_lost); }));
   EXPECT_THROW(bench.motor->spin_at(RadPerSec(100)), DeviceError);
 }
 
@@ -93,7 +93,7 @@ TEST(Replugging, RefusesAnotherModuleUntilTheRightOneIsBack) {
   bench.pull();
   ASSERT_TRUE(soon([&] { return !bench.motor->alive(); }));
   bench.plug_in([](Module& m) { m.values[{5, 4}] = fake::u32(0xDEADBEEF); });
-  ASSERT_TRUE(soon([&] { return bench.noted(EventKind::another_module); }));
+  ASSERT_TRUE(soon([&] { return bench.noted(EventKind::motor_another_module); }));
   EXPECT_THROW(bench.motor->spin_at(RadPerSec(100)), DeviceError);
   EXPECT_EQ(bench.motions(), 0u);
   EXPECT_NE(bench.motor->failure().find("another module"), std::string::npos) << bench.motor->failure();
@@ -145,7 +145,7 @@ TEST(Restarting, OfTheModuleIsNoticedAndItIsSetUpAgain) {
     bench.motor->renew();
     return !bench.motor->alive();
   }));
-  EXPECT_TRUE(soon([&] { return bench.noted(EventKind::module_reset); }));
+  EXPECT_TRUE(soon([&] { return bench.noted(EventKind::motor_reset); }));
   ASSERT_TRUE(bench.reconnected());
   EXPECT_EQ(bench.line->with([](Module& m) { return fake::to_f32(m.values.at({52, 15})); }), 0.5f);
   EXPECT_TRUE(bench.line->left_coasting());
@@ -159,7 +159,7 @@ TEST(Silence, OfTheModuleEndsWhenItIsPoweredAgain) {
     bench.motor->renew();
     return !bench.motor->alive();
   }));
-  EXPECT_TRUE(soon([&] { return bench.noted(EventKind::module_silent); }));
+  EXPECT_TRUE(soon([&] { return bench.noted(EventKind::motor_silent); }));
   bench.line->with([](Module& m) { m.mute = false; });
   ASSERT_TRUE(bench.reconnected());
   EXPECT_TRUE(bench.line->left_coasting());

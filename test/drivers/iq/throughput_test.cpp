@@ -20,22 +20,23 @@ double rate() {
   Settings settings;
   settings.telemetry_hz = 255;
   settings.slow_hz = 1;
-  settings.every_cycle = {Quantity::speed, Quantity::motor_current, Quantity::supply_voltage, Quantity::supply_current};
+  settings.every_cycle = {MotorChannel::speed, MotorChannel::motor_current, MotorChannel::supply_voltage,
+                          MotorChannel::supply_current};
   Motor motor(module.device(), 115200, settings, clock);
-  std::map<Quantity, int> count;
-  std::array<Reading, 512> readings;
+  std::map<MotorChannel, int> count;
+  std::array<MotorReading, 512> readings;
   Instant first{kNever}, last{0};
   while (last - std::min(first, last) < 1s) {
     const std::size_t n = motor.take(readings);
     for (std::size_t i = 0; i < n; ++i) {
-      ++count[readings[i].quantity];
-      first = std::min(first, readings[i].time);
-      last = std::max(last, readings[i].time);
+      ++count[readings[i].channel];
+      first = std::min(first, Instant(readings[i].time_ns));
+      last = std::max(last, Instant(readings[i].time_ns));
     }
     std::this_thread::sleep_for(5ms);
   }
   int cycles = 1 << 30;
-  for (const Quantity quantity : settings.every_cycle) cycles = std::min(cycles, count[quantity]);
+  for (const MotorChannel quantity : settings.every_cycle) cycles = std::min(cycles, count[quantity]);
   EXPECT_EQ(motor.counters().crc_errors, 0u);
   return cycles / to_seconds(last - first);
 }

@@ -66,15 +66,15 @@ class Wire {
   }
   void deliver(const Bytes& bytes, Duration delay = {}) { arrivals_.emplace(now + delay, bytes); }
   [[nodiscard]] std::size_t replies_on_their_way() const { return arrivals_.size(); }
-  std::vector<Reading> readings() {
-    std::vector<Reading> all(10000);
+  std::vector<MotorReading> readings() {
+    std::vector<MotorReading> all(10000);
     all.resize(session.take(all));
     return all;
   }
-  std::vector<double> values(Quantity quantity) {
+  std::vector<double> values(MotorChannel quantity) {
     std::vector<double> found;
-    for (const Reading& reading : readings()) {
-      if (reading.quantity == quantity) found.push_back(reading.value);
+    for (const MotorReading& reading : readings()) {
+      if (reading.channel == quantity) found.push_back(reading.value);
     }
     return found;
   }

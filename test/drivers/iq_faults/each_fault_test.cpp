@@ -66,7 +66,7 @@ TEST_P(EachFault, NoneAtAll) {
   EXPECT_EQ(j.counters().crc_errors, 0u);
   EXPECT_EQ(j.counters().resyncs, 0u);
   EXPECT_TRUE(std::any_of(j.readings().begin(), j.readings().end(),
-                          [](const Reading& r) { return r.quantity == Quantity::speed && r.value > 850; }));
+                          [](const MotorReading& r) { return r.channel == MotorChannel::speed && r.value > 850; }));
   EXPECT_TRUE(j.session().coasting());
 }
 
@@ -147,8 +147,8 @@ TEST_P(EachFault, ImpossibleNumbers) {
   for (const char* value : {"nan", "inf", "-inf"}) {
     Joined& j = run_one({{"kind", "motor_value"}, {"value", value}, {"type", "50"}, {"sub", "13"}});
     EXPECT_EQ(j.counters().bad_values, done(sim::FaultKind::motor_value));
-    EXPECT_TRUE(
-        std::all_of(j.readings().begin(), j.readings().end(), [](const Reading& r) { return std::isfinite(r.value); }));
+    EXPECT_TRUE(std::all_of(j.readings().begin(), j.readings().end(),
+                            [](const MotorReading& r) { return std::isfinite(r.value); }));
   }
   run_one({{"kind", "motor_value"}, {"value", "denormal"}, {"type", "50"}, {"sub", "13"}});
 }
@@ -201,7 +201,7 @@ TEST_P(EachFault, CommandsFlippedWhileItConnects) {
 
 TEST_P(EachFault, UnpluggedAndPluggedInAgain) {
   run(script({{{"kind", "motor_unplug"}, {"at_s", "3"}, {"for_s", "1"}}}), 6s);
-  EXPECT_TRUE(joined->saw(EventKind::port_lost));
+  EXPECT_TRUE(joined->saw(EventKind::motor_port_lost));
   if (joined->module().singing()) return;  // as above
   EXPECT_EQ(joined->session().state(), Session::State::ready) << joined->session().failure();
   EXPECT_FALSE(joined->session().armed()) << "until the owner rearms it";
@@ -209,7 +209,7 @@ TEST_P(EachFault, UnpluggedAndPluggedInAgain) {
 
 TEST_P(EachFault, AnotherModulePluggedInIsToldNothingButCoast) {
   run(script({{{"kind", "motor_unplug"}, {"at_s", "3"}, {"for_s", "1"}, {"other", "true"}}}), 6s);
-  EXPECT_TRUE(joined->saw(EventKind::another_module));
+  EXPECT_TRUE(joined->saw(EventKind::motor_another_module));
   EXPECT_NE(joined->session().state(), Session::State::ready);
   EXPECT_GT(joined->silence_after(3100ms), 1h) << "nothing of it is delivered";
   EXPECT_LT(joined->module().last_motion().target, 1) << "it never spun";
@@ -220,7 +220,7 @@ TEST_P(EachFault, ABrownOutIsSeenAndDisarms) {
     SCOPED_TRACE(down);
     run(script({{{"kind", "motor_brown_out"}, {"at_s", "3"}, {"down_s", down}}}), 7s);
     EXPECT_GT(joined->failures(), 0);
-    EXPECT_TRUE(joined->saw(EventKind::module_reset) || joined->saw(EventKind::module_silent));
+    EXPECT_TRUE(joined->saw(EventKind::motor_reset) || joined->saw(EventKind::motor_silent));
     EXPECT_EQ(joined->session().state(), Session::State::ready) << joined->session().failure();
     EXPECT_FALSE(joined->session().armed());
   }
@@ -296,7 +296,7 @@ TEST_P(EachFault, PhysicsMayGoWrongWithoutTheAccount) {
 TEST_P(EachFault, DeratesAreDelivered) {
   run(script({{{"kind", "motor_redline"}, {"speed_rad_s", "300"}, {"at_s", "3"}, {"for_s", "1"}}}), 3s);
   EXPECT_TRUE(std::any_of(joined->readings().begin(), joined->readings().end(),
-                          [](const Reading& r) { return r.quantity == Quantity::derate && r.value < 1; }));
+                          [](const MotorReading& r) { return r.channel == MotorChannel::derate && r.value < 1; }));
 }
 
 Manner plain() { return {}; }

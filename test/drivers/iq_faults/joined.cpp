@@ -45,25 +45,25 @@ struct Key {
   friend auto operator<=>(const Key&, const Key&) = default;
 };
 
-Key key_of(Quantity quantity, bool legacy) {
+Key key_of(MotorChannel quantity, bool legacy) {
   switch (quantity) {
-    case Quantity::speed:
+    case MotorChannel::speed:
       return {50, 13};
-    case Quantity::supply_voltage:
+    case MotorChannel::supply_voltage:
       return {69, 0};
-    case Quantity::supply_current:
+    case MotorChannel::supply_current:
       return {69, 1};
-    case Quantity::motor_current:
+    case MotorChannel::motor_current:
       return {50, 36};
-    case Quantity::coil_temperature:
+    case MotorChannel::coil_temperature:
       return legacy ? Key{77, 0} : Key{83, 0};
-    case Quantity::derate:
+    case MotorChannel::derate:
       return {50, 41};
-    case Quantity::drive_mode:
+    case MotorChannel::drive_mode:
       return {50, 0};
-    case Quantity::drive_pwm:
+    case MotorChannel::drive_pwm:
       return {50, 8};
-    case Quantity::fault_now:
+    case MotorChannel::fault_now:
       return {84, 0};
   }
   return {0, 0};
@@ -75,10 +75,10 @@ std::uint32_t bits_of(std::span<const std::uint8_t> data) {
   return bits;
 }
 
-std::uint32_t bits_of(const Reading& reading) {
-  if (reading.quantity == Quantity::drive_mode || reading.quantity == Quantity::fault_now)
+std::uint32_t bits_of(const MotorReading& reading) {
+  if (reading.channel == MotorChannel::drive_mode || reading.channel == MotorChannel::fault_now)
     return static_cast<std::uint32_t>(reading.value);
-  if (reading.quantity == Quantity::derate) return static_cast<std::uint32_t>(std::lround(reading.value * 65536));
+  if (reading.channel == MotorChannel::derate) return static_cast<std::uint32_t>(std::lround(reading.value * 65536));
   return std::bit_cast<std::uint32_t>(static_cast<float>(reading.value));
 }
 
@@ -137,7 +137,7 @@ void Joined::pump(Instant now) {
   if (session_.deadline() <= now) session_.advance(now);
   connect_again(now);
   command(now);
-  for (Event& event : session_.take_events()) events_.push_back(std::move(event));
+  for (StreamEvent& event : session_.take_events()) events_.push_back(std::move(event));
   auto output = was_plugged_ ? session_.output() : std::span<const std::uint8_t>{};
   if (manner_.port_takes > 0) output = output.first(std::min(output.size(), manner_.port_takes));
   if (!output.empty()) {
@@ -145,7 +145,7 @@ void Joined::pump(Instant now) {
     line_.send(output, now);
     session_.sent(output.size());
   }
-  std::array<Reading, 64> taken;
+  std::array<MotorReading, 64> taken;
   for (std::size_t n = session_.take(taken); n > 0; n = session_.take(taken)) {
     readings_.insert(readings_.end(), taken.begin(), taken.begin() + static_cast<std::ptrdiff_t>(n));
     received_.insert(received_.end(), n, now);
@@ -156,7 +156,7 @@ void Joined::pump(Instant now) {
 void Joined::follow_the_plug(Instant now) {
   if (line_.plugged() == was_plugged_) return;
   was_plugged_ = line_.plugged();
-  if (!was_plugged_) return session_.fail(EventKind::port_lost, "the port is gone", now);
+  if (!was_plugged_) return session_.fail(EventKind::motor_port_lost, "the port is gone", now);
   ++connects_;
   session_.connect_anew(now);
 }
@@ -197,13 +197,13 @@ void Joined::watch(std::span<const std::uint8_t> bytes, Instant now) {
 
 Duration Joined::silence_after(Instant after) const {
   for (std::size_t i = 0; i < readings_.size(); ++i) {
-    if (readings_[i].quantity == Quantity::speed && received_[i] > after) return received_[i] - after;
+    if (readings_[i].channel == MotorChannel::speed && received_[i] > after) return received_[i] - after;
   }
   return 10h;
 }
 
 bool Joined::saw(EventKind kind) const {
-  return std::any_of(events_.begin(), events_.end(), [&](const Event& event) { return event.kind == kind; });
+  return std::any_of(events_.begin(), events_.end(), [&](const StreamEvent& event) { return event.kind == kind; });
 }
 
 std::string Joined::danger() const {
@@ -253,14 +253,14 @@ std::string Joined::wrong_readings() const {
   std::string out;
   int wrong = 0;
   for (std::size_t i = 0; i < readings_.size(); ++i) {
-    const Reading& reading = readings_[i];
-    const Key key = key_of(reading.quantity, manner_.quirks.legacy);
+    const MotorReading& reading = readings_[i];
+    const Key key = key_of(reading.channel, manner_.quirks.legacy);
     const auto& candidates = sent[key];
     const std::size_t none = candidates.size();
     std::size_t best = none;
     Duration least = Duration::max();
     for (std::size_t j = next[key]; j < candidates.size() && candidates[j]->asked <= received_[i]; ++j) {
-      const Duration away(std::abs((candidates[j]->asked - reading.time).count()));
+      const Duration away(std::abs((candidates[j]->asked.count() - reading.time_ns)));
       if (bits_of(candidates[j]->data()) == bits_of(reading) && away < least) {
         least = away;
         best = j;
@@ -268,13 +268,14 @@ std::string Joined::wrong_readings() const {
     }
     const bool untrue = best == none;
     if (!untrue) next[key] = best + 1;
-    if (!untrue && least <= reading.uncertainty + slack) continue;
+    if (!untrue && least <= Duration(reading.uncertainty_ns) + slack) continue;
     if (++wrong > 3) continue;
-    out += untrue ? fmt::format("{} {} at {:.4f} s was never sent\n", name_of(reading.quantity), reading.value,
+    out += untrue ? fmt::format("{} {} at {:.4f} s was never sent\n", name_of(reading.channel), reading.value,
                                 to_seconds(received_[i]))
                   : fmt::format("{} {} was taken {:.4f} s off the {:.4f} ± {:.4f} s that the driver claims\n",
-                                name_of(reading.quantity), reading.value, to_seconds(least), to_seconds(reading.time),
-                                to_seconds(reading.uncertainty));
+                                name_of(reading.channel), reading.value, to_seconds(least),
+                                1e-9 * static_cast<double>(reading.time_ns),
+                                1e-9 * static_cast<double>(reading.uncertainty_ns));
   }
   if (wrong > 3) out += fmt::format("... {} wrong readings in all\n", wrong);
   return out;

@@ -51,7 +51,7 @@ class Joined {
   [[nodiscard]] const sim::IqTruth& truth() const noexcept { return line_.truth(); }
   [[nodiscard]] const sim::IqDevice& module() const noexcept { return module_; }
   [[nodiscard]] const sim::MotorState& motor() const noexcept { return plant_.motor(); }
-  [[nodiscard]] const std::vector<Reading>& readings() const noexcept { return readings_; }
+  [[nodiscard]] const std::vector<MotorReading>& readings() const noexcept { return readings_; }
   [[nodiscard]] int failures() const noexcept { return failures_; }
   [[nodiscard]] const std::string& first_failure() const noexcept { return first_failure_; }
   [[nodiscard]] Instant ready_at() const noexcept { return ready_at_; }
@@ -71,10 +71,10 @@ class Joined {
   sim::IqLine line_;
   Session session_;
   sim::IqScanner host_frames_;  ///< of what the driver says
-  std::vector<Reading> readings_;
+  std::vector<MotorReading> readings_;
   std::vector<Instant> received_;  ///< when each of them was delivered
   std::uint64_t tick_ = 0;
-  std::vector<Event> events_;
+  std::vector<StreamEvent> events_;
   bool may_spin_ = true, was_plugged_ = true, was_failed_ = false;
   bool coasted_ = true;  ///< no spin_at() since the last coast on the wire
   Instant next_command_{0}, reconnect_at_{0}, ready_at_{-1};

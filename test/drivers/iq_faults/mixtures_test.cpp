@@ -107,7 +107,7 @@ TEST_P(Mixtures, NothingWrongIsDeliveredAndNothingSpinsOn) {
     const bool exchanged =
         std::any_of(faults.begin(), faults.end(), [](const Fault& f) { return f.kind == K::motor_unplug && f.other; });
     if (exchanged) {
-      EXPECT_TRUE(joined.saw(EventKind::another_module));
+      EXPECT_TRUE(joined.saw(EventKind::motor_another_module));
       EXPECT_GT(joined.silence_after(over), 1h) << "nothing of another module is delivered";
       continue;
     }

@@ -53,7 +53,7 @@ class OverAPort : public testing::Test {
 
 TEST_F(OverAPort, EveryReadingWasSent) {
   serve({});
-  std::vector<Reading> readings(4096);
+  std::vector<MotorReading> readings(4096);
   {
     Motor motor(device, 115200, {}, clock);
     motor.spin_at(RadPerSec(300));
@@ -67,8 +67,8 @@ TEST_F(OverAPort, EveryReadingWasSent) {
   }
   stop();
   EXPECT_GT(readings.size(), 50u);
-  for (const Reading& reading : readings) {
-    if (reading.quantity != Quantity::speed) continue;
+  for (const MotorReading& reading : readings) {
+    if (reading.channel != MotorChannel::speed) continue;
     const auto& log = server->motor_truth().log;
     EXPECT_TRUE(std::any_of(log.begin(), log.end(), [&](const sim::SentIqReply& sent) {
       float said = 0;

@@ -179,20 +179,20 @@ class Driver {
     }
     while (const std::size_t count = cell_.take(records_)) {
       for (std::size_t i = 0; i < count; ++i) {
-        const std::uint32_t rdt = records_[i].record.rdt_sequence;
+        const std::uint32_t rdt = records_[i].rdt_sequence;
         in_order &= taken_++ == 0 || rdt == last_rdt_ + 1;
         last_rdt_ = rdt;
       }
       if (!keep_ages) continue;
       const Instant now = clock_.now();
-      for (std::size_t i = 0; i < count; ++i) ages_.push_back(now - records_[i].arrival);
+      for (std::size_t i = 0; i < count; ++i) ages_.push_back(now - records_[i].arrival());
     }
   }
 
   const Clock& clock_;
   LoadCell cell_;
   int receiver_ = 0;
-  std::vector<StampedRecord> records_ = std::vector<StampedRecord>(4096);
+  std::vector<LoadCellRecord> records_ = std::vector<LoadCellRecord>(4096);
   std::vector<Duration> ages_;
   std::uint64_t taken_ = 0;
   std::uint32_t last_rdt_ = 0;

@@ -45,7 +45,7 @@ class SessionTest : public testing::Test {
   Instant now = 1s;
   StreamSettings settings;
   Session session{settings};
-  std::vector<StampedRecord> out;
+  std::vector<LoadCellRecord> out;
 };
 
 }  // namespace kphi::netbox::test

@@ -84,10 +84,9 @@ TEST(Standstill, AConsumerThatStandsStillForFiveSecondsLosesNothing) {
   EXPECT_EQ(counters.queue_overflows + counters.lost_network + counters.lost_host, 0u);
   EXPECT_GE(cell.health().queue_high_water, 35'000u);
   EXPECT_NEAR(cell.health().records_per_second, 7000, 200);
-  std::vector<StampedRecord> taken(counters.received + 1);
+  std::vector<LoadCellRecord> taken(counters.received + 1);
   EXPECT_EQ(cell.take(taken), counters.received);
-  for (std::size_t i = 1; i < counters.received; ++i)
-    ASSERT_EQ(taken[i].record.ft_sequence, taken[i - 1].record.ft_sequence + 1);
+  for (std::size_t i = 1; i < counters.received; ++i) ASSERT_EQ(taken[i].ft_sequence, taken[i - 1].ft_sequence + 1);
 }
 
 }  // namespace

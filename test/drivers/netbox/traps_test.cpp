@@ -77,7 +77,7 @@ TEST(Traps, AZeroByteEndsNeitherARequestNorADatagram) {
   std::span<const UdpSocket::Datagram> datagrams;
   ASSERT_TRUE(eventually([&] { return !(datagrams = peer.driver.receive()).empty(); }));
   EXPECT_EQ(datagrams[0].bytes.size(), 36u);
-  std::array<Record, kMaxRecords> out;
+  std::array<LoadCellRecord, kMaxRecords> out;
   EXPECT_EQ(decode(datagrams[0].bytes, out), 1u);
 }
 
@@ -90,7 +90,7 @@ class TrapsOfTheSequence : public testing::Test {
   }
   void receive(std::uint32_t rdt, Instant at) { session.receive(records(rdt, 1000 + rdt), at, out); }
   Session session{StreamSettings{}};
-  std::vector<StampedRecord> out;
+  std::vector<LoadCellRecord> out;
 };
 
 TEST_F(TrapsOfTheSequence, ALateRecordDoesNotOverwriteTheNewestNumber) {
@@ -126,7 +126,7 @@ TEST_F(TrapsOfTheSequence, NoFilterTouchesTheCounts) {
   for (std::uint32_t i = 0; i < 40; ++i) test::put_record(bytes, 2 + i, 1002 + i, 0, i % 2 == 0 ? 1'000'000 : -7);
   session.receive(bytes, 1s, out);
   ASSERT_EQ(out.size(), 41u);
-  for (std::size_t i = 0; i < 40; ++i) EXPECT_EQ(out[i + 1].record.counts[2], i % 2 == 0 ? 1'000'000 : -7);
+  for (std::size_t i = 0; i < 40; ++i) EXPECT_EQ(out[i + 1].counts[2], i % 2 == 0 ? 1'000'000 : -7);
 }
 
 TEST(Traps, ASettingIsWrittenByItsNameAndWithAnEqualsSign) {
@@ -169,7 +169,7 @@ TEST(Traps, NoOldRecordIsGivenAgainWhenNothingComes) {
   const SteadyClock clock;
   LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
   cell.start();
-  std::vector<StampedRecord> out(4096);
+  std::vector<LoadCellRecord> out(4096);
   std::size_t taken = 0;
   ASSERT_TRUE(eventually([&] {
     taken += cell.take(out);
@@ -187,8 +187,8 @@ TEST_F(TrapsOfTheSequence, ALatchedMonitorConditionIsHealthyAndAnErrorIsNoExcept
   test::put_record(bytes, 3, 1003, 0xC0000000);
   session.receive(bytes, 1s, out);
   ASSERT_EQ(out.size(), 3u);
-  EXPECT_TRUE(healthy(out[1].record.status));
-  EXPECT_FALSE(healthy(out[2].record.status));
+  EXPECT_TRUE(healthy(out[1].status));
+  EXPECT_FALSE(healthy(out[2].status));
 }
 
 TEST(Traps, ALostDatagramNeverHangsTheClient) {

@@ -59,7 +59,7 @@ TEST(Axia, ItsSaturationIsReadByItsOwnMap) {
   j.finish();
   const auto count = [&](Product product) {
     return std::count_if(j.out().begin(), j.out().end(),
-                         [&](const StampedRecord& r) { return saturated(r.record.status, product); });
+                         [&](const LoadCellRecord& r) { return saturated(r.status, product); });
   };
   EXPECT_NEAR(static_cast<double>(count(Product::axia)), 3500 + 31, 2) << "an Axia's bit stays for 32 samples";
   EXPECT_EQ(count(Product::net_box), 0);

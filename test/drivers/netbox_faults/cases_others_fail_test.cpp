@@ -171,10 +171,10 @@ TEST(CasesOthersFail, AConsumerWithAStateIsNeverCopied) {
 /// Of the next `records`; N.
 double mean_thrust(LoadCell& cell, std::uint64_t records) {
   ZeroEstimate estimate;
-  std::vector<StampedRecord> one(1);
+  std::vector<LoadCellRecord> one(1);
   for (std::uint64_t taken = 0; taken < records && cell.wait(kPatience);) {
     taken += cell.take(one);
-    estimate.add(one[0].record.counts, one[0].record.status);
+    estimate.add(one[0].counts, one[0].status);
   }
   return estimate.result(cell.configuration()).mean[2];
 }

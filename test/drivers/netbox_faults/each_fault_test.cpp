@@ -273,14 +273,14 @@ TEST_P(EachFault, AnAddressGivenBackIsALongGap) {
 
 TEST_P(EachFault, ZeroDriftIsInTheRecordsOnly) {
   run(script({{{"kind", "zero_drift"}, {"at_s", "0"}, {"axis", "0"}, {"amount", "-2"}, {"tau_s", "1"}}}));
-  const StampedRecord& last = joined->out().back();
-  EXPECT_NEAR(last.record.counts[0], -2e6 * (1 - std::exp(-to_seconds(last.arrival))), 2e4);
+  const LoadCellRecord& last = joined->out().back();
+  EXPECT_NEAR(last.counts[0], -2e6 * (1 - std::exp(-to_seconds(last.arrival()))), 2e4);
   EXPECT_EQ(joined->counters().lost_network, 0u);
 }
 
 TEST_P(EachFault, UnitsChangedMidRunScaleTheCounts) {
   run(script({{{"kind", "units"}, {"at_s", "1.5"}, {"force_unit", "1"}}}));
-  EXPECT_EQ(joined->out().back().record.counts[2], 0) << "at 1 count per lbf";
+  EXPECT_EQ(joined->out().back().counts[2], 0) << "at 1 count per lbf";
   EXPECT_EQ(joined->counters().lost_network, 0u);
 }
 
@@ -299,8 +299,8 @@ TEST_P(EachFault, EveryStatusBitMomentaryAndLatched) {
       j.run_until(400ms);
       j.finish();
       ASSERT_EQ(j.disagreement(), "") << bit;
-      const auto shown = std::count_if(j.out().begin(), j.out().end(),
-                                       [&](const StampedRecord& r) { return r.record.status == bits; });
+      const auto shown =
+          std::count_if(j.out().begin(), j.out().end(), [&](const LoadCellRecord& r) { return r.status == bits; });
       const double expected = (latched ? 1400.0 : 700.0) / GetParam().manner.divisor;
       ASSERT_NEAR(static_cast<double>(shown), expected, 41) << bit;
     }
@@ -310,14 +310,13 @@ TEST_P(EachFault, EveryStatusBitMomentaryAndLatched) {
 TEST_P(EachFault, StatusBitsDoNotTouchTheAccount) {
   run(script({{{"kind", "status"}, {"at_s", "1"}, {"for_s", "0.5"}, {"bits", "0x80400000"}}}));
   const auto bad = std::count_if(joined->out().begin(), joined->out().end(),
-                                 [](const StampedRecord& r) { return r.record.status == 0x80400000u; });
+                                 [](const LoadCellRecord& r) { return r.status == 0x80400000u; });
   EXPECT_NEAR(static_cast<double>(bad), 3500.0 / GetParam().manner.divisor, 1);
 }
 
 TEST_P(EachFault, SaturationIsInTheRecords) {
   run(script({{{"kind", "saturation"}, {"at_s", "1"}, {"for_s", "0.5"}, {"axes", "4"}}}));
-  for (const StampedRecord& r : joined->out())
-    ASSERT_EQ(r.record.status == 0x80020000u, r.record.counts[2] == 60'000'000);
+  for (const LoadCellRecord& r : joined->out()) ASSERT_EQ(r.status == 0x80020000u, r.counts[2] == 60'000'000);
 }
 
 /// Of a finite request, as another client may send it.
@@ -334,7 +333,7 @@ TEST(LastBlock, PartialPaddedOrDroppedIsAccountedFor) {
     session.start(Instant{0});
     session.advance(session.deadline());
     wire.request(std::array<std::uint8_t, 8>{0x12, 0x34, 0, 3, 0, 0, 0, 100}, 7, Instant{0});
-    std::vector<StampedRecord> out;
+    std::vector<LoadCellRecord> out;
     sim::Datagram datagram;
     for (std::int64_t tick = 1; tick <= 700; ++tick) {
       const Instant now(10'000'000 + tick * 1'000'000 / 7);

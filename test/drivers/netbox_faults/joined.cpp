@@ -105,7 +105,7 @@ std::string Joined::disagreement() const {
   compare("sum", account.expected, account.received + account.lost_network + account.lost_host);
   compare("delivered", out_.size(), truth.received);
   for (std::size_t i = 0; i < std::min(out_.size(), truth.delivered.size()); ++i) {
-    const Ideal::Delivered given{out_[i].record.rdt_sequence, out_[i].record.ft_sequence, out_[i].arrival};
+    const Ideal::Delivered given{out_[i].rdt_sequence, out_[i].ft_sequence, out_[i].arrival()};
     if (given == truth.delivered[i]) continue;
     const auto& t = truth.delivered[i];
     return out + fmt::format("record {}: driver rdt {} ft {} at {}, truth rdt {} ft {} at {}\n", i, given.rdt, given.ft,

@@ -36,7 +36,7 @@ class Joined {
   [[nodiscard]] const Counters& counters() const noexcept { return session_.counters(); }
   [[nodiscard]] sim::FaultInjector& wire() noexcept { return wire_; }
   [[nodiscard]] sim::NetBoxDevice& box() noexcept { return box_; }
-  [[nodiscard]] const std::vector<StampedRecord>& out() const noexcept { return out_; }
+  [[nodiscard]] const std::vector<LoadCellRecord>& out() const noexcept { return out_; }
   [[nodiscard]] int silences() const noexcept { return silences_; }
 
  private:
@@ -47,7 +47,7 @@ class Joined {
   sim::NetBoxDevice box_;
   sim::FaultInjector wire_;
   Session session_;
-  std::vector<StampedRecord> out_;
+  std::vector<LoadCellRecord> out_;
   std::vector<Arrival> arrivals_;  // of whole datagrams that the session did not drain
   std::uint64_t drained_ = 0;
   int silences_ = 0;

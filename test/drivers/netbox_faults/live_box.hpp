@@ -93,7 +93,7 @@ class Consumer {
   }
   void take_what_waits() {
     while (const std::size_t count = cell_.take(batch_)) {
-      for (std::size_t i = 0; i < count; ++i) see(batch_[i].record);
+      for (std::size_t i = 0; i < count; ++i) see(batch_[i]);
     }
   }
 
@@ -118,7 +118,7 @@ class Consumer {
   }
 
   LoadCell& cell_;
-  std::vector<StampedRecord> batch_;
+  std::vector<LoadCellRecord> batch_;
   std::uint64_t taken_ = 0, out_of_order_ = 0, samples_missing_ = 0;
   std::uint32_t first_rdt_ = 0;
   Record last_;

@@ -52,7 +52,7 @@ class Live : public testing::Test {
   template <class Enough>
   bool follow(LoadCell& cell, Enough enough) {
     const auto deadline = std::chrono::steady_clock::now() + kPatience;
-    std::vector<StampedRecord> batch(4096);
+    std::vector<LoadCellRecord> batch(4096);
     while (std::chrono::steady_clock::now() < deadline) {
       (void)cell.wait(20ms);
       taken += cell.take(batch);

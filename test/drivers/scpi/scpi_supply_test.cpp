@@ -95,24 +95,24 @@ TEST_F(ScpiSupplyTest, SpeaksTheDialectOfTheMaker) {
   ScpiSupply supply(lend(line), clock);
   supply.apply(kTwelveVolts);
   EXPECT_EQ(line.told.front(), "OUTP:OVP:VAL 13.200");
-  const supply::Reading reading = supply.read();
-  EXPECT_EQ(reading.protection, supply::Protection::over_current);
-  EXPECT_EQ(reading.regulation, supply::Regulation::constant_current);
+  const SupplyReading reading = supply.read();
+  EXPECT_EQ(reading.protection, SupplyProtection::over_current);
+  EXPECT_EQ(reading.regulation, SupplyRegulation::constant_current);
   EXPECT_FALSE(reading.output);
 }
 
 TEST_F(ScpiSupplyTest, ReadsWhatItGives) {
   ScpiSupply supply(lend(line), clock);
-  const supply::Reading reading = supply.read();
+  const SupplyReading reading = supply.read();
   EXPECT_DOUBLE_EQ(reading.voltage_v, 11.98);
   EXPECT_DOUBLE_EQ(reading.current_a, 1.234);
   EXPECT_DOUBLE_EQ(reading.power_w(), 11.98 * 1.234);
-  EXPECT_EQ(reading.regulation, supply::Regulation::constant_voltage);
-  EXPECT_EQ(reading.protection, supply::Protection::none);
+  EXPECT_EQ(reading.regulation, SupplyRegulation::constant_voltage);
+  EXPECT_EQ(reading.protection, SupplyProtection::none);
   line.answers["STAT:QUES:COND?"] = "2";
   line.answers["VOLT:PROT:TRIP?"] = "1";
-  EXPECT_EQ(supply.read().regulation, supply::Regulation::constant_current);
-  EXPECT_EQ(supply.read().protection, supply::Protection::over_voltage);
+  EXPECT_EQ(supply.read().regulation, SupplyRegulation::constant_current);
+  EXPECT_EQ(supply.read().protection, SupplyProtection::over_voltage);
 }
 
 TEST_F(ScpiSupplyTest, SwitchesOnOnlyWhileAGuardLivesAndVerifies) {

@@ -152,9 +152,9 @@ TEST_F(TcpInstrumentTest, SpeaksTheDialectOfRigol) {
   const supply::Limits limits{Volts(12), Amperes(5), Volts(13.2), Amperes(6)};
   EXPECT_EQ(supply.apply(limits), limits);
   const supply::PoweredOutput output(supply);
-  EXPECT_EQ(supply.read().regulation, supply::Regulation::constant_current);
+  EXPECT_EQ(supply.read().regulation, SupplyRegulation::constant_current);
   (void)rigol.apply("OUTP:OCP:VAL 4");
-  EXPECT_EQ(supply.read().protection, supply::Protection::over_current);
+  EXPECT_EQ(supply.read().protection, SupplyProtection::over_current);
 }
 
 TEST_F(TcpInstrumentTest, GivesALateAnswerToNobody) {

@@ -56,18 +56,18 @@ TEST_F(UsbInstrumentTest, IsASupplyWithItsLimitsAndProtections) {
   EXPECT_EQ(supply.apply(limits), limits);
   {
     supply::PoweredOutput output(supply);
-    supply::Reading reading = supply.read();
+    SupplyReading reading = supply.read();
     EXPECT_TRUE(reading.output);
     EXPECT_DOUBLE_EQ(reading.voltage_v, 12);
     EXPECT_DOUBLE_EQ(reading.current_a, 2);
-    EXPECT_EQ(reading.regulation, supply::Regulation::constant_voltage);
+    EXPECT_EQ(reading.regulation, SupplyRegulation::constant_voltage);
     instrument.connect_load(1);
     reading = supply.read();
     EXPECT_DOUBLE_EQ(reading.voltage_v, 5);
-    EXPECT_EQ(reading.regulation, supply::Regulation::constant_current);
+    EXPECT_EQ(reading.regulation, SupplyRegulation::constant_current);
     (void)instrument.apply("VOLT:PROT 3");
     reading = supply.read();
-    EXPECT_EQ(reading.protection, supply::Protection::over_voltage);
+    EXPECT_EQ(reading.protection, SupplyProtection::over_voltage);
     EXPECT_FALSE(reading.output);
   }
   EXPECT_FALSE(instrument.state().output);

@@ -75,18 +75,18 @@ TEST_P(EverySupply, ReadsWhatIsAtItsTerminals) {
     PoweredOutput on(supply);
     ASSERT_TRUE(eventually([&] { return supply.read().voltage_v > 11.969; }));
     const Instant before = clock.now();
-    const Reading reading = supply.read();
+    const SupplyReading reading = supply.read();
     EXPECT_TRUE(reading.output);
-    EXPECT_EQ(reading.regulation, Regulation::constant_voltage);
-    EXPECT_EQ(reading.protection, Protection::none);
+    EXPECT_EQ(reading.regulation, SupplyRegulation::constant_voltage);
+    EXPECT_EQ(reading.protection, SupplyProtection::none);
     EXPECT_NEAR(reading.voltage_v, 12 - 0.020 * 1.2, 0.02);
     EXPECT_NEAR(reading.current_a, 0.1 * reading.voltage_v, 0.02);
     EXPECT_NEAR(reading.power_w(), reading.voltage_v * reading.current_a, 1e-12);
     EXPECT_DOUBLE_EQ(reading.set_voltage_v, 12);
     EXPECT_DOUBLE_EQ(reading.current_limit_a, 2.5);
-    EXPECT_GE(reading.at - reading.uncertainty, before - 1ns);
-    EXPECT_LE(reading.at + reading.uncertainty, clock.now() + 1ns);
-    EXPECT_GT(reading.uncertainty, Duration{0});
+    EXPECT_GE(Instant(reading.time_ns - reading.uncertainty_ns), before - 1ns);
+    EXPECT_LE(Instant(reading.time_ns + reading.uncertainty_ns), clock.now() + 1ns);
+    EXPECT_GT(reading.uncertainty_ns, 0);
   }
   EXPECT_FALSE(simulated.output());
   EXPECT_EQ(simulated.harm(), 0u);
@@ -97,7 +97,7 @@ TEST_P(EverySupply, TellsConstantCurrent) {
   supply.apply({Volts(12), Amperes(1), Volts(13), Amperes(3)});
   simulated.hang({0, 0.5});
   PoweredOutput on(supply);
-  EXPECT_TRUE(eventually([&] { return supply.read().regulation == Regulation::constant_current; }));
+  EXPECT_TRUE(eventually([&] { return supply.read().regulation == SupplyRegulation::constant_current; }));
   EXPECT_TRUE(eventually([&] { return std::abs(supply.read().current_a - 1) < 0.015; }));
   EXPECT_NEAR(supply.read().voltage_v, 2, 0.2);
 }
@@ -108,8 +108,8 @@ TEST_P(EverySupply, TellsWhyItHasTripped) {
   simulated.hang({0, 0.2});
   const std::string refusal = what_of([&] {
     PoweredOutput on(supply);
-    eventually([&] { return supply.read().protection != Protection::none; });
-    EXPECT_EQ(supply.read().protection, Protection::over_current);
+    eventually([&] { return supply.read().protection != SupplyProtection::none; });
+    EXPECT_EQ(supply.read().protection, SupplyProtection::over_current);
     EXPECT_FALSE(supply.read().output);
     throw std::runtime_error("seen");
   });
@@ -237,7 +237,7 @@ TEST_F(Riden, OfUnknownModelIsRefusedAndLeftAlone) {
 
 TEST_F(OpenRiden, ReplacedByAnotherIsNoticed) {
   simulated.spoil(lasting(FaultKind::supply_reads_as, 2, 4712));
-  EXPECT_TRUE(supply.read().at > Instant{0}) << "nothing has given rise to the question";
+  EXPECT_TRUE(supply.read().time_ns > 0) << "nothing has given rise to the question";
   sim::Fault lost;
   lost.kind = FaultKind::supply_no_reply;
   lost.count = 1;
@@ -258,7 +258,7 @@ TEST_F(OpenRiden, ReportingWhatCannotBeIsNotBelieved) {
 
 TEST_F(OpenRiden, WithAnUnknownProtectionCodeHasTripped) {
   simulated.spoil(lasting(FaultKind::supply_reads_as, 16, 9));
-  EXPECT_EQ(supply.read().protection, Protection::unknown);
+  EXPECT_EQ(supply.read().protection, SupplyProtection::unknown);
 }
 
 /// After a preset was recalled on the panel the thresholds are not the ones that are read: they are always written.

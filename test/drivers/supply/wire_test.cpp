@@ -211,16 +211,16 @@ TEST(SupplyCounts, FitOnlyWhatTheDeviceCanBeTold) {
 TEST(SupplyProtection, IsNamedByTheDevicesOwnCode) {
   const RegisterMap& riden = *find_model("RD6006")->map;
   const RegisterMap& hanmatek = *find_model("HM310P")->map;
-  EXPECT_EQ(protection_of(riden, 0), Protection::none);
-  EXPECT_EQ(protection_of(riden, 1), Protection::over_voltage);
-  EXPECT_EQ(protection_of(riden, 2), Protection::over_current);
-  EXPECT_EQ(protection_of(riden, 9), Protection::unknown);
-  EXPECT_EQ(protection_of(*find_model("DPS5005")->map, 3), Protection::over_power);
-  EXPECT_EQ(protection_of(hanmatek, 0), Protection::none);
-  EXPECT_EQ(protection_of(hanmatek, 0b00010), Protection::over_current);
-  EXPECT_EQ(protection_of(hanmatek, 0b01000), Protection::over_temperature);
-  EXPECT_EQ(protection_of(hanmatek, 0b10000), Protection::short_circuit);
-  EXPECT_EQ(protection_of(hanmatek, 0b100000), Protection::unknown);
+  EXPECT_EQ(protection_of(riden, 0), SupplyProtection::none);
+  EXPECT_EQ(protection_of(riden, 1), SupplyProtection::over_voltage);
+  EXPECT_EQ(protection_of(riden, 2), SupplyProtection::over_current);
+  EXPECT_EQ(protection_of(riden, 9), SupplyProtection::unknown);
+  EXPECT_EQ(protection_of(*find_model("DPS5005")->map, 3), SupplyProtection::over_power);
+  EXPECT_EQ(protection_of(hanmatek, 0), SupplyProtection::none);
+  EXPECT_EQ(protection_of(hanmatek, 0b00010), SupplyProtection::over_current);
+  EXPECT_EQ(protection_of(hanmatek, 0b01000), SupplyProtection::over_temperature);
+  EXPECT_EQ(protection_of(hanmatek, 0b10000), SupplyProtection::short_circuit);
+  EXPECT_EQ(protection_of(hanmatek, 0b100000), SupplyProtection::unknown);
 }
 
 }  // namespace

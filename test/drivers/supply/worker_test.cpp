@@ -40,7 +40,7 @@ class FakeSupply final : public Supply {
   explicit FakeSupply(Script& script) : script_(script) { identity_.device = "fake supply"; }
   [[nodiscard]] const Identity& identity() const noexcept override { return identity_; }
   Limits apply(const Limits& limits) override { return limits; }
-  [[nodiscard]] Reading read() override {
+  [[nodiscard]] SupplyReading read() override {
     const int look = ++script_.looks;
     if (look == 1 && script_.inside != nullptr) {
       script_.inside->count_down();
@@ -48,8 +48,8 @@ class FakeSupply final : public Supply {
     }
     if (script_.throws_oddly) throw 42;
     if (script_.read_fails) throw DeviceError("fake supply", "read", "the line is lost", "plug it in");
-    Reading reading;
-    reading.at = Instant(look);
+    SupplyReading reading;
+    reading.time_ns = look;
     reading.output = script_.output;
     return reading;
   }
@@ -126,16 +126,16 @@ TEST(SupplyWorker, HandsOutReadingsInOrder) {
   Script script;
   SteadyClock clock(100);
   Worker worker(fake(script), clock, 5);
-  std::vector<Reading> all;
+  std::vector<SupplyReading> all;
   EXPECT_TRUE(eventually([&] {
     std::array<Reading, 8> some;
     const std::size_t count = worker.take(some);
     all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(count));
     return all.size() >= 20;
   }));
-  for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(all[i].at, Instant(static_cast<std::int64_t>(i) + 1));
+  for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(all[i].time_ns, static_cast<std::int64_t>(i) + 1);
   ASSERT_TRUE(worker.newest());
-  EXPECT_GE(worker.newest()->at, all.back().at);
+  EXPECT_GE(worker.newest()->time_ns, all.back().time_ns);
   EXPECT_TRUE(worker.alive());
   EXPECT_EQ(worker.failure(), "");
 }
@@ -145,10 +145,10 @@ TEST(SupplyWorker, DropsWhatNobodyTakes) {
   SteadyClock clock(1000);
   Worker worker(fake(script), clock, 100);
   EXPECT_TRUE(eventually([&] { return script.looks > 4200; }));
-  std::vector<Reading> kept(5000);
+  std::vector<SupplyReading> kept(5000);
   ASSERT_GE(worker.take(kept), 4096u);
-  EXPECT_EQ(kept[4095].at, Instant(4096));
-  EXPECT_GT(worker.newest()->at, Instant(4197)) << "the newest is known though it was dropped";
+  EXPECT_EQ(kept[4095].time_ns, 4096);
+  EXPECT_GT(worker.newest()->time_ns, 4197) << "the newest is known though it was dropped";
 }
 
 TEST(SupplyWorker, SwitchesOffWhenItDies) {
@@ -328,14 +328,15 @@ TEST(SupplyWorkerOnAWire, FeedsFromAStockSupplyOfTenAnswersPerSecond) {
   Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock), clock, 5);
   worker.apply(kTwelveVolts);
   worker.switch_on();
-  std::vector<Reading> all;
+  std::vector<SupplyReading> all;
   EXPECT_TRUE(eventually([&] {
     std::array<Reading, 8> some;
     const std::size_t count = worker.take(some);
     all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(count));
     return all.size() >= 6;
   }));
-  EXPECT_TRUE(std::is_sorted(all.begin(), all.end(), [](const Reading& a, const Reading& b) { return a.at < b.at; }));
+  EXPECT_TRUE(std::is_sorted(all.begin(), all.end(),
+                             [](const SupplyReading& a, const SupplyReading& b) { return a.time_ns < b.time_ns; }));
   int settled = 0;
   for (const auto& frame : simulated.truth().frames) settled += frame[1] == 3 && frame[3] == 0;
   EXPECT_EQ(settled, 1) << "nothing was asked twice: who it is was asked at the beginning only";
@@ -383,7 +384,7 @@ TEST(SupplyWorkerOnAWire, ReportsATripAsAReading) {
   simulated.spoil(trip);
   EXPECT_TRUE(eventually([&] {
     const auto newest = worker.newest();
-    return newest && newest->protection == Protection::over_voltage && !newest->output;
+    return newest && newest->protection == SupplyProtection::over_voltage && !newest->output;
   }));
   EXPECT_TRUE(worker.alive());
   worker.switch_on();
@@ -400,7 +401,7 @@ TEST(SupplyWorkerOnAWire, SeesTheVoltageRiseWhenTheLoadFeedsBack) {
   worker.switch_on();
   ASSERT_TRUE(eventually([&] { return worker.newest() && worker.newest()->voltage_v > 11.9; }));
   simulated.hang({-0.2, 0});
-  EXPECT_TRUE(eventually([&] { return worker.newest()->protection == Protection::over_voltage; }));
+  EXPECT_TRUE(eventually([&] { return worker.newest()->protection == SupplyProtection::over_voltage; }));
   EXPECT_TRUE(eventually([&] { return worker.newest()->current_a < 0.01; }));
 }
 

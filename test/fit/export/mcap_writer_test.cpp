@@ -126,7 +126,7 @@ results::RunRecording recording() {
   run.header.load_cell.counts_per_newton = 1000;
   run.header.load_cell.counts_per_newton_metre = 10000;
   run.load_cell.push_back({{1000, -2000, 500, 10000, 0, 0}, 1, 7, 0, 2'000'000'000});
-  run.motor.push_back({results::MotorChannel::speed, 1'500'000'000, 0, 123.5});
+  run.motor.push_back({MotorChannel::speed, 1'500'000'000, 0, 123.5});
   run.phases.push_back({results::Phase::step, 0, 1'000'000'000, 120});
   return run;
 }

@@ -18,7 +18,7 @@ results::RunRecording recording() {
   run.header.thrust_sign = -1;
   run.header.load_cell.counts_per_newton = 1e6;
   for (int i = 0; i < 4000; ++i) {
-    results::LoadCellRecord record;
+    LoadCellRecord record;
     record.arrival_ns = std::int64_t{i} * 1'000'000;
     record.counts[2] = -1'000'000 * (i / 1000) - (i % 2) * 1000;
     run.load_cell.push_back(record);

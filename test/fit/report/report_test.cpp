@@ -39,7 +39,7 @@ Provenance provenance() {
   result.campaign = "icra <script>alert(1)</script> & \"co\"";
   result.propeller_name = "Tom's 5x4 & more";
   result.source = "steps.csv";
-  results::SampleAccount account;
+  SampleAccount account;
   account.expected = 560000;
   account.received = 559990;
   account.lost_network = 7;

@@ -42,7 +42,7 @@ TEST(Replies, ThatComeLateNeverAnswerTheNextRequest) {
     wire.run_for(2s);
     EXPECT_GE(wire.session.counters().late_replies, 1u) << factor;
     EXPECT_EQ(wire.session.counters().late_replies, wire.session.counters().timeouts);
-    const auto speeds = wire.values(Quantity::speed);
+    const auto speeds = wire.values(MotorChannel::speed);
     EXPECT_EQ(std::count(speeds.begin(), speeds.end(), 999.0), 0) << factor;
     EXPECT_GT(static_cast<double>(speeds.size()), 90 - 5 * factor) << "and polling goes on behind it";
   }
@@ -66,11 +66,11 @@ TEST(Replies, OfALineThatStallsInOrderAreNeverTakenForLaterOnes) {
   wire.run_for(60s);
   EXPECT_GT(wire.session.counters().late_replies, 5u);
   int checked = 0;
-  for (const Reading& reading : wire.readings()) {
-    if (reading.quantity != Quantity::speed) continue;
+  for (const MotorReading& reading : wire.readings()) {
+    if (reading.channel != MotorChannel::speed) continue;
     ++checked;
     const Instant asked = from_seconds(reading.value);
-    EXPECT_LT(std::abs(to_seconds(asked - (reading.time - reading.uncertainty))), 1e-4) << checked;
+    EXPECT_LT(std::abs(to_seconds(asked - Instant(reading.time_ns - reading.uncertainty_ns))), 1e-4) << checked;
   }
   EXPECT_GT(checked, 100);
 }
@@ -89,7 +89,7 @@ TEST(Replies, LeftUnreadByAHostThatSleptAreNotTakenForLaterOnes) {
   session.advance(wire.now);  // the timers come first, then the bytes of before
   wire.readings();
   session.receive(fake::message(50, 13, 3, 0, fake::f32(111)), wire.now);
-  EXPECT_TRUE(wire.values(Quantity::speed).empty());
+  EXPECT_TRUE(wire.values(MotorChannel::speed).empty());
   EXPECT_EQ(session.counters().late_replies, 1u);
 }
 
@@ -114,7 +114,7 @@ TEST(Replies, ThatBeganToComeBeforeTheirQuestionAreSecondCopies) {
     };
     const auto before = wire.session.counters().unasked;
     wire.run_for(1s);
-    const auto speeds = wire.values(Quantity::speed);
+    const auto speeds = wire.values(MotorChannel::speed);
     EXPECT_GT(speeds.size(), 45u);
     EXPECT_EQ(std::count(speeds.begin(), speeds.end(), 999.0), 0) << paced;
     EXPECT_GT(wire.session.counters().unasked, before + 45);
@@ -132,7 +132,7 @@ TEST(Replies, OfAnotherModuleAreRejectedAndCounted) {
   wire.run_for(25ms);
   wire.readings();
   wire.run_for(500ms);
-  EXPECT_TRUE(wire.values(Quantity::speed).empty());
+  EXPECT_TRUE(wire.values(MotorChannel::speed).empty());
   EXPECT_GT(wire.session.counters().wrong_module, 0u);
 }
 
@@ -147,7 +147,7 @@ TEST(Replies, OfTheWrongLengthAreCountedAndNotStored) {
     wire.run_for(25ms);
     wire.readings();
     wire.run_for(200ms);
-    EXPECT_TRUE(wire.values(Quantity::speed).empty()) << data.size();
+    EXPECT_TRUE(wire.values(MotorChannel::speed).empty()) << data.size();
     EXPECT_GT(wire.session.counters().wrong_length, before);
   }
 }
@@ -161,7 +161,7 @@ TEST(Replies, ThatAreNoNumbersAreCountedAndNotStored) {
   wire.run_for(100ms);
   wire.module.values[{50, 13}] = fake::u32(0xFF800000);
   wire.run_for(100ms);
-  for (const Reading& reading : wire.readings()) EXPECT_TRUE(std::isfinite(reading.value));
+  for (const MotorReading& reading : wire.readings()) EXPECT_TRUE(std::isfinite(reading.value));
   EXPECT_GE(wire.session.counters().bad_values, 8u);
 }
 
@@ -187,7 +187,7 @@ TEST(Resync, BringsTheNextReplyWithinOneTimeoutAfterAFalseHeader) {
     const auto timeouts = wire.session.counters().timeouts;
     wire.deliver({0x55, length, 0x32});
     wire.run_for(kTimeout);
-    EXPECT_GE(wire.values(Quantity::speed).size(), 4u) << int{length};
+    EXPECT_GE(wire.values(MotorChannel::speed).size(), 4u) << int{length};
     EXPECT_EQ(wire.session.counters().timeouts, timeouts);
   }
 }
@@ -205,7 +205,7 @@ TEST(Resync, WaitsForTheSecondHalfOfAFrameFromASlowAdapter) {
   };
   wire.module.silent = {{69, 0}, {69, 1}, {50, 36}, {83, 0}, {50, 41}, {50, 0}, {5, 15}, {84, 1}, {50, 8}, {84, 0}};
   wire.run_for(200ms);
-  EXPECT_GE(wire.values(Quantity::speed).size(), 9u);
+  EXPECT_GE(wire.values(MotorChannel::speed).size(), 9u);
   EXPECT_EQ(wire.session.counters().resyncs, 0u);
 }
 
@@ -237,8 +237,8 @@ TEST(Timeouts, OfALostReplyCostOneGapOfThatEntryAndNoOther) {
   wire.run_for(1s);
   EXPECT_EQ(wire.session.counters().timeouts, 1u);
   const auto readings = wire.readings();
-  const auto speeds =
-      std::count_if(readings.begin(), readings.end(), [](const Reading& r) { return r.quantity == Quantity::speed; });
+  const auto speeds = std::count_if(readings.begin(), readings.end(),
+                                    [](const MotorReading& r) { return r.channel == MotorChannel::speed; });
   EXPECT_GE(speeds, 50 - 4) << "a time-out of 40 ms at 50 Hz: others have overtaken it by then";
   EXPECT_GE(readings.size() - static_cast<std::size_t>(speeds), 49u);
 }
@@ -253,7 +253,7 @@ TEST(RoundTrips, AreToldWhenTheyBlurReadingsInTime) {
     EXPECT_LE(wire.session.round_trips().quantile(0.5), latency * 9 / 8);
     const auto events = wire.session.take_events();
     const auto slow = std::count_if(events.begin(), events.end(),
-                                    [](const Event& e) { return e.kind == EventKind::slow_round_trip; });
+                                    [](const StreamEvent& e) { return e.kind == EventKind::motor_slow_round_trip; });
     EXPECT_EQ(slow, latency > 4ms ? 1 : 0);
   }
 }

@@ -49,21 +49,21 @@ TEST(Motor, ConnectsCoastingAndKnowsItsModule) {
 TEST(Motor, SpinsAndBringsTelemetry) {
   Stand stand;
   stand.spin(1234.5);
-  std::array<Reading, 32> some;
-  Reading speed;
+  std::array<MotorReading, 32> some;
+  MotorReading speed;
   ASSERT_TRUE(soon(
       [&] {
         stand.motor->renew();
         const std::size_t n = stand.motor->take(some);
         for (std::size_t i = 0; i < n; ++i) {
-          if (some[i].quantity == Quantity::speed) speed = some[i];
+          if (some[i].channel == MotorChannel::speed) speed = some[i];
         }
         return speed.value == 1234.5;
       },
       2000ms));
-  EXPECT_GT(speed.time, Instant{0});
-  EXPECT_LE(speed.time, stand.clock.now());
-  EXPECT_LT(speed.uncertainty, 50ms);
+  EXPECT_GT(speed.time_ns, 0);
+  EXPECT_LE(Instant(speed.time_ns), stand.clock.now());
+  EXPECT_LT(Duration(speed.uncertainty_ns), 50ms);
   EXPECT_GT(stand.motor->counters().replies, 10u);
 }
 
@@ -141,12 +141,12 @@ TEST(Motor, StretchesProtocolDeadlinesOnAFastBench) {
   ModuleOnALine line;
   Motor motor(line.device(), 115200, Settings{}, clock);
   EXPECT_EQ(line.with([](Module& m) { return fake::to_f32(m.values.at({52, 15})); }), 0.5f) << "its own seconds";
-  std::array<Reading, 512> readings;
+  std::array<MotorReading, 512> readings;
   std::size_t speeds = 0;
   ASSERT_TRUE(soon(
       [&] {
         const std::size_t n = motor.take(readings);
-        for (std::size_t i = 0; i < n; ++i) speeds += readings[i].quantity == Quantity::speed ? 1 : 0;
+        for (std::size_t i = 0; i < n; ++i) speeds += readings[i].channel == MotorChannel::speed ? 1 : 0;
         return speeds > 200;
       },
       2000ms));
@@ -162,7 +162,8 @@ TEST(Motor, AnswersQuestionsInPassing) {
   EXPECT_EQ(replies[0].value, 2200.0);
   EXPECT_EQ(replies[1].value, std::nullopt);
   EXPECT_TRUE(replies[2].accepted);
-  EXPECT_THROW((void)stand.motor->inquire({{find("propeller_motor_control.ctrl_velocity"), 0.1}}), std::invalid_argument);
+  EXPECT_THROW((void)stand.motor->inquire({{find("propeller_motor_control.ctrl_velocity"), 0.1}}),
+               std::invalid_argument);
   EXPECT_TRUE(stand.motor->alive());
 }
 

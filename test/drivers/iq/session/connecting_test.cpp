@@ -92,7 +92,7 @@ TEST(Connecting, TakesTheCoilTemperatureOfOldFirmware) {
   EXPECT_EQ(wire.session.identity().coil_temperature_client(), 77);
   wire.readings();
   wire.run_for(1s);
-  const auto temperatures = wire.values(Quantity::coil_temperature);
+  const auto temperatures = wire.values(MotorChannel::coil_temperature);
   ASSERT_FALSE(temperatures.empty());
   EXPECT_EQ(temperatures[0], 44.5);
 }
@@ -103,7 +103,7 @@ TEST(Connecting, GoesOnWithoutACoilTemperature) {
   wire.session.connect(wire.now);
   ASSERT_TRUE(wire.run_to_state(State::ready, 3s)) << wire.session.failure();
   wire.run_for(1s);
-  EXPECT_TRUE(wire.values(Quantity::coil_temperature).empty());
+  EXPECT_TRUE(wire.values(MotorChannel::coil_temperature).empty());
   EXPECT_EQ(wire.session.state(), State::ready);
 }
 
@@ -146,7 +146,7 @@ TEST(Reconnecting, SendsNothingOfBefore) {
   wire.connect();
   wire.session.spin_at(RadPerSec(700), wire.now);
   wire.session.sent(3);  // the rest has not left when the plug is pulled
-  wire.session.fail(EventKind::port_lost, "unplugged", wire.now);
+  wire.session.fail(EventKind::motor_port_lost, "unplugged", wire.now);
   wire.session.connect_anew(wire.now + 1s);
   wire.now += 1s;
   EXPECT_EQ(fake::hex(wire.session.output().first(7)), "55 02 34 02 01 8E 06") << "a whole coast, not half a speed";
@@ -158,7 +158,7 @@ TEST(Reconnecting, SendsNothingOfBefore) {
 TEST(Reconnecting, RefusesAnotherModuleBeforeTellingItAnythingButCoast) {
   Wire wire;
   wire.connect();
-  wire.session.fail(EventKind::port_lost, "unplugged", wire.now);
+  wire.session.fail(EventKind::motor_port_lost, "unplugged", wire.now);
   wire.module.heard.clear();
   wire.module.values[{5, 6}] = fake::u32(0x99999999);
   wire.session.connect_anew(wire.now);
@@ -166,7 +166,7 @@ TEST(Reconnecting, RefusesAnotherModuleBeforeTellingItAnythingButCoast) {
   ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
   EXPECT_NE(wire.session.failure().find("another module answers, uid 111111112222222299999999"), std::string::npos)
       << wire.session.failure();
-  EXPECT_EQ(wire.session.take_events().back().kind, EventKind::another_module);
+  EXPECT_EQ(wire.session.take_events().back().kind, EventKind::motor_another_module);
   EXPECT_EQ(wire.module.count([](const auto& m) { return m.access == 1 && !m.is_coast(); }), 0u);
 }
 

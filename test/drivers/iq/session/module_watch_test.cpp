@@ -1,5 +1,3 @@
-#include "drivers/iq/session/stopping.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 
 #include "base/error.hpp"
 #include "drivers/iq/link/motor.hpp"
+#include "drivers/iq/session/stopping.hpp"
 #include "test/drivers/iq/module_on_a_line.hpp"
 #include "test/drivers/iq/wire.hpp"
 #include "test/soon.hpp"
@@ -39,7 +38,7 @@ struct Turning {
     return speeds;
   }
   [[nodiscard]] bool noted(EventKind kind) {
-    for (const Event& event : wire.session.take_events())
+    for (const StreamEvent& event : wire.session.take_events())
       if (event.kind == kind) return true;
     return false;
   }
@@ -62,7 +61,7 @@ TEST(DriveWatch, SendsNoSpeedToAModuleThatHasStoppedDriving) {
   motor.wire.spin(600);
   motor.wire.run_for(500ms);
   EXPECT_EQ(motor.wire.session.state(), State::failed);
-  EXPECT_TRUE(motor.noted(EventKind::let_go));
+  EXPECT_TRUE(motor.noted(EventKind::motor_let_go));
   EXPECT_LE(motor.speeds_since().size(), 1u) << "one speed had its confirmation already";
   EXPECT_TRUE(motor.wire.module.last_motion()->is_coast());
   EXPECT_FALSE(motor.wire.session.armed());
@@ -72,7 +71,7 @@ TEST(DriveWatch, SeesOnASteadySpeedThatTheModuleHasStoppedDriving) {
   Turning motor;
   motor.let_the_module_go();
   motor.wire.run_for(1s);
-  EXPECT_TRUE(motor.noted(EventKind::let_go));
+  EXPECT_TRUE(motor.noted(EventKind::motor_let_go));
   EXPECT_THAT(motor.speeds_since(), IsEmpty());
 }
 
@@ -83,7 +82,7 @@ TEST(DriveWatch, OrdersACoastAfterTheHostStoodStillForLongerThanTheModuleWaits) 
     motor.wire.spin(600);
     EXPECT_THAT(motor.speeds_since(), IsEmpty()) << to_seconds(absent);
     EXPECT_TRUE(motor.wire.module.last_motion()->is_coast());
-    EXPECT_TRUE(motor.noted(EventKind::host_absent));
+    EXPECT_TRUE(motor.noted(EventKind::motor_host_absent));
     EXPECT_THAT(motor.wire.session.failure(), HasSubstr("did not run kphi for"));
   }
 }
@@ -166,8 +165,8 @@ TEST_P(EveryRestart, IsNoticedNamedAndNeverFollowedByMotion) {
   ASSERT_TRUE(wire.run_to_state(State::failed, 300ms));
   const auto events = wire.session.take_events();
   ASSERT_EQ(events.size(), 1u);
-  EXPECT_EQ(events[0].kind, EventKind::module_reset);
-  EXPECT_TRUE(spoils_a_run(events[0].kind));
+  EXPECT_EQ(events[0].kind, EventKind::motor_reset);
+  EXPECT_TRUE(ends_a_run(events[0].kind));
   EXPECT_EQ(wire.session.counters().module_resets, 1u);
   EXPECT_NE(wire.session.failure().find("restarted by itself"), std::string::npos);
   wire.run_for(100ms);

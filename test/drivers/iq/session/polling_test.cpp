@@ -25,21 +25,23 @@ TEST(Telemetry, ReadsSpeedEveryCycleAndTheOthersInTurn) {
   wire.run_for(200ms);
   wire.readings();
   wire.run_for(3s);
-  std::map<Quantity, int> count;
-  std::map<Quantity, double> value;
-  for (const Reading& reading : wire.readings()) {
-    ++count[reading.quantity];
-    value[reading.quantity] = reading.value;
+  std::map<MotorChannel, int> count;
+  std::map<MotorChannel, double> value;
+  for (const MotorReading& reading : wire.readings()) {
+    ++count[reading.channel];
+    value[reading.channel] = reading.value;
   }
-  EXPECT_NEAR(count[Quantity::speed], 150, 1);
-  for (int i = 1; i < kQuantities; ++i) EXPECT_NEAR(count[static_cast<Quantity>(i)], 150.0 / (kQuantities - 1), 1) << i;
-  EXPECT_EQ(value[Quantity::speed], 1000);
-  EXPECT_EQ(value[Quantity::supply_voltage], 12.5);
-  EXPECT_EQ(value[Quantity::supply_current], 3.25);
-  EXPECT_EQ(value[Quantity::motor_current], 10);
-  EXPECT_EQ(value[Quantity::coil_temperature], 55.25);
-  EXPECT_EQ(value[Quantity::derate], 1.0);
-  EXPECT_EQ(value[Quantity::drive_mode], 3);
+  EXPECT_NEAR(count[MotorChannel::speed], 150, 1);
+  constexpr std::size_t kChannels = kMotorChannels.size();
+  for (std::size_t i = 1; i < kChannels; ++i)
+    EXPECT_NEAR(count[static_cast<MotorChannel>(i)], 150.0 / (kChannels - 1), 1) << i;
+  EXPECT_EQ(value[MotorChannel::speed], 1000);
+  EXPECT_EQ(value[MotorChannel::supply_voltage], 12.5);
+  EXPECT_EQ(value[MotorChannel::supply_current], 3.25);
+  EXPECT_EQ(value[MotorChannel::motor_current], 10);
+  EXPECT_EQ(value[MotorChannel::coil_temperature], 55.25);
+  EXPECT_EQ(value[MotorChannel::derate], 1.0);
+  EXPECT_EQ(value[MotorChannel::drive_mode], 3);
 }
 
 TEST(Telemetry, AsksBothOfACycleInOneBatch) {
@@ -100,9 +102,9 @@ TEST(Telemetry, StampsTheMiddleLessTheTimeOnTheWire) {
   ASSERT_EQ(wire.batches.size(), 1u);
   wire.run_for(10ms);
   const auto readings = wire.readings();
-  EXPECT_TRUE(std::any_of(readings.begin(), readings.end(), [&](const Reading& reading) {
-    return reading.quantity == Quantity::speed && reading.time == wire.batches[0].first + 700us + 1ms &&
-           reading.uncertainty == 1ms;
+  EXPECT_TRUE(std::any_of(readings.begin(), readings.end(), [&](const MotorReading& reading) {
+    return reading.channel == MotorChannel::speed && Instant(reading.time_ns) == wire.batches[0].first + 700us + 1ms &&
+           Duration(reading.uncertainty_ns) == 1ms;
   }));
 }
 
@@ -122,9 +124,9 @@ TEST(Telemetry, UncertaintyCoversTheMomentOfMeasurement) {
   wire.readings();
   wire.run_for(2s);
   int checked = 0;
-  for (const Reading& reading : wire.readings()) {
-    if (reading.quantity != Quantity::speed) continue;
-    EXPECT_LE(std::abs(reading.value - to_seconds(reading.time)), to_seconds(reading.uncertainty) + 1e-6);
+  for (const MotorReading& reading : wire.readings()) {
+    if (reading.channel != MotorChannel::speed) continue;
+    EXPECT_LE(std::abs(reading.value - 1e-9 * reading.time_ns), 1e-9 * reading.uncertainty_ns + 1e-6);
     ++checked;
   }
   EXPECT_GT(checked, 90);
@@ -145,17 +147,18 @@ TEST(Telemetry, AsksForAllThatIsWantedInEveryCycle) {
   Settings settings;
   settings.telemetry_hz = 100;
   settings.slow_hz = 10;
-  settings.every_cycle = {Quantity::speed, Quantity::motor_current, Quantity::supply_voltage, Quantity::supply_current};
+  settings.every_cycle = {MotorChannel::speed, MotorChannel::motor_current, MotorChannel::supply_voltage,
+                          MotorChannel::supply_current};
   Wire wire(settings);
   wire.connect();
   wire.run_for(100ms);
   wire.readings();
   wire.run_for(1s);
-  std::map<Quantity, int> count;
-  for (const Reading& reading : wire.readings()) ++count[reading.quantity];
-  for (const Quantity quantity : settings.every_cycle) EXPECT_NEAR(count[quantity], 100, 1) << name_of(quantity);
-  EXPECT_NEAR(count[Quantity::coil_temperature] + count[Quantity::derate] + count[Quantity::drive_mode] +
-                  count[Quantity::drive_pwm] + count[Quantity::fault_now],
+  std::map<MotorChannel, int> count;
+  for (const MotorReading& reading : wire.readings()) ++count[reading.channel];
+  for (const MotorChannel quantity : settings.every_cycle) EXPECT_NEAR(count[quantity], 100, 1) << name_of(quantity);
+  EXPECT_NEAR(count[MotorChannel::coil_temperature] + count[MotorChannel::derate] + count[MotorChannel::drive_mode] +
+                  count[MotorChannel::drive_pwm] + count[MotorChannel::fault_now],
               10, 1);
 }
 

@@ -59,7 +59,7 @@ TEST(Rearming, IsRefusedUnlessReady) {
   EXPECT_THROW(wire.session.rearm(), std::logic_error);
   wire.connect();
   EXPECT_TRUE(wire.session.armed()) << "the first connection arms";
-  wire.session.fail(EventKind::port_lost, "unplugged", wire.now);
+  wire.session.fail(EventKind::motor_port_lost, "unplugged", wire.now);
   EXPECT_THROW(wire.session.rearm(), std::logic_error);
   EXPECT_FALSE(wire.session.armed());
 }
@@ -91,10 +91,10 @@ TEST(Soak, ARuinedLineNeverBringsAFalseValueAndNeverMotionAfterACoast) {
     wire.run_for(4s);
     EXPECT_TRUE(wire.module.last_motion()->is_coast()) << "seed " << seed;
     EXPECT_TRUE(wire.session.coasting()) << "seed " << seed;
-    for (const Reading& reading : wire.readings()) {
-      ASSERT_TRUE(reading.quantity != Quantity::speed || reading.value == 0 || reading.value == 100)
+    for (const MotorReading& reading : wire.readings()) {
+      ASSERT_TRUE(reading.channel != MotorChannel::speed || reading.value == 0 || reading.value == 100)
           << "seed " << seed << ": " << reading.value;
-      ASSERT_TRUE(reading.quantity != Quantity::supply_voltage || reading.value == 12.5) << "seed " << seed;
+      ASSERT_TRUE(reading.channel != MotorChannel::supply_voltage || reading.value == 12.5) << "seed " << seed;
     }
   }
 }

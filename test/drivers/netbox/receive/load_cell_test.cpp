@@ -28,7 +28,7 @@ std::string xml(unsigned divisor = 1, unsigned records_per_datagram = 40) {
 
 /// Takes until `wanted` records have come; each must follow the one before, unless `gaps` may be between them.
 std::uint64_t consume(LoadCell& cell, std::uint64_t wanted, bool gaps = false) {
-  std::vector<StampedRecord> batch(512);
+  std::vector<LoadCellRecord> batch(512);
   std::uint64_t taken = 0;
   std::uint32_t before = 0;
   Instant arrival{0};
@@ -37,13 +37,13 @@ std::uint64_t consume(LoadCell& cell, std::uint64_t wanted, bool gaps = false) {
     if (!cell.wait(1s)) continue;
     const std::size_t count = cell.take(batch);
     for (std::size_t i = 0; i < count; ++i) {
-      const StampedRecord& stamped = batch[i];
+      const LoadCellRecord& stamped = batch[i];
       if (taken + i > 0 && !gaps) {
-        EXPECT_EQ(stamped.record.rdt_sequence, before + 1);
+        EXPECT_EQ(stamped.rdt_sequence, before + 1);
       }
-      before = stamped.record.rdt_sequence;
-      EXPECT_GE(stamped.arrival, arrival - 20ms);
-      arrival = stamped.arrival;
+      before = stamped.rdt_sequence;
+      EXPECT_GE(stamped.arrival(), arrival - 20ms);
+      arrival = stamped.arrival();
     }
     taken += count;
   }

@@ -85,7 +85,7 @@ class ConnectionTest : public testing::Test {
 
   Instant now = 1s;
   Connection connection{parse_configuration(page())};
-  std::vector<StampedRecord> out = std::vector<StampedRecord>(4096);
+  std::vector<LoadCellRecord> out = std::vector<LoadCellRecord>(4096);
 };
 
 TEST(Answer, SaysHowFarItCame) {

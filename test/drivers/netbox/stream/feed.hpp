@@ -18,7 +18,7 @@ struct Step {
   std::uint32_t ft = 0;
   bool taken = true;
 
-  [[nodiscard]] Record record() const { return {number, ft, 0, {}}; }
+  [[nodiscard]] LoadCellRecord record(Instant arrival) const { return {{}, number, ft, 0, arrival.count()}; }
 };
 
 /// "3": rdt 3, ft 1003. "3@70": ft 70. "3..9@70": and the next ones, "/2": 2 of ft apart instead of `stride`. "!"

@@ -25,14 +25,13 @@ class Reordered {
       if (step.kind == Step::Kind::expire) window.expire(now, account, out);
       if (step.kind == Step::Kind::flush) window.flush(account, out);
       if (step.kind != Step::Kind::record) continue;
-      EXPECT_EQ(window.receive(step.record(), now, account, out), step.taken) << step.number << " at " << step.ft;
+      EXPECT_EQ(window.receive(step.record(now), account, out), step.taken) << step.number << " at " << step.ft;
     }
   }
   /// ft of the records, less 1000.
   std::vector<std::int32_t> delivered() const {
     std::vector<std::int32_t> numbers;
-    for (const StampedRecord& stamped : out)
-      numbers.push_back(static_cast<std::int32_t>(stamped.record.ft_sequence - 1000));
+    for (const LoadCellRecord& stamped : out) numbers.push_back(static_cast<std::int32_t>(stamped.ft_sequence - 1000));
     return numbers;
   }
   void expect(const std::string& what, const std::string& counts) const {
@@ -49,7 +48,7 @@ class Reordered {
   Instant now = 1s;
   LossTracker account{1, 7000};
   ReorderWindow window{64, 20ms, 1};
-  std::vector<StampedRecord> out;
+  std::vector<LoadCellRecord> out;
 };
 
 struct Case {
@@ -141,16 +140,16 @@ TEST(ReorderProperty, EveryRecordThatCameInTimeIsDeliveredOnceAndInOrder) {
     const unsigned stride = 1 + random() % 50;
     LossTracker account(stride, 7000);
     ReorderWindow window(64, 1s, stride);
-    std::vector<StampedRecord> out;
+    std::vector<LoadCellRecord> out;
     std::uint32_t rdt = random(), ft = random();
     struct Sent {
       unsigned address;
-      Record record;
+      LoadCellRecord record;
     };
     std::vector<Sent> channel;
     std::uint64_t lost = 0, doubled = 0;
     for (unsigned i = 0; i < 1000; ++i, ++rdt, ft += stride) {
-      Record record;
+      LoadCellRecord record;
       record.rdt_sequence = rdt;
       record.ft_sequence = ft;
       const bool edge = i == 0 || i == 999;
@@ -178,7 +177,7 @@ TEST(ReorderProperty, EveryRecordThatCameInTimeIsDeliveredOnceAndInOrder) {
     EXPECT_EQ(c.duplicates, doubled) << seed;
     EXPECT_EQ(c.late + c.restarts + c.reboots + c.irregular, 0u) << seed;
     for (std::size_t i = 1; i < out.size(); ++i)
-      ASSERT_GT(static_cast<std::int32_t>(out[i].record.ft_sequence - out[i - 1].record.ft_sequence), 0) << seed;
+      ASSERT_GT(static_cast<std::int32_t>(out[i].ft_sequence - out[i - 1].ft_sequence), 0) << seed;
   }
 }
 

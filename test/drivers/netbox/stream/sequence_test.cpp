@@ -21,10 +21,7 @@ class Stream {
 
   bool accept(std::uint32_t rdt, std::uint32_t ft) {
     now_ += from_seconds(stride_ / 7000.0);
-    Record record;
-    record.rdt_sequence = rdt;
-    record.ft_sequence = ft;
-    return account_.accept(record, now_);
+    return account_.accept({{}, rdt, ft, 0, now_.count()});
   }
   /// Returns the number of records accepted. Each must be taken or refused as its step says.
   std::uint64_t feed(const char* text) {
@@ -38,7 +35,7 @@ class Stream {
       accepted += step.taken;
       if (const auto other = account_.take_confirmed()) {
         ++accepted;
-        confirmed_ft = other->record.ft_sequence;
+        confirmed_ft = other->ft_sequence;
       }
     }
     return accepted;

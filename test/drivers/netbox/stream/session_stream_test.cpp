@@ -25,7 +25,7 @@ TEST_F(SessionTest, PutsSwappedDatagramsInOrder) {
   now += 1ms;
   receive(records(41, 1040, 40));
   ASSERT_EQ(out.size(), 120u);
-  for (std::uint32_t i = 0; i < 120; ++i) EXPECT_EQ(out[i].record.ft_sequence, 1000 + i);
+  for (std::uint32_t i = 0; i < 120; ++i) EXPECT_EQ(out[i].ft_sequence, 1000 + i);
   EXPECT_EQ(session.release_deadline(), kNever);
   EXPECT_EQ(session.counters().lost_network + session.counters().late, 0u);
 }
@@ -109,7 +109,7 @@ TEST_F(SessionTest, NeverAllocatesInTheCallersVectorOnceItIsLargeEnough) {
   start_streaming();
   out.clear();
   out.reserve(40);
-  const StampedRecord* const address = out.data();
+  const LoadCellRecord* const address = out.data();
   for (std::uint32_t i = 1; i < 100; ++i) {
     out.clear();
     receive(records(1 + 40 * i, 1000 + 40 * i, 40));
@@ -129,7 +129,7 @@ TEST(SessionProperty, TheAccountClosesForEveryChannel) {
     settings.records_per_datagram = static_cast<int>(1 + random() % 40);
     const auto k = static_cast<unsigned>(settings.records_per_datagram);
     Session session(settings);
-    std::vector<StampedRecord> out;
+    std::vector<LoadCellRecord> out;
     Instant now = 1s;
     session.start(now);
     session.advance(now = session.deadline());
@@ -161,14 +161,14 @@ TEST(SessionProperty, TheAccountClosesForEveryChannel) {
     EXPECT_EQ(c.malformed, malformed) << seed;
     EXPECT_EQ(c.reboots + c.late, 0u) << seed;
     for (std::size_t i = 1; i < out.size(); ++i)
-      ASSERT_GT(static_cast<std::int32_t>(out[i].record.ft_sequence - out[i - 1].record.ft_sequence), 0) << seed;
+      ASSERT_GT(static_cast<std::int32_t>(out[i].ft_sequence - out[i - 1].ft_sequence), 0) << seed;
   }
 }
 
 TEST(SessionProperty, RandomDatagramsNeverBreakTheAccount) {
   std::mt19937 random(3);
   Session session{StreamSettings{}};
-  std::vector<StampedRecord> out;
+  std::vector<LoadCellRecord> out;
   Instant now = 1s;
   session.start(now);
   for (int i = 0; i < 20'000; ++i) {

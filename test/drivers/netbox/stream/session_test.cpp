@@ -42,9 +42,9 @@ TEST_F(SessionTest, StampsEachRecordWithItsDatagramsArrival) {
   now += 5714us;
   receive(records(41, 1040, 40));
   ASSERT_EQ(out.size(), 40u);
-  EXPECT_EQ(out.front().arrival, now);
-  EXPECT_EQ(out.back().arrival, now);
-  EXPECT_EQ(out.back().record.rdt_sequence, 80u);
+  EXPECT_EQ(out.front().arrival(), now);
+  EXPECT_EQ(out.back().arrival(), now);
+  EXPECT_EQ(out.back().rdt_sequence, 80u);
 }
 
 TEST_F(SessionTest, DiscardsWhatAnOldStreamStillSendsAndWaitsForItsEnd) {

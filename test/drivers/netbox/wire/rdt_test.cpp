@@ -44,8 +44,8 @@ std::vector<Golden> golden(const std::string& kind) {
   return found;
 }
 
-Record record_of(const Golden& golden) {
-  Record record{golden.values.at(0), golden.values.at(1), golden.values.at(2), {}};
+LoadCellRecord record_of(const Golden& golden) {
+  LoadCellRecord record{{}, golden.values.at(0), golden.values.at(1), golden.values.at(2)};
   for (std::size_t axis = 0; axis < 6; ++axis)
     record.counts[axis] = static_cast<std::int32_t>(golden.values.at(3 + axis));
   return record;
@@ -71,7 +71,7 @@ TEST(RdtRecord, DecodesTheManualsRecords) {
   const std::vector<Golden> records = golden("record");
   ASSERT_EQ(records.size(), 3u);
   for (const Golden& expected : records) {
-    std::array<Record, kMaxRecords> out;
+    std::array<LoadCellRecord, kMaxRecords> out;
     ASSERT_EQ(decode(expected.bytes, out), 1u) << expected.name;
     EXPECT_EQ(out[0], record_of(expected)) << expected.name;
   }
@@ -89,7 +89,7 @@ TEST(RdtRecord, DecodesABufferedDatagramInItsOrder) {
   const std::vector<Golden> records = golden("record");
   Bytes datagram = records[0].bytes;
   datagram.insert(datagram.end(), records[1].bytes.begin(), records[1].bytes.end());
-  std::array<Record, kMaxRecords> out;
+  std::array<LoadCellRecord, kMaxRecords> out;
   ASSERT_EQ(decode(datagram, out), 2u);
   EXPECT_EQ(out[0], record_of(records[0]));
   EXPECT_EQ(out[1], record_of(records[1]));
@@ -98,7 +98,7 @@ TEST(RdtRecord, DecodesABufferedDatagramInItsOrder) {
 TEST(RdtRecord, TakesEveryWholeNumberOfRecordsUpTo40AndNoOtherSize) {
   const Bytes zeros(2000, 0);
   for (std::size_t size = 0; size <= zeros.size(); ++size) {
-    std::array<Record, kMaxRecords> out;
+    std::array<LoadCellRecord, kMaxRecords> out;
     const bool whole = size > 0 && size % 36 == 0 && size <= 1440;
     EXPECT_EQ(decode(std::span(zeros).first(size), out), whole ? size / 36 : 0u) << size;
   }
@@ -106,14 +106,14 @@ TEST(RdtRecord, TakesEveryWholeNumberOfRecordsUpTo40AndNoOtherSize) {
 
 TEST(RdtRecord, RefusesTheSizesNamedByTheFaultList) {
   for (const std::size_t size : {0u, 35u, 37u, 71u, 1476u}) {
-    std::array<Record, kMaxRecords> out;
+    std::array<LoadCellRecord, kMaxRecords> out;
     EXPECT_EQ(decode(Bytes(size, 0xff), out), 0u) << size;
   }
 }
 
 TEST(RdtRecord, RandomDatagramsComeOutAsTheyWouldBeWritten) {
   std::mt19937 random(1);
-  std::array<Record, kMaxRecords> out;
+  std::array<LoadCellRecord, kMaxRecords> out;
   for (int trial = 0; trial < 5000; ++trial) {
     Bytes datagram(36 * std::uniform_int_distribution<std::size_t>(1, 40)(random));
     for (auto& byte : datagram) byte = static_cast<std::uint8_t>(random());
@@ -131,7 +131,7 @@ TEST(RdtRecord, RandomDatagramsComeOutAsTheyWouldBeWritten) {
 }
 
 TEST(RdtRecord, LeavesTheRestOfTheOutputAlone) {
-  std::array<Record, kMaxRecords> out;
+  std::array<LoadCellRecord, kMaxRecords> out;
   out[2].rdt_sequence = 4711;
   EXPECT_EQ(decode(test::records(1, 1, 2), out), 2u);
   EXPECT_EQ(out[2].rdt_sequence, 4711u);

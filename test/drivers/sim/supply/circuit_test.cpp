@@ -65,21 +65,21 @@ TEST(SupplyCircuit, TakesNoCurrentBack) {
 TEST(SupplyCircuit, TripsWhenTheVoltageRises) {
   SupplyCircuit circuit = at_twelve_volts();
   run(circuit, {-1, 0}, 0.010);
-  EXPECT_EQ(circuit.tripped(), SupplyTrip::over_voltage);
+  EXPECT_EQ(circuit.tripped(), SupplyProtection::over_voltage);
   EXPECT_FALSE(circuit.output());
   run(circuit, {}, 10);
   EXPECT_NEAR(circuit.volts(), 0, 0.01) << "the bleeder has emptied the capacitor";
   circuit.switch_output(true);
-  EXPECT_EQ(circuit.tripped(), SupplyTrip::none);
+  EXPECT_EQ(circuit.tripped(), SupplyProtection::none);
 }
 
 TEST(SupplyCircuit, TripsOnCurrentAfterAMomentOnly) {
   SupplyCircuit circuit = at_twelve_volts(10);
   run(circuit, {7, 0}, 0.001);
-  EXPECT_EQ(circuit.tripped(), SupplyTrip::none);
+  EXPECT_EQ(circuit.tripped(), SupplyProtection::none);
   run(circuit, {1, 0}, 0.010);
   run(circuit, {7, 0}, 0.010);
-  EXPECT_EQ(circuit.tripped(), SupplyTrip::over_current);
+  EXPECT_EQ(circuit.tripped(), SupplyProtection::over_current);
 }
 
 TEST(SupplyCircuit, IsDeadWhenOff) {

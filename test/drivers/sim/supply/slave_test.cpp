@@ -249,7 +249,7 @@ TEST(SimulatedHanmatek, HasItsGaps) {
 
 TEST(SimulatedHanmatek, TellsItsTripAsABit) {
   Asked supply(of_model("HM310P"));
-  supply.slave.circuit().trip(SupplyTrip::over_temperature);
+  supply.slave.circuit().trip(SupplyProtection::over_temperature);
   EXPECT_EQ(supply.slave.registers().read(2), 0b1000);
 }
 
