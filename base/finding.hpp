@@ -34,8 +34,4 @@ inline void put_worst_first(std::vector<Finding>& findings) {
                    [](const Finding& a, const Finding& b) { return a.severity > b.severity; });
 }
 
-[[nodiscard]] inline bool any_fault(const std::vector<Finding>& findings) {
-  return std::any_of(findings.begin(), findings.end(), [](const Finding& f) { return f.severity == Severity::fault; });
-}
-
 }  // namespace kphi

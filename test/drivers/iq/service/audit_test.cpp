@@ -245,7 +245,6 @@ TEST(IqAudit, PutsTheWorstFirst) {
   EXPECT_EQ(findings[0].severity, Severity::fault);
   EXPECT_EQ(findings[1].severity, Severity::warning);
   EXPECT_EQ(findings[2].severity, Severity::note);
-  EXPECT_TRUE(any_fault(findings));
 }
 
 TEST(IqAudit, RefusesAModuleThatSaysNothing) {
