@@ -3,7 +3,6 @@
 
 #include "commands/commands.hpp"
 #include "results/campaign_folder.hpp"
-#include "results/campaign_state.hpp"
 #include "results/file_layer.hpp"
 #include "results/run_reader.hpp"
 

@@ -7,9 +7,12 @@
 #include <cstdlib>
 #include <map>
 #include <optional>
+#include <system_error>
 #include <tuple>
+#include <utility>
 
 #include "base/number.hpp"
+#include "results/run_reader.hpp"
 
 namespace kphi::results {
 namespace {
@@ -63,6 +66,55 @@ std::vector<std::filesystem::path> complete_files(const std::filesystem::path& f
   return paths;
 }
 
+constexpr std::string_view kPart = ".h5.part";
+constexpr std::string_view kRun = ".h5";
+
+std::string set_aside(const CampaignFolder& folder, const std::filesystem::path& file, std::string_view ending,
+                      const std::string& becomes, FileLayer& files) {
+  std::string stem = file.string();
+  stem.resize(stem.size() - ending.size());
+  return on_disk(file.string(), [&] {
+    const std::filesystem::path to = free_name(stem + becomes, std::string(ending));
+    files.rename(file, to);
+    files.sync_folder(folder.runs());
+    return "runs/" + to.filename().string();
+  });
+}
+
+/// File (relative to the folder) → SHA-256, as last written down.
+std::map<std::string, std::string> recorded_digests(const CampaignFolder& folder, CampaignVerification& found) {
+  std::map<std::string, std::string> digests;
+  if (!std::filesystem::exists(folder.journal())) {
+    found.problems.push_back(folder.journal().string() + ": missing");
+    return digests;
+  }
+  const JournalReading journal = read_journal(folder.journal());
+  found.entries = journal.entries.size();
+  found.torn_last_line = journal.torn_last_line;
+  found.problems.insert(found.problems.end(), journal.problems.begin(), journal.problems.end());
+  for (const JournalEntry& entry : journal.entries) {
+    const auto& data = entry.data;
+    if (!data.is_object() || !data.contains("file") || !data.contains("sha256")) continue;
+    if (data["file"].is_string() && data["sha256"].is_string()) digests[data["file"]] = data["sha256"];
+  }
+  return digests;
+}
+
+/// Empty: the file is the one of the journal.
+std::string problem_with(const std::filesystem::path& path, const std::string& sha256) {
+  if (!std::filesystem::exists(path)) return path.string() + ": missing, but in the journal";
+  if (sha256_of_file(path) != sha256) return path.string() + ": SHA-256 does not match the journal";
+  return {};
+}
+
+/// Copying or version control may have made it writable; the SHA-256 shows whether anybody changed it.
+bool is_writable(const std::filesystem::path& path) {
+  using std::filesystem::perms;
+  std::error_code none;
+  const perms all = std::filesystem::status(path, none).permissions();
+  return (all & (perms::owner_write | perms::group_write | perms::others_write)) != perms::none;
+}
+
 }  // namespace
 
 std::string run_file_name(const std::string& propeller_id, double occlusion_deg, int repetition) {
@@ -106,6 +158,70 @@ std::vector<std::filesystem::path> CampaignFolder::other_runs() const {
   std::vector<std::filesystem::path> paths = files_in(runs());
   std::erase_if(paths, [](const auto& file) { return parse_run_name(file.filename().string()).has_value(); });
   return paths;
+}
+
+CampaignState state_of(const JournalReading& journal) {
+  CampaignState state;
+  for (const JournalEntry& entry : journal.entries) {
+    if (entry.event == kCampaignStarted || entry.event == kCampaignResumed) state.identity = entry.data;
+    if (entry.event == kCampaignResumed) state.safety_stop.clear();
+    if (entry.data.value("safety_stop", false)) state.safety_stop = entry.data.value("reason", "unknown cause");
+    state.finished = entry.event == kCampaignFinished;
+    if (entry.event != kRunAccepted) continue;
+    const auto file = entry.data.find("file");
+    const auto digest = entry.data.find("sha256");
+    if (file == entry.data.end() || digest == entry.data.end()) continue;
+    state.accepted.push_back({*file, *digest, entry.time_ns});
+  }
+  return state;
+}
+
+std::vector<std::string> changed_runs(const CampaignFolder& folder, const CampaignState& state) {
+  std::vector<std::string> problems;
+  for (const AcceptedRun& run : state.accepted) {
+    if (std::string problem = problem_with(folder.path() / run.file, run.sha256); !problem.empty())
+      problems.push_back(std::move(problem));
+  }
+  return problems;
+}
+
+std::vector<std::string> set_leftovers_aside(const CampaignFolder& folder, const CampaignState& state,
+                                             FileLayer& files) {
+  std::vector<std::string> names;
+  for (const auto& file : folder.complete_runs()) {
+    const std::string name = "runs/" + file.filename().string();
+    const bool accepted = std::ranges::any_of(state.accepted, [&](const AcceptedRun& run) { return run.file == name; });
+    if (!accepted) names.push_back(set_aside(folder, file, kRun, ".unaccepted", files));
+  }
+  for (const auto& file : folder.other_runs()) {
+    const std::string name = file.filename().string();
+    if (!name.ends_with(kPart) || name.find(".interrupted") != std::string::npos) continue;
+    names.push_back(set_aside(folder, file, kPart, ".interrupted", files));
+  }
+  return names;
+}
+
+CampaignVerification verify_campaign(const CampaignFolder& folder) {
+  CampaignVerification found;
+  const auto digests = recorded_digests(folder, found);
+  for (const auto& [file, digest] : digests) {
+    if (std::string problem = problem_with(folder.path() / file, digest); !problem.empty())
+      found.problems.push_back(std::move(problem));
+  }
+  std::vector<std::filesystem::path> runs = folder.complete_runs();
+  for (const auto& path : folder.reference_runs()) runs.push_back(path);
+  for (const auto& path : runs) {
+    ++found.runs;
+    if (is_writable(path)) found.remarks.push_back(path.string() + ": writable; run chmod a-w on it");
+    for (const std::string& problem : verify_run(path).problems) {
+      found.problems.push_back(problem.find(path.string()) == std::string::npos ? path.string() + ": " + problem
+                                                                                : problem);
+    }
+    if (!digests.contains("runs/" + path.filename().string())) {
+      found.problems.push_back(path.string() + ": not in the journal");
+    }
+  }
+  return found;
 }
 
 }  // namespace kphi::results

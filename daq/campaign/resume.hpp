@@ -9,7 +9,6 @@
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 #include "results/campaign_folder.hpp"
-#include "results/campaign_state.hpp"
 
 namespace kphi::daq {
 

@@ -3,7 +3,7 @@
 
 #include "base/error.hpp"
 #include "daq/guard/interlock.hpp"
-#include "results/campaign_state.hpp"
+#include "results/campaign_folder.hpp"
 #include "results/file_layer.hpp"
 #include "results/journal.hpp"
 #include "results/reduction/reduction.hpp"

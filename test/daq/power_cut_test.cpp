@@ -9,7 +9,7 @@
 #include "daq/campaign/campaign_run.hpp"
 #include "daq/campaign/resume.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
-#include "results/campaign_state.hpp"
+#include "results/campaign_folder.hpp"
 #include "results/journal.hpp"
 #include "test/daq/model_disk.hpp"
 

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include "results/campaign_folder.hpp"
-#include "results/campaign_state.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/reduction/repetitions.hpp"
 #include "results/run_reader.hpp"

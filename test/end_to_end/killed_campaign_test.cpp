@@ -9,7 +9,7 @@
 #include <random>
 #include <thread>
 
-#include "results/campaign_state.hpp"
+#include "results/campaign_folder.hpp"
 #include "test/daq/bench_fixture.hpp"
 #include "test/end_to_end/process.hpp"
 #include "test/source_dir.hpp"

@@ -12,7 +12,6 @@
 #include "base/error.hpp"
 #include "base/number.hpp"
 #include "results/campaign_folder.hpp"
-#include "results/campaign_state.hpp"
 #include "results/file_layer.hpp"
 #include "results/journal.hpp"
 #include "results/steps_csv.hpp"

@@ -5,7 +5,7 @@
 #include <map>
 
 #include "profiles/plan.hpp"
-#include "results/campaign_state.hpp"
+#include "results/campaign_folder.hpp"
 #include "results/journal.hpp"
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"

@@ -7,7 +7,7 @@
 
 #include "daq/campaign/campaign_run.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
-#include "results/campaign_state.hpp"
+#include "results/campaign_folder.hpp"
 #include "results/journal.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/reduction/repetitions.hpp"

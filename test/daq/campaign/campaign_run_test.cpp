@@ -4,7 +4,7 @@
 
 #include "base/error.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
-#include "results/campaign_state.hpp"
+#include "results/campaign_folder.hpp"
 #include "results/journal.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"

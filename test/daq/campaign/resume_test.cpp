@@ -8,7 +8,7 @@
 #include "base/error.hpp"
 #include "daq/campaign/campaign_run.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
-#include "results/campaign_state.hpp"
+#include "results/campaign_folder.hpp"
 #include "results/journal.hpp"
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
