@@ -22,7 +22,7 @@ constexpr std::chrono::milliseconds kAsk{2};  // between two checks of the newes
 
 std::unique_ptr<supply::Supply> open_supply(const profiles::SupplyConfig& config, const Clock& clock) {
   try {
-    if (scpi::is_scpi(config.uri)) return scpi::open_supply(config.uri, clock);
+    if (scpi::is_scpi(config.uri)) return std::make_unique<scpi::ScpiSupply>(scpi::open_line(config.uri), clock);
     return std::make_unique<supply::ModbusSupply>(supply::parse_address(config.uri), clock);
   } catch (const std::invalid_argument& error) {
     throw ConfigurationError(std::string("supply.uri: ") + error.what());

@@ -170,8 +170,4 @@ void ScpiSupply::fail(std::string_view operation, const std::string& cause, cons
   throw DeviceError(identity_.device, std::string(operation), cause, next_move);
 }
 
-std::unique_ptr<supply::Supply> open_supply(const std::string& uri, const Clock& clock) {
-  return std::make_unique<ScpiSupply>(open_line(uri), clock);
-}
-
 }  // namespace kphi::scpi

@@ -44,7 +44,4 @@ class ScpiSupply final : public supply::Supply {
   const Dialect* dialect_ = nullptr;
 };
 
-/// Throws as open_line() does. `clock` outlives it.
-[[nodiscard]] std::unique_ptr<supply::Supply> open_supply(const std::string& uri, const Clock& clock);
-
 }  // namespace kphi::scpi

@@ -41,7 +41,8 @@ TEST(ScpiAddress, OpensASupplyThatOwnsItsLine) {
   sim::ScpiInstrument instrument;
   const sim::ScpiTcp server(instrument, faults);
   instrument.connect_load(6);
-  const auto supply = open_supply("scpi-tcp:127.0.0.1:" + std::to_string(server.port()), clock);
+  const auto supply =
+      std::make_unique<ScpiSupply>(open_line("scpi-tcp:127.0.0.1:" + std::to_string(server.port())), clock);
   EXPECT_EQ(supply->identity().model, "SIM3010");
   EXPECT_FALSE(supply->read().output);
   (void)supply->apply({Volts(12), Amperes(5), Volts(13), Amperes(6)});
