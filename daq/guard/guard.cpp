@@ -111,12 +111,6 @@ bool Guard::relay() {
   return (bench_.supply() != nullptr && supply_readings_.move(*bench_.supply(), inspect)) || moved;
 }
 
-std::vector<StreamEvent> Guard::take_events() {
-  std::vector<StreamEvent> taken;
-  events_.consume_all([&](const StreamEvent& event) { taken.push_back(event); });
-  return taken;
-}
-
 void Guard::trip(Trip trip) noexcept {
   if (!judging_ || latch_.trip() != nullptr) return;
   trip.noticed = bench_.clock().now();

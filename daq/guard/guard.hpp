@@ -48,7 +48,7 @@ class Guard final {
   std::size_t take(std::span<MotorReading> out) { return readings_.take(out); }
   std::size_t take(std::span<SupplyReading> out) { return supply_readings_.take(out); }
   /// Events of load cell and motor.
-  [[nodiscard]] std::vector<StreamEvent> take_events();
+  [[nodiscard]] std::vector<StreamEvent> take_events() { return take_all(events_); }
 
   // The runner's thread.
   /// A step or another phase begins. Throws SafetyStop when the guard has stalled and takes no more marks.

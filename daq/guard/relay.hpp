@@ -9,6 +9,14 @@
 
 namespace kphi::daq {
 
+/// Consumer. Everything that waits, oldest first.
+template <class T>
+[[nodiscard]] std::vector<T> take_all(boost::lockfree::spsc_queue<T>& queue) {
+  std::vector<T> taken;
+  queue.consume_all([&](const T& each) { taken.push_back(each); });
+  return taken;
+}
+
 template <class T>
 class Relay {
  public:

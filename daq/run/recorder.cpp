@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "daq/bench/device_records.hpp"
 #include "daq/guard/guard_limits.hpp"
 
 namespace kphi::daq {
@@ -91,12 +90,6 @@ void Recorder::drain(std::vector<T>& buffer) {
 void Recorder::mark(const results::PhaseMark& mark) {
   // The queue holds more marks than a run has; it can only be full when nobody drains it.
   if (!marks_.push(mark)) throw std::runtime_error("recorder: stalled, its queue of marks is full");
-}
-
-std::vector<StreamEvent> Recorder::take_events() {
-  std::vector<StreamEvent> taken;
-  events_.consume_all([&](const StreamEvent& event) { taken.push_back(event); });
-  return taken;
 }
 
 void Recorder::check_failure() {

@@ -25,7 +25,7 @@ class Recorder {
   /// Begins a phase.
   void mark(const results::PhaseMark& mark);
   /// Events of load cell and motor since the last call, already in the file.
-  [[nodiscard]] std::vector<StreamEvent> take_events();
+  [[nodiscard]] std::vector<StreamEvent> take_events() { return take_all(events_); }
   /// Records an event of the runner. Call it only after the last drain().
   void note(const StreamEvent& event);
   /// Mean and standard deviation of all axes over the present phase, if it measures a bias or the zero before.
