@@ -1,5 +1,6 @@
 #include "daq/live/live_session.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -17,30 +18,19 @@ double calendar_seconds(const Clock& clock, Instant now) {
 
 }  // namespace
 
-QuickLook::Look QuickLook::mean(std::size_t begin, std::size_t end) const {
-  Look sum{0, 0};
-  for (std::size_t i = begin; i < end; ++i) {
-    sum.thrust_n += looks_[i].thrust_n;
-    sum.speed_squared += looks_[i].speed_squared;
-  }
-  const auto n = static_cast<double>(end - begin);
-  return {sum.thrust_n / n, sum.speed_squared / n};
-}
-
 StepFigures QuickLook::result() const {
-  const std::size_t n = looks_.size();
+  const auto n = static_cast<Eigen::Index>(thrusts_n_.size());
   if (n == 0) return {};
-  const Look whole = mean(0, n);
-  StepFigures result{n, whole.thrust_n, std::sqrt(whole.speed_squared), whole.thrust_n / whole.speed_squared, kUnknown};
+  const Eigen::Map<const Eigen::ArrayXd> thrust(thrusts_n_.data(), n), squared(speeds_squared_.data(), n);
+  const auto k_of = [&](Eigen::Index begin, Eigen::Index end) {
+    return thrust.segment(begin, end - begin).mean() / squared.segment(begin, end - begin).mean();
+  };
+  StepFigures result{thrusts_n_.size(), thrust.mean(), std::sqrt(squared.mean()), k_of(0, n), kUnknown};
   if (n < 2 * kBlocks) return result;
   // Means of successive blocks: what is correlated within a block counts once.
-  double sum = 0;
-  for (std::size_t block = 0; block < kBlocks; ++block) {
-    const Look part = mean(block * n / kBlocks, (block + 1) * n / kBlocks);
-    const double off = part.thrust_n / part.speed_squared - result.k;
-    sum += off * off;
-  }
-  result.u_k = std::sqrt(sum / (kBlocks * (kBlocks - 1)));
+  Eigen::Array<double, kBlocks, 1> blocks;
+  for (Eigen::Index i = 0; i < kBlocks; ++i) blocks[i] = k_of(i * n / kBlocks, (i + 1) * n / kBlocks);
+  result.u_k = std::sqrt((blocks - result.k).square().sum() / (kBlocks * (kBlocks - 1)));
   return result;
 }
 

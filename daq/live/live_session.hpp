@@ -17,18 +17,17 @@ namespace kphi::daq::live {
 /// Preliminary k of a step, for the page.
 class QuickLook {
  public:
-  static constexpr std::size_t kBlocks = 5;
+  static constexpr int kBlocks = 5;
 
-  void begin() { looks_.clear(); }
-  void add(Newtons thrust, RadPerSec speed) { looks_.push_back({thrust.value(), speed.value() * speed.value()}); }
+  void begin() { *this = {}; }
+  void add(Newtons thrust, RadPerSec speed) {
+    thrusts_n_.push_back(thrust.value());
+    speeds_squared_.push_back(speed.value() * speed.value());
+  }
   [[nodiscard]] StepFigures result() const;
 
  private:
-  struct Look {
-    double thrust_n, speed_squared;
-  };
-  [[nodiscard]] Look mean(std::size_t begin, std::size_t end) const;
-  std::vector<Look> looks_;
+  std::vector<double> thrusts_n_, speeds_squared_;
 };
 
 class LiveProgress final : public Progress {
