@@ -185,6 +185,7 @@ ExitCode show_replay(const Asked& asked) {
   const results::RunRecording recording = results::read_run(asked.path);
   live::LiveSession view(asked.live, live::subject_of(recording));
   put(stderr, live_greeting(view));
+  if (asked.live.port) put(stderr, "The replay starts when a browser opens this address; Ctrl-C ends it.\n");
   const SignalWatch signals;
   const std::function<bool()> stop_asked = [] { return SignalWatch::count() > 0; };
   while (asked.live.port && !view.is_watched() && !stop_asked())
