@@ -48,20 +48,15 @@ std::optional<Cooling> read_cooling(ProfileReader& file) {
   return cooling;
 }
 
-template <class T>
-std::optional<T> read_limit(ProfileReader& file, const std::string& key, double factor = 1) {
-  const std::string pointer = "/limits/" + key;
-  return file.has(pointer) ? std::optional<T>(factor * file.number(pointer)) : std::nullopt;
-}
-
 Limits read_limits(ProfileReader& file) {
   Limits limits{from_rpm(file.number("/limits/speed_max_rpm")), Newtons(file.number("/limits/thrust_max_n")),
                 Amperes(file.number("/limits/supply_current_max_a")),
                 Celsius(file.number("/limits/coil_temperature_max_degc")), read_cooling(file)};
-  limits.torque_max = read_limit<NewtonMetres>(file, "torque_max_nm");
-  limits.supply_voltage_min = read_limit<Volts>(file, "supply_voltage_min_v");
-  limits.supply_voltage_max = read_limit<Volts>(file, "supply_voltage_max_v");
-  limits.speed_error_max = read_limit<double>(file, "speed_error_max_percent", 0.01);
+  limits.torque_max = std::optional<NewtonMetres>(file.find<double>("/limits/torque_max_nm"));
+  limits.supply_voltage_min = std::optional<Volts>(file.find<double>("/limits/supply_voltage_min_v"));
+  limits.supply_voltage_max = std::optional<Volts>(file.find<double>("/limits/supply_voltage_max_v"));
+  if (const auto percent = file.find<double>("/limits/speed_error_max_percent"))
+    limits.speed_error_max = 0.01 * *percent;
   const double supply = file.number("/supply_v");
   const auto refuse = [&](const char* key, double volts, const char* relation, const char* remedy) {
     file.refuse(std::string("/limits/") + key,

@@ -4,8 +4,6 @@
 
 #include <string_view>
 
-#include "profiles/schema.hpp"
-
 namespace kphi::profiles {
 namespace {
 

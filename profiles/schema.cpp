@@ -3,15 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <functional>
-#include <optional>
 #include <regex>
 #include <set>
-#include <stdexcept>
-#include <string>
 #include <string_view>
-#include <utility>
 
 namespace kphi::profiles {
 namespace {
@@ -148,10 +143,6 @@ std::vector<std::string> keys_of(const json& object) {
 
 std::vector<std::string> known_keys(const json& schema) { return keys_of(schema.value("properties", json::object())); }
 
-bool contains(const std::vector<std::string>& words, const std::string& word) {
-  return std::ranges::find(words, word) != words.end();
-}
-
 void check_type(const Spot& s, const json& type, Findings& findings) {
   const auto fits = [&](const json& name) { return (s.value.*type_named(name).is)(); };
   if (type.is_array()) {
@@ -279,7 +270,7 @@ void check_other_keys(const Spot& s, const json& rule, Findings& findings) {
   if (!s.value.is_object()) return;
   const std::vector<std::string> known = known_keys(s.schema);
   for (const auto& [key, value] : s.value.items()) {
-    if (contains(known, key)) continue;
+    if (std::ranges::count(known, key) > 0) continue;
     const std::string pointer = child_pointer(s.pointer, key);
     if (rule.is_object()) {
       check({s.document, s.whole_schema, rule, value, pointer}, findings);
@@ -297,7 +288,7 @@ void check_required(const Spot& s, const json& required, Findings& findings) {
   const std::vector<std::string> known = known_keys(s.schema);
   const auto meant_elsewhere = [&](const std::string& key) {
     for (const std::string& present : keys_of(s.value)) {
-      if (contains(known, present)) continue;
+      if (std::ranges::count(known, present) > 0) continue;
       const auto by_unit = same_but_for_unit(present, known);
       if ((by_unit ? by_unit : nearest_name(present, known)) == key) return true;
     }

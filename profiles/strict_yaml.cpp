@@ -18,7 +18,6 @@
 #include <regex>
 #include <sstream>
 #include <string_view>
-#include <utility>
 
 #include "base/number.hpp"
 
@@ -82,16 +81,6 @@ struct Scalar {
   std::string next_move;
 };
 
-bool is_boolean_elsewhere(const std::string& word) {
-  static const std::regex kWords("yes|no|on|off|y|n|true|false");
-  return std::regex_match(word, kWords);
-}
-
-bool is_not_finite(const std::string& word) {
-  static const std::regex kWords("[+-]?([.]?(inf|nan)|infinity)");
-  return std::regex_match(word, kWords);
-}
-
 /// `digits` has no sign. Why other readers, or the reader of this page, may see another number in it.
 std::optional<std::string> doubtful_number(const std::string& digits) {
   static const std::pair<std::regex, const char*> kDoubts[] = {
@@ -104,29 +93,26 @@ std::optional<std::string> doubtful_number(const std::string& digits) {
   return std::nullopt;
 }
 
-/// `digits` has no sign.
-bool is_decimal(const std::string& digits) {
-  static const std::regex kDecimal("([0-9]+[.]?[0-9]*|[.][0-9]+)([eE][+-]?[0-9]+)?");
-  return std::regex_match(digits, kDecimal);
-}
-
 /// An unquoted scalar.
 Scalar read_plain_scalar(const std::string& text) {
+  static const std::regex kBooleanElsewhere("yes|no|on|off|y|n|true|false");
+  static const std::regex kNotFinite("[+-]?([.]?(inf|nan)|infinity)");
+  static const std::regex kDecimal("([0-9]+[.]?[0-9]*|[.][0-9]+)([eE][+-]?[0-9]+)?");
   if (text == "true" || text == "false") return {text == "true", "", ""};
   const std::string word = boost::algorithm::to_lower_copy(text);
-  if (is_boolean_elsewhere(word)) {
+  if (std::regex_match(word, kBooleanElsewhere)) {
     return {nullptr, fmt::format("{} is a boolean to some YAML readers and text to others", text),
             fmt::format("write true or false, or quote it: \"{}\"", text)};
   }
   const Scalar not_finite{nullptr, fmt::format("{} is not a finite number", text), "write a finite number"};
-  if (is_not_finite(word)) return not_finite;
+  if (std::regex_match(word, kNotFinite)) return not_finite;
 
   const bool has_sign = text[0] == '+' || text[0] == '-';
   const std::string digits = text.substr(has_sign ? 1 : 0);
   if (const auto doubt = doubtful_number(digits)) {
     return {nullptr, fmt::format("{} {}", text, *doubt), "write a plain decimal number, or quote it if it is text"};
   }
-  if (!is_decimal(digits)) return {text, "", ""};
+  if (!std::regex_match(digits, kDecimal)) return {text, "", ""};
   const int sign = text[0] == '-' ? -1 : 1;
   if (const auto whole = parse_integer<std::int64_t>(digits)) return {sign * *whole, "", ""};
   if (const auto number = parse_double(digits)) return {sign * *number, "", ""};
@@ -332,10 +318,6 @@ class Builder final : public YAML::EventHandler {
   throw RefusedFile(path, {{mark, "", what, next_move}});
 }
 
-std::string without_byte_order_mark(const std::string& text) {
-  return text.compare(0, 3, "\xEF\xBB\xBF") == 0 ? text.substr(3) : text;
-}
-
 }  // namespace
 
 Mark SourceDocument::value_mark(std::string pointer) const {
@@ -352,7 +334,8 @@ Mark SourceDocument::key_mark(const std::string& pointer) const {
 }
 
 SourceDocument parse_strict_yaml(const std::string& whole_text, const std::string& path) {
-  const std::string text = without_byte_order_mark(whole_text);
+  const bool has_byte_order_mark = whole_text.starts_with("\xEF\xBB\xBF");
+  const std::string text = whole_text.substr(has_byte_order_mark ? 3 : 0);
   if (text.size() > kMaxTextBytes) refuse(path, {}, "larger than 1 MiB", "check that this is the right file");
   const Lines lines(text);
   if (const auto bad = first_bad_character(text))
