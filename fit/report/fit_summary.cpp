@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "compensation/units.hpp"
 
@@ -12,17 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-template <class Value>
-Json maybe(const std::optional<Value>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
-template <class Range, class Write>
-Json list(const Range& range, Write write) {
-  Json array = Json::array();
-  for (const auto& one : range) array.push_back(write(one));
-  return array;
-}
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 std::string number_line(const char* name, double value, double error, const char* per) {
   const auto rpm = [](double k) { return to_newtons_per_rpm2(ThrustCoefficient(k)); };
@@ -45,6 +36,19 @@ void to_json(Json& json, const HypothesisTest& test) {
 }
 
 static void to_json(Json& json, const Budget& budget) {
+  Json rows = Json::array();
+  for (const BudgetRow& row : budget.rows) {
+    rows.push_back({{"source", row.source},
+                    {"type", row.evaluation == Evaluation::type_a ? "A" : "B"},
+                    {"u", row.u},
+                    {"unit", row.unit},
+                    {"sensitivity", row.sensitivity},
+                    {"contribution", row.known() ? row.contribution() : kUnknown},
+                    {"freedom", row.freedom},
+                    {"share", budget.share(row)},
+                    {"common", row.common},
+                    {"note", row.note}});
+  }
   json = {{"quantity", budget.quantity},
           {"unit", budget.unit},
           {"value", budget.value},
@@ -52,18 +56,11 @@ static void to_json(Json& json, const Budget& budget) {
           {"freedom", budget.freedom()},
           {"coverage_factor_95", budget.coverage()},
           {"expanded_95", budget.expanded()},
-          {"rows", list(budget.rows, [&](const BudgetRow& row) {
-             return Json{{"source", row.source},
-                         {"type", row.evaluation == Evaluation::type_a ? "A" : "B"},
-                         {"u", row.u},
-                         {"unit", row.unit},
-                         {"sensitivity", row.sensitivity},
-                         {"contribution", row.known() ? Json(row.contribution()) : Json(nullptr)},
-                         {"freedom", row.freedom},
-                         {"share", budget.share(row)},
-                         {"common", row.common},
-                         {"note", row.note}};
-           })}};
+          {"rows", rows}};
+}
+
+static void to_json(Json& json, const OcclusionCoefficient& row) {
+  json = {{"phi_deg", row.phi_deg}, {"k", row.k}, {"standard_error", row.standard_error}};
 }
 
 static void to_json(Json& json, const SpeedCoefficient& level) {
@@ -163,8 +160,8 @@ void to_json(Json& json, const Analysis& analysis) {
             {"linear_aicc", curvature.linear_aic},
             {"quadratic_aicc", curvature.quadratic_aic}}},
           {"line_shape",
-           {{"clipping_deg", maybe(analysis.shape.clipping_deg)},
-            {"zero_deg", maybe(analysis.shape.zero_deg)},
+           {{"clipping_deg", analysis.shape.clipping_deg.value_or(kUnknown)},
+            {"zero_deg", analysis.shape.zero_deg.value_or(kUnknown)},
             {"intercept_minus_K_T", analysis.shape.mismatch}}},
           {"remarks", analysis.remarks},
           {"differences", analysis.differences},
@@ -203,17 +200,14 @@ Json fit_json(const Identification& identification, const Analysis& analysis,
           {"k_unit", "N/(rad/s)^2"},
           {"K_T", line.K_T},
           {"K_T_standard_error", line.K_T_standard_error},
-          {"k_standard", standard ? Json(standard->value) : Json(nullptr)},
-          {"air_density_kg_m3", identification.air ? Json(identification.air->value) : Json(nullptr)},
+          {"k_standard", standard ? standard->value : kUnknown},
+          {"air_density_kg_m3", identification.air ? identification.air->value : kUnknown},
           {"anchored", line.anchored},
           {"intercept", line.intercept},
           {"slope_per_deg", line.slope_per_deg},
           {"covariance", line.covariance},
           {"overlap", compensation::name_of(identification.options.overlap)},
-          {"table", list(identification.table,
-                         [](const OcclusionCoefficient& row) {
-                           return Json{{"phi_deg", row.phi_deg}, {"k", row.k}, {"standard_error", row.standard_error}};
-                         })},
+          {"table", identification.table},
           {"steps_used", identification.selection.used.size()},
           {"steps_flagged", identification.selection.flagged.size()},
           {"estimator", name_of(identification.options.estimator)},

@@ -7,7 +7,6 @@
 #include <boost/locale/utf.hpp>
 #include <cctype>
 #include <cmath>
-#include <cstdint>
 #include <pugixml.hpp>
 #include <sstream>
 

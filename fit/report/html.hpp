@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace kphi::fit {
@@ -36,6 +37,8 @@ class HtmlTable {
  public:
   enum class Column : std::uint8_t { number, text, hash };
   struct Heading {
+    Heading(const char* title, Column content = Column::number) : html(title), column(content) {}
+    Heading(std::string title) : html(std::move(title)) {}
     std::string html;
     Column column = Column::number;
   };

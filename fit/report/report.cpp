@@ -17,8 +17,10 @@
 namespace kphi::fit {
 namespace {
 
-using enum HtmlTable::Column;
 using Cells = std::vector<std::string>;
+
+/// Heading of a column of text.
+HtmlTable::Heading text(const char* html) { return {html, HtmlTable::Column::text}; }
 
 /// N/(rad/s)² → N/RPM², for numbers on the page.
 double per_rpm2(double k) { return to_newtons_per_rpm2(ThrustCoefficient(k)); }
@@ -76,9 +78,9 @@ void sum_row(HtmlTable& table, const std::vector<Budget>& budgets, const char* n
 /// `standard`: of the same coefficients in standard air; may be empty.
 std::string budget_section(const std::vector<Budget>& budgets, const std::vector<Budget>& standard) {
   if (budgets.empty() || budgets.front().rows.empty()) return {};
-  std::vector<HtmlTable::Heading> headings{{"source", text}, {"type"}, {"shared by"}};
-  for (const Budget& budget : budgets) headings.push_back({typeset(budget.quantity) + ", %"});
-  headings.push_back({"from", text});
+  std::vector<HtmlTable::Heading> headings{text("source"), "type", "shared by"};
+  for (const Budget& budget : budgets) headings.emplace_back(typeset(budget.quantity) + ", %");
+  headings.push_back(text("from"));
   HtmlTable table(headings);
   for (const BudgetRow& row : budgets.front().rows) {
     Cells cells{typeset(row.source), row.evaluation == Evaluation::type_a ? "A" : "B", row.common ? "all φ" : "one φ"};
@@ -108,8 +110,7 @@ std::string test_section(const Analysis& analysis) {
   tests.insert(tests.end(), {&analysis.curvature.lack_of_fit, &analysis.curvature.quadratic});
   for (const HypothesisTest& test : analysis.differences) tests.push_back(&test);
   std::erase_if(tests, [](const HypothesisTest* test) { return test->name.empty(); });
-  HtmlTable table(
-      {{"test", text}, {"hypothesis", text}, {"statistic"}, {"degrees of freedom"}, {"p"}, {"verdict (5 %)", text}});
+  HtmlTable table({text("test"), text("hypothesis"), "statistic", "degrees of freedom", "p", text("verdict (5 %)")});
   for (const HypothesisTest* test : tests) {
     const bool f = test->error_freedom > 0;
     table.row(
@@ -127,7 +128,7 @@ std::string test_section(const Analysis& analysis) {
 }
 
 std::string speed_section(const std::vector<SpeedDependence>& speed) {
-  HtmlTable table({{"φ"}, {"change of k over the range, %"}, {"±, %"}, {"beyond noise, %"}});
+  HtmlTable table({"φ", "change of k over the range, %", "±, %", "beyond noise, %"});
   for (const SpeedDependence& one : speed) {
     const double k = one.levels.empty() ? 0 : one.levels.back().k;
     table.row({html_angle(one.phi_deg), html_number(100 * one.change.value, "{:+.3f}"),
@@ -138,12 +139,8 @@ std::string speed_section(const std::vector<SpeedDependence>& speed) {
 }
 
 std::string torque_section(const std::vector<TorqueCoefficient>& torque) {
-  HtmlTable table({{"φ"},
-                   {"k<sub>Q</sub>, N m/(rad/s)²"},
-                   {"share of k<sub>Q</sub>(0)"},
-                   {"±"},
-                   {"κ = k<sub>Q</sub>/k, mm"},
-                   {"±"}});
+  HtmlTable table(
+      {"φ", "k<sub>Q</sub>, N m/(rad/s)²", "share of k<sub>Q</sub>(0)", "±", "κ = k<sub>Q</sub>/k, mm", "±"});
   for (const TorqueCoefficient& one : torque)
     table.row({html_angle(one.phi_deg), with_power_of_ten(one.k_q.value, one.k_q.u), html_number(one.share, "{:.4f}"),
                one.phi_deg == 0 ? "–" : html_number(one.share_u, "{:.4f}"),
@@ -153,13 +150,8 @@ std::string torque_section(const std::vector<TorqueCoefficient>& torque) {
 }
 
 std::string prediction_section(const std::vector<LinePrediction>& predictions) {
-  HtmlTable table({{"φ"},
-                   {"k on the line, 10⁻⁶ N/(rad/s)²"},
-                   {"95 %: ±"},
-                   {"k<sub>i</sub>"},
-                   {"95 %: ±"},
-                   {"u of the speed ω̂, %"},
-                   {"remark", text}});
+  HtmlTable table({"φ", "k on the line, 10⁻⁶ N/(rad/s)²", "95 %: ±", "k<sub>i</sub>", "95 %: ±", "u of the speed ω̂, %",
+                   text("remark")});
   for (const LinePrediction& one : predictions)
     table.row({html_angle(one.phi_deg), html_number(1e6 * one.k.value, "{:.5f}"),
                html_number(1e6 * one.k.expanded(), "{:.5f}"), html_number(one.scaling_factor.value, "{:.4f}"),
@@ -171,7 +163,7 @@ std::string prediction_section(const std::vector<LinePrediction>& predictions) {
 }
 
 std::string rejected_section(const std::vector<RejectedPoint>& rejected) {
-  HtmlTable table({{"φ"}, {"repetition"}, {"step"}, {"speed, RPM"}, {"thrust, N"}, {"residual, N"}, {"robust weight"}});
+  HtmlTable table({"φ", "repetition", "step", "speed, RPM", "thrust, N", "residual, N", "robust weight"});
   for (const RejectedPoint& point : rejected)
     table.row({html_angle(point.phi_deg), fmt::format("{}", point.repetition), fmt::format("{}", point.step + 1),
                rpm_text(point.speed_rad_s), fmt::format("{:.4f}", point.thrust_n),
@@ -217,7 +209,7 @@ std::string clock_words(const MotorClock& clock) {
 }
 
 std::string hash_section(const std::vector<RunProvenance>& runs) {
-  HtmlTable table({{"file", text}, {"SHA-256", hash}}, true);
+  HtmlTable table({text("file"), {"SHA-256", HtmlTable::Column::hash}}, true);
   for (const RunProvenance& run : runs) table.row({html_escaped(run.file), html_escaped(run.sha256)});
   return section("Hashes of the runs", table);
 }
@@ -245,14 +237,8 @@ std::string coefficient_section(const Identification& identification) {
   const std::string at =
       identification.at_speed_rad_s > 0 ? " at " + rpm_text(identification.at_speed_rad_s) + " RPM" : "";
   const std::string units = ", N/(rad/s)²<br/><span class=\"soft\">N/RPM²</span>";
-  HtmlTable table({{"φ"},
-                   {"k" + units},
-                   {"k" + at + units},
-                   {"thrust share<br/>" + at},
-                   {"line − k"},
-                   {"residual<br/>rms, mN"},
-                   {"R²"},
-                   {"steps"}});
+  HtmlTable table({"φ", "k" + units, "k" + at + units, "thrust share<br/>" + at, "line − k", "residual<br/>rms, mN",
+                   "R²", "steps"});
   for (const OcclusionCoefficient& row : identification.table) {
     const double miss = identification.curve().at(from_degrees(row.phi_deg)).value() - row.k;
     table.row({html_angle(row.phi_deg), both_units(row.k, row.standard_error),
@@ -277,7 +263,7 @@ std::string standard_section(const Identification& identification) {
            "<p class=\"warning\">Air density unknown: k holds for the air of that day only, and k at standard density "
            "is not given. 10 K or 30 hPa change the density by 3 %. Add `ambient:` to the bench file.</p>\n";
   }
-  HtmlTable table({{"φ"}, {"k · 1.225/ρ, N/(rad/s)²"}, {"N/RPM²"}});
+  HtmlTable table({"φ", "k · 1.225/ρ, N/(rad/s)²", "N/RPM²"});
   for (const OcclusionCoefficient& row : identification.table)
     if (const auto& standard = row.standard)
       table.row({html_angle(row.phi_deg), with_power_of_ten(standard->value, standard->u),
@@ -292,8 +278,7 @@ std::string power_section(const Identification& identification) {
   constexpr std::size_t kRows = 5;
   std::map<double, std::vector<StepPower>> by_angle;
   for (const StepPower& row : power_of(identification.selection.used)) by_angle[row.phi_deg].push_back(row);
-  HtmlTable table(
-      {{"φ"}, {"step"}, {"speed, RPM"}, {"thrust, N"}, {"power, W"}, {"g/W"}, {"N/W"}, {"measured by", text}});
+  HtmlTable table({"φ", "step", "speed, RPM", "thrust, N", "power, W", "g/W", "N/W", text("measured by")});
   for (const auto& [phi, rows] : by_angle) {
     const std::size_t n = std::min(kRows, rows.size());
     for (std::size_t i = 1; i <= n; ++i) {
@@ -317,15 +302,8 @@ std::string step_section(const StepSelection& selection) {
           "A step is left out for a quality flag or by hand, both with a stated cause, never for being far from "
           "the others: the scatter of the repetitions is part of their uncertainty (JCGM 100, 3.4.7 and 4.2) and "
           "of the budget.");
-  HtmlTable table({{"φ"},
-                   {"repetition"},
-                   {"step"},
-                   {"commanded, RPM"},
-                   {"measured, RPM"},
-                   {"thrust, N"},
-                   {"flag", text},
-                   {"verdict", text}},
-                  true);
+  HtmlTable table(
+      {"φ", "repetition", "step", "commanded, RPM", "measured, RPM", "thrust, N", text("flag"), text("verdict")}, true);
   for (const FlaggedStep& flagged : selection.flagged) {
     const results::StepMean& step = flagged.step;
     table.row({html_angle(step.occlusion_deg), fmt::format("{}", step.repetition), fmt::format("{}", step.step + 1),
@@ -336,14 +314,8 @@ std::string step_section(const StepSelection& selection) {
 }
 
 std::string run_section(const Provenance& provenance, const StepSelection& selection) {
-  HtmlTable table({{"file", text},
-                   {"outcome", text},
-                   {"steps fitted"},
-                   {"left out"},
-                   {"samples expected"},
-                   {"received"},
-                   {"lost"},
-                   {"flags and events", text}},
+  HtmlTable table({text("file"), text("outcome"), "steps fitted", "left out", "samples expected", "received", "lost",
+                   text("flags and events")},
                   true);
   const auto bad = [](bool is_bad) { return is_bad ? std::optional<std::size_t>(1) : std::nullopt; };
   for (const RunProvenance& run : provenance.runs)
@@ -383,13 +355,9 @@ std::string provenance_section(const Identification& identification, const Prove
 }
 
 std::string family_section(std::span<const Fitted> family) {
-  HtmlTable table({{"propeller", text},
-                   {"diameter, in"},
-                   {"blades"},
-                   {"K<sub>T</sub>, N/(rad/s)²"},
-                   {"K<sub>T</sub>/D⁴, N/((rad/s)² m⁴)"},
-                   {"slope, N/(rad/s)² per degree"},
-                   {"slope, % of K<sub>T</sub> per degree"}});
+  HtmlTable table({text("propeller"), "diameter, in", "blades", "K<sub>T</sub>, N/(rad/s)²",
+                   "K<sub>T</sub>/D⁴, N/((rad/s)² m⁴)", "slope, N/(rad/s)² per degree",
+                   "slope, % of K<sub>T</sub> per degree"});
   for (const Fitted& fitted : family) {
     const Identification& one = fitted.identification;
     const LineFit& line = one.line;
@@ -405,8 +373,7 @@ std::string family_section(std::span<const Fitted> family) {
 }
 
 std::string slopes_section(std::span<const SharedSlope> slopes) {
-  HtmlTable table(
-      {{"diameter, in"}, {"propellers", text}, {"slope, N/(rad/s)² per degree"}, {"95 %, ±"}, {"equal slopes, p"}});
+  HtmlTable table({"diameter, in", text("propellers"), "slope, N/(rad/s)² per degree", "95 %, ±", "equal slopes, p"});
   for (const SharedSlope& one : slopes)
     table.row({fmt::format("{:g}", one.diameter_in), html_escaped(fmt::format("{}", fmt::join(one.propellers, ", "))),
                with_power_of_ten(one.slope.value, std::hypot(one.slope.u, one.common_u)),
@@ -517,7 +484,7 @@ std::string analysis_sections(const Analysis& analysis) {
 }
 
 std::string claims_section(std::span<const Claim> claims) {
-  HtmlTable table({{"statement", text}, {"found"}, {"95 %"}, {"allowed"}, {"unit", text}, {"verdict", text}});
+  HtmlTable table({text("statement"), "found", "95 %", "allowed", text("unit"), text("verdict")});
   for (const Claim& claim : claims)
     table.row({typeset(claim.statement), html_number(claim.value, "{:.4g}"), interval(claim.lower, claim.upper),
                interval(claim.allowed_lower, claim.allowed_upper), typeset(claim.unit), name_of(claim.verdict)},
