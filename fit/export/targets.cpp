@@ -84,23 +84,19 @@ std::string xml_comment_safe(std::string text) {
   return html_escaped(text);
 }
 
-class Parameters {
- public:
-  void add(const std::string& key, const std::string& value) { text_ += "      " + key + ": " + value + "\n"; }
+struct Parameters {
+  std::string text, unknown;
+
+  void add(const std::string& key, const std::string& value) { text += "      " + key + ": " + value + "\n"; }
   void number(const std::string& key, std::optional<double> value) {
     if (value) add(key, yaml_number(*value));
-    if (!value) unknown_ += (unknown_.empty() ? "" : ", ") + key;
+    if (!value) unknown += (unknown.empty() ? "" : ", ") + key;
   }
   void list(const std::string& key, const std::vector<double>& values) {
     std::string joined;
     for (const double value : values) joined += (joined.empty() ? "" : ", ") + yaml_number(value);
     add(key, "[" + joined + "]");
   }
-  [[nodiscard]] const std::string& text() const { return text_; }
-  [[nodiscard]] const std::string& unknown() const { return unknown_; }
-
- private:
-  std::string text_, unknown_;
 };
 
 template <class Unit>
@@ -261,11 +257,11 @@ Export to_ros2(const compensation::Coefficients& file, const ExportOptions&) {
   parameters.number("air_density_kg_m3", file.air_density_kg_m3);
   add_table(file, parameters);
   Export result;
-  result.text = comment(file, "# ") + "/**:\n  ros__parameters:\n    kphi:\n" + parameters.text();
+  result.text = comment(file, "# ") + "/**:\n  ros__parameters:\n    kphi:\n" + parameters.text;
   result.lost = {"hashes of the runs: only in the coefficient file",
                  "the covariance's shape: parameters have no matrices; it is row by row of (intercept, slope per rad)"};
-  if (!parameters.unknown().empty())
-    result.lost.push_back("unknown values: parameters have no null; left out: " + parameters.unknown());
+  if (!parameters.unknown.empty())
+    result.lost.push_back("unknown values: parameters have no null; left out: " + parameters.unknown);
   return result;
 }
 

@@ -86,16 +86,9 @@ double median_absolute(std::vector<double> values) {
 
 /// Null for Loss::none. `sigma` in units of the residuals.
 std::unique_ptr<ceres::LossFunction> loss_function(Loss loss, double sigma) {
-  switch (loss) {
-    case Loss::none:
-      return nullptr;
-    case Loss::huber:
-      return std::make_unique<ceres::HuberLoss>(1.345 * sigma);
-    case Loss::cauchy:
-      return std::make_unique<ceres::CauchyLoss>(2.385 * sigma);
-    case Loss::tukey:
-      return std::make_unique<ceres::TukeyLoss>(4.685 * sigma);
-  }
+  if (loss == Loss::huber) return std::make_unique<ceres::HuberLoss>(1.345 * sigma);
+  if (loss == Loss::cauchy) return std::make_unique<ceres::CauchyLoss>(2.385 * sigma);
+  if (loss == Loss::tukey) return std::make_unique<ceres::TukeyLoss>(4.685 * sigma);
   return nullptr;
 }
 

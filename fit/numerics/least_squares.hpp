@@ -3,7 +3,6 @@
 
 #include <ceres/ceres.h>
 
-#include <utility>
 #include <vector>
 
 namespace kphi::fit {

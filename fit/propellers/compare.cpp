@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.hpp"
-#include "base/number.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "fit/model/step_selection.hpp"
 #include "fit/model/thrust_fit.hpp"
@@ -23,7 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr double kLevel = 0.05;
 constexpr const char* kUnit = "N/(rad/s)^2";
 
 std::string coefficient_name(double phi_deg) { return fmt::format("k({:g}°)", std::round(phi_deg * 1e6) / 1e6); }
@@ -91,7 +89,7 @@ Difference difference(const ComparedValue& a, const ComparedValue& b) {
   const Estimate apart =
       difference(Estimate{b.value, b.standard_error, b.freedom}, Estimate{a.value, a.standard_error, a.freedom});
   result.standard_error = apart.u;
-  result.coverage = coverage_factor(apart.freedom, 1 - kLevel);
+  result.coverage = coverage_factor(apart.freedom, 1 - kTestLevel);
   result.p = student_test(apart, 0).p;
   return result;
 }
@@ -103,11 +101,11 @@ void judge(std::vector<Difference>& differences) {
     if (entry.judged && entry.p) judged.push_back(&entry);
   std::ranges::sort(judged, [](const Difference* a, const Difference* b) { return *a->p < *b->p; });
   for (std::size_t i = 0; i < judged.size(); ++i) {
-    if (!(*judged[i]->p < kLevel / static_cast<double>(judged.size() - i))) break;
+    if (!(*judged[i]->p < kTestLevel / static_cast<double>(judged.size() - i))) break;
     judged[i]->significant = true;
   }
   for (Difference& entry : differences)
-    if (!entry.judged && entry.p) entry.significant = *entry.p < kLevel;
+    if (!entry.judged && entry.p) entry.significant = *entry.p < kTestLevel;
 }
 
 Agreement verdict_of(const std::vector<Difference>& differences) {
@@ -273,7 +271,7 @@ std::string comparison_json(const Comparison& comparison) {
   const Json json{{"a", comparison.a.name},
                   {"b", comparison.b.name},
                   {"verdict", word(comparison.verdict)},
-                  {"level", kLevel},
+                  {"level", kTestLevel},
                   {"largest_open_share", comparison.largest_open_share},
                   {"diameter_ratio4", maybe(comparison.diameter_ratio4)},
                   {"differences", rows},

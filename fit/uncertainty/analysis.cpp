@@ -4,8 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "fit/uncertainty/budget.hpp"
+#include <numeric>
 
 namespace kphi::fit {
 namespace {
@@ -69,9 +68,7 @@ BudgetRow scaled(BudgetRow row, double by) {
 }
 
 double norm(const std::vector<double>& weights) {
-  double squares = 0;
-  for (const double weight : weights) squares += weight * weight;
-  return std::sqrt(squares);
+  return std::sqrt(std::inner_product(weights.begin(), weights.end(), weights.begin(), 0.0));
 }
 
 /// The line's own row weighs by how much of each point's deviation gets into the weights.

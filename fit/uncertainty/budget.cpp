@@ -4,9 +4,7 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
-#include <optional>
 
 #include "base/csv.hpp"
 #include "base/error.hpp"
