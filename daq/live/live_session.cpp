@@ -5,8 +5,6 @@
 #include <cmath>
 
 #include "daq/live/access_control.hpp"
-#include "daq/live/messages.hpp"
-#include "daq/live/server.hpp"
 
 namespace kphi::daq::live {
 namespace {

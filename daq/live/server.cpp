@@ -17,11 +17,9 @@
 #include <deque>
 #include <set>
 #include <thread>
-#include <vector>
 
 #include "base/error.hpp"
 #include "daq/live/access_control.hpp"
-#include "daq/live/feed.hpp"
 #include "daq/live/messages.hpp"
 
 namespace kphi::daq::live {
@@ -46,28 +44,72 @@ std::string_view view(beast::string_view text) { return {text.data(), text.size(
 }  // namespace
 
 /// Everything except draw() and clients() belongs to its thread.
-class Server::Impl {
- public:
-  Impl(Settings settings, Feed& feed);
-  ~Impl();
-  [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
-  [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
-  void draw() {
-    asio::post(io_, [this] { frame(); });
-  }
-  [[nodiscard]] std::size_t clients() const noexcept { return clients_now_; }
-
- private:
+struct Server::Impl {
   class Request;
   class Client;
-  void listen();
+
+  Impl(Settings settings, Feed& feed) : settings_(std::move(settings)), feed_(feed) {
+    listen();
+    accept();
+    arm();
+    thread_ = std::thread([this] { run(); });
+  }
+
+  ~Impl() {
+    asio::post(io_, [this] { begin_closing(); });
+    thread_.join();
+  }
+
+  void listen() {
+    Error failed;
+    const tcp::endpoint here(asio::ip::address_v4::loopback(), settings_.port);
+    acceptor_.open(here.protocol());
+    acceptor_.set_option(asio::socket_base::reuse_address(true));
+    acceptor_.bind(here, failed);
+    if (!failed) acceptor_.listen(asio::socket_base::max_listen_connections, failed);
+    if (failed) {
+      throw ConfigurationError(
+          fmt::format("--live {0}: cannot listen on 127.0.0.1:{0}: {1}; give another port, or none for any free one",
+                      settings_.port, failed.message()));
+    }
+    port_ = acceptor_.local_endpoint().port();
+  }
+
+  void run() {
+    // Linux gives each thread its own nice value: acquisition comes first.
+    ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), kYielding);
+    io_.run();
+  }
+
+  void arm() {
+    if (settings_.frame.count() == 0) return;
+    frames_due_.expires_after(settings_.frame);
+    frames_due_.async_wait([this](Error failed) {
+      if (failed || closing_) return;
+      frame();
+      arm();
+    });
+  }
+
+  void stop_asked() {
+    if (!settings_.can_stop || !feed_.ask_stop()) return;
+    broadcast(stop_message(feed_.newest().time_s));
+  }
+
+  void begin_closing() {
+    frame();
+    closing_ = true;
+    Error ignored;
+    acceptor_.close(ignored);
+    frames_due_.cancel();
+    closing_limit_.expires_after(kClosingLimit);
+    closing_limit_.async_wait([this](Error) { io_.stop(); });
+    finish_if_all_sent();
+  }
+
   void accept();
-  void run();
-  void arm();
   void frame();
   void broadcast(const Message& message);
-  void stop_asked();
-  void begin_closing();
   void finish_if_all_sent();
 
   Settings settings_;
@@ -295,55 +337,12 @@ class Server::Impl::Request : public std::enable_shared_from_this<Request> {
   std::size_t lingered_ = 0;
 };
 
-Server::Impl::Impl(Settings settings, Feed& feed) : settings_(std::move(settings)), feed_(feed) {
-  listen();
-  accept();
-  arm();
-  thread_ = std::thread([this] { run(); });
-}
-
-Server::Impl::~Impl() {
-  asio::post(io_, [this] { begin_closing(); });
-  thread_.join();
-}
-
-void Server::Impl::listen() {
-  Error failed;
-  const tcp::endpoint here(asio::ip::address_v4::loopback(), settings_.port);
-  acceptor_.open(here.protocol());
-  acceptor_.set_option(asio::socket_base::reuse_address(true));
-  acceptor_.bind(here, failed);
-  if (!failed) acceptor_.listen(asio::socket_base::max_listen_connections, failed);
-  if (failed) {
-    throw ConfigurationError(
-        fmt::format("--live {0}: cannot listen on 127.0.0.1:{0}: {1}; give another port, or none for any free one",
-                    settings_.port, failed.message()));
-  }
-  port_ = acceptor_.local_endpoint().port();
-}
-
-void Server::Impl::run() {
-  // Linux gives each thread its own nice value: acquisition comes first.
-  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(SYS_gettid)), kYielding);
-  io_.run();
-}
-
 void Server::Impl::accept() {
   acceptor_.async_accept([this](Error failed, tcp::socket socket) {
     if (failed == asio::error::operation_aborted) return;
     // Beyond the limit the connection is closed unread.
     if (!failed && requests_ < kMostRequests) std::make_shared<Request>(*this, std::move(socket))->read();
     accept();
-  });
-}
-
-void Server::Impl::arm() {
-  if (settings_.frame.count() == 0) return;
-  frames_due_.expires_after(settings_.frame);
-  frames_due_.async_wait([this](Error failed) {
-    if (failed || closing_) return;
-    frame();
-    arm();
   });
 }
 
@@ -370,22 +369,6 @@ void Server::Impl::broadcast(const Message& message) {
   for (const auto& client : clients) client->send(text);
 }
 
-void Server::Impl::stop_asked() {
-  if (!settings_.can_stop || !feed_.ask_stop()) return;
-  broadcast(stop_message(feed_.newest().time_s));
-}
-
-void Server::Impl::begin_closing() {
-  frame();
-  closing_ = true;
-  Error ignored;
-  acceptor_.close(ignored);
-  frames_due_.cancel();
-  closing_limit_.expires_after(kClosingLimit);
-  closing_limit_.async_wait([this](Error) { io_.stop(); });
-  finish_if_all_sent();
-}
-
 void Server::Impl::finish_if_all_sent() {
   for (const auto& client : clients_)
     if (!client->all_sent()) return;
@@ -397,11 +380,13 @@ void Server::Impl::finish_if_all_sent() {
 
 Server::Server(Settings settings, Feed& feed) : impl_(std::make_unique<Impl>(std::move(settings), feed)) {}
 Server::~Server() = default;
-std::uint16_t Server::port() const noexcept { return impl_->port(); }
+std::uint16_t Server::port() const noexcept { return impl_->port_; }
 std::string Server::url() const {
-  return fmt::format("http://127.0.0.1:{}/?token={}", impl_->port(), impl_->settings().token);
+  return fmt::format("http://127.0.0.1:{}/?token={}", impl_->port_, impl_->settings_.token);
 }
-std::size_t Server::clients() const noexcept { return impl_->clients(); }
-void Server::draw() { impl_->draw(); }
+std::size_t Server::clients() const noexcept { return impl_->clients_now_; }
+void Server::draw() {
+  asio::post(impl_->io_, [impl = impl_.get()] { impl->frame(); });
+}
 
 }  // namespace kphi::daq::live

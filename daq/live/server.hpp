@@ -47,7 +47,7 @@ class Server {
   void draw();
 
  private:
-  class Impl;
+  struct Impl;
   std::unique_ptr<Impl> impl_;
 };
 

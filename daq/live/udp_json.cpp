@@ -9,7 +9,6 @@
 
 #include "base/error.hpp"
 #include "base/number.hpp"
-#include "daq/live/messages.hpp"
 
 namespace kphi::daq::live {
 namespace {

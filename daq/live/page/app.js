@@ -29,15 +29,14 @@ const occlusionColours = () => matchMedia('(prefers-color-scheme: dark)').matche
 const common = () => ({ legend: 'never', interactionModel: {}, showLabelsOnHighlight: false, highlightCircleSize: 0,
   gridLineColor: colour('line'), axisLineColor: colour('line'), rightGap: 12, strokeWidth: 2, animatedZooms: false,
   axisLabelFontSize: 14, xAxisHeight: 24 });
-const whole = value => thousands(value);
 const charts = {};
 
 function makeCharts() {
   for (const chart of Object.values(charts)) chart.destroy();
   const empty = n => [[0, ...Array(n).fill(null)], [1, ...Array(n).fill(null)]];
   charts.speed = new Dygraph(at('speed_chart'), empty(2), { ...common(), labels: ['t', 'commanded', 'measured'],
-    colors: [colour('commanded'), colour('measured')], axes: { y: { axisLabelWidth: 62, axisLabelFormatter: whole } },
-    series: { commanded: { stepPlot: true, strokeWidth: 3 } } });
+    colors: [colour('commanded'), colour('measured')], series: { commanded: { stepPlot: true, strokeWidth: 3 } },
+    axes: { y: { axisLabelWidth: 62, axisLabelFormatter: thousands } } });
   charts.thrust = new Dygraph(at('thrust_chart'), empty(1), { ...common(), labels: ['t', 'thrust'],
     colors: [colour('thrust')], axes: { y: { axisLabelWidth: 62 } } });
   charts.k = new Dygraph(at('k_chart'), empty(1), { ...common(), labels: ['x', 'k'], strokeWidth: 0, drawPoints: true,
