@@ -12,7 +12,6 @@
 #include "fit/propellers/claims.hpp"
 #include "fit/propellers/compare.hpp"
 #include "fit/report/fit_summary.hpp"
-#include "results/file_layer.hpp"
 #include "results/run_reader.hpp"
 
 namespace kphi::commands {

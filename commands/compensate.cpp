@@ -1,17 +1,135 @@
+#include "commands/compensate.hpp"
+
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <iostream>
+#include <string>
+#include <string_view>
+#include <vector>
 
+#include "base/csv.hpp"
+#include "base/number.hpp"
 #include "commands/commands.hpp"
-#include "commands/compensate_rows.hpp"
 #include "commands/inputs.hpp"
-#include "compensation/compensator.hpp"
 
 namespace kphi::commands {
 namespace {
 
 using namespace compensation;
+
+constexpr std::size_t kFlushAt = 1 << 16;
+constexpr std::size_t kColumns = 8;
+constexpr std::array<std::string_view, kColumns> kColumnNames = {"theta1_deg", "theta2_deg", "theta3_deg", "theta4_deg",
+                                                                 "thrust1_n",  "thrust2_n",  "thrust3_n",  "thrust4_n"};
+constexpr std::string_view kCsvHeader =
+    "phi1_deg,phi2_deg,phi3_deg,phi4_deg,k1,k2,k3,k4,speed1_rpm,speed2_rpm,speed3_rpm,speed4_rpm,flags\n";
+
+struct FlagName {
+  Flag flag;
+  std::string_view name;
+};
+constexpr FlagName kFlagNames[] = {{Flag::thrust_nan, "thrust_nan"},
+                                   {Flag::thrust_negative, "thrust_negative"},
+                                   {Flag::speed_at_slowest, "speed_at_slowest"},
+                                   {Flag::speed_at_fastest, "speed_at_fastest"},
+                                   {Flag::arm_angle_unknown, "arm_angle_unknown"},
+                                   {Flag::beyond_fit, "beyond_fit"},
+                                   {Flag::at_floor, "at_floor"},
+                                   {Flag::at_ceiling, "at_ceiling"}};
+
+using Fields = std::vector<std::string>;
+
+/// Empty if the quotes of the line do not close.
+Fields fields_of(std::string_view line) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (line.starts_with(kByteOrderMark)) line.remove_prefix(kByteOrderMark.size());
+  if (line.ends_with('\r')) line.remove_suffix(1);
+  return split_csv_line(line).value_or(Fields());
+}
+
+bool is_blank(const Fields& fields) { return fields == Fields{""}; }
+
+constexpr const char* kNextMove =
+    "; the first line must name theta1_deg..theta4_deg and thrust1_n..thrust4_n once each, separated by commas";
+
+/// What is wrong with a column that stands there `found` times; `names` may hold it in another unit.
+std::string complaint_about(std::string_view wanted, std::ptrdiff_t found, const Fields& names) {
+  if (found > 1) return fmt::format("column `{}` stands {} times{}", wanted, found, kNextMove);
+  const std::string_view stem = wanted.substr(0, wanted.find('_') + 1);
+  const auto like = std::ranges::find_if(names, [&](const std::string& name) { return name.starts_with(stem); });
+  if (like == names.end()) return fmt::format("column `{}` is missing{}", wanted, kNextMove);
+  return fmt::format("column `{}` is missing, but there is `{}`; the unit is part of the name, degrees and N are read",
+                     wanted, *like);
+}
+
+/// The places of the columns.
+std::array<std::size_t, kColumns> read_header(const Fields& names) {
+  const auto refuse = [](const std::string& what) { throw ConfigurationError("stdin:1: " + what); };
+  if (is_blank(names)) refuse(fmt::format("no header{}", kNextMove));
+  std::array<std::size_t, kColumns> places{};
+  for (std::size_t i = 0; i < kColumns; ++i) {
+    const auto found = std::ranges::count(names, kColumnNames[i]);
+    if (found != 1) refuse(complaint_about(kColumnNames[i], found, names));
+    places[i] = static_cast<std::size_t>(std::ranges::find(names, kColumnNames[i]) - names.begin());
+  }
+  return places;
+}
+
+/// Empty when the row can be used, else why not.
+std::string read_row(const Fields& fields, std::size_t expected, const std::array<std::size_t, kColumns>& places,
+                     std::array<double, kColumns>& values) {
+  if (fields.empty()) return "has a quote that is not closed";
+  if (fields.size() != expected) return fmt::format("has {} fields where the header has {}", fields.size(), expected);
+  for (std::size_t i = 0; i < kColumns; ++i) {
+    const auto value = parse_finite(fields[places[i]]);
+    if (!value) return fmt::format("{} is `{}`, not a finite number", kColumnNames[i], fields[places[i]]);
+    values[i] = *value;
+  }
+  return {};
+}
+
+struct RowStyle {
+  const char* before[4];  ///< the four φ, the four k_i, the four speeds, the flags
+  const char* quote;      ///< around a flag
+  const char* between;    ///< two flags
+  const char* end;
+};
+constexpr RowStyle kCsv{{"", ",", ",", ","}, "", " ", "\n"};
+constexpr RowStyle kJson{{"{\"phi_deg\":[", "],\"k\":[", "],\"speed_rpm\":[", "],\"flags\":["}, "\"", ",", "]}\n"};
+
+void append_row(std::string& text, const RowStyle& style, const Compensator& compensator, const SpeedCommand& command) {
+  const auto four = [&](std::size_t group, const auto& value_of) {
+    text += style.before[group];
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (i != 0) text += ',';
+      text += shortest(value_of(i));
+    }
+  };
+  four(0, [&](std::size_t i) { return to_degrees(compensator.occlusion_angles()[i]); });
+  four(1, [&](std::size_t i) { return compensator.scaling_factors()[i]; });
+  four(2, [&](std::size_t i) { return to_rpm(command.speeds[i]); });
+  text += style.before[3];
+  const char* separator = "";
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (!command.flags[i].any()) continue;
+    for (const FlagName& entry : kFlagNames) {
+      if (!command.flags[i].has(entry.flag)) continue;
+      text += separator + (style.quote + std::to_string(i + 1)) + ":" + std::string(entry.name) + style.quote;
+      separator = style.between;
+    }
+  }
+  text += style.end;
+}
+
+void hand_on(std::string& buffer, std::ostream& out) {
+  out << buffer << std::flush;
+  buffer.clear();
+}
+
+// ---- the verb
 
 struct Request {
   std::string coefficients;
@@ -65,6 +183,43 @@ ExitCode compensate(const Request& request) {
 }
 
 }  // namespace
+
+RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& words, Compensator& compensator,
+                          ArmRange reach, RowFormat format) {
+  std::string line;
+  std::getline(in, line);
+  const Fields header = fields_of(line);
+  const auto places = read_header(header);
+
+  RowCounts counts;
+  std::string buffer(format == RowFormat::csv ? kCsvHeader : std::string_view());
+  std::array<double, kColumns> values{};
+  std::array<Radians, 4> arm_angles;
+  std::array<Newtons, 4> thrusts;
+  for (std::uint64_t line_number = 2; out && std::getline(in, line); ++line_number) {
+    const Fields fields = fields_of(line);
+    if (is_blank(fields)) continue;
+    const std::string complaint = read_row(fields, header.size(), places, values);
+    if (!complaint.empty()) {
+      ++counts.rejected;
+      words << "stdin:" << line_number << ": " << complaint << "; row left out\n";
+      continue;
+    }
+    for (std::size_t i = 0; i < 4; ++i) {
+      arm_angles[i] = from_degrees(values[i]);
+      thrusts[i] = Newtons(values[i + 4]);
+    }
+    const auto beyond = [&](Radians angle) { return !(angle >= reach.from && angle <= reach.to); };
+    if (std::ranges::any_of(arm_angles, beyond)) ++counts.out_of_reach;
+    compensator.set_arms(arm_angles);
+    const SpeedCommand command = compensator.speeds_for(thrusts);
+    ++counts.written;
+    append_row(buffer, format == RowFormat::csv ? kCsv : kJson, compensator, command);
+    if (buffer.size() >= kFlushAt || in.rdbuf()->in_avail() <= 0) hand_on(buffer, out);
+  }
+  hand_on(buffer, out);
+  return counts;
+}
 
 void add_compensate(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<Request>(

@@ -1,6 +1,5 @@
 #include <filesystem>
 #include <map>
-#include <set>
 #include <vector>
 
 #include "commands/commands.hpp"
@@ -81,9 +80,7 @@ double import_file(const std::string& path, const ImportRequest& request, const 
   const std::string record = import_record(import, text, path, options, kVersion);
   write_output(folder / "import.json", record);
   print_findings(import, path);
-  if (request.json) fmt::print("{}", record);
-  const std::string summary = summary_of(import.table);
-  if (!request.json) fmt::print("{}: {}\n", name, summary);
+  fmt::print("{}", request.json ? record : fmt::format("{}: {}\n", name, summary_of(import.table)));
   return fit_thrust(points_of(import.table.steps)).parameters.k;
 }
 

@@ -4,6 +4,7 @@
 #include "commands/commands.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/file_layer.hpp"
+#include "results/run_layout.hpp"
 #include "results/run_reader.hpp"
 
 namespace kphi::commands {
@@ -16,32 +17,13 @@ struct Asked {
   bool json = false;
 };
 
-Json describe(const StreamHealth& health) {
-  return {{"records_per_second", health.records_per_second},
-          {"datagrams_per_second", health.datagrams_per_second},
-          {"jitter_p50_s", health.jitter_p50_s},
-          {"jitter_p99_s", health.jitter_p99_s},
-          {"skew_ppm", health.skew_ppm},
-          {"clock_uncertainty_s", health.clock_uncertainty_s},
-          {"queue_high_water", health.queue_high_water},
-          {"events_dropped", health.events_dropped}};
-}
-
-Json describe(const BoxBias& bias) {
-  if (bias.records == 0) return nullptr;
-  return {{"records", bias.records},
-          {"before", bias.before},
-          {"before_sd", bias.before_sd},
-          {"after", bias.after},
-          {"after_sd", bias.after_sd}};
-}
-
-Json describe(const std::vector<StreamEvent>& events) {
-  Json list = Json::array();
-  for (const StreamEvent& event : events) {
-    list.push_back({{"kind", name_of(event.kind)}, {"t_ns", event.time_ns}, {"text", event.text}});
-  }
-  return list;
+/// The figures at the end of a run whose names begin with `prefix`, without it.
+Json figures_of(const RunEnding& ending, std::string_view prefix) {
+  Json figures;
+  for_each_figure(ending, [&](std::string_view name, const auto& value) {
+    if (name.starts_with(prefix)) figures[std::string(name.substr(prefix.size()))] = value;
+  });
+  return figures;
 }
 
 Json describe(const std::filesystem::path& path) {
@@ -50,6 +32,9 @@ Json describe(const std::filesystem::path& path) {
   const double seconds =
       run.phases.empty() ? 0 : 1e-9 * static_cast<double>(run.phases.back().time_ns - run.phases.front().time_ns);
   const auto steps = std::ranges::count_if(run.phases, [](const PhaseMark& m) { return m.phase == Phase::step; });
+  Json events = Json::array();
+  for (const StreamEvent& event : run.events)
+    events.push_back({{"kind", name_of(event.kind)}, {"t_ns", event.time_ns}, {"text", event.text}});
   Json told{{"file", path.string()},
             {"outcome", run.outcome == Outcome::complete ? "complete" : "aborted"},
             {"outcome_reason", run.outcome_reason},
@@ -70,9 +55,9 @@ Json describe(const std::filesystem::path& path) {
             {"malformed", run.account.malformed},
             {"restarts", run.account.restarts},
             {"reboots", run.account.reboots},
-            {"events", describe(run.events)},
-            {"health", describe(run.health)},
-            {"box_bias", describe(run.box_bias)},
+            {"events", events},
+            {"health", figures_of(run, "health_")},
+            {"box_bias", run.box_bias.records == 0 ? Json() : figures_of(run, "box_bias_")},
             {"motor_readings", run.motor.size()},
             {"calibration_serial", header.load_cell.serial},
             {"configuration_sha256", sha256(header.load_cell.configuration_xml)},

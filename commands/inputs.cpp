@@ -7,7 +7,6 @@
 #include "base/number.hpp"
 #include "commands/commands.hpp"
 #include "compensation/file/coefficient_file.hpp"
-#include "fit/coefficients/coefficients.hpp"
 #include "fit/logs/import_table.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"

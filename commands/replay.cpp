@@ -154,17 +154,13 @@ Json to_json(const StepMean& step) {
 }
 
 void print(const Replay& replay, bool json) {
-  if (!json) {
-    fmt::print("{}", results::format_steps(replay.steps));
-    return;
-  }
-  Json out;
-  out["steps"] = Json::array();
-  for (const StepMean& step : replay.steps) out["steps"].push_back(to_json(step));
-  out["compared_with"] = replay.stored ? Json(replay.stored->string()) : Json();
-  out["same"] = replay.stored ? Json(!replay.difference) : Json();
-  out["difference"] = replay.difference ? Json(*replay.difference) : Json();
-  print_json(out);
+  if (!json) return fmt::print("{}", results::format_steps(replay.steps));
+  Json steps = Json::array();
+  for (const StepMean& step : replay.steps) steps.push_back(to_json(step));
+  print_json({{"steps", steps},
+              {"compared_with", replay.stored ? Json(replay.stored->string()) : Json()},
+              {"same", replay.stored ? Json(!replay.difference) : Json()},
+              {"difference", replay.difference ? Json(*replay.difference) : Json()}});
 }
 
 ExitCode run_replay(const Asked& asked) {

@@ -54,21 +54,12 @@ bool has_terminal() {
   return isatty(STDERR_FILENO) && !(term && std::string(term) == "dumb");
 }
 
-void summarise(const CampaignResult& result, const results::CampaignFolder& folder, bool json) {
-  if (json) {
-    put(stdout, nlohmann::json{{"folder", folder.path().string()},
-                               {"runs", result.runs},
-                               {"samples", result.samples},
-                               {"lost", result.lost},
-                               {"steps", result.steps},
-                               {"flagged_steps", result.flagged_steps}}
-                        .dump() +
-                    "\n");
-  } else {
-    put(stdout, folder.path().string() + "\n");
-  }
+void summarise(const CampaignResult& result, const std::string& folder, bool json) {
+  const nlohmann::json all{{"folder", folder},    {"runs", result.runs},   {"samples", result.samples},
+                           {"lost", result.lost}, {"steps", result.steps}, {"flagged_steps", result.flagged_steps}};
+  put(stdout, (json ? all.dump() : folder) + "\n");
   put(stderr, fmt::format("{} runs, {} samples, {} lost, {} of {} steps flagged\nnext: kphi fit {}\n", result.runs,
-                          result.samples, result.lost, result.flagged_steps, result.steps, folder.path().string()));
+                          result.samples, result.lost, result.flagged_steps, result.steps, folder));
 }
 
 profiles::Campaign campaign_of(const RunOptions& options) {
@@ -158,12 +149,6 @@ struct Request {
   std::optional<profiles::Answers> answers;
 };
 
-Request read_files(const RunOptions& options) {
-  Request request{options, campaign_of(options), profiles::load_bench(options.bench), std::nullopt};
-  if (!options.answers.empty()) request.answers = profiles::load_answers(options.answers);
-  return request;
-}
-
 ExitCode print_plan(const Request& request) {
   const auto& [options, campaign, config, answers] = request;
   const DryRun dry = dry_run(campaign, config, options.out, answers);
@@ -201,7 +186,8 @@ CampaignResult execute(const Request& request, const profiles::Plan& plan, Desti
 }
 
 ExitCode run(const RunOptions& options) {
-  const Request request = read_files(options);
+  Request request{options, campaign_of(options), profiles::load_bench(options.bench), std::nullopt};
+  if (!options.answers.empty()) request.answers = profiles::load_answers(options.answers);
   if (options.dry_run) return print_plan(request);
   const auto& [unused, campaign, config, answers] = request;
   profiles::require_within(campaign, config);
@@ -218,7 +204,8 @@ ExitCode run(const RunOptions& options) {
   const auto operator_ = person(options, answers, config, stop_asked);
   clear_safety_stop(destination, *operator_, answers);
   const SignalWatch signals;
-  summarise(execute(request, dry.plan, destination, *operator_, view, stop_asked), *destination.folder, options.json);
+  const CampaignResult result = execute(request, dry.plan, destination, *operator_, view, stop_asked);
+  summarise(result, destination.folder->path().string(), options.json);
   operator_->finish();
   return ExitCode::ok;
 }

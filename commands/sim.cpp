@@ -15,7 +15,6 @@
 #include "drivers/sim/physics/truth.hpp"
 #include "drivers/sim/truth_log.hpp"
 #include "profiles/bench_config.hpp"
-#include "profiles/strict_yaml.hpp"
 
 namespace kphi::commands {
 namespace {

@@ -1,4 +1,4 @@
-#include "commands/compensate_rows.hpp"
+#include "commands/compensate.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
