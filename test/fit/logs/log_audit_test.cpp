@@ -200,9 +200,9 @@ TEST(LogAudit, CountsStampsThatGoBackOrStandTwice) {
   log.rows[200].time_s = 0;
   log.rows[300].time_s = 306;
   EXPECT_EQ(found(log), (Names{"time_backward", "time_repeated"}));
-  for (const LogFinding& finding : audit(log, {})) {
-    if (finding.kind == FindingKind::time_backward) EXPECT_EQ(finding.rows, 2u);
-    if (finding.kind == FindingKind::time_repeated) EXPECT_EQ(finding.rows, 1u);
+  for (const auto& [kind, rows, line, text, lines] : audit(log, {})) {
+    const std::size_t expected = kind == FindingKind::time_backward ? 2 : kind == FindingKind::time_repeated ? 1 : rows;
+    EXPECT_EQ(rows, expected) << name_of(kind);
   }
 }
 
