@@ -20,7 +20,7 @@ static_assert(KPHI_LOAD_SHARE == static_cast<int>(OverlapMeasure::load_share));
 static_assert(KPHI_DEMAND_NAN == static_cast<int>(Concession::demand_nan));
 static_assert(KPHI_LAW_PUBLISHED == static_cast<int>(ScalingLaw::published));
 
-/// Codes of kphi_compensator_build beyond those of Refusal.
+/// Codes of kphi_compensator_build beyond those of Refusal; kphi_refusal_text has their words in the same order.
 enum MoreRefusals : int { kBadLine = 100, kBadOutline, kBadLaw, kBadOverlap };
 
 Compensator& of(kphi_compensator* c) noexcept { return *std::launder(reinterpret_cast<Compensator*>(c->state)); }
@@ -106,9 +106,7 @@ int kphi_compensator_build(kphi_compensator* out, const kphi_line lines[4], cons
   }
   const std::optional<ThrustCurve> made[4] = {curve_of(lines[0]), curve_of(lines[1]), curve_of(lines[2]),
                                               curve_of(lines[3])};
-  for (const auto& line : made) {
-    if (!line) return kBadLine;
-  }
+  if (!made[0] || !made[1] || !made[2] || !made[3]) return kBadLine;
   const BuildOutcome outcome =
       Compensator::build({*made[0], *made[1], *made[2], *made[3]}, frame, static_cast<ScalingLaw>(law));
   if (!outcome.compensator) return static_cast<int>(outcome.refusal);
@@ -117,20 +115,15 @@ int kphi_compensator_build(kphi_compensator* out, const kphi_line lines[4], cons
 }
 
 const char* kphi_refusal_text(int refusal) {
-  switch (refusal) {
-    case kBadLine:
-      return "a line needs K_T > 0, intercept > 0, a finite slope, a largest angle in (0, 2 pi], a known overlap "
-             "measure, and variances that are not negative";
-    case kBadOutline:
-      return "the body must have 3 to 12 corners, finite, counter-clockwise and convex";
-    case kBadLaw:
-      return "the law is neither KPHI_LAW_CLAMPED nor KPHI_LAW_PUBLISHED";
-    case kBadOverlap:
-      return "the airframe's overlap measure is none of KPHI_RIM_ARC, KPHI_AREA_SHARE, KPHI_LOAD_SHARE";
-    default:
-      return refusal >= 0 && refusal <= static_cast<int>(Refusal::overlap) ? describe(static_cast<Refusal>(refusal))
-                                                                           : "unknown refusal";
-  }
+  static constexpr const char* kMore[] = {
+      "a line needs K_T > 0, intercept > 0, a finite slope, a largest angle in (0, 2 pi], a known overlap measure, and "
+      "variances that are not negative",
+      "the body must have 3 to 12 corners, finite, counter-clockwise and convex",
+      "the law is neither KPHI_LAW_CLAMPED nor KPHI_LAW_PUBLISHED",
+      "the airframe's overlap measure is none of KPHI_RIM_ARC, KPHI_AREA_SHARE, KPHI_LOAD_SHARE"};
+  if (refusal >= kBadLine && refusal <= kBadOverlap) return kMore[refusal - kBadLine];
+  const bool known = refusal >= 0 && refusal <= static_cast<int>(Refusal::overlap);
+  return known ? describe(static_cast<Refusal>(refusal)) : "unknown refusal";
 }
 
 void kphi_set_arms(kphi_compensator* compensator, const double arm_angles_rad[4]) {

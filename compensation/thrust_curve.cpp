@@ -1,7 +1,5 @@
 #include "compensation/thrust_curve.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace kphi::compensation {

@@ -10,7 +10,6 @@
 #include <fstream>
 #include <set>
 #include <sstream>
-#include <utility>
 
 namespace kphi::compensation {
 namespace {
@@ -52,10 +51,12 @@ class Value {
     const YAML::Node value = node_[key];
     return is_unknown(value) ? std::nullopt : std::optional(Value(value, key, *path_));
   }
-  [[nodiscard]] Value at(const std::string& key) const {
+  /// Refuses the file with these words if the key is not given.
+  [[nodiscard]] Value at(const std::string& key, const std::string& what, const std::string& next_move) const {
     if (const auto value = find(key)) return *value;
-    refuse("`" + key + "` is missing here", kFitAgain);
+    refuse(what, next_move);
   }
+  [[nodiscard]] Value at(const std::string& key) const { return at(key, "`" + key + "` is missing here", kFitAgain); }
   [[nodiscard]] Value map_at(const std::string& key) const {
     const Value value = at(key);
     if (!value.node().IsMap()) value.refuse("`" + key + "` must hold keys of its own", kFitAgain);
@@ -145,35 +146,27 @@ Value top_of(const std::string& text, const std::string& path) {
 }
 
 void refuse_other_format(const Value& top) {
-  const auto format = top.find("format");
-  if (!format) {
-    top.refuse("no `format`, so this is not a coefficient file", "give the coefficients.yaml that `kphi fit` wrote");
-  }
-  if (format->text() == kCoefficientFormat) return;
-  format->refuse("format `" + format->text() + "` is not " + kCoefficientFormat,
-                 "fit again with this version of kphi, or update it");
+  const Value format = top.at("format", "no `format`, so this is not a coefficient file",
+                              "give the coefficients.yaml that `kphi fit` wrote");
+  if (format.text() == kCoefficientFormat) return;
+  format.refuse("format `" + format.text() + "` is not " + kCoefficientFormat,
+                "fit again with this version of kphi, or update it");
 }
 
 /// N/(rad/s)² per unit of the file.
 double scale_of_unit(const Value& top) {
-  const auto unit = top.find("k_unit");
-  if (!unit) {
-    top.refuse("the file does not say the unit of its coefficients",
-               "add `k_unit: N/(rad/s)^2` or `k_unit: N/RPM^2`, whichever the numbers are in");
-  }
-  if (unit->text() == "N/(rad/s)^2") return 1.0;
-  if (unit->text() == "N/RPM^2") return from_newtons_per_rpm2(1.0).value();
-  unit->refuse("k_unit `" + unit->text() + "` is not known", "use N/(rad/s)^2 or N/RPM^2");
+  const Value unit = top.at("k_unit", "the file does not say the unit of its coefficients",
+                            "add `k_unit: N/(rad/s)^2` or `k_unit: N/RPM^2`, whichever the numbers are in");
+  if (unit.text() == "N/(rad/s)^2") return 1.0;
+  if (unit.text() == "N/RPM^2") return from_newtons_per_rpm2(1.0).value();
+  unit.refuse("k_unit `" + unit.text() + "` is not known", "use N/(rad/s)^2 or N/RPM^2");
 }
 
 OverlapMeasure overlap_of(const Value& top) {
-  const auto overlap = top.find("overlap");
-  if (!overlap) {
-    top.refuse("the file does not say how its occlusion angles are defined",
-               "add `overlap: rim_arc` if they are rim arcs");
-  }
-  if (const auto measure = overlap_measure_named(overlap->text())) return *measure;
-  overlap->refuse("overlap `" + overlap->text() + "` is not known", "use rim_arc, area_share or load_share");
+  const Value overlap = top.at("overlap", "the file does not say how its occlusion angles are defined",
+                               "add `overlap: rim_arc` if they are rim arcs");
+  if (const auto measure = overlap_measure_named(overlap.text())) return *measure;
+  overlap.refuse("overlap `" + overlap.text() + "` is not known", "use rim_arc, area_share or load_share");
 }
 
 std::optional<ThrustCoefficient> coefficient_at(const Value& map, const std::string& key, double scale) {

@@ -1,7 +1,6 @@
 #include "compensation/flight/flight.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 #include "compensation/flight/simulated_vehicle.hpp"
@@ -46,24 +45,28 @@ Eigen::Vector3d roll_pitch_yaw(const Eigen::Quaterniond& q) noexcept {
   return {std::atan2(r(2, 1), r(2, 2)), std::asin(std::clamp(-r(2, 0), -1.0, 1.0)), std::atan2(r(1, 0), r(0, 0))};
 }
 
-class Flight {
- public:
-  Flight(const Experiment& experiment, const Scene& scene, const Shadow& shadow, std::vector<TraceRow>* trace)
-      : experiment_(experiment),
-        scene_(scene),
-        plant_(scene.vehicle, scene.truth, scene.curve.thrust_coefficient(), shadow),
-        pilot_(pilot_for(scene)),
-        estimator_(scene.noise, kStep * kStepsPerTick, Random(scene.seed)),
-        motion_(scene.vehicle.angles(experiment.legs[0].shape), scene.vehicle.build.morph_s),
-        now_(plant_.configuration(motion_.angles(0), {})),
-        trace_(trace) {
-    const Reference start = reference_at(experiment.path, 0);
-    const double hover = kGravity * scene.vehicle.build.mass_kg / 4 / scene.curve.thrust_coefficient().value();
-    state_ = level_state({start.position, start.velocity}, now_.mass, std::sqrt(hover));
-    pilot_.set_arms(motion_.angles(0));
-  }
+/// For one call of run(). The first four members are what it works with.
+struct Flight {
+  const Experiment& experiment_;
+  const Scene& scene_;
+  const Shadow& shadow_;
+  std::vector<TraceRow>* trace_;
+  Aircraft plant_{scene_.vehicle, scene_.truth, scene_.curve.thrust_coefficient(), shadow_};
+  Pilot pilot_ = pilot_for(scene_);
+  Estimator estimator_{scene_.noise, kStep* kStepsPerTick, Random(scene_.seed)};
+  ArmMotion motion_{scene_.vehicle.angles(experiment_.legs[0].shape), scene_.vehicle.build.morph_s};
+  Configuration now_ = plant_.configuration(motion_.angles(0), {});
+  AircraftState state_{};
+  Reference reference_{};
+  BodyMotion estimate_{};
+  long step_ = 0;
+  std::size_t leg_ = 0;
 
   FlightResult run() {
+    const Reference start = reference_at(experiment_.path, 0);
+    const double hover = kGravity * scene_.vehicle.build.mass_kg / 4 / scene_.curve.thrust_coefficient().value();
+    state_ = level_state({start.position, start.velocity}, now_.mass, std::sqrt(hover));
+    pilot_.set_arms(motion_.angles(0));
     FlightResult result;
     result.leg_count = experiment_.leg_count;
     for (leg_ = 0; leg_ < experiment_.leg_count && !result.lost; ++leg_) {
@@ -74,7 +77,6 @@ class Flight {
     return result;
   }
 
- private:
   static Pilot pilot_for(const Scene& scene) {
     const auto pilot = Pilot::build(scene.vehicle, scene.curve, scene.pilot);
     if (!pilot) throw std::invalid_argument("no controller can be built for this vehicle; check its sizes and spins");
@@ -152,26 +154,12 @@ class Flight {
     }
     return found;
   }
-
-  const Experiment& experiment_;
-  const Scene& scene_;
-  Aircraft plant_;
-  Pilot pilot_;
-  Estimator estimator_;
-  ArmMotion motion_;
-  Configuration now_;
-  AircraftState state_;
-  Reference reference_;
-  BodyMotion estimate_;
-  long step_ = 0;
-  std::size_t leg_ = 0;
-  std::vector<TraceRow>* trace_;
 };
 
 }  // namespace
 
 FlightResult fly(const Experiment& experiment, const Scene& scene, const Shadow& shadow, std::vector<TraceRow>* trace) {
-  return Flight(experiment, scene, shadow, trace).run();
+  return Flight{experiment, scene, shadow, trace}.run();
 }
 
 }  // namespace kphi::flight

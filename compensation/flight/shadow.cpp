@@ -1,9 +1,6 @@
 #include "compensation/flight/shadow.hpp"
 
 #include <Eigen/Core>
-#include <algorithm>
-#include <array>
-#include <cmath>
 
 #include "compensation/flight/simulated_vehicle.hpp"
 
