@@ -128,7 +128,7 @@ TEST(SupplyWorker, HandsOutReadingsInOrder) {
   Worker worker(fake(script), clock, 5);
   std::vector<SupplyReading> all;
   EXPECT_TRUE(eventually([&] {
-    std::array<Reading, 8> some;
+    std::array<SupplyReading, 8> some;
     const std::size_t count = worker.take(some);
     all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(count));
     return all.size() >= 20;
@@ -282,7 +282,7 @@ TEST(SupplyWorker, LetsNobodyWaitForASlowSupply) {
   SteadyClock clock;
   Worker worker(fake(script), clock);
   inside.wait();
-  std::array<Reading, 4> some;
+  std::array<SupplyReading, 4> some;
   EXPECT_EQ(worker.take(some), 0u);
   EXPECT_FALSE(worker.newest());
   EXPECT_TRUE(worker.alive());
@@ -330,7 +330,7 @@ TEST(SupplyWorkerOnAWire, FeedsFromAStockSupplyOfTenAnswersPerSecond) {
   worker.switch_on();
   std::vector<SupplyReading> all;
   EXPECT_TRUE(eventually([&] {
-    std::array<Reading, 8> some;
+    std::array<SupplyReading, 8> some;
     const std::size_t count = worker.take(some);
     all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(count));
     return all.size() >= 6;

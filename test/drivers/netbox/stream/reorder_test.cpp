@@ -149,9 +149,7 @@ TEST(ReorderProperty, EveryRecordThatCameInTimeIsDeliveredOnceAndInOrder) {
     std::vector<Sent> channel;
     std::uint64_t lost = 0, doubled = 0;
     for (unsigned i = 0; i < 1000; ++i, ++rdt, ft += stride) {
-      LoadCellRecord record;
-      record.rdt_sequence = rdt;
-      record.ft_sequence = ft;
+      const LoadCellRecord record{{}, rdt, ft, 0, 0};
       const bool edge = i == 0 || i == 999;
       if (!edge && random() % 30 == 0) {
         ++lost;
@@ -167,7 +165,10 @@ TEST(ReorderProperty, EveryRecordThatCameInTimeIsDeliveredOnceAndInOrder) {
     std::stable_sort(channel.begin(), channel.end() - 1,
                      [](const Sent& a, const Sent& b) { return a.address < b.address; });
     Instant now = 1s;
-    for (const Sent& sent : channel) window.receive(sent.record, now += from_seconds(stride / 70'000.0), account, out);
+    for (Sent& sent : channel) {
+      sent.record.arrival_ns = (now += from_seconds(stride / 70'000.0)).count();
+      window.receive(sent.record, account, out);
+    }
     window.flush(account, out);
     const Counters& c = account.counters();
     EXPECT_EQ(c.lost_network, lost) << seed;
