@@ -105,7 +105,7 @@ class Consumer {
   [[nodiscard]] std::uint32_t last_rdt() const { return last_.rdt_sequence; }
 
  private:
-  void see(const Record& record) {
+  void see(const LoadCellRecord& record) {
     if (taken_++ == 0) {
       first_rdt_ = record.rdt_sequence;
     } else {
@@ -121,7 +121,7 @@ class Consumer {
   std::vector<LoadCellRecord> batch_;
   std::uint64_t taken_ = 0, out_of_order_ = 0, samples_missing_ = 0;
   std::uint32_t first_rdt_ = 0;
-  Record last_;
+  LoadCellRecord last_;
 };
 
 /// Kinds of the events until one of `last` comes, that one included; all so far when it does not come in time.
