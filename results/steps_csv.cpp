@@ -20,7 +20,7 @@ namespace {
 using Field = std::variant<std::string StepMean::*, int StepMean::*, std::uint64_t StepMean::*, double StepMean::*,
                            std::uint32_t StepMean::*>;  // the last one: flags
 
-struct Column {
+struct StepColumn {
   const char* name;
   Field field;
   int group = 0;  ///< columns of a group but 0 are written if a step has a value for the first of them
@@ -28,43 +28,44 @@ struct Column {
 
 const std::array kColumns{
     // the step
-    Column{"propeller", &StepMean::propeller}, Column{"blades", &StepMean::blades},
-    Column{"diameter_in", &StepMean::diameter_in}, Column{"occlusion_deg", &StepMean::occlusion_deg},
-    Column{"repetition", &StepMean::repetition}, Column{"step", &StepMean::step},
-    Column{"commanded_speed_rad_s", &StepMean::commanded_speed_rad_s},
+    StepColumn{"propeller", &StepMean::propeller}, StepColumn{"blades", &StepMean::blades},
+    StepColumn{"diameter_in", &StepMean::diameter_in}, StepColumn{"occlusion_deg", &StepMean::occlusion_deg},
+    StepColumn{"repetition", &StepMean::repetition}, StepColumn{"step", &StepMean::step},
+    StepColumn{"commanded_speed_rad_s", &StepMean::commanded_speed_rad_s},
     // what it measured
-    Column{"speed_rad_s", &StepMean::speed_rad_s}, Column{"speed_sd_rad_s", &StepMean::speed_sd_rad_s},
-    Column{"speed_n", &StepMean::speed_n}, Column{"thrust_n", &StepMean::thrust_n},
-    Column{"thrust_sd_n", &StepMean::thrust_sd_n}, Column{"thrust_samples", &StepMean::thrust_samples},
-    Column{"torque_nm", &StepMean::torque_nm}, Column{"torque_sd_nm", &StepMean::torque_sd_nm},
-    Column{"zero_n", &StepMean::zero_n}, Column{"supply_voltage_v", &StepMean::supply_voltage_v},
-    Column{"supply_current_a", &StepMean::supply_current_a}, Column{"motor_current_a", &StepMean::motor_current_a},
-    Column{"coil_temperature_degc", &StepMean::coil_temperature_degc},
-    Column{"window_begin_s", &StepMean::window_begin_s}, Column{"window_end_s", &StepMean::window_end_s},
-    Column{"quality_flags", &StepMean::quality_flags},
+    StepColumn{"speed_rad_s", &StepMean::speed_rad_s}, StepColumn{"speed_sd_rad_s", &StepMean::speed_sd_rad_s},
+    StepColumn{"speed_n", &StepMean::speed_n}, StepColumn{"thrust_n", &StepMean::thrust_n},
+    StepColumn{"thrust_sd_n", &StepMean::thrust_sd_n}, StepColumn{"thrust_samples", &StepMean::thrust_samples},
+    StepColumn{"torque_nm", &StepMean::torque_nm}, StepColumn{"torque_sd_nm", &StepMean::torque_sd_nm},
+    StepColumn{"zero_n", &StepMean::zero_n}, StepColumn{"supply_voltage_v", &StepMean::supply_voltage_v},
+    StepColumn{"supply_current_a", &StepMean::supply_current_a},
+    StepColumn{"motor_current_a", &StepMean::motor_current_a},
+    StepColumn{"coil_temperature_degc", &StepMean::coil_temperature_degc},
+    StepColumn{"window_begin_s", &StepMean::window_begin_s}, StepColumn{"window_end_s", &StepMean::window_end_s},
+    StepColumn{"quality_flags", &StepMean::quality_flags},
     // bench supply
-    Column{"supply_v", &StepMean::supply_v, 1}, Column{"supply_a", &StepMean::supply_a, 1},
-    Column{"supply_w", &StepMean::supply_w, 1},
+    StepColumn{"supply_v", &StepMean::supply_v, 1}, StepColumn{"supply_a", &StepMean::supply_a, 1},
+    StepColumn{"supply_w", &StepMean::supply_w, 1},
     // air
-    Column{"air_density_kg_m3", &StepMean::air_density_kg_m3, 2},
-    Column{"air_density_u_kg_m3", &StepMean::air_density_u_kg_m3, 2},
+    StepColumn{"air_density_kg_m3", &StepMean::air_density_kg_m3, 2},
+    StepColumn{"air_density_u_kg_m3", &StepMean::air_density_u_kg_m3, 2},
     // how certain it is
-    Column{"discarded_s", &StepMean::discarded_s, 3}, Column{"thrust_n_eff", &StepMean::thrust_n_eff, 3},
-    Column{"thrust_u_n", &StepMean::thrust_u_n, 3}, Column{"thrust_freedom", &StepMean::thrust_freedom, 3},
-    Column{"speed_u_rad_s", &StepMean::speed_u_rad_s, 3}, Column{"zero_u_n", &StepMean::zero_u_n, 3},
-    Column{"zero_moved_n", &StepMean::zero_moved_n, 3}, Column{"lag_s", &StepMean::lag_s, 3},
-    Column{"lag_u_s", &StepMean::lag_u_s, 3}, Column{"speed_glitches", &StepMean::speed_glitches, 3},
+    StepColumn{"discarded_s", &StepMean::discarded_s, 3}, StepColumn{"thrust_n_eff", &StepMean::thrust_n_eff, 3},
+    StepColumn{"thrust_u_n", &StepMean::thrust_u_n, 3}, StepColumn{"thrust_freedom", &StepMean::thrust_freedom, 3},
+    StepColumn{"speed_u_rad_s", &StepMean::speed_u_rad_s, 3}, StepColumn{"zero_u_n", &StepMean::zero_u_n, 3},
+    StepColumn{"zero_moved_n", &StepMean::zero_moved_n, 3}, StepColumn{"lag_s", &StepMean::lag_s, 3},
+    StepColumn{"lag_u_s", &StepMean::lag_u_s, 3}, StepColumn{"speed_glitches", &StepMean::speed_glitches, 3},
     // averages
-    Column{"repetitions_averaged", &StepMean::repetitions_averaged, 4},
-    Column{"repetitions_left_out", &StepMean::repetitions_left_out, 4}};
+    StepColumn{"repetitions_averaged", &StepMean::repetitions_averaged, 4},
+    StepColumn{"repetitions_left_out", &StepMean::repetitions_left_out, 4}};
 
-using Columns = std::vector<Column>;
+using Columns = std::vector<StepColumn>;
 
 Columns columns_of(std::span<const StepMean> steps) {
   Columns columns;
   int group = 0;
   bool present = true;
-  for (const Column& column : kColumns) {
+  for (const StepColumn& column : kColumns) {
     if (column.group != std::exchange(group, column.group)) {
       const auto first = std::get<double StepMean::*>(column.field);
       present = std::ranges::any_of(steps, [&](const StepMean& s) { return !std::isnan(s.*first); });
@@ -76,7 +77,7 @@ Columns columns_of(std::span<const StepMean> steps) {
 
 std::string header_of(const Columns& columns) {
   std::string line;
-  for (const Column& column : columns) line += (line.empty() ? "" : ",") + std::string(column.name);
+  for (const StepColumn& column : columns) line += (line.empty() ? "" : ",") + std::string(column.name);
   return line;
 }
 
@@ -176,12 +177,12 @@ std::string row_of(const StepMean& step, const Columns& columns) {
 Columns columns_named(const std::vector<std::string>& names) {
   Columns columns;
   for (const std::string& name : names) {
-    const auto found = std::ranges::find(kColumns, name, &Column::name);
+    const auto found = std::ranges::find(kColumns, name, &StepColumn::name);
     if (found == kColumns.end()) throw std::invalid_argument(fmt::format("unknown column \"{}\"", name));
     if (std::ranges::count(names, name) > 1) throw std::invalid_argument(fmt::format("column {} occurs twice", name));
     columns.push_back(*found);
   }
-  for (const Column& required : columns_of({})) {
+  for (const StepColumn& required : columns_of({})) {
     if (std::ranges::find(names, required.name) == names.end())
       throw std::invalid_argument(
           fmt::format("column {} is missing; expected {}", required.name, header_of(columns_of({}))));

@@ -15,7 +15,7 @@ bool is_glitch(std::span<const MotorReading> speeds, std::size_t i) {
   return std::abs(value(i) - middle) > std::max(kGlitchShare * std::abs(middle), kGlitchSpeed);
 }
 
-MotorSeries::Readings within(MotorSeries::Readings readings, MotorChannel channel, const Window& window) {
+MotorSeries::Readings readings_of(MotorSeries::Readings readings, MotorChannel channel, const Window& window) {
   const auto at = [&](Nanoseconds time) {
     return std::partition_point(readings.begin(), readings.end(), [&](const MotorReading& r) {
       return r.channel < channel || (r.channel == channel && r.time_ns < time);
@@ -30,8 +30,9 @@ MotorSeries::Readings within(MotorSeries::Readings readings, MotorChannel channe
 }  // namespace
 
 MotorSeries::MotorSeries(std::span<const MotorReading> readings) : readings_(readings) {
-  const Readings speeds = within(readings, MotorChannel::speed,
-                                 {std::numeric_limits<Nanoseconds>::min(), std::numeric_limits<Nanoseconds>::max()});
+  const Readings speeds =
+      readings_of(readings, MotorChannel::speed,
+                  {std::numeric_limits<Nanoseconds>::min(), std::numeric_limits<Nanoseconds>::max()});
   speeds_.reserve(speeds.size());
   for (std::size_t i = 0; i < speeds.size(); ++i) {
     if (is_glitch(speeds, i)) {
@@ -43,7 +44,7 @@ MotorSeries::MotorSeries(std::span<const MotorReading> readings) : readings_(rea
 }
 
 MotorSeries::Readings MotorSeries::over(MotorChannel channel, const Window& window) const {
-  return within(channel == MotorChannel::speed ? Readings(speeds_) : readings_, channel, window);
+  return readings_of(channel == MotorChannel::speed ? Readings(speeds_) : readings_, channel, window);
 }
 
 Statistics MotorSeries::statistics(MotorChannel channel, const Window& window, double sign) const {
