@@ -54,9 +54,9 @@ std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
   for (const auto& run : runs) {
     tasks.emplace_back([&opening, &run] {
       std::unique_lock one_at_a_time(opening);
-      const results::RunRecording recording = results::read_run(run);
+      results::RunColumns file = results::read_columns(run);
       one_at_a_time.unlock();
-      return reduce(recording);
+      return reduce(file.run, std::move(file.cell));
     });
   }
   std::atomic<std::size_t> next = 0;

@@ -114,6 +114,18 @@ void read_outcome(const Handle& root, RunRecording& run) {
   run.outcome = complete == 1 ? Outcome::complete : Outcome::aborted;
 }
 
+RunRecording all_but_samples(const Handle& root, const std::filesystem::path& path) {
+  const std::string file = path.string();
+  RunRecording run;
+  run.header = header_of(root, path);
+  run.motor = motor_of(root, file);
+  run.phases = rows_of(root, kCommandGroup, file);
+  run.events = rows_of(root, kEventGroup, file);
+  run.supply = rows_of(root, kSupplyGroup, file);
+  read_outcome(root, run);
+  return run;
+}
+
 /// One error text per file, however deep it arose.
 template <class Read>
 auto naming(const std::filesystem::path& path, Read&& read) {
@@ -226,18 +238,37 @@ void check_scale(const RunHeader& header, Problems& problems) {
 
 }  // namespace
 
+LoadCellColumns::LoadCellColumns(const std::vector<LoadCellRecord>& records) {
+  for (const LoadCellRecord& record : records) {
+    counts.push_back(record.counts);
+    ft_sequence.push_back(record.ft_sequence);
+    status.push_back(record.status);
+    arrival_ns.push_back(record.arrival_ns);
+  }
+}
+
+RunColumns read_columns(const std::filesystem::path& path) {
+  return naming(path, [&] {
+    const Handle root = hdf5::open_file(path);
+    RunColumns found{all_but_samples(root, path), {}};
+    GroupReader<LoadCellRecord> group(root, kLoadCellGroup, path.string());
+    const auto read = [&](std::size_t column, auto& values) {
+      values.resize(group.rows);
+      group.columns[column].read(0, group.rows, values.data());
+    };
+    read(0, found.cell.counts);
+    read(2, found.cell.ft_sequence);
+    read(3, found.cell.status);
+    read(4, found.cell.arrival_ns);
+    return found;
+  });
+}
+
 RunRecording read_run(const std::filesystem::path& path) {
   return naming(path, [&] {
     const Handle root = hdf5::open_file(path);
-    const std::string file = path.string();
-    RunRecording run;
-    run.header = header_of(root, path);
-    run.load_cell = rows_of(root, kLoadCellGroup, file);
-    run.motor = motor_of(root, file);
-    run.phases = rows_of(root, kCommandGroup, file);
-    run.events = rows_of(root, kEventGroup, file);
-    run.supply = rows_of(root, kSupplyGroup, file);
-    read_outcome(root, run);
+    RunRecording run = all_but_samples(root, path);
+    run.load_cell = rows_of(root, kLoadCellGroup, path.string());
     if (has_ending(root)) return run;
     run.account.received = run.load_cell.size();
     run.account.lost_network = check_sequence(run.load_cell, run.header.load_cell.ft_stride).lost;

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
-#include <span>
 #include <utility>
 
 namespace kphi::results {
@@ -52,16 +51,17 @@ void CountSums::add(std::int64_t difference) {
   squares += static_cast<Wide>(difference) * difference;
 }
 
-void CellBin::add(std::span<const LoadCellRecord> records, const CountFrame& frame) {
+void CellBin::add(const LoadCellColumns& cell, std::size_t from, std::size_t to, const CountFrame& frame) {
   CellBin sums = *this;  // in registers
   const CountFrame f = frame;
-  for (const LoadCellRecord& record : records) {
-    sums.force.add(std::int64_t{record.counts[f.axis]} - f.force_origin);
-    sums.torque.add(std::int64_t{record.counts[f.axis + 3]} - f.torque_origin);
-    sums.status |= record.status == (kSummaryBit | kMonitorBit) ? 0u : record.status;
-    sums.at_limit |= reach(record.counts, f.limits);
+  for (std::size_t i = from; i < to; ++i) {
+    const Counts& counts = cell.counts[i];
+    sums.force.add(std::int64_t{counts[f.axis]} - f.force_origin);
+    sums.torque.add(std::int64_t{counts[f.axis + 3]} - f.torque_origin);
+    sums.status |= cell.status[i] == (kSummaryBit | kMonitorBit) ? 0u : cell.status[i];
+    sums.at_limit |= reach(counts, f.limits);
   }
-  sums.n += static_cast<std::uint32_t>(records.size());
+  sums.n += static_cast<std::uint32_t>(to - from);
   *this = sums;
 }
 
@@ -112,10 +112,10 @@ CellWindow CellBins::over(std::size_t first, std::size_t last) const {
   return found;
 }
 
-CellStream::CellStream(const RunRecording& run)
+CellStream::CellStream(const RunRecording& run, LoadCellColumns cell)
     : header_(run.header),
-      records_(run.load_cell),
-      clock_(records_, run.header.load_cell.device_rate_hz, run.events),
+      cell_(std::move(cell)),
+      clock_(cell_, run.header.load_cell.device_rate_hz, run.events),
       frame_(frame_of(run.header)) {
   for (const ClockEpoch& epoch : clock_.epochs()) {
     if (epoch.rebooted) reboots_.push_back(clock_.time_ns(epoch, epoch.begin));
@@ -151,7 +151,7 @@ CellBins CellStream::bins(const Window& window) const {
     take_gaps(epoch, begin, end, bins);
     if (begin == end) continue;
     if (first) {
-      const Counts& counts = records_[begin].counts;
+      const Counts& counts = cell_.counts[begin];
       bins.frame_.force_origin = counts[frame_.axis];
       bins.frame_.torque_origin = counts[frame_.axis + 3];
       first = false;
@@ -159,7 +159,7 @@ CellBins CellStream::bins(const Window& window) const {
     std::size_t from = begin;
     for (std::size_t i = 0; i < bins.size() && from < end; ++i) {
       const std::size_t to = clock_.first_at(epoch, bins.window(i, i + 1).end, from);
-      bins.bins_[i].add(records_.subspan(from, to - from), bins.frame_);
+      bins.bins_[i].add(cell_, from, to, bins.frame_);
       from = to;
     }
   }
@@ -175,7 +175,7 @@ EvenSamples CellStream::samples(const Window& window) const {
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t strides = i == begin ? 1 : advance_to(i) / stride_of(header_);
       for (std::uint32_t k = 1; k < strides; ++k) found.counts.push_back(found.counts.back());
-      found.counts.push_back(records_[i].counts[frame_.axis]);
+      found.counts.push_back(cell_.counts[i][frame_.axis]);
     }
   }
   return found;

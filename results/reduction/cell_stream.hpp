@@ -6,7 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
+#include <utility>
 #include <vector>
 
 #include "results/records.hpp"
@@ -44,7 +44,8 @@ struct CellBin {
   std::uint32_t n = 0;
   std::uint32_t status = 0;  ///< all set bits, without healthy monitor words
   bool at_limit = false;     ///< a count of some axis at the end of its range
-  void add(std::span<const LoadCellRecord> records, const CountFrame& frame);
+  /// Records [from, to).
+  void add(const LoadCellColumns& cell, std::size_t from, std::size_t to, const CountFrame& frame);
   [[nodiscard]] bool frozen() const;  ///< more than one sample, and no force differs
 };
 
@@ -107,7 +108,8 @@ struct EvenSamples {
 class CellStream {
  public:
   /// The recording must outlive the stream.
-  explicit CellStream(const RunRecording& run);
+  CellStream(const RunRecording& run, LoadCellColumns cell);
+  explicit CellStream(const RunRecording& run) : CellStream(run, run.load_cell) {}
 
   /// Number of restarts of the box before `time`.
   [[nodiscard]] std::size_t boot_at(Nanoseconds time) const;
@@ -118,12 +120,12 @@ class CellStream {
 
  private:
   [[nodiscard]] std::uint32_t advance_to(std::size_t i) const {
-    return records_[i].ft_sequence - records_[i - 1].ft_sequence;
+    return cell_.ft_sequence[i] - cell_.ft_sequence[i - 1];
   }
   void take_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const;
 
   const RunHeader& header_;
-  std::span<const LoadCellRecord> records_;
+  LoadCellColumns cell_;
   ClockMap clock_;
   std::vector<Nanoseconds> reboots_;
   CountFrame frame_;

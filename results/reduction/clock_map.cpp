@@ -50,34 +50,33 @@ class DelayFloor {
 
 }  // namespace
 
-ClockMap::ClockMap(std::span<const LoadCellRecord> records, double device_rate_hz, std::span<const StreamEvent> events)
-    : records_(records), tick_ns_(1e9 / device_rate_hz) {
+ClockMap::ClockMap(const LoadCellColumns& cell, double device_rate_hz, std::span<const StreamEvent> events)
+    : ft_(cell.ft_sequence), tick_ns_(1e9 / device_rate_hz) {
+  const std::vector<Nanoseconds>& arrival_ns = cell.arrival_ns;
   // Signed difference: the wrap of the 32-bit counter goes forward, a restart of the box back.
-  const auto counts_on = [&](std::size_t i) {
-    return static_cast<std::int32_t>(records[i].ft_sequence - records[i - 1].ft_sequence) > 0;
-  };
+  const auto counts_on = [&](std::size_t i) { return static_cast<std::int32_t>(ft_[i] - ft_[i - 1]) > 0; };
   std::vector<std::size_t> broken;  // the first record that arrived at or after the end of each stall
   for (const StreamEvent& event : events) {
     if (event.kind != EventKind::stall_ended) continue;
-    const auto first = std::ranges::lower_bound(records, event.time_ns, {}, &LoadCellRecord::arrival_ns);
-    broken.push_back(static_cast<std::size_t>(first - records.begin()));
+    broken.push_back(
+        static_cast<std::size_t>(std::ranges::lower_bound(arrival_ns, event.time_ns) - arrival_ns.begin()));
   }
-  for (std::size_t begin = 0; begin < records.size();) {
+  for (std::size_t begin = 0; begin < ft_.size();) {
     const auto next_break = std::ranges::upper_bound(broken, begin);
-    const std::size_t last = next_break == broken.end() ? records.size() : *next_break;
-    ClockEpoch epoch{begin, begin, records[begin].ft_sequence};
+    const std::size_t last = next_break == broken.end() ? ft_.size() : *next_break;
+    ClockEpoch epoch{begin, begin, ft_[begin]};
     epoch.rebooted = begin > 0 && !counts_on(begin);
     DelayFloor floor;
     for (bool counts = true; counts;) {
       const std::size_t i = epoch.end++;
       counts = epoch.end < last && counts_on(epoch.end);
       // Of a datagram of many records only the last is fresh: the others waited for it.
-      if (counts && records[i + 1].arrival_ns == records[i].arrival_ns) continue;
-      const double device = device_ns(epoch, records[i].ft_sequence);
-      floor.add(device, static_cast<double>(records[i].arrival_ns - records[begin].arrival_ns) - device);
+      if (counts && arrival_ns[i + 1] == arrival_ns[i]) continue;
+      const double device = device_ns(epoch, ft_[i]);
+      floor.add(device, static_cast<double>(arrival_ns[i] - arrival_ns[begin]) - device);
     }
     floor.fit(epoch);
-    epoch.offset_ns += static_cast<double>(records[begin].arrival_ns);
+    epoch.offset_ns += static_cast<double>(arrival_ns[begin]);
     epochs_.push_back(epoch);
     begin = epoch.end;
   }
@@ -89,12 +88,12 @@ Nanoseconds ClockMap::time_of(const ClockEpoch& epoch, std::uint32_t ft) const {
 }
 
 std::size_t ClockMap::first_at(const ClockEpoch& epoch, Nanoseconds time, std::size_t from) const {
-  const auto earlier = [&](const LoadCellRecord& record) { return time_of(epoch, record.ft_sequence) < time; };
-  auto records = records_.subspan(from, epoch.end - from);
+  const auto earlier = [&](std::uint32_t ft) { return time_of(epoch, ft) < time; };
+  auto counts = std::span(ft_).subspan(from, epoch.end - from);
   std::size_t reach = 1;  // in growing leaps, since a search across all records would miss the cache
-  while (reach < records.size() && earlier(records[reach])) reach *= 2;
-  records = records.first(std::min(reach + 1, records.size()));
-  return from + static_cast<std::size_t>(std::ranges::partition_point(records, earlier) - records.begin());
+  while (reach < counts.size() && earlier(counts[reach])) reach *= 2;
+  counts = counts.first(std::min(reach + 1, counts.size()));
+  return from + static_cast<std::size_t>(std::ranges::partition_point(counts, earlier) - counts.begin());
 }
 
 }  // namespace kphi::results

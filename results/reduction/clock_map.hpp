@@ -23,16 +23,15 @@ struct ClockEpoch {
 
 class ClockMap {
  public:
-  /// `device_rate_hz`: rate at which ft_sequence counts. The records must be in order of arrival.
+  /// `device_rate_hz`: rate at which ft_sequence counts. The records are in order of arrival.
   /// A one-way stream cannot show the constant delays of box, filter and wire: times are late by their smallest sum.
   /// `events`: in a stall the box repeats its measurement and its clock stands still; behind it begins another epoch.
-  /// The records must outlive the map.
-  ClockMap(std::span<const LoadCellRecord> records, double device_rate_hz, std::span<const StreamEvent> events = {});
+  ClockMap(const LoadCellColumns& cell, double device_rate_hz, std::span<const StreamEvent> events = {});
 
   [[nodiscard]] const std::vector<ClockEpoch>& epochs() const { return epochs_; }
   /// Bench time of the sample in record `index` of `epoch`. Increases with the index.
   [[nodiscard]] Nanoseconds time_ns(const ClockEpoch& epoch, std::size_t index) const {
-    return time_of(epoch, records_[index].ft_sequence);
+    return time_of(epoch, ft_[index]);
   }
   /// First record of `epoch` at or after `time`, not before `from`; epoch.end if there is none. Quick near `from`.
   [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, Nanoseconds time, std::size_t from) const;
@@ -46,7 +45,7 @@ class ClockMap {
     return static_cast<double>(ft - epoch.ft_first) * tick_ns_;
   }
   [[nodiscard]] Nanoseconds time_of(const ClockEpoch& epoch, std::uint32_t ft) const;
-  std::span<const LoadCellRecord> records_;
+  std::vector<std::uint32_t> ft_;
   double tick_ns_;
   std::vector<ClockEpoch> epochs_;
 };

@@ -40,11 +40,11 @@ const RunRecording& usable(const RunRecording& run) {
 
 class Reduction {
  public:
-  explicit Reduction(const RunRecording& run)
+  Reduction(const RunRecording& run, LoadCellColumns cell)
       : run_(usable(run)),
         newtons_(run.header.thrust_sign / run.header.load_cell.counts_per_newton),
         newton_metres_(run.header.thrust_sign / run.header.load_cell.counts_per_newton_metre),
-        cell_(run),
+        cell_(run, std::move(cell)),
         motor_(run.motor),
         zeros_(run, cell_, motor_),
         spans_(flag_spans(run.events)) {}
@@ -284,10 +284,13 @@ class Reduction {
 
 }  // namespace
 
-Reduced reduce_with_zeros(const RunRecording& run) { return Reduction(run).reduced(); }
+Reduced reduce_with_zeros(const RunRecording& run) { return Reduction(run, run.load_cell).reduced(); }
 
-std::vector<Transition> transitions_of(const RunRecording& run) { return Reduction(run).transitions(); }
+std::vector<Transition> transitions_of(const RunRecording& run) { return Reduction(run, run.load_cell).transitions(); }
 
-std::vector<StepMean> reduce(const RunRecording& run) { return reduce_with_zeros(run).steps; }
+std::vector<StepMean> reduce(const RunRecording& run) { return reduce(run, run.load_cell); }
+std::vector<StepMean> reduce(const RunRecording& run, LoadCellColumns cell) {
+  return Reduction(run, std::move(cell)).reduced().steps;
+}
 
 }  // namespace kphi::results
