@@ -2,11 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/random.hpp"
-#include "base/statistics.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -37,17 +38,36 @@ void resample(std::span<const RunSums> runs, std::span<double> into, SplitMix64&
   }
 }
 
-/// The sample whose rank among n is nearest to `share` of n − 1. Reorders the samples.
-double percentile(std::vector<double>& samples, double share) {
-  const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(samples.size() - 1) + 0.5);
-  std::nth_element(samples.begin(), samples.begin() + rank, samples.end());
-  return samples[static_cast<std::size_t>(rank)];
+/// The samples whose ranks among n are nearest to 2.5 % and 97.5 % of n − 1. Of a normal sample only 11 % lie
+/// beyond 1.2 deviations on each side: as a rule only these are put in order.
+std::pair<double, double> ends_of(const std::vector<double>& samples, double centre, double deviation) {
+  const auto rank = [&](double share) {
+    return static_cast<std::ptrdiff_t>(share * static_cast<double>(samples.size() - 1) + 0.5);
+  };
+  std::vector<double> tails(samples.size());
+  auto low = tails.begin(), high = tails.end();  // each sample is written at both, without a branch
+  for (const double sample : samples) {
+    *low = *(high - 1) = sample;
+    low += sample < centre - 1.2 * deviation;
+    high -= sample > centre + 1.2 * deviation;
+  }
+  const auto lower = tails.begin() + rank(0.025), upper = tails.begin() + rank(0.975);
+  if (lower >= low || upper < high) {
+    tails = samples;
+    low = tails.end();
+    high = tails.begin();
+  }
+  std::nth_element(tails.begin(), lower, low);
+  std::nth_element(high, upper, tails.end());
+  return {*lower, *upper};
 }
 
-BootstrapInterval summary(std::string quantity, double value, std::vector<double> samples) {
-  const double deviation = std::sqrt(variance(samples));
+BootstrapInterval summary(std::string quantity, double value, const std::vector<double>& samples) {
+  const auto n = static_cast<Eigen::Index>(samples.size());
+  const Eigen::Map<const Eigen::ArrayXd> all(samples.data(), n);
+  const double centre = all.mean(), deviation = std::sqrt((all - centre).square().sum() / static_cast<double>(n - 1));
   if (!std::isfinite(deviation)) return {std::move(quantity), value, deviation, deviation, deviation};
-  const double lower = percentile(samples, 0.025), upper = percentile(samples, 0.975);
+  const auto [lower, upper] = ends_of(samples, centre, deviation);
   return {std::move(quantity), value, deviation, lower, upper};
 }
 
