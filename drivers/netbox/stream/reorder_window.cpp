@@ -179,8 +179,8 @@ ReorderWindow::ReorderWindow(std::size_t records, Duration patience, unsigned st
   held_.reserve(records_ + 1);
 }
 
-bool ReorderWindow::receive(const LoadCellRecord& record, LossTracker& account, std::vector<LoadCellRecord>& out) {
-  if (held_.empty() && account.is_next(record)) return deliver(record, account, out);
+bool ReorderWindow::receive_unusual(const LoadCellRecord& record, LossTracker& account,
+                                    std::vector<LoadCellRecord>& out) {
   if (held_.empty() && !account.has_last()) account.forget_host_drops();
   expire(record.arrival(), account, out);
   const bool rebooted = account.looks_rebooted(record);

@@ -132,7 +132,11 @@ class ReorderWindow {
   [[nodiscard]] bool empty() const noexcept { return held_.empty(); }
   /// Appends to `out` the records that can be delivered now, ascending in ft_sequence, counted by `account`. False if
   /// the record was refused and counted (duplicate, late, stalled).
-  bool receive(const LoadCellRecord& record, LossTracker& account, std::vector<LoadCellRecord>& out);
+  bool receive(const LoadCellRecord& record, LossTracker& account, std::vector<LoadCellRecord>& out) {
+    if (!held_.empty() || !account.is_next(record)) return receive_unusual(record, account, out);
+    out.push_back(record);
+    return account.accept(record);
+  }
   /// Gives up the gaps older than the patience.
   void expire(Instant now, LossTracker& account, std::vector<LoadCellRecord>& out);
   /// Gives up all gaps.
@@ -142,6 +146,7 @@ class ReorderWindow {
   [[nodiscard]] Instant deadline() const noexcept { return held_.empty() ? kNever : oldest_arrival_ + patience_; }
 
  private:
+  bool receive_unusual(const LoadCellRecord& record, LossTracker& account, std::vector<LoadCellRecord>& out);
   [[nodiscard]] bool may_have_overtaken(const LoadCellRecord& record, const LossTracker& account) const noexcept;
   /// No record can be missing between (rdt, ft) and `record`.
   [[nodiscard]] bool follows(std::uint32_t rdt, std::uint32_t ft, const LoadCellRecord& record) const noexcept;
