@@ -76,6 +76,13 @@ TEST(ClockMap, BeatsTheArrivalStampsOfBufferedRecords) {
   EXPECT_LT(worst_error_us(truth, run.load_cell, map), 100);
 }
 
+TEST(ClockMap, IsNotMovedByRecordsThatWaitedForTheirDatagram) {
+  Truth truth = stream_of(30, 40, 30);
+  truth.rate_hz = 50;  // 0.8 s a datagram
+  const auto run = make_run(truth);
+  EXPECT_LT(worst_error_us(truth, run.load_cell, ClockMap(run.load_cell, 50)), 100);
+}
+
 TEST(ClockMap, IsNotMovedByLateDatagramsOrGaps) {
   Truth truth = stream_of(60, 1, 30);
   truth.lose = [](std::uint64_t n) { return (n > 70000 && n < 90000) || n % 97 == 3; };
@@ -137,6 +144,10 @@ TEST(ClockMap, LivesWithAlmostNothing) {
   const ClockMap map(one, 7000);
   ASSERT_EQ(map.epochs().size(), 1u);
   EXPECT_EQ(map.time_ns(map.epochs()[0], 0), 0);
+
+  std::vector<LoadCellRecord> brief(1400);
+  for (std::uint32_t i = 0; i < brief.size(); ++i) brief[i].ft_sequence = 7 * i, brief[i].arrival_ns = 1'001'000 * i;
+  EXPECT_EQ(ClockMap(brief, 7000).epochs()[0].skew, 0) << "three half seconds";
 }
 
 /// One record each millisecond; the box stands still for a second after the 2000th.
