@@ -53,14 +53,22 @@ std::vector<Transition> transitions(const Truth& truth, unsigned seed = 1) {
 }
 
 TEST(Lag, IsRecoveredWithinFiveMilliseconds) {
+  int smoothed = 0;
   for (const double motor : {0.02, 0.1, 0.4}) {
     for (const double delay : {0.0, 0.02, 0.1, 0.3}) {
       const Lag lag = estimate_lag(transitions({delay, 0, motor}));
       EXPECT_TRUE(lag.known());
       EXPECT_NEAR(lag.seconds, delay, 0.005) << motor;
       EXPECT_LT(lag.u, 0.004);
+      smoothed += lag.smoothing > 0;
     }
   }
+  EXPECT_LE(smoothed, 2) << "only where chance shows one";
+}
+
+TEST(Lag, HasOneDegreeOfFreedomLessThanThereAreSteps) {
+  const std::vector<Transition> alike(5, transitions({0.1}).back());
+  EXPECT_NEAR(estimate_lag(alike).freedom, 4, 1e-6);
 }
 
 TEST(Lag, OfACellThatSmoothsIsItsMeanDelay) {
@@ -114,6 +122,7 @@ TEST(Lag, IsUnknownFromTooFewStepsFromNoiseAndOutsideTheSearch) {
   EXPECT_FALSE(estimate_lag(transitions({0.1, 0, 0.1, 0.004, 2})).known());
   EXPECT_FALSE(estimate_lag(transitions({0.1, 0, 0.1, 5.0})).known());
   EXPECT_FALSE(estimate_lag(transitions({0.9, 0, 0.1})).known());
+  EXPECT_FALSE(estimate_lag(transitions({-0.2, 0, 0.1})).known());
 }
 
 TEST(Lag, IsNotDisturbedByBinsThatHoldNothing) {
