@@ -18,11 +18,11 @@ std::vector<MotorReading> speeds(std::initializer_list<double> values) {
 constexpr Window kAll{0, 1'000'000'000};
 
 TEST(MotorSeries, LeavesOutSpeedsThatNoRotorCanHaveAndCountsThem) {
-  const auto readings = speeds({800, 801, 1600, 799, 800, 800, 200, 150, 800, 801, 800});
+  const auto readings = speeds({800, 801, 1600, 799, 800, 800, 200, 150, 800, 801});
   const MotorSeries series(readings);
   EXPECT_EQ(series.glitches(kAll), 3u);
   EXPECT_NEAR(series.statistics(MotorChannel::speed, kAll).mean, 800, 1);
-  EXPECT_EQ(series.statistics(MotorChannel::speed, kAll).n, 8u);
+  EXPECT_EQ(series.statistics(MotorChannel::speed, kAll).n, 7u);
   EXPECT_EQ(series.glitches({100'000'000, 1'000'000'000}), 2u);
 }
 
