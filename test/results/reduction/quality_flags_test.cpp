@@ -65,6 +65,19 @@ TEST(QualityFlags, ChecksVoltageAndCoilOnlyAgainstLimitsThatTheRunHas) {
   }
 }
 
+TEST(QualityFlags, ASupplyMayLimitBeforeTheStepIsSettledButNotBeOff) {
+  RunRecording run = make_run({});
+  const Nanoseconds begin = run.phases[2].time_ns, late = begin + 1'900'000'000;
+  run.supply = {{begin + 1'000'000, 0, 14, 9, 16, 9, SupplyRegulation::constant_current, SupplyProtection::none, 1},
+                {late, 0, 16, 1, 16, 9, SupplyRegulation::constant_voltage, SupplyProtection::none, 1},
+                {late + 1'000'000, 0, 15.5, 3, 16, 9, SupplyRegulation::constant_voltage, SupplyProtection::none, 1}};
+  const StepMean step = reduce(run).at(1);
+  EXPECT_EQ(quality_flag_names(step.quality_flags), "");
+  EXPECT_DOUBLE_EQ(step.supply_w, (16 + 46.5) / 2) << "the mean of the products";
+  run.supply[0].output = 0;
+  EXPECT_EQ(quality_flag_names(reduce(run).at(1).quality_flags), "supply_off");
+}
+
 TEST(QualityFlags, FlagsAStepThatDoesNotSettleAndDoesNotAverageItAsIfItHad) {
   Truth truth;
   truth.noise_n = 0.001;
