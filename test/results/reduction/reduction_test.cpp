@@ -106,6 +106,7 @@ TEST(Reduction, ADriftingZeroIsInterpolatedInTime) {
     EXPECT_NEAR(k_of(step), truth.k, 1e-3 * truth.k) << step.step;
     const double centre = 0.5 * (step.window_begin_s + step.window_end_s);
     EXPECT_NEAR(step.zero_n, truth.sign * (truth.zero_force_n + truth.drift_n_per_s * centre), 1e-3);
+    EXPECT_NEAR(step.zero_moved_n, truth.sign * truth.drift_n_per_s * 10.25, 2e-3) << "from 0.5 to 10.75 s";
   }
 }
 
@@ -115,6 +116,8 @@ TEST(Reduction, TheZeroOfTheTorqueIsSubtractedAndInterpolated) {
   for (auto& r : run.load_cell) r.counts[5] += 50000 + static_cast<std::int32_t>(r.arrival_ns / 1'000'000);  // 1 mN m/s
   const auto steps = reduce(run);
   for (std::size_t i = 0; i < steps.size(); ++i) EXPECT_NEAR(steps[i].torque_nm, exact[i].torque_nm, 1e-5) << i;
+  run.header.load_cell.counts_per_newton_metre *= 2;
+  EXPECT_NEAR(reduce(run)[2].torque_nm, exact[2].torque_nm / 2, 1e-5);
 }
 
 TEST(Reduction, FlagsAMeanOfUnknownUncertainty) {
