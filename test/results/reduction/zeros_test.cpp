@@ -19,6 +19,7 @@ using testing::IsEmpty;
 
 struct Built {
   explicit Built(const Truth& truth) : run(make_run(truth)) {}
+  explicit Built(RunRecording recording) : run(std::move(recording)) {}
   RunRecording run;
   CellStream cell{run};
   MotorSeries motor{run.motor};
@@ -36,7 +37,7 @@ TEST(Zeros, LieOnALineBetweenBeforeAndAfter) {
 }
 
 TEST(Zeros, AreLeastCertainNearEachAndMoreBetweenThem) {
-  const Built built({});
+  const Built built(Truth{});
   const double at_one = built.zeros.at(0.5e9, 0).u;
   const double between = built.zeros.at(5e9, 0).u;
   EXPECT_NEAR(at_one, 1e6 * 0.02 / std::sqrt(1000.0), 300);
@@ -51,13 +52,21 @@ TEST(Zeros, HaveEachItsOwnUncertainty) {
     if (i % 10 == 0) wander = random() % 2 == 0 ? 40000 : -40000;
     run.load_cell[i].counts[2] += wander;
   }
-  const CellStream cell(run);
-  const MotorSeries motor(run.motor);
-  const Zeros zeros(run, cell, motor);
+  const Built built(run);
+  const Zeros& zeros = built.zeros;
   const double end = 0.5e9 + static_cast<double>(run.phases[run.phases.size() - 2].time_ns);
   EXPECT_NEAR(zeros.at(0.5e9, 0).u, 1e6 * 0.02 / std::sqrt(1000.0), 300);
   EXPECT_GT(zeros.at(end, 0).u, 1.5 * zeros.at(0.5e9, 0).u);
   EXPECT_GT(zeros.largest_u(), 1.5 * zeros.at(0.5e9, 0).u);
+  EXPECT_NEAR(zeros.largest_deviation(), 1e6 * std::hypot(0.02, 0.04), 1000);
+}
+
+TEST(Zeros, PayADegreeOfFreedomForTheTrendOfANoiseThatSwings) {
+  Truth truth;
+  truth.noise_n = 0;
+  RunRecording run = make_run(truth);
+  for (std::size_t i = 0; i < run.load_cell.size(); ++i) run.load_cell[i].counts[2] += i / 10 % 2 == 0 ? 1000 : -1000;
+  EXPECT_NEAR(Built(run).zeros.at(0.5e9, 0).freedom, 11, 1e-6) << "twelve waves";
 }
 
 TEST(Zeros, MayMoveByHalfAPercentOfTheLargestThrust) {
