@@ -61,7 +61,8 @@ TEST(UsbAddress, IsVendorAndProductThenSerialAndPort) {
 TEST(UsbAddress, RefusesAnythingElseAndShowsTheForm) {
   for (const char* text :
        {"", "usb:", "usb:4d8:dd", "usb:04d8", "usb:04d8:00dg", "usb:04d8:00dd:", "usb:04d8:00dd@", "usb:04d8:00dd@one",
-        "usb:04d8:00ddX", "04d8:00dd", "usb:-4d8:00dd", "usb:**:00dd", "usb::6001"}) {
+        "usb:04d8:00ddX", "04d8:00dd", "usb:-4d8:00dd", "usb:**:00dd", "usb::6001", "usb:04d8:00dd@1-1-2",
+        "usb:04d8:00dd@1-", "usb:04d8:00dd@1-1:1:0", "usb:04d8:00dd::1"}) {
     EXPECT_THAT(refusal([&] { return UsbAddress::parse(text); }), testing::HasSubstr("usb:VENDOR:PRODUCT")) << text;
     EXPECT_FALSE(UsbAddress::read(text)) << text;
   }
@@ -71,6 +72,7 @@ TEST(UsbAddress, FitsWhatItNames) {
   EXPECT_TRUE(UsbAddress::parse("usb:04d8:00dd").fits(0x04d8, 0x00dd, "1"));
   EXPECT_TRUE(UsbAddress::parse("usb:*:00dd:1").fits(0x1234, 0x00dd, "1"));
   EXPECT_FALSE(UsbAddress::parse("usb:*:00dd:1").fits(0x1234, 0x00dd, ""));
+  EXPECT_FALSE(UsbAddress::parse("usb:*:00dd:1").fits(0x1234, 0x00dd, "12"));
   EXPECT_FALSE(UsbAddress::parse("usb:04d8:*").fits(0x04d9, 0x00dd, "1"));
 }
 
