@@ -50,6 +50,12 @@ TEST(OutlyingRuns, AreNotLookedForAmongTwo) {
   EXPECT_TRUE(outlying_runs(identify(steps, anchored).selection.used).empty());
 }
 
+TEST(Repeatability, AddsTheFreedomWithinTheRunsOfAllAngles) {
+  AngleScatter angle{.k = 1, .within = {1, 10}};
+  angle.runs.resize(1);
+  EXPECT_NEAR((Repeatability{.angles = {angle, angle}}.freedom()), 20, 1e-9);
+}
+
 TEST(LeftOutRuns, AreListedWithTheirCauseAndWeighNothing) {
   IdentificationOptions options;
   options.left_out = {parse_left_out_run("90:2:plate slipped: seen afterwards")};
