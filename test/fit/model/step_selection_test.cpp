@@ -23,6 +23,10 @@ StepMean step_of(double thrust_u_n, double speed_u_rad_s) {
   return step;
 }
 
+TEST(StepSelection, TakesTheSpeedsAtBothEndsOfTheRange) {
+  EXPECT_EQ(select_steps(std::vector{step_of(0.005, 0.3)}, {1000, 1000}, {}).used.size(), 1u);
+}
+
 TEST(StepUncertainty, IsTheStepsOwnWhereTheyTellIt) {
   const auto points = points_of(std::vector{step_of(0.005, 0.3), step_of(0.007, 0.4)});
   EXPECT_EQ(points[0].u_thrust_n, 0.005);
