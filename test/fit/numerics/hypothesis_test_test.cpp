@@ -25,6 +25,7 @@ TEST(HypothesisTest, RejectsAtTheLevel) {
   EXPECT_TRUE(student_test({4.31, 1, 2}, 0).rejected());
   EXPECT_FALSE(student_test({4.29, 1, 2}, 0).rejected());
   EXPECT_FALSE(student_test({100, 0, 2}, 0).tested()) << "without an error nothing is tested";
+  EXPECT_FALSE(student_test({100, 1, 0}, 0).tested());
   EXPECT_FALSE(f_test(5, 2, 0).tested());
   EXPECT_FALSE(f_test(5, 2, 0).rejected());
 }
