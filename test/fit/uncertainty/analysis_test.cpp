@@ -47,9 +47,12 @@ TEST(Analysis, WhatIsCommonToAllCancelsInTheScalingFactor) {
   const Analysis before = analyse(study.found, study.options);
   study.options.bench.cell_calibration = 0.5;
   study.options.bench.motor_clock = 0.5;
+  study.options.bench.alignment_rad = 0.02;
   const Analysis after = analyse(study.found, study.options);
   EXPECT_GT(after.coefficients[0].combined(), 0.4 * after.coefficients[0].value);
   EXPECT_GT(after.predictions[0].speed_u_share, 0.2);
+  const Budget& k = after.coefficients[0];
+  EXPECT_NEAR(row_of(k, "alignment").contribution() / k.value, 0.02 * 0.02 / std::sqrt(2.0), 1e-12);
   EXPECT_NEAR(after.predictions[0].scaling_factor.combined() / before.predictions[0].scaling_factor.combined(), 1,
               1e-9);
 }
@@ -86,6 +89,8 @@ TEST(Analysis, StandardAirAddsTheDensity) {
   const Analysis analysis = analyse(study.found, study.options);
   const double scale = kStandardDensity / study.campaign.measured_density;
   EXPECT_NEAR(analysis.standard[0].value / (analysis.coefficients[0].value * scale), 1, 1e-12);
+  EXPECT_NEAR(row_of(analysis.standard[0], "cell calibration").contribution(), 2e-3 * analysis.standard[0].value,
+              1e-17);
   EXPECT_NEAR(row_of(analysis.standard[0], "air density").contribution(), 3e-3 * analysis.standard[0].value, 1e-17);
   study.options.air_density_kg_m3.reset();
   EXPECT_TRUE(analyse(study.found, study.options).standard.empty()) << "never 1.225 in silence";
@@ -110,6 +115,9 @@ TEST(Analysis, TorqueFollowsTheSameEstimators) {
     EXPECT_NEAR(analysis.torque[i].drag_per_thrust_m.value, 0.013, 4 * analysis.torque[i].drag_per_thrust_m.u + 1e-5);
   EXPECT_EQ(analysis.torque[0].share, 1);
   EXPECT_LT(analysis.torque[4].share, 0.3);
+  const auto relative = [](const Estimate& k_q) { return k_q.u / k_q.value; };
+  EXPECT_NEAR(analysis.torque[4].share_u / analysis.torque[4].share,
+              std::hypot(relative(analysis.torque[4].k_q), relative(analysis.torque[0].k_q)), 1e-12);
 }
 
 TEST(Analysis, OneRunEachLeavesTheRepetitionsUnknown) {
@@ -126,6 +134,7 @@ TEST(Analysis, OfATableUsesItsOwnErrors) {
   const std::vector<LinePoint> points{{0, 1.5e-6, 1e-8}, {90, 1.2e-6, 1e-8}, {180, 0.8e-6, 2e-8}, {270, 0.4e-6, 1e-8}};
   const Analysis analysis = analyse(identify_table(points, {.speed_range = {300, 2000}}));
   EXPECT_NEAR(analysis.coefficients[2].combined(), 2e-8, 1e-20);
+  EXPECT_NEAR(analysis.shape.mismatch.u, std::hypot(analysis.intercept.combined(), 1e-8), 1e-18);
   EXPECT_TRUE(analysis.speed.empty());
   EXPECT_TRUE(analysis.torque.empty());
   EXPECT_TRUE(analysis.bootstrap.empty());
