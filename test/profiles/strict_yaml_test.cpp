@@ -148,6 +148,7 @@ TEST(StrictYaml, RefusesTabsInTheIndentation) {
 TEST(StrictYaml, RefusesControlCharacters) {
   EXPECT_EQ(finding_of("a: 1\nb: x\x01y\n"), "2:5: a control character (0x01); save the file as UTF-8 text");
   EXPECT_EQ(finding_of(std::string("a: x\0y", 6)), "1:5: a control character (0x00); save the file as UTF-8 text");
+  EXPECT_EQ(finding_of("a: x\x7fy"), "1:5: a control character (0x7f); save the file as UTF-8 text");
   EXPECT_EQ(finding_of("a: 1\rb: 2"), "1:5: a control character (0x0d); save the file as UTF-8 text");
   EXPECT_EQ(finding_of("a: \"x\\0y\""), "1:4: a control character (0x00); write it without") << "written as an escape";
 }
@@ -205,6 +206,7 @@ TEST(StrictYaml, HoldsItsLimits) {
   EXPECT_EQ(findings_of(std::string(kMaxDepth, '[') + std::string(kMaxDepth, ']')).size(), 0u);
   EXPECT_THAT(findings_of(std::string(100'000, '[')), SizeIs(1)) << "and no stack overflows";
   EXPECT_THAT(finding_of("a: " + std::string(kMaxScalarBytes + 1, 'x')), HasSubstr("1:4: this text has 4097 bytes"));
+  EXPECT_EQ(findings_of("a: " + std::string(kMaxScalarBytes, 'x')).size(), 0u);
   EXPECT_THAT(finding_of(std::string(kMaxKeyBytes + 1, 'x') + ": 1"), HasSubstr("1:1: this key is too long"));
   EXPECT_THAT(finding_of(std::string(kMaxTextBytes + 1, '#')), HasSubstr("1:1: larger than 1 MiB"));
   EXPECT_EQ(value_of("a: 1\n#" + std::string(kMaxTextBytes - 6, '#')), json({{"a", 1}}));
