@@ -202,9 +202,9 @@ TEST(Vehicle, RefusesMassesAndGainsThatCannotBe) {
 }
 
 TEST(Vehicle, HasABodyThatIsAPlateOrTellsItsInertia) {
-  const std::string plate = "body_height_m: 0.04\n", told = "body_inertia_kg_m2: [1e-3, 1e-3, 1.8e-3]\n";
+  const std::string plate = "body_height_m: 0.04\n", told = "body_inertia_kg_m2: [1e-3, 1e-3, 2e-3]\n";
   const auto text = changed(kVehicleText + kFlightText, plate, told);
-  EXPECT_THAT(*parse_vehicle(text, "v").dynamics->body_inertia, ElementsAre(1e-3, 1e-3, 1.8e-3));
+  EXPECT_THAT(*parse_vehicle(text, "v").dynamics->body_inertia, ElementsAre(1e-3, 1e-3, 2e-3));
   expect_refusals(
       refused_in_flight,
       {{"  " + plate, "", "15:3: dynamics: neither body_height_m nor body_inertia_kg_m2…"},
