@@ -45,6 +45,10 @@ TEST(Hysteresis, IsFoundWithItsSizeAndUncertainty) {
   const auto& fastest = found->speeds.back();
   EXPECT_NEAR(fastest.up_minus_down_n, 0.01 * kK * fastest.speed_rad_s * fastest.speed_rad_s, 4 * fastest.u_n);
   EXPECT_NEAR(fastest.u_n, kU * std::sqrt(2.0), 1e-5);
+  auto steps = run(0);
+  for (StepMean& step : steps) step.speed_u_rad_s = 1e-3 * step.speed_rad_s, step.thrust_u_n = 0;
+  const auto of_speed = hysteresis_of(steps)->speeds.front();
+  EXPECT_NEAR(of_speed.u_n / (2e-3 * std::sqrt(2.0) * kK * std::pow(of_speed.speed_rad_s, 2)), 1, 0.1) << "2 u(w)/w";
 }
 
 TEST(Hysteresis, IsNotSeenWhereThereIsNoneAndItsUncertaintyIsHonest) {
