@@ -76,6 +76,8 @@ TEST(QualityFlags, ASupplyMayLimitBeforeTheStepIsSettledButNotBeOff) {
   EXPECT_DOUBLE_EQ(step.supply_w, (16 + 46.5) / 2) << "the mean of the products";
   run.supply[0].output = 0;
   EXPECT_EQ(quality_flag_names(reduce(run).at(1).quality_flags), "supply_off");
+  run.supply[0].output = 1, run.supply[0].protection = SupplyProtection::over_voltage, run.supply[1].voltage_v = 16.6;
+  EXPECT_EQ(quality_flag_names(reduce(run).at(1).quality_flags), "supply_off+supply_rise");
 }
 
 TEST(QualityFlags, FlagsAStepThatDoesNotSettleAndDoesNotAverageItAsIfItHad) {
@@ -260,6 +262,7 @@ TEST(QualityFlags, StatusWordsBecomeFlags) {
   EXPECT_EQ(flags_with(0x80020000u), "saturated");
   EXPECT_EQ(flags_with(0x80010000u), "");  // a monitor condition is no error
   EXPECT_EQ(flags_with(0x80000010u), "bad_status");
+  EXPECT_EQ(flags_with(0x80000000u), "bad_status") << "an error without a cause";
   EXPECT_EQ(flags_with(0x80020010u), "saturated+bad_status");
   constexpr std::uint32_t kAxia = 1u << 27 | 1u << 30;
   EXPECT_EQ(flags_with(0xC0000000u, kAxia), "saturated");
