@@ -164,6 +164,9 @@ TEST(Drift, IsNoNoiseNoSmallChangeAndNoTransient) {
   EXPECT_FALSE(drifts(step(3, 0, 1, 1, 0.006))) << "0.2 % in the second half";
   EXPECT_FALSE(drifts(step(3, -1, 0.15))) << "dies";
   EXPECT_FALSE(drifts(std::vector<double>(4, 1.0)));
+  std::vector<double> tent;
+  for (int i = 0; i < 200; ++i) tent.push_back(3 - 0.001 * std::abs(i - 100));
+  EXPECT_FALSE(drifts(tent)) << "turns round";
 }
 
 }  // namespace
