@@ -261,6 +261,7 @@ TEST(RunFile, BytesNeededAreEnoughButNotFarOff) {
   const std::uint64_t needed = RunWriter::bytes_needed(run.load_cell.size(), run.motor.size());
   EXPECT_GE(needed, std::filesystem::file_size(folder / "a.h5"));
   EXPECT_LE(needed, 4 * std::filesystem::file_size(folder / "a.h5"));
+  EXPECT_GT(RunWriter::bytes_needed(0, 1'000'000), 24'000'000u) << "readings";
 }
 
 }  // namespace
