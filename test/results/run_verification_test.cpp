@@ -127,7 +127,7 @@ TEST_F(VerifiedRun, ADoubledSampleARebootAndALeftStrideShow) {
 TEST_F(VerifiedRun, AGapThatIsNoMultipleOfTheStrideIsWholeWhenItWasCounted) {
   RunRecording run = make_run({});
   for (std::size_t i = 1000; i < run.load_cell.size(); ++i) run.load_cell[i].ft_sequence += 25;  // 4.6 strides
-  run.account.lost_network += 4;
+  run.account.lost_network += 3, run.account.lost_host += 1;
   run.account.expected += 4;
   run.account.irregular += 1;
   EXPECT_THAT(problems_of(run), testing::IsEmpty());
@@ -149,6 +149,7 @@ TEST_F(VerifiedRun, WithARestartOfTheBoxThatWasCountedIsWhole) {
   for (std::size_t i = 0; i < run.load_cell.size(); ++i)
     run.load_cell[i].ft_sequence = static_cast<std::uint32_t>(7 * (i < 5000 ? i : i - 5000));
   run.account.reboots = 1;
+  run.account.lost_network += 3, run.account.expected += 3;  // while it restarted; ft_sequence does not show them
   write_run(path_, run);
   EXPECT_TRUE(verify_run(path_).whole()) << ::testing::PrintToString(verify_run(path_).problems);
 }
@@ -171,6 +172,8 @@ TEST_F(VerifiedRun, AStrangeScaleShows) {
   run = make_run({});
   run.header.load_cell.device_rate_hz = 5000;
   EXPECT_THAT(problems_of(run), Contains(HasSubstr("do not make the box's")));
+  run.header.thrust_axis = -1, run.header.spin = 0, run.header.clock_gain = HUGE_VAL;
+  EXPECT_THAT(problems_of(run), testing::IsSupersetOf({"thrust_axis is -1", "spin is 0", "clock_gain is inf"}));
 }
 
 TEST_F(VerifiedRun, WhatIsNoRunFileIsSaidToBeNone) {
