@@ -36,14 +36,16 @@ TEST(Csv, ReportsLinesWithTooManyOrTooFewFields) {
 }
 
 TEST(Csv, ReadsQuotedFields) {
-  const Table table = read_csv("a,b\n\"1,5\",\"say \"\"hi\"\"\"\n\"open,2\n\"x\"y,2\n", "t.csv");
+  const Table table = read_csv("a,b\n\"1,5\",\"say \"\"hi\"\"\"\n\"open,2\n\"x\"y2\n", "t.csv");
   ASSERT_EQ(table.rows.size(), 1u);
   EXPECT_THAT(table.rows[0].fields, ElementsAre("1,5", "say \"hi\""));
   EXPECT_EQ(table.problems.size(), 2u);
 }
 
 TEST(Csv, FindsColumnsByNameInAnyOrder) {
-  const Table table = read_csv("b,a,b\n", "t.csv");
+  const Table table = read_csv("\nb,a,b\n", "t.csv");
+  EXPECT_EQ(table.header_line, 2u);
+  EXPECT_THAT(read_csv("a,b;c\n", "t.csv", 0).header, ElementsAre("a", "b;c")) << "a comma, where nothing tells more";
   EXPECT_EQ(table.column("a"), 1u);
   EXPECT_THROW((void)table.column("c"), ConfigurationError);
   EXPECT_THROW((void)table.column("b"), ConfigurationError) << "which of the two?";
