@@ -432,9 +432,9 @@ TEST(CompensatorBuild, DoubtsALineThatStepsAtContactOrGainsWithOcclusion) {
   EXPECT_FALSE(doubts(paper_line(), ScalingLaw::clamped).steps_at_contact);
   EXPECT_TRUE(doubts(paper_line(), ScalingLaw::published).steps_at_contact);
   EXPECT_TRUE(doubts(example_line(0.95, -0.002), ScalingLaw::clamped).steps_at_contact);
-  EXPECT_FALSE(doubts(example_line(1.0, -0.002), ScalingLaw::published).steps_at_contact);
+  EXPECT_FALSE(doubts(example_line(1.0 - 1e-12, -0.002), ScalingLaw::published).steps_at_contact);
   EXPECT_FALSE(doubts(paper_line(), ScalingLaw::clamped).gains_with_occlusion);
-  EXPECT_TRUE(doubts(example_line(1.0, 0.001), ScalingLaw::clamped).gains_with_occlusion);
+  EXPECT_TRUE(doubts(example_line(1.0, 0), ScalingLaw::clamped).gains_with_occlusion);
 }
 
 TEST(CompensatorUncertainty, TellsTheUncertaintyOfItsSpeeds) {
