@@ -166,7 +166,7 @@ TEST(ConvexPolygon, CannotExistInvalid) {
   EXPECT_TRUE(made({at(0, 0), at(1, 0), at(0, 1)}));
   EXPECT_FALSE(made({at(0, 0), at(0, 1), at(1, 0)})) << "clockwise";
   EXPECT_FALSE(made({at(0, 0), at(1, 0)}));
-  EXPECT_FALSE(made({at(0, 0), at(1, 0), at(2, 0), at(0, 1)})) << "a corner on the line of its neighbours";
+  EXPECT_FALSE(made({at(0, 0), at(1, 0), at(2, 1e-10), at(0, 1)})) << "a corner on the line of its neighbours";
   EXPECT_FALSE(made({at(0, 0), at(2, 0), at(0.5, 0.5), at(0, 2)})) << "a dent";
   EXPECT_FALSE(made({at(0, 0), at(1, 0), at(1, 0), at(0, 1)})) << "a corner twice";
   for (const double bad : {kNaN, kInfinity}) EXPECT_FALSE(made({at(0, 0), at(1, bad), at(0, 1)}));
