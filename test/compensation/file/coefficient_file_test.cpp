@@ -120,7 +120,9 @@ TEST(CoefficientFile, GivesTheFitAndTheBudgets) {
   EXPECT_EQ(c.uncertainty->thrust_coefficient, 2e-9);
   EXPECT_TRUE(std::isinf(c.uncertainty->freedom));
   EXPECT_FALSE(c.uncertainty->intercept);
+  EXPECT_EQ(c.uncertainty->slope_per_deg, 3e-12);
   EXPECT_EQ(c.uncertainty->table.back(), 2.5e-9);
+  EXPECT_EQ(parse_coefficients(with(kGood + budgets, ".inf", "12"), "c").uncertainty->freedom, 12);
   EXPECT_THAT(refusal_of(with_fit + "uncertainty: 0.3\n"), StartsWith("c.yaml:24: "));
   EXPECT_THAT(refusal_of(with(with_fit + budgets, "u: 2.5e-09", "u: small")), HasSubstr("`u`"));
   EXPECT_THAT(refusal_of(with(with_fit, "[3000.0, 17000.0]", "[3000.0]")), HasSubstr("speed_range_rpm"));
@@ -201,6 +203,7 @@ TEST(CoefficientFile, IsRefusedWhenANumberIsNotFinite) {
     EXPECT_THAT(refusal_of(with(kGood, "-4.5e-09", bad)), HasSubstr("`slope_per_deg`")) << bad;
   }
   EXPECT_THAT(refusal_of(with(kGood, "4.0e-23", ".nan")), HasSubstr("covariance"));
+  EXPECT_THAT(refusal_of(with(kGood, "blades: 3", "blades: -3")), HasSubstr("not a count"));
   EXPECT_THAT(refusal_of(with(kGood, "k: 1.4e-06", "k: .nan")), StartsWith("c.yaml:17: "));
 }
 
@@ -238,7 +241,7 @@ TEST(CoefficientFile, HoldsOcclusionsOfOneTurnAtMost) {
 TEST(CoefficientFile, HoldsAnAnchoredLineToOnePartInAMillion) {
   const std::string anchored = with(kGood, "anchored: false", "anchored: true");
   EXPECT_TRUE(parse_coefficients(with(anchored, "1.6e-06", "1.550001e-06"), "c.yaml").anchored);
-  EXPECT_THAT(refusal_of(with(anchored, "1.6e-06", "1.550003e-06")), HasSubstr("its intercept is not K_T"));
+  EXPECT_THAT(refusal_of(with(anchored, "1.6e-06", "1.549997e-06")), HasSubstr("its intercept is not K_T"));
 }
 
 TEST(CoefficientFile, IsRefusedWhenTheCovarianceHasAnotherShape) {
