@@ -82,28 +82,32 @@ TEST(PlainInterface, TellsTheUncertaintyWhereTheLineHasOne) {
   kphi_line line = plain_line();
   line.has_uncertainty = 1;
   line.thrust_coefficient_error = 0.01 * line.thrust_coefficient;
+  line.intercept_variance = 4e-18;
   const kphi_line lines[4] = {line, line, line, plain_line()};
   const kphi_airframe airframe = plain_airframe();
   kphi_compensator compensator;
   ASSERT_EQ(kphi_compensator_build(&compensator, lines, &airframe, KPHI_LAW_CLAMPED), 0);
-  const double x[4] = {0.8, 0.8, 0.8, 0.8}, thrusts[4] = {1, 1, 1, 1};
+  const double x[4] = {0.8, kPi, 0.8, 0.8}, thrusts[4] = {1, 1, 1, 1};
   kphi_set_arms(&compensator, x);
   double speeds[4], uncertainties[4];
   kphi_speeds_for(&compensator, thrusts, speeds, nullptr);
-  kphi_speed_uncertainties(&compensator, thrusts, 0.01, uncertainties);
+  kphi_speed_uncertainties(&compensator, thrusts, 0, uncertainties);
   EXPECT_NEAR(uncertainties[0] / speeds[0], 0.005, 1e-12);
+  EXPECT_NEAR(uncertainties[1] / speeds[1], 0.5 * 2e-9 * speeds[1] * speeds[1], 1e-12) << "of k = 1 N over speed²";
   EXPECT_EQ(uncertainties[3], std::numeric_limits<double>::infinity());
 }
 
 TEST(PlainInterface, TakesAPolygonBody) {
   kphi_airframe airframe = plain_airframe();
+  for (int i = 0; i < 4; ++i) airframe.mirrored[i] = i % 2;
+  kphi_compensator closed = built(airframe);
   airframe.corner_count = 4;
   const double square[4][2] = {{.045, .045}, {-.045, .045}, {-.045, -.045}, {.045, -.045}};
   std::memcpy(airframe.corners, square, sizeof square);
   std::memcpy(airframe.hinges, square, sizeof square);
-  for (int i = 0; i < 4; ++i) airframe.hinge_turn_rad[i] = i * kPi / 2;
-  kphi_compensator general = built(airframe), closed = built(plain_airframe());
-  const double o[4] = {kPi, kPi, kPi - 0.25, kPi};
+  for (int i = 0; i < 4; ++i) airframe.hinge_turn_rad[i] = (i + i % 2) * kPi / 2;
+  kphi_compensator general = built(airframe);
+  const double o[4] = {kPi, kPi - 0.25, kPi - 0.25, kPi};
   kphi_set_arms(&general, o);
   kphi_set_arms(&closed, o);
   double a[4], b[4];
