@@ -131,6 +131,7 @@ TEST(Mixer, IteratesUntilTheTorquePerThrustBelongsToTheThrust) {
     differs = std::max(differs, (vector(constant.mix(demand, limits(0, 100)).thrusts) - vector(mixed.thrusts)).norm());
   }
   EXPECT_GT(differs, 1e-3) << "κ(f) must matter at all";
+  EXPECT_NEAR(mixer_of(shape_x(), -kKappa).wrench_of(thrusts_of(2, 1, 2, 1)).yaw.value(), kKappa, 1e-15) << "κ/2 each";
 }
 
 TEST(Mixer, TakesYawDownFirst) {
@@ -175,6 +176,7 @@ TEST(Mixer, NeverAnswersWithMoreYawThanDemandedNorOfTheOtherSign) {
   EXPECT_TRUE(mixed.concessions.has(Concession::thrust));
   EXPECT_LE(mixed.achieved.yaw.value(), 0.005 + 1e-15);
   EXPECT_GE(mixed.achieved.yaw.value(), -1e-15);
+  EXPECT_LE(mixer.mix(wrench(7, 0.2, 0.2, -0.005), limits(0, 2.4), NewtonMetres(-1)).achieved.yaw.value(), 1e-15);
 }
 
 TEST(Mixer, ShiftsAlongTheTorqueFreeDirectionWhereTheShapeIsNotSymmetric) {
@@ -339,7 +341,8 @@ TEST(Mixer, KeepsTheLayoutBeforeWhereTheNewOneCannotBeFlown) {
   bad.spins[1] = 0;
   EXPECT_FALSE(mixer.set_layout(bad));
   for (const double scale : {0.0, -1.0, kNaN, kInfinity}) EXPECT_FALSE(mixer.set_layout(good, {1, 1, scale, 1}));
-  for (std::size_t i = 0; i < 4; ++i) bad.hubs[i] = {Metres(0.1 * static_cast<double>(i)), Metres(0.02)};
+  for (std::size_t i = 0; i < 4; ++i)
+    bad.hubs[i] = {Metres(0.1 * static_cast<double>(i)), Metres(i == 1 ? 0.020001 : 0.02)};
   bad.spins = good.spins;
   EXPECT_FALSE(mixer.set_layout(bad)) << "hubs on one line cannot roll";
   bad = layout_of(shape_x());
