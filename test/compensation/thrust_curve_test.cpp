@@ -152,6 +152,7 @@ TEST(ThrustCurve, HasTheUncertaintyOfKtWhereTheLawLeavesTheLine) {
   const ThrustCurve line = line_with(example_uncertainty());
   EXPECT_DOUBLE_EQ(line.relative_uncertainty(Radians(0), Radians(0)), 0.01);
   EXPECT_DOUBLE_EQ(line.relative_uncertainty(from_degrees(5), Radians(0.1)), 0.01) << "held at 1";
+  EXPECT_NEAR(line.relative_uncertainty(Radians(0), Radians(0), ScalingLaw::published), 0.025 / 0.97, 1e-12);
 }
 
 TEST(ThrustCurve, SaysInfiniteWhereNoUncertaintyCanBeGiven) {
