@@ -64,11 +64,8 @@ TEST(Lag, IsRecoveredWithinFiveMilliseconds) {
     }
   }
   EXPECT_LE(smoothed, 2) << "only where chance shows one";
-}
-
-TEST(Lag, HasOneDegreeOfFreedomLessThanThereAreSteps) {
   const std::vector<Transition> alike(5, transitions({0.1}).back());
-  EXPECT_NEAR(estimate_lag(alike).freedom, 4, 1e-6);
+  EXPECT_NEAR(estimate_lag(alike).freedom, 4, 1e-6) << "steps less one";
 }
 
 TEST(Lag, OfACellThatSmoothsIsItsMeanDelay) {

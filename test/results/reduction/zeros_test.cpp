@@ -62,10 +62,8 @@ TEST(Zeros, HaveEachItsOwnUncertainty) {
 }
 
 TEST(Zeros, PayADegreeOfFreedomForTheTrendOfANoiseThatSwings) {
-  Truth truth;
-  truth.noise_n = 0;
-  RunRecording run = make_run(truth);
-  for (std::size_t i = 0; i < run.load_cell.size(); ++i) run.load_cell[i].counts[2] += i / 10 % 2 == 0 ? 1000 : -1000;
+  RunRecording run = make_run({});
+  for (std::size_t i = 0; i < run.load_cell.size(); ++i) run.load_cell[i].counts[2] += i / 10 % 2 == 0 ? 1e6 : -1e6;
   EXPECT_NEAR(Built(run).zeros.at(0.5e9, 0).freedom, 11, 1e-6) << "twelve waves";
 }
 
