@@ -51,9 +51,13 @@ TEST(OutlyingRuns, AreNotLookedForAmongTwo) {
 }
 
 TEST(Repeatability, AddsTheFreedomWithinTheRunsOfAllAngles) {
-  AngleScatter angle{.k = 1, .within = {1, 10}};
+  AngleScatter angle;
+  angle.k = 1;
   angle.runs.resize(1);
-  EXPECT_NEAR((Repeatability{.angles = {angle, angle}}.freedom()), 20, 1e-9);
+  angle.within = {1, 10};
+  Repeatability both;
+  both.angles = {angle, angle};
+  EXPECT_NEAR(both.freedom(), 20, 1e-9);
 }
 
 TEST(LeftOutRuns, AreListedWithTheirCauseAndWeighNothing) {
