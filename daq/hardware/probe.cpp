@@ -106,7 +106,7 @@ DeviceAnswer ask_supply(const profiles::SupplyConfig& config, const Clock& clock
                            {"current_a", seen.current_a},
                            {"set_voltage_v", seen.set_voltage_v},
                            {"current_limit_a", seen.current_limit_a},
-                           {"output", seen.output}});
+                           {"output", seen.output != 0}});
     findings = findings_of(identity, seen, config);
   } catch (const DeviceError& error) {
     findings.push_back({Severity::fault, error.what(), ""});
