@@ -72,6 +72,17 @@ TEST(Program, TellsWhoItsDevicesAreAndHowTheirClocksRun) {
   for (const json& finding : motor.at("findings")) EXPECT_NE(finding.at("severity"), "fault") << finding;
 }
 
+TEST(Program, TellsThatAModuleCannotAnswerWhileTheSupplysOutputIsOff) {
+  Manner manner;
+  manner.supply = true;
+  RunningBench bench(manner);
+  Process devices({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--json"});
+  ASSERT_EQ(devices.wait(), 0) << devices.err();
+  const json answers = json::parse(devices.out());
+  EXPECT_EQ(answers.at(1).at("output"), false);
+  EXPECT_EQ(answers.at(2).at("answers"), false) << "its module, which is not missed then";
+}
+
 TEST(Program, StopsOnCtrlCWithTheMotorCoastingAndTheFileKept) {
   for (const int signal_number : {SIGINT, SIGTERM, SIGHUP}) {
     RunningBench bench;
