@@ -105,6 +105,11 @@ TEST(Sequence, CountsWhatTheNumbersAndTheTimeSay) {
            {"a stream that begins anew meanwhile has begun anew", 1, "1..10@101 11..15@110/0! 1..20@110/0! 21..22@111",
             "stalled 25, restarts 1"},
            {"a lost hour is counted when an hour has passed", 1, "1@100 +3600000 25200001@25200100", "lost 25199999"},
+           {"drops before a boot explain nothing behind it", 1, "1..100@10000001 +3000 drop2 1@20000! 2@20001 5@20004",
+            "lost 2, reboots 1"},
+           {"a gap before a boot is forgotten", 1, "1..500@10001 502..1000@10502 1@1! 2..10999@2 10501@10501!",
+            "lost 1, duplicates 1, reboots 1"},
+           {"a gap of half a stride is rounded up", 2, "1@100 2@103", "lost 1, irregular 1"},
            {"an unexpected stride is marked", 1, "1@100 2@107", "lost 6, irregular 1"},
            {"a new segment owes nothing to the one before", 1, "1@100 segment 1@90000", ""}}) {
     SCOPED_TRACE(c.name);
