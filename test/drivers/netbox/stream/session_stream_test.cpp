@@ -82,6 +82,11 @@ TEST_F(SessionTest, ChargesTheHostWithWholeDatagrams) {
   session.flush(out);
   EXPECT_EQ(session.counters().lost_host, 120u);
   EXPECT_EQ(session.counters().lost_network, 80u);
+  receive(records(321, 1320, 10));
+  session.note_host_drops(4);
+  receive(records(371, 1370, 10));
+  session.flush(out);
+  EXPECT_EQ(session.counters().lost_host, 130u) << "the box now sends ten records per datagram";
 }
 
 TEST_F(SessionTest, ADuplicatedStartLosesNothing) {
