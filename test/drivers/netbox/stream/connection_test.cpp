@@ -165,6 +165,19 @@ TEST_F(ConnectionTest, AnAnswerThatComesAfterTheStreamIsNoNews) {
   EXPECT_FALSE(connection.next_question());
 }
 
+TEST_F(ConnectionTest, ABoxThatComesBackByItselfIsAskedAgainOnlyAfterItsNextSilence) {
+  stream();
+  for (const std::uint32_t rdt : {41u, 81u}) {
+    fall_silent();
+    answer(no_answer());
+    EXPECT_THAT(events(), ElementsAre(EventKind::silent, EventKind::unreachable));
+    receive(rdt);
+    connection.advance(now += 300ms);
+    EXPECT_FALSE(connection.next_question());
+    EXPECT_THAT(events(), ElementsAre(EventKind::resumed));
+  }
+}
+
 TEST_F(ConnectionTest, AStreamThatAnotherClientHasTakenIsLeftAlone) {
   stream();
   fall_silent();
@@ -209,6 +222,11 @@ TEST_F(ConnectionTest, AfterABootWithTheStreamGoingOnItAsksAndNamesTheChange) {
   EXPECT_THAT(events(), ElementsAre(EventKind::rebooted, EventKind::configuration_changed));
   EXPECT_THAT(requested(), IsEmpty()) << "its records are counted as before";
   EXPECT_EQ(connection.configuration().calibration_serial, "FT99999");
+  answer(answer_of("<html/>"));
+  EXPECT_THAT(events(), ElementsAre(EventKind::unusable));
+  receive(81, 40, 0);
+  answer(answer_of(page("comrdtrate", "1000")));
+  EXPECT_EQ(taken(), 80u) << "the records held back are delivered before the stream starts again";
 }
 
 TEST_F(ConnectionTest, AnotherRateIsStreamedByItsOwnStride) {
@@ -226,6 +244,7 @@ TEST_F(ConnectionTest, AnotherRateIsStreamedByItsOwnStride) {
   EXPECT_EQ(taken(), 80u);
   EXPECT_EQ(connection.counters().irregular, 0u);
   EXPECT_EQ(connection.counters().received, 120u) << "the counters continue";
+  EXPECT_NEAR(connection.health().datagrams_per_second, 1000, 1) << "of the new rate alone";
 }
 
 TEST_F(ConnectionTest, AStopDeliversTheRecordsHeldBack) {
