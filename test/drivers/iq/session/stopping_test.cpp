@@ -87,6 +87,37 @@ TEST(Coasting, IsRepeatedUntilConfirmed) {
   EXPECT_EQ(wire.session.state(), State::ready);
 }
 
+/// The longest time in which the module heard nothing.
+Duration longest_pause(const Wire& wire) {
+  Duration longest{0};
+  for (std::size_t i = 1; i < wire.batches.size(); ++i)
+    longest = std::max(longest, wire.batches[i].first - wire.batches[i - 1].first);
+  return longest;
+}
+
+TEST(Coasting, FallsSilentToAMuteModuleAndSendsNoCoastMeanwhile) {
+  Wire wire;
+  wire.connect();
+  wire.spin(300);
+  wire.run_for(50ms);
+  wire.module.mute = true;
+  wire.coast();
+  ASSERT_TRUE(wire.run_to_state(State::failed, 2s));
+  const std::size_t before = wire.batches.size();
+  wire.coast();
+  EXPECT_EQ(wire.batches.size(), before);
+  wire.run_for(3s);
+  EXPECT_GT(longest_pause(wire), 500ms);
+}
+
+TEST(Coasting, IsConfirmedAgainAfterEachOrder) {
+  Wire wire;
+  wire.connect();
+  ASSERT_TRUE(wire.session.coasting());
+  wire.coast();
+  EXPECT_FALSE(wire.session.coasting());
+}
+
 TEST(Coasting, FallsSilentWhenUnconfirmedSoThatTheModuleTimesOut) {
   Wire wire;
   wire.connect();
@@ -96,11 +127,7 @@ TEST(Coasting, FallsSilentWhenUnconfirmedSoThatTheModuleTimesOut) {
   wire.coast();
   wire.run_for(6s);
   EXPECT_EQ(wire.session.state(), State::failed);
-  Duration longest{0};
-  for (std::size_t i = 1; i < wire.batches.size(); ++i) {
-    longest = std::max(longest, wire.batches[i].first - wire.batches[i - 1].first);
-  }
-  EXPECT_GT(longest, 500ms);
+  EXPECT_GT(longest_pause(wire), 500ms);
   EXPECT_GT(wire.session.counters().unconfirmed_coasts, 1u) << "and it goes on trying";
   wire.module.ignore_sets = false;
   wire.run_for(3s);
@@ -288,6 +315,7 @@ TEST(Stop, SaysThatTheModuleDoesNotConfirm) {
   EXPECT_EQ(report.outcome, Outcome::unconfirmed);
   EXPECT_FALSE(report.safe());
   EXPECT_EQ(propeller.wire.session.state(), State::failed);
+  EXPECT_LT(propeller.wire.now, 2s) << "long before the stop's limit";
 }
 
 TEST(Stop, CutShortByACoastCoastsAtOnce) {
@@ -332,6 +360,41 @@ TEST(Stop, OfAStandingMotorIsOverAtOnce) {
   propeller.wire.run_for(200ms);
   propeller.wire.session.stop(kRamp, propeller.wire.now);
   EXPECT_EQ(propeller.finish(1s).outcome, Outcome::standing);
+}
+
+TEST(Stop, OfACoastingMotorNeverDrivesIt) {
+  Propeller propeller;
+  propeller.decay_s = 5;
+  propeller.speed = 1500;
+  propeller.wire.run_for(200ms);
+  propeller.wire.session.stop(kRamp, propeller.wire.now);
+  propeller.wire.run_for(1s);
+  EXPECT_EQ(propeller.wire.module.count([](const auto& m) { return m.is_speed(); }), 0u);
+}
+
+struct Seen {
+  const char* name;
+  std::vector<std::pair<Instant, double>> speeds;
+  bool confirmed;
+  Outcome outcome;
+};
+
+TEST(Stop, IsJudgedByTheConfirmedCoastAndTheSpeedsReadAfterIt) {
+  for (const Seen& c : std::vector<Seen>{{"at rest, coast not confirmed", {{2s, 5}}, false, Outcome::unconfirmed},
+                                         {"at rest before the coast only", {{900ms, 5}}, true, Outcome::unseen},
+                                         {"2 % slower", {{2s, 500}, {3s, 490}}, true, Outcome::turning},
+                                         {"10 % slower", {{2s, 500}, {3s, 450}}, true, Outcome::slowing}}) {
+    Stopping stopping;
+    stopping.begin(kRamp, 1000, true, 0s);
+    stopping.coasted(1s);
+    for (const auto& [time, speed] : c.speeds) stopping.measured(speed, time);
+    if (c.confirmed) stopping.confirmed(4s);
+    stopping.advance(5s);
+    EXPECT_TRUE(stopping.active()) << c.name;
+    stopping.advance(11s);
+    ASSERT_TRUE(stopping.report().has_value()) << c.name;
+    EXPECT_EQ(stopping.report()->outcome, c.outcome) << c.name;
+  }
 }
 
 TEST(StopSettings, ThatMakeNoSenseAreRefused) {
