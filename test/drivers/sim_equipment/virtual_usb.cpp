@@ -104,12 +104,13 @@ class VirtualUsb::Socket {
     node_ = fmt::format("/dev/bus/usb/001/{:03}", number_);
     path_ = fmt::format("/sys/devices/usb1/1-{}", port);
     GError* error = nullptr;
-    if (umockdev_testbed_add_from_string(bed_, description(port).c_str(), &error) == 0)
-      throw_and_free("virtual USB: add a device", error);
     handler_.reset(umockdev_ioctl_base_new());
     g_signal_connect(handler_.get(), "handle-ioctl", G_CALLBACK(&Socket::on_ioctl), this);
+    // Before the device is seen: umockdev ends a program that opens one whose calls it cannot answer yet.
     if (umockdev_testbed_attach_ioctl(bed_, node_.c_str(), handler_.get(), &error) == 0)
       throw_and_free("virtual USB: attach a device", error);
+    if (umockdev_testbed_add_from_string(bed_, description(port).c_str(), &error) == 0)
+      throw_and_free("virtual USB: add a device", error);
     umockdev_testbed_uevent(bed_, path_.c_str(), "add");
   }
   ~Socket() {
