@@ -2,7 +2,6 @@
 #include <atomic>
 #include <filesystem>
 #include <future>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <thread>
@@ -46,24 +45,18 @@ std::vector<std::filesystem::path> runs_of(const CampaignFolder& folder) {
   return folder.complete_runs(profiles::load_campaign(folder.campaign_file().string()).occlusions_deg);
 }
 
-/// Steps in the order of the files; a thread per processor. HDF5 is asked by one thread at a time; the samples are read
-/// without it.
+/// Steps in the order of the files; a thread per processor.
 std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
-  std::mutex opening;
-  std::vector<std::packaged_task<std::vector<StepMean>()>> tasks;
+  std::vector<std::packaged_task<std::vector<StepMean>(results::LoadCellColumns&)>> tasks;
   for (const auto& run : runs) {
-    tasks.emplace_back([&opening, &run] {
-      std::unique_lock one_at_a_time(opening);
-      results::RunColumns file = results::read_columns(run);
-      one_at_a_time.unlock();
-      return reduce(file.run, std::move(file.cell));
-    });
+    tasks.emplace_back([&run](auto& cell) { return reduce(results::read_run(run, cell), cell); });
   }
   std::atomic<std::size_t> next = 0;
   std::vector<std::jthread> threads;
   for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
     threads.emplace_back([&] {
-      for (std::size_t task = next++; task < tasks.size(); task = next++) tasks[task]();
+      results::LoadCellColumns cell;
+      for (std::size_t task = next++; task < tasks.size(); task = next++) tasks[task](cell);
     });
   std::vector<StepMean> steps;
   for (auto& task : tasks) {

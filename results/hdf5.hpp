@@ -121,6 +121,9 @@ class ColumnReader {
   Handle space_;
   std::uint64_t rows_ = 0;
   std::vector<hsize_t> dims_;
+  std::uint64_t chunk_rows_ = 0;
+  std::vector<haddr_t> chunks_;  ///< where the whole ones lie in the file, if they lie there as in memory
+  int descriptor_ = -1;
 };
 
 /// Makes `scale` the dimension scale of dimension `dimension` of each of `datasets` (HDF5 Dimension Scale

@@ -140,14 +140,4 @@ struct RunRecording : RunEnding {
   std::vector<StreamEvent> events;  ///< in the order in which they were noticed
 };
 
-/// What a reduction needs of the load-cell records, column by column, as a run file has it.
-struct LoadCellColumns {
-  LoadCellColumns() = default;
-  LoadCellColumns(const std::vector<LoadCellRecord>& records);  // NOLINT: the same numbers in another order
-
-  std::vector<std::array<std::int32_t, 6>> counts;
-  std::vector<std::uint32_t> ft_sequence, status;
-  std::vector<Nanoseconds> arrival_ns;
-};
-
 }  // namespace kphi::results

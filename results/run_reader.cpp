@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string_view>
@@ -238,29 +239,29 @@ void check_scale(const RunHeader& header, Problems& problems) {
 
 }  // namespace
 
-LoadCellColumns::LoadCellColumns(const std::vector<LoadCellRecord>& records) {
-  for (const LoadCellRecord& record : records) {
-    counts.push_back(record.counts);
-    ft_sequence.push_back(record.ft_sequence);
-    status.push_back(record.status);
-    arrival_ns.push_back(record.arrival_ns);
-  }
-}
-
-RunColumns read_columns(const std::filesystem::path& path) {
+RunRecording read_run(const std::filesystem::path& path, LoadCellColumns& cell) {
   return naming(path, [&] {
+    static std::mutex asking;  // threads that all ask HDF5 wake each other at each of its calls
+    std::unique_lock one_at_a_time(asking);
     const Handle root = hdf5::open_file(path);
-    RunColumns found{all_but_samples(root, path), {}};
+    RunRecording run = all_but_samples(root, path);
     GroupReader<LoadCellRecord> group(root, kLoadCellGroup, path.string());
-    const auto read = [&](std::size_t column, auto& values) {
-      values.resize(group.rows);
-      group.columns[column].read(0, group.rows, values.data());
-    };
-    read(0, found.cell.counts);
-    read(2, found.cell.ft_sequence);
-    read(3, found.cell.status);
-    read(4, found.cell.arrival_ns);
-    return found;
+    one_at_a_time.unlock();
+    cell.reset(group.rows);
+    group.columns[2].read(0, group.rows, cell.ft_sequence.data());
+    std::vector<LoadCellColumns::Counts> counts;
+    std::vector<std::uint32_t> status;
+    std::vector<Nanoseconds> arrival_ns;
+    for (std::uint64_t at = 0; at < group.rows; at += kBlock) {
+      counts.resize(std::min(kBlock, group.rows - at));
+      status.resize(counts.size());
+      arrival_ns.resize(counts.size());
+      group.columns[0].read(at, counts.size(), counts.data());
+      group.columns[3].read(at, counts.size(), status.data());
+      group.columns[4].read(at, counts.size(), arrival_ns.data());
+      cell.take(at, counts, status, arrival_ns, run.header);
+    }
+    return run;
   });
 }
 

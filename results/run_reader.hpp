@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/error.hpp"
+#include "results/load_cell_columns.hpp"
 #include "results/records.hpp"
 
 namespace kphi::results {
@@ -14,13 +15,9 @@ namespace kphi::results {
 /// The whole run; of a .part the rows valid at its last sync, as aborted. Does not check checksums; see verify_run().
 [[nodiscard]] RunRecording read_run(const std::filesystem::path& path);
 
-/// As read_run(), with the load-cell records as columns, and twice as quickly: `run.load_cell` stays empty, and so does
-/// the account of a .part.
-struct RunColumns {
-  RunRecording run;
-  LoadCellColumns cell;
-};
-[[nodiscard]] RunColumns read_columns(const std::filesystem::path& path);
+/// As read_run(), but quicker, with the load-cell records as columns in `cell`, whose memory is used again:
+/// `run.load_cell` stays empty, and so does the account of a .part.
+[[nodiscard]] RunRecording read_run(const std::filesystem::path& path, LoadCellColumns& cell);
 
 /// Gaps and restarts in a stream of records, by its sequence numbers.
 struct SequenceCheck {

@@ -130,7 +130,8 @@ Estimate mean_gain(const std::vector<Estimate>& lines) {
 std::optional<BladePassCheck> check_by_blade_pass(std::span<const results::RunRecording> runs) {
   BladePassCheck check;
   for (const results::RunRecording& run : runs) {
-    const results::CellStream cell(run);
+    const results::LoadCellColumns columns(run.load_cell, run.header);
+    const results::CellStream cell(run, columns);
     const results::MotorSeries motor(run.motor);
     for (std::size_t i = 0; i + 1 < run.phases.size(); ++i) {
       if (run.phases[i].phase != results::Phase::step) continue;

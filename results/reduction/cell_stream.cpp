@@ -2,21 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
-#include <utility>
 
 namespace kphi::results {
 namespace {
-
-using Counts = std::array<std::int32_t, 6>;
-
-bool reach(const Counts& counts, const Counts& limits) {
-  std::int32_t any = 0;  // without a branch: six numbers side by side
-  for (std::size_t i = 0; i < counts.size(); ++i)
-    any |= static_cast<std::int32_t>(counts[i] >= limits[i]) | static_cast<std::int32_t>(counts[i] <= -limits[i]);
-  return any != 0;
-}
 
 constexpr Nanoseconds kBin = 10'000'000;
 constexpr double kLeastSamplesPerBin = 2;
@@ -32,37 +21,14 @@ CountMean mean_of(const CountSums& sums, std::int32_t origin, std::uint64_t samp
 
 std::uint32_t stride_of(const RunHeader& header) { return std::max(header.load_cell.ft_stride, 1u); }
 
-CountFrame frame_of(const RunHeader& header) {
-  CountFrame frame;
-  frame.axis = static_cast<std::size_t>(header.thrust_axis);
-  const auto& scale = header.load_cell;
-  for (std::size_t i = 0; i < frame.limits.size(); ++i) {
-    const double counts = scale.range[i] * (i < 3 ? scale.counts_per_newton : scale.counts_per_newton_metre);
-    const double full = std::numeric_limits<std::int32_t>::max();
-    frame.limits[i] = static_cast<std::int32_t>(counts > 0 && counts < full ? counts : full);
-  }
-  return frame;
-}
-
 }  // namespace
 
-void CountSums::add(std::int64_t difference) {
-  sum += difference;
-  squares += static_cast<Wide>(difference) * difference;
-}
-
-void CellBin::add(const LoadCellColumns& cell, std::size_t from, std::size_t to, const CountFrame& frame) {
-  CellBin sums = *this;  // in registers
-  const CountFrame f = frame;
-  for (std::size_t i = from; i < to; ++i) {
-    const Counts& counts = cell.counts[i];
-    sums.force.add(std::int64_t{counts[f.axis]} - f.force_origin);
-    sums.torque.add(std::int64_t{counts[f.axis + 3]} - f.torque_origin);
-    sums.status |= cell.status[i] == (kSummaryBit | kMonitorBit) ? 0u : cell.status[i];
-    sums.at_limit |= reach(counts, f.limits);
+void CountSums::add(std::span<const std::int32_t> counts, std::int32_t origin) {
+  for (const std::int32_t count : counts) {
+    const std::int64_t difference = std::int64_t{count} - origin;
+    sum += difference;
+    squares += static_cast<Wide>(difference) * difference;
   }
-  sums.n += static_cast<std::uint32_t>(to - from);
-  *this = sums;
 }
 
 bool CellBin::frozen() const { return n > 1 && force.squares * n == static_cast<Wide>(force.sum) * force.sum; }
@@ -83,7 +49,7 @@ std::size_t CellBins::first_from(Nanoseconds time) const {
 double CellBins::force(std::size_t bin) const {
   const CellBin& b = bins_[bin];
   if (2.0 * b.n < expected_ || b.n == 0) return std::numeric_limits<double>::quiet_NaN();
-  return frame_.force_origin + static_cast<double>(b.force.sum) / b.n;
+  return force_origin_ + static_cast<double>(b.force.sum) / b.n;
 }
 
 CellWindow CellBins::over(std::size_t first, std::size_t last) const {
@@ -102,8 +68,8 @@ CellWindow CellBins::over(std::size_t first, std::size_t last) const {
     if (!goes_on) frozen_since = bin.frozen() ? i : i + 1;
     found.frozen |= static_cast<double>(i + 1 - frozen_since) * bin_s() >= kFrozenSpan;
   }
-  found.force = mean_of(force, frame_.force_origin, found.n);
-  found.torque = mean_of(torque, frame_.torque_origin, found.n);
+  found.force = mean_of(force, force_origin_, found.n);
+  found.torque = mean_of(torque, torque_origin_, found.n);
   const Window whole = window(first, last);
   for (const Gap& gap : gaps_) {
     found.lost += static_cast<std::uint64_t>(gap.up_to(static_cast<double>(whole.end)) -
@@ -112,11 +78,8 @@ CellWindow CellBins::over(std::size_t first, std::size_t last) const {
   return found;
 }
 
-CellStream::CellStream(const RunRecording& run, LoadCellColumns cell)
-    : header_(run.header),
-      cell_(std::move(cell)),
-      clock_(cell_, run.header.load_cell.device_rate_hz, run.events),
-      frame_(frame_of(run.header)) {
+CellStream::CellStream(const RunRecording& run, const LoadCellColumns& cell)
+    : header_(run.header), cell_(cell), clock_(cell_, run.header.load_cell.device_rate_hz, run.events) {
   for (const ClockEpoch& epoch : clock_.epochs()) {
     if (epoch.rebooted) reboots_.push_back(clock_.time_ns(epoch, epoch.begin));
   }
@@ -139,7 +102,6 @@ CellBins CellStream::bins(const Window& window) const {
   const double sparse = rate > 0 ? std::ceil(kLeastSamplesPerBin * 1e9 / rate) : 0;
   bins.begin_ = window.begin;
   bins.width_ = std::max(kBin, static_cast<Nanoseconds>(sparse));
-  bins.frame_ = frame_;
   bins.expected_ = 1e-9 * static_cast<double>(bins.width_) * rate;
   if (window.end <= window.begin) return bins;
   bins.bins_.resize(static_cast<std::size_t>((window.end - window.begin) / bins.width_));
@@ -151,19 +113,29 @@ CellBins CellStream::bins(const Window& window) const {
     take_gaps(epoch, begin, end, bins);
     if (begin == end) continue;
     if (first) {
-      const Counts& counts = cell_.counts[begin];
-      bins.frame_.force_origin = counts[frame_.axis];
-      bins.frame_.torque_origin = counts[frame_.axis + 3];
+      bins.force_origin_ = cell_.force[begin];
+      bins.torque_origin_ = cell_.torque[begin];
       first = false;
     }
     std::size_t from = begin;
     for (std::size_t i = 0; i < bins.size() && from < end; ++i) {
       const std::size_t to = clock_.first_at(epoch, bins.window(i, i + 1).end, from);
-      bins.bins_[i].add(cell_, from, to, bins.frame_);
+      add(from, to, bins, bins.bins_[i]);
       from = to;
     }
   }
   return bins;
+}
+
+void CellStream::add(std::size_t from, std::size_t to, CellBins& bins, CellBin& bin) const {
+  bin.force.add(std::span(cell_.force).subspan(from, to - from), bins.force_origin_);
+  bin.torque.add(std::span(cell_.torque).subspan(from, to - from), bins.torque_origin_);
+  bin.n += static_cast<std::uint32_t>(to - from);
+  auto mark = std::ranges::lower_bound(cell_.marks, from, {}, &LoadCellColumns::Mark::record);
+  for (; mark != cell_.marks.end() && mark->record < to; ++mark) {
+    bin.status |= mark->status;
+    bin.at_limit |= mark->at_limit;
+  }
 }
 
 EvenSamples CellStream::samples(const Window& window) const {
@@ -175,7 +147,7 @@ EvenSamples CellStream::samples(const Window& window) const {
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t strides = i == begin ? 1 : advance_to(i) / stride_of(header_);
       for (std::uint32_t k = 1; k < strides; ++k) found.counts.push_back(found.counts.back());
-      found.counts.push_back(cell_.counts[i][frame_.axis]);
+      found.counts.push_back(cell_.force[i]);
     }
   }
   return found;
@@ -185,9 +157,13 @@ EvenSamples CellStream::samples(const Window& window) const {
 void CellStream::take_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const {
   const std::size_t from = std::max(begin, epoch.begin + 1);
   const std::size_t to = std::min(end + 1, epoch.end);
+  const std::uint32_t stride = stride_of(header_);
+  const auto first = cell_.ft_sequence.begin();
+  const auto jump = [stride](std::uint32_t a, std::uint32_t b) { return b - a >= 2 * stride; };
   for (std::size_t i = from; i < to; ++i) {
-    if (advance_to(i) < 2 * stride_of(header_)) continue;
-    const std::uint32_t missing = advance_to(i) / stride_of(header_) - 1;
+    i = static_cast<std::size_t>(std::adjacent_find(first + i - 1, first + to, jump) - first) + 1;
+    if (i >= to) break;
+    const std::uint32_t missing = advance_to(i) / stride - 1;
     const Nanoseconds before = clock_.time_ns(epoch, i - 1);
     const double period = static_cast<double>(clock_.time_ns(epoch, i) - before) / (missing + 1.0);
     bins.gaps_.push_back({static_cast<double>(before), period, missing});

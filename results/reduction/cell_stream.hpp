@@ -3,49 +3,35 @@
 // into bins gives the same sums, and the same bytes in steps.csv.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
-#include "results/records.hpp"
+#include "results/load_cell_columns.hpp"
 #include "results/reduction/clock_map.hpp"
 
 namespace kphi::results {
 
 __extension__ using Wide = __int128;
 
-// Bits of the status word of every product.
-inline constexpr std::uint32_t kMonitorBit = 1u << 16;  ///< a condition the user set; raises the summary bit, too
-inline constexpr std::uint32_t kSummaryBit = 1u << 31;
-
-/// Of one axis, about `origin`.
+/// Of one axis, about an origin.
 struct CountSums {
   std::int64_t sum = 0;
   Wide squares = 0;
-  void add(std::int64_t difference);
+  void add(std::span<const std::int32_t> counts, std::int32_t origin);
   void add(const CountSums& other) {
     sum += other.sum;
     squares += other.squares;
   }
 };
 
-/// The summed axes, force and torque about it, and the origins of both sums.
-struct CountFrame {
-  std::size_t axis = 2;  ///< 0..2
-  std::int32_t force_origin = 0;
-  std::int32_t torque_origin = 0;
-  std::array<std::int32_t, 6> limits{};  ///< ends of the ranges, counts
-};
-
 struct CellBin {
   CountSums force, torque;
   std::uint32_t n = 0;
-  std::uint32_t status = 0;  ///< all set bits, without healthy monitor words
-  bool at_limit = false;     ///< a count of some axis at the end of its range
-  /// Records [from, to).
-  void add(const LoadCellColumns& cell, std::size_t from, std::size_t to, const CountFrame& frame);
+  std::uint32_t status = 0;           ///< all set bits, without healthy monitor words
+  bool at_limit = false;              ///< a count of some axis at the end of its range
   [[nodiscard]] bool frozen() const;  ///< more than one sample, and no force differs
 };
 
@@ -94,7 +80,7 @@ class CellBins {
   Nanoseconds begin_ = 0;
   Nanoseconds width_ = 1;
   double expected_ = 0;  ///< samples per bin
-  CountFrame frame_;
+  std::int32_t force_origin_ = 0, torque_origin_ = 0;
   std::vector<CellBin> bins_;
   std::vector<Gap> gaps_;
 };
@@ -107,9 +93,8 @@ struct EvenSamples {
 
 class CellStream {
  public:
-  /// The recording must outlive the stream.
-  CellStream(const RunRecording& run, LoadCellColumns cell);
-  explicit CellStream(const RunRecording& run) : CellStream(run, run.load_cell) {}
+  /// The recording and its columns must outlive the stream.
+  CellStream(const RunRecording& run, const LoadCellColumns& cell);
 
   /// Number of restarts of the box before `time`.
   [[nodiscard]] std::size_t boot_at(Nanoseconds time) const;
@@ -122,13 +107,14 @@ class CellStream {
   [[nodiscard]] std::uint32_t advance_to(std::size_t i) const {
     return cell_.ft_sequence[i] - cell_.ft_sequence[i - 1];
   }
+  /// Adds records [from, to).
+  void add(std::size_t from, std::size_t to, CellBins& bins, CellBin& bin) const;
   void take_gaps(const ClockEpoch& epoch, std::size_t begin, std::size_t end, CellBins& bins) const;
 
   const RunHeader& header_;
-  LoadCellColumns cell_;
+  const LoadCellColumns& cell_;
   ClockMap clock_;
   std::vector<Nanoseconds> reboots_;
-  CountFrame frame_;
 };
 
 }  // namespace kphi::results

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace kphi::results {
 namespace {
@@ -52,44 +53,47 @@ class DelayFloor {
 
 ClockMap::ClockMap(const LoadCellColumns& cell, double device_rate_hz, std::span<const StreamEvent> events)
     : ft_(cell.ft_sequence), tick_ns_(1e9 / device_rate_hz) {
-  const std::vector<Nanoseconds>& arrival_ns = cell.arrival_ns;
+  const auto& datagrams = cell.datagrams;
   // Signed difference: the wrap of the 32-bit counter goes forward, a restart of the box back.
   const auto counts_on = [&](std::size_t i) { return static_cast<std::int32_t>(ft_[i] - ft_[i - 1]) > 0; };
   std::vector<std::size_t> broken;  // the first record that arrived at or after the end of each stall
   for (const StreamEvent& event : events) {
     if (event.kind != EventKind::stall_ended) continue;
-    broken.push_back(
-        static_cast<std::size_t>(std::ranges::lower_bound(arrival_ns, event.time_ns) - arrival_ns.begin()));
+    const auto next = std::ranges::lower_bound(datagrams, event.time_ns, {}, &LoadCellColumns::Datagram::arrival_ns);
+    broken.push_back(next == datagrams.begin() ? 0 : std::prev(next)->end);
   }
+  auto datagram = datagrams.begin();
   for (std::size_t begin = 0; begin < ft_.size();) {
     const auto next_break = std::ranges::upper_bound(broken, begin);
     const std::size_t last = next_break == broken.end() ? ft_.size() : *next_break;
-    ClockEpoch epoch{begin, begin, ft_[begin]};
+    ClockEpoch epoch{begin, begin + 1, ft_[begin]};
     epoch.rebooted = begin > 0 && !counts_on(begin);
+    while (epoch.end < last && counts_on(epoch.end)) ++epoch.end;
     DelayFloor floor;
-    for (bool counts = true; counts;) {
-      const std::size_t i = epoch.end++;
-      counts = epoch.end < last && counts_on(epoch.end);
+    const Nanoseconds first_ns = datagram->arrival_ns;
+    for (std::size_t end = begin; end < epoch.end;) {
       // Of a datagram of many records only the last is fresh: the others waited for it.
-      if (counts && arrival_ns[i + 1] == arrival_ns[i]) continue;
-      const double device = device_ns(epoch, ft_[i]);
-      floor.add(device, static_cast<double>(arrival_ns[i] - arrival_ns[begin]) - device);
+      end = std::min(datagram->end, epoch.end);
+      const double device = device_ns(epoch, ft_[end - 1]);
+      floor.add(device, static_cast<double>(datagram->arrival_ns - first_ns) - device);
+      if (end == datagram->end) ++datagram;
     }
     floor.fit(epoch);
-    epoch.offset_ns += static_cast<double>(arrival_ns[begin]);
+    epoch.offset_ns += static_cast<double>(first_ns);
     epochs_.push_back(epoch);
     begin = epoch.end;
   }
 }
 
-Nanoseconds ClockMap::time_of(const ClockEpoch& epoch, std::uint32_t ft) const {
+double ClockMap::exact_time_of(const ClockEpoch& epoch, std::uint32_t ft) const {
   const double device = device_ns(epoch, ft);
-  return std::llround(epoch.offset_ns + device + epoch.skew * device);
+  return epoch.offset_ns + device + epoch.skew * device;
 }
 
 std::size_t ClockMap::first_at(const ClockEpoch& epoch, Nanoseconds time, std::size_t from) const {
-  const auto earlier = [&](std::uint32_t ft) { return time_of(epoch, ft) < time; };
-  auto counts = std::span(ft_).subspan(from, epoch.end - from);
+  const double rounds_up = static_cast<double>(time) - 0.5;
+  const auto earlier = [&](std::uint32_t ft) { return exact_time_of(epoch, ft) < rounds_up; };
+  auto counts = ft_.subspan(from, epoch.end - from);
   std::size_t reach = 1;  // in growing leaps, since a search across all records would miss the cache
   while (reach < counts.size() && earlier(counts[reach])) reach *= 2;
   counts = counts.first(std::min(reach + 1, counts.size()));

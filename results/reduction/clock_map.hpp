@@ -3,11 +3,12 @@
 // smallest (arrival - device time) per 0.5 s of device time, and a least-squares line through these over the whole run.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <span>
 #include <vector>
 
-#include "results/records.hpp"
+#include "results/load_cell_columns.hpp"
 
 namespace kphi::results {
 
@@ -23,7 +24,7 @@ struct ClockEpoch {
 
 class ClockMap {
  public:
-  /// `device_rate_hz`: rate at which ft_sequence counts. The records are in order of arrival.
+  /// `device_rate_hz`: rate at which ft_sequence counts. The columns, in order of arrival, must outlive the map.
   /// A one-way stream cannot show the constant delays of box, filter and wire: times are late by their smallest sum.
   /// `events`: in a stall the box repeats its measurement and its clock stands still; behind it begins another epoch.
   ClockMap(const LoadCellColumns& cell, double device_rate_hz, std::span<const StreamEvent> events = {});
@@ -31,7 +32,7 @@ class ClockMap {
   [[nodiscard]] const std::vector<ClockEpoch>& epochs() const { return epochs_; }
   /// Bench time of the sample in record `index` of `epoch`. Increases with the index.
   [[nodiscard]] Nanoseconds time_ns(const ClockEpoch& epoch, std::size_t index) const {
-    return time_of(epoch, ft_[index]);
+    return std::llround(exact_time_of(epoch, ft_[index]));
   }
   /// First record of `epoch` at or after `time`, not before `from`; epoch.end if there is none. Quick near `from`.
   [[nodiscard]] std::size_t first_at(const ClockEpoch& epoch, Nanoseconds time, std::size_t from) const;
@@ -44,8 +45,8 @@ class ClockMap {
   [[nodiscard]] double device_ns(const ClockEpoch& epoch, std::uint32_t ft) const {
     return static_cast<double>(ft - epoch.ft_first) * tick_ns_;
   }
-  [[nodiscard]] Nanoseconds time_of(const ClockEpoch& epoch, std::uint32_t ft) const;
-  std::vector<std::uint32_t> ft_;
+  [[nodiscard]] double exact_time_of(const ClockEpoch& epoch, std::uint32_t ft) const;  ///< ns
+  std::span<const std::uint32_t> ft_;
   double tick_ns_;
   std::vector<ClockEpoch> epochs_;
 };

@@ -103,17 +103,20 @@ struct Misfit {
   Eigen::Matrix2d curvature = Eigen::Matrix2d::Zero();
 };
 
-/// Of y, x, and x by delay and smoothing.
+/// Of y, x, and, of four, x by delay and smoothing.
+template <int N>
 struct Sums {
+  using Values = Eigen::Matrix<double, N, 1>;
+  using Products = Eigen::Matrix<double, N, N>;
   double n = 0;
-  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
-  Eigen::Matrix4d product = Eigen::Matrix4d::Zero();
+  Values sum = Values::Zero();
+  Products product = Products::Zero();
   void add(const Eigen::Vector4d& v) {
     n += 1;
-    sum += v;
-    product += v * v.transpose();
+    sum += v.head<N>();
+    product += v.head<N>() * v.head<N>().transpose();
   }
-  [[nodiscard]] Eigen::Matrix4d centred() const { return product - sum * sum.transpose() / n; }
+  [[nodiscard]] Products centred() const { return product - sum * sum.transpose() / n; }
 };
 
 std::ptrdiff_t bins_before(const Transition& transition) {
@@ -131,7 +134,8 @@ double thrust_in(const Transition& transition, std::ptrdiff_t bin) {
                  : transition.thrust[static_cast<std::size_t>(bin)];
 }
 
-template <class Each>
+/// `each`(bin, ω² as the thrust has it, and its derivatives by delay and smoothing, or 0 if it is not smoothed).
+template <bool kSmoothed = true, class Each>
 void for_each_bin(const Prepared& prepared, const Shape& shape, std::ptrdiff_t bins, Each&& each) {
   const Transition& transition = prepared.transition;
   const double h = transition.bin_s;
@@ -139,7 +143,7 @@ void for_each_bin(const Prepared& prepared, const Shape& shape, std::ptrdiff_t b
   Integral integral(prepared.knots);
   Smoothing value(shape[1], h), slope(shape[1], h), value_on(shape[1] + kDerivative, h);
   const std::ptrdiff_t first = -bins_before(transition);
-  const std::ptrdiff_t history = static_cast<std::ptrdiff_t>(kHistory / h) - first;
+  const std::ptrdiff_t history = (kSmoothed ? static_cast<std::ptrdiff_t>(kHistory / h) : 0) - first;
   auto left = integral.at(-static_cast<double>(history) * h - delay);
   value.start(left.value);
   value_on.start(left.value);
@@ -149,6 +153,10 @@ void for_each_bin(const Prepared& prepared, const Shape& shape, std::ptrdiff_t b
     const double mean = (right.integral - left.integral) / h;
     const double later = -(right.value - left.value) / h;
     left = right;
+    if constexpr (!kSmoothed) {
+      each(i, mean, 0.0, 0.0);
+      continue;
+    }
     const double x = value(mean);
     const double x_delay = slope(later);
     const double x_smooth = (value_on(mean) - x) / kDerivative - x_delay;
@@ -156,19 +164,22 @@ void for_each_bin(const Prepared& prepared, const Shape& shape, std::ptrdiff_t b
   }
 }
 
+/// `kSmoothed`: with the derivatives; otherwise of a shape without smoothing.
+template <bool kSmoothed = true>
 Misfit misfit_of(const Prepared& prepared, const Shape& shape) {
   const Transition& transition = prepared.transition;
-  Sums sums;
+  Sums<kSmoothed ? 4 : 2> sums;
   // Relative to the initial levels: sums of squares of the levels themselves would lose the digits.
   const double thrust = transition.thrust.front(), squared = transition.squared.front().value;
-  for_each_bin(prepared, shape, concerned(transition),
-               [&](std::ptrdiff_t i, double x, double x_delay, double x_smooth) {
-                 const double y = thrust_in(transition, i);
-                 if (!std::isnan(y)) sums.add({y - (std::isnan(thrust) ? 0 : thrust), x - squared, x_delay, x_smooth});
-               });
+  const double level = std::isnan(thrust) ? 0 : thrust;
+  for_each_bin<kSmoothed>(prepared, shape, concerned(transition),
+                          [&](std::ptrdiff_t i, double x, double x_delay, double x_smooth) {
+                            const double y = thrust_in(transition, i);
+                            if (!std::isnan(y)) sums.add({y - level, x - squared, x_delay, x_smooth});
+                          });
   Misfit misfit;
   if (sums.n < 4) return misfit;
-  const Eigen::Matrix4d c = sums.centred();
+  const auto c = sums.centred();
   const double yy = c(0, 0), xx = c(1, 1), xy = c(0, 1);
   misfit.bins = sums.n - 2;
   const double b = xx > 0 ? xy / xx : 0;
@@ -177,9 +188,11 @@ Misfit misfit_of(const Prepared& prepared, const Shape& shape) {
     return misfit;
   }
   misfit.squares = yy - b * xy;
-  const Eigen::Vector2d by_y = c.col(0).tail<2>(), by_x = c.col(1).tail<2>();
-  misfit.gradient = b * (by_y - b * by_x);
-  misfit.curvature = b * b * (c.bottomRightCorner<2, 2>() - by_x * by_x.transpose() / xx);
+  if constexpr (kSmoothed) {
+    const Eigen::Vector2d by_y = c.col(0).template tail<2>(), by_x = c.col(1).template tail<2>();
+    misfit.gradient = b * (by_y - b * by_x);
+    misfit.curvature = b * b * (c.template bottomRightCorner<2, 2>() - by_x * by_x.transpose() / xx);
+  }
   return misfit;
 }
 
@@ -226,7 +239,7 @@ double best_of_grid(std::span<const Prepared> transitions) {
   double least = std::numeric_limits<double>::infinity();
   for (double delay = kEarliest + kGrid; delay < kLongest; delay += kGrid) {
     double squares = 0;
-    for (const Prepared& transition : transitions) squares += misfit_of(transition, {delay, 0.0}).squares;
+    for (const Prepared& transition : transitions) squares += misfit_of<false>(transition, {delay, 0.0}).squares;
     if (squares >= least) continue;
     least = squares;
     best = delay;

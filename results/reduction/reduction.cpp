@@ -40,11 +40,11 @@ const RunRecording& usable(const RunRecording& run) {
 
 class Reduction {
  public:
-  Reduction(const RunRecording& run, LoadCellColumns cell)
+  Reduction(const RunRecording& run, const LoadCellColumns& cell)
       : run_(usable(run)),
         newtons_(run.header.thrust_sign / run.header.load_cell.counts_per_newton),
         newton_metres_(run.header.thrust_sign / run.header.load_cell.counts_per_newton_metre),
-        cell_(run, std::move(cell)),
+        cell_(run, cell),
         motor_(run.motor),
         zeros_(run, cell_, motor_),
         spans_(flag_spans(run.events)) {}
@@ -284,13 +284,15 @@ class Reduction {
 
 }  // namespace
 
-Reduced reduce_with_zeros(const RunRecording& run) { return Reduction(run, run.load_cell).reduced(); }
+Reduced reduce_with_zeros(const RunRecording& run) { return Reduction(run, {run.load_cell, run.header}).reduced(); }
 
-std::vector<Transition> transitions_of(const RunRecording& run) { return Reduction(run, run.load_cell).transitions(); }
+std::vector<Transition> transitions_of(const RunRecording& run) {
+  return Reduction(run, {run.load_cell, run.header}).transitions();
+}
 
-std::vector<StepMean> reduce(const RunRecording& run) { return reduce(run, run.load_cell); }
-std::vector<StepMean> reduce(const RunRecording& run, LoadCellColumns cell) {
-  return Reduction(run, std::move(cell)).reduced().steps;
+std::vector<StepMean> reduce(const RunRecording& run) { return reduce(run, {run.load_cell, run.header}); }
+std::vector<StepMean> reduce(const RunRecording& run, const LoadCellColumns& cell) {
+  return Reduction(run, cell).reduced().steps;
 }
 
 }  // namespace kphi::results

@@ -37,7 +37,7 @@ struct Reduced {
 /// An aborted run gives the steps before the interrupted one. Throws RecordError if a run with steps has no load-cell
 /// samples in any zero window, or its scale is invalid.
 [[nodiscard]] std::vector<StepMean> reduce(const RunRecording& run);
-[[nodiscard]] std::vector<StepMean> reduce(const RunRecording& run, LoadCellColumns cell);
+[[nodiscard]] std::vector<StepMean> reduce(const RunRecording& run, const LoadCellColumns& cell);
 
 /// As reduce(), with the check of the zeros.
 [[nodiscard]] Reduced reduce_with_zeros(const RunRecording& run);

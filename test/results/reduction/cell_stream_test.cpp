@@ -10,11 +10,15 @@ namespace {
 using test::make_run;
 using test::Truth;
 
+struct Stream : LoadCellColumns, CellStream {
+  explicit Stream(const RunRecording& run) : LoadCellColumns(run.load_cell, run.header), CellStream(run, *this) {}
+};
+
 constexpr Window kSecond{2'000'000'000, 3'000'000'000};
 
 TEST(CellBins, HoldEverySampleOnceHoweverTheyAreCut) {
   const auto run = make_run(Truth{});
-  const CellStream cell(run);
+  const Stream cell(run);
   const CellBins bins = cell.bins(kSecond);
   ASSERT_EQ(bins.size(), 100u);
   const CellWindow whole = bins.over(0, 100);
@@ -29,7 +33,7 @@ TEST(CellBins, HoldEverySampleOnceHoweverTheyAreCut) {
 
 TEST(CellBins, ComeToTheSameBitsFromAnotherBeginning) {
   const auto run = make_run(Truth{});
-  const CellStream cell(run);
+  const Stream cell(run);
   const CellWindow late = cell.bins(kSecond).over(50, 100);
   const CellWindow alone = cell.bins({2'500'000'000, 3'000'000'000}).over(0, 50);
   EXPECT_EQ(late.n, alone.n);
@@ -40,7 +44,7 @@ TEST(CellBins, AreExactAtTheLargestCounts) {
   auto run = make_run(Truth{});
   bool high = false;
   for (auto& record : run.load_cell) record.counts[2] = (high = !high) ? 2'147'483'647 : -2'147'483'647 - 1;
-  const CellStream cell(run);
+  const Stream cell(run);
   const CellBins bins = cell.bins(kSecond);
   const CellWindow all = bins.over(0, bins.size());
   EXPECT_NEAR(all.force.mean, -0.5, 5e6);
@@ -51,7 +55,7 @@ TEST(CellBins, AreExactAtTheLargestCounts) {
 TEST(CellBins, NoticeAThrustThatRepeatsOneValueWhileTheOtherAxesGoOn) {
   auto run = make_run(Truth{});
   for (std::size_t i = 2500; i < 2640; ++i) run.load_cell[i].counts[2] = run.load_cell[2500].counts[2];
-  EXPECT_TRUE(CellStream(run).bins(kSecond).over(0, 100).frozen);
+  EXPECT_TRUE(Stream(run).bins(kSecond).over(0, 100).frozen);
 }
 
 TEST(CellBins, NoticeACellThatRepeatsOneValue) {
@@ -60,10 +64,10 @@ TEST(CellBins, NoticeACellThatRepeatsOneValue) {
     for (std::size_t i = begin; i < end; ++i) run.load_cell[i].counts = run.load_cell[begin].counts;
   };
   freeze(2300, 2380);
-  EXPECT_FALSE(CellStream(run).bins(kSecond).over(0, 100).frozen) << "less than a tenth of a second";
+  EXPECT_FALSE(Stream(run).bins(kSecond).over(0, 100).frozen) << "less than a tenth of a second";
   freeze(2500, 2640);
-  EXPECT_TRUE(CellStream(run).bins(kSecond).over(0, 100).frozen);
-  EXPECT_FALSE(CellStream(run).bins(kSecond).over(0, 50).frozen);
+  EXPECT_TRUE(Stream(run).bins(kSecond).over(0, 100).frozen);
+  EXPECT_FALSE(Stream(run).bins(kSecond).over(0, 50).frozen);
 }
 
 TEST(CellBins, AreWiderWhereSamplesAreRare) {
@@ -71,7 +75,7 @@ TEST(CellBins, AreWiderWhereSamplesAreRare) {
   truth.rate_hz = 26;
   truth.ft_stride = 1;
   const auto run = make_run(truth);
-  const CellBins bins = CellStream(run).bins(kSecond);
+  const CellBins bins = Stream(run).bins(kSecond);
   EXPECT_NEAR(bins.bin_s(), 2.0 / 26, 1e-6);
   for (std::size_t i = 0; i < bins.size(); ++i) EXPECT_FALSE(std::isnan(bins.force(i)));
 }
@@ -80,7 +84,7 @@ TEST(CellBins, TellWhatWasLostToTheSample) {
   Truth truth;
   truth.lose = [](std::uint64_t n) { return (n >= 2495 && n < 2505) || (n >= 2998 && n < 3010); };
   const auto run = make_run(truth);
-  const CellBins bins = CellStream(run).bins(kSecond);
+  const CellBins bins = Stream(run).bins(kSecond);
   EXPECT_EQ(bins.over(0, 50).lost, 5u);
   EXPECT_EQ(bins.over(0, 99).lost, 10u);
   EXPECT_EQ(bins.over(50, 100).lost, 7u) << "two of those that were lost across the end";
@@ -91,7 +95,7 @@ TEST(CellStream, GivesEvenSamplesWithGapsFilledAndNoneAcrossARestart) {
   Truth truth;
   truth.lose = [](std::uint64_t n) { return n >= 2500 && n < 2510; };
   RunRecording run = make_run(truth);
-  const EvenSamples even = CellStream(run).samples(kSecond);
+  const EvenSamples even = Stream(run).samples(kSecond);
   EXPECT_DOUBLE_EQ(even.rate_hz, truth.rate_hz);
   ASSERT_NEAR(static_cast<double>(even.counts.size()), 1000, 1);
   std::size_t held = 0;
@@ -99,7 +103,7 @@ TEST(CellStream, GivesEvenSamplesWithGapsFilledAndNoneAcrossARestart) {
   EXPECT_EQ(held, 10u);
   for (auto& record : run.load_cell)
     if (record.arrival_ns > 2'300'000'000) record.ft_sequence -= 500000;
-  EXPECT_TRUE(CellStream(run).samples(kSecond).counts.empty()) << "the box restarted at 2.3 s";
+  EXPECT_TRUE(Stream(run).samples(kSecond).counts.empty()) << "the box restarted at 2.3 s";
 }
 
 }  // namespace

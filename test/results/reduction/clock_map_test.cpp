@@ -12,6 +12,11 @@ namespace {
 using test::make_run;
 using test::Truth;
 
+struct Map : LoadCellColumns, ClockMap {
+  Map(const std::vector<LoadCellRecord>& records, double rate_hz, std::span<const StreamEvent> events = {})
+      : LoadCellColumns(records), ClockMap(static_cast<const LoadCellColumns&>(*this), rate_hz, events) {}
+};
+
 Truth stream_of(double skew_ppm, int records_per_datagram, double jitter_us) {
   Truth truth;
   truth.rate_hz = 7000;
@@ -54,7 +59,7 @@ TEST(ClockMap, FindsASkewedJitteredDeviceClockWithinATenthOfAMillisecond) {
       for (const double jitter : {30.0, 200.0}) {
         const Truth truth = stream_of(skew, records, jitter);
         const auto run = make_run(truth);
-        const ClockMap map(run.load_cell, 7000);
+        const Map map(run.load_cell, 7000);
         ASSERT_EQ(map.epochs().size(), 1u);
         const double worst = worst_error_us(truth, run.load_cell, map);
         EXPECT_LT(worst, 100) << skew << " ppm, " << records << " records, jitter " << jitter << " µs";
@@ -69,7 +74,7 @@ TEST(ClockMap, FindsASkewedJitteredDeviceClockWithinATenthOfAMillisecond) {
 TEST(ClockMap, BeatsTheArrivalStampsOfBufferedRecords) {
   Truth truth = stream_of(30, 40, 30);
   const auto run = make_run(truth);
-  const ClockMap map(run.load_cell, 7000);
+  const Map map(run.load_cell, 7000);
   // The first record of a datagram waited 39 periods for its stamp: 5.6 ms.
   const double waited = 1e-3 * static_cast<double>(run.load_cell[0].arrival_ns - map.time_ns(map.epochs()[0], 0));
   EXPECT_GT(waited, 5000);
@@ -84,7 +89,7 @@ TEST(ClockMap, IsNotMovedByLateDatagramsOrGaps) {
   truth.lose = [](std::uint64_t n) { return (n > 70000 && n < 90000) || n % 97 == 3; };
   auto run = make_run(truth);
   for (std::size_t i = 0; i < run.load_cell.size(); i += 500) run.load_cell[i].arrival_ns += 20000000;
-  const ClockMap map(run.load_cell, 7000);
+  const Map map(run.load_cell, 7000);
   EXPECT_LT(worst_error_us(truth, run.load_cell, map), 100);
 }
 
@@ -92,7 +97,7 @@ TEST(ClockMap, GoesThroughTheWrapOfTheCounter) {
   Truth truth = stream_of(0, 1, 30);
   truth.ft_begin = 4294967295u - 1000;
   const auto run = make_run(truth);
-  const ClockMap map(run.load_cell, 7000);
+  const Map map(run.load_cell, 7000);
   EXPECT_EQ(map.epochs().size(), 1u);
   EXPECT_LT(worst_error_us(truth, run.load_cell, map), 100);
 }
@@ -108,7 +113,7 @@ TEST(ClockMap, ARestartedBoxIsANewClock) {
     run.load_cell[i].ft_sequence = static_cast<std::uint32_t>(i - half);
   }
   run.load_cell[half].ft_sequence = 0;
-  const ClockMap map(run.load_cell, 7000);
+  const Map map(run.load_cell, 7000);
   ASSERT_EQ(map.epochs().size(), 2u);
   const ClockEpoch& second = map.epochs()[1];
   EXPECT_EQ(second.begin, half);
@@ -118,13 +123,13 @@ TEST(ClockMap, ARestartedBoxIsANewClock) {
 
 TEST(ClockMap, AWrongRateIsNotPlausible) {
   const auto run = make_run(stream_of(0, 1, 30));
-  const ClockMap map(run.load_cell, 7010);
+  const Map map(run.load_cell, 7010);
   EXPECT_FALSE(std::abs(map.epochs()[0].skew) < 500e-6);
 }
 
 TEST(ClockMap, FindsTheFirstSampleAtATime) {
   const auto run = make_run(stream_of(10, 40, 30));
-  const ClockMap map(run.load_cell, 7000);
+  const Map map(run.load_cell, 7000);
   const ClockEpoch& epoch = map.epochs()[0];
   for (const std::size_t i : {std::size_t{1}, std::size_t{777}, run.load_cell.size() - 1}) {
     EXPECT_EQ(map.first_at(epoch, map.time_ns(epoch, i)), i);
@@ -137,7 +142,7 @@ TEST(ClockMap, FindsTheFirstSampleAtATime) {
 TEST(ClockMap, LivesWithAlmostNothing) {
   EXPECT_TRUE(ClockMap({}, 7000).epochs().empty());
   const std::vector<LoadCellRecord> one(1);
-  const ClockMap map(one, 7000);
+  const Map map(one, 7000);
   ASSERT_EQ(map.epochs().size(), 1u);
   EXPECT_EQ(map.time_ns(map.epochs()[0], 0), 0);
   std::vector<LoadCellRecord> brief(1400);
@@ -153,14 +158,14 @@ TEST(ClockMap, BeginsAnewWhereTheBoxTookUpCountingAgain) {
     records[i].arrival_ns = static_cast<Nanoseconds>(1'000'000 * i + (i < 2000 ? 0 : 1'000'000'000));
   }
   const std::vector<StreamEvent> events{{EventKind::stall_ended, 3'000'000'000, 0, ""}};
-  const ClockMap map(records, 7000, events);
+  const Map map(records, 7000, events);
   ASSERT_EQ(map.epochs().size(), 2u);
   EXPECT_FALSE(map.epochs()[1].rebooted);
   EXPECT_EQ(map.epochs()[1].begin, 2000u);
   EXPECT_NEAR(static_cast<double>(map.time_ns(map.epochs()[1], 4000)), 5e9, 1e3);
   EXPECT_NEAR(1e6 * map.epochs()[0].skew, 0, 1);
 
-  const ClockMap unaware(records, 7000);
+  const Map unaware(records, 7000);
   EXPECT_FALSE(std::abs(unaware.epochs()[0].skew) < 500e-6) << "without the break the clock seems far off";
 }
 

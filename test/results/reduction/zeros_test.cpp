@@ -21,7 +21,8 @@ struct Built {
   explicit Built(const Truth& truth) : run(make_run(truth)) {}
   explicit Built(RunRecording recording) : run(std::move(recording)) {}
   RunRecording run;
-  CellStream cell{run};
+  LoadCellColumns columns{run.load_cell, run.header};
+  CellStream cell{run, columns};
   MotorSeries motor{run.motor};
   Zeros zeros{run, cell, motor};
 };
