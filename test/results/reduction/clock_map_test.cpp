@@ -61,10 +61,8 @@ TEST(ClockMap, FindsASkewedJitteredDeviceClockWithinATenthOfAMillisecond) {
         const auto run = make_run(truth);
         const Map map(run.load_cell, 7000);
         ASSERT_EQ(map.epochs().size(), 1u);
-        const double worst = worst_error_us(truth, run.load_cell, map);
-        EXPECT_LT(worst, 100) << skew << " ppm, " << records << " records, jitter " << jitter << " µs";
+        EXPECT_LT(worst_error_us(truth, run.load_cell, map), 100) << skew << " ppm, " << records << " records";
         EXPECT_NEAR(1e6 * map.epochs()[0].skew, skew, 2);
-        EXPECT_TRUE(std::abs(map.epochs()[0].skew) < 500e-6);
         EXPECT_NEAR(lateness_p99_us(run.load_cell, map), jitter * std::log(100), 0.5 * jitter * std::log(100));
       }
     }
@@ -108,11 +106,7 @@ TEST(ClockMap, ARestartedBoxIsANewClock) {
   auto run = make_run(truth);
   const std::size_t half = run.load_cell.size() / 2;
   for (std::size_t i = half; i < run.load_cell.size(); ++i)
-    run.load_cell[i].ft_sequence -= run.load_cell[half].ft_sequence;
-  for (std::size_t i = half + 1; i < run.load_cell.size(); ++i) {
     run.load_cell[i].ft_sequence = static_cast<std::uint32_t>(i - half);
-  }
-  run.load_cell[half].ft_sequence = 0;
   const Map map(run.load_cell, 7000);
   ASSERT_EQ(map.epochs().size(), 2u);
   const ClockEpoch& second = map.epochs()[1];
