@@ -299,7 +299,8 @@ ColumnReader::ColumnReader(const Handle& group, const char* name, Stored stored,
   const Handle type = own(H5Dget_type(dataset_.get()), doing_);
   std::array<hsize_t, 2> chunk{0, 1};
   if (H5Pget_layout(list.get()) == H5D_CHUNKED && H5Pget_nfilters(list.get()) == 0 &&
-      H5Tequal(type.get(), type_.get()) > 0 && H5Pget_chunk(list.get(), 2, chunk.data()) == rank && chunk[1] == width) {
+      H5Tequal(type.get(), type_.get()) > 0 && H5Pget_chunk(list.get(), 2, chunk.data()) == rank && chunk[1] == width &&
+      rows_ <= H5Dget_storage_size(dataset_.get()) / row_bytes_) {
     chunk_rows_ = chunk[0];
     for (hsize_t first = 0; first + chunk_rows_ <= rows_; first += chunk_rows_) {
       const std::array<hsize_t, 2> offset{first, 0};
