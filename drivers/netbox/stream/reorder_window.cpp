@@ -41,6 +41,13 @@ void LossTracker::begin_segment() noexcept {
   former_lines_.clear();
 }
 
+void LossTracker::change_stride(unsigned stride, double device_rate_hz) noexcept {
+  if (stride == stride_ && device_rate_hz == device_rate_hz_) return;
+  stride_ = stride;
+  device_rate_hz_ = device_rate_hz;
+  former_lines_.clear();
+}
+
 bool LossTracker::accept_unusual(const LoadCellRecord& record) noexcept {
   if (!has_last_) {
     has_last_ = true;

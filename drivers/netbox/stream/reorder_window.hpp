@@ -49,6 +49,8 @@ class LossTracker {
   [[nodiscard]] bool is_next(const LoadCellRecord& record) const noexcept {
     return has_last_ && record.rdt_sequence == last_rdt_ + 1 && record.ft_sequence == last_ft_ + stride_;
   }
+  /// From now on the box streams by another stride: what is missing until its next record counts by the new one.
+  void change_stride(unsigned stride, double device_rate_hz) noexcept;
   /// The first record of a stream has arrived: earlier drops explain no later gap.
   void forget_host_drops() noexcept { host_credit_ = 0; }
   /// The first of the two records that proved a reboot, after accept() has taken the second: deliver both, in the order

@@ -24,11 +24,7 @@ Session::Session(const StreamSettings& settings)
       datagram_records_(static_cast<std::size_t>(settings.records_per_datagram)) {}
 
 void Session::adopt(const StreamSettings& settings) {
-  if (settings.divisor != settings_.divisor || settings.device_rate_hz != settings_.device_rate_hz) {
-    const Counters counters = account_.counters();
-    account_ = LossTracker(settings.divisor, settings.device_rate_hz);
-    account_.counters() = counters;
-  }
+  account_.change_stride(settings.divisor, settings.device_rate_hz);
   settings_ = settings;
   window_ = ReorderWindow(window_records(settings), settings.reorder_patience, settings.divisor);
   datagram_records_ = static_cast<std::size_t>(settings.records_per_datagram);

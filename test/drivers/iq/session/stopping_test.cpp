@@ -16,6 +16,14 @@ using fake::Bytes;
 using fake::State;
 using fake::Wire;
 
+struct SpinningWire : Wire {
+  explicit SpinningWire(double target = 300) {
+    connect();
+    spin(target);
+    run_for(100ms);
+  }
+};
+
 TEST(Coasting, GoesBeforeAllThatHasNotBegunToLeave) {
   Wire wire;
   wire.connect();
@@ -73,10 +81,7 @@ TEST(Coasting, IsConfirmedOnlyByAQuestionPutAfterwards) {
 }
 
 TEST(Coasting, IsRepeatedUntilConfirmed) {
-  Wire wire;
-  wire.connect();
-  wire.spin(300);
-  wire.run_for(50ms);
+  SpinningWire wire;
   wire.module.ignore_sets = true;
   wire.coast();
   wire.run_for(250ms);
@@ -96,10 +101,7 @@ Duration longest_pause(const Wire& wire) {
 }
 
 TEST(Coasting, FallsSilentToAMuteModuleAndSendsNoCoastMeanwhile) {
-  Wire wire;
-  wire.connect();
-  wire.spin(300);
-  wire.run_for(50ms);
+  SpinningWire wire;
   wire.module.mute = true;
   wire.coast();
   ASSERT_TRUE(wire.run_to_state(State::failed, 2s));
@@ -119,10 +121,7 @@ TEST(Coasting, IsConfirmedAgainAfterEachOrder) {
 }
 
 TEST(Coasting, FallsSilentWhenUnconfirmedSoThatTheModuleTimesOut) {
-  Wire wire;
-  wire.connect();
-  wire.spin(300);
-  wire.run_for(50ms);
+  SpinningWire wire;
   wire.module.ignore_sets = true;
   wire.coast();
   wire.run_for(6s);
@@ -136,10 +135,7 @@ TEST(Coasting, FallsSilentWhenUnconfirmedSoThatTheModuleTimesOut) {
 }
 
 TEST(Coasting, IsWhatAModuleThatStoppedAnsweringHearsLast) {
-  Wire wire;
-  wire.connect();
-  wire.spin(300);
-  wire.run_for(100ms);
+  SpinningWire wire;
   wire.module.mute = true;
   ASSERT_TRUE(wire.run_to_state(State::failed, 3s));
   EXPECT_NE(wire.session.failure().find("stopped answering"), std::string::npos);
@@ -148,10 +144,7 @@ TEST(Coasting, IsWhatAModuleThatStoppedAnsweringHearsLast) {
 }
 
 TEST(Emergency, IsThreeCoastsAtOnceBeforeAllElse) {
-  Wire wire;
-  wire.connect();
-  wire.spin(1000);
-  wire.run_for(50ms);
+  SpinningWire wire(1000);
   wire.batches.clear();
   wire.session.spin_at(RadPerSec(2000), wire.now);
   wire.session.emergency_stop(wire.now);
