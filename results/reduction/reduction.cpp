@@ -183,7 +183,8 @@ class Reduction {
     evidence.commanded_rad_s = step.mark.speed_rad_s;
     evidence.planned_s = seconds(step.whole.end - step.whole.begin - discard());
     evidence.window = bins.window(settling.begin, bins.size());
-    evidence.motor_window = {evidence.window.begin - lag, evidence.window.end - lag};
+    // A lag that seems to be below 0 would take in the next command.
+    evidence.motor_window = {evidence.window.begin - lag, std::min(evidence.window.end - lag, step.whole.end)};
     evidence.cell = bins.over(settling.begin, bins.size());
     evidence.speed = motor_.statistics(MotorChannel::speed, evidence.motor_window, run_.header.spin);
 
