@@ -20,7 +20,7 @@ using namespace std::chrono_literals;
 
 constexpr std::chrono::nanoseconds kHttpTimeout = 5s;
 constexpr std::chrono::nanoseconds kHealthPeriod = 20ms;
-constexpr std::chrono::nanoseconds kLongestLinger = 100ms;
+constexpr std::chrono::nanoseconds kLongestLinger = 250ms, kQuiet = 50ms;
 constexpr int kBatchesPerDrain = 64;
 
 std::string fetch_configuration(const Address& address, std::chrono::nanoseconds wall_timeout) {
@@ -210,7 +210,7 @@ void LoadCell::answer_questions() noexcept {
 void LoadCell::linger() noexcept {
   const Instant give_up = clock_.now() + clock_.stretched(kLongestLinger);
   pollfd readable{socket_.descriptor(), POLLIN, 0};
-  while (clock_.now() < give_up && poll_for({&readable, 1}, 2 * clock_.shrunk(connection_.settings().settle))) {
+  while (clock_.now() < give_up && poll_for({&readable, 1}, kQuiet)) {
     drain();
     send_requests();
   }
