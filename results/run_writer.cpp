@@ -50,8 +50,9 @@ class Series {
     for (Column& column : columns_) column.flush();
     for (Column& column : columns_) column.write_crc();
     if (components_) components_->flush();
-    hdf5::write_attribute(group_, "n_valid", rows());
   }
+  /// Only when what flush() wrote is on disk: HDF5 writes its metadata in any order.
+  void declare_valid() { hdf5::write_attribute(group_, "n_valid", rows()); }
   [[nodiscard]] std::uint64_t rows() const { return columns_.front().rows(); }
 
  private:
@@ -119,12 +120,13 @@ struct RunWriter::File {
     for_each_attribute(header, [&](const char* name, const auto& value) { hdf5::write_attribute(root, name, value); });
     hdf5::write_attribute(root, "configuration_sha256", sha256(header.load_cell.configuration_xml));
   }
-  void flush() {
-    load_cell.flush();
-    for (auto& channel : channels) channel.flush();
-    commands.flush();
-    events.flush();
-    supply.flush();
+  template <class Each>
+  void for_each_series(Each&& each) {
+    each(load_cell);
+    for (auto& channel : channels) each(channel);
+    each(commands);
+    each(events);
+    each(supply);
   }
 
   Handle root;
@@ -190,13 +192,18 @@ void RunWriter::sync() {
 
 void RunWriter::secure() {
   constexpr std::uint64_t kMetadata = 256u << 10;  // more than one flush adds
-  file_->flush();
+  file_->for_each_series([](auto& series) { series.flush(); });
   // With room reserved the flush of the metadata, which must not stop halfway, cannot meet a full disk.
   const int descriptor = hdf5::descriptor_of(file_->root);
   const std::uint64_t size = hdf5::size_of(file_->root);
   files_.reserve(descriptor, reserved_, size + kMetadata - reserved_);
-  hdf5::check(H5Fflush(file_->root.get(), H5F_SCOPE_GLOBAL), path_.string() + ": flush");
-  files_.sync_data(descriptor);
+  const auto sync = [&] {
+    hdf5::check(H5Fflush(file_->root.get(), H5F_SCOPE_GLOBAL), path_.string() + ": flush");
+    files_.sync_data(descriptor);
+  };
+  sync();
+  file_->for_each_series([](auto& series) { series.declare_valid(); });
+  sync();
   reserved_ = size;
 }
 
