@@ -14,6 +14,7 @@
 #include "results/campaign_folder.hpp"
 #include "results/file_layer.hpp"
 #include "results/journal.hpp"
+#include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
 #include "test/results/recordings.hpp"
 #include "test/results/synthetic_run.hpp"
@@ -374,6 +375,30 @@ TEST(Lasting, ARunIsSyncedWhenItBeginsAndBeforeAndAfterItsRenaming) {
   (void)writer.finish(run);
   const std::string size = std::to_string(std::filesystem::file_size(folder / "a.h5"));
   EXPECT_THAT(files.log, ElementsAre(sync, sync, "sync a.h5.part " + size, "rename a.h5.part a.h5", synced_folder));
+}
+
+/// What a program that is killed at a sync leaves.
+class CopiedDisk : public FileLayer {
+ public:
+  void sync_data(int descriptor) override {
+    const auto path = std::filesystem::read_symlink("/proc/self/fd/" + std::to_string(descriptor));
+    std::filesystem::copy_file(path, path.string() + ".copy", std::filesystem::copy_options::overwrite_existing);
+    if (path.extension() == ".part") rows.push_back(read_run(path.string() + ".copy").load_cell.size());
+  }
+  std::vector<std::size_t> rows;
+};
+
+TEST(Lasting, TheNumberOfRowsIsWrittenOnlyWhenTheRowsAreSynced) {
+  const TemporaryFolder folder;
+  const RunRecording run = test::make_run({});
+  CopiedDisk files;
+  RunWriter writer(folder / "a.h5", run.header, files);
+  test::write_pieces(writer, run);
+  (void)writer.finish(run);
+  ASSERT_GE(files.rows.size(), 4u);
+  for (std::size_t i = 2; i + 1 < files.rows.size(); i += 2)
+    EXPECT_EQ(files.rows[i], files.rows[i - 1]) << "the first sync of each two still has the former number";
+  EXPECT_GT(files.rows[3], files.rows[2]);
 }
 
 TEST(Lasting, ACampaignFolderAndTheNamesOfItsLeftoversAreSynced) {
