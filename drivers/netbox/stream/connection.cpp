@@ -51,7 +51,12 @@ Connection::Connection(const Configuration& box, double bench_speed)
       session_(stream_settings(box)),
       meter_(std::in_place, box.device_rate_hz, bench_speed),
       queue_records_(queue_capacity(box, bench_speed)),
-      queue_(queue_records_) {}
+      queue_(queue_records_) {
+  // Touches all of its memory, so that no page is missing when a record comes.
+  while (queue_.push(LoadCellRecord{})) {
+  }
+  queue_.reset();
+}
 
 StreamSettings Connection::stream_settings(const Configuration& box) const {
   StreamSettings settings;

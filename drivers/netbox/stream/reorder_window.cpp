@@ -48,7 +48,8 @@ void LossTracker::change_stride(unsigned stride, double device_rate_hz) noexcept
   former_lines_.clear();
 }
 
-bool LossTracker::accept_unusual(const LoadCellRecord& record) noexcept {
+bool LossTracker::accept(const LoadCellRecord& record) noexcept {
+  if (accept_run({&record, 1})) return true;
   if (!has_last_) {
     has_last_ = true;
     accept_sound(record);
@@ -186,8 +187,7 @@ ReorderWindow::ReorderWindow(std::size_t records, Duration patience, unsigned st
   held_.reserve(records_ + 1);
 }
 
-bool ReorderWindow::receive_unusual(const LoadCellRecord& record, LossTracker& account,
-                                    std::vector<LoadCellRecord>& out) {
+bool ReorderWindow::receive(const LoadCellRecord& record, LossTracker& account, std::vector<LoadCellRecord>& out) {
   if (held_.empty() && !account.has_last()) account.forget_host_drops();
   expire(record.arrival(), account, out);
   const bool rebooted = account.looks_rebooted(record);

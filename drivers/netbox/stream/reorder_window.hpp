@@ -5,6 +5,7 @@
 #include <boost/circular_buffer.hpp>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "base/clock.hpp"
@@ -38,16 +39,15 @@ class LossTracker {
   /// The next record is the first of a requested stream: no record is missing before it.
   void begin_segment() noexcept;
   /// True: deliver it. False: counted and to be discarded.
-  [[nodiscard]] bool accept(const LoadCellRecord& record) noexcept {
-    if (is_next(record)) [[likely]] {
-      accept_sound(record);
-      return true;
-    }
-    return accept_unusual(record);
-  }
-  /// Follows the last accepted one in both numbers.
-  [[nodiscard]] bool is_next(const LoadCellRecord& record) const noexcept {
-    return has_last_ && record.rdt_sequence == last_rdt_ + 1 && record.ft_sequence == last_ft_ + stride_;
+  [[nodiscard]] bool accept(const LoadCellRecord& record) noexcept;
+  /// True if they follow the last accepted record and each other in both numbers: deliver them. False: none is counted.
+  [[nodiscard]] bool accept_run(std::span<const LoadCellRecord> records) noexcept {
+    std::uint32_t rdt = last_rdt_, ft = last_ft_, deviation = !has_last_;
+    for (const LoadCellRecord& record : records)
+      deviation |= (record.rdt_sequence ^ ++rdt) | (record.ft_sequence ^ (ft += stride_));
+    if (deviation != 0) return false;
+    accept_sound(records.back(), records.size());
+    return true;
   }
   /// From now on the box streams by another stride: what is missing until its next record counts by the new one.
   void change_stride(unsigned stride, double device_rate_hz) noexcept;
@@ -80,13 +80,12 @@ class LossTracker {
     last_arrival_ = record.arrival();
     has_stray_ = false;
   }
-  /// No record is missing before it.
-  void accept_sound(const LoadCellRecord& record) noexcept {
+  /// No record is missing before the last of `count`.
+  void accept_sound(const LoadCellRecord& record, std::uint64_t count = 1) noexcept {
     remember(record);
-    ++counters_.received;
-    ++counters_.expected;
+    counters_.received += count;
+    counters_.expected += count;
   }
-  bool accept_unusual(const LoadCellRecord& record) noexcept;
   bool accept_forward(const LoadCellRecord& record, std::int32_t rdt_step, std::int32_t ft_step) noexcept;
   bool refuse(std::uint64_t Counters::*as) noexcept {
     ++(counters_.*as);
@@ -134,10 +133,12 @@ class ReorderWindow {
   [[nodiscard]] bool empty() const noexcept { return held_.empty(); }
   /// Appends to `out` the records that can be delivered now, ascending in ft_sequence, counted by `account`. False if
   /// the record was refused and counted (duplicate, late, stalled).
-  bool receive(const LoadCellRecord& record, LossTracker& account, std::vector<LoadCellRecord>& out) {
-    if (!held_.empty() || !account.is_next(record)) return receive_unusual(record, account, out);
-    out.push_back(record);
-    return account.accept(record);
+  bool receive(const LoadCellRecord& record, LossTracker& account, std::vector<LoadCellRecord>& out);
+  /// The records of one datagram, as long as none is missing or held: nearly always. False: nothing was taken.
+  bool receive_run(std::span<const LoadCellRecord> records, LossTracker& account, std::vector<LoadCellRecord>& out) {
+    if (!held_.empty() || !account.accept_run(records)) return false;
+    out.insert(out.end(), records.begin(), records.end());
+    return true;
   }
   /// Gives up the gaps older than the patience.
   void expire(Instant now, LossTracker& account, std::vector<LoadCellRecord>& out);
@@ -148,7 +149,6 @@ class ReorderWindow {
   [[nodiscard]] Instant deadline() const noexcept { return held_.empty() ? kNever : oldest_arrival_ + patience_; }
 
  private:
-  bool receive_unusual(const LoadCellRecord& record, LossTracker& account, std::vector<LoadCellRecord>& out);
   [[nodiscard]] bool may_have_overtaken(const LoadCellRecord& record, const LossTracker& account) const noexcept;
   /// No record can be missing between (rdt, ft) and `record`.
   [[nodiscard]] bool follows(std::uint32_t rdt, std::uint32_t ft, const LoadCellRecord& record) const noexcept;

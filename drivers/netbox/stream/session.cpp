@@ -91,12 +91,12 @@ Command Session::start_command() const noexcept {
 }
 
 bool Session::take_records(std::size_t count, std::vector<LoadCellRecord>& out) {
-  bool any_new = false;
+  const std::span<const LoadCellRecord> records = std::span(decoded_).first(count);
   std::uint32_t status = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    status |= decoded_[i].status;
-    any_new |= window_.receive(decoded_[i], account_, out);
-  }
+  for (const LoadCellRecord& record : records) status |= record.status;
+  bool any_new = window_.receive_run(records, account_, out);
+  if (!any_new)
+    for (const LoadCellRecord& record : records) any_new |= window_.receive(record, account_, out);
   note_status(status, decoded_[0]);
   return any_new;
 }
