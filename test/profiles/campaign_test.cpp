@@ -9,7 +9,7 @@
 #include "test/profiles/refusals.hpp"
 
 namespace kphi::profiles {
-namespace {
+namespace campaign_test {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
@@ -332,5 +332,5 @@ TEST(Campaign, NamesItsFile) {
               testing::ThrowsMessage<ConfigurationError>(StartsWith("dir/c.yaml:")));
 }
 
-}  // namespace
+}  // namespace campaign_test
 }  // namespace kphi::profiles
