@@ -60,6 +60,8 @@ class ThrustCurve {
   /// Of the parameters; nullopt if unknown.
   [[nodiscard]] const std::optional<LineUncertainty>& uncertainty() const noexcept { return uncertainty_; }
 
+  [[nodiscard]] bool has_uncertainty() const noexcept { return uncertainty_.has_value(); }
+
   /// k(φ), also beyond the largest fitted angle, where it may be negative.
   [[nodiscard]] ThrustCoefficient at(Radians occlusion_angle) const noexcept {
     return line_.intercept + ThrustCoefficient(line_.slope_per_rad * occlusion_angle.value());

@@ -49,6 +49,8 @@ struct StepProfile {
 struct Cooling {
   Celsius pause_above;
   Celsius resume_below;
+
+  friend bool operator==(const Cooling&, const Cooling&) = default;
 };
 
 /// A plan beyond the speed is refused; exceeding any of them during a run coasts the motor.
@@ -61,6 +63,8 @@ struct Limits {
   std::optional<NewtonMetres> torque_max{};  ///< about the shaft
   std::optional<Volts> supply_voltage_min{}, supply_voltage_max{};
   std::optional<double> speed_error_max{};  ///< share of the command
+
+  friend bool operator==(const Limits&, const Limits&) = default;
 };
 
 struct Campaign {

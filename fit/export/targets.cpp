@@ -154,7 +154,7 @@ std::string error_at(const compensation::ThrustCurve& curve, Radians phi) {
 
 constexpr const char* kCoefficientSchema =
     R"({"type":"object","properties":{"phi_deg":{"type":"number"},"k":{"type":"number"},"standard_error":{"type":"number"},)"
-    R"("line_k":{"type":"number"},"scaling_factor":{"type":"number"}}})";
+    R"("curve_k":{"type":"number"},"scaling_factor":{"type":"number"}}})";
 
 std::map<std::string, std::string> provenance(const compensation::Coefficients& file) {
   std::map<std::string, std::string> values{{"propeller", file.propeller.id},
@@ -292,14 +292,14 @@ Export to_header(const compensation::Coefficients& file, const ExportOptions&) {
 Export to_csv(const compensation::Coefficients& file, const ExportOptions&) {
   const compensation::ThrustCurve& curve = file.curve;
   Export result;
-  result.text = "phi_deg,k,u_k,line_k,u_line_k,scaling_factor\n";
+  result.text = "phi_deg,k,u_k,curve_k,u_curve_k,scaling_factor\n";
   for (const auto& row : file.table) {
     result.text += fmt::format(
         "{},{},{},{},{},{}\n", shortest(std::round(to_degrees(row.occlusion) * 1e9) / 1e9), shortest(row.k.value()),
         shortest(row.standard_error.value_or(ThrustCoefficient()).value()), shortest(curve.at(row.occlusion).value()),
         error_at(curve, row.occlusion), shortest(curve.scaling_factor(row.occlusion)));
   }
-  result.lost = {"units: the header line has none; k, u_k and line_k are in N/(rad/s)^2",
+  result.lost = {"units: the header line has none; k, u_k and curve_k are in N/(rad/s)^2",
                  "slope, covariance, validity, hashes of the runs: only in the coefficient file"};
   return result;
 }
@@ -314,7 +314,7 @@ Export to_mcap(const compensation::Coefficients& file, const ExportOptions&) {
   for (const auto& row : file.table) {
     Json message{{"phi_deg", to_degrees(row.occlusion)}, {"k", row.k.value()}};
     if (row.standard_error) message["standard_error"] = row.standard_error->value();
-    message["line_k"] = file.curve.at(row.occlusion).value();
+    message["curve_k"] = file.curve.at(row.occlusion).value();
     message["scaling_factor"] = file.curve.scaling_factor(row.occlusion);
     writer.write(channel, time_ns, message.dump());
     time_ns += 1'000'000'000;

@@ -76,6 +76,10 @@ struct Identification {
   double speed_min_rad_s = 0;   ///< speeds measured at every φ: the valid range of the line
   double speed_max_rad_s = 0;
 
+  /// Thrust coefficient measured at φ = 0, N/(rad/s)².
+  [[nodiscard]] Estimate thrust_coefficient() const { return {line.K_T, line.K_T_standard_error}; }
+  /// From this φ on the curve that flies lies between measured occlusions.
+  [[nodiscard]] double first_fitted_deg() const { return line.points.front().phi_deg; }
   /// The curve that flies, valid up to the widest occlusion measured.
   [[nodiscard]] compensation::ThrustCurve curve() const { return line.curve(table.back().phi_deg, options.overlap); }
 };

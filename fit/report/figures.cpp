@@ -74,7 +74,7 @@ std::string curve_rows(const compensation::ThrustCurve& curve, double from_deg, 
 
 std::string share_axes(const Identification& identification, const std::vector<ThrustShares>& shares) {
   const auto& table = identification.table;
-  const double bottom = share_bottom(shares), top = share_top(identification, shares), K_T = identification.line.K_T;
+  const double bottom = share_bottom(shares), top = share_top(identification, shares), K_T = identification.thrust_coefficient().value;
   double gap = 60;  // boxes are as wide as the angles allow without touching
   std::string tics;
   for (std::size_t i = 0; i < table.size(); ++i) {
@@ -95,7 +95,6 @@ std::string share_axes(const Identification& identification, const std::vector<T
 }
 
 Figure share_figure(const Identification& identification, const std::vector<ThrustShares>& shares) {
-  const LineFit& line = identification.line;
   const compensation::ThrustCurve curve = identification.curve();
   const bool at = identification.at_speed_rad_s > 0;
   Figure figure{
@@ -124,7 +123,7 @@ Figure share_figure(const Identification& identification, const std::vector<Thru
     figure.csv += csv_row(std::string("k_n_s2_per_rad2"), row.phi_deg, row.k, row.standard_error);
     coefficients += fmt::format("{:.6g} {:.8g} {:.8g}\n", row.phi_deg, row.k * 1e6, 2 * row.standard_error * 1e6);
   }
-  const double first = line.points.front().phi_deg, last = line.points.back().phi_deg;
+  const double first = identification.first_fitted_deg(), last = identification.table.back().phi_deg;
   data += data_block("line", curve_rows(curve, first, std::max(last, first + 1e-3))) +
           data_block("before", curve_rows(curve, 0, first)) + data_block("k", coefficients);
   curves.insert(
@@ -356,18 +355,18 @@ Figure family_figure(std::span<const Fitted> family) {
   Curves absolute, relative;
   for (std::size_t i = 0; i < family.size(); ++i) {
     const Identification& one = family[i].identification;
-    const LineFit& line = one.line;
+    const double K_T = one.thrust_coefficient().value;
     const compensation::ThrustCurve curve = one.curve();
     std::string points, fitted;
     for (const OcclusionCoefficient& row : one.table) {
-      const double share = row.k / line.K_T;
+      const double share = row.k / K_T;
       points += fmt::format("{:.6g} {:.8g} {:.8g} {:.8g} {:.8g}\n", row.phi_deg, row.k * 1e6, 2e6 * row.standard_error,
-                            share, 2 * row.standard_error / line.K_T);
+                            share, 2 * row.standard_error / K_T);
       figure.csv += csv_row(one.propeller, row.phi_deg, row.k, row.standard_error, share);
+      const ThrustCoefficient flown = curve.at(from_degrees(row.phi_deg));
+      if (row.phi_deg >= one.first_fitted_deg())
+        fitted += fmt::format("{:.6g} {:.8g} {:.8g}\n", row.phi_deg, flown.value() * 1e6, flown.value() / K_T);
     }
-    for (const double phi : {line.points.front().phi_deg, line.points.back().phi_deg})
-      fitted += fmt::format("{:.6g} {:.8g} {:.8g}\n", phi, curve.at(from_degrees(phi)).value() * 1e6,
-                            curve.at(from_degrees(phi)) / curve.thrust_coefficient());
     data += data_block(fmt::format("points{}", i), points) + data_block(fmt::format("line{}", i), fitted);
     const auto add = [&](Curves& curves, int value, int error, int column, const std::string& title) {
       const auto [colour, shape] = mark(i);

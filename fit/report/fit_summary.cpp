@@ -195,11 +195,12 @@ void to_json(Json& json, const FamilyFindings& findings) {
 Json fit_json(const Identification& identification, const Analysis& analysis,
               const std::filesystem::path& coefficients) {
   const LineFit& line = identification.line;
+  const Estimate K_T = identification.thrust_coefficient();
   const auto& standard = identification.table.front().standard;
   return {{"coefficients", coefficients.string()},
           {"k_unit", "N/(rad/s)^2"},
-          {"K_T", line.K_T},
-          {"K_T_standard_error", line.K_T_standard_error},
+          {"K_T", K_T.value},
+          {"K_T_standard_error", K_T.u},
           {"k_standard", standard ? standard->value : kUnknown},
           {"air_density_kg_m3", identification.air ? identification.air->value : kUnknown},
           {"anchored", line.anchored},
@@ -225,7 +226,8 @@ std::string with_error(double value, double standard_error) {
 
 std::string headline_text(const Identification& identification) {
   const LineFit& line = identification.line;
-  std::string text = number_line("K_T", line.K_T, line.K_T_standard_error, "") +
+  const Estimate K_T = identification.thrust_coefficient();
+  std::string text = number_line("K_T", K_T.value, K_T.u, "") +
                      number_line("intercept", line.intercept, std::sqrt(line.covariance[0][0]), "") +
                      number_line("slope", line.slope_per_deg, std::sqrt(line.covariance[1][1]), " per degree");
   if (const auto& standard = identification.table.front().standard)

@@ -31,7 +31,7 @@ std::string rpm_text(double speed_rad_s) { return fmt::format("{:.0f}", to_rpm(R
 /// Thrust at the φ of `row` over the thrust at φ = 0, at the reference speed if there is one.
 double share_of_thrust(const Identification& identification, const OcclusionCoefficient& row) {
   const auto& nominal = identification.table.front().at_speed;
-  return row.at_speed && nominal ? row.at_speed->k / nominal->k : row.k / identification.line.K_T;
+  return row.at_speed && nominal ? row.at_speed->k / nominal->k : row.k / identification.thrust_coefficient().value;
 }
 
 /// Empty if the table is.
@@ -244,7 +244,7 @@ std::string coefficient_section(const Identification& identification) {
     table.row({html_angle(row.phi_deg), both_units(row.k, row.standard_error),
                row.at_speed ? both_units(row.at_speed->k, row.at_speed->standard_error) : "–",
                fmt::format("{:.1f} %", 100 * share_of_thrust(identification, row)),
-               signed_percent(100 * miss / identification.line.K_T),
+               signed_percent(100 * miss / identification.thrust_coefficient().value),
                row.fit ? fmt::format("{:.2f}", 1e3 * row.fit->rms_n) : "–",
                row.fit ? fmt::format("{:.5f}", row.fit->r_squared) : "–", row.fit ? whole(row.fit->n) : "–"});
   }
@@ -361,13 +361,14 @@ std::string family_section(std::span<const Fitted> family) {
   for (const Fitted& fitted : family) {
     const Identification& one = fitted.identification;
     const LineFit& line = one.line;
+    const Estimate K_T = one.thrust_coefficient();
     const double diameter_m = 0.0254 * one.diameter_in;
     table.row({html_escaped(one.propeller), one.diameter_in > 0 ? fmt::format("{:g}", one.diameter_in) : "–",
                one.blades > 0 ? fmt::format("{}", one.blades) : "–",
-               with_power_of_ten(line.K_T, line.K_T_standard_error),
-               diameter_m > 0 ? fmt::format("{:.5f}", line.K_T / std::pow(diameter_m, 4)) : "–",
+               with_power_of_ten(K_T.value, K_T.u),
+               diameter_m > 0 ? fmt::format("{:.5f}", K_T.value / std::pow(diameter_m, 4)) : "–",
                with_power_of_ten(line.slope_per_deg, std::sqrt(line.covariance[1][1])),
-               html_number(100 * line.slope_per_deg / line.K_T, "{:+.4f}")});
+               html_number(100 * line.slope_per_deg / K_T.value, "{:+.4f}")});
   }
   return section("The propellers side by side", table);
 }
@@ -422,7 +423,7 @@ std::string lead(const Identification& identification) {
       "K<sub>T</sub>.</p>\n",
       at ? "At " + rpm_text(identification.at_speed_rad_s) + " RPM an" : "An", html_angle(widest.phi_deg),
       100 * share_of_thrust(identification, widest),
-      -100 * identification.line.slope_per_deg / identification.line.K_T);
+      -100 * identification.line.slope_per_deg / identification.thrust_coefficient().value);
 }
 
 /// Figures `begin` to `end`. Their numbers run through the page and keep the ids of their drawings apart.

@@ -81,7 +81,7 @@ Budget line_budget(const ErrorSources& sources, const char* quantity, const char
 
 LinePrediction predict(const Identification& identification, const ErrorSources& sources, const LineWeights& weights,
                        double phi_deg, const BudgetRow& row) {
-  const LineFit& line = identification.line;
+  const double K_T = identification.thrust_coefficient().value;
   const compensation::ThrustCurve curve = identification.curve();
   std::vector<double> at(weights.slope.size());
   for (std::size_t i = 0; i < at.size(); ++i) at[i] = weights.intercept[i] + phi_deg * weights.slope[i];
@@ -92,13 +92,13 @@ LinePrediction predict(const Identification& identification, const ErrorSources&
   prediction.k.rows.push_back(scaled(row, std::sqrt(1 + std::pow(norm(at), 2))));
   prediction.speed_u_share = k > 0 ? 0.5 * prediction.k.combined() / k : std::numeric_limits<double>::infinity();
   std::vector<double> ratio = at;
-  for (double& weight : ratio) weight /= line.K_T;
-  ratio.front() -= k / (line.K_T * line.K_T);
-  prediction.clipped = k >= line.K_T;
+  for (double& weight : ratio) weight /= K_T;
+  ratio.front() -= k / (K_T * K_T);
+  prediction.clipped = k >= K_T;
   prediction.scaling_factor =
       sources.budget(fmt::format("k_i({} deg)", phi_deg), "1", curve.scaling_factor(from_degrees(phi_deg)), ratio);
-  prediction.scaling_factor.rows.push_back(scaled(row, std::sqrt(1 + std::pow(norm(at), 2)) / line.K_T));
-  prediction.extrapolated = phi_deg < line.points.front().phi_deg || phi_deg > line.points.back().phi_deg;
+  prediction.scaling_factor.rows.push_back(scaled(row, std::sqrt(1 + std::pow(norm(at), 2)) / K_T));
+  prediction.extrapolated = phi_deg < identification.first_fitted_deg() || phi_deg > identification.line.points.back().phi_deg;
   return prediction;
 }
 

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kphi {
-namespace {
+namespace clock_test {
 
 using namespace std::chrono_literals;
 
@@ -104,5 +104,5 @@ TEST(ManualClock, HasTheSameEpochInEveryRun) {
   EXPECT_EQ(ManualClock(7s).epoch_utc(), ManualClock().epoch_utc());
 }
 
-}  // namespace
+}  // namespace clock_test
 }  // namespace kphi

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kphi {
-namespace {
+namespace histogram_test {
 
 using namespace std::chrono_literals;
 
@@ -27,5 +27,5 @@ TEST(DelayHistogram, TakesWhateverComes) {
   EXPECT_EQ(histogram.total(), 2u);
 }
 
-}  // namespace
+}  // namespace histogram_test
 }  // namespace kphi

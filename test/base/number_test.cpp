@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 namespace kphi {
-namespace {
+namespace number_test {
 
 TEST(ParseDouble, TakesTheWholeTextOrNothing) {
   EXPECT_EQ(parse_double("1.5e3"), 1500);
@@ -40,5 +40,5 @@ TEST(Shortest, ReadsBackAsTheSameBits) {
     EXPECT_EQ(parse_double(shortest(value)), value);
 }
 
-}  // namespace
+}  // namespace number_test
 }  // namespace kphi

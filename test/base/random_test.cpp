@@ -8,7 +8,7 @@
 #include <map>
 
 namespace kphi {
-namespace {
+namespace random_test {
 
 using testing::ElementsAre;
 
@@ -105,5 +105,5 @@ TEST(Shuffle, BearsNothingAndOne) {
   EXPECT_THAT(one, ElementsAre(5));
 }
 
-}  // namespace
+}  // namespace random_test
 }  // namespace kphi

@@ -5,7 +5,7 @@
 #include <array>
 
 namespace kphi {
-namespace {
+namespace statistics_test {
 
 TEST(Statistics, MeanAndVariance) {
   const std::array<double, 4> values{1, 2, 3, 6};
@@ -23,5 +23,5 @@ TEST(Statistics, MediansDifferOnlyForAnEvenNumber) {
   EXPECT_EQ(median({7}), 7);
 }
 
-}  // namespace
+}  // namespace statistics_test
 }  // namespace kphi

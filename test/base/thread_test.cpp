@@ -6,7 +6,7 @@
 #include "base/wakeup.hpp"
 
 namespace kphi {
-namespace {
+namespace thread_test {
 
 bool blocks(int signal) {
   sigset_t now;
@@ -57,5 +57,5 @@ TEST(Descriptor, ClosesOnceWhoeverHoldsIt) {
   EXPECT_EQ(::read(reader.number(), bytes, 2), 0) << "the writing end is closed";
 }
 
-}  // namespace
+}  // namespace thread_test
 }  // namespace kphi

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 namespace kphi {
-namespace {
+namespace uri_test {
 
 using testing::ElementsAre;
 using testing::Pair;
@@ -114,5 +114,5 @@ TEST(Addresses, AreRefusedOrReadBackAsTheyWereWritten) {
   EXPECT_GT(refused, 1000);
 }
 
-}  // namespace
+}  // namespace uri_test
 }  // namespace kphi

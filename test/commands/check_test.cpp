@@ -9,7 +9,7 @@
 #include "test/verb.hpp"
 
 namespace kphi::profiles {
-namespace {
+namespace check_test {
 
 using kphi::test::Said;
 using kphi::test::say;
@@ -192,5 +192,5 @@ TEST(CheckCommand, RefusesAFaultScriptAtItsLineAndColumn) {
           "kphi-faults/1?");
 }
 
-}  // namespace
+}  // namespace check_test
 }  // namespace kphi::profiles

@@ -13,7 +13,7 @@
 #include "test/compensation/example_vehicle.hpp"
 
 namespace kphi::commands {
-namespace {
+namespace compensate_test {
 
 using namespace compensation;
 
@@ -164,5 +164,5 @@ TEST(CompensateRows, HandsARowOnBeforeWaitingForTheNext) {
   EXPECT_GT(source.output_sizes[3], source.output_sizes[2]);
 }
 
-}  // namespace
+}  // namespace compensate_test
 }  // namespace kphi::commands

@@ -6,7 +6,7 @@
 #include "test/compensation/geometry_vectors.hpp"
 
 namespace kphi::compensation {
-namespace {
+namespace airframe_test {
 
 void expect_hub_mm(std::size_t arm, Radians theta, double x, double y) {
   const HubPosition hub = hub_in_body(example_airframe(), arm, theta);
@@ -60,5 +60,5 @@ TEST(Airframe, MirrorsAnArmAboutTheDiagonalOfItsCorner) {
   EXPECT_NEAR(opposite.y.value(), -folded.y.value(), 1e-15);
 }
 
-}  // namespace
+}  // namespace airframe_test
 }  // namespace kphi::compensation

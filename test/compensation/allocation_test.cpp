@@ -5,7 +5,7 @@
 #include "test/compensation/example_vehicle.hpp"
 
 namespace kphi::compensation {
-namespace {
+namespace allocation_test {
 
 TEST(FlyingCalls, AllocateNothing) {
   const long before_control = allocations.load();
@@ -40,5 +40,5 @@ TEST(FlyingCalls, AllocateNothing) {
   EXPECT_GT(sum, 0.0);
 }
 
-}  // namespace
+}  // namespace allocation_test
 }  // namespace kphi::compensation

@@ -11,7 +11,7 @@
 #include "test/compensation/geometry_vectors.hpp"
 
 namespace kphi::compensation {
-namespace {
+namespace compensator_test {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -470,5 +470,5 @@ TEST(CompensatorUncertainty, TellsTheUncertaintyOfItsSpeeds) {
   }
 }
 
-}  // namespace
+}  // namespace compensator_test
 }  // namespace kphi::compensation

@@ -12,7 +12,7 @@
 #include "test/compensation/geometry_vectors.hpp"
 
 namespace kphi::compensation {
-namespace {
+namespace convex_polygon_test {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -184,5 +184,5 @@ TEST(OverlapMeasure, IsNamedAsInTheFiles) {
   EXPECT_EQ(name_of(static_cast<OverlapMeasure>(7)), "unknown");
 }
 
-}  // namespace
+}  // namespace convex_polygon_test
 }  // namespace kphi::compensation

@@ -12,7 +12,7 @@
 #include "test/compensation/example_vehicle.hpp"
 
 namespace kphi::compensation {
-namespace {
+namespace kphi_compensation_test {
 
 kphi_line plain_line() {
   const ThrustCurve line = paper_line();
@@ -167,5 +167,5 @@ TEST(PlainInterface, MixesAsTheClassDoes) {
   EXPECT_EQ(kphi_mixer_build(&plain, hubs, no_spins, 0.0133, 0), 0);
 }
 
-}  // namespace
+}  // namespace kphi_compensation_test
 }  // namespace kphi::compensation

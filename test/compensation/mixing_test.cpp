@@ -11,7 +11,7 @@
 #include "test/compensation/example_vehicle.hpp"
 
 namespace kphi::compensation {
-namespace {
+namespace mixing_test {
 
 constexpr double kKappa = 0.0133;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -360,5 +360,5 @@ TEST(Mixer, PromisesNotToThrow) {
   static_assert(std::is_trivially_copyable_v<Mixer>);
 }
 
-}  // namespace
+}  // namespace mixing_test
 }  // namespace kphi::compensation

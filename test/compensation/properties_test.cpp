@@ -10,7 +10,7 @@
 #include "test/compensation/example_vehicle.hpp"
 
 namespace kphi::compensation {
-namespace {
+namespace properties_test {
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr int kDraws = 50000;
@@ -224,5 +224,5 @@ TEST(Properties, XAndHAndTAndOffAreThePlainMapBitForBit) {
   }
 }
 
-}  // namespace
+}  // namespace properties_test
 }  // namespace kphi::compensation

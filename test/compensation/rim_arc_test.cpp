@@ -8,7 +8,7 @@
 #include "test/compensation/geometry_vectors.hpp"
 
 namespace kphi::compensation {
-namespace {
+namespace rim_arc_test {
 
 double arc(double half_side, double radius, double x, double y) {
   return rim_arc(Metres(half_side), Metres(radius), Metres(x), Metres(y)).value();
@@ -183,5 +183,5 @@ TEST(ContactFreeWindow, SeparatesTouchingFromFreeAnglesOnRandomVehicles) {
   EXPECT_GT(never, 50);
 }
 
-}  // namespace
+}  // namespace rim_arc_test
 }  // namespace kphi::compensation

@@ -11,7 +11,7 @@
 #include "test/compensation/example_vehicle.hpp"
 
 namespace kphi::compensation {
-namespace {
+namespace thrust_curve_test {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -210,5 +210,5 @@ TEST(ThrustCurve, IsMadeWithoutExceptions) {
   static_assert(!std::is_default_constructible_v<ThrustCurve>);
 }
 
-}  // namespace
+}  // namespace thrust_curve_test
 }  // namespace kphi::compensation

@@ -5,7 +5,7 @@
 #include <type_traits>
 
 namespace kphi {
-namespace {
+namespace units_test {
 
 TEST(Units, OneNewtonPerRpmSquaredIsAbout91Point19InSi) {
   EXPECT_NEAR(from_newtons_per_rpm2(1.0).value(), 91.19, 0.005);
@@ -38,5 +38,5 @@ TEST(Units, DifferentUnitsDoNotMix) {
 
 TEST(Units, GramForceIsExact) { EXPECT_EQ(from_gram_force(1000).value(), 9.80665); }
 
-}  // namespace
+}  // namespace units_test
 }  // namespace kphi

@@ -13,7 +13,7 @@
 #include "test/compensation/instructions.hpp"
 
 namespace kphi::compensation {
-namespace {
+namespace worst_case_test {
 
 using test::instructions_of;
 
@@ -140,5 +140,5 @@ TEST_F(WorstCase, OfMixingIsBounded) {
   }
 }
 
-}  // namespace
+}  // namespace worst_case_test
 }  // namespace kphi::compensation

@@ -10,7 +10,7 @@
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace clock_gain_test {
 
 /// The simulator's own speed at every tick of the runner.
 class TrueSpeed final : public Progress {
@@ -60,5 +60,5 @@ TEST(ClockGain, GivesTrueSpeedsFromAModuleWhoseClockIsFast) {
   }
 }
 
-}  // namespace
+}  // namespace clock_gain_test
 }  // namespace kphi::daq

@@ -11,7 +11,7 @@
 #include "results/steps_csv.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace faulty_campaign_test {
 
 using testing::AllOf;
 using testing::AnyOf;
@@ -431,5 +431,5 @@ TEST_F(FaultyCampaign, KeepsThePagesOfAllSlotsAndTheHealthOfTheStream) {
   EXPECT_NEAR(run.health.datagrams_per_second, 175, 1);
 }
 
-}  // namespace
+}  // namespace faulty_campaign_test
 }  // namespace kphi::daq

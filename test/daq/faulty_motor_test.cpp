@@ -2,7 +2,7 @@
 #include "test/daq/faulty_campaign.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace faulty_motor_test {
 
 using testing::Contains;
 using testing::HasSubstr;
@@ -133,5 +133,5 @@ TEST_F(FaultyMotor, GivesTheSameBytesFromTheSameSeed) {
   EXPECT_NE(once, digest(10));
 }
 
-}  // namespace
+}  // namespace faulty_motor_test
 }  // namespace kphi::daq

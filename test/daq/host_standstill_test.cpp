@@ -10,7 +10,7 @@
 #include "test/daq/wrapped_bench.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace host_standstill_test {
 
 using std::chrono::milliseconds;
 using testing::HasSubstr;
@@ -88,5 +88,5 @@ TEST_F(HostStandstill, BeforeTheMotorTurnsHarmsNothing) {
   EXPECT_EQ(results::read_run(record(milliseconds(450)).file).outcome, results::Outcome::complete);
 }
 
-}  // namespace
+}  // namespace host_standstill_test
 }  // namespace kphi::daq

@@ -14,7 +14,7 @@
 #include "test/daq/model_disk.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace power_cut_test {
 
 namespace fs = std::filesystem;
 
@@ -170,5 +170,5 @@ TEST_F(AnyOperation, RefusedStopsTheMotorSaysWhyAndCanBeResumed) {
   }
 }
 
-}  // namespace
+}  // namespace power_cut_test
 }  // namespace kphi::daq

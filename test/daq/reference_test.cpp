@@ -9,7 +9,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace reference_test {
 
 class Reference : public testing::Test {
  protected:
@@ -33,5 +33,5 @@ TEST_F(Reference, GivesTheStoredStepMeansByteForByte) {
   EXPECT_EQ(results::format_steps(means_of(steps)), results::read_text(folder_.means()));
 }
 
-}  // namespace
+}  // namespace reference_test
 }  // namespace kphi::daq

@@ -10,7 +10,7 @@
 #include "test/verb.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace replay_commands_test {
 
 using kphi::test::Said;
 using ::testing::HasSubstr;
@@ -87,5 +87,5 @@ TEST_F(Replay, WithoutStoredStepsJustTells) {
   EXPECT_TRUE(json.at("same").is_null());
 }
 
-}  // namespace
+}  // namespace replay_commands_test
 }  // namespace kphi::daq

@@ -13,7 +13,7 @@
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace supply_campaign_test {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
@@ -227,5 +227,5 @@ TEST_F(AtTheStand, NobodyIsAskedToComeNearBeforeTheRotorIsAtRestWithoutPower) {
   EXPECT_LT(speed, 10);
 }
 
-}  // namespace
+}  // namespace supply_campaign_test
 }  // namespace kphi::daq

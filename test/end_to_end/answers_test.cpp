@@ -10,7 +10,7 @@
 #include "test/end_to_end/process.hpp"
 
 namespace kphi::test {
-namespace {
+namespace answers_test {
 
 using testing::HasSubstr;
 
@@ -92,5 +92,5 @@ TEST_F(Answered, WithoutThemAndWithoutATerminalNobodyIsThere) {
   EXPECT_THAT(run.err(), HasSubstr("--answers FILE"));
 }
 
-}  // namespace
+}  // namespace answers_test
 }  // namespace kphi::test

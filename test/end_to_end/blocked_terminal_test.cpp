@@ -13,7 +13,7 @@
 #include "test/end_to_end/running_bench.hpp"
 
 namespace kphi::test {
-namespace {
+namespace blocked_terminal_test {
 
 using nlohmann::json;
 using std::chrono::seconds;
@@ -119,5 +119,5 @@ TEST(TerminalThatGoesOn, ShowsWhatWasSaidMeanwhile) {
   EXPECT_THAT(said, testing::HasSubstr("\nnext: kphi fit ")) << "the last words";
 }
 
-}  // namespace
+}  // namespace blocked_terminal_test
 }  // namespace kphi::test

@@ -12,7 +12,7 @@
 #include "test/soon.hpp"
 
 namespace kphi::test {
-namespace {
+namespace closed_streams_test {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -175,5 +175,5 @@ TEST_F(LeftOutput, DoesNotHideAnErrorThatIsWorse) {
   EXPECT_EQ(exit_code(GONE R"(exec "$@" >&3 2>&3 3>&-)", {"fit", path("nothing")}), 2);
 }
 
-}  // namespace
+}  // namespace closed_streams_test
 }  // namespace kphi::test

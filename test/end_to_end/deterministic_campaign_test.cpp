@@ -9,7 +9,7 @@
 #include "test/end_to_end/process.hpp"
 
 namespace kphi::test {
-namespace {
+namespace deterministic_campaign_test {
 
 using testing::HasSubstr;
 
@@ -98,5 +98,5 @@ TEST(DeterministicCampaign, StopsWithExitCodeFourWhenItsFaultScriptTakesTheStrea
   EXPECT_NE(run.err().find("1 of 6 runs finished"), std::string::npos) << run.err();
 }
 
-}  // namespace
+}  // namespace deterministic_campaign_test
 }  // namespace kphi::test

@@ -10,7 +10,7 @@
 #include "test/end_to_end/running_bench.hpp"
 
 namespace kphi::test {
-namespace {
+namespace faulty_wire_test {
 
 using nlohmann::json;
 using testing::AllOf;
@@ -140,5 +140,5 @@ TEST_F(BadScript, OrATruthLogThatCannotBeWrittenIsRefusedAtTheBeginning) {
   refused({"--truth-log", (folder_ / "no/such/log.jsonl").string()}, 1, "no/such/log.jsonl");
 }
 
-}  // namespace
+}  // namespace faulty_wire_test
 }  // namespace kphi::test

@@ -17,7 +17,7 @@
 #include "test/soon.hpp"
 
 namespace kphi::test {
-namespace {
+namespace hanging_runner_test {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -100,5 +100,5 @@ TEST_F(HangingRunner, DoesNotKeepTheGuardFromSeeingThatAKnobIsTurned) {
   EXPECT_LT(after_ms, kSoonerThanByPause);
 }
 
-}  // namespace
+}  // namespace hanging_runner_test
 }  // namespace kphi::test

@@ -15,7 +15,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::test {
-namespace {
+namespace killed_campaign_test {
 
 namespace fs = std::filesystem;
 using Seconds = std::chrono::duration<double>;
@@ -136,5 +136,5 @@ TEST_P(KilledCampaign, ResumedEachTimeGivesTheRunsTheTablesAndTheFitOfOneThatWas
 
 INSTANTIATE_TEST_SUITE_P(Kills, KilledCampaign, testing::Values(KPHI_KILLS));
 
-}  // namespace
+}  // namespace killed_campaign_test
 }  // namespace kphi::test

@@ -7,7 +7,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::test {
-namespace {
+namespace locks_and_resume_test {
 
 using testing::AllOf;
 using testing::HasSubstr;
@@ -82,5 +82,5 @@ TEST(Resume, NeedsACampaignOrAFolder) {
   EXPECT_THAT(nothing.err(), HasSubstr("no campaign; give its file, or a folder with --resume"));
 }
 
-}  // namespace
+}  // namespace locks_and_resume_test
 }  // namespace kphi::test

@@ -19,7 +19,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::test {
-namespace {
+namespace power_cut_test {
 
 namespace fs = std::filesystem;
 using Files = std::map<std::string, std::string>;
@@ -194,5 +194,5 @@ TEST_P(PowerCut, WouldLoseRunsIfFilesWereNotSynced) {
 
 INSTANTIATE_TEST_SUITE_P(Of, PowerCut, testing::Values("ext4", "xfs"), [](const auto& kind) { return kind.param; });
 
-}  // namespace
+}  // namespace power_cut_test
 }  // namespace kphi::test

@@ -19,7 +19,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::test {
-namespace {
+namespace program_test {
 
 using nlohmann::json;
 using testing::HasSubstr;
@@ -341,5 +341,5 @@ TEST(DryRun, PrintsThePlanAndTouchesNoDevice) {
   EXPECT_EQ(plan.at("spinning_s"), 1200.0);
 }
 
-}  // namespace
+}  // namespace program_test
 }  // namespace kphi::test

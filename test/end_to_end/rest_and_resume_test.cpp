@@ -11,7 +11,7 @@
 #include "test/soon.hpp"
 
 namespace kphi::test {
-namespace {
+namespace rest_and_resume_test {
 
 using testing::AllOf;
 using testing::ContainsRegex;
@@ -181,5 +181,5 @@ TEST(SafetyStop, IsClearedByTheAnswersFileOnceAndNotBeforeItHappened) {
   EXPECT_THAT(bytes_of(std::filesystem::path(stand.folder()) / "journal.jsonl"), HasSubstr("cleared_safety_stop"));
 }
 
-}  // namespace
+}  // namespace rest_and_resume_test
 }  // namespace kphi::test

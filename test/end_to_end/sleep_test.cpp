@@ -7,7 +7,7 @@
 #include "test/end_to_end/sleeping_host.hpp"
 
 namespace kphi::test {
-namespace {
+namespace sleep_test {
 
 using testing::ContainsRegex;
 
@@ -134,5 +134,5 @@ INSTANTIATE_TEST_SUITE_P(ByNight, SleepingComputer, testing::ValuesIn(rows(true)
 INSTANTIATE_TEST_SUITE_P(ByDay, SleepingComputer, testing::ValuesIn(rows(false)), name_in_suite);
 #endif
 
-}  // namespace
+}  // namespace sleep_test
 }  // namespace kphi::test

@@ -10,7 +10,7 @@
 #include "test/end_to_end/running_bench.hpp"
 
 namespace kphi::test {
-namespace {
+namespace slow_supply_test {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr double kTimeout = 0.5;  // s: what the driver waits for an answer
@@ -54,5 +54,5 @@ TEST(SlowSupply, DisturbsNothingAndNoneOfItsLateAnswersBecomesAValue) {
   EXPECT_GT(longest, static_cast<std::int64_t>(kTimeout * kSecond)) << "no answer was late: this test showed nothing";
 }
 
-}  // namespace
+}  // namespace slow_supply_test
 }  // namespace kphi::test

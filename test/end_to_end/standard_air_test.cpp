@@ -11,7 +11,7 @@
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::test {
-namespace {
+namespace standard_air_test {
 
 /// Pa, at 20 °C and half the humidity that the air can hold.
 double pressure_of(double kg_m3) {
@@ -82,5 +82,5 @@ TEST(StandardAir, GivesTheSamePropellerTheSameCoefficientsInAnyAir) {
   }
 }
 
-}  // namespace
+}  // namespace standard_air_test
 }  // namespace kphi::test

@@ -14,7 +14,7 @@
 #include "test/end_to_end/running_bench.hpp"
 
 namespace kphi::test {
-namespace {
+namespace usb_bench_test {
 
 using testing::HasSubstr;
 
@@ -122,5 +122,5 @@ TEST_F(UsbBench, CoastsWithinAFifthOfASecondWhenTheSupplyIsPulledOut) {
   EXPECT_THAT(kept.events.back().text, HasSubstr("step 2"));
 }
 
-}  // namespace
+}  // namespace usb_bench_test
 }  // namespace kphi::test

@@ -12,7 +12,7 @@
 #include "test/end_to_end/running_bench.hpp"
 
 namespace kphi::test {
-namespace {
+namespace ways_out_test {
 
 using nlohmann::json;
 using testing::ContainsRegex;
@@ -233,5 +233,5 @@ TEST_P(WaysOut, EndWithTheMotorCoasting) {
 INSTANTIATE_TEST_SUITE_P(Each, WaysOut, testing::ValuesIn(kWays),
                          [](const testing::TestParamInfo<Way>& way) { return std::string(way.param.name); });
 
-}  // namespace
+}  // namespace ways_out_test
 }  // namespace kphi::test

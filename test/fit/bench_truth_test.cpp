@@ -16,7 +16,7 @@
 #include "test/daq/wrapped_bench.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace bench_truth_test {
 
 constexpr double kClockError = 0.005;
 
@@ -243,5 +243,5 @@ TEST(Dynamics, NeedSteps) {
   EXPECT_FALSE(identify_dynamics({}));
 }
 
-}  // namespace
+}  // namespace bench_truth_test
 }  // namespace kphi::fit

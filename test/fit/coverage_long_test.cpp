@@ -5,7 +5,7 @@
 #include "test/fit/bench_study.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace coverage_long_test {
 
 TEST(ThousandCampaigns, IntervalsCoverTheTruthAsOftenAsTheySay) {
   for (const auto& [quantity, coverage] : coverage_study({}, 1000)) {
@@ -36,5 +36,5 @@ TEST(ThousandCampaigns, AStraightTruthIsCalledBentInOneOfTwenty) {
   }
 }
 
-}  // namespace
+}  // namespace coverage_long_test
 }  // namespace kphi::fit

@@ -3,7 +3,7 @@
 #include "test/fit/bench_study.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace coverage_test {
 
 // 100 campaigns: a share of 95 % has a deviation of 2.2 %. The tight statement is made by a thousand.
 TEST(Coverage, IntervalsOfAHundredCampaignsHoldTheTruth) {
@@ -40,5 +40,5 @@ TEST(Coverage, AStraightTruthIsSeldomCalledBent) {
   EXPECT_LE(found.lack_of_fit, 26) << "5 % of 300, and three deviations";
 }
 
-}  // namespace
+}  // namespace coverage_test
 }  // namespace kphi::fit

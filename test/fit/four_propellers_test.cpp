@@ -18,7 +18,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace four_propellers_test {
 
 using ::testing::HasSubstr;
 
@@ -138,5 +138,5 @@ TEST(FourPropellers, BearOutThePapersStatementsAndTheBenchsTruth) {
   expect_that_mixed_up_ones_fail();
 }
 
-}  // namespace
+}  // namespace four_propellers_test
 }  // namespace kphi::fit

@@ -14,7 +14,7 @@
 #include "test/temporary_folder.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace program_test {
 
 using nlohmann::json;
 using test::Process;
@@ -181,5 +181,5 @@ TEST_F(Program, ExplainsEveryCommand) {
   }
 }
 
-}  // namespace
+}  // namespace program_test
 }  // namespace kphi::fit

@@ -13,7 +13,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::house {
-namespace {
+namespace rooms_test {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
@@ -183,5 +183,5 @@ TEST(Violations, KeepTheFlyingLibraryToTheStandardLibraryAndEigen) {
   EXPECT_EQ(system("daq/run/run.cpp", "fmt/format.h"), 0u);
 }
 
-}  // namespace
+}  // namespace rooms_test
 }  // namespace kphi::house

@@ -6,7 +6,7 @@
 #include "test/profiles/refusals.hpp"
 
 namespace kphi::profiles {
-namespace {
+namespace answers_test {
 
 using testing::ElementsAre;
 using testing::StartsWith;
@@ -67,5 +67,5 @@ TEST(RequireMountings, NamesTheFirstThatIsWrongMissingOrLeftOver) {
               StartsWith("a.yaml:2:12: mountings ends after 0"));
 }
 
-}  // namespace
+}  // namespace answers_test
 }  // namespace kphi::profiles

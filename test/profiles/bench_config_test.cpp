@@ -6,7 +6,7 @@
 #include "test/profiles/refusals.hpp"
 
 namespace kphi::profiles {
-namespace {
+namespace bench_config_test {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
@@ -299,5 +299,5 @@ TEST(BenchConfig, RefusesASupplyThatWouldTripAtOnce) {
               ElementsAre(testing::HasSubstr("supply.current_limit_a is missing")));
 }
 
-}  // namespace
+}  // namespace bench_config_test
 }  // namespace kphi::profiles

@@ -3,10 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
+#include "profiles/schema.hpp"
 #include "test/profiles/refusals.hpp"
 
 namespace kphi::profiles {
-namespace {
+namespace campaign_test {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
@@ -41,6 +44,27 @@ TEST(Campaign, IsReadIntoSiUnits) {
   EXPECT_EQ(campaign.limits.coil_temperature_max, Celsius(110));
   EXPECT_EQ(campaign.text, kCampaignText);
   EXPECT_EQ(campaign.path, "c.yaml");
+}
+
+/// The limits with `key` set to the first value that is accepted.
+Limits limits_with(const std::string& key, std::initializer_list<double> values) {
+  std::string text = kCampaignText;
+  const auto line = text.find("  " + key + ": ");
+  if (line != std::string::npos) text.erase(line, text.find('\n', line) + 1 - line);
+  for (const double value : values) {
+    const std::string with = text + "  " + key + ": " + std::to_string(value) + "\n";
+    if (refusals([&] { return parse_campaign(with, "c.yaml"); }).empty()) return parse_campaign(with, "c.yaml").limits;
+  }
+  ADD_FAILURE() << key << ": no value is accepted";
+  return parse_campaign(kCampaignText, "c.yaml").limits;
+}
+
+TEST(Campaign, IgnoresNoLimitThatItsSchemaAllows) {
+  const Limits usual = parse_campaign(kCampaignText, "c.yaml").limits;
+  for (const auto& [key, schema] : schema_of(FileKind::campaign)["properties"]["limits"]["properties"].items()) {
+    if (schema["type"] != "number") continue;
+    EXPECT_FALSE(limits_with(key, {schema["maximum"].get<double>(), 1}) == usual) << key;
+  }
 }
 
 TEST(Campaign, HasThreeRepetitionsAndNoOperatorUnlessItSaysSo) {
@@ -308,5 +332,5 @@ TEST(Campaign, NamesItsFile) {
               testing::ThrowsMessage<ConfigurationError>(StartsWith("dir/c.yaml:")));
 }
 
-}  // namespace
+}  // namespace campaign_test
 }  // namespace kphi::profiles

@@ -12,7 +12,7 @@
 #include "test/profiles/refusals.hpp"
 
 namespace kphi::profiles {
-namespace {
+namespace plan_test {
 
 TEST(Plan, OfThePapersCampaignHasFifteenRunsAndTwentyMinutesOfSpinning) {
   const Plan plan =
@@ -228,5 +228,5 @@ TEST(Order, IsToldInWords) {
             "last");
 }
 
-}  // namespace
+}  // namespace plan_test
 }  // namespace kphi::profiles

@@ -6,7 +6,7 @@
 #include <set>
 
 namespace kphi::profiles {
-namespace {
+namespace schema_test {
 
 using nlohmann::json;
 using testing::ElementsAre;
@@ -136,5 +136,5 @@ TEST(KeyNames, WithAnotherUnitOrNoneAreRecognised) {
   EXPECT_FALSE(same_but_for_unit("dwel_ms", kKeys));
 }
 
-}  // namespace
+}  // namespace schema_test
 }  // namespace kphi::profiles

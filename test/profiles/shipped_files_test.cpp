@@ -18,7 +18,7 @@
 #include "test/profiles/refusals.hpp"
 
 namespace kphi::profiles {
-namespace {
+namespace shipped_files_test {
 
 std::vector<std::string> shipped_files() {
   std::vector<std::string> paths;
@@ -218,5 +218,5 @@ TEST(ShippedFiles, DamagedAtRandomLoadOrAreRefusedWithAPlace) {
   EXPECT_GT(refused, 3000) << "the damage is too gentle";
 }
 
-}  // namespace
+}  // namespace shipped_files_test
 }  // namespace kphi::profiles

@@ -10,7 +10,7 @@
 #include "test/profiles/refusals.hpp"
 
 namespace kphi::profiles {
-namespace {
+namespace strict_yaml_test {
 
 using nlohmann::json;
 using testing::ElementsAre;
@@ -244,5 +244,5 @@ TEST(Refusals, ListTheirFindingsInTheOrderOfTheFileAndNotWithoutEnd) {
   EXPECT_THAT(message, testing::EndsWith("f.yaml:20:1: wrong; fix it\nf.yaml: 10 more problems; fix these first"));
 }
 
-}  // namespace
+}  // namespace strict_yaml_test
 }  // namespace kphi::profiles

@@ -6,7 +6,7 @@
 #include "test/profiles/refusals.hpp"
 
 namespace kphi::profiles {
-namespace {
+namespace vehicle_test {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
@@ -223,5 +223,5 @@ TEST(Vehicle, HasOneBody) {
                                 StartsWith("20:15: arm_mirrored: belongs to a square body")));
 }
 
-}  // namespace
+}  // namespace vehicle_test
 }  // namespace kphi::profiles

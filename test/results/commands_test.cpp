@@ -10,7 +10,7 @@
 #include "test/verb.hpp"
 
 namespace kphi::results {
-namespace {
+namespace commands_test {
 
 using kphi::test::Said;
 using kphi::test::say;
@@ -81,5 +81,5 @@ TEST_F(Commands, VerifyEndsWith5AndOneLinePerProblem) {
   EXPECT_EQ(std::count(folder.out.begin(), folder.out.end(), '\n'), 2);
 }
 
-}  // namespace
+}  // namespace commands_test
 }  // namespace kphi::results

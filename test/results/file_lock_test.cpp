@@ -8,7 +8,7 @@
 #include "test/temporary_folder.hpp"
 
 namespace kphi::results {
-namespace {
+namespace file_lock_test {
 
 using testing::HasSubstr;
 
@@ -65,5 +65,5 @@ TEST_F(Lock, MovesWithItsOwner) {
   EXPECT_FALSE(take()) << "what was moved from gives nothing back";
 }
 
-}  // namespace
+}  // namespace file_lock_test
 }  // namespace kphi::results

@@ -19,7 +19,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::results {
-namespace {
+namespace run_file_test {
 
 using test::digest;
 using test::error_of;
@@ -264,5 +264,5 @@ TEST(RunFile, BytesNeededAreEnoughButNotFarOff) {
   EXPECT_GT(RunWriter::bytes_needed(0, 1'000'000), 24'000'000u) << "readings";
 }
 
-}  // namespace
+}  // namespace run_file_test
 }  // namespace kphi::results

@@ -10,7 +10,7 @@
 #include "test/results/synthetic_run.hpp"
 
 namespace kphi::results {
-namespace {
+namespace run_verification_test {
 
 using test::digest;
 using test::make_run;
@@ -182,5 +182,5 @@ TEST_F(VerifiedRun, WhatIsNoRunFileIsSaidToBeNone) {
   EXPECT_THROW((void)read_run(folder_ / "nothing.h5"), RecordError);
 }
 
-}  // namespace
+}  // namespace run_verification_test
 }  // namespace kphi::results

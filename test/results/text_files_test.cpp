@@ -20,7 +20,7 @@
 #include "test/results/synthetic_run.hpp"
 
 namespace kphi::results {
-namespace {
+namespace text_files_test {
 
 using test::error_of;
 using test::TemporaryFolder;
@@ -508,5 +508,5 @@ TEST_F(VerifiedCampaign, WithoutItsJournalItIsNotWhole) {
   EXPECT_THAT(verify_campaign(folder_).problems, Contains(HasSubstr("journal.jsonl: missing")));
 }
 
-}  // namespace
+}  // namespace text_files_test
 }  // namespace kphi::results

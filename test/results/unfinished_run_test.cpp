@@ -17,7 +17,7 @@
 #include "test/results/synthetic_run.hpp"
 
 namespace kphi::results {
-namespace {
+namespace unfinished_run_test {
 
 using test::error_of;
 using test::make_run;
@@ -187,5 +187,5 @@ TEST(DiskFull, ARefusedSyncIsAnError) {
   EXPECT_THAT(error_of<RecordError>([&] { writer.sync(); }), HasSubstr("Input/output error"));
 }
 
-}  // namespace
+}  // namespace unfinished_run_test
 }  // namespace kphi::results

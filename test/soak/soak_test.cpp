@@ -9,7 +9,7 @@
 #include "test/soak/soak_lives.hpp"
 
 namespace kphi::soak {
-namespace {
+namespace soak_test {
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr int kSeedsInOne = 5;
@@ -79,5 +79,5 @@ TEST_P(OnceWrong, IsRight) { expect_nothing_wrong(GetParam()); }
 INSTANTIATE_TEST_SUITE_P(Seeds, OnceWrong, testing::Values(421, 1619, 2420, 4123, 6724, 6807, 8001));
 #endif
 
-}  // namespace
+}  // namespace soak_test
 }  // namespace kphi::soak

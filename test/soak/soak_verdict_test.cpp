@@ -12,7 +12,7 @@
 #include "results/file_layer.hpp"
 
 namespace kphi::soak {
-namespace {
+namespace soak_verdict_test {
 
 using namespace std::chrono_literals;
 using results::QualityFlag;
@@ -431,5 +431,5 @@ TEST(SoakVerdict, BearsOnlyAsManyCleanStepsFlaggedAsChanceExplains) {
   EXPECT_FALSE(of(0.05, 200)) << "and a larger one in fifty";
 }
 
-}  // namespace
+}  // namespace soak_verdict_test
 }  // namespace kphi::soak

@@ -9,7 +9,7 @@
 #include "test/temporary_folder.hpp"
 
 namespace kphi::soak {
-namespace {
+namespace torn_write_test {
 
 namespace fs = std::filesystem;
 
@@ -73,5 +73,5 @@ TEST_F(Torn, OfTwoWrittenFilesNobodyKnowsWhichCameFirst) {
             "x");
 }
 
-}  // namespace
+}  // namespace torn_write_test
 }  // namespace kphi::soak

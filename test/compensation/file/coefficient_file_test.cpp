@@ -10,7 +10,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::compensation {
-namespace {
+namespace coefficient_file_test {
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -276,5 +276,5 @@ TEST(CoefficientFile, OfTheConsumerProjectIsRead) {
   EXPECT_NEAR(to_newtons_per_rpm2(c.curve.thrust_coefficient()), 1.7e-8, 1e-20);
 }
 
-}  // namespace
+}  // namespace coefficient_file_test
 }  // namespace kphi::compensation

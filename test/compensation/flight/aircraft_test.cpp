@@ -7,7 +7,7 @@
 #include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {
-namespace {
+namespace aircraft_test {
 
 const double kMorphSeconds = example_build().morph_s;
 
@@ -203,5 +203,5 @@ TEST(RungeKutta, ErrsByLittleAtTheStepThatFlies) {
   EXPECT_LT((tumble(600).y - tumble(9600).y).head<13>().norm(), 1e-7);
 }
 
-}  // namespace
+}  // namespace aircraft_test
 }  // namespace kphi::flight

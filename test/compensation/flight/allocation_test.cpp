@@ -4,7 +4,7 @@
 #include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {
-namespace {
+namespace allocation_test {
 
 TEST(Flight, AllocatesNothing) {
   const Scene scene = example_scene();
@@ -18,5 +18,5 @@ TEST(Flight, AllocatesNothing) {
   EXPECT_FALSE(flight.lost);
 }
 
-}  // namespace
+}  // namespace allocation_test
 }  // namespace kphi::flight

@@ -6,7 +6,7 @@
 #include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {
-namespace {
+namespace flight_test {
 
 FlightResult flown(ExperimentIndex index, const Scene& scene, std::vector<TraceRow>* trace = nullptr) {
   return fly(kExperiments[index], scene, example_shadow(), trace);
@@ -120,5 +120,5 @@ TEST(Flight, RefusesAVehicleThatNoControllerCanBeBuiltFor) {
   EXPECT_THROW((void)flown(kHoverPlain, scene), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace flight_test
 }  // namespace kphi::flight

@@ -14,7 +14,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::test {
-namespace {
+namespace fly_command_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -211,5 +211,5 @@ TEST_F(Fly, AsksForTheSectionsThatOnlyAFlightNeeds) {
   }
 }
 
-}  // namespace
+}  // namespace fly_command_test
 }  // namespace kphi::test

@@ -7,7 +7,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::test {
-namespace {
+namespace fly_study_test {
 
 const std::string kProfiles = kphi::test::source_dir() + "/profiles/";
 
@@ -30,5 +30,5 @@ TEST(FlyStudy, OfFourHundredDrawsFindsWhatThePaperFound) {
   EXPECT_LE(study["lost_compensated"].get<int>(), 8) << study;
 }
 
-}  // namespace
+}  // namespace fly_study_test
 }  // namespace kphi::test

@@ -3,7 +3,7 @@
 #include "compensation/flight/flight.hpp"
 
 namespace kphi::flight {
-namespace {
+namespace noise_test {
 
 TEST(Random, IsSplitMix64) {
   Random random(1234567);
@@ -67,5 +67,5 @@ TEST(Estimator, TellsTheTruthWithoutNoise) {
   EXPECT_EQ(told.velocity, Eigen::Vector3d(4, 5, 6));
 }
 
-}  // namespace
+}  // namespace noise_test
 }  // namespace kphi::flight

@@ -4,7 +4,7 @@
 #include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {
-namespace {
+namespace paper_test {
 
 /// How far ë may be from kP e + kD ė when the printed numbers are rounded: half a unit of each last digit.
 double rounding(const Gains& gains, double error_digit) {
@@ -92,5 +92,5 @@ TEST(Reference, FliesThePapersCircles) {
   EXPECT_NEAR(highest, 1.75, 1e-4);
 }
 
-}  // namespace
+}  // namespace paper_test
 }  // namespace kphi::flight

@@ -6,7 +6,7 @@
 #include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {
-namespace {
+namespace pilot_test {
 
 const Eigen::Quaterniond kLevel = Eigen::Quaterniond::Identity();
 
@@ -210,5 +210,5 @@ TEST(Pilot, IsRefusedForAVehicleThatCannotFly) {
   EXPECT_FALSE(Pilot::build(vehicle, bench_line(), example_settings()));
 }
 
-}  // namespace
+}  // namespace pilot_test
 }  // namespace kphi::flight

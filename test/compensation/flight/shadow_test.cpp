@@ -10,7 +10,7 @@
 #include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {
-namespace {
+namespace shadow_test {
 
 using compensation::ConvexPolygon;
 
@@ -163,5 +163,5 @@ TEST(LossLaw, LosesGammaTimesAsMuchInFlight) {
   }
 }
 
-}  // namespace
+}  // namespace shadow_test
 }  // namespace kphi::flight

@@ -6,7 +6,7 @@
 #include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {
-namespace {
+namespace simulated_vehicle_test {
 
 struct Known {
   const char* shape;
@@ -165,5 +165,5 @@ TEST(ArmMotion, RatesAreTheDerivativeOfTheAngles) {
   }
 }
 
-}  // namespace
+}  // namespace simulated_vehicle_test
 }  // namespace kphi::flight

@@ -8,7 +8,7 @@
 #include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {
-namespace {
+namespace study_test {
 
 std::vector<Draw> draws(std::size_t count, std::size_t threads) {
   return fly_draws(example_scene(), example_shadow(), count, threads);
@@ -159,5 +159,5 @@ TEST(Draw, StaysWithinItsStatedRanges) {
   EXPECT_NEAR(std::sqrt(squares / 600), 0.01, 0.001);
 }
 
-}  // namespace
+}  // namespace study_test
 }  // namespace kphi::flight

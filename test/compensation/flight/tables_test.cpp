@@ -9,7 +9,7 @@
 #include "test/compensation/flight/flight_fixture.hpp"
 
 namespace kphi::flight {
-namespace {
+namespace tables_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -130,5 +130,5 @@ TEST(ErrorFigure, NamesTheFlightAndItsLegs) {
   EXPECT_THAT(script, HasSubstr("set ylabel 'z error [m]'"));
 }
 
-}  // namespace
+}  // namespace tables_test
 }  // namespace kphi::flight

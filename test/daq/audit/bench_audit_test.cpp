@@ -9,7 +9,7 @@
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace bench_audit_test {
 
 using testing::HasSubstr;
 
@@ -136,5 +136,5 @@ TEST_F(Audit, WarnsOfAnotherBufferSize) {
   EXPECT_THAT(found_.at(0).finding.what, HasSubstr("10 records per datagram"));
 }
 
-}  // namespace
+}  // namespace bench_audit_test
 }  // namespace kphi::daq

@@ -9,7 +9,7 @@
 #include "base/error.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace box_test {
 
 using testing::HasSubstr;
 
@@ -73,5 +73,5 @@ TEST(BoxBias, HasWorkedWhenEveryAxisIsNearZero) {
   EXPECT_THAT(beyond_zero(zero).value(), HasSubstr("Fx is -0.06 N afterwards, limit 0.05 N"));
 }
 
-}  // namespace
+}  // namespace box_test
 }  // namespace kphi::daq

@@ -6,7 +6,7 @@
 #include "test/daq/queue_bench.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace supply_link_test {
 
 TEST(OutputEnable, HoldsThePowerWhileItLives) {
   QueueSupply supply;
@@ -83,5 +83,5 @@ TEST(MotorPower, OfAnotherSupplyStaysOnAndOnlyALostModuleIsConnectedAgain) {
   EXPECT_EQ(bench.motor.wakes, 1);
 }
 
-}  // namespace
+}  // namespace supply_link_test
 }  // namespace kphi::daq

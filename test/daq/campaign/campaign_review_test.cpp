@@ -16,7 +16,7 @@
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace campaign_review_test {
 
 using nlohmann::json;
 using testing::Contains;
@@ -343,5 +343,5 @@ TEST_F(OrderedCampaign, JournalsWhatWasAskedAndAnswered) {
   EXPECT_EQ(events("mounted").at(0).at("confirmed_by"), "--yes");
 }
 
-}  // namespace
+}  // namespace campaign_review_test
 }  // namespace kphi::daq

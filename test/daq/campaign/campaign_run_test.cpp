@@ -12,7 +12,7 @@
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace campaign_run_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -177,5 +177,5 @@ TEST(Cooling, WaitsWhileTheTemperatureIsNotANumber) {
 
 TEST(Cooling, NeverPausesWithoutARule) { EXPECT_FALSE(CoolingRule{}.pauses(false, 500)); }
 
-}  // namespace
+}  // namespace campaign_run_test
 }  // namespace kphi::daq

@@ -9,7 +9,7 @@
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace dry_run_test {
 
 using testing::HasSubstr;
 
@@ -182,5 +182,5 @@ TEST(ThrustPrior, IsUnknownOfWhatNobodyMeasured) {
   EXPECT_FALSE(thrust_prior({"10x2", "", 10, 2}));
 }
 
-}  // namespace
+}  // namespace dry_run_test
 }  // namespace kphi::daq

@@ -12,7 +12,7 @@
 #include "daq/guard/run_stopped.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace operator_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -236,5 +236,5 @@ TEST(AnsweringOperator, DictatesEachQuestionAndAnswer) {
                           "operator_asked: mounted angle for propeller 5x3, 90 degrees?", "operator_answered: 45"));
 }
 
-}  // namespace
+}  // namespace operator_test
 }  // namespace kphi::daq

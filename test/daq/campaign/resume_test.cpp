@@ -14,7 +14,7 @@
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace resume_test {
 
 using test::measured_in;
 using testing::Contains;
@@ -287,5 +287,5 @@ TEST_F(Resume, LeavesFinishedRunsReadOnlyAndVerifyRemarksWhatIsNot) {
   EXPECT_THAT(found.remarks, ElementsAre(HasSubstr("5x3_phi090_rep1.h5: writable")));
 }
 
-}  // namespace
+}  // namespace resume_test
 }  // namespace kphi::daq

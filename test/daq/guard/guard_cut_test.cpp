@@ -7,7 +7,7 @@
 #include "test/daq/coasting_bench.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace guard_cut_test {
 
 using std::chrono::milliseconds;
 
@@ -70,5 +70,5 @@ TEST_F(GuardsCut, IsMissedByAMotorThatOnlyItsOrderReaches) {
   EXPECT_GT(winding_amps(), kTurning) << "nothing but the guard would end this";
 }
 
-}  // namespace
+}  // namespace guard_cut_test
 }  // namespace kphi::daq

@@ -9,7 +9,7 @@
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace guard_limits_test {
 
 using testing::HasSubstr;
 
@@ -132,5 +132,5 @@ TEST_F(CombinedLimits, OfARecordedRunAreThoseThatItsGuardHad) {
   EXPECT_EQ(combine_limits(campaign_, config_, &recorded), combine_limits(campaign_, config_, &*devices_));
 }
 
-}  // namespace
+}  // namespace guard_limits_test
 }  // namespace kphi::daq

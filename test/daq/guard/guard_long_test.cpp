@@ -7,7 +7,7 @@
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace guard_long_test {
 
 /// 30 minutes, 300 changes of speed. At 1 kHz, so that the file stays small; the physics and the noise go on at 7 kHz.
 void run_clean(double first_rpm, double last_rpm, bool supply) {
@@ -34,5 +34,5 @@ void run_clean(double first_rpm, double last_rpm, bool supply) {
 TEST(AnHourOfCleanRunning, TripsNothingOnTheWayUp) { run_clean(100, 19100, true); }
 TEST(AnHourOfCleanRunning, TripsNothingOnTheWayDown) { run_clean(19100, 100, false); }
 
-}  // namespace
+}  // namespace guard_long_test
 }  // namespace kphi::daq

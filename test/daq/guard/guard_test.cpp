@@ -10,7 +10,7 @@
 #include "test/daq/queue_bench.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace guard_test {
 
 using std::chrono::milliseconds;
 using testing::HasSubstr;
@@ -361,5 +361,5 @@ TEST_F(GuardAlone, StandsDownWhenTheRunIsOver) {
   EXPECT_EQ(reason(), "");
 }
 
-}  // namespace
+}  // namespace guard_test
 }  // namespace kphi::daq

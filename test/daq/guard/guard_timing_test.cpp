@@ -21,7 +21,7 @@
 #include "test/daq/coasting_bench.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace guard_timing_test {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
@@ -331,5 +331,5 @@ TEST(GuardTimings, LeaveNoRowOfTheTableOut) {
   }
 }
 
-}  // namespace
+}  // namespace guard_timing_test
 }  // namespace kphi::daq

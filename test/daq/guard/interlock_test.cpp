@@ -8,7 +8,7 @@
 #include <vector>
 
 namespace kphi::daq {
-namespace {
+namespace interlock_test {
 
 const GuardLimit kThrust{Watched::thrust, "thrust", 20, "N", "campaign limits.thrust_max_n"};
 
@@ -122,5 +122,5 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"LimitTurned", [](SupplyReading& s) { s.current_limit_a = 21; }, "current limit is 21 A, kphi set 20 A"}),
     [](const testing::TestParamInfo<Case>& tested) { return std::string(tested.param.name); });
 
-}  // namespace
+}  // namespace interlock_test
 }  // namespace kphi::daq

@@ -7,7 +7,7 @@
 #include "test/daq/queue_bench.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace load_watch_test {
 
 LoadCellRecord sample(double fz_n, double tz_nm = 0) {
   LoadCellRecord record;
@@ -85,5 +85,5 @@ TEST(LoadWatch, HasAWindowOfOneSampleWhenTheyAreFew) {
   EXPECT_DOUBLE_EQ(watch.thrust(), 21);
 }
 
-}  // namespace
+}  // namespace load_watch_test
 }  // namespace kphi::daq

@@ -8,7 +8,7 @@
 #include "test/daq/queue_bench.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace motor_enable_test {
 
 class ToldMotor : public MotorLink {
  public:
@@ -180,5 +180,5 @@ TEST_F(Spinning, CannotBeCopiedAwayFromItsGuard) {
   EXPECT_FALSE(std::is_move_constructible_v<MotorEnable>);
 }
 
-}  // namespace
+}  // namespace motor_enable_test
 }  // namespace kphi::daq

@@ -10,7 +10,7 @@
 #include "test/daq/queue_bench.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace observation_test {
 
 using std::chrono::milliseconds;
 
@@ -153,5 +153,5 @@ TEST_F(Observed, PassesEveryValueOnToTheJudgeAlsoNoNumbers) {
   EXPECT_EQ(judged_.size(), 1u + 3 * 6);
 }
 
-}  // namespace
+}  // namespace observation_test
 }  // namespace kphi::daq

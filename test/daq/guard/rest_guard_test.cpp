@@ -7,7 +7,7 @@
 #include "test/daq/queue_bench.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace rest_guard_test {
 
 using testing::HasSubstr;
 
@@ -158,5 +158,5 @@ TEST_F(AtAPrompt, AnOutputThatComesOnUnaskedTripsButNoReadingFromBefore) {
   expect_safe();
 }
 
-}  // namespace
+}  // namespace rest_guard_test
 }  // namespace kphi::daq

@@ -12,7 +12,7 @@
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace speed_error_test {
 
 using std::chrono::milliseconds;
 using testing::HasSubstr;
@@ -279,5 +279,5 @@ TEST(SpeedWatch, SaysWhatIsMeasuredAndWhatWasCommanded) {
               HasSubstr("speed off target for 0.1 s: -30 of 6000 RPM; check for a blocked rotor"));
 }
 
-}  // namespace
+}  // namespace speed_error_test
 }  // namespace kphi::daq

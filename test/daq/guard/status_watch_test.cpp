@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace kphi::daq {
-namespace {
+namespace status_watch_test {
 
 using netbox::Product;
 using testing::HasSubstr;
@@ -124,5 +124,5 @@ TEST_F(StatusWatching, TellsOfAFieldBusThatNothingElseTells) {
   EXPECT_THAT(events_[0].text, HasSubstr("\"CAN communication error\""));
 }
 
-}  // namespace
+}  // namespace status_watch_test
 }  // namespace kphi::daq

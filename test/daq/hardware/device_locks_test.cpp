@@ -7,7 +7,7 @@
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace device_locks_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -67,5 +67,5 @@ TEST(FolderLock, RefusesTheSecondWriter) {
   EXPECT_NO_THROW((void)lock_folder(results));
 }
 
-}  // namespace
+}  // namespace device_locks_test
 }  // namespace kphi::daq

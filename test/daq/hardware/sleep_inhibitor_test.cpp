@@ -15,7 +15,7 @@
 #include "test/daq/private_bus.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace sleep_inhibitor_test {
 
 using namespace std::chrono_literals;
 using test::Inhibitor;
@@ -169,5 +169,5 @@ TEST_F(SleepInhibitorOnABus, GivesUpOnALogindThatNeverAnswers) {
   expect_soon(begin);
 }
 
-}  // namespace
+}  // namespace sleep_inhibitor_test
 }  // namespace kphi::daq

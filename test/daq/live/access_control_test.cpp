@@ -10,7 +10,7 @@
 #include <vector>
 
 namespace kphi::daq::live {
-namespace {
+namespace access_control_test {
 
 constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
 
@@ -129,5 +129,5 @@ TEST(AccessControl, DrawsAnotherTokenEveryTime) {
   EXPECT_EQ(tokens.begin()->find_first_not_of("0123456789abcdef"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace access_control_test
 }  // namespace kphi::daq::live

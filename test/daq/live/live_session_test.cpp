@@ -12,7 +12,7 @@
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq::live {
-namespace {
+namespace live_session_test {
 
 using nlohmann::json;
 using testing::ElementsAre;
@@ -223,5 +223,5 @@ TEST(History, ForgetsTheOldestWhenItIsFull) {
   EXPECT_EQ(message["messages"].back()["n"], 2 * History::kTraceLength - 1);
 }
 
-}  // namespace
+}  // namespace live_session_test
 }  // namespace kphi::daq::live

@@ -7,7 +7,7 @@
 #include <set>
 
 namespace kphi::daq::live {
-namespace {
+namespace messages_test {
 
 using nlohmann::json;
 
@@ -119,5 +119,5 @@ TEST(PlotMessages, FitIntoOneDatagramOfPlotJuggler) {
   EXPECT_LT(plot_message(tick, limits).size(), 1400u);
 }
 
-}  // namespace
+}  // namespace messages_test
 }  // namespace kphi::daq::live

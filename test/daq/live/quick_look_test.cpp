@@ -6,7 +6,7 @@
 #include "daq/live/live_session.hpp"
 
 namespace kphi::daq::live {
-namespace {
+namespace quick_look_test {
 
 TEST(QuickLook, KnowsNothingBeforeItLooked) { EXPECT_EQ(QuickLook().result().n, 0u); }
 
@@ -39,5 +39,5 @@ TEST(QuickLook, StatesAnUncertaintyThatCoversTheTruthOfCorrelatedNoise) {
   EXPECT_NEAR(covered / double(kSteps), 0.95, 0.03);
 }
 
-}  // namespace
+}  // namespace quick_look_test
 }  // namespace kphi::daq::live

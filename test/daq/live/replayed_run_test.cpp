@@ -8,7 +8,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::daq::live {
-namespace {
+namespace replayed_run_test {
 
 const results::RunRecording& recording() {
   static const results::RunRecording kRecording =
@@ -99,5 +99,5 @@ TEST(LiveView, TellsHowTheWorkEndedAndLetsItsErrorPass) {
   EXPECT_FALSE(view.stop_asked());
 }
 
-}  // namespace
+}  // namespace replayed_run_test
 }  // namespace kphi::daq::live

@@ -21,7 +21,7 @@
 #include "test/soon.hpp"
 
 namespace kphi::daq::live {
-namespace {
+namespace server_test {
 
 namespace asio = boost::asio;
 namespace websocket = boost::beast::websocket;
@@ -407,5 +407,5 @@ TEST(LivePage, IsOneTextThatNamesNoOtherPlace) {
   EXPECT_THAT(page, HasSubstr("Dygraph"));
 }
 
-}  // namespace
+}  // namespace server_test
 }  // namespace kphi::daq::live

@@ -10,7 +10,7 @@
 #include "base/error.hpp"
 
 namespace kphi::daq::live {
-namespace {
+namespace udp_json_test {
 
 using boost::asio::ip::udp;
 
@@ -50,5 +50,5 @@ TEST(UdpJson, RefusesWhatIsNotOneMachine) {
   }
 }
 
-}  // namespace
+}  // namespace udp_json_test
 }  // namespace kphi::daq::live

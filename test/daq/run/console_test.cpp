@@ -14,7 +14,7 @@
 #include "test/soon.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace console_test {
 
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
@@ -220,5 +220,5 @@ TEST_F(Words, ThatNobodyWillTakeAreForgotten) {
   EXPECT_EQ(all(), "two\n");
 }
 
-}  // namespace
+}  // namespace console_test
 }  // namespace kphi::daq

@@ -6,7 +6,7 @@
 #include <memory>
 
 namespace kphi::daq {
-namespace {
+namespace progress_test {
 
 Position in_a_step() {
   Position position;
@@ -101,5 +101,5 @@ TEST(ProgressOnATerminal, IsRewrittenInPlaceAndClearedBeforeAnythingElse) {
   EXPECT_NE(text.find("\r\x1b[Krun 1 of 15 done\n"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace progress_test
 }  // namespace kphi::daq

@@ -9,7 +9,7 @@
 #include "test/daq/queue_bench.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace recorder_test {
 
 class Recording : public testing::Test {
  protected:
@@ -109,5 +109,5 @@ TEST(RecordingOntoABrokenDisk, KeepsTheFirstErrorForTheRunnerAndThrowsNothingIts
   EXPECT_THROW(recorder.check_failure(), RecordError) << "it stays";
 }
 
-}  // namespace
+}  // namespace recorder_test
 }  // namespace kphi::daq

@@ -14,7 +14,7 @@
 #include "test/daq/coasting_bench.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace run_test {
 
 using results::Outcome;
 using results::Phase;
@@ -300,5 +300,5 @@ TEST(UtcText, IsIso8601) {
   EXPECT_EQ(utc_text(ManualClock(), Instant(std::chrono::seconds(61))), "2021-05-30T00:01:01Z");
 }
 
-}  // namespace
+}  // namespace run_test
 }  // namespace kphi::daq

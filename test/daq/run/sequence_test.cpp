@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kphi::daq {
-namespace {
+namespace sequence_test {
 
 using std::chrono::milliseconds;
 
@@ -28,5 +28,5 @@ TEST(Slew, TakesNoTimeWithoutARateOrWithoutAChange) {
   EXPECT_EQ(Slew(RadPerSec(5), RadPerSec(5), 1.0).lasts(), Duration(0));
 }
 
-}  // namespace
+}  // namespace sequence_test
 }  // namespace kphi::daq

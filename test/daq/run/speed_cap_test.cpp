@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace kphi::daq {
-namespace {
+namespace speed_cap_test {
 
 using results::QualityFlag;
 using results::StepMean;
@@ -86,5 +86,5 @@ TEST(OutOfDrive, IsAStepThatFallsShortWithNoDriveLeft) {
   EXPECT_FALSE(is_out_of_drive(RadPerSec(1900), RadPerSec(1990), 1)) << "on its way down";
 }
 
-}  // namespace
+}  // namespace speed_cap_test
 }  // namespace kphi::daq

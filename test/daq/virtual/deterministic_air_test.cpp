@@ -6,7 +6,7 @@
 #include "base/error.hpp"
 
 namespace kphi::daq {
-namespace {
+namespace deterministic_air_test {
 
 using namespace std::chrono_literals;
 
@@ -47,5 +47,5 @@ TEST(DeterministicAir, KnowsNothingOnceItsReadingIsAMinuteOldAndComesBackWithThe
   EXPECT_TRUE(air.density());
 }
 
-}  // namespace
+}  // namespace deterministic_air_test
 }  // namespace kphi::daq

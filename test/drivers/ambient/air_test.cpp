@@ -6,7 +6,7 @@
 #include <random>
 
 namespace kphi::ambient {
-namespace {
+namespace air_test {
 
 TEST(AirDensity, AgreesWithTheSimplerFormulaOfDryAirAndVapour) {
   // ρ = (p − e)/(287.05 T) + e/(461.5 T), e after Magnus: good to some 5e-4.
@@ -60,5 +60,5 @@ TEST(AirDensity, RefusesWhatNoAirIs) {
   }
 }
 
-}  // namespace
+}  // namespace air_test
 }  // namespace kphi::ambient

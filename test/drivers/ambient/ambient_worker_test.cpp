@@ -9,7 +9,7 @@
 #include "base/error.hpp"
 
 namespace kphi::ambient {
-namespace {
+namespace ambient_worker_test {
 
 using namespace std::chrono_literals;
 
@@ -175,5 +175,5 @@ TEST_F(AmbientWorkerTest, EndsAtOnceBetweenTwoReadings) {
   EXPECT_EQ(script.alive, 0);
 }
 
-}  // namespace
+}  // namespace ambient_worker_test
 }  // namespace kphi::ambient

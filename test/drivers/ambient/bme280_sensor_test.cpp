@@ -8,7 +8,7 @@
 #include "test/refusal.hpp"
 
 namespace kphi::ambient {
-namespace {
+namespace bme280_sensor_test {
 
 using testing::HasSubstr;
 
@@ -101,5 +101,5 @@ TEST(SensorAddress, RefusesWhatIsNoSensorOfTheAir) {
     EXPECT_THROW((void)sensor_address(text), std::invalid_argument) << text;
 }
 
-}  // namespace
+}  // namespace bme280_sensor_test
 }  // namespace kphi::ambient

@@ -6,7 +6,7 @@
 #include <random>
 
 namespace kphi::ambient::bme280 {
-namespace {
+namespace bme280_test {
 
 /// BMP280 data sheet, 3.12.
 Calibration data_sheet() {
@@ -113,5 +113,5 @@ TEST(Bme280, IsDefinedForAnyBytes) {
   }
 }
 
-}  // namespace
+}  // namespace bme280_test
 }  // namespace kphi::ambient::bme280

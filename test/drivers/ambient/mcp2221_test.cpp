@@ -7,7 +7,7 @@
 #include "test/refusal.hpp"
 
 namespace kphi::ambient {
-namespace {
+namespace mcp2221_test {
 
 using Bytes = std::vector<std::uint8_t>;
 using testing::ElementsAre;
@@ -122,5 +122,5 @@ TEST(Mcp2221, NeverTakesMoreThanItAskedFor) {
   EXPECT_THAT(refusal([&] { bridge.read(0x76, 0xD0, data); }), HasSubstr("more bytes"));
 }
 
-}  // namespace
+}  // namespace mcp2221_test
 }  // namespace kphi::ambient

@@ -13,7 +13,7 @@
 #include "test/drivers/usb/virtual_bus.hpp"
 
 namespace kphi::ambient {
-namespace {
+namespace usb_sensor_test {
 
 using namespace std::chrono_literals;
 using sim::FaultKind;
@@ -224,5 +224,5 @@ TEST_F(UsbSensorTest, IsPulledOutAndPluggedInAsAScriptSays) {
   ASSERT_TRUE(eventually([&] { return bus.list().size() == 1; }));
 }
 
-}  // namespace
+}  // namespace usb_sensor_test
 }  // namespace kphi::ambient

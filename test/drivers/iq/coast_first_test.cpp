@@ -13,7 +13,7 @@
 #include "test/soon.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace coast_first_test {
 
 using namespace std::chrono_literals;
 using fake::Bytes;
@@ -199,5 +199,5 @@ TEST(CoastFirst, OfALinkWhoseLineTakesNoBytes) {
   });
 }
 
-}  // namespace
+}  // namespace coast_first_test
 }  // namespace kphi::iq

@@ -15,7 +15,7 @@
 #include "test/temporary_folder.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace reconnect_test {
 
 using namespace std::chrono_literals;
 using fake::Module;
@@ -166,5 +166,5 @@ TEST(Silence, OfTheModuleEndsWhenItIsPoweredAgain) {
   EXPECT_FALSE(bench.motor->alive());
 }
 
-}  // namespace
+}  // namespace reconnect_test
 }  // namespace kphi::iq

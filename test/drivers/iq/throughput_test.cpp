@@ -9,7 +9,7 @@
 #include "test/drivers/iq/paced_module.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace throughput_test {
 
 using namespace std::chrono_literals;
 
@@ -47,5 +47,5 @@ TEST(Throughput, OfFourQuantitiesIsBeyondWhatOneQuestionAtATimeAllows) {
   EXPECT_GT(best, 200) << "the host may be busy, but not five times";
 }
 
-}  // namespace
+}  // namespace throughput_test
 }  // namespace kphi::iq

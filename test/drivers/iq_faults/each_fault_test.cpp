@@ -8,7 +8,7 @@
 #include "test/drivers/iq_faults/joined.hpp"
 
 namespace kphi::iq::test {
-namespace {
+namespace each_fault_test {
 
 using namespace std::chrono_literals;
 using sim::FaultEntry;
@@ -330,5 +330,5 @@ INSTANTIATE_TEST_SUITE_P(, EachFault,
                                          Mode{"WithoutWireTimeAsModule42", instant()}),
                          [](const auto& mode) { return std::string(mode.param.name); });
 
-}  // namespace
+}  // namespace each_fault_test
 }  // namespace kphi::iq::test

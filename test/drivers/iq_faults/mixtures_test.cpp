@@ -11,7 +11,7 @@
 #include "test/drivers/iq_faults/joined.hpp"
 
 namespace kphi::iq::test {
-namespace {
+namespace mixtures_test {
 
 using namespace std::chrono_literals;
 using kphi::test::Dice;
@@ -123,5 +123,5 @@ TEST_P(Mixtures, NothingWrongIsDeliveredAndNothingSpinsOn) {
 
 INSTANTIATE_TEST_SUITE_P(TenSeedsEach, Mixtures, testing::Range(0, 20));
 
-}  // namespace
+}  // namespace mixtures_test
 }  // namespace kphi::iq::test

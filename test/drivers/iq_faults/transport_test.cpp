@@ -17,7 +17,7 @@
 #include "test/temporary_folder.hpp"
 
 namespace kphi::iq::test {
-namespace {
+namespace transport_test {
 
 using namespace std::chrono_literals;
 using kphi::test::soon;
@@ -130,5 +130,5 @@ TEST_F(OverAPort, AModuleAtAnotherRateIsFoundAndNothingIsChanged) {
   EXPECT_TRUE(probe({device, 921600, 0}, clock).answers()) << "it still speaks at its own rate";
 }
 
-}  // namespace
+}  // namespace transport_test
 }  // namespace kphi::iq::test

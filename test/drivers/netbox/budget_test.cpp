@@ -6,7 +6,7 @@
 #include "test/drivers/netbox/receivers.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace budget_test {
 
 using namespace std::chrono_literals;
 using namespace test;
@@ -57,5 +57,5 @@ TEST(Budget, ASingleRecordForWhoOnlyTakesCostsAFractionOfAWakeUp) {
 
 TEST(Budget, ABlockIsHandedOverAtOnce) { expect_within({true, Driver::Consumer::waits}, {2.5, 0.05, 200us}); }
 
-}  // namespace
+}  // namespace budget_test
 }  // namespace kphi::netbox

@@ -6,7 +6,7 @@
 #include "test/drivers/netbox/receivers.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace load_test {
 
 using namespace std::chrono_literals;
 using namespace test;
@@ -42,5 +42,5 @@ TEST(Load, BesideTwoBusyLoopsNothingIsLostAndNothingIsOld) {
   EXPECT_LT(driver.age(99), 20ms);
 }
 
-}  // namespace
+}  // namespace load_test
 }  // namespace kphi::netbox

@@ -10,7 +10,7 @@
 #include "test/drivers/netbox/box_process.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace standstill_test {
 
 using namespace std::chrono_literals;
 using test::FakeBox;
@@ -89,5 +89,5 @@ TEST(Standstill, AConsumerThatStandsStillForFiveSecondsLosesNothing) {
   for (std::size_t i = 1; i < counters.received; ++i) ASSERT_EQ(taken[i].ft_sequence, taken[i - 1].ft_sequence + 1);
 }
 
-}  // namespace
+}  // namespace standstill_test
 }  // namespace kphi::netbox

@@ -16,7 +16,7 @@
 #include "test/drivers/netbox/settable_web.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace traps_test {
 
 using namespace std::chrono_literals;
 using test::Bytes;
@@ -259,5 +259,5 @@ TEST(Traps, NothingIsWrittenAndNoStreamIsTakenAtStartUp) {
   EXPECT_EQ(box.starts() + box.stops() + box.biases() + box.settings_written(), 0);
 }
 
-}  // namespace
+}  // namespace traps_test
 }  // namespace kphi::netbox

@@ -8,7 +8,7 @@
 #include "test/drivers/netbox_faults/joined.hpp"
 
 namespace kphi::netbox::test {
-namespace {
+namespace axia_test {
 
 using namespace std::chrono_literals;
 
@@ -74,5 +74,5 @@ TEST(Axia, IsStartedAgainLikeANetBox) {
   EXPECT_EQ(j.counters().reboots, 1u);
 }
 
-}  // namespace
+}  // namespace axia_test
 }  // namespace kphi::netbox::test

@@ -7,7 +7,7 @@
 #include "test/drivers/netbox_faults/live_box.hpp"
 
 namespace kphi::netbox::test {
-namespace {
+namespace cases_others_fail_test {
 
 using namespace std::chrono_literals;
 using testing::Contains;
@@ -206,5 +206,5 @@ void bias(bool stops_stream) {
 TEST(CasesOthersFail, ABiasOnABoxThatKeepsStreaming) { bias(false); }
 TEST(CasesOthersFail, ABiasOnABoxThatStopsItsStream) { bias(true); }
 
-}  // namespace
+}  // namespace cases_others_fail_test
 }  // namespace kphi::netbox::test

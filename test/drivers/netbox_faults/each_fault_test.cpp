@@ -12,7 +12,7 @@
 #include "test/drivers/netbox_faults/joined.hpp"
 
 namespace kphi::netbox::test {
-namespace {
+namespace each_fault_test {
 
 using namespace std::chrono_literals;
 using sim::FaultEntry;
@@ -356,5 +356,5 @@ INSTANTIATE_TEST_SUITE_P(, EachFault,
                                          Mode{"SinglesAt1000", blocks_of(1, 7)}),
                          [](const auto& mode) { return std::string(mode.param.name); });
 
-}  // namespace
+}  // namespace each_fault_test
 }  // namespace kphi::netbox::test

@@ -16,7 +16,7 @@
 #include "drivers/sim/bench_server.hpp"
 
 namespace kphi::netbox::test {
-namespace {
+namespace live_test {
 
 using namespace std::chrono_literals;
 using testing::HasSubstr;
@@ -193,5 +193,5 @@ TEST_F(Live, SettingsAreWrittenAndSetBackOnABoxThatServesThreeWritesASecond) {
   EXPECT_FALSE(std::filesystem::exists(journal));
 }
 
-}  // namespace
+}  // namespace live_test
 }  // namespace kphi::netbox::test

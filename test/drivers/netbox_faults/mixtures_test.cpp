@@ -11,7 +11,7 @@
 #include "test/drivers/netbox_faults/joined.hpp"
 
 namespace kphi::netbox::test {
-namespace {
+namespace mixtures_test {
 
 using namespace std::chrono_literals;
 using kphi::test::Dice;
@@ -147,5 +147,5 @@ INSTANTIATE_TEST_SUITE_P(TenSeedsEach, Mixtures, testing::Range(0, mixtures() / 
 /// again looks like a step forward.
 TEST(Mixture, ABootRightBehindTheWrap) { expect_agreement(4537); }
 
-}  // namespace
+}  // namespace mixtures_test
 }  // namespace kphi::netbox::test

@@ -8,7 +8,7 @@
 #include "test/drivers/netbox_faults/live_box.hpp"
 
 namespace kphi::netbox::test {
-namespace {
+namespace over_sockets_test {
 
 using namespace std::chrono_literals;
 using sim::FaultEntry;
@@ -247,5 +247,5 @@ TEST(StreamOverSockets, EveryLostRecordIsCounted) {
   EXPECT_LE(counters.lost_network, s.box.stop().records_dropped);
 }
 
-}  // namespace
+}  // namespace over_sockets_test
 }  // namespace kphi::netbox::test

@@ -8,7 +8,7 @@
 #include "test/drivers/sim_equipment/scpi_tcp.hpp"
 
 namespace kphi::scpi {
-namespace {
+namespace open_test {
 
 std::string refusal(const std::string& uri) {
   try {
@@ -53,5 +53,5 @@ TEST(ScpiAddress, OpensASupplyThatOwnsItsLine) {
   EXPECT_FALSE(instrument.state().output);
 }
 
-}  // namespace
+}  // namespace open_test
 }  // namespace kphi::scpi

@@ -12,7 +12,7 @@
 #include "test/refusal.hpp"
 
 namespace kphi::scpi {
-namespace {
+namespace scpi_supply_test {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -151,5 +151,5 @@ TEST_F(ScpiSupplyTest, RefusesLimitsBeyondTheDevice) {
   EXPECT_TRUE(line.told.empty());
 }
 
-}  // namespace
+}  // namespace scpi_supply_test
 }  // namespace kphi::scpi

@@ -18,7 +18,7 @@
 #include "test/refusal.hpp"
 
 namespace kphi::scpi {
-namespace {
+namespace tcp_test {
 
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
@@ -192,5 +192,5 @@ TEST_F(TcpInstrumentTest, AnswersTrulyOrNotAtAllUnderAnyMixtureOfFaults) {
   EXPECT_GT(failed, 20);
 }
 
-}  // namespace
+}  // namespace tcp_test
 }  // namespace kphi::scpi

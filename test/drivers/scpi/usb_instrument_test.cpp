@@ -14,7 +14,7 @@
 #include "test/drivers/usb/virtual_bus.hpp"
 
 namespace kphi::scpi {
-namespace {
+namespace usb_instrument_test {
 
 using namespace std::chrono_literals;
 using sim::FaultKind;
@@ -204,5 +204,5 @@ TEST_F(UsbInstrumentTest, AnswersTrulyOrNotAtAllUnderAnyMixtureOfFaults) {
   EXPECT_GT(failed, 10);
 }
 
-}  // namespace
+}  // namespace usb_instrument_test
 }  // namespace kphi::scpi

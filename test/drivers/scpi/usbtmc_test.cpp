@@ -6,7 +6,7 @@
 #include "test/refusal.hpp"
 
 namespace kphi::scpi {
-namespace {
+namespace usbtmc_test {
 
 using testing::Contains;
 using testing::ElementsAre;
@@ -122,5 +122,5 @@ TEST_F(UsbtmcTest, GivesUpAnAnswerThatNeverEnds) {
   EXPECT_THAT(refusal(line, "CURV?"), HasSubstr("does not end")) << "one empty part after the other";
 }
 
-}  // namespace
+}  // namespace usbtmc_test
 }  // namespace kphi::scpi

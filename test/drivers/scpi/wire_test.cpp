@@ -7,7 +7,7 @@
 #include <string>
 
 namespace kphi::scpi {
-namespace {
+namespace wire_test {
 
 TEST(ScpiNumbers, ReadsEveryFormOfTheStandard) {
   EXPECT_EQ(number_of("12"), 12.0);
@@ -86,5 +86,5 @@ TEST(ScpiIdentity, IsFourFieldsOrFewer) {
   EXPECT_THAT(identity_fields(""), ElementsAre("", "", "", ""));
 }
 
-}  // namespace
+}  // namespace wire_test
 }  // namespace kphi::scpi

@@ -6,7 +6,7 @@
 #include "test/drivers/serial/fake_sysfs.hpp"
 
 namespace kphi::serial {
-namespace {
+namespace discovery_test {
 
 using fake::Sysfs;
 using fake::UsbAdapter;
@@ -149,5 +149,5 @@ TEST_F(Discovery, WarnsOfALongLatencyTimerAndNamesTheRemedy) {
   EXPECT_FALSE(finding("ttyUSB2")) << "has no such timer";
 }
 
-}  // namespace
+}  // namespace discovery_test
 }  // namespace kphi::serial

@@ -11,7 +11,7 @@
 #include "test/drivers/serial/pseudo_terminal.hpp"
 
 namespace kphi::serial {
-namespace {
+namespace port_test {
 
 using fake::PseudoTerminal;
 
@@ -125,5 +125,5 @@ TEST(Port, NamesTheGroupWhenPermissionIsMissing) {
   EXPECT_NE(refusal(terminal.name(), 115200).find("dialout"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace port_test
 }  // namespace kphi::serial

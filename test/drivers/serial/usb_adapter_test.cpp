@@ -12,7 +12,7 @@
 #include "drivers/serial/port.hpp"
 
 namespace kphi::serial {
-namespace {
+namespace usb_adapter_test {
 
 using testing::HasSubstr;
 
@@ -111,5 +111,5 @@ TEST_F(UsbAdapterOnAFakeBus, IsMissedOnceItIsUnplugged) {
   }
 }
 
-}  // namespace
+}  // namespace usb_adapter_test
 }  // namespace kphi::serial

@@ -10,7 +10,7 @@
 #include "test/drivers/sim/hex.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace bench_test {
 
 using namespace std::chrono_literals;
 using test::bytes;
@@ -146,5 +146,5 @@ TEST(SimulatedBench, TicksAreCheapEnoughForTwentyFiveTimesRealTime) {
   EXPECT_LT(per_tick, 5000);
 }
 
-}  // namespace
+}  // namespace bench_test
 }  // namespace kphi::sim

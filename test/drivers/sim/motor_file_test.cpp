@@ -12,7 +12,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace motor_file_test {
 
 using testing::HasSubstr;
 
@@ -103,5 +103,5 @@ TEST(MotorFile, IsStrictAndSaysWhere) {
     EXPECT_THAT(refusal(kHead + bad), HasSubstr("m.yaml:")) << bad;
 }
 
-}  // namespace
+}  // namespace motor_file_test
 }  // namespace kphi::sim

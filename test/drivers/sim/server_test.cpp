@@ -22,7 +22,7 @@
 #include "test/drivers/sim/hex.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace server_test {
 
 namespace fs = std::filesystem;
 using test::bytes;
@@ -440,5 +440,5 @@ TEST(Pty, KeepsTheNumberOfAPulledAdapter) {
   fs::remove_all(folder);
 }
 
-}  // namespace
+}  // namespace server_test
 }  // namespace kphi::sim

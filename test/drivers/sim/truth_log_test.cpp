@@ -8,7 +8,7 @@
 #include "drivers/sim/iq/frame.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace truth_log_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -59,5 +59,5 @@ TEST_F(MotionLogTest, SeesAModuleThatCoastsUntold) {
   EXPECT_THAT(log_.json_lines(), Not(HasSubstr("\"motion_command\":\"coast\"")));
 }
 
-}  // namespace
+}  // namespace truth_log_test
 }  // namespace kphi::sim

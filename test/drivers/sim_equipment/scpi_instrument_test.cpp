@@ -5,7 +5,7 @@
 #include "base/random.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace scpi_instrument_test {
 
 TEST(SimulatedScpiInstrument, KnowsShortAndLongFormsInAnyCase) {
   ScpiInstrument supply;
@@ -92,5 +92,5 @@ TEST(SimulatedScpiInstrument, AnswersAnythingWithinItsLimits) {
   }
 }
 
-}  // namespace
+}  // namespace scpi_instrument_test
 }  // namespace kphi::sim

@@ -6,7 +6,7 @@
 #include "base/random.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace usbtmc_test {
 
 using namespace std::chrono_literals;
 using Bytes = std::vector<std::uint8_t>;
@@ -159,5 +159,5 @@ TEST_F(SimulatedUsbtmcTest, SurvivesAnyTransfersAndAnswersAgainOnceItIsCleared) 
   }
 }
 
-}  // namespace
+}  // namespace usbtmc_test
 }  // namespace kphi::sim

@@ -9,7 +9,7 @@
 #include "test/drivers/supply/simulated_supply.hpp"
 
 namespace kphi::supply {
-namespace {
+namespace each_fault_test {
 
 using namespace std::chrono_literals;
 using sim::FaultKind;
@@ -195,5 +195,5 @@ TEST(SupplyOnABadLine, ReadsTheTruthOrNothing) {
   EXPECT_EQ(simulated.harm(), 0u);
 }
 
-}  // namespace
+}  // namespace each_fault_test
 }  // namespace kphi::supply

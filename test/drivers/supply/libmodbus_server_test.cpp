@@ -13,7 +13,7 @@
 #include "test/drivers/supply/simulated_supply.hpp"
 
 namespace kphi::supply {
-namespace {
+namespace libmodbus_server_test {
 
 /// Registers 0 to 127 of a plain memory, on TCP.
 class LibraryServer {
@@ -72,5 +72,5 @@ TEST(LibmodbusServer, AndTheDriverUnderstandEachOther) {
   EXPECT_FALSE(supply.read().output);
 }
 
-}  // namespace
+}  // namespace libmodbus_server_test
 }  // namespace kphi::supply

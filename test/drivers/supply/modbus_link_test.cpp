@@ -14,7 +14,7 @@
 #include "test/drivers/supply/simulated_supply.hpp"
 
 namespace kphi::supply {
-namespace {
+namespace modbus_link_test {
 
 using namespace std::chrono_literals;
 using sim::FaultKind;
@@ -226,5 +226,5 @@ TEST(ModbusLink, NoticesTheClosedPortAtOnce) {
   EXPECT_TRUE(test::eventually([&] { return link.read({8, 13}, image).failure == Failure::lost; }));
 }
 
-}  // namespace
+}  // namespace modbus_link_test
 }  // namespace kphi::supply

@@ -13,7 +13,7 @@
 #include "test/drivers/supply/simulated_supply.hpp"
 
 namespace kphi::supply {
-namespace {
+namespace modbus_supply_test {
 
 using namespace std::chrono_literals;
 using sim::FaultKind;
@@ -353,5 +353,5 @@ TEST(RandomSettings, ArriveAsTheNearestStep) {
   }
 }
 
-}  // namespace
+}  // namespace modbus_supply_test
 }  // namespace kphi::supply

@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 namespace kphi::supply {
-namespace {
+namespace wire_test {
 
 using testing::HasSubstr;
 
@@ -223,5 +223,5 @@ TEST(SupplyProtection, IsNamedByTheDevicesOwnCode) {
   EXPECT_EQ(protection_of(hanmatek, 0b100000), SupplyProtection::unknown);
 }
 
-}  // namespace
+}  // namespace wire_test
 }  // namespace kphi::supply

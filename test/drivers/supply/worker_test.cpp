@@ -15,7 +15,7 @@
 #include "test/drivers/supply/simulated_supply.hpp"
 
 namespace kphi::supply {
-namespace {
+namespace worker_test {
 
 using namespace std::chrono_literals;
 using test::eventually;
@@ -405,5 +405,5 @@ TEST(SupplyWorkerOnAWire, SeesTheVoltageRiseWhenTheLoadFeedsBack) {
   EXPECT_TRUE(eventually([&] { return worker.newest()->current_a < 0.01; }));
 }
 
-}  // namespace
+}  // namespace worker_test
 }  // namespace kphi::supply

@@ -12,7 +12,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi {
-namespace {
+namespace rules_test {
 
 namespace fs = std::filesystem;
 using Ids = std::set<std::string>;  // "04d8:00dd"
@@ -83,5 +83,5 @@ TEST(UdevRules, MakeTheMotorsAdapterAnswerAtOnce) {
   EXPECT_THAT(rules(), testing::HasSubstr("DRIVER==\"ftdi_sio\", ATTR{latency_timer}=\"1\""));
 }
 
-}  // namespace
+}  // namespace rules_test
 }  // namespace kphi

@@ -12,7 +12,7 @@
 #include "test/drivers/usb/virtual_bus.hpp"
 
 namespace kphi::usb {
-namespace {
+namespace bus_test {
 
 using namespace std::chrono_literals;
 using testing::ElementsAre;
@@ -181,5 +181,5 @@ TEST(UsbListing, FitsByWhatTheAddressNames) {
   EXPECT_FALSE(fits(UsbAddress::parse("usb:04d8:00de"), one));
 }
 
-}  // namespace
+}  // namespace bus_test
 }  // namespace kphi::usb

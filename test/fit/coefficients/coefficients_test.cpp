@@ -17,7 +17,7 @@
 #include "test/temporary_folder.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace coefficients_test {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -226,5 +226,5 @@ TEST_F(RecordedFitTest, RefusesWordsItDoesNotKnow) {
   EXPECT_THROW((void)read_recorded_fit(file_), compensation::CoefficientError);
 }
 
-}  // namespace
+}  // namespace coefficients_test
 }  // namespace kphi::fit

@@ -15,7 +15,7 @@
 #include "test/temporary_folder.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace mcap_writer_test {
 
 using test::read_with;
 using test::TemporaryFolder;
@@ -178,5 +178,5 @@ TEST(RunExport, KnowsTheTime) {
   EXPECT_EQ(nanoseconds_since_1970("2021-02-31T00:00:00Z"), 0u);
 }
 
-}  // namespace
+}  // namespace mcap_writer_test
 }  // namespace kphi::fit

@@ -17,7 +17,7 @@
 #include "test/temporary_folder.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace targets_test {
 
 using test::read_with;
 using test::TemporaryFolder;
@@ -190,5 +190,5 @@ TEST(Targets, ThatNeedASpeedSaySo) {
   EXPECT_NO_THROW((void)to_agilicious(file, {}));
 }
 
-}  // namespace
+}  // namespace targets_test
 }  // namespace kphi::fit

@@ -9,7 +9,7 @@
 #include "fit/logs/import_table.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace coefficient_table_test {
 
 using ::testing::HasSubstr;
 
@@ -104,5 +104,5 @@ TEST(Tables, NoMutationOfATableCrashesAReader) {
   EXPECT_GT(refused, 0u);
 }
 
-}  // namespace
+}  // namespace coefficient_table_test
 }  // namespace kphi::fit

@@ -8,7 +8,7 @@
 #include "base/error.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace csv_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -64,5 +64,5 @@ TEST(Csv, NumbersAreWholeFiniteFields) {
     EXPECT_FALSE(parse_number(bad)) << bad;
 }
 
-}  // namespace
+}  // namespace csv_test
 }  // namespace kphi::fit

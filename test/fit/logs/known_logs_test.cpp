@@ -18,7 +18,7 @@
 #include "test/fit/logs/synthetic_logs.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace known_logs_test {
 
 using ::testing::HasSubstr;
 
@@ -334,5 +334,5 @@ TEST_F(RealData, ReportTheLineWithUnquotedCommas) {
   EXPECT_EQ(log.rows.size(), 4022u);
 }
 
-}  // namespace
+}  // namespace known_logs_test
 }  // namespace kphi::fit

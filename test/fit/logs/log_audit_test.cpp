@@ -8,7 +8,7 @@
 #include "compensation/units.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace log_audit_test {
 
 using results::QualityFlag;
 using ::testing::HasSubstr;
@@ -219,5 +219,5 @@ TEST(GroupOutliers, NeedAGroupAndADistance) {
   EXPECT_TRUE(group_outliers(group).empty());
 }
 
-}  // namespace
+}  // namespace log_audit_test
 }  // namespace kphi::fit

@@ -9,7 +9,7 @@
 #include "fit/logs/import_table.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace stand_log_test {
 
 using ::testing::HasSubstr;
 
@@ -215,5 +215,5 @@ TEST(Rcbenchmark, RefusesATareThatScatters) {
               HasSubstr("cannot give a zero"));
 }
 
-}  // namespace
+}  // namespace stand_log_test
 }  // namespace kphi::fit

@@ -9,7 +9,7 @@
 #include "test/fit/campaign_steps.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace air_test {
 
 /// The same propeller, noise and all, in another air: thrust is proportional to its density.
 std::vector<results::StepMean> in_air(double kg_m3) {
@@ -66,5 +66,5 @@ TEST(Air, StandsInFileAndReport) {
   EXPECT_EQ(report.find("Air density unknown"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace air_test
 }  // namespace kphi::fit

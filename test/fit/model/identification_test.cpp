@@ -9,7 +9,7 @@
 #include "test/fit/campaign_steps.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace identification_test {
 
 using results::QualityFlag;
 using ::testing::HasSubstr;
@@ -147,5 +147,5 @@ TEST(Identification, OfATableKeepsTheRangeItWasGiven) {
   EXPECT_EQ(result.speed_max_rad_s, 2000);
 }
 
-}  // namespace
+}  // namespace identification_test
 }  // namespace kphi::fit

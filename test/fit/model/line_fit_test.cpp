@@ -10,7 +10,7 @@
 #include "base/error.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace line_fit_test {
 
 constexpr double kThrustCoefficient = 1.55e-6;
 
@@ -201,5 +201,5 @@ TEST(Curvature, OfThreePointsHasOneTest) {
   EXPECT_FALSE(curvature(points(0.2, 0), 10).bends()) << "without errors nothing can be said";
 }
 
-}  // namespace
+}  // namespace line_fit_test
 }  // namespace kphi::fit

@@ -7,7 +7,7 @@
 #include "test/fit/bench_study.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace repeatability_test {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
@@ -78,5 +78,5 @@ TEST(LeftOutRuns, NeedACause) {
     EXPECT_THROW((void)parse_left_out_run(text), ConfigurationError) << text;
 }
 
-}  // namespace
+}  // namespace repeatability_test
 }  // namespace kphi::fit

@@ -6,7 +6,7 @@
 #include "test/fit/campaign_steps.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace step_selection_test {
 
 using results::StepMean;
 
@@ -58,5 +58,5 @@ TEST(StepUncertainty, OfCorrelatedSamplesWeighsLess) {
   EXPECT_GT(identify(steps, options).table[0].k / k, 1.004) << "s/√n knows no difference";
 }
 
-}  // namespace
+}  // namespace step_selection_test
 }  // namespace kphi::fit

@@ -12,7 +12,7 @@
 #include "fit/numerics/linear_regression.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace thrust_fit_test {
 
 constexpr double kTruth = 1.55e-6;
 
@@ -259,5 +259,5 @@ TEST(ThrustFit, ALossWithoutScatterChangesNothing) {
   EXPECT_NEAR(fit_thrust(data, with(Loss::tukey)).parameters.k / kRobustTruth, 1, 1e-14);
 }
 
-}  // namespace
+}  // namespace thrust_fit_test
 }  // namespace kphi::fit

@@ -7,7 +7,7 @@
 #include "test/fit/campaign_steps.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace torque_power_test {
 
 results::StepMean step(double phi, int number, double thrust_n) {
   results::StepMean one;
@@ -61,5 +61,5 @@ TEST(Power, StandsInTheReportOnlyWhereSomebodyMeasuredIt) {
   EXPECT_NE(report.find("<td>5.000</td><td>0.04903</td><td class=\"text\">supply</td>"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace torque_power_test
 }  // namespace kphi::fit

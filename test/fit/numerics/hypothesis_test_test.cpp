@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace kphi::fit {
-namespace {
+namespace hypothesis_test_test {
 
 TEST(HypothesisTest, KnowsStudentsFactors) {
   EXPECT_NEAR(coverage_factor(2), 4.302652729911275, 1e-9);
@@ -38,5 +38,5 @@ TEST(HypothesisTest, WelchTakesTheFreedomOfTheWorse) {
   EXPECT_FALSE(welch_test(sharp, blunt).rejected());
 }
 
-}  // namespace
+}  // namespace hypothesis_test_test
 }  // namespace kphi::fit

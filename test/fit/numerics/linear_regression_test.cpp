@@ -11,7 +11,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace linear_regression_test {
 
 struct Certified {
   bool polynomial = false;
@@ -106,5 +106,5 @@ TEST(LinearRegression, RefusesWhatCannotBeToldApart) {
   EXPECT_THROW((void)regress({}, {}), FitError);
 }
 
-}  // namespace
+}  // namespace linear_regression_test
 }  // namespace kphi::fit

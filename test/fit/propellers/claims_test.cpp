@@ -9,7 +9,7 @@
 #include "test/fit/bench_study.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace claims_test {
 
 /// In N/RPM², as the paper prints them: K_T, intercept and slope per degree of the occluded line.
 struct PaperPropeller {
@@ -135,5 +135,5 @@ TEST(Family, PredictsThePropellerThatWasLeftOut) {
   EXPECT_FALSE(predict(std::span(members).first(2), 6, 3, 90));
 }
 
-}  // namespace
+}  // namespace claims_test
 }  // namespace kphi::fit

@@ -14,7 +14,7 @@
 #include "test/temporary_folder.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace compare_test {
 
 using test::TemporaryFolder;
 using ::testing::HasSubstr;
@@ -170,5 +170,5 @@ TEST(Compare, GivesTheSameAsJson) {
   EXPECT_TRUE(json["differences"][1]["standard_error"].is_null());
 }
 
-}  // namespace
+}  // namespace compare_test
 }  // namespace kphi::fit

@@ -8,7 +8,7 @@
 #include "test/temporary_folder.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace raw_samples_test {
 
 using test::TemporaryFolder;
 
@@ -62,5 +62,5 @@ TEST(RawSamples, AreNotShownWhenARunIsMissing) {
   EXPECT_FALSE(raw.runs[0].account);
 }
 
-}  // namespace
+}  // namespace raw_samples_test
 }  // namespace kphi::fit

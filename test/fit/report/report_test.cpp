@@ -23,7 +23,7 @@
 #include "test/temporary_folder.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace report_test {
 
 using results::QualityFlag;
 using test::TemporaryFolder;
@@ -351,5 +351,5 @@ TEST(Gnuplot, IgnoresNoSignalThatThisProgramIgnores) {
   }
 }
 
-}  // namespace
+}  // namespace report_test
 }  // namespace kphi::fit

@@ -10,7 +10,7 @@
 #include "test/fit/bench_study.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace analysis_test {
 
 using ::testing::HasSubstr;
 
@@ -216,5 +216,5 @@ TEST(Analysis, IsWrittenWithoutWhatJsonCannotHold) {
   EXPECT_EQ(yaml, format_coefficients(study.found, {}, &analysis));
 }
 
-}  // namespace
+}  // namespace analysis_test
 }  // namespace kphi::fit

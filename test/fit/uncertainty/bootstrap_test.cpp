@@ -9,7 +9,7 @@
 #include "test/fit/bench_study.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace bootstrap_test {
 
 AngleScatter runs_of(double phi, std::initializer_list<double> k) {
   AngleScatter angle;
@@ -62,5 +62,5 @@ TEST(Bootstrap, AgreesWithTheBudgetUpToItsNarrowness) {
   EXPECT_NEAR(ratio, std::sqrt(2.0 / 3), 0.12) << "three runs: the bootstrap divides by n, not n - 1";
 }
 
-}  // namespace
+}  // namespace bootstrap_test
 }  // namespace kphi::fit

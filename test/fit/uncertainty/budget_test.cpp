@@ -7,7 +7,7 @@
 #include "base/error.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace budget_test {
 
 BudgetRow row(const char* source, double contribution, double freedom) {
   BudgetRow one;
@@ -52,5 +52,5 @@ TEST(BenchUncertainty, IsReadFromWords) {
     EXPECT_THROW(set_uncertainty(bench, wrong), ConfigurationError) << wrong;
 }
 
-}  // namespace
+}  // namespace budget_test
 }  // namespace kphi::fit

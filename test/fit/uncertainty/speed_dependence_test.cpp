@@ -9,7 +9,7 @@
 #include "test/fit/bench_study.hpp"
 
 namespace kphi::fit {
-namespace {
+namespace speed_dependence_test {
 
 using Steps = std::vector<results::StepMean>;
 
@@ -143,5 +143,5 @@ TEST(SpeedDependence, OfPerfectStepsIsNone) {
   }
 }
 
-}  // namespace
+}  // namespace speed_dependence_test
 }  // namespace kphi::fit

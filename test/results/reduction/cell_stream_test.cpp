@@ -5,7 +5,7 @@
 #include "test/results/synthetic_run.hpp"
 
 namespace kphi::results {
-namespace {
+namespace cell_stream_test {
 
 using test::make_run;
 using test::Truth;
@@ -106,5 +106,5 @@ TEST(CellStream, GivesEvenSamplesWithGapsFilledAndNoneAcrossARestart) {
   EXPECT_TRUE(Stream(run).samples(kSecond).counts.empty()) << "the box restarted at 2.3 s";
 }
 
-}  // namespace
+}  // namespace cell_stream_test
 }  // namespace kphi::results

@@ -8,7 +8,7 @@
 #include "test/results/synthetic_run.hpp"
 
 namespace kphi::results {
-namespace {
+namespace clock_map_test {
 using test::make_run;
 using test::Truth;
 
@@ -163,5 +163,5 @@ TEST(ClockMap, BeginsAnewWhereTheBoxTookUpCountingAgain) {
   EXPECT_FALSE(std::abs(unaware.epochs()[0].skew) < 500e-6) << "without the break the clock seems far off";
 }
 
-}  // namespace
+}  // namespace clock_map_test
 }  // namespace kphi::results

@@ -4,7 +4,7 @@
 #include "results/steps_csv.hpp"
 
 namespace kphi::results {
-namespace {
+namespace event_flags_test {
 
 std::string flags(const std::vector<StreamEvent>& events, Nanoseconds begin, Nanoseconds end) {
   return quality_flag_names(flags_within(flag_spans(events), begin, end));
@@ -63,5 +63,5 @@ TEST(EventFlags, RangesAndRestartsOfTheBoxShowInTheSamplesThemselves) {
   }
 }
 
-}  // namespace
+}  // namespace event_flags_test
 }  // namespace kphi::results

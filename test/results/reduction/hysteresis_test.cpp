@@ -8,7 +8,7 @@
 #include "results/reduction/repetitions.hpp"
 
 namespace kphi::results {
-namespace {
+namespace hysteresis_test {
 
 constexpr double kK = 1.3e-6;
 constexpr double kU = 0.002;
@@ -87,5 +87,5 @@ TEST(Hysteresis, IsToldInOneLine) {
   EXPECT_THAT(hysteresis_of(run(0, 2))->to_words(), testing::HasSubstr("no hysteresis seen"));
 }
 
-}  // namespace
+}  // namespace hysteresis_test
 }  // namespace kphi::results

@@ -7,7 +7,7 @@
 #include <vector>
 
 namespace kphi::results {
-namespace {
+namespace lag_test {
 
 struct Truth {
   double delay_s = 0;
@@ -137,5 +137,5 @@ TEST(Lag, ExplainsTheThrust) {
   for (std::size_t i = 0; i < squared.size(); ++i) EXPECT_NEAR(1.5e-6 * squared[i], step.thrust[i], 0.005) << i;
 }
 
-}  // namespace
+}  // namespace lag_test
 }  // namespace kphi::results

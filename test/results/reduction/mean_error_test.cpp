@@ -7,7 +7,7 @@
 #include "results/reduction/bin_statistics.hpp"
 
 namespace kphi::results {
-namespace {
+namespace mean_error_test {
 
 /// First-order autoregressive noise of deviation 1 whose correlation falls to 1/e in `memory` values.
 std::vector<double> noise(std::mt19937_64& random, std::size_t n, double memory) {
@@ -106,5 +106,5 @@ TEST(MeanError, JoinsDegreesOfFreedom) {
   EXPECT_NEAR(joint_freedom(1, 10, 2, 5), 25 / (1 / 10.0 + 16 / 5.0), 1e-9);
 }
 
-}  // namespace
+}  // namespace mean_error_test
 }  // namespace kphi::results

@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace kphi::results {
-namespace {
+namespace motor_series_test {
 
 std::vector<MotorReading> speeds(std::initializer_list<double> values) {
   std::vector<MotorReading> readings;
@@ -57,5 +57,5 @@ TEST(MotorSeries, TellsMeanDeviationAndLeastOfAWindow) {
   EXPECT_EQ(MotorSeries(readings).statistics(MotorChannel::derate, kAll).n, 0u);
 }
 
-}  // namespace
+}  // namespace motor_series_test
 }  // namespace kphi::results

@@ -10,7 +10,7 @@
 #include "test/results/synthetic_run.hpp"
 
 namespace kphi::results {
-namespace {
+namespace quality_flags_test {
 
 using test::make_run;
 using test::spin_down_at;
@@ -343,5 +343,5 @@ TEST(QualityFlags, ADeratingModuleIsFlagged) {
   EXPECT_FALSE(has(steps[2], QualityFlag::derated));
 }
 
-}  // namespace
+}  // namespace quality_flags_test
 }  // namespace kphi::results

@@ -16,7 +16,7 @@
 #include "results/steps_csv.hpp"
 
 namespace kphi::results {
-namespace {
+namespace real_logs_test {
 
 constexpr double kRpm = M_PI / 30;
 
@@ -229,5 +229,5 @@ TEST_F(RealLogs, ImpossibleSpeedsAreCounted) {
   EXPECT_LT(left, spikes) << "those that last longer than two readings stay";
 }
 
-}  // namespace
+}  // namespace real_logs_test
 }  // namespace kphi::results

@@ -11,7 +11,7 @@
 #include "test/results/synthetic_run.hpp"
 
 namespace kphi::results {
-namespace {
+namespace reduction_test {
 using test::make_run;
 using test::spin_down_at;
 using test::Truth;
@@ -214,5 +214,5 @@ TEST(Reduction, GivesTheSameBytesFromMemoryAndFromTheFile) {
   EXPECT_EQ(format_steps(reduce(run)), format_steps(reduce(read_run(folder / "a.h5"))));
 }
 
-}  // namespace
+}  // namespace reduction_test
 }  // namespace kphi::results

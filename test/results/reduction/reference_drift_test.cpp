@@ -7,7 +7,7 @@
 #include "results/reduction/repetitions.hpp"
 
 namespace kphi::results {
-namespace {
+namespace reference_drift_test {
 
 /// Reference runs -1, -2, …; run i has the coefficient 1.3e-6 · (1 + off[i]), in air of density[i] if given.
 std::vector<StepMean> runs(const std::vector<double>& off, const std::vector<double>& density = {}, unsigned seed = 1) {
@@ -67,5 +67,5 @@ TEST(ReferenceDrift, IsUnknownWithoutTwoGoodRuns) {
   EXPECT_FALSE(reference_drift(steps));
 }
 
-}  // namespace
+}  // namespace reference_drift_test
 }  // namespace kphi::results

@@ -9,7 +9,7 @@
 #include "results/steps_csv.hpp"
 
 namespace kphi::results {
-namespace {
+namespace repetitions_test {
 using testing::HasSubstr;
 
 double k_of(const StepMean& step) { return step.thrust_n / (step.speed_rad_s * step.speed_rad_s); }
@@ -285,5 +285,5 @@ TEST(JudgeRepetitions, WaitsUntilTheWantedOnesAreThere) {
   EXPECT_FALSE(judged(runs({0}), {.wanted = 1}).asks_for_another);
 }
 
-}  // namespace
+}  // namespace repetitions_test
 }  // namespace kphi::results

@@ -7,7 +7,7 @@
 #include "results/reduction/bin_statistics.hpp"
 
 namespace kphi::results {
-namespace {
+namespace settling_test {
 
 constexpr double kBin = 0.01;
 
@@ -169,5 +169,5 @@ TEST(Drift, IsNoNoiseNoSmallChangeAndNoTransient) {
   EXPECT_FALSE(drifts(tent)) << "turns round";
 }
 
-}  // namespace
+}  // namespace settling_test
 }  // namespace kphi::results

@@ -12,7 +12,7 @@
 #include "test/results/synthetic_run.hpp"
 
 namespace kphi::results {
-namespace {
+namespace step_study_test {
 using test::make_run;
 using test::Truth;
 
@@ -185,5 +185,5 @@ TEST(StepStudy, ADeviationOverTheRootOfTheNumberWouldBeFiveTimesTooSmall) {
   }
 }
 
-}  // namespace
+}  // namespace step_study_test
 }  // namespace kphi::results

@@ -9,7 +9,7 @@
 #include "test/results/synthetic_run.hpp"
 
 namespace kphi::results {
-namespace {
+namespace zeros_test {
 
 using test::make_run;
 using test::Truth;
@@ -103,5 +103,5 @@ TEST(ZeroCheck, RefusesAZeroThatWandersThoughItsSamplesScatterLittle) {
   EXPECT_TRUE(check.noisy());
 }
 
-}  // namespace
+}  // namespace zeros_test
 }  // namespace kphi::results

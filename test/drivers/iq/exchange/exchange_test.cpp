@@ -11,7 +11,7 @@
 #include "test/drivers/iq/wire.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace exchange_test {
 
 using namespace std::chrono_literals;
 using fake::Bytes;
@@ -302,5 +302,5 @@ TEST(Settings, ThatMakeNoSenseAreRefused) {
   }
 }
 
-}  // namespace
+}  // namespace exchange_test
 }  // namespace kphi::iq

@@ -12,7 +12,7 @@
 #include "test/temporary_folder.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace capture_test {
 
 using namespace std::chrono_literals;
 using test::TemporaryFolder;
@@ -131,5 +131,5 @@ TEST(Capture, OfAMotorGoesThroughTheParserBitByBit) {
   EXPECT_EQ(module.heard.size(), line.with([](fake::Module& m) { return m.heard.size(); }));
 }
 
-}  // namespace
+}  // namespace capture_test
 }  // namespace kphi::iq

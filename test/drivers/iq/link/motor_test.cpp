@@ -13,7 +13,7 @@
 #include "test/soon.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace motor_test {
 
 using namespace std::chrono_literals;
 using fake::Module;
@@ -300,5 +300,5 @@ TEST(FailedConnection, LeavesCoastAsTheOnlyMotionCommand) {
   }
 }
 
-}  // namespace
+}  // namespace motor_test
 }  // namespace kphi::iq

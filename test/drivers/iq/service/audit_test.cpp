@@ -6,7 +6,7 @@
 #include "test/drivers/iq/fake_dialogue.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace audit_test {
 
 using fake::FakeDialogue;
 using testing::Contains;
@@ -277,5 +277,5 @@ TEST(FaultWords, NameEveryBit) {
   EXPECT_EQ(fault_words(0x81), "under-voltage of the logic, bit 7");
 }
 
-}  // namespace
+}  // namespace audit_test
 }  // namespace kphi::iq

@@ -11,7 +11,7 @@
 #include "test/refusal.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace clock_gain_test {
 
 using fake::FakeDialogue;
 using testing::HasSubstr;
@@ -186,5 +186,5 @@ TEST(ClockGain, IsWrittenForTheBenchFile) {
             "\"2026-05-01T12:00:00Z\", duration_s: 60.0}");
 }
 
-}  // namespace
+}  // namespace clock_gain_test
 }  // namespace kphi::iq

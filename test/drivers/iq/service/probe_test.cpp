@@ -8,7 +8,7 @@
 #include "test/drivers/iq/module_on_a_line.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace probe_test {
 
 using fake::FakeDialogue;
 using fake::Module;
@@ -174,5 +174,5 @@ TEST(SettingReadBack, AcceptsOldFirmwareWhereTheEntryIsNotRequired) {
   EXPECT_EQ(set_timeout(module.ask()).size(), 1u);
 }
 
-}  // namespace
+}  // namespace probe_test
 }  // namespace kphi::iq

@@ -8,7 +8,7 @@
 #include "test/drivers/iq/wire.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace connecting_test {
 
 using namespace std::chrono_literals;
 using fake::Bytes;
@@ -288,5 +288,5 @@ TEST(OpenInquiry, CanBeGivenUp) {
   EXPECT_TRUE(open.done());
 }
 
-}  // namespace
+}  // namespace connecting_test
 }  // namespace kphi::iq

@@ -12,7 +12,7 @@
 #include "test/soon.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace module_watch_test {
 
 using namespace std::chrono_literals;
 using fake::Module;
@@ -209,5 +209,5 @@ TEST(Restarts, AreNotSeenWhenTheTimeIsSet) {
   EXPECT_TRUE(wire.session.inquiries().replies().at(0).accepted);
 }
 
-}  // namespace
+}  // namespace module_watch_test
 }  // namespace kphi::iq

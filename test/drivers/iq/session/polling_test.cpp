@@ -9,7 +9,7 @@
 #include "test/drivers/iq/wire.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace polling_test {
 
 using namespace std::chrono_literals;
 using fake::Bytes;
@@ -162,5 +162,5 @@ TEST(Telemetry, AsksForAllThatIsWantedInEveryCycle) {
               10, 1);
 }
 
-}  // namespace
+}  // namespace polling_test
 }  // namespace kphi::iq

@@ -10,7 +10,7 @@
 #include "test/drivers/iq/wire.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace session_test {
 
 using namespace std::chrono_literals;
 using fake::Bytes;
@@ -99,5 +99,5 @@ TEST(Soak, ARuinedLineNeverBringsAFalseValueAndNeverMotionAfterACoast) {
   }
 }
 
-}  // namespace
+}  // namespace session_test
 }  // namespace kphi::iq

@@ -9,7 +9,7 @@
 #include "test/drivers/iq/wire.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace stopping_test {
 
 using namespace std::chrono_literals;
 using fake::Bytes;
@@ -399,5 +399,5 @@ TEST(StopSettings, ThatMakeNoSenseAreRefused) {
   EXPECT_THROW(Stopping::check({1000, 500, 10, 0s}), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace stopping_test
 }  // namespace kphi::iq

@@ -14,7 +14,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace entries_test {
 
 using fake::Bytes;
 
@@ -224,5 +224,5 @@ TEST(ReadBack, IsComparedBitByBit) {
   EXPECT_FALSE(is_as_set(entry<"hobby_input.allowed_protocols">, 254, 255));
 }
 
-}  // namespace
+}  // namespace entries_test
 }  // namespace kphi::iq

@@ -9,7 +9,7 @@
 #include "test/drivers/iq/fake_module.hpp"
 
 namespace kphi::iq {
-namespace {
+namespace packet_test {
 
 using fake::Bytes;
 
@@ -330,5 +330,5 @@ TEST(Parser, CarriesANanWithItsBits) {
   EXPECT_EQ(reception.frames[0], nan);
 }
 
-}  // namespace
+}  // namespace packet_test
 }  // namespace kphi::iq

@@ -7,7 +7,7 @@
 #include "test/drivers/netbox/fake_box.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace calinfo_test {
 
 using namespace std::chrono_literals;
 using testing::HasSubstr;
@@ -135,5 +135,5 @@ TEST(CalinfoCrossCheck, AsksAndComparesAndNotesABoxWithoutTheInterface) {
   EXPECT_EQ(finding->severity, Severity::note);
 }
 
-}  // namespace
+}  // namespace calinfo_test
 }  // namespace kphi::netbox

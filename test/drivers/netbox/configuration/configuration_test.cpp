@@ -10,7 +10,7 @@
 #include "test/drivers/netbox/record_bytes.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace configuration_test {
 
 using test::captured_xml;
 using test::with;
@@ -367,5 +367,5 @@ TEST(Printable, ReplacesWhatWouldSteerATerminal) {
   EXPECT_EQ(printable(std::string("a\0b", 3)), "a\uFFFDb");
 }
 
-}  // namespace
+}  // namespace configuration_test
 }  // namespace kphi::netbox

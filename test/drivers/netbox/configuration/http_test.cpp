@@ -7,7 +7,7 @@
 #include "test/drivers/netbox/fake_box.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace http_test {
 
 using namespace std::chrono_literals;
 using test::FakeWeb;
@@ -106,5 +106,5 @@ TEST(HttpGet, AnUnknownNameIsNamed) {
   }
 }
 
-}  // namespace
+}  // namespace http_test
 }  // namespace kphi::netbox

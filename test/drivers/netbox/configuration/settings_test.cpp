@@ -17,7 +17,7 @@
 #include "test/drivers/netbox/settable_web.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace settings_test {
 
 using test::SettableWeb;
 using testing::AllOf;
@@ -287,5 +287,5 @@ TEST_F(SettingsTest, RateAndFilterOfAnAxiaAreRefused) {
   EXPECT_THAT(web.writes(), IsEmpty());
 }
 
-}  // namespace
+}  // namespace settings_test
 }  // namespace kphi::netbox

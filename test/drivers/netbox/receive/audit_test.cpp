@@ -6,7 +6,7 @@
 #include "test/drivers/netbox/record_bytes.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace audit_test {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -174,5 +174,5 @@ TEST(AliasedLines, ASlowRotorIsNotAliased) {
   EXPECT_THAT(aliased_lines(1000, slow, 2, 2), IsEmpty());
 }
 
-}  // namespace
+}  // namespace audit_test
 }  // namespace kphi::netbox

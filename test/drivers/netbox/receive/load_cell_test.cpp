@@ -9,7 +9,7 @@
 #include "test/drivers/netbox/fake_box.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace load_cell_test {
 
 using namespace std::chrono_literals;
 using test::captured_xml;
@@ -270,5 +270,5 @@ TEST(LoadCell, TellsHowLongTheProcessMayStandStill) {
   EXPECT_NEAR(static_cast<double>(buffer.period.count()), 1e9 * 40 / 7000 / 4, 1) << "time runs four times as fast";
 }
 
-}  // namespace
+}  // namespace load_cell_test
 }  // namespace kphi::netbox

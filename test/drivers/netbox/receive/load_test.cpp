@@ -6,7 +6,7 @@
 #include <limits>
 
 namespace kphi::netbox {
-namespace {
+namespace load_test {
 
 TEST(ZeroEstimate, IsMeanAndSpreadInNewtonsAndNewtonMetresWithoutSaturatedAndFaultyRecords) {
   Configuration scale;
@@ -68,5 +68,5 @@ TEST(RangeWatchOfPounds, UsesTheRangeInSi) {
   EXPECT_EQ(RangeWatch(configuration).look({9, 0, 0, 0, 0, 0}), RangeVerdict::near);  // 40 N
 }
 
-}  // namespace
+}  // namespace load_test
 }  // namespace kphi::netbox

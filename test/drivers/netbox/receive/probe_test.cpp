@@ -6,7 +6,7 @@
 #include "test/drivers/netbox/fake_box.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace probe_test {
 
 using namespace std::chrono_literals;
 using test::captured_xml;
@@ -74,5 +74,5 @@ TEST(Probe, ABoxThatDoesNotAnswerIsAFindingAndNoException) {
   EXPECT_THAT(found.findings[0].what, HasSubstr("check the address"));
 }
 
-}  // namespace
+}  // namespace probe_test
 }  // namespace kphi::netbox

@@ -7,7 +7,7 @@
 #include "test/drivers/netbox/fake_box.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace udp_socket_test {
 
 using namespace std::chrono_literals;
 using test::LoopbackSocket;
@@ -146,5 +146,5 @@ TEST(ReceiveBuffer, IsAWarningBelowHalfASecondAndElseANote) {
   EXPECT_NE(forty->what.find("more than 526 ms"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace udp_socket_test
 }  // namespace kphi::netbox

@@ -4,7 +4,7 @@
 #include "test/drivers/netbox/delay_channel.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace clock_estimate_test {
 
 using namespace std::chrono_literals;
 
@@ -80,5 +80,5 @@ TEST(ClockEstimate, DoubtsARateThatIsAnotherThanConfigured) {
   EXPECT_GT(estimate.skew_ppm(), ClockEstimate::kBelievableSkewPpm);
 }
 
-}  // namespace
+}  // namespace clock_estimate_test
 }  // namespace kphi::netbox

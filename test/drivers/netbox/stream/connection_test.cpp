@@ -9,7 +9,7 @@
 #include "test/drivers/netbox/record_bytes.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace connection_test {
 
 using namespace std::chrono_literals;
 using test::captured_xml;
@@ -297,5 +297,5 @@ TEST(Gathering, EndsByTheStreamsTimeHoweverLateTheThreadIs) {
   EXPECT_EQ(connection.gathering_time(-1h), whole) << "a clock that was set back";
 }
 
-}  // namespace
+}  // namespace connection_test
 }  // namespace kphi::netbox

@@ -7,7 +7,7 @@
 #include "base/published.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace health_test {
 
 using namespace std::chrono_literals;
 
@@ -65,5 +65,5 @@ TEST(Published, IsReadWholeWhileItIsWritten) {
   writer.join();
 }
 
-}  // namespace
+}  // namespace health_test
 }  // namespace kphi::netbox

@@ -8,7 +8,7 @@
 #include "test/drivers/netbox/stream/feed.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace reorder_test {
 
 using namespace std::chrono_literals;
 using test::Step;
@@ -182,5 +182,5 @@ TEST(ReorderProperty, EveryRecordThatCameInTimeIsDeliveredOnceAndInOrder) {
   }
 }
 
-}  // namespace
+}  // namespace reorder_test
 }  // namespace kphi::netbox

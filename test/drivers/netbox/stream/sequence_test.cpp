@@ -7,7 +7,7 @@
 #include "test/drivers/netbox/stream/feed.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace sequence_test {
 
 using namespace std::chrono_literals;
 using test::Step;
@@ -216,5 +216,5 @@ TEST(Sequence, TheAccountClosesAndEqualsTheTruthWhateverTheChannelDoes) {
   }
 }
 
-}  // namespace
+}  // namespace sequence_test
 }  // namespace kphi::netbox

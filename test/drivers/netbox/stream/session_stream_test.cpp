@@ -7,7 +7,7 @@
 #include "test/drivers/netbox/session_fixture.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace session_stream_test {
 
 using namespace std::chrono_literals;
 using test::Bytes;
@@ -188,5 +188,5 @@ TEST(SessionProperty, RandomDatagramsNeverBreakTheAccount) {
   }
 }
 
-}  // namespace
+}  // namespace session_stream_test
 }  // namespace kphi::netbox

@@ -6,7 +6,7 @@
 #include "test/drivers/netbox/session_fixture.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace session_test {
 
 using namespace std::chrono_literals;
 using test::Bytes;
@@ -340,5 +340,5 @@ TEST_F(SessionTest, StopsAndRepeatsTheStopWhileTheBoxGoesOn) {
   EXPECT_EQ(session.counters().drained, 2u);
 }
 
-}  // namespace
+}  // namespace session_test
 }  // namespace kphi::netbox

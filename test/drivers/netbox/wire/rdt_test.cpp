@@ -11,7 +11,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::netbox {
-namespace {
+namespace rdt_test {
 
 using test::Bytes;
 
@@ -137,5 +137,5 @@ TEST(RdtRecord, LeavesTheRestOfTheOutputAlone) {
   EXPECT_EQ(out[2].rdt_sequence, 4711u);
 }
 
-}  // namespace
+}  // namespace rdt_test
 }  // namespace kphi::netbox

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace kphi::netbox {
-namespace {
+namespace status_test {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
@@ -127,5 +127,5 @@ TEST(Status, EveryBitOfTheAxiasMapHasItsName) {
   EXPECT_THAT(names(1u << 31, Product::axia), ElementsAre("error summary"));
 }
 
-}  // namespace
+}  // namespace status_test
 }  // namespace kphi::netbox

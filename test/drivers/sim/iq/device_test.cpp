@@ -8,7 +8,7 @@
 #include "test/drivers/sim/iq_module.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace device_test {
 
 using namespace std::chrono_literals;
 using test::bytes;
@@ -187,5 +187,5 @@ TEST(IqEntries, AnswerByTheirAccessAndLengthInBothFirmwares) {
   }
 }
 
-}  // namespace
+}  // namespace device_test
 }  // namespace kphi::sim

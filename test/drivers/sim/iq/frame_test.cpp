@@ -7,7 +7,7 @@
 #include "test/drivers/sim/hex.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace frame_test {
 
 using test::bytes;
 using test::hex;
@@ -97,5 +97,5 @@ TEST(IqFrame, WaitsForTheRestInAnyChunks) {
   EXPECT_EQ(count, 50 * static_cast<int>(std::size(kVectors)));
 }
 
-}  // namespace
+}  // namespace frame_test
 }  // namespace kphi::sim

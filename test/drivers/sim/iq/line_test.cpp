@@ -8,7 +8,7 @@
 #include "test/drivers/sim/hex.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace line_test {
 
 using namespace std::chrono_literals;
 using test::bytes;
@@ -329,5 +329,5 @@ TEST_F(Line, ItsTruthCanBeWritten) {
   EXPECT_NE(text.find(R"("motor_totals")"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace line_test
 }  // namespace kphi::sim

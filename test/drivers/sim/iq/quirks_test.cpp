@@ -4,7 +4,7 @@
 #include "test/drivers/sim/iq_module.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace quirks_test {
 
 using namespace std::chrono_literals;
 using test::hex;
@@ -112,5 +112,5 @@ TEST_F(Quirk, SafeModeReadsCoastAndEndsWithoutLatching) {
   EXPECT_EQ(device.stage().mode, PowerStage::Mode::drive);
 }
 
-}  // namespace
+}  // namespace quirks_test
 }  // namespace kphi::sim

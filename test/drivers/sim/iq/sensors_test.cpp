@@ -7,7 +7,7 @@
 #include "drivers/sim/physics/motor.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace sensors_test {
 
 class Sensors : public ::testing::Test {
  protected:
@@ -96,5 +96,5 @@ TEST_F(Sensors, JoulesAreWhatWasMeasured) {
   EXPECT_EQ(read().joules, 0);
 }
 
-}  // namespace
+}  // namespace sensors_test
 }  // namespace kphi::sim

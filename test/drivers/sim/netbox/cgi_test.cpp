@@ -6,7 +6,7 @@
 #include "test/drivers/sim/hex.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace cgi_test {
 
 using test::bytes;
 
@@ -101,5 +101,5 @@ TEST_F(NetBoxWrites, BeyondThreeInASecondAreLostOnSomeBoxes) {
   EXPECT_EQ(element(strict, "comrdtrate"), "70");
 }
 
-}  // namespace
+}  // namespace cgi_test
 }  // namespace kphi::sim

@@ -7,7 +7,7 @@
 #include "test/drivers/sim/hex.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace device_test {
 
 using test::bytes;
 using test::hex;
@@ -174,5 +174,5 @@ TEST(NetBoxDevice, SaturationClampsAndFlags) {
   EXPECT_EQ(word(after(box, 1)[0], 0, 8), 0u) << "not latched";
 }
 
-}  // namespace
+}  // namespace device_test
 }  // namespace kphi::sim

@@ -13,7 +13,7 @@
 #include "test/drivers/sim/hex.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace fault_injector_test {
 
 using namespace std::chrono_literals;
 using test::bytes;
@@ -407,5 +407,5 @@ TEST(FaultInjector, TellsTheTruthLineByLine) {
   EXPECT_EQ(std::count_if(all.begin() + 2, all.end() - 1, [](const auto& d) { return d["arrivals"] == 0; }), 2);
 }
 
-}  // namespace
+}  // namespace fault_injector_test
 }  // namespace kphi::sim

@@ -8,7 +8,7 @@
 #include "drivers/sim/netbox/device.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace pages_test {
 
 struct Answer {
   std::string status;
@@ -98,5 +98,5 @@ TEST(NetBoxPages, EverythingElseIsNotFound) {
   }
 }
 
-}  // namespace
+}  // namespace pages_test
 }  // namespace kphi::sim

@@ -5,7 +5,7 @@
 #include "test/drivers/sim/hex.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace quirks_test {
 
 using test::bytes;
 using LastBlock = NetBoxQuirks::LastBlock;
@@ -131,5 +131,5 @@ TEST(NetBoxStall, RepeatsTheSample) {
   EXPECT_EQ(word(after(box, 1)[0], 4), 3u);
 }
 
-}  // namespace
+}  // namespace quirks_test
 }  // namespace kphi::sim

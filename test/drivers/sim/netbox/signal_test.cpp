@@ -8,7 +8,7 @@
 #include "drivers/sim/physics/motor.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace signal_test {
 
 constexpr double kPi = 3.14159265358979323846;
 
@@ -89,5 +89,5 @@ TEST(NetBoxSignal, AxiaHoldsTheSaturationBit) {
   EXPECT_FALSE(signal.saturated());
 }
 
-}  // namespace
+}  // namespace signal_test
 }  // namespace kphi::sim

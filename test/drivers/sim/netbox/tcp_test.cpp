@@ -4,7 +4,7 @@
 #include "test/drivers/sim/hex.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace tcp_test {
 
 using test::bytes;
 using test::hex;
@@ -54,5 +54,5 @@ TEST_F(NetBoxTcp, UnknownCommandsAreIgnored) {
   EXPECT_EQ(ask("02 00000000000000 00000000000000 00 0000 0000"), "");  // WRITETRANSFORM
 }
 
-}  // namespace
+}  // namespace tcp_test
 }  // namespace kphi::sim

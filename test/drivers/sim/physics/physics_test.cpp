@@ -10,7 +10,7 @@
 #include "drivers/sim/physics/plant.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace physics_test {
 
 /// The module's default tuning.
 MotorDrive at_speed(double speed) {
@@ -416,5 +416,5 @@ TEST(Physics, VibrationStandsAtOncePerTurnAndAtTheBladePass) {
   }
 }
 
-}  // namespace
+}  // namespace physics_test
 }  // namespace kphi::sim

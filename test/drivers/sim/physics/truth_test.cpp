@@ -6,7 +6,7 @@
 #include "compensation/units.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace truth_test {
 
 double k_rpm(std::string_view id, double phi) {
   return to_newtons_per_rpm2(ThrustCoefficient(thrust_coefficient(*find_propeller(id), phi)));
@@ -90,5 +90,5 @@ TEST(Truth, YamlGivesBackEveryDigit) {
   }
 }
 
-}  // namespace
+}  // namespace truth_test
 }  // namespace kphi::sim

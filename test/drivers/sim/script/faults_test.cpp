@@ -15,7 +15,7 @@
 #include "test/source_dir.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace faults_test {
 
 using namespace std::chrono_literals;
 
@@ -400,5 +400,5 @@ TEST(Faults, ActInTheirWindowAndThatManyTimes) {
   EXPECT_EQ(fault.end(), kNever);
 }
 
-}  // namespace
+}  // namespace faults_test
 }  // namespace kphi::sim

@@ -5,7 +5,7 @@
 #include <cmath>
 
 namespace kphi::sim {
-namespace {
+namespace circuit_test {
 
 constexpr double kTick = 1.0 / 7000;
 
@@ -110,5 +110,5 @@ TEST(SupplyCircuit, ShowsItsMeterWithTheLagOfAMeter) {
   EXPECT_NEAR(circuit.shown_amps(), 2, 0.02);
 }
 
-}  // namespace
+}  // namespace circuit_test
 }  // namespace kphi::sim

@@ -8,7 +8,7 @@
 #include "test/drivers/sim/hex.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace slave_test {
 
 using namespace std::chrono_literals;
 using test::bytes;
@@ -358,5 +358,5 @@ TEST(SupplySlave, SurvivesAnyRequest) {
   }
 }
 
-}  // namespace
+}  // namespace slave_test
 }  // namespace kphi::sim

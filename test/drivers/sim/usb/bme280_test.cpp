@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 namespace kphi::sim {
-namespace {
+namespace bme280_test {
 
 using namespace std::chrono_literals;
 
@@ -86,5 +86,5 @@ TEST(SimulatedBme280, TakesSeveralRegistersInOneWrite) {
   EXPECT_EQ(sensor.peek(0xF4, 10ms), 0xB5);
 }
 
-}  // namespace
+}  // namespace bme280_test
 }  // namespace kphi::sim

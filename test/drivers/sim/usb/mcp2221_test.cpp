@@ -6,7 +6,7 @@
 #include "base/random.hpp"
 
 namespace kphi::sim {
-namespace {
+namespace mcp2221_test {
 
 using namespace std::chrono_literals;
 using Bytes = std::vector<std::uint8_t>;
@@ -163,5 +163,5 @@ TEST_F(SimulatedMcp2221Test, SurvivesPacketsOfAnyLength) {
   }
 }
 
-}  // namespace
+}  // namespace mcp2221_test
 }  // namespace kphi::sim
