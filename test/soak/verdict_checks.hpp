@@ -12,6 +12,9 @@ namespace kphi::soak {
 
 using Lines = std::vector<std::string>;
 
+/// From a sample beyond a limit to the coast at most; of a module that hears nothing: by its own timeout.
+inline constexpr Duration kHeard = std::chrono::milliseconds(50), kOwnTimeout = std::chrono::milliseconds(600);
+
 void check_account(const Evidence& evidence, Lines& wrong);
 void check_motion(const Evidence& evidence, const Reaches& reaches, Lines& wrong);
 void check_record(const Evidence& evidence, Lines& wrong);

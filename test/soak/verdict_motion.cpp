@@ -9,8 +9,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Duration kHeard = 50ms;
-constexpr Duration kOwnTimeout = 600ms;
 constexpr Duration kOldest = 250ms;
 constexpr double kSafeToTouch = 5.0;  // rad/s
 

@@ -10,8 +10,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr Duration kHeard = 50ms;
-constexpr Duration kOwnTimeout = 600ms;
 constexpr Duration kUnjudged = 20ms;  ///< at the end of a run, when the guard has stood down
 /// Of a Net Box: summary, latch, saturation, and what concerns its networks only.
 constexpr std::uint32_t kBorne =
