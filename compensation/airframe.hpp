@@ -61,16 +61,8 @@ struct Airframe {
   if (airframe.polygon) return hub_at_hinge(airframe.polygon->hinges[arm], airframe.arm_length, arm_angle);
   HubPosition hub = hub_seen_from_hinge(airframe, arm_angle);
   if (airframe.mirrored[arm]) hub = {hub.y, hub.x};
-  switch (airframe.hinge_turns[arm] & 3) {
-    case 1:
-      return {-hub.y, hub.x};
-    case 2:
-      return {-hub.x, -hub.y};
-    case 3:
-      return {hub.y, -hub.x};
-    default:
-      return hub;
-  }
+  for (int turns = airframe.hinge_turns[arm] & 3; turns > 0; --turns) hub = {-hub.y, hub.x};
+  return hub;
 }
 
 }  // namespace kphi::compensation

@@ -10,22 +10,17 @@ namespace kphi::daq {
 
 std::string to_words(const SpeedError& error) {
   const double measured = to_rpm(error.measured), commanded = to_rpm(error.commanded), lasts = to_seconds(error.lasts);
-  switch (error.kind) {
-    case SpeedError::Kind::none:
-      return {};
-    case SpeedError::Kind::strays:
-      return fmt::format(
-          "motor: speed off target for {:.2g} s: {:.0f} of {:.0f} RPM; check for a blocked rotor, a loose propeller, a "
-          "weak supply",
-          lasts, measured, commanded);
-    case SpeedError::Kind::stalled:
-      return fmt::format(
-          "motor: the rotor is stalled for {:.2g} s: {:.0f} A at {:.0f} of {:.0f} RPM; check for a blocked rotor",
-          lasts, error.motor_current.value(), measured, commanded);
-    case SpeedError::Kind::unseen:
-      return fmt::format("motor: no speed reading for {:.2g} s although the module answers; check its line", lasts);
-  }
-  return {};
+  if (error.kind == SpeedError::Kind::strays)
+    return fmt::format(
+        "motor: speed off target for {:.2g} s: {:.0f} of {:.0f} RPM; check for a blocked rotor, a loose propeller, a "
+        "weak supply",
+        lasts, measured, commanded);
+  if (error.kind == SpeedError::Kind::stalled)
+    return fmt::format(
+        "motor: the rotor is stalled for {:.2g} s: {:.0f} A at {:.0f} of {:.0f} RPM; check for a blocked rotor", lasts,
+        error.motor_current.value(), measured, commanded);
+  if (error.kind == SpeedError::Kind::none) return {};
+  return fmt::format("motor: no speed reading for {:.2g} s although the module answers; check its line", lasts);
 }
 
 void SpeedWatch::command(Instant at, RadPerSec speed) noexcept {

@@ -189,14 +189,10 @@ std::string value_text(const std::optional<double>& value, const char* unit) {
 }
 
 std::string coil_words(const AuditRecord& module) {
-  switch (module.coil_temperature_client()) {
-    case 83:
-      return "coil " + value_text(module.value<"coil_temperature_estimator.t_coil">(), "°C");
-    case 77:
-      return "coil " + value_text(module.value<"temperature_estimator.temp">(), "°C") + " (old client)";
-    default:
-      return "no coil temperature";
-  }
+  const int client = module.coil_temperature_client();
+  if (client == 83) return "coil " + value_text(module.value<"coil_temperature_estimator.t_coil">(), "°C");
+  if (client == 77) return "coil " + value_text(module.value<"temperature_estimator.temp">(), "°C") + " (old client)";
+  return "no coil temperature";
 }
 
 void describe(const AuditRecord& module, std::vector<std::string>& text) {

@@ -83,20 +83,13 @@ void Coasting::ask(Exchange& exchange, Instant now) noexcept {
 std::string StopReport::summary() const {
   const std::string coast = time_to_coast ? fmt::format("coast confirmed after {:.2f} s", to_seconds(*time_to_coast))
                                           : std::string("coast NOT CONFIRMED");
-  switch (outcome) {
-    case Outcome::standing:
-      return fmt::format("{}, at rest after {:.1f} s", coast, to_seconds(time_to_standing.value_or(Duration(0))));
-    case Outcome::slowing:
-      return fmt::format("{}, slowing down at {}", coast, rpm(speed_at_end));
-    case Outcome::turning:
-      return fmt::format("{}, but STILL TURNING at {}: cut its power", coast, rpm(speed_at_end));
-    case Outcome::unseen:
-      return coast + ", but its speed was not read afterwards: it may still be turning";
-    case Outcome::overruled:
-      return "coast overruled by a new speed";
-    case Outcome::unconfirmed:
-      break;
-  }
+  if (outcome == Outcome::standing)
+    return fmt::format("{}, at rest after {:.1f} s", coast, to_seconds(time_to_standing.value_or(Duration(0))));
+  if (outcome == Outcome::slowing) return fmt::format("{}, slowing down at {}", coast, rpm(speed_at_end));
+  if (outcome == Outcome::turning)
+    return fmt::format("{}, but STILL TURNING at {}: cut its power", coast, rpm(speed_at_end));
+  if (outcome == Outcome::unseen) return coast + ", but its speed was not read afterwards: it may still be turning";
+  if (outcome == Outcome::overruled) return "coast overruled by a new speed";
   return coast +
          ": it MAY BE TURNING, cut its power at the switch; without orders its module stops driving after 0.5 s";
 }

@@ -55,16 +55,12 @@ http::response<http::string_body> read_response(TcpClient& box) {
 }
 
 std::string advice(const TcpError& error, std::uint16_t port) {
-  switch (error.cause) {
-    case TcpError::Cause::refused:
-      return fmt::format("a device is at this address, but no web server on port {}: check the address and http_port",
-                         port);
-    case TcpError::Cause::timeout:
-      return "check the address, the cable and the box's power; the box serves one connection at a time: close its web "
-             "pages";
-    default:
-      return "check the address, the cable and the box's power";
-  }
+  if (error.cause == TcpError::Cause::refused)
+    return fmt::format("a device is at this address, but no web server on port {}: check the address and http_port",
+                       port);
+  const std::string all = "check the address, the cable and the box's power";
+  if (error.cause != TcpError::Cause::timeout) return all;
+  return all + "; the box serves one connection at a time: close its web pages";
 }
 
 }  // namespace
