@@ -5,7 +5,6 @@
 
 #include <hdf5.h>
 
-#include <array>
 #include <boost/crc.hpp>
 #include <cstddef>
 #include <cstdint>

@@ -9,8 +9,6 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <span>
-#include <string_view>
-#include <utility>
 
 #include "results/hdf5.hpp"
 #include "results/run_layout.hpp"

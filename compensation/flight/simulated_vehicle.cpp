@@ -1,7 +1,6 @@
 #include "compensation/flight/simulated_vehicle.hpp"
 
 #include <Eigen/LU>
-#include <cmath>
 
 namespace kphi::flight {
 namespace {

@@ -9,7 +9,6 @@
 #include <atomic>
 #include <functional>
 #include <memory>
-#include <optional>
 
 #include "daq/bench/bench.hpp"
 #include "daq/guard/interlock.hpp"

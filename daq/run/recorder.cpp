@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "daq/guard/guard_limits.hpp"
 
 namespace kphi::daq {

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <exception>
-#include <string>
 #include <vector>
 
 #include "base/published.hpp"

@@ -2,7 +2,6 @@
 // and the sensor with one forced measurement per reading, so that it does not heat itself between them.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>

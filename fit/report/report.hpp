@@ -4,7 +4,6 @@
 
 #include <span>
 #include <string>
-#include <vector>
 
 #include "fit/coefficients/coefficients.hpp"
 #include "fit/propellers/claims.hpp"

@@ -9,13 +9,11 @@
 // degrees of freedom reduced for correlated steps (Box, Ann. Math. Stat. 25 (1954) 484).
 #pragma once
 
-#include <optional>
 #include <span>
 #include <vector>
 
 #include "fit/model/identification.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
-#include "results/step_mean.hpp"
 
 namespace kphi::fit {
 
