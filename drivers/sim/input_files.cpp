@@ -120,8 +120,8 @@ constexpr std::array kRows{
 };
 
 void set(MotorProfile& profile, const std::string& section, const std::string& key, const std::string& text) {
-  const auto found = std::find_if(kRows.begin(), kRows.end(),
-                                  [&](const MotorRow& row) { return row.section == section && row.name == key; });
+  const auto found =
+      std::ranges::find_if(kRows, [&](const MotorRow& row) { return row.section == section && row.name == key; });
   if (found == kRows.end())
     throw FaultEntryError(key, fmt::format("{} has no key \"{}\", see profiles/motor_iq2306.yaml", section, key));
   try {
@@ -165,8 +165,7 @@ void load_faults(const std::string& text, const std::string& path, BenchSettings
 MotorProfile parse_motor_profile(const std::string& text, const std::string& path) {
   MotorProfile profile;
   for (const auto& [section, node] : file_of(text, path, kMotorFormat)) {
-    const bool known =
-        std::any_of(kRows.begin(), kRows.end(), [&name = section](const MotorRow& row) { return row.section == name; });
+    const bool known = std::ranges::find(kRows, section, &MotorRow::section) != kRows.end();
     if (!known) refuse(path, node.Mark(), fmt::format("unknown key \"{}\"", section), "remove it");
     read_entry(node, path, "fix this entry", [&profile, &name = section](const FaultEntry& entry) {
       for (const auto& [key, value] : entry) set(profile, name, key, value);

@@ -14,8 +14,6 @@ constexpr double kBusCapacitance = 270e-6;  // F: the capacitor that the vendor 
 constexpr double kApproach = 0.5;           // of the way to the voltage limit, per tick
 constexpr double kSaturated = 1e-3;         // V
 
-double sign_of(double x) noexcept { return x > 0 ? 1.0 : (x < 0 ? -1.0 : 0.0); }
-
 /// A current at which regeneration lifts the bus no further than it may within one tick; the firmware's own tick is
 /// much shorter, so it can wait and see. `emf` and the result are of the turning direction.
 double least_amps(double emf, double volts, const IqLimits& limits) noexcept {

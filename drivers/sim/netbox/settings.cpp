@@ -36,8 +36,7 @@ constexpr std::array<QuirkRow, 8> kQuirks{{
 }  // namespace
 
 void set_quirk(NetBoxQuirks& quirks, const std::string& name, const std::string& value) {
-  const auto quirk =
-      std::find_if(kQuirks.begin(), kQuirks.end(), [&](const QuirkRow& row) { return row.name == name; });
+  const auto quirk = std::ranges::find(kQuirks, name, &QuirkRow::name);
   if (quirk == kQuirks.end()) {
     std::vector<std::string_view> known;
     for (const QuirkRow& row : kQuirks) known.push_back(row.name);
@@ -45,7 +44,7 @@ void set_quirk(NetBoxQuirks& quirks, const std::string& name, const std::string&
   }
   std::vector<std::string_view> words(quirk->words.begin(), quirk->words.end());
   if (words.back().empty()) words.pop_back();
-  const auto word = std::find(words.begin(), words.end(), value);
+  const auto word = std::ranges::find(words, value);
   if (word == words.end())
     throw FaultEntryError(name, fmt::format("\"{}\" is not one of {}", value, fmt::join(words, ", ")));
   quirk->set(quirks, static_cast<int>(word - words.begin()));

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -19,23 +20,15 @@ struct Unit {
   double si;   ///< SI units in one of these
   int counts;  ///< per unit
 };
-using Units = std::array<Unit, 6>;
 
-inline constexpr Units kForceUnits{{{"lbf", 4.4482216152605, 1},
-                                    {"N", 1, 1'000'000},
-                                    {"klbf", 4448.2216152605, 1},
-                                    {"kN", 1000, 1'000'000},
-                                    {"kgf", 9.80665, 1},
-                                    {"gf", 0.00980665, 1}}};
-inline constexpr Units kTorqueUnits{{{"lbf-in", 0.1129848290276167, 1},
-                                     {"lbf-ft", 1.3558179483314004, 1},
-                                     {"Nm", 1, 1'000'000},
-                                     {"Nmm", 0.001, 1000},
-                                     {"kgf-cm", 0.0980665, 1},
-                                     {"kNm", 1000, 1'000'000}}};
+inline constexpr Unit kForceUnits[] = {{"lbf", 4.4482216152605, 1}, {"N", 1, 1'000'000}, {"klbf", 4448.2216152605, 1},
+                                       {"kN", 1000, 1'000'000},     {"kgf", 9.80665, 1}, {"gf", 0.00980665, 1}};
+inline constexpr Unit kTorqueUnits[] = {
+    {"lbf-in", 0.1129848290276167, 1}, {"lbf-ft", 1.3558179483314004, 1}, {"Nm", 1, 1'000'000}, {"Nmm", 0.001, 1000},
+    {"kgf-cm", 0.0980665, 1},          {"kNm", 1000, 1'000'000}};
 
 /// Codes count from 1.
-[[nodiscard]] constexpr const Unit& unit(const Units& units, int code) noexcept {
+[[nodiscard]] constexpr const Unit& unit(std::span<const Unit> units, int code) noexcept {
   return units[static_cast<std::size_t>(code - 1)];
 }
 

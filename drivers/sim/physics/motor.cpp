@@ -10,8 +10,6 @@ namespace {
 
 constexpr int kTicksPerWarming = 70;  // heat is slow: every 10 ms
 
-double sign_of(double x) noexcept { return x > 0 ? 1.0 : (x < 0 ? -1.0 : 0.0); }
-
 }  // namespace
 
 /// One tick of the shaft before the motor's torque is known.

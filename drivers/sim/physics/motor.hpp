@@ -15,6 +15,8 @@ namespace kphi::sim {
 inline constexpr int kTicksPerSecond = 7000;
 inline constexpr double kTick = 1.0 / kTicksPerSecond;  ///< s
 
+[[nodiscard]] inline double sign_of(double x) noexcept { return x > 0 ? 1.0 : (x < 0 ? -1.0 : 0.0); }
+
 /// What the power stage does during one tick.
 struct PowerStage {
   enum class Mode : std::uint8_t {

@@ -26,7 +26,7 @@ void append_propeller(std::string& out, const PropellerTruth& propeller) {
 }  // namespace
 
 const PropellerTruth* find_propeller(std::string_view id) noexcept {
-  const auto found = std::find_if(kPropellers.begin(), kPropellers.end(), [&](const auto& p) { return p.id == id; });
+  const auto found = std::ranges::find(kPropellers, id, &PropellerTruth::id);
   return found == kPropellers.end() ? nullptr : &*found;
 }
 

@@ -246,8 +246,7 @@ constexpr FaultyDevice kFaultyDevices[] = {
     {"motor_", "the motor"}, {"supply_", "the supply"}, {"ambient_", "the air sensor"}, {"", "the load cell"}};
 
 const FaultyDevice& device_of(std::string_view name) {
-  return *std::find_if(std::begin(kFaultyDevices), std::end(kFaultyDevices),
-                       [&](const FaultyDevice& device) { return name.starts_with(device.prefix); });
+  return *std::ranges::find_if(kFaultyDevices, [&](const auto& device) { return name.starts_with(device.prefix); });
 }
 
 const FaultRow& row_of(const FaultEntry& entry) {
@@ -287,8 +286,7 @@ Fault fault_of(const FaultEntry& entry) {
   const FaultRow& row = row_of(entry);
   const std::vector<FaultKey> keys = keys_of(row);
   for (const auto& [name, unused] : entry) {
-    const bool known =
-        std::any_of(keys.begin(), keys.end(), [&name = name](const FaultKey& key) { return key.name == name; });
+    const bool known = std::ranges::find(keys, name, &FaultKey::name) != keys.end();
     if (!known && name != "kind") refuse(name, fmt::format("{} has no key \"{}\"", row.name, name));
   }
   const bool ends = entry.contains("for_s"), counts = entry.contains("count");
@@ -310,8 +308,7 @@ Fault fault_of(const FaultEntry& entry) {
 }
 
 std::string_view name_of(FaultKind kind) noexcept {
-  const auto row =
-      std::find_if(fault_rows().begin(), fault_rows().end(), [kind](const FaultRow& r) { return r.kind == kind; });
+  const auto row = std::ranges::find(fault_rows(), kind, &FaultRow::kind);
   return row == fault_rows().end() ? "?" : row->name;
 }
 
