@@ -35,6 +35,16 @@ class ConfigurationError : public Error {
   explicit ConfigurationError(const std::string& message) : Error(message, ExitCode::usage) {}
 };
 
+/// Runs `work`; an argument that it refuses becomes a ConfigurationError of `where`.
+template <class Work>
+auto configured(const std::string& where, Work&& work) {
+  try {
+    return work();
+  } catch (const std::invalid_argument& error) {
+    throw ConfigurationError(where + ": " + error.what());
+  }
+}
+
 /// A device operation that failed.
 class DeviceError : public Error {
  public:

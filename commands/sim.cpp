@@ -66,7 +66,7 @@ profiles::BenchConfig load_simulated(const Options& options) {
 }
 
 void load_supply(const profiles::BenchConfig& bench, const Options& options, ServerSettings& settings) {
-  try {
+  configured(bench.path, [&] {
     const SupplyUri uri = parse_supply_uri(bench.supply->uri);
     auto& supply = *settings.bench.supply;
     supply.model = uri.model;
@@ -75,9 +75,7 @@ void load_supply(const profiles::BenchConfig& bench, const Options& options, Ser
     (void)SupplySlave(supply);  // refuses an unknown model
     settings.supply = uri.addresses;
     if (options.free_ports) settings.supply->port = 0;
-  } catch (const std::invalid_argument& error) {
-    refuse(bench.path, error.what());
-  }
+  });
 }
 
 ServerSettings settings_of(const profiles::BenchConfig& bench, const Options& options) {

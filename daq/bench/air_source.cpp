@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <stdexcept>
-
 #include "base/error.hpp"
 #include "drivers/ambient/bme280.hpp"
 
@@ -13,26 +11,17 @@ namespace {
 constexpr std::chrono::seconds kFirstReading{10};  // wall time; a sensor takes 0.2 s
 constexpr std::chrono::minutes kOldest{1};         // likewise; weather is slower
 
-template <class Work>
-auto configured(Work&& work) {
-  try {
-    return work();
-  } catch (const std::invalid_argument& error) {
-    throw ConfigurationError(std::string("ambient: ") + error.what());
-  }
-}
-
 }  // namespace
 
 AirSource::AirSource(const profiles::AmbientConfig& config, const Clock& clock) : clock_(clock) {
   if (const auto& seen = config.manual) {
-    manual_ = configured([&] {
+    manual_ = configured("ambient", [&] {
       return ambient::density_of({seen->temperature_c, seen->pressure_pa, seen->relative_humidity,
                                   seen->u_temperature_c, seen->u_pressure_pa, seen->u_relative_humidity});
     });
   }
   if (config.sensor.empty()) return;
-  const UsbAddress sensor = configured([&] { return ambient::sensor_address(config.sensor); });
+  const UsbAddress sensor = configured("ambient", [&] { return ambient::sensor_address(config.sensor); });
   (void)ambient::open(sensor);  // throws at once if it is unusable
   sensor_.emplace([sensor] { return ambient::open(sensor); }, clock);
   if (!sensor_->wait_for_first(kFirstReading)) throw DeviceError(sensor_->failure());

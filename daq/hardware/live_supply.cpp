@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <stdexcept>
 #include <thread>
 
 #include "base/error.hpp"
@@ -21,12 +20,10 @@ constexpr std::chrono::milliseconds kAsk{2};  // between two checks of the newes
 }  // namespace
 
 std::unique_ptr<supply::Supply> open_supply(const profiles::SupplyConfig& config, const Clock& clock) {
-  try {
+  return configured("supply.uri", [&]() -> std::unique_ptr<supply::Supply> {
     if (scpi::is_scpi(config.uri)) return std::make_unique<scpi::ScpiSupply>(scpi::open_line(config.uri), clock);
     return std::make_unique<supply::ModbusSupply>(supply::parse_address(config.uri), clock);
-  } catch (const std::invalid_argument& error) {
-    throw ConfigurationError(std::string("supply.uri: ") + error.what());
-  }
+  });
 }
 
 std::string summary(const supply::Identity& identity) {
@@ -42,11 +39,9 @@ LiveSupply::LiveSupply(const profiles::SupplyConfig& config, const Clock& clock)
 std::string LiveSupply::identity() const { return summary(worker_.identity()); }
 
 void LiveSupply::switch_on() {
-  try {
+  configured("supply", [&] {
     worker_.apply({config_.voltage, config_.current_limit, config_.over_voltage, config_.over_current});
-  } catch (const std::invalid_argument& error) {
-    throw ConfigurationError(std::string("supply: ") + error.what());
-  }
+  });
   worker_.switch_on();
   const auto give_up = std::chrono::steady_clock::now() + kRise;
   const double enough = (1 - results::kSupplySag) * config_.voltage.value();
