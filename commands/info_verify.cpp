@@ -137,9 +137,7 @@ ExitCode verify(const Asked& asked) {
     found["outcome"] = run.outcome == Outcome::complete ? "complete" : "aborted";
     found["samples"] = run.samples;
     found["lost"] = run.lost;
-    for (const std::string& problem : run.problems) {
-      problems.push_back(problem.find(asked.path) == std::string::npos ? asked.path + ": " + problem : problem);
-    }
+    for (const std::string& problem : run.problems) problems.push_back(with_file(asked.path, problem));
     words = fmt::format("{} run, {} samples, {} lost and accounted for", found["outcome"].get<std::string>(),
                         run.samples, run.lost);
   }

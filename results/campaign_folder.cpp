@@ -100,11 +100,12 @@ std::map<std::string, std::string> recorded_digests(const CampaignFolder& folder
   return digests;
 }
 
-/// Empty: the file is the one of the journal.
-std::string problem_with(const std::filesystem::path& path, const std::string& sha256) {
-  if (!std::filesystem::exists(path)) return path.string() + ": missing, but in the journal";
-  if (sha256_of_file(path) != sha256) return path.string() + ": SHA-256 does not match the journal";
-  return {};
+/// Adds a problem unless the file is the one of the journal.
+void check_file(const std::filesystem::path& path, const std::string& sha256, std::vector<std::string>& problems) {
+  const bool exists = std::filesystem::exists(path);
+  if (!exists) problems.push_back(path.string() + ": missing, but in the journal");
+  if (exists && sha256_of_file(path) != sha256)
+    problems.push_back(path.string() + ": SHA-256 does not match the journal");
 }
 
 /// Copying or version control may have made it writable; the SHA-256 shows whether anybody changed it.
@@ -178,10 +179,7 @@ CampaignState state_of(const JournalReading& journal) {
 
 std::vector<std::string> changed_runs(const CampaignFolder& folder, const CampaignState& state) {
   std::vector<std::string> problems;
-  for (const AcceptedRun& run : state.accepted) {
-    if (std::string problem = problem_with(folder.path() / run.file, run.sha256); !problem.empty())
-      problems.push_back(std::move(problem));
-  }
+  for (const AcceptedRun& run : state.accepted) check_file(folder.path() / run.file, run.sha256, problems);
   return problems;
 }
 
@@ -204,22 +202,15 @@ std::vector<std::string> set_leftovers_aside(const CampaignFolder& folder, const
 CampaignVerification verify_campaign(const CampaignFolder& folder) {
   CampaignVerification found;
   const auto digests = recorded_digests(folder, found);
-  for (const auto& [file, digest] : digests) {
-    if (std::string problem = problem_with(folder.path() / file, digest); !problem.empty())
-      found.problems.push_back(std::move(problem));
-  }
+  for (const auto& [file, digest] : digests) check_file(folder.path() / file, digest, found.problems);
   std::vector<std::filesystem::path> runs = folder.complete_runs();
   for (const auto& path : folder.reference_runs()) runs.push_back(path);
   for (const auto& path : runs) {
     ++found.runs;
     if (is_writable(path)) found.remarks.push_back(path.string() + ": writable; run chmod a-w on it");
-    for (const std::string& problem : verify_run(path).problems) {
-      found.problems.push_back(problem.find(path.string()) == std::string::npos ? path.string() + ": " + problem
-                                                                                : problem);
-    }
-    if (!digests.contains("runs/" + path.filename().string())) {
+    for (const std::string& problem : verify_run(path).problems) found.problems.push_back(with_file(path, problem));
+    if (!digests.contains("runs/" + path.filename().string()))
       found.problems.push_back(path.string() + ": not in the journal");
-    }
   }
   return found;
 }

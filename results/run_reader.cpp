@@ -131,8 +131,7 @@ auto naming(const std::filesystem::path& path, Read&& read) {
   try {
     return read();
   } catch (const RecordError& error) {
-    const std::string text = error.what();
-    throw RecordError(text.find(path.string()) != std::string::npos ? text : path.string() + ": " + text);
+    throw RecordError(with_file(path, error.what()));
   }
 }
 
@@ -313,16 +312,17 @@ std::string attributes_digest(const RunHeader& header, const RunEnding& ending) 
   return sha256(all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
+std::string with_file(const std::filesystem::path& path, const std::string& problem) {
+  return problem.find(path.string()) == std::string::npos ? path.string() + ": " + problem : problem;
+}
+
 const char* outcome_name(Outcome outcome) { return outcome == Outcome::complete ? "complete" : "aborted"; }
 
 Verification verify_run(const std::filesystem::path& path) {
   Verification found;
-  found.path = path;
   try {
     const Handle root = hdf5::open_file(path);
     const RunRecording run = read_run(path);
-    found.header = run.header;
-    found.account = run.account;
     found.outcome = run.outcome;
     found.samples = run.load_cell.size();
     check_end(root, run, found.problems);

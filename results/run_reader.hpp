@@ -29,10 +29,10 @@ struct SequenceCheck {
 };
 [[nodiscard]] SequenceCheck check_sequence(const std::vector<LoadCellRecord>& records, std::uint32_t ft_stride);
 
+/// `problem` with the file's name in front, unless it names the file already.
+[[nodiscard]] std::string with_file(const std::filesystem::path& path, const std::string& problem);
+
 struct Verification {
-  std::filesystem::path path;
-  RunHeader header;
-  SampleAccount account;
   Outcome outcome = Outcome::aborted;
   std::uint64_t samples = 0;
   std::uint64_t lost = 0;
