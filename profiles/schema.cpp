@@ -317,22 +317,22 @@ struct Keyword {
 };
 
 /// What a schema may say beside annotations. The type first: of the findings at one value the first is shown.
-constexpr std::array<Keyword, 16> kKeywords{{{"type", check_type},
-                                             {"enum", check_enum},
-                                             {"pattern", check_pattern},
-                                             {"maximum", check_maximum},
-                                             {"exclusiveMaximum", check_below},
-                                             {"minimum", check_minimum},
-                                             {"exclusiveMinimum", check_above},
-                                             {"maxLength", check_longest},
-                                             {"minLength", check_shortest},
-                                             {"maxItems", check_most_items},
-                                             {"minItems", check_fewest_items},
-                                             {"minProperties", check_fewest_keys},
-                                             {"properties", check_properties},
-                                             {"additionalProperties", check_other_keys},
-                                             {"required", check_required},
-                                             {"items", check_items}}};
+constexpr Keyword kKeywords[] = {{"type", check_type},
+                                 {"enum", check_enum},
+                                 {"pattern", check_pattern},
+                                 {"maximum", check_maximum},
+                                 {"exclusiveMaximum", check_below},
+                                 {"minimum", check_minimum},
+                                 {"exclusiveMinimum", check_above},
+                                 {"maxLength", check_longest},
+                                 {"minLength", check_shortest},
+                                 {"maxItems", check_most_items},
+                                 {"minItems", check_fewest_items},
+                                 {"minProperties", check_fewest_keys},
+                                 {"properties", check_properties},
+                                 {"additionalProperties", check_other_keys},
+                                 {"required", check_required},
+                                 {"items", check_items}};
 
 void check(const Spot& spot, Findings& findings) {
   for (const Keyword& keyword : kKeywords) {

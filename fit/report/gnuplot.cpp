@@ -27,13 +27,8 @@ constexpr const char* kMissing =
     "gnuplot is not installed; `apt install gnuplot-nox`, then `kphi report` draws the figures";
 constexpr std::size_t kMessageMax = 400;
 
-constexpr std::array<Mark, 7> kMarks{{{"#0072B2", 7},
-                                      {"#D55E00", 5},
-                                      {"#009E73", 9},
-                                      {"#CC79A7", 13},
-                                      {"#E69F00", 11},
-                                      {"#56B4E9", 15},
-                                      {"#444444", 6}}};
+constexpr Mark kMarks[] = {{"#0072B2", 7},  {"#D55E00", 5},  {"#009E73", 9}, {"#CC79A7", 13},
+                           {"#E69F00", 11}, {"#56B4E9", 15}, {"#444444", 6}};
 
 /// How the child begins: its three streams, and default actions for signals that this program may ignore.
 struct SpawnSettings {
@@ -111,7 +106,7 @@ Figures draw(const std::vector<Figure>& wanted, const fs::path& folder, const st
   return figures;
 }
 
-Mark mark(std::size_t i) { return kMarks[i % kMarks.size()]; }
+Mark mark(std::size_t i) { return kMarks[i % std::size(kMarks)]; }
 
 std::string figure_head(int height) {
   return fmt::format(

@@ -108,14 +108,15 @@ std::string inline_svg(std::string_view svg, const std::string& prefix) {
 }
 
 std::string typeset(std::string_view text) {
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kSigns{{{"K_T", "K<sub>T</sub>"},
-                                                                                        {"k_i", "k<sub>i</sub>"},
-                                                                                        {"w^2", "ω²"},
-                                                                                        {"phi", "φ"},
-                                                                                        {" deg", "°"},
-                                                                                        {"RPM^2", "RPM²"},
-                                                                                        {")^2", ")²"},
-                                                                                        {"D^4", "D⁴"}}};
+  using Sign = std::pair<std::string_view, std::string_view>;
+  static constexpr Sign kSigns[] = {{"K_T", "K<sub>T</sub>"},
+                                    {"k_i", "k<sub>i</sub>"},
+                                    {"w^2", "ω²"},
+                                    {"phi", "φ"},
+                                    {" deg", "°"},
+                                    {"RPM^2", "RPM²"},
+                                    {")^2", ")²"},
+                                    {"D^4", "D⁴"}};
   std::string result = html_escaped(text);
   const auto letter = [&](std::size_t at) {
     return at < result.size() && std::isalpha(static_cast<unsigned char>(result[at])) != 0;
