@@ -80,8 +80,8 @@ class Checks {
     const auto prior = thrust_prior(campaign_.propeller);
     if (!prior)
       return tell("thrust", fmt::format("limit {:g} N; no published thrust data for such a propeller", limit));
-    const double low = ThrustPrior::at(prior->low, top_speed(campaign_)).value();
-    const double high = ThrustPrior::at(prior->high, top_speed(campaign_)).value();
+    const double low = thrust_at(prior->low, top_speed(campaign_)).value();
+    const double high = thrust_at(prior->high, top_speed(campaign_)).value();
     const std::string words = fmt::format("about {:.1f} to {:.1f} N expected at top speed ({}), limit {:g} N", low,
                                           high, prior->source, limit);
     warn_if(high > limit, "thrust", words, low > limit ? "the limit will stop the run" : "the limit may stop the run");

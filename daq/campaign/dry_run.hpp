@@ -23,9 +23,6 @@ struct ThrustPrior {
   ThrustCoefficient low;
   ThrustCoefficient high;
   std::string source;
-  [[nodiscard]] static Newtons at(ThrustCoefficient k, RadPerSec speed) {
-    return Newtons(k.value() * speed.value() * speed.value());
-  }
 };
 
 /// By diameter and number of blades; nullopt without a published measurement. A plausibility check, not a result.

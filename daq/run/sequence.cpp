@@ -133,12 +133,12 @@ std::string Sequence::explanation() {
 }
 
 void Sequence::take_box_bias() {
-  const netbox::ZeroMeasurement before = measure(Phase::bias_before);
+  const netbox::ZeroMeasurement before = hold_zero(Phase::bias_before);
   if (const auto why = unrest(before)) throw DeviceError("Net Box", "take the bias", *why, results::kZeroNextMove);
   // The box takes one noisy sample as its zero: after a bad one, try again.
   for (int attempt = 1;; ++attempt) {
     set_box_bias();
-    const netbox::ZeroMeasurement after = measure(Phase::bias_after);
+    const netbox::ZeroMeasurement after = hold_zero(Phase::bias_after);
     box_bias_ = to_bias(before, after);
     const auto remains = beyond_zero(after);
     if (!remains) return;
@@ -151,11 +151,6 @@ void Sequence::set_box_bias() {
   bench_.load_cell().set_bias();
   const netbox::Configuration& box = bench_.load_cell().configuration();
   hold(bench_.clock().stretched(kBiasWorksWall) + from_seconds(3 * box.records_per_datagram / box.rdt_rate_hz));
-}
-
-netbox::ZeroMeasurement Sequence::measure(Phase phase) {
-  hold_zero(phase);
-  return recorder_.measured();
 }
 
 void Sequence::ramp_to(RadPerSec level, MotorEnable& spin) {
@@ -229,10 +224,11 @@ void Sequence::change_speed() {
   guard_.settles_until(bench_.clock().now() + from_seconds(order_.campaign.minimum_discard.value()));
 }
 
-void Sequence::hold_zero(Phase phase) {
+netbox::ZeroMeasurement Sequence::hold_zero(Phase phase) {
   mark(phase);
   hold(from_seconds(order_.campaign.zero.value()));
   progress_.step_done(position_, seen_);
+  return recorder_.measured();
 }
 
 void Sequence::require_rest() {

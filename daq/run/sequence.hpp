@@ -58,7 +58,6 @@ class Sequence {
   void watch_the_coast(StopWords& words);
   void take_box_bias();
   void set_box_bias();
-  netbox::ZeroMeasurement measure(results::Phase phase);
   void spin_through_the_steps();
   void hold_step(const profiles::PlannedStep& step, MotorEnable& spin);
   /// If the motor missed a speed at full drive, the run skips the remaining steps at or above it.
@@ -67,7 +66,7 @@ class Sequence {
   /// Takes no time if the campaign sets no ramp.
   void ramp_to(RadPerSec level, MotorEnable& spin);
   void change_speed();
-  void hold_zero(results::Phase phase);
+  netbox::ZeroMeasurement hold_zero(results::Phase phase);
   /// Refuses a noisy zero before anything turns: all thrusts would inherit its error.
   void require_rest();
   void wait_for_standstill();

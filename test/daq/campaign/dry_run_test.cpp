@@ -166,7 +166,7 @@ TEST(ThrustPrior, OfFiveInchesIsWhatOthersMeasured) {
   ASSERT_TRUE(prior);
   EXPECT_EQ(prior->low.value(), 1.12e-6);
   EXPECT_EQ(prior->high.value(), 1.38e-6);
-  EXPECT_NEAR(ThrustPrior::at(prior->high, from_rpm(19100)).value(), 5.52, 0.01);
+  EXPECT_NEAR(thrust_at(prior->high, from_rpm(19100)).value(), 5.52, 0.01);
 }
 
 TEST(ThrustPrior, OfSixInchesIsTwiceThatAndSaysSo) {
