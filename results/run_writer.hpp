@@ -21,8 +21,6 @@ class RunWriter {
   /// Refuses if `final_path` exists. Renames a .part left by a killed writer.
   /// `files` must outlive the writer.
   RunWriter(std::filesystem::path final_path, const RunHeader& header, FileLayer& files = disk());
-  RunWriter(const RunWriter&) = delete;
-  RunWriter& operator=(const RunWriter&) = delete;
   /// Closes the file; without finish() the .part stays.
   ~RunWriter();
 

@@ -68,8 +68,6 @@ class CampaignRun {
     person_.log_to({});
     person_.while_waiting({});
   }
-  CampaignRun(const CampaignRun&) = delete;
-  CampaignRun& operator=(const CampaignRun&) = delete;
 
   CampaignResult run(const Resumption* resumption, const std::vector<BenchFinding>* audited) {
     json identity = identity_of(campaign_, config_);

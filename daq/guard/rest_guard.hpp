@@ -25,8 +25,6 @@ class RestGuard {
  public:
   /// Takes all readings of the bench, which must outlive this. `motor_has_power`: as far as the bench knows.
   RestGuard(Bench& bench, bool motor_has_power);
-  RestGuard(const RestGuard&) = delete;
-  RestGuard& operator=(const RestGuard&) = delete;
 
   /// Returns once a reading taken from now on shows the rotor at rest. Throws SafetyStop after a trip, if the rotor
   /// still turns after 30 s, or if its speed cannot be read; Interrupted if `stop_asked`.

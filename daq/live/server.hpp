@@ -35,8 +35,6 @@ class Server {
   Server(Settings settings, Feed& feed);
   /// Sends waiting messages for at most half a second, and closes.
   ~Server();
-  Server(const Server&) = delete;
-  Server& operator=(const Server&) = delete;
 
   [[nodiscard]] std::uint16_t port() const noexcept;
   /// With the token.

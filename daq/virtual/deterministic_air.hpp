@@ -18,8 +18,6 @@ class DeterministicAir {
   /// reading. `bench` outlives this.
   DeterministicAir(const Clock& bench, const sim::TrueAir& air, sim::FaultScript faults);
   ~DeterministicAir();
-  DeterministicAir(const DeterministicAir&) = delete;
-  DeterministicAir& operator=(const DeterministicAir&) = delete;
 
   /// Call it whenever time has passed. Measures every five seconds; after a failure it opens the sensor again, after
   /// longer and longer pauses.

@@ -37,8 +37,6 @@ class AmbientWorker {
   AmbientWorker(Open open, const Clock& clock, const Rhythm& rhythm = {});
   /// Waits for a reading in progress: 0.2 s, or some seconds if the bridge no longer answers.
   ~AmbientWorker();
-  AmbientWorker(const AmbientWorker&) = delete;
-  AmbientWorker& operator=(const AmbientWorker&) = delete;
 
   // Any thread; they do not wait.
   /// nullopt before the first reading. After a failure of the sensor it stays and ages.

@@ -45,8 +45,6 @@ class Port {
   /// program uses flock.
   Port(const std::string& specification, unsigned baud);
   ~Port();
-  Port(const Port&) = delete;
-  Port& operator=(const Port&) = delete;
 
   /// For poll(2).
   [[nodiscard]] int fd() const noexcept { return port_.number(); }

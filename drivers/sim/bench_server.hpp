@@ -43,8 +43,6 @@ class Server {
   /// Opens everything. Throws DeviceError, also if another simulator has the control socket.
   explicit Server(const ServerSettings& settings);
   ~Server();  ///< removes control socket and symlink
-  Server(const Server&) = delete;
-  Server& operator=(const Server&) = delete;
 
   /// The actual ports and names.
   [[nodiscard]] const Addresses& addresses() const noexcept { return addresses_; }

@@ -39,8 +39,6 @@ struct BenchSettings {
 class SimulatedBench {
  public:
   explicit SimulatedBench(const BenchSettings& settings);
-  SimulatedBench(const SimulatedBench&) = delete;
-  SimulatedBench& operator=(const SimulatedBench&) = delete;
 
   /// Occlusion in degrees, [0, 360). Throws std::invalid_argument for an unknown propeller, an angle out of range, or
   /// while the shaft turns faster than 5 rad/s.

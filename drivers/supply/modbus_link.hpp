@@ -46,8 +46,6 @@ class ModbusLink {
   /// Opens nothing yet. `address`: of parse_address().
   ModbusLink(const Address& address, const Timing& timing);
   ~ModbusLink();
-  ModbusLink(const ModbusLink&) = delete;
-  ModbusLink& operator=(const ModbusLink&) = delete;
 
   /// Opens, or reopens. A serial port is opened exclusively.
   [[nodiscard]] Outcome open();

@@ -33,8 +33,6 @@ class Worker {
   Worker(std::unique_ptr<Supply> supply, const Clock& clock, double looks_per_second = kUsualRate);
   /// Switches off and closes; takes as long as the supply, a few seconds when it does not answer.
   ~Worker();
-  Worker(const Worker&) = delete;
-  Worker& operator=(const Worker&) = delete;
 
   /// Any thread; wait for the device. Throw what Supply throws, and DeviceError when the worker is not alive.
   void apply(const Limits& limits) {

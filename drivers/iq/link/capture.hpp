@@ -25,8 +25,6 @@ class Capture {
   /// Throws DeviceError when the file cannot be written.
   explicit Capture(const std::string& path);
   ~Capture();
-  Capture(const Capture&) = delete;
-  Capture& operator=(const Capture&) = delete;
 
   /// From one thread; never waits for the disk.
   void add(Direction direction, std::span<const std::uint8_t> bytes, Instant time);

@@ -63,8 +63,6 @@ class Link {
     }
   }
   ~Link() { end_thread(); }
-  Link(const Link&) = delete;
-  Link& operator=(const Link&) = delete;
 
  private:
   void wait_until_ready() {

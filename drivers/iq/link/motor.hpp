@@ -51,8 +51,6 @@ class Motor {
         const std::string& capture = {});
   /// Coasts three times, waits at most 0.6 s for drive mode coast, closes.
   ~Motor();
-  Motor(const Motor&) = delete;
-  Motor& operator=(const Motor&) = delete;
 
   // Callers; any thread unless it says otherwise.
 

@@ -19,8 +19,6 @@ class Pty {
   /// `baud`: rate of the other end until its client sets one.
   explicit Pty(const std::string& device, unsigned baud = 115200);
   ~Pty();  ///< removes the symlink, if it is still ours
-  Pty(const Pty&) = delete;
-  Pty& operator=(const Pty&) = delete;
 
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
   [[nodiscard]] int number() const noexcept { return master_.number(); }
