@@ -25,14 +25,8 @@ constexpr auto kAllAnswers = 1500ms;
 constexpr const char* kWhats[] = {"sleep:idle:handle-lid-switch", "sleep:idle", "sleep"};
 
 /// Does not flush: that would wait for a peer that does not read.
-struct CloseBus {
-  void operator()(sd_bus* bus) const noexcept { sd_bus_close_unref(bus); }
-};
-using Bus = std::unique_ptr<sd_bus, CloseBus>;
-
-struct ReleaseMessage {
-  void operator()(sd_bus_message* message) const noexcept { sd_bus_message_unref(message); }
-};
+using Bus = std::unique_ptr<sd_bus, decltype([](sd_bus* bus) { sd_bus_close_unref(bus); })>;
+using Message = std::unique_ptr<sd_bus_message, decltype([](sd_bus_message* one) { sd_bus_message_unref(one); })>;
 
 SteadyTime now() { return std::chrono::steady_clock::now(); }
 
@@ -67,7 +61,7 @@ int inhibit(sd_bus* bus, const char* what, SteadyTime end, std::string& cause) {
   int result = sd_bus_call_method(bus, "org.freedesktop.login1", "/org/freedesktop/login1",
                                   "org.freedesktop.login1.Manager", "Inhibit", &error, &answer, "ssss", what, "kphi",
                                   "the motor of the test stand may turn", "block");
-  const std::unique_ptr<sd_bus_message, ReleaseMessage> owned(answer);
+  const Message owned(answer);
   int lent = -1;
   if (result >= 0) result = sd_bus_message_read(answer, "h", &lent);
   if (result >= 0) {

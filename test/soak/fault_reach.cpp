@@ -28,7 +28,7 @@ bool silences(sim::FaultKind kind) {
 }
 
 Device device_of(sim::FaultKind kind) {
-  if (sim::on_motor(kind)) return Device::motor;
+  if (sim::within(kind, sim::FaultKind::motor_flip, sim::FaultKind::motor_locked)) return Device::motor;
   if (sim::on_supply(kind)) return Device::supply;
   return sim::on_air_sensor(kind) ? Device::air : Device::load_cell;
 }

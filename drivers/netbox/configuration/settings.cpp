@@ -42,11 +42,6 @@ constexpr Setting kSettings[] = {
     {"comm.cgi", "comrdtbsiz", "records_per_datagram", &WantedSettings::records_per_datagram, 1, 40},
 };
 
-const Setting* setting_of(const std::string& key) noexcept {
-  const auto found = std::ranges::find_if(kSettings, [&](const Setting& s) { return key == s.key; });
-  return found == std::end(kSettings) ? nullptr : found;
-}
-
 std::string device(const Address& address) { return "Net Box " + address.host; }
 
 /// The elements of netftapi2.xml; works for an unusable slot, too.
@@ -147,8 +142,8 @@ std::vector<Finding> set_back(const Address& address, const std::vector<ChangedS
   std::vector<Assignment> assignments;
   std::vector<Finding> findings;
   for (const ChangedSetting& c : changed) {
-    const Setting* setting = setting_of(c.key);
-    if (setting == nullptr || present.number(c.key) == c.before) continue;
+    const Setting* setting = std::ranges::find(kSettings, c.key, &Setting::key);
+    if (setting == std::end(kSettings) || present.number(c.key) == c.before) continue;
     if (present.number(c.key) == c.applied) {
       assignments.push_back({setting, c.applied, c.before});
     } else {

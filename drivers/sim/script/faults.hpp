@@ -171,9 +171,6 @@ struct FaultEvent {
 [[nodiscard]] constexpr bool within(FaultKind kind, FaultKind first, FaultKind last) noexcept {
   return kind >= first && kind <= last;
 }
-[[nodiscard]] constexpr bool on_motor(FaultKind kind) noexcept {
-  return within(kind, FaultKind::motor_flip, FaultKind::motor_locked);
-}
 [[nodiscard]] constexpr bool on_supply(FaultKind kind) noexcept {
   return within(kind, FaultKind::supply_bad_crc, FaultKind::supply_sag);
 }
