@@ -79,10 +79,6 @@ Scene nominal_of(const Request& request) {
   return nominal_scene(vehicle, *file.control, curve, request.seed);
 }
 
-std::size_t threads_of(const Request& request) {
-  return request.threads > 0 ? request.threads : std::max(1u, std::thread::hardware_concurrency());
-}
-
 void make_folder(const std::string& path) {
   std::error_code error;
   fs::create_directories(path, error);
@@ -120,7 +116,8 @@ Flown fly_requested(const Request& request) {
     if (!request.experiment.empty() && request.experiment != kExperiments[i].name) continue;
     flown.flights[i] = fly_one(i, flown.nominal, shadow, request.out.empty() ? nullptr : &traces[i]);
   }
-  flown.draws = fly_draws(flown.nominal, shadow, request.draws, threads_of(request));
+  const std::size_t threads = request.threads > 0 ? request.threads : std::max(1u, std::thread::hardware_concurrency());
+  flown.draws = fly_draws(flown.nominal, shadow, request.draws, threads);
   if (!request.out.empty()) write_out(request, flown, traces);
   return flown;
 }
@@ -207,12 +204,6 @@ ExitCode fly_as_asked(const Request& request) {
   return ExitCode::ok;
 }
 
-std::vector<std::string> experiment_names() {
-  std::vector<std::string> names;
-  for (const Experiment& experiment : kExperiments) names.emplace_back(experiment.name);
-  return names;
-}
-
 }  // namespace
 
 void add_fly(CLI::App& program, ExitCode& exit_code) {
@@ -222,7 +213,8 @@ void add_fly(CLI::App& program, ExitCode& exit_code) {
   command.footer(
       "Without --draws: one set of circumstances. With --draws N: N more sets, drawn from the seed, and percentiles.");
   add_flight_files(command, request.coefficients, request.vehicle);
-  const auto names = experiment_names();
+  std::vector<std::string> names;
+  for (const Experiment& experiment : kExperiments) names.emplace_back(experiment.name);
   add_value(command, "--experiment", "NAME", request.experiment,
             fmt::format("one of the nine (default: all): {}", fmt::join(names, ", ")))
       ->check(CLI::IsMember(names).description(""));

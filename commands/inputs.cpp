@@ -45,11 +45,6 @@ void take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
   }
 }
 
-MotorClock clock_of(const fs::path& bench_file) {
-  const auto gain = profiles::load_bench(bench_file.string()).iq.clock_gain;
-  return gain ? MotorClock{gain->factor, gain->u_factor} : MotorClock{};
-}
-
 FitInput campaign_input(const fs::path& path) {
   const auto folder = results::CampaignFolder::open(path);
   if (!fs::exists(folder.steps())) {
@@ -62,7 +57,10 @@ FitInput campaign_input(const fs::path& path) {
   input.steps = results::read_steps(folder.steps());
   input.provenance.source = "steps.csv of the campaign folder";
   take_runs(folder, input.provenance);
-  if (fs::exists(folder.bench_file())) input.provenance.clock = clock_of(folder.bench_file());
+  if (fs::exists(folder.bench_file())) {
+    const auto gain = profiles::load_bench(folder.bench_file().string()).iq.clock_gain;
+    if (gain) input.provenance.clock = {gain->factor, gain->u_factor};
+  }
   if (fs::exists(folder.campaign_file())) {
     const profiles::Campaign campaign = profiles::load_campaign(folder.campaign_file().string());
     input.provenance.campaign = campaign.name;

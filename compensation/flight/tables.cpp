@@ -37,10 +37,6 @@ std::string forward_cell(const FlightResult& flight, const std::optional<Forward
   return " " + spread(leg.mean_distance, leg.deviation) + paper;
 }
 
-std::string percentile_row(const std::string& title, const Percentiles& p, const std::string& paper) {
-  return padded(title, 34) + aligned(p.p10, 3, 9) + aligned(p.p50, 3, 9) + aligned(p.p90, 3, 9) + "   " + paper + "\n";
-}
-
 // ---- for other programs ---------------------------------------------------------------------------------------------
 
 constexpr std::size_t kFigureStride = 5;  // 50 ms
@@ -172,7 +168,10 @@ std::string findings_table(const Findings& found) {
                      " with or in X. Percentiles are over the " + std::to_string(found.kept) + " others.\n" +
                      padded("", 34) + "      p10      p50      p90   paper\n";
   for (std::size_t i = 0; i < kMerits.size(); ++i) {
-    if (*kMerits[i].title != '\0') text += percentile_row(kMerits[i].title, found.merits[i], kMerits[i].paper);
+    if (*kMerits[i].title == '\0') continue;
+    const auto& [p10, p50, p90] = found.merits[i];
+    text += padded(kMerits[i].title, 34) + aligned(p10, 3, 9) + aligned(p50, 3, 9) + aligned(p90, 3, 9);
+    text += std::string("   ") + kMerits[i].paper + "\n";
   }
   text += "better with compensation: hover z in " + percent(found.hover_z_better) + ", forward flight in " +
           percent(found.forward_better) +

@@ -24,14 +24,6 @@ Duration host_delay(const profiles::BenchConfig& config) {
   return std::chrono::milliseconds(is_slowed(config) ? 300 : 60);
 }
 
-Mounting mounting_of(const profiles::BenchConfig& config) {
-  return {config.thrust_axis, config.thrust_sign, config.iq.spin};
-}
-
-std::size_t samples_relayed(const results::LoadCellScale& scale) {
-  return static_cast<std::size_t>(std::max(1024.0, kRelayed * scale.sample_rate_hz));
-}
-
 /// Readings from before this run, for example from a pause for a mounting.
 template <class Reading, class Link>
 void discard(Link& link) {
@@ -54,7 +46,7 @@ Guard::Guard(Bench& bench, const profiles::BenchConfig& config, const results::L
     : bench_(bench),
       supply_(config.supply),
       table_(limits),
-      observer_(mounting_of(config), scale,
+      observer_({config.thrust_axis, config.thrust_sign, config.iq.spin}, scale,
                 SpeedWatch(config.iq.spin, bench.clock().stretched(host_delay(config)), speed_share(limits)),
                 [this](Watched watched, double value) { hold(watched, value); }),
       status_watch_(bench.load_cell().configuration().kind, bench.load_cell().configuration().records_per_datagram,
@@ -63,7 +55,7 @@ Guard::Guard(Bench& bench, const profiles::BenchConfig& config, const results::L
       fresh_{bench.clock().stretched(kFreshWall) +
                  from_seconds(3 * bench.load_cell().configuration().records_per_datagram / scale.sample_rate_hz),
              bench.clock().stretched(kFreshWall) + kFreshMotor},
-      samples_(samples_relayed(scale), kAtOnce),
+      samples_(static_cast<std::size_t>(std::max(1024.0, kRelayed * scale.sample_rate_hz)), kAtOnce),
       readings_(kReadingsRelayed, kAtOnce),
       supply_readings_(kSupplyReadingsRelayed, 16),
       polled_ns_(bench.clock().now().count()),

@@ -44,11 +44,6 @@ std::string air_of(const std::string& address) {
                      air.pressure_pa / 100, 100 * air.relative_humidity, words_of(ambient::density_of(air)));
 }
 
-DeviceAnswer ask_instrument(const std::string& address) {
-  const std::string uri = "scpi-" + address;
-  return answer_of("SCPI " + uri, [&] { return scpi::open_line(uri)->query("*IDN?"); });
-}
-
 /// As it must be written to mean this one.
 std::string address_of(const usb::Listing& found, const std::vector<usb::Listing>& all) {
   UsbAddress address{found.vendor, found.product, found.serial, ""};
@@ -133,7 +128,8 @@ std::vector<DeviceAnswer> ask_usb(const std::vector<DeviceAnswer>& known) {
     if (std::ranges::any_of(known, [&](const auto& each) { return each.device.find(name) != each.device.npos; }))
       continue;
     const std::string address = address_of(found, all);
-    answers.push_back(is_bridge(found) ? ask_sensor(address) : ask_instrument(address));
+    const auto ask = [&] { return scpi::open_line("scpi-" + address)->query("*IDN?"); };
+    answers.push_back(is_bridge(found) ? ask_sensor(address) : answer_of("SCPI scpi-" + address, ask));
     answers.back().wanted = false;
   }
   return answers;

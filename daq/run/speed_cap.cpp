@@ -20,10 +20,6 @@ bool at_its_end(const StepMean& step) {
          has(step, QualityFlag::supply_limited);
 }
 
-bool fell_short(const StepMean& step) {
-  return has(step, QualityFlag::speed_not_reached) && at_its_end(step) && step.speed_rad_s < step.commanded_speed_rad_s;
-}
-
 }  // namespace
 
 bool is_out_of_drive(RadPerSec commanded, RadPerSec reached, double drive_pwm) {
@@ -35,7 +31,9 @@ std::optional<CapLesson> SpeedCap::learn(std::span<const StepMean> run) {
   const StepMean* lowest = nullptr;
   for (const StepMean& step : run) {
     const bool lower = lowest == nullptr || step.commanded_speed_rad_s < lowest->commanded_speed_rad_s;
-    if (fell_short(step) && lower) lowest = &step;
+    if (lower && has(step, QualityFlag::speed_not_reached) && at_its_end(step) &&
+        step.speed_rad_s < step.commanded_speed_rad_s)
+      lowest = &step;
   }
   if (lowest == nullptr) return std::nullopt;
   double held = 0;

@@ -21,10 +21,6 @@ namespace {
 constexpr std::chrono::milliseconds kWakeUp{1};  // wall time
 constexpr int kCatchUp = 8;                      // bench time per wake-up, in wake-ups
 
-Peer peer_of(const sockaddr_in& address) noexcept {
-  return static_cast<Peer>(address.sin_addr.s_addr) << 16 | address.sin_port;
-}
-
 sockaddr_in address_of(Peer peer) noexcept {
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -173,7 +169,8 @@ void Server::hear_requests() {
                                      reinterpret_cast<sockaddr*>(&from), &size);
     if (count < 0) return;
     const auto length = std::min(static_cast<std::size_t>(count), bytes.size());
-    bench_.wire().request(std::span(bytes).first(length), peer_of(from), reached_);
+    const Peer peer = static_cast<Peer>(from.sin_addr.s_addr) << 16 | from.sin_port;
+    bench_.wire().request(std::span(bytes).first(length), peer, reached_);
   }
 }
 

@@ -18,11 +18,6 @@
 namespace kphi::sim {
 namespace {
 
-std::vector<std::string> words_of(std::string_view line) {
-  std::istringstream in{std::string(line)};
-  return {std::istream_iterator<std::string>(in), {}};
-}
-
 std::string mount(SimulatedBench& bench, const std::string& propeller, const std::string& angle) {
   const auto occlusion_deg = parse_double(angle);
   if (!occlusion_deg) return "error \"" + angle + "\" is not an angle in degrees";
@@ -77,7 +72,8 @@ std::string fail(SimulatedBench& bench, std::vector<std::string> words) {
 }  // namespace
 
 std::string control_answer(SimulatedBench& bench, std::string_view line) {
-  const auto words = words_of(line);
+  std::istringstream in{std::string(line)};
+  const std::vector<std::string> words(std::istream_iterator<std::string>(in), {});
   if (words.size() == 3 && words[0] == "mount") return mount(bench, words[1], words[2]);
   if (words.size() == 1 && words[0] == "status") return status(bench);
   if (words.size() > 1 && words[0] == "fault") return fail(bench, words);

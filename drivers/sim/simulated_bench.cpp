@@ -29,10 +29,6 @@ constexpr Instant time_of_tick(std::uint64_t tick) noexcept {
 }
 static_assert(kTicksPerSecond == 7000);
 
-constexpr std::uint64_t ticks_before(Instant time) noexcept {
-  return static_cast<std::uint64_t>(time.count()) / 1'000'000 * 7;
-}
-
 }  // namespace
 
 SimulatedBench::SimulatedBench(const BenchSettings& settings)
@@ -42,7 +38,7 @@ SimulatedBench::SimulatedBench(const BenchSettings& settings)
       motor_(module_of(settings), plant_.motor()),
       motor_line_(motor_, {settings.motor_line_paced, settings.time_scale, settings.motor_usb_tick}, settings.faults,
                   settings.seed ^ kLineStream, settings.motor_keep),
-      ticks_(ticks_before(settings.begin)),
+      ticks_(static_cast<std::uint64_t>(settings.begin.count()) / 1'000'000 * 7),
       tick_at_(time_of_tick(ticks_)) {
   if (!settings.supply) return;
   SupplySettings supply = *settings.supply;

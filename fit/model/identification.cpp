@@ -18,15 +18,12 @@ using results::StepMean;
 
 using StepsByAngle = std::map<double, std::vector<StepMean>>;
 
-bool measured_at(const std::vector<StepMean>& steps, double speed) {
-  return std::ranges::any_of(steps, [&](const StepMean& step) { return same_level(level(step), speed); });
-}
-
 double highest_common_level(const StepsByAngle& by_angle) {
   double highest = 0;
   for (const StepMean& step : by_angle.begin()->second) {
-    const bool everywhere =
-        std::ranges::all_of(by_angle, [&](const auto& entry) { return measured_at(entry.second, level(step)); });
+    const bool everywhere = std::ranges::all_of(by_angle, [&](const auto& entry) {
+      return std::ranges::any_of(entry.second, [&](const StepMean& at) { return same_level(level(at), level(step)); });
+    });
     if (everywhere) highest = std::max(highest, level(step));
   }
   return highest;

@@ -79,11 +79,6 @@ void weigh(std::vector<Point>& points, Weighting weighting, const ThrustParamete
   for (Point& point : points) point.weight *= static_cast<double>(points.size()) / sum;
 }
 
-double median_absolute(std::vector<double> values) {
-  for (double& value : values) value = std::abs(value);
-  return upper_median(std::move(values));
-}
-
 /// Null for Loss::none. `sigma` in units of the residuals.
 std::unique_ptr<ceres::LossFunction> loss_function(Loss loss, double sigma) {
   if (loss == Loss::huber) return std::make_unique<ceres::HuberLoss>(1.345 * sigma);
@@ -112,9 +107,9 @@ class Fitter {
 
   /// Solves for the points taken last. A `coarse` solution only gives the start and the scale of the next one.
   void solve(const std::vector<Point>& points, Loss loss, bool coarse = false) {
-    std::vector<double> residuals;
-    for (const Point& point : points) residuals.push_back(residual(point));
-    const double sigma = loss == Loss::none ? 0 : 1.4826 * median_absolute(residuals);
+    std::vector<double> deviations;
+    for (const Point& point : points) deviations.push_back(std::abs(residual(point)));
+    const double sigma = loss == Loss::none ? 0 : 1.4826 * upper_median(std::move(deviations));
     loss_ = sigma > 0 ? loss_function(loss, sigma) : nullptr;  // points without scatter have no outliers
     changing_loss_.Reset(loss_.get(), ceres::DO_NOT_TAKE_OWNERSHIP);
     if (loss_) {

@@ -168,11 +168,6 @@ std::string slope_line(const SharedSlope& one) {
       one.diameter_in, one.slope.value, one.expanded(), fmt::join(one.propellers, ", "), one.equal_slopes.p);
 }
 
-std::string prediction_line(const FamilyPrediction& one) {
-  return fmt::format("{:g}x{} at {:g} deg: k = {:.4e} N/(rad/s)^2, 95 %: {:.3e} to {:.3e}\n", one.diameter_in,
-                     one.blades, one.phi_deg, one.k.value, one.lower, one.upper);
-}
-
 }  // namespace
 
 const char* name_of(Verdict verdict) {
@@ -245,7 +240,9 @@ std::string family_text(const FamilyFindings& findings) {
   if (!findings.slopes.empty()) text += "\nOne slope for each diameter\n";
   for (const SharedSlope& one : findings.slopes) text += slope_line(one);
   if (!findings.predictions.empty()) text += "\nPrediction for propellers that were not measured\n";
-  for (const FamilyPrediction& one : findings.predictions) text += prediction_line(one);
+  for (const FamilyPrediction& one : findings.predictions)
+    text += fmt::format("{:g}x{} at {:g} deg: k = {:.4e} N/(rad/s)^2, 95 %: {:.3e} to {:.3e}\n", one.diameter_in,
+                        one.blades, one.phi_deg, one.k.value, one.lower, one.upper);
   return text;
 }
 

@@ -12,10 +12,6 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kGageFullScale = 32768;  // gage counts of an axis at its full range
 constexpr int kAxiaHold = 32;             // samples for which an Axia keeps the bit
 
-std::int32_t clamped(std::int64_t counts) noexcept {
-  return static_cast<std::int32_t>(std::clamp<std::int64_t>(counts, INT32_MIN, INT32_MAX));
-}
-
 }  // namespace
 
 LowPass::LowPass(double cutoff_hz) noexcept {
@@ -63,7 +59,8 @@ void NetBoxSignal::measure(const Wrench& wrench) noexcept {
     value -= gage_bias_[axis];
     if (filter_ != 0) value = filters_[axis].step(value);
     const double counts = value * scale_[axis];
-    counts_[axis] = clamped(static_cast<std::int64_t>(counts + (counts < 0 ? -0.5 : 0.5)) - software_bias_[axis]);
+    const std::int64_t whole = static_cast<std::int64_t>(counts + (counts < 0 ? -0.5 : 0.5)) - software_bias_[axis];
+    counts_[axis] = static_cast<std::int32_t>(std::clamp<std::int64_t>(whole, INT32_MIN, INT32_MAX));
   }
   if (saturation_left_ > 0) --saturation_left_;
   if (beyond) saturation_left_ = axia_ ? kAxiaHold : 1;
