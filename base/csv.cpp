@@ -57,13 +57,13 @@ std::optional<std::vector<std::string>> split_blanks(std::string_view line) {
 /// A row with the header's number of fields, a trailing empty one taken off; otherwise the problem goes into the table.
 void take_row(Table& table, std::size_t number, std::optional<std::vector<std::string>> fields) {
   if (!fields) {
-    table.problems.push_back({number, "a quoted field is not closed; the line is left out"});
+    table.problems.push_back({number, "a quoted field is not closed; line skipped"});
     return;
   }
   if (fields->size() == table.header.size() + 1 && fields->back().empty()) fields->pop_back();
   if (fields->size() != table.header.size()) {
-    table.problems.push_back({number, fmt::format("{} fields where the header has {}; the line is left out",
-                                                  fields->size(), table.header.size())});
+    table.problems.push_back(
+        {number, fmt::format("{} fields where the header has {}; line skipped", fields->size(), table.header.size())});
     return;
   }
   table.rows.push_back({number, std::move(*fields)});

@@ -214,10 +214,11 @@ const Kind& kind_of(const std::string& text, const std::string& path) {
       if (document.value.is_object() && document.value.contains(key)) return kind;
   }
   const auto near = nearest_name(format, formats);
-  throw RefusedFile(path, {{document.value_mark("/format"), "/format",
-                            format.empty() ? "unknown kind of file: no format given" : "unknown format " + format,
-                            near ? fmt::format("did you mean format: {}?", *near)
-                                 : fmt::format("begin it with format: and one of {}", fmt::join(formats, ", "))}});
+  throw RefusedFile(path,
+                    {{document.value_mark("/format"), "/format",
+                      format.empty() ? "unknown kind of file: no format given" : "unknown format " + format,
+                      near ? fmt::format("did you mean format: {}?", *near)
+                           : fmt::format("begin the file with format: and one of {}", fmt::join(formats, ", "))}});
 }
 
 /// Adds to the file what `check` refuses.

@@ -57,12 +57,13 @@ constexpr const char* kNextMove =
 
 /// What is wrong with a column that stands there `found` times; `names` may hold it in another unit.
 std::string complaint_about(std::string_view wanted, std::ptrdiff_t found, const Fields& names) {
-  if (found > 1) return fmt::format("column `{}` stands {} times{}", wanted, found, kNextMove);
+  if (found > 1) return fmt::format("column `{}` appears {} times{}", wanted, found, kNextMove);
   const std::string_view stem = wanted.substr(0, wanted.find('_') + 1);
   const auto like = std::ranges::find_if(names, [&](const std::string& name) { return name.starts_with(stem); });
   if (like == names.end()) return fmt::format("column `{}` is missing{}", wanted, kNextMove);
-  return fmt::format("column `{}` is missing, but there is `{}`; the unit is part of the name, degrees and N are read",
-                     wanted, *like);
+  return fmt::format(
+      "column `{}` is missing, but there is `{}`; convert it to the unit in the wanted name and rename it", wanted,
+      *like);
 }
 
 /// The places of the columns.
@@ -202,7 +203,7 @@ RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& wor
     const std::string complaint = read_row(fields, header.size(), places, values);
     if (!complaint.empty()) {
       ++counts.rejected;
-      words << "stdin:" << line_number << ": " << complaint << "; row left out\n";
+      words << "stdin:" << line_number << ": " << complaint << "; row skipped\n";
       continue;
     }
     for (std::size_t i = 0; i < 4; ++i) {

@@ -61,7 +61,7 @@ void refuse_same_names(const std::vector<std::string>& files) {
 }
 
 void print_findings(const Import& import, const std::string& path) {
-  for (const std::string& column : import.table.unread) fmt::print(stderr, "{}: column left out: {}\n", path, column);
+  for (const std::string& column : import.table.unread) fmt::print(stderr, "{}: column skipped: {}\n", path, column);
   for (const LogFinding& finding : import.findings) {
     const std::string place = finding.first_line == 0 ? path : fmt::format("{}:{}", path, finding.first_line);
     fmt::print(stderr, "{}: {} ({} row{}): {}\n", place, name_of(finding.kind), finding.rows,

@@ -48,8 +48,8 @@ void take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
 FitInput campaign_input(const fs::path& path) {
   const auto folder = results::CampaignFolder::open(path);
   if (!fs::exists(folder.steps())) {
-    throw ConfigurationError(
-        fmt::format("{}: no steps.csv; `kphi replay {}` makes it from the runs", path.string(), path.string()));
+    throw ConfigurationError(fmt::format("{}: no steps.csv; run `kphi replay {}` to compute it from the runs",
+                                         path.string(), path.string()));
   }
   FitInput input;
   input.folder = path;

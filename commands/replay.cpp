@@ -161,8 +161,7 @@ ExitCode run_replay(const Asked& asked) {
   const Replay result = is_campaign ? replay_campaign(CampaignFolder::open(asked.path)) : replay_run(asked.path);
   print(result, asked.json);
   if (!result.difference) return ExitCode::ok;
-  fmt::print(stderr, "{}: {}; the raw files are the truth, see kphi verify\n", result.stored->string(),
-             *result.difference);
+  fmt::print(stderr, "{}: {}; check the raw files with `kphi verify`\n", result.stored->string(), *result.difference);
   return ExitCode::data_rejected;
 }
 

@@ -112,7 +112,7 @@ void clear_safety_stop(Destination& destination, Operator& person, const std::op
     destination.resumption->cleared_by = person.name();
   } else if (answers && answers->continue_after_safety_stop) {
     throw ConfigurationError(
-        answers->path + ": continue_after_safety_stop is left over: no safety stop ended this campaign; remove it");
+        answers->path + ": continue_after_safety_stop is not needed: no safety stop ended this campaign; remove it");
   }
 }
 

@@ -71,7 +71,8 @@ void get(const Handle& object, const char* name, hid_t memory_type, hssize_t ele
   const std::string doing = fmt::format("read attribute {}", name);
   const Handle attribute = own(H5Aopen(object.get(), name, H5P_DEFAULT), doing);
   const Handle space = own(H5Aget_space(attribute.get()), doing);
-  if (H5Sget_simple_extent_npoints(space.get()) != elements) throw RecordError(doing + ": has a strange size");
+  if (H5Sget_simple_extent_npoints(space.get()) != elements)
+    throw RecordError(doing + ": has the wrong number of values");
   check(H5Aread(attribute.get(), memory_type, value), doing);
 }
 
@@ -288,11 +289,12 @@ ColumnReader::ColumnReader(const Handle& group, const char* name, Stored stored,
   dataset_ = own(H5Dopen2(group.get(), name, access.get()), doing_);
   space_ = own(H5Dget_space(dataset_.get()), doing_);
   const int rank = H5Sget_simple_extent_ndims(space_.get());
-  if (rank < 1 || rank > 2) throw RecordError(doing_ + ": has a strange shape");
+  if (rank < 1 || rank > 2) throw RecordError(doing_ + ": not one- or two-dimensional");
   dims_.resize(static_cast<std::size_t>(rank));
   check(H5Sget_simple_extent_dims(space_.get(), dims_.data(), nullptr), doing_);
   const std::size_t width = rank == 2 ? dims_[1] : 1;
-  if (width * H5Tget_size(type_.get()) != row_bytes_) throw RecordError(doing_ + ": has a strange shape");
+  if (width * H5Tget_size(type_.get()) != row_bytes_)
+    throw RecordError(doing_ + ": has the wrong number of values per row");
   rows_ = dims_[0];
   if (rows_ < kManyRows) return;
   const Handle list = own(H5Dget_create_plist(dataset_.get()), doing_);

@@ -145,7 +145,7 @@ void check_columns(const Handle& parent, const RunGroup<Row>& layout, Problems& 
     const char* name = layout.columns[i].name;
     if (column.rows() != group.n_valid) {
       problems.push_back(
-          fmt::format("{}/{} has {} rows where n_valid is {}", layout.name, name, column.rows(), group.n_valid));
+          fmt::format("{}/{} has {} rows, n_valid is {}", layout.name, name, column.rows(), group.n_valid));
       continue;
     }
     std::uint32_t crc = 0;
@@ -186,20 +186,19 @@ void check_account(const RunRecording& run, const SequenceCheck& sequence, Probl
   const SampleAccount& account = run.account;
   const std::uint64_t counted = account.lost_network + account.lost_host;
   if (account.received != run.load_cell.size()) {
-    problems.push_back(fmt::format("{} samples where {} were received", run.load_cell.size(), account.received));
+    problems.push_back(fmt::format("{} samples, {} were received", run.load_cell.size(), account.received));
   }
   if (account.received + counted != account.expected) {
     problems.push_back(
         fmt::format("{} received and {} lost are not the {} expected", account.received, counted, account.expected));
   }
   if (sequence.lost != counted && sequence.reboots == 0 && has_one_stride(run)) {
-    problems.push_back(
-        fmt::format("ft_sequence shows {} missing samples where {} were counted", sequence.lost, counted));
+    problems.push_back(fmt::format("ft_sequence shows {} missing samples, {} were counted", sequence.lost, counted));
   }
 }
 
 void check_order(const RunRecording& run, const SequenceCheck& sequence, Problems& problems) {
-  if (sequence.repeated > 0) problems.push_back(fmt::format("{} samples are there twice", sequence.repeated));
+  if (sequence.repeated > 0) problems.push_back(fmt::format("{} samples occur twice", sequence.repeated));
   if (sequence.off_stride > run.account.irregular && has_one_stride(run)) {
     problems.push_back(fmt::format("ft_sequence left its stride of {} at {} places", run.header.load_cell.ft_stride,
                                    sequence.off_stride));
@@ -210,8 +209,8 @@ void check_order(const RunRecording& run, const SequenceCheck& sequence, Problem
   }
   // Before the wrap of its counter a restart of the box looks like one of the stream.
   if (sequence.restarts + sequence.reboots > run.account.restarts + run.account.reboots) {
-    problems.push_back(fmt::format("rdt_sequence began again {} times where {} restarts were counted",
-                                   sequence.restarts, run.account.restarts));
+    problems.push_back(fmt::format("rdt_sequence restarted {} times, {} restarts were counted", sequence.restarts,
+                                   run.account.restarts));
   }
   for (std::size_t i = 1; i < run.phases.size(); ++i) {
     if (run.phases[i].time_ns < run.phases[i - 1].time_ns)
@@ -231,7 +230,7 @@ void check_scale(const RunHeader& header, Problems& problems) {
     if (!(std::isfinite(value) && value > 0)) problems.push_back(fmt::format("{} is {}", name, value));
   }
   if (std::abs(scale.sample_rate_hz * scale.ft_stride / scale.device_rate_hz - 1) > 0.01) {
-    problems.push_back(fmt::format("{} Hz with a stride of {} do not make the box's {} Hz", scale.sample_rate_hz,
+    problems.push_back(fmt::format("rate mismatch: {} Hz times stride {} is not the box's {} Hz", scale.sample_rate_hz,
                                    scale.ft_stride, scale.device_rate_hz));
   }
   if (header.thrust_axis < 0 || header.thrust_axis > 2)

@@ -70,8 +70,8 @@ inline constexpr std::array<std::string_view, 4> kNotReproduced{{
     "no hover is; its identity kP e + kD e' holds as arithmetic",
     "the sign of the height in row 2 of Table II: the paper's compensated drone is above its reference, this one "
     "mostly below, because more is lost in flight than on the bench",
-    "x and y of Table I: they hang on the centre of gravity, the attitude stiffness and kpxy, which nobody published; "
-    "the draws show how far",
+    "x and y of Table I: they depend on the centre of gravity, the attitude stiffness and kpxy, none of them "
+    "published; the draws show how much",
 }};
 
 /// Flights with no legs were not flown; their rows are left out, and a table without rows is empty.

@@ -189,7 +189,7 @@ results::LoadCellScale LiveLoadCell::start() {
     throw DeviceError(
         "Net Box " + config_.host, "compare settings",
         fmt::format("the box streams at {:g} Hz, the bench file expects {:g} Hz", found.rdt_rate_hz, config_.rate_hz),
-        "set the RDT output rate on the box's communication page or rate_hz in the bench file");
+        "set the RDT output rate on the box's Communications page, or rate_hz in the bench file");
   }
   cell_->start();
   results::LoadCellScale scale = to_scale(found);

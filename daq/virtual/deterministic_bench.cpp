@@ -31,7 +31,7 @@ std::string body_of(const std::string& response, const std::string& operation) {
   const std::size_t blank = response.find("\r\n\r\n");
   const std::string status = response.substr(0, response.find("\r\n"));
   if (blank == std::string::npos) throw DeviceError("Net Box", operation, "the answer is cut short");
-  if (status.find(" 200 ") == std::string::npos) throw DeviceError("Net Box", operation, "the box says: " + status);
+  if (status.find(" 200 ") == std::string::npos) throw DeviceError("Net Box", operation, "the box answers: " + status);
   return response.substr(blank + 4);
 }
 

@@ -87,7 +87,7 @@ void DeterministicMotor::watch_plug() {
 }
 
 void DeterministicMotor::spin_at(RadPerSec signed_speed) {
-  if (!session_.armed()) throw DeviceError("IQ module", "spin", failure(), "see to what happened, then rearm it");
+  if (!session_.armed()) throw DeviceError("IQ module", "spin", failure(), "find the cause, then connect again");
   session_.spin_at(signed_speed, clock_.now());
   exchange();
 }

@@ -48,7 +48,8 @@ std::string Tcp::query(std::string_view command) {
   std::size_t end = std::string::npos;
   carry_out(command, [&] {
     while ((end = received_.find('\n')) == std::string::npos && received_.size() <= kLongestAnswer) {
-      if (!connection_->receive(received_)) throw TcpError(TcpError::Cause::other, "it has closed the connection");
+      if (!connection_->receive(received_))
+        throw TcpError(TcpError::Cause::other, "the instrument closed the connection");
     }
   });
   if (end == std::string::npos) fail(command, "the answer does not end", "");

@@ -44,7 +44,7 @@ std::string advice_for(int error, const std::string& device) {
   if (error == EACCES || error == EPERM)
     return "join the group dialout (usermod -aG dialout $USER as root) and log in again";
   if (error == EBUSY || error == EWOULDBLOCK)
-    return fmt::format("close the other program; 'fuser -v {}' names it", device);
+    return fmt::format("close the other program; `fuser -v {}` names it", device);
   return "check the device and its cable";
 }
 

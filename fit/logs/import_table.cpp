@@ -109,8 +109,8 @@ bool is_k_table(std::string_view text) {
 std::vector<LinePoint> read_k_table(std::string_view text, std::string path) {
   const Table table = read_csv(text, std::move(path));
   if (!table.problems.empty()) {
-    throw ConfigurationError(
-        fmt::format("{}:{}: {}", table.path, table.problems.front().line, table.problems.front().what));
+    const auto& [line, what] = table.problems.front();
+    throw ConfigurationError(fmt::format("{}:{}: {}", table.path, line, what.substr(0, what.find(';'))));
   }
   const bool per_rpm = table.find_column("k_n_per_rpm2").has_value();
   const double unit = per_rpm ? from_newtons_per_rpm2(1).value() : 1;

@@ -27,7 +27,7 @@ std::vector<LinePoint> sorted(std::span<const LinePoint> points) {
     if (!std::isfinite(result[i].phi_deg) || !std::isfinite(result[i].k))
       throw FitError("line fit: an angle or a coefficient is not a number");
     if (i > 0 && result[i].phi_deg - result[i - 1].phi_deg < kSameAngleDeg)
-      throw FitError(fmt::format("line fit: phi = {} deg is listed twice", result[i].phi_deg));
+      throw FitError(fmt::format("line fit: phi = {}° is listed twice", result[i].phi_deg));
   }
   return result;
 }
@@ -38,7 +38,7 @@ const LinePoint& point_at(const std::vector<LinePoint>& points, double phi_deg) 
   std::vector<double> measured;
   for (const LinePoint& point : points) measured.push_back(point.phi_deg);
   throw FitError(
-      fmt::format("line fit: phi = {} deg was not measured; measured are {} deg", phi_deg, fmt::join(measured, ", ")));
+      fmt::format("line fit: phi = {}° was not measured; measured are {}°", phi_deg, fmt::join(measured, ", ")));
 }
 
 std::vector<LinePoint> carriers(const std::vector<LinePoint>& points, const LineFitOptions& options) {

@@ -238,11 +238,11 @@ std::string headline_text(const Identification& identification) {
 std::string caution_text(const Identification& identification, const Analysis& analysis) {
   std::string text;
   for (const FlaggedStep& flagged : identification.selection.flagged) {
-    text += fmt::format("{:<13} phi {} deg, repetition {}, step {}: {}\n", flagged.left_out ? "left out" : "kept",
+    text += fmt::format("{:<13} phi {}°, repetition {}, step {}: {}\n", flagged.left_out ? "left out" : "kept",
                         flagged.step.occlusion_deg, flagged.step.repetition, flagged.step.step + 1, flagged.reason);
   }
   for (const RejectedPoint& point : analysis.rejected) {
-    text += fmt::format("rejected      phi {} deg, repetition {}, step {}: {:+.3f} N off, robust weight {:.2f}\n",
+    text += fmt::format("rejected      phi {}°, repetition {}, step {}: {:+.3f} N off, robust weight {:.2f}\n",
                         point.phi_deg, point.repetition, point.step + 1, point.residual_n, point.robust_weight);
   }
   for (const std::string& remark : analysis.remarks) text += fmt::format("remark        {}\n", remark);

@@ -203,7 +203,7 @@ std::string entry(const char* term, const std::string& description) {
 std::string clock_words(const MotorClock& clock) {
   if (!clock.u_gain)
     return "unchecked: all speeds may be off together by a few tenths of a percent, and k by twice that; measure it "
-           "with kphi devices --bench FILE --clock-gain";
+           "with `kphi devices --bench FILE --clock-gain`";
   return fmt::format("gain {:.7g} ± {:.1e}, speeds are corrected; shared by all steps: {:.1e} of k", clock.gain,
                      *clock.u_gain, 2 * *clock.u_gain / clock.gain);
 }

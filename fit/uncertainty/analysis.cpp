@@ -119,7 +119,7 @@ std::vector<std::string> remarks_of(const Identification& identification, const 
   const double share = 100 * line.mismatch() / line.K_T;
   for (const OutlyingRun& run : analysis.outlying)
     remarks.push_back(fmt::format(
-        "repetition {} at {} deg stands out, {:+.2f} % from the others ({}); it is kept, and its scatter is in the "
+        "repetition {} at {}° stands out, {:+.2f} % from the others ({}): it is kept, and its scatter is in the "
         "budget of every k; look for a cause and repeat this occlusion",
         run.repetition, run.phi_deg, 100 * run.share, std::isnan(run.p) ? "Hampel" : fmt::format("p = {:.2g}", run.p)));
   if (!line.anchored) {
@@ -134,12 +134,12 @@ std::vector<std::string> remarks_of(const Identification& identification, const 
   }
   const double clipping = *line.clipping_deg(), zero = *line.zero_crossing_deg();
   if (clipping > 0)
-    remarks.push_back(fmt::format("up to {:.1f} deg the line is above K_T, so k_i is held at 1", clipping));
+    remarks.push_back(fmt::format("up to {:.1f}° the line is above K_T, so k_i is held at 1", clipping));
   if (clipping < 0)
     remarks.push_back(
         fmt::format("at first contact the line is already {:.2f} % below K_T, so k_i steps there", -share));
   if (zero < 360)
-    remarks.push_back(fmt::format("the line reaches 0 at {:.1f} deg; it was measured up to {} deg", zero, largest));
+    remarks.push_back(fmt::format("the line reaches 0 at {:.1f}°; it was measured up to {}°", zero, largest));
   return remarks;
 }
 

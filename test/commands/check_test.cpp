@@ -120,7 +120,7 @@ TEST_F(Check, GuessesTheKindOfAFileWithoutFormatFromItsKeys) {
 TEST_F(Check, SaysWhenItCannotTellWhatAFileIs) {
   const auto refusal = [&](const std::string& text) { return errors(check({write("a.yaml", text)}).front()); };
   EXPECT_THAT(refusal("colour: red\n"),
-              ElementsAre(HasSubstr("unknown kind of file: no format given; begin it with format:")));
+              ElementsAre(HasSubstr("unknown kind of file: no format given; begin the file with format:")));
   EXPECT_THAT(refusal("format: kphi-campain/1\n"),
               ElementsAre(HasSubstr(":1:9: unknown format kphi-campain/1; did you mean format: kphi-campaign/1?")));
   EXPECT_THAT(refusal("just words\n"), ElementsAre(HasSubstr("unknown kind of file")));

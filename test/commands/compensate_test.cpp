@@ -94,8 +94,8 @@ TEST(CompensateRows, LeavesOutBadRowsAndNamesThemByLine) {
                                     "45,45,45,45,1,1,1,2\n");
   EXPECT_EQ(result.counts.written, 2u);
   EXPECT_EQ(result.counts.rejected, 6u);
-  EXPECT_THAT(result.words, StartsWith("stdin:3: has 7 fields where the header has 8; row left out\n"
-                                       "stdin:4: thrust2_n is `much`, not a finite number; row left out\n"
+  EXPECT_THAT(result.words, StartsWith("stdin:3: has 7 fields where the header has 8; row skipped\n"
+                                       "stdin:4: thrust2_n is `much`, not a finite number; row skipped\n"
                                        "stdin:6: theta2_deg is `nan`"));
   EXPECT_THAT(result.words, HasSubstr("stdin:9: thrust4_n is `1 N`"));
 }
@@ -120,8 +120,8 @@ TEST(CompensateRows, SaysWhatIsWrongWithTheHeader) {
   EXPECT_THAT(complaint(""), StartsWith("stdin:1: no header; the first line must name theta1_deg..theta4_deg"));
   EXPECT_THAT(complaint(rest), StartsWith("stdin:1: column `theta1_deg` is missing; the first line must name"));
   EXPECT_THAT(complaint("theta1_rad," + rest),
-              StartsWith("stdin:1: column `theta1_deg` is missing, but there is `theta1_rad`; the unit is part"));
-  EXPECT_THAT(complaint("theta1_deg,thrust1_n," + rest), StartsWith("stdin:1: column `thrust1_n` stands 2 times"));
+              StartsWith("stdin:1: column `theta1_deg` is missing, but there is `theta1_rad`; convert it"));
+  EXPECT_THAT(complaint("theta1_deg,thrust1_n," + rest), StartsWith("stdin:1: column `thrust1_n` appears 2 times"));
 }
 
 TEST(CompensateRows, CountsRowsWithAnArmWhereNoServoGoes) {

@@ -44,8 +44,8 @@ TEST_F(Answered, RunsTheWholeCampaignAndWritesDownWhatWasAskedAndAnswered) {
     if (entry.event.starts_with("operator_")) told.push_back(entry.data.at("words"));
     if (entry.event == "mounted") told.push_back(entry.data.at("confirmed_by"));
   }
-  EXPECT_THAT(told, testing::ElementsAre("mounted angle for propeller 5x3, 0 degrees?", "0", path("answers.yaml"),
-                                         "mounted angle for propeller 5x3, 90 degrees?", "90", path("answers.yaml")));
+  EXPECT_THAT(told, testing::ElementsAre("mounted angle for propeller 5x3, 0°?", "0", path("answers.yaml"),
+                                         "mounted angle for propeller 5x3, 90°?", "90", path("answers.yaml")));
 }
 
 TEST_F(Answered, RefusesWrongMissingAndLeftOverMountingsBeforeAnythingIsTouched) {
@@ -65,7 +65,7 @@ TEST_F(Answered, NamesADecisionThatWasNeverAskedForAfterTheCampaignIsKept) {
   answers("mountings: [0, 90]\nrun_again: [true]\n");
   Process run(command({"--answers", path("answers.yaml")}));
   EXPECT_EQ(run.wait(), 2);
-  EXPECT_THAT(run.err(), HasSubstr("answers.yaml:3:13: answer 1 of run_again is left over"));
+  EXPECT_THAT(run.err(), HasSubstr("answers.yaml:3:13: answer 1 of run_again is one too many"));
   const std::filesystem::path folder = run.out().substr(0, run.out().find('\n'));
   EXPECT_EQ(results::read_journal(folder / "journal.jsonl").entries.back().event, "campaign_finished");
 }

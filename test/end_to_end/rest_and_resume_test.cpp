@@ -169,7 +169,7 @@ TEST(SafetyStop, IsClearedByTheAnswersFileOnceAndNotBeforeItHappened) {
         "format: kphi-answers/1\nmountings: [0, 90]\ncontinue_after_safety_stop: true\n");
   Process early(stand.first({"--answers", stand.bench.path("answers.yaml")}));
   EXPECT_EQ(early.wait(), 2);
-  EXPECT_THAT(early.err(), HasSubstr("continue_after_safety_stop is left over"));
+  EXPECT_THAT(early.err(), HasSubstr("continue_after_safety_stop is not needed"));
 
   stand.stop_by_the_guard();
   std::string text = bytes_of(stand.bench.path("short.yaml"));

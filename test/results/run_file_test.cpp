@@ -229,7 +229,7 @@ TEST(RunFile, FinishRefusesARunWhoseLossesDoNotAddUp) {
   run.account.received -= 1;
   run.account.expected -= 1;
   EXPECT_THAT(error_of<RecordError>([&] { write_run(folder / "a.h5", run); }),
-              HasSubstr("1 missing samples where 0 were counted"));
+              HasSubstr("1 missing samples, 0 were counted"));
   EXPECT_FALSE(std::filesystem::exists(folder / "a.h5"));
   EXPECT_TRUE(std::filesystem::exists(folder / "a.h5.part"));
 }

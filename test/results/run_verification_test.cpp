@@ -99,16 +99,16 @@ TEST_F(VerifiedRun, ChangedAttributesShow) {
 TEST_F(VerifiedRun, AMissingSampleShows) {
   RunRecording run = make_run({});
   run.load_cell.erase(run.load_cell.begin() + 777);
-  EXPECT_THAT(problems_of(run), Contains(HasSubstr("samples where")));
+  EXPECT_THAT(problems_of(run), Contains(HasSubstr("were received")));
   run.account.received -= 1;
   run.account.expected -= 1;
-  EXPECT_THAT(problems_of(run), Contains("ft_sequence shows 1 missing samples where 0 were counted"));
+  EXPECT_THAT(problems_of(run), Contains("ft_sequence shows 1 missing samples, 0 were counted"));
 }
 
 TEST_F(VerifiedRun, ADoubledSampleARebootAndALeftStrideShow) {
   RunRecording run = make_run({});
   run.load_cell[100] = run.load_cell[99];
-  EXPECT_THAT(problems_of(run), Contains(HasSubstr("there twice")));
+  EXPECT_THAT(problems_of(run), Contains(HasSubstr("occur twice")));
   run = make_run({});
   for (std::uint32_t i = 0; i < run.load_cell.size(); ++i) run.load_cell[i].ft_sequence = 7 * (i % 5000);
   EXPECT_THAT(problems_of(run), Contains(HasSubstr("the box restarted")));
@@ -141,7 +141,7 @@ TEST_F(VerifiedRun, AStreamThatBeginsAnewAtAnySampleOfTheBoxIsWhole) {
   std::swap(run.account.restarts, run.account.reboots);
   EXPECT_THAT(problems_of(run), testing::IsEmpty()) << "before the wrap of its counter the box's looks like that";
   run.account.reboots = 0;
-  EXPECT_THAT(problems_of(run), Contains(HasSubstr("began again 1 times where 0")));
+  EXPECT_THAT(problems_of(run), Contains(HasSubstr("restarted 1 times, 0")));
 }
 
 TEST_F(VerifiedRun, WithARestartOfTheBoxThatWasCountedIsWhole) {
@@ -171,7 +171,7 @@ TEST_F(VerifiedRun, AStrangeScaleShows) {
   EXPECT_THAT(problems_of(run), Contains("counts_per_newton is 0"));
   run = make_run({});
   run.header.load_cell.device_rate_hz = 5000;
-  EXPECT_THAT(problems_of(run), Contains(HasSubstr("do not make the box's")));
+  EXPECT_THAT(problems_of(run), Contains(HasSubstr("is not the box's")));
   run.header.thrust_axis = -1, run.header.spin = 0, run.header.clock_gain = HUGE_VAL;
   EXPECT_THAT(problems_of(run), testing::IsSupersetOf({"thrust_axis is -1", "spin is 0", "clock_gain is inf"}));
 }

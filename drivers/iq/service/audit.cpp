@@ -226,7 +226,7 @@ class Checks {
            "lower the top speed, or raise brushless_drive.motor_redline_start");
     if (intention_.clock_unchecked)
       note("the module's clock is unchecked: its speeds may be off by some tenths of a percent",
-           "kphi devices --bench FILE --clock-gain measures it");
+           "measure it: `kphi devices --bench FILE --clock-gain`");
     const auto kp = value<"propeller_motor_control.velocity_Kp">();
     const auto ki = value<"propeller_motor_control.velocity_Ki">();
     if (kp && ki && !(*kp > 0) && !(*ki > 0))

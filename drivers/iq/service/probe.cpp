@@ -230,7 +230,7 @@ std::vector<std::string> Probe::lines() const {
   }
   if (clock_gain) {
     text.push_back(
-        fmt::format("its clock runs {:+.1f} ppm against this host's, u {:.1f} ppm, from {} readings over {:.0f} s; "
+        fmt::format("its clock runs {:+.1f} ppm against this computer's, u {:.1f} ppm, from {} readings over {:.0f} s; "
                     "write under iq: in the bench file:",
                     clock_gain->ppm(), 1e6 * clock_gain->u_factor, clock_gain->readings, clock_gain->duration_s));
     text.push_back(clock_gain->yaml());

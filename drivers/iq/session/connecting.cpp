@@ -156,7 +156,7 @@ void Connecting::conclude(const char* why_silent) {
   if (step.sets() && !reply.accepted) {
     failure_ = fmt::format(
         "the module did not accept its communication timeout ({} reads {} instead of {}): the motor would keep "
-        "turning if this host died",
+        "turning if this computer stopped",
         step.entry->name(), *reply.value, *wanted());
     return;
   }

@@ -31,7 +31,7 @@ class Elements {
     const pugi::xml_parse_result result = document_.load_buffer(xml.data(), xml.size());
     if (!result) {
       refuse(fmt::format("the XML is broken at byte {}: {}", result.offset, result.description()),
-             "try again; the box may have broken off");
+             "try again, then power-cycle the box");
     }
     root_ = document_.child("netft");
     if (!root_) refuse("no element <netft>", "check that this is a Net Box: open its address in a browser");

@@ -23,7 +23,7 @@ struct Refused {
 };
 const Refused kNotHttp{"the answer is not HTTP", "not a Net Box: check the address and http_port"};
 const Refused kTooLong{"the answer is longer than 1 MiB", "not a Net Box: check the address"};
-const Refused kCutShort{"the connection ended early", "the box broke off; try again, then power-cycle the box"};
+const Refused kCutShort{"the connection ended early", "try again, then power-cycle the box"};
 
 void refuse_if_wrong(const boost::system::error_code& error) {
   if (!error || error == http::error::need_more) return;

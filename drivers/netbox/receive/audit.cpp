@@ -12,16 +12,16 @@ namespace {
 using Findings = std::vector<Finding>;
 
 constexpr const char* kAxes[] = {"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
-const char* unit_of(std::size_t axis) { return axis < 3 ? "N" : "Nm"; }
+const char* unit_of(std::size_t axis) { return axis < 3 ? "N" : "N m"; }
 
 void check_stream(const Configuration& box, const Intention& intention, Findings& found) {
   if (!box.rdt_enabled)
     found.push_back({Severity::fault, "RDT is disabled (comrdte)", "enable RDT on the box's Communications page"});
   if (intention.rate_hz > 0 && std::abs(box.rdt_rate_hz - intention.rate_hz) > 0.5)
-    found.push_back(
-        {Severity::fault,
-         fmt::format("the box streams at {:.4g} Hz, the bench file says {:g} Hz", box.rdt_rate_hz, intention.rate_hz),
-         "set the RDT output rate on the box's Communications page, or rate_hz in the bench file"});
+    found.push_back({Severity::fault,
+                     fmt::format("the box streams at {:.4g} Hz, the bench file expects {:g} Hz", box.rdt_rate_hz,
+                                 intention.rate_hz),
+                     "set the RDT output rate on the box's Communications page, or rate_hz in the bench file"});
   const double cutoff = filter_cutoff_hz(box).value_or(0);
   std::vector<std::string> lines;
   for (const AliasedLine& line :
@@ -33,8 +33,8 @@ void check_stream(const Configuration& box, const Intention& intention, Findings
   }
   if (!lines.empty())
     found.push_back({Severity::fault,
-                     fmt::format("at {:.4g} Hz these steps are folded into a constant force: {}", box.rdt_rate_hz,
-                                 fmt::join(lines, ", ")),
+                     fmt::format("at {:.4g} Hz a rotor harmonic aliases to a constant force at these steps: {}",
+                                 box.rdt_rate_hz, fmt::join(lines, ", ")),
                      "set the RDT output rate to 7000 Hz"});
 }
 
@@ -59,7 +59,7 @@ void check_sampling(const Configuration& box, const Intention& intention, Findin
     found.push_back({Severity::warning, std::move(what), next_move});
   };
   if (intention.records_per_datagram > 0 && box.records_per_datagram != intention.records_per_datagram)
-    warn(fmt::format("the box sends {} records per datagram, the bench file says {}", box.records_per_datagram,
+    warn(fmt::format("the box sends {} records per datagram, the bench file expects {}", box.records_per_datagram,
                      intention.records_per_datagram),
          "set the RDT buffer size on the box's Communications page, or records_per_datagram in the bench file");
   const auto cutoff = filter_cutoff_hz(box);

@@ -73,12 +73,12 @@ std::vector<std::string> Probe::lines() const {
     const Configuration& box = *configuration;
     text.push_back(fmt::format("{}, serial {}, firmware {}", box.product.empty() ? "Net Box" : box.product,
                                box.serial.empty() ? "unknown" : box.serial, box.firmware));
-    text.push_back(fmt::format("calibration {} in slot {} \"{}\", {:.0f} counts per N, {:.0f} per Nm",
+    text.push_back(fmt::format("calibration {} in slot {} \"{}\", {:.0f} counts per N, {:.0f} per N m",
                                box.calibration_serial, box.slot, box.slot_name, box.counts_per_newton,
                                box.counts_per_newton_metre));
     const std::span range(box.range);
     text.push_back(
-        fmt::format("ranges {:g} N, {:g} Nm", fmt::join(range.first(3), " "), fmt::join(range.last(3), " ")));
+        fmt::format("ranges {:g} N, {:g} N m", fmt::join(range.first(3), " "), fmt::join(range.last(3), " ")));
     text.push_back(fmt::format("RDT {}, {:.4g} Hz, {} records per datagram, {}",
                                box.rdt_enabled ? "enabled" : "disabled", box.rdt_rate_hz, box.records_per_datagram,
                                filter_words(box)));

@@ -85,7 +85,7 @@ void as_ip(Fault& fault, const FaultKey& key, const std::string& word) {
 void as_wrong_size(Fault& fault, const FaultKey& key, const std::string& text) {
   into<&Fault::size>(fault, key, text);
   if (fault.size > 0 && fault.size % 36 == 0 && fault.size <= 1440)
-    refuse("size", "whole records are the right size: 36 to 1440 in steps of 36");
+    refuse("size", "size is a multiple of 36 up to 1440, so it is not a wrong size");
 }
 
 void as_reading(Fault& fault, const FaultKey&, const std::string& text) {

@@ -34,7 +34,8 @@ Listening listen_at(const std::string& host, int type, std::uint16_t port) {
   boost::asio::io_context io;
   boost::system::error_code unknown;
   const auto found = tcp::resolver(io).resolve(tcp::v4(), host, std::to_string(port), unknown);
-  if (unknown) throw DeviceError(where, "resolve", unknown.message(), "name an address of this machine in netbox.host");
+  if (unknown)
+    throw DeviceError(where, "resolve", unknown.message(), "name an address of this computer in netbox.host");
   const tcp::endpoint at = *found.begin();
   try {
     if (type == SOCK_STREAM) return taken_over(tcp::acceptor(io, at));
@@ -43,7 +44,7 @@ Listening listen_at(const std::string& host, int type, std::uint16_t port) {
     return taken_over(std::move(socket));
   } catch (const boost::system::system_error& error) {
     throw DeviceError(fmt::format("{}:{}", where, port), "listen", error.code().message(),
-                      "is another simulator running? Else choose other ports in the bench file");
+                      "stop any other simulator, or choose other ports in the bench file");
   }
 }
 

@@ -194,14 +194,14 @@ TEST(AnsweringOperator, LeavesTheMotorLockedAfterAWrongAnswer) {
   auto person = answering("mountings: [0, 45]\n");
   (void)person.confirm_mounting(kPropeller, 0);
   EXPECT_EQ(refused([&] { (void)person.confirm_mounting(kPropeller, 90); }),
-            "a.yaml:2:16: mounting 2 is 45 degrees, the campaign asks for 90; the motor stays locked");
+            "a.yaml:2:16: mounting 2 is 45°, the campaign needs 90°; the motor stays locked");
 }
 
 TEST(AnsweringOperator, RefusesWhatItHasNoAnswerTo) {
   auto person = answering("mountings: [0]\nrun_again: [true]\n");
   (void)person.confirm_mounting(kPropeller, 0);
   EXPECT_EQ(refused([&] { (void)person.confirm_mounting(kPropeller, 45); }),
-            "a.yaml:2:13: mountings has no answer 2: the campaign asks for 45 degrees; add it");
+            "a.yaml:2:13: mountings has no answer 2: the campaign needs 45°; add it");
   EXPECT_TRUE(person.run_again(question()));
   EXPECT_THAT(refused([&] { (void)person.run_again(question()); }),
               AllOf(HasSubstr("a.yaml:3:13: run_again has no answer 2: 45 degrees, repetition 2 is off; add")));
@@ -210,9 +210,9 @@ TEST(AnsweringOperator, RefusesWhatItHasNoAnswerTo) {
 TEST(AnsweringOperator, NamesWhatIsLeftOver) {
   auto person = answering("mountings: [0, 45]\nrun_again: [true]\n");
   (void)person.confirm_mounting(kPropeller, 0);
-  EXPECT_THAT(refused([&] { person.finish(); }), HasSubstr("a.yaml:2:16: mounting 2 is left over"));
+  EXPECT_THAT(refused([&] { person.finish(); }), HasSubstr("a.yaml:2:16: mounting 2 is one too many"));
   (void)person.confirm_mounting(kPropeller, 45);
-  EXPECT_THAT(refused([&] { person.finish(); }), HasSubstr("a.yaml:3:13: answer 1 of run_again is left over"));
+  EXPECT_THAT(refused([&] { person.finish(); }), HasSubstr("a.yaml:3:13: answer 1 of run_again is one too many"));
 }
 
 TEST(AnsweringOperator, ConfirmsTheMountingOfAnotherRunWithTheAnswerToRunIt) {
@@ -230,10 +230,9 @@ TEST(AnsweringOperator, DictatesEachQuestionAndAnswer) {
   (void)person.confirm_mounting(kPropeller, 0);
   (void)person.run_again(question());
   EXPECT_NE(refused([&] { (void)person.confirm_mounting(kPropeller, 90); }), "");
-  EXPECT_THAT(record,
-              ElementsAre("operator_asked: mounted angle for propeller 5x3, 0 degrees?", "operator_answered: 0",
-                          "operator_asked: run 45 degrees again? repetition 2 is off", "operator_answered: true",
-                          "operator_asked: mounted angle for propeller 5x3, 90 degrees?", "operator_answered: 45"));
+  EXPECT_THAT(record, ElementsAre("operator_asked: mounted angle for propeller 5x3, 0°?", "operator_answered: 0",
+                                  "operator_asked: run 45° again? repetition 2 is off", "operator_answered: true",
+                                  "operator_asked: mounted angle for propeller 5x3, 90°?", "operator_answered: 45"));
 }
 
 }  // namespace operator_test

@@ -39,7 +39,7 @@ TEST(OutlyingRuns, AreNamedAndKeptAndWidenTheBudget) {
   }
   EXPECT_GE(named, 38) << "ten times what repetitions scatter";
   EXPECT_THAT(analyse(identify(with_one_run_off(2, 0.03))).remarks,
-              Contains(HasSubstr("repetition 2 at 90 deg stands out")));
+              Contains(HasSubstr("repetition 2 at 90° stands out")));
 }
 
 TEST(OutlyingRuns, AreNotLookedForAmongTwo) {

@@ -49,7 +49,7 @@ TEST(Connecting, FailsWhenTheTimeoutIsNotAccepted) {
     wire.module.read_only = {{52, sub}};
     wire.session.connect(wire.now);
     ASSERT_TRUE(wire.run_to_state(State::failed, 3s)) << sub;
-    EXPECT_NE(wire.session.failure().find("the motor would keep turning if this host died"), std::string::npos)
+    EXPECT_NE(wire.session.failure().find("the motor would keep turning if this computer stopped"), std::string::npos)
         << wire.session.failure();
     EXPECT_TRUE(wire.module.last_motion()->is_coast());
   }

@@ -66,12 +66,12 @@ TEST(HttpGet, ABoxThatNeverEndsItsAnswerEndsInATimeout) {
 
 TEST(HttpGet, ATruncatedAnswerIsNoAnswer) {
   FakeWeb web({{"HTTP/1.0 200 OK\r\nContent-Length: 100\r\n\r\n<netft>"}});
-  EXPECT_THAT(failure(web.port()), AllOf(HasSubstr("read the answer"), HasSubstr("broke off")));
+  EXPECT_THAT(failure(web.port()), AllOf(HasSubstr("read the answer"), HasSubstr("ended early")));
 }
 
 TEST(HttpGet, AnEmptyAnswerIsNoAnswer) {
   FakeWeb web(FakeWeb::Manner{});
-  EXPECT_THAT(failure(web.port()), AllOf(HasSubstr("read the answer"), HasSubstr("broke off")));
+  EXPECT_THAT(failure(web.port()), AllOf(HasSubstr("read the answer"), HasSubstr("ended early")));
 }
 
 TEST(HttpGet, AnAnswerAboveOneMebibyteIsRefused) {

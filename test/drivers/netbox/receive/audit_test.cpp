@@ -72,9 +72,9 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"Disabled", [](Configuration& box, Intention&) { box.rdt_enabled = false; }, Severity::fault,
              "RDT is disabled", "Communications page"},
         Case{"OtherRate", [](Configuration&, Intention& intention) { intention.rate_hz = 1000; }, Severity::fault,
-             "streams at 7000 Hz, the bench file says 1000 Hz", "rate_hz"},
+             "streams at 7000 Hz, the bench file expects 1000 Hz", "rate_hz"},
         Case{"OtherBuffer", [](Configuration&, Intention& intention) { intention.records_per_datagram = 1; },
-             Severity::warning, "sends 40 records per datagram, the bench file says 1", "RDT buffer size"},
+             Severity::warning, "sends 40 records per datagram, the bench file expects 1", "RDT buffer size"},
         Case{"FilterAboveHalfTheRate",
              [](Configuration& box, Intention&) {
                set_divisor(box, 7);
@@ -120,7 +120,7 @@ INSTANTIATE_TEST_SUITE_P(
                box.monitoring = true;
                box.monitor_conditions = {{2, true, 55}, {5, false, -0.5}};
              },
-             Severity::note, "monitor conditions at 7 kHz: Fz > 55 N, Tz < -0.5 Nm", "until it is reset"},
+             Severity::note, "monitor conditions at 7 kHz: Fz > 55 N, Tz < -0.5 N m", "until it is reset"},
         Case{"GageBias", [](Configuration& box, Intention&) { box.gage_bias[0] = 745; }, Severity::note, "setbias",
              "tare"}),
     [](const testing::TestParamInfo<Case>& one) { return one.param.name; });

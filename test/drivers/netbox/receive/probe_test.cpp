@@ -37,7 +37,7 @@ TEST(Probe, TellsWhoAnswersAndHowWellItStreams) {
   for (const Finding& finding : found.findings) EXPECT_EQ(finding.severity, Severity::note) << finding.what;
   const std::vector<std::string> lines = found.lines();
   EXPECT_THAT(lines, Contains(HasSubstr("firmware 2.2.59")));
-  EXPECT_THAT(lines, Contains(HasSubstr("ranges 330 330 990 N, 30 30 30 Nm")));
+  EXPECT_THAT(lines, Contains(HasSubstr("ranges 330 330 990 N, 30 30 30 N m")));
   EXPECT_THAT(lines, Contains(HasSubstr("RDT enabled, 7000 Hz, 40 records per datagram, no filter")));
   EXPECT_THAT(lines, Contains(HasSubstr("0 lost, 0 late, 0 duplicates")));
   EXPECT_THAT(lines, Contains(HasSubstr("note: could not cross-check the scale")));
