@@ -364,8 +364,7 @@ std::string family_section(std::span<const Fitted> family) {
     const Estimate K_T = one.thrust_coefficient();
     const double diameter_m = 0.0254 * one.diameter_in;
     table.row({html_escaped(one.propeller), one.diameter_in > 0 ? fmt::format("{:g}", one.diameter_in) : "–",
-               one.blades > 0 ? fmt::format("{}", one.blades) : "–",
-               with_power_of_ten(K_T.value, K_T.u),
+               one.blades > 0 ? fmt::format("{}", one.blades) : "–", with_power_of_ten(K_T.value, K_T.u),
                diameter_m > 0 ? fmt::format("{:.5f}", K_T.value / std::pow(diameter_m, 4)) : "–",
                with_power_of_ten(line.slope_per_deg, std::sqrt(line.covariance[1][1])),
                html_number(100 * line.slope_per_deg / K_T.value, "{:+.4f}")});

@@ -98,7 +98,8 @@ LinePrediction predict(const Identification& identification, const ErrorSources&
   prediction.scaling_factor =
       sources.budget(fmt::format("k_i({} deg)", phi_deg), "1", curve.scaling_factor(from_degrees(phi_deg)), ratio);
   prediction.scaling_factor.rows.push_back(scaled(row, std::sqrt(1 + std::pow(norm(at), 2)) / K_T));
-  prediction.extrapolated = phi_deg < identification.first_fitted_deg() || phi_deg > identification.line.points.back().phi_deg;
+  prediction.extrapolated =
+      phi_deg < identification.first_fitted_deg() || phi_deg > identification.line.points.back().phi_deg;
   return prediction;
 }
 
