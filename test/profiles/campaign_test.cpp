@@ -46,24 +46,13 @@ TEST(Campaign, IsReadIntoSiUnits) {
   EXPECT_EQ(campaign.path, "c.yaml");
 }
 
-/// The limits with `key` set to the first value that is accepted.
-Limits limits_with(const std::string& key, std::initializer_list<double> values) {
-  std::string text = kCampaignText;
-  const auto line = text.find("  " + key + ": ");
-  if (line != std::string::npos) text.erase(line, text.find('\n', line) + 1 - line);
-  for (const double value : values) {
-    const std::string with = text + "  " + key + ": " + std::to_string(value) + "\n";
-    if (refusals([&] { return parse_campaign(with, "c.yaml"); }).empty()) return parse_campaign(with, "c.yaml").limits;
-  }
-  ADD_FAILURE() << key << ": no value is accepted";
-  return parse_campaign(kCampaignText, "c.yaml").limits;
-}
-
 TEST(Campaign, IgnoresNoLimitThatItsSchemaAllows) {
   const Limits usual = parse_campaign(kCampaignText, "c.yaml").limits;
   for (const auto& [key, schema] : schema_of(FileKind::campaign)["properties"]["limits"]["properties"].items()) {
     if (schema["type"] != "number") continue;
-    EXPECT_FALSE(limits_with(key, {schema["maximum"].get<double>(), 1}) == usual) << key;
+    std::string text = std::regex_replace(kCampaignText, std::regex("  " + key + ": .*\n"), "") + "  " + key + ": ";
+    text += key == "supply_voltage_min_v" ? "1" : schema["maximum"].dump();
+    EXPECT_FALSE(parse_campaign(text, "c.yaml").limits == usual) << key;
   }
 }
 
