@@ -59,7 +59,7 @@ FitInput campaign_input(const fs::path& path) {
   take_runs(folder, input.provenance);
   if (fs::exists(folder.bench_file())) {
     const auto gain = profiles::load_bench(folder.bench_file().string()).iq.clock_gain;
-    if (gain) input.provenance.clock = {gain->factor, gain->u_factor};
+    input.provenance.clock = gain ? MotorClock{gain->factor, gain->u_factor} : MotorClock{};
   }
   if (fs::exists(folder.campaign_file())) {
     const profiles::Campaign campaign = profiles::load_campaign(folder.campaign_file().string());

@@ -204,7 +204,7 @@ TEST(AnsweringOperator, RefusesWhatItHasNoAnswerTo) {
             "a.yaml:2:13: mountings has no answer 2: the campaign needs 45°; add it");
   EXPECT_TRUE(person.run_again(question()));
   EXPECT_THAT(refused([&] { (void)person.run_again(question()); }),
-              AllOf(HasSubstr("a.yaml:3:13: run_again has no answer 2: 45 degrees, repetition 2 is off; add")));
+              AllOf(HasSubstr("a.yaml:3:13: run_again has no answer 2: 45°, repetition 2 is off; add")));
 }
 
 TEST(AnsweringOperator, NamesWhatIsLeftOver) {
