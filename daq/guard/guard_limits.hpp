@@ -136,11 +136,10 @@ static_assert(
     [] {
       for (std::size_t i = 0; i < kQuantities.size(); ++i) {
         if (kQuantities[i].watched != static_cast<Watched>(i)) return false;
-        if ((kQuantities[i].campaign_key == nullptr) != (kQuantities[i].campaign_limit == nullptr)) return false;
       }
       return true;
     }(),
-    "kQuantities has one row per Watched, in its order; a campaign key and its limit go together");
+    "kQuantities has one row per Watched, in its order");
 
 [[nodiscard]] constexpr const GuardedQuantity& row_of(Watched watched) {
   return kQuantities[static_cast<std::size_t>(watched)];
