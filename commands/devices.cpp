@@ -191,8 +191,10 @@ ExitCode devices(const Asked& asked) {
   const bool unpowered = bench && bench->supply && answers.back().details.value("output", true) == false;
   if (bench) answers.push_back(ask_motor(bench->iq, clock, asked.clock_gain_s, !unpowered));
   if (unpowered && !answers.back().answers) {
-    answers.back().wanted = false;
-    answers.back().lines = {"note: cannot answer while the supply's output is off; kphi run switches it on"};
+    answers.back().wanted = asked.clock_gain_s.has_value();
+    answers.back().lines = {
+        asked.clock_gain_s ? "fault: clock not measured: the supply's output is off; switch it on by hand, try again"
+                           : "note: cannot answer while the supply's output is off; kphi run switches it on"};
   }
   if (bench) ask_about_air(*bench, answers);
   for (DeviceAnswer& answer : ask_usb(answers)) answers.push_back(std::move(answer));

@@ -81,6 +81,9 @@ TEST(Program, TellsThatAModuleCannotAnswerWhileTheSupplysOutputIsOff) {
   const json answers = json::parse(devices.out());
   EXPECT_EQ(answers.at(1).at("output"), false);
   EXPECT_EQ(answers.at(2).at("answers"), false) << "its module, which is not missed then";
+  Process measured({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--clock-gain", "10"});
+  EXPECT_EQ(measured.wait(), 3) << "unless its clock is asked for";
+  EXPECT_THAT(measured.out(), HasSubstr("clock not measured: the supply's output is off"));
 }
 
 TEST(Program, StopsOnCtrlCWithTheMotorCoastingAndTheFileKept) {
