@@ -62,7 +62,6 @@ OcclusionCoefficient coefficient(double phi_deg, std::vector<StepMean> steps, co
   row.standard_error = row.fit->standard_error.k;
   row.steps = levels.size();
   row.repetitions = repetitions.size();
-  if (const auto air = air_of(steps)) row.standard = at_standard(row.k, row.standard_error, *air);
   if (!at_level.empty()) row.at_speed = k_at_speed(at_level);
   if (options.estimator == Estimator::polynomial || options.estimator == Estimator::at_speed) {
     if (!row.at_speed) throw FitError("no good step at the reference speed; name a speed of the profile");
@@ -190,7 +189,9 @@ std::vector<OcclusionCoefficient> coefficients_of(std::span<const StepMean> step
   }
   repeatability = fit::repeatability(std::move(scatter));
   for (std::size_t i = 0; i < table.size(); ++i) {
-    if (repeatability.repeated) table[i].standard_error = repeatability.independent_u(i);
+    OcclusionCoefficient& row = table[i];
+    if (repeatability.repeated) row.standard_error = repeatability.independent_u(i);
+    if (const auto air = air_of(row.measured)) row.standard = at_standard(row.k, row.standard_error, *air);
   }
   return table;
 }

@@ -38,6 +38,18 @@ TEST(Air, ItsUncertaintyJoinsThatOfTheFit) {
   EXPECT_NEAR(standard.u / standard.value, std::hypot(0.01, 0.03), 1e-12);
 }
 
+TEST(Air, ScalesTheCoefficientOfTheTableWithItsWholeUncertaintyByEachEstimator) {
+  const auto steps = in_air(1.10);
+  for (const Estimator estimator :
+       {Estimator::through_origin, Estimator::with_offset, Estimator::polynomial, Estimator::at_speed}) {
+    for (const OcclusionCoefficient& row : identify(steps, {.estimator = estimator}).table) {
+      const double scale = kStandardDensity / 1.10;
+      EXPECT_NEAR(row.standard->value / (row.k * scale), 1, 1e-12) << name_of(estimator) << ' ' << row.phi_deg;
+      EXPECT_NEAR(row.standard->u / std::hypot(row.standard_error * scale, 0.01 * row.k * scale), 1, 1e-9);
+    }
+  }
+}
+
 TEST(Air, OneStepWithoutItIsEnoughToKnowNothing) {
   auto steps = in_air(1.2);
   steps[300].air_density_kg_m3 = results::kNotMeasured;
