@@ -132,14 +132,14 @@ void hand_on(std::string& buffer, std::ostream& out) {
 
 // ---- the verb
 
-struct Request {
+struct CompensateRequest {
   std::string coefficients;
   std::string vehicle;
   std::string law = "clamped";
   bool json = false;
 };
 
-Compensator compensator_of(const Request& request, const profiles::Vehicle& vehicle) {
+Compensator compensator_of(const CompensateRequest& request, const profiles::Vehicle& vehicle) {
   const ThrustCurve curve = load_curve_for(request.coefficients, vehicle);
   const ScalingLaw law = request.law == "published" ? ScalingLaw::published : ScalingLaw::clamped;
   const BuildOutcome outcome = Compensator::build({curve, curve, curve, curve}, profiles::airframe_of(vehicle), law);
@@ -171,7 +171,7 @@ ExitCode verdict(const RowCounts& counts, const profiles::Vehicle& vehicle) {
   return ExitCode::data_rejected;
 }
 
-ExitCode compensate(const Request& request) {
+ExitCode compensate(const CompensateRequest& request) {
   std::ios::sync_with_stdio(false);
   std::cin.tie(nullptr);
   const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
@@ -223,7 +223,7 @@ RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& wor
 }
 
 void add_compensate(CLI::App& program, ExitCode& exit_code) {
-  const auto [command, request] = add_verb<Request>(
+  const auto [command, request] = add_verb<CompensateRequest>(
       program, exit_code, "compensate",
       "turn rows of arm angles and thrusts (CSV on stdin) into occlusions, k_i and rotor speeds", compensate);
   command.footer(

@@ -19,7 +19,7 @@ using namespace daq;
 
 constexpr const char* kFactoryAddress = "192.168.1.1";
 
-struct Asked {
+struct DevicesRequest {
   std::string bench;
   std::string campaign;
   bool json = false;
@@ -57,7 +57,7 @@ Json to_json(const netbox::Counters& counters, const StreamHealth& health) {
           {"queue_high_water", health.queue_high_water}};
 }
 
-netbox::ProbeSettings probe_settings(const Asked& asked, const std::optional<profiles::BenchConfig>& bench) {
+netbox::ProbeSettings probe_settings(const DevicesRequest& asked, const std::optional<profiles::BenchConfig>& bench) {
   netbox::ProbeSettings settings;
   if (!bench) return settings;
   settings.tcp_port = bench->netbox.tcp_port;
@@ -172,7 +172,7 @@ void print(const std::vector<DeviceAnswer>& answers, bool json) {
   }
 }
 
-ExitCode devices(const Asked& asked) {
+ExitCode devices(const DevicesRequest& asked) {
   std::optional<profiles::BenchConfig> bench;
   if (!asked.bench.empty()) bench = profiles::load_bench(asked.bench);
   if (bench && bench->simulation && bench->simulation->in_process) {
@@ -209,7 +209,7 @@ ExitCode devices(const Asked& asked) {
 }  // namespace
 
 void add_devices(CLI::App& program, ExitCode& exit_code) {
-  const auto [command, asked] = add_verb<Asked>(program, exit_code, "devices",
+  const auto [command, asked] = add_verb<DevicesRequest>(program, exit_code, "devices",
                                                 "find and identify the devices, list what is wrong with them", devices);
   CLI::Option* bench =
       add_value(command, "--bench", "FILE", asked.bench, "bench file (default: try only the Net Box's factory address)")

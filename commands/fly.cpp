@@ -16,7 +16,7 @@ using namespace flight;
 
 namespace fs = std::filesystem;
 
-struct Request {
+struct FlyRequest {
   std::string coefficients;
   std::string vehicle;
   std::string experiment;
@@ -41,8 +41,8 @@ void require_section(const profiles::Vehicle& file, bool is_given, const char* s
                   file.path, section));
 }
 
-Vehicle vehicle_of(const profiles::Vehicle& file) {
-  Vehicle vehicle;
+flight::Vehicle vehicle_of(const profiles::Vehicle& file) {
+  flight::Vehicle vehicle;
   vehicle.airframe = profiles::airframe_of(file);
   vehicle.build = *file.dynamics;
   for (const auto& [name, angles] : {std::pair{"X", &vehicle.x}, std::pair{"O", &vehicle.o}}) {
@@ -56,12 +56,12 @@ Vehicle vehicle_of(const profiles::Vehicle& file) {
   return vehicle;
 }
 
-Scene nominal_of(const Request& request) {
+Scene nominal_of(const FlyRequest& request) {
   const profiles::Vehicle file = profiles::load_vehicle(request.vehicle);
   const compensation::ThrustCurve curve = load_curve_for(request.coefficients, file);
   require_section(file, file.dynamics.has_value(), "dynamics (mass_kg, hub_mass_kg, …)");
   require_section(file, file.control.has_value(), "control (the controller's gains)");
-  const Vehicle vehicle = vehicle_of(file);
+  const flight::Vehicle vehicle = vehicle_of(file);
   const auto built = compensation::Compensator::build({curve, curve, curve, curve}, vehicle.airframe);
   if (!built.compensator) throw ConfigurationError(request.vehicle + ": " + describe(built.refusal));
   if (!Pilot::build(vehicle, curve, *file.control)) {
@@ -91,7 +91,7 @@ std::string write_figure(const fs::path& folder, const std::string& name, const 
   return fit::draw(folder / (name + ".gp"), folder / (name + ".svg"));
 }
 
-void write_out(const Request& request, const Flown& flown, const std::array<std::vector<TraceRow>, 9>& traces) {
+void write_out(const FlyRequest& request, const Flown& flown, const std::array<std::vector<TraceRow>, 9>& traces) {
   const fs::path folder(request.out);
   std::string skipped;
   for (std::size_t i = 0; i < traces.size(); ++i) {
@@ -107,7 +107,7 @@ void write_out(const Request& request, const Flown& flown, const std::array<std:
   if (!skipped.empty()) fmt::print(stderr, "no figures: {}\n", skipped);
 }
 
-Flown fly_requested(const Request& request) {
+Flown fly_requested(const FlyRequest& request) {
   Flown flown{nominal_of(request), {}, {}};
   const Shadow shadow(flown.nominal.vehicle.airframe);
   std::array<std::vector<TraceRow>, 9> traces;
@@ -122,7 +122,7 @@ Flown fly_requested(const Request& request) {
   return flown;
 }
 
-std::string circumstances(const Request& request, const Scene& scene) {
+std::string circumstances(const FlyRequest& request, const Scene& scene) {
   const Truth& truth = scene.truth;
   const compensation::ThrustCurve& curve = scene.curve;
   const auto share = [&](Radians phi) { return curve.at(phi) / curve.thrust_coefficient(); };
@@ -138,7 +138,7 @@ std::string circumstances(const Request& request, const Scene& scene) {
       errors, 1e3 * truth.cog_error.x(), 1e3 * truth.cog_error.y(), request.seed);
 }
 
-void print_text(const Request& request, const Flown& flown) {
+void print_text(const FlyRequest& request, const Flown& flown) {
   fmt::print("{}{}{}{}", circumstances(request, flown.nominal), hover_table(flown.flights),
              height_table(flown.flights, flown.nominal.pilot.gains), forward_table(flown.flights));
   for (std::size_t i = 0; i < flown.flights.size(); ++i) {
@@ -185,7 +185,7 @@ Json json_of(const Experiment& experiment, const FlightResult& flight) {
   return {{"name", experiment.name}, {"lost", flight.lost}, {"conceded_steps", flight.concessions}, {"legs", legs}};
 }
 
-void print_flights(const Request& request, const Flown& flown) {
+void print_flights(const FlyRequest& request, const Flown& flown) {
   const Truth& truth = flown.nominal.truth;
   Json flights = Json::array();
   for (std::size_t i = 0; i < flown.flights.size(); ++i) {
@@ -198,7 +198,7 @@ void print_flights(const Request& request, const Flown& flown) {
   print_json(out);
 }
 
-ExitCode fly_as_asked(const Request& request) {
+ExitCode fly_as_asked(const FlyRequest& request) {
   const Flown flown = fly_requested(request);
   request.json ? print_flights(request, flown) : print_text(request, flown);
   return ExitCode::ok;
@@ -207,7 +207,7 @@ ExitCode fly_as_asked(const Request& request) {
 }  // namespace
 
 void add_fly(CLI::App& program, ExitCode& exit_code) {
-  const auto [command, request] = add_verb<Request>(
+  const auto [command, request] = add_verb<FlyRequest>(
       program, exit_code, "fly",
       "fly the paper's nine experiments in simulation with these coefficients, before propellers turn", fly_as_asked);
   command.footer(

@@ -12,7 +12,7 @@ namespace {
 
 using namespace results;
 
-struct Asked {
+struct VerifyRequest {
   std::string path;
   bool json = false;
 };
@@ -112,14 +112,14 @@ void print_folder(const Json& folder) {
   }
 }
 
-ExitCode info(const Asked& asked) {
+ExitCode info(const VerifyRequest& asked) {
   const bool folder = std::filesystem::is_directory(asked.path);
   const Json found = folder ? describe_folder(CampaignFolder::open(asked.path)) : describe(asked.path);
   asked.json ? print_json(found) : folder ? print_folder(found) : print_run(found);
   return ExitCode::ok;
 }
 
-ExitCode verify(const Asked& asked) {
+ExitCode verify(const VerifyRequest& asked) {
   Json found{{"path", asked.path}};
   std::vector<std::string> problems, remarks;
   std::string words;
@@ -154,8 +154,8 @@ ExitCode verify(const Asked& asked) {
   return problems.empty() ? ExitCode::ok : ExitCode::data_rejected;
 }
 
-void add(CLI::App& program, ExitCode& exit_code, const char* name, const char* what, ExitCode (*run)(const Asked&)) {
-  const auto [command, asked] = add_verb<Asked>(program, exit_code, name, what, run);
+void add(CLI::App& program, ExitCode& exit_code, const char* name, const char* what, ExitCode (*run)(const VerifyRequest&)) {
+  const auto [command, asked] = add_verb<VerifyRequest>(program, exit_code, name, what, run);
   add_argument(command, "PATH", asked.path, "run file or campaign folder")->check(kExistingPath);
   command.add_flag("--json", asked.json, "print one JSON object");
 }

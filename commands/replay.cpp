@@ -27,7 +27,7 @@ using namespace daq;
 using results::CampaignFolder;
 using results::StepMean;
 
-struct Asked {
+struct ReplayRequest {
   std::string path;
   bool json = false;
   live::LiveOptions live;
@@ -156,7 +156,7 @@ void print(const Replay& replay, bool json) {
               {"difference", replay.difference ? Json(*replay.difference) : Json()}});
 }
 
-ExitCode run_replay(const Asked& asked) {
+ExitCode run_replay(const ReplayRequest& asked) {
   const bool is_campaign = std::filesystem::is_directory(asked.path);
   const Replay result = is_campaign ? replay_campaign(CampaignFolder::open(asked.path)) : replay_run(asked.path);
   print(result, asked.json);
@@ -166,7 +166,7 @@ ExitCode run_replay(const Asked& asked) {
 }
 
 /// Plays a recorded run. With a page it waits for the first browser.
-ExitCode show_replay(const Asked& asked) {
+ExitCode show_replay(const ReplayRequest& asked) {
   if (std::filesystem::is_directory(asked.path))
     throw ConfigurationError(asked.path +
                              ": --live and --udp-json show one run, not a folder; name a file of its runs/");
@@ -187,12 +187,12 @@ ExitCode show_replay(const Asked& asked) {
   throw Interrupted("stopped by request");
 }
 
-ExitCode replay_as_asked(const Asked& asked) { return asked.live.any() ? show_replay(asked) : run_replay(asked); }
+ExitCode replay_as_asked(const ReplayRequest& asked) { return asked.live.any() ? show_replay(asked) : run_replay(asked); }
 
 }  // namespace
 
 void add_replay(CLI::App& program, ExitCode& exit_code) {
-  const auto [command, asked] = add_verb<Asked>(
+  const auto [command, asked] = add_verb<ReplayRequest>(
       program, exit_code, "replay", "compute the step means again from the raw samples and compare them with steps.csv",
       replay_as_asked);
   add_argument(command, "PATH", asked.path, "run file or campaign folder")->check(kExistingPath);

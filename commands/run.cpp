@@ -142,21 +142,21 @@ ExitCode print_finished(const Destination& destination, bool json) {
 }
 
 /// What the command line and the files ask for.
-struct Request {
+struct RunRequest {
   const RunOptions& options;
   profiles::Campaign campaign;
   profiles::BenchConfig config;
   std::optional<profiles::Answers> answers;
 };
 
-ExitCode print_plan(const Request& request) {
+ExitCode print_plan(const RunRequest& request) {
   const auto& [options, campaign, config, answers] = request;
   const DryRun dry = dry_run(campaign, config, options.out, answers);
   fmt::print("{}", options.json ? to_json(dry, campaign, config).dump() + "\n" : to_text(dry, campaign, config));
   return dry.ok() ? ExitCode::ok : ExitCode::usage;
 }
 
-void announce(const Request& request, const DryRun& dry) {
+void announce(const RunRequest& request, const DryRun& dry) {
   put(stderr, plan_text(request.campaign, request.config, dry.plan) +
                   "\nCtrl-C coasts the motor, closes the file and stops.\n");
   for (const PlanCheck& check : dry.checks) {
@@ -165,7 +165,7 @@ void announce(const Request& request, const DryRun& dry) {
 }
 
 /// Connects, checks devices and disk, makes the folder, and runs what is left of the campaign.
-CampaignResult execute(const Request& request, const profiles::Plan& plan, Destination& destination, Operator& person,
+CampaignResult execute(const RunRequest& request, const profiles::Plan& plan, Destination& destination, Operator& person,
                        live::LiveSession& view, const std::function<bool()>& stop_asked) {
   const auto& [options, campaign, config, answers] = request;
   const auto devices = lock_devices(lock_names(config));
@@ -186,7 +186,7 @@ CampaignResult execute(const Request& request, const profiles::Plan& plan, Desti
 }
 
 ExitCode run(const RunOptions& options) {
-  Request request{options, campaign_of(options), profiles::load_bench(options.bench), std::nullopt};
+  RunRequest request{options, campaign_of(options), profiles::load_bench(options.bench), std::nullopt};
   if (!options.answers.empty()) request.answers = profiles::load_answers(options.answers);
   if (options.dry_run) return print_plan(request);
   const auto& [unused, campaign, config, answers] = request;

@@ -21,7 +21,7 @@ namespace {
 
 using namespace sim;
 
-struct Options {
+struct SimRequest {
   std::string bench;
   std::string truth;
   std::string resolved;
@@ -49,7 +49,7 @@ void stop_running(int) {
   throw ConfigurationError(path + ": " + what);
 }
 
-profiles::BenchConfig load_simulated(const Options& options) {
+profiles::BenchConfig load_simulated(const SimRequest& options) {
   profiles::BenchConfig bench = profiles::load_bench(options.bench);
   if (!bench.simulation) refuse(bench.path, "a real bench cannot be simulated; add a `simulation` section");
   if (bench.simulation->in_process)
@@ -65,7 +65,7 @@ profiles::BenchConfig load_simulated(const Options& options) {
   return bench;
 }
 
-void load_supply(const profiles::BenchConfig& bench, const Options& options, ServerSettings& settings) {
+void load_supply(const profiles::BenchConfig& bench, const SimRequest& options, ServerSettings& settings) {
   configured(bench.path, [&] {
     const SupplyUri uri = parse_supply_uri(bench.supply->uri);
     auto& supply = *settings.bench.supply;
@@ -78,7 +78,7 @@ void load_supply(const profiles::BenchConfig& bench, const Options& options, Ser
   });
 }
 
-ServerSettings settings_of(const profiles::BenchConfig& bench, const Options& options) {
+ServerSettings settings_of(const profiles::BenchConfig& bench, const SimRequest& options) {
   ServerSettings settings;
   settings.bench = daq::simulated_devices(bench);
   if (std::ranges::any_of(settings.bench.faults, [](const Fault& f) { return on_air_sensor(f.kind); }))
@@ -144,7 +144,7 @@ ExitCode send(const profiles::BenchConfig& bench, const std::string& line) {
   return answer.starts_with("error") ? ExitCode::failure : ExitCode::ok;
 }
 
-ExitCode serve(const profiles::BenchConfig& bench, const Options& options) {
+ExitCode serve(const profiles::BenchConfig& bench, const SimRequest& options) {
   Server server(settings_of(bench, options));
   if (!options.truth_log.empty())
     write_output(options.truth_log, "");  // refuses an unwritable file now, not at the end
@@ -173,7 +173,7 @@ ExitCode serve(const profiles::BenchConfig& bench, const Options& options) {
   return ExitCode::ok;
 }
 
-ExitCode run(const Options& options) {
+ExitCode run(const SimRequest& options) {
   const profiles::BenchConfig bench = load_simulated(options);
   if (!options.mount.empty()) return send(bench, "mount " + options.mount);
   if (options.status) return send(bench, "status");
@@ -183,7 +183,7 @@ ExitCode run(const Options& options) {
 }  // namespace
 
 void add_sim(CLI::App& program, ExitCode& exit_code) {
-  const auto [sim, options] = add_verb<Options>(
+  const auto [sim, options] = add_verb<SimRequest>(
       program, exit_code, "sim", "run the simulated bench of a bench file, or control a running one", run);
   add_argument(sim, "BENCH", options.bench, "bench file with a `simulation` section");
   add_value(sim, "--truth", "FILE", options.truth,
