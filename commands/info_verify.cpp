@@ -154,7 +154,8 @@ ExitCode verify(const VerifyRequest& asked) {
   return problems.empty() ? ExitCode::ok : ExitCode::data_rejected;
 }
 
-void add(CLI::App& program, ExitCode& exit_code, const char* name, const char* what, ExitCode (*run)(const VerifyRequest&)) {
+void add(CLI::App& program, ExitCode& exit_code, const char* name, const char* what,
+         ExitCode (*run)(const VerifyRequest&)) {
   const auto [command, asked] = add_verb<VerifyRequest>(program, exit_code, name, what, run);
   add_argument(command, "PATH", asked.path, "run file or campaign folder")->check(kExistingPath);
   command.add_flag("--json", asked.json, "print one JSON object");

@@ -187,7 +187,9 @@ ExitCode show_replay(const ReplayRequest& asked) {
   throw Interrupted("stopped by request");
 }
 
-ExitCode replay_as_asked(const ReplayRequest& asked) { return asked.live.any() ? show_replay(asked) : run_replay(asked); }
+ExitCode replay_as_asked(const ReplayRequest& asked) {
+  return asked.live.any() ? show_replay(asked) : run_replay(asked);
+}
 
 }  // namespace
 

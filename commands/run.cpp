@@ -165,8 +165,8 @@ void announce(const RunRequest& request, const DryRun& dry) {
 }
 
 /// Connects, checks devices and disk, makes the folder, and runs what is left of the campaign.
-CampaignResult execute(const RunRequest& request, const profiles::Plan& plan, Destination& destination, Operator& person,
-                       live::LiveSession& view, const std::function<bool()>& stop_asked) {
+CampaignResult execute(const RunRequest& request, const profiles::Plan& plan, Destination& destination,
+                       Operator& person, live::LiveSession& view, const std::function<bool()>& stop_asked) {
   const auto& [options, campaign, config, answers] = request;
   const auto devices = lock_devices(lock_names(config));
   if (!destination.folder) std::filesystem::create_directories(options.out);
