@@ -33,7 +33,7 @@ std::optional<ThrustCurve> ThrustCurve::from_line(ThrustCoefficient thrust_coeff
 }
 
 double ThrustCurve::standard_error_at(Radians occlusion_angle) const noexcept {
-  return uncertainty_ ? std::sqrt(std::max(variance_at(*uncertainty_, occlusion_angle.value()), 0.0)) : kUnknown;
+  return uncertainty_ ? std::sqrt(std::max(variance_at(*uncertainty(), occlusion_angle.value()), 0.0)) : kUnknown;
 }
 
 double ThrustCurve::relative_uncertainty(Radians occlusion_angle, Radians angle_uncertainty,
@@ -41,9 +41,9 @@ double ThrustCurve::relative_uncertainty(Radians occlusion_angle, Radians angle_
   const double phi = occlusion_angle.value(), reference = thrust_coefficient_.value(), k = at(occlusion_angle).value();
   const double factor = scaling_factor(occlusion_angle, law);
   if (!uncertainty_ || phi != phi || !(factor > kScalingFloor)) return kUnknown;
-  const LineUncertainty& u = *uncertainty_;
+  const LineUncertainty& u = *uncertainty();
   if (law == ScalingLaw::clamped && factor == 1.0) return u.thrust_coefficient / reference;
-  const double from_angle = line_.slope_per_rad * angle_uncertainty.value();
+  const double from_angle = line().slope_per_rad * angle_uncertainty.value();
   double variance = variance_at(u, phi) + from_angle * from_angle;
   // The published law reflects the curve at K_T: K_T k_i = 2 K_T − k there.
   if (k > reference) variance += 4 * u.thrust_coefficient * u.thrust_coefficient;

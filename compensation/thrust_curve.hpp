@@ -64,7 +64,7 @@ class ThrustCurve {
 
   /// k(φ), also beyond the largest fitted angle, where it may be negative.
   [[nodiscard]] ThrustCoefficient at(Radians occlusion_angle) const noexcept {
-    return line_.intercept + ThrustCoefficient(line_.slope_per_rad * occlusion_angle.value());
+    return line().intercept + ThrustCoefficient(line().slope_per_rad * occlusion_angle.value());
   }
   /// Standard uncertainty of k(φ) [N/(rad/s)²]; +∞ if unknown.
   [[nodiscard]] double standard_error_at(Radians occlusion_angle) const noexcept;
@@ -85,8 +85,8 @@ class ThrustCurve {
   /// The curve raised by `raised` everywhere, with what it changes over φ times `steepness`; K_T and everything else
   /// stays. nullopt if k(0) is not positive then.
   [[nodiscard]] std::optional<ThrustCurve> perturbed(ThrustCoefficient raised, double steepness) const noexcept {
-    return from_line(thrust_coefficient_, line_.intercept + raised, line_.slope_per_rad * steepness, largest_fitted_,
-                     overlap_, uncertainty_);
+    return from_line(thrust_coefficient_, line().intercept + raised, line().slope_per_rad * steepness, largest_fitted_,
+                     overlap_, uncertainty());
   }
 
  private:

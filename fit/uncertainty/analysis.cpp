@@ -79,12 +79,19 @@ Budget line_budget(const ErrorSources& sources, const char* quantity, const char
   return budget;
 }
 
-LinePrediction predict(const Identification& identification, const ErrorSources& sources, const LineWeights& weights,
+/// k(φ) of the line as a linear function of the k of the table.
+std::vector<double> weights_at(const LineFit& line, std::span<const double> phis, double phi_deg) {
+  const LineWeights weights = line.weights(phis);
+  std::vector<double> at(phis.size());
+  for (std::size_t i = 0; i < at.size(); ++i) at[i] = weights.intercept[i] + phi_deg * weights.slope[i];
+  return at;
+}
+
+LinePrediction predict(const Identification& identification, const ErrorSources& sources, std::span<const double> phis,
                        double phi_deg, const BudgetRow& row) {
   const double K_T = identification.thrust_coefficient().value;
   const compensation::ThrustCurve curve = identification.curve();
-  std::vector<double> at(weights.slope.size());
-  for (std::size_t i = 0; i < at.size(); ++i) at[i] = weights.intercept[i] + phi_deg * weights.slope[i];
+  const std::vector<double> at = weights_at(identification.line, phis, phi_deg);
   LinePrediction prediction;
   prediction.phi_deg = phi_deg;
   const double k = curve.at(from_degrees(phi_deg)).value();
@@ -226,7 +233,7 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   analysis.slope = line_budget(sources, "slope", "N/(rad/s)^2/deg", line.slope_per_deg, weights.slope, row);
   analysis.covariance = covariance_of(sources, weights, row);
   for (const double phi : options.prediction_deg)
-    analysis.predictions.push_back(predict(identification, sources, weights, phi, row));
+    analysis.predictions.push_back(predict(identification, sources, phis, phi, row));
   analysis.standard = standard_air(analysis.coefficients, options);
   analysis.differences = neighbour_tests(analysis.coefficients, sources, identification);
   analysis.between_runs = identification.repeatability.between;
