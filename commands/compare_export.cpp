@@ -76,11 +76,6 @@ void print_lost(const std::vector<std::string>& lost) {
   for (const std::string& line : lost) fmt::print(stderr, "left out  {}\n", line);
 }
 
-void refuse_terminal(const ExportRequest& request) {
-  if (request.out.empty() && request.to == "mcap" && ::isatty(STDOUT_FILENO) == 1)
-    throw ConfigurationError("mcap is binary, standard output is a terminal; name a file with --out, or use a pipe");
-}
-
 void export_run(const ExportRequest& request) {
   if (request.to != "csv" && request.to != "mcap")
     throw ConfigurationError(request.file + ": a run holds samples, not coefficients; export it --to csv or mcap");
@@ -106,7 +101,8 @@ void export_coefficients(const ExportRequest& request) {
 }
 
 ExitCode run_export(const ExportRequest& request) {
-  refuse_terminal(request);
+  if (request.out.empty() && request.to == "mcap" && ::isatty(STDOUT_FILENO) == 1)
+    throw ConfigurationError("mcap is binary, standard output is a terminal; name a file with --out, or use a pipe");
   const bool is_run = fs::path(request.file).extension() == ".h5";
   is_run ? export_run(request) : export_coefficients(request);
   return ExitCode::ok;

@@ -40,11 +40,6 @@ struct Replay {
   std::optional<std::string> difference;        ///< of that table, or of another one of the campaign
 };
 
-std::vector<std::filesystem::path> runs_of(const CampaignFolder& folder) {
-  if (!std::filesystem::exists(folder.campaign_file())) return folder.complete_runs();
-  return folder.complete_runs(profiles::load_campaign(folder.campaign_file().string()).occlusions_deg);
-}
-
 /// Steps in the order of the files; a thread per processor.
 std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
   std::vector<std::packaged_task<std::vector<StepMean>(results::LoadCellColumns&)>> tasks;
@@ -104,7 +99,10 @@ bool is_unlike(const std::filesystem::path& table, const std::vector<StepMean>& 
 }
 
 Replay replay_campaign(const CampaignFolder& folder) {
-  Replay replay{reduced(runs_of(folder)), std::nullopt, std::nullopt};
+  std::vector<double> order;
+  if (const auto file = folder.campaign_file(); std::filesystem::exists(file))
+    order = profiles::load_campaign(file.string()).occlusions_deg;
+  Replay replay{reduced(folder.complete_runs(order)), std::nullopt, std::nullopt};
   if (!std::filesystem::exists(folder.steps())) return replay;
   replay.stored = folder.steps();
   replay.difference = difference(results::format_steps(replay.steps), results::read_text(folder.steps()));

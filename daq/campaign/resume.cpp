@@ -24,11 +24,6 @@ constexpr Kept kKept[] = {
     {"tool_version", "the program", false},         {"motor", "the motor module", false},
     {"load_cell", "the load cell", false},          {"supply", "the supply", false}};
 
-std::string load_cell_words(const netbox::Configuration& box) {
-  return fmt::format("calibration {}, {:g} counts/N, {:g} counts/(N m)", box.calibration_serial, box.counts_per_newton,
-                     box.counts_per_newton_metre);
-}
-
 }  // namespace
 
 json identity_of(const profiles::Campaign& campaign, const profiles::BenchConfig& config) {
@@ -47,7 +42,9 @@ json identity_of(const profiles::Campaign& campaign, const profiles::BenchConfig
 
 void add_devices(json& identity, Bench& bench) {
   identity["motor"] = bench.motor().identity();
-  identity["load_cell"] = load_cell_words(bench.load_cell().configuration());
+  const netbox::Configuration& box = bench.load_cell().configuration();
+  identity["load_cell"] = fmt::format("calibration {}, {:g} counts/N, {:g} counts/(N m)", box.calibration_serial,
+                                      box.counts_per_newton, box.counts_per_newton_metre);
   if (bench.supply() != nullptr) identity["supply"] = bench.supply()->identity();
 }
 

@@ -7,14 +7,6 @@
 #include "daq/live/access_control.hpp"
 
 namespace kphi::daq::live {
-namespace {
-
-double calendar_seconds(const Clock& clock, Instant now) {
-  const std::chrono::duration<double> epoch = clock.epoch_utc().time_since_epoch();
-  return epoch.count() + to_seconds(clock.shrunk(now));
-}
-
-}  // namespace
 
 StepFigures QuickLook::result() const {
   const auto n = static_cast<Eigen::Index>(thrusts_n_.size());
@@ -54,7 +46,8 @@ void LiveProgress::tick(const Position& position, const Observation& seen) {
   add_to_step(position, seen, now);
   most_remaining_s_ = std::max(most_remaining_s_, position.remaining_s);
   const double progress = most_remaining_s_ > 0 ? 1 - position.remaining_s / most_remaining_s_ : 0;
-  const Tick tick{to_seconds(now), calendar_seconds(clock_, now), progress, position, seen};
+  const std::chrono::duration<double> epoch = clock_.epoch_utc().time_since_epoch();
+  const Tick tick{to_seconds(now), epoch.count() + to_seconds(clock_.shrunk(now)), progress, position, seen};
   feed_.show(tick);
   if (plotter_ != nullptr) plotter_->send(tick);
 }

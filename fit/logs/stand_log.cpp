@@ -255,11 +255,6 @@ double tare_of(const StandLog& log, const RowSelection& selection, SpeedSource s
   return mean(zeros);
 }
 
-bool is_point(const StandRow& row, const RowSelection& selection, SpeedSource source) {
-  if (!(rpm_of(row, source).value_or(0) > selection.speed_above_rpm)) return false;
-  return !selection.throttle_above_us || row.throttle_us.value_or(0) > *selection.throttle_above_us;
-}
-
 results::StepMean step_of(const StandRow& row, const RowSelection& selection, SpeedSource source, double tare_n) {
   const double sign = selection.reverse_thrust ? -1 : 1;
   results::StepMean step = step_of_row(*rpm_of(row, source) * selection.speed_factor, sign * (row.thrust_n - tare_n));
@@ -396,7 +391,8 @@ ImportedTable select_rows(const StandLog& log, const RowSelection& selection) {
   imported.problems = log.problems;
   imported.unread = log.unread;
   for (const StandRow& row : log.rows) {
-    if (!is_point(row, selection, source)) continue;
+    if (!(rpm_of(row, source).value_or(0) > selection.speed_above_rpm)) continue;
+    if (selection.throttle_above_us && !(row.throttle_us.value_or(0) > *selection.throttle_above_us)) continue;
     results::StepMean step = step_of(row, selection, source, imported.tare_n);
     step.propeller = std::filesystem::path(log.path).stem().string();
     step.step = static_cast<int>(imported.steps.size());
