@@ -74,7 +74,8 @@ std::string curve_rows(const compensation::ThrustCurve& curve, double from_deg, 
 
 std::string share_axes(const Identification& identification, const std::vector<ThrustShares>& shares) {
   const auto& table = identification.table;
-  const double bottom = share_bottom(shares), top = share_top(identification, shares), K_T = identification.thrust_coefficient().value;
+  const double bottom = share_bottom(shares), top = share_top(identification, shares),
+               K_T = identification.thrust_coefficient().value;
   double gap = 60;  // boxes are as wide as the angles allow without touching
   std::string tics;
   for (std::size_t i = 0; i < table.size(); ++i) {
