@@ -185,16 +185,12 @@ ExitCode show_replay(const ReplayRequest& asked) {
   throw Interrupted("stopped by request");
 }
 
-ExitCode replay_as_asked(const ReplayRequest& asked) {
-  return asked.live.any() ? show_replay(asked) : run_replay(asked);
-}
-
 }  // namespace
 
 void add_replay(CLI::App& program, ExitCode& exit_code) {
   const auto [command, asked] = add_verb<ReplayRequest>(
       program, exit_code, "replay", "compute the step means again from the raw samples and compare them with steps.csv",
-      replay_as_asked);
+      [](const ReplayRequest& it) { return it.live.any() ? show_replay(it) : run_replay(it); });
   add_argument(command, "PATH", asked.path, "run file or campaign folder")->check(kExistingPath);
   command.add_flag("--json", asked.json, "print one JSON object");
   add_live_options(command, asked.live);

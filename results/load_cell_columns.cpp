@@ -1,7 +1,10 @@
 #include "results/load_cell_columns.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
+#include <ranges>
+#include <type_traits>
 
 namespace kphi::results {
 namespace {
@@ -42,23 +45,23 @@ bool any(Four numbers) { return (numbers[0] | numbers[1] | numbers[2] | numbers[
 }  // namespace
 
 LoadCellColumns::LoadCellColumns(const std::vector<LoadCellRecord>& records, const RunHeader& header) {
-  std::vector<Counts> counts;
-  std::vector<std::uint32_t> status;
-  std::vector<Nanoseconds> arrival_ns;
+  const auto column = [&records](auto member) {
+    const auto values = records | std::views::transform(member);
+    return std::vector(values.begin(), values.end());
+  };
   reset(records.size());
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    counts.push_back(records[i].counts);
-    status.push_back(records[i].status);
-    arrival_ns.push_back(records[i].arrival_ns);
-    ft_sequence[i] = records[i].ft_sequence;
-  }
-  take(0, counts, status, arrival_ns, header);
+  std::ranges::transform(records, ft_sequence.begin(), &LoadCellRecord::ft_sequence);
+  take(0, column(&LoadCellRecord::counts), column(&LoadCellRecord::status), column(&LoadCellRecord::arrival_ns),
+       header);
 }
 
 void LoadCellColumns::reset(std::size_t records) {
-  force.resize(records);
-  torque.resize(records);
-  ft_sequence.resize(records);
+  const auto make_room = [records](auto& column) {
+    // With something to spare for the next run, and without a copy of what nobody wants any more.
+    if (records > column.capacity()) column = std::remove_reference_t<decltype(column)>(records + records / 8);
+    column.resize(records);
+  };
+  make_room(force), make_room(torque), make_room(ft_sequence);
   marks.clear();
   datagrams.clear();
 }

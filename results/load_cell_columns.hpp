@@ -2,9 +2,13 @@
 // campaign is reduced at the speed of memory.
 #pragma once
 
+#include <sys/mman.h>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
+#include <new>
 #include <span>
 #include <vector>
 
@@ -15,6 +19,22 @@ namespace kphi::results {
 // Bits of the status word of every product.
 inline constexpr std::uint32_t kMonitorBit = 1u << 16;  ///< a condition the user set; raises the summary bit, too
 inline constexpr std::uint32_t kSummaryBit = 1u << 31;
+
+/// Memory in huge pages, where the system has them: the first touch of each small one takes longer than filling it.
+template <class T>
+struct HugePages {
+  using value_type = T;
+  T* allocate(std::size_t n) {
+    constexpr std::size_t kPage = 2u << 20;
+    const std::size_t bytes = (n * sizeof(T) + kPage - 1) / kPage * kPage;
+    void* memory = std::aligned_alloc(kPage, bytes);
+    if (memory == nullptr) throw std::bad_alloc();
+    ::madvise(memory, bytes, MADV_HUGEPAGE);
+    return static_cast<T*>(memory);
+  }
+  void deallocate(T* memory, std::size_t) { std::free(memory); }
+  bool operator==(const HugePages&) const = default;
+};
 
 struct LoadCellColumns {
   using Counts = std::array<std::int32_t, 6>;
@@ -40,10 +60,10 @@ struct LoadCellColumns {
   void take(std::size_t first, std::span<const Counts> counts, std::span<const std::uint32_t> status,
             std::span<const Nanoseconds> arrival_ns, const RunHeader& header);
 
-  std::vector<std::int32_t> force, torque;  ///< of the thrust axis and about it, counts
-  std::vector<Mark> marks;                  ///< in the order of the records
+  std::vector<std::int32_t, HugePages<std::int32_t>> force, torque;  ///< of the thrust axis and about it, counts
+  std::vector<Mark> marks;                                           ///< in the order of the records
   std::vector<Datagram> datagrams;
-  std::vector<std::uint32_t> ft_sequence;
+  std::vector<std::uint32_t, HugePages<std::uint32_t>> ft_sequence;
 };
 
 }  // namespace kphi::results
