@@ -80,24 +80,37 @@ void Observer::take(const LoadCellRecord& sample) {
 
 void Observer::take(const MotorReading& reading) {
   newest_.motor_ns = reading.time_ns;
-  const MotorChannel channel = reading.channel;
-  const double value = reading.value;
-  if (channel == MotorChannel::speed) {
-    newest_.speed_rad_s = std::abs(value);
-    tell(Watched::speed, to_rpm(RadPerSec(std::abs(value))));
-  }
-  if (channel == MotorChannel::supply_voltage) {
-    tell(Watched::supply_voltage_low, value);
-    tell(Watched::supply_voltage_high, value);
-  }
-  if (channel == MotorChannel::supply_current) tell(Watched::supply_current, value);
-  if (channel == MotorChannel::motor_current) tell(Watched::motor_current, std::abs(value));
-  if (channel == MotorChannel::coil_temperature) tell(Watched::coil_temperature, value);
-  if (channel == MotorChannel::fault_now) newest_.fault_bits = static_cast<std::uint64_t>(value);
-  if (channel == MotorChannel::derate) newest_.derate = value;
-  if (channel == MotorChannel::drive_pwm) newest_.drive_pwm = value;
+  tell_motor(reading.channel, reading.value);
   speed_.take(reading);
   newest_.judged[Watched::speed_error] = speed_.error_percent();
+}
+
+void Observer::tell_motor(MotorChannel channel, double value) {
+  switch (channel) {
+    case MotorChannel::speed:
+      newest_.speed_rad_s = std::abs(value);
+      return tell(Watched::speed, to_rpm(RadPerSec(std::abs(value))));
+    case MotorChannel::supply_voltage:
+      tell(Watched::supply_voltage_low, value);
+      return tell(Watched::supply_voltage_high, value);
+    case MotorChannel::supply_current:
+      return tell(Watched::supply_current, value);
+    case MotorChannel::motor_current:
+      return tell(Watched::motor_current, std::abs(value));
+    case MotorChannel::coil_temperature:
+      return tell(Watched::coil_temperature, value);
+    case MotorChannel::derate:
+      newest_.derate = value;
+      return;
+    case MotorChannel::drive_mode:
+      return;
+    case MotorChannel::drive_pwm:
+      newest_.drive_pwm = value;
+      return;
+    case MotorChannel::fault_now:
+      newest_.fault_bits = static_cast<std::uint64_t>(value);
+      return;
+  }
 }
 
 void Observer::take(const SupplyReading& reading) {

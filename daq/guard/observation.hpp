@@ -124,6 +124,7 @@ class Observer {
 
  private:
   void tell(Watched watched, double value);
+  void tell_motor(MotorChannel channel, double value);
 
   const Mounting mounting_;
   LoadWatch load_;
