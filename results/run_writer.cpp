@@ -16,7 +16,6 @@
 #include "results/run_reader.hpp"
 
 namespace kphi::results {
-namespace {
 
 using hdf5::Column;
 using hdf5::Handle;
@@ -88,6 +87,8 @@ class Series {
   std::optional<Column> components_;
   std::array<std::byte, 12288> block_;
 };
+
+namespace {
 
 std::string without_ending(const std::filesystem::path& path) { return (path.parent_path() / path.stem()).string(); }
 

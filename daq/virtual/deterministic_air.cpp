@@ -14,6 +14,8 @@ constexpr Duration kOldest = std::chrono::minutes(1);
 constexpr Duration kAskAgain = std::chrono::milliseconds(1);
 const ambient::Rhythm kRhythm;
 
+}  // namespace
+
 /// The drivers' transport straight into the simulated function.
 class DirectUsb final : public usb::Transport {
  public:
@@ -77,8 +79,6 @@ class DirectUsb final : public usb::Transport {
   const std::string name_ = "simulated sensor of the air";
   std::vector<usb::Interface> interfaces_;
 };
-
-}  // namespace
 
 class DeterministicAir::Sensor {
  public:
