@@ -64,9 +64,9 @@ typedef struct kphi_airframe {
   double hinge_turn_rad[4];
 } kphi_airframe;
 
-/* Opaque; plain bytes. */
+/* Opaque; plain bytes, with room for another form of k(phi) than a line. */
 typedef struct kphi_compensator {
-  double state[208];
+  double state[512];
 } kphi_compensator;
 
 /* 0, or why not: kphi_refusal_text() says it in words. Nothing is built then. */
