@@ -161,6 +161,7 @@ void DeterministicBench::exchange_load_cell() {
     if (!connection_ || datagram.foreign) continue;  // a connected socket does not see what others send
     const std::uint64_t drained = connection_->counters().drained;
     connection_->receive(datagram.payload(), datagram.at);
+    connection_->deliver();
     if (witness_.heard) witness_.heard(datagram, connection_->counters().drained > drained);
   }
 }

@@ -166,14 +166,14 @@ void LoadCell::drain() noexcept {
       connection_.receive(datagram.bytes,
                           stamped ? at_first + clock_.stretched(between(first, datagram.stamp)) : at_first);
     }
+    hand_over();
     drained_ += datagrams.size();
     if (datagrams.size() < UdpSocket::kBatch) break;
   }
-  hand_over();
 }
 
 void LoadCell::hand_over() noexcept {
-  if (!connection_.queued_records()) return;
+  if (!connection_.deliver()) return;
   std::atomic_thread_fence(std::memory_order_seq_cst);
   if (consumer_waits_.load(std::memory_order_relaxed) && consumer_waits_.exchange(false)) record_wakeup_.raise();
 }

@@ -86,9 +86,9 @@ void Connection::stop(Instant now) {
 
 void Connection::receive(std::span<const std::uint8_t> datagram, Instant arrival) {
   newest_datagram_ = arrival;
+  const std::size_t before = accepted_.size();
   session_.receive(datagram, arrival, accepted_);
-  if (!accepted_.empty()) meter_->note(accepted_.back(), accepted_.size(), session_.counters().reboots);
-  store_accepted();
+  if (accepted_.size() > before) meter_->note(accepted_.back(), accepted_.size() - before, session_.counters().reboots);
 }
 
 void Connection::store_accepted() noexcept {
@@ -101,10 +101,8 @@ void Connection::store_accepted() noexcept {
 }
 
 void Connection::advance(Instant now) {
-  if (session_.release_deadline() <= now) {
-    session_.release(now, accepted_);
-    store_accepted();
-  }
+  if (session_.release_deadline() <= now) session_.release(now, accepted_);
+  store_accepted();
   session_.advance(now);
   collect_events();
   supervise(now);

@@ -46,6 +46,7 @@ class Connection {
   /// The box takes its present load as zero; see Session::set_bias.
   void set_bias(Instant now) { session_.set_bias(now); }
 
+  /// Its records can be taken after deliver(), advance() or stop(): many datagrams share what a queue costs.
   void receive(std::span<const std::uint8_t> datagram, Instant arrival);
   /// Datagrams dropped by the socket since it was opened, as known with the next datagram.
   void note_host_drops(std::uint64_t total) noexcept { session_.note_host_drops(total); }
@@ -66,8 +67,11 @@ class Connection {
   /// How long the receiving thread may sleep so that single records of 2 ms wall time share one wake-up; 0: wake up
   /// with the next datagram. At 7 kHz a wake-up is most of what a single record costs.
   [[nodiscard]] Duration gathering_time(Instant now) const noexcept;
-  /// Records have been queued since the last call.
-  [[nodiscard]] bool queued_records() noexcept { return std::exchange(queued_, false); }
+  /// Queues for take() what receive() has accepted; true if records have been queued since the last call.
+  bool deliver() noexcept {
+    store_accepted();
+    return std::exchange(queued_, false);
+  }
 
   /// Consumer: oldest first; returns how many.
   std::size_t take(std::span<LoadCellRecord> out) noexcept { return queue_.pop(out.data(), out.size()); }
