@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
-#include <ranges>
 #include <type_traits>
 
 namespace kphi::results {
@@ -46,8 +45,9 @@ bool any(Four numbers) { return (numbers[0] | numbers[1] | numbers[2] | numbers[
 
 LoadCellColumns::LoadCellColumns(const std::vector<LoadCellRecord>& records, const RunHeader& header) {
   const auto column = [&records](auto member) {
-    const auto values = records | std::views::transform(member);
-    return std::vector(values.begin(), values.end());
+    std::vector<std::remove_cvref_t<decltype(records.front().*member)>> values;
+    for (const LoadCellRecord& record : records) values.push_back(record.*member);
+    return values;
   };
   reset(records.size());
   std::ranges::transform(records, ft_sequence.begin(), &LoadCellRecord::ft_sequence);
