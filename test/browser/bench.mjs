@@ -5,10 +5,11 @@ import net from 'node:net';
 import os from 'node:os';
 import path from 'node:path';
 
-/// Priorities of the bench and of the run, where this process may grant them: the browser beside them does not delay them.
+/// Priorities of the bench and of the run, where this process may grant them. The browser has what is left over: also the
+/// kernel's own threads, which hand on what a pseudo-terminal has heard, do not wait for it.
 const kBenchPriority = 20, kRunPriority = 10;
 const mayKeepRealTime = spawnSync('chrt', ['-f', '1', 'true']).status === 0;
-const inRealTime = (priority, command) => mayKeepRealTime ? ['chrt', '-f', `${priority}`, ...command] : command;
+const inRealTime = (priority, command) => ['chrt', ...(mayKeepRealTime ? ['-f', `${priority}`] : ['-o', '0']), ...command];
 
 /// A child process whose words are read as they come.
 export class Child {
