@@ -194,7 +194,7 @@ TEST_F(UsbSensorTest, EndsAtOnceWhenItIsUnpluggedInTheMiddle) {
   break_with(FaultKind::ambient_no_reply);
   const std::uint64_t before = bridge.truth().commands;
   auto failure = std::async(std::launch::async, [&] { return refusal([&] { (void)air->read(); }); });
-  ASSERT_TRUE(eventually([&] { return bridge.truth().commands > before; })) << "it waits for the answer";
+  ASSERT_TRUE(soon([&] { return bridge.truth().commands > before; })) << "it waits for the answer";
   wire->unplug(1);
   EXPECT_THAT(failure.get(), HasSubstr("unplugged"));
   EXPECT_THAT(refusal([&] { (void)air->read(); }), HasSubstr("unplugged"));
@@ -207,11 +207,11 @@ TEST_F(UsbSensorTest, ComesBackByItselfAfterAReplug) {
   const AmbientWorker worker([] { return open(sensor_address(kAddress)); }, clock, {10ms, 20ms, 80ms});
   ASSERT_TRUE(worker.wait_for_first(10s)) << worker.failure();
   wire->unplug(1);
-  ASSERT_TRUE(eventually([&] { return worker.failure().find("not plugged in") != std::string::npos; }));
+  ASSERT_TRUE(soon([&] { return worker.failure().find("not plugged in") != std::string::npos; }));
   EXPECT_TRUE(worker.newest()) << "what was measured stays, and grows old";
   const Instant last = worker.newest()->at;
   wire->plug(1, bridge);
-  ASSERT_TRUE(eventually([&] { return worker.newest()->at > last; })) << worker.failure();
+  ASSERT_TRUE(soon([&] { return worker.newest()->at > last; })) << worker.failure();
   expect_equal(worker.newest()->air, truth);
 }
 
@@ -219,9 +219,9 @@ TEST_F(UsbSensorTest, IsPulledOutAndPluggedInAsAScriptSays) {
   faults.set({sim::Fault{FaultKind::ambient_unplug, clock.now() + 100ms, 50ms}});
   const usb::Bus bus;
   const sim::UsbSocket socket(*wire, 1, bridge, faults);
-  ASSERT_TRUE(eventually([&] { return bus.list().size() == 1; }));
-  ASSERT_TRUE(eventually([&] { return bus.list().empty(); }));
-  ASSERT_TRUE(eventually([&] { return bus.list().size() == 1; }));
+  ASSERT_TRUE(soon([&] { return bus.list().size() == 1; }));
+  ASSERT_TRUE(soon([&] { return bus.list().empty(); }));
+  ASSERT_TRUE(soon([&] { return bus.list().size() == 1; }));
 }
 
 }  // namespace usb_sensor_test

@@ -8,26 +8,18 @@
 
 #include "drivers/netbox/receive/load_cell.hpp"
 #include "test/drivers/netbox/box_process.hpp"
+#include "test/soon.hpp"
 
 namespace kphi::netbox {
 namespace standstill_test {
 
 using namespace std::chrono_literals;
+using kphi::test::soon;
 using test::FakeBox;
 using test::FakeWeb;
 using test::Pipe;
 using test::Ports;
 using test::streaming_xml;
-
-template <class Condition>
-bool eventually(Condition condition) {
-  const auto deadline = std::chrono::steady_clock::now() + 20s;
-  while (!condition()) {
-    if (std::chrono::steady_clock::now() > deadline) return false;
-    usleep(1000);
-  }
-  return true;
-}
 
 /// The child's life: streams 15 000 records and tells its account.
 void be_the_reader(const Pipe& orders, const Pipe& reports) {
@@ -36,9 +28,9 @@ void be_the_reader(const Pipe& orders, const Pipe& reports) {
   const SteadyClock clock;
   LoadCell cell({"127.0.0.1", ports.rdt, ports.http}, clock);
   cell.start();
-  if (!eventually([&] { return cell.counters().received >= 1000; })) return;
+  if (!soon([&] { return cell.counters().received >= 1000; })) return;
   reports.put(static_cast<int>(cell.receive_buffer().tolerated_ms()));
-  if (!eventually([&] { return cell.counters().received + cell.counters().lost_host >= 15'000; })) return;
+  if (!soon([&] { return cell.counters().received + cell.counters().lost_host >= 15'000; })) return;
   cell.stop();
   reports.put(cell.counters());
 }
@@ -58,7 +50,7 @@ TEST(Standstill, AProcessStoppedForASecondLosesNothingOneRecordPerDatagram) {
   const bool started = orders.put(Ports{box.port(), web.port()}) && reports.get(tolerated_ms);
   const std::uint64_t before = box.sent();
   kill(child, SIGSTOP);
-  const bool a_second_has_passed = eventually([&] { return box.sent() >= before + 7000; });
+  const bool a_second_has_passed = soon([&] { return box.sent() >= before + 7000; });
   kill(child, SIGCONT);
   const bool reported = reports.get(counters);
   if (!reported) kill(child, SIGKILL);
@@ -78,7 +70,7 @@ TEST(Standstill, AConsumerThatStandsStillForFiveSecondsLosesNothing) {
   const SteadyClock clock;
   LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
   cell.start();
-  ASSERT_TRUE(eventually([&] { return cell.counters().received >= 35'000; }));
+  ASSERT_TRUE(soon([&] { return cell.counters().received >= 35'000; }));
   cell.stop();
   const Counters counters = cell.counters();
   EXPECT_EQ(counters.queue_overflows + counters.lost_network + counters.lost_host, 0u);

@@ -14,11 +14,13 @@
 #include "drivers/netbox/wire/status.hpp"
 #include "test/drivers/netbox/fake_box.hpp"
 #include "test/drivers/netbox/settable_web.hpp"
+#include "test/soon.hpp"
 
 namespace kphi::netbox {
 namespace traps_test {
 
 using namespace std::chrono_literals;
+using kphi::test::soon;
 using test::Bytes;
 using test::captured_xml;
 using test::FakeBox;
@@ -28,16 +30,6 @@ using test::with;
 using SteadyTime = std::chrono::steady_clock;
 
 std::string xml() { return with(with(captured_xml(), "comrdtrate", "7000"), "comrdtbsiz", "40"); }
-
-template <class Condition>
-bool eventually(Condition condition) {
-  const auto deadline = SteadyTime::now() + 20s;
-  while (!condition()) {
-    if (SteadyTime::now() > deadline) return false;
-    std::this_thread::yield();
-  }
-  return true;
-}
 
 /// A peer of the driver's socket, told where that is by its first datagram.
 class Peer {
@@ -75,7 +67,7 @@ TEST(Traps, AZeroByteEndsNeitherARequestNorADatagram) {
   EXPECT_EQ(peer.received(), 8);
   peer.send(Bytes(36, 0));
   std::span<const UdpSocket::Datagram> datagrams;
-  ASSERT_TRUE(eventually([&] { return !(datagrams = peer.driver.receive()).empty(); }));
+  ASSERT_TRUE(soon([&] { return !(datagrams = peer.driver.receive()).empty(); }));
   EXPECT_EQ(datagrams[0].bytes.size(), 36u);
   std::array<LoadCellRecord, kMaxRecords> out;
   EXPECT_EQ(decode(datagrams[0].bytes, out), 1u);
@@ -118,7 +110,7 @@ TEST(Traps, TheBoxDoesNotStreamToADeadPortAfterTheEnd) {
     cell.start();
     ASSERT_TRUE(cell.wait(20s));
   }
-  EXPECT_TRUE(eventually([&] { return !box.streaming(); }));
+  EXPECT_TRUE(soon([&] { return !box.streaming(); }));
 }
 
 TEST_F(TrapsOfTheSequence, NoFilterTouchesTheCounts) {
@@ -140,7 +132,7 @@ TEST(Traps, ABacklogIsTakenAtOnceAndNotOneDatagramPerCycle) {
   Peer peer;
   for (std::uint32_t i = 0; i < 60; ++i) peer.send(records(1 + i, 1 + i));
   std::size_t taken = 0, calls = 0;
-  ASSERT_TRUE(eventually([&] {
+  ASSERT_TRUE(soon([&] {
     const std::size_t count = peer.driver.receive().size();
     if (count > 0) ++calls;
     return (taken += count) == 60;
@@ -171,7 +163,7 @@ TEST(Traps, NoOldRecordIsGivenAgainWhenNothingComes) {
   cell.start();
   std::vector<LoadCellRecord> out(4096);
   std::size_t taken = 0;
-  ASSERT_TRUE(eventually([&] {
+  ASSERT_TRUE(soon([&] {
     taken += cell.take(out);
     return cell.state() == State::silent;
   }));
@@ -217,7 +209,7 @@ TEST(Traps, ARecordIsStampedWhenItArrivesAndNotWhenItIsRead) {
   timespec sent{};
   clock_gettime(CLOCK_REALTIME, &sent);
   const auto read_at = SteadyTime::now() + 50ms;
-  ASSERT_TRUE(eventually([&] { return SteadyTime::now() > read_at; }));
+  ASSERT_TRUE(soon([&] { return SteadyTime::now() > read_at; }));
   const auto datagrams = peer.driver.receive();
   ASSERT_EQ(datagrams.size(), 1u);
   const double late_s = static_cast<double>(datagrams[0].stamp.tv_sec - sent.tv_sec) +

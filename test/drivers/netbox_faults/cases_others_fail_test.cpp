@@ -92,7 +92,7 @@ void blocked_consumer(std::uint64_t records) {
   for (std::uint64_t second = 1; second <= 2; ++second) {
     ASSERT_TRUE(consumer.take_until(second * 3500));
     const std::uint64_t before = cell.counters().received;
-    ASSERT_TRUE(eventually([&] { return cell.counters().received >= before + records; }));
+    ASSERT_TRUE(soon([&] { return cell.counters().received >= before + records; }));
   }
   expect_all_delivered(cell, consumer);
   EXPECT_THAT(cell.take_events(), testing::IsEmpty());
@@ -190,11 +190,11 @@ void bias(bool stops_stream) {
   EXPECT_GT(std::abs(mean_thrust(cell, 2000)), 0.05) << "there was something to take away";
   // The box takes one noisy sample as its zero: what remains is its noise, and after a bad one kphi asks again.
   std::uint64_t asked = 0;
-  ASSERT_TRUE(eventually([&] {
+  ASSERT_TRUE(soon([&] {
     const std::uint64_t starts = cell.counters().restarts;
     cell.set_bias();
     ++asked;
-    if (stops_stream && !eventually([&] { return cell.counters().restarts > starts; })) return true;
+    if (stops_stream && !soon([&] { return cell.counters().restarts > starts; })) return true;
     return std::abs(mean_thrust(cell, 2000)) < 0.05;
   }));
   cell.stop();

@@ -9,22 +9,14 @@
 
 #include "drivers/netbox/receive/load_cell.hpp"
 #include "drivers/sim/bench_server.hpp"
+#include "test/soon.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::netbox::test {
 
 inline constexpr std::chrono::seconds kPatience{20};
 
-/// True as soon as `condition` is; false after kPatience.
-template <class Condition>
-bool eventually(Condition condition) {
-  const auto deadline = std::chrono::steady_clock::now() + kPatience;
-  while (!condition()) {
-    if (std::chrono::steady_clock::now() > deadline) return false;
-    std::this_thread::sleep_for(std::chrono::microseconds(200));
-  }
-  return true;
-}
+using kphi::test::soon;
 
 /// Free ports, a folder of its own, a thread of its own.
 class LiveBox {
@@ -127,7 +119,7 @@ class Consumer {
 /// Kinds of the events until one of `last` comes, that one included; all so far when it does not come in time.
 inline std::vector<EventKind> events_until(LoadCell& cell, EventKind last) {
   std::vector<EventKind> kinds;
-  (void)eventually([&] {
+  (void)soon([&] {
     for (const Event& event : cell.take_events()) kinds.push_back(event.kind);
     return !kinds.empty() && kinds.back() == last;
   });

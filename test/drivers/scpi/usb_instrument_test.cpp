@@ -138,7 +138,7 @@ TEST_F(UsbInstrumentTest, GivesALateAnswerToNobodyEvenIfTheInstrumentIgnoresAbor
   faults.set({{FaultKind::ambient_late, {}, {}, 1, 400ms}, {FaultKind::usb_deaf_to_abort, {}, {}, 4}});
   EXPECT_NE(refusal([&] { (void)line.query("VOLT? MAX"); }), "");
   std::string answer;
-  ASSERT_TRUE(eventually([&] { return refusal([&] { answer = line.query("CURR? MAX"); }).empty(); }));
+  ASSERT_TRUE(soon([&] { return refusal([&] { answer = line.query("CURR? MAX"); }).empty(); }));
   EXPECT_EQ(answer, "10.000");
 }
 
@@ -162,14 +162,13 @@ TEST_F(UsbInstrumentTest, EndsAtOnceWhenItIsUnpluggedInTheMiddleAndComesBack) {
     Usbtmc line(*device, 60'000ms);
     break_with(FaultKind::ambient_no_reply);
     auto failure = std::async(std::launch::async, [&] { return refusal([&] { (void)idn(line); }); });
-    ASSERT_TRUE(eventually([&] { return function.truth().requests > 0; }));
+    ASSERT_TRUE(soon([&] { return function.truth().requests > 0; }));
     wire->unplug(1);
     EXPECT_THAT(failure.get(), HasSubstr("unplugged"));
     EXPECT_THAT(refusal([&] { (void)idn(line); }), HasSubstr("unplugged"));
   }
   wire->plug(1, function);
-  ASSERT_TRUE(
-      eventually([&] { return refusal([&] { device = bus->open(UsbAddress::parse("usb:1209:5c91")); }).empty(); }));
+  ASSERT_TRUE(soon([&] { return refusal([&] { device = bus->open(UsbAddress::parse("usb:1209:5c91")); }).empty(); }));
   Usbtmc line(*device, 500ms);
   EXPECT_EQ(idn(line), kIdentity);
 }

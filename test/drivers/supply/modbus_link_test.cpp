@@ -223,7 +223,7 @@ TEST(ModbusLink, NoticesTheClosedPortAtOnce) {
   closed.kind = FaultKind::supply_closed;
   closed.lasts = 1h;
   supply.spoil(closed);
-  EXPECT_TRUE(test::eventually([&] { return link.read({8, 13}, image).failure == Failure::lost; }));
+  EXPECT_TRUE(test::soon([&] { return link.read({8, 13}, image).failure == Failure::lost; }));
 }
 
 }  // namespace modbus_link_test

@@ -17,11 +17,11 @@ namespace modbus_supply_test {
 
 using namespace std::chrono_literals;
 using sim::FaultKind;
-using test::eventually;
 using test::kShort;
 using test::lasting;
 using test::Over;
 using test::SimulatedSupply;
+using test::soon;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -73,7 +73,7 @@ TEST_P(EverySupply, ReadsWhatIsAtItsTerminals) {
   EXPECT_FALSE(supply.read().output);
   {
     PoweredOutput on(supply);
-    ASSERT_TRUE(eventually([&] { return supply.read().voltage_v > 11.969; }));
+    ASSERT_TRUE(soon([&] { return supply.read().voltage_v > 11.969; }));
     const Instant before = clock.now();
     const SupplyReading reading = supply.read();
     EXPECT_TRUE(reading.output);
@@ -97,8 +97,8 @@ TEST_P(EverySupply, TellsConstantCurrent) {
   supply.apply({Volts(12), Amperes(1), Volts(13), Amperes(3)});
   simulated.hang({0, 0.5});
   PoweredOutput on(supply);
-  EXPECT_TRUE(eventually([&] { return supply.read().regulation == SupplyRegulation::constant_current; }));
-  EXPECT_TRUE(eventually([&] { return std::abs(supply.read().current_a - 1) < 0.015; }));
+  EXPECT_TRUE(soon([&] { return supply.read().regulation == SupplyRegulation::constant_current; }));
+  EXPECT_TRUE(soon([&] { return std::abs(supply.read().current_a - 1) < 0.015; }));
   EXPECT_NEAR(supply.read().voltage_v, 2, 0.2);
 }
 
@@ -108,7 +108,7 @@ TEST_P(EverySupply, TellsWhyItHasTripped) {
   simulated.hang({0, 0.2});
   const std::string refusal = what_of([&] {
     PoweredOutput on(supply);
-    eventually([&] { return supply.read().protection != SupplyProtection::none; });
+    EXPECT_TRUE(soon([&] { return supply.read().protection != SupplyProtection::none; }));
     EXPECT_EQ(supply.read().protection, SupplyProtection::over_current);
     EXPECT_FALSE(supply.read().output);
     throw std::runtime_error("seen");
@@ -279,8 +279,8 @@ TEST_F(Riden, ComesBackAfterItWasUnpluggedAndPluggedInAgain) {
     closed.kind = FaultKind::supply_closed;
     closed.lasts = 100ms;
     simulated.spoil(closed);
-    EXPECT_TRUE(eventually([&] { return what_of([&] { (void)supply.read(); }) != "nothing was thrown"; }));
-    EXPECT_TRUE(eventually([&] { return what_of([&] { (void)supply.read(); }) == "nothing was thrown"; }));
+    EXPECT_TRUE(soon([&] { return what_of([&] { (void)supply.read(); }) != "nothing was thrown"; }));
+    EXPECT_TRUE(soon([&] { return what_of([&] { (void)supply.read(); }) == "nothing was thrown"; }));
   }
 }
 
@@ -325,7 +325,7 @@ TEST(RidenDisputes, DoNotTouchAReading) {
     ModbusSupply supply(simulated.address(), clock, kShort);
     supply.apply(kTwelveVolts);
     PoweredOutput on(supply);
-    EXPECT_TRUE(eventually([&] { return std::abs(supply.read().power_w() - 14.3) < 0.2; }));
+    EXPECT_TRUE(soon([&] { return std::abs(supply.read().power_w() - 14.3) < 0.2; }));
   }
 }
 

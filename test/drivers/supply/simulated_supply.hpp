@@ -11,6 +11,7 @@
 #include "drivers/supply/modbus_link.hpp"
 #include "drivers/supply/wire.hpp"
 #include "test/drivers/sim_equipment/supply_server.hpp"
+#include "test/soon.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::supply::test {
@@ -19,15 +20,7 @@ namespace kphi::supply::test {
 inline constexpr Timing kShort{std::chrono::milliseconds(150), std::chrono::milliseconds(50),
                                std::chrono::milliseconds(60)};
 
-/// Polls until it holds; false after ten seconds.
-inline bool eventually(const std::function<bool()>& holds) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-  while (!holds()) {
-    if (std::chrono::steady_clock::now() > end) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  return true;
-}
+using kphi::test::soon;
 
 enum class Over { rtu, tcp };
 

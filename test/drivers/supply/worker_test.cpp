@@ -18,9 +18,9 @@ namespace kphi::supply {
 namespace worker_test {
 
 using namespace std::chrono_literals;
-using test::eventually;
 using test::kShort;
 using test::lasting;
+using test::soon;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -127,7 +127,7 @@ TEST(SupplyWorker, HandsOutReadingsInOrder) {
   SteadyClock clock(100);
   Worker worker(fake(script), clock, 5);
   std::vector<SupplyReading> all;
-  EXPECT_TRUE(eventually([&] {
+  EXPECT_TRUE(soon([&] {
     std::array<SupplyReading, 8> some;
     const std::size_t count = worker.take(some);
     all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(count));
@@ -144,7 +144,7 @@ TEST(SupplyWorker, DropsWhatNobodyTakes) {
   Script script;
   SteadyClock clock(1000);
   Worker worker(fake(script), clock, 100);
-  EXPECT_TRUE(eventually([&] { return script.looks > 4200; }));
+  EXPECT_TRUE(soon([&] { return script.looks > 4200; }));
   std::vector<SupplyReading> kept(5000);
   ASSERT_GE(worker.take(kept), 4096u);
   EXPECT_EQ(kept[4095].time_ns, 4096);
@@ -189,7 +189,7 @@ TEST(SupplyWorker, SwitchesOffWhenTheSupplyFails) {
   Worker worker(fake(script), clock);
   worker.switch_on();
   script.read_fails = true;
-  EXPECT_TRUE(eventually([&] { return !worker.alive(); }));
+  EXPECT_TRUE(soon([&] { return !worker.alive(); }));
   EXPECT_FALSE(script.output);
   EXPECT_EQ(worker.failure(), "fake supply: read: the line is lost; plug it in");
 }
@@ -200,7 +200,7 @@ TEST(SupplyWorker, SwitchesOffWhateverIsThrownOnItsThread) {
   Worker worker(fake(script), clock);
   worker.switch_on();
   script.throws_oddly = true;
-  EXPECT_TRUE(eventually([&] { return !worker.alive(); }));
+  EXPECT_TRUE(soon([&] { return !worker.alive(); }));
   EXPECT_FALSE(script.output);
   EXPECT_EQ(worker.failure(), "an unknown failure");
 }
@@ -212,7 +212,7 @@ TEST(SupplyWorker, SaysThatItCouldNotSwitchOff) {
   worker.switch_on();
   script.off_fails = true;
   script.read_fails = true;
-  EXPECT_TRUE(eventually([&] { return !worker.alive(); }));
+  EXPECT_TRUE(soon([&] { return !worker.alive(); }));
   EXPECT_GE(script.offs, 1);
   EXPECT_EQ(
       worker.failure(),
@@ -267,7 +267,7 @@ TEST(SupplyWorker, RefusesOrdersWhenItHasFailed) {
   script.read_fails = true;
   SteadyClock clock;
   Worker worker(fake(script), clock);
-  EXPECT_TRUE(eventually([&] { return !worker.alive(); }));
+  EXPECT_TRUE(soon([&] { return !worker.alive(); }));
   EXPECT_THAT(what_of([&] { worker.switch_on(); }), HasSubstr("the line is lost"));
   EXPECT_THAT(what_of([&] { worker.apply(kTwelveVolts); }), HasSubstr("the line is lost"));
 }
@@ -291,7 +291,7 @@ TEST(SupplyWorker, LetsNobodyWaitForASlowSupply) {
   EXPECT_FALSE(worker.switch_off_and_confirm(1ms));
   EXPECT_TRUE(script.output);
   release.count_down();
-  EXPECT_TRUE(eventually([&] { return !script.output; }));
+  EXPECT_TRUE(soon([&] { return !script.output; }));
 }
 
 /// While a look goes on, on and off are asked for, in this order: it never goes on.
@@ -329,7 +329,7 @@ TEST(SupplyWorkerOnAWire, FeedsFromAStockSupplyOfTenAnswersPerSecond) {
   worker.apply(kTwelveVolts);
   worker.switch_on();
   std::vector<SupplyReading> all;
-  EXPECT_TRUE(eventually([&] {
+  EXPECT_TRUE(soon([&] {
     std::array<SupplyReading, 8> some;
     const std::size_t count = worker.take(some);
     all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(count));
@@ -351,7 +351,7 @@ TEST(SupplyWorkerOnAWire, NamesTheUnpluggedSupplyAndThatItCouldNotSwitchOff) {
   worker.apply(kTwelveVolts);
   worker.switch_on();
   simulated.spoil(lasting(sim::FaultKind::supply_closed));
-  EXPECT_TRUE(eventually([&] { return !worker.alive(); }));
+  EXPECT_TRUE(soon([&] { return !worker.alive(); }));
   EXPECT_THAT(worker.failure(),
               AllOf(HasSubstr("supply RD6006 on "), HasSubstr("No such file"), HasSubstr("plug"),
                     HasSubstr("switch off"), HasSubstr("its output may be on: switch it off by hand")));
@@ -366,7 +366,7 @@ TEST(SupplyWorkerOnAWire, SwitchesOffASupplyThatIsNotHeardAnyMore) {
     worker.apply(kTwelveVolts);
     worker.switch_on();
     simulated.spoil(lasting(sim::FaultKind::supply_no_reply));
-    EXPECT_TRUE(eventually([&] { return !worker.alive(); }));
+    EXPECT_TRUE(soon([&] { return !worker.alive(); }));
     EXPECT_THAT(worker.failure(), HasSubstr("its output may be on"));
   }
   EXPECT_FALSE(simulated.output()) << "it has heard, though it was not heard";
@@ -382,7 +382,7 @@ TEST(SupplyWorkerOnAWire, ReportsATripAsAReading) {
   trip.kind = sim::FaultKind::supply_trip;
   trip.code = 1;
   simulated.spoil(trip);
-  EXPECT_TRUE(eventually([&] {
+  EXPECT_TRUE(soon([&] {
     const auto newest = worker.newest();
     return newest && newest->protection == SupplyProtection::over_voltage && !newest->output;
   }));
@@ -399,10 +399,10 @@ TEST(SupplyWorkerOnAWire, SeesTheVoltageRiseWhenTheLoadFeedsBack) {
   worker.apply(kTwelveVolts);
   simulated.hang({0.5, 0});
   worker.switch_on();
-  ASSERT_TRUE(eventually([&] { return worker.newest() && worker.newest()->voltage_v > 11.9; }));
+  ASSERT_TRUE(soon([&] { return worker.newest() && worker.newest()->voltage_v > 11.9; }));
   simulated.hang({-0.2, 0});
-  EXPECT_TRUE(eventually([&] { return worker.newest()->protection == SupplyProtection::over_voltage; }));
-  EXPECT_TRUE(eventually([&] { return worker.newest()->current_a < 0.01; }));
+  EXPECT_TRUE(soon([&] { return worker.newest()->protection == SupplyProtection::over_voltage; }));
+  EXPECT_TRUE(soon([&] { return worker.newest()->current_a < 0.01; }));
 }
 
 }  // namespace worker_test

@@ -11,6 +11,7 @@
 #include "drivers/sim/usb/function.hpp"
 #include "test/drivers/sim_equipment/virtual_usb.hpp"
 #include "test/refusal.hpp"
+#include "test/soon.hpp"
 
 namespace kphi {
 
@@ -36,15 +37,6 @@ class OnVirtualBus : public testing::Test {
   std::unique_ptr<sim::VirtualUsb> wire;
 };
 
-/// Polls; false after ten seconds.
-template <class Condition>
-[[nodiscard]] bool eventually(Condition&& holds) {
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-  while (!holds()) {
-    if (std::chrono::steady_clock::now() > deadline) return false;
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  return true;
-}
+using test::soon;
 
 }  // namespace kphi

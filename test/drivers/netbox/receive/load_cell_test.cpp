@@ -7,11 +7,13 @@
 
 #include "base/error.hpp"
 #include "test/drivers/netbox/fake_box.hpp"
+#include "test/soon.hpp"
 
 namespace kphi::netbox {
 namespace load_cell_test {
 
 using namespace std::chrono_literals;
+using kphi::test::soon;
 using test::captured_xml;
 using test::FakeBox;
 using test::FakeWeb;
@@ -48,16 +50,6 @@ std::uint64_t consume(LoadCell& cell, std::uint64_t wanted, bool gaps = false) {
     taken += count;
   }
   return taken;
-}
-
-template <class Condition>
-bool eventually(Condition condition) {
-  const auto deadline = std::chrono::steady_clock::now() + kPatience;
-  while (!condition()) {
-    if (std::chrono::steady_clock::now() > deadline) return false;
-    std::this_thread::yield();
-  }
-  return true;
 }
 
 /// A load cell on a box of its own.
@@ -106,7 +98,7 @@ void stream_without_loss(unsigned records_per_datagram) {
   EXPECT_GE(counters.received, 7000u);
   EXPECT_EQ(counters.expected, counters.received);
   EXPECT_EQ(counters.lost_network + counters.lost_host + counters.malformed + counters.queue_overflows, 0u);
-  EXPECT_TRUE(eventually([&] { return !bench.box.streaming(); }));
+  EXPECT_TRUE(soon([&] { return !bench.box.streaming(); }));
   EXPECT_EQ(bench.box.starts(), 1);
   EXPECT_EQ(bench.box.settings_written(), 0);
   EXPECT_EQ(bench.cell.state(), State::idle);
@@ -126,7 +118,7 @@ TEST(LoadCell, TakesTwentyTimesTheRateOnAClockTwentyTimesAsFast) {
 TEST(LoadCell, ASleepingConsumerLosesNothing) {
   Bench bench({.records_per_datagram = 1});
   bench.cell.start();
-  ASSERT_TRUE(eventually([&] { return bench.cell.counters().received >= 7000; }));  // nobody takes for a second
+  ASSERT_TRUE(soon([&] { return bench.cell.counters().received >= 7000; }));  // nobody takes for a second
   bench.cell.stop();
   const Counters counters = bench.cell.counters();
   EXPECT_EQ(counters.queue_overflows, 0u);
@@ -163,7 +155,7 @@ TEST(LoadCell, RepeatsAStopThatWasLost) {
     cell.start();
     EXPECT_GE(consume(cell, 100), 100u);
   }
-  EXPECT_TRUE(eventually([&] { return !box.streaming(); }));
+  EXPECT_TRUE(soon([&] { return !box.streaming(); }));
   EXPECT_GE(box.stops(), 3);
 }
 
@@ -174,7 +166,7 @@ TEST(LoadCell, StartsAgainAfterAStopWithItsCountersGoingOn) {
   bench.cell.stop();
   const std::uint64_t first = bench.cell.counters().received;
   bench.cell.start();
-  ASSERT_TRUE(eventually([&] { return bench.cell.counters().received >= first + 400; }));
+  ASSERT_TRUE(soon([&] { return bench.cell.counters().received >= first + 400; }));
   EXPECT_EQ(bench.cell.counters().lost_network, 0u);
   EXPECT_EQ(bench.cell.counters().expected, bench.cell.counters().received);
 }
@@ -182,14 +174,14 @@ TEST(LoadCell, StartsAgainAfterAStopWithItsCountersGoingOn) {
 TEST(LoadCell, SaysThatAStreamHasFallenSilent) {
   Bench bench({.mute_after_1000 = true});
   bench.cell.start();
-  EXPECT_TRUE(eventually([&] { return bench.cell.state() == State::silent; }));
+  EXPECT_TRUE(soon([&] { return bench.cell.state() == State::silent; }));
   EXPECT_EQ(bench.cell.counters().received, 1000u);
   EXPECT_EQ(bench.box.starts(), 1) << "it must not fight for a stream that another client has taken";
 }
 
 std::vector<EventKind> kinds_until(LoadCell& cell, std::size_t wanted) {
   std::vector<EventKind> kinds;
-  EXPECT_TRUE(eventually([&] {
+  EXPECT_TRUE(soon([&] {
     for (const Event& event : cell.take_events()) kinds.push_back(event.kind);
     return kinds.size() >= wanted;
   }));
