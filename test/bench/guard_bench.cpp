@@ -124,14 +124,14 @@ Shares run(const BoxProcess& box, bool guarded) {
     });
     std::optional<Working> guarding;
     if (guarded) guarding.emplace([&] { guard.poll(); });
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));  // caches and queues fill
     const auto now = [&] {
       return Shares{cpu_seconds(cpu_clock_of(receiver)), guarding ? guarding->cpu_s() : 0, recording.cpu_s(),
                     idling.cpu_s()};
     };
     const Shares begun = now();
     const double wall = cpu_seconds(CLOCK_MONOTONIC);
-    std::this_thread::sleep_for(std::chrono::duration<double>(kSeconds));
+    std::this_thread::sleep_for(std::chrono::duration<double>(kSeconds));  // what is measured
     const Shares ended = now();
     const double lasted = cpu_seconds(CLOCK_MONOTONIC) - wall;
     shares = {(ended.receiver - begun.receiver) / lasted, (ended.guard - begun.guard) / lasted,

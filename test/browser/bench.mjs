@@ -5,8 +5,7 @@ import net from 'node:net';
 import os from 'node:os';
 import path from 'node:path';
 
-/// Priorities of the bench and of the run, where this process may grant them. The browser has what is left over: also the
-/// kernel's own threads, which hand on what a pseudo-terminal has heard, do not wait for it.
+/// Priorities of the bench and of the run, where this process may grant them.
 const kBenchPriority = 20, kRunPriority = 10;
 const mayKeepRealTime = spawnSync('chrt', ['-f', '1', 'true']).status === 0;
 const inRealTime = (priority, command) => ['chrt', ...(mayKeepRealTime ? ['-f', `${priority}`] : ['-o', '0']), ...command];

@@ -33,7 +33,7 @@ double rate() {
       first = std::min(first, Instant(readings[i].time_ns));
       last = std::max(last, Instant(readings[i].time_ns));
     }
-    std::this_thread::sleep_for(5ms);
+    std::this_thread::sleep_for(5ms);  // of a second that is measured by the readings' own stamps
   }
   int cycles = 1 << 30;
   for (const MotorChannel quantity : settings.every_cycle) cycles = std::min(cycles, count[quantity]);

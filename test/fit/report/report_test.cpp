@@ -20,17 +20,17 @@
 #include "fit/report/html.hpp"
 #include "results/file_layer.hpp"
 #include "test/fit/campaign_steps.hpp"
+#include "test/gnuplot.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::fit {
 namespace report_test {
 
 using results::QualityFlag;
+using test::gnuplot_is_installed;
 using test::TemporaryFolder;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-bool gnuplot_is_installed() { return std::system("command -v gnuplot >/dev/null 2>&1") == 0; }
 
 Provenance provenance() {
   Provenance result;

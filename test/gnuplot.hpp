@@ -1,0 +1,10 @@
+// Whether the figures can be drawn here: gnuplot is no part of kphi.
+#pragma once
+
+#include <cstdlib>
+
+namespace kphi::test {
+
+[[nodiscard]] inline bool gnuplot_is_installed() { return std::system("command -v gnuplot >/dev/null 2>&1") == 0; }
+
+}  // namespace kphi::test
