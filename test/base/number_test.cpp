@@ -1,7 +1,9 @@
 #include "base/number.hpp"
 
 #include <gtest/gtest.h>
+#include <rapidcheck.h>
 
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -38,6 +40,31 @@ TEST(ParseInteger, HoldsTheRangeOfItsType) {
 TEST(Shortest, ReadsBackAsTheSameBits) {
   for (const double value : {45.0, 1e-6, 0.1, 1.0 / 3, -2.5e300, std::numeric_limits<double>::denorm_min()})
     EXPECT_EQ(parse_double(shortest(value)), value);
+}
+
+TEST(YamlNumber, LooksLikeAFloatToEveryReader) {
+  EXPECT_EQ(yaml_number(45), "45.0");
+  EXPECT_EQ(yaml_number(0), "0.0");
+  EXPECT_EQ(yaml_number(1e-6), "1.0e-06");
+  EXPECT_EQ(yaml_number(1.35e-6), "1.35e-06");
+  EXPECT_EQ(yaml_number(1e300), "1.0e+300");
+  EXPECT_EQ(yaml_number(-0.5), "-0.5");
+}
+
+TEST(YamlNumber, RefusesWhatIsNoNumber) {
+  EXPECT_THROW((void)yaml_number(std::nan("")), std::invalid_argument);
+  EXPECT_THROW((void)yaml_number(std::numeric_limits<double>::infinity()), std::invalid_argument);
+}
+
+TEST(Number, OfAnyMagnitudeReadsBackAsTheSameBits) {
+  EXPECT_TRUE(rc::check([](std::uint64_t bits) {
+    const double value = std::bit_cast<double>(bits);
+    RC_PRE(std::isfinite(value));
+    RC_ASSERT(std::bit_cast<std::uint64_t>(*parse_double(shortest(value))) == bits);
+    const std::string yaml = yaml_number(value);
+    RC_ASSERT(std::bit_cast<std::uint64_t>(*parse_double(yaml)) == bits);
+    RC_ASSERT(yaml.find('.') != std::string::npos && yaml.find('.') < yaml.find('e'));
+  }));
 }
 
 }  // namespace number_test

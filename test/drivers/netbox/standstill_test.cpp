@@ -3,7 +3,6 @@
 #include <signal.h>
 #include <sys/wait.h>
 
-#include <functional>
 #include <vector>
 
 #include "drivers/netbox/receive/load_cell.hpp"

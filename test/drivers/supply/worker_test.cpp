@@ -183,26 +183,19 @@ TEST(SupplyWorker, SwitchesOffWhenItsOwnerThrows) {
   EXPECT_FALSE(script.output);
 }
 
-TEST(SupplyWorker, SwitchesOffWhenTheSupplyFails) {
-  Script script;
-  SteadyClock clock(100);
-  Worker worker(fake(script), clock);
-  worker.switch_on();
-  script.read_fails = true;
-  EXPECT_TRUE(soon([&] { return !worker.alive(); }));
-  EXPECT_FALSE(script.output);
-  EXPECT_EQ(worker.failure(), "fake supply: read: the line is lost; plug it in");
-}
-
-TEST(SupplyWorker, SwitchesOffWhateverIsThrownOnItsThread) {
-  Script script;
-  SteadyClock clock(100);
-  Worker worker(fake(script), clock);
-  worker.switch_on();
-  script.throws_oddly = true;
-  EXPECT_TRUE(soon([&] { return !worker.alive(); }));
-  EXPECT_FALSE(script.output);
-  EXPECT_EQ(worker.failure(), "an unknown failure");
+TEST(SupplyWorker, SwitchesOffWhenTheSupplyFailsAndWhateverIsThrownOnItsThread) {
+  for (const auto& [fails, failure] :
+       {std::pair{&Script::read_fails, "fake supply: read: the line is lost; plug it in"},
+        std::pair{&Script::throws_oddly, "an unknown failure"}}) {
+    Script script;
+    SteadyClock clock(100);
+    Worker worker(fake(script), clock);
+    worker.switch_on();
+    script.*fails = true;
+    EXPECT_TRUE(soon([&] { return !worker.alive(); }));
+    EXPECT_FALSE(script.output);
+    EXPECT_EQ(worker.failure(), failure);
+  }
 }
 
 TEST(SupplyWorker, SaysThatItCouldNotSwitchOff) {

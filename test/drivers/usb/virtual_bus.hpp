@@ -5,7 +5,6 @@
 
 #include <chrono>
 #include <memory>
-#include <thread>
 
 #include "base/clock.hpp"
 #include "drivers/sim/usb/function.hpp"
