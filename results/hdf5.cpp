@@ -340,11 +340,11 @@ void ColumnReader::read(std::uint64_t first, std::uint64_t count, void* rows) {
 }
 
 std::uint32_t ColumnReader::crc() {
-  constexpr std::uint64_t kBlock = 65536;
-  std::vector<std::byte> rows(kBlock * row_bytes_);
+  const std::uint64_t block = std::min<std::uint64_t>(65536, rows_);
+  std::vector<std::byte> rows(block * row_bytes_);
   boost::crc_32_type crc;
-  for (std::uint64_t at = 0; at < rows_; at += kBlock) {
-    const std::uint64_t n = std::min(kBlock, rows_ - at);
+  for (std::uint64_t at = 0; at < rows_; at += block) {
+    const std::uint64_t n = std::min(block, rows_ - at);
     read(at, n, rows.data());
     crc.process_bytes(rows.data(), n * row_bytes_);
   }

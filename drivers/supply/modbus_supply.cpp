@@ -211,17 +211,27 @@ void ModbusSupply::switch_off() {
                     "switch it off by hand");
 }
 
+/// The first failure says what to do: over TCP a late answer makes the next one look damaged.
 void ModbusSupply::persist(const std::string& operation, const std::function<Outcome()>& attempt) {
-  Outcome outcome;
+  Outcome first, newest;
+  const auto fails = [&](Outcome outcome) {
+    newest = std::move(outcome);
+    if (first.ok()) first = newest;
+  };
   for (int i = 0; i < kAttempts; ++i) {
-    if (unsettled_) outcome = settle();
-    if (unsettled_) continue;
-    outcome = attempt();
+    if (unsettled_)
+      if (Outcome settled = settle(); !settled.ok()) {
+        fails(std::move(settled));
+        continue;
+      }
+    Outcome outcome = attempt();
     if (outcome.ok()) return;
-    unsettled_ = outcome.failure != Failure::busy && outcome.failure != Failure::refused;
-    if (outcome.failure == Failure::refused) break;
+    fails(std::move(outcome));
+    unsettled_ = newest.failure != Failure::busy && newest.failure != Failure::refused;
+    if (newest.failure == Failure::refused) break;
   }
-  throw DeviceError(identity_.device, operation, outcome.words, remedy(outcome.failure));
+  const std::string then = newest.words == first.words ? "" : ", then " + newest.words;
+  throw DeviceError(identity_.device, operation, first.words + then, remedy(first.failure));
 }
 
 /// After success no answer to an earlier request can arrive.
