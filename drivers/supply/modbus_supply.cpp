@@ -214,21 +214,12 @@ void ModbusSupply::switch_off() {
 /// The first failure says what to do: over TCP a late answer makes the next one look damaged.
 void ModbusSupply::persist(const std::string& operation, const std::function<Outcome()>& attempt) {
   Outcome first, newest;
-  const auto fails = [&](Outcome outcome) {
-    newest = std::move(outcome);
+  for (int i = 0; i < kAttempts && newest.failure != Failure::refused; ++i) {
+    newest = unsettled_ ? settle() : Outcome{};
+    if (newest.ok()) newest = attempt();
+    if (newest.ok()) return;
+    if (!unsettled_) unsettled_ = newest.failure != Failure::busy && newest.failure != Failure::refused;
     if (first.ok()) first = newest;
-  };
-  for (int i = 0; i < kAttempts; ++i) {
-    if (unsettled_)
-      if (Outcome settled = settle(); !settled.ok()) {
-        fails(std::move(settled));
-        continue;
-      }
-    Outcome outcome = attempt();
-    if (outcome.ok()) return;
-    fails(std::move(outcome));
-    unsettled_ = newest.failure != Failure::busy && newest.failure != Failure::refused;
-    if (newest.failure == Failure::refused) break;
   }
   const std::string then = newest.words == first.words ? "" : ", then " + newest.words;
   throw DeviceError(identity_.device, operation, first.words + then, remedy(first.failure));

@@ -20,6 +20,8 @@ std::string bench_text(const Mixture& mixture) {
          ", faults: faults.yaml}\n";
 }
 
+}  // namespace
+
 /// What a person types, not always after being asked.
 class Keyboard {
  public:
@@ -54,8 +56,6 @@ class Nowhere {
   Nowhere& operator=(const Nowhere&) = delete;
   std::FILE* stream;
 };
-
-}  // namespace
 
 const char* name_of(End end) noexcept {
   constexpr const char* kNames[] = {"finished",    "stopped",     "refused", "disk refused",

@@ -166,14 +166,15 @@ void LoadCell::drain() noexcept {
       connection_.receive(datagram.bytes,
                           stamped ? at_first + clock_.stretched(between(first, datagram.stamp)) : at_first);
     }
-    hand_over();
+    queued_ |= connection_.deliver();
     drained_ += datagrams.size();
     if (datagrams.size() < UdpSocket::kBatch) break;
   }
 }
 
 void LoadCell::hand_over() noexcept {
-  if (!connection_.deliver()) return;
+  queued_ |= connection_.deliver();
+  if (!std::exchange(queued_, false)) return;
   std::atomic_thread_fence(std::memory_order_seq_cst);
   if (consumer_waits_.load(std::memory_order_relaxed) && consumer_waits_.exchange(false)) record_wakeup_.raise();
 }

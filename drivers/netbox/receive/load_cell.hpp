@@ -80,6 +80,7 @@ class LoadCell {
   std::thread thread_;
   std::atomic<bool> stopping_{false}, bias_requested_{false}, consumer_waits_{false};
   std::size_t drained_ = 0;  // datagrams, last time
+  bool queued_ = false;      // records for which the consumer has not been woken
   Instant health_due_{0};
 
   // Published by the receive thread.

@@ -135,10 +135,8 @@ class ReorderWindow {
   /// the record was refused and counted (duplicate, late, stalled).
   bool receive(const LoadCellRecord& record, LossTracker& account, std::vector<LoadCellRecord>& out);
   /// The records of one datagram, as long as none is missing or held: nearly always. False: nothing was taken.
-  bool receive_run(std::span<const LoadCellRecord> records, LossTracker& account, std::vector<LoadCellRecord>& out) {
-    if (!held_.empty() || !account.accept_run(records)) return false;
-    out.insert(out.end(), records.begin(), records.end());
-    return true;
+  [[nodiscard]] bool accept_run(std::span<const LoadCellRecord> records, LossTracker& account) const noexcept {
+    return held_.empty() && account.accept_run(records);
   }
   /// Gives up the gaps older than the patience.
   void expire(Instant now, LossTracker& account, std::vector<LoadCellRecord>& out);

@@ -59,18 +59,29 @@ void Session::stop(Instant now) {
 void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<LoadCellRecord>& out) {
   Counters& counters = account_.counters();
   ++counters.datagrams;
-  const std::size_t count = decode(datagram, decoded_);
-  for (LoadCellRecord& record : std::span(decoded_).first(count)) record.arrival_ns = arrival.count();
+  const std::size_t before = out.size(), count = records_in(datagram.size());
   if (count == 0) {
     ++counters.malformed;
     return;
+  }
+  // Decoded where nearly all stay: copied at once, they would wait for the words just written.
+  out.resize(before + count);
+  const std::span<LoadCellRecord> records = std::span(out).subspan(before);
+  decode(datagram, records);
+  for (LoadCellRecord& record : records) record.arrival_ns = arrival.count();
+  const bool in_order = phase_ == Phase::streaming && window_.accept_run(records, account_);
+  if (!in_order) {
+    std::ranges::copy(records, decoded_.begin());
+    out.resize(before);
   }
   if (phase_ != Phase::streaming) {
     const bool expected = phase_ == Phase::silent || (phase_ == Phase::awaiting && belongs_to_new_stream(decoded_[0]));
     if (!expected) return discard(arrival);
   }
   datagram_records_ = count;
-  if (!take_records(count, out)) return;
+  const bool any_new = in_order || take_records(count, out);
+  note_status(in_order ? records : std::span(decoded_).first(count));
+  if (!any_new) return;
   if (phase_ != Phase::streaming) begin_streaming();
   newest_arrival_ = arrival;
   due_ = arrival + settings_.silence();
@@ -91,19 +102,17 @@ Command Session::start_command() const noexcept {
 }
 
 bool Session::take_records(std::size_t count, std::vector<LoadCellRecord>& out) {
-  const std::span<const LoadCellRecord> records = std::span(decoded_).first(count);
-  std::uint32_t status = 0;
-  for (const LoadCellRecord& record : records) status |= record.status;
-  bool any_new = window_.receive_run(records, account_, out);
-  if (!any_new)
-    for (const LoadCellRecord& record : records) any_new |= window_.receive(record, account_, out);
-  note_status(status, decoded_[0]);
+  bool any_new = false;
+  for (const LoadCellRecord& record : std::span(decoded_).first(count))
+    any_new |= window_.receive(record, account_, out);
   return any_new;
 }
 
-void Session::note_status(std::uint32_t status, const LoadCellRecord& shown_by) noexcept {
-  const std::uint32_t trouble = settings_.product == Product::net_box ? status & kStreamTrouble : 0;
-  if ((trouble & ~trouble_) != 0) note_event(EventKind::box_trouble, shown_by, trouble);
+void Session::note_status(std::span<const LoadCellRecord> records) noexcept {
+  std::uint32_t trouble = 0;
+  for (const LoadCellRecord& record : records) trouble |= record.status;
+  trouble &= settings_.product == Product::net_box ? kStreamTrouble : 0;
+  if ((trouble & ~trouble_) != 0) note_event(EventKind::box_trouble, records.front(), trouble);
   trouble_ = trouble;
 }
 

@@ -96,7 +96,7 @@ class Session {
   void discard(Instant arrival);
   void check_bias(Instant now) noexcept;
   bool take_records(std::size_t count, std::vector<LoadCellRecord>& out);
-  void note_status(std::uint32_t status, const LoadCellRecord& shown_by) noexcept;
+  void note_status(std::span<const LoadCellRecord> records) noexcept;
   void note_silence(Instant now) noexcept;
   void note_event(EventKind kind, const LoadCellRecord& shown_by, std::uint32_t status = 0) noexcept;
   bool belongs_to_new_stream(const LoadCellRecord& first) const noexcept;

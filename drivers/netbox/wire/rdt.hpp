@@ -46,9 +46,8 @@ inline void decode(const std::uint8_t* bytes, LoadCellRecord& out) noexcept {
   for (std::size_t axis = 0; axis < 6; ++axis) out.counts[axis] = boost::endian::load_big_s32(bytes + 12 + 4 * axis);
 }
 
-/// Number of records written to `out`: records_in().
-[[nodiscard]] inline std::size_t decode(std::span<const std::uint8_t> datagram,
-                                        std::span<LoadCellRecord, kMaxRecords> out) noexcept {
+/// Number of records written to `out`: records_in(), which it has room for.
+inline std::size_t decode(std::span<const std::uint8_t> datagram, std::span<LoadCellRecord> out) noexcept {
   const std::size_t count = records_in(datagram.size());
   for (std::size_t i = 0; i < count; ++i) decode(datagram.data() + i * kRecordBytes, out[i]);
   return count;
