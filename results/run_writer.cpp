@@ -17,7 +17,6 @@
 
 namespace kphi::results {
 
-using hdf5::Column;
 using hdf5::Handle;
 
 /// A group of columns that grow together; `n_valid` says how many rows were complete at the last sync.
@@ -46,8 +45,8 @@ class Series {
     }
   }
   void flush() {
-    for (Column& column : columns_) column.flush();
-    for (Column& column : columns_) column.write_crc();
+    for (hdf5::Column& column : columns_) column.flush();
+    for (hdf5::Column& column : columns_) column.write_crc();
     if (components_) components_->flush();
   }
   /// Only when what flush() wrote is on disk: HDF5 writes its metadata in any order.
@@ -83,8 +82,8 @@ class Series {
 
   RunGroup<Row> layout_;
   Handle group_;
-  std::deque<Column> columns_;
-  std::optional<Column> components_;
+  std::deque<hdf5::Column> columns_;
+  std::optional<hdf5::Column> components_;
   std::array<std::byte, 12288> block_;
 };
 
@@ -188,10 +187,12 @@ void RunWriter::note(const StreamEvent& event) {
 }
 
 void RunWriter::sync() {
-  guarded([&] { secure(); });
+  guarded([&] { secure([] {}); });
 }
 
-void RunWriter::secure() {
+/// `declare` writes what is true only of data that is on disk.
+template <class Declare>
+void RunWriter::secure(Declare&& declare) {
   constexpr std::uint64_t kMetadata = 256u << 10;  // more than one flush adds
   file_->for_each_series([](auto& series) { series.flush(); });
   // With room reserved the flush of the metadata, which must not stop halfway, cannot meet a full disk.
@@ -204,6 +205,7 @@ void RunWriter::secure() {
   };
   sync();
   file_->for_each_series([](auto& series) { series.declare_valid(); });
+  declare();
   sync();
   reserved_ = size;
 }
@@ -222,27 +224,27 @@ void RunWriter::close() {
 }
 
 std::string RunWriter::finish(const RunEnding& ending) {
-  const Outcome outcome = ending.outcome;
   guarded([&] {
-    const Handle& root = file_->root;
-    for_each_figure(ending, [&](const char* name, const auto& value) { hdf5::write_attribute(root, name, value); });
-    hdf5::write_attribute(root, "outcome", std::string(outcome_name(outcome)));
-    hdf5::write_attribute(root, "outcome_reason", ending.outcome_reason);
-    hdf5::write_attribute(root, "attributes_sha256", attributes_digest(header_, ending));
-    hdf5::write_attribute(root, "complete", std::int32_t{outcome == Outcome::complete});
-    secure();
+    secure([&] {
+      const Handle& root = file_->root;
+      for_each_figure(ending, [&](const char* name, const auto& value) { hdf5::write_attribute(root, name, value); });
+      hdf5::write_attribute(root, "outcome", std::string(outcome_name(ending.outcome)));
+      hdf5::write_attribute(root, "outcome_reason", ending.outcome_reason);
+      hdf5::write_attribute(root, "attributes_sha256", attributes_digest(header_, ending));
+      hdf5::write_attribute(root, "complete", std::int32_t{ending.outcome == Outcome::complete});
+    });
   });
   close();
   on_disk(path_.string(), [&] { sync_file(path_, files_); });  // what closing wrote
 
   const Verification verification = verify_run(path_);
-  if (outcome == Outcome::complete && !verification.whole()) {
+  if (ending.outcome == Outcome::complete && !verification.whole()) {
     throw RecordError(fmt::format("{}: the finished file failed verification: {}; repeat the run", path_.string(),
                                   fmt::join(verification.problems, "; ")));
   }
   const std::string digest = sha256_of_file(path_);
   const std::filesystem::path target =
-      outcome == Outcome::complete ? final_path_ : free_name(without_ending(final_path_) + ".aborted", ".h5");
+      ending.outcome == Outcome::complete ? final_path_ : free_name(without_ending(final_path_) + ".aborted", ".h5");
   on_disk(target.string(), [&] {
     using std::filesystem::perms;
     std::filesystem::permissions(path_, perms::owner_write | perms::group_write | perms::others_write,

@@ -50,7 +50,8 @@ class RunWriter {
   struct File;
   template <class Action>
   void guarded(Action&& action);
-  void secure();
+  template <class Declare>
+  void secure(Declare&& declare);
   void close();
   std::filesystem::path final_path_;
   std::filesystem::path path_;

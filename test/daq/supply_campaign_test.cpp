@@ -200,12 +200,8 @@ TEST_F(AtTheStand, AnOutputThatComesOnUnaskedIsASafetyStopWhetherOrNotThePromptN
   person_.act = [this] { circuit().switch_output(true); };
   for (const bool looks : {true, false}) {
     person_.looks = looks;
-    try {
-      run_with_person();
-      ADD_FAILURE() << "went on";
-    } catch (const SafetyStop& stop) {
-      EXPECT_THAT(stop.what(), HasSubstr("output is on while somebody may be near"));
-    }
+    EXPECT_THAT([&] { run_with_person(); },
+                testing::ThrowsMessage<SafetyStop>(HasSubstr("output is on while somebody may be near")));
     EXPECT_FALSE(circuit().output());
     if (!looks) break;
     results_.emplace(results::CampaignFolder::create(folder_.path(), "u", "again"));

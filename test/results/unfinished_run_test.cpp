@@ -173,18 +173,32 @@ TEST(DiskFull, CanBeToldToTheWriterByTheFileLayer) {
   EXPECT_LT(rescued.load_cell.size(), run.load_cell.size());
 }
 
+class NoSync : public FileLayer {
+ public:
+  void sync_data(int) override {
+    if (--granted < 0) throw std::system_error(EIO, std::generic_category());
+  }
+  int granted = 1000;
+};
+
 TEST(DiskFull, ARefusedSyncIsAnError) {
-  class NoSync : public FileLayer {
-   public:
-    void sync_data(int) override {
-      if (armed) throw std::system_error(EIO, std::generic_category());
-    }
-    bool armed = false;
-  } files;
+  NoSync files;
   const TemporaryFolder folder;
   RunWriter writer(folder / "a.h5", make_run({}).header, files);
-  files.armed = true;
+  files.granted = 0;
   EXPECT_THAT(error_of<RecordError>([&] { writer.sync(); }), HasSubstr("Input/output error"));
+}
+
+TEST(DiskFull, ARunIsNotCalledCompleteBeforeItsDataAreOnDisk) {
+  const RunRecording run = make_run({});
+  for (int granted = 2; granted < 4; ++granted) {  // two syncs begin a file, two end it
+    NoSync files;
+    files.granted = granted;
+    const TemporaryFolder folder;
+    EXPECT_THROW(write_run(folder / "a.h5", run, files), RecordError);
+    const RunRecording left = read_run(folder / "a.h5.part");
+    EXPECT_TRUE(left.outcome != Outcome::complete || left.load_cell.size() == run.load_cell.size()) << granted;
+  }
 }
 
 }  // namespace unfinished_run_test

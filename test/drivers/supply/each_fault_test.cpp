@@ -18,6 +18,7 @@ using test::lasting;
 using test::Over;
 using test::SimulatedSupply;
 using testing::HasSubstr;
+using testing::ThrowsMessage;
 
 struct Row {
   const char* name;
@@ -70,13 +71,8 @@ TEST_P(SupplyMeets, ForEverAndSaysSo) {
     EXPECT_EQ(supply.read().set_voltage_v, 12);
     return;
   }
-  try {
-    (void)supply.read();
-    ADD_FAILURE() << "it has read something";
-  } catch (const DeviceError& error) {
-    EXPECT_THAT(error.what(), HasSubstr(GetParam().words));
-    EXPECT_THAT(error.what(), HasSubstr("supply RD6006 on "));
-  }
+  EXPECT_THAT([&] { (void)supply.read(); },
+              ThrowsMessage<DeviceError>(testing::AllOf(HasSubstr(GetParam().words), HasSubstr("supply RD6006 on "))));
 }
 
 constexpr Duration kNone{0};
@@ -119,6 +115,20 @@ TEST(SupplyMeetsABusyDevice, AndAsksAgain) {
   busy.count = 2;
   simulated.spoil(busy);
   EXPECT_FALSE(supply.read().output);
+}
+
+TEST(SupplyMeetsOneFaultAfterAnother, AndNamesTheFirstFirst) {
+  SteadyClock clock;
+  SimulatedSupply simulated;
+  ModbusSupply supply(simulated.address(Over::tcp), clock, kShort);
+  sim::Fault silent;
+  silent.kind = FaultKind::supply_no_reply;
+  silent.count = 1;
+  simulated.spoil(silent);
+  simulated.spoil(lasting(FaultKind::supply_wrong_transaction));
+  EXPECT_THAT(
+      [&] { (void)supply.read(); },
+      ThrowsMessage<DeviceError>(HasSubstr("read: no answer, then damaged answer (Invalid data); check its power")));
 }
 
 struct Lateness {
