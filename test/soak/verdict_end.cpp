@@ -61,8 +61,9 @@ void check_end(const Evidence& evidence, const Reaches& reaches, Lines& wrong) {
   // What else stopped it was seen before, in the same moment, or while what had stopped it was told.
   if (story.woke && story.end == End::finished) return unless(false);
   switch (story.end) {
-    case End::finished:
-      return unless(mixture.answers_are_good);
+    case End::finished:  // without an answer only where no run was left to do
+      return unless(mixture.answers_are_good ||
+                    (!evidence.files.empty() && std::ranges::all_of(evidence.files, &FileOfRun::inherited)));
     case End::stopped:
     case End::refused:
       return check_reason(evidence, reaches, wrong);

@@ -103,12 +103,8 @@ TEST_F(UsbAdapterOnAFakeBus, IsMissedOnceItIsUnplugged) {
   add(adapter("1-1", "0403:6001", "A10K0000", "ttyUSB0"));
   EXPECT_EQ(path_of("usb:0403:6001"), "/dev/ttyUSB0");
   umockdev_testbed_remove_device(bed_.get(), "/sys/devices/pci0/usb1/1-1");
-  try {
-    (void)path_of("usb:0403:6001");
-    FAIL() << "found an adapter that is gone";
-  } catch (const DeviceError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("no USB serial adapter is plugged in"));
-  }
+  EXPECT_THAT([&] { (void)path_of("usb:0403:6001"); },
+              testing::ThrowsMessage<DeviceError>(HasSubstr("no USB serial adapter is plugged in")));
 }
 
 }  // namespace usb_adapter_test

@@ -46,18 +46,10 @@ TEST(KTable, NamesTheLineThatIsWrong) {
                           "phi_deg,k\n0,-1e-6\n", ""}) {
     EXPECT_THROW((void)read_k_table(bad, "K.csv"), ConfigurationError) << bad;
   }
-  try {
-    (void)read_k_table("phi_deg,k\n0,1e-6\n45,abc\n", "K.csv");
-    FAIL();
-  } catch (const ConfigurationError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("K.csv:3"));
-  }
-  try {
-    (void)read_k_table("phi_deg,k\n0,1e-6\n45\n", "K.csv");
-    FAIL();
-  } catch (const ConfigurationError& error) {
-    EXPECT_STREQ(error.what(), "K.csv:3: 1 fields where the header has 2");
-  }
+  EXPECT_THAT([&] { (void)read_k_table("phi_deg,k\n0,1e-6\n45,abc\n", "K.csv"); },
+              testing::ThrowsMessage<ConfigurationError>(HasSubstr("K.csv:3")));
+  EXPECT_THAT([&] { (void)read_k_table("phi_deg,k\n0,1e-6\n45\n", "K.csv"); },
+              testing::ThrowsMessage<ConfigurationError>(testing::StrEq("K.csv:3: 1 fields where the header has 2")));
   EXPECT_TRUE(is_k_table("phi_deg,k\n"));
   EXPECT_FALSE(is_k_table("propeller,blades\n"));
 }

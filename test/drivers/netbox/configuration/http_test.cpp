@@ -98,12 +98,8 @@ TEST(HttpGet, AClosedPortIsNamedAtOnce) {
 }
 
 TEST(HttpGet, AnUnknownNameIsNamed) {
-  try {
-    (void)http_get("no such host", 80, "/", 10s);
-    FAIL();
-  } catch (const DeviceError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("look up the name"));
-  }
+  EXPECT_THAT([&] { (void)http_get("no such host", 80, "/", 10s); },
+              testing::ThrowsMessage<DeviceError>(HasSubstr("look up the name")));
 }
 
 }  // namespace http_test

@@ -209,12 +209,8 @@ TEST_F(SettingsTest, RestoreReportsAndIsDoneOnce) {
 TEST_F(SettingsTest, ARestoreThatFailsIsAnErrorAndKeepsTheJournal) {
   SettingsKeeper keeper(web.address(), {.rate_hz = 1000}, journal);
   web.behave({.writes_ignored = 1000});
-  try {
-    keeper.restore();
-    FAIL();
-  } catch (const DeviceError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("set comrdtrate to 7000 on the box's web pages"));
-  }
+  EXPECT_THAT([&] { keeper.restore(); },
+              testing::ThrowsMessage<DeviceError>(HasSubstr("set comrdtrate to 7000 on the box's web pages")));
   EXPECT_TRUE(std::filesystem::exists(journal));
   web.behave({});
   keeper.restore();
