@@ -1,4 +1,4 @@
-// Whether the figures can be drawn here: gnuplot is no part of kphi.
+// Tells whether gnuplot, which draws kphi's figures, is installed.
 #pragma once
 
 #include <cstdlib>

@@ -211,7 +211,7 @@ void ModbusSupply::switch_off() {
                     "switch it off by hand");
 }
 
-/// The first failure says what to do: over TCP a late answer makes the next one look damaged.
+/// The advice fits the first failure: over TCP a late answer to the first request makes the next one look damaged.
 void ModbusSupply::persist(const std::string& operation, const std::function<Outcome()>& attempt) {
   Outcome first, newest;
   for (int i = 0; i < kAttempts && newest.failure != Failure::refused; ++i) {

@@ -68,7 +68,7 @@ class Working {
           while (!stop_) {
             work();
             cpu_s_ = cpu_seconds();
-            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));  // the period of the real threads
           }
         }) {}
   ~Working() {

@@ -134,7 +134,8 @@ class ReorderWindow {
   /// Appends to `out` the records that can be delivered now, ascending in ft_sequence, counted by `account`. False if
   /// the record was refused and counted (duplicate, late, stalled).
   bool receive(const LoadCellRecord& record, LossTracker& account, std::vector<LoadCellRecord>& out);
-  /// The records of one datagram, as long as none is missing or held: nearly always. False: nothing was taken.
+  /// Counts the records of one datagram as accepted if none is missing and none is held: nearly always. False: nothing
+  /// was counted.
   [[nodiscard]] bool accept_run(std::span<const LoadCellRecord> records, LossTracker& account) const noexcept {
     return held_.empty() && account.accept_run(records);
   }

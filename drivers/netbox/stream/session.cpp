@@ -64,7 +64,7 @@ void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, s
     ++counters.malformed;
     return;
   }
-  // Decoded where nearly all stay: copied at once, they would wait for the words just written.
+  // Decoded straight into `out`, where nearly all stay: a copy right after the writes stalls the processor.
   out.resize(before + count);
   const std::span<LoadCellRecord> records = std::span(out).subspan(before);
   decode(datagram, records);

@@ -104,6 +104,7 @@ class FakeWeb {
     while (!manner_.keep_open && !ending_ && recv(client, bytes, sizeof bytes, 0) > 0) {
     }
   }
+  /// In slices of 1 ms, so that the end of a test does not wait for a slow page.
   void pause(std::chrono::milliseconds duration) const {
     for (; duration.count() > 0 && !ending_; duration -= std::chrono::milliseconds(1)) usleep(1000);
   }

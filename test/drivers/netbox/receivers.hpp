@@ -175,7 +175,7 @@ class Driver {
     if (consumer == Consumer::waits) {
       if (!cell_.wait(std::chrono::milliseconds(100))) return;
     } else {
-      usleep(5000);
+      usleep(5000);  // a recorder's period; what it costs is measured
     }
     while (const std::size_t count = cell_.take(records_)) {
       for (std::size_t i = 0; i < count; ++i) {
