@@ -126,6 +126,19 @@ TEST(LoadCell, ASleepingConsumerLosesNothing) {
   EXPECT_EQ(consume(bench.cell, counters.received), counters.received);
 }
 
+TEST(LoadCell, ARecordWakesWhoWaitsForIt) {
+  Bench bench({.records_per_datagram = 1});
+  bench.cell.start();
+  std::array<LoadCellRecord, 1024> records;
+  const Instant begin = bench.clock.now();
+  for (int woken = 0; woken < 5; ++woken) {
+    while (bench.cell.take(records) > 0) {
+    }
+    ASSERT_TRUE(bench.cell.wait(20s));
+    ASSERT_LT(bench.clock.now() - begin, 20s) << "it was found when the time was over";
+  }
+}
+
 TEST(LoadCell, CountsExactlyWhatTheNetworkLost) {
   Bench bench({.skip_every = 10});
   bench.cell.start();
