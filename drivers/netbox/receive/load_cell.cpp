@@ -1,8 +1,11 @@
 #include "drivers/netbox/receive/load_cell.hpp"
 
 #include <fmt/format.h>
+#include <linux/futex.h>
 #include <poll.h>
 #include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -31,10 +34,14 @@ Duration between(const timespec& from, const timespec& to) noexcept {
   return Duration((to.tv_sec - from.tv_sec) * 1'000'000'000 + to.tv_nsec - from.tv_nsec);
 }
 
+timespec timeout_of(std::chrono::nanoseconds wall) noexcept {
+  const auto clamped = std::clamp<std::chrono::nanoseconds>(wall, 0ns, 1h);
+  return {clamped.count() / 1'000'000'000, clamped.count() % 1'000'000'000};
+}
+
 /// True if a descriptor became readable within `wall`.
 bool poll_for(std::span<pollfd> descriptors, std::chrono::nanoseconds wall) noexcept {
-  const auto clamped = std::clamp<std::chrono::nanoseconds>(wall, 0ns, 1h);
-  const timespec timeout{clamped.count() / 1'000'000'000, clamped.count() % 1'000'000'000};
+  const timespec timeout = timeout_of(wall);
   return ppoll(descriptors.data(), descriptors.size(), &timeout, nullptr) > 0;
 }
 
@@ -96,12 +103,11 @@ void LoadCell::set_bias() noexcept {
 bool LoadCell::wait(std::chrono::nanoseconds wall) noexcept {
   const auto deadline = std::chrono::steady_clock::now() + wall;
   for (auto left = wall; connection_.empty() && left > 0ns; left = deadline - std::chrono::steady_clock::now()) {
-    record_wakeup_.clear();
-    consumer_waits_ = true;
+    consumer_waits_ = 1;
     std::atomic_thread_fence(std::memory_order_seq_cst);
-    pollfd records{record_wakeup_.descriptor(), POLLIN, 0};
-    if (connection_.empty()) poll_for({&records, 1}, left);
-    consumer_waits_ = false;
+    const timespec timeout = timeout_of(left);
+    if (connection_.empty()) syscall(SYS_futex, &consumer_waits_, FUTEX_WAIT_PRIVATE, 1, &timeout, nullptr, 0);
+    consumer_waits_ = 0;
   }
   return !connection_.empty();
 }
@@ -176,7 +182,8 @@ void LoadCell::hand_over() noexcept {
   queued_ |= connection_.deliver();
   if (!std::exchange(queued_, false)) return;
   std::atomic_thread_fence(std::memory_order_seq_cst);
-  if (consumer_waits_.load(std::memory_order_relaxed) && consumer_waits_.exchange(false)) record_wakeup_.raise();
+  if (consumer_waits_.load(std::memory_order_relaxed) != 0 && consumer_waits_.exchange(0) != 0)
+    syscall(SYS_futex, &consumer_waits_, FUTEX_WAKE_PRIVATE, 1, nullptr, nullptr, 0);
 }
 
 void LoadCell::send_requests() noexcept {

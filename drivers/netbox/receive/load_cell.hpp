@@ -76,11 +76,12 @@ class LoadCell {
   const Configuration configuration_;
   UdpSocket socket_;
   Connection connection_;  // the receive thread's while it runs, except what belongs to the consumer
-  Wakeup order_wakeup_, record_wakeup_;
+  Wakeup order_wakeup_;
   std::thread thread_;
-  std::atomic<bool> stopping_{false}, bias_requested_{false}, consumer_waits_{false};
-  std::size_t drained_ = 0;  // datagrams, last time
-  bool queued_ = false;      // records for which the consumer has not been woken
+  std::atomic<bool> stopping_{false}, bias_requested_{false};
+  std::atomic<std::uint32_t> consumer_waits_{0};  // a futex: poll(2) costs both threads more
+  std::size_t drained_ = 0;                       // datagrams, last time
+  bool queued_ = false;                           // records for which the consumer has not been woken
   Instant health_due_{0};
 
   // Published by the receive thread.
