@@ -205,16 +205,17 @@ TEST(Traps, OneReadIsNotOneMessage) {
 
 TEST(Traps, ARecordIsStampedWhenItArrivesAndNotWhenItIsRead) {
   Peer peer;
-  peer.send(records(1, 1));
-  timespec sent{};
-  clock_gettime(CLOCK_REALTIME, &sent);
-  const auto read_at = SteadyTime::now() + 50ms;
-  ASSERT_TRUE(soon([&] { return SteadyTime::now() > read_at; }));
-  const auto datagrams = peer.driver.receive();
-  ASSERT_EQ(datagrams.size(), 1u);
-  const double late_s = static_cast<double>(datagrams[0].stamp.tv_sec - sent.tv_sec) +
-                        1e-9 * static_cast<double>(datagrams[0].stamp.tv_nsec - sent.tv_nsec);
-  EXPECT_LT(late_s, 0.04);
+  const auto delay_s = [&] {
+    peer.send(records(1, 1));
+    timespec sent{};
+    clock_gettime(CLOCK_REALTIME, &sent);
+    const auto read_at = SteadyTime::now() + 50ms;
+    EXPECT_TRUE(soon([&] { return SteadyTime::now() > read_at; }));
+    const timespec stamp = peer.driver.receive().front().stamp;
+    return static_cast<double>(stamp.tv_sec - sent.tv_sec) + 1e-9 * static_cast<double>(stamp.tv_nsec - sent.tv_nsec);
+  };
+  // The kernel begins to stamp a moment after the first socket has asked for it.
+  EXPECT_TRUE(soon([&] { return delay_s() < 0.04; }));
 }
 
 TEST(Traps, ASignalExtendsNoTimeout) {
