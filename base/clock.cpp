@@ -5,14 +5,10 @@
 namespace kphi {
 namespace {
 
-std::int64_t nanoseconds(const timespec& t) noexcept {
-  return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
-}
-
 std::int64_t read(clockid_t id) noexcept {
   timespec t{};
   clock_gettime(id, &t);
-  return nanoseconds(t);
+  return to_duration(t).count();
 }
 
 Duration scaled(std::int64_t ns, double factor) noexcept {
@@ -49,7 +45,7 @@ Instant SteadyClock::at_realtime(const timespec& stamp) const noexcept {
   // A paired reading, so that a step of the calendar clock does not move the samples.
   const std::int64_t realtime = read(CLOCK_REALTIME);
   const std::int64_t monotonic = read(CLOCK_MONOTONIC);
-  return scaled(monotonic - (realtime - nanoseconds(stamp)) - epoch_monotonic_ns_, scale_);
+  return scaled(monotonic - (realtime - to_duration(stamp).count()) - epoch_monotonic_ns_, scale_);
 }
 
 std::chrono::system_clock::time_point SteadyClock::epoch_utc() const noexcept {

@@ -22,6 +22,12 @@ inline constexpr Instant kNever = Instant::max();
 [[nodiscard]] constexpr Duration from_seconds(double seconds) noexcept {
   return Duration(static_cast<std::int64_t>(seconds * 1e9 + (seconds < 0 ? -0.5 : 0.5)));
 }
+[[nodiscard]] constexpr Duration to_duration(const timespec& time) noexcept {
+  return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+}
+[[nodiscard]] constexpr timespec to_timespec(Duration duration) noexcept {
+  return {duration.count() / 1'000'000'000, duration.count() % 1'000'000'000};
+}
 
 /// Thread-safe.
 class Clock {

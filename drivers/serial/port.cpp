@@ -137,7 +137,7 @@ std::size_t Port::write(std::span<const std::uint8_t> bytes) {
 
 bool Port::wait(Duration wall) const noexcept {
   pollfd line{fd(), POLLIN, 0};
-  const timespec limit{static_cast<time_t>(wall.count() / 1'000'000'000), wall.count() % 1'000'000'000};
+  const timespec limit = to_timespec(wall);
   return wall >= Duration{0} && ppoll(&line, 1, &limit, nullptr) > 0;
 }
 

@@ -145,8 +145,7 @@ class Link {
   };
   Woken sleep() {
     const auto left = std::max(due() - steady_clock::now(), steady_clock::duration{0});
-    const auto ns = std::chrono::nanoseconds(left).count();
-    const timespec limit{static_cast<time_t>(ns / 1'000'000'000), ns % 1'000'000'000};
+    const timespec limit = to_timespec(left);
     pollfd fds[2] = {{motor_.commanded_.descriptor(), POLLIN, 0}, {-1, 0, 0}};
     if (port_) fds[1] = {port_->fd(), static_cast<short>(congested_ ? POLLIN | POLLOUT : POLLIN), 0};
     if (ppoll(fds, 2, &limit, nullptr) <= 0) return {};

@@ -30,18 +30,9 @@ std::string fetch_configuration(const Address& address, std::chrono::nanoseconds
   return http_get(address.host, address.http_port, "/netftapi2.xml", wall_timeout);
 }
 
-Duration between(const timespec& from, const timespec& to) noexcept {
-  return Duration((to.tv_sec - from.tv_sec) * 1'000'000'000 + to.tv_nsec - from.tv_nsec);
-}
-
-timespec timeout_of(std::chrono::nanoseconds wall) noexcept {
-  const auto clamped = std::clamp<std::chrono::nanoseconds>(wall, 0ns, 1h);
-  return {clamped.count() / 1'000'000'000, clamped.count() % 1'000'000'000};
-}
-
 /// True if a descriptor became readable within `wall`.
 bool poll_for(std::span<pollfd> descriptors, std::chrono::nanoseconds wall) noexcept {
-  const timespec timeout = timeout_of(wall);
+  const timespec timeout = to_timespec(std::max(wall, 0ns));
   return ppoll(descriptors.data(), descriptors.size(), &timeout, nullptr) > 0;
 }
 
@@ -64,10 +55,11 @@ LoadCell::~LoadCell() {
 
 void LoadCell::start() {
   stop();
-  if (!configuration_.rdt_enabled) {
-    throw DeviceError("Net Box " + address_.host, "start the stream", "RDT is disabled (comrdte)",
-                      "enable RDT on the box's Communications page");
-  }
+  const auto fail = [&](const std::string& cause, const char* next_move) {
+    throw DeviceError(fmt::format("Net Box {}:{}", address_.host, address_.rdt_port), "start the stream", cause,
+                      next_move);
+  };
+  if (!configuration_.rdt_enabled) fail("RDT is disabled (comrdte)", "enable RDT on the box's Communications page");
   stopping_ = false;
   order_wakeup_.clear();
   state_ = State::starting;
@@ -76,10 +68,6 @@ void LoadCell::start() {
   state_.wait(State::starting);
   if (state_ != State::failed) return;
   stop();
-  const auto fail = [&](const std::string& cause, const char* next_move) {
-    throw DeviceError(fmt::format("Net Box {}:{}", address_.host, address_.rdt_port), "start the stream", cause,
-                      next_move);
-  };
   if (socket_.refusals() > 0)
     fail("the box is reachable but refuses the RDT port",
          "check rdt_port, and that RDT is enabled on the box's Communications page");
@@ -105,7 +93,7 @@ bool LoadCell::wait(std::chrono::nanoseconds wall) noexcept {
   for (auto left = wall; connection_.empty() && left > 0ns; left = deadline - std::chrono::steady_clock::now()) {
     consumer_waits_ = 1;
     std::atomic_thread_fence(std::memory_order_seq_cst);
-    const timespec timeout = timeout_of(left);
+    const timespec timeout = to_timespec(left);
     if (connection_.empty()) syscall(SYS_futex, &consumer_waits_, FUTEX_WAIT_PRIVATE, 1, &timeout, nullptr, 0);
     consumer_waits_ = 0;
   }
@@ -169,8 +157,9 @@ void LoadCell::drain() noexcept {
     const Instant at_first = stamped ? clock_.at_realtime(first) : clock_.now();
     for (const UdpSocket::Datagram& datagram : datagrams) {
       connection_.note_host_drops(datagram.dropped);
-      connection_.receive(datagram.bytes,
-                          stamped ? at_first + clock_.stretched(between(first, datagram.stamp)) : at_first);
+      connection_.receive(
+          datagram.bytes,
+          stamped ? at_first + clock_.stretched(to_duration(datagram.stamp) - to_duration(first)) : at_first);
     }
     queued_ |= connection_.deliver();
     drained_ += datagrams.size();
