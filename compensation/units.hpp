@@ -2,7 +2,6 @@
 // gram-force and N/RPM² exist only as named ways in and out. No conversion happens by itself.
 #pragma once
 
-#include <cmath>
 
 namespace kphi {
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "base/descriptor.hpp"
+#include "base/device_data.hpp"
 #include "results/file_layer.hpp"
-#include "results/records.hpp"
 
 namespace kphi::results {
 

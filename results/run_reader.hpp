@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "base/error.hpp"
 #include "results/load_cell_columns.hpp"
 #include "results/records.hpp"
 

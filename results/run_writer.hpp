@@ -10,7 +10,6 @@
 #include <span>
 #include <string>
 
-#include "base/error.hpp"
 #include "results/file_layer.hpp"
 #include "results/records.hpp"
 

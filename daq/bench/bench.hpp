@@ -14,12 +14,11 @@
 #include "base/finding.hpp"
 #include "compensation/units.hpp"
 #include "drivers/ambient/air.hpp"
-#include "drivers/iq/service/audit.hpp"
 #include "drivers/iq/session/stopping.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
 #include "profiles/bench_config.hpp"
+#include "results/file_layer.hpp"
 #include "results/records.hpp"
-#include "results/run_writer.hpp"
 
 namespace kphi {
 

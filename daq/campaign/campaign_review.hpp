@@ -11,7 +11,6 @@
 #include "daq/campaign/operator.hpp"
 #include "daq/run/progress.hpp"
 #include "daq/run/speed_cap.hpp"
-#include "profiles/plan.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/step_mean.hpp"
 

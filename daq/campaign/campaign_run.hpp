@@ -7,7 +7,6 @@
 #include "daq/audit/bench_audit.hpp"
 #include "daq/bench/bench.hpp"
 #include "daq/campaign/operator.hpp"
-#include "daq/guard/interlock.hpp"
 #include "daq/run/progress.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"

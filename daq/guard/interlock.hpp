@@ -12,7 +12,6 @@
 #include "daq/guard/guard_limits.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "profiles/bench_config.hpp"
-#include "results/records.hpp"
 
 namespace kphi::daq {
 

@@ -11,8 +11,8 @@
 #include <string>
 
 #include "base/clock.hpp"
+#include "base/device_data.hpp"
 #include "compensation/units.hpp"
-#include "results/records.hpp"
 
 namespace kphi::daq {
 

@@ -9,8 +9,8 @@
 #include <optional>
 #include <string>
 
+#include "base/device_data.hpp"
 #include "drivers/netbox/wire/status.hpp"
-#include "results/records.hpp"
 
 namespace kphi::daq {
 

@@ -10,7 +10,6 @@
 
 #include "daq/guard/observation.hpp"
 #include "daq/run/console.hpp"
-#include "profiles/campaign.hpp"
 
 namespace kphi::daq {
 

@@ -10,6 +10,7 @@
 #include "daq/bench/bench.hpp"
 #include "daq/guard/guard.hpp"
 #include "drivers/netbox/receive/load.hpp"
+#include "results/run_writer.hpp"
 
 namespace kphi::daq {
 

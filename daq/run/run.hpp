@@ -8,11 +8,9 @@
 #include <string>
 
 #include "daq/bench/bench.hpp"
-#include "daq/guard/interlock.hpp"
 #include "daq/run/progress.hpp"
 #include "daq/run/run_order.hpp"
 #include "drivers/iq/session/stopping.hpp"
-#include "results/records.hpp"
 
 namespace kphi::daq {
 

@@ -161,9 +161,9 @@ void DeterministicBench::exchange_load_cell() {
     if (!connection_ || datagram.foreign) continue;  // a connected socket does not see what others send
     const std::uint64_t drained = connection_->counters().drained;
     connection_->receive(datagram.payload(), datagram.at);
-    connection_->deliver();
     if (witness_.heard) witness_.heard(datagram, connection_->counters().drained > drained);
   }
+  if (connection_) connection_->deliver();
 }
 
 /// Delivers the answer to the last question once it is due, then asks the next one.

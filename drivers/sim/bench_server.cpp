@@ -9,7 +9,6 @@
 #include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
-#include <cstring>
 #include <filesystem>
 
 #include "base/error.hpp"

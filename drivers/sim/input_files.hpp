@@ -18,7 +18,6 @@
 
 #include <string>
 
-#include "base/error.hpp"
 #include "drivers/sim/simulated_bench.hpp"
 
 namespace kphi::sim {

@@ -12,7 +12,6 @@
 
 #include "base/error.hpp"
 #include "base/number.hpp"
-#include "fit/export/mcap_writer.hpp"
 #include "fit/report/html.hpp"
 
 namespace kphi::fit {

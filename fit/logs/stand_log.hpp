@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "base/csv.hpp"
-#include "fit/model/step_selection.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::fit {

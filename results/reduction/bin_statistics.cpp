@@ -12,7 +12,6 @@ namespace kphi::results {
 namespace {
 
 constexpr double kWindowing = 1.5;  // S: correlations die within S times the integrated time
-constexpr double kMostFreedom = 1e6;
 constexpr std::size_t kSwing = 10;
 constexpr double kSwingSurely = 2.5;  // standard deviations of a correlation by chance
 constexpr std::size_t kLeastWaves = 3;
@@ -186,7 +185,7 @@ std::vector<double> without_trend(std::span<const double> values) {
 
 double student(double freedom, double confidence) {
   if (!(freedom > 0)) return std::numeric_limits<double>::quiet_NaN();
-  return boost::math::quantile(boost::math::students_t(std::min(freedom, kMostFreedom)), 0.5 + 0.5 * confidence);
+  return boost::math::quantile(boost::math::students_t(freedom), 0.5 + 0.5 * confidence);
 }
 
 double joint_freedom(double u1, double freedom1, double u2, double freedom2) {

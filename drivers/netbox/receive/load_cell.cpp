@@ -161,15 +161,13 @@ void LoadCell::drain() noexcept {
           datagram.bytes,
           stamped ? at_first + clock_.stretched(to_duration(datagram.stamp) - to_duration(first)) : at_first);
     }
-    queued_ |= connection_.deliver();
     drained_ += datagrams.size();
     if (datagrams.size() < UdpSocket::kBatch) break;
   }
 }
 
 void LoadCell::hand_over() noexcept {
-  queued_ |= connection_.deliver();
-  if (!std::exchange(queued_, false)) return;
+  if (!connection_.deliver()) return;
   std::atomic_thread_fence(std::memory_order_seq_cst);
   if (consumer_waits_.load(std::memory_order_relaxed) != 0 && consumer_waits_.exchange(0) != 0)
     syscall(SYS_futex, &consumer_waits_, FUTEX_WAKE_PRIVATE, 1, nullptr, nullptr, 0);

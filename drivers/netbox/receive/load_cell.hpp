@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <thread>
 #include <vector>
 
@@ -81,7 +80,6 @@ class LoadCell {
   std::atomic<bool> stopping_{false}, bias_requested_{false};
   std::atomic<std::uint32_t> consumer_waits_{0};  // a futex: poll(2) costs both threads more
   std::size_t drained_ = 0;                       // datagrams, last time
-  bool queued_ = false;                           // records for which the consumer has not been woken
   Instant health_due_{0};
 
   // Published by the receive thread.

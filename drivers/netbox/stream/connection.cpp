@@ -50,13 +50,7 @@ Connection::Connection(const Configuration& box, double bench_speed)
       streamed_(box),
       session_(stream_settings(box)),
       meter_(std::in_place, box.device_rate_hz, bench_speed),
-      queue_records_(queue_capacity(box, bench_speed)),
-      queue_(queue_records_) {
-  // Touches all of its memory, so that no page is missing when a record comes.
-  while (queue_.push(LoadCellRecord{})) {
-  }
-  queue_.reset();
-}
+      queue_(queue_capacity(box, bench_speed)) {}
 
 StreamSettings Connection::stream_settings(const Configuration& box) const {
   StreamSettings settings;
@@ -79,30 +73,31 @@ void Connection::start(Instant now) {
 
 void Connection::stop(Instant now) {
   session_.flush(accepted_);
-  store_accepted();
+  queue_accepted();
   if (session_.state() != State::failed) session_.stop(now);
   collect_events();
 }
 
 void Connection::receive(std::span<const std::uint8_t> datagram, Instant arrival) {
   newest_datagram_ = arrival;
-  const std::size_t before = accepted_.size();
+  const std::span<LoadCellRecord> slots = queue_.slots(records_in(datagram.size()));
+  if (session_.receive_in_order(datagram, arrival, slots)) {
+    meter_->note(slots.back(), slots.size(), session_.counters().reboots);
+    return queue_.fill(slots.size());
+  }
   session_.receive(datagram, arrival, accepted_);
-  if (accepted_.size() > before) meter_->note(accepted_.back(), accepted_.size() - before, session_.counters().reboots);
+  if (!accepted_.empty()) meter_->note(accepted_.back(), accepted_.size(), session_.counters().reboots);
+  queue_accepted();
 }
 
-void Connection::store_accepted() noexcept {
-  if (accepted_.empty()) return;
-  const std::size_t queued = queue_.push(accepted_.data(), accepted_.size());
-  queue_overflows_ += accepted_.size() - queued;
-  meter_->note_queue(queue_records_ - queue_.write_available());
-  queued_ |= queued > 0;
+void Connection::queue_accepted() noexcept {
+  queue_overflows_ += accepted_.size() - queue_.push(accepted_);
   accepted_.clear();
 }
 
 void Connection::advance(Instant now) {
   if (session_.release_deadline() <= now) session_.release(now, accepted_);
-  store_accepted();
+  queue_accepted();
   session_.advance(now);
   collect_events();
   supervise(now);
@@ -196,7 +191,7 @@ void Connection::answered(Answer answer, Instant at) {
 void Connection::adopt_latest() {
   if (!changes_stream(compare(streamed_, latest_))) return;
   session_.flush(accepted_);
-  store_accepted();
+  queue_accepted();
   collect_events();
   session_.adopt(stream_settings(latest_));
   meter_.emplace(latest_.device_rate_hz, bench_speed_);

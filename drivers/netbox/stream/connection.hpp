@@ -16,6 +16,7 @@
 #include "base/clock.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
 #include "drivers/netbox/stream/health.hpp"
+#include "drivers/netbox/stream/record_queue.hpp"
 #include "drivers/netbox/stream/session.hpp"
 
 namespace kphi::netbox {
@@ -46,7 +47,7 @@ class Connection {
   /// The box takes its present load as zero; see Session::set_bias.
   void set_bias(Instant now) { session_.set_bias(now); }
 
-  /// Its records can be taken after deliver(), advance() or stop(): many datagrams share what a queue costs.
+  /// Its records can be taken after deliver().
   void receive(std::span<const std::uint8_t> datagram, Instant arrival);
   /// Datagrams dropped by the socket since it was opened, as known with the next datagram.
   void note_host_drops(std::uint64_t total) noexcept { session_.note_host_drops(total); }
@@ -67,16 +68,17 @@ class Connection {
   /// How long the receiving thread may sleep so that single records of 2 ms wall time share one wake-up; 0: wake up
   /// with the next datagram. At 7 kHz a wake-up is most of what a single record costs.
   [[nodiscard]] Duration gathering_time(Instant now) const noexcept;
-  /// Queues for take() what receive() has accepted; true if records have been queued since the last call.
+  /// Lets the consumer take all that has been accepted; true if there is more than last time.
   bool deliver() noexcept {
-    store_accepted();
-    return std::exchange(queued_, false);
+    if (!queue_.publish()) return false;
+    meter_->note_queue(queue_.waiting());
+    return true;
   }
 
   /// Consumer: oldest first; returns how many.
-  std::size_t take(std::span<LoadCellRecord> out) noexcept { return queue_.pop(out.data(), out.size()); }
+  std::size_t take(std::span<LoadCellRecord> out) noexcept { return queue_.take(out); }
   /// Consumer: no record is waiting.
-  [[nodiscard]] bool empty() const noexcept { return queue_.read_available() == 0; }
+  [[nodiscard]] bool empty() const noexcept { return queue_.empty(); }
   /// Consumer: events since the last call, oldest first.
   [[nodiscard]] std::vector<Event> take_events();
 
@@ -90,7 +92,7 @@ class Connection {
 
  private:
   [[nodiscard]] StreamSettings stream_settings(const Configuration& box) const;
-  void store_accepted() noexcept;
+  void queue_accepted() noexcept;
   void collect_events() noexcept;
   void ask_about_silence(Instant silent_at) noexcept;
   void pause(Instant now) noexcept;
@@ -112,9 +114,7 @@ class Connection {
   std::optional<Answer::Kind> last_answer_;  // of this silence
   bool question_ = false;
 
-  const std::size_t queue_records_;  // that it holds at most
-  boost::lockfree::spsc_queue<LoadCellRecord> queue_;
-  bool queued_ = false;
+  RecordQueue queue_;
   boost::lockfree::spsc_queue<Event, boost::lockfree::capacity<256>> events_;
   std::vector<LoadCellRecord> accepted_;
   Instant newest_datagram_{0};

@@ -56,31 +56,36 @@ void Session::stop(Instant now) {
   due_ = bias_due_ = kNever;
 }
 
+bool Session::receive_in_order(std::span<const std::uint8_t> datagram, Instant arrival, std::span<LoadCellRecord> out) {
+  if (phase_ != Phase::streaming || out.empty()) return false;
+  decode(datagram, out, arrival);
+  if (!window_.accept_run(out, account_)) return false;
+  ++account_.counters().datagrams;
+  datagram_records_ = out.size();
+  note_status(out);
+  newest_arrival_ = arrival;
+  due_ = arrival + settings_.silence();
+  return true;
+}
+
 void Session::receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<LoadCellRecord>& out) {
   Counters& counters = account_.counters();
   ++counters.datagrams;
-  const std::size_t before = out.size(), count = records_in(datagram.size());
+  const std::size_t count = records_in(datagram.size());
   if (count == 0) {
     ++counters.malformed;
     return;
   }
-  // Decoded straight into `out`, where nearly all stay: a copy right after the writes stalls the processor.
-  out.resize(before + count);
-  const std::span<LoadCellRecord> records = std::span(out).subspan(before);
-  decode(datagram, records);
-  for (LoadCellRecord& record : records) record.arrival_ns = arrival.count();
-  const bool in_order = phase_ == Phase::streaming && window_.accept_run(records, account_);
-  if (!in_order) {
-    std::ranges::copy(records, decoded_.begin());
-    out.resize(before);
-  }
+  const std::span<LoadCellRecord> records = std::span(decoded_).first(count);
+  decode(datagram, records, arrival);
   if (phase_ != Phase::streaming) {
-    const bool expected = phase_ == Phase::silent || (phase_ == Phase::awaiting && belongs_to_new_stream(decoded_[0]));
+    const bool expected = phase_ == Phase::silent || (phase_ == Phase::awaiting && belongs_to_new_stream(records[0]));
     if (!expected) return discard(arrival);
   }
   datagram_records_ = count;
-  const bool any_new = in_order || take_records(count, out);
-  note_status(in_order ? records : std::span(decoded_).first(count));
+  bool any_new = false;
+  for (const LoadCellRecord& record : records) any_new |= window_.receive(record, account_, out);
+  note_status(records);
   if (!any_new) return;
   if (phase_ != Phase::streaming) begin_streaming();
   newest_arrival_ = arrival;
@@ -99,13 +104,6 @@ void Session::begin_streaming() noexcept {
 
 Command Session::start_command() const noexcept {
   return settings_.product == Product::axia ? Command::axia_multi_block : Command::buffered;
-}
-
-bool Session::take_records(std::size_t count, std::vector<LoadCellRecord>& out) {
-  bool any_new = false;
-  for (const LoadCellRecord& record : std::span(decoded_).first(count))
-    any_new |= window_.receive(record, account_, out);
-  return any_new;
 }
 
 void Session::note_status(std::span<const LoadCellRecord> records) noexcept {

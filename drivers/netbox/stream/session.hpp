@@ -63,6 +63,9 @@ class Session {
   /// until silence() has passed, it is started again when no record comes within three datagram periods and
   /// bias_patience. Another state: nothing is sent.
   void set_bias(Instant now);
+  /// The usual case: true if the stream goes on without a gap; its records, as many as `out` holds, are there then.
+  /// False: nothing has happened, call receive().
+  bool receive_in_order(std::span<const std::uint8_t> datagram, Instant arrival, std::span<LoadCellRecord> out);
   /// Appends to `out` the records that can be delivered, ascending in ft_sequence. Records behind a gap are held back
   /// (StreamSettings::reorder_records and reorder_patience) and come with a later call.
   void receive(std::span<const std::uint8_t> datagram, Instant arrival, std::vector<LoadCellRecord>& out);
@@ -95,7 +98,6 @@ class Session {
 
   void discard(Instant arrival);
   void check_bias(Instant now) noexcept;
-  bool take_records(std::size_t count, std::vector<LoadCellRecord>& out);
   void note_status(std::span<const LoadCellRecord> records) noexcept;
   void note_silence(Instant now) noexcept;
   void note_event(EventKind kind, const LoadCellRecord& shown_by, std::uint32_t status = 0) noexcept;

@@ -38,8 +38,9 @@ inline constexpr std::size_t kRecordBytes = 36, kMaxRecords = 40;
   return datagram_bytes % kRecordBytes == 0 && count <= kMaxRecords ? count : 0;
 }
 
-/// One record from its kRecordBytes, all but its arrival.
-inline void decode(const std::uint8_t* bytes, LoadCellRecord& out) noexcept {
+/// One record from its kRecordBytes.
+inline void decode(const std::uint8_t* bytes, LoadCellRecord& out, Instant arrival = {}) noexcept {
+  out.arrival_ns = arrival.count();
   out.rdt_sequence = boost::endian::load_big_u32(bytes);
   out.ft_sequence = boost::endian::load_big_u32(bytes + 4);
   out.status = boost::endian::load_big_u32(bytes + 8);
@@ -47,9 +48,10 @@ inline void decode(const std::uint8_t* bytes, LoadCellRecord& out) noexcept {
 }
 
 /// Number of records written to `out`: records_in(), which it has room for.
-inline std::size_t decode(std::span<const std::uint8_t> datagram, std::span<LoadCellRecord> out) noexcept {
+inline std::size_t decode(std::span<const std::uint8_t> datagram, std::span<LoadCellRecord> out,
+                          Instant arrival = {}) noexcept {
   const std::size_t count = records_in(datagram.size());
-  for (std::size_t i = 0; i < count; ++i) decode(datagram.data() + i * kRecordBytes, out[i]);
+  for (std::size_t i = 0; i < count; ++i) decode(datagram.data() + i * kRecordBytes, out[i], arrival);
   return count;
 }
 

@@ -6,7 +6,6 @@
 #include <deque>
 #include <mutex>
 
-#include "drivers/sim/script/faults.hpp"
 #include "drivers/sim/usb/bme280.hpp"
 #include "drivers/sim/usb/function.hpp"
 

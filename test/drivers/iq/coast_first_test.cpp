@@ -2,6 +2,7 @@
 // speed comes after them. Whatever waits, and wherever the line stopped taking bytes.
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <memory>
@@ -146,17 +147,19 @@ TEST(CoastFirst, OfASessionWhosePollsSettingsAndSpeedsWait) {
 /// What is on its way is ahead of anything: here the line is full of frames that nobody else sends.
 class FullLine {
  public:
-  explicit FullLine(const std::string& device)
-      : host_end_(::open(device.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK)) {}
+  explicit FullLine(const fake::ModuleOnALine& line)
+      : module_end_(line.master()),
+        host_end_(::open(line.device().c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK)) {}
   ~FullLine() { ::close(host_end_); }
   FullLine(const FullLine&) = delete;
   FullLine& operator=(const FullLine&) = delete;
-  void fill() const {
-    const Bytes frame = fake::message(kNobodys, 0, 0, 0);
-    for (std::size_t n = frame.size(); n > 0; n = n == 1 ? 0 : 1) {
-      while (::write(host_end_, frame.data(), n) > 0) {
-      }
-    }
+  /// True once not a byte more fits; before, the terminal moves bytes on within itself, which makes room.
+  [[nodiscard]] bool fill() const {
+    write_all_that_fits();
+    int readable = 0;
+    ::ioctl(module_end_, FIONREAD, &readable);
+    write_all_that_fits();
+    return readable == kReadable;
   }
   /// Frames up to the last of them.
   [[nodiscard]] static std::size_t ahead(const std::vector<fake::QueryResult>& heard) {
@@ -166,14 +169,23 @@ class FullLine {
   }
 
  private:
+  void write_all_that_fits() const {
+    const Bytes frame = fake::message(kNobodys, 0, 0, 0);
+    for (std::size_t n = frame.size(); n > 0; n = n == 1 ? 0 : 1) {
+      while (::write(host_end_, frame.data(), n) > 0) {
+      }
+    }
+  }
+
   static constexpr int kNobodys = 200;
-  int host_end_;
+  static constexpr int kReadable = 4095;  // of a terminal of Linux, at most
+  int module_end_, host_end_;
 };
 
 TEST(CoastFirst, OfALinkWhoseLineTakesNoBytes) {
   const SteadyClock clock;
   fake::ModuleOnALine line;
-  const FullLine full(line.device());
+  const FullLine full(line);
   Settings settings;
   settings.telemetry_hz = 200;
   Motor motor(line.device(), 115200, settings, clock);
@@ -181,10 +193,7 @@ TEST(CoastFirst, OfALinkWhoseLineTakesNoBytes) {
   ASSERT_TRUE(line.heard_a_speed(500));
   line.with([&](Module&) {  // which hears nothing meanwhile
     const auto before = motor.counters();
-    const auto polls_wait = [&] {
-      full.fill();  // again: the terminal moves bytes on within itself
-      return motor.counters().timeouts > before.timeouts;
-    };
+    const auto polls_wait = [&] { return full.fill() && motor.counters().timeouts > before.timeouts; };
     ASSERT_TRUE(test::soon(polls_wait));
     motor.spin_at(RadPerSec(600));
     motor.emergency_stop();

@@ -22,6 +22,8 @@ class ModuleOnALine {
   ModuleOnALine& operator=(const ModuleOnALine&) = delete;
 
   [[nodiscard]] const std::string& device() const { return terminal_.name(); }
+  /// The module's end of the line.
+  [[nodiscard]] int master() const { return terminal_.master(); }
   /// Look at the module, or change it.
   template <class Work>
   auto with(Work&& work) {

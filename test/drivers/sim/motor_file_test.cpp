@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "base/error.hpp"
 #include "base/random.hpp"
 #include "drivers/sim/input_files.hpp"
 #include "test/source_dir.hpp"
