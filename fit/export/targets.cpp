@@ -12,6 +12,7 @@
 
 #include "base/error.hpp"
 #include "base/number.hpp"
+#include "fit/export/mcap_writer.hpp"
 #include "fit/report/html.hpp"
 
 namespace kphi::fit {
