@@ -1,5 +1,8 @@
 #include "base/number.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <stdexcept>
@@ -20,6 +23,12 @@ std::string yaml_number(double value) {
   std::string mantissa = text.substr(0, e);
   if (mantissa.find('.') == std::string::npos) mantissa += ".0";
   return e == std::string::npos ? mantissa : mantissa + text.substr(e);  // to_chars always signs the exponent
+}
+
+std::string with_error(double value, double half_width) {
+  if (!(half_width > 0) || !std::isfinite(half_width) || !(std::abs(value) > 0)) return fmt::format("{:.5e}", value);
+  const double digits = std::floor(std::log10(std::abs(value))) - std::floor(std::log10(half_width)) + 1;
+  return fmt::format("{:.{}e} ± {:.1e}", value, static_cast<int>(std::clamp(digits, 1.0, 12.0)), half_width);
 }
 
 std::optional<double> parse_double(std::string_view text) {

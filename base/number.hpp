@@ -16,6 +16,9 @@ namespace kphi {
 /// (45.0, 1.0e-06, 1.0e+300). Throws std::invalid_argument for NaN and infinities.
 [[nodiscard]] std::string yaml_number(double value);
 
+/// "1.5500e-06 ± 1.2e-09": the value to the second digit of what follows ±; six digits where that is not positive.
+[[nodiscard]] std::string with_error(double value, double half_width);
+
 /// The whole of `text` as a number (std::from_chars), NaN and infinities included; nullopt for anything else, such as
 /// "", " 1" and "+1".
 [[nodiscard]] std::optional<double> parse_double(std::string_view text);

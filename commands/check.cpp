@@ -113,7 +113,7 @@ std::string summary_of(const Vehicle& vehicle) {
 /// What the curve's uncertainty does to the speed of a rotor, at the ends of the valid range.
 std::string uncertainty_of(const compensation::ThrustCurve& curve) {
   if (!curve.has_uncertainty())
-    return "  speeds     uncertainty unknown: the file lacks the covariance of the line or the error of K_T\n";
+    return "  speeds     uncertainty unknown: the file has no `uncertainty.covariance`\n";
   const auto percent = [&](Radians phi) { return 50 * curve.relative_uncertainty(phi, Radians(0)); };
   return fmt::format("  speeds     known to {:.2g} % without occlusion, {:.2g} % at {:g}°\n", percent(Radians(0)),
                      percent(curve.largest_fitted()), to_degrees(curve.largest_fitted()));

@@ -27,14 +27,15 @@ using namespace fit;
 namespace fs = std::filesystem;
 
 /// Fills the runs of `input` from their files and draws.
-Figures draw_all(const Identification& identification, FitInput& input, const fs::path& figures) {
+Figures draw_all(const Fitted& fitted, FitInput& input, const fs::path& figures) {
+  const Identification& identification = fitted.identification;
   RawSamples raw;
   if (input.campaign) {
     raw = read_raw_samples(identification, std::move(input.provenance.runs), input.folder);
     input.provenance.runs = std::move(raw.runs);
   }
   if (raw.shares.empty()) raw.shares = shares_of_steps(identification);
-  Figures drawn = draw_figures(identification, raw.shares, figures, "gnuplot", raw.settling ? &*raw.settling : nullptr);
+  Figures drawn = draw_figures(fitted, raw.shares, figures, "gnuplot", raw.settling ? &*raw.settling : nullptr);
   if (!drawn.skipped.empty()) fmt::print(stderr, "kphi: figures skipped: {}\n", drawn.skipped);
   return drawn;
 }
@@ -46,7 +47,7 @@ void write_page(const fs::path& page, const std::string& html) {
 }
 
 void write_report(const Fitted& fitted, FitInput& input, const fs::path& page) {
-  const Figures figures = draw_all(fitted.identification, input, page.parent_path() / "figures");
+  const Figures figures = draw_all(fitted, input, page.parent_path() / "figures");
   write_page(page, format_report(fitted, {input.provenance, figures}));
 }
 
@@ -121,8 +122,6 @@ AnalysisOptions analysis_options(const FitRequest& request, const FitInput& inpu
                                  const Identification& identification) {
   AnalysisOptions options = commands::analysis_options(input, identification);
   for (const std::string& text : request.uncertainties) set_uncertainty(options.bench, text);
-  const bool is_unused = request.no_report && !request.json;
-  if (is_unused) options.bootstrap.resamples = 0;
   return options;
 }
 
@@ -164,7 +163,7 @@ void print_findings(const FitRequest& request, const FitInput& input, const Fitt
   std::optional<FamilyFindings> family;
   if (!request.family.empty()) family = family_findings(request, fitted);
   if (!request.json) {
-    fmt::print("{}", headline_text(fitted.identification));
+    fmt::print("{}", headline_text(fitted));
     if (family) fmt::print("\n{}", family_text(*family));
     if (!raw.is_null()) fmt::print("{}\n", raw.dump(2));
     return;
@@ -187,7 +186,7 @@ ExitCode run_fit(const FitRequest& request) {
   if (input.table.empty()) input.provenance.bench = options.bench;
   fitted.analysis = analyse(identification, options);
   fs::create_directories(folder);
-  write_output(file, format_coefficients(identification, input.provenance, &fitted.analysis));
+  write_output(file, format_coefficients(fitted, input.provenance));
   print_findings(request, input, fitted, file);
   fmt::print(stderr, "{}coefficients  {}\n", caution_text(identification, fitted.analysis), file.string());
   if (!request.no_report) write_report(fitted, input, folder / "report.html");
@@ -224,7 +223,7 @@ ExitCode report_several(const ReportRequest& request) {
   std::vector<Chapter> chapters;
   for (const std::string& path : request.folders) {
     auto [input, fitted] = fitted_again(path);
-    const Figures drawn = draw_all(fitted.identification, input, figures / fmt::format("{}", chapters.size() + 1));
+    const Figures drawn = draw_all(fitted, input, figures / fmt::format("{}", chapters.size() + 1));
     family.push_back(std::move(fitted));
     chapters.push_back({std::move(input.provenance), drawn});
   }

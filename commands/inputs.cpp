@@ -101,10 +101,7 @@ FitInput load_input(const std::string& path) {
 
 AnalysisOptions analysis_options(const FitInput& input, const Identification& identification) {
   AnalysisOptions options;
-  if (const auto& air = identification.air) {
-    options.air_density_kg_m3 = air->value;
-    options.bench.air_density = air->u / air->value;
-  }
+  if (const auto& air = identification.air) options.bench.air_density = air->u / air->value;
   if (const auto& clock = input.provenance.clock) options.bench.motor_clock = clock->u_gain;
   return options;
 }

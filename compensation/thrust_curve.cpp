@@ -43,7 +43,7 @@ double ThrustCurve::relative_uncertainty(Radians occlusion_angle, Radians angle_
   if (!uncertainty_ || phi != phi || !(factor > kScalingFloor)) return kUnknown;
   const LineUncertainty& u = *uncertainty();
   if (law == ScalingLaw::clamped && factor == 1.0) return u.thrust_coefficient / reference;
-  const double from_angle = line().slope_per_rad * angle_uncertainty.value();
+  const double from_angle = line_.slope_per_rad * angle_uncertainty.value();
   double variance = variance_at(u, phi) + from_angle * from_angle;
   // The published law reflects the curve at K_T: K_T k_i = 2 K_T − k there.
   if (k > reference) variance += 4 * u.thrust_coefficient * u.thrust_coefficient;

@@ -1,6 +1,6 @@
 // k(φ) of one propeller, as fitted on the bench (paper, Fig. 5 and equation 4): the one type that all code after the
-// fit asks. Its form, today a line, is its own affair: only what writes, reads or prints the parameters calls line(),
-// so another form beside the line shows at compile time where it is missing.
+// fit asks. Its form, today a line, is its own affair: only what writes or prints the parameters calls visit(), with a
+// function for each form, so that where another form is missing does not compile.
 #pragma once
 
 #include <algorithm>
@@ -55,8 +55,11 @@ class ThrustCurve {
   /// How the φ of the fit is measured; the flight must measure it the same way.
   [[nodiscard]] OverlapMeasure overlap() const noexcept { return overlap_; }
 
-  /// The parameters, for whatever writes or prints them.
-  [[nodiscard]] const Line& line() const noexcept { return line_; }
+  /// Calls `of_form(const Line&)`, for whatever writes or prints the parameters, and returns what it returns.
+  template <class OfForm>
+  decltype(auto) visit(OfForm&& of_form) const {
+    return of_form(line_);
+  }
   /// Of the parameters; nullopt if unknown.
   [[nodiscard]] const std::optional<LineUncertainty>& uncertainty() const noexcept { return uncertainty_; }
 
@@ -64,7 +67,7 @@ class ThrustCurve {
 
   /// k(φ), also beyond the largest fitted angle, where it may be negative.
   [[nodiscard]] ThrustCoefficient at(Radians occlusion_angle) const noexcept {
-    return line().intercept + ThrustCoefficient(line().slope_per_rad * occlusion_angle.value());
+    return line_.intercept + ThrustCoefficient(line_.slope_per_rad * occlusion_angle.value());
   }
   /// Standard uncertainty of k(φ) [N/(rad/s)²]; +∞ if unknown.
   [[nodiscard]] double standard_error_at(Radians occlusion_angle) const noexcept;
@@ -85,7 +88,7 @@ class ThrustCurve {
   /// The curve raised by `raised` everywhere, with what it changes over φ times `steepness`; K_T and everything else
   /// stays. nullopt if k(0) is not positive then.
   [[nodiscard]] std::optional<ThrustCurve> perturbed(ThrustCoefficient raised, double steepness) const noexcept {
-    return from_line(thrust_coefficient_, line().intercept + raised, line().slope_per_rad * steepness, largest_fitted_,
+    return from_line(thrust_coefficient_, line_.intercept + raised, line_.slope_per_rad * steepness, largest_fitted_,
                      overlap_, uncertainty());
   }
 

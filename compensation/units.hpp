@@ -2,7 +2,6 @@
 // gram-force and N/RPM² exist only as named ways in and out. No conversion happens by itself.
 #pragma once
 
-
 namespace kphi {
 
 inline constexpr double kPi = 3.14159265358979323846;

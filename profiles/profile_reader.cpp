@@ -7,7 +7,7 @@
 namespace kphi::profiles {
 namespace {
 
-/// "coefficients" of "kphi-coefficients/1"; empty for any other format.
+/// "coefficients" of "kphi-coefficients/2"; empty for any other format.
 std::string word_of(const std::string& format) {
   constexpr std::string_view kOurs = "kphi-";
   const auto slash = format.find('/');

@@ -169,25 +169,30 @@ OverlapMeasure overlap_of(const Value& top) {
   overlap.refuse("overlap `" + overlap.text() + "` is not known", "use rim_arc, area_share or load_share");
 }
 
-std::optional<ThrustCoefficient> coefficient_at(const Value& map, const std::string& key, double scale) {
-  const auto value = map.number_at(key);
-  return value ? std::optional(ThrustCoefficient(*value * scale)) : std::nullopt;
+/// nullopt if the file does not give it.
+std::optional<Coefficients::Uncertainty> read_uncertainty(const Value& map, double scale) {
+  const auto u = map.number_at("u");
+  if (!u) return std::nullopt;
+  Coefficients::Uncertainty one{*u * scale, map.number_at("expanded_95").value_or(0) * scale};
+  if (*u < 0 || one.expanded_95 < 0) map.at("u").refuse("an uncertainty is below 0", kFitAgain);
+  if (map.text_at("freedom") != ".inf") one.freedom = map.number_at("freedom").value_or(one.freedom);
+  return one;
 }
 
-std::optional<LineUncertainty> read_uncertainty(const Value& line, double scale,
-                                                const std::optional<ThrustCoefficient>& error) {
-  const std::vector<Value> rows = line.list("covariance");
+/// Of K_T, intercept and slope; nullopt without a covariance.
+std::optional<LineUncertainty> read_covariance(const Value& top, double scale) {
+  const std::vector<Value> rows =
+      top.find("uncertainty") ? top.map_at("uncertainty").list("covariance") : std::vector<Value>();
   if (rows.empty()) return std::nullopt;
-  const double units[2] = {scale, scale * kPerDegreeToPerRad};
-  double covariance[2][2] = {};
+  const double units[3] = {scale, scale, scale * kPerDegreeToPerRad};
+  double covariance[3][3] = {};
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (rows.size() != 2 || !rows[i].node().IsSequence() || rows[i].items().size() != 2)
-      rows[i].refuse("covariance is not two rows of two numbers", kFitAgain);
-    for (std::size_t j = 0; j < 2; ++j) covariance[i][j] = rows[i].items()[j].number() * units[i] * units[j];
+    if (rows.size() != 3 || !rows[i].node().IsSequence() || rows[i].items().size() != 3)
+      rows[i].refuse("covariance is not three rows of three numbers", kFitAgain);
+    for (std::size_t j = 0; j < 3; ++j) covariance[i][j] = rows[i].items()[j].number() * units[i] * units[j];
     if (covariance[i][i] < 0.0) rows[i].refuse("a variance is below 0", kFitAgain);
   }
-  if (!error) return std::nullopt;
-  return LineUncertainty{error->value(), covariance[0][0], covariance[0][1], covariance[1][1]};
+  return LineUncertainty{std::sqrt(covariance[0][0]), covariance[1][1], covariance[1][2], covariance[2][2]};
 }
 
 ThrustCoefficient read_thrust_coefficient(const Value& map, double scale) {
@@ -199,20 +204,14 @@ ThrustCoefficient read_thrust_coefficient(const Value& map, double scale) {
   return k;
 }
 
-std::optional<ThrustCoefficient> read_error(const Value& map, double scale) {
-  const auto error = coefficient_at(map, "standard_error", scale);
-  if (error && error->value() < 0.0) map.at("standard_error").refuse("a standard error is below 0", kFitAgain);
-  return error;
-}
-
 ThrustCurve read_curve(const Value& top, double scale, Radians largest) {
   const OverlapMeasure overlap = overlap_of(top);
   const Value reference = top.map_at("K_T");
   const ThrustCoefficient k_t = read_thrust_coefficient(reference, scale);
   const Value line = top.map_at("line");
-  const ThrustCoefficient intercept(line.at("intercept").number() * scale);
-  const double slope = line.at("slope_per_deg").number() * scale * kPerDegreeToPerRad;
-  const auto uncertainty = read_uncertainty(line, scale, read_error(reference, scale));
+  const ThrustCoefficient intercept(line.map_at("intercept").at("value").number() * scale);
+  const double slope = line.map_at("slope_per_deg").at("value").number() * scale * kPerDegreeToPerRad;
+  const auto uncertainty = read_covariance(top, scale);
   if (!(intercept.value() > 0.0))
     line.at("intercept").refuse("the intercept must be positive", "check sign and unit of the fit");
   if (line.at("anchored").truth() && std::fabs(intercept / k_t - 1.0) > kAnchorTolerance)
@@ -243,7 +242,7 @@ Coefficients::Row read_row(const Value& map, double scale) {
   Coefficients::Row row;
   row.occlusion = from_degrees(map.at("phi_deg").number());
   row.k = ThrustCoefficient(map.at("k").number() * scale);
-  row.standard_error = coefficient_at(map, "standard_error", scale);
+  row.uncertainty = read_uncertainty(map, scale);
   if (const auto rpm = map.number_at("at_speed_rpm")) row.at_speed = from_rpm(*rpm);
   return row;
 }
@@ -276,21 +275,6 @@ void read_provenance(const Value& map, Coefficients::Provenance& into) {
     into.runs.push_back({run.at("file").text(), run.text_at("sha256")});
 }
 
-Coefficients::Uncertainty read_budgets(const Value& map, double scale) {
-  const auto u_of = [&](const Value& budget) {
-    const auto u = budget.number_at("u");
-    return u ? std::optional(*u * scale) : std::nullopt;
-  };
-  Coefficients::Uncertainty budgets;
-  const Value k_t = map.map_at("K_T");
-  budgets.thrust_coefficient = u_of(k_t);
-  budgets.intercept = u_of(map.map_at("intercept"));
-  budgets.slope_per_deg = u_of(map.map_at("slope_per_deg"));
-  if (k_t.text_at("freedom") != ".inf") budgets.freedom = k_t.number_at("freedom").value_or(budgets.freedom);
-  for (const Value& row : map.rows("table", "a row of the budgets has no keys")) budgets.table.push_back(u_of(row));
-  return budgets;
-}
-
 }  // namespace
 
 Coefficients parse_coefficients(const std::string& text, const std::string& path) {
@@ -301,7 +285,7 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   Coefficients coefficients(read_curve(top, scale, from_degrees(largest)));
   coefficients.path = path;
   coefficients.smallest_occlusion = from_degrees(smallest);
-  coefficients.thrust_coefficient_error = read_error(top.at("K_T"), scale);
+  coefficients.thrust_coefficient = read_uncertainty(top.at("K_T"), scale);
   coefficients.anchored = top.at("line").at("anchored").truth();
   for (const Value& point : top.at("line").list("points_deg"))
     coefficients.points.push_back(from_degrees(point.number()));
@@ -317,7 +301,14 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   coefficients.air_density_kg_m3 = top.number_at("air_density_kg_m3");
   if (const auto map = top.find("provenance"); map && map->node().IsMap())
     read_provenance(*map, coefficients.provenance);
-  if (top.find("uncertainty")) coefficients.uncertainty = read_budgets(top.map_at("uncertainty"), scale);
+  for (const char* key : {"intercept", "slope_per_deg"}) {
+    const Value parameter = top.at("line").map_at(key);
+    coefficients.parameters.push_back(
+        {key, parameter.at("value").number() * scale, read_uncertainty(parameter, scale)});
+  }
+  if (top.find("uncertainty"))
+    for (const Value& source : top.map_at("uncertainty").list("not_known"))
+      coefficients.not_known.push_back(source.text());
   return coefficients;
 }
 
@@ -333,11 +324,12 @@ Coefficients load_coefficients(const std::string& path) {
 }
 
 std::string words_of(const ThrustCurve& curve) {
-  char words[64];
-  const double slope = curve.line().slope_per_rad;
-  std::snprintf(words, sizeof words, "%.6g %c %.6g phi/rad", curve.line().intercept.value(), slope < 0 ? '-' : '+',
-                std::fabs(slope));
-  return words;
+  return curve.visit([](const Line& line) {
+    char words[64];
+    std::snprintf(words, sizeof words, "%.6g %c %.6g phi/rad", line.intercept.value(),
+                  line.slope_per_rad < 0 ? '-' : '+', std::fabs(line.slope_per_rad));
+    return std::string(words);
+  });
 }
 
 std::optional<std::string> overlap_mismatch(OverlapMeasure fitted, const std::string& coefficients,

@@ -1,4 +1,4 @@
-// Reads the coefficient file that `kphi fit` writes (format kphi-coefficients/1). For the ground: allocates and throws.
+// Reads the coefficient file that `kphi fit` writes (format kphi-coefficients/2). For the ground: allocates and throws.
 #pragma once
 
 #include <limits>
@@ -14,7 +14,7 @@
 
 namespace kphi::compensation {
 
-inline constexpr const char* kCoefficientFormat = "kphi-coefficients/1";
+inline constexpr const char* kCoefficientFormat = "kphi-coefficients/2";
 
 /// A coefficient file that cannot be used. The message is "file:line: what is wrong; the next step".
 class CoefficientError : public std::runtime_error {
@@ -33,10 +33,22 @@ struct Coefficients {
     double diameter_in = 0;  ///< 0 if unknown
     int blades = 0;          ///< 0 if unknown
   };
+  /// Of one number by the GUM, in the number's unit.
+  struct Uncertainty {
+    double u = 0;            ///< standard uncertainty
+    double expanded_95 = 0;  ///< half of the 95 % interval
+    double freedom = std::numeric_limits<double>::infinity();
+  };
+  /// "intercept" in N/(rad/s)², "slope_per_deg" in N/(rad/s)² per degree.
+  struct Parameter {
+    std::string key;
+    double value = 0;
+    std::optional<Uncertainty> uncertainty;
+  };
   struct Row {
     Radians occlusion;
     ThrustCoefficient k;
-    std::optional<ThrustCoefficient> standard_error;
+    std::optional<Uncertainty> uncertainty;
     std::optional<RadPerSec> at_speed;  ///< the single speed of the file's k_at_speed
   };
   struct Run {
@@ -55,30 +67,24 @@ struct Coefficients {
     Fit fit;
     std::vector<Run> runs;
   };
-  /// The budgets: standard uncertainties by the GUM, N/(rad/s)²; nullopt where unknown.
-  struct Uncertainty {
-    std::optional<double> thrust_coefficient, intercept, slope_per_deg;
-    double freedom = std::numeric_limits<double>::infinity();  ///< degrees of freedom of K_T's
-    std::vector<std::optional<double>> table;                  ///< one per row of `table`
-  };
-
   std::string path;
   std::string measured_utc;
   std::string tool_version;
   Propeller propeller;
-  /// What flies: K_T, the line, its overlap measure and the largest valid φ; with its uncertainty if the file has both
-  /// the covariance and the standard error of K_T.
+  /// What flies: K_T, the line, its overlap measure and the largest valid φ; with its uncertainty if the file has the
+  /// covariance.
   ThrustCurve curve;
-  std::optional<ThrustCoefficient> thrust_coefficient_error;  ///< standard error of K_T
-  bool anchored = false;                                      ///< the line is forced through K_T at φ = 0
-  std::vector<Radians> points;                                ///< occlusions behind the line
-  Radians smallest_occlusion;                                 ///< of the valid range of φ
-  std::optional<RadPerSec> slowest_speed;                     ///< valid range of speeds
+  std::optional<Uncertainty> thrust_coefficient;  ///< of K_T
+  std::vector<Parameter> parameters;              ///< of the curve, as the file names them
+  std::vector<std::string> not_known;             ///< sources that these uncertainties lack
+  bool anchored = false;                          ///< the line is forced through K_T at φ = 0
+  std::vector<Radians> points;                    ///< occlusions behind the line
+  Radians smallest_occlusion;                     ///< of the valid range of φ
+  std::optional<RadPerSec> slowest_speed;         ///< valid range of speeds
   std::optional<RadPerSec> fastest_speed;
   std::vector<Row> table;
   std::optional<double> air_density_kg_m3;
   Provenance provenance;
-  std::optional<Uncertainty> uncertainty;
 };
 
 /// Refuses a file of another format, without k_unit or overlap, with a K_T that is not positive, with numbers that are

@@ -46,8 +46,6 @@ std::string speed_range(double min_rad_s, double max_rad_s) {
   return list({printed_rpm(min_rad_s), printed_rpm(max_rad_s)});
 }
 
-std::string per_rpm2(double k) { return fmt::format("{:.6g} N/RPM^2", to_newtons_per_rpm2(ThrustCoefficient(k))); }
-
 std::string head(const Identification& identification, const Provenance& provenance) {
   const std::string blades = identification.blades > 0 ? fmt::format("{}", identification.blades) : "unknown";
   return fmt::format(
@@ -63,21 +61,33 @@ std::string head(const Identification& identification, const Provenance& provena
       known_if_positive(identification.diameter_in), blades, compensation::name_of(identification.options.overlap));
 }
 
-std::string line_block(const LineFit& line) {
+/// As keys of a map.
+std::string errors(const Budget& budget) {
+  return fmt::format("u: {}, freedom: {}, expanded_95: {}", number(budget.combined()),
+                     std::isfinite(budget.freedom()) ? number(budget.freedom()) : ".inf", number(budget.expanded()));
+}
+
+/// In N/RPM².
+std::string in_rpm(const Budget& budget) {
+  const auto rpm = [](double k) { return to_newtons_per_rpm2(ThrustCoefficient(k)); };
+  return with_error(rpm(budget.value), rpm(budget.expanded()));
+}
+
+/// A map of value and errors, with the value in the paper's unit as a comment.
+std::string entry_of(const Budget& budget, const std::string& more, const std::string& per) {
+  return fmt::format("{{value: {}, {}{}}}  # {} N/RPM^2{}\n", yaml_number(budget.value), errors(budget), more,
+                     in_rpm(budget), per);
+}
+
+std::string curve_block(const Fitted& fitted) {
+  const CurveFit& fit = fitted.identification.curve_fit;
   std::vector<double> points;
-  for (const LinePoint& point : line.points) points.push_back(point.phi_deg);
-  const auto& c = line.covariance;
-  return fmt::format(
-      "K_T: {{value: {}, standard_error: {}, phi_deg: 0.0}}  # {}\n"
-      "line:\n"
-      "  anchored: {}\n"
-      "  intercept: {}  # {}\n"
-      "  slope_per_deg: {}  # {}\n"
-      "  covariance: {}  # of intercept, slope_per_deg\n"
-      "  points_deg: {}\n",
-      yaml_number(line.K_T), yaml_number(line.K_T_standard_error), per_rpm2(line.K_T), line.anchored,
-      yaml_number(line.intercept), per_rpm2(line.intercept), yaml_number(line.slope_per_deg),
-      per_rpm2(line.slope_per_deg) + " per degree", matrix({{c[0][0], c[0][1]}, {c[1][0], c[1][1]}}), list(points));
+  for (const LinePoint& point : fit.points) points.push_back(point.phi_deg);
+  std::string text = "K_T: " + entry_of(fitted.analysis.coefficients.front(), ", phi_deg: 0.0", "") +
+                     fmt::format("line:\n  anchored: {}\n  points_deg: {}\n", fit.anchored, list(points));
+  for (std::size_t i = 0; i < fit.parameters.size(); ++i)
+    text += "  " + fit.parameters[i].key + ": " + entry_of(fitted.analysis.parameters[i], "", fit.parameters[i].per);
+  return text;
 }
 
 std::string valid_block(const Identification& identification) {
@@ -87,25 +97,28 @@ std::string valid_block(const Identification& identification) {
   return text + "}\n";
 }
 
-std::string table_row(const OcclusionCoefficient& row, double at_speed_rad_s) {
-  std::string text = fmt::format("  - {{phi_deg: {}, k: {}, standard_error: {}", yaml_number(row.phi_deg),
-                                 yaml_number(row.k), known_if_positive(row.standard_error));
+std::string table_row(const Fitted& fitted, std::size_t i) {
+  const OcclusionCoefficient& row = fitted.identification.table[i];
+  std::string text = fmt::format("  - {{phi_deg: {}, k: {}, {}", yaml_number(row.phi_deg), yaml_number(row.k),
+                                 errors(fitted.analysis.coefficients[i]));
   if (row.at_speed) {
     text += fmt::format(", k_at_speed: {}, at_speed_rpm: {}", yaml_number(row.at_speed->k),
-                        yaml_number(printed_rpm(at_speed_rad_s)));
+                        yaml_number(printed_rpm(fitted.identification.at_speed_rad_s)));
   }
-  if (row.standard)
-    text += fmt::format(", k_standard: {}, k_standard_error: {}", yaml_number(row.standard->value),
-                        yaml_number(row.standard->u));
+  if (!fitted.analysis.standard.empty()) {
+    const Budget& standard = fitted.analysis.standard[i];
+    text += fmt::format(", k_standard: {}, k_standard_u: {}, k_standard_expanded_95: {}", yaml_number(standard.value),
+                        number(standard.combined()), number(standard.expanded()));
+  }
   if (row.fit) text += fmt::format(", steps: {}, repetitions: {}", row.steps, row.repetitions);
   return text + "}\n";
 }
 
-std::string standard_block(const Identification& identification) {
-  const auto& standard = identification.table.front().standard;
-  if (!identification.air || !standard) return "unknown";
-  return fmt::format("{{value: {}, standard_error: {}, air_density_kg_m3: {}}}", yaml_number(standard->value),
-                     yaml_number(standard->u), yaml_number(kStandardDensity));
+std::string standard_block(const Analysis& analysis) {
+  if (analysis.standard.empty()) return "unknown";
+  const Budget& K_T = analysis.standard.front();
+  return fmt::format("{{value: {}, {}, air_density_kg_m3: {}}}", yaml_number(K_T.value), errors(K_T),
+                     yaml_number(kStandardDensity));
 }
 
 /// The options in `provenance.fit`, with which the same can be fitted again.
@@ -124,7 +137,8 @@ std::string fit_options(const Identification& identification, const std::optiona
   return text + fmt::format(", u: {{{}}}", fmt::join(known, ", "));
 }
 
-std::string provenance_block(const Identification& identification, const Provenance& provenance) {
+std::string provenance_block(const Fitted& fitted, const Provenance& provenance) {
+  const Identification& identification = fitted.identification;
   const auto& air = identification.air;
   std::string text = fmt::format(
       "air_density_kg_m3: {}\n"
@@ -134,7 +148,7 @@ std::string provenance_block(const Identification& identification, const Provena
       "provenance:\n"
       "  campaign: {}\n"
       "  fit: {{model: \"T = k w^2\", estimator: {}, {}}}\n",
-      air ? yaml_number(air->value) : "unknown", air ? yaml_number(air->u) : "unknown", standard_block(identification),
+      air ? yaml_number(air->value) : "unknown", air ? yaml_number(air->u) : "unknown", standard_block(fitted.analysis),
       number(provenance.supply_v.value_or(kUnknown)), quoted(provenance.campaign),
       quoted(estimator_words(identification)), fit_options(identification, provenance.bench));
   if (const auto& clock = provenance.clock) {
@@ -150,30 +164,13 @@ std::string provenance_block(const Identification& identification, const Provena
 
 std::string number_or_none(const std::optional<double>& value) { return value ? number(*value) : "none"; }
 
-std::string errors(const Budget& budget) {
-  return fmt::format("{{u: {}, freedom: {}, expanded_95: {}}}", number(budget.combined()),
-                     std::isfinite(budget.freedom()) ? number(budget.freedom()) : ".inf", number(budget.expanded()));
-}
-
-std::vector<std::string> not_known(const Budget& budget) {
-  std::vector<std::string> names;
-  for (const BudgetRow& row : budget.rows)
-    if (!row.known()) names.push_back(row.source);
-  return names;
-}
-
 std::string analysis_blocks(const Analysis& analysis) {
-  std::string text = "uncertainty:  # standard uncertainties by the GUM; expanded: 95 %\n";
-  text += fmt::format("  K_T: {}\n", errors(analysis.coefficients.front()));
-  text += fmt::format("  intercept: {}\n  slope_per_deg: {}\n", errors(analysis.intercept), errors(analysis.slope));
-  text += fmt::format("  covariance: {}  # of K_T, intercept, slope_per_deg\n", matrix(analysis.covariance));
+  std::string text = "uncertainty:  # by the GUM: u standard, expanded_95 half of the 95 % interval\n";
+  text +=
+      fmt::format("  covariance: {}  # of K_T and the keys of the line, in their order\n", matrix(analysis.covariance));
   text += fmt::format("  not_known: [{}]  # sources missing in the sums\n",
-                      fmt::join(not_known(analysis.coefficients.front()), ", "));
-  text += "  table:\n";
-  for (const Budget& budget : analysis.coefficients)
-    text += fmt::format("    - {{quantity: {}, u: {}, expanded_95: {}}}\n", budget.quantity, number(budget.combined()),
-                        number(budget.expanded()));
-  text += fmt::format("  line: {{clipping_deg: {}, zero_deg: {}, intercept_minus_K_T: {}, u: {}}}\n",
+                      fmt::join(analysis.coefficients.front().not_known(), ", "));
+  text += fmt::format("  line: {{clipping_deg: {}, zero_deg: {}, k0_minus_K_T: {}, u: {}}}\n",
                       number_or_none(analysis.shape.clipping_deg), number_or_none(analysis.shape.zero_deg),
                       number(analysis.shape.mismatch.value), number(analysis.shape.mismatch.u));
   text += fmt::format("  line_lack_of_fit_p: {}\n  line_quadratic_p: {}\n", number(analysis.curvature.lack_of_fit.p),
@@ -217,13 +214,11 @@ std::string estimator_words(const Identification& identification) {
   return text + ", then a weighted line through k(phi)";
 }
 
-std::string format_coefficients(const Identification& identification, const Provenance& provenance,
-                                const Analysis* analysis) {
-  std::string text = head(identification, provenance) + line_block(identification.line) + valid_block(identification);
-  text += "table:\n";
-  for (const OcclusionCoefficient& row : identification.table) text += table_row(row, identification.at_speed_rad_s);
-  text += provenance_block(identification, provenance);
-  return analysis == nullptr ? text : text + analysis_blocks(*analysis);
+std::string format_coefficients(const Fitted& fitted, const Provenance& provenance) {
+  const Identification& identification = fitted.identification;
+  std::string text = head(identification, provenance) + curve_block(fitted) + valid_block(identification) + "table:\n";
+  for (std::size_t i = 0; i < identification.table.size(); ++i) text += table_row(fitted, i);
+  return text + provenance_block(fitted, provenance) + analysis_blocks(fitted.analysis);
 }
 
 RecordedFit read_recorded_fit(const std::string& path) {
@@ -235,8 +230,10 @@ RecordedFit read_recorded_fit(const std::string& path) {
   options.diameter_in = file.propeller.diameter_in;
   options.blades = file.propeller.blades;
   options.overlap = file.curve.overlap();
-  options.line.anchored = file.anchored;
-  for (const Radians& point : file.points) options.line.points_deg.push_back(to_degrees(point));
+  file.curve.visit([&](const compensation::Line&) {
+    options.line.anchored = file.anchored;
+    for (const Radians& point : file.points) options.line.points_deg.push_back(to_degrees(point));
+  });
   if (!file.table.empty() && file.table.front().at_speed) options.at_speed_rad_s = file.table.front().at_speed->value();
   if (fit.speed_range_rpm) {
     const double slack = 1e-3;  // the file has RPM to a thousandth; with this slack the same steps are taken

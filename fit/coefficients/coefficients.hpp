@@ -52,10 +52,8 @@ struct Provenance {
 /// The estimator in words; the same in file and report.
 [[nodiscard]] std::string estimator_words(const Identification& identification);
 
-/// The whole file; without an analysis it lacks the keys `uncertainty` and `torque`. The same arguments give the same
-/// bytes.
-[[nodiscard]] std::string format_coefficients(const Identification& identification, const Provenance& provenance,
-                                              const Analysis* analysis = nullptr);
+/// The whole file. The same arguments give the same bytes.
+[[nodiscard]] std::string format_coefficients(const Fitted& fitted, const Provenance& provenance);
 
 /// How a coefficients.yaml was fitted.
 struct RecordedFit {

@@ -2,6 +2,7 @@
 #include "fit/export/targets.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -44,12 +45,20 @@ std::string one_line(std::string text) {
   return text;
 }
 
+/// "± 2.1e-09 (95 %, GUM; without calibration, which is unknown)".
+std::string uncertainty_words(const compensation::Coefficients& file) {
+  if (!file.thrust_coefficient) return "uncertainty unknown";
+  const std::string missing =
+      file.not_known.empty() ? "" : fmt::format("; unknown and not in it: {}", fmt::join(file.not_known, ", "));
+  return fmt::format("± {:.2g} (95 %, GUM{})", file.thrust_coefficient->expanded_95, one_line(missing));
+}
+
 /// "5x3, Cyclone T5040C; 1.23e-06 N/(rad/s)^2 at phi = 0 deg; measured …, fitted by kphi …; 15 runs", one line each.
 std::vector<std::string> provenance_lines(const compensation::Coefficients& file) {
   const auto known = [](const std::string& text) { return text.empty() ? std::string("unknown") : one_line(text); };
   return {fmt::format("propeller {}, {}", known(file.propeller.id), known(file.propeller.name)),
-          fmt::format("K_T {} N/(rad/s)^2, standard error {}", yaml_number(file.curve.thrust_coefficient().value()),
-                      file.thrust_coefficient_error ? yaml_number(file.thrust_coefficient_error->value()) : "unknown"),
+          fmt::format("K_T {} N/(rad/s)^2, {}", yaml_number(file.curve.thrust_coefficient().value()),
+                      uncertainty_words(file)),
           fmt::format("phi is meant as the {} of the overlap", compensation::name_of(file.curve.overlap())),
           fmt::format("measured {}, campaign {}, {} runs, fitted by kphi {}", known(file.measured_utc),
                       known(file.provenance.campaign), file.provenance.runs.size(), known(file.tool_version)),
@@ -105,16 +114,20 @@ std::optional<double> value_of(const std::optional<Quantity<Unit>>& quantity) {
 }
 
 void add_table(const compensation::Coefficients& file, Parameters& parameters) {
-  std::vector<double> angles, coefficients, errors;
+  std::vector<double> angles, coefficients, u, expanded;
   for (const auto& row : file.table) {
     angles.push_back(to_degrees(row.occlusion));
     coefficients.push_back(row.k.value());
-    if (row.standard_error) errors.push_back(row.standard_error->value());
+    if (!row.uncertainty) continue;
+    u.push_back(row.uncertainty->u);
+    expanded.push_back(row.uncertainty->expanded_95);
   }
   if (angles.empty()) return;
   parameters.list("phi_deg", angles);
   parameters.list("k_n_s2_per_rad2", coefficients);
-  if (errors.size() == angles.size()) parameters.list("k_standard_error_n_s2_per_rad2", errors);
+  if (u.size() != angles.size()) return;
+  parameters.list("k_u_n_s2_per_rad2", u);
+  parameters.list("k_expanded_95_n_s2_per_rad2", expanded);
 }
 
 std::string identifier(const std::string& id) {
@@ -153,17 +166,16 @@ std::string error_at(const compensation::ThrustCurve& curve, Radians phi) {
 }
 
 constexpr const char* kCoefficientSchema =
-    R"({"type":"object","properties":{"phi_deg":{"type":"number"},"k":{"type":"number"},"standard_error":{"type":"number"},)"
+    R"({"type":"object","properties":{"phi_deg":{"type":"number"},"k":{"type":"number"},"u":{"type":"number"},"expanded_95":{"type":"number"},)"
     R"("curve_k":{"type":"number"},"scaling_factor":{"type":"number"}}})";
 
 std::map<std::string, std::string> provenance(const compensation::Coefficients& file) {
   std::map<std::string, std::string> values{{"propeller", file.propeller.id},
                                             {"k_unit", "N/(rad/s)^2"},
                                             {"K_T", Json(file.curve.thrust_coefficient().value()).dump()},
-                                            {"intercept", Json(file.curve.line().intercept.value()).dump()},
-                                            {"slope_per_rad", Json(file.curve.line().slope_per_rad).dump()},
                                             {"measured_utc", file.measured_utc},
                                             {"tool_version", file.tool_version}};
+  for (const auto& parameter : file.parameters) values[parameter.key] = Json(parameter.value).dump();
   for (const auto& run : file.provenance.runs) values["sha256 " + run.file] = run.sha256;
   return values;
 }
@@ -182,7 +194,7 @@ Export to_agilicious(const compensation::Coefficients& file, const ExportOptions
     result.text +=
         fmt::format("motor_omega_min: {}  # rad/s, the slowest measured\n", yaml_number(file.slowest_speed->value()));
   result.lost = {no_phi("thrust_map", options.phi_deg),
-                 "standard errors, covariance, air density: the file has no keys for them; see its comments"};
+                 "uncertainties, air density: the file has no keys for them; see its comments"};
   return result;
 }
 
@@ -208,7 +220,7 @@ Export to_px4(const compensation::Coefficients& file, const ExportOptions& optio
   result.text += fmt::format("1\t1\tTHR_MDL_FAC\t1.0\t{}\n", kReal32);
   result.lost = {no_phi("CA_ROTORn_CT", options.phi_deg),
                  "rad/s: PX4 has only a normalised output; CT is for the speed at full output named above",
-                 "standard errors: PX4 has no such parameters"};
+                 "uncertainties: PX4 has no such parameters; see its comments"};
   return result;
 }
 
@@ -246,9 +258,14 @@ Export to_ros2(const compensation::Coefficients& file, const ExportOptions&) {
   parameters.add("propeller", json_text(file.propeller.id));
   parameters.add("overlap", fmt::format("\"{}\"", compensation::name_of(file.curve.overlap())));
   parameters.number("thrust_coefficient_n_s2_per_rad2", file.curve.thrust_coefficient().value());
-  parameters.number("thrust_coefficient_standard_error_n_s2_per_rad2", value_of(file.thrust_coefficient_error));
-  parameters.number("line_intercept_n_s2_per_rad2", file.curve.line().intercept.value());
-  parameters.number("line_slope_n_s2_per_rad3", file.curve.line().slope_per_rad);
+  const auto& K_T = file.thrust_coefficient;
+  parameters.number("thrust_coefficient_u_n_s2_per_rad2", K_T ? std::optional(K_T->u) : std::nullopt);
+  parameters.number("thrust_coefficient_expanded_95_n_s2_per_rad2",
+                    K_T ? std::optional(K_T->expanded_95) : std::nullopt);
+  file.curve.visit([&](const compensation::Line& line) {
+    parameters.number("line_intercept_n_s2_per_rad2", line.intercept.value());
+    parameters.number("line_slope_n_s2_per_rad3", line.slope_per_rad);
+  });
   if (const auto& u = file.curve.uncertainty())
     parameters.list("line_covariance", {u->intercept_variance, u->covariance, u->covariance, u->slope_variance});
   parameters.number("phi_max_rad", file.curve.largest_fitted().value());
@@ -274,10 +291,12 @@ Export to_header(const compensation::Coefficients& file, const ExportOptions&) {
     result.text += fmt::format("constexpr double {} = {};  ///< {}\n", name, yaml_number(value), what);
   };
   constant("kThrustCoefficient", file.curve.thrust_coefficient().value(), "K_T, N/(rad/s)^2");
-  if (file.thrust_coefficient_error)
-    constant("kThrustCoefficientError", file.thrust_coefficient_error->value(), "its standard error");
-  constant("kIntercept", file.curve.line().intercept.value(), "of the line, N/(rad/s)^2");
-  constant("kSlope", file.curve.line().slope_per_rad, "of the line, N/(rad/s)^2 per rad");
+  if (file.thrust_coefficient)
+    constant("kThrustCoefficientExpanded95", file.thrust_coefficient->expanded_95, "half of its 95 % interval (GUM)");
+  file.curve.visit([&](const compensation::Line& line) {
+    constant("kIntercept", line.intercept.value(), "of the line, N/(rad/s)^2");
+    constant("kSlope", line.slope_per_rad, "of the line, N/(rad/s)^2 per rad");
+  });
   constant("kLargestPhi", file.curve.largest_fitted().value(), "rad, the largest occlusion measured");
   if (file.fastest_speed) constant("kFastestSpeed", file.fastest_speed->value(), "rad/s, the fastest measured");
   result.text += kHeaderFunctions;
@@ -288,18 +307,20 @@ Export to_header(const compensation::Coefficients& file, const ExportOptions&) {
   return result;
 }
 
-/// The table per occlusion with the line beside it. phi_deg,k,u_k come first: `kphi fit` reads them.
+/// The table per occlusion with the line beside it. phi_deg,k,u_k come first: `kphi fit` reads them; u are standard
+/// uncertainties.
 Export to_csv(const compensation::Coefficients& file, const ExportOptions&) {
   const compensation::ThrustCurve& curve = file.curve;
   Export result;
-  result.text = "phi_deg,k,u_k,curve_k,u_curve_k,scaling_factor\n";
+  result.text = "phi_deg,k,u_k,expanded_95_k,curve_k,u_curve_k,scaling_factor\n";
   for (const auto& row : file.table) {
-    result.text += fmt::format(
-        "{},{},{},{},{},{}\n", shortest(std::round(to_degrees(row.occlusion) * 1e9) / 1e9), shortest(row.k.value()),
-        shortest(row.standard_error.value_or(ThrustCoefficient()).value()), shortest(curve.at(row.occlusion).value()),
-        error_at(curve, row.occlusion), shortest(curve.scaling_factor(row.occlusion)));
+    result.text += fmt::format("{},{},{},{},{},{},{}\n", shortest(std::round(to_degrees(row.occlusion) * 1e9) / 1e9),
+                               shortest(row.k.value()), row.uncertainty ? shortest(row.uncertainty->u) : "",
+                               row.uncertainty ? shortest(row.uncertainty->expanded_95) : "",
+                               shortest(curve.at(row.occlusion).value()), error_at(curve, row.occlusion),
+                               shortest(curve.scaling_factor(row.occlusion)));
   }
-  result.lost = {"units: the header line has none; k, u_k and curve_k are in N/(rad/s)^2",
+  result.lost = {"units: the header line has none; every k and u is in N/(rad/s)^2",
                  "slope, covariance, validity, hashes of the runs: only in the coefficient file"};
   return result;
 }
@@ -313,7 +334,7 @@ Export to_mcap(const compensation::Coefficients& file, const ExportOptions&) {
   std::uint64_t time_ns = 0;
   for (const auto& row : file.table) {
     Json message{{"phi_deg", to_degrees(row.occlusion)}, {"k", row.k.value()}};
-    if (row.standard_error) message["standard_error"] = row.standard_error->value();
+    if (row.uncertainty) message.update({{"u", row.uncertainty->u}, {"expanded_95", row.uncertainty->expanded_95}});
     message["curve_k"] = file.curve.at(row.occlusion).value();
     message["scaling_factor"] = file.curve.scaling_factor(row.occlusion);
     writer.write(channel, time_ns, message.dump());

@@ -8,8 +8,10 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.hpp"
+#include "base/number.hpp"
 #include "compensation/units.hpp"
-#include "fit/report/fit_summary.hpp"
+#include "fit/model/identification.hpp"
+#include "fit/model/thrust_fit.hpp"
 #include "results/file_layer.hpp"
 
 namespace kphi::fit {

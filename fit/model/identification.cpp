@@ -131,6 +131,13 @@ std::vector<LinePoint> line_points(const std::vector<OcclusionCoefficient>& tabl
   return points;
 }
 
+/// The curve through the table. Throws FitError if it cannot fly.
+Identification with_curve(Identification result) {
+  result.curve_fit = fit_line(line_points(result.table), result.options.line);
+  (void)result.curve();
+  return result;
+}
+
 }  // namespace
 
 std::optional<Estimate> air_of(std::span<const results::StepMean> steps) {
@@ -143,11 +150,6 @@ std::optional<Estimate> air_of(std::span<const results::StepMean> steps) {
     mean.u += (std::isnan(step.air_density_u_kg_m3) ? 0.0 : step.air_density_u_kg_m3) / n;
   }
   return mean;
-}
-
-Estimate at_standard(double k, double standard_error, const Estimate& air) {
-  const double scaled = k * (kStandardDensity / air.value);
-  return {scaled, std::hypot(scaled * standard_error / k, scaled * air.u / air.value)};
 }
 
 bool speeds_known(const Identification& identification) {
@@ -191,7 +193,7 @@ std::vector<OcclusionCoefficient> coefficients_of(std::span<const StepMean> step
   for (std::size_t i = 0; i < table.size(); ++i) {
     OcclusionCoefficient& row = table[i];
     if (repeatability.repeated) row.standard_error = repeatability.independent_u(i);
-    if (const auto air = air_of(row.measured)) row.standard = at_standard(row.k, row.standard_error, *air);
+    row.air = air_of(row.measured);
   }
   return table;
 }
@@ -228,9 +230,7 @@ Identification identify(std::span<const StepMean> steps, const IdentificationOpt
     throw FitError(fmt::format("no good step at {:.0f} RPM; name a speed of the profile",
                                to_rpm(RadPerSec(*options.at_speed_rad_s))));
   }
-  result.line = fit_line(line_points(result.table), options.line);
-  (void)result.curve();  // throws if it cannot fly
-  return result;
+  return with_curve(std::move(result));
 }
 
 Identification identify_table(std::span<const LinePoint> points, const IdentificationOptions& options) {
@@ -239,15 +239,13 @@ Identification identify_table(std::span<const LinePoint> points, const Identific
   result.propeller = options.propeller;
   result.diameter_in = options.diameter_in;
   result.blades = options.blades;
-  result.line = fit_line(points, options.line);
   for (const LinePoint& point : points)
     result.table.push_back({.phi_deg = point.phi_deg, .k = point.k, .standard_error = point.standard_error});
   std::ranges::sort(result.table, {}, &OcclusionCoefficient::phi_deg);
   result.fitted = options.speed_range;
   result.speed_min_rad_s = options.speed_range.min_rad_s;
   result.speed_max_rad_s = options.speed_range.max_rad_s;
-  (void)result.curve();  // throws if it cannot fly
-  return result;
+  return with_curve(std::move(result));
 }
 
 }  // namespace kphi::fit

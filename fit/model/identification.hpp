@@ -20,9 +20,6 @@ inline constexpr double kStandardDensity = 1.225;  ///< kg/m³: ISA at sea level
 /// its density: kphi never assumes standard air.
 [[nodiscard]] std::optional<Estimate> air_of(std::span<const results::StepMean> steps);
 
-/// k · 1.225/ρ in N/(rad/s)², with the errors of k and density combined (JCGM 100, eq. 12).
-[[nodiscard]] Estimate at_standard(double k, double standard_error, const Estimate& air);
-
 /// Which k of an occlusion the line is drawn through.
 enum class Estimator : std::uint8_t {
   through_origin,  ///< k of T = k ω² over the speed range
@@ -50,11 +47,11 @@ struct IdentificationOptions {
 struct OcclusionCoefficient {
   double phi_deg = 0;
   double k = 0;  ///< N/(rad/s)², by the estimator
-  /// N/(rad/s)². Of several repetitions: noise, zero and scatter between runs (Repeatability), without the errors
-  /// common to all k; of a single one: of the fit.
+  /// N/(rad/s)², for weights and tests; Analysis has the whole uncertainty. Of several repetitions: noise, zero and
+  /// scatter between runs (Repeatability), without the errors common to all k; of a single one: of the fit.
   double standard_error = 0;
-  std::optional<Estimate> standard{};  ///< k in standard air; nullopt if the air is unknown
-  std::size_t steps = 0;               ///< distinct levels
+  std::optional<Estimate> air{};  ///< kg/m³, of its steps; nullopt: unknown
+  std::size_t steps = 0;          ///< distinct levels
   std::size_t repetitions = 0;
   std::optional<ThrustFit> fit{};              ///< nullopt in a table without steps
   std::vector<results::StepMean> measured{};   ///< behind `fit`, one per point of it
@@ -67,7 +64,7 @@ struct Identification {
   int blades = 0;                           ///< 0: unknown
   IdentificationOptions options;            ///< by which it was fitted
   std::vector<OcclusionCoefficient> table;  ///< ascending φ, the first is φ = 0
-  LineFit line;
+  CurveFit curve_fit;
   Repeatability repeatability;  ///< one angle per row of the table; empty in a table without steps
   StepSelection selection;
   std::optional<Estimate> air;  ///< kg/m³, of the steps used; nullopt: unknown, and so is every k at standard density
@@ -77,11 +74,13 @@ struct Identification {
   double speed_max_rad_s = 0;
 
   /// Thrust coefficient measured at φ = 0, N/(rad/s)².
-  [[nodiscard]] Estimate thrust_coefficient() const { return {line.K_T, line.K_T_standard_error}; }
+  [[nodiscard]] Estimate thrust_coefficient() const { return {curve_fit.K_T, curve_fit.K_T_standard_error}; }
   /// From this φ on the curve that flies lies between measured occlusions.
-  [[nodiscard]] double first_fitted_deg() const { return line.points.front().phi_deg; }
+  [[nodiscard]] double first_fitted_deg() const { return curve_fit.points.front().phi_deg; }
   /// The curve that flies, valid up to the widest occlusion measured.
-  [[nodiscard]] compensation::ThrustCurve curve() const { return line.curve(table.back().phi_deg, options.overlap); }
+  [[nodiscard]] compensation::ThrustCurve curve() const {
+    return curve_fit.curve(table.back().phi_deg, options.overlap);
+  }
 };
 
 /// Whether the range of speeds is known (a table of k may lack it).

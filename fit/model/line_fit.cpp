@@ -4,8 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
+#include <utility>
 
 #include "base/error.hpp"
 #include "fit/numerics/linear_regression.hpp"
@@ -86,59 +89,81 @@ double corrected_aic(double chi_squared, double terms, double n) {
   return chi_squared + 2 * terms + 2 * terms * (terms + 1) / room;
 }
 
-}  // namespace
-
-std::optional<double> LineFit::clipping_deg() const {
-  if (!(slope_per_deg < 0)) return std::nullopt;
-  return (K_T - intercept) / slope_per_deg;
-}
-
-std::optional<double> LineFit::zero_crossing_deg() const {
-  if (!(slope_per_deg < 0)) return std::nullopt;
-  return -intercept / slope_per_deg;
-}
-
-compensation::ThrustCurve LineFit::curve(std::optional<double> largest_deg,
-                                         compensation::OverlapMeasure overlap) const {
-  constexpr double kPerRad = 180 / kPi;
-  const auto curve = compensation::ThrustCurve::from_line(
-      ThrustCoefficient(K_T), ThrustCoefficient(intercept), slope_per_deg * kPerRad,
-      from_degrees(largest_deg.value_or(points.back().phi_deg)), overlap,
-      compensation::LineUncertainty{K_T_standard_error, std::max(0.0, covariance[0][0]), covariance[0][1] * kPerRad,
-                                    std::max(0.0, covariance[1][1]) * kPerRad * kPerRad});
-  if (curve) return *curve;
-  throw FitError(fmt::format(
-      "line fit: K_T = {:.4g} and k of the line at phi = 0, {:.4g} N/(rad/s)^2, must be positive; check the "
-      "sign of the thrust and which points carry the line",
-      K_T, intercept));
-}
-
-LineWeights LineFit::weights(std::span<const double> phis_deg) const {
-  const auto [sum, first, second] = WeightSums(points, sigmas);
+/// Of intercept and slope over `all`, with the weights of the fit.
+std::array<std::vector<double>, 2> line_weights(const CurveFit& fit, const std::vector<LinePoint>& all) {
+  const auto [sum, first, second] = WeightSums(fit.points, fit.sigmas);
   const double determinant = sum * second - first * first;
-  LineWeights result{std::vector<double>(phis_deg.size()), std::vector<double>(phis_deg.size())};
-  for (std::size_t j = 0; j < phis_deg.size(); ++j) {
-    const double phi = phis_deg[j];
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      if (std::abs(points[i].phi_deg - phi) >= kSameAngleDeg) continue;
-      const double weight = 1 / (sigmas[i] * sigmas[i]);
-      if (!anchored) result.intercept[j] += weight * (second - first * phi) / determinant;
-      result.slope[j] += anchored ? weight * phi / second : weight * (sum * phi - first) / determinant;
+  std::array<std::vector<double>, 2> result{std::vector<double>(all.size()), std::vector<double>(all.size())};
+  auto& [intercept, slope] = result;
+  for (std::size_t j = 0; j < all.size(); ++j) {
+    const double phi = all[j].phi_deg;
+    for (std::size_t i = 0; i < fit.points.size(); ++i) {
+      if (std::abs(fit.points[i].phi_deg - phi) >= kSameAngleDeg) continue;
+      const double weight = 1 / (fit.sigmas[i] * fit.sigmas[i]);
+      if (!fit.anchored) intercept[j] += weight * (second - first * phi) / determinant;
+      slope[j] += fit.anchored ? weight * phi / second : weight * (sum * phi - first) / determinant;
     }
-    if (anchored && std::abs(phi) < kSameAngleDeg) {
-      result.intercept[j] = 1;
-      result.slope[j] -= first / second;
+    if (fit.anchored && std::abs(phi) < kSameAngleDeg) {
+      intercept[j] = 1;
+      slope[j] -= first / second;
     }
   }
   return result;
 }
 
-LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& options) {
+}  // namespace
+
+std::optional<double> CurveFit::falls_to(double k) const {
+  const double slope = k_at(1) - k_at(0);
+  return slope < 0 ? std::optional((k - k_at(0)) / slope) : std::nullopt;
+}
+
+std::vector<double> CurveFit::basis_at(double phi_deg) const { return {1, phi_deg}; }
+
+double CurveFit::k_at(double phi_deg) const {
+  double k = 0;
+  const std::vector<double> basis = basis_at(phi_deg);
+  for (std::size_t i = 0; i < parameters.size(); ++i) k += basis[i] * parameters[i].value;
+  return k;
+}
+
+std::vector<double> CurveFit::weights_at(double phi_deg) const {
+  std::vector<double> at(parameters.front().weights.size());
+  const std::vector<double> basis = basis_at(phi_deg);
+  for (std::size_t i = 0; i < parameters.size(); ++i)
+    for (std::size_t j = 0; j < at.size(); ++j) at[j] += basis[i] * parameters[i].weights[j];
+  return at;
+}
+
+const CurveParameter* CurveFit::find(const std::string& key) const {
+  const auto found = std::ranges::find(parameters, key, &CurveParameter::key);
+  return found == parameters.end() ? nullptr : &*found;
+}
+
+double CurveFit::value(const std::string& key) const {
+  if (const CurveParameter* parameter = find(key)) return parameter->value;
+  throw std::out_of_range("the curve has no parameter " + key);
+}
+
+compensation::ThrustCurve CurveFit::curve(std::optional<double> largest_deg,
+                                          compensation::OverlapMeasure overlap) const {
+  constexpr double kPerRad = 180 / kPi;
+  const auto curve = compensation::ThrustCurve::from_line(
+      ThrustCoefficient(K_T), ThrustCoefficient(value("intercept")), value("slope_per_deg") * kPerRad,
+      from_degrees(largest_deg.value_or(points.back().phi_deg)), overlap);
+  if (curve) return *curve;
+  throw FitError(fmt::format(
+      "line fit: K_T = {:.4g} and k of the line at phi = 0, {:.4g} N/(rad/s)^2, must be positive; check the "
+      "sign of the thrust and which points carry the line",
+      K_T, k_at(0)));
+}
+
+CurveFit fit_line(std::span<const LinePoint> points, const LineFitOptions& options) {
   const std::vector<LinePoint> all = sorted(points);
   if (all.empty() || std::abs(all.front().phi_deg) > kSameAngleDeg)
     throw FitError("line fit: no run at phi = 0; K_T is measured without an occlusion on the same stand");
 
-  LineFit fit;
+  CurveFit fit;
   fit.anchored = options.anchored;
   fit.K_T = all.front().k;
   const double floor = kErrorFloor * largest_k(all);
@@ -159,21 +184,11 @@ LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& option
     weights.push_back(1 / (sigmas[i] * sigmas[i]));
   }
   const Regression line = regress(rows, k, weights);
-  fit.intercept = fit.anchored ? fit.K_T : line.estimates.front();
-  fit.slope_per_deg = line.estimates.back();
+  auto [intercept, slope] = line_weights(fit, all);
+  fit.parameters = {
+      {"intercept", "intercept", "", fit.anchored ? fit.K_T : line.estimates.front(), std::move(intercept)},
+      {"slope_per_deg", "slope", "/deg", line.estimates.back(), std::move(slope)}};
   fit.residuals = line.residuals;
-  const double freedom = static_cast<double>(line.freedom);
-  const double enlarge = freedom > 0 ? std::max(1.0, line.weighted_squares / freedom) : 1.0;
-  const auto& c = line.covariance;
-  if (fit.anchored) {
-    const double anchor_variance = fit.K_T_standard_error * fit.K_T_standard_error;
-    const WeightSums sums(fit.points, sigmas);
-    const double gradient = -sums.first / sums.second;  // what an error of K_T does to the slope
-    fit.covariance = {{{anchor_variance, gradient * anchor_variance},
-                       {gradient * anchor_variance, c[0][0] * enlarge + gradient * gradient * anchor_variance}}};
-  } else {
-    fit.covariance = {{{c[0][0] * enlarge, c[0][1] * enlarge}, {c[1][0] * enlarge, c[1][1] * enlarge}}};
-  }
   return fit;
 }
 

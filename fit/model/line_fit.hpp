@@ -7,9 +7,9 @@
 // contact, but the residual is larger.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "compensation/thrust_curve.hpp"
@@ -28,44 +28,54 @@ struct LineFitOptions {
   std::vector<double> points_deg{};  ///< which points carry the line; empty: all with φ > 0
 };
 
-struct LineWeights {
-  std::vector<double> intercept, slope;  ///< one per φ; slope per degree
+/// One parameter of the curve.
+struct CurveParameter {
+  std::string key;   ///< in coefficients.yaml: "intercept", "slope_per_deg"
+  std::string name;  ///< for people
+  std::string per;   ///< what follows the unit of k: "", "/deg"
+  double value = 0;
+  /// The value is Σ weight · k over all the points given to the fit, ascending φ, with the weights of the fit.
+  std::vector<double> weights{};
 };
 
-struct LineFit {
+/// k(φ) as fitted: a linear function of its parameters. What comes after the fit asks for k, weights and parameters and
+/// does not know the form.
+struct CurveFit {
   bool anchored = false;
-  double intercept = 0;      ///< N/(rad/s)²
-  double slope_per_deg = 0;  ///< N/(rad/s)² per degree
-  /// Of (intercept, slope_per_deg). (JᵀJ)⁻¹ of residuals in units of their standard errors, enlarged by χ²/(n − p)
-  /// where that is above 1 (scatter about the line larger than the errors explain). Anchored: with the error of K_T
-  /// carried through to the slope.
-  std::array<std::array<double, 2>, 2> covariance{};
+  std::vector<CurveParameter> parameters;
   std::vector<LinePoint> points;  ///< used, ascending φ
-  std::vector<double> residuals;  ///< k − line, N/(rad/s)², one per point used
+  std::vector<double> residuals;  ///< k − curve, N/(rad/s)², one per point used
   std::vector<double> sigmas;     ///< the errors by which the points were weighted
   double K_T = 0;                 ///< N/(rad/s)², measured at φ = 0
   double K_T_standard_error = 0;
 
-  /// The curve that flies: k(φ), its error and K_T, up to `largest_deg` (default: the last point). Throws FitError if
-  /// K_T or the intercept is not positive, or a number not finite.
+  /// The curve that flies up to `largest_deg` (default: the last point), without its uncertainty, which Analysis has.
+  /// Throws FitError if K_T or k(0) of the curve is not positive, or a number not finite.
   [[nodiscard]] compensation::ThrustCurve curve(
       std::optional<double> largest_deg = {},
       compensation::OverlapMeasure overlap = compensation::OverlapMeasure::rim_arc) const;
-  /// intercept − K_T: by how much the line misses the measured k(0).
-  [[nodiscard]] double mismatch() const { return intercept - K_T; }
+  /// k(φ) = Σ basis · value over the parameters.
+  [[nodiscard]] std::vector<double> basis_at(double phi_deg) const;
+  [[nodiscard]] double k_at(double phi_deg) const;
+  /// k(φ) = Σ weight · k over all the points given to the fit.
+  [[nodiscard]] std::vector<double> weights_at(double phi_deg) const;
+  /// nullptr if the curve has no such parameter.
+  [[nodiscard]] const CurveParameter* find(const std::string& key) const;
+  /// Throws std::out_of_range if the curve has no such parameter.
+  [[nodiscard]] double value(const std::string& key) const;
+  /// k(0) − K_T: by how much the curve misses the measured k(0).
+  [[nodiscard]] double mismatch() const { return k_at(0) - K_T; }
   /// φ where the line meets K_T; below it the line is above K_T and compensation clips. nullopt unless the slope is
   /// negative.
-  [[nodiscard]] std::optional<double> clipping_deg() const;
+  [[nodiscard]] std::optional<double> clipping_deg() const { return falls_to(K_T); }
   /// φ where the line predicts no thrust at all. nullopt unless the slope is negative.
-  [[nodiscard]] std::optional<double> zero_crossing_deg() const;
-  /// The line as a linear function of the coefficients: intercept and slope are Σ weight · k over `phis_deg` (of the
-  /// whole table, φ = 0 first), with the weights of the fit.
-  [[nodiscard]] LineWeights weights(std::span<const double> phis_deg) const;
+  [[nodiscard]] std::optional<double> zero_crossing_deg() const { return falls_to(0); }
+  [[nodiscard]] std::optional<double> falls_to(double k) const;
 };
 
 /// `points` hold exactly one φ = 0 (K_T) and the occluded ones, each φ once. Throws FitError when K_T is missing, a φ
 /// is listed twice or not measured, or too few points remain (free: 2, anchored: 1 with φ > 0).
-[[nodiscard]] LineFit fit_line(std::span<const LinePoint> points, const LineFitOptions& options = {});
+[[nodiscard]] CurveFit fit_line(std::span<const LinePoint> points, const LineFitOptions& options = {});
 
 struct Curvature {
   HypothesisTest lack_of_fit;  ///< of the line: χ²/(m − 2) against the variance of the coefficients

@@ -36,8 +36,9 @@ std::optional<Estimate> k_of(const Fitted* member, double phi_deg, Air air) {
 }
 
 std::optional<Estimate> slope_of(const Fitted* member, Air air) {
-  if (member == nullptr) return std::nullopt;
-  Estimate slope = member->analysis.slope.estimate();
+  const Budget* of_line = member == nullptr ? nullptr : member->analysis.parameter("slope");
+  if (of_line == nullptr) return std::nullopt;
+  Estimate slope = of_line->estimate();
   if (air == Air::measured) return slope;
   const Budget& standard = member->analysis.standard.front();
   const double scale = standard.value / member->analysis.coefficients.front().value;

@@ -35,28 +35,21 @@ ComparedResult result_of(const compensation::Coefficients& file, const std::stri
   if (file.fastest_speed) result.speed_max_rad_s = file.fastest_speed->value();
   result.air_density_kg_m3 = file.air_density_kg_m3;
   const auto& curve = file.curve;
-  // The budgets' uncertainties where the file has them, else the standard errors of the fit.
-  const auto budgets = file.uncertainty.value_or(compensation::Coefficients::Uncertainty{});
-  const auto add = [&](const std::string& of, const char* unit, double value, const std::optional<double>& budget,
-                       double error, bool judged = true) {
-    const bool known = budget && *budget > 0;
-    result.estimates.push_back({of, unit, value, known ? *budget : error, judged});
-    if (known) result.estimates.back().freedom = budgets.freedom;
+  using Uncertainty = compensation::Coefficients::Uncertainty;
+  const auto add = [&](const std::string& of, const char* unit, double value, const std::optional<Uncertainty>& known,
+                       bool judged = true) {
+    const Uncertainty one = known.value_or(Uncertainty{});
+    result.estimates.push_back({of, unit, value, one.u, judged, one.freedom});
   };
-  const auto error_of = [](const std::optional<ThrustCoefficient>& error) { return error ? error->value() : 0; };
-  add("K_T", kUnit, curve.thrust_coefficient().value(), budgets.thrust_coefficient,
-      error_of(file.thrust_coefficient_error));
-  for (std::size_t i = 0; i < file.table.size(); ++i) {
-    const auto& row = file.table[i];
-    if (row.occlusion.value() <= 0) continue;  // K_T
-    add(coefficient_name(to_degrees(row.occlusion)), kUnit, row.k.value(),
-        i < budgets.table.size() ? budgets.table[i] : std::nullopt, error_of(row.standard_error));
+  add("K_T", kUnit, curve.thrust_coefficient().value(), file.thrust_coefficient);
+  for (const auto& row : file.table)
+    if (row.occlusion.value() > 0)
+      add(coefficient_name(to_degrees(row.occlusion)), kUnit, row.k.value(), row.uncertainty);
+  for (const auto& parameter : file.parameters) {
+    const std::size_t per = parameter.key.find("_per_deg");
+    add(parameter.key.substr(0, per), per == std::string::npos ? kUnit : "N/(rad/s)^2 per degree", parameter.value,
+        parameter.uncertainty, false);
   }
-  const auto u = curve.uncertainty().value_or(compensation::LineUncertainty{});
-  constexpr double kPerDegree = kPi / 180;
-  add("intercept", kUnit, curve.line().intercept.value(), budgets.intercept, std::sqrt(u.intercept_variance), false);
-  add("slope", "N/(rad/s)^2 per degree", curve.line().slope_per_rad * kPerDegree, budgets.slope_per_deg,
-      std::sqrt(u.slope_variance) * kPerDegree, false);
   return result;
 }
 

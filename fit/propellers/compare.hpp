@@ -29,8 +29,8 @@ struct ComparedResult {
 };
 
 /// A coefficients.yaml, a campaign folder with one, or a folder or steps.csv without occlusions (K_T alone). Standard
-/// uncertainties are those of the file's `uncertainty` block (scatter from run to run, errors of the stand), without it
-/// the standard errors of the fit. Throws ConfigurationError, compensation::CoefficientError or FitError.
+/// uncertainties are those of the file, by the GUM; of a table of steps the standard error of the fit. Throws
+/// ConfigurationError, compensation::CoefficientError or FitError.
 [[nodiscard]] ComparedResult load_result(const std::string& path);
 
 struct Difference {

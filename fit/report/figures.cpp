@@ -61,12 +61,21 @@ double share_bottom(const std::vector<ThrustShares>& shares) {
   return 10 * std::floor(bottom / 10);
 }
 
-std::string curve_rows(const compensation::ThrustCurve& curve, double from_deg, double to_deg) {
+/// The line with its 95 % interval, by the whole budget.
+std::string curve_rows(const Fitted& fitted, double from_deg, double to_deg) {
   constexpr int kPieces = 60;
+  const compensation::ThrustCurve curve = fitted.identification.curve();
+  const Analysis& analysis = fitted.analysis;
   std::string rows;
   for (int i = 0; i <= kPieces; ++i) {
     const double phi = from_deg + (to_deg - from_deg) * i / kPieces;
-    const double k = curve.at(from_degrees(phi)).value(), band = 2 * curve.standard_error_at(from_degrees(phi));
+    const double k = curve.at(from_degrees(phi)).value();
+    const std::vector<double> basis = fitted.identification.curve_fit.basis_at(phi);
+    double variance = 0;
+    for (std::size_t a = 0; a < basis.size(); ++a)
+      for (std::size_t b = 0; b < basis.size(); ++b)
+        variance += basis[a] * basis[b] * analysis.covariance[a + 1][b + 1];
+    const double band = analysis.parameters.back().coverage() * std::sqrt(std::max(variance, 0.0));
     rows += fmt::format("{:.6g} {:.8g} {:.8g} {:.8g}\n", phi, k * 1e6, (k - band) * 1e6, (k + band) * 1e6);
   }
   return rows;
@@ -95,17 +104,17 @@ std::string share_axes(const Identification& identification, const std::vector<T
       top / 100 * K_T * 1e6, tics, width);
 }
 
-Figure share_figure(const Identification& identification, const std::vector<ThrustShares>& shares) {
-  const compensation::ThrustCurve curve = identification.curve();
+Figure share_figure(const Fitted& fitted, const std::vector<ThrustShares>& shares) {
+  const Identification& identification = fitted.identification;
   const bool at = identification.at_speed_rad_s > 0;
   Figure figure{
       "thrust_share",
       fmt::format("Thrust in percent of the thrust without occlusion (boxes, left axis{}) and the coefficient "
-                  "k(φ) over all speeds (right axis, bars and band: two standard errors). The line is solid "
+                  "k(φ) over all speeds (right axis, bars and band: 95 %). The line is solid "
                   "between the measured occlusions and dashed below them.",
                   at ? fmt::format(", at {:.0f} RPM", rpm(identification.at_speed_rad_s)) : ""),
       {},
-      "kind,phi_deg,value,standard_error\n"};
+      "kind,phi_deg,value,expanded_95\n"};
   Curves curves{
       "$line using 1:3:4 axes x1y2 with filledcurves fs transparent solid 0.2 noborder lc rgb '#D55E00' notitle"};
   std::string data, coefficients;
@@ -120,13 +129,15 @@ Figure share_figure(const Identification& identification, const std::vector<Thru
     curves.push_back(fmt::format("$share{} using ({}):1 with boxplot lc rgb '#3b6ea5' fillcolor rgb '#a9c6e6' {}", i,
                                  cell(shares[i].phi_deg), curves.size() == 1 ? "title 'thrust'" : "notitle"));
   }
-  for (const auto& row : identification.table) {
-    figure.csv += csv_row(std::string("k_n_s2_per_rad2"), row.phi_deg, row.k, row.standard_error);
-    coefficients += fmt::format("{:.6g} {:.8g} {:.8g}\n", row.phi_deg, row.k * 1e6, 2 * row.standard_error * 1e6);
+  for (std::size_t i = 0; i < identification.table.size(); ++i) {
+    const double phi = identification.table[i].phi_deg, k = identification.table[i].k,
+                 expanded = fitted.analysis.coefficients[i].expanded();
+    figure.csv += csv_row(std::string("k_n_s2_per_rad2"), phi, k, expanded);
+    coefficients += fmt::format("{:.6g} {:.8g} {:.8g}\n", phi, k * 1e6, expanded * 1e6);
   }
   const double first = identification.first_fitted_deg(), last = identification.table.back().phi_deg;
-  data += data_block("line", curve_rows(curve, first, std::max(last, first + 1e-3))) +
-          data_block("before", curve_rows(curve, 0, first)) + data_block("k", coefficients);
+  data += data_block("line", curve_rows(fitted, first, std::max(last, first + 1e-3))) +
+          data_block("before", curve_rows(fitted, 0, first)) + data_block("k", coefficients);
   curves.insert(
       curves.end(),
       {"$before using 1:2 axes x1y2 with lines dt 2 lw 1.5 lc rgb '#D55E00' notitle",
@@ -346,12 +357,11 @@ std::vector<ThrustShares> shares_of_steps(const Identification& identification) 
 }
 
 Figure family_figure(std::span<const Fitted> family) {
-  Figure figure{
-      "family",
-      "Left: k(φ) of every propeller with its line and two standard errors. Right: the same as a share of its "
-      "own K_T; propellers whose lines coincide there lose the same share of thrust.",
-      {},
-      "propeller,phi_deg,k_n_s2_per_rad2,standard_error,share_of_K_T\n"};
+  Figure figure{"family",
+                "Left: k(φ) of every propeller with its line and 95 % intervals. Right: the same as a share of its "
+                "own K_T; propellers whose lines coincide there lose the same share of thrust.",
+                {},
+                "propeller,phi_deg,k_n_s2_per_rad2,expanded_95,share_of_K_T\n"};
   std::string data;
   Curves absolute, relative;
   for (std::size_t i = 0; i < family.size(); ++i) {
@@ -359,11 +369,12 @@ Figure family_figure(std::span<const Fitted> family) {
     const double K_T = one.thrust_coefficient().value;
     const compensation::ThrustCurve curve = one.curve();
     std::string points, fitted;
-    for (const OcclusionCoefficient& row : one.table) {
-      const double share = row.k / K_T;
-      points += fmt::format("{:.6g} {:.8g} {:.8g} {:.8g} {:.8g}\n", row.phi_deg, row.k * 1e6, 2e6 * row.standard_error,
-                            share, 2 * row.standard_error / K_T);
-      figure.csv += csv_row(one.propeller, row.phi_deg, row.k, row.standard_error, share);
+    for (std::size_t j = 0; j < one.table.size(); ++j) {
+      const OcclusionCoefficient& row = one.table[j];
+      const double share = row.k / K_T, expanded = family[i].analysis.coefficients[j].expanded();
+      points += fmt::format("{:.6g} {:.8g} {:.8g} {:.8g} {:.8g}\n", row.phi_deg, row.k * 1e6, 1e6 * expanded, share,
+                            expanded / K_T);
+      figure.csv += csv_row(one.propeller, row.phi_deg, row.k, expanded, share);
       const ThrustCoefficient flown = curve.at(from_degrees(row.phi_deg));
       if (row.phi_deg >= one.first_fitted_deg())
         fitted += fmt::format("{:.6g} {:.8g} {:.8g}\n", row.phi_deg, flown.value() * 1e6, flown.value() / K_T);
@@ -387,9 +398,10 @@ Figure family_figure(std::span<const Fitted> family) {
   return figure;
 }
 
-Figures draw_figures(const Identification& identification, const std::vector<ThrustShares>& shares,
-                     const std::filesystem::path& folder, const std::string& gnuplot, const Settling* settling) {
-  std::vector<Figure> wanted{share_figure(identification, shares)};
+Figures draw_figures(const Fitted& fitted, const std::vector<ThrustShares>& shares, const std::filesystem::path& folder,
+                     const std::string& gnuplot, const Settling* settling) {
+  const Identification& identification = fitted.identification;
+  std::vector<Figure> wanted{share_figure(fitted, shares)};
   if (std::ranges::all_of(identification.table, [](const auto& row) { return row.fit.has_value(); })) {
     wanted.push_back(thrust_figure(identification));
     wanted.push_back(speed_figure(identification));

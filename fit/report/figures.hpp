@@ -41,7 +41,7 @@ struct Settling {
 /// the second axis, scaled so that K_T is at 100 %, the coefficients and the line), thrust with residuals, k against
 /// speed, repetitions, power, settling. `settling` may be null. Throws RecordError when the folder cannot be written;
 /// a missing gnuplot only skips the figures.
-[[nodiscard]] Figures draw_figures(const Identification& identification, const std::vector<ThrustShares>& shares,
+[[nodiscard]] Figures draw_figures(const Fitted& fitted, const std::vector<ThrustShares>& shares,
                                    const std::filesystem::path& folder, const std::string& gnuplot = "gnuplot",
                                    const Settling* settling = nullptr);
 

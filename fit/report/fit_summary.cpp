@@ -1,11 +1,13 @@
 #include "fit/report/fit_summary.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "base/number.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::fit {
@@ -15,10 +17,10 @@ using Json = nlohmann::ordered_json;
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-std::string number_line(const char* name, double value, double error, const char* per) {
+std::string number_line(const std::string& name, const Budget& budget, const std::string& per = {}) {
   const auto rpm = [](double k) { return to_newtons_per_rpm2(ThrustCoefficient(k)); };
-  return fmt::format("{:<10} {} N/(rad/s)^2{}  =  {} N/RPM^2{}\n", name, with_error(value, error), per,
-                     with_error(rpm(value), rpm(error)), per);
+  return fmt::format("{:<10} {} N/(rad/s)^2{}  =  {} N/RPM^2{}\n", name, with_error(budget.value, budget.expanded()),
+                     per, with_error(rpm(budget.value), rpm(budget.expanded())), per);
 }
 
 }  // namespace
@@ -59,10 +61,6 @@ static void to_json(Json& json, const Budget& budget) {
           {"rows", rows}};
 }
 
-static void to_json(Json& json, const OcclusionCoefficient& row) {
-  json = {{"phi_deg", row.phi_deg}, {"k", row.k}, {"standard_error", row.standard_error}};
-}
-
 static void to_json(Json& json, const SpeedCoefficient& level) {
   json = {{"speed_rpm", to_rpm(RadPerSec(level.speed_rad_s))},
           {"k", level.k},
@@ -85,14 +83,6 @@ static void to_json(Json& json, const LinePrediction& one) {
           {"speed_u_share", one.speed_u_share},
           {"clipped", one.clipped},
           {"extrapolated", one.extrapolated}};
-}
-
-static void to_json(Json& json, const BootstrapInterval& one) {
-  json = {{"quantity", one.quantity},
-          {"value", one.value},
-          {"standard_error", one.standard_error},
-          {"lower", one.lower},
-          {"upper", one.upper}};
 }
 
 static void to_json(Json& json, const TorqueCoefficient& one) {
@@ -147,9 +137,8 @@ static void to_json(Json& json, const FamilyPrediction& one) {
 void to_json(Json& json, const Analysis& analysis) {
   const Curvature& curvature = analysis.curvature;
   json = {{"coefficients", analysis.coefficients},
-          {"intercept", analysis.intercept},
-          {"slope", analysis.slope},
-          {"covariance_K_T_intercept_slope", analysis.covariance},
+          {"parameters", analysis.parameters},
+          {"covariance_K_T_parameters", analysis.covariance},
           {"standard_air", analysis.standard},
           {"speed", analysis.speed},
           {"line_lack_of_fit", curvature.lack_of_fit},
@@ -166,7 +155,6 @@ void to_json(Json& json, const Analysis& analysis) {
           {"remarks", analysis.remarks},
           {"differences", analysis.differences},
           {"predictions", analysis.predictions},
-          {"bootstrap", analysis.bootstrap},
           {"torque", analysis.torque},
           {"between_runs_share", analysis.between_runs.u},
           {"outlying_runs", analysis.outlying},
@@ -194,21 +182,31 @@ void to_json(Json& json, const FamilyFindings& findings) {
 
 Json fit_json(const Identification& identification, const Analysis& analysis,
               const std::filesystem::path& coefficients) {
-  const LineFit& line = identification.line;
-  const Estimate K_T = identification.thrust_coefficient();
-  const auto& standard = identification.table.front().standard;
+  const Budget& K_T = analysis.coefficients.front();
+  Json curve, table = Json::array();
+  for (std::size_t i = 0; i < identification.table.size(); ++i) {
+    const Budget& budget = analysis.coefficients[i];
+    table.push_back({{"phi_deg", identification.table[i].phi_deg},
+                     {"k", budget.value},
+                     {"u", budget.combined()},
+                     {"expanded_95", budget.expanded()}});
+  }
+  for (std::size_t i = 0; i < analysis.parameters.size(); ++i)
+    curve[identification.curve_fit.parameters[i].key] = {{"value", analysis.parameters[i].value},
+                                                         {"u", analysis.parameters[i].combined()},
+                                                         {"expanded_95", analysis.parameters[i].expanded()}};
   return {{"coefficients", coefficients.string()},
           {"k_unit", "N/(rad/s)^2"},
           {"K_T", K_T.value},
-          {"K_T_standard_error", K_T.u},
-          {"k_standard", standard ? standard->value : kUnknown},
+          {"K_T_u", K_T.combined()},
+          {"K_T_expanded_95", K_T.expanded()},
+          {"not_known", K_T.not_known()},
+          {"k_standard", analysis.standard.empty() ? kUnknown : analysis.standard.front().value},
           {"air_density_kg_m3", identification.air ? identification.air->value : kUnknown},
-          {"anchored", line.anchored},
-          {"intercept", line.intercept},
-          {"slope_per_deg", line.slope_per_deg},
-          {"covariance", line.covariance},
+          {"anchored", identification.curve_fit.anchored},
+          {"curve", curve},
           {"overlap", compensation::name_of(identification.options.overlap)},
-          {"table", identification.table},
+          {"table", table},
           {"steps_used", identification.selection.used.size()},
           {"steps_flagged", identification.selection.flagged.size()},
           {"estimator", name_of(identification.options.estimator)},
@@ -217,22 +215,22 @@ Json fit_json(const Identification& identification, const Analysis& analysis,
           {"analysis", analysis}};
 }
 
-std::string with_error(double value, double standard_error) {
-  if (!(standard_error > 0) || !std::isfinite(standard_error) || !(std::abs(value) > 0))
-    return fmt::format("{:.5e}", value);
-  const double digits = std::floor(std::log10(std::abs(value))) - std::floor(std::log10(standard_error)) + 1;
-  return fmt::format("{:.{}e} ± {:.1e}", value, static_cast<int>(std::clamp(digits, 1.0, 12.0)), standard_error);
+std::string plus_minus_words(const Budget& budget) {
+  const std::vector<std::string> missing = budget.not_known();
+  if (!(budget.combined() > 0)) return "no uncertainty is known";
+  if (missing.empty()) return "± is 95 % by the GUM, all sources of the budget in it";
+  return fmt::format("± is 95 % by the GUM, but {} not in it: unknown (--u)", fmt::join(missing, ", "));
 }
 
-std::string headline_text(const Identification& identification) {
-  const LineFit& line = identification.line;
-  const Estimate K_T = identification.thrust_coefficient();
-  std::string text = number_line("K_T", K_T.value, K_T.u, "") +
-                     number_line("intercept", line.intercept, std::sqrt(line.covariance[0][0]), "") +
-                     number_line("slope", line.slope_per_deg, std::sqrt(line.covariance[1][1]), " per degree");
-  if (const auto& standard = identification.table.front().standard)
-    text += number_line("k_standard", standard->value, standard->u, "");
-  return text;
+std::string headline_text(const Fitted& fitted) {
+  const auto& [identification, analysis] = fitted;
+  const Budget& K_T = analysis.coefficients.front();
+  std::string text = number_line("K_T", K_T);
+  for (std::size_t i = 0; i < analysis.parameters.size(); ++i)
+    text += number_line(analysis.parameters[i].quantity, analysis.parameters[i],
+                        identification.curve_fit.parameters[i].per);
+  if (!analysis.standard.empty()) text += number_line("k_standard", analysis.standard.front());
+  return text + plus_minus_words(analysis.standard.empty() ? K_T : analysis.standard.front()) + "\n";
 }
 
 std::string caution_text(const Identification& identification, const Analysis& analysis) {

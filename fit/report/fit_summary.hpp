@@ -14,11 +14,12 @@
 
 namespace kphi::fit {
 
-/// "1.5500e-06 ± 1.2e-09": the value to the second digit of its standard error; without one, six digits.
-[[nodiscard]] std::string with_error(double value, double standard_error);
+/// "± 95 % by the GUM, without calibration, motor clock (unknown): name them by --u": what the ± of every headline says
+/// and leaves out.
+[[nodiscard]] std::string plus_minus_words(const Budget& budget);
 
-/// K_T, intercept, slope, and K_T in standard air if the air is known; one line each.
-[[nodiscard]] std::string headline_text(const Identification& identification);
+/// K_T, the parameters of the curve, and K_T in standard air if the air is known, one line each; what their ± says.
+[[nodiscard]] std::string headline_text(const Fitted& fitted);
 
 /// Cautions, one line each: steps left out or kept with a flag, points that the robust loss rejected, repetitions that
 /// stand out, remarks on the line, air unknown.

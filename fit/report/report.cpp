@@ -11,6 +11,7 @@
 
 #include "compensation/units.hpp"
 #include "fit/model/torque_power.hpp"
+#include "fit/report/fit_summary.hpp"
 #include "fit/report/html.hpp"
 #include "fit/report/raw_samples.hpp"
 
@@ -43,6 +44,8 @@ std::string section(std::string_view title, const HtmlTable& table, std::string_
 std::string percent(double share) { return fmt::format("{:.3f}", 100 * share); }
 
 std::string whole(std::size_t n) { return fmt::format("{}", n); }
+
+constexpr double kNoError = 0;  // the number then shows six digits
 
 /// N/(rad/s)², and below it N/RPM².
 std::string both_units(double k, double error) {
@@ -233,45 +236,47 @@ std::string remark_section(std::span<const std::string> remarks) {
   return html + "</ul></div>\n";
 }
 
-std::string coefficient_section(const Identification& identification) {
+std::string coefficient_section(const Fitted& fitted) {
+  const auto& [identification, analysis] = fitted;
   const std::string at =
       identification.at_speed_rad_s > 0 ? " at " + rpm_text(identification.at_speed_rad_s) + " RPM" : "";
   const std::string units = ", N/(rad/s)²<br/><span class=\"soft\">N/RPM²</span>";
   HtmlTable table({"φ", "k" + units, "k" + at + units, "thrust share<br/>" + at, "line − k", "residual<br/>rms, mN",
                    "R²", "steps"});
-  for (const OcclusionCoefficient& row : identification.table) {
+  for (std::size_t i = 0; i < identification.table.size(); ++i) {
+    const OcclusionCoefficient& row = identification.table[i];
     const double miss = identification.curve().at(from_degrees(row.phi_deg)).value() - row.k;
-    table.row({html_angle(row.phi_deg), both_units(row.k, row.standard_error),
-               row.at_speed ? both_units(row.at_speed->k, row.at_speed->standard_error) : "–",
+    table.row({html_angle(row.phi_deg), both_units(row.k, analysis.coefficients[i].expanded()),
+               row.at_speed ? both_units(row.at_speed->k, kNoError) : "–",
                fmt::format("{:.1f} %", 100 * share_of_thrust(identification, row)),
                signed_percent(100 * miss / identification.thrust_coefficient().value),
                row.fit ? fmt::format("{:.2f}", 1e3 * row.fit->rms_n) : "–",
                row.fit ? fmt::format("{:.5f}", row.fit->r_squared) : "–", row.fit ? whole(row.fit->n) : "–"});
   }
-  return section(
-      "Coefficients", table,
-      "± is one standard error: for k from noise, zero and scatter between the runs, for k at one speed from "
-      "the repetitions. It leaves out the errors that all steps share (calibration of the load cell, air "
-      "density, mounting); the budget below includes them. Line − k is in percent of K<sub>T</sub>; the "
-      "thrust share is k over k(0) at the same speed.");
+  return section("Coefficients", table,
+                 typeset(plus_minus_words(analysis.coefficients.front())) +
+                     ". The budget below lists its sources. Line − k is in percent of K<sub>T</sub>; the thrust share "
+                     "is k over k(0) at the same speed.");
 }
 
-std::string standard_section(const Identification& identification) {
+std::string standard_section(const Fitted& fitted) {
+  const auto& [identification, analysis] = fitted;
   const char* const title = "In standard air, 1.225 kg/m³";
-  if (!identification.air) {
+  if (analysis.standard.empty()) {
     return html_heading(title) +
            "<p class=\"warning\">Air density unknown: k holds for the air of that day only, and k at standard density "
            "is not given. 10 K or 30 hPa change the density by 3 %. Add `ambient:` to the bench file.</p>\n";
   }
   HtmlTable table({"φ", "k · 1.225/ρ, N/(rad/s)²", "N/RPM²"});
-  for (const OcclusionCoefficient& row : identification.table)
-    if (const auto& standard = row.standard)
-      table.row({html_angle(row.phi_deg), with_power_of_ten(standard->value, standard->u),
-                 with_power_of_ten(per_rpm2(standard->value), per_rpm2(standard->u))});
+  for (std::size_t i = 0; i < analysis.standard.size(); ++i) {
+    const Budget& k = analysis.standard[i];
+    table.row({html_angle(identification.table[i].phi_deg), with_power_of_ten(k.value, k.expanded()),
+               with_power_of_ten(per_rpm2(k.value), per_rpm2(k.expanded()))});
+  }
   return html_heading(title) +
-         fmt::format("<p>Measured in air of {:.4f} ± {:.4f} kg/m³.</p>\n", identification.air->value,
-                     identification.air->u) +
-         table.html() + html_note("± includes the standard uncertainty of the density.");
+         fmt::format("<p>Measured in air of {:.4f} kg/m³, standard uncertainty {:.4f}.</p>\n",
+                     identification.air->value, identification.air->u) +
+         table.html() + html_note(typeset(plus_minus_words(analysis.standard.front())) + ".");
 }
 
 std::string power_section(const Identification& identification) {
@@ -330,7 +335,7 @@ std::string run_section(const Provenance& provenance, const StepSelection& selec
 
 std::string provenance_section(const Identification& identification, const Provenance& provenance) {
   const auto known = [](const std::string& words) { return words.empty() ? "unknown" : words; };
-  const LineFit& line = identification.line;
+  const CurveFit& line = identification.curve_fit;
   const auto& air = identification.air;
   std::string points;
   for (const LinePoint& point : line.points) points += (points.empty() ? "" : ", ") + html_angle(point.phi_deg);
@@ -360,16 +365,16 @@ std::string family_section(std::span<const Fitted> family) {
                    "slope, % of K<sub>T</sub> per degree"});
   for (const Fitted& fitted : family) {
     const Identification& one = fitted.identification;
-    const LineFit& line = one.line;
-    const Estimate K_T = one.thrust_coefficient();
+    const Budget& K_T = fitted.analysis.coefficients.front();
+    const Budget* slope = fitted.analysis.parameter("slope");
     const double diameter_m = 0.0254 * one.diameter_in;
     table.row({html_escaped(one.propeller), one.diameter_in > 0 ? fmt::format("{:g}", one.diameter_in) : "–",
-               one.blades > 0 ? fmt::format("{}", one.blades) : "–", with_power_of_ten(K_T.value, K_T.u),
+               one.blades > 0 ? fmt::format("{}", one.blades) : "–", with_power_of_ten(K_T.value, K_T.expanded()),
                diameter_m > 0 ? fmt::format("{:.5f}", K_T.value / std::pow(diameter_m, 4)) : "–",
-               with_power_of_ten(line.slope_per_deg, std::sqrt(line.covariance[1][1])),
-               html_number(100 * line.slope_per_deg / K_T.value, "{:+.4f}")});
+               slope != nullptr ? with_power_of_ten(slope->value, slope->expanded()) : "–",
+               slope != nullptr ? html_number(100 * slope->value / K_T.value, "{:+.4f}") : "–"});
   }
-  return section("The propellers side by side", table);
+  return section("The propellers side by side", table, "± is 95 % by the GUM; what each lacks stands in its chapter.");
 }
 
 std::string slopes_section(std::span<const SharedSlope> slopes) {
@@ -386,43 +391,45 @@ std::string slopes_section(std::span<const SharedSlope> slopes) {
 // ---- the page
 // ----------------------------------------------------------------------------------------------------------
 
-std::string card(const std::string& title, double value, double error, const std::string& per,
-                 const std::string& more) {
+std::string card(const std::string& title, const Budget& budget, const std::string& per, const std::string& more) {
+  const double value = budget.value, error = budget.expanded();
   return fmt::format(
       "<div class=\"card\"><h3>{0}</h3><div class=\"value\">{1} <span class=\"unit\">N/(rad/s)²{3}</span></div>"
       "<p>{2} N/RPM²{3}</p>{4}</div>\n",
       title, with_power_of_ten(value, error), with_power_of_ten(per_rpm2(value), per_rpm2(error)), per, more);
 }
 
-std::string headline(const LineFit& line) {
-  std::string crossings;
+std::string headline(const Fitted& fitted) {
+  const CurveFit& line = fitted.identification.curve_fit;
+  const Analysis& analysis = fitted.analysis;
+  std::string shape =
+      line.anchored ? "<p>anchored at K<sub>T</sub></p>"
+                    : fmt::format("<p>k(0) {:.2f} % {} the measured K<sub>T</sub></p>",
+                                  100 * std::abs(line.mismatch()) / line.K_T, line.mismatch() < 0 ? "below" : "above");
   if (line.clipping_deg() && !line.anchored)
-    crossings +=
+    shape +=
         fmt::format("<p>meets K<sub>T</sub> at {:.1f}°; below that angle compensation holds k<sub>i</sub> at 1</p>",
                     *line.clipping_deg());
-  if (line.zero_crossing_deg()) crossings += fmt::format("<p>reaches zero at {:.1f}°</p>", *line.zero_crossing_deg());
-  const std::string mismatch =
-      line.anchored ? "<p>anchored at K<sub>T</sub></p>"
-                    : fmt::format("<p>{:.2f} % {} the measured K<sub>T</sub></p>",
-                                  100 * std::abs(line.mismatch()) / line.K_T, line.mismatch() < 0 ? "below" : "above");
-  return "<div class=\"cards\">\n" +
-         card("Thrust coefficient K<sub>T</sub> = k(0)", line.K_T, line.K_T_standard_error, "",
-              "<p>measured without occlusion</p>") +
-         card("Line k(φ): intercept", line.intercept, std::sqrt(line.covariance[0][0]), "", mismatch) +
-         card("Line k(φ): slope", line.slope_per_deg, std::sqrt(line.covariance[1][1]), " per degree", crossings) +
-         "</div>\n";
+  if (line.zero_crossing_deg()) shape += fmt::format("<p>reaches zero at {:.1f}°</p>", *line.zero_crossing_deg());
+  const Budget& K_T = analysis.coefficients.front();
+  std::string cards = card("Thrust coefficient K<sub>T</sub> = k(0)", K_T, "", "<p>measured without occlusion</p>");
+  for (std::size_t i = 0; i < analysis.parameters.size(); ++i)
+    cards += card("Line k(φ): " + analysis.parameters[i].quantity, analysis.parameters[i], line.parameters[i].per,
+                  i + 1 == analysis.parameters.size() ? shape : "");
+  return "<div class=\"cards\">\n" + cards + "</div>\n" + html_note(typeset(plus_minus_words(K_T)) + ".");
 }
 
 /// The result in one sentence.
 std::string lead(const Identification& identification) {
   const OcclusionCoefficient& widest = identification.table.back();
   const bool at = identification.at_speed_rad_s > 0 && widest.at_speed;
-  return fmt::format(
-      "<p class=\"lead\">{} occlusion of {} leaves {:.1f} % of the thrust; each further degree costs {:.3f} % of "
-      "K<sub>T</sub>.</p>\n",
-      at ? "At " + rpm_text(identification.at_speed_rad_s) + " RPM an" : "An", html_angle(widest.phi_deg),
-      100 * share_of_thrust(identification, widest),
-      -100 * identification.line.slope_per_deg / identification.thrust_coefficient().value);
+  const CurveParameter* slope = identification.curve_fit.find("slope_per_deg");
+  return fmt::format("<p class=\"lead\">{} occlusion of {} leaves {:.1f} % of the thrust{}.</p>\n",
+                     at ? "At " + rpm_text(identification.at_speed_rad_s) + " RPM an" : "An",
+                     html_angle(widest.phi_deg), 100 * share_of_thrust(identification, widest),
+                     slope == nullptr ? ""
+                                      : fmt::format("; each further degree costs {:.3f} % of K<sub>T</sub>",
+                                                    -100 * slope->value / identification.thrust_coefficient().value));
 }
 
 /// Figures `begin` to `end`. Their numbers run through the page and keep the ids of their drawings apart.
@@ -468,8 +475,8 @@ std::string body(const Fitted& fitted, const Chapter& chapter, int& number) {
   const auto& [provenance, figures] = chapter;
   const std::string first = figure_blocks(figures, 0, 1, number);
   const std::string details = figure_blocks(figures, 1, figures.drawn.size(), number);
-  return lead(identification) + headline(identification.line) + first + skipped_note(figures) +
-         remark_section(analysis.remarks) + coefficient_section(identification) + standard_section(identification) +
+  return lead(identification) + headline(fitted) + first + skipped_note(figures) + remark_section(analysis.remarks) +
+         coefficient_section(fitted) + standard_section(fitted) +
          (details.empty() ? "" : html_heading("How well the model holds") + details) + analysis_sections(analysis) +
          power_section(identification) + step_section(identification.selection) +
          run_section(provenance, identification.selection) + provenance_section(identification, provenance);

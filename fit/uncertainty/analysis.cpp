@@ -29,14 +29,14 @@ ErrorSources sources_of(const Identification& identification, const Analysis& an
 }
 
 /// Deviation from the line beyond the errors of its points, once a test has rejected the line.
-BudgetRow line_row(const LineFit& line, const Curvature& curvature) {
+BudgetRow line_row(const CurveFit& line, const Curvature& curvature) {
   BudgetRow row{.source = "line k(phi)",
                 .unit = kUnitOfK,
                 .sensitivity = 1,
                 .note = "deviation of its points beyond their errors, where a test finds it"};
   if (!curvature.bends()) return row;
   double excess = 0;
-  const double terms = line.anchored ? 1 : 2;
+  const double terms = static_cast<double>(line.parameters.size()) - (line.anchored ? 1 : 0);
   const double n = static_cast<double>(line.points.size());
   for (std::size_t i = 0; i < line.points.size(); ++i)
     excess += line.residuals[i] * line.residuals[i] / (n - terms) - std::pow(line.points[i].standard_error, 2) / n;
@@ -45,14 +45,14 @@ BudgetRow line_row(const LineFit& line, const Curvature& curvature) {
   return row;
 }
 
-/// Of K_T, intercept and slope; the line's own row is in the last two.
-std::vector<std::vector<double>> covariance_of(const ErrorSources& sources, const LineWeights& weights,
-                                               const BudgetRow& row) {
-  const std::vector<std::vector<double>> functions{unit_vector(weights.slope.size(), 0), weights.intercept,
-                                                   weights.slope};
-  std::vector<std::vector<double>> result(3, std::vector<double>(3));
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) {
+/// Of K_T and the parameters; the line's own row is in the latter.
+std::vector<std::vector<double>> covariance_of(const ErrorSources& sources, const CurveFit& fit, const BudgetRow& row) {
+  std::vector<std::vector<double>> functions{unit_vector(fit.parameters.front().weights.size(), 0)};
+  for (const CurveParameter& parameter : fit.parameters) functions.push_back(parameter.weights);
+  const std::size_t n = functions.size();
+  std::vector<std::vector<double>> result(n, std::vector<double>(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j) {
       result[i][j] = sources.covariance(functions[i], functions[j]);
       if (i == 0 || j == 0) continue;
       for (std::size_t m = 0; m < functions[i].size(); ++m)
@@ -72,26 +72,17 @@ double norm(const std::vector<double>& weights) {
 }
 
 /// The line's own row weighs by how much of each point's deviation gets into the weights.
-Budget line_budget(const ErrorSources& sources, const char* quantity, const char* unit, double value,
-                   const std::vector<double>& weights, const BudgetRow& row) {
-  Budget budget = sources.budget(quantity, unit, value, weights);
-  budget.rows.push_back(scaled(row, norm(weights)));
+Budget budget_of(const CurveParameter& parameter, const ErrorSources& sources, const BudgetRow& row) {
+  Budget budget = sources.budget(parameter.name, kUnitOfK + parameter.per, parameter.value, parameter.weights);
+  budget.rows.push_back(scaled(row, norm(parameter.weights)));
   return budget;
 }
 
-/// k(φ) of the line as a linear function of the k of the table.
-std::vector<double> weights_at(const LineFit& line, std::span<const double> phis, double phi_deg) {
-  const LineWeights weights = line.weights(phis);
-  std::vector<double> at(phis.size());
-  for (std::size_t i = 0; i < at.size(); ++i) at[i] = weights.intercept[i] + phi_deg * weights.slope[i];
-  return at;
-}
-
-LinePrediction predict(const Identification& identification, const ErrorSources& sources, std::span<const double> phis,
-                       double phi_deg, const BudgetRow& row) {
+LinePrediction predict(const Identification& identification, const ErrorSources& sources, double phi_deg,
+                       const BudgetRow& row) {
   const double K_T = identification.thrust_coefficient().value;
   const compensation::ThrustCurve curve = identification.curve();
-  const std::vector<double> at = weights_at(identification.line, phis, phi_deg);
+  const std::vector<double> at = identification.curve_fit.weights_at(phi_deg);
   LinePrediction prediction;
   prediction.phi_deg = phi_deg;
   const double k = curve.at(from_degrees(phi_deg)).value();
@@ -106,22 +97,21 @@ LinePrediction predict(const Identification& identification, const ErrorSources&
       sources.budget(fmt::format("k_i({} deg)", phi_deg), "1", curve.scaling_factor(from_degrees(phi_deg)), ratio);
   prediction.scaling_factor.rows.push_back(scaled(row, std::sqrt(1 + std::pow(norm(at), 2)) / K_T));
   prediction.extrapolated =
-      phi_deg < identification.first_fitted_deg() || phi_deg > identification.line.points.back().phi_deg;
+      phi_deg < identification.first_fitted_deg() || phi_deg > identification.curve_fit.points.back().phi_deg;
   return prediction;
 }
 
-LineShape shape_of(const Identification& identification, const ErrorSources& sources, const LineWeights& weights,
-                   const BudgetRow& row) {
-  const LineFit& line = identification.line;
-  std::vector<double> difference_weights = weights.intercept;
+LineShape shape_of(const CurveFit& fit, const ErrorSources& sources, const BudgetRow& row) {
+  const std::vector<double> at_zero = fit.weights_at(0);
+  std::vector<double> difference_weights = at_zero;
   difference_weights.front() -= 1;
-  Budget mismatch = sources.budget("intercept - K_T", kUnitOfK, line.mismatch(), difference_weights);
-  mismatch.rows.push_back(scaled(row, line.anchored ? 0 : norm(weights.intercept)));
-  return {line.clipping_deg(), line.zero_crossing_deg(), mismatch.estimate()};
+  Budget mismatch = sources.budget("k(0) - K_T", kUnitOfK, fit.mismatch(), difference_weights);
+  mismatch.rows.push_back(scaled(row, fit.anchored ? 0 : norm(at_zero)));
+  return {fit.clipping_deg(), fit.zero_crossing_deg(), mismatch.estimate()};
 }
 
 std::vector<std::string> remarks_of(const Identification& identification, const Analysis& analysis) {
-  const LineFit& line = identification.line;
+  const CurveFit& line = identification.curve_fit;
   std::vector<std::string> remarks;
   const double largest = identification.table.back().phi_deg;
   const double share = 100 * line.mismatch() / line.K_T;
@@ -135,7 +125,7 @@ std::vector<std::string> remarks_of(const Identification& identification, const 
     remarks.push_back(fmt::format("the line's intercept is {:+.2f} % from K_T, {} its error", share,
                                   beyond_error ? "beyond" : "within"));
   }
-  if (line.slope_per_deg >= 0) {
+  if (!line.zero_crossing_deg()) {
     remarks.push_back(
         "the line does not fall with phi: either the occlusion costs no thrust or the runs were mixed up");
     return remarks;
@@ -182,15 +172,17 @@ std::vector<HypothesisTest> neighbour_tests(const std::vector<Budget>& coefficie
   return tests;
 }
 
-std::vector<Budget> standard_air(const std::vector<Budget>& coefficients, const AnalysisOptions& options) {
+std::vector<Budget> standard_air(const Identification& identification, const std::vector<Budget>& coefficients,
+                                 const std::optional<double>& u) {
   std::vector<Budget> result;
-  if (!options.air_density_kg_m3) return result;
-  const double scale = kStandardDensity / *options.air_density_kg_m3;
-  for (Budget budget : coefficients) {
+  for (std::size_t i = 0; i < coefficients.size(); ++i) {
+    const auto& air = identification.table[i].air;
+    if (!air) return {};
+    const double scale = kStandardDensity / air->value;
+    Budget budget = coefficients[i];
     budget.quantity += " in standard air";
     budget.value *= scale;
     for (BudgetRow& row : budget.rows) row.sensitivity *= scale;
-    const auto& u = options.bench.air_density;
     budget.rows.push_back({.source = "air density",
                            .evaluation = Evaluation::type_b,
                            .u = u.value_or(std::numeric_limits<double>::quiet_NaN()),
@@ -204,14 +196,19 @@ std::vector<Budget> standard_air(const std::vector<Budget>& coefficients, const 
 }
 
 std::vector<LinePoint> with_errors(const Identification& identification) {
-  std::vector<LinePoint> points = identification.line.points;
+  const CurveFit& fit = identification.curve_fit;
+  std::vector<LinePoint> points = fit.points;
   const bool zero_carries = points.front().phi_deg == 0;
-  if (identification.line.anchored && !zero_carries)
-    points.insert(points.begin(), {0, identification.line.K_T, identification.line.K_T_standard_error});
+  if (fit.anchored && !zero_carries) points.insert(points.begin(), {0, fit.K_T, fit.K_T_standard_error});
   return points;
 }
 
 }  // namespace
+
+const Budget* Analysis::parameter(const std::string& name) const {
+  const auto found = std::ranges::find(parameters, name, &Budget::quantity);
+  return found == parameters.end() ? nullptr : &*found;
+}
 
 Analysis analyse(const Identification& identification, const AnalysisOptions& options) {
   Analysis analysis;
@@ -226,22 +223,20 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
 
   const double freedom = from_steps ? identification.repeatability.freedom() : std::numeric_limits<double>::infinity();
   analysis.curvature = curvature(with_errors(identification), freedom);
-  const LineFit& line = identification.line;
-  const LineWeights weights = line.weights(phis);
-  const BudgetRow row = line_row(line, analysis.curvature);
-  analysis.intercept = line_budget(sources, "intercept", kUnitOfK, line.intercept, weights.intercept, row);
-  analysis.slope = line_budget(sources, "slope", "N/(rad/s)^2/deg", line.slope_per_deg, weights.slope, row);
-  analysis.covariance = covariance_of(sources, weights, row);
+  const CurveFit& fit = identification.curve_fit;
+  const BudgetRow row = line_row(fit, analysis.curvature);
+  for (const CurveParameter& parameter : fit.parameters)
+    analysis.parameters.push_back(budget_of(parameter, sources, row));
+  analysis.covariance = covariance_of(sources, fit, row);
   for (const double phi : options.prediction_deg)
-    analysis.predictions.push_back(predict(identification, sources, phis, phi, row));
-  analysis.standard = standard_air(analysis.coefficients, options);
+    analysis.predictions.push_back(predict(identification, sources, phi, row));
+  analysis.standard = standard_air(identification, analysis.coefficients, options.bench.air_density);
   analysis.differences = neighbour_tests(analysis.coefficients, sources, identification);
   analysis.between_runs = identification.repeatability.between;
-  analysis.shape = shape_of(identification, sources, weights, row);
+  analysis.shape = shape_of(fit, sources, row);
   analysis.outlying = outlying_runs(identification.selection.used);
   analysis.remarks = remarks_of(identification, analysis);
   analysis.rejected = rejected_points(identification);
-  analysis.bootstrap = bootstrap(identification.repeatability.angles, weights, options.bootstrap);
   std::vector<Estimate> k;
   for (const Budget& budget : analysis.coefficients) k.push_back(budget.estimate());
   if (from_steps) analysis.torque = identify_torque(identification.selection.used, phis, k);

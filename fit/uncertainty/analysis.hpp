@@ -9,7 +9,6 @@
 #include "fit/model/line_fit.hpp"
 #include "fit/model/torque_power.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
-#include "fit/uncertainty/bootstrap.hpp"
 #include "fit/uncertainty/budget.hpp"
 #include "fit/uncertainty/speed_dependence.hpp"
 
@@ -17,9 +16,6 @@ namespace kphi::fit {
 
 struct AnalysisOptions {
   BenchUncertainty bench;
-  /// Of the air during the measurement; its relative standard uncertainty is BenchUncertainty::air_density.
-  std::optional<double> air_density_kg_m3;
-  BootstrapOptions bootstrap;
   std::vector<double> prediction_deg{0, 15, 30, 45, 60, 75, 90, 120, 150, 180, 210, 240, 270};
 };
 
@@ -47,19 +43,18 @@ struct LinePrediction {
 struct LineShape {
   std::optional<double> clipping_deg;  ///< below, the line is above K_T
   std::optional<double> zero_deg;      ///< there it predicts no thrust
-  Estimate mismatch;                   ///< intercept − K_T
+  Estimate mismatch;                   ///< k(0) − K_T
 };
 
 struct Analysis {
-  std::vector<Budget> coefficients;  ///< one per row of the table: k(φ)
-  Budget intercept, slope;
+  std::vector<Budget> coefficients;             ///< one per row of the table: k(φ)
+  std::vector<Budget> parameters;               ///< of the curve, as CurveFit::parameters
   std::vector<Budget> standard;                 ///< k(φ) in standard air, one per row; empty if the air is unknown
-  std::vector<std::vector<double>> covariance;  ///< of K_T, intercept, slope, with the errors common to all k
+  std::vector<std::vector<double>> covariance;  ///< of K_T and the parameters, with the errors common to all k
   std::vector<SpeedDependence> speed;           ///< one per φ
   Curvature curvature;
   std::vector<HypothesisTest> differences;  ///< Student tests between neighbouring occlusions
   std::vector<LinePrediction> predictions;
-  std::vector<BootstrapInterval> bootstrap;
   std::vector<TorqueCoefficient> torque;
   std::vector<RejectedPoint> rejected;
   std::vector<OutlyingRun> outlying;  ///< kept; each also gives a remark
@@ -67,6 +62,9 @@ struct Analysis {
   Estimate between_runs;
   LineShape shape;
   std::vector<std::string> remarks;  ///< sentences on the line: clipping, zero, extrapolation, mismatch
+
+  /// Of the parameter with this name ("slope"); nullptr if the curve has none.
+  [[nodiscard]] const Budget* parameter(const std::string& name) const;
 };
 
 /// One fitted propeller.

@@ -100,6 +100,7 @@ void add_inadequacy(ErrorSources& sources, std::span<const SpeedDependence> spee
 double BudgetRow::contribution() const { return known() ? std::abs(sensitivity) * u : 0; }
 
 double Budget::combined() const {
+  if (std::ranges::none_of(rows, &BudgetRow::known)) return std::numeric_limits<double>::quiet_NaN();
   double squares = 0;
   for (const BudgetRow& row : rows) squares += std::pow(row.contribution(), 2);
   return std::sqrt(squares);
@@ -114,6 +115,13 @@ double Budget::freedom() const {
 double Budget::coverage(double level) const { return coverage_factor(freedom(), level); }
 
 double Budget::expanded(double level) const { return coverage(level) * combined(); }
+
+std::vector<std::string> Budget::not_known() const {
+  std::vector<std::string> names;
+  for (const BudgetRow& row : rows)
+    if (!row.known()) names.push_back(row.source);
+  return names;
+}
 
 double Budget::share(const BudgetRow& row) const {
   const double whole = combined();

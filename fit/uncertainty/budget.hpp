@@ -43,11 +43,13 @@ struct Budget {
   double value = 0;
   std::vector<BudgetRow> rows;
 
-  [[nodiscard]] double combined() const;                     ///< standard uncertainty (eq. 10; rows are independent)
+  /// Standard uncertainty (eq. 10; rows are independent) of the sources that are known; NaN if none is.
+  [[nodiscard]] double combined() const;
   [[nodiscard]] double freedom() const;                      ///< Welch-Satterthwaite (G.2b)
   [[nodiscard]] double coverage(double level = 0.95) const;  ///< Student's factor for freedom()
   [[nodiscard]] double expanded(double level = 0.95) const;  ///< half the interval
   [[nodiscard]] double share(const BudgetRow& row) const;    ///< of the variance, 0..1
+  [[nodiscard]] std::vector<std::string> not_known() const;  ///< sources that are missing in the sum
   [[nodiscard]] Estimate estimate() const { return {value, combined(), freedom()}; }
 };
 

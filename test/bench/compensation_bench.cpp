@@ -11,6 +11,7 @@
 #include "compensation/mixing.hpp"
 #include "test/bench/figures.hpp"
 #include "test/compensation/example_vehicle.hpp"
+#include "test/compensation/line_of.hpp"
 
 namespace {
 
@@ -82,7 +83,7 @@ double shared(double from, double to, double other_from, double other_to) {
     const double b1 = std::asin(held((-a - y) / r)), b2 = std::asin(held((a - y) / r));
     update.phi[i] = shared(a1, a2, b1, b2) + shared(-a2, -a1, b1, b2) + shared(a1, a2, kPi - b2, kPi - b1) +
                     shared(2 * kPi - a2, 2 * kPi - a1, kPi - b2, kPi - b1);
-    const double k = line.line().intercept.value() + line.line().slope_per_rad * update.phi[i];
+    const double k = line_of(line).intercept.value() + line_of(line).slope_per_rad * update.phi[i];
     update.factor[i] =
         update.phi[i] > 0 ? std::min(std::max(k / line.thrust_coefficient().value(), kScalingFloor), 1.0) : 1.0;
     const double fastest = frame.fastest_speed.value();

@@ -1,7 +1,6 @@
 """What a careful user would write with numpy and scipy for the same two tasks: the peer of kphi_fit_bench.
 
 fit_peer.py fit STEPS.csv       robust k per occlusion with its covariance, then the weighted line; JSON on stdout
-fit_peer.py bootstrap           milliseconds for 10,000 resamples by run, vectorised; the fastest of several
 """
 import json
 import sys
@@ -39,29 +38,4 @@ def fit(path):
                       "covariance": (covariance * unit ** 2).tolist()}))
 
 
-def bootstrap():
-    import numpy as np
-    random = np.random.default_rng(1)
-    phi = np.array([0.0, 45, 90, 180, 270])
-    xx = 1e12 * np.ones((5, 3))
-    xt = xx * (1.5e-6 - 4.4e-9 * phi)[:, None] * (1 + 0.003 * random.standard_normal((5, 3)))
-    design = np.vstack([np.ones(4), phi[1:]]).T
-    solve = np.linalg.inv(design.T @ design) @ design.T
-    best = 1e9
-    for _ in range(15):
-        begin = time.perf_counter()
-        draws = random.integers(0, 3, size=(10000, 5, 3))
-        rows = np.arange(5)[None, :, None]
-        k = xt[rows, draws].sum(axis=2) / xx[rows, draws].sum(axis=2)
-        line = k[:, 1:] @ solve.T
-        everything = np.hstack([k, line])
-        everything.std(axis=0, ddof=1)
-        np.percentile(everything, [2.5, 97.5], axis=0)
-        best = min(best, time.perf_counter() - begin)
-    print(1e3 * best)
-
-
-if sys.argv[1] == "fit":
-    fit(sys.argv[2])
-else:
-    bootstrap()
+fit(sys.argv[2])

@@ -95,7 +95,7 @@ TEST_F(Check, SaysWhatAVehicleLacksThatASimulatedFlightNeeds) {
 }
 
 TEST_F(Check, KnowsCoefficientsEvenIfBroken) {
-  const auto file = check({write("c.yaml", "format: 'kphi-coefficients/1'\nk: [\n")}).front();
+  const auto file = check({write("c.yaml", "format: 'kphi-coefficients/2'\nk: [\n")}).front();
   EXPECT_EQ(file["kind"], "coefficients");
   EXPECT_EQ(file["errors"].size(), 1u);
 }

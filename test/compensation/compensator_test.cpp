@@ -9,6 +9,7 @@
 
 #include "test/compensation/example_vehicle.hpp"
 #include "test/compensation/geometry_vectors.hpp"
+#include "test/compensation/line_of.hpp"
 
 namespace kphi::compensation {
 namespace compensator_test {
@@ -442,7 +443,7 @@ TEST(CompensatorUncertainty, TellsTheUncertaintyOfItsSpeeds) {
   const double k = kExampleCoefficient.value();
   const LineUncertainty u{0.01 * k, 0.0004 * k * k, 0, 0};
   const ThrustCurve line =
-      *ThrustCurve::from_line(rim.thrust_coefficient(), rim.line().intercept, rim.line().slope_per_rad,
+      *ThrustCurve::from_line(rim.thrust_coefficient(), line_of(rim).intercept, line_of(rim).slope_per_rad,
                               rim.largest_fitted(), OverlapMeasure::rim_arc, u);
   Compensator compensator = *Compensator::build({line, line, line, rim}, example_airframe()).compensator;
   const auto thrusts = thrusts_of(1.5, 1.5, 1.5, 1.5);

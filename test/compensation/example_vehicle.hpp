@@ -4,6 +4,7 @@
 #include <array>
 
 #include "compensation/compensator.hpp"
+#include "test/compensation/line_of.hpp"
 
 namespace kphi::compensation {
 
@@ -20,7 +21,7 @@ inline ThrustCurve example_line(double intercept, double slope_per_deg, double l
 /// Through (45°, 0.90) and (270°, 0.25); fitted on sector plates, where the measures agree, so flown by any of them.
 inline ThrustCurve paper_line(OverlapMeasure measure = OverlapMeasure::rim_arc) {
   const ThrustCurve line = example_line(1.03, -0.0028889);
-  return *ThrustCurve::from_line(line.thrust_coefficient(), line.line().intercept, line.line().slope_per_rad,
+  return *ThrustCurve::from_line(line.thrust_coefficient(), line_of(line).intercept, line_of(line).slope_per_rad,
                                  line.largest_fitted(), measure);
 }
 

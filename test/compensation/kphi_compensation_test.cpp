@@ -10,6 +10,7 @@
 
 #include "compensation/mixing.hpp"
 #include "test/compensation/example_vehicle.hpp"
+#include "test/compensation/line_of.hpp"
 
 namespace kphi::compensation {
 namespace kphi_compensation_test {
@@ -18,8 +19,8 @@ kphi_line plain_line() {
   const ThrustCurve line = paper_line();
   kphi_line plain{};
   plain.thrust_coefficient = line.thrust_coefficient().value();
-  plain.intercept = line.line().intercept.value();
-  plain.slope_per_rad = line.line().slope_per_rad;
+  plain.intercept = line_of(line).intercept.value();
+  plain.slope_per_rad = line_of(line).slope_per_rad;
   plain.largest_fitted_rad = line.largest_fitted().value();
   return plain;
 }

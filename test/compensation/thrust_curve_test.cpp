@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "test/compensation/example_vehicle.hpp"
+#include "test/compensation/line_of.hpp"
 
 namespace kphi::compensation {
 namespace thrust_curve_test {
@@ -107,14 +108,14 @@ TEST(ThrustCurve, CannotExistInvalid) {
 
 ThrustCurve line_with(const LineUncertainty& uncertainty) {
   const ThrustCurve line = paper_line();
-  return *ThrustCurve::from_line(line.thrust_coefficient(), line.line().intercept, line.line().slope_per_rad,
+  return *ThrustCurve::from_line(line.thrust_coefficient(), line_of(line).intercept, line_of(line).slope_per_rad,
                                  line.largest_fitted(), OverlapMeasure::rim_arc, uncertainty);
 }
 
 /// 1 % of K_T, 1.5 % of the intercept, 4 % of the slope, correlated as lines through distant points are.
 LineUncertainty example_uncertainty() {
   const double k = kExampleCoefficient.value();
-  const double intercept = 0.015 * k, slope = 0.04 * paper_line().line().slope_per_rad;
+  const double intercept = 0.015 * k, slope = 0.04 * line_of(paper_line()).slope_per_rad;
   return {0.01 * k, intercept * intercept, 0.8 * intercept * slope, slope * slope};
 }
 
@@ -132,8 +133,8 @@ TEST(ThrustCurve, PropagatesItsUncertaintyAsDrawingManyLinesDoes) {
       for (int i = 0; i < kDraws; ++i) {
         const double a = normal(random), b = normal(random);
         const double k_t = kExampleCoefficient.value() + u.thrust_coefficient * normal(random);
-        const double intercept = line.line().intercept.value() + std::sqrt(u.intercept_variance) * a;
-        const double slope = line.line().slope_per_rad - std::sqrt(u.slope_variance) * (0.8 * a + 0.6 * b);
+        const double intercept = line_of(line).intercept.value() + std::sqrt(u.intercept_variance) * a;
+        const double slope = line_of(line).slope_per_rad - std::sqrt(u.slope_variance) * (0.8 * a + 0.6 * b);
         const double k = intercept + slope * (phi + angle_error * normal(random));
         const double effective = law == ScalingLaw::published ? k_t - std::fabs(k_t - k) : k;
         sum += effective;
@@ -166,7 +167,7 @@ TEST(ThrustCurve, SaysInfiniteWhereNoUncertaintyCanBeGiven) {
 TEST(ThrustCurve, RefusesAnUncertaintyOrAMeasureThatCannotBe) {
   const ThrustCurve line = paper_line();
   const auto made = [&](const LineUncertainty& u, OverlapMeasure overlap = OverlapMeasure::area_share) {
-    return ThrustCurve::from_line(line.thrust_coefficient(), line.line().intercept, line.line().slope_per_rad,
+    return ThrustCurve::from_line(line.thrust_coefficient(), line_of(line).intercept, line_of(line).slope_per_rad,
                                   line.largest_fitted(), overlap, u);
   };
   ASSERT_TRUE(made(example_uncertainty()));

@@ -76,8 +76,8 @@ TEST(StandardAir, GivesTheSamePropellerTheSameCoefficientsInAnyAir) {
   ASSERT_EQ(thin.table.size(), 3u);
   for (std::size_t i = 0; i < thin.table.size(); ++i) {
     EXPECT_NEAR(dense.table[i].k / thin.table[i].k, 1.25 / 1.10, 1e-6);
-    ASSERT_TRUE(thin.table[i].standard && dense.table[i].standard);
-    EXPECT_NEAR(dense.table[i].standard->value / thin.table[i].standard->value, 1, 1e-6)
+    ASSERT_TRUE(thin.table[i].air && dense.table[i].air);
+    EXPECT_NEAR(dense.table[i].k / dense.table[i].air->value / (thin.table[i].k / thin.table[i].air->value), 1, 1e-6)
         << thin.table[i].phi_deg << "°";
   }
 }

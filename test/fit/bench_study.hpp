@@ -75,6 +75,7 @@ inline StudyCampaign study_campaign(const StudyTruth& truth, unsigned seed) {
         step.thrust_samples = 7000;
         step.torque_nm = -0.013 * held;
         step.torque_sd_nm = 1e-3;
+        step.air_density_kg_m3 = campaign.measured_density;
         step.window_begin_s = time += 2;
         step.window_end_s = time + 1;
         before = held;
@@ -90,8 +91,6 @@ inline AnalysisOptions study_options(const StudyTruth& truth, const StudyCampaig
   options.bench.cell_calibration = truth.calibration;
   options.bench.motor_clock = truth.clock;
   options.bench.air_density = truth.density;
-  options.air_density_kg_m3 = campaign.measured_density;
-  options.bootstrap.resamples = 0;
   options.prediction_deg = {135};
   return options;
 }
@@ -125,8 +124,8 @@ inline std::map<std::string, Coverage> coverage_study(const StudyTruth& truth, u
       table[analysis.coefficients[i].quantity].add(analysis.coefficients[i], k * air);
       table[analysis.standard[i].quantity].add(analysis.standard[i], k);
     }
-    table["intercept"].add(analysis.intercept, truth.line.intercept * air);
-    table["slope"].add(analysis.slope, truth.line.slope_per_deg * air);
+    table["intercept"].add(analysis.parameters[0], truth.line.intercept * air);
+    table["slope"].add(analysis.parameters[1], truth.line.slope_per_deg * air);
     table["line at 135 deg"].add(analysis.predictions.front().k, truth.k(135) * air);
     table["k_i(135 deg)"].add(analysis.predictions.front().scaling_factor, truth.k(135) / truth.k(0));
   }

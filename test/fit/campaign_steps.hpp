@@ -2,9 +2,11 @@
 #pragma once
 
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "compensation/units.hpp"
+#include "fit/uncertainty/analysis.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::fit {
@@ -43,6 +45,11 @@ struct CampaignTruth {
     }
   }
   return steps;
+}
+
+inline Fitted analysed(Identification found) {
+  Analysis analysis = analyse(found);
+  return {std::move(found), std::move(analysis)};
 }
 
 }  // namespace kphi::fit

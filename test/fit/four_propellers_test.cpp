@@ -53,7 +53,6 @@ Fitted measured(const std::string& name, int seed) {
   member.identification = identify(results::read_steps(results.steps()));
   AnalysisOptions options;
   options.bench.motor_clock = 2e-4;
-  options.bootstrap.resamples = 0;
   member.analysis = analyse(member.identification, options);
   return member;
 }

@@ -63,7 +63,7 @@ TEST(Vehicle, EachMistakeEarnsItsRefusal) {
                 {"half_side_m: 0.045", "half_side_m: 45",
                  "3:14: half_side_m: 45 is above 10 m; write a value from above 0 to 10 m"},
                 // Refuses a file of another kind with one line
-                {"kphi-vehicle/1", "kphi-coefficients/1",
+                {"kphi-vehicle/1", "kphi-coefficients/2",
                  "1:9: this is a coefficients file, expected a vehicle file; name a file that begins with "
                  "format: kphi-vehicle/1"},
                 {"kphi-vehicle/1", "kphi-vehicel/1", "1:9: format: text \"kphi-vehicel/1\" is not allowed…"}});

@@ -3,6 +3,7 @@
 
 #include "compensation/flight/study.hpp"
 #include "test/compensation/example_vehicle.hpp"
+#include "test/compensation/line_of.hpp"
 
 namespace kphi::flight {
 
@@ -54,8 +55,9 @@ inline compensation::ThrustCurve bench_line() { return compensation::example_lin
 /// The curve with all that it loses against K_T scaled: 0 believes that no occlusion costs anything.
 inline compensation::ThrustCurve scaled_loss(const compensation::ThrustCurve& curve, double factor) {
   const ThrustCoefficient k_t = curve.thrust_coefficient();
-  return *compensation::ThrustCurve::from_line(k_t, k_t + factor * (curve.line().intercept - k_t),
-                                               factor * curve.line().slope_per_rad, curve.largest_fitted());
+  return *compensation::ThrustCurve::from_line(k_t, k_t + factor * (compensation::line_of(curve).intercept - k_t),
+                                               factor * compensation::line_of(curve).slope_per_rad,
+                                               curve.largest_fitted());
 }
 
 inline Scene example_scene(std::uint64_t seed = 1) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "daq/virtual/deterministic_bench.hpp"
+#include "profiles/schema.hpp"
 #include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
@@ -36,6 +37,19 @@ class CombinedLimits : public testing::Test {
   profiles::BenchConfig config_ = test::deterministic_config(1);
   std::optional<DeviceLimits> devices_;
 };
+
+TEST(GuardedQuantities, HoldEachLimitThatTheCampaignFileAllows) {
+  const auto& limits = profiles::schema_of(profiles::FileKind::campaign)["properties"]["limits"]["properties"];
+  for (const auto& [key, schema] : limits.items()) {
+    if (schema["type"] != "number") continue;
+    EXPECT_TRUE(std::ranges::any_of(kQuantities,
+                                    [&](const GuardedQuantity& one) {
+                                      return one.campaign_key != nullptr && one.campaign_key == key &&
+                                             one.campaign_limit != nullptr;
+                                    }))
+        << key << " guards nothing: give it a row";
+  }
+}
 
 TEST_F(CombinedLimits, AreThoseOfTheCampaignWhenNobodySaysLess) {
   expect(Watched::thrust, 20, "campaign limits.thrust_max_n");

@@ -11,6 +11,7 @@
 #include "base/error.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "fit/uncertainty/analysis.hpp"
+#include "test/compensation/line_of.hpp"
 #include "test/fit/bench_study.hpp"
 #include "test/fit/campaign_steps.hpp"
 #include "test/source_dir.hpp"
@@ -34,25 +35,28 @@ Provenance provenance() {
 }
 
 TEST(Coefficients, RoundTripThroughYamlBitForBit) {
-  const Identification fit = identify(campaign_steps());
-  const YAML::Node file = YAML::Load(format_coefficients(fit, provenance()));
-  EXPECT_EQ(file["format"].as<std::string>(), "kphi-coefficients/1");
+  const auto [fit, analysis] = analysed(identify(campaign_steps()));
+  const YAML::Node file = YAML::Load(format_coefficients({fit, analysis}, provenance()));
+  EXPECT_EQ(file["format"].as<std::string>(), "kphi-coefficients/2");
   EXPECT_EQ(file["k_unit"].as<std::string>(), "N/(rad/s)^2");
   EXPECT_EQ(file["overlap"].as<std::string>(), "rim_arc");
   EXPECT_EQ(file["propeller"]["id"].as<std::string>(), "5x3");
   EXPECT_EQ(file["propeller"]["name"].as<std::string>(), provenance().propeller_name);
   EXPECT_EQ(file["propeller"]["blades"].as<int>(), 3);
-  EXPECT_EQ(file["K_T"]["value"].as<double>(), fit.line.K_T);
-  EXPECT_EQ(file["K_T"]["standard_error"].as<double>(), fit.line.K_T_standard_error);
+  EXPECT_EQ(file["K_T"]["value"].as<double>(), fit.curve_fit.K_T);
+  EXPECT_EQ(file["K_T"]["u"].as<double>(), analysis.coefficients[0].combined());
+  EXPECT_EQ(file["K_T"]["expanded_95"].as<double>(), analysis.coefficients[0].expanded());
   EXPECT_FALSE(file["line"]["anchored"].as<bool>());
-  EXPECT_EQ(file["line"]["intercept"].as<double>(), fit.line.intercept);
-  EXPECT_EQ(file["line"]["slope_per_deg"].as<double>(), fit.line.slope_per_deg);
-  for (std::size_t i = 0; i < 2; ++i)
-    for (std::size_t j = 0; j < 2; ++j)
-      EXPECT_EQ(file["line"]["covariance"][i][j].as<double>(), fit.line.covariance[i][j]);
+  EXPECT_EQ(file["line"]["intercept"]["value"].as<double>(), fit.curve_fit.value("intercept"));
+  EXPECT_EQ(file["line"]["slope_per_deg"]["value"].as<double>(), fit.curve_fit.value("slope_per_deg"));
+  EXPECT_EQ(file["line"]["slope_per_deg"]["expanded_95"].as<double>(), analysis.parameters[1].expanded());
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j)
+      EXPECT_EQ(file["uncertainty"]["covariance"][i][j].as<double>(), analysis.covariance[i][j]);
   EXPECT_EQ(file["line"]["points_deg"].as<std::vector<double>>(), (std::vector<double>{45, 90, 180, 270}));
   ASSERT_EQ(file["table"].size(), 5u);
   EXPECT_EQ(file["table"][4]["k"].as<double>(), fit.table[4].k);
+  EXPECT_EQ(file["table"][4]["expanded_95"].as<double>(), analysis.coefficients[4].expanded());
   EXPECT_EQ(file["table"][4]["k_at_speed"].as<double>(), fit.table[4].at_speed->k);
   EXPECT_EQ(file["table"][4]["repetitions"].as<int>(), 3);
   EXPECT_NEAR(file["valid"]["speed_rpm"][1].as<double>(), 19100, 1e-9);
@@ -66,11 +70,13 @@ TEST(Coefficients, AreReadByTheLibraryThatFlies) {
     IdentificationOptions options;
     options.line.anchored = anchored;
     const Identification fit = identify(campaign_steps(), options);
-    const auto file = compensation::parse_coefficients(format_coefficients(fit, provenance()), "coefficients.yaml");
+    const auto file =
+        compensation::parse_coefficients(format_coefficients(analysed(fit), provenance()), "coefficients.yaml");
     EXPECT_EQ(file.anchored, anchored);
-    EXPECT_EQ(file.curve.thrust_coefficient().value(), fit.line.K_T);
-    EXPECT_EQ(file.curve.line().intercept.value(), fit.line.intercept);
-    EXPECT_NEAR(file.curve.line().slope_per_rad * kPi / 180 / fit.line.slope_per_deg, 1, 1e-15);
+    EXPECT_EQ(file.curve.thrust_coefficient().value(), fit.curve_fit.K_T);
+    EXPECT_EQ(compensation::line_of(file.curve).intercept.value(), fit.curve_fit.value("intercept"));
+    EXPECT_NEAR(compensation::line_of(file.curve).slope_per_rad * kPi / 180 / fit.curve_fit.value("slope_per_deg"), 1,
+                1e-15);
     EXPECT_NEAR(to_degrees(file.curve.largest_fitted()), 270, 1e-9);
     ASSERT_TRUE(file.curve.uncertainty());
     EXPECT_EQ(file.table.size(), 5u);
@@ -82,28 +88,28 @@ TEST(Coefficients, AreReadByTheLibraryThatFlies) {
 TEST(Coefficients, OfABareTableAreReadToo) {
   const std::vector<LinePoint> points{{0, 1.55e-6, 0}, {45, 1.4e-6, 0}, {270, 0.4e-6, 0}};
   const Identification fit = identify_table(points, {.propeller = "5e3"});
-  const std::string text = format_coefficients(fit, {});
+  const std::string text = format_coefficients(analysed(fit), {});
   const auto file = compensation::parse_coefficients(text, "k.yaml");
   EXPECT_FALSE(file.fastest_speed) << "a range nobody gave is not invented";
   EXPECT_EQ(file.propeller.id, "5e3");
   EXPECT_EQ(file.table.size(), 3u);
-  EXPECT_FALSE(file.table[0].standard_error);
+  EXPECT_FALSE(file.table[0].uncertainty);
   EXPECT_EQ(file.curve.at(from_degrees(100)), fit.curve().at(from_degrees(100)));
 }
 
 TEST(Coefficients, AreTheSameBytesForTheSameSteps) {
-  EXPECT_EQ(format_coefficients(identify(campaign_steps()), provenance()),
-            format_coefficients(identify(campaign_steps()), provenance()));
-  EXPECT_NE(format_coefficients(identify(campaign_steps({}, 1)), provenance()),
-            format_coefficients(identify(campaign_steps({}, 2)), provenance()));
+  EXPECT_EQ(format_coefficients(analysed(identify(campaign_steps())), provenance()),
+            format_coefficients(analysed(identify(campaign_steps())), provenance()));
+  EXPECT_NE(format_coefficients(analysed(identify(campaign_steps({}, 1))), provenance()),
+            format_coefficients(analysed(identify(campaign_steps({}, 2))), provenance()));
 }
 
 TEST(Coefficients, PrintTheOtherUnitBesideThem) {
-  EXPECT_THAT(format_coefficients(identify(campaign_steps()), provenance()), HasSubstr("N/RPM^2"));
+  EXPECT_THAT(format_coefficients(analysed(identify(campaign_steps())), provenance()), HasSubstr("N/RPM^2"));
 }
 
 TEST(Coefficients, NeverHoldAnExponentOrIntegerThatReadsAsText) {
-  const std::string text = format_coefficients(identify(campaign_steps()), provenance());
+  const std::string text = format_coefficients(analysed(identify(campaign_steps())), provenance());
   EXPECT_THAT(text, Not(HasSubstr(": nan")));
   EXPECT_THAT(text, HasSubstr("points_deg: [45.0, 90.0, 180.0, 270.0]"));
 }
@@ -145,7 +151,7 @@ TEST(Coefficients, HaveExactlyTheKeysOfTheReadme) {
   all.bench.emplace().motor_clock = 1e-5;
   const Analysis analysis = analyse(fit);
   std::set<std::string> written;
-  collect_keys(YAML::Load(format_coefficients(fit, all, &analysis)), "", written);
+  collect_keys(YAML::Load(format_coefficients({fit, analysis}, all)), "", written);
   EXPECT_EQ(written, keys_in_readme());
 }
 
@@ -154,7 +160,7 @@ class RecordedFitTest : public ::testing::Test {
   RecordedFit written(const Identification& found, const std::optional<BenchUncertainty>& bench) {
     Provenance provenance;
     provenance.bench = bench;
-    write(format_coefficients(found, provenance));
+    write(format_coefficients(analysed(found), provenance));
     return read_recorded_fit(file_);
   }
   void write(const std::string& text) { std::ofstream(file_) << text; }
@@ -184,8 +190,8 @@ TEST_F(RecordedFitTest, FitsAndBudgetsTheSameAgain) {
 
   const RecordedFit record = written(found, how.bench);
   const Identification again = identify(steps, record.options);
-  EXPECT_EQ(again.line.intercept, found.line.intercept);
-  EXPECT_EQ(again.line.slope_per_deg, found.line.slope_per_deg);
+  EXPECT_EQ(again.curve_fit.value("intercept"), found.curve_fit.value("intercept"));
+  EXPECT_EQ(again.curve_fit.value("slope_per_deg"), found.curve_fit.value("slope_per_deg"));
   EXPECT_EQ(again.options.overlap, found.options.overlap);
   EXPECT_EQ(again.selection.used.size(), found.selection.used.size());
   ASSERT_EQ(again.options.left_out.size(), 1u);
@@ -207,7 +213,7 @@ TEST_F(RecordedFitTest, KeepsThePropellerThatSomebodyNamed) {
 }
 
 TEST_F(RecordedFitTest, OfAnOlderFileIsThePlainFitAndNoUncertainty) {
-  const std::string text = format_coefficients(identify(campaign_steps()), {});
+  const std::string text = format_coefficients(analysed(identify(campaign_steps())), {});
   const std::size_t begin = text.find(", k_by:"), end = text.find(", speed_range_rpm");
   ASSERT_NE(begin, std::string::npos);
   write(text.substr(0, begin) + text.substr(end));
@@ -218,7 +224,7 @@ TEST_F(RecordedFitTest, OfAnOlderFileIsThePlainFitAndNoUncertainty) {
 }
 
 TEST_F(RecordedFitTest, RefusesWordsItDoesNotKnow) {
-  std::string text = format_coefficients(identify(campaign_steps()), {});
+  std::string text = format_coefficients(analysed(identify(campaign_steps())), {});
   text.replace(text.find("loss: none"), 10, "loss: soft");
   write(text);
   EXPECT_THROW((void)read_recorded_fit(file_), ConfigurationError);

@@ -111,7 +111,8 @@ TEST_F(Mcap, WithoutMessagesIsWhole) { EXPECT_EQ(read(file_of(0))["indexed"], 0)
 TEST_F(Mcap, OfCoefficientsHoldsTheTableAndItsProvenance) {
   Provenance provenance;
   provenance.runs = {{"runs/a.h5", std::string(64, 'a'), "", std::nullopt}};
-  const auto file = compensation::parse_coefficients(format_coefficients(identify(campaign_steps()), provenance), "c");
+  const auto file =
+      compensation::parse_coefficients(format_coefficients(analysed(identify(campaign_steps())), provenance), "c");
   const auto json = read(to_mcap(file, {}).text);
   ASSERT_EQ(json["messages"].size(), 5u);
   EXPECT_EQ(json["messages"][0]["data"]["k"].get<double>(), file.curve.thrust_coefficient().value());

@@ -12,6 +12,7 @@
 #include "base/error.hpp"
 #include "fit/coefficients/coefficients.hpp"
 #include "fit/logs/import_table.hpp"
+#include "test/compensation/line_of.hpp"
 #include "test/fit/campaign_steps.hpp"
 #include "test/fit/export/outside_reader.hpp"
 #include "test/temporary_folder.hpp"
@@ -34,7 +35,8 @@ compensation::Coefficients coefficients(const std::string& name = "Tom's \"5x4\"
   provenance.tool_version = "0.1.0";
   provenance.measured_utc = "2021-05-30T00:00:00Z";
   provenance.runs = {{"runs/5x3_phi000_rep1.h5", std::string(64, 'a'), "", std::nullopt}};
-  return compensation::parse_coefficients(format_coefficients(identify(campaign_steps()), provenance), "c.yaml");
+  return compensation::parse_coefficients(format_coefficients(analysed(identify(campaign_steps())), provenance),
+                                          "c.yaml");
 }
 
 nlohmann::json yaml_as_json(const std::string& text) {
@@ -71,7 +73,7 @@ TEST_F(Yaml, OfRos2IsReadByPythonWithDoublesAndListsOfOneType) {
   const auto& parameters = all["/**"]["ros__parameters"]["kphi"];
   EXPECT_EQ(parameters["propeller"], "5x3");
   EXPECT_EQ(parameters["thrust_coefficient_n_s2_per_rad2"].get<double>(), file.curve.thrust_coefficient().value());
-  EXPECT_EQ(parameters["line_slope_n_s2_per_rad3"].get<double>(), file.curve.line().slope_per_rad);
+  EXPECT_EQ(parameters["line_slope_n_s2_per_rad3"].get<double>(), compensation::line_of(file.curve).slope_per_rad);
   ASSERT_EQ(parameters["phi_deg"].size(), 5u);
   for (const auto& [key, value] : parameters.items()) {
     if (key == "propeller" || key == "overlap") continue;
@@ -157,8 +159,8 @@ TEST(CsvExport, IsFittedAgainToTheSameCoefficients) {
   ASSERT_TRUE(is_k_table(text));
   const auto points = read_k_table(text, "K.csv");
   ASSERT_EQ(points.size(), 5u);
-  const LineFit line = fit_line(points);
-  EXPECT_NEAR(line.slope_per_deg / (file.curve.line().slope_per_rad * kPi / 180), 1, 1e-9);
+  const CurveFit line = fit_line(points);
+  EXPECT_NEAR(line.value("slope_per_deg") / (compensation::line_of(file.curve).slope_per_rad * kPi / 180), 1, 1e-9);
   EXPECT_EQ(line.K_T, file.curve.thrust_coefficient().value());
 }
 

@@ -26,8 +26,8 @@ TEST(Identification, RecoversTheTruthOfASyntheticCampaign) {
     EXPECT_EQ(row.at_speed->repetitions, 3u);
     EXPECT_NEAR(row.at_speed->k, truth.k(row.phi_deg), 2e-8);
   }
-  EXPECT_NEAR(result.line.intercept / truth.intercept, 1, 0.003);
-  EXPECT_NEAR(result.line.slope_per_deg / truth.slope_per_deg, 1, 0.005);
+  EXPECT_NEAR(result.curve_fit.value("intercept") / truth.intercept, 1, 0.003);
+  EXPECT_NEAR(result.curve_fit.value("slope_per_deg") / truth.slope_per_deg, 1, 0.005);
   EXPECT_NEAR(to_rpm(RadPerSec(result.at_speed_rad_s)), 19100, 1e-6);
   EXPECT_NEAR(to_rpm(RadPerSec(result.speed_max_rad_s)), 19100, 1e-6);
   EXPECT_GT(to_rpm(RadPerSec(result.speed_min_rad_s)), 3000);
@@ -39,9 +39,10 @@ TEST(Identification, CoversTheTruthOfTheLineAsOftenAsItClaims) {
   truth.noise_n = 0.2;  // well above the floor of 0.1 %
   int within = 0;
   for (unsigned seed = 0; seed < 100; ++seed) {
-    const Identification result = identify(campaign_steps(truth, seed));
-    const double error = std::abs(result.curve().at(from_degrees(135)).value() - truth.k(135));
-    within += error <= 2 * result.curve().standard_error_at(from_degrees(135)) ? 1 : 0;
+    AnalysisOptions options;
+    options.prediction_deg = {135};
+    const Budget k = analyse(identify(campaign_steps(truth, seed)), options).predictions[0].k;
+    within += std::abs(k.value - truth.k(135)) <= k.expanded() ? 1 : 0;
   }
   EXPECT_GE(within, 88);
 }

@@ -23,9 +23,9 @@ std::vector<LinePoint> paper_points(double standard_error = 1e-9) {
 }
 
 TEST(LineFit, FindsThePapersLineThroughTheOccludedPoints) {
-  const LineFit fit = fit_line(paper_points());
-  EXPECT_NEAR(fit.intercept / kThrustCoefficient, 1.03, 1e-12);
-  EXPECT_NEAR(fit.slope_per_deg / kThrustCoefficient, -0.65 / 225, 1e-14);
+  const CurveFit fit = fit_line(paper_points());
+  EXPECT_NEAR(fit.value("intercept") / kThrustCoefficient, 1.03, 1e-12);
+  EXPECT_NEAR(fit.value("slope_per_deg") / kThrustCoefficient, -0.65 / 225, 1e-14);
   EXPECT_EQ(fit.points.size(), 4u);
   EXPECT_NEAR(fit.mismatch() / kThrustCoefficient, 0.03, 1e-12);
   EXPECT_NEAR(*fit.clipping_deg(), 10.3846, 1e-3);
@@ -34,29 +34,29 @@ TEST(LineFit, FindsThePapersLineThroughTheOccludedPoints) {
 
 TEST(LineFit, LeavesThePointAtZeroOutUnlessAskedForIt) {
   auto points = paper_points();
-  const LineFit apart = fit_line(points);
+  const CurveFit apart = fit_line(points);
   points.front().k *= 1.1;
-  const LineFit moved = fit_line(points);
-  EXPECT_NEAR(apart.slope_per_deg / moved.slope_per_deg, 1, 1e-12);
+  const CurveFit moved = fit_line(points);
+  EXPECT_NEAR(apart.value("slope_per_deg") / moved.value("slope_per_deg"), 1, 1e-12);
   EXPECT_NE(apart.K_T, moved.K_T);
-  const LineFit with_zero = fit_line(paper_points(), {.points_deg = {0, 45, 90, 180, 270}});
+  const CurveFit with_zero = fit_line(paper_points(), {.points_deg = {0, 45, 90, 180, 270}});
   // facts: free through the four points and (0, 1): -0.002814 per degree, 1.0153
-  EXPECT_NEAR(with_zero.slope_per_deg / kThrustCoefficient, -0.002814, 2e-6);
-  EXPECT_NEAR(with_zero.intercept / kThrustCoefficient, 1.0153, 1e-4);
+  EXPECT_NEAR(with_zero.value("slope_per_deg") / kThrustCoefficient, -0.002814, 2e-6);
+  EXPECT_NEAR(with_zero.value("intercept") / kThrustCoefficient, 1.0153, 1e-4);
 }
 
 TEST(LineFit, AnchoredStartsAtTheMeasuredThrustCoefficient) {
-  const LineFit fit = fit_line(paper_points(), {.anchored = true});
-  EXPECT_EQ(fit.intercept, kThrustCoefficient);
+  const CurveFit fit = fit_line(paper_points(), {.anchored = true});
+  EXPECT_EQ(fit.value("intercept"), kThrustCoefficient);
   EXPECT_EQ(fit.mismatch(), 0);
-  EXPECT_NEAR(fit.slope_per_deg / kThrustCoefficient, -0.0027368, 1e-6);
+  EXPECT_NEAR(fit.value("slope_per_deg") / kThrustCoefficient, -0.0027368, 1e-6);
   EXPECT_NEAR(fit.curve().at(from_degrees(45)).value() / kThrustCoefficient, 0.877, 5e-4);
   EXPECT_NEAR(fit.curve().at(from_degrees(270)).value() / kThrustCoefficient, 0.261, 5e-4);
   EXPECT_NEAR(*fit.zero_crossing_deg(), 365.4, 0.1);
   EXPECT_NEAR(*fit.clipping_deg(), 0, 1e-12);
 }
 
-TEST(LineFit, CovarianceIsTheClosedFormOfAWeightedLine) {
+TEST(LineFit, IsTheClosedFormOfAWeightedLine) {
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0, 1);
   std::uniform_real_distribution<double> error(3e-9, 3e-8);
@@ -75,78 +75,40 @@ TEST(LineFit, CovarianceIsTheClosedFormOfAWeightedLine) {
       sxy += w * p.phi_deg * p.k;
     }
     const double determinant = s * sxx - sx * sx;
-    const double intercept = (sxx * sy - sx * sxy) / determinant, slope = (s * sxy - sx * sy) / determinant;
-    double chi_squared = 0;
-    for (const auto& p : points)
-      if (p.phi_deg > 0) chi_squared += std::pow((p.k - intercept - slope * p.phi_deg) / p.standard_error, 2);
-    const double enlarge = std::max(1.0, chi_squared / 2);
-    const LineFit fit = fit_line(points);
-    EXPECT_NEAR(fit.intercept / intercept, 1, 1e-11);
-    EXPECT_NEAR(fit.slope_per_deg / slope, 1, 1e-11);
-    EXPECT_NEAR(fit.covariance[0][0] / (sxx / determinant * enlarge), 1, 1e-9);
-    EXPECT_NEAR(fit.covariance[1][1] / (s / determinant * enlarge), 1, 1e-9);
-    EXPECT_NEAR(fit.covariance[0][1] / (-sx / determinant * enlarge), 1, 1e-9);
-    EXPECT_EQ(fit.covariance[0][1], fit.covariance[1][0]);
+    const CurveFit fit = fit_line(points);
+    EXPECT_NEAR(fit.value("intercept") / ((sxx * sy - sx * sxy) / determinant), 1, 1e-11);
+    EXPECT_NEAR(fit.value("slope_per_deg") / ((s * sxy - sx * sy) / determinant), 1, 1e-11);
   }
-}
-
-TEST(LineFit, AnchoredCovarianceIsWhatRepeatedMeasurementShows) {
-  std::mt19937 random(11);
-  std::normal_distribution<double> noise(0, 1);
-  constexpr double kError = 2e-8;
-  double slope_sum = 0, slope_squares = 0, claimed = 0;
-  constexpr int kTrials = 2000;
-  for (int trial = 0; trial < kTrials; ++trial) {
-    std::vector<LinePoint> points;
-    for (const double phi : {0.0, 45.0, 90.0, 180.0, 270.0})
-      points.push_back({phi, 1.5e-6 - 4e-9 * phi + kError * noise(random), kError});
-    const LineFit fit = fit_line(points, {.anchored = true});
-    slope_sum += fit.slope_per_deg;
-    slope_squares += fit.slope_per_deg * fit.slope_per_deg;
-    claimed = std::max(claimed, 0.0) + fit.covariance[1][1] / kTrials;
-    EXPECT_LT(fit.covariance[0][1], 0) << "with a higher K_T the line falls faster";
-  }
-  const double scatter = slope_squares / kTrials - std::pow(slope_sum / kTrials, 2);
-  EXPECT_NEAR(claimed / scatter, 1, 0.35) << "enlarging never shrinks: the claim lies a little above the scatter";
-  EXPECT_GE(claimed / scatter, 0.95);
 }
 
 TEST(LineFit, FloorsTheErrorsSoThatOneRunCannotRuleTheLine) {
   auto points = paper_points(1e-8);
   points[1].standard_error = 1e-20;
   points[1].k *= 1.02;
-  const LineFit fit = fit_line(points);
+  const CurveFit fit = fit_line(points);
   EXPECT_GT(std::abs(fit.residuals[0]), 1e-4 * points[1].k);
-  EXPECT_TRUE(std::isfinite(fit.covariance[0][0]));
 }
 
 TEST(LineFit, TakesTheFloorWhereAnErrorIsNotKnown) {
   auto points = paper_points(0);
   points[2].standard_error = std::numeric_limits<double>::quiet_NaN();
-  const LineFit fit = fit_line(points);
-  EXPECT_NEAR(fit.intercept / kThrustCoefficient, 1.03, 1e-12);
-  EXPECT_GT(fit.covariance[0][0], 0);
+  const CurveFit fit = fit_line(points);
+  EXPECT_NEAR(fit.value("intercept") / kThrustCoefficient, 1.03, 1e-12);
   EXPECT_NEAR(fit.K_T_standard_error / (1e-3 * kThrustCoefficient), 1, 1e-12);
 }
 
 TEST(LineFit, UsesTheChosenPointsInAnyOrder) {
   auto points = paper_points();
   points[1].k *= 2;
-  const LineFit fit = fit_line(points, {.points_deg = {270, 90, 180}});
-  EXPECT_NEAR(fit.intercept / kThrustCoefficient, 1.03, 1e-12);
+  const CurveFit fit = fit_line(points, {.points_deg = {270, 90, 180}});
+  EXPECT_NEAR(fit.value("intercept") / kThrustCoefficient, 1.03, 1e-12);
   ASSERT_EQ(fit.points.size(), 3u);
   EXPECT_EQ(fit.points.front().phi_deg, 90);
 }
 
-TEST(LineFit, StandardErrorOnTheLineIsSmallestAmongItsPoints) {
-  const LineFit fit = fit_line(paper_points(1e-8));
-  EXPECT_LT(fit.curve().standard_error_at(from_degrees(146)), fit.curve().standard_error_at(from_degrees(0)));
-  EXPECT_LT(fit.curve().standard_error_at(from_degrees(146)), fit.curve().standard_error_at(from_degrees(350)));
-}
-
 TEST(LineFit, HasNoCrossingsUnlessItFalls) {
   std::vector<LinePoint> rising{{0, 1e-6, 0}, {90, 1.1e-6, 0}, {180, 1.2e-6, 0}};
-  const LineFit fit = fit_line(rising);
+  const CurveFit fit = fit_line(rising);
   EXPECT_FALSE(fit.clipping_deg());
   EXPECT_FALSE(fit.zero_crossing_deg());
 }

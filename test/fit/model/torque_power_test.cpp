@@ -54,9 +54,9 @@ TEST(Power, IsTheMeanOfTheRepetitionsOfAStep) {
 
 TEST(Power, StandsInTheReportOnlyWhereSomebodyMeasuredIt) {
   auto steps = campaign_steps();
-  EXPECT_EQ(format_report({identify(steps), {}}, {}).find("g/W"), std::string::npos);
+  EXPECT_EQ(format_report(analysed(identify(steps)), {}).find("g/W"), std::string::npos);
   for (auto& one : steps) one.supply_w = 100 * one.thrust_n / 9.80665e-3 / 500;
-  const std::string report = format_report({identify(steps), {}}, {});
+  const std::string report = format_report(analysed(identify(steps)), {});
   EXPECT_NE(report.find("<th>g/W</th><th>N/W</th>"), std::string::npos);
   EXPECT_NE(report.find("<td>5.000</td><td>0.04903</td><td class=\"text\">supply</td>"), std::string::npos);
 }

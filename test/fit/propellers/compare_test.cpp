@@ -33,7 +33,7 @@ ComparedResult result(std::initializer_list<ComparedValue> values) {
 std::string campaign(const TemporaryFolder& folder, const char* name, const CampaignTruth& truth, unsigned seed) {
   const auto path = folder.path() / name;
   std::filesystem::create_directories(path);
-  std::ofstream(path / "coefficients.yaml") << format_coefficients(identify(campaign_steps(truth, seed)), {});
+  std::ofstream(path / "coefficients.yaml") << format_coefficients(analysed(identify(campaign_steps(truth, seed))), {});
   return path.string();
 }
 

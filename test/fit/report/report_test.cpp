@@ -14,6 +14,7 @@
 #include <set>
 #include <string>
 
+#include "base/number.hpp"
 #include "fit/report/figures.hpp"
 #include "fit/report/fit_summary.hpp"
 #include "fit/report/gnuplot.hpp"
@@ -57,7 +58,7 @@ std::vector<results::StepMean> steps_with_flags() {
 }
 
 std::string page(const Figures& figures = {}) {
-  return format_report({identify(steps_with_flags()), {}}, {provenance(), figures});
+  return format_report(analysed(identify(steps_with_flags())), {provenance(), figures});
 }
 
 /// Every attribute that makes a browser load something.
@@ -161,7 +162,7 @@ TEST(Report, ListsEveryFlagEventAndRejectionWithItsRun) {
   Provenance told = provenance();
   told.runs[0].events = {"3.20 s: restarted, the stream <began> anew"};
   told.rejected = {{"5x3_phi090_rep2.h5", "2021-05-30T00:10:00Z", "speed error & more"}};
-  const std::string html = format_report({identify(steps_with_flags()), {}}, {told, {}});
+  const std::string html = format_report(analysed(identify(steps_with_flags())), {told, {}});
   EXPECT_THAT(html, HasSubstr("3.20 s: restarted, the stream &lt;began&gt; anew"));
   EXPECT_THAT(html, HasSubstr("not accepted"));
   EXPECT_THAT(html, HasSubstr("2021-05-30T00:10:00Z: speed error &amp; more"));
@@ -180,7 +181,7 @@ TEST(Report, OfSeveralCampaignsIsOnePage) {
   std::vector<Chapter> chapters;
   for (auto& [identification, analysis] : family) {
     analysis = analyse(identification);
-    chapters.push_back({provenance(), draw_figures(identification, shares_of_steps(identification),
+    chapters.push_back({provenance(), draw_figures({identification, analysis}, shares_of_steps(identification),
                                                    folder.path() / identification.propeller)});
   }
   const std::string html = format_reports(family, chapters, draw({family_figure(family)}, folder.path()));
@@ -199,7 +200,8 @@ TEST(Report, OfSeveralCampaignsIsOnePage) {
 TEST(Report, SaysWhyFiguresAreMissingAndHowToGetThem) {
   const TemporaryFolder folder;
   const Identification fit = identify(campaign_steps());
-  const Figures figures = draw_figures(fit, shares_of_steps(fit), folder.path() / "figures", "no-such-gnuplot");
+  const Figures figures =
+      draw_figures(analysed(fit), shares_of_steps(fit), folder.path() / "figures", "no-such-gnuplot");
   EXPECT_TRUE(figures.drawn.empty());
   EXPECT_THAT(figures.skipped, HasSubstr("apt install gnuplot-nox"));
   EXPECT_THAT(page(figures), HasSubstr("Figures skipped: gnuplot is not installed"));
@@ -219,7 +221,7 @@ TEST(Figures, AreDrawnAsSvgWithScriptAndDataBesideThem) {
   if (!gnuplot_is_installed()) GTEST_SKIP() << "gnuplot is not installed";
   const TemporaryFolder folder;
   const Identification fit = identify(campaign_steps());
-  const Figures figures = draw_figures(fit, shares_of_steps(fit), folder.path());
+  const Figures figures = draw_figures(analysed(fit), shares_of_steps(fit), folder.path());
   EXPECT_EQ(figures.skipped, "");
   ASSERT_EQ(figures.drawn.size(), 4u);
   for (const DrawnFigure& figure : figures.drawn) {
@@ -240,8 +242,8 @@ TEST(Figures, AreTheSameBytesForTheSameSteps) {
   if (!gnuplot_is_installed()) GTEST_SKIP() << "gnuplot is not installed";
   const TemporaryFolder one, two;
   const Identification fit = identify(campaign_steps());
-  const Figures first = draw_figures(fit, shares_of_steps(fit), one.path());
-  const Figures second = draw_figures(fit, shares_of_steps(fit), two.path());
+  const Figures first = draw_figures(analysed(fit), shares_of_steps(fit), one.path());
+  const Figures second = draw_figures(analysed(fit), shares_of_steps(fit), two.path());
   ASSERT_EQ(first.drawn.size(), second.drawn.size());
   for (std::size_t i = 0; i < first.drawn.size(); ++i)
     EXPECT_EQ(results::read_text(first.drawn[i].svg), results::read_text(second.drawn[i].svg));
@@ -252,7 +254,7 @@ TEST(Figures, OfABareTableShowTheLineOnly) {
   if (!gnuplot_is_installed()) GTEST_SKIP() << "gnuplot is not installed";
   const TemporaryFolder folder;
   const std::vector<LinePoint> points{{0, 1.55e-6, 0}, {45, 1.4e-6, 1e-8}, {270, 0.4e-6, 1e-8}};
-  const Figures figures = draw_figures(identify_table(points, {}), {}, folder.path());
+  const Figures figures = draw_figures(analysed(identify_table(points, {})), {}, folder.path());
   EXPECT_EQ(figures.skipped, "");
   EXPECT_EQ(figures.drawn.size(), 1u);
 }
@@ -297,9 +299,10 @@ TEST(AnalysisSections, ShowEveryRowOfTheBudgetAndWhatNobodyKnows) {
 TEST(AnalysisSections, TellHowSureStandardAirIsWhereTheAirIsKnown) {
   AnalysisOptions options;
   EXPECT_THAT(analysis_sections(analyse(identify(campaign_steps()), options)), Not(HasSubstr("in standard air, 95 %")));
-  options.air_density_kg_m3 = 1.18;
   options.bench.air_density = 0.002;
-  const std::string html = analysis_sections(analyse(identify(campaign_steps()), options));
+  auto steps = campaign_steps();
+  for (auto& step : steps) step.air_density_kg_m3 = 1.18;
+  const std::string html = analysis_sections(analyse(identify(steps), options));
   ASSERT_TRUE(well_formed(html));
   EXPECT_THAT(html, HasSubstr("in standard air, 95 %"));
 }

@@ -61,8 +61,8 @@ TEST(Analysis, CovarianceBelongsToTheBudgets) {
   Study study;
   const Analysis analysis = analyse(study.found, study.options);
   EXPECT_NEAR(std::sqrt(analysis.covariance[0][0]) / analysis.coefficients[0].combined(), 1, 1e-12);
-  EXPECT_NEAR(std::sqrt(analysis.covariance[1][1]) / analysis.intercept.combined(), 1, 1e-9);
-  EXPECT_NEAR(std::sqrt(analysis.covariance[2][2]) / analysis.slope.combined(), 1, 1e-9);
+  EXPECT_NEAR(std::sqrt(analysis.covariance[1][1]) / analysis.parameters[0].combined(), 1, 1e-9);
+  EXPECT_NEAR(std::sqrt(analysis.covariance[2][2]) / analysis.parameters[1].combined(), 1, 1e-9);
   EXPECT_LT(analysis.covariance[1][2], 0);
 }
 
@@ -73,14 +73,15 @@ TEST(Analysis, LineWeightsAreTheLine) {
     const Identification found = identify(study_campaign({}, 6).steps, options);
     std::vector<double> phis;
     for (const auto& row : found.table) phis.push_back(row.phi_deg);
-    const LineWeights weights = found.line.weights(phis);
-    double intercept = 0, slope = 0;
-    for (std::size_t i = 0; i < phis.size(); ++i) {
-      intercept += weights.intercept[i] * found.table[i].k;
-      slope += weights.slope[i] * found.table[i].k;
-    }
-    EXPECT_NEAR(intercept / found.line.intercept, 1, 1e-12);
-    EXPECT_NEAR(slope / found.line.slope_per_deg, 1, 1e-11);
+    const auto sum_of = [&](const std::vector<double>& weights) {
+      double sum = 0;
+      for (std::size_t i = 0; i < phis.size(); ++i) sum += weights[i] * found.table[i].k;
+      return sum;
+    };
+    for (const CurveParameter& parameter : found.curve_fit.parameters)
+      EXPECT_NEAR(sum_of(parameter.weights) / parameter.value, 1, 1e-11) << parameter.key;
+    for (const double phi : {0.0, 30.0, 200.0})
+      EXPECT_NEAR(sum_of(found.curve_fit.weights_at(phi)) / found.curve_fit.k_at(phi), 1, 1e-11) << phi;
   }
 }
 
@@ -92,7 +93,7 @@ TEST(Analysis, StandardAirAddsTheDensity) {
   EXPECT_NEAR(row_of(analysis.standard[0], "cell calibration").contribution(), 2e-3 * analysis.standard[0].value,
               1e-17);
   EXPECT_NEAR(row_of(analysis.standard[0], "air density").contribution(), 3e-3 * analysis.standard[0].value, 1e-17);
-  study.options.air_density_kg_m3.reset();
+  study.found.table[1].air.reset();
   EXPECT_TRUE(analyse(study.found, study.options).standard.empty()) << "never 1.225 in silence";
 }
 
@@ -134,10 +135,9 @@ TEST(Analysis, OfATableUsesItsOwnErrors) {
   const std::vector<LinePoint> points{{0, 1.5e-6, 1e-8}, {90, 1.2e-6, 1e-8}, {180, 0.8e-6, 2e-8}, {270, 0.4e-6, 1e-8}};
   const Analysis analysis = analyse(identify_table(points, {.speed_range = {300, 2000}}));
   EXPECT_NEAR(analysis.coefficients[2].combined(), 2e-8, 1e-20);
-  EXPECT_NEAR(analysis.shape.mismatch.u, std::hypot(analysis.intercept.combined(), 1e-8), 1e-18);
+  EXPECT_NEAR(analysis.shape.mismatch.u, std::hypot(analysis.parameters[0].combined(), 1e-8), 1e-18);
   EXPECT_TRUE(analysis.speed.empty());
   EXPECT_TRUE(analysis.torque.empty());
-  EXPECT_TRUE(analysis.bootstrap.empty());
   EXPECT_TRUE(analysis.curvature.lack_of_fit.tested());
 }
 
@@ -211,9 +211,9 @@ TEST(Analysis, IsWrittenWithoutWhatJsonCannotHold) {
   EXPECT_EQ(text.find("nan"), std::string::npos);
   EXPECT_EQ(text.find("inf"), std::string::npos);
   EXPECT_THAT(text, HasSubstr("\"source\":\"zero drift\""));
-  const std::string yaml = format_coefficients(study.found, {}, &analysis);
+  const std::string yaml = format_coefficients({study.found, analysis}, {});
   EXPECT_THAT(yaml, HasSubstr("not_known: [cross-axis, alignment]"));
-  EXPECT_EQ(yaml, format_coefficients(study.found, {}, &analysis));
+  EXPECT_EQ(yaml, format_coefficients({study.found, analysis}, {}));
 }
 
 }  // namespace analysis_test
