@@ -111,12 +111,15 @@ std::string summary_of(const Vehicle& vehicle) {
 }
 
 /// What the curve's uncertainty does to the speed of a rotor, at the ends of the valid range.
-std::string uncertainty_of(const compensation::ThrustCurve& curve) {
+std::string uncertainty_of(const compensation::Coefficients& file) {
+  const compensation::ThrustCurve& curve = file.curve;
   if (!curve.has_uncertainty())
     return "  speeds     uncertainty unknown: the file has no `uncertainty.covariance`\n";
   const auto percent = [&](Radians phi) { return 50 * curve.relative_uncertainty(phi, Radians(0)); };
-  return fmt::format("  speeds     known to {:.2g} % without occlusion, {:.2g} % at {:g}°\n", percent(Radians(0)),
-                     percent(curve.largest_fitted()), to_degrees(curve.largest_fitted()));
+  const std::string missing = fmt::format("{}", fmt::join(file.not_known, ", "));
+  return fmt::format("  speeds     known to {:.2g} % without occlusion, {:.2g} % at {:g}°, standard{}\n",
+                     percent(Radians(0)), percent(curve.largest_fitted()), to_degrees(curve.largest_fitted()),
+                     missing.empty() ? "" : "; unknown and not in it: " + missing);
 }
 
 std::string summary_of(const compensation::Coefficients& c) {
@@ -129,7 +132,7 @@ std::string summary_of(const compensation::Coefficients& c) {
       c.propeller.id, c.propeller.name, c.curve.thrust_coefficient().value(),
       to_newtons_per_rpm2(c.curve.thrust_coefficient()), words_of(c.curve), c.anchored ? ", anchored at K_T" : "",
       to_degrees(c.smallest_occlusion), to_degrees(c.curve.largest_fitted()), name_of(c.curve.overlap()),
-      uncertainty_of(c.curve));
+      uncertainty_of(c));
 }
 
 std::string summary_of(const sim::FaultFile& file) {

@@ -62,6 +62,7 @@ struct FitRequest {
   std::vector<std::string> family;
   bool raw = false;
   bool no_report = false;
+  bool accept = false;
   bool json = false;
 };
 
@@ -190,7 +191,9 @@ ExitCode run_fit(const FitRequest& request) {
   print_findings(request, input, fitted, file);
   fmt::print(stderr, "{}coefficients  {}\n", caution_text(identification, fitted.analysis), file.string());
   if (!request.no_report) write_report(fitted, input, folder / "report.html");
-  return ExitCode::ok;
+  const bool refused = fitted.analysis.flight.readiness() == Readiness::not_yet && !request.accept;
+  if (refused) fmt::print(stderr, "kphi fit: do not fly yet (see above); --accept takes the result all the same\n");
+  return refused ? ExitCode::data_rejected : ExitCode::ok;
 }
 
 /// An option that takes the name of one of `values`; `into` must outlive the command.
@@ -282,6 +285,7 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
   command.add_option("--diameter-in", request.options.diameter_in, "diameter in inches (default: from the steps)");
   command.add_option("--blades", request.options.blades, "number of blades (default: from the steps)");
   command.add_flag("--no-report", request.no_report, "write coefficients only");
+  command.add_flag("--accept", request.accept, "exit with 0 also if the verdict is: do not fly yet");
   command.add_flag("--json", request.json, "print the result as JSON");
   command.footer("kphi fit results/<folder>\nkphi fit K.csv --anchored --points 45,90 --out k.yaml");
 }

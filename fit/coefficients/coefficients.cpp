@@ -170,6 +170,9 @@ std::string analysis_blocks(const Analysis& analysis) {
       fmt::format("  covariance: {}  # of K_T and the keys of the line, in their order\n", matrix(analysis.covariance));
   text += fmt::format("  not_known: [{}]  # sources missing in the sums\n",
                       fmt::join(analysis.coefficients.front().not_known(), ", "));
+  std::vector<std::string> doubts;
+  for (const Doubt& doubt : analysis.flight.doubts) doubts.push_back(quoted(doubt.text));
+  text += fmt::format("  verdict: {}\n  doubts: [{}]\n", name_of(analysis.flight.readiness()), fmt::join(doubts, ", "));
   text += fmt::format("  line: {{clipping_deg: {}, zero_deg: {}, k0_minus_K_T: {}, u: {}}}\n",
                       number_or_none(analysis.shape.clipping_deg), number_or_none(analysis.shape.zero_deg),
                       number(analysis.shape.mismatch.value), number(analysis.shape.mismatch.u));

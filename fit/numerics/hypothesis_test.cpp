@@ -1,5 +1,6 @@
 #include "fit/numerics/hypothesis_test.hpp"
 
+#include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
@@ -18,6 +19,16 @@ constexpr double kManyDegrees = 1e6;  // as good as endless, and computable
 
 double coverage_factor(double freedom, double level) {
   return freedom > 0 ? results::student(freedom, level) : std::numeric_limits<double>::infinity();
+}
+
+double holm_level(std::vector<double> p, double level) {
+  std::erase_if(p, [](double one) { return std::isnan(one); });
+  std::ranges::sort(p);
+  const auto m = static_cast<double>(p.size());
+  double threshold = level / std::max(m, 1.0);
+  for (std::size_t i = 0; i < p.size() && p[i] < threshold; ++i)
+    threshold = level / std::max(m - static_cast<double>(i) - 1, 1.0);
+  return threshold;
 }
 
 HypothesisTest student_test(const Estimate& estimate, double expected) {

@@ -3,6 +3,7 @@
 
 #include <limits>
 #include <string>
+#include <vector>
 
 namespace kphi::fit {
 
@@ -41,6 +42,10 @@ struct Estimate {
 
 /// a − b of independent estimates, degrees of freedom by Welch-Satterthwaite.
 [[nodiscard]] Estimate difference(const Estimate& a, const Estimate& b);
+
+/// Holm's procedure: of several tests those with p below this fall, so that one of true hypotheses falls by chance in
+/// `level` of all cases. NaN (not tested) does not count.
+[[nodiscard]] double holm_level(std::vector<double> p, double level = kTestLevel);
 
 /// Student's two-sided factor: value ± factor · u covers with `level`. Infinite freedom: 1.96.
 [[nodiscard]] double coverage_factor(double freedom, double level = 0.95);

@@ -87,18 +87,12 @@ Difference difference(const ComparedValue& a, const ComparedValue& b) {
   return result;
 }
 
-/// Holm: the smallest p against level/m, the next against level/(m − 1), until one is not rejected.
 void judge(std::vector<Difference>& differences) {
-  std::vector<Difference*> judged;
-  for (Difference& entry : differences)
-    if (entry.judged && entry.p) judged.push_back(&entry);
-  std::ranges::sort(judged, [](const Difference* a, const Difference* b) { return *a->p < *b->p; });
-  for (std::size_t i = 0; i < judged.size(); ++i) {
-    if (!(*judged[i]->p < kTestLevel / static_cast<double>(judged.size() - i))) break;
-    judged[i]->significant = true;
-  }
-  for (Difference& entry : differences)
-    if (!entry.judged && entry.p) entry.significant = *entry.p < kTestLevel;
+  std::vector<double> p;
+  for (const Difference& entry : differences)
+    if (entry.judged && entry.p) p.push_back(*entry.p);
+  const double level = holm_level(p);
+  for (Difference& entry : differences) entry.significant = entry.p && *entry.p < (entry.judged ? level : kTestLevel);
 }
 
 Agreement verdict_of(const std::vector<Difference>& differences) {

@@ -195,7 +195,11 @@ Json fit_json(const Identification& identification, const Analysis& analysis,
     curve[identification.curve_fit.parameters[i].key] = {{"value", analysis.parameters[i].value},
                                                          {"u", analysis.parameters[i].combined()},
                                                          {"expanded_95", analysis.parameters[i].expanded()}};
+  Json doubts = Json::array();
+  for (const Doubt& doubt : analysis.flight.doubts) doubts.push_back(doubt.text);
   return {{"coefficients", coefficients.string()},
+          {"verdict", name_of(analysis.flight.readiness())},
+          {"doubts", doubts},
           {"k_unit", "N/(rad/s)^2"},
           {"K_T", K_T.value},
           {"K_T_u", K_T.combined()},
@@ -217,15 +221,17 @@ Json fit_json(const Identification& identification, const Analysis& analysis,
 
 std::string plus_minus_words(const Budget& budget) {
   const std::vector<std::string> missing = budget.not_known();
-  if (!(budget.combined() > 0)) return "no uncertainty is known";
-  if (missing.empty()) return "± is 95 % by the GUM, all sources of the budget in it";
-  return fmt::format("± is 95 % by the GUM, but {} not in it: unknown (--u)", fmt::join(missing, ", "));
+  if (!(budget.combined() > 0)) return "the uncertainty is unknown";
+  if (missing.empty()) return "± is 95 % by the GUM";
+  return fmt::format("± is 95 % by the GUM; unknown and not in it: {} (see --u)", fmt::join(missing, ", "));
 }
 
 std::string headline_text(const Fitted& fitted) {
   const auto& [identification, analysis] = fitted;
   const Budget& K_T = analysis.coefficients.front();
-  std::string text = number_line("K_T", K_T);
+  std::string text = fmt::format("{:<10} {}\n", "verdict", words(analysis.flight.readiness()));
+  for (const Doubt& doubt : analysis.flight.doubts) text += fmt::format("{:<10} {}\n", "", doubt.text);
+  text += number_line("K_T", K_T);
   for (std::size_t i = 0; i < analysis.parameters.size(); ++i)
     text += number_line(analysis.parameters[i].quantity, analysis.parameters[i],
                         identification.curve_fit.parameters[i].per);

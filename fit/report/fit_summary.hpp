@@ -14,11 +14,11 @@
 
 namespace kphi::fit {
 
-/// "± 95 % by the GUM, without calibration, motor clock (unknown): name them by --u": what the ± of every headline says
-/// and leaves out.
+/// "± is 95 % by the GUM; unknown and not in it: cell calibration (see --u)": of every headline.
 [[nodiscard]] std::string plus_minus_words(const Budget& budget);
 
-/// K_T, the parameters of the curve, and K_T in standard air if the air is known, one line each; what their ± says.
+/// Whether to fly, and what speaks against it; then K_T, the parameters of the curve, and K_T in standard air if the
+/// air is known, one line each; what their ± says.
 [[nodiscard]] std::string headline_text(const Fitted& fitted);
 
 /// Cautions, one line each: steps left out or kept with a flag, points that the robust loss rejected, repetitions that

@@ -185,6 +185,8 @@ td.hash{text-align:left;font:.68rem/1.4 ui-monospace,"DejaVu Sans Mono",Menlo,mo
 .soft{color:var(--soft)}
 .remarks{background:var(--panel);border-left:4px solid var(--accent);padding:.7rem 1.2rem;margin:1.2rem 0}
 .remarks h3{margin:0 0 .3rem;font-size:.95rem}.remarks ul{margin:0;padding-left:1.2rem}.remarks li{margin:.15rem 0}
+.verdict{background:var(--panel);border-left:4px solid #2e7d4f;padding:.6rem 1.2rem;margin:1.2rem 0}.verdict h3,.verdict p{margin:.1rem 0}
+.verdict.with_care{border-color:#c77d00}.verdict.not_yet{border-color:#b3261e}
 .warning{background:#fff5e9;border-left:4px solid var(--accent);padding:.6rem 1rem}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:.3rem 1.4rem;margin:0;font-size:.92rem}
 dt{color:var(--soft)}dd{margin:0;overflow-wrap:anywhere}

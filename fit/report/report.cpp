@@ -107,27 +107,34 @@ std::string probability(const HypothesisTest& test) {
   return test.p < 0.0001 ? "&lt; 0.0001" : fmt::format("{:.4f}", test.p);
 }
 
+/// Tests of the model fall together or not (Holm); k of neighbouring occlusions should differ.
 std::string test_section(const Analysis& analysis) {
   std::vector<const HypothesisTest*> tests;
   for (const SpeedDependence& one : analysis.speed) tests.insert(tests.end(), {&one.lack_of_fit, &one.trend});
   tests.insert(tests.end(), {&analysis.curvature.lack_of_fit, &analysis.curvature.quadratic});
+  std::vector<double> p;
+  for (const HypothesisTest* test : tests) p.push_back(test->p);
+  const std::size_t of_model = tests.size();
+  const double level = holm_level(p);
   for (const HypothesisTest& test : analysis.differences) tests.push_back(&test);
-  std::erase_if(tests, [](const HypothesisTest* test) { return test->name.empty(); });
   HtmlTable table({text("test"), text("hypothesis"), "statistic", "degrees of freedom", "p", text("verdict (5 %)")});
-  for (const HypothesisTest* test : tests) {
-    const bool f = test->error_freedom > 0;
-    table.row(
-        {typeset(test->name), typeset(test->hypothesis),
-         html_escaped(test->statistic) + " = " +
-             html_number(test->value, std::abs(test->value) < 1000 ? "{:.3g}" : "{:.0f}"),
-         (f ? fmt::format("{:.0f}, ", test->freedom) : "") + freedom_words(f ? test->error_freedom : test->freedom),
-         probability(*test),
-         !test->tested()    ? "not tested"
-         : test->rejected() ? "rejected"
-                            : "not rejected"},
-        test->rejected() ? std::optional<std::size_t>(5) : std::nullopt);
+  for (std::size_t i = 0; i < tests.size(); ++i) {
+    const HypothesisTest& test = *tests[i];
+    if (test.name.empty()) continue;
+    const bool f = test.error_freedom > 0, model = i < of_model, falls = test.p < (model ? level : kTestLevel);
+    table.row({typeset(test.name), typeset(test.hypothesis),
+               html_escaped(test.statistic) + " = " +
+                   html_number(test.value, std::abs(test.value) < 1000 ? "{:.3g}" : "{:.0f}"),
+               (f ? fmt::format("{:.0f}, ", test.freedom) : "") + freedom_words(f ? test.error_freedom : test.freedom),
+               probability(test),
+               !test.tested() ? "not tested"
+               : model        ? (falls ? "rejected" : "not rejected")
+                              : (falls ? "they differ" : "not told apart")},
+              model && falls ? std::optional<std::size_t>(5) : std::nullopt);
   }
-  return section("Tests", table);
+  return section("Tests", table,
+                 "The tests of the model are judged together (Holm): in a perfect campaign one of them falls by chance "
+                 "in one of twenty.");
 }
 
 std::string speed_section(const std::vector<SpeedDependence>& speed) {
@@ -227,6 +234,16 @@ std::string signed_percent(double percent) {
   const std::string digits = fmt::format("{:.2f}", std::abs(percent));
   if (digits == "0.00") return "0.00 %";
   return (percent < 0 ? "−" : "+") + digits + " %";
+}
+
+/// At the top of the page.
+std::string verdict_box(const FlightReadiness& flight) {
+  std::string html = fmt::format("<div class=\"verdict {}\"><h3>{}</h3>\n", name_of(flight.readiness()),
+                                 flight.doubts.empty()                      ? "Fit to fly: no test of the model falls"
+                                 : flight.readiness() == Readiness::not_yet ? "Do not fly yet"
+                                                                            : "Fly with care");
+  for (const Doubt& doubt : flight.doubts) html += "<p>" + typeset(doubt.text) + "</p>\n";
+  return html + "</div>\n";
 }
 
 std::string remark_section(std::span<const std::string> remarks) {
@@ -475,8 +492,8 @@ std::string body(const Fitted& fitted, const Chapter& chapter, int& number) {
   const auto& [provenance, figures] = chapter;
   const std::string first = figure_blocks(figures, 0, 1, number);
   const std::string details = figure_blocks(figures, 1, figures.drawn.size(), number);
-  return lead(identification) + headline(fitted) + first + skipped_note(figures) + remark_section(analysis.remarks) +
-         coefficient_section(fitted) + standard_section(fitted) +
+  return verdict_box(analysis.flight) + lead(identification) + headline(fitted) + first + skipped_note(figures) +
+         remark_section(analysis.remarks) + coefficient_section(fitted) + standard_section(fitted) +
          (details.empty() ? "" : html_heading("How well the model holds") + details) + analysis_sections(analysis) +
          power_section(identification) + step_section(identification.selection) +
          run_section(provenance, identification.selection) + provenance_section(identification, provenance);

@@ -235,6 +235,7 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   analysis.between_runs = identification.repeatability.between;
   analysis.shape = shape_of(fit, sources, row);
   analysis.outlying = outlying_runs(identification.selection.used);
+  analysis.flight = flight_readiness(identification, analysis);
   analysis.remarks = remarks_of(identification, analysis);
   analysis.rejected = rejected_points(identification);
   std::vector<Estimate> k;

@@ -10,6 +10,7 @@
 #include "fit/model/torque_power.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
 #include "fit/uncertainty/budget.hpp"
+#include "fit/uncertainty/readiness.hpp"
 #include "fit/uncertainty/speed_dependence.hpp"
 
 namespace kphi::fit {
@@ -61,6 +62,7 @@ struct Analysis {
   /// Relative scatter of k between runs beyond what noise and zero explain, pooled over φ; its freedom.
   Estimate between_runs;
   LineShape shape;
+  FlightReadiness flight;
   std::vector<std::string> remarks;  ///< sentences on the line: clipping, zero, extrapolation, mismatch
 
   /// Of the parameter with this name ("slope"); nullptr if the curve has none.

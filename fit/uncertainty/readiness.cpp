@@ -1,0 +1,136 @@
+#include "fit/uncertainty/readiness.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <optional>
+
+#include "compensation/units.hpp"
+#include "fit/uncertainty/analysis.hpp"
+
+namespace kphi::fit {
+namespace {
+
+/// A line that misses a measured k by more than this share of K_T does not give the thrust that was asked for.
+constexpr double kLargestMiss = 0.05;
+
+/// A run that stands out by less moves the mean of three by less than 0.5 %, and the scatter in the ± has it.
+constexpr double kSmallStray = 0.015;
+
+/// A doubt for the case that its test falls.
+struct Suspicion {
+  double p = 1;
+  Doubt doubt;
+};
+
+/// The smaller of two tests of one hypothesis, so that both together reject it as rarely as one.
+double of_both(double p, double q) { return std::min(1.0, 2 * std::fmin(p, q)); }
+
+/// "0.3 %", with as many digits as a small number needs.
+std::string in_percent(double share) { return fmt::format("{:.2g} %", 100 * std::abs(share)); }
+
+/// Of the φ whose tests say so most clearly.
+std::optional<Suspicion> of_speed(const Identification& identification, const Analysis& analysis) {
+  Suspicion clearest;
+  double tests = 0;
+  const auto rpm = [](const SpeedCoefficient& level) { return to_rpm(RadPerSec(level.speed_rad_s)); };
+  for (std::size_t i = 0; i < analysis.speed.size(); ++i) {
+    const SpeedDependence& one = analysis.speed[i];
+    const double p = of_both(one.lack_of_fit.p, one.trend.p);
+    if (std::isnan(p) || one.levels.size() < 2) continue;
+    ++tests;
+    if (!(p < clearest.p)) continue;
+    clearest.p = p;
+    const double change = one.change.value, slowest = one.levels.front().k / identification.table[i].k - 1;
+    clearest.doubt.text = fmt::format(
+        "k {} with speed, by {} at {}° from {:.0f} to {:.0f} RPM: near {:.0f} RPM the thrust is {} {} than k says; fit "
+        "the speeds of your flight alone (--speed-range-rpm)",
+        change > 0 ? "rises" : "falls", in_percent(change), one.phi_deg, rpm(one.levels.front()),
+        rpm(one.levels.back()), rpm(one.levels.front()), in_percent(slowest), slowest < 0 ? "lower" : "higher");
+  }
+  if (tests == 0) return std::nullopt;
+  clearest.p = std::min(1.0, tests * clearest.p);
+  return clearest;
+}
+
+std::optional<Suspicion> of_line(const Identification& identification, const Analysis& analysis) {
+  const CurveFit& fit = identification.curve_fit;
+  const double p = of_both(analysis.curvature.lack_of_fit.p, analysis.curvature.quadratic.p);
+  if (std::isnan(p)) return std::nullopt;
+  std::size_t worst = 0;
+  for (std::size_t i = 0; i < fit.residuals.size(); ++i)
+    if (std::abs(fit.residuals[i]) > std::abs(fit.residuals[worst])) worst = i;
+  const double miss = fit.residuals[worst] / fit.K_T;
+  return Suspicion{
+      p,
+      {std::abs(miss) > kLargestMiss ? Readiness::not_yet : Readiness::with_care,
+       fmt::format("k(φ) is not a line: at {}° the measured k is {} of K_T {} it; expect the same error of thrust in "
+                   "flight, and check the plates and their angles",
+                   fit.points[worst].phi_deg, in_percent(miss), miss < 0 ? "below" : "above")}};
+}
+
+std::optional<Suspicion> of_runs(const Analysis& analysis) {
+  const auto worst = std::ranges::min_element(analysis.outlying, [](const OutlyingRun& a, const OutlyingRun& b) {
+    return std::fmin(a.p, 1) < std::fmin(b.p, 1);
+  });
+  if (worst == analysis.outlying.end() || !(std::abs(worst->share) > kSmallStray)) return Suspicion{};
+  if (std::isnan(worst->p)) return std::nullopt;
+  return Suspicion{worst->p,
+                   {Readiness::with_care,
+                    fmt::format("repetition {} at {}° is {} {} the others: look for a slipped plate or a loose screw, "
+                                "then repeat this occlusion, or leave the run out (--leave-out \"{}:{}:CAUSE\")",
+                                worst->repetition, worst->phi_deg, in_percent(worst->share),
+                                worst->share < 0 ? "below" : "above", worst->phi_deg, worst->repetition)}};
+}
+
+/// k that rises from one occlusion to the next. Each at its share of the level, one side of the two-sided test; where k
+/// falls as it should, none of them can fall by chance, so they take nothing from the other tests.
+std::vector<Doubt> of_order(const Identification& identification, const Analysis& analysis) {
+  std::vector<Doubt> all;
+  const double level = 2 * kTestLevel / static_cast<double>(std::max<std::size_t>(1, analysis.differences.size()));
+  for (std::size_t i = 0; i < analysis.differences.size(); ++i) {
+    const OcclusionCoefficient &before = identification.table[i], &after = identification.table[i + 1];
+    if (!(after.k > before.k) || !(analysis.differences[i].p < level)) continue;
+    all.push_back({Readiness::not_yet,
+                   fmt::format("k rises by {} from {}° to {}°, but a larger occlusion cannot give more thrust: check "
+                               "whether two occlusions were exchanged",
+                               in_percent(after.k / before.k - 1), before.phi_deg, after.phi_deg)});
+  }
+  return all;
+}
+
+}  // namespace
+
+FlightReadiness flight_readiness(const Identification& identification, const Analysis& analysis) {
+  FlightReadiness flight{of_order(identification, analysis)};
+  std::vector<Suspicion> all;
+  for (const auto& one : {of_speed(identification, analysis), of_line(identification, analysis), of_runs(analysis)})
+    if (one) all.push_back(*one);
+  std::vector<double> p;
+  for (const Suspicion& one : all) p.push_back(one.p);
+  const double level = holm_level(p);
+  for (Suspicion& one : all)
+    if (one.p < level) flight.doubts.push_back(std::move(one.doubt));
+  const bool from_steps = !identification.repeatability.angles.empty();
+  if (from_steps && !identification.repeatability.repeated)
+    flight.doubts.push_back({Readiness::with_care,
+                             "every occlusion was measured once: how much k changes from mounting to mounting is "
+                             "unknown, and not in the ±; repeat the campaign"});
+  std::ranges::stable_sort(flight.doubts, std::greater{}, &Doubt::readiness);
+  return flight;
+}
+
+const char* words(Readiness readiness) {
+  constexpr std::array kWords{"fit to fly", "fly with care", "do not fly yet"};
+  return kWords[static_cast<std::size_t>(readiness)];
+}
+
+const char* name_of(Readiness readiness) {
+  constexpr std::array kNames{"fit_to_fly", "with_care", "not_yet"};
+  return kNames[static_cast<std::size_t>(readiness)];
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,43 @@
+// Whether a drone may fly on a result: the tests of the model, taken together, and each that falls in words.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace kphi::fit {
+
+struct Identification;
+struct Analysis;
+
+enum class Readiness : std::uint8_t {
+  fit_to_fly,
+  with_care,  ///< read the doubts first
+  not_yet,    ///< the thrust would be wrong: mend or repeat first
+};
+
+/// One thing that speaks against the result: what, how large, what follows from it, what to do.
+struct Doubt {
+  Readiness readiness = Readiness::with_care;
+  std::string text;
+};
+
+struct FlightReadiness {
+  /// Worst first. Of the tests of the model (k against speed, the line, a run that stands out) those that fall under
+  /// Holm at 5 % for all together; k that rises with φ; and one repetition, which shows no scatter.
+  std::vector<Doubt> doubts;
+
+  [[nodiscard]] Readiness readiness() const {
+    return doubts.empty() ? Readiness::fit_to_fly : doubts.front().readiness;
+  }
+};
+
+[[nodiscard]] FlightReadiness flight_readiness(const Identification& identification, const Analysis& analysis);
+
+/// "fit to fly", "fly with care", "do not fly yet".
+[[nodiscard]] const char* words(Readiness readiness);
+
+/// "fit_to_fly", "with_care", "not_yet".
+[[nodiscard]] const char* name_of(Readiness readiness);
+
+}  // namespace kphi::fit

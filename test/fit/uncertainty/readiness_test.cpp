@@ -1,0 +1,100 @@
+#include "fit/uncertainty/readiness.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "fit/coefficients/coefficients.hpp"
+#include "fit/report/fit_summary.hpp"
+#include "fit/report/report.hpp"
+#include "test/fit/bench_study.hpp"
+#include "test/fit/campaign_steps.hpp"
+
+namespace kphi::fit {
+namespace readiness_test {
+
+using ::testing::HasSubstr;
+
+constexpr int kCampaigns = 60;
+
+/// How many of kCampaigns end with `readiness` and a doubt whose text holds `words`.
+template <class Spoil>
+int found_in(const StudyTruth& truth, Readiness readiness, const std::string& words, Spoil&& spoil) {
+  int found = 0;
+  for (unsigned seed = 1; seed <= kCampaigns; ++seed) {
+    StudyCampaign campaign = study_campaign(truth, seed);
+    spoil(campaign.steps);
+    const Identification identification = identify(campaign.steps);
+    const FlightReadiness flight = analyse(identification, study_options(truth, campaign)).flight;
+    const bool said = std::ranges::any_of(
+        flight.doubts, [&](const Doubt& doubt) { return doubt.text.find(words) != std::string::npos; });
+    found += said && flight.readiness() == readiness ? 1 : 0;
+  }
+  return found;
+}
+
+void nothing(std::vector<results::StepMean>&) {}
+
+TEST(FlightReadiness, OfACleanCampaignIsDoubtedOnceInTwenty) {
+  const int doubted = found_in({}, Readiness::with_care, "", nothing) + found_in({}, Readiness::not_yet, "", nothing);
+  EXPECT_LE(doubted, 6) << "5 % of 60 are 3; more than 6 in 60 by chance once in 40";
+}
+
+TEST(FlightReadiness, SaysThatKRisesWithSpeedAndWhatFollows) {
+  StudyTruth truth;
+  truth.rise = 0.05;
+  EXPECT_GE(found_in(truth, Readiness::with_care, "k rises with speed, by ", nothing), 57);
+}
+
+TEST(FlightReadiness, SaysWhichRunStandsOut) {
+  const auto slipped = [](std::vector<results::StepMean>& steps) {
+    for (results::StepMean& step : steps)
+      if (step.occlusion_deg == 90 && step.repetition == 2) step.thrust_n *= 0.963;  // by 10° less cover
+  };
+  EXPECT_GE(found_in({}, Readiness::with_care, "repetition 2 at 90° is", slipped), 57);
+}
+
+TEST(FlightReadiness, RefusesExchangedOcclusions) {
+  const auto exchanged = [](std::vector<results::StepMean>& steps) {
+    for (results::StepMean& step : steps) {
+      if (step.occlusion_deg == 90) {
+        step.occlusion_deg = 180;
+      } else if (step.occlusion_deg == 180) {
+        step.occlusion_deg = 90;
+      }
+    }
+  };
+  EXPECT_GE(found_in({}, Readiness::not_yet, "from 90° to 180°, but a larger occlusion", exchanged), 57);
+}
+
+TEST(FlightReadiness, SaysThatKIsNotALine) {
+  const auto bent = [](std::vector<results::StepMean>& steps) {
+    for (results::StepMean& step : steps)
+      if (step.occlusion_deg == 180) step.thrust_n *= 1.02;
+  };
+  EXPECT_GE(found_in({}, Readiness::with_care, "k(φ) is not a line", bent), 57);
+}
+
+TEST(FlightReadiness, AsksForCareAfterASingleMeasurement) {
+  const auto once = [](std::vector<results::StepMean>& steps) {
+    std::erase_if(steps, [](const results::StepMean& step) { return step.repetition > 1; });
+  };
+  EXPECT_EQ(found_in({}, Readiness::with_care, "measured once", once), kCampaigns);
+}
+
+TEST(FlightReadiness, StandsAtTheTopOfScreenFileAndReport) {
+  Fitted fitted = analysed(identify(campaign_steps()));
+  fitted.analysis.flight = {};
+  EXPECT_THAT(headline_text(fitted), ::testing::StartsWith("verdict    fit to fly\n"));
+  EXPECT_THAT(format_coefficients(fitted, {}), HasSubstr("verdict: fit_to_fly\n  doubts: []\n"));
+  fitted.analysis.flight.doubts = {{Readiness::not_yet, "a \"plate\" is <bent>"}};
+  EXPECT_THAT(headline_text(fitted), ::testing::StartsWith("verdict    do not fly yet\n           a \"plate\" is"));
+  EXPECT_THAT(format_coefficients(fitted, {}), HasSubstr("  doubts: [\"a \\\"plate\\\" is <bent>\"]\n"));
+  const std::string page = format_report(fitted, {});
+  EXPECT_LT(page.find("Do not fly yet"), page.find("class=\"lead\""));
+  EXPECT_THAT(page, HasSubstr("is &lt;bent&gt;"));
+}
+
+}  // namespace readiness_test
+}  // namespace kphi::fit
