@@ -299,6 +299,7 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   for (const Value& row : top.rows("table", "a row of the table has no keys"))
     coefficients.table.push_back(read_row(row, scale));
   coefficients.air_density_kg_m3 = top.number_at("air_density_kg_m3");
+  coefficients.air_density_u_kg_m3 = top.number_at("air_density_u_kg_m3");
   if (const auto map = top.find("provenance"); map && map->node().IsMap())
     read_provenance(*map, coefficients.provenance);
   for (const char* key : {"intercept", "slope_per_deg"}) {

@@ -83,7 +83,7 @@ struct Coefficients {
   std::optional<RadPerSec> slowest_speed;         ///< valid range of speeds
   std::optional<RadPerSec> fastest_speed;
   std::vector<Row> table;
-  std::optional<double> air_density_kg_m3;
+  std::optional<double> air_density_kg_m3, air_density_u_kg_m3;
   Provenance provenance;
 };
 

@@ -15,13 +15,6 @@ double shape(const ThrustFit& fit, double k, std::size_t i) {
   return thrust(fit.parameters, fit.points[i].speed_rad_s) / k;
 }
 
-double zero_moved(std::span<const results::StepMean> steps, int repetition) {
-  results::ZeroDrift drift;
-  for (const results::StepMean& step : steps)
-    if (step.repetition == repetition) drift.add(step);
-  return drift.moved_n();
-}
-
 /// Residuals of one step index over the runs that have it.
 struct LevelResiduals {
   double wx = 0, count = 0, sum = 0, squares = 0;
@@ -32,7 +25,7 @@ double count(const AngleScatter& angle) { return static_cast<double>(angle.runs.
 std::vector<results::RunShare> shares_of(const AngleScatter& angle) {
   std::vector<results::RunShare> shares;
   for (const RunSums& run : angle.runs) {
-    const double zero = run.zero_moved_n / std::sqrt(12.0) * angle.zero_sensitivity;
+    const double zero = run.zero_u_n * angle.zero_sensitivity;
     shares.push_back({run.k() / angle.k, (angle.within.variance + zero * zero) / (angle.k * angle.k)});
   }
   return shares;
@@ -47,8 +40,10 @@ double between_u(const Repeatability& all, const AngleScatter& angle) {
 std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepMean> steps, const ThrustFit& fit,
                                   double k) {
   std::map<int, RunSums> runs;
+  std::map<int, results::RunZero> zeros;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     RunSums& run = runs[steps[i].repetition];
+    zeros[steps[i].repetition].add(steps[i]);
     const double w = weight_of(fit, i), x = shape(fit, k, i);
     run.xt += w * x * fit.points[i].thrust_n;
     run.xx += w * x * x;
@@ -58,7 +53,7 @@ std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepM
   for (auto& [repetition, run] : runs) {
     run.phi_deg = phi_deg;
     run.repetition = repetition;
-    run.zero_moved_n = zero_moved(steps, repetition);
+    run.zero_u_n = zeros[repetition].u_n();
     if (run.xx > 0) result.push_back(run);
   }
   return result;
@@ -115,7 +110,7 @@ AngleScatter scatter_of_angle(double k, std::vector<RunSums> runs, const WithinR
   for (const RunSums& run : runs) {
     x += run.x;
     xx += run.xx;
-    squares += std::pow(run.zero_moved_n / 2, 2) / 3;
+    squares += run.zero_u_n * run.zero_u_n;
   }
   const double n = static_cast<double>(runs.size());
   if (xx > 0) angle.zero_sensitivity = x / xx;

@@ -1,4 +1,4 @@
-// How well k repeats: noise within the runs, drift of the zero, and the scatter from run to run beyond the two
+// How well k repeats: noise within the runs, the zero, and the scatter from run to run beyond the two
 // (mounting, air, bearing), pooled over all occlusions as a share of k, since three repetitions alone are too few.
 #pragma once
 
@@ -14,10 +14,10 @@ namespace kphi::fit {
 struct RunSums {
   double phi_deg = 0;
   int repetition = 0;
-  double xt = 0;            ///< Σ w x T; x = ω², or the map's term in its place
-  double xx = 0;            ///< Σ w x²
-  double x = 0;             ///< Σ w x
-  double zero_moved_n = 0;  ///< drift of the zero over the run; 0: unknown
+  double xt = 0;        ///< Σ w x T; x = ω², or the map's term in its place
+  double xx = 0;        ///< Σ w x²
+  double x = 0;         ///< Σ w x
+  double zero_u_n = 0;  ///< standard, of the zero that its steps share; 0: unknown
 
   [[nodiscard]] double k() const { return xt / xx; }  ///< N/(rad/s)²
 };
@@ -44,7 +44,7 @@ struct AngleScatter {
   double k = 0;
   std::vector<RunSums> runs;
   WithinRuns within;            ///< of one run
-  double zero_u_n = 0;          ///< rectangular, half of the drift of each zero (JCGM 100, 4.3.7)
+  double zero_u_n = 0;          ///< of the mean of the runs' zeros
   double zero_sensitivity = 0;  ///< of k per N
 
   [[nodiscard]] double within_u() const;  ///< N/(rad/s)²

@@ -11,9 +11,11 @@
 
 #include "base/error.hpp"
 #include "compensation/file/coefficient_file.hpp"
+#include "fit/model/identification.hpp"
 #include "fit/model/step_selection.hpp"
 #include "fit/model/thrust_fit.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
+#include "results/reduction/bin_statistics.hpp"
 #include "results/steps_csv.hpp"
 
 namespace kphi::fit {
@@ -33,7 +35,7 @@ ComparedResult result_of(const compensation::Coefficients& file, const std::stri
   result.diameter_in = file.propeller.diameter_in;
   if (file.slowest_speed) result.speed_min_rad_s = file.slowest_speed->value();
   if (file.fastest_speed) result.speed_max_rad_s = file.fastest_speed->value();
-  result.air_density_kg_m3 = file.air_density_kg_m3;
+  if (file.air_density_kg_m3) result.air = Estimate{*file.air_density_kg_m3, file.air_density_u_kg_m3.value_or(0)};
   const auto& curve = file.curve;
   using Uncertainty = compensation::Coefficients::Uncertainty;
   const auto add = [&](const std::string& of, const char* unit, double value, const std::optional<Uncertainty>& known,
@@ -82,6 +84,7 @@ Difference difference(const ComparedValue& a, const ComparedValue& b) {
   const Estimate apart =
       difference(Estimate{b.value, b.standard_error, b.freedom}, Estimate{a.value, a.standard_error, a.freedom});
   result.standard_error = apart.u;
+  result.freedom = apart.freedom;
   result.coverage = coverage_factor(apart.freedom, 1 - kTestLevel);
   result.p = student_test(apart, 0).p;
   return result;
@@ -116,11 +119,47 @@ void remark(Comparison& comparison) {
         "different speeds: {:.0f} to {:.0f} and {:.0f} to {:.0f} RPM; on real propellers k rises with speed",
         rpm(a.speed_min_rad_s), rpm(a.speed_max_rad_s), rpm(b.speed_min_rad_s), rpm(b.speed_max_rad_s)));
   }
-  if (!a.air_density_kg_m3 || !b.air_density_kg_m3) {
+  if (!a.air || !b.air) {
     say("air density unknown: the weather changes k by up to 3 %");
-  } else if (apart(*a.air_density_kg_m3, *b.air_density_kg_m3)) {
-    say(fmt::format("different air: {:.4g} and {:.4g} kg/m³; k is proportional to it", *a.air_density_kg_m3,
-                    *b.air_density_kg_m3));
+  } else {
+    say(fmt::format("compared in standard air, {} kg/m³; measured in {:.4g} and {:.4g} kg/m³", kStandardDensity,
+                    a.air->value, b.air->value));
+  }
+}
+
+/// All k higher by one factor: neither the propeller nor the plates do that.
+void remark_common_factor(Comparison& comparison) {
+  double weights = 0, sum = 0;
+  std::vector<double> shares, errors;
+  for (const Difference& entry : comparison.differences) {
+    if (!entry.judged || !entry.standard_error) continue;
+    shares.push_back(entry.share());
+    errors.push_back(*entry.standard_error / std::abs(entry.a));
+    weights += 1 / (errors.back() * errors.back());
+    sum += shares.back() / (errors.back() * errors.back());
+  }
+  const bool differ = comparison.verdict == Agreement::differ;
+  if (!differ || shares.size() < 3) return;
+  const double factor = sum / weights;
+  for (std::size_t i = 0; i < shares.size(); ++i)
+    if (std::abs(shares[i] - factor) > 2 * errors[i]) return;
+  comparison.remarks.push_back(fmt::format(
+      "every k of B is {:.2g} % {} by one factor: look at calibration, mounting, clock and air first, not at "
+      "propeller or plates",
+      100 * std::abs(factor), factor < 0 ? "lower" : "higher"));
+}
+
+/// k · 1.225/ρ, with the error of the density.
+void to_standard_air(ComparedResult& result) {
+  const double scale = kStandardDensity / result.air->value;
+  for (ComparedValue& one : result.estimates) {
+    const double of_density = one.value * scale * result.air->u / result.air->value;
+    one.value *= scale;
+    one.standard_error *= scale;
+    if (!(one.standard_error > 0)) continue;
+    one.freedom =
+        results::joint_freedom(one.standard_error, one.freedom, of_density, std::numeric_limits<double>::infinity());
+    one.standard_error = std::hypot(one.standard_error, of_density);
   }
 }
 
@@ -163,6 +202,8 @@ Comparison compare(ComparedResult a, ComparedResult b) {
   Comparison comparison;
   comparison.a = std::move(a);
   comparison.b = std::move(b);
+  if (comparison.a.air && comparison.b.air)
+    for (ComparedResult* one : {&comparison.a, &comparison.b}) to_standard_air(*one);
   for (const ComparedValue& of_a : comparison.a.estimates) {
     for (const ComparedValue& of_b : comparison.b.estimates)
       if (of_a.name == of_b.name) comparison.differences.push_back(difference(of_a, of_b));
@@ -178,6 +219,7 @@ Comparison compare(ComparedResult a, ComparedResult b) {
   if (d_a > 0 && d_b > 0 && d_a != d_b) comparison.diameter_ratio4 = std::pow(d_b / d_a, 4);
   remark(comparison);
   remark_missing(comparison);
+  remark_common_factor(comparison);
   return comparison;
 }
 
@@ -215,14 +257,18 @@ const char* word(Agreement verdict) {
 }
 
 std::string comparison_table(const Comparison& comparison) {
-  std::string text = fmt::format("A  {}\nB  {}\n\n{:<10} {:>13} {:>13} {:>11} {:>9} {:>9} {:>9}\n", comparison.a.name,
-                                 comparison.b.name, "", "A", "B", "B - A", "u", "B/A - 1", "p");
+  std::string text =
+      fmt::format("A  {}\nB  {}\n\n{:<10} {:>13} {:>13} {:>11} {:>9} {:>7} {:>9} {:>9}\n", comparison.a.name,
+                  comparison.b.name, "", "A", "B", "B - A", "u", "freedom", "B/A - 1", "p");
   for (const Difference& entry : comparison.differences) {
     // fmt pads by display width, so that k(45°) keeps its column.
-    text +=
-        fmt::format("{:<10} {:>13.5e} {:>13.5e} {:>+11.2e} {:>9} {:>+7.2f} % {:>9}{}\n", entry.name, entry.a, entry.b,
-                    entry.difference, entry.standard_error ? fmt::format("{:.1e}", *entry.standard_error) : "?",
-                    100 * entry.share(), probability(entry.p), entry.significant ? " *" : "");
+    text += fmt::format("{:<10} {:>13.5e} {:>13.5e} {:>+11.2e} {:>9} {:>7} {:>+7.2f} % {:>9}{}\n", entry.name, entry.a,
+                        entry.b, entry.difference,
+                        entry.standard_error ? fmt::format("{:.1e}", *entry.standard_error) : "?",
+                        !entry.standard_error ? "?"
+                        : entry.freedom > 999 ? ">999"
+                                              : fmt::format("{:.0f}", entry.freedom),
+                        100 * entry.share(), probability(entry.p), entry.significant ? " *" : "");
   }
   text += "\n";
   for (const Difference& entry : comparison.differences) {
@@ -249,7 +295,8 @@ std::string comparison_json(const Comparison& comparison) {
                     {"a", entry.a},
                     {"b", entry.b},
                     {"difference", entry.difference},
-                    {"standard_error", maybe(entry.standard_error)},
+                    {"u", maybe(entry.standard_error)},
+                    {"freedom", std::isfinite(entry.freedom) ? Json(entry.freedom) : Json(nullptr)},
                     {"share", entry.share()},
                     {"p", maybe(entry.p)},
                     {"judged", entry.judged},

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "fit/numerics/hypothesis_test.hpp"
+
 namespace kphi::fit {
 
 /// One number of a result, independent of the other result's; a standard error of 0 or NaN is unknown.
@@ -24,7 +26,7 @@ struct ComparedResult {
   std::string propeller;
   double diameter_in = 0;  ///< 0: unknown
   double speed_min_rad_s = 0, speed_max_rad_s = 0;
-  std::optional<double> air_density_kg_m3;
+  std::optional<Estimate> air;  ///< density, kg/m³
   std::vector<ComparedValue> estimates;
 };
 
@@ -40,6 +42,7 @@ struct Difference {
   double difference = 0;                   ///< b − a
   std::optional<double> standard_error{};  ///< of it; nullopt if one of the two is unknown
   std::optional<double> p{};               ///< of a difference this large by chance (Student, Welch-Satterthwaite)
+  double freedom = 0;                      ///< degrees of freedom behind it
   double coverage = 0;                     ///< Student's factor for the 95 % interval
   bool judged = true;
   bool significant = false;  ///< after Holm's correction for the number of judged differences, level 5 %
@@ -52,14 +55,14 @@ struct Comparison {
   ComparedResult a, b;
   std::vector<Difference> differences;  ///< of the numbers that both have
   Agreement verdict = Agreement::undecided;
-  std::vector<std::string> remarks;  ///< other propeller, speeds, air; missing angles
+  std::vector<std::string> remarks;  ///< other propeller, speeds, air; missing angles; a factor common to all k
   /// The largest |difference| / a of a judged quantity that is possible at 95 %: they agree to within this.
   double largest_open_share = 0;
   /// K_T of b over a against (D_b/D_a)⁴, where the diameters differ.
   std::optional<double> diameter_ratio4;
 };
 
-/// Undecided unless a judged quantity has both errors.
+/// In standard air if both know their density. Undecided unless a judged quantity has both errors.
 [[nodiscard]] Comparison compare(ComparedResult a, ComparedResult b);
 
 /// A result beside the truth of the simulated bench.

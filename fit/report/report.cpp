@@ -423,7 +423,7 @@ std::string headline(const Fitted& fitted) {
       line.anchored ? "<p>anchored at K<sub>T</sub></p>"
                     : fmt::format("<p>k(0) {:.2f} % {} the measured K<sub>T</sub></p>",
                                   100 * std::abs(line.mismatch()) / line.K_T, line.mismatch() < 0 ? "below" : "above");
-  if (line.clipping_deg() && !line.anchored)
+  if (line.clipping_deg().value_or(0) > 0 && !line.anchored)
     shape +=
         fmt::format("<p>meets K<sub>T</sub> at {:.1f}°; below that angle compensation holds k<sub>i</sub> at 1</p>",
                     *line.clipping_deg());

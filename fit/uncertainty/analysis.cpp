@@ -235,7 +235,8 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   analysis.between_runs = identification.repeatability.between;
   analysis.shape = shape_of(fit, sources, row);
   analysis.outlying = outlying_runs(identification.selection.used);
-  analysis.flight = flight_readiness(identification, analysis);
+  analysis.flight =
+      flight_readiness(identification, {analysis.speed, analysis.curvature, analysis.outlying, analysis.differences});
   analysis.remarks = remarks_of(identification, analysis);
   analysis.rejected = rejected_points(identification);
   std::vector<Estimate> k;

@@ -9,7 +9,6 @@
 #include <optional>
 
 #include "compensation/units.hpp"
-#include "fit/uncertainty/analysis.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -33,15 +32,15 @@ double of_both(double p, double q) { return std::min(1.0, 2 * std::fmin(p, q)); 
 std::string in_percent(double share) { return fmt::format("{:.2g} %", 100 * std::abs(share)); }
 
 /// Of the φ whose tests say so most clearly.
-std::optional<Suspicion> of_speed(const Identification& identification, const Analysis& analysis) {
+std::optional<Suspicion> of_speed(const Identification& identification, const ModelTests& tests) {
   Suspicion clearest;
-  double tests = 0;
+  double count = 0;
   const auto rpm = [](const SpeedCoefficient& level) { return to_rpm(RadPerSec(level.speed_rad_s)); };
-  for (std::size_t i = 0; i < analysis.speed.size(); ++i) {
-    const SpeedDependence& one = analysis.speed[i];
+  for (std::size_t i = 0; i < tests.speed.size(); ++i) {
+    const SpeedDependence& one = tests.speed[i];
     const double p = of_both(one.lack_of_fit.p, one.trend.p);
     if (std::isnan(p) || one.levels.size() < 2) continue;
-    ++tests;
+    ++count;
     if (!(p < clearest.p)) continue;
     clearest.p = p;
     const double change = one.change.value, slowest = one.levels.front().k / identification.table[i].k - 1;
@@ -51,14 +50,14 @@ std::optional<Suspicion> of_speed(const Identification& identification, const An
         change > 0 ? "rises" : "falls", in_percent(change), one.phi_deg, rpm(one.levels.front()),
         rpm(one.levels.back()), rpm(one.levels.front()), in_percent(slowest), slowest < 0 ? "lower" : "higher");
   }
-  if (tests == 0) return std::nullopt;
-  clearest.p = std::min(1.0, tests * clearest.p);
+  if (count == 0) return std::nullopt;
+  clearest.p = std::min(1.0, count * clearest.p);
   return clearest;
 }
 
-std::optional<Suspicion> of_line(const Identification& identification, const Analysis& analysis) {
+std::optional<Suspicion> of_line(const Identification& identification, const ModelTests& tests) {
   const CurveFit& fit = identification.curve_fit;
-  const double p = of_both(analysis.curvature.lack_of_fit.p, analysis.curvature.quadratic.p);
+  const double p = of_both(tests.curvature.lack_of_fit.p, tests.curvature.quadratic.p);
   if (std::isnan(p)) return std::nullopt;
   std::size_t worst = 0;
   for (std::size_t i = 0; i < fit.residuals.size(); ++i)
@@ -72,11 +71,10 @@ std::optional<Suspicion> of_line(const Identification& identification, const Ana
                    fit.points[worst].phi_deg, in_percent(miss), miss < 0 ? "below" : "above")}};
 }
 
-std::optional<Suspicion> of_runs(const Analysis& analysis) {
-  const auto worst = std::ranges::min_element(analysis.outlying, [](const OutlyingRun& a, const OutlyingRun& b) {
-    return std::fmin(a.p, 1) < std::fmin(b.p, 1);
-  });
-  if (worst == analysis.outlying.end() || !(std::abs(worst->share) > kSmallStray)) return Suspicion{};
+std::optional<Suspicion> of_runs(const ModelTests& tests) {
+  const auto worst = std::ranges::min_element(
+      tests.outlying, [](const OutlyingRun& a, const OutlyingRun& b) { return std::fmin(a.p, 1) < std::fmin(b.p, 1); });
+  if (worst == tests.outlying.end() || !(std::abs(worst->share) > kSmallStray)) return Suspicion{};
   if (std::isnan(worst->p)) return std::nullopt;
   return Suspicion{worst->p,
                    {Readiness::with_care,
@@ -88,12 +86,12 @@ std::optional<Suspicion> of_runs(const Analysis& analysis) {
 
 /// k that rises from one occlusion to the next. Each at its share of the level, one side of the two-sided test; where k
 /// falls as it should, none of them can fall by chance, so they take nothing from the other tests.
-std::vector<Doubt> of_order(const Identification& identification, const Analysis& analysis) {
+std::vector<Doubt> of_order(const Identification& identification, const ModelTests& tests) {
   std::vector<Doubt> all;
-  const double level = 2 * kTestLevel / static_cast<double>(std::max<std::size_t>(1, analysis.differences.size()));
-  for (std::size_t i = 0; i < analysis.differences.size(); ++i) {
+  const double level = 2 * kTestLevel / static_cast<double>(std::max<std::size_t>(1, tests.differences.size()));
+  for (std::size_t i = 0; i < tests.differences.size(); ++i) {
     const OcclusionCoefficient &before = identification.table[i], &after = identification.table[i + 1];
-    if (!(after.k > before.k) || !(analysis.differences[i].p < level)) continue;
+    if (!(after.k > before.k) || !(tests.differences[i].p < level)) continue;
     all.push_back({Readiness::not_yet,
                    fmt::format("k rises by {} from {}° to {}°, but a larger occlusion cannot give more thrust: check "
                                "whether two occlusions were exchanged",
@@ -104,10 +102,10 @@ std::vector<Doubt> of_order(const Identification& identification, const Analysis
 
 }  // namespace
 
-FlightReadiness flight_readiness(const Identification& identification, const Analysis& analysis) {
-  FlightReadiness flight{of_order(identification, analysis)};
+FlightReadiness flight_readiness(const Identification& identification, const ModelTests& tests) {
+  FlightReadiness flight{of_order(identification, tests)};
   std::vector<Suspicion> all;
-  for (const auto& one : {of_speed(identification, analysis), of_line(identification, analysis), of_runs(analysis)})
+  for (const auto& one : {of_speed(identification, tests), of_line(identification, tests), of_runs(tests)})
     if (one) all.push_back(*one);
   std::vector<double> p;
   for (const Suspicion& one : all) p.push_back(one.p);

@@ -2,13 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
-namespace kphi::fit {
+#include "fit/model/identification.hpp"
+#include "fit/uncertainty/speed_dependence.hpp"
 
-struct Identification;
-struct Analysis;
+namespace kphi::fit {
 
 enum class Readiness : std::uint8_t {
   fit_to_fly,
@@ -32,7 +33,15 @@ struct FlightReadiness {
   }
 };
 
-[[nodiscard]] FlightReadiness flight_readiness(const Identification& identification, const Analysis& analysis);
+/// What was found out about the model; see Analysis.
+struct ModelTests {
+  std::span<const SpeedDependence> speed;
+  const Curvature& curvature;
+  std::span<const OutlyingRun> outlying;
+  std::span<const HypothesisTest> differences;
+};
+
+[[nodiscard]] FlightReadiness flight_readiness(const Identification& identification, const ModelTests& tests);
 
 /// "fit to fly", "fly with care", "do not fly yet".
 [[nodiscard]] const char* words(Readiness readiness);

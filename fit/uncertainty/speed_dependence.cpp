@@ -27,22 +27,11 @@ struct Run {
   double zero_u_n = kNan;       ///< of the zero that they share; NaN: not known
 };
 
-/// Of the zero itself, and rectangular over half of its drift.
-double zero_u(std::span<const results::StepMean> steps, int repetition) {
-  double of_zero = 0;
-  results::ZeroDrift drift;
-  for (const results::StepMean& step : steps) {
-    if (step.repetition != repetition) continue;
-    if (std::isfinite(step.zero_u_n)) of_zero = std::max(of_zero, step.zero_u_n);
-    drift.add(step);
-  }
-  const double u = std::hypot(of_zero, drift.u_n());
-  return u > 0 ? u : kNan;
-}
-
 std::vector<Run> runs_of(std::span<const results::StepMean> steps) {
   std::map<int, Run> runs;
+  std::map<int, results::RunZero> zeros;
   for (const results::StepMean& step : steps) {
+    zeros[step.repetition].add(step);
     if (!(step.speed_rad_s > 0)) continue;
     runs[step.repetition].samples.push_back(
         {step.step, step.speed_rad_s, step.speed_rad_s * step.speed_rad_s, step.thrust_n});
@@ -52,7 +41,7 @@ std::vector<Run> runs_of(std::span<const results::StepMean> steps) {
     double xt = 0, xx = 0;
     for (const Sample& sample : run.samples) xt += sample.x * sample.thrust, xx += sample.x * sample.x;
     run.k = xt / xx;
-    run.zero_u_n = zero_u(steps, repetition);
+    if (const double u = zeros[repetition].u_n(); u > 0) run.zero_u_n = u;
     std::ranges::sort(run.samples, {}, &Sample::level);
     result.push_back(std::move(run));
   }

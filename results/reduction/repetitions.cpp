@@ -116,20 +116,19 @@ std::set<int> good_levels(const Group& run) {
 
 /// k and its uncertainty, over these levels.
 void fit_k(const Group& run, const std::set<int>& levels, RepetitionFigure& figure) {
-  double tx = 0, xx = 0, x_sum = 0, variance = 0, zero = 0;
-  ZeroDrift drift;
+  double tx = 0, xx = 0, x_sum = 0, variance = 0;
+  RunZero zero;
   for (const StepMean* step : run) {
-    if (is_good(*step)) drift.add(*step);
+    if (is_good(*step)) zero.add(*step);
     if (!levels.contains(step->step)) continue;
     const double x = square(step->speed_rad_s);
     tx += step->thrust_n * x;
     xx += x * x;
     x_sum += x;
     variance += square(x * u_within(*step));
-    zero = std::fmax(zero, step->zero_u_n);  // ignores an unknown one
   }
   figure.k = tx / xx;
-  figure.u = std::sqrt(variance + square(std::hypot(zero, drift.u_n()) * x_sum)) / xx;
+  figure.u = std::sqrt(variance + square(zero.u_n() * x_sum)) / xx;
 }
 
 std::vector<RepetitionFigure> figures_of(const Runs& runs) {
@@ -340,13 +339,15 @@ std::vector<StepMean> means_of(std::span<const StepMean> steps) {
   return means;
 }
 
-void ZeroDrift::add(const StepMean& step) {
-  if (!std::isfinite(step.zero_n)) return;
-  lowest_ = std::min(lowest_, step.zero_n);
-  highest_ = std::max(highest_, step.zero_n);
+void RunZero::add(const StepMean& step) {
+  own_u_ = std::fmax(own_u_, step.zero_u_n);  // ignores an unknown one
+  lowest_ = std::fmin(lowest_, step.zero_n);
+  highest_ = std::fmax(highest_, step.zero_n);
 }
 
-double ZeroDrift::u_n() const { return moved_n() / std::sqrt(12.0); }
+double RunZero::u_n() const {
+  return std::hypot(own_u_, highest_ > lowest_ ? (highest_ - lowest_) / std::sqrt(12.0) : 0);
+}
 
 double freedom_between(std::span<const std::vector<RunShare>> occlusions) {
   double freedom = 0;

@@ -29,18 +29,17 @@ namespace kphi::results {
 /// Standard uncertainty of the thrust from the noise within the step, N.
 [[nodiscard]] double thrust_u_within(const StepMean& step);
 
-/// How far the zero of one run moved, from the zeros that were subtracted at its steps; add() the good ones. Between
-/// the two measured zeros of a run it is a line in time; the true zero may leave that line by up to half of the
-/// movement.
-class ZeroDrift {
+/// The zero of one run, from what was subtracted at its good steps: add() them. Between the two measured zeros of a run
+/// it is a line in time; the true zero may leave that line by up to half of the movement.
+class RunZero {
  public:
   void add(const StepMean& step);
-  [[nodiscard]] double moved_n() const { return highest_ > lowest_ ? highest_ - lowest_ : 0; }  ///< N; 0: unknown
-  /// Standard uncertainty of the zero by it, N: rectangular over half of the movement (JCGM 100, 4.3.7).
+  /// Standard uncertainty, N, shared by all steps; 0: unknown. That of the measured zeros, and rectangular over half of
+  /// the movement (JCGM 100, 4.3.7).
   [[nodiscard]] double u_n() const;
 
  private:
-  double lowest_ = std::numeric_limits<double>::infinity(), highest_ = -lowest_;
+  double own_u_ = 0, lowest_ = std::numeric_limits<double>::infinity(), highest_ = -lowest_;
 };
 
 /// k of one run as a share of the k of its occlusion, with the variance that its noise and its zero explain.

@@ -25,7 +25,7 @@ ComparedResult result(std::initializer_list<ComparedValue> values) {
   made.propeller = "5x3";
   made.speed_min_rad_s = 300;
   made.speed_max_rad_s = 2000;
-  made.air_density_kg_m3 = 1.2;
+  made.air = Estimate{kStandardDensity, 0};
   made.estimates = values;
   return made;
 }
@@ -151,13 +151,44 @@ TEST(Compare, RemarksWhatMakesResultsUnlike) {
   a.diameter_in = 5;
   b.diameter_in = 6;
   b.speed_max_rad_s = 1800;
-  b.air_density_kg_m3 = 1.1;
+  b.air = Estimate{1.1, 0.01};
   const Comparison comparison = compare(a, b);
   EXPECT_NEAR(*comparison.diameter_ratio4, 2.0736, 1e-12);
   EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("5x3 and 6x3")));
   EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("different speeds")));
-  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("different air")));
+  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("compared in standard air")));
   EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("only in made: k(90°)")));
+}
+
+TEST(Compare, SeesTheSamePropellerInAnyAir) {
+  int differ = 0;
+  for (unsigned seed = 1; seed <= 1000; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    ComparedResult results[2];
+    for (ComparedResult& one : results) {
+      const double density = 1.10 + 0.15 * static_cast<double>(random() % 1000) / 1000, u = 0.003 * density;
+      const double known = density + u * normal(random);
+      for (const double k : {1.5e-6, 1.3e-6, 1.1e-6, 0.7e-6, 0.4e-6})
+        one.estimates.push_back(
+            {fmt::format("k{}", k), "", k * density / kStandardDensity + 2e-9 * normal(random), 2e-9});
+      one.air = Estimate{known, u};
+    }
+    differ += compare(results[0], results[1]).verdict == Agreement::differ ? 1 : 0;
+  }
+  EXPECT_LE(differ, 70) << "of 1000";
+}
+
+TEST(Compare, NamesAFactorThatAllHaveInCommon) {
+  const auto all = [](double factor, double of_third) {
+    return result({{"K_T", "", 1.5e-6 * factor, 2e-9},
+                   {"k(45°)", "", 1.3e-6 * factor, 2e-9},
+                   {"k(90°)", "", 1.1e-6 * factor * of_third, 2e-9}});
+  };
+  EXPECT_THAT(comparison_table(compare(all(1, 1), all(1.02, 1))),
+              HasSubstr("every k of B is 2 % higher by one factor"));
+  EXPECT_THAT(comparison_table(compare(all(1, 1), all(1.02, 1.02))), ::testing::Not(HasSubstr("by one factor")));
+  EXPECT_THAT(comparison_table(compare(all(1, 1), all(1, 1))), ::testing::Not(HasSubstr("by one factor")));
 }
 
 TEST(Compare, GivesTheSameAsJson) {
@@ -167,7 +198,7 @@ TEST(Compare, GivesTheSameAsJson) {
   EXPECT_EQ(json["verdict"], "differ");
   EXPECT_EQ(json["differences"].size(), 2u);
   EXPECT_EQ(json["differences"][0]["difference"], 1.0);
-  EXPECT_TRUE(json["differences"][1]["standard_error"].is_null());
+  EXPECT_TRUE(json["differences"][1]["u"].is_null());
 }
 
 }  // namespace compare_test

@@ -30,7 +30,7 @@ TEST(Analysis, ABudgetHasEverySourceAndSaysWhichNobodyKnows) {
   Study study;
   const Budget budget = analyse(study.found, study.options).coefficients[1];
   EXPECT_EQ(budget.quantity, "k(45 deg)");
-  for (const char* source : {"noise within runs", "repetitions", "zero drift", "model T = k w^2", "cell calibration",
+  for (const char* source : {"noise within runs", "repetitions", "zero", "model T = k w^2", "cell calibration",
                              "cross-axis", "alignment", "motor clock"})
     EXPECT_NO_THROW((void)row_of(budget, source)) << source;
   EXPECT_FALSE(row_of(budget, "cross-axis").known());
@@ -210,7 +210,7 @@ TEST(Analysis, IsWrittenWithoutWhatJsonCannotHold) {
   const std::string text = nlohmann::ordered_json(analysis).dump();
   EXPECT_EQ(text.find("nan"), std::string::npos);
   EXPECT_EQ(text.find("inf"), std::string::npos);
-  EXPECT_THAT(text, HasSubstr("\"source\":\"zero drift\""));
+  EXPECT_THAT(text, HasSubstr("\"source\":\"zero\""));
   const std::string yaml = format_coefficients({study.found, analysis}, {});
   EXPECT_THAT(yaml, HasSubstr("not_known: [cross-axis, alignment]"));
   EXPECT_EQ(yaml, format_coefficients({study.found, analysis}, {}));
