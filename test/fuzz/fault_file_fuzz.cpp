@@ -2,6 +2,7 @@
 #include <cstdlib>
 #include <string>
 
+#include "base/error.hpp"
 #include "drivers/sim/input_files.hpp"
 #include "drivers/sim/netbox/fault_injector.hpp"
 #include "test/fuzz/tokens.hpp"
