@@ -163,6 +163,19 @@ TEST_F(Program, TakesOneValueForEachOptionThatMayBeRepeated) {
       << "the folder is no second value";
 }
 
+TEST_F(Program, ExitsWithFiveForAResultThatMustNotFlyUnlessItIsAccepted) {
+  const std::string folder = steps("5x3");
+  auto exchanged = results::read_steps(folder + "/steps.csv");
+  for (auto& step : exchanged)
+    if (step.occlusion_deg == 90 || step.occlusion_deg == 180) step.occlusion_deg = 270 - step.occlusion_deg;
+  results::write_steps(folder + "/steps.csv", exchanged);
+  const Answer refused = kphi({"fit", folder, "--no-report"});
+  EXPECT_EQ(refused.code, 5);
+  EXPECT_THAT(refused.out, AllOf(HasSubstr("do not fly yet"), HasSubstr("exchanged")));
+  EXPECT_THAT(refused.err, HasSubstr("--accept"));
+  EXPECT_EQ(kphi({"fit", folder, "--no-report", "--accept"}).code, 0);
+}
+
 TEST_F(Program, TellsAllItFoundAsJson) {
   const Answer fit = kphi({"fit", steps("5x3"), "--no-report", "--json"});
   ASSERT_EQ(fit.code, 0);

@@ -42,6 +42,18 @@ TEST(Analysis, ABudgetHasEverySourceAndSaysWhichNobodyKnows) {
   EXPECT_NEAR(shares, 1, 1e-12);
 }
 
+TEST(Analysis, TheZerosOwnUncertaintyIsInEveryK) {
+  Study study;
+  const Analysis before = analyse(study.found, study.options);
+  for (results::StepMean& step : study.campaign.steps) step.zero_u_n = 0.05;
+  const Analysis after = analyse(identify(study.campaign.steps), study.options);
+  for (std::size_t i = 0; i < before.coefficients.size(); ++i) {
+    const double u = row_of(after.coefficients[i], "zero").u;
+    EXPECT_NEAR(u, std::hypot(row_of(before.coefficients[i], "zero").u, 0.05 / std::sqrt(3.0)), 1e-12) << "three runs";
+    EXPECT_GT(after.coefficients[i].combined(), before.coefficients[i].combined() * 0.9);
+  }
+}
+
 TEST(Analysis, WhatIsCommonToAllCancelsInTheScalingFactor) {
   Study study;
   const Analysis before = analyse(study.found, study.options);
