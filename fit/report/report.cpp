@@ -133,8 +133,8 @@ std::string test_section(const Analysis& analysis) {
               model && falls ? std::optional<std::size_t>(5) : std::nullopt);
   }
   return section("Tests", table,
-                 "The tests of the model are judged together (Holm): in a perfect campaign one of them falls by chance "
-                 "in one of twenty.");
+                 "The tests of the model are judged together (Holm): of twenty perfect campaigns, one has a rejected "
+                 "test by chance.");
 }
 
 std::string speed_section(const std::vector<SpeedDependence>& speed) {

@@ -25,10 +25,14 @@ struct Suspicion {
   Doubt doubt;
 };
 
-/// The smaller of two tests of one hypothesis, so that both together reject it as rarely as one.
-double of_both(double p, double q) { return std::min(1.0, 2 * std::fmin(p, q)); }
+/// The smaller of two tests of one hypothesis, so that both together reject it as rarely as one; NaN if neither could
+/// be made.
+double of_both(double p, double q) {
+  const double least = 2 * std::fmin(p, q);
+  return least > 1 ? 1 : least;
+}
 
-/// "0.3 %", with as many digits as a small number needs.
+/// "0.32 %", "15 %": two digits, without a sign.
 std::string in_percent(double share) { return fmt::format("{:.2g} %", 100 * std::abs(share)); }
 
 /// Of the φ whose tests say so most clearly.

@@ -27,7 +27,7 @@ class RecordQueue {
   }
   /// Writer: the next `count` slots are filled.
   void fill(std::size_t count) noexcept { written_ += count; }
-  /// Writer: copies the oldest of `records` as far as they fit; returns how many.
+  /// Writer: copies as many of `records` as fit, oldest first; returns how many.
   std::size_t push(std::span<const LoadCellRecord> records) noexcept {
     records = records.first(std::min(records.size(), slots_.size() - waiting()));
     for (const LoadCellRecord& record : records) slots_[written_++ & (slots_.size() - 1)] = record;
