@@ -193,7 +193,12 @@ try {
     assert.match(limits.fz_n, /^device load cell/);
     assert.equal(await page.locator('.limit').count(), Object.keys(limits).length);
     assert.match(await page.locator('.limit', { hasText: 'Coil' }).getAttribute('title'), /Set by: campaign limits\.coil/);
-    const cut = await page.evaluate(() => [...document.querySelectorAll('.limit b, .limit span')].filter(node => node.scrollWidth > node.clientWidth).map(node => node.textContent));
+    // At their widest: as many digits as the limit has, beyond it, in bold.
+    const cut = await page.evaluate(() => {
+      const beyond = state.limits.map(limit => [limit.key, limit.lower ? limit.limit * 0.99 : limit.limit * 1.01]);
+      showLimits({ watched: Object.fromEntries(beyond) });
+      return [...document.querySelectorAll('.limit b, .limit span')].filter(node => node.scrollWidth > node.clientWidth).map(node => `${node.textContent} (${node.scrollWidth} of ${node.clientWidth} px)`);
+    });
     assert.deepEqual(cut, [], 'words that do not fit');
   });
 
