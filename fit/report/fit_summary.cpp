@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "base/number.hpp"
@@ -34,7 +33,7 @@ static void to_json(Json& json, const Estimate& one) {
 void to_json(Json& json, const HypothesisTest& test) {
   json = {{"name", test.name},   {"hypothesis", test.hypothesis}, {"statistic", test.statistic},
           {"value", test.value}, {"freedom", test.freedom},       {"error_freedom", test.error_freedom},
-          {"p", test.p},         {"rejected", test.rejected()}};
+          {"p", test.p}};
 }
 
 static void to_json(Json& json, const Budget& budget) {

@@ -107,34 +107,30 @@ std::string probability(const HypothesisTest& test) {
   return test.p < 0.0001 ? "&lt; 0.0001" : fmt::format("{:.4f}", test.p);
 }
 
-/// Tests of the model fall together or not (Holm); k of neighbouring occlusions should differ.
+/// The verdict at the top of the page is the one judge of the model; k of neighbouring occlusions should differ.
 std::string test_section(const Analysis& analysis) {
-  std::vector<const HypothesisTest*> tests;
-  for (const SpeedDependence& one : analysis.speed) tests.insert(tests.end(), {&one.lack_of_fit, &one.trend});
-  tests.insert(tests.end(), {&analysis.curvature.lack_of_fit, &analysis.curvature.quadratic});
-  std::vector<double> p;
-  for (const HypothesisTest* test : tests) p.push_back(test->p);
-  const std::size_t of_model = tests.size();
-  const double level = holm_level(p);
-  for (const HypothesisTest& test : analysis.differences) tests.push_back(&test);
-  HtmlTable table({text("test"), text("hypothesis"), "statistic", "degrees of freedom", "p", text("verdict (5 %)")});
-  for (std::size_t i = 0; i < tests.size(); ++i) {
-    const HypothesisTest& test = *tests[i];
-    if (test.name.empty()) continue;
-    const bool f = test.error_freedom > 0, model = i < of_model, falls = test.p < (model ? level : kTestLevel);
+  HtmlTable table({text("test"), text("hypothesis"), "statistic", "degrees of freedom", "p"});
+  const auto add = [&table](const HypothesisTest& test) {
+    if (test.name.empty()) return;
+    const bool f = test.error_freedom > 0;
     table.row({typeset(test.name), typeset(test.hypothesis),
                html_escaped(test.statistic) + " = " +
                    html_number(test.value, std::abs(test.value) < 1000 ? "{:.3g}" : "{:.0f}"),
                (f ? fmt::format("{:.0f}, ", test.freedom) : "") + freedom_words(f ? test.error_freedom : test.freedom),
-               probability(test),
-               !test.tested() ? "not tested"
-               : model        ? (falls ? "rejected" : "not rejected")
-                              : (falls ? "they differ" : "not told apart")},
-              model && falls ? std::optional<std::size_t>(5) : std::nullopt);
+               probability(test)});
+  };
+  for (const SpeedDependence& one : analysis.speed) {
+    add(one.lack_of_fit);
+    add(one.trend);
   }
-  return section("Tests", table,
-                 "The tests of the model are judged together (Holm): of twenty perfect campaigns, one has a rejected "
-                 "test by chance.");
+  add(analysis.curvature.lack_of_fit);
+  add(analysis.curvature.quadratic);
+  for (const HypothesisTest& test : analysis.differences) add(test);
+  return section(
+      "Tests", table,
+      "p is the probability of at least this statistic if the hypothesis is true; – : too few data. Among "
+      "so many tests a single p below 0.05 is expected. The verdict at the top of the page judges all of the "
+      "model together (Holm, 5 %).");
 }
 
 std::string speed_section(const std::vector<SpeedDependence>& speed) {
@@ -405,8 +401,7 @@ std::string slopes_section(std::span<const SharedSlope> slopes) {
                  "single propeller never takes a point as known better than 0.1 % of K<sub>T</sub>.");
 }
 
-// ---- the page
-// ----------------------------------------------------------------------------------------------------------
+// ---- the page ----------------------------------------------------------------------------------------------
 
 std::string card(const std::string& title, const Budget& budget, const std::string& per, const std::string& more) {
   const double value = budget.value, error = budget.expanded();
