@@ -83,8 +83,9 @@ std::string curve_block(const Fitted& fitted) {
   const CurveFit& fit = fitted.identification.curve_fit;
   std::vector<double> points;
   for (const LinePoint& point : fit.points) points.push_back(point.phi_deg);
-  std::string text = "K_T: " + entry_of(fitted.analysis.coefficients.front(), ", phi_deg: 0.0", "") +
-                     fmt::format("line:\n  anchored: {}\n  points_deg: {}\n", fit.anchored, list(points));
+  std::string text =
+      "K_T: " + entry_of(fitted.analysis.coefficients.front(), ", phi_deg: 0.0", "") +
+      fmt::format("{}:\n  anchored: {}\n  points_deg: {}\n", name_of(fit.form), fit.anchored, list(points));
   for (std::size_t i = 0; i < fit.parameters.size(); ++i)
     text += "  " + fit.parameters[i].key + ": " + entry_of(fitted.analysis.parameters[i], "", fit.parameters[i].per);
   return text;
@@ -205,7 +206,8 @@ Enum named(const std::string& name, const char* key, const std::string& path, st
 
 std::string estimator_words(const Identification& identification) {
   const bool from_steps = !identification.table.empty() && identification.table.front().fit.has_value();
-  if (!from_steps) return "a weighted line through given k(phi)";
+  const char* const form = name_of(identification.options.line.form);
+  if (!from_steps) return fmt::format("a weighted {} through given k(phi)", form);
   constexpr std::array<const char*, 4> words{
       "least squares of T on w^2 through the origin", "least squares of T on w^2 with an offset",
       "T/w^2 at the reference speed, by least squares of T on w^2, w and 1", "mean T/w^2 at the reference speed"};
@@ -214,7 +216,7 @@ std::string estimator_words(const Identification& identification) {
     text += fmt::format(", weighted by {}",
                         identification.options.weighting == Weighting::thrust ? "u(T)" : "u(T) and u(w)");
   if (identification.options.loss != Loss::none) text += fmt::format(", {} loss", name_of(identification.options.loss));
-  return text + ", then a weighted line through k(phi)";
+  return text + fmt::format(", then a weighted {} through k(phi)", form);
 }
 
 std::string format_coefficients(const Fitted& fitted, const Provenance& provenance) {
@@ -234,6 +236,7 @@ RecordedFit read_recorded_fit(const std::string& path) {
   options.blades = file.propeller.blades;
   options.overlap = file.curve.overlap();
   file.curve.visit([&](const compensation::Line&) {
+    options.line.form = CurveForm::line;
     options.line.anchored = file.anchored;
     for (const Radians& point : file.points) options.line.points_deg.push_back(to_degrees(point));
   });

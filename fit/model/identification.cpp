@@ -133,7 +133,7 @@ std::vector<LinePoint> line_points(const std::vector<OcclusionCoefficient>& tabl
 
 /// The curve through the table. Throws FitError if it cannot fly.
 Identification with_curve(Identification result) {
-  result.curve_fit = fit_line(line_points(result.table), result.options.line);
+  result.curve_fit = fit_curve(line_points(result.table), result.options.line);
   (void)result.curve();
   return result;
 }

@@ -111,53 +111,6 @@ std::array<std::vector<double>, 2> line_weights(const CurveFit& fit, const std::
   return result;
 }
 
-}  // namespace
-
-std::optional<double> CurveFit::falls_to(double k) const {
-  const double slope = k_at(1) - k_at(0);
-  return slope < 0 ? std::optional((k - k_at(0)) / slope) : std::nullopt;
-}
-
-std::vector<double> CurveFit::basis_at(double phi_deg) const { return {1, phi_deg}; }
-
-double CurveFit::k_at(double phi_deg) const {
-  double k = 0;
-  const std::vector<double> basis = basis_at(phi_deg);
-  for (std::size_t i = 0; i < parameters.size(); ++i) k += basis[i] * parameters[i].value;
-  return k;
-}
-
-std::vector<double> CurveFit::weights_at(double phi_deg) const {
-  std::vector<double> at(parameters.front().weights.size());
-  const std::vector<double> basis = basis_at(phi_deg);
-  for (std::size_t i = 0; i < parameters.size(); ++i)
-    for (std::size_t j = 0; j < at.size(); ++j) at[j] += basis[i] * parameters[i].weights[j];
-  return at;
-}
-
-const CurveParameter* CurveFit::find(const std::string& key) const {
-  const auto found = std::ranges::find(parameters, key, &CurveParameter::key);
-  return found == parameters.end() ? nullptr : &*found;
-}
-
-double CurveFit::value(const std::string& key) const {
-  if (const CurveParameter* parameter = find(key)) return parameter->value;
-  throw std::out_of_range("the curve has no parameter " + key);
-}
-
-compensation::ThrustCurve CurveFit::curve(std::optional<double> largest_deg,
-                                          compensation::OverlapMeasure overlap) const {
-  constexpr double kPerRad = 180 / kPi;
-  const auto curve = compensation::ThrustCurve::from_line(
-      ThrustCoefficient(K_T), ThrustCoefficient(value("intercept")), value("slope_per_deg") * kPerRad,
-      from_degrees(largest_deg.value_or(points.back().phi_deg)), overlap);
-  if (curve) return *curve;
-  throw FitError(fmt::format(
-      "line fit: K_T = {:.4g} and k of the line at phi = 0, {:.4g} N/(rad/s)^2, must be positive; check the "
-      "sign of the thrust and which points carry the line",
-      K_T, k_at(0)));
-}
-
 CurveFit fit_line(std::span<const LinePoint> points, const LineFitOptions& options) {
   const std::vector<LinePoint> all = sorted(points);
   if (all.empty() || std::abs(all.front().phi_deg) > kSameAngleDeg)
@@ -190,6 +143,127 @@ CurveFit fit_line(std::span<const LinePoint> points, const LineFitOptions& optio
       {"slope_per_deg", "slope", "/deg", line.estimates.back(), std::move(slope)}};
   fit.residuals = line.residuals;
   return fit;
+}
+
+std::vector<std::string> line_remarks(const CurveFit& line, const Estimate& mismatch, double largest_deg) {
+  std::vector<std::string> remarks;
+  const double share = 100 * line.mismatch() / line.K_T;
+  if (!line.anchored) {
+    const bool beyond_error = student_test(mismatch, 0).rejected();
+    remarks.push_back(fmt::format("the line's intercept is {:+.2f} % from K_T, {} its error", share,
+                                  beyond_error ? "beyond" : "within"));
+  }
+  if (!line.zero_crossing_deg()) {
+    remarks.push_back(
+        "the line does not fall with phi: either the occlusion costs no thrust or the runs were mixed up");
+    return remarks;
+  }
+  const double clipping = *line.clipping_deg(), zero = *line.zero_crossing_deg();
+  if (clipping > 0)
+    remarks.push_back(fmt::format("up to {:.1f}° the line is above K_T, so k_i is held at 1", clipping));
+  if (clipping < 0)
+    remarks.push_back(
+        fmt::format("at first contact the line is already {:.2f} % below K_T, so k_i steps there", -share));
+  if (zero < 360)
+    remarks.push_back(fmt::format("the line reaches 0 at {:.1f}°; it was measured up to {}°", zero, largest_deg));
+  return remarks;
+}
+
+}  // namespace
+
+const char* name_of(CurveForm form) {
+  switch (form) {
+    case CurveForm::line:
+      return "line";
+  }
+  return "";
+}
+
+std::optional<double> CurveFit::falls_to(double k) const {
+  switch (form) {
+    case CurveForm::line: {
+      const double slope = value("slope_per_deg");
+      return slope < 0 ? std::optional((k - k_at(0)) / slope) : std::nullopt;
+    }
+  }
+  return std::nullopt;
+}
+
+std::vector<double> CurveFit::basis_at(double phi_deg) const {
+  switch (form) {
+    case CurveForm::line:
+      return {1, phi_deg};
+  }
+  return {};
+}
+
+double CurveFit::k_at(double phi_deg) const {
+  double k = 0;
+  const std::vector<double> basis = basis_at(phi_deg);
+  for (std::size_t i = 0; i < parameters.size(); ++i) k += basis[i] * parameters[i].value;
+  return k;
+}
+
+std::vector<double> CurveFit::weights_at(double phi_deg) const {
+  std::vector<double> at(parameters.front().weights.size());
+  const std::vector<double> basis = basis_at(phi_deg);
+  for (std::size_t i = 0; i < parameters.size(); ++i)
+    for (std::size_t j = 0; j < at.size(); ++j) at[j] += basis[i] * parameters[i].weights[j];
+  return at;
+}
+
+const CurveParameter* CurveFit::find(const std::string& key) const {
+  const auto found = std::ranges::find(parameters, key, &CurveParameter::key);
+  return found == parameters.end() ? nullptr : &*found;
+}
+
+double CurveFit::value(const std::string& key) const {
+  if (const CurveParameter* parameter = find(key)) return parameter->value;
+  throw std::out_of_range("the curve has no parameter " + key);
+}
+
+compensation::ThrustCurve CurveFit::curve(std::optional<double> largest_deg,
+                                          compensation::OverlapMeasure overlap) const {
+  constexpr double kPerRad = 180 / kPi;
+  const Radians largest = from_degrees(largest_deg.value_or(points.back().phi_deg));
+  std::optional<compensation::ThrustCurve> curve;
+  switch (form) {
+    case CurveForm::line:
+      curve = compensation::ThrustCurve::from_line(ThrustCoefficient(K_T), ThrustCoefficient(value("intercept")),
+                                                   value("slope_per_deg") * kPerRad, largest, overlap);
+  }
+  if (curve) return *curve;
+  throw FitError(fmt::format(
+      "line fit: K_T = {:.4g} and k of the line at phi = 0, {:.4g} N/(rad/s)^2, must be positive; check the "
+      "sign of the thrust and which points carry the line",
+      K_T, k_at(0)));
+}
+
+Curvature CurveFit::tested(double freedom) const {
+  switch (form) {
+    case CurveForm::line: {
+      std::vector<LinePoint> with_zero = points;
+      if (anchored && points.front().phi_deg != 0) with_zero.insert(with_zero.begin(), {0, K_T, K_T_standard_error});
+      return curvature(with_zero, freedom);
+    }
+  }
+  return {};
+}
+
+std::vector<std::string> CurveFit::remarks(const Estimate& mismatch, double largest_deg) const {
+  switch (form) {
+    case CurveForm::line:
+      return line_remarks(*this, mismatch, largest_deg);
+  }
+  return {};
+}
+
+CurveFit fit_curve(std::span<const LinePoint> points, const LineFitOptions& options) {
+  switch (options.form) {
+    case CurveForm::line:
+      return fit_line(points, options);
+  }
+  return {};
 }
 
 Curvature curvature(std::span<const LinePoint> points, double freedom) {

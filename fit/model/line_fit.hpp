@@ -7,6 +7,7 @@
 // contact, but the residual is larger.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -23,7 +24,28 @@ struct LinePoint {
   double standard_error = 0;  ///< of k; 0 or NaN: unknown
 };
 
+/// Forms of k(φ). What depends on the form is a switch over all of them in line_fit.cpp, and a function for each form
+/// where one is visited: where a further form is missing does not compile.
+enum class CurveForm : std::uint8_t { line };
+
+/// "line": for people, and the key in coefficients.yaml.
+[[nodiscard]] const char* name_of(CurveForm form);
+
+struct Curvature {
+  HypothesisTest lack_of_fit;  ///< of the line: χ²/(m − 2) against the variance of the coefficients
+  HypothesisTest quadratic;    ///< F test of the parabola's third term
+  double second_order = 0;     ///< N/(rad/s)²/deg², of the parabola
+  double second_order_u = 0;
+  double linear_aic = 0, quadratic_aic = 0;  ///< corrected for small samples (AICc); the lower one describes better
+  [[nodiscard]] bool bends() const { return lack_of_fit.rejected() || quadratic.rejected(); }
+};
+
+/// Tests whether k(φ) is a line, by the `points` that carry it (with φ = 0 if anchored) and their standard errors;
+/// `freedom` of the variance behind those errors. Needs 3 points; with 3 the two tests are the same.
+[[nodiscard]] Curvature curvature(std::span<const LinePoint> points, double freedom);
+
 struct LineFitOptions {
+  CurveForm form = CurveForm::line;
   bool anchored = false;             ///< the intercept is K_T
   std::vector<double> points_deg{};  ///< which points carry the line; empty: all with φ > 0
 };
@@ -41,7 +63,8 @@ struct CurveParameter {
 /// k(φ) as fitted: a linear function of its parameters. What comes after the fit asks for k, weights and parameters and
 /// does not know the form.
 struct CurveFit {
-  bool anchored = false;
+  CurveForm form = CurveForm::line;
+  bool anchored = false;  ///< k(0) of the curve is K_T
   std::vector<CurveParameter> parameters;
   std::vector<LinePoint> points;  ///< used, ascending φ
   std::vector<double> residuals;  ///< k − curve, N/(rad/s)², one per point used
@@ -65,29 +88,20 @@ struct CurveFit {
   [[nodiscard]] double value(const std::string& key) const;
   /// k(0) − K_T: by how much the curve misses the measured k(0).
   [[nodiscard]] double mismatch() const { return k_at(0) - K_T; }
-  /// φ where the line meets K_T; below it the line is above K_T and compensation clips. nullopt unless the slope is
-  /// negative.
+  /// φ where the curve meets K_T; below it the curve is above K_T and compensation clips. nullopt unless it falls.
   [[nodiscard]] std::optional<double> clipping_deg() const { return falls_to(K_T); }
-  /// φ where the line predicts no thrust at all. nullopt unless the slope is negative.
+  /// φ where the curve predicts no thrust at all. nullopt unless it falls.
   [[nodiscard]] std::optional<double> zero_crossing_deg() const { return falls_to(0); }
   [[nodiscard]] std::optional<double> falls_to(double k) const;
+  /// Of the form, by the points that carry it; see curvature().
+  [[nodiscard]] Curvature tested(double freedom) const;
+  /// What a pilot should know of the form: intercept beside K_T, clipping, zero. `mismatch` is that of k(0) with its
+  /// error, `largest_deg` the widest occlusion measured.
+  [[nodiscard]] std::vector<std::string> remarks(const Estimate& mismatch, double largest_deg) const;
 };
 
 /// `points` hold exactly one φ = 0 (K_T) and the occluded ones, each φ once. Throws FitError when K_T is missing, a φ
 /// is listed twice or not measured, or too few points remain (free: 2, anchored: 1 with φ > 0).
-[[nodiscard]] CurveFit fit_line(std::span<const LinePoint> points, const LineFitOptions& options = {});
-
-struct Curvature {
-  HypothesisTest lack_of_fit;  ///< of the line: χ²/(m − 2) against the variance of the coefficients
-  HypothesisTest quadratic;    ///< F test of the parabola's third term
-  double second_order = 0;     ///< N/(rad/s)²/deg², of the parabola
-  double second_order_u = 0;
-  double linear_aic = 0, quadratic_aic = 0;  ///< corrected for small samples (AICc); the lower one describes better
-  [[nodiscard]] bool bends() const { return lack_of_fit.rejected() || quadratic.rejected(); }
-};
-
-/// Tests whether k(φ) is a line, by the `points` that carry it (with φ = 0 if anchored) and their standard errors;
-/// `freedom` of the variance behind those errors. Needs 3 points; with 3 the two tests are the same.
-[[nodiscard]] Curvature curvature(std::span<const LinePoint> points, double freedom);
+[[nodiscard]] CurveFit fit_curve(std::span<const LinePoint> points, const LineFitOptions& options = {});
 
 }  // namespace kphi::fit

@@ -61,7 +61,7 @@ double share_bottom(const std::vector<ThrustShares>& shares) {
   return 10 * std::floor(bottom / 10);
 }
 
-/// The line with its 95 % interval, by the whole budget.
+/// The curve with its 95 % interval, by the whole budget.
 std::string curve_rows(const Fitted& fitted, double from_deg, double to_deg) {
   constexpr int kPieces = 60;
   const compensation::ThrustCurve curve = fitted.identification.curve();
@@ -110,7 +110,7 @@ Figure share_figure(const Fitted& fitted, const std::vector<ThrustShares>& share
   Figure figure{
       "thrust_share",
       fmt::format("Thrust in percent of the thrust without occlusion (boxes, left axis{}) and the coefficient "
-                  "k(φ) over all speeds (right axis, bars and band: 95 %). The line is solid "
+                  "k(φ) over all speeds (right axis, bars and band: 95 %). The fitted k(φ) is solid "
                   "between the measured occlusions and dashed below them.",
                   at ? fmt::format(", at {:.0f} RPM", rpm(identification.at_speed_rad_s)) : ""),
       {},
@@ -141,7 +141,7 @@ Figure share_figure(const Fitted& fitted, const std::vector<ThrustShares>& share
   curves.insert(
       curves.end(),
       {"$before using 1:2 axes x1y2 with lines dt 2 lw 1.5 lc rgb '#D55E00' notitle",
-       "$line using 1:2 axes x1y2 with lines lw 2.5 lc rgb '#D55E00' title 'line k(φ)'",
+       "$line using 1:2 axes x1y2 with lines lw 2.5 lc rgb '#D55E00' title 'fitted k(φ)'",
        "$k using 1:2:3 axes x1y2 with yerrorbars pt 7 ps 0.6 lw 1.4 lc rgb '#222222' title 'k of each occlusion'"});
   figure.script = figure_head() + data + share_axes(identification, shares) + plot(curves);
   return figure;
@@ -358,8 +358,8 @@ std::vector<ThrustShares> shares_of_steps(const Identification& identification) 
 
 Figure family_figure(std::span<const Fitted> family) {
   Figure figure{"family",
-                "Left: k(φ) of every propeller with its line and 95 % intervals. Right: the same as a share of its "
-                "own K_T; propellers whose lines coincide there lose the same share of thrust.",
+                "Left: k(φ) of every propeller as fitted, with 95 % intervals. Right: the same as a share of its "
+                "own K_T; propellers that coincide there lose the same share of thrust.",
                 {},
                 "propeller,phi_deg,k_n_s2_per_rad2,expanded_95,share_of_K_T\n"};
   std::string data;

@@ -156,8 +156,8 @@ std::string torque_section(const std::vector<TorqueCoefficient>& torque) {
 }
 
 std::string prediction_section(const std::vector<LinePrediction>& predictions) {
-  HtmlTable table({"φ", "k on the line, 10⁻⁶ N/(rad/s)²", "95 %: ±", "k<sub>i</sub>", "95 %: ±", "u of the speed ω̂, %",
-                   text("remark")});
+  HtmlTable table(
+      {"φ", "k(φ), 10⁻⁶ N/(rad/s)²", "95 %: ±", "k<sub>i</sub>", "95 %: ±", "u of the speed ω̂, %", text("remark")});
   for (const LinePrediction& one : predictions)
     table.row({html_angle(one.phi_deg), html_number(1e6 * one.k.value, "{:.5f}"),
                html_number(1e6 * one.k.expanded(), "{:.5f}"), html_number(one.scaling_factor.value, "{:.4f}"),
@@ -165,7 +165,7 @@ std::string prediction_section(const std::vector<LinePrediction>& predictions) {
                one.clipped        ? "above K<sub>T</sub>, held at 1"
                : one.extrapolated ? "extrapolated"
                                   : ""});
-  return section("The line in flight", table);
+  return section("k(φ) in flight", table);
 }
 
 std::string rejected_section(const std::vector<RejectedPoint>& rejected) {
@@ -254,7 +254,7 @@ std::string coefficient_section(const Fitted& fitted) {
   const std::string at =
       identification.at_speed_rad_s > 0 ? " at " + rpm_text(identification.at_speed_rad_s) + " RPM" : "";
   const std::string units = ", N/(rad/s)²<br/><span class=\"soft\">N/RPM²</span>";
-  HtmlTable table({"φ", "k" + units, "k" + at + units, "thrust share<br/>" + at, "line − k", "residual<br/>rms, mN",
+  HtmlTable table({"φ", "k" + units, "k" + at + units, "thrust share<br/>" + at, "k(φ) − k", "residual<br/>rms, mN",
                    "R²", "steps"});
   for (std::size_t i = 0; i < identification.table.size(); ++i) {
     const OcclusionCoefficient& row = identification.table[i];
@@ -268,7 +268,7 @@ std::string coefficient_section(const Fitted& fitted) {
   }
   return section("Coefficients", table,
                  typeset(plus_minus_words(analysis.coefficients.front())) +
-                     ". The budget below lists its sources. Line − k is in percent of K<sub>T</sub>; the thrust share "
+                     ". The budget below lists its sources. k(φ) − k is in percent of K<sub>T</sub>; the thrust share "
                      "is k over k(0) at the same speed.");
 }
 
@@ -356,7 +356,8 @@ std::string provenance_section(const Identification& identification, const Prove
   html += entry("Campaign", known(provenance.campaign));
   html += entry("Fitted from", provenance.source);
   html += entry("Model", "T = k ω²: " + estimator_words(identification));
-  html += entry("Line", (line.anchored ? "anchored at K_T, points " : "free, points ") + points);
+  html += entry("k(φ)", std::string(name_of(line.form)) + ", " +
+                            (line.anchored ? "anchored at K_T, points " : "free, points ") + points);
   if (speeds_known(identification))
     html += entry("Speeds", rpm_text(identification.speed_min_rad_s) + " to " +
                                 rpm_text(identification.speed_max_rad_s) + " RPM");
@@ -426,8 +427,8 @@ std::string headline(const Fitted& fitted) {
   const Budget& K_T = analysis.coefficients.front();
   std::string cards = card("Thrust coefficient K<sub>T</sub> = k(0)", K_T, "", "<p>measured without occlusion</p>");
   for (std::size_t i = 0; i < analysis.parameters.size(); ++i)
-    cards += card("Line k(φ): " + analysis.parameters[i].quantity, analysis.parameters[i], line.parameters[i].per,
-                  i + 1 == analysis.parameters.size() ? shape : "");
+    cards += card(fmt::format("k(φ), {}: {}", name_of(line.form), analysis.parameters[i].quantity),
+                  analysis.parameters[i], line.parameters[i].per, i + 1 == analysis.parameters.size() ? shape : "");
   return "<div class=\"cards\">\n" + cards + "</div>\n" + html_note(typeset(plus_minus_words(K_T)) + ".");
 }
 

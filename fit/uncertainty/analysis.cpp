@@ -30,7 +30,7 @@ ErrorSources sources_of(const Identification& identification, const Analysis& an
 
 /// Deviation from the line beyond the errors of its points, once a test has rejected the line.
 BudgetRow line_row(const CurveFit& line, const Curvature& curvature) {
-  BudgetRow row{.source = "line k(phi)",
+  BudgetRow row{.source = fmt::format("{} k(phi)", name_of(line.form)),
                 .unit = kUnitOfK,
                 .sensitivity = 1,
                 .note = "deviation of its points beyond their errors, where a test finds it"};
@@ -86,7 +86,8 @@ LinePrediction predict(const Identification& identification, const ErrorSources&
   LinePrediction prediction;
   prediction.phi_deg = phi_deg;
   const double k = curve.at(from_degrees(phi_deg)).value();
-  prediction.k = sources.budget(fmt::format("line at {} deg", phi_deg), kUnitOfK, k, at);
+  prediction.k =
+      sources.budget(fmt::format("{} at {} deg", name_of(identification.curve_fit.form), phi_deg), kUnitOfK, k, at);
   prediction.k.rows.push_back(scaled(row, std::sqrt(1 + std::pow(norm(at), 2))));
   prediction.speed_u_share = k > 0 ? 0.5 * prediction.k.combined() / k : std::numeric_limits<double>::infinity();
   std::vector<double> ratio = at;
@@ -111,33 +112,15 @@ LineShape shape_of(const CurveFit& fit, const ErrorSources& sources, const Budge
 }
 
 std::vector<std::string> remarks_of(const Identification& identification, const Analysis& analysis) {
-  const CurveFit& line = identification.curve_fit;
   std::vector<std::string> remarks;
-  const double largest = identification.table.back().phi_deg;
-  const double share = 100 * line.mismatch() / line.K_T;
   for (const OutlyingRun& run : analysis.outlying)
     remarks.push_back(fmt::format(
         "repetition {} at {}° stands out, {:+.2f} % from the others ({}): it is kept, and its scatter is in the "
         "budget of every k; look for a cause and repeat this occlusion",
         run.repetition, run.phi_deg, 100 * run.share, std::isnan(run.p) ? "Hampel" : fmt::format("p = {:.2g}", run.p)));
-  if (!line.anchored) {
-    const bool beyond_error = student_test(analysis.shape.mismatch, 0).rejected();
-    remarks.push_back(fmt::format("the line's intercept is {:+.2f} % from K_T, {} its error", share,
-                                  beyond_error ? "beyond" : "within"));
-  }
-  if (!line.zero_crossing_deg()) {
-    remarks.push_back(
-        "the line does not fall with phi: either the occlusion costs no thrust or the runs were mixed up");
-    return remarks;
-  }
-  const double clipping = *line.clipping_deg(), zero = *line.zero_crossing_deg();
-  if (clipping > 0)
-    remarks.push_back(fmt::format("up to {:.1f}° the line is above K_T, so k_i is held at 1", clipping));
-  if (clipping < 0)
-    remarks.push_back(
-        fmt::format("at first contact the line is already {:.2f} % below K_T, so k_i steps there", -share));
-  if (zero < 360)
-    remarks.push_back(fmt::format("the line reaches 0 at {:.1f}°; it was measured up to {}°", zero, largest));
+  for (std::string& remark :
+       identification.curve_fit.remarks(analysis.shape.mismatch, identification.table.back().phi_deg))
+    remarks.push_back(std::move(remark));
   return remarks;
 }
 
@@ -195,14 +178,6 @@ std::vector<Budget> standard_air(const Identification& identification, const std
   return result;
 }
 
-std::vector<LinePoint> with_errors(const Identification& identification) {
-  const CurveFit& fit = identification.curve_fit;
-  std::vector<LinePoint> points = fit.points;
-  const bool zero_carries = points.front().phi_deg == 0;
-  if (fit.anchored && !zero_carries) points.insert(points.begin(), {0, fit.K_T, fit.K_T_standard_error});
-  return points;
-}
-
 }  // namespace
 
 const Budget* Analysis::parameter(const std::string& name) const {
@@ -222,8 +197,8 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
         sources.budget(name_of_k(phis[i]), kUnitOfK, identification.table[i].k, unit_vector(phis.size(), i)));
 
   const double freedom = from_steps ? identification.repeatability.freedom() : std::numeric_limits<double>::infinity();
-  analysis.curvature = curvature(with_errors(identification), freedom);
   const CurveFit& fit = identification.curve_fit;
+  analysis.curvature = fit.tested(freedom);
   const BudgetRow row = line_row(fit, analysis.curvature);
   for (const CurveParameter& parameter : fit.parameters)
     analysis.parameters.push_back(budget_of(parameter, sources, row));

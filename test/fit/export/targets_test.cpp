@@ -159,7 +159,7 @@ TEST(CsvExport, IsFittedAgainToTheSameCoefficients) {
   ASSERT_TRUE(is_k_table(text));
   const auto points = read_k_table(text, "K.csv");
   ASSERT_EQ(points.size(), 5u);
-  const CurveFit line = fit_line(points);
+  const CurveFit line = fit_curve(points);
   EXPECT_NEAR(line.value("slope_per_deg") / (compensation::line_of(file.curve).slope_per_rad * kPi / 180), 1, 1e-9);
   EXPECT_EQ(line.K_T, file.curve.thrust_coefficient().value());
 }

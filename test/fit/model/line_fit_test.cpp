@@ -23,7 +23,7 @@ std::vector<LinePoint> paper_points(double standard_error = 1e-9) {
 }
 
 TEST(LineFit, FindsThePapersLineThroughTheOccludedPoints) {
-  const CurveFit fit = fit_line(paper_points());
+  const CurveFit fit = fit_curve(paper_points());
   EXPECT_NEAR(fit.value("intercept") / kThrustCoefficient, 1.03, 1e-12);
   EXPECT_NEAR(fit.value("slope_per_deg") / kThrustCoefficient, -0.65 / 225, 1e-14);
   EXPECT_EQ(fit.points.size(), 4u);
@@ -34,19 +34,19 @@ TEST(LineFit, FindsThePapersLineThroughTheOccludedPoints) {
 
 TEST(LineFit, LeavesThePointAtZeroOutUnlessAskedForIt) {
   auto points = paper_points();
-  const CurveFit apart = fit_line(points);
+  const CurveFit apart = fit_curve(points);
   points.front().k *= 1.1;
-  const CurveFit moved = fit_line(points);
+  const CurveFit moved = fit_curve(points);
   EXPECT_NEAR(apart.value("slope_per_deg") / moved.value("slope_per_deg"), 1, 1e-12);
   EXPECT_NE(apart.K_T, moved.K_T);
-  const CurveFit with_zero = fit_line(paper_points(), {.points_deg = {0, 45, 90, 180, 270}});
+  const CurveFit with_zero = fit_curve(paper_points(), {.points_deg = {0, 45, 90, 180, 270}});
   // facts: free through the four points and (0, 1): -0.002814 per degree, 1.0153
   EXPECT_NEAR(with_zero.value("slope_per_deg") / kThrustCoefficient, -0.002814, 2e-6);
   EXPECT_NEAR(with_zero.value("intercept") / kThrustCoefficient, 1.0153, 1e-4);
 }
 
 TEST(LineFit, AnchoredStartsAtTheMeasuredThrustCoefficient) {
-  const CurveFit fit = fit_line(paper_points(), {.anchored = true});
+  const CurveFit fit = fit_curve(paper_points(), {.anchored = true});
   EXPECT_EQ(fit.value("intercept"), kThrustCoefficient);
   EXPECT_EQ(fit.mismatch(), 0);
   EXPECT_NEAR(fit.value("slope_per_deg") / kThrustCoefficient, -0.0027368, 1e-6);
@@ -75,7 +75,7 @@ TEST(LineFit, IsTheClosedFormOfAWeightedLine) {
       sxy += w * p.phi_deg * p.k;
     }
     const double determinant = s * sxx - sx * sx;
-    const CurveFit fit = fit_line(points);
+    const CurveFit fit = fit_curve(points);
     EXPECT_NEAR(fit.value("intercept") / ((sxx * sy - sx * sxy) / determinant), 1, 1e-11);
     EXPECT_NEAR(fit.value("slope_per_deg") / ((s * sxy - sx * sy) / determinant), 1, 1e-11);
   }
@@ -85,14 +85,14 @@ TEST(LineFit, FloorsTheErrorsSoThatOneRunCannotRuleTheLine) {
   auto points = paper_points(1e-8);
   points[1].standard_error = 1e-20;
   points[1].k *= 1.02;
-  const CurveFit fit = fit_line(points);
+  const CurveFit fit = fit_curve(points);
   EXPECT_GT(std::abs(fit.residuals[0]), 1e-4 * points[1].k);
 }
 
 TEST(LineFit, TakesTheFloorWhereAnErrorIsNotKnown) {
   auto points = paper_points(0);
   points[2].standard_error = std::numeric_limits<double>::quiet_NaN();
-  const CurveFit fit = fit_line(points);
+  const CurveFit fit = fit_curve(points);
   EXPECT_NEAR(fit.value("intercept") / kThrustCoefficient, 1.03, 1e-12);
   EXPECT_NEAR(fit.K_T_standard_error / (1e-3 * kThrustCoefficient), 1, 1e-12);
 }
@@ -100,7 +100,7 @@ TEST(LineFit, TakesTheFloorWhereAnErrorIsNotKnown) {
 TEST(LineFit, UsesTheChosenPointsInAnyOrder) {
   auto points = paper_points();
   points[1].k *= 2;
-  const CurveFit fit = fit_line(points, {.points_deg = {270, 90, 180}});
+  const CurveFit fit = fit_curve(points, {.points_deg = {270, 90, 180}});
   EXPECT_NEAR(fit.value("intercept") / kThrustCoefficient, 1.03, 1e-12);
   ASSERT_EQ(fit.points.size(), 3u);
   EXPECT_EQ(fit.points.front().phi_deg, 90);
@@ -108,21 +108,21 @@ TEST(LineFit, UsesTheChosenPointsInAnyOrder) {
 
 TEST(LineFit, HasNoCrossingsUnlessItFalls) {
   std::vector<LinePoint> rising{{0, 1e-6, 0}, {90, 1.1e-6, 0}, {180, 1.2e-6, 0}};
-  const CurveFit fit = fit_line(rising);
+  const CurveFit fit = fit_curve(rising);
   EXPECT_FALSE(fit.clipping_deg());
   EXPECT_FALSE(fit.zero_crossing_deg());
 }
 
 TEST(LineFit, RefusesWhatMakesNoLine) {
   const auto points = paper_points();
-  EXPECT_THROW((void)fit_line(std::vector<LinePoint>{}), FitError);
-  EXPECT_THROW((void)fit_line(std::vector<LinePoint>(points.begin() + 1, points.end())), FitError) << "no K_T";
-  EXPECT_THROW((void)fit_line(std::vector<LinePoint>{points[0], points[1]}), FitError);
-  EXPECT_NO_THROW((void)fit_line(std::vector<LinePoint>{points[0], points[1]}, {.anchored = true}));
-  EXPECT_THROW((void)fit_line(std::vector<LinePoint>{points[0], points[1], points[1]}), FitError);
-  EXPECT_THROW((void)fit_line(points, {.points_deg = {45, 60}}), FitError);
-  EXPECT_THROW((void)fit_line(points, {.points_deg = {45, 45}}), FitError);
-  EXPECT_THROW((void)fit_line(points, {.anchored = true, .points_deg = {0}}), FitError);
+  EXPECT_THROW((void)fit_curve(std::vector<LinePoint>{}), FitError);
+  EXPECT_THROW((void)fit_curve(std::vector<LinePoint>(points.begin() + 1, points.end())), FitError) << "no K_T";
+  EXPECT_THROW((void)fit_curve(std::vector<LinePoint>{points[0], points[1]}), FitError);
+  EXPECT_NO_THROW((void)fit_curve(std::vector<LinePoint>{points[0], points[1]}, {.anchored = true}));
+  EXPECT_THROW((void)fit_curve(std::vector<LinePoint>{points[0], points[1], points[1]}), FitError);
+  EXPECT_THROW((void)fit_curve(points, {.points_deg = {45, 60}}), FitError);
+  EXPECT_THROW((void)fit_curve(points, {.points_deg = {45, 45}}), FitError);
+  EXPECT_THROW((void)fit_curve(points, {.anchored = true, .points_deg = {0}}), FitError);
 }
 
 std::vector<LinePoint> points(double bend, double error = 0.01) {
