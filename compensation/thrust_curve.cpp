@@ -29,19 +29,20 @@ std::optional<ThrustCurve> ThrustCurve::from_line(ThrustCoefficient thrust_coeff
   if (!std::isfinite(slope_per_rad)) return std::nullopt;
   if (!positive(largest_fitted.value()) || largest_fitted.value() > 2 * kPi) return std::nullopt;
   if (name_of(overlap) == "unknown" || (uncertainty && !sound(*uncertainty))) return std::nullopt;
-  return ThrustCurve(thrust_coefficient, {intercept, slope_per_rad}, largest_fitted, overlap, uncertainty);
+  return ThrustCurve(thrust_coefficient, {intercept, slope_per_rad, uncertainty}, largest_fitted, overlap);
 }
 
 double ThrustCurve::standard_error_at(Radians occlusion_angle) const noexcept {
-  return uncertainty_ ? std::sqrt(std::max(variance_at(*uncertainty(), occlusion_angle.value()), 0.0)) : kUnknown;
+  const auto& u = line_.uncertainty;
+  return u ? std::sqrt(std::max(variance_at(*u, occlusion_angle.value()), 0.0)) : kUnknown;
 }
 
 double ThrustCurve::relative_uncertainty(Radians occlusion_angle, Radians angle_uncertainty,
                                          ScalingLaw law) const noexcept {
   const double phi = occlusion_angle.value(), reference = thrust_coefficient_.value(), k = at(occlusion_angle).value();
   const double factor = scaling_factor(occlusion_angle, law);
-  if (!uncertainty_ || phi != phi || !(factor > kScalingFloor)) return kUnknown;
-  const LineUncertainty& u = *uncertainty();
+  if (!line_.uncertainty || phi != phi || !(factor > kScalingFloor)) return kUnknown;
+  const LineUncertainty& u = *line_.uncertainty;
   if (law == ScalingLaw::clamped && factor == 1.0) return u.thrust_coefficient / reference;
   const double from_angle = line_.slope_per_rad * angle_uncertainty.value();
   double variance = variance_at(u, phi) + from_angle * from_angle;

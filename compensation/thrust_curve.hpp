@@ -22,18 +22,19 @@ enum class ScalingLaw : std::uint8_t {
 /// The smallest k_i of ScalingLaw::clamped: the speed is raised by 1/sqrt(0.1) = 3.16 at most.
 inline constexpr double kScalingFloor = 0.1;
 
-/// k(φ) = intercept + slope φ.
-struct Line {
-  ThrustCoefficient intercept;  ///< k at φ = 0 [N/(rad/s)²], positive; K_T only if the fit was anchored
-  double slope_per_rad = 0;     ///< N/(rad/s)² per rad, finite, usually negative
-};
-
 /// How well K_T and the line are known, one standard deviation, SI.
 struct LineUncertainty {
   double thrust_coefficient = 0.0;  ///< of K_T [N/(rad/s)²]
   double intercept_variance = 0.0;  ///< of the line, [N/(rad/s)²]²
   double covariance = 0.0;          ///< of intercept and slope, per rad
   double slope_variance = 0.0;      ///< per rad²
+};
+
+/// k(φ) = intercept + slope φ.
+struct Line {
+  ThrustCoefficient intercept;  ///< k at φ = 0 [N/(rad/s)²], positive; K_T only if the fit was anchored
+  double slope_per_rad = 0;     ///< N/(rad/s)² per rad, finite, usually negative
+  std::optional<LineUncertainty> uncertainty{};
 };
 
 /// T = k(φ) ω². A ThrustCurve that exists is valid.
@@ -60,10 +61,7 @@ class ThrustCurve {
   decltype(auto) visit(OfForm&& of_form) const {
     return of_form(line_);
   }
-  /// Of the parameters; nullopt if unknown.
-  [[nodiscard]] const std::optional<LineUncertainty>& uncertainty() const noexcept { return uncertainty_; }
-
-  [[nodiscard]] bool has_uncertainty() const noexcept { return uncertainty_.has_value(); }
+  [[nodiscard]] bool has_uncertainty() const noexcept { return line_.uncertainty.has_value(); }
 
   /// k(φ), also beyond the largest fitted angle, where it may be negative.
   [[nodiscard]] ThrustCoefficient at(Radians occlusion_angle) const noexcept {
@@ -89,23 +87,18 @@ class ThrustCurve {
   /// stays. nullopt if k(0) is not positive then.
   [[nodiscard]] std::optional<ThrustCurve> perturbed(ThrustCoefficient raised, double steepness) const noexcept {
     return from_line(thrust_coefficient_, line_.intercept + raised, line_.slope_per_rad * steepness, largest_fitted_,
-                     overlap_, uncertainty());
+                     overlap_, line_.uncertainty);
   }
 
  private:
-  ThrustCurve(ThrustCoefficient thrust_coefficient, const Line& line, Radians largest_fitted, OverlapMeasure overlap,
-              const std::optional<LineUncertainty>& uncertainty) noexcept
-      : thrust_coefficient_(thrust_coefficient),
-        line_(line),
-        largest_fitted_(largest_fitted),
-        overlap_(overlap),
-        uncertainty_(uncertainty) {}
+  ThrustCurve(ThrustCoefficient thrust_coefficient, const Line& line, Radians largest_fitted,
+              OverlapMeasure overlap) noexcept
+      : thrust_coefficient_(thrust_coefficient), line_(line), largest_fitted_(largest_fitted), overlap_(overlap) {}
 
   ThrustCoefficient thrust_coefficient_;
   Line line_;
   Radians largest_fitted_;
   OverlapMeasure overlap_;
-  std::optional<LineUncertainty> uncertainty_;
 };
 
 }  // namespace kphi::compensation

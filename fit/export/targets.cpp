@@ -140,10 +140,12 @@ std::string cpp_comment_safe(std::string text) {
   return text;
 }
 
-constexpr const char* kHeaderFunctions = R"(
+constexpr const char* kHeaderLine = R"(
 /// k on the line, N/(rad/s)^2; phi in rad. Beyond kLargestPhi it is an extrapolation and may be negative.
 constexpr double coefficient_at(double phi) { return kIntercept + kSlope * phi; }
+)";
 
+constexpr const char* kHeaderFunctions = R"(
 /// k_i in [0.1, 1]: 1 without occlusion (and for a NaN), never a slower propeller, never a diverging one.
 constexpr double scaling_factor(double phi) {
   return !(phi > 0) ? 1.0
@@ -263,9 +265,9 @@ Export to_ros2(const compensation::Coefficients& file, const ExportOptions&) {
   file.curve.visit([&](const compensation::Line& line) {
     parameters.number("line_intercept_n_s2_per_rad2", line.intercept.value());
     parameters.number("line_slope_n_s2_per_rad3", line.slope_per_rad);
+    if (const auto& u = line.uncertainty)
+      parameters.list("line_covariance", {u->intercept_variance, u->covariance, u->covariance, u->slope_variance});
   });
-  if (const auto& u = file.curve.uncertainty())
-    parameters.list("line_covariance", {u->intercept_variance, u->covariance, u->covariance, u->slope_variance});
   parameters.number("phi_max_rad", file.curve.largest_fitted().value());
   parameters.number("speed_min_rad_s", value_of(file.slowest_speed));
   parameters.number("speed_max_rad_s", value_of(file.fastest_speed));
@@ -291,12 +293,13 @@ Export to_header(const compensation::Coefficients& file, const ExportOptions&) {
   constant("kThrustCoefficient", file.curve.thrust_coefficient().value(), "K_T, N/(rad/s)^2");
   if (file.thrust_coefficient)
     constant("kThrustCoefficientExpanded95", file.thrust_coefficient->expanded_95, "half of its 95 % interval (GUM)");
+  constant("kLargestPhi", file.curve.largest_fitted().value(), "rad, the largest occlusion measured");
+  if (file.fastest_speed) constant("kFastestSpeed", file.fastest_speed->value(), "rad/s, the fastest measured");
   file.curve.visit([&](const compensation::Line& line) {
     constant("kIntercept", line.intercept.value(), "of the line, N/(rad/s)^2");
     constant("kSlope", line.slope_per_rad, "of the line, N/(rad/s)^2 per rad");
+    result.text += kHeaderLine;
   });
-  constant("kLargestPhi", file.curve.largest_fitted().value(), "rad, the largest occlusion measured");
-  if (file.fastest_speed) constant("kFastestSpeed", file.fastest_speed->value(), "rad/s, the fastest measured");
   result.text += kHeaderFunctions;
   result.text += fmt::format("\n}}  // namespace {}\n", identifier(file.propeller.id));
   result.lost = {

@@ -102,7 +102,7 @@ TEST(CoefficientFile, ConvertsEveryCoefficientFromNewtonsPerRpmSquared) {
   EXPECT_DOUBLE_EQ(rpm.thrust_coefficient->u / si.thrust_coefficient->u, scale);
   EXPECT_DOUBLE_EQ(line_of(rpm.curve).intercept / line_of(si.curve).intercept, scale);
   EXPECT_DOUBLE_EQ(line_of(rpm.curve).slope_per_rad / line_of(si.curve).slope_per_rad, scale);
-  EXPECT_DOUBLE_EQ(rpm.curve.uncertainty()->covariance / si.curve.uncertainty()->covariance, scale * scale);
+  EXPECT_DOUBLE_EQ(line_of(rpm.curve).uncertainty->covariance / line_of(si.curve).uncertainty->covariance, scale * scale);
   EXPECT_DOUBLE_EQ(rpm.table[0].k / si.table[0].k, scale);
   EXPECT_DOUBLE_EQ(rpm.table[0].uncertainty->expanded_95 / si.table[0].uncertainty->expanded_95, scale);
 }
@@ -163,13 +163,13 @@ TEST(CoefficientFile, HandsItsOverlapMeasureAndItsUncertaintyToTheLine) {
     const std::string text = with(kGood, "rim_arc", std::string(name_of(measure)));
     EXPECT_EQ(parse_coefficients(text, "c").curve.overlap(), measure);
   }
-  const auto uncertainty = parse_coefficients(kGood, "c").curve.uncertainty();
+  const auto uncertainty = line_of(parse_coefficients(kGood, "c").curve).uncertainty;
   ASSERT_TRUE(uncertainty);
   EXPECT_EQ(uncertainty->thrust_coefficient, 1e-9);
   EXPECT_EQ(uncertainty->intercept_variance, 1e-18);
   EXPECT_DOUBLE_EQ(uncertainty->covariance, -5e-21 * 180 / kPi);
   EXPECT_DOUBLE_EQ(uncertainty->slope_variance, 4e-23 * (180 / kPi) * (180 / kPi));
-  EXPECT_FALSE(parse_coefficients(with(kGood, "covariance:", "other:"), "c").curve.uncertainty());
+  EXPECT_FALSE(parse_coefficients(with(kGood, "covariance:", "other:"), "c").curve.has_uncertainty());
 }
 
 TEST(CoefficientFile, IsRefusedWithAVarianceBelowZeroOrAnErrorBelowZero) {

@@ -78,7 +78,7 @@ TEST(Coefficients, AreReadByTheLibraryThatFlies) {
     EXPECT_NEAR(compensation::line_of(file.curve).slope_per_rad * kPi / 180 / fit.curve_fit.value("slope_per_deg"), 1,
                 1e-15);
     EXPECT_NEAR(to_degrees(file.curve.largest_fitted()), 270, 1e-9);
-    ASSERT_TRUE(file.curve.uncertainty());
+    ASSERT_TRUE(file.curve.has_uncertainty());
     EXPECT_EQ(file.table.size(), 5u);
     EXPECT_EQ(file.provenance.runs.size(), 1u);
     EXPECT_EQ(file.curve.at(from_degrees(100)), fit.curve().at(from_degrees(100)));
