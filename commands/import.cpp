@@ -71,7 +71,7 @@ void print_findings(const Import& import, const std::string& path) {
 
 /// Writes the table and says its k, which is returned.
 double import_file(const std::string& path, const ImportRequest& request, const ImportOptions& options) {
-  const std::string text = results::read_text(path);
+  const std::string text = results::read_text(path, results::kLargestLog);
   const Import import = import_table(text, path, options);
   const std::string name = fs::path(path).stem().string();
   const fs::path folder = fs::path(request.out) / name;

@@ -10,6 +10,7 @@
 #include <iostream>
 #include <vector>
 
+#include "base/text.hpp"
 #include "commands/commands.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "daq/guard/run_stopped.hpp"
@@ -53,7 +54,7 @@ void print_message(const std::string& words) {
 }
 
 ExitCode complain(const std::exception& error, ExitCode exit_code) {
-  print_message(fmt::format("kphi: {}\n", error.what()));
+  print_message(fmt::format("kphi: {}\n", kphi::printable(error.what(), kphi::LineEnds::keep)));
   return exit_code;
 }
 

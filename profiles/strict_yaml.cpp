@@ -9,10 +9,7 @@
 #include <algorithm>
 #include <boost/algorithm/string/case_conv.hpp>
 #include <boost/locale/utf.hpp>
-#include <cerrno>
 #include <cstdint>
-#include <cstring>
-#include <fstream>
 #include <iterator>
 #include <optional>
 #include <regex>
@@ -20,6 +17,7 @@
 #include <string_view>
 
 #include "base/number.hpp"
+#include "base/text.hpp"
 
 namespace kphi::profiles {
 namespace {
@@ -359,20 +357,11 @@ SourceDocument parse_strict_yaml(const std::string& whole_text, const std::strin
 }
 
 std::string read_text(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file)
-    throw ConfigurationError(fmt::format("{}: cannot be opened: {}; check the name", path, std::strerror(errno)));
-  std::string text(kMaxTextBytes + 1, '\0');
-  errno = 0;
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (file.bad() || (file.gcount() == 0 && errno != 0)) {
-    throw ConfigurationError(fmt::format("{}: cannot be read: {}; name a file", path, std::strerror(errno)));
+  try {
+    return read_text_file(path, kMaxTextBytes);
+  } catch (const std::runtime_error& error) {
+    throw ConfigurationError(fmt::format("{}: {}", path, error.what()));
   }
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  if (text.size() > kMaxTextBytes) {
-    throw ConfigurationError(fmt::format("{}: larger than 1 MiB; check that this is the right file", path));
-  }
-  return text;
 }
 
 std::string child_pointer(const std::string& pointer, const std::string& key) {

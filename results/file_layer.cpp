@@ -9,11 +9,11 @@
 #include <array>
 #include <cerrno>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <vector>
 
 #include "base/descriptor.hpp"
+#include "base/text.hpp"
 
 namespace kphi::results {
 namespace {
@@ -132,14 +132,12 @@ void write_text(const std::filesystem::path& path, const std::string& text, File
   });
 }
 
-std::string read_text(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::string text;
-  std::array<char, 1 << 16> piece{};
-  while (in.read(piece.data(), piece.size()) || in.gcount() > 0)
-    text.append(piece.data(), static_cast<std::size_t>(in.gcount()));
-  if (!in.is_open() || in.bad()) throw RecordError(failure_text(path.string(), errno));
-  return text;
+std::string read_text(const std::filesystem::path& path, std::size_t most_bytes) {
+  try {
+    return read_text_file(path, most_bytes);
+  } catch (const std::runtime_error& error) {
+    throw RecordError(fmt::format("{}: {}", path.string(), error.what()));
+  }
 }
 
 std::string failure_text(const std::string& where, int error) {

@@ -70,8 +70,11 @@ void sync_file(const std::filesystem::path& path, FileLayer& files);
 /// Writes `text` to `path`.part, syncs it, replaces `path` by it and syncs the folder. Throws RecordError.
 void write_text(const std::filesystem::path& path, const std::string& text, FileLayer& files = disk());
 
-/// The file's bytes. Throws RecordError.
-[[nodiscard]] std::string read_text(const std::filesystem::path& path);
+/// Of a table or a journal that kphi writes; of a log that is imported.
+inline constexpr std::size_t kLargestTable = std::size_t{64} << 20, kLargestLog = std::size_t{4} << 30;
+
+/// The file's bytes. Throws RecordError, also if it is no regular file or longer than `most_bytes`.
+[[nodiscard]] std::string read_text(const std::filesystem::path& path, std::size_t most_bytes = kLargestTable);
 
 /// 64 lower-case hex digits.
 [[nodiscard]] std::string sha256(std::string_view bytes);

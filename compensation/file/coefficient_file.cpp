@@ -1,5 +1,6 @@
 #include "compensation/file/coefficient_file.hpp"
 
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <cerrno>
@@ -7,9 +8,11 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <set>
 #include <sstream>
+#include <system_error>
 
 namespace kphi::compensation {
 namespace {
@@ -29,6 +32,32 @@ bool is_unknown(const YAML::Node& node) {
 [[noreturn]] void refuse(const std::string& path, int line, const std::string& what, const std::string& next_move) {
   throw CoefficientError(path + ":" + std::to_string(line + 1) + ": " + what + "; " + next_move);
 }
+
+/// Lets pass what `kphi fit` writes: no anchors and aliases, with which a few bytes become a tree without end.
+struct Guard : YAML::EventHandler {
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override { take(mark, anchor); }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override { take(mark, 1); }
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, const std::string&) override {
+    take(mark, anchor);
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value) override {
+    take(mark, anchor);
+  }
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value) override {
+    take(mark, anchor);
+  }
+  void OnMapEnd() override {}
+
+ private:
+  static void take(const YAML::Mark& mark, YAML::anchor_t anchor) {
+    if (anchor != 0) throw YAML::ParserException(mark, "an anchor or alias stands for a value");
+  }
+};
 
 void refuse_repeated_keys(const YAML::Node& node, const std::string& path) {
   std::set<std::string> seen;
@@ -136,6 +165,9 @@ class Value {
 Value top_of(const std::string& text, const std::string& path) {
   YAML::Node node;
   try {
+    std::istringstream stream(text);
+    Guard guard;
+    YAML::Parser(stream).HandleNextDocument(guard);
     node = YAML::Load(text);
   } catch (const YAML::Exception& error) {
     refuse(path, error.mark.line, "not YAML: " + error.msg, "restore the file as `kphi fit` wrote it");
@@ -314,14 +346,19 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
 }
 
 Coefficients load_coefficients(const std::string& path) {
+  constexpr std::size_t kLargest = 1 << 20;
+  const std::string next_move = "; give the coefficients.yaml that `kphi fit` wrote";
+  std::error_code error;
+  if (std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error))
+    throw CoefficientError(path + ": is a folder, a pipe or a device" + next_move);
   std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  if (file) text << file.rdbuf();
-  if (!file || text.bad()) {
-    throw CoefficientError(path + ": cannot be read (" + std::strerror(errno) +
-                           "); give the coefficients.yaml that `kphi fit` wrote");
-  }
-  return parse_coefficients(text.str(), path);
+  std::string text(kLargest + 1, '\0');
+  if (file) file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (!file.is_open() || file.bad())
+    throw CoefficientError(path + ": cannot be read (" + std::strerror(errno) + ")" + next_move);
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.size() > kLargest) throw CoefficientError(path + ": is larger than 1 MiB" + next_move);
+  return parse_coefficients(text, path);
 }
 
 std::string words_of(const ThrustCurve& curve) {

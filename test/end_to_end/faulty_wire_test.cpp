@@ -133,7 +133,7 @@ TEST_F(BadScript, IsRefusedByLineAndColumn) {
 TEST_F(BadScript, ThatCannotBeReadIsNamed) {
   refused({"--faults", (folder_ / "none.yaml").string()}, 2,
           "none.yaml: cannot be opened: No such file or directory; check the name");
-  refused({"--faults", folder_.path().string()}, 2, "cannot be read: Is a directory; name a file");
+  refused({"--faults", folder_.path().string()}, 2, "is a folder; name a file");
 }
 
 TEST_F(BadScript, OrATruthLogThatCannotBeWrittenIsRefusedAtTheBeginning) {

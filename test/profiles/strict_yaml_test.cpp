@@ -228,7 +228,7 @@ TEST(Files, ThatCannotBeReadAreNamedWithTheReason) {
   const auto read = [](const std::string& path) { return [path] { static_cast<void>(read_text(path)); }; };
   EXPECT_THAT(read("/no/such.yaml"), testing::ThrowsMessage<ConfigurationError>(
                                          "/no/such.yaml: cannot be opened: No such file or directory; check the name"));
-  EXPECT_THAT(read("/"), testing::ThrowsMessage<ConfigurationError>("/: cannot be read: Is a directory; name a file"));
+  EXPECT_THAT(read("/"), testing::ThrowsMessage<ConfigurationError>("/: is a folder; name a file"));
 
   const auto path = std::filesystem::temp_directory_path() / ("kphi_large_" + std::to_string(getpid()) + ".yaml");
   std::ofstream(path) << std::string(kMaxTextBytes + 1, '#');

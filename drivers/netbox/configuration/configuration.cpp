@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <boost/algorithm/string.hpp>
-#include <boost/locale/utf.hpp>
 #include <cmath>
 #include <iterator>
 #include <pugixml.hpp>
@@ -13,6 +12,7 @@
 
 #include "base/error.hpp"
 #include "base/number.hpp"
+#include "base/text.hpp"
 #include "drivers/netbox/wire/unit.hpp"
 
 namespace kphi::netbox {
@@ -239,8 +239,6 @@ void read_monitor(const Elements& elements, Configuration& configuration) {
   configuration.monitor_conditions = std::move(conditions);
 }
 
-constexpr std::string_view kReplacement = "\xEF\xBF\xBD";
-
 struct Row {
   Change change;
   const char* name;
@@ -295,24 +293,6 @@ Configuration parse_configuration(std::string_view xml, const std::string& devic
   read_monitor(elements, configuration);
   configuration.xml = xml;
   return configuration;
-}
-
-std::string printable(std::string_view text) {
-  using Utf8 = boost::locale::utf::utf_traits<char>;
-  std::string out;
-  for (auto at = text.begin(); at != text.end();) {
-    auto end = at;
-    const auto code = Utf8::decode(end, text.end());
-    const bool control = code < 0x20 || (code >= 0x7F && code < 0xA0);
-    if (control || !boost::locale::utf::is_valid_codepoint(code)) {
-      out += kReplacement;
-      ++at;
-    } else {
-      out.append(at, end);
-      at = end;
-    }
-  }
-  return out;
 }
 
 Changes compare(const Configuration& before, const Configuration& after) {

@@ -80,10 +80,6 @@ struct Configuration {
 /// locale.
 [[nodiscard]] Configuration parse_configuration(std::string_view xml, const std::string& device = "Net Box");
 
-/// Valid UTF-8 without control characters, fit for a terminal and for JSON: each byte or character that is neither
-/// becomes U+FFFD.
-[[nodiscard]] std::string printable(std::string_view text);
-
 /// Bits of Changes.
 enum class Change : std::uint32_t {
   product = 1u << 0,

@@ -102,7 +102,8 @@ TEST(CoefficientFile, ConvertsEveryCoefficientFromNewtonsPerRpmSquared) {
   EXPECT_DOUBLE_EQ(rpm.thrust_coefficient->u / si.thrust_coefficient->u, scale);
   EXPECT_DOUBLE_EQ(line_of(rpm.curve).intercept / line_of(si.curve).intercept, scale);
   EXPECT_DOUBLE_EQ(line_of(rpm.curve).slope_per_rad / line_of(si.curve).slope_per_rad, scale);
-  EXPECT_DOUBLE_EQ(line_of(rpm.curve).uncertainty->covariance / line_of(si.curve).uncertainty->covariance, scale * scale);
+  EXPECT_DOUBLE_EQ(line_of(rpm.curve).uncertainty->covariance / line_of(si.curve).uncertainty->covariance,
+                   scale * scale);
   EXPECT_DOUBLE_EQ(rpm.table[0].k / si.table[0].k, scale);
   EXPECT_DOUBLE_EQ(rpm.table[0].uncertainty->expanded_95 / si.table[0].uncertainty->expanded_95, scale);
 }
@@ -260,8 +261,15 @@ TEST(CoefficientFile, SurvivesBeingCutAnywhere) {
   }
 }
 
+TEST(CoefficientFile, HasNoAnchorsAndAliasesOfWhichAFewBytesMakeATreeWithoutEnd) {
+  for (const char* text : {"a: &a {b: *a}\n", "a: &a [x]\nb: [*a, *a]\n", "a: &a x\n", "*a\n"})
+    EXPECT_THAT([&] { (void)parse_coefficients(text, "c.yaml"); },
+                testing::ThrowsMessage<CoefficientError>(StartsWith("c.yaml:1: not YAML: ")))
+        << text;
+}
+
 TEST(CoefficientFile, ThatCannotBeReadIsNamed) {
-  for (const char* path : {"/nonexistent/c.yaml", "/"}) {
+  for (const char* path : {"/nonexistent/c.yaml", "/", "/dev/zero"}) {
     EXPECT_THAT([&] { (void)load_coefficients(path); }, testing::ThrowsMessage<CoefficientError>(StartsWith(path)));
   }
 }
