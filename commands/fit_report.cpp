@@ -52,7 +52,7 @@ void write_report(const Fitted& fitted, FitInput& input, const fs::path& page) {
 }
 
 struct FitRequest {
-  std::string path;
+  std::string path, k_unit;
   IdentificationOptions options;  ///< of the fit; the rest of the request completes them
   std::string speed_range_rpm;
   std::optional<double> at_speed_rpm;
@@ -147,7 +147,7 @@ Json raw_json(const FitInput& input) {
 FamilyFindings family_findings(const FitRequest& request, const Fitted& fitted) {
   std::vector<Fitted> family{fitted};
   for (const std::string& path : request.family) {
-    const FitInput input = load_input(path);
+    const FitInput input = load_input(path, request.k_unit);
     FitRequest same = request;
     same.options.propeller.clear();
     same.options.diameter_in = same.options.blades = 0;
@@ -176,7 +176,7 @@ void print_findings(const FitRequest& request, const FitInput& input, const Fitt
 }
 
 ExitCode run_fit(const FitRequest& request) {
-  FitInput input = load_input(request.path);
+  FitInput input = load_input(request.path, request.k_unit);
   if (request.raw && !input.campaign)
     throw ConfigurationError(request.path + ": --raw needs the runs of a campaign folder");
   Fitted fitted{identify_input(input, request), {}};
@@ -247,8 +247,11 @@ ExitCode run_report(const ReportRequest& request) {
 void add_fit(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<FitRequest>(
       program, exit_code, "fit", "fit k to the steps of each occlusion, then the line k(φ); write a report", run_fit);
-  add_argument(command, "INPUT", request.path, "campaign folder, steps.csv, or K.csv with phi_deg,k[,u_k]")
+  add_argument(command, "INPUT", request.path,
+               "campaign folder, steps.csv, or K.csv with phi_deg and k_n_s2_per_rad2 or k_n_per_rpm2[, u_k_…]")
       ->check(kExistingPath);
+  add_value(command, "--k-unit", "UNIT", request.k_unit, "unit of a column named k: N/(rad/s)^2 or N/RPM^2")
+      ->check(CLI::IsMember({"N/(rad/s)^2", "N/RPM^2"}));
   command.add_flag("--anchored", request.options.line.anchored,
                    "start the line at K_T (default: free, through the occlusions)");
   add_value(command, "--points", "DEG,DEG,…", request.options.line.points_deg,

@@ -70,14 +70,14 @@ FitInput campaign_input(const fs::path& path) {
   return input;
 }
 
-FitInput file_input(const fs::path& path) {
+FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
   FitInput input;
   input.folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   input.provenance.campaign = path.stem().string();
   input.provenance.source = path.filename().string();
   const std::string text = results::read_text(path);
   if (is_k_table(text)) {
-    input.table = read_k_table(text, path.string());
+    input.table = read_k_table(text, path.string(), unit_of_k);
   } else {
     input.steps = results::parse_steps(text, path.string());
   }
@@ -86,15 +86,17 @@ FitInput file_input(const fs::path& path) {
 
 }  // namespace
 
-FitInput load_input(const std::string& path) {
+FitInput load_input(const std::string& path, const std::string& unit_of_k) {
   const bool campaign = fs::exists(fs::path(path) / "journal.jsonl") || fs::exists(fs::path(path) / "runs");
   if (fs::is_directory(path) && !campaign && !fs::exists(fs::path(path) / "steps.csv")) {
     throw ConfigurationError(path +
                              ": no campaign and no steps.csv in it; name a folder made by `kphi run` or `kphi import`");
   }
   FitInput input = campaign                 ? campaign_input(path)
-                   : fs::is_directory(path) ? file_input(fs::path(path) / "steps.csv")
-                                            : file_input(path);
+                   : fs::is_directory(path) ? file_input(fs::path(path) / "steps.csv", unit_of_k)
+                                            : file_input(path, unit_of_k);
+  if (!unit_of_k.empty() && input.table.empty())
+    throw ConfigurationError(path + ": --k-unit is for a table of k; steps have their units");
   input.provenance.tool_version = kVersion;
   return input;
 }

@@ -27,7 +27,7 @@ struct FitInput {
 
 /// From a campaign folder, a folder with a steps.csv, a steps.csv or a table of k. Throws ConfigurationError, naming
 /// the next move, if there are neither steps nor coefficients.
-[[nodiscard]] FitInput load_input(const std::string& path);
+[[nodiscard]] FitInput load_input(const std::string& path, const std::string& unit_of_k = {});
 
 /// What the campaign's own files know of errors: the clock's from the bench file, the air's from its instruments.
 [[nodiscard]] fit::AnalysisOptions analysis_options(const FitInput& input, const fit::Identification& identification);

@@ -308,12 +308,14 @@ Export to_header(const compensation::Coefficients& file, const ExportOptions&) {
   return result;
 }
 
-/// The table per occlusion with the line beside it. phi_deg,k,u_k come first: `kphi fit` reads them; u are standard
+/// The table per occlusion with the line beside it. phi_deg, k and u come first: `kphi fit` reads them; u are standard
 /// uncertainties.
 Export to_csv(const compensation::Coefficients& file, const ExportOptions&) {
   const compensation::ThrustCurve& curve = file.curve;
   Export result;
-  result.text = "phi_deg,k,u_k,expanded_95_k,curve_k,u_curve_k,scaling_factor\n";
+  result.text =
+      "phi_deg,k_n_s2_per_rad2,u_k_n_s2_per_rad2,expanded_95_k_n_s2_per_rad2,curve_k_n_s2_per_rad2,"
+      "u_curve_k_n_s2_per_rad2,scaling_factor\n";
   for (const auto& row : file.table) {
     result.text += fmt::format("{},{},{},{},{},{},{}\n", shortest(std::round(to_degrees(row.occlusion) * 1e9) / 1e9),
                                shortest(row.k.value()), row.uncertainty ? shortest(row.uncertainty->u) : "",
@@ -321,8 +323,7 @@ Export to_csv(const compensation::Coefficients& file, const ExportOptions&) {
                                shortest(curve.at(row.occlusion).value()), error_at(curve, row.occlusion),
                                shortest(curve.scaling_factor(row.occlusion)));
   }
-  result.lost = {"units: the header line has none; every k and u is in N/(rad/s)^2",
-                 "slope, covariance, validity, hashes of the runs: only in the coefficient file"};
+  result.lost = {"slope, covariance, validity, hashes of the runs: only in the coefficient file"};
   return result;
 }
 

@@ -27,7 +27,7 @@ struct Export {
 [[nodiscard]] Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_ros2(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_header(const compensation::Coefficients& file, const ExportOptions& options);
-/// phi_deg,k,u_k first: `kphi fit` reads the table.
+/// phi_deg, k and its u first: `kphi fit` reads the table.
 [[nodiscard]] Export to_csv(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_mcap(const compensation::Coefficients& file, const ExportOptions& options);
 

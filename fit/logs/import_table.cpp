@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "base/error.hpp"
 #include "base/number.hpp"
@@ -32,6 +33,27 @@ double non_negative(const Table& table, const TableRow& row, std::size_t column)
 }
 
 std::string_view first_line(std::string_view text) { return text.substr(0, text.find('\n')); }
+
+constexpr const char *kPerRad2 = "k_n_s2_per_rad2", *kPerRpm2 = "k_n_per_rpm2";
+
+/// The column's name, and N/(rad/s)² per unit of it.
+std::pair<std::string, double> column_of_k(const Table& table, std::string_view unit) {
+  const double per_rpm2 = from_newtons_per_rpm2(1).value();
+  const auto refuse = [&](const char* words) {
+    throw ConfigurationError(fmt::format("{}:{}: {}", table.path, table.header_line, words));
+  };
+  const bool in_rad = table.find_column(kPerRad2).has_value(), in_rpm = table.find_column(kPerRpm2).has_value(),
+             bare = table.find_column("k").has_value();
+  if (in_rad + in_rpm + bare > 1) refuse("several columns of k; keep one");
+  if (!bare && !unit.empty()) refuse("the header names the unit of k already; leave --k-unit out");
+  if (in_rad) return {kPerRad2, 1};
+  if (in_rpm) return {kPerRpm2, per_rpm2};
+  if (bare && unit.empty())
+    refuse(
+        "the unit of k is not known; call the column k_n_s2_per_rad2 for N/(rad/s)^2 or k_n_per_rpm2 for N/RPM^2, "
+        "or give --k-unit");
+  return {"k", unit == "N/RPM^2" ? per_rpm2 : 1};
+}
 
 /// Whether the header's columns are RPM and CT.
 bool is_uiuc(std::string_view text) {
@@ -105,19 +127,19 @@ ImportedTable read_uiuc(std::string_view text, std::string path, std::optional<d
 
 bool is_k_table(std::string_view text) {
   const Table header = read_csv(first_line(text), "");
-  return header.find_column("phi_deg") && (header.find_column("k") || header.find_column("k_n_per_rpm2"));
+  return header.find_column("phi_deg") &&
+         (header.find_column("k") || header.find_column(kPerRad2) || header.find_column(kPerRpm2));
 }
 
-std::vector<LinePoint> read_k_table(std::string_view text, std::string path) {
+std::vector<LinePoint> read_k_table(std::string_view text, std::string path, std::string_view unit_of_k) {
   const Table table = read_csv(text, std::move(path));
   if (!table.problems.empty()) {
     const auto& [line, what] = table.problems.front();
     throw ConfigurationError(fmt::format("{}:{}: {}", table.path, line, what.substr(0, what.find(';'))));
   }
-  const bool per_rpm = table.find_column("k_n_per_rpm2").has_value();
-  const double unit = per_rpm ? from_newtons_per_rpm2(1).value() : 1;
-  const std::size_t phi = table.column("phi_deg"), k = table.column(per_rpm ? "k_n_per_rpm2" : "k");
-  const auto error = table.find_column(per_rpm ? "u_k_n_per_rpm2" : "u_k");
+  const auto [name, unit] = column_of_k(table, unit_of_k);
+  const std::size_t phi = table.column("phi_deg"), k = table.column(name);
+  const auto error = table.find_column("u_" + name);
   std::vector<LinePoint> points;
   for (const TableRow& row : table.rows) {
     points.push_back({non_negative(table, row, phi), non_negative(table, row, k) * unit,

@@ -25,13 +25,15 @@ inline constexpr double kUiucDensityKgM3 = 1.225;
 [[nodiscard]] ImportedTable read_uiuc(std::string_view text, std::string path, std::optional<double> diameter_in = {},
                                       double density_kg_m3 = kUiucDensityKgM3);
 
-/// Whether the header has the columns phi_deg and k (or k_n_per_rpm2).
+/// Whether the header has phi_deg and one of the columns of k.
 [[nodiscard]] bool is_k_table(std::string_view text);
 
-/// CSV with phi_deg, k and, if known, its standard error u_k, in N/(rad/s)²; `k_n_per_rpm2` and `u_k_n_per_rpm2`
-/// instead are in N/RPM². Throws ConfigurationError (path:line) for a missing column, a line that does not fit, a φ
-/// outside [0, 360), or a negative k or u_k (k = 0 is allowed: a fully blocked propeller).
-[[nodiscard]] std::vector<LinePoint> read_k_table(std::string_view text, std::string path);
+/// CSV with phi_deg, k and, if known, its standard error: k_n_s2_per_rad2 and u_k_n_s2_per_rad2 in N/(rad/s)², or
+/// k_n_per_rpm2 and u_k_n_per_rpm2 in N/RPM², or k and u_k in `unit`, "N/(rad/s)^2" or "N/RPM^2": the paper's unit is
+/// 91 times larger, so none is assumed. Throws ConfigurationError (path:line) where the unit is not known or given
+/// twice, for a missing column, a line that does not fit, a φ outside [0, 360), or a negative k or u_k (k = 0 is
+/// allowed: a fully blocked propeller).
+[[nodiscard]] std::vector<LinePoint> read_k_table(std::string_view text, std::string path, std::string_view unit = {});
 
 struct ImportOptions {
   RowSelection rows;

@@ -124,11 +124,14 @@ TEST_F(Program, RefusesWhatItCannotFitInOneLineWithTheNextMove) {
   expect_refused({"fit", (folder_ / "none").string()}, 2, "does not exist");
   expect_refused({"fit", empty}, 2, "`kphi run` or `kphi import`");
   expect_refused({"fit", file("empty.csv", "")}, 2, "empty.csv");
-  expect_refused({"fit", file("word.csv", "phi_deg,k\n0,1.5e-6\n45,abc\n")}, 2, "word.csv:3");
-  expect_refused({"fit", file("nan.csv", "phi_deg,k\n0,nan\n45,1e-6\n90,1e-6\n")}, 2, "nan.csv:2");
+  expect_refused({"fit", file("word.csv", "phi_deg,k_n_s2_per_rad2\n0,1.5e-6\n45,abc\n")}, 2, "word.csv:3");
+  expect_refused({"fit", file("unit.csv", "phi_deg,k\n0,1.5e-6\n45,1.4e-6\n90,1.2e-6\n")}, 2,
+                 "the unit of k is not known");
+  expect_refused({"fit", file("nan.csv", "phi_deg,k_n_s2_per_rad2\n0,nan\n45,1e-6\n90,1e-6\n")}, 2, "nan.csv:2");
   expect_refused({"fit", file("nothing.csv", "a,b\n1,2\n")}, 2, "nothing.csv");
-  expect_refused({"fit", file("k.csv", "phi_deg,k\n0,1.5e-6\n45,1.4e-6\n90,1.2e-6\n"), "--u", "clock=1e-4"}, 2,
-                 "--u needs steps");
+  expect_refused(
+      {"fit", file("k.csv", "phi_deg,k_n_s2_per_rad2\n0,1.5e-6\n45,1.4e-6\n90,1.2e-6\n"), "--u", "clock=1e-4"}, 2,
+      "--u needs steps");
   expect_refused({"fit", config, "--u", "clock"}, 2, "NAME=VALUE");
   expect_refused({"fit", config, "--u", "clock=nan"}, 2, "NAME=VALUE");
   expect_refused({"fit", config, "--raw"}, 2, "campaign folder");

@@ -37,7 +37,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return summary_of(import_table(text, "own.csv", options).table);
   });
   accept_or_refuse([&] { return parse_column_role(text); });
-  accept_or_refuse([&] { return read_k_table(text, "K.csv"); });
+  accept_or_refuse([&] { return read_k_table(text, "K.csv", "N/RPM^2"); });
   accept_or_refuse([&] { return kphi::results::parse_steps(text, "steps.csv"); });
   return 0;
 }

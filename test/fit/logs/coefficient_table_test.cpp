@@ -32,7 +32,7 @@ TEST(UiucTable, TurnsTheCoefficientIntoThrust) {
 }
 
 TEST(KTable, ReadsCoefficientsInBothUnits) {
-  const auto si = read_k_table("phi_deg,k,u_k\n0,1.55e-6,1e-9\n45,1.4e-6,2e-9\n", "K.csv");
+  const auto si = read_k_table("phi_deg,k_n_s2_per_rad2,u_k_n_s2_per_rad2\n0,1.55e-6,1e-9\n45,1.4e-6,2e-9\n", "K.csv");
   ASSERT_EQ(si.size(), 2u);
   EXPECT_EQ(si[1].k, 1.4e-6);
   EXPECT_EQ(si[1].standard_error, 2e-9);
@@ -41,14 +41,26 @@ TEST(KTable, ReadsCoefficientsInBothUnits) {
   EXPECT_EQ(rpm[0].standard_error, 0);
 }
 
+TEST(KTable, NeverAssumesAUnit) {
+  constexpr const char* kBare = "phi_deg,k,u_k\n0,1.7e-8,1e-9\n";
+  EXPECT_THAT([] { (void)read_k_table(kBare, "K.csv"); },
+              testing::ThrowsMessage<ConfigurationError>(HasSubstr("K.csv:1: the unit of k is not known")));
+  EXPECT_EQ(read_k_table(kBare, "K.csv", "N/(rad/s)^2")[0].k, 1.7e-8);
+  EXPECT_NEAR(read_k_table(kBare, "K.csv", "N/RPM^2")[0].k, 1.7e-8 * 91.189065, 1e-12);
+  EXPECT_NEAR(read_k_table(kBare, "K.csv", "N/RPM^2")[0].standard_error, 1e-9 * 91.189065, 1e-13);
+  for (const char* twice : {"phi_deg,k,k_n_per_rpm2\n", "phi_deg,k_n_s2_per_rad2,k_n_per_rpm2\n"})
+    EXPECT_THROW((void)read_k_table(twice, "K.csv", "N/RPM^2"), ConfigurationError) << twice;
+  EXPECT_THROW((void)read_k_table("phi_deg,k_n_per_rpm2\n0,1\n", "K.csv", "N/RPM^2"), ConfigurationError);
+}
+
 TEST(KTable, NamesTheLineThatIsWrong) {
   for (const char* bad : {"phi_deg\n0\n", "k\n1\n", "phi_deg,k\n0\n", "phi_deg,k\n0,x\n", "phi_deg,k\n400,1e-6\n",
                           "phi_deg,k\n0,-1e-6\n", ""}) {
-    EXPECT_THROW((void)read_k_table(bad, "K.csv"), ConfigurationError) << bad;
+    EXPECT_THROW((void)read_k_table(bad, "K.csv", "N/(rad/s)^2"), ConfigurationError) << bad;
   }
-  EXPECT_THAT([&] { (void)read_k_table("phi_deg,k\n0,1e-6\n45,abc\n", "K.csv"); },
+  EXPECT_THAT([&] { (void)read_k_table("phi_deg,k\n0,1e-6\n45,abc\n", "K.csv", "N/(rad/s)^2"); },
               testing::ThrowsMessage<ConfigurationError>(HasSubstr("K.csv:3")));
-  EXPECT_THAT([&] { (void)read_k_table("phi_deg,k\n0,1e-6\n45\n", "K.csv"); },
+  EXPECT_THAT([&] { (void)read_k_table("phi_deg,k\n0,1e-6\n45\n", "K.csv", "N/(rad/s)^2"); },
               testing::ThrowsMessage<ConfigurationError>(testing::StrEq("K.csv:3: 1 fields where the header has 2")));
   EXPECT_TRUE(is_k_table("phi_deg,k\n"));
   EXPECT_FALSE(is_k_table("propeller,blades\n"));
@@ -91,7 +103,7 @@ TEST(Tables, NoMutationOfATableCrashesAReader) {
           accepted += read_uiuc(text, "apc_5x4_x.txt").steps.size();
           break;
         default:
-          accepted += read_k_table(text, "K.csv").size();
+          accepted += read_k_table(text, "K.csv", "N/RPM^2").size();
           break;
       }
     } catch (const ConfigurationError&) {
