@@ -33,10 +33,9 @@ std::string read_text_file(const std::filesystem::path& path, std::size_t most_b
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) fail("cannot be read", "check the disk");
     size += static_cast<std::size_t>(got);
-    if (size > most_bytes) {
+    if (size > most_bytes)
       throw std::runtime_error(
           fmt::format("is larger than {} MiB; check that this is the right file", most_bytes >> 20));
-    }
     if (got > 0) continue;
     text.resize(size);
     return text;

@@ -10,7 +10,6 @@
 #include <boost/algorithm/string/case_conv.hpp>
 #include <boost/locale/utf.hpp>
 #include <cstdint>
-#include <iterator>
 #include <optional>
 #include <regex>
 #include <sstream>

@@ -1,6 +1,5 @@
 #include "compensation/file/coefficient_file.hpp"
 
-#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <cerrno>
@@ -11,7 +10,6 @@
 #include <filesystem>
 #include <fstream>
 #include <set>
-#include <sstream>
 #include <system_error>
 
 namespace kphi::compensation {
@@ -33,38 +31,16 @@ bool is_unknown(const YAML::Node& node) {
   throw CoefficientError(path + ":" + std::to_string(line + 1) + ": " + what + "; " + next_move);
 }
 
-/// Lets pass what `kphi fit` writes: no anchors and aliases, with which a few bytes become a tree without end.
-struct Guard : YAML::EventHandler {
-  void OnDocumentStart(const YAML::Mark&) override {}
-  void OnDocumentEnd() override {}
-  void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override { take(mark, anchor); }
-  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override { take(mark, 1); }
-  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, const std::string&) override {
-    take(mark, anchor);
-  }
-  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
-                       YAML::EmitterStyle::value) override {
-    take(mark, anchor);
-  }
-  void OnSequenceEnd() override {}
-  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
-                  YAML::EmitterStyle::value) override {
-    take(mark, anchor);
-  }
-  void OnMapEnd() override {}
-
- private:
-  static void take(const YAML::Mark& mark, YAML::anchor_t anchor) {
-    if (anchor != 0) throw YAML::ParserException(mark, "an anchor or alias stands for a value");
-  }
-};
-
-void refuse_repeated_keys(const YAML::Node& node, const std::string& path) {
+/// What `kphi fit` writes is flat; an alias can make a tree without end of a few bytes.
+void refuse_repeated_keys(const YAML::Node& node, const std::string& path, int depth, int& values) {
+  constexpr int kMostDepth = 16, kMostValues = 100'000;
+  if (depth > kMostDepth || ++values > kMostValues)
+    refuse(path, node.Mark().line, "nested too deep or too long for coefficients", kFitAgain);
   std::set<std::string> seen;
   for (const auto& entry : node) {
     if (node.IsMap() && entry.first.IsScalar() && !seen.insert(entry.first.Scalar()).second)
       refuse(path, entry.first.Mark().line, "`" + entry.first.Scalar() + "` is given twice", "keep one of the two");
-    refuse_repeated_keys(node.IsMap() ? entry.second : entry, path);
+    refuse_repeated_keys(node.IsMap() ? entry.second : entry, path, depth + 1, values);
   }
 }
 
@@ -165,15 +141,13 @@ class Value {
 Value top_of(const std::string& text, const std::string& path) {
   YAML::Node node;
   try {
-    std::istringstream stream(text);
-    Guard guard;
-    YAML::Parser(stream).HandleNextDocument(guard);
     node = YAML::Load(text);
   } catch (const YAML::Exception& error) {
     refuse(path, error.mark.line, "not YAML: " + error.msg, "restore the file as `kphi fit` wrote it");
   }
   if (!node.IsMap()) refuse(path, 0, "not a coefficient file", "give the coefficients.yaml that `kphi fit` wrote");
-  refuse_repeated_keys(node, path);
+  int values = 0;
+  refuse_repeated_keys(node, path, 0, values);
   return {node, "", path};
 }
 
