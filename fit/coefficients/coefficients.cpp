@@ -38,7 +38,10 @@ std::string list(const std::vector<double>& values) {
 
 std::string matrix(const std::vector<std::vector<double>>& rows) {
   std::vector<std::string> lines;
-  for (const auto& row : rows) lines.push_back(list(row));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (!std::isfinite(rows[i][i])) return "unknown";
+    lines.push_back(list(rows[i]));
+  }
   return fmt::format("[{}]", fmt::join(lines, ", "));
 }
 

@@ -149,9 +149,11 @@ std::vector<std::string> line_remarks(const CurveFit& line, const Estimate& mism
   std::vector<std::string> remarks;
   const double share = 100 * line.mismatch() / line.K_T;
   if (!line.anchored) {
-    const bool beyond_error = student_test(mismatch, 0).rejected();
-    remarks.push_back(fmt::format("the line's intercept is {:+.2f} % from K_T, {} its error", share,
-                                  beyond_error ? "beyond" : "within"));
+    const HypothesisTest none = student_test(mismatch, 0);
+    remarks.push_back(fmt::format("the line's intercept is {:+.2f} % from K_T{}", share,
+                                  !none.tested()    ? ""
+                                  : none.rejected() ? ", beyond its error"
+                                                    : ", within its error"));
   }
   if (!line.zero_crossing_deg()) {
     remarks.push_back(

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace kphi::fit {
@@ -28,16 +29,25 @@ ErrorSources sources_of(const Identification& identification, const Analysis& an
   return error_sources(std::move(k), std::move(errors));
 }
 
-/// Deviation from the line beyond the errors of its points, once a test has rejected the line.
+/// Deviation from the line beyond the errors of its points, once a test has rejected the line. Of points without errors
+/// the whole deviation, which is all that is known of them.
 BudgetRow line_row(const CurveFit& line, const Curvature& curvature) {
   BudgetRow row{.source = fmt::format("{} k(phi)", name_of(line.form)),
                 .unit = kUnitOfK,
                 .sensitivity = 1,
                 .note = "deviation of its points beyond their errors, where a test finds it"};
-  if (!curvature.bends()) return row;
-  double excess = 0;
   const double terms = static_cast<double>(line.parameters.size()) - (line.anchored ? 1 : 0);
   const double n = static_cast<double>(line.points.size());
+  if (!std::ranges::all_of(line.points, [](const LinePoint& point) { return point.standard_error > 0; })) {
+    const double squares =
+        std::inner_product(line.residuals.begin(), line.residuals.end(), line.residuals.begin(), 0.0);
+    row.u = n > terms ? std::sqrt(squares / (n - terms)) : std::numeric_limits<double>::quiet_NaN();
+    row.freedom = n - terms;
+    row.note = "scatter of its points, whose own errors are not given";
+    return row;
+  }
+  if (!curvature.bends()) return row;
+  double excess = 0;
   for (std::size_t i = 0; i < line.points.size(); ++i)
     excess += line.residuals[i] * line.residuals[i] / (n - terms) - std::pow(line.points[i].standard_error, 2) / n;
   row.u = std::sqrt(std::max(0.0, excess));
@@ -209,6 +219,8 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   analysis.differences = neighbour_tests(analysis.coefficients, sources, identification);
   analysis.between_runs = identification.repeatability.between;
   analysis.shape = shape_of(fit, sources, row);
+  if (const double u = analysis.coefficients.front().combined(); std::isnan(u))
+    analysis.covariance[0][0] = analysis.shape.mismatch.u = u;
   analysis.outlying = outlying_runs(identification.selection.used);
   analysis.flight =
       flight_readiness(identification, {analysis.speed, analysis.curvature, analysis.outlying, analysis.differences});

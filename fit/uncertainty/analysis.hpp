@@ -51,7 +51,7 @@ struct Analysis {
   std::vector<Budget> coefficients;             ///< one per row of the table: k(φ)
   std::vector<Budget> parameters;               ///< of the curve, as CurveFit::parameters
   std::vector<Budget> standard;                 ///< k(φ) in standard air, one per row; empty if the air is unknown
-  std::vector<std::vector<double>> covariance;  ///< of K_T and the parameters, with the errors common to all k
+  std::vector<std::vector<double>> covariance;  ///< of K_T and the parameters; NaN: unknown
   std::vector<SpeedDependence> speed;           ///< one per φ
   Curvature curvature;
   std::vector<HypothesisTest> differences;  ///< Student tests between neighbouring occlusions

@@ -121,6 +121,10 @@ FlightReadiness flight_readiness(const Identification& identification, const Mod
     flight.doubts.push_back({Readiness::with_care,
                              "every occlusion was measured once: how much k changes from mounting to mounting is "
                              "unknown, and not in the ±; repeat the campaign"});
+  if (!from_steps &&
+      std::ranges::any_of(identification.table, [](const auto& row) { return !(row.standard_error > 0); }))
+    flight.doubts.push_back(
+        {Readiness::with_care, "the table gives no u of k: how wrong a k may be is unknown; add its column u_k_…"});
   std::ranges::stable_sort(flight.doubts, std::greater{}, &Doubt::readiness);
   return flight;
 }

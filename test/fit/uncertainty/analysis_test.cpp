@@ -5,9 +5,11 @@
 
 #include <cmath>
 
+#include "compensation/file/coefficient_file.hpp"
 #include "fit/coefficients/coefficients.hpp"
 #include "fit/report/fit_summary.hpp"
 #include "test/fit/bench_study.hpp"
+#include "test/fit/campaign_steps.hpp"
 
 namespace kphi::fit {
 namespace analysis_test {
@@ -151,6 +153,25 @@ TEST(Analysis, OfATableUsesItsOwnErrors) {
   EXPECT_TRUE(analysis.speed.empty());
   EXPECT_TRUE(analysis.torque.empty());
   EXPECT_TRUE(analysis.curvature.lack_of_fit.tested());
+}
+
+TEST(Analysis, OfATableWithoutErrorsInventsNone) {
+  const std::vector<LinePoint> points{{0, 1.5}, {45, 1.38}, {90, 1.21}, {180, 0.82}, {270, 0.39}};
+  const Fitted fitted = analysed(identify_table(points, {.speed_range = {300, 2000}}));
+  const Analysis& analysis = fitted.analysis;
+  EXPECT_TRUE(std::isnan(analysis.coefficients[0].combined()));
+  // Ordinary least squares: the standard errors by the scatter about the line.
+  EXPECT_NEAR(analysis.parameters[0].combined(), 0.021678357028584474, 1e-14);
+  EXPECT_NEAR(analysis.parameters[1].combined(), 0.00012761637925497133, 1e-16);
+  EXPECT_EQ(analysis.parameters[1].freedom(), 2);
+  EXPECT_NEAR(analysis.covariance[1][2], -2.3818187621692447e-06, 1e-18);
+  EXPECT_TRUE(std::isnan(analysis.shape.mismatch.u)) << "K_T's error is unknown";
+  EXPECT_EQ(analysis.flight.readiness(), Readiness::with_care);
+  const std::string file = format_coefficients(fitted, {});
+  EXPECT_THAT(file, testing::HasSubstr("covariance: unknown"));
+  EXPECT_FALSE(compensation::parse_coefficients(file, "k.yaml").curve.has_uncertainty());
+  const std::vector<LinePoint> two{{0, 1.5}, {45, 1.38}, {90, 1.21}};
+  EXPECT_TRUE(std::isnan(analyse(identify_table(two, {})).parameters[0].combined())) << "no scatter about two points";
 }
 
 TEST(Analysis, ListsThePointsThatTheLossIgnored) {
