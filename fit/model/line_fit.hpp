@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -32,11 +33,13 @@ enum class CurveForm : std::uint8_t { line };
 [[nodiscard]] const char* name_of(CurveForm form);
 
 struct Curvature {
-  HypothesisTest lack_of_fit;  ///< of the line: χ²/(m − 2) against the variance of the coefficients
-  HypothesisTest quadratic;    ///< F test of the parabola's third term
-  double second_order = 0;     ///< N/(rad/s)²/deg², of the parabola
-  double second_order_u = 0;
-  double linear_aic = 0, quadratic_aic = 0;  ///< corrected for small samples (AICc); the lower one describes better
+  static constexpr double kNotComputed = std::numeric_limits<double>::quiet_NaN();
+  HypothesisTest lack_of_fit;          ///< of the line: χ²/(m − 2) against the variance of the coefficients
+  HypothesisTest quadratic;            ///< F test of the parabola's third term
+  double second_order = kNotComputed;  ///< N/(rad/s)²/deg², of the parabola
+  double second_order_u = kNotComputed;
+  /// Corrected for small samples (AICc); the lower one describes better.
+  double linear_aic = kNotComputed, quadratic_aic = kNotComputed;
   [[nodiscard]] bool bends() const { return lack_of_fit.rejected() || quadratic.rejected(); }
 };
 
