@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <system_error>
 
 #include "base/error.hpp"
 
@@ -162,6 +163,10 @@ Handle create_file(const std::filesystem::path& path) {
 
 Handle open_file(const std::filesystem::path& path) {
   be_quiet();
+  // The library would wait for somebody to write into a pipe.
+  std::error_code none;
+  if (std::filesystem::exists(path, none) && !std::filesystem::is_regular_file(path, none))
+    throw RecordError(path.string() + ": open: this is a folder, a pipe or a device; name a run file");
   return own(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), path.string() + ": open");
 }
 

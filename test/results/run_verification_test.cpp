@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 #include <random>
@@ -180,6 +181,8 @@ TEST_F(VerifiedRun, WhatIsNoRunFileIsSaidToBeNone) {
   std::ofstream(path_) << "not a run";
   EXPECT_THAT(verify_run(path_).problems, Contains(HasSubstr(path_.string())));
   EXPECT_THROW((void)read_run(folder_ / "nothing.h5"), RecordError);
+  ASSERT_EQ(::mkfifo((folder_ / "pipe.h5").c_str(), 0600), 0);
+  EXPECT_THAT(verify_run(folder_ / "pipe.h5").problems, Contains(HasSubstr("a pipe"))) << "and nobody waits for it";
 }
 
 }  // namespace run_verification_test

@@ -39,6 +39,8 @@ TEST(KTable, ReadsCoefficientsInBothUnits) {
   const auto rpm = read_k_table("phi_deg,k_n_per_rpm2\n0,1.7e-8\n", "K.csv");
   EXPECT_NEAR(rpm[0].k, 1.7e-8 * 91.189065, 1e-12);
   EXPECT_EQ(rpm[0].standard_error, 0);
+  EXPECT_EQ(read_k_table("phi_deg,k_n_per_rpm2,u_k_n_per_rpm2\n0,1.7e-8,\n", "K.csv")[0].standard_error, 0)
+      << "unknown";
 }
 
 TEST(KTable, NeverAssumesAUnit) {
