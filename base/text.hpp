@@ -8,8 +8,8 @@
 
 namespace kphi {
 
-/// The file's bytes, `most_bytes` at most. Throws std::runtime_error with "cause; next move", without the file's name:
-/// it cannot be opened or read, it is none (a folder, a pipe, a device), or it is longer.
+/// The file's bytes, `most_bytes` at most. Throws std::runtime_error ("cause; next move", without the file's name) if
+/// the file cannot be opened or read, is longer, or is a folder, a pipe or a device.
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes);
 
 enum class LineEnds { replace, keep };

@@ -73,7 +73,7 @@ void write_text(const std::filesystem::path& path, const std::string& text, File
 /// Of a table or a journal that kphi writes; of a log that is imported.
 inline constexpr std::size_t kLargestTable = std::size_t{64} << 20, kLargestLog = std::size_t{4} << 30;
 
-/// The file's bytes. Throws RecordError, also if it is no regular file or longer than `most_bytes`.
+/// The file's bytes, `most_bytes` at most. Throws RecordError for a longer file, a pipe, a device or a folder.
 [[nodiscard]] std::string read_text(const std::filesystem::path& path, std::size_t most_bytes = kLargestTable);
 
 /// 64 lower-case hex digits.
