@@ -78,10 +78,10 @@ async function open(browser, url, more = {}) {
   return page;
 }
 
-/// Until the motor of `run` turns on the page that shows it.
+/// Until the motor of `run` turns on the page that shows it, in this repetition or a later one.
 async function turns(page, run, repetition) {
   const ended = run.ended.then(() => { throw new Error(`ended before it turned:\n${run.words}`); });
-  await Promise.race([ended, page.waitForFunction(of => window.seen.last && window.seen.last.repetition === of
+  await Promise.race([ended, page.waitForFunction(of => window.seen.last && window.seen.last.repetition >= of
     && window.seen.last.step >= 0 && window.seen.last.speed_rpm > 5000, repetition)]);
   ended.catch(() => {});  // it may end from now on
 }
@@ -95,7 +95,7 @@ async function stopBy(how, ask, page, bench, run) {
   await ask();
   await page.waitForFunction(() => state.asked);
   const asked = await page.evaluate(() => window.seen.asked.at(-1)) + offset;
-  assert.equal(await Promise.race([run.ended, new Promise(done => setTimeout(done, 20_000, 'no end'))]), kInterrupted, run.words);
+  assert.equal(await Promise.race([run.ended, new Promise(done => setTimeout(done, 20_000, 'no end').unref())]), kInterrupted, run.words);
   await page.waitForFunction(() => state.ended);
   assert.match(await page.locator('#banner').innerText(), /stopped by request/);
   assert.equal(await page.locator('#stop_word').innerText(), 'ENDED');
@@ -162,7 +162,7 @@ try {
   // Meanwhile the first run goes on.
   await it('shows a recorded run again, in which nothing can be stopped', async () => {
     const file = new URL('../../results/reference/runs/5x3_phi090_rep1.h5', import.meta.url).pathname;
-    const replay = new Child([kphi, 'replay', file, '--live', '--speed', '3']);
+    const replay = new Child([kphi, 'replay', file, '--live']);
     try {
       const seen = await open(browser, await addressOf(replay), { colorScheme: 'dark' });
       const during = await seen.waitForFunction(() => state.steps.length >= 1 && !state.ended
@@ -181,9 +181,9 @@ try {
   });
 
   await it('shows k of every step, lines, and what the guard holds the bench to', async () => {
-    await run.waitFor(/run\s+1\/2/);
+    await run.waitFor(/run\s+1\/20/);
     await page.waitForFunction(() => state.steps.length >= 3 && state.trace.length > 50);
-    assert.match(await page.locator('#lines').innerText(), /run\s+1\/2/);
+    assert.match(await page.locator('#lines').innerText(), /run\s+1\/20/);
     const k = await page.evaluate(() => state.steps.map(step => step.k_n_s2));
     for (const value of k) assert.ok(value > 0.5e-6 && value < 3e-6, `k = ${value} N s²`);
     const limits = await page.evaluate(() => Object.fromEntries(state.limits.map(limit => [limit.key, limit.source])));
@@ -222,11 +222,13 @@ try {
   await it('cost the acquisition at 7 kHz no sample', () => {
     const results = bench.path('results'), journal = path.join(results, readdirSync(results).sort()[0], 'journal.jsonl');
     const accepted = readFileSync(journal, 'utf8').split('\n').filter(line => line.includes('"run_accepted"')).map(line => JSON.parse(line));
-    assert.equal(accepted.length, 1);
-    const entry = accepted[0].data ?? accepted[0];
-    assert.ok(entry.samples > 25_000, `${entry.samples} samples`);
-    assert.equal(entry.lost, 0);
-    console.log(`     ${entry.lost} of ${entry.samples} samples lost`);
+    assert.ok(accepted.length >= 1);
+    for (const line of accepted) {
+      const entry = line.data ?? line;
+      assert.ok(entry.samples > 25_000, `${entry.samples} samples`);
+      assert.equal(entry.lost, 0);
+    }
+    console.log(`     0 samples lost in ${accepted.length} runs`);
   });
 
   await it('asks no other place for anything, and complains of nothing', () => {
