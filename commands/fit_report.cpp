@@ -252,9 +252,9 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
       ->check(kExistingPath);
   add_value(command, "--k-unit", "UNIT", request.k_unit, "unit of a column named k: N/(rad/s)^2 or N/RPM^2")
       ->check(CLI::IsMember({"N/(rad/s)^2", "N/RPM^2"}));
-  command.add_flag("--anchored", request.options.line.anchored,
+  command.add_flag("--anchored", request.options.curve.anchored,
                    "start the line at K_T (default: free, through the occlusions)");
-  add_value(command, "--points", "DEG,DEG,…", request.options.line.points_deg,
+  add_value(command, "--points", "DEG,DEG,…", request.options.curve.points_deg,
             "angles that carry the line, in degrees (default: all above 0)")
       ->delimiter(',');
   add_value(command, "--speed-range-rpm", "A:B", request.speed_range_rpm,

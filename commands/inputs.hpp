@@ -9,7 +9,7 @@
 #include "compensation/thrust_curve.hpp"
 #include "daq/live/live_session.hpp"
 #include "fit/coefficients/coefficients.hpp"
-#include "fit/model/line_fit.hpp"
+#include "fit/model/curve_fit.hpp"
 #include "fit/uncertainty/analysis.hpp"
 #include "profiles/vehicle.hpp"
 #include "results/step_mean.hpp"
@@ -19,7 +19,7 @@ namespace kphi::commands {
 /// What is fitted, and what is known about where it comes from.
 struct FitInput {
   std::vector<results::StepMean> steps;
-  std::vector<fit::LinePoint> table;  ///< instead of steps
+  std::vector<fit::CurvePoint> table;  ///< instead of steps
   fit::Provenance provenance;
   std::filesystem::path folder;  ///< where the outputs go
   bool campaign = false;         ///< `folder` is a campaign folder

@@ -185,20 +185,20 @@ std::optional<Coefficients::Uncertainty> read_uncertainty(const Value& map, doub
   return one;
 }
 
-/// Of K_T, intercept and slope; nullopt without a covariance.
-std::optional<LineUncertainty> read_covariance(const Value& top, double scale) {
+/// Of K_T and the parameters of the curve, each times its unit; empty without a covariance.
+std::vector<std::vector<double>> read_covariance(const Value& top, const std::vector<double>& units) {
   const std::vector<Value> rows =
       top.find("uncertainty") ? top.map_at("uncertainty").list("covariance") : std::vector<Value>();
-  if (rows.empty()) return std::nullopt;
-  const double units[3] = {scale, scale, scale * kPerDegreeToPerRad};
-  double covariance[3][3] = {};
+  const std::size_t n = units.size();
+  std::vector<std::vector<double>> covariance(rows.size(), std::vector<double>(n));
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (rows.size() != 3 || !rows[i].node().IsSequence() || rows[i].items().size() != 3)
-      rows[i].refuse("covariance is not three rows of three numbers", kFitAgain);
-    for (std::size_t j = 0; j < 3; ++j) covariance[i][j] = rows[i].items()[j].number() * units[i] * units[j];
+    if (rows.size() != n || !rows[i].node().IsSequence() || rows[i].items().size() != n)
+      rows[i].refuse("covariance is not " + std::to_string(n) + " rows of " + std::to_string(n) + " numbers",
+                     kFitAgain);
+    for (std::size_t j = 0; j < n; ++j) covariance[i][j] = rows[i].items()[j].number() * units[i] * units[j];
     if (covariance[i][i] < 0.0) rows[i].refuse("a variance is below 0", kFitAgain);
   }
-  return LineUncertainty{std::sqrt(covariance[0][0]), covariance[1][1], covariance[1][2], covariance[2][2]};
+  return covariance;
 }
 
 ThrustCoefficient read_thrust_coefficient(const Value& map, double scale) {
@@ -210,21 +210,46 @@ ThrustCoefficient read_thrust_coefficient(const Value& map, double scale) {
   return k;
 }
 
-ThrustCurve read_curve(const Value& top, double scale, Radians largest) {
-  const OverlapMeasure overlap = overlap_of(top);
-  const Value reference = top.map_at("K_T");
-  const ThrustCoefficient k_t = read_thrust_coefficient(reference, scale);
-  const Value line = top.map_at("line");
+std::optional<ThrustCurve> read_line(const Value& top, ThrustCoefficient k_t, double scale, Radians largest) {
+  const Value line = top.map_at("curve");
   const ThrustCoefficient intercept(line.map_at("intercept").at("value").number() * scale);
   const double slope = line.map_at("slope_per_deg").at("value").number() * scale * kPerDegreeToPerRad;
-  const auto uncertainty = read_covariance(top, scale);
+  const auto c = read_covariance(top, {scale, scale, scale * kPerDegreeToPerRad});
+  std::optional<LineUncertainty> uncertainty;
+  if (!c.empty()) uncertainty = LineUncertainty{std::sqrt(c[0][0]), c[1][1], c[1][2], c[2][2]};
   if (!(intercept.value() > 0.0))
     line.at("intercept").refuse("the intercept must be positive", "check sign and unit of the fit");
-  if (line.at("anchored").truth() && std::fabs(intercept / k_t - 1.0) > kAnchorTolerance)
-    line.at("intercept").refuse("the line is called anchored, but its intercept is not K_T", kFitAgain);
-  const auto curve = ThrustCurve::from_line(k_t, intercept, slope, largest, overlap, uncertainty);
-  if (!curve) line.refuse("the numbers of K_T, line and valid are too large to fly", kFitAgain);
-  return *curve;
+  return ThrustCurve::from_line(k_t, intercept, slope, largest, overlap_of(top), uncertainty);
+}
+
+/// A form of `curve.form` with what reads it.
+struct FormReader {
+  const char* name;
+  std::optional<ThrustCurve> (*read)(const Value& top, ThrustCoefficient k_t, double scale, Radians largest);
+};
+constexpr FormReader kForms[] = {{"line", read_line}};
+
+ThrustCurve read_curve(const Value& top, double scale, Radians largest) {
+  const ThrustCoefficient k_t = read_thrust_coefficient(top.map_at("K_T"), scale);
+  const Value block = top.map_at("curve"), form = block.at("form");
+  for (const auto& [name, read] : kForms) {
+    if (form.text() != name) continue;
+    const auto curve = read(top, k_t, scale, largest);
+    if (!curve) block.refuse("the numbers of K_T, curve and valid are too large to fly", kFitAgain);
+    if (block.at("anchored").truth() && std::fabs(curve->at(Radians(0)) / k_t - 1.0) > kAnchorTolerance)
+      block.at("anchored").refuse("the curve is called anchored, but its k(0) is not K_T", kFitAgain);
+    return *curve;
+  }
+  form.refuse("form `" + form.text() + "` of the curve is not known", "use a newer kphi, or fit again with this one");
+}
+
+/// Each map in the block of the curve that has a value.
+std::vector<Coefficients::Parameter> read_parameters(const Value& block, double scale) {
+  std::vector<Coefficients::Parameter> parameters;
+  for (const auto& [key, value] : block.entries())
+    if (value.node().IsMap() && value.find("value"))
+      parameters.push_back({key, value.at("value").number() * scale, read_uncertainty(value, scale)});
+  return parameters;
 }
 
 std::optional<std::pair<double, double>> read_range(const Value& map, const std::string& key) {
@@ -292,9 +317,11 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   coefficients.path = path;
   coefficients.smallest_occlusion = from_degrees(smallest);
   coefficients.thrust_coefficient = read_uncertainty(top.at("K_T"), scale);
-  coefficients.anchored = top.at("line").at("anchored").truth();
-  for (const Value& point : top.at("line").list("points_deg"))
-    coefficients.points.push_back(from_degrees(point.number()));
+  const Value curve = top.map_at("curve");
+  coefficients.form = curve.at("form").text();
+  coefficients.anchored = curve.at("anchored").truth();
+  coefficients.parameters = read_parameters(curve, scale);
+  for (const Value& point : curve.list("points_deg")) coefficients.points.push_back(from_degrees(point.number()));
   if (const auto speed = read_range(top.at("valid"), "speed_rpm")) {
     coefficients.slowest_speed = from_rpm(speed->first);
     coefficients.fastest_speed = from_rpm(speed->second);
@@ -308,11 +335,6 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   coefficients.air_density_u_kg_m3 = top.number_at("air_density_u_kg_m3");
   if (const auto map = top.find("provenance"); map && map->node().IsMap())
     read_provenance(*map, coefficients.provenance);
-  for (const char* key : {"intercept", "slope_per_deg"}) {
-    const Value parameter = top.at("line").map_at(key);
-    coefficients.parameters.push_back(
-        {key, parameter.at("value").number() * scale, read_uncertainty(parameter, scale)});
-  }
   if (top.find("uncertainty"))
     for (const Value& source : top.map_at("uncertainty").list("not_known"))
       coefficients.not_known.push_back(source.text());

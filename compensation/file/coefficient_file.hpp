@@ -39,9 +39,9 @@ struct Coefficients {
     double expanded_95 = 0;  ///< half of the 95 % interval
     double freedom = std::numeric_limits<double>::infinity();
   };
-  /// "intercept" in N/(rad/s)², "slope_per_deg" in N/(rad/s)² per degree.
+  /// One number of the curve, in the units of its form: "intercept" N/(rad/s)², "slope_per_deg" N/(rad/s)² per degree.
   struct Parameter {
-    std::string key;
+    std::string key;  ///< as the file names it
     double value = 0;
     std::optional<Uncertainty> uncertainty;
   };
@@ -71,14 +71,15 @@ struct Coefficients {
   std::string measured_utc;
   std::string tool_version;
   Propeller propeller;
-  /// What flies: K_T, the line, its overlap measure and the largest valid φ; with its uncertainty if the file has the
+  /// What flies: K_T, k(φ), its overlap measure and the largest valid φ; with its uncertainty if the file has the
   /// covariance.
   ThrustCurve curve;
+  std::string form;                               ///< of the curve: "line"
   std::optional<Uncertainty> thrust_coefficient;  ///< of K_T
-  std::vector<Parameter> parameters;              ///< of the curve, as the file names them
+  std::vector<Parameter> parameters;              ///< of the curve
   std::vector<std::string> not_known;             ///< sources that these uncertainties lack
-  bool anchored = false;                          ///< the line is forced through K_T at φ = 0
-  std::vector<Radians> points;                    ///< occlusions behind the line
+  bool anchored = false;                          ///< k(0) of the curve is K_T
+  std::vector<Radians> points;                    ///< occlusions behind the curve
   Radians smallest_occlusion;                     ///< of the valid range of φ
   std::optional<RadPerSec> slowest_speed;         ///< valid range of speeds
   std::optional<RadPerSec> fastest_speed;

@@ -85,10 +85,10 @@ std::string entry_of(const Budget& budget, const std::string& more, const std::s
 std::string curve_block(const Fitted& fitted) {
   const CurveFit& fit = fitted.identification.curve_fit;
   std::vector<double> points;
-  for (const LinePoint& point : fit.points) points.push_back(point.phi_deg);
-  std::string text =
-      "K_T: " + entry_of(fitted.analysis.coefficients.front(), ", phi_deg: 0.0", "") +
-      fmt::format("{}:\n  anchored: {}\n  points_deg: {}\n", name_of(fit.form), fit.anchored, list(points));
+  for (const CurvePoint& point : fit.points) points.push_back(point.phi_deg);
+  std::string text = "K_T: " + entry_of(fitted.analysis.coefficients.front(), ", phi_deg: 0.0", "") +
+                     fmt::format("curve:\n  form: {}\n  anchored: {}\n  points_deg: {}\n", name_of(fit.form),
+                                 fit.anchored, list(points));
   for (std::size_t i = 0; i < fit.parameters.size(); ++i)
     text += "  " + fit.parameters[i].key + ": " + entry_of(fitted.analysis.parameters[i], "", fit.parameters[i].per);
   return text;
@@ -170,18 +170,18 @@ std::string number_or_none(const std::optional<double>& value) { return value ? 
 
 std::string analysis_blocks(const Analysis& analysis) {
   std::string text = "uncertainty:  # by the GUM: u standard, expanded_95 half of the 95 % interval\n";
-  text +=
-      fmt::format("  covariance: {}  # of K_T and the keys of the line, in their order\n", matrix(analysis.covariance));
+  text += fmt::format("  covariance: {}  # of K_T and the parameters of the curve, in their order\n",
+                      matrix(analysis.covariance));
   text += fmt::format("  not_known: [{}]  # sources missing in the sums\n",
                       fmt::join(analysis.coefficients.front().not_known(), ", "));
   std::vector<std::string> doubts;
   for (const Doubt& doubt : analysis.flight.doubts) doubts.push_back(quoted(doubt.text));
   text += fmt::format("  verdict: {}\n  doubts: [{}]\n", name_of(analysis.flight.readiness()), fmt::join(doubts, ", "));
-  text += fmt::format("  line: {{clipping_deg: {}, zero_deg: {}, k0_minus_K_T: {}, u: {}}}\n",
-                      number_or_none(analysis.shape.clipping_deg), number_or_none(analysis.shape.zero_deg),
-                      number(analysis.shape.mismatch.value), number(analysis.shape.mismatch.u));
-  text += fmt::format("  line_lack_of_fit_p: {}\n  line_quadratic_p: {}\n", number(analysis.curvature.lack_of_fit.p),
-                      number(analysis.curvature.quadratic.p));
+  text += fmt::format(
+      "  curve: {{clipping_deg: {}, zero_deg: {}, k0_minus_K_T: {}, u: {}, lack_of_fit_p: {}, quadratic_p: {}}}\n",
+      number_or_none(analysis.shape.clipping_deg), number_or_none(analysis.shape.zero_deg),
+      number(analysis.shape.mismatch.value), number(analysis.shape.mismatch.u),
+      number(analysis.curvature.lack_of_fit.p), number(analysis.curvature.quadratic.p));
   if (!analysis.speed.empty()) text += "  speed:\n";
   for (const SpeedDependence& one : analysis.speed)
     text += fmt::format("    - {{phi_deg: {}, change_share: {}, u: {}, lack_of_fit_p: {}}}\n", number(one.phi_deg),
@@ -197,8 +197,8 @@ std::string analysis_blocks(const Analysis& analysis) {
 }
 
 /// The value with this name; the first if the file has none.
-template <class Enum>
-Enum named(const std::string& name, const char* key, const std::string& path, std::initializer_list<Enum> values) {
+template <class Enum, std::size_t n>
+Enum named(const std::string& name, const char* key, const std::string& path, const std::array<Enum, n>& values) {
   if (name.empty()) return *values.begin();
   for (const Enum value : values)
     if (name == name_of(value)) return value;
@@ -209,7 +209,7 @@ Enum named(const std::string& name, const char* key, const std::string& path, st
 
 std::string estimator_words(const Identification& identification) {
   const bool from_steps = !identification.table.empty() && identification.table.front().fit.has_value();
-  const char* const form = name_of(identification.options.line.form);
+  const char* const form = name_of(identification.options.curve.form);
   if (!from_steps) return fmt::format("a weighted {} through given k(phi)", form);
   constexpr std::array<const char*, 4> words{
       "least squares of T on w^2 through the origin", "least squares of T on w^2 with an offset",
@@ -226,7 +226,9 @@ std::string format_coefficients(const Fitted& fitted, const Provenance& provenan
   const Identification& identification = fitted.identification;
   std::string text = head(identification, provenance) + curve_block(fitted) + valid_block(identification) + "table:\n";
   for (std::size_t i = 0; i < identification.table.size(); ++i) text += table_row(fitted, i);
-  return text + provenance_block(fitted, provenance) + analysis_blocks(fitted.analysis);
+  text += provenance_block(fitted, provenance) + analysis_blocks(fitted.analysis);
+  (void)compensation::parse_coefficients(text, "coefficients.yaml");  // what cannot be read again is not written
+  return text;
 }
 
 RecordedFit read_recorded_fit(const std::string& path) {
@@ -238,11 +240,9 @@ RecordedFit read_recorded_fit(const std::string& path) {
   options.diameter_in = file.propeller.diameter_in;
   options.blades = file.propeller.blades;
   options.overlap = file.curve.overlap();
-  file.curve.visit([&](const compensation::Line&) {
-    options.line.form = CurveForm::line;
-    options.line.anchored = file.anchored;
-    for (const Radians& point : file.points) options.line.points_deg.push_back(to_degrees(point));
-  });
+  options.curve.form = named(file.form, "form", path, kCurveForms);
+  options.curve.anchored = file.anchored;
+  for (const Radians& point : file.points) options.curve.points_deg.push_back(to_degrees(point));
   if (!file.table.empty() && file.table.front().at_speed) options.at_speed_rad_s = file.table.front().at_speed->value();
   if (fit.speed_range_rpm) {
     const double slack = 1e-3;  // the file has RPM to a thousandth; with this slack the same steps are taken
@@ -251,10 +251,10 @@ RecordedFit read_recorded_fit(const std::string& path) {
   }
   options.estimator =
       named(fit.k_by, "k_by", path,
-            {Estimator::through_origin, Estimator::with_offset, Estimator::polynomial, Estimator::at_speed});
-  options.weighting =
-      named(fit.weights, "weights", path, {Weighting::equal, Weighting::thrust, Weighting::effective_variance});
-  options.loss = named(fit.loss, "loss", path, {Loss::none, Loss::huber, Loss::cauchy, Loss::tukey});
+            std::array{Estimator::through_origin, Estimator::with_offset, Estimator::polynomial, Estimator::at_speed});
+  options.weighting = named(fit.weights, "weights", path,
+                            std::array{Weighting::equal, Weighting::thrust, Weighting::effective_variance});
+  options.loss = named(fit.loss, "loss", path, std::array{Loss::none, Loss::huber, Loss::cauchy, Loss::tukey});
   for (const std::string& run : fit.leave_out) options.left_out.push_back(parse_left_out_run(run));
   if (!fit.bench) return record;
   record.bench.emplace();

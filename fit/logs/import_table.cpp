@@ -131,7 +131,7 @@ bool is_k_table(std::string_view text) {
          (header.find_column("k") || header.find_column(kPerRad2) || header.find_column(kPerRpm2));
 }
 
-std::vector<LinePoint> read_k_table(std::string_view text, std::string path, std::string_view unit_of_k) {
+std::vector<CurvePoint> read_k_table(std::string_view text, std::string path, std::string_view unit_of_k) {
   const Table table = read_csv(text, std::move(path));
   if (!table.problems.empty()) {
     const auto& [line, what] = table.problems.front();
@@ -140,7 +140,7 @@ std::vector<LinePoint> read_k_table(std::string_view text, std::string path, std
   const auto [name, unit] = column_of_k(table, unit_of_k);
   const std::size_t phi = table.column("phi_deg"), k = table.column(name);
   const auto error = table.find_column("u_" + name);
-  std::vector<LinePoint> points;
+  std::vector<CurvePoint> points;
   for (const TableRow& row : table.rows) {
     points.push_back({non_negative(table, row, phi), non_negative(table, row, k) * unit,
                       error && !row.fields[*error].empty() ? non_negative(table, row, *error) * unit : 0});

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "fit/logs/log_audit.hpp"
-#include "fit/model/line_fit.hpp"
+#include "fit/model/curve_fit.hpp"
 
 namespace kphi::fit {
 
@@ -33,7 +33,7 @@ inline constexpr double kUiucDensityKgM3 = 1.225;
 /// 91 times larger, so none is assumed. Throws ConfigurationError (path:line) where the unit is not known or given
 /// twice, for a missing column, a line that does not fit, a φ outside [0, 360), or a negative k or u_k (k = 0 is
 /// allowed: a fully blocked propeller).
-[[nodiscard]] std::vector<LinePoint> read_k_table(std::string_view text, std::string path, std::string_view unit = {});
+[[nodiscard]] std::vector<CurvePoint> read_k_table(std::string_view text, std::string path, std::string_view unit = {});
 
 struct ImportOptions {
   RowSelection rows;

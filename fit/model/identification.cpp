@@ -125,15 +125,9 @@ StepsByAngle by_angle(std::span<const StepMean> steps) {
   return result;
 }
 
-std::vector<LinePoint> line_points(const std::vector<OcclusionCoefficient>& table) {
-  std::vector<LinePoint> points;
-  for (const OcclusionCoefficient& row : table) points.push_back({row.phi_deg, row.k, row.standard_error});
-  return points;
-}
-
 /// The curve through the table. Throws FitError if it cannot fly.
 Identification with_curve(Identification result) {
-  result.curve_fit = fit_curve(line_points(result.table), result.options.line);
+  result.curve_fit = fit_curve(points_of(result.table), result.options.curve);
   (void)result.curve();
   return result;
 }
@@ -233,13 +227,19 @@ Identification identify(std::span<const StepMean> steps, const IdentificationOpt
   return with_curve(std::move(result));
 }
 
-Identification identify_table(std::span<const LinePoint> points, const IdentificationOptions& options) {
+std::vector<CurvePoint> points_of(std::span<const OcclusionCoefficient> table) {
+  std::vector<CurvePoint> points;
+  for (const OcclusionCoefficient& row : table) points.push_back({row.phi_deg, row.k, row.standard_error});
+  return points;
+}
+
+Identification identify_table(std::span<const CurvePoint> points, const IdentificationOptions& options) {
   Identification result;
   result.options = options;
   result.propeller = options.propeller;
   result.diameter_in = options.diameter_in;
   result.blades = options.blades;
-  for (const LinePoint& point : points)
+  for (const CurvePoint& point : points)
     result.table.push_back({.phi_deg = point.phi_deg, .k = point.k, .standard_error = point.standard_error});
   std::ranges::sort(result.table, {}, &OcclusionCoefficient::phi_deg);
   result.fitted = options.speed_range;

@@ -1,4 +1,4 @@
-// Steps of one propeller → one k per occlusion → the line k(φ). Read this first.
+// Steps of one propeller → one k per occlusion → the curve k(φ). Read this first.
 #pragma once
 
 #include <optional>
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "compensation/convex_polygon.hpp"
-#include "fit/model/line_fit.hpp"
+#include "fit/model/curve_fit.hpp"
 #include "fit/model/repeatability.hpp"
 #include "fit/model/step_selection.hpp"
 #include "fit/model/thrust_fit.hpp"
@@ -20,7 +20,7 @@ inline constexpr double kStandardDensity = 1.225;  ///< kg/m³: ISA at sea level
 /// its density: kphi never assumes standard air.
 [[nodiscard]] std::optional<Estimate> air_of(std::span<const results::StepMean> steps);
 
-/// Which k of an occlusion the line is drawn through.
+/// Which k of an occlusion the curve is drawn through.
 enum class Estimator : std::uint8_t {
   through_origin,  ///< k of T = k ω² over the speed range
   with_offset,     ///< k of T = k ω² + offset
@@ -35,7 +35,7 @@ struct IdentificationOptions {
   SpeedRange speed_range{.min_rad_s = kSpeedMinRpm * 3.14159265358979323846 / 30};
   std::vector<LeftOutRun> left_out{};
   std::optional<double> at_speed_rad_s{};  ///< for "k at speed"; default: the highest level measured at every φ
-  LineFitOptions line{};
+  CurveOptions curve{};
   std::string propeller{};  ///< empty: as the steps say
   double diameter_in = 0;   ///< 0: as the steps say
   int blades = 0;
@@ -70,7 +70,7 @@ struct Identification {
   std::optional<Estimate> air;  ///< kg/m³, of the steps used; nullopt: unknown, and so is every k at standard density
   double at_speed_rad_s = 0;    ///< commanded level of "k at speed"; 0: none
   SpeedRange fitted{0, 0};      ///< lowest and highest level used at any φ
-  double speed_min_rad_s = 0;   ///< speeds measured at every φ: the valid range of the line
+  double speed_min_rad_s = 0;   ///< speeds measured at every φ: the valid range of the curve
   double speed_max_rad_s = 0;
 
   /// Thrust coefficient measured at φ = 0, N/(rad/s)².
@@ -106,7 +106,10 @@ struct Identification {
 [[nodiscard]] Identification identify(std::span<const results::StepMean> steps,
                                       const IdentificationOptions& options = {});
 
-/// The same from given coefficients: the line alone. The range of speeds in the options is their valid range.
-[[nodiscard]] Identification identify_table(std::span<const LinePoint> points, const IdentificationOptions& options);
+/// The points of the curve.
+[[nodiscard]] std::vector<CurvePoint> points_of(std::span<const OcclusionCoefficient> table);
+
+/// The same from given coefficients: the curve alone. The range of speeds in the options is their valid range.
+[[nodiscard]] Identification identify_table(std::span<const CurvePoint> points, const IdentificationOptions& options);
 
 }  // namespace kphi::fit

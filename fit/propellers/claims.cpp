@@ -36,9 +36,8 @@ std::optional<Estimate> k_of(const Fitted* member, double phi_deg, Air air) {
 }
 
 std::optional<Estimate> slope_of(const Fitted* member, Air air) {
-  const Budget* of_line = member == nullptr ? nullptr : member->analysis.parameter("slope");
-  if (of_line == nullptr) return std::nullopt;
-  Estimate slope = of_line->estimate();
+  if (member == nullptr) return std::nullopt;
+  Estimate slope = member->analysis.line.slope.estimate();
   if (air == Air::measured) return slope;
   const Budget& standard = member->analysis.standard.front();
   const double scale = standard.value / member->analysis.coefficients.front().value;
@@ -89,7 +88,7 @@ Claim judged(std::string id, std::string statement, std::string unit, const std:
 
 /// A test that does not reject is no proof: the claim then holds as far as these data show.
 Claim linear(const Fitted& member) {
-  const HypothesisTest& test = member.analysis.curvature.lack_of_fit;
+  const HypothesisTest& test = member.analysis.line.test.lack_of_fit;
   const std::string& propeller = member.identification.propeller;
   Claim claim = judged(fmt::format("linear_{}", propeller),
                        fmt::format("thrust falls linearly with the occlusion ({}); p of the lack of fit, {} or above",

@@ -44,10 +44,9 @@ double freedom_of(std::span<const Fitted* const> members) {
 double common_u_of_slope(std::span<const Fitted* const> members) {
   double largest = 0;
   for (const Fitted* member : members) {
-    const Budget* slope = member->analysis.parameter("slope");
-    if (slope == nullptr) continue;
     double squares = 0;
-    for (const BudgetRow& row : slope->rows) squares += row.common ? row.contribution() * row.contribution() : 0;
+    for (const BudgetRow& row : member->analysis.line.slope.rows)
+      squares += row.common ? row.contribution() * row.contribution() : 0;
     largest = std::max(largest, std::sqrt(squares));
   }
   return largest;

@@ -62,22 +62,11 @@ double share_bottom(const std::vector<ThrustShares>& shares) {
 }
 
 /// The curve with its 95 % interval, by the whole budget.
-std::string curve_rows(const Fitted& fitted, double from_deg, double to_deg) {
-  constexpr int kPieces = 60;
-  const compensation::ThrustCurve curve = fitted.identification.curve();
-  const Analysis& analysis = fitted.analysis;
+std::string curve_rows(const std::vector<CurveBand>& band, double from_deg, double to_deg) {
   std::string rows;
-  for (int i = 0; i <= kPieces; ++i) {
-    const double phi = from_deg + (to_deg - from_deg) * i / kPieces;
-    const double k = curve.at(from_degrees(phi)).value();
-    const std::vector<double> basis = fitted.identification.curve_fit.basis_at(phi);
-    double variance = 0;
-    for (std::size_t a = 0; a < basis.size(); ++a)
-      for (std::size_t b = 0; b < basis.size(); ++b)
-        variance += basis[a] * basis[b] * analysis.covariance[a + 1][b + 1];
-    const double band = analysis.parameters.back().coverage() * std::sqrt(std::max(variance, 0.0));
-    rows += fmt::format("{:.6g} {:.8g} {:.8g} {:.8g}\n", phi, k * 1e6, (k - band) * 1e6, (k + band) * 1e6);
-  }
+  for (const auto& [phi, k, expanded] : band)
+    if (phi >= from_deg && phi <= to_deg)
+      rows += fmt::format("{:.6g} {:.8g} {:.8g} {:.8g}\n", phi, k * 1e6, (k - expanded) * 1e6, (k + expanded) * 1e6);
   return rows;
 }
 
@@ -136,8 +125,8 @@ Figure share_figure(const Fitted& fitted, const std::vector<ThrustShares>& share
     coefficients += fmt::format("{:.6g} {:.8g} {:.8g}\n", phi, k * 1e6, expanded * 1e6);
   }
   const double first = identification.first_fitted_deg(), last = identification.table.back().phi_deg;
-  data += data_block("line", curve_rows(fitted, first, std::max(last, first + 1e-3))) +
-          data_block("before", curve_rows(fitted, 0, first)) + data_block("k", coefficients);
+  data += data_block("line", curve_rows(fitted.analysis.band, first, last)) +
+          data_block("before", curve_rows(fitted.analysis.band, 0, first)) + data_block("k", coefficients);
   curves.insert(
       curves.end(),
       {"$before using 1:2 axes x1y2 with lines dt 2 lw 1.5 lc rgb '#D55E00' notitle",

@@ -38,7 +38,7 @@ struct Settling {
 [[nodiscard]] Figure family_figure(std::span<const Fitted> family);
 
 /// All figures that the data allow, in the order of the report: the paper's (box plots of the thrust shares over φ; on
-/// the second axis, scaled so that K_T is at 100 %, the coefficients and the line), thrust with residuals, k against
+/// the second axis, scaled so that K_T is at 100 %, the coefficients and the curve), thrust with residuals, k against
 /// speed, repetitions, power, settling. `settling` may be null. Throws RecordError when the folder cannot be written;
 /// a missing gnuplot only skips the figures.
 [[nodiscard]] Figures draw_figures(const Fitted& fitted, const std::vector<ThrustShares>& shares,

@@ -71,7 +71,7 @@ static void to_json(Json& json, const SpeedDependence& one) {
           {"lack_of_fit", one.lack_of_fit}, {"trend", one.trend},         {"levels", one.levels}};
 }
 
-static void to_json(Json& json, const LinePrediction& one) {
+static void to_json(Json& json, const CurvePrediction& one) {
   json = {{"phi_deg", one.phi_deg},
           {"k", one.k.value},
           {"u_k", one.k.combined()},
@@ -139,17 +139,17 @@ void to_json(Json& json, const Analysis& analysis) {
           {"covariance_K_T_parameters", analysis.covariance},
           {"standard_air", analysis.standard},
           {"speed", analysis.speed},
-          {"line_lack_of_fit", curvature.lack_of_fit},
-          {"line_quadratic",
+          {"curve_lack_of_fit", curvature.lack_of_fit},
+          {"curve_quadratic",
            {{"test", curvature.quadratic},
             {"second_order", curvature.second_order},
             {"u", curvature.second_order_u},
             {"linear_aicc", curvature.linear_aic},
             {"quadratic_aicc", curvature.quadratic_aic}}},
-          {"line_shape",
+          {"curve_shape",
            {{"clipping_deg", analysis.shape.clipping_deg.value_or(kUnknown)},
             {"zero_deg", analysis.shape.zero_deg.value_or(kUnknown)},
-            {"intercept_minus_K_T", analysis.shape.mismatch}}},
+            {"k0_minus_K_T", analysis.shape.mismatch}}},
           {"remarks", analysis.remarks},
           {"differences", analysis.differences},
           {"predictions", analysis.predictions},
@@ -181,7 +181,8 @@ void to_json(Json& json, const FamilyFindings& findings) {
 Json fit_json(const Identification& identification, const Analysis& analysis,
               const std::filesystem::path& coefficients) {
   const Budget& K_T = analysis.coefficients.front();
-  Json curve, table = Json::array();
+  const CurveFit& fit = identification.curve_fit;
+  Json curve{{"form", name_of(fit.form)}, {"anchored", fit.anchored}}, table = Json::array();
   for (std::size_t i = 0; i < identification.table.size(); ++i) {
     const Budget& budget = analysis.coefficients[i];
     table.push_back({{"phi_deg", identification.table[i].phi_deg},
@@ -190,9 +191,9 @@ Json fit_json(const Identification& identification, const Analysis& analysis,
                      {"expanded_95", budget.expanded()}});
   }
   for (std::size_t i = 0; i < analysis.parameters.size(); ++i)
-    curve[identification.curve_fit.parameters[i].key] = {{"value", analysis.parameters[i].value},
-                                                         {"u", analysis.parameters[i].combined()},
-                                                         {"expanded_95", analysis.parameters[i].expanded()}};
+    curve[fit.parameters[i].key] = {{"value", analysis.parameters[i].value},
+                                    {"u", analysis.parameters[i].combined()},
+                                    {"expanded_95", analysis.parameters[i].expanded()}};
   Json doubts = Json::array();
   for (const Doubt& doubt : analysis.flight.doubts) doubts.push_back(doubt.text);
   return {{"coefficients", coefficients.string()},
@@ -205,7 +206,6 @@ Json fit_json(const Identification& identification, const Analysis& analysis,
           {"not_known", K_T.not_known()},
           {"k_standard", analysis.standard.empty() ? kUnknown : analysis.standard.front().value},
           {"air_density_kg_m3", identification.air ? identification.air->value : kUnknown},
-          {"anchored", identification.curve_fit.anchored},
           {"curve", curve},
           {"overlap", compensation::name_of(identification.options.overlap)},
           {"table", table},

@@ -22,7 +22,7 @@ namespace kphi::fit {
 [[nodiscard]] std::string headline_text(const Fitted& fitted);
 
 /// Cautions, one line each: steps left out or kept with a flag, points that the robust loss rejected, repetitions that
-/// stand out, remarks on the line, air unknown.
+/// stand out, remarks on the curve, air unknown.
 [[nodiscard]] std::string caution_text(const Identification& identification, const Analysis& analysis);
 
 /// Headline, table, options and the whole analysis; `coefficients` is the file written.

@@ -155,10 +155,10 @@ std::string torque_section(const std::vector<TorqueCoefficient>& torque) {
   return section("Torque", table);
 }
 
-std::string prediction_section(const std::vector<LinePrediction>& predictions) {
+std::string prediction_section(const std::vector<CurvePrediction>& predictions) {
   HtmlTable table(
       {"φ", "k(φ), 10⁻⁶ N/(rad/s)²", "95 %: ±", "k<sub>i</sub>", "95 %: ±", "u of the speed ω̂, %", text("remark")});
-  for (const LinePrediction& one : predictions)
+  for (const CurvePrediction& one : predictions)
     table.row({html_angle(one.phi_deg), html_number(1e6 * one.k.value, "{:.5f}"),
                html_number(1e6 * one.k.expanded(), "{:.5f}"), html_number(one.scaling_factor.value, "{:.4f}"),
                html_number(one.scaling_factor.expanded(), "{:.4f}"), html_number(100 * one.speed_u_share, "{:.3f}"),
@@ -348,16 +348,15 @@ std::string run_section(const Provenance& provenance, const StepSelection& selec
 
 std::string provenance_section(const Identification& identification, const Provenance& provenance) {
   const auto known = [](const std::string& words) { return words.empty() ? "unknown" : words; };
-  const CurveFit& line = identification.curve_fit;
+  const CurveFit& curve = identification.curve_fit;
   const auto& air = identification.air;
   std::string points;
-  for (const LinePoint& point : line.points) points += (points.empty() ? "" : ", ") + html_angle(point.phi_deg);
+  for (const CurvePoint& point : curve.points) points += (points.empty() ? "" : ", ") + html_angle(point.phi_deg);
   std::string html = html_heading("Provenance") + "<dl>\n";
   html += entry("Campaign", known(provenance.campaign));
   html += entry("Fitted from", provenance.source);
   html += entry("Model", "T = k ω²: " + estimator_words(identification));
-  html += entry("k(φ)", std::string(name_of(line.form)) + ", " +
-                            (line.anchored ? "anchored at K_T, points " : "free, points ") + points);
+  html += entry("k(φ)", curve.words() + ", points " + points);
   if (speeds_known(identification))
     html += entry("Speeds", rpm_text(identification.speed_min_rad_s) + " to " +
                                 rpm_text(identification.speed_max_rad_s) + " RPM");
@@ -380,13 +379,13 @@ std::string family_section(std::span<const Fitted> family) {
   for (const Fitted& fitted : family) {
     const Identification& one = fitted.identification;
     const Budget& K_T = fitted.analysis.coefficients.front();
-    const Budget* slope = fitted.analysis.parameter("slope");
+    const Budget& slope = fitted.analysis.line.slope;
     const double diameter_m = 0.0254 * one.diameter_in;
     table.row({html_escaped(one.propeller), one.diameter_in > 0 ? fmt::format("{:g}", one.diameter_in) : "–",
                one.blades > 0 ? fmt::format("{}", one.blades) : "–", with_power_of_ten(K_T.value, K_T.expanded()),
                diameter_m > 0 ? fmt::format("{:.5f}", K_T.value / std::pow(diameter_m, 4)) : "–",
-               slope != nullptr ? with_power_of_ten(slope->value, slope->expanded()) : "–",
-               slope != nullptr ? html_number(100 * slope->value / K_T.value, "{:+.4f}") : "–"});
+               with_power_of_ten(slope.value, slope.expanded()),
+               html_number(100 * slope.value / K_T.value, "{:+.4f}")});
   }
   return section("The propellers side by side", table, "± is 95 % by the GUM; what each lacks stands in its chapter.");
 }
@@ -413,22 +412,23 @@ std::string card(const std::string& title, const Budget& budget, const std::stri
 }
 
 std::string headline(const Fitted& fitted) {
-  const CurveFit& line = fitted.identification.curve_fit;
+  const CurveFit& curve = fitted.identification.curve_fit;
   const Analysis& analysis = fitted.analysis;
-  std::string shape =
-      line.anchored ? "<p>anchored at K<sub>T</sub></p>"
-                    : fmt::format("<p>k(0) {:.2f} % {} the measured K<sub>T</sub></p>",
-                                  100 * std::abs(line.mismatch()) / line.K_T, line.mismatch() < 0 ? "below" : "above");
-  if (line.clipping_deg().value_or(0) > 0 && !line.anchored)
+  std::string shape;
+  if (!curve.anchored)
+    shape = fmt::format("<p>k(0) {:.2f} % {} the measured K<sub>T</sub></p>",
+                        100 * std::abs(curve.mismatch()) / curve.K_T, curve.mismatch() < 0 ? "below" : "above");
+  if (curve.clipping_deg().value_or(0) > 0 && !curve.anchored)
     shape +=
         fmt::format("<p>meets K<sub>T</sub> at {:.1f}°; below that angle compensation holds k<sub>i</sub> at 1</p>",
-                    *line.clipping_deg());
-  if (line.zero_crossing_deg()) shape += fmt::format("<p>reaches zero at {:.1f}°</p>", *line.zero_crossing_deg());
+                    *curve.clipping_deg());
+  if (curve.zero_crossing_deg()) shape += fmt::format("<p>reaches zero at {:.1f}°</p>", *curve.zero_crossing_deg());
   const Budget& K_T = analysis.coefficients.front();
   std::string cards = card("Thrust coefficient K<sub>T</sub> = k(0)", K_T, "", "<p>measured without occlusion</p>");
   for (std::size_t i = 0; i < analysis.parameters.size(); ++i)
-    cards += card(fmt::format("k(φ), {}: {}", name_of(line.form), analysis.parameters[i].quantity),
-                  analysis.parameters[i], line.parameters[i].per, i + 1 == analysis.parameters.size() ? shape : "");
+    cards += card(fmt::format("k(φ), {}: {}", name_of(curve.form), analysis.parameters[i].quantity),
+                  analysis.parameters[i], curve.parameters[i].per, "");
+  cards += fmt::format("<div class=\"card\"><h3>k(φ): {}</h3>{}</div>\n", typeset(curve.words()), shape);
   return "<div class=\"cards\">\n" + cards + "</div>\n" + html_note(typeset(plus_minus_words(K_T)) + ".");
 }
 

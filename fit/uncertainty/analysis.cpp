@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <set>
 
 namespace kphi::fit {
 namespace {
@@ -29,33 +30,32 @@ ErrorSources sources_of(const Identification& identification, const Analysis& an
   return error_sources(std::move(k), std::move(errors));
 }
 
-/// Deviation from the line beyond the errors of its points, once a test has rejected the line. Of points without errors
-/// the whole deviation, which is all that is known of them.
-BudgetRow line_row(const CurveFit& line, const Curvature& curvature) {
-  BudgetRow row{.source = fmt::format("{} k(phi)", name_of(line.form)),
+/// Deviation from the curve beyond the errors of its points, once a test has rejected its form. Of points without
+/// errors the whole deviation, which is all that is known of them.
+BudgetRow curve_row(const CurveFit& curve, const Curvature& curvature) {
+  BudgetRow row{.source = fmt::format("{} k(phi)", name_of(curve.form)),
                 .unit = kUnitOfK,
                 .sensitivity = 1,
                 .note = "deviation of its points beyond their errors, where a test finds it"};
-  const double terms = static_cast<double>(line.parameters.size()) - (line.anchored ? 1 : 0);
-  const double n = static_cast<double>(line.points.size());
-  if (!std::ranges::all_of(line.points, [](const LinePoint& point) { return point.standard_error > 0; })) {
+  const double n = static_cast<double>(curve.points.size()), spare = curve.spare_points();
+  if (!std::ranges::all_of(curve.points, [](const CurvePoint& point) { return point.standard_error > 0; })) {
     const double squares =
-        std::inner_product(line.residuals.begin(), line.residuals.end(), line.residuals.begin(), 0.0);
-    row.u = n > terms ? std::sqrt(squares / (n - terms)) : std::numeric_limits<double>::quiet_NaN();
-    row.freedom = n - terms;
+        std::inner_product(curve.residuals.begin(), curve.residuals.end(), curve.residuals.begin(), 0.0);
+    row.u = spare > 0 ? std::sqrt(squares / spare) : std::numeric_limits<double>::quiet_NaN();
+    row.freedom = spare;
     row.note = "scatter of its points, whose own errors are not given";
     return row;
   }
   if (!curvature.bends()) return row;
   double excess = 0;
-  for (std::size_t i = 0; i < line.points.size(); ++i)
-    excess += line.residuals[i] * line.residuals[i] / (n - terms) - std::pow(line.points[i].standard_error, 2) / n;
+  for (std::size_t i = 0; i < curve.points.size(); ++i)
+    excess += curve.residuals[i] * curve.residuals[i] / spare - std::pow(curve.points[i].standard_error, 2) / n;
   row.u = std::sqrt(std::max(0.0, excess));
-  row.freedom = n - terms;
+  row.freedom = spare;
   return row;
 }
 
-/// Of K_T and the parameters; the line's own row is in the latter.
+/// Of K_T and the parameters; the curve's own row is in the latter.
 std::vector<std::vector<double>> covariance_of(const ErrorSources& sources, const CurveFit& fit, const BudgetRow& row) {
   std::vector<std::vector<double>> functions{unit_vector(fit.parameters.front().weights.size(), 0)};
   for (const CurveParameter& parameter : fit.parameters) functions.push_back(parameter.weights);
@@ -81,19 +81,19 @@ double norm(const std::vector<double>& weights) {
   return std::sqrt(std::inner_product(weights.begin(), weights.end(), weights.begin(), 0.0));
 }
 
-/// The line's own row weighs by how much of each point's deviation gets into the weights.
+/// The curve's own row weighs by how much of each point's deviation gets into the weights.
 Budget budget_of(const CurveParameter& parameter, const ErrorSources& sources, const BudgetRow& row) {
   Budget budget = sources.budget(parameter.name, kUnitOfK + parameter.per, parameter.value, parameter.weights);
   budget.rows.push_back(scaled(row, norm(parameter.weights)));
   return budget;
 }
 
-LinePrediction predict(const Identification& identification, const ErrorSources& sources, double phi_deg,
-                       const BudgetRow& row) {
+CurvePrediction predict(const Identification& identification, const ErrorSources& sources, double phi_deg,
+                        const BudgetRow& row) {
   const double K_T = identification.thrust_coefficient().value;
   const compensation::ThrustCurve curve = identification.curve();
   const std::vector<double> at = identification.curve_fit.weights_at(phi_deg);
-  LinePrediction prediction;
+  CurvePrediction prediction;
   prediction.phi_deg = phi_deg;
   const double k = curve.at(from_degrees(phi_deg)).value();
   prediction.k =
@@ -112,7 +112,33 @@ LinePrediction predict(const Identification& identification, const ErrorSources&
   return prediction;
 }
 
-LineShape shape_of(const CurveFit& fit, const ErrorSources& sources, const BudgetRow& row) {
+/// With a piece more or less where a measured φ falls between two.
+std::vector<CurveBand> band_of(const Identification& identification, const ErrorSources& sources,
+                               const BudgetRow& row) {
+  constexpr int kPieces = 80;
+  const double widest = identification.table.back().phi_deg;
+  std::set<double> angles;
+  for (int i = 0; i <= kPieces; ++i) angles.insert(widest * i / kPieces);
+  for (const OcclusionCoefficient& one : identification.table) angles.insert(one.phi_deg);
+  std::vector<CurveBand> band;
+  for (const double phi : angles) {
+    const std::vector<double> at = identification.curve_fit.weights_at(phi);
+    Budget k = sources.budget("", kUnitOfK, identification.curve_fit.k_at(phi), at);
+    k.rows.push_back(scaled(row, norm(at)));
+    band.push_back({phi, k.value, k.expanded()});
+  }
+  return band;
+}
+
+StraightLine straight_line(const Identification& identification, const ErrorSources& sources, double freedom) {
+  CurveOptions options = identification.options.curve;
+  options.form = CurveForm::line;
+  const CurveFit line = fit_curve(points_of(identification.table), options);
+  Curvature test = line.tested(freedom);
+  return {budget_of(*line.find("slope_per_deg"), sources, curve_row(line, test)), test};
+}
+
+CurveShape shape_of(const CurveFit& fit, const ErrorSources& sources, const BudgetRow& row) {
   const std::vector<double> at_zero = fit.weights_at(0);
   std::vector<double> difference_weights = at_zero;
   difference_weights.front() -= 1;
@@ -190,11 +216,6 @@ std::vector<Budget> standard_air(const Identification& identification, const std
 
 }  // namespace
 
-const Budget* Analysis::parameter(const std::string& name) const {
-  const auto found = std::ranges::find(parameters, name, &Budget::quantity);
-  return found == parameters.end() ? nullptr : &*found;
-}
-
 Analysis analyse(const Identification& identification, const AnalysisOptions& options) {
   Analysis analysis;
   std::vector<double> phis;
@@ -209,12 +230,14 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   const double freedom = from_steps ? identification.repeatability.freedom() : std::numeric_limits<double>::infinity();
   const CurveFit& fit = identification.curve_fit;
   analysis.curvature = fit.tested(freedom);
-  const BudgetRow row = line_row(fit, analysis.curvature);
+  analysis.line = straight_line(identification, sources, freedom);
+  const BudgetRow row = curve_row(fit, analysis.curvature);
   for (const CurveParameter& parameter : fit.parameters)
     analysis.parameters.push_back(budget_of(parameter, sources, row));
   analysis.covariance = covariance_of(sources, fit, row);
   for (const double phi : options.prediction_deg)
     analysis.predictions.push_back(predict(identification, sources, phi, row));
+  analysis.band = band_of(identification, sources, row);
   analysis.standard = standard_air(identification, analysis.coefficients, options.bench.air_density);
   analysis.differences = neighbour_tests(analysis.coefficients, sources, identification);
   analysis.between_runs = identification.repeatability.between;

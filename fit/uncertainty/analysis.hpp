@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "fit/model/curve_fit.hpp"
 #include "fit/model/identification.hpp"
-#include "fit/model/line_fit.hpp"
 #include "fit/model/torque_power.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
 #include "fit/uncertainty/budget.hpp"
@@ -29,20 +29,33 @@ struct RejectedPoint {
   double robust_weight = 0;  ///< 1: believed, 0: ignored
 };
 
-/// The line at one φ of a grid, with its whole uncertainty.
-struct LinePrediction {
+/// The curve at one φ of a grid, with its whole uncertainty.
+struct CurvePrediction {
   double phi_deg = 0;
-  Budget k;               ///< of the line, N/(rad/s)²
+  Budget k;               ///< of the curve, N/(rad/s)²
   Budget scaling_factor;  ///< k_i as it flies, ScalingLaw::clamped; errors common to all k cancel
   /// Relative standard uncertainty of ω̂ = sqrt(T/k) for a given T: half that of k. 1.
   double speed_u_share = 0;
-  bool clipped = false;       ///< the line lies above K_T here, k_i is held at 1
-  bool extrapolated = false;  ///< outside the occlusions that carry the line
+  bool clipped = false;       ///< the curve lies above K_T here, k_i is held at 1
+  bool extrapolated = false;  ///< outside the occlusions that carry the curve
 };
 
-/// Where the line meets K_T and 0: what equation 4 makes of it.
-struct LineShape {
-  std::optional<double> clipping_deg;  ///< below, the line is above K_T
+/// The curve itself, for a drawing.
+struct CurveBand {
+  double phi_deg = 0;
+  double k = 0;         ///< N/(rad/s)²
+  double expanded = 0;  ///< half of the 95 % interval
+};
+
+/// A line through the points of the curve, whatever its form: for statements on the slope.
+struct StraightLine {
+  Budget slope;    ///< N/(rad/s)²/deg
+  Curvature test;  ///< whether k(φ) is a line
+};
+
+/// Where the curve meets K_T and 0: what equation 4 makes of it.
+struct CurveShape {
+  std::optional<double> clipping_deg;  ///< below, the curve is above K_T
   std::optional<double> zero_deg;      ///< there it predicts no thrust
   Estimate mismatch;                   ///< k(0) − K_T
 };
@@ -53,20 +66,19 @@ struct Analysis {
   std::vector<Budget> standard;                 ///< k(φ) in standard air, one per row; empty if the air is unknown
   std::vector<std::vector<double>> covariance;  ///< of K_T and the parameters; NaN: unknown
   std::vector<SpeedDependence> speed;           ///< one per φ
-  Curvature curvature;
+  Curvature curvature;                          ///< of the curve's form
+  StraightLine line;
   std::vector<HypothesisTest> differences;  ///< Student tests between neighbouring occlusions
-  std::vector<LinePrediction> predictions;
+  std::vector<CurvePrediction> predictions;
+  std::vector<CurveBand> band;  ///< ascending from φ = 0 to the widest occlusion, each measured φ among them
   std::vector<TorqueCoefficient> torque;
   std::vector<RejectedPoint> rejected;
   std::vector<OutlyingRun> outlying;  ///< kept; each also gives a remark
   /// Relative scatter of k between runs beyond what noise and zero explain, pooled over φ; its freedom.
   Estimate between_runs;
-  LineShape shape;
+  CurveShape shape;
   FlightReadiness flight;
-  std::vector<std::string> remarks;  ///< sentences on the line: clipping, zero, extrapolation, mismatch
-
-  /// Of the parameter with this name ("slope"); nullptr if the curve has none.
-  [[nodiscard]] const Budget* parameter(const std::string& name) const;
+  std::vector<std::string> remarks;  ///< sentences on the curve: clipping, zero, extrapolation, mismatch
 };
 
 /// One fitted propeller.

@@ -70,9 +70,9 @@ std::optional<Suspicion> of_line(const Identification& identification, const Mod
   return Suspicion{
       p,
       {std::abs(miss) > kLargestMiss ? Readiness::not_yet : Readiness::with_care,
-       fmt::format("k(φ) is not a line: at {}° the measured k is {} of K_T {} it; expect the same error of thrust in "
-                   "flight, and check the plates and their angles",
-                   fit.points[worst].phi_deg, in_percent(miss), miss < 0 ? "below" : "above")}};
+       fmt::format("{}: at {}° the measured k is {} of K_T {} it; expect the same error of thrust in flight, and check "
+                   "the plates and their angles",
+                   fit.denial(), fit.points[worst].phi_deg, in_percent(miss), miss < 0 ? "below" : "above")}};
 }
 
 std::optional<Suspicion> of_runs(const ModelTests& tests) {

@@ -24,8 +24,8 @@ struct Doubt {
 };
 
 struct FlightReadiness {
-  /// Worst first. Of the tests of the model (k against speed, the line, a run that stands out) those that fall under
-  /// Holm at 5 % for all together; k that rises with φ; and one repetition, which shows no scatter.
+  /// Worst first. Of the tests of the model (k against speed, the curve's form, a run that stands out) those that fall
+  /// under Holm at 5 % for all together; k that rises with φ; and one repetition, which shows no scatter.
   std::vector<Doubt> doubts;
 
   [[nodiscard]] Readiness readiness() const {

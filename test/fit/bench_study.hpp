@@ -86,7 +86,7 @@ inline StudyCampaign study_campaign(const StudyTruth& truth, unsigned seed) {
   return campaign;
 }
 
-inline AnalysisOptions study_options(const StudyTruth& truth, const StudyCampaign& campaign) {
+inline AnalysisOptions study_options(const StudyTruth& truth) {
   AnalysisOptions options;
   options.bench.cell_calibration = truth.calibration;
   options.bench.motor_clock = truth.clock;
@@ -117,7 +117,7 @@ inline std::map<std::string, Coverage> coverage_study(const StudyTruth& truth, u
   for (unsigned seed = 1; seed <= campaigns; ++seed) {
     const StudyCampaign campaign = study_campaign(truth, seed);
     const Identification found = identify(campaign.steps, how);
-    const Analysis analysis = analyse(found, study_options(truth, campaign));
+    const Analysis analysis = analyse(found, study_options(truth));
     const double air = campaign.density / kStandardDensity;
     for (std::size_t i = 0; i < found.table.size(); ++i) {
       const double k = truth.k(found.table[i].phi_deg);
@@ -145,7 +145,7 @@ inline BentCount count_bent(const StudyTruth& truth, unsigned campaigns) {
   BentCount count;
   for (unsigned seed = 1; seed <= campaigns; ++seed) {
     const StudyCampaign campaign = study_campaign(truth, seed);
-    const Analysis analysis = analyse(identify(campaign.steps), study_options(truth, campaign));
+    const Analysis analysis = analyse(identify(campaign.steps), study_options(truth));
     count.line += analysis.curvature.bends() ? 1 : 0;
     count.line_lack_of_fit += analysis.curvature.lack_of_fit.rejected() ? 1 : 0;
     count.everywhere += std::all_of(analysis.speed.begin(), analysis.speed.end(),

@@ -137,9 +137,9 @@ TEST(Violations, AreFoundWhereverTheyAre) {
            {"daq/guard/guard.cpp", "daq/run/run.hpp"},
            {"daq/run/run.cpp", "compensation/compensator.hpp"},
            {"daq/run/run.cpp", "commands/run.hpp"},
-           {"fit/model/line_fit.cpp", "daq/run/run.hpp"},
-           {"fit/model/line_fit.cpp", "fit/report/report.hpp"},
-           {"fit/model/line_fit.cpp", "profiles/campaign.hpp"},
+           {"fit/model/curve_fit.cpp", "daq/run/run.hpp"},
+           {"fit/model/curve_fit.cpp", "fit/report/report.hpp"},
+           {"fit/model/curve_fit.cpp", "profiles/campaign.hpp"},
            {"profiles/plan.cpp", "drivers/serial/port.hpp"},
            {"profiles/plan.cpp", "plan.hpp"},
            {"profiles/plan.cpp", "../profiles/plan.hpp"},
@@ -158,7 +158,7 @@ TEST(Violations, AreNotFoundInWhatIsAllowed) {
            {"results/reduction/reduction.cpp", "results/run_reader.hpp"},
            {"daq/run/run.cpp", "drivers/netbox/receive/bias.hpp"},
            {"daq/run/run.cpp", "profiles/plan.hpp"},
-           {"fit/model/line_fit.cpp", "results/step_mean.hpp"},
+           {"fit/model/curve_fit.cpp", "results/step_mean.hpp"},
            {"commands/fit.cpp", "daq/run/run.hpp"},
        }) {
     EXPECT_THAT(violations(planted.path, include(planted.header)), IsEmpty());

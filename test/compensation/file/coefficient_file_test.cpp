@@ -23,7 +23,8 @@ propeller: {id: 5x3, name: "Dalprop 5040", diameter_in: 5.0, blades: 3}
 k_unit: N/(rad/s)^2
 overlap: rim_arc
 K_T: {value: 1.55e-06, u: 1.0e-09, freedom: 12, expanded_95: 2.2e-09, phi_deg: 0.0}
-line:
+curve:
+  form: line
   anchored: false
   intercept: {value: 1.6e-06, u: 1.0e-09, freedom: .inf, expanded_95: 2.0e-09}
   slope_per_deg: {value: -4.5e-09, u: unknown}
@@ -174,9 +175,9 @@ TEST(CoefficientFile, HandsItsOverlapMeasureAndItsUncertaintyToTheLine) {
 }
 
 TEST(CoefficientFile, IsRefusedWithAVarianceBelowZeroOrAnErrorBelowZero) {
-  EXPECT_THAT(refusal_of(with(kGood, "[[1.0e-18,", "[[-1.0e-18,")), StartsWith("c.yaml:24: "));
-  EXPECT_THAT(refusal_of(with(kGood, "4.0e-23]]", "-4.0e-23]]")), StartsWith("c.yaml:24: "));
-  EXPECT_THAT(refusal_of(with(kGood, "[0.0, -5.0e-21, 4.0e-23]]", "[0.0, -5.0e-21]]")), HasSubstr("three numbers"));
+  EXPECT_THAT(refusal_of(with(kGood, "[[1.0e-18,", "[[-1.0e-18,")), StartsWith("c.yaml:25: "));
+  EXPECT_THAT(refusal_of(with(kGood, "4.0e-23]]", "-4.0e-23]]")), StartsWith("c.yaml:25: "));
+  EXPECT_THAT(refusal_of(with(kGood, "[0.0, -5.0e-21, 4.0e-23]]", "[0.0, -5.0e-21]]")), HasSubstr("3 numbers"));
   EXPECT_THAT(refusal_of(with(kGood, "u: 1.0e-09", "u: -1.0e-09")), StartsWith("c.yaml:7: "));
   EXPECT_THAT(refusal_of(with(kGood, "u: 1.1e-09", "u: small")), HasSubstr("`u`"));
 }
@@ -190,7 +191,8 @@ TEST(CoefficientFile, IsRefusedInAnotherFormat) {
 }
 
 TEST(CoefficientFile, IsRefusedWhenARequiredKeyIsMissing) {
-  for (const char* key : {"propeller", "K_T", "line", "valid", "value", "anchored", "intercept", "slope_per_deg"}) {
+  for (const char* key :
+       {"propeller", "K_T", "curve", "form", "valid", "value", "anchored", "intercept", "slope_per_deg"}) {
     const std::string text = with(kGood, std::string(key) + ":", "other:");
     EXPECT_THAT(refusal_of(text), HasSubstr("`" + std::string(key) + "`")) << key;
   }
@@ -202,11 +204,11 @@ TEST(CoefficientFile, IsRefusedWhenANumberIsNotFinite) {
        {".nan", "nan", ".inf", "inf", "-inf", "1e999", "much", "1.55e-06x", "0x10", "[1]", "{}", "~"}) {
     EXPECT_THAT(refusal_of(with(kGood, "value: 1.55e-06", "value: " + std::string(bad))), StartsWith("c.yaml:7: "))
         << bad;
-    EXPECT_THAT(refusal_of(with(kGood, "-4.5e-09", bad)), StartsWith("c.yaml:11: `value`")) << bad;
+    EXPECT_THAT(refusal_of(with(kGood, "-4.5e-09", bad)), StartsWith("c.yaml:12: `value`")) << bad;
   }
   EXPECT_THAT(refusal_of(with(kGood, "4.0e-23", ".nan")), HasSubstr("covariance"));
   EXPECT_THAT(refusal_of(with(kGood, "blades: 3", "blades: -3")), HasSubstr("not a count"));
-  EXPECT_THAT(refusal_of(with(kGood, "k: 1.4e-06", "k: .nan")), StartsWith("c.yaml:16: "));
+  EXPECT_THAT(refusal_of(with(kGood, "k: 1.4e-06", "k: .nan")), StartsWith("c.yaml:17: "));
 }
 
 TEST(CoefficientFile, IsRefusedWhenTheThrustCoefficientIsNotPositive) {
@@ -219,7 +221,7 @@ TEST(CoefficientFile, IsRefusedWhenTheThrustCoefficientIsNotPositive) {
 
 TEST(CoefficientFile, IsRefusedWhenAKeyIsGivenTwice) {
   EXPECT_THAT(refusal_of(kGood + "k_unit: N/RPM^2\n"), HasSubstr("`k_unit` is given twice; keep one"));
-  EXPECT_THAT(refusal_of(with(kGood, "  intercept:", "  intercept: 1.0\n  intercept:")), StartsWith("c.yaml:11: "));
+  EXPECT_THAT(refusal_of(with(kGood, "  intercept:", "  intercept: 1.0\n  intercept:")), StartsWith("c.yaml:12: "));
 }
 
 TEST(CoefficientFile, IsRefusedWhenAnAnchoredLineMissesItsAnchor) {
@@ -230,7 +232,7 @@ TEST(CoefficientFile, IsRefusedWhenAnAnchoredLineMissesItsAnchor) {
 
 TEST(CoefficientFile, IsRefusedWhenARangeIsNoRange) {
   for (const char* bad : {"[270.0, 0.0]", "[0.0]", "[0.0, 400.0]", "[-5.0, 270.0]", "270.0", "[]", "[0.0, .nan]"}) {
-    EXPECT_THAT(refusal_of(with(kGood, "[0.0, 270.0]", bad)), StartsWith("c.yaml:13: ")) << bad;
+    EXPECT_THAT(refusal_of(with(kGood, "[0.0, 270.0]", bad)), StartsWith("c.yaml:14: ")) << bad;
   }
 }
 
@@ -240,16 +242,21 @@ TEST(CoefficientFile, HoldsOcclusionsOfOneTurnAtMost) {
   EXPECT_THAT(refusal_of(with(kGood, "[0.0, 270.0]", "[0.0, 360.1]")), HasSubstr("at most 360"));
 }
 
+TEST(CoefficientFile, IsRefusedWithACurveOfAnUnknownForm) {
+  EXPECT_THAT(refusal_of(with(kGood, "form: line", "form: spline")), StartsWith("c.yaml:9: form `spline`"));
+  EXPECT_EQ(parse_coefficients(kGood, "c").form, "line");
+}
+
 TEST(CoefficientFile, HoldsAnAnchoredLineToOnePartInAMillion) {
   const std::string anchored = with(kGood, "anchored: false", "anchored: true");
   EXPECT_TRUE(parse_coefficients(with(anchored, "1.6e-06", "1.550001e-06"), "c.yaml").anchored);
-  EXPECT_THAT(refusal_of(with(anchored, "1.6e-06", "1.549997e-06")), HasSubstr("its intercept is not K_T"));
+  EXPECT_THAT(refusal_of(with(anchored, "1.6e-06", "1.549997e-06")), HasSubstr("its k(0) is not K_T"));
 }
 
 TEST(CoefficientFile, IsRefusedWhenTheCovarianceHasAnotherShape) {
   const std::string good = "[[1.0e-18, 0.0, 0.0], [0.0, 1.0e-18, -5.0e-21], [0.0, -5.0e-21, 4.0e-23]]";
   for (const char* bad : {"[[1, 2, 3], [1, 2, 3]]", "[[1, 2]]", "[1, 2]", "[[1, 2], [3, 4], [5, 6]]"})
-    EXPECT_THAT(refusal_of(with(kGood, good, bad)), StartsWith("c.yaml:24: ")) << bad;
+    EXPECT_THAT(refusal_of(with(kGood, good, bad)), StartsWith("c.yaml:25: ")) << bad;
 }
 
 TEST(CoefficientFile, SurvivesBeingCutAnywhere) {

@@ -46,14 +46,14 @@ TEST(Coefficients, RoundTripThroughYamlBitForBit) {
   EXPECT_EQ(file["K_T"]["value"].as<double>(), fit.curve_fit.K_T);
   EXPECT_EQ(file["K_T"]["u"].as<double>(), analysis.coefficients[0].combined());
   EXPECT_EQ(file["K_T"]["expanded_95"].as<double>(), analysis.coefficients[0].expanded());
-  EXPECT_FALSE(file["line"]["anchored"].as<bool>());
-  EXPECT_EQ(file["line"]["intercept"]["value"].as<double>(), fit.curve_fit.value("intercept"));
-  EXPECT_EQ(file["line"]["slope_per_deg"]["value"].as<double>(), fit.curve_fit.value("slope_per_deg"));
-  EXPECT_EQ(file["line"]["slope_per_deg"]["expanded_95"].as<double>(), analysis.parameters[1].expanded());
+  EXPECT_FALSE(file["curve"]["anchored"].as<bool>());
+  EXPECT_EQ(file["curve"]["intercept"]["value"].as<double>(), fit.curve_fit.value("intercept"));
+  EXPECT_EQ(file["curve"]["slope_per_deg"]["value"].as<double>(), fit.curve_fit.value("slope_per_deg"));
+  EXPECT_EQ(file["curve"]["slope_per_deg"]["expanded_95"].as<double>(), analysis.parameters[1].expanded());
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t j = 0; j < 3; ++j)
       EXPECT_EQ(file["uncertainty"]["covariance"][i][j].as<double>(), analysis.covariance[i][j]);
-  EXPECT_EQ(file["line"]["points_deg"].as<std::vector<double>>(), (std::vector<double>{45, 90, 180, 270}));
+  EXPECT_EQ(file["curve"]["points_deg"].as<std::vector<double>>(), (std::vector<double>{45, 90, 180, 270}));
   ASSERT_EQ(file["table"].size(), 5u);
   EXPECT_EQ(file["table"][4]["k"].as<double>(), fit.table[4].k);
   EXPECT_EQ(file["table"][4]["expanded_95"].as<double>(), analysis.coefficients[4].expanded());
@@ -65,18 +65,26 @@ TEST(Coefficients, RoundTripThroughYamlBitForBit) {
   EXPECT_EQ(file["provenance"]["runs"][0]["sha256"].as<std::string>(), std::string(64, 'a'));
 }
 
+std::vector<std::pair<CurveForm, bool>> every_form() {
+  std::vector<std::pair<CurveForm, bool>> all;
+  for (const CurveForm form : kCurveForms)
+    for (const bool anchored : {false, true}) all.emplace_back(form, anchored);
+  return all;
+}
+
 TEST(Coefficients, AreReadByTheLibraryThatFlies) {
-  for (const bool anchored : {false, true}) {
+  for (const auto& [form, anchored] : every_form()) {
     IdentificationOptions options;
-    options.line.anchored = anchored;
+    options.curve.form = form;
+    options.curve.anchored = anchored;
     const Identification fit = identify(campaign_steps(), options);
     const auto file =
         compensation::parse_coefficients(format_coefficients(analysed(fit), provenance()), "coefficients.yaml");
     EXPECT_EQ(file.anchored, anchored);
     EXPECT_EQ(file.curve.thrust_coefficient().value(), fit.curve_fit.K_T);
-    EXPECT_EQ(compensation::line_of(file.curve).intercept.value(), fit.curve_fit.value("intercept"));
-    EXPECT_NEAR(compensation::line_of(file.curve).slope_per_rad * kPi / 180 / fit.curve_fit.value("slope_per_deg"), 1,
-                1e-15);
+    EXPECT_EQ(file.form, name_of(form));
+    ASSERT_EQ(file.parameters.size(), fit.curve_fit.parameters.size());
+    for (const auto& [key, value, uncertainty] : file.parameters) EXPECT_EQ(value, fit.curve_fit.value(key)) << key;
     EXPECT_NEAR(to_degrees(file.curve.largest_fitted()), 270, 1e-9);
     ASSERT_TRUE(file.curve.has_uncertainty());
     EXPECT_EQ(file.table.size(), 5u);
@@ -86,7 +94,7 @@ TEST(Coefficients, AreReadByTheLibraryThatFlies) {
 }
 
 TEST(Coefficients, OfABareTableAreReadToo) {
-  const std::vector<LinePoint> points{{0, 1.55e-6, 0}, {45, 1.4e-6, 0}, {270, 0.4e-6, 0}};
+  const std::vector<CurvePoint> points{{0, 1.55e-6, 0}, {45, 1.4e-6, 0}, {270, 0.4e-6, 0}};
   const Identification fit = identify_table(points, {.propeller = "5e3"});
   const std::string text = format_coefficients(analysed(fit), {});
   const auto file = compensation::parse_coefficients(text, "k.yaml");
@@ -175,8 +183,8 @@ TEST_F(RecordedFitTest, FitsAndBudgetsTheSameAgain) {
   options.loss = Loss::tukey;
   options.weighting = Weighting::effective_variance;
   options.estimator = Estimator::with_offset;
-  options.line.anchored = true;
-  options.line.points_deg = {45, 180};
+  options.curve.anchored = true;
+  options.curve.points_deg = {45, 180};
   options.speed_range.max_rad_s = from_rpm(17000).value();
   options.left_out = {{90, 2, "plate \"slipped\": seen"}};
   auto steps = campaign.steps;

@@ -136,7 +136,7 @@ TEST(Identification, NamesTheAngleThatCannotBeFitted) {
 }
 
 TEST(Identification, OfATableKeepsTheRangeItWasGiven) {
-  const std::vector<LinePoint> points{{90, 1.2e-6, 1e-8}, {0, 1.5e-6, 1e-8}, {270, 0.4e-6, 1e-8}};
+  const std::vector<CurvePoint> points{{90, 1.2e-6, 1e-8}, {0, 1.5e-6, 1e-8}, {270, 0.4e-6, 1e-8}};
   const Identification result = identify_table(points, {.speed_range = {300, 2000}});
   EXPECT_EQ(result.table.front().phi_deg, 0);
   EXPECT_FALSE(result.table.front().fit);

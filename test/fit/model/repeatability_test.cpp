@@ -46,7 +46,7 @@ TEST(OutlyingRuns, AreNotLookedForAmongTwo) {
   auto steps = study_campaign({}, 1).steps;
   std::erase_if(steps, [](const auto& step) { return step.occlusion_deg > 45 || step.repetition > 2; });
   IdentificationOptions anchored;
-  anchored.line.anchored = true;
+  anchored.curve.anchored = true;
   EXPECT_TRUE(outlying_runs(identify(steps, anchored).selection.used).empty());
 }
 

@@ -41,7 +41,7 @@ Fitted member(const PaperPropeller& propeller, unsigned seed, double slope_facto
   }
   Fitted result;
   result.identification = identify(campaign.steps);
-  result.analysis = analyse(result.identification, study_options(truth, campaign));
+  result.analysis = analyse(result.identification, study_options(truth));
   return result;
 }
 

@@ -253,7 +253,7 @@ TEST(Figures, AreTheSameBytesForTheSameSteps) {
 TEST(Figures, OfABareTableShowTheLineOnly) {
   if (!gnuplot_is_installed()) GTEST_SKIP() << "gnuplot is not installed";
   const TemporaryFolder folder;
-  const std::vector<LinePoint> points{{0, 1.55e-6, 0}, {45, 1.4e-6, 1e-8}, {270, 0.4e-6, 1e-8}};
+  const std::vector<CurvePoint> points{{0, 1.55e-6, 0}, {45, 1.4e-6, 1e-8}, {270, 0.4e-6, 1e-8}};
   const Figures figures = draw_figures(analysed(identify_table(points, {})), {}, folder.path());
   EXPECT_EQ(figures.skipped, "");
   EXPECT_EQ(figures.drawn.size(), 1u);

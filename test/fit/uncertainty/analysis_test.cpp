@@ -25,7 +25,7 @@ const BudgetRow& row_of(const Budget& budget, const std::string& source) {
 struct Study {
   StudyCampaign campaign = study_campaign({}, 5);
   Identification found = identify(campaign.steps);
-  AnalysisOptions options = study_options({}, campaign);
+  AnalysisOptions options = study_options({});
 };
 
 TEST(Analysis, ABudgetHasEverySourceAndSaysWhichNobodyKnows) {
@@ -83,7 +83,7 @@ TEST(Analysis, CovarianceBelongsToTheBudgets) {
 TEST(Analysis, LineWeightsAreTheLine) {
   for (const bool anchored : {false, true}) {
     IdentificationOptions options;
-    options.line.anchored = anchored;
+    options.curve.anchored = anchored;
     const Identification found = identify(study_campaign({}, 6).steps, options);
     std::vector<double> phis;
     for (const auto& row : found.table) phis.push_back(row.phi_deg);
@@ -146,7 +146,7 @@ TEST(Analysis, OneRunEachLeavesTheRepetitionsUnknown) {
 }
 
 TEST(Analysis, OfATableUsesItsOwnErrors) {
-  const std::vector<LinePoint> points{{0, 1.5e-6, 1e-8}, {90, 1.2e-6, 1e-8}, {180, 0.8e-6, 2e-8}, {270, 0.4e-6, 1e-8}};
+  const std::vector<CurvePoint> points{{0, 1.5e-6, 1e-8}, {90, 1.2e-6, 1e-8}, {180, 0.8e-6, 2e-8}, {270, 0.4e-6, 1e-8}};
   const Analysis analysis = analyse(identify_table(points, {.speed_range = {300, 2000}}));
   EXPECT_NEAR(analysis.coefficients[2].combined(), 2e-8, 1e-20);
   EXPECT_NEAR(analysis.shape.mismatch.u, std::hypot(analysis.parameters[0].combined(), 1e-8), 1e-18);
@@ -156,7 +156,7 @@ TEST(Analysis, OfATableUsesItsOwnErrors) {
 }
 
 TEST(Analysis, OfATableWithoutErrorsInventsNone) {
-  const std::vector<LinePoint> points{{0, 1.5}, {45, 1.38}, {90, 1.21}, {180, 0.82}, {270, 0.39}};
+  const std::vector<CurvePoint> points{{0, 1.5}, {45, 1.38}, {90, 1.21}, {180, 0.82}, {270, 0.39}};
   const Fitted fitted = analysed(identify_table(points, {.speed_range = {300, 2000}}));
   const Analysis& analysis = fitted.analysis;
   EXPECT_TRUE(std::isnan(analysis.coefficients[0].combined()));
@@ -170,7 +170,7 @@ TEST(Analysis, OfATableWithoutErrorsInventsNone) {
   const std::string file = format_coefficients(fitted, {});
   EXPECT_THAT(file, testing::HasSubstr("covariance: unknown"));
   EXPECT_FALSE(compensation::parse_coefficients(file, "k.yaml").curve.has_uncertainty());
-  const std::vector<LinePoint> two{{0, 1.5}, {45, 1.38}, {90, 1.21}};
+  const std::vector<CurvePoint> two{{0, 1.5}, {45, 1.38}, {90, 1.21}};
   EXPECT_TRUE(std::isnan(analyse(identify_table(two, {})).parameters[0].combined())) << "no scatter about two points";
 }
 
@@ -207,16 +207,16 @@ TEST(Analysis, TellsTwoSetupsApartOnlyWhereTheyDiffer) {
   for (unsigned seed = 100; seed < 120; ++seed) {
     StudyCampaign one = study_campaign({}, seed), other = study_campaign({}, seed + 1000);
     for (auto& step : other.steps) step.thrust_n *= one.density / other.density;
-    const auto tests = compare_setups(analyse(identify(one.steps), study_options({}, one)),
-                                      analyse(identify(other.steps), study_options({}, other)));
+    const auto tests = compare_setups(analyse(identify(one.steps), study_options({})),
+                                      analyse(identify(other.steps), study_options({})));
     ASSERT_EQ(tests.size(), 5u);
     for (const HypothesisTest& test : tests) differ += test.rejected() ? 1 : 0;
   }
   EXPECT_LE(differ, 15) << "5 % of 100";
   StudyCampaign one = study_campaign({}, 1), bigger = one;
   for (auto& step : bigger.steps) step.thrust_n *= 1.04;
-  for (const auto& test : compare_setups(analyse(identify(one.steps), study_options({}, one)),
-                                         analyse(identify(bigger.steps), study_options({}, bigger))))
+  for (const auto& test : compare_setups(analyse(identify(one.steps), study_options({})),
+                                         analyse(identify(bigger.steps), study_options({}))))
     EXPECT_TRUE(test.rejected()) << test.name;
 }
 
@@ -228,7 +228,7 @@ TEST(Analysis, EveryEstimatorFindsTheTruth) {
     IdentificationOptions options;
     options.estimator = estimator;
     const Identification found = identify(campaign.steps, options);
-    const Analysis analysis = analyse(found, study_options(truth, campaign));
+    const Analysis analysis = analyse(found, study_options(truth));
     for (std::size_t i = 0; i < found.table.size(); ++i) {
       const double expected = truth.k(found.table[i].phi_deg) * campaign.density / kStandardDensity;
       EXPECT_NEAR(found.table[i].k, expected, 4 * analysis.coefficients[i].combined())

@@ -26,7 +26,7 @@ int found_in(const StudyTruth& truth, Readiness readiness, const std::string& wo
     StudyCampaign campaign = study_campaign(truth, seed);
     spoil(campaign.steps);
     const Identification identification = identify(campaign.steps);
-    const FlightReadiness flight = analyse(identification, study_options(truth, campaign)).flight;
+    const FlightReadiness flight = analyse(identification, study_options(truth)).flight;
     const bool said = std::ranges::any_of(
         flight.doubts, [&](const Doubt& doubt) { return doubt.text.find(words) != std::string::npos; });
     found += said && flight.readiness() == readiness ? 1 : 0;

@@ -1,4 +1,4 @@
-#include "fit/model/line_fit.hpp"
+#include "fit/model/curve_fit.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,16 +10,42 @@
 #include "base/error.hpp"
 
 namespace kphi::fit {
-namespace line_fit_test {
+namespace curve_fit_test {
 
 constexpr double kThrustCoefficient = 1.55e-6;
 
 /// The paper's 5-inch propeller with three blades: 90 % at 45°, 25 % at 270°, straight between.
-std::vector<LinePoint> paper_points(double standard_error = 1e-9) {
-  std::vector<LinePoint> points{{0, kThrustCoefficient, standard_error}};
+std::vector<CurvePoint> paper_points(double standard_error = 1e-9) {
+  std::vector<CurvePoint> points{{0, kThrustCoefficient, standard_error}};
   for (const double phi : {45.0, 90.0, 180.0, 270.0})
     points.push_back({phi, kThrustCoefficient * (1.03 - 0.65 / 225 * phi), standard_error});
   return points;
+}
+
+TEST(CurveFit, OfEveryFormIsALinearFunctionOfTheMeasuredKAndFliesAsItWasFitted) {
+  const auto points = paper_points();
+  for (const CurveForm form : kCurveForms) {
+    for (const bool anchored : {false, true}) {
+      const CurveFit fit = fit_curve(points, {.form = form, .anchored = anchored});
+      const std::string words = name_of(form) + std::string(anchored ? ", anchored" : ", free");
+      EXPECT_EQ(fit.form, form);
+      EXPECT_GE(fit.spare_points(), 0) << words;
+      EXPECT_LT(fit.spare_points(), static_cast<double>(fit.points.size())) << words;
+      EXPECT_NE(fit.words().find(name_of(form)), std::string::npos) << words;
+      EXPECT_NE(std::string(fit.denial()), "") << words;
+      for (const double phi : {0.0, 30.0, 45.0, 100.0, 270.0}) {
+        const std::vector<double> weights = fit.weights_at(phi);
+        double k = 0;
+        for (std::size_t i = 0; i < points.size(); ++i) k += weights[i] * points[i].k;
+        EXPECT_NEAR(fit.k_at(phi) / k, 1, 1e-12) << words << phi;
+        EXPECT_NEAR(fit.curve().at(from_degrees(phi)).value() / k, 1, 1e-12) << words << phi;
+      }
+      for (std::size_t i = 0; i < fit.points.size(); ++i)
+        EXPECT_EQ(fit.residuals[i], fit.points[i].k - fit.k_at(fit.points[i].phi_deg)) << words;
+      EXPECT_NEAR(fit.k_at(fit.falls_to(0.5 * kThrustCoefficient).value()) / kThrustCoefficient, 0.5, 1e-9) << words;
+      EXPECT_EQ(anchored, std::abs(fit.mismatch()) < 1e-18) << words;
+    }
+  }
 }
 
 TEST(LineFit, FindsThePapersLineThroughTheOccludedPoints) {
@@ -107,7 +133,7 @@ TEST(LineFit, UsesTheChosenPointsInAnyOrder) {
 }
 
 TEST(LineFit, HasNoCrossingsUnlessItFalls) {
-  std::vector<LinePoint> rising{{0, 1e-6, 0}, {90, 1.1e-6, 0}, {180, 1.2e-6, 0}};
+  std::vector<CurvePoint> rising{{0, 1e-6, 0}, {90, 1.1e-6, 0}, {180, 1.2e-6, 0}};
   const CurveFit fit = fit_curve(rising);
   EXPECT_FALSE(fit.clipping_deg());
   EXPECT_FALSE(fit.zero_crossing_deg());
@@ -115,18 +141,18 @@ TEST(LineFit, HasNoCrossingsUnlessItFalls) {
 
 TEST(LineFit, RefusesWhatMakesNoLine) {
   const auto points = paper_points();
-  EXPECT_THROW((void)fit_curve(std::vector<LinePoint>{}), FitError);
-  EXPECT_THROW((void)fit_curve(std::vector<LinePoint>(points.begin() + 1, points.end())), FitError) << "no K_T";
-  EXPECT_THROW((void)fit_curve(std::vector<LinePoint>{points[0], points[1]}), FitError);
-  EXPECT_NO_THROW((void)fit_curve(std::vector<LinePoint>{points[0], points[1]}, {.anchored = true}));
-  EXPECT_THROW((void)fit_curve(std::vector<LinePoint>{points[0], points[1], points[1]}), FitError);
+  EXPECT_THROW((void)fit_curve(std::vector<CurvePoint>{}), FitError);
+  EXPECT_THROW((void)fit_curve(std::vector<CurvePoint>(points.begin() + 1, points.end())), FitError) << "no K_T";
+  EXPECT_THROW((void)fit_curve(std::vector<CurvePoint>{points[0], points[1]}), FitError);
+  EXPECT_NO_THROW((void)fit_curve(std::vector<CurvePoint>{points[0], points[1]}, {.anchored = true}));
+  EXPECT_THROW((void)fit_curve(std::vector<CurvePoint>{points[0], points[1], points[1]}), FitError);
   EXPECT_THROW((void)fit_curve(points, {.points_deg = {45, 60}}), FitError);
   EXPECT_THROW((void)fit_curve(points, {.points_deg = {45, 45}}), FitError);
   EXPECT_THROW((void)fit_curve(points, {.anchored = true, .points_deg = {0}}), FitError);
 }
 
-std::vector<LinePoint> points(double bend, double error = 0.01) {
-  std::vector<LinePoint> result;
+std::vector<CurvePoint> points(double bend, double error = 0.01) {
+  std::vector<CurvePoint> result;
   for (const double phi : {45.0, 90.0, 180.0, 270.0}) {
     const double u = phi / 270;
     result.push_back({phi, 1 - 0.7 * u + bend * u * u, error});
@@ -163,5 +189,5 @@ TEST(Curvature, OfThreePointsHasOneTest) {
   EXPECT_FALSE(curvature(points(0.2, 0), 10).bends()) << "without errors nothing can be said";
 }
 
-}  // namespace line_fit_test
+}  // namespace curve_fit_test
 }  // namespace kphi::fit
