@@ -403,32 +403,22 @@ std::string slopes_section(std::span<const SharedSlope> slopes) {
 
 // ---- the page ----------------------------------------------------------------------------------------------
 
-std::string card(const std::string& title, const Budget& budget, const std::string& per, const std::string& more) {
+std::string card(const std::string& title, const Budget& budget, const std::string& per) {
   const double value = budget.value, error = budget.expanded();
   return fmt::format(
       "<div class=\"card\"><h3>{0}</h3><div class=\"value\">{1} <span class=\"unit\">N/(rad/s)²{3}</span></div>"
-      "<p>{2} N/RPM²{3}</p>{4}</div>\n",
-      title, with_power_of_ten(value, error), with_power_of_ten(per_rpm2(value), per_rpm2(error)), per, more);
+      "<p>{2} N/RPM²{3}</p></div>\n",
+      title, with_power_of_ten(value, error), with_power_of_ten(per_rpm2(value), per_rpm2(error)), per);
 }
 
 std::string headline(const Fitted& fitted) {
   const CurveFit& curve = fitted.identification.curve_fit;
   const Analysis& analysis = fitted.analysis;
-  std::string shape;
-  if (!curve.anchored)
-    shape = fmt::format("<p>k(0) {:.2f} % {} the measured K<sub>T</sub></p>",
-                        100 * std::abs(curve.mismatch()) / curve.K_T, curve.mismatch() < 0 ? "below" : "above");
-  if (curve.clipping_deg().value_or(0) > 0 && !curve.anchored)
-    shape +=
-        fmt::format("<p>meets K<sub>T</sub> at {:.1f}°; below that angle compensation holds k<sub>i</sub> at 1</p>",
-                    *curve.clipping_deg());
-  if (curve.zero_crossing_deg()) shape += fmt::format("<p>reaches zero at {:.1f}°</p>", *curve.zero_crossing_deg());
   const Budget& K_T = analysis.coefficients.front();
-  std::string cards = card("Thrust coefficient K<sub>T</sub> = k(0)", K_T, "", "<p>measured without occlusion</p>");
+  std::string cards = card("Thrust coefficient K<sub>T</sub> = k(0), measured without occlusion", K_T, "");
   for (std::size_t i = 0; i < analysis.parameters.size(); ++i)
     cards += card(fmt::format("k(φ), {}: {}", name_of(curve.form), analysis.parameters[i].quantity),
-                  analysis.parameters[i], curve.parameters[i].per, "");
-  cards += fmt::format("<div class=\"card\"><h3>k(φ): {}</h3>{}</div>\n", typeset(curve.words()), shape);
+                  analysis.parameters[i], curve.parameters[i].per);
   return "<div class=\"cards\">\n" + cards + "</div>\n" + html_note(typeset(plus_minus_words(K_T)) + ".");
 }
 
