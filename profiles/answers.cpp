@@ -23,7 +23,7 @@ std::vector<Answer<Value>> read_list(const ProfileReader& file, const std::strin
 std::string Answers::place(const Mark& mark) const { return fmt::format("{}:{}:{}", path, mark.line, mark.column); }
 
 Answers parse_answers(const std::string& text, const std::string& path) {
-  const ProfileReader file(text, path, FileKind::answers);
+  ProfileReader file(text, path, FileKind::answers);
   Answers answers;
   answers.mountings = read_list<double>(file, "/mountings");
   answers.run_again = read_list<bool>(file, "/run_again");
@@ -32,6 +32,7 @@ Answers parse_answers(const std::string& text, const std::string& path) {
     answers.end_of_run_again = answers.run_again.empty() ? file.mark("/run_again") : answers.run_again.back().mark;
   answers.continue_after_safety_stop = file.get_or("/continue_after_safety_stop", answers.continue_after_safety_stop);
   answers.path = path;
+  file.finish();
   return answers;
 }
 

@@ -42,6 +42,7 @@ ClockGain read_clock_gain(const ProfileReader& file) {
   gain.u_factor = file.number("/iq/clock_gain/u");
   gain.uid = file.get_or("/iq/clock_gain/uid", gain.uid);
   gain.measured_utc = file.get_or("/iq/clock_gain/measured_utc", gain.measured_utc);
+  static_cast<void>(file.find<double>("/iq/clock_gain/duration_s"));  // for people only
   return gain;
 }
 

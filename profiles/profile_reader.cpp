@@ -34,7 +34,7 @@ ProfileReader::ProfileReader(const std::string& text, const std::string& path, F
   refuse_other_kind(document_, kind);
   for (FileFinding& finding : check_schema(document_, schema_of(kind)))
     document_.findings.push_back(std::move(finding));
-  finish();
+  throw_findings();
 }
 
 const nlohmann::json& ProfileReader::value(const std::string& pointer) const {
@@ -66,7 +66,19 @@ void ProfileReader::require_above(const std::string& high, const std::string& lo
   refuse(high, fmt::format("{} is not above {}{} ({})", number(high), number(low), unit, dotted(low)), next_move);
 }
 
-void ProfileReader::finish() const {
+void ProfileReader::finish() {
+  throw_findings();
+  const nlohmann::json values = document_.value.flatten();
+  for (const auto& [pointer, value] : values.items()) {
+    if (value.is_null()) continue;  // an empty list or object
+    std::string known = pointer;
+    while (!known.empty() && !read_.contains(known)) known.resize(known.rfind('/'));
+    if (known.empty()) refuse(pointer, "this kphi does not use it", "remove it, and report this mistake of kphi");
+  }
+  throw_findings();
+}
+
+void ProfileReader::throw_findings() const {
   if (!document_.findings.empty()) throw RefusedFile(document_.path, document_.findings);
 }
 

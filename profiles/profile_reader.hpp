@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 
 #include "profiles/schema.hpp"
@@ -21,6 +22,7 @@ class ProfileReader {
   /// T: bool, an integer, double or std::string.
   template <class T>
   [[nodiscard]] T get(const std::string& pointer) const {
+    read_.insert(pointer);
     return value(pointer).get<T>();
   }
   template <class T>
@@ -41,12 +43,15 @@ class ProfileReader {
   void refuse(const std::string& pointer, const std::string& what, const std::string& next_move);
   /// Adds one unless the number at `high` is above that at `low`; `unit` follows the latter: " m" or nothing.
   void require_above(const std::string& high, const std::string& low, const char* unit, const std::string& next_move);
+  /// Refuses keys that nobody has read: a limit that kphi does not know must not look as if it held.
   /// Throws RefusedFile if anything was refused.
-  void finish() const;
+  void finish();
 
  private:
   [[nodiscard]] const nlohmann::json& value(const std::string& pointer) const;
+  void throw_findings() const;
   SourceDocument document_;
+  mutable std::set<std::string> read_{"/format"};  ///< pointers; with what they hold
 };
 
 }  // namespace kphi::profiles

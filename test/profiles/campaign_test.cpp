@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "profiles/schema.hpp"
+#include "profiles/profile_reader.hpp"
 #include "test/profiles/refusals.hpp"
 
 namespace kphi::profiles {
@@ -312,6 +312,27 @@ TEST(Campaign, SaysAllThatIsWrongAtOnceAndEachThingOnce) {
               ElementsAre(StartsWith("10:14: 010 looks octal"), StartsWith("12:3: stesp is not a key"),
                           StartsWith("18:11: supply_v: 120 is above 60 V"),
                           StartsWith("19:1: limits.thrust_max_n is missing")));
+}
+
+TEST(ProfileReader, RefusesEachKeyThatNobodyReads) {
+  const auto unread = [](const auto& read) {
+    return refusals([&] {
+      ProfileReader file(kCampaignText + std::string("order: {}\n"), "c.yaml", FileKind::campaign);
+      read(file);
+      file.finish();
+      return 0;
+    });
+  };
+  const auto all = unread([](ProfileReader&) {});
+  EXPECT_EQ(all.size(), 21u) << "23 lines; three begin an object, one is the format, one a list of three";
+  EXPECT_THAT(all, testing::Contains("20:18: limits.speed_max_rpm: this kphi does not use it; remove it, and report "
+                                     "this mistake of kphi"));
+  const auto rest = unread([](ProfileReader& file) {
+    static_cast<void>(file.get<std::vector<double>>("/occlusions_deg"));
+    static_cast<void>(file.has("/limits/speed_max_rpm"));
+    static_cast<void>(file.number("/supply_v"));
+  });
+  EXPECT_EQ(rest.size(), all.size() - 4) << "whether a key is there does not count as reading it";
 }
 
 TEST(Campaign, NamesItsFile) {
