@@ -118,6 +118,7 @@ BenchConfig parse_bench(const std::string& text, const std::string& path) {
   bench.thrust_axis = axis[2] - 'x';
   if (file.has("/supply")) bench.supply = read_supply(file);
   bench.supply_sinks_current = file.get_or("/supply_sinks_current", bench.supply_sinks_current);
+  bench.limits = read_limits(file, "/supply/voltage_v");
   if (file.has("/ambient")) bench.ambient = read_ambient(file);
   if (file.has("/simulation")) bench.simulation = read_simulation(file, std::filesystem::path(path).parent_path());
   bench.text = text;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "compensation/units.hpp"
+#include "profiles/limits.hpp"
 
 namespace kphi::profiles {
 
@@ -91,6 +92,7 @@ struct BenchConfig {
   int thrust_sign = +1;                ///< sign of the axis when the propeller pulls
   std::optional<SupplyConfig> supply;  ///< nullopt: kphi does not switch what powers the motor
   bool supply_sinks_current = false;   ///< what powers the motor takes current back, so a run may end with a ramp
+  Limits limits;                       ///< of this stand; the campaign's hold as well
   AmbientConfig ambient;
   std::optional<Simulation> simulation;
   std::string text;  ///< the file, verbatim

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <tuple>
 
 #include "profiles/profile_reader.hpp"
 
@@ -35,37 +34,6 @@ void check_occlusions(ProfileReader& file, const std::vector<double>& occlusions
                   fmt::format("{}° is already listed at [{}]", occlusions_deg[i], first),
                   "list each occlusion once; repetitions sets how often it is run");
   }
-}
-
-std::optional<Cooling> read_cooling(ProfileReader& file) {
-  if (!file.has("/limits/cooling")) return std::nullopt;
-  const Cooling cooling{Celsius(file.number("/limits/cooling/pause_above_degc")),
-                        Celsius(file.number("/limits/cooling/resume_below_degc"))};
-  if (cooling.resume_below.value() > cooling.pause_above.value()) {
-    file.refuse("/limits/cooling/resume_below_degc", "is above pause_above_degc", "lower it: a pause would never end");
-  }
-  return cooling;
-}
-
-Limits read_limits(ProfileReader& file) {
-  Limits limits{from_rpm(file.number("/limits/speed_max_rpm")), Newtons(file.number("/limits/thrust_max_n")),
-                Amperes(file.number("/limits/supply_current_max_a")),
-                Celsius(file.number("/limits/coil_temperature_max_degc")), read_cooling(file)};
-  limits.torque_max = std::optional<NewtonMetres>(file.find<double>("/limits/torque_max_nm"));
-  limits.supply_voltage_min = std::optional<Volts>(file.find<double>("/limits/supply_voltage_min_v"));
-  limits.supply_voltage_max = std::optional<Volts>(file.find<double>("/limits/supply_voltage_max_v"));
-  if (const auto percent = file.find<double>("/limits/speed_error_max_percent"))
-    limits.speed_error_max = 0.01 * *percent;
-  const double supply = file.number("/supply_v");
-  const auto refuse = [&](const char* key, double volts, const char* relation, const char* remedy) {
-    file.refuse(std::string("/limits/") + key,
-                fmt::format("{:g} V is not {} the {:g} V of supply_v", volts, relation, supply),
-                fmt::format("{} it: the motor would never turn", remedy));
-  };
-  const auto& [low, high] = std::tie(limits.supply_voltage_min, limits.supply_voltage_max);
-  if (low && low->value() >= supply) refuse("supply_voltage_min_v", low->value(), "below", "lower");
-  if (high && high->value() <= supply) refuse("supply_voltage_max_v", high->value(), "above", "raise");
-  return limits;
 }
 
 Order read_order(ProfileReader& file) {
@@ -112,7 +80,7 @@ Campaign parse_campaign(const std::string& text, const std::string& path) {
   campaign.zero = Seconds(file.number("/zero_s"));
   campaign.box_bias = file.get_or("/box_bias", campaign.box_bias);
   campaign.minimum_discard = Seconds(file.number("/minimum_discard_s"));
-  campaign.limits = read_limits(file);
+  campaign.limits = read_limits(file, "/supply_v");
   campaign.supply = Volts(file.number("/supply_v"));
   campaign.text = text;
   campaign.path = path;

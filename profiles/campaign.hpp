@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "compensation/units.hpp"
+#include "profiles/limits.hpp"
 
 namespace kphi::profiles {
 
@@ -43,28 +44,6 @@ struct StepProfile {
   std::optional<double> slew_rad_s2{};  ///< limit of the commanded acceleration; nullopt: steps
   /// All levels, ascending or descending, `steps` of them.
   [[nodiscard]] std::vector<RadPerSec> levels() const;
-};
-
-/// The motor rests between runs until its coil has cooled down.
-struct Cooling {
-  Celsius pause_above;
-  Celsius resume_below;
-
-  friend bool operator==(const Cooling&, const Cooling&) = default;
-};
-
-/// A plan beyond the speed is refused; exceeding any of them during a run coasts the motor.
-struct Limits {
-  RadPerSec speed_max;
-  Newtons thrust_max;
-  Amperes supply_current_max;
-  Celsius coil_temperature_max;
-  std::optional<Cooling> cooling{};
-  std::optional<NewtonMetres> torque_max{};  ///< about the shaft
-  std::optional<Volts> supply_voltage_min{}, supply_voltage_max{};
-  std::optional<double> speed_error_max{};  ///< share of the command
-
-  friend bool operator==(const Limits&, const Limits&) = default;
 };
 
 struct Campaign {

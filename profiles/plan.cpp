@@ -108,13 +108,17 @@ Seconds ramp_time(const StepProfile& profile, const PlannedRun& run) {
 void require_within(const Campaign& campaign, const BenchConfig& bench) {
   const bool last_is_top = campaign.profile.last >= campaign.profile.first;
   const RadPerSec top = last_is_top ? campaign.profile.last : campaign.profile.first;
-  if (top <= bench.iq.speed_max) return;
   const std::string key = last_is_top ? "last_rpm" : "first_rpm";
-  throw ConfigurationError(fmt::format(
-      "{}: profile.{}: {:.6g} RPM is above {:.6g} RPM, the motor's iq.speed_max_rpm ({}); lower the profile "
-      "or choose another bench",
-      place(campaign.path, campaign.text, "/profile/" + key), key, to_rpm(top), to_rpm(bench.iq.speed_max),
-      place(bench.path, bench.text, "/iq/speed_max_rpm")));
+  const auto require = [&](RadPerSec most, const char* limit) {
+    if (top <= most) return;
+    throw ConfigurationError(
+        fmt::format("{}: profile.{}: {:.6g} RPM is above {:.6g} RPM, the bench's {} ({}); lower the profile or choose "
+                    "another bench",
+                    place(campaign.path, campaign.text, "/profile/" + key), key, to_rpm(top), to_rpm(most),
+                    dotted(limit), place(bench.path, bench.text, limit)));
+  };
+  require(bench.iq.speed_max, "/iq/speed_max_rpm");
+  if (const auto& rpm = bench.limits["speed_max_rpm"]) require(from_rpm(*rpm), "/limits/speed_max_rpm");
 }
 
 std::vector<PlannedStep> steps_in_order(const std::vector<RadPerSec>& levels, StepOrderKind kind,

@@ -53,7 +53,7 @@ struct Plan {
 [[nodiscard]] Seconds ramp_time(const StepProfile& profile, const PlannedRun& run);
 
 /// Throws ConfigurationError, naming both files and both values, if the campaign asks for more speed than the
-/// bench's motor allows.
+/// bench allows.
 void require_within(const Campaign& campaign, const BenchConfig& bench);
 
 }  // namespace kphi::profiles

@@ -82,7 +82,7 @@ struct RunHeader {
   int spin = +1;
   double minimum_discard_s = 0;
   double supply_voltage_v = 0;           ///< that the campaign wants at the motor module; 0: not checked
-  double coil_temperature_max_degc = 0;  ///< the campaign's limit; 0: not checked
+  double coil_temperature_max_degc = 0;  ///< the limit of the files; 0: not checked
   double clock_gain = 1;                 ///< true speed per speed that the motor module reports
   double clock_gain_u = 0;               ///< its standard uncertainty; 0: the gain was not measured
   LoadCellScale load_cell;

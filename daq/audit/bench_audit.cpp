@@ -37,7 +37,7 @@ iq::Intention motor_intention(const profiles::Campaign& campaign, const profiles
   intention.supply_voltage_max_v = campaign.supply.value();
   for (const RadPerSec level : campaign.profile.levels())
     intention.speed_max_rad_s = std::max(intention.speed_max_rad_s, level.value());
-  intention.coil_temperature_max_degc = campaign.limits.coil_temperature_max.value();
+  intention.coil_temperature_max_degc = limit_of_files(Watched::coil_temperature, campaign, config);
   if (config.iq.clock_gain) intention.uid = config.iq.clock_gain->uid;
   return intention;
 }
@@ -85,7 +85,7 @@ netbox::Intention intention_of(const profiles::Campaign& campaign, const profile
   netbox::Intention intention;
   for (const RadPerSec level : campaign.profile.levels()) intention.speeds_rpm.push_back(to_rpm(level));
   intention.blades = campaign.propeller.blades;
-  intention.largest_thrust_n = campaign.limits.thrust_max.value();
+  intention.largest_thrust_n = limit_of_files(Watched::thrust, campaign, config);
   intention.thrust_axis = config.thrust_axis;
   intention.rate_hz = config.netbox.rate_hz;
   intention.records_per_datagram = config.netbox.records_per_datagram;

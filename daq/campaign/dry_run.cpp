@@ -71,12 +71,12 @@ class Checks {
     add(Severity::note, "speed",
         fmt::format("{:.0f} RPM at most; the campaign allows {:.0f}, the motor {:.0f} RPM; blade tips at {:.0f} m/s, "
                     "Mach {:.2f}",
-                    to_rpm(top), to_rpm(campaign_.limits.speed_max), to_rpm(config_.iq.speed_max), tip,
+                    to_rpm(top), *campaign_.limits["speed_max_rpm"], to_rpm(config_.iq.speed_max), tip,
                     tip / kSpeedOfSound));
   }
 
   void thrust() {
-    const double limit = campaign_.limits.thrust_max.value();
+    const double limit = limit_of(Watched::thrust);
     const auto prior = thrust_prior(campaign_.propeller);
     if (!prior)
       return tell("thrust", fmt::format("limit {:g} N; no published thrust data for such a propeller", limit));
@@ -112,15 +112,15 @@ class Checks {
   }
 
   void supply() {
-    const auto& limits = campaign_.limits;
+    const double most = limit_of(Watched::supply_current);
     if (!config_.supply)
       return add(Severity::note, "supply",
                  fmt::format("{:g} V expected, not controlled by kphi; the motor coasts above {:g} A",
-                             campaign_.supply.value(), limits.supply_current_max.value()));
+                             campaign_.supply.value(), most));
     const auto& set = *config_.supply;
-    const std::string words = fmt::format(
-        "set to {:g} V, at most {:g} A; the campaign expects {:g} V and coasts above {:g} A", set.voltage.value(),
-        set.current_limit.value(), campaign_.supply.value(), limits.supply_current_max.value());
+    const std::string words =
+        fmt::format("set to {:g} V, at most {:g} A; the campaign expects {:g} V and coasts above {:g} A",
+                    set.voltage.value(), set.current_limit.value(), campaign_.supply.value(), most);
     warn_if(std::abs(set.voltage / campaign_.supply - 1) > results::kSupplyBand, "supply", words,
             "every step would be flagged; make the two voltages agree");
   }
@@ -142,14 +142,14 @@ class Checks {
   }
 
   void coil() {
-    const auto& limits = campaign_.limits;
-    const double most = limits.coil_temperature_max.value();
-    if (!limits.cooling)
+    const auto& cooling = campaign_.limits.cooling;
+    const double most = limit_of(Watched::coil_temperature);
+    if (!cooling)
       return add(Severity::note, "coil", fmt::format("the motor coasts above {:g} °C; no pauses for cooling", most));
     const std::string words =
         fmt::format("runs start below {:g} °C, otherwise kphi waits for {:g} °C; the motor coasts above {:g} °C",
-                    limits.cooling->pause_above.value(), limits.cooling->resume_below.value(), most);
-    warn_if(limits.cooling->pause_above.value() >= most, "coil", words,
+                    cooling->pause_above.value(), cooling->resume_below.value(), most);
+    warn_if(cooling->pause_above.value() >= most, "coil", words,
             "set cooling.pause_above_degc below the limit, or runs start that cannot finish");
   }
 
@@ -183,6 +183,7 @@ class Checks {
   [[nodiscard]] std::vector<PlanCheck> take() { return std::move(checks_); }
 
  private:
+  [[nodiscard]] double limit_of(Watched watched) const { return limit_of_files(watched, campaign_, config_); }
   void warn_if(bool is_doubtful, std::string subject, std::string what, std::string next_move) {
     if (is_doubtful) return add(Severity::warning, std::move(subject), std::move(what), std::move(next_move));
     add(Severity::note, std::move(subject), std::move(what));

@@ -27,11 +27,13 @@ void offer(Table& table, Watched watched, const std::optional<double>& value, co
     table[watched] = {watched, row.name, *value, row.unit, source, lower};
 }
 
-void offer_campaign(Table& table, const profiles::Limits& limits) {
+/// `file`: "campaign" or "bench".
+void offer_file(Table& table, const char* file, const profiles::Limits& limits) {
   for (const GuardedQuantity& row : kQuantities) {
-    if (row.campaign_limit == nullptr) continue;
-    offer(table, row.watched, row.campaign_limit(limits),
-          std::string("campaign limits.") + row.campaign_key + row.note);
+    const std::optional<double> value = row.limit ? limits[*row.limit] : std::nullopt;
+    if (value)
+      offer(table, row.watched, row.allowed * *value,
+            fmt::format("{} limits.{}{}", file, profiles::kLimitKeys[row.limit->index], row.note));
   }
 }
 
@@ -88,7 +90,8 @@ DeviceLimits device_limits(const results::RunHeader& header) {
 std::vector<GuardLimit> combine_limits(const profiles::Campaign& campaign, const profiles::BenchConfig& config,
                                        const DeviceLimits* devices) {
   Table table;
-  offer_campaign(table, campaign.limits);
+  offer_file(table, "campaign", campaign.limits);
+  offer_file(table, "bench", config.limits);
   offer_bench(table, config);
   if (devices != nullptr) offer_devices(table, *devices);
   offer_own(table, config);
@@ -96,6 +99,12 @@ std::vector<GuardLimit> combine_limits(const profiles::Campaign& campaign, const
   for (const auto& [watched, limit] : table)
     if (config.supply || row_of(watched).source != Source::supply) limits.push_back(limit);
   return limits;
+}
+
+double limit_of_files(Watched watched, const profiles::Campaign& campaign, const profiles::BenchConfig& config) {
+  for (const GuardLimit& limit : combine_limits(campaign, config))
+    if (limit.watched == watched) return limit.value;
+  return 0;
 }
 
 std::string to_words(const GuardLimit& limit) {

@@ -2,6 +2,7 @@
 // of several limits on one quantity the tightest holds, and names its source.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -47,21 +48,19 @@ enum class Source : std::uint8_t { load_cell, motor, supply, runner, computer, g
 /// On which side of its limit a quantity is safe.
 enum class Sense : std::uint8_t { upper, lower };
 
-using CampaignLimit = std::optional<double> (*)(const profiles::Limits&);
-
 /// One guarded quantity, except how it is measured (observation.cpp) and how a device limits it (guard_limits.cpp).
 struct GuardedQuantity {
   Watched watched;
   Source source;
   Sense sense;
-  const char* name;                    ///< in messages and --dry-run
-  const char* unit;                    ///< of value and limit
-  const char* key;                     ///< on the live page, with its unit
-  const char* label;                   ///< on the live page
-  const char* next_move;               ///< after a trip
-  const char* campaign_key = nullptr;  ///< under `limits:` in the campaign file; nullptr: none
-  CampaignLimit campaign_limit = nullptr;
-  const char* note = "";  ///< added to the limit's source
+  const char* name;                        ///< in messages and --dry-run
+  const char* unit;                        ///< of value and limit
+  const char* key;                         ///< on the live page, with its unit
+  const char* label;                       ///< on the live page
+  const char* next_move;                   ///< after a trip
+  std::optional<profiles::Limit> limit{};  ///< under `limits:` in campaign and bench file, in `unit`
+  double allowed = 1;                      ///< share of that limit
+  const char* note = "";                   ///< added to the limit's source
 };
 
 inline constexpr const char* kCheckStand = "look at the stand before you continue";
@@ -71,14 +70,9 @@ inline constexpr const char* kCheckShort = "check for a blocked rotor and a shor
 inline constexpr const char* kCheckVoltage = "check the supply, its leads and its limits";
 inline constexpr const char* kCheckBox = "check the box's power and network cable: `kphi devices`";
 
-namespace detail {
-template <class Quantity>
-std::optional<double> plain(const std::optional<Quantity>& value) {
-  return value ? std::optional(value->value()) : std::nullopt;
-}
-}  // namespace detail
-
 inline constexpr double kOvershoot = 1.05;  ///< a closed loop overshoots a little on every step
+
+using profiles::Limit;
 
 inline constexpr std::array<GuardedQuantity, kWatchedCount> kQuantities{{
     {Watched::force_x, Source::load_cell, Sense::upper, "Fx", "N", "fx_n", "Fx", kCheckLoad},
@@ -88,40 +82,31 @@ inline constexpr std::array<GuardedQuantity, kWatchedCount> kQuantities{{
     {Watched::torque_y, Source::load_cell, Sense::upper, "Ty", "N m", "ty_nm", "Ty", kCheckLoad},
     {Watched::torque_z, Source::load_cell, Sense::upper, "Tz", "N m", "tz_nm", "Tz", kCheckLoad},
     // Either sign, zero subtracted; so is the torque about the thrust axis.
-    {Watched::thrust, Source::load_cell, Sense::upper, "thrust", "N", "thrust_n", "Thrust", kCheckLoad, "thrust_max_n",
-     [](const profiles::Limits& limits) { return std::optional(limits.thrust_max.value()); }},
+    {Watched::thrust, Source::load_cell, Sense::upper, "thrust", "N", "thrust_n", "Thrust", kCheckLoad,
+     Limit("thrust_max_n")},
     {Watched::shaft_torque, Source::load_cell, Sense::upper, "torque about the shaft", "N m", "torque_nm",
-     "Shaft torque", kCheckLoad, "torque_max_nm",
-     [](const profiles::Limits& limits) { return detail::plain(limits.torque_max); }},
-    {Watched::speed, Source::motor, Sense::upper, "speed", "RPM", "speed_rpm", "Speed", kCheckRotor, "speed_max_rpm",
-     [](const profiles::Limits& limits) { return std::optional(kOvershoot * to_rpm(limits.speed_max)); },
-     ", 5 % overshoot allowed"},
+     "Shaft torque", kCheckLoad, Limit("torque_max_nm")},
+    {Watched::speed, Source::motor, Sense::upper, "speed", "RPM", "speed_rpm", "Speed", kCheckRotor,
+     Limit("speed_max_rpm"), kOvershoot, ", 5 % overshoot allowed"},
     // Share of the command, in addition to 20 rad/s: see speed_error.hpp.
     {Watched::speed_error, Source::motor, Sense::upper, "speed error", "%", "speed_error_percent", "Speed error",
-     kCheckStand, "speed_error_max_percent",
-     [](const profiles::Limits& limits) {
-       return limits.speed_error_max ? std::optional(100 * *limits.speed_error_max) : std::nullopt;
-     }},
+     kCheckStand, Limit("speed_error_max_percent")},
     // Into the motor module, as the module measures it.
     {Watched::supply_current, Source::motor, Sense::upper, "supply current", "A", "module_a", "Module current",
-     kCheckShort, "supply_current_max_a",
-     [](const profiles::Limits& limits) { return std::optional(limits.supply_current_max.value()); }},
+     kCheckShort, Limit("supply_current_max_a")},
     // Out of the bench supply, as the supply measures it.
     {Watched::output_current, Source::supply, Sense::upper, "output current of the supply", "A", "supply_a",
-     "Supply current", kCheckShort, "supply_current_max_a",
-     [](const profiles::Limits& limits) { return std::optional(limits.supply_current_max.value()); }},
+     "Supply current", kCheckShort, Limit("supply_current_max_a")},
     {Watched::motor_current, Source::motor, Sense::upper, "motor current", "A", "motor_a", "Motor current",
      kCheckShort},
     {Watched::supply_voltage_low, Source::motor, Sense::lower, "supply voltage", "V", "voltage_low_v", "Voltage",
-     kCheckVoltage, "supply_voltage_min_v",
-     [](const profiles::Limits& limits) { return detail::plain(limits.supply_voltage_min); }},
+     kCheckVoltage, Limit("supply_voltage_min_v")},
     // Of the module or of the bench supply.
     {Watched::supply_voltage_high, Source::motor, Sense::upper, "supply voltage", "V", "voltage_high_v", "Voltage",
-     kCheckVoltage, "supply_voltage_max_v",
-     [](const profiles::Limits& limits) { return detail::plain(limits.supply_voltage_max); }},
+     kCheckVoltage, Limit("supply_voltage_max_v")},
     {Watched::coil_temperature, Source::motor, Sense::upper, "coil temperature", "°C", "coil_degc", "Coil",
-     "let the motor cool; add limits.cooling to the campaign, or use shorter steps", "coil_temperature_max_degc",
-     [](const profiles::Limits& limits) { return std::optional(limits.coil_temperature_max.value()); }},
+     "let the motor cool; add limits.cooling to the campaign, or use shorter steps",
+     Limit("coil_temperature_max_degc")},
     // Wall time, while the motor turns; likewise the next three.
     {Watched::load_cell_age, Source::load_cell, Sense::upper, "age of the newest load-cell sample", "s",
      "load_cell_age_s", "Cell silent", kCheckBox},
@@ -140,6 +125,14 @@ static_assert(
       return true;
     }(),
     "kQuantities has one row per Watched, in its order");
+static_assert(
+    [] {
+      std::array<bool, profiles::kLimitKeys.size()> guards{};
+      for (const GuardedQuantity& row : kQuantities)
+        if (row.limit) guards[row.limit->index] = true;
+      return std::ranges::find(guards, false) == guards.end();
+    }(),
+    "a limit that a file may set has no row in kQuantities");
 
 [[nodiscard]] constexpr const GuardedQuantity& row_of(Watched watched) {
   return kQuantities[static_cast<std::size_t>(watched)];
@@ -183,6 +176,9 @@ struct DeviceLimits {
 [[nodiscard]] std::vector<GuardLimit> combine_limits(const profiles::Campaign& campaign,
                                                      const profiles::BenchConfig& config,
                                                      const DeviceLimits* devices = nullptr);
+/// The tightest limit of the files; 0: none.
+[[nodiscard]] double limit_of_files(Watched watched, const profiles::Campaign& campaign,
+                                    const profiles::BenchConfig& config);
 
 /// "thrust                               above 20 N        campaign limits.thrust_max_n", one line per limit.
 [[nodiscard]] std::vector<std::string> to_lines(const std::vector<GuardLimit>& limits);

@@ -45,7 +45,7 @@ results::RunHeader header_of(const RunOrder& order, Bench& bench, const results:
   header.spin = config.iq.spin;
   header.minimum_discard_s = campaign.minimum_discard.value();
   header.supply_voltage_v = campaign.supply.value();
-  header.coil_temperature_max_degc = campaign.limits.coil_temperature_max.value();
+  header.coil_temperature_max_degc = limit_of_files(Watched::coil_temperature, campaign, config);
   if (const auto& gain = config.iq.clock_gain) {
     header.clock_gain = gain->factor;
     header.clock_gain_u = gain->u_factor;

@@ -76,7 +76,7 @@ TEST_F(FaultyMotor, FindsNothingWrongWithTheRotorInALongCleanRun) {
   campaign_.profile.first = from_rpm(100);
   campaign_.profile.last = from_rpm(19100);
   campaign_.profile.dwell = Seconds(2);
-  campaign_.limits.speed_max = from_rpm(19100);
+  campaign_.limits["speed_max_rpm"] = 19100;
   EXPECT_NO_THROW((void)run("  []\n"));
   std::swap(campaign_.profile.first, campaign_.profile.last);
   EXPECT_NO_THROW((void)run("  []\n", 5));

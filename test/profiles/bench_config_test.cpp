@@ -299,5 +299,18 @@ TEST(BenchConfig, RefusesASupplyThatWouldTripAtOnce) {
               ElementsAre(testing::HasSubstr("supply.current_limit_a is missing")));
 }
 
+TEST(BenchConfig, MayLimitWhatItsStandTolerates) {
+  EXPECT_EQ(parse_bench(kBenchText, "b.yaml").limits, Limits{});
+  const BenchConfig bench = parse_bench(with_power("limits: {thrust_max_n: 15}\n"), "b.yaml");
+  EXPECT_EQ(bench.limits["thrust_max_n"], 15);
+  EXPECT_FALSE(bench.limits["torque_max_nm"]);
+  const auto refused_limit = [](const std::string& limit) {
+    return refusals([&] { return parse_bench(with_power(kSupply + ("limits: {" + limit + "}\n")), "b.yaml"); });
+  };
+  EXPECT_THAT(refused_limit("supply_voltage_min_v: 12"),
+              ElementsAre(testing::HasSubstr("12 V is not below the 12 V of supply.voltage_v")));
+  EXPECT_THAT(refused_limit("cooling: {}"), ElementsAre(testing::HasSubstr("cooling is not a key of limits")));
+}
+
 }  // namespace bench_config_test
 }  // namespace kphi::profiles

@@ -147,7 +147,7 @@ TEST(Plan, IsRefusedOnABenchWhoseMotorMayNotTurnSoFast) {
   EXPECT_THAT(
       [&] { require_within(campaign, bench); },
       testing::ThrowsMessage<ConfigurationError>(
-          "c.yaml:15:13: profile.last_rpm: 19100 RPM is above 18000 RPM, the motor's iq.speed_max_rpm (b.yaml:15:18); "
+          "c.yaml:15:13: profile.last_rpm: 19100 RPM is above 18000 RPM, the bench's iq.speed_max_rpm (b.yaml:15:18); "
           "lower the profile or choose another bench"));
 }
 
@@ -158,6 +158,13 @@ TEST(Plan, IsRefusedForItsFirstSpeedWhereThatIsTheTop) {
   EXPECT_THAT(
       [&] { require_within(parse_campaign(text, "c.yaml"), bench); },
       testing::ThrowsMessage<ConfigurationError>(testing::StartsWith("c.yaml:14:14: profile.first_rpm: 19000 RPM")));
+}
+
+TEST(Plan, IsRefusedAboveALimitOfTheStand) {
+  const BenchConfig bench = parse_bench(std::string(kBenchText) + "limits: {speed_max_rpm: 18000}\n", "b.yaml");
+  EXPECT_THAT([&] { require_within(parse_campaign(kCampaignText, "c.yaml"), bench); },
+              testing::ThrowsMessage<ConfigurationError>(
+                  testing::HasSubstr("above 18000 RPM, the bench's limits.speed_max_rpm (b.yaml:21:25)")));
 }
 
 TEST(Plan, MayReachTheMotorsLimitItself) {

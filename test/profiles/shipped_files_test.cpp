@@ -93,7 +93,7 @@ TEST(ShippedFiles, AreThePapersCampaigns) {
     EXPECT_EQ(campaign.profile.dwell, Seconds(2));
     EXPECT_EQ(campaign.profile.first, from_rpm(100));
     EXPECT_EQ(campaign.profile.last, from_rpm(expected.last_rpm));
-    EXPECT_EQ(campaign.limits.speed_max, from_rpm(expected.last_rpm));
+    EXPECT_EQ(campaign.limits["speed_max_rpm"], expected.last_rpm);
     EXPECT_EQ(campaign.supply, Volts(12));
   }
 }
@@ -156,6 +156,15 @@ TEST(Schemas, AreEmbeddedAsTheyLieInTheFolder) {
     const auto file = read_text(shipped(std::string("schema/") + kind.word + ".schema.json"));
     EXPECT_EQ(nlohmann::json::parse(schema_text(kind.kind)), nlohmann::json::parse(file)) << kind.word;
   }
+}
+
+TEST(Schemas, OfCampaignAndBenchDescribeTheSameLimits) {
+  const auto limits = [](FileKind kind) { return schema_of(kind)["properties"]["limits"]["properties"]; };
+  nlohmann::json campaign = limits(FileKind::campaign);
+  campaign.erase("cooling");
+  EXPECT_EQ(campaign, limits(FileKind::bench));
+  EXPECT_EQ(campaign.size(), kLimitKeys.size());
+  for (const std::string_view key : kLimitKeys) EXPECT_TRUE(campaign.contains(std::string(key))) << key;
 }
 
 TEST(Schemas, DescribeEveryKey) {

@@ -43,7 +43,7 @@ TEST_F(BenchAudit, RefusesAnotherModuleThanTheOneWhoseClockWasMeasured) {
 
 TEST_F(BenchAudit, TellsFaultsOfBothDevicesAtOnce) {
   config_.iq.clock_gain = profiles::ClockGain{1.005, 1e-5, "000000000000000000000001", ""};
-  campaign_.limits.thrust_max = Newtons(60);
+  campaign_.limits["thrust_max_n"] = 60;
   campaign_.supply = Volts(60);
   EXPECT_THAT(refusal(), AllOf(HasSubstr("Net Box 127.0.0.1: 60 N"), HasSubstr("IQ module /dev/null: this is module"),
                                HasSubstr("60 V")));
@@ -51,7 +51,7 @@ TEST_F(BenchAudit, TellsFaultsOfBothDevicesAtOnce) {
 
 TEST_F(BenchAudit, SaysAWarningOnceAndJournalsIt) {
   campaign_ = test::short_campaign("0", 1, 2);
-  campaign_.limits.coil_temperature_max = Celsius(190);
+  campaign_.limits["coil_temperature_max_degc"] = 190;
   test::SaidLines said;
   const test::TemporaryFolder folder;
   const auto results = results::CampaignFolder::create(folder.path(), "u", "c");
@@ -109,9 +109,9 @@ TEST_F(Audit, RefusesALineThatIsConstantOverTheShortWindowsOfTheCampaign) {
 }
 
 TEST_F(Audit, RefusesALimitOfThrustThatTheCellCannotBear) {
-  campaign_.limits.thrust_max = Newtons(60);
+  campaign_.limits["thrust_max_n"] = 60;
   EXPECT_THAT(refusal(), HasSubstr("60 N expected on Fz, its range is 60 N"));
-  campaign_.limits.thrust_max = Newtons(50);
+  campaign_.limits["thrust_max_n"] = 50;
   EXPECT_EQ(refusal(), "");
   ASSERT_EQ(found_.size(), 1u);
   EXPECT_EQ(found_[0].line(),

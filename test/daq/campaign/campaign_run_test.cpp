@@ -89,7 +89,7 @@ TEST_F(ShortCampaign, KeepsFinishedRunsWhenAMountingIsRefused) {
 
 TEST_F(ShortCampaign, JournalsWhyARunWasStopped) {
   profiles::Campaign campaign = test::short_campaign("0", 1, 3);
-  campaign.limits.supply_current_max = Amperes(1.0);
+  campaign.limits["supply_current_max_a"] = 1.0;
   EXPECT_THROW((void)run(campaign), SafetyStop);
   const auto journal = results::read_journal(results_.journal());
   EXPECT_EQ(journal.entries[3].event, "run_aborted");

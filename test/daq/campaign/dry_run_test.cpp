@@ -55,8 +55,8 @@ TEST_F(DryRunOfAShortCampaign, PrintsMountingsAndRunsInTheirOrder) {
 }
 
 TEST_F(DryRunOfAShortCampaign, PrintsTheGuardsOwnLimits) {
-  campaign_.limits.torque_max = NewtonMetres(0.3);
-  campaign_.limits.supply_voltage_min = Volts(10.5);
+  campaign_.limits["torque_max_nm"] = 0.3;
+  campaign_.limits["supply_voltage_min_v"] = 10.5;
   const DryRun found = dry();
   const auto guards = combine_limits(campaign_, config_);
   EXPECT_EQ(found.limits, guards);
@@ -93,10 +93,10 @@ TEST_F(DryRunOfAShortCampaign, RefusesMoreSpeedThanTheMotorMayTurnButStillLooksA
 }
 
 TEST_F(DryRunOfAShortCampaign, WarnsOfAThrustLimitThatThePropellerIsLikelyToPass) {
-  campaign_.limits.thrust_max = Newtons(4.5);
+  campaign_.limits["thrust_max_n"] = 4.5;
   EXPECT_THAT(line(dry(), "thrust"), AllOf(HasSubstr("warning: about 4.0 to 4.9 N"), HasSubstr("may stop")));
   EXPECT_TRUE(dry().ok());
-  campaign_.limits.thrust_max = Newtons(3);
+  campaign_.limits["thrust_max_n"] = 3;
   EXPECT_THAT(line(dry(), "thrust"), HasSubstr("the limit will stop the run"));
   campaign_.propeller.diameter_in = 9;
   EXPECT_THAT(line(dry(), "thrust"), HasSubstr("no published thrust data"));

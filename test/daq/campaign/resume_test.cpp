@@ -265,10 +265,10 @@ TEST_F(Resume, TellsHowToGoOn) {
 }
 
 TEST_F(Resume, ContinuesAfterASafetyStopOnlyWhenSomebodyHasClearedIt) {
-  const Newtons limit = campaign_.limits.thrust_max;
-  campaign_.limits.thrust_max = Newtons(2.0);
+  const auto limit = campaign_.limits["thrust_max_n"];
+  campaign_.limits["thrust_max_n"] = 2.0;
   EXPECT_THROW((void)begin(results_), SafetyStop);
-  campaign_.limits.thrust_max = limit;
+  campaign_.limits["thrust_max_n"] = limit;
   Resumption stopped = inspect(results_, true);
   EXPECT_THAT(stopped.state.safety_stop, HasSubstr("is above 2 N"));
   EXPECT_THROW((void)resume_with(stopped), ConfigurationError);

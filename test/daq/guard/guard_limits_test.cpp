@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <regex>
 
 #include "daq/virtual/deterministic_bench.hpp"
 #include "profiles/schema.hpp"
@@ -38,16 +39,29 @@ class CombinedLimits : public testing::Test {
   std::optional<DeviceLimits> devices_;
 };
 
-TEST(GuardedQuantities, HoldEachLimitThatTheCampaignFileAllows) {
-  const auto& limits = profiles::schema_of(profiles::FileKind::campaign)["properties"]["limits"]["properties"];
-  for (const auto& [key, schema] : limits.items()) {
-    if (schema["type"] != "number") continue;
-    EXPECT_TRUE(std::ranges::any_of(kQuantities,
-                                    [&](const GuardedQuantity& one) {
-                                      return one.campaign_key != nullptr && one.campaign_key == key &&
-                                             one.campaign_limit != nullptr;
-                                    }))
-        << key << " guards nothing: give it a row";
+TEST_F(CombinedLimits, NameEachLimitThatAFileMaySet) {
+  using profiles::FileKind;
+  const auto holds = [&](FileKind kind, const std::string& key, double value) {
+    const bool of_campaign = kind == FileKind::campaign;
+    std::string text = of_campaign ? campaign_.text : config_.text + "limits: {}\n";
+    text = std::regex_replace(text, std::regex("(limits: .*?)" + key + ": \\d+,?"), "$1");
+    text.insert(text.find("limits: {") + 9, fmt::format("{}: {}, ", key, value));
+    try {
+      const auto limits = of_campaign ? combine_limits(profiles::parse_campaign(text, "c.yaml"), config_)
+                                      : combine_limits(campaign_, profiles::parse_bench(text, "b.yaml"));
+      return std::ranges::any_of(limits, [&](const GuardLimit& limit) {
+        return limit.source.starts_with(fmt::format("{} limits.{}", info(kind).word, key));
+      });
+    } catch (const ConfigurationError&) {
+      return false;  // another value may be allowed
+    }
+  };
+  for (const FileKind kind : {FileKind::campaign, FileKind::bench}) {
+    for (const auto& [key, schema] : schema_of(kind)["properties"]["limits"]["properties"].items()) {
+      if (schema["type"] != "number") continue;
+      const auto tight = {1.0, 20.0, 12.5, 18000.0};
+      EXPECT_TRUE(std::ranges::any_of(tight, [&](double value) { return holds(kind, key, value); })) << key;
+    }
   }
 }
 
@@ -72,10 +86,14 @@ TEST_F(CombinedLimits, TakeTheTighterOfCampaignAndBench) {
   config_.supply = profiles::SupplyConfig{"x", Volts(12), Amperes(20), Volts(14), Amperes(22)};
   expect(Watched::supply_voltage_high, 14, "bench supply.over_voltage_v");
   expect(Watched::output_current, 1.02 * 22, "bench supply.over_current_a");
-  campaign_.limits.supply_current_max = Amperes(18);
-  campaign_.limits.supply_voltage_max = Volts(13.2);
+  campaign_.limits["supply_current_max_a"] = 18;
+  campaign_.limits["supply_voltage_max_v"] = 13.2;
   expect(Watched::output_current, 18, "campaign");
   expect(Watched::supply_voltage_high, 13.2, "campaign limits.supply_voltage_max_v");
+  EXPECT_EQ(limit_of_files(Watched::thrust, campaign_, config_), 20);
+  config_.limits["thrust_max_n"] = 15;
+  expect(Watched::thrust, 15, "bench limits.thrust_max_n");
+  EXPECT_EQ(limit_of_files(Watched::thrust, campaign_, config_), 15);
 }
 
 TEST_F(CombinedLimits, TakeWhatTheDevicesBearWhenThatIsLess) {
@@ -94,7 +112,7 @@ TEST_F(CombinedLimits, TakeWhatTheDevicesBearWhenThatIsLess) {
 TEST_F(CombinedLimits, OfAVoltageTheHigherOfTheLowerOnesIsTheTighter) {
   told(iq::entry<"power_safety.volt_input_low">, 5);
   expect(Watched::supply_voltage_low, 5, "device motor power_safety.volt_input_low");
-  campaign_.limits.supply_voltage_min = Volts(10.5);
+  campaign_.limits["supply_voltage_min_v"] = 10.5;
   expect(Watched::supply_voltage_low, 10.5, "campaign limits.supply_voltage_min_v");
   EXPECT_TRUE(row(Watched::supply_voltage_low)->lower);
 }
@@ -108,7 +126,7 @@ TEST_F(CombinedLimits, BelieveNoDeviceThatSaysNonsense) {
 
 TEST_F(CombinedLimits, OfASpeedErrorCanOnlyBeTightened) {
   expect(Watched::speed_error, 15, "kphi");
-  campaign_.limits.speed_error_max = 0.05;
+  campaign_.limits["speed_error_max_percent"] = 5;
   expect(Watched::speed_error, 5, "campaign limits.speed_error_max_percent");
 }
 

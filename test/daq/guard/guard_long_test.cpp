@@ -19,9 +19,9 @@ void run_clean(double first_rpm, double last_rpm, bool supply) {
     config.supply = profiles::SupplyConfig{"modbus-rtu:/dev/null", Volts(12), Amperes(24), Volts(14), Amperes(24)};
   profiles::Campaign campaign = test::short_campaign();
   campaign.profile = {300, Seconds(6), from_rpm(first_rpm), from_rpm(last_rpm)};
-  campaign.limits.torque_max = NewtonMetres(0.15);
-  campaign.limits.supply_voltage_min = Volts(10.5);
-  campaign.limits.supply_voltage_max = Volts(14);
+  campaign.limits["torque_max_nm"] = 0.15;
+  campaign.limits["supply_voltage_min_v"] = 10.5;
+  campaign.limits["supply_voltage_max_v"] = 14;
   DeterministicBench bench(config);
   bench.mounted("5x3", 0);
   Progress progress;

@@ -20,11 +20,6 @@ TEST(GuardedQuantities, HaveAKeyOfTheirOwn) {
   EXPECT_EQ(keys.size(), kWatchedCount);
 }
 
-TEST(GuardedQuantities, HaveACampaignLimitExactlyWhereTheyHaveItsKey) {
-  for (const GuardedQuantity& row : kQuantities)
-    EXPECT_EQ(row.campaign_key == nullptr, row.campaign_limit == nullptr) << row.name;
-}
-
 class Observed : public testing::Test {
  protected:
   void samples(double fz_n, int n, double tz_nm = 0) {

@@ -143,7 +143,7 @@ TEST_F(OneRun, DelaysARampThatItServesLateInsteadOfJumping) {
 }
 
 TEST_F(OneRun, LetsGoAtOnceAtATripAndSaysWhatBecameOfTheMotor) {
-  campaign_.limits.thrust_max = Newtons(2.0);
+  campaign_.limits["thrust_max_n"] = 2.0;
   try {
     (void)record();
     FAIL();
@@ -179,7 +179,7 @@ TEST_F(OneRun, StopsOnRequestAtAnyTickLetsTheMotorGoAndKeepsWhatItHas) {
 }
 
 TEST_F(OneRun, StopsWhenALimitIsPassedAndNamesIt) {
-  campaign_.limits.thrust_max = Newtons(2.0);
+  campaign_.limits["thrust_max_n"] = 2.0;
   try {
     (void)record();
     FAIL() << "6 N of thrust passed a limit of 2 N";
