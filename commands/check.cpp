@@ -113,8 +113,7 @@ std::string summary_of(const Vehicle& vehicle) {
 /// What the curve's uncertainty does to the speed of a rotor, at the ends of the valid range.
 std::string uncertainty_of(const compensation::Coefficients& file) {
   const compensation::ThrustCurve& curve = file.curve;
-  if (!curve.has_uncertainty())
-    return "  speeds     uncertainty unknown: the file has no `uncertainty.covariance`\n";
+  if (!curve.has_uncertainty()) return "  speeds     uncertainty unknown: the file has no `uncertainty.covariance`\n";
   const auto percent = [&](Radians phi) { return 50 * curve.relative_uncertainty(phi, Radians(0)); };
   const std::string missing = fmt::format("{}", fmt::join(file.not_known, ", "));
   return fmt::format("  speeds     known to {:.2g} % without occlusion, {:.2g} % at {:g}°, standard{}\n",
@@ -231,12 +230,11 @@ void attempt(CheckedFile& file, Check&& check) {
   try {
     check();
   } catch (const RefusedFile& refused) {
-    for (const FileFinding& finding : refused.findings())
-      file.errors.push_back({{"line", finding.mark.line},
-                             {"column", finding.mark.column},
-                             {"what", finding.what},
-                             {"next_move", finding.next_move},
-                             {"message", describe(file.path, finding)}});
+    for (const FileFinding& finding : refused.findings()) {
+      Json& error = file.errors.emplace_back(Json{{"message", describe(file.path, finding)}});
+      KPHI_JSON_MEMBERS(error, finding, what, next_move);
+      KPHI_JSON_MEMBERS(error, finding.mark, line, column);
+    }
   } catch (const std::runtime_error& refused) {
     file.errors.push_back({{"message", refused.what()}});
   }

@@ -5,11 +5,11 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 
 #include "base/error.hpp"
+#include "base/json.hpp"
 
 namespace kphi::commands {
 

@@ -42,19 +42,13 @@ Json to_json(const netbox::Configuration& box) {
 }
 
 Json to_json(const netbox::Counters& counters, const StreamHealth& health) {
-  return {{"expected", counters.expected},
-          {"received", counters.received},
-          {"lost_network", counters.lost_network},
-          {"lost_host", counters.lost_host},
-          {"late", counters.late},
-          {"duplicates", counters.duplicates},
-          {"reordered", counters.reordered},
-          {"malformed", counters.malformed},
-          {"records_per_second", health.records_per_second},
-          {"jitter_p50_ns", std::llround(1e9 * health.jitter_p50_s)},
-          {"jitter_p99_ns", std::llround(1e9 * health.jitter_p99_s)},
-          {"skew_ppm", health.skew_ppm},
-          {"queue_high_water", health.queue_high_water}};
+  Json json;
+  KPHI_JSON_MEMBERS(json, counters, expected, received, lost_network, lost_host, late, duplicates, reordered,
+                    malformed);
+  json["jitter_p50_ns"] = std::llround(1e9 * health.jitter_p50_s);
+  json["jitter_p99_ns"] = std::llround(1e9 * health.jitter_p99_s);
+  KPHI_JSON_MEMBERS(json, health, records_per_second, skew_ppm, queue_high_water);
+  return json;
 }
 
 netbox::ProbeSettings probe_settings(const DevicesRequest& asked, const std::optional<profiles::BenchConfig>& bench) {
@@ -97,15 +91,10 @@ Json to_json(const serial::Adapter& adapter) {
 }
 
 Json to_json(const iq::Counters& counters) {
-  return {{"requests", counters.requests},
-          {"replies", counters.replies},
-          {"timeouts", counters.timeouts},
-          {"late_replies", counters.late_replies},
-          {"unasked", counters.unasked},
-          {"wrong_module", counters.wrong_module},
-          {"crc_errors", counters.crc_errors},
-          {"wrong_length", counters.wrong_length},
-          {"discarded_bytes", counters.discarded_bytes}};
+  Json json;
+  KPHI_JSON_MEMBERS(json, counters, requests, replies, timeouts, late_replies, unasked, wrong_module, crc_errors,
+                    wrong_length, discarded_bytes);
+  return json;
 }
 
 Json to_json(const iq::ClockGain& gain) {

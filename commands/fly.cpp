@@ -149,12 +149,8 @@ void print_text(const FlyRequest& request, const Flown& flown) {
 }
 
 Json json_of(const Findings& found) {
-  Json json{{"draws", found.draws},
-            {"kept", found.kept},
-            {"lost_plain", found.lost_plain},
-            {"lost_compensated", found.lost_compensated},
-            {"hover_z_better", found.hover_z_better},
-            {"forward_better", found.forward_better}};
+  Json json;
+  KPHI_JSON_MEMBERS(json, found, draws, kept, lost_plain, lost_compensated, hover_z_better, forward_better);
   for (std::size_t i = 0; i < kMerits.size(); ++i) {
     const auto& [p10, p50, p90] = found.merits[i];
     json[kMerits[i].key] = found.kept == 0 ? Json() : Json{{"p10", p10}, {"p50", p50}, {"p90", p90}};

@@ -127,21 +127,11 @@ Replay replay_run(const std::filesystem::path& path) {
 
 /// NaN becomes null.
 Json to_json(const StepMean& step) {
-  return {{"propeller", step.propeller},
-          {"occlusion_deg", step.occlusion_deg},
-          {"repetition", step.repetition},
-          {"step", step.step},
-          {"commanded_speed_rad_s", step.commanded_speed_rad_s},
-          {"speed_rad_s", step.speed_rad_s},
-          {"thrust_n", step.thrust_n},
-          {"thrust_sd_n", step.thrust_sd_n},
-          {"torque_nm", step.torque_nm},
-          {"zero_n", step.zero_n},
-          {"thrust_samples", step.thrust_samples},
-          {"thrust_u_n", step.thrust_u_n},
-          {"thrust_n_eff", step.thrust_n_eff},
-          {"lag_s", step.lag_s},
-          {"quality_flags", results::quality_flag_names(step.quality_flags)}};
+  Json json;
+  KPHI_JSON_MEMBERS(json, step, propeller, occlusion_deg, repetition, step, commanded_speed_rad_s, speed_rad_s,
+                    thrust_n, thrust_sd_n, torque_nm, zero_n, thrust_samples, thrust_u_n, thrust_n_eff, lag_s);
+  json["quality_flags"] = results::quality_flag_names(step.quality_flags);
+  return json;
 }
 
 void print(const Replay& replay, bool json) {

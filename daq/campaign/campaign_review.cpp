@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <tuple>
 
+#include "base/json.hpp"
 #include "results/reduction/repetitions.hpp"
 #include "results/steps_csv.hpp"
 
@@ -20,21 +20,12 @@ using results::StepMean;
 json to_json(const results::RepetitionVerdict& verdict) {
   json list = json::array();
   for (const results::RepetitionFigure& figure : verdict.repetitions) {
-    list.push_back({{"repetition", figure.repetition},
-                    {"k_n_s2_per_rad2", figure.k},
-                    {"u_k", figure.u},
-                    {"usable", figure.usable},
-                    {"outlying", figure.outlying},
-                    {"p", figure.p}});
+    json& one = list.emplace_back(json{{"k_n_s2_per_rad2", figure.k}, {"u_k", figure.u}});
+    KPHI_JSON_MEMBERS(one, figure, repetition, usable, outlying, p);
   }
-  return {{"occlusion_deg", verdict.occlusion_deg},
-          {"repetitions", list},
-          {"k_n_s2_per_rad2", verdict.k},
-          {"between_sd", verdict.between_sd},
-          {"within_u", verdict.within_u},
-          {"f", verdict.f},
-          {"p", verdict.p},
-          {"reason", verdict.reason}};
+  json all{{"repetitions", list}, {"k_n_s2_per_rad2", verdict.k}};
+  KPHI_JSON_MEMBERS(all, verdict, occlusion_deg, between_sd, within_u, f, p, reason);
+  return all;
 }
 
 json to_json(const results::Hysteresis& hysteresis) {

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "base/error.hpp"
+#include "base/json.hpp"
 #include "daq/bench/air_source.hpp"
 #include "daq/hardware/live_supply.hpp"
 #include "drivers/ambient/bme280.hpp"
@@ -97,11 +98,8 @@ DeviceAnswer ask_supply(const profiles::SupplyConfig& config, const Clock& clock
     answer.lines.push_back(fmt::format("set to {:g} V, limit {:g} A; measures {:.4g} V, {:.3g} A, {:.3g} W; output {}",
                                        seen.set_voltage_v, seen.current_limit_a, seen.voltage_v, seen.current_a,
                                        seen.power_w(), seen.output ? "on" : "off"));
-    answer.details.update({{"voltage_v", seen.voltage_v},
-                           {"current_a", seen.current_a},
-                           {"set_voltage_v", seen.set_voltage_v},
-                           {"current_limit_a", seen.current_limit_a},
-                           {"output", seen.output != 0}});
+    KPHI_JSON_MEMBERS(answer.details, seen, voltage_v, current_a, set_voltage_v, current_limit_a);
+    answer.details["output"] = seen.output != 0;
     findings = findings_of(identity, seen, config);
   } catch (const DeviceError& error) {
     findings.push_back({Severity::fault, error.what(), ""});

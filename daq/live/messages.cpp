@@ -1,7 +1,8 @@
 #include "daq/live/messages.hpp"
 
 #include <cmath>
-#include <nlohmann/json.hpp>
+
+#include "base/json.hpp"
 
 namespace kphi::daq::live {
 namespace {
@@ -39,9 +40,7 @@ void add_readings(ordered_json& to, const Tick& tick) {
   add("coil_degc", seen.judged[Watched::coil_temperature]);
   add("derate", seen.derate, seen.motor_is_fresh());
   to["fault_bits"] = seen.motor_is_fresh() ? seen.fault_bits : 0;
-  to["received"] = seen.account.received;
-  to["lost_network"] = seen.account.lost_network;
-  to["lost_host"] = seen.account.lost_host;
+  KPHI_JSON_MEMBERS(to, seen.account, received, lost_network, lost_host);
 }
 
 ordered_json bars_of(const std::vector<GuardLimit>& limits) {
@@ -54,13 +53,9 @@ ordered_json bars_of(const std::vector<GuardLimit>& limits) {
 }  // namespace
 
 std::string hello_message(const Subject& subject) {
-  return text_of({{"type", "hello"},
-                  {"format", "kphi-live/2"},
-                  {"replay", subject.replay},
-                  {"name", subject.name},
-                  {"propeller", subject.propeller},
-                  {"speed_max_rpm", subject.speed_max_rpm},
-                  {"limits", bars_of(subject.limits)}});
+  ordered_json hello{{"type", "hello"}, {"format", "kphi-live/2"}, {"limits", bars_of(subject.limits)}};
+  KPHI_JSON_MEMBERS(hello, subject, replay, name, propeller, speed_max_rpm);
+  return text_of(hello);
 }
 
 Message limits_message(const std::vector<GuardLimit>& limits) {
@@ -74,12 +69,8 @@ std::string tick_message(const Tick& tick, double silent_s, std::uint64_t droppe
                        {"progress", rounded(tick.progress)},
                        {"remaining_s", rounded(at.remaining_s)},
                        {"propeller", at.propeller.data()},
-                       {"phase", at.step < 0 ? at.phase : std::string_view()},
-                       {"step", at.step},
-                       {"steps", at.steps},
-                       {"occlusion_deg", at.occlusion_deg},
-                       {"repetition", at.repetition},
-                       {"repetitions", at.repetitions}};
+                       {"phase", at.step < 0 ? at.phase : std::string_view()}};
+  KPHI_JSON_MEMBERS(message, at, step, steps, occlusion_deg, repetition, repetitions);
   add_readings(message, tick);
   for (const GuardedQuantity& row : kQuantities)
     message["watched"][row.key] = rounded(tick.seen.judged[row.watched], 4);
@@ -112,11 +103,8 @@ Message end_message(double time_s, bool well, const std::string& text) {
 }
 
 std::string plot_message(const Tick& tick, const std::vector<GuardLimit>& limits) {
-  ordered_json message{{"timestamp", tick.timestamp_s},
-                       {"time_s", tick.time_s},
-                       {"occlusion_deg", tick.position.occlusion_deg},
-                       {"repetition", tick.position.repetition},
-                       {"step", tick.position.step}};
+  ordered_json message{{"timestamp", tick.timestamp_s}, {"time_s", tick.time_s}};
+  KPHI_JSON_MEMBERS(message, tick.position, occlusion_deg, repetition, step);
   add_readings(message, tick);
   for (const GuardLimit& limit : limits)
     message["limit_share"][row_of(limit.watched).key] = rounded(share_of(limit, tick.seen.judged[limit.watched]), 4);

@@ -4,7 +4,8 @@
 
 #include <array>
 #include <cmath>
-#include <nlohmann/json.hpp>
+
+#include "base/json.hpp"
 
 namespace kphi::sim {
 namespace {
@@ -18,25 +19,10 @@ void add_done(ordered_json& totals, const std::map<FaultKind, std::uint64_t>& do
 }
 
 ordered_json totals_of(const WireTruth& truth) {
-  ordered_json totals{{"sent", truth.sent},
-                      {"records_sent", truth.records_sent},
-                      {"arrived", truth.arrived},
-                      {"records_arrived", truth.records_arrived},
-                      {"dropped", truth.dropped},
-                      {"records_dropped", truth.records_dropped},
-                      {"duplicated", truth.duplicated},
-                      {"records_duplicated", truth.records_duplicated},
-                      {"overtaken", truth.overtaken},
-                      {"delayed", truth.delayed},
-                      {"malformed", truth.malformed},
-                      {"foreign", truth.foreign},
-                      {"records_left_out", truth.records_left_out},
-                      {"to_others", truth.to_others},
-                      {"records_to_others", truth.records_to_others},
-                      {"starts", truth.starts},
-                      {"unheard", truth.unheard},
-                      {"restarts", truth.restarts},
-                      {"reboots", truth.reboots}};
+  ordered_json totals;
+  KPHI_JSON_MEMBERS(totals, truth, sent, records_sent, arrived, records_arrived, dropped, records_dropped, duplicated,
+                    records_duplicated, overtaken, delayed, malformed, foreign, records_left_out, to_others,
+                    records_to_others, starts, unheard, restarts, reboots);
   add_done(totals, truth.done);
   return totals;
 }
@@ -52,9 +38,8 @@ std::string json_lines(const WireTruth& truth) {
   std::string lines;
   for (const FaultEvent& event : truth.events) add(lines, {{"at_ns", event.at.count()}, {"event", event.what}});
   for (const SentDatagram& d : truth.log) {
-    ordered_json line{{"sent_ns", d.sent.count()}, {"boot", d.boot},         {"stream", d.stream},
-                      {"first_rdt", d.first_rdt},  {"first_ft", d.first_ft}, {"last_ft", d.last_ft},
-                      {"records", d.records},      {"samples", d.samples},   {"arrivals", d.arrivals}};
+    ordered_json line{{"sent_ns", d.sent.count()}};
+    KPHI_JSON_MEMBERS(line, d, boot, stream, first_rdt, first_ft, last_ft, records, samples, arrivals);
     if (d.arrivals > 0) line["first_arrival_ns"] = d.first_arrival.count();
     if (d.first_sample < truth.sampled.size()) line["first_sampled_ns"] = truth.sampled[d.first_sample].count();
     add(lines, line);
@@ -88,13 +73,9 @@ std::string json_lines(const IqTruth& truth) {
     for (const FaultKind kind : r.done) line["faults"].push_back(name_of(kind));
     add(lines, line);
   }
-  ordered_json totals{{"bytes_from_host", truth.bytes_from_host},
-                      {"bytes_to_module", truth.bytes_to_module},
-                      {"bytes_from_module", truth.bytes_from_module},
-                      {"bytes_to_host", truth.bytes_to_host},
-                      {"replies", truth.replies},
-                      {"frames_arrived", truth.frames_arrived},
-                      {"spoilt", truth.spoilt}};
+  ordered_json totals;
+  KPHI_JSON_MEMBERS(totals, truth, bytes_from_host, bytes_to_module, bytes_from_module, bytes_to_host, replies,
+                    frames_arrived, spoilt);
   add_done(totals, truth.done);
   add(lines, {{"motor_totals", totals}});
   return lines;

@@ -5,10 +5,10 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/error.hpp"
+#include "base/json.hpp"
 #include "base/number.hpp"
 #include "compensation/units.hpp"
 #include "fit/model/identification.hpp"
@@ -178,11 +178,8 @@ std::string import_record(const Import& import, std::string_view text, const std
                           const ImportOptions& options, const std::string& tool_version) {
   Json findings = Json::array();
   for (const LogFinding& finding : import.findings) {
-    findings.push_back({{"kind", name_of(finding.kind)},
-                        {"rows", finding.rows},
-                        {"first_line", finding.first_line},
-                        {"text", finding.text},
-                        {"lines", finding.lines}});
+    Json& one = findings.emplace_back(Json{{"kind", name_of(finding.kind)}});
+    KPHI_JSON_MEMBERS(one, finding, rows, first_line, text, lines);
   }
   Json problems = Json::array();
   for (const TableProblem& problem : import.table.problems)

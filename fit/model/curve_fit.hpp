@@ -35,8 +35,6 @@ struct Curvature {
   HypothesisTest quadratic;    ///< F test of the third term of a parabola; without a name: not of this form
   double second_order = kNotComputed;  ///< N/(rad/s)²/deg², of the parabola
   double second_order_u = kNotComputed;
-  /// Corrected for small samples (AICc); the lower one describes better.
-  double linear_aic = kNotComputed, quadratic_aic = kNotComputed;
   [[nodiscard]] bool bends() const { return lack_of_fit.rejected() || quadratic.rejected(); }
 };
 

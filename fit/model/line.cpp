@@ -30,13 +30,6 @@ struct WeightSums {
   double sum = 0, first = 0, second = 0;
 };
 
-/// Akaike's criterion for known variances, corrected for n observations (Hurvich, Tsai 1989).
-double corrected_aic(double chi_squared, double terms, double n) {
-  const double room = n - terms - 1;
-  if (room <= 0) return std::numeric_limits<double>::infinity();
-  return chi_squared + 2 * terms + 2 * terms * (terms + 1) / room;
-}
-
 /// Of intercept and slope over `all`, with the weights of the fit.
 std::array<std::vector<double>, 2> line_weights(const CurveFit& fit, std::span<const CurvePoint> all) {
   const auto [sum, first, second] = WeightSums(fit.points, fit.sigmas);
@@ -156,9 +149,6 @@ Curvature curvature(std::span<const CurvePoint> points, double freedom) {
     result.quadratic = f_test(straight - parabola.weighted_squares, 1, freedom);
     result.second_order = parabola.estimates[2] / (scale * scale);
     result.second_order_u = std::sqrt(parabola.covariance[2][2]) / (scale * scale);
-    const double observations = m + (std::isfinite(freedom) ? freedom : 0);
-    result.linear_aic = corrected_aic(straight, 2, observations);
-    result.quadratic_aic = corrected_aic(parabola.weighted_squares, 3, observations);
   }
   result.lack_of_fit.name = "lack of fit of the line k(phi)";
   result.quadratic.name = "third term of a parabola k(phi)";

@@ -7,9 +7,9 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "base/error.hpp"
+#include "base/json.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "fit/model/identification.hpp"
 #include "fit/model/step_selection.hpp"
@@ -290,17 +290,9 @@ std::string comparison_json(const Comparison& comparison) {
   const auto maybe = [](const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); };
   Json rows = Json::array();
   for (const Difference& entry : comparison.differences) {
-    rows.push_back({{"name", entry.name},
-                    {"unit", entry.unit},
-                    {"a", entry.a},
-                    {"b", entry.b},
-                    {"difference", entry.difference},
-                    {"u", maybe(entry.standard_error)},
-                    {"freedom", std::isfinite(entry.freedom) ? Json(entry.freedom) : Json(nullptr)},
-                    {"share", entry.share()},
-                    {"p", maybe(entry.p)},
-                    {"judged", entry.judged},
-                    {"significant", entry.significant}});
+    Json& row =
+        rows.emplace_back(Json{{"u", maybe(entry.standard_error)}, {"share", entry.share()}, {"p", maybe(entry.p)}});
+    KPHI_JSON_MEMBERS(row, entry, name, unit, a, b, difference, freedom, judged, significant);
   }
   const Json json{{"a", comparison.a.name},
                   {"b", comparison.b.name},

@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "base/json.hpp"
 #include "base/number.hpp"
 #include "compensation/units.hpp"
 
@@ -25,29 +26,19 @@ std::string number_line(const std::string& name, const Budget& budget, const std
 
 // Numbers that are not finite become null: JSON has neither NaN nor infinity.
 
-static void to_json(Json& json, const Estimate& one) {
-  json = {{"value", one.value}, {"u", one.u}, {"freedom", one.freedom}};
-}
+static void to_json(Json& json, const Estimate& one) { KPHI_JSON_MEMBERS(json, one, value, u, freedom); }
 
 void to_json(Json& json, const HypothesisTest& test) {
-  json = {{"name", test.name},   {"hypothesis", test.hypothesis}, {"statistic", test.statistic},
-          {"value", test.value}, {"freedom", test.freedom},       {"error_freedom", test.error_freedom},
-          {"p", test.p}};
+  KPHI_JSON_MEMBERS(json, test, name, hypothesis, statistic, value, freedom, error_freedom, p);
 }
 
 static void to_json(Json& json, const Budget& budget) {
   Json rows = Json::array();
   for (const BudgetRow& row : budget.rows) {
-    rows.push_back({{"source", row.source},
-                    {"type", row.evaluation == Evaluation::type_a ? "A" : "B"},
-                    {"u", row.u},
-                    {"unit", row.unit},
-                    {"sensitivity", row.sensitivity},
-                    {"contribution", row.known() ? row.contribution() : kUnknown},
-                    {"freedom", row.freedom},
-                    {"share", budget.share(row)},
-                    {"common", row.common},
-                    {"note", row.note}});
+    Json& one = rows.emplace_back(Json{{"type", row.evaluation == Evaluation::type_a ? "A" : "B"},
+                                       {"contribution", row.known() ? row.contribution() : kUnknown},
+                                       {"share", budget.share(row)}});
+    KPHI_JSON_MEMBERS(one, row, source, u, unit, sensitivity, freedom, common, note);
   }
   json = {{"quantity", budget.quantity},
           {"unit", budget.unit},
@@ -60,27 +51,20 @@ static void to_json(Json& json, const Budget& budget) {
 }
 
 static void to_json(Json& json, const SpeedCoefficient& level) {
-  json = {{"speed_rpm", to_rpm(RadPerSec(level.speed_rad_s))},
-          {"k", level.k},
-          {"standard_error", level.standard_error},
-          {"repetitions", level.repetitions}};
+  json["speed_rpm"] = to_rpm(RadPerSec(level.speed_rad_s));
+  KPHI_JSON_MEMBERS(json, level, k, standard_error, repetitions);
 }
 
 static void to_json(Json& json, const SpeedDependence& one) {
-  json = {{"phi_deg", one.phi_deg},         {"change_share", one.change}, {"inadequacy", one.inadequacy},
-          {"lack_of_fit", one.lack_of_fit}, {"trend", one.trend},         {"levels", one.levels}};
+  KPHI_JSON_MEMBERS(json, one, phi_deg, inadequacy, lack_of_fit, trend, levels);
+  json["change_share"] = one.change;
 }
 
 static void to_json(Json& json, const CurvePrediction& one) {
-  json = {{"phi_deg", one.phi_deg},
-          {"k", one.k.value},
-          {"u_k", one.k.combined()},
-          {"expanded_95_k", one.k.expanded()},
-          {"k_i", one.scaling_factor.value},
-          {"u_k_i", one.scaling_factor.combined()},
-          {"speed_u_share", one.speed_u_share},
-          {"clipped", one.clipped},
-          {"extrapolated", one.extrapolated}};
+  json = {{"phi_deg", one.phi_deg},          {"k", one.k.value},
+          {"u_k", one.k.combined()},         {"expanded_95_k", one.k.expanded()},
+          {"k_i", one.scaling_factor.value}, {"u_k_i", one.scaling_factor.combined()}};
+  KPHI_JSON_MEMBERS(json, one, speed_u_share, clipped, extrapolated);
 }
 
 static void to_json(Json& json, const TorqueCoefficient& one) {
@@ -91,30 +75,16 @@ static void to_json(Json& json, const TorqueCoefficient& one) {
           {"drag_per_thrust_m", one.drag_per_thrust_m}};
 }
 
-static void to_json(Json& json, const OutlyingRun& run) {
-  json = {{"phi_deg", run.phi_deg}, {"repetition", run.repetition}, {"share", run.share}, {"p", run.p}};
-}
+static void to_json(Json& json, const OutlyingRun& run) { KPHI_JSON_MEMBERS(json, run, phi_deg, repetition, share, p); }
 
 static void to_json(Json& json, const RejectedPoint& one) {
-  json = {{"phi_deg", one.phi_deg},
-          {"repetition", one.repetition},
-          {"step", one.step + 1},
-          {"speed_rpm", to_rpm(RadPerSec(one.speed_rad_s))},
-          {"thrust_n", one.thrust_n},
-          {"residual_n", one.residual_n},
-          {"robust_weight", one.robust_weight}};
+  json = {{"step", one.step + 1}, {"speed_rpm", to_rpm(RadPerSec(one.speed_rad_s))}};
+  KPHI_JSON_MEMBERS(json, one, phi_deg, repetition, thrust_n, residual_n, robust_weight);
 }
 
 static void to_json(Json& json, const Claim& claim) {
-  json = {{"id", claim.id},
-          {"statement", claim.statement},
-          {"unit", claim.unit},
-          {"value", claim.value},
-          {"lower", claim.lower},
-          {"upper", claim.upper},
-          {"allowed_lower", claim.allowed_lower},
-          {"allowed_upper", claim.allowed_upper},
-          {"verdict", name_of(claim.verdict)}};
+  KPHI_JSON_MEMBERS(json, claim, id, statement, unit, value, lower, upper, allowed_lower, allowed_upper);
+  json["verdict"] = name_of(claim.verdict);
 }
 
 static void to_json(Json& json, const SharedSlope& one) {
@@ -123,13 +93,8 @@ static void to_json(Json& json, const SharedSlope& one) {
 }
 
 static void to_json(Json& json, const FamilyPrediction& one) {
-  json = {{"diameter_in", one.diameter_in},
-          {"blades", one.blades},
-          {"phi_deg", one.phi_deg},
-          {"k", one.k.value},
-          {"u", one.k.u},
-          {"lower", one.lower},
-          {"upper", one.upper}};
+  json = {{"k", one.k.value}, {"u", one.k.u}};
+  KPHI_JSON_MEMBERS(json, one, diameter_in, blades, phi_deg, lower, upper);
 }
 
 void to_json(Json& json, const Analysis& analysis) {
@@ -141,29 +106,18 @@ void to_json(Json& json, const Analysis& analysis) {
           {"speed", analysis.speed},
           {"curve_lack_of_fit", curvature.lack_of_fit},
           {"curve_quadratic",
-           {{"test", curvature.quadratic},
-            {"second_order", curvature.second_order},
-            {"u", curvature.second_order_u},
-            {"linear_aicc", curvature.linear_aic},
-            {"quadratic_aicc", curvature.quadratic_aic}}},
+           {{"test", curvature.quadratic}, {"second_order", curvature.second_order}, {"u", curvature.second_order_u}}},
           {"curve_shape",
            {{"clipping_deg", analysis.shape.clipping_deg.value_or(kUnknown)},
             {"zero_deg", analysis.shape.zero_deg.value_or(kUnknown)},
             {"k0_minus_K_T", analysis.shape.mismatch}}},
-          {"remarks", analysis.remarks},
-          {"differences", analysis.differences},
-          {"predictions", analysis.predictions},
-          {"torque", analysis.torque},
           {"between_runs_share", analysis.between_runs.u},
-          {"outlying_runs", analysis.outlying},
-          {"rejected", analysis.rejected}};
+          {"outlying_runs", analysis.outlying}};
+  KPHI_JSON_MEMBERS(json, analysis, remarks, differences, predictions, torque, rejected);
 }
 
 void to_json(Json& json, const Dynamics& dynamics) {
-  json = {{"steps", dynamics.steps},
-          {"motor_time_constant_s", dynamics.motor_time_constant_s},
-          {"motor_delay_s", dynamics.motor_delay_s},
-          {"thrust_lag_s", dynamics.thrust_lag_s}};
+  KPHI_JSON_MEMBERS(json, dynamics, steps, motor_time_constant_s, motor_delay_s, thrust_lag_s);
 }
 
 void to_json(Json& json, const BladePassCheck& check) {
