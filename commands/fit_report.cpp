@@ -92,7 +92,7 @@ IdentificationOptions options_of(const FitRequest& request) {
   return options;
 }
 
-/// A table of given k is fitted by a line alone: what would be ignored is refused.
+/// A table of given k is fitted by a curve alone: what would be ignored is refused.
 void refuse_for_table(const FitRequest& request) {
   const auto refuse = [&](bool given, const char* option) {
     if (given) throw ConfigurationError(fmt::format("{}: a table of given k; {} needs steps", request.path, option));
@@ -246,16 +246,16 @@ ExitCode run_report(const ReportRequest& request) {
 
 void add_fit(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<FitRequest>(
-      program, exit_code, "fit", "fit k to the steps of each occlusion, then the line k(φ); write a report", run_fit);
+      program, exit_code, "fit", "fit k to the steps of each occlusion, then the curve k(φ); write a report", run_fit);
   add_argument(command, "INPUT", request.path,
                "campaign folder, steps.csv, or K.csv with phi_deg and k_n_s2_per_rad2 or k_n_per_rpm2[, u_k_…]")
       ->check(kExistingPath);
   add_value(command, "--k-unit", "UNIT", request.k_unit, "unit of a column named k: N/(rad/s)^2 or N/RPM^2")
       ->check(CLI::IsMember({"N/(rad/s)^2", "N/RPM^2"}));
   command.add_flag("--anchored", request.options.curve.anchored,
-                   "start the line at K_T (default: free, through the occlusions)");
+                   "start the curve at K_T (default: free, through the occlusions)");
   add_value(command, "--points", "DEG,DEG,…", request.options.curve.points_deg,
-            "angles that carry the line, in degrees (default: all above 0)")
+            "angles that carry the curve, in degrees (default: all above 0)")
       ->delimiter(',');
   add_value(command, "--speed-range-rpm", "A:B", request.speed_range_rpm,
             "speeds to fit (default 3000: and up; below, noise of the load cell hides the thrust)");

@@ -97,7 +97,7 @@ int end(ExitCode exit_code) {
 }
 
 ExitCode run(int argc, char** argv) {
-  CLI::App program("kphi: propeller test stand to k(φ) line to flight", "kphi");
+  CLI::App program("kphi: propeller test stand to k(φ) to flight", "kphi");
   program.set_version_flag("--version", std::string("kphi ") + kphi::kVersion);
   program.require_subcommand(1);
   ExitCode exit_code = ExitCode::ok;

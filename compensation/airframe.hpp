@@ -38,7 +38,7 @@ struct Airframe {
   RadPerSec fastest_speed;
   std::array<int, 4> hinge_turns{{0, 1, 2, 3}};  ///< corner of each arm: (half_side, half_side) turned by so many 90°
   std::array<bool, 4> mirrored{};                ///< arms that fold the other way round: θ counts clockwise
-  OverlapMeasure overlap = OverlapMeasure::rim_arc;  ///< how φ is measured; the lines must be fitted with the same
+  OverlapMeasure overlap = OverlapMeasure::rim_arc;  ///< how φ is measured; the curves must be fitted with the same
   std::optional<PolygonBody> polygon =
       std::nullopt;  ///< instead of the square: half_side, hinge_turns and mirrored do not count then
 };

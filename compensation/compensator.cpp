@@ -50,11 +50,11 @@ ContactFreeWindow window_of(const Airframe& airframe) noexcept {
 /// As a number that is added: the compiler makes vector instructions of it.
 constexpr double worth(Flag flag) noexcept { return static_cast<double>(flag); }
 
-LineDoubts doubts_about(const ThrustCurve& line, ScalingLaw law) noexcept {
-  LineDoubts doubts;
-  doubts.gains_with_occlusion = line.at(line.largest_fitted()) >= line.at(Radians(0.0));
+CurveDoubts doubts_about(const ThrustCurve& curve, ScalingLaw law) noexcept {
+  CurveDoubts doubts;
+  doubts.gains_with_occlusion = curve.at(curve.largest_fitted()) >= curve.at(Radians(0.0));
   // A curve forced through K_T may miss it by the rounding of its file.
-  const double offset = line.at(Radians(0.0)) / line.thrust_coefficient() - 1.0;
+  const double offset = curve.at(Radians(0.0)) / curve.thrust_coefficient() - 1.0;
   doubts.steps_at_contact = offset < -1e-9 || (law == ScalingLaw::published && offset > 1e-9);
   return doubts;
 }
@@ -70,33 +70,33 @@ const char* describe(Refusal refusal) noexcept {
       "speed limits must satisfy 0 <= slowest < fastest; check the vehicle's speed limits",
       "each arm needs a corner of its own; give the hinge turns 0, 1, 2, 3 (times 90 degrees) in some order",
       "a hinge of the polygon body is not finite; check its place [m] and turn [rad]",
-      "a line was fitted with another overlap measure than the airframe flies with; fly the measure of the fit, "
+      "a curve was fitted with another overlap measure than the airframe flies with; fly the measure of the fit, "
       "or fit again"};
   return refusal <= Refusal::overlap ? kSentences[static_cast<std::size_t>(refusal)] : "unknown refusal";
 }
 
-BuildOutcome Compensator::build(const std::array<ThrustCurve, 4>& lines, const Airframe& airframe,
+BuildOutcome Compensator::build(const std::array<ThrustCurve, 4>& curves, const Airframe& airframe,
                                 ScalingLaw law) noexcept {
   BuildOutcome outcome;
   outcome.refusal = refusal_of(airframe);
-  for (const ThrustCurve& line : lines) {
-    if (outcome.refusal == Refusal::none && line.overlap() != airframe.overlap) outcome.refusal = Refusal::overlap;
+  for (const ThrustCurve& curve : curves) {
+    if (outcome.refusal == Refusal::none && curve.overlap() != airframe.overlap) outcome.refusal = Refusal::overlap;
   }
   if (outcome.refusal != Refusal::none) return outcome;
-  for (std::size_t i = 0; i < lines.size(); ++i) outcome.doubts[i] = doubts_about(lines[i], law);
-  outcome.compensator = Compensator(lines, airframe, law);
+  for (std::size_t i = 0; i < curves.size(); ++i) outcome.doubts[i] = doubts_about(curves[i], law);
+  outcome.compensator = Compensator(curves, airframe, law);
   return outcome;
 }
 
-Compensator::Compensator(const std::array<ThrustCurve, 4>& lines, const Airframe& airframe, ScalingLaw law) noexcept
+Compensator::Compensator(const std::array<ThrustCurve, 4>& curves, const Airframe& airframe, ScalingLaw law) noexcept
     : slowest_(airframe.slowest_speed.value()),
       fastest_(airframe.fastest_speed.value()),
       law_(law),
-      lines_(lines),
+      curves_(curves),
       airframe_(airframe),
       contact_free_(window_of(airframe)) {
   arm_angles_.fill(Radians(std::numeric_limits<double>::quiet_NaN()));  // differs from every first angle
-  for (std::size_t i = 0; i < lines_.size(); ++i) apply_occlusion(i);
+  for (std::size_t i = 0; i < curves_.size(); ++i) apply_occlusion(i);
 }
 
 Compensator::Arm Compensator::take(std::size_t i, Radians angle) noexcept {
@@ -135,16 +135,16 @@ void Compensator::set_arms(const std::array<Radians, 4>& arm_angles) noexcept {
 
 void Compensator::enable(bool on) noexcept {
   enabled_ = on;
-  for (std::size_t i = 0; i < lines_.size(); ++i) apply_occlusion(i);
+  for (std::size_t i = 0; i < curves_.size(); ++i) apply_occlusion(i);
 }
 
 void Compensator::apply_occlusion(std::size_t rotor) noexcept {
-  const ThrustCurve& line = lines_[rotor];
+  const ThrustCurve& curve = curves_[rotor];
   const Radians phi = occlusion_angles_[rotor];
   const bool covered = enabled_ && phi.value() > 0.0;
-  const double scaling = covered ? line.scaling_factor(phi, law_) : 1.0;
+  const double scaling = covered ? curve.scaling_factor(phi, law_) : 1.0;
   // The published law reaches 0 and below: divide by next to nothing then, and the fastest speed holds.
-  const double effective = std::max(line.thrust_coefficient().value() * scaling, std::numeric_limits<double>::min());
+  const double effective = std::max(curve.thrust_coefficient().value() * scaling, std::numeric_limits<double>::min());
   scaling_factors_[rotor] = scaling;
   effective_coefficients_[rotor] = effective;
   thrust_max_[rotor] = Newtons(effective * (fastest_ * fastest_));
@@ -152,9 +152,9 @@ void Compensator::apply_occlusion(std::size_t rotor) noexcept {
   arm_flags_[rotor] =
       Flags()
           .with(Flag::arm_angle_unknown, arm_flags_[rotor].has(Flag::arm_angle_unknown))
-          .with(Flag::beyond_fit, phi > line.largest_fitted())
+          .with(Flag::beyond_fit, phi > curve.largest_fitted())
           .with(Flag::at_floor, scaling <= kScalingFloor)
-          .with(Flag::at_ceiling, covered && law_ == ScalingLaw::clamped && line.at(phi) > line.thrust_coefficient());
+          .with(Flag::at_ceiling, covered && law_ == ScalingLaw::clamped && curve.at(phi) > curve.thrust_coefficient());
 }
 
 SpeedCommand Compensator::speeds_for(const std::array<Newtons, 4>& thrusts) const noexcept {
@@ -207,7 +207,8 @@ std::array<RadPerSec, 4> Compensator::speed_uncertainties(const std::array<Newto
       const Radians below = occlusion_of_arm(airframe_, i, angle - arm_angle_uncertainty);
       spread = Radians(0.5 * std::fabs((above - below).value()));
     }
-    const double relative = lines_[i].relative_uncertainty(phi, spread, phi.value() > 0.0 ? law_ : ScalingLaw::clamped);
+    const double relative =
+        curves_[i].relative_uncertainty(phi, spread, phi.value() > 0.0 ? law_ : ScalingLaw::clamped);
     const double unknown = std::numeric_limits<double>::infinity();
     const double speed = command.speeds[i].value();
     // Zero times infinity would be NaN.

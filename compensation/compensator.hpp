@@ -27,9 +27,9 @@ enum class Flag : std::uint8_t {
   speed_at_slowest = 4,    ///< raised to the slowest speed
   speed_at_fastest = 8,    ///< cut to the fastest speed: the thrust will be missed
   arm_angle_unknown = 16,  ///< the last arm angle was not finite: the occlusion before it is kept
-  beyond_fit = 32,         ///< φ is larger than the largest fitted occlusion: the line is extrapolated
+  beyond_fit = 32,         ///< φ is larger than the largest fitted occlusion: the curve is extrapolated
   at_floor = 64,           ///< k_i is at kScalingFloor or (published law) below
-  at_ceiling = 128,        ///< covered, yet the line lies above K_T there: k_i is held at 1 (clamped law)
+  at_ceiling = 128,        ///< covered, yet the curve lies above K_T there: k_i is held at 1 (clamped law)
 };
 
 /// One rotor's.
@@ -48,7 +48,7 @@ enum class Refusal : std::uint8_t {
   speeds,       ///< 0 <= slowest < fastest, both finite
   hinge_turns,  ///< each arm has a corner of its own: 0, 1, 2, 3 in any order
   hinges,       ///< hinges of a polygon body must be finite
-  overlap,      ///< every line must be fitted with the overlap measure that the airframe flies with
+  overlap,      ///< every curve must be fitted with the overlap measure that the airframe flies with
 };
 
 /// One sentence, with the next move.
@@ -58,8 +58,8 @@ struct BuildOutcome;
 
 class Compensator {
  public:
-  /// The only place that refuses. `lines` and `airframe` in the order of the rotors.
-  [[nodiscard]] static BuildOutcome build(const std::array<ThrustCurve, 4>& lines, const Airframe& airframe,
+  /// The only place that refuses. `curves` and `airframe` in the order of the rotors.
+  [[nodiscard]] static BuildOutcome build(const std::array<ThrustCurve, 4>& curves, const Airframe& airframe,
                                           ScalingLaw law = ScalingLaw::clamped) noexcept;
 
   /// At servo rate. Recomputes φ and k_i of the arms that moved; an angle that is not finite keeps the last φ.
@@ -70,8 +70,8 @@ class Compensator {
   /// Where nothing is covered this is sqrt(T / K_T) bit for bit.
   [[nodiscard]] SpeedCommand speeds_for(const std::array<Newtons, 4>& thrusts) const noexcept;
 
-  /// Standard uncertainty [rad/s] of the speeds that speeds_for gives for these thrusts, from the lines' own (K_T,
-  /// intercept, slope) and that of the arm angles [rad], which moves φ. +∞ where none can be given: the line carries
+  /// Standard uncertainty [rad/s] of the speeds that speeds_for gives for these thrusts, from the curves' own and
+  /// that of the arm angles [rad], which moves φ. +∞ where none can be given: the curve carries
   /// none, k_i is at its floor, the arm angle is not known. Costs up to eight times a set_arms: for logs and planning.
   [[nodiscard]] std::array<RadPerSec, 4> speed_uncertainties(
       const std::array<Newtons, 4>& thrusts, Radians arm_angle_uncertainty = Radians(0.0)) const noexcept;
@@ -94,7 +94,7 @@ class Compensator {
   [[nodiscard]] const std::array<Flags, 4>& arm_flags() const noexcept { return arm_flags_; }
 
  private:
-  Compensator(const std::array<ThrustCurve, 4>& lines, const Airframe& airframe, ScalingLaw law) noexcept;
+  Compensator(const std::array<ThrustCurve, 4>& curves, const Airframe& airframe, ScalingLaw law) noexcept;
   /// What a new angle means for φ: nothing, that it is 0 again, or that it must be computed.
   enum class Arm : std::uint8_t { at_rest, left_body, near_body };
   [[nodiscard]] Arm take(std::size_t i, Radians angle) noexcept;
@@ -114,23 +114,23 @@ class Compensator {
   std::array<double, 4> scaling_factors_{};
   std::array<Newtons, 4> thrust_max_{};
   std::array<double, 4> drag_scale_{};
-  std::array<ThrustCurve, 4> lines_;
+  std::array<ThrustCurve, 4> curves_;
   Airframe airframe_;
   ContactFreeWindow contact_free_;
 };
 
 static_assert(std::is_trivially_copyable<Compensator>::value, "a Compensator is copied between threads as bytes");
 
-/// Lines that can be flown but deserve a look.
-struct LineDoubts {
-  bool gains_with_occlusion = false;  ///< the slope is not negative: the file may be of another propeller or sign
-  bool steps_at_contact = false;      ///< k_i jumps at first contact: intercept below K_T, or not equal (published law)
+/// Of curves that can be flown but deserve a look.
+struct CurveDoubts {
+  bool gains_with_occlusion = false;  ///< k does not fall: the file may be of another propeller or sign
+  bool steps_at_contact = false;      ///< k_i jumps at first contact: k(0) below K_T, or not equal (published law)
 };
 
 struct BuildOutcome {
   std::optional<Compensator> compensator;  ///< there unless refused
   Refusal refusal = Refusal::none;
-  std::array<LineDoubts, 4> doubts{};
+  std::array<CurveDoubts, 4> doubts{};
 };
 
 }  // namespace kphi::compensation

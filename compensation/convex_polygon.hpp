@@ -1,5 +1,5 @@
 // A body seen from above: a convex polygon, and how much of a propeller's disk lies over it, as one angle φ. On the
-// bench's sector plates all three measures of φ agree; over a body they differ by tens of degrees, so a line must be
+// bench's sector plates all three measures of φ agree; over a body they differ by tens of degrees, so a curve must be
 // flown with the measure it was fitted with.
 #pragma once
 

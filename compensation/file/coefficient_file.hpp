@@ -39,7 +39,7 @@ struct Coefficients {
     double expanded_95 = 0;  ///< half of the 95 % interval
     double freedom = std::numeric_limits<double>::infinity();
   };
-  /// One number of the curve, in the units of its form: "intercept" N/(rad/s)², "slope_per_deg" N/(rad/s)² per degree.
+  /// One number of the curve, in the unit of its form.
   struct Parameter {
     std::string key;  ///< as the file names it
     double value = 0;
@@ -74,7 +74,7 @@ struct Coefficients {
   /// What flies: K_T, k(φ), its overlap measure and the largest valid φ; with its uncertainty if the file has the
   /// covariance.
   ThrustCurve curve;
-  std::string form;                               ///< of the curve: "line"
+  std::string form;                               ///< of the curve, as the file names it
   std::optional<Uncertainty> thrust_coefficient;  ///< of K_T
   std::vector<Parameter> parameters;              ///< of the curve
   std::vector<std::string> not_known;             ///< sources that these uncertainties lack
@@ -95,7 +95,7 @@ struct Coefficients {
 /// As load_coefficients, from text; `path` only names it in messages.
 [[nodiscard]] Coefficients parse_coefficients(const std::string& text, const std::string& path);
 
-/// "1.59668e-06 - 2.5658e-07 phi/rad": k(φ) in N/(rad/s)², for people.
+/// k(φ) in N/(rad/s)² for people: "1.59668e-06 - 2.5658e-07 phi/rad".
 [[nodiscard]] std::string words_of(const ThrustCurve& curve);
 
 /// A message for coefficients and a vehicle that measure φ differently, naming both files; nullopt if they agree.

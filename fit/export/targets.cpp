@@ -76,7 +76,7 @@ std::string json_text(const std::string& text) {
   return Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-/// Why a target with one constant loses the line.
+/// Why a target with one constant loses k(φ).
 std::string no_phi(const char* target, double phi_deg) {
   return fmt::format(
       "k(phi): {} has one constant per motor and cannot change it in flight; this one is for phi = {:g} deg, use the "
@@ -303,12 +303,12 @@ Export to_header(const compensation::Coefficients& file, const ExportOptions&) {
   result.text += kHeaderFunctions;
   result.text += fmt::format("\n}}  // namespace {}\n", identifier(file.propeller.id));
   result.lost = {
-      "the table per occlusion, covariance, hashes of the runs: the header is for the flight, which only needs the "
-      "line"};
+      "the measured k per occlusion, covariance, hashes of the runs: the header is for the flight, which only needs "
+      "k(phi)"};
   return result;
 }
 
-/// The table per occlusion with the line beside it. phi_deg, k and u come first: `kphi fit` reads them; u are standard
+/// The table per occlusion with the curve beside it. phi_deg, k and u come first: `kphi fit` reads them; u are standard
 /// uncertainties.
 Export to_csv(const compensation::Coefficients& file, const ExportOptions&) {
   const compensation::ThrustCurve& curve = file.curve;
@@ -323,7 +323,7 @@ Export to_csv(const compensation::Coefficients& file, const ExportOptions&) {
                                shortest(curve.at(row.occlusion).value()), error_at(curve, row.occlusion),
                                shortest(curve.scaling_factor(row.occlusion)));
   }
-  result.lost = {"slope, covariance, validity, hashes of the runs: only in the coefficient file"};
+  result.lost = {"the curve's parameters, covariance, validity, hashes of the runs: only in the coefficient file"};
   return result;
 }
 

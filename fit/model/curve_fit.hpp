@@ -1,5 +1,6 @@
 // The curve k(φ) through the coefficients of the occlusions (paper, "Results of the Identification": the orange line).
-// Today it is a line, line.cpp. What comes after the fit asks for k, weights and parameters and does not know the form.
+// Its forms have files of their own (line.cpp). What comes after the fit asks for k, weights and parameters and does
+// not know the form.
 #pragma once
 
 #include <array>
@@ -26,7 +27,7 @@ struct CurvePoint {
 enum class CurveForm : std::uint8_t { line };
 inline constexpr std::array kCurveForms{CurveForm::line};
 
-/// "line": in coefficients.yaml and for people.
+/// In coefficients.yaml and for people: "line".
 [[nodiscard]] const char* name_of(CurveForm form);
 
 struct Curvature {
@@ -50,7 +51,7 @@ struct CurveOptions {
 
 /// One parameter of the curve.
 struct CurveParameter {
-  std::string key;   ///< in coefficients.yaml: "intercept", "slope_per_deg"
+  std::string key;   ///< in coefficients.yaml
   std::string name;  ///< for people
   std::string per;   ///< what follows the unit of k: "", "/deg"
   double value = 0;
@@ -135,7 +136,7 @@ inline constexpr double kSameAngleDeg = 1e-6;
 [[nodiscard]] const CurveModel& line_model();
 
 /// `points` hold exactly one φ = 0 (K_T) and the occluded ones, each φ once. Throws FitError when K_T is missing, a φ
-/// is listed twice or not measured, or too few points remain (free line: 2, anchored: 1 with φ > 0).
+/// is listed twice or not measured, or too few points remain for the form.
 [[nodiscard]] CurveFit fit_curve(std::span<const CurvePoint> points, const CurveOptions& options = {});
 
 }  // namespace kphi::fit

@@ -59,9 +59,10 @@ std::optional<Suspicion> of_speed(const Identification& identification, const Mo
   return clearest;
 }
 
-std::optional<Suspicion> of_line(const Identification& identification, const ModelTests& tests) {
+std::optional<Suspicion> of_curve(const Identification& identification, const ModelTests& tests) {
   const CurveFit& fit = identification.curve_fit;
-  const double p = of_both(tests.curvature.lack_of_fit.p, tests.curvature.quadratic.p);
+  const HypothesisTest &form = tests.curvature.lack_of_fit, &quadratic = tests.curvature.quadratic;
+  const double p = quadratic.name.empty() ? form.p : of_both(form.p, quadratic.p);
   if (std::isnan(p)) return std::nullopt;
   std::size_t worst = 0;
   for (std::size_t i = 0; i < fit.residuals.size(); ++i)
@@ -109,7 +110,7 @@ std::vector<Doubt> of_order(const Identification& identification, const ModelTes
 FlightReadiness flight_readiness(const Identification& identification, const ModelTests& tests) {
   FlightReadiness flight{of_order(identification, tests)};
   std::vector<Suspicion> all;
-  for (const auto& one : {of_speed(identification, tests), of_line(identification, tests), of_runs(tests)})
+  for (const auto& one : {of_speed(identification, tests), of_curve(identification, tests), of_runs(tests)})
     if (one) all.push_back(*one);
   std::vector<double> p;
   for (const Suspicion& one : all) p.push_back(one.p);
