@@ -184,20 +184,17 @@ std::string import_record(const Import& import, std::string_view text, const std
   Json problems = Json::array();
   for (const TableProblem& problem : import.table.problems)
     problems.push_back({{"line", problem.line}, {"what", problem.what}});
-  const Json record{{"format", "kphi-import/1"},
-                    {"source", path},
-                    {"sha256", results::sha256(text)},
-                    {"tool_version", tool_version},
-                    {"thrust_unit", import.table.unit},
-                    {"speed_source", import.table.speed_source},
-                    {"speed_factor", options.rows.speed_factor},
-                    {"reverse_thrust", options.rows.reverse_thrust},
-                    {"tare_n", import.table.tare_n},
-                    {"rows_total", import.table.rows_total},
-                    {"rows_used", import.table.steps.size()},
-                    {"columns_left_out", import.table.unread},
-                    {"findings", findings},
-                    {"lines_left_out", problems}};
+  Json record{{"format", "kphi-import/1"},
+              {"source", path},
+              {"sha256", results::sha256(text)},
+              {"tool_version", tool_version},
+              {"thrust_unit", import.table.unit},
+              {"rows_used", import.table.steps.size()},
+              {"columns_left_out", import.table.unread},
+              {"findings", findings},
+              {"lines_left_out", problems}};
+  KPHI_JSON_MEMBERS(record, import.table, speed_source, tare_n, rows_total);
+  KPHI_JSON_MEMBERS(record, options.rows, speed_factor, reverse_thrust);
   return record.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -75,32 +75,30 @@ double largest_k(const std::vector<CurvePoint>& points, const char* form) {
 
 const char* name_of(CurveForm form) { return model_of(form).name(); }
 
-std::optional<double> CurveFit::falls_to(double k) const { return model_of(form).falls_to(*this, k); }
+const CurveModel& CurveFit::model() const { return model_of(form); }
 
-Curvature CurveFit::tested(double freedom) const { return model_of(form).tested(*this, freedom); }
+std::optional<double> CurveFit::falls_to(double k) const { return model().falls_to(*this, k); }
+
+Curvature CurveFit::tested(double freedom) const { return model().tested(*this, freedom); }
 
 double CurveFit::spare_points() const {
-  return static_cast<double>(points.size()) - static_cast<double>(model_of(form).terms(*this));
+  return static_cast<double>(points.size()) - static_cast<double>(model().terms(*this));
 }
 
-const char* CurveFit::denial() const { return model_of(form).denial(); }
-
-std::string CurveFit::words() const { return model_of(form).words(*this); }
-
 std::vector<std::string> CurveFit::remarks(const Estimate& mismatch, double largest_deg) const {
-  return model_of(form).remarks(*this, mismatch, largest_deg);
+  return model().remarks(*this, mismatch, largest_deg);
 }
 
 double CurveFit::k_at(double phi_deg) const {
   double k = 0;
-  const std::vector<double> basis = model_of(form).basis(*this, phi_deg);
+  const std::vector<double> basis = model().basis(*this, phi_deg);
   for (std::size_t i = 0; i < parameters.size(); ++i) k += basis[i] * parameters[i].value;
   return k;
 }
 
 std::vector<double> CurveFit::weights_at(double phi_deg) const {
   std::vector<double> at(parameters.front().weights.size());
-  const std::vector<double> basis = model_of(form).basis(*this, phi_deg);
+  const std::vector<double> basis = model().basis(*this, phi_deg);
   for (std::size_t i = 0; i < parameters.size(); ++i)
     for (std::size_t j = 0; j < at.size(); ++j) at[j] += basis[i] * parameters[i].weights[j];
   return at;
@@ -119,7 +117,7 @@ double CurveFit::value(const std::string& key) const {
 compensation::ThrustCurve CurveFit::curve(std::optional<double> largest_deg,
                                           compensation::OverlapMeasure overlap) const {
   const Radians largest = from_degrees(largest_deg.value_or(points.back().phi_deg));
-  if (const auto curve = model_of(form).flown(*this, largest, overlap)) return *curve;
+  if (const auto curve = model().flown(*this, largest, overlap)) return *curve;
   throw FitError(fmt::format(
       "{0} fit: K_T = {1:.4g} and k of the {0} at phi = 0, {2:.4g} N/(rad/s)^2, must be positive; check the "
       "sign of the thrust and which points carry the {0}",

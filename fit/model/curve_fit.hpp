@@ -59,6 +59,8 @@ struct CurveParameter {
   std::vector<double> weights{};
 };
 
+class CurveModel;
+
 /// k(φ) as fitted: a linear function of its parameters.
 struct CurveFit {
   CurveForm form = CurveForm::line;
@@ -89,12 +91,11 @@ struct CurveFit {
   /// φ where the curve predicts no thrust at all. nullopt unless it falls.
   [[nodiscard]] std::optional<double> zero_crossing_deg() const { return falls_to(0); }
 
-  // Of the form; see CurveModel.
+  [[nodiscard]] const CurveModel& model() const;
+  // Of the model; see there.
   [[nodiscard]] std::optional<double> falls_to(double k) const;
   [[nodiscard]] Curvature tested(double freedom) const;
   [[nodiscard]] double spare_points() const;
-  [[nodiscard]] const char* denial() const;
-  [[nodiscard]] std::string words() const;
   [[nodiscard]] std::vector<std::string> remarks(const Estimate& mismatch, double largest_deg) const;
 };
 
@@ -117,6 +118,8 @@ class CurveModel {
   [[nodiscard]] virtual Curvature tested(const CurveFit& fit, double freedom) const = 0;
   /// Numbers that the fit was free to choose: fewer than parameters where k(0) is given.
   [[nodiscard]] virtual std::size_t terms(const CurveFit& fit) const = 0;
+  /// Whether the true k(φ) may lie beside the curve: not where the form follows whatever k is.
+  [[nodiscard]] virtual bool may_miss(const CurveFit& fit, double phi_deg) const = 0;
   /// What a pilot reads when the test falls: "k(φ) is not a line".
   [[nodiscard]] virtual const char* denial() const = 0;
   /// "line, free": for people.

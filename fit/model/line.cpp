@@ -58,6 +58,7 @@ class LineModel final : public CurveModel {
   const char* denial() const override { return "k(φ) is not a line"; }
   std::size_t least_points(bool anchored) const override { return anchored ? 1 : 2; }
   std::size_t terms(const CurveFit& line) const override { return line.anchored ? 1 : 2; }
+  bool may_miss(const CurveFit& line, double phi_deg) const override { return phi_deg > 0 || !line.anchored; }
   std::vector<double> basis(const CurveFit&, double phi_deg) const override { return {1, phi_deg}; }
   std::string words(const CurveFit& line) const override {
     return line.anchored ? "line, anchored at K_T" : "line, free";

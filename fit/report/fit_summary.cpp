@@ -40,14 +40,12 @@ static void to_json(Json& json, const Budget& budget) {
                                        {"share", budget.share(row)}});
     KPHI_JSON_MEMBERS(one, row, source, u, unit, sensitivity, freedom, common, note);
   }
-  json = {{"quantity", budget.quantity},
-          {"unit", budget.unit},
-          {"value", budget.value},
-          {"u", budget.combined()},
-          {"freedom", budget.freedom()},
-          {"coverage_factor_95", budget.coverage()},
-          {"expanded_95", budget.expanded()},
-          {"rows", rows}};
+  KPHI_JSON_MEMBERS(json, budget, quantity, unit, value);
+  json.update({{"u", budget.combined()},
+               {"freedom", budget.freedom()},
+               {"coverage_factor_95", budget.coverage()},
+               {"expanded_95", budget.expanded()},
+               {"rows", rows}});
 }
 
 static void to_json(Json& json, const SpeedCoefficient& level) {
@@ -68,11 +66,8 @@ static void to_json(Json& json, const CurvePrediction& one) {
 }
 
 static void to_json(Json& json, const TorqueCoefficient& one) {
-  json = {{"phi_deg", one.phi_deg},
-          {"k_q_nm_per_rad2_s2", one.k_q},
-          {"share", one.share},
-          {"u_share", one.share_u},
-          {"drag_per_thrust_m", one.drag_per_thrust_m}};
+  json = {{"k_q_nm_per_rad2_s2", one.k_q}, {"u_share", one.share_u}};
+  KPHI_JSON_MEMBERS(json, one, phi_deg, share, drag_per_thrust_m);
 }
 
 static void to_json(Json& json, const OutlyingRun& run) { KPHI_JSON_MEMBERS(json, run, phi_deg, repetition, share, p); }
@@ -99,11 +94,8 @@ static void to_json(Json& json, const FamilyPrediction& one) {
 
 void to_json(Json& json, const Analysis& analysis) {
   const Curvature& curvature = analysis.curvature;
-  json = {{"coefficients", analysis.coefficients},
-          {"parameters", analysis.parameters},
-          {"covariance_K_T_parameters", analysis.covariance},
+  json = {{"covariance_K_T_parameters", analysis.covariance},
           {"standard_air", analysis.standard},
-          {"speed", analysis.speed},
           {"curve_lack_of_fit", curvature.lack_of_fit},
           {"curve_quadratic",
            {{"test", curvature.quadratic}, {"second_order", curvature.second_order}, {"u", curvature.second_order_u}}},
@@ -113,7 +105,8 @@ void to_json(Json& json, const Analysis& analysis) {
             {"k0_minus_K_T", analysis.shape.mismatch}}},
           {"between_runs_share", analysis.between_runs.u},
           {"outlying_runs", analysis.outlying}};
-  KPHI_JSON_MEMBERS(json, analysis, remarks, differences, predictions, torque, rejected);
+  KPHI_JSON_MEMBERS(json, analysis, coefficients, parameters, speed, remarks, differences, predictions, torque,
+                    rejected);
 }
 
 void to_json(Json& json, const Dynamics& dynamics) {

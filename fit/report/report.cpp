@@ -356,7 +356,7 @@ std::string provenance_section(const Identification& identification, const Prove
   html += entry("Campaign", known(provenance.campaign));
   html += entry("Fitted from", provenance.source);
   html += entry("Model", "T = k ω²: " + estimator_words(identification));
-  html += entry("k(φ)", curve.words() + ", points " + points);
+  html += entry("k(φ)", curve.model().words(curve) + ", points " + points);
   if (speeds_known(identification))
     html += entry("Speeds", rpm_text(identification.speed_min_rad_s) + " to " +
                                 rpm_text(identification.speed_max_rad_s) + " RPM");

@@ -55,8 +55,34 @@ BudgetRow curve_row(const CurveFit& curve, const Curvature& curvature) {
   return row;
 }
 
-/// Of K_T and the parameters; the curve's own row is in the latter.
-std::vector<std::vector<double>> covariance_of(const ErrorSources& sources, const CurveFit& fit, const BudgetRow& row) {
+/// How the deviation of points from the form of their curve gets into what is computed from them.
+struct Misfit {
+  Misfit(const CurveFit& curve, const Curvature& curvature, std::span<const OcclusionCoefficient> table)
+      : row(curve_row(curve, curvature)) {
+    for (const OcclusionCoefficient& one : table) may_miss.push_back(curve.model().may_miss(curve, one.phi_deg));
+  }
+
+  BudgetRow row;  ///< of one point
+  std::vector<bool> may_miss;
+
+  [[nodiscard]] double covariance(const std::vector<double>& a, const std::vector<double>& b) const {
+    double sum = 0;
+    for (std::size_t i = 0; i < a.size(); ++i)
+      if (may_miss[i]) sum += a[i] * b[i] * row.u * row.u;
+    return sum;
+  }
+  /// Of Σ weights · k, times `scale`, with what k itself may be off the curve if `beside`.
+  [[nodiscard]] BudgetRow of(const std::vector<double>& weights, bool beside = false, double scale = 1) const {
+    double squares = beside ? 1 : 0;
+    for (std::size_t i = 0; i < weights.size(); ++i) squares += may_miss[i] ? weights[i] * weights[i] : 0;
+    BudgetRow scaled = row;
+    scaled.sensitivity *= std::sqrt(squares) * scale;
+    return scaled;
+  }
+};
+
+/// Of K_T and the parameters; the curve's misfit is in the latter.
+std::vector<std::vector<double>> covariance_of(const ErrorSources& sources, const CurveFit& fit, const Misfit& misfit) {
   std::vector<std::vector<double>> functions{unit_vector(fit.parameters.front().weights.size(), 0)};
   for (const CurveParameter& parameter : fit.parameters) functions.push_back(parameter.weights);
   const std::size_t n = functions.size();
@@ -64,32 +90,20 @@ std::vector<std::vector<double>> covariance_of(const ErrorSources& sources, cons
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j < n; ++j) {
       result[i][j] = sources.covariance(functions[i], functions[j]);
-      if (i == 0 || j == 0) continue;
-      for (std::size_t m = 0; m < functions[i].size(); ++m)
-        result[i][j] += functions[i][m] * functions[j][m] * row.u * row.u;
+      if (i > 0 && j > 0) result[i][j] += misfit.covariance(functions[i], functions[j]);
     }
   }
   return result;
 }
 
-BudgetRow scaled(BudgetRow row, double by) {
-  row.sensitivity *= by;
-  return row;
-}
-
-double norm(const std::vector<double>& weights) {
-  return std::sqrt(std::inner_product(weights.begin(), weights.end(), weights.begin(), 0.0));
-}
-
-/// The curve's own row weighs by how much of each point's deviation gets into the weights.
-Budget budget_of(const CurveParameter& parameter, const ErrorSources& sources, const BudgetRow& row) {
+Budget budget_of(const CurveParameter& parameter, const ErrorSources& sources, const Misfit& misfit) {
   Budget budget = sources.budget(parameter.name, kUnitOfK + parameter.per, parameter.value, parameter.weights);
-  budget.rows.push_back(scaled(row, norm(parameter.weights)));
+  budget.rows.push_back(misfit.of(parameter.weights));
   return budget;
 }
 
 CurvePrediction predict(const Identification& identification, const ErrorSources& sources, double phi_deg,
-                        const BudgetRow& row) {
+                        const Misfit& misfit) {
   const double K_T = identification.thrust_coefficient().value;
   const compensation::ThrustCurve curve = identification.curve();
   const std::vector<double> at = identification.curve_fit.weights_at(phi_deg);
@@ -98,7 +112,8 @@ CurvePrediction predict(const Identification& identification, const ErrorSources
   const double k = curve.at(from_degrees(phi_deg)).value();
   prediction.k =
       sources.budget(fmt::format("{} at {} deg", name_of(identification.curve_fit.form), phi_deg), kUnitOfK, k, at);
-  prediction.k.rows.push_back(scaled(row, std::sqrt(1 + std::pow(norm(at), 2))));
+  const bool beside = identification.curve_fit.model().may_miss(identification.curve_fit, phi_deg);
+  prediction.k.rows.push_back(misfit.of(at, beside));
   prediction.speed_u_share = k > 0 ? 0.5 * prediction.k.combined() / k : std::numeric_limits<double>::infinity();
   std::vector<double> ratio = at;
   for (double& weight : ratio) weight /= K_T;
@@ -106,7 +121,7 @@ CurvePrediction predict(const Identification& identification, const ErrorSources
   prediction.clipped = k >= K_T;
   prediction.scaling_factor =
       sources.budget(fmt::format("k_i({} deg)", phi_deg), "1", curve.scaling_factor(from_degrees(phi_deg)), ratio);
-  prediction.scaling_factor.rows.push_back(scaled(row, std::sqrt(1 + std::pow(norm(at), 2)) / K_T));
+  prediction.scaling_factor.rows.push_back(misfit.of(at, beside, 1 / K_T));
   prediction.extrapolated =
       phi_deg < identification.first_fitted_deg() || phi_deg > identification.curve_fit.points.back().phi_deg;
   return prediction;
@@ -114,7 +129,7 @@ CurvePrediction predict(const Identification& identification, const ErrorSources
 
 /// With a piece more or less where a measured φ falls between two.
 std::vector<CurveBand> band_of(const Identification& identification, const ErrorSources& sources,
-                               const BudgetRow& row) {
+                               const Misfit& misfit) {
   constexpr int kPieces = 80;
   const double widest = identification.table.back().phi_deg;
   std::set<double> angles;
@@ -124,7 +139,7 @@ std::vector<CurveBand> band_of(const Identification& identification, const Error
   for (const double phi : angles) {
     const std::vector<double> at = identification.curve_fit.weights_at(phi);
     Budget k = sources.budget("", kUnitOfK, identification.curve_fit.k_at(phi), at);
-    k.rows.push_back(scaled(row, norm(at)));
+    k.rows.push_back(misfit.of(at));
     band.push_back({phi, k.value, k.expanded()});
   }
   return band;
@@ -135,15 +150,15 @@ StraightLine straight_line(const Identification& identification, const ErrorSour
   options.form = CurveForm::line;
   const CurveFit line = fit_curve(points_of(identification.table), options);
   Curvature test = line.tested(freedom);
-  return {budget_of(*line.find("slope_per_deg"), sources, curve_row(line, test)), test};
+  return {budget_of(*line.find("slope_per_deg"), sources, {line, test, identification.table}), test};
 }
 
-CurveShape shape_of(const CurveFit& fit, const ErrorSources& sources, const BudgetRow& row) {
+CurveShape shape_of(const CurveFit& fit, const ErrorSources& sources, const Misfit& misfit) {
   const std::vector<double> at_zero = fit.weights_at(0);
   std::vector<double> difference_weights = at_zero;
   difference_weights.front() -= 1;
   Budget mismatch = sources.budget("k(0) - K_T", kUnitOfK, fit.mismatch(), difference_weights);
-  mismatch.rows.push_back(scaled(row, fit.anchored ? 0 : norm(at_zero)));
+  mismatch.rows.push_back(misfit.of(at_zero));
   return {fit.clipping_deg(), fit.zero_crossing_deg(), mismatch.estimate()};
 }
 
@@ -231,17 +246,17 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   const CurveFit& fit = identification.curve_fit;
   analysis.curvature = fit.tested(freedom);
   analysis.line = straight_line(identification, sources, freedom);
-  const BudgetRow row = curve_row(fit, analysis.curvature);
+  const Misfit misfit(fit, analysis.curvature, identification.table);
   for (const CurveParameter& parameter : fit.parameters)
-    analysis.parameters.push_back(budget_of(parameter, sources, row));
-  analysis.covariance = covariance_of(sources, fit, row);
+    analysis.parameters.push_back(budget_of(parameter, sources, misfit));
+  analysis.covariance = covariance_of(sources, fit, misfit);
   for (const double phi : options.prediction_deg)
-    analysis.predictions.push_back(predict(identification, sources, phi, row));
-  analysis.band = band_of(identification, sources, row);
+    analysis.predictions.push_back(predict(identification, sources, phi, misfit));
+  analysis.band = band_of(identification, sources, misfit);
   analysis.standard = standard_air(identification, analysis.coefficients, options.bench.air_density);
   analysis.differences = neighbour_tests(analysis.coefficients, sources, identification);
   analysis.between_runs = identification.repeatability.between;
-  analysis.shape = shape_of(fit, sources, row);
+  analysis.shape = shape_of(fit, sources, misfit);
   if (const double u = analysis.coefficients.front().combined(); std::isnan(u))
     analysis.covariance[0][0] = analysis.shape.mismatch.u = u;
   analysis.outlying = outlying_runs(identification.selection.used);

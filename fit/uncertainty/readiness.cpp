@@ -73,7 +73,7 @@ std::optional<Suspicion> of_curve(const Identification& identification, const Mo
       {std::abs(miss) > kLargestMiss ? Readiness::not_yet : Readiness::with_care,
        fmt::format("{}: at {}° the measured k is {} of K_T {} it; expect the same error of thrust in flight, and check "
                    "the plates and their angles",
-                   fit.denial(), fit.points[worst].phi_deg, in_percent(miss), miss < 0 ? "below" : "above")}};
+                   fit.model().denial(), fit.points[worst].phi_deg, in_percent(miss), miss < 0 ? "below" : "above")}};
 }
 
 std::optional<Suspicion> of_runs(const ModelTests& tests) {
